@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+namespace alidade {
+
+enum class BoardKind { chessboard, charuco, aprilgrid, circles, asymmetric_circles };
+
+/// A calibration target. Its points lie in frame `board`: x along the columns, y along the rows, z = x × y (away from
+/// a camera that sees the board upright), the origin at point 0; points are numbered row by row, left to right.
+struct Board {
+  BoardKind kind = BoardKind::chessboard;
+  int cols = 9;  ///< Inner corners (chessboard, charuco), circles, or tags (aprilgrid) along x.
+  int rows = 6;
+  double square_m = 0.025;      ///< Pitch: square side, circle spacing, or tag side (aprilgrid). [m]
+  double marker_m = 0.0;        ///< Marker side (charuco) or gap between tags (aprilgrid). [m]
+  std::string dictionary = "";  ///< ArUco dictionary (charuco), for example DICT_5X5_100.
+
+  bool operator==(const Board&) const = default;
+};
+
+/// Number of points of a board: 4 a tag for an aprilgrid, one a corner or circle otherwise.
+[[nodiscard]] int num_points(const Board& board);
+
+/// The board's points [m], index = number. A printed board is nearly this; `BoardShape` says how nearly.
+[[nodiscard]] std::vector<Eigen::Vector3d> points_in_board(const Board& board);
+
+}  // namespace alidade

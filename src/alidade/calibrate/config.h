@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace alidade {
+
+/// Which shape the board may have: flat as printed; a bow (two parameters: out-of-plane parabolas along x and y);
+/// free (every point moves in 3-D, rigid motion and scale held); or given (points learned elsewhere, held).
+enum class BoardShape { flat, bow, free, given };
+
+/// What is known of a lens parameter before the photos: a normal distribution.
+struct Prior {
+  std::string name;  ///< Parameter name of the lens model: fx, cx, k3, …
+  double value = 0.0;
+  double sigma = 1.0;
+
+  bool operator==(const Prior&) const = default;
+};
+
+/// Options of calibrate(). Plain data with usable defaults: `calibrate(board, views, size, {})` is a sensible call.
+struct CalibrateConfig {
+  std::string model = "brown";                ///< pinhole, brown or kannala_brandt.
+  std::vector<std::string> fixed = {"skew"};  ///< Parameters held: at their prior's value, else zero (k…, skew).
+  std::vector<Prior> priors;
+  BoardShape board_shape = BoardShape::flat;
+  bool reject_outliers = true;  ///< Drop, and name, corners that no noise explains.
+  double outlier_sigmas = 6.0;  ///< A corner further off than this many robust σ is an outlier.
+  int max_iterations = 60;
+
+  bool operator==(const CalibrateConfig&) const = default;
+};
+
+}  // namespace alidade

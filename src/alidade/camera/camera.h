@@ -1,0 +1,61 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "alidade/camera/brown.h"
+#include "alidade/camera/kannala_brandt.h"
+#include "alidade/camera/pinhole.h"
+
+namespace alidade {
+
+/// A model together with its parameter values.
+template <CameraModel Model>
+struct Calibrated {
+  using model = Model;
+  Params<Model> params = Params<Model>::Zero();
+};
+
+/// Every lens this library knows. std::visit makes a forgotten case a compile error.
+using Lens = std::variant<Calibrated<Pinhole>, Calibrated<Brown>, Calibrated<KannalaBrandt>>;
+
+/// What a calibration produces and everything else consumes: a plain value — copy it, compare it, write it to a file.
+struct Camera {
+  int width_px = 0;
+  int height_px = 0;
+  Lens lens = Calibrated<Brown>{};
+  /// Covariance of all parameters of the lens in their order (a held parameter has zero rows); 0×0 where unknown.
+  Eigen::MatrixXd cov;
+  double rms_px = 0.0;  ///< Per point, of the calibration that made it; 0 where unknown.
+  std::string source;   ///< Where it came from, for a person.
+};
+
+[[nodiscard]] std::string_view model_name(const Lens& lens);
+[[nodiscard]] std::vector<std::string> param_names(const Lens& lens);
+[[nodiscard]] Eigen::VectorXd params(const Lens& lens);
+/// The same model with other values. `values` has as many entries as the model has parameters.
+[[nodiscard]] Lens with_params(const Lens& lens, const Eigen::VectorXd& values);
+/// A lens of that name with all parameters zero. None for an unknown name.
+[[nodiscard]] std::optional<Lens> make_lens(std::string_view model_name);
+
+/// Pixel of a point in the camera frame, or none; see the model.
+[[nodiscard]] std::optional<Eigen::Vector2d> project(const Camera& camera, const Eigen::Vector3d& point_in_cam);
+/// Projects a batch. One dispatch per call, not per point: the inner loop is compiled for the actual model.
+[[nodiscard]] std::vector<std::optional<Eigen::Vector2d>> project(const Camera& camera,
+                                                                  std::span<const Eigen::Vector3d> points_in_cam);
+/// Unit ray of a pixel, in the camera frame, or none.
+[[nodiscard]] std::optional<Eigen::Vector3d> unproject(const Camera& camera, const Eigen::Vector2d& px);
+
+/// A pixel with its derivatives, for any model: J_px_params is 2 × number of parameters.
+struct LensProjection {
+  Eigen::Vector2d px;
+  Eigen::Matrix<double, 2, 3> J_px_point;
+  Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 16> J_px_params;
+};
+[[nodiscard]] std::optional<LensProjection> project_with_jacobians(const Camera& camera,
+                                                                   const Eigen::Vector3d& point_in_cam);
+
+}  // namespace alidade

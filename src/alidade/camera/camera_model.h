@@ -1,0 +1,36 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <concepts>
+#include <optional>
+#include <string_view>
+
+namespace alidade {
+
+template <class Model>
+using Params = Eigen::Matrix<double, Model::num_params, 1>;
+
+/// A pixel with its derivatives.
+template <class Model>
+struct Projection {
+  Eigen::Vector2d px;
+  Eigen::Matrix<double, 2, 3> J_px_point;                   ///< With respect to the point in the camera frame [px/m].
+  Eigen::Matrix<double, 2, Model::num_params> J_px_params;  ///< With respect to the lens parameters, in their order.
+};
+
+/// A lens: pure functions of a parameter vector. No state, no base class; adding a model is adding one header and
+/// one entry to `Lens`. Pixel (0, 0) is the CENTRE of the top-left pixel; camera axes are x right, y down, z forward.
+/// The first five parameters of every model are fx, fy, cx, cy, skew [px]: (u, v) = (fx x + skew y + cx, fy y + cy)
+/// of the distorted normalised point (x, y). No answer (nullopt) behind the camera or outside the valid domain.
+template <class Model>
+concept CameraModel = requires(const Params<Model>& params, const Eigen::Vector3d& point_in_cam,
+                               const Eigen::Vector2d& px) {
+  { Model::name } -> std::convertible_to<std::string_view>;
+  { Model::num_params } -> std::convertible_to<int>;
+  { Model::param_names[0] } -> std::convertible_to<std::string_view>;
+  { Model::project(params, point_in_cam) } -> std::same_as<std::optional<Eigen::Vector2d>>;
+  { Model::project_with_jacobians(params, point_in_cam) } -> std::same_as<std::optional<Projection<Model>>>;
+  { Model::unproject(params, px) } -> std::same_as<std::optional<Eigen::Vector3d>>;
+};
+
+}  // namespace alidade

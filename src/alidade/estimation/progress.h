@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <stdexcept>
+#include <string_view>
+
+namespace alidade {
+
+/// The person pressed Ctrl-C; the door turns it into one line and its exit code, nothing is written.
+struct Interrupted : std::runtime_error {
+  Interrupted() : std::runtime_error("interrupted; nothing written") {}
+};
+
+/// How long work reports itself and is stopped: called now and then, from any thread, as (what, done, total).
+/// Returns false to stop; the work then throws Interrupted. An empty Progress never stops and shows nothing.
+using Progress = std::function<bool(std::string_view what, std::size_t done, std::size_t total)>;
+
+inline void report_progress(const Progress& progress, std::string_view what, std::size_t done, std::size_t total) {
+  if (progress && !progress(what, done, total)) throw Interrupted();
+}
+
+}  // namespace alidade

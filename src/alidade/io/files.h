@@ -1,0 +1,22 @@
+#pragma once
+
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+namespace alidade {
+
+/// The outside world is wrong: one line, "file:line: column: what; what to do". Becomes exit code 3.
+struct InputError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Whole content of a file. Throws InputError if it cannot be read or is larger than 1 GiB.
+[[nodiscard]] std::string read_file(const std::filesystem::path& file);
+
+/// Writes a file whole: temporary file in the same folder, then rename; makes missing folders. Nothing half-written
+/// ever stands under `file`. Throws InputError if it cannot be written.
+void write_file(const std::filesystem::path& file, std::string_view content);
+
+}  // namespace alidade

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "alidade/board/board.h"
+#include "alidade/board/board_view.h"
+#include "alidade/camera/camera.h"
+#include "alidade/geometry/rigid3.h"
+
+namespace cv {
+class Mat;
+}
+
+namespace alidade {
+
+/// A world for `calibrate`: a camera, a board with its true points, and where the board was held.
+struct BoardScene {
+  Camera camera;
+  Board board;
+  std::vector<Eigen::Vector3d> points_in_board;  ///< True points [m]: flat, bowed, or free.
+  std::vector<Rigid3> cam_from_board;            ///< One a photo.
+};
+
+struct BoardSceneConfig {
+  int num_photos = 20;
+  double max_tilt_rad = 0.6;
+  double min_fill = 0.35, max_fill = 0.9;  ///< Board width over picture width.
+  double bow_m = 0.0;                      ///< Height of the bow in the board's middle. [m]
+  double shape_sigma_m = 0.0;              ///< Scatter of every point, in and out of plane. [m]
+};
+
+/// Draws a scene in which every point of every board is seen. Same seed, same scene.
+[[nodiscard]] BoardScene draw_board_scene(const Camera& camera, const Board& board, const BoardSceneConfig& config,
+                                          std::uint64_t seed);
+
+/// True pixels of the board's points in photo `i`, in the board's order.
+[[nodiscard]] std::vector<Eigen::Vector2d> true_corners(const BoardScene& scene, std::size_t i);
+
+/// Corners without pictures: truth plus normal noise of `sigma_px` a coordinate, with that covariance.
+[[nodiscard]] std::vector<BoardView> simulate_views(const BoardScene& scene, double sigma_px, std::uint64_t seed);
+
+struct RenderConfig {
+  double blur_px = 0.6;  ///< σ of the optical blur.
+  double noise = 2.0;    ///< σ of the grey noise, in grey values of 255.
+  double black = 40.0, white = 210.0;
+  double gradient = 0.0;  ///< Relative fall of light from the left to the right edge.
+  int oversampling = 4;   ///< Rays a pixel and axis; edges are exact to 1/oversampling² of a pixel's area.
+};
+
+/// Photo `i` of the scene, 8-bit grey, rendered by casting rays through the lens on the (bent) board.
+[[nodiscard]] cv::Mat render_board_photo(const BoardScene& scene, std::size_t i, const RenderConfig& config,
+                                         std::uint64_t seed);
+
+}  // namespace alidade

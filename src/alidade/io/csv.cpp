@@ -1,0 +1,211 @@
+#include "alidade/io/csv.h"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <optional>
+
+namespace alidade {
+namespace {
+
+constexpr double largest_number = 1e12;  // metres, pixels, seconds since 1970: all far below; their squares are finite
+
+std::string_view trimmed(std::string_view text) {
+  const auto is_space = [](char c) { return c == ' ' || c == '\t'; };
+  while (!text.empty() && is_space(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_space(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+/// A cell as it may stand in a message: short, in one line.
+std::string in_quotes(std::string_view cell) {
+  constexpr std::size_t longest = 40;
+  std::string text(cell.substr(0, longest));
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < 0x20U) c = ' ';
+  }
+  return "'" + text + (cell.size() > longest ? "…'" : "'");
+}
+
+std::string at_line(const std::string& name, std::size_t line) { return name + ":" + std::to_string(line) + ": "; }
+
+/// True for what no text file holds. UTF-16 is caught by its zero bytes.
+bool is_binary(char c) {
+  const auto code = static_cast<unsigned char>(c);
+  return (code < 0x20U && c != '\n' && c != '\r' && c != '\t') || code == 0x7fU;
+}
+
+struct Row {
+  std::vector<std::string> cells;
+  std::size_t line = 1;  ///< Where it begins.
+};
+
+/// Splits text into rows of cells: RFC 4180, with LF, CRLF or CR ends.
+class Splitter {
+ public:
+  Splitter(std::string_view text, const std::string& name) : text_(text), name_(name) {}
+
+  /// The next row, blank ones included (one empty cell). None at the end.
+  [[nodiscard]] std::optional<Row> next() {
+    if (at_ == text_.size()) return std::nullopt;
+    Row row{{}, line_};
+    do {
+      row.cells.push_back(cell());
+    } while (take(','));
+    take('\r');
+    take('\n');
+    ++line_;
+    return row;
+  }
+
+ private:
+  bool take(char c) {
+    if (at_ == text_.size() || text_[at_] != c) return false;
+    ++at_;
+    return true;
+  }
+
+  std::string cell() {
+    while (at_ < text_.size() && (text_[at_] == ' ' || text_[at_] == '\t')) ++at_;
+    if (take('"')) return quoted_cell();
+    const std::size_t end = std::min(text_.find_first_of(",\r\n", at_), text_.size());
+    const std::string_view cell = trimmed(text_.substr(at_, end - at_));
+    at_ = end;
+    return std::string(cell);
+  }
+
+  std::string quoted_cell() {
+    const std::size_t begin_line = line_;
+    std::string cell;
+    while (at_ < text_.size()) {
+      const char c = text_[at_++];
+      if (c == '"' && !take('"')) {
+        while (take(' ') || take('\t')) {
+        }
+        if (at_ < text_.size() && text_.substr(at_, 1).find_first_of(",\r\n") == std::string_view::npos) {
+          throw InputError(at_line(name_, line_) + "text after a closing quote");
+        }
+        return cell;
+      }
+      if (c == '\n') ++line_;
+      cell += c;
+    }
+    throw InputError(at_line(name_, begin_line) + "a quote is opened and never closed");
+  }
+
+  std::string_view text_;
+  const std::string& name_;
+  std::size_t at_ = 0;
+  std::size_t line_ = 1;
+};
+
+bool is_blank(const Row& row) { return row.cells.size() == 1 && row.cells[0].empty(); }
+
+void refuse_binary(std::string_view text, const std::string& name) {
+  const auto* const bad = std::find_if(text.begin(), text.end(), is_binary);
+  if (bad == text.end()) return;
+  const auto line = static_cast<std::size_t>(std::count(text.begin(), bad, '\n')) + 1;
+  throw InputError(at_line(name, line) + "is not a text file; a table of comma-separated values is needed");
+}
+
+std::map<std::string, std::size_t> columns_of(const Row& header, const std::string& name) {
+  std::map<std::string, std::size_t> columns;
+  for (std::size_t i = 0; i < header.cells.size(); ++i) {
+    const std::string& column = header.cells[i];
+    if (column.empty()) {
+      throw InputError(at_line(name, header.line) + "column " + std::to_string(i + 1) + " has no name");
+    }
+    if (!columns.emplace(column, i).second) {
+      throw InputError(at_line(name, header.line) + "column " + in_quotes(column) + " stands twice in the header");
+    }
+  }
+  return columns;
+}
+
+/// The whole of `text` as a number. None if it is not one.
+template <typename Number>
+std::optional<Number> parse_number(std::string_view text) {
+  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+  Number value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+/// True for digits that no double can hold, "1e999", which are a number all the same.
+bool is_out_of_range(std::string_view text) {
+  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+  double value = 0.0;
+  return std::from_chars(text.data(), text.data() + text.size(), value).ec == std::errc::result_out_of_range;
+}
+
+}  // namespace
+
+Csv Csv::read(const std::filesystem::path& file) { return parse(read_file(file), file.string()); }
+
+Csv Csv::parse(std::string_view text, const std::string& name) {
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // byte order mark, as spreadsheets write it
+  refuse_binary(text, name);
+  Csv csv;
+  csv.name_ = name;
+  std::size_t blank_line = 0;  // none yet
+  for (Splitter splitter(text, name); std::optional<Row> row = splitter.next();) {
+    if (is_blank(*row)) {
+      if (blank_line == 0) blank_line = row->line;
+      continue;
+    }
+    if (csv.header_.empty()) {
+      csv.columns_ = columns_of(*row, name);
+      csv.header_ = std::move(row->cells);
+      blank_line = 0;
+      continue;
+    }
+    if (blank_line != 0) throw InputError(at_line(name, blank_line) + "a blank line inside the table; remove it");
+    if (row->cells.size() != csv.header_.size()) {
+      throw InputError(at_line(name, row->line) + "has " + std::to_string(row->cells.size()) +
+                       " cells, the header has " + std::to_string(csv.header_.size()));
+    }
+    csv.rows_.push_back(std::move(row->cells));
+    csv.lines_.push_back(row->line);
+  }
+  if (csv.header_.empty()) throw InputError(name + ": is empty; a header line with the columns' names is needed");
+  return csv;
+}
+
+bool Csv::is_empty(std::size_t row, const std::string& column) const { return text(row, column).empty(); }
+
+const std::string& Csv::text(std::size_t row, const std::string& column) const {
+  const auto found = columns_.find(column);
+  if (found != columns_.end()) return rows_.at(row)[found->second];
+  std::string known;
+  for (const std::string& each : header_) known += (known.empty() ? "" : ", ") + each;
+  throw InputError(name_ + ": has no column '" + column + "'; it has: " + known);
+}
+
+double Csv::number(std::size_t row, const std::string& column) const {
+  const std::string& cell = text(row, column);
+  if (cell.empty()) throw InputError(where(row, column) + ": is empty; a number is needed");
+  const std::optional<double> value = parse_number<double>(cell);
+  if (value && !std::isfinite(*value))
+    throw InputError(where(row, column) + ": " + in_quotes(cell) + " is not a finite number");
+  if (value && std::abs(*value) <= largest_number) return *value;
+  if (value || is_out_of_range(cell)) {
+    throw InputError(where(row, column) + ": " + in_quotes(cell) + " is out of range; numbers up to 1e12 are read");
+  }
+  throw InputError(where(row, column) + ": " + in_quotes(cell) + " is not a number");
+}
+
+long Csv::integer(std::size_t row, const std::string& column, long low, long high) const {
+  const std::string& cell = text(row, column);
+  const std::optional<long> value = parse_number<long>(cell);
+  if (value && low <= *value && *value <= high) return *value;
+  throw InputError(where(row, column) + ": " + in_quotes(cell) + " is not a whole number from " + std::to_string(low) +
+                   " to " + std::to_string(high));
+}
+
+std::string Csv::where(std::size_t row, const std::string& column) const {
+  return name_ + ":" + std::to_string(lines_.at(row)) + ": column '" + column + "'";
+}
+
+}  // namespace alidade

@@ -49,6 +49,9 @@ struct Camera {
 /// Unit ray of a pixel, in the camera frame, or none.
 [[nodiscard]] std::optional<Eigen::Vector3d> unproject(const Camera& camera, const Eigen::Vector2d& px);
 
+[[nodiscard]] std::vector<std::optional<Eigen::Vector3d>> unproject(const Camera& camera,
+                                                                    std::span<const Eigen::Vector2d> pixels);
+
 /// A pixel with its derivatives, for any model: J_px_params is 2 × number of parameters.
 struct LensProjection {
   Eigen::Vector2d px;

@@ -20,17 +20,23 @@ struct Projection {
 
 /// A lens: pure functions of a parameter vector. No state, no base class; adding a model is adding one header and
 /// one entry to `Lens`. Pixel (0, 0) is the CENTRE of the top-left pixel; camera axes are x right, y down, z forward.
+/// `Domain` is what the parameters alone decide about the valid domain: compute it once with domain(), then project a
+/// batch with the overloads that take it. The overloads without it are for single points.
 /// The first five parameters of every model are fx, fy, cx, cy, skew [px]: (u, v) = (fx x + skew y + cx, fy y + cy)
 /// of the distorted normalised point (x, y). No answer (nullopt) behind the camera or outside the valid domain.
 template <class Model>
 concept CameraModel = requires(const Params<Model>& params, const Eigen::Vector3d& point_in_cam,
-                               const Eigen::Vector2d& px) {
+                               const typename Model::Domain& domain, const Eigen::Vector2d& px) {
   { Model::name } -> std::convertible_to<std::string_view>;
   { Model::num_params } -> std::convertible_to<int>;
   { Model::param_names[0] } -> std::convertible_to<std::string_view>;
+  { Model::domain(params) } -> std::same_as<typename Model::Domain>;
   { Model::project(params, point_in_cam) } -> std::same_as<std::optional<Eigen::Vector2d>>;
   { Model::project_with_jacobians(params, point_in_cam) } -> std::same_as<std::optional<Projection<Model>>>;
+  { Model::project(params, domain, point_in_cam) } -> std::same_as<std::optional<Eigen::Vector2d>>;
+  { Model::project_with_jacobians(params, domain, point_in_cam) } -> std::same_as<std::optional<Projection<Model>>>;
   { Model::unproject(params, px) } -> std::same_as<std::optional<Eigen::Vector3d>>;
+  { Model::unproject(params, domain, px) } -> std::same_as<std::optional<Eigen::Vector3d>>;
 };
 
 }  // namespace alidade

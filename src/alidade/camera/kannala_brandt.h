@@ -16,6 +16,12 @@ struct KannalaBrandt {
   static constexpr std::array<std::string_view, num_params> param_names{"fx", "fy", "cx", "cy", "skew",
                                                                         "k1", "k2", "k3", "k4"};
 
+  /// Angle where the radial map folds. [rad]
+  struct Domain {
+    double max_angle = 0.0;
+  };
+  [[nodiscard]] static Domain domain(const Params<KannalaBrandt>& params);
+
   [[nodiscard]] static std::optional<Eigen::Vector2d> project(const Params<KannalaBrandt>& params,
                                                               const Eigen::Vector3d& point_in_cam);
   [[nodiscard]] static std::optional<Projection<KannalaBrandt>> project_with_jacobians(
@@ -26,6 +32,14 @@ struct KannalaBrandt {
 
   /// Smallest root θ in (0, π] of dθ_d/dθ; π where the map never folds. [rad]
   [[nodiscard]] static double max_angle(const Params<KannalaBrandt>& params);
+
+  /// The same for a batch, with the domain computed once.
+  [[nodiscard]] static std::optional<Eigen::Vector2d> project(const Params<KannalaBrandt>& params, const Domain& domain,
+                                                              const Eigen::Vector3d& point_in_cam);
+  [[nodiscard]] static std::optional<Projection<KannalaBrandt>> project_with_jacobians(
+      const Params<KannalaBrandt>& params, const Domain& domain, const Eigen::Vector3d& point_in_cam);
+  [[nodiscard]] static std::optional<Eigen::Vector3d> unproject(const Params<KannalaBrandt>& params,
+                                                                const Domain& domain, const Eigen::Vector2d& px);
 };
 
 static_assert(CameraModel<KannalaBrandt>);

@@ -1,0 +1,88 @@
+#include "alidade/camera/camera.h"
+
+namespace alidade {
+namespace {
+
+template <CameraModel Model>
+LensProjection for_any_lens(const Projection<Model>& projection) {
+  return {projection.px, projection.J_px_point, projection.J_px_params};
+}
+
+}  // namespace
+
+std::string_view model_name(const Lens& lens) {
+  return std::visit([]<CameraModel Model>(const Calibrated<Model>&) { return Model::name; }, lens);
+}
+
+std::vector<std::string> param_names(const Lens& lens) {
+  return std::visit(
+      []<CameraModel Model>(const Calibrated<Model>&) {
+        return std::vector<std::string>(Model::param_names.begin(), Model::param_names.end());
+      },
+      lens);
+}
+
+Eigen::VectorXd params(const Lens& lens) {
+  return std::visit([](const auto& calibrated) { return Eigen::VectorXd(calibrated.params); }, lens);
+}
+
+Lens with_params(const Lens& lens, const Eigen::VectorXd& values) {
+  return std::visit([&]<CameraModel Model>(const Calibrated<Model>&) { return Lens(Calibrated<Model>{values}); }, lens);
+}
+
+std::optional<Lens> make_lens(std::string_view model_name) {
+  if (model_name == Pinhole::name) return Calibrated<Pinhole>{};
+  if (model_name == Brown::name) return Calibrated<Brown>{};
+  if (model_name == KannalaBrandt::name) return Calibrated<KannalaBrandt>{};
+  return std::nullopt;
+}
+
+std::optional<Eigen::Vector2d> project(const Camera& camera, const Eigen::Vector3d& point_in_cam) {
+  return std::visit(
+      [&]<CameraModel Model>(const Calibrated<Model>& lens) { return Model::project(lens.params, point_in_cam); },
+      camera.lens);
+}
+
+std::vector<std::optional<Eigen::Vector2d>> project(const Camera& camera,
+                                                    std::span<const Eigen::Vector3d> points_in_cam) {
+  return std::visit(
+      [&]<CameraModel Model>(const Calibrated<Model>& lens) {
+        const typename Model::Domain domain = Model::domain(lens.params);
+        std::vector<std::optional<Eigen::Vector2d>> pixels;
+        pixels.reserve(points_in_cam.size());
+        for (const Eigen::Vector3d& point : points_in_cam) {
+          pixels.push_back(Model::project(lens.params, domain, point));
+        }
+        return pixels;
+      },
+      camera.lens);
+}
+
+std::optional<Eigen::Vector3d> unproject(const Camera& camera, const Eigen::Vector2d& px) {
+  return std::visit([&]<CameraModel Model>(const Calibrated<Model>& lens) { return Model::unproject(lens.params, px); },
+                    camera.lens);
+}
+
+std::vector<std::optional<Eigen::Vector3d>> unproject(const Camera& camera, std::span<const Eigen::Vector2d> pixels) {
+  return std::visit(
+      [&]<CameraModel Model>(const Calibrated<Model>& lens) {
+        const typename Model::Domain domain = Model::domain(lens.params);
+        std::vector<std::optional<Eigen::Vector3d>> rays_in_cam;
+        rays_in_cam.reserve(pixels.size());
+        for (const Eigen::Vector2d& px : pixels) rays_in_cam.push_back(Model::unproject(lens.params, domain, px));
+        return rays_in_cam;
+      },
+      camera.lens);
+}
+
+std::optional<LensProjection> project_with_jacobians(const Camera& camera, const Eigen::Vector3d& point_in_cam) {
+  return std::visit(
+      [&]<CameraModel Model>(const Calibrated<Model>& lens) -> std::optional<LensProjection> {
+        const auto projection = Model::project_with_jacobians(lens.params, point_in_cam);
+        if (!projection) return std::nullopt;
+        return for_any_lens(*projection);
+      },
+      camera.lens);
+}
+
+}  // namespace alidade

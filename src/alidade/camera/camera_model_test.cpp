@@ -88,12 +88,12 @@ TYPED_TEST(CameraModelLaws, DerivativesMatchCentralDifferences) {
         EXPECT_LT((at->J_px_point.col(i) - (*ahead - *behind) / 2e-5).norm(), 1e-6) << i << ": " << point_in_cam;
       }
       for (int i = 0; i < TypeParam::num_params; ++i) {
-        const Params<TypeParam> h = 1e-4 * Params<TypeParam>::Unit(i);
+        const Params<TypeParam> h = 1e-5 * Params<TypeParam>::Unit(i);
         const auto ahead = TypeParam::project(params + h, point_in_cam);
         const auto behind = TypeParam::project(params - h, point_in_cam);
         ASSERT_TRUE(ahead && behind);
         // linear in each parameter: rounding alone
-        EXPECT_LT((at->J_px_params.col(i) - (*ahead - *behind) / 2e-4).norm(), 1e-7)
+        EXPECT_LT((at->J_px_params.col(i) - (*ahead - *behind) / 2e-5).norm(), 1e-7)
             << TypeParam::param_names.at(std::size_t(i));
       }
     }

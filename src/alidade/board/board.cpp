@@ -15,6 +15,10 @@ void append_tag(const Board& board, int col, int row, std::vector<Eigen::Vector3
 
 }  // namespace
 
+double circle_radius_m(const Board& board) {
+  return board.marker_m > 0.0 ? 0.5 * board.marker_m : 0.2 * board.square_m;
+}
+
 int num_points(const Board& board) { return board.cols * board.rows * (board.kind == BoardKind::aprilgrid ? 4 : 1); }
 
 std::vector<Eigen::Vector3d> points_in_board(const Board& board) {
@@ -24,7 +28,7 @@ std::vector<Eigen::Vector3d> points_in_board(const Board& board) {
     for (int col = 0; col < board.cols; ++col) {
       if (board.kind == BoardKind::aprilgrid) {
         append_tag(board, col, row, points);
-      } else if (board.kind == BoardKind::asymmetric_circles) {  // every other row is shifted by half a pitch
+      } else if (board.kind == BoardKind::asymmetric_circles) {  // every other row is shifted by one pitch
         points.emplace_back((2 * col + row % 2) * board.square_m, row * board.square_m, 0.0);
       } else {
         points.emplace_back(col * board.square_m, row * board.square_m, 0.0);

@@ -10,16 +10,24 @@ enum class BoardKind { chessboard, charuco, aprilgrid, circles, asymmetric_circl
 
 /// A calibration target. Its points lie in frame `board`: x along the columns, y along the rows, z = x × y (away from
 /// a camera that sees the board upright), the origin at point 0; points are numbered row by row, left to right.
+/// Chessboard, charuco: the square at the top left is black; markers are numbered row by row (OpenCV 4.6's layout).
+/// Aprilgrid: Kalibr's target, tags 36h11 with black squares in the gaps, tag 0 at the bottom LEFT; the points are
+/// still numbered from the top left, four a tag: top-left, top-right, bottom-right, bottom-left.
+/// Asymmetric circles: row 1, 3, … is shifted by one pitch; circles of one row are two pitches apart.
 struct Board {
   BoardKind kind = BoardKind::chessboard;
   int cols = 9;  ///< Inner corners (chessboard, charuco), circles, or tags (aprilgrid) along x.
   int rows = 6;
   double square_m = 0.025;      ///< Pitch: square side, circle spacing, or tag side (aprilgrid). [m]
-  double marker_m = 0.0;        ///< Marker side (charuco) or gap between tags (aprilgrid). [m]
+  double marker_m = 0.0;        ///< Marker side (charuco), gap between tags (aprilgrid), diameter (circles). [m]
   std::string dictionary = "";  ///< ArUco dictionary (charuco), for example DICT_5X5_100.
 
   bool operator==(const Board&) const = default;
 };
+
+/// Radius of the circles of a circle grid [m]: half of `marker_m`; where that is 0, the 1/5 of the pitch that OpenCV's
+/// pattern generator draws.
+[[nodiscard]] double circle_radius_m(const Board& board);
 
 /// Number of points of a board: 4 a tag for an aprilgrid, one a corner or circle otherwise.
 [[nodiscard]] int num_points(const Board& board);

@@ -25,14 +25,18 @@ struct BoardScene {
 struct BoardSceneConfig {
   int num_photos = 20;
   double max_tilt_rad = 0.6;
-  double min_fill = 0.35, max_fill = 0.9;  ///< Board width over picture width.
-  double bow_m = 0.0;                      ///< Height of the bow in the board's middle. [m]
-  double shape_sigma_m = 0.0;              ///< Scatter of every point, in and out of plane. [m]
+  double min_fill = 0.35, max_fill = 0.9;  ///< Printed size over picture size, whichever axis is fuller.
+  double bow_m = 0.0;          ///< Height of the bow in the board's middle over its corners, away from the camera. [m]
+  double shape_sigma_m = 0.0;  ///< Scatter of every point, in and out of plane. [m]
 };
 
 /// Draws a scene in which every point of every board is seen. Same seed, same scene.
+/// Tilts, rolls, places in the picture and distances vary; where a pose drawn so would not fit, the board moves away.
 [[nodiscard]] BoardScene draw_board_scene(const Camera& camera, const Board& board, const BoardSceneConfig& config,
                                           std::uint64_t seed);
+
+/// Name of photo `i`: board_001.png for the first.
+[[nodiscard]] std::string photo_name(std::size_t i);
 
 /// True pixels of the board's points in photo `i`, in the board's order.
 [[nodiscard]] std::vector<Eigen::Vector2d> true_corners(const BoardScene& scene, std::size_t i);
@@ -44,11 +48,14 @@ struct RenderConfig {
   double blur_px = 0.6;  ///< σ of the optical blur.
   double noise = 2.0;    ///< σ of the grey noise, in grey values of 255.
   double black = 40.0, white = 210.0;
-  double gradient = 0.0;  ///< Relative fall of light from the left to the right edge.
-  int oversampling = 4;   ///< Rays a pixel and axis; edges are exact to 1/oversampling² of a pixel's area.
+  double gradient = 0.0;            ///< Relative fall of light from the left to the right edge.
+  double background_texture = 1.0;  ///< 0: plain grey behind the board; 1: gentle waves.
+  int oversampling = 4;  ///< Sub-samples a pixel and axis where edges are; each is itself the mean over its area.
 };
 
-/// Photo `i` of the scene, 8-bit grey, rendered by casting rays through the lens on the (bent) board.
+/// Photo `i` of the scene, 8-bit grey, rendered by casting rays through the lens on the (bent) board: the print's
+/// light, blurred by the optics, integrated over each pixel, with noise, rounded. Edges stand where the lens puts them
+/// to better than 0.002 px (tested). `seed` draws the noise, a different one for each photo.
 [[nodiscard]] cv::Mat render_board_photo(const BoardScene& scene, std::size_t i, const RenderConfig& config,
                                          std::uint64_t seed);
 

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "alidade/board/board.h"
+
+namespace alidade {
+
+/// What is printed on a board: the ink at any place and where its edges are. Places are nominal coordinates in frame
+/// `board` [m], as those of points_in_board(). Around the pattern there is a margin of paper.
+class PrintedPattern {
+ public:
+  /// Needs a board without fault().
+  explicit PrintedPattern(const Board& board);
+
+  /// Ink at a place: 1 black, 0 paper, `outside` off the paper. Near an edge the two sides are mixed over a ramp of the
+  /// full widths given [m].
+  [[nodiscard]] double ink(const Eigen::Vector2d& place, const Eigen::Vector2d& ramp, double outside) const;
+
+  /// The ink at a place without an edge within ±`reach` [m] of it, axis by axis. None where an edge may be so near.
+  [[nodiscard]] std::optional<double> even_ink(const Eigen::Vector2d& place, const Eigen::Vector2d& reach,
+                                               double outside) const;
+
+  /// Opposite corners of the printed area (paper without its margin).
+  [[nodiscard]] Eigen::Vector2d print_min() const { return print_min_; }
+  [[nodiscard]] Eigen::Vector2d print_max() const { return print_max_; }
+
+ private:
+  /// Ascending places where the ink may change along one axis; cell i lies between edges i−1 and i.
+  struct Axis {
+    std::vector<double> edges;
+    std::vector<std::size_t> first_edge;  ///< Per bin: the first edge beyond the bin's start.
+    double bins_per_m = 0.0;
+
+    void finish();
+    [[nodiscard]] std::size_t num_cells() const { return edges.size() + 1; }
+    [[nodiscard]] std::size_t cell(double at) const;
+    [[nodiscard]] double middle(std::size_t cell) const { return 0.5 * (edges[cell - 1] + edges[cell]); }
+  };
+  /// A cell, and how much of its nearest neighbour is mixed in.
+  struct Mix {
+    std::size_t near, far;
+    double far_weight, distance;
+  };
+
+  [[nodiscard]] static Mix mix(const Axis& axis, double at, double ramp);
+  [[nodiscard]] double cell_ink(std::size_t col, std::size_t row, double outside) const;
+  [[nodiscard]] double nearest_disc_distance(const Eigen::Vector2d& place) const;
+  void print_chessboard(const Board& board);
+  void print_tags(const Board& board);
+  void print_discs(const Board& board);
+  void fill_margin(double margin_m);
+
+  Axis x_, y_;
+  std::vector<signed char> ink_;  ///< Row-major cells: 1 black, 0 paper, −1 off the paper.
+  Board board_;
+  double disc_radius_m_ = 0.0;  ///< 0 where no discs are printed.
+  Eigen::Vector2d print_min_, print_max_;
+};
+
+}  // namespace alidade

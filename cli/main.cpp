@@ -1,1 +1,10 @@
-int main() { return 0; }
+#include "cli/commands.h"
+#include "cli/frame.h"
+
+namespace {
+
+void add_commands(alidade::cli::Frame& /*frame*/) {}
+
+}  // namespace
+
+int main(int argc, char** argv) { return alidade::cli::run_cli(argc, argv, add_commands); }

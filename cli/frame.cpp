@@ -1,0 +1,252 @@
+#include "cli/frame.h"
+
+#include <tbb/global_control.h>
+#include <tbb/info.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <deque>
+#include <iostream>
+#include <numeric>
+#include <opencv2/core.hpp>
+#include <opencv2/core/utils/logger.hpp>
+
+#include "cli/terminal.h"
+
+namespace alidade::cli {
+
+struct Frame::Command {
+  CommandSpec spec;
+  CLI::App* app = nullptr;
+  std::function<ExitCode(Run&)> work;
+  CommonOptions options;
+};
+
+struct Frame::State {
+  CLI::App app{"alidade: calibrate what moves. Cameras you can trust, from photos, with their uncertainty.", "alidade"};
+  std::deque<Command> commands;  // options point into it: it must not move
+  Terminal terminal;
+};
+
+namespace {
+
+/// Inserted, removed or replaced letters between two words. Levenshtein 1965.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0]++;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, diagonal + 1, row[j] + 1});
+    }
+  }
+  return row.back();
+}
+
+/// "; did you mean 'WORD'?" for the nearest of the known words, if one is near.
+std::string suggestion(const std::string& word, const std::vector<std::string>& known) {
+  const std::string* nearest = nullptr;
+  std::size_t distance = 1 + word.size() / 3;
+  for (const std::string& each : known) {
+    const std::size_t d = edit_distance(word, each);
+    if (d > distance || (nearest != nullptr && d == distance)) continue;
+    nearest = &each;
+    distance = d;
+  }
+  return nearest != nullptr ? "; did you mean '" + *nearest + "'?" : "";
+}
+
+std::vector<std::string> subcommand_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* each : app.get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(each->get_name());
+  return names;
+}
+
+std::vector<std::string> option_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* each : app.get_options()) {
+    for (const std::string& name : each->get_lnames()) names.push_back("--" + name);
+  }
+  return names;
+}
+
+/// The command, or group, that the line got to.
+const CLI::App& deepest(const CLI::App& app) {
+  const auto parsed = app.get_subcommands();
+  return parsed.empty() ? app : deepest(*parsed.front());
+}
+
+/// "camera show: " of the app that the line got to; "" of the program itself.
+std::string where(const CLI::App& app) {
+  if (app.get_parent() == nullptr) return "";
+  const std::string parent = where(*app.get_parent());
+  return (parent.empty() ? "" : parent.substr(0, parent.size() - 2) + " ") + app.get_name() + ": ";
+}
+
+/// What is wrong with the line, in one line that says what to do.
+std::string usage_fault(const CLI::App& app, const CLI::ParseError& error) {
+  const CLI::App& at = deepest(app);
+  std::string extra;
+  for (const std::string& word : app.remaining(true)) {  // an option that nobody knows explains more than its effects
+    if (extra.empty() || (extra.front() != '-' && word.front() == '-')) extra = word;
+  }
+  const bool is_option = extra.size() > 1 && extra.front() == '-';
+  if (is_option) {
+    const std::string name = extra.substr(0, extra.find('='));
+    return where(at) + "unknown option '" + name + "'" + suggestion(name, option_names(at));
+  }
+  const std::vector<std::string> names = subcommand_names(at);
+  if (!extra.empty() && !names.empty()) {
+    return where(at) + "unknown command '" + extra + "'" + suggestion(extra, names);
+  }
+  if (!names.empty()) return where(at) + "a command is required; see alidade --help";
+  if (!extra.empty()) return where(at) + "unexpected argument '" + extra + "'";
+  return where(at) + error.what();
+}
+
+/// What every command has.
+void add_common_options(CLI::App& app, const CommandSpec& spec, CommonOptions& options) {
+  options.out = std::filesystem::path("alidade-out") / spec.name.substr(0, spec.name.find(' '));
+  const std::string group = "Common options";
+  app.add_option("--out", options.out, "Folder for the results")->type_name("DIR")->capture_default_str()->group(group);
+  app.add_flag("--json", options.json, "One JSON document on stdout and nothing else")->group(group);
+  app.add_flag("--quiet", options.quiet, "Nothing on stdout")->group(group);
+  app.add_flag("--no-report", options.no_report, "Write no report.html")->group(group);
+  app.add_option("--threads", options.threads, "Threads to use at most; 0: as many as there are processors")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str()
+      ->group(group);
+  if (!spec.draws_random_numbers) return;
+  app.add_option("--seed", options.seed, "Seed of the random numbers; same seed, same result")
+      ->type_name("N")
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 62U))
+      ->capture_default_str()
+      ->group(group);
+}
+
+/// Finds out before the work, not after it, that there is no place for results.
+void require_place(const CommonOptions& options) {
+  std::error_code ignored;
+  if (!options.leaves_results) return;
+  if (std::filesystem::exists(options.out, ignored) && !std::filesystem::is_directory(options.out, ignored)) {
+    throw InputError(options.out.string() + ": is a file, not a folder; give another --out");
+  }
+}
+
+/// Threads and foreign libraries as the options say. The limit lasts as long as what is returned.
+tbb::global_control prepare_libraries(int threads) {
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  cv::setNumThreads(threads == 0 ? -1 : threads);
+  const int limit = threads == 0 ? tbb::info::default_concurrency() : threads;
+  return {tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(limit)};
+}
+
+std::string refusal(const std::string& command, const Verdict& verdict) {
+  return command + ": " + verdict.sentence + (verdict.to_add.empty() ? "" : "; " + verdict.to_add);
+}
+
+constexpr const char* bug = " (a bug in alidade; please report it)";
+
+}  // namespace
+
+Frame::Frame() : state_(std::make_unique<State>()) {
+  CLI::App& app = state_->app;
+  app.set_version_flag("--version", "alidade " ALIDADE_VERSION);
+  app.set_help_flag("--help,-h", "Print this help");
+  app.require_subcommand(1);
+  app.footer(
+      "Each command has its own help: alidade COMMAND --help\n"
+      "Exit codes: 0 an estimate that stands, 1 a fault of alidade, 2 wrong usage, 3 bad input, nothing written,\n"
+      "4 the data cannot tell (what is missing is named), 5 no convergence, 130 interrupted.");
+}
+
+Frame::~Frame() = default;
+
+void Frame::add_group(const std::string& name, const std::string& summary) {
+  state_->app.add_subcommand(name, summary)->require_subcommand(1);
+}
+
+CLI::App& Frame::add_command(const CommandSpec& spec, std::function<ExitCode(Run&)> work) {
+  const std::size_t space = spec.name.find(' ');
+  CLI::App* parent = &state_->app;
+  if (space != std::string::npos) parent = parent->get_subcommand(spec.name.substr(0, space));
+  CLI::App* app =
+      parent->add_subcommand(space == std::string::npos ? spec.name : spec.name.substr(space + 1), spec.summary);
+  Command& command = state_->commands.emplace_back(Command{spec, app, std::move(work), {}});
+  command.options.leaves_results = spec.leaves_results;
+  add_common_options(*app, spec, command.options);
+  app->footer("Examples:\n" + spec.examples);
+  return *app;
+}
+
+Frame::Command* Frame::chosen_command() {
+  for (Command& command : state_->commands) {
+    if (command.app->parsed()) return &command;
+  }
+  return nullptr;
+}
+
+int Frame::dispatch(int argc, const char* const* argv) {
+  CLI::App& app = state_->app;
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help and --version
+    throw UsageError(usage_fault(app, error));
+  }
+  Command& command = *chosen_command();
+  CommonOptions& options = command.options;
+  if (command.app->count("--out") > 0) options.leaves_results = true;
+  require_place(options);
+  const tbb::global_control limit = prepare_libraries(options.threads);
+  catch_interrupts();
+  Run run(command.spec.name, {argv, argv + argc}, options, state_->terminal.progress(!options.quiet && !options.json));
+  if (command.spec.draws_random_numbers) run.document.seed = options.seed;
+  try {
+    const ExitCode code = command.work(run);
+    state_->terminal.wipe_progress();
+    if (code != ExitCode::ok) state_->terminal.error(refusal(command.spec.name, run.document.verdict));
+    return static_cast<int>(code);
+  } catch (const UsageError& error) {
+    throw UsageError(command.spec.name + ": " + error.what());
+  }
+}
+
+int run_cli(int argc, const char* const* argv, void (*add_commands)(Frame&)) {
+  Frame frame;
+  const auto failed = [&](const std::string& message, ExitCode code) {
+    frame.state_->terminal.error(message);
+    return static_cast<int>(code);
+  };
+  try {
+    add_commands(frame);
+    const int code = frame.dispatch(argc, argv);
+    std::cout.flush();
+    const bool is_written = std::cout.good() && std::fflush(stdout) == 0;
+    return is_written ? code : failed("stdout: cannot be written", ExitCode::bad_input);
+  } catch (const UsageError& error) {
+    return failed(error.what(), ExitCode::usage);
+  } catch (const Interrupted& error) {
+    frame.state_->terminal.error(error.what());
+    return 128 + interrupting_signal();
+  } catch (const InputError& error) {
+    return failed(error.what(), ExitCode::bad_input);
+  } catch (const std::filesystem::filesystem_error& error) {
+    return failed(error.path1().string() + ": " + error.code().message(), ExitCode::bad_input);
+  } catch (const std::bad_alloc&) {
+    return failed("internal: not enough memory; use fewer or smaller inputs", ExitCode::internal_error);
+  } catch (const cv::Exception& error) {
+    return failed("internal: OpenCV: " + error.err + bug, ExitCode::internal_error);
+  } catch (const std::exception& error) {
+    return failed(std::string("internal: ") + error.what() + bug, ExitCode::internal_error);
+  } catch (...) {
+    return failed(std::string("internal: unknown") + bug, ExitCode::internal_error);
+  }
+}
+
+}  // namespace alidade::cli

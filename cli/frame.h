@@ -1,0 +1,53 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "cli/run.h"
+
+namespace CLI {
+class App;
+}
+
+namespace alidade::cli {
+
+/// What a command is called and how it presents itself.
+struct CommandSpec {
+  std::string name;                   ///< "calibrate"; with a space, "camera show", a command of a group.
+  std::string summary;                ///< One line.
+  std::string examples;               ///< Command lines, one a line; shown at the end of --help.
+  bool draws_random_numbers = false;  ///< Gives it --seed.
+  bool leaves_results = true;         ///< False: nothing is written into DIR unless --out is given (show, convert).
+};
+
+/// The commands and what they share: options, threads, errors, exit codes. See cli/commands.h.
+class Frame {
+ public:
+  Frame();
+  ~Frame();
+  Frame(const Frame&) = delete;
+  Frame& operator=(const Frame&) = delete;
+
+  /// A command. `work` runs after the whole line has been parsed; it ends with `return run.finish(verdict);`. Add the
+  /// command's own options to what is returned.
+  CLI::App& add_command(const CommandSpec& spec, std::function<ExitCode(Run&)> work);
+  /// The word before the commands of a group: "camera" of "camera show". Comes before them.
+  void add_group(const std::string& name, const std::string& summary);
+
+ private:
+  friend int run_cli(int argc, const char* const* argv, void (*add_commands)(Frame&));
+  struct Command;
+  struct State;
+
+  int dispatch(int argc, const char* const* argv);
+  Command* chosen_command();
+
+  std::unique_ptr<State> state_;
+};
+
+/// Parses, runs the chosen command, and is the one place that turns what is thrown into a line and an exit code.
+[[nodiscard]] int run_cli(int argc, const char* const* argv, void (*add_commands)(Frame&));
+
+}  // namespace alidade::cli

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "alidade/estimation/progress.h"
+
+namespace alidade::cli {
+
+/// The person in front of the command: error lines, the progress line, Ctrl-C. One for a process.
+class Terminal {
+ public:
+  Terminal();
+  ~Terminal();
+  Terminal(const Terminal&) = delete;
+  Terminal& operator=(const Terminal&) = delete;
+
+  /// `alidade: error: MESSAGE`, one line whatever the message holds, after wiping the progress line.
+  void error(std::string_view message);
+  /// Called by long work: shows a line on a terminal (not with `--quiet` or `--json`), and stops after Ctrl-C.
+  [[nodiscard]] Progress progress(bool shown);
+  void wipe_progress();
+
+ private:
+  struct State;
+  std::shared_ptr<State> state_;  // the Progress handed out shares it, so that it may outlive this
+};
+
+/// From now on the first SIGINT or SIGTERM asks the work to stop, and the second ends the process at once.
+void catch_interrupts();
+/// The signal that asked to stop; 0 if none did.
+[[nodiscard]] int interrupting_signal();
+
+/// Text in one line: control characters and line ends become spaces, runs of spaces become one.
+[[nodiscard]] std::string one_line(std::string_view text);
+
+}  // namespace alidade::cli

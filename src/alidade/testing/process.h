@@ -1,0 +1,82 @@
+#pragma once
+
+#include <fcntl.h>
+#include <pty.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "alidade/io/files.h"
+#include "alidade/testing/temporary_folder.h"
+
+namespace alidade::testing {
+
+/// What a process left: exit code (128 + signal where it was killed) and what it wrote.
+struct Outcome {
+  int code = -1;
+  std::string out;
+  std::string err;
+};
+
+/// Runs `body` in a child process whose exit code is what it returns; `meanwhile` runs here with its id.
+[[nodiscard]] inline Outcome run_in_child(const std::function<int()>& body,
+                                          const std::function<void(pid_t)>& meanwhile = {}) {
+  const TemporaryFolder folder;
+  const std::string out = (folder.path() / "out").string(), err = (folder.path() / "err").string();
+  std::fflush(nullptr);
+  const pid_t child = ::fork();
+  if (child < 0) throw std::runtime_error("fork failed");
+  if (child == 0) {
+    ::dup2(::open(out.c_str(), O_CREAT | O_WRONLY, 0600), STDOUT_FILENO);
+    ::dup2(::open(err.c_str(), O_CREAT | O_WRONLY, 0600), STDERR_FILENO);
+    const int code = body();
+    std::fflush(nullptr);
+    ::_exit(code);
+  }
+  if (meanwhile) meanwhile(child);
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_file(out), read_file(err)};
+}
+
+/// Runs a program with arguments; `folder`: where, unless empty.
+[[nodiscard]] inline Outcome run_program(std::vector<std::string> words, const std::string& folder = "",
+                                         const std::function<void(pid_t)>& meanwhile = {}) {
+  const auto body = [&] {
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    if (!folder.empty() && ::chdir(folder.c_str()) != 0) return 127;
+    ::execvp(argv[0], argv.data());
+    return 127;
+  };
+  return run_in_child(body, meanwhile);
+}
+
+/// Runs `body` in a child process on a terminal of its own and gives everything that the terminal showed.
+[[nodiscard]] inline std::string shown_on_terminal(const std::function<int()>& body) {
+  int master = -1;
+  std::fflush(nullptr);
+  const pid_t child = ::forkpty(&master, nullptr, nullptr, nullptr);
+  if (child < 0) throw std::runtime_error("forkpty failed");
+  if (child == 0) {
+    const int code = body();
+    std::fflush(nullptr);
+    ::_exit(code);
+  }
+  std::string shown;
+  char chunk[4096];
+  for (ssize_t got = 0; (got = ::read(master, chunk, sizeof chunk)) > 0;)
+    shown.append(chunk, static_cast<std::size_t>(got));
+  ::close(master);
+  ::waitpid(child, nullptr, 0);
+  return shown;
+}
+
+}  // namespace alidade::testing

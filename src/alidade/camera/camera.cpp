@@ -85,4 +85,19 @@ std::optional<LensProjection> project_with_jacobians(const Camera& camera, const
       camera.lens);
 }
 
+std::vector<std::optional<LensProjection>> project_with_jacobians(const Camera& camera,
+                                                                  std::span<const Eigen::Vector3d> points_in_cam) {
+  return std::visit(
+      [&]<CameraModel Model>(const Calibrated<Model>& lens) {
+        const typename Model::Domain domain = Model::domain(lens.params);
+        std::vector<std::optional<LensProjection>> projections(points_in_cam.size());
+        for (std::size_t i = 0; i < points_in_cam.size(); ++i) {
+          const auto projection = Model::project_with_jacobians(lens.params, domain, points_in_cam[i]);
+          if (projection) projections[i] = for_any_lens(*projection);
+        }
+        return projections;
+      },
+      camera.lens);
+}
+
 }  // namespace alidade

@@ -60,5 +60,7 @@ struct LensProjection {
 };
 [[nodiscard]] std::optional<LensProjection> project_with_jacobians(const Camera& camera,
                                                                    const Eigen::Vector3d& point_in_cam);
+[[nodiscard]] std::vector<std::optional<LensProjection>> project_with_jacobians(
+    const Camera& camera, std::span<const Eigen::Vector3d> points_in_cam);
 
 }  // namespace alidade

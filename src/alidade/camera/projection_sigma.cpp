@@ -1,0 +1,114 @@
+#include "alidade/camera/projection_sigma.h"
+
+#include <Eigen/QR>
+#include <cmath>
+#include <limits>
+
+#include "alidade/camera/implied_motion.h"
+#include "alidade/geometry/so3.h"
+
+namespace alidade {
+
+PixelGrid make_grid(int width_px, int height_px, int cols, int rows) {
+  const double last_u = width_px - 1, last_v = height_px - 1;
+  PixelGrid grid{cols, rows, 0.0, 0.0, 1.0, 1.0, {}};
+  if (cols > 1) grid.du_px = last_u / (cols - 1);
+  if (rows > 1) grid.dv_px = last_v / (rows - 1);
+  if (cols == 1) grid.u0_px = 0.5 * last_u;
+  if (rows == 1) grid.v0_px = 0.5 * last_v;
+  return grid;
+}
+
+namespace detail {
+
+std::vector<std::optional<GridPoint>> look(const Camera& camera, const PixelGrid& grid, double distance_m) {
+  std::vector<Eigen::Vector2d> pixels;
+  for (int row = 0; row < grid.rows; ++row) {
+    for (int col = 0; col < grid.cols; ++col) pixels.push_back(grid.px(col, row));
+  }
+  const std::vector<std::optional<Eigen::Vector3d>> rays_in_cam = unproject(camera, pixels);
+  const double range_m = std::isfinite(distance_m) ? distance_m : 1.0;
+  std::vector<Eigen::Vector3d> points_in_cam;
+  for (const auto& ray : rays_in_cam) points_in_cam.push_back(range_m * ray.value_or(Eigen::Vector3d::Zero()));
+  const std::vector<std::optional<LensProjection>> projections = project_with_jacobians(camera, points_in_cam);
+  std::vector<std::optional<GridPoint>> seen(pixels.size());
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    if (rays_in_cam[i] && projections[i]) seen[i] = GridPoint{points_in_cam[i], *projections[i]};
+  }
+  return seen;
+}
+
+MotionJacobian motion_jacobian(const Eigen::Matrix<double, 2, 3>& J_px_point, const Eigen::Vector3d& point_in_cam,
+                               bool with_translation) {
+  MotionJacobian J(2, with_translation ? 6 : 3);
+  J.rightCols<3>() = -J_px_point * cross_matrix(point_in_cam);
+  if (with_translation) J.leftCols<3>() = J_px_point * point_in_cam.norm();
+  return J;
+}
+
+std::vector<Eigen::Matrix2d> implied_covariance(const Eigen::MatrixXd& cov,
+                                                std::span<const std::optional<GridPoint>> seen,
+                                                std::span<const double> weights, bool with_translation) {
+  const Eigen::Index num_motion = with_translation ? 6 : 3;
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(num_motion, num_motion);
+  Eigen::MatrixXd B = Eigen::MatrixXd::Zero(num_motion, cov.cols());
+  std::vector<MotionJacobian> J_motion(seen.size());
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (!seen[i]) continue;
+    J_motion[i] = motion_jacobian(seen[i]->projection.J_px_point, seen[i]->point_in_cam, with_translation);
+    A.noalias() += weights[i] * J_motion[i].transpose() * J_motion[i];
+    B.noalias() += weights[i] * J_motion[i].transpose() * seen[i]->projection.J_px_params;
+  }
+  // The least-norm answer where the grid does not tell the motion (a very narrow picture).
+  const Eigen::MatrixXd K = -A.completeOrthogonalDecomposition().solve(B);
+  std::vector<Eigen::Matrix2d> covariances(seen.size(), Eigen::Matrix2d::Zero());
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (!seen[i]) continue;
+    const Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 16> G = seen[i]->projection.J_px_params + J_motion[i] * K;
+    covariances[i].noalias() = G * (cov * G.transpose());
+  }
+  return covariances;
+}
+
+double largest_sigma(const Eigen::Matrix2d& cov) {
+  const double mean = 0.5 * cov.trace(), half_difference = 0.5 * (cov(0, 0) - cov(1, 1));
+  return std::sqrt(std::max(0.0, mean + std::hypot(half_difference, 0.5 * (cov(0, 1) + cov(1, 0)))));
+}
+
+std::vector<double> inverse_variance_weights(std::span<const double> sigmas_px) {
+  double largest = 0.0;
+  for (const double sigma_px : sigmas_px) {
+    if (sigma_px > largest) largest = sigma_px;
+  }
+  std::vector<double> weights(sigmas_px.size(), 1.0);
+  if (!(largest > 0.0)) return weights;
+  const double floor = 1e-4 * largest * largest;  // no pixel counts more than 10⁴ times another
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    weights[i] = floor / (floor + sigmas_px[i] * sigmas_px[i]);
+  }
+  return weights;
+}
+
+}  // namespace detail
+
+PixelGrid projection_sigma(const Camera& camera, int cols, int rows, double distance_m) {
+  PixelGrid grid = make_grid(camera.width_px, camera.height_px, cols, rows);
+  const std::size_t num_pixels = static_cast<std::size_t>(cols) * static_cast<std::size_t>(rows);
+  grid.values.assign(num_pixels, std::numeric_limits<double>::quiet_NaN());
+  if (camera.cov.rows() != params(camera.lens).size() || camera.cov.cols() != camera.cov.rows()) return grid;
+
+  const bool with_translation = std::isfinite(distance_m);
+  const std::vector<std::optional<detail::GridPoint>> seen = detail::look(camera, grid, distance_m);
+  std::vector<double> weights(num_pixels, 1.0), sigmas_px(num_pixels, 0.0);
+  for (int pass = 0; pass < 2; ++pass) {
+    const auto covariances = detail::implied_covariance(camera.cov, seen, weights, with_translation);
+    for (std::size_t i = 0; i < num_pixels; ++i) sigmas_px[i] = detail::largest_sigma(covariances[i]);
+    if (pass == 0) weights = detail::inverse_variance_weights(sigmas_px);
+  }
+  for (std::size_t i = 0; i < num_pixels; ++i) {
+    if (seen[i]) grid.values[i] = sigmas_px[i];
+  }
+  return grid;
+}
+
+}  // namespace alidade

@@ -1,0 +1,112 @@
+#include "cli/board_options.h"
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <charconv>
+#include <optional>
+#include <utility>
+
+#include "alidade/board/dictionary.h"
+#include "cli/option_checks.h"
+#include "cli/run.h"
+
+namespace alidade::cli {
+namespace {
+
+constexpr std::array<std::pair<const char*, BoardKind>, 5> targets{
+    {{"chessboard", BoardKind::chessboard},
+     {"charuco", BoardKind::charuco},
+     {"aprilgrid", BoardKind::aprilgrid},
+     {"circles", BoardKind::circles},
+     {"asymmetric_circles", BoardKind::asymmetric_circles}}};
+
+/// Columns and rows of "9x6".
+std::optional<std::pair<int, int>> cols_and_rows(const std::string& text) {
+  const char *at = text.data(), *end = at + text.size();
+  int cols = 0, rows = 0;
+  const auto left = std::from_chars(at, end, cols);
+  if (left.ec != std::errc{} || left.ptr == end || (*left.ptr != 'x' && *left.ptr != 'X')) return std::nullopt;
+  const auto right = std::from_chars(left.ptr + 1, end, rows);
+  if (right.ec != std::errc{} || right.ptr != end || cols <= 0 || rows <= 0) return std::nullopt;
+  return std::pair{cols, rows};
+}
+
+CLI::Validator size_check() {
+  return {[](const std::string& text) -> std::string {
+            return cols_and_rows(text) ? "" : "'" + text + "' is not COLSxROWS, for example 9x6";
+          },
+          ""};
+}
+
+CLI::Validator target_check() {
+  return {[](const std::string& text) -> std::string {
+            std::string known;
+            for (const auto& [name, kind] : targets) {
+              if (text == name) return "";
+              known += (known.empty() ? "" : ", ") + std::string(name);
+            }
+            return "'" + text + "' is not one of " + known;
+          },
+          ""};
+}
+
+CLI::Validator dictionary_check() {
+  return {[](const std::string& text) -> std::string {
+            if (marker_dictionary(text)) return "";
+            return "'" + text + "' is not a marker dictionary; known are " + marker_dictionary_names();
+          },
+          ""};
+}
+
+}  // namespace
+
+void add_board_options(CLI::App& command, BoardOptions& options) {
+  const std::string group = "The board";
+  command.add_option("--board", options.size, "Inner corners (circles, tags) along and across")
+      ->type_name("COLSxROWS")
+      ->check(size_check())
+      ->required()
+      ->group(group);
+  command.add_option("--square", options.square_m, "Side of a square, distance of circles, side of a tag [m]")
+      ->type_name("M")
+      ->check(positive_number())
+      ->required()
+      ->group(group);
+  command.add_option("--target", options.target, "chessboard, charuco, aprilgrid, circles or asymmetric_circles")
+      ->type_name("KIND")
+      ->check(target_check())
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--marker", options.marker_m,
+                  "Side of a marker (charuco), gap between tags (aprilgrid), diameter (circles) [m]")
+      ->type_name("M")
+      ->check(positive_number())
+      ->group(group);
+  command.add_option("--dictionary", options.dictionary, "Marker dictionary of a charuco board")
+      ->type_name("NAME")
+      ->check(dictionary_check())
+      ->capture_default_str()
+      ->group(group);
+}
+
+Board board_from(const BoardOptions& options) {
+  Board board;
+  for (const auto& [name, kind] : targets) {
+    if (options.target == name) board.kind = kind;
+  }
+  const auto size = cols_and_rows(options.size);
+  if (!size) throw UsageError("--board: '" + options.size + "' is not COLSxROWS, for example 9x6");
+  std::tie(board.cols, board.rows) = *size;
+  board.square_m = options.square_m;
+  board.marker_m = options.marker_m;
+  const bool needs_marker = board.kind == BoardKind::charuco || board.kind == BoardKind::aprilgrid;
+  if (needs_marker && board.marker_m == 0.0) throw UsageError("--target " + options.target + " needs --marker M");
+  if (board.kind == BoardKind::chessboard && board.marker_m != 0.0) throw UsageError("--marker: a chessboard has none");
+  if (board.kind == BoardKind::charuco) board.dictionary = options.dictionary;
+  const std::string what = fault(board);
+  if (!what.empty()) throw UsageError("--board: " + what);
+  return board;
+}
+
+}  // namespace alidade::cli

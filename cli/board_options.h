@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+
+#include "alidade/board/board.h"
+
+namespace CLI {
+class App;
+}
+
+namespace alidade::cli {
+
+/// The flags that describe a board, the same for every command that reads or makes photos of one.
+struct BoardOptions {
+  std::string target = "chessboard";
+  std::string size;       ///< "9x6"
+  double square_m = 0.0;  ///< 0: not given.
+  double marker_m = 0.0;  ///< 0: not given.
+  std::string dictionary = "DICT_5X5_100";
+};
+
+/// Adds --board, --square, --target, --marker and --dictionary. --board and --square are required.
+void add_board_options(CLI::App& command, BoardOptions& options);
+
+/// The board that the flags describe. Throws UsageError where there is none.
+[[nodiscard]] Board board_from(const BoardOptions& options);
+
+}  // namespace alidade::cli

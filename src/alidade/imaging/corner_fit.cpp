@@ -1,0 +1,300 @@
+#include "alidade/imaging/corner_fit.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <opencv2/core.hpp>
+#include <utility>
+#include <vector>
+
+#include "alidade/imaging/blurred_edge.h"
+
+namespace alidade {
+namespace {
+
+constexpr double min_blur_px = 0.4, max_blur_px = 4.0;  // a pixel's own width blurs by 0.29; sharper edges make jumps
+constexpr std::size_t min_pixels = 16;                  // more than twice the parameters
+constexpr double small_square_px = 10.0;  // in smaller squares every pixel counts: the window is the whole square
+constexpr double converged_px = 1e-3;     // the next step would be ten times smaller
+constexpr double min_sin_angle = 0.10;    // 6°: beyond it the two edges are one
+constexpr double max_sigma_px = 0.5;      // a corner less certain than that is none
+
+/// The model's parameters. Edge k runs along (cos, sin)(angle_rad[k]) through `px` and bends by bend[k] (held).
+struct Model {
+  Eigen::Vector2d px;
+  std::array<double, 2> angle_rad, bend;
+  double blur_px, contrast, mean;
+};
+
+/// The pixels of the parallelogram, relative to `origin`. Their number is a multiple of four: up to three are left out.
+struct Pixels {
+  Eigen::Vector2d origin;
+  std::vector<float> x, y, grey;
+  [[nodiscard]] std::size_t size() const { return x.size(); }
+};
+
+/// Columns: offsets of the two edges, their angles, blur, contrast, mean; and the residual last.
+using Matrix8 = Eigen::Matrix<double, 8, 8>;
+using Matrix7 = Eigen::Matrix<double, 7, 7>;
+using Vector7 = Eigen::Vector<double, 7>;
+
+double cost_of(const Matrix8& sums) { return sums(7, 7); }
+
+/// Columns of row y, relative to the origin, that lie in the parallelogram |a|, |b| < half, (a, b) = inverse · (p − c).
+std::pair<int, int> span_of_row(const Eigen::Matrix2d& inverse, const Eigen::Vector2d& half,
+                                const Eigen::Vector2d& center, double y) {
+  double x_min = -1e6, x_max = 1e6;
+  for (int k = 0; k < 2; ++k) {
+    const double slope = inverse(k, 0);
+    const double at_zero = inverse(k, 1) * (y - center.y()) - slope * center.x();
+    if (std::abs(slope) < 1e-9) {
+      if (!(std::abs(at_zero) < half[k])) return {0, -1};
+      continue;
+    }
+    const double one = (-half[k] - at_zero) / slope, other = (half[k] - at_zero) / slope;
+    x_min = std::max(x_min, std::min(one, other));
+    x_max = std::min(x_max, std::max(one, other));
+  }
+  return {static_cast<int>(std::ceil(x_min)), static_cast<int>(std::floor(x_max))};
+}
+
+Pixels gather(const cv::Mat& photo, const CornerStart& start, const CornerFitConfig& config) {
+  const int origin_x = static_cast<int>(std::lround(start.px.x()));
+  const int origin_y = static_cast<int>(std::lround(start.px.y()));
+  Pixels pixels{.origin = {origin_x, origin_y}, .x = {}, .y = {}, .grey = {}};
+  Eigen::Matrix2d square;
+  square << start.along_cols, start.along_rows;
+  const Eigen::Vector2d lengths = square.colwise().norm();
+  const Eigen::Vector2d half = (config.max_half_window_px * lengths.cwiseInverse())
+                                   .cwiseMin(lengths.minCoeff() < small_square_px ? 0.5 : config.window);
+  const Eigen::Matrix2d inverse = square.inverse();
+  const Eigen::Vector2d center = start.px - pixels.origin;
+  const double reach = std::abs(square(1, 0)) * half[0] + std::abs(square(1, 1)) * half[1];
+  const int y_min = std::max(-origin_y, static_cast<int>(std::ceil(center.y() - reach)));
+  const int y_max = std::min(photo.rows - 1 - origin_y, static_cast<int>(std::floor(center.y() + reach)));
+  for (int y = y_min; y <= y_max; ++y) {
+    const auto [first, last] = span_of_row(inverse, half, center, y);
+    const float* row = photo.ptr<float>(origin_y + y) + origin_x;
+    for (int x = std::max(first, -origin_x); x <= std::min(last, photo.cols - 1 - origin_x); ++x) {
+      pixels.x.push_back(static_cast<float>(x));
+      pixels.y.push_back(static_cast<float>(y));
+      pixels.grey.push_back(row[x]);
+    }
+  }
+  const std::size_t groups = pixels.size() / 4;
+  for (std::vector<float>* values : {&pixels.x, &pixels.y, &pixels.grey}) values->resize(4 * groups);
+  return pixels;
+}
+
+Float4 load(const float* from) {
+  Float4 values;
+  std::memcpy(&values, from, sizeof values);
+  return values;
+}
+
+float sum(Float4 v) { return (v[0] + v[1]) + (v[2] + v[3]); }
+
+/// One edge at four pixels: distance, position along it, and the two factors of the model.
+struct EdgeAtPixels {
+  Float4 distance, along;
+  EdgeProfile profile;
+};
+
+/// Constants of one edge, in float.
+struct EdgeConstants {
+  float cosine, sine, half_bend, inverse_width;
+
+  [[nodiscard]] EdgeAtPixels at(Float4 dx, Float4 dy) const {
+    const Float4 along = cosine * dx + sine * dy;
+    const Float4 distance = cosine * dy - sine * dx - half_bend * along * along;
+    return {distance, along, edge_profile(distance * inverse_width)};
+  }
+};
+
+/// Adds column[r] · column[c], c ≥ r, row by row; written out at compile time, which halves the time of a fit.
+template <std::size_t... r>
+void add_products(const std::array<Float4, 8>& column, std::array<Float4, 36>& sums, std::index_sequence<r...>) {
+  const auto add_row = [&]<std::size_t row, std::size_t... c>(std::index_sequence<c...>) {
+    ((sums[row * 8 - row * (row - 1) / 2 + c] += column[row] * column[row + c]), ...);
+  };
+  (add_row.template operator()<r>(std::make_index_sequence<8 - r>{}), ...);
+}
+
+/// Sums of all products of the columns of [J r] over the pixels, in float: positions are small numbers around the
+/// corner.
+Matrix8 normal_sums(const Pixels& pixels, const Model& model) {
+  const auto inverse_width = static_cast<float>(1.0 / (std::numbers::sqrt2 * model.blur_px));
+  std::array<EdgeConstants, 2> edges{};
+  for (std::size_t k = 0; k < 2; ++k) {
+    edges[k] = {static_cast<float>(std::cos(model.angle_rad[k])), static_cast<float>(std::sin(model.angle_rad[k])),
+                static_cast<float>(0.5 * model.bend[k]), inverse_width};
+  }
+  const auto slope = static_cast<float>(2.0 * std::numbers::inv_sqrtpi * model.contrast) * inverse_width;
+  const auto contrast = static_cast<float>(model.contrast), mean = static_cast<float>(model.mean);
+  const auto minus_inverse_blur = static_cast<float>(-1.0 / model.blur_px);
+  const Eigen::Vector2f corner = (model.px - pixels.origin).cast<float>();
+
+  std::array<Float4, 36> sums{};
+  for (std::size_t i = 0; i < pixels.size(); i += 4) {
+    const Float4 dx = load(&pixels.x[i]) - corner.x(), dy = load(&pixels.y[i]) - corner.y();
+    const EdgeAtPixels one = edges[0].at(dx, dy), two = edges[1].at(dx, dy);
+    const Float4 g1 = slope * one.profile.bell * two.profile.step;
+    const Float4 g2 = slope * one.profile.step * two.profile.bell;
+    const Float4 product = one.profile.step * two.profile.step;
+    const std::array<Float4, 8> column{g1,
+                                       g2,
+                                       -g1 * one.along,
+                                       -g2 * two.along,
+                                       (g1 * one.distance + g2 * two.distance) * minus_inverse_blur,
+                                       product,
+                                       Float4{1.0f, 1.0f, 1.0f, 1.0f},
+                                       mean + contrast * product - load(&pixels.grey[i])};
+    add_products(column, sums, std::make_index_sequence<8>{});
+  }
+  Matrix8 full;
+  std::size_t at = 0;
+  for (int r = 0; r < 8; ++r) {
+    for (int c = r; c < 8; ++c) full(r, c) = full(c, r) = static_cast<double>(sum(sums[at++]));
+  }
+  return full;
+}
+
+/// Moves the model by a step of the seven parameters; the corner is where the two displaced edges meet.
+Model moved(const Model& model, const Vector7& step) {
+  Model next = model;
+  Eigen::Matrix2d normals;
+  for (std::size_t k = 0; k < 2; ++k) {
+    normals.row(static_cast<Eigen::Index>(k)) << -std::sin(model.angle_rad[k]), std::cos(model.angle_rad[k]);
+    next.angle_rad[k] += step[2 + static_cast<Eigen::Index>(k)];
+  }
+  next.px -= normals.inverse() * step.head<2>();
+  next.blur_px = std::clamp(model.blur_px + step[4], min_blur_px, max_blur_px);
+  next.contrast += step[5];
+  next.mean += step[6];
+  return next;
+}
+
+/// Best mean and contrast for the start's geometry, by linear least squares.
+Model with_best_greys(const Pixels& pixels, Model model) {
+  model.contrast = 1.0;
+  model.mean = 0.0;
+  const Matrix8 sums = normal_sums(pixels, model);
+  const Eigen::Vector2d step = sums.block<2, 2>(5, 5).inverse() * sums.block<2, 1>(5, 7);
+  model.contrast -= step[0];
+  model.mean -= step[1];
+  return model;
+}
+
+struct Solution {
+  Model model;
+  Matrix8 sums;
+  bool converged = false;
+};
+
+/// Damped Gauss–Newton step. Where the blur stands at a limit and would cross it, the others step without it.
+Vector7 damped_step(const Solution& at, double damping) {
+  Matrix7 JtJ = at.sums.topLeftCorner<7, 7>();
+  Vector7 Jtr = at.sums.topRightCorner<7, 1>();
+  JtJ.diagonal() *= 1.0 + damping;
+  const Vector7 step = -JtJ.ldlt().solve(Jtr);
+  const double blur_px = at.model.blur_px;
+  if (!(blur_px <= min_blur_px && step[4] < 0.0) && !(blur_px >= max_blur_px && step[4] > 0.0)) return step;
+  JtJ.row(4).setZero();
+  JtJ.col(4).setZero();
+  JtJ(4, 4) = 1.0;
+  Jtr[4] = 0.0;
+  return -JtJ.ldlt().solve(Jtr);
+}
+
+Solution levenberg_marquardt(const Pixels& pixels, const Model& start, int max_iterations) {
+  Solution best{start, normal_sums(pixels, start)};
+  double damping = 1e-3;
+  for (int i = 0; i < max_iterations; ++i) {
+    const Vector7 step = damped_step(best, damping);
+    const Model model = moved(best.model, step);
+    const Matrix8 sums = normal_sums(pixels, model);
+    const bool is_small = step.head<2>().norm() < converged_px;
+    if (cost_of(sums) < cost_of(best.sums)) {
+      best = {model, sums};
+      damping *= 0.1;
+    } else if (!is_small) {
+      damping *= 10.0;
+    }
+    if (is_small || damping > 1e3) {  // or no step goes down: rounding to float is all that is left
+      best.converged = true;
+      break;
+    }
+  }
+  return best;
+}
+
+/// Covariance of the corner: that of the two offsets, turned into x and y.
+Eigen::Matrix2d covariance_of(const Solution& solution, double variance) {
+  const Matrix7 inverse = solution.sums.topLeftCorner<7, 7>().ldlt().solve(Matrix7::Identity());
+  Eigen::Matrix2d normals;
+  for (std::size_t k = 0; k < 2; ++k) {
+    normals.row(static_cast<Eigen::Index>(k)) << -std::sin(solution.model.angle_rad[k]),
+        std::cos(solution.model.angle_rad[k]);
+  }
+  const Eigen::Matrix2d px_from_offsets = normals.inverse();
+  const Eigen::Matrix2d cov = variance * px_from_offsets * inverse.topLeftCorner<2, 2>() * px_from_offsets.transpose();
+  return 0.5 * (cov + cov.transpose());
+}
+
+std::string_view reason_against(const CornerFit& fit, const CornerStart& start, const Solution& solution,
+                                const CornerFitConfig& config) {
+  if (!solution.converged || !fit.px.allFinite() || !fit.cov.allFinite()) return "the fit does not converge";
+  if (!(std::abs(fit.contrast) >= config.min_contrast)) return "no contrast";
+  if (!((fit.px - start.px).norm() <= config.max_move_px)) return "the fit moved away";
+  if (!(fit.rms <= config.max_misfit * std::abs(fit.contrast)))
+    return "not two edges: glare, shadow or something before it";
+  if (!(fit.cov.trace() < max_sigma_px * max_sigma_px)) return "too uncertain";
+  return {};
+}
+
+}  // namespace
+
+CornerFit fit_corner(const cv::Mat& photo, const CornerStart& start, const CornerFitConfig& config) {
+  CornerFit fit;
+  fit.px = start.px;
+  const double lengths = start.along_cols.norm() * start.along_rows.norm();
+  const double cross = start.along_cols.x() * start.along_rows.y() - start.along_cols.y() * start.along_rows.x();
+  if (!start.px.allFinite() || !(std::abs(cross) > min_sin_angle * lengths)) {
+    fit.reason = "the two edges nearly coincide";
+    return fit;
+  }
+  if (!(start.px.x() > 1.0 && start.px.y() > 1.0 && start.px.x() < photo.cols - 2.0 &&
+        start.px.y() < photo.rows - 2.0)) {
+    fit.reason = "outside the photo";
+    return fit;
+  }
+  const Pixels pixels = gather(photo, start, config);
+  if (pixels.size() < min_pixels) {
+    fit.reason = "the squares are too small";
+    return fit;
+  }
+  const Model first = {.px = start.px,
+                       .angle_rad = {std::atan2(start.along_cols.y(), start.along_cols.x()),
+                                     std::atan2(start.along_rows.y(), start.along_rows.x())},
+                       .bend = {start.bend_cols, start.bend_rows},
+                       .blur_px = start.blur_px,
+                       .contrast = 1.0,
+                       .mean = 0.0};
+  const Solution solution = levenberg_marquardt(pixels, with_best_greys(pixels, first), config.max_iterations);
+  const double variance = cost_of(solution.sums) / static_cast<double>(pixels.size() - 7);
+  fit.px = solution.model.px;
+  fit.cov = covariance_of(solution, variance);
+  fit.edge_cols = {std::cos(solution.model.angle_rad[0]), std::sin(solution.model.angle_rad[0])};
+  fit.edge_rows = {std::cos(solution.model.angle_rad[1]), std::sin(solution.model.angle_rad[1])};
+  fit.blur_px = solution.model.blur_px;
+  // Two left normals: with along_rows to the right of along_cols, the bright quadrant has d₁ d₂ < 0.
+  fit.contrast = cross > 0.0 ? -solution.model.contrast : solution.model.contrast;
+  fit.rms = std::sqrt(variance);
+  fit.reason = reason_against(fit, start, solution, config);
+  return fit;
+}
+
+}  // namespace alidade

@@ -1,0 +1,49 @@
+#include "alidade/imaging/find_board.h"
+
+#include <opencv2/core.hpp>
+
+#include "alidade/imaging/chessboard.h"
+#include "alidade/imaging/chessboard_corners.h"
+#include "alidade/imaging/grey_photo.h"
+
+namespace alidade {
+namespace {
+
+BoardDetection not_found(std::string reason) { return {.view = {}, .reason = std::move(reason)}; }
+
+BoardDetection find_chessboard_corners(const cv::Mat& photo, const Board& board, bool reject_partial) {
+  const Chessboard coarse = find_chessboard(photo, board.cols, board.rows);
+  if (!coarse.reason.empty()) return not_found(coarse.reason);
+  BoardDetection detection = fit_chessboard(photo, board, coarse);
+  const std::size_t seen = detection.view.corners.size();
+  if (reject_partial && detection.found() && seen < static_cast<std::size_t>(num_points(board))) {
+    return not_found("only " + std::to_string(seen) + " of " + std::to_string(num_points(board)) + " corners");
+  }
+  return detection;
+}
+
+}  // namespace
+
+BoardDetection find_board(const cv::Mat& photo, const Board& board, bool reject_partial) {
+  if (board.cols < 2 || board.rows < 2) return not_found("a board has at least 2×2 points");
+  std::string reason;
+  const cv::Mat grey = to_grey_photo(photo, reason);
+  if (!reason.empty()) return not_found(std::move(reason));
+  switch (board.kind) {
+    case BoardKind::chessboard:
+      return find_chessboard_corners(grey, board, reject_partial);
+    default:
+      return not_found("this kind of board is not supported");
+  }
+}
+
+BoardDetection refind_board(const cv::Mat& photo, const Board& board, const BoardView& first, const Camera& camera,
+                            const Rigid3& cam_from_board) {
+  if (board.kind != BoardKind::chessboard) return not_found("this kind of board is not supported");
+  std::string reason;
+  const cv::Mat grey = to_grey_photo(photo, reason);
+  if (!reason.empty()) return not_found(std::move(reason));
+  return refit_chessboard(grey, board, first, camera, cam_from_board);
+}
+
+}  // namespace alidade

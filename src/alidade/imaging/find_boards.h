@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <vector>
+
+#include "alidade/board/board.h"
+#include "alidade/estimation/progress.h"
+#include "alidade/imaging/find_board.h"
+
+namespace cv {
+class Mat;
+}
+
+namespace alidade {
+
+/// Gives photo `i`; called from several threads, each photo once. What it throws becomes that photo's reason.
+using PhotoLoader = std::function<cv::Mat(std::size_t i)>;
+
+struct PhotoSize {
+  int width_px = 0, height_px = 0;
+};
+
+/// The boards of many photos, in the photos' order, with the size of every photo (0×0 where it could not be read).
+struct BoardDetections {
+  std::vector<BoardDetection> photos;
+  std::vector<PhotoSize> sizes;
+};
+
+/// Finds the board in every photo, on all cores that TBB is allowed; the answer does not depend on their number. Only
+/// as many photos as there are threads are in memory at a time. Throws Interrupted when `progress` says stop.
+[[nodiscard]] BoardDetections find_boards(std::size_t num_photos, const PhotoLoader& load_photo, const Board& board,
+                                          bool reject_partial = false, const Progress& progress = {});
+
+}  // namespace alidade

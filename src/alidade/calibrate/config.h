@@ -22,7 +22,7 @@ struct Prior {
 struct CalibrateConfig {
   std::string model = "brown";                ///< pinhole, brown or kannala_brandt.
   std::vector<std::string> fixed = {"skew"};  ///< Parameters held: at their prior's value, else zero (k…, skew).
-  std::vector<Prior> priors;
+  std::vector<Prior> priors = {};
   BoardShape board_shape = BoardShape::flat;
   bool reject_outliers = true;  ///< Drop, and name, corners that no noise explains.
   double outlier_sigmas = 6.0;  ///< A corner further off than this many robust σ is an outlier.

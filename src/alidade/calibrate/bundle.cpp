@@ -1,0 +1,221 @@
+#include "alidade/calibrate/bundle.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "alidade/calibrate/normal_equations.h"
+
+namespace alidade {
+namespace {
+
+using Pose6 = Eigen::Matrix<double, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+/// The reduced system after the poses are eliminated, scaled to unit diagonal, and what takes a step back to them.
+struct Reduced {
+  Eigen::MatrixXd S;  ///< Lower triangle, of the unscaled unknowns.
+  Eigen::VectorXd rhs;
+  std::vector<Eigen::LLT<Pose6>> V_llt;
+  bool ok = true;
+};
+
+/// Adds −YᵀY for stacked rows Y (6 a view): in batches, as one large product is faster than many small ones.
+void subtract_outer(const Eigen::MatrixXd& Y, Eigen::MatrixXd& S) {
+  S.selfadjointView<Eigen::Lower>().rankUpdate(Y.transpose(), -1.0);
+}
+
+/// Schur complement of the poses with Marquardt damping λ on every diagonal.
+Reduced reduce(const NormalEquations& eq, double lambda) {
+  Reduced reduced;
+  reduced.S = eq.H;
+  reduced.S.diagonal() *= 1.0 + lambda;
+  reduced.rhs = -eq.gradient;
+  reduced.V_llt.reserve(eq.V.size());
+  constexpr Eigen::Index batch_views = 32;
+  Eigen::MatrixXd Y(6 * batch_views, eq.num_globals);
+  Eigen::Index filled = 0;
+  for (std::size_t k = 0; k < eq.V.size(); ++k) {
+    Pose6 V = eq.V[k];
+    V.diagonal() *= 1.0 + lambda;
+    reduced.V_llt.emplace_back(V);
+    if (reduced.V_llt.back().info() != Eigen::Success) {
+      reduced.ok = false;
+      return reduced;
+    }
+    const auto L = reduced.V_llt.back().matrixL();
+    auto rows = Y.middleRows<6>(filled);
+    rows = eq.coupling(k).transpose();
+    L.solveInPlace(rows);
+    reduced.rhs += rows.transpose() * L.solve(eq.pose_gradient[k]);
+    filled += 6;
+    if (filled == Y.rows()) {
+      subtract_outer(Y, reduced.S);
+      filled = 0;
+    }
+  }
+  if (filled > 0) subtract_outer(Y.topRows(filled), reduced.S);
+  return reduced;
+}
+
+Eigen::VectorXd unit_scale(const Eigen::MatrixXd& S) {
+  return S.diagonal().cwiseMax(std::numeric_limits<double>::min()).cwiseSqrt().cwiseInverse();
+}
+
+/// Solution of S x = rhs, scaled to unit diagonal. None where S is not positive definite.
+std::optional<Eigen::VectorXd> solve_scaled(const Eigen::MatrixXd& S, const Eigen::VectorXd& rhs) {
+  if (S.size() == 0) return Eigen::VectorXd(0);
+  const Eigen::VectorXd scale = unit_scale(S);
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * S * scale.asDiagonal();
+  const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> llt(scaled);
+  if (llt.info() != Eigen::Success) return std::nullopt;
+  Eigen::VectorXd x = scale.cwiseProduct(llt.solve(scale.cwiseProduct(rhs)));
+  if (!x.allFinite()) return std::nullopt;
+  return x;
+}
+
+BundleState step_from(const BundleProblem& problem, const BundleState& state, const Eigen::VectorXd& globals,
+                      const std::vector<Vector6>& poses) {
+  BundleState next = state;
+  Eigen::VectorXd lens = params(state.lens);
+  for (std::size_t i = 0; i < problem.free_lens.size(); ++i) {
+    lens[problem.free_lens[i]] += globals[static_cast<Eigen::Index>(i)];
+  }
+  next.lens = with_params(state.lens, lens);
+  for (std::size_t k = 0; k < poses.size(); ++k) next.cam_from_board[k] = state.cam_from_board[k].retract(poses[k]);
+  const auto at = static_cast<Eigen::Index>(problem.free_lens.size());
+  if (problem.shape == BoardShape::bow) {
+    const BowBasis basis = bow_basis(problem.printed_points);
+    for (std::size_t i = 0; i < next.board_points.size(); ++i) {
+      next.board_points[i].z() += basis.along_x[i] * globals[at] + basis.along_y[i] * globals[at + 1];
+    }
+  } else if (problem.shape == BoardShape::free) {
+    for (std::size_t i = 0; i < next.board_points.size(); ++i) {
+      next.board_points[i] += globals.segment<3>(at + 3 * static_cast<Eigen::Index>(i));
+    }
+  }
+  return next;
+}
+
+/// One damped step, or none where the damped system is not positive definite. `decrease`: predicted fall of the cost.
+struct Step {
+  BundleState state;
+  double decrease = 0.0;
+};
+
+std::optional<Step> damped_step(const BundleProblem& problem, const BundleState& state, const NormalEquations& eq,
+                                double lambda) {
+  const Reduced reduced = reduce(eq, lambda);
+  if (!reduced.ok) return std::nullopt;
+  const auto globals = solve_scaled(reduced.S, reduced.rhs);
+  if (!globals) return std::nullopt;
+  std::vector<Vector6> poses(eq.V.size());
+  double decrease = -globals->dot(eq.gradient);
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    poses[k] = reduced.V_llt[k].solve(-eq.pose_gradient[k] - eq.coupling(k).transpose() * *globals);
+    if (!poses[k].allFinite()) return std::nullopt;
+    decrease -= poses[k].dot(eq.pose_gradient[k]);
+  }
+  return Step{step_from(problem, state, *globals, poses), decrease};
+}
+
+/// Covariance of globals and poses from the undamped equations; status singular where they do not determine them.
+void finish(const NormalEquations& eq, bool want_pose_cov, BundleResult& result) {
+  const Reduced reduced = reduce(eq, 0.0);
+  if (!reduced.ok) {
+    result.status = BundleResult::Status::singular;
+    return;
+  }
+  if (eq.num_globals == 0) return;  // poses alone
+  const Eigen::VectorXd scale = unit_scale(reduced.S);
+  Eigen::MatrixXd scaled = reduced.S.selfadjointView<Eigen::Lower>();
+  scaled = scale.asDiagonal() * scaled * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+  result.weakest = eigen.eigenvectors().col(0);
+  result.weakest_eigenvalue = eigen.eigenvalues()[0];
+  constexpr double singular = 1e-13;  // below this the smallest eigenvalue is rounding
+  if (!(result.weakest_eigenvalue > singular)) {
+    result.status = BundleResult::Status::singular;
+    return;
+  }
+  const Eigen::MatrixXd inverse =
+      eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+  result.cov = scale.asDiagonal() * inverse * scale.asDiagonal();
+  if (!want_pose_cov) return;
+  result.pose_cov.reserve(eq.V.size());
+  for (std::size_t k = 0; k < eq.V.size(); ++k) {
+    const Eigen::Matrix<double, 6, Eigen::Dynamic> gain = reduced.V_llt[k].solve(eq.coupling(k).transpose());
+    result.pose_cov.push_back(reduced.V_llt[k].solve(Pose6::Identity()) + gain * result.cov * gain.transpose());
+  }
+}
+
+double degrees_of_freedom(const BundleProblem& problem) {
+  double rows = 0.0;
+  for (const ViewArrays& view : problem.views) rows += 2.0 * static_cast<double>(view.size()) - 6.0;
+  return std::max(1.0, rows - num_globals(problem));
+}
+
+}  // namespace
+
+BundleResult solve_bundle(const BundleProblem& problem, BundleState start, int max_iterations, bool want_pose_cov) {
+  BundleResult result;
+  result.state = std::move(start);
+  result.status = BundleResult::Status::no_convergence;
+  NormalEquations eq, trial;
+  if (!linearize(problem, result.state, eq)) return result;
+  const double dof = degrees_of_freedom(problem);
+  double lambda = 1e-5;
+  for (; result.iterations < max_iterations && lambda < 1e12; ++result.iterations) {
+    const auto step = damped_step(problem, result.state, eq, lambda);
+    // The step moves nothing by more than 10⁻⁴ of its own σ (or 10⁻⁸ px): we are there.
+    if (step && lambda <= 1e-3 && step->decrease <= 1e-8 * eq.cost / dof + 1e-16 * dof) {
+      result.status = BundleResult::Status::converged;
+      break;
+    }
+    if (!step || !linearize(problem, step->state, trial) || !(trial.cost <= eq.cost)) {
+      lambda = std::max(10.0 * lambda, 1e-5);
+      continue;
+    }
+    result.state = step->state;
+    std::swap(eq, trial);
+    lambda = lambda <= 1e-9 ? 0.0 : lambda * 0.1;
+  }
+  result.cost = eq.cost;
+  if (result.status == BundleResult::Status::converged) finish(eq, want_pose_cov, result);
+  return result;
+}
+
+std::vector<Eigen::Vector2d> residuals_px(const BundleState& state, std::size_t view_index, const ViewArrays& view) {
+  Camera camera;
+  camera.lens = state.lens;
+  std::vector<Eigen::Vector3d> points_in_cam;
+  points_in_cam.reserve(view.size());
+  for (const std::int32_t index : view.index) {
+    points_in_cam.push_back(state.cam_from_board[view_index] * state.board_points[static_cast<std::size_t>(index)]);
+  }
+  const auto pixels = project(camera, points_in_cam);
+  std::vector<Eigen::Vector2d> residuals;
+  residuals.reserve(view.size());
+  for (std::size_t i = 0; i < view.size(); ++i) {
+    const Eigen::Vector2d seen(view.u_px[i], view.v_px[i]);
+    residuals.push_back(pixels[i] ? Eigen::Vector2d(*pixels[i] - seen)
+                                  : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()));
+  }
+  return residuals;
+}
+
+std::optional<Rigid3> refine_pose(const Lens& lens, const std::vector<Eigen::Vector3d>& board_points,
+                                  const ViewArrays& view, const Rigid3& cam_from_board) {
+  BundleProblem problem;
+  problem.views = {&view, 1};
+  problem.prior_value = params(lens);
+  problem.prior_information = Eigen::VectorXd::Zero(problem.prior_value.size());
+  constexpr int max_iterations = 30;
+  const BundleResult result = solve_bundle(problem, {lens, {cam_from_board}, board_points}, max_iterations, false);
+  if (result.status == BundleResult::Status::no_convergence) return std::nullopt;
+  return result.state.cam_from_board.front();
+}
+
+}  // namespace alidade

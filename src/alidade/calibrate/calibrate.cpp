@@ -1,0 +1,296 @@
+#include "alidade/calibrate/calibrate.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/calibrate/bundle.h"
+#include "alidade/calibrate/initial_lens.h"
+#include "alidade/calibrate/setup.h"
+#include "alidade/calibrate/start.h"
+#include "alidade/calibrate/weights.h"
+
+namespace alidade {
+namespace {
+
+using Residuals = std::vector<std::vector<Eigen::Vector2d>>;
+
+/// The views that take part, and what is known of them so far.
+struct Work {
+  std::vector<std::size_t> number;  ///< Position of each in the caller's views.
+  std::vector<BoardView> views;
+  std::vector<ViewArrays> arrays;
+  BundleProblem problem;
+  bool use_covariances = false;
+};
+
+void refuse(CalibrateReport& report, std::string reason, std::string to_add) {
+  report.status = CalibrateReport::Status::degenerate;
+  report.reason = std::move(reason);
+  report.to_add = std::move(to_add);
+}
+
+/// Takes in every view with enough corners; the others are named.
+void take_usable_views(std::span<const BoardView> views, CalibrateReport& report, Work& work) {
+  constexpr std::size_t least_corners = 6;  // a pose takes 3; the rest must say something of the lens
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    report.views[k].corners.resize(views[k].corners.size());
+    if (views[k].corners.empty()) {
+      report.views[k].reason = "no corners";
+    } else if (views[k].corners.size() < least_corners) {
+      report.views[k].reason = "only " + std::to_string(views[k].corners.size()) + " corners";
+    } else {
+      work.number.push_back(k);
+      work.views.push_back(views[k]);
+    }
+  }
+}
+
+void drop_view(std::size_t at, const std::string& reason, CalibrateReport& report, Work& work, BundleState& state) {
+  report.views[work.number[at]].reason = reason;
+  const auto offset = static_cast<std::ptrdiff_t>(at);
+  work.number.erase(work.number.begin() + offset);
+  work.views.erase(work.views.begin() + offset);
+  if (at < work.arrays.size()) work.arrays.erase(work.arrays.begin() + offset);
+  if (at < state.cam_from_board.size()) state.cam_from_board.erase(state.cam_from_board.begin() + offset);
+}
+
+/// A few views, evenly chosen: enough to find the lens that the whole set is then refined from.
+std::vector<BoardView> sample(const std::vector<BoardView>& views) {
+  constexpr std::size_t enough = 40;
+  std::vector<BoardView> chosen;
+  const std::size_t count = std::min(enough, views.size());
+  for (std::size_t i = 0; i < count; ++i) chosen.push_back(views[i * views.size() / count]);
+  return chosen;
+}
+
+/// Poses of all views by the lens; a view without one is dropped and named.
+void find_poses(CalibrateReport& report, Work& work, BundleState& state) {
+  Camera camera;
+  camera.lens = state.lens;
+  for (std::size_t k = 0; k < work.views.size();) {
+    const auto pose = pose_from_plane(camera, work.views[k], state.board_points);
+    if (pose) {
+      state.cam_from_board.push_back(*pose);
+      ++k;
+    } else {
+      drop_view(k, "its corners do not form a board seen from the front", report, work, state);
+    }
+  }
+}
+
+Residuals all_residuals(const Work& work, const BundleState& state) {
+  Residuals residuals;
+  residuals.reserve(work.arrays.size());
+  for (std::size_t k = 0; k < work.arrays.size(); ++k) residuals.push_back(residuals_px(state, k, work.arrays[k]));
+  return residuals;
+}
+
+int num_parameters(const Work& work) {
+  const int shape_gauge = work.problem.shape == BoardShape::free ? 7 : 0;
+  return num_unknown_globals(work.problem) - shape_gauge + 6 * static_cast<int>(work.views.size());
+}
+
+void whiten(Work& work, const Residuals& residuals, const NoiseEstimate& noise, double huber_sigmas) {
+  for (std::size_t k = 0; k < work.views.size(); ++k) {
+    set_whiteners(work.views[k], residuals[k], noise, noise.used[k], work.use_covariances, huber_sigmas,
+                  work.arrays[k]);
+  }
+}
+
+/// Views of which two corners in five fit nothing do not belong to this board and camera.
+bool drop_misfits(const NoiseEstimate& noise, CalibrateReport& report, Work& work, BundleState& state) {
+  bool dropped = false;
+  for (std::size_t k = work.views.size(); k-- > 0;) {
+    const auto bad = std::count(noise.used[k].begin(), noise.used[k].end(), false);
+    const auto all = static_cast<std::ptrdiff_t>(noise.used[k].size());
+    if (5 * bad <= 2 * all) continue;
+    drop_view(k, std::to_string(bad) + " of " + std::to_string(all) + " corners do not fit the other photos", report,
+              work, state);
+    dropped = true;
+  }
+  return dropped;
+}
+
+BundleResult solve(Work& work, BundleState start, const CalibrateConfig& config, bool want_pose_cov) {
+  work.problem.views = work.arrays;
+  return solve_bundle(work.problem, std::move(start), config.max_iterations, want_pose_cov);
+}
+
+/// Alternates solve and noise estimate until no corner changes sides. The first solve weighs all corners alike.
+BundleResult solve_robustly(const CalibrateConfig& config, CalibrateReport& report, Work& work, BundleState state,
+                            NoiseEstimate& noise) {
+  const bool weights_matter =
+      work.use_covariances || work.problem.prior_information.any() || work.problem.shape == BoardShape::free;
+  constexpr int max_rounds = 8;
+  constexpr double huber_sigmas = 2.5;
+  BundleResult result = solve(work, std::move(state), config, true);
+  report.iterations = result.iterations;
+  std::vector<std::vector<bool>> used_before;
+  double excess_before = -1.0;
+  for (int round = 0; round < max_rounds; ++round) {
+    const Residuals residuals = all_residuals(work, result.state);
+    noise = estimate_noise(work.views, residuals, work.use_covariances, config.reject_outliers, config.outlier_sigmas,
+                           num_parameters(work));
+    const bool clean = noise.num_dropped == 0;
+    if (round == 0 && clean && !weights_matter) return result;
+    const bool settled = noise.used == used_before && std::abs(noise.excess_px - excess_before) <= 0.01 * excess_before;
+    if (settled) break;
+    // Outliers pull the first solves: let them weigh less before saying which they are.
+    const bool soft = !clean && round < 3;
+    if (!soft && drop_misfits(noise, report, work, result.state)) {
+      used_before.clear();
+      if (work.views.size() < 2) break;
+      for (std::size_t k = 0; k < work.views.size(); ++k) work.arrays[k] = make_arrays(work.views[k]);
+      result = solve(work, std::move(result.state), config, true);
+      report.iterations += result.iterations;
+      continue;
+    }
+    used_before = soft ? std::vector<std::vector<bool>>{} : noise.used;
+    excess_before = noise.excess_px;
+    whiten(work, residuals, noise, soft ? huber_sigmas : 0.0);
+    result = solve(work, std::move(result.state), config, true);
+    report.iterations += result.iterations;
+  }
+  return result;
+}
+
+/// RMS, noise and the corners' fates, from the final residuals.
+void fill_views(const Work& work, const BundleResult& result, const NoiseEstimate& noise, double variance_scale,
+                CalibrateReport& report) {
+  double total = 0.0;
+  for (std::size_t k = 0; k < work.views.size(); ++k) {
+    ViewFit& fit = report.views[work.number[k]];
+    fit.used = true;
+    fit.cam_from_board = result.state.cam_from_board[k];
+    if (k < result.pose_cov.size()) fit.pose_cov = variance_scale * result.pose_cov[k];
+    const auto residuals = residuals_px(result.state, k, work.arrays[k]);
+    double sum = 0.0, count = 0.0;
+    for (std::size_t i = 0; i < residuals.size(); ++i) {
+      fit.corners[i] = {residuals[i], noise.used[k][i]};
+      if (!noise.used[k][i]) continue;
+      sum += residuals[i].squaredNorm();
+      count += 1.0;
+    }
+    fit.rms_px = std::sqrt(sum / std::max(1.0, count));
+    total += sum;
+    report.corners_used += static_cast<int>(count);
+    report.corners_dropped += static_cast<int>(residuals.size()) - static_cast<int>(count);
+  }
+  report.num_parameters = num_parameters(work);
+  const double dof = std::max(1.0, 2.0 * report.corners_used - report.num_parameters);
+  report.rms_px = std::sqrt(total / std::max(1, report.corners_used));
+  report.noise_px = std::sqrt(total / dof);
+  report.excess_px = noise.excess_px;
+}
+
+/// Lens and board shape with their covariances, the latter in units of what the residuals say.
+double fill_estimate(const Work& work, const BundleResult& result, const NoiseEstimate& noise, ImageSize size,
+                     CalibrateReport& report) {
+  double corners = 0.0;
+  for (const auto& view : noise.used) corners += static_cast<double>(std::count(view.begin(), view.end(), true));
+  const double dof = std::max(1.0, 2.0 * corners - num_parameters(work));
+  const double variance_scale = result.cost / dof;
+  report.camera.width_px = size.width_px;
+  report.camera.height_px = size.height_px;
+  report.camera.lens = result.state.lens;
+  report.board_points = result.state.board_points;
+  const auto n = params(result.state.lens).size();
+  report.camera.cov = Eigen::MatrixXd::Zero(n, n);
+  const auto& free = work.problem.free_lens;
+  if (result.cov.size() == 0) return variance_scale;
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    for (std::size_t j = 0; j < free.size(); ++j) {
+      report.camera.cov(free[i], free[j]) =
+          variance_scale * result.cov(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    }
+  }
+  report.board_sigma_z_m = shape_sigma_z(work.problem, result.cov, variance_scale);
+  return variance_scale;
+}
+
+/// Refuses where the answer is no answer: singular, or a focal length or principal point with a huge σ.
+void judge(const Work& work, const BundleResult& result, CalibrateReport& report) {
+  if (result.status == BundleResult::Status::no_convergence) {
+    report.status = CalibrateReport::Status::no_convergence;
+    report.reason = "the solve did not settle in " + std::to_string(report.iterations) + " iterations";
+    report.to_add = "check --board and --square, and look at the photos that fit worst";
+    return;
+  }
+  if (result.status == BundleResult::Status::singular) {
+    refuse(report, "these photos leave free: " + name_combination(work.problem, report.camera.lens, result.weakest),
+           "add photos with the board tilted 20–45° in several directions, or hold a parameter with --fix");
+    return;
+  }
+  const Eigen::VectorXd values = params(report.camera.lens);
+  const auto names = param_names(report.camera.lens);
+  for (const int at : work.problem.free_lens) {
+    if (at >= 4) continue;
+    const double sigma = std::sqrt(report.camera.cov(at, at));
+    const double limit = at < 2 ? 0.05 * values[at] : 0.1 * std::max(report.camera.width_px, report.camera.height_px);
+    if (sigma <= limit && std::isfinite(sigma)) continue;
+    refuse(report,
+           names[static_cast<std::size_t>(at)] + " cannot be told: its σ is " +
+               std::to_string(static_cast<long>(std::min(sigma, 1e9))) + " px",
+           "tilt the board 20–45° in several directions and fill the picture");
+    return;
+  }
+  report.status = CalibrateReport::Status::converged;
+}
+
+}  // namespace
+
+CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, ImageSize size,
+                          const CalibrateConfig& config, std::span<const Eigen::Vector3d> given_points) {
+  CalibrateReport report;
+  report.views.resize(views.size());
+  report.board_points = config.board_shape == BoardShape::given
+                            ? std::vector<Eigen::Vector3d>(given_points.begin(), given_points.end())
+                            : points_in_board(board);
+  report.camera.width_px = size.width_px;
+  report.camera.height_px = size.height_px;
+  Work work;
+  take_usable_views(views, report, work);
+  const std::size_t least = least_views(config);
+  const auto too_few = [&] {
+    refuse(report,
+           "only " + std::to_string(work.views.size()) + " usable photo" + (work.views.size() == 1 ? "" : "s") +
+               " of the board; it takes " + std::to_string(least),
+           "add photos of the board, tilted 20–45° in several directions");
+  };
+  if (work.views.size() < least) {
+    too_few();
+    return report;
+  }
+  const Lens held = set_up_problem(board, config, size, work.problem);
+  work.use_covariances = have_covariances(work.views);
+
+  BundleState state{held, {}, report.board_points};
+  const auto lens = initial_lens(sample(work.views), report.board_points, size, held, work.problem);
+  if (lens) state.lens = *lens;
+  report.camera.lens = state.lens;
+  if (lens) find_poses(report, work, state);
+  if (!lens || work.views.size() < least) {
+    too_few();
+    return report;
+  }
+  constexpr double parallel_rad = 0.05;  // 3°: below it, tilt is what noise makes of it
+  if (spread_of_normals_rad(state.cam_from_board) < parallel_rad) {
+    refuse(report, "all boards are parallel: the focal length cannot be told from the distance",
+           "tilt the board 20–45° in several directions");
+    return report;
+  }
+  for (const BoardView& view : work.views) work.arrays.push_back(make_arrays(view));
+  NoiseEstimate noise;
+  const BundleResult result = solve_robustly(config, report, work, std::move(state), noise);
+  const double variance_scale = fill_estimate(work, result, noise, size, report);
+  fill_views(work, result, noise, variance_scale, report);
+  report.camera.rms_px = report.rms_px;
+  if (work.views.size() < least) {
+    too_few();
+    return report;
+  }
+  judge(work, result, report);
+  return report;
+}
+
+}  // namespace alidade

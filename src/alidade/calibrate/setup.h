@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "alidade/calibrate/bundle.h"
+#include "alidade/calibrate/calibrate.h"
+
+namespace alidade {
+
+/// Every fault of `config`, one sentence each; empty if it is usable.
+[[nodiscard]] std::vector<std::string> faults(const CalibrateConfig& config);
+
+/// How many usable views it takes: three, two where the principal point is held (Zhang 2000, §3.1).
+[[nodiscard]] std::size_t least_views(const CalibrateConfig& config);
+
+/// Free parameters, priors and board of `problem`; returns the lens with every held parameter at its value: its
+/// prior's, else the picture's centre (cx, cy), else zero. `config` must have no faults.
+[[nodiscard]] Lens set_up_problem(const Board& board, const CalibrateConfig& config, ImageSize size,
+                                  BundleProblem& problem);
+
+/// Number of unknowns besides the poses.
+[[nodiscard]] int num_unknown_globals(const BundleProblem& problem);
+
+/// σ of each board point's z [m] from the covariance of the globals; empty for a flat or given board.
+[[nodiscard]] std::vector<double> shape_sigma_z(const BundleProblem& problem, const Eigen::MatrixXd& cov,
+                                                double variance_scale);
+
+/// The parameters that carry a direction of the globals, for a person: "fx, fy and the distances of the boards".
+[[nodiscard]] std::string name_combination(const BundleProblem& problem, const Lens& lens,
+                                           const Eigen::VectorXd& direction);
+
+}  // namespace alidade

@@ -18,23 +18,22 @@ struct GridPoint {
 [[nodiscard]] std::vector<std::optional<GridPoint>> look(const Camera& camera, const PixelGrid& grid,
                                                          double distance_m);
 
-/// Derivative of a point's pixel by a small motion of the camera's frame: x → x + φ × x at infinity (3 columns φ),
-/// x → x + φ × x + |x| τ at a finite distance (6 columns τ, φ; τ has no unit, which keeps the columns alike in size).
+/// Derivative of a point's pixel by a small motion x → x + φ × x + range·τ: 6 columns τ, φ; τ has no unit, which keeps
+/// the columns alike in size. At infinity (range 0) the rotation alone: 3 columns φ.
 using MotionJacobian = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 6>;
-[[nodiscard]] MotionJacobian motion_jacobian(const Eigen::Matrix<double, 2, 3>& J_px_point,
-                                             const Eigen::Vector3d& point_in_cam, bool with_translation);
+[[nodiscard]] MotionJacobian motion_jacobian(const GridPoint& at, double range_m);
 
 /// Covariance of each pixel [px²], G Σ Gᵀ with G = J_params + J_motion K: the lens changes by dp and the motion follows
 /// by K dp = argmin Σ weight |J_params dp + J_motion K dp|². Weights per grid point, those of unseen points are not
 /// read.
 [[nodiscard]] std::vector<Eigen::Matrix2d> implied_covariance(const Eigen::MatrixXd& cov,
                                                               std::span<const std::optional<GridPoint>> seen,
-                                                              std::span<const double> weights, bool with_translation);
+                                                              std::span<const double> weights, double range_m);
 
 /// Square root of the larger eigenvalue of a symmetric 2×2 matrix.
 [[nodiscard]] double largest_sigma(const Eigen::Matrix2d& cov);
 
-/// 1/σ² of each pixel, bounded so that a pixel that is known exactly does not take everything; 1 where all σ are 0.
+/// 1/σ² [px⁻²] of each pixel, bounded so that one that is known exactly does not take everything; 1 where all σ are 0.
 [[nodiscard]] std::vector<double> inverse_variance_weights(std::span<const double> sigmas_px);
 
 }  // namespace alidade::detail

@@ -38,24 +38,24 @@ std::vector<std::optional<GridPoint>> look(const Camera& camera, const PixelGrid
   return seen;
 }
 
-MotionJacobian motion_jacobian(const Eigen::Matrix<double, 2, 3>& J_px_point, const Eigen::Vector3d& point_in_cam,
-                               bool with_translation) {
+MotionJacobian motion_jacobian(const GridPoint& at, double range_m) {
+  const bool with_translation = range_m > 0.0;
   MotionJacobian J(2, with_translation ? 6 : 3);
-  J.rightCols<3>() = -J_px_point * cross_matrix(point_in_cam);
-  if (with_translation) J.leftCols<3>() = J_px_point * point_in_cam.norm();
+  J.rightCols<3>() = -at.projection.J_px_point * cross_matrix(at.point_in_cam);
+  if (with_translation) J.leftCols<3>() = at.projection.J_px_point * range_m;
   return J;
 }
 
 std::vector<Eigen::Matrix2d> implied_covariance(const Eigen::MatrixXd& cov,
                                                 std::span<const std::optional<GridPoint>> seen,
-                                                std::span<const double> weights, bool with_translation) {
-  const Eigen::Index num_motion = with_translation ? 6 : 3;
+                                                std::span<const double> weights, double range_m) {
+  const Eigen::Index num_motion = range_m > 0.0 ? 6 : 3;
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(num_motion, num_motion);
   Eigen::MatrixXd B = Eigen::MatrixXd::Zero(num_motion, cov.cols());
   std::vector<MotionJacobian> J_motion(seen.size());
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (!seen[i]) continue;
-    J_motion[i] = motion_jacobian(seen[i]->projection.J_px_point, seen[i]->point_in_cam, with_translation);
+    J_motion[i] = motion_jacobian(*seen[i], range_m);
     A.noalias() += weights[i] * J_motion[i].transpose() * J_motion[i];
     B.noalias() += weights[i] * J_motion[i].transpose() * seen[i]->projection.J_px_params;
   }
@@ -83,9 +83,7 @@ std::vector<double> inverse_variance_weights(std::span<const double> sigmas_px) 
   std::vector<double> weights(sigmas_px.size(), 1.0);
   if (!(largest > 0.0)) return weights;
   const double floor = 1e-4 * largest * largest;  // no pixel counts more than 10⁴ times another
-  for (std::size_t i = 0; i < weights.size(); ++i) {
-    weights[i] = floor / (floor + sigmas_px[i] * sigmas_px[i]);
-  }
+  for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = 1.0 / (floor + sigmas_px[i] * sigmas_px[i]);
   return weights;
 }
 
@@ -97,11 +95,11 @@ PixelGrid projection_sigma(const Camera& camera, int cols, int rows, double dist
   grid.values.assign(num_pixels, std::numeric_limits<double>::quiet_NaN());
   if (camera.cov.rows() != params(camera.lens).size() || camera.cov.cols() != camera.cov.rows()) return grid;
 
-  const bool with_translation = std::isfinite(distance_m);
+  const double range_m = std::isfinite(distance_m) ? distance_m : 0.0;
   const std::vector<std::optional<detail::GridPoint>> seen = detail::look(camera, grid, distance_m);
   std::vector<double> weights(num_pixels, 1.0), sigmas_px(num_pixels, 0.0);
   for (int pass = 0; pass < 2; ++pass) {
-    const auto covariances = detail::implied_covariance(camera.cov, seen, weights, with_translation);
+    const auto covariances = detail::implied_covariance(camera.cov, seen, weights, range_m);
     for (std::size_t i = 0; i < num_pixels; ++i) sigmas_px[i] = detail::largest_sigma(covariances[i]);
     if (pass == 0) weights = detail::inverse_variance_weights(sigmas_px);
   }

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace alidade::report {
+
+/// Text made harmless in HTML text and quoted attributes: & < > " ' escaped, control characters and broken UTF-8
+/// replaced.
+[[nodiscard]] std::string escaped(std::string_view text);
+
+[[nodiscard]] std::string base64(std::string_view bytes);
+
+/// JSON made harmless inside <script>: every `<` becomes `\u003c`.
+[[nodiscard]] std::string json_in_script(std::string_view json);
+
+/// Appends a coordinate with at most `decimals` (1 or 2) decimals, as short as possible: `12.5`, `-3`.
+void append_coordinate(std::string& out, double value, int decimals = 1);
+
+/// A number to so many significant digits without needless exponents; "–" where missing.
+[[nodiscard]] std::string number_text(double value, int digits = 4);
+
+/// "532.8 ± 1.3": value and 3σ to two digits of 3σ; without a usable σ the value to 4 digits, and nothing behind it.
+struct ValueText {
+  std::string value, plus_minus;
+};
+[[nodiscard]] ValueText value_text(double value, double sigma);
+
+/// Shortened in the middle to at most `max_chars` characters (UTF-8): "lef…01.jpg".
+[[nodiscard]] std::string shortened(std::string_view text, std::size_t max_chars);
+
+}  // namespace alidade::report

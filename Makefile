@@ -1,0 +1,57 @@
+# Two commands: `make demo` and `make test`. Each target installs what it misses, says what it does, and is quick the
+# second time.
+.PHONY: help build demo test bench format tidy clean
+.DEFAULT_GOAL := help
+
+out := build/release
+# Ninja's own choice of jobs, unless told: make test JOBS=1
+jobs := $(if $(JOBS),-j $(JOBS),)
+
+help:
+	@echo "make demo    calibrate a camera from 13 real photos, and write its report"
+	@echo "make test    build and run the tests"
+	@echo "make build   build build/release/alidade"
+	@echo "make bench   measure speed, side by side with OpenCV and mrcal"
+	@echo "make format  format the sources;  make tidy: let clang-tidy read them"
+	@echo "make clean   remove build/"
+	@echo "Each installs the Debian packages it misses (packages.debian), as root or with sudo."
+
+build:
+	@tools/setup build
+	@echo "build: $(out)/alidade"
+	@cmake --preset release >/dev/null
+	@ninja -C $(out) $(jobs) alidade_cli
+
+demo: build
+	@tools/demo_photos build/demo/photos
+	@echo "demo: $(out)/alidade calibrate build/demo/photos/left*.jpg --board 9x6 --square 0.025 --out build/demo/result"
+	@$(out)/alidade calibrate build/demo/photos/left*.jpg --board 9x6 --square 0.025 --out build/demo/result
+
+test:
+	@tools/setup build test
+	@echo "test: building the tests in $(out)"
+	@cmake --preset release -DALIDADE_TESTS=ON >/dev/null
+	@ninja -C $(out) $(jobs)
+	@echo "test: running them"
+	@ctest --test-dir $(out) --output-on-failure --parallel $$(nproc)
+
+bench:
+	@tools/setup build bench
+	@echo "bench: building the benchmarks in $(out)"
+	@cmake --preset release -DALIDADE_BENCH=ON >/dev/null
+	@ninja -C $(out) $(jobs) benchmarks
+	@echo "bench: running them"
+	@bench/run $(out)
+
+format:
+	@tools/setup tidy
+	@echo "format: every source file"
+	@git ls-files '*.h' '*.cpp' | xargs clang-format -i
+
+tidy:
+	@tools/setup build test tidy
+	@tools/check_tidy
+
+clean:
+	@echo "clean: removing build/"
+	@rm -rf build

@@ -21,30 +21,46 @@ MAY_INCLUDE = {
     "testing": FOUNDATIONS | SENSORS | ESTIMATORS | {"simulate", "report", "io"},
 }
 TESTS_MAY_ALSO = {"testing", "simulate", "io"}
-HEAVY = re.compile(r'#include [<"](ceres|opencv2|nlohmann|yaml-cpp|tbb)/')
 INCLUDE = re.compile(r'#include "alidade/(\w+)/')
+# A public header speaks Eigen and std: these cost seconds in every file that sees them.
+HEAVY = re.compile(r'#include [<"](ceres|opencv2|nlohmann|yaml-cpp|tbb|fmt)/')
+# Only io/ opens files; nothing in the library prints, starts threads or looks at a clock or the environment.
+OUTSIDE_WORLD = re.compile(
+    r"#include <(iostream|fstream|thread|chrono|ctime|unistd\.h)>|\b(f?printf|puts|fopen|getenv|imread|imwrite)\(")
+HEADERS_A_FOLDER = 12
+LINES_A_FILE = 400
 
 
-def faults_of(file, folder, is_test):
-    """Every forbidden include of one file, as `file:line: what`."""
+def faults_of(file, folder):
+    """Everything forbidden in one file, as `file:line: what`."""
     if folder not in MAY_INCLUDE:
         return [f"{file}: folder '{folder}' is not in the table"]
+    is_test = file.stem.endswith("_test") or folder == "testing"
     allowed = MAY_INCLUDE[folder] | {folder} | (TESTS_MAY_ALSO if is_test else set())
-    found = []
-    for number, line in enumerate(file.read_text().splitlines(), 1):
+    found, lines = [], file.read_text().splitlines()
+    for number, line in enumerate(lines, 1):
         target = INCLUDE.match(line)
         if target and target[1] not in allowed:
             found.append(f"{file}:{number}: {folder}/ may not include {target[1]}/")
         heavy = HEAVY.match(line)
-        if heavy and file.suffix == ".h" and folder != "testing":
+        if heavy and file.suffix == ".h" and not is_test:
             found.append(f"{file}:{number}: {heavy[1]} belongs in a .cpp")
+        outside = OUTSIDE_WORLD.search(line.split("//")[0])
+        if outside and folder != "io" and not is_test:
+            found.append(f"{file}:{number}: only io/ and cli/ may use {outside[1] or outside[2]}")
+    if len(lines) > LINES_A_FILE:
+        found.append(f"{file}: {len(lines)} lines; a file has at most {LINES_A_FILE}")
     return found
 
 
 def main(root):
-    faults, files = [], sorted(root.rglob("*.[hc]*"))
+    faults, files = [], sorted(p for p in root.rglob("*") if p.suffix in {".h", ".cpp"})
     for file in files:
-        faults += faults_of(file, file.relative_to(root).parts[0], file.stem.endswith("_test"))
+        faults += faults_of(file, file.relative_to(root).parts[0])
+    for folder in sorted({file.parent for file in files}):
+        headers = sum(1 for file in files if file.parent == folder and file.suffix == ".h")
+        if headers > HEADERS_A_FOLDER:
+            faults.append(f"{folder}: {headers} headers; a folder has at most {HEADERS_A_FOLDER}")
     print("\n".join(faults) or f"layers ok ({len(files)} files)")
     return bool(faults)
 

@@ -1,0 +1,89 @@
+#!/usr/bin/env python3
+"""The lints fail on what they forbid, and only on that."""
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+TOOLS = pathlib.Path(__file__).parent
+
+
+def outcome(script, files):
+    """Exit code and output of a lint run on a folder that holds `files` {path: text}."""
+    with tempfile.TemporaryDirectory() as folder:
+        for path, text in files.items():
+            file = pathlib.Path(folder) / path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text)
+        done = subprocess.run([sys.executable, TOOLS / script, folder], capture_output=True, text=True, check=False)
+        return done.returncode, done.stdout.replace(folder + "/", "")
+
+
+class Layers(unittest.TestCase):
+    def assert_refused(self, path, text, message):
+        self.assertEqual(outcome("check_layers.py", {path: text}), (1, message + "\n"))
+
+    def test_arrows_point_one_way(self):
+        self.assert_refused("geometry/a.h", '#include "alidade/camera/camera.h"\n', "geometry/a.h:1: geometry/ may not include camera/")
+        self.assert_refused("camera/a.cpp", '\n#include "alidade/io/csv.h"\n', "camera/a.cpp:2: camera/ may not include io/")
+        self.assert_refused("calibrate/a.cpp", '#include "alidade/simulate/x.h"\n', "calibrate/a.cpp:1: calibrate/ may not include simulate/")
+        self.assert_refused("simulate/a.cpp", '#include "alidade/calibrate/x.h"\n', "simulate/a.cpp:1: simulate/ may not include calibrate/")
+
+    def test_an_unknown_folder_is_refused(self):
+        self.assert_refused("utils/a.h", "", "utils/a.h: folder 'utils' is not in the table")
+
+    def test_heavy_headers_stay_out_of_headers(self):
+        self.assert_refused("imaging/a.h", "#include <opencv2/core.hpp>\n", "imaging/a.h:1: opencv2 belongs in a .cpp")
+
+    def test_only_io_meets_the_outside_world(self):
+        self.assert_refused("calibrate/a.cpp", "#include <iostream>\n", "calibrate/a.cpp:1: only io/ and cli/ may use iostream")
+        self.assert_refused("imaging/a.cpp", "cv::imread(name);\n", "imaging/a.cpp:1: only io/ and cli/ may use imread")
+
+    def test_sizes_hold(self):
+        self.assert_refused("geometry/a.cpp", "\n" * 401, "geometry/a.cpp: 401 lines; a file has at most 400")
+        code, text = outcome("check_layers.py", {f"geometry/h{i}.h": "" for i in range(13)})
+        self.assertEqual(code, 1)
+        self.assertTrue(text.endswith("geometry: 13 headers; a folder has at most 12\n"), text)
+
+    def test_what_is_drawn_is_allowed(self):
+        files = {
+            "camera/a.h": '#include "alidade/geometry/x.h"\n#include "alidade/camera/y.h"\n',
+            "calibrate/a.cpp": '#include "alidade/board/x.h"\n#include <opencv2/core.hpp>\n',
+            "calibrate/a_test.cpp": '#include "alidade/simulate/x.h"\n#include <thread>\n',
+            "io/a.cpp": '#include "alidade/calibrate/x.h"\n#include <cstdio>\n',
+        }
+        self.assertEqual(outcome("check_layers.py", files), (0, "layers ok (4 files)\n"))
+
+
+class Frames(unittest.TestCase):
+    def assert_refused(self, line, message):
+        self.assertEqual(outcome("check_frames.py", {"a.cpp": line}), (1, f"a.cpp:1: {message}\n"), line)
+
+    def assert_allowed(self, line):
+        self.assertEqual(outcome("check_frames.py", {"a.cpp": line})[0], 0, line)
+
+    def test_inner_names_must_cancel(self):
+        self.assert_refused("x = cam_from_world * board_from_world;", "frames do not cancel: cam_from_world * board_from_world")
+        self.assert_refused("f(cam_from_board * point_in_cam);", "frames do not cancel: cam_from_board * a point in cam")
+        self.assert_refused("a.cam_from_world * b[i].board_from_cam", "frames do not cancel: cam_from_world * board_from_cam")
+        self.assert_refused("cam_from_world.rotation * ray_in_cam", "frames do not cancel: cam_from_world * a point in cam")
+        self.assert_refused("cam_from_board.inverse() * point_in_board", "frames do not cancel: board_from_cam * a point in board")
+        self.assert_refused("base_from_head(pan_rad, tilt_rad) * cam_from_head", "frames do not cancel: base_from_head * cam_from_head")
+        self.assert_refused("a_from_b * b_from_c * b_from_d", "frames do not cancel: b_from_c * b_from_d")
+
+    def test_outer_names_must_be_the_result(self):
+        self.assert_refused("const Rigid3 board_from_cam = cam_from_world * world_from_board;", "board_from_cam is assigned cam_from_board")
+        self.assert_refused("const Vec point_in_world = cam_from_world * point_in_world;", "world is assigned cam")
+
+    def test_products_that_cancel_are_allowed(self):
+        self.assert_allowed("const Rigid3 cam_from_board = cam_from_world * world_from_board;")
+        self.assert_allowed("const Vec point_in_cam = view.cam_from_board * point_in_board;")
+        self.assert_allowed("const Vec point_in_board = cam_from_board.inverse() * point_in_cam;")
+        self.assert_allowed("const Vec point_in_cam = cam_from_board * points_in_board[i];")
+        self.assert_allowed("const Vec offset = cam_from_board * point_in_board - true_cam_from_board * point_in_board;")
+        self.assert_allowed("x = cam_from_world * 2.0;  // board_from_world * point_in_cam")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -7,7 +7,7 @@
 
 #include "cli/run.h"
 
-namespace CLI {
+namespace CLI {  // NOLINT(readability-identifier-naming): CLI11's
 class App;
 }
 

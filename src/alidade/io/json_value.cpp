@@ -41,9 +41,10 @@ JsonValue JsonValue::object() {
 JsonValue& JsonValue::operator[](std::string_view key) {
   if (std::holds_alternative<std::nullptr_t>(content_)) content_ = Object{};
   Object& members = std::get<Object>(content_);
-  const auto found = std::find_if(members.begin(), members.end(), [&](const Member& each) { return each.key == key; });
-  if (found != members.end()) return found->value;
-  return members.emplace_back(Member{std::string(key), {}}).value;
+  const auto found =
+      std::find_if(members.begin(), members.end(), [&](const Member& each) { return each.first == key; });
+  if (found != members.end()) return found->second;
+  return members.emplace_back(std::string(key), JsonValue()).second;
 }
 
 void JsonValue::push_back(JsonValue value) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -13,7 +14,7 @@ namespace alidade {
 /// that are not finite become null in the text.
 class JsonValue {
  public:
-  struct Member;
+  using Member = std::pair<std::string, JsonValue>;
   using List = std::vector<JsonValue>;
   using Object = std::vector<Member>;
   using Content = std::variant<std::nullptr_t, bool, std::int64_t, double, std::string, std::vector<std::int64_t>,
@@ -51,11 +52,6 @@ class JsonValue {
 
  private:
   Content content_ = nullptr;
-};
-
-struct JsonValue::Member {
-  std::string key;
-  JsonValue value;
 };
 
 /// The numbers to so many decimals: what a reader can use, in a file of a fitting size.

@@ -115,7 +115,8 @@ std::string lines_of(JsonValue& value) {
   std::string text = "{\n";
   const auto& members = std::get<JsonValue::Object>(value.content());
   for (std::size_t i = 0; i < members.size(); ++i) {
-    text += JsonValue(members[i].key).text() + ": " + members[i].value.text() + (i + 1 < members.size() ? ",\n" : "\n");
+    text +=
+        JsonValue(members[i].first).text() + ": " + members[i].second.text() + (i + 1 < members.size() ? ",\n" : "\n");
   }
   return text + "}\n";
 }

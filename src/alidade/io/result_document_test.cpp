@@ -65,7 +65,11 @@ TEST(ResultDocument, CarriesWhatItIsGiven) {
   document.seed = 7;
   document.seconds = {{"total", 0.5}};
   document.inputs = {{"photo", "a.jpg", 3, "abc"}};
-  document.verdict = {State::refused, ExitCode::cannot_tell, "two photos", "add one", {{"coverage", State::bad, "worst 3σ 2 px", 2.0, 0.5, "px", "trust"}}};
+  document.verdict = {State::refused,
+                      ExitCode::cannot_tell,
+                      "two photos",
+                      "add one",
+                      {{"coverage", State::bad, "worst 3σ 2 px", 2.0, 0.5, "px", "trust"}}};
   document.counts = {3, 2, 0, {{"b.jpg", 0, "no board"}}};
   document.covariance_names = {"fx", "fy"};
   document.covariance_upper = {4.0, 0.5, 9.0};

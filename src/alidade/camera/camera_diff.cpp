@@ -23,7 +23,8 @@ bool has_covariance(const Camera& camera) {
 Seen look_with(const Camera& b, const Rigid3& b_from_a, const Seen& seen_by_a) {
   std::vector<Eigen::Vector3d> points_in_b;
   for (const auto& at : seen_by_a) {
-    points_in_b.push_back(at ? Eigen::Vector3d(b_from_a * at->point_in_cam) : Eigen::Vector3d::Constant(nan));
+    const Eigen::Vector3d point_in_a = at ? at->point_in_cam : Eigen::Vector3d::Constant(nan);
+    points_in_b.push_back(b_from_a * point_in_a);
   }
   const std::vector<std::optional<LensProjection>> projections = project_with_jacobians(b, points_in_b);
   Seen seen(seen_by_a.size());

@@ -3,21 +3,36 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "alidade/camera/camera.h"
 #include "alidade/io/files.h"
 
 namespace alidade {
 
+/// `opencv` is cv::FileStorage (YAML; XML and JSON are read too), `ros` a camera_info YAML, `kalibr` a camchain YAML,
+/// `mrcal` a .cameramodel, `colmap` a cameras.txt. The traps of each: docs/maths/camera-models.md.
 enum class CameraFormat { alidade, opencv, ros, kalibr, mrcal, colmap };
 
-/// Reads a camera file of any known format, recognised by its content. Throws InputError.
+/// Reads a camera file of any known format, recognised by its content. Of a file with several cameras one is chosen by
+/// its name in the file: "camchain.yaml:cam1". Throws InputError, also for a lens that no model of ours can be.
 [[nodiscard]] Camera read_camera(const std::filesystem::path& file);
 
-/// A camera as text of a format. Throws InputError saying what would be lost, unless `lossy`.
+/// The same of text that is at hand; `name` stands for the file in messages, `choice` is the camera's name in the file
+/// (empty: the only one).
+[[nodiscard]] Camera parse_camera(std::string_view text, const std::string& name, const std::string& choice = "");
+
+/// A camera as text of a format. Throws InputError saying what would be lost, unless `lossy`; also if the format has no
+/// such lens at all.
 [[nodiscard]] std::string camera_text(const Camera& camera, CameraFormat format, bool lossy = false);
+
+/// What of the lens the format cannot hold, "skew 0.3 px" each; camera_text() refuses these.
+[[nodiscard]] std::vector<std::string> lens_losses(const Camera& camera, CameraFormat format);
+/// What else a format does not hold (covariance, RMS): worth a note, no reason to refuse.
+[[nodiscard]] std::vector<std::string> other_losses(const Camera& camera, CameraFormat format);
 
 /// The format of a name (`opencv`, `ros`, …). Throws InputError for an unknown one.
 [[nodiscard]] CameraFormat camera_format(std::string_view name);
+[[nodiscard]] std::string_view camera_format_name(CameraFormat format);
 
 }  // namespace alidade

@@ -1,0 +1,126 @@
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/io/camera_formats.h"
+
+namespace alidade::detail {
+namespace {
+
+/// The covariance of {names, upper}: upper triangle row by row, in the order of `names`; parameters that are not named
+/// are held and have zero rows.
+Eigen::MatrixXd read_covariance(const YAML::Node& node, const Fields& fields, const std::vector<std::string>& known) {
+  const Fields entries(node, fields.file(), fields.full("covariance."));
+  const std::vector<std::string> names = entries.texts("names");
+  const std::vector<double> upper = entries.numbers("upper");
+  if (upper.size() != names.size() * (names.size() + 1) / 2) {
+    refuse(entries.file(), entries.full("upper"),
+           fmt::format("{} numbers are not the upper triangle of {} parameters", upper.size(), names.size()));
+  }
+  std::vector<Eigen::Index> index;
+  for (const std::string& name : names) {
+    const auto found = std::find(known.begin(), known.end(), name);
+    if (found == known.end())
+      refuse(entries.file(), entries.full("names"), "'" + name + "' is no parameter of the model");
+    const Eigen::Index at = found - known.begin();
+    if (std::find(index.begin(), index.end(), at) != index.end()) {
+      refuse(entries.file(), entries.full("names"), "'" + name + "' stands twice");
+    }
+    index.push_back(at);
+  }
+  const Eigen::Index size = static_cast<Eigen::Index>(known.size());
+  Eigen::MatrixXd cov = Eigen::MatrixXd::Zero(size, size);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < index.size(); ++i) {
+    for (std::size_t j = i; j < index.size(); ++j) cov(index[i], index[j]) = cov(index[j], index[i]) = upper[next++];
+  }
+  for (Eigen::Index i = 0; i < size; ++i) {
+    for (Eigen::Index j = 0; j < size; ++j) {
+      const bool is_possible =
+          cov(i, i) >= 0.0 && std::abs(cov(i, j)) <= std::sqrt(cov(i, i) * cov(j, j)) * (1.0 + 1e-9);
+      if (!is_possible) {
+        refuse(entries.file(), entries.full("upper"),
+               fmt::format("{} and {} cannot vary together like that: not a covariance",
+                           known[static_cast<std::size_t>(i)], known[static_cast<std::size_t>(j)]));
+      }
+    }
+  }
+  return cov;
+}
+
+void refuse_unknown_keys(const Fields& fields, const std::vector<std::string>& names) {
+  std::vector<std::string> known{"model", "width", "height"};
+  known.insert(known.end(), names.begin(), names.end());
+  known.insert(known.end(), {"rms_px", "source", "covariance"});
+  for (const std::string& key : fields.keys()) {
+    if (std::find(known.begin(), known.end(), key) != known.end()) continue;
+    refuse(fields.file(), fields.full(key),
+           fmt::format("is not a key of this model; known: {}", fmt::join(known, " ")));
+  }
+}
+
+/// One line of text as a YAML string in double quotes.
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+  }
+  return out + "\"";
+}
+
+}  // namespace
+
+Camera read_alidade(const YAML::Node& root, const CameraText& file) {
+  const Fields fields(root, file.name);
+  if (!file.choice.empty()) refuse(file.name, "", "holds one camera without a name; leave ':" + file.choice + "' out");
+  const std::string model = fields.text("model");
+  const std::optional<Lens> lens = make_lens(model);
+  if (!lens) refuse(file.name, "model", "'" + model + "' is not known; known: pinhole brown kannala_brandt");
+  const std::vector<std::string> names = param_names(*lens);
+  refuse_unknown_keys(fields, names);
+
+  Camera camera;
+  camera.width_px = fields.size("width");
+  camera.height_px = fields.size("height");
+  Eigen::VectorXd values = params(*lens);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const bool is_optional = names[i] == "skew";  // no other format has it; what is not there is zero
+    if (is_optional && !fields.has(names[i])) continue;
+    values[static_cast<Eigen::Index>(i)] = fields.number(names[i]);
+    if (i < 2 && !(fields.number(names[i]) > 0.0)) refuse(file.name, names[i], "is not above zero");
+  }
+  camera.lens = with_params(*lens, values);
+  if (fields.has("rms_px")) {
+    camera.rms_px = fields.number("rms_px");
+    if (camera.rms_px < 0.0) refuse(file.name, "rms_px", "is below zero");
+  }
+  if (fields.has("source")) camera.source = fields.text("source");
+  if (fields.has("covariance")) camera.cov = read_covariance(root["covariance"], fields, names);
+  return camera;
+}
+
+std::string write_alidade(const Camera& camera) {
+  const std::vector<std::string> names = param_names(camera.lens);
+  const Eigen::VectorXd values = params(camera.lens);
+  std::string text =
+      fmt::format("model: {}\nwidth: {}\nheight: {}\n", model_name(camera.lens), camera.width_px, camera.height_px);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    text += fmt::format("{}: {}\n", names[i], number_text(values[static_cast<Eigen::Index>(i)]));
+  }
+  if (camera.rms_px > 0.0) text += fmt::format("rms_px: {}\n", number_text(camera.rms_px));
+  if (!camera.source.empty()) text += fmt::format("source: {}\n", quoted(camera.source));
+  if (camera.cov.rows() != values.size() || camera.cov.cols() != values.size()) return text;
+  text += fmt::format("covariance:  # upper triangle, row by row\n  names: [{}]\n  upper: [", fmt::join(names, ", "));
+  for (Eigen::Index i = 0; i < camera.cov.rows(); ++i) {
+    for (Eigen::Index j = i; j < camera.cov.cols(); ++j) {
+      const bool is_last = i + 1 == camera.cov.rows();
+      text += number_text(camera.cov(i, j)) + (is_last ? "]\n" : j + 1 < camera.cov.cols() ? ", " : ",\n          ");
+    }
+  }
+  return text;
+}
+
+}  // namespace alidade::detail

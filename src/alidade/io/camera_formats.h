@@ -1,0 +1,94 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/camera/camera.h"
+#include "alidade/io/files.h"
+
+namespace YAML {
+class Node;
+}
+
+/// The formats behind read_camera() and camera_text(), one pair of functions each. Readers throw InputError.
+namespace alidade::detail {
+
+/// Text of a file with the name that messages begin with and the camera that is wanted (empty: the only one).
+struct CameraText {
+  std::string_view text;
+  std::string name;
+  std::string choice;
+};
+
+[[nodiscard]] Camera read_alidade(const YAML::Node& root, const CameraText& file);
+[[nodiscard]] std::string write_alidade(const Camera& camera);
+
+[[nodiscard]] Camera read_opencv(const YAML::Node& root, const CameraText& file);
+[[nodiscard]] Camera read_opencv_xml(const CameraText& file);
+[[nodiscard]] std::string write_opencv(const Camera& camera);
+
+[[nodiscard]] Camera read_ros(const YAML::Node& root, const CameraText& file);
+[[nodiscard]] std::string write_ros(const Camera& camera);
+
+[[nodiscard]] Camera read_kalibr(const YAML::Node& root, const CameraText& file);
+[[nodiscard]] std::string write_kalibr(const Camera& camera);
+
+[[nodiscard]] Camera read_mrcal(const CameraText& file);
+[[nodiscard]] std::string write_mrcal(const Camera& camera);
+
+[[nodiscard]] Camera read_colmap(const CameraText& file);
+[[nodiscard]] std::string write_colmap(const Camera& camera);
+
+/// Throws `file: key: what`.
+[[noreturn]] void refuse(const std::string& file, const std::string& key, const std::string& what);
+/// A number of at most 1e12 in size, or refuses.
+[[nodiscard]] double checked_number(std::string_view text, const std::string& file, const std::string& key);
+/// A picture's width or height: a whole number from 1 to 1 000 000.
+[[nodiscard]] int checked_size(double value, const std::string& file, const std::string& key);
+/// The index of the wanted camera among those of a file; refuses where the choice is not clear, and names them.
+[[nodiscard]] std::size_t chosen_camera(const std::vector<std::string>& names, const CameraText& file);
+
+/// Shortest text that reads back as the same double, always with a point or an exponent.
+[[nodiscard]] std::string number_text(double value);
+[[nodiscard]] std::string number_list(const std::vector<double>& values);
+
+/// fx, fy, cx, cy of any lens, and the distortion in the order k1 k2 p1 p2 k3 (brown) or k1 k2 k3 k4.
+[[nodiscard]] std::vector<double> focal_and_centre(const Camera& camera);
+[[nodiscard]] std::vector<double> distortion(const Camera& camera);
+
+/// A camera from fx, fy, cx, cy and OpenCV's coefficients k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 τx τy (0, 4, 5, 8, 12 or
+/// 14 of them). Refuses those that are not zero and that a brown lens does not have; all zero is a pinhole.
+[[nodiscard]] Camera opencv_camera(const std::vector<double>& focal_centre, const std::vector<double>& coefficients,
+                                   const std::string& file, const std::string& key);
+/// A fisheye from fx, fy, cx, cy and k1…k4.
+[[nodiscard]] Camera fisheye_camera(const std::vector<double>& focal_centre, const std::vector<double>& coefficients,
+                                    const std::string& file, const std::string& key);
+
+/// The entries of a YAML map with the file's name in every message.
+class Fields {
+ public:
+  /// Refuses what is not a map, and a key that stands twice. `prefix` begins the keys in messages ("cam0.").
+  Fields(const YAML::Node& map, std::string file, std::string prefix = "");
+
+  [[nodiscard]] bool has(const std::string& key) const;
+  [[nodiscard]] double number(const std::string& key) const;
+  [[nodiscard]] int size(const std::string& key) const;
+  [[nodiscard]] std::string text(const std::string& key) const;
+  [[nodiscard]] std::vector<double> numbers(const std::string& key) const;
+  [[nodiscard]] std::vector<std::string> texts(const std::string& key) const;
+  /// The numbers of {rows, cols, data}, row-major. Refuses where they are not rows × cols.
+  [[nodiscard]] std::vector<double> matrix(const std::string& key) const;
+  [[nodiscard]] std::vector<std::string> keys() const;
+  [[nodiscard]] const std::string& file() const { return file_; }
+  [[nodiscard]] std::string full(const std::string& key) const { return prefix_ + key; }
+
+ private:
+  [[nodiscard]] YAML::Node at(const std::string& key) const;
+
+  const YAML::Node& map_;
+  std::string file_;
+  std::string prefix_;
+};
+
+}  // namespace alidade::detail

@@ -13,13 +13,13 @@ enum class State { good, care, bad, refused, not_converged };
 
 /// One thing that was checked: "coverage: worst 3σ 0.5 px, bottom-left corner".
 struct Check {
-  std::string name;
+  std::string name = {};
   State state = State::good;
-  std::string text;
+  std::string text = {};
   double value = 0.0;  ///< The figure that decides, in `unit`.
   double limit = 0.0;  ///< Beyond it the state changes.
-  std::string unit;
-  std::string figure;  ///< Id of the figure in the report that shows it.
+  std::string unit = {};
+  std::string figure = {};  ///< Id of the figure in the report that shows it.
 };
 
 /// What an estimator says of its own answer: a state, one sentence, what to add, and the checks behind it.

@@ -32,4 +32,15 @@ struct BoardDetections {
 [[nodiscard]] BoardDetections find_boards(std::size_t num_photos, const PhotoLoader& load_photo, const Board& board,
                                           bool reject_partial = false, const Progress& progress = {});
 
+/// Where a board stands by a first calibration, for the second extraction. Photos without one are left alone.
+struct KnownBoard {
+  const BoardView* first = nullptr;  ///< As found before; null: leave this photo alone.
+  Rigid3 cam_from_board;
+};
+
+/// refind_board() for every photo with a known board; a photo whose second extraction fails gets the reason.
+[[nodiscard]] std::vector<BoardDetection> refind_boards(const std::vector<KnownBoard>& known,
+                                                        const PhotoLoader& load_photo, const Board& board,
+                                                        const Camera& camera, const Progress& progress = {});
+
 }  // namespace alidade

@@ -1,0 +1,63 @@
+#include "alidade/calibrate/calibrate_photos.h"
+
+namespace alidade {
+namespace {
+
+std::string text(const PhotoSize& size) { return std::to_string(size.width_px) + "x" + std::to_string(size.height_px); }
+
+/// Takes over what was found; photos of another size than the first are left out.
+void take_detections(BoardDetections&& found, PhotoCalibration& result) {
+  PhotoSize first;
+  for (std::size_t i = 0; i < found.photos.size(); ++i) {
+    const PhotoSize& size = found.sizes[i];
+    if (size.width_px == 0) ++result.num_unreadable;
+    if (first.width_px == 0) first = size;
+    if (found.photos[i].found() && (size.width_px != first.width_px || size.height_px != first.height_px)) {
+      result.reasons[i] = "is " + text(size) + ", but the first photo is " + text(first);
+    } else if (found.photos[i].found()) {
+      result.views[i].corners = std::move(found.photos[i].view.corners);
+    } else {
+      result.reasons[i] = found.photos[i].reason;
+    }
+  }
+  result.size = {first.width_px, first.height_px};
+}
+
+/// Replaces the corners of every photo that the first calibration used by those of the second extraction.
+void extract_again(const PhotoLoader& load_photo, const Board& board, const CalibrateReport& first,
+                   const Progress& progress, PhotoCalibration& result) {
+  std::vector<KnownBoard> known(result.views.size());
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    if (first.views[i].used) known[i] = {&result.views[i], first.views[i].cam_from_board};
+  }
+  auto again = refind_boards(known, load_photo, board, first.camera, progress);
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    if (known[i].first == nullptr || !again[i].found() || again[i].view.corners.empty()) continue;
+    result.views[i].corners = std::move(again[i].view.corners);
+  }
+}
+
+}  // namespace
+
+PhotoCalibration calibrate_photos(const std::vector<std::string>& names, const PhotoLoader& load_photo,
+                                  const Board& board, const CalibrateConfig& config,
+                                  std::span<const Eigen::Vector3d> given_points, const Progress& progress) {
+  PhotoCalibration result;
+  result.reasons.resize(names.size());
+  for (const std::string& name : names) result.views.push_back({.photo = name, .corners = {}});
+  take_detections(find_boards(names.size(), load_photo, board, false, progress), result);
+
+  CalibrateConfig flat = config;
+  if (config.board_shape != BoardShape::given) flat.board_shape = BoardShape::flat;
+  const CalibrateReport first = calibrate(board, result.views, result.size, flat, given_points);
+  if (first.status == CalibrateReport::Status::converged) {
+    extract_again(load_photo, board, first, progress, result);
+  }
+  result.report = calibrate(board, result.views, result.size, config, given_points);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (!result.reasons[i].empty()) result.report.views[i].reason = result.reasons[i];
+  }
+  return result;
+}
+
+}  // namespace alidade

@@ -1,0 +1,24 @@
+#pragma once
+
+#include "alidade/calibrate/calibrate_photos.h"
+#include "alidade/calibrate/next_photo.h"
+#include "alidade/calibrate/study.h"
+#include "alidade/estimation/verdict.h"
+
+namespace alidade {
+
+/// Everything `alidade calibrate` has to say. `study` and `next` are empty where there is no camera.
+struct Calibration {
+  PhotoCalibration photos;
+  CalibrateConfig config;  ///< As used: a shape that does not transfer is not used.
+  CalibrationStudy study;
+  NextPhotoPlan next;
+  Verdict verdict;
+};
+
+/// Judges a finished solve: studies it, plans the next photo and gives the verdict. A board shape that was asked for
+/// but does not transfer from one half of the photos to the other is dropped, and the board solved flat.
+[[nodiscard]] Calibration judge_calibration(const Board& board, PhotoCalibration photos, CalibrateConfig config,
+                                            const Progress& progress = {});
+
+}  // namespace alidade

@@ -1,0 +1,254 @@
+#include "alidade/calibrate/calibration_verdict.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "alidade/calibrate/weights.h"
+
+namespace alidade {
+namespace {
+
+/// A number with two significant digits, as people read σ.
+std::string two(double value) {
+  std::array<char, 32> text{};
+  if (!(std::abs(value) > 0.0)) return "0";
+  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(std::abs(value)))), 0, 6);
+  std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
+  return text.data();
+}
+
+State grade(double value, double care, double bad) {
+  if (!(value <= bad)) return State::bad;  // NaN is bad, too
+  return value <= care ? State::good : State::care;
+}
+
+/// Where in the picture a pixel lies, for a person.
+std::string place(const Eigen::Vector2d& px, const Camera& camera) {
+  const double x = px.x() / camera.width_px, y = px.y() / camera.height_px;
+  const std::string row = y < 1.0 / 3 ? "top" : y > 2.0 / 3 ? "bottom" : "";
+  const std::string col = x < 1.0 / 3 ? "left" : x > 2.0 / 3 ? "right" : "";
+  if (row.empty() && col.empty()) return "in the middle";
+  return "at the " + row + (row.empty() || col.empty() ? "" : " ") + col;
+}
+
+struct Worst {
+  double value = 0.0;
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+};
+
+Worst worst_of(const PixelGrid& grid) {
+  Worst worst;
+  for (int row = 0; row < grid.rows; ++row) {
+    for (int col = 0; col < grid.cols; ++col) {
+      const double value = grid.values[static_cast<std::size_t>(row * grid.cols + col)];
+      if (std::isfinite(value) && value > worst.value) worst = {value, grid.px(col, row)};
+    }
+  }
+  return worst;
+}
+
+/// Share [%] of the picture where 3σ is at most `limit_px`.
+double share_below(const PixelGrid& sigma, double limit_px) {
+  const auto below =
+      std::count_if(sigma.values.begin(), sigma.values.end(), [&](double value) { return 3.0 * value <= limit_px; });
+  return 100.0 * static_cast<double>(below) / static_cast<double>(std::max<std::size_t>(1, sigma.values.size()));
+}
+
+Check coverage(const CalibrateReport& report, const CalibrationStudy& study) {
+  const Worst worst = worst_of(study.sigma_infinity);
+  Check check{.name = "coverage", .value = 3.0 * worst.value, .limit = 1.0, .unit = "px", .figure = "sigma"};
+  check.state = grade(check.value, 1.0, 10.0);
+  check.text = "worst 3σ " + two(check.value) + " px, " + place(worst.px, report.camera);
+  return check;
+}
+
+Check lens_adequate(const CalibrationStudy& study) {
+  Check check{.name = "lens adequate", .limit = 3.0, .unit = "σ", .figure = "rings"};
+  for (const ResidualRing& ring : study.rings) {
+    if (ring.count < 10) continue;
+    check.value = std::max({check.value, std::abs(ring.mean_radial_px) / ring.sigma_px,
+                            std::abs(ring.mean_tangential_px) / ring.sigma_px});
+  }
+  const HeldOutModel* better = nullptr;
+  for (const HeldOutModel& model : study.models) {
+    const bool gains = model.is_richer && model.gain_px > 2.0 * model.sigma_px && model.gain_px > 0.0;
+    if (gains && (!better || model.gain_px > better->gain_px)) better = &model;
+  }
+  check.state = grade(check.value, 3.0, 8.0);
+  check.text = check.state == State::good ? "no ring departs from zero by more than 3σ"
+                                          : "a ring departs from zero by " + two(check.value) + "σ";
+  if (better) {
+    check.state = std::max(check.state, State::care);
+    check.text = better->name + " lowers the held-out error by " + two(better->gain_px) + " ± " +
+                 two(3.0 * better->sigma_px) + " px";
+  }
+  return check;
+}
+
+Check consistent(const CalibrationStudy& study) {
+  Check check{.name = "consistent", .limit = 3.0, .unit = "σ", .figure = "halves"};
+  if (!study.halves) {
+    check.state = State::care;
+    check.text = "too few photos to compare two halves";
+    return check;
+  }
+  check.value = study.halves->worst_z;
+  check.state = grade(check.value, 3.0, 6.0);
+  check.text = "halves differ by " + two(check.value) + "σ in " + study.halves->worst_name;
+  return check;
+}
+
+/// Corners against their own σ; without one, against the bulk of the others.
+struct Tails {
+  double ratio = std::nan("");  ///< RMS over what the corners' covariances predict.
+  int far = 0;                  ///< Corners more than 6 robust σ off.
+  double worst_px = 0.0;
+  std::string worst_photo;
+  int worst_index = 0;
+};
+
+Tails corner_tails(const CalibrateReport& report, std::span<const BoardView> views) {
+  Tails tails;
+  std::vector<double> norms;
+  double predicted = 0.0, seen = 0.0;
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    if (!report.views[k].used) continue;
+    for (std::size_t i = 0; i < views[k].corners.size(); ++i) {
+      const CornerFit& fit = report.views[k].corners[i];
+      if (!fit.residual_px.allFinite()) continue;
+      norms.push_back(fit.residual_px.norm());
+      if (norms.back() > tails.worst_px) {
+        tails.worst_px = norms.back();
+        tails.worst_photo = views[k].photo;
+        tails.worst_index = views[k].corners[i].index;
+      }
+      if (!fit.used) continue;
+      predicted += views[k].corners[i].cov.trace();
+      seen += fit.residual_px.squaredNorm();
+    }
+  }
+  if (norms.empty()) return tails;
+  const auto middle = norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
+  std::nth_element(norms.begin(), middle, norms.end());
+  const double robust_sigma = *middle / std::sqrt(2.0 * std::log(2.0));
+  tails.far = static_cast<int>(
+      std::count_if(norms.begin(), norms.end(), [&](double norm) { return norm > 6.0 * robust_sigma; }));
+  if (have_covariances(views)) tails.ratio = std::sqrt(seen / predicted);
+  return tails;
+}
+
+Check honest_corners(const CalibrateReport& report, std::span<const BoardView> views) {
+  const Tails tails = corner_tails(report, views);
+  Check check{.name = "honest corners", .limit = 2.0, .unit = "", .figure = "residuals"};
+  if (std::isfinite(tails.ratio)) {
+    check.value = tails.ratio;
+    check.state = grade(tails.ratio, 2.0, 5.0);
+    check.text = "RMS is " + two(tails.ratio) + " × what the corners' own σ predicts";
+  } else {
+    constexpr double usual_px = 0.25;  // RMS of a good detector on a good board stays below
+    check.value = report.rms_px;
+    check.limit = usual_px;
+    check.unit = "px";
+    check.state = grade(report.rms_px, usual_px, 4.0 * usual_px);
+    check.text = "RMS " + two(report.rms_px) + " px; the corners bring no σ to compare with";
+  }
+  if (tails.far > 0) {
+    const bool many = tails.far > 2 + report.corners_used / 500;
+    check.state = std::max(check.state, many ? State::bad : State::care);
+    check.text += "; " + std::to_string(tails.far) + (tails.far == 1 ? " corner is" : " corners are") +
+                  " more than 6σ off, the worst " + two(tails.worst_px) + " px (" + tails.worst_photo + ", corner " +
+                  std::to_string(tails.worst_index) + ")";
+  }
+  return check;
+}
+
+Check board_flat(const CalibrationStudy& study, const CalibrateConfig& config) {
+  Check check{.name = "board flat", .limit = 0.95, .unit = "", .figure = "board"};
+  const bool shaped = config.board_shape == BoardShape::bow || config.board_shape == BoardShape::free;
+  if (!study.transfer) {
+    check.state = State::care;
+    check.text = "too few photos to test the board's shape";
+    return check;
+  }
+  const std::string figures = "RMS of unseen photos " + two(study.transfer->flat_rms_px) + " px flat, " +
+                              two(study.transfer->transfer_rms_px) + " px with the shape learned on the others";
+  check.value = study.transfer->transfer_rms_px / study.transfer->flat_rms_px;
+  if (shaped) {
+    check.state = study.transfer->transfers() ? State::good : State::bad;
+    check.text = (study.transfer->transfers() ? "the shape transfers: " : "the shape does not transfer: ") + figures;
+  } else {
+    check.state = check.value < 0.9 ? State::care : State::good;
+    check.text = (check.value < 0.9 ? "the board bends: " : "flat as far as the photos tell: ") + figures;
+  }
+  return check;
+}
+
+Check principal_point(const CalibrateReport& report) {
+  const Eigen::VectorXd values = params(report.camera.lens);
+  const double x = (values[2] + 0.5) / report.camera.width_px - 0.5,
+               y = (values[3] + 0.5) / report.camera.height_px - 0.5;
+  Check check{.name = "principal point",
+              .value = 100.0 * std::max(std::abs(x), std::abs(y)),
+              .limit = 15.0,
+              .unit = "%",
+              .figure = "estimate"};
+  check.state = grade(check.value, 15.0, 35.0);
+  check.text = two(check.value) + " % of the picture from its centre";
+  return check;
+}
+
+std::string advice(const Verdict& verdict, const NextPhotoPlan& next, double worst_px) {
+  for (const Check& check : verdict.checks) {
+    if (check.state == State::good) continue;
+    if (check.name == "honest corners" && check.state == State::bad)
+      return "look at the corners named, or extract them again";
+    if (check.name == "board flat" && check.text.starts_with("the board bends")) return "use --board-shape free";
+    if (check.name == "lens adequate") return "try a richer lens model (--model), see the held-out errors";
+    if (check.name == "consistent") return "add photos: the halves do not agree";
+    if (check.name == "coverage" && !next.photos.empty()) {
+      return "add a photo as proposed: it lowers the worst 3σ from " + two(worst_px) + " to " +
+             two(next.photos.front().worst_3sigma_px) + " px";
+    }
+  }
+  return "";
+}
+
+}  // namespace
+
+Verdict calibration_verdict(const CalibrateReport& report, const CalibrationStudy& study,
+                            std::span<const BoardView> views, const CalibrateConfig& config,
+                            const NextPhotoPlan& next) {
+  Verdict verdict;
+  verdict.checks = {coverage(report, study),       lens_adequate(study),      consistent(study),
+                    honest_corners(report, views), board_flat(study, config), principal_point(report)};
+  const Check* worst = &verdict.checks.front();
+  for (const Check& check : verdict.checks) {
+    if (check.state > worst->state) worst = &check;
+  }
+  verdict.state = worst->state;
+  constexpr double wanted_px = 0.5;
+  const std::string trust =
+      "3σ is below 0.5 px in " + two(share_below(study.sigma_infinity, wanted_px)) + " % of the picture";
+  if (verdict.state == State::good) {
+    verdict.sentence = "Good: " + trust;
+  } else {
+    verdict.sentence = std::string(verdict.state == State::care ? "Usable with care: " : "Not to be trusted: ") +
+                       trust + "; " + worst->name + ": " + worst->text;
+  }
+  verdict.to_add = advice(verdict, next, 3.0 * worst_of(study.sigma_infinity).value);
+  return verdict;
+}
+
+Verdict refusal_verdict(const CalibrateReport& report) {
+  Verdict verdict;
+  const bool degenerate = report.status == CalibrateReport::Status::degenerate;
+  verdict.state = degenerate ? State::refused : State::not_converged;
+  verdict.exit_code = degenerate ? ExitCode::cannot_tell : ExitCode::no_convergence;
+  verdict.sentence = report.reason;
+  verdict.to_add = report.to_add;
+  return verdict;
+}
+
+}  // namespace alidade

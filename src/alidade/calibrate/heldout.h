@@ -1,0 +1,17 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "alidade/calibrate/study.h"
+
+namespace alidade {
+
+/// Error on photos left out (five folds; the camera is held, their poses are found anew), for the model in use and for
+/// its simpler and richer neighbours. `views` are those that take part.
+[[nodiscard]] std::vector<HeldOutModel> heldout_models(const Board& board, std::span<const BoardView> views,
+                                                       ImageSize size, const CalibrateConfig& config,
+                                                       const std::vector<Eigen::Vector3d>& board_points,
+                                                       const Progress& progress);
+
+}  // namespace alidade

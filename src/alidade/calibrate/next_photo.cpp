@@ -1,0 +1,155 @@
+#include "alidade/calibrate/next_photo.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/calibrate/bundle.h"
+#include "alidade/calibrate/normal_equations.h"
+#include "alidade/camera/projection_sigma.h"
+
+namespace alidade {
+namespace {
+
+struct Candidate {
+  Rigid3 cam_from_board;
+  Eigen::MatrixXd information;  ///< Of the free lens parameters, per unit noise.
+};
+
+std::vector<int> free_parameters(const Camera& camera) {
+  std::vector<int> free;
+  for (int i = 0; i < camera.cov.rows(); ++i) {
+    if (camera.cov(i, i) > 0.0) free.push_back(i);
+  }
+  return free;
+}
+
+Eigen::MatrixXd submatrix(const Eigen::MatrixXd& full, const std::vector<int>& rows) {
+  const auto n = static_cast<Eigen::Index>(rows.size());
+  Eigen::MatrixXd part(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      part(i, j) = full(rows[static_cast<std::size_t>(i)], rows[static_cast<std::size_t>(j)]);
+    }
+  }
+  return part;
+}
+
+/// The view of all corners at a pose, with no residual; none where a corner falls outside the picture.
+std::optional<ViewArrays> see(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
+                              const Rigid3& cam_from_board) {
+  BoardView view;
+  for (std::size_t i = 0; i < board_points.size(); ++i) {
+    const auto px = project(camera, cam_from_board * board_points[i]);
+    const bool inside =
+        px && px->x() > 0.0 && px->y() > 0.0 && px->x() < camera.width_px - 1.0 && px->y() < camera.height_px - 1.0;
+    if (inside) view.corners.push_back({static_cast<int>(i), *px});
+  }
+  if (view.corners.size() < board_points.size()) return std::nullopt;
+  return make_arrays(view);
+}
+
+std::optional<Candidate> evaluate(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
+                                  const Rigid3& cam_from_board, const std::vector<int>& free) {
+  const auto view = see(camera, board_points, cam_from_board);
+  if (!view) return std::nullopt;
+  BundleProblem problem;
+  problem.views = {&*view, 1};
+  problem.free_lens = free;
+  problem.prior_value = params(camera.lens);
+  problem.prior_information = Eigen::VectorXd::Zero(problem.prior_value.size());
+  NormalEquations eq;
+  if (!linearize(problem, {camera.lens, {cam_from_board}, board_points}, eq)) return std::nullopt;
+  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> V(eq.V.front());
+  if (V.info() != Eigen::Success) return std::nullopt;
+  const Eigen::MatrixXd H = eq.H.selfadjointView<Eigen::Lower>();
+  return Candidate{cam_from_board, H - eq.coupling(0) * V.solve(eq.coupling(0).transpose())};
+}
+
+/// The board turned by `tilt` about its middle, its middle seen at `px`, `fill` of the picture's width wide.
+std::optional<Rigid3> place(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
+                            const Eigen::Vector2d& px, double fill, const Eigen::Vector3d& tilt) {
+  Eigen::AlignedBox3d box;
+  for (const auto& point : board_points) box.extend(point);
+  const auto ray = unproject(camera, px);
+  if (!ray || !(ray->z() > 0.1)) return std::nullopt;
+  const double distance_m = params(camera.lens)[0] * box.sizes().x() / (fill * camera.width_px);
+  const Eigen::Quaterniond rotation = exp_so3(tilt);
+  const Eigen::Vector3d middle_in_cam = *ray * (distance_m / ray->z());
+  return Rigid3{rotation, middle_in_cam - rotation * box.center()};
+}
+
+std::vector<Candidate> all_candidates(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
+                                      const std::vector<int>& free) {
+  constexpr double tilt = 0.55;  // 32°: what a person holds easily
+  const std::vector<Eigen::Vector3d> tilts = {{0, 0, 0}, {tilt, 0, 0}, {-tilt, 0, 0}, {0, tilt, 0}, {0, -tilt, 0}};
+  std::vector<Candidate> found;
+  for (const double fill : {0.3, 0.55}) {
+    for (int row = 0; row < 5; ++row) {
+      for (int col = 0; col < 5; ++col) {
+        const Eigen::Vector2d px((0.1 + 0.2 * col) * camera.width_px, (0.1 + 0.2 * row) * camera.height_px);
+        for (const Eigen::Vector3d& turn : tilts) {
+          const auto pose = place(camera, board_points, px, fill, turn);
+          auto candidate = pose ? evaluate(camera, board_points, *pose, free) : std::nullopt;
+          if (candidate) found.push_back(std::move(*candidate));
+        }
+      }
+    }
+  }
+  return found;
+}
+
+double worst_3sigma(Camera camera, const Eigen::MatrixXd& cov, const std::vector<int>& free) {
+  camera.cov.setZero();
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    for (std::size_t j = 0; j < free.size(); ++j) {
+      camera.cov(free[i], free[j]) = cov(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    }
+  }
+  double worst = 0.0;
+  const PixelGrid sigma = projection_sigma(camera, 9, 7, std::numeric_limits<double>::infinity());
+  for (const double value : sigma.values) {
+    if (std::isfinite(value)) worst = std::max(worst, 3.0 * value);
+  }
+  return worst;
+}
+
+}  // namespace
+
+NextPhotoPlan plan_next_photos(const Camera& camera, double noise_px, const std::vector<Eigen::Vector3d>& board_points,
+                               int num_photos, const Progress& progress) {
+  NextPhotoPlan plan;
+  const std::vector<int> free = free_parameters(camera);
+  if (free.empty() || !(noise_px > 0.0)) return plan;
+  Eigen::MatrixXd cov = submatrix(camera.cov, free);
+  plan.worst_3sigma_px = worst_3sigma(camera, cov, free);
+  const std::vector<Candidate> candidates = all_candidates(camera, board_points, free);
+  if (candidates.empty()) return plan;
+  // Scaled to unit diagonal: focal lengths and k3 differ by many orders.
+  const Eigen::VectorXd scale = cov.diagonal().cwiseSqrt();
+  const auto inverse = [&](const Eigen::MatrixXd& S) -> Eigen::MatrixXd {
+    return S.llt().solve(Eigen::MatrixXd::Identity(S.rows(), S.cols()));
+  };
+  const Eigen::MatrixXd correlation = scale.cwiseInverse().asDiagonal() * cov * scale.cwiseInverse().asDiagonal();
+  Eigen::MatrixXd information = inverse(correlation);
+  for (int photo = 0; photo < num_photos; ++photo) {
+    NextPhoto best{{}, std::numeric_limits<double>::infinity()};
+    Eigen::MatrixXd best_information;
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      report_progress(progress, "trying board poses", i, candidates.size());
+      const Eigen::MatrixXd with =
+          information + scale.asDiagonal() * candidates[i].information * scale.asDiagonal() / (noise_px * noise_px);
+      const Eigen::MatrixXd with_cov = scale.asDiagonal() * inverse(with) * scale.asDiagonal();
+      const double worst = worst_3sigma(camera, with_cov, free);
+      if (worst >= best.worst_3sigma_px) continue;
+      best = {candidates[i].cam_from_board, worst};
+      best_information = with;
+    }
+    if (!std::isfinite(best.worst_3sigma_px)) break;
+    plan.photos.push_back(best);
+    information = best_information;
+  }
+  return plan;
+}
+
+}  // namespace alidade

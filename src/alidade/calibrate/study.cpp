@@ -1,0 +1,121 @@
+#include "alidade/calibrate/study.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/calibrate/heldout.h"
+#include "alidade/calibrate/residual_structure.h"
+
+namespace alidade {
+namespace {
+
+constexpr std::size_t least_photos = 6;  // two halves of three
+
+/// The views that took part, at most `most` of them, evenly chosen, without the corners that were rejected.
+std::vector<BoardView> used_views(std::span<const BoardView> views, const CalibrateReport& report, std::size_t most) {
+  std::vector<std::size_t> taken;
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    if (report.views[k].used) taken.push_back(k);
+  }
+  const std::size_t count = std::min(most, taken.size());
+  std::vector<BoardView> chosen;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t k = taken[i * taken.size() / count];
+    BoardView view{views[k].photo, {}};
+    for (std::size_t c = 0; c < views[k].corners.size(); ++c) {
+      if (report.views[k].corners[c].used) view.corners.push_back(views[k].corners[c]);
+    }
+    chosen.push_back(std::move(view));
+  }
+  return chosen;
+}
+
+std::vector<BoardView> half(std::span<const BoardView> views, std::size_t parity) {
+  std::vector<BoardView> chosen;
+  for (std::size_t k = parity; k < views.size(); k += 2) chosen.push_back(views[k]);
+  return chosen;
+}
+
+double median_distance_m(const CalibrateReport& report) {
+  std::vector<double> distances;
+  for (const ViewFit& view : report.views) {
+    if (view.used) distances.push_back(view.cam_from_board.translation.norm());
+  }
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
+}
+
+/// Both halves calibrated apart, on one board shape.
+std::optional<Halves> compare_halves(const Board& board, std::span<const BoardView> views, ImageSize size,
+                                     CalibrateConfig config, const std::vector<Eigen::Vector3d>& board_points) {
+  if (views.size() < least_photos) return std::nullopt;
+  config.board_shape = BoardShape::given;
+  const auto a = calibrate(board, half(views, 0), size, config, board_points);
+  const auto b = calibrate(board, half(views, 1), size, config, board_points);
+  if (a.status != CalibrateReport::Status::converged || b.status != CalibrateReport::Status::converged) {
+    return std::nullopt;
+  }
+  const auto diff = diff_cameras(a.camera, b.camera, {.cols = 30, .rows = 20});
+  if (!diff) return std::nullopt;
+  Halves halves{*diff, 0.0, ""};
+  for (const ParameterDiff& row : halves.diff.parameters) {
+    const double z = std::abs(row.b - row.a) / std::hypot(row.sigma_a, row.sigma_b);
+    if (z > halves.worst_z) {
+      halves.worst_z = z;
+      halves.worst_name = row.name;
+    }
+  }
+  return halves;
+}
+
+}  // namespace
+
+std::optional<ShapeTransfer> test_shape_transfer(const Board& board, std::span<const BoardView> views, ImageSize size,
+                                                 const CalibrateConfig& config) {
+  if (views.size() < least_photos) return std::nullopt;
+  double flat = 0.0, transferred = 0.0, corners = 0.0;
+  for (const std::size_t parity : {0u, 1u}) {
+    CalibrateConfig shaped = config, plain = config, held = config;
+    shaped.board_shape = config.board_shape == BoardShape::bow ? BoardShape::bow : BoardShape::free;
+    plain.board_shape = BoardShape::flat;
+    held.board_shape = BoardShape::given;
+    const auto teacher = calibrate(board, half(views, parity), size, shaped);
+    if (teacher.status != CalibrateReport::Status::converged) return std::nullopt;
+    const auto others = half(views, 1 - parity);
+    const auto pupil = calibrate(board, others, size, held, teacher.board_points);
+    const auto without = calibrate(board, others, size, plain);
+    if (pupil.status != CalibrateReport::Status::converged || without.status != CalibrateReport::Status::converged) {
+      return std::nullopt;
+    }
+    flat += without.rms_px * without.rms_px * without.corners_used;
+    transferred += pupil.rms_px * pupil.rms_px * pupil.corners_used;
+    corners += pupil.corners_used;
+  }
+  return ShapeTransfer{std::sqrt(flat / corners), std::sqrt(transferred / corners)};
+}
+
+CalibrationStudy study_calibration(const Board& board, std::span<const BoardView> views, const CalibrateConfig& config,
+                                   const CalibrateReport& report, const Progress& progress) {
+  CalibrationStudy study;
+  const ImageSize size{report.camera.width_px, report.camera.height_px};
+  study.cells = residual_cells(views, report, 8, 6);
+  study.rings = residual_rings(views, report, 10);
+  study.working_distance_m = median_distance_m(report);
+  study.sigma_infinity = projection_sigma(report.camera, 60, 40, std::numeric_limits<double>::infinity());
+  study.sigma_working = projection_sigma(report.camera, 60, 40, study.working_distance_m);
+
+  constexpr std::size_t most_photos = 120;
+  const std::vector<BoardView> sampled = used_views(views, report, most_photos);
+  report_progress(progress, "comparing the halves", 0, 1);
+  study.halves = compare_halves(board, sampled, size, config, report.board_points);
+  if (sampled.size() >= least_photos) {
+    const std::vector<BoardView> fewer = used_views(views, report, 60);
+    study.models = heldout_models(board, fewer, size, config, report.board_points, progress);
+    report_progress(progress, "testing the board's shape", 0, 1);
+    study.transfer = test_shape_transfer(board, fewer, size, config);
+  }
+  return study;
+}
+
+}  // namespace alidade

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "alidade/calibrate/calibrate.h"
+#include "alidade/camera/camera_diff.h"
+#include "alidade/estimation/progress.h"
+
+namespace alidade {
+
+/// Mean residual over a cell of the picture.
+struct ResidualCell {
+  double u_px = 0.0, v_px = 0.0;  ///< Centre.
+  int count = 0;
+  Eigen::Vector2d mean_px = Eigen::Vector2d::Zero();
+  double z = 0.0;  ///< |mean| over its σ, √(χ²₂): over 3 it is not noise.
+};
+
+/// Mean radial and tangential residual over a ring around the principal point.
+struct ResidualRing {
+  double radius_px = 0.0;
+  int count = 0;
+  double mean_radial_px = 0.0, mean_tangential_px = 0.0, sigma_px = 0.0;
+};
+
+/// Residuals of photos that took no part in the calibration, with one lens model.
+struct HeldOutModel {
+  std::string name;
+  double heldout_rms_px = 0.0;
+  double sigma_px = 0.0;   ///< σ of the difference to the model in use, from photo to photo; its own: 0.
+  double gain_px = 0.0;    ///< By how much its error is below that of the model in use.
+  bool is_richer = false;  ///< Has terms that the model in use lacks.
+};
+
+/// The two halves of the photos (even and odd), calibrated apart.
+struct Halves {
+  CameraDiff diff;       ///< Second minus first over the picture.
+  double worst_z = 0.0;  ///< Largest |difference| of a parameter in its σ.
+  std::string worst_name;
+};
+
+/// A board shape learned on one half, held fixed on the other, both ways.
+struct ShapeTransfer {
+  double flat_rms_px = 0.0;      ///< Of both halves with a flat board.
+  double transfer_rms_px = 0.0;  ///< With the other half's shape.
+  [[nodiscard]] bool transfers() const { return transfer_rms_px < 0.95 * flat_rms_px; }
+};
+
+/// What stands behind the verdict on a calibration.
+struct CalibrationStudy {
+  std::vector<ResidualCell> cells;
+  std::vector<ResidualRing> rings;
+  PixelGrid sigma_infinity, sigma_working;
+  double working_distance_m = 0.0;   ///< Median distance of the boards.
+  std::optional<Halves> halves;      ///< None for fewer than six photos.
+  std::vector<HeldOutModel> models;  ///< Empty for fewer than six photos.
+  std::optional<ShapeTransfer> transfer;
+};
+
+/// Residual structure, σ maps, halves, held-out error of other models and the shape's transfer. `report` must have
+/// converged. Photos beyond a few dozen are sampled where a part would take long; the seconds stay in the order of the
+/// calibration's own.
+[[nodiscard]] CalibrationStudy study_calibration(const Board& board, std::span<const BoardView> views,
+                                                 const CalibrateConfig& config, const CalibrateReport& report,
+                                                 const Progress& progress = {});
+
+/// Shape learned on the even photos, tested on the odd ones, and the other way round. None for fewer than six photos.
+[[nodiscard]] std::optional<ShapeTransfer> test_shape_transfer(const Board& board, std::span<const BoardView> views,
+                                                               ImageSize size, const CalibrateConfig& config);
+
+}  // namespace alidade

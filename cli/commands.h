@@ -4,6 +4,8 @@ namespace alidade::cli {
 
 class Frame;
 
+void add_calibrate(Frame& frame);
+
 // How to write a command: cli/NAME.cpp with one function `add_NAME(Frame&)`, declared here and called in main.cpp.
 //
 //   ExitCode calibrate(const Args& args, Run& run) {

@@ -3,7 +3,7 @@
 
 namespace {
 
-void add_commands(alidade::cli::Frame& /*frame*/) {}
+void add_commands(alidade::cli::Frame& frame) { alidade::cli::add_calibrate(frame); }
 
 }  // namespace
 

@@ -57,10 +57,16 @@ double share_below(const PixelGrid& sigma, double limit_px) {
 }
 
 Check coverage(const CalibrateReport& report, const CalibrationStudy& study) {
+  constexpr double wanted_px = 1.0;
   const Worst worst = worst_of(study.sigma_infinity);
-  Check check{.name = "coverage", .value = 3.0 * worst.value, .limit = 1.0, .unit = "px", .figure = "sigma"};
-  check.state = grade(check.value, 1.0, 10.0);
-  check.text = "worst 3σ " + two(check.value) + " px, " + place(worst.px, report.camera);
+  Check check{.name = "coverage",
+              .value = share_below(study.sigma_infinity, wanted_px),
+              .limit = 95.0,
+              .unit = "%",
+              .figure = "sigma"};
+  check.state = check.value >= 95.0 ? State::good : check.value >= 50.0 ? State::care : State::bad;
+  check.text = "3σ is below 1 px in " + two(check.value) + " % of the picture; worst " + two(3.0 * worst.value) +
+               " px, " + place(worst.px, report.camera);
   return check;
 }
 
@@ -144,7 +150,7 @@ Check honest_corners(const CalibrateReport& report, std::span<const BoardView> v
   Check check{.name = "honest corners", .limit = 2.0, .unit = "", .figure = "residuals"};
   if (std::isfinite(tails.ratio)) {
     check.value = tails.ratio;
-    check.state = grade(tails.ratio, 2.0, 5.0);
+    check.state = grade(tails.ratio, 2.0, 20.0);
     check.text = "RMS is " + two(tails.ratio) + " × what the corners' own σ predicts";
   } else {
     constexpr double usual_px = 0.25;  // RMS of a good detector on a good board stays below
@@ -228,15 +234,13 @@ Verdict calibration_verdict(const CalibrateReport& report, const CalibrationStud
     if (check.state > worst->state) worst = &check;
   }
   verdict.state = worst->state;
-  constexpr double wanted_px = 0.5;
   const std::string trust =
-      "3σ is below 0.5 px in " + two(share_below(study.sigma_infinity, wanted_px)) + " % of the picture";
-  if (verdict.state == State::good) {
-    verdict.sentence = "Good: " + trust;
-  } else {
-    verdict.sentence = std::string(verdict.state == State::care ? "Usable with care: " : "Not to be trusted: ") +
-                       trust + "; " + worst->name + ": " + worst->text;
-  }
+      "3σ is below 0.5 px in " + two(share_below(study.sigma_infinity, 0.5)) + " % of the picture";
+  const std::string word = verdict.state == State::good   ? "Good: "
+                           : verdict.state == State::care ? "Usable with care: "
+                                                          : "Not to be trusted: ";
+  verdict.sentence = word + trust;
+  if (worst->state != State::good && worst->name != "coverage") verdict.sentence += "; " + worst->text;
   verdict.to_add = advice(verdict, next, 3.0 * worst_of(study.sigma_infinity).value);
   return verdict;
 }

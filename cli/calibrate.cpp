@@ -1,0 +1,229 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <set>
+
+#include "alidade/calibrate/calibration.h"
+#include "alidade/calibrate/setup.h"
+#include "alidade/io/calibration_document.h"
+#include "alidade/io/camera_file.h"
+#include "alidade/io/corner_file.h"
+#include "alidade/io/photos.h"
+#include "cli/board_options.h"
+#include "cli/calibration_summary.h"
+#include "cli/commands.h"
+#include "cli/frame.h"
+#include "cli/option_checks.h"
+
+namespace alidade::cli {
+namespace {
+
+struct Args {
+  std::vector<std::filesystem::path> photos;
+  BoardOptions board;
+  std::filesystem::path corners;
+  std::string size;
+  std::string board_shape = "flat";
+  std::string outliers = "auto";
+  std::vector<std::string> fixed;
+  std::vector<std::string> free;
+  std::vector<std::string> priors;
+  CalibrateConfig config;
+};
+
+/// "fx=650±5" or "fx=650:5": name, value, σ.
+Prior parse_prior(const std::string& text) {
+  const auto equals = text.find('='), colon = text.find(':');
+  const auto fail = [&] { return UsageError("--prior: '" + text + "' is not NAME=VALUE:SIGMA, for example fx=650:5"); };
+  if (equals == std::string::npos || colon == std::string::npos || colon < equals) throw fail();
+  const auto number = [&](const std::string& digits) {
+    if (!finite_number()(digits).empty()) throw fail();
+    return std::stod(digits);
+  };
+  return {text.substr(0, equals), number(text.substr(equals + 1, colon - equals - 1)), number(text.substr(colon + 1))};
+}
+
+ImageSize parse_size(const std::string& text) {
+  ImageSize size;
+  char rest = 0;
+  const bool ok = std::sscanf(text.c_str(), "%dx%d%c", &size.width_px, &size.height_px, &rest) == 2;
+  if (!ok || size.width_px < 1 || size.height_px < 1 || size.width_px > 200000 || size.height_px > 200000) {
+    throw UsageError("--size: '" + text + "' is not WIDTHxHEIGHT, for example 640x480");
+  }
+  return size;
+}
+
+/// The config that the flags describe; throws UsageError with every fault of it.
+CalibrateConfig config_from(const Args& args) {
+  CalibrateConfig config = args.config;
+  config.fixed = {"skew"};
+  for (const std::string& name : args.fixed) {
+    if (std::find(config.fixed.begin(), config.fixed.end(), name) == config.fixed.end()) config.fixed.push_back(name);
+  }
+  for (const std::string& name : args.free) std::erase(config.fixed, name);
+  for (const std::string& text : args.priors) config.priors.push_back(parse_prior(text));
+  if (args.board_shape == "bow") {
+    config.board_shape = BoardShape::bow;
+  } else if (args.board_shape == "free") {
+    config.board_shape = BoardShape::free;
+  } else if (args.board_shape != "flat") {
+    config.board_shape = BoardShape::given;
+  }
+  std::string sentence;
+  for (const std::string& fault : faults(config)) sentence += (sentence.empty() ? "" : "; ") + fault;
+  if (!sentence.empty()) throw UsageError(sentence);
+  return config;
+}
+
+/// Reads each photo once; the second look comes from memory while the set is small. Called from many threads.
+class PhotoShelf {
+ public:
+  PhotoShelf(std::vector<std::filesystem::path> files, Run& run) : files_(std::move(files)), run_(run) {
+    photos_.resize(files_.size());
+    inputs_.resize(files_.size());
+  }
+
+  cv::Mat load(std::size_t i) {
+    if (!photos_[i].empty()) return photos_[i];
+    const std::string bytes = read_file(files_[i]);
+    {
+      const std::scoped_lock lock(mutex_);
+      if (!inputs_[i]) run_.add_input("photo", files_[i].string(), bytes);
+      inputs_[i] = true;
+    }
+    cv::Mat photo = decode_photo(bytes);
+    const std::scoped_lock lock(mutex_);
+    constexpr std::size_t most_bytes = 256u << 20;
+    held_ += photo.total() * photo.elemSize();
+    if (held_ < most_bytes) photos_[i] = photo;
+    return photo;
+  }
+
+ private:
+  std::vector<std::filesystem::path> files_;
+  Run& run_;
+  std::mutex mutex_;
+  std::vector<cv::Mat> photos_;
+  std::vector<bool> inputs_;
+  std::size_t held_ = 0;
+};
+
+/// Size of the pictures where only corners are given: as asked, else the smallest that holds them all.
+ImageSize size_of(const Args& args, const std::vector<BoardView>& views) {
+  if (!args.size.empty()) return parse_size(args.size);
+  double width = 1.0, height = 1.0;
+  for (const BoardView& view : views) {
+    for (const Corner& corner : view.corners) {
+      width = std::max(width, corner.px.x());
+      height = std::max(height, corner.px.y());
+    }
+  }
+  return {static_cast<int>(std::ceil(std::min(width, 2e5))) + 1,
+          static_cast<int>(std::ceil(std::min(height, 2e5))) + 1};
+}
+
+PhotoCalibration from_corners(const Args& args, const Board& board, CalibrateConfig& config,
+                              std::span<const Eigen::Vector3d> given, Run& run) {
+  PhotoCalibration result;
+  run.add_input("corners", args.corners);
+  result.views = read_corners(args.corners, num_points(board));
+  result.reasons.resize(result.views.size());
+  result.size = size_of(args, result.views);
+  const bool have_sigma = std::any_of(result.views.begin(), result.views.end(), [](const BoardView& view) {
+    return std::any_of(view.corners.begin(), view.corners.end(),
+                       [](const Corner& corner) { return corner.cov != Eigen::Matrix2d::Identity(); });
+  });
+  // Corners without σ are somebody's measurements to be judged as they are: the same corners, the same optimum.
+  config.reject_outliers = args.outliers == "drop" || (args.outliers == "auto" && have_sigma);
+  result.report = calibrate(board, result.views, result.size, config, given);
+  run.lap("solve");
+  return result;
+}
+
+PhotoCalibration from_photos(const std::vector<std::filesystem::path>& files, PhotoShelf& shelf, const Board& board,
+                             const CalibrateConfig& config, std::span<const Eigen::Vector3d> given, Run& run) {
+  std::vector<std::string> names;
+  std::set<std::string> short_names;
+  for (const auto& file : files) short_names.insert(file.filename().string());
+  const bool unique = short_names.size() == files.size();
+  for (const auto& file : files) names.push_back(unique ? file.filename().string() : file.string());
+  PhotoCalibration result = calibrate_photos(
+      names, [&shelf](std::size_t i) { return shelf.load(i); }, board, config, given, run.progress);
+  if (result.num_unreadable == files.size()) {
+    throw InputError(
+        files.front().string() + ": " + result.reasons.front() +
+        (files.size() > 1 ? "; nor can any of the other " + std::to_string(files.size() - 1) + " be read" : ""));
+  }
+  run.lap("detect_and_solve");
+  return result;
+}
+
+ExitCode calibrate(const Args& args, Run& run) {
+  const Board board = board_from(args.board);
+  CalibrateConfig config = config_from(args);
+  if (args.corners.empty() == args.photos.empty()) {
+    throw UsageError(args.photos.empty() ? "give photos, or --corners FILE" : "--corners takes the place of photos");
+  }
+  std::vector<Eigen::Vector3d> given;
+  if (config.board_shape == BoardShape::given) {
+    run.add_input("board_points", args.board_shape);
+    given = read_board_points(args.board_shape, num_points(board));
+  }
+  config.reject_outliers = args.outliers != "keep";
+  const auto files = list_photos(args.photos);
+  PhotoShelf shelf(files, run);
+  PhotoCalibration solved = args.corners.empty() ? from_photos(files, shelf, board, config, given, run)
+                                                 : from_corners(args, board, config, given, run);
+  Calibration result = judge_calibration(board, std::move(solved), config, run.progress);
+  run.lap("study");
+  fill_calibration(board, result, run.document);
+  if (!run.options.no_report && args.corners.empty()) {
+    add_pictures(
+        result, [&shelf](std::size_t i) { return shelf.load(i); }, run);
+    run.lap("pictures");
+  }
+  summarize(result, run);
+  add_result_files(result, run);
+  return run.finish(result.verdict);
+}
+
+}  // namespace
+
+void add_calibrate(Frame& frame) {
+  auto args = std::make_shared<Args>();
+  CLI::App& command = frame.add_command(
+      {.name = "calibrate",
+       .summary = "A camera with its distortion and covariance, from photos of a board",
+       .examples = "alidade calibrate photos/*.jpg --board 9x6 --square 0.025\n"
+                   "alidade calibrate photos/ --board 9x6 --square 0.025 --board-shape free --fix k3\n"
+                   "alidade calibrate --corners corners.csv --size 640x480 --board 9x6 --square 0.025\n"},
+      [args](Run& run) { return calibrate(*args, run); });
+  command.add_option("photos", args->photos, "Photos of the board, or folders of them (8- or 16-bit JPEG, PNG, TIFF)");
+  add_board_options(command, args->board);
+  command.add_option("--corners", args->corners,
+                     "Corners instead of photos: CSV photo,corner,u_px,v_px[,sigma_u_px,sigma_v_px]");
+  command.add_option("--size", args->size, "Picture size of --corners, WIDTHxHEIGHT (default: what holds the corners)");
+  command.add_option("--model", args->config.model, "Lens: pinhole, brown or kannala_brandt")->capture_default_str();
+  command
+      .add_option("--fix", args->fixed,
+                  "Parameters held at zero (cx, cy: the picture's centre; with --prior: its value), as k3,p1,p2")
+      ->delimiter(',');
+  command.add_option("--free", args->free, "Parameters estimated that are held otherwise: skew")->delimiter(',');
+  command.add_option("--prior", args->priors, "What is known of a parameter, NAME=VALUE:SIGMA, as fx=650:5")
+      ->delimiter(',');
+  command
+      .add_option("--board-shape", args->board_shape,
+                  "flat, bow (2 parameters), free (every point), or a board_points.csv of an earlier run, held")
+      ->capture_default_str();
+  command
+      .add_option("--outliers", args->outliers,
+                  "drop: leave out corners that no noise explains, by name; keep; auto: drop, but keep corners given "
+                  "without sigma")
+      ->check(CLI::IsMember({"auto", "drop", "keep"}))
+      ->capture_default_str();
+}
+
+}  // namespace alidade::cli

@@ -1,0 +1,106 @@
+#include "cli/calibration_summary.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "alidade/camera/projection_sigma.h"
+#include "alidade/io/calibration_document.h"
+#include "alidade/io/camera_file.h"
+#include "alidade/io/corner_file.h"
+#include "alidade/io/photos.h"
+
+namespace alidade::cli {
+namespace {
+
+/// "532.8 ± 1.3": both to two digits of the 3σ.
+std::string value_and_3sigma(double value, double sigma) {
+  const double bound = 3.0 * sigma;
+  if (!(bound > 0.0)) return fmt::format("{:.6g} (held)", value);
+  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(bound))), 0, 9);
+  return fmt::format("{:.{}f} ± {:.{}f}", value, decimals, bound, decimals);
+}
+
+std::vector<std::size_t> worst_first(const CalibrateReport& report) {
+  std::vector<std::size_t> order;
+  for (std::size_t k = 0; k < report.views.size(); ++k) order.push_back(k);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return report.views[a].used > report.views[b].used ||
+           (report.views[a].used == report.views[b].used && report.views[a].rms_px > report.views[b].rms_px);
+  });
+  return order;
+}
+
+int preview_width_px(std::size_t num_photos) { return num_photos <= 40 ? 640 : num_photos <= 200 ? 320 : 160; }
+
+}  // namespace
+
+void summarize(const Calibration& calibration, Run& run) {
+  const auto& [views, reasons, size, unreadable, report] = calibration.photos;
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    if (!report.views[k].used) run.say(fmt::format("not used: {}: {}", views[k].photo, report.views[k].reason));
+  }
+  if (report.status != CalibrateReport::Status::converged) return;
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    for (std::size_t i = 0; report.views[k].used && i < views[k].corners.size(); ++i) {
+      const CornerFit& fit = report.views[k].corners[i];
+      if (fit.used) continue;
+      run.say(fmt::format("left out: {}: corner {} is {:.2f} px off", views[k].photo, views[k].corners[i].index,
+                          fit.residual_px.norm()));
+    }
+  }
+  const auto names = param_names(report.camera.lens);
+  const Eigen::VectorXd values = params(report.camera.lens);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    const double sigma = std::sqrt(report.camera.cov(at, at));
+    if (names[i] == "skew" && sigma == 0.0 && values[at] == 0.0) continue;
+    run.say(fmt::format("{:5} {}{}", names[i], value_and_3sigma(values[at], sigma), i < 5 ? " px" : ""));
+  }
+  const auto used =
+      std::count_if(report.views.begin(), report.views.end(), [](const ViewFit& fit) { return fit.used; });
+  run.say(fmt::format("{} of {} photos, {} corners ({} left out), RMS {:.4f} px, board {}", used, views.size(),
+                      report.corners_used, report.corners_dropped, report.rms_px,
+                      shape_name(calibration.config.board_shape)));
+}
+
+void add_result_files(const Calibration& calibration, Run& run) {
+  const auto& report = calibration.photos.report;
+  if (report.status != CalibrateReport::Status::converged) return;
+  Camera camera = report.camera;
+  camera.source = "alidade calibrate";
+  std::vector<std::string> photos;
+  std::vector<Rigid3> poses;
+  for (std::size_t k = 0; k < report.views.size(); ++k) {
+    if (!report.views[k].used) continue;
+    photos.push_back(calibration.photos.views[k].photo);
+    poses.push_back(report.views[k].cam_from_board);
+  }
+  run.add_file("camera.yaml", camera_text(camera, CameraFormat::alidade));
+  run.add_file("corners.csv", corners_csv(calibration.photos.views));
+  run.add_file("poses.csv", poses_csv(photos, poses));
+  run.add_file("board_points.csv", board_points_csv(report.board_points));
+}
+
+void add_pictures(const Calibration& calibration, const PhotoLoader& load_photo, Run& run) {
+  constexpr std::size_t most = 300;
+  std::vector<std::size_t> chosen = worst_first(calibration.photos.report);
+  if (chosen.size() > most) chosen.resize(most);
+  const int width_px = preview_width_px(chosen.size());
+  std::vector<std::string> jpegs(chosen.size());
+  tbb::parallel_for(std::size_t{0}, chosen.size(), [&](std::size_t i) {
+    try {
+      jpegs[i] = jpeg_preview(load_photo(chosen[i]), i < 20 ? std::max(width_px, 640) : width_px, 75);
+    } catch (const std::exception&) {
+      jpegs[i].clear();  // not a picture: it is named as such already
+    }
+  });
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    if (!jpegs[i].empty()) run.add_picture(calibration.photos.views[chosen[i]].photo, jpegs[i]);
+  }
+}
+
+}  // namespace alidade::cli

@@ -1,0 +1,288 @@
+#include "alidade/io/calibration_document.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace alidade {
+namespace {
+
+using Numbers = std::vector<double>;
+
+double rounded(double value, double step) { return std::isfinite(value) ? std::round(value / step) * step : value; }
+
+/// Seven columns of a pose: x y z in metres, then the quaternion.
+struct PoseColumns {
+  std::array<Numbers, 7> values;
+  void add(const Rigid3* pose) {
+    const double none = std::nan("");
+    for (int i = 0; i < 3; ++i) {
+      values[static_cast<std::size_t>(i)].push_back(pose ? pose->translation[i] : none);
+    }
+    for (int i = 0; i < 4; ++i) {  // x y z w
+      values[static_cast<std::size_t>(3 + i)].push_back(pose ? pose->rotation.coeffs()[i] : none);
+    }
+  }
+  void append_to(DataTable& table, const std::string& name) const {
+    static const std::array<const char*, 7> endings = {"_x_m", "_y_m", "_z_m", "_qx", "_qy", "_qz", "_qw"};
+    for (std::size_t i = 0; i < 7; ++i) table.columns.emplace_back(name + endings[i], values[i]);
+  }
+};
+
+DataTable photos_table(const Calibration& calibration) {
+  const auto& [views, reasons, size, unreadable, report] = calibration.photos;
+  std::vector<std::string> names, why;
+  std::vector<bool> used;
+  std::vector<int> num_corners;
+  Numbers rms;
+  PoseColumns poses;
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    const ViewFit& fit = report.views[k];
+    names.push_back(views[k].photo);
+    used.push_back(fit.used);
+    why.push_back(fit.reason);
+    num_corners.push_back(static_cast<int>(views[k].corners.size()));
+    rms.push_back(fit.used ? fit.rms_px : std::nan(""));
+    poses.add(fit.used ? &fit.cam_from_board : nullptr);
+  }
+  DataTable table{"photos",
+                  {{"name", names}, {"used", used}, {"reason", why}, {"num_corners", num_corners}, {"rms_px", rms}}};
+  poses.append_to(table, "cam_from_board");
+  return table;
+}
+
+DataTable corners_table(const Board& board, const Calibration& calibration) {
+  const auto& [views, reasons, size, unreadable, report] = calibration.photos;
+  std::vector<int> photo, col, row;
+  std::array<Numbers, 8> c;
+  const int per_row = board.kind == BoardKind::aprilgrid ? 4 * board.cols : board.cols;
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    for (std::size_t i = 0; i < views[k].corners.size(); ++i) {
+      const Corner& corner = views[k].corners[i];
+      const CornerFit& fit = report.views[k].corners[i];
+      const bool solved = report.views[k].used;
+      const double sigma_u = std::sqrt(corner.cov(0, 0)), sigma_v = std::sqrt(corner.cov(1, 1));
+      photo.push_back(static_cast<int>(k));
+      col.push_back(corner.index % per_row);
+      row.push_back(corner.index / per_row);
+      c[0].push_back(rounded(corner.px.x(), 0.01));
+      c[1].push_back(rounded(corner.px.y(), 0.01));
+      c[2].push_back(rounded(sigma_u, 1e-4));
+      c[3].push_back(rounded(sigma_v, 1e-4));
+      c[4].push_back(rounded(corner.cov(0, 1) / (sigma_u * sigma_v), 1e-3));
+      c[5].push_back(solved ? rounded(fit.residual_px.x(), 1e-4) : std::nan(""));
+      c[6].push_back(solved ? rounded(fit.residual_px.y(), 1e-4) : std::nan(""));
+      c[7].push_back(solved && fit.used ? 1.0 : 0.0);
+    }
+  }
+  return {"corners",
+          {{"photo", photo},
+           {"col", col},
+           {"row", row},
+           {"u_px", c[0]},
+           {"v_px", c[1]},
+           {"sigma_u_px", c[2]},
+           {"sigma_v_px", c[3]},
+           {"corr_uv", c[4]},
+           {"residual_u_px", c[5]},
+           {"residual_v_px", c[6]},
+           {"weight", c[7]}}};
+}
+
+DataTable cells_table(const CalibrationStudy& study) {
+  Numbers u, v, mean_u, mean_v, z;
+  std::vector<int> count;
+  for (const ResidualCell& cell : study.cells) {
+    u.push_back(cell.u_px);
+    v.push_back(cell.v_px);
+    count.push_back(cell.count);
+    mean_u.push_back(cell.count > 0 ? cell.mean_px.x() : std::nan(""));
+    mean_v.push_back(cell.count > 0 ? cell.mean_px.y() : std::nan(""));
+    z.push_back(cell.count > 0 ? cell.z : std::nan(""));
+  }
+  return {"cells",
+          {{"u_px", u}, {"v_px", v}, {"count", count}, {"mean_u_px", mean_u}, {"mean_v_px", mean_v}, {"z", z}}};
+}
+
+DataTable rings_table(const CalibrationStudy& study) {
+  Numbers radius, radial, tangential, sigma;
+  for (const ResidualRing& ring : study.rings) {
+    if (ring.count == 0) continue;
+    radius.push_back(ring.radius_px);
+    radial.push_back(ring.mean_radial_px);
+    tangential.push_back(ring.mean_tangential_px);
+    sigma.push_back(ring.sigma_px);
+  }
+  return {"rings",
+          {{"radius_px", radius}, {"mean_radial_px", radial}, {"mean_tangential_px", tangential}, {"sigma_px", sigma}}};
+}
+
+DataTable models_table(const CalibrationStudy& study) {
+  std::vector<std::string> names;
+  Numbers rms, sigma;
+  for (const HeldOutModel& model : study.models) {
+    names.push_back(model.name);
+    rms.push_back(model.heldout_rms_px);
+    sigma.push_back(model.sigma_px);
+  }
+  return {"models", {{"name", names}, {"heldout_rms_px", rms}, {"sigma_px", sigma}}};
+}
+
+DataTable board_points_table(const Board& board, const CalibrateReport& report) {
+  const auto printed = points_in_board(board);
+  const int per_row = board.kind == BoardKind::aprilgrid ? 4 * board.cols : board.cols;
+  std::vector<int> col, row;
+  Numbers dx, dy, dz, sigma;
+  for (std::size_t i = 0; i < printed.size(); ++i) {
+    col.push_back(static_cast<int>(i) % per_row);
+    row.push_back(static_cast<int>(i) / per_row);
+    const Eigen::Vector3d moved = report.board_points[i] - printed[i];
+    dx.push_back(moved.x());
+    dy.push_back(moved.y());
+    dz.push_back(moved.z());
+    sigma.push_back(i < report.board_sigma_z_m.size() ? report.board_sigma_z_m[i] : 0.0);
+  }
+  return {"board_points",
+          {{"col", col}, {"row", row}, {"dx_m", dx}, {"dy_m", dy}, {"dz_m", dz}, {"sigma_dz_m", sigma}}};
+}
+
+DataTable next_table(const NextPhotoPlan& next) {
+  PoseColumns poses;
+  Numbers worst;
+  for (const NextPhoto& photo : next.photos) {
+    poses.add(&photo.cam_from_board);
+    worst.push_back(photo.worst_3sigma_px);
+  }
+  DataTable table{"next", {}};
+  poses.append_to(table, "cam_from_board");
+  table.columns.emplace_back("worst_3sigma_px", worst);
+  return table;
+}
+
+DataGrid grid_of(const std::string& name, const PixelGrid& grid) {
+  return {name, grid.cols, grid.rows, grid.u0_px, grid.v0_px, grid.du_px, grid.dv_px, {}};
+}
+
+void fill_grids(const CalibrationStudy& study, ResultDocument& document) {
+  const auto sigma = [&](const std::string& name, const PixelGrid& grid) {
+    DataGrid data = grid_of(name, grid);
+    Numbers values;
+    for (const double value : grid.values) values.push_back(rounded(value, 1e-5));
+    data.values.emplace_back("sigma_px", values);
+    document.grids.push_back(std::move(data));
+  };
+  sigma("sigma_infinity", study.sigma_infinity);
+  sigma("sigma_working", study.sigma_working);
+  if (!study.halves) return;
+  const CameraDiff& diff = study.halves->diff;
+  DataGrid halves = grid_of("halves", diff.delta_u);
+  Numbers predicted;
+  for (std::size_t i = 0; i < diff.sigma_a.values.size(); ++i) {
+    predicted.push_back(std::hypot(diff.sigma_a.values[i], diff.sigma_b.values[i]));
+  }
+  halves.values = {
+      {"delta_u_px", diff.delta_u.values}, {"delta_v_px", diff.delta_v.values}, {"predicted_sigma_px", predicted}};
+  document.grids.push_back(std::move(halves));
+}
+
+void fill_estimate(const Board& board, const Calibration& calibration, ResultDocument& document) {
+  const auto& report = calibration.photos.report;
+  const auto names = param_names(report.camera.lens);
+  const Eigen::VectorXd values = params(report.camera.lens);
+  JsonValue& camera = document.estimate["camera"];
+  camera["model"] = std::string(model_name(report.camera.lens));
+  camera["width"] = report.camera.width_px;
+  camera["height"] = report.camera.height_px;
+  std::vector<Eigen::Index> free;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    camera[names[i]] = values[at];
+    document.stddev["camera"][names[i]] = std::sqrt(report.camera.cov(at, at));
+    if (report.camera.cov(at, at) > 0.0) free.push_back(at);
+  }
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    document.covariance_names.push_back(names[static_cast<std::size_t>(free[i])]);
+    for (std::size_t j = i; j < free.size(); ++j) {
+      document.covariance_upper.push_back(report.camera.cov(free[i], free[j]));
+    }
+  }
+  document.estimate["rms_px"] = report.rms_px;
+  document.estimate["noise_px"] = report.noise_px;
+  document.estimate["excess_px"] = report.excess_px;
+  document.estimate["board_shape"] = shape_name(calibration.config.board_shape);
+  document.estimate["transfer_rms_px"] =
+      calibration.study.transfer ? calibration.study.transfer->transfer_rms_px : std::nan("");
+  document.estimate["transfer_flat_rms_px"] =
+      calibration.study.transfer ? calibration.study.transfer->flat_rms_px : std::nan("");
+  document.estimate["working_distance_m"] = calibration.study.working_distance_m;
+  JsonValue& target = document.estimate["board"];
+  target["cols"] = board.cols;
+  target["rows"] = board.rows;
+  target["square_m"] = board.square_m;
+}
+
+}  // namespace
+
+std::string shape_name(BoardShape shape) {
+  switch (shape) {
+    case BoardShape::flat:
+      return "flat";
+    case BoardShape::bow:
+      return "bow";
+    case BoardShape::free:
+      return "free";
+    case BoardShape::given:
+      return "given";
+  }
+  return "flat";
+}
+
+void fill_calibration(const Board& board, const Calibration& calibration, ResultDocument& document) {
+  const auto& [views, reasons, size, unreadable, report] = calibration.photos;
+  document.counts.given = views.size();
+  JsonValue photos = JsonValue::list();
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    const ViewFit& fit = report.views[k];
+    if (fit.used) {
+      ++document.counts.used;
+    } else {
+      document.counts.skipped.push_back({views[k].photo, 0, fit.reason});
+    }
+    JsonValue row;
+    row["file"] = views[k].photo;
+    row["used"] = fit.used;
+    row["rms_px"] = fit.used ? fit.rms_px : std::nan("");
+    row["reason"] = fit.reason;
+    photos.push_back(std::move(row));
+  }
+  document.counts.dropped = document.counts.given - document.counts.used;
+  const bool solved = report.status == CalibrateReport::Status::converged;
+  if (solved) {
+    fill_estimate(board, calibration, document);
+    JsonValue rejected = JsonValue::list();
+    for (std::size_t k = 0; k < views.size(); ++k) {
+      for (std::size_t i = 0; report.views[k].used && i < views[k].corners.size(); ++i) {
+        const CornerFit& fit = report.views[k].corners[i];
+        if (fit.used) continue;
+        JsonValue row;
+        row["file"] = views[k].photo;
+        row["corner"] = views[k].corners[i].index;
+        row["residual_px"] = fit.residual_px.norm();
+        rejected.push_back(std::move(row));
+      }
+    }
+    document.estimate["corners_used"] = report.corners_used;
+    document.estimate["corners_rejected"] = std::move(rejected);
+  }
+  document.estimate["photos"] = std::move(photos);
+  document.data = {photos_table(calibration), corners_table(board, calibration)};
+  if (!solved) return;
+  for (DataTable& table : std::vector<DataTable>{cells_table(calibration.study), rings_table(calibration.study),
+                                                 models_table(calibration.study), board_points_table(board, report),
+                                                 next_table(calibration.next)}) {
+    document.data.push_back(std::move(table));
+  }
+  fill_grids(calibration.study, document);
+}
+
+}  // namespace alidade

@@ -1,0 +1,16 @@
+#pragma once
+
+#include "alidade/board/board.h"
+#include "alidade/calibrate/calibration.h"
+#include "alidade/io/result_document.h"
+
+namespace alidade {
+
+/// Fills counts, estimate, stddev, covariance, data tables and grids of `document` from a calibration: the names of
+/// docs' contract for `calibrate`. For a refusal, what there is.
+void fill_calibration(const Board& board, const Calibration& calibration, ResultDocument& document);
+
+/// The word of --board-shape for a shape.
+[[nodiscard]] std::string shape_name(BoardShape shape);
+
+}  // namespace alidade

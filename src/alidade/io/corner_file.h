@@ -1,0 +1,30 @@
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/board/board_view.h"
+#include "alidade/geometry/rigid3.h"
+#include "alidade/io/files.h"
+
+namespace alidade {
+
+/// Corners as CSV: photo,corner,u_px,v_px,sigma_u_px,sigma_v_px,corr_uv. Places to 10⁻⁶ px.
+[[nodiscard]] std::string corners_csv(std::span<const BoardView> views);
+
+/// Reads such a file, by anybody: photo, corner, u_px, v_px (or u, v) and, optionally, sigma_u_px, sigma_v_px and
+/// corr_uv; without σ the covariance is the identity, "unknown". Photos in order of first appearance. Throws
+/// InputError: a corner that the board does not have, the same corner twice, a σ that is not positive, a missing
+/// column.
+[[nodiscard]] std::vector<BoardView> read_corners(const std::filesystem::path& file, int num_points);
+
+/// Poses as CSV: photo,cam_from_board_x_m,…_y_m,…_z_m,…_qx,…_qy,…_qz,…_qw.
+[[nodiscard]] std::string poses_csv(const std::vector<std::string>& photos, std::span<const Rigid3> cam_from_board);
+
+/// Board points as CSV: corner,x_m,y_m,z_m; and back. Throws InputError where a point is missing.
+[[nodiscard]] std::string board_points_csv(std::span<const Eigen::Vector3d> points_in_board);
+[[nodiscard]] std::vector<Eigen::Vector3d> read_board_points(const std::filesystem::path& file, int num_points);
+
+}  // namespace alidade

@@ -1,0 +1,111 @@
+#include "alidade/io/photos.h"
+
+#include <algorithm>
+#include <cctype>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace alidade {
+namespace {
+
+bool looks_like_a_photo(const std::filesystem::path& file) {
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  static const std::vector<std::string> endings = {".jpg", ".jpeg", ".png", ".tif", ".tiff",
+                                                   ".bmp", ".pgm",  ".ppm", ".webp"};
+  return std::find(endings.begin(), endings.end(), ending) != endings.end();
+}
+
+/// a2 before a10: runs of digits compare as numbers.
+bool natural_less(const std::string& a, const std::string& b) {
+  std::size_t i = 0, j = 0;
+  const auto digit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; };
+  while (i < a.size() && j < b.size()) {
+    if (digit(a[i]) && digit(b[j])) {
+      std::size_t i_end = i, j_end = j;
+      while (i_end < a.size() && digit(a[i_end])) ++i_end;
+      while (j_end < b.size() && digit(b[j_end])) ++j_end;
+      while (i + 1 < i_end && a[i] == '0') ++i;
+      while (j + 1 < j_end && b[j] == '0') ++j;
+      const std::string_view x(a.data() + i, i_end - i), y(b.data() + j, j_end - j);
+      if (x != y) return x.size() != y.size() ? x.size() < y.size() : x < y;
+      i = i_end;
+      j = j_end;
+    } else {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i;
+      ++j;
+    }
+  }
+  return a.size() - i < b.size() - j;
+}
+
+bool starts_with(std::string_view bytes, std::string_view magic) { return bytes.substr(0, magic.size()) == magic; }
+
+/// A JPEG ends in its end marker, a PNG in its IEND chunk (a few stray bytes may follow): without it the file was cut
+/// off, and decoders would fill the rest with grey.
+bool is_cut_off(std::string_view bytes) {
+  constexpr std::size_t stray = 64 * 1024;
+  const std::string_view tail = bytes.substr(bytes.size() > stray ? bytes.size() - stray : 0);
+  if (starts_with(bytes, "\xFF\xD8\xFF")) return tail.rfind("\xFF\xD9") == std::string_view::npos;
+  if (starts_with(bytes, "\x89PNG")) return tail.rfind("IEND") == std::string_view::npos;
+  return false;
+}
+
+}  // namespace
+
+std::vector<std::filesystem::path> list_photos(const std::vector<std::filesystem::path>& arguments) {
+  std::vector<std::filesystem::path> photos;
+  for (const auto& argument : arguments) {
+    std::error_code error;
+    if (!std::filesystem::exists(argument, error)) {
+      throw InputError(argument.string() + ": no such file or folder");
+    }
+    if (!std::filesystem::is_directory(argument, error)) {
+      photos.push_back(argument);
+      continue;
+    }
+    std::vector<std::filesystem::path> inside;
+    for (const auto& entry : std::filesystem::directory_iterator(argument, error)) {
+      if (looks_like_a_photo(entry.path())) inside.push_back(entry.path());
+    }
+    if (error) throw InputError(argument.string() + ": cannot be read: " + error.message());
+    if (inside.empty()) throw InputError(argument.string() + ": the folder holds no photos");
+    std::sort(inside.begin(), inside.end(),
+              [](const auto& a, const auto& b) { return natural_less(a.string(), b.string()); });
+    photos.insert(photos.end(), inside.begin(), inside.end());
+  }
+  return photos;
+}
+
+cv::Mat decode_photo(std::string_view bytes) {
+  if (bytes.empty()) throw InputError("the file is empty");
+  if (is_cut_off(bytes)) throw InputError("the picture is cut off");
+  cv::Mat photo;
+  try {
+    const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
+    photo = cv::imdecode(raw, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR | cv::IMREAD_IGNORE_ORIENTATION);
+  } catch (const cv::Exception&) {
+    photo.release();  // a header that promises more than OpenCV holds
+  }
+  if (photo.empty()) throw InputError("not a picture that can be read");
+  return photo;
+}
+
+std::string jpeg_preview(const cv::Mat& photo, int max_width_px, int quality) {
+  cv::Mat small = photo;
+  if (photo.cols > max_width_px) {
+    const double scale = static_cast<double>(max_width_px) / photo.cols;
+    cv::resize(photo, small, {}, scale, scale, cv::INTER_AREA);
+  }
+  if (small.depth() == CV_16U) small.convertTo(small, CV_8U, 1.0 / 257.0);
+  if (small.depth() != CV_8U) small.convertTo(small, CV_8U);
+  if (small.channels() == 3) cv::cvtColor(small, small, cv::COLOR_BGR2GRAY);
+  if (small.channels() == 4) cv::cvtColor(small, small, cv::COLOR_BGRA2GRAY);
+  std::vector<unsigned char> jpeg;
+  cv::imencode(".jpg", small, jpeg, {cv::IMWRITE_JPEG_QUALITY, quality});
+  return {jpeg.begin(), jpeg.end()};
+}
+
+}  // namespace alidade

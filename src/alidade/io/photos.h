@@ -1,0 +1,27 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/io/files.h"
+
+namespace cv {
+class Mat;
+}
+
+namespace alidade {
+
+/// Photo files for arguments that are files or folders: of a folder, its pictures (by ending) in natural order, 2
+/// before 10. Throws InputError for a path that does not exist and for a folder without pictures.
+[[nodiscard]] std::vector<std::filesystem::path> list_photos(const std::vector<std::filesystem::path>& arguments);
+
+/// Decodes a photo as it is: 8 or 16 bit, grey or colour; any EXIF turn is ignored, as the lens does not turn. Throws
+/// InputError: empty, not a picture, cut off.
+[[nodiscard]] cv::Mat decode_photo(std::string_view bytes);
+
+/// JPEG bytes of a photo in 8-bit grey, at most `max_width_px` wide.
+[[nodiscard]] std::string jpeg_preview(const cv::Mat& photo, int max_width_px, int quality = 80);
+
+}  // namespace alidade

@@ -16,9 +16,9 @@ struct Rgb {
 /// Blue over grey to orange, share −1…1 (clamped), for values with a sign.
 [[nodiscard]] Rgb diverging(double share);
 
-/// The same colour for the same size in every report: px on a logarithmic scale, 0.02…5.
+/// The same colour for the same size in every report: px on a logarithmic scale, 0.05…10.
 struct PixelColours {
-  static constexpr double low_px = 0.02, high_px = 5.0;
+  static constexpr double low_px = 0.05, high_px = 10.0;
   [[nodiscard]] static double share(double size_px);
 };
 

@@ -33,15 +33,26 @@ std::string unit_of(const std::string& path) {
 
 bool is_row_of_photos(const std::string& path) { return path.rfind("photos[", 0) == 0; }
 
-std::string row_of(const Quantity& quantity) {
+// The unit has its own column: `transfer_rms_px` reads "transfer rms".
+std::string shown_name(const std::string& path, const std::string& unit) {
+  std::string name = path.rfind("camera.", 0) == 0 ? last_part(path) : path;
+  if (const std::size_t at = name.rfind("_" + unit); at != std::string::npos && at > 0 && !unit.empty())
+    name.erase(at, unit.size() + 1);
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
+}
+
+std::string row_of(const Quantity& quantity, bool has_sigmas) {
   const bool is_lens = quantity.path.rfind("camera.", 0) == 0;
-  const std::string name = is_lens ? last_part(quantity.path) : quantity.path;
+  const std::string name = shown_name(quantity.path, unit_of(quantity.path));
   if (!quantity.text.empty() || !std::isfinite(quantity.value))
     return fmt::format("<tr><th>{}</th><td colspan=\"3\" class=\"word\">{}</td></tr>", escaped(name),
                        quantity.text.empty() ? "–" : escaped(quantity.text));
   const ValueText words = value_text(quantity.value, quantity.sigma);
   const bool is_size = name == "width" || name == "height";
-  const std::string behind = !words.plus_minus.empty() ? "± " + words.plus_minus : is_lens && !is_size ? "held" : "";
+  const std::string behind = !words.plus_minus.empty()           ? "± " + words.plus_minus
+                             : is_lens && !is_size && has_sigmas ? "held"
+                                                                 : "";
   return fmt::format("<tr><th>{}</th><td class=\"value\">{}</td><td>{}</td><td class=\"unit\">{}</td></tr>",
                      escaped(name), words.value, behind, unit_of(quantity.path));
 }
@@ -128,9 +139,11 @@ std::string correlation_matrix(const Correlations& matrix) {
 MaybeFigure figure_estimate(const Document& document) {
   Figure figure{.id = "estimate", .title = "Estimate", .note = "value ± 3σ", .span = 6};
   std::string lens, rest;
+  const bool has_sigmas =
+      std::any_of(document.estimate.begin(), document.estimate.end(), [](const Quantity& q) { return q.sigma > 0.0; });
   for (const Quantity& quantity : document.estimate) {
     if (is_row_of_photos(quantity.path)) continue;
-    (quantity.path.rfind("camera.", 0) == 0 ? lens : rest) += row_of(quantity);
+    (quantity.path.rfind("camera.", 0) == 0 ? lens : rest) += row_of(quantity, has_sigmas);
     ++figure.marks;
   }
   if (figure.marks == 0) return std::nullopt;

@@ -34,12 +34,13 @@ std::string field_map(const Field& field, const Grid& grid, PicturePanel panel, 
     draw_scale_bar(svg, {panel.left + 2.0, panel.bottom() + 17.0}, scale.bar_length(panel),
                    number_text(scale.bar_px, 2) + " px, arrows " + scale.text(), false);
   }
-  draw_contours(svg, panel, grid, field.sizes_px);
+  draw_contours(svg, panel, grid, field.sizes_px,
+                has_arrows ? 0.03 : 1e-3);  // near the zero of a difference they tell nothing
   return svg.str();
 }
 
 std::string colour_key(double width) {
-  Svg svg(width, 46.0, "Colours of sizes in px");
+  Svg svg(width, 46.0, "Colours of sizes in px", "key");
   draw_pixel_colour_bar(svg, 20.0, width - 20.0, 2.0, "px");
   return svg.str();
 }

@@ -79,8 +79,8 @@ std::string photo_marks(const CalibrateScene& scene, std::size_t index, const Ar
   path(paths.ellipses, "ellipse");
   if (!paths.arrows.empty())
     out += fmt::format(
-        "<path id=\"arrows-{0}\" class=\"photo-arrow\" d=\"{1}\"/><use href=\"#arrows-{0}\" "
-        "class=\"photo-arrow-top\"/>",
+        "<defs><path id=\"arrows-{0}\" d=\"{1}\"/></defs><use href=\"#arrows-{0}\" class=\"photo-arrow\"/>"
+        "<use href=\"#arrows-{0}\" class=\"photo-arrow-top\"/>",
         index, paths.arrows);
   std::string all_dots;
   for (int direction = 0; direction < num_directions; ++direction) {
@@ -120,7 +120,7 @@ std::vector<std::size_t> shown_photos(const CalibrateScene& scene, const Picture
 }
 
 std::string caption(const PhotoMark& photo) {
-  if (photo.is_used && std::isfinite(photo.rms_px)) return photo.name + " · " + number_text(photo.rms_px, 3) + " px";
+  if (photo.is_used && std::isfinite(photo.rms_px)) return photo.name + " · " + rounded_text(photo.rms_px, 3) + " px";
   return photo.name + " · " + (photo.reason.empty() ? "not used" : "not used: " + photo.reason);
 }
 

@@ -17,7 +17,7 @@ namespace {
 using Points = std::vector<Eigen::Vector3d>;
 
 // RMS colours mean the same in every report.
-constexpr double rms_low_px = 0.03, rms_high_px = 3.0;
+constexpr double rms_low_px = 0.05, rms_high_px = 5.0;
 
 std::string rms_colour(double rms_px) {
   if (!(rms_px > 0.0)) return "#888888";
@@ -173,7 +173,7 @@ void draw_rms_bar(Svg& svg, double left, double right, double top) {
     svg.rect({left + width * i, top}, width + 0.4, 8.0, "",
              fmt::format("fill=\"{}\"", hex(cividis((i + 0.5) / pieces))));
   const Scale x{rms_low_px, rms_high_px, left, right, true};
-  for (const double tick : {0.03, 0.1, 0.3, 1.0, 3.0})
+  for (const double tick : {0.05, 0.2, 0.5, 1.0, 2.0, 5.0})
     svg.text({x(tick), top + 22.0}, number_text(tick, 2), "tick", "middle");
   svg.text({left - 8.0, top + 9.0}, "RMS, px", "tick", "end");
 }

@@ -42,12 +42,13 @@ void draw_share(Svg& svg, const Scale& x, const Scale& y, std::vector<double> va
   std::erase_if(values, [](double value) { return !std::isfinite(value); });
   if (values.empty()) return;
   std::sort(values.begin(), values.end());
-  std::vector<Place> line{{x(values.front()), y(0.0)}};
+  std::vector<Place> line{{std::clamp(x(values.front()), x.from, x.to), y(0.0)}};
   const std::size_t step = std::max<std::size_t>(1, values.size() / 200);
   for (std::size_t i = 0; i < values.size(); i += step)
-    line.push_back({x(values[i]), y(100.0 * static_cast<double>(i + 1) / static_cast<double>(all))});
+    line.push_back(
+        {std::clamp(x(values[i]), x.from, x.to), y(100.0 * static_cast<double>(i + 1) / static_cast<double>(all))});
   const double last = y(100.0 * static_cast<double>(values.size()) / static_cast<double>(all));
-  line.push_back({x(values.back()), last});
+  line.push_back({std::clamp(x(values.back()), x.from, x.to), last});
   line.push_back({x.to, last});
   svg.polyline(line, look);
 }

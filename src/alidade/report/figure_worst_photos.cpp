@@ -60,11 +60,11 @@ std::string bars(const CalibrateScene& scene, double width, const char* css_clas
     svg.raw("</g>");
   };
   for (const std::size_t index : scene.worst_first)
-    draw(index, scene.photos[index].rms_px, "photo-bar", number_text(scene.photos[index].rms_px, 3));
+    draw(index, scene.photos[index].rms_px, "photo-bar", rounded_text(scene.photos[index].rms_px, 3));
   for (const std::size_t index : scene.unused) draw(index, 0.12 * y.high, "unused-bar", "unused");
   if (all > 0.0) {
     svg.line({left, y(all)}, {right, y(all)}, "dashed");
-    svg.text({right, y(all) - 5.0}, "all " + number_text(all, 3), "label", "end");
+    svg.text({right, y(all) - 5.0}, "all " + rounded_text(all, 3), "label", "end");
   }
   svg.text({0.5 * (left + right), bottom + 34.0}, "photos, worst first", "tick", "middle");
   return svg.str();

@@ -115,19 +115,21 @@ void append_coordinate(std::string& out, double value, int decimals) {
   out += static_cast<char>('0' + rest);
 }
 
-std::string number_text(double value, int digits) {
+std::string rounded_text(double value, int digits) {
   if (std::isnan(value)) return "–";
   if (std::isinf(value)) return value > 0.0 ? "∞" : "−∞";
-  if (value == 0.0) return "0";
   const double size = std::abs(value);
-  if (size >= 1e7 || size < 1e-5) return fmt::format("{:.{}e}", value, std::max(0, digits - 1));
-  const int before = static_cast<int>(std::floor(std::log10(size))) + 1;
-  std::string text = fmt::format("{:.{}f}", value, std::clamp(digits - before, 0, 12));
-  if (text.find('.') != std::string::npos) {
-    text.erase(text.find_last_not_of('0') + 1);
-    if (text.back() == '.') text.pop_back();
-  }
-  return text;
+  if (size != 0.0 && (size >= 1e7 || size < 1e-5)) return fmt::format("{:.{}e}", value, std::max(0, digits - 1));
+  const int before = size > 0.0 ? static_cast<int>(std::floor(std::log10(size))) + 1 : 1;
+  return fmt::format("{:.{}f}", value, std::clamp(digits - before, 0, 12));
+}
+
+std::string number_text(double value, int digits) {
+  std::string text = rounded_text(value, digits);
+  if (text.find('.') == std::string::npos || text.find('e') != std::string::npos) return text;
+  text.erase(text.find_last_not_of('0') + 1);
+  if (text.back() == '.') text.pop_back();
+  return text == "-0" ? "0" : text;
 }
 
 ValueText value_text(double value, double sigma) {

@@ -20,6 +20,9 @@ void append_coordinate(std::string& out, double value, int decimals = 1);
 /// A number to so many significant digits without needless exponents; "–" where missing.
 [[nodiscard]] std::string number_text(double value, int digits = 4);
 
+/// The same with its closing zeros, for columns of numbers: "0.200".
+[[nodiscard]] std::string rounded_text(double value, int digits);
+
 /// "532.8 ± 1.3": value and 3σ to two digits of 3σ; without a usable σ the value to 4 digits, and nothing behind it.
 struct ValueText {
   std::string value, plus_minus;

@@ -65,7 +65,7 @@ code{font:12px ui-monospace,"DejaVu Sans Mono",monospace}
 )css";
 
 constexpr std::string_view drawing_rules = R"css(
-svg text{font-family:inherit}path:not([fill]){fill:none}
+svg text{font-family:inherit}:where(path:not([fill])){fill:none}
 .tick,.small{font-size:11.5px;fill:var(--muted)}.label{font-size:12px;fill:var(--ink)}
 .gridline{stroke:var(--line)}.axis{stroke:var(--muted)}.panel{fill:var(--panel);stroke:var(--line)}
 .curve,.curve-dashed{fill:none;stroke:var(--ink);stroke-width:1.8}.curve-dashed{stroke-dasharray:6 4}
@@ -81,19 +81,19 @@ svg text{font-family:inherit}path:not([fill]){fill:none}
 .bar{stroke:var(--ink);stroke-width:1.8}.bar-light{stroke:#fff;stroke-width:2}
 .bar-fill,.photo-bar{fill:var(--blue)}.on-bar{font-size:11.5px;font-weight:600;fill:var(--card)}.bar-muted{fill:var(--muted)}.unused-bar{fill:url(#hatch);stroke:var(--muted)}
 .pick{cursor:pointer}.pick:hover .photo-bar{fill-opacity:.8}.chosen .photo-bar{fill:var(--orange)}
-.frustum{stroke:var(--ink);stroke-width:1.3}.sheet{fill-opacity:.42;stroke:var(--muted);stroke-width:1}.board:hover .sheet{fill-opacity:.75}
+.frustum{stroke:var(--ink);stroke-width:1.3}.sheet{fill-opacity:.3;stroke:var(--muted);stroke-width:1}.board:hover .sheet{fill-opacity:.75}
 .when-chosen{display:none}.chosen .when-chosen{display:inline}.chosen .sheet{stroke:var(--orange);stroke-width:2.4;fill-opacity:.55}
 .rays{stroke:var(--orange);stroke-width:1;stroke-opacity:.8}.chequers{fill:var(--orange)}
 .axis-x{stroke:#d55e00;stroke-width:2.2}.axis-y{stroke:#009e73;stroke-width:2.2}.axis-z{stroke:#0072b2;stroke-width:2.2}
 .axis-name-x,.axis-name-y,.axis-name-z{font-size:13px;font-weight:600;fill:var(--ink)}
 .no-picture{fill:var(--panel);stroke:var(--line)}
-.photo-arrow{stroke:#000;stroke-opacity:.65;stroke-width:4}.photo-arrow-top path,.photo-arrow-top{stroke:#fff}
-.photo-dots{stroke-linecap:round;stroke-width:6.5}.ellipse{stroke:#ffd84d;stroke-width:1.3}.rejected{stroke:#ff4d2e;stroke-width:2.4}
+.photo-arrow{stroke:#000;stroke-opacity:.65;stroke-width:4}.photo-arrow-top{stroke:#fff;stroke-width:1.9}
+.photo-dots{stroke-linecap:round;stroke-width:6.5}.ellipse{stroke:#ffd84d;stroke-width:1.2;stroke-opacity:.75}.rejected{stroke:#ff4d2e;stroke-width:2.4}
 .error{stroke-width:1.6}.error.blue{stroke:var(--blue)}.error.orange{stroke:var(--orange)}.mark.blue{fill:var(--blue)}.mark.orange{fill:var(--orange)}
 .board-point{stroke:var(--line)}.board-ring{fill:none;stroke:var(--ink);stroke-width:1.4}
 .next-sheet{fill:#fff;stroke:#444}.next-square{fill:#222}
 .diagonal{fill:var(--line)}.on-dark{font-size:10px;font-weight:600;fill:#fff}.on-light{font-size:10px;font-weight:600;fill:var(--ink)}
-.matrix{max-width:360px}
+.matrix{max-width:360px}.card svg.key{max-width:520px}
 )css";
 
 constexpr std::string_view size_rules = R"css(

@@ -95,12 +95,13 @@ void draw_heat(Svg& svg, const PicturePanel& panel, const Grid& grid, const std:
   svg.raw("</g>");
 }
 
-int draw_contours(Svg& svg, const PicturePanel& panel, const Grid& grid, const std::vector<double>& sizes_px) {
+int draw_contours(Svg& svg, const PicturePanel& panel, const Grid& grid, const std::vector<double>& sizes_px,
+                  double smallest_share) {
   std::vector<double> logs;
   for (const double size : sizes_px) logs.push_back(size > 0.0 ? std::log(size) : std::nan(""));
   double low = quantile(sizes_px, 0.0), high = quantile(sizes_px, 1.0);
   if (!(high > 0.0)) return 0;
-  low = std::max(low, 0.02 * high);  // lines around the zero of a difference tell nothing
+  low = std::max(low, smallest_share * high);
   std::vector<Place> taken, marks;
   std::vector<std::string> words;
   const std::vector<double> levels = contour_levels(low, high);

@@ -29,8 +29,9 @@ struct PicturePanel {
 void draw_heat(Svg& svg, const PicturePanel& panel, const Grid& grid, const std::vector<double>& sizes_px,
                const std::string& clip_id);
 
-/// Labelled lines of equal size [px]. Returns the number of levels drawn.
-int draw_contours(Svg& svg, const PicturePanel& panel, const Grid& grid, const std::vector<double>& sizes_px);
+/// Labelled lines of equal size [px], from `smallest_share` of the largest on. Returns the number of levels drawn.
+int draw_contours(Svg& svg, const PicturePanel& panel, const Grid& grid, const std::vector<double>& sizes_px,
+                  double smallest_share = 1e-3);
 
 /// Magnified arrows at (u, v): how many times longer than in the picture, a round number, the same for all of them.
 struct ArrowScale {

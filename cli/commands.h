@@ -5,6 +5,7 @@ namespace alidade::cli {
 class Frame;
 
 void add_calibrate(Frame& frame);
+void add_camera(Frame& frame);
 
 // How to write a command: cli/NAME.cpp with one function `add_NAME(Frame&)`, declared here and called in main.cpp.
 //

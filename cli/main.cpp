@@ -3,7 +3,10 @@
 
 namespace {
 
-void add_commands(alidade::cli::Frame& frame) { alidade::cli::add_calibrate(frame); }
+void add_commands(alidade::cli::Frame& frame) {
+  alidade::cli::add_calibrate(frame);
+  alidade::cli::add_camera(frame);
+}
 
 }  // namespace
 

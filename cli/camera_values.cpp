@@ -1,0 +1,64 @@
+#include "cli/camera_values.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "alidade/io/camera_file.h"
+#include "alidade/report/markup.h"
+
+namespace alidade::cli {
+
+Camera read_camera_input(Run& run, const std::string& role, const std::filesystem::path& file) {
+  Camera camera = read_camera(file);
+  std::error_code ignored;
+  std::string name = file.string();
+  if (!std::filesystem::exists(name, ignored)) name = name.substr(0, name.rfind(':'));  // FILE:NAME
+  run.add_input(role, file.string(), read_file(name));
+  return camera;
+}
+
+bool has_covariance(const Camera& camera) {
+  return camera.cov.rows() > 0 && camera.cov.rows() == params(camera.lens).size();
+}
+
+JsonValue camera_values(const Camera& camera) {
+  JsonValue values = JsonValue::object();
+  values["model"] = model_name(camera.lens);
+  values["width"] = camera.width_px;
+  values["height"] = camera.height_px;
+  const std::vector<std::string> names = param_names(camera.lens);
+  const Eigen::VectorXd of_lens = params(camera.lens);
+  for (std::size_t i = 0; i < names.size(); ++i) values[names[i]] = of_lens[static_cast<Eigen::Index>(i)];
+  return values;
+}
+
+JsonValue camera_stddev(const Camera& camera) {
+  JsonValue values = JsonValue::object();
+  if (!has_covariance(camera)) return values;
+  const std::vector<std::string> names = param_names(camera.lens);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const Eigen::Index at = static_cast<Eigen::Index>(i);
+    values[names[i]] = std::sqrt(std::max(0.0, camera.cov(at, at)));
+  }
+  return values;
+}
+
+std::vector<std::string> camera_lines(const Camera& camera) {
+  const std::vector<std::string> names = param_names(camera.lens);
+  const Eigen::VectorXd values = params(camera.lens);
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const Eigen::Index at = static_cast<Eigen::Index>(i);
+    const double sigma = has_covariance(camera) ? std::sqrt(std::max(0.0, camera.cov(at, at))) : 0.0;
+    const report::ValueText text = report::value_text(values[at], sigma);
+    const std::string value =
+        text.plus_minus.empty() ? fmt::format("{:.8g}", values[at]) : text.value + " ± " + text.plus_minus;
+    lines.push_back(fmt::format("  {:<5}{}{}", names[i], value, i < 5 ? " px" : ""));
+  }
+  return lines;
+}
+
+}  // namespace alidade::cli

@@ -55,7 +55,7 @@ std::vector<std::string> camera_lines(const Camera& camera) {
     const double sigma = has_covariance(camera) ? std::sqrt(std::max(0.0, camera.cov(at, at))) : 0.0;
     const report::ValueText text = report::value_text(values[at], sigma);
     const std::string value =
-        text.plus_minus.empty() ? fmt::format("{:.8g}", values[at]) : text.value + " ± " + text.plus_minus;
+        text.plus_minus.empty() ? fmt::format("{:.10g}", values[at]) : text.value + " ± " + text.plus_minus;
     lines.push_back(fmt::format("  {:<5}{}{}", names[i], value, i < 5 ? " px" : ""));
   }
   return lines;

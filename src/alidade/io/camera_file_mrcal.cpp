@@ -72,7 +72,7 @@ class LiteralReader {
     at_ += end.size();
     const std::size_t stop = text_.find(end, at_);
     if (stop == std::string_view::npos) fail("a quotation has no end");
-    const std::string word(text_.substr(at_, stop - at_));
+    std::string word(text_.substr(at_, stop - at_));
     at_ = stop + end.size();
     return word;
   }

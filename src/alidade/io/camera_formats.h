@@ -7,7 +7,7 @@
 #include "alidade/camera/camera.h"
 #include "alidade/io/files.h"
 
-namespace YAML {
+namespace YAML {  // NOLINT(readability-identifier-naming): yaml-cpp's own
 class Node;
 }
 

@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "alidade/imaging/grid_border.h"
 #include "alidade/imaging/grid_placement.h"
 #include "alidade/imaging/saddle_points.h"
 
@@ -12,6 +13,8 @@ namespace {
 
 constexpr double max_pixels = 1.7e6;  // of a picture that is searched; larger photos are halved first
 constexpr int min_side_px = 60;
+constexpr std::size_t min_corners_to_extend = 9;
+constexpr const char* no_corners = "no chessboard corners";
 
 cv::Mat resized(const cv::Mat& photo, double factor) {
   cv::Mat result;
@@ -28,26 +31,38 @@ void to_photo_pixels(CornerGrid& grid, double scale) {
   }
 }
 
-/// Better: a placed grid before none, then the one with more corners; a reason about a larger grid tells more.
-bool is_better(const Chessboard& a, const Chessboard& b) {
-  if (a.reason.empty() != b.reason.empty()) return a.reason.empty();
+/// A grid as found and as numbered.
+struct Candidate {
+  CornerGrid grid;
+  PlacedGrid placed;
+  double scale = 1.0;
+  [[nodiscard]] bool is_placed() const { return placed.reason.empty(); }
+};
+
+/// A placed grid before none, then the one with more corners.
+bool is_better(const Candidate& a, const Candidate& b) {
+  if (a.is_placed() != b.is_placed()) return a.is_placed();
   return a.grid.corners.size() > b.grid.corners.size();
 }
 
 /// The best board at one size of the picture.
-Chessboard search(const cv::Mat& picture, double scale, int cols, int rows) {
-  Chessboard best{.grid = {}, .pixel_scale = scale, .reason = "no chessboard corners"};
+Candidate search(const cv::Mat& picture, double scale, int cols, int rows) {
+  Candidate best{.grid = {}, .placed = {.grid = {}, .reason = no_corners}, .scale = scale};
   const std::vector<SaddlePoint> points = find_saddle_points(picture);
-  for (CornerGrid& grid : grow_grids(points)) {
+  for (CornerGrid& grid : grow_grids(picture, points)) {
     to_photo_pixels(grid, scale);
     PlacedGrid placed = place_grid(grid, cols, rows);
-    const bool is_placed = placed.reason.empty();
-    Chessboard board{.grid = is_placed ? std::move(placed.grid) : std::move(grid),
-                     .pixel_scale = scale,
-                     .reason = std::move(placed.reason)};
-    if (is_better(board, best)) best = std::move(board);
+    Candidate candidate{.grid = std::move(grid), .placed = std::move(placed), .scale = scale};
+    if (is_better(candidate, best)) best = std::move(candidate);
   }
   return best;
+}
+
+/// A grid that cannot be placed as it is: missed lines are looked for, then the board's borders.
+void place_by_borders(const cv::Mat& photo, Candidate& candidate, int cols, int rows) {
+  if (candidate.is_placed() || candidate.grid.corners.size() < min_corners_to_extend) return;
+  extend_by_fit(photo, candidate.grid, std::max(cols, rows) + 1);
+  candidate.placed = place_grid(candidate.grid, cols, rows, find_borders(photo, candidate.grid));
 }
 
 }  // namespace
@@ -56,17 +71,17 @@ Chessboard find_chessboard(const cv::Mat& photo, int cols, int rows) {
   double first = 1.0;
   const double pixels = static_cast<double>(photo.total());
   while (pixels / (first * first) > max_pixels) first *= 2.0;
-  Chessboard best{.grid = {}, .pixel_scale = first, .reason = "no chessboard corners"};
+  Candidate best{.grid = {}, .placed = {.grid = {}, .reason = no_corners}, .scale = first};
   const auto whole = static_cast<std::size_t>(cols * rows);
   for (const double scale : {first, 2.0 * first, 4.0 * first, 0.5 * first}) {
-    const bool too_small = std::min(photo.rows, photo.cols) / scale < min_side_px;
-    if (scale > first && too_small) continue;
+    if (scale > first && std::min(photo.rows, photo.cols) / scale < min_side_px) continue;
     if (scale < first && pixels / (scale * scale) > max_pixels) continue;
-    Chessboard board = search(scale == 1.0 ? photo : resized(photo, 1.0 / scale), scale, cols, rows);
-    if (is_better(board, best)) best = std::move(board);
-    if (best.reason.empty() && best.grid.corners.size() == whole) break;
+    Candidate candidate = search(scale == 1.0 ? photo : resized(photo, 1.0 / scale), scale, cols, rows);
+    if (is_better(candidate, best)) best = std::move(candidate);
+    if (best.is_placed() && best.placed.grid.corners.size() == whole) break;
   }
-  return best;
+  place_by_borders(photo, best, cols, rows);
+  return {.grid = std::move(best.placed.grid), .pixel_scale = best.scale, .reason = std::move(best.placed.reason)};
 }
 
 }  // namespace alidade

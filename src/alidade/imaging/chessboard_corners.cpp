@@ -15,6 +15,7 @@ namespace {
 
 constexpr double min_relative_contrast = 0.15;  // of the board's median: less is not a corner of this board
 constexpr std::size_t min_corners = 6;
+constexpr double min_sagitta_px = 0.03;  // over one square: it moves a straight fit by 0.003 px
 
 struct FittedCorner {
   GridCell cell;
@@ -60,6 +61,14 @@ void drop_wrong_colours(std::vector<FittedCorner>& corners) {
   });
 }
 
+/// Curvature [1/px] of the edge through three points, positive towards the left normal (-sin, cos) of before → behind.
+double bend_of(const Eigen::Vector2d& before, const Eigen::Vector2d& at, const Eigen::Vector2d& behind) {
+  const Eigen::Vector2d chord = behind - before, way = 0.5 * (before + behind) - at;
+  const double length = chord.norm();
+  const double sagitta = (chord.x() * way.y() - chord.y() * way.x()) / length;
+  return 8.0 * sagitta / (length * length);
+}
+
 class ChessboardFitter {
  public:
   ChessboardFitter(const cv::Mat& photo, const Board& board, const Chessboard& coarse)
@@ -72,6 +81,7 @@ class ChessboardFitter {
     for (const auto& [cell, corner] : CornerGrid(grid_).corners) try_at(cell, corner, corners);
     look_for_missing(corners);
     drop_wrong_colours(corners);
+    refit_bent(corners);
     return corners;
   }
 
@@ -103,6 +113,33 @@ class ChessboardFitter {
     }
   }
 
+  /// Fits again where the neighbours' places show that the lens bends the edges.
+  void refit_bent(std::vector<FittedCorner>& corners) {
+    grid_.corners.clear();
+    for (const FittedCorner& corner : corners) grid_.corners[corner.cell].px = corner.fit.px;
+    for (FittedCorner& corner : corners) {
+      CornerStart start = start_at(
+          with_local_steps(grid_, corner.cell, *grid_.at(corner.cell.first, corner.cell.second)), corner.fit.blur_px);
+      start.bend_cols = bend_at(corner.cell, 1, 0);
+      start.bend_rows = bend_at(corner.cell, 0, 1);
+      const double sagitta_px = 0.5 * std::max(std::abs(start.bend_cols) * start.along_cols.squaredNorm(),
+                                               std::abs(start.bend_rows) * start.along_rows.squaredNorm());
+      if (!(sagitta_px > min_sagitta_px)) continue;
+      const CornerFit again = fit_corner(photo_, start, config_);
+      if (again.accepted()) corner.fit = again;
+    }
+  }
+
+  /// Curvature of the grid line through a corner; of the nearest one inside where it has one neighbour only.
+  [[nodiscard]] double bend_at(const GridCell& cell, int di, int dj) const {
+    for (const int shift : {0, -1, 1}) {
+      const int i = cell.first + shift * di, j = cell.second + shift * dj;
+      const GridCorner *before = grid_.at(i - di, j - dj), *at = grid_.at(i, j), *behind = grid_.at(i + di, j + dj);
+      if (before && at && behind) return bend_of(before->px, at->px, behind->px);
+    }
+    return 0.0;
+  }
+
   const cv::Mat& photo_;
   Board board_;
   CornerGrid grid_;
@@ -125,14 +162,6 @@ BoardDetection to_detection(std::vector<FittedCorner> corners, const Board& boar
         {.index = corner.cell.second * board.cols + corner.cell.first, .px = corner.fit.px, .cov = corner.fit.cov});
   }
   return detection;
-}
-
-/// Curvature [1/px] of the edge through three points, positive towards the left normal (-sin, cos) of before → behind.
-double bend_of(const Eigen::Vector2d& before, const Eigen::Vector2d& at, const Eigen::Vector2d& behind) {
-  const Eigen::Vector2d chord = behind - before, way = 0.5 * (before + behind) - at;
-  const double length = chord.norm();
-  const double sagitta = (chord.x() * way.y() - chord.y() * way.x()) / length;
-  return 8.0 * sagitta / (length * length);
 }
 
 /// The start of a fit where the lens and the pose are known; none where the corner's square is not in the picture.

@@ -8,19 +8,20 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <utility>
-#include <vector>
 
 #include "alidade/imaging/blurred_edge.h"
+#include "alidade/imaging/corner_window.h"
 
 namespace alidade {
 namespace {
 
 constexpr double min_blur_px = 0.4, max_blur_px = 4.0;  // a pixel's own width blurs by 0.29; sharper edges make jumps
-constexpr std::size_t min_pixels = 16;                  // more than twice the parameters
-constexpr double small_square_px = 10.0;  // in smaller squares every pixel counts: the window is the whole square
-constexpr double converged_px = 1e-3;     // the next step would be ten times smaller
-constexpr double min_sin_angle = 0.10;    // 6°: beyond it the two edges are one
-constexpr double max_sigma_px = 0.5;      // a corner less certain than that is none
+constexpr double min_pixels = 16.0;                     // more than twice the parameters
+constexpr double converged_px = 1e-3;                   // the next step would be ten times smaller
+constexpr double min_sin_angle = 0.10;                  // 6°: beyond it the two edges are one
+constexpr double max_sigma_px = 0.5;                    // a corner less certain than that is none
+
+constexpr double edge_reach = 3.6;  // blurs from an edge its step is whole to 3e-4 of the contrast
 
 /// The model's parameters. Edge k runs along (cos, sin)(angle_rad[k]) through `px` and bends by bend[k] (held).
 struct Model {
@@ -29,65 +30,14 @@ struct Model {
   double blur_px, contrast, mean;
 };
 
-/// The pixels of the parallelogram, relative to `origin`. Their number is a multiple of four: up to three are left out.
-struct Pixels {
-  Eigen::Vector2d origin;
-  std::vector<float> x, y, grey;
-  [[nodiscard]] std::size_t size() const { return x.size(); }
-};
-
 /// Columns: offsets of the two edges, their angles, blur, contrast, mean; and the residual last.
 using Matrix8 = Eigen::Matrix<double, 8, 8>;
 using Matrix7 = Eigen::Matrix<double, 7, 7>;
 using Vector7 = Eigen::Vector<double, 7>;
 
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
 double cost_of(const Matrix8& sums) { return sums(7, 7); }
-
-/// Columns of row y, relative to the origin, that lie in the parallelogram |a|, |b| < half, (a, b) = inverse · (p − c).
-std::pair<int, int> span_of_row(const Eigen::Matrix2d& inverse, const Eigen::Vector2d& half,
-                                const Eigen::Vector2d& center, double y) {
-  double x_min = -1e6, x_max = 1e6;
-  for (int k = 0; k < 2; ++k) {
-    const double slope = inverse(k, 0);
-    const double at_zero = inverse(k, 1) * (y - center.y()) - slope * center.x();
-    if (std::abs(slope) < 1e-9) {
-      if (!(std::abs(at_zero) < half[k])) return {0, -1};
-      continue;
-    }
-    const double one = (-half[k] - at_zero) / slope, other = (half[k] - at_zero) / slope;
-    x_min = std::max(x_min, std::min(one, other));
-    x_max = std::min(x_max, std::max(one, other));
-  }
-  return {static_cast<int>(std::ceil(x_min)), static_cast<int>(std::floor(x_max))};
-}
-
-Pixels gather(const cv::Mat& photo, const CornerStart& start, const CornerFitConfig& config) {
-  const int origin_x = static_cast<int>(std::lround(start.px.x()));
-  const int origin_y = static_cast<int>(std::lround(start.px.y()));
-  Pixels pixels{.origin = {origin_x, origin_y}, .x = {}, .y = {}, .grey = {}};
-  Eigen::Matrix2d square;
-  square << start.along_cols, start.along_rows;
-  const Eigen::Vector2d lengths = square.colwise().norm();
-  const Eigen::Vector2d half = (config.max_half_window_px * lengths.cwiseInverse())
-                                   .cwiseMin(lengths.minCoeff() < small_square_px ? 0.5 : config.window);
-  const Eigen::Matrix2d inverse = square.inverse();
-  const Eigen::Vector2d center = start.px - pixels.origin;
-  const double reach = std::abs(square(1, 0)) * half[0] + std::abs(square(1, 1)) * half[1];
-  const int y_min = std::max(-origin_y, static_cast<int>(std::ceil(center.y() - reach)));
-  const int y_max = std::min(photo.rows - 1 - origin_y, static_cast<int>(std::floor(center.y() + reach)));
-  for (int y = y_min; y <= y_max; ++y) {
-    const auto [first, last] = span_of_row(inverse, half, center, y);
-    const float* row = photo.ptr<float>(origin_y + y) + origin_x;
-    for (int x = std::max(first, -origin_x); x <= std::min(last, photo.cols - 1 - origin_x); ++x) {
-      pixels.x.push_back(static_cast<float>(x));
-      pixels.y.push_back(static_cast<float>(y));
-      pixels.grey.push_back(row[x]);
-    }
-  }
-  const std::size_t groups = pixels.size() / 4;
-  for (std::vector<float>* values : {&pixels.x, &pixels.y, &pixels.grey}) values->resize(4 * groups);
-  return pixels;
-}
 
 Float4 load(const float* from) {
   Float4 values;
@@ -123,9 +73,9 @@ void add_products(const std::array<Float4, 8>& column, std::array<Float4, 36>& s
   (add_row.template operator()<r>(std::make_index_sequence<8 - r>{}), ...);
 }
 
-/// Sums of all products of the columns of [J r] over the pixels, in float: positions are small numbers around the
-/// corner.
-Matrix8 normal_sums(const Pixels& pixels, const Model& model) {
+/// Sums of all products of the columns of [J r] over the pixels near the edges, in float: positions are small numbers
+/// around the corner.
+Matrix8 near_sums(const CornerWindow& window, const Model& model) {
   const auto inverse_width = static_cast<float>(1.0 / (std::numbers::sqrt2 * model.blur_px));
   std::array<EdgeConstants, 2> edges{};
   for (std::size_t k = 0; k < 2; ++k) {
@@ -135,11 +85,11 @@ Matrix8 normal_sums(const Pixels& pixels, const Model& model) {
   const auto slope = static_cast<float>(2.0 * std::numbers::inv_sqrtpi * model.contrast) * inverse_width;
   const auto contrast = static_cast<float>(model.contrast), mean = static_cast<float>(model.mean);
   const auto minus_inverse_blur = static_cast<float>(-1.0 / model.blur_px);
-  const Eigen::Vector2f corner = (model.px - pixels.origin).cast<float>();
+  const Eigen::Vector2f corner = (model.px - window.origin).cast<float>();
 
   std::array<Float4, 36> sums{};
-  for (std::size_t i = 0; i < pixels.size(); i += 4) {
-    const Float4 dx = load(&pixels.x[i]) - corner.x(), dy = load(&pixels.y[i]) - corner.y();
+  for (std::size_t i = 0; i < window.num_near(); i += 4) {
+    const Float4 dx = load(&window.x[i]) - corner.x(), dy = load(&window.y[i]) - corner.y();
     const EdgeAtPixels one = edges[0].at(dx, dy), two = edges[1].at(dx, dy);
     const Float4 g1 = slope * one.profile.bell * two.profile.step;
     const Float4 g2 = slope * one.profile.step * two.profile.bell;
@@ -151,7 +101,7 @@ Matrix8 normal_sums(const Pixels& pixels, const Model& model) {
                                        (g1 * one.distance + g2 * two.distance) * minus_inverse_blur,
                                        product,
                                        Float4{1.0f, 1.0f, 1.0f, 1.0f},
-                                       mean + contrast * product - load(&pixels.grey[i])};
+                                       mean + contrast * product - load(&window.grey[i])};
     add_products(column, sums, std::make_index_sequence<8>{});
   }
   Matrix8 full;
@@ -160,6 +110,22 @@ Matrix8 normal_sums(const Pixels& pixels, const Model& model) {
     for (int c = r; c < 8; ++c) full(r, c) = full(c, r) = static_cast<double>(sum(sums[at++]));
   }
   return full;
+}
+
+/// Sums over all pixels. Far from the edges the product of the two steps is -1 or 1 and nothing else changes.
+Matrix8 normal_sums(const CornerWindow& window, const Model& model) {
+  Matrix8 sums = near_sums(window, model);
+  for (const double product : {-1.0, 1.0}) {
+    const FarPixels& far = window.far[product > 0.0 ? 1 : 0];
+    const double grey = model.mean + product * model.contrast;
+    const double residual = far.count * grey - far.sum;
+    sums.block<3, 3>(5, 5) +=
+        (Eigen::Matrix3d() << far.count, product * far.count, product * residual,  //
+         product * far.count, far.count, residual,                                 //
+         product * residual, residual, far.count * grey * grey - 2.0 * grey * far.sum + far.sum_of_squares)
+            .finished();
+  }
+  return sums;
 }
 
 /// Moves the model by a step of the seven parameters; the corner is where the two displaced edges meet.
@@ -178,10 +144,10 @@ Model moved(const Model& model, const Vector7& step) {
 }
 
 /// Best mean and contrast for the start's geometry, by linear least squares.
-Model with_best_greys(const Pixels& pixels, Model model) {
+Model with_best_greys(const CornerWindow& window, Model model) {
   model.contrast = 1.0;
   model.mean = 0.0;
-  const Matrix8 sums = normal_sums(pixels, model);
+  const Matrix8 sums = normal_sums(window, model);
   const Eigen::Vector2d step = sums.block<2, 2>(5, 5).inverse() * sums.block<2, 1>(5, 7);
   model.contrast -= step[0];
   model.mean -= step[1];
@@ -209,13 +175,13 @@ Vector7 damped_step(const Solution& at, double damping) {
   return -JtJ.ldlt().solve(Jtr);
 }
 
-Solution levenberg_marquardt(const Pixels& pixels, const Model& start, int max_iterations) {
-  Solution best{start, normal_sums(pixels, start)};
+Solution levenberg_marquardt(const CornerWindow& window, const Model& start, int max_iterations) {
+  Solution best{start, normal_sums(window, start)};
   double damping = 1e-3;
   for (int i = 0; i < max_iterations; ++i) {
     const Vector7 step = damped_step(best, damping);
     const Model model = moved(best.model, step);
-    const Matrix8 sums = normal_sums(pixels, model);
+    const Matrix8 sums = normal_sums(window, model);
     const bool is_small = step.head<2>().norm() < converged_px;
     if (cost_of(sums) < cost_of(best.sums)) {
       best = {model, sums};
@@ -244,15 +210,46 @@ Eigen::Matrix2d covariance_of(const Solution& solution, double variance) {
   return 0.5 * (cov + cov.transpose());
 }
 
+std::string_view reason_against(const CornerStart& start, const cv::Mat& photo) {
+  const double lengths = start.along_cols.norm() * start.along_rows.norm();
+  if (!start.px.allFinite() || !(std::abs(cross(start.along_cols, start.along_rows)) > min_sin_angle * lengths)) {
+    return "the two edges nearly coincide";
+  }
+  const bool is_inside =
+      start.px.x() > 1.0 && start.px.y() > 1.0 && start.px.x() < photo.cols - 2.0 && start.px.y() < photo.rows - 2.0;
+  return is_inside ? "" : "outside the photo";
+}
+
 std::string_view reason_against(const CornerFit& fit, const CornerStart& start, const Solution& solution,
                                 const CornerFitConfig& config) {
   if (!solution.converged || !fit.px.allFinite() || !fit.cov.allFinite()) return "the fit does not converge";
   if (!(std::abs(fit.contrast) >= config.min_contrast)) return "no contrast";
   if (!((fit.px - start.px).norm() <= config.max_move_px)) return "the fit moved away";
-  if (!(fit.rms <= config.max_misfit * std::abs(fit.contrast)))
-    return "not two edges: glare, shadow or something before it";
+  if (!(fit.rms <= config.max_misfit * std::abs(fit.contrast))) return "not two edges: glare or something before it";
   if (!(fit.cov.trace() < max_sigma_px * max_sigma_px)) return "too uncertain";
   return {};
+}
+
+/// How far from the first edges a pixel can lie and still feel the solution's edges.
+double reach_of(const Solution& solution, const Model& first, const CornerFitConfig& config) {
+  const Model& model = solution.model;
+  const double turned_rad =
+      std::max(std::abs(model.angle_rad[0] - first.angle_rad[0]), std::abs(model.angle_rad[1] - first.angle_rad[1]));
+  return edge_reach * model.blur_px + (model.px - first.px).norm() + config.max_half_window_px * turned_rad;
+}
+
+CornerFit fit_of(const Solution& solution, double num_pixels) {
+  CornerFit fit;
+  const Model& model = solution.model;
+  const double variance = cost_of(solution.sums) / (num_pixels - 7.0);
+  fit.px = model.px;
+  fit.cov = covariance_of(solution, variance);
+  fit.edge_cols = {std::cos(model.angle_rad[0]), std::sin(model.angle_rad[0])};
+  fit.edge_rows = {std::cos(model.angle_rad[1]), std::sin(model.angle_rad[1])};
+  fit.blur_px = model.blur_px;
+  fit.contrast = -model.contrast;  // left normals: between +along_cols and +along_rows, d₁ and d₂ differ in sign
+  fit.rms = std::sqrt(variance);
+  return fit;
 }
 
 }  // namespace
@@ -260,22 +257,8 @@ std::string_view reason_against(const CornerFit& fit, const CornerStart& start, 
 CornerFit fit_corner(const cv::Mat& photo, const CornerStart& start, const CornerFitConfig& config) {
   CornerFit fit;
   fit.px = start.px;
-  const double lengths = start.along_cols.norm() * start.along_rows.norm();
-  const double cross = start.along_cols.x() * start.along_rows.y() - start.along_cols.y() * start.along_rows.x();
-  if (!start.px.allFinite() || !(std::abs(cross) > min_sin_angle * lengths)) {
-    fit.reason = "the two edges nearly coincide";
-    return fit;
-  }
-  if (!(start.px.x() > 1.0 && start.px.y() > 1.0 && start.px.x() < photo.cols - 2.0 &&
-        start.px.y() < photo.rows - 2.0)) {
-    fit.reason = "outside the photo";
-    return fit;
-  }
-  const Pixels pixels = gather(photo, start, config);
-  if (pixels.size() < min_pixels) {
-    fit.reason = "the squares are too small";
-    return fit;
-  }
+  fit.reason = reason_against(start, photo);
+  if (!fit.accepted()) return fit;
   const Model first = {.px = start.px,
                        .angle_rad = {std::atan2(start.along_cols.y(), start.along_cols.x()),
                                      std::atan2(start.along_rows.y(), start.along_rows.x())},
@@ -283,16 +266,17 @@ CornerFit fit_corner(const cv::Mat& photo, const CornerStart& start, const Corne
                        .blur_px = start.blur_px,
                        .contrast = 1.0,
                        .mean = 0.0};
-  const Solution solution = levenberg_marquardt(pixels, with_best_greys(pixels, first), config.max_iterations);
-  const double variance = cost_of(solution.sums) / static_cast<double>(pixels.size() - 7);
-  fit.px = solution.model.px;
-  fit.cov = covariance_of(solution, variance);
-  fit.edge_cols = {std::cos(solution.model.angle_rad[0]), std::sin(solution.model.angle_rad[0])};
-  fit.edge_rows = {std::cos(solution.model.angle_rad[1]), std::sin(solution.model.angle_rad[1])};
-  fit.blur_px = solution.model.blur_px;
-  // Two left normals: with along_rows to the right of along_cols, the bright quadrant has d₁ d₂ < 0.
-  fit.contrast = cross > 0.0 ? -solution.model.contrast : solution.model.contrast;
-  fit.rms = std::sqrt(variance);
+  CornerWindow window = gather_window(photo, start, config, edge_reach * start.blur_px + 1.0);
+  if (window.num_pixels() < min_pixels) {
+    fit.reason = "the squares are too small";
+    return fit;
+  }
+  Solution solution = levenberg_marquardt(window, with_best_greys(window, first), config.max_iterations);
+  if (const double reach = reach_of(solution, first, config); reach > window.near_px) {
+    window = gather_window(photo, start, config, reach + 1.0);
+    solution = levenberg_marquardt(window, solution.model, config.max_iterations);
+  }
+  fit = fit_of(solution, window.num_pixels());
   fit.reason = reason_against(fit, start, solution, config);
   return fit;
 }

@@ -20,7 +20,7 @@ struct CornerStart {
 };
 
 struct CornerFitConfig {
-  double window = 0.42;  ///< Half side of the fitted parallelogram, in squares.
+  double window = 0.47;  ///< Half side of the fitted parallelogram, in squares; below 0.5 no pixel serves two corners.
   double max_half_window_px =
       24;                     ///< Beyond it more of the edges tells more of the lens's curvature than of the corner.
   double max_move_px = 2.0;   ///< A fit that leaves its start further found something else.

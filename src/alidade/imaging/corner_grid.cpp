@@ -4,50 +4,63 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <numbers>
-#include <unordered_map>
+#include <opencv2/core.hpp>
 
 namespace alidade {
 namespace {
 
-constexpr float bucket_px = 24.0f;
+constexpr float bucket_px = 16.0f;
 constexpr float min_step_px = 4.0f, max_step_px = 130.0f;  // larger squares are found at half the size
-constexpr float max_neighbour_angle_rad = 0.28f;           // between an edge and the way to the neighbour
+constexpr float min_neighbour_cosine = 0.96f;              // 16° between an edge and the way to the neighbour
 constexpr float max_line_angle_rad = 0.5f;                 // between the same edge at two corners
 constexpr double max_miss = 0.3;                           // from the prediction, in squares
+constexpr float max_contrast_ratio = 4.0f;                 // among the corners of a first square
+constexpr float min_square_contrast = 0.25f;               // of its weakest corner's, for it and its neighbours
+constexpr std::size_t max_seeds = 2000;                    // the strongest: bounds the time spent on a texture
 constexpr std::size_t min_corners = 6;
 constexpr std::array<GridCell, 4> sides{{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
 
-/// Saddle points by place.
+/// Saddle points by place: the points of square bucket k are order_[first_[k]] … order_[first_[k + 1] - 1].
 class PointIndex {
  public:
   explicit PointIndex(std::span<const SaddlePoint> points) : points_(points) {
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      buckets_[key(bucket(points[k].px.x()), bucket(points[k].px.y()))].push_back(k);
+    for (const SaddlePoint& point : points) {
+      cols_ = std::max(cols_, bucket(point.px.x()) + 1);
+      rows_ = std::max(rows_, bucket(point.px.y()) + 1);
     }
+    first_.assign(static_cast<std::size_t>(cols_ * rows_) + 1, 0);
+    for (const SaddlePoint& point : points) ++first_[place(point) + 1];
+    for (std::size_t k = 1; k < first_.size(); ++k) first_[k] += first_[k - 1];
+    order_.resize(points.size());
+    std::vector<std::size_t> next = first_;
+    for (std::size_t k = 0; k < points.size(); ++k) order_[next[place(points[k])]++] = k;
   }
 
   template <class Visit>
   void visit_around(const Eigen::Vector2f& px, float radius_px, const Visit& visit) const {
-    for (int y = bucket(px.y() - radius_px); y <= bucket(px.y() + radius_px); ++y) {
-      for (int x = bucket(px.x() - radius_px); x <= bucket(px.x() + radius_px); ++x) {
-        const auto found = buckets_.find(key(x, y));
-        if (found == buckets_.end()) continue;
-        for (const std::size_t k : found->second) {
-          if ((points_[k].px - px).squaredNorm() <= radius_px * radius_px) visit(k);
-        }
+    const int x_min = std::max(bucket(px.x() - radius_px), 0);
+    const int x_max = std::min(bucket(px.x() + radius_px), cols_ - 1);
+    if (x_min > x_max) return;
+    for (int y = std::max(bucket(px.y() - radius_px), 0); y <= std::min(bucket(px.y() + radius_px), rows_ - 1); ++y) {
+      const auto from = static_cast<std::size_t>(y * cols_ + x_min), to = static_cast<std::size_t>(y * cols_ + x_max);
+      for (std::size_t at = first_[from]; at < first_[to + 1]; ++at) {
+        const std::size_t k = order_[at];
+        if ((points_[k].px - px).squaredNorm() <= radius_px * radius_px) visit(k);
       }
     }
   }
 
  private:
-  static int bucket(float at) { return static_cast<int>(std::floor(at / bucket_px)); }
-  static std::int64_t key(int x, int y) { return (static_cast<std::int64_t>(y) << 32) ^ static_cast<std::uint32_t>(x); }
+  static int bucket(float at) { return static_cast<int>(std::floor(std::clamp(at, -1e6f, 1e6f) / bucket_px)); }
+  [[nodiscard]] std::size_t place(const SaddlePoint& point) const {
+    return static_cast<std::size_t>(bucket(point.px.y()) * cols_ + bucket(point.px.x()));
+  }
 
   std::span<const SaddlePoint> points_;
-  std::unordered_map<std::int64_t, std::vector<std::size_t>> buckets_;
+  int cols_ = 0, rows_ = 0;
+  std::vector<std::size_t> first_, order_;
 };
 
 /// Angle between two undirected lines, in [0, π/2].
@@ -69,13 +82,15 @@ int type_along_i(int i, int j) { return (i + j) & 1; }
 
 class Grower {
  public:
-  explicit Grower(std::span<const SaddlePoint> points) : points_(points), index_(points), used_(points.size(), 0) {}
+  Grower(const cv::Mat& picture, std::span<const SaddlePoint> points)
+      : picture_(picture), points_(points), index_(points), used_(points.size(), 0) {}
 
   std::vector<CornerGrid> run() {
     std::vector<std::size_t> order(points_.size());
     for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
     std::sort(order.begin(), order.end(),
               [&](std::size_t a, std::size_t b) { return points_[a].strength > points_[b].strength; });
+    if (order.size() > max_seeds) order.resize(max_seeds);
     std::vector<CornerGrid> grids;
     for (const std::size_t seed : order) {
       if (used_[seed]) continue;
@@ -105,9 +120,10 @@ class Grower {
     index_.visit_around(from.px, max_step_px, [&](std::size_t k) {
       if (used_[k] || k == seed) return;
       const Eigen::Vector2f way = points_[k].px - from.px;
+      const float ahead = direction.dot(way);
+      if (!(ahead > 0.0f)) return;
       const float length = way.norm();
-      if (!(length < best_px && length > min_step_px)) return;
-      if (direction.dot(way) < std::cos(max_neighbour_angle_rad) * length) return;
+      if (!(length < best_px && length > min_step_px) || ahead < min_neighbour_cosine * length) return;
       if (!has_lines(points_[k], 1, from.angle_rad[0], from.angle_rad[1])) return;
       best_px = length;
       best = k;
@@ -130,6 +146,8 @@ class Grower {
         far.px = origin + sign_i * far.step_i + sign_j * far.step_j;
         const auto opposite = nearest(far, 0);
         if (!opposite) continue;
+        // Seen from the seed, the sectors between +i and +j and between -i and -j are bright.
+        if (!has_checkered_surroundings({seed, *along_i, *along_j, *opposite}, far, sign_i == sign_j)) continue;
         const int i = static_cast<int>(sign_i), j = static_cast<int>(sign_j);
         CornerGrid grid;
         take(grid, {0, 0}, seed, far);
@@ -140,6 +158,32 @@ class Grower {
       }
     }
     return {};
+  }
+
+  /// The square between four corners and its eight neighbours alternate: chance saddles of a texture seldom do.
+  [[nodiscard]] bool has_checkered_surroundings(const std::array<std::size_t, 4>& corners, const GridCorner& steps,
+                                                bool center_is_bright) const {
+    Eigen::Vector2f center = Eigen::Vector2f::Zero();
+    float middle = 0.0f, weakest = points_[corners[0]].contrast, strongest = weakest;
+    for (const std::size_t k : corners) {
+      center += 0.25f * points_[k].px;
+      middle += 0.25f * points_[k].middle;
+      weakest = std::min(weakest, points_[k].contrast);
+      strongest = std::max(strongest, points_[k].contrast);
+    }
+    if (strongest > max_contrast_ratio * weakest) return false;
+    const Eigen::Vector2f step_i = steps.step_i.cast<float>(), step_j = steps.step_j.cast<float>();
+    for (int b = -1; b <= 1; ++b) {
+      for (int a = -1; a <= 1; ++a) {
+        const Eigen::Vector2f px = center + static_cast<float>(a) * step_i + static_cast<float>(b) * step_j;
+        const int x = static_cast<int>(std::lround(px.x())), y = static_cast<int>(std::lround(px.y()));
+        if (x < 0 || y < 0 || x >= picture_.cols || y >= picture_.rows) continue;
+        const float above = picture_.at<float>(y, x) - middle;
+        const bool should_be_bright = center_is_bright == ((a + b) % 2 == 0);
+        if (!((should_be_bright ? above : -above) > min_square_contrast * weakest)) return false;
+      }
+    }
+    return true;
   }
 
   /// The unused point nearest to a prediction, within `max_miss` of a square in both directions.
@@ -161,9 +205,33 @@ class Grower {
     return best;
   }
 
+  /// Every square that the new corner completes has its colour, and its corners are about as bright and as strong.
+  [[nodiscard]] bool fits_colours(const CornerGrid& grid, const GridCell& cell, std::size_t point) const {
+    const SaddlePoint& added = points_[point];
+    for (const int di : {-1, 1}) {
+      for (const int dj : {-1, 1}) {
+        const GridCorner *one = grid.at(cell.first + di, cell.second), *two = grid.at(cell.first, cell.second + dj);
+        const GridCorner* far = grid.at(cell.first + di, cell.second + dj);
+        if (!one || !two || !far) continue;
+        const float weakest = std::min({added.contrast, one->contrast, two->contrast, far->contrast});
+        const float strongest = std::max({added.contrast, one->contrast, two->contrast, far->contrast});
+        if (strongest > max_contrast_ratio * weakest) return false;
+        const float middle = 0.25f * (added.middle + one->middle + two->middle + far->middle);
+        const Eigen::Vector2d center = 0.25 * (added.px.cast<double>() + one->px + two->px + far->px);
+        const auto x = static_cast<int>(std::lround(center.x())), y = static_cast<int>(std::lround(center.y()));
+        const bool is_bright = (cell.first + cell.second + (di < 0 ? 1 : 0) + (dj < 0 ? 1 : 0)) % 2 == 0;
+        const float above = picture_.at<float>(y, x) - middle;
+        if (!((is_bright ? above : -above) > min_square_contrast * weakest)) return false;
+      }
+    }
+    return true;
+  }
+
   void take(CornerGrid& grid, const GridCell& cell, std::size_t point, const GridCorner& steps) {
     GridCorner corner = steps;
     corner.px = points_[point].px.cast<double>();
+    corner.middle = points_[point].middle;
+    corner.contrast = points_[point].contrast;
     grid.corners[cell] = corner;
     used_[point] = 1;
     taken_.push_back(point);
@@ -181,7 +249,7 @@ class Grower {
           const auto predicted = predict_corner(grid, i + di, j + dj);
           if (!predicted) continue;
           const auto point = nearest(*predicted, type_along_i(i + di, j + dj));
-          if (!point) continue;
+          if (!point || !fits_colours(grid, {i + di, j + dj}, *point)) continue;
           take(grid, {i + di, j + dj}, *point, *predicted);
           grown = true;
         }
@@ -189,6 +257,7 @@ class Grower {
     }
   }
 
+  const cv::Mat& picture_;
   std::span<const SaddlePoint> points_;
   PointIndex index_;
   std::vector<char> used_;
@@ -249,6 +318,8 @@ std::optional<GridCorner> predict_corner(const CornerGrid& grid, int i, int j) {
   return GridCorner{total / weight, *step_i, *step_j};
 }
 
-std::vector<CornerGrid> grow_grids(std::span<const SaddlePoint> points) { return Grower(points).run(); }
+std::vector<CornerGrid> grow_grids(const cv::Mat& picture, std::span<const SaddlePoint> points) {
+  return Grower(picture, points).run();
+}
 
 }  // namespace alidade

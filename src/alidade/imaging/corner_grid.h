@@ -9,6 +9,10 @@
 
 #include "alidade/imaging/saddle_points.h"
 
+namespace cv {
+class Mat;
+}
+
 namespace alidade {
 
 /// Place in a grid: (i, j) counts along its first and second direction, from anywhere.
@@ -18,6 +22,7 @@ using GridCell = std::pair<int, int>;
 struct GridCorner {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   Eigen::Vector2d step_i = Eigen::Vector2d::Zero(), step_j = Eigen::Vector2d::Zero();
+  float middle = 0.0f, contrast = 0.0f;  ///< Of its saddle point.
 };
 
 /// Saddle points that lie like the inner corners of a chessboard. Right-handed as seen: j turns right from i. The
@@ -41,8 +46,9 @@ struct GridExtent {
 /// Where the corner (i, j) should be, from its neighbours in the grid. None without three of them in a row or a square.
 [[nodiscard]] std::optional<GridCorner> predict_corner(const CornerGrid& grid, int i, int j);
 
-/// Grows grids from every four saddle points that form a square of a chessboard, each by local prediction, so that
-/// strong tilt and distortion do no harm. Largest first; grids of fewer than six corners are left out.
-[[nodiscard]] std::vector<CornerGrid> grow_grids(std::span<const SaddlePoint> points);
+/// Grows grids from every four saddle points that form a square of a chessboard, its eight neighbours of the right
+/// colours, each by local prediction, so that strong tilt and distortion do no harm. Largest first; grids of fewer than
+/// six corners are left out. `picture` is the one in which the points were found.
+[[nodiscard]] std::vector<CornerGrid> grow_grids(const cv::Mat& picture, std::span<const SaddlePoint> points);
 
 }  // namespace alidade

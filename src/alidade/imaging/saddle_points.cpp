@@ -11,7 +11,7 @@ namespace alidade {
 namespace {
 
 constexpr double smoothing_px = 1.1;
-constexpr float min_strength = 0.3f;            // noise of σ = 3 grey values leaves 0.1 after the smoothing
+constexpr float min_strength = 1.0f;            // a step of 8 grey values with a blur of 1 px has 2
 constexpr float relative_strength = 5e-4f;      // of the strongest: one thirtieth of its contrast
 constexpr float min_ring_contrast = 2.5f;       // half step, in grey values
 constexpr float max_ring_asymmetry = 0.5f;      // of the contrast, mean difference of opposite points
@@ -148,6 +148,7 @@ std::optional<SaddlePoint> check_ring(const cv::Mat& smooth, const Ring& ring, i
   SaddlePoint point;
   point.angle_rad[0] = from;
   point.angle_rad[1] = from + sector;
+  point.middle = middle;
   point.contrast = contrast;
   return point;
 }

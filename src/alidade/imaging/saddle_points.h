@@ -16,7 +16,8 @@ struct SaddlePoint {
   /// angle[0] to angle[1] (towards increasing angle) is bright.
   float angle_rad[2] = {0.0f, 0.0f};
   float strength = 0.0f;  ///< -det of the Hessian [grey²/px⁴].
-  float contrast = 0.0f;  ///< Half the step on the ring around it, in grey values.
+  float middle = 0.0f;    ///< Grey between bright and dark on the ring around it.
+  float contrast = 0.0f;  ///< Half the step on that ring, in grey values.
 };
 
 /// Saddle points of a picture (one channel, 32-bit float, 0 to 255): local maxima of -det Hessian of the smoothed

@@ -1,8 +1,10 @@
 #include "cli/run.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <ctime>
 #include <nlohmann/json.hpp>
+#include <tuple>
 
 #include "alidade/io/sha256.h"
 #include "alidade/report/page.h"
@@ -74,6 +76,10 @@ void Run::say(std::string line) { lines_.push_back(std::move(line)); }
 
 ExitCode Run::finish(Verdict verdict) {
   document.verdict = std::move(verdict);
+  // Photos are read by many threads, in any order; the document has one order.
+  std::stable_sort(document.inputs.begin(), document.inputs.end(), [](const InputFile& a, const InputFile& b) {
+    return std::tie(a.role, a.name) < std::tie(b.role, b.name);
+  });
   document.seconds.insert(document.seconds.begin(), {"total", seconds_since(start_)});
   const std::string result = result_text(document);
   report_progress(progress, "writing", 0, 0);  // the last moment at which Ctrl-C leaves nothing written

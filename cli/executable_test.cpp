@@ -1,0 +1,108 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <regex>
+
+#include "alidade/testing/process.h"
+
+// The executable as a person, or a script, meets it.
+
+namespace alidade {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
+using testing::Outcome;
+using testing::run_program;
+
+Outcome run_alidade(std::vector<std::string> words) {
+  words.insert(words.begin(), ALIDADE_EXECUTABLE);
+  return run_program(words);
+}
+
+/// The commands that a help text lists.
+std::vector<std::string> listed_commands(const std::string& help) {
+  std::vector<std::string> names;
+  const std::size_t at = help.find("Subcommands:");
+  if (at == std::string::npos) return names;
+  const std::string list = help.substr(at);
+  const std::regex line("\n  ([a-z]+) ");
+  for (std::sregex_iterator each(list.begin(), list.end(), line), end; each != end; ++each) names.push_back((*each)[1]);
+  return names;
+}
+
+/// Every command line that has a --help of its own: "calibrate", "camera show", …
+void collect_commands(const std::vector<std::string>& group, std::vector<std::vector<std::string>>& commands) {
+  std::vector<std::string> words = group;
+  words.emplace_back("--help");
+  for (const std::string& name : listed_commands(run_alidade(words).out)) {
+    std::vector<std::string> command = group;
+    command.push_back(name);
+    const std::size_t before = commands.size();
+    collect_commands(command, commands);
+    if (commands.size() == before) commands.push_back(command);
+  }
+}
+
+std::vector<std::vector<std::string>> all_commands() {
+  std::vector<std::vector<std::string>> commands;
+  collect_commands({}, commands);
+  return commands;
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+TEST(Executable, EveryCommandHasHelpWithExamplesOfItself) {
+  int num_checked = 0;
+  for (std::vector<std::string> command : all_commands()) {
+    const std::string name = joined(command);
+    command.emplace_back("--help");
+    const Outcome outcome = run_alidade(command);
+    EXPECT_EQ(outcome.code, 0) << name;
+    EXPECT_EQ(outcome.err, "") << name;
+    EXPECT_THAT(outcome.out, HasSubstr("Examples:")) << name;
+    EXPECT_THAT(outcome.out.substr(outcome.out.find("Examples:")), HasSubstr("alidade " + name));
+    EXPECT_THAT(outcome.out, HasSubstr("--json"));
+    ++num_checked;
+  }
+  EXPECT_GE(num_checked, 1);
+}
+
+TEST(Executable, EveryCommandRefusesAnUnknownOption) {
+  int num_checked = 0;
+  for (std::vector<std::string> command : all_commands()) {
+    const std::string name = joined(command);
+    command.emplace_back("--no-such-option");
+    const Outcome outcome = run_alidade(command);
+    EXPECT_EQ(outcome.code, 2) << name;
+    EXPECT_THAT(outcome.err, MatchesRegex("alidade: error: " + name + ": unknown option '--no-such-option'[^\n]*\n"));
+    EXPECT_EQ(outcome.out, "") << name;
+    ++num_checked;
+  }
+  EXPECT_GE(num_checked, 1);
+}
+
+TEST(Executable, EveryCommandThatNeedsSomethingSaysSo) {
+  int num_refused = 0;
+  for (const std::vector<std::string>& command : all_commands()) {
+    if (command[0] == "simulate") continue;  // needs nothing, and would write here
+    const Outcome outcome = run_alidade(command);
+    EXPECT_EQ(outcome.code, 2) << joined(command) << ": " << outcome.err;
+    EXPECT_THAT(outcome.err, MatchesRegex("alidade: error: [^\n]+\n"));
+    ++num_refused;
+  }
+  EXPECT_GE(num_refused, 1);
+}
+
+TEST(Executable, UnknownCommandsAndNoCommandAreWrongUsage) {
+  EXPECT_EQ(run_alidade({}).code, 2);
+  EXPECT_EQ(run_alidade({"levitate"}).err, "alidade: error: unknown command 'levitate'\n");
+  EXPECT_THAT(run_alidade({"calibrat"}).err, HasSubstr("did you mean 'calibrate'?"));
+}
+
+}  // namespace
+}  // namespace alidade

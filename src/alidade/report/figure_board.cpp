@@ -90,10 +90,16 @@ MaybeFigure figure_board(const CalibrateScene& scene) {
   if (!points) return std::nullopt;
   Figure figure{.id = "board", .title = "Is the board flat?", .note = "mm", .span = 7};
   const double highest_mm = 1e3 * largest_size(points->numbers("dz_m"));
-  figure.body = shape_map(*points, std::max(0.1, round_up_125(highest_mm)), figure.marks);
+  const std::string map = shape_map(*points, std::max(0.1, round_up_125(highest_mm)), figure.marks);
   if (figure.marks == 0) return std::nullopt;
+  const bool is_held_flat = !(highest_mm > 0.0) && !(largest_size(points->numbers("dx_m")) > 0.0);
+  figure.body = is_held_flat ? "<p>The board was held flat, so its heights are not shown.</p>" : map;
   figure.body += transfer_words(scene.document);
-  figure.good = fmt::format("Ringed: further than 3σ from flat. Highest {} mm.", number_text(highest_mm, 2));
+  figure.good =
+      is_held_flat
+          ? "RMS on unseen photos, with the shape learned on the others and flat: much smaller with it means that "
+            "the board bends."
+          : fmt::format("Ringed: further than 3σ from flat. Highest {} mm.", number_text(highest_mm, 2));
   if (const std::string shape = scene.document.estimated_text("board_shape"); !shape.empty())
     figure.good += " Solved as: " + shape + ".";
   return figure;

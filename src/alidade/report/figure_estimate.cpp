@@ -31,7 +31,12 @@ std::string unit_of(const std::string& path) {
   return unit;
 }
 
-bool is_row_of_photos(const std::string& path) { return path.rfind("photos[", 0) == 0; }
+// What the run was given and what it counted stand in the header and in the tables.
+bool is_shown_elsewhere(const std::string& path) {
+  for (const char* beginning : {"photos", "board.", "corners_"})
+    if (path.rfind(beginning, 0) == 0) return true;
+  return false;
+}
 
 // The unit has its own column: `transfer_rms_px` reads "transfer rms".
 std::string shown_name(const std::string& path, const std::string& unit) {
@@ -142,7 +147,7 @@ MaybeFigure figure_estimate(const Document& document) {
   const bool has_sigmas =
       std::any_of(document.estimate.begin(), document.estimate.end(), [](const Quantity& q) { return q.sigma > 0.0; });
   for (const Quantity& quantity : document.estimate) {
-    if (is_row_of_photos(quantity.path)) continue;
+    if (is_shown_elsewhere(quantity.path)) continue;
     (quantity.path.rfind("camera.", 0) == 0 ? lens : rest) += row_of(quantity, has_sigmas);
     ++figure.marks;
   }

@@ -29,8 +29,8 @@ std::string field_map(const Field& field, const Grid& grid, PicturePanel panel, 
   panel.frame(svg);
   draw_heat(svg, panel, grid, field.sizes_px, "clip-" + field.id);
   if (has_arrows) {
-    const ArrowScale scale = ArrowScale::fitting(panel, quantile(field.sizes_px, 0.95), 0.09 * width);
-    arrows = draw_field(svg, panel, grid, field.u_name, field.v_name, scale, 11);
+    const ArrowScale scale = ArrowScale::fitting(panel, quantile(field.sizes_px, 0.75), 0.07 * width);
+    arrows = draw_field(svg, panel, grid, field.u_name, field.v_name, scale, 11, "clip-" + field.id);
     draw_scale_bar(svg, {panel.left + 2.0, panel.bottom() + 17.0}, scale.bar_length(panel),
                    number_text(scale.bar_px, 2) + " px, arrows " + scale.text(), false);
   }

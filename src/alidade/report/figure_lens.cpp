@@ -85,16 +85,18 @@ std::string model_plot(const Table& models) {
     const double rms = models.number("heldout_rms_px", i), sigma = models.number("sigma_px", i),
                  reach = std::isfinite(sigma) ? 3.0 * sigma : 0.0;
     if (!std::isfinite(rms)) continue;
-    low = std::min(low, rms - reach);
-    high = std::max(high, rms + reach);
+    low = std::min(low, std::max(rms - reach, 0.7 * rms));
+    high = std::max(high, std::min(rms + reach, 1.5 * rms));
   }
   if (!(high > 0.0)) return "";
-  const double margin = std::max(0.15 * (high - low), 0.02 * high), names = 150.0;
-  const Scale x{std::max(0.0, low - margin), high + margin, names, right};
+  constexpr double names = 150.0;
+  const bool is_log = high > 3.0 * low;  // a model that fails by far must not hide the others
+  const double margin = is_log ? 0.0 : std::max(0.15 * (high - low), 0.02 * high);
+  const Scale x{std::max(1e-6, low - margin), high + margin, names, right, is_log};
   const double bottom = 26.0 + 26.0 * static_cast<double>(models.num_rows);
   Svg svg(width, bottom + 44.0, "Error on photos that were held out, for each lens model");
   svg.text({8.0, 14.0}, "error on held-out photos ± 3σ", "small");
-  for (const double tick : linear_ticks(x.low, x.high, 4)) {
+  for (const double tick : is_log ? log_ticks(x.low, x.high) : linear_ticks(x.low, x.high, 4)) {
     svg.line({x(tick), 22.0}, {x(tick), bottom}, "gridline");
     svg.text({x(tick), bottom + 16.0}, number_text(tick, 3), "tick", "middle");
   }
@@ -104,7 +106,7 @@ std::string model_plot(const Table& models) {
     svg.text({names - 10.0, y + 4.0}, shortened(models.text("name", i), 20), "tick", "end");
     if (!std::isfinite(rms)) continue;
     const double reach = std::isfinite(sigma) ? 3.0 * sigma : 0.0;
-    svg.line({x(rms - reach), y}, {x(rms + reach), y}, "error blue");
+    svg.line({std::max(names, x(rms - reach)), y}, {std::min(right, x(rms + reach)), y}, "error blue");
     svg.circle({x(rms), y}, 4.5, "mark blue");
   }
   svg.text({0.5 * (names + right), bottom + 36.0}, "RMS, px", "tick", "middle");

@@ -76,7 +76,7 @@ std::string pose_words(const CalibrateScene& scene, const Rigid3& cam_from_board
 }
 
 double worst_now(const Document& document) {
-  for (const char* name : {"sigma_working", "sigma_infinity"})
+  for (const char* name : {"sigma_infinity", "sigma_working"})
     if (const Grid* grid = document.grid(name))
       if (const double worst = 3.0 * largest_size(grid->value("sigma_px")); worst > 0.0) return worst;
   return std::nan("");

@@ -79,10 +79,10 @@ std::string residual_map(const CalibrateScene& scene, std::size_t& marks, CellAr
 // The density that the corners' own σ predict: the mean of their normal curves, by classes of σ.
 class PredictedDensity {
  public:
-  explicit PredictedDensity(const CalibrateScene& scene) {
+  PredictedDensity(const CalibrateScene& scene, double excess_px) {
     for (const CornerMark& corner : scene.corners)
-      for (const double sigma : {corner.sigma_u_px, corner.sigma_v_px})
-        if (corner.is_used && sigma > 1e-5 && sigma < 1e3) {
+      for (const double own : {corner.sigma_u_px, corner.sigma_v_px})
+        if (const double sigma = std::hypot(own, excess_px); corner.is_used && sigma > 1e-5 && sigma < 1e3) {
           ++classes_[static_cast<std::size_t>(std::lround(20.0 * std::log10(sigma / 1e-5)))];
           ++count_;
         }
@@ -136,7 +136,8 @@ std::string histogram(const CalibrateScene& scene) {
     const double place = (r + limit) / (2.0 * limit) * bins;
     if (place >= 0.0 && place < bins) counts[static_cast<std::size_t>(place)] += 1.0;
   }
-  const PredictedDensity predicted(scene);
+  const double excess_px = scene.document.estimated("excess_px");
+  const PredictedDensity predicted(scene, 0.0), with_excess(scene, excess_px > 0.0 ? excess_px : 0.0);
   const double to_count = static_cast<double>(residuals.size()) * 2.0 * limit / bins;
   double highest = *std::max_element(counts.begin(), counts.end());
   if (predicted.is_known()) highest = std::max(highest, std::min(3.0 * highest, predicted(0.0) * to_count));
@@ -144,17 +145,21 @@ std::string histogram(const CalibrateScene& scene) {
   const Scale x{-limit, limit, left, right}, y{0.0, highest, bottom, top};
   Svg svg(map_width, bottom + 44.0, "Histogram of the residuals against the predicted normal curve");
   svg.text({left, 14.0},
-           predicted.is_known() ? "residuals u and v; line: what the corners' σ predict" : "residuals u and v",
+           predicted.is_known() ? "residuals u, v; line: the corners' σ predict; dashed: with the excess"
+                                : "residuals u and v",
            "small");
   const double bar = (right - left) / bins;
   for (std::size_t i = 0; i < bins; ++i)
     svg.rect({left + bar * static_cast<double>(i), y(counts[i])}, bar - 1.0, bottom - y(counts[i]), "bar-fill");
-  std::vector<Place> curve;
-  for (int i = 0; i <= 120 && predicted.is_known(); ++i) {
-    const double r = limit * (i / 60.0 - 1.0);
-    curve.push_back({x(r), y(std::min(highest, predicted(r) * to_count))});
+  for (const auto& [density, look] : {std::pair{&predicted, "curve"}, std::pair{&with_excess, "curve-dashed"}}) {
+    if (!density->is_known() || (density == &with_excess && !(excess_px > 0.0))) continue;
+    std::vector<Place> curve;
+    for (int i = 0; i <= 200; ++i) {
+      const double r = limit * (i / 100.0 - 1.0);
+      curve.push_back({x(r), y(std::min(highest, (*density)(r)*to_count))});
+    }
+    svg.polyline(curve, look);
   }
-  svg.polyline(curve, "curve");
   svg.line({left, bottom}, {right, bottom}, "axis");
   for (const double tick : linear_ticks(-limit, limit, 5))
     svg.text({x(tick), bottom + 16.0}, number_text(tick, 2), "tick", "middle");

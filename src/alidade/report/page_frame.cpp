@@ -67,16 +67,24 @@ std::string counts_line(const Document& document) {
   return escaped(line);
 }
 
+// Checks may name the table or grid that decides instead of the figure that shows it.
+std::string figure_of_check(const std::string& name) {
+  if (name.rfind("sigma", 0) == 0) return "trust";
+  if (name == "rings" || name == "models") return "lens";
+  if (name == "cells" || name == "corners") return "residuals";
+  return name == "board_points" ? "board" : name;
+}
+
 std::string check_markup(const CheckLine& check, const std::vector<Figure>& figures) {
   const StateLook look = look_of(check.state);
-  const bool has_figure =
-      std::any_of(figures.begin(), figures.end(), [&](const Figure& f) { return f.id == check.figure; });
+  const std::string target = figure_of_check(check.figure);
+  const bool has_figure = std::any_of(figures.begin(), figures.end(), [&](const Figure& f) { return f.id == target; });
   const std::string name =
       fmt::format("<span class=\"state-{}\"><span role=\"img\" aria-label=\"{}\">{}</span> <b>{}</b></span>", look.name,
                   look.word, look.symbol, escaped(check.name));
   const std::string inside = name + " " + escaped(check.text);
   if (!has_figure) return "<li>" + inside + "</li>";
-  return "<li><a href=\"#fig-" + escaped(check.figure) + "\">" + inside + "</a></li>";
+  return "<li><a href=\"#fig-" + target + "\">" + inside + "</a></li>";
 }
 
 std::string row(std::string_view name, const std::string& value_markup) {

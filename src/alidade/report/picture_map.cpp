@@ -149,7 +149,7 @@ void draw_scale_bar(Svg& svg, Place left_middle, double length, const std::strin
 }
 
 int draw_field(Svg& svg, const PicturePanel& panel, const Grid& grid, const std::string& u_name,
-               const std::string& v_name, const ArrowScale& scale, int across) {
+               const std::string& v_name, const ArrowScale& scale, int across, const std::string& clip_id) {
   const std::vector<double> u = grid.value(u_name), v = grid.value(v_name);
   if (u.empty() || v.empty()) return 0;
   const int step = std::max(1, static_cast<int>(std::lround(static_cast<double>(grid.cols) / across)));
@@ -163,8 +163,9 @@ int draw_field(Svg& svg, const PicturePanel& panel, const Grid& grid, const std:
       append_arrow(d, from, scale.tip(panel, from, u[at], v[at]), 5.0);
       ++count;
     }
-  svg.path(d, "halo");
-  svg.path(d, "vector");
+  const std::string clip = fmt::format("clip-path=\"url(#{})\"", clip_id);
+  svg.path(d, "halo", clip);
+  svg.path(d, "vector", clip);
   return count;
 }
 

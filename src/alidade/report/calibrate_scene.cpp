@@ -6,6 +6,8 @@
 #include <cstdlib>
 #include <unordered_map>
 
+#include "alidade/report/jpeg_size.h"
+
 namespace alidade::report {
 namespace {
 
@@ -92,18 +94,23 @@ void read_board(CalibrateScene& scene) {
   }
 }
 
-// Without a camera in the document the grids' or the corners' extent must do.
-void read_picture_size(CalibrateScene& scene) {
+// Without a camera in the document the first picture tells at least the shape. Corners are then not drawn: the picture
+// may be smaller than the photo, and they would stand in wrong places.
+void read_picture_size(const Pictures& pictures, CalibrateScene& scene) {
   const double width = scene.document.estimated("camera.width"), height = scene.document.estimated("camera.height");
   if (width >= 1.0 && height >= 1.0) {
     scene.width_px = width;
     scene.height_px = height;
     return;
   }
-  for (const CornerMark& corner : scene.corners) {
-    scene.width_px = std::max(scene.width_px, corner.u_px * 1.1);
-    scene.height_px = std::max(scene.height_px, corner.v_px * 1.1);
-  }
+  scene.corners.clear();
+  for (PhotoMark& photo : scene.photos) photo.corners.clear();
+  for (const auto& [name, bytes] : pictures)
+    if (const auto size = jpeg_size(bytes)) {
+      scene.width_px = size->width_px;
+      scene.height_px = size->height_px;
+      return;
+    }
 }
 
 }  // namespace
@@ -118,13 +125,13 @@ bool read_pose(const Table& table, const std::string& prefix, std::size_t row, R
   return true;
 }
 
-CalibrateScene calibrate_scene(const Document& document) {
+CalibrateScene calibrate_scene(const Document& document, const Pictures& pictures) {
   CalibrateScene scene{.document = document};
   if (const Table* photos = document.table("photos")) read_photos(*photos, scene);
   if (const Table* corners = document.table("corners")) read_corners(*corners, scene);
   rank_photos(scene);
   read_board(scene);
-  read_picture_size(scene);
+  read_picture_size(pictures, scene);
   return scene;
 }
 

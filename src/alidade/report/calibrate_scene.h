@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,8 @@
 #include "alidade/report/picture_map.h"
 
 namespace alidade::report {
+
+using Pictures = std::map<std::string, std::string>;  ///< File name as in the document → JPEG bytes.
 
 struct CornerMark {
   std::size_t photo = 0;
@@ -45,7 +48,7 @@ struct CalibrateScene {
   }
 };
 
-[[nodiscard]] CalibrateScene calibrate_scene(const Document& document);
+[[nodiscard]] CalibrateScene calibrate_scene(const Document& document, const Pictures& pictures);
 
 /// A pose column group of a table; nothing (false) if a part is missing.
 [[nodiscard]] bool read_pose(const Table& table, const std::string& prefix, std::size_t row, Rigid3& pose);

@@ -32,7 +32,7 @@ std::string field_map(const Field& field, const Grid& grid, PicturePanel panel, 
     const ArrowScale scale = ArrowScale::fitting(panel, quantile(field.sizes_px, 0.75), 0.07 * width);
     arrows = draw_field(svg, panel, grid, field.u_name, field.v_name, scale, 11, "clip-" + field.id);
     draw_scale_bar(svg, {panel.left + 2.0, panel.bottom() + 17.0}, scale.bar_length(panel),
-                   number_text(scale.bar_px, 2) + " px, arrows " + scale.text(), false);
+                   number_text(scale.bar_px, 2) + " px, arrows " + scale.text() + "; far longer ones left out", false);
   }
   draw_contours(svg, panel, grid, field.sizes_px,
                 has_arrows ? 0.03 : 1e-3);  // near the zero of a difference they tell nothing
@@ -97,7 +97,7 @@ void draw_curve(Svg& svg, const Scale& x, const Scale& y, const std::vector<doub
                 const char* look) {
   std::vector<Place> line;
   for (std::size_t i = 0; i < ys.size(); ++i)
-    if (std::isfinite(ys[i])) line.push_back({x(xs[i]), y(ys[i])});
+    if (std::isfinite(ys[i])) line.push_back({x(xs[i]), std::min(y(ys[i]), y.from)});
   if (line.size() > 1) svg.polyline(line, look);
 }
 
@@ -150,7 +150,7 @@ MaybeFigure figure_difference(const Document& document) {
       figure.body += "<figure>" +
                      field_map({words, name, "", "", sigma}, *grid, panel_of(document, *grid, half), half, none) +
                      "</figure>";
-  figure.body += "</div>" + colour_key(width);
+  figure.body += "</div>" + colour_key(map_width);
   figure.good = fmt::format("Half of the picture differs by less than {} px, 95 % of it by less than {} px.",
                             number_text(quantile(size, 0.5), 2), number_text(quantile(size, 0.95), 2));
   return figure;
@@ -163,10 +163,11 @@ MaybeFigure figure_diagonal(const Document& document) {
   const double highest =
       std::max({largest_size(curves.size), largest_size(curves.three_sigma_a), largest_size(curves.three_sigma_b)});
   if (!(highest > 0.0)) return std::nullopt;
+  const double low = round_down_125(std::max(1e-4 * highest, quantile(curves.size, 0.02)));
   constexpr double width = 520.0, left = 56.0, right = width - 12.0, top = 30.0, bottom = 250.0;
-  const Scale x{0.0, curves.along_px.back(), left, right}, y{0.0, round_up_125(highest), bottom, top};
+  const Scale x{0.0, curves.along_px.back(), left, right}, y{low, round_up_125(highest), bottom, top, true};
   Svg svg(width, bottom + 42.0, "Difference along the picture's diagonal beside the 3σ of each camera");
-  for (const double tick : linear_ticks(0.0, y.high, 5)) {
+  for (const double tick : log_ticks(y.low, y.high)) {
     svg.line({left, y(tick)}, {right, y(tick)}, "gridline");
     svg.text({left - 6.0, y(tick) + 4.0}, number_text(tick, 3), "tick", "end");
   }

@@ -163,15 +163,18 @@ MaybeFigure figure_photo(const CalibrateScene& scene, const Pictures& pictures) 
   const PicturePanel panel = scene.panel(photo_width);
   const ArrowScale scale = arrow_scale(scene);
   Figure figure{.id = "photo", .title = "This photo: how far off is each corner?", .span = 12};
-  figure.note = "found → predicted " + scale.text();
+  if (!scene.corners.empty()) figure.note = "found → predicted " + scale.text();
   Svg svg(photo_width, panel.height(), "Residual arrows in the photo " + caption(scene.photos[first]), "stage");
   svg.raw(fmt::format(
       "<use data-part=\"picture\" href=\"#picture-{0}\"/><use data-part=\"marks\" href=\"#marks-{0}\"/>", first));
-  draw_scale_bar(svg, {panel.left + 20.0, panel.bottom() - 24.0}, scale.bar_length(panel),
-                 number_text(scale.bar_px, 2) + " px", true);
+  if (!scene.corners.empty())
+    draw_scale_bar(svg, {panel.left + 20.0, panel.bottom() - 24.0}, scale.bar_length(panel),
+                   number_text(scale.bar_px, 2) + " px", true);
   figure.body =
       "<p class=\"caption\" data-part=\"caption\">" + escaped(caption(scene.photos[first])) + "</p>" + svg.str();
-  figure.good = "Good: arrows of no common direction, within their 3σ ellipses. Crosses: dropped corners.";
+  figure.good = scene.corners.empty()
+                    ? "No corners are drawn: this run has no camera to draw them by."
+                    : "Good: arrows of no common direction, within their 3σ ellipses. Crosses: dropped corners.";
   figure.marks = scene.photos[first].corners.size();
   return figure;
 }

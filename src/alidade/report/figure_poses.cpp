@@ -129,6 +129,8 @@ void draw_boards(Svg& svg, const View3& view, const PoseScene& poses, bool with_
   std::vector<std::size_t> order = poses.posed;
   const auto depth = [&](std::size_t i) { return view.depth(poses.scene.photos[i].cam_from_board.translation); };
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return depth(a) > depth(b); });
+  const auto chosen = std::find(order.begin(), order.end(), poses.scene.chosen);
+  if (chosen != order.end()) std::rotate(chosen, chosen + 1, order.end());  // on top
   for (const std::size_t index : order) {
     const PhotoMark& photo = poses.scene.photos[index];
     const Points outline = board_outline(poses.scene, photo.cam_from_board);

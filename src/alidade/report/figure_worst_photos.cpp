@@ -92,10 +92,15 @@ MaybeFigure figure_worst_photos(const CalibrateScene& scene) {
                 .title = "Which photos fit worst?",
                 .note = "RMS per corner, px · click a bar, or ← →",
                 .span = 24};
-  figure.body = bars(scene, 1440.0, "wide") + bars(scene, 560.0, "narrow") + reasons(scene);
-  figure.good =
-      "Good: all about alike. A bar that stands out is a blurred photo, a bent board or a wrong corner: look at it "
-      "below.";
+  if (!scene.worst_first.empty())
+    figure.body = bars(scene, 1440.0, "wide") + bars(scene, 560.0, "narrow");
+  else
+    figure.body = "<p>None was used.</p>";
+  figure.body += reasons(scene);
+  if (!scene.worst_first.empty())
+    figure.good =
+        "Good: all about alike. A bar that stands out is a blurred photo, a bent board or a wrong corner: look at it "
+        "below.";
   figure.marks = scene.photos.size();
   return figure;
 }

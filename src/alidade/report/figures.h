@@ -10,8 +10,6 @@
 
 namespace alidade::report {
 
-using Pictures = std::map<std::string, std::string>;  ///< File name as in the document → JPEG bytes.
-
 /// One card of the page. Its title is the question that it answers.
 struct Figure {
   std::string id = {};     ///< Checks link to it: #fig-ID.

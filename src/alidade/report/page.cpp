@@ -29,7 +29,7 @@ void add(Content& content, MaybeFigure figure, const char* title) {
 }
 
 Content calibrate_content(const Document& document, const Pictures& pictures) {
-  const CalibrateScene scene = report::calibrate_scene(document);
+  const CalibrateScene scene = report::calibrate_scene(document, pictures);
   Content content;
   add(content, report::figure_estimate(document), "Estimate");
   add(content, report::figure_trust(scene), "Where can I trust a pixel?");
@@ -53,6 +53,7 @@ Content difference_content(const Document& document) {
   add(content, report::figure_diagonal(document), "Where along the diagonal?");
   add(content, report::figure_parameters(document), "Which parameters differ?");
   add(content, report::figure_estimate(document), "Estimate");
+  if (content.figures.size() == 4) content.figures.back().span = 10;
   return content;
 }
 

@@ -31,6 +31,7 @@ std::string_view page_script() {
     if (!thumb) return;
     chosen = photo;
     all('.pick').forEach((mark) => mark.classList.toggle('chosen', mark.dataset.photo === photo));
+    all('.board.chosen').forEach((board) => board.parentNode.append(board));
     for (const part of ['picture', 'marks'])
       all('use[data-part=' + part + ']').forEach((use) => use.setAttribute('href', '#' + part + '-' + photo));
     all('[data-part=caption]').forEach((caption) => { caption.textContent = thumb.dataset.caption; });

@@ -74,7 +74,7 @@ svg text{font-family:inherit}:where(path:not([fill])){fill:none}
 .contour{stroke:#fff;stroke-width:1.3}.badge{fill:#000;fill-opacity:.74}.badge-text{fill:#fff;font-size:12px;font-weight:600}
 .corner-dots{stroke:#fff;stroke-opacity:.5;stroke-width:2.2;stroke-linecap:round}
 .dots{stroke-linecap:round;stroke-width:4.4}.many .dots{stroke-width:2}.many .corner-dots{stroke-width:1;stroke-opacity:.3}
-.cell{fill:none;stroke:var(--line)}
+.many .sheet{fill-opacity:.07;stroke-opacity:.5}.many .chosen .sheet{fill-opacity:.6;stroke-opacity:1}.cell{fill:none;stroke:var(--line)}
 .mean{stroke:var(--ink);stroke-width:1.7}.mean-bold{stroke:var(--bad);stroke-width:3.6}
 .mean-halo{stroke:var(--panel);stroke-width:4.6;stroke-opacity:.85}.mean-halo-bold{stroke:var(--panel);stroke-width:6.6;stroke-opacity:.85}
 .halo{stroke:#000;stroke-opacity:.6;stroke-width:3.6}.vector{stroke:#fff;stroke-width:1.6}

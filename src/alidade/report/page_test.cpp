@@ -225,6 +225,18 @@ TEST(ReportPage, ARefusalIsAPage) {
   EXPECT_THAT(page, HasSubstr("Left out"));
 }
 
+TEST(ReportPage, CornersAreNotDrawnWherePicturesMayHaveAnotherSize) {
+  Json document = sample(2);
+  document["estimate"] = Json::object();
+  // Start of image, then a frame header: 8 bits, height 0x01E0, width 0x0280.
+  const std::string jpeg("\xFF\xD8\xFF\xC0\x00\x11\x08\x01\xE0\x02\x80\x03", 12);
+  const std::string page = report_page(document.dump(), {{"photo0.jpg", jpeg}});
+  EXPECT_THAT(card_of(page, "photo"), HasSubstr("viewBox=\"0 0 640 480\""));
+  EXPECT_EQ(occurrences(page, "class=\"rejected\""), 0u);
+  EXPECT_EQ(occurrences(page, "h0\""), 0u);
+  expect_balanced(page);
+}
+
 TEST(ReportPage, AnUnreadableDocumentStillMakesAPage) {
   for (const char* text : {"", "{", "[]", "null", "\"text\""}) {
     const std::string page = report_page(text, {});

@@ -153,6 +153,7 @@ int draw_field(Svg& svg, const PicturePanel& panel, const Grid& grid, const std:
   const std::vector<double> u = grid.value(u_name), v = grid.value(v_name);
   if (u.empty() || v.empty()) return 0;
   const int step = std::max(1, static_cast<int>(std::lround(static_cast<double>(grid.cols) / across)));
+  const double longest = 2.0 * step * std::min(grid.du_px, grid.dv_px) * panel.scale;  // beyond it they cross
   std::string d;
   int count = 0;
   for (int row = step / 2; row < grid.rows; row += step)
@@ -160,7 +161,9 @@ int draw_field(Svg& svg, const PicturePanel& panel, const Grid& grid, const std:
       const auto at = static_cast<std::size_t>(row * grid.cols + col);
       if (!std::isfinite(u[at]) || !std::isfinite(v[at])) continue;
       const Place from = panel.at(grid.u0_px + col * grid.du_px, grid.v0_px + row * grid.dv_px);
-      append_arrow(d, from, scale.tip(panel, from, u[at], v[at]), 5.0);
+      const Place tip = scale.tip(panel, from, u[at], v[at]);
+      if (std::hypot(tip.x - from.x, tip.y - from.y) > longest) continue;
+      append_arrow(d, from, tip, 5.0);
       ++count;
     }
   const std::string clip = fmt::format("clip-path=\"url(#{})\"", clip_id);

@@ -51,7 +51,8 @@ struct ArrowScale {
 /// "├─┤ 0.5 px" with its left end at `left_middle`.
 void draw_scale_bar(Svg& svg, Place left_middle, double length, const std::string& words, bool on_picture);
 
-/// Arrows of a vector field on the grid, thinned to about `across` columns. Returns their number. `clip_id`: of the
+/// Arrows of a vector field on the grid, thinned to about `across` columns. Those longer than two steps of the grid are
+/// left to the colours. Returns their number. `clip_id`: of the
 /// heat below.
 int draw_field(Svg& svg, const PicturePanel& panel, const Grid& grid, const std::string& u_name,
                const std::string& v_name, const ArrowScale& scale, int across, const std::string& clip_id);

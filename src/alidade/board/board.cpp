@@ -1,7 +1,17 @@
 #include "alidade/board/board.h"
 
+#include <array>
+#include <utility>
+
 namespace alidade {
 namespace {
+
+constexpr std::array<std::pair<std::string_view, BoardKind>, 5> kinds{
+    {{"chessboard", BoardKind::chessboard},
+     {"charuco", BoardKind::charuco},
+     {"aprilgrid", BoardKind::aprilgrid},
+     {"circles", BoardKind::circles},
+     {"asymmetric_circles", BoardKind::asymmetric_circles}}};
 
 /// Corners of tag (col, row): top-left, top-right, bottom-right, bottom-left, as ArUco orders them.
 void append_tag(const Board& board, int col, int row, std::vector<Eigen::Vector3d>& points) {
@@ -17,6 +27,20 @@ void append_tag(const Board& board, int col, int row, std::vector<Eigen::Vector3
 
 double circle_radius_m(const Board& board) {
   return board.marker_m > 0.0 ? 0.5 * board.marker_m : 0.2 * board.square_m;
+}
+
+std::string_view kind_name(BoardKind kind) {
+  for (const auto& [name, known] : kinds) {
+    if (known == kind) return name;
+  }
+  return "";
+}
+
+std::optional<BoardKind> board_kind(std::string_view name) {
+  for (const auto& [known, kind] : kinds) {
+    if (known == name) return kind;
+  }
+  return std::nullopt;
 }
 
 int num_points(const Board& board) { return board.cols * board.rows * (board.kind == BoardKind::aprilgrid ? 4 : 1); }

@@ -1,12 +1,18 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace alidade {
 
 enum class BoardKind { chessboard, charuco, aprilgrid, circles, asymmetric_circles };
+
+/// The word for a kind in flags and files, and back. None for an unknown word.
+[[nodiscard]] std::string_view kind_name(BoardKind kind);
+[[nodiscard]] std::optional<BoardKind> board_kind(std::string_view name);
 
 /// A calibration target. Its points lie in frame `board`: x along the columns, y along the rows, z = x × y (away from
 /// a camera that sees the board upright), the origin at point 0; points are numbered row by row, left to right.

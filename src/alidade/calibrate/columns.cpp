@@ -180,13 +180,23 @@ PointArrays make_arrays(const std::vector<Eigen::Vector3d>& points) {
 
 void Columns::resize(std::size_t num_corners) {
   const std::size_t stride = (num_corners + lane - 1) / lane * lane;
-  if (stride == stride_ && num_corners == stride) return;  // no padding to clear
+  if (num_corners == num_corners_ && stride == stride_) return;  // the padding is zero already
+  num_corners_ = num_corners;
   stride_ = stride;
   data_.assign(static_cast<std::size_t>(count) * num_rows(), 0.0);
 }
 
-bool fill_columns(const Lens& lens, const Rigid3& cam_from_board, const PointArrays& points, const ViewArrays& view,
-                  Columns& columns) {
+PreparedLens prepare(const Lens& lens) {
+  PreparedLens prepared{lens, 0.0};
+  if (const auto* brown = std::get_if<Calibrated<Brown>>(&lens)) {
+    const double radius = Brown::max_radius(brown->params);
+    prepared.max_radius2 = radius * radius;
+  }
+  return prepared;
+}
+
+bool fill_columns(const PreparedLens& lens, const Rigid3& cam_from_board, const PointArrays& points,
+                  const ViewArrays& view, Columns& columns) {
   columns.resize(view.size());
   const Gathered& at = gather(points, view);
   const CornerArrays in{at.x.data(),         at.y.data(),         at.z.data(),
@@ -195,14 +205,13 @@ bool fill_columns(const Lens& lens, const Rigid3& cam_from_board, const PointArr
   return std::visit(
       [&]<class Model>(const Calibrated<Model>& model) {
         if constexpr (std::is_same_v<Model, Brown>) {
-          const double radius = Brown::max_radius(model.params);
-          return brown_columns(in, numbers(cam_from_board), model.params.data(), radius * radius, columns[0],
+          return brown_columns(in, numbers(cam_from_board), model.params.data(), lens.max_radius2, columns[0],
                                columns.num_rows(), columns.stride()) == 0;
         } else {
           return model_columns<Model>(model.params, in, cam_from_board, columns) == 0;
         }
       },
-      lens);
+      lens.lens);
 }
 
 void fill_bow_columns(const ViewArrays& view, const std::vector<double>& along_x, const std::vector<double>& along_y,

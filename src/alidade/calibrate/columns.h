@@ -33,12 +33,19 @@ class Columns {
   }
 
  private:
-  std::size_t stride_ = 0;
+  std::size_t num_corners_ = 0, stride_ = 0;
   std::vector<double> data_;
 };
 
+/// A lens with what its inner loop needs and is dear to find: made once a linearisation.
+struct PreparedLens {
+  Lens lens;
+  double max_radius2 = 0.0;  ///< Brown: squared radius where the radial map folds.
+};
+[[nodiscard]] PreparedLens prepare(const Lens& lens);
+
 /// Fills `columns` for one view. False where a corner that counts cannot be projected: the step is to be refused.
-[[nodiscard]] bool fill_columns(const Lens& lens, const Rigid3& cam_from_board, const PointArrays& points,
+[[nodiscard]] bool fill_columns(const PreparedLens& lens, const Rigid3& cam_from_board, const PointArrays& points,
                                 const ViewArrays& view, Columns& columns);
 
 /// Columns of the bow: derivative by its two parameters, heights `along_x[i]`, `along_y[i]` of board point i.

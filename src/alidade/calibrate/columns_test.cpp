@@ -54,7 +54,7 @@ TEST_P(ColumnsOfModel, AreTheDerivativesOfTheWhitenedResidual) {
     const Setting s = draw_setting(rng);
     Columns at, ahead, behind;
     const PointArrays points = make_arrays(s.points);
-    ASSERT_TRUE(fill_columns(lens, s.cam_from_board, points, s.view, at));
+    ASSERT_TRUE(fill_columns(prepare(lens), s.cam_from_board, points, s.view, at));
     const auto compare = [&](int column, double h) {
       for (std::size_t row = 0; row < at.num_rows(); ++row) {
         const double numeric = (ahead[Columns::residual][row] - behind[Columns::residual][row]) / (2 * h);
@@ -66,15 +66,17 @@ TEST_P(ColumnsOfModel, AreTheDerivativesOfTheWhitenedResidual) {
       const double h = k < 5 ? 1e-3 : 1e-6;  // px, or a distortion coefficient
       Eigen::VectorXd step = Eigen::VectorXd::Zero(params(lens).size());
       step[k] = h;
-      ASSERT_TRUE(fill_columns(with_params(lens, params(lens) + step), s.cam_from_board, points, s.view, ahead));
-      ASSERT_TRUE(fill_columns(with_params(lens, params(lens) - step), s.cam_from_board, points, s.view, behind));
+      ASSERT_TRUE(
+          fill_columns(prepare(with_params(lens, params(lens) + step)), s.cam_from_board, points, s.view, ahead));
+      ASSERT_TRUE(
+          fill_columns(prepare(with_params(lens, params(lens) - step)), s.cam_from_board, points, s.view, behind));
       compare(k, h);
     }
     for (int k = 0; k < 6; ++k) {
       constexpr double h = 1e-6;
       const Eigen::Vector<double, 6> step = h * Eigen::Vector<double, 6>::Unit(k);
-      ASSERT_TRUE(fill_columns(lens, s.cam_from_board.retract(step), points, s.view, ahead));
-      ASSERT_TRUE(fill_columns(lens, s.cam_from_board.retract(-step), points, s.view, behind));
+      ASSERT_TRUE(fill_columns(prepare(lens), s.cam_from_board.retract(step), points, s.view, ahead));
+      ASSERT_TRUE(fill_columns(prepare(lens), s.cam_from_board.retract(-step), points, s.view, behind));
       compare(Columns::pose + k, h);
     }
   }
@@ -86,7 +88,7 @@ TEST_P(ColumnsOfModel, RefuseABoardBehindTheCamera) {
   Setting s = draw_setting(rng);
   s.cam_from_board.translation.z() = GetParam() == "kannala_brandt" ? std::nan("") : -1.0;
   Columns columns;
-  EXPECT_FALSE(fill_columns(example(GetParam()), s.cam_from_board, make_arrays(s.points), s.view, columns));
+  EXPECT_FALSE(fill_columns(prepare(example(GetParam())), s.cam_from_board, make_arrays(s.points), s.view, columns));
 }
 
 INSTANTIATE_TEST_SUITE_P(Models, ColumnsOfModel, ::testing::Values("pinhole", "brown", "kannala_brandt"));

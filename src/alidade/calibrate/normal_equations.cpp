@@ -138,12 +138,13 @@ bool linearize(const BundleProblem& problem, const BundleState& state, NormalEqu
   eq.V.resize(num_views);
   eq.pose_gradient.resize(num_views);
 
+  const PreparedLens lens = prepare(state.lens);
   const PointArrays points = make_arrays(state.board_points);
   const BowBasis basis = bow ? bow_basis(problem.printed_points) : BowBasis{};
   thread_local Scratch s;  // one a thread: kept between calls, so that the inner loop allocates nothing
   for (std::size_t k = 0; k < num_views; ++k) {
     const ViewArrays& view = problem.views[k];
-    if (!fill_columns(state.lens, state.cam_from_board[k], points, view, s.columns)) return false;
+    if (!fill_columns(lens, state.cam_from_board[k], points, view, s.columns)) return false;
     if (bow) fill_bow_columns(view, basis.along_x, basis.along_y, s.columns);
     s.pointers.clear();
     for (const int column : problem.free_lens) s.pointers.push_back(s.columns[column]);

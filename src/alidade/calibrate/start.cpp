@@ -79,12 +79,13 @@ std::optional<Rigid3> pose_from_plane(const Camera& camera, const BoardView& vie
                                       std::span<const Eigen::Vector3d> board_points) {
   constexpr std::size_t max_corners = 96;  // a start needs no more
   const std::size_t stride = (view.corners.size() + max_corners - 1) / max_corners;
-  std::vector<Eigen::Vector2d> on_board, on_plane;
-  for (std::size_t i = 0; i < view.corners.size(); i += stride) {
-    const auto ray = unproject(camera, view.corners[i].px);
-    if (!ray || !(ray->z() > 0.05)) continue;  // a plane at z = 1 shows nothing sideways
-    on_plane.emplace_back(ray->hnormalized());
-    on_board.emplace_back(board_points[static_cast<std::size_t>(view.corners[i].index)].head<2>());
+  std::vector<Eigen::Vector2d> px, on_board, on_plane;
+  for (std::size_t i = 0; i < view.corners.size(); i += stride) px.push_back(view.corners[i].px);
+  const auto rays = unproject(camera, px);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (!rays[i] || !(rays[i]->z() > 0.05)) continue;  // a plane at z = 1 shows nothing sideways
+    on_plane.emplace_back(rays[i]->hnormalized());
+    on_board.emplace_back(board_points[static_cast<std::size_t>(view.corners[i * stride].index)].head<2>());
   }
   const auto H = fit_homography(on_board, on_plane);
   if (!H) return std::nullopt;

@@ -146,19 +146,6 @@ DataTable board_points_table(const Board& board, const CalibrateReport& report) 
           {{"col", col}, {"row", row}, {"dx_m", dx}, {"dy_m", dy}, {"dz_m", dz}, {"sigma_dz_m", sigma}}};
 }
 
-DataTable next_table(const NextPhotoPlan& next) {
-  PoseColumns poses;
-  Numbers worst;
-  for (const NextPhoto& photo : next.photos) {
-    poses.add(&photo.cam_from_board);
-    worst.push_back(photo.worst_3sigma_px);
-  }
-  DataTable table{"next", {}};
-  poses.append_to(table, "cam_from_board");
-  table.columns.emplace_back("worst_3sigma_px", worst);
-  return table;
-}
-
 DataGrid grid_of(const std::string& name, const PixelGrid& grid) {
   return {name, grid.cols, grid.rows, grid.u0_px, grid.v0_px, grid.du_px, grid.dv_px, {}};
 }
@@ -216,12 +203,27 @@ void fill_estimate(const Board& board, const Calibration& calibration, ResultDoc
       calibration.study.transfer ? calibration.study.transfer->flat_rms_px : std::nan("");
   document.estimate["working_distance_m"] = calibration.study.working_distance_m;
   JsonValue& target = document.estimate["board"];
+  target["kind"] = kind_name(board.kind);
   target["cols"] = board.cols;
   target["rows"] = board.rows;
   target["square_m"] = board.square_m;
+  if (board.marker_m > 0.0) target["marker_m"] = board.marker_m;
 }
 
 }  // namespace
+
+DataTable next_photos_table(const NextPhotoPlan& next) {
+  PoseColumns poses;
+  Numbers worst;
+  for (const NextPhoto& photo : next.photos) {
+    poses.add(&photo.cam_from_board);
+    worst.push_back(photo.worst_3sigma_px);
+  }
+  DataTable table{"next", {}};
+  poses.append_to(table, "cam_from_board");
+  table.columns.emplace_back("worst_3sigma_px", worst);
+  return table;
+}
 
 std::string shape_name(BoardShape shape) {
   switch (shape) {
@@ -279,7 +281,7 @@ void fill_calibration(const Board& board, const Calibration& calibration, Result
   if (!solved) return;
   for (DataTable& table : std::vector<DataTable>{cells_table(calibration.study), rings_table(calibration.study),
                                                  models_table(calibration.study), board_points_table(board, report),
-                                                 next_table(calibration.next)}) {
+                                                 next_photos_table(calibration.next)}) {
     document.data.push_back(std::move(table));
   }
   fill_grids(calibration.study, document);

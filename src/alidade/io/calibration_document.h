@@ -10,6 +10,9 @@ namespace alidade {
 /// docs' contract for `calibrate`. For a refusal, what there is.
 void fill_calibration(const Board& board, const Calibration& calibration, ResultDocument& document);
 
+/// Table `next`: poses and what they bring.
+[[nodiscard]] DataTable next_photos_table(const NextPhotoPlan& plan);
+
 /// The word of --board-shape for a shape.
 [[nodiscard]] std::string shape_name(BoardShape shape);
 

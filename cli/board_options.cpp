@@ -1,7 +1,6 @@
 #include "cli/board_options.h"
 
 #include <CLI/CLI.hpp>
-#include <array>
 #include <charconv>
 #include <optional>
 #include <utility>
@@ -12,13 +11,6 @@
 
 namespace alidade::cli {
 namespace {
-
-constexpr std::array<std::pair<const char*, BoardKind>, 5> targets{
-    {{"chessboard", BoardKind::chessboard},
-     {"charuco", BoardKind::charuco},
-     {"aprilgrid", BoardKind::aprilgrid},
-     {"circles", BoardKind::circles},
-     {"asymmetric_circles", BoardKind::asymmetric_circles}}};
 
 /// Columns and rows of "9x6".
 std::optional<std::pair<int, int>> cols_and_rows(const std::string& text) {
@@ -40,12 +32,8 @@ CLI::Validator size_check() {
 
 CLI::Validator target_check() {
   return {[](const std::string& text) -> std::string {
-            std::string known;
-            for (const auto& [name, kind] : targets) {
-              if (text == name) return "";
-              known += (known.empty() ? "" : ", ") + std::string(name);
-            }
-            return "'" + text + "' is not one of " + known;
+            if (board_kind(text)) return "";
+            return "'" + text + "' is not one of chessboard, charuco, aprilgrid, circles, asymmetric_circles";
           },
           ""};
 }
@@ -92,9 +80,7 @@ void add_board_options(CLI::App& command, BoardOptions& options) {
 
 Board board_from(const BoardOptions& options) {
   Board board;
-  for (const auto& [name, kind] : targets) {
-    if (options.target == name) board.kind = kind;
-  }
+  board.kind = board_kind(options.target).value_or(BoardKind::chessboard);
   const auto size = cols_and_rows(options.size);
   if (!size) throw UsageError("--board: '" + options.size + "' is not COLSxROWS, for example 9x6");
   std::tie(board.cols, board.rows) = *size;

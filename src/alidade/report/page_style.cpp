@@ -51,7 +51,7 @@ summary{cursor:pointer;color:var(--muted);font-size:13px}
 .reasons{margin-top:6px;font-size:13px}.reasons ul,footer ul{margin:4px 0;padding-left:20px;overflow-wrap:anywhere}
 table{border-collapse:collapse;font-variant-numeric:tabular-nums}th{text-align:left;font-weight:400}
 .estimate{width:100%}.estimate th,.estimate td{padding:2.6px 6px 2.6px 0;vertical-align:baseline}
-.estimate th{overflow-wrap:anywhere}.estimate .value{text-align:right;font-weight:600;white-space:nowrap}
+.estimate th{overflow-wrap:anywhere;min-width:5em}.estimate .value{text-align:right;font-weight:600;white-space:nowrap}
 .estimate td{color:var(--muted);white-space:nowrap}.estimate .value,.estimate .word{color:var(--ink)}.estimate .word{white-space:normal;text-align:right;overflow-wrap:anywhere}.unit{text-align:right}
 .estimate thead th{font-size:12.5px;color:var(--muted);text-align:center}
 .scroll{overflow-x:auto}
@@ -97,6 +97,8 @@ svg text{font-family:inherit}:where(path:not([fill])){fill:none}
 )css";
 
 constexpr std::string_view size_rules = R"css(
+@media(min-width:1000px) and (max-width:1380px){main{grid-auto-flow:dense}
+.card:not([style*=":24"],[style*=":16"],[style*=":14"]){grid-column:span 12}.card[style*=":16"],.card[style*=":14"]{grid-column:span 24}}
 @media(max-width:999px){main{display:block;padding:12px}.card{margin-bottom:12px}.below{padding:0 12px 8px}
 .card svg{max-width:680px;margin:auto}.card svg.stage{max-width:100%}.wide{display:none!important}.narrow{display:block!important}.card svg.narrow{max-width:100%}
 .thumbs>div{grid-template-columns:repeat(auto-fill,minmax(140px,1fr))}.matrix{max-width:380px!important}}

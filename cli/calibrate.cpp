@@ -26,7 +26,7 @@ struct Args {
   BoardOptions board;
   std::filesystem::path corners;
   std::string size;
-  std::string board_shape = "flat";
+  std::string board_shape = "auto";
   std::string outliers = "auto";
   std::vector<std::string> fixed;
   std::vector<std::string> free;
@@ -69,6 +69,8 @@ CalibrateConfig config_from(const Args& args) {
     config.board_shape = BoardShape::bow;
   } else if (args.board_shape == "free") {
     config.board_shape = BoardShape::free;
+  } else if (args.board_shape == "auto") {
+    config.board_shape = BoardShape::automatic;
   } else if (args.board_shape != "flat") {
     config.board_shape = BoardShape::given;
   }
@@ -138,6 +140,7 @@ PhotoCalibration from_corners(const Args& args, const Board& board, CalibrateCon
   });
   // Corners without σ are somebody's measurements to be judged as they are: the same corners, the same optimum.
   config.reject_outliers = args.outliers == "drop" || (args.outliers == "auto" && have_sigma);
+  if (config.board_shape == BoardShape::automatic && !have_sigma) config.board_shape = BoardShape::flat;
   result.report = calibrate(board, result.views, result.size, config, given);
   run.lap("solve");
   return result;
@@ -216,7 +219,8 @@ void add_calibrate(Frame& frame) {
       ->delimiter(',');
   command
       .add_option("--board-shape", args->board_shape,
-                  "flat, bow (2 parameters), free (every point), or a board_points.csv of an earlier run, held")
+                  "flat, bow (2 parameters), free (every point), auto (free if the photos prove it), or a "
+                  "board_points.csv of an earlier run, held")
       ->capture_default_str();
   command
       .add_option("--outliers", args->outliers,

@@ -6,8 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
-#include "alidade/camera/projection_sigma.h"
+#include "alidade/camera/undistort.h"
 #include "alidade/io/calibration_document.h"
 #include "alidade/io/camera_file.h"
 #include "alidade/io/corner_file.h"
@@ -36,6 +37,16 @@ std::vector<std::size_t> worst_first(const CalibrateReport& report) {
 
 int preview_width_px(std::size_t num_photos) { return num_photos <= 40 ? 640 : num_photos <= 200 ? 320 : 160; }
 
+/// The worst photo without its distortion, as the report shows it beside the original.
+std::string undistorted_preview(const Camera& camera, const cv::Mat& photo) {
+  PixelMap map = undistortion_map(camera, undistorted_camera(camera));
+  const cv::Mat u_px(map.height_px, map.width_px, CV_32F, map.u_px.data());
+  const cv::Mat v_px(map.height_px, map.width_px, CV_32F, map.v_px.data());
+  cv::Mat straight;
+  cv::remap(photo, straight, u_px, v_px, cv::INTER_LINEAR);
+  return jpeg_preview(straight, 640, 75);
+}
+
 }  // namespace
 
 void summarize(const Calibration& calibration, Run& run) {
@@ -48,8 +59,9 @@ void summarize(const Calibration& calibration, Run& run) {
     for (std::size_t i = 0; report.views[k].used && i < views[k].corners.size(); ++i) {
       const CornerFit& fit = report.views[k].corners[i];
       if (fit.used) continue;
-      run.say(fmt::format("left out: {}: corner {} is {:.2f} px off", views[k].photo, views[k].corners[i].index,
-                          fit.residual_px.norm()));
+      const std::string what = fit.residual_px.allFinite() ? fmt::format("is {:.2f} px off", fit.residual_px.norm())
+                                                           : "lies where this lens sees nothing";
+      run.say(fmt::format("left out: {}: corner {} {}", views[k].photo, views[k].corners[i].index, what));
     }
   }
   const auto names = param_names(report.camera.lens);
@@ -101,6 +113,10 @@ void add_pictures(const Calibration& calibration, const PhotoLoader& load_photo,
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     if (!jpegs[i].empty()) run.add_picture(calibration.photos.views[chosen[i]].photo, jpegs[i]);
   }
+  const auto& report = calibration.photos.report;
+  if (report.status != CalibrateReport::Status::converged || chosen.empty()) return;
+  run.add_picture("undistorted:" + calibration.photos.views[chosen.front()].photo,
+                  undistorted_preview(report.camera, load_photo(chosen.front())));
 }
 
 }  // namespace alidade::cli

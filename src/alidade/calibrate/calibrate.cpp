@@ -23,8 +23,12 @@ struct Work {
   bool use_covariances = false;
 };
 
+/// Every view that would have been used says why it was not.
 void refuse(CalibrateReport& report, std::string reason, std::string to_add) {
   report.status = CalibrateReport::Status::degenerate;
+  for (ViewFit& view : report.views) {
+    if (!view.used && view.reason.empty()) view.reason = "no camera: " + reason;
+  }
   report.reason = std::move(reason);
   report.to_add = std::move(to_add);
 }

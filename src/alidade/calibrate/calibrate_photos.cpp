@@ -1,5 +1,7 @@
 #include "alidade/calibrate/calibrate_photos.h"
 
+#include <algorithm>
+
 namespace alidade {
 namespace {
 
@@ -23,6 +25,16 @@ void take_detections(BoardDetections&& found, PhotoCalibration& result) {
   result.size = {first.width_px, first.height_px};
 }
 
+/// Adds the corners of the first extraction that the second lost: where the lens model fits badly, the second starts
+/// too far off, and these corners are the ones that tell.
+void keep_missing(const std::vector<Corner>& first, std::vector<Corner>& again) {
+  for (const Corner& corner : first) {
+    const auto same = [&](const Corner& other) { return other.index == corner.index; };
+    if (std::none_of(again.begin(), again.end(), same)) again.push_back(corner);
+  }
+  std::sort(again.begin(), again.end(), [](const Corner& a, const Corner& b) { return a.index < b.index; });
+}
+
 /// Replaces the corners of every photo that the first calibration used by those of the second extraction.
 void extract_again(const PhotoLoader& load_photo, const Board& board, const CalibrateReport& first,
                    const Progress& progress, PhotoCalibration& result) {
@@ -33,6 +45,7 @@ void extract_again(const PhotoLoader& load_photo, const Board& board, const Cali
   auto again = refind_boards(known, load_photo, board, first.camera, progress);
   for (std::size_t i = 0; i < known.size(); ++i) {
     if (known[i].first == nullptr || !again[i].found() || again[i].view.corners.empty()) continue;
+    keep_missing(result.views[i].corners, again[i].view.corners);
     result.views[i].corners = std::move(again[i].view.corners);
   }
 }

@@ -7,8 +7,24 @@
 namespace alidade {
 namespace {
 
-bool asks_for_shape(const CalibrateConfig& config) {
-  return config.board_shape == BoardShape::bow || config.board_shape == BoardShape::free;
+/// The shape to use, by what the transfer test says: one that was asked for must transfer; one that was not must fit
+/// the other half's photos better by a clear tenth.
+BoardShape decide_shape(BoardShape asked, const std::optional<ShapeTransfer>& transfer) {
+  if (asked == BoardShape::automatic) {
+    const bool bends = transfer && transfer->transfer_rms_px < 0.9 * transfer->flat_rms_px;
+    return bends ? BoardShape::free : BoardShape::flat;
+  }
+  const bool refused = (asked == BoardShape::bow || asked == BoardShape::free) && transfer && !transfer->transfers();
+  return refused ? BoardShape::flat : asked;
+}
+
+/// Solves again with another shape; the reasons of photos without corners stay.
+void solve_again(const Board& board, const CalibrateConfig& config, PhotoCalibration& photos) {
+  CalibrateReport again = calibrate(board, photos.views, photos.size, config);
+  for (std::size_t k = 0; k < photos.views.size(); ++k) {
+    if (photos.views[k].corners.empty()) again.views[k].reason = photos.report.views[k].reason;
+  }
+  photos.report = std::move(again);
 }
 
 }  // namespace
@@ -21,21 +37,21 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
     result.verdict = refusal_verdict(report);
     return result;
   }
-  result.study = study_calibration(board, result.photos.views, result.config, report, progress);
-  const bool refused_shape =
-      asks_for_shape(result.config) && result.study.transfer && !result.study.transfer->transfers();
-  if (refused_shape) {
-    const auto transfer = result.study.transfer;
-    result.config.board_shape = BoardShape::flat;
-    std::vector<std::string> reasons;
-    for (const ViewFit& view : report.views) reasons.push_back(view.reason);
-    report = calibrate(board, result.photos.views, result.photos.size, result.config);
-    for (std::size_t k = 0; k < reasons.size(); ++k) {
-      if (result.photos.views[k].corners.empty()) report.views[k].reason = reasons[k];
+  constexpr std::size_t most_photos = 60;  // enough to tell a board's shape
+  report_progress(progress, "testing the board's shape", 0, 1);
+  const auto transfer = test_shape_transfer(board, used_views(result.photos.views, report, most_photos),
+                                            result.photos.size, result.config);
+  const BoardShape asked = result.config.board_shape;
+  result.config.board_shape = decide_shape(asked, transfer);
+  const bool solved_flat = asked == BoardShape::automatic || asked == BoardShape::flat;
+  if (result.config.board_shape != asked && !(solved_flat && result.config.board_shape == BoardShape::flat)) {
+    solve_again(board, result.config, result.photos);
+    if (report.status != CalibrateReport::Status::converged) {
+      result.verdict = refusal_verdict(report);
+      return result;
     }
-    result.study = study_calibration(board, result.photos.views, result.config, report, progress);
-    result.study.transfer = transfer;
   }
+  result.study = study_calibration(board, result.photos.views, result.config, report, transfer, progress);
   result.next = plan_next_photos(report.camera, report.noise_px, report.board_points, 1, progress);
   result.verdict = calibration_verdict(report, result.study, result.photos.views, result.config, result.next);
   return result;

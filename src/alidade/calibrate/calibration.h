@@ -17,7 +17,8 @@ struct Calibration {
 };
 
 /// Judges a finished solve: studies it, plans the next photo and gives the verdict. A board shape that was asked for
-/// but does not transfer from one half of the photos to the other is dropped, and the board solved flat.
+/// but does not transfer from one half of the photos to the other is dropped, and the board solved flat; with
+/// BoardShape::automatic the transfer test decides.
 [[nodiscard]] Calibration judge_calibration(const Board& board, PhotoCalibration photos, CalibrateConfig config,
                                             const Progress& progress = {});
 

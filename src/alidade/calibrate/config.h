@@ -6,8 +6,10 @@
 namespace alidade {
 
 /// Which shape the board may have: flat as printed; a bow (two parameters: out-of-plane parabolas along x and y);
-/// free (every point moves in 3-D, rigid motion and scale held); or given (points learned elsewhere, held).
-enum class BoardShape { flat, bow, free, given };
+/// free (every point moves in 3-D, rigid motion and scale held); given (points learned elsewhere, held); or automatic:
+/// free where a shape learned on one half of the photos fits the other half better than a flat one, flat elsewhere.
+/// calibrate() takes automatic as flat; judge_calibration() decides.
+enum class BoardShape { flat, bow, free, given, automatic };
 
 /// What is known of a lens parameter before the photos: a normal distribution.
 struct Prior {
@@ -25,7 +27,7 @@ struct CalibrateConfig {
   std::vector<Prior> priors = {};
   BoardShape board_shape = BoardShape::flat;
   bool reject_outliers = true;  ///< Drop, and name, corners that no noise explains.
-  double outlier_sigmas = 6.0;  ///< A corner further off than this many robust σ is an outlier.
+  double outlier_sigmas = 8.0;  ///< A corner further off than this many robust σ is an outlier.
   int max_iterations = 60;
 
   bool operator==(const CalibrateConfig&) const = default;

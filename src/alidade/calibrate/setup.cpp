@@ -69,7 +69,8 @@ Lens set_up_problem(const Board& board, const CalibrateConfig& config, ImageSize
     }
     if (!held) problem.free_lens.push_back(static_cast<int>(i));
   }
-  problem.shape = config.board_shape == BoardShape::given ? BoardShape::flat : config.board_shape;
+  const bool solved = config.board_shape == BoardShape::bow || config.board_shape == BoardShape::free;
+  problem.shape = solved ? config.board_shape : BoardShape::flat;
   problem.printed_points = points_in_board(board);
   problem.shape_sigma_m = 0.1 * board.square_m;  // far wider than any board's shape
   return with_params(lens, values);

@@ -11,25 +11,6 @@ namespace {
 
 constexpr std::size_t least_photos = 6;  // two halves of three
 
-/// The views that took part, at most `most` of them, evenly chosen, without the corners that were rejected.
-std::vector<BoardView> used_views(std::span<const BoardView> views, const CalibrateReport& report, std::size_t most) {
-  std::vector<std::size_t> taken;
-  for (std::size_t k = 0; k < views.size(); ++k) {
-    if (report.views[k].used) taken.push_back(k);
-  }
-  const std::size_t count = std::min(most, taken.size());
-  std::vector<BoardView> chosen;
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t k = taken[i * taken.size() / count];
-    BoardView view{views[k].photo, {}};
-    for (std::size_t c = 0; c < views[k].corners.size(); ++c) {
-      if (report.views[k].corners[c].used) view.corners.push_back(views[k].corners[c]);
-    }
-    chosen.push_back(std::move(view));
-  }
-  return chosen;
-}
-
 std::vector<BoardView> half(std::span<const BoardView> views, std::size_t parity) {
   std::vector<BoardView> chosen;
   for (std::size_t k = parity; k < views.size(); k += 2) chosen.push_back(views[k]);
@@ -51,8 +32,8 @@ std::optional<Halves> compare_halves(const Board& board, std::span<const BoardVi
                                      CalibrateConfig config, const std::vector<Eigen::Vector3d>& board_points) {
   if (views.size() < least_photos) return std::nullopt;
   config.board_shape = BoardShape::given;
-  const auto a = calibrate(board, half(views, 0), size, config, board_points);
-  const auto b = calibrate(board, half(views, 1), size, config, board_points);
+  const CalibrateReport a = calibrate(board, half(views, 0), size, config, board_points);
+  const CalibrateReport b = calibrate(board, half(views, 1), size, config, board_points);
   if (a.status != CalibrateReport::Status::converged || b.status != CalibrateReport::Status::converged) {
     return std::nullopt;
   }
@@ -70,6 +51,24 @@ std::optional<Halves> compare_halves(const Board& board, std::span<const BoardVi
 }
 
 }  // namespace
+
+std::vector<BoardView> used_views(std::span<const BoardView> views, const CalibrateReport& report, std::size_t most) {
+  std::vector<std::size_t> taken;
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    if (report.views[k].used) taken.push_back(k);
+  }
+  const std::size_t count = std::min(most, taken.size());
+  std::vector<BoardView> chosen;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t k = taken[i * taken.size() / count];
+    BoardView view{views[k].photo, {}};
+    for (std::size_t c = 0; c < views[k].corners.size(); ++c) {
+      if (report.views[k].corners[c].used) view.corners.push_back(views[k].corners[c]);
+    }
+    chosen.push_back(std::move(view));
+  }
+  return chosen;
+}
 
 std::optional<ShapeTransfer> test_shape_transfer(const Board& board, std::span<const BoardView> views, ImageSize size,
                                                  const CalibrateConfig& config) {
@@ -96,8 +95,10 @@ std::optional<ShapeTransfer> test_shape_transfer(const Board& board, std::span<c
 }
 
 CalibrationStudy study_calibration(const Board& board, std::span<const BoardView> views, const CalibrateConfig& config,
-                                   const CalibrateReport& report, const Progress& progress) {
+                                   const CalibrateReport& report, std::optional<ShapeTransfer> transfer,
+                                   const Progress& progress) {
   CalibrationStudy study;
+  study.transfer = transfer;
   const ImageSize size{report.camera.width_px, report.camera.height_px};
   study.cells = residual_cells(views, report, 8, 6);
   study.rings = residual_rings(views, report, 10);
@@ -112,8 +113,6 @@ CalibrationStudy study_calibration(const Board& board, std::span<const BoardView
   if (sampled.size() >= least_photos) {
     const std::vector<BoardView> fewer = used_views(views, report, 60);
     study.models = heldout_models(board, fewer, size, config, report.board_points, progress);
-    report_progress(progress, "testing the board's shape", 0, 1);
-    study.transfer = test_shape_transfer(board, fewer, size, config);
   }
   return study;
 }

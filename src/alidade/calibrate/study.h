@@ -59,12 +59,16 @@ struct CalibrationStudy {
   std::optional<ShapeTransfer> transfer;
 };
 
-/// Residual structure, σ maps, halves, held-out error of other models and the shape's transfer. `report` must have
+/// Residual structure, σ maps, halves and held-out error of other models; `transfer` is passed on. `report` must have
 /// converged. Photos beyond a few dozen are sampled where a part would take long; the seconds stay in the order of the
 /// calibration's own.
 [[nodiscard]] CalibrationStudy study_calibration(const Board& board, std::span<const BoardView> views,
                                                  const CalibrateConfig& config, const CalibrateReport& report,
-                                                 const Progress& progress = {});
+                                                 std::optional<ShapeTransfer> transfer, const Progress& progress = {});
+
+/// The views that took part, at most `most` of them, evenly chosen, without the corners that were rejected.
+[[nodiscard]] std::vector<BoardView> used_views(std::span<const BoardView> views, const CalibrateReport& report,
+                                                std::size_t most);
 
 /// Shape learned on the even photos, tested on the odd ones, and the other way round. None for fewer than six photos.
 [[nodiscard]] std::optional<ShapeTransfer> test_shape_transfer(const Board& board, std::span<const BoardView> views,

@@ -235,6 +235,8 @@ std::string shape_name(BoardShape shape) {
       return "free";
     case BoardShape::given:
       return "given";
+    case BoardShape::automatic:
+      return "auto";
   }
   return "flat";
 }
@@ -275,6 +277,10 @@ void fill_calibration(const Board& board, const Calibration& calibration, Result
     }
     document.estimate["corners_used"] = report.corners_used;
     document.estimate["corners_rejected"] = std::move(rejected);
+  }
+  if (!solved) {
+    document.estimate["camera"]["width"] = size.width_px;
+    document.estimate["camera"]["height"] = size.height_px;
   }
   document.estimate["photos"] = std::move(photos);
   document.data = {photos_table(calibration), corners_table(board, calibration)};

@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Each target installs what it misses, says what it does, and is quick the
 # second time.
-.PHONY: help build demo test bench format tidy clean
+.PHONY: help build demo test bench docs format tidy clean
 .DEFAULT_GOAL := help
 
 out := build/release
@@ -12,6 +12,7 @@ help:
 	@echo "make test    build and run the tests"
 	@echo "make build   build build/release/alidade"
 	@echo "make bench   measure speed, side by side with OpenCV and mrcal"
+	@echo "make docs    renew the picture in the README"
 	@echo "make format  format the sources;  make tidy: let clang-tidy read them"
 	@echo "make clean   remove build/"
 	@echo "Each installs the Debian packages it misses (packages.debian), as root or with sudo."
@@ -42,6 +43,12 @@ bench:
 	@ninja -C $(out) $(jobs) benchmarks
 	@echo "bench: running them"
 	@bench/run $(out)
+
+docs: demo
+	@tools/setup docs
+	@echo "docs: docs/report.png, the demo's report as a browser draws it"
+	@chromium --headless --no-sandbox --hide-scrollbars --window-size=1500,885 --force-device-scale-factor=0.8 \
+	  --screenshot=docs/report.png "file://$(CURDIR)/build/demo/result/report.html" >/dev/null 2>&1
 
 format:
 	@tools/setup tidy

@@ -69,7 +69,7 @@ TEST(Executable, EveryCommandHasHelpWithExamplesOfItself) {
     EXPECT_THAT(outcome.out, HasSubstr("--json"));
     ++num_checked;
   }
-  EXPECT_GE(num_checked, 1);
+  EXPECT_GE(num_checked, 5);
 }
 
 TEST(Executable, EveryCommandRefusesAnUnknownOption) {
@@ -83,7 +83,7 @@ TEST(Executable, EveryCommandRefusesAnUnknownOption) {
     EXPECT_EQ(outcome.out, "") << name;
     ++num_checked;
   }
-  EXPECT_GE(num_checked, 1);
+  EXPECT_GE(num_checked, 5);
 }
 
 TEST(Executable, EveryCommandThatNeedsSomethingSaysSo) {
@@ -95,7 +95,7 @@ TEST(Executable, EveryCommandThatNeedsSomethingSaysSo) {
     EXPECT_THAT(outcome.err, MatchesRegex("alidade: error: [^\n]+\n"));
     ++num_refused;
   }
-  EXPECT_GE(num_refused, 1);
+  EXPECT_GE(num_refused, 5);
 }
 
 TEST(Executable, UnknownCommandsAndNoCommandAreWrongUsage) {

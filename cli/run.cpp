@@ -97,19 +97,13 @@ void Run::write_files(const std::string& result) {
   if (has_report_) write_file(options.out / "report.html", page);
 }
 
-/// The page; empty where it is not wanted or fails. A failed report never fails the run.
-std::string Run::report(const std::string& result) const {
+/// The page; empty where it is not wanted or fails. A failed report never fails the run, but it says so.
+std::string Run::report(const std::string& result) {
   if (options.no_report) return "";
   try {
-#ifdef ALIDADE_HAS_REPORT
     return report_page(result, pictures_);
-#else
-    static_cast<void>(result);
-    return "";
-#endif
-  } catch (const std::bad_alloc&) {
-    return "";
-  } catch (const std::exception&) {
+  } catch (const std::exception& error) {
+    say(std::string("report: failed: ") + error.what());
     return "";
   }
 }

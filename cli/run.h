@@ -63,7 +63,7 @@ class Run {
  private:
   using Clock = std::chrono::steady_clock;
 
-  [[nodiscard]] std::string report(const std::string& result) const;
+  [[nodiscard]] std::string report(const std::string& result);
   void remove_older_files() const;
   void write_files(const std::string& result);
   void print(const std::string& result) const;

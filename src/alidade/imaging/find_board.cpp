@@ -2,9 +2,12 @@
 
 #include <opencv2/core.hpp>
 
+#include "alidade/board/dictionary.h"
 #include "alidade/imaging/chessboard.h"
 #include "alidade/imaging/chessboard_corners.h"
+#include "alidade/imaging/circle_grid.h"
 #include "alidade/imaging/grey_photo.h"
+#include "alidade/imaging/marker_board.h"
 
 namespace alidade {
 namespace {
@@ -25,24 +28,38 @@ BoardDetection find_chessboard_corners(const cv::Mat& photo, const Board& board,
 }  // namespace
 
 BoardDetection find_board(const cv::Mat& photo, const Board& board, bool reject_partial) {
-  if (board.cols < 2 || board.rows < 2) return not_found("a board has at least 2×2 points");
-  std::string reason;
+  std::string reason = fault(board);
+  if (!reason.empty()) return not_found(std::move(reason));
   const cv::Mat grey = to_grey_photo(photo, reason);
   if (!reason.empty()) return not_found(std::move(reason));
   switch (board.kind) {
     case BoardKind::chessboard:
       return find_chessboard_corners(grey, board, reject_partial);
-    default:
-      return not_found("this kind of board is not supported");
+    case BoardKind::charuco:
+    case BoardKind::aprilgrid:
+      return find_marker_board(grey, board);
+    case BoardKind::circles:
+    case BoardKind::asymmetric_circles:
+      return find_circle_grid(grey, board);
   }
+  return not_found("this kind of board is not supported");
 }
 
 BoardDetection refind_board(const cv::Mat& photo, const Board& board, const BoardView& first, const Camera& camera,
                             const Rigid3& cam_from_board) {
-  if (board.kind != BoardKind::chessboard) return not_found("this kind of board is not supported");
   std::string reason;
   const cv::Mat grey = to_grey_photo(photo, reason);
   if (!reason.empty()) return not_found(std::move(reason));
+  switch (board.kind) {
+    case BoardKind::chessboard:
+      break;
+    case BoardKind::charuco:
+    case BoardKind::aprilgrid:
+      return refind_marker_board(grey, board, first, camera, cam_from_board);
+    case BoardKind::circles:
+    case BoardKind::asymmetric_circles:
+      return refind_circle_grid(grey, board, first, camera, cam_from_board);
+  }
   return refit_chessboard(grey, board, first, camera, cam_from_board);
 }
 

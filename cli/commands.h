@@ -7,6 +7,7 @@ class Frame;
 void add_calibrate(Frame& frame);
 void add_camera(Frame& frame);
 void add_plan(Frame& frame);
+void add_simulate(Frame& frame);
 
 // How to write a command: cli/NAME.cpp with one function `add_NAME(Frame&)`, declared here and called in main.cpp.
 //

@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Each target installs what it misses, says what it does, and is quick the
 # second time.
-.PHONY: help build demo test bench docs format tidy clean
+.PHONY: help build demo test bench study docs format tidy clean
 .DEFAULT_GOAL := help
 
 out := build/release
@@ -13,6 +13,7 @@ help:
 	@echo "make build   build build/release/alidade"
 	@echo "make bench   measure speed, side by side with OpenCV and mrcal"
 	@echo "make docs    renew the picture in the README"
+	@echo "make study   measure accuracy on simulated data, side by side with OpenCV"
 	@echo "make format  format the sources;  make tidy: let clang-tidy read them"
 	@echo "make clean   remove build/"
 	@echo "Each installs the Debian packages it misses (packages.debian), as root or with sudo."
@@ -49,6 +50,13 @@ docs: demo
 	@echo "docs: docs/report.png, the demo's report as a browser draws it"
 	@chromium --headless --no-sandbox --hide-scrollbars --window-size=1500,885 --force-device-scale-factor=0.8 \
 	  --screenshot=docs/report.png "file://$(CURDIR)/build/demo/result/report.html" >/dev/null 2>&1
+
+study:
+	@tools/setup build
+	@echo "study: building bench/corner_accuracy.cpp in $(out)"
+	@cmake --preset release -DALIDADE_BENCH=ON >/dev/null
+	@ninja -C $(out) $(jobs) corner_accuracy
+	@$(out)/corner_accuracy
 
 format:
 	@tools/setup tidy

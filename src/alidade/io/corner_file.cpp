@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
@@ -47,8 +48,10 @@ std::string corners_csv(std::span<const BoardView> views) {
     const std::string photo = cell(view.photo);
     for (const Corner& corner : view.corners) {
       const double sigma_u = std::sqrt(corner.cov(0, 0)), sigma_v = std::sqrt(corner.cov(1, 1));
+      constexpr double most = 0.9999;  // in four decimals the next would be 1, which no covariance has
+      const double correlation = std::clamp(corner.cov(0, 1) / (sigma_u * sigma_v), -most, most);
       fmt::format_to(std::back_inserter(text), "{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.4f}\n", photo, corner.index,
-                     corner.px.x(), corner.px.y(), sigma_u, sigma_v, corner.cov(0, 1) / (sigma_u * sigma_v));
+                     corner.px.x(), corner.px.y(), sigma_u, sigma_v, correlation);
     }
   }
   return text;
@@ -57,7 +60,10 @@ std::string corners_csv(std::span<const BoardView> views) {
 std::vector<BoardView> read_corners(const std::filesystem::path& file, int num_points) {
   const Csv csv = Csv::read(file);
   const std::string u = csv.has("u_px") ? "u_px" : "u", v = csv.has("v_px") ? "v_px" : "v";
-  const bool has_sigma = csv.has("sigma_u_px") && csv.has("sigma_v_px");
+  // One σ without the other is a mistake, and named as such.
+  const auto is_given = [&](std::size_t row, const std::string& column) {
+    return csv.has(column) && !csv.is_empty(row, column);
+  };
   std::vector<BoardView> views;
   std::map<std::string, std::size_t> number;
   std::set<std::pair<std::size_t, int>> seen;
@@ -72,7 +78,7 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, int num_p
                        "' stands twice");
     }
     corner.px = {csv.number(row, u), csv.number(row, v)};
-    if (has_sigma && !csv.is_empty(row, "sigma_u_px")) corner.cov = read_cov(csv, row);
+    if (is_given(row, "sigma_u_px") || is_given(row, "sigma_v_px")) corner.cov = read_cov(csv, row);
     views[at->second].corners.push_back(corner);
   }
   return views;
@@ -106,6 +112,7 @@ std::vector<Eigen::Vector3d> read_board_points(const std::filesystem::path& file
   std::vector<bool> found(points.size(), false);
   for (std::size_t row = 0; row < csv.num_rows(); ++row) {
     const auto at = static_cast<std::size_t>(csv.integer(row, "corner", 0, num_points - 1));
+    if (found[at]) throw InputError(csv.where(row, "corner") + ": point " + std::to_string(at) + " stands twice");
     points[at] = {csv.number(row, "x_m"), csv.number(row, "y_m"), csv.number(row, "z_m")};
     found[at] = true;
   }

@@ -43,14 +43,25 @@ bool natural_less(const std::string& a, const std::string& b) {
 
 bool starts_with(std::string_view bytes, std::string_view magic) { return bytes.substr(0, magic.size()) == magic; }
 
-/// A JPEG ends in its end marker, a PNG in its IEND chunk (a few stray bytes may follow): without it the file was cut
-/// off, and decoders would fill the rest with grey.
+/// Where a JPEG's picture data begin, behind its headers: a thumbnail in them has an end marker of its own.
+std::size_t jpeg_data_start(std::string_view bytes) {
+  const auto byte = [&](std::size_t i) { return static_cast<std::size_t>(static_cast<unsigned char>(bytes[i])); };
+  std::size_t at = 2;
+  while (at + 4 <= bytes.size() && byte(at) == 0xFF && byte(at + 1) != 0xDA) {
+    at += byte(at + 1) == 0xFF ? 1 : 2 + 256 * byte(at + 2) + byte(at + 3);  // fill bytes; segments
+  }
+  return std::min(at, bytes.size());
+}
+
+/// A JPEG has its end marker, and a PNG its IEND chunk: without it the file was cut off, and decoders would fill the
+/// rest with grey. What stands behind them (some phones append a video) is no matter.
 bool is_cut_off(std::string_view bytes) {
+  if (starts_with(bytes, "\xFF\xD8\xFF")) {
+    return bytes.find("\xFF\xD9", jpeg_data_start(bytes)) == std::string_view::npos;
+  }
   constexpr std::size_t stray = 64 * 1024;
   const std::string_view tail = bytes.substr(bytes.size() > stray ? bytes.size() - stray : 0);
-  if (starts_with(bytes, "\xFF\xD8\xFF")) return tail.rfind("\xFF\xD9") == std::string_view::npos;
-  if (starts_with(bytes, "\x89PNG")) return tail.rfind("IEND") == std::string_view::npos;
-  return false;
+  return starts_with(bytes, "\x89PNG") && tail.rfind("IEND") == std::string_view::npos;
 }
 
 }  // namespace

@@ -206,20 +206,27 @@ Check principal_point(const CalibrateReport& report) {
   return check;
 }
 
+/// What to do next. What makes σ large comes first: more photos of a bent board are no help.
 std::string advice(const Verdict& verdict, const NextPhotoPlan& next, double worst_px) {
-  for (const Check& check : verdict.checks) {
-    if (check.state == State::good) continue;
-    if (check.name == "honest corners" && check.state == State::bad)
-      return "look at the corners named, or extract them again";
-    if (check.name == "board flat" && check.text.starts_with("the board bends")) return "use --board-shape free";
-    if (check.name == "lens adequate") return "try a richer lens model (--model), see the held-out errors";
-    if (check.name == "consistent") return "add photos: the halves do not agree";
-    if (check.name == "coverage" && !next.photos.empty()) {
-      return "add a photo as proposed: it lowers the worst 3σ from " + two(worst_px) + " to " +
-             two(next.photos.front().worst_3sigma_px) + " px";
-    }
+  const auto ails = [&](const std::string& name) {
+    return std::any_of(verdict.checks.begin(), verdict.checks.end(),
+                       [&](const Check& check) { return check.name == name && check.state != State::good; });
+  };
+  const auto text_starts = [&](const std::string& name, const std::string& words) {
+    return std::any_of(verdict.checks.begin(), verdict.checks.end(),
+                       [&](const Check& check) { return check.name == name && check.text.starts_with(words); });
+  };
+  const bool wrong_corners = std::any_of(verdict.checks.begin(), verdict.checks.end(), [](const Check& check) {
+    return check.name == "honest corners" && check.state == State::bad;
+  });
+  if (wrong_corners) return "look at the corners named, or extract them again";
+  if (text_starts("board flat", "the board bends")) return "use --board-shape free";
+  if (ails("lens adequate")) return "try a richer lens model (--model), see the held-out errors";
+  if (ails("coverage") && !next.photos.empty()) {
+    return "add a photo as proposed: it lowers the worst 3σ from " + two(worst_px) + " to " +
+           two(next.photos.front().worst_3sigma_px) + " px";
   }
-  return "";
+  return ails("consistent") ? "add photos: the halves do not agree" : "";
 }
 
 }  // namespace
@@ -231,10 +238,8 @@ Verdict calibration_verdict(const CalibrateReport& report, const CalibrationStud
   verdict.checks = {coverage(report, study),       lens_adequate(study),      consistent(study),
                     honest_corners(report, views), board_flat(study, config), principal_point(report)};
   const Check* worst = &verdict.checks.front();
-  for (const Check& check : verdict.checks) {
-    const bool more_telling =
-        check.state == worst->state && worst->name == "coverage";  // which stands in every sentence
-    if (check.state > worst->state || more_telling) worst = &check;
+  for (const Check& check : verdict.checks) {  // among equals not coverage: the sentence begins with it
+    if (check.state > worst->state || (check.state == worst->state && worst->name == "coverage")) worst = &check;
   }
   verdict.state = worst->state;
   const std::string trust =

@@ -18,14 +18,12 @@ struct Candidate {
 /// From plain to rich; a richer one frees terms of the one before.
 const std::vector<Candidate>& ladder() {
   static const std::vector<Candidate> steps = {
-      {"pinhole", "pinhole", {"skew"}},
       {"k1", "brown", {"skew", "k2", "p1", "p2", "k3"}},
       {"k1 k2", "brown", {"skew", "p1", "p2", "k3"}},
       {"k1 k2 p1 p2", "brown", {"skew", "k3"}},
       {"k1 k2 p1 p2 k3", "brown", {"skew"}},
       {"k1 k2 p1 p2 k3 skew", "brown", {}},
       {"kannala_brandt", "kannala_brandt", {"skew"}},
-      {"kannala_brandt skew", "kannala_brandt", {}},
   };
   return steps;
 }

@@ -242,6 +242,9 @@ Verdict calibration_verdict(const CalibrateReport& report, const CalibrationStud
     if (check.state > worst->state || (check.state == worst->state && worst->name == "coverage")) worst = &check;
   }
   verdict.state = worst->state;
+  for (const Check& check : verdict.checks) {  // halves that differ are a symptom of it
+    if (check.name == "board flat" && check.text.starts_with("the board bends")) worst = &check;
+  }
   const std::string trust =
       "3σ is below 0.5 px in " + two(share_below(study.sigma_infinity, 0.5)) + " % of the picture";
   const std::string word = verdict.state == State::good   ? "Good: "

@@ -38,18 +38,15 @@ TEST(HeldOutModels, NoRicherModelGainsWhereTheLensIsRight) {
       if (gains_much) RecordProperty("gains_seed_" + std::to_string(seed), model.name);
     }
   }
-  EXPECT_EQ(richer, 12 * 4);
+  EXPECT_EQ(richer, 12 * 3);
   EXPECT_EQ(gains, 0);
 }
 
 TEST(HeldOutModels, PlainerModelsLoseWhatTheyLack) {
   const auto models = models_of(sample_camera("brown", {{"k3", 0.0}}), without_k3, 1);
-  for (const char* name : {"pinhole", "k1"}) {
-    const HeldOutModel& model = named(models, name);
-    EXPECT_FALSE(model.is_richer);
-    EXPECT_LT(model.gain_px, -2.0 * model.sigma_px) << name;
-  }
-  EXPECT_GT(named(models, "pinhole").heldout_rms_px, 10.0 * named(models, "k1 k2 p1 p2").heldout_rms_px);
+  const HeldOutModel& model = named(models, "k1");
+  EXPECT_FALSE(model.is_richer);
+  EXPECT_LT(model.gain_px, -2.0 * model.sigma_px);
 }
 
 TEST(HeldOutModels, ARicherModelGainsWhereTheLensNeedsIt) {
@@ -64,7 +61,7 @@ TEST(HeldOutModels, AModelOffTheLadderStandsInFront) {
   EXPECT_EQ(models.front().name, "brown (as asked)");
   EXPECT_EQ(models.front().gain_px, 0.0);
   EXPECT_EQ(models.front().sigma_px, 0.0);
-  EXPECT_EQ(models.size(), 9u);
+  EXPECT_EQ(models.size(), 7u);
 }
 
 TEST(HeldOutModels, TheErrorIsThatOfTheNoise) {

@@ -49,7 +49,8 @@ CalibrationStudy study_of(const std::vector<BoardView>& views) {
   const CalibrateConfig config;
   const auto report = calibrate(sample_board, views, sample_size, config);
   EXPECT_EQ(report.status, CalibrateReport::Status::converged);
-  return study_calibration(sample_board, views, config, report);
+  const auto transfer = test_shape_transfer(sample_board, views, sample_size, config);
+  return study_calibration(sample_board, views, config, report, transfer);
 }
 
 TEST(StudyCalibration, HalvesOfOneCameraAgree) {

@@ -77,7 +77,7 @@ std::optional<double> focal_from_vanishing_points(std::span<const Eigen::Matrix3
 
 std::optional<Rigid3> pose_from_plane(const Camera& camera, const BoardView& view,
                                       std::span<const Eigen::Vector3d> board_points) {
-  constexpr std::size_t max_corners = 96;  // a start needs no more
+  constexpr std::size_t max_corners = 32;  // a start needs no more
   const std::size_t stride = (view.corners.size() + max_corners - 1) / max_corners;
   std::vector<Eigen::Vector2d> px, on_board, on_plane;
   for (std::size_t i = 0; i < view.corners.size(); i += stride) px.push_back(view.corners[i].px);

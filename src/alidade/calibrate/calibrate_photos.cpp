@@ -25,6 +25,21 @@ void take_detections(BoardDetections&& found, PhotoCalibration& result) {
   result.size = {first.width_px, first.height_px};
 }
 
+/// Where many photos show a whole grid of another size, the few in which the asked one was seen are parts of that grid:
+/// no camera comes from a wrong board. The sentence for it; empty where the board is right.
+std::string wrong_board(const PhotoCalibration& result) {
+  std::size_t others = 0, found = 0;
+  std::string example;
+  for (std::size_t i = 0; i < result.views.size(); ++i) {
+    found += result.views[i].corners.empty() ? 0u : 1u;
+    if (!result.reasons[i].starts_with("a grid of ")) continue;
+    ++others;
+    example = result.reasons[i];
+  }
+  if (others < 2 || 3 * others < found) return "";
+  return std::to_string(others) + " photos show " + example;
+}
+
 /// Adds the corners of the first extraction that the second lost: where the lens model fits badly, the second starts
 /// too far off, and these corners are the ones that tell.
 void keep_missing(const std::vector<Corner>& first, std::vector<Corner>& again) {
@@ -60,6 +75,16 @@ PhotoCalibration calibrate_photos(const std::vector<std::string>& names, const P
   for (const std::string& name : names) result.views.push_back({.photo = name, .corners = {}});
   take_detections(find_boards(names.size(), load_photo, board, false, progress), result);
 
+  if (const std::string wrong = wrong_board(result); !wrong.empty()) {
+    result.report.reason = wrong;
+    result.report.to_add = "check --board, which counts inner corners";
+    result.report.views.resize(names.size());
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      result.report.views[i].corners.resize(result.views[i].corners.size());
+      result.report.views[i].reason = result.reasons[i].empty() ? "no camera: " + wrong : result.reasons[i];
+    }
+    return result;
+  }
   CalibrateConfig flat = config;
   if (config.board_shape != BoardShape::given) flat.board_shape = BoardShape::flat;
   const CalibrateReport first = calibrate(board, result.views, result.size, flat, given_points);

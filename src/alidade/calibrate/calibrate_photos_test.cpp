@@ -58,6 +58,20 @@ TEST(CalibratePhotos, IsAsWrongAsItSaysFromPixelsToCamera) {
   EXPECT_LT(error.dot(cov.ldlt().solve(error)), 42.7);  // χ²(9) beyond it with probability < 3·10⁻⁶
 }
 
+TEST(CalibratePhotos, AWrongBoardGivesNoCamera) {
+  int refused = 0;
+  for (const auto& [cols, rows] : {std::pair{8, 6}, std::pair{9, 5}, std::pair{7, 5}, std::pair{10, 7}}) {
+    Board wrong = sample_board;
+    wrong.cols = cols;
+    wrong.rows = rows;
+    const auto result = calibrate_photos(photos().names, photos().loader(), wrong, {});
+    EXPECT_EQ(result.report.status, CalibrateReport::Status::degenerate) << cols << "x" << rows;
+    EXPECT_FALSE(result.report.to_add.empty());
+    ++refused;
+  }
+  EXPECT_EQ(refused, 4);
+}
+
 TEST(CalibratePhotos, APhotoOfAnotherSizeIsNamed) {
   Photos changed = photos();
   const cv::Rect part(0, 0, 640, 470);

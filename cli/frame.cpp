@@ -103,7 +103,12 @@ std::string usage_fault(const CLI::App& app, const CLI::ParseError& error) {
   if (!extra.empty() && !names.empty()) {
     return where(at) + "unknown command '" + extra + "'" + suggestion(extra, names);
   }
-  if (!names.empty()) return where(at) + "a command is required; see alidade --help";
+  if (at.get_parent() == nullptr) return "a command is required; see alidade --help";
+  if (!names.empty()) {
+    std::string list;
+    for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+    return where(at) + "a command is required: " + list + "; see alidade " + at.get_name() + " --help";
+  }
   if (!extra.empty()) return where(at) + "unexpected argument '" + extra + "'";
   return where(at) + error.what();
 }

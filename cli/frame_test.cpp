@@ -97,7 +97,7 @@ TEST(Frame, WrongUsageIsOneLineAndExitCode2) {
       {{"work", "--length", "1e999"}, "work: --length: '1e999' is not a finite number"},
       {{"work", "--length", "-1"}, "work: --length: '-1' is not above zero"},
       {{"work", "--threads", "-1"}, "work: --threads: Value -1 not in range 0 to 1024"},
-      {{"camera"}, "camera: a command is required; see alidade --help"},
+      {{"camera"}, "camera: a command is required: show; see alidade camera --help"},
       {{"camera", "shwo"}, "camera: unknown command 'shwo'; did you mean 'show'?"},
       {{"camera", "show", "--x"}, "camera show: unknown option '--x'"},
   };

@@ -194,7 +194,7 @@ BoardDetection find_circle_grid(const cv::Mat& photo, const Board& board) {
   maps = local_maps(places, seen);
   const double radius_m = board.marker_m > 0.0 ? guess_m : measured_radius_m(ellipses, maps, places, guess_m);
   BoardDetection detection;
-  constexpr double doubt = 0.15;  // of what neighbours tell about a lens: the scatter in simulations
+  constexpr double doubt = 0.07;  // of what neighbours tell about a lens: scatter over boards seen by a 64° lens
   detection.view.corners = corners_at(ellipses, maps, places, radius_m, doubt);
   if (2 * detection.view.corners.size() < places.size()) {
     return not_found("only " + std::to_string(detection.view.corners.size()) + " of " + std::to_string(places.size()) +

@@ -5,13 +5,14 @@ import re
 import sys
 
 FOUNDATIONS = {"geometry", "estimation"}
-SENSORS = {"camera", "board", "imaging"}
-ESTIMATORS = {"calibrate"}
+SENSORS = {"camera", "pantilt", "board", "imaging"}
+ESTIMATORS = {"calibrate", "observe"}
 
 MAY_INCLUDE = {
     "geometry": set(),
     "estimation": set(),
     "camera": FOUNDATIONS,
+    "pantilt": FOUNDATIONS,
     "board": FOUNDATIONS | {"camera"},
     "imaging": FOUNDATIONS | {"camera", "board"},
     "simulate": FOUNDATIONS | SENSORS,

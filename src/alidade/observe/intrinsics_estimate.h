@@ -1,0 +1,43 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+
+namespace alidade {
+
+/// What an estimator noticed in a frame.
+enum class ObserveEvent {
+  none,
+  start,        ///< The first estimate.
+  burst,        ///< One frame did not fit and was left out.
+  slip,         ///< One point did not fit and was left out; see `point`.
+  zoom,         ///< The intrinsics are changing.
+  zoom_end,     ///< They have come to rest.
+  restart,      ///< Estimated anew from the last seconds.
+  new_segment,  ///< A gap: the rotation across it is not known.
+};
+
+/// Intrinsics of a rotating camera after a frame, by whatever method. [px]
+struct IntrinsicsEstimate {
+  bool has_value = false;  ///< False: not yet; nothing below holds.
+  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;
+  double k1 = 0.0;
+  Eigen::Vector4d sigma = Eigen::Vector4d::Zero();        ///< Of fx, fy, cx, cy; NaN where the method has none.
+  double nis = std::numeric_limits<double>::quiet_NaN();  ///< Normalised innovation squared of this frame.
+  int nis_dof = 0;
+  ObserveEvent event = ObserveEvent::none;
+  int point = -1;  ///< Of a slip, from 0.
+
+  [[nodiscard]] Eigen::Vector4d values() const { return {fx, fy, cx, cy}; }
+};
+
+/// Pixels to numbers near one: q = (px − centre) / scale, so that every equation keeps its form and its condition falls
+/// from 7·10⁷ to 3·10².
+struct PixelScale {
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< Middle of the picture. [px]
+  double scale = 1.0;                                ///< About half its width. [px]
+
+  [[nodiscard]] Eigen::Vector2d normalised(const Eigen::Vector2d& px) const { return (px - centre) / scale; }
+};
+
+}  // namespace alidade

@@ -1,0 +1,139 @@
+#include "alidade/simulate/rotation.h"
+
+#include "alidade/pantilt/head_rotation.h"
+#include "alidade/simulate/draws.h"
+
+namespace alidade {
+namespace {
+
+/// The mount's rotation since the start, at times that only grow.
+class TrueRotation {
+ public:
+  TrueRotation(const RotationScene& scene, RotationSource source, double step_s)
+      : scene_(scene), is_rate_(source == RotationSource::rate), step_s_(step_s) {}
+
+  /// mount_from_start at t ≥ 0 (and, for a small negative t, extrapolated).
+  Eigen::Quaterniond at(double t_s) {
+    if (!is_rate_)
+      return base_from_cam_rotation(scene_.motion(t_s)).conjugate() * base_from_cam_rotation(scene_.motion(0.0));
+    while (t_s_ + step_s_ <= t_s) advance(step_s_);
+    return exp_so3(-scene_.motion(0.5 * (t_s_ + t_s)) * (t_s - t_s_)) * mount_from_start_;
+  }
+
+ private:
+  void advance(double h) {
+    mount_from_start_ = (exp_so3(-scene_.motion(t_s_ + 0.5 * h) * h) * mount_from_start_).normalized();
+    t_s_ += h;
+  }
+
+  const RotationScene& scene_;
+  bool is_rate_;
+  double step_s_;
+  double t_s_ = 0.0;
+  Eigen::Quaterniond mount_from_start_ = Eigen::Quaterniond::Identity();
+};
+
+Eigen::Vector2d distorted(const RotatingIntrinsics& k, const Eigen::Vector2d& ray) {
+  const Eigen::Vector2d bent = ray * (1.0 + k.k1 * ray.squaredNorm());
+  return {k.fx * bent.x() + k.cx, k.fy * bent.y() + k.cy};
+}
+
+/// The ray (x, y, 1) that is seen there: Newton's method on the radius.
+Eigen::Vector3d ray_of(const RotatingIntrinsics& k, const Eigen::Vector2d& px) {
+  const Eigen::Vector2d bent((px.x() - k.cx) / k.fx, (px.y() - k.cy) / k.fy);
+  const double radius = bent.norm();
+  double r = radius;
+  for (int i = 0; i < 20; ++i) r -= (r + k.k1 * r * r * r - radius) / (1.0 + 3.0 * k.k1 * r * r);
+  const Eigen::Vector2d ray = radius > 0.0 ? Eigen::Vector2d(bent * (r / radius)) : bent;
+  return {ray.x(), ray.y(), 1.0};
+}
+
+/// Points at the start, in the camera frame; those without a depth stand a million metres away.
+std::vector<Eigen::Vector3d> world_of(const RotationScene& scene) {
+  std::vector<Eigen::Vector3d> points;
+  for (std::size_t i = 0; i < scene.start_px.size(); ++i) {
+    const double depth_m = scene.depth_m.empty() ? 1e6 : scene.depth_m[i];
+    points.push_back(depth_m * ray_of(scene.intrinsics(0.0), scene.start_px[i]));
+  }
+  return points;
+}
+
+void measure_rotation(const RotationScene& scene, const RotationLogConfig& config, Draws& draws, RotationRow& row) {
+  const Eigen::Vector3d motion = scene.motion(row.t_s);
+  if (config.source == RotationSource::rate) {
+    row.rate_rad_per_s = motion + config.rate_bias_rad_per_s + config.sigma_rate_rad_per_s * draws.normal3();
+  } else if (config.source == RotationSource::head) {
+    row.pan_tilt_roll_rad = motion + config.sigma_angle_rad * draws.normal3();
+  } else if (config.source == RotationSource::attitude) {
+    row.base_from_cam = base_from_cam_rotation(motion) * exp_so3(config.sigma_angle_rad * draws.normal3());
+  }
+}
+
+}  // namespace
+
+Eigen::Vector3d paper_rate(double t_s) { return {0.07 * std::sin(0.8 * t_s), 0.12 * std::sin(1.6 * t_s), 0.0}; }
+
+Eigen::Vector3d paper_pan_tilt(double t_s, double mean_tilt_rad) {
+  const double pan = -0.075 * (1.0 - std::cos(1.6 * t_s)), tilt = 0.0875 * (1.0 - std::cos(0.8 * t_s));
+  return {pan, mean_tilt_rad + tilt, 0.0};
+}
+
+std::vector<Eigen::Vector2d> draw_points(int width_px, int height_px, int count, std::uint64_t seed) {
+  constexpr double margin_px = 60.0, least_height_px = 40.0;
+  Draws draws(seed);
+  std::vector<Eigen::Vector2d> points;
+  const auto fits = [&](const Eigen::Vector2d& c) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if ((points[i] - c).norm() < least_height_px) return false;
+      for (std::size_t j = 0; j < i; ++j) {
+        const Eigen::Vector2d ab = points[j] - points[i], ac = c - points[i], bc = c - points[j];
+        const double twice_area = std::abs(ab.x() * ac.y() - ab.y() * ac.x());
+        if (twice_area < least_height_px * std::max({ab.norm(), ac.norm(), bc.norm()})) return false;
+      }
+    }
+    return true;
+  };
+  // With many points no triangle can be asked to be wide.
+  const std::size_t demanding = std::min<std::size_t>(static_cast<std::size_t>(count), 6);
+  while (points.size() < static_cast<std::size_t>(count)) {
+    const double x = draws.uniform(margin_px, width_px - margin_px),
+                 y = draws.uniform(margin_px, height_px - margin_px);
+    if (points.size() >= demanding || fits({x, y})) points.emplace_back(x, y);
+  }
+  return points;
+}
+
+RotationLog simulate_rotation(const RotationScene& scene, const RotationLogConfig& config, std::uint64_t seed) {
+  Draws draws(seed);
+  RotationLog log;
+  log.source = config.source;
+  log.num_points = scene.start_px.size();
+  log.has_roll_rate = config.source == RotationSource::rate;
+  const std::vector<Eigen::Vector3d> world = world_of(scene);
+  const Eigen::Quaterniond cam_from_mount = exp_so3(scene.mount_rad);
+  TrueRotation mount(scene, config.source, 1.0 / (64.0 * config.rate_hz));
+  const auto num_rows = static_cast<std::size_t>(std::floor(config.duration_s * config.rate_hz + 0.5)) + 1;
+  for (std::size_t k = 0; k < num_rows; ++k) {
+    RotationRow row;
+    row.t_s = static_cast<double>(k) / config.rate_hz;
+    measure_rotation(scene, config, draws, row);
+    const Eigen::Quaterniond cam_from_start =
+        cam_from_mount * mount.at(row.t_s + scene.delay_s) * cam_from_mount.conjugate();
+    const RotatingIntrinsics now = scene.intrinsics(row.t_s);
+    for (std::size_t i = 0; i < world.size(); ++i) {
+      const Eigen::Vector3d point = cam_from_start * (world[i] + scene.lever_arm_m) - scene.lever_arm_m;
+      if (i == 0 && config.with_range) row.range_m = point.norm() + config.sigma_range_m * draws.normal();
+      const Eigen::Vector2d px = distorted(now, point.head<2>() / point.z()) + config.sigma_px * draws.normal2();
+      const bool is_inside =
+          px.x() >= -0.5 && px.y() >= -0.5 && px.x() < scene.width_px - 0.5 && px.y() < scene.height_px - 0.5;
+      const bool is_lost = config.lost_share > 0.0 && draws.uniform() < config.lost_share;
+      const bool seen = point.z() > 0.0 && (is_inside || !config.clip_to_picture) && !is_lost;
+      row.px.push_back(seen ? px : Eigen::Vector2d::Constant(not_seen));
+    }
+    log.rows.push_back(std::move(row));
+    log.truth.push_back({now.fx, now.fy, now.cx, now.cy});
+  }
+  return log;
+}
+
+}  // namespace alidade

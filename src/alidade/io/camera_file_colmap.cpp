@@ -123,7 +123,7 @@ std::string write_colmap(const Camera& camera) {
   std::string text = fmt::format("# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n1 {} {} {} {} {} {} {}", model,
                                  camera.width_px, camera.height_px, number_text(f[0]), number_text(f[1]),
                                  centre_for_colmap(f[2]), centre_for_colmap(f[3]));
-  for (const double value : k) text += " " + number_text(value);
+  for (const double value : k) text.append(" ").append(number_text(value));
   return text + "\n";
 }
 

@@ -50,8 +50,10 @@ struct Temporary {
 /// A name beside `file` that no other run, and no other thread of this one, uses.
 std::filesystem::path temporary_name(const std::filesystem::path& file) {
   static std::atomic<unsigned> count{0};
-  const std::string tail = std::to_string(::getpid()) + "-" + std::to_string(count++) + ".part";
-  return file.parent_path() / ("." + file.filename().string() + "." + tail);
+  std::string name = ".";
+  name.append(file.filename().string()).append(".").append(std::to_string(::getpid()));
+  name.append("-").append(std::to_string(count++)).append(".part");
+  return file.parent_path() / name;
 }
 
 void write_all(const std::filesystem::path& file, const Descriptor& out, std::string_view content) {

@@ -95,7 +95,8 @@ std::vector<Eigen::Vector2d> draw_points(int width_px, int height_px, int count,
   };
   // With many points no triangle can be asked to be wide.
   const std::size_t demanding = std::min<std::size_t>(static_cast<std::size_t>(count), 6);
-  while (points.size() < static_cast<std::size_t>(count)) {
+  for (int tries = 0; points.size() < static_cast<std::size_t>(count); ++tries) {
+    if (tries % 1000 == 999 && points.size() < demanding) points.clear();  // these leave no room for another
     const double x = draws.uniform(margin_px, width_px - margin_px),
                  y = draws.uniform(margin_px, height_px - margin_px);
     if (points.size() >= demanding || fits({x, y})) points.emplace_back(x, y);

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+
+#include "alidade/observe/rotation_frame.h"
+
+namespace alidade {
+
+/// What is estimated beside fx, fy, cx, cy.
+struct ObserveNuisances {
+  bool k1 = false;     ///< Radial distortion: x (1 + k1 r²) on coordinates over the focal length.
+  bool mount = false;  ///< Rotation from the frame whose rotation is measured to the camera's, 3 angles.
+  bool delay = false;  ///< Pixels are of t + delay.
+  bool lever = false;  ///< Camera centre from the centre of rotation, camera frame. [m]
+  bool turn = false;   ///< Error of the measured rotation, 3 angles; one a frame in a bundle, of now in a filter.
+};
+
+inline constexpr int most_common = 15;  ///< Of ObserveNuisances with everything.
+using CommonVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_common, 1>;
+using CommonMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_common, most_common>;
+using PixelByCommon = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, most_common>;
+
+/// Where each parameter stands in a vector: fx, fy, cx, cy, then what else is estimated. −1: not there.
+struct CommonLayout {
+  explicit CommonLayout(const ObserveNuisances& nuisances);
+
+  int size = 4;
+  int k1 = -1, mount = -1, delay = -1, lever = -1, turn = -1;
+};
+
+/// What all points have in common. Pixels are normalised (PixelScale), so are fx, fy, cx, cy.
+struct RotatingCamera {
+  Eigen::Vector4d k{1.0, 1.0, 0.0, 0.0};  ///< fx, fy, cx, cy.
+  double k1 = 0.0;
+  Eigen::Quaterniond cam_from_mount = Eigen::Quaterniond::Identity();
+  double delay_s = 0.0;
+  Eigen::Vector3d lever_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();  ///< mount_now = Exp(turn) · measured.
+
+  /// The values moved by `step`, in the layout's order; the mount turns on the right.
+  [[nodiscard]] RotatingCamera retract(const CommonLayout& layout, const CommonVector& step) const;
+};
+
+/// A static point: bearing start_from_point · (a, b, 1) seen from the camera at the segment's start, over its depth.
+/// start_from_point is fixed where the point is first met, so that a, b stay small on a full turn.
+struct BearingPoint {
+  Eigen::Matrix3d start_from_point = Eigen::Matrix3d::Identity();
+  Eigen::Vector2d ab = Eigen::Vector2d::Zero();
+  double inverse_depth = 0.0;  ///< [1/m]; 0: far away.
+
+  [[nodiscard]] Eigen::Vector3d ray() const { return start_from_point * Eigen::Vector3d(ab.x(), ab.y(), 1.0); }
+};
+
+/// Pixel of a point with its derivatives. J_px_point: by a, b and the inverse depth.
+struct RotationPrediction {
+  Eigen::Vector2d px;
+  PixelByCommon J_px_common;
+  Eigen::Matrix<double, 2, 3> J_px_point;
+};
+
+/// The camera at one frame: what does not depend on the point.
+class RotationView {
+ public:
+  RotationView(const RotatingCamera& camera, const RotationFrame& frame);
+
+  /// Normalised pixel of a point; none behind the camera or beyond the fold of the lens.
+  /// p ~ K D(C R Cᵀ (m + χ r) + χ (t − r)): R the measured rotation, C the mount, r the lever arm, t the shift.
+  [[nodiscard]] std::optional<Eigen::Vector2d> project(const BearingPoint& point) const;
+  [[nodiscard]] bool predict(const BearingPoint& point, const CommonLayout& layout, RotationPrediction& out) const;
+  /// Ray of the pixel in the start's frame, for a point far away.
+  [[nodiscard]] std::optional<Eigen::Vector3d> ray_in_start(const Eigen::Vector2d& px) const;
+  /// Point in the camera, times its inverse depth; the derivative by common parameters, a, b and inverse depth.
+  [[nodiscard]] Eigen::Vector3d point_in_cam(const BearingPoint& point) const;
+  void point_jacobians(const BearingPoint& point, const CommonLayout& layout,
+                       Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most_common>& J_common,
+                       Eigen::Matrix3d& J_point) const;
+
+ private:
+  const RotatingCamera& camera_;
+  Eigen::Matrix3d cam_from_mount_, mount_from_start_, cam_from_start_;
+  Eigen::Vector3d rate_, shift_m_;
+};
+
+/// A rotation that takes (0, 0, 1) to the direction of `ray`.
+[[nodiscard]] Eigen::Matrix3d rotation_to(const Eigen::Vector3d& ray);
+
+}  // namespace alidade

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <vector>
+
+#include "alidade/observe/rotation_bundle.h"
+
+namespace alidade {
+
+/// Extended Kalman filter on "common parameters c + many static points", with a joint covariance of the form of a star:
+/// given c, the points are independent. Measurement updates keep that form exactly, for a pixel depends on c and its
+/// own point alone, and cost O(points). Process noise on c would tie the points to each other; there the joint normal
+/// is projected on the nearest star (the one that keeps c with each single point, the minimum of the Kullback–Leibler
+/// divergence). Allocates nothing after construction. Everything is in normalised pixels.
+/// Bar-Shalom, Li & Kirubarajan, "Estimation with applications to tracking and navigation", 2001, section 10.3.
+class StarFilter {
+ public:
+  StarFilter(const ObserveNuisances& nuisances, bool with_depth, std::size_t num_points);
+
+  /// Begins with a bundle's solution. Points that it does not know join when they are seen.
+  void start(const BundleSolution& solution, const std::vector<int>& bundle_point_of, double sigma_px);
+  void forget_points();  ///< A new segment: points are met anew, what they have in common stays.
+  void forget_point(std::size_t i) { points_[i].known = false; }
+
+  /// The common parameters walk: variances added, in the layout's order; `turn` is drawn anew where `turn_sigma` > 0.
+  void predict(const CommonVector& variance, double turn_sigma_rad);
+  /// Takes up a frame: innovations of all known points that were seen. `px` normalised, NaN: not seen.
+  void observe(const RotationFrame& frame, std::span<const Eigen::Vector2d> px);
+  /// Innovations are of so many points; point `i` (a place in this list) can be left out.
+  [[nodiscard]] std::size_t num_seen() const { return num_seen_; }
+  [[nodiscard]] int seen_point(std::size_t i) const { return seen_[i].point; }
+  void leave_out(std::size_t i, bool out) { seen_[i].left_out = out; }
+  [[nodiscard]] bool is_left_out(std::size_t i) const { return seen_[i].left_out; }
+  [[nodiscard]] int dof() const;
+  /// Normalised innovation squared of the points not left out; with `variance` added to the common parameters before.
+  [[nodiscard]] double nis();
+  [[nodiscard]] double nis_if_walked(const CommonVector& variance);
+  /// The same of one point alone, 2 degrees of freedom.
+  [[nodiscard]] double own_nis(std::size_t i) const;
+  /// Takes the innovations in, but those left out; new points join. After `observe`, once.
+  void update();
+  /// Takes a range of a known point in. False: it does not fit (beyond 4 σ), or the point has no depth.
+  bool update_range(const RotationFrame& frame, std::size_t point, double range_m, double sigma_range_m);
+
+  [[nodiscard]] const RotatingCamera& camera() const { return camera_; }
+  [[nodiscard]] const CommonLayout& layout() const { return layout_; }
+  [[nodiscard]] const CommonMatrix& covariance() const { return covariance_; }
+  [[nodiscard]] bool knows(std::size_t point) const { return points_[point].known; }
+  [[nodiscard]] const BearingPoint& point(std::size_t i) const { return points_[i].bearing; }
+  [[nodiscard]] PointGivenCommon given_common(std::size_t i) const { return {points_[i].slope, points_[i].cov}; }
+
+ private:
+  struct Point {
+    BearingPoint bearing;
+    PointByCommonSlope slope;
+    Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();
+    bool known = false;
+  };
+  struct Seen {
+    int point = 0;
+    bool left_out = false;
+    Eigen::Vector2d innovation;
+    Eigen::Matrix<double, 2, 3> J_point;
+    PixelByCommon by_common;      ///< ∂px/∂c through c and through the point's slope.
+    Eigen::Matrix2d inverse_cov;  ///< Of the innovation given c.
+  };
+
+  void accumulate();
+  void add_new_points(const RotationFrame& frame, std::span<const Eigen::Vector2d> px);
+  void move_common(const CommonVector& step);
+
+  CommonLayout layout_;
+  bool with_depth_;
+  double variance_px_ = 1e-6;
+  RotatingCamera camera_;
+  CommonMatrix covariance_;
+  std::vector<Point> points_;
+  std::vector<Seen> seen_;
+  std::size_t num_seen_ = 0;
+  RotationFrame frame_;
+  std::span<const Eigen::Vector2d> px_;
+  CommonMatrix information_;  ///< Σ Gᵀ R⁻¹ G of those not left out.
+  CommonVector gradient_;     ///< Σ Gᵀ R⁻¹ ν.
+  double squares_ = 0.0;      ///< Σ νᵀ R⁻¹ ν.
+};
+
+}  // namespace alidade

@@ -1,5 +1,6 @@
 #include "alidade/calibrate/homography.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
@@ -26,26 +27,29 @@ std::optional<Eigen::Matrix3d> fit_homography(std::span<const Eigen::Vector2d> f
   const std::size_t stride = (from.size() + max_points - 1) / max_points;
   const Eigen::Matrix3d normal_from = normaliser(from, stride), normal_to = normaliser(to, stride);
 
-  Eigen::Matrix<double, 9, 9> AtA = Eigen::Matrix<double, 9, 9>::Zero();
+  // Rows h1, h2, h3 of H, each residual h1·p − u h3·p and h2·p − v h3·p: given h3, the others are linear least squares.
+  Eigen::Matrix3d pp = Eigen::Matrix3d::Zero(), u_pp = pp, v_pp = pp, rr_pp = pp;
   for (std::size_t i = 0; i < from.size(); i += stride) {
     const Eigen::Vector3d p = normal_from * from[i].homogeneous();
     const Eigen::Vector3d q = normal_to * to[i].homogeneous();
-    const Eigen::Matrix3d pp = p * p.transpose();  // rows (0, −p, v p) and (p, 0, −u p) of A
-    AtA.block<3, 3>(0, 0) += pp;
-    AtA.block<3, 3>(3, 3) += pp;
-    AtA.block<3, 3>(0, 6) -= q.x() * pp;
-    AtA.block<3, 3>(3, 6) -= q.y() * pp;
-    AtA.block<3, 3>(6, 6) += q.head<2>().squaredNorm() * pp;
+    const Eigen::Matrix3d outer = p * p.transpose();
+    pp += outer;
+    u_pp += q.x() * outer;
+    v_pp += q.y() * outer;
+    rr_pp += q.head<2>().squaredNorm() * outer;
   }
-  if (!AtA.allFinite()) return std::nullopt;
-  AtA.block<3, 3>(6, 0) = AtA.block<3, 3>(0, 6);
-  AtA.block<3, 3>(6, 3) = AtA.block<3, 3>(3, 6);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> eigen(AtA);
-  if (!(eigen.eigenvalues()[1] > 1e-10 * eigen.eigenvalues()[8])) return std::nullopt;  // two null vectors: a line
+  if (!rr_pp.allFinite() || !pp.allFinite()) return std::nullopt;
+  const Eigen::LLT<Eigen::Matrix3d> llt(pp);
+  const Eigen::Vector3d pivots = llt.matrixLLT().diagonal();
+  if (llt.info() != Eigen::Success || !(pivots.minCoeff() > 1e-6 * pivots.maxCoeff())) return std::nullopt;  // a line
+  const Eigen::Matrix3d h1_from_h3 = llt.solve(u_pp), h2_from_h3 = llt.solve(v_pp);
+  const Eigen::Matrix3d S = rr_pp - u_pp * h1_from_h3 - v_pp * h2_from_h3;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(S);
+  if (!(eigen.eigenvalues()[1] > 1e-10 * rr_pp.trace())) return std::nullopt;  // two null vectors: images on a line
 
-  const Eigen::Matrix<double, 9, 1> h = eigen.eigenvectors().col(0);
+  const Eigen::Vector3d h3 = eigen.eigenvectors().col(0);
   Eigen::Matrix3d H;
-  H << h.segment<3>(0).transpose(), h.segment<3>(3).transpose(), h.segment<3>(6).transpose();
+  H << (h1_from_h3 * h3).transpose(), (h2_from_h3 * h3).transpose(), h3.transpose();
   H = normal_to.inverse() * H * normal_from;
   return H * ((H(2, 2) < 0.0 ? -1.0 : 1.0) / H.norm());
 }

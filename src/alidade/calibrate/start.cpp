@@ -2,7 +2,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <cmath>
 
 #include "alidade/calibrate/homography.h"
@@ -77,7 +76,7 @@ std::optional<double> focal_from_vanishing_points(std::span<const Eigen::Matrix3
 
 std::optional<Rigid3> pose_from_plane(const Camera& camera, const BoardView& view,
                                       std::span<const Eigen::Vector3d> board_points) {
-  constexpr std::size_t max_corners = 32;  // a start needs no more
+  constexpr std::size_t max_corners = 20;  // a start needs no more
   const std::size_t stride = (view.corners.size() + max_corners - 1) / max_corners;
   std::vector<Eigen::Vector2d> px, on_board, on_plane;
   for (std::size_t i = 0; i < view.corners.size(); i += stride) px.push_back(view.corners[i].px);
@@ -92,11 +91,15 @@ std::optional<Rigid3> pose_from_plane(const Camera& camera, const BoardView& vie
   const Eigen::Vector2d centre = on_board[on_board.size() / 2];
   const double side = (*H * centre.homogeneous()).z() < 0.0 ? -1.0 : 1.0;  // the board is in front of the camera
   const Eigen::Matrix3d G = *H * (side * 2.0 / (H->col(0).norm() + H->col(1).norm()));
+  // The orthonormal pair nearest to the first two columns A: A (AᵀA)^−½, with √B = (B + √|B| I) / √(tr B + 2 √|B|).
+  const Eigen::Matrix<double, 3, 2> A = G.leftCols<2>();
+  const Eigen::Matrix2d B = A.transpose() * A;
+  const double root = std::sqrt(B.determinant());
+  const Eigen::Matrix2d half = (B + root * Eigen::Matrix2d::Identity()) / std::sqrt(B.trace() + 2.0 * root);
+  const Eigen::Matrix<double, 3, 2> axes = A * half.inverse();
   Eigen::Matrix3d R;
-  R << G.col(0), G.col(1), G.col(0).cross(G.col(1));
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  R = svd.matrixU() * svd.matrixV().transpose();
-  if (R.determinant() < 0.0 || !R.allFinite()) return std::nullopt;
+  R << axes, axes.col(0).cross(axes.col(1));
+  if (!(root > 0.0) || !R.allFinite()) return std::nullopt;
   return Rigid3{Eigen::Quaterniond(R).normalized(), G.col(2)};
 }
 

@@ -83,13 +83,15 @@ std::optional<Eigen::Vector2d> undistort(const Params<Brown>& p, const Brown::Do
                          -(d.a * error.y() - d.b * error.x()) / d.det());
     const double limit = 0.2 * (1.0 + m.norm());  // a full step near the fold would jump over it
     if (step.norm() > limit) step *= limit / step.norm();
+    constexpr double small = 1e-8;  // its square is below rounding: where the map is no fold, one step of it ends here
+    const bool is_last = step.norm() <= (d.det() > 0.1 ? small : 1e-15) * (1.0 + m.norm());
     // Never leave the sheet that contains the axis.
-    for (int halvings = 0; halvings < 30; ++halvings, step *= 0.5) {
+    for (int halvings = 0; !is_last && halvings < 30; ++halvings, step *= 0.5) {
       const Eigen::Vector2d next = m + step;
       if (next.squaredNorm() < domain.max_radius2 && distort(p, next.x(), next.y()).det() > 0.0) break;
     }
     m += step;
-    if (step.norm() <= 1e-15 * (1.0 + m.norm())) break;
+    if (is_last) break;
   }
   const Distorted d = distort(p, m.x(), m.y());
   const bool converged = (d.m - target).norm() <= 1e-13 * (1.0 + target_norm);

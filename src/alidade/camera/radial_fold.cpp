@@ -1,19 +1,39 @@
 #include "alidade/camera/radial_fold.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
-#include <vector>
 
 namespace alidade::detail {
 namespace {
 
+/// A few numbers without the heap: this runs for every batch of pixels.
+class Numbers {
+ public:
+  void push_back(double value) { values_[count_++] = value; }
+  void pop_back() { --count_; }
+  [[nodiscard]] std::size_t size() const { return count_; }
+  [[nodiscard]] bool empty() const { return count_ == 0; }
+  [[nodiscard]] double operator[](std::size_t i) const { return values_[i]; }
+  [[nodiscard]] double front() const { return values_[0]; }
+  [[nodiscard]] double back() const { return values_[count_ - 1]; }
+  [[nodiscard]] double* begin() { return values_.data(); }
+  [[nodiscard]] double* end() { return values_.data() + count_; }
+  [[nodiscard]] const double* begin() const { return values_.data(); }
+  [[nodiscard]] const double* end() const { return values_.data() + count_; }
+
+ private:
+  std::array<double, 8> values_{};
+  std::size_t count_ = 0;
+};
+
 /// Coefficients from the constant term upwards.
-using Polynomial = std::vector<double>;
+using Polynomial = Numbers;
 
 double value(const Polynomial& p, double t) {
   double sum = 0.0;
-  for (auto c = p.rbegin(); c != p.rend(); ++c) sum = sum * t + *c;
+  for (std::size_t i = p.size(); i-- > 0;) sum = sum * t + p[i];
   return sum;
 }
 
@@ -41,11 +61,11 @@ double bracketed_root(const Polynomial& p, double low, double high) {
 }
 
 /// All sign changes of p in (0, 1), ascending: between the roots of its derivative it is monotone.
-std::vector<double> roots_in_unit_interval(const Polynomial& p) {
+Numbers roots_in_unit_interval(const Polynomial& p) {
   if (p.size() < 2) return {};
-  std::vector<double> turns = roots_in_unit_interval(derivative(p));
+  Numbers turns = roots_in_unit_interval(derivative(p));
   turns.push_back(1.0);
-  std::vector<double> roots;
+  Numbers roots;
   double low = 0.0;
   for (const double high : turns) {
     const double at_low = value(p, low), at_high = value(p, high);
@@ -62,17 +82,18 @@ std::vector<double> roots_in_unit_interval(const Polynomial& p) {
 }  // namespace
 
 double first_root(std::span<const double> c) {
-  Polynomial p{1.0};
+  Polynomial p;
+  p.push_back(1.0);
   for (const double coefficient : c) {
     if (!(std::abs(coefficient) < 1e100)) return 0.0;  // beyond: overflow, and no lens
     p.push_back(coefficient);
   }
   while (p.back() == 0.0) p.pop_back();
-  const std::vector<double> near = roots_in_unit_interval(p);
+  const Numbers near = roots_in_unit_interval(p);
   if (!near.empty()) return near.front();
   // Beyond 1: the largest root in s = 1/t of the polynomial with its coefficients reversed.
   std::reverse(p.begin(), p.end());
-  const std::vector<double> far = roots_in_unit_interval(p);
+  const Numbers far = roots_in_unit_interval(p);
   return far.empty() || far.back() <= 0.0 ? std::numeric_limits<double>::infinity() : 1.0 / far.back();
 }
 

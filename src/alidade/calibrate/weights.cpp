@@ -9,23 +9,24 @@ namespace {
 
 constexpr double rayleigh_median = 1.1774100225154747;  // √(2 ln 2): median of |r| for unit normal coordinates
 
-Eigen::Matrix2d own_cov(const Corner& corner, bool use_covariances) {
-  return use_covariances ? corner.cov : Eigen::Matrix2d::Zero();
+const Eigen::Matrix2d no_cov = Eigen::Matrix2d::Zero();
+
+const Eigen::Matrix2d& own_cov(const Corner& corner, bool use_covariances) {
+  return use_covariances ? corner.cov : no_cov;
 }
 
 constexpr double least_variance = 1e-12;  // px²: noise-free corners still have a finite weight
 
-/// (own + excess² I)⁻¹.
-Eigen::Matrix2d inverse_plus(const Eigen::Matrix2d& own, double excess2) {
+/// (own + excess² I)⁻¹ r.
+Eigen::Vector2d weighted(const Eigen::Vector2d& r, const Eigen::Matrix2d& own, double excess2) {
   const double p = own(0, 0) + excess2 + least_variance, q = own(0, 1), s = own(1, 1) + excess2 + least_variance;
-  Eigen::Matrix2d adjugate;
-  adjugate << s, -q, -q, p;
-  return adjugate / (p * s - q * q);
+  const double inverse = 1.0 / (p * s - q * q);
+  return {inverse * (s * r.x() - q * r.y()), inverse * (p * r.y() - q * r.x())};
 }
 
 /// rᵀ Σ⁻¹ r with Σ = own + excess² I.
 double mahalanobis2(const Eigen::Vector2d& r, const Eigen::Matrix2d& own, double excess2) {
-  return r.dot(inverse_plus(own, excess2) * r);
+  return r.dot(weighted(r, own, excess2));
 }
 
 double median_norm(const std::vector<std::vector<Eigen::Vector2d>>& residuals) {
@@ -69,9 +70,9 @@ double matching_excess2(std::span<const BoardView> views, const std::vector<std:
     double chi2 = 0.0, slope = 0.0;
     for_each_corner(views, residuals, true, [&](std::size_t k, std::size_t i, const auto& r, const auto& own) {
       if (!used[k][i]) return;
-      const Eigen::Vector2d weighted = inverse_plus(own, excess2) * r;
-      chi2 += r.dot(weighted);
-      slope -= weighted.squaredNorm();
+      const Eigen::Vector2d w = weighted(r, own, excess2);
+      chi2 += r.dot(w);
+      slope -= w.squaredNorm();
     });
     const double step = (chi2 - dof) * chi2 / (dof * slope);
     const double next = std::max(0.0, excess2 - step);
@@ -101,22 +102,24 @@ NoiseEstimate estimate_noise(std::span<const BoardView> views,
   noise.excess_px = robust_sigma;
   for (const auto& view : residuals) noise.used.emplace_back(view.size(), true);
 
+  const double most2 = outlier_sigmas * outlier_sigmas, near2 = most2 * robust_sigma * robust_sigma;
   constexpr int max_rounds = 4;
   for (int round = 0; round < max_rounds; ++round) {
     // The first scale is robust; never let it fall below a tenth of that, or a good fit would disown its own corners.
     const double floor2 =
         round == 0 ? noise.excess_px * noise.excess_px
                    : std::max(noise.excess_px, 0.1 * robust_sigma) * std::max(noise.excess_px, 0.1 * robust_sigma);
-    std::size_t dropped = 0;
+    std::size_t dropped = 0, changed = 0;
     for_each_corner(
         views, residuals, use_covariances, [&](std::size_t k, std::size_t i, const auto& r, const auto& own) {
-          const bool fits =
-              r.allFinite() && (!reject || mahalanobis2(r, own, floor2) <= outlier_sigmas * outlier_sigmas ||
-                                r.norm() <= outlier_sigmas * robust_sigma);
+          const bool is_near = r.squaredNorm() <= near2;
+          const bool fits = is_near || (r.allFinite() && (!reject || mahalanobis2(r, own, floor2) <= most2));
+          if (noise.used[k][i] != fits) ++changed;
           noise.used[k][i] = fits;
           dropped += fits ? 0 : 1;
         });
     noise.num_dropped = dropped;
+    if (round > 0 && changed == 0) break;  // the same corners, the same excess
 
     const double before = noise.excess_px;
     noise.excess_px = std::sqrt(matching_excess2(views, residuals, use_covariances, noise.used, num_parameters));
@@ -129,7 +132,7 @@ void set_whiteners(const BoardView& view, const std::vector<Eigen::Vector2d>& re
                    const std::vector<bool>& used, bool use_covariances, double huber_sigmas, ViewArrays& arrays) {
   const double excess2 = noise.excess_px * noise.excess_px;
   for (std::size_t i = 0; i < view.corners.size(); ++i) {
-    const Eigen::Matrix2d own = own_cov(view.corners[i], use_covariances);
+    const Eigen::Matrix2d& own = own_cov(view.corners[i], use_covariances);
     double weight = used[i] ? 1.0 : 0.0;
     if (huber_sigmas > 0.0) {
       const double distance = residuals[i].allFinite() ? std::sqrt(mahalanobis2(residuals[i], own, excess2)) : 1e9;

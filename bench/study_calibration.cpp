@@ -63,8 +63,8 @@ Eigen::MatrixXd bound_of(const BoardScene& scene) {
   problem.prior_value = Eigen::VectorXd::Zero(10);
   problem.prior_information = Eigen::VectorXd::Zero(10);
   problem.printed_points = scene.points_in_board;
-  const BundleResult at_truth =
-      solve_bundle(problem, {scene.camera.lens, scene.cam_from_board, scene.points_in_board}, 5, false);
+  const BundleState truth{scene.camera.lens, scene.cam_from_board, scene.points_in_board};
+  const BundleResult at_truth = with_covariance(solve_bundle(problem, truth, {.max_iterations = 5}), false);
   return noise_px * noise_px * at_truth.cov;
 }
 

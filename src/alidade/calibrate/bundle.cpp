@@ -121,14 +121,23 @@ std::optional<Step> damped_step(const BundleProblem& problem, const BundleState&
   return Step{step_from(problem, state, *globals, poses), decrease};
 }
 
-/// Covariance of globals and poses from the undamped equations; status singular where they do not determine them.
-void finish(const NormalEquations& eq, bool want_pose_cov, BundleResult& result) {
+double degrees_of_freedom(const BundleProblem& problem) {
+  double rows = 0.0;
+  for (const ViewArrays& view : problem.views) rows += 2.0 * static_cast<double>(view.size()) - 6.0;
+  return std::max(1.0, rows - num_globals(problem));
+}
+
+}  // namespace
+
+BundleResult with_covariance(BundleResult result, bool want_pose_cov) {
+  if (result.status != BundleResult::Status::converged) return result;
+  const NormalEquations& eq = *result.equations;
   const Reduced reduced = reduce(eq, 0.0);
   if (!reduced.ok) {
     result.status = BundleResult::Status::singular;
-    return;
+    return result;
   }
-  if (eq.num_globals == 0) return;  // poses alone
+  if (eq.num_globals == 0) return result;  // poses alone
   const Eigen::VectorXd scale = unit_scale(reduced.S);
   Eigen::MatrixXd scaled = reduced.S.selfadjointView<Eigen::Lower>();
   scaled = scale.asDiagonal() * scaled * scale.asDiagonal();
@@ -138,72 +147,52 @@ void finish(const NormalEquations& eq, bool want_pose_cov, BundleResult& result)
   constexpr double singular = 1e-13;  // below this the smallest eigenvalue is rounding
   if (!(result.weakest_eigenvalue > singular)) {
     result.status = BundleResult::Status::singular;
-    return;
+    return result;
   }
   const Eigen::MatrixXd inverse =
       eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
   result.cov = scale.asDiagonal() * inverse * scale.asDiagonal();
-  if (!want_pose_cov) return;
+  if (!want_pose_cov) return result;
   result.pose_cov.reserve(eq.V.size());
   for (std::size_t k = 0; k < eq.V.size(); ++k) {
     const Eigen::Matrix<double, 6, Eigen::Dynamic> gain = reduced.V_llt[k].solve(eq.coupling(k).transpose());
     result.pose_cov.push_back(reduced.V_llt[k].solve(Pose6::Identity()) + gain * result.cov * gain.transpose());
   }
+  return result;
 }
 
-double degrees_of_freedom(const BundleProblem& problem) {
-  double rows = 0.0;
-  for (const ViewArrays& view : problem.views) rows += 2.0 * static_cast<double>(view.size()) - 6.0;
-  return std::max(1.0, rows - num_globals(problem));
-}
-
-}  // namespace
-
-BundleResult solve_bundle(const BundleProblem& problem, BundleState start, int max_iterations, bool want_pose_cov) {
+BundleResult solve_bundle(const BundleProblem& problem, BundleState start, const BundleConfig& config) {
   BundleResult result;
   result.state = std::move(start);
   result.status = BundleResult::Status::no_convergence;
   NormalEquations eq, trial;
   if (!linearize(problem, result.state, eq)) return result;
   const double dof = degrees_of_freedom(problem);
-  double lambda = 1e-5;
-  for (; result.iterations < max_iterations && lambda < 1e12; ++result.iterations) {
-    const auto step = damped_step(problem, result.state, eq, lambda);
-    // The step moves nothing by more than 10⁻⁴ of its own σ (or 10⁻⁸ px): we are there.
-    if (step && lambda <= 1e-3 && step->decrease <= 1e-8 * eq.cost / dof + 1e-16 * dof) {
+  const double tolerance2 = config.tolerance_sigmas * config.tolerance_sigmas;
+  double lambda = config.first_lambda;
+  for (; result.iterations < config.max_iterations && lambda < 1e12; ++result.iterations) {
+    auto step = damped_step(problem, result.state, eq, lambda);
+    // The step moves nothing by more than the tolerance (or 10⁻⁸ px): with it we are there.
+    if (step && lambda <= 1e-3 && step->decrease <= tolerance2 * eq.cost / dof + 1e-16 * dof) {
       result.status = BundleResult::Status::converged;
+      result.state = std::move(step->state);
       break;
     }
     if (!step || !linearize(problem, step->state, trial) || !(trial.cost <= eq.cost)) {
       lambda = std::max(10.0 * lambda, 1e-5);
       continue;
     }
-    result.state = step->state;
+    result.state = std::move(step->state);
     std::swap(eq, trial);
-    lambda = lambda <= 1e-9 ? 0.0 : lambda * 0.1;
+    lambda = lambda <= 1e-5 ? 0.0 : lambda * 0.1;
   }
   result.cost = eq.cost;
-  if (result.status == BundleResult::Status::converged) finish(eq, want_pose_cov, result);
+  result.equations = std::make_shared<const NormalEquations>(std::move(eq));
   return result;
 }
 
 std::vector<Eigen::Vector2d> residuals_px(const BundleState& state, std::size_t view_index, const ViewArrays& view) {
-  Camera camera;
-  camera.lens = state.lens;
-  std::vector<Eigen::Vector3d> points_in_cam;
-  points_in_cam.reserve(view.size());
-  for (const std::int32_t index : view.index) {
-    points_in_cam.push_back(state.cam_from_board[view_index] * state.board_points[static_cast<std::size_t>(index)]);
-  }
-  const auto pixels = project(camera, points_in_cam);
-  std::vector<Eigen::Vector2d> residuals;
-  residuals.reserve(view.size());
-  for (std::size_t i = 0; i < view.size(); ++i) {
-    const Eigen::Vector2d seen(view.u_px[i], view.v_px[i]);
-    residuals.push_back(pixels[i] ? Eigen::Vector2d(*pixels[i] - seen)
-                                  : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()));
-  }
-  return residuals;
+  return residuals_px(prepare(state.lens), state.cam_from_board[view_index], make_arrays(state.board_points), view);
 }
 
 std::optional<Rigid3> refine_pose(const Lens& lens, const std::vector<Eigen::Vector3d>& board_points,
@@ -212,8 +201,7 @@ std::optional<Rigid3> refine_pose(const Lens& lens, const std::vector<Eigen::Vec
   problem.views = {&view, 1};
   problem.prior_value = params(lens);
   problem.prior_information = Eigen::VectorXd::Zero(problem.prior_value.size());
-  constexpr int max_iterations = 30;
-  const BundleResult result = solve_bundle(problem, {lens, {cam_from_board}, board_points}, max_iterations, false);
+  const BundleResult result = solve_bundle(problem, {lens, {cam_from_board}, board_points}, {.max_iterations = 30});
   if (result.status == BundleResult::Status::no_convergence) return std::nullopt;
   return result.state.cam_from_board.front();
 }

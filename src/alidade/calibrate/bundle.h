@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -10,6 +11,8 @@
 #include "alidade/geometry/rigid3.h"
 
 namespace alidade {
+
+struct NormalEquations;
 
 /// What is estimated together: lens, poses, board points.
 struct BundleState {
@@ -30,6 +33,13 @@ struct BundleProblem {
       0.0;  ///< Prior σ of a free point against the printed one; keeps unseen points where they were.
 };
 
+/// How a solve starts and ends.
+struct BundleConfig {
+  int max_iterations = 60;
+  double tolerance_sigmas = 1e-3;  ///< The last step moves nothing by more of its own σ.
+  double first_lambda = 1e-5;      ///< Marquardt's damping at first; 0 where the start is known to be near.
+};
+
 /// Where the solve ended. `cov` is over the free lens parameters, then the shape (bow: 2 heights; free: x y z a point).
 struct BundleResult {
   enum class Status { converged, no_convergence, singular };
@@ -37,6 +47,8 @@ struct BundleResult {
   BundleState state;
   double cost = 0.0;  ///< Σ of squared whitened residuals, priors included.
   int iterations = 0;
+  std::shared_ptr<const NormalEquations> equations;  ///< Where the last step began.
+  // From here on: by with_covariance().
   Eigen::MatrixXd cov;                                ///< Inverse of the reduced normal matrix.
   std::vector<Eigen::Matrix<double, 6, 6>> pose_cov;  ///< One a view, if asked for.
   /// Eigenvector of the smallest eigenvalue of the reduced matrix scaled to unit diagonal: singular → what is free.
@@ -47,8 +59,11 @@ struct BundleResult {
 /// Maximum-likelihood bundle adjustment by Levenberg–Marquardt. The poses are eliminated view by view (6 × 6
 /// Cholesky), so time and memory are linear in the views. Triggs et al., "Bundle adjustment — a modern synthesis",
 /// 2000, §6; gauge of the free board: minimal constraints, the rigid motion and scale that fit the printed board best.
-[[nodiscard]] BundleResult solve_bundle(const BundleProblem& problem, BundleState start, int max_iterations,
-                                        bool want_pose_cov);
+[[nodiscard]] BundleResult solve_bundle(const BundleProblem& problem, BundleState start, const BundleConfig& config);
+
+/// The same with its covariances, from the undamped equations; status singular where they do not determine all.
+/// Anything but a converged result is returned as it is.
+[[nodiscard]] BundleResult with_covariance(BundleResult result, bool want_pose_cov);
 
 /// Residual (prediction − seen) [px] of every corner of a view, not whitened; NaN where it cannot be projected.
 [[nodiscard]] std::vector<Eigen::Vector2d> residuals_px(const BundleState& state, std::size_t view_index,

@@ -58,26 +58,32 @@ void drop_view(std::size_t at, const std::string& reason, CalibrateReport& repor
   if (at < state.cam_from_board.size()) state.cam_from_board.erase(state.cam_from_board.begin() + offset);
 }
 
-/// A few views, evenly chosen: enough to find the lens that the whole set is then refined from.
-std::vector<BoardView> sample(const std::vector<BoardView>& views) {
-  constexpr std::size_t enough = 40;
+/// The lens from a few views, evenly chosen: enough to refine the whole set from. Poses of the others stay open.
+std::optional<InitialLens> first_lens(const Work& work, const std::vector<Eigen::Vector3d>& board_points,
+                                      ImageSize size, const Lens& held) {
+  constexpr std::size_t enough = 24;
+  const std::size_t count = std::min(enough, work.views.size());
   std::vector<BoardView> chosen;
-  const std::size_t count = std::min(enough, views.size());
-  for (std::size_t i = 0; i < count; ++i) chosen.push_back(views[i * views.size() / count]);
-  return chosen;
+  for (std::size_t i = 0; i < count; ++i) chosen.push_back(work.views[i * work.views.size() / count]);
+  auto found = initial_lens(chosen, board_points, size, held, work.problem);
+  if (!found) return std::nullopt;
+  std::vector<std::optional<Rigid3>> poses(work.views.size());
+  for (std::size_t i = 0; i < count; ++i) poses[i * work.views.size() / count] = found->cam_from_board[i];
+  return InitialLens{found->lens, std::move(poses)};
 }
 
-/// Poses of all views by the lens; a view without one is dropped and named.
-void find_poses(CalibrateReport& report, Work& work, BundleState& state) {
+/// Poses of all views by the lens, those that are not `known`; a view without one is dropped and named.
+void find_poses(const std::vector<std::optional<Rigid3>>& known, CalibrateReport& report, Work& work,
+                BundleState& state) {
   Camera camera;
   camera.lens = state.lens;
-  for (std::size_t k = 0; k < work.views.size();) {
-    const auto pose = pose_from_plane(camera, work.views[k], state.board_points);
+  for (const std::optional<Rigid3>& start : known) {
+    const std::size_t at = state.cam_from_board.size();
+    const auto pose = start ? start : pose_from_plane(camera, work.views[at], state.board_points);
     if (pose) {
       state.cam_from_board.push_back(*pose);
-      ++k;
     } else {
-      drop_view(k, "its corners do not form a board seen from the front", report, work, state);
+      drop_view(at, "its corners do not form a board seen from the front", report, work, state);
     }
   }
 }
@@ -115,9 +121,13 @@ bool drop_misfits(const NoiseEstimate& noise, CalibrateReport& report, Work& wor
   return dropped;
 }
 
-BundleResult solve(Work& work, BundleState start, const CalibrateConfig& config, bool want_pose_cov) {
+/// How near the optimum: a tenth of a σ does where the corners' weights are still to change.
+enum class Nearness { rough, full };
+
+BundleResult solve(Work& work, BundleState start, const CalibrateConfig& config, Nearness nearness) {
   work.problem.views = work.arrays;
-  return solve_bundle(work.problem, std::move(start), config.max_iterations, want_pose_cov);
+  const double tolerance = nearness == Nearness::rough ? 0.1 : BundleConfig{}.tolerance_sigmas;
+  return solve_bundle(work.problem, std::move(start), {config.max_iterations, tolerance, 0.0});
 }
 
 /// Alternates solve and noise estimate until no corner changes sides. The first solve weighs all corners alike.
@@ -127,7 +137,7 @@ BundleResult solve_robustly(const CalibrateConfig& config, CalibrateReport& repo
       work.use_covariances || work.problem.prior_information.any() || work.problem.shape == BoardShape::free;
   constexpr int max_rounds = 8;
   constexpr double huber_sigmas = 2.5;
-  BundleResult result = solve(work, std::move(state), config, true);
+  BundleResult result = solve(work, std::move(state), config, weights_matter ? Nearness::rough : Nearness::full);
   report.iterations = result.iterations;
   std::vector<std::vector<bool>> used_before;
   double excess_before = -1.0;
@@ -145,14 +155,14 @@ BundleResult solve_robustly(const CalibrateConfig& config, CalibrateReport& repo
       used_before.clear();
       if (work.views.size() < 2) break;
       for (std::size_t k = 0; k < work.views.size(); ++k) work.arrays[k] = make_arrays(work.views[k]);
-      result = solve(work, std::move(result.state), config, true);
+      result = solve(work, std::move(result.state), config, Nearness::full);
       report.iterations += result.iterations;
       continue;
     }
     used_before = soft ? std::vector<std::vector<bool>>{} : noise.used;
     excess_before = noise.excess_px;
     whiten(work, residuals, noise, soft ? huber_sigmas : 0.0);
-    result = solve(work, std::move(result.state), config, true);
+    result = solve(work, std::move(result.state), config, soft ? Nearness::rough : Nearness::full);
     report.iterations += result.iterations;
   }
   return result;
@@ -269,11 +279,11 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
   work.use_covariances = have_covariances(work.views);
 
   BundleState state{held, {}, report.board_points};
-  const auto lens = initial_lens(sample(work.views), report.board_points, size, held, work.problem);
-  if (lens) state.lens = *lens;
+  const auto start = first_lens(work, report.board_points, size, held);
+  if (start) state.lens = start->lens;
   report.camera.lens = state.lens;
-  if (lens) find_poses(report, work, state);
-  if (!lens || work.views.size() < least) {
+  if (start) find_poses(start->cam_from_board, report, work, state);
+  if (!start || work.views.size() < least) {
     too_few();
     return report;
   }
@@ -285,7 +295,7 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
   }
   for (const BoardView& view : work.views) work.arrays.push_back(make_arrays(view));
   NoiseEstimate noise;
-  const BundleResult result = solve_robustly(config, report, work, std::move(state), noise);
+  const BundleResult result = with_covariance(solve_robustly(config, report, work, std::move(state), noise), true);
   const double variance_scale = fill_estimate(work, result, noise, size, report);
   fill_views(work, result, noise, variance_scale, report);
   report.camera.rms_px = report.rms_px;

@@ -1,6 +1,7 @@
 #include "alidade/calibrate/columns.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "alidade/calibrate/vector_clones.h"
 
@@ -115,6 +116,35 @@ ALIDADE_VECTOR_CLONES int brown_columns(const CornerArrays& in, const PoseNumber
   return bad > 0.0 ? 1 : 0;
 }
 
+/// Brown's residuals alone, u and v by turns; NaN where Brown::project has no answer.
+ALIDADE_VECTOR_CLONES void brown_residuals(const CornerArrays& in, const PoseNumbers& pose, const double* p,
+                                           double max_radius2, double* __restrict residuals) {
+  const double fx = p[0], fy = p[1], cx = p[2], cy = p[3], skew = p[4];
+  const double k1 = p[5], k2 = p[6], p1 = p[7], p2 = p[8], k3 = p[9];
+  const PoseNumbers at = pose;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < in.n; ++i) {
+    const double X = in.x[i], Y = in.y[i], Z = in.z[i];
+    const double zc = at.r[6] * X + at.r[7] * Y + at.r[8] * Z + at.t[2];
+    const double iz = 1.0 / zc;
+    const double x = (at.r[0] * X + at.r[1] * Y + at.r[2] * Z + at.t[0]) * iz;
+    const double y = (at.r[3] * X + at.r[4] * Y + at.r[5] * Z + at.t[1]) * iz;
+    const double xx = x * x, yy = y * y, xy = x * y, r2 = xx + yy;
+    const double L = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+    const double D = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2));
+    const double xd = L * x + 2.0 * p1 * xy + p2 * (r2 + 2.0 * xx);
+    const double yd = L * y + p1 * (r2 + 2.0 * yy) + 2.0 * p2 * xy;
+    const double j00 = L + D * xx + 2.0 * p1 * y + 6.0 * p2 * x;
+    const double j01 = D * xy + 2.0 * p1 * x + 2.0 * p2 * y;
+    const double j11 = L + D * yy + 6.0 * p1 * y + 2.0 * p2 * x;
+    const double bad = (zc > 0.0 ? 0.0 : 1.0) + (r2 < max_radius2 ? 0.0 : 1.0) + (j00 * j11 > j01 * j01 ? 0.0 : 1.0);
+    const double off = bad > 0.0 ? nan : 0.0;
+    residuals[2 * i] = fx * xd + skew * yd + cx - in.u[i] + off;
+    residuals[2 * i + 1] = fy * yd + cy - in.v[i] + off;
+  }
+}
+
 /// Any other model, corner by corner.
 template <class Model>
 int model_columns(const Params<Model>& params, const CornerArrays& in, const Rigid3& cam_from_board, Columns& J) {
@@ -193,6 +223,31 @@ PreparedLens prepare(const Lens& lens) {
     prepared.max_radius2 = radius * radius;
   }
   return prepared;
+}
+
+std::vector<Eigen::Vector2d> residuals_px(const PreparedLens& lens, const Rigid3& cam_from_board,
+                                          const PointArrays& points, const ViewArrays& view) {
+  std::vector<Eigen::Vector2d> residuals(view.size());
+  if (residuals.empty()) return residuals;
+  const Gathered& at = gather(points, view);
+  if (const auto* brown = std::get_if<Calibrated<Brown>>(&lens.lens)) {
+    const CornerArrays in{at.x.data(), at.y.data(), at.z.data(), view.u_px.data(), view.v_px.data(),
+                          nullptr,     nullptr,     nullptr,     view.size()};
+    brown_residuals(in, numbers(cam_from_board), brown->params.data(), lens.max_radius2, residuals.front().data());
+    return residuals;
+  }
+  Camera camera;
+  camera.lens = lens.lens;
+  std::vector<Eigen::Vector3d> points_in_cam;
+  for (std::size_t i = 0; i < view.size(); ++i) {
+    points_in_cam.push_back(cam_from_board * Eigen::Vector3d(at.x[i], at.y[i], at.z[i]));
+  }
+  const auto pixels = project(camera, points_in_cam);
+  for (std::size_t i = 0; i < view.size(); ++i) {
+    const Eigen::Vector2d nowhere = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+    residuals[i] = pixels[i] ? Eigen::Vector2d(*pixels[i] - Eigen::Vector2d(view.u_px[i], view.v_px[i])) : nowhere;
+  }
+  return residuals;
 }
 
 bool fill_columns(const PreparedLens& lens, const Rigid3& cam_from_board, const PointArrays& points,

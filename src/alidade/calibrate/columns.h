@@ -48,6 +48,10 @@ struct PreparedLens {
 [[nodiscard]] bool fill_columns(const PreparedLens& lens, const Rigid3& cam_from_board, const PointArrays& points,
                                 const ViewArrays& view, Columns& columns);
 
+/// Residual (prediction − seen) [px] of every corner, not whitened; NaN where it cannot be projected.
+[[nodiscard]] std::vector<Eigen::Vector2d> residuals_px(const PreparedLens& lens, const Rigid3& cam_from_board,
+                                                        const PointArrays& points, const ViewArrays& view);
+
 /// Columns of the bow: derivative by its two parameters, heights `along_x[i]`, `along_y[i]` of board point i.
 void fill_bow_columns(const ViewArrays& view, const std::vector<double>& along_x, const std::vector<double>& along_y,
                       Columns& columns);

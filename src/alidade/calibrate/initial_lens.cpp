@@ -57,7 +57,7 @@ double misfit(const BundleProblem& problem, const BundleState& state) {
 }
 
 struct Trial {
-  Lens lens;
+  InitialLens found;
   double misfit_px = 0.0;
 };
 
@@ -67,8 +67,10 @@ std::optional<Trial> refine(const Lens& lens, std::span<const BoardView> views,
   camera.lens = lens;
   BundleState start{lens, {}, board_points};
   std::vector<ViewArrays> arrays;
+  std::vector<std::optional<Rigid3>> poses;
   for (const BoardView& view : views) {
     const auto pose = pose_from_plane(camera, view, board_points);
+    poses.push_back(pose);
     if (!pose) continue;
     start.cam_from_board.push_back(*pose);
     arrays.push_back(make_arrays(view));
@@ -78,19 +80,25 @@ std::optional<Trial> refine(const Lens& lens, std::span<const BoardView> views,
   problem.shape = BoardShape::flat;
   problem.views = arrays;
   problem.prior_information.setZero();
-  constexpr int max_iterations = 60;  // from a poor start the way is longer than the usual 8
-  const BundleResult result = solve_bundle(problem, std::move(start), max_iterations, false);
+  // A tenth of a σ is near enough for a start. From a poor one the way is longer than the usual 8 iterations.
+  const BundleResult result = solve_bundle(problem, std::move(start), {.max_iterations = 60, .tolerance_sigmas = 0.1});
   const double f_min = params(result.state.lens).head<2>().minCoeff();
   if (!(f_min > 0.0)) return std::nullopt;
-  return Trial{result.state.lens, misfit(problem, result.state)};
+  std::size_t next = 0;
+  for (auto& pose : poses) {
+    if (pose) pose = result.state.cam_from_board[next++];
+  }
+  return Trial{{result.state.lens, std::move(poses)}, misfit(problem, result.state)};
 }
 
 }  // namespace
 
-std::optional<Lens> initial_lens(std::span<const BoardView> views, const std::vector<Eigen::Vector3d>& board_points,
-                                 ImageSize size, const Lens& held, const BundleProblem& settings) {
+std::optional<InitialLens> initial_lens(std::span<const BoardView> views,
+                                        const std::vector<Eigen::Vector3d>& board_points, ImageSize size,
+                                        const Lens& held, const BundleProblem& settings) {
   const std::vector<Eigen::Matrix3d> H = homographies(views, board_points);
   std::optional<Trial> best;
+  constexpr double good_px = 1.0;  // corners fit: no other start can be meant
   for (const Eigen::Vector4d& k : candidates(H, size)) {
     Eigen::VectorXd values = params(held);
     for (const int at : settings.free_lens) {
@@ -101,11 +109,11 @@ std::optional<Lens> initial_lens(std::span<const BoardView> views, const std::ve
     }
     auto trial = refine(with_params(held, values), views, board_points, settings);
     if (trial && (!best || trial->misfit_px < best->misfit_px)) best = std::move(trial);
-    constexpr double good_px = 1.0;  // corners fit: no other start can be meant
     if (best && best->misfit_px < good_px) break;
   }
   if (!best) return std::nullopt;
-  return best->lens;
+  if (!(best->misfit_px < good_px)) best->found.cam_from_board.assign(views.size(), std::nullopt);
+  return std::move(best->found);
 }
 
 double spread_of_normals_rad(std::span<const Rigid3> cam_from_board) {

@@ -133,7 +133,9 @@ Adjustment adjust(const FrameBuffer& buffer, const AdjustConfig& config, const P
   const std::size_t unknowns = static_cast<std::size_t>(CommonLayout(config.nuisances).size) + 2 * bundle.points.size();
   if (2 * bundle.observations.size() < unknowns + 4) return adjustment;
 
-  BundleConfig solve{config.nuisances, config.with_depth};
+  BundleConfig solve;
+  solve.nuisances = config.nuisances;
+  solve.with_depth = config.with_depth;
   solve.sigma_turn_rad = config.sigma_turn_rad;
   solve.sigma_rate_rad_per_s = config.sigma_rate_rad_per_s;
   solve.sigma_range_m = config.sigma_range_m > 0.0 ? config.sigma_range_m : 1e-3;

@@ -20,6 +20,7 @@ StarFilter::StarFilter(const ObserveNuisances& nuisances, bool with_depth, std::
     : layout_(nuisances), with_depth_(with_depth), points_(num_points), seen_(num_points) {
   const int n = layout_.size;
   covariance_.setIdentity(n, n);
+  precision_.setIdentity(n, n);
   information_.setZero(n, n);
   gradient_.setZero(n);
   for (Point& point : points_) point.slope.setZero(3, n);
@@ -32,6 +33,7 @@ void StarFilter::start(const BundleSolution& solution, const std::vector<int>& b
   camera_ = solution.camera;
   covariance_.setZero(n, n);
   covariance_.topLeftCorner(solved, solved) = solution.covariance();
+  precision_ = inverse(covariance_);
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const int from = bundle_point_of[i];
     Point& point = points_[i];
@@ -63,7 +65,8 @@ void StarFilter::predict(const CommonVector& variance, double turn_sigma_rad) {
     camera_.turn_rad.setZero();
   }
   covariance_.diagonal() += variance;
-  const CommonMatrix gain = kept * inverse(covariance_);
+  precision_ = inverse(covariance_);
+  const CommonMatrix gain = kept * precision_;
   const CommonMatrix lost = before - gain * covariance_ * gain.transpose();
   for (Point& point : points_) {
     if (!point.known) continue;
@@ -76,6 +79,7 @@ void StarFilter::observe(const RotationFrame& frame, std::span<const Eigen::Vect
   frame_ = frame;
   px_ = px;
   num_seen_ = 0;
+  is_summed_ = false;
   const RotationView view(camera_, frame);
   RotationPrediction prediction;
   for (std::size_t i = 0; i < points_.size() && i < px.size(); ++i) {
@@ -107,6 +111,8 @@ int StarFilter::dof() const {
 }
 
 void StarFilter::accumulate() {
+  if (is_summed_) return;
+  is_summed_ = true;
   information_.setZero();
   gradient_.setZero();
   squares_ = 0.0;
@@ -122,7 +128,7 @@ void StarFilter::accumulate() {
 
 double StarFilter::nis() {
   accumulate();
-  const CommonMatrix all = inverse(covariance_) + information_;
+  const CommonMatrix all = precision_ + information_;
   return squares_ - gradient_.dot(all.llt().solve(gradient_));
 }
 
@@ -132,6 +138,15 @@ double StarFilter::nis_if_walked(const CommonVector& variance) {
   walked.diagonal() += variance;
   const CommonMatrix all = inverse(walked) + information_;
   return squares_ - gradient_.dot(all.llt().solve(gradient_));
+}
+
+void StarFilter::add_score(Eigen::Vector4d& score, Eigen::Matrix4d& information) {
+  accumulate();
+  // By Woodbury's identity Gᵀ S⁻¹ = (1 + Λ P)⁻¹ Gᵀ R⁻¹, Λ = Gᵀ R⁻¹ G.
+  const CommonMatrix both = CommonMatrix::Identity(layout_.size, layout_.size) + information_ * covariance_;
+  const Eigen::PartialPivLU<CommonMatrix> solver(both);
+  score += solver.solve(gradient_).head<4>();
+  information += solver.solve(information_).topLeftCorner<4, 4>();
 }
 
 double StarFilter::own_nis(std::size_t i) const {
@@ -152,7 +167,8 @@ void StarFilter::move_common(const CommonVector& step) {
 
 void StarFilter::update() {
   accumulate();
-  covariance_ = inverse(CommonMatrix(inverse(covariance_) + information_));
+  precision_ += information_;
+  covariance_ = inverse(precision_);
   const CommonVector step = covariance_ * gradient_;
   move_common(step);
   for (std::size_t i = 0; i < num_seen_; ++i) {
@@ -230,6 +246,7 @@ bool StarFilter::update_range(const RotationFrame& frame, std::size_t i, double 
   const CommonVector gain_common = covariance_ * by_common / variance;
   const CommonVector step = gain_common * innovation;
   covariance_ = (covariance_ - variance * gain_common * gain_common.transpose()).eval();
+  precision_ = inverse(covariance_);
   move_common(step);
   const Eigen::Vector3d gain = point.cov * by_point.transpose() / given;
   const Eigen::Vector3d move = gain * (innovation - by_common.dot(step));

@@ -28,7 +28,10 @@ class StarFilter {
   /// Innovations are of so many points; point `i` (a place in this list) can be left out.
   [[nodiscard]] std::size_t num_seen() const { return num_seen_; }
   [[nodiscard]] int seen_point(std::size_t i) const { return seen_[i].point; }
-  void leave_out(std::size_t i, bool out) { seen_[i].left_out = out; }
+  void leave_out(std::size_t i, bool out) {
+    seen_[i].left_out = out;
+    is_summed_ = false;
+  }
   [[nodiscard]] bool is_left_out(std::size_t i) const { return seen_[i].left_out; }
   [[nodiscard]] int dof() const;
   /// Normalised innovation squared of the points not left out; with `variance` added to the common parameters before.
@@ -36,6 +39,8 @@ class StarFilter {
   [[nodiscard]] double nis_if_walked(const CommonVector& variance);
   /// The same of one point alone, 2 degrees of freedom.
   [[nodiscard]] double own_nis(std::size_t i) const;
+  /// Adds the score of fx, fy, cx, cy, Gᵀ S⁻¹ ν, and its covariance Gᵀ S⁻¹ G: zero on the mean while nothing changes.
+  void add_score(Eigen::Vector4d& score, Eigen::Matrix4d& information);
   /// Takes the innovations in, but those left out; new points join. After `observe`, once.
   void update();
   /// Takes a range of a known point in. False: it does not fit (beyond 4 σ), or the point has no depth.
@@ -72,7 +77,7 @@ class StarFilter {
   bool with_depth_;
   double variance_px_ = 1e-6;
   RotatingCamera camera_;
-  CommonMatrix covariance_;
+  CommonMatrix covariance_, precision_;  ///< Of the common parameters, and its inverse.
   std::vector<Point> points_;
   std::vector<Seen> seen_;
   std::size_t num_seen_ = 0;
@@ -81,6 +86,7 @@ class StarFilter {
   CommonMatrix information_;  ///< Σ Gᵀ R⁻¹ G of those not left out.
   CommonVector gradient_;     ///< Σ Gᵀ R⁻¹ ν.
   double squares_ = 0.0;      ///< Σ νᵀ R⁻¹ ν.
+  bool is_summed_ = false;    ///< The three sums are of what is not left out now.
 };
 
 }  // namespace alidade

@@ -1,0 +1,276 @@
+#include "alidade/observe/hybrid.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace alidade {
+namespace {
+
+constexpr double gate_z = 3.09;          // one frame in a thousand is called bad by chance
+constexpr double zoom_gain = 33.4;       // χ²₄ at 10⁻⁶: what a change of K explains that chance does not
+constexpr int slip_patience = 15;        // frames until a point that slipped is met anew
+constexpr double restart_after_s = 1.0;  // without a frame that fits
+constexpr double fine_enough = 1e-3;     // σ_f / f: the filter's linearisation is exact to rounding
+constexpr double adjustments_until_s = 4.0;
+constexpr double first_zoom_frames = 1e2;  // worth of change in the frame that shows it
+constexpr int drift_window = 15;           // frames
+
+}  // namespace
+
+double chi2_quantile(int dof, double z) {
+  const double n = std::max(dof, 1), a = 2.0 / (9.0 * n);
+  return n * std::pow(1.0 - a + z * std::sqrt(a), 3.0);
+}
+
+HybridObserver::HybridObserver(const HybridConfig& config)
+    : config_(config),
+      filter_(config.nuisances, config.with_depth, config.num_points),
+      buffer_(config.num_points, config.buffer_frames),
+      px_(config.num_points, Eigen::Vector2d::Constant(not_seen)),
+      frames_out_(config.num_points, 0) {}
+
+void HybridObserver::normalise(const RotationFrame& frame) {
+  for (std::size_t i = 0; i < px_.size(); ++i) {
+    px_[i] = i < frame.px.size() ? config_.scale.normalised(frame.px[i]) : Eigen::Vector2d::Constant(not_seen);
+  }
+}
+
+IntrinsicsEstimate HybridObserver::step(const RotationFrame& frame) {
+  IntrinsicsEstimate estimate;
+  normalise(frame);
+  if (frame.starts_segment && buffer_.size() > 0) {
+    buffer_.renew_all();
+    filter_.forget_points();
+    estimate.event = ObserveEvent::new_segment;
+  }
+  if (is_running_) filter_frame(frame, estimate);
+  if (!is_running_) bootstrap(frame, estimate);
+  if (is_running_) report(estimate);
+  return estimate;
+}
+
+void HybridObserver::bootstrap(const RotationFrame& frame, IntrinsicsEstimate& estimate) {
+  if (buffer_.size() == 0) next_adjustment_s_ = frame.t_s + config_.bootstrap_s;
+  buffer_.add(frame, px_);
+  // A frame at 1 s is due, whatever the rounding of its time.
+  if (frame.t_s < next_adjustment_s_ - 1e-6) return;
+  next_adjustment_s_ = frame.t_s + 0.5 * config_.bootstrap_s;
+  if (!adjust_buffer()) return;
+  is_running_ = true;
+  last_fit_s_ = frame.t_s;
+  constant_since_s_ = buffer_.frames().front().t_s;
+  adjust_until_s_ = constant_since_s_ + adjustments_until_s;
+  estimate.event = ObserveEvent::start;
+}
+
+bool HybridObserver::adjust_buffer() {
+  AdjustConfig config;
+  config.nuisances = config_.nuisances;
+  config.with_depth = config_.with_depth;
+  config.sigma_px = config_.sigma_px / config_.scale.scale;
+  config.sigma_range_m = config_.sigma_range_m;
+  config.range_point = config_.range_point;
+  config.start = is_running_ ? filter_.camera() : config_.start;
+  config.prior = config_.prior;
+  if (!config_.start_is_given && !is_running_) config.other_starts = {0.7, 1.3, 2.5, 5.0, 10.0};
+  Adjustment adjustment = adjust(buffer_, config);
+  if (!adjustment.has_value && !is_running_ && config_.start_is_given) {
+    config.other_starts = {0.7, 1.3, 2.5, 5.0, 10.0};  // the given start may be far off
+    adjustment = adjust(buffer_, config);
+  }
+  if (!adjustment.has_value) return false;
+  sigma_px_ = adjustment.sigma_px;
+  filter_.start(adjustment.solution, adjustment.bundle_point_of, sigma_px_);
+  sum_nis_ = sum_dof_ = std::max(adjustment.solution.dof, 1);
+  drift_frames_ = 0;
+  return true;
+}
+
+CommonVector HybridObserver::zoom_variance(double frames) const {
+  CommonVector variance = CommonVector::Zero(filter_.layout().size);
+  const double sigma = config_.zoom_px / config_.scale.scale;
+  variance.head<4>().setConstant(frames * sigma * sigma);
+  return variance;
+}
+
+void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate& estimate) {
+  if (is_zooming_) filter_.predict(zoom_variance(1.0), 0.0);
+  filter_.observe(frame, px_);
+  const Judgement judgement = judge();
+  estimate.nis = judgement.nis;
+  estimate.nis_dof = judgement.dof;
+  if (estimate.event == ObserveEvent::none) estimate.event = judgement.event;
+  estimate.point = judgement.point;
+  if (!judgement.accept) {
+    ++bad_frames_;
+    if (frame.t_s - last_fit_s_ > restart_after_s) restart(estimate);
+    return;
+  }
+  if (judgement.event == ObserveEvent::zoom) begin_zoom(frame);
+  if (!is_zooming_ && has_drifted()) {
+    estimate.event = ObserveEvent::zoom;
+    begin_zoom(frame);
+  }
+  take_in(frame, judgement);
+  if (is_zooming_ && has_come_to_rest()) {
+    is_zooming_ = false;
+    constant_since_s_ = frame.t_s;
+    estimate.event = ObserveEvent::zoom_end;
+  }
+}
+
+void HybridObserver::begin_zoom(const RotationFrame& frame) {
+  if (!is_zooming_) buffer_.clear();
+  is_zooming_ = true;
+  past_count_ = 0;
+  drift_frames_ = 0;
+  adjust_until_s_ = 0.0;  // the frames before are of another camera, those after know the points already
+  // The step is taken at once: the points stand still, one frame tells.
+  filter_.predict(zoom_variance(first_zoom_frames), 0.0);
+  filter_.observe(frame, px_);
+}
+
+/// The intrinsics' scores of some frames together: a slow change that no single frame shows.
+bool HybridObserver::has_drifted() {
+  if (drift_frames_ == 0) {
+    drift_score_.setZero();
+    drift_information_.setZero();
+  }
+  filter_.add_score(drift_score_, drift_information_);
+  if (++drift_frames_ < drift_window) return false;
+  drift_frames_ = 0;
+  return drift_score_.dot(drift_information_.ldlt().solve(drift_score_)) > zoom_gain;
+}
+
+/// The last frames' estimates differ by no more than their noise.
+bool HybridObserver::has_come_to_rest() {
+  const Eigen::Vector4d now = filter_.camera().k;
+  const Eigen::Vector4d before = past_k_[static_cast<std::size_t>(past_count_ % rest_frames)];
+  past_k_[static_cast<std::size_t>(past_count_ % rest_frames)] = now;
+  if (past_count_++ < rest_frames) return false;
+  const Eigen::Vector4d sigma = filter_.covariance().diagonal().head<4>().cwiseSqrt() * std::sqrt(2.0);
+  return ((now - before).cwiseAbs().array() < 3.0 * sigma.array()).all();
+}
+
+void HybridObserver::take_in(const RotationFrame& frame, const Judgement& judgement) {
+  bad_frames_ = 0;
+  last_fit_s_ = frame.t_s;
+  if (!is_zooming_) {
+    sum_nis_ += judgement.nis;
+    sum_dof_ += judgement.dof;
+  }
+  note_slips();
+  filter_.update();
+  if (frame.range_m > 0.0 && config_.with_depth) {
+    filter_.update_range(frame, config_.range_point, frame.range_m, config_.sigma_range_m);
+  }
+  if (is_zooming_ || frame.t_s > adjust_until_s_) return;
+  buffer_.add(frame, px_);
+  const CommonMatrix& P = filter_.covariance();
+  const Eigen::Vector4d& k = filter_.camera().k;
+  const bool is_coarse = std::max(std::sqrt(P(0, 0)) / k[0], std::sqrt(P(1, 1)) / k[1]) > fine_enough;
+  if (!is_coarse || frame.t_s < next_adjustment_s_ - 1e-6) return;
+  next_adjustment_s_ = frame.t_s + 0.5 * config_.bootstrap_s;
+  adjust_buffer();
+}
+
+void HybridObserver::note_slips() {
+  for (std::size_t i = 0; i < filter_.num_seen(); ++i) {
+    const auto point = static_cast<std::size_t>(filter_.seen_point(i));
+    if (!filter_.is_left_out(i)) {
+      frames_out_[point] = 0;
+      continue;
+    }
+    px_[point].setConstant(not_seen);
+    if (++frames_out_[point] < slip_patience) continue;
+    filter_.forget_point(point);
+    buffer_.renew_point(point);
+    frames_out_[point] = 0;
+  }
+}
+
+void HybridObserver::restart(IntrinsicsEstimate& estimate) {
+  is_running_ = is_zooming_ = false;
+  buffer_.clear();
+  bad_frames_ = 0;
+  estimate.event = ObserveEvent::restart;
+}
+
+double HybridObserver::noise_ratio() const {
+  return config_.sigma_px > 0.0 || !(sum_dof_ > 0.0) ? 1.0 : std::sqrt(sum_nis_ / sum_dof_);
+}
+
+void HybridObserver::report(IntrinsicsEstimate& estimate) const {
+  const double scale = config_.scale.scale;
+  const Eigen::Vector4d& k = filter_.camera().k;
+  estimate.has_value = true;
+  estimate.fx = scale * k[0];
+  estimate.fy = scale * k[1];
+  estimate.cx = scale * k[2] + config_.scale.centre.x();
+  estimate.cy = scale * k[3] + config_.scale.centre.y();
+  estimate.k1 = filter_.camera().k1;
+  estimate.sigma = scale * noise_ratio() * filter_.covariance().diagonal().head<4>().cwiseSqrt();
+}
+
+HybridObserver::Judgement HybridObserver::judge() {
+  Judgement judgement;
+  judgement.dof = filter_.dof();
+  judgement.nis = filter_.nis();
+  if (judgement.dof == 0) return judgement;
+  if (judgement.nis <= chi2_quantile(judgement.dof, gate_z)) return judgement;
+  const double whole = judgement.nis;
+  const int whole_dof = judgement.dof;
+  if (leave_out_until(gate_z, judgement)) return judgement;
+  // Does a change of the intrinsics explain it, and more than chance would?
+  const double walked = filter_.nis_if_walked(zoom_variance(1e4));
+  const int left = std::max(whole_dof - 4, 0);
+  const bool explains = left > 0 ? walked <= chi2_quantile(left, gate_z) : bad_frames_ > 0;
+  const bool is_sure = left > 0 && whole - walked > zoom_gain;
+  if (explains && (is_sure || bad_frames_ > 0)) {
+    judgement.event = ObserveEvent::zoom;
+  } else {
+    judgement.event = ObserveEvent::burst;
+    judgement.accept = false;
+  }
+  return judgement;
+}
+
+/// Leaves out the worst points one by one until the rest fits: a slip. At most a third of them (one of three or four).
+/// False, with none left out: that is not it.
+bool HybridObserver::leave_out_until(double z, Judgement& judgement) {
+  const std::size_t seen = filter_.num_seen();
+  const std::size_t most = seen < 3 ? 0 : std::max<std::size_t>(seen / 3, 1);
+  for (std::size_t out = 0; out < most; ++out) {
+    std::size_t worst = seen;
+    double best = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < seen; ++i) {
+      if (filter_.is_left_out(i)) continue;
+      double without = -filter_.own_nis(i);  // many points: the one that fits worst by itself
+      if (seen <= 12) {
+        filter_.leave_out(i, true);
+        without = filter_.nis();
+        filter_.leave_out(i, false);
+      }
+      if (without < best) {
+        best = without;
+        worst = i;
+      }
+    }
+    filter_.leave_out(worst, true);
+    judgement.point = filter_.seen_point(worst);
+    judgement.nis = filter_.nis();
+    judgement.dof = filter_.dof();
+    if (judgement.nis <= chi2_quantile(judgement.dof, z)) {
+      judgement.event = ObserveEvent::slip;
+      return true;
+    }
+  }
+  for (std::size_t i = 0; i < seen; ++i) filter_.leave_out(i, false);
+  judgement.nis = filter_.nis();
+  judgement.dof = filter_.dof();
+  judgement.point = -1;
+  return false;
+}
+
+}  // namespace alidade

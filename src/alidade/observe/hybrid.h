@@ -1,0 +1,92 @@
+#pragma once
+
+#include "alidade/observe/frame_buffer.h"
+#include "alidade/observe/star_filter.h"
+
+namespace alidade {
+
+struct HybridConfig {
+  std::size_t num_points = 0;
+  PixelScale scale;
+  ObserveNuisances nuisances;
+  bool with_depth = false;
+  RotatingCamera start;  ///< Normalised.
+  std::optional<CommonPrior> prior;
+  bool start_is_given = false;  ///< Otherwise several focal lengths are tried.
+  double sigma_px = 0.0;        ///< [px]; 0: told by the residuals.
+  double sigma_range_m = 0.0;   ///< Of the frames' ranges.
+  std::size_t range_point = 0;
+  double bootstrap_s = 1.0;
+  std::size_t buffer_frames = 300;  ///< Kept for adjustments.
+  double zoom_px = 1.0;             ///< σ that a frame of zoom adds to each of fx, fy, cx, cy. [px]
+};
+
+/// The default estimator of a rotating camera: a rotation bundle adjustment over the first second, adjusted again
+/// while the answer is still coarse, then an extended Kalman filter (StarFilter) that judges each frame before it takes
+/// it in: a point that slipped is left out (and after 15 frames met anew), a burst of noise is skipped, a change of
+/// the intrinsics is followed. If nothing fits for a second it starts again.
+/// `step` allocates nothing once the adjustments are over (about 4 s).
+/// docs/maths/rotating-camera.md.
+class HybridObserver {
+ public:
+  explicit HybridObserver(const HybridConfig& config);
+
+  IntrinsicsEstimate step(const RotationFrame& frame);
+
+  [[nodiscard]] const StarFilter& filter() const { return filter_; }
+  [[nodiscard]] bool is_running() const { return is_running_; }
+  /// σ of a pixel coordinate: given, or as the log tells so far. [px]
+  [[nodiscard]] double sigma_px() const { return config_.scale.scale * sigma_px_ * noise_ratio(); }
+  /// When the intrinsics last came to rest, or the estimate began. [s]
+  [[nodiscard]] double constant_since_s() const { return constant_since_s_; }
+
+ private:
+  struct Judgement {
+    ObserveEvent event = ObserveEvent::none;
+    int point = -1;
+    double nis = 0.0;
+    int dof = 0;
+    bool accept = true;
+  };
+
+  void normalise(const RotationFrame& frame);
+  void bootstrap(const RotationFrame& frame, IntrinsicsEstimate& estimate);
+  bool adjust_buffer();
+  void filter_frame(const RotationFrame& frame, IntrinsicsEstimate& estimate);
+  [[nodiscard]] Judgement judge();
+  bool leave_out_until(double gate_z, Judgement& judgement);
+  void begin_zoom(const RotationFrame& frame);
+  [[nodiscard]] bool has_drifted();
+  [[nodiscard]] bool has_come_to_rest();
+  void take_in(const RotationFrame& frame, const Judgement& judgement);
+  void note_slips();
+  void restart(IntrinsicsEstimate& estimate);
+  [[nodiscard]] CommonVector zoom_variance(double frames) const;
+  [[nodiscard]] double noise_ratio() const;
+  void report(IntrinsicsEstimate& estimate) const;
+
+  static constexpr int rest_frames = 10;  ///< Over which a zoom that is over shows no change.
+
+  HybridConfig config_;
+  StarFilter filter_;
+  FrameBuffer buffer_;
+  std::vector<Eigen::Vector2d> px_;  ///< Of this frame, normalised.
+  std::vector<int> frames_out_;      ///< One a point: in a row left out.
+  bool is_running_ = false;
+  double sigma_px_ = 0.0;  ///< Normalised.
+  double next_adjustment_s_ = 0.0, adjust_until_s_ = 0.0;
+  double constant_since_s_ = 0.0, last_fit_s_ = 0.0;
+  double sum_nis_ = 0.0, sum_dof_ = 0.0;  ///< Over frames that fit: the noise.
+  int bad_frames_ = 0;                    ///< In a row that did not fit.
+  bool is_zooming_ = false;
+  std::array<Eigen::Vector4d, rest_frames> past_k_;
+  int past_count_ = 0;
+  Eigen::Vector4d drift_score_;
+  Eigen::Matrix4d drift_information_;
+  int drift_frames_ = 0;
+};
+
+/// Quantile of χ² with `dof` degrees of freedom at the normal deviate `z` (3.09: 0.999). Wilson & Hilferty 1931.
+[[nodiscard]] double chi2_quantile(int dof, double z);
+
+}  // namespace alidade

@@ -12,9 +12,9 @@ constexpr double zoom_gain = 33.4;       // χ²₄ at 10⁻⁶: what a change o
 constexpr int slip_patience = 15;        // frames until a point that slipped is met anew
 constexpr double restart_after_s = 1.0;  // without a frame that fits
 constexpr double fine_enough = 1e-3;     // σ_f / f: the filter's linearisation is exact to rounding
-constexpr double adjustments_until_s = 4.0;
-constexpr double first_zoom_frames = 1e2;  // worth of change in the frame that shows it
-constexpr int drift_window = 15;           // frames
+constexpr double better_by = 9.2;        // χ²₂ at 0.01
+constexpr double any_zoom = 1e6;         // frames worth of change: whatever the pixels want
+constexpr int drift_window = 15;         // frames
 
 }  // namespace
 
@@ -28,7 +28,10 @@ HybridObserver::HybridObserver(const HybridConfig& config)
       filter_(config.nuisances, config.with_depth, config.num_points),
       buffer_(config.num_points, config.buffer_frames),
       px_(config.num_points, Eigen::Vector2d::Constant(not_seen)),
-      frames_out_(config.num_points, 0) {}
+      frames_out_(config.num_points, 0),
+      patience_(config.num_points, slip_patience),
+      candidate_(filter_),
+      own_drift_(config.num_points) {}
 
 void HybridObserver::normalise(const RotationFrame& frame) {
   for (std::size_t i = 0; i < px_.size(); ++i) {
@@ -60,7 +63,6 @@ void HybridObserver::bootstrap(const RotationFrame& frame, IntrinsicsEstimate& e
   is_running_ = true;
   last_fit_s_ = frame.t_s;
   constant_since_s_ = buffer_.frames().front().t_s;
-  adjust_until_s_ = constant_since_s_ + adjustments_until_s;
   estimate.event = ObserveEvent::start;
 }
 
@@ -84,6 +86,9 @@ bool HybridObserver::adjust_buffer() {
   filter_.start(adjustment.solution, adjustment.bundle_point_of, sigma_px_);
   sum_nis_ = sum_dof_ = std::max(adjustment.solution.dof, 1);
   drift_frames_ = 0;
+  const CommonMatrix& P = filter_.covariance();
+  const Eigen::Vector4d& k = filter_.camera().k;
+  is_coarse_ = std::max(std::sqrt(P(0, 0)) / k[0], std::sqrt(P(1, 1)) / k[1]) > fine_enough;
   return true;
 }
 
@@ -97,20 +102,32 @@ CommonVector HybridObserver::zoom_variance(double frames) const {
 void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate& estimate) {
   if (is_zooming_) filter_.predict(zoom_variance(1.0), 0.0);
   filter_.observe(frame, px_);
-  const Judgement judgement = judge();
+  Judgement judgement = judge();
+  if (judgement.event == ObserveEvent::burst && is_coarse_) {
+    // What the filter knows is not exact yet: let all frames together say what this one means.
+    buffer_.add(frame, px_);
+    if (adjust_buffer()) filter_.observe(frame, px_);
+    judgement = judge();
+    judgement.accept = true;
+    for (std::size_t i = 0; i < filter_.num_seen(); ++i) filter_.leave_out(i, true);  // they are in already
+  }
+  if (judgement.event == ObserveEvent::burst && is_zoom(frame)) {
+    judgement.event = ObserveEvent::zoom;
+    judgement.accept = true;
+  }
   estimate.nis = judgement.nis;
   estimate.nis_dof = judgement.dof;
-  if (estimate.event == ObserveEvent::none) estimate.event = judgement.event;
   estimate.point = judgement.point;
+  if (estimate.event == ObserveEvent::none) estimate.event = judgement.event;
   if (!judgement.accept) {
-    ++bad_frames_;
     if (frame.t_s - last_fit_s_ > restart_after_s) restart(estimate);
     return;
   }
-  if (judgement.event == ObserveEvent::zoom) begin_zoom(frame);
-  if (!is_zooming_ && has_drifted()) {
+  has_candidate_ = false;
+  if (!is_zooming_ && has_drifted(estimate)) {
     estimate.event = ObserveEvent::zoom;
-    begin_zoom(frame);
+    begin_zoom();
+    jump(filter_, frame);
   }
   take_in(frame, judgement);
   if (is_zooming_ && has_come_to_rest()) {
@@ -120,27 +137,96 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
   }
 }
 
-void HybridObserver::begin_zoom(const RotationFrame& frame) {
-  if (!is_zooming_) buffer_.clear();
-  is_zooming_ = true;
-  past_count_ = 0;
-  drift_frames_ = 0;
-  adjust_until_s_ = 0.0;  // the frames before are of another camera, those after know the points already
-  // The step is taken at once: the points stand still, one frame tells.
-  filter_.predict(zoom_variance(first_zoom_frames), 0.0);
-  filter_.observe(frame, px_);
+/// A frame that does not fit: would it fit another camera? Two frames in a row must want the same one.
+bool HybridObserver::is_zoom(const RotationFrame& frame) {
+  if (has_candidate_) {
+    candidate_.predict(zoom_variance(1.0), 0.0);
+    candidate_.observe(frame, px_);
+    if (candidate_.dof() > 0 && candidate_.nis() <= chi2_quantile(candidate_.dof(), gate_z)) {
+      filter_ = candidate_;  // and this frame is about to be taken in
+      has_candidate_ = false;
+      begin_zoom();
+      return true;
+    }
+  }
+  const int left = std::max(filter_.dof() - 4, 0);
+  const double gate = left > 0 ? chi2_quantile(left, gate_z) : 1.0;
+  has_candidate_ = filter_.if_walked(zoom_variance(any_zoom)).nis <= gate;
+  if (has_candidate_) {
+    candidate_ = filter_;
+    jump(candidate_, frame);
+    candidate_.update();
+  }
+  return false;
 }
 
-/// The intrinsics' scores of some frames together: a slow change that no single frame shows.
-bool HybridObserver::has_drifted() {
+/// Lets the intrinsics walk as far as this frame wants them to, and no farther: what it takes for a step of 70 px would
+/// make a drift of 1 px as noisy as one frame is.
+void HybridObserver::jump(StarFilter& filter, const RotationFrame& frame) const {
+  const CommonVector step = filter.if_walked(zoom_variance(any_zoom)).step;
+  CommonVector variance = zoom_variance(4.0);
+  variance.head<4>() += step.head<4>().cwiseAbs2();
+  filter.predict(variance, 0.0);
+  filter.observe(frame, px_);
+}
+
+void HybridObserver::begin_zoom() {
+  if (!is_zooming_) past_count_ = 0;
+  is_zooming_ = true;
+  drift_frames_ = 0;
+  is_coarse_ = false;  // frames before are of another camera, and the points are known already
+  buffer_.clear();
+}
+
+/// The intrinsics' scores of some frames together: a slow change that no single frame shows. Where leaving one point
+/// out explains it, that point is not what it was.
+bool HybridObserver::has_drifted(IntrinsicsEstimate& estimate) {
   if (drift_frames_ == 0) {
-    drift_score_.setZero();
-    drift_information_.setZero();
+    drift_ = {};
+    std::fill(own_drift_.begin(), own_drift_.end(), Score{});
   }
-  filter_.add_score(drift_score_, drift_information_);
+  filter_.add_score(drift_.score, drift_.information);
+  for (std::size_t i = 0; i < filter_.num_seen(); ++i) {
+    Score& own = own_drift_[static_cast<std::size_t>(filter_.seen_point(i))];
+    if (!filter_.is_left_out(i)) filter_.add_own_score(i, own.score, own.information);
+  }
   if (++drift_frames_ < drift_window) return false;
   drift_frames_ = 0;
-  return drift_score_.dot(drift_information_.ldlt().solve(drift_score_)) > zoom_gain;
+  const double statistic = drift_.score.dot(drift_.information.ldlt().solve(drift_.score));
+  if (!(statistic > chi2_quantile(4, gate_z))) return false;
+  const int point = drifting_point();
+  const bool is_on_probation = point >= 0 && patience_[static_cast<std::size_t>(point)] > slip_patience;
+  if (!is_on_probation && !(statistic > zoom_gain)) return false;
+  if (point < 0) return !is_coarse_;
+  estimate.event = ObserveEvent::slip;
+  estimate.point = point;
+  renew(static_cast<std::size_t>(point));
+  for (std::size_t i = 0; i < filter_.num_seen(); ++i) {
+    if (filter_.seen_point(i) == point) filter_.leave_out(i, true);
+  }
+  return false;
+}
+
+/// The point without which the window's scores are no more than chance; −1: none.
+int HybridObserver::drifting_point() const {
+  Score all;
+  for (const Score& own : own_drift_) {
+    all.score += own.score;
+    all.information += own.information;
+  }
+  int best = -1;
+  double least = chi2_quantile(4, gate_z);
+  for (std::size_t i = 0; i < own_drift_.size(); ++i) {
+    if (own_drift_[i].information.isZero(0.0)) continue;
+    const Eigen::Vector4d score = all.score - own_drift_[i].score;
+    const Eigen::Matrix4d information = all.information - own_drift_[i].information;
+    const Eigen::Matrix4d P = filter_.covariance().topLeftCorner<4, 4>();
+    const double statistic = score.dot((information + information * P * information).ldlt().solve(score));
+    if (!(statistic < least)) continue;
+    least = statistic;
+    best = static_cast<int>(i);
+  }
+  return best;
 }
 
 /// The last frames' estimates differ by no more than their noise.
@@ -154,7 +240,6 @@ bool HybridObserver::has_come_to_rest() {
 }
 
 void HybridObserver::take_in(const RotationFrame& frame, const Judgement& judgement) {
-  bad_frames_ = 0;
   last_fit_s_ = frame.t_s;
   if (!is_zooming_) {
     sum_nis_ += judgement.nis;
@@ -165,13 +250,10 @@ void HybridObserver::take_in(const RotationFrame& frame, const Judgement& judgem
   if (frame.range_m > 0.0 && config_.with_depth) {
     filter_.update_range(frame, config_.range_point, frame.range_m, config_.sigma_range_m);
   }
-  if (is_zooming_ || frame.t_s > adjust_until_s_) return;
+  if (!is_coarse_) return;
   buffer_.add(frame, px_);
-  const CommonMatrix& P = filter_.covariance();
-  const Eigen::Vector4d& k = filter_.camera().k;
-  const bool is_coarse = std::max(std::sqrt(P(0, 0)) / k[0], std::sqrt(P(1, 1)) / k[1]) > fine_enough;
-  if (!is_coarse || frame.t_s < next_adjustment_s_ - 1e-6) return;
-  next_adjustment_s_ = frame.t_s + 0.5 * config_.bootstrap_s;
+  if (frame.t_s < next_adjustment_s_ - 1e-6) return;
+  next_adjustment_s_ = frame.t_s + std::max(0.5 * config_.bootstrap_s, 0.25 * buffer_.duration_s());
   adjust_buffer();
 }
 
@@ -183,17 +265,22 @@ void HybridObserver::note_slips() {
       continue;
     }
     px_[point].setConstant(not_seen);
-    if (++frames_out_[point] < slip_patience) continue;
-    filter_.forget_point(point);
-    buffer_.renew_point(point);
-    frames_out_[point] = 0;
+    if (++frames_out_[point] >= patience_[point]) renew(point);
   }
+}
+
+/// The point is met anew; if it slips again, later and later.
+void HybridObserver::renew(std::size_t point) {
+  filter_.forget_point(point);
+  buffer_.renew_point(point);
+  frames_out_[point] = 0;
+  patience_[point] = std::min(4 * patience_[point], 10000);
 }
 
 void HybridObserver::restart(IntrinsicsEstimate& estimate) {
   is_running_ = is_zooming_ = false;
+  has_candidate_ = false;
   buffer_.clear();
-  bad_frames_ = 0;
   estimate.event = ObserveEvent::restart;
 }
 
@@ -219,20 +306,15 @@ HybridObserver::Judgement HybridObserver::judge() {
   judgement.nis = filter_.nis();
   if (judgement.dof == 0) return judgement;
   if (judgement.nis <= chi2_quantile(judgement.dof, gate_z)) return judgement;
-  const double whole = judgement.nis;
-  const int whole_dof = judgement.dof;
-  if (leave_out_until(gate_z, judgement)) return judgement;
-  // Does a change of the intrinsics explain it, and more than chance would?
-  const double walked = filter_.nis_if_walked(zoom_variance(1e4));
-  const int left = std::max(whole_dof - 4, 0);
-  const bool explains = left > 0 ? walked <= chi2_quantile(left, gate_z) : bad_frames_ > 0;
-  const bool is_sure = left > 0 && whole - walked > zoom_gain;
-  if (explains && (is_sure || bad_frames_ > 0)) {
-    judgement.event = ObserveEvent::zoom;
-  } else {
-    judgement.event = ObserveEvent::burst;
-    judgement.accept = false;
+  const double if_zoomed = filter_.if_walked(zoom_variance(any_zoom)).nis;
+  if (leave_out_until(gate_z, judgement)) {
+    // A change of the intrinsics moves all points, some little: it is no slip where it explains clearly more.
+    if (!(judgement.nis - if_zoomed > better_by)) return judgement;
+    for (std::size_t i = 0; i < filter_.num_seen(); ++i) filter_.leave_out(i, false);
+    judgement.point = -1;
   }
+  judgement.event = ObserveEvent::burst;
+  judgement.accept = false;
   return judgement;
 }
 

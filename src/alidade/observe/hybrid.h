@@ -18,7 +18,7 @@ struct HybridConfig {
   std::size_t range_point = 0;
   double bootstrap_s = 1.0;
   std::size_t buffer_frames = 300;  ///< Kept for adjustments.
-  double zoom_px = 1.0;             ///< σ that a frame of zoom adds to each of fx, fy, cx, cy. [px]
+  double zoom_px = 0.5;             ///< σ that a frame of zoom adds to each of fx, fy, cx, cy. [px]
 };
 
 /// The default estimator of a rotating camera: a rotation bundle adjustment over the first second, adjusted again
@@ -55,8 +55,12 @@ class HybridObserver {
   void filter_frame(const RotationFrame& frame, IntrinsicsEstimate& estimate);
   [[nodiscard]] Judgement judge();
   bool leave_out_until(double gate_z, Judgement& judgement);
-  void begin_zoom(const RotationFrame& frame);
-  [[nodiscard]] bool has_drifted();
+  [[nodiscard]] bool is_zoom(const RotationFrame& frame);
+  void jump(StarFilter& filter, const RotationFrame& frame) const;
+  void begin_zoom();
+  [[nodiscard]] bool has_drifted(IntrinsicsEstimate& estimate);
+  [[nodiscard]] int drifting_point() const;
+  void renew(std::size_t point);
   [[nodiscard]] bool has_come_to_rest();
   void take_in(const RotationFrame& frame, const Judgement& judgement);
   void note_slips();
@@ -71,18 +75,25 @@ class HybridObserver {
   StarFilter filter_;
   FrameBuffer buffer_;
   std::vector<Eigen::Vector2d> px_;  ///< Of this frame, normalised.
-  std::vector<int> frames_out_;      ///< One a point: in a row left out.
+  std::vector<int> frames_out_;      ///< One a point: in a row left out,
+  std::vector<int> patience_;        ///< and how many before it is met anew.
+  StarFilter candidate_;             ///< The filter if the last frame was a zoom.
+  bool has_candidate_ = false;
+  bool is_coarse_ = true;  ///< Still adjusted, not only filtered.
   bool is_running_ = false;
   double sigma_px_ = 0.0;  ///< Normalised.
-  double next_adjustment_s_ = 0.0, adjust_until_s_ = 0.0;
+  double next_adjustment_s_ = 0.0;
   double constant_since_s_ = 0.0, last_fit_s_ = 0.0;
   double sum_nis_ = 0.0, sum_dof_ = 0.0;  ///< Over frames that fit: the noise.
-  int bad_frames_ = 0;                    ///< In a row that did not fit.
   bool is_zooming_ = false;
   std::array<Eigen::Vector4d, rest_frames> past_k_;
   int past_count_ = 0;
-  Eigen::Vector4d drift_score_;
-  Eigen::Matrix4d drift_information_;
+  struct Score {
+    Eigen::Vector4d score = Eigen::Vector4d::Zero();
+    Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
+  };
+  Score drift_;
+  std::vector<Score> own_drift_;  ///< One a point.
   int drift_frames_ = 0;
 };
 

@@ -64,6 +64,7 @@ void MotionReader::advance_by_rate(const Eigen::Vector3d& rate, RotationFrame& f
   const Eigen::Vector3d vector = turn - h * h / 12.0 * rate.cross(last_rate_);
   cam_from_start_ = (exp_so3(-vector) * cam_from_start_).normalized();
   frame.mean_rate_rad_per_s = vector / h;
+  frame.acceleration_rad_per_s2 = (rate - last_rate_) / h;
   before_rate_ = last_rate_;
   last_rate_ = rate;
   last_dt_s_ = h;
@@ -75,7 +76,14 @@ void MotionReader::advance_by_attitude(const Eigen::Quaterniond& base_from_cam, 
     const Eigen::Quaterniond now_from_last = base_from_cam.conjugate() * last_base_from_cam_;
     cam_from_start_ = (now_from_last * cam_from_start_).normalized();
     if (frame.dt_s > 0.0) frame.mean_rate_rad_per_s = -log_so3(now_from_last.normalized()) / frame.dt_s;
-    frame.rate_rad_per_s = frame.mean_rate_rad_per_s;
+    if (has_before_ && frame.dt_s > 0.0 && last_dt_s_ > 0.0) {
+      const Eigen::Vector3d change = frame.mean_rate_rad_per_s - last_mean_rate_;
+      frame.acceleration_rad_per_s2 = 2.0 * change / (frame.dt_s + last_dt_s_);
+    }
+    frame.rate_rad_per_s = frame.mean_rate_rad_per_s + 0.5 * frame.dt_s * frame.acceleration_rad_per_s2;
+    last_mean_rate_ = frame.mean_rate_rad_per_s;
+    last_dt_s_ = frame.dt_s;
+    has_before_ = true;
   }
   last_base_from_cam_ = base_from_cam;
 }

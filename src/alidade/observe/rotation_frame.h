@@ -16,9 +16,10 @@ struct RotationFrame {
   Eigen::Quaterniond cam_from_start = Eigen::Quaterniond::Identity();  ///< R.
   Eigen::Vector3d rate_rad_per_s =
       Eigen::Vector3d::Zero();  ///< ω at this instant, camera frame (or the mean, if not measured).
-  Eigen::Vector3d mean_rate_rad_per_s = Eigen::Vector3d::Zero();  ///< Mean ω since the frame before.
-  Eigen::Vector3d shift_m = Eigen::Vector3d::Zero();              ///< From measured velocity; zero without.
-  double range_m = not_seen;                                      ///< To the log's range point.
+  Eigen::Vector3d mean_rate_rad_per_s = Eigen::Vector3d::Zero();      ///< Mean ω since the frame before.
+  Eigen::Vector3d acceleration_rad_per_s2 = Eigen::Vector3d::Zero();  ///< ω̇, from the last two samples.
+  Eigen::Vector3d shift_m = Eigen::Vector3d::Zero();                  ///< From measured velocity; zero without.
+  double range_m = not_seen;                                          ///< To the log's range point.
   /// The rotation since the frame before is not known (a gap in a rate log): what was seen before does not bind what
   /// is seen now but through the intrinsics. cam_from_start starts again at the identity.
   bool starts_segment = false;
@@ -47,6 +48,7 @@ class MotionReader {
   bool has_last_ = false, has_before_ = false;
   double last_t_s_ = 0.0, last_dt_s_ = 0.0;
   Eigen::Vector3d last_rate_ = Eigen::Vector3d::Zero(), before_rate_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d last_mean_rate_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d last_velocity_ = Eigen::Vector3d::Zero(), shift_m_ = Eigen::Vector3d::Zero();
   Eigen::Quaterniond last_base_from_cam_ = Eigen::Quaterniond::Identity();
   Eigen::Quaterniond cam_from_start_ = Eigen::Quaterniond::Identity();

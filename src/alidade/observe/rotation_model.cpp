@@ -39,7 +39,9 @@ RotationView::RotationView(const RotatingCamera& camera, const RotationFrame& fr
       shift_m_(frame.shift_m) {
   mount_from_start_ = frame.cam_from_start.toRotationMatrix();
   if (camera.delay_s != 0.0) {
-    mount_from_start_ = exp_so3(-camera.delay_s * rate_).toRotationMatrix() * mount_from_start_;
+    const Eigen::Vector3d mean_rate = rate_ + 0.5 * camera.delay_s * frame.acceleration_rad_per_s2;
+    mount_from_start_ = exp_so3(-camera.delay_s * mean_rate).toRotationMatrix() * mount_from_start_;
+    rate_ += camera.delay_s * frame.acceleration_rad_per_s2;
   }
   if (!camera.turn_rad.isZero(0.0)) mount_from_start_ = exp_so3(camera.turn_rad).toRotationMatrix() * mount_from_start_;
   cam_from_start_ = cam_from_mount_ * mount_from_start_ * cam_from_mount_.transpose();

@@ -93,13 +93,14 @@ void StarFilter::observe(const RotationFrame& frame, std::span<const Eigen::Vect
     seen.by_common = prediction.J_px_common;
     Eigen::Matrix2d cov = Eigen::Matrix2d::Identity() * variance_px_;
     if (with_depth_) {
-      seen.by_common.noalias() += seen.J_point * point.slope;
+      seen.through_point.noalias() = seen.J_point * point.slope;
       cov.noalias() += seen.J_point * point.cov * seen.J_point.transpose();
     } else {
       const Eigen::Matrix2d J = seen.J_point.leftCols<2>();
-      seen.by_common.noalias() += J * point.slope.topRows<2>();
+      seen.through_point.noalias() = J * point.slope.topRows<2>();
       cov.noalias() += J * point.cov.topLeftCorner<2, 2>() * J.transpose();
     }
+    seen.by_common += seen.through_point;
     seen.inverse_cov = cov.inverse();
   }
 }
@@ -132,12 +133,28 @@ double StarFilter::nis() {
   return squares_ - gradient_.dot(all.llt().solve(gradient_));
 }
 
-double StarFilter::nis_if_walked(const CommonVector& variance) {
-  accumulate();
+StarFilter::Walk StarFilter::if_walked(const CommonVector& variance) const {
   CommonMatrix walked = covariance_;
   walked.diagonal() += variance;
-  const CommonMatrix all = inverse(walked) + information_;
-  return squares_ - gradient_.dot(all.llt().solve(gradient_));
+  CommonMatrix information = inverse(walked);
+  // As in predict(): the points stay where they are, whatever the camera becomes.
+  const CommonMatrix gain = covariance_ * information;
+  const CommonMatrix lost = covariance_ - gain * walked * gain.transpose();
+  const CommonMatrix change = gain - CommonMatrix::Identity(layout_.size, layout_.size);
+  CommonVector gradient = CommonVector::Zero(layout_.size);
+  double squares = 0.0;
+  for (std::size_t i = 0; i < num_seen_; ++i) {
+    const Seen& seen = seen_[i];
+    if (seen.left_out) continue;
+    const PixelByCommon by_common = seen.by_common + seen.through_point * change;
+    const Eigen::Matrix2d cov = seen.inverse_cov.inverse() + seen.through_point * lost * seen.through_point.transpose();
+    const Eigen::Matrix2d inverse_cov = cov.inverse();
+    information.noalias() += by_common.transpose() * inverse_cov * by_common;
+    gradient.noalias() += by_common.transpose() * (inverse_cov * seen.innovation);
+    squares += seen.innovation.dot(inverse_cov * seen.innovation);
+  }
+  const CommonVector step = information.llt().solve(gradient);
+  return {squares - gradient.dot(step), step};
 }
 
 void StarFilter::add_score(Eigen::Vector4d& score, Eigen::Matrix4d& information) {
@@ -147,6 +164,12 @@ void StarFilter::add_score(Eigen::Vector4d& score, Eigen::Matrix4d& information)
   const Eigen::PartialPivLU<CommonMatrix> solver(both);
   score += solver.solve(gradient_).head<4>();
   information += solver.solve(information_).topLeftCorner<4, 4>();
+}
+
+void StarFilter::add_own_score(std::size_t i, Eigen::Vector4d& score, Eigen::Matrix4d& information) const {
+  const Eigen::Matrix<double, 2, 4> by_k = seen_[i].by_common.leftCols<4>();
+  score.noalias() += by_k.transpose() * (seen_[i].inverse_cov * seen_[i].innovation);
+  information.noalias() += by_k.transpose() * seen_[i].inverse_cov * by_k;
 }
 
 double StarFilter::own_nis(std::size_t i) const {

@@ -34,13 +34,20 @@ class StarFilter {
   }
   [[nodiscard]] bool is_left_out(std::size_t i) const { return seen_[i].left_out; }
   [[nodiscard]] int dof() const;
-  /// Normalised innovation squared of the points not left out; with `variance` added to the common parameters before.
+  /// Normalised innovation squared of the points not left out.
   [[nodiscard]] double nis();
-  [[nodiscard]] double nis_if_walked(const CommonVector& variance);
+  /// The same with `variance` added to the common parameters before, and how they would move.
+  struct Walk {
+    double nis = 0.0;
+    CommonVector step;
+  };
+  [[nodiscard]] Walk if_walked(const CommonVector& variance) const;
   /// The same of one point alone, 2 degrees of freedom.
   [[nodiscard]] double own_nis(std::size_t i) const;
   /// Adds the score of fx, fy, cx, cy, Gᵀ S⁻¹ ν, and its covariance Gᵀ S⁻¹ G: zero on the mean while nothing changes.
   void add_score(Eigen::Vector4d& score, Eigen::Matrix4d& information);
+  /// One point's share of it, as if the common parameters were known: Gᵀ R⁻¹ ν and Gᵀ R⁻¹ G.
+  void add_own_score(std::size_t i, Eigen::Vector4d& score, Eigen::Matrix4d& information) const;
   /// Takes the innovations in, but those left out; new points join. After `observe`, once.
   void update();
   /// Takes a range of a known point in. False: it does not fit (beyond 4 σ), or the point has no depth.
@@ -65,6 +72,7 @@ class StarFilter {
     bool left_out = false;
     Eigen::Vector2d innovation;
     Eigen::Matrix<double, 2, 3> J_point;
+    PixelByCommon through_point;  ///< ∂px/∂c through the point's slope alone.
     PixelByCommon by_common;      ///< ∂px/∂c through c and through the point's slope.
     Eigen::Matrix2d inverse_cov;  ///< Of the innovation given c.
   };

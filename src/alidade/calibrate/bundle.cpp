@@ -121,6 +121,21 @@ std::optional<Step> damped_step(const BundleProblem& problem, const BundleState&
   return Step{step_from(problem, state, *globals, poses), decrease};
 }
 
+/// Inverse of a matrix with unit diagonal; none where it is singular: then its weakest direction is in `result`.
+std::optional<Eigen::MatrixXd> inverse_of(const Eigen::MatrixXd& scaled, BundleResult& result) {
+  constexpr double surely_regular = 1e-11;  // 1/|S⁻¹| (Frobenius) is a lower bound of the smallest eigenvalue
+  const Eigen::LLT<Eigen::MatrixXd> llt(scaled);
+  if (llt.info() == Eigen::Success) {
+    Eigen::MatrixXd inverse = llt.solve(Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols()));
+    if (inverse.norm() * surely_regular < 1.0) return inverse;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+  result.weakest = eigen.eigenvectors().col(0);
+  constexpr double singular = 1e-13;  // below this the smallest eigenvalue is rounding
+  if (!(eigen.eigenvalues()[0] > singular)) return std::nullopt;
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+}
+
 double degrees_of_freedom(const BundleProblem& problem) {
   double rows = 0.0;
   for (const ViewArrays& view : problem.views) rows += 2.0 * static_cast<double>(view.size()) - 6.0;
@@ -141,17 +156,12 @@ BundleResult with_covariance(BundleResult result, bool want_pose_cov) {
   const Eigen::VectorXd scale = unit_scale(reduced.S);
   Eigen::MatrixXd scaled = reduced.S.selfadjointView<Eigen::Lower>();
   scaled = scale.asDiagonal() * scaled * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
-  result.weakest = eigen.eigenvectors().col(0);
-  result.weakest_eigenvalue = eigen.eigenvalues()[0];
-  constexpr double singular = 1e-13;  // below this the smallest eigenvalue is rounding
-  if (!(result.weakest_eigenvalue > singular)) {
+  const std::optional<Eigen::MatrixXd> inverse = inverse_of(scaled, result);
+  if (!inverse) {
     result.status = BundleResult::Status::singular;
     return result;
   }
-  const Eigen::MatrixXd inverse =
-      eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
-  result.cov = scale.asDiagonal() * inverse * scale.asDiagonal();
+  result.cov = scale.asDiagonal() * *inverse * scale.asDiagonal();
   if (!want_pose_cov) return result;
   result.pose_cov.reserve(eq.V.size());
   for (std::size_t k = 0; k < eq.V.size(); ++k) {

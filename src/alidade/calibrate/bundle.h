@@ -51,9 +51,9 @@ struct BundleResult {
   // From here on: by with_covariance().
   Eigen::MatrixXd cov;                                ///< Inverse of the reduced normal matrix.
   std::vector<Eigen::Matrix<double, 6, 6>> pose_cov;  ///< One a view, if asked for.
-  /// Eigenvector of the smallest eigenvalue of the reduced matrix scaled to unit diagonal: singular → what is free.
+  /// Where the reduced matrix, scaled to unit diagonal, is (nearly) singular: the eigenvector of its smallest
+  /// eigenvalue, which is what the views leave free.
   Eigen::VectorXd weakest;
-  double weakest_eigenvalue = 0.0;
 };
 
 /// Maximum-likelihood bundle adjustment by Levenberg–Marquardt. The poses are eliminated view by view (6 × 6

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "alidade/calibrate/vector_clones.h"
+#include "alidade/geometry/vector_clones.h"
 
 namespace alidade {
 namespace {

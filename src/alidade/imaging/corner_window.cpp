@@ -6,6 +6,8 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
+#include "alidade/geometry/vector_clones.h"
+
 namespace alidade {
 namespace {
 
@@ -46,6 +48,17 @@ struct StartEdge {
   }
 };
 
+/// Distances of the pixels (from + i, y) to the two edges.
+ALIDADE_VECTOR_CLONES void row_distances(StartEdge one, StartEdge two, int from, int y, std::size_t count,
+                                         float* __restrict d1, float* __restrict d2) {
+  const auto at_y = static_cast<float>(y);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto at_x = static_cast<float>(from + static_cast<int>(i));
+    d1[i] = one.distance(at_x, at_y);
+    d2[i] = two.distance(at_x, at_y);
+  }
+}
+
 void add_far(FarPixels& far, double grey) {
   far.count += 1.0;
   far.sum += grey;
@@ -84,22 +97,35 @@ CornerWindow gather_window(const cv::Mat& photo, const CornerStart& start, const
   const auto near = static_cast<float>(near_px);
   const int y_min = std::max(-origin_y, static_cast<int>(std::ceil(area.center.y() - area.reach_y)));
   const int y_max = std::min(photo.rows - 1 - origin_y, static_cast<int>(std::floor(area.center.y() + area.reach_y)));
+  std::size_t count = 0;
+  std::vector<float> to_one, to_two;  // a row's distances to the edges
   for (int y = y_min; y <= y_max; ++y) {
     const auto [first, last] = span_of_row(area.inverse, area.half, area.center, y);
     const float* row = photo.ptr<float>(origin_y + y) + origin_x;
-    for (int x = std::max(first, -origin_x); x <= std::min(last, photo.cols - 1 - origin_x); ++x) {
-      const auto at_x = static_cast<float>(x), at_y = static_cast<float>(y);
-      const float d1 = one.distance(at_x, at_y), d2 = two.distance(at_x, at_y);
-      if (std::abs(d1) > near && std::abs(d2) > near) {
-        add_far(window.far[d1 * d2 > 0.0f ? 1 : 0], row[x]);
+    const int from = std::max(first, -origin_x), to = std::min(last, photo.cols - 1 - origin_x);
+    if (to < from) continue;
+    const auto num_in_row = static_cast<std::size_t>(to - from + 1), most = count + num_in_row;
+    for (std::vector<float>* values : {&window.x, &window.y, &window.grey}) {
+      if (values->size() < most) values->resize(2 * most);
+    }
+    if (to_one.size() < num_in_row) {
+      to_one.resize(num_in_row);
+      to_two.resize(num_in_row);
+    }
+    row_distances(one, two, from, y, num_in_row, to_one.data(), to_two.data());
+    for (std::size_t i = 0; i < num_in_row; ++i) {
+      const int x = from + static_cast<int>(i);
+      if (std::abs(to_one[i]) > near && std::abs(to_two[i]) > near) {
+        add_far(window.far[to_one[i] * to_two[i] > 0.0f ? 1 : 0], row[x]);
         continue;
       }
-      window.x.push_back(at_x);
-      window.y.push_back(at_y);
-      window.grey.push_back(row[x]);
+      window.x[count] = static_cast<float>(x);
+      window.y[count] = static_cast<float>(y);
+      window.grey[count] = row[x];
+      ++count;
     }
   }
-  const std::size_t groups = window.num_near() / 4;
+  const std::size_t groups = count / 4;
   for (std::vector<float>* values : {&window.x, &window.y, &window.grey}) values->resize(4 * groups);
   return window;
 }

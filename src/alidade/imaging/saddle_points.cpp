@@ -3,9 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+
+#include "alidade/geometry/vector_clones.h"
+#include "alidade/imaging/blurred_edge.h"
 
 namespace alidade {
 namespace {
@@ -49,7 +54,7 @@ Ring make_ring() {
 }
 
 /// -det of the Hessian of the smoothed picture.
-cv::Mat strength_of(const cv::Mat& smooth) {
+ALIDADE_VECTOR_CLONES cv::Mat strength_of(const cv::Mat& smooth) {
   cv::Mat strength(smooth.size(), CV_32F, cv::Scalar(0));
   for (int y = 1; y + 1 < smooth.rows; ++y) {
     const float *up = smooth.ptr<float>(y - 1), *here = smooth.ptr<float>(y), *down = smooth.ptr<float>(y + 1);
@@ -62,6 +67,17 @@ cv::Mat strength_of(const cv::Mat& smooth) {
     }
   }
   return strength;
+}
+
+/// One of eight values is above the threshold.
+bool is_any_above(const float* values, float threshold) {
+  Float4 one, two;
+  std::memcpy(&one, values, sizeof one);
+  std::memcpy(&two, values + 4, sizeof two);
+  const Int4 above = (one > threshold) | (two > threshold);
+  std::array<std::uint64_t, 2> halves;
+  std::memcpy(halves.data(), &above, sizeof above);
+  return (halves[0] | halves[1]) != 0;
 }
 
 bool is_local_maximum(const cv::Mat& strength, int x, int y) {
@@ -125,8 +141,10 @@ std::optional<SaddlePoint> check_ring(const cv::Mat& smooth, const Ring& ring, i
   constexpr float pi = std::numbers::pi_v<float>;
   const std::size_t n = ring.offset.size();
   float lowest = 1e9f, highest = -1e9f;
+  const float* here = smooth.ptr<float>(y) + x;
+  const auto step = static_cast<std::ptrdiff_t>(smooth.step1());
   for (std::size_t i = 0; i < n; ++i) {
-    grey[i] = smooth.at<float>(y + ring.offset[i][1], x + ring.offset[i][0]);
+    grey[i] = here[ring.offset[i][1] * step + ring.offset[i][0]];
     lowest = std::min(lowest, grey[i]);
     highest = std::max(highest, grey[i]);
   }
@@ -169,6 +187,8 @@ std::vector<SaddlePoint> find_saddle_points(const cv::Mat& photo) {
   for (int y = border; y < photo.rows - border; ++y) {
     const float* row = strength.ptr<float>(y);
     for (int x = border; x < photo.cols - border; ++x) {
+      while (x + 8 <= photo.cols - border && !is_any_above(row + x, threshold)) x += 8;  // most of a photo is smooth
+      if (x >= photo.cols - border) break;
       if (!(row[x] > threshold) || row[x] < row[x - 1] || row[x] < row[x + 1]) continue;
       if (!is_local_maximum(strength, x, y)) continue;
       auto point = check_ring(smooth, ring, x, y, grey);

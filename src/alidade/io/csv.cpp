@@ -4,7 +4,7 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <optional>
+#include <utility>
 
 namespace alidade {
 namespace {
@@ -36,20 +36,16 @@ bool is_binary(char c) {
   return (code < 0x20U && c != '\n' && c != '\r' && c != '\t') || code == 0x7fU;
 }
 
-struct Row {
-  std::vector<std::string> cells;
-  std::size_t line = 1;  ///< Where it begins.
-};
-
 /// Splits text into rows of cells: RFC 4180, with LF, CRLF or CR ends.
 class Splitter {
  public:
-  Splitter(std::string_view text, const std::string& name) : text_(text), name_(name) {}
+  Splitter(std::string_view text, const std::string& name, std::size_t line = 1)
+      : text_(text), name_(name), line_(line) {}
 
   /// The next row, blank ones included (one empty cell). None at the end.
-  [[nodiscard]] std::optional<Row> next() {
+  [[nodiscard]] std::optional<CsvRow> next() {
     if (at_ == text_.size()) return std::nullopt;
-    Row row{{}, line_};
+    CsvRow row{{}, line_};
     do {
       row.cells.push_back(cell());
     } while (take(','));
@@ -97,19 +93,19 @@ class Splitter {
   std::string_view text_;
   const std::string& name_;
   std::size_t at_ = 0;
-  std::size_t line_ = 1;
+  std::size_t line_;
 };
 
-bool is_blank(const Row& row) { return row.cells.size() == 1 && row.cells[0].empty(); }
+bool is_blank(const CsvRow& row) { return row.cells.size() == 1 && row.cells[0].empty(); }
 
-void refuse_binary(std::string_view text, const std::string& name) {
+void refuse_binary(std::string_view text, const std::string& name, std::size_t first_line = 1) {
   const auto* const bad = std::find_if(text.begin(), text.end(), is_binary);
   if (bad == text.end()) return;
-  const auto line = static_cast<std::size_t>(std::count(text.begin(), bad, '\n')) + 1;
+  const auto line = static_cast<std::size_t>(std::count(text.begin(), bad, '\n')) + first_line;
   throw InputError(at_line(name, line) + "is not a text file; a table of comma-separated values is needed");
 }
 
-std::map<std::string, std::size_t> columns_of(const Row& header, const std::string& name) {
+std::map<std::string, std::size_t> columns_of(const CsvRow& header, const std::string& name) {
   std::map<std::string, std::size_t> columns;
   for (std::size_t i = 0; i < header.cells.size(); ++i) {
     const std::string& column = header.cells[i];
@@ -140,7 +136,61 @@ bool is_out_of_range(std::string_view text) {
   return std::from_chars(text.data(), text.data() + text.size(), value).ec == std::errc::result_out_of_range;
 }
 
+[[noreturn]] void throw_empty(const std::string& name) {
+  throw InputError(name + ": is empty; a header line with the columns' names is needed");
+}
+
+[[noreturn]] void throw_blank_line(const std::string& name, std::size_t line) {
+  throw InputError(at_line(name, line) + "a blank line inside the table; remove it");
+}
+
+void check_length(const CsvRow& row, std::size_t wanted, const std::string& name) {
+  if (row.cells.size() == wanted) return;
+  throw InputError(at_line(name, row.line) + "has " + std::to_string(row.cells.size()) + " cells, the header has " +
+                   std::to_string(wanted));
+}
+
+/// One line with its end, or several where a quoted cell has line ends in it. Empty at the end of the stream.
+std::string read_line(std::istream& in, const std::string& name, std::size_t line) {
+  constexpr std::size_t longest = std::size_t{16} << 20U;
+  std::string text;
+  bool is_quoted = false, may_open = true, has_closed = false;
+  std::streambuf& buffer = *in.rdbuf();  // get() would look at the stream's state for every character
+  for (int code = buffer.sbumpc(); code != std::streambuf::traits_type::eof(); code = buffer.sbumpc()) {
+    const char c = static_cast<char>(code);
+    text += c;
+    if (text.size() > longest) throw InputError(at_line(name, line) + "is longer than 16 MiB");
+    const bool closes = is_quoted && c == '"';
+    if (closes || (c == '"' && (may_open || has_closed))) is_quoted = !is_quoted;
+    has_closed = closes;
+    may_open = c == ',' || c == '\r' || (may_open && (c == ' ' || c == '\t'));
+    if (c == '\n' && !is_quoted) break;
+  }
+  return text;
+}
+
+std::size_t count_line_ends(std::string_view text) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool is_lone_return = text[i] == '\r' && (i + 1 == text.size() || text[i + 1] != '\n');
+    if (text[i] == '\n' || is_lone_return) ++count;
+  }
+  return count;
+}
+
 }  // namespace
+
+std::string CsvPlace::text() const { return at_line(file, line) + "column '" + column + "'"; }
+
+double csv_number(const std::string& cell, const CsvPlace& place) {
+  if (cell.empty()) throw InputError(place.text() + ": is empty; a number is needed");
+  const std::optional<double> value = parse_number<double>(cell);
+  if (value && std::abs(*value) <= largest_number) return *value;
+  const std::string what = place.text() + ": " + in_quotes(cell);
+  if (value && !std::isfinite(*value)) throw InputError(what + " is not a finite number");
+  if (value || is_out_of_range(cell)) throw InputError(what + " is out of range; numbers up to 1e12 are read");
+  throw InputError(what + " is not a number");
+}
 
 Csv Csv::read(const std::filesystem::path& file) { return parse(read_file(file), file.string()); }
 
@@ -150,7 +200,7 @@ Csv Csv::parse(std::string_view text, const std::string& name) {
   Csv csv;
   csv.name_ = name;
   std::size_t blank_line = 0;  // none yet
-  for (Splitter splitter(text, name); std::optional<Row> row = splitter.next();) {
+  for (Splitter splitter(text, name); std::optional<CsvRow> row = splitter.next();) {
     if (is_blank(*row)) {
       if (blank_line == 0) blank_line = row->line;
       continue;
@@ -161,15 +211,12 @@ Csv Csv::parse(std::string_view text, const std::string& name) {
       blank_line = 0;
       continue;
     }
-    if (blank_line != 0) throw InputError(at_line(name, blank_line) + "a blank line inside the table; remove it");
-    if (row->cells.size() != csv.header_.size()) {
-      throw InputError(at_line(name, row->line) + "has " + std::to_string(row->cells.size()) +
-                       " cells, the header has " + std::to_string(csv.header_.size()));
-    }
+    if (blank_line != 0) throw_blank_line(name, blank_line);
+    check_length(*row, csv.header_.size(), name);
     csv.rows_.push_back(std::move(row->cells));
     csv.lines_.push_back(row->line);
   }
-  if (csv.header_.empty()) throw InputError(name + ": is empty; a header line with the columns' names is needed");
+  if (csv.header_.empty()) throw_empty(name);
   return csv;
 }
 
@@ -184,16 +231,7 @@ const std::string& Csv::text(std::size_t row, const std::string& column) const {
 }
 
 double Csv::number(std::size_t row, const std::string& column) const {
-  const std::string& cell = text(row, column);
-  if (cell.empty()) throw InputError(where(row, column) + ": is empty; a number is needed");
-  const std::optional<double> value = parse_number<double>(cell);
-  if (value && !std::isfinite(*value))
-    throw InputError(where(row, column) + ": " + in_quotes(cell) + " is not a finite number");
-  if (value && std::abs(*value) <= largest_number) return *value;
-  if (value || is_out_of_range(cell)) {
-    throw InputError(where(row, column) + ": " + in_quotes(cell) + " is out of range; numbers up to 1e12 are read");
-  }
-  throw InputError(where(row, column) + ": " + in_quotes(cell) + " is not a number");
+  return csv_number(text(row, column), {name_, lines_.at(row), column});
 }
 
 long Csv::integer(std::size_t row, const std::string& column, long low, long high) const {
@@ -205,7 +243,52 @@ long Csv::integer(std::size_t row, const std::string& column, long low, long hig
 }
 
 std::string Csv::where(std::size_t row, const std::string& column) const {
-  return name_ + ":" + std::to_string(lines_.at(row)) + ": column '" + column + "'";
+  return CsvPlace{name_, lines_.at(row), column}.text();
+}
+
+CsvStream::CsvStream(std::istream& in, std::string name) : in_(in), name_(std::move(name)) {
+  std::optional<CsvRow> header = next_with_content();
+  if (!header) throw_empty(name_);
+  (void)columns_of(*header, name_);
+  header_ = std::move(header->cells);
+  header_line_ = header->line;
+  blank_line_ = 0;
+}
+
+std::optional<CsvRow> CsvStream::next() {
+  std::optional<CsvRow> row = next_with_content();
+  if (!row) return std::nullopt;
+  if (const std::size_t blank_line = std::exchange(blank_line_, 0); blank_line != 0) {
+    rows_.push_front(std::move(*row));
+    throw_blank_line(name_, blank_line);
+  }
+  check_length(*row, header_.size(), name_);
+  return row;
+}
+
+/// The next row that is not blank.
+std::optional<CsvRow> CsvStream::next_with_content() {
+  while (!rows_.empty() || read_rows()) {
+    CsvRow row = std::move(rows_.front());
+    rows_.pop_front();
+    if (!is_blank(row)) return row;
+    if (blank_line_ == 0) blank_line_ = row.line;
+  }
+  return std::nullopt;
+}
+
+/// A line is one row (several, where lines end in CR alone). False at the end.
+bool CsvStream::read_rows() {
+  const std::string line = read_line(in_, name_, line_);
+  if (line.empty()) return false;
+  const std::size_t first = line_;
+  line_ += count_line_ends(line);
+  std::string_view text = line;
+  if (first == 1 && text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  refuse_binary(text, name_, first);
+  for (Splitter splitter(text, name_, first); std::optional<CsvRow> row = splitter.next();)
+    rows_.push_back(std::move(*row));
+  return true;
 }
 
 }  // namespace alidade

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <deque>
 #include <filesystem>
+#include <istream>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +13,18 @@
 
 namespace alidade {
 
+/// Where a cell stands; `text` is "file:line: column 'name'", to begin a message with.
+struct CsvPlace {
+  const std::string& file;
+  std::size_t line;
+  const std::string& column;
+
+  [[nodiscard]] std::string text() const;
+};
+
+/// A finite number, |x| ≤ 1e12. Throws `shots.csv:17: column 'range_m': 'nan' is not a finite number`.
+[[nodiscard]] double csv_number(const std::string& cell, const CsvPlace& place);
+
 /// A CSV file as read: header names and text cells. The ONE reader of tables; every fault names file, line and column.
 class Csv {
  public:
@@ -17,6 +32,8 @@ class Csv {
   [[nodiscard]] static Csv read(const std::filesystem::path& file);
   [[nodiscard]] static Csv parse(std::string_view text, const std::string& name);
 
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] std::size_t line(std::size_t row) const { return lines_.at(row); }  ///< Where the row begins.
   [[nodiscard]] std::size_t num_rows() const { return rows_.size(); }
   [[nodiscard]] bool has(const std::string& column) const { return columns_.contains(column); }
   [[nodiscard]] const std::vector<std::string>& header() const { return header_; }
@@ -24,7 +41,6 @@ class Csv {
 
   /// Text of a cell. Throws InputError naming the missing column and the known ones.
   [[nodiscard]] const std::string& text(std::size_t row, const std::string& column) const;
-  /// A finite number, |x| ≤ 1e12. Throws `shots.csv:17: column 'range_m': 'nan' is not a finite number`.
   [[nodiscard]] double number(std::size_t row, const std::string& column) const;
   /// An integer in [low, high].
   [[nodiscard]] long integer(std::size_t row, const std::string& column, long low, long high) const;
@@ -37,6 +53,36 @@ class Csv {
   std::map<std::string, std::size_t> columns_;
   std::vector<std::vector<std::string>> rows_;
   std::vector<std::size_t> lines_;
+};
+
+struct CsvRow {
+  std::vector<std::string> cells;
+  std::size_t line = 1;  ///< Where it begins.
+};
+
+/// Such a table row by row, as it arrives: nothing is waited for beyond the end of the line that is asked for.
+class CsvStream {
+ public:
+  /// Reads the header. Throws InputError as Csv does.
+  CsvStream(std::istream& in, std::string name);
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] const std::vector<std::string>& header() const { return header_; }
+  [[nodiscard]] std::size_t header_line() const { return header_line_; }
+  /// The next row, as long as the header; none at the end. Throws InputError; the call after that goes on behind the
+  /// fault.
+  [[nodiscard]] std::optional<CsvRow> next();
+
+ private:
+  [[nodiscard]] std::optional<CsvRow> next_with_content();
+  [[nodiscard]] bool read_rows();
+
+  std::istream& in_;
+  std::string name_;
+  std::vector<std::string> header_;
+  std::size_t header_line_ = 0;
+  std::size_t line_ = 1, blank_line_ = 0;  ///< Of what comes next; of a blank line just passed, 0: none.
+  std::deque<CsvRow> rows_;                ///< Read and not yet given.
 };
 
 }  // namespace alidade

@@ -40,35 +40,54 @@ double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() 
 
 double cost_of(const Matrix8& sums) { return sums(7, 7); }
 
-Float4 load(const float* from) {
-  Float4 values;
+template <class Floats>
+[[gnu::always_inline]] inline void load(const float* from, Floats& values) {
   std::memcpy(&values, from, sizeof values);
-  return values;
 }
 
-float sum(Float4 v) { return (v[0] + v[1]) + (v[2] + v[3]); }
-
-/// One edge at four pixels: distance, position along it, and the two factors of the model.
+/// One edge at some pixels: distance, position along it, and the two factors of the model.
+template <class Floats>
 struct EdgeAtPixels {
-  Float4 distance, along;
-  EdgeProfile profile;
+  Floats distance, along;
+  EdgeProfile<Floats> profile;
 };
 
 /// Constants of one edge, in float.
 struct EdgeConstants {
   float cosine, sine, half_bend, inverse_width;
 
-  [[nodiscard]] EdgeAtPixels at(Float4 dx, Float4 dy) const {
-    const Float4 along = cosine * dx + sine * dy;
-    const Float4 distance = cosine * dy - sine * dx - half_bend * along * along;
-    return {distance, along, edge_profile(distance * inverse_width)};
+  template <class Floats>
+  [[nodiscard, gnu::always_inline]] inline EdgeAtPixels<Floats> at(const Floats& dx, const Floats& dy) const {
+    const Floats along = cosine * dx + sine * dy;
+    const Floats distance = cosine * dy - sine * dx - half_bend * along * along;
+    return {distance, along, edge_profile<Floats>(distance * inverse_width)};
+  }
+};
+
+/// The model in float, relative to the window's origin.
+struct FloatModel {
+  std::array<EdgeConstants, 2> edges;
+  float x, y, slope, contrast, mean, minus_inverse_blur;
+
+  FloatModel(const CornerWindow& window, const Model& model)
+      : edges{},
+        x(static_cast<float>(model.px.x() - window.origin.x())),
+        y(static_cast<float>(model.px.y() - window.origin.y())),
+        contrast(static_cast<float>(model.contrast)),
+        mean(static_cast<float>(model.mean)),
+        minus_inverse_blur(static_cast<float>(-1.0 / model.blur_px)) {
+    const auto inverse_width = static_cast<float>(1.0 / (std::numbers::sqrt2 * model.blur_px));
+    for (std::size_t k = 0; k < 2; ++k) {
+      edges[k] = {static_cast<float>(std::cos(model.angle_rad[k])), static_cast<float>(std::sin(model.angle_rad[k])),
+                  static_cast<float>(0.5 * model.bend[k]), inverse_width};
+    }
+    slope = static_cast<float>(2.0 * std::numbers::inv_sqrtpi * model.contrast) * inverse_width;
   }
 };
 
 /// Adds column[r] · column[c], c ≥ r, row by row; written out at compile time, which halves the time of a fit.
-/// Inlined, so that it is compiled for the processor that its caller is compiled for.
-template <std::size_t... r>
-[[gnu::always_inline]] inline void add_products(const std::array<Float4, 8>& column, std::array<Float4, 36>& sums,
+template <class Floats, std::size_t... r>
+[[gnu::always_inline]] inline void add_products(const std::array<Floats, 8>& column, std::array<Floats, 36>& sums,
                                                 std::index_sequence<r...>) {
   const auto add_row = [&]<std::size_t row, std::size_t... c>(std::index_sequence<c...>)
       __attribute__((always_inline)) {
@@ -77,41 +96,49 @@ template <std::size_t... r>
   (add_row.template operator()<r>(std::make_index_sequence<8 - r>{}), ...);
 }
 
+/// Adds the products of the columns of [J r] over the pixels from number i on, as many as fit into `Floats`.
+template <class Floats>
+[[gnu::always_inline]] inline void add_pixels(const CornerWindow& window, std::size_t i, const FloatModel& model,
+                                              std::array<Floats, 36>& sums) {
+  Floats x, y, grey;
+  load(&window.x[i], x);
+  load(&window.y[i], y);
+  load(&window.grey[i], grey);
+  const Floats dx = x - model.x, dy = y - model.y;
+  const EdgeAtPixels<Floats> one = model.edges[0].at(dx, dy), two = model.edges[1].at(dx, dy);
+  const Floats g1 = model.slope * one.profile.bell * two.profile.step;
+  const Floats g2 = model.slope * one.profile.step * two.profile.bell;
+  const Floats product = one.profile.step * two.profile.step;
+  const std::array<Floats, 8> column{g1,
+                                     g2,
+                                     -g1 * one.along,
+                                     -g2 * two.along,
+                                     (g1 * one.distance + g2 * two.distance) * model.minus_inverse_blur,
+                                     product,
+                                     Floats{} + 1.0f,
+                                     model.mean + model.contrast * product - grey};
+  add_products(column, sums, std::make_index_sequence<8>{});
+}
+
 /// Sums of all products of the columns of [J r] over the pixels near the edges, in float: positions are small numbers
 /// around the corner.
 ALIDADE_VECTOR_CLONES Matrix8 near_sums(const CornerWindow& window, const Model& model) {
-  const auto inverse_width = static_cast<float>(1.0 / (std::numbers::sqrt2 * model.blur_px));
-  std::array<EdgeConstants, 2> edges{};
-  for (std::size_t k = 0; k < 2; ++k) {
-    edges[k] = {static_cast<float>(std::cos(model.angle_rad[k])), static_cast<float>(std::sin(model.angle_rad[k])),
-                static_cast<float>(0.5 * model.bend[k]), inverse_width};
-  }
-  const auto slope = static_cast<float>(2.0 * std::numbers::inv_sqrtpi * model.contrast) * inverse_width;
-  const auto contrast = static_cast<float>(model.contrast), mean = static_cast<float>(model.mean);
-  const auto minus_inverse_blur = static_cast<float>(-1.0 / model.blur_px);
-  const Eigen::Vector2f corner = (model.px - window.origin).cast<float>();
-
-  std::array<Float4, 36> sums{};
-  for (std::size_t i = 0; i < window.num_near(); i += 4) {
-    const Float4 dx = load(&window.x[i]) - corner.x(), dy = load(&window.y[i]) - corner.y();
-    const EdgeAtPixels one = edges[0].at(dx, dy), two = edges[1].at(dx, dy);
-    const Float4 g1 = slope * one.profile.bell * two.profile.step;
-    const Float4 g2 = slope * one.profile.step * two.profile.bell;
-    const Float4 product = one.profile.step * two.profile.step;
-    const std::array<Float4, 8> column{g1,
-                                       g2,
-                                       -g1 * one.along,
-                                       -g2 * two.along,
-                                       (g1 * one.distance + g2 * two.distance) * minus_inverse_blur,
-                                       product,
-                                       Float4{1.0f, 1.0f, 1.0f, 1.0f},
-                                       mean + contrast * product - load(&window.grey[i])};
-    add_products(column, sums, std::make_index_sequence<8>{});
-  }
+  const FloatModel constants(window, model);
+  std::array<Float8, 36> sums{};
+  std::array<Float4, 36> last{};  // the pixels are a multiple of four
+  std::size_t i = 0;
+  for (; i + 8 <= window.num_near(); i += 8) add_pixels(window, i, constants, sums);
+  if (i < window.num_near()) add_pixels(window, i, constants, last);
   Matrix8 full;
   std::size_t at = 0;
   for (int r = 0; r < 8; ++r) {
-    for (int c = r; c < 8; ++c) full(r, c) = full(c, r) = static_cast<double>(sum(sums[at++]));
+    for (int c = r; c < 8; ++c, ++at) {
+      const Float8& s = sums[at];
+      const Float4& t = last[at];
+      const float sum =
+          ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7])) + ((t[0] + t[1]) + (t[2] + t[3]));
+      full(r, c) = full(c, r) = static_cast<double>(sum);
+    }
   }
   return full;
 }

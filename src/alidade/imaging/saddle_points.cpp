@@ -54,8 +54,10 @@ Ring make_ring() {
 }
 
 /// -det of the Hessian of the smoothed picture.
-ALIDADE_VECTOR_CLONES cv::Mat strength_of(const cv::Mat& smooth) {
-  cv::Mat strength(smooth.size(), CV_32F, cv::Scalar(0));
+ALIDADE_VECTOR_CLONES void find_strength(const cv::Mat& smooth, cv::Mat& strength) {
+  strength.create(smooth.size(), CV_32F);
+  for (const int edge : {0, smooth.rows - 1}) strength.row(edge).setTo(0.0);
+  for (const int edge : {0, smooth.cols - 1}) strength.col(edge).setTo(0.0);
   for (int y = 1; y + 1 < smooth.rows; ++y) {
     const float *up = smooth.ptr<float>(y - 1), *here = smooth.ptr<float>(y), *down = smooth.ptr<float>(y + 1);
     float* out = strength.ptr<float>(y);
@@ -66,7 +68,6 @@ ALIDADE_VECTOR_CLONES cv::Mat strength_of(const cv::Mat& smooth) {
       out[x] = xy * xy - xx * yy;
     }
   }
-  return strength;
 }
 
 /// One of eight values is above the threshold.
@@ -74,7 +75,7 @@ bool is_any_above(const float* values, float threshold) {
   Float4 one, two;
   std::memcpy(&one, values, sizeof one);
   std::memcpy(&two, values + 4, sizeof two);
-  const Int4 above = (one > threshold) | (two > threshold);
+  const IntsOf<Float4> above = (one > threshold) | (two > threshold);
   std::array<std::uint64_t, 2> halves;
   std::memcpy(halves.data(), &above, sizeof above);
   return (halves[0] | halves[1]) != 0;
@@ -177,9 +178,9 @@ std::vector<SaddlePoint> find_saddle_points(const cv::Mat& photo) {
   static const Ring ring = make_ring();
   std::vector<SaddlePoint> points;
   if (photo.rows <= 2 * border || photo.cols <= 2 * border) return points;
-  cv::Mat smooth;
+  thread_local cv::Mat smooth, strength;  // kept between photos: new pages of memory cost as much as the blur
   cv::GaussianBlur(photo, smooth, cv::Size(7, 7), smoothing_px, smoothing_px, cv::BORDER_REPLICATE);
-  const cv::Mat strength = strength_of(smooth);
+  find_strength(smooth, strength);
   double strongest = 0.0;
   cv::minMaxLoc(strength, nullptr, &strongest);
   const float threshold = std::max(min_strength, relative_strength * static_cast<float>(strongest));

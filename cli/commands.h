@@ -6,7 +6,9 @@ class Frame;
 
 void add_calibrate(Frame& frame);
 void add_camera(Frame& frame);
+void add_observe(Frame& frame);
 void add_plan(Frame& frame);
+void add_rotation_scenario(Frame& frame);  ///< Of `simulate`.
 void add_simulate(Frame& frame);
 
 // How to write a command: cli/NAME.cpp with one function `add_NAME(Frame&)`, declared here and called in main.cpp.

@@ -2,7 +2,6 @@
 
 #include <CLI/CLI.hpp>
 #include <array>
-#include <charconv>
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -14,6 +13,7 @@
 #include "cli/commands.h"
 #include "cli/frame.h"
 #include "cli/option_checks.h"
+#include "cli/picture_size.h"
 
 namespace alidade::cli {
 namespace {
@@ -26,23 +26,6 @@ struct BoardArgs {
   double blur_px = 0.6, noise = 2.0, sigma_px = 0.1;
   bool corners_only = false;
 };
-
-/// Width and height of "800x600".
-std::pair<int, int> picture_size(const std::string& text) {
-  const char *at = text.data(), *end = at + text.size();
-  int width = 0, height = 0;
-  const auto left = std::from_chars(at, end, width);
-  const bool has_cross = left.ec == std::errc{} && left.ptr != end && *left.ptr == 'x';
-  const auto right = has_cross ? std::from_chars(left.ptr + 1, end, height) : left;
-  constexpr int least = 32, most = 20000;
-  const bool is_size = has_cross && right.ec == std::errc{} && right.ptr == end && std::min(width, height) >= least &&
-                       std::max(width, height) <= most;
-  if (!is_size) {
-    throw UsageError(
-        fmt::format("--size: '{}' is not WIDTHxHEIGHT of {} to {} px, for example 800x600", text, least, most));
-  }
-  return {width, height};
-}
 
 Camera camera_from(const BoardArgs& args, Run& run) {
   if (!args.camera_file.empty()) {
@@ -172,7 +155,7 @@ void add_board_scenario(Frame& frame) {
 
 void add_simulate(Frame& frame) {
   frame.add_group("simulate", "Measurements with known truth, in the files that the other commands read");
-  constexpr std::array scenarios{add_board_scenario};  // one function a scenario
+  constexpr std::array scenarios{add_board_scenario, add_rotation_scenario};  // one function a scenario
   for (const auto add_scenario : scenarios) add_scenario(frame);
 }
 

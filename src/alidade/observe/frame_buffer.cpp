@@ -144,7 +144,8 @@ Adjustment adjust(const FrameBuffer& buffer, const AdjustConfig& config, const P
   const auto attempt = [&](const RotatingCamera& start) {
     if (!start_points(bundle, start, config.with_depth)) return;
     bundle.camera = start;
-    BundleSolution solution = solve_rotation_bundle(bundle, config.prior.value_or(CommonPrior(start)), solve, progress);
+    BundleSolution solution =
+        solve_rotation_bundle(bundle, config.prior ? config.prior->about(start) : CommonPrior(start), solve, progress);
     const bool is_better = !adjustment.has_value || solution.sum_squares < adjustment.solution.sum_squares;
     if (!solution.converged || !std::isfinite(solution.rms_px) || !is_better) return;
     adjustment.solution = std::move(solution);
@@ -165,8 +166,8 @@ Adjustment adjust(const FrameBuffer& buffer, const AdjustConfig& config, const P
     }
     bundle.camera = so_far.camera;
     bundle.points = so_far.points;
-    BundleSolution again =
-        solve_rotation_bundle(bundle, config.prior.value_or(CommonPrior(so_far.camera)), solve, progress);
+    BundleSolution again = solve_rotation_bundle(
+        bundle, config.prior ? config.prior->about(so_far.camera) : CommonPrior(so_far.camera), solve, progress);
     adjustment.has_value = again.converged && std::isfinite(again.rms_px);
     adjustment.solution = std::move(again);
   }

@@ -7,9 +7,10 @@
 namespace alidade {
 namespace {
 
-constexpr double gate_z = 3.09;          // one frame in a thousand is called bad by chance
-constexpr double zoom_gain = 33.4;       // χ²₄ at 10⁻⁶: what a change of K explains that chance does not
-constexpr int slip_patience = 15;        // frames until a point that slipped is met anew
+constexpr double gate_z = 3.09;     // one frame in a thousand is called bad by chance
+constexpr double zoom_gain = 33.4;  // χ²₄ at 10⁻⁶: what a change of K explains that chance does not
+constexpr int slip_patience = 15;   // frames until a point that slipped is met anew
+constexpr double slipped_variance = 25.0;
 constexpr double restart_after_s = 1.0;  // without a frame that fits
 constexpr double fine_enough = 1e-3;     // σ_f / f: the filter's linearisation is exact to rounding
 constexpr double better_by = 9.2;        // χ²₂ at 0.01
@@ -272,6 +273,7 @@ void HybridObserver::note_slips() {
 /// The point is met anew; if it slips again, later and later.
 void HybridObserver::renew(std::size_t point) {
   filter_.forget_point(point);
+  filter_.distrust(point, slipped_variance);  // what slipped once may not stand still now either
   buffer_.renew_point(point);
   frames_out_[point] = 0;
   patience_[point] = std::min(4 * patience_[point], 10000);

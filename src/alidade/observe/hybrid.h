@@ -37,6 +37,8 @@ class HybridObserver {
   [[nodiscard]] bool is_running() const { return is_running_; }
   /// σ of a pixel coordinate: given, or as the log tells so far. [px]
   [[nodiscard]] double sigma_px() const { return config_.scale.scale * sigma_px_ * noise_ratio(); }
+  /// The σ that the filter reckons with, normalised: its covariance is in units of it.
+  [[nodiscard]] double filter_sigma_px() const { return sigma_px_; }
   /// When the intrinsics last came to rest, or the estimate began. [s]
   [[nodiscard]] double constant_since_s() const { return constant_since_s_; }
 

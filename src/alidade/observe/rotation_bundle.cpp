@@ -103,7 +103,7 @@ class Solver {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     if (!(place.camera.k[0] > 0.02 && place.camera.k[1] > 0.02)) return infinity;
     const CommonVector offset = prior_.offset(layout_, place.camera);
-    double cost = (offset.array().square() * prior_.information(layout_).array()).sum();
+    double cost = offset.dot(prior_.information(layout_) * offset);
     std::optional<RotationView> view;
     int frame = -1;
     for (const BundleObservation& seen : bundle_.observations) {
@@ -161,10 +161,11 @@ class Solver {
     const int n = layout_.size;
     common_.setZero(n + 3 * turns_, n + 3 * turns_);
     gradient_.setZero(n + 3 * turns_);
-    common_.diagonal().head(n) = prior_.information(layout_);
-    gradient_.head(n) = prior_.information(layout_).cwiseProduct(prior_.offset(layout_, place_.camera));
+    common_.topLeftCorner(n, n) = prior_.information(layout_);
+    gradient_.head(n) = prior_.information(layout_) * prior_.offset(layout_, place_.camera);
     for (std::size_t i = 0; i < blocks_.size(); ++i) begin_point(i);
     residual_px_.clear();
+    residuals_.clear();
     sum_squares_ = 0.0;
     for (int k = 0; k < turns_; ++k) add_turn_prior(k);
     std::optional<RotationView> view;
@@ -210,10 +211,12 @@ class Solver {
     const BearingPoint& point = place_.points[static_cast<std::size_t>(seen.point)];
     if (!view.predict(point, turns_ > 0 ? turn_layout_ : layout_, p)) {
       residual_px_.push_back(std::numeric_limits<double>::infinity());
+      residuals_.push_back(Eigen::Vector2d::Constant(not_seen));
       return;
     }
     const Eigen::Vector2d error = p.px - seen.px;
     residual_px_.push_back(error.norm());
+    residuals_.push_back(error);
     const double weight = huber_weight(error.norm() / config_.sigma_px) / square(config_.sigma_px);
     sum_squares_ += weight * error.squaredNorm();
     const int n = layout_.size;
@@ -326,7 +329,8 @@ class Solver {
     Eigen::MatrixXd reduced = common_;
     Eigen::VectorXd gradient = gradient_;
     solution.prior_information = prior_.information(layout_);
-    reduced.diagonal().head(n) -= solution.prior_information;
+    solution.said_information = prior_.said_information(layout_);
+    reduced.topLeftCorner(n, n) -= solution.prior_information;
     eliminate_points(0.0, reduced, gradient);
     if (turns_ > 0) {
       const auto turns = reduced.bottomRightCorner(3 * turns_, 3 * turns_).selfadjointView<Eigen::Lower>();
@@ -338,6 +342,7 @@ class Solver {
       solution.given_common.push_back({-inverse_[i] * blocks_[i].by_common, inverse_[i]});
     }
     solution.residual_px = residual_px_;
+    solution.residuals = residuals_;
     solution.sum_squares = sum_squares_;
     double squares = 0.0;
     for (const double norm : residual_px_) squares += norm * norm;
@@ -360,6 +365,7 @@ class Solver {
   std::vector<PointBlock> blocks_;
   std::vector<Eigen::Matrix3d> inverse_;
   std::vector<double> residual_px_;
+  std::vector<Eigen::Vector2d> residuals_;
   double sum_squares_ = 0.0;
   RotationPrediction prediction_;
 
@@ -370,45 +376,6 @@ class Solver {
 };
 
 }  // namespace
-
-CommonPrior::CommonPrior(const RotatingCamera& mean_in)
-    : mean(mean_in), sigma_k(0.5 * mean_in.k[0], 0.5 * mean_in.k[1], 0.5, 0.5) {}
-
-CommonVector CommonPrior::information(const CommonLayout& layout) const {
-  CommonVector sigma = CommonVector::Ones(layout.size);
-  sigma.head<4>() = sigma_k;
-  if (layout.k1 >= 0) sigma[layout.k1] = sigma_k1;
-  if (layout.mount >= 0) sigma.segment<3>(layout.mount).setConstant(sigma_mount_rad);
-  if (layout.delay >= 0) sigma[layout.delay] = sigma_delay_s;
-  if (layout.lever >= 0) sigma.segment<3>(layout.lever).setConstant(sigma_lever_m);
-  return sigma.array().square().inverse();
-}
-
-CommonVector CommonPrior::offset(const CommonLayout& layout, const RotatingCamera& camera) const {
-  CommonVector offset = CommonVector::Zero(layout.size);
-  offset.head<4>() = camera.k - mean.k;
-  if (layout.k1 >= 0) offset[layout.k1] = camera.k1 - mean.k1;
-  if (layout.mount >= 0) {
-    offset.segment<3>(layout.mount) = log_so3((mean.cam_from_mount.conjugate() * camera.cam_from_mount).normalized());
-  }
-  if (layout.delay >= 0) offset[layout.delay] = camera.delay_s - mean.delay_s;
-  if (layout.lever >= 0) offset.segment<3>(layout.lever) = camera.lever_m - mean.lever_m;
-  return offset;
-}
-
-CommonMatrix BundleSolution::covariance() const {
-  CommonMatrix all = information;
-  all.diagonal() += prior_information;
-  return all.ldlt().solve(CommonMatrix::Identity(all.rows(), all.cols()));
-}
-
-double robust_sigma(std::vector<double> residual_norms, int dof) {
-  if (residual_norms.empty() || dof < 1) return 0.0;
-  const auto middle = residual_norms.begin() + static_cast<std::ptrdiff_t>(residual_norms.size() / 2);
-  std::nth_element(residual_norms.begin(), middle, residual_norms.end());
-  const double share = static_cast<double>(dof) / (2.0 * static_cast<double>(residual_norms.size()));
-  return *middle / std::sqrt(2.0 * std::log(2.0)) / std::sqrt(share);
-}
 
 BundleSolution solve_rotation_bundle(const RotationBundle& bundle, const CommonPrior& prior, const BundleConfig& config,
                                      const Progress& progress) {

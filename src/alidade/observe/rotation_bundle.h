@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -44,19 +46,25 @@ struct BundleConfig {
   int max_iterations = 60;
 };
 
-/// What is known of the common parameters before: independent normal distributions. Weak unless told.
+/// What is known of the common parameters before: normal distributions, weak where nothing is said.
 struct CommonPrior {
   explicit CommonPrior(const RotatingCamera& mean_in);
   RotatingCamera mean;
-  Eigen::Vector4d sigma_k;  ///< fx, fy: half their value; cx, cy: a quarter of the picture.
+  Eigen::Vector4d sigma_k;       ///< fx, fy: half their value; cx, cy: a quarter of the picture.
+  std::array<bool, 4> says_k{};  ///< sigma_k is said by a person, not weak.
+  double sigma_aspect = std::numeric_limits<double>::infinity();  ///< Of fx − fy, where a person says so.
   double sigma_k1 = 0.5;
   double sigma_mount_rad = 0.2;
   double sigma_delay_s = 0.1;
   double sigma_lever_m = 0.3;
 
-  [[nodiscard]] CommonVector information(const CommonLayout& layout) const;  ///< 1/σ² in the layout's order.
+  [[nodiscard]] CommonMatrix information(const CommonLayout& layout) const;
+  /// Of what a person says alone.
+  [[nodiscard]] CommonMatrix said_information(const CommonLayout& layout) const;
   /// Values minus the mean, in the layout's order.
   [[nodiscard]] CommonVector offset(const CommonLayout& layout, const RotatingCamera& camera) const;
+  /// The same knowledge; what is weak is weak about `camera`.
+  [[nodiscard]] CommonPrior about(const RotatingCamera& camera) const;
 };
 
 /// A point's share of the joint covariance given the common parameters c: point = point_mean + slope (c − c_mean) + e,
@@ -75,14 +83,18 @@ struct BundleSolution {
   std::vector<Eigen::Quaterniond> mount_from_start;  ///< One a frame, with its turn.
   CommonMatrix information;  ///< Of the common parameters but the turn, all else eliminated, without the prior, in
                              ///< units of 1/σ².
-  CommonVector prior_information;
+  CommonMatrix prior_information;
+  CommonMatrix said_information;               ///< Of the prior, what a person said.
   std::vector<PointGivenCommon> given_common;  ///< One a point; not with turns.
-  std::vector<double> residual_px;             ///< Norm, one an observation, normalised.
+  std::vector<Eigen::Vector2d> residuals;      ///< Prediction minus pixel, one an observation, normalised.
+  std::vector<double> residual_px;             ///< Their norms.
   double sum_squares = 0.0;                    ///< Of weighted residuals over σ.
   double rms_px = 0.0;                         ///< A coordinate, normalised, unweighted.
   int dof = 0;                                 ///< Measurements minus unknowns.
 
   [[nodiscard]] CommonMatrix covariance() const;
+  /// Cramér–Rao bound at the solution: without the weak prior. Not finite where the data cannot tell.
+  [[nodiscard]] CommonMatrix bound() const;
 };
 
 /// Rotation-only bundle adjustment: Levenberg–Marquardt on the common parameters, all points, and (with nuisances.turn)

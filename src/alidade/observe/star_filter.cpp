@@ -91,7 +91,7 @@ void StarFilter::observe(const RotationFrame& frame, std::span<const Eigen::Vect
     seen.innovation = px[i] - prediction.px;
     seen.J_point = prediction.J_px_point;
     seen.by_common = prediction.J_px_common;
-    Eigen::Matrix2d cov = Eigen::Matrix2d::Identity() * variance_px_;
+    Eigen::Matrix2d cov = Eigen::Matrix2d::Identity() * (variance_px_ * point.variance_factor);
     if (with_depth_) {
       seen.through_point.noalias() = seen.J_point * point.slope;
       cov.noalias() += seen.J_point * point.cov * seen.J_point.transpose();
@@ -237,7 +237,7 @@ void StarFilter::add_new_points(const RotationFrame& frame, std::span<const Eige
     point.slope.setZero();
     point.slope.topRows<2>() = -J_inverse * prediction.J_px_common;
     point.cov.setZero();
-    point.cov.topLeftCorner<2, 2>() = variance_px_ * J_inverse * J_inverse.transpose();
+    point.cov.topLeftCorner<2, 2>() = variance_px_ * point.variance_factor * J_inverse * J_inverse.transpose();
     if (with_depth_) {
       constexpr double variance = new_inverse_depth_sigma * new_inverse_depth_sigma;
       point.cov.topLeftCorner<2, 2>() += variance * by_depth * by_depth.transpose();

@@ -20,6 +20,8 @@ class StarFilter {
   void start(const BundleSolution& solution, const std::vector<int>& bundle_point_of, double sigma_px);
   void forget_points();  ///< A new segment: points are met anew, what they have in common stays.
   void forget_point(std::size_t i) { points_[i].known = false; }
+  /// From now on this point's pixels have so many times their variance.
+  void distrust(std::size_t i, double factor) { points_[i].variance_factor = factor; }
 
   /// The common parameters walk: variances added, in the layout's order; `turn` is drawn anew where `turn_sigma` > 0.
   void predict(const CommonVector& variance, double turn_sigma_rad);
@@ -65,6 +67,7 @@ class StarFilter {
     BearingPoint bearing;
     PointByCommonSlope slope;
     Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();
+    double variance_factor = 1.0;
     bool known = false;
   };
   struct Seen {

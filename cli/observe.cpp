@@ -1,0 +1,190 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "alidade/io/camera_file.h"
+#include "alidade/io/observe_document.h"
+#include "alidade/io/rotation_log_file.h"
+#include "cli/commands.h"
+#include "cli/frame.h"
+#include "cli/option_checks.h"
+#include "cli/picture_size.h"
+
+namespace alidade::cli {
+namespace {
+
+struct Args {
+  std::string log, pairs, camera, size, method = "hybrid", rotation = "known";
+  std::vector<std::string> estimate;
+  std::vector<double> start, lever;
+  bool skip_bad = false;
+  ObserveConfig config;
+};
+
+void set_words(const Args& args, ObserveConfig& config) {
+  static const std::map<std::string, ObserveMethod> methods{{"hybrid", ObserveMethod::hybrid},
+                                                            {"window", ObserveMethod::window},
+                                                            {"flow", ObserveMethod::flow},
+                                                            {"fang2011", ObserveMethod::fang2011},
+                                                            {"batch", ObserveMethod::batch}};
+  static const std::map<std::string, RotationKnowledge> rotations{
+      {"known", RotationKnowledge::known}, {"noisy", RotationKnowledge::noisy}, {"free", RotationKnowledge::free}};
+  config.method = methods.at(args.method);
+  config.rotation = rotations.at(args.rotation);
+  for (const std::string& name : args.estimate) {
+    if (name == "k1") {
+      config.estimate.k1 = true;
+    } else if (name == "mount") {
+      config.estimate.mount = true;
+    } else if (name == "delay") {
+      config.estimate.delay = true;
+    } else if (name == "lever") {
+      config.estimate.lever = true;
+    } else {
+      throw UsageError("--estimate: '" + name + "' is not k1, mount, delay or lever");
+    }
+  }
+}
+
+ObserveConfig config_from(const Args& args, const std::optional<Camera>& camera) {
+  ObserveConfig config = args.config;
+  set_words(args, config);
+  if (!args.size.empty()) {
+    std::tie(config.width_px, config.height_px) = picture_size(args.size);
+  } else if (camera) {
+    config.width_px = camera->width_px;
+    config.height_px = camera->height_px;
+  }
+  if (camera) config.start = params(camera->lens).head<4>();
+  if (!args.start.empty()) config.start = Eigen::Vector4d(args.start.data());
+  if (config.start && !(config.start->head<2>().minCoeff() > 0.0)) {
+    throw UsageError("--start: the focal lengths must be above zero");
+  }
+  if (!args.lever.empty()) config.lever_m = Eigen::Vector3d(args.lever.data());
+  const bool is_regression = config.method == ObserveMethod::flow || config.method == ObserveMethod::fang2011;
+  if (is_regression && (!args.estimate.empty() || config.rotation != RotationKnowledge::known)) {
+    throw UsageError("--method " + args.method + " knows neither --estimate nor a rotation that is not known");
+  }
+  return config;
+}
+
+RotationLog read_log(const Args& args, Run& run) {
+  const bool is_pairs = !args.pairs.empty();
+  const std::string& file = is_pairs ? args.pairs : args.log;
+  run.add_input(is_pairs ? "pairs" : "log", file);
+  if (is_pairs) return read_pairs(file);
+  RotationLogFile read = read_rotation_log(
+      file, {.skip_bad = args.skip_bad, .needs_rotation = args.rotation != "free"});
+  run.document.counts.given = read.skipped.size();
+  run.document.counts.skipped = std::move(read.skipped);
+  return std::move(read.log);
+}
+
+void summarize(const ObserveReport& report, Run& run) {
+  for (const ObservedQuantity& quantity : report.quantities) {
+    run.say(fmt::format("{:<11} {:.6g} ± {:.2g}   (3σ; this log's bound {:.2g})", quantity.name, quantity.value,
+                        3.0 * quantity.sigma, 3.0 * quantity.bound));
+  }
+  run.say(fmt::format("σ of a pixel {:.3g} px, {}", report.sigma_px,
+                      report.sigma_is_told ? "told by the residuals" : "as given"));
+  int bursts = 0;
+  for (const ObserveNote& note : report.events) {
+    if (note.event == ObserveEvent::burst || note.event == ObserveEvent::slip) {
+      ++bursts;
+    } else {
+      run.say(fmt::format("{:8.2f} s  {}", note.t_s, event_name(note.event)));
+    }
+  }
+  if (bursts > 0) run.say(fmt::format("{} frames or points left out that did not fit", bursts));
+}
+
+ExitCode observe_log(const Args& args, Run& run) {
+  if (args.log.empty() == args.pairs.empty()) throw UsageError("give a rotation log, or --pairs FILE");
+  std::optional<Camera> camera;
+  if (!args.camera.empty()) {
+    run.add_input("camera", args.camera);
+    camera = read_camera(args.camera);
+  }
+  ObserveConfig config = config_from(args, camera);
+  RotationLog log = read_log(args, run);
+  if (log.source == RotationSource::none && config.rotation != RotationKnowledge::free) {
+    if (args.pairs.empty()) {
+      throw InputError(args.log + ": no rotation: omega_x,omega_y or pan,tilt or qw,qx,qy,qz, or say --rotation free");
+    }
+    config.rotation = RotationKnowledge::free;
+  }
+  if (config.rotation == RotationKnowledge::free) log.source = RotationSource::none;
+  if (camera) log = undistorted(log, *camera);
+  run.lap("read");
+  const ObserveReport report = observe(log, config, run.progress);
+  run.lap("observe");
+  const Verdict verdict = observe_verdict(report, log, config);
+  const Camera seen = observed_camera(report, camera);
+  fill_observation(log, report, seen, run.document);
+  if (verdict.exit_code == ExitCode::ok) {
+    summarize(report, run);
+    run.add_file("camera.yaml", camera_text(seen, CameraFormat::alidade));
+  }
+  std::vector<double> times;
+  for (const RotationRow& row : log.rows) times.push_back(row.t_s);
+  run.add_file("intrinsics.csv", intrinsics_csv(times, report.steps));
+  return run.finish(verdict);
+}
+
+void add_options(CLI::App& command, Args& args) {
+  command.add_option("log", args.log, "Rotation log, CSV: t, the rotation, p1x,p1y,p2x,p2y,…");
+  command
+      .add_option("--pairs", args.pairs, "Matched points of neighbouring photos instead, CSV: frame_a,frame_b,ua_px,…")
+      ->type_name("FILE");
+  command.add_option("--method", args.method, "hybrid, window, flow, fang2011 or batch")
+      ->check(CLI::IsMember({"hybrid", "window", "flow", "fang2011", "batch"}))
+      ->capture_default_str();
+  command
+      .add_option("--rotation", args.rotation, "known: exact; noisy: measured with --sigma-angle or --sigma-rate; free")
+      ->check(CLI::IsMember({"known", "noisy", "free"}))
+      ->capture_default_str();
+  command.add_option("--estimate", args.estimate, "Estimated as well: k1, mount, delay, lever")->delimiter(',');
+  command.add_option("--camera", args.camera, "Where to start, and the lens' distortion")->type_name("FILE");
+  command.add_option("--start", args.start, "Where to start: fx,fy,cx,cy [px]; without it several are tried")
+      ->delimiter(',')
+      ->expected(4)
+      ->check(finite_number());
+  command.add_option("--size", args.size, "Size of the picture (default: what holds the points)")->type_name("WxH");
+  command.add_option("--profile", args.config.profile, "Of fang2011: fast, quiet or kalman")
+      ->check(CLI::IsMember({"fast", "quiet", "kalman"}))
+      ->capture_default_str();
+  command.add_flag("--square-pixels", args.config.square_pixels, "fx = fy");
+  command.add_flag("--fix-centre", args.config.fixed_centre, "cx, cy: the start's, or the picture's middle");
+  command.add_option("--lever", args.lever, "Camera centre from the centre of rotation, x,y,z in the camera frame [m]")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(finite_number());
+  const auto sigma = [&](const char* name, double& value, const char* help) {
+    command.add_option(name, value, help)->check(positive_number());
+  };
+  sigma("--sigma-px", args.config.sigma_px, "Of a pixel coordinate (default: told by the residuals)");
+  sigma("--sigma-angle", args.config.sigma_angle_rad, "Of an encoder or attitude angle [rad]");
+  sigma("--sigma-rate", args.config.sigma_rate_rad_per_s, "Of a rate [rad/s]");
+  sigma("--sigma-range-m", args.config.sigma_range_m, "Of range_m");
+  sigma("--window-s", args.config.window_s, "Length of --method window");
+  command.add_flag("--skip-bad", args.skip_bad, "Leave out rows that are wrong, by name, instead of stopping");
+}
+
+}  // namespace
+
+void add_observe(Frame& frame) {
+  auto args = std::make_shared<Args>();
+  CLI::App& command = frame.add_command(
+      {.name = "observe",
+       .summary = "Intrinsics of a camera that pans, tilts and zooms, from what it sees while it turns",
+       .examples =
+           "alidade observe log.csv --size 780x582\n"
+           "alidade observe log.csv --camera prior.yaml --estimate k1,mount,delay\n"
+           "alidade observe log.csv --method fang2011 --profile quiet --start 500,510,400,300\n"
+           "alidade observe --pairs matches.csv --rotation free --square-pixels --fix-centre --size 1280x960\n"},
+      [args](Run& run) { return observe_log(*args, run); });
+  add_options(command, *args);
+}
+
+}  // namespace alidade::cli

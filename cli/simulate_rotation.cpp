@@ -1,0 +1,160 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+#include "alidade/io/camera_file.h"
+#include "alidade/io/rotation_log_file.h"
+#include "alidade/simulate/draws.h"
+#include "alidade/simulate/rotation.h"
+#include "cli/commands.h"
+#include "cli/frame.h"
+#include "cli/option_checks.h"
+#include "cli/picture_size.h"
+
+namespace alidade::cli {
+namespace {
+
+struct Args {
+  std::string size = "780x582", source = "rate", motion = "sway", zoom = "none";
+  std::vector<double> k{710.0, 700.0, 390.0, 290.0}, lever, depth;
+  double k1 = 0.0, tilt_deg = 0.0, delay_s = 0.0;
+  int points = 4;
+  RotationLogConfig config;
+};
+
+/// Pan, tilt, roll or rates, over time.
+std::function<Eigen::Vector3d(double)> motion_of(const Args& args) {
+  const bool is_rate = args.source == "rate";
+  const Eigen::Vector3d kept = args.motion == "pan"    ? Eigen::Vector3d(is_rate ? 0.0 : 1.0, is_rate ? 1.0 : 0.0, 0.0)
+                               : args.motion == "tilt" ? Eigen::Vector3d(is_rate ? 1.0 : 0.0, is_rate ? 0.0 : 1.0, 0.0)
+                                                       : Eigen::Vector3d::Ones();
+  const double tilt = args.tilt_deg * std::numbers::pi / 180.0;
+  if (args.motion == "roll") {
+    return [is_rate](double t) {
+      return Eigen::Vector3d(0.0, 0.0, is_rate ? 0.2 * std::sin(1.6 * t) : 0.125 * (1.0 - std::cos(1.6 * t)));
+    };
+  }
+  if (args.motion == "still") return [](double) { return Eigen::Vector3d(Eigen::Vector3d::Zero()); };
+  if (is_rate) return [kept](double t) { return Eigen::Vector3d(paper_rate(t).cwiseProduct(kept)); };
+  return [kept, tilt](double t) {
+    return Eigen::Vector3d(paper_pan_tilt(t, 0.0).cwiseProduct(kept) + Eigen::Vector3d(0.0, tilt, 0.0));
+  };
+}
+
+RotatingIntrinsics intrinsics_at(const Args& args, double t_s) {
+  RotatingIntrinsics now{args.k[0], args.k[1], args.k[2], args.k[3], args.k1};
+  if (args.zoom == "step" && t_s >= 6.0) {
+    now.fx *= 1.1;
+    now.fy *= 1.1;
+  }
+  if (args.zoom == "ramp") {
+    const double more = 6.0 * std::clamp(t_s - 6.0, 0.0, 4.0);  // eq. (29): all four by 6 px/s from 6 s to 10 s
+    now.fx += more;
+    now.fy += more;
+    now.cx += more;
+    now.cy += more;
+  }
+  return now;
+}
+
+RotationSource source_of(const std::string& word) {
+  return word == "rate" ? RotationSource::rate : word == "head" ? RotationSource::head : RotationSource::attitude;
+}
+
+std::string truth_yaml(const Args& args, const RotationLog& log, const RotationScene& scene) {
+  Camera camera;
+  camera.width_px = scene.width_px;
+  camera.height_px = scene.height_px;
+  camera.lens = *make_lens(args.k1 != 0.0 ? "brown" : "pinhole");
+  Eigen::VectorXd values = params(camera.lens);
+  for (int i = 0; i < 4; ++i) values[i] = log.truth.back()[static_cast<std::size_t>(i)];
+  const auto names = param_names(camera.lens);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (names[i] == "k1") values[static_cast<Eigen::Index>(i)] = args.k1;
+  }
+  camera.lens = with_params(camera.lens, values);
+  camera.source = "alidade simulate rotation: true at the end";
+  return camera_text(camera, CameraFormat::alidade);
+}
+
+ExitCode simulate_rotation_log(const Args& args, Run& run) {
+  RotationScene scene;
+  std::tie(scene.width_px, scene.height_px) = picture_size(args.size);
+  if (std::min(scene.width_px, scene.height_px) < 240) throw UsageError("--size: points need 240 px and more");
+  scene.start_px = draw_points(scene.width_px, scene.height_px, args.points, run.options.seed);
+  scene.intrinsics = [&args](double t_s) { return intrinsics_at(args, t_s); };
+  scene.motion = motion_of(args);
+  scene.delay_s = args.delay_s;
+  if (!args.lever.empty()) scene.lever_arm_m = Eigen::Vector3d(args.lever.data());
+  if (!args.depth.empty()) {
+    Draws draws(run.options.seed + 1);
+    for (int i = 0; i < args.points; ++i) scene.depth_m.push_back(draws.uniform(args.depth[0], args.depth[1]));
+  }
+  RotationLogConfig config = args.config;
+  config.source = source_of(args.source);
+  config.with_range = !args.depth.empty();
+  const RotationLog log = simulate_rotation(scene, config, run.options.seed);
+  run.add_file("log.csv", rotation_log_csv(log));
+  run.add_file("truth_camera.yaml", truth_yaml(args, log, scene));
+  run.document.counts.given = run.document.counts.used = log.rows.size();
+  Verdict verdict;
+  verdict.sentence = fmt::format("{} rows of {} points with known truth", log.rows.size(), args.points);
+  run.say(fmt::format("{} in {}", verdict.sentence, (run.options.out / "log.csv").string()));
+  return run.finish(verdict);
+}
+
+void add_options(CLI::App& command, Args& args) {
+  const auto word = [&](const char* name, std::string& value, const char* help, std::vector<std::string> words) {
+    command.add_option(name, value, help)->check(CLI::IsMember(std::move(words)))->capture_default_str();
+  };
+  const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
+    command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
+  };
+  word("--source", args.source, "How the rotation is measured: rate, head or attitude", {"rate", "head", "attitude"});
+  word("--motion", args.motion, "sway (the paper's, eq. 27), pan, tilt, roll or still",
+       {"sway", "pan", "tilt", "roll", "still"});
+  word("--zoom", args.zoom, "none, ramp (eq. 29) or step (+10 % at 6 s)", {"none", "ramp", "step"});
+  command.add_option("--points", args.points, "How many")->check(CLI::Range(1, 5000))->capture_default_str();
+  command.add_option("--size", args.size, "Picture")->type_name("WxH")->capture_default_str();
+  command.add_option("--intrinsics", args.k, "True fx,fy,cx,cy [px]")
+      ->delimiter(',')
+      ->expected(4)
+      ->check(finite_number());
+  command.add_option("--lever", args.lever, "Camera centre from the centre of rotation, x,y,z [m]")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(finite_number());
+  command.add_option("--depth", args.depth, "Least and largest depth of the points [m]; adds range_m of the first")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(positive_number());
+  number("--k1", args.k1, "True radial distortion", -0.4, 0.4);
+  number("--tilt-deg", args.tilt_deg, "Mean tilt of a head", -80.0, 80.0);
+  number("--delay", args.delay_s, "Pixels are so much later than the rotation [s]", -0.5, 0.5);
+  number("--duration", args.config.duration_s, "[s]", 0.1, 100000.0);
+  number("--rate", args.config.rate_hz, "Rows a second", 1.0, 10000.0);
+  number("--sigma-px", args.config.sigma_px, "Noise of a pixel coordinate", 0.0, 100.0);
+  number("--sigma-rate", args.config.sigma_rate_rad_per_s, "Noise of a rate [rad/s]", 0.0, 1.0);
+  number("--sigma-angle", args.config.sigma_angle_rad, "Noise of an angle [rad]", 0.0, 1.0);
+  number("--sigma-range-m", args.config.sigma_range_m, "Noise of a range [m]", 0.0, 10.0);
+  number("--lost", args.config.lost_share, "Share of pixels not seen", 0.0, 0.95);
+}
+
+}  // namespace
+
+void add_rotation_scenario(Frame& frame) {
+  auto args = std::make_shared<Args>();
+  CLI::App& command = frame.add_command(
+      {"simulate rotation", "Pixels of still points and the rotation of a camera that turns, with the truth",
+       "  alidade simulate rotation --out turn && alidade observe turn/log.csv --size 780x582\n"
+       "  alidade simulate rotation --source head --tilt-deg 20 --zoom ramp --k1 -0.2 --out zoom",
+       true},
+      [args](Run& run) { return simulate_rotation_log(*args, run); });
+  add_options(command, *args);
+}
+
+}  // namespace alidade::cli

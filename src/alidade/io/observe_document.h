@@ -1,0 +1,12 @@
+#pragma once
+
+#include "alidade/io/result_document.h"
+#include "alidade/observe/observe.h"
+
+namespace alidade {
+
+/// Fills counts, estimate, stddev, covariance and data of the document of `alidade observe`; also for a refusal.
+void fill_observation(const RotationLog& log, const ObserveReport& report, const Camera& camera,
+                      ResultDocument& document);
+
+}  // namespace alidade

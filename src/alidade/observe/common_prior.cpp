@@ -1,0 +1,81 @@
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/geometry/so3.h"
+#include "alidade/observe/rotation_bundle.h"
+
+namespace alidade {
+
+CommonPrior::CommonPrior(const RotatingCamera& mean_in)
+    : mean(mean_in), sigma_k(0.5 * mean_in.k[0], 0.5 * mean_in.k[1], 0.5, 0.5) {}
+
+CommonMatrix CommonPrior::information(const CommonLayout& layout) const {
+  CommonVector sigma = CommonVector::Ones(layout.size);
+  sigma.head<4>() = sigma_k;
+  if (layout.k1 >= 0) sigma[layout.k1] = sigma_k1;
+  if (layout.mount >= 0) sigma.segment<3>(layout.mount).setConstant(sigma_mount_rad);
+  if (layout.delay >= 0) sigma[layout.delay] = sigma_delay_s;
+  if (layout.lever >= 0) sigma.segment<3>(layout.lever).setConstant(sigma_lever_m);
+  CommonMatrix information = CommonMatrix::Zero(layout.size, layout.size);
+  information.diagonal() = sigma.array().square().inverse();
+  for (int i = 0; i < 4; ++i) {
+    if (says_k[static_cast<std::size_t>(i)]) information(i, i) = 0.0;
+  }
+  return information + said_information(layout);
+}
+
+CommonMatrix CommonPrior::said_information(const CommonLayout& layout) const {
+  CommonMatrix information = CommonMatrix::Zero(layout.size, layout.size);
+  for (int i = 0; i < 4; ++i) {
+    if (says_k[static_cast<std::size_t>(i)]) information(i, i) = 1.0 / (sigma_k[i] * sigma_k[i]);
+  }
+  const double aspect = 1.0 / (sigma_aspect * sigma_aspect);
+  information.topLeftCorner<2, 2>() += aspect * (Eigen::Matrix2d() << 1.0, -1.0, -1.0, 1.0).finished();
+  return information;
+}
+
+CommonPrior CommonPrior::about(const RotatingCamera& camera) const {
+  CommonPrior moved = *this;
+  moved.mean = camera;
+  for (int i = 0; i < 4; ++i) {
+    if (says_k[static_cast<std::size_t>(i)]) moved.mean.k[i] = mean.k[i];
+  }
+  // A said aspect is one of the difference: its mean must keep it.
+  if (std::isfinite(sigma_aspect) && !says_k[0] && !says_k[1]) {
+    moved.mean.k.head<2>().setConstant(0.5 * (camera.k[0] + camera.k[1]));
+  }
+  return moved;
+}
+
+CommonVector CommonPrior::offset(const CommonLayout& layout, const RotatingCamera& camera) const {
+  CommonVector offset = CommonVector::Zero(layout.size);
+  offset.head<4>() = camera.k - mean.k;
+  if (layout.k1 >= 0) offset[layout.k1] = camera.k1 - mean.k1;
+  if (layout.mount >= 0) {
+    offset.segment<3>(layout.mount) = log_so3((mean.cam_from_mount.conjugate() * camera.cam_from_mount).normalized());
+  }
+  if (layout.delay >= 0) offset[layout.delay] = camera.delay_s - mean.delay_s;
+  if (layout.lever >= 0) offset.segment<3>(layout.lever) = camera.lever_m - mean.lever_m;
+  return offset;
+}
+
+CommonMatrix BundleSolution::covariance() const {
+  const CommonMatrix all = information + prior_information;
+  return all.ldlt().solve(CommonMatrix::Identity(all.rows(), all.cols()));
+}
+
+CommonMatrix BundleSolution::bound() const {
+  const CommonMatrix all = information + said_information;
+  return all.ldlt().solve(CommonMatrix::Identity(all.rows(), all.cols()));
+}
+
+double robust_sigma(std::vector<double> residual_norms, int dof) {
+  if (residual_norms.empty() || dof < 1) return 0.0;
+  const auto middle = residual_norms.begin() + static_cast<std::ptrdiff_t>(residual_norms.size() / 2);
+  std::nth_element(residual_norms.begin(), middle, residual_norms.end());
+  const double share = static_cast<double>(dof) / (2.0 * static_cast<double>(residual_norms.size()));
+  return *middle / std::sqrt(2.0 * std::log(2.0)) / std::sqrt(share);
+}
+
+}  // namespace alidade

@@ -1,0 +1,373 @@
+#include "alidade/observe/observe.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/geometry/so3.h"
+#include "alidade/observe/fang_observer.h"
+#include "alidade/observe/flow_filter.h"
+#include "alidade/observe/hybrid.h"
+
+namespace alidade {
+namespace {
+
+constexpr std::size_t most_turns = 240;  // frames whose rotation is estimated: the solve is cubic in them
+constexpr std::size_t most_cells = 4000000;
+
+/// One run over one log: frames, scale and start made once, then a method, then the reference.
+class Observation {
+ public:
+  Observation(const RotationLog& log, const ObserveConfig& config, const Progress& progress)
+      : log_(log), config_(config), progress_(progress) {
+    report_.width_px = config.width_px;
+    report_.height_px = config.height_px;
+    report_.scale = pixel_scale(log, report_.width_px, report_.height_px);
+    report_.sigma_is_told = !(config.sigma_px > 0.0);
+    report_.steps.resize(log.rows.size());
+    with_depth_ = config.lever_m.has_value() || config.estimate.lever || log.has_velocity;
+    start_.k = config.start ? normalised(*config.start) : Eigen::Vector4d(1.3, 1.3, 0.0, 0.0);
+    if (config.lever_m) start_.lever_m = *config.lever_m;
+  }
+
+  ObserveReport run() {
+    make_frames();
+    if (!enough_to_begin()) return std::move(report_);
+    switch (config_.rotation == RotationKnowledge::known ? config_.method : ObserveMethod::batch) {
+      case ObserveMethod::hybrid:
+        run_hybrid();
+        break;
+      case ObserveMethod::window:
+        run_window();
+        break;
+      case ObserveMethod::flow:
+        run_flow();
+        break;
+      case ObserveMethod::fang2011:
+        run_fang();
+        break;
+      case ObserveMethod::batch:
+        break;
+    }
+    solve_reference();
+    conclude();
+    return std::move(report_);
+  }
+
+ private:
+  [[nodiscard]] Eigen::Vector4d normalised(const Eigen::Vector4d& k_px) const {
+    const PixelScale& scale = report_.scale;
+    const Eigen::Vector2d centre = (k_px.tail<2>() - scale.centre) / scale.scale;
+    return {k_px[0] / scale.scale, k_px[1] / scale.scale, centre.x(), centre.y()};
+  }
+
+  void make_frames() {
+    MotionReader reader(log_.source, config_.max_gap_s);
+    for (const RotationRow& row : log_.rows) frames_.push_back(reader.next(row));
+    Eigen::Quaterniond attitude = Eigen::Quaterniond::Identity();
+    for (const RotationFrame& frame : frames_) {
+      attitude = exp_so3(-frame.mean_rate_rad_per_s * frame.dt_s) * attitude;
+      report_.motion.path_rad += frame.mean_rate_rad_per_s.cwiseAbs() * frame.dt_s;
+      report_.motion.span_rad = std::max(report_.motion.span_rad, log_so3(attitude.normalized()).norm());
+      const bool is_used = std::any_of(frame.px.begin(), frame.px.end(), is_seen);
+      report_.rows_used += is_used ? 1 : 0;
+    }
+    if (log_.source == RotationSource::none) begin_free();
+  }
+
+  void begin_free() {
+    const auto start = free_rotation_start(log_, report_.scale);
+    if (!start) return;
+    if (!config_.start) start_.k.head<2>().setConstant(start->focal);
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      frames_[k].cam_from_start = start->cam_from_start[k];
+      frames_[k].starts_segment = k == 0;
+      if (k == 0) continue;
+      const Eigen::Vector3d turn =
+          log_so3((start->cam_from_start[k] * start->cam_from_start[k - 1].conjugate()).normalized());
+      report_.motion.path_rad += turn.cwiseAbs();
+      report_.motion.span_rad = std::max(report_.motion.span_rad, log_so3(start->cam_from_start[k]).norm());
+    }
+    free_started_ = true;
+  }
+
+  [[nodiscard]] bool enough_to_begin() const {
+    return report_.rows_used >= 3 && (log_.source != RotationSource::none || free_started_);
+  }
+
+  void note(std::size_t row) {
+    const IntrinsicsEstimate& step = report_.steps[row];
+    if (step.event != ObserveEvent::none) report_.events.push_back({log_.rows[row].t_s, step.event, step.point});
+    if ((row & 255u) == 0) report_progress(progress_, "frames", row, frames_.size());
+  }
+
+  void run_hybrid() {
+    HybridObserver observer(hybrid_config(report_.scale));
+    double sum_nis = 0.0, sum_dof = 0.0;
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      report_.steps[k] = observer.step(frames_[k]);
+      note(k);
+      const IntrinsicsEstimate& step = report_.steps[k];
+      if (!(step.nis_dof > 0) || step.event == ObserveEvent::burst || step.event == ObserveEvent::zoom) continue;
+      sum_nis += step.nis;
+      sum_dof += step.nis_dof;
+    }
+    report_.nis_per_dof = sum_dof > 0.0 ? sum_nis / sum_dof : 0.0;
+    if (!observer.is_running()) return;
+    report_.sigma_px = observer.sigma_px();
+    report_.reference_from_s = observer.constant_since_s();
+    final_ = observer.filter().camera();
+    const double noise = observer.sigma_px() / report_.scale.scale;
+    const double ratio = config_.sigma_px > 0.0 ? 1.0 : std::pow(noise / observer.filter_sigma_px(), 2);
+    final_cov_ = ratio * observer.filter().covariance();
+    has_final_ = true;
+  }
+
+  [[nodiscard]] HybridConfig hybrid_config(const PixelScale& scale) const {
+    HybridConfig hybrid;
+    hybrid.num_points = log_.num_points;
+    hybrid.scale = scale;
+    hybrid.nuisances = config_.estimate;
+    hybrid.with_depth = with_depth_;
+    hybrid.start = start_;
+    hybrid.start_is_given = config_.start.has_value();
+    hybrid.prior = prior();
+    hybrid.sigma_px = config_.sigma_px;
+    hybrid.sigma_range_m = config_.sigma_range_m;
+    hybrid.range_point = log_.range_point;
+    return hybrid;
+  }
+
+  /// What the person says of the camera; none if nothing.
+  [[nodiscard]] std::optional<CommonPrior> prior() const {
+    if (!config_.square_pixels && !config_.fixed_centre) return std::nullopt;
+    constexpr double held = 1e-7;
+    CommonPrior prior(start_);
+    if (config_.square_pixels) prior.sigma_aspect = held;
+    if (config_.fixed_centre) {
+      prior.sigma_k.tail<2>().setConstant(held);
+      prior.says_k[2] = prior.says_k[3] = true;
+    }
+    return prior;
+  }
+
+  [[nodiscard]] AdjustConfig adjust_config() const {
+    AdjustConfig adjust;
+    adjust.nuisances = config_.estimate;
+    adjust.nuisances.turn = config_.rotation != RotationKnowledge::known;
+    adjust.with_depth = with_depth_;
+    adjust.sigma_px = config_.sigma_px / report_.scale.scale;
+    adjust.sigma_range_m = config_.sigma_range_m;
+    adjust.range_point = log_.range_point;
+    adjust.start = start_;
+    adjust.prior = prior();
+    if (config_.rotation == RotationKnowledge::free) {
+      adjust.sigma_turn_rad = std::numeric_limits<double>::infinity();
+    } else if (log_.source == RotationSource::rate) {
+      adjust.sigma_rate_rad_per_s = config_.sigma_rate_rad_per_s > 0.0 ? config_.sigma_rate_rad_per_s : 1e-3;
+    } else {
+      adjust.sigma_turn_rad = config_.sigma_angle_rad > 0.0 ? config_.sigma_angle_rad : 1e-4;
+    }
+    if (!config_.start) adjust.other_starts = {0.7, 2.5, 5.0, 10.0};
+    return adjust;
+  }
+
+  void add_frame(FrameBuffer& buffer, std::size_t row) const {
+    std::vector<Eigen::Vector2d> px(log_.num_points, Eigen::Vector2d::Constant(not_seen));
+    for (std::size_t i = 0; i < frames_[row].px.size(); ++i) px[i] = report_.scale.normalised(frames_[row].px[i]);
+    if (frames_[row].starts_segment) buffer.renew_all();
+    buffer.add(frames_[row], px);
+  }
+
+  void run_window() {
+    constexpr double keyframe_s = 0.1;
+    FrameBuffer buffer(log_.num_points, std::min<std::size_t>(frames_.size(), 20000));
+    AdjustConfig adjust_with = adjust_config();
+    double next_s = frames_.front().t_s + 1.0;
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      add_frame(buffer, k);
+      buffer.erase_before(frames_[k].t_s - config_.window_s);
+      if (k > 0) report_.steps[k] = report_.steps[k - 1];
+      report_.steps[k].event = ObserveEvent::none;
+      if (frames_[k].t_s < next_s - 1e-6) continue;
+      next_s = frames_[k].t_s + keyframe_s;
+      const Adjustment adjustment = adjust(buffer, adjust_with, progress_);
+      if (adjustment.has_value) {
+        if (!report_.steps[k].has_value) report_.steps[k].event = ObserveEvent::start;
+        fill(report_.steps[k], adjustment);
+        adjust_with.start = adjustment.solution.camera;
+        adjust_with.other_starts.clear();
+      }
+      note(k);
+    }
+  }
+
+  void fill(IntrinsicsEstimate& step, const Adjustment& adjustment) {
+    step.has_value = true;
+    set_values(step, adjustment.solution.camera);
+    final_ = adjustment.solution.camera;
+    final_cov_ = adjustment.solution.covariance();
+    has_final_ = true;
+    step.sigma = report_.scale.scale * final_cov_.diagonal().head<4>().cwiseSqrt();
+    const int dof = std::max(adjustment.solution.dof, 1);
+    step.nis = adjustment.solution.sum_squares;
+    step.nis_dof = dof;
+    report_.sigma_px = adjustment.sigma_px * report_.scale.scale;
+    report_.nis_per_dof = adjustment.solution.sum_squares / dof;
+  }
+
+  void set_values(IntrinsicsEstimate& step, const RotatingCamera& camera) const {
+    const PixelScale& scale = report_.scale;
+    step.fx = camera.k[0] * scale.scale;
+    step.fy = camera.k[1] * scale.scale;
+    step.cx = camera.k[2] * scale.scale + scale.centre.x();
+    step.cy = camera.k[3] * scale.scale + scale.centre.y();
+    step.k1 = camera.k1;
+  }
+
+  [[nodiscard]] Eigen::Vector4d start_px() const {
+    const PixelScale& scale = report_.scale;
+    const Eigen::Vector4d& k = start_.k;
+    return {k[0] * scale.scale, k[1] * scale.scale, k[2] * scale.scale + scale.centre.x(),
+            k[3] * scale.scale + scale.centre.y()};
+  }
+
+  template <typename Observer>
+  void run_regression(Observer& observer) {
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      report_.steps[k] = observer.step(frames_[k]);
+      note(k);
+    }
+    const auto last =
+        std::find_if(report_.steps.rbegin(), report_.steps.rend(), [](const auto& s) { return s.has_value; });
+    if (last == report_.steps.rend()) return;
+    const double scale = report_.scale.scale;
+    final_ = start_;
+    final_.k = normalised(last->values());
+    final_cov_ = (last->sigma / scale).cwiseAbs2().asDiagonal();
+    has_final_ = true;
+  }
+
+  void run_flow() {
+    FlowFilterConfig flow;
+    flow.num_points = log_.num_points;
+    flow.scale = report_.scale;
+    flow.start = start_px();
+    if (config_.sigma_px > 0.0) flow.sigma_px = config_.sigma_px;
+    FlowFilter observer(flow);
+    run_regression(observer);
+  }
+
+  void run_fang() {
+    FangConfig fang;
+    fang.num_points = log_.num_points;
+    fang.scale = report_.scale;
+    fang.start = start_px();
+    fang.profile = config_.profile == "fast"    ? FangProfile::fast
+                   : config_.profile == "quiet" ? FangProfile::quiet
+                                                : FangProfile::kalman;
+    if (config_.sigma_px > 0.0) fang.sigma_px = config_.sigma_px;
+    fang.roll_columns = log_.source != RotationSource::rate || log_.has_roll_rate;
+    FangObserver observer(fang);
+    run_regression(observer);
+    report_.gramian_lambda_min = observer.gramian_lambda_min();
+  }
+
+  /// All rows since the intrinsics last changed, together: the bound, and the answer of `batch`.
+  void solve_reference() {
+    std::size_t rows = 0;
+    for (const RotationFrame& frame : frames_) rows += frame.t_s >= report_.reference_from_s - 1e-9 ? 1 : 0;
+    const bool turns = config_.rotation != RotationKnowledge::known;
+    const std::size_t room = std::max<std::size_t>(most_cells / std::max<std::size_t>(log_.num_points, 1), 64);
+    FrameBuffer buffer(log_.num_points, turns ? most_turns : std::min(rows + 1, room));
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      if (frames_[k].t_s >= report_.reference_from_s - 1e-9) add_frame(buffer, k);
+    }
+    AdjustConfig config = adjust_config();
+    if (has_final_ && config_.method != ObserveMethod::fang2011) {
+      config.start = final_;
+      config.start.turn_rad.setZero();
+      config.other_starts.clear();
+    }
+    report_.reference = adjust(buffer, config, progress_);
+    if (!report_.reference.has_value) return;
+    report_.pixels_left_out = report_.reference.num_left_out;
+    if (config_.rotation == RotationKnowledge::known) {
+      report_.proposals = residual_proposals(buffer, report_.reference, config, progress_);
+    }
+    if (config_.method != ObserveMethod::batch && config_.rotation == RotationKnowledge::known) return;
+    IntrinsicsEstimate all;
+    fill(all, report_.reference);
+    std::fill(report_.steps.begin(), report_.steps.end(), all);
+  }
+
+  void conclude() {
+    if (!has_final_ || !report_.reference.has_value) {
+      report_.status = ObserveReport::Status::no_convergence;
+      if (!report_.reference.has_value) return;
+    }
+    const bool regression = config_.method == ObserveMethod::flow || config_.method == ObserveMethod::fang2011;
+    ObserveNuisances nuisances = config_.estimate;
+    if (regression && config_.rotation == RotationKnowledge::known) nuisances = {};
+    const CommonLayout layout(nuisances);
+    if (report_.sigma_px == 0.0) report_.sigma_px = report_.reference.sigma_px * report_.scale.scale;
+    const CommonMatrix bound = report_.reference.solution.bound();
+    list_quantities(layout, bound);
+    if (!has_final_) return;
+    report_.status = is_observable(bound) ? ObserveReport::Status::ok : ObserveReport::Status::unobservable;
+  }
+
+  [[nodiscard]] bool is_observable(const CommonMatrix& bound) const {
+    constexpr double most = 0.05;  // of the focal length; of the picture's width
+    const Eigen::Vector4d& k = report_.reference.solution.camera.k;
+    const Eigen::Vector4d variance = bound.diagonal().head<4>();
+    if (!(variance.array() > 0.0).all() || !variance.allFinite()) return false;
+    const Eigen::Vector4d sigma = variance.cwiseSqrt();
+    const double width = report_.width_px / report_.scale.scale;
+    return sigma[0] < most * k[0] && sigma[1] < most * k[1] && sigma[2] < most * width && sigma[3] < most * width;
+  }
+
+  void list_quantities(const CommonLayout& layout, const CommonMatrix& bound) {
+    const double s = report_.scale.scale;
+    const Eigen::Vector2d& c = report_.scale.centre;
+    CommonVector unit = CommonVector::Ones(layout.size), offset = CommonVector::Zero(layout.size);
+    unit.head<4>().setConstant(s);
+    offset.segment<2>(2) = c;
+    std::vector<std::string> names{"fx", "fy", "cx", "cy"};
+    if (layout.k1 >= 0) names.emplace_back("k1");
+    if (layout.mount >= 0) names.insert(names.end(), {"mount_x_rad", "mount_y_rad", "mount_z_rad"});
+    if (layout.delay >= 0) names.emplace_back("delay_s");
+    if (layout.lever >= 0) names.insert(names.end(), {"lever_x_m", "lever_y_m", "lever_z_m"});
+    const RotatingCamera& camera = has_final_ ? final_ : report_.reference.solution.camera;
+    RotatingCamera zero;
+    zero.k.setZero();
+    const CommonVector value = CommonPrior(zero).offset(layout, camera);
+    const CommonMatrix cov =
+        has_final_ ? final_cov_ : CommonMatrix(CommonMatrix::Constant(layout.size, layout.size, not_seen));
+    report_.covariance =
+        Eigen::MatrixXd(unit.asDiagonal()) * cov.topLeftCorner(layout.size, layout.size) * unit.asDiagonal();
+    for (int i = 0; i < layout.size; ++i) {
+      const double variance = i < bound.rows() ? bound(i, i) : -1.0;
+      report_.quantities.push_back({names[static_cast<std::size_t>(i)], unit[i] * value[i] + offset[i],
+                                    std::sqrt(report_.covariance(i, i)),
+                                    variance > 0.0 ? unit[i] * std::sqrt(variance) : not_seen});
+    }
+  }
+
+  const RotationLog& log_;
+  const ObserveConfig& config_;
+  const Progress& progress_;
+  ObserveReport report_;
+  std::vector<RotationFrame> frames_;
+  bool with_depth_ = false, free_started_ = false, has_final_ = false;
+  RotatingCamera start_, final_;
+  CommonMatrix final_cov_;
+};
+
+}  // namespace
+
+ObserveReport observe(const RotationLog& log, const ObserveConfig& config, const Progress& progress) {
+  return Observation(log, config, progress).run();
+}
+
+}  // namespace alidade

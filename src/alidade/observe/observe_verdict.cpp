@@ -1,0 +1,175 @@
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "alidade/observe/fang_observer.h"
+#include "alidade/observe/observe.h"
+
+namespace alidade {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180.0;
+constexpr double fine = 0.003;      // σ over the focal length of a converged estimate
+constexpr double ask_beyond = 5.0;  // σ at which the residuals ask for one thing more
+
+std::string text_of(double value, int digits = 3) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return text;
+}
+
+/// Why the log cannot tell, in the words of who turned the camera; and what to add.
+struct Reason {
+  std::string name, what, add;
+};
+
+Reason reason_of(const ObserveReport& report, const RotationLog& log, const ObserveConfig& config) {
+  const Eigen::Vector3d& path = report.motion.path_rad;  // about x: tilt; y: pan; z: roll
+  const double most = path.maxCoeff();
+  constexpr double little = 0.02;  // of the largest: an axis that did not turn
+  if (log.num_points == 0 || report.rows_used < 3) {
+    return {"too few points", "too few points: " + std::to_string(report.rows_used) + " rows see any",
+            "track at least one point through the turn, better four"};
+  }
+  if (most < 0.2 * degree) return {"no motion", "the camera does not turn", "pan and tilt it by 5° or more"};
+  if (path.y() < little * most && path.x() < little * most) {
+    return {"roll only", "roll only: neither fx nor fy can be told", "pan and tilt the camera"};
+  }
+  if (path.x() < little * path.y()) {
+    return {"pan only", "pan only: fy cannot be told", "tilt the camera as well"};
+  }
+  if (path.y() < little * path.x()) {
+    return {"tilt only", "tilt only: fx cannot be told", "pan the camera as well"};
+  }
+  if (config.rotation == RotationKnowledge::free) {
+    return {
+        "free rotation", "with the rotation unknown these views cannot tell fx / fy, cx and cy apart",
+        "measure the rotation, turn the camera about its axis of view too, or hold them: --square-pixels --fix-centre"};
+  }
+  if (report.motion.span_rad < 3.0 * degree) {
+    return {"too small a span",
+            "too small a span: the camera turns by " + text_of(report.motion.span_rad / degree, 2) + "° only",
+            "pan and tilt by 5° or more"};
+  }
+  if (log.num_points < 2) return {"too few points", "too few points: one does not tell", "track four or more"};
+  return {"weak motion", "the motion is too weak for the noise", "turn farther, longer, or track more points"};
+}
+
+/// The worst-known combination of fx, fy, cx, cy: its σ [px] and its name.
+Check weakest(const ObserveReport& report) {
+  Check check{"weakest combination", State::good, "", 0.0, 0.0, "px", "excitation"};
+  const double s = report.scale.scale;
+  const CommonMatrix bound = report.reference.solution.bound();
+  const Eigen::Matrix4d K = bound.topLeftCorner<4, 4>() * s * s;
+  if (!K.allFinite() || (K.diagonal().array() <= 0.0).any()) {
+    check.state = State::refused;
+    check.text = "no bound";
+    return check;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(K);
+  const Eigen::Vector4d direction = eigen.eigenvectors().col(3);
+  static const char* const names[] = {"fx", "fy", "cx", "cy"};
+  for (int i = 0; i < 4; ++i) {
+    if (std::abs(direction[i]) < 0.3) continue;
+    check.text += (check.text.empty()   ? ""
+                   : direction[i] > 0.0 ? " + "
+                                        : " − ") +
+                  text_of(std::abs(direction[i]), 2) + " " + names[i];
+  }
+  check.value = std::sqrt(eigen.eigenvalues()[3]);
+  check.limit = 0.05 * report.width_px;
+  check.text += " is known to " + text_of(check.value, 2) + " px (1σ)";
+  if (check.value > check.limit) check.state = State::refused;
+  return check;
+}
+
+void add_checks(const ObserveReport& report, Verdict& verdict) {
+  verdict.checks.push_back(weakest(report));
+  const double f_sigma = std::max(report.quantities[0].sigma / report.quantities[0].value,
+                                  report.quantities[1].sigma / report.quantities[1].value);
+  verdict.checks.push_back({"focal length", f_sigma < fine ? State::good : State::care,
+                            "σ of the focal length is " + text_of(100.0 * f_sigma, 2) + " %", 100.0 * f_sigma,
+                            100.0 * fine, "%", "intrinsics"});
+  if (report.nis_per_dof > 0.0) {
+    const bool fits = report.nis_per_dof > 0.5 && report.nis_per_dof < 2.0;
+    verdict.checks.push_back({"consistent", fits ? State::good : State::care,
+                              "innovations are " + text_of(std::sqrt(report.nis_per_dof), 2) + " times their σ",
+                              report.nis_per_dof, 2.0, "", "nis"});
+  }
+  for (const auto& [name, z] : report.proposals) {
+    verdict.checks.push_back({"needs " + name, z < ask_beyond ? State::good : State::care,
+                              z < ask_beyond
+                                  ? name + " is not asked for by the residuals"
+                                  : "the residuals ask for --estimate " + name + " (" + text_of(z, 2) + " σ)",
+                              z, ask_beyond, "σ", "residuals"});
+  }
+  if (report.gramian_lambda_min >= 0.0) {
+    const double lambda = report.gramian_lambda_min;
+    const State state = lambda < fang_refuse_lambda ? State::refused
+                        : lambda < fang_warn_lambda ? State::care
+                                                    : State::good;
+    verdict.checks.push_back({"persistent excitation", state,
+                              "least eigenvalue of the observer's Gramian " + text_of(lambda, 2), lambda,
+                              fang_refuse_lambda, "", "excitation"});
+  }
+}
+
+Verdict refusal(const std::string& sentence, const std::string& add, ExitCode code) {
+  Verdict verdict;
+  verdict.state = code == ExitCode::cannot_tell ? State::refused : State::not_converged;
+  verdict.exit_code = code;
+  verdict.sentence = sentence;
+  verdict.to_add = add;
+  return verdict;
+}
+
+Verdict fang_refusal(const ObserveReport& report, const RotationLog& log) {
+  std::string why = "the paper's observer is not excited: least eigenvalue of its Gramian " +
+                    text_of(report.gramian_lambda_min, 2) + " < 1e-4";
+  if (log.num_points < 3)
+    why = "too few points for the paper's observer: " + std::to_string(log.num_points) + ", it needs three";
+  Verdict verdict = refusal(why, "use --method hybrid, which can tell from this log", ExitCode::cannot_tell);
+  add_checks(report, verdict);
+  return verdict;
+}
+
+}  // namespace
+
+Verdict observe_verdict(const ObserveReport& report, const RotationLog& log, const ObserveConfig& config) {
+  using Status = ObserveReport::Status;
+  if (report.status == Status::unobservable || report.status == Status::too_few_data) {
+    const Reason reason = reason_of(report, log, config);
+    Verdict verdict = refusal(reason.what, reason.add, ExitCode::cannot_tell);
+    if (report.status == Status::unobservable) verdict.checks.push_back(weakest(report));
+    return verdict;
+  }
+  if (report.status == Status::no_convergence) {
+    // An adjustment that finds no bottom, on a log that could not tell anyway.
+    const Reason reason = reason_of(report, log, config);
+    if (reason.name != "weak motion" && reason.name != "free rotation") {
+      return refusal(reason.what, reason.add, ExitCode::cannot_tell);
+    }
+    return refusal("no intrinsics explain these pixels with this rotation",
+                   "check the axes and units of the rotation, and that the points stand still",
+                   ExitCode::no_convergence);
+  }
+  if (config.method == ObserveMethod::fang2011 && report.gramian_lambda_min >= 0.0 &&
+      report.gramian_lambda_min < fang_refuse_lambda) {
+    return fang_refusal(report, log);
+  }
+  Verdict verdict;
+  add_checks(report, verdict);
+  for (const Check& check : verdict.checks) {
+    if (check.state != State::care || verdict.state != State::good) continue;
+    verdict.state = State::care;
+    verdict.to_add = check.text;
+  }
+  const ObservedQuantity &fx = report.quantities[0], &fy = report.quantities[1];
+  verdict.sentence = "fx " + text_of(fx.value, 5) + " ± " + text_of(3.0 * fx.sigma, 2) + " px, fy " +
+                     text_of(fy.value, 5) + " ± " + text_of(3.0 * fy.sigma, 2) + " px (3σ) from " +
+                     std::to_string(report.rows_used) + " rows";
+  return verdict;
+}
+
+}  // namespace alidade

@@ -1,0 +1,63 @@
+#include <algorithm>
+#include <array>
+
+#include "alidade/observe/observe.h"
+
+namespace alidade {
+
+RotationLog undistorted(const RotationLog& log, const Camera& camera) {
+  RotationLog straight = log;
+  const Eigen::VectorXd known = params(camera.lens);
+  const auto names = param_names(camera.lens);
+  const auto value = [&](std::string_view name) {
+    const auto at = std::find(names.begin(), names.end(), name);
+    return at == names.end() ? 0.0 : known[at - names.begin()];
+  };
+  for (RotationRow& row : straight.rows) {
+    for (Eigen::Vector2d& px : row.px) {
+      if (!is_seen(px)) continue;
+      const auto ray = unproject(camera, px);
+      px = ray && ray->z() > 1e-6 ? Eigen::Vector2d(value("fx") * ray->x() / ray->z() + value("cx"),
+                                                    value("fy") * ray->y() / ray->z() + value("cy"))
+                                  : Eigen::Vector2d::Constant(not_seen);
+    }
+  }
+  return straight;
+}
+
+Camera observed_camera(const ObserveReport& report, const std::optional<Camera>& known) {
+  Camera camera;
+  camera.width_px = report.width_px;
+  camera.height_px = report.height_px;
+  camera.rms_px = report.sigma_px * std::sqrt(2.0);
+  camera.source = "alidade observe";
+  const bool has_k1 = std::any_of(report.quantities.begin(), report.quantities.end(),
+                                  [](const ObservedQuantity& quantity) { return quantity.name == "k1"; });
+  camera.lens = known ? known->lens : *make_lens(has_k1 ? "brown" : "pinhole");
+  Eigen::VectorXd values = params(camera.lens);
+  const auto names = param_names(camera.lens);
+  camera.cov = Eigen::MatrixXd::Zero(values.size(), values.size());
+  std::vector<Eigen::Index> place;
+  for (const ObservedQuantity& quantity : report.quantities) {
+    const auto at = std::find(names.begin(), names.end(), quantity.name);
+    place.push_back(at == names.end() ? -1 : at - names.begin());
+    if (place.back() >= 0) values[place.back()] = quantity.value;
+  }
+  camera.lens = with_params(camera.lens, values);
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    for (std::size_t j = 0; j < place.size(); ++j) {
+      if (place[i] < 0 || place[j] < 0) continue;
+      camera.cov(place[i], place[j]) = report.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    }
+  }
+  if (!camera.cov.allFinite()) camera.cov.resize(0, 0);
+  return camera;
+}
+
+std::string_view event_name(ObserveEvent event) {
+  static constexpr std::array<std::string_view, 8> names{"",     "start",    "burst",   "slip",
+                                                         "zoom", "zoom_end", "restart", "gap"};
+  return names[static_cast<std::size_t>(event)];
+}
+
+}  // namespace alidade

@@ -4,7 +4,9 @@
 #include <memory>
 
 #include "alidade/io/camera_file.h"
+#include "alidade/io/intrinsics_file.h"
 #include "alidade/io/observe_document.h"
+#include "alidade/io/pairs_file.h"
 #include "alidade/io/rotation_log_file.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
@@ -73,9 +75,8 @@ RotationLog read_log(const Args& args, Run& run) {
   const bool is_pairs = !args.pairs.empty();
   const std::string& file = is_pairs ? args.pairs : args.log;
   run.add_input(is_pairs ? "pairs" : "log", file);
-  if (is_pairs) return read_pairs(file);
-  RotationLogFile read = read_rotation_log(
-      file, {.skip_bad = args.skip_bad, .needs_rotation = args.rotation != "free"});
+  const RotationLogOptions options{.skip_bad = args.skip_bad, .needs_rotation = args.rotation != "free"};
+  RotationLogFile read = is_pairs ? read_pairs(file, options) : read_rotation_log(file, options);
   run.document.counts.given = read.skipped.size();
   run.document.counts.skipped = std::move(read.skipped);
   return std::move(read.log);

@@ -264,7 +264,8 @@ TEST(FangObserver, NeedsTheColumnsOfRollOnAHead) {
         fx[roll_columns].values.push_back(std::abs(error_px(log, observe_log(observer, log), log.rows.size() - 1)[0]));
       }
     }
-    // In that study 150 to 480 px without them, and all fail; 2.5 to 4.5 px with, here half as much again for another draw.
+    // In that study 150 to 480 px without them, and all fail; 2.5 to 4.5 px with, here half as much again for another
+    // draw.
     EXPECT_GT(fx[0].median(), 50.0) << tilt_rad << " " << fx[0];
     EXPECT_LT(fx[1].median(), 1.5 * 4.5) << tilt_rad << " " << fx[1];
   }

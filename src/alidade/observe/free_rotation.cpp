@@ -41,21 +41,21 @@ double middle(std::vector<double> values) {
 }
 
 struct Alignment {
-  Eigen::Matrix3d now_from_before = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d cam_from_before = Eigen::Matrix3d::Identity();
   double median_angle = 0.0;
 };
 
 /// Robust: from the best of pairs of correspondences (least median), then weights that fall with the residual.
 Alignment robust_alignment(const std::vector<RayPair>& pairs) {
   std::vector<double> angles(pairs.size()), weights(pairs.size(), 1.0);
-  const auto measure = [&](const Eigen::Matrix3d& now_from_before) {
+  const auto measure = [&](const Eigen::Matrix3d& cam_from_before) {
     for (std::size_t i = 0; i < pairs.size(); ++i) {
-      angles[i] = (now_from_before * pairs[i].before - pairs[i].now).norm();
+      angles[i] = (cam_from_before * pairs[i].before - pairs[i].now).norm();
     }
     return middle(angles);
   };
   Alignment best{align(pairs, weights), 0.0};
-  best.median_angle = measure(best.now_from_before);
+  best.median_angle = measure(best.cam_from_before);
   const std::size_t n = pairs.size();
   for (std::size_t a = 0; a < std::min<std::size_t>(n, 40); ++a) {
     const std::size_t i = a * n / std::min<std::size_t>(n, 40), j = (i + n / 2) % n;
@@ -66,11 +66,11 @@ Alignment robust_alignment(const std::vector<RayPair>& pairs) {
     if (median < best.median_angle) best = {trial, median};
   }
   for (int round = 0; round < 10; ++round) {
-    const double width = 2.0 * std::max(measure(best.now_from_before), 1e-9);
+    const double width = 2.0 * std::max(measure(best.cam_from_before), 1e-9);
     for (std::size_t i = 0; i < n; ++i) weights[i] = 1.0 / std::pow(1.0 + std::pow(angles[i] / width, 2), 2);
-    best.now_from_before = align(pairs, weights);
+    best.cam_from_before = align(pairs, weights);
   }
-  best.median_angle = measure(best.now_from_before);
+  best.median_angle = measure(best.cam_from_before);
   return best;
 }
 
@@ -119,8 +119,9 @@ std::optional<FreeRotationStart> free_rotation_start(const RotationLog& log, con
     if (neighbour[k] < 0) return std::nullopt;
     const auto from = static_cast<std::size_t>(neighbour[k]);
     const auto pairs = shared_rays(log.rows[from], log.rows[k], scale, best.focal);
-    const Eigen::Quaterniond now_from_before(robust_alignment(pairs).now_from_before);
-    best.cam_from_start[k] = (now_from_before * best.cam_from_start[from]).normalized();
+    const Eigen::Quaterniond cam_from_before(robust_alignment(pairs).cam_from_before);
+    const Eigen::Quaterniond& before_from_start = best.cam_from_start[from];
+    best.cam_from_start[k] = (cam_from_before * before_from_start).normalized();
   }
   return best;
 }

@@ -93,15 +93,16 @@ bool HybridObserver::adjust_buffer() {
   return true;
 }
 
-CommonVector HybridObserver::zoom_variance(double frames) const {
-  CommonVector variance = CommonVector::Zero(filter_.layout().size);
+/// Variance that so many frames of zoom add.
+CommonVector HybridObserver::walk(const StarFilter& filter, double frames) const {
+  CommonVector variance = CommonVector::Zero(filter.layout().size);
   const double sigma = config_.zoom_px / config_.scale.scale;
   variance.head<4>().setConstant(frames * sigma * sigma);
   return variance;
 }
 
 void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate& estimate) {
-  if (is_zooming_) filter_.predict(zoom_variance(1.0), 0.0);
+  if (is_zooming_) filter_.predict(walk(filter_, 1.0), 0.0);
   filter_.observe(frame, px_);
   Judgement judgement = judge();
   if (judgement.event == ObserveEvent::burst && is_coarse_) {
@@ -141,7 +142,7 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
 /// A frame that does not fit: would it fit another camera? Two frames in a row must want the same one.
 bool HybridObserver::is_zoom(const RotationFrame& frame) {
   if (has_candidate_) {
-    candidate_.predict(zoom_variance(1.0), 0.0);
+    candidate_.predict(walk(candidate_, 1.0), 0.0);
     candidate_.observe(frame, px_);
     if (candidate_.dof() > 0 && candidate_.nis() <= chi2_quantile(candidate_.dof(), gate_z)) {
       filter_ = candidate_;  // and this frame is about to be taken in
@@ -152,7 +153,7 @@ bool HybridObserver::is_zoom(const RotationFrame& frame) {
   }
   const int left = std::max(filter_.dof() - 4, 0);
   const double gate = left > 0 ? chi2_quantile(left, gate_z) : 1.0;
-  has_candidate_ = filter_.if_walked(zoom_variance(any_zoom)).nis <= gate;
+  has_candidate_ = filter_.if_walked(walk(filter_, any_zoom)).nis <= gate;
   if (has_candidate_) {
     candidate_ = filter_;
     jump(candidate_, frame);
@@ -164,8 +165,9 @@ bool HybridObserver::is_zoom(const RotationFrame& frame) {
 /// Lets the intrinsics walk as far as this frame wants them to, and no farther: what it takes for a step of 70 px would
 /// make a drift of 1 px as noisy as one frame is.
 void HybridObserver::jump(StarFilter& filter, const RotationFrame& frame) const {
-  const CommonVector step = filter.if_walked(zoom_variance(any_zoom)).step;
-  CommonVector variance = zoom_variance(4.0);
+  const CommonVector step = filter.if_walked(walk(filter, any_zoom)).step;
+  filter.remember_intrinsics();
+  CommonVector variance = walk(filter, 4.0);
   variance.head<4>() += step.head<4>().cwiseAbs2();
   filter.predict(variance, 0.0);
   filter.observe(frame, px_);
@@ -308,7 +310,7 @@ HybridObserver::Judgement HybridObserver::judge() {
   judgement.nis = filter_.nis();
   if (judgement.dof == 0) return judgement;
   if (judgement.nis <= chi2_quantile(judgement.dof, gate_z)) return judgement;
-  const double if_zoomed = filter_.if_walked(zoom_variance(any_zoom)).nis;
+  const double if_zoomed = filter_.if_walked(walk(filter_, any_zoom)).nis;
   if (leave_out_until(gate_z, judgement)) {
     // A change of the intrinsics moves all points, some little: it is no slip where it explains clearly more.
     if (!(judgement.nis - if_zoomed > better_by)) return judgement;

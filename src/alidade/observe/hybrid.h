@@ -67,7 +67,7 @@ class HybridObserver {
   void take_in(const RotationFrame& frame, const Judgement& judgement);
   void note_slips();
   void restart(IntrinsicsEstimate& estimate);
-  [[nodiscard]] CommonVector zoom_variance(double frames) const;
+  [[nodiscard]] CommonVector walk(const StarFilter& filter, double frames) const;
   [[nodiscard]] double noise_ratio() const;
   void report(IntrinsicsEstimate& estimate) const;
 

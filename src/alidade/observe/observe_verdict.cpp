@@ -147,7 +147,7 @@ Verdict observe_verdict(const ObserveReport& report, const RotationLog& log, con
   if (report.status == Status::no_convergence) {
     // An adjustment that finds no bottom, on a log that could not tell anyway.
     const Reason reason = reason_of(report, log, config);
-    if (reason.name != "weak motion" && reason.name != "free rotation") {
+    if (reason.name != "weak motion") {
       return refusal(reason.what, reason.add, ExitCode::cannot_tell);
     }
     return refusal("no intrinsics explain these pixels with this rotation",

@@ -16,6 +16,7 @@ CommonLayout::CommonLayout(const ObserveNuisances& nuisances) {
   place(nuisances.mount, mount, 3);
   place(nuisances.delay, delay, 1);
   place(nuisances.lever, lever, 3);
+  place(nuisances.learnt, learnt, 4);
   place(nuisances.turn, turn, 3);
 }
 

@@ -13,10 +13,12 @@ struct ObserveNuisances {
   bool mount = false;  ///< Rotation from the frame whose rotation is measured to the camera's, 3 angles.
   bool delay = false;  ///< Pixels are of t + delay.
   bool lever = false;  ///< Camera centre from the centre of rotation, camera frame. [m]
-  bool turn = false;   ///< Error of the measured rotation, 3 angles; one a frame in a bundle, of now in a filter.
+  bool learnt =
+      false;  ///< fx, fy, cx, cy with which the points were learnt, before a zoom: they know nothing of the new ones.
+  bool turn = false;  ///< Error of the measured rotation, 3 angles; one a frame in a bundle, of now in a filter.
 };
 
-inline constexpr int most_common = 15;  ///< Of ObserveNuisances with everything.
+inline constexpr int most_common = 19;  ///< Of ObserveNuisances with everything.
 using CommonVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_common, 1>;
 using CommonMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_common, most_common>;
 using PixelByCommon = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, most_common>;
@@ -26,7 +28,7 @@ struct CommonLayout {
   explicit CommonLayout(const ObserveNuisances& nuisances);
 
   int size = 4;
-  int k1 = -1, mount = -1, delay = -1, lever = -1, turn = -1;
+  int k1 = -1, mount = -1, delay = -1, lever = -1, learnt = -1, turn = -1;
 };
 
 /// What all points have in common. Pixels are normalised (PixelScale), so are fx, fy, cx, cy.

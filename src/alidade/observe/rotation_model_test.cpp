@@ -34,7 +34,7 @@ Sample draw_sample(Draws& draws) {
 
 TEST(RotationModel, JacobiansAreTheDerivatives) {
   Draws draws(testing::make_rng()());
-  const CommonLayout layout({true, true, true, true, true});
+  const CommonLayout layout({true, true, true, true, true, true});
   ASSERT_EQ(layout.size, most_common);
   int checked = 0;
   for (int trial = 0; trial < 200; ++trial) {

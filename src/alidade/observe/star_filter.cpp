@@ -17,7 +17,7 @@ CommonMatrix inverse(const CommonMatrix& symmetric) {
 }  // namespace
 
 StarFilter::StarFilter(const ObserveNuisances& nuisances, bool with_depth, std::size_t num_points)
-    : layout_(nuisances), with_depth_(with_depth), points_(num_points), seen_(num_points) {
+    : nuisances_(nuisances), layout_(nuisances), with_depth_(with_depth), points_(num_points), seen_(num_points) {
   const int n = layout_.size;
   covariance_.setIdentity(n, n);
   precision_.setIdentity(n, n);
@@ -28,6 +28,8 @@ StarFilter::StarFilter(const ObserveNuisances& nuisances, bool with_depth, std::
 }
 
 void StarFilter::start(const BundleSolution& solution, const std::vector<int>& bundle_point_of, double sigma_px) {
+  nuisances_.learnt = false;
+  layout_ = CommonLayout(nuisances_);
   const int n = layout_.size, solved = static_cast<int>(solution.information.rows());
   variance_px_ = sigma_px * sigma_px;
   camera_ = solution.camera;
@@ -48,6 +50,32 @@ void StarFilter::start(const BundleSolution& solution, const std::vector<int>& b
 
 void StarFilter::forget_points() {
   for (Point& point : points_) point.known = false;
+}
+
+void StarFilter::remember_intrinsics() {
+  if (nuisances_.learnt) return;
+  const int n = layout_.size;
+  nuisances_.learnt = true;
+  layout_ = CommonLayout(nuisances_);  // its place is the last one: a filter has no turn
+  const CommonMatrix before = covariance_;
+  covariance_.resize(n + 4, n + 4);
+  covariance_.topLeftCorner(n, n) = before;
+  covariance_.bottomLeftCorner(4, n) = before.topRows<4>();
+  covariance_.topRightCorner(n, 4) = before.leftCols<4>();
+  covariance_.bottomRightCorner<4, 4>() = before.topLeftCorner<4, 4>();
+  // The copy differs from the original by nothing yet; the walk that follows makes them two.
+  covariance_.diagonal().head<4>().array() += 1e-12;
+  precision_ = inverse(covariance_);
+  for (Point& point : points_) {
+    const PointByCommonSlope slope = point.slope;
+    point.slope.setZero(3, n + 4);
+    point.slope.leftCols(n) = slope;
+    point.slope.leftCols<4>().setZero();
+    point.slope.rightCols<4>() = slope.leftCols<4>();
+  }
+  information_.setZero(n + 4, n + 4);
+  gradient_.setZero(n + 4);
+  is_summed_ = false;
 }
 
 void StarFilter::predict(const CommonVector& variance, double turn_sigma_rad) {

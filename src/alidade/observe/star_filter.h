@@ -23,6 +23,9 @@ class StarFilter {
   /// From now on this point's pixels have so many times their variance.
   void distrust(std::size_t i, double factor) { points_[i].variance_factor = factor; }
 
+  /// The intrinsics are about to change, the points are not: keeps fx, fy, cx, cy as the points were learnt with as
+  /// further common parameters, so that what the points have in common stays in common. Once; later calls do nothing.
+  void remember_intrinsics();
   /// The common parameters walk: variances added, in the layout's order; `turn` is drawn anew where `turn_sigma` > 0.
   void predict(const CommonVector& variance, double turn_sigma_rad);
   /// Takes up a frame: innovations of all known points that were seen. `px` normalised, NaN: not seen.
@@ -84,6 +87,7 @@ class StarFilter {
   void add_new_points(const RotationFrame& frame, std::span<const Eigen::Vector2d> px);
   void move_common(const CommonVector& step);
 
+  ObserveNuisances nuisances_;
   CommonLayout layout_;
   bool with_depth_;
   double variance_px_ = 1e-6;

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <iostream>
 #include <memory>
 
 #include "alidade/io/camera_file.h"
@@ -82,6 +83,34 @@ RotationLog read_log(const Args& args, Run& run) {
   return std::move(read.log);
 }
 
+/// Rows from standard input as they come, each answered at once with a row of intrinsics.csv; the log, at its end.
+RotationLog follow_input(const Args& args, const ObserveConfig& config, const std::optional<Camera>& camera, Run& run) {
+  if (config.width_px <= 0) throw UsageError("observe -: say --size WxH or --camera FILE, the first rows do not tell");
+  RotationLogStream stream(std::cin, "-", {.skip_bad = args.skip_bad});
+  RotationLog log = stream.layout();
+  ObserveConfig sized = config;
+  const PixelScale scale = pixel_scale(log, sized.width_px, sized.height_px);
+  HybridObserver observer(hybrid_config(log, config, scale));
+  MotionReader reader(log.source, config.max_gap_s);
+  const bool shows = !run.options.json && !run.options.quiet;
+  if (shows) std::cout << intrinsics_csv({}, {}) << std::flush;
+  while (auto entry = stream.next()) {
+    report_progress(run.progress, "rows", log.rows.size(), 0);
+    log.rows.push_back(std::move(entry->row));
+    if (entry->truth) log.truth.push_back(*entry->truth);
+    RotationLog one = stream.layout();
+    one.rows.push_back(log.rows.back());
+    if (camera) one = undistorted(one, *camera);
+    const double t_s = one.rows.front().t_s;
+    const IntrinsicsEstimate estimate = observer.step(reader.next(one.rows.front()));
+    const std::string table = intrinsics_csv({&t_s, 1}, {&estimate, 1});
+    if (shows) std::cout << table.substr(table.find('\n') + 1) << std::flush;
+  }
+  run.document.counts.given = stream.skipped().size();
+  run.document.counts.skipped = stream.skipped();
+  return log;
+}
+
 void summarize(const ObserveReport& report, Run& run) {
   for (const ObservedQuantity& quantity : report.quantities) {
     run.say(fmt::format("{:<11} {:.6g} ± {:.2g}   (3σ; this log's bound {:.2g})", quantity.name, quantity.value,
@@ -108,7 +137,7 @@ ExitCode observe_log(const Args& args, Run& run) {
     camera = read_camera(args.camera);
   }
   ObserveConfig config = config_from(args, camera);
-  RotationLog log = read_log(args, run);
+  RotationLog log = args.log == "-" ? follow_input(args, config, camera, run) : read_log(args, run);
   if (log.source == RotationSource::none && config.rotation != RotationKnowledge::free) {
     if (args.pairs.empty()) {
       throw InputError(args.log + ": no rotation: omega_x,omega_y or pan,tilt or qw,qx,qy,qz, or say --rotation free");
@@ -134,7 +163,9 @@ ExitCode observe_log(const Args& args, Run& run) {
 }
 
 void add_options(CLI::App& command, Args& args) {
-  command.add_option("log", args.log, "Rotation log, CSV: t, the rotation, p1x,p1y,p2x,p2y,…");
+  command.add_option(
+      "log", args.log,
+      "Rotation log, CSV: t, the rotation, p1x,p1y,p2x,p2y,…; - reads rows from standard input and answers each");
   command
       .add_option("--pairs", args.pairs, "Matched points of neighbouring photos instead, CSV: frame_a,frame_b,ua_px,…")
       ->type_name("FILE");

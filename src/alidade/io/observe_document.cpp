@@ -129,7 +129,7 @@ void fill_observation(const RotationLog& log, const ObserveReport& report, const
     JsonValue event = JsonValue::object();
     event["t_s"] = note.t_s;
     event["kind"] = event_name(note.event);
-    if (note.point >= 0) event["point"] = "p" + std::to_string(note.point + 1);
+    if (note.point >= 0) event["point"] = note.point + 1;
     events.push_back(std::move(event));
   }
   document.estimate["events"] = std::move(events);

@@ -38,6 +38,11 @@ struct PixelScale {
   double scale = 1.0;                                ///< About half its width. [px]
 
   [[nodiscard]] Eigen::Vector2d normalised(const Eigen::Vector2d& px) const { return (px - centre) / scale; }
+  /// Of fx, fy, cx, cy.
+  [[nodiscard]] Eigen::Vector4d normalised_intrinsics(const Eigen::Vector4d& k_px) const {
+    const Eigen::Vector2d c = normalised(k_px.tail<2>());
+    return {k_px[0] / scale, k_px[1] / scale, c.x(), c.y()};
+  }
 };
 
 }  // namespace alidade

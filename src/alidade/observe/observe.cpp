@@ -25,9 +25,8 @@ class Observation {
     report_.scale = pixel_scale(log, report_.width_px, report_.height_px);
     report_.sigma_is_told = !(config.sigma_px > 0.0);
     report_.steps.resize(log.rows.size());
-    with_depth_ = config.lever_m.has_value() || config.estimate.lever || log.has_velocity;
-    start_.k = config.start ? normalised(*config.start) : Eigen::Vector4d(1.3, 1.3, 0.0, 0.0);
-    if (config.lever_m) start_.lever_m = *config.lever_m;
+    with_depth_ = needs_depth(log, config);
+    start_ = start_camera(config, report_.scale);
   }
 
   ObserveReport run() {
@@ -55,12 +54,6 @@ class Observation {
   }
 
  private:
-  [[nodiscard]] Eigen::Vector4d normalised(const Eigen::Vector4d& k_px) const {
-    const PixelScale& scale = report_.scale;
-    const Eigen::Vector2d centre = (k_px.tail<2>() - scale.centre) / scale.scale;
-    return {k_px[0] / scale.scale, k_px[1] / scale.scale, centre.x(), centre.y()};
-  }
-
   void make_frames() {
     MotionReader reader(log_.source, config_.max_gap_s);
     for (const RotationRow& row : log_.rows) frames_.push_back(reader.next(row));
@@ -102,7 +95,7 @@ class Observation {
   }
 
   void run_hybrid() {
-    HybridObserver observer(hybrid_config(report_.scale));
+    HybridObserver observer(hybrid_config(log_, config_, report_.scale));
     double sum_nis = 0.0, sum_dof = 0.0;
     for (std::size_t k = 0; k < frames_.size(); ++k) {
       report_.steps[k] = observer.step(frames_[k]);
@@ -123,34 +116,6 @@ class Observation {
     has_final_ = true;
   }
 
-  [[nodiscard]] HybridConfig hybrid_config(const PixelScale& scale) const {
-    HybridConfig hybrid;
-    hybrid.num_points = log_.num_points;
-    hybrid.scale = scale;
-    hybrid.nuisances = config_.estimate;
-    hybrid.with_depth = with_depth_;
-    hybrid.start = start_;
-    hybrid.start_is_given = config_.start.has_value();
-    hybrid.prior = prior();
-    hybrid.sigma_px = config_.sigma_px;
-    hybrid.sigma_range_m = config_.sigma_range_m;
-    hybrid.range_point = log_.range_point;
-    return hybrid;
-  }
-
-  /// What the person says of the camera; none if nothing.
-  [[nodiscard]] std::optional<CommonPrior> prior() const {
-    if (!config_.square_pixels && !config_.fixed_centre) return std::nullopt;
-    constexpr double held = 1e-7;
-    CommonPrior prior(start_);
-    if (config_.square_pixels) prior.sigma_aspect = held;
-    if (config_.fixed_centre) {
-      prior.sigma_k.tail<2>().setConstant(held);
-      prior.says_k[2] = prior.says_k[3] = true;
-    }
-    return prior;
-  }
-
   [[nodiscard]] AdjustConfig adjust_config() const {
     AdjustConfig adjust;
     adjust.nuisances = config_.estimate;
@@ -160,7 +125,7 @@ class Observation {
     adjust.sigma_range_m = config_.sigma_range_m;
     adjust.range_point = log_.range_point;
     adjust.start = start_;
-    adjust.prior = prior();
+    adjust.prior = said_prior(config_, start_);
     if (config_.rotation == RotationKnowledge::free) {
       adjust.sigma_turn_rad = std::numeric_limits<double>::infinity();
     } else if (log_.source == RotationSource::rate) {
@@ -243,7 +208,7 @@ class Observation {
     if (last == report_.steps.rend()) return;
     const double scale = report_.scale.scale;
     final_ = start_;
-    final_.k = normalised(last->values());
+    final_.k = report_.scale.normalised_intrinsics(last->values());
     final_cov_ = (last->sigma / scale).cwiseAbs2().asDiagonal();
     has_final_ = true;
   }

@@ -5,6 +5,7 @@
 #include "alidade/camera/camera.h"
 #include "alidade/estimation/verdict.h"
 #include "alidade/observe/frame_buffer.h"
+#include "alidade/observe/hybrid.h"
 
 namespace alidade {
 
@@ -75,6 +76,14 @@ struct ObserveReport {
 /// Intrinsics of a rotating camera from what it saw while it turned. Throws Interrupted.
 /// docs/maths/rotating-camera.md.
 [[nodiscard]] ObserveReport observe(const RotationLog& log, const ObserveConfig& config, const Progress& progress = {});
+
+/// The parts of it that an on-line run needs: the hybrid observer's configuration for a log whose rows are yet to come.
+[[nodiscard]] HybridConfig hybrid_config(const RotationLog& layout, const ObserveConfig& config,
+                                         const PixelScale& scale);
+[[nodiscard]] bool needs_depth(const RotationLog& log, const ObserveConfig& config);
+[[nodiscard]] RotatingCamera start_camera(const ObserveConfig& config, const PixelScale& scale);
+/// What the person says of the camera; none if nothing.
+[[nodiscard]] std::optional<CommonPrior> said_prior(const ObserveConfig& config, const RotatingCamera& start);
 
 /// What the answer is worth, or why there is none and what to add.
 [[nodiscard]] Verdict observe_verdict(const ObserveReport& report, const RotationLog& log, const ObserveConfig& config);

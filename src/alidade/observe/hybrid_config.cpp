@@ -1,0 +1,43 @@
+#include "alidade/observe/observe.h"
+
+namespace alidade {
+
+bool needs_depth(const RotationLog& log, const ObserveConfig& config) {
+  return config.lever_m.has_value() || config.estimate.lever || log.has_velocity;
+}
+
+RotatingCamera start_camera(const ObserveConfig& config, const PixelScale& scale) {
+  RotatingCamera start;
+  start.k = config.start ? scale.normalised_intrinsics(*config.start) : Eigen::Vector4d(1.3, 1.3, 0.0, 0.0);
+  if (config.lever_m) start.lever_m = *config.lever_m;
+  return start;
+}
+
+std::optional<CommonPrior> said_prior(const ObserveConfig& config, const RotatingCamera& start) {
+  if (!config.square_pixels && !config.fixed_centre) return std::nullopt;
+  constexpr double held = 1e-7;
+  CommonPrior prior(start);
+  if (config.square_pixels) prior.sigma_aspect = held;
+  if (config.fixed_centre) {
+    prior.sigma_k.tail<2>().setConstant(held);
+    prior.says_k[2] = prior.says_k[3] = true;
+  }
+  return prior;
+}
+
+HybridConfig hybrid_config(const RotationLog& layout, const ObserveConfig& config, const PixelScale& scale) {
+  HybridConfig hybrid;
+  hybrid.num_points = layout.num_points;
+  hybrid.scale = scale;
+  hybrid.nuisances = config.estimate;
+  hybrid.with_depth = needs_depth(layout, config);
+  hybrid.start = start_camera(config, scale);
+  hybrid.start_is_given = config.start.has_value();
+  hybrid.prior = said_prior(config, hybrid.start);
+  hybrid.sigma_px = config.sigma_px;
+  hybrid.sigma_range_m = config.sigma_range_m;
+  hybrid.range_point = layout.range_point;
+  return hybrid;
+}
+
+}  // namespace alidade

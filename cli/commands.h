@@ -8,6 +8,7 @@ void add_calibrate(Frame& frame);
 void add_camera(Frame& frame);
 void add_observe(Frame& frame);
 void add_plan(Frame& frame);
+void add_plan_observe(Frame& frame);       ///< Of `plan`.
 void add_rotation_scenario(Frame& frame);  ///< Of `simulate`.
 void add_simulate(Frame& frame);
 

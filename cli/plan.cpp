@@ -76,6 +76,7 @@ void add_plan(Frame& frame) {
   command.add_option("--photos", args->photos, "How many photos to propose")
       ->check(CLI::Range(1, 20))
       ->capture_default_str();
+  add_plan_observe(frame);
 }
 
 }  // namespace alidade::cli

@@ -222,8 +222,8 @@ ZoomFigures experiment_3(MakeLog make_log, int num_sets) {
 
 TEST(FangExperiment3, FastFollowsAZoomThatMovesNothing) {
   const ZoomFigures figures = experiment_3(flow_only_log, 60);
-  // About these in an independent study.
-  const std::array<double, 4> limit_px{5.0, 14.0, 2.0, 2.0};
+  // About 5 14 2 2 px in an independent study; nine in ten go to 16 35 6 4, so that two medians differ by a fifth.
+  const std::array<double, 4> limit_px{6.0, 16.8, 2.4, 2.4};
   for (std::size_t i = 0; i < 4; ++i) {
     EXPECT_LE(figures.ramp[i].median(), limit_px[i]) << figures.ramp[i];
     EXPECT_LT(figures.after[i].median(), 0.3) << figures.after[i];

@@ -144,6 +144,7 @@ TEST(FangObserver, LosesEnergyAtEveryGainAndStep) {
       MotionReader reader(log.source, 0.5);
       double last_energy = std::numeric_limits<double>::infinity(), first_energy = 0.0;
       std::array<Eigen::Vector2d, 4> last_e;
+      last_e.fill(Eigen::Vector2d::Zero());
       for (const RotationRow& row : log.rows) {
         const RotationFrame frame = reader.next(row);
         (void)observer.step(frame);

@@ -7,6 +7,9 @@ namespace alidade {
 namespace {
 
 constexpr int max_projection_steps = 3;
+/// Of ten degrees of freedom: not once in a million.
+constexpr double implausible_chi2 = 50.0;
+constexpr double least_inverse_focal = 1.0 / 20.0;
 
 double squared(double x) { return x * x; }
 
@@ -76,25 +79,41 @@ void FlowFilter::restart(Point& point, const Eigen::Vector2d& q) const {
   point.s = variance_;
 }
 
-/// Gauss–Newton from the frame before. A focal length at most halves or doubles in a step: the first frames say little.
+/// From the frame before; where that does not fit, it may stand in a wrong valley, and Θ̂ itself is tried as well.
 void FlowFilter::project() {
   const Eigen::Matrix<double, 14, 14> information = theta_.information();
-  const auto weight = information.topLeftCorner(num_columns_, num_columns_);
+  Projection best = projection_from(k_, information);
+  if (!(best.chi2 < implausible_chi2)) {
+    const auto plain = intrinsics_of(theta_.mean()(difference_rows), least_inverse_focal);
+    const Projection other = plain ? projection_from(*plain, information) : best;
+    if (other.chi2 < best.chi2) best = other;
+  }
+  k_ = best.k;
+  sigma_k_ = best.sigma;
+  has_value_ = k_.allFinite() && sigma_k_.allFinite();
+}
+
+/// Gauss–Newton. A focal length at most halves or doubles in a step: the first frames say little.
+FlowFilter::Projection FlowFilter::projection_from(const Eigen::Vector4d& start,
+                                                   const Eigen::Matrix<double, 14, 14>& information) const {
+  Projection at{.k = start};
+  Eigen::Matrix<double, 14, 14> weight = information;
+  if (num_columns_ == 10) weight.bottomRows<4>().setZero();  // the ten are independent of the four that were not used
   Eigen::Matrix4d normal;
   for (int i = 0; i < max_projection_steps; ++i) {
-    const Eigen::Matrix<double, 14, 4> j_all = flow_parameters_jacobian(k_);
-    const FlowParameters error_all = theta_.mean() - flow_parameters(k_);
-    Eigen::Matrix<double, 14, 4> weighted = Eigen::Matrix<double, 14, 4>::Zero();
-    weighted.topRows(num_columns_) = weight.lazyProduct(j_all.topRows(num_columns_));
-    normal = weighted.transpose() * j_all;
-    const Eigen::Vector4d step = normal.ldlt().solve(weighted.transpose() * error_all);
+    const Eigen::Matrix<double, 14, 4> j = flow_parameters_jacobian(at.k);
+    const Eigen::Matrix<double, 14, 4> weighted = weight * j;
+    normal = weighted.transpose() * j;
+    const Eigen::Vector4d step = normal.ldlt().solve(weighted.transpose() * (theta_.mean() - flow_parameters(at.k)));
     if (!step.allFinite()) break;
     for (Eigen::Index axis = 0; axis < 2; ++axis)
-      k_[axis] = std::clamp(k_[axis] + step[axis], 0.5 * k_[axis], 2.0 * k_[axis]);
-    k_.tail<2>() += step.tail<2>();
+      at.k[axis] = std::clamp(at.k[axis] + step[axis], 0.5 * at.k[axis], 2.0 * at.k[axis]);
+    at.k.tail<2>() += step.tail<2>();
   }
-  sigma_k_ = normal.inverse().diagonal().cwiseSqrt();
-  has_value_ = k_.allFinite() && sigma_k_.allFinite();
+  const FlowParameters error = theta_.mean() - flow_parameters(at.k);
+  at.chi2 = error.dot(weight * error);
+  at.sigma = normal.inverse().diagonal().cwiseSqrt();
+  return at;
 }
 
 IntrinsicsEstimate FlowFilter::estimate(ObserveEvent event) const {

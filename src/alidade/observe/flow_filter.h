@@ -52,7 +52,14 @@ class FlowFilter {
 
   void advance(Point& point, const Eigen::Vector2d& q, const RotationFrame& frame);
   void restart(Point& point, const Eigen::Vector2d& q) const;
+  /// A point of the four-dimensional surface of possible Θ, and how far Θ̂ is from it.
+  struct Projection {
+    Eigen::Vector4d k, sigma = Eigen::Vector4d::Zero();
+    double chi2 = 0.0;
+  };
   void project();
+  [[nodiscard]] Projection projection_from(const Eigen::Vector4d& start,
+                                           const Eigen::Matrix<double, 14, 14>& information) const;
   [[nodiscard]] IntrinsicsEstimate estimate(ObserveEvent event) const;
 
   FlowFilterConfig config_;

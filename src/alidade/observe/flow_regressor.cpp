@@ -1,15 +1,6 @@
 #include "alidade/observe/flow_regressor.h"
 
-#include <array>
-
 namespace alidade {
-namespace {
-
-/// Rows of Θ that differencing leaves.
-constexpr std::array<Eigen::Index, 8> difference_rows{0, 1, 2, 3, 4, 5, 10, 12};
-
-}  // namespace
-
 FlowRegressor flow_regressor(const Eigen::Vector2d& q, const Eigen::Vector3d& rate) {
   const double px = q.x(), py = q.y(), wx = rate.x(), wy = rate.y(), wz = rate.z();
   FlowRegressor g;

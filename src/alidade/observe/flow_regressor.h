@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 
 #include "alidade/observe/intrinsics_estimate.h"
@@ -23,6 +24,9 @@ using FlowRegressor = Eigen::Matrix<double, 14, 2>;  ///< G: q̇ = Gᵀ Θ.
 /// The difference of two points' flows loses columns 7 to 10, 12 and 14: θ = (Θ1 … Θ6, fx/fy, fy/fx).
 using DifferenceParameters = Eigen::Matrix<double, 8, 1>;
 using DifferenceRegressor = Eigen::Matrix<double, 8, 2>;  ///< Ω of one point: ẏ = Ωᵀ θ with y = q − q_reference.
+
+/// Rows of Θ that are left in θ.
+inline constexpr std::array<Eigen::Index, 8> difference_rows{0, 1, 2, 3, 4, 5, 10, 12};
 
 [[nodiscard]] FlowRegressor flow_regressor(const Eigen::Vector2d& q, const Eigen::Vector3d& rate_rad_per_s);
 [[nodiscard]] DifferenceRegressor difference_regressor(const Eigen::Vector2d& q, const Eigen::Vector2d& q_reference,

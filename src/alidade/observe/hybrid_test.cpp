@@ -7,6 +7,7 @@
 
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/rotation.h"
+#include "alidade/testing/allocations.h"
 
 namespace alidade {
 namespace {
@@ -293,6 +294,68 @@ TEST(Hybrid, EstimatesDistortionMountAndDelay) {
     }
     EXPECT_LE(std::sqrt(squares[0]), 1.5) << (experiment == &bent ? "k1" : "mount and delay");
   }
+}
+
+TEST(Hybrid, AllocatesNothingOnceItRuns) {
+  Experiment experiment = paper_experiment(20.0);
+  experiment.scene.intrinsics = [](double t_s) {
+    RotatingIntrinsics now;
+    if (t_s >= 12.0) now.fx *= 1.1;
+    return now;
+  };
+  experiment.disturb = [](RotationLog& log, int) {
+    for (RotationRow& row : log.rows) {
+      if (row.t_s >= 8.0) row.px[1] += Eigen::Vector2d(20.0, 5.0);
+    }
+  };
+  for (int set = 0; set < 5; ++set) {
+    const RotationLog log = log_of(experiment, set);
+    std::size_t before = 0;
+    run(experiment, log, [&](std::size_t, const RotationRow& row, const Eigen::Vector4d&, const IntrinsicsEstimate&) {
+      if (row.t_s < 6.0) before = testing::num_allocations();
+    });
+    EXPECT_EQ(testing::num_allocations(), before) << "set " << set;
+  }
+}
+
+/// Mean error over the sets, of fx and fy, with a lever arm of 20 mm and points 2 m away.
+Eigen::Vector2d mean_error_with_lever(bool says_lever, double& sigma_of_mean) {
+  Experiment experiment = paper_experiment(6.0);
+  experiment.scene.lever_arm_m = {0.0, 0.0, 0.02};
+  experiment.scene.depth_m.assign(4, 2.0);
+  experiment.log.with_range = true;
+  experiment.log.sigma_range_m = 0.002;
+  constexpr int sets = 100;
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero(), squares = Eigen::Vector2d::Zero();
+  for (int set = 0; set < sets; ++set) {
+    const RotationLog log = log_of(experiment, set);
+    HybridConfig config;
+    config.num_points = 4;
+    config.scale = paper_scale;
+    config.start.k = {1.25, 1.275, 0.025, 0.0225};
+    config.start_is_given = true;
+    config.with_depth = says_lever;
+    config.sigma_range_m = 0.002;
+    if (says_lever) config.start.lever_m = experiment.scene.lever_arm_m;
+    HybridObserver observer(config);
+    MotionReader reader(log.source, 0.25);
+    IntrinsicsEstimate estimate;
+    for (const RotationRow& row : log.rows) estimate = observer.step(reader.next(row));
+    const Eigen::Vector2d error(estimate.fx - 710.0, estimate.fy - 700.0);
+    sum += error;
+    squares += error.cwiseAbs2();
+  }
+  const Eigen::Vector2d mean = sum / sets;
+  sigma_of_mean = std::sqrt((squares / sets - mean.cwiseAbs2()).maxCoeff() / sets);
+  return mean;
+}
+
+TEST(Hybrid, ALeverArmBiasesByFTimesArmOverDepthAndARangeFreesItOfThat) {
+  double sigma = 0.0;
+  const Eigen::Vector2d ignored = mean_error_with_lever(false, sigma);
+  EXPECT_GT(ignored.minCoeff(), 5.0);  // f r / Z = 7 px
+  const Eigen::Vector2d told = mean_error_with_lever(true, sigma);
+  EXPECT_LT(told.cwiseAbs().maxCoeff(), 0.3) << told.transpose() << ", σ of the mean " << sigma;
 }
 
 }  // namespace

@@ -58,7 +58,8 @@ inline std::optional<RotationLog> paper_case(const std::string& name) {
     row.t_s = static_cast<double>(r) / 30.0;  // the file has nine digits of it, too few for gains of 10⁵
     row.rate_rad_per_s = {csv.number(r, "omega_x"), csv.number(r, "omega_y"), 0.0};
     for (int i = 1; i <= 4; ++i) {
-      const std::string point = "p" + std::to_string(i);
+      std::string point = "p";
+      point += std::to_string(i);
       row.px.emplace_back(csv.number(r, point + "x"), csv.number(r, point + "y"));
     }
     log.rows.push_back(std::move(row));

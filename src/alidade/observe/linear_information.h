@@ -13,7 +13,10 @@ class LinearInformation {
   using Vector = Eigen::Matrix<double, n, 1>;
   using Matrix = Eigen::Matrix<double, n, n>;
 
-  LinearInformation(const Vector& mean, const Matrix& information) : mean_(mean), information_(information) { begin(); }
+  LinearInformation(const Vector& mean, const Matrix& information)
+      : mean_(mean), information_(information), factor_(information) {
+    begin();
+  }
 
   void begin() {
     gradient_.setZero();
@@ -51,8 +54,8 @@ class LinearInformation {
  private:
   Vector mean_;
   Matrix information_;  // lower triangle
-  Vector gradient_;
   Eigen::LDLT<Matrix> factor_;
+  Vector gradient_;
   double chi2_ = 0.0;
   int num_scalars_ = 0;
 };

@@ -18,7 +18,7 @@ std::string last_part(const std::string& path) { return path.substr(path.find_la
 std::string unit_of(const std::string& path) {
   const std::string name = path.substr(0, path.find('['));
   static constexpr std::array<std::string_view, 7> lens_px{"fx", "fy", "cx", "cy", "skew", "width", "height"};
-  if (name.find("camera") != std::string::npos &&
+  if ((name.find("camera") != std::string::npos || name.starts_with("bound.")) &&
       std::find(lens_px.begin(), lens_px.end(), last_part(name)) != lens_px.end())
     return "px";
   using Ending = std::pair<std::string_view, std::string_view>;

@@ -57,8 +57,22 @@ Content difference_content(const Document& document) {
   return content;
 }
 
+Content observe_content(const Document& document) {
+  const report::ObserveScene scene = report::observe_scene(document);
+  Content content;
+  add(content, report::figure_estimate(document), "Estimate");
+  add(content, report::figure_observe_intrinsics(scene), "What are fx, fy, cx and cy, and how sure is it?");
+  add(content, report::figure_observe_motion(scene), "Did the motion tell enough?");
+  add(content, report::figure_observe_nis(scene), "Does each frame fit?");
+  add(content, report::figure_observe_tracks(scene), "Where were the points seen?");
+  add(content, report::figure_observe_directions(scene), "Where did it look?");
+  add(content, report::figure_observe_points(scene), "Does each point fit?");
+  return content;
+}
+
 Content content_of(const Document& document, const Pictures& pictures) {
   if (document.command == "calibrate") return calibrate_content(document, pictures);
+  if (document.command == "observe") return observe_content(document);
   if (document.command == "camera diff") return difference_content(document);
   Content content;
   add(content, report::figure_estimate(document), "Estimate");

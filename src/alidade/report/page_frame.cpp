@@ -51,7 +51,9 @@ std::string counts_line(const Document& document) {
   const double used = count(document, "used"), given = count(document, "given"), dropped = count(document, "dropped");
   if (std::isfinite(used))
     parts.push_back(fmt::format("{}{} {}", number_text(used, 9), given > used ? " of " + number_text(given, 9) : "",
-                                is_calibrate ? "photos" : "used"));
+                                is_calibrate                    ? "photos"
+                                : document.command == "observe" ? "rows"
+                                                                : "used"));
   if (const Table* corners = document.table("corners"); corners && is_calibrate)
     parts.push_back(fmt::format("{} corners{}", corners->num_rows,
                                 std::isfinite(dropped) ? " (" + number_text(dropped, 9) + " dropped)" : ""));

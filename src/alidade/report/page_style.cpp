@@ -96,13 +96,30 @@ svg text{font-family:inherit}:where(path:not([fill])){fill:none}
 .matrix{max-width:360px}.card svg.key{max-width:520px}
 )css";
 
+constexpr std::string_view time_rules = R"css(
+.panels{display:grid;grid-template-columns:repeat(2,minmax(0,1fr));gap:10px 16px;align-items:start}
+.legend{display:flex;flex-wrap:wrap;gap:2px 18px;margin:0 0 6px;font-size:12.5px;color:var(--muted)}.legend span{white-space:nowrap}
+.card svg.sample,.card svg.sample-mark{display:inline-block;width:26px;height:12px;vertical-align:-1px;margin:0 6px 0 0}.card svg.sample-mark{width:12px}
+.line-blue{stroke:var(--blue);stroke-width:1.7;stroke-linejoin:round}.line-orange{stroke:var(--orange);stroke-width:2}.line-near{stroke:var(--blue);stroke-width:1;stroke-opacity:.5}
+.line-error{stroke:var(--muted);stroke-width:.9;stroke-opacity:.75}.band{fill:var(--blue);fill-opacity:.2}
+.truth{stroke:var(--ink);stroke-width:1.5;stroke-dasharray:6 4}.bound{stroke:var(--orange);stroke-width:2;stroke-dasharray:2 3}
+.series-x{stroke:var(--blue);stroke-width:1.7}.series-y{stroke:var(--orange);stroke-width:1.7;stroke-dasharray:9 3}.series-z{stroke:var(--green);stroke-width:1.9;stroke-dasharray:2 3}
+.zoom-span{fill:var(--orange);fill-opacity:.16}.event-line{stroke:var(--orange);stroke-opacity:.6;stroke-dasharray:2 4}.event{fill:var(--orange)}
+.limit-line{stroke:var(--bad);stroke-width:1.6}.care-line{stroke:var(--care);stroke-dasharray:7 3}.below-limit{fill:var(--bad);fill-opacity:.12}
+.nis-dots,.residual-dots,.bearing-dots,.track-start{stroke-linecap:round;stroke:var(--blue);stroke-width:2.4}
+.residual-dots{stroke-opacity:.45;stroke-width:3}.bearing-dots{stroke:var(--ink);stroke-width:4}.track-start{stroke-width:6.5;stroke:var(--ink)}
+.left-out-mark{stroke:var(--orange);stroke-width:2}.ring{fill:none;stroke:var(--ink);stroke-width:1.3;stroke-dasharray:5 4}
+.track{stroke:var(--blue);stroke-width:1.3;stroke-opacity:.8;stroke-linejoin:round}.centre-mark{stroke:var(--orange);stroke-width:2}
+.sphere{fill:var(--panel);stroke:var(--muted)}.near-line{stroke:var(--muted);stroke-opacity:.22}.footprint{stroke:var(--orange);stroke-width:1.3;fill:none}
+)css";
+
 constexpr std::string_view size_rules = R"css(
 @media(min-width:1000px) and (max-width:1380px){main{grid-auto-flow:dense}
-.card:not([style*=":24"],[style*=":16"],[style*=":14"]){grid-column:span 12}.card[style*=":16"],.card[style*=":14"]{grid-column:span 24}}
+.card:not([style*=":24"],[style*=":18"],[style*=":16"],[style*=":14"]){grid-column:span 12}.card[style*=":18"],.card[style*=":16"],.card[style*=":14"]{grid-column:span 24}}
 @media(max-width:999px){main{display:block;padding:12px}.card{margin-bottom:12px}.below{padding:0 12px 8px}
 .card svg{max-width:680px;margin:auto}.card svg.stage{max-width:100%}.wide{display:none!important}.narrow{display:block!important}.card svg.narrow{max-width:100%}
 .thumbs>div{grid-template-columns:repeat(auto-fill,minmax(140px,1fr))}.matrix{max-width:380px!important}}
-@media(max-width:640px){.headline{flex-direction:column-reverse;gap:8px}h1{font-size:17px}.top{padding:12px 14px}}
+@media(max-width:640px){.panels{display:block}.headline{flex-direction:column-reverse;gap:8px}h1{font-size:17px}.top{padding:12px 14px}}
 @media print{body{background:#fff;font-size:11px}main{display:block;padding:0}nav,.choices{display:none}.below{padding:0}
 .card,.below>section,footer{break-inside:avoid;margin-bottom:10px}.card svg{max-width:150mm;max-height:190mm;margin:auto}
 .wide{display:none!important}.narrow{display:block!important}*{print-color-adjust:exact;-webkit-print-color-adjust:exact}}
@@ -117,6 +134,7 @@ std::string page_style() {
       light_colours, dark_colours);
   out += frame_rules;
   out += drawing_rules;
+  out += time_rules;
   for (int direction = 0; direction < num_directions; ++direction)
     out += fmt::format(".d{}{{stroke:{}}}", direction, hex(direction_colour(direction)));
   out += size_rules;

@@ -18,7 +18,7 @@ std::string last_part(const std::string& path) { return path.substr(path.find_la
 std::string unit_of(const std::string& path) {
   const std::string name = path.substr(0, path.find('['));
   static constexpr std::array<std::string_view, 7> lens_px{"fx", "fy", "cx", "cy", "skew", "width", "height"};
-  if ((name.find("camera") != std::string::npos || name.starts_with("bound.")) &&
+  if ((name.find("camera") != std::string::npos || name.starts_with("bound.") || name.starts_with("error.")) &&
       std::find(lens_px.begin(), lens_px.end(), last_part(name)) != lens_px.end())
     return "px";
   using Ending = std::pair<std::string_view, std::string_view>;
@@ -33,7 +33,7 @@ std::string unit_of(const std::string& path) {
 
 // What the run was given and what it counted stand in the header and in the tables.
 bool is_shown_elsewhere(const std::string& path) {
-  for (const char* beginning : {"photos", "board.", "corners_"})
+  for (const char* beginning : {"photos", "board.", "corners_", "events["})
     if (path.rfind(beginning, 0) == 0) return true;
   return false;
 }
@@ -69,6 +69,8 @@ struct Correlations {
 
 Correlations correlations(const Document& document) {
   Correlations result{document.covariance_names, {}};
+  for (std::string& name : result.names)
+    if (name.starts_with("camera.")) name = last_part(name);
   const std::size_t n = result.names.size();
   if (n < 2 || document.covariance_upper.size() != n * (n + 1) / 2) return {};
   std::vector<double> cov(n * n);

@@ -104,9 +104,11 @@ std::string panel(const ObserveScene& scene, const IntrinsicColumns& column) {
   const Errors errors = errors_of(column);
   const bool has_error = error.is_there();
   const double low_end = has_error ? error_bottom : bottom;
-  Svg svg(TimePlot::width, low_end + 36.0, fmt::format("{} over time; at the end {}", column.name, last_words(column)));
+  // A run that was refused has no last value to quote.
+  const std::string last = scene.document.is_answer() ? "at the end " + last_words(column) : std::string();
+  Svg svg(TimePlot::width, low_end + 36.0, fmt::format("{} over time {}", column.name, last));
   svg.text({TimePlot::left, 15.0}, column.name + ", px", "label");
-  svg.text({TimePlot::right, 15.0}, "at the end " + last_words(column), "small", "end");
+  svg.text({TimePlot::right, 15.0}, last, "small", "end");
   TimePlot value(svg, scene, {range.low, range.high, bottom, top}, 4);
   value.event_marks(true);
   value.begin("clip-" + column.name);
@@ -188,8 +190,8 @@ std::string event_list(const ObserveScene& scene) {
   }
   if (scene.events.size() > most)
     items += fmt::format("<li>… and {} more: intrinsics.csv has them all</li>", scene.events.size() - most);
-  return fmt::format("<details class=\"reasons\"><summary>{} events</summary><ul>{}</ul></details>",
-                     scene.events.size(), items);
+  return fmt::format("<details class=\"reasons\"><summary>{} event{}</summary><ul>{}</ul></details>",
+                     scene.events.size(), scene.events.size() == 1 ? "" : "s", items);
 }
 
 }  // namespace

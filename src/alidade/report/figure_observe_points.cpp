@@ -55,7 +55,7 @@ std::vector<PointSummary> summaries(const ObserveScene& scene) {
 
 /// σ of a coordinate: stated, or that of the residuals.
 double noise_of(const ObserveScene& scene) {
-  if (const double noise = scene.document.estimated("noise_px"); noise > 0.0) return noise;
+  if (const double noise = scene.document.estimated("sigma_px"); noise > 0.0) return noise;
   std::vector<double> sizes;
   for (const PointMark& mark : scene.points)
     if (mark.is_used && has_residual(mark)) sizes.push_back(size_of(mark));
@@ -201,27 +201,35 @@ std::vector<Track> tracks_of(const ObserveScene& scene) {
   return tracks;
 }
 
-/// Steps between neighbours of a track beyond which it was out of sight.
-int longest_gap(const Track& track) {
+/// Steps between neighbours of a track, most often.
+double usual_gap(const Track& track) {
   std::vector<double> gaps;
   for (std::size_t i = 1; i < track.size(); ++i) gaps.push_back(track[i]->step - track[i - 1]->step);
-  return gaps.empty() ? 1 : static_cast<int>(std::lround(4.0 * std::max(1.0, quantile(gaps, 0.5))));
+  return gaps.empty() ? 1.0 : std::max(1.0, quantile(gaps, 0.5));
 }
 
-void append_track(std::string& d, const Track& track, const PicturePanel& panel, double u0, double v0,
-                  std::size_t every) {
-  const int gap = longest_gap(track);
+struct TrackPaths {
+  std::string lines, dots;
+};
+
+/// A line, broken where the point was out of sight; dots where so few rows are known that a line would lie.
+void append_track(TrackPaths& paths, const Track& track, const PicturePanel& panel, Place origin, std::size_t every) {
+  constexpr double widest_gap = 4.0;
+  const double gap = usual_gap(track);
   std::vector<Place> line;
   for (std::size_t i = 0; i < track.size(); ++i) {
-    const bool is_apart = i > 0 && track[i]->step - track[i - 1]->step > gap;
-    if (is_apart) {
-      append_polyline(d, line, false);
+    const Place at = panel.at(track[i]->u_px - origin.x, track[i]->v_px - origin.y);
+    if (gap > widest_gap) {
+      if (i % every == 0) append_dot(paths.dots, at);
+      continue;
+    }
+    if (i > 0 && track[i]->step - track[i - 1]->step > 4.0 * gap) {
+      append_polyline(paths.lines, line, false);
       line.clear();
     }
-    if (line.empty() || i % every == 0 || i + 1 == track.size())
-      line.push_back(panel.at(track[i]->u_px - u0, track[i]->v_px - v0));
+    if (line.empty() || i % every == 0 || i + 1 == track.size()) line.push_back(at);
   }
-  append_polyline(d, line, false);
+  append_polyline(paths.lines, line, false);
 }
 
 void draw_principal_point(Svg& svg, const ObserveScene& scene, const PicturePanel& panel, double u0, double v0) {
@@ -243,12 +251,14 @@ std::string track_plot(const ObserveScene& scene, const std::vector<Track>& trac
   const std::size_t every = places / most_places + 1;
   Svg svg(width, panel.bottom() + 24.0, fmt::format("Tracks of {} points over the picture", tracks.size()));
   panel.frame(svg);
-  std::string lines, starts;
+  TrackPaths paths;
+  std::string starts;
   for (std::size_t i = 0; i < shown; ++i) {
-    append_track(lines, tracks[i], panel, u0, v0, every);
+    append_track(paths, tracks[i], panel, {u0, v0}, every);
     append_dot(starts, panel.at(tracks[i].front()->u_px - u0, tracks[i].front()->v_px - v0));
   }
-  svg.path(lines, "track");
+  svg.path(paths.lines, "track");
+  svg.path(paths.dots, "nis-dots");
   svg.path(starts, "track-start");
   if (tracks.size() <= 24)
     for (const Track& track : tracks) {

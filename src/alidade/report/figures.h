@@ -48,20 +48,20 @@ using MaybeFigure = std::optional<Figure>;
 [[nodiscard]] MaybeFigure figure_parameters(const Document& document);
 
 /// Figures of `observe`. They read, and do without what is missing (null in a row, or no such column):
-/// - table `steps`, a row a row of the log (or thinned, see thin.h; then all rows with an event are kept):
+/// - table `steps`, a row a row of the log (or thinned evenly, see thin.h, all rows with an event kept):
 ///   t_s; fx_px, fy_px, cx_px, cy_px (null until there is an estimate); sigma_fx_px, … (one σ); truth_fx_px, …;
 ///   bound_fx_px, … (Cramér–Rao σ of the log so far); nis, nis_dof (of the frame, of what was not left out);
 ///   event (start, burst, slip, zoom, zoom_end, restart, gap; empty or null: none), event_point (from 0, of a slip);
 ///   weak_eigenvalue (information on the weakest combination, above zero), weak_combination (what it is called; the
 ///   last one that is there is shown), weak_limit (below it: refused), weak_care (below it: with care); the motion, one
-///   of pan_rad, tilt_rad, roll_rad or omega_x_rad_s, omega_y_rad_s, omega_z_rad_s; the attitude start_from_cam_qx,
+///   of pan_rad, tilt_rad, roll_rad or omega_x_rad_per_s, _y_, _z_; the attitude start_from_cam_qx,
 ///   _qy, _qz, _qw;
 /// - table `points`, a row a pixel (thinned): step (row of the full log, growing), point (from 0; shown as p1, …),
 /// u_px,
 ///   v_px (seen), residual_u_px, residual_v_px (predicted − seen), used (0: left out; 1 where missing);
 /// - table `bearings`, a row a point: x, y, z in the start's frame;
 /// - estimate: camera.width, camera.height (the picture's frame), camera.fx, fy, cx, cy (what the picture covers, the
-///   principal point), noise_px (σ of a coordinate).
+///   principal point), sigma_px (σ of a coordinate).
 /// Kept small by the writer: 2000 steps, 6000 points; 4 decimals of fx and σ, of residuals, 2 of pixels, 3 of t_s.
 [[nodiscard]] MaybeFigure figure_observe_intrinsics(const ObserveScene& scene);
 [[nodiscard]] MaybeFigure figure_observe_motion(const ObserveScene& scene);

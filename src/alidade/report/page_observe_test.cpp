@@ -45,7 +45,7 @@ TEST(ObservePage, DrawsWhatTheTablesHold) {
   const int with_estimate = static_cast<int>(
       std::ranges::count_if(document["data"]["steps"]["fx_px"], [](const Json& value) { return value.is_number(); }));
   EXPECT_EQ(marks_of(page, "intrinsics"), with_estimate);
-  EXPECT_EQ(marks_of(page, "nis"), with_estimate);
+  EXPECT_EQ(marks_of(page, "nis"), with_estimate - 6) << "without those of the events";
   EXPECT_EQ(marks_of(page, "motion"), 601);
   EXPECT_EQ(marks_of(page, "directions"), 601);
   EXPECT_EQ(marks_of(page, "points"), static_cast<int>(rows_of(document, "points")));
@@ -108,7 +108,7 @@ TEST(ObservePage, SaysWhichFiguresAreLeftOut) {
 TEST(ObservePage, WithoutPictureSizeTruthOrBoundThereIsStillAPage) {
   Json document = sample_observe_document(301, 600);
   document["estimate"]["camera"].erase("width");
-  document["estimate"].erase("noise_px");
+  document["estimate"].erase("sigma_px");
   Json& steps = document["data"]["steps"];
   for (const char* name : {"fx", "fy", "cx", "cy"})
     for (const char* kind : {"truth_", "bound_"}) steps.erase(std::string(kind) + name + "_px");
@@ -119,6 +119,13 @@ TEST(ObservePage, WithoutPictureSizeTruthOrBoundThereIsStillAPage) {
   EXPECT_THAT(card_of(page, "intrinsics"), HasSubstr("time since the first row, s"));
   EXPECT_THAT(card_of(page, "intrinsics"), Not(HasSubstr("truth")));
   expect_balanced(page);
+}
+
+TEST(ObservePage, ARefusedRunQuotesNoValue) {
+  Json document = sample_observe_document(61, 60);
+  EXPECT_THAT(card_of(report_page(document.dump(), {}), "intrinsics"), HasSubstr("at the end"));
+  document["verdict"]["state"] = "refused";
+  EXPECT_THAT(card_of(report_page(document.dump(), {}), "intrinsics"), Not(HasSubstr("at the end")));
 }
 
 TEST(ObservePage, AnUnknownEventIsShownAsText) {

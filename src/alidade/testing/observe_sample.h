@@ -58,9 +58,9 @@ inline void append_sample_step(nlohmann::ordered_json& steps, const RotationLog&
   steps["weak_combination"].push_back(t < 5.0 ? "fy" : "fx − cx");
   steps["weak_limit"].push_back(1e-4);
   steps["weak_care"].push_back(3e-4);
-  steps["omega_x_rad_s"].push_back(sample_number(row.rate_rad_per_s.x(), 1e-6));
-  steps["omega_y_rad_s"].push_back(sample_number(row.rate_rad_per_s.y(), 1e-6));
-  steps["omega_z_rad_s"].push_back(sample_number(row.rate_rad_per_s.z(), 1e-6));
+  steps["omega_x_rad_per_s"].push_back(sample_number(row.rate_rad_per_s.x(), 1e-6));
+  steps["omega_y_rad_per_s"].push_back(sample_number(row.rate_rad_per_s.y(), 1e-6));
+  steps["omega_z_rad_per_s"].push_back(sample_number(row.rate_rad_per_s.z(), 1e-6));
 }
 
 inline void append_sample_attitude(nlohmann::ordered_json& steps, const Eigen::Quaterniond& start_from_cam) {
@@ -159,7 +159,7 @@ inline nlohmann::ordered_json sample_observe_document(std::size_t num_steps, std
                             {"fy", 730.02},
                             {"cx", 390.0},
                             {"cy", 290.1}}},
-                          {"noise_px", 0.316},
+                          {"sigma_px", 0.316},
                           {"bound", {{"fx", 0.045}, {"fy", 0.067}, {"cx", 0.034}, {"cy", 0.056}}}};
   document["stddev"] = {{"camera", {{"fx", 0.047}, {"fy", 0.07}, {"cx", 0.035}, {"cy", 0.059}}}};
   document["covariance"] = {{"names", {"fx", "fy", "cx", "cy"}},

@@ -6,6 +6,8 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "alidade/observe/observe.h"
+
 namespace alidade {
 namespace {
 
@@ -15,28 +17,6 @@ void append_number(std::string& text, double value, int decimals) {
 }
 
 }  // namespace
-
-std::string event_word(ObserveEvent event) {
-  switch (event) {
-    case ObserveEvent::none:
-      break;
-    case ObserveEvent::start:
-      return "start";
-    case ObserveEvent::burst:
-      return "burst";
-    case ObserveEvent::slip:
-      return "slip";
-    case ObserveEvent::zoom:
-      return "zoom";
-    case ObserveEvent::zoom_end:
-      return "zoom_end";
-    case ObserveEvent::restart:
-      return "restart";
-    case ObserveEvent::new_segment:
-      return "gap";
-  }
-  return "";
-}
 
 std::string intrinsics_csv(std::span<const double> t_s, std::span<const IntrinsicsEstimate> estimates) {
   if (t_s.size() != estimates.size()) throw std::logic_error("intrinsics_csv: times and estimates differ in number");
@@ -51,7 +31,7 @@ std::string intrinsics_csv(std::span<const double> t_s, std::span<const Intrinsi
     } else {
       text += ",,,,,,,,,";
     }
-    fmt::format_to(std::back_inserter(text), ",{}\n", event_word(estimate.event));
+    fmt::format_to(std::back_inserter(text), ",{}\n", event_name(estimate.event));
   }
   return text;
 }

@@ -7,12 +7,9 @@
 
 namespace alidade {
 
-/// The word for an event in files: start, burst, slip, zoom, zoom_end, restart, gap; nothing for none.
-[[nodiscard]] std::string event_word(ObserveEvent event);
-
 /// Text of intrinsics.csv: t_s,fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy,nis,event. A row per row of the log,
-/// empty until there is an estimate; σ and NIS are empty where the method has none. Throws std::logic_error where the
-/// times are not as many as the estimates.
+/// empty until there is an estimate, events by `event_name`; σ and NIS are empty where the method has none. Throws
+/// std::logic_error where the times are not as many as the estimates.
 [[nodiscard]] std::string intrinsics_csv(std::span<const double> t_s, std::span<const IntrinsicsEstimate> estimates);
 
 }  // namespace alidade

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "alidade/observe/observe.h"
+
 namespace alidade {
 namespace {
 
@@ -29,11 +31,11 @@ TEST(IntrinsicsFile, ARowARowOfTheLogEmptyUntilThereIsAnEstimate) {
 
 TEST(IntrinsicsFile, EveryEventHasAWord) {
   using enum ObserveEvent;
-  EXPECT_EQ(event_word(none), "");
+  EXPECT_EQ(event_name(none), "");
   const std::vector<std::pair<ObserveEvent, std::string>> words{
       {start, "start"},       {burst, "burst"},     {slip, "slip"},      {zoom, "zoom"},
       {zoom_end, "zoom_end"}, {restart, "restart"}, {new_segment, "gap"}};
-  for (const auto& [event, word] : words) EXPECT_EQ(event_word(event), word);
+  for (const auto& [event, word] : words) EXPECT_EQ(event_name(event), word);
 }
 
 }  // namespace

@@ -2,22 +2,37 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+
+#include "alidade/report/thin.h"
 
 namespace alidade {
 namespace {
 
 using Numbers = std::vector<double>;
 
+constexpr std::size_t most_steps = 2000, most_pixels = 6000;  // the page holds them; intrinsics.csv has all rows
+
+/// Which rows stand in the table: evenly spread, and those with an event.
+std::vector<bool> kept_rows(const ObserveReport& report) {
+  std::vector<bool> has_event, kept(report.steps.size(), false);
+  for (const IntrinsicsEstimate& step : report.steps) has_event.push_back(step.event != ObserveEvent::none);
+  for (const std::size_t row : report::thinned_rows(kept.size(), {}, has_event, most_steps)) kept[row] = true;
+  return kept;
+}
+
 /// Values over time, the event, and where the camera looked.
 DataTable steps_table(const RotationLog& log, const ObserveReport& report) {
   const std::vector<std::string> names{"fx", "fy", "cx", "cy"};
-  Numbers t, nis, nis_dof, weak;
+  Numbers t, nis, nis_dof, weak, event_point;
   std::vector<Numbers> value(4), sigma(4), truth(4), attitude(4), rate(3);
   std::vector<std::string> events;
   MotionReader reader(log.source, 0.25);
+  const std::vector<bool> is_kept = kept_rows(report);
   for (std::size_t k = 0; k < log.rows.size(); ++k) {
     const IntrinsicsEstimate& step = report.steps[k];
     const RotationFrame frame = reader.next(log.rows[k]);
+    if (!is_kept[k]) continue;
     t.push_back(log.rows[k].t_s);
     for (std::size_t i = 0; i < 4; ++i) {
       const auto at = static_cast<Eigen::Index>(i);
@@ -31,6 +46,7 @@ DataTable steps_table(const RotationLog& log, const ObserveReport& report) {
     nis_dof.push_back(step.nis_dof);
     weak.push_back(step.has_value ? 1.0 / step.sigma.cwiseAbs2().maxCoeff() : not_seen);
     events.emplace_back(event_name(step.event));
+    event_point.push_back(step.point >= 0 ? step.point : not_seen);
   }
   DataTable table{"steps", {{"t_s", t}}};
   for (std::size_t i = 0; i < 4; ++i) table.columns.emplace_back(names[i] + "_px", rounded(value[i], 5));
@@ -41,6 +57,7 @@ DataTable steps_table(const RotationLog& log, const ObserveReport& report) {
   table.columns.emplace_back("nis", rounded(nis, 4));
   table.columns.emplace_back("nis_dof", nis_dof);
   table.columns.emplace_back("event", events);
+  table.columns.emplace_back("event_point", event_point);
   table.columns.emplace_back("weak_eigenvalue", weak);
   const std::vector<std::string> axes{"x", "y", "z"}, quaternion{"qx", "qy", "qz", "qw"};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -52,7 +69,14 @@ DataTable steps_table(const RotationLog& log, const ObserveReport& report) {
   return table;
 }
 
-/// Residuals of the reference adjustment, pixel minus prediction. `step` is a row of `steps`.
+/// Every so many of so many: a step that meets every point in turn.
+std::size_t stride(std::size_t count, std::size_t num_points) {
+  std::size_t every = (count + most_pixels - 1) / most_pixels;
+  while (every > 1 && std::gcd(every, num_points) != 1) ++every;
+  return std::max<std::size_t>(1, every);
+}
+
+/// Residuals of the reference adjustment, prediction minus pixel. `step` is a row of the log.
 DataTable points_table(const RotationLog& log, const ObserveReport& report) {
   std::vector<int> step, point;
   Numbers u, v, du, dv;
@@ -64,7 +88,8 @@ DataTable points_table(const RotationLog& log, const ObserveReport& report) {
       log_point[static_cast<std::size_t>(reference.bundle_point_of[i])] = static_cast<int>(i);
     }
   }
-  for (std::size_t i = 0; i < reference.solution.residuals.size(); ++i) {
+  const std::size_t every = stride(reference.solution.residuals.size(), std::max<std::size_t>(1, log.num_points));
+  for (std::size_t i = 0; i < reference.solution.residuals.size(); i += every) {
     const BundleObservation& seen = reference.bundle.observations[i];
     const double t_s = reference.bundle.frames[static_cast<std::size_t>(seen.frame)].t_s;
     const auto row = std::lower_bound(log.rows.begin(), log.rows.end(), t_s - 1e-9,
@@ -73,8 +98,8 @@ DataTable points_table(const RotationLog& log, const ObserveReport& report) {
     point.push_back(log_point[static_cast<std::size_t>(seen.point)]);
     u.push_back(seen.px.x() * s + report.scale.centre.x());
     v.push_back(seen.px.y() * s + report.scale.centre.y());
-    du.push_back(-s * reference.solution.residuals[i].x());
-    dv.push_back(-s * reference.solution.residuals[i].y());
+    du.push_back(s * reference.solution.residuals[i].x());
+    dv.push_back(s * reference.solution.residuals[i].y());
   }
   return {"points",
           {{"step", step},

@@ -2,6 +2,7 @@
 
 #include "alidade/pantilt/head_rotation.h"
 #include "alidade/simulate/draws.h"
+#include "alidade/simulate/rotating_lens.h"
 
 namespace alidade {
 namespace {
@@ -33,27 +34,12 @@ class TrueRotation {
   Eigen::Quaterniond mount_from_start_ = Eigen::Quaterniond::Identity();
 };
 
-Eigen::Vector2d distorted(const RotatingIntrinsics& k, const Eigen::Vector2d& ray) {
-  const Eigen::Vector2d bent = ray * (1.0 + k.k1 * ray.squaredNorm());
-  return {k.fx * bent.x() + k.cx, k.fy * bent.y() + k.cy};
-}
-
-/// The ray (x, y, 1) that is seen there: Newton's method on the radius.
-Eigen::Vector3d ray_of(const RotatingIntrinsics& k, const Eigen::Vector2d& px) {
-  const Eigen::Vector2d bent((px.x() - k.cx) / k.fx, (px.y() - k.cy) / k.fy);
-  const double radius = bent.norm();
-  double r = radius;
-  for (int i = 0; i < 20; ++i) r -= (r + k.k1 * r * r * r - radius) / (1.0 + 3.0 * k.k1 * r * r);
-  const Eigen::Vector2d ray = radius > 0.0 ? Eigen::Vector2d(bent * (r / radius)) : bent;
-  return {ray.x(), ray.y(), 1.0};
-}
-
 /// Points at the start, in the camera frame; those without a depth stand a million metres away.
 std::vector<Eigen::Vector3d> world_of(const RotationScene& scene) {
   std::vector<Eigen::Vector3d> points;
   for (std::size_t i = 0; i < scene.start_px.size(); ++i) {
     const double depth_m = scene.depth_m.empty() ? 1e6 : scene.depth_m[i];
-    points.push_back(depth_m * ray_of(scene.intrinsics(0.0), scene.start_px[i]));
+    points.push_back(depth_m * ray_of_px(scene.intrinsics(0.0), scene.start_px[i]));
   }
   return points;
 }
@@ -124,7 +110,8 @@ RotationLog simulate_rotation(const RotationScene& scene, const RotationLogConfi
     for (std::size_t i = 0; i < world.size(); ++i) {
       const Eigen::Vector3d point = cam_from_start * (world[i] + scene.lever_arm_m) - scene.lever_arm_m;
       if (i == 0 && config.with_range) row.range_m = point.norm() + config.sigma_range_m * draws.normal();
-      const Eigen::Vector2d px = distorted(now, point.head<2>() / point.z()) + config.sigma_px * draws.normal2();
+      const Eigen::Vector2d px =
+          px_of_ray(now, Eigen::Vector2d(point.head<2>() / point.z())) + config.sigma_px * draws.normal2();
       const bool is_inside =
           px.x() >= -0.5 && px.y() >= -0.5 && px.x() < scene.width_px - 0.5 && px.y() < scene.height_px - 0.5;
       const bool is_lost = config.lost_share > 0.0 && draws.uniform() < config.lost_share;

@@ -271,7 +271,7 @@ double csv_pixel(const std::string& cell, const CsvPlace& place) {
   throw InputError(place.text() + ": '" + cell + "' is out of range; pixels up to 1e6 are read");
 }
 
-RotationLogColumns rotation_log_columns(const CsvStream& table, bool needs_rotation) {
+RotationLogColumns rotation_log_columns(const CsvStream& table, bool needs_rotation, bool needs_points) {
   const std::array<Names, 3> velocity{{{"vx"}, {"vy"}, {"vz"}}};
   const std::array<Names, 4> truth{{{"fx"}, {"fy"}, {"cx", "u0"}, {"cy", "v0"}}};
   RotationLogColumns columns;
@@ -287,7 +287,8 @@ RotationLogColumns rotation_log_columns(const CsvStream& table, bool needs_rotat
   header.refuse_rest();
   if (!t) throw InputError(table.name() + ": has no column 't' (time, s)");
   columns.t = *t;
-  if (columns.points.empty()) throw InputError(table.name() + ": has no points; columns p1x, p1y, … are needed");
+  if (needs_points && columns.points.empty())
+    throw InputError(table.name() + ": has no points; columns p1x, p1y, … are needed");
   return columns;
 }
 

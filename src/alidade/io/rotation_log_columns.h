@@ -30,7 +30,8 @@ struct RotationLogColumns {
 
 /// Finds them in the header. Throws InputError naming the column: an unknown one (with what was probably meant), one
 /// without its partner, points that are not numbered 1, 2, …, two kinds of rotation, none where it is needed.
-[[nodiscard]] RotationLogColumns rotation_log_columns(const CsvStream& table, bool needs_rotation);
+[[nodiscard]] RotationLogColumns rotation_log_columns(const CsvStream& table, bool needs_rotation,
+                                                      bool needs_points = true);
 
 /// What a row holds by these columns. Throws InputError.
 [[nodiscard]] RotationRow rotation_row(const CsvRow& row, const RotationLogColumns& columns, const std::string& file);

@@ -94,7 +94,7 @@ void append_rotation(std::string& text, const RotationLog& log, const RotationRo
 RotationLogStream::RotationLogStream(std::istream& in, const std::string& name, const RotationLogOptions& options)
     : table_(in, name),
       options_(options),
-      columns_(rotation_log_columns(table_, options.needs_rotation)),
+      columns_(rotation_log_columns(table_, options.needs_rotation, options.needs_points)),
       layout_(layout_of(columns_)) {}
 
 std::optional<RotationLogEntry> RotationLogStream::next() {

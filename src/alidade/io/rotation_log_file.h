@@ -15,6 +15,7 @@ namespace alidade {
 struct RotationLogOptions {
   bool skip_bad = false;       ///< A wrong row is left out and listed, not thrown.
   bool needs_rotation = true;  ///< False: a log without rates, angles and attitude will do (`--rotation free`).
+  bool needs_points = true;    ///< False: a log of the rotation alone will do (a video has the points).
 };
 
 /// A log and what was left out of it: rows that say the same as the one before, and wrong ones with `skip_bad`.

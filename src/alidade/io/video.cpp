@@ -1,0 +1,137 @@
+#include "alidade/io/video.h"
+
+#include <fmt/format.h>
+
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <vector>
+
+#include "alidade/io/files.h"
+#include "alidade/io/photos.h"
+#include "alidade/io/video_process.h"
+
+namespace alidade {
+namespace {
+
+constexpr int min_side_px = 64;  // less has no room for a handful of patches
+
+/// "frame_0012.png" is 12.
+std::optional<std::size_t> number_in(const std::filesystem::path& picture) {
+  constexpr std::size_t most_digits = 9;  // more are clocks, not counts
+  const std::string name = picture.stem().string();
+  const std::size_t last = name.find_last_of("0123456789");
+  if (last == std::string::npos) return std::nullopt;
+  const std::size_t before = name.find_last_not_of("0123456789", last);
+  const std::string digits = name.substr(before == std::string::npos ? 0 : before + 1, last - before);
+  if (digits.size() > most_digits) return std::nullopt;
+  return std::stoul(digits);
+}
+
+/// Numbers of the frames from 0: those in the names if all have one and they grow, else their count.
+std::vector<std::size_t> numbers_of(const std::vector<std::filesystem::path>& pictures) {
+  std::vector<std::size_t> counted(pictures.size()), named;
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    counted[i] = i;
+    const std::optional<std::size_t> number = number_in(pictures[i]);
+    if (number && (named.empty() || *number > named.back())) named.push_back(*number);
+  }
+  if (named.size() < pictures.size()) return counted;
+  for (std::size_t i = named.size(); i-- > 0;) named[i] -= named[0];
+  return named;
+}
+
+cv::Mat one_channel(const cv::Mat& photo) {
+  cv::Mat grey = photo;
+  if (photo.channels() == 3) cv::cvtColor(photo, grey, cv::COLOR_BGR2GRAY);
+  if (photo.channels() == 4) cv::cvtColor(photo, grey, cv::COLOR_BGRA2GRAY);
+  return grey;
+}
+
+}  // namespace
+
+class VideoFrames::Impl {
+ public:
+  explicit Impl(const std::filesystem::path& path) : name(path.string()) {
+    std::error_code error;
+    if (!std::filesystem::exists(path, error)) throw InputError(name + ": no such file or folder");
+    if (std::filesystem::is_directory(path, error)) {
+      pictures_ = list_photos({path});
+      numbers_ = numbers_of(pictures_);
+      num_frames = pictures_.size();
+    } else {
+      process_.emplace(path);
+      num_frames = process_->num_frames();
+    }
+  }
+
+  cv::Mat next() {
+    cv::Mat grey = process_ ? decoded() : read();
+    if (grey.empty()) return grey;
+    const std::string where = process_ ? name : pictures_[count_].string();
+    if (size_.empty()) size_ = grey.size();
+    if (grey.size() != size_)
+      throw InputError(fmt::format("{}: is {}×{}, the first frame is {}×{}; one video has one size", where, grey.cols,
+                                   grey.rows, size_.width, size_.height));
+    if (std::min(grey.rows, grey.cols) < min_side_px)
+      throw InputError(fmt::format("{}: is {}×{}; points are followed in {} pixels a side or more", where, grey.cols,
+                                   grey.rows, min_side_px));
+    number = process_ ? count_ : numbers_[count_];
+    ++count_;
+    return grey;
+  }
+
+  std::string name;
+  std::size_t number = 0, num_frames = 0;
+
+ private:
+  cv::Mat decoded() {
+    std::vector<unsigned char> bytes = process_->next();
+    if (bytes.empty()) return {};
+    return cv::Mat(process_->height_px(), process_->width_px(), CV_8U, bytes.data()).clone();
+  }
+
+  cv::Mat read() {
+    if (count_ == pictures_.size()) return {};
+    try {
+      return to_frame(one_channel(decode_photo(read_file(pictures_[count_]))));
+    } catch (const InputError& error) {
+      const std::string what = error.what(), file = pictures_[count_].string();
+      throw InputError(what.starts_with(file) ? what : file + ": " + what);
+    }
+  }
+
+  /// Deep pictures become float, divided by the same for all frames: what the first one's bits ask for, as 10- and
+  /// 12-bit cameras store their values in 16.
+  cv::Mat to_frame(const cv::Mat& grey) {
+    if (grey.depth() == CV_8U) return grey;
+    cv::Mat frame;
+    if (count_ == 0) {
+      double brightest = 0.0;
+      cv::minMaxLoc(grey, nullptr, &brightest);
+      while (full_scale_ < brightest) full_scale_ = 2.0 * full_scale_ + 1.0;
+    }
+    grey.convertTo(frame, CV_32F, 255.0 / full_scale_);
+    cv::patchNaNs(frame, 0.0);
+    return frame;
+  }
+
+  std::vector<std::filesystem::path> pictures_;
+  std::vector<std::size_t> numbers_;
+  std::optional<VideoProcess> process_;
+  std::size_t count_ = 0;
+  cv::Size size_;
+  double full_scale_ = 255.0;
+};
+
+VideoFrames::VideoFrames(const std::filesystem::path& file_or_folder) : impl_(std::make_unique<Impl>(file_or_folder)) {}
+VideoFrames::VideoFrames(VideoFrames&&) noexcept = default;
+VideoFrames& VideoFrames::operator=(VideoFrames&&) noexcept = default;
+VideoFrames::~VideoFrames() = default;
+
+cv::Mat VideoFrames::next() { return impl_->next(); }
+std::size_t VideoFrames::number() const { return impl_->number; }
+std::size_t VideoFrames::num_frames() const { return impl_->num_frames; }
+const std::string& VideoFrames::name() const { return impl_->name; }
+
+}  // namespace alidade

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+namespace cv {
+class Mat;
+}
+
+namespace alidade {
+
+/// Frames of a video, one after the other: of a folder of numbered pictures, or of a file.
+class VideoFrames {
+ public:
+  /// Throws InputError: no such file, no pictures in the folder, not a video.
+  explicit VideoFrames(const std::filesystem::path& file_or_folder);
+  VideoFrames(VideoFrames&&) noexcept;
+  VideoFrames& operator=(VideoFrames&&) noexcept;
+  ~VideoFrames();
+
+  /// The next frame in grey: 8 bits, or 32-bit float of 0 to 255 where the picture has more. Empty at the end. Throws
+  /// InputError: not a picture, cut off, another size than the first, too small to follow points in.
+  [[nodiscard]] cv::Mat next();
+
+  /// Number of the frame that next() gave, the first 0: pictures that are missing from a folder leave a gap. Where not
+  /// all names end in a number of up to nine digits, pictures are counted.
+  [[nodiscard]] std::size_t number() const;
+  /// How many there will be; 0: not known. For showing progress.
+  [[nodiscard]] std::size_t num_frames() const;
+  /// File or folder, to begin a message with.
+  [[nodiscard]] const std::string& name() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace alidade

@@ -3,17 +3,21 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "alidade/imaging/picture_warp.h"
+
 namespace cv {
 class Mat;
 }
 
 namespace alidade {
 
-/// Where a patch stands in a picture, and how it has been turned and stretched since it was cut out: what lay at offset
-/// d from its middle is seen at px + linear d, with grey values gain · grey + bias.
+/// Where a patch stands in a picture, and how it has been turned, stretched and bent since it was cut out: what lay at
+/// offset d from its middle is seen at px + linear d + ½ bend (d_x², 2 d_x d_y, d_y²), with grey values gain · grey +
+/// bias.
 struct PatchPose {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   Eigen::Matrix2d linear = Eigen::Matrix2d::Identity();
+  WarpBend bend = WarpBend::Zero();  ///< Given: a patch alone tells bend and place badly apart.
   double gain = 1.0, bias = 0.0;
 };
 
@@ -29,8 +33,8 @@ struct PatchFit {
 /// hundredths of a pixel: inverse-compositional Gauss–Newton, so that the derivatives are the patch's own and are taken
 /// once. S. Baker & I. Matthews, "Lucas–Kanade 20 years on", 2004.
 ///
-/// Pictures are 32-bit float, smoothed by smoothed_for_patches(): cubic interpolation then leaves no error that depends
-/// on the place between pixels.
+/// Pictures are 32-bit float, smoothed by smoothed_for_patches(): interpolation then leaves hardly an error that
+/// depends on the place between pixels.
 class AnchorPatch {
  public:
   static constexpr int half_px = 7;

@@ -75,8 +75,8 @@ TEST(AnchorPatch, CovarianceCoversTheNoise) {
     nees += error.dot(fit.cov.inverse() * error) / num_trials / 2.0;
     mean += error / num_trials;
   }
-  // Two noisy pictures leave 1.94 times the squares that are left here, so that 1.94 is expected. Interpolation and the
-  // estimate of the noise from one patch add to it: 2.3 is seen, a σ that is 9 % too small.
+  // Two noisy pictures leave 1.98 times the squares that are left here: that is expected, ± 0.1 by chance, and some 3 %
+  // more because the noise is estimated from one patch.
   EXPECT_GT(nees, 1.75);
   EXPECT_LT(nees, 2.4);
   EXPECT_LT(mean.norm(), 0.005);  // σ ≈ 0.03 px: ± 0.002

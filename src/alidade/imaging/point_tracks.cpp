@@ -5,8 +5,11 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
+#include <utility>
 
 #include "alidade/imaging/anchor_patch.h"
 #include "alidade/imaging/pyramid_flow.h"
@@ -23,8 +26,10 @@ constexpr double min_gain = 0.5, max_gain = 2.0;
 struct Track {
   int id = 0;
   AnchorPatch patch;
-  Eigen::Vector2d offset = Eigen::Vector2d::Zero();  ///< Of the point from the middle of its patch, in the patch.
-  PatchPose pose;                                    ///< Of the patch in the last frame.
+  Eigen::Vector2d offset = Eigen::Vector2d::Zero();     ///< Of the point from the middle of its patch, in the patch.
+  PatchPose pose;                                       ///< Of the patch in the last frame.
+  Eigen::Vector2d anchor_px = Eigen::Vector2d::Zero();  ///< Where the patch was cut out, in frame `anchor_frame`.
+  std::size_t anchor_frame = 0;
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   Eigen::Vector2d flow_px = Eigen::Vector2d::Zero();  ///< Since the frame before.
   double sigma_px = 0.0;
@@ -47,12 +52,14 @@ bool has_room(const cv::Mat& picture, const Eigen::Vector2d& px) {
 }
 
 /// Cuts the track's patch out of this picture, around the whole pixel next to the point.
-bool set_anchor(Track& track, const cv::Mat& smoothed) {
+bool set_anchor(Track& track, const cv::Mat& smoothed, std::size_t frame) {
   const Eigen::Vector2d middle = track.px.array().round();
   if (!has_room(smoothed, middle)) return false;
   track.patch = AnchorPatch(smoothed, static_cast<int>(middle.x()), static_cast<int>(middle.y()));
   track.offset = track.px - middle;
   track.pose = {.px = middle};
+  track.anchor_px = middle;
+  track.anchor_frame = frame;
   return true;
 }
 
@@ -85,11 +92,14 @@ class PointTracker::Impl {
     const cv::Mat smoothed = smoothed_for_patches(grey);
     std::vector<cv::Mat> levels = pyramid_of(smoothed, max_levels);
     if (!levels_.empty() && levels_[0].size() != smoothed.size()) tracks_.clear();
+    ++frame_;
+    predict_bends();
     tbb::parallel_for(std::size_t{0}, tracks_.size(), [&](std::size_t i) { follow(tracks_[i], levels); });
     drop_doubles();
     std::erase_if(tracks_, [](const Track& track) { return track.is_lost; });
     note_noise();
     replenish(smoothed);
+    note_places();
     levels_ = std::move(levels);
     seen_.clear();
     for (const Track& track : tracks_) seen_.push_back({track.id, track.px, track.sigma_px});
@@ -97,6 +107,34 @@ class PointTracker::Impl {
   }
 
  private:
+  /// How each patch is bent by the perspective of the turn since it was cut out: what all points tell that were seen
+  /// then and in the frame before this one.
+  void predict_bends() {
+    std::vector<PointMove> moves;
+    for (const auto& [frame, places] : places_) {
+      moves.clear();
+      auto track = tracks_.begin();
+      for (const auto& [id, px] : places) {
+        while (track != tracks_.end() && track->id < id) ++track;
+        if (track != tracks_.end() && track->id == id) moves.push_back({px, track->px});
+      }
+      const std::optional<PictureWarp> warp = PictureWarp::fit(moves);
+      for (Track& each : tracks_)
+        if (warp && each.anchor_frame == frame) each.pose.bend = warp->bend_at(each.anchor_px);
+    }
+  }
+
+  /// Keeps where all points are in this frame if a patch was cut out of it, until the last such patch is gone.
+  void note_places() {
+    const auto is_used = [&](std::size_t frame) {
+      return std::ranges::any_of(tracks_, [&](const Track& track) { return track.anchor_frame == frame; });
+    };
+    std::erase_if(places_, [&](const auto& each) { return !is_used(each.first); });
+    if (!is_used(frame_)) return;
+    auto& places = places_[frame_];
+    for (const Track& track : tracks_) places.emplace_back(track.id, track.px);
+  }
+
   void follow(Track& track, const std::vector<cv::Mat>& levels) const {
     track.is_lost = true;
     const Eigen::Vector2d before = track.px;
@@ -117,7 +155,7 @@ class PointTracker::Impl {
     track.noise = fit.rms / track.patch.rms_of_unit_noise();
     track.is_lost = track.sigma_px > config_.max_sigma_px;
     if (!track.is_lost && stretch_of(track.pose.linear) > config_.max_stretch)
-      track.is_lost = !set_anchor(track, levels[0]);
+      track.is_lost = !set_anchor(track, levels[0], frame_);
   }
 
   [[nodiscard]] bool is_alike(const Track& track, const PatchFit& fit) const {
@@ -193,7 +231,7 @@ class PointTracker::Impl {
     track.px = corner.cast<double>();
     for (const Track& other : tracks_)
       if ((other.px - track.px).squaredNorm() < min_distance_px * min_distance_px) return;
-    if (!set_anchor(track, smoothed)) return;
+    if (!set_anchor(track, smoothed, frame_)) return;
     track.sigma_px = noise_ * sigma_of(track.patch.cov_of_unit_noise());
     if (!(track.sigma_px < config_.max_sigma_px)) return;
     track.noise = noise_;
@@ -202,9 +240,11 @@ class PointTracker::Impl {
   }
 
   PointTrackerConfig config_;
-  std::vector<cv::Mat> levels_;  ///< Of the frame before.
-  std::vector<Track> tracks_;    ///< By id.
+  std::vector<cv::Mat> levels_;                                                 ///< Of the frame before.
+  std::vector<Track> tracks_;                                                   ///< By id.
+  std::map<std::size_t, std::vector<std::pair<int, Eigen::Vector2d>>> places_;  ///< By frame, then by id.
   std::vector<TrackedPoint> seen_;
+  std::size_t frame_ = 0;
   int next_id_ = 0, frames_since_search_ = 1000;
   std::ptrdiff_t last_free_ = 0;
   double noise_ = first_noise;

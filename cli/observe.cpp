@@ -9,6 +9,7 @@
 #include "alidade/io/observe_document.h"
 #include "alidade/io/pairs_file.h"
 #include "alidade/io/rotation_log_file.h"
+#include "alidade/io/video_log.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
 #include "cli/option_checks.h"
@@ -18,7 +19,8 @@ namespace alidade::cli {
 namespace {
 
 struct Args {
-  std::string log, pairs, camera, size, method = "hybrid", rotation = "known";
+  std::string log, pairs, video, angles, camera, size, method = "hybrid", rotation = "known";
+  double rate_hz = 0.0;
   std::vector<std::string> estimate;
   std::vector<double> start, lever;
   bool skip_bad = false;
@@ -72,7 +74,27 @@ ObserveConfig config_from(const Args& args, const std::optional<Camera>& camera)
   return config;
 }
 
-RotationLog read_log(const Args& args, Run& run) {
+/// Points followed through a video. The result tells their log, points.csv, so that it can be looked at and used again.
+RotationLog follow_video(const Args& args, ObserveConfig& config, Run& run) {
+  run.add_input("angles", args.angles);
+  const RotationLog angles = read_angles(args.angles);
+  VideoFrames video(args.video);
+  if (std::filesystem::is_regular_file(args.video)) run.add_input("video", args.video);
+  const VideoLog made = log_from_video(video, angles, args.angles, {.rate_hz = args.rate_hz}, run.progress);
+  if (config.width_px <= 0) std::tie(config.width_px, config.height_px) = std::pair(made.width_px, made.height_px);
+  if (config.width_px != made.width_px || config.height_px != made.height_px) {
+    throw InputError(fmt::format("{}: frames are {}x{}, but the camera or --size says {}x{}", args.video, made.width_px,
+                                 made.height_px, config.width_px, config.height_px));
+  }
+  run.say(fmt::format("{} frames, {} points followed, {} used; σ of a pixel {:.2g} px as the tracker sees it",
+                      made.num_frames, made.num_tracks, made.log.num_points, made.median_sigma_px));
+  run.document.counts.given = made.log.rows.size();
+  run.add_file("points.csv", rotation_log_csv(made.log));
+  return made.log;
+}
+
+RotationLog read_log(const Args& args, ObserveConfig& config, Run& run) {
+  if (!args.video.empty()) return follow_video(args, config, run);
   const bool is_pairs = !args.pairs.empty();
   const std::string& file = is_pairs ? args.pairs : args.log;
   run.add_input(is_pairs ? "pairs" : "log", file);
@@ -129,15 +151,23 @@ void summarize(const ObserveReport& report, Run& run) {
   if (bursts > 0) run.say(fmt::format("{} frames or points left out that did not fit", bursts));
 }
 
+void check_sources(const Args& args) {
+  if (!args.log.empty() + !args.pairs.empty() + !args.video.empty() != 1) {
+    throw UsageError("give one of a rotation log, --video FILE and --pairs FILE");
+  }
+  if (args.video.empty() != args.angles.empty()) throw UsageError("--video and --angles go together");
+  if (args.video.empty() && args.rate_hz > 0.0) throw UsageError("--rate is for --video");
+}
+
 ExitCode observe_log(const Args& args, Run& run) {
-  if (args.log.empty() == args.pairs.empty()) throw UsageError("give a rotation log, or --pairs FILE");
+  check_sources(args);
   std::optional<Camera> camera;
   if (!args.camera.empty()) {
     run.add_input("camera", args.camera);
     camera = read_camera(args.camera);
   }
   ObserveConfig config = config_from(args, camera);
-  RotationLog log = args.log == "-" ? follow_input(args, config, camera, run) : read_log(args, run);
+  RotationLog log = args.log == "-" ? follow_input(args, config, camera, run) : read_log(args, config, run);
   if (log.source == RotationSource::none && config.rotation != RotationKnowledge::free) {
     if (args.pairs.empty()) {
       throw InputError(args.log + ": no rotation: omega_x,omega_y or pan,tilt or qw,qx,qy,qz, or say --rotation free");
@@ -169,6 +199,14 @@ void add_options(CLI::App& command, Args& args) {
   command
       .add_option("--pairs", args.pairs, "Matched points of neighbouring photos instead, CSV: frame_a,frame_b,ua_px,…")
       ->type_name("FILE");
+  command
+      .add_option("--video", args.video, "Video file or folder of numbered frames instead: points are followed in it")
+      ->type_name("FILE|DIR");
+  command.add_option("--angles", args.angles, "How the camera turned in the video, CSV: t, the rotation")
+      ->type_name("FILE");
+  command
+      .add_option("--rate", args.rate_hz, "Frames a second, first at t = 0 (default: the angles have a row a frame)")
+      ->check(positive_number());
   command.add_option("--method", args.method, "hybrid, window, flow, fang2011 or batch")
       ->check(CLI::IsMember({"hybrid", "window", "flow", "fang2011", "batch"}))
       ->capture_default_str();
@@ -213,6 +251,7 @@ void add_observe(Frame& frame) {
        .examples =
            "alidade observe log.csv --size 780x582\n"
            "alidade observe log.csv --camera prior.yaml --estimate k1,mount,delay\n"
+           "alidade observe --video ptz.mp4 --angles encoder.csv --rate 30\n"
            "alidade observe log.csv --method fang2011 --profile quiet --start 500,510,400,300\n"
            "alidade observe --pairs matches.csv --rotation free --square-pixels --fix-centre --size 1280x960\n"},
       [args](Run& run) { return observe_log(*args, run); });

@@ -1,5 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "alidade/io/files.h"
 #include "alidade/testing/process.h"
 #include "alidade/testing/temporary_folder.h"
 
@@ -41,12 +45,152 @@ TEST(Observe, SaysWhatIsWrongWithItsInput) {
     EXPECT_EQ(outcome.code, code) << outcome.err;
     EXPECT_NE(outcome.err.find(what), std::string::npos) << outcome.err;
   };
-  expect({}, 2, "give a rotation log, or --pairs FILE");
+  expect({}, 2, "give one of a rotation log, --video FILE and --pairs FILE");
   expect({"none.csv", "--method", "best"}, 2, "--method");
   expect({"none.csv", "--estimate", "k9"}, 2, "--estimate: 'k9' is not k1, mount, delay or lever");
   expect({"none.csv", "--start", "1,2,3,nan"}, 2, "--start");
   expect({(folder.path() / "none.csv").string()}, 3, "none.csv");
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "out"));
+}
+
+/// A small log with one cell or line made wrong.
+class BadLog : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const Outcome made =
+        testing::run_program({ALIDADE_EXECUTABLE, "simulate", "rotation", "--duration", "3", "--out", path("made")});
+    ASSERT_EQ(made.code, 0) << made.err;
+    good_ = read_file(path("made/log.csv"));
+  }
+  [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
+
+  Outcome observe(const std::string& text, const std::vector<std::string>& options = {}) const {
+    write_file(path("log.csv"), text);
+    std::vector<std::string> command{ALIDADE_EXECUTABLE, "observe",     path("log.csv"), "--size",
+                                     "780x582",          "--no-report", "--out",         path("out")};
+    command.insert(command.end(), options.begin(), options.end());
+    return testing::run_program(command);
+  }
+
+  /// Cell `column` of data row `row` replaced.
+  [[nodiscard]] std::string with_cell(std::size_t row, std::size_t column, const std::string& cell) const {
+    std::size_t at = 0;
+    for (std::size_t i = 0; i <= row; ++i) at = good_.find('\n', at) + 1;
+    for (std::size_t i = 0; i < column; ++i) at = good_.find(',', at) + 1;
+    const std::size_t end = good_.find_first_of(",\n", at);
+    return good_.substr(0, at) + cell + good_.substr(end);
+  }
+
+  void expect_bad_input(const std::string& text, const std::string& what) const {
+    const Outcome outcome = observe(text);
+    EXPECT_EQ(outcome.code, 3) << outcome.err;
+    EXPECT_NE(outcome.err.find(what), std::string::npos) << outcome.err;
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+    EXPECT_FALSE(std::filesystem::exists(path("out")));
+  }
+
+  testing::TemporaryFolder folder_;
+  std::string good_;
+};
+
+TEST_F(BadLog, IsNamedByLineAndColumn) {
+  expect_bad_input("", "log.csv");
+  expect_bad_input(good_.substr(0, good_.find('\n') + 1), "log.csv");
+  expect_bad_input(with_cell(4, 1, "nan"), "log.csv:6: column 'omega_x'");
+  expect_bad_input(with_cell(4, 1, "fast"), "log.csv:6: column 'omega_x'");
+  expect_bad_input(with_cell(4, 5, "inf"), "log.csv:6");
+  expect_bad_input(with_cell(4, 5, "1e300"), "log.csv:6");
+  expect_bad_input(with_cell(4, 0, ""), "log.csv:6: column 't'");
+  expect_bad_input("time,wx,wy\n0,1,2\n", "log.csv");
+  std::string without_rotation = good_;
+  without_rotation.replace(without_rotation.find("omega_x"), 7, "omega_q");
+  expect_bad_input(without_rotation, "omega");
+}
+
+TEST_F(BadLog, IsLeftOutByNameWhereItIsToldTo) {
+  const Outcome outcome = observe(with_cell(4, 5, "broken"), {"--skip-bad", "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto document = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(document["counts"]["given"], 91);
+  EXPECT_EQ(document["counts"]["skipped"].size(), 1u);
+  EXPECT_NE(document["counts"]["skipped"].dump().find("6"), std::string::npos);
+}
+
+TEST_F(BadLog, GoodRowsGiveTheNamesOfTheContract) {
+  const Outcome outcome = observe(good_, {"--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto document = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(document["command"], "observe");
+  for (const char* name : {"fx", "fy", "cx", "cy"}) {
+    const double value = document["estimate"]["camera"][name], sigma = document["stddev"]["camera"][name],
+                 bound = document["estimate"]["bound"][name];
+    EXPECT_GT(value, 100.0);
+    EXPECT_GT(sigma, 0.5 * bound);
+    EXPECT_LT(sigma, 2.0 * bound);
+  }
+  EXPECT_NEAR(document["estimate"]["camera"]["fx"], 710.0, 5.0 * document["stddev"]["camera"]["fx"].get<double>());
+  const std::string table = read_file(path("out/intrinsics.csv"));
+  EXPECT_EQ(table.substr(0, table.find('\n')), "t_s,fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy,nis,event");
+  EXPECT_EQ(std::ranges::count(table, '\n'), 92);
+}
+
+TEST_F(BadLog, RowsFromStandardInputAreAnsweredOneByOne) {
+  write_file(path("log.csv"), good_);
+  const Outcome outcome =
+      testing::run_program({"/bin/sh", "-c",
+                            std::string("'") + ALIDADE_EXECUTABLE + "' observe - --size 780x582 --no-report --out '" +
+                                path("out") + "' < '" + path("log.csv") + "'"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  std::size_t rows = 0;
+  for (std::size_t at = 0; (at = outcome.out.find('\n', at)) != std::string::npos; ++at) ++rows;
+  EXPECT_GE(rows, 92u);
+  EXPECT_EQ(outcome.out.substr(0, 4), "t_s,");
+}
+
+/// A rendered film of a textured world, 4 s: what a person with a pan-tilt camera and its encoders has.
+class Film : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const Outcome made = testing::run_program({ALIDADE_EXECUTABLE, "simulate", "rotation", "--video", "--source",
+                                               "head", "--size", "640x480", "--intrinsics", "610,600,330,235",
+                                               "--duration", "4", "--rate", "15", "--out", path("film")});
+    ASSERT_EQ(made.code, 0) << made.err;
+  }
+  [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
+  testing::TemporaryFolder folder_;
+};
+
+TEST_F(Film, GivesFocalLengthsWithinThreePerMilleAndThreeSigma) {
+  const Outcome outcome = testing::run_program({ALIDADE_EXECUTABLE, "observe", "--video", path("film/frames"),
+                                                "--angles", path("film/angles.csv"), "--json", "--out", path("out")});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto document = nlohmann::json::parse(outcome.out);
+  const std::vector<std::pair<const char*, double>> truth{{"fx", 610.0}, {"fy", 600.0}, {"cx", 330.0}, {"cy", 235.0}};
+  for (const auto& [name, value] : truth) {
+    const double estimate = document["estimate"]["camera"][name], sigma = document["stddev"]["camera"][name];
+    RecordProperty(name, std::to_string(estimate) + " +- " + std::to_string(sigma));
+    if (name[0] == 'f') EXPECT_NEAR(estimate, value, 0.003 * value) << name;
+    EXPECT_NEAR(estimate, value, 3.0 * sigma) << name;
+  }
+}
+
+TEST_F(Film, SaysWhatDoesNotFit) {
+  const auto expect = [&](const std::vector<std::string>& arguments, int code, const std::string& what) {
+    std::vector<std::string> command{ALIDADE_EXECUTABLE, "observe", "--out", path("out")};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    const Outcome outcome = testing::run_program(command);
+    EXPECT_EQ(outcome.code, code) << outcome.err;
+    EXPECT_NE(outcome.err.find(what), std::string::npos) << outcome.err;
+    EXPECT_FALSE(std::filesystem::exists(path("out")));
+  };
+  const std::string frames = path("film/frames"), angles = path("film/angles.csv");
+  expect({"--video", frames}, 2, "--video and --angles go together");
+  expect({"--video", frames, "--angles", path("none.csv")}, 3, "none.csv");
+  expect({"--video", path("none.mp4"), "--angles", angles}, 3, "none.mp4");
+  expect({"--video", frames, "--angles", angles, "--rate", "10"}, 3, "angles.csv: covers");
+  expect({"--video", frames, "--angles", angles, "--size", "320x240"}, 3, "frames are 640x480");
+  write_file(frames + "/000020.png", "not a picture");
+  expect({"--video", frames, "--angles", angles}, 3, "000020.png");
 }
 
 }  // namespace

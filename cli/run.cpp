@@ -117,7 +117,9 @@ void Run::remove_older_files() const {
   if (!older.is_object() || older.value("schema", "") != "alidade-result/1" || !older.contains("files")) return;
   for (const auto& name : older["files"]) {
     const std::filesystem::path file = name.is_string() ? name.get<std::string>() : "";
-    if (file == file.filename() && !file.empty()) std::filesystem::remove(options.out / file, ignored);
+    const bool is_inside =
+        !file.empty() && file.is_relative() && file == file.lexically_normal() && *file.begin() != "..";
+    if (is_inside && file.has_filename()) std::filesystem::remove(options.out / file, ignored);
   }
   std::filesystem::remove(options.out / "report.html", ignored);
 }

@@ -5,10 +5,13 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "alidade/io/camera_file.h"
 #include "alidade/io/rotation_log_file.h"
 #include "alidade/simulate/draws.h"
+#include "alidade/simulate/panorama_video.h"
 #include "alidade/simulate/rotation.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
@@ -23,12 +26,16 @@ struct Args {
   std::vector<double> k{710.0, 700.0, 390.0, 290.0}, lever, depth;
   double k1 = 0.0, tilt_deg = 0.0, delay_s = 0.0;
   int points = 4;
+  bool video = false;
+  std::string photo;
+  double photo_deg = 90.0;
+  PanoramaConfig panorama;
   RotationLogConfig config;
 };
 
 /// Pan, tilt, roll or rates, over time.
 std::function<Eigen::Vector3d(double)> motion_of(const Args& args) {
-  const bool is_rate = args.source == "rate";
+  const bool is_rate = args.source == "rate" && !args.video;  // a video's motion is told by angles
   const Eigen::Vector3d kept = args.motion == "pan"    ? Eigen::Vector3d(is_rate ? 0.0 : 1.0, is_rate ? 1.0 : 0.0, 0.0)
                                : args.motion == "tilt" ? Eigen::Vector3d(is_rate ? 1.0 : 0.0, is_rate ? 0.0 : 1.0, 0.0)
                                                        : Eigen::Vector3d::Ones();
@@ -81,6 +88,33 @@ std::string truth_yaml(const Args& args, const RotationLog& log, const RotationS
   return camera_text(camera, CameraFormat::alidade);
 }
 
+FarWorld world_of(const Args& args, Run& run) {
+  if (args.photo.empty()) return FarWorld::of_noise(3.0 / std::min(args.k[0], args.k[1]), run.options.seed);
+  run.add_input("photo", args.photo);
+  const cv::Mat photo = cv::imread(args.photo, cv::IMREAD_GRAYSCALE);
+  if (photo.empty()) throw InputError(args.photo + ": is not a picture");
+  return FarWorld::of_photo(photo, args.photo_deg * std::numbers::pi / 180.0 / photo.cols);
+}
+
+/// Frames as a camera on a head sees them, and the angles it reads: what `observe --video` takes.
+ExitCode simulate_video(const Args& args, const RotationScene& scene, const RotationLogConfig& config, Run& run) {
+  FarWorld world = world_of(args, run);
+  const RotationLog log = panorama_log(scene, config, run.options.seed);
+  for (std::size_t k = 0; k < log.rows.size(); ++k) {
+    report_progress(run.progress, "frames", k, log.rows.size());
+    std::vector<unsigned char> png;
+    cv::imencode(".png", render_panorama_frame(world, scene, k, config.rate_hz, args.panorama, run.options.seed), png);
+    run.add_file(fmt::format("frames/{:06}.png", k), {png.begin(), png.end()});
+  }
+  run.add_file("angles.csv", rotation_log_csv(log));
+  run.add_file("truth_camera.yaml", truth_yaml(args, log, scene));
+  run.document.counts.given = run.document.counts.used = log.rows.size();
+  Verdict verdict;
+  verdict.sentence = fmt::format("{} frames and their angles with known truth", log.rows.size());
+  run.say(fmt::format("{} in {}", verdict.sentence, run.options.out.string()));
+  return run.finish(verdict);
+}
+
 ExitCode simulate_rotation_log(const Args& args, Run& run) {
   RotationScene scene;
   std::tie(scene.width_px, scene.height_px) = picture_size(args.size);
@@ -97,6 +131,10 @@ ExitCode simulate_rotation_log(const Args& args, Run& run) {
   RotationLogConfig config = args.config;
   config.source = source_of(args.source);
   config.with_range = !args.depth.empty();
+  if (args.video) {
+    if (!args.depth.empty() || !args.lever.empty()) throw UsageError("--video: its world is far away, without --depth");
+    return simulate_video(args, scene, config, run);
+  }
   const RotationLog log = simulate_rotation(scene, config, run.options.seed);
   run.add_file("log.csv", rotation_log_csv(log));
   run.add_file("truth_camera.yaml", truth_yaml(args, log, scene));
@@ -132,6 +170,11 @@ void add_options(CLI::App& command, Args& args) {
       ->delimiter(',')
       ->expected(2)
       ->check(positive_number());
+  command.add_flag("--video", args.video, "Render frames instead of points: frames/, angles.csv");
+  command.add_option("--photo", args.photo, "What the video's world looks like (default: noise)")->type_name("FILE");
+  number("--photo-deg", args.photo_deg, "How wide that photo stands in the world", 1.0, 360.0);
+  number("--noise", args.panorama.noise, "Grey noise of the frames, of 255", 0.0, 100.0);
+  number("--blur", args.panorama.blur_px, "Optical blur of the frames [px]", 0.0, 20.0);
   number("--k1", args.k1, "True radial distortion", -0.4, 0.4);
   number("--tilt-deg", args.tilt_deg, "Mean tilt of a head", -80.0, 80.0);
   number("--delay", args.delay_s, "Pixels are so much later than the rotation [s]", -0.5, 0.5);
@@ -151,7 +194,9 @@ void add_rotation_scenario(Frame& frame) {
   CLI::App& command = frame.add_command(
       {"simulate rotation", "Pixels of still points and the rotation of a camera that turns, with the truth",
        "  alidade simulate rotation --out turn && alidade observe turn/log.csv --size 780x582\n"
-       "  alidade simulate rotation --source head --tilt-deg 20 --zoom ramp --k1 -0.2 --out zoom",
+       "  alidade simulate rotation --source head --tilt-deg 20 --zoom ramp --k1 -0.2 --out zoom\n"
+       "  alidade simulate rotation --video --source head --duration 8 --out film &&\n"
+       "    alidade observe --video film/frames --angles film/angles.csv",
        true},
       [args](Run& run) { return simulate_rotation_log(*args, run); });
   add_options(command, *args);

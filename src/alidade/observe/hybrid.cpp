@@ -4,18 +4,20 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/observe/steadiness.h"
+
 namespace alidade {
 namespace {
 
-constexpr double gate_z = 3.09;     // one frame in a thousand is called bad by chance
 constexpr double zoom_gain = 33.4;  // χ²₄ at 10⁻⁶: what a change of K explains that chance does not
 constexpr int slip_patience = 15;   // frames until a point that slipped is met anew
 constexpr double slipped_variance = 25.0;
 constexpr double restart_after_s = 1.0;  // without a frame that fits
 constexpr double fine_enough = 1e-3;     // σ_f / f: the filter's linearisation is exact to rounding
 constexpr double better_by = 9.2;        // χ²₂ at 0.01
-constexpr double any_zoom = 1e6;         // frames worth of change: whatever the pixels want
 constexpr int drift_window = 15;         // frames
+constexpr double finer_by = 0.75;        // of σ: what the filter gained since the last adjustment, before the next
+constexpr int between_adjustments = 5;   // frames
 
 }  // namespace
 
@@ -83,6 +85,10 @@ bool HybridObserver::adjust_buffer() {
     adjustment = adjust(buffer_, config);
   }
   if (!adjustment.has_value) return false;
+  if (!is_running_ && steadiness_of(adjustment.bundle, adjustment.solution).is_unsteady()) {
+    buffer_.erase_before(buffer_.frames().back().t_s - config_.bootstrap_s);  // wait for a second at rest
+    return false;
+  }
   sigma_px_ = adjustment.sigma_px;
   filter_.start(adjustment.solution, adjustment.bundle_point_of, sigma_px_);
   sum_nis_ = sum_dof_ = std::max(adjustment.solution.dof, 1);
@@ -90,19 +96,14 @@ bool HybridObserver::adjust_buffer() {
   const CommonMatrix& P = filter_.covariance();
   const Eigen::Vector4d& k = filter_.camera().k;
   is_coarse_ = std::max(std::sqrt(P(0, 0)) / k[0], std::sqrt(P(1, 1)) / k[1]) > fine_enough;
+  adjusted_variance_ = P.diagonal().head<2>();
+  frames_since_adjustment_ = 0;
   return true;
 }
 
-/// Variance that so many frames of zoom add.
-CommonVector HybridObserver::walk(const StarFilter& filter, double frames) const {
-  CommonVector variance = CommonVector::Zero(filter.layout().size);
-  const double sigma = config_.zoom_px / config_.scale.scale;
-  variance.head<4>().setConstant(frames * sigma * sigma);
-  return variance;
-}
-
 void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate& estimate) {
-  if (is_zooming_) filter_.predict(walk(filter_, 1.0), 0.0);
+  const Eigen::Vector4d k_before = filter_.camera().k;
+  if (is_zooming_) filter_.predict(zoom_walk(), 0.0);
   filter_.observe(frame, px_);
   Judgement judgement = judge();
   if (judgement.event == ObserveEvent::burst && is_coarse_) {
@@ -132,53 +133,12 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
     jump(filter_, frame);
   }
   take_in(frame, judgement);
+  if (is_zooming_) learn_zoom_walk(k_before);
   if (is_zooming_ && has_come_to_rest()) {
     is_zooming_ = false;
     constant_since_s_ = frame.t_s;
     estimate.event = ObserveEvent::zoom_end;
   }
-}
-
-/// A frame that does not fit: would it fit another camera? Two frames in a row must want the same one.
-bool HybridObserver::is_zoom(const RotationFrame& frame) {
-  if (has_candidate_) {
-    candidate_.predict(walk(candidate_, 1.0), 0.0);
-    candidate_.observe(frame, px_);
-    if (candidate_.dof() > 0 && candidate_.nis() <= chi2_quantile(candidate_.dof(), gate_z)) {
-      filter_ = candidate_;  // and this frame is about to be taken in
-      has_candidate_ = false;
-      begin_zoom();
-      return true;
-    }
-  }
-  const int left = std::max(filter_.dof() - 4, 0);
-  const double gate = left > 0 ? chi2_quantile(left, gate_z) : 1.0;
-  has_candidate_ = filter_.if_walked(walk(filter_, any_zoom)).nis <= gate;
-  if (has_candidate_) {
-    candidate_ = filter_;
-    jump(candidate_, frame);
-    candidate_.update();
-  }
-  return false;
-}
-
-/// Lets the intrinsics walk as far as this frame wants them to, and no farther: what it takes for a step of 70 px would
-/// make a drift of 1 px as noisy as one frame is.
-void HybridObserver::jump(StarFilter& filter, const RotationFrame& frame) const {
-  const CommonVector step = filter.if_walked(walk(filter, any_zoom)).step;
-  filter.remember_intrinsics();
-  CommonVector variance = walk(filter, 4.0);
-  variance.head<4>() += step.head<4>().cwiseAbs2();
-  filter.predict(variance, 0.0);
-  filter.observe(frame, px_);
-}
-
-void HybridObserver::begin_zoom() {
-  if (!is_zooming_) past_count_ = 0;
-  is_zooming_ = true;
-  drift_frames_ = 0;
-  is_coarse_ = false;  // frames before are of another camera, and the points are known already
-  buffer_.clear();
 }
 
 /// The intrinsics' scores of some frames together: a slow change that no single frame shows. Where leaving one point
@@ -232,16 +192,6 @@ int HybridObserver::drifting_point() const {
   return best;
 }
 
-/// The last frames' estimates differ by no more than their noise.
-bool HybridObserver::has_come_to_rest() {
-  const Eigen::Vector4d now = filter_.camera().k;
-  const Eigen::Vector4d before = past_k_[static_cast<std::size_t>(past_count_ % rest_frames)];
-  past_k_[static_cast<std::size_t>(past_count_ % rest_frames)] = now;
-  if (past_count_++ < rest_frames) return false;
-  const Eigen::Vector4d sigma = filter_.covariance().diagonal().head<4>().cwiseSqrt() * std::sqrt(2.0);
-  return ((now - before).cwiseAbs().array() < 3.0 * sigma.array()).all();
-}
-
 void HybridObserver::take_in(const RotationFrame& frame, const Judgement& judgement) {
   last_fit_s_ = frame.t_s;
   if (!is_zooming_) {
@@ -255,9 +205,17 @@ void HybridObserver::take_in(const RotationFrame& frame, const Judgement& judgem
   }
   if (!is_coarse_) return;
   buffer_.add(frame, px_);
-  if (frame.t_s < next_adjustment_s_ - 1e-6) return;
+  if (frame.t_s < next_adjustment_s_ - 1e-6 && !has_gained_much()) return;
   next_adjustment_s_ = frame.t_s + std::max(0.5 * config_.bootstrap_s, 0.25 * buffer_.duration_s());
   adjust_buffer();
+}
+
+/// While it is coarse the filter takes some of its own errors of linearisation for knowledge: what it has gained is
+/// checked by adjusting, before it is much.
+bool HybridObserver::has_gained_much() {
+  if (++frames_since_adjustment_ < between_adjustments) return false;
+  const Eigen::Vector2d variance = filter_.covariance().diagonal().head<2>();
+  return (variance.array() < finer_by * finer_by * adjusted_variance_.array()).any();
 }
 
 void HybridObserver::note_slips() {
@@ -281,7 +239,12 @@ void HybridObserver::renew(std::size_t point) {
   patience_[point] = std::min(4 * patience_[point], 10000);
 }
 
+void HybridObserver::settle() {
+  if (is_running_ && is_coarse_) adjust_buffer();
+}
+
 void HybridObserver::restart(IntrinsicsEstimate& estimate) {
+  if (!is_zooming_) note_rest();
   is_running_ = is_zooming_ = false;
   has_candidate_ = false;
   buffer_.clear();

@@ -24,7 +24,8 @@ struct HybridConfig {
 /// The default estimator of a rotating camera: a rotation bundle adjustment over the first second, adjusted again
 /// while the answer is still coarse, then an extended Kalman filter (StarFilter) that judges each frame before it takes
 /// it in: a point that slipped is left out (and after 15 frames met anew), a burst of noise is skipped, a change of
-/// the intrinsics is followed. If nothing fits for a second it starts again.
+/// the intrinsics is followed, as fast as it is. While the focal length does not stand still it does not begin. If
+/// nothing fits for a second it starts again.
 /// `step` allocates nothing once the adjustments are over (about 4 s).
 /// docs/maths/rotating-camera.md.
 class HybridObserver {
@@ -39,8 +40,15 @@ class HybridObserver {
   [[nodiscard]] double sigma_px() const { return config_.scale.scale * sigma_px_ * noise_ratio(); }
   /// The σ that the filter reckons with, normalised: its covariance is in units of it.
   [[nodiscard]] double filter_sigma_px() const { return sigma_px_; }
-  /// When the intrinsics last came to rest, or the estimate began. [s]
-  [[nodiscard]] double constant_since_s() const { return constant_since_s_; }
+  /// A time in which the intrinsics did not change.
+  struct Rest {
+    double from_s = 0.0, until_s = 0.0;
+    [[nodiscard]] double duration_s() const { return until_s - from_s; }
+  };
+  /// The longest so far; of no length while there is none.
+  [[nodiscard]] Rest longest_rest() const;
+  /// The log has ended: while the answer is coarse, all frames together say it best.
+  void settle();
 
  private:
   struct Judgement {
@@ -65,13 +73,19 @@ class HybridObserver {
   void renew(std::size_t point);
   [[nodiscard]] bool has_come_to_rest();
   void take_in(const RotationFrame& frame, const Judgement& judgement);
+  [[nodiscard]] bool has_gained_much();
   void note_slips();
+  void note_rest();
   void restart(IntrinsicsEstimate& estimate);
   [[nodiscard]] CommonVector walk(const StarFilter& filter, double frames) const;
+  [[nodiscard]] CommonVector zoom_walk() const;
+  void learn_zoom_walk(const Eigen::Vector4d& k_before);
   [[nodiscard]] double noise_ratio() const;
   void report(IntrinsicsEstimate& estimate) const;
 
-  static constexpr int rest_frames = 10;  ///< Over which a zoom that is over shows no change.
+  static constexpr double gate_z = 3.09;   ///< One frame in a thousand is called bad by chance.
+  static constexpr double any_zoom = 1e6;  ///< Frames worth of change: whatever the pixels want.
+  static constexpr int rest_frames = 10;   ///< Over which a zoom that is over shows no change.
 
   HybridConfig config_;
   StarFilter filter_;
@@ -86,8 +100,12 @@ class HybridObserver {
   double sigma_px_ = 0.0;  ///< Normalised.
   double next_adjustment_s_ = 0.0;
   double constant_since_s_ = 0.0, last_fit_s_ = 0.0;
+  Rest rest_;                                                    ///< The longest before the intrinsics last changed.
+  Eigen::Vector2d adjusted_variance_ = Eigen::Vector2d::Zero();  ///< Of fx, fy, by the last adjustment.
+  int frames_since_adjustment_ = 0;
   double sum_nis_ = 0.0, sum_dof_ = 0.0;  ///< Over frames that fit: the noise.
   bool is_zooming_ = false;
+  Eigen::Vector4d zoom_variance_ = Eigen::Vector4d::Zero();  ///< Of a frame's change while zooming, as it was of late.
   std::array<Eigen::Vector4d, rest_frames> past_k_;
   int past_count_ = 0;
   struct Score {

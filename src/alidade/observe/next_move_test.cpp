@@ -70,7 +70,12 @@ TEST(NextMove, AsksForATiltWhereAPanHasSaidAllItCan) {
   EXPECT_LT(moves[0].sigma_px[1], 20.0);
 }
 
-TEST(NextMove, HasNoneWithoutPoints) { EXPECT_TRUE(plan_next_moves({780, 582}, {}, 3).empty()); }
+TEST(NextMove, HasNoneWithoutPoints) {
+  ObservedNow now;
+  now.width_px = 780;
+  now.height_px = 582;
+  EXPECT_TRUE(plan_next_moves(now, {}, 3).empty());
+}
 
 }  // namespace
 }  // namespace alidade

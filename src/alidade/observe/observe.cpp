@@ -8,6 +8,7 @@
 #include "alidade/observe/fang_observer.h"
 #include "alidade/observe/flow_filter.h"
 #include "alidade/observe/hybrid.h"
+#include "alidade/observe/steadiness.h"
 
 namespace alidade {
 namespace {
@@ -107,13 +108,18 @@ class Observation {
     }
     report_.nis_per_dof = sum_dof > 0.0 ? sum_nis / sum_dof : 0.0;
     if (!observer.is_running()) return;
+    observer.settle();
     report_.sigma_px = observer.sigma_px();
-    report_.reference_from_s = observer.constant_since_s();
+    const HybridObserver::Rest rest = observer.longest_rest();
+    report_.reference_from_s = rest.from_s;
+    report_.reference_until_s = rest.until_s;
     final_ = observer.filter().camera();
     const double noise = observer.sigma_px() / report_.scale.scale;
     const double ratio = config_.sigma_px > 0.0 ? 1.0 : std::pow(noise / observer.filter_sigma_px(), 2);
     final_cov_ = ratio * observer.filter().covariance();
     has_final_ = true;
+    set_values(report_.steps.back(), final_);
+    report_.steps.back().sigma = report_.scale.scale * final_cov_.diagonal().head<4>().cwiseSqrt();
   }
 
   [[nodiscard]] AdjustConfig adjust_config() const {
@@ -241,12 +247,15 @@ class Observation {
   /// All rows since the intrinsics last changed, together: the bound, and the answer of `batch`.
   void solve_reference() {
     std::size_t rows = 0;
-    for (const RotationFrame& frame : frames_) rows += frame.t_s >= report_.reference_from_s - 1e-9 ? 1 : 0;
+    const auto is_at_rest = [&](const RotationFrame& frame) {
+      return frame.t_s >= report_.reference_from_s - 1e-9 && frame.t_s <= report_.reference_until_s + 1e-9;
+    };
+    for (const RotationFrame& frame : frames_) rows += is_at_rest(frame) ? 1 : 0;
     const bool turns = config_.rotation != RotationKnowledge::known;
     const std::size_t room = std::max<std::size_t>(most_cells / std::max<std::size_t>(log_.num_points, 1), 64);
     FrameBuffer buffer(log_.num_points, turns ? most_turns : std::min(rows + 1, room));
     for (std::size_t k = 0; k < frames_.size(); ++k) {
-      if (frames_[k].t_s >= report_.reference_from_s - 1e-9) add_frame(buffer, k);
+      if (is_at_rest(frames_[k])) add_frame(buffer, k);
     }
     AdjustConfig config = adjust_config();
     if (has_final_ && config_.method != ObserveMethod::fang2011) {
@@ -266,7 +275,18 @@ class Observation {
     std::fill(report_.steps.begin(), report_.steps.end(), all);
   }
 
+  /// Are the rows that the answer rests on of one focal length?
+  [[nodiscard]] bool is_unsteady() const {
+    const bool says_one = !has_final_ || config_.method == ObserveMethod::batch;
+    return says_one && config_.rotation == RotationKnowledge::known && report_.reference.has_value &&
+           steadiness_of(report_.reference.bundle, report_.reference.solution).is_unsteady();
+  }
+
   void conclude() {
+    if (is_unsteady()) {
+      report_.status = ObserveReport::Status::unsteady;
+      return;
+    }
     if (!has_final_ || !report_.reference.has_value) {
       report_.status = ObserveReport::Status::no_convergence;
       if (!report_.reference.has_value) return;

@@ -50,7 +50,13 @@ struct ObservedQuantity {
 };
 
 struct ObserveReport {
-  enum class Status { ok, too_few_data, unobservable, no_convergence };
+  enum class Status {
+    ok,
+    too_few_data,
+    unobservable,
+    unsteady,  ///< The focal length changes all the time, and the method is for one that does not.
+    no_convergence
+  };
   Status status = Status::too_few_data;
   PixelScale scale;
   int width_px = 0, height_px = 0;
@@ -66,9 +72,10 @@ struct ObserveReport {
   ObserveMotion motion;
   std::size_t rows_used = 0;
   std::size_t pixels_left_out = 0;
-  /// The reference: all rows since the intrinsics last changed, adjusted together. Its information is the bound's.
+  /// The reference: the rows of the longest time in which the intrinsics did not change, adjusted together.
+  /// Its information is the bound's.
   Adjustment reference;
-  double reference_from_s = 0.0;
+  double reference_from_s = 0.0, reference_until_s = std::numeric_limits<double>::infinity();
   /// What the residuals would gain by estimating it: name and value over σ.
   std::vector<std::pair<std::string, double>> proposals;
 };

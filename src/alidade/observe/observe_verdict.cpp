@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include "alidade/observe/fang_observer.h"
 #include "alidade/observe/observe.h"
@@ -124,12 +125,14 @@ Verdict refusal(const std::string& sentence, const std::string& add, ExitCode co
   return verdict;
 }
 
-Verdict fang_refusal(const ObserveReport& report, const RotationLog& log) {
+Verdict fang_refusal(const ObserveReport& report, const RotationLog& log, const Reason& reason) {
   std::string why = "the paper's observer is not excited: least eigenvalue of its Gramian " +
                     text_of(report.gramian_lambda_min, 2) + " < 1e-4";
   if (log.num_points < 3)
     why = "too few points for the paper's observer: " + std::to_string(log.num_points) + ", it needs three";
-  Verdict verdict = refusal(why, "use --method hybrid, which can tell from this log", ExitCode::cannot_tell);
+  std::string add = "use --method hybrid, which can tell from this log";
+  if (reason.name == "too small a span") std::tie(why, add) = std::pair(reason.what, reason.add);
+  Verdict verdict = refusal(why, add, ExitCode::cannot_tell);
   add_checks(report, verdict);
   return verdict;
 }
@@ -144,6 +147,14 @@ Verdict observe_verdict(const ObserveReport& report, const RotationLog& log, con
     if (report.status == Status::unobservable) verdict.checks.push_back(weakest(report));
     return verdict;
   }
+  if (report.status == Status::unsteady) {
+    const bool is_hybrid = config.method == ObserveMethod::hybrid;
+    return refusal(is_hybrid ? "the focal length never stands still: there is no second to learn the points in"
+                             : "the focal length changes within this log: one camera is no answer",
+                   is_hybrid ? "let the zoom rest for a second or two while the camera pans and tilts, then zoom"
+                             : "use --method hybrid, which follows a zoom",
+                   ExitCode::cannot_tell);
+  }
   if (report.status == Status::no_convergence) {
     // An adjustment that finds no bottom, on a log that could not tell anyway.
     const Reason reason = reason_of(report, log, config);
@@ -151,12 +162,12 @@ Verdict observe_verdict(const ObserveReport& report, const RotationLog& log, con
       return refusal(reason.what, reason.add, ExitCode::cannot_tell);
     }
     return refusal("no intrinsics explain these pixels with this rotation",
-                   "check the axes and units of the rotation, and that the points stand still",
+                   "check the axes and units of the rotation, that the points stand still, and the zoom for a second",
                    ExitCode::no_convergence);
   }
   if (config.method == ObserveMethod::fang2011 && report.gramian_lambda_min >= 0.0 &&
       report.gramian_lambda_min < fang_refuse_lambda) {
-    return fang_refusal(report, log);
+    return fang_refusal(report, log, reason_of(report, log, config));
   }
   Verdict verdict;
   add_checks(report, verdict);

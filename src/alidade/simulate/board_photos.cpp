@@ -5,13 +5,13 @@
 #include <limits>
 #include <numbers>
 
+#include "alidade/simulate/board_placing.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/printed_pattern.h"
 
 namespace alidade {
-namespace {
 
-std::vector<Eigen::Vector3d> bent_points(const Board& board, const BoardSceneConfig& config, Draws& draws) {
+std::vector<Eigen::Vector3d> draw_bent_points(const Board& board, const BoardSceneConfig& config, Draws& draws) {
   std::vector<Eigen::Vector3d> points = points_in_board(board);
   const Eigen::Vector3d middle = 0.5 * (points.front() + points.back());
   const Eigen::Vector3d half = (points.back() - middle).cwiseMax(1e-12);
@@ -23,8 +23,7 @@ std::vector<Eigen::Vector3d> bent_points(const Board& board, const BoardSceneCon
   return points;
 }
 
-/// Places whose visibility makes the board visible: the outline of what is printed, and the points.
-std::vector<Eigen::Vector3d> outline_of(const BoardScene& scene) {
+std::vector<Eigen::Vector3d> visible_outline(const BoardScene& scene) {
   const PrintedPattern pattern(scene.board);
   const Eigen::Vector2d low = pattern.print_min(), high = pattern.print_max();
   std::vector<Eigen::Vector3d> outline = scene.points_in_board;
@@ -39,14 +38,16 @@ std::vector<Eigen::Vector3d> outline_of(const BoardScene& scene) {
   return outline;
 }
 
-bool sees_all(const Camera& camera, const Rigid3& cam_from_board, const std::vector<Eigen::Vector3d>& points) {
+bool sees_all(const Camera& camera, const Rigid3& cam_from_board, const std::vector<Eigen::Vector3d>& points_in_board) {
   constexpr double margin_px = 6.0;  // room for the fit's pixels and the blur
-  return std::all_of(points.begin(), points.end(), [&](const Eigen::Vector3d& point) {
+  return std::all_of(points_in_board.begin(), points_in_board.end(), [&](const Eigen::Vector3d& point) {
     const auto px = project(camera, cam_from_board * point);
     return px && px->x() >= margin_px && px->y() >= margin_px && px->x() <= camera.width_px - 1 - margin_px &&
            px->y() <= camera.height_px - 1 - margin_px;
   });
 }
+
+namespace {
 
 /// Draws poses until one shows everything; the board moves away a little after every failure.
 Rigid3 draw_pose(const BoardScene& scene, const std::vector<Eigen::Vector3d>& outline, const BoardSceneConfig& config,
@@ -81,8 +82,8 @@ Rigid3 draw_pose(const BoardScene& scene, const std::vector<Eigen::Vector3d>& ou
 BoardScene draw_board_scene(const Camera& camera, const Board& board, const BoardSceneConfig& config,
                             std::uint64_t seed) {
   Draws draws(seed);
-  BoardScene scene{camera, board, bent_points(board, config, draws), {}};
-  const std::vector<Eigen::Vector3d> outline = outline_of(scene);
+  BoardScene scene{camera, board, draw_bent_points(board, config, draws), {}};
+  const std::vector<Eigen::Vector3d> outline = visible_outline(scene);
   for (int i = 0; i < config.num_photos; ++i) scene.cam_from_board.push_back(draw_pose(scene, outline, config, draws));
   return scene;
 }

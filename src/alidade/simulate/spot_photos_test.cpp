@@ -5,6 +5,7 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
+#include "alidade/simulate/board_light.h"
 #include "alidade/simulate/board_surface.h"
 #include "alidade/simulate/example_camera.h"
 #include "alidade/simulate/printed_pattern.h"
@@ -68,17 +69,6 @@ AddedLight added_light(const SpotScene& scene, std::size_t i, SpotPhotoConfig co
   return added;
 }
 
-/// The nominal place on the board that the beam hits, on a flat board.
-Eigen::Vector2d place_hit(const SpotScene& scene, std::size_t i) {
-  return (scene.boards.cam_from_board[i].inverse() * spot_in_cam(scene, i)).head<2>();
-}
-
-/// Distance of a place to the nearest line of the squares' grid.
-double distance_to_edge(const Eigen::Vector2d& place) {
-  const Eigen::Array2d in_squares = place.array() / board.square_m;
-  return board.square_m * (in_squares - in_squares.round()).abs().minCoeff();
-}
-
 TEST(SpotScene, TheBeamHitsThePrintOfEveryBoardAtItsRange) {
   for (const double bow_m : {0.0, 0.004}) {
     const SpotScene scene = scene_of(40, bow_m);
@@ -118,21 +108,27 @@ TEST(SpotPhoto, WithTheLaserOffItIsTheGreyPhotoThreeTimes) {
   }
 }
 
-TEST(SpotPhoto, TheLightsCentroidIsTheProjectedHitOnEvenSquares) {
-  // Rounding scatters the centroid by 0.29·√(Σ x²)/Σ S, 0.01 px for a spot of 2 px; perspective over the spot's width
-  // moves it by σ² tan(tilt) f/Z², 0.02 px at most here.
-  const SpotScene scene = scene_of(400);
-  SpotPhotoConfig config = dim_light();
-  config.render.black = 30.0;
-  config.laser.peak = 190.0;
+TEST(BoardLight, AddedLightHasItsCentroidAtTheProjectedHit) {
+  // Perspective over a spot of radius σ moves its centroid by about σ² tan(tilt) f/Z²: 0.004 px for 1.5 mm at 0.6 m.
+  const SpotScene scene = scene_of(10);
   int checked = 0;
-  for (std::size_t i = 0; i < 400; ++i) {
-    const double px_m = scene.range_m[i] / 256.0;  // what a pixel sees; the blur reaches three of them
-    if (distance_to_edge(place_hit(scene, i)) < 0.011 + 3.0 * px_m) continue;
-    EXPECT_LT((added_light(scene, i, config).px - *true_spot(scene, i)).norm(), 0.03) << i;
+  for (std::size_t i = 0; i < 10; ++i) {
+    const Rigid3 board_from_cam = scene.boards.cam_from_board[i].inverse();
+    const Eigen::Vector3d hit_in_board = board_from_cam * spot_in_cam(scene, i);
+    const Eigen::Vector3d direction_in_board = board_from_cam.rotation * scene.beam_direction_in_cam;
+    const BoardLight board_light(scene.boards, i, RenderConfig{}, 1);
+    const PixelLight light = board_light.added({0, 0, 320, 240}, 0.999999, [&](const Eigen::Vector3d& point_in_board) {
+      return std::exp(-8.0 * (point_in_board - hit_in_board).cross(direction_in_board).squaredNorm() / (0.006 * 0.006));
+    });
+    const Eigen::ArrayXd u = Eigen::ArrayXd::LinSpaced(320, 0.0, 319.0), v = Eigen::ArrayXd::LinSpaced(240, 0.0, 239.0);
+    const Eigen::MatrixXd weight = light.cast<double>() / light.cast<double>().sum();
+    const Eigen::Vector2d centroid(weight.colwise().sum().dot(u.matrix()), weight.rowwise().sum().dot(v.matrix()));
+    const Eigen::Array2d place = hit_in_board.head<2>();
+    if ((place < -0.03).any() || place.x() > 0.28 || place.y() > 0.18) continue;  // the spot leaves the paper
+    EXPECT_LT((centroid - *true_spot(scene, i)).norm(), 0.008) << i;
     ++checked;
   }
-  EXPECT_GT(checked, 5);
+  EXPECT_GE(checked, 4);
 }
 
 TEST(SpotPhoto, ASpotOnAnEdgeLeansToThePaper) {

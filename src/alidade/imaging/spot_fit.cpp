@@ -48,7 +48,8 @@ DiscSums sums_in_disc(const SpotSignal& signal, const Eigen::Vector2d& px, doubl
   for_each_around(signal, px, radius + 1.0, [&](Eigen::Index v, Eigen::Index u, const Eigen::Vector2d& offset) {
     const double weight = std::clamp(radius + 0.5 - offset.norm(), 0.0, 1.0);
     const double light = static_cast<double>(signal.light(v, u)) - offset_light;
-    const double edge = signal.edge_sigma_px * static_cast<double>(signal.edge(v, u));
+    // Errors at an edge are alike along it, over about four pixels of a disc.
+    const double edge = 2.0 * signal.edge_sigma_px * static_cast<double>(signal.edge(v, u));
     sums.light += weight * light;
     sums.first += weight * light * offset;
     sums.second += weight * light * offset.squaredNorm();

@@ -95,12 +95,7 @@ class RobustSum {
     constexpr int rounds = 4;
     double limit = std::numeric_limits<double>::infinity();
     for (int round = 0; round < rounds; ++round) {
-      Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(n + 1, n + 1);
-      for (Eigen::Index i = 0; i < samples_.cols(); ++i) {
-        if (round > 0 && !(std::abs(residual(i)) <= limit)) continue;
-        const Eigen::VectorXd sample = samples_.col(i).cast<double>();
-        sums.selfadjointView<Eigen::Lower>().rankUpdate(sample);
-      }
+      const Eigen::MatrixXd sums = products(limit);
       Eigen::MatrixXd normal = sums.topLeftCorner(n, n).selfadjointView<Eigen::Lower>();
       normal.diagonal().array() *= 1.0 + 1e-9;  // terms that are alike share
       normal.diagonal().array() += 1e-9;
@@ -111,9 +106,24 @@ class RobustSum {
       limit = 3.0 * std::max(0.5, normal_from_mad * median(sizes));
     }
   }
+  /// Lower triangle of the sums of all products over the samples within the limit.
+  [[nodiscard]] Eigen::MatrixXd products(double limit) const {
+    const Eigen::Index n = samples_.rows();
+    Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(n, n);
+    for (Eigen::Index i = 0; i < samples_.cols(); ++i) {
+      if (weights_.size() > 0 && !(std::abs(residual(i)) <= limit)) continue;
+      const float* sample = samples_.data() + i * n;
+      for (Eigen::Index c = 0; c < n; ++c)
+        for (Eigen::Index r = c; r < n; ++r) sums(r, c) += static_cast<double>(sample[r]) * static_cast<double>(sample[c]);
+    }
+    return sums;
+  }
   [[nodiscard]] double residual(Eigen::Index i) const {
     const Eigen::Index n = samples_.rows() - 1;
-    return static_cast<double>(samples_(n, i) - samples_.col(i).head(n).dot(weights_));
+    const float* sample = samples_.data() + i * (n + 1);
+    float rest = sample[n];
+    for (Eigen::Index k = 0; k < n; ++k) rest -= weights_[k] * sample[k];
+    return static_cast<double>(rest);
   }
 
   std::vector<const Picture*> terms_;
@@ -154,22 +164,29 @@ Picture board_background(const Picture& channel, const SpotSignal& part, const S
   const Picture x = Eigen::RowVectorXf::LinSpaced(cols, -1.0F, 1.0F).replicate(rows, 1).array();
   const Picture y = Eigen::VectorXf::LinSpaced(rows, -1.0F, 1.0F).replicate(1, cols).array();
   const PictureMask use = (unsaturated(channel) > 0).select(part.is_in_region, PictureMask::Zero(rows, cols));
-  Picture best;
-  double least = std::numeric_limits<double>::infinity();
-  for (const double blur_px : {0.45, 0.65, 0.9, 1.25, 1.8}) {
+  const auto at_blur = [&](double blur_px) {
     Picture paper = sharp;
     cv::Mat mat = as_mat(paper);
     cv::GaussianBlur(mat, mat, cv::Size(), blur_px, blur_px, cv::BORDER_REPLICATE);
     const Picture ink = 1.0F - paper, paper_x = paper * x, paper_y = paper * y, ink_x = ink * x, ink_y = ink * y;
     const RobustSum sum(channel, {&paper, &paper_x, &paper_y, &ink, &ink_x, &ink_y}, use);
-    if (!sum.is_solved()) return {};
-    Picture background = sum.sum();
-    const double cost = static_cast<double>((use > 0).select((channel - background).abs().min(20.0F), 0.0F).sum());
-    if (!(cost < least)) continue;
-    least = cost;
-    best = std::move(background);
+    return sum.is_solved() ? sum.sum() : Picture();
+  };
+  const auto cost = [&](const Picture& background) {
+    if (background.size() == 0) return std::numeric_limits<double>::infinity();
+    return static_cast<double>((use > 0).select((channel - background).abs().min(20.0F).square(), 0.0F).sum());
+  };
+  double least = std::numeric_limits<double>::infinity(), best_px = 0.65;
+  for (const double blur_px : {0.4, 0.6, 0.9, 1.35, 2.0}) {
+    const double now = cost(at_blur(blur_px));
+    if (now < least) best_px = blur_px;
+    least = std::min(least, now);
   }
-  return best;
+  // The cost is a parabola of the blur near its best value.
+  const double low_px = best_px / 1.2, high_px = best_px * 1.2, low = cost(at_blur(low_px)), high = cost(at_blur(high_px));
+  const double bend = low - 2.0 * least + high;
+  if (bend > 0.0) best_px *= std::pow(1.2, std::clamp(0.5 * (low - high) / bend, -1.0, 1.0));
+  return at_blur(best_px);
 }
 
 /// Fills the region: the polygon, and the board's print where it is known.
@@ -279,16 +296,22 @@ SpotSignal spot_signal(const cv::Mat& photo, int channel, const LaserSpotAids& a
     Picture model = board_background(main, signal, *aids.seen_board);
     if (model.size() > 0) {
       signal.background = std::move(model);
-      signal.light = main - signal.background;
-      if (signal.detected.size() == 0) signal.detected = signal.light;
       signal.background_is_lit = false;
+      const Picture over_model = main - signal.background;
+      // The excess over other channels fits the print better, but it vanishes where its own channel saturates.
+      if (signal.detected.size() == 0) signal.detected = signal.light = over_model;
+      signal.light = (signal.is_saturated > 0).select(over_model, signal.light);
     }
   }
   if (signal.background.size() == 0) {
     signal.reason = "the photo is blown out";
     return signal;
   }
-  signal.edge = gradient_length(signal.background);
+  // At the middle of a saddle there is no gradient, but an error as large as beside it.
+  Picture gradient = gradient_length(signal.background);
+  signal.edge.resizeLike(gradient);
+  cv::Mat widened = as_mat(signal.edge);
+  cv::dilate(as_mat(gradient), widened, cv::Mat());
   measure_noise(signal);
   return signal;
 }

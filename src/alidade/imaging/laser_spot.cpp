@@ -73,8 +73,9 @@ LaserSpot find_laser_spot(const cv::Mat& photo, const LaserSpotAids& aids, const
     if (is_blown_out(signal)) return no_spot("the photo is blown out");
     channels.back().candidates = spot_candidates(signal, config);
   }
-  const Channel& best = *std::max_element(
-      channels.begin(), channels.end(), [](const Channel& a, const Channel& b) { return a.strongest() < b.strongest(); });
+  const Channel& best = *std::max_element(channels.begin(), channels.end(), [](const Channel& a, const Channel& b) {
+    return a.strongest() < b.strongest();
+  });
   if (best.candidates.empty()) return no_spot("no laser spot");
   const SpotCandidate& candidate = best.candidates.front();
   Eigen::Vector2d rival_px;

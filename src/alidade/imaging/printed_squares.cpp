@@ -98,7 +98,8 @@ Picture paper_share(const SeenBoard& seen, int u_min, int v_min, int cols, int r
         continue;
       }
       // The square at the top left is black: it lies at (-1 … 0)², where both waves are negative.
-      const float x = std::clamp(place.at.x(), -0.5F, last_x - 0.5F), y = std::clamp(place.at.y(), -0.5F, last_y - 0.5F);
+      const float x = std::clamp(place.at.x(), -0.5F, last_x - 0.5F),
+                  y = std::clamp(place.at.y(), -0.5F, last_y - 0.5F);
       const float chess = 0.5F - 0.5F * square_wave(x, px.x()) * square_wave(y, px.y());
       const auto inside = [](float at, float last, float width) {
         return std::clamp(0.5F + std::min(at + 1.0F, last - at) / std::max(width, 1e-6F), 0.0F, 1.0F);

@@ -7,9 +7,9 @@
 namespace alidade {
 namespace {
 
-constexpr double smoothing_px = 1.0;  // the width of a small spot
+constexpr double smoothing_px = 1.0;                      // the width of a small spot
 constexpr double smoothed_noise = 0.2821 / smoothing_px;  // 1/(2 √π s): noise of the smoothed over that of a pixel
-constexpr float low_snr = 4.0F;       // how far down the slopes a patch reaches
+constexpr float low_snr = 4.0F;                           // how far down the slopes a patch reaches
 
 /// Mean of the eight neighbours.
 float ring_mean(const Picture& picture, Eigen::Index v, Eigen::Index u) {
@@ -146,9 +146,9 @@ std::vector<SpotCandidate> spot_candidates(SpotSignal& signal, const LaserSpotCo
   std::vector<SpotCandidate> spots;
   for (int label = 1; label < num_labels; ++label) {
     const int* box = boxes.ptr<int>(label);
-    const Patch patch{cv::Rect(box[cv::CC_STAT_LEFT], box[cv::CC_STAT_TOP], box[cv::CC_STAT_WIDTH],
-                               box[cv::CC_STAT_HEIGHT]),
-                      &labels, label};
+    const Patch patch{
+        cv::Rect(box[cv::CC_STAT_LEFT], box[cv::CC_STAT_TOP], box[cv::CC_STAT_WIDTH], box[cv::CC_STAT_HEIGHT]), &labels,
+        label};
     float peak = 0.0F;
     patch.for_each([&](int v, int u) { peak = std::max(peak, snr(v, u)); });
     if (!(static_cast<double>(peak) > config.min_snr)) continue;
@@ -157,7 +157,8 @@ std::vector<SpotCandidate> spot_candidates(SpotSignal& signal, const LaserSpotCo
     if (!(moments.sum > 0.0)) continue;
     SpotCandidate spot = candidate_of(signal, patch, moments, paper);
     spot.snr = static_cast<double>(peak);
-    const auto v = static_cast<Eigen::Index>(std::lround(spot.px.y())), u = static_cast<Eigen::Index>(std::lround(spot.px.x()));
+    const auto v = static_cast<Eigen::Index>(std::lround(spot.px.y())),
+               u = static_cast<Eigen::Index>(std::lround(spot.px.x()));
     if (signal.is_in_region(v, u) == 0 || !is_spot_like(moments, spot, config)) continue;
     spots.push_back(std::move(spot));
   }

@@ -94,8 +94,8 @@ SpotPlace measure_spot(const SpotSignal& signal, const SpotCandidate& candidate)
     const Eigen::Vector2d step = sums.first / sums.light;
     spot.px += step;
     const double mean_square = 0.5 * (sums.second / sums.light - step.squaredNorm());
-    spot.radius_px = std::clamp(std::sqrt(std::max(0.0, mean_square)), 0.7 * candidate.radius_px,
-                                1.5 * candidate.radius_px + 0.5);
+    spot.radius_px =
+        std::clamp(std::sqrt(std::max(0.0, mean_square)), 0.7 * candidate.radius_px, 1.5 * candidate.radius_px + 0.5);
     if (!(std::abs(spot.px.x() - candidate.px.x()) < 3.0 * candidate.radius_px + 2.0) ||
         !(std::abs(spot.px.y() - candidate.px.y()) < 3.0 * candidate.radius_px + 2.0)) {
       spot.reason = "no laser spot";
@@ -105,7 +105,7 @@ SpotPlace measure_spot(const SpotSignal& signal, const SpotCandidate& candidate)
   spot.peak = sums.peak;
   spot.offset_light = offset_light;
   spot.is_saturated = candidate.is_saturated;
-  constexpr double rim_gain = 1.0 / 0.95;   // the disc follows the noise a little
+  constexpr double rim_gain = 1.0 / 0.95;     // the disc follows the noise a little
   constexpr double sampling_sigma_px = 0.01;  // sums over pixels instead of integrals, perspective over the spot
   spot.cov = rim_gain * rim_gain * sums.noise / (sums.light * sums.light) +
              sampling_sigma_px * sampling_sigma_px * Eigen::Matrix2d::Identity();

@@ -26,7 +26,8 @@ std::vector<Picture> channels_of(const cv::Mat& photo, const cv::Rect& part, dou
   cv::split(wide, planes);
   std::vector<Picture> channels;
   for (const cv::Mat& plane : planes) {
-    if (channels.size() < 3) channels.emplace_back(Eigen::Map<const Picture>(plane.ptr<float>(), plane.rows, plane.cols));
+    if (channels.size() < 3)
+      channels.emplace_back(Eigen::Map<const Picture>(plane.ptr<float>(), plane.rows, plane.cols));
   }
   if (channels.size() < 3) return {channels.front()};
   channels.push_back(0.114F * channels[0] + 0.587F * channels[1] + 0.299F * channels[2]);
@@ -58,14 +59,20 @@ Picture gradient_length(const Picture& picture, Picture* du = nullptr, Picture* 
   return length;
 }
 
-/// Weights of the best sum of some pictures for another one, by least squares without outliers: every third pixel of
-/// every third row, residuals beyond three sigmas left out. A spot is small beside a photo.
+/// Stride along both axes that leaves some ten thousand pixels: enough for six weights and a median to 1 %.
+Eigen::Index stride_of(Eigen::Index num_pixels) {
+  return std::max<Eigen::Index>(1, std::lround(std::sqrt(static_cast<double>(num_pixels) / 1e4)));
+}
+
+/// Weights of the best sum of some pictures for another one, by least squares without outliers: of some thousands of
+/// pixels, residuals beyond three sigmas left out. A spot is small beside a photo.
 class RobustSum {
  public:
-  RobustSum(const Picture& target, std::vector<const Picture*> terms, const PictureMask& use)
-      : terms_(std::move(terms)) {
+  /// `equal_shares`: weight, per sample, of the prior that the first two terms have 0.5 each.
+  RobustSum(const Picture& target, std::vector<const Picture*> terms, const PictureMask& use, double equal_shares = 0.0)
+      : terms_(std::move(terms)), equal_shares_(equal_shares) {
     const Eigen::Index rows = target.rows(), cols = target.cols();
-    const Eigen::Index step = rows * cols > 40000 ? 3 : 1;
+    const Eigen::Index step = stride_of(rows * cols);
     const auto n = static_cast<Eigen::Index>(terms_.size());
     samples_.resize(n + 1, (rows / step + 1) * (cols / step + 1));
     Eigen::Index count = 0;
@@ -99,7 +106,11 @@ class RobustSum {
       Eigen::MatrixXd normal = sums.topLeftCorner(n, n).selfadjointView<Eigen::Lower>();
       normal.diagonal().array() *= 1.0 + 1e-9;  // terms that are alike share
       normal.diagonal().array() += 1e-9;
-      weights_ = normal.ldlt().solve(sums.row(n).head(n).transpose()).cast<float>();
+      Eigen::VectorXd right = sums.row(n).head(n).transpose();
+      const double prior = equal_shares_ * static_cast<double>(samples_.cols());
+      normal.diagonal().head<2>().array() += prior;
+      right.head<2>().array() += 0.5 * prior;
+      weights_ = normal.ldlt().solve(right).cast<float>();
       std::vector<float> sizes(static_cast<std::size_t>(samples_.cols()));
       for (Eigen::Index i = 0; i < samples_.cols(); ++i)
         sizes[static_cast<std::size_t>(i)] = static_cast<float>(std::abs(residual(i)));
@@ -114,7 +125,8 @@ class RobustSum {
       if (weights_.size() > 0 && !(std::abs(residual(i)) <= limit)) continue;
       const float* sample = samples_.data() + i * n;
       for (Eigen::Index c = 0; c < n; ++c)
-        for (Eigen::Index r = c; r < n; ++r) sums(r, c) += static_cast<double>(sample[r]) * static_cast<double>(sample[c]);
+        for (Eigen::Index r = c; r < n; ++r)
+          sums(r, c) += static_cast<double>(sample[r]) * static_cast<double>(sample[c]);
     }
     return sums;
   }
@@ -127,13 +139,25 @@ class RobustSum {
   }
 
   std::vector<const Picture*> terms_;
+  double equal_shares_;
   Eigen::MatrixXf samples_;  ///< Terms, then the target.
   Eigen::VectorXf weights_;
 };
 
+/// Noise of one pixel, from the differences of neighbours.
+double noise_of(const Picture& picture) {
+  std::vector<float> differences;
+  const Eigen::Index step = stride_of(picture.size());
+  for (Eigen::Index v = 0; v < picture.rows(); v += step)
+    for (Eigen::Index u = 1; u < picture.cols(); u += step)
+      differences.push_back(std::abs(picture(v, u) - picture(v, u - 1)));
+  return std::max(0.4, normal_from_mad / std::sqrt(2.0) * median(differences));
+}
+
 PictureMask unsaturated(const Picture& channel) {
-  return (channel < saturated_grey).select(PictureMask::Constant(channel.rows(), channel.cols(), 255),
-                                           PictureMask::Zero(channel.rows(), channel.cols()));
+  return (channel < saturated_grey)
+      .select(PictureMask::Constant(channel.rows(), channel.cols(), 255),
+              PictureMask::Zero(channel.rows(), channel.cols()));
 }
 
 /// `off` as `lit` would show it without the laser: exposure, offset and a small displacement are fitted.
@@ -183,7 +207,8 @@ Picture board_background(const Picture& channel, const SpotSignal& part, const S
     least = std::min(least, now);
   }
   // The cost is a parabola of the blur near its best value.
-  const double low_px = best_px / 1.2, high_px = best_px * 1.2, low = cost(at_blur(low_px)), high = cost(at_blur(high_px));
+  const double low_px = best_px / 1.2, high_px = best_px * 1.2, low = cost(at_blur(low_px)),
+               high = cost(at_blur(high_px));
   const double bend = low - 2.0 * least + high;
   if (bend > 0.0) best_px *= std::pow(1.2, std::clamp(0.5 * (low - high) / bend, -1.0, 1.0));
   return at_blur(best_px);
@@ -197,7 +222,8 @@ PictureMask region_mask(const LaserSpotAids& aids, const cv::Rect& part) {
     cv::Mat inside(part.size(), CV_8U, cv::Scalar(0));
     std::vector<cv::Point> points;
     for (const Eigen::Vector2d& px : polygon)
-      points.emplace_back(static_cast<int>(std::lround(px.x())) - part.x, static_cast<int>(std::lround(px.y())) - part.y);
+      points.emplace_back(static_cast<int>(std::lround(px.x())) - part.x,
+                          static_cast<int>(std::lround(px.y())) - part.y);
     cv::fillPoly(inside, std::vector<std::vector<cv::Point>>{points}, cv::Scalar(255));
     mask &= inside;
   };
@@ -230,8 +256,9 @@ void measure_noise(SpotSignal& signal) {
   std::vector<float> even, at_edges;
   double edge_sum = 0.0;
   const float strong = std::max(8.0F, 0.4F * signal.edge.maxCoeff());
+  const Eigen::Index step = stride_of(signal.detected.size() / 3);
   for (Eigen::Index v = 1; v + 1 < signal.detected.rows(); ++v) {
-    for (Eigen::Index u = 1 + v % 2; u + 1 < signal.detected.cols(); u += 2) {
+    for (Eigen::Index u = 1 + v % step; u + 1 < signal.detected.cols(); u += step * step) {
       if (signal.is_in_region(v, u) == 0 || signal.is_saturated(v, u) != 0) continue;
       const float edge = signal.edge(v, u), size = std::abs(signal.detected(v, u));
       if (edge < 0.3F * strong) even.push_back(size);
@@ -286,7 +313,10 @@ SpotSignal spot_signal(const cv::Mat& photo, int channel, const LaserSpotAids& a
   } else if (channels.size() > 1 && channel < 3) {
     const Picture one = Picture::Ones(part.height, part.width);
     const Picture &first = channels[(at + 1) % 3], &second = channels[(at + 2) % 3];
-    const RobustSum sum(main, {&first, &second, &one}, unsaturated(main.max(first).max(second)));
+    // Where nothing has contrast noise alone would tell the shares, and tell nought; neutral things have halves.
+    constexpr double prior_noises = 60.0;
+    const double noise = noise_of(first), prior = prior_noises * noise * noise;
+    const RobustSum sum(main, {&first, &second, &one}, unsaturated(main.max(first).max(second)), prior);
     if (sum.is_solved()) signal.background = sum.sum();
     signal.background_is_lit = true;
   }

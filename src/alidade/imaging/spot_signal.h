@@ -13,13 +13,13 @@ using PictureMask = Eigen::Array<unsigned char, Eigen::Dynamic, Eigen::Dynamic, 
 
 /// What the laser may have added to one channel of a part of a photo, in grey values.
 struct SpotSignal {
-  Picture detected;                ///< Light over what is expected, in which spots are looked for.
-  Picture light;                   ///< The same, best for measuring.
-  Picture background;              ///< What the channel would show without the laser.
-  Picture edge;                    ///< Length of the background's gradient [grey/px].
-  PictureMask is_saturated;        ///< The channel is at its limit.
-  PictureMask is_in_region;        ///< A spot may be here.
-  int u_min = 0, v_min = 0;        ///< The part's first pixel in the photo.
+  Picture detected;          ///< Light over what is expected, in which spots are looked for.
+  Picture light;             ///< The same, best for measuring.
+  Picture background;        ///< What the channel would show without the laser.
+  Picture edge;              ///< Length of the background's gradient [grey/px].
+  PictureMask is_saturated;  ///< The channel is at its limit.
+  PictureMask is_in_region;  ///< A spot may be here.
+  int u_min = 0, v_min = 0;  ///< The part's first pixel in the photo.
   int photo_cols = 0, photo_rows = 0;
   double sigma = 1.0;              ///< Noise of `detected`.
   double edge_sigma_px = 0.0;      ///< What remains at edges, as an uncertainty of their place.

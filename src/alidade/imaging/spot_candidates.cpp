@@ -10,6 +10,7 @@ namespace {
 constexpr double smoothing_px = 1.0;                      // the width of a small spot
 constexpr double smoothed_noise = 0.2821 / smoothing_px;  // 1/(2 √π s): noise of the smoothed over that of a pixel
 constexpr float low_snr = 4.0F;                           // how far down the slopes a patch reaches
+constexpr int border_px = 2;  // of the part: too few neighbours to tell light from a single pixel's noise
 
 /// Mean of the eight neighbours.
 float ring_mean(const Picture& picture, Eigen::Index v, Eigen::Index u) {
@@ -126,8 +127,9 @@ SpotCandidate candidate_of(SpotSignal& signal, const Patch& patch, const Moments
   patch.for_each([&](int v, int u) { num_saturated += signal.is_saturated(v, u) != 0; });
   spot.is_saturated = num_saturated >= 3;
   const cv::Rect in_photo = patch.box + cv::Point(signal.u_min, signal.v_min);
-  if (in_photo.x <= 0 || in_photo.y <= 0 || in_photo.x + in_photo.width >= signal.photo_cols ||
-      in_photo.y + in_photo.height >= signal.photo_rows) {
+  if (in_photo.x <= border_px || in_photo.y <= border_px ||
+      in_photo.x + in_photo.width >= signal.photo_cols - border_px ||
+      in_photo.y + in_photo.height >= signal.photo_rows - border_px) {
     spot.reason = "is cut by the photo's border";
   }
   return spot;
@@ -137,7 +139,9 @@ SpotCandidate candidate_of(SpotSignal& signal, const Patch& patch, const Moments
 
 std::vector<SpotCandidate> spot_candidates(SpotSignal& signal, const LaserSpotConfig& config) {
   remove_hot_pixels(signal);
-  const Picture snr = signal_to_noise(signal);
+  Picture snr = signal_to_noise(signal);
+  snr.topRows(border_px) = snr.bottomRows(border_px) = 0.0F;
+  snr.leftCols(border_px) = snr.rightCols(border_px) = 0.0F;
   const double paper = paper_level(signal);
   PictureMask lit = ((snr > low_snr) || (signal.is_saturated > 0)).cast<unsigned char>();
   const cv::Mat mask(static_cast<int>(lit.rows()), static_cast<int>(lit.cols()), CV_8U, lit.data());

@@ -255,7 +255,7 @@ SpotPlace fit_on_edge(const SpotSignal& signal, const SpotPlace& start) {
   spot.cov = std::max(1.0, solution.cost / dof) * inverse.topLeftCorner<2, 2>();
   // What the print's model misses grows with the correction; without a photo to compare with the print is less known.
   // So does a cut middle: it is the part that tells most.
-  const double share = signal.background_is_lit ? 0.15 : start.is_saturated ? 0.1 : 0.05;
+  const double share = signal.background_is_lit || signal.is_modelled ? 0.15 : start.is_saturated ? 0.1 : 0.05;
   spot.cov += share * share * moved * moved.transpose() + 1e-4 * Eigen::Matrix2d::Identity();
   if (!spot.cov.allFinite()) return with_wide_sigma(start);
   return spot;

@@ -45,11 +45,12 @@ struct DiscSums {
 DiscSums sums_in_disc(const SpotSignal& signal, const Eigen::Vector2d& px, double radius_px, double offset_light) {
   DiscSums sums;
   const double radius = disc_radius(radius_px);
+  // Errors at an edge are alike along it, over about four pixels of a disc; those of a model over all of it.
+  const double edge_factor = (signal.is_modelled ? 4.0 : 2.0) * signal.edge_sigma_px;
   for_each_around(signal, px, radius + 1.0, [&](Eigen::Index v, Eigen::Index u, const Eigen::Vector2d& offset) {
     const double weight = std::clamp(radius + 0.5 - offset.norm(), 0.0, 1.0);
     const double light = static_cast<double>(signal.light(v, u)) - offset_light;
-    // Errors at an edge are alike along it, over about four pixels of a disc.
-    const double edge = 2.0 * signal.edge_sigma_px * static_cast<double>(signal.edge(v, u));
+    const double edge = edge_factor * static_cast<double>(signal.edge(v, u));
     sums.light += weight * light;
     sums.first += weight * light * offset;
     sums.second += weight * light * offset.squaredNorm();

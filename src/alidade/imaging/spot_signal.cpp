@@ -268,9 +268,12 @@ void measure_noise(SpotSignal& signal) {
     }
   }
   signal.sigma = std::max(0.4, normal_from_mad * median(even));  // rounding alone makes 0.29, of two photos 0.41
-  if (at_edges.size() < 20) return;
+  // A print has many edges; those of a few pixels may be the spot's own light in the other channels.
+  if (at_edges.size() < 20 || 50 * at_edges.size() < even.size()) return;
   const double rest = normal_from_mad * median(at_edges), mean_edge = edge_sum / static_cast<double>(at_edges.size());
-  signal.edge_sigma_px = std::sqrt(std::max(0.0, rest * rest - signal.sigma * signal.sigma)) / mean_edge;
+  constexpr double max_edge_sigma_px = 0.3;  // what is worse was not compared with its like
+  signal.edge_sigma_px =
+      std::min(max_edge_sigma_px, std::sqrt(std::max(0.0, rest * rest - signal.sigma * signal.sigma)) / mean_edge);
 }
 
 bool is_chessboard(const LaserSpotAids& aids) {
@@ -329,7 +332,8 @@ SpotSignal spot_signal(const cv::Mat& photo, int channel, const LaserSpotAids& a
       signal.background_is_lit = false;
       const Picture over_model = main - signal.background;
       // The excess over other channels fits the print better, but it vanishes where its own channel saturates.
-      if (signal.detected.size() == 0) signal.detected = signal.light = over_model;
+      signal.is_modelled = signal.detected.size() == 0;
+      if (signal.is_modelled) signal.detected = signal.light = over_model;
       signal.light = (signal.is_saturated > 0).select(over_model, signal.light);
     }
   }

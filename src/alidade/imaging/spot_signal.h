@@ -24,6 +24,7 @@ struct SpotSignal {
   double sigma = 1.0;              ///< Noise of `detected`.
   double edge_sigma_px = 0.0;      ///< What remains at edges, as an uncertainty of their place.
   bool background_is_lit = false;  ///< It was taken from channels that see some of the laser's light.
+  bool is_modelled = false;        ///< `light` is the difference to a model of the print, not to a photo or channel.
   std::string reason;              ///< Why there is no signal; empty where there is one.
 };
 

@@ -113,7 +113,7 @@ TEST_P(LaserSpotAccuracy, NoSpotIsWrongAndSigmaSaysHowWellItStands) {
   // One in three is dim; on ink, and in a grey photo, many of those drown.
   EXPECT_GE(score.num_found, GetParam() == Known::grey_with_pose ? 136 : 170);
   EXPECT_EQ(score.num_wrong, 0);
-  EXPECT_LT(score.edge_rms(), 0.25);  // uncorrected, a spot of 2 px on an edge errs by up to 1 px
+  EXPECT_LT(score.edge_rms(), 0.25);     // uncorrected, a spot of 2 px on an edge errs by up to 1 px
   EXPECT_GT(score.share_in_68(), 0.60);  // 0.68 less 2.5 times √(0.68 · 0.32/204)
   EXPECT_GT(score.share_in_95(), 0.90);  // 0.95 less 3 times √(0.95 · 0.05/204)
 }
@@ -122,14 +122,14 @@ TEST(LaserSpotBias, NoneOnEvenSquares) {
   // Squares of 30 px and more, hit in their middle or nearly: ink and paper.
   const Board large{BoardKind::chessboard, 3, 2, 0.08, 0.0, ""};
   const auto hits = draw_spot_scene(*example_camera("brown", 320, 240), large, {0.04, -0.01, 0.005}, {-0.06, 0.02, 1.0},
-                                    {.num_photos = 30, .min_range_m = 0.5, .max_range_m = 0.8}, 4);
+                                    {.num_photos = 20, .min_range_m = 0.5, .max_range_m = 0.8}, 4);
   ASSERT_TRUE(hits);
   Score score;
-  for (std::size_t i = 0; i < 30; ++i) {
+  for (std::size_t i = 0; i < 20; ++i) {
     const RenderConfig config{.black = 25.0, .white = 120.0};
     SpotStudio photos(hits->boards, i, config, i);
+    const cv::Mat off = photos.photo(1.0, i);
     photos.add_spot(spot_in_cam(*hits, i), hits->beam_direction_in_cam, hits->range_m[i], {.peak = 300.0});
-    const cv::Mat off = SpotStudio(hits->boards, i, config, i).photo(1.0, i);
     for (std::uint64_t seed = 0; seed < 4; ++seed) {
       LaserSpotAids aids;
       aids.photo_off = &off;
@@ -139,7 +139,7 @@ TEST(LaserSpotBias, NoneOnEvenSquares) {
   }
   std::cout << "even " << score.num_even << " mean " << (score.even_sum / score.num_even).transpose() << " rms "
             << score.even_rms() << " in " << score.share_in_68() << ' ' << score.share_in_95() << '\n';
-  EXPECT_GT(score.num_even, 40);
+  EXPECT_GT(score.num_even, 30);
   EXPECT_LT((score.even_sum / score.num_even).norm(), 0.05);
   EXPECT_LT(score.even_rms(), 0.15);
 }

@@ -257,6 +257,8 @@ SpotPlace fit_on_edge(const SpotSignal& signal, const SpotPlace& start) {
   // So does a cut middle: it is the part that tells most.
   const double share = signal.background_is_lit || signal.is_modelled ? 0.15 : start.is_saturated ? 0.1 : 0.05;
   spot.cov += share * share * moved * moved.transpose() + 1e-4 * Eigen::Matrix2d::Identity();
+  // A grey photo made of a colour one hides what its colours cut, and a model what the light does near an edge.
+  if (signal.is_modelled) spot.cov += 0.0144 * radius_px * radius_px * Eigen::Matrix2d::Identity();
   if (!spot.cov.allFinite()) return with_wide_sigma(start);
   return spot;
 }

@@ -3,7 +3,6 @@
 
 #include <Eigen/LU>
 #include <cmath>
-#include <iostream>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -106,9 +105,7 @@ TEST_P(LaserSpotAccuracy, NoSpotIsWrongAndSigmaSaysHowWellItStands) {
   for (const Shot& shot : shots())
     score.add(find(shot.photo, shot.photo_off, shot.pose, GetParam()), *true_spot(scene(), shot.pose));
   RecordProperty("edge_rms_px", std::to_string(score.edge_rms()));
-  std::cout << "found " << score.num_found << " wrong " << score.num_wrong << " even " << score.num_even << " rms "
-            << score.even_rms() << " edge " << score.num_edge << " rms " << score.edge_rms() << " in "
-            << score.share_in_68() << ' ' << score.share_in_95() << '\n';
+  RecordProperty("share_in_68", std::to_string(score.share_in_68()));
   EXPECT_EQ(score.num_shown, 204);
   // One in three is dim; on ink, and in a grey photo, many of those drown.
   EXPECT_GE(score.num_found, GetParam() == Known::grey_with_pose ? 136 : 170);
@@ -137,8 +134,6 @@ TEST(LaserSpotBias, NoneOnEvenSquares) {
       if (spot.found() && !spot.is_on_edge) score.add(spot, *true_spot(*hits, i));
     }
   }
-  std::cout << "even " << score.num_even << " mean " << (score.even_sum / score.num_even).transpose() << " rms "
-            << score.even_rms() << " in " << score.share_in_68() << ' ' << score.share_in_95() << '\n';
   EXPECT_GT(score.num_even, 30);
   EXPECT_LT((score.even_sum / score.num_even).norm(), 0.05);
   EXPECT_LT(score.even_rms(), 0.15);

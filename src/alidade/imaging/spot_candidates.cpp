@@ -109,7 +109,7 @@ Moments moments_of(const SpotSignal& signal, const Patch& patch) {
   return moments;
 }
 
-/// Why a patch is no spot at all; empty where it may be one.
+/// Whether a patch is as small and as round as a spot.
 bool is_spot_like(const Moments& moments, const SpotCandidate& spot, const LaserSpotConfig& config) {
   const double mean_square = 0.5 * moments.cov.trace(), area = std::sqrt(std::max(0.0, moments.cov.determinant()));
   constexpr double max_elongation = 5.0;  // a board tilted by 78°; a streak along an edge is longer

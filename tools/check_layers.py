@@ -5,8 +5,8 @@ import re
 import sys
 
 FOUNDATIONS = {"geometry", "estimation"}
-SENSORS = {"camera", "pantilt", "board", "imaging"}
-ESTIMATORS = {"calibrate", "observe"}
+SENSORS = {"camera", "pantilt", "beam", "board", "imaging"}
+ESTIMATORS = {"calibrate", "observe", "rangefinder"}
 
 MAY_INCLUDE = {
     "geometry": set(),
@@ -14,6 +14,7 @@ MAY_INCLUDE = {
     "camera": FOUNDATIONS,
     "pantilt": FOUNDATIONS,
     "board": FOUNDATIONS | {"camera"},
+    "beam": FOUNDATIONS | {"camera", "board"},
     "imaging": FOUNDATIONS | {"camera", "board"},
     "simulate": FOUNDATIONS | SENSORS,
     **{estimator: FOUNDATIONS | SENSORS for estimator in ESTIMATORS},

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+
+#include "alidade/board/board_view.h"
+#include "alidade/geometry/rigid3.h"
+
+namespace alidade {
+
+/// Plane n · point_in_cam + d = 0.
+struct Plane {
+  Eigen::Vector3d normal_in_cam = Eigen::Vector3d::UnitZ();  ///< Unit vector.
+  double d_m = 0.0;
+  Eigen::Matrix4d cov = Eigen::Matrix4d::Zero();  ///< Of (normal, d); zero: exact.
+};
+
+/// The board's plane z = 0, oriented away from the camera: d < 0.
+[[nodiscard]] inline Plane plane_of(const Rigid3& cam_from_board) {
+  Plane plane;
+  plane.normal_in_cam = cam_from_board.rotation * Eigen::Vector3d::UnitZ();
+  plane.d_m = -plane.normal_in_cam.dot(cam_from_board.translation);
+  if (plane.d_m > 0.0) {
+    plane.normal_in_cam = -plane.normal_in_cam;
+    plane.d_m = -plane.d_m;
+  }
+  return plane;
+}
+
+/// Where the laser's spot was seen.
+struct Spot {
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();  ///< With distortion: as in the photo.
+  std::optional<double> sigma_px = {};           ///< Of a coordinate.
+};
+
+/// Where a board stood, with the covariance of its right perturbation ξ; zero: exact.
+struct BoardPose {
+  Rigid3 cam_from_board;
+  Eigen::Matrix<double, 6, 6> cov = Eigen::Matrix<double, 6, 6>::Zero();
+};
+
+/// One reading of the rangefinder and what was seen of it. Of the board at most one is needed: its corners, else its
+/// pose, else its plane; the first that is there counts.
+struct Shot {
+  double range_m = 0.0;
+  std::optional<double> sigma_range_m = {};
+  std::optional<Spot> spot = {};
+  std::optional<BoardView> board = {};
+  std::optional<BoardPose> pose = {};
+  std::optional<Plane> plane = {};
+  std::string name = {};  ///< For a person: a row or a photo.
+
+  [[nodiscard]] bool has_plane() const { return board || pose || plane; }
+};
+
+}  // namespace alidade

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "alidade/estimation/progress.h"
+#include "alidade/rangefinder/rangefinder.h"
+
+namespace alidade {
+
+/// What is known of the beam, and what the next shots will be measured with.
+struct BeamNow {
+  Beam beam;      ///< With covariance, and covariance with the lens.
+  Camera camera;  ///< With covariance where known.
+  std::vector<Eigen::Vector3d> points_in_board;
+  RangefinderMethod method = RangefinderMethod::joint;
+  double sigma_spot_px = 0.3;
+  double sigma_corner_px = 0.2;
+  bool estimate_scale = false;
+};
+
+struct ShotLimits {
+  double min_range_m = 0.5, max_range_m = 4.0;
+  double max_tilt_rad = 0.78;
+};
+
+/// A place for the board, and what would be known with it.
+struct NextShot {
+  double distance_m = 0.0;   ///< Along the beam, as read.
+  double tilt_rad = 0.0;     ///< Between the board's normal and the camera's view.
+  double azimuth_rad = 0.0;  ///< Which side is farther: 0 right, ½π the lower.
+  Rigid3 cam_from_board;
+  double sigma_origin_m = 0.0, sigma_direction_rad = 0.0;  ///< With it and the ones before.
+  double spot_sigma_px = 0.0;                              ///< Worst over the four ranges of the bound.
+};
+
+/// The shots that lower the uncertainty most, one after the other: each the best over distances, tilts and sides by the
+/// mean variance of the points that the beam will measure from its origin to the farthest range.
+[[nodiscard]] std::vector<NextShot> plan_next_shots(const BeamNow& now, const ShotLimits& limits, int num_shots,
+                                                    const Progress& progress = {});
+
+/// What each distance × tilt would bring as the next shot, best side each: √ of the mean variance after it. [m]
+struct ShotGain {
+  double distance_m = 0.0, tilt_rad = 0.0;
+  double sigma_point_m = 0.0;
+};
+[[nodiscard]] std::vector<ShotGain> next_shot_gains(const BeamNow& now, const ShotLimits& limits);
+
+}  // namespace alidade

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <array>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/beam/shot.h"
+#include "alidade/estimation/progress.h"
+#include "alidade/estimation/verdict.h"
+#include "alidade/rangefinder/config.h"
+
+namespace alidade {
+
+/// One shot after the solve. NaN where there is nothing to compare.
+struct ShotFit {
+  bool used = false;
+  std::string reason;                                                  ///< Why it was not used; empty otherwise.
+  double residual_range_m = std::numeric_limits<double>::quiet_NaN();  ///< Predicted from the board − read.
+  double sigma_range_m = std::numeric_limits<double>::quiet_NaN();     ///< Of that residual: the reading, the board.
+  Eigen::Vector2d residual_px = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  Eigen::Matrix2d cov_px = Eigen::Matrix2d::Zero();        ///< Of that residual.
+  Eigen::Vector3d point_in_cam = Eigen::Vector3d::Zero();  ///< Where the beam says the reading was taken.
+  std::optional<Plane> plane = {};                         ///< Of the board, in the camera frame.
+  std::optional<BoardPose> pose = {};                      ///< Of the board, as solved; where it has one.
+};
+
+/// What can be known of the beam from these shots, and how its geometry stands.
+struct BeamBound {
+  BeamMatrix cov = BeamMatrix::Zero();  ///< Cramér–Rao, lens and poses estimated too; infinite where singular.
+  double sigma_origin_m = 0.0;          ///< √trace of the origin's covariance, of the estimate.
+  double sigma_direction_rad = 0.0;     ///< √trace of the direction's, of the estimate.
+  std::array<double, 4>
+      spot_sigma_px{};         ///< Larger axis of the predicted spot at bound_ranges_m, for an exact reading.
+  double condition = 0.0;      ///< Of the information about the beam, scaled to a unit diagonal.
+  double range_ratio = 0.0;    ///< Longest over shortest reading.
+  double normal_spread = 0.0;  ///< Least singular value of the boards' normals over √(their number).
+  double offset_m = 0.0;       ///< Of the beam's line from the camera's centre.
+};
+inline constexpr std::array<double, 4> bound_ranges_m{0.5, 1.0, 2.0, 4.0};
+
+struct RangefinderReport {
+  enum class Status {
+    converged,
+    too_few,        ///< Shots for the method.
+    degenerate,     ///< The information about the beam is singular.
+    scale_unknown,  ///< A scale was asked of spots alone.
+    ambiguous,      ///< Two beams explain the shots alike.
+    no_convergence
+  };
+  Status status = Status::too_few;
+  Beam beam;
+  Camera camera;                   ///< As given, or refined with the beam; the beam belongs to it.
+  std::vector<Beam> alternatives;  ///< Other beams that fit as well.
+  std::vector<ShotFit> shots;      ///< One a shot.
+  BeamBound bound;
+  double sigma_spot_px = 0.0;  ///< Of spots that do not bring their own.
+  double sigma_corner_px = 0.0;
+  bool spot_sigma_is_told = false, range_sigma_is_told = false;  ///< By the residuals.
+  double cost = 0.0;  ///< Sum of the whitened squared residuals: corners, spots, ranges, prior of the lens.
+  int dof = 0;        ///< Of that sum.
+  double rms_px = 0.0, rms_range_m = 0.0;  ///< Of the spots (per point) and of the ranges used.
+  int shots_used = 0, shots_dropped = 0;
+  int iterations = 0;
+};
+
+/// Origin and direction (and scale) of a rangefinder's beam in the camera frame, by maximum likelihood, with what is
+/// wrong among the shots named. Needs no first guess and does not throw on bad data: the report says how it went.
+/// `points_in_board` [m]: of the board of those shots that have corners; may be empty if none has.
+/// Wang & Li, "Extrinsic calibration of a single-point laser rangefinder and a camera", 2020, eq. (5)–(16), corrected
+/// in docs/maths/rangefinder.md. Throws Interrupted.
+[[nodiscard]] RangefinderReport calibrate_rangefinder(std::span<const Shot> shots,
+                                                      std::span<const Eigen::Vector3d> points_in_board,
+                                                      const Camera& camera, const RangefinderConfig& config,
+                                                      const Progress& progress = {});
+
+/// What the answer is worth, or why there is none, what to add, and which other method could tell.
+[[nodiscard]] Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Shot> shots,
+                                          const RangefinderConfig& config);
+
+}  // namespace alidade

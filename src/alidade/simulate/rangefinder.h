@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/beam/beam.h"
+#include "alidade/beam/shot.h"
+#include "alidade/board/board.h"
+#include "alidade/camera/camera.h"
+
+namespace alidade {
+
+/// A world for `rangefinder`: a camera, a beam, and where a board was held so that the beam hits it.
+struct RangefinderScene {
+  Camera camera;
+  Board board;
+  Beam beam;                           ///< beam.noise: what the readings will have.
+  std::vector<Rigid3> cam_from_board;  ///< One a shot.
+  std::vector<double> range_m;         ///< True reading of each shot.
+};
+
+struct RangefinderSceneConfig {
+  int num_shots = 18;
+  double min_range_m = 0.5, max_range_m = 4.0;
+  bool uniform_in_inverse_range = false;  ///< Else uniform in the range.
+  double min_tilt_rad = 0.0, max_tilt_rad = 0.7853981633974483;
+  std::optional<double> azimuth_rad = {};  ///< Of the tilt: all boards parallel with one tilt. None: any side.
+  Beam beam;
+  Board board{.cols = 9, .rows = 6, .square_m = 0.04};
+  Camera camera;
+};
+
+struct ShotNoise {
+  double sigma_corner_px = 0.2;
+  double sigma_spot_px = 0.3;
+  double outlier_share =
+      0.0;  ///< Of the shots, rounded: the beam passed the board and hit what is 0.3 to 1 m behind it.
+  bool with_spot = true, with_board = true;
+};
+
+/// The scenarios by name: reference, table1, parallel, frontal, equal_range, through_centre, toed_in, near_frontal,
+/// short_span, inverse_range, four_shots. None for an unknown name. The camera is 1280×960, f 1200 px.
+[[nodiscard]] std::optional<RangefinderSceneConfig> rangefinder_scenario(std::string_view name);
+[[nodiscard]] std::vector<std::string> rangefinder_scenarios();
+
+/// Draws boards that are all inside the picture and hit by the beam. Same seed, same scene.
+[[nodiscard]] RangefinderScene draw_rangefinder_scene(const RangefinderSceneConfig& config, std::uint64_t seed);
+
+/// What is measured in such a world. Corners bring their covariance; spots and readings bring no σ.
+struct SimulatedShots {
+  std::vector<Shot> shots;
+  std::vector<bool> is_outlier;
+};
+[[nodiscard]] SimulatedShots simulate_shots(const RangefinderScene& scene, const ShotNoise& noise, std::uint64_t seed);
+
+}  // namespace alidade

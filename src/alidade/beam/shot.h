@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "alidade/board/board_pose.h"
 #include "alidade/board/board_view.h"
 #include "alidade/geometry/rigid3.h"
 
@@ -32,12 +33,6 @@ struct Plane {
 struct Spot {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();  ///< With distortion: as in the photo.
   std::optional<double> sigma_px = {};           ///< Of a coordinate.
-};
-
-/// Where a board stood, with the covariance of its right perturbation ξ; zero: exact.
-struct BoardPose {
-  Rigid3 cam_from_board;
-  Eigen::Matrix<double, 6, 6> cov = Eigen::Matrix<double, 6, 6>::Zero();
 };
 
 /// One reading of the rangefinder and what was seen of it. Of the board at most one is needed: its corners, else its

@@ -1,0 +1,182 @@
+#include "alidade/board/board_pose.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+#include <cmath>
+#include <vector>
+
+namespace alidade {
+namespace {
+
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+/// L⁻¹ of cov = L Lᵀ.
+Eigen::Matrix2d whitener(const Eigen::Matrix2d& cov) {
+  const double a = std::sqrt(cov(0, 0)), b = cov(1, 0) / a, c = std::sqrt(cov(1, 1) - b * b);
+  return (Eigen::Matrix2d() << 1.0 / a, 0.0, -b / (a * c), 1.0 / c).finished();
+}
+
+/// The points' middle and their mean distance from it.
+std::pair<Eigen::Vector2d, double> middle_and_size(const BoardView& view, std::span<const Eigen::Vector3d> points) {
+  const auto num = static_cast<double>(view.corners.size());
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  double size = 0.0;
+  for (const Corner& corner : view.corners) middle += points[static_cast<std::size_t>(corner.index)].head<2>() / num;
+  for (const Corner& corner : view.corners)
+    size += (points[static_cast<std::size_t>(corner.index)].head<2>() - middle).norm() / num;
+  return {middle, size};
+}
+
+/// H with ray ~ H (x, y, 1) of points on the board, up to scale: null vector of ray × H p = 0. Rays instead of pixels
+/// let it work behind the lens, too. None where the points are on a line.
+std::optional<Eigen::Matrix3d> ray_homography(const Camera& camera, const BoardView& view,
+                                              std::span<const Eigen::Vector3d> points) {
+  const auto [middle, size] = middle_and_size(view, points);
+  if (!(size > 0.0)) return std::nullopt;
+  Eigen::Matrix<double, 9, 9> AtA = Eigen::Matrix<double, 9, 9>::Zero();
+  Eigen::Vector3d side = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector2d> px;
+  for (const Corner& corner : view.corners) px.push_back(corner.px);
+  const auto rays = unproject(camera, px);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (!rays[i]) continue;
+    const auto index = static_cast<std::size_t>(view.corners[i].index);
+    const Eigen::Vector3d p = ((points[index].head<2>() - middle) / size).homogeneous();
+    const Eigen::Matrix3d cross = cross_matrix(*rays[i]);
+    const Eigen::Matrix3d weight = cross.transpose() * cross, outer = p * p.transpose();
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b) AtA.block<3, 3>(3 * a, 3 * b) += outer(a, b) * weight;
+    side += *rays[i];
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> eigen(AtA);
+  if (!(eigen.eigenvalues()[1] > 1e-9 * eigen.eigenvalues()[8])) return std::nullopt;
+  Eigen::Matrix3d H = eigen.eigenvectors().col(0).reshaped(3, 3);
+  if (H.col(2).dot(side) < 0.0) H = -H;  // in front of the camera
+  H.leftCols<2>() /= size;
+  H.col(2) -= H.leftCols<2>() * middle;
+  return H;
+}
+
+std::optional<Rigid3> start_pose(const Camera& camera, const BoardView& view, std::span<const Eigen::Vector3d> points) {
+  const auto H = ray_homography(camera, view, points);
+  if (!H) return std::nullopt;
+  const double scale = 2.0 / (H->col(0).norm() + H->col(1).norm());
+  Eigen::Matrix3d axes;
+  axes << H->col(0) * scale, H->col(1) * scale, H->col(0).cross(H->col(1)) * scale * scale;
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d R = svd.matrixU() * svd.matrixV().transpose();
+  if (!R.allFinite() || !(R.determinant() > 0.0)) return std::nullopt;
+  return Rigid3{Eigen::Quaterniond(R), H->col(2) * scale};
+}
+
+/// The other pose that looks nearly alike from far away: the normal mirrored at the view of the board's middle.
+Rigid3 mirrored(const Rigid3& cam_from_board, const Eigen::Vector3d& middle_in_board) {
+  const Eigen::Vector3d middle_in_cam = cam_from_board * middle_in_board;
+  const Eigen::Vector3d view = middle_in_cam.normalized();
+  const Eigen::Vector3d normal = cam_from_board.rotation * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d wanted = 2.0 * view.dot(normal) * view - normal;
+  const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(normal, wanted);
+  const Eigen::Quaterniond rotation = (turn * cam_from_board.rotation).normalized();
+  return {rotation, middle_in_cam - rotation * middle_in_board};
+}
+
+struct Refined {
+  Rigid3 cam_from_board;
+  CornerResiduals residuals;
+};
+
+std::optional<Refined> refined(const Camera& camera, Rigid3 cam_from_board, const BoardView& view,
+                               std::span<const Eigen::Vector3d> points, std::optional<double> sigma_px) {
+  auto now = corner_residuals(camera, cam_from_board, view, points, sigma_px);
+  if (!now) return std::nullopt;
+  double damping = 1e-6;
+  constexpr int max_iterations = 50;  // quadratic from a homography: 3–5 are typical
+  for (int i = 0; i < max_iterations; ++i) {
+    const Matrix6 H = now->J_pose.transpose() * now->J_pose;
+    const Vector6 g = now->J_pose.transpose() * now->r;
+    Matrix6 damped = H;
+    damped.diagonal() *= 1.0 + damping;
+    const Vector6 step = -damped.ldlt().solve(g);
+    if (!step.allFinite()) return std::nullopt;
+    // A step of 10⁻⁶ σ changes nothing that could be measured.
+    const bool is_small = step.dot(H * step) < 1e-12 * (1.0 + now->r.squaredNorm() * 1e-6);
+    const Rigid3 trial = cam_from_board.retract(step);
+    auto next = corner_residuals(camera, trial, view, points, sigma_px);
+    if (next && next->r.squaredNorm() <= now->r.squaredNorm()) {
+      cam_from_board = trial;
+      now = std::move(next);
+      damping = std::max(0.1 * damping, 1e-12);
+    } else if ((damping *= 10.0) > 1e12) {
+      break;
+    }
+    if (is_small) return Refined{cam_from_board, std::move(*now)};
+  }
+  return std::nullopt;
+}
+
+bool fits_board(const BoardView& view, std::span<const Eigen::Vector3d> points) {
+  for (const Corner& corner : view.corners) {
+    if (corner.index < 0 || static_cast<std::size_t>(corner.index) >= points.size()) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::optional<CornerResiduals> corner_residuals(const Camera& camera, const Rigid3& cam_from_board,
+                                                const BoardView& view, std::span<const Eigen::Vector3d> points_in_board,
+                                                std::optional<double> sigma_px) {
+  if (!fits_board(view, points_in_board)) return std::nullopt;
+  std::vector<Eigen::Vector3d> points_in_cam;
+  points_in_cam.reserve(view.corners.size());
+  const Eigen::Matrix3d R = cam_from_board.rotation.toRotationMatrix();
+  for (const Corner& corner : view.corners)
+    points_in_cam.push_back(R * points_in_board[static_cast<std::size_t>(corner.index)] + cam_from_board.translation);
+  const auto seen = project_with_jacobians(camera, points_in_cam);
+  const auto rows = static_cast<Eigen::Index>(2 * seen.size());
+  CornerResiduals out{Eigen::VectorXd(rows), Eigen::Matrix<double, Eigen::Dynamic, 6>(rows, 6), {}};
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (!seen[i]) return std::nullopt;
+    if (i == 0) out.J_lens.resize(rows, seen[i]->J_px_params.cols());
+    const Corner& corner = view.corners[i];
+    const Eigen::Matrix2d W =
+        sigma_px ? Eigen::Matrix2d(Eigen::Matrix2d::Identity() / *sigma_px) : whitener(corner.cov);
+    const Eigen::Matrix<double, 2, 3> J_board = W * seen[i]->J_px_point * R;
+    const auto row = static_cast<Eigen::Index>(2 * i);
+    out.r.segment<2>(row) = W * (seen[i]->px - corner.px);
+    out.J_pose.block<2, 3>(row, 0) = J_board;
+    out.J_pose.block<2, 3>(row, 3) = -J_board * cross_matrix(points_in_board[static_cast<std::size_t>(corner.index)]);
+    out.J_lens.middleRows<2>(row) = W * seen[i]->J_px_params;
+  }
+  if (!out.r.allFinite()) return std::nullopt;
+  return out;
+}
+
+std::optional<BoardPoseFit> fit_board_pose(const Camera& camera, const BoardView& view,
+                                           std::span<const Eigen::Vector3d> points_in_board,
+                                           std::optional<double> sigma_px) {
+  if (view.corners.size() < 4 || !fits_board(view, points_in_board)) return std::nullopt;
+  const auto start = start_pose(camera, view, points_in_board);
+  if (!start) return std::nullopt;
+  auto best = refined(camera, *start, view, points_in_board, sigma_px);
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  middle.head<2>() = middle_and_size(view, points_in_board).first;
+  const auto other =
+      refined(camera, mirrored(best ? best->cam_from_board : *start, middle), view, points_in_board, sigma_px);
+  if (other && (!best || other->residuals.r.squaredNorm() < best->residuals.r.squaredNorm())) best = other;
+  if (!best) return std::nullopt;
+
+  const CornerResiduals& at = best->residuals;
+  const Eigen::LDLT<Matrix6> H(at.J_pose.transpose() * at.J_pose);
+  BoardPoseFit fit;
+  fit.pose = {best->cam_from_board, H.solve(Matrix6::Identity())};
+  fit.chi2 = at.r.squaredNorm();
+  fit.dof = static_cast<int>(at.r.size()) - 6;
+  fit.J_pose_lens = -H.solve(at.J_pose.transpose() * at.J_lens);
+  if (!fit.pose.cov.allFinite()) return std::nullopt;
+  return fit;
+}
+
+}  // namespace alidade

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+
+#include "alidade/board/board_view.h"
+#include "alidade/camera/camera.h"
+#include "alidade/geometry/rigid3.h"
+
+namespace alidade {
+
+/// Where a board stood, with the covariance of its right perturbation ξ; zero: exact.
+struct BoardPose {
+  Rigid3 cam_from_board;
+  Eigen::Matrix<double, 6, 6> cov = Eigen::Matrix<double, 6, 6>::Zero();
+};
+
+/// Whitened residuals of the corners of one view, two rows a corner in the view's order, with their derivatives by the
+/// pose's right perturbation ξ = [translation, rotation] and by the lens.
+struct CornerResiduals {
+  Eigen::VectorXd r;
+  Eigen::Matrix<double, Eigen::Dynamic, 6> J_pose;
+  Eigen::MatrixXd J_lens;  ///< As many columns as the lens has parameters.
+};
+
+/// None where the lens does not see a corner, or a corner has a number that the board has not. `sigma_px`: takes the
+/// place of the corners' covariances.
+[[nodiscard]] std::optional<CornerResiduals> corner_residuals(const Camera& camera, const Rigid3& cam_from_board,
+                                                              const BoardView& view,
+                                                              std::span<const Eigen::Vector3d> points_in_board,
+                                                              std::optional<double> sigma_px = {});
+
+struct BoardPoseFit {
+  BoardPose pose;
+  double chi2 = 0.0;  ///< Sum of the squared whitened residuals.
+  int dof = 0;
+  /// How the pose follows the lens: ∂ξ/∂(lens parameters), 6 × their number.
+  Eigen::Matrix<double, 6, Eigen::Dynamic> J_pose_lens;
+};
+
+/// Pose of a flat (or nearly flat) board of at least four corners in front of a known camera, by maximum likelihood
+/// from a homography of the corners' rays; of the two poses that a distant board nearly has, the better one. None where
+/// there is none: too few corners, all on a line, numbers that the board has not, or no convergence.
+[[nodiscard]] std::optional<BoardPoseFit> fit_board_pose(const Camera& camera, const BoardView& view,
+                                                         std::span<const Eigen::Vector3d> points_in_board,
+                                                         std::optional<double> sigma_px = {});
+
+}  // namespace alidade

@@ -36,8 +36,7 @@ struct RangefinderSceneConfig {
 struct ShotNoise {
   double sigma_corner_px = 0.2;
   double sigma_spot_px = 0.3;
-  double outlier_share =
-      0.0;  ///< Of the shots, rounded: the beam passed the board and hit what is 0.3 to 1 m behind it.
+  double outlier_share = 0.0;  ///< Of the shots, rounded: their readings are 0.3 to 1 m too long.
   bool with_spot = true, with_board = true;
 };
 

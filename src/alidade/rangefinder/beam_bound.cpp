@@ -1,0 +1,62 @@
+#include "alidade/rangefinder/beam_bound.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+namespace alidade {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+void put_geometry(const BeamProblem& problem, const Beam& beam, BeamBound& bound) {
+  double nearest_m = infinity, farthest_m = 0.0;
+  Eigen::Matrix3d outer = Eigen::Matrix3d::Zero();
+  double num_planes = 0.0;
+  for (const PreparedShot& shot : problem.shots) {
+    if (!shot.used) continue;
+    nearest_m = std::min(nearest_m, shot.range_m);
+    farthest_m = std::max(farthest_m, shot.range_m);
+    if (!shot.plane) continue;
+    outer += shot.plane->normal_in_cam * shot.plane->normal_in_cam.transpose();
+    num_planes += 1.0;
+  }
+  bound.range_ratio = farthest_m > 0.0 ? farthest_m / nearest_m : 0.0;
+  if (num_planes > 0.0) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(outer / num_planes);
+    bound.normal_spread = std::sqrt(std::max(0.0, eigen.eigenvalues()[0]));
+  }
+  bound.offset_m = offset_of_line_m(beam);
+}
+
+}  // namespace
+
+double scaled_condition(const Eigen::MatrixXd& information) {
+  const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
+  if (!scale.allFinite()) return infinity;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * information * scale.asDiagonal());
+  const double least = eigen.eigenvalues()[0];
+  return least > 0.0 ? eigen.eigenvalues()[eigen.eigenvalues().size() - 1] / least : infinity;
+}
+
+BeamBound judge_beam(const BeamProblem& problem, const Beam& beam, const Camera& camera) {
+  BeamBound bound;
+  put_geometry(problem, beam, bound);
+  bound.condition = infinity;
+  if (const auto normals = beam_normals(problem, camera, beam))
+    bound.condition = scaled_condition(normals->H.topLeftCorner(problem.num_free(), problem.num_free()));
+  bound.sigma_origin_m = std::sqrt(beam.cov.topLeftCorner<3, 3>().trace());
+  bound.sigma_direction_rad = std::sqrt(beam.cov.block<2, 2>(3, 3).trace());
+  for (std::size_t i = 0; i < bound_ranges_m.size(); ++i) {
+    const auto pixel = measured_pixel(beam, camera, bound_ranges_m[i], 0.0);
+    bound.spot_sigma_px[i] = infinity;  // not seen there
+    if (!pixel) continue;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(pixel->cov);
+    bound.spot_sigma_px[i] = std::sqrt(std::max(0.0, eigen.eigenvalues()[1]));
+  }
+  return bound;
+}
+
+}  // namespace alidade

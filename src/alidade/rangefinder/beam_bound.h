@@ -1,0 +1,14 @@
+#pragma once
+
+#include "alidade/rangefinder/prepare.h"
+#include "alidade/rangefinder/rangefinder.h"
+
+namespace alidade {
+
+/// Geometry and uncertainty of a beam that has its covariance: everything of BeamBound but `cov`.
+[[nodiscard]] BeamBound judge_beam(const BeamProblem& problem, const Beam& beam, const Camera& camera);
+
+/// Ratio of the largest to the least eigenvalue after scaling to a unit diagonal; infinite where it is singular.
+[[nodiscard]] double scaled_condition(const Eigen::MatrixXd& information);
+
+}  // namespace alidade

@@ -1,0 +1,196 @@
+#include "alidade/rangefinder/beam_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "alidade/beam/unit_direction.h"
+#include "alidade/rangefinder/beam_start.h"
+
+namespace alidade {
+namespace {
+
+using Sample = std::vector<const PreparedShot*>;
+constexpr double plausible_origin_m = 0.5;  // a rangefinder beside a camera: decides between beams that fit alike
+constexpr double as_good = 9.0;             // 3σ of one parameter
+
+double focal_of(const Camera& camera) { return params(camera.lens)[0]; }
+
+std::vector<Beam> starts_of(const Sample& sample, const BeamProblem& problem, const Camera& camera) {
+  Sample with_spot, with_plane;
+  for (const PreparedShot* shot : sample) {
+    if (shot->spot_px) with_spot.push_back(shot);
+    if (shot->plane) with_plane.push_back(shot);
+  }
+  std::vector<Beam> starts;
+  if (!with_plane.empty() && (!with_spot.empty() || problem.estimate_scale)) {
+    if (const auto start = joint_start(sample, problem.model, focal_of(camera), problem.estimate_scale))
+      starts.push_back(*start);
+  }
+  if (with_spot.size() >= 3 && (with_plane.empty() || starts.empty())) {
+    if (const auto start = spot_start(with_spot)) starts.push_back(*start);
+  }
+  if (with_plane.size() >= 5 && (with_spot.empty() || starts.empty())) {
+    for (const Beam& start : plane_starts(with_plane)) starts.push_back(start);
+  }
+  return starts;
+}
+
+Sample used_shots(const BeamProblem& problem) {
+  Sample used;
+  for (const PreparedShot& shot : problem.shots)
+    if (shot.used && shot.num_rows() > 0) used.push_back(&shot);
+  return used;
+}
+
+double rank_of(const BeamSolution& solution) {
+  return solution.normals.cost + (solution.beam.origin_in_cam.norm() > plausible_origin_m ? as_good : 0.0) +
+         (solution.converged ? 0.0 : as_good);
+}
+
+/// Another beam, by more than 5σ of the best one.
+bool is_another(const BeamSolution& best, const Beam& beam) {
+  BeamVector away = BeamVector::Zero();
+  away.head<3>() = beam.origin_in_cam - best.beam.origin_in_cam;
+  away.segment<2>(3) = tangent_basis(best.beam.direction_in_cam).transpose() * beam.direction_in_cam;
+  away[5] = beam.scale - best.beam.scale;
+  return away.dot(best.normals.H * away) > 25.0;
+}
+
+/// One shot out of each of `size` classes of range: spread samples tell most.
+Sample draw_sample(const Sample& by_range, std::size_t size, std::mt19937_64& bits) {
+  Sample sample;
+  for (std::size_t k = 0; k < size; ++k) {
+    const std::size_t from = k * by_range.size() / size, to = (k + 1) * by_range.size() / size;
+    sample.push_back(by_range[from + static_cast<std::size_t>(bits() % (to - from))]);
+  }
+  return sample;
+}
+
+/// Squared residuals of all shots at a beam, the scale they are measured by, and what they add up to, truncated.
+struct Agreement {
+  std::vector<double> chi2;
+  double scale2 = 1.0;
+  double score = std::numeric_limits<double>::infinity();
+  int num_agreeing = 0;
+};
+
+Agreement agreement_of(const Sample& shots, const Beam& beam, const Camera& camera, const ShotModel& model,
+                       const OutlierSearch& search) {
+  Agreement found;
+  double num_rows = 0.0;
+  for (const PreparedShot* shot : shots) {
+    found.chi2.push_back(shot_chi2(*shot, beam, camera, model));
+    num_rows += shot->num_rows();
+  }
+  const double limit = search.sigmas * search.sigmas;
+  if (!search.knows_sigma) {
+    std::vector<double> sorted = found.chi2;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    // Median of χ² by Wilson & Hilferty's cube root.
+    const double rows = num_rows / static_cast<double>(shots.size());
+    found.scale2 = *middle / (rows * std::pow(1.0 - 2.0 / (9.0 * rows), 3));
+    if (!std::isfinite(found.scale2)) return found;
+    found.scale2 = std::max(found.scale2, 1e-12);
+  }
+  found.score = search.knows_sigma ? 0.0 : found.scale2;
+  for (const double chi2 : found.chi2) {
+    if (search.knows_sigma) found.score += std::min(chi2, limit);
+    if (chi2 < limit * found.scale2) ++found.num_agreeing;
+  }
+  return found;
+}
+
+/// The beam of those that agree; twice, as they change with it.
+Beam refined_on_agreeing(const BeamProblem& all, const Sample& shots, Beam beam, Agreement& agreement,
+                         const Camera& camera, const OutlierSearch& search) {
+  for (int pass = 0; pass < 3; ++pass) {
+    BeamProblem agreeing = all;
+    agreeing.shots.clear();
+    for (std::size_t i = 0; i < shots.size(); ++i)
+      if (agreement.chi2[i] < search.sigmas * search.sigmas * agreement.scale2) agreeing.shots.push_back(*shots[i]);
+    const auto solved = solve_beam(agreeing, camera, beam);
+    if (!solved) break;
+    Agreement better = agreement_of(shots, solved->beam, camera, all.model, search);
+    if (!(better.score < agreement.score)) break;
+    beam = solved->beam;
+    agreement = std::move(better);
+  }
+  return beam;
+}
+
+}  // namespace
+
+std::optional<BeamFit> best_beam(const BeamProblem& problem, const Camera& camera,
+                                 const std::optional<Beam>& also_from) {
+  std::vector<Beam> starts = starts_of(used_shots(problem), problem, camera);
+  if (also_from) starts.push_back(*also_from);
+  std::vector<BeamSolution> solutions;
+  for (const Beam& start : starts) {
+    auto solution = solve_beam(problem, camera, start);
+    if (solution) solutions.push_back(std::move(*solution));
+  }
+  if (solutions.empty()) return std::nullopt;
+  std::stable_sort(solutions.begin(), solutions.end(),
+                   [](const auto& a, const auto& b) { return rank_of(a) < rank_of(b); });
+  BeamFit fit{solutions[0], {}};
+  for (std::size_t i = 1; i < solutions.size(); ++i) {
+    const bool fits = rank_of(solutions[i]) < rank_of(solutions[0]) + as_good && solutions[i].converged;
+    if (fits && is_another(solutions[0], solutions[i].beam)) fit.alternatives.push_back(solutions[i].beam);
+  }
+  return fit;
+}
+
+std::size_t sample_size(const BeamProblem& problem) {
+  const Sample used = used_shots(problem);
+  const auto count = [&](auto has) { return std::count_if(used.begin(), used.end(), has); };
+  const bool has_planes = count([](const PreparedShot* shot) { return shot->plane.has_value(); }) > 0;
+  const bool has_spots = count([](const PreparedShot* shot) { return shot->spot_px.has_value(); }) > 0;
+  const auto num_both = count([](const PreparedShot* shot) { return shot->plane && shot->spot_px; });
+  if (!has_planes) return 4;
+  if (!has_spots) return problem.estimate_scale ? 6 : 5;
+  return num_both == static_cast<std::ptrdiff_t>(used.size()) ? 3 : 5;
+}
+
+std::optional<Beam> find_outliers(BeamProblem& problem, const Camera& camera, const OutlierSearch& search) {
+  Sample shots = used_shots(problem);
+  std::stable_sort(shots.begin(), shots.end(),
+                   [](const PreparedShot* a, const PreparedShot* b) { return a->range_m < b->range_m; });
+  const std::size_t size = sample_size(problem);
+  if (shots.size() < size) return std::nullopt;
+  std::mt19937_64 bits(search.seed);
+  std::optional<Beam> best;
+  Agreement best_agreement;
+  for (int draw = 0; draw < search.num_draws; ++draw) {
+    for (Beam beam : starts_of(draw_sample(shots, size, bits), problem, camera)) {
+      Agreement agreement = agreement_of(shots, beam, camera, problem.model, search);
+      if (!(agreement.score < 2.0 * best_agreement.score)) continue;
+      beam = refined_on_agreeing(problem, shots, beam, agreement, camera, search);
+      if (!(agreement.score < best_agreement.score)) continue;
+      best = beam;
+      best_agreement = std::move(agreement);
+    }
+  }
+  if (!best) return std::nullopt;
+  std::vector<std::size_t> wrong;
+  for (std::size_t i = 0; i < shots.size(); ++i)
+    if (!(best_agreement.chi2[i] < search.sigmas * search.sigmas * best_agreement.scale2))
+      wrong.push_back(shots[i]->index);
+  for (PreparedShot& shot : problem.shots)
+    if (std::find(wrong.begin(), wrong.end(), shot.index) != wrong.end()) shot.used = false;
+  return best;
+}
+
+bool looks_wrong(const BeamProblem& problem, const Camera& camera, const BeamSolution& solution) {
+  if (!solution.converged) return true;
+  const double dof = std::max(1, solution.normals.num_rows - problem.num_free());
+  if (!(solution.normals.cost < dof + 5.0 * std::sqrt(2.0 * dof))) return true;
+  const Sample used = used_shots(problem);
+  return std::any_of(used.begin(), used.end(), [&](const PreparedShot* shot) {
+    return !(shot_chi2(*shot, solution.beam, camera, problem.model) < 25.0);
+  });
+}
+
+}  // namespace alidade

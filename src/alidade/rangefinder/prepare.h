@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+
+#include "alidade/rangefinder/beam_solve.h"
+#include "alidade/rangefinder/rangefinder.h"
+#include "alidade/rangefinder/refine_all.h"
+
+namespace alidade {
+
+/// The caller's shots made ready: checked, boards' poses solved, each σ that is known in its place.
+struct Preparation {
+  BeamProblem problem;
+  std::vector<std::string> reasons;  ///< One a shot: why it cannot be used; empty otherwise.
+  double sigma_corner_px = 0.0;
+  bool knows_spot_sigma = true, knows_range_sigma = true;
+};
+
+/// Where σ is not known and the residuals have not been asked yet: a centroid, a cheap rangefinder.
+inline constexpr double guessed_sigma_px = 0.3;
+inline constexpr double guessed_sigma_m = 0.002;
+
+[[nodiscard]] Preparation prepare_shots(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board,
+                                        const Camera& camera, const RangefinderConfig& config);
+
+}  // namespace alidade

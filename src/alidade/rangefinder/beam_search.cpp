@@ -49,13 +49,14 @@ double rank_of(const BeamSolution& solution) {
          (solution.converged ? 0.0 : as_good);
 }
 
-/// Another beam, by more than 5σ of the best one.
+/// Another beam, not a place in the same minimum: more than 1σ of the best one away, what its covariance does not
+/// cover.
 bool is_another(const BeamSolution& best, const Beam& beam) {
   BeamVector away = BeamVector::Zero();
   away.head<3>() = beam.origin_in_cam - best.beam.origin_in_cam;
   away.segment<2>(3) = tangent_basis(best.beam.direction_in_cam).transpose() * beam.direction_in_cam;
   away[5] = beam.scale - best.beam.scale;
-  return away.dot(best.normals.H * away) > 25.0;
+  return away.dot(best.normals.H * away) > 1.0;
 }
 
 /// One shot out of each of `size` classes of range: spread samples tell most.

@@ -193,7 +193,9 @@ RangefinderReport calibrate_rangefinder(std::span<const Shot> shots, std::span<c
   const auto fit = search_beam(ready, camera, config, progress);
   if (!fit) {
     report.status = num_rows_used(problem) >= problem.num_free() ? Status::degenerate : Status::too_few;
+    report.bound = judge_beam(problem, report.beam, camera);
     report.bound.condition = std::numeric_limits<double>::infinity();
+    put_fits(problem, report);
     return report;
   }
   report_progress(progress, "refinement", 2, 3);

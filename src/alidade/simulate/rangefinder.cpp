@@ -94,20 +94,34 @@ double draw_range(const RangefinderSceneConfig& config, Draws& draws) {
   return 1.0 / draws.uniform(1.0 / config.max_range_m, 1.0 / config.min_range_m);
 }
 
-/// One pose whose board is seen whole; the spot anywhere on the inner half of the board.
-std::optional<std::pair<double, Rigid3>> draw_shot(const RangefinderSceneConfig& config,
-                                                   const std::vector<Eigen::Vector3d>& points, Draws& draws) {
-  const double range_m = draw_range(config, draws);
+/// Where a board may be hit at a reading; the spot anywhere on its inner half. None where it is not seen whole.
+std::optional<Rigid3> draw_pose(const RangefinderSceneConfig& config, double range_m,
+                                const std::vector<Eigen::Vector3d>& points, Draws& draws) {
   const double tilt_rad = draws.uniform(config.min_tilt_rad, config.max_tilt_rad);
-  const double azimuth_rad = config.azimuth_rad.value_or(draws.uniform(-std::numbers::pi, std::numbers::pi));
-  const double roll_rad = config.azimuth_rad ? 0.0 : draws.uniform(-30.0 * degree, 30.0 * degree);
+  const double any_azimuth_rad = draws.uniform(-std::numbers::pi, std::numbers::pi);
+  const double any_roll_rad = draws.uniform(-30.0 * degree, 30.0 * degree);
   const double x = draws.uniform(-0.25, 0.25), y = draws.uniform(-0.25, 0.25);
   const double width_m = (config.board.cols - 1) * config.board.square_m;
   const double height_m = (config.board.rows - 1) * config.board.square_m;
   const Eigen::Vector3d hit_in_board((0.5 + x) * width_m, (0.5 + y) * height_m, 0.0);
-  const Rigid3 cam_from_board = board_at(point_at(config.beam, range_m), hit_in_board, tilt_rad, azimuth_rad, roll_rad);
+  const Rigid3 cam_from_board =
+      board_at(point_at(config.beam, range_m), hit_in_board, tilt_rad, config.azimuth_rad.value_or(any_azimuth_rad),
+               config.azimuth_rad ? 0.0 : any_roll_rad);
   if (!is_inside(config.camera, cam_from_board, points)) return std::nullopt;
-  return std::pair{range_m, cam_from_board};
+  return cam_from_board;
+}
+
+/// A reading and a pose for it; another reading only where no pose is found, so that readings keep their distribution.
+std::pair<double, Rigid3> draw_shot(const RangefinderSceneConfig& config, const std::vector<Eigen::Vector3d>& points,
+                                    Draws& draws) {
+  constexpr int ranges = 50, poses = 200;
+  for (int i = 0; i < ranges; ++i) {
+    const double range_m = draw_range(config, draws);
+    for (int k = 0; k < poses; ++k) {
+      if (const auto cam_from_board = draw_pose(config, range_m, points, draws)) return {range_m, *cam_from_board};
+    }
+  }
+  throw std::runtime_error("the beam meets no board that the camera sees whole");
 }
 
 /// Which shots missed the board: so many, by chance.
@@ -148,15 +162,10 @@ RangefinderScene draw_rangefinder_scene(const RangefinderSceneConfig& config, st
   Draws draws(seed);
   RangefinderScene scene{config.camera, config.board, config.beam, {}, {}};
   const std::vector<Eigen::Vector3d> points = points_in_board(config.board);
-  constexpr int most_draws = 10000;  // of one shot: a beam that leaves the picture has none
-  for (int i = 0, draw = 0; i < config.num_shots; ++draw) {
-    if (draw == most_draws) throw std::runtime_error("the beam meets no board that the camera sees whole");
-    const auto shot = draw_shot(config, points, draws);
-    if (!shot) continue;
-    scene.range_m.push_back(shot->first);
-    scene.cam_from_board.push_back(shot->second);
-    draw = 0;
-    ++i;
+  for (int i = 0; i < config.num_shots; ++i) {
+    const auto [range_m, cam_from_board] = draw_shot(config, points, draws);
+    scene.range_m.push_back(range_m);
+    scene.cam_from_board.push_back(cam_from_board);
   }
   return scene;
 }

@@ -122,6 +122,30 @@ Beam refined_on_agreeing(const BeamProblem& all, const Sample& shots, Beam beam,
   return beam;
 }
 
+/// Where σ is not known, the least median of many samples is too small a scale. From those within 6 of it outwards:
+/// beam and scale of those that agree, then all that agree with these, until no more do.
+Beam grown(const BeamProblem& all, const Sample& shots, Beam beam, Agreement& agreement, const Camera& camera,
+           const OutlierSearch& search) {
+  const double spare = std::max(1.0, static_cast<double>(shots.size()) - all.num_free());
+  agreement.scale2 *= std::pow(1.0 + 5.0 / spare, 2);  // P. J. Rousseeuw & A. M. Leroy, 1987, on small samples
+  for (int pass = 0, before = 0; pass < 20; ++pass) {
+    BeamProblem agreeing = all;
+    agreeing.shots.clear();
+    for (std::size_t i = 0; i < shots.size(); ++i)
+      if (agreement.chi2[i] < search.sigmas * search.sigmas * agreement.scale2) agreeing.shots.push_back(*shots[i]);
+    const auto now = static_cast<int>(agreeing.shots.size());
+    const auto solved = now > before ? solve_beam(agreeing, camera, beam) : std::nullopt;
+    if (!solved) break;
+    before = now;
+    beam = solved->beam;
+    const double dof = solved->normals.num_rows - all.num_free();
+    const double scale2 = std::max(agreement.scale2, solved->normals.cost / std::max(1.0, dof));
+    agreement = agreement_of(shots, beam, camera, all.model, search);
+    agreement.scale2 = scale2;
+  }
+  return beam;
+}
+
 }  // namespace
 
 std::optional<BeamFit> best_beam(const BeamProblem& problem, const Camera& camera,
@@ -175,6 +199,7 @@ std::optional<Beam> find_outliers(BeamProblem& problem, const Camera& camera, co
     }
   }
   if (!best) return std::nullopt;
+  if (!search.knows_sigma) best = grown(problem, shots, *best, best_agreement, camera, search);
   std::vector<std::size_t> wrong;
   for (std::size_t i = 0; i < shots.size(); ++i)
     if (!(best_agreement.chi2[i] < search.sigmas * search.sigmas * best_agreement.scale2))

@@ -32,6 +32,10 @@ bool is_enough(const BeamProblem& problem, const RangefinderConfig& config) {
   return spots > 0 && planes > 0 && 2 * spots + planes >= 6 && spots + planes >= 4;
 }
 
+double scale2_of(const BeamFit& fit, const BeamProblem& problem) {
+  return fit.best.normals.cost / std::max(1, fit.best.normals.num_rows - problem.num_free());
+}
+
 /// Beam, outliers and noise, lens and poses held: what is marked in the problem stays for what follows.
 std::optional<BeamFit> search_beam(Preparation& ready, const Camera& camera, const RangefinderConfig& config,
                                    const Progress& progress) {
@@ -42,11 +46,17 @@ std::optional<BeamFit> search_beam(Preparation& ready, const Camera& camera, con
   const auto num_used = static_cast<std::size_t>(
       std::count_if(problem.shots.begin(), problem.shots.end(), [](const auto& shot) { return shot.used; }));
   const bool can_tell = config.reject_outliers && num_used >= sample_size(problem) + 2;
-  std::optional<Beam> agreed;
   if (can_tell && (!knows_sigma || !fit || looks_wrong(problem, camera, fit->best))) {
     report_progress(progress, "outliers", 1, 3);
-    agreed = find_outliers(problem, camera, {config.outlier_sigmas, config.num_draws, config.seed, knows_sigma});
-    fit = best_beam(problem, camera, agreed);
+    BeamProblem without = problem;
+    const auto agreed =
+        find_outliers(without, camera, {config.outlier_sigmas, config.num_draws, config.seed, knows_sigma});
+    auto better = agreed ? best_beam(without, camera, agreed) : std::nullopt;
+    // Where σ is not known, outliers are what makes all residuals three times as large: else it is the noise.
+    if (better && (knows_sigma || !fit || !(scale2_of(*fit, problem) < 9.0 * scale2_of(*better, problem)))) {
+      problem = std::move(without);
+      fit = std::move(better);
+    }
   }
   constexpr int rounds = 12;  // of σ and beam in turn: linear, a factor of five each
   for (int round = 0; round < rounds && fit && !knows_sigma; ++round) {

@@ -32,8 +32,17 @@ bool is_enough(const BeamProblem& problem, const RangefinderConfig& config) {
   return spots > 0 && planes > 0 && 2 * spots + planes >= 6 && spots + planes >= 4;
 }
 
-double scale2_of(const BeamFit& fit, const BeamProblem& problem) {
-  return fit.best.normals.cost / std::max(1, fit.best.normals.num_rows - problem.num_free());
+int dof_of(const BeamFit& fit, const BeamProblem& problem) {
+  return std::max(1, fit.best.normals.num_rows - problem.num_free());
+}
+
+/// Where σ is not known: do the residuals of all say that some are wrong, by how much less those of the others are?
+/// Three times as large they must be, more where few are left, as any few can be found to agree.
+bool tells_outliers(const BeamFit& all, const BeamProblem& all_shots, const BeamFit& others,
+                    const BeamProblem& other_shots) {
+  const int dof = dof_of(others, other_shots);
+  const double limit = 3.0 * (1.0 + 5.0 / dof);
+  return !(all.best.normals.cost / dof_of(all, all_shots) < limit * limit * others.best.normals.cost / dof);
 }
 
 /// Beam, outliers and noise, lens and poses held: what is marked in the problem stays for what follows.
@@ -52,8 +61,7 @@ std::optional<BeamFit> search_beam(Preparation& ready, const Camera& camera, con
     const auto agreed =
         find_outliers(without, camera, {config.outlier_sigmas, config.num_draws, config.seed, knows_sigma});
     auto better = agreed ? best_beam(without, camera, agreed) : std::nullopt;
-    // Where σ is not known, outliers are what makes all residuals three times as large: else it is the noise.
-    if (better && (knows_sigma || !fit || !(scale2_of(*fit, problem) < 9.0 * scale2_of(*better, problem)))) {
+    if (better && (knows_sigma || !fit || tells_outliers(*fit, problem, *better, without))) {
       problem = std::move(without);
       fit = std::move(better);
     }

@@ -40,6 +40,10 @@ int dof_of(const BeamFit& fit, const BeamProblem& problem) {
 /// Three times as large they must be, more where few are left, as any few can be found to agree.
 bool tells_outliers(const BeamFit& all, const BeamProblem& all_shots, const BeamFit& others,
                     const BeamProblem& other_shots) {
+  const auto num_used = [](const BeamProblem& problem) {
+    return std::count_if(problem.shots.begin(), problem.shots.end(), [](const auto& shot) { return shot.used; });
+  };
+  if (10 * num_used(other_shots) < 6 * num_used(all_shots)) return false;
   const int dof = dof_of(others, other_shots);
   const double limit = 3.0 * (1.0 + 5.0 / dof);
   return !(all.best.normals.cost / dof_of(all, all_shots) < limit * limit * others.best.normals.cost / dof);

@@ -1,0 +1,93 @@
+#include "alidade/rangefinder/next_shot.h"
+
+#include <gtest/gtest.h>
+
+#include "alidade/testing/rangefinder_sample.h"
+
+namespace alidade {
+namespace {
+
+using namespace testing;
+
+/// What two drawn shots leave known; what planned and drawn shots are added to.
+struct Begun {
+  RangefinderSceneConfig config = *rangefinder_scenario("reference");
+  RangefinderSample sample;
+  BeamNow now;
+};
+
+Begun begin(std::uint64_t seed, int num_shots) {
+  Begun begun;
+  begun.config.num_shots = num_shots;
+  begun.sample = draw_rangefinder_sample(begun.config, {}, seed);
+  const RangefinderReport report = solve_sample(begun.sample, told_config(RangefinderMethod::joint));
+  begun.now = {report.beam, report.camera, begun.sample.points};
+  return begun;
+}
+
+/// √ of the mean variance of measured points at 0, 0.5, 1.4 and 4 m.
+double point_sigma_m(const Beam& beam) {
+  double sum = 0.0;
+  for (const double range_m : {0.0, 0.5, std::sqrt(2.0), 4.0}) {
+    const auto J = J_point_beam(beam, range_m);
+    sum += 0.25 * (J * beam.cov * J.transpose()).trace();
+  }
+  return std::sqrt(sum);
+}
+
+TEST(NextShot, FiveGuidedShotsAreAsGoodAsFifteenRandomOnes) {
+  double guided2 = 0.0, random2 = 0.0, truth2 = 0.0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Begun begun = begin(seed, 2);
+    const auto plan = plan_next_shots(begun.now, {}, 5);
+    ASSERT_EQ(plan.size(), 5u);
+    // Really taken: simulated at the planned places and solved with the two from before.
+    RangefinderSample taken = begun.sample;
+    RangefinderScene more = begun.sample.scene;
+    more.range_m.clear();
+    more.cam_from_board.clear();
+    for (const NextShot& shot : plan) {
+      // The board stands where the true beam meets it, not where the estimate says.
+      const Plane plane = plane_of(shot.cam_from_board);
+      more.cam_from_board.push_back(shot.cam_from_board);
+      more.range_m.push_back(-(plane.d_m + plane.normal_in_cam.dot(more.beam.origin_in_cam)) /
+                             plane.normal_in_cam.dot(more.beam.direction_in_cam));
+    }
+    for (const Shot& shot : simulate_shots(more, {}, seed + 77).shots) taken.simulated.shots.push_back(shot);
+    const RangefinderReport guided = solve_sample(taken, told_config(RangefinderMethod::joint));
+    const RangefinderReport random = solve_sample(begin(seed + 500, 17).sample, told_config(RangefinderMethod::joint));
+    guided2 += std::pow(point_sigma_m(guided.beam), 2);
+    random2 += std::pow(point_sigma_m(random.beam), 2);
+    truth2 += std::pow(origin_error_m(guided, taken), 2);
+    EXPECT_NEAR(plan.back().sigma_origin_m / guided.bound.sigma_origin_m, 1.0, 0.3);  // what was promised came
+  }
+  EXPECT_LE(std::sqrt(guided2 / random2), 1.05);
+  EXPECT_LT(std::sqrt(truth2 / 20), 0.004);
+}
+
+TEST(NextShot, EachLowersWhatIsUnknown) {
+  const Begun begun = begin(3, 3);
+  double before_m = begun.now.beam.cov.topLeftCorner<3, 3>().trace();
+  before_m = std::sqrt(before_m);
+  for (const NextShot& shot : plan_next_shots(begun.now, {}, 4)) {
+    EXPECT_LT(shot.sigma_origin_m, before_m);
+    before_m = shot.sigma_origin_m;
+  }
+}
+
+TEST(NextShot, AsksForWhatADegenerateLogLacks) {
+  RangefinderSceneConfig config = *rangefinder_scenario("near_frontal");
+  const auto sample = draw_rangefinder_sample(config, {}, 4);
+  const RangefinderReport report = solve_sample(sample, told_config(RangefinderMethod::plane));
+  BeamNow now{report.beam, report.camera, sample.points};
+  now.method = RangefinderMethod::plane;
+  const auto tilted = plan_next_shots(now, {}, 1);
+  ASSERT_EQ(tilted.size(), 1u);
+  EXPECT_GT(tilted[0].tilt_rad, 0.4);
+  EXPECT_FALSE(next_shot_gains(now, {}).empty());
+}
+
+TEST(NextShot, HasNoneWithoutABoard) { EXPECT_TRUE(plan_next_shots({}, {}, 3).empty()); }
+
+}  // namespace
+}  // namespace alidade

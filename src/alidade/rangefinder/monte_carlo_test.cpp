@@ -45,7 +45,7 @@ class MonteCarlo : public ::testing::TestWithParam<Case> {};
 TEST_P(MonteCarlo, IsAsGoodAsTheTable) {
   const auto& [method, row] = GetParam();
   // Few shots have long tails: more logs, so that the quantiles are those of the method.
-  const int trials = row.num_shots <= 3 ? 500 : row.num_shots <= 8 ? 250 : 120;
+  const int trials = row.num_shots <= 3 ? 400 : row.num_shots <= 8 ? 200 : 100;
   std::vector<double> position_mm, direction_mrad, reprojection;
   RangefinderSceneConfig scene = *rangefinder_scenario("reference");
   scene.num_shots = row.num_shots;
@@ -78,7 +78,7 @@ std::string name_of(const ::testing::TestParamInfo<Case>& info) {
 INSTANTIATE_TEST_SUITE_P(Table, MonteCarlo, ::testing::ValuesIn(all_cases()), name_of);
 
 TEST(MonteCarlo, JointIsAtTheBoundAndItsSigmaCoversIt) {
-  constexpr int trials = 400;
+  constexpr int trials = 300;
   RangefinderSceneConfig scene = *rangefinder_scenario("reference");
   scene.num_shots = 15;
   double origin2 = 0.0, origin_bound2 = 0.0, direction2 = 0.0, direction_bound2 = 0.0, within1 = 0.0, within2 = 0.0;

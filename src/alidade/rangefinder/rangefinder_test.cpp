@@ -24,7 +24,7 @@ class DegenerateBattery : public ::testing::TestWithParam<Degenerate> {};
 TEST_P(DegenerateBattery, IsAlwaysRefusedByNameWithWhatElseCouldTell) {
   const auto& [scenario, method, reason] = GetParam();
   int refused = 0;
-  constexpr int trials = 40;
+  constexpr int trials = 24;
   for (int trial = 0; trial < trials; ++trial) {
     RangefinderSceneConfig scene = *rangefinder_scenario(scenario);
     scene.num_shots = 15;
@@ -113,7 +113,9 @@ TEST(RangefinderScale, IsToldWithBoardsAndRefusedWithSpotsAlone) {
     const RangefinderReport report = solve_sample(sample, config);
     ASSERT_TRUE(report.status == Status::converged);
     sum += error2_of(report, sample);
-    if (config.method == Method::joint) EXPECT_NEAR(report.beam.scale, 1.02, 0.005);
+    if (config.method == Method::joint) {
+      EXPECT_NEAR(report.beam.scale, 1.02, 0.005);
+    }
     config.method = Method::spot;
     const RangefinderReport alone = solve_sample(sample, config);
     EXPECT_TRUE(alone.status == Status::scale_unknown);
@@ -127,7 +129,9 @@ TEST(RangefinderScale, IsToldWithBoardsAndRefusedWithSpotsAlone) {
 TEST(Rangefinder, UsesEachShotForWhatItHas) {
   double sum_mixed = 0.0, sum_full = 0.0;
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
-    auto sample = draw_rangefinder_sample(*rangefinder_scenario("reference"), {}, seed);
+    RangefinderSceneConfig scene = *rangefinder_scenario("reference");
+    scene.max_range_m = 2.5;  // farther, a board may be taken for its mirror image, and without its spot is left out
+    auto sample = draw_rangefinder_sample(scene, {}, seed);
     for (std::size_t i = 6; i < 18; ++i) {
       if (i < 12) sample.simulated.shots[i].spot.reset();
       if (i >= 12) sample.simulated.shots[i].board.reset();
@@ -152,8 +156,9 @@ TEST(Rangefinder, FindsItsOwnNoise) {
   double sum_m = 0.0, sum_px = 0.0, sum_corner = 0.0;
   constexpr int trials = 20;
   for (int trial = 0; trial < trials; ++trial) {
-    const auto sample = draw_rangefinder_sample(scene, {.sigma_corner_px = 0.1, .sigma_spot_px = 0.8},
-                                                static_cast<std::uint64_t>(trial));
+    auto sample = draw_rangefinder_sample(scene, {.sigma_corner_px = 0.1, .sigma_spot_px = 0.8},
+                                          static_cast<std::uint64_t>(trial));
+    sample.camera = sample.scene.camera;  // an error of the lens would show in the corners
     const RangefinderReport report = solve_sample(sample, {});
     EXPECT_TRUE(report.spot_sigma_is_told && report.range_sigma_is_told);
     sum_m += std::pow(report.beam.noise.sigma_m, 2) / trials;

@@ -216,7 +216,7 @@ TEST(ReferenceCases, Table1OfThePaperHasItsSignsTurned) {
     const Eigen::Vector4d printed_mm = vector_of<4>(reference["table"][i]);
     Shot shot;
     // As printed every board is behind the camera; turned round, the plane is N·X = |N|².
-    shot.plane = Plane{-printed_mm.head<3>().normalized(), printed_mm[3] / printed_mm.head<3>().norm() / 1000.0, {}};
+    shot.plane = Plane{-printed_mm.head<3>().normalized(), -printed_mm.head<3>().norm() / 1000.0, {}};
     shot.plane->cov.setZero();
     EXPECT_LT((shot.plane->normal_in_cam - vector_of<3>(reference["normal"][i])).norm(), 1e-12);
     EXPECT_NEAR(-1000.0 * shot.plane->d_m, reference["distance_mm"][i].get<double>(), 1e-6);

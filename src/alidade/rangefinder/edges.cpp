@@ -13,7 +13,8 @@ namespace {
 
 using Vector5 = Eigen::Vector<double, 5>;
 constexpr double origin_step_m = 0.03, direction_step_rad = 0.02;  // how far the simplex reaches at first
-constexpr float empty = 1e-3F;                                     // density of what has no edge, of a uniform one
+constexpr double usual_m = 0.1, usual_rad = 0.1, prior_weight = 0.1;
+constexpr float empty = 1e-3F;  // density of what has no edge, of a uniform one
 
 /// An edge of the scan: where the head looked, and the nearer of the two ranges (that is where the edge is).
 struct ScanEdge {
@@ -155,12 +156,21 @@ Vector5 simplex(const std::function<double(const Vector5&)>& cost, const Vector5
 }
 
 Beam aligned(const std::vector<ScanEdge>& edges, const std::vector<GreyImage>& densities, const Camera& camera,
-             Beam beam, const EdgesConfig& config) {
+             const Beam& start, const EdgesConfig& config) {
+  Beam beam = start;
   Vector5 size;
   size << Eigen::Vector3d::Constant(origin_step_m), Eigen::Vector2d::Constant(direction_step_rad);
   for (const GreyImage& density : densities) {
     const Beam from = beam;
-    const auto cost = [&](const Vector5& step) { return -mean_log(edges, density, camera, moved(from, step)); };
+    // The edges hardly tell the origin: it stays within some centimetres of the start unless they gain much.
+    const auto cost = [&](const Vector5& step) {
+      const Beam trial = moved(from, step);
+      const Eigen::Vector3d away_m = trial.origin_in_cam - start.origin_in_cam;
+      const Eigen::Vector3d turned_rad = trial.direction_in_cam - start.direction_in_cam;
+      return 0.5 * (away_m.squaredNorm() / (usual_m * usual_m) + turned_rad.squaredNorm() / (usual_rad * usual_rad)) *
+                 prior_weight -
+             mean_log(edges, density, camera, trial);
+    };
     beam = moved(from, simplex(cost, size, config.max_evaluations));
     size *= 0.5;
   }

@@ -13,7 +13,6 @@ struct BeamProblem {
   std::span<const Eigen::Vector3d> points_in_board;
   ShotModel model;
   std::optional<double> sigma_corner_px;  ///< Takes the place of the corners' own covariances.
-  double corner_factor = 1.0;             ///< On the corners' σ.
   bool estimate_scale = false;
   int max_iterations = 50;
 

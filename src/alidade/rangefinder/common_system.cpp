@@ -25,7 +25,7 @@ bool add_corners(const BeamProblem& problem, const LensPrior& prior, const Commo
   auto corners = corner_residuals(state.camera, *state.cam_from_board[i], *problem.shots[i].board,
                                   problem.points_in_board, problem.sigma_corner_px);
   if (!corners) return false;
-  const double weight = 1.0 / (problem.corner_factor * problem.corner_factor);
+  const double weight = 1.0 / std::pow(problem.shots[i].corner_factor, 2);
   const auto k = static_cast<Eigen::Index>(prior.free.size());
   const Eigen::MatrixXd J_lens = corners->J_lens(Eigen::all, prior.free);
   Block& block = system.blocks[i];

@@ -40,7 +40,7 @@ Plane normalised(const Plane& plane) {
   return unit;
 }
 
-/// Sums over all boards: do the corners scatter as they say?
+/// How the corners of a board scatter about its fit.
 struct CornerFit {
   double chi2 = 0.0, sigma2_sum = 0.0;
   int dof = 0, num_corners = 0;
@@ -58,8 +58,8 @@ void use_board(const Shot& shot, const Camera& camera, const RangefinderConfig& 
   ready.pose = fit->pose;
   ready.J_pose_lens = fit->J_pose_lens;
   if (is_measured) ready.plane = plane_of(fit->pose.cam_from_board);
-  corners.chi2 += fit->chi2;
-  corners.dof += fit->dof;
+  corners.chi2 = fit->chi2;
+  corners.dof = fit->dof;
   for (const Corner& corner : shot.board->corners) {
     corners.says_nothing = corners.says_nothing && corner.cov.isIdentity(0.0);
     corners.sigma2_sum += config.sigma_corner_px ? std::pow(*config.sigma_corner_px, 2) : 0.5 * corner.cov.trace();
@@ -102,21 +102,49 @@ PreparedShot prepared(const Shot& shot, const Camera& camera, const RangefinderC
   return ready;
 }
 
-/// Corners with σ that is not told, or wrongly told, get what they scatter by. Few degrees of freedom may only raise
-/// it.
-void scale_corners(const CornerFit& corners, const RangefinderConfig& config, Preparation& ready) {
-  if (corners.num_corners == 0) return;
-  ready.sigma_corner_px = std::sqrt(corners.sigma2_sum / corners.num_corners);
+/// Corners with σ that is not told, or wrongly told, get what they scatter by, each board for itself: a near one shows
+/// that it is bent, a far one does not. Where a board has few corners, those of all boards together.
+void scale_corners(const std::vector<CornerFit>& fits, const RangefinderConfig& config, Preparation& ready) {
+  CornerFit all;
+  for (const CornerFit& fit : fits) {
+    all.chi2 += fit.chi2;
+    all.dof += fit.dof;
+    all.sigma2_sum += fit.sigma2_sum;
+    all.num_corners += fit.num_corners;
+    all.says_nothing = all.says_nothing && fit.says_nothing;
+  }
+  if (all.num_corners == 0) return;
+  ready.sigma_corner_px = std::sqrt(all.sigma2_sum / all.num_corners);
   if (config.sigma_corner_px) return;
   constexpr int enough = 50;
-  double factor = std::sqrt(corners.chi2 / std::max(1, corners.dof));
-  if (corners.dof < enough && !corners.says_nothing) factor = std::max(1.0, factor);
-  factor = std::max(factor, 1e-4 / ready.sigma_corner_px);  // exact corners: simulated without noise
-  ready.problem.corner_factor = factor;
-  ready.sigma_corner_px *= factor;
+  const auto factor_of = [&](const CornerFit& fit) {
+    double factor = std::sqrt(fit.chi2 / std::max(1, fit.dof));
+    if (fit.dof < enough && !fit.says_nothing) factor = std::max(1.0, factor);
+    return std::max(factor, 1e-4 / ready.sigma_corner_px);  // exact corners: simulated without noise
+  };
+  const double factor_of_all = factor_of(all);
+  double sum2 = 0.0;
   for (PreparedShot& shot : ready.problem.shots) {
-    if (shot.board) shot.pose->cov *= factor * factor;
+    if (!shot.board) continue;
+    const CornerFit& fit = fits[shot.index];
+    shot.corner_factor = fit.dof >= enough ? factor_of(fit) : factor_of_all;
+    sum2 += shot.corner_factor * shot.corner_factor * fit.sigma2_sum;
+    shot.pose->cov *= shot.corner_factor * shot.corner_factor;
   }
+  ready.sigma_corner_px = std::sqrt(sum2 / all.num_corners);
+}
+
+/// The step of readings that are all multiples of one, 10⁻³, 2·10⁻³, 5·10⁻³, 10⁻² m, …; 0 where there is none.
+double step_of_readings(std::span<const Shot> shots) {
+  if (shots.size() < 5) return 0.0;
+  for (const double step_m : {0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001}) {
+    const bool fits = std::all_of(shots.begin(), shots.end(), [&](const Shot& shot) {
+      const double steps = shot.range_m / step_m;
+      return std::abs(steps - std::round(steps)) < 1e-6;
+    });
+    if (fits) return step_m;
+  }
+  return 0.0;
 }
 
 }  // namespace
@@ -132,11 +160,12 @@ Preparation prepare_shots(std::span<const Shot> shots, std::span<const Eigen::Ve
   problem.max_iterations = config.max_iterations;
   ready.reasons.resize(shots.size());
   const bool lens_is_free = config.refine == Refine::all && !lens_prior(camera, config.refine_distortion).free.empty();
-  CornerFit corners;
+  std::vector<CornerFit> corners(shots.size());
+  ready.least_sigma_range_m = step_of_readings(shots) / std::sqrt(12.0);
   for (std::size_t i = 0; i < shots.size(); ++i) {
     ready.reasons[i] = fault_of(shots[i]);
     if (!ready.reasons[i].empty()) continue;
-    PreparedShot shot = prepared(shots[i], camera, config, lens_is_free, points_in_board, corners, ready.reasons[i]);
+    PreparedShot shot = prepared(shots[i], camera, config, lens_is_free, points_in_board, corners[i], ready.reasons[i]);
     shot.index = i;
     shot.used = shot.num_rows() > 0;
     if (shot.used) ready.reasons[i].clear();

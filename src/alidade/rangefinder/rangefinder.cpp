@@ -62,8 +62,9 @@ std::optional<BeamFit> search_beam(Preparation& ready, const Camera& camera, con
   if (can_tell && (!knows_sigma || !fit || looks_wrong(problem, camera, fit->best))) {
     report_progress(progress, "outliers", 1, 3);
     BeamProblem without = problem;
-    const auto agreed =
-        find_outliers(without, camera, {config.outlier_sigmas, config.num_draws, config.seed, knows_sigma});
+    const auto agreed = find_outliers(without, camera,
+                                      {config.outlier_sigmas, config.num_draws, config.seed, knows_sigma,
+                                       std::pow(ready.least_sigma_range_m / guessed_sigma_m, 2)});
     auto better = agreed ? best_beam(without, camera, agreed) : std::nullopt;
     if (better && (knows_sigma || !fit || tells_outliers(*fit, problem, *better, without))) {
       problem = std::move(without);
@@ -74,6 +75,8 @@ std::optional<BeamFit> search_beam(Preparation& ready, const Camera& camera, con
   for (int round = 0; round < rounds && fit && !knows_sigma; ++round) {
     const double change =
         estimate_noise(problem, camera, fit->best.beam, !ready.knows_spot_sigma, !ready.knows_range_sigma);
+    if (!ready.knows_range_sigma)
+      problem.model.noise.sigma_m = std::max(problem.model.noise.sigma_m, ready.least_sigma_range_m);
     fit = best_beam(problem, camera, fit->best.beam);
     if (change < 1e-3) break;
   }
@@ -162,6 +165,22 @@ void take_over(const RefinedBeam& refined, BeamProblem& problem, RangefinderRepo
   }
 }
 
+/// Do the readings ask for a scale? What the residuals of all shots shrink by with one parameter more, lens and poses
+/// held, over what is left: where σ was told by residuals, they hold the missing scale too.
+double scale_in_sigmas(const BeamProblem& problem, const Camera& camera, const Beam& beam, bool sigma_is_told) {
+  const auto planes = std::count_if(problem.shots.begin(), problem.shots.end(),
+                                    [](const PreparedShot& shot) { return shot.used && shot.plane; });
+  if (problem.estimate_scale || planes < 8) return 0.0;
+  BeamProblem with_scale = problem;
+  with_scale.estimate_scale = true;
+  const auto without = solve_beam(problem, camera, beam), with = solve_beam(with_scale, camera, beam);
+  if (!without || !with || !with->converged) return 0.0;
+  const double left = with->normals.cost / std::max(1, with->normals.num_rows - num_beam_params);
+  const double gain = std::max(0.0, without->normals.cost - with->normals.cost);
+  const double z = std::sqrt(gain / std::max(left, sigma_is_told ? 1e-30 : 1.0));
+  return with->beam.scale < 1.0 ? -z : z;
+}
+
 void solve_report(Preparation& ready, const BeamFit& fit, const Camera& camera, const RangefinderConfig& config,
                   RangefinderReport& report) {
   BeamProblem& problem = ready.problem;
@@ -184,6 +203,7 @@ void solve_report(Preparation& ready, const BeamFit& fit, const Camera& camera, 
     carry_lens(problem, fit.best, camera, report.beam);
   }
   report.beam.noise = problem.model.noise;
+  report.scale_in_sigmas = scale_in_sigmas(problem, report.camera, report.beam, report.range_sigma_is_told);
   report.bound = judge_beam(problem, report.beam, report.camera);
   report.bound.cov =
       refined ? refined->state.beam.cov : BeamMatrix(BeamMatrix::Constant(std::numeric_limits<double>::infinity()));

@@ -60,6 +60,8 @@ struct RangefinderReport {
   bool spot_sigma_is_told = false, range_sigma_is_told = false;  ///< By the residuals.
   double cost = 0.0;  ///< Sum of the whitened squared residuals: corners, spots, ranges, prior of the lens.
   int dof = 0;        ///< Of that sum.
+  /// What a scale of the readings would be, were it estimated too, less 1, over its σ; 0 where that was not asked.
+  double scale_in_sigmas = 0.0;
   double rms_px = 0.0, rms_range_m = 0.0;  ///< Of the spots (per point) and of the ranges used.
   int shots_used = 0, shots_dropped = 0;
   int iterations = 0;

@@ -170,6 +170,31 @@ void add_geometry(const RangefinderReport& report, Method method, Verdict& verdi
   }
 }
 
+/// Measurements beyond what the beam takes: with none to spare a wrong shot bends the beam and leaves no residual.
+void add_spare(const RangefinderReport& report, Verdict& verdict) {
+  constexpr int enough = 3;
+  int spare = report.beam.cov(5, 5) > 0.0 ? -6 : -5;
+  for (const ShotFit& fit : report.shots) {
+    if (!fit.used) continue;
+    spare += (std::isfinite(fit.residual_range_m) ? 1 : 0) + (fit.residual_px.allFinite() ? 2 : 0);
+  }
+  const std::string text = "only " + std::to_string(spare) + " measurement" + (spare == 1 ? "" : "s") +
+                           " to spare: a wrong shot would go unnoticed; take more";
+  verdict.checks.push_back(check_of("to spare", spare < enough ? State::care : State::good,
+                                    spare < enough ? text : std::to_string(spare) + " measurements to spare", spare,
+                                    enough, "", "residuals"));
+}
+
+void add_scale(const RangefinderReport& report, Verdict& verdict) {
+  constexpr double ask_beyond = 4.0;
+  const double z = std::abs(report.scale_in_sigmas);
+  if (z == 0.0) return;
+  verdict.checks.push_back(check_of("scale", z < ask_beyond ? State::good : State::care,
+                                    z < ask_beyond ? "no scale of the readings is asked for"
+                                                   : "the readings ask for --scale (" + text_of(z, 2) + " σ)",
+                                    z, ask_beyond, "σ", "residuals"));
+}
+
 void add_fit(const RangefinderReport& report, Verdict& verdict) {
   int outliers = 0;
   std::string named;
@@ -226,6 +251,8 @@ Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Sho
     add_precision(report, method, verdict);
     add_geometry(report, method, verdict);
     add_fit(report, verdict);
+    add_spare(report, verdict);
+    add_scale(report, verdict);
   }
   const auto worst = [&](State state) {
     return std::find_if(verdict.checks.begin(), verdict.checks.end(), [&](const Check& c) { return c.state == state; });

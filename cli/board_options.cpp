@@ -48,18 +48,21 @@ CLI::Validator dictionary_check() {
 
 }  // namespace
 
-void add_board_options(CLI::App& command, BoardOptions& options) {
+void add_board_options(CLI::App& command, BoardOptions& options, bool is_required) {
   const std::string group = "The board";
-  command.add_option("--board", options.size, "Inner corners (circles, tags) along and across")
-      ->type_name("COLSxROWS")
-      ->check(size_check())
-      ->required()
-      ->group(group);
-  command.add_option("--square", options.square_m, "Side of a square, distance of circles, side of a tag [m]")
-      ->type_name("M")
-      ->check(positive_number())
-      ->required()
-      ->group(group);
+  CLI::Option* size = command.add_option("--board", options.size, "Inner corners (circles, tags) along and across")
+                          ->type_name("COLSxROWS")
+                          ->check(size_check())
+                          ->required(is_required)
+                          ->group(group);
+  CLI::Option* square =
+      command.add_option("--square", options.square_m, "Side of a square, distance of circles, side of a tag [m]")
+          ->type_name("M")
+          ->check(positive_number())
+          ->required(is_required)
+          ->group(group);
+  size->needs(square);
+  square->needs(size);
   command.add_option("--target", options.target, "chessboard, charuco, aprilgrid, circles or asymmetric_circles")
       ->type_name("KIND")
       ->check(target_check())

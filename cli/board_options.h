@@ -19,8 +19,9 @@ struct BoardOptions {
   std::string dictionary = "DICT_5X5_100";
 };
 
-/// Adds --board, --square, --target, --marker and --dictionary. --board and --square are required.
-void add_board_options(CLI::App& command, BoardOptions& options);
+/// Adds --board, --square, --target, --marker and --dictionary. Where a board is not required, --board needs --square
+/// and the other way round.
+void add_board_options(CLI::App& command, BoardOptions& options, bool is_required = true);
 
 /// The board that the flags describe. Throws UsageError where there is none.
 [[nodiscard]] Board board_from(const BoardOptions& options);

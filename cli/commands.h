@@ -8,8 +8,12 @@ void add_calibrate(Frame& frame);
 void add_camera(Frame& frame);
 void add_observe(Frame& frame);
 void add_plan(Frame& frame);
-void add_plan_observe(Frame& frame);       ///< Of `plan`.
-void add_rotation_scenario(Frame& frame);  ///< Of `simulate`.
+void add_plan_observe(Frame& frame);      ///< Of `plan`.
+void add_plan_rangefinder(Frame& frame);  ///< Of `plan`.
+void add_project(Frame& frame);
+void add_rangefinder(Frame& frame);
+void add_rangefinder_scenario(Frame& frame);  ///< Of `simulate`.
+void add_rotation_scenario(Frame& frame);     ///< Of `simulate`.
 void add_simulate(Frame& frame);
 
 // How to write a command: cli/NAME.cpp with one function `add_NAME(Frame&)`, declared here and called in main.cpp.

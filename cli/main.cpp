@@ -8,6 +8,8 @@ void add_commands(alidade::cli::Frame& frame) {
   alidade::cli::add_camera(frame);
   alidade::cli::add_observe(frame);
   alidade::cli::add_plan(frame);
+  alidade::cli::add_project(frame);
+  alidade::cli::add_rangefinder(frame);
   alidade::cli::add_simulate(frame);
 }
 

@@ -77,6 +77,7 @@ void add_plan(Frame& frame) {
       ->check(CLI::Range(1, 20))
       ->capture_default_str();
   add_plan_observe(frame);
+  add_plan_rangefinder(frame);
 }
 
 }  // namespace alidade::cli

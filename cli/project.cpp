@@ -1,0 +1,218 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <Eigen/Eigenvalues>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "alidade/io/beam_file.h"
+#include "alidade/io/camera_file.h"
+#include "alidade/io/photos.h"
+#include "cli/commands.h"
+#include "cli/frame.h"
+#include "cli/option_checks.h"
+
+namespace alidade::cli {
+namespace {
+
+struct Args {
+  std::filesystem::path beam, camera, overlay;
+  std::vector<double> ranges_m;
+  double sigma_range_m = 0.0;
+};
+
+struct Projected {
+  double range_m = 0.0;
+  BeamPoint point;
+  std::optional<BeamPixel> pixel;  ///< None: the camera does not see it.
+};
+
+/// Half axes and angle of the 3σ ellipse.
+cv::RotatedRect ellipse_3sigma(const BeamPixel& pixel) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(pixel.cov);
+  const Eigen::Vector2d sigma = axes.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::Vector2d along = axes.eigenvectors().col(1);
+  return {cv::Point2f(static_cast<float>(pixel.px.x()), static_cast<float>(pixel.px.y())),
+          cv::Size2f(static_cast<float>(6.0 * sigma[1]), static_cast<float>(6.0 * sigma[0])),
+          static_cast<float>(std::atan2(along.y(), along.x()) * 180.0 / CV_PI)};
+}
+
+/// The photo with the beam's line from 0.1 m to beyond the farthest range, and each spot with its 3σ ellipse.
+std::string overlay_png(const cv::Mat& photo, const Beam& beam, const Camera& camera,
+                        const std::vector<Projected>& projected) {
+  cv::Mat picture;
+  photo.convertTo(picture, CV_8U, photo.depth() == CV_16U ? 1.0 / 257.0 : 1.0);
+  if (picture.channels() == 1) cv::cvtColor(picture, picture, cv::COLOR_GRAY2BGR);
+  constexpr int shift = 4;
+  const auto fixed = [](const Eigen::Vector2d& px) {
+    return cv::Point(static_cast<int>(std::lround(px.x() * (1 << shift))),
+                     static_cast<int>(std::lround(px.y() * (1 << shift))));
+  };
+  double farthest_m = 1.0;
+  for (const Projected& one : projected) farthest_m = std::max(farthest_m, one.range_m);
+  std::optional<Eigen::Vector2d> last;
+  for (double range_m = 0.1; range_m < 3.0 * farthest_m; range_m *= 1.02) {
+    const auto px = project(camera, point_at(beam, range_m));
+    const bool is_near = px && (px->array().abs() < 1e5).all();
+    if (is_near && last) cv::line(picture, fixed(*last), fixed(*px), {0, 200, 255}, 1, cv::LINE_AA, shift);
+    last = is_near ? px : std::nullopt;
+  }
+  for (const Projected& one : projected) {
+    if (!one.pixel) continue;
+    cv::ellipse(picture, ellipse_3sigma(*one.pixel), {80, 255, 80}, 1, cv::LINE_AA);
+    cv::drawMarker(picture,
+                   {static_cast<int>(std::lround(one.pixel->px.x())), static_cast<int>(std::lround(one.pixel->px.y()))},
+                   {80, 255, 80}, cv::MARKER_CROSS, 9, 1, cv::LINE_AA);
+  }
+  std::vector<unsigned char> png;
+  cv::imencode(".png", picture, png);
+  return {png.begin(), png.end()};
+}
+
+DataTable points_table(const std::vector<Projected>& projected) {
+  std::vector<std::vector<double>> column(15);
+  for (const Projected& one : projected) {
+    const Eigen::Vector3d& p = one.point.point_in_cam;
+    const Eigen::Matrix3d& c = one.point.cov;
+    const double none = std::nan("");
+    const Eigen::Vector2d px = one.pixel ? one.pixel->px : Eigen::Vector2d(none, none);
+    const Eigen::Matrix2d s = one.pixel ? one.pixel->cov : Eigen::Matrix2d(Eigen::Matrix2d::Constant(none));
+    const std::array<double, 15> values{one.range_m, px.x(),  px.y(),  s(0, 0), s(0, 1), s(1, 1), p.x(),  p.y(),
+                                        p.z(),       c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)};
+    for (std::size_t i = 0; i < values.size(); ++i) column[i].push_back(values[i]);
+  }
+  static const std::array<const char*, 15> names{"range_m",
+                                                 "u_px",
+                                                 "v_px",
+                                                 "cov_uu_px2",
+                                                 "cov_uv_px2",
+                                                 "cov_vv_px2",
+                                                 "point_in_cam_x_m",
+                                                 "point_in_cam_y_m",
+                                                 "point_in_cam_z_m",
+                                                 "cov_xx_m2",
+                                                 "cov_xy_m2",
+                                                 "cov_xz_m2",
+                                                 "cov_yy_m2",
+                                                 "cov_yz_m2",
+                                                 "cov_zz_m2"};
+  DataTable table{"points", {}};
+  for (std::size_t i = 0; i < names.size(); ++i) table.columns.emplace_back(names[i], column[i]);
+  return table;
+}
+
+std::string points_csv(const DataTable& table, std::size_t rows) {
+  std::string text;
+  for (const auto& [name, values] : table.columns) text += (text.empty() ? "" : ",") + name;
+  text += "\n";
+  for (std::size_t row = 0; row < rows; ++row) {
+    for (std::size_t k = 0; k < table.columns.size(); ++k) {
+      const double value = std::get<std::vector<double>>(table.columns[k].second.content())[row];
+      text += k == 0 ? "" : ",";
+      if (std::isfinite(value)) text += fmt::format("{:.9g}", value);
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+void describe(const std::vector<Projected>& projected, Run& run) {
+  for (const Projected& one : projected) {
+    const Eigen::Vector3d& p = one.point.point_in_cam;
+    const Eigen::Vector3d sigma = 3.0 * one.point.cov.diagonal().cwiseSqrt();
+    const std::string pixel = one.pixel ? fmt::format("u {:.2f} ± {:.2g}  v {:.2f} ± {:.2g} px", one.pixel->px.x(),
+                                                      3.0 * std::sqrt(one.pixel->cov(0, 0)), one.pixel->px.y(),
+                                                      3.0 * std::sqrt(one.pixel->cov(1, 1)))
+                                        : "not in the camera's sight";
+    run.say(fmt::format("{:.4g} m: {}   x {:.4f} ± {:.2g}  y {:.4f} ± {:.2g}  z {:.4f} ± {:.2g} m   (3σ)", one.range_m,
+                        pixel, p.x(), sigma.x(), p.y(), sigma.y(), p.z(), sigma.z()));
+  }
+}
+
+JsonValue rows_of(const Eigen::MatrixXd& matrix) {
+  JsonValue rows = JsonValue::list();
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+    std::vector<double> row;
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j) row.push_back(matrix(i, j));
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+/// The first range under the names of a single answer.
+void fill_first(const Projected& first, ResultDocument& document) {
+  const Eigen::Vector3d& p = first.point.point_in_cam;
+  document.estimate["point_in_cam_m"] = std::vector<double>{p.x(), p.y(), p.z()};
+  document.estimate["point_cov_m2"] = rows_of(first.point.cov);
+  const Eigen::Vector3d sigma_m = first.point.cov.diagonal().cwiseSqrt();
+  document.stddev["point_in_cam_m"] = std::vector<double>{sigma_m.x(), sigma_m.y(), sigma_m.z()};
+  if (!first.pixel) return;
+  document.estimate["px"] = std::vector<double>{first.pixel->px.x(), first.pixel->px.y()};
+  document.estimate["px_cov_px2"] = rows_of(first.pixel->cov);
+  document.stddev["px"] = std::vector<double>{std::sqrt(first.pixel->cov(0, 0)), std::sqrt(first.pixel->cov(1, 1))};
+}
+
+ExitCode project_beam(const Args& args, Run& run) {
+  run.add_input("beam", args.beam);
+  const BeamFile file = read_beam(args.beam);
+  const std::filesystem::path camera_file = args.camera.empty() ? file.camera : args.camera;
+  if (camera_file.empty()) throw UsageError("the beam names no camera; say --camera FILE");
+  run.add_input("camera", camera_file);
+  const Camera camera = read_camera(camera_file);
+  Beam beam = file.beam;
+  // A covariance with another lens' parameters is of another calibration.
+  if (beam.cov_with_lens.cols() != camera.cov.cols()) beam.cov_with_lens.resize(0, 0);
+  std::vector<Projected> projected;
+  const std::optional<double> sigma_m = args.sigma_range_m > 0.0 ? std::optional(args.sigma_range_m) : std::nullopt;
+  for (const double range_m : args.ranges_m)
+    projected.push_back(
+        {range_m, measured_point(beam, range_m, sigma_m), measured_pixel(beam, camera, range_m, sigma_m)});
+  const DataTable table = points_table(projected);
+  run.add_file("points.csv", points_csv(table, projected.size()));
+  run.document.data.push_back(table);
+  run.document.counts.given = projected.size();
+  const auto num_seen = std::ranges::count_if(projected, [](const Projected& one) { return one.pixel.has_value(); });
+  run.document.counts.used = static_cast<std::size_t>(num_seen);
+  fill_first(projected.front(), run.document);
+  describe(projected, run);
+  if (!args.overlay.empty()) {
+    const std::string bytes = read_file(args.overlay);
+    run.add_input("photo", args.overlay.string(), bytes);
+    const cv::Mat photo = decode_photo(bytes);
+    if (photo.cols != camera.width_px || photo.rows != camera.height_px)
+      throw InputError(fmt::format("{}: is {}x{}, the camera is for {}x{}", args.overlay.string(), photo.cols,
+                                   photo.rows, camera.width_px, camera.height_px));
+    run.add_file("overlay.png", overlay_png(photo, beam, camera, projected));
+    run.say("overlay: " + (run.options.out / "overlay.png").string());
+  }
+  Verdict verdict;
+  verdict.sentence = fmt::format("{} of {} point{} in the picture's model", num_seen, projected.size(),
+                                 projected.size() == 1 ? "" : "s");
+  return run.finish(verdict);
+}
+
+}  // namespace
+
+void add_project(Frame& frame) {
+  auto args = std::make_shared<Args>();
+  CLI::App& command =
+      frame.add_command({.name = "project",
+                         .summary = "Pixel and 3-D point of a rangefinder's reading, with their covariance",
+                         .examples = "alidade project --beam rangefinder.yaml --camera camera.yaml --range 2.31\n"
+                                     "alidade project --beam rangefinder.yaml --range 0.5,1,2,4 --overlay photo.jpg\n"},
+                        [args](Run& run) { return project_beam(*args, run); });
+  command.add_option("--beam", args->beam, "rangefinder.yaml of alidade rangefinder")->type_name("FILE")->required();
+  command.add_option("--camera", args->camera, "The camera (default: the one that the beam names)")->type_name("FILE");
+  command.add_option("--range", args->ranges_m, "Reading, or several [m]")
+      ->delimiter(',')
+      ->required()
+      ->check(positive_number());
+  command.add_option("--sigma-range-m", args->sigma_range_m, "Of the reading (default: the beam's)")
+      ->check(positive_number());
+  command.add_option("--overlay", args->overlay, "Draw the beam's line and the spots into this photo: overlay.png")
+      ->type_name("PHOTO");
+}
+
+}  // namespace alidade::cli

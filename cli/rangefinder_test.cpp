@@ -1,0 +1,260 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "alidade/io/csv.h"
+#include "alidade/io/files.h"
+#include "alidade/testing/process.h"
+#include "alidade/testing/temporary_folder.h"
+
+namespace alidade {
+namespace {
+
+using testing::Outcome;
+using Json = nlohmann::json;
+
+class RangefinderCommand : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
+  [[nodiscard]] static Outcome alidade(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), ALIDADE_EXECUTABLE);
+    return testing::run_program(std::move(arguments));
+  }
+  void simulate(const std::vector<std::string>& options = {}) {
+    std::vector<std::string> arguments{"simulate", "rangefinder", "--out", path("sim"), "--quiet"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const Outcome made = alidade(arguments);
+    ASSERT_EQ(made.code, 0) << made.err;
+  }
+  /// The simulated shots, with their corners.
+  [[nodiscard]] Outcome calibrate(const std::vector<std::string>& options) const {
+    std::vector<std::string> arguments{"rangefinder", path("sim/shots.csv"),
+                                       "--camera",    path("sim/camera.yaml"),
+                                       "--corners",   path("sim/corners.csv"),
+                                       "--board",     "9x6",
+                                       "--square",    "0.04",
+                                       "--out",       path("out")};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return alidade(arguments);
+  }
+  /// Of spots, planes or ranges in a table of one's own.
+  [[nodiscard]] Outcome calibrate_table(const std::string& table, const std::vector<std::string>& options = {}) const {
+    write_file(path("shots.csv"), table);
+    std::vector<std::string> arguments{"rangefinder", path("shots.csv"), "--camera", path("sim/camera.yaml"),
+                                       "--no-report", "--out",           path("out")};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return alidade(arguments);
+  }
+  testing::TemporaryFolder folder_;
+};
+
+void expect_near_truth(const Json& document, double sigmas = 3.5) {
+  const std::vector<double> origin{0.04, -0.07, 0.04}, direction{0.013795889, -0.015203087, 0.999789248};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double sigma_m = document["stddev"]["origin_m"][i], sigma = document["stddev"]["direction"][i];
+    EXPECT_NEAR(document["estimate"]["origin_m"][i], origin[i], sigmas * sigma_m);
+    EXPECT_NEAR(document["estimate"]["direction"][i], direction[i], sigmas * sigma);
+  }
+}
+
+TEST_F(RangefinderCommand, GivesTheBeamWithTheNamesOfTheContract) {
+  simulate();
+  for (const std::string method : {"joint", "spot", "plane"}) {
+    const Outcome outcome = calibrate({"--method", method, "--json", "--no-report"});
+    ASSERT_EQ(outcome.code, 0) << method << ": " << outcome.err;
+    const Json document = Json::parse(outcome.out);
+    expect_near_truth(document);
+    const Json& estimate = document["estimate"];
+    EXPECT_EQ(estimate["scale"], 1.0);
+    for (const char* name : {"theta_x_rad", "theta_y_rad", "rms_px", "rms_range_m", "bound"})
+      EXPECT_TRUE(estimate.contains(name)) << name;
+    EXPECT_NEAR(estimate["theta_x_rad"], 1.557, 0.02);
+    EXPECT_EQ(document["data"]["shots"]["range_m"].size(), 18u);
+    EXPECT_EQ(document["counts"]["used"], 18);
+    EXPECT_TRUE(std::filesystem::exists(path("out/rangefinder.yaml")));
+    EXPECT_TRUE(std::filesystem::exists(path("out/camera.yaml")));
+  }
+}
+
+TEST_F(RangefinderCommand, ProjectSaysWhereTheSpotIsAndHowSure) {
+  simulate();
+  ASSERT_EQ(calibrate({"--no-report"}).code, 0);
+  const Outcome outcome =
+      alidade({"project", "--beam", path("out/rangefinder.yaml"), "--camera", path("out/camera.yaml"), "--range",
+               "2.31", "--json", "--no-report", "--out", path("projected")});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  // By hand: X = B + L A of the truth, f 1200 px, centre (640, 480).
+  const double x = 0.04 + 2.31 * 0.013795889, y = -0.07 - 2.31 * 0.015203087, z = 0.04 + 2.31 * 0.999789248;
+  const Json &px = document["estimate"]["px"], &sigma = document["stddev"]["px"];
+  EXPECT_NEAR(px[0], 640.0 + 1200.0 * x / z, 4.0 * sigma[0].get<double>());
+  EXPECT_NEAR(px[1], 480.0 + 1200.0 * y / z, 4.0 * sigma[1].get<double>());
+  EXPECT_LT(sigma[0], 0.5);
+  EXPECT_NEAR(document["estimate"]["point_in_cam_m"][2], z, 0.02);
+  const Csv points = Csv::read(path("projected/points.csv"));
+  EXPECT_EQ(points.num_rows(), 1u);
+  EXPECT_NEAR(points.number(0, "u_px"), px[0], 1e-6);
+}
+
+TEST_F(RangefinderCommand, PlanProposesShotsThatLowerTheUncertainty) {
+  simulate({"--shots", "6"});
+  ASSERT_EQ(calibrate({"--no-report"}).code, 0);
+  const Outcome outcome = alidade({"plan", "rangefinder", path("out"), "--json", "--no-report", "--out", path("plan")});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json estimate = Json::parse(outcome.out)["estimate"];
+  EXPECT_LT(estimate["sigma_planned_origin_m"], estimate["sigma_now_origin_m"]);
+}
+
+TEST_F(RangefinderCommand, WhatCannotTellIsRefusedByName) {
+  for (const auto& [scenario, method, reason] :
+       std::vector<std::array<std::string, 3>>{{"equal_range", "spot", "equal ranges"},
+                                               {"equal_range", "plane", "equal ranges"},
+                                               {"table1", "plane", "equal ranges"},
+                                               {"table1", "spot", "equal ranges"},
+                                               {"frontal", "plane", "frontal boards"},
+                                               {"parallel", "plane", "parallel boards"},
+                                               {"through_centre", "spot", "centre"}}) {
+    simulate({"--scenario", scenario});
+    const Outcome outcome = calibrate({"--method", method, "--no-report"});
+    EXPECT_EQ(outcome.code, 4) << scenario << ' ' << method << outcome.out;
+    EXPECT_NE(outcome.err.find(reason), std::string::npos) << scenario << ' ' << method << ": " << outcome.err;
+    EXPECT_FALSE(std::filesystem::exists(path("out/rangefinder.yaml"))) << scenario;
+    EXPECT_TRUE(std::filesystem::exists(path("out/result.json")));
+  }
+  simulate();
+  const Outcome scale = calibrate({"--method", "spot", "--scale", "--no-report"});
+  EXPECT_EQ(scale.code, 4);
+  EXPECT_NE(scale.err.find("scale"), std::string::npos) << scale.err;
+}
+
+TEST_F(RangefinderCommand, WrongShotsAreNamed) {
+  simulate({"--outliers", "0.17"});
+  const Json made = Json::parse(read_file(path("sim/result.json")));
+  ASSERT_EQ(made["estimate"]["outliers"].size(), 3u);
+  const Outcome outcome = calibrate({"--json", "--no-report"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  expect_near_truth(document);
+  const Json& shots = document["data"]["shots"];
+  for (std::size_t i = 0; i < 18; ++i) {
+    const bool is_outlier = std::ranges::count(made["estimate"]["outliers"], shots["name"][i]) > 0;
+    EXPECT_EQ(shots["used"][i].get<bool>(), !is_outlier) << shots["name"][i] << shots["reason"][i];
+  }
+}
+
+TEST_F(RangefinderCommand, SaysWhatIsWrongWithItsInput) {
+  simulate();
+  const auto expect = [&](const std::string& table, const std::string& what) {
+    const Outcome outcome = calibrate_table(table);
+    EXPECT_EQ(outcome.code, 3) << table << outcome.err;
+    EXPECT_NE(outcome.err.find(what), std::string::npos) << outcome.err;
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+    EXPECT_FALSE(std::filesystem::exists(path("out")));
+  };
+  expect("", "shots.csv");
+  expect("range_m,u,v\n", "has no shots");
+  expect("range_mm,u,v\n2310,1,1\n", "has no column 'range_m'; ranges are metres");
+  expect("range_m\n2.31\n", "ranges alone");
+  expect("range_m,u\n2.31,4\n", "'u' and 'v'");
+  expect("range_m,nx,ny,nz\n2.31,0,0,1\n", "'nx', 'ny', 'nz' and 'd'");
+  expect("range_m,u,v\n2.31,4,5\nnan,4,5\n", "shots.csv:3: column 'range_m': 'nan' is not a finite number");
+  expect("range_m,u,v\n-2.31,4,5\n", "shots.csv:2: column 'range_m': '-2.31' is not above zero");
+  expect("range_m,u,v\n2310,4,5\n", "ranges are metres");
+  expect("range_m,u,v\n2.31,,5\n", "shots.csv:2: column 'u': is empty");
+  expect("range_m,u,v\n2.31,1e300,5\n", "shots.csv:2");
+  expect("range_m,nx,ny,nz,d\n2.31,0,0,2,-2\n", "the normal's length is 2, not 1");
+  expect("range_m,nx,ny,nz,d\n2.31,0,0,1,0\n", "passes through the camera's centre");
+  expect("range_m,photo\n2.31,none.jpg\n", "none.jpg");
+  write_file(path("text.jpg"), "not a picture");
+  expect("range_m,photo\n2.31,text.jpg\n", "text.jpg");
+  const Outcome skipped = calibrate_table("range_m,u,v\n2.31,4,5\nnan,4,5\n", {"--skip-bad", "--json"});
+  EXPECT_EQ(skipped.code, 4) << skipped.err;  // one shot tells nothing
+  EXPECT_EQ(Json::parse(skipped.out)["counts"]["skipped"].size(), 1u);
+}
+
+TEST_F(RangefinderCommand, WrongUsageAndBadFilesAreNamed) {
+  simulate();
+  EXPECT_EQ(alidade({"rangefinder", path("sim/shots.csv")}).code, 2);
+  EXPECT_EQ(calibrate({"--method", "magic"}).code, 2);
+  EXPECT_EQ(alidade({"rangefinder", path("sim/shots.csv"), "--camera", path("sim/camera.yaml"), "--board", "9x6"}).code,
+            2);
+  EXPECT_EQ(alidade({"project", "--beam", path("none.yaml"), "--range", "1"}).code, 3);
+  EXPECT_EQ(alidade({"project", "--beam", path("sim/truth_rangefinder.yaml"), "--range", "-1"}).code, 2);
+  write_file(path("bad.yaml"), "origin_m: [0, 0, 0]\ndirection: [0, 0, 2]\n");
+  const Outcome outcome = alidade({"project", "--beam", path("bad.yaml"), "--range", "1"});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_NE(outcome.err.find("direction: has the length 2, not 1"), std::string::npos) << outcome.err;
+}
+
+/// From rendered photos, found and solved without help: board, lens and spot with noise.
+TEST_F(RangefinderCommand, FromPhotosTheOriginIsWithinThreeMillimetres) {
+  simulate({"--photos", "--seed", "4"});
+  const Outcome outcome = alidade({"rangefinder", path("sim/shots.csv"), "--camera", path("sim/camera.yaml"), "--board",
+                                   "9x6", "--square", "0.04", "--json", "--out", path("out")});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  expect_near_truth(document, 3.0);
+  double squares_m2 = 0.0, cosine = 0.0;
+  const std::vector<double> origin{0.04, -0.07, 0.04}, direction{0.013795889, -0.015203087, 0.999789248};
+  for (std::size_t i = 0; i < 3; ++i) {
+    squares_m2 += std::pow(document["estimate"]["origin_m"][i].get<double>() - origin[i], 2);
+    cosine += document["estimate"]["direction"][i].get<double>() * direction[i];
+  }
+  EXPECT_LT(std::sqrt(squares_m2), 0.003);
+  EXPECT_LT(std::acos(std::min(cosine, 1.0)) * 180.0 / M_PI, 0.05);
+  EXPECT_TRUE(std::filesystem::exists(path("out/report.html")));
+}
+
+/// A true single-point rangefinder: 37 photos, readings in steps of 1 cm.
+TEST_F(RangefinderCommand, ARealRangefindersRangesArePredicted) {
+  const char* data = std::getenv("ALIDADE_DATA");
+  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set: the photos of a real rangefinder are not at hand";
+  const std::string folder = std::string(data) + "/data/lidar1d-giubilato/";
+  const Csv ranges = Csv::read(folder + "ranges_m.csv");
+  std::string table = "range_m,photo\n";
+  for (std::size_t row = 0; row < ranges.num_rows(); ++row)
+    table += ranges.text(row, "range_m") + "," + folder + "images/" + ranges.text(row, "image") + "\n";
+  write_file(path("shots.csv"), table);
+  const Outcome camera = alidade({"calibrate", folder + "images", "--board", "8x6", "--square", "0.0387", "--no-report",
+                                  "--quiet", "--out", path("camera")});
+  ASSERT_EQ(camera.code, 0) << camera.err;
+  const std::vector<std::string> command{"rangefinder", path("shots.csv"),
+                                         "--camera",    path("camera/camera.yaml"),
+                                         "--board",     "8x6",
+                                         "--square",    "0.0387",
+                                         "--method",    "plane",
+                                         "--json",      "--no-report",
+                                         "--out",       path("out")};
+  const Outcome plain = alidade(command);
+  ASSERT_EQ(plain.code, 0) << plain.err;
+  EXPECT_NE(Json::parse(plain.out)["verdict"]["checks"].dump().find("--scale"), std::string::npos);
+  std::vector<std::string> scaled = command;
+  scaled.emplace_back("--scale");
+  const Outcome outcome = alidade(scaled);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  const Json& estimate = document["estimate"];
+  EXPECT_LT(estimate["left_out"]["rms_range_m"], 0.018);
+  // The authors' own unconstrained fit has |direction| 0.975: the same scale.
+  EXPECT_NEAR(estimate["scale"], 0.98, 0.02);
+  EXPECT_GT((1.0 - estimate["scale"].get<double>()) / document["stddev"]["scale"].get<double>(), 3.0);
+  EXPECT_GE(estimate["noise"]["sigma_range_m"], 0.01 / std::sqrt(12.0) * 0.999);  // the steps of the readings
+  // σ covers the scatter: residuals over their σ.
+  double squares = 0.0;
+  int num = 0;
+  const Json& shots = document["data"]["shots"];
+  for (std::size_t i = 0; i < shots["used"].size(); ++i) {
+    if (!shots["used"][i].get<bool>()) continue;
+    squares +=
+        std::pow(shots["residual_range_m"][i].get<double>() / shots["sigma_residual_range_m"][i].get<double>(), 2);
+    ++num;
+  }
+  EXPECT_GE(num, 34);
+  EXPECT_NEAR(std::sqrt(squares / (num - 6)), 1.0, 0.35);
+}
+
+}  // namespace
+}  // namespace alidade

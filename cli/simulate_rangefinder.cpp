@@ -1,0 +1,139 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "alidade/io/beam_file.h"
+#include "alidade/io/camera_file.h"
+#include "alidade/io/corner_file.h"
+#include "alidade/io/shots_file.h"
+#include "alidade/simulate/rangefinder.h"
+#include "alidade/simulate/spot_photos.h"
+#include "cli/commands.h"
+#include "cli/frame.h"
+#include "cli/option_checks.h"
+
+namespace alidade::cli {
+namespace {
+
+struct Args {
+  std::string scenario = "reference", laser = "red";
+  std::filesystem::path camera;
+  int shots = 18;
+  double sigma_range_m = 0.002, scale = 1.0;
+  ShotNoise noise;
+  bool photos = false, photos_off = false;
+};
+
+std::string row_name(std::size_t i) { return fmt::format("shot_{:03}.png", i + 1); }
+
+RangefinderScene scene_of(const Args& args, Run& run) {
+  auto config = rangefinder_scenario(args.scenario);
+  if (!config)
+    throw UsageError(
+        fmt::format("--scenario: '{}' is not one of {}", args.scenario, fmt::join(rangefinder_scenarios(), ", ")));
+  if (!args.camera.empty()) {
+    run.add_input("camera", args.camera);
+    config->camera = read_camera(args.camera);
+  }
+  config->num_shots = args.shots;
+  config->beam.noise = {args.sigma_range_m, 0.0, 0.0};
+  config->beam.scale = args.scale;
+  return draw_rangefinder_scene(*config, run.options.seed);
+}
+
+/// Photos of the boards with the spot, and shots that name them: what a person brings home.
+void add_photos(const Args& args, const RangefinderScene& scene, std::vector<Shot>& shots, Run& run) {
+  SpotScene spots;
+  spots.boards = {scene.camera, scene.board, points_in_board(scene.board), scene.cam_from_board};
+  spots.beam_origin_in_cam = scene.beam.origin_in_cam;
+  spots.beam_direction_in_cam = scene.beam.direction_in_cam;
+  for (const double range_m : scene.range_m) spots.range_m.push_back(scene.beam.scale * range_m);
+  SpotPhotoConfig config;
+  config.laser.colour = args.laser == "green" ? LaserColour::green : LaserColour::red;
+  const auto add = [&](std::size_t i, bool is_on, const std::string& name) {
+    config.is_on = is_on;
+    std::vector<unsigned char> png;
+    cv::imencode(".png", render_spot_photo(spots, i, config, run.options.seed + (is_on ? 0u : 1u)), png);
+    run.add_file(name, {png.begin(), png.end()});
+  };
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    report_progress(run.progress, "photos", i, shots.size());
+    shots[i].spot.reset();
+    add(i, true, row_name(i));
+    if (args.photos_off) add(i, false, "off_" + row_name(i));
+  }
+}
+
+std::string table_of(const Args& args, const std::vector<Shot>& shots) {
+  if (!args.photos) return shots_csv(shots, true);
+  std::string text = args.photos_off ? "range_m,photo,photo_off\n" : "range_m,photo\n";
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    text += fmt::format("{:.6f},{}", shots[i].range_m, row_name(i));
+    text += args.photos_off ? ",off_" + row_name(i) + "\n" : "\n";
+  }
+  return text;
+}
+
+ExitCode simulate_rangefinder(const Args& args, Run& run) {
+  const RangefinderScene scene = scene_of(args, run);
+  SimulatedShots simulated = simulate_shots(scene, args.noise, run.options.seed);
+  std::vector<BoardView> views;
+  for (std::size_t i = 0; i < simulated.shots.size(); ++i) {
+    Shot& shot = simulated.shots[i];
+    shot.name = row_name(i);
+    if (!shot.board) continue;
+    shot.board->photo = shot.name;
+    views.push_back(*shot.board);
+  }
+  if (args.photos) add_photos(args, scene, simulated.shots, run);
+  run.add_file("shots.csv", table_of(args, simulated.shots));
+  if (!args.photos) run.add_file("corners.csv", corners_csv(views));
+  run.add_file("camera.yaml", camera_text(scene.camera, CameraFormat::alidade));
+  run.add_file("truth_rangefinder.yaml", beam_text(scene.beam, scene.camera, "camera.yaml"));
+  JsonValue outliers = JsonValue::list();
+  for (std::size_t i = 0; i < simulated.is_outlier.size(); ++i)
+    if (simulated.is_outlier[i]) outliers.push_back(row_name(i));
+  run.document.estimate["outliers"] = std::move(outliers);
+  run.document.counts.given = run.document.counts.used = simulated.shots.size();
+  Verdict verdict;
+  verdict.sentence = fmt::format("{} shots of a rangefinder with known truth; board {}x{}, {:g} m", args.shots,
+                                 scene.board.cols, scene.board.rows, scene.board.square_m);
+  run.say(fmt::format("{} in {}", verdict.sentence, run.options.out.string()));
+  return run.finish(verdict);
+}
+
+}  // namespace
+
+void add_rangefinder_scenario(Frame& frame) {
+  auto args = std::make_shared<Args>();
+  CLI::App& command = frame.add_command(
+      {"simulate rangefinder", "Shots of a laser rangefinder beside a camera, with boards and spots, and the truth",
+       "  alidade simulate rangefinder --out shots && alidade rangefinder shots/shots.csv --camera shots/camera.yaml "
+       "\\\n"
+       "    --corners shots/corners.csv --board 9x6 --square 0.04\n"
+       "  alidade simulate rangefinder --photos --shots 12 --out photos",
+       true},
+      [args](Run& run) { return simulate_rangefinder(*args, run); });
+  command.add_option("--scenario", args->scenario, fmt::format("{}", fmt::join(rangefinder_scenarios(), ", ")))
+      ->capture_default_str();
+  command.add_option("--shots", args->shots, "How many")->check(CLI::Range(1, 10000))->capture_default_str();
+  command.add_option("--camera", args->camera, "The true camera; without it one is made up")->type_name("FILE");
+  const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
+    command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
+  };
+  number("--sigma-range-m", args->sigma_range_m, "Noise of a reading [m]", 0.0, 1.0);
+  number("--sigma-px", args->noise.sigma_spot_px, "Noise of a spot's coordinate", 0.0, 100.0);
+  number("--sigma-corner-px", args->noise.sigma_corner_px, "Noise of a corner's coordinate", 0.0, 100.0);
+  number("--outliers", args->noise.outlier_share, "Share of shots whose beam passed the board", 0.0, 0.9);
+  number("--scale", args->scale, "Metres for each metre read", 0.5, 2.0);
+  command.add_flag("--photos", args->photos, "Render the photos instead of spots and corners");
+  command.add_flag("--photos-off", args->photos_off, "With --photos: each also with the laser off");
+  command.add_option("--laser", args->laser, "Colour of the laser in photos: red or green")
+      ->check(CLI::IsMember({"red", "green"}))
+      ->capture_default_str();
+}
+
+}  // namespace alidade::cli

@@ -12,7 +12,7 @@ help:
 	@echo "make test    build and run the tests"
 	@echo "make build   build build/release/alidade"
 	@echo "make bench   measure speed, side by side with OpenCV and mrcal"
-	@echo "make docs    renew the picture in the README"
+	@echo "make docs    renew the pictures in README and docs"
 	@echo "make study   is σ what it says? 2400 calibrations, 2000 observations; corners against OpenCV's, with known truth"
 	@echo "make format  format the sources;  make tidy: let clang-tidy read them"
 	@echo "make clean   remove build/"
@@ -47,7 +47,11 @@ bench:
 
 docs: demo
 	@tools/setup docs
-	@echo "docs: docs/report.png, the demo's report as a browser draws it"
+	@echo "docs: docs/report.png and docs/observe.png, reports as a browser draws them"
+	@$(out)/alidade simulate rotation --source head --zoom ramp --points 12 --seed 3 --out build/demo/turn --quiet
+	@$(out)/alidade observe build/demo/turn/log.csv --size 780x582 --out build/demo/observed --quiet
+	@chromium --headless --no-sandbox --hide-scrollbars --window-size=1500,1330 --force-device-scale-factor=0.7 \
+	  --screenshot=docs/observe.png "file://$(CURDIR)/build/demo/observed/report.html" >/dev/null 2>&1
 	@chromium --headless --no-sandbox --hide-scrollbars --window-size=1500,885 --force-device-scale-factor=0.8 \
 	  --screenshot=docs/report.png "file://$(CURDIR)/build/demo/result/report.html" >/dev/null 2>&1
 

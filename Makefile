@@ -13,7 +13,7 @@ help:
 	@echo "make build   build build/release/alidade"
 	@echo "make bench   measure speed, side by side with OpenCV and mrcal"
 	@echo "make docs    renew the pictures in README and docs"
-	@echo "make study   is σ what it says? 2400 calibrations, 2000 observations; corners against OpenCV's, with known truth"
+	@echo "make study   is σ what it says? 2400 calibrations, 2000 observations, rangefinders; corners against OpenCV's, with known truth"
 	@echo "make format  format the sources;  make tidy: let clang-tidy read them"
 	@echo "make clean   remove build/"
 	@echo "Each installs the Debian packages it misses (packages.debian), as root or with sudo."
@@ -57,14 +57,16 @@ docs: demo
 
 study:
 	@tools/setup build
-	@echo "study: building $(out)/study_calibration, study_observe and corner_accuracy"
+	@echo "study: building $(out)/study_calibration, study_observe, study_rangefinder and corner_accuracy"
 	@cmake --preset release -DALIDADE_BENCH=ON >/dev/null
-	@ninja -C $(out) $(jobs) study_calibration study_observe corner_accuracy
+	@ninja -C $(out) $(jobs) study_calibration study_observe study_rangefinder corner_accuracy
 	@echo "study: 2400 calibrations, into docs/studies.md"
 	@mkdir -p build/study
 	@$(out)/study_calibration 2400 >build/study/studies.md; met=$$?; cp build/study/studies.md docs/studies.md; exit $$met
 	@echo "study: 2000 observations of a rotating camera, into docs/studies-observe.md"
 	@$(out)/study_observe 2000 >build/study/observe.md; met=$$?; cp build/study/observe.md docs/studies-observe.md; exit $$met
+	@echo "study: rangefinders, into docs/studies-rangefinder.md"
+	@$(out)/study_rangefinder 200 2000 >build/study/rangefinder.md; met=$$?; cp build/study/rangefinder.md docs/studies-rangefinder.md; exit $$met
 	@$(out)/corner_accuracy
 
 format:

@@ -96,8 +96,9 @@ void read_verdict(const Json& verdict, Document& document) {
   document.to_add = text_of(verdict, "to_add");
   if (const Json& checks = member(verdict, "checks"); checks.is_array())
     for (const Json& check : checks)
-      document.checks.push_back(
-          {text_of(check, "name"), text_of(check, "state"), text_of(check, "text"), text_of(check, "figure")});
+      document.checks.push_back({text_of(check, "name"), text_of(check, "state"), text_of(check, "text"),
+                                 text_of(check, "figure"), number_of(member(check, "value")),
+                                 number_of(member(check, "limit")), text_of(check, "unit")});
 }
 
 void read_provenance(const Json& json, Document& document) {

@@ -46,6 +46,8 @@ struct Quantity {
 
 struct CheckLine {
   std::string name, state, text, figure;
+  double value, limit;  ///< NaN if missing.
+  std::string unit;
 };
 
 struct InputFile {

@@ -67,16 +67,16 @@ struct Correlations {
   std::vector<double> rho;  // row-major, NaN where there is no variance
 };
 
-Correlations correlations(const Document& document) {
-  Correlations result{document.covariance_names, {}};
+Correlations correlations(const std::vector<std::string>& names, const std::vector<double>& upper) {
+  Correlations result{names, {}};
   for (std::string& name : result.names)
     if (name.starts_with("camera.")) name = last_part(name);
   const std::size_t n = result.names.size();
-  if (n < 2 || document.covariance_upper.size() != n * (n + 1) / 2) return {};
+  if (n < 2 || upper.size() != n * (n + 1) / 2) return {};
   std::vector<double> cov(n * n);
   std::size_t at = 0;
   for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = i; j < n; ++j) cov[i * n + j] = cov[j * n + i] = document.covariance_upper[at++];
+    for (std::size_t j = i; j < n; ++j) cov[i * n + j] = cov[j * n + i] = upper[at++];
   result.rho.resize(n * n);
   for (std::size_t i = 0; i < n; ++i)
     for (std::size_t j = 0; j < n; ++j) {
@@ -143,6 +143,11 @@ std::string correlation_matrix(const Correlations& matrix) {
 
 }  // namespace
 
+std::string correlation_markup(const std::vector<std::string>& names, const std::vector<double>& upper) {
+  const Correlations matrix = correlations(names, upper);
+  return matrix.names.size() > 1 ? "<h3>correlation</h3>" + correlation_matrix(matrix) : "";
+}
+
 MaybeFigure figure_estimate(const Document& document) {
   Figure figure{.id = "estimate", .title = "Estimate", .note = "value ± 3σ", .span = 6};
   std::string lens, rest;
@@ -155,8 +160,7 @@ MaybeFigure figure_estimate(const Document& document) {
   }
   if (figure.marks == 0) return std::nullopt;
   figure.body = "<table class=\"estimate\">" + lens + rest + "</table>";
-  if (const Correlations matrix = correlations(document); matrix.names.size() > 1)
-    figure.body += "<h3>correlation</h3>" + correlation_matrix(matrix);
+  figure.body += correlation_markup(document.covariance_names, document.covariance_upper);
   return figure;
 }
 

@@ -8,6 +8,7 @@
 #include "alidade/report/calibrate_scene.h"
 #include "alidade/report/document.h"
 #include "alidade/report/observe_scene.h"
+#include "alidade/report/rangefinder_scene.h"
 
 namespace alidade::report {
 
@@ -27,6 +28,8 @@ using MaybeFigure = std::optional<Figure>;
 
 /// Value ± 3σ of every estimate, and the correlation matrix.
 [[nodiscard]] MaybeFigure figure_estimate(const Document& document);
+/// The correlation matrix by itself; empty where fewer than two of the parameters have a variance.
+[[nodiscard]] std::string correlation_markup(const std::vector<std::string>& names, const std::vector<double>& upper);
 
 [[nodiscard]] MaybeFigure figure_trust(const CalibrateScene& scene);
 [[nodiscard]] MaybeFigure figure_residuals(const CalibrateScene& scene);
@@ -69,6 +72,29 @@ using MaybeFigure = std::optional<Figure>;
 [[nodiscard]] MaybeFigure figure_observe_nis(const ObserveScene& scene);
 [[nodiscard]] MaybeFigure figure_observe_points(const ObserveScene& scene);
 [[nodiscard]] MaybeFigure figure_observe_tracks(const ObserveScene& scene);
+
+/// Figures of `rangefinder`. They read, and do without what is missing (null in a row, or no such column):
+/// - table `shots`, a row a shot: name, used, reason, range_m, residual_range_m, sigma_residual_range_m, u_px, v_px,
+///   residual_u_px, residual_v_px, sigma_residual_u_px, sigma_residual_v_px, cov_residual_uv_px2, point_in_cam_x_m, …;
+/// - table `planes`, a row a board, by the shot's name: nx, ny, nz, d_m, cam_from_board_*;
+/// - table `left_out`: shot (row of `shots`, from 0), residual_range_m, residual_u_px, residual_v_px;
+/// - table `by_count`: num_shots, sigma_origin_m, sigma_direction_rad, bound_origin_m, bound_direction_rad;
+/// - grid `next_shot`: distance_m, tilt_rad, sigma_point_m, cells in any order;
+/// - estimate: origin_m, direction, theta_x_rad, theta_y_rad, scale, bound, noise, left_out, spot_sigma_px at
+///   spot_sigma_at_m, board, camera (width, height, model and the lens' parameters); covariance of origin, direction,
+///   scale (7×7).
+/// Pictures come under the shots' names, whole photos made smaller.
+[[nodiscard]] MaybeFigure figure_rangefinder_estimate(const RangefinderScene& scene);
+[[nodiscard]] MaybeFigure figure_rangefinder_refusal(const RangefinderScene& scene);
+[[nodiscard]] MaybeFigure figure_rangefinder_beam(const RangefinderScene& scene);
+[[nodiscard]] MaybeFigure figure_rangefinder_residuals(const RangefinderScene& scene);
+[[nodiscard]] MaybeFigure figure_rangefinder_precision(const RangefinderScene& scene);
+[[nodiscard]] MaybeFigure figure_rangefinder_counts(const RangefinderScene& scene);
+[[nodiscard]] MaybeFigure figure_rangefinder_next(const RangefinderScene& scene);
+[[nodiscard]] MaybeFigure figure_rangefinder_photo(const RangefinderScene& scene, const Pictures& pictures);
+[[nodiscard]] MaybeFigure figure_rangefinder_all_photos(const RangefinderScene& scene, const Pictures& pictures);
+/// Photos and what is drawn over them, shown by reference.
+[[nodiscard]] std::string shared_rangefinder_drawings(const RangefinderScene& scene, const Pictures& pictures);
 
 /// The first rows of every table, with a download of all.
 [[nodiscard]] std::string data_tables(const Document& document);

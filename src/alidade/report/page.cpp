@@ -70,9 +70,32 @@ Content observe_content(const Document& document) {
   return content;
 }
 
+Content rangefinder_content(const Document& document, const Pictures& pictures) {
+  const report::RangefinderScene scene = report::rangefinder_scene(document, pictures);
+  Content content;
+  add(content, report::figure_rangefinder_estimate(scene), "Estimate");
+  if (!document.is_answer()) add(content, report::figure_rangefinder_refusal(scene), "What cannot be told?");
+  add(content, report::figure_rangefinder_beam(scene), "Where is the beam?");
+  add(content, report::figure_rangefinder_residuals(scene), "Does each shot fit?");
+  add(content, report::figure_rangefinder_photo(scene, pictures), "Is the spot where the beam puts it?");
+  add(content, report::figure_rangefinder_precision(scene), "How well is it known?");
+  add(content, report::figure_rangefinder_next(scene), "Which shot next?");
+  add(content, report::figure_rangefinder_counts(scene), "Do more shots help?");
+  add(content, report::figure_rangefinder_all_photos(scene, pictures), "Is it the same in every photo?");
+  content.shared = report::shared_rangefinder_drawings(scene, pictures);
+  if (!document.is_answer())  // the refusal stands where the beam would
+    for (Figure& figure : content.figures) {
+      if (figure.id == "beam") figure.span = 14;
+      if (figure.id == "residuals") figure.span = 10;
+      if (figure.id == "precision") figure.span = 14;
+    }
+  return content;
+}
+
 Content content_of(const Document& document, const Pictures& pictures) {
   if (document.command == "calibrate") return calibrate_content(document, pictures);
   if (document.command == "observe") return observe_content(document);
+  if (document.command == "rangefinder") return rangefinder_content(document, pictures);
   if (document.command == "camera diff") return difference_content(document);
   Content content;
   add(content, report::figure_estimate(document), "Estimate");

@@ -51,9 +51,10 @@ std::string counts_line(const Document& document) {
   const double used = count(document, "used"), given = count(document, "given"), dropped = count(document, "dropped");
   if (std::isfinite(used))
     parts.push_back(fmt::format("{}{} {}", number_text(used, 9), given > used ? " of " + number_text(given, 9) : "",
-                                is_calibrate                    ? "photos"
-                                : document.command == "observe" ? "rows"
-                                                                : "used"));
+                                is_calibrate                        ? "photos"
+                                : document.command == "observe"     ? "rows"
+                                : document.command == "rangefinder" ? "shots"
+                                                                    : "used"));
   if (const Table* corners = document.table("corners"); corners && is_calibrate)
     parts.push_back(fmt::format("{} corners{}", corners->num_rows,
                                 std::isfinite(dropped) ? " (" + number_text(dropped, 9) + " dropped)" : ""));
@@ -62,6 +63,8 @@ std::string counts_line(const Document& document) {
   if (!document.skipped.empty()) parts.push_back(fmt::format("{} skipped", document.skipped.size()));
   if (const double rms = document.estimated("rms_px"); std::isfinite(rms))
     parts.push_back("RMS " + number_text(rms, 3) + (is_calibrate ? " px per corner" : " px"));
+  if (const double rms = document.estimated("rms_range_m"); rms > 0.0)
+    parts.push_back("ranges " + number_text(1e3 * rms, 3) + " mm");
   if (const double seconds = total_seconds(document); std::isfinite(seconds))
     parts.push_back(number_text(seconds, 2) + " s");
   std::string line;

@@ -35,7 +35,7 @@ std::string_view page_script() {
     for (const part of ['picture', 'marks'])
       all('use[data-part=' + part + ']').forEach((use) => use.setAttribute('href', '#' + part + '-' + photo));
     all('[data-part=caption]').forEach((caption) => { caption.textContent = thumb.dataset.caption; });
-    all('svg.stage').forEach((stage) => stage.setAttribute('aria-label', 'Residual arrows in the photo ' + thumb.dataset.caption));
+    all('svg.stage').forEach((stage) => stage.setAttribute('aria-label', thumb.dataset.label || 'Residual arrows in the photo ' + thumb.dataset.caption));
   };
   const step = (by) => order.length && choose(order[(order.indexOf(chosen) + by + order.length) % order.length]);
   document.getElementById('theme').onclick = toggleTheme;

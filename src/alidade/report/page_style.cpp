@@ -113,6 +113,21 @@ constexpr std::string_view time_rules = R"css(
 .sphere{fill:var(--panel);stroke:var(--muted)}.near-line{stroke:var(--muted);stroke-opacity:.22}.footprint{stroke:var(--orange);stroke-width:1.3;fill:none}
 )css";
 
+constexpr std::string_view beam_rules = R"css(
+.beam{stroke:var(--bad);stroke-width:1.8}.beam-cone{fill:var(--bad);fill-opacity:.16;stroke:var(--bad);stroke-opacity:.45;stroke-width:1}
+.beam-ring{stroke:var(--bad);stroke-opacity:.75}.origin-ellipsoid{fill:var(--bad);fill-opacity:.3;stroke:var(--bad)}.beam-origin{fill:var(--bad);stroke:var(--card);stroke-width:1.2}
+.plane{fill:var(--blue);fill-opacity:.12;stroke:var(--blue);stroke-opacity:.8}.plane-unused{fill:url(#hatch);fill-opacity:.3;stroke:var(--muted);stroke-dasharray:4 3}
+.hit{fill:var(--blue);stroke:var(--card)}.hit-unused{fill:var(--card);stroke:var(--muted);stroke-width:1.3}
+.chosen .plane,.chosen .plane-unused{stroke:var(--orange);stroke-opacity:1;stroke-width:2.4}.chosen .hit{fill:var(--orange)}.board:hover .plane{fill-opacity:.35}
+.expected{fill:var(--muted);fill-opacity:.26}.unused-span{fill:url(#hatch);fill-opacity:.28}.chosen .slot{fill:var(--orange);fill-opacity:.14}.slot{fill:transparent}
+.left-ring{fill:none;stroke:var(--ink);stroke-width:1.3}.cross-mark{stroke:var(--bad);stroke-width:2.2}.mark.ink{fill:var(--ink)}
+.bound-under{stroke:var(--orange);stroke-opacity:.4;stroke-width:8;stroke-linejoin:round}.ellipse-fill{fill:var(--blue);fill-opacity:.22;stroke:var(--blue);stroke-width:1.6}.cell-number{font-size:11px;text-anchor:middle}
+.best-cell{fill:none;stroke:var(--orange);stroke-width:3.2}.chips>div{display:flex;flex-wrap:wrap;gap:6px}.chips figcaption{margin:0}
+.beam-line-halo{stroke:#000;stroke-opacity:.55;stroke-width:3.6}.beam-line{stroke:#ff5a36;stroke-width:1.7}.beam-mark{fill:#ff5a36;stroke:#000;stroke-opacity:.6}
+.spot-halo{stroke:#000;stroke-opacity:.65;stroke-width:4}.spot-seen{stroke:#fff;stroke-width:1.9}.spot-other{stroke:#fff;stroke-opacity:.75;stroke-width:5;stroke-linecap:round}
+.spot-predicted{stroke:#ffd84d;stroke-width:2}.inset{fill:#262b31}.inset-halo{fill:none;stroke:#000;stroke-opacity:.7;stroke-width:7}.inset-frame{fill:none;stroke:#fff;stroke-width:3}.empty-picture{fill:#3a4048}
+)css";
+
 constexpr std::string_view size_rules = R"css(
 @media(min-width:1000px) and (max-width:1380px){main{grid-auto-flow:dense}
 .card:not([style*=":24"],[style*=":18"],[style*=":16"],[style*=":14"]){grid-column:span 12}.card[style*=":18"],.card[style*=":16"],.card[style*=":14"]{grid-column:span 24}}
@@ -135,6 +150,7 @@ std::string page_style() {
   out += frame_rules;
   out += drawing_rules;
   out += time_rules;
+  out += beam_rules;
   for (int direction = 0; direction < num_directions; ++direction)
     out += fmt::format(".d{}{{stroke:{}}}", direction, hex(direction_colour(direction)));
   out += size_rules;

@@ -220,7 +220,7 @@ TEST(ReportPage, ShowsADifferenceOfCameras) {
 }
 
 TEST(ReportPage, ShowsAnyOtherCommand) {
-  Json document{{"schema", "alidade-result/1"}, {"command", "rangefinder"}};
+  Json document{{"schema", "alidade-result/1"}, {"command", "rig"}};
   document["verdict"] = {{"state", "not_converged"}, {"sentence", "No convergence after 60 steps."}};
   document["estimate"] = {{"origin_m", {0.1, 0.2, 0.3}}};
   document["stddev"] = {{"origin_m", {0.001, 0.002, 0.003}}};

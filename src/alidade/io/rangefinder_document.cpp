@@ -1,5 +1,6 @@
 #include "alidade/io/rangefinder_document.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -145,19 +146,37 @@ void add_left_out(const std::vector<LeftOutShot>& left_out, ResultDocument& docu
   rms["rms_px"] = num_spots > 0 ? std::sqrt(squares_px2 / num_spots) : not_there;
 }
 
+Numbers sorted_unique(Numbers values) {
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+  return values;
+}
+
+/// Distances by rows, tilts by columns; a pose that does not fit into the picture is null.
 void add_gains(const std::vector<ShotGain>& gains, ResultDocument& document) {
   if (gains.empty()) return;
-  std::size_t cols = 1;  // tilts of the first distance
-  while (cols < gains.size() && gains[cols].distance_m == gains[0].distance_m) ++cols;
+  Numbers distances, tilts;
+  for (const ShotGain& gain : gains) {
+    distances.push_back(gain.distance_m);
+    tilts.push_back(gain.tilt_rad);
+  }
+  distances = sorted_unique(std::move(distances));
+  tilts = sorted_unique(std::move(tilts));
   DataGrid grid;
   grid.name = "next_shot";
-  grid.cols = static_cast<int>(cols);
-  grid.rows = static_cast<int>(gains.size() / cols);
-  Numbers distance, tilt, sigma;
+  grid.cols = static_cast<int>(tilts.size());
+  grid.rows = static_cast<int>(distances.size());
+  Numbers distance, tilt, sigma(distances.size() * tilts.size(), not_there);
+  for (const double d : distances) {
+    for (const double angle : tilts) {
+      distance.push_back(d);
+      tilt.push_back(angle);
+    }
+  }
   for (const ShotGain& gain : gains) {
-    distance.push_back(gain.distance_m);
-    tilt.push_back(gain.tilt_rad);
-    sigma.push_back(gain.sigma_point_m);
+    const auto row = std::lower_bound(distances.begin(), distances.end(), gain.distance_m) - distances.begin();
+    const auto col = std::lower_bound(tilts.begin(), tilts.end(), gain.tilt_rad) - tilts.begin();
+    sigma[static_cast<std::size_t>(row) * tilts.size() + static_cast<std::size_t>(col)] = gain.sigma_point_m;
   }
   grid.values = {{"distance_m", distance}, {"tilt_rad", tilt}, {"sigma_point_m", sigma}};
   document.grids.push_back(std::move(grid));

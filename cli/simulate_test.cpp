@@ -87,7 +87,7 @@ TEST(Simulate, WithoutANameListsTheScenarios) {
   const Outcome outcome = testing::run_program({ALIDADE_EXECUTABLE, "simulate"});
   EXPECT_EQ(outcome.code, 2);
   EXPECT_EQ(outcome.err,
-            "alidade: error: simulate: a command is required: board, rotation; see alidade simulate --help\n");
+            "alidade: error: simulate: a command is required: board, rangefinder, rotation; see alidade simulate --help\n");
 }
 
 }  // namespace

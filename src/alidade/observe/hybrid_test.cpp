@@ -21,7 +21,7 @@ using testing::paper_experiment;
 using testing::quantile;
 using testing::run;
 constexpr int num_sets = 200;
-const PixelScale paper_scale = testing::experiment_scale;
+using testing::paper_scale;
 
 TEST(Hybrid, ReachesTheCramerRaoBoundAndSaysSo) {
   Experiment experiment = paper_experiment(6.0);
@@ -79,6 +79,34 @@ struct Errors {
     return worst;
   }
 };
+
+/// The paper's experiment 1: its noise on one coordinate of each point.
+TEST(Hybrid, IsWithinOnePercentByTwoSecondsOfThePapersNoise) {
+  std::vector<double> within_s;
+  std::vector<double> rms[4];
+  for (int set = 0; set < num_sets; ++set) {
+    Experiment experiment = paper_experiment(20.0);
+    experiment.log.sigma_px = 0.0;
+    RotationLog log = log_of(experiment, set);
+    testing::add_paper_noise(log, static_cast<std::uint64_t>(set) + 7);
+    double bad_until_s = 0.0;
+    Eigen::Vector4d squares = Eigen::Vector4d::Zero();
+    int late = 0;
+    run(experiment, log,
+        [&](std::size_t, const RotationRow& row, const Eigen::Vector4d& error, const IntrinsicsEstimate& estimate) {
+          const bool is_good =
+              estimate.has_value && (error.cwiseAbs().array() < 0.01 * testing::paper_truth.array()).all();
+          if (!is_good) bad_until_s = row.t_s;
+          if (row.t_s < 14.0) return;
+          squares += error.cwiseAbs2();
+          ++late;
+        });
+    within_s.push_back(bad_until_s);
+    for (int i = 0; i < 4; ++i) rms[i].push_back(std::sqrt(squares[i] / late));
+  }
+  EXPECT_LE(quantile(within_s, 0.9), 2.0);
+  for (const auto& of_one : rms) EXPECT_LE(quantile(of_one, 0.9), 0.5);
+}
 
 TEST(Hybrid, FollowsARampOfZoom) {
   Experiment experiment = paper_experiment(20.0);

@@ -1,16 +1,15 @@
 #pragma once
 
-#include <algorithm>
 #include <functional>
 #include <vector>
 
 #include "alidade/observe/hybrid.h"
 #include "alidade/simulate/rotation.h"
+#include "alidade/testing/rotation_sample.h"
 
 namespace alidade::testing {
 
 // The paper's camera, picture and start (28); points drawn anew for each set; noise σ² = 0.1 px² on every coordinate.
-inline const PixelScale experiment_scale{{390.0, 291.0}, 400.0};
 
 struct Experiment {
   RotationScene scene;
@@ -36,7 +35,7 @@ inline RotationLog log_of(Experiment& experiment, int set) {
 inline HybridObserver paper_observer(const ObserveNuisances& estimate = {}) {
   HybridConfig config;
   config.num_points = 4;
-  config.scale = experiment_scale;
+  config.scale = paper_scale;
   config.start.k = {500.0 / 400.0, 510.0 / 400.0, 10.0 / 400.0, 9.0 / 400.0};
   config.start_is_given = true;
   config.nuisances = estimate;
@@ -56,13 +55,6 @@ inline void run(const Experiment& experiment, const RotationLog& log, const Watc
   }
 }
 
-inline double quantile(std::vector<double> values, double share) {
-  const auto at = static_cast<std::ptrdiff_t>(
-      std::min(share * static_cast<double>(values.size()), static_cast<double>(values.size() - 1)));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
-}
-
 /// Cramér–Rao bound of the first `rows` rows: σ of fx, fy, cx, cy at the truth, by the information of all pixels.
 inline Eigen::Vector4d bound_of(const Experiment& experiment, const RotationLog& log, std::size_t rows) {
   RotationBundle bundle;
@@ -78,7 +70,7 @@ inline Eigen::Vector4d bound_of(const Experiment& experiment, const RotationLog&
     bundle.frames.push_back(reader.next(log.rows[k]));
     for (int i = 0; i < 4; ++i) {
       bundle.observations.push_back(
-          {static_cast<int>(k), i, experiment_scale.normalised(log.rows[k].px[static_cast<std::size_t>(i)])});
+          {static_cast<int>(k), i, paper_scale.normalised(log.rows[k].px[static_cast<std::size_t>(i)])});
     }
   }
   BundleConfig config;

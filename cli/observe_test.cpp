@@ -169,7 +169,9 @@ TEST_F(Film, GivesFocalLengthsWithinThreePerMilleAndThreeSigma) {
   for (const auto& [name, value] : truth) {
     const double estimate = document["estimate"]["camera"][name], sigma = document["stddev"]["camera"][name];
     RecordProperty(name, std::to_string(estimate) + " +- " + std::to_string(sigma));
-    if (name[0] == 'f') EXPECT_NEAR(estimate, value, 0.003 * value) << name;
+    if (name[0] == 'f') {
+      EXPECT_NEAR(estimate, value, 0.003 * value) << name;
+    }
     EXPECT_NEAR(estimate, value, 3.0 * sigma) << name;
   }
 }

@@ -43,26 +43,26 @@ std::optional<BroadcastMotion> broadcast(const std::string& name) {
 const double sway_s = 2.0 * std::numbers::pi / 0.8;
 
 /// Points all around the field, of which the picture holds a dozen at a time.
-RotationLog log_of(const BroadcastMotion& motion, double sway_s, std::uint64_t seed) {
+RotationLog log_of(const BroadcastMotion& motion, double first_s, std::uint64_t seed) {
   RotationScene scene;
   scene.width_px = 1280;
   scene.height_px = 720;
   Draws draws(seed);
   for (int i = 0; i < 60; ++i)
     scene.start_px.emplace_back(draws.uniform(-1200.0, 2500.0), draws.uniform(-300.0, 1000.0));
-  scene.intrinsics = [&motion, sway_s](double t_s) {
-    const double f = motion.at(motion.f_px, t_s - sway_s);
+  scene.intrinsics = [&motion, first_s](double t_s) {
+    const double f = motion.at(motion.f_px, t_s - first_s);
     return RotatingIntrinsics{f, f, 640.0, 360.0};
   };
-  scene.motion = [&motion, sway_s](double t_s) {
-    const Eigen::Vector3d broadcast(motion.at(motion.pan_rad, t_s - sway_s), motion.at(motion.tilt_rad, t_s - sway_s),
+  scene.motion = [&motion, first_s](double t_s) {
+    const Eigen::Vector3d broadcast(motion.at(motion.pan_rad, t_s - first_s), motion.at(motion.tilt_rad, t_s - first_s),
                                     0.0);
-    return Eigen::Vector3d(broadcast + (t_s < sway_s ? 0.5 : 0.0) * paper_pan_tilt(t_s, 0.0));
+    return Eigen::Vector3d(broadcast + (t_s < first_s ? 0.5 : 0.0) * paper_pan_tilt(t_s, 0.0));
   };
   RotationLogConfig config;
   config.source = RotationSource::head;
   config.rate_hz = motion.rate_hz;
-  config.duration_s = sway_s + static_cast<double>(motion.f_px.size() - 1) / motion.rate_hz;
+  config.duration_s = first_s + static_cast<double>(motion.f_px.size() - 1) / motion.rate_hz;
   config.sigma_px = 0.3;
   config.clip_to_picture = true;
   return simulate_rotation(scene, config, seed);

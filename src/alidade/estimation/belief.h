@@ -1,0 +1,23 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace alidade {
+
+/// A Gaussian over N numbers: mean x and covariance P.
+template <int N>
+struct Belief {
+  static constexpr int dim = N;
+  Eigen::Vector<double, N> x = Eigen::Vector<double, N>::Zero();
+  Eigen::Matrix<double, N, N> P = Eigen::Matrix<double, N, N>::Identity();
+};
+
+/// Copies the upper triangle onto the lower one. Write recursions so that the upper one is right.
+template <int N>
+void mirror_upper(Eigen::Matrix<double, N, N>& P) {
+  for (int i = 1; i < N; ++i) {
+    for (int j = 0; j < i; ++j) P(i, j) = P(j, i);
+  }
+}
+
+}  // namespace alidade

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <concepts>
+
+#include "alidade/estimation/belief.h"
+
+namespace alidade {
+
+/// How a target moves between measurements: the belief dt ≥ 0 later. The first three numbers of every state are the
+/// position [m], the next three the velocity [m/s]; the frame is the caller's and does not turn.
+template <class Model>
+concept MotionModel = requires(const Model& model, const Belief<Model::dim>& belief, double dt_s) {
+  { Model::dim } -> std::convertible_to<int>;
+  { model.transition(belief.x, dt_s) } -> std::same_as<Eigen::Vector<double, Model::dim>>;
+  { model.transition_jacobian(belief.x, dt_s) } -> std::same_as<Eigen::Matrix<double, Model::dim, Model::dim>>;
+  { model.noise(dt_s) } -> std::same_as<Eigen::Matrix<double, Model::dim, Model::dim>>;
+  { model.predicted(belief, dt_s) } -> std::same_as<Belief<Model::dim>>;
+};
+
+/// σ_a is the acceleration that, held for this long and then drawn anew, moves the target as white noise of density
+/// q = σ_a² · 0.05 s does.
+inline constexpr double acceleration_hold_s = 0.05;
+
+/// Constant velocity: F = [I, Δ; 0, I], Q = q [Δ³/3, Δ²/2; Δ²/2, Δ].
+/// Bar-Shalom, Li & Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001, section 6.2.2.
+struct ConstantVelocity {
+  static constexpr int dim = 6;
+  double sigma_a_m_s2 = 1.0;  ///< About the target's peak acceleration.
+
+  [[nodiscard]] double density() const { return sigma_a_m_s2 * sigma_a_m_s2 * acceleration_hold_s; }
+  [[nodiscard]] Eigen::Vector<double, 6> transition(const Eigen::Vector<double, 6>& x, double dt_s) const;
+  [[nodiscard]] Eigen::Matrix<double, 6, 6> transition_jacobian(const Eigen::Vector<double, 6>& x, double dt_s) const;
+  [[nodiscard]] Eigen::Matrix<double, 6, 6> noise(double dt_s) const;
+  [[nodiscard]] Belief<6> predicted(const Belief<6>& belief, double dt_s) const;
+};
+
+/// Velocity that returns to rest: dv = −v/τ dt + noise that holds its σ at σ_v. (Ornstein–Uhlenbeck.)
+struct MeanReverting {
+  static constexpr int dim = 6;
+  double sigma_v_m_s = 0.9;
+  double tau_s = 0.7;
+
+  [[nodiscard]] Eigen::Vector<double, 6> transition(const Eigen::Vector<double, 6>& x, double dt_s) const;
+  [[nodiscard]] Eigen::Matrix<double, 6, 6> transition_jacobian(const Eigen::Vector<double, 6>& x, double dt_s) const;
+  [[nodiscard]] Eigen::Matrix<double, 6, 6> noise(double dt_s) const;
+  [[nodiscard]] Belief<6> predicted(const Belief<6>& belief, double dt_s) const;
+};
+
+/// Acceleration that returns to zero: da = −a/τ dt + noise that holds its σ at σ_a. State [p, v, a].
+/// R. A. Singer, "Estimating optimal tracking filter performance for manned maneuvering targets", 1970.
+struct Singer {
+  static constexpr int dim = 9;
+  double sigma_a_m_s2 = 1.0;
+  double tau_s = 0.5;
+
+  [[nodiscard]] Eigen::Vector<double, 9> transition(const Eigen::Vector<double, 9>& x, double dt_s) const;
+  [[nodiscard]] Eigen::Matrix<double, 9, 9> transition_jacobian(const Eigen::Vector<double, 9>& x, double dt_s) const;
+  [[nodiscard]] Eigen::Matrix<double, 9, 9> noise(double dt_s) const;
+  [[nodiscard]] Belief<9> predicted(const Belief<9>& belief, double dt_s) const;
+};
+
+/// Turn in space: dv = ω × v dt + noise, ω a random walk. State [p, v, ω], ω in rad/s.
+/// Bar-Shalom, Li & Kirubarajan, 2001, section 11.7, in three dimensions.
+struct CoordinatedTurn {
+  static constexpr int dim = 9;
+  double sigma_a_m_s2 = 0.3;                 ///< Of what is no turn; 0.3 of what constant velocity would need.
+  double turn_density_rad_s_per_rt_s = 2.0;  ///< ω drifts by this in a second.
+
+  [[nodiscard]] Eigen::Vector<double, 9> transition(const Eigen::Vector<double, 9>& x, double dt_s) const;
+  [[nodiscard]] Eigen::Matrix<double, 9, 9> transition_jacobian(const Eigen::Vector<double, 9>& x, double dt_s) const;
+  [[nodiscard]] Eigen::Matrix<double, 9, 9> noise(double dt_s) const;
+  [[nodiscard]] Belief<9> predicted(const Belief<9>& belief, double dt_s) const;
+};
+
+static_assert(MotionModel<ConstantVelocity> && MotionModel<MeanReverting> && MotionModel<Singer> &&
+              MotionModel<CoordinatedTurn>);
+
+}  // namespace alidade

@@ -6,13 +6,13 @@ import sys
 
 FOUNDATIONS = {"geometry", "estimation"}
 SENSORS = {"camera", "pantilt", "beam", "board", "imaging"}
-ESTIMATORS = {"calibrate", "observe", "rangefinder"}
+ESTIMATORS = {"calibrate", "observe", "rangefinder", "rig"}
 
 MAY_INCLUDE = {
     "geometry": set(),
     "estimation": set(),
     "camera": FOUNDATIONS,
-    "pantilt": FOUNDATIONS,
+    "pantilt": FOUNDATIONS | {"camera"},
     "board": FOUNDATIONS | {"camera"},
     "beam": FOUNDATIONS | {"camera", "board"},
     "imaging": FOUNDATIONS | {"camera", "board"},

@@ -1,0 +1,135 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+
+#include "alidade/camera/camera.h"
+#include "alidade/geometry/rigid3.h"
+
+// The general pan-tilt head; docs/maths/pan-tilt-heads.md. Angles at every interface are what the encoders READ, as
+// (pan, tilt) [rad]; the head itself stands at scale · (reading − zero). Pan > 0 turns left, tilt > 0 turns up.
+
+namespace alidade {
+
+/// How the readings of a head become angles of its axes: angle = scale · (reading − zero).
+struct Encoder {
+  double pan_zero_rad = 0.0;  ///< What is read where the pan angle is zero.
+  double tilt_zero_rad = 0.0;
+  double pan_scale = 1.0;
+  double tilt_scale = 1.0;
+  double sigma_rad = 0.0;  ///< Of a reading.
+
+  [[nodiscard]] Eigen::Vector2d angles(const Eigen::Vector2d& readings_rad) const {
+    return {pan_scale * (readings_rad.x() - pan_zero_rad), tilt_scale * (readings_rad.y() - tilt_zero_rad)};
+  }
+  [[nodiscard]] Eigen::Vector2d readings(const Eigen::Vector2d& angles_rad) const {
+    return {angles_rad.x() / pan_scale + pan_zero_rad, angles_rad.y() / tilt_scale + tilt_zero_rad};
+  }
+  bool operator==(const Encoder&) const = default;
+};
+
+/// A pan-over-tilt head with its camera's mounting. A point goes from the world into the camera by
+///     point_in_pan = Exp(pan e_y) point_in_base − pan_to_tilt_m       (y of the base is the pan axis)
+///     point_in_tilt = Exp(−tilt e_x) point_in_pan − tilt_to_cam_m     (x of `pan` is the tilt axis)
+///     point_in_cam = cam_from_tilt point_in_tilt
+struct Head {
+  int id = 1;
+  Rigid3 world_from_base;
+  Eigen::Vector3d pan_to_tilt_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d tilt_to_cam_m = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond cam_from_tilt = Eigen::Quaterniond::Identity();
+  Encoder encoder;
+};
+
+/// A head and the camera that it carries.
+struct RigHead {
+  Head head;
+  Camera camera;
+};
+
+/// The parameters of a head in their order: world_from_base ξ (translation, rotation; on the right), pan_to_tilt,
+/// tilt_to_cam, cam_from_tilt (rotation, on the right), pan zero, tilt zero, pan scale, tilt scale.
+inline constexpr int num_head_params = 19;
+inline constexpr std::array<const char*, num_head_params> head_param_names{
+    "base_x_m",        "base_y_m",        "base_z_m",        "base_rx_rad",     "base_ry_rad",
+    "base_rz_rad",     "pan_to_tilt_x_m", "pan_to_tilt_y_m", "pan_to_tilt_z_m", "tilt_to_cam_x_m",
+    "tilt_to_cam_y_m", "tilt_to_cam_z_m", "cam_rx_rad",      "cam_ry_rad",      "cam_rz_rad",
+    "pan_zero_rad",    "tilt_zero_rad",   "pan_scale",       "tilt_scale"};
+using HeadVector = Eigen::Matrix<double, num_head_params, 1>;
+
+/// The head moved by a small step of its parameters.
+[[nodiscard]] Head retract(const Head& head, const HeadVector& step);
+
+/// Where the camera of a head is, at these readings.
+[[nodiscard]] Rigid3 world_from_cam(const Head& head, const Eigen::Vector2d& pan_tilt_rad);
+[[nodiscard]] Rigid3 cam_from_world(const Head& head, const Eigen::Vector2d& pan_tilt_rad);
+[[nodiscard]] Eigen::Vector3d cam_centre_in_world(const Head& head, const Eigen::Vector2d& pan_tilt_rad);
+
+/// A head at one pair of readings, its sines and matrices computed: what to hold where many points are projected.
+struct TurnedHead {
+  TurnedHead(const Head& head, const Eigen::Vector2d& pan_tilt_rad);
+
+  Eigen::Matrix3d cam_from_world_rotation;
+  Eigen::Vector3d cam_from_world_translation;
+  Eigen::Matrix3d cam_from_base_rotation;
+  Eigen::Matrix3d cam_from_tilt_rotation;
+  Eigen::Matrix3d tilt_from_pan_rotation;
+  Eigen::Matrix3d pan_from_base_rotation;
+  Eigen::Vector3d pan_to_tilt_m, tilt_to_cam_m;
+  Eigen::Vector2d angle_per_reading;       ///< The encoder's scales.
+  Eigen::Vector2d readings_from_zero_rad;  ///< Reading − zero.
+
+  [[nodiscard]] Eigen::Vector3d point_in_cam(const Eigen::Vector3d& point_in_world) const {
+    return cam_from_world_rotation * point_in_world + cam_from_world_translation;
+  }
+  /// ∂ point_in_cam / ∂ point_in_world is cam_from_world_rotation; by the readings (pan, tilt):
+  [[nodiscard]] Eigen::Matrix<double, 3, 2> J_point_readings(const Eigen::Vector3d& point_in_cam) const;
+  /// ∂ point_in_cam / ∂ the head's parameters.
+  [[nodiscard]] Eigen::Matrix<double, 3, num_head_params> J_point_head(const Eigen::Vector3d& point_in_cam) const;
+};
+
+struct HeadPixel {
+  Eigen::Vector2d px;
+  Eigen::Vector3d point_in_cam;
+  Eigen::Matrix<double, 2, 3> J_px_point;     ///< By the point in the world.
+  Eigen::Matrix<double, 2, 2> J_px_readings;  ///< By the readings (pan, tilt).
+};
+
+/// Pixel of a point of the world through the whole lens, or none where the camera does not see it.
+[[nodiscard]] std::optional<HeadPixel> project(const TurnedHead& turned, const Camera& camera,
+                                               const Eigen::Vector3d& point_in_world);
+[[nodiscard]] std::optional<HeadPixel> project(const RigHead& rig_head, const Eigen::Vector2d& pan_tilt_rad,
+                                               const Eigen::Vector3d& point_in_world);
+
+/// The same with the derivatives by the head's parameters.
+struct HeadPixelOfParams {
+  HeadPixel pixel;
+  Eigen::Matrix<double, 2, num_head_params> J_px_head;
+};
+[[nodiscard]] std::optional<HeadPixelOfParams> project_with_head(const RigHead& rig_head,
+                                                                 const Eigen::Vector2d& pan_tilt_rad,
+                                                                 const Eigen::Vector3d& point_in_world);
+
+/// A straight line of sight.
+struct WorldRay {
+  Eigen::Vector3d origin_in_world;
+  Eigen::Vector3d direction_in_world;  ///< Unit vector.
+};
+/// What a pixel looks along, at these readings. None where the lens has no ray there.
+[[nodiscard]] std::optional<WorldRay> ray_in_world(const RigHead& rig_head, const Eigen::Vector2d& pan_tilt_rad,
+                                                   const Eigen::Vector2d& px);
+
+/// The readings (pan in (−π, π] of angle) at which the camera sees a point of the world on a ray of its own, its axis
+/// if not said: exact at once for a head without offsets, at most 6 steps of Newton else. None: no such readings.
+[[nodiscard]] std::optional<Eigen::Vector2d> aim(const Head& head, const Eigen::Vector3d& point_in_world,
+                                                 const Eigen::Vector3d& ray_in_cam = Eigen::Vector3d::UnitZ());
+
+/// M = K [R | t] (3×4) at these readings: (u, v, 1) ~ M (X, Y, Z, 1), the lens without its distortion.
+[[nodiscard]] Eigen::Matrix<double, 3, 4> projection_matrix(const RigHead& rig_head,
+                                                            const Eigen::Vector2d& pan_tilt_rad);
+
+/// The two heads of Xiahou, Chen & Wu, 2015: no offsets, 0.50 m apart along x, f = 337.84 px, 320 × 240.
+[[nodiscard]] std::array<RigHead, 2> xiahou_rig();
+
+}  // namespace alidade

@@ -1,0 +1,109 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <concepts>
+#include <optional>
+
+#include "alidade/estimation/belief.h"
+
+namespace alidade {
+
+/// Two numbers seen of a position, and their derivative by it: a pixel, in whatever frame the position is.
+struct PositionSeen {
+  Eigen::Vector2d z;
+  Eigen::Matrix<double, 2, 3> J_z_position;
+};
+
+/// h(position), or none where it cannot be seen.
+template <class See>
+concept SeesPosition = requires(const See& see, const Eigen::Vector3d& position) {
+  { see(position) } -> std::same_as<std::optional<PositionSeen>>;
+};
+
+struct IteratedUpdateConfig {
+  int max_iterations = 4;   ///< Gauss–Newton steps.
+  double tolerance = 1e-3;  ///< Stop where the next step would move the measurement by less than this many σ.
+};
+
+/// What was expected of a measurement before it was used: innovation ν = z − h(x) and its covariance S.
+struct Innovation {
+  Eigen::Vector2d nu = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d S = Eigen::Matrix2d::Identity();
+  double nis = 0.0;  ///< νᵀ S⁻¹ ν: χ² with 2 degrees of freedom where the models hold.
+};
+
+/// S⁻¹ of a symmetric 2×2, or NaN where it has none.
+[[nodiscard]] inline Eigen::Matrix2d inverse_of_symmetric(const Eigen::Matrix2d& S) {
+  const double determinant = S(0, 0) * S(1, 1) - S(0, 1) * S(0, 1);
+  const double scale = determinant > 0.0 ? 1.0 / determinant : std::nan("");
+  Eigen::Matrix2d inverse;
+  inverse << S(1, 1) * scale, -S(0, 1) * scale, -S(0, 1) * scale, S(0, 0) * scale;
+  return inverse;
+}
+
+template <int N>
+[[nodiscard]] Innovation innovation_of(const Belief<N>& belief, const PositionSeen& expected, const Eigen::Vector2d& z,
+                                       const Eigen::Matrix2d& R) {
+  Innovation result;
+  const Eigen::Matrix<double, 2, 3> HP = expected.J_z_position * belief.P.template topLeftCorner<3, 3>();
+  result.nu = z - expected.z;
+  result.S = HP * expected.J_z_position.transpose() + R;
+  result.nis = result.nu.dot(inverse_of_symmetric(result.S) * result.nu);
+  return result;
+}
+
+/// P − K H P − (P − K H P) Hᵀ Kᵀ + K R Kᵀ, where H sees the position alone: Joseph's form with products of rank 2.
+/// G. J. Bierman, "Factorization Methods for Discrete Sequential Estimation", 1977, section II.5.
+template <int N>
+void joseph_update(Eigen::Matrix<double, N, N>& P, const Eigen::Matrix<double, N, 2>& K,
+                   const Eigen::Matrix<double, N, 2>& PHt, const Eigen::Matrix2d& HPHt, const Eigen::Matrix2d& R) {
+  const Eigen::Matrix2d S = HPHt + R;
+  for (int i = 0; i < N; ++i) {  // by hand: small products of fixed size leave no temporary and half the work
+    const double k0 = K(i, 0), k1 = K(i, 1);
+    const double m0 = k0 * S(0, 0) + k1 * S(1, 0) - PHt(i, 0), m1 = k0 * S(0, 1) + k1 * S(1, 1) - PHt(i, 1);
+    for (int j = i; j < N; ++j) P(i, j) += m0 * K(j, 0) + m1 * K(j, 1) - k0 * PHt(j, 0) - k1 * PHt(j, 1);
+  }
+  mirror_upper<N>(P);
+}
+
+/// Iterated extended Kalman update: x ← x̂ + K_j (z − h(x_j) − H_j (x̂ − x_j)), the covariance by Joseph's form at the
+/// last H. `expected` is see(x̂). None where an iterate cannot be seen or nothing finite comes out; use the prior then.
+/// Bell & Cathey, "The iterated Kalman filter update as a Gauss–Newton method", 1993.
+template <int N, SeesPosition See>
+[[nodiscard]] std::optional<Belief<N>> iterated_update(const Belief<N>& prior, const PositionSeen& expected,
+                                                       const Eigen::Vector2d& z, const Eigen::Matrix2d& R,
+                                                       const See& see, const IteratedUpdateConfig& config = {}) {
+  const Eigen::Matrix3d P_position = prior.P.template topLeftCorner<3, 3>();
+  const Eigen::Vector3d start = prior.x.template head<3>();
+  const double tolerance2 = config.tolerance * config.tolerance;
+  PositionSeen seen = expected;
+  Eigen::Vector3d position = start;
+  Eigen::Matrix<double, 2, 3> H;
+  Eigen::Matrix2d HPHt, S_inverse;
+  Eigen::Vector2d weighted;
+  for (int iteration = 0; iteration < config.max_iterations; ++iteration) {
+    H = seen.J_z_position;
+    const Eigen::Matrix<double, 3, 2> PHt = P_position * H.transpose();
+    HPHt.noalias() = H * PHt;
+    S_inverse = inverse_of_symmetric(HPHt + R);
+    weighted = S_inverse * (z - seen.z - H * (start - position));
+    const Eigen::Vector3d next = start + PHt * weighted;
+    if (iteration + 1 == config.max_iterations) break;
+    const std::optional<PositionSeen> there = see(next);
+    if (!there) return std::nullopt;
+    const Eigen::Vector2d bend = there->z - seen.z - H * (next - position);
+    if (bend[0] * bend[0] < tolerance2 * R(0, 0) && bend[1] * bend[1] < tolerance2 * R(1, 1)) break;
+    position = next;
+    seen = *there;
+  }
+  Belief<N> result = prior;
+  const Eigen::Matrix<double, N, 2> PHt = prior.P.template leftCols<3>() * H.transpose();
+  const Eigen::Matrix<double, N, 2> K = PHt * S_inverse;
+  result.x += PHt * weighted;
+  joseph_update<N>(result.P, K, PHt, HPHt, R);
+  if (!result.x.allFinite() || !(result.P.diagonal().minCoeff() > 0.0)) return std::nullopt;
+  return result;
+}
+
+}  // namespace alidade

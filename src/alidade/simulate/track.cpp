@@ -1,0 +1,171 @@
+#include "alidade/simulate/track.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "alidade/simulate/draws.h"
+
+namespace alidade {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+/// Where the paper's target starts, of which the circles are drawn. [m]
+const Vector3d circle_start(0.173, -0.314, 0.636);
+
+std::function<Vector3d(double)> circle(double radius_m, double period_s) {
+  return [=](double t_s) {
+    const double angle = 2.0 * std::numbers::pi * t_s / period_s;
+    return Vector3d(circle_start + radius_m * Vector3d(std::cos(angle) - 1.0, std::sin(angle), 0.0));
+  };
+}
+
+/// The paper's heads as they would be built: axes that do not meet, bases and cameras a few degrees askew.
+void make_general(std::vector<RigHead>& heads) {
+  heads[0].head.pan_to_tilt_m = {0.012, -0.021, 0.016};
+  heads[0].head.tilt_to_cam_m = {-0.014, 0.011, 0.028};
+  heads[0].head.cam_from_tilt = exp_so3({0.035, -0.044, 0.052});
+  heads[0].head.world_from_base.rotation = exp_so3({-0.038, 0.042, 0.036});
+  heads[1].head.pan_to_tilt_m = {-0.017, 0.013, -0.022};
+  heads[1].head.tilt_to_cam_m = {0.019, -0.025, 0.015};
+  heads[1].head.cam_from_tilt = exp_so3({-0.047, 0.036, -0.041});
+  heads[1].head.world_from_base.rotation = exp_so3({0.051, -0.037, -0.044});
+}
+
+struct Turn {
+  double start_s, duration_s;
+  Vector3d axis;
+};
+constexpr double turn_rate_rad_s = 4.0;  // 1.5 m/s round 0.375 m: 6 m/s²
+
+const std::array<Turn, 5> turns{{{1.4985, 0.767, {0.0, -0.98665574, -0.16282031}},
+                                 {3.7655, 0.433, {0.00830493, -0.99868267, -0.05063544}},
+                                 {5.6985, 0.631, {0.27225479, -0.96188979, -0.02540382}},
+                                 {7.8295, 0.529, {0.24943754, -0.96831824, -0.01186178}},
+                                 {9.8585, 0.346, {0.24783512, -0.93820624, -0.24155083}}}};
+
+/// ∫ Exp(axis ω s) v ds over a turn that is still going on.
+Vector3d moved_in_turn(const Vector3d& velocity, const Vector3d& axis, double angle) {
+  return (std::sin(angle) * velocity + (1.0 - std::cos(angle)) * axis.cross(velocity)) / turn_rate_rad_s;
+}
+
+/// A head that turns after its target: first order, the target's angles held for 5 ms.
+class Follower {
+ public:
+  Follower(const TrackScene& scene, std::size_t head) : scene_(scene), head_(scene.heads[head].head) {
+    angles_ = aimed(0.0).value_or(Vector2d::Zero());
+  }
+  /// Readings without noise at a time; call in order of time.
+  const Vector2d& at(double t_s) {
+    const int steps = std::max(1, static_cast<int>(std::ceil((t_s - t_s_) / 0.005)));
+    const double dt_s = (t_s - t_s_) / steps;
+    const double share = scene_.aiming_lag_s > 0.0 ? 1.0 - std::exp(-dt_s / scene_.aiming_lag_s) : 1.0;
+    for (int i = 1; i <= steps; ++i) {
+      const auto goal = aimed(t_s_ + (scene_.aiming_lag_s > 0.0 ? i - 0.5 : i) * dt_s);
+      if (goal) angles_ += share * (*goal - angles_);
+    }
+    t_s_ = t_s;
+    return angles_;
+  }
+
+ private:
+  [[nodiscard]] std::optional<Vector2d> aimed(double t_s) const { return aim(head_, scene_.position(t_s)); }
+  const TrackScene& scene_;
+  const Head& head_;
+  Vector2d angles_;
+  double t_s_ = 0.0;
+};
+
+bool is_hidden(const TrackScene& scene, std::size_t head, double t_s) {
+  return std::ranges::any_of(scene.occlusions, [&](const Occlusion& occlusion) {
+    return occlusion.head == head && t_s >= occlusion.from_s && t_s < occlusion.to_s;
+  });
+}
+
+bool is_in_picture(const Camera& camera, const Vector2d& px) {
+  return px.x() >= -0.5 && px.y() >= -0.5 && px.x() <= camera.width_px - 0.5 && px.y() <= camera.height_px - 0.5;
+}
+
+void add_sights(const TrackScene& scene, std::size_t head, std::uint64_t seed, std::vector<SimulatedSight>& sights) {
+  Draws draws(2 * seed + 1000003 * head);
+  Follower follower(scene, head);
+  const double late_s = scene.latency_s + (scene.more_latency_s.empty() ? 0.0 : scene.more_latency_s[head]);
+  for (int k = 0;; ++k) {
+    const double t_s = scene.phase_s[head] + k / scene.rate_hz[head];
+    if (t_s > scene.duration_s) return;
+    const Vector2d angles = follower.at(t_s);
+    const Vector2d noise_px = scene.sigma_px * draws.normal2(), noise_rad = scene.sigma_encoder_rad * draws.normal2();
+    const auto seen = project(scene.heads[head], angles, scene.position(t_s));
+    if (!seen || is_hidden(scene, head, t_s)) continue;
+    const Vector2d px = seen->px + noise_px;
+    if (!is_in_picture(scene.heads[head].camera, px)) continue;
+    sights.push_back({t_s, t_s + late_s, head, angles + noise_rad, px});
+  }
+}
+
+TrackScene scene_named(std::string name) {
+  TrackScene scene;
+  scene.name = std::move(name);
+  const std::array<RigHead, 2> rig = xiahou_rig();
+  scene.heads.assign(rig.begin(), rig.end());
+  for (RigHead& head : scene.heads) head.head.encoder.sigma_rad = scene.sigma_encoder_rad;
+  scene.rate_hz = {20.0, 20.0};
+  scene.phase_s = {0.0, 0.0};
+  return scene;
+}
+
+}  // namespace
+
+Eigen::Vector3d manoeuvre_position(double t_s) {
+  Vector3d position(0.2, -0.2, 3.0), velocity(1.5, 0.0, 0.0);
+  double now_s = 0.0;
+  for (const Turn& turn : turns) {
+    if (t_s <= turn.start_s) break;
+    position += (turn.start_s - now_s) * velocity;
+    const double turning_s = std::min(t_s - turn.start_s, turn.duration_s);
+    const double angle = turn_rate_rad_s * turning_s;
+    position += moved_in_turn(velocity, turn.axis, angle);
+    velocity = exp_so3(angle * turn.axis) * velocity;
+    now_s = turn.start_s + turning_s;
+  }
+  return position + std::max(0.0, t_s - now_s) * velocity;
+}
+
+std::vector<std::string> track_scenarios() { return {"A", "A2", "B", "C", "D", "E", "F", "G"}; }
+
+std::optional<TrackScene> track_scenario(std::string_view name) {
+  if (std::ranges::count(track_scenarios(), name) == 0) return std::nullopt;
+  TrackScene scene = scene_named(std::string(name));
+  if (name == "A" || name == "A2") {
+    scene.position = circle(0.1, 10.0);
+    scene.sigma_a_m_s2 = 0.06;
+    if (name == "A2") make_general(scene.heads);
+  } else if (name == "B" || name == "E") {
+    scene.position = circle(0.2, 3.0);
+    scene.duration_s = 6.0;
+    scene.sigma_a_m_s2 = 1.0;
+  } else {
+    scene.position = manoeuvre_position;
+    scene.duration_s = 11.0;
+    scene.sigma_a_m_s2 = 6.0;
+  }
+  if (name == "E" || name == "F") scene.latency_s = 0.1;
+  if (name == "G") {
+    scene.rate_hz = {20.0, 30.0};
+    scene.phase_s = {0.0, 0.007};
+  }
+  if (name == "D") scene.occlusions = {{1, 3.0, 5.0}, {0, 7.0, 7.5}, {1, 7.0, 7.5}};
+  return scene;
+}
+
+std::vector<SimulatedSight> simulate_track(const TrackScene& scene, std::uint64_t seed) {
+  std::vector<SimulatedSight> sights;
+  for (std::size_t head = 0; head < scene.heads.size(); ++head) add_sights(scene, head, seed, sights);
+  std::ranges::stable_sort(sights, {}, &SimulatedSight::t_arrival_s);
+  return sights;
+}
+
+}  // namespace alidade

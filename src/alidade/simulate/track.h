@@ -1,0 +1,58 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/pantilt/head.h"
+
+namespace alidade {
+
+/// A time during which a head sees nothing.
+struct Occlusion {
+  std::size_t head;
+  double from_s, to_s;
+};
+
+/// A world for `track`: where the target goes, and the heads that follow it, each late by a first-order lag.
+struct TrackScene {
+  std::string name;
+  std::vector<RigHead> heads;
+  std::function<Eigen::Vector3d(double t_s)> position;  ///< In the world. [m]
+  double duration_s = 10.0;
+  std::vector<double> rate_hz;         ///< One a head: pictures.
+  std::vector<double> phase_s;         ///< One a head: when its first picture is taken.
+  double latency_s = 0.0;              ///< Capture to arrival.
+  std::vector<double> more_latency_s;  ///< One a head, added; empty: none.
+  double aiming_lag_s = 0.34;          ///< Time constant of the heads. 0: they always point at the target.
+  double sigma_px = 0.5, sigma_encoder_rad = 0.0008726646259971648;
+  double sigma_a_m_s2 = 1.0;  ///< What a filter should be told of the target.
+  std::vector<Occlusion> occlusions;
+};
+
+/// One picture of one head: what the encoders read at its capture, and where the target was seen.
+struct SimulatedSight {
+  double t_capture_s = 0.0, t_arrival_s = 0.0;
+  std::size_t head = 0;
+  Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+};
+
+/// The scenarios by name: A (slow circle), A2 (the same, heads with offsets and turned mountings), B (fast circle),
+/// C (manoeuvre), D (C, occluded), E (B, 100 ms late), F (C, 100 ms late), G (C, 20 and 30 pictures a second), line
+/// (one straight path at rest before). None for an unknown name.
+[[nodiscard]] std::optional<TrackScene> track_scenario(std::string_view name);
+[[nodiscard]] std::vector<std::string> track_scenarios();
+
+/// The manoeuvre of scenario C: 11 s between 0.9 and 3.9 m, up to 1.5 m/s and 6 m/s².
+[[nodiscard]] Eigen::Vector3d manoeuvre_position(double t_s);
+
+/// All sights in order of arrival; pictures without the target in them are not there. Same seed, same sights.
+[[nodiscard]] std::vector<SimulatedSight> simulate_track(const TrackScene& scene, std::uint64_t seed);
+
+}  // namespace alidade

@@ -1,0 +1,101 @@
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <optional>
+
+#include "alidade/estimation/interacting_models.h"
+#include "alidade/estimation/iterated_update.h"
+#include "alidade/estimation/motion_models.h"
+#include "alidade/track/sight.h"
+
+// The beliefs that a tracker can carry, behind one surface: start, predict, expect, update, estimate.
+
+namespace alidade {
+
+/// A target that moves by one model.
+template <MotionModel Model>
+struct ModelFilter {
+  static constexpr bool can_smooth = true;
+  struct Models {
+    Model motion;
+    double start_sigma_rest = 1.0;  ///< Of what the state holds beyond position and velocity, at the start.
+  };
+  Belief<Model::dim> belief;
+
+  void start(const Models& models, const Belief<6>& first) {
+    belief.x.setZero();
+    belief.P.setIdentity();
+    belief.P *= models.start_sigma_rest * models.start_sigma_rest;
+    belief.x.template head<6>() = first.x;
+    belief.P.template topLeftCorner<6, 6>() = first.P;
+  }
+  void predict(const Models& models, double dt_s) {
+    if (dt_s > 0.0) belief = models.motion.predicted(belief, dt_s);
+  }
+  [[nodiscard]] Eigen::Vector3d position() const { return belief.x.template head<3>(); }
+  [[nodiscard]] Innovation expect(const PositionSeen& seen, const Eigen::Vector2d& z, const Eigen::Matrix2d& R) const {
+    return innovation_of(belief, seen, z, R);
+  }
+  /// False, and no change, where the update has no answer.
+  [[nodiscard]] bool update(const PositionSeen& seen, const Eigen::Vector2d& z, const Eigen::Matrix2d& R,
+                            const SightModel& see, const IteratedUpdateConfig& config) {
+    const auto updated = iterated_update(belief, seen, z, R, see, config);
+    if (updated) belief = *updated;
+    return updated.has_value();
+  }
+  [[nodiscard]] Belief<6> estimate() const {
+    return {belief.x.template head<6>(), belief.P.template topLeftCorner<6, 6>()};
+  }
+  /// This belief, given what was learnt until dt later: one step back of the smoother.
+  /// Rauch, Tung & Striebel, "Maximum likelihood estimates of linear dynamic systems", 1965.
+  [[nodiscard]] ModelFilter smoothed(const Models& models, const ModelFilter& later, double dt_s) const {
+    if (!(dt_s > 0.0)) return later;
+    const Belief<Model::dim> ahead = models.motion.predicted(belief, dt_s);
+    const Eigen::Matrix<double, Model::dim, Model::dim> FP =
+        models.motion.transition_jacobian(belief.x, dt_s) * belief.P;
+    const Eigen::Matrix<double, Model::dim, Model::dim> G = ahead.P.ldlt().solve(FP).transpose();
+    ModelFilter result = *this;
+    result.belief.x += G * (later.belief.x - ahead.x);
+    result.belief.P += G * (later.belief.P - ahead.P) * G.transpose();
+    mirror_upper<Model::dim>(result.belief.P);
+    return result;
+  }
+};
+
+/// A target that is now quiet, now agile.
+struct InteractingFilter {
+  static constexpr bool can_smooth = false;
+  using Models = InteractingModels;
+  InteractingBelief belief;
+
+  void start(const Models& models, const Belief<6>& first) {
+    belief.quiet = first;
+    ModelFilter<Singer> agile;
+    agile.start({models.agile, models.agile.sigma_a_m_s2}, first);
+    belief.agile = agile.belief;
+    belief.mu.setConstant(0.5);
+  }
+  void predict(const Models& models, double dt_s) { belief.predict(models, dt_s); }
+  [[nodiscard]] Eigen::Vector3d position() const {
+    return belief.mu[0] * belief.quiet.x.head<3>() + belief.mu[1] * belief.agile.x.head<3>();
+  }
+  [[nodiscard]] Innovation expect(const PositionSeen& seen, const Eigen::Vector2d& z, const Eigen::Matrix2d& R) const {
+    return innovation_of(belief.merged(), seen, z, R);
+  }
+  [[nodiscard]] bool update(const PositionSeen&, const Eigen::Vector2d& z, const Eigen::Matrix2d& R,
+                            const SightModel& see, const IteratedUpdateConfig& config) {
+    const auto by_quiet = see(belief.quiet.x.head<3>()), by_agile = see(belief.agile.x.head<3>());
+    if (!by_quiet || !by_agile) return false;
+    const auto quiet = iterated_update(belief.quiet, *by_quiet, z, R, see, config);
+    const auto agile = iterated_update(belief.agile, *by_agile, z, R, see, config);
+    if (!quiet || !agile) return false;
+    belief.weigh(innovation_of(belief.quiet, *by_quiet, z, R), innovation_of(belief.agile, *by_agile, z, R));
+    belief.quiet = *quiet;
+    belief.agile = *agile;
+    return true;
+  }
+  [[nodiscard]] Belief<6> estimate() const { return belief.merged(); }
+};
+
+}  // namespace alidade

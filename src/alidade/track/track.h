@@ -1,0 +1,64 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/estimation/verdict.h"
+#include "alidade/track/tracker.h"
+#include "alidade/track/xiahou_filter.h"
+
+namespace alidade {
+
+/// A target's true position at some times, in order of time.
+struct TrueTrack {
+  std::vector<double> t_s;
+  std::vector<Eigen::Vector3d> position;
+
+  /// Between two times: on the straight line. None before the first and after the last.
+  [[nodiscard]] std::optional<Eigen::Vector3d> at(double t_s) const;
+};
+
+struct TrackConfig {
+  TrackerConfig tracker;
+  bool find_sigma_a = true;  ///< Take the σ_a that makes the innovations most probable, not the tracker's.
+  double warm_up_s = 0.5;    ///< After the start of a track: not counted in errors and statistics.
+};
+
+/// A predicted position beyond the newest capture time. NaN: none.
+struct TrackReport {
+  double sigma_a_m_s2 = 0.0;
+  std::vector<TrackStep> steps;  ///< One a sight, in their order.
+  std::size_t num_used = 0, num_starts = 0;
+  /// With truth, after the warm-up; NaN without.
+  double rms_m = std::numeric_limits<double>::quiet_NaN();
+  double mean_error_m = std::numeric_limits<double>::quiet_NaN();
+  double nees_per_dof = std::numeric_limits<double>::quiet_NaN();
+  double pcrlb_m = std::numeric_limits<double>::quiet_NaN();
+  double nis_per_dof = std::numeric_limits<double>::quiet_NaN();  ///< Of the used sights; gated ones count at the gate.
+  std::vector<double> nees;                                       ///< One a step; NaN where there is no truth.
+};
+
+/// Follows a target through all sights, in order of arrival.
+[[nodiscard]] TrackReport track_target(std::span<const TargetSight> sights, std::span<const RigHead> heads,
+                                       const TrackConfig& config, const TrueTrack& truth = {});
+
+/// The same by the filter of Xiahou et al.: its steps have a position and σ, and no innovations.
+[[nodiscard]] TrackReport track_target_xiahou(std::span<const TargetSight> sights, std::span<const RigHead> heads,
+                                              const XiahouConfig& config, const TrueTrack& truth = {});
+
+/// σ of the position (root of the trace) after each sight that no estimator can undercut on average, for a target
+/// that moves by white acceleration along this path: posterior Cramér–Rao bound of this trajectory. The information
+/// of the sights is taken at the truth. Tichavský, Muravchik & Nehorai, 1998, with one trajectory.
+[[nodiscard]] std::vector<double> track_bound(std::span<const TargetSight> sights, std::span<const RigHead> heads,
+                                              const TrackConfig& config, const TrueTrack& truth);
+
+/// Whether the track stands; where it does not, whether swapped heads or angles in degrees would explain it.
+[[nodiscard]] Verdict track_verdict(const TrackReport& report, std::span<const TargetSight> sights,
+                                    std::span<const RigHead> heads, const TrackConfig& config);
+
+}  // namespace alidade

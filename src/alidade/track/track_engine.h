@@ -1,0 +1,241 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "alidade/track/tracker.h"
+
+namespace alidade::detail {
+
+/// The tracker for one kind of filter: the last moments of sights and of beliefs after them, in order of capture, so
+/// that a sight that comes late is put in its place and what follows is done again.
+template <class Filter>
+class TrackEngine {
+ public:
+  using Models = typename Filter::Models;
+
+  TrackEngine(std::vector<RigHead> heads, const TrackerConfig& config, const Models& models)
+      : heads_(std::move(heads)), config_(config), models_(models), kept_(std::max<std::size_t>(8, config.most_kept)) {}
+
+  TrackStep take(const TargetSight& sight) {
+    if (!is_in_picture(sight)) return rejected(TrackEvent::outside);
+    std::size_t place = count_;
+    while (place > 0 && entry(place - 1).sight.t_capture_s > sight.t_capture_s) --place;
+    const bool is_late = place < count_ && (newest().sight.t_capture_s - sight.t_capture_s > config_.history_s ||
+                                            (place == 0 && has_forgotten_));
+    if (is_late) return rejected(TrackEvent::late);
+    place -= make_room(place);
+    for (std::size_t i = count_; i > place; --i) entry(i) = entry(i - 1);
+    ++count_;
+    entry(place).sight = sight;
+    TrackStep step;
+    apply(place, step);
+    for (std::size_t i = place + 1; i < count_; ++i) {
+      TrackStep again;
+      apply(i, again);
+    }
+    report_newest(step);
+    return step;
+  }
+
+  [[nodiscard]] std::optional<Belief<6>> at(double t_s) const {
+    if (count_ == 0 || !newest().has_started || !(t_s >= newest().sight.t_capture_s)) return std::nullopt;
+    Filter filter = newest().filter;
+    filter.predict(models_, t_s - newest().sight.t_capture_s);
+    return filter.estimate();
+  }
+
+  [[nodiscard]] std::optional<Tracker::Smoothed> smoothed(double lag_s) const {
+    if constexpr (Filter::can_smooth) {
+      if (count_ == 0 || !newest().has_started) return std::nullopt;
+      Filter filter = newest().filter;
+      std::size_t i = count_ - 1;
+      while (newest().sight.t_capture_s - entry(i).sight.t_capture_s < lag_s) {
+        if (i == 0 || entry(i).began || !entry(i - 1).has_started) return std::nullopt;
+        filter =
+            entry(i - 1).filter.smoothed(models_, filter, entry(i).sight.t_capture_s - entry(i - 1).sight.t_capture_s);
+        --i;
+      }
+      return Tracker::Smoothed{entry(i).sight.t_capture_s, filter.estimate()};
+    } else {
+      return std::nullopt;
+    }
+  }
+
+ private:
+  /// A sight, and how things stood after it.
+  struct Entry {
+    TargetSight sight;
+    Filter filter;
+    bool has_started = false;
+    bool began = false;  ///< The track starts, or starts anew, here.
+    int num_rejected = 0;
+    std::size_t head = 0;  ///< That saw the target last, when, and when another did.
+    double t_head_s = 0.0, t_other_s = 0.0;
+  };
+
+  [[nodiscard]] Entry& entry(std::size_t i) { return kept_[(first_ + i) % kept_.size()]; }
+  [[nodiscard]] const Entry& entry(std::size_t i) const { return kept_[(first_ + i) % kept_.size()]; }
+  [[nodiscard]] const Entry& newest() const { return entry(count_ - 1); }
+
+  /// Forgets what nothing can be put before any more. Returns how many.
+  std::size_t make_room(std::size_t place) {
+    std::size_t dropped = 0;
+    const double oldest_s = newest_time() - config_.history_s;
+    while (count_ > 1 && dropped < place && (entry(1).sight.t_capture_s < oldest_s || count_ == kept_.size())) {
+      first_ = (first_ + 1) % kept_.size();
+      --count_;
+      ++dropped;
+      has_forgotten_ = true;
+    }
+    if (count_ == kept_.size()) --count_;  // the sight is older than all that is kept: the newest makes room
+    return dropped;
+  }
+  [[nodiscard]] double newest_time() const { return count_ > 0 ? newest().sight.t_capture_s : -1e300; }
+
+  [[nodiscard]] bool is_in_picture(const TargetSight& sight) const {
+    if (!(sight.head < heads_.size()) || !std::isfinite(sight.t_capture_s) || !sight.pan_tilt_rad.allFinite())
+      return false;
+    const Camera& camera = heads_[sight.head].camera;
+    return sight.px.x() >= -0.5 && sight.px.y() >= -0.5 && sight.px.x() <= camera.width_px - 0.5 &&
+           sight.px.y() <= camera.height_px - 0.5;
+  }
+  [[nodiscard]] double sigma_encoder(std::size_t head) const {
+    const double own = heads_[head].head.encoder.sigma_rad;
+    return own > 0.0 ? own : config_.sigma_encoder_rad;
+  }
+  [[nodiscard]] bool is_in_range(double depth_m) const {
+    return depth_m >= config_.min_depth_m && depth_m <= config_.max_depth_m;
+  }
+
+  TrackStep rejected(TrackEvent event) {
+    TrackStep step;
+    step.event = event;
+    report_newest(step);
+    return step;
+  }
+  void report_newest(TrackStep& step) const {
+    if (count_ == 0) return;
+    step.t_s = newest().sight.t_capture_s;
+    step.has_belief = newest().has_started;
+    if (step.has_belief) step.belief = newest().filter.estimate();
+  }
+
+  /// What becomes of the sight at this place, given the entry before it.
+  void apply(std::size_t place, TrackStep& step) {
+    Entry& now = entry(place);
+    now.began = false;
+    if (place == 0) {
+      now.has_started = false;
+      now.num_rejected = 0;
+      step.event = TrackEvent::waiting;
+      return;
+    }
+    const Entry& before = entry(place - 1);
+    now.filter = before.filter;
+    now.has_started = before.has_started;
+    now.num_rejected = before.num_rejected;
+    now.head = before.head;
+    now.t_head_s = before.t_head_s;
+    now.t_other_s = before.t_other_s;
+    if (!now.has_started) {
+      step.accepted = begin(place);
+      step.event = step.accepted ? TrackEvent::start : TrackEvent::waiting;
+      return;
+    }
+    now.filter.predict(models_, now.sight.t_capture_s - before.sight.t_capture_s);
+    step.event = use(now, step);
+    step.accepted = step.event == TrackEvent::none;
+    if (step.accepted) {
+      now.num_rejected = 0;
+      note_head(now);
+      if (now.t_head_s - now.t_other_s > one_head_after_s) step.event = TrackEvent::one_head;
+    } else if (++now.num_rejected >= config_.restart_after && begin(place)) {
+      step.event = TrackEvent::restart;
+      step.accepted = true;
+    }
+  }
+
+  void note_head(Entry& now) const {
+    if (now.sight.head != now.head) {
+      now.t_other_s = now.t_head_s;
+      now.head = now.sight.head;
+    }
+    now.t_head_s = now.sight.t_capture_s;
+  }
+
+  /// Updates with the sight, where the gates let it: then `none`.
+  TrackEvent use(Entry& now, TrackStep& step) const {
+    const SightModel see(heads_[now.sight.head], now.sight.pan_tilt_rad);
+    const Eigen::Vector3d position = now.filter.position();
+    if (!is_in_range(see.depth_m(position))) return TrackEvent::depth;
+    const auto expected = see(position);
+    if (!expected) return TrackEvent::depth;
+    const Eigen::Matrix2d R = see.noise(position, *expected, config_.sigma_px, sigma_encoder(now.sight.head));
+    step.innovation = now.filter.expect(*expected, now.sight.px, R);
+    step.has_innovation = true;
+    if (!(step.innovation.nis < config_.gate)) return TrackEvent::gated;
+    const Filter prior = now.filter;
+    if (!now.filter.update(*expected, now.sight.px, R, see, config_.update)) return TrackEvent::gated;
+    if (!is_in_range(see.depth_m(now.filter.position()))) {
+      now.filter = prior;
+      return TrackEvent::depth;
+    }
+    return TrackEvent::none;
+  }
+
+  /// Begins the track at this place from its sight and the last one of another head, if they are of about one time
+  /// and their rays meet in the working range.
+  bool begin(std::size_t place) {
+    Entry& now = entry(place);
+    for (std::size_t i = place; i-- > 0 && now.sight.t_capture_s - entry(i).sight.t_capture_s <= config_.together_s;) {
+      const Entry& other = entry(i);
+      if (other.sight.head == now.sight.head) continue;
+      const auto filter = begun(other.sight, now.sight);
+      if (!filter) return false;
+      now.filter = *filter;
+      now.has_started = now.began = true;
+      now.num_rejected = 0;
+      now.head = now.sight.head;
+      now.t_head_s = now.sight.t_capture_s;
+      now.t_other_s = other.sight.t_capture_s;
+      return true;
+    }
+    return false;
+  }
+
+  [[nodiscard]] std::optional<Filter> begun(const TargetSight& earlier, const TargetSight& later) const {
+    const auto ray_a = ray_in_world(heads_[earlier.head], earlier.pan_tilt_rad, earlier.px);
+    const auto ray_b = ray_in_world(heads_[later.head], later.pan_tilt_rad, later.px);
+    if (!ray_a || !ray_b) return std::nullopt;
+    const auto met = nearest_to_rays(*ray_a, *ray_b);
+    if (!met) return std::nullopt;
+    const double distance_m = (*met - ray_a->origin_in_world).norm();
+    const double sigma_m = std::max(config_.start_sigma_m, 0.1 * distance_m);
+    Belief<6> first;
+    first.x << *met, Eigen::Vector3d::Zero();
+    first.P.topLeftCorner<3, 3>() *= sigma_m * sigma_m;
+    first.P.bottomRightCorner<3, 3>() *= config_.start_sigma_v_m_s * config_.start_sigma_v_m_s;
+    Entry trial;
+    trial.filter.start(models_, first);
+    TrackStep ignored;
+    trial.sight = earlier;
+    if (use(trial, ignored) != TrackEvent::none) return std::nullopt;
+    trial.filter.predict(models_, later.t_capture_s - earlier.t_capture_s);
+    trial.sight = later;
+    if (use(trial, ignored) != TrackEvent::none) return std::nullopt;
+    return trial.filter;
+  }
+
+  static constexpr double one_head_after_s = 0.5;
+
+  std::vector<RigHead> heads_;
+  TrackerConfig config_;
+  Models models_;
+  std::vector<Entry> kept_;  ///< A ring: `count_` entries from `first_` on, in order of capture.
+  std::size_t first_ = 0, count_ = 0;
+  bool has_forgotten_ = false;
+};
+
+}  // namespace alidade::detail

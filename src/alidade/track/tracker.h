@@ -1,0 +1,91 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "alidade/estimation/interacting_models.h"
+#include "alidade/estimation/motion_models.h"
+#include "alidade/track/sight.h"
+
+namespace alidade {
+
+enum class TrackMethod { cv, singer, turn, resting, imm };
+
+/// The words of --method: cv, singer, turn, resting, imm.
+[[nodiscard]] std::string_view method_name(TrackMethod method);
+
+struct TrackerConfig {
+  TrackMethod method = TrackMethod::cv;
+  double sigma_px = 0.5;
+  double sigma_encoder_rad = 0.0008726646259971648;  ///< 0.05°; for heads whose encoder does not say its own.
+  double sigma_a_m_s2 = 1.0;                         ///< About the target's peak acceleration; see the models.
+  double singer_tau_s = 0.5;
+  double resting_sigma_v_m_s = 0.9, resting_tau_s = 0.7;
+  IteratedUpdateConfig update;
+  double gate = 25.0;  ///< On NIS, 2 degrees of freedom: a right sight fails it once in 270 000.
+  double min_depth_m = 0.2, max_depth_m = 20.0;  ///< The rig's working range, along a camera's view.
+  int restart_after = 2;                         ///< Rejections one after the other.
+  double together_s = 0.06;                      ///< Two heads that far apart in time still intersect.
+  double start_sigma_m = 1.0;                    ///< Or a tenth of the distance, where that is more.
+  double start_sigma_v_m_s = 2.0;
+  double history_s = 0.3;       ///< How late a sight may come.
+  std::size_t most_kept = 256;  ///< Sights within history_s; older ones can then no longer be overtaken.
+};
+
+enum class TrackEvent {
+  none,
+  waiting,   ///< No track yet: another head is needed to start it.
+  start,     ///< Track begun, by intersecting the rays of two heads.
+  restart,   ///< Begun anew: the old one did not agree with what was seen.
+  gated,     ///< Sight left out: NIS beyond the gate.
+  depth,     ///< Sight left out: the target would be outside the working range.
+  outside,   ///< Sight left out: its pixel is not in the picture, or not a number.
+  late,      ///< Sight left out: older than the history.
+  one_head,  ///< Used, but only one head has seen the target for a while: its range is drifting.
+};
+[[nodiscard]] std::string_view event_name(TrackEvent event);
+
+/// What became of one sight. The belief is that of the newest capture time so far, position and velocity in the world.
+struct TrackStep {
+  double t_s = 0.0;
+  bool has_belief = false;
+  Belief<6> belief;
+  TrackEvent event = TrackEvent::waiting;
+  bool accepted = false;
+  bool has_innovation = false;
+  Innovation innovation;  ///< At the sight's own capture time.
+};
+
+/// Follows a target in space through the pixels of moving heads, one sight at a time, each at its capture time and
+/// with the angles of that instant, in whatever order they arrive. Allocates nothing once made.
+/// Iterated extended Kalman filter on pixels; docs/maths/tracking.md.
+class Tracker {
+ public:
+  Tracker(std::vector<RigHead> heads, const TrackerConfig& config);
+  ~Tracker();
+  Tracker(Tracker&&) noexcept;
+  Tracker& operator=(Tracker&&) noexcept;
+
+  TrackStep take(const TargetSight& sight);
+  /// The newest belief predicted to a time; none before the start, or before the newest capture time.
+  [[nodiscard]] std::optional<Belief<6>> at(double t_s) const;
+  /// The belief at the newest capture time that is at least `lag_s` before the last, given all sights since (within the
+  /// history). None before the start, and for imm.
+  struct Smoothed {
+    double t_s;
+    Belief<6> belief;
+  };
+  [[nodiscard]] std::optional<Smoothed> smoothed(double lag_s) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// Where rays come nearest to one another, by least squares. None where they are parallel within 1 mrad.
+[[nodiscard]] std::optional<Eigen::Vector3d> nearest_to_rays(const WorldRay& a, const WorldRay& b);
+
+}  // namespace alidade

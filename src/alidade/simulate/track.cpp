@@ -150,7 +150,7 @@ std::optional<TrackScene> track_scenario(std::string_view name) {
   } else {
     scene.position = manoeuvre_position;
     scene.duration_s = 11.0;
-    scene.sigma_a_m_s2 = 6.0;
+    scene.sigma_a_m_s2 = 4.0;  // below the turns' 6 m/s², which last a third of the time
   }
   if (name == "E" || name == "F") scene.latency_s = 0.1;
   if (name == "G") {

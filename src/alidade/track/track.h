@@ -29,11 +29,13 @@ struct TrackConfig {
   double warm_up_s = 0.5;    ///< After the start of a track: not counted in errors and statistics.
 };
 
-/// A predicted position beyond the newest capture time. NaN: none.
+/// What became of all sights, and how good it is.
 struct TrackReport {
   double sigma_a_m_s2 = 0.0;
+  bool sigma_a_is_found = false;
   std::vector<TrackStep> steps;  ///< One a sight, in their order.
-  std::size_t num_used = 0, num_starts = 0;
+  std::size_t num_used = 0, num_starts = 0, num_restarts = 0;
+  double log_likelihood = 0.0;  ///< Of all innovations, but for a constant.
   /// With truth, after the warm-up; NaN without.
   double rms_m = std::numeric_limits<double>::quiet_NaN();
   double mean_error_m = std::numeric_limits<double>::quiet_NaN();

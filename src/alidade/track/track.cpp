@@ -1,0 +1,213 @@
+#include "alidade/track/track.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+namespace alidade {
+namespace {
+
+constexpr double not_there = std::numeric_limits<double>::quiet_NaN();
+
+TrackReport followed(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackerConfig& config) {
+  Tracker tracker({heads.begin(), heads.end()}, config);
+  TrackReport report;
+  report.sigma_a_m_s2 = config.sigma_a_m_s2;
+  report.steps.reserve(sights.size());
+  for (const TargetSight& sight : sights) {
+    const TrackStep step = tracker.take(sight);
+    report.num_used += step.accepted ? 1 : 0;
+    report.num_starts += step.event == TrackEvent::start ? 1 : 0;
+    report.num_restarts += step.event == TrackEvent::restart ? 1 : 0;
+    if (step.has_innovation)
+      report.log_likelihood -=
+          0.5 * (std::min(step.innovation.nis, config.gate) + std::log(step.innovation.S.determinant()));
+    report.steps.push_back(step);
+  }
+  return report;
+}
+
+/// The σ_a whose innovations are the most probable: eight to the decade would cost more and tell the same.
+double most_probable_sigma_a(std::span<const TargetSight> sights, std::span<const RigHead> heads,
+                             TrackerConfig config) {
+  constexpr std::size_t most_sights = 4000;  // a few minutes: enough to tell
+  const auto first = sights.first(std::min(sights.size(), most_sights));
+  double best = config.sigma_a_m_s2, most = -std::numeric_limits<double>::infinity();
+  for (int quarter = -6; quarter <= 6; ++quarter) {
+    config.sigma_a_m_s2 = std::pow(10.0, 0.25 * quarter);
+    const TrackReport report = followed(first, heads, config);
+    const double log_likelihood =
+        report.log_likelihood - config.gate * static_cast<double>(report.num_restarts);  // a restart hides its misfit
+    if (report.num_starts > 0 && log_likelihood > most) {
+      most = log_likelihood;
+      best = config.sigma_a_m_s2;
+    }
+  }
+  return best;
+}
+
+/// The sights that count in statistics: there is a belief, and the track is older than the warm-up.
+std::vector<bool> counted(const std::vector<TrackStep>& steps, double warm_up_s) {
+  std::vector<bool> result;
+  double began_s = std::numeric_limits<double>::infinity();
+  for (const TrackStep& step : steps) {
+    if (step.event == TrackEvent::start) began_s = step.t_s;
+    result.push_back(step.has_belief && step.t_s >= began_s + warm_up_s);
+  }
+  return result;
+}
+
+void add_errors(TrackReport& report, const std::vector<bool>& counts, const TrueTrack& truth,
+                std::span<const double> bound) {
+  double sum2 = 0.0, sum = 0.0, sum_nees = 0.0, sum_bound = 0.0, num = 0.0;
+  report.nees.assign(report.steps.size(), not_there);
+  for (std::size_t i = 0; i < report.steps.size(); ++i) {
+    const TrackStep& step = report.steps[i];
+    const auto position = truth.at(step.t_s);
+    if (!step.has_belief || !position) continue;
+    const Eigen::Vector3d error = step.belief.x.head<3>() - *position;
+    const Eigen::Matrix3d P = step.belief.P.topLeftCorner<3, 3>();
+    report.nees[i] = error.dot(P.inverse() * error);
+    if (!counts[i]) continue;
+    sum2 += error.squaredNorm();
+    sum += error.norm();
+    sum_nees += report.nees[i];
+    if (!bound.empty()) sum_bound += bound[i] * bound[i];
+    num += 1.0;
+  }
+  if (!(num > 0.0)) return;
+  report.rms_m = std::sqrt(sum2 / num);
+  report.mean_error_m = sum / num;
+  report.nees_per_dof = sum_nees / (3.0 * num);
+  if (!bound.empty()) report.pcrlb_m = std::sqrt(sum_bound / num);
+}
+
+/// The angles (pan, tilt) that an unturned head without offsets would have to look along a sight.
+std::optional<Eigen::Vector2d> angles_of_ray(const RigHead& head, const TargetSight& sight) {
+  const auto ray = ray_in_world(head, sight.pan_tilt_rad, sight.px);
+  if (!ray) return std::nullopt;
+  const Eigen::Vector3d& d = ray->direction_in_world;
+  return Eigen::Vector2d(-std::atan2(d.x(), d.z()), -std::atan2(d.y(), std::hypot(d.x(), d.z())));
+}
+
+TrackStep step_of(const XiahouFilter& filter, double t_s, const Eigen::Vector3d& origin) {
+  constexpr double m_per_cm = 0.01;
+  constexpr std::array<int, 6> place{0, 2, 4, 1, 3, 5};  // of x, y, z, vx, vy, vz in the paper's state
+  TrackStep step;
+  step.t_s = t_s;
+  step.has_belief = step.accepted = true;
+  step.event = TrackEvent::none;
+  for (int i = 0; i < 6; ++i) {
+    const int from = place[static_cast<std::size_t>(i)];
+    step.belief.x[i] = m_per_cm * filter.state().x[from];
+    for (int j = 0; j < 6; ++j)
+      step.belief.P(i, j) = m_per_cm * m_per_cm * filter.state().P(from, place[static_cast<std::size_t>(j)]);
+  }
+  step.belief.x.head<3>() += origin;
+  return step;
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector3d> TrueTrack::at(double time_s) const {
+  constexpr double slack_s = 1e-9;
+  if (t_s.empty() || !(time_s >= t_s.front() - slack_s) || !(time_s <= t_s.back() + slack_s)) return std::nullopt;
+  const auto after = std::ranges::lower_bound(t_s, time_s);
+  const auto i = static_cast<std::size_t>(after - t_s.begin());
+  if (i == 0) return position.front();
+  if (i == t_s.size()) return position.back();
+  const double share = (time_s - t_s[i - 1]) / (t_s[i] - t_s[i - 1]);
+  return Eigen::Vector3d((1.0 - share) * position[i - 1] + share * position[i]);
+}
+
+TrackReport track_target(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackConfig& config,
+                         const TrueTrack& truth) {
+  TrackConfig used = config;
+  if (config.find_sigma_a) used.tracker.sigma_a_m_s2 = most_probable_sigma_a(sights, heads, config.tracker);
+  TrackReport report = followed(sights, heads, used.tracker);
+  report.sigma_a_is_found = config.find_sigma_a;
+  const std::vector<bool> counts = counted(report.steps, config.warm_up_s);
+  double sum_nis = 0.0, num = 0.0;
+  for (std::size_t i = 0; i < report.steps.size(); ++i) {
+    if (!counts[i] || !report.steps[i].has_innovation) continue;
+    sum_nis += std::min(report.steps[i].innovation.nis, config.tracker.gate);
+    num += 1.0;
+  }
+  if (num > 0.0) report.nis_per_dof = sum_nis / (2.0 * num);
+  if (!truth.t_s.empty()) add_errors(report, counts, truth, track_bound(sights, heads, used, truth));
+  return report;
+}
+
+TrackReport track_target_xiahou(std::span<const TargetSight> sights, std::span<const RigHead> heads,
+                                const XiahouConfig& config, const TrueTrack& truth) {
+  constexpr double together_s = 0.06;
+  TrackReport report;
+  std::optional<XiahouFilter> filter;
+  std::array<std::optional<TargetSight>, 2> last;
+  double filter_time_s = 0.0;
+  const Eigen::Vector3d origin = heads.empty() ? Eigen::Vector3d::Zero() : heads[0].head.world_from_base.translation;
+  for (const TargetSight& sight : sights) {
+    TrackStep step;
+    if (filter) step = step_of(*filter, filter_time_s, origin);
+    step.accepted = false;
+    if (sight.head < 2) last[sight.head] = sight;
+    if (sight.head < 2 && last[0] && last[1] && std::abs(last[0]->t_capture_s - last[1]->t_capture_s) <= together_s) {
+      std::array<std::optional<Eigen::Vector2d>, 2> angles{last[0]->pan_tilt_rad, last[1]->pan_tilt_rad};
+      for (std::size_t i = 0; i < 2 && config.use_pixels; ++i) angles[i] = angles_of_ray(heads[i], *last[i]);
+      const double t_s = std::max(last[0]->t_capture_s, last[1]->t_capture_s);
+      const auto k =
+          angles[0] && angles[1] ? pseudo_measurement(*angles[0], *angles[1], config.baseline_cm) : std::nullopt;
+      if (k && (!filter || t_s > filter_time_s)) {
+        const bool starts = !filter;
+        if (starts) filter.emplace(config, position_of_pseudo_measurement(*k, config.baseline_cm));
+        if (!starts) filter->step(*k, t_s - filter_time_s);
+        filter_time_s = t_s;
+        step = step_of(*filter, t_s, origin);
+        if (starts) step.event = TrackEvent::start;
+        report.num_starts += starts ? 1 : 0;
+        report.num_used += 2;
+        last = {};
+      }
+    }
+    report.steps.push_back(step);
+  }
+  if (!truth.t_s.empty()) add_errors(report, counted(report.steps, TrackConfig{}.warm_up_s), truth, {});
+  return report;
+}
+
+std::vector<double> track_bound(std::span<const TargetSight> sights, std::span<const RigHead> heads,
+                                const TrackConfig& config, const TrueTrack& truth) {
+  std::vector<std::size_t> order(sights.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return sights[i].t_capture_s; });
+  const ConstantVelocity motion{config.tracker.sigma_a_m_s2};
+  Belief<6> belief;
+  belief.P.topLeftCorner<3, 3>() *= config.tracker.start_sigma_m * config.tracker.start_sigma_m;
+  belief.P.bottomRightCorner<3, 3>() *= config.tracker.start_sigma_v_m_s * config.tracker.start_sigma_v_m_s;
+  std::vector<double> sigma_m(sights.size(), not_there);
+  double now_s = order.empty() ? 0.0 : sights[order.front()].t_capture_s;
+  for (const std::size_t i : order) {
+    const TargetSight& sight = sights[i];
+    belief = motion.predicted(belief, sight.t_capture_s - now_s);
+    now_s = sight.t_capture_s;
+    const auto position = truth.at(now_s);
+    if (position && sight.head < heads.size()) {
+      const RigHead& head = heads[sight.head];
+      const SightModel see(head, sight.pan_tilt_rad);
+      const double own = head.head.encoder.sigma_rad;
+      belief.x.head<3>() = *position;
+      if (const auto seen = see(*position)) {
+        const Eigen::Matrix2d R =
+            see.noise(*position, *seen, config.tracker.sigma_px, own > 0.0 ? own : config.tracker.sigma_encoder_rad);
+        const auto updated = iterated_update(belief, *seen, seen->z, R, see, {.max_iterations = 1});
+        if (updated) belief = *updated;
+      }
+    }
+    sigma_m[i] = std::sqrt(belief.P.topLeftCorner<3, 3>().trace());
+  }
+  return sigma_m;
+}
+
+}  // namespace alidade

@@ -27,6 +27,7 @@ Belief<N> mixed(const Belief<N>& a, const Belief<N>& b, double weight_of_a) {
   Belief<N> result;
   result.x = weight_of_a * a.x + weight_of_b * b.x;
   result.P = weight_of_a * a.P + weight_of_b * b.P + (weight_of_a * weight_of_b) * apart * apart.transpose();
+  mirror_upper<N>(result.P);
   return result;
 }
 

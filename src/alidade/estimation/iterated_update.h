@@ -9,10 +9,11 @@
 
 namespace alidade {
 
-/// Two numbers seen of a position, and their derivative by it: a pixel, in whatever frame the position is.
+/// Two numbers seen of a position, their derivative by it, and their noise if it is there.
 struct PositionSeen {
   Eigen::Vector2d z;
   Eigen::Matrix<double, 2, 3> J_z_position;
+  Eigen::Matrix2d R;
 };
 
 /// h(position), or none where it cannot be seen.
@@ -43,12 +44,12 @@ struct Innovation {
 }
 
 template <int N>
-[[nodiscard]] Innovation innovation_of(const Belief<N>& belief, const PositionSeen& expected, const Eigen::Vector2d& z,
-                                       const Eigen::Matrix2d& R) {
+[[nodiscard]] Innovation innovation_of(const Belief<N>& belief, const PositionSeen& expected,
+                                       const Eigen::Vector2d& z) {
   Innovation result;
   const Eigen::Matrix<double, 2, 3> HP = expected.J_z_position * belief.P.template topLeftCorner<3, 3>();
   result.nu = z - expected.z;
-  result.S = HP * expected.J_z_position.transpose() + R;
+  result.S = HP * expected.J_z_position.transpose() + expected.R;
   result.nis = result.nu.dot(inverse_of_symmetric(result.S) * result.nu);
   return result;
 }
@@ -68,12 +69,12 @@ void joseph_update(Eigen::Matrix<double, N, N>& P, const Eigen::Matrix<double, N
 }
 
 /// Iterated extended Kalman update: x ← x̂ + K_j (z − h(x_j) − H_j (x̂ − x_j)), the covariance by Joseph's form at the
-/// last H. `expected` is see(x̂). None where an iterate cannot be seen or nothing finite comes out; use the prior then.
-/// Bell & Cathey, "The iterated Kalman filter update as a Gauss–Newton method", 1993.
+/// last H and R. `expected` is see(x̂). None where an iterate cannot be seen or nothing finite comes out; use the prior
+/// then. Bell & Cathey, "The iterated Kalman filter update as a Gauss–Newton method", 1993.
 template <int N, SeesPosition See>
 [[nodiscard]] std::optional<Belief<N>> iterated_update(const Belief<N>& prior, const PositionSeen& expected,
-                                                       const Eigen::Vector2d& z, const Eigen::Matrix2d& R,
-                                                       const See& see, const IteratedUpdateConfig& config = {}) {
+                                                       const Eigen::Vector2d& z, const See& see,
+                                                       const IteratedUpdateConfig& config = {}) {
   const Eigen::Matrix3d P_position = prior.P.template topLeftCorner<3, 3>();
   const Eigen::Vector3d start = prior.x.template head<3>();
   const double tolerance2 = config.tolerance * config.tolerance;
@@ -86,14 +87,14 @@ template <int N, SeesPosition See>
     H = seen.J_z_position;
     const Eigen::Matrix<double, 3, 2> PHt = P_position * H.transpose();
     HPHt.noalias() = H * PHt;
-    S_inverse = inverse_of_symmetric(HPHt + R);
+    S_inverse = inverse_of_symmetric(HPHt + seen.R);
     weighted = S_inverse * (z - seen.z - H * (start - position));
     const Eigen::Vector3d next = start + PHt * weighted;
     if (iteration + 1 == config.max_iterations) break;
     const std::optional<PositionSeen> there = see(next);
     if (!there) return std::nullopt;
     const Eigen::Vector2d bend = there->z - seen.z - H * (next - position);
-    if (bend[0] * bend[0] < tolerance2 * R(0, 0) && bend[1] * bend[1] < tolerance2 * R(1, 1)) break;
+    if (bend[0] * bend[0] < tolerance2 * seen.R(0, 0) && bend[1] * bend[1] < tolerance2 * seen.R(1, 1)) break;
     position = next;
     seen = *there;
   }
@@ -101,7 +102,7 @@ template <int N, SeesPosition See>
   const Eigen::Matrix<double, N, 2> PHt = prior.P.template leftCols<3>() * H.transpose();
   const Eigen::Matrix<double, N, 2> K = PHt * S_inverse;
   result.x += PHt * weighted;
-  joseph_update<N>(result.P, K, PHt, HPHt, R);
+  joseph_update<N>(result.P, K, PHt, HPHt, seen.R);
   if (!result.x.allFinite() || !(result.P.diagonal().minCoeff() > 0.0)) return std::nullopt;
   return result;
 }

@@ -19,27 +19,28 @@ struct TargetSight {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
 };
 
-/// h of one sight: the head as it stood, and its camera. Lives as long as the camera.
+/// h and R of one sight: the head as it stood, its camera, and the noise of pixel and encoder. Lives as long as the
+/// camera.
 struct SightModel {
   TurnedHead turned;
   const Camera* camera;
+  double variance_px2, variance_rad2;
 
-  SightModel(const RigHead& head, const Eigen::Vector2d& pan_tilt_rad)
-      : turned(head.head, pan_tilt_rad), camera(&head.camera) {}
+  SightModel(const RigHead& head, const Eigen::Vector2d& pan_tilt_rad, double sigma_px, double sigma_encoder_rad)
+      : turned(head.head, pan_tilt_rad),
+        camera(&head.camera),
+        variance_px2(sigma_px * sigma_px),
+        variance_rad2(sigma_encoder_rad * sigma_encoder_rad) {}
 
+  /// R = σ_px² I + σ_enc² J Jᵀ, J by the readings, at the position.
   [[nodiscard]] std::optional<PositionSeen> operator()(const Eigen::Vector3d& position) const {
-    const auto seen = project_with_jacobians(*camera, turned.point_in_cam(position));
+    const Eigen::Vector3d point_in_cam = turned.point_in_cam(position);
+    const auto seen = project_with_jacobians(*camera, point_in_cam);
     if (!seen) return std::nullopt;
-    return PositionSeen{seen->px, seen->J_px_point * turned.cam_from_world_rotation};
-  }
-
-  /// R = σ_px² I + σ_enc² J Jᵀ, J by the readings, there.
-  [[nodiscard]] Eigen::Matrix2d noise(const Eigen::Vector3d& position, const PositionSeen& seen, double sigma_px,
-                                      double sigma_encoder_rad) const {
-    const Eigen::Matrix<double, 2, 2> J = seen.J_z_position * turned.cam_from_world_rotation.transpose() *
-                                          turned.J_point_readings(turned.point_in_cam(position));
-    return sigma_px * sigma_px * Eigen::Matrix2d::Identity() +
-           sigma_encoder_rad * sigma_encoder_rad * J * J.transpose();
+    const Eigen::Matrix2d J = seen->J_px_point * turned.J_point_readings(point_in_cam);
+    PositionSeen result{seen->px, seen->J_px_point * turned.cam_from_world_rotation, variance_rad2 * J * J.transpose()};
+    result.R.diagonal().array() += variance_px2;
+    return result;
   }
 
   [[nodiscard]] double depth_m(const Eigen::Vector3d& position) const {

@@ -34,13 +34,13 @@ struct ModelFilter {
     if (dt_s > 0.0) belief = models.motion.predicted(belief, dt_s);
   }
   [[nodiscard]] Eigen::Vector3d position() const { return belief.x.template head<3>(); }
-  [[nodiscard]] Innovation expect(const PositionSeen& seen, const Eigen::Vector2d& z, const Eigen::Matrix2d& R) const {
-    return innovation_of(belief, seen, z, R);
+  [[nodiscard]] Innovation expect(const PositionSeen& seen, const Eigen::Vector2d& z) const {
+    return innovation_of(belief, seen, z);
   }
   /// False, and no change, where the update has no answer.
-  [[nodiscard]] bool update(const PositionSeen& seen, const Eigen::Vector2d& z, const Eigen::Matrix2d& R,
-                            const SightModel& see, const IteratedUpdateConfig& config) {
-    const auto updated = iterated_update(belief, seen, z, R, see, config);
+  [[nodiscard]] bool update(const PositionSeen& seen, const Eigen::Vector2d& z, const SightModel& see,
+                            const IteratedUpdateConfig& config) {
+    const auto updated = iterated_update(belief, seen, z, see, config);
     if (updated) belief = *updated;
     return updated.has_value();
   }
@@ -80,17 +80,17 @@ struct InteractingFilter {
   [[nodiscard]] Eigen::Vector3d position() const {
     return belief.mu[0] * belief.quiet.x.head<3>() + belief.mu[1] * belief.agile.x.head<3>();
   }
-  [[nodiscard]] Innovation expect(const PositionSeen& seen, const Eigen::Vector2d& z, const Eigen::Matrix2d& R) const {
-    return innovation_of(belief.merged(), seen, z, R);
+  [[nodiscard]] Innovation expect(const PositionSeen& seen, const Eigen::Vector2d& z) const {
+    return innovation_of(belief.merged(), seen, z);
   }
-  [[nodiscard]] bool update(const PositionSeen&, const Eigen::Vector2d& z, const Eigen::Matrix2d& R,
-                            const SightModel& see, const IteratedUpdateConfig& config) {
+  [[nodiscard]] bool update(const PositionSeen&, const Eigen::Vector2d& z, const SightModel& see,
+                            const IteratedUpdateConfig& config) {
     const auto by_quiet = see(belief.quiet.x.head<3>()), by_agile = see(belief.agile.x.head<3>());
     if (!by_quiet || !by_agile) return false;
-    const auto quiet = iterated_update(belief.quiet, *by_quiet, z, R, see, config);
-    const auto agile = iterated_update(belief.agile, *by_agile, z, R, see, config);
+    const auto quiet = iterated_update(belief.quiet, *by_quiet, z, see, config);
+    const auto agile = iterated_update(belief.agile, *by_agile, z, see, config);
     if (!quiet || !agile) return false;
-    belief.weigh(innovation_of(belief.quiet, *by_quiet, z, R), innovation_of(belief.agile, *by_agile, z, R));
+    belief.weigh(innovation_of(belief.quiet, *by_quiet, z), innovation_of(belief.agile, *by_agile, z));
     belief.quiet = *quiet;
     belief.agile = *agile;
     return true;

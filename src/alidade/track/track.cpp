@@ -195,13 +195,12 @@ std::vector<double> track_bound(std::span<const TargetSight> sights, std::span<c
     const auto position = truth.at(now_s);
     if (position && sight.head < heads.size()) {
       const RigHead& head = heads[sight.head];
-      const SightModel see(head, sight.pan_tilt_rad);
       const double own = head.head.encoder.sigma_rad;
+      const SightModel see(head, sight.pan_tilt_rad, config.tracker.sigma_px,
+                           own > 0.0 ? own : config.tracker.sigma_encoder_rad);
       belief.x.head<3>() = *position;
       if (const auto seen = see(*position)) {
-        const Eigen::Matrix2d R =
-            see.noise(*position, *seen, config.tracker.sigma_px, own > 0.0 ? own : config.tracker.sigma_encoder_rad);
-        const auto updated = iterated_update(belief, *seen, seen->z, R, see, {.max_iterations = 1});
+        const auto updated = iterated_update(belief, *seen, seen->z, see, {.max_iterations = 1});
         if (updated) belief = *updated;
       }
     }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -70,7 +71,9 @@ class TrackEngine {
     Filter filter;
     bool has_started = false;
     bool began = false;  ///< The track starts, or starts anew, here.
-    int num_rejected = 0;
+    /// Of each head, one after the other: counted together, a head that keeps failing would be hidden by one that does
+    /// not. Heads beyond the eighth share the last place.
+    std::array<int, 8> num_rejected{};
     std::size_t head = 0;  ///< That saw the target last, when, and when another did.
     double t_head_s = 0.0, t_other_s = 0.0;
   };
@@ -128,7 +131,7 @@ class TrackEngine {
     now.began = false;
     if (place == 0) {
       now.has_started = false;
-      now.num_rejected = 0;
+      now.num_rejected = {};
       step.event = TrackEvent::waiting;
       return;
     }
@@ -147,11 +150,12 @@ class TrackEngine {
     now.filter.predict(models_, now.sight.t_capture_s - before.sight.t_capture_s);
     step.event = use(now, step);
     step.accepted = step.event == TrackEvent::none;
+    int& num_rejected = now.num_rejected[std::min(now.sight.head, now.num_rejected.size() - 1)];
     if (step.accepted) {
-      now.num_rejected = 0;
+      num_rejected = 0;
       note_head(now);
       if (now.t_head_s - now.t_other_s > one_head_after_s) step.event = TrackEvent::one_head;
-    } else if (++now.num_rejected >= config_.restart_after && begin(place)) {
+    } else if (++num_rejected >= config_.restart_after && begin(place)) {
       step.event = TrackEvent::restart;
       step.accepted = true;
     }
@@ -167,17 +171,17 @@ class TrackEngine {
 
   /// Updates with the sight, where the gates let it: then `none`.
   TrackEvent use(Entry& now, TrackStep& step) const {
-    const SightModel see(heads_[now.sight.head], now.sight.pan_tilt_rad);
+    const SightModel see(heads_[now.sight.head], now.sight.pan_tilt_rad, config_.sigma_px,
+                         sigma_encoder(now.sight.head));
     const Eigen::Vector3d position = now.filter.position();
     if (!is_in_range(see.depth_m(position))) return TrackEvent::depth;
     const auto expected = see(position);
     if (!expected) return TrackEvent::depth;
-    const Eigen::Matrix2d R = see.noise(position, *expected, config_.sigma_px, sigma_encoder(now.sight.head));
-    step.innovation = now.filter.expect(*expected, now.sight.px, R);
+    step.innovation = now.filter.expect(*expected, now.sight.px);
     step.has_innovation = true;
     if (!(step.innovation.nis < config_.gate)) return TrackEvent::gated;
     const Filter prior = now.filter;
-    if (!now.filter.update(*expected, now.sight.px, R, see, config_.update)) return TrackEvent::gated;
+    if (!now.filter.update(*expected, now.sight.px, see, config_.update)) return TrackEvent::gated;
     if (!is_in_range(see.depth_m(now.filter.position()))) {
       now.filter = prior;
       return TrackEvent::depth;
@@ -196,7 +200,7 @@ class TrackEngine {
       if (!filter) return false;
       now.filter = *filter;
       now.has_started = now.began = true;
-      now.num_rejected = 0;
+      now.num_rejected = {};
       now.head = now.sight.head;
       now.t_head_s = now.sight.t_capture_s;
       now.t_other_s = other.sight.t_capture_s;

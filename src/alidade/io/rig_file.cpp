@@ -1,0 +1,254 @@
+#include "alidade/io/rig_file.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "alidade/io/camera_file.h"
+#include "alidade/io/camera_formats.h"
+
+namespace alidade {
+namespace {
+
+using detail::Fields;
+using detail::number_list;
+using detail::number_text;
+using detail::refuse;
+
+void refuse_unknown_keys(const Fields& fields, const std::vector<std::string>& known, const char* what) {
+  for (const std::string& key : fields.keys()) {
+    if (std::find(known.begin(), known.end(), key) == known.end())
+      refuse(fields.file(), fields.full(key),
+             fmt::format("is not a key of {}; known: {}", what, fmt::join(known, " ")));
+  }
+}
+
+std::string vector_text(const Eigen::Vector3d& v) { return number_list({v.x(), v.y(), v.z()}); }
+
+std::string quaternion_text(const Eigen::Quaterniond& rotation) {
+  const double sign = rotation.w() < 0.0 ? -1.0 : 1.0;
+  return number_list({sign * rotation.w(), sign * rotation.x(), sign * rotation.y(), sign * rotation.z()});
+}
+
+std::string indented(const std::string& text, const std::string& margin) {
+  std::string out = margin;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    out += text[i];
+    if (text[i] == '\n' && i + 1 < text.size()) out += margin;
+  }
+  return out;
+}
+
+std::string head_text(const RigHead& rig_head, const std::string& camera_file) {
+  const Head& head = rig_head.head;
+  const Encoder& encoder = head.encoder;
+  std::string text = fmt::format("  - id: {}\n", head.id);
+  text += camera_file.empty()
+              ? "    camera:\n" + indented(camera_text(rig_head.camera, CameraFormat::alidade), "      ")
+              : fmt::format("    camera: {}\n", camera_file);
+  text += fmt::format("    world_from_base:\n      translation_m: {}\n      quaternion_wxyz: {}\n",
+                      vector_text(head.world_from_base.translation), quaternion_text(head.world_from_base.rotation));
+  text += fmt::format("    pan_to_tilt_m: {}\n    tilt_to_cam_m: {}\n", vector_text(head.pan_to_tilt_m),
+                      vector_text(head.tilt_to_cam_m));
+  text += fmt::format("    cam_from_tilt:\n      quaternion_wxyz: {}\n", quaternion_text(head.cam_from_tilt));
+  if (head.axes_skew_rad != 0.0) text += fmt::format("    axes_skew_rad: {}\n", number_text(head.axes_skew_rad));
+  text += fmt::format("    encoder:\n      pan_zero_rad: {}\n      tilt_zero_rad: {}\n",
+                      number_text(encoder.pan_zero_rad), number_text(encoder.tilt_zero_rad));
+  if (encoder.pan_scale != 1.0) text += fmt::format("      pan_scale: {}\n", number_text(encoder.pan_scale));
+  if (encoder.tilt_scale != 1.0) text += fmt::format("      tilt_scale: {}\n", number_text(encoder.tilt_scale));
+  return text + fmt::format("      sigma_rad: {}\n", number_text(encoder.sigma_rad));
+}
+
+/// Names of all parameters of all heads: "head1.base_x_m".
+std::vector<std::string> covariance_names(const std::vector<RigHead>& heads) {
+  std::vector<std::string> names;
+  for (const RigHead& rig_head : heads)
+    for (const char* name : head_param_names) names.push_back(fmt::format("head{}.{}", rig_head.head.id, name));
+  return names;
+}
+
+/// What is held has zero rows, and is not written.
+std::string covariance_text(const Rig& rig) {
+  const std::vector<std::string> names = covariance_names(rig.heads);
+  std::vector<std::string> free_names;
+  std::vector<Eigen::Index> free;
+  for (Eigen::Index i = 0; i < rig.cov.rows(); ++i) {
+    if (!(rig.cov(i, i) > 0.0)) continue;
+    free.push_back(i);
+    free_names.push_back(names[static_cast<std::size_t>(i)]);
+  }
+  std::vector<double> upper;
+  for (std::size_t i = 0; i < free.size(); ++i)
+    for (std::size_t j = i; j < free.size(); ++j) upper.push_back(rig.cov(free[i], free[j]));
+  return fmt::format(
+      "covariance:  # upper triangle, row by row; base and cam: small motions on the right\n"
+      "  names: [{}]\n  upper: {}\n",
+      fmt::join(free_names, ", "), number_list(upper));
+}
+
+Eigen::Vector3d vector_of(const Fields& fields, const std::string& key) {
+  if (!fields.has(key)) return Eigen::Vector3d::Zero();
+  const std::vector<double> numbers = fields.numbers(key);
+  if (numbers.size() != 3) refuse(fields.file(), fields.full(key), "must be three numbers");
+  return Eigen::Vector3d(numbers.data());
+}
+
+Eigen::Quaterniond quaternion_of(const Fields& fields) {
+  if (!fields.has("quaternion_wxyz")) return Eigen::Quaterniond::Identity();
+  const std::vector<double> q = fields.numbers("quaternion_wxyz");
+  const std::string key = fields.full("quaternion_wxyz");
+  if (q.size() != 4) refuse(fields.file(), key, "must be four numbers: w, x, y, z");
+  const Eigen::Quaterniond rotation(q[0], q[1], q[2], q[3]);
+  if (!(std::abs(rotation.norm() - 1.0) < 1e-3))
+    refuse(fields.file(), key, fmt::format("has the length {:.6g}, not 1", rotation.norm()));
+  return rotation.normalized();
+}
+
+double angle_of(const Fields& fields, const std::string& key) {
+  if (!fields.has(key)) return 0.0;
+  const double angle = fields.number(key);
+  if (!(std::abs(angle) <= 2.0 * std::numbers::pi))
+    refuse(fields.file(), fields.full(key), fmt::format("{:.6g} is more than a turn; angles are radians", angle));
+  return angle;
+}
+
+double scale_of(const Fields& fields, const std::string& key) {
+  if (!fields.has(key)) return 1.0;
+  const double scale = fields.number(key);
+  // A degree, or a servo's microsecond, for a radian is another unit, not a scale.
+  if (!(std::abs(scale) > 0.1 && std::abs(scale) < 10.0))
+    refuse(fields.file(), fields.full(key), fmt::format("{:.6g} is not between 0.1 and 10 in size", scale));
+  return scale;
+}
+
+Encoder encoder_of(const YAML::Node& node, const Fields& parent) {
+  const Fields fields(node, parent.file(), parent.full("encoder."));
+  refuse_unknown_keys(fields, {"pan_zero_rad", "tilt_zero_rad", "pan_scale", "tilt_scale", "sigma_rad"}, "an encoder");
+  Encoder encoder;
+  encoder.pan_zero_rad = angle_of(fields, "pan_zero_rad");
+  encoder.tilt_zero_rad = angle_of(fields, "tilt_zero_rad");
+  encoder.pan_scale = scale_of(fields, "pan_scale");
+  encoder.tilt_scale = scale_of(fields, "tilt_scale");
+  encoder.sigma_rad = angle_of(fields, "sigma_rad");
+  if (encoder.sigma_rad < 0.0) refuse(fields.file(), fields.full("sigma_rad"), "is below zero");
+  return encoder;
+}
+
+Camera camera_of(const YAML::Node& node, const Fields& fields, const std::filesystem::path& file) {
+  if (!node["camera"].IsDefined()) refuse(fields.file(), fields.full("camera"), "is missing");
+  if (node["camera"].IsMap()) {
+    YAML::Emitter text;
+    text << node["camera"];
+    return parse_camera(text.c_str(), fields.file() + ": " + fields.full("camera"));
+  }
+  return read_camera(file.parent_path() / fields.text("camera"));
+}
+
+RigHead head_of(const YAML::Node& node, std::size_t index, const std::filesystem::path& file) {
+  const Fields fields(node, file.string(), fmt::format("heads[{}].", index));
+  refuse_unknown_keys(fields,
+                      {"id", "camera", "world_from_base", "pan_to_tilt_m", "tilt_to_cam_m", "cam_from_tilt",
+                       "axes_skew_rad", "encoder"},
+                      "a head");
+  RigHead read;
+  Head& head = read.head;
+  const double id = fields.has("id") ? fields.number("id") : static_cast<double>(index + 1);
+  if (!(id >= 0.0 && id <= 1e6) || id != std::floor(id))
+    refuse(fields.file(), fields.full("id"), fmt::format("{} is not a whole number from 0 to 1000000", id));
+  head.id = static_cast<int>(id);
+  read.camera = camera_of(node, fields, file);
+  if (fields.has("world_from_base")) {
+    const YAML::Node base = node["world_from_base"];
+    const Fields pose(base, fields.file(), fields.full("world_from_base."));
+    refuse_unknown_keys(pose, {"translation_m", "quaternion_wxyz"}, "a pose");
+    head.world_from_base = {quaternion_of(pose), vector_of(pose, "translation_m")};
+  }
+  head.pan_to_tilt_m = vector_of(fields, "pan_to_tilt_m");
+  head.tilt_to_cam_m = vector_of(fields, "tilt_to_cam_m");
+  if (fields.has("cam_from_tilt")) {
+    const YAML::Node mounting = node["cam_from_tilt"];
+    const Fields rotation(mounting, fields.file(), fields.full("cam_from_tilt."));
+    refuse_unknown_keys(rotation, {"quaternion_wxyz"}, "a rotation");
+    head.cam_from_tilt = quaternion_of(rotation);
+  }
+  head.axes_skew_rad = angle_of(fields, "axes_skew_rad");
+  if (fields.has("encoder")) head.encoder = encoder_of(node["encoder"], fields);
+  return read;
+}
+
+bool is_covariance(const Eigen::MatrixXd& cov) {
+  const Eigen::VectorXd sigma = cov.diagonal().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::VectorXd scale = sigma.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 1.0; });
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * cov * scale.asDiagonal(),
+                                                             Eigen::EigenvaluesOnly);
+  return cov.diagonal().minCoeff() >= 0.0 && eigen.eigenvalues().minCoeff() >= -1e-6;
+}
+
+Eigen::MatrixXd covariance_of(const YAML::Node& node, const Fields& parent, const std::vector<RigHead>& heads) {
+  const Fields fields(node, parent.file(), "covariance.");
+  refuse_unknown_keys(fields, {"names", "upper"}, "a covariance");
+  const std::vector<std::string> known = covariance_names(heads), names = fields.texts("names");
+  const std::vector<double> upper = fields.numbers("upper");
+  if (upper.size() != names.size() * (names.size() + 1) / 2)
+    refuse(fields.file(), fields.full("upper"),
+           fmt::format("{} numbers are not the upper triangle of {} parameters", upper.size(), names.size()));
+  std::vector<Eigen::Index> at;
+  for (const std::string& name : names) {
+    const auto found = std::find(known.begin(), known.end(), name);
+    if (found == known.end())
+      refuse(fields.file(), fields.full("names"), "'" + name + "' is no parameter of these heads");
+    if (std::find(at.begin(), at.end(), found - known.begin()) != at.end())
+      refuse(fields.file(), fields.full("names"), "'" + name + "' stands twice");
+    at.push_back(found - known.begin());
+  }
+  const auto size = static_cast<Eigen::Index>(known.size());
+  Eigen::MatrixXd cov = Eigen::MatrixXd::Zero(size, size);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < at.size(); ++i)
+    for (std::size_t j = i; j < at.size(); ++j) cov(at[i], at[j]) = cov(at[j], at[i]) = upper[next++];
+  if (!is_covariance(cov)) refuse(fields.file(), fields.full("upper"), "is not a covariance");
+  return cov;
+}
+
+YAML::Node load(const std::filesystem::path& file) {
+  try {
+    return YAML::Load(read_file(file));
+  } catch (const YAML::Exception& error) {
+    throw InputError(fmt::format("{}:{}: is not YAML: {}", file.string(), error.mark.line + 1, error.msg));
+  }
+}
+
+}  // namespace
+
+std::string rig_text(const Rig& rig, std::span<const std::string> camera_files) {
+  std::string text = "# Pan-tilt heads; angle = scale * (reading - zero), pan > 0 left, tilt > 0 up\nheads:\n";
+  for (std::size_t i = 0; i < rig.heads.size(); ++i)
+    text += head_text(rig.heads[i], i < camera_files.size() ? camera_files[i] : "");
+  return rig.cov.size() > 0 && !rig.cov.isZero(0.0) ? text + covariance_text(rig) : text;
+}
+
+Rig read_rig(const std::filesystem::path& file) {
+  const YAML::Node root = load(file);
+  const Fields fields(root, file.string());
+  refuse_unknown_keys(fields, {"heads", "covariance"}, "a rig");
+  const YAML::Node heads = root["heads"];
+  if (!heads.IsDefined() || !heads.IsSequence() || heads.size() == 0)
+    refuse(file.string(), "heads", "must be a list of at least one head");
+  Rig rig;
+  for (std::size_t i = 0; i < heads.size(); ++i) {
+    const YAML::Node node = heads[i];
+    rig.heads.push_back(head_of(node, i, file));
+    for (std::size_t k = 0; k < i; ++k) {
+      if (rig.heads[k].head.id == rig.heads[i].head.id)
+        refuse(file.string(), fmt::format("heads[{}].id", i), fmt::format("{} stands twice", rig.heads[i].head.id));
+    }
+  }
+  if (fields.has("covariance")) rig.cov = covariance_of(root["covariance"], fields, rig.heads);
+  return rig;
+}
+
+}  // namespace alidade

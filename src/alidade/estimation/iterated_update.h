@@ -80,9 +80,9 @@ template <int N, SeesPosition See>
   const double tolerance2 = config.tolerance * config.tolerance;
   PositionSeen seen = expected;
   Eigen::Vector3d position = start;
-  Eigen::Matrix<double, 2, 3> H;
-  Eigen::Matrix2d HPHt, S_inverse;
-  Eigen::Vector2d weighted;
+  Eigen::Matrix<double, 2, 3> H = seen.J_z_position;
+  Eigen::Matrix2d HPHt = Eigen::Matrix2d::Zero(), S_inverse = HPHt;
+  Eigen::Vector2d weighted = Eigen::Vector2d::Zero();
   for (int iteration = 0; iteration < config.max_iterations; ++iteration) {
     H = seen.J_z_position;
     const Eigen::Matrix<double, 3, 2> PHt = P_position * H.transpose();

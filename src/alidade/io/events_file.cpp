@@ -1,0 +1,162 @@
+#include "alidade/io/events_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/io/csv.h"
+
+namespace alidade {
+namespace {
+
+struct Columns {
+  std::string pan, tilt, u, v;
+  bool has_arrival = false, from_centre = false;
+};
+
+std::string either(const Csv& csv, const std::string& first, const std::string& second, const std::string& hint = "") {
+  if (csv.has(first)) return first;
+  if (csv.has(second)) return second;
+  throw InputError(csv.name() + ": has no column '" + first + "'" + hint);
+}
+
+Columns columns_of(const Csv& csv) {
+  for (const char* name : {"t_capture_s", "head"}) {
+    if (!csv.has(name)) throw InputError(csv.name() + ": has no column '" + name + "'");
+  }
+  const std::string hint = csv.has("pan_deg") || csv.has("tilt_deg") ? "; angles are radians" : "";
+  Columns columns{either(csv, "pan_rad", "pan_rad_at_capture", hint),
+                  either(csv, "tilt_rad", "tilt_rad_at_capture", hint),
+                  "",
+                  "",
+                  csv.has("t_arrival_s"),
+                  !csv.has("u_px") && csv.has("du_px")};
+  columns.u = columns.from_centre ? "du_px" : "u_px";
+  columns.v = columns.from_centre ? "dv_px" : "v_px";
+  for (const std::string& name : {columns.u, columns.v}) {
+    if (!csv.has(name)) throw InputError(csv.name() + ": has no column '" + name + "'");
+  }
+  return columns;
+}
+
+std::size_t head_of(const Csv& csv, std::size_t row, std::span<const RigHead> heads) {
+  const long id = csv.integer(row, "head", -1000000, 1000000);
+  const auto at = std::ranges::find_if(heads, [id](const RigHead& head) { return head.head.id == id; });
+  if (at == heads.end()) {
+    std::string known;
+    for (const RigHead& head : heads) known += (known.empty() ? "" : ", ") + std::to_string(head.head.id);
+    throw InputError(csv.where(row, "head") + ": '" + csv.text(row, "head") + "' is not a head of the rig (" + known +
+                     ")");
+  }
+  return static_cast<std::size_t>(at - heads.begin());
+}
+
+Eigen::Vector2d principal_point(const Camera& camera) {
+  const Eigen::VectorXd values = params(camera.lens);  // fx, fy, cx, cy, skew come first in every model
+  return {values[2], values[3]};
+}
+
+TargetSight read_row(const Csv& csv, std::size_t row, const Columns& columns, std::span<const RigHead> heads,
+                     double newest_arrival_s) {
+  TargetSight sight;
+  sight.t_capture_s = csv.number(row, "t_capture_s");
+  sight.t_arrival_s = columns.has_arrival ? csv.number(row, "t_arrival_s") : sight.t_capture_s;
+  const std::string clock = columns.has_arrival ? "t_arrival_s" : "t_capture_s";
+  if (!(sight.t_arrival_s >= sight.t_capture_s))
+    throw InputError(csv.where(row, "t_arrival_s") + ": arrives before its capture");
+  if (!(sight.t_arrival_s >= newest_arrival_s))
+    throw InputError(csv.where(row, clock) + ": '" + csv.text(row, clock) +
+                     "' runs backwards; rows stand in order of arrival");
+  sight.head = head_of(csv, row, heads);
+  constexpr double most_rad = 1e4, most_px = 1e6;
+  sight.pan_tilt_rad = {csv.number(row, columns.pan), csv.number(row, columns.tilt)};
+  for (const std::string& name : {columns.pan, columns.tilt}) {
+    if (std::abs(csv.number(row, name)) > most_rad)
+      throw InputError(csv.where(row, name) + ": '" + csv.text(row, name) + "' is no angle in radians");
+  }
+  sight.px = {csv.number(row, columns.u), csv.number(row, columns.v)};
+  if (!(sight.px.cwiseAbs().maxCoeff() < most_px)) throw InputError(csv.where(row, columns.u) + ": is in no picture");
+  if (columns.from_centre) sight.px += principal_point(heads[sight.head].camera);
+  return sight;
+}
+
+std::string cells_of(const Belief<6>& belief) {
+  std::string cells;
+  for (int i = 0; i < 6; ++i) cells += fmt::format(",{:.6f}", belief.x[i]);
+  for (int i = 0; i < 3; ++i) cells += fmt::format(",{:.6g}", std::sqrt(belief.P(i, i)));
+  return cells;
+}
+
+}  // namespace
+
+EventsFile read_events(const std::filesystem::path& file, std::span<const RigHead> heads,
+                       const EventsOptions& options) {
+  const Csv csv = Csv::read(file);
+  const Columns columns = columns_of(csv);
+  EventsFile read;
+  double newest_s = -1e300;
+  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
+    try {
+      read.sights.push_back(read_row(csv, row, columns, heads, newest_s));
+      newest_s = read.sights.back().t_arrival_s;
+    } catch (const InputError& error) {
+      if (!options.skip_bad) throw;
+      std::string reason = error.what();
+      const std::string place = csv.name() + ":" + std::to_string(csv.line(row)) + ": ";
+      if (reason.starts_with(place)) reason.erase(0, place.size());
+      read.skipped.push_back({csv.name(), csv.line(row), std::move(reason)});
+    }
+  }
+  if (read.sights.empty()) throw InputError(file.string() + ": has no events; at least one row is needed");
+  return read;
+}
+
+std::string events_csv(std::span<const TargetSight> sights, std::span<const RigHead> heads) {
+  std::string text = "t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px\n";
+  for (const TargetSight& sight : sights) {
+    text += fmt::format("{:.6f},{:.6f},{},{:.9f},{:.9f},{:.4f},{:.4f}\n", sight.t_capture_s, sight.t_arrival_s,
+                        heads[sight.head].head.id, sight.pan_tilt_rad.x(), sight.pan_tilt_rad.y(), sight.px.x(),
+                        sight.px.y());
+  }
+  return text;
+}
+
+TrueTrack read_true_track(const std::filesystem::path& file) {
+  const Csv csv = Csv::read(file);
+  TrueTrack truth;
+  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
+    const double t_s = csv.number(row, "t_s");
+    if (!truth.t_s.empty() && !(t_s > truth.t_s.back()))
+      throw InputError(csv.where(row, "t_s") + ": '" + csv.text(row, "t_s") + "' is not after the row before it");
+    truth.t_s.push_back(t_s);
+    truth.position.emplace_back(csv.number(row, "x_m"), csv.number(row, "y_m"), csv.number(row, "z_m"));
+  }
+  if (truth.t_s.empty()) throw InputError(file.string() + ": has no rows");
+  return truth;
+}
+
+std::string true_track_csv(const TrueTrack& truth) {
+  std::string text = "t_s,x_m,y_m,z_m\n";
+  for (std::size_t i = 0; i < truth.t_s.size(); ++i) {
+    const Eigen::Vector3d& p = truth.position[i];
+    text += fmt::format("{:.6f},{:.7f},{:.7f},{:.7f}\n", truth.t_s[i], p.x(), p.y(), p.z());
+  }
+  return text;
+}
+
+std::string track_csv(std::span<const TrackStep> steps, std::span<const PredictedStep> ahead) {
+  std::string text = "t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,sigma_x_m,sigma_y_m,sigma_z_m,nis,event\n";
+  const std::string no_belief(9, ',');
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const TrackStep& step = steps[i];
+    text += fmt::format("{:.6f}", step.t_s) + (step.has_belief ? cells_of(step.belief) : no_belief);
+    text += step.has_innovation ? fmt::format(",{:.4f},", step.innovation.nis) : ",,";
+    text += std::string(event_name(step.event)) + "\n";
+    if (i < ahead.size() && ahead[i].has_belief)
+      text += fmt::format("{:.6f}", ahead[i].t_s) + cells_of(ahead[i].belief) + ",,predicted\n";
+  }
+  return text;
+}
+
+}  // namespace alidade

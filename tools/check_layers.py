@@ -12,7 +12,7 @@ MAY_INCLUDE = {
     "geometry": set(),
     "estimation": set(),
     "camera": FOUNDATIONS,
-    "pantilt": FOUNDATIONS | {"camera"},
+    "pantilt": FOUNDATIONS | {"camera", "board"},
     "board": FOUNDATIONS | {"camera"},
     "beam": FOUNDATIONS | {"camera", "board"},
     "imaging": FOUNDATIONS | {"camera", "board"},

@@ -20,6 +20,12 @@ Eigen::Matrix3d tilt_rotation(double angle_rad) {
   return (Eigen::Matrix3d() << 1.0, 0.0, 0.0, 0.0, c, s, 0.0, -s, c).finished();
 }
 
+/// Exp(−skew e_z).
+Eigen::Matrix3d skew_rotation(double skew_rad) {
+  const double c = std::cos(skew_rad), s = std::sin(skew_rad);
+  return (Eigen::Matrix3d() << c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0).finished();
+}
+
 double wrapped(double angle_rad) { return std::atan2(std::sin(angle_rad), std::cos(angle_rad)); }
 
 /// The angles at which a head without offsets sees the direction of a base on the ray (unit vectors both). Exact.
@@ -45,6 +51,7 @@ Head retract(const Head& head, const HeadVector& step) {
   moved.encoder.tilt_zero_rad += step[16];
   moved.encoder.pan_scale += step[17];
   moved.encoder.tilt_scale += step[18];
+  moved.axes_skew_rad += step[19];
   return moved;
 }
 
@@ -56,7 +63,7 @@ TurnedHead::TurnedHead(const Head& head, const Eigen::Vector2d& pan_tilt_rad)
       readings_from_zero_rad(pan_tilt_rad - Eigen::Vector2d(head.encoder.pan_zero_rad, head.encoder.tilt_zero_rad)) {
   const Eigen::Vector2d angles = head.encoder.angles(pan_tilt_rad);
   pan_from_base_rotation = pan_rotation(angles.x());
-  tilt_from_pan_rotation = tilt_rotation(angles.y());
+  tilt_from_pan_rotation = tilt_rotation(angles.y()) * skew_rotation(head.axes_skew_rad);
   const Eigen::Matrix3d cam_from_pan_rotation = cam_from_tilt_rotation * tilt_from_pan_rotation;
   cam_from_base_rotation = cam_from_pan_rotation * pan_from_base_rotation;
   cam_from_world_rotation = cam_from_base_rotation * head.world_from_base.rotation.toRotationMatrix().transpose();
@@ -92,6 +99,7 @@ Eigen::Matrix<double, 3, num_head_params> TurnedHead::J_point_head(const Eigen::
   J.middleCols<2>(15) = -J_readings;
   for (int axis = 0; axis < 2; ++axis)
     J.col(17 + axis) = J_readings.col(axis) * (readings_from_zero_rad[axis] / angle_per_reading[axis]);
+  J.col(19) = -cam_from_tilt_rotation * tilt_from_pan_rotation.col(2).cross(from_tilt_axis);
   return J;
 }
 

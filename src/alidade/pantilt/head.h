@@ -31,8 +31,9 @@ struct Encoder {
 
 /// A pan-over-tilt head with its camera's mounting. A point goes from the world into the camera by
 ///     point_in_pan = Exp(pan e_y) point_in_base − pan_to_tilt_m       (y of the base is the pan axis)
-///     point_in_tilt = Exp(−tilt e_x) point_in_pan − tilt_to_cam_m     (x of `pan` is the tilt axis)
+///     point_in_tilt = Exp(−tilt e_x) Exp(−skew e_z) point_in_pan − tilt_to_cam_m
 ///     point_in_cam = cam_from_tilt point_in_tilt
+/// The tilt axis is (cos skew, sin skew, 0) in frame `pan`: square to the pan axis where the skew is zero.
 struct Head {
   int id = 1;
   Rigid3 world_from_base;
@@ -40,6 +41,7 @@ struct Head {
   Eigen::Vector3d tilt_to_cam_m = Eigen::Vector3d::Zero();
   Eigen::Quaterniond cam_from_tilt = Eigen::Quaterniond::Identity();
   Encoder encoder;
+  double axes_skew_rad = 0.0;
 };
 
 /// A head and the camera that it carries.
@@ -49,13 +51,14 @@ struct RigHead {
 };
 
 /// The parameters of a head in their order: world_from_base ξ (translation, rotation; on the right), pan_to_tilt,
-/// tilt_to_cam, cam_from_tilt (rotation, on the right), pan zero, tilt zero, pan scale, tilt scale.
-inline constexpr int num_head_params = 19;
+/// tilt_to_cam, cam_from_tilt (rotation, on the right), pan zero, tilt zero, pan scale, tilt scale,
+/// skew of the axes.
+inline constexpr int num_head_params = 20;
 inline constexpr std::array<const char*, num_head_params> head_param_names{
     "base_x_m",        "base_y_m",        "base_z_m",        "base_rx_rad",     "base_ry_rad",
     "base_rz_rad",     "pan_to_tilt_x_m", "pan_to_tilt_y_m", "pan_to_tilt_z_m", "tilt_to_cam_x_m",
     "tilt_to_cam_y_m", "tilt_to_cam_z_m", "cam_rx_rad",      "cam_ry_rad",      "cam_rz_rad",
-    "pan_zero_rad",    "tilt_zero_rad",   "pan_scale",       "tilt_scale"};
+    "pan_zero_rad",    "tilt_zero_rad",   "pan_scale",       "tilt_scale",      "axes_skew_rad"};
 using HeadVector = Eigen::Matrix<double, num_head_params, 1>;
 
 /// The head moved by a small step of its parameters.

@@ -15,6 +15,8 @@ void add_rangefinder(Frame& frame);
 void add_rangefinder_scenario(Frame& frame);  ///< Of `simulate`.
 void add_rotation_scenario(Frame& frame);     ///< Of `simulate`.
 void add_simulate(Frame& frame);
+void add_track(Frame& frame);
+void add_track_scenario(Frame& frame);  ///< Of `simulate`.
 
 // How to write a command: cli/NAME.cpp with one function `add_NAME(Frame&)`, declared here and called in main.cpp.
 //

@@ -35,11 +35,6 @@ struct EventsOptions {
 
 /// Text of track.csv: `t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,sigma_x_m,sigma_y_m,sigma_z_m,nis,event`, a row a sight;
 /// `ahead` (one a sight, or none) adds rows with the event `predicted`.
-struct PredictedStep {
-  double t_s = 0.0;
-  bool has_belief = false;
-  Belief<6> belief;
-};
 [[nodiscard]] std::string track_csv(std::span<const TrackStep> steps, std::span<const PredictedStep> ahead = {});
 
 }  // namespace alidade

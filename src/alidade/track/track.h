@@ -26,14 +26,23 @@ struct TrueTrack {
 struct TrackConfig {
   TrackerConfig tracker;
   bool find_sigma_a = true;  ///< Take the σ_a that makes the innovations most probable, not the tracker's.
+  double predict_s = 0.0;    ///< Above 0: a prediction so far ahead of each step.
   double warm_up_s = 0.5;    ///< After the start of a track: not counted in errors and statistics.
+};
+
+/// Where the target will be.
+struct PredictedStep {
+  double t_s = 0.0;
+  bool has_belief = false;
+  Belief<6> belief;
 };
 
 /// What became of all sights, and how good it is.
 struct TrackReport {
   double sigma_a_m_s2 = 0.0;
   bool sigma_a_is_found = false;
-  std::vector<TrackStep> steps;  ///< One a sight, in their order.
+  std::vector<TrackStep> steps;      ///< One a sight, in their order.
+  std::vector<PredictedStep> ahead;  ///< One a step, or none.
   std::size_t num_used = 0, num_starts = 0, num_restarts = 0;
   double log_likelihood = 0.0;  ///< Of all innovations, but for a constant.
   /// With truth, after the warm-up; NaN without.

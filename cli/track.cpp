@@ -1,0 +1,158 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <memory>
+
+#include "alidade/io/events_file.h"
+#include "alidade/io/rig_file.h"
+#include "alidade/io/track_document.h"
+#include "alidade/track/track.h"
+#include "cli/commands.h"
+#include "cli/frame.h"
+#include "cli/option_checks.h"
+
+namespace alidade::cli {
+namespace {
+
+struct Args {
+  std::filesystem::path events, rig, truth;
+  std::string method = "cv";
+  bool corrected = false, skip_bad = false;
+  double sigma_a = 0.0;
+  TrackConfig config;
+};
+
+TrackMethod method_of(const std::string& name) {
+  for (const TrackMethod method : {TrackMethod::singer, TrackMethod::turn, TrackMethod::resting, TrackMethod::imm})
+    if (method_name(method) == name) return method;
+  return TrackMethod::cv;
+}
+
+TrackConfig config_of(const Args& args) {
+  TrackConfig config = args.config;
+  config.tracker.method = method_of(args.method);
+  config.find_sigma_a = !(args.sigma_a > 0.0);
+  if (args.sigma_a > 0.0) config.tracker.sigma_a_m_s2 = args.sigma_a;
+  if (config.tracker.min_depth_m >= config.tracker.max_depth_m)
+    throw UsageError("--min-depth: is not below --max-depth");
+  return config;
+}
+
+/// The paper's filter on the same events.
+std::pair<TrackReport, Verdict> track_as_paper(const Args& args, std::span<const TargetSight> sights,
+                                               std::span<const RigHead> heads, const TrueTrack& truth) {
+  XiahouConfig config;
+  if (heads.size() != 2) throw UsageError("--method xiahou2015: needs a rig of two heads");
+  config.baseline_cm =
+      100.0 * (heads[1].head.world_from_base.translation - heads[0].head.world_from_base.translation).norm();
+  config.use_pixels = args.corrected;
+  TrackReport report = track_target_xiahou(sights, heads, config, truth);
+  Verdict verdict;
+  if (report.num_starts == 0) {
+    verdict = {State::refused,
+               ExitCode::cannot_tell,
+               "the two heads' axes never meet in front of them",
+               "check that events of both heads are there, or use --method cv",
+               {}};
+  } else {
+    verdict.state = State::care;
+    verdict.sentence = "the paper's filter: no gates, and its covariance does not say how good it is";
+  }
+  return {std::move(report), std::move(verdict)};
+}
+
+void summarize(const TrackReport& report, Run& run) {
+  if (report.steps.empty() || !report.steps.back().has_belief) return;
+  const TrackStep& last = report.steps.back();
+  const std::array<const char*, 3> axes{"x", "y", "z"};
+  for (int i = 0; i < 3; ++i) {
+    run.say(fmt::format("{} {:9.4f} ± {:.2g} m, {:7.3f} ± {:.2g} m/s   (3σ, at {:.3f} s)",
+                        axes[static_cast<std::size_t>(i)], last.belief.x[i], 3.0 * std::sqrt(last.belief.P(i, i)),
+                        last.belief.x[3 + i], 3.0 * std::sqrt(last.belief.P(3 + i, 3 + i)), last.t_s));
+  }
+  if (std::isfinite(report.nis_per_dof))
+    run.say(fmt::format("NIS per degree of freedom {:.2f}; the target's acceleration {:.2g} m/s² ({})",
+                        report.nis_per_dof, report.sigma_a_m_s2,
+                        report.sigma_a_is_found ? "told by the innovations" : "as given"));
+  if (std::isfinite(report.rms_m))
+    run.say(fmt::format("against the truth: RMS {:.2f} mm, mean {:.2f} mm, NEES {:.2f}", 1e3 * report.rms_m,
+                        1e3 * report.mean_error_m, report.nees_per_dof));
+  if (std::isfinite(report.pcrlb_m)) run.say(fmt::format("bound (PCRLB) {:.2f} mm", 1e3 * report.pcrlb_m));
+}
+
+ExitCode track(const Args& args, Run& run) {
+  const TrackConfig config = config_of(args);
+  if (args.corrected && args.method != "xiahou2015") throw UsageError("--corrected: only with --method xiahou2015");
+  run.add_input("events", args.events);
+  run.add_input("rig", args.rig);
+  const Rig rig = read_rig(args.rig);
+  const EventsFile events = read_events(args.events, rig.heads, {.skip_bad = args.skip_bad});
+  TrueTrack truth;
+  if (!args.truth.empty()) {
+    run.add_input("truth", args.truth);
+    truth = read_true_track(args.truth);
+  }
+  run.lap("read");
+  TrackReport report;
+  Verdict verdict;
+  if (args.method == "xiahou2015") {
+    std::tie(report, verdict) = track_as_paper(args, events.sights, rig.heads, truth);
+  } else {
+    report = track_target(events.sights, rig.heads, config, truth);
+    run.lap("track");
+    verdict = track_verdict(report, events.sights, rig.heads, config);
+  }
+  run.lap("verdict");
+  run.document.counts.given = events.skipped.size();
+  run.document.counts.skipped = events.skipped;
+  fill_track(events.sights, rig.heads, report, truth, run.document);
+  summarize(report, run);
+  if (verdict.exit_code == ExitCode::ok) run.add_file("track.csv", track_csv(report.steps, report.ahead));
+  return run.finish(verdict);
+}
+
+void add_options(CLI::App& command, Args& args) {
+  command
+      .add_option("events", args.events,
+                  "Events, CSV: t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px, in order of arrival")
+      ->required();
+  command.add_option("--rig", args.rig, "The heads and their cameras")->type_name("FILE")->required();
+  command.add_option("--truth", args.truth, "True path, CSV: t_s,x_m,y_m,z_m; adds errors, NEES and the bound")
+      ->type_name("FILE");
+  command
+      .add_option(
+          "--method", args.method,
+          "Motion of the target: cv (constant velocity), singer, turn, resting, imm; or the filter of xiahou2015")
+      ->check(CLI::IsMember({"cv", "singer", "turn", "resting", "imm", "xiahou2015"}))
+      ->capture_default_str();
+  command.add_flag("--corrected", args.corrected, "With xiahou2015: pixels and mounting corrected, else as printed");
+  command.add_option("--predict", args.config.predict_s, "Rows so far ahead of each event [s]")
+      ->check(positive_number());
+  command.add_option("--sigma-a", args.sigma_a, "The target's acceleration [m/s2] (default: told by the innovations)")
+      ->check(positive_number());
+  const auto number = [&](const char* name, double& value, const char* help) {
+    command.add_option(name, value, help)->check(positive_number())->capture_default_str();
+  };
+  number("--sigma-px", args.config.tracker.sigma_px, "Of the target's pixel coordinate");
+  number("--sigma-angle", args.config.tracker.sigma_encoder_rad, "Of an encoder that the rig says none of [rad]");
+  number("--min-depth", args.config.tracker.min_depth_m, "Working range, nearest [m]");
+  number("--max-depth", args.config.tracker.max_depth_m, "Working range, furthest [m]");
+  command.add_flag("--skip-bad", args.skip_bad, "Leave out rows that are wrong, by name, instead of stopping");
+}
+
+}  // namespace
+
+void add_track(Frame& frame) {
+  auto args = std::make_shared<Args>();
+  CLI::App& command = frame.add_command(
+      {.name = "track",
+       .summary = "Path of a target in space from the pixels and angles of two or more pan-tilt heads",
+       .examples = "alidade track events.csv --rig rig.yaml\n"
+                   "alidade track events.csv --rig rig.yaml --method imm --predict 0.1\n"
+                   "alidade track events.csv --rig rig.yaml --truth truth.csv --method xiahou2015\n"},
+      [args](Run& run) { return track(*args, run); });
+  add_options(command, *args);
+}
+
+}  // namespace alidade::cli

@@ -1,0 +1,212 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "alidade/io/csv.h"
+#include "alidade/io/files.h"
+#include "alidade/testing/process.h"
+#include "alidade/testing/temporary_folder.h"
+
+namespace alidade {
+namespace {
+
+using testing::Outcome;
+using Json = nlohmann::json;
+
+class TrackCommand : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
+  [[nodiscard]] static Outcome alidade(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), ALIDADE_EXECUTABLE);
+    return testing::run_program(std::move(arguments));
+  }
+  void simulate(const std::string& scenario, const std::vector<std::string>& options = {}) {
+    std::vector<std::string> arguments{"simulate", "track", "--scenario", scenario, "--out", path("sim"), "--quiet"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const Outcome made = alidade(arguments);
+    ASSERT_EQ(made.code, 0) << made.err;
+  }
+  [[nodiscard]] Outcome track(const std::vector<std::string>& options, const std::string& events = "sim/events.csv") {
+    std::vector<std::string> arguments{"track", path(events), "--rig",      path("sim/rig.yaml"),
+                                       "--out", path("out"),  "--no-report"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return alidade(arguments);
+  }
+  /// The simulated events, each row changed.
+  void write_changed(const std::function<std::string(const Csv&, std::size_t row)>& change) {
+    const Csv csv = Csv::read(path("sim/events.csv"));
+    std::string text = "t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px\n";
+    for (std::size_t row = 0; row < csv.num_rows(); ++row) text += change(csv, row);
+    write_file(path("changed.csv"), text);
+  }
+  testing::TemporaryFolder folder_;
+};
+
+std::string row_of(const Csv& csv, std::size_t row, const std::string& column, const std::string& value) {
+  std::string text;
+  for (const std::string& name : csv.header())
+    text += (text.empty() ? "" : ",") + (name == column ? value : csv.text(row, name));
+  return text + "\n";
+}
+
+TEST_F(TrackCommand, GivesThePathWithTheNamesOfTheContract) {
+  simulate("B");
+  for (const std::string method : {"cv", "singer", "turn", "resting", "imm"}) {
+    const Outcome outcome = track({"--method", method, "--truth", path("sim/truth.csv"), "--json"});
+    ASSERT_EQ(outcome.code, 0) << method << outcome.err;
+    const Json document = Json::parse(outcome.out);
+    const Json& estimate = document["estimate"];
+    EXPECT_LT(estimate["rms_m"], 0.005) << method;
+    EXPECT_LT(estimate["mean_error_m"], estimate["rms_m"]) << method;
+    EXPECT_GT(estimate["nis_per_dof"], 0.7) << method;
+    EXPECT_LT(estimate["nis_per_dof"], 1.4) << method;
+    EXPECT_GT(estimate["nees_per_dof"], 0.4) << method;
+    EXPECT_LT(estimate["nees_per_dof"], 1.8) << method;
+    EXPECT_GT(estimate["pcrlb_m"], 0.001) << method;
+    const Json& steps = document["data"]["steps"];
+    EXPECT_EQ(steps["t_s"].size(), steps["target_in_base_x_m"].size());
+    EXPECT_EQ(document["data"]["measurements"]["accepted"].size(), document["counts"]["given"]);
+  }
+  const Csv rows = Csv::read(path("out/track.csv"));
+  const std::vector<std::string> header{"t_s",    "x_m",       "y_m",       "z_m",       "vx_m_s", "vy_m_s",
+                                        "vz_m_s", "sigma_x_m", "sigma_y_m", "sigma_z_m", "nis",    "event"};
+  EXPECT_EQ(rows.header(), header);
+  EXPECT_EQ(rows.num_rows(), Csv::read(path("sim/events.csv")).num_rows());
+}
+
+TEST_F(TrackCommand, PredictsAhead) {
+  simulate("B");
+  ASSERT_EQ(track({"--predict", "0.1"}).code, 0);
+  const Csv rows = Csv::read(path("out/track.csv"));
+  std::size_t predicted = 0;
+  double sum2 = 0.0;
+  for (std::size_t row = 1; row < rows.num_rows(); ++row) {
+    if (rows.text(row, "event") != "predicted") continue;
+    EXPECT_NEAR(rows.number(row, "t_s"), rows.number(row - 1, "t_s") + 0.1, 1e-6);
+    const double t_s = rows.number(row, "t_s"), angle = 2.0 * std::acos(-1.0) * t_s / 3.0;
+    if (t_s < 1.0) continue;
+    const double dx = rows.number(row, "x_m") - (0.173 + 0.2 * (std::cos(angle) - 1.0));
+    const double dy = rows.number(row, "y_m") - (-0.314 + 0.2 * std::sin(angle));
+    const double dz = rows.number(row, "z_m") - 0.636;
+    sum2 += dx * dx + dy * dy + dz * dz;
+    ++predicted;
+  }
+  EXPECT_GT(predicted, 150u);
+  EXPECT_LT(std::sqrt(sum2 / static_cast<double>(predicted)), 0.014);  // 25 mm where latency is ignored
+}
+
+TEST_F(TrackCommand, ReadsTheReferenceEventsInTheirSpelling) {
+  const char* data = std::getenv("ALIDADE_DATA");
+  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set";
+  simulate("B");
+  const std::string events = std::string(data) + "/cases/c6_events_latency.csv";
+  const Outcome outcome = alidade({"track", events, "--rig", path("sim/rig.yaml"), "--truth", path("sim/truth.csv"),
+                                   "--sigma-a", "1", "--out", path("out"), "--no-report", "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_LT(Json::parse(outcome.out)["estimate"]["rms_m"], 0.0038);
+}
+
+TEST_F(TrackCommand, ThePapersFilterStandsBesideOurs) {
+  simulate("A");
+  const auto rms_of = [&](const std::vector<std::string>& options) {
+    std::vector<std::string> all{"--truth", path("sim/truth.csv"), "--json"};
+    all.insert(all.end(), options.begin(), options.end());
+    const Outcome outcome = track(all);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return Json::parse(outcome.out)["estimate"]["rms_m"].get<double>();
+  };
+  const double ours = rms_of({}), literal = rms_of({"--method", "xiahou2015"});
+  EXPECT_LT(ours, 0.0025);
+  EXPECT_NEAR(literal, 0.0236, 0.0036);  // an independent simulation's figure
+  EXPECT_LT(rms_of({"--method", "xiahou2015", "--corrected"}), 0.5 * literal);
+}
+
+TEST_F(TrackCommand, MistakesAreNamedAndRefused) {
+  simulate("B");
+  const auto refused_as = [&](const std::string& what) {
+    const Outcome outcome = track({}, "changed.csv");
+    EXPECT_EQ(outcome.code, 4) << what << outcome.out << outcome.err;
+    EXPECT_NE(outcome.err.find(what), std::string::npos) << outcome.err;
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+    EXPECT_FALSE(std::filesystem::exists(path("out/track.csv")));
+    EXPECT_TRUE(std::filesystem::exists(path("out/result.json")));
+  };
+  write_changed(
+      [](const Csv& csv, std::size_t row) { return csv.text(row, "head") == "1" ? row_of(csv, row, "", "") : ""; });
+  refused_as("one head only");
+  write_changed([](const Csv& csv, std::size_t row) {
+    return row_of(csv, row, "head", csv.text(row, "head") == "1" ? "2" : "1");
+  });
+  refused_as("heads swapped");
+  write_changed([](const Csv& csv, std::size_t row) {
+    const auto degrees = [&](const char* name) { return std::to_string(csv.number(row, name) * 57.29577951308232); };
+    return csv.text(row, "t_capture_s") + "," + csv.text(row, "t_arrival_s") + "," + csv.text(row, "head") + "," +
+           degrees("pan_rad") + "," + degrees("tilt_rad") + "," + csv.text(row, "u_px") + "," + csv.text(row, "v_px") +
+           "\n";
+  });
+  refused_as("angles in degrees");
+  write_changed([](const Csv& csv, std::size_t row) {
+    return csv.text(row, "t_capture_s") + "," + csv.text(row, "t_arrival_s") + "," + csv.text(row, "head") +
+           ",0.1,0.2,160,120\n";
+  });
+  refused_as("parallel rays");
+}
+
+TEST_F(TrackCommand, SaysWhatIsWrongWithItsInput) {
+  simulate("B");
+  const std::string header = "t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px\n";
+  const auto expect = [&](const std::string& table, const std::string& what) {
+    write_file(path("bad.csv"), table);
+    const Outcome outcome = track({}, "bad.csv");
+    EXPECT_EQ(outcome.code, 3) << table << outcome.err;
+    EXPECT_NE(outcome.err.find(what), std::string::npos) << outcome.err;
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+    EXPECT_FALSE(std::filesystem::exists(path("out")));
+  };
+  expect("", "bad.csv");
+  expect(header, "has no events");
+  expect("t_capture_s,head,pan_deg,tilt_deg,u_px,v_px\n0,1,1,1,1,1\n", "angles are radians");
+  expect("t_capture_s,head,pan_rad,tilt_rad\n0,1,1,1\n", "has no column 'u_px'");
+  expect(header + "0,0.1,3,0,0,1,1\n", "bad.csv:2: column 'head': '3' is not a head of the rig (1, 2)");
+  expect(header + "0.2,0.1,1,0,0,1,1\n", "arrives before its capture");
+  expect(header + "0,0.2,1,0,0,1,1\n0.05,0.1,2,0,0,1,1\n", "bad.csv:3: column 't_arrival_s': '0.1' runs backwards");
+  expect(header + "0,0,1,nan,0,1,1\n", "column 'pan_rad': 'nan' is not a finite number");
+  expect(header + "0,0,1,0,0,1e9,1\n", "is in no picture");
+  EXPECT_EQ(track({"--method", "magic"}).code, 2);
+  EXPECT_EQ(track({"--corrected"}).code, 2);
+  EXPECT_EQ(track({"--min-depth", "30"}).code, 2);
+  EXPECT_EQ(track({"--predict", "-1"}).code, 2);
+  EXPECT_EQ(alidade({"simulate", "track", "--scenario", "Z", "--out", path("z")}).code, 2);
+}
+
+TEST_F(TrackCommand, SkipsBadRowsByName) {
+  simulate("B");
+  write_changed([](const Csv& csv, std::size_t row) {
+    return row_of(csv, row, row == 30 ? "u_px" : "", row == 30 ? "nan" : "");
+  });
+  EXPECT_EQ(track({}, "changed.csv").code, 3);
+  const Outcome outcome = track({"--skip-bad", "--json"}, "changed.csv");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  ASSERT_EQ(document["counts"]["skipped"].size(), 1u);
+  EXPECT_EQ(document["counts"]["skipped"][0]["line"], 32);
+}
+
+TEST_F(TrackCommand, SaysWhereOneHeadWasAlone) {
+  simulate("D");
+  const Outcome outcome = track({"--json", "--sigma-a", "4"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  EXPECT_EQ(document["verdict"]["state"], "care");
+  const Csv rows = Csv::read(path("out/track.csv"));
+  std::size_t alone = 0;
+  for (std::size_t row = 0; row < rows.num_rows(); ++row) alone += rows.text(row, "event") == "one_head" ? 1u : 0u;
+  EXPECT_GT(alone, 5u);
+}
+
+}  // namespace
+}  // namespace alidade

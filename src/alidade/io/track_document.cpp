@@ -1,0 +1,138 @@
+#include "alidade/io/track_document.h"
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "alidade/report/thin.h"
+
+namespace alidade {
+namespace {
+
+using Numbers = std::vector<double>;
+
+constexpr double not_there = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t most_rows = 4000;  // the page holds them; track.csv has all
+constexpr std::array<const char*, 3> axes{"x", "y", "z"};
+
+/// Which rows stand in the tables: evenly spread, and those with something to say.
+std::vector<std::size_t> kept_rows(const TrackReport& report) {
+  std::vector<bool> has_event;
+  for (const TrackStep& step : report.steps) {
+    has_event.push_back(step.event != TrackEvent::none && step.event != TrackEvent::one_head &&
+                        step.event != TrackEvent::waiting);
+  }
+  return report::thinned_rows(report.steps.size(), {}, has_event, most_rows);
+}
+
+DataTable steps_table(const TrackReport& report, const TrueTrack& truth, std::span<const std::size_t> rows) {
+  Numbers t, nees;
+  std::array<Numbers, 3> position, velocity, sigma, sigma_velocity, true_position;
+  std::vector<std::string> events;
+  for (const std::size_t row : rows) {
+    const TrackStep& step = report.steps[row];
+    const auto there = truth.at(step.t_s);
+    t.push_back(step.t_s);
+    nees.push_back(row < report.nees.size() ? report.nees[row] : not_there);
+    events.emplace_back(event_name(step.event));
+    for (int i = 0; i < 3; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      position[k].push_back(step.has_belief ? step.belief.x[i] : not_there);
+      velocity[k].push_back(step.has_belief ? step.belief.x[3 + i] : not_there);
+      sigma[k].push_back(step.has_belief ? std::sqrt(step.belief.P(i, i)) : not_there);
+      sigma_velocity[k].push_back(step.has_belief ? std::sqrt(step.belief.P(3 + i, 3 + i)) : not_there);
+      true_position[k].push_back(there ? (*there)[i] : not_there);
+    }
+  }
+  DataTable table{"steps", {{"t_s", t}}};
+  const auto add = [&](const std::string& before, const std::string& after, std::array<Numbers, 3>& values) {
+    for (std::size_t k = 0; k < 3; ++k)
+      table.columns.emplace_back(before + axes[k] + after, rounded(std::move(values[k]), 6));
+  };
+  add("target_in_base_", "_m", position);
+  add("velocity_", "_m_s", velocity);
+  add("sigma_target_in_base_", "_m", sigma);
+  add("sigma_velocity_", "_m_s", sigma_velocity);
+  if (!truth.t_s.empty()) add("truth_", "_m", true_position);
+  table.columns.emplace_back("nees", rounded(std::move(nees), 4));
+  table.columns.emplace_back("event", events);
+  return table;
+}
+
+DataTable measurements_table(std::span<const TargetSight> sights, std::span<const RigHead> heads,
+                             const TrackReport& report, std::span<const std::size_t> rows) {
+  constexpr std::array<const char*, 12> names{"t_capture_s",
+                                              "t_arrival_s",
+                                              "pan_rad",
+                                              "tilt_rad",
+                                              "u_px",
+                                              "v_px",
+                                              "innovation_u_px",
+                                              "innovation_v_px",
+                                              "sigma_innovation_u_px",
+                                              "sigma_innovation_v_px",
+                                              "nis",
+                                              "head"};
+  std::array<Numbers, names.size()> column;
+  std::vector<bool> accepted;
+  for (const std::size_t row : rows) {
+    const TargetSight& sight = sights[row];
+    const TrackStep& step = report.steps[row];
+    const Innovation& innovation = step.innovation;
+    const auto if_there = [&](double value) { return step.has_innovation ? value : not_there; };
+    const std::array<double, names.size()> values{sight.t_capture_s,
+                                                  sight.t_arrival_s,
+                                                  sight.pan_tilt_rad.x(),
+                                                  sight.pan_tilt_rad.y(),
+                                                  sight.px.x(),
+                                                  sight.px.y(),
+                                                  if_there(innovation.nu.x()),
+                                                  if_there(innovation.nu.y()),
+                                                  if_there(std::sqrt(innovation.S(0, 0))),
+                                                  if_there(std::sqrt(innovation.S(1, 1))),
+                                                  if_there(innovation.nis),
+                                                  static_cast<double>(heads[sight.head].head.id)};
+    for (std::size_t k = 0; k < names.size(); ++k) column[k].push_back(values[k]);
+    accepted.push_back(step.accepted);
+  }
+  DataTable table{"measurements", {}};
+  for (std::size_t k = 0; k < names.size(); ++k)
+    table.columns.emplace_back(names[k], rounded(std::move(column[k]), k < 4 ? 6 : 4));
+  table.columns.emplace_back("accepted", accepted);
+  return table;
+}
+
+}  // namespace
+
+void fill_track(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackReport& report,
+                const TrueTrack& truth, ResultDocument& document) {
+  document.counts.given += sights.size();
+  document.counts.used = report.num_used;
+  document.counts.dropped = sights.size() - report.num_used;
+  JsonValue& estimate = document.estimate;
+  estimate["rms_m"] = report.rms_m;
+  estimate["mean_error_m"] = report.mean_error_m;
+  estimate["nees_per_dof"] = report.nees_per_dof;
+  estimate["nis_per_dof"] = report.nis_per_dof;
+  estimate["pcrlb_m"] = report.pcrlb_m;
+  estimate["sigma_a_m_s2"] = report.sigma_a_m_s2;
+  estimate["sigma_a_is_estimated"] = report.sigma_a_is_found;
+  estimate["restarts"] = report.num_restarts;
+  if (!report.steps.empty() && report.steps.back().has_belief) {
+    const Belief<6>& last = report.steps.back().belief;
+    estimate["position_m"] = Numbers(last.x.data(), last.x.data() + 3);
+    estimate["velocity_m_s"] = Numbers(last.x.data() + 3, last.x.data() + 6);
+    const Eigen::Vector<double, 6> sigma = last.P.diagonal().cwiseSqrt();
+    document.stddev["position_m"] = Numbers(sigma.data(), sigma.data() + 3);
+    document.stddev["velocity_m_s"] = Numbers(sigma.data() + 3, sigma.data() + 6);
+    document.covariance_names = {"x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s"};
+    for (int i = 0; i < 6; ++i) {
+      for (int j = i; j < 6; ++j) document.covariance_upper.push_back(last.P(i, j));
+    }
+  }
+  const std::vector<std::size_t> rows = kept_rows(report);
+  document.data.push_back(steps_table(report, truth, rows));
+  document.data.push_back(measurements_table(sights, heads, report, rows));
+}
+
+}  // namespace alidade

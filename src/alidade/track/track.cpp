@@ -11,7 +11,8 @@ namespace {
 
 constexpr double not_there = std::numeric_limits<double>::quiet_NaN();
 
-TrackReport followed(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackerConfig& config) {
+TrackReport followed(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackerConfig& config,
+                     double predict_s = 0.0) {
   Tracker tracker({heads.begin(), heads.end()}, config);
   TrackReport report;
   report.sigma_a_m_s2 = config.sigma_a_m_s2;

@@ -24,7 +24,7 @@ struct Args {
 };
 
 TrackMethod method_of(const std::string& name) {
-  for (const TrackMethod method : {TrackMethod::singer, TrackMethod::turn, TrackMethod::resting, TrackMethod::imm})
+  for (const TrackMethod method : {TrackMethod::singer, TrackMethod::turn, TrackMethod::imm})
     if (method_name(method) == name) return method;
   return TrackMethod::cv;
 }
@@ -121,10 +121,9 @@ void add_options(CLI::App& command, Args& args) {
   command.add_option("--truth", args.truth, "True path, CSV: t_s,x_m,y_m,z_m; adds errors, NEES and the bound")
       ->type_name("FILE");
   command
-      .add_option(
-          "--method", args.method,
-          "Motion of the target: cv (constant velocity), singer, turn, resting, imm; or the filter of xiahou2015")
-      ->check(CLI::IsMember({"cv", "singer", "turn", "resting", "imm", "xiahou2015"}))
+      .add_option("--method", args.method,
+                  "Motion of the target: cv (constant velocity), singer, turn, imm; or the filter of xiahou2015")
+      ->check(CLI::IsMember({"cv", "singer", "turn", "imm", "xiahou2015"}))
       ->capture_default_str();
   command.add_flag("--corrected", args.corrected, "With xiahou2015: pixels and mounting corrected, else as printed");
   command.add_option("--predict", args.config.predict_s, "Rows so far ahead of each event [s]")

@@ -55,7 +55,7 @@ std::string row_of(const Csv& csv, std::size_t row, const std::string& column, c
 
 TEST_F(TrackCommand, GivesThePathWithTheNamesOfTheContract) {
   simulate("B");
-  for (const std::string method : {"cv", "singer", "turn", "resting", "imm"}) {
+  for (const std::string method : {"cv", "singer", "turn", "imm"}) {
     const Outcome outcome = track({"--method", method, "--truth", path("sim/truth.csv"), "--json"});
     ASSERT_EQ(outcome.code, 0) << method << outcome.err;
     const Json document = Json::parse(outcome.out);
@@ -194,6 +194,17 @@ TEST_F(TrackCommand, SkipsBadRowsByName) {
   const Json document = Json::parse(outcome.out);
   ASSERT_EQ(document["counts"]["skipped"].size(), 1u);
   EXPECT_EQ(document["counts"]["skipped"][0]["line"], 32);
+}
+
+TEST_F(TrackCommand, SaysThatTheNoiseIsNotAsStated) {
+  simulate("B", {"--sigma-px", "1.2"});
+  const Outcome outcome = track({"--json"});  // told 0.5 px
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json verdict = Json::parse(outcome.out)["verdict"];
+  EXPECT_NE(verdict["state"], "good");
+  EXPECT_NE(verdict["sentence"].get<std::string>().find("noise is larger than stated"), std::string::npos) << verdict;
+  const Outcome told = track({"--json", "--sigma-px", "1.2"});
+  EXPECT_EQ(Json::parse(told.out)["verdict"]["state"], "good") << told.out;
 }
 
 TEST_F(TrackCommand, SaysWhereOneHeadWasAlone) {

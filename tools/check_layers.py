@@ -6,7 +6,7 @@ import sys
 
 FOUNDATIONS = {"geometry", "estimation"}
 SENSORS = {"camera", "pantilt", "beam", "board", "imaging"}
-ESTIMATORS = {"calibrate", "observe", "rangefinder", "rig"}
+ESTIMATORS = {"calibrate", "observe", "rangefinder", "rig", "track"}
 
 MAY_INCLUDE = {
     "geometry": set(),

@@ -74,7 +74,9 @@ void add_errors(TrackReport& report, const std::vector<bool>& counts, const True
     const Eigen::Vector3d error = step.belief.x.head<3>() - *position;
     const Eigen::Matrix3d P = step.belief.P.topLeftCorner<3, 3>();
     report.nees[i] = error.dot(P.inverse() * error);
-    if (!counts[i]) continue;
+    // Of several heads at one instant the last one's sight completes the estimate.
+    const bool is_complete = i + 1 == report.steps.size() || report.steps[i + 1].t_s != step.t_s;
+    if (!counts[i] || !is_complete) continue;
     sum2 += error.squaredNorm();
     sum += error.norm();
     sum_nees += report.nees[i];

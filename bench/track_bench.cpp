@@ -1,0 +1,46 @@
+/// Processor times of the tracker, one core: track_bench [--benchmark_filter=...]
+#include <benchmark/benchmark.h>
+
+#include <string>
+#include <vector>
+
+#include "alidade/simulate/track.h"
+#include "alidade/track/tracker.h"
+
+namespace alidade::bench {
+namespace {
+
+/// Sights a second, as a camera would give them: gates, history and all. items/s is what the goal speaks of.
+void time_sights(benchmark::State& state, const std::string& scenario, TrackMethod method) {
+  const TrackScene scene = *track_scenario(scenario);
+  std::vector<TargetSight> sights;
+  for (const SimulatedSight& s : simulate_track(scene, 1))
+    sights.push_back({s.t_capture_s, s.t_arrival_s, s.head, s.pan_tilt_rad, s.px});
+  TrackerConfig config;
+  config.method = method;
+  config.sigma_a_m_s2 = scene.sigma_a_m_s2;
+  for (auto _ : state) {
+    Tracker tracker(scene.heads, config);
+    for (const TargetSight& sight : sights) benchmark::DoNotOptimize(tracker.take(sight).belief.x[0]);
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(sights.size()));
+}
+
+void add_all() {
+  for (const TrackMethod method : {TrackMethod::cv, TrackMethod::singer, TrackMethod::turn, TrackMethod::imm}) {
+    for (const std::string scenario : {"B", "C", "G"}) {
+      benchmark::RegisterBenchmark(("track/" + std::string(method_name(method)) + "/" + scenario).c_str(),
+                                   [=](benchmark::State& state) { time_sights(state, scenario, method); });
+    }
+  }
+}
+
+}  // namespace
+}  // namespace alidade::bench
+
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  alidade::bench::add_all();
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}

@@ -25,9 +25,16 @@ std::vector<std::size_t> kept_rows(const TrackReport& report) {
   return report::thinned_rows(report.steps.size(), {}, has_event, most_rows);
 }
 
+using ByAxis = std::array<Numbers, 3>;
+
+void add_by_axis(DataTable& table, const std::string& before, const std::string& after, ByAxis values) {
+  for (std::size_t k = 0; k < 3; ++k)
+    table.columns.emplace_back(before + axes[k] + after, rounded(std::move(values[k]), 6));
+}
+
 DataTable steps_table(const TrackReport& report, const TrueTrack& truth, std::span<const std::size_t> rows) {
   Numbers t, nees;
-  std::array<Numbers, 3> position, velocity, sigma, sigma_velocity, true_position;
+  ByAxis position, velocity, sigma, sigma_velocity, true_position;
   std::vector<std::string> events;
   for (const std::size_t row : rows) {
     const TrackStep& step = report.steps[row];
@@ -45,15 +52,11 @@ DataTable steps_table(const TrackReport& report, const TrueTrack& truth, std::sp
     }
   }
   DataTable table{"steps", {{"t_s", t}}};
-  const auto add = [&](const std::string& before, const std::string& after, std::array<Numbers, 3>& values) {
-    for (std::size_t k = 0; k < 3; ++k)
-      table.columns.emplace_back(before + axes[k] + after, rounded(std::move(values[k]), 6));
-  };
-  add("target_in_base_", "_m", position);
-  add("velocity_", "_m_s", velocity);
-  add("sigma_target_in_base_", "_m", sigma);
-  add("sigma_velocity_", "_m_s", sigma_velocity);
-  if (!truth.t_s.empty()) add("truth_", "_m", true_position);
+  add_by_axis(table, "target_in_base_", "_m", std::move(position));
+  add_by_axis(table, "velocity_", "_m_s", std::move(velocity));
+  add_by_axis(table, "sigma_target_in_base_", "_m", std::move(sigma));
+  add_by_axis(table, "sigma_velocity_", "_m_s", std::move(sigma_velocity));
+  if (!truth.t_s.empty()) add_by_axis(table, "truth_", "_m", std::move(true_position));
   table.columns.emplace_back("nees", rounded(std::move(nees), 4));
   table.columns.emplace_back("event", events);
   return table;

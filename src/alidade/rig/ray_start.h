@@ -1,0 +1,34 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "alidade/rig/rig_solve.h"
+
+namespace alidade {
+
+/// A line of sight through a head's middle and the point that was seen along it.
+struct SightLine {
+  Eigen::Vector3d direction_in_base;  ///< Unit vector.
+  Eigen::Vector3d point_in_board;
+};
+
+/// The pose of points that are seen along such lines, by orthogonal iteration from the 24 turns of a cube, and the mean
+/// capped angle that is left. None for fewer than six lines.
+/// Lu, Hager & Mjolsness, "Fast and globally convergent pose estimation from video images", 2000.
+struct SightPose {
+  Rigid3 base_from_board;
+  double misfit_rad = 0.0;
+};
+[[nodiscard]] std::optional<SightPose> pose_of_sight_lines(std::span<const SightLine> lines);
+
+/// What a head's views of a board say of its place when no view alone does: single points at many angles. Offsets are
+/// taken as zero. `usable`: one a view of the problem.
+[[nodiscard]] std::optional<SightPose> sight_pose(const RigProblem& problem, const std::vector<bool>& usable,
+                                                  const RigHead& rig_head, std::size_t head, std::size_t board);
+
+/// The turns that take a cube into itself.
+[[nodiscard]] std::vector<Eigen::Quaterniond> turns_of_a_cube();
+
+}  // namespace alidade

@@ -1,0 +1,296 @@
+#include "alidade/rig/rig.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "alidade/rig/rig_frame.h"
+#include "alidade/rig/rig_start.h"
+#include "alidade/rig/rig_work.h"
+
+namespace alidade {
+namespace {
+
+using Status = RigReport::Status;
+constexpr double degree = std::numbers::pi / 180.0;
+
+/// χ² of a view over its count; infinite where a corner is not seen.
+std::vector<double> mean_chi2(const Work& work, const RigState& state) {
+  std::vector<double> mean(work.given.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t v = 0; v < work.given.size(); ++v) {
+    if (!work.usable[v]) continue;
+    if (const auto at = view_residuals(work.problem, state, v))
+      mean[v] = at->r.squaredNorm() / static_cast<double>(at->r.size());
+  }
+  return mean;
+}
+
+double typical(const Work& work, const std::vector<double>& mean) {
+  std::vector<double> used;
+  for (std::size_t v = 0; v < mean.size(); ++v)
+    if (work.usable[v]) used.push_back(mean[v]);
+  return median_of(used);
+}
+
+/// Geman & McClure's weights, at a scale that half of the views set.
+std::vector<double> soft_weights(const Work& work, const RigState& state) {
+  const std::vector<double> mean = mean_chi2(work, state);
+  const double scale = 9.0 * std::max(1.0, typical(work, mean));
+  std::vector<double> weights;
+  for (const double one : mean) weights.push_back(std::isfinite(one) ? std::pow(1.0 / (1.0 + one / scale), 2) : 0.0);
+  if (!work.config.reject_outliers)
+    for (std::size_t v = 0; v < weights.size(); ++v) weights[v] = std::isfinite(mean[v]) ? 1.0 : 0.0;
+  return weights;
+}
+
+/// Readings of a view moved to where its board looks best: what a view that was left out must be judged by.
+void correct_reading(const Work& work, RigState& state, std::size_t v) {
+  for (int i = 0; i < 3; ++i) {
+    const auto at = view_residuals(work.problem, state, v);
+    if (!at) return;
+    const Eigen::Matrix2d H = at->J_correction.transpose() * at->J_correction;
+    state.corrections_rad[v] -= H.ldlt().solve(at->J_correction.transpose() * at->r);
+  }
+}
+
+std::vector<double> hard_weights(const Work& work, RigState& state, const std::vector<double>& before) {
+  for (std::size_t v = 0; v < before.size(); ++v)
+    if (work.usable[v] && before[v] < 0.5) correct_reading(work, state, v);
+  const std::vector<double> mean = mean_chi2(work, state);
+  const double scale = std::max(1.0, typical(work, mean));
+  std::vector<double> weights;
+  for (std::size_t v = 0; v < mean.size(); ++v) {
+    const auto rows = static_cast<double>(2 * work.given[v].seen.corners.size() + 2);
+    const double most = scale * std::max(4.0, 1.0 + 8.0 * std::sqrt(2.0 / rows));
+    const bool keep = std::isfinite(mean[v]) && (mean[v] <= most || !work.config.reject_outliers);
+    weights.push_back(keep ? 1.0 : 0.0);
+  }
+  return weights;
+}
+
+/// Soft weights until the views have settled, then those that disagree left out.
+std::optional<SolvedRig> solve_robustly(Work& work, const RigState& start, std::vector<double>& weights) {
+  constexpr int rounds = 6, max_iterations = 40;
+  std::optional<SolvedRig> solved;
+  RigState state = start;
+  for (int round = 0; round < rounds; ++round) {
+    report_progress(work.progress, "solve", static_cast<std::size_t>(round), rounds + 2);
+    weights = soft_weights(work, state);
+    solved = solve_rig(work.problem, state, weights, max_iterations);
+    if (!solved) return std::nullopt;
+    work.report.iterations += solved->iterations;
+    state = solved->state;
+    if (solved->converged && solved->iterations <= 2) break;
+  }
+  for (int round = 0; round < 3; ++round) {
+    const std::vector<double> next = hard_weights(work, state, weights);
+    const bool is_settled = round > 0 && next == weights;
+    weights = next;
+    if (is_settled) break;
+    solved = solve_rig(work.problem, state, weights, max_iterations);
+    if (!solved) return std::nullopt;
+    work.report.iterations += solved->iterations;
+    state = solved->state;
+  }
+  return solved;
+}
+
+double sum_of_corrections2(const Work& work, const SolvedRig& solved, const std::vector<double>& weights) {
+  double sum = 0.0;
+  for (std::size_t v = 0; v < work.given.size(); ++v)
+    if (weights[v] > 0.0) sum += solved.state.corrections_rad[v].squaredNorm();
+  return sum;
+}
+
+/// Solves, and with it what the encoders' noise is (Helmert's variance component). None: no convergence.
+std::optional<SolvedRig> solve_with_noise(Work& work, const RigState& start, std::vector<double>& weights) {
+  constexpr double usual_rad = 0.05 * degree, least_rad = 1e-3 * degree;
+  constexpr double enough =
+      8.0;  // of as many corrections a σ is told to a quarter; of fewer it is easily far too small
+  work.report.sigma_encoder_is_told = !work.config.sigma_encoder_rad;
+  work.problem.sigma_encoder_rad = work.config.sigma_encoder_rad.value_or(usual_rad);
+  auto solved = solve_robustly(work, start, weights);
+  for (int round = 0; round < 8 && solved && solved->converged && work.report.sigma_encoder_is_told; ++round) {
+    const auto cov = rig_covariance(work.problem, *solved).cov;
+    if (!cov) break;
+    const double num = 2.0 * static_cast<double>(std::ranges::count(weights, 1.0));
+    const double told = num - num_held_corrections(work.problem, *solved, *cov, weights);
+    const double before = work.problem.sigma_encoder_rad;
+    double sigma_rad = std::max(least_rad, std::sqrt(sum_of_corrections2(work, *solved, weights) / told));
+    if (!(told >= enough)) {
+      work.report.sigma_encoder_is_told = false;
+      sigma_rad = told > 1.0 ? std::max(sigma_rad, usual_rad) : usual_rad;
+    }
+    work.problem.sigma_encoder_rad = sigma_rad;
+    solved = solve_robustly(work, solved->state, weights);
+    if (std::abs(work.problem.sigma_encoder_rad / before - 1.0) < 0.02) break;
+  }
+  work.report.sigma_encoder_rad = work.problem.sigma_encoder_rad;
+  return solved;
+}
+
+/// Why a view does not fit: where its board seems to stand, and whether another head would explain it.
+std::string reason_of(const Work& work, const RigState& state, std::size_t v) {
+  const RigView& view = work.problem.views[v];
+  if (!work.poses[v]) return "outlier: its pixels do not fit";
+  const Rigid3& cam_from_board = work.poses[v]->pose.cam_from_board;
+  const auto off = [&](std::size_t head) {
+    const Rigid3 expected =
+        cam_from_world(state.heads[head].head, work.given[v].pan_tilt_rad) * state.world_from_board[view.board];
+    return std::pair{expected.rotation.angularDistance(cam_from_board.rotation),
+                     (expected.translation - cam_from_board.translation).norm()};
+  };
+  const auto [angle_rad, length_m] = off(view.head);
+  for (std::size_t h = 0; h < state.heads.size(); ++h) {
+    const auto [other_rad, other_m] = off(h);
+    if (h != view.head && other_rad < 2.0 * degree && other_m < 0.05 && angle_rad + length_m > 0.1)
+      return "outlier: it fits head " + std::to_string(work.ids[h]) + "; heads swapped?";
+  }
+  char text[96];
+  std::snprintf(text, sizeof text, "outlier: the board is %.1f° and %.0f mm from where this head's angles put it",
+                angle_rad / degree, 1e3 * length_m);
+  return text;
+}
+
+void describe_views(Work& work, const SolvedRig& solved, const std::vector<double>& weights) {
+  double squares = 0.0, num = 0.0;
+  for (std::size_t v = 0; v < work.given.size(); ++v) {
+    HeadViewFit& fit = work.report.views[v];
+    fit.used = weights[v] > 0.0;
+    if (!fit.used && fit.reason.empty()) fit.reason = reason_of(work, solved.state, v);
+    (fit.used ? work.report.views_used : work.report.views_dropped) += 1;
+    const auto at = view_residuals(work.problem, solved.state, v);
+    if (!at) continue;
+    fit.chi2 = at->r.squaredNorm();
+    fit.reading_correction_rad = solved.state.corrections_rad[v];
+    double own = 0.0;
+    for (Eigen::Index i = 0; i + 2 < at->r.size(); i += 2) {
+      fit.residual_px.emplace_back(at->r.segment<2>(i) * work.problem.sigma_px);
+      own += fit.residual_px.back().squaredNorm();
+    }
+    const auto count = static_cast<double>(fit.residual_px.size());
+    fit.rms_px = std::sqrt(own / count);
+    if (!fit.used) continue;
+    squares += own;
+    num += count;
+    work.report.chi2 += fit.chi2;
+  }
+  work.report.rms_px = num > 0.0 ? std::sqrt(squares / num) : 0.0;
+  int num_boards = 0;
+  for (const auto& board : solved.system.boards) num_boards += board.V.isZero(0.0) ? 0 : 1;
+  work.report.dof = solved.system.num_residuals - work.problem.num_free() - 6 * num_boards;
+}
+
+void count_cover(Work& work) {
+  for (std::size_t h = 0; h < work.heads.size(); ++h) {
+    HeadCover cover{.id = work.ids[h]};
+    std::map<std::size_t, int> seen_boards;
+    for (std::size_t v = 0; v < work.given.size(); ++v) {
+      if (!work.usable[v] || work.problem.views[v].head != h) continue;
+      const Eigen::Vector2d& angles = work.given[v].pan_tilt_rad;
+      cover.lowest_rad = cover.num_views == 0 ? angles : Eigen::Vector2d(cover.lowest_rad.cwiseMin(angles));
+      cover.highest_rad = cover.num_views == 0 ? angles : Eigen::Vector2d(cover.highest_rad.cwiseMax(angles));
+      ++cover.num_views;
+      ++seen_boards[work.problem.views[v].board];
+    }
+    cover.num_boards = static_cast<int>(seen_boards.size());
+    for (const auto& [board, count] : seen_boards) {
+      const bool is_shared = std::ranges::any_of(work.problem.views, [&, board = board](const RigView& view) {
+        return view.board == board && view.head != h &&
+               work.usable[static_cast<std::size_t>(&view - work.problem.views.data())];
+      });
+      cover.num_shared_boards += is_shared ? 1 : 0;
+    }
+    work.report.covers.push_back(cover);
+  }
+}
+
+bool has_enough(const Work& work) {
+  if (work.heads.empty()) return false;
+  return std::ranges::all_of(work.report.covers, [](const HeadCover& cover) { return cover.num_views >= 3; });
+}
+
+bool turns_about_both_axes(const Work& work) {
+  return std::ranges::all_of(work.report.covers, [](const HeadCover& cover) {
+    return (cover.highest_rad - cover.lowest_rad).minCoeff() >= least_span_rad;
+  });
+}
+
+void finish(Work& work, const SolvedRig& solved, const std::vector<double>& weights) {
+  describe_views(work, solved, weights);
+  const RigCovariance covariance = rig_covariance(work.problem, solved);
+  if (!covariance.cov) {
+    work.report.status = Status::degenerate;
+    work.report.unknown = covariance.unknown;
+    return;
+  }
+  RigState state = solved.state;
+  for (RigHead& rig_head : state.heads) rig_head.head.encoder.sigma_rad = work.problem.sigma_encoder_rad;
+  const WorldAtCamera world = world_at_camera(work.problem, state, *covariance.cov);
+  work.report.rig = world.rig;
+  for (std::size_t b = 0; b < work.boards.size(); ++b) {
+    const Rigid3& old_from_board = state.world_from_board[b];
+    work.report.boards.push_back({work.boards[b], world.world_from_old * old_from_board});
+  }
+  add_relative_sigma(work.report);
+  work.report.status = solved.converged ? Status::converged : Status::no_convergence;
+}
+
+void calibrate(Work& work, const std::map<int, Camera>& cameras) {
+  index_views(work, cameras);
+  fit_poses(work);
+  count_cover(work);
+  if (!has_enough(work)) return;
+  if (!start_mountings(work)) {
+    work.report.status = Status::degrees;
+    return;
+  }
+  if (!turns_about_both_axes(work)) {
+    work.report.status = Status::degenerate;
+    return;
+  }
+  choose_free(work);
+  const PlacedRig placed = place_rig(work.problem, work.heads, work.boards.size(), work.usable, work.poses);
+  if (std::ranges::count(placed.has_head, false) > 0) {
+    work.report.status = Status::not_linked;
+    return;
+  }
+  for (std::size_t v = 0; v < work.given.size(); ++v)
+    if (!placed.has_board[work.problem.views[v].board]) work.usable[v] = false;
+  std::vector<double> weights;
+  const auto solved = solve_with_noise(work, placed.state, weights);
+  work.report.status = Status::no_convergence;
+  if (solved) finish(work, *solved, weights);
+}
+
+RigReport calibrated(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
+                     const std::map<int, Camera>& cameras, const RigConfig& config, const Progress& progress) {
+  Work work{views, config, progress, {}, {}, {}, {}, {}, {}, {}};
+  work.problem.points_in_board = points_in_board;
+  calibrate(work, cameras);
+  return std::move(work.report);
+}
+
+/// What a wrong camera looks like: encoders worse than any encoder, views that contradict each other.
+bool is_suspicious(const RigReport& report) {
+  constexpr double usual_rad = 0.3 * degree;
+  if (report.status != Status::converged) return report.status == Status::no_convergence;
+  return report.sigma_encoder_rad > usual_rad || report.chi2_per_dof() > 2.0 ||
+         5 * report.views_dropped > report.views_used;
+}
+
+}  // namespace
+
+RigReport calibrate_rig(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
+                        const std::map<int, Camera>& cameras, const RigConfig& config, const Progress& progress) {
+  RigReport report = calibrated(views, points_in_board, cameras, config, progress);
+  if (cameras.size() != 2 || !is_suspicious(report)) return report;
+  std::map<int, Camera> swapped = cameras;
+  std::swap(swapped.begin()->second, swapped.rbegin()->second);
+  const RigReport otherwise = calibrated(views, points_in_board, swapped, config, progress);
+  if (otherwise.status == Status::converged && !is_suspicious(otherwise)) report.status = Status::swapped;
+  return report;
+}
+
+}  // namespace alidade

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/estimation/progress.h"
+#include "alidade/estimation/verdict.h"
+#include "alidade/geometry/rigid3.h"
+#include "alidade/pantilt/head_view.h"
+#include "alidade/pantilt/rig.h"
+
+namespace alidade {
+
+struct RigConfig {
+  std::optional<double> sigma_px;           ///< Of a corner's coordinate; none: told by the residuals.
+  std::optional<double> sigma_encoder_rad;  ///< Of a reading; none: told by the residuals.
+  bool estimate_scales = false;             ///< Radians of the axes for each radian read.
+  bool estimate_skew = true;                ///< Of the axes from being square to each other.
+  bool reject_outliers = true;
+};
+
+/// One view after the solve.
+struct HeadViewFit {
+  bool used = false;
+  std::string reason;   ///< Why it was not used; empty otherwise.
+  double chi2 = 0.0;    ///< Corners and reading, against the rig as solved; also of a view that was left out.
+  double rms_px = 0.0;  ///< Per point.
+  Eigen::Vector2d reading_correction_rad =
+      Eigen::Vector2d::Zero();               ///< What the rig would rather have read, less read.
+  std::vector<Eigen::Vector2d> residual_px;  ///< Prediction − observation, one a corner.
+};
+
+/// A place of the board, in the world.
+struct RigBoard {
+  int board = 0;
+  Rigid3 world_from_board;
+};
+
+/// A head that turned less about an axis is taken not to have turned about it.
+inline constexpr double least_span_rad = 0.07;
+
+/// What the views of one head cover.
+struct HeadCover {
+  int id = 0;
+  int num_views = 0, num_boards = 0;
+  Eigen::Vector2d lowest_rad = Eigen::Vector2d::Zero(), highest_rad = Eigen::Vector2d::Zero();  ///< Pan, tilt.
+  int num_shared_boards = 0;  ///< Seen by another head, too.
+};
+
+struct RigReport {
+  enum class Status {
+    converged,
+    too_few,     ///< Usable views.
+    degenerate,  ///< A combination of parameters cannot be told; `unknown` names it.
+    not_linked,  ///< A head shares no board with the others.
+    degrees,     ///< The readings are degrees.
+    swapped,     ///< The cameras belong to the other heads.
+    no_convergence
+  };
+  Status status = Status::too_few;
+  Rig rig;  ///< World: the first head's camera at readings of zero.
+  std::vector<RigBoard> boards;
+  std::vector<HeadViewFit> views;    ///< One a view.
+  std::vector<HeadCover> covers;     ///< One a head.
+  std::vector<std::string> unknown;  ///< Parameters of the combination that cannot be told.
+  double sigma_px = 0.0, sigma_encoder_rad = 0.0;
+  bool sigma_px_is_told = false, sigma_encoder_is_told = false;  ///< By the residuals.
+  double chi2 = 0.0;                                             ///< Whitened corners and reading corrections.
+  int dof = 0;
+  double rms_px = 0.0;  ///< Per point, of the used views.
+  /// σ of where another head's camera (else the camera after a turn, against where it started) stands, over the
+  /// angles covered: what the calibration is for.
+  double sigma_relative_rad = 0.0, sigma_relative_m = 0.0;
+  int views_used = 0, views_dropped = 0, iterations = 0;
+
+  [[nodiscard]] double chi2_per_dof() const { return dof > 0 ? chi2 / dof : 0.0; }
+};
+
+/// Axes, offsets and mounting of pan-tilt heads, and where they stand to each other, from views of boards that stood
+/// still, by maximum likelihood; readings have noise of their own and are corrected view by view. Lenses are known.
+/// Needs no first guess and does not throw on bad data: the report says how it went. `cameras`: by id of the head.
+/// docs/maths/pan-tilt-heads.md. Throws Interrupted.
+[[nodiscard]] RigReport calibrate_rig(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
+                                      const std::map<int, Camera>& cameras, const RigConfig& config,
+                                      const Progress& progress = {});
+
+/// What the answer is worth, or why there is none, and what to add.
+[[nodiscard]] Verdict rig_verdict(const RigReport& report, const RigConfig& config);
+
+/// Covariance (translation, rotation; on the right) of cam_from_cam(first, second) of two heads at these readings, by
+/// the covariance of the rig; of one head (the same index): of its camera against where it is at `first_rad`.
+[[nodiscard]] Eigen::Matrix<double, 6, 6> relative_covariance(const Rig& rig, std::size_t first,
+                                                              const Eigen::Vector2d& first_rad, std::size_t second,
+                                                              const Eigen::Vector2d& second_rad);
+
+}  // namespace alidade

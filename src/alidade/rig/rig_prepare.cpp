@@ -1,0 +1,144 @@
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "alidade/rig/ray_start.h"
+#include "alidade/rig/rig_start.h"
+#include "alidade/rig/rig_work.h"
+
+namespace alidade {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180.0;
+
+std::size_t index_of(std::vector<int>& known, int value) {
+  const auto found = std::ranges::find(known, value);
+  if (found != known.end()) return static_cast<std::size_t>(found - known.begin());
+  known.push_back(value);
+  return known.size() - 1;
+}
+
+bool is_of_board(const Work& work, const HeadView& view) {
+  const auto num = static_cast<int>(work.problem.points_in_board.size());
+  return !view.seen.corners.empty() && std::ranges::all_of(view.seen.corners, [num](const Corner& corner) {
+    return corner.index >= 0 && corner.index < num && corner.px.allFinite();
+  });
+}
+
+std::vector<std::optional<BoardPoseFit>> fitted_poses(const Work& work, std::span<const RigHead> heads) {
+  std::vector<std::optional<BoardPoseFit>> poses(work.given.size());
+  for (std::size_t v = 0; v < work.given.size(); ++v) {
+    report_progress(work.progress, "views", v, work.given.size());
+    if (work.usable[v])
+      poses[v] = fit_board_pose(heads[work.problem.views[v].head].camera, work.given[v].seen,
+                                work.problem.points_in_board, 1.0);
+  }
+  return poses;
+}
+
+/// σ of a corner that half of the views fit at least as well as; 0: no view can tell.
+double sigma_of_poses(const std::vector<std::optional<BoardPoseFit>>& poses) {
+  std::vector<double> variances;
+  for (const auto& pose : poses) {
+    if (!pose || pose->dof < 2) continue;
+    // Median over mean of χ²: Wilson & Hilferty, 1931.
+    variances.push_back(pose->chi2 / pose->dof / std::pow(1.0 - 2.0 / (9.0 * pose->dof), 3));
+  }
+  return std::sqrt(median_of(variances));
+}
+
+MountingStart mounting_of(const Work& work, std::size_t head, double unit) {
+  std::vector<TurnedView> turned;
+  for (std::size_t v = 0; v < work.given.size(); ++v) {
+    const RigView& view = work.problem.views[v];
+    if (view.head != head || !work.usable[v] || !work.poses[v]) continue;
+    turned.push_back({work.given[v].pan_tilt_rad * unit, work.poses[v]->pose.cam_from_board.rotation, view.board});
+  }
+  return mounting_start(turned);
+}
+
+/// Which way the encoders count, of a head that sees single points only: what explains its best board best.
+void choose_counting(const Work& work, std::size_t head, RigHead& rig_head) {
+  double least = std::numeric_limits<double>::infinity();
+  const RigHead nominal = rig_head;
+  for (std::size_t board = 0; board < work.boards.size(); ++board) {
+    for (const Eigen::Vector2d& scales : {Eigen::Vector2d(1.0, 1.0), Eigen::Vector2d(-1.0, 1.0),
+                                          Eigen::Vector2d(1.0, -1.0), Eigen::Vector2d(-1.0, -1.0)}) {
+      RigHead trial = nominal;
+      trial.head.encoder.pan_scale = scales.x();
+      trial.head.encoder.tilt_scale = scales.y();
+      const auto seen = sight_pose(work.problem, work.usable, trial, head, board);
+      if (seen && seen->misfit_rad < 0.999 * least) least = seen->misfit_rad, rig_head = trial;
+    }
+  }
+}
+
+}  // namespace
+
+void index_views(Work& work, const std::map<int, Camera>& cameras) {
+  for (const auto& [id, camera] : cameras) {
+    if (std::ranges::none_of(work.given, [id = id](const HeadView& view) { return view.head == id; })) continue;
+    work.ids.push_back(id);
+    work.heads.push_back({{}, camera});
+    work.heads.back().head.id = id;
+  }
+  work.report.views.resize(work.given.size());
+  for (std::size_t v = 0; v < work.given.size(); ++v) {
+    const HeadView& view = work.given[v];
+    const bool has_camera = cameras.contains(view.head), has_corners = is_of_board(work, view);
+    work.usable.push_back(has_camera && has_corners);
+    if (!has_corners) work.report.views[v].reason = "no corners of the board";
+    if (!has_camera) work.report.views[v].reason = "no camera of head " + std::to_string(view.head);
+    const std::size_t head = has_camera ? index_of(work.ids, view.head) : 0;
+    work.problem.views.push_back({&view, head, index_of(work.boards, view.board)});
+  }
+}
+
+void fit_poses(Work& work) {
+  work.poses = fitted_poses(work, work.heads);
+  const double told_px = sigma_of_poses(work.poses);
+  work.report.sigma_px_is_told = !work.config.sigma_px && told_px > 0.0;
+  work.report.sigma_px = work.config.sigma_px ? *work.config.sigma_px : told_px > 0.0 ? std::max(told_px, 1e-3) : 0.5;
+  work.problem.sigma_px = work.report.sigma_px;
+  constexpr double most_sigmas = 6.0;  // of one view's own residuals: blurred is not wrong, a wrong corner is
+  for (std::size_t v = 0; v < work.given.size(); ++v) {
+    if (!work.usable[v]) continue;
+    const auto& pose = work.poses[v];
+    // A view without a pose of its own is placed by the others.
+    if (pose && work.config.reject_outliers && pose->dof > 0 &&
+        pose->chi2 / pose->dof > std::pow(most_sigmas * std::max(told_px, work.report.sigma_px), 2)) {
+      work.usable[v] = false;
+      work.report.views[v].reason = "its corners do not fit the board";
+      work.poses[v].reset();
+    }
+  }
+}
+
+bool start_mountings(Work& work) {
+  constexpr double suspicious_rad = 3.0 * degree;
+  for (std::size_t h = 0; h < work.heads.size(); ++h) {
+    const MountingStart mounting = mounting_of(work, h, 1.0);
+    if (mounting.misfit_rad > suspicious_rad && mounting_of(work, h, degree).misfit_rad < 0.3 * mounting.misfit_rad)
+      return false;
+    Head& head = work.heads[h].head;
+    head.cam_from_tilt = mounting.cam_from_tilt;
+    head.encoder.pan_scale = mounting.pan_scale;
+    head.encoder.tilt_scale = mounting.tilt_scale;
+    if (mounting.num_compared == 0) choose_counting(work, h, work.heads[h]);
+  }
+  return true;
+}
+
+/// The first head keeps its base; what a general head has twice is held (docs/maths/pan-tilt-heads.md).
+void choose_free(Work& work) {
+  for (std::size_t h = 0; h < work.heads.size(); ++h) {
+    std::vector<int> free;
+    if (h > 0) free = {0, 1, 2, 3, 4, 5};
+    free.insert(free.end(), {8, 9, 10, 11, 12, 13, 14});
+    if (work.config.estimate_scales) free.insert(free.end(), {17, 18});
+    if (work.config.estimate_skew) free.push_back(19);
+    work.problem.free.push_back(free);
+  }
+}
+
+}  // namespace alidade

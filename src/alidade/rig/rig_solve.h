@@ -1,0 +1,99 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/geometry/rigid3.h"
+#include "alidade/pantilt/head_view.h"
+#include "alidade/pantilt/rig.h"
+
+namespace alidade {
+
+/// One view with its head and board by index.
+struct RigView {
+  const HeadView* view = nullptr;
+  std::size_t head = 0, board = 0;
+};
+
+/// What the solver is given. The world is the base of head 0, which is held.
+struct RigProblem {
+  std::vector<RigView> views;
+  std::span<const Eigen::Vector3d> points_in_board;
+  std::vector<std::vector<int>> free;  ///< Of each head: which of its parameters are estimated.
+  double sigma_px = 1.0;
+  double sigma_encoder_rad = 0.0;  ///< 0: readings are exact.
+
+  [[nodiscard]] int num_free() const;
+  /// Where a head's parameters begin among the free ones.
+  [[nodiscard]] int first_free(std::size_t head) const;
+};
+
+struct RigState {
+  std::vector<RigHead> heads;
+  std::vector<Rigid3> world_from_board;
+  std::vector<Eigen::Vector2d> corrections_rad;  ///< One a view: to be added to its reading.
+};
+
+/// Whitened residuals of a view: corners (two rows each), then the correction of the reading.
+struct RigViewResiduals {
+  Eigen::VectorXd r;
+  Eigen::MatrixXd J_head;  ///< By the free parameters of its head.
+  Eigen::Matrix<double, Eigen::Dynamic, 6> J_board;
+  Eigen::Matrix<double, Eigen::Dynamic, 2> J_correction;
+};
+/// None where the camera does not see a corner.
+[[nodiscard]] std::optional<RigViewResiduals> view_residuals(const RigProblem& problem, const RigState& state,
+                                                             std::size_t view);
+
+/// Normal equations with the corrections eliminated view by view: heads (common), boards, and how they are coupled.
+struct RigSystem {
+  struct ViewBlock {
+    Eigen::Matrix2d E = Eigen::Matrix2d::Identity();  ///< Of the correction.
+    Eigen::Matrix<double, 2, Eigen::Dynamic> E_head;
+    Eigen::Matrix<double, 2, 6> E_board;
+    Eigen::Vector2d g = Eigen::Vector2d::Zero();
+    double chi2 = 0.0;
+  };
+  struct BoardBlock {
+    Eigen::Matrix<double, 6, 6> V = Eigen::Matrix<double, 6, 6>::Zero();
+    Eigen::Matrix<double, 6, Eigen::Dynamic> W;  ///< Board by common.
+    Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();
+  };
+  Eigen::MatrixXd U;
+  Eigen::VectorXd g;
+  std::vector<BoardBlock> boards;
+  std::vector<ViewBlock> views;
+  double cost = 0.0;  ///< Weighted.
+  int num_residuals = 0;
+
+  /// Schur complement over the boards: the information about the heads.
+  [[nodiscard]] Eigen::MatrixXd information() const;
+};
+/// `weights`: one a view; zero leaves it out. None where a view with a weight is not seen whole.
+[[nodiscard]] std::optional<RigSystem> rig_system(const RigProblem& problem, const RigState& state,
+                                                  std::span<const double> weights);
+
+struct SolvedRig {
+  RigState state;
+  RigSystem system;  ///< At the state.
+  bool converged = false;
+  int iterations = 0;
+};
+/// Levenberg–Marquardt over heads, boards and corrections at these weights.
+[[nodiscard]] std::optional<SolvedRig> solve_rig(const RigProblem& problem, const RigState& start,
+                                                 std::span<const double> weights, int max_iterations);
+
+/// Covariance of the free parameters; none, and the names of what cannot be told, where the information is singular.
+struct RigCovariance {
+  std::optional<Eigen::MatrixXd> cov;
+  std::vector<std::string> unknown;
+};
+[[nodiscard]] RigCovariance rig_covariance(const RigProblem& problem, const SolvedRig& solved);
+
+/// Σ over the used views of tr cov(correction)/σ²: how many of the corrections the prior alone holds.
+[[nodiscard]] double num_held_corrections(const RigProblem& problem, const SolvedRig& solved,
+                                          const Eigen::MatrixXd& cov, std::span<const double> weights);
+
+}  // namespace alidade

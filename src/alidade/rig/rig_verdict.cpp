@@ -1,0 +1,210 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "alidade/rig/rig.h"
+
+namespace alidade {
+namespace {
+
+using Status = RigReport::Status;
+constexpr double degree = std::numbers::pi / 180.0;
+constexpr double good_span_rad = 20.0 * degree;
+constexpr double good_relative_rad = 0.2 * degree, good_relative_m = 0.0035;  // of a use in tracking
+constexpr double refuse_relative_rad = 2.0 * degree, refuse_relative_m = 0.05;
+
+std::string text_of(double value, int digits = 3) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return text;
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+Verdict refusal(State state, ExitCode code, std::string sentence, std::string add) {
+  return {.state = state, .exit_code = code, .sentence = std::move(sentence), .to_add = std::move(add), .checks = {}};
+}
+
+Verdict cannot_tell(std::string sentence, std::string add) {
+  return refusal(State::refused, ExitCode::cannot_tell, std::move(sentence), std::move(add));
+}
+
+/// A head that never turned about one of its axes.
+std::optional<Verdict> refusal_by_angles(const RigReport& report) {
+  for (const HeadCover& cover : report.covers) {
+    const Eigen::Vector2d span = cover.highest_rad - cover.lowest_rad;
+    const bool pans = span.x() >= least_span_rad, tilts = span.y() >= least_span_rad;
+    const std::string head = "head " + std::to_string(cover.id);
+    if (cover.num_views < 3 || (pans && tilts)) continue;
+    if (!pans && !tilts)
+      return cannot_tell(head + " does not turn: its axes cannot be told",
+                         "look at each board at several pans and tilts, ±20° or more of each");
+    if (pans)
+      return cannot_tell(head + ": pan only: its tilt axis cannot be told", "tilt the head as well, by ±15° or more");
+    return cannot_tell(head + ": tilt only: its pan axis cannot be told", "pan the head as well, by ±20° or more");
+  }
+  return std::nullopt;
+}
+
+std::optional<Verdict> refusal_by_count(const RigReport& report) {
+  if (report.covers.empty()) return cannot_tell("no view is of a head with a camera", "give --camera for each head");
+  for (const HeadCover& cover : report.covers) {
+    if (cover.num_views >= 3) continue;
+    return cannot_tell("head " + std::to_string(cover.id) + " has " + std::to_string(cover.num_views) +
+                           " usable views; three are the least",
+                       "look at boards from more angles, each board at least twice");
+  }
+  return std::nullopt;
+}
+
+Verdict refusal_by_link(const RigReport& report) {
+  for (const HeadCover& cover : report.covers) {
+    if (cover.num_shared_boards > 0) continue;
+    return cannot_tell("head " + std::to_string(cover.id) +
+                           " shares no board with another head: where they stand to each other cannot be told",
+                       "let both heads see a board in the same place");
+  }
+  return cannot_tell("not all heads share boards with each other", "let all heads see a board in the same place");
+}
+
+Verdict refusal_by_status(const RigReport& report) {
+  if (const auto few = refusal_by_count(report)) return *few;
+  switch (report.status) {
+    case Status::degrees:
+      return refusal(State::refused, ExitCode::cannot_tell,
+                     "the angles are degrees: the boards turn as if each radian were a degree",
+                     "give pan_rad and tilt_rad in radians");
+    case Status::swapped:
+      return refusal(State::refused, ExitCode::cannot_tell,
+                     "heads swapped: the views of each head fit the camera of the other",
+                     "exchange the cameras, or the numbers in column 'head'");
+    case Status::not_linked:
+      return refusal_by_link(report);
+    default:
+      break;
+  }
+  if (const auto angles = refusal_by_angles(report)) return *angles;
+  if (report.status == Status::degenerate)
+    return cannot_tell("these cannot be told apart: " + joined(report.unknown),
+                       "look at each board from more pans and tilts");
+  return refusal(State::not_converged, ExitCode::no_convergence, "no rig explains these views",
+                 "check that each view has its own angles (radians), head and board, and the camera files");
+}
+
+Check check_of(std::string name, State state, std::string text, double value, double limit, std::string unit) {
+  return {std::move(name), state, std::move(text), value, limit, std::move(unit), ""};
+}
+
+void add_precision(const RigReport& report, Verdict& verdict) {
+  const std::string what = report.rig.heads.size() > 1 ? "between the cameras" : "of the camera as it turns";
+  const double angle = report.sigma_relative_rad, length = report.sigma_relative_m;
+  const auto state = [](double value, double good, double refuse) {
+    return !(value < refuse) ? State::refused : value > good ? State::care : State::good;
+  };
+  verdict.checks.push_back(check_of("rotation", state(angle, good_relative_rad, refuse_relative_rad),
+                                    "σ " + what + " is up to " + text_of(angle / degree, 2) + "°", angle / degree,
+                                    good_relative_rad / degree, "°"));
+  verdict.checks.push_back(check_of("position", state(length, good_relative_m, refuse_relative_m),
+                                    "σ " + what + " is up to " + text_of(1e3 * length, 2) + " mm", 1e3 * length,
+                                    1e3 * good_relative_m, "mm"));
+}
+
+void add_spans(const RigReport& report, Verdict& verdict) {
+  for (const HeadCover& cover : report.covers) {
+    for (int axis = 0; axis < 2; ++axis) {
+      const double span = cover.highest_rad[axis] - cover.lowest_rad[axis];
+      const std::string name = axis == 0 ? "pan" : "tilt";
+      verdict.checks.push_back(
+          check_of(name + " " + std::to_string(cover.id), span >= good_span_rad ? State::good : State::care,
+                   "head " + std::to_string(cover.id) + " covers " + text_of(cover.lowest_rad[axis] / degree, 2) +
+                       "° to " + text_of(cover.highest_rad[axis] / degree, 2) + "° of " + name +
+                       (span >= good_span_rad ? "" : "; " + name + " farther"),
+                   span / degree, good_span_rad / degree, "°"));
+    }
+  }
+}
+
+void add_boards(const RigReport& report, Verdict& verdict) {
+  if (report.rig.heads.size() < 2) return;
+  int least = report.covers.front().num_shared_boards;
+  for (const HeadCover& cover : report.covers) least = std::min(least, cover.num_shared_boards);
+  verdict.checks.push_back(check_of("shared boards", least >= 3 ? State::good : State::care,
+                                    std::to_string(least) + (least == 1 ? " place" : " places") +
+                                        " of the board seen by more than one head" +
+                                        (least >= 3 ? "" : "; put it in three places or more"),
+                                    least, 3.0, ""));
+}
+
+void add_fit(const RigReport& report, Verdict& verdict) {
+  std::string named;
+  int outliers = 0;
+  for (std::size_t v = 0; v < report.views.size(); ++v) {
+    if (report.views[v].used) continue;
+    named += (named.empty() ? "" : ", ") + std::to_string(v + 1);
+    ++outliers;
+  }
+  const auto given = static_cast<double>(report.views.size());
+  const State state = outliers == 0 ? State::good : outliers > 0.4 * given ? State::refused : State::care;
+  verdict.checks.push_back(check_of("outliers", state, outliers == 0 ? "all views agree" : "left out: view " + named,
+                                    outliers, 0.4 * given, ""));
+  if (report.dof < 1) return;
+  const double ratio = report.chi2_per_dof(), most = 1.3 + 3.0 * std::sqrt(2.0 / report.dof);
+  verdict.checks.push_back(check_of("fit", ratio < most ? State::good : State::care,
+                                    "χ² per degree of freedom is " + text_of(ratio), ratio, most, ""));
+}
+
+/// Encoders that are worse than any encoder say that something else is wrong.
+void add_encoder(const RigReport& report, const RigConfig& config, Verdict& verdict) {
+  constexpr double good_rad = 0.5 * degree;
+  const double sigma = report.sigma_encoder_rad;
+  verdict.checks.push_back(check_of("encoder", sigma < good_rad ? State::good : State::care,
+                                    "σ of a reading is " + text_of(sigma / degree, 2) + "°" +
+                                        (report.sigma_encoder_is_told ? " (told by the residuals)"
+                                         : config.sigma_encoder_rad   ? " (as given)"
+                                                                      : " (assumed: too few views to tell)"),
+                                    sigma / degree, good_rad / degree, "°"));
+}
+
+}  // namespace
+
+Verdict rig_verdict(const RigReport& report, const RigConfig& config) {
+  if (report.status != Status::converged) return refusal_by_status(report);
+  if (const auto angles = refusal_by_angles(report)) return *angles;
+  Verdict verdict;
+  add_precision(report, verdict);
+  add_spans(report, verdict);
+  add_boards(report, verdict);
+  add_fit(report, verdict);
+  add_encoder(report, config, verdict);
+  const auto first = [&](State state) {
+    return std::ranges::find_if(verdict.checks, [&](const Check& check) { return check.state == state; });
+  };
+  const auto refused = first(State::refused), care = first(State::care);
+  if (refused != verdict.checks.end()) {
+    const std::vector<Check> checks = verdict.checks;
+    verdict = refused->name == "outliers"
+                  ? refusal(State::not_converged, ExitCode::no_convergence, "the views do not agree: " + refused->text,
+                            "check that each view has its own angles, head and board")
+                  : cannot_tell("too little for this noise: " + refused->text,
+                                "look at more boards, nearer, from more pans and tilts");
+    verdict.checks = checks;
+    return verdict;
+  }
+  if (care != verdict.checks.end()) {
+    verdict.state = State::care;
+    verdict.to_add = care->text;
+  }
+  const auto num = report.rig.heads.size();
+  verdict.sentence = std::to_string(num) + (num == 1 ? " head" : " heads") + " from " +
+                     std::to_string(report.views_used) + " views, camera to camera ± " +
+                     text_of(3.0 * report.sigma_relative_rad / degree, 2) + "°, ± " +
+                     text_of(3e3 * report.sigma_relative_m, 2) + " mm (3σ)";
+  return verdict;
+}
+
+}  // namespace alidade

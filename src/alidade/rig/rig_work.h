@@ -1,0 +1,45 @@
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "alidade/board/board_pose.h"
+#include "alidade/rig/rig.h"
+#include "alidade/rig/rig_solve.h"
+
+/// The steps of calibrate_rig() before the solve, and what they hand on.
+namespace alidade {
+
+/// Everything on the way: what is estimated, and what the views are.
+struct Work {
+  std::span<const HeadView> given;
+  const RigConfig& config;
+  const Progress& progress;
+  RigProblem problem;            ///< Its views: those given, in order.
+  std::vector<int> ids, boards;  ///< By index.
+  std::vector<RigHead> heads;
+  std::vector<std::optional<BoardPoseFit>> poses;
+  std::vector<bool> usable;
+  RigReport report;
+};
+
+/// Heads and boards by index; views without a camera or corners of the board are named and left aside.
+void index_views(Work& work, const std::map<int, Camera>& cameras);
+/// The pose of the board of each view by itself, and with them σ of a corner.
+void fit_poses(Work& work);
+/// Mountings of all heads; false where the readings are degrees.
+[[nodiscard]] bool start_mountings(Work& work);
+/// Which parameters are estimated.
+void choose_free(Work& work);
+
+[[nodiscard]] inline double median_of(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace alidade

@@ -1,0 +1,156 @@
+#include "alidade/simulate/rig.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "alidade/simulate/draws.h"
+
+namespace alidade {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180.0;
+
+std::vector<double> spread(double low, double high, int count) {
+  std::vector<double> values;
+  for (int i = 0; i < count; ++i) values.push_back(low + (high - low) * i / (count - 1));
+  return values;
+}
+
+RigHead drawn_head(const RigHead& nominal, const RigSceneConfig& config, bool is_first, Draws& draws) {
+  RigHead drawn = nominal;
+  Head& head = drawn.head;
+  head.cam_from_tilt = nominal.head.cam_from_tilt * exp_so3(config.mounting_sigma_rad * draws.normal3());
+  head.pan_to_tilt_m += Eigen::Vector3d(0.0, 0.0, config.offset_sigma_m * draws.normal());
+  head.tilt_to_cam_m += config.offset_sigma_m * draws.normal3();
+  head.axes_skew_rad += config.skew_sigma_rad * draws.normal();
+  if (is_first) return drawn;
+  head.world_from_base.rotation =
+      nominal.head.world_from_base.rotation * exp_so3(config.base_sigma_rad * draws.normal3());
+  head.world_from_base.translation += config.base_sigma_m * draws.normal3();
+  return drawn;
+}
+
+/// The corners of a board as a head at these angles sees them; fewer where some are not in the picture.
+BoardView true_view(const RigHead& rig_head, const Eigen::Vector2d& angles, const Rigid3& world_from_board,
+                    const std::vector<Eigen::Vector3d>& points_in_board) {
+  BoardView seen;
+  const TurnedHead turned(rig_head.head, angles);
+  for (std::size_t i = 0; i < points_in_board.size(); ++i) {
+    const auto px = project(rig_head.camera, turned.point_in_cam(world_from_board * points_in_board[i]));
+    const bool inside = px && px->x() >= 0.0 && px->y() >= 0.0 && px->x() <= rig_head.camera.width_px - 1.0 &&
+                        px->y() <= rig_head.camera.height_px - 1.0;
+    if (inside) seen.corners.push_back({static_cast<int>(i), *px, Eigen::Matrix2d::Identity()});
+  }
+  return seen;
+}
+
+/// Whole views of a board by one head, at most so many, spread over the grid of angles.
+std::vector<HeadView> views_of(const RigHead& rig_head, const Rigid3& world_from_board,
+                               const std::vector<Eigen::Vector3d>& points_in_board, const RigSceneConfig& config) {
+  std::vector<HeadView> all, kept;
+  for (const double pan : config.pans_rad) {
+    for (const double tilt : config.tilts_rad) {
+      HeadView view{
+          true_view(rig_head, {pan, tilt}, world_from_board, points_in_board), 0, rig_head.head.id, {pan, tilt}};
+      if (view.seen.corners.size() == points_in_board.size()) all.push_back(std::move(view));
+    }
+  }
+  const auto most = static_cast<std::size_t>(config.most_views_of_a_board);
+  if (all.size() <= most) return all;
+  for (std::size_t i = 0; i < most; ++i) kept.push_back(all[i * all.size() / most]);
+  return kept;
+}
+
+Rigid3 drawn_board(const RigSceneConfig& config, const Rig& rig, const Eigen::Vector3d& middle_in_board, Draws& draws) {
+  // Somewhere in front of the heads' middle, its face towards them, tilted by up to 35°.
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const RigHead& rig_head : rig.heads)
+    middle += rig_head.head.world_from_base.translation / static_cast<double>(rig.heads.size());
+  const double range_m = draws.uniform(config.min_range_m, config.max_range_m);
+  const double pan = draws.uniform(-30.0, 30.0) * degree, tilt = draws.uniform(-10.0, 20.0) * degree;
+  const Eigen::Quaterniond towards = exp_so3({0.0, -pan, 0.0}) * exp_so3({tilt, 0.0, 0.0});
+  const Eigen::Vector3d place = middle + range_m * (towards * Eigen::Vector3d::UnitZ());
+  const double side = draws.uniform(0.0, 2.0 * std::numbers::pi), lean = draws.uniform(5.0, 35.0) * degree;
+  const Eigen::Quaterniond turn = exp_so3(lean * Eigen::Vector3d(std::cos(side), std::sin(side), 0.0)) *
+                                  exp_so3({0.0, 0.0, draws.uniform(-0.3, 0.3)});
+  const Eigen::Quaterniond rotation = (towards * turn).normalized();
+  return {rotation, place - rotation * middle_in_board};
+}
+
+RigSceneConfig completed(RigSceneConfig config) {
+  if (config.pans_rad.empty()) config.pans_rad = spread(-40.0 * degree, 40.0 * degree, 5);
+  if (config.tilts_rad.empty()) config.tilts_rad = spread(-15.0 * degree, 30.0 * degree, 4);
+  if (config.nominal.empty())
+    for (const RigHead& rig_head : xiahou_rig()) config.nominal.push_back(rig_head);
+  return config;
+}
+
+/// Turns the world so that it is the first head's camera at readings of zero.
+void use_first_camera(Rig& rig) {
+  const Rigid3 world_from_old = cam_from_world(rig.heads[0].head, Eigen::Vector2d::Zero());
+  for (RigHead& rig_head : rig.heads) {
+    const Rigid3 old_from_base = rig_head.head.world_from_base;
+    rig_head.head.world_from_base = world_from_old * old_from_base;
+  }
+}
+
+}  // namespace
+
+RigScene draw_rig_scene(const RigSceneConfig& given, std::uint64_t seed) {
+  const RigSceneConfig config = completed(given);
+  Draws draws(seed);
+  RigScene scene;
+  scene.board = config.board;
+  for (const RigHead& nominal : config.nominal)
+    scene.rig.heads.push_back(drawn_head(nominal, config, scene.rig.heads.empty(), draws));
+  use_first_camera(scene.rig);
+  const std::vector<Eigen::Vector3d> points = points_in_board(config.board);
+  const Eigen::Vector3d middle = 0.5 * (points.front() + points.back());
+  constexpr int most_tries = 100000;
+  for (int tries = 0; static_cast<int>(scene.world_from_board.size()) < config.num_boards; ++tries) {
+    if (tries > most_tries) throw std::runtime_error("no board can be placed in sight of these heads");
+    const Rigid3 world_from_board = drawn_board(config, scene.rig, middle, draws);
+    const auto index = static_cast<int>(scene.world_from_board.size());
+    std::vector<HeadView> views;
+    bool is_seen = true;
+    for (std::size_t h = 0; h < scene.rig.heads.size(); ++h) {
+      if (!config.shared && static_cast<std::size_t>(index) % scene.rig.heads.size() != h) continue;
+      const std::vector<HeadView> own = views_of(scene.rig.heads[h], world_from_board, points, config);
+      is_seen = is_seen && own.size() >= 2;
+      views.insert(views.end(), own.begin(), own.end());
+    }
+    if (!is_seen) continue;
+    for (HeadView& view : views) {
+      view.board = index;
+      view.seen.photo = "view " + std::to_string(scene.views.size());
+      scene.views.push_back(std::move(view));
+    }
+    scene.world_from_board.push_back(world_from_board);
+  }
+  return scene;
+}
+
+SimulatedViews simulate_head_views(const RigScene& scene, const RigNoise& noise, std::uint64_t seed) {
+  Draws draws(seed + 0x9e3779b97f4a7c15u);
+  SimulatedViews simulated{scene.views, std::vector<bool>(scene.views.size(), false)};
+  for (HeadView& view : simulated.views) {
+    view.pan_tilt_rad += noise.sigma_encoder_rad * draws.normal2();
+    for (Corner& corner : view.seen.corners) corner.px += noise.sigma_px * draws.normal2();
+  }
+  const auto num = scene.views.size();
+  const auto num_wrong = static_cast<std::size_t>(std::lround(noise.wrong_views * static_cast<double>(num)));
+  for (std::size_t made = 0; made < num_wrong;) {
+    const auto v = static_cast<std::size_t>(draws.uniform() * static_cast<double>(num));
+    const auto other = static_cast<std::size_t>(draws.uniform() * static_cast<double>(num));
+    const double apart = (scene.views[v].pan_tilt_rad - scene.views[other].pan_tilt_rad).norm();
+    if (simulated.is_wrong[v] || apart < 5.0 * degree) continue;
+    simulated.views[v].pan_tilt_rad = scene.views[other].pan_tilt_rad;
+    simulated.is_wrong[v] = true;
+    ++made;
+  }
+  return simulated;
+}
+
+}  // namespace alidade

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "alidade/board/board.h"
+#include "alidade/geometry/rigid3.h"
+#include "alidade/pantilt/head_view.h"
+#include "alidade/pantilt/rig.h"
+
+namespace alidade {
+
+/// A world for `rig`: heads, places of a board, and which angles each board was looked at from. The world is the first
+/// head's camera at readings of zero.
+struct RigScene {
+  Rig rig;
+  Board board;
+  std::vector<Rigid3> world_from_board;
+  std::vector<HeadView> views;  ///< True: angles without noise, corners where the lens puts them.
+};
+
+struct RigSceneConfig {
+  std::vector<RigHead> nominal;  ///< Drawn heads are near these; empty: the paper's two.
+  Board board{.cols = 9, .rows = 6, .square_m = 0.025};
+  int num_boards = 5;
+  std::vector<double> pans_rad, tilts_rad;  ///< Empty: −40 to 40° in 5 and −15 to 30° in 4.
+  double min_range_m = 0.7, max_range_m = 1.3;
+  int most_views_of_a_board = 4;  ///< By one head, spread over those that see it whole.
+  double mounting_sigma_rad = 0.04, offset_sigma_m = 0.02, base_sigma_rad = 0.05, base_sigma_m = 0.03;
+  double skew_sigma_rad = 0.01;
+  bool shared = true;  ///< Each board is seen by all heads.
+};
+
+/// Draws heads and boards. Boards that some head does not see at two pairs of angles are drawn again. Same seed, same
+/// scene.
+[[nodiscard]] RigScene draw_rig_scene(const RigSceneConfig& config, std::uint64_t seed);
+
+struct RigNoise {
+  double sigma_px = 0.2;
+  double sigma_encoder_rad = 0.02 * 0.017453292519943295;
+  double wrong_views = 0.0;  ///< Share of the views whose angles are those of another view.
+};
+struct SimulatedViews {
+  std::vector<HeadView> views;
+  std::vector<bool> is_wrong;
+};
+[[nodiscard]] SimulatedViews simulate_head_views(const RigScene& scene, const RigNoise& noise, std::uint64_t seed);
+
+}  // namespace alidade

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <span>
+
+#include "alidade/io/result_document.h"
+#include "alidade/rig/rig.h"
+
+namespace alidade {
+
+/// Puts a rig into a result: heads, chi2_per_dof, rms_px, noise, covers, the covariance, and the views as a table.
+void fill_rig(std::span<const HeadView> views, const RigReport& report, ResultDocument& document);
+
+}  // namespace alidade

@@ -10,6 +10,7 @@ void add_commands(alidade::cli::Frame& frame) {
   alidade::cli::add_plan(frame);
   alidade::cli::add_project(frame);
   alidade::cli::add_rangefinder(frame);
+  alidade::cli::add_rig(frame);
   alidade::cli::add_simulate(frame);
   alidade::cli::add_track(frame);
 }

@@ -13,6 +13,7 @@
 #include "cli/commands.h"
 #include "cli/frame.h"
 #include "cli/option_checks.h"
+#include "cli/project_rig.h"
 
 namespace alidade::cli {
 namespace {
@@ -21,6 +22,7 @@ struct Args {
   std::filesystem::path beam, camera, overlay;
   std::vector<double> ranges_m;
   double sigma_range_m = 0.0;
+  RigProjectionArgs rig;
 };
 
 struct Projected {
@@ -193,26 +195,48 @@ ExitCode project_beam(const Args& args, Run& run) {
   return run.finish(verdict);
 }
 
+/// Which of the two it is, and whether its options are there.
+ExitCode project(const Args& args, Run& run) {
+  if (!args.rig.rig.empty()) {
+    if (!args.beam.empty() || !args.ranges_m.empty()) throw UsageError("--rig and --beam are two different questions");
+    if (args.rig.pans_rad.empty() || args.rig.tilts_rad.empty()) throw UsageError("--rig needs --pan and --tilt");
+    return project_rig(args.rig, run);
+  }
+  if (args.beam.empty()) throw UsageError("give --beam FILE with --range, or --rig FILE with --pan and --tilt");
+  if (args.ranges_m.empty()) throw UsageError("--beam needs --range");
+  if (!args.rig.pans_rad.empty() || !args.rig.tilts_rad.empty() || !args.rig.point_m.empty())
+    throw UsageError("--pan, --tilt and --point belong to --rig");
+  return project_beam(args, run);
+}
+
 }  // namespace
 
 void add_project(Frame& frame) {
   auto args = std::make_shared<Args>();
-  CLI::App& command =
-      frame.add_command({.name = "project",
-                         .summary = "Pixel and 3-D point of a rangefinder's reading, with their covariance",
-                         .examples = "alidade project --beam rangefinder.yaml --camera camera.yaml --range 2.31\n"
-                                     "alidade project --beam rangefinder.yaml --range 0.5,1,2,4 --overlay photo.jpg\n"},
-                        [args](Run& run) { return project_beam(*args, run); });
-  command.add_option("--beam", args->beam, "rangefinder.yaml of alidade rangefinder")->type_name("FILE")->required();
+  CLI::App& command = frame.add_command(
+      {.name = "project",
+       .summary = "Pixel and 3-D point of a rangefinder's reading, or matrices and pixels of a pan-tilt rig",
+       .examples = "alidade project --beam rangefinder.yaml --camera camera.yaml --range 2.31\n"
+                   "alidade project --beam rangefinder.yaml --range 0.5,1,2,4 --overlay photo.jpg\n"
+                   "alidade project --rig rig.yaml --pan 0.1,-0.2 --tilt 0.2 --point 0.1 -0.3 2.5\n"},
+      [args](Run& run) { return project(*args, run); });
+  command.add_option("--beam", args->beam, "rangefinder.yaml of alidade rangefinder")->type_name("FILE");
   command.add_option("--camera", args->camera, "The camera (default: the one that the beam names)")->type_name("FILE");
-  command.add_option("--range", args->ranges_m, "Reading, or several [m]")
-      ->delimiter(',')
-      ->required()
-      ->check(positive_number());
+  command.add_option("--range", args->ranges_m, "Reading, or several [m]")->delimiter(',')->check(positive_number());
   command.add_option("--sigma-range-m", args->sigma_range_m, "Of the reading (default: the beam's)")
       ->check(positive_number());
   command.add_option("--overlay", args->overlay, "Draw the beam's line and the spots into this photo: overlay.png")
       ->type_name("PHOTO");
+  command.add_option("--rig", args->rig.rig, "rig.yaml of alidade rig")->type_name("FILE");
+  command.add_option("--pan", args->rig.pans_rad, "What the pan encoders read, one for all or one for each head [rad]")
+      ->delimiter(',')
+      ->check(finite_number());
+  command.add_option("--tilt", args->rig.tilts_rad, "What the tilt encoders read [rad]")
+      ->delimiter(',')
+      ->check(finite_number());
+  command.add_option("--point", args->rig.point_m, "X Y Z in the rig's world [m]: gives its pixels")
+      ->expected(3)
+      ->check(finite_number());
 }
 
 }  // namespace alidade::cli

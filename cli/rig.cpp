@@ -1,0 +1,199 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <mutex>
+#include <numbers>
+#include <opencv2/core.hpp>
+#include <set>
+
+#include "alidade/imaging/find_boards.h"
+#include "alidade/io/camera_file.h"
+#include "alidade/io/photos.h"
+#include "alidade/io/rig_document.h"
+#include "alidade/io/rig_file.h"
+#include "alidade/io/views_file.h"
+#include "alidade/rig/rig.h"
+#include "cli/board_options.h"
+#include "cli/commands.h"
+#include "cli/frame.h"
+#include "cli/option_checks.h"
+
+namespace alidade::cli {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180.0;
+
+struct Args {
+  std::filesystem::path views;
+  std::vector<std::filesystem::path> cameras;
+  BoardOptions board;
+  double sigma_px = 0.0, sigma_angle_rad = 0.0;
+  bool scales = false, skip_bad = false;
+  std::string outliers = "drop";
+};
+
+RigConfig config_from(const Args& args) {
+  RigConfig config;
+  if (args.sigma_px > 0.0) config.sigma_px = args.sigma_px;
+  if (args.sigma_angle_rad > 0.0) config.sigma_encoder_rad = args.sigma_angle_rad;
+  config.estimate_scales = args.scales;
+  config.reject_outliers = args.outliers == "drop";
+  return config;
+}
+
+/// One camera for all heads, or one for each in the order of their numbers.
+std::map<int, Camera> cameras_of(const Args& args, const std::vector<HeadView>& views) {
+  std::set<int> ids;
+  for (const HeadView& view : views) ids.insert(view.head);
+  if (args.cameras.size() != 1 && args.cameras.size() != ids.size())
+    throw InputError(fmt::format("{}: has {} heads ({}), but there are {} cameras; give one, or one for each head",
+                                 args.views.string(), ids.size(), fmt::join(ids, ", "), args.cameras.size()));
+  std::map<int, Camera> cameras;
+  std::size_t next = 0;
+  for (const int id : ids) {
+    cameras[id] = read_camera(args.cameras[next]);
+    if (args.cameras.size() > 1) ++next;
+  }
+  return cameras;
+}
+
+/// Corners of the boards in the views' photos; a path is relative to the table's. A photo without a board is named.
+void find_corners(const Args& args, const Board& board, const std::map<int, Camera>& cameras,
+                  std::vector<HeadView>& views, Run& run) {
+  std::mutex mutex;
+  std::vector<std::string> faults(views.size());
+  const auto load = [&](std::size_t i) -> cv::Mat {
+    const std::filesystem::path file = args.views.parent_path() / views[i].seen.photo;
+    try {
+      const std::string bytes = read_file(file);
+      {
+        const std::scoped_lock lock(mutex);
+        run.add_input("photo", file.string(), bytes);
+      }
+      cv::Mat photo = decode_photo(bytes);
+      const Camera& camera = cameras.at(views[i].head);
+      if (photo.cols != camera.width_px || photo.rows != camera.height_px)
+        throw InputError(fmt::format("is {}x{}, the camera of head {} is for {}x{}", photo.cols, photo.rows,
+                                     views[i].head, camera.width_px, camera.height_px));
+      return photo;
+    } catch (const InputError& error) {
+      faults[i] = error.what();
+      throw;
+    }
+  };
+  const BoardDetections found = find_boards(views.size(), load, board, false, run.progress);
+  std::vector<HeadView> seen;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (!faults[i].empty() && !args.skip_bad)
+      throw InputError(fmt::format("{}: photo '{}': {}", args.views.string(), views[i].seen.photo, faults[i]));
+    if (!faults[i].empty() || !found.photos[i].found()) {
+      const std::string& reason = faults[i].empty() ? found.photos[i].reason : faults[i];
+      run.say(fmt::format("no board: {}: {}", views[i].seen.photo, reason));
+      run.document.counts.skipped.push_back({views[i].seen.photo, 0, reason});
+      continue;
+    }
+    seen.push_back(views[i]);
+    seen.back().seen.corners = found.photos[i].view.corners;
+  }
+  views = std::move(seen);
+  run.lap("find_boards");
+}
+
+void summarize(std::span<const HeadView> views, const RigReport& report, bool is_given, Run& run) {
+  for (std::size_t v = 0; v < report.views.size() && v < views.size(); ++v) {
+    const HeadViewFit& fit = report.views[v];
+    if (!fit.used && !fit.reason.empty()) run.say(fmt::format("not used: {}: {}", views[v].seen.photo, fit.reason));
+  }
+  if (report.status != RigReport::Status::converged) return;
+  const Rig& rig = report.rig;
+  for (std::size_t h = 0; h < rig.heads.size(); ++h) {
+    const Head& head = rig.heads[h].head;
+    const HeadVector sigma = 3.0 * rig.cov.diagonal()
+                                       .segment<num_head_params>(num_head_params * static_cast<Eigen::Index>(h))
+                                       .cwiseMax(0.0)
+                                       .cwiseSqrt();
+    const Eigen::Vector3d &base = head.world_from_base.translation, &arm = head.tilt_to_cam_m;
+    run.say(fmt::format("head {}: base at ({:.1f}, {:.1f}, {:.1f}) ± ({:.2g}, {:.2g}, {:.2g}) mm   (3σ)", head.id,
+                        1e3 * base.x(), 1e3 * base.y(), 1e3 * base.z(), 1e3 * sigma[0], 1e3 * sigma[1],
+                        1e3 * sigma[2]));
+    run.say(fmt::format("  tilt axis {:.2f} ± {:.2g} mm before the pan axis, {:.3f} ± {:.2g}° from square to it",
+                        1e3 * head.pan_to_tilt_m.z(), 1e3 * sigma[8], head.axes_skew_rad / degree, sigma[19] / degree));
+    run.say(fmt::format("  camera at ({:.2f}, {:.2f}, {:.2f}) ± ({:.2g}, {:.2g}, {:.2g}) mm from the tilt axis",
+                        1e3 * arm.x(), 1e3 * arm.y(), 1e3 * arm.z(), 1e3 * sigma[9], 1e3 * sigma[10], 1e3 * sigma[11]));
+  }
+  run.say(fmt::format("{} of {} views; χ²/dof {:.3f}, rms {:.3f} px; σ of a reading {:.3g}° ({})", report.views_used,
+                      report.views.size(), report.chi2_per_dof(), report.rms_px, report.sigma_encoder_rad / degree,
+                      report.sigma_encoder_is_told ? "told by the residuals"
+                      : is_given                   ? "as given"
+                                                   : "assumed"));
+}
+
+void add_files(const RigReport& report, Run& run) {
+  std::vector<std::string> camera_files;
+  for (const RigHead& rig_head : report.rig.heads) {
+    camera_files.push_back(fmt::format("camera_{}.yaml", rig_head.head.id));
+    run.add_file(camera_files.back(), camera_text(rig_head.camera, CameraFormat::alidade));
+  }
+  run.add_file("rig.yaml", rig_text(report.rig, camera_files));
+}
+
+ExitCode rig(const Args& args, Run& run) {
+  const Board board = board_from(args.board);
+  const RigConfig config = config_from(args);
+  run.add_input("views", args.views);
+  for (const std::filesystem::path& camera : args.cameras) run.add_input("camera", camera);
+  ViewsFile file = read_views(args.views, {.skip_bad = args.skip_bad, .num_points = num_points(board)});
+  run.document.counts.skipped = file.skipped;
+  run.document.counts.given = file.skipped.size();
+  const std::map<int, Camera> cameras = cameras_of(args, file.views);
+  run.lap("read");
+  if (file.has_photos) {
+    find_corners(args, board, cameras, file.views, run);
+    run.document.counts.given = run.document.counts.skipped.size();
+  }
+  const RigReport report = calibrate_rig(file.views, points_in_board(board), cameras, config, run.progress);
+  run.lap("solve");
+  const Verdict verdict = rig_verdict(report, config);
+  summarize(file.views, report, config.sigma_encoder_rad.has_value(), run);
+  fill_rig(file.views, report, run.document);
+  if (verdict.exit_code == ExitCode::ok) add_files(report, run);
+  return run.finish(verdict);
+}
+
+}  // namespace
+
+void add_rig(Frame& frame) {
+  auto args = std::make_shared<Args>();
+  CLI::App& command = frame.add_command(
+      {.name = "rig",
+       .summary = "Axes, offsets and mounting of pan-tilt heads, and where they stand to each other",
+       .examples = "alidade rig views.csv --camera camera.yaml --board 9x6 --square 0.025\n"
+                   "alidade rig views.csv --camera left.yaml --camera right.yaml --board 9x6 --square 0.025\n"
+                   "alidade rig views.csv --camera camera.yaml --board 9x6 --square 0.025 --sigma-angle 0.0003\n"},
+      [args](Run& run) { return rig(*args, run); });
+  command
+      .add_option("views", args->views,
+                  "Table of views, CSV: view,board,head,pan_rad,tilt_rad with corner,u,v (a row a corner) or photo (a "
+                  "row a view); `board` numbers the places where the board stood")
+      ->required();
+  command
+      .add_option("--camera", args->cameras,
+                  "The camera of all heads, or one for each head in the order of their numbers")
+      ->type_name("FILE")
+      ->required()
+      ->expected(1)
+      ->take_all();
+  add_board_options(command, args->board);
+  command.add_option("--sigma-px", args->sigma_px, "Of a corner's coordinate (default: told by the residuals)")
+      ->check(positive_number());
+  command.add_option("--sigma-angle", args->sigma_angle_rad, "Of an encoder's reading [rad] (default: told as well)")
+      ->check(positive_number());
+  command.add_flag("--scales", args->scales, "Estimate the scale of each encoder as well");
+  command.add_option("--outliers", args->outliers, "drop: leave out views that contradict the others, by name; keep")
+      ->check(CLI::IsMember({"drop", "keep"}))
+      ->capture_default_str();
+  command.add_flag("--skip-bad", args->skip_bad, "Leave out rows that are wrong, by name, instead of stopping");
+}
+
+}  // namespace alidade::cli

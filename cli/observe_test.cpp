@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "alidade/io/files.h"
@@ -193,6 +194,23 @@ TEST_F(Film, SaysWhatDoesNotFit) {
   expect({"--video", frames, "--angles", angles, "--size", "320x240"}, 3, "frames are 640x480");
   write_file(frames + "/000020.png", "not a picture");
   expect({"--video", frames, "--angles", angles}, 3, "000020.png");
+}
+
+/// Seven photos of a camera turned by hand.
+TEST(Observe, ARealCameraTurnedByHandTellsItsFocalLengthAndSaysWhatItCannot) {
+  const char* data = std::getenv("ALIDADE_DATA");
+  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set: the matched photos of a real camera are not at hand";
+  const testing::TemporaryFolder folder;
+  std::vector<std::string> command{
+      ALIDADE_EXECUTABLE, "observe", "--pairs", std::string(data) + "/data/rot-prexy/correspondences.csv",
+      "--rotation",       "free",    "--size",  "1280x960",
+      "--no-report",      "--json",  "--out",   (folder.path() / "out").string()};
+  EXPECT_EQ(testing::run_program(command).code, 4);
+  command.insert(command.end(), {"--square-pixels", "--fix-centre"});
+  const Outcome outcome = testing::run_program(command);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto document = nlohmann::json::parse(outcome.out);
+  EXPECT_NEAR(document["estimate"]["camera"]["fx"], 1190.0, 0.05 * 1190.0);
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ class RangefinderCommand : public ::testing::Test {
     return testing::run_program(std::move(arguments));
   }
   void simulate(const std::vector<std::string>& options = {}) {
-    std::vector<std::string> arguments{"simulate", "rangefinder", "--out", path("sim"), "--quiet"};
+    std::vector<std::string> arguments{"simulate", "rangefinder", "--out", path("sim"), "--quiet", "--no-report"};
     arguments.insert(arguments.end(), options.begin(), options.end());
     const Outcome made = alidade(arguments);
     ASSERT_EQ(made.code, 0) << made.err;

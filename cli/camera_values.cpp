@@ -20,32 +20,6 @@ Camera read_camera_input(Run& run, const std::string& role, const std::filesyste
   return camera;
 }
 
-bool has_covariance(const Camera& camera) {
-  return camera.cov.rows() > 0 && camera.cov.rows() == params(camera.lens).size();
-}
-
-JsonValue camera_values(const Camera& camera) {
-  JsonValue values = JsonValue::object();
-  values["model"] = model_name(camera.lens);
-  values["width"] = camera.width_px;
-  values["height"] = camera.height_px;
-  const std::vector<std::string> names = param_names(camera.lens);
-  const Eigen::VectorXd of_lens = params(camera.lens);
-  for (std::size_t i = 0; i < names.size(); ++i) values[names[i]] = of_lens[static_cast<Eigen::Index>(i)];
-  return values;
-}
-
-JsonValue camera_stddev(const Camera& camera) {
-  JsonValue values = JsonValue::object();
-  if (!has_covariance(camera)) return values;
-  const std::vector<std::string> names = param_names(camera.lens);
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    const Eigen::Index at = static_cast<Eigen::Index>(i);
-    values[names[i]] = std::sqrt(std::max(0.0, camera.cov(at, at)));
-  }
-  return values;
-}
-
 std::vector<std::string> camera_lines(const Camera& camera) {
   const std::vector<std::string> names = param_names(camera.lens);
   const Eigen::VectorXd values = params(camera.lens);

@@ -5,8 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "alidade/io/files.h"
-#include "alidade/testing/process.h"
-#include "alidade/testing/temporary_folder.h"
+#include "alidade/testing/command_test.h"
 
 namespace alidade {
 namespace {
@@ -55,7 +54,7 @@ TEST(Observe, SaysWhatIsWrongWithItsInput) {
 }
 
 /// A small log with one cell or line made wrong.
-class BadLog : public ::testing::Test {
+class BadLog : public testing::CommandTest {
  protected:
   void SetUp() override {
     const Outcome made =
@@ -63,7 +62,6 @@ class BadLog : public ::testing::Test {
     ASSERT_EQ(made.code, 0) << made.err;
     good_ = read_file(path("made/log.csv"));
   }
-  [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
 
   Outcome observe(const std::string& text, const std::vector<std::string>& options = {}) const {
     write_file(path("log.csv"), text);
@@ -90,7 +88,6 @@ class BadLog : public ::testing::Test {
     EXPECT_FALSE(std::filesystem::exists(path("out")));
   }
 
-  testing::TemporaryFolder folder_;
   std::string good_;
 };
 
@@ -149,7 +146,7 @@ TEST_F(BadLog, RowsFromStandardInputAreAnsweredOneByOne) {
 }
 
 /// A rendered film of a textured world: what a person with a pan-tilt camera and its encoders has.
-class Film : public ::testing::Test {
+class Film : public testing::CommandTest {
  protected:
   void render(const std::string& duration_s) {
     const Outcome made = testing::run_program(
@@ -157,8 +154,6 @@ class Film : public ::testing::Test {
          "610,600,330,235", "--duration", duration_s, "--rate", "15", "--no-report", "--out", path("film")});
     ASSERT_EQ(made.code, 0) << made.err;
   }
-  [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
-  testing::TemporaryFolder folder_;
 };
 
 TEST_F(Film, GivesFocalLengthsWithinThreePerMilleAndThreeSigma) {

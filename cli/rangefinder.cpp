@@ -8,6 +8,7 @@
 
 #include "alidade/io/beam_file.h"
 #include "alidade/io/camera_file.h"
+#include "alidade/io/camera_json.h"
 #include "alidade/io/corner_file.h"
 #include "alidade/io/photos.h"
 #include "alidade/io/rangefinder_document.h"
@@ -167,17 +168,6 @@ RangefinderExtras extras_of(const RangefinderReport& report, std::span<const Sho
   return extras;
 }
 
-/// The camera that the beam belongs to, for the page's photos.
-void fill_camera(const Camera& camera, Run& run) {
-  JsonValue& seen = run.document.estimate["camera"];
-  seen["model"] = model_name(camera.lens);
-  seen["width"] = camera.width_px;
-  seen["height"] = camera.height_px;
-  const auto names = param_names(camera.lens);
-  const Eigen::VectorXd values = params(camera.lens);
-  for (std::size_t i = 0; i < names.size(); ++i) seen[names[i]] = values[static_cast<Eigen::Index>(i)];
-}
-
 ExitCode rangefinder(const Args& args, Run& run) {
   if (args.method == "edges") return align_scan({args.shots, args.camera, args.photo, args.start}, run);
   if (!args.photo.empty() || !args.start.empty()) throw UsageError("--photo and --start are for --method edges");
@@ -204,7 +194,7 @@ ExitCode rangefinder(const Args& args, Run& run) {
   run.lap("solve");
   const Verdict verdict = rangefinder_verdict(report, shots, config);
   summarize(report, shots, run);
-  fill_camera(report.camera, run);
+  run.document.estimate["camera"] = camera_values(report.camera);  // that the beam belongs to
   fill_rangefinder(shots, report, config, extras_of(report, shots, points, camera, config, board, run), run.document);
   if (verdict.exit_code == ExitCode::ok) {
     Camera seen = report.camera;

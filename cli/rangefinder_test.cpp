@@ -7,8 +7,7 @@
 
 #include "alidade/io/csv.h"
 #include "alidade/io/files.h"
-#include "alidade/testing/process.h"
-#include "alidade/testing/temporary_folder.h"
+#include "alidade/testing/command_test.h"
 
 namespace alidade {
 namespace {
@@ -16,17 +15,11 @@ namespace {
 using testing::Outcome;
 using Json = nlohmann::json;
 
-class RangefinderCommand : public ::testing::Test {
+class RangefinderCommand : public testing::CommandTest {
  protected:
-  [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
-  [[nodiscard]] static Outcome alidade(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), ALIDADE_EXECUTABLE);
-    return testing::run_program(std::move(arguments));
-  }
   void simulate(const std::vector<std::string>& options = {}) {
     std::vector<std::string> arguments{"simulate", "rangefinder", "--out", path("sim"), "--quiet", "--no-report"};
-    arguments.insert(arguments.end(), options.begin(), options.end());
-    const Outcome made = alidade(arguments);
+    const Outcome made = alidade(arguments, options);
     ASSERT_EQ(made.code, 0) << made.err;
   }
   /// The simulated shots, with their corners.
@@ -37,18 +30,15 @@ class RangefinderCommand : public ::testing::Test {
                                        "--board",     "9x6",
                                        "--square",    "0.04",
                                        "--out",       path("out")};
-    arguments.insert(arguments.end(), options.begin(), options.end());
-    return alidade(arguments);
+    return alidade(arguments, options);
   }
   /// Of spots, planes or ranges in a table of one's own.
   [[nodiscard]] Outcome calibrate_table(const std::string& table, const std::vector<std::string>& options = {}) const {
     write_file(path("shots.csv"), table);
     std::vector<std::string> arguments{"rangefinder", path("shots.csv"), "--camera", path("sim/camera.yaml"),
                                        "--no-report", "--out",           path("out")};
-    arguments.insert(arguments.end(), options.begin(), options.end());
-    return alidade(arguments);
+    return alidade(arguments, options);
   }
-  testing::TemporaryFolder folder_;
 };
 
 void expect_near_truth(const Json& document, double sigmas = 3.5) {

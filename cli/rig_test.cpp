@@ -6,8 +6,7 @@
 
 #include "alidade/io/files.h"
 #include "alidade/io/rig_file.h"
-#include "alidade/testing/process.h"
-#include "alidade/testing/temporary_folder.h"
+#include "alidade/testing/command_test.h"
 
 namespace alidade {
 namespace {
@@ -16,27 +15,19 @@ using testing::Outcome;
 using Json = nlohmann::json;
 constexpr double degree = 0.017453292519943295;
 
-class RigCommand : public ::testing::Test {
+class RigCommand : public testing::CommandTest {
  protected:
-  [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
-  [[nodiscard]] static Outcome alidade(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), ALIDADE_EXECUTABLE);
-    return testing::run_program(std::move(arguments));
-  }
   void simulate(const std::vector<std::string>& options = {}) {
     std::vector<std::string> arguments{"simulate", "rig", "--out", path("sim"), "--quiet", "--no-report"};
-    arguments.insert(arguments.end(), options.begin(), options.end());
-    const Outcome made = alidade(arguments);
+    const Outcome made = alidade(arguments, options);
     ASSERT_EQ(made.code, 0) << made.err;
   }
   [[nodiscard]] Outcome calibrate(const std::string& views, const std::vector<std::string>& options = {}) const {
     std::vector<std::string> arguments{"rig",         views,   "--camera", path("sim/camera_1.yaml"),
                                        "--board",     "9x6",   "--square", "0.025",
                                        "--no-report", "--out", path("out")};
-    arguments.insert(arguments.end(), options.begin(), options.end());
-    return alidade(arguments);
+    return alidade(arguments, options);
   }
-  testing::TemporaryFolder folder_;
 };
 
 /// RMS over both heads' angles of the second camera in the first.

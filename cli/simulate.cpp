@@ -7,6 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "alidade/io/camera_file.h"
+#include "alidade/io/camera_json.h"
 #include "alidade/simulate/board_photos.h"
 #include "alidade/simulate/example_camera.h"
 #include "cli/board_options.h"
@@ -92,13 +93,7 @@ void add_photos(const BoardScene& scene, const BoardArgs& args, Run& run) {
 }
 
 void describe_truth(const BoardScene& scene, Run& run) {
-  JsonValue& camera = run.document.estimate["camera"];
-  camera["model"] = model_name(scene.camera.lens);
-  camera["width"] = scene.camera.width_px;
-  camera["height"] = scene.camera.height_px;
-  const std::vector<std::string> names = param_names(scene.camera.lens);
-  const Eigen::VectorXd values = params(scene.camera.lens);
-  for (std::size_t i = 0; i < names.size(); ++i) camera[names[i]] = values[static_cast<Eigen::Index>(i)];
+  run.document.estimate["camera"] = camera_values(scene.camera);
   run.document.counts.given = run.document.counts.used = scene.cam_from_board.size();
 }
 

@@ -8,8 +8,7 @@
 
 #include "alidade/io/csv.h"
 #include "alidade/io/files.h"
-#include "alidade/testing/process.h"
-#include "alidade/testing/temporary_folder.h"
+#include "alidade/testing/command_test.h"
 
 namespace alidade {
 namespace {
@@ -17,24 +16,17 @@ namespace {
 using testing::Outcome;
 using Json = nlohmann::json;
 
-class TrackCommand : public ::testing::Test {
+class TrackCommand : public testing::CommandTest {
  protected:
-  [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
-  [[nodiscard]] static Outcome alidade(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), ALIDADE_EXECUTABLE);
-    return testing::run_program(std::move(arguments));
-  }
   void simulate(const std::string& scenario, const std::vector<std::string>& options = {}) {
     std::vector<std::string> arguments{"simulate", "track", "--scenario", scenario, "--out", path("sim"), "--quiet"};
-    arguments.insert(arguments.end(), options.begin(), options.end());
-    const Outcome made = alidade(arguments);
+    const Outcome made = alidade(arguments, options);
     ASSERT_EQ(made.code, 0) << made.err;
   }
   [[nodiscard]] Outcome track(const std::vector<std::string>& options, const std::string& events = "sim/events.csv") {
     std::vector<std::string> arguments{"track", path(events), "--rig",      path("sim/rig.yaml"),
                                        "--out", path("out"),  "--no-report"};
-    arguments.insert(arguments.end(), options.begin(), options.end());
-    return alidade(arguments);
+    return alidade(arguments, options);
   }
   /// The simulated events, each row changed.
   void write_changed(const std::function<std::string(const Csv&, std::size_t row)>& change) {
@@ -43,7 +35,6 @@ class TrackCommand : public ::testing::Test {
     for (std::size_t row = 0; row < csv.num_rows(); ++row) text += change(csv, row);
     write_file(path("changed.csv"), text);
   }
-  testing::TemporaryFolder folder_;
 };
 
 std::string row_of(const Csv& csv, std::size_t row, const std::string& column, const std::string& value) {

@@ -3,12 +3,11 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "alidade/beam/unit_direction.h"
-#include "alidade/io/camera_formats.h"
+#include "alidade/io/yaml_fields.h"
 
 namespace alidade {
 namespace {
@@ -46,26 +45,10 @@ std::vector<double> upper_of(const Eigen::Matrix<double, 7, 7>& cov) {
   return numbers;
 }
 
-BeamMatrix read_covariance(const YAML::Node& node, const Fields& fields, const Eigen::Vector3d& direction) {
-  const Fields entries(node, fields.file(), fields.full("covariance."));
-  const std::vector<std::string> given = entries.texts("names");
-  if (!std::equal(given.begin(), given.end(), names.begin(), names.end()))
-    refuse(entries.file(), entries.full("names"), fmt::format("must be {}", fmt::join(names, ", ")));
-  const std::vector<double> upper = entries.numbers("upper");
-  if (upper.size() != 28) refuse(entries.file(), entries.full("upper"), "must be 28 numbers, an upper triangle of 7");
-  Eigen::Matrix<double, 7, 7> cov;
-  std::size_t next = 0;
-  for (Eigen::Index i = 0; i < 7; ++i)
-    for (Eigen::Index j = i; j < 7; ++j) cov(i, j) = cov(j, i) = upper[next++];
-  for (Eigen::Index i = 0; i < 7; ++i) {
-    for (Eigen::Index j = 0; j < 7; ++j) {
-      const bool is_possible =
-          cov(i, i) >= 0.0 && std::abs(cov(i, j)) <= std::sqrt(cov(i, i) * cov(j, j)) * (1.0 + 1e-9);
-      if (!is_possible) refuse(entries.file(), entries.full("upper"), "is not a covariance");
-    }
-  }
-  const Embedding J = embedding_of(direction);  // orthonormal columns: its transpose undoes it
-  return J.transpose() * cov * J;
+/// Of origin, direction and scale, taken to the tangent of the direction: the embedding's columns are orthonormal.
+BeamMatrix read_beam_covariance(const YAML::Node& node, const Fields& fields, const Eigen::Vector3d& direction) {
+  const Embedding J = embedding_of(direction);
+  return J.transpose() * detail::read_covariance(node, fields, {names.begin(), names.end()}, "a beam") * J;
 }
 
 Eigen::MatrixXd read_cov_with_lens(const Fields& fields, const Eigen::Vector3d& direction) {
@@ -77,29 +60,17 @@ Eigen::MatrixXd read_cov_with_lens(const Fields& fields, const Eigen::Vector3d& 
   return embedding_of(direction).transpose() * embedded;
 }
 
-void refuse_unknown_keys(const Fields& fields) {
-  static const std::vector<std::string> known{"origin_m",
-                                              "direction",
-                                              "theta_x_rad",
-                                              "theta_y_rad",
-                                              "scale",
-                                              "sigma_range_m",
-                                              "sigma_range_per_m",
-                                              "sigma_range_incidence_m",
-                                              "covariance",
-                                              "covariance_with_camera",
-                                              "camera"};
-  for (const std::string& key : fields.keys()) {
-    if (std::find(known.begin(), known.end(), key) == known.end())
-      refuse(fields.file(), key, fmt::format("is not a key of a beam; known: {}", fmt::join(known, " ")));
-  }
-}
-
-Eigen::Vector3d vector_of(const Fields& fields, const std::string& key) {
-  const std::vector<double> numbers = fields.numbers(key);
-  if (numbers.size() != 3) refuse(fields.file(), key, "must be three numbers");
-  return Eigen::Vector3d(numbers.data());
-}
+const std::vector<std::string> keys{"origin_m",
+                                    "direction",
+                                    "theta_x_rad",
+                                    "theta_y_rad",
+                                    "scale",
+                                    "sigma_range_m",
+                                    "sigma_range_per_m",
+                                    "sigma_range_incidence_m",
+                                    "covariance",
+                                    "covariance_with_camera",
+                                    "camera"};
 
 double not_negative(const Fields& fields, const std::string& key, double otherwise) {
   if (!fields.has(key)) return otherwise;
@@ -135,18 +106,13 @@ std::string beam_text(const Beam& beam, const Camera& camera, const std::string&
 }
 
 BeamFile read_beam(const std::filesystem::path& file) {
-  YAML::Node root;
-  try {
-    root = YAML::Load(read_file(file));
-  } catch (const YAML::Exception& error) {
-    throw InputError(fmt::format("{}:{}: is not YAML: {}", file.string(), error.mark.line + 1, error.msg));
-  }
+  const YAML::Node root = detail::load_yaml(read_file(file), file.string());
   const Fields fields(root, file.string());
-  refuse_unknown_keys(fields);
+  detail::refuse_unknown_keys(fields, keys, "a beam");
   BeamFile read;
   Beam& beam = read.beam;
-  beam.origin_in_cam = vector_of(fields, "origin_m");
-  beam.direction_in_cam = vector_of(fields, "direction");
+  beam.origin_in_cam = detail::read_vector(fields, "origin_m");
+  beam.direction_in_cam = detail::read_vector(fields, "direction");
   const double length = beam.direction_in_cam.norm();
   if (!(std::abs(length - 1.0) < 1e-3))
     refuse(file.string(), "direction", fmt::format("has the length {:.6g}, not 1", length));
@@ -156,7 +122,7 @@ BeamFile read_beam(const std::filesystem::path& file) {
   beam.noise.sigma_m = not_negative(fields, "sigma_range_m", 0.0);
   beam.noise.per_m = not_negative(fields, "sigma_range_per_m", 0.0);
   beam.noise.incidence_m = not_negative(fields, "sigma_range_incidence_m", 0.0);
-  if (fields.has("covariance")) beam.cov = read_covariance(root["covariance"], fields, beam.direction_in_cam);
+  if (fields.has("covariance")) beam.cov = read_beam_covariance(root["covariance"], fields, beam.direction_in_cam);
   if (fields.has("covariance_with_camera")) beam.cov_with_lens = read_cov_with_lens(fields, beam.direction_in_cam);
   if (fields.has("camera")) read.camera = file.parent_path() / fields.text("camera");
   return read;

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "alidade/io/camera_json.h"
+
 namespace alidade {
 namespace {
 
@@ -175,16 +177,11 @@ void fill_grids(const CalibrationStudy& study, ResultDocument& document) {
 void fill_estimate(const Board& board, const Calibration& calibration, ResultDocument& document) {
   const auto& report = calibration.photos.report;
   const auto names = param_names(report.camera.lens);
-  const Eigen::VectorXd values = params(report.camera.lens);
-  JsonValue& camera = document.estimate["camera"];
-  camera["model"] = std::string(model_name(report.camera.lens));
-  camera["width"] = report.camera.width_px;
-  camera["height"] = report.camera.height_px;
+  document.estimate["camera"] = camera_values(report.camera);
+  document.stddev["camera"] = camera_stddev(report.camera);
   std::vector<Eigen::Index> free;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
-    camera[names[i]] = values[at];
-    document.stddev["camera"][names[i]] = std::sqrt(report.camera.cov(at, at));
     if (report.camera.cov(at, at) > 0.0) free.push_back(at);
   }
   for (std::size_t i = 0; i < free.size(); ++i) {

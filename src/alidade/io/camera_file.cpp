@@ -62,12 +62,7 @@ Camera read_yaml(const detail::CameraText& file) {
     const std::size_t end = text.find('\n');
     text.erase(0, end == std::string::npos ? text.size() : end);
   }
-  YAML::Node root;
-  try {
-    root = YAML::Load(text);
-  } catch (const YAML::Exception& error) {
-    throw InputError(fmt::format("{}:{}: is not YAML: {}", file.name, error.mark.line + 1, error.msg));
-  }
+  const YAML::Node root = detail::load_yaml(text, file.name);
   if (!root.IsMap()) detail::refuse(file.name, "", unknown_file);
   const YAML::Node& map = root;
   const auto has = [&](const char* key) { return map[key].IsDefined(); };

@@ -9,58 +9,6 @@
 namespace alidade::detail {
 namespace {
 
-/// The covariance of {names, upper}: upper triangle row by row, in the order of `names`; parameters that are not named
-/// are held and have zero rows.
-Eigen::MatrixXd read_covariance(const YAML::Node& node, const Fields& fields, const std::vector<std::string>& known) {
-  const Fields entries(node, fields.file(), fields.full("covariance."));
-  const std::vector<std::string> names = entries.texts("names");
-  const std::vector<double> upper = entries.numbers("upper");
-  if (upper.size() != names.size() * (names.size() + 1) / 2) {
-    refuse(entries.file(), entries.full("upper"),
-           fmt::format("{} numbers are not the upper triangle of {} parameters", upper.size(), names.size()));
-  }
-  std::vector<Eigen::Index> index;
-  for (const std::string& name : names) {
-    const auto found = std::find(known.begin(), known.end(), name);
-    if (found == known.end())
-      refuse(entries.file(), entries.full("names"), "'" + name + "' is no parameter of the model");
-    const Eigen::Index at = found - known.begin();
-    if (std::find(index.begin(), index.end(), at) != index.end()) {
-      refuse(entries.file(), entries.full("names"), "'" + name + "' stands twice");
-    }
-    index.push_back(at);
-  }
-  const Eigen::Index size = static_cast<Eigen::Index>(known.size());
-  Eigen::MatrixXd cov = Eigen::MatrixXd::Zero(size, size);
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < index.size(); ++i) {
-    for (std::size_t j = i; j < index.size(); ++j) cov(index[i], index[j]) = cov(index[j], index[i]) = upper[next++];
-  }
-  for (Eigen::Index i = 0; i < size; ++i) {
-    for (Eigen::Index j = 0; j < size; ++j) {
-      const bool is_possible =
-          cov(i, i) >= 0.0 && std::abs(cov(i, j)) <= std::sqrt(cov(i, i) * cov(j, j)) * (1.0 + 1e-9);
-      if (!is_possible) {
-        refuse(entries.file(), entries.full("upper"),
-               fmt::format("{} and {} cannot vary together like that: not a covariance",
-                           known[static_cast<std::size_t>(i)], known[static_cast<std::size_t>(j)]));
-      }
-    }
-  }
-  return cov;
-}
-
-void refuse_unknown_keys(const Fields& fields, const std::vector<std::string>& names) {
-  std::vector<std::string> known{"model", "width", "height"};
-  known.insert(known.end(), names.begin(), names.end());
-  known.insert(known.end(), {"rms_px", "source", "covariance"});
-  for (const std::string& key : fields.keys()) {
-    if (std::find(known.begin(), known.end(), key) != known.end()) continue;
-    refuse(fields.file(), fields.full(key),
-           fmt::format("is not a key of this model; known: {}", fmt::join(known, " ")));
-  }
-}
-
 /// One line of text as a YAML string in double quotes.
 std::string quoted(const std::string& text) {
   std::string out = "\"";
@@ -80,7 +28,10 @@ Camera read_alidade(const YAML::Node& root, const CameraText& file) {
   const std::optional<Lens> lens = make_lens(model);
   if (!lens) refuse(file.name, "model", "'" + model + "' is not known; known: pinhole brown kannala_brandt");
   const std::vector<std::string> names = param_names(*lens);
-  refuse_unknown_keys(fields, names);
+  std::vector<std::string> known{"model", "width", "height"};
+  known.insert(known.end(), names.begin(), names.end());
+  known.insert(known.end(), {"rms_px", "source", "covariance"});
+  refuse_unknown_keys(fields, known, "this model");
 
   Camera camera;
   camera.width_px = fields.size("width");
@@ -98,7 +49,7 @@ Camera read_alidade(const YAML::Node& root, const CameraText& file) {
     if (camera.rms_px < 0.0) refuse(file.name, "rms_px", "is below zero");
   }
   if (fields.has("source")) camera.source = fields.text("source");
-  if (fields.has("covariance")) camera.cov = read_covariance(root["covariance"], fields, names);
+  if (fields.has("covariance")) camera.cov = read_covariance(root["covariance"], fields, names, "the model");
   return camera;
 }
 

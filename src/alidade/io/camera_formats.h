@@ -6,10 +6,7 @@
 
 #include "alidade/camera/camera.h"
 #include "alidade/io/files.h"
-
-namespace YAML {  // NOLINT(readability-identifier-naming): yaml-cpp's own
-class Node;
-}
+#include "alidade/io/yaml_fields.h"
 
 /// The formats behind read_camera() and camera_text(), one pair of functions each. Readers throw InputError.
 namespace alidade::detail {
@@ -40,18 +37,8 @@ struct CameraText {
 [[nodiscard]] Camera read_colmap(const CameraText& file);
 [[nodiscard]] std::string write_colmap(const Camera& camera);
 
-/// Throws `file: key: what`.
-[[noreturn]] void refuse(const std::string& file, const std::string& key, const std::string& what);
-/// A number of at most 1e12 in size, or refuses.
-[[nodiscard]] double checked_number(std::string_view text, const std::string& file, const std::string& key);
-/// A picture's width or height: a whole number from 1 to 1 000 000.
-[[nodiscard]] int checked_size(double value, const std::string& file, const std::string& key);
 /// The index of the wanted camera among those of a file; refuses where the choice is not clear, and names them.
 [[nodiscard]] std::size_t chosen_camera(const std::vector<std::string>& names, const CameraText& file);
-
-/// Shortest text that reads back as the same double, always with a point or an exponent.
-[[nodiscard]] std::string number_text(double value);
-[[nodiscard]] std::string number_list(const std::vector<double>& values);
 
 /// fx, fy, cx, cy of any lens, and the distortion in the order k1 k2 p1 p2 k3 (brown) or k1 k2 k3 k4.
 [[nodiscard]] std::vector<double> focal_and_centre(const Camera& camera);
@@ -64,31 +51,5 @@ struct CameraText {
 /// A fisheye from fx, fy, cx, cy and k1…k4.
 [[nodiscard]] Camera fisheye_camera(const std::vector<double>& focal_centre, const std::vector<double>& coefficients,
                                     const std::string& file, const std::string& key);
-
-/// The entries of a YAML map with the file's name in every message.
-class Fields {
- public:
-  /// Refuses what is not a map, and a key that stands twice. `prefix` begins the keys in messages ("cam0.").
-  Fields(const YAML::Node& map, std::string file, std::string prefix = "");
-
-  [[nodiscard]] bool has(const std::string& key) const;
-  [[nodiscard]] double number(const std::string& key) const;
-  [[nodiscard]] int size(const std::string& key) const;
-  [[nodiscard]] std::string text(const std::string& key) const;
-  [[nodiscard]] std::vector<double> numbers(const std::string& key) const;
-  [[nodiscard]] std::vector<std::string> texts(const std::string& key) const;
-  /// The numbers of {rows, cols, data}, row-major. Refuses where they are not rows × cols.
-  [[nodiscard]] std::vector<double> matrix(const std::string& key) const;
-  [[nodiscard]] std::vector<std::string> keys() const;
-  [[nodiscard]] const std::string& file() const { return file_; }
-  [[nodiscard]] std::string full(const std::string& key) const { return prefix_ + key; }
-
- private:
-  [[nodiscard]] YAML::Node at(const std::string& key) const;
-
-  const YAML::Node& map_;
-  std::string file_;
-  std::string prefix_;
-};
 
 }  // namespace alidade::detail

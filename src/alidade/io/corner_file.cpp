@@ -12,14 +12,6 @@
 namespace alidade {
 namespace {
 
-/// A CSV cell: quoted where it must be.
-std::string cell(const std::string& text) {
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
-}
-
 double positive(const Csv& csv, std::size_t row, const std::string& column) {
   const double value = csv.number(row, column);
   if (!(value > 0.0)) throw InputError(csv.where(row, column) + ": '" + csv.text(row, column) + "' is not above zero");
@@ -45,7 +37,7 @@ Eigen::Matrix2d read_cov(const Csv& csv, std::size_t row) {
 std::string corners_csv(std::span<const BoardView> views) {
   std::string text = "photo,corner,u_px,v_px,sigma_u_px,sigma_v_px,corr_uv\n";
   for (const BoardView& view : views) {
-    const std::string photo = cell(view.photo);
+    const std::string photo = csv_cell(view.photo);
     for (const Corner& corner : view.corners) {
       const double sigma_u = std::sqrt(corner.cov(0, 0)), sigma_v = std::sqrt(corner.cov(1, 1));
       constexpr double most = 0.9999;  // in four decimals the next would be 1, which no covariance has
@@ -91,8 +83,8 @@ std::string poses_csv(const std::vector<std::string>& photos, std::span<const Ri
   for (std::size_t i = 0; i < photos.size(); ++i) {
     const Eigen::Vector3d& t = cam_from_board[i].translation;
     const Eigen::Quaterniond& q = cam_from_board[i].rotation;
-    fmt::format_to(std::back_inserter(text), "{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}\n", cell(photos[i]),
-                   t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+    fmt::format_to(std::back_inserter(text), "{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}\n",
+                   csv_cell(photos[i]), t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
   }
   return text;
 }

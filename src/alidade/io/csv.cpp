@@ -182,6 +182,13 @@ std::size_t count_line_ends(std::string_view text) {
 
 std::string CsvPlace::text() const { return at_line(file, line) + "column '" + column + "'"; }
 
+std::string csv_cell(const std::string& text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
 double csv_number(const std::string& cell, const CsvPlace& place) {
   if (cell.empty()) throw InputError(place.text() + ": is empty; a number is needed");
   const std::optional<double> value = parse_number<double>(cell);

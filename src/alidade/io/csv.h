@@ -25,6 +25,9 @@ struct CsvPlace {
 /// A finite number, |x| ≤ 1e12. Throws `shots.csv:17: column 'range_m': 'nan' is not a finite number`.
 [[nodiscard]] double csv_number(const std::string& cell, const CsvPlace& place);
 
+/// Text as a cell: quoted where it must be.
+[[nodiscard]] std::string csv_cell(const std::string& text);
+
 /// A CSV file as read: header names and text cells. The ONE reader of tables; every fault names file, line and column.
 class Csv {
  public:

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/io/csv.h"
+#include "alidade/io/table_rows.h"
 
 namespace alidade {
 namespace {
@@ -96,18 +96,10 @@ EventsFile read_events(const std::filesystem::path& file, std::span<const RigHea
   const Columns columns = columns_of(csv);
   EventsFile read;
   double newest_s = -1e300;
-  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
-    try {
-      read.sights.push_back(read_row(csv, row, columns, heads, newest_s));
-      newest_s = read.sights.back().t_arrival_s;
-    } catch (const InputError& error) {
-      if (!options.skip_bad) throw;
-      std::string reason = error.what();
-      const std::string place = csv.name() + ":" + std::to_string(csv.line(row)) + ": ";
-      if (reason.starts_with(place)) reason.erase(0, place.size());
-      read.skipped.push_back({csv.name(), csv.line(row), std::move(reason)});
-    }
-  }
+  for_each_row(csv, options.skip_bad, read.skipped, [&](std::size_t row) {
+    read.sights.push_back(read_row(csv, row, columns, heads, newest_s));
+    newest_s = read.sights.back().t_arrival_s;
+  });
   if (read.sights.empty()) throw InputError(file.string() + ": has no events; at least one row is needed");
   return read;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "alidade/io/camera_json.h"
 #include "alidade/report/thin.h"
 
 namespace alidade {
@@ -116,14 +117,7 @@ bool is_of_camera(const std::string& name) {
 
 void fill_values(const ObserveReport& report, const Camera& camera, ResultDocument& document) {
   JsonValue& estimate = document.estimate;
-  estimate["camera"]["model"] = model_name(camera.lens);
-  estimate["camera"]["width"] = camera.width_px;
-  estimate["camera"]["height"] = camera.height_px;
-  const auto names = param_names(camera.lens);
-  const Eigen::VectorXd values = params(camera.lens);
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    estimate["camera"][names[i]] = values[static_cast<Eigen::Index>(i)];
-  }
+  estimate["camera"] = camera_values(camera);
   for (const ObservedQuantity& quantity : report.quantities) {
     if (is_of_camera(quantity.name)) {
       document.stddev["camera"][quantity.name] = quantity.sigma;

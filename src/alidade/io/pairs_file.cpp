@@ -5,6 +5,8 @@
 #include <set>
 #include <tuple>
 
+#include "alidade/io/table_rows.h"
+
 namespace alidade {
 namespace {
 
@@ -106,13 +108,6 @@ class Tracks {
   std::set<std::pair<Place, Place>> matches_;
 };
 
-/// A row's fault as its line and reason.
-SkippedInput skipped(const Csv& csv, std::size_t row, std::string reason) {
-  const std::string place = csv.name() + ":" + std::to_string(csv.line(row)) + ": ";
-  if (reason.starts_with(place)) reason.erase(0, place.size());
-  return {csv.name(), csv.line(row), std::move(reason)};
-}
-
 }  // namespace
 
 RotationLogFile read_pairs(const std::filesystem::path& file, const RotationLogOptions& options) {
@@ -122,14 +117,9 @@ RotationLogFile read_pairs(const std::filesystem::path& file, const RotationLogO
   Tracks tracks;
   RotationLogFile read;
   read.log.source = RotationSource::none;
-  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
-    try {
-      if (!tracks.add(read_match(csv, names, row))) read.skipped.push_back(skipped(csv, row, "repeated row"));
-    } catch (const InputError& error) {
-      if (!options.skip_bad) throw;
-      read.skipped.push_back(skipped(csv, row, error.what()));
-    }
-  }
+  for_each_row(csv, options.skip_bad, read.skipped, [&](std::size_t row) {
+    if (!tracks.add(read_match(csv, names, row))) read.skipped.push_back(skipped_row(csv, row, "repeated row"));
+  });
   if (tracks.num_frames() < 2) throw InputError(file.string() + ": has no matches; at least one row is needed");
   if (tracks.num_points() > most_cells / tracks.num_frames())
     throw InputError(file.string() + ": has too many frames and points; match fewer at a time");

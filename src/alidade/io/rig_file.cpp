@@ -3,13 +3,12 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "alidade/io/camera_file.h"
-#include "alidade/io/camera_formats.h"
+#include "alidade/io/yaml_fields.h"
 
 namespace alidade {
 namespace {
@@ -18,14 +17,7 @@ using detail::Fields;
 using detail::number_list;
 using detail::number_text;
 using detail::refuse;
-
-void refuse_unknown_keys(const Fields& fields, const std::vector<std::string>& known, const char* what) {
-  for (const std::string& key : fields.keys()) {
-    if (std::find(known.begin(), known.end(), key) == known.end())
-      refuse(fields.file(), fields.full(key),
-             fmt::format("is not a key of {}; known: {}", what, fmt::join(known, " ")));
-  }
-}
+using detail::refuse_unknown_keys;
 
 std::string vector_text(const Eigen::Vector3d& v) { return number_list({v.x(), v.y(), v.z()}); }
 
@@ -90,11 +82,9 @@ std::string covariance_text(const Rig& rig) {
       fmt::join(free_names, ", "), number_list(upper));
 }
 
+/// Three numbers, zero where they are left out.
 Eigen::Vector3d vector_of(const Fields& fields, const std::string& key) {
-  if (!fields.has(key)) return Eigen::Vector3d::Zero();
-  const std::vector<double> numbers = fields.numbers(key);
-  if (numbers.size() != 3) refuse(fields.file(), fields.full(key), "must be three numbers");
-  return Eigen::Vector3d(numbers.data());
+  return fields.has(key) ? detail::read_vector(fields, key) : Eigen::Vector3d::Zero();
 }
 
 Eigen::Quaterniond quaternion_of(const Fields& fields) {
@@ -180,48 +170,6 @@ RigHead head_of(const YAML::Node& node, std::size_t index, const std::filesystem
   return read;
 }
 
-bool is_covariance(const Eigen::MatrixXd& cov) {
-  const Eigen::VectorXd sigma = cov.diagonal().cwiseMax(0.0).cwiseSqrt();
-  const Eigen::VectorXd scale = sigma.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 1.0; });
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * cov * scale.asDiagonal(),
-                                                             Eigen::EigenvaluesOnly);
-  return cov.diagonal().minCoeff() >= 0.0 && eigen.eigenvalues().minCoeff() >= -1e-6;
-}
-
-Eigen::MatrixXd covariance_of(const YAML::Node& node, const Fields& parent, const std::vector<RigHead>& heads) {
-  const Fields fields(node, parent.file(), "covariance.");
-  refuse_unknown_keys(fields, {"names", "upper"}, "a covariance");
-  const std::vector<std::string> known = covariance_names(heads), names = fields.texts("names");
-  const std::vector<double> upper = fields.numbers("upper");
-  if (upper.size() != names.size() * (names.size() + 1) / 2)
-    refuse(fields.file(), fields.full("upper"),
-           fmt::format("{} numbers are not the upper triangle of {} parameters", upper.size(), names.size()));
-  std::vector<Eigen::Index> at;
-  for (const std::string& name : names) {
-    const auto found = std::find(known.begin(), known.end(), name);
-    if (found == known.end())
-      refuse(fields.file(), fields.full("names"), "'" + name + "' is no parameter of these heads");
-    if (std::find(at.begin(), at.end(), found - known.begin()) != at.end())
-      refuse(fields.file(), fields.full("names"), "'" + name + "' stands twice");
-    at.push_back(found - known.begin());
-  }
-  const auto size = static_cast<Eigen::Index>(known.size());
-  Eigen::MatrixXd cov = Eigen::MatrixXd::Zero(size, size);
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < at.size(); ++i)
-    for (std::size_t j = i; j < at.size(); ++j) cov(at[i], at[j]) = cov(at[j], at[i]) = upper[next++];
-  if (!is_covariance(cov)) refuse(fields.file(), fields.full("upper"), "is not a covariance");
-  return cov;
-}
-
-YAML::Node load(const std::filesystem::path& file) {
-  try {
-    return YAML::Load(read_file(file));
-  } catch (const YAML::Exception& error) {
-    throw InputError(fmt::format("{}:{}: is not YAML: {}", file.string(), error.mark.line + 1, error.msg));
-  }
-}
-
 }  // namespace
 
 std::string rig_text(const Rig& rig, std::span<const std::string> camera_files) {
@@ -232,7 +180,7 @@ std::string rig_text(const Rig& rig, std::span<const std::string> camera_files) 
 }
 
 Rig read_rig(const std::filesystem::path& file) {
-  const YAML::Node root = load(file);
+  const YAML::Node root = detail::load_yaml(read_file(file), file.string());
   const Fields fields(root, file.string());
   refuse_unknown_keys(fields, {"heads", "covariance"}, "a rig");
   const YAML::Node heads = root["heads"];
@@ -247,7 +195,8 @@ Rig read_rig(const std::filesystem::path& file) {
         refuse(file.string(), fmt::format("heads[{}].id", i), fmt::format("{} stands twice", rig.heads[i].head.id));
     }
   }
-  if (fields.has("covariance")) rig.cov = covariance_of(root["covariance"], fields, rig.heads);
+  if (fields.has("covariance"))
+    rig.cov = detail::read_covariance(root["covariance"], fields, covariance_names(rig.heads), "these heads");
   return rig;
 }
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "alidade/io/csv.h"
+#include "alidade/io/table_rows.h"
 
 namespace alidade {
 namespace {
@@ -115,17 +115,8 @@ ShotsFile read_shots(const std::filesystem::path& file, const ShotsOptions& opti
   const Csv csv = Csv::read(file);
   const Columns columns = columns_of(csv);
   ShotsFile read;
-  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
-    try {
-      read.rows.push_back(read_row(csv, row, columns));
-    } catch (const InputError& error) {
-      if (!options.skip_bad) throw;
-      std::string reason = error.what();
-      const std::string place = csv.name() + ":" + std::to_string(csv.line(row)) + ": ";
-      if (reason.starts_with(place)) reason.erase(0, place.size());
-      read.skipped.push_back({csv.name(), csv.line(row), std::move(reason)});
-    }
-  }
+  for_each_row(csv, options.skip_bad, read.skipped,
+               [&](std::size_t row) { read.rows.push_back(read_row(csv, row, columns)); });
   if (read.rows.empty()) throw InputError(file.string() + ": has no shots; at least one row is needed");
   return read;
 }
@@ -142,7 +133,7 @@ std::string shots_csv(std::span<const Shot> shots, bool with_photos) {
     } else {
       text += ",,,,";
     }
-    text += with_photos ? "," + shot.name + "\n" : "\n";
+    text += with_photos ? "," + csv_cell(shot.name) + "\n" : "\n";
   }
   return text;
 }

@@ -7,7 +7,7 @@
 #include <map>
 #include <numbers>
 
-#include "alidade/io/csv.h"
+#include "alidade/io/table_rows.h"
 
 namespace alidade {
 namespace {
@@ -113,17 +113,8 @@ ViewsFile read_views(const std::filesystem::path& file, const ViewsOptions& opti
   const Columns columns = columns_of(csv);
   ViewsFile read{{}, {}, columns.has_photo};
   std::map<long, std::size_t> index;
-  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
-    try {
-      add_row(csv, row, columns, options.num_points, index, read);
-    } catch (const InputError& error) {
-      if (!options.skip_bad) throw;
-      std::string reason = error.what();
-      const std::string place = csv.name() + ":" + std::to_string(csv.line(row)) + ": ";
-      if (reason.starts_with(place)) reason.erase(0, place.size());
-      read.skipped.push_back({csv.name(), csv.line(row), std::move(reason)});
-    }
-  }
+  for_each_row(csv, options.skip_bad, read.skipped,
+               [&](std::size_t row) { add_row(csv, row, columns, options.num_points, index, read); });
   if (read.views.empty()) throw InputError(file.string() + ": has no views; at least one row is needed");
   return read;
 }

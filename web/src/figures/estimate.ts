@@ -1,0 +1,106 @@
+// Estimate: value ± 3σ, and the correlation matrix.
+import {Chart} from '../core/chart';
+import {css, diverging, onto} from '../core/colours';
+import type {Doc, Quantity} from '../core/document';
+import {el} from '../core/dom';
+import type {Figure} from '../core/figure';
+import {degrees, num, shortened, valueText} from '../core/format';
+import {correlationsOf, type Correlations} from './correlations';
+
+interface Reading {
+  name: string;
+  unit: string;
+  factor: number;
+}
+
+const lensPixels = new Set(['fx', 'fy', 'cx', 'cy', 'skew', 'width', 'height']);
+const units: [string, string, number][] = [['_m_s2', 'm/s²', 1], ['_m_s', 'm/s', 1], ['_px', 'px', 1], ['_rad', '°', degrees], ['_deg', '°', 1], ['_s', 's', 1], ['_m', 'm', 1]];
+
+/** Units are in the names (`origin_m`, `rms_px`), except of a lens, whose parameters have the names of its literature. */
+function readingOf(quantity: Quantity, doc: Doc): Reading {
+  const index = /\[(\d)\]$/.exec(quantity.path)?.[1], plain = quantity.path.replace(/\[\d+\]$/, '');
+  const last = plain.slice(plain.lastIndexOf('.') + 1), isLens = /^camera\./.test(plain);
+  let name = (isLens ? last : plain).replace(/^noise\./, 'noise: ').replace(/\./g, ' '), unit = isLens && lensPixels.has(last) ? 'px' : '', factor = 1;
+  for (const [ending, word, by] of units)
+    if (plain.endsWith(ending)) {
+      unit = word, factor = by, name = name.slice(0, -ending.length);
+      break;
+    }
+  if (unit === 'm' && isSmall(quantity, plain, doc)) unit = 'mm', factor = 1000;
+  if (index !== undefined) name += ' ' + (['x', 'y', 'z', 'w'][Number(index)] ?? index);
+  return {name: name.replace(/_/g, ' ').trim(), unit, factor};
+}
+/** All entries of a vector in the same unit. */
+function isSmall(quantity: Quantity, plain: string, doc: Doc): boolean {
+  const sizes = doc.estimates.filter((one) => one.path.replace(/\[\d+\]$/, '') === plain).map((one) => Math.abs(one.value));
+  return Math.max(...sizes, Math.abs(quantity.value)) < 0.3;
+}
+
+// What the run was given and what it counted stand in the header and in the tables; bounds and errors beside the values.
+const elsewhere = /^(photos|board\.|corners_|events\[|bound\.|error\.|covers|heads|claims|controllers|camera\.(model|width|height)$|spot_sigma|left_out\.|b_from_a)/;
+
+function rowOf(quantity: Quantity, doc: Doc, has: {sigma: boolean; bound: boolean; error: boolean}): HTMLElement {
+  const {name, unit, factor} = readingOf(quantity, doc);
+  if (!Number.isFinite(quantity.value))
+    return el('tr', {}, el('th', {}, name), el('td', {class: 'word', colspan: 3 + Number(has.bound) + Number(has.error)}, quantity.text || '–'));
+  const text = valueText(factor * quantity.value, factor * quantity.sigma);
+  const isLens = quantity.path.startsWith('camera.');
+  const behind = text.plusMinus ? `± ${text.plusMinus}` : isLens && has.sigma ? 'held' : '';
+  const beside = (kind: string, by: number) => {
+    const value = doc.estimate(`${kind}.${quantity.path.replace(/^camera\./, '')}`);
+    return el('td', {class: 'right'}, value !== 0 && Number.isFinite(value) ? (kind === 'bound' ? '± ' : '') + num(by * factor * value, 2) : '');
+  };
+  return el('tr', {'data-path': quantity.path}, el('th', {}, name), el('td', {class: 'value'}, text.value), el('td', {}, behind),
+    has.bound ? beside('bound', 3) : null, has.error ? beside('error', 1) : null, el('td', {class: 'unit'}, unit));
+}
+
+function lensLine(doc: Doc): string {
+  const size = doc.pictureSize, model = doc.estimateText('camera.model');
+  return size && model ? `${model} lens, ${size.width} × ${size.height} px` : '';
+}
+
+export function drawCorrelations(host: HTMLElement, matrix: Correlations): void {
+  const count = Math.min(matrix.names.length, 30), most = Math.min(44 + 30 * count, 460);
+  host.append(el('p', {class: 'caption'}, 'correlation: ' + matrix.words));
+  const outer = el('div', {style: `max-width:${most}px;width:100%`});
+  host.append(outer);
+  new Chart(outer, {height: 60, aspect: (20 + 26 * count) / (44 + 26 * count), most: 420, label: matrix.words}, (pen) => {
+    const left = 44, size = Math.min((pen.w - left) / count, (pen.h - 20) / count), text = Math.min(10.5, size * 0.38);
+    for (let i = 0; i < count; ++i) {
+      const middle = size * (i + 0.5), short = shortened(matrix.names[i]!, 6);
+      if (size > 9) {
+        pen.text(short, left - 5, middle, {align: 'right', size: Math.min(11, size), colour: pen.c.soft});
+        pen.text(short, left + middle, size * count + 9, {align: 'center', size: Math.min(11, size * 0.45), colour: pen.c.soft});
+      }
+      for (let j = 0; j < count; ++j) {
+        const rho = matrix.rho[i * matrix.names.length + j]!, x = left + size * j, y = size * i;
+        const colour = diverging(-rho), strength = Math.abs(rho);
+        pen.rect(x, y, size - 1.5, size - 1.5, i === j ? pen.c.grid : css(colour, 0.08 + 0.9 * strength));
+        if (i !== j && strength > 0.6 && text > 6)
+          pen.text((rho < 0 ? '−' : '') + strength.toFixed(2).replace(/^0/, ''), x + size / 2, y + size / 2, {align: 'center', size: text, colour: strength > 0.55 ? onto(colour) : pen.c.ink});
+        pen.hit({x: x + size / 2, y: y + size / 2, w: size, h: size, tip: () => [`${matrix.names[i]} and ${matrix.names[j]}`, `correlation ${num(rho, 3)}`]});
+      }
+    }
+  });
+}
+
+export const estimate: Figure = {
+  id: 'estimate', title: 'Estimate', note: 'value ± 3σ', span: 6,
+  draw(host, doc) {
+    const shown = doc.estimates.filter((one) => !elsewhere.test(one.path) && !(one.text === '' && one.path.includes('[]')));
+    if (shown.length === 0) return null;
+    shown.sort((a, b) => Number(b.path.startsWith('camera.')) - Number(a.path.startsWith('camera.')));
+    const any = (kind: string) => shown.some((one) => Number.isFinite(doc.estimate(`${kind}.${one.path.replace(/^camera\./, '')}`)));
+    const has = {sigma: shown.some((one) => one.sigma > 0), bound: any('bound'), error: any('error')};
+    const lens = lensLine(doc);
+    if (lens) host.append(el('p', {class: 'caption'}, lens));
+    host.append(el('table', {class: 'estimate'},
+      has.bound || has.error ? el('thead', {}, el('tr', {}, el('th'), el('th'), el('th', {}, '3σ'), has.bound ? el('th', {}, '3σ at best') : null,
+        has.error ? el('th', {}, 'true error') : null, el('th'))) : null,
+      el('tbody', {}, ...shown.slice(0, 60).map((one) => rowOf(one, doc, has)))));
+    const matrix = correlationsOf(doc);
+    if (matrix && matrix.names.length > 1) drawCorrelations(host, matrix);
+    return {marks: shown.length, rows: shown.length, tables: [], words: matrix?.words ?? '',
+      good: has.bound ? 'At best: the Cramér–Rao bound of these measurements.' : undefined};
+  },
+};

@@ -1,0 +1,26 @@
+// Do the halves agree? Two cameras, each from half of the photos, and what σ predicts for their difference.
+import {el} from '../core/dom';
+import type {Figure} from '../core/figure';
+import {lengths, scaled} from '../core/stats';
+import {colourKey, drawField, shareNotAbove, sizeOfGrid} from './fields';
+
+export const halves: Figure = {
+  id: 'halves', title: 'Do the halves agree?', note: 'two cameras, each from half of the photos, px', span: 16,
+  draw(host, doc) {
+    const grid = doc.pixelGrid('halves'), du = grid?.values('delta_u_px'), dv = grid?.values('delta_v_px');
+    if (!grid || !du || !dv) return null;
+    const size = doc.pictureSize ?? sizeOfGrid(grid), values = lengths(du, dv), sigma = grid.values('predicted_sigma_px');
+    const row = el('div', {class: 'row'}), left = el('div'), right = el('div');
+    host.append(row);
+    row.append(left);
+    if (sigma) row.append(right);
+    let marks = 0;
+    const predicted = sigma ? scaled(sigma, 3) : null;
+    drawField(left, {title: 'difference of the halves', grid, size, values, du, dv}, 0.05, (n) => (marks = n));
+    if (predicted) drawField(right, {title: '3σ that the noise predicts for it', grid, size, values: predicted}, 0.05);
+    colourKey(host, 'px');
+    const share = predicted ? 100 * shareNotAbove(values, predicted) : NaN;
+    const good = Number.isFinite(share) ? `Good: the difference stays below the predicted 3σ. Here it does in ${share.toFixed(0)} % of the picture.` : 'Good: small against the accuracy that the task needs.';
+    return {marks, rows: marks, tables: [], words: good, good};
+  },
+};

@@ -1,0 +1,77 @@
+// Keys, the help that lists them, and the theme.
+import {charts} from '../core/chart';
+import {forgetPalette, palette} from '../core/colours';
+import {el} from '../core/dom';
+import type {Selection} from '../core/selection';
+import {seriesPlots} from '../core/series';
+import {tipWords} from '../core/tip';
+import {views3} from '../core/view3';
+import {toggleFull, toggleTable, type Card} from './card';
+import {savePicture} from './picture_file';
+import type {Doc} from '../core/document';
+
+const help: [string, string][] = [
+  ['← →  or  j k', 'another photo, shot or view, worst first'], ['0', 'views as they were'], ['d', 'dark or light'],
+  ['f', 'figure in the full window, and back'], ['s', 'save the figure as PNG'], ['t', 'the table behind the figure'],
+  ['c', 'copy the value at the cursor'], ['?', 'this help'],
+  ['drag', 'zoom into a time axis (double click: all); turn a 3-D view (shift: move it)'],
+];
+
+export function showHelp(): void {
+  let box = document.querySelector<HTMLDialogElement>('dialog.help');
+  if (!box) {
+    box = el('dialog', {class: 'help', 'aria-label': 'Keys'}, el('h2', {}, 'Keys'),
+      el('table', {}, ...help.map(([key, words]) => el('tr', {}, el('td', {}, el('kbd', {}, key)), el('td', {}, words)))),
+      el('p', {class: 'good'}, 'A key acts on the figure under the pointer. Bands, ellipses and “±” are 3σ everywhere.'));
+    box.addEventListener('click', () => box?.close());
+    document.body.append(box);
+  }
+  if (box.open) box.close();
+  else box.showModal();
+}
+
+export function redrawAll(): void {
+  forgetPalette();
+  for (const view of views3) view.forget();
+  for (const chart of charts) chart.redraw();
+  for (const plot of seriesPlots) plot.redraw();
+}
+
+export function toggleTheme(): void {
+  document.documentElement.dataset['theme'] = palette().isDark ? 'light' : 'dark';
+  redrawAll();
+}
+
+function resetAll(): void {
+  for (const view of views3) view.reset();
+  for (const plot of seriesPlots) plot.reset();
+}
+
+export function listenToKeys(doc: Doc, selection: Selection, cards: Card[]): void {
+  let active: Card | null = null;
+  for (const card of cards) {
+    const touch = () => (active = card);
+    card.section.addEventListener('pointerenter', touch);
+    card.section.addEventListener('focusin', touch);
+  }
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redrawAll);
+  const actions: Record<string, () => void> = {
+    ArrowRight: () => selection.step(1), j: () => selection.step(1),
+    ArrowLeft: () => selection.step(-1), k: () => selection.step(-1),
+    '0': resetAll, d: toggleTheme, '?': showHelp,
+    f: () => active && toggleFull(active),
+    t: () => active && toggleTable(active),
+    s: () => active && savePicture(active, doc),
+    c: () => void navigator.clipboard?.writeText(tipWords()).catch(() => undefined),
+    Escape: () => cards.filter((card) => card.section.classList.contains('full')).forEach(toggleFull),
+  };
+  document.addEventListener('keydown', (event) => {
+    const target = event.target as HTMLElement | null;
+    if (event.ctrlKey || event.metaKey || event.altKey || target?.matches('input, select, textarea')) return;
+    const action = actions[event.key];
+    if (!action) return;
+    if (event.key.startsWith('Arrow') && selection.items.length === 0) return; // the page scrolls
+    event.preventDefault();
+    action();
+  });
+}

@@ -56,6 +56,11 @@ export async function opened(browser, url, {width = 1280, height = 900, theme = 
 export async function settled(page) {
   await page.evaluate(async () => {
     for (const view of window.alidade.views3 ?? []) view.wake();
+    for (let y = 0; y < document.body.scrollHeight; y += 600) { // thumbnails are decoded in sight
+      scrollTo(0, y);
+      await new Promise((done) => requestAnimationFrame(done));
+    }
+    scrollTo(0, 0);
     for (let i = 0; i < 3; ++i) await new Promise((done) => requestAnimationFrame(() => setTimeout(done, 20)));
   });
 }

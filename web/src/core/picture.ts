@@ -81,7 +81,7 @@ export function drawContours(pen: Pen, panel: Panel, grid: Grid, values: Float64
 }
 
 function label(pen: Pen, panel: Panel, segments: Segment[], words: string, taken: [number, number][], index: number): void {
-  const half = pen.width(words, 10.5, 700) / 2 + 5;
+  const half = pen.width(words, 10.5, 700) / 2 + 9;
   // Labels stand at the lower right, each a little further round, so that they do not pile up.
   const turn = 0.5 + 0.55 * index, dx = Math.cos(turn), dy = Math.sin(turn);
   const middle: [number, number] = [panel.x + panel.w / 2, panel.y + panel.h / 2];

@@ -5,7 +5,7 @@ import {lengths, scaled} from '../core/stats';
 import {colourKey, drawField, shareNotAbove, sizeOfGrid} from './fields';
 
 export const halves: Figure = {
-  id: 'halves', title: 'Do the halves agree?', note: 'two cameras, each from half of the photos, px', span: 16,
+  id: 'halves', title: 'Do the halves agree?', note: 'two cameras, each from half of the photos, px', span: 12,
   draw(host, doc) {
     const grid = doc.pixelGrid('halves'), du = grid?.values('delta_u_px'), dv = grid?.values('delta_v_px');
     if (!grid || !du || !dv) return null;

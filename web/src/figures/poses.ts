@@ -52,6 +52,7 @@ export const poses: Figure = {
         if (chosen && hasPicture(chosen.name)) world.pictures.push({corners, name: chosen.name});
       }
       world.axes(identity, 0.28 * nearest);
+      world.hold([0.3 * nearest, 0, 0], [0, 0.36 * nearest, 0]);
       return world;
     };
     const view = new View3(host, {height: 420, isFilling: true, up: [0, -1, 0], ahead: [0, 0, 1], yaw: 0.75, pitch: 0.35,

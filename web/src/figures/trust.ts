@@ -1,7 +1,7 @@
 // Where can I trust a pixel? 3σ of projection over the picture, and the share of the picture under each size.
 import {Chart, type Pen} from '../core/chart';
 import type {Grid} from '../core/document';
-import {choice, type Figure} from '../core/figure';
+import {choice, legend, type Figure} from '../core/figure';
 import {num} from '../core/format';
 import {colourBar, drawContours, drawHeat, panelIn, valueAt, type Panel} from '../core/picture';
 import {scale, yAxis, type Scale} from '../core/scale';
@@ -59,14 +59,13 @@ export const trust: Figure = {
       const [u, v] = panel.pixel(x, y), value = valueAt(shown.grid, shown.three, u, v);
       return [`u ${num(u, 4)}, v ${num(v, 4)} px`, `3σ ${num(value, 3)} px ${shown.words}`];
     };
+    if (maps.length > 1) legend(host, maps.map((one, i) => ({words: one.words, colour: 'var(--ink)', look: i === 0 ? 'line' : 'dash'})));
     const share = new Chart(host, {height: 150, isFilling: true, label: 'Share of the picture whose 3σ is below each size'}, (pen) => {
       const left = 46, right = pen.w - 10, bottom = pen.h - 44;
       const x = scale(pixelLow, pixelHigh, left, right, true), y = scale(0, 100, bottom, 22);
       yAxis(pen, y, left, right, {format: (v) => `${v} %`, wanted: 2, label: 'share of the picture below …'});
       maps.forEach((one, i) => {
         drawShare(pen, one, x, y, i === 0 ? [] : [5, 4]);
-        const at = right - (maps.length - 1 - i) * 168 - 140;
-        if (maps.length > 1 && pen.w > 420) pen.line(at, 10, at + 20, 10, pen.c.ink, 1.8, i === 0 ? [] : [5, 4]), pen.text(one.words, at + 26, 10, {size: 11, colour: pen.c.soft});
       });
       colourBar(pen, left, right, bottom + 3, '3σ of projection, px');
     });

@@ -7,7 +7,7 @@ import {calibrateScene} from './calibrate_scene';
 const prefix = 'undistorted:';
 
 export const undistorted: Figure = {
-  id: 'undistorted', title: 'Are straight lines straight?', note: 'as taken, and undistorted', span: 16,
+  id: 'undistorted', title: 'Are straight lines straight?', note: 'as taken, and undistorted', span: 12,
   draw(host, doc, selection) {
     const {photos} = calibrateScene(doc, selection);
     if (!photos.some((photo) => photo.isUsed) || !doc.isAnswer) return null;
@@ -16,7 +16,11 @@ export const undistorted: Figure = {
     whenPicturesAreHere(() => {
       const name = pictureNames().find((one) => one.startsWith(prefix));
       // Pictures stand behind the document: only now is known whether there is one.
-      if (!name) return void host.closest('section')?.remove();
+      if (!name) {
+        host.closest('section')?.remove();
+        document.getElementById('fig-halves')?.style.setProperty('--span', '24');
+        return;
+      }
       for (const [picture, words] of [[name.slice(prefix.length), 'as taken'], [name, 'undistorted']] as const) {
         const figure = el('figure', {}, el('figcaption', {class: 'caption'}, `${name.slice(prefix.length)}, ${words}`));
         const show = () => {

@@ -32,7 +32,7 @@ export const worstPhotos: Figure = {
     const chart = new Chart(host, {height: 150, label}, (pen) => {
       const left = 46, right = pen.w - 8, top = 20, bottom = pen.h - 20;
       const high = 1.1 * Math.max(worst?.rms_px ?? 0, all > 0 ? all : 0, 1e-6), y = scale(0, high, bottom, top);
-      yAxis(pen, y, left, right, {wanted: 3});
+      yAxis(pen, y, left, right, {wanted: 4});
       const pitch = Math.min(120, (right - left) / order.length), gap = pitch > 12 ? 3 : pitch > 4 ? 1 : 0;
       order.forEach((index, place) => {
         const photo = scene.photos[index]!, x = left + pitch * place, w = Math.max(0.5, pitch - gap);
@@ -41,7 +41,7 @@ export const worstPhotos: Figure = {
         if (isUsed) pen.rect(x, top_, w, bottom - top_, isChosen ? pen.c.orange : pen.c.blue);
         else hatched(pen, x, top_, w, bottom - top_);
         if (isChosen) pen.rect(x, bottom + 1, w, 3, pen.c.orange);
-        if (pitch > 40 && isUsed) pen.text(rounded(photo.rms_px, 3), x + w / 2, top_ - 8, {align: 'center', size: 11, colour: pen.c.soft});
+        if (pitch > 40 && isUsed) pen.text(rounded(photo.rms_px, 3), x + w / 2, bottom - 10, {align: 'center', size: 11, weight: 650, colour: bottom - top_ > 20 ? pen.c.card : pen.c.ink});
         if (pitch > 40) pen.text(shortened(photo.name.replace(/\.\w+$/, ''), Math.floor(pitch / 7.5)), x + w / 2, bottom + 12, {align: 'center', size: 11, colour: isChosen ? pen.c.ink : pen.c.soft});
         pen.hit({x: x + pitch / 2, y: (top + bottom) / 2, w: pitch, h: bottom - top + 30, pick: () => selection.choose(index),
           tip: () => [photo.name, isUsed ? `RMS ${num(photo.rms_px, 4)} px, ${photo.corners.length} corners` : `not used: ${photo.reason || '–'}`]});

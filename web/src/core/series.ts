@@ -3,6 +3,7 @@ import uPlot from 'uplot';
 import {faded, palette, type ColourName} from './colours';
 import {el} from './dom';
 import {num} from './format';
+import {scale, ticksOf} from './scale';
 import type {Selection} from './selection';
 import {scaled} from './stats';
 import {hideTip, showTip} from './tip';
@@ -120,9 +121,11 @@ export class SeriesPlot {
         ...(look.syncKey === '' ? {} : {sync: {key: look.syncKey ?? 'time'}})},
       scales: {x: {time: false}, y: {distr: look.isLog ? 3 : 1, range: (_, low, high) => this.rangeOf(low, high)}},
       axes: [
-        {show: true, stroke, font, grid, ticks, values: hasX ? write : (_, v) => v.map(() => ''), size: hasX ? (look.xLabel ? 44 : 30) : 6,
+        {show: true, stroke, font, grid, ticks, values: hasX ? write : (_, v) => v.map(() => ''), size: hasX ? 26 : 6,
           label: look.xLabel || undefined, labelFont: font, labelSize: 16, labelGap: 0, space: 55},
-        {stroke, font, grid, ticks, size: 54, space: 26, values: (_, v) => thinned(v, look.isLog ?? false)},
+        {stroke, font, grid, ticks, size: 54,
+          splits: (u, __, low, high) => ticksOf(scale(low, high, 0, 1, look.isLog), Math.max(2, (u.bbox?.height || 200) / (devicePixelRatio || 1) / 30)),
+          values: (_, v) => v.map((one) => (one === null || one === undefined ? '' : num(one, 5)))},
       ],
       series: [{}, ...look.lines.map((line) => this.seriesOf(line))],
       hooks: {drawAxes: [(u) => this.under(u)], draw: [(u) => this.over(u)]},
@@ -232,16 +235,4 @@ function stroke(g: CanvasRenderingContext2D, [x1, y1, x2, y2]: [number, number, 
   g.lineTo(x2, y2);
   g.stroke();
   g.setLineDash([]);
-}
-
-/** On a logarithmic axis only round values are written. */
-function thinned(values: (number | null)[], isLog: boolean): string[] {
-  return values.map((v) => {
-    if (v === null || v === undefined) return '';
-    if (!isLog) return num(v, 5);
-    const mantissa = Number((v / 10 ** Math.floor(Math.log10(v) + 1e-9)).toFixed(3));
-    const decades = Math.log10(Math.max(...values.filter((x): x is number => x !== null && x > 0)) /
-      Math.min(...values.filter((x): x is number => x !== null && x > 0)));
-    return mantissa === 1 || (decades < 1.5 && (mantissa === 2 || mantissa === 5)) ? num(v, 2) : '';
-  });
 }

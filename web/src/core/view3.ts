@@ -15,6 +15,7 @@ export interface View3Look extends ChartLook {
   yaw: number;
   pitch: number;
   note?: string; // at the lower right
+  hasNoBar?: boolean;
 }
 
 interface Polygon {
@@ -129,7 +130,7 @@ export class View3 {
     const camera = this.orbit.camera;
     const perPixel = (2 * this.orbit.distance * Math.tan((camera.fov * Math.PI) / 360)) / pen.h;
     const bar_m = roundDown125(90 * perPixel);
-    pen.scaleBar(14, pen.h - 16, bar_m / perPixel, bar_m < 0.1 ? `${num(1e3 * bar_m, 2)} mm` : `${num(bar_m, 2)} m`);
+    if (!this.look.hasNoBar) pen.scaleBar(14, pen.h - 16, bar_m / perPixel, bar_m < 0.1 ? `${num(1e3 * bar_m, 2)} mm` : `${num(bar_m, 2)} m`);
     if (this.look.note) pen.text(this.look.note, pen.w - 12, pen.h - 16, {align: 'right', size: 11, colour: pen.c.soft});
   }
   private collect(pen: Pen): void {

@@ -7,6 +7,7 @@ import {diagonal, difference, parameters} from './diff';
 import {estimate} from './estimate';
 import {halves} from './halves';
 import {lens} from './lens';
+import {localizeError, localizeNis, localizeSpace, localizeSpeed, localizeTracks} from './localize';
 import {nextPhoto} from './next_photo';
 import {observeDirections} from './observe_directions';
 import {observeIntrinsics} from './observe_intrinsics';
@@ -20,7 +21,11 @@ import {rangefinderPhoto, rangefinderShots} from './rangefinder_photo';
 import {rangefinderCounts, rangefinderNext, rangefinderPrecision} from './rangefinder_precision';
 import {rangefinderResiduals} from './rangefinder_residuals';
 import {refusal} from './refusal';
+import {reproduceFigure, reproduceTable} from './reproduce';
 import {residuals} from './residuals';
+import {rigCoverage, rigEstimate, rigResiduals, rigSpace, rigUnknown, rigView} from './rig';
+import {servoAngles, servoCompare, servoError, servoLoops, servoPicture, servoRobust} from './servo';
+import {trackAbove, trackAge, trackError, trackInnovations, trackPosition, trackSpace} from './track';
 import {trust} from './trust';
 import {undistorted} from './undistorted';
 import {worstPhotos} from './worst_photos';
@@ -28,11 +33,19 @@ import {worstPhotos} from './worst_photos';
 const byCommand: Record<string, Figure[]> = {
   calibrate: [estimate, trust, residuals, worstPhotos, poses, photo, allPhotos, halves, undistorted, lens, board, nextPhoto],
   observe: [estimate, observeIntrinsics, observeMotion, observeNis, observeTracks, observeDirections, observePoints],
-  rangefinder: [{...estimate, note: 'camera frame, value ± 3σ'}, rangefinderBeam, rangefinderResiduals, rangefinderPhoto, rangefinderPrecision, rangefinderNext, rangefinderCounts, rangefinderShots],
+  rangefinder: [{...estimate, span: 7, note: 'camera frame, value ± 3σ'}, {...rangefinderBeam, span: 17}, rangefinderResiduals, rangefinderPhoto, rangefinderPrecision, rangefinderNext, rangefinderCounts, rangefinderShots],
+  rig: [rigEstimate, rigSpace, rigCoverage, rigResiduals, rigView, {...rigUnknown, span: 14}],
+  track: [trackSpace, trackPosition, trackError, trackInnovations, {...estimate, span: 8}, {...trackAbove, span: 8}, {...trackAge, span: 8}],
+  servo: [servoError, servoPicture, servoAngles, servoCompare, {...servoRobust, span: 12}, {...servoLoops, span: 12}, trackSpace, trackPosition],
+  localize: [localizeSpace, localizeError, localizeTracks, localizeNis, localizeSpeed, {...estimate, span: 8}],
   'camera diff': [difference, diagonal, parameters, {...estimate, span: 10}],
 };
 
 export function figuresOf(doc: Doc): Figure[] {
-  const own = Object.prototype.hasOwnProperty.call(byCommand, doc.command) ? byCommand[doc.command]! : [estimate];
+  if (doc.command.startsWith('reproduce')) {
+    const figures = [...doc.tables.values()].filter((table) => table.name.startsWith('fig_') && table.rows > 0);
+    return [reproduceTable, ...figures.map(reproduceFigure), {...estimate, span: 12}];
+  }
+  const own = Object.prototype.hasOwnProperty.call(byCommand, doc.command) ? byCommand[doc.command]! : [{...estimate, span: 12}];
   return doc.isAnswer || !doc.isReadable ? own : [refusal, ...own];
 }

@@ -37,10 +37,16 @@ function isSmall(quantity: Quantity, plain: string, doc: Doc): boolean {
 }
 
 // What the run was given and what it counted stand in the header and in the tables; bounds and errors beside the values.
-const elsewhere = /^(photos|board\.|corners_|events\[|bound\.|error\.|covers|heads|claims|controllers|camera\.(model|width|height)$|spot_sigma|left_out\.|b_from_a)/;
+const elsewhere = /^(photos|board\.|corners_|events\[|bound\.|error\.|covers|heads|claims|controllers|camera\.(model|width|height)$|spot_sigma|b_from_a|excess_px|noise\.\w+_from|(sigma_px|noise\.\w+)_from)/;
+const elsewhereOf: Record<string, RegExp> = {rangefinder: /^(camera|refine|condition|range_ratio|normal_spread|offset_m|direction\[2\])/};
+const names: Record<string, string> = {theta_x_rad: 'angle to the x axis', theta_y_rad: 'angle to the y axis', 'left_out.rms_px': 'left-out spots, RMS', 'left_out.rms_range_m': 'left-out ranges, RMS',
+  rms_range_m: 'ranges, RMS', rms_px: 'RMS', noise_px: 'noise of a corner', transfer_rms_px: 'unseen photos, RMS', transfer_flat_rms_px: 'the same, board flat', working_distance_m: 'working distance',
+  sigma_px: 'σ of a pixel', 'noise.sigma_spot_px': 'σ of a spot', 'noise.sigma_corner_px': 'σ of a corner', 'noise.sigma_range_m': 'σ of a reading', 'noise.sigma_px': 'σ of a corner', 'noise.sigma_encoder_rad': 'σ of a reading',
+  sigma_relative_rad: 'σ camera to camera', sigma_relative_m: 'σ camera to camera', chi2_per_dof: 'χ² per degree of freedom', nees_per_dof: 'NEES per degree of freedom', nis_per_dof: 'NIS per degree of freedom',
+  pcrlb_m: 'best possible RMS (PCRLB)', rms_m: 'RMS error', mean_error_m: 'mean error', sigma_a_m_s2: 'σ of the acceleration', compared_share: 'share compared', ate_m: 'ATE', rpe_m: 'RPE'};
 
 function rowOf(quantity: Quantity, doc: Doc, has: {sigma: boolean; bound: boolean; error: boolean}): HTMLElement {
-  const {name, unit, factor} = readingOf(quantity, doc);
+  const {unit, factor, ...reading} = readingOf(quantity, doc), name = names[quantity.path] ?? reading.name;
   if (!Number.isFinite(quantity.value))
     return el('tr', {}, el('th', {}, name), el('td', {class: 'word', colspan: 3 + Number(has.bound) + Number(has.error)}, quantity.text || '–'));
   const text = valueText(factor * quantity.value, factor * quantity.sigma);
@@ -87,7 +93,7 @@ export function drawCorrelations(host: HTMLElement, matrix: Correlations): void 
 export const estimate: Figure = {
   id: 'estimate', title: 'Estimate', note: 'value ± 3σ', span: 6,
   draw(host, doc) {
-    const shown = doc.estimates.filter((one) => !elsewhere.test(one.path) && !(one.text === '' && one.path.includes('[]')));
+    const shown = doc.estimates.filter((one) => !elsewhere.test(one.path) && !elsewhereOf[doc.command]?.test(one.path) && !(one.path === 'scale' && !(one.sigma > 0)) && !(one.text === '' && one.path.includes('[]')));
     if (shown.length === 0) return null;
     shown.sort((a, b) => Number(b.path.startsWith('camera.')) - Number(a.path.startsWith('camera.')));
     const any = (kind: string) => shown.some((one) => Number.isFinite(doc.estimate(`${kind}.${one.path.replace(/^camera\./, '')}`)));
@@ -95,12 +101,12 @@ export const estimate: Figure = {
     const lens = lensLine(doc);
     if (lens) host.append(el('p', {class: 'caption'}, lens));
     host.append(el('table', {class: 'estimate'},
-      has.bound || has.error ? el('thead', {}, el('tr', {}, el('th'), el('th'), el('th', {}, '3σ'), has.bound ? el('th', {}, '3σ at best') : null,
-        has.error ? el('th', {}, 'true error') : null, el('th'))) : null,
+      has.bound || has.error ? el('thead', {}, el('tr', {}, el('th'), el('th'), el('th', {}, '3σ'), has.bound ? el('th', {}, 'at best') : null,
+        has.error ? el('th', {}, 'error') : null, el('th'))) : null,
       el('tbody', {}, ...shown.slice(0, 60).map((one) => rowOf(one, doc, has)))));
     const matrix = correlationsOf(doc);
     if (matrix && matrix.names.length > 1) drawCorrelations(host, matrix);
     return {marks: shown.length, rows: shown.length, tables: [], words: matrix?.words ?? '',
-      good: has.bound ? 'At best: the Cramér–Rao bound of these measurements.' : undefined};
+      good: !doc.isAnswer ? 'No answer: values are where the search ended, and not to be used.' : has.bound ? 'At best: 3σ of the Cramér–Rao bound of these measurements.' : undefined};
   },
 };

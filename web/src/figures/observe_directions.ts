@@ -71,7 +71,7 @@ export const observeDirections: Figure = {
       for (const p of [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]] as V3[]) world.hold(p);
       return world;
     };
-    const view = new View3(left, {height: 320, up: [0, -1, 0], ahead: [0, 0, 1], yaw: 0.45, pitch: 0.3, label: `Directions on a sphere; ${words}`}, make);
+    const view = new View3(left, {height: 320, up: [0, -1, 0], ahead: [0, 0, 1], yaw: 0.45, pitch: 0.3, hasNoBar: true, label: `Directions on a sphere; ${words}`}, make);
     const chart = new Chart(right, {height: 320, label: `The same in degrees; ${words}`}, (pen) => {
       const all = [...axis.map(({d}) => d), ...footprints.flat()], xs = extent(all.map(rightOf))!, ys = extent(all.map(upOf))!;
       const w = pen.w - 60, h = pen.h - 66, span = Math.max((xs[1] - xs[0]) / w, (ys[1] - ys[0]) / h) * 1.06 || 1;

@@ -25,11 +25,12 @@ export function observeScene(doc: Doc): ObserveScene | null {
   if (!steps) return null;
   const raw = steps.numbers('t_s'), first = raw.find(Number.isFinite) ?? 0, isRelative = Math.abs(first) > 1e4;
   const t = isRelative ? raw.map((v) => v - first) : raw, events: EventMark[] = [], zooms: {from: number; to: number}[] = [];
+  const hasEnds = Array.from({length: steps.rows}, (_, i) => steps.text('event', i)).includes('zoom_end');
   let from = NaN;
   for (let i = 0; i < steps.rows; ++i) {
     const kind = steps.text('event', i), words = wordsOfEvent(kind);
     if (kind === 'zoom' && Number.isNaN(from)) from = t[i]!;
-    if (kind === 'zoom_end' || (kind !== 'zoom' && steps.has('event') && Number.isFinite(from) && kind === '')) zooms.push({from, to: t[i]!}), (from = NaN);
+    if (Number.isFinite(from) && (hasEnds ? kind === 'zoom_end' : kind !== 'zoom')) zooms.push({from, to: t[i]!}), (from = NaN);
     if (words && kind !== 'zoom') events.push({t: t[i]!, words: kind === 'slip' ? `p${steps.number('event_point', i) + 1} slipped` : words});
   }
   if (Number.isFinite(from)) zooms.push({from, to: t[t.length - 1]!});

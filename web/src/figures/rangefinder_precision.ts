@@ -29,7 +29,7 @@ function ellipsesOf(beam: Beam): Ellipse[] {
 
 function drawEllipse(pen: Pen, e: Ellipse): void {
   const side = Math.min(pen.w - 46, pen.h - 62), left = 40, top = 20, x = scale(-e.limit, e.limit, left, left + side), y = scale(-e.limit, e.limit, top, top + side);
-  yAxis(pen, y, left, left + side, {label: `${e.title}, ${e.unit}`, wanted: 4, format: (v) => num(e.names[1] === 'z' ? -v : v, 3)});
+  yAxis(pen, y, left, left + side, {label: e.unit, wanted: 4, format: (v) => num(e.names[1] === 'z' ? -v : v, 3)});
   xAxis(pen, x, top, top + side, {wanted: 4});
   const places = ellipsePlaces(x(0), y(0), e.xx, e.xy, e.yy, 3 * (x(1) - x(0)));
   pen.fill(places, faded(pen.c.blue, 0.25));
@@ -48,6 +48,7 @@ export const rangefinderPrecision: Figure = {
     host.append(row);
     for (const ellipse of ellipses) {
       const part = el('div');
+      part.append(el('p', {class: 'caption'}, ellipse.title));
       row.append(part);
       new Chart(part, {height: 160, aspect: 1.12, most: 260, label: ellipse.title}, (pen) => drawEllipse(pen, ellipse));
     }

@@ -47,7 +47,7 @@ function read(doc: Doc): RangefinderScene | null {
   if (!table) return null;
   const shots = shotsOf(doc, table), all = shots.map((_, i) => i);
   const cols = doc.estimate('board.cols'), rows = doc.estimate('board.rows'), square_m = doc.estimate('board.square_m');
-  return {shots, table, beam: beamOf(doc), lens: lensOf(doc),
+  return {shots, table, beam: doc.isAnswer ? beamOf(doc) : null, lens: lensOf(doc),
     board: cols > 1 && rows > 1 && square_m > 0 && cols < 500 && rows < 500 ? {cols, rows, square_m} : null,
     worstFirst: all.sort((a, b) => Number(shots[b]!.isUsed) - Number(shots[a]!.isUsed) || severity(shots[b]!) - severity(shots[a]!))};
 }

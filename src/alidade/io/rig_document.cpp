@@ -1,7 +1,10 @@
 #include "alidade/io/rig_document.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 
 namespace alidade {
 namespace {
@@ -75,6 +78,91 @@ JsonValue covers_value(const RigReport& report) {
   return covers;
 }
 
+void add_pose(DataTable& table, const std::string& name, const std::vector<Rigid3>& poses) {
+  static constexpr std::array<const char*, 7> parts{"_x_m", "_y_m", "_z_m", "_qx", "_qy", "_qz", "_qw"};
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k < 3 ? k : k - 3);
+    Numbers values;
+    for (const Rigid3& pose : poses) values.push_back(k < 3 ? pose.translation[at] : pose.rotation.coeffs()[at]);
+    table.columns.emplace_back(name + parts[k], rounded(std::move(values), 6));
+  }
+}
+
+const Head* head_of(const Rig& rig, int id) {
+  const auto found = std::ranges::find_if(rig.heads, [id](const RigHead& one) { return one.head.id == id; });
+  return found == rig.heads.end() ? nullptr : &found->head;
+}
+
+/// Which way each view's pan came from, of the same head: residuals of two levels by it are backlash. 0 at first.
+std::vector<int> travel_signs(std::span<const HeadView> views) {
+  std::map<int, double> last_rad;
+  std::vector<int> signs;
+  for (const HeadView& view : views) {
+    const auto [last, is_first] = last_rad.try_emplace(view.head, view.pan_tilt_rad.x());
+    const double moved_rad = view.pan_tilt_rad.x() - last->second;
+    signs.push_back(is_first || std::abs(moved_rad) < 1e-3 ? 0 : moved_rad > 0.0 ? 1 : -1);
+    last->second = view.pan_tilt_rad.x();
+  }
+  return signs;
+}
+
+/// The pan and the tilt axis of each head, at readings of zero, in the world: what the page draws.
+DataTable axes_table(const Rig& rig) {
+  std::vector<std::string> names;
+  std::array<Numbers, 6> columns;
+  for (const RigHead& one : rig.heads) {
+    const Head& head = one.head;
+    const Eigen::Vector2d angles = head.encoder.angles(Eigen::Vector2d::Zero());
+    const Eigen::Matrix3d base_from_pan = Eigen::AngleAxisd(-angles.x(), Eigen::Vector3d::UnitY()).toRotationMatrix();
+    const Eigen::Vector3d tilt_in_pan{std::cos(head.axes_skew_rad), std::sin(head.axes_skew_rad), 0.0};
+    for (const bool is_pan : {true, false}) {
+      Eigen::Vector3d point_in_base = Eigen::Vector3d::Zero(), direction_in_base = Eigen::Vector3d::UnitY();
+      if (!is_pan) {
+        point_in_base = base_from_pan * head.pan_to_tilt_m;
+        direction_in_base = base_from_pan * tilt_in_pan;
+      }
+      const Eigen::Vector3d place = head.world_from_base * point_in_base;
+      const Eigen::Vector3d direction = head.world_from_base.rotation * direction_in_base;
+      names.push_back((is_pan ? "pan " : "tilt ") + std::to_string(head.id));
+      for (int k = 0; k < 3; ++k) {
+        columns[static_cast<std::size_t>(k)].push_back(place[k]);
+        columns[static_cast<std::size_t>(3 + k)].push_back(direction[k]);
+      }
+    }
+  }
+  static constexpr std::array<const char*, 6> column_names{
+      "point_in_base_x_m", "point_in_base_y_m", "point_in_base_z_m", "direction_x", "direction_y", "direction_z"};
+  DataTable table{"axes", {{"name", names}}};
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    table.columns.emplace_back(column_names[k], rounded(std::move(columns[k]), 6));
+  return table;
+}
+
+/// Corners with their residuals, prediction − observation; `view` is a row of `views`.
+DataTable corners_table(std::span<const HeadView> views, const RigReport& report) {
+  std::vector<int> view, corner;
+  std::array<Numbers, 4> columns;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const auto& residuals = report.views[v].residual_px;
+    if (residuals.size() != views[v].seen.corners.size()) continue;
+    for (std::size_t i = 0; i < residuals.size(); ++i) {
+      view.push_back(static_cast<int>(v));
+      corner.push_back(views[v].seen.corners[i].index);
+      columns[0].push_back(views[v].seen.corners[i].px.x());
+      columns[1].push_back(views[v].seen.corners[i].px.y());
+      columns[2].push_back(residuals[i].x());
+      columns[3].push_back(residuals[i].y());
+    }
+  }
+  return {"corners",
+          {{"view", view},
+           {"corner", corner},
+           {"u_px", rounded(std::move(columns[0]), 2)},
+           {"v_px", rounded(std::move(columns[1]), 2)},
+           {"residual_u_px", rounded(std::move(columns[2]), 4)},
+           {"residual_v_px", rounded(std::move(columns[3]), 4)}}};
+}
+
 DataTable views_table(std::span<const HeadView> views, const RigReport& report) {
   std::vector<std::string> name, reason;
   std::vector<int> head, board;
@@ -93,17 +181,26 @@ DataTable views_table(std::span<const HeadView> views, const RigReport& report) 
     pan_off.push_back(fit.reading_correction_rad.x());
     tilt_off.push_back(fit.reading_correction_rad.y());
   }
-  return {"views",
-          {{"name", name},
-           {"head", head},
-           {"board", board},
-           {"used", used},
-           {"reason", reason},
-           {"pan_rad", pan},
-           {"tilt_rad", tilt},
-           {"rms_px", rounded(rms, 5)},
-           {"pan_correction_rad", rounded(pan_off, 8)},
-           {"tilt_correction_rad", rounded(tilt_off, 8)}}};
+  DataTable table{"views",
+                  {{"name", name},
+                   {"head", head},
+                   {"board", board},
+                   {"used", used},
+                   {"reason", reason},
+                   {"pan_rad", pan},
+                   {"tilt_rad", tilt},
+                   {"rms_px", rounded(rms, 5)},
+                   {"pan_correction_rad", rounded(pan_off, 8)},
+                   {"tilt_correction_rad", rounded(tilt_off, 8)},
+                   {"travel_sign", travel_signs(views)}}};
+  if (report.status != RigReport::Status::converged) return table;
+  std::vector<Rigid3> world_from_cams;
+  for (const HeadView& view : views) {
+    const Head* const turned = head_of(report.rig, view.head);
+    world_from_cams.push_back(turned ? world_from_cam(*turned, view.pan_tilt_rad) : Rigid3());
+  }
+  add_pose(table, "base_from_cam", world_from_cams);
+  return table;
 }
 
 }  // namespace
@@ -125,7 +222,11 @@ void fill_rig(std::span<const HeadView> views, const RigReport& report, ResultDo
   estimate["noise"]["px_from"] = report.sigma_px_is_told ? "residuals" : "given";
   estimate["noise"]["encoder_from"] = report.sigma_encoder_is_told ? "residuals" : "given or assumed";
   estimate["covers"] = covers_value(report);
-  if (report.views.size() == views.size()) document.data.push_back(views_table(views, report));
+  if (report.views.size() != views.size()) return;
+  document.data.push_back(views_table(views, report));
+  if (report.status != RigReport::Status::converged) return;
+  document.data.push_back(axes_table(report.rig));
+  document.data.push_back(corners_table(views, report));
 }
 
 }  // namespace alidade

@@ -14,6 +14,8 @@ using Numbers = std::vector<double>;
 constexpr double not_there = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t most_rows = 4000;  // the page holds them; track.csv has all
 constexpr std::array<const char*, 3> axes{"x", "y", "z"};
+constexpr std::array<const char*, 6> cov_names{"xx", "xy", "xz", "yy", "yz", "zz"};
+constexpr std::array<std::pair<int, int>, 6> cov_places{{{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}}};
 
 /// Which rows stand in the tables: evenly spread, and those with something to say.
 std::vector<std::size_t> kept_rows(const TrackReport& report) {
@@ -35,6 +37,7 @@ void add_by_axis(DataTable& table, const std::string& before, const std::string&
 DataTable steps_table(const TrackReport& report, const TrueTrack& truth, std::span<const std::size_t> rows) {
   Numbers t, nees;
   ByAxis position, velocity, sigma, sigma_velocity, true_position;
+  std::array<Numbers, 6> cov;  // of the position, upper triangle
   std::vector<std::string> events;
   for (const std::size_t row : rows) {
     const TrackStep& step = report.steps[row];
@@ -50,12 +53,18 @@ DataTable steps_table(const TrackReport& report, const TrueTrack& truth, std::sp
       sigma_velocity[k].push_back(step.has_belief ? std::sqrt(step.belief.P(3 + i, 3 + i)) : not_there);
       true_position[k].push_back(there ? (*there)[i] : not_there);
     }
+    for (std::size_t k = 0; k < cov.size(); ++k) {
+      const auto [i, j] = cov_places[k];
+      cov[k].push_back(step.has_belief ? step.belief.P(i, j) : not_there);
+    }
   }
   DataTable table{"steps", {{"t_s", t}}};
   add_by_axis(table, "target_in_base_", "_m", std::move(position));
   add_by_axis(table, "velocity_", "_m_s", std::move(velocity));
   add_by_axis(table, "sigma_target_in_base_", "_m", std::move(sigma));
   add_by_axis(table, "sigma_velocity_", "_m_s", std::move(sigma_velocity));
+  for (std::size_t k = 0; k < cov.size(); ++k)
+    table.columns.emplace_back(std::string("cov_") + cov_names[k] + "_m2", std::move(cov[k]));
   if (!truth.t_s.empty()) add_by_axis(table, "truth_", "_m", std::move(true_position));
   table.columns.emplace_back("nees", rounded(std::move(nees), 4));
   table.columns.emplace_back("event", events);
@@ -77,6 +86,7 @@ DataTable measurements_table(std::span<const TargetSight> sights, std::span<cons
                                               "nis",
                                               "head"};
   std::array<Numbers, names.size()> column;
+  ByAxis ray_origin, ray_direction;
   std::vector<bool> accepted;
   for (const std::size_t row : rows) {
     const TargetSight& sight = sights[row];
@@ -97,11 +107,18 @@ DataTable measurements_table(std::span<const TargetSight> sights, std::span<cons
                                                   static_cast<double>(heads[sight.head].head.id)};
     for (std::size_t k = 0; k < names.size(); ++k) column[k].push_back(values[k]);
     accepted.push_back(step.accepted);
+    const auto ray = ray_in_world(heads[sight.head], sight.pan_tilt_rad, sight.px);
+    for (int i = 0; i < 3; ++i) {
+      ray_origin[static_cast<std::size_t>(i)].push_back(ray ? ray->origin_in_world[i] : not_there);
+      ray_direction[static_cast<std::size_t>(i)].push_back(ray ? ray->direction_in_world[i] : not_there);
+    }
   }
   DataTable table{"measurements", {}};
   for (std::size_t k = 0; k < names.size(); ++k)
     table.columns.emplace_back(names[k], rounded(std::move(column[k]), k < 4 ? 6 : 4));
   table.columns.emplace_back("accepted", accepted);
+  add_by_axis(table, "ray_origin_in_base_", "_m", std::move(ray_origin));
+  add_by_axis(table, "ray_direction_", "", std::move(ray_direction));
   return table;
 }
 

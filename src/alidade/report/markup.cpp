@@ -3,11 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <vector>
 
 namespace alidade::report {
 namespace {
@@ -96,25 +93,6 @@ std::string json_in_script(std::string_view json) {
   return out;
 }
 
-void append_coordinate(std::string& out, double value, int decimals) {
-  if (!std::isfinite(value)) value = 0.0;
-  const long unit = decimals == 1 ? 10 : 100;
-  const long scaled = std::lround(std::clamp(value, -1e7, 1e7) * static_cast<double>(unit));
-  std::array<char, 32> buffer{};
-  if (scaled < 0) out += '-';
-  const long size = std::abs(scaled);
-  out.append(buffer.data(), std::to_chars(buffer.data(), buffer.data() + buffer.size(), size / unit).ptr);
-  long rest = size % unit;
-  if (rest == 0) return;
-  out += '.';
-  if (unit == 100) {
-    out += static_cast<char>('0' + rest / 10);
-    rest %= 10;
-    if (rest == 0) return;
-  }
-  out += static_cast<char>('0' + rest);
-}
-
 std::string rounded_text(double value, int digits) {
   if (std::isnan(value)) return "–";
   if (std::isinf(value)) return value > 0.0 ? "∞" : "−∞";
@@ -141,15 +119,6 @@ ValueText value_text(double value, double sigma) {
   if (exponent < -7) return {fmt::format("{:.8g}", value), fmt::format("{:.1e}", three_sigma)};
   const int decimals = std::max(0, 1 - exponent);
   return {fmt::format("{:.{}f}", value, decimals), fmt::format("{:.{}f}", three_sigma, decimals)};
-}
-
-std::string shortened(std::string_view text, std::size_t max_chars) {
-  std::vector<std::size_t> starts;
-  for (std::size_t i = 0; i < text.size(); ++i)
-    if (!is_continuation(text[i])) starts.push_back(i);
-  if (starts.size() <= max_chars || max_chars < 3) return std::string(text);
-  const std::size_t tail = (max_chars - 1) * 2 / 3, head = max_chars - 1 - tail;
-  return std::string(text.substr(0, starts[head])) + "…" + std::string(text.substr(starts[starts.size() - tail]));
 }
 
 }  // namespace alidade::report

@@ -14,9 +14,6 @@ namespace alidade::report {
 /// JSON made harmless inside <script>: every `<` becomes `\u003c`.
 [[nodiscard]] std::string json_in_script(std::string_view json);
 
-/// Appends a coordinate with at most `decimals` (1 or 2) decimals, as short as possible: `12.5`, `-3`.
-void append_coordinate(std::string& out, double value, int decimals = 1);
-
 /// A number to so many significant digits without needless exponents; "–" where missing.
 [[nodiscard]] std::string number_text(double value, int digits = 4);
 
@@ -28,8 +25,5 @@ struct ValueText {
   std::string value, plus_minus;
 };
 [[nodiscard]] ValueText value_text(double value, double sigma);
-
-/// Shortened in the middle to at most `max_chars` characters (UTF-8): "lef…01.jpg".
-[[nodiscard]] std::string shortened(std::string_view text, std::size_t max_chars);
 
 }  // namespace alidade::report

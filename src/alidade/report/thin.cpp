@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 namespace alidade::report {
 namespace {
@@ -20,10 +21,9 @@ void append_extremes(std::span<const double> values, std::size_t begin, std::siz
   out.push_back(high);
 }
 
-void sort_unique(std::vector<std::size_t>& rows, std::size_t from = 0) {
-  const auto begin = rows.begin() + static_cast<std::ptrdiff_t>(from);
-  std::sort(begin, rows.end());
-  rows.erase(std::unique(begin, rows.end()), rows.end());
+void sort_unique(std::vector<std::size_t>& rows) {
+  std::sort(rows.begin(), rows.end());
+  rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
 }
 
 }  // namespace
@@ -46,32 +46,6 @@ std::vector<std::size_t> thinned_rows(std::size_t num_rows, const std::vector<st
     if (must_keep[i]) rows.push_back(i);
   sort_unique(rows);
   return rows;
-}
-
-std::vector<std::vector<std::size_t>> thinned_curve(const Curve& curve, double unit) {
-  std::vector<std::vector<std::size_t>> pieces;
-  const std::size_t count = std::min(curve.x.size(), curve.y.size());
-  const auto is_there = [&](std::size_t i) { return std::isfinite(curve.x[i]) && std::isfinite(curve.y[i]); };
-  for (std::size_t i = 0; i < count;) {
-    if (!is_there(i)) {
-      ++i;
-      continue;
-    }
-    std::vector<std::size_t> piece;
-    while (i < count && is_there(i)) {
-      const double slot = std::floor(curve.x[i] / unit);
-      std::size_t end = i + 1;
-      while (end < count && is_there(end) && std::floor(curve.x[end] / unit) == slot) ++end;
-      const std::size_t from = piece.size();
-      piece.push_back(i);
-      append_extremes(curve.y, i, end, piece);
-      piece.push_back(end - 1);
-      sort_unique(piece, from);
-      i = end;
-    }
-    pieces.push_back(std::move(piece));
-  }
-  return pieces;
 }
 
 }  // namespace alidade::report

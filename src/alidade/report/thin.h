@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <span>
 #include <vector>
 
 namespace alidade::report {
@@ -12,14 +11,5 @@ namespace alidade::report {
 [[nodiscard]] std::vector<std::size_t> thinned_rows(std::size_t num_rows,
                                                     const std::vector<std::vector<double>>& columns,
                                                     const std::vector<bool>& must_keep, std::size_t most);
-
-/// A curve of values over places, NaN where it is broken.
-struct Curve {
-  std::span<const double> x, y;  ///< Paper units.
-};
-
-/// Pieces of the curve with at most four points a unit of x: first, lowest, highest and last, so that it looks the
-/// same.
-[[nodiscard]] std::vector<std::vector<std::size_t>> thinned_curve(const Curve& curve, double unit);
 
 }  // namespace alidade::report

@@ -202,7 +202,7 @@ std::vector<double> track_bound(std::span<const TargetSight> sights, std::span<c
     if (position && sight.head < heads.size()) {
       const RigHead& head = heads[sight.head];
       const double own = head.head.encoder.sigma_rad;
-      const SightModel see(head, sight.pan_tilt_rad, config.tracker.sigma_px,
+      const SightModel see(head, sight.pan_tilt_rad, sigma_px_of(sight, config.tracker.sigma_px),
                            own > 0.0 ? own : config.tracker.sigma_encoder_rad);
       belief.x.head<3>() = *position;
       if (const auto seen = see(*position)) {

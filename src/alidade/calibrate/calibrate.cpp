@@ -5,6 +5,7 @@
 
 #include "alidade/calibrate/bundle.h"
 #include "alidade/calibrate/initial_lens.h"
+#include "alidade/calibrate/port.h"
 #include "alidade/calibrate/setup.h"
 #include "alidade/calibrate/start.h"
 #include "alidade/calibrate/weights.h"
@@ -238,14 +239,18 @@ void judge(const Work& work, const BundleResult& result, CalibrateReport& report
   const Eigen::VectorXd values = params(report.camera.lens);
   const auto names = param_names(report.camera.lens);
   for (const int at : work.problem.free_lens) {
-    if (at >= 4) continue;
+    const std::string& name = names[static_cast<std::size_t>(at)];
     const double sigma = std::sqrt(report.camera.cov(at, at));
-    const double limit = at < 2 ? 0.05 * values[at] : 0.1 * std::max(report.camera.width_px, report.camera.height_px);
-    if (sigma <= limit && std::isfinite(sigma)) continue;
-    refuse(report,
-           names[static_cast<std::size_t>(at)] + " cannot be told: its σ is " +
-               std::to_string(static_cast<long>(std::min(sigma, 1e9))) + " px",
-           "tilt the board 20–45° in several directions and fill the picture");
+    if (sigma <= largest_told_sigma(name, values[at], report.camera)) continue;
+    if (at < 4) {
+      refuse(report,
+             name + " cannot be told: its σ is " + std::to_string(static_cast<long>(std::min(sigma, 1e9))) + " px",
+             "tilt the board 20–45° in several directions and fill the picture");
+    } else {
+      refuse(report, name + " cannot be told: its σ is " + std::to_string(sigma),
+             "hold the board at several distances, near ones too, and at the picture's edges, or hold " + name +
+                 " with --fix");
+    }
     return;
   }
   report.status = CalibrateReport::Status::converged;
@@ -288,7 +293,9 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
     return report;
   }
   constexpr double parallel_rad = 0.05;  // 3°: below it, tilt is what noise makes of it
-  if (spread_of_normals_rad(state.cam_from_board) < parallel_rad) {
+  // A port behind a known lens may be told from parallel boards: its σ will say.
+  const bool lens_is_known = !is_central(held) && work.problem.free_lens.front() >= 4;
+  if (!lens_is_known && spread_of_normals_rad(state.cam_from_board) < parallel_rad) {
     refuse(report, "all boards are parallel: the focal length cannot be told from the distance",
            "tilt the board 20–45° in several directions");
     return report;

@@ -33,7 +33,7 @@ class CalibratePortCommand : public testing::CommandTest {
         alidade({"simulate", "board", "--camera", path("port.yaml"), "--photos", "30", "--corners-only", "--sigma-px",
                  "0.3", "--max-tilt-deg", max_tilt_deg, "--out", path("water"), "--quiet"},
                 board_);
-    ASSERT_EQ(made.exit_code, 0) << made.err;
+    ASSERT_EQ(made.code, 0) << made.err;
   }
 
   [[nodiscard]] Outcome calibrate(const std::vector<std::string>& options) const {
@@ -51,7 +51,7 @@ class CalibratePortCommand : public testing::CommandTest {
 TEST_F(CalibratePortCommand, FindsGapAndNormalAndSaysWhetherBrownWouldDo) {
   simulate("35");
   const Outcome run = calibrate({"--model", "flat_port", "--air", path("air.yaml"), "--glass", "0.01"});
-  ASSERT_EQ(run.exit_code, 0) << run.err;
+  ASSERT_EQ(run.code, 0) << run.err;
   const json estimate = json::parse(run.out)["estimate"];
   const json& camera = estimate["camera"];
   EXPECT_EQ(camera["model"], "flat_port");
@@ -62,36 +62,36 @@ TEST_F(CalibratePortCommand, FindsGapAndNormalAndSaysWhetherBrownWouldDo) {
   EXPECT_EQ(estimate["port"]["brown_is_enough"], false);
   EXPECT_NEAR(double(estimate["port"]["brown_rms_px"][0]), 1.5, 0.4);
   // The camera that it writes is one that other commands read, or refuse by name.
-  EXPECT_EQ(alidade({"camera", "show", path("out/camera.yaml"), "--quiet"}).exit_code, 0);
+  EXPECT_EQ(alidade({"camera", "show", path("out/camera.yaml"), "--quiet"}).code, 0);
   const Outcome refused = alidade({"camera", "convert", path("out/camera.yaml"), path("x.yaml"), "--to", "opencv"});
-  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_EQ(refused.code, 3);
   EXPECT_THAT(refused.err, HasSubstr("opencv has no lens like flat_port"));
   const Outcome undistort = alidade({"camera", "undistort", path("out/camera.yaml"), path("a.png")});
-  EXPECT_EQ(undistort.exit_code, 3);
+  EXPECT_EQ(undistort.code, 3);
   EXPECT_THAT(undistort.err, HasSubstr("has no single viewpoint"));
 }
 
 TEST_F(CalibratePortCommand, RefusesAFreeLensFromParallelBoards) {
   simulate("0");
   const Outcome run = calibrate({"--model", "flat_port", "--glass", "0.01"});
-  EXPECT_EQ(run.exit_code, 4) << run.err;
+  EXPECT_EQ(run.code, 4) << run.err;
   EXPECT_THAT(std::string(json::parse(run.out)["verdict"]["sentence"]), HasSubstr("cannot be told"));
 }
 
 TEST_F(CalibratePortCommand, SaysWhatIsMissing) {
   simulate("35");
   Outcome run = calibrate({"--model", "flat_port"});
-  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_EQ(run.code, 2);
   EXPECT_THAT(run.err, HasSubstr("--glass 0.01"));
   run = calibrate({"--air", path("air.yaml")});
-  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_EQ(run.code, 2);
   EXPECT_THAT(run.err, HasSubstr("are of --model flat_port"));
   run = calibrate({"--model", "flat_port", "--glass", "0.01", "--air", path("port.yaml")});
-  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_EQ(run.code, 3);
   EXPECT_THAT(run.err, HasSubstr("has no single viewpoint"));
   write_file(path("small.yaml"), std::string("model: brown\nwidth: 640\nheight: 480\n") + lens);
   run = calibrate({"--model", "flat_port", "--glass", "0.01", "--air", path("small.yaml")});
-  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_EQ(run.code, 3);
   EXPECT_THAT(run.err, HasSubstr("is of 640x480 px, but the photos are 768x576"));
 }
 

@@ -71,8 +71,7 @@ void summarize(const Calibration& calibration, Run& run) {
     const double sigma = std::sqrt(report.camera.cov(at, at));
     if (names[i] == "skew" && sigma == 0.0 && values[at] == 0.0) continue;
     const char* unit = i < 5 ? " px" : names[i].ends_with("_m") ? " m" : "";
-    run.say(
-        fmt::format("{:5} {}{}", names[i].substr(0, names[i].rfind("_m")), value_and_3sigma(values[at], sigma), unit));
+    run.say(fmt::format("{:5} {}{}", names[i], value_and_3sigma(values[at], sigma), unit));
   }
   const auto used =
       std::count_if(report.views.begin(), report.views.end(), [](const ViewFit& fit) { return fit.used; });

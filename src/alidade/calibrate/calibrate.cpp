@@ -223,19 +223,8 @@ double fill_estimate(const Work& work, const BundleResult& result, const NoiseEs
   return variance_scale;
 }
 
-/// Refuses where the answer is no answer: singular, or a focal length or principal point with a huge σ.
-void judge(const Work& work, const BundleResult& result, CalibrateReport& report) {
-  if (result.status == BundleResult::Status::no_convergence) {
-    report.status = CalibrateReport::Status::no_convergence;
-    report.reason = "the solve did not settle in " + std::to_string(report.iterations) + " iterations";
-    report.to_add = "check --board and --square, and look at the photos that fit worst";
-    return;
-  }
-  if (result.status == BundleResult::Status::singular) {
-    refuse(report, "these photos leave free: " + name_combination(work.problem, report.camera.lens, result.weakest),
-           "add photos with the board tilted 20–45° in several directions, or hold a parameter with --fix");
-    return;
-  }
+/// Refuses the first parameter with a σ that makes it no answer.
+bool refuse_untold(const Work& work, CalibrateReport& report) {
   const Eigen::VectorXd values = params(report.camera.lens);
   const auto names = param_names(report.camera.lens);
   for (const int at : work.problem.free_lens) {
@@ -251,9 +240,40 @@ void judge(const Work& work, const BundleResult& result, CalibrateReport& report
              "hold the board at several distances, near ones too, and at the picture's edges, or hold " + name +
                  " with --fix");
     }
+    return true;
+  }
+  return false;
+}
+
+/// Refuses where the answer is no answer: singular, or a parameter with a huge σ.
+void judge(const Work& work, const BundleResult& result, bool settled, CalibrateReport& report) {
+  if (result.status == BundleResult::Status::singular) {
+    refuse(report, "these photos leave free: " + name_combination(work.problem, report.camera.lens, result.weakest),
+           "add photos with the board tilted 20–45° in several directions, or hold a parameter with --fix");
     return;
   }
-  report.status = CalibrateReport::Status::converged;
+  const bool has_cov = result.status == BundleResult::Status::converged;
+  if (has_cov && refuse_untold(work, report)) return;
+  const auto* port = std::get_if<Calibrated<FlatPort>>(&report.camera.lens);
+  if (port && has_cov && port->params[10] < 0.0) {  // gap_m
+    refuse(report,
+           "gap_m comes out below zero, " + std::to_string(port->params[10]) + " with a σ of " +
+               std::to_string(std::sqrt(report.camera.cov(10, 10))),
+           "if the lens stands on the glass, hold the gap: --gap 0 --fix gap_m; else check --glass and --n-water");
+  } else if (!settled) {
+    report.status = CalibrateReport::Status::no_convergence;
+    report.reason = "the solve did not settle in " + std::to_string(report.iterations) + " iterations";
+    report.to_add = "check --board and --square, and look at the photos that fit worst";
+  } else {
+    report.status = CalibrateReport::Status::converged;
+  }
+}
+
+/// The result with its covariance. What photos hardly tell of a port makes the solve creep: then, too, there is one to
+/// say which parameter it is.
+BundleResult finished(BundleResult result, bool settled) {
+  if (!settled && !is_central(result.state.lens) && result.equations) result.status = BundleResult::Status::converged;
+  return with_covariance(std::move(result), true);
 }
 
 }  // namespace
@@ -302,7 +322,9 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
   }
   for (const BoardView& view : work.views) work.arrays.push_back(make_arrays(view));
   NoiseEstimate noise;
-  const BundleResult result = with_covariance(solve_robustly(config, report, work, std::move(state), noise), true);
+  BundleResult solved = solve_robustly(config, report, work, std::move(state), noise);
+  const bool settled = solved.status == BundleResult::Status::converged;
+  const BundleResult result = finished(std::move(solved), settled);
   const double variance_scale = fill_estimate(work, result, noise, size, report);
   fill_views(work, result, noise, variance_scale, report);
   report.camera.rms_px = report.rms_px;
@@ -310,7 +332,7 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
     too_few();
     return report;
   }
-  judge(work, result, report);
+  judge(work, result, settled, report);
   return report;
 }
 

@@ -131,6 +131,28 @@ TEST(CalibratePort, RefusesAFreeLensAndFreeIndices) {
   EXPECT_NE(report.status, CalibrateReport::Status::converged);
 }
 
+TEST(CalibratePort, RefusesAGapBelowZeroAndHoldsItAtZero) {
+  const Camera truth = port_camera(0.0, 1.0);
+  int refused = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    const auto views = simulate_views(scene_of(truth, seed), sigma_px, seed + 20);
+    const auto report = calibrate(board, views, size, with_port({}, knowledge()));
+    if (report.status == CalibrateReport::Status::degenerate) {
+      EXPECT_TRUE(report.reason.starts_with("gap_m comes out below zero")) << report.reason;
+      ++refused;
+    } else {
+      EXPECT_EQ(report.status, CalibrateReport::Status::converged) << report.reason;
+    }
+    PortKnowledge on_glass = knowledge();
+    on_glass.gap_m = 0.0;
+    const auto held = calibrate(board, views, size, with_port({.fixed = {"skew", "gap_m"}}, on_glass));
+    EXPECT_EQ(held.status, CalibrateReport::Status::converged) << held.reason;
+    EXPECT_LT(errors_of(held, truth).normal_rad, 0.3 * deg);
+  }
+  EXPECT_GT(refused, 0);  // half of them, but for chance
+  EXPECT_LT(refused, 8);
+}
+
 TEST(CalibratePort, JudgesWhetherBrownWouldDo) {
   const auto judged = [](double gap_m) {
     PhotoCalibration photos;

@@ -11,9 +11,9 @@ enum : Eigen::Index { gap = 10, glass, n_glass, n_water, normal_x, normal_y };
 /// Whether the numbers describe a port at all: also false for what is not finite.
 bool is_port(const Params<FlatPort>& p) {
   const auto is_index = [](double n) { return n >= 1.0 && n <= 4.0; };
-  const double most_m = 1e6;
-  return p[gap] >= 0.0 && p[gap] < most_m && p[glass] >= 0.0 && p[glass] < most_m && is_index(p[n_glass]) &&
-         is_index(p[n_water]) && p[normal_x] * p[normal_x] + p[normal_y] * p[normal_y] < 1.0;
+  constexpr double most_m = 1e6;
+  return p[gap] > FlatPort::least_gap_m && p[gap] < most_m && p[glass] >= 0.0 && p[glass] < most_m &&
+         is_index(p[n_glass]) && is_index(p[n_water]) && p[normal_x] * p[normal_x] + p[normal_y] * p[normal_y] < 1.0;
 }
 
 /// tan of the angle in a medium of index n where it is τ in air, with its derivatives: τ Q^−½, Q = n² + (n² − 1) τ².
@@ -39,6 +39,7 @@ struct Axial {
 std::optional<double> solve_tau(const Params<FlatPort>& p, double water_m, double rho) {
   const double n2 = p[n_water] * p[n_water];
   const double slope0 = p[gap] + p[glass] / p[n_glass] + water_m / p[n_water];
+  if (!(slope0 > 0.0)) return std::nullopt;
   const double depth = p[gap] + p[glass] + water_m;
   double tau = rho / slope0;  // the tangent at τ = 0: below the root
   if (const double s2 = n2 * rho * rho / (rho * rho + depth * depth); s2 < 0.8) {
@@ -49,8 +50,9 @@ std::optional<double> solve_tau(const Params<FlatPort>& p, double water_m, doubl
   for (int i = 0; i < max_iterations; ++i) {
     const Refracted in_glass = refract(tau, p[n_glass]), in_water = refract(tau, p[n_water]);
     const double off = p[gap] * tau + p[glass] * in_glass.tan + water_m * in_water.tan - rho;
-    const double step = off / (p[gap] + p[glass] * in_glass.by_tau + water_m * in_water.by_tau);
-    if (!std::isfinite(step)) return std::nullopt;
+    const double slope = p[gap] + p[glass] * in_glass.by_tau + water_m * in_water.by_tau;
+    const double step = off / slope;
+    if (!(slope > 0.0) || !std::isfinite(step)) return std::nullopt;
     tau = std::max(0.0, tau - step);
     if (last) return tau;
     last = std::abs(step) <= 1e-7 * (1.0 + tau);  // its square is below rounding: one more step ends here

@@ -13,7 +13,8 @@ namespace alidade {
 /// the pixel of the air direction n + τ (P − z n)/ρ in the Brown lens. Agrawal et al., "A theory of multi-layer flat
 /// refractive geometry", CVPR 2012, for the axis; docs/maths/camera-models.md.
 /// NOT central: the rays in water do not meet in a point, so a direction alone says not all: see sight_ray().
-/// Valid for z > d + t (in water), d, t ≥ 0, indices in [1, 4], and where the Brown lens sees the air direction.
+/// Valid for z > d + t (in water), t ≥ 0, indices in [1, 4], and where the Brown lens sees the air direction.
+/// A gap a little below zero is no port, but lets an estimate of one at zero scatter to both sides.
 struct FlatPort {
   static constexpr std::string_view name = "flat_port";
   static constexpr bool is_central = false;
@@ -21,6 +22,8 @@ struct FlatPort {
   static constexpr std::array<std::string_view, num_params> param_names{
       "fx", "fy", "cx",    "cy",      "skew",    "k1",      "k2",       "p1",
       "p2", "k3", "gap_m", "glass_m", "n_glass", "n_water", "normal_x", "normal_y"};
+
+  static constexpr double least_gap_m = -0.03;
 
   /// That of the lens in air.
   using Domain = Brown::Domain;

@@ -194,7 +194,7 @@ TEST(FlatPort, AnswersNothingToNonsense) {
     }
     EXPECT_FALSE(FlatPort::unproject(good, {bad, 200.0}));
   }
-  for (const auto& [at, value] : {std::pair{10, -0.01}, {11, -0.01}, {12, 0.9}, {13, 0.0}, {14, 1.1}}) {
+  for (const auto& [at, value] : {std::pair{10, -0.05}, {11, -0.01}, {12, 0.9}, {13, 0.0}, {14, 1.1}}) {
     Params<FlatPort> p = good;
     p[at] = value;
     EXPECT_FALSE(FlatPort::project(p, point_in_cam)) << at;

@@ -41,6 +41,8 @@ TrackConfig config_of(const Args& args) {
   if (args.sigma_a > 0.0) config.tracker.sigma_a_m_s2 = args.sigma_a;
   if (config.tracker.min_depth_m >= config.tracker.max_depth_m)
     throw UsageError("--min-depth: is not below --max-depth");
+  if (config.smooth_s > 0.0 && (args.method == "imm" || args.method == "xiahou2015"))
+    throw UsageError("--smooth: not for --method " + args.method);
   return config;
 }
 
@@ -83,6 +85,8 @@ void summarize(const TrackReport& report, Run& run) {
   if (std::isfinite(report.rms_m))
     run.say(fmt::format("against the truth: RMS {:.2f} mm, mean {:.2f} mm, NEES {:.2f}", 1e3 * report.rms_m,
                         1e3 * report.mean_error_m, report.nees_per_dof));
+  if (std::isfinite(report.smoothed_rms_m))
+    run.say(fmt::format("smoothed: RMS {:.2f} mm", 1e3 * report.smoothed_rms_m));
   if (std::isfinite(report.pcrlb_m)) run.say(fmt::format("bound (PCRLB) {:.2f} mm", 1e3 * report.pcrlb_m));
 }
 
@@ -162,6 +166,8 @@ ExitCode track(const Args& args, Run& run) {
   fill_track(events.sights, rig.heads, report, truth, run.document);
   summarize(report, run);
   if (verdict.exit_code == ExitCode::ok) run.add_file("track.csv", track_csv(report.steps, report.ahead));
+  if (verdict.exit_code == ExitCode::ok && !report.smoothed.empty())
+    run.add_file("smoothed.csv", smoothed_csv(report.smoothed));
   return run.finish(verdict);
 }
 
@@ -189,6 +195,10 @@ void add_options(CLI::App& command, Args& args) {
   command.add_flag("--corrected", args.corrected, "With xiahou2015: pixels and mounting corrected, else as printed");
   command.add_option("--predict", args.config.predict_s, "Rows so far ahead of each event [s]")
       ->check(positive_number());
+  command
+      .add_option("--smooth", args.config.smooth_s,
+                  "Also smoothed.csv: the path as the sights until so long after tell it [s]; not for imm")
+      ->check(finite_number() & CLI::Range(0.01, 2.0));
   command.add_option("--sigma-a", args.sigma_a, "The target's acceleration [m/s2] (default: told by the innovations)")
       ->check(positive_number());
   const auto number = [&](const char* name, double& value, const char* help) {

@@ -211,6 +211,20 @@ TEST_F(TrackCommand, SaysWhereOneHeadWasAlone) {
   EXPECT_GT(alone, 5u);
 }
 
+TEST_F(TrackCommand, SmoothingLowersTheErrorWhereTheTargetTurns) {
+  simulate("C");
+  const Outcome outcome = track({"--smooth", "0.3", "--truth", path("sim/truth.csv")});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json estimate = Json::parse(read_file(path("out/result.json")))["estimate"];
+  // The filter's own test finds a ratio of 0.8 or less at 0.2 s.
+  EXPECT_LT(estimate["smoothed_rms_m"].get<double>(), 0.8 * estimate["rms_m"].get<double>());
+  const Csv csv = Csv::read(path("out/smoothed.csv"));
+  EXPECT_GT(csv.num_rows(), 150U);  // 11 s at 20 Hz
+  for (std::size_t row = 1; row < csv.num_rows(); ++row) EXPECT_GT(csv.number(row, "t_s"), csv.number(row - 1, "t_s"));
+  EXPECT_EQ(track({"--smooth", "0.3", "--method", "imm"}).code, 2);
+  EXPECT_EQ(track({"--smooth", "30"}).code, 2);
+}
+
 /// Two heads film a red ball.
 class TrackFilm : public TrackCommand {
  protected:

@@ -147,4 +147,10 @@ std::string track_csv(std::span<const TrackStep> steps, std::span<const Predicte
   return text;
 }
 
+std::string smoothed_csv(std::span<const PredictedStep> smoothed) {
+  std::string text = "t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,sigma_x_m,sigma_y_m,sigma_z_m\n";
+  for (const PredictedStep& step : smoothed) text += fmt::format("{:.6f}", step.t_s) + cells_of(step.belief) + "\n";
+  return text;
+}
+
 }  // namespace alidade

@@ -39,4 +39,7 @@ struct EventsOptions {
 /// `ahead` (one a sight, or none) adds rows with the event `predicted`.
 [[nodiscard]] std::string track_csv(std::span<const TrackStep> steps, std::span<const PredictedStep> ahead = {});
 
+/// Text of smoothed.csv: `t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,sigma_x_m,sigma_y_m,sigma_z_m`.
+[[nodiscard]] std::string smoothed_csv(std::span<const PredictedStep> smoothed);
+
 }  // namespace alidade

@@ -115,6 +115,7 @@ void fill_track(std::span<const TargetSight> sights, std::span<const RigHead> he
   JsonValue& estimate = document.estimate;
   estimate["rms_m"] = report.rms_m;
   estimate["mean_error_m"] = report.mean_error_m;
+  if (!report.smoothed.empty()) estimate["smoothed_rms_m"] = report.smoothed_rms_m;
   estimate["nees_per_dof"] = report.nees_per_dof;
   estimate["nis_per_dof"] = report.nis_per_dof;
   estimate["pcrlb_m"] = report.pcrlb_m;

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -32,6 +34,9 @@ struct Args {
   std::vector<std::string> free;
   std::vector<std::string> priors;
   CalibrateConfig config;
+  std::filesystem::path air;
+  PortKnowledge port;
+  bool has_glass = false;
 };
 
 /// "fx=650±5" or "fx=650:5": name, value, σ.
@@ -63,8 +68,9 @@ CalibrateConfig config_from(const Args& args) {
   for (const std::string& name : args.fixed) {
     if (std::find(config.fixed.begin(), config.fixed.end(), name) == config.fixed.end()) config.fixed.push_back(name);
   }
-  for (const std::string& name : args.free) std::erase(config.fixed, name);
   for (const std::string& text : args.priors) config.priors.push_back(parse_prior(text));
+  if (config.model == FlatPort::name) config = with_port(std::move(config), args.port);
+  for (const std::string& name : args.free) std::erase(config.fixed, name);
   if (args.board_shape == "bow") {
     config.board_shape = BoardShape::bow;
   } else if (args.board_shape == "free") {
@@ -78,6 +84,36 @@ CalibrateConfig config_from(const Args& args) {
   for (const std::string& fault : faults(config)) sentence += (sentence.empty() ? "" : "; ") + fault;
   if (!sentence.empty()) throw UsageError(sentence);
   return config;
+}
+
+/// The lens in air of --air.
+Camera read_air_lens(const std::filesystem::path& file) {
+  Camera air = read_central_camera(file);
+  if (!std::holds_alternative<Calibrated<Pinhole>>(air.lens) && !std::holds_alternative<Calibrated<Brown>>(air.lens)) {
+    throw InputError(fmt::format("{}: model: a lens behind a port must be pinhole or brown, not {}", file.string(),
+                                 model_name(air.lens)));
+  }
+  return air;
+}
+
+/// Reads what --model flat_port needs; refuses its options with another model.
+void take_port(Args& args, Run& run) {
+  if (args.config.model != FlatPort::name) {
+    if (!args.air.empty() || args.has_glass) throw UsageError("--air and --glass are of --model flat_port");
+    return;
+  }
+  if (!args.has_glass) throw UsageError("--model flat_port: give the port's thickness in metres, --glass 0.01");
+  if (args.air.empty()) return;
+  run.add_input("air", args.air);
+  args.port.air = read_air_lens(args.air);
+}
+
+/// A lens held must be of these pictures.
+void require_size_of_air(const Args& args, const ImageSize& size) {
+  const std::optional<Camera>& air = args.port.air;
+  if (!air || (air->width_px == size.width_px && air->height_px == size.height_px)) return;
+  throw InputError(fmt::format("{}: is of {}x{} px, but the photos are {}x{}", args.air.string(), air->width_px,
+                               air->height_px, size.width_px, size.height_px));
 }
 
 /// Reads each photo once; the second look comes from memory while the set is small. Called from many threads.
@@ -116,6 +152,7 @@ class PhotoShelf {
 /// Size of the pictures where only corners are given: as asked, else the smallest that holds them all.
 ImageSize size_of(const Args& args, const std::vector<BoardView>& views) {
   if (!args.size.empty()) return parse_size(args.size);
+  if (args.port.air) return {args.port.air->width_px, args.port.air->height_px};
   double width = 1.0, height = 1.0;
   for (const BoardView& view : views) {
     for (const Corner& corner : view.corners) {
@@ -164,7 +201,8 @@ PhotoCalibration from_photos(const std::vector<std::filesystem::path>& files, Ph
   return result;
 }
 
-ExitCode calibrate(const Args& args, Run& run) {
+ExitCode calibrate(Args args, Run& run) {
+  take_port(args, run);
   const Board board = board_from(args.board);
   CalibrateConfig config = config_from(args);
   if (args.corners.empty() == args.photos.empty()) {
@@ -180,6 +218,7 @@ ExitCode calibrate(const Args& args, Run& run) {
   PhotoShelf shelf(files, run);
   PhotoCalibration solved = args.corners.empty() ? from_photos(files, shelf, board, config, given, run)
                                                  : from_corners(args, board, config, given, run);
+  require_size_of_air(args, solved.size);
   Calibration result = judge_calibration(board, std::move(solved), config, run.progress);
   run.lap("study");
   fill_calibration(board, result, run.document);
@@ -202,14 +241,17 @@ void add_calibrate(Frame& frame) {
        .summary = "A camera with its distortion and covariance, from photos of a board",
        .examples = "alidade calibrate photos/*.jpg --board 9x6 --square 0.025\n"
                    "alidade calibrate photos/ --board 9x6 --square 0.025 --board-shape free --fix k3\n"
-                   "alidade calibrate --corners corners.csv --size 640x480 --board 9x6 --square 0.025\n"},
+                   "alidade calibrate --corners corners.csv --size 640x480 --board 9x6 --square 0.025\n"
+                   "alidade calibrate water/*.png --board 9x6 --square 0.025 --model flat_port --air camera_air.yaml "
+                   "--glass 0.01\n"},
       [args](Run& run) { return calibrate(*args, run); });
   command.add_option("photos", args->photos, "Photos of the board, or folders of them (8- or 16-bit JPEG, PNG, TIFF)");
   add_board_options(command, args->board);
   command.add_option("--corners", args->corners,
                      "Corners instead of photos: CSV photo,corner,u_px,v_px[,sigma_u_px,sigma_v_px]");
   command.add_option("--size", args->size, "Picture size of --corners, WIDTHxHEIGHT (default: what holds the corners)");
-  command.add_option("--model", args->config.model, "Lens: pinhole, brown or kannala_brandt")->capture_default_str();
+  command.add_option("--model", args->config.model, "Lens: pinhole, brown, kannala_brandt or flat_port")
+      ->capture_default_str();
   command
       .add_option("--fix", args->fixed,
                   "Parameters held at zero (cx, cy: the picture's centre; with --prior: its value), as k3,p1,p2")
@@ -217,6 +259,20 @@ void add_calibrate(Frame& frame) {
   command.add_option("--free", args->free, "Parameters estimated that are held otherwise: skew")->delimiter(',');
   command.add_option("--prior", args->priors, "What is known of a parameter, NAME=VALUE:SIGMA, as fx=650:5")
       ->delimiter(',');
+  command.add_option("--air", args->air,
+                     "flat_port: the lens' camera file from a calibration in air, held; without it the lens is "
+                     "estimated as well, if the photos tell");
+  const auto of_port = [&](const char* name, double& value, const char* help, double low, double high) {
+    return command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high));
+  };
+  of_port("--gap", args->port.gap_m, "flat_port: air between lens and glass, a start [m]", 0.0, 10.0)
+      ->capture_default_str();
+  of_port("--glass", args->port.glass_m, "flat_port: thickness of the port, held [m]; must be given", 0.0, 10.0)
+      ->each([args](const std::string&) { args->has_glass = true; });
+  of_port("--n-glass", args->port.n_glass, "flat_port: refractive index of the port, held", 1.0, 4.0)
+      ->capture_default_str();
+  of_port("--n-water", args->port.n_water, "flat_port: of the water, held (fresh 1.333, sea 1.34)", 1.0, 4.0)
+      ->capture_default_str();
   command
       .add_option("--board-shape", args->board_shape,
                   "flat, bow (2 parameters), free (every point), auto (free if the photos prove it), or a "

@@ -70,13 +70,15 @@ void summarize(const Calibration& calibration, Run& run) {
     const auto at = static_cast<Eigen::Index>(i);
     const double sigma = std::sqrt(report.camera.cov(at, at));
     if (names[i] == "skew" && sigma == 0.0 && values[at] == 0.0) continue;
-    run.say(fmt::format("{:5} {}{}", names[i], value_and_3sigma(values[at], sigma), i < 5 ? " px" : ""));
+    const char* unit = i < 5 ? " px" : names[i].ends_with("_m") ? " m" : "";
+    run.say(fmt::format("{:5} {}{}", names[i], value_and_3sigma(values[at], sigma), unit));
   }
   const auto used =
       std::count_if(report.views.begin(), report.views.end(), [](const ViewFit& fit) { return fit.used; });
   run.say(fmt::format("{} of {} photos, {} corners ({} left out), RMS {:.4f} px, board {}", used, views.size(),
                       report.corners_used, report.corners_dropped, report.rms_px,
                       shape_name(calibration.config.board_shape)));
+  if (calibration.port) run.say(port_sentence(*calibration.port));
 }
 
 void add_result_files(const Calibration& calibration, Run& run) {

@@ -27,6 +27,10 @@ double limit_deg(const Camera& camera) {
   if (const auto* fisheye = std::get_if<Calibrated<KannalaBrandt>>(&camera.lens)) {
     return deg_per_rad * KannalaBrandt::max_angle(fisheye->params);
   }
+  if (const auto* port = std::get_if<Calibrated<FlatPort>>(&camera.lens)) {  // of the axis of lens and port, in water
+    const double in_air_rad = std::atan(Brown::max_radius(FlatPort::air_lens(port->params)));
+    return deg_per_rad * std::asin(std::sin(in_air_rad) / port->params[13]);
+  }
   return 90.0;
 }
 

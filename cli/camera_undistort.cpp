@@ -76,6 +76,7 @@ std::string undistorted_png(const cv::Mat& photo, const cv::Mat& u_px, const cv:
 
 ExitCode undistort(const UndistortArgs& args, Run& run) {
   const Camera camera = read_camera_input(run, "camera", args.camera);
+  require_central(camera, args.camera);
   const Camera straight = undistorted_camera(camera, args.zoom);
   const std::filesystem::path& out = run.options.out;
   const std::vector<std::string> names = result_names(args, out);

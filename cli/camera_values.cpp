@@ -30,7 +30,8 @@ std::vector<std::string> camera_lines(const Camera& camera) {
     const report::ValueText text = report::value_text(values[at], sigma);
     const std::string value =
         text.plus_minus.empty() ? fmt::format("{:.10g}", values[at]) : text.value + " ± " + text.plus_minus;
-    lines.push_back(fmt::format("  {:<5}{}{}", names[i], value, i < 5 ? " px" : ""));
+    const std::string name = names[i] + (names[i].size() < 5 ? "" : " ");
+    lines.push_back(fmt::format("  {:<5}{}{}", name, value, i < 5 ? " px" : names[i].ends_with("_m") ? " m" : ""));
   }
   return lines;
 }

@@ -164,7 +164,7 @@ ExitCode observe_log(const Args& args, Run& run) {
   std::optional<Camera> camera;
   if (!args.camera.empty()) {
     run.add_input("camera", args.camera);
-    camera = read_camera(args.camera);
+    camera = read_central_camera(args.camera);
   }
   ObserveConfig config = config_from(args, camera);
   RotationLog log = args.log == "-" ? follow_input(args, config, camera, run) : read_log(args, config, run);

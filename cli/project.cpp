@@ -162,7 +162,7 @@ ExitCode project_beam(const Args& args, Run& run) {
   const std::filesystem::path camera_file = args.camera.empty() ? file.camera : args.camera;
   if (camera_file.empty()) throw UsageError("the beam names no camera; say --camera FILE");
   run.add_input("camera", camera_file);
-  const Camera camera = read_camera(camera_file);
+  const Camera camera = read_central_camera(camera_file);
   Beam beam = file.beam;
   // A covariance with another lens' parameters is of another calibration.
   if (beam.cov_with_lens.cols() != camera.cov.cols()) beam.cov_with_lens.resize(0, 0);

@@ -178,7 +178,7 @@ ExitCode rangefinder(const Args& args, Run& run) {
   run.add_input("shots", args.shots);
   run.add_input("camera", args.camera);
   ShotsFile file = read_shots(args.shots, {.skip_bad = args.skip_bad});
-  const Camera camera = read_camera(args.camera);
+  const Camera camera = read_central_camera(args.camera);
   std::vector<Shot> shots;
   for (const ShotRow& row : file.rows) shots.push_back(row.shot);
   run.lap("read");

@@ -35,7 +35,7 @@ ExitCode align_scan(const EdgesArgs& args, Run& run) {
   run.add_input("scan", args.scan);
   run.add_input("camera", args.camera);
   const std::vector<ScanRow> scan = read_scan(args.scan);
-  const Camera camera = read_camera(args.camera);
+  const Camera camera = read_central_camera(args.camera);
   Beam start;
   if (!args.start.empty()) {
     run.add_input("start", args.start);

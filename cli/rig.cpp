@@ -52,7 +52,7 @@ std::map<int, Camera> cameras_of(const Args& args, const std::vector<HeadView>& 
   std::map<int, Camera> cameras;
   std::size_t next = 0;
   for (const int id : ids) {
-    cameras[id] = read_camera(args.cameras[next]);
+    cameras[id] = read_central_camera(args.cameras[next]);
     if (args.cameras.size() > 1) ++next;
   }
   return cameras;

@@ -35,7 +35,7 @@ Camera camera_from(const BoardArgs& args, Run& run) {
   }
   const auto [width, height] = picture_size(args.size);
   auto camera = example_camera(args.model, width, height);
-  if (!camera) throw UsageError("--model: '" + args.model + "' is not pinhole, brown or kannala_brandt");
+  if (!camera) throw UsageError("--model: '" + args.model + "' is not pinhole, brown, kannala_brandt or flat_port");
   return *camera;
 }
 

@@ -36,7 +36,7 @@ RangefinderScene scene_of(const Args& args, Run& run) {
         fmt::format("--scenario: '{}' is not one of {}", args.scenario, fmt::join(rangefinder_scenarios(), ", ")));
   if (!args.camera.empty()) {
     run.add_input("camera", args.camera);
-    config->camera = read_camera(args.camera);
+    config->camera = read_central_camera(args.camera);
   }
   config->num_shots = args.shots;
   config->beam.noise = {args.sigma_range_m, 0.0, 0.0};

@@ -77,7 +77,7 @@ TEST(SimulateBoard, NamesWhatIsWrong) {
   };
   expect({"--size", "320"}, 2, "--size: '320' is not WIDTHxHEIGHT");
   expect({"--size", "320x10"}, 2, "--size: '320x10' is not WIDTHxHEIGHT");
-  expect({"--model", "thin"}, 2, "--model: 'thin' is not pinhole, brown or kannala_brandt");
+  expect({"--model", "thin"}, 2, "--model: 'thin' is not pinhole, brown, kannala_brandt or flat_port");
   expect({"--noise", "nan"}, 2, "--noise: 'nan' is not a finite number");
   expect({"--photos", "0"}, 2, "--photos");
   expect({"--camera", (folder.path() / "none.yaml").string()}, 3, "none.yaml");

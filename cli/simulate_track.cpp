@@ -2,9 +2,13 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
+#include <opencv2/imgcodecs.hpp>
 
 #include "alidade/io/events_file.h"
 #include "alidade/io/rig_file.h"
+#include "alidade/io/video_sights.h"
+#include "alidade/simulate/draws.h"
+#include "alidade/simulate/target_video.h"
 #include "alidade/simulate/track.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
@@ -15,6 +19,8 @@ namespace {
 
 struct Args {
   std::string scenario = "B";
+  bool video = false;
+  double duration_s = 0.0;
   double latency_ms = -1.0, lag_s = 0.34, sigma_px = 0.5, sigma_angle = 0.0008726646259971648;
 };
 
@@ -24,6 +30,7 @@ TrackScene scene_of(const Args& args) {
     throw UsageError(
         fmt::format("--scenario: '{}' is not one of {}", args.scenario, fmt::join(track_scenarios(), ", ")));
   if (args.latency_ms >= 0.0) scene->latency_s = 1e-3 * args.latency_ms;
+  if (args.duration_s > 0.0) scene->duration_s = args.duration_s;
   scene->aiming_lag_s = args.lag_s;
   scene->sigma_px = args.sigma_px;
   scene->sigma_encoder_rad = args.sigma_angle;
@@ -42,21 +49,54 @@ TrueTrack truth_of(const TrackScene& scene) {
   return truth;
 }
 
-ExitCode simulate_track_events(const Args& args, Run& run) {
-  const TrackScene scene = scene_of(args);
+/// Frames of both heads and the angles they read: what `track --video` takes. Pictures are taken at the true angles.
+std::size_t add_frames(const TrackScene& scene, double sigma_encoder_rad, Run& run) {
+  HeadAngles angles;
+  angles.logs.resize(scene.heads.size());
+  Draws draws(run.options.seed);
+  const auto sights = simulate_track(scene, run.options.seed);
+  for (std::size_t k = 0; k < sights.size(); ++k) {
+    report_progress(run.progress, "frames", k, sights.size());
+    const SimulatedSight& sight = sights[k];
+    const RigHead& head = scene.heads[sight.head];
+    const cv::Mat frame =
+        render_target_frame(head, sight.pan_tilt_rad, scene.position(sight.t_capture_s), {}, {}, run.options.seed + k);
+    std::vector<unsigned char> png;
+    cv::imencode(".png", frame, png);
+    auto& rows = angles.logs[sight.head].rows;
+    run.add_file(fmt::format("head_{}/{:06}.png", head.head.id, rows.size()), {png.begin(), png.end()});
+    const Eigen::Vector2d read = sight.pan_tilt_rad + sigma_encoder_rad * draws.normal2();
+    RotationRow row;
+    row.t_s = sight.t_capture_s;
+    row.pan_tilt_roll_rad << read, 0.0;
+    rows.push_back(row);
+  }
+  run.add_file("angles.csv", head_angles_csv(angles, scene.heads));
+  return sights.size();
+}
+
+std::size_t add_events(const TrackScene& scene, Run& run) {
   std::vector<TargetSight> sights;
   for (const SimulatedSight& s : simulate_track(scene, run.options.seed))
     sights.push_back({s.t_capture_s, s.t_arrival_s, s.head, s.pan_tilt_rad, s.px});
   run.add_file("events.csv", events_csv(sights, scene.heads));
+  return sights.size();
+}
+
+ExitCode simulate_track_events(const Args& args, Run& run) {
+  TrackScene scene = scene_of(args);
+  if (args.video) scene.sigma_encoder_rad = 0.0;
+  const std::size_t num_sights = args.video ? add_frames(scene, args.sigma_angle, run) : add_events(scene, run);
   run.add_file("truth.csv", true_track_csv(truth_of(scene)));
   Rig rig;
   rig.heads = scene.heads;
   run.add_file("rig.yaml", rig_text(rig));
   run.document.estimate["sigma_a_m_s2"] = scene.sigma_a_m_s2;
   run.document.estimate["duration_s"] = scene.duration_s;
-  run.document.counts.given = run.document.counts.used = sights.size();
+  run.document.counts.given = run.document.counts.used = num_sights;
   Verdict verdict;
-  verdict.sentence = fmt::format("scenario {}: {} sights of two heads with known truth", scene.name, sights.size());
+  verdict.sentence = fmt::format("scenario {}: {} {} of two heads with known truth", scene.name, num_sights,
+                                 args.video ? "frames" : "sights");
   run.say(fmt::format("{} in {}", verdict.sentence, run.options.out.string()));
   return run.finish(verdict);
 }
@@ -69,7 +109,9 @@ void add_track_scenario(Frame& frame) {
       {"simulate track", "What two pan-tilt heads see of a moving target, and its true path",
        "  alidade simulate track --scenario C --out sim && alidade track sim/events.csv --rig sim/rig.yaml \\\n"
        "    --truth sim/truth.csv\n"
-       "  alidade simulate track --scenario B --latency-ms 100 --out late",
+       "  alidade simulate track --scenario B --latency-ms 100 --out late\n"
+       "  alidade simulate track --scenario B --video --duration 3 --out film && alidade track --video film/head_1 \\\n"
+       "    film/head_2 --angles film/angles.csv --rig film/rig.yaml --target colour:230,70,20 --truth film/truth.csv",
        true},
       [args](Run& run) { return simulate_track_events(*args, run); });
   command.add_option("--scenario", args->scenario, fmt::format("{}", fmt::join(track_scenarios(), ", ")))
@@ -77,6 +119,8 @@ void add_track_scenario(Frame& frame) {
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
     return command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high));
   };
+  command.add_flag("--video", args->video, "Render frames instead of sights: head_1/, head_2/, angles.csv");
+  number("--duration", args->duration_s, "Seconds (default: the scenario's)", 0.1, 3600.0);
   number("--latency-ms", args->latency_ms, "Capture to arrival (default: the scenario's)", 0.0, 10000.0);
   number("--lag-s", args->lag_s, "Time constant of the heads", 0.0, 10.0)->capture_default_str();
   number("--sigma-px", args->sigma_px, "Noise of the target's pixel", 0.0, 100.0)->capture_default_str();

@@ -7,16 +7,21 @@
 #include "alidade/io/events_file.h"
 #include "alidade/io/rig_file.h"
 #include "alidade/io/track_document.h"
+#include "alidade/io/video_sights.h"
 #include "alidade/track/track.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
 #include "cli/option_checks.h"
+#include "cli/target_look.h"
 
 namespace alidade::cli {
 namespace {
 
 struct Args {
-  std::filesystem::path events, rig, truth;
+  std::filesystem::path events, rig, truth, angles;
+  std::vector<std::string> videos;
+  std::string target;
+  double rate_hz = 0.0;
   std::string method = "cv";
   bool corrected = false, skip_bad = false;
   double sigma_a = 0.0;
@@ -36,6 +41,8 @@ TrackConfig config_of(const Args& args) {
   if (args.sigma_a > 0.0) config.tracker.sigma_a_m_s2 = args.sigma_a;
   if (config.tracker.min_depth_m >= config.tracker.max_depth_m)
     throw UsageError("--min-depth: is not below --max-depth");
+  if (config.smooth_s > 0.0 && (args.method == "imm" || args.method == "xiahou2015"))
+    throw UsageError("--smooth: not for --method " + args.method);
   return config;
 }
 
@@ -78,16 +85,66 @@ void summarize(const TrackReport& report, Run& run) {
   if (std::isfinite(report.rms_m))
     run.say(fmt::format("against the truth: RMS {:.2f} mm, mean {:.2f} mm, NEES {:.2f}", 1e3 * report.rms_m,
                         1e3 * report.mean_error_m, report.nees_per_dof));
+  if (std::isfinite(report.smoothed_rms_m))
+    run.say(fmt::format("smoothed: RMS {:.2f} mm", 1e3 * report.smoothed_rms_m));
   if (std::isfinite(report.pcrlb_m)) run.say(fmt::format("bound (PCRLB) {:.2f} mm", 1e3 * report.pcrlb_m));
 }
 
+/// The target found in the frames of the heads' videos. The result tells its sights, events.csv, so that they can be
+/// looked at and used again.
+EventsFile watch_videos(const Args& args, const Rig& rig, Run& run) {
+  if (args.videos.size() != rig.heads.size())
+    throw UsageError(
+        fmt::format("--video: the rig has {} heads, but {} videos are given", rig.heads.size(), args.videos.size()));
+  run.add_input("angles", args.angles);
+  const TargetOption target = read_target_option(args.target, run);
+  const HeadAngles angles = read_head_angles(args.angles, rig.heads);
+  std::vector<VideoFrames> videos;
+  for (const std::string& video : args.videos) {
+    videos.emplace_back(video, target.look.kind == TargetKind::colour ? FrameColour::bgr : FrameColour::grey);
+    if (std::filesystem::is_regular_file(video)) run.add_input("video", video);
+  }
+  const std::vector<TargetFrame> frames = target_frames(videos, angles, rig.heads, target.look, target.pattern.get(),
+                                                        {.rate_hz = args.rate_hz}, run.progress);
+  run.lap("look");
+  EventsFile events{sights_of(frames), {}};
+  fill_target_frames(frames, rig.heads, run.document);
+  run.say(fmt::format("target seen in {} of {} frames", events.sights.size(), frames.size()));
+  if (!events.sights.empty()) run.add_file("events.csv", events_csv(events.sights, rig.heads));
+  return events;
+}
+
+EventsFile sights_given(const Args& args, const Rig& rig, Run& run) {
+  if (!args.videos.empty()) return watch_videos(args, rig, run);
+  run.add_input("events", args.events);
+  return read_events(args.events, rig.heads, {.skip_bad = args.skip_bad});
+}
+
+void check_inputs(const Args& args) {
+  if (args.events.empty() == args.videos.empty()) throw UsageError("give one of an events file and --video");
+  if (args.videos.empty() && !(args.angles.empty() && args.target.empty() && args.rate_hz == 0.0))
+    throw UsageError("--angles, --target and --rate are for --video");
+  if (!args.videos.empty() && (args.angles.empty() || args.target.empty()))
+    throw UsageError("--video needs --angles and --target");
+}
+
+/// Nothing was seen at all.
+Verdict never_seen() {
+  return {State::refused,
+          ExitCode::cannot_tell,
+          "the target is in no frame of the videos",
+          "check --target against a frame, and that the target is in the picture",
+          {}};
+}
+
 ExitCode track(const Args& args, Run& run) {
+  check_inputs(args);
   const TrackConfig config = config_of(args);
   if (args.corrected && args.method != "xiahou2015") throw UsageError("--corrected: only with --method xiahou2015");
-  run.add_input("events", args.events);
   run.add_input("rig", args.rig);
   const Rig rig = read_rig(args.rig);
-  const EventsFile events = read_events(args.events, rig.heads, {.skip_bad = args.skip_bad});
+  const EventsFile events = sights_given(args, rig, run);
+  if (events.sights.empty()) return run.finish(never_seen());
   TrueTrack truth;
   if (!args.truth.empty()) {
     run.add_input("truth", args.truth);
@@ -109,14 +166,24 @@ ExitCode track(const Args& args, Run& run) {
   fill_track(events.sights, rig.heads, report, truth, run.document);
   summarize(report, run);
   if (verdict.exit_code == ExitCode::ok) run.add_file("track.csv", track_csv(report.steps, report.ahead));
+  if (verdict.exit_code == ExitCode::ok && !report.smoothed.empty())
+    run.add_file("smoothed.csv", smoothed_csv(report.smoothed));
   return run.finish(verdict);
 }
 
 void add_options(CLI::App& command, Args& args) {
+  command.add_option("events", args.events,
+                     "Events, CSV: t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px, in order of arrival");
   command
-      .add_option("events", args.events,
-                  "Events, CSV: t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px, in order of arrival")
-      ->required();
+      .add_option("--video", args.videos,
+                  "Videos or folders of numbered frames instead, one a head of the rig, in its order")
+      ->type_name("FILE");
+  command.add_option("--angles", args.angles, "With --video: t_s,head,pan_rad,tilt_rad, CSV")->type_name("FILE");
+  command.add_option("--target", args.target, target_help)->type_name("LOOK");
+  command
+      .add_option("--rate", args.rate_hz,
+                  "Frames a second of the videos; angles are interpolated (default: one row of angles a frame)")
+      ->check(positive_number());
   command.add_option("--rig", args.rig, "The heads and their cameras")->type_name("FILE")->required();
   command.add_option("--truth", args.truth, "True path, CSV: t_s,x_m,y_m,z_m; adds errors, NEES and the bound")
       ->type_name("FILE");
@@ -128,6 +195,10 @@ void add_options(CLI::App& command, Args& args) {
   command.add_flag("--corrected", args.corrected, "With xiahou2015: pixels and mounting corrected, else as printed");
   command.add_option("--predict", args.config.predict_s, "Rows so far ahead of each event [s]")
       ->check(positive_number());
+  command
+      .add_option("--smooth", args.config.smooth_s,
+                  "Also smoothed.csv: the path as the sights until so long after tell it [s]; not for imm")
+      ->check(finite_number() & CLI::Range(0.01, 2.0));
   command.add_option("--sigma-a", args.sigma_a, "The target's acceleration [m/s2] (default: told by the innovations)")
       ->check(positive_number());
   const auto number = [&](const char* name, double& value, const char* help) {
@@ -149,7 +220,9 @@ void add_track(Frame& frame) {
        .summary = "Path of a target in space from the pixels and angles of two or more pan-tilt heads",
        .examples = "alidade track events.csv --rig rig.yaml\n"
                    "alidade track events.csv --rig rig.yaml --method imm --predict 0.1\n"
-                   "alidade track events.csv --rig rig.yaml --truth truth.csv --method xiahou2015\n"},
+                   "alidade track events.csv --rig rig.yaml --truth truth.csv --method xiahou2015\n"
+                   "alidade track --video left.mp4 right.mp4 --angles angles.csv --rate 30 --rig rig.yaml \\\n"
+                   "  --target colour:230,70,20\n"},
       [args](Run& run) { return track(*args, run); });
   add_options(command, *args);
 }

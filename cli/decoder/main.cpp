@@ -1,4 +1,4 @@
-// alidade_video FILE: writes a video's frames as grey values to standard output, for src/alidade/io/video_process.h:
+// alidade_video FILE grey|bgr: writes a video's frames to standard output, for src/alidade/io/video_process.h:
 // 64 characters "alidade_video WIDTH HEIGHT FRAMES", then for each frame 'f' and its bytes, and 'e' at the end.
 // A program of its own, because OpenCV's videoio loads a hundred libraries that no other command needs.
 #include <array>
@@ -6,38 +6,40 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <string_view>
 
 namespace {
 
-/// As 8-bit grey; empty if it is not such a picture.
-cv::Mat to_grey(const cv::Mat& frame) {
-  cv::Mat grey;
-  if (frame.depth() != CV_8U) return grey;
-  if (frame.channels() == 1) return frame.clone();
-  if (frame.channels() == 3) cv::cvtColor(frame, grey, cv::COLOR_BGR2GRAY);
-  return grey;
+/// As 8-bit grey or BGR; empty if it is not such a picture.
+cv::Mat in_colours(const cv::Mat& frame, bool is_bgr) {
+  cv::Mat result;
+  if (frame.depth() != CV_8U) return result;
+  if (frame.channels() == (is_bgr ? 3 : 1)) return frame.clone();
+  if (frame.channels() == 3) cv::cvtColor(frame, result, cv::COLOR_BGR2GRAY);
+  if (frame.channels() == 1) cv::cvtColor(frame, result, cv::COLOR_GRAY2BGR);
+  return result;
 }
 
-bool write_header(const cv::Mat& grey, double frames) {
+bool write_header(const cv::Mat& picture, double frames) {
   std::array<char, 64> header{};
   const unsigned long count = frames > 0.0 && frames < 1e9 ? static_cast<unsigned long>(frames) : 0UL;
-  std::snprintf(header.data(), header.size(), "alidade_video %d %d %lu", grey.cols, grey.rows, count);
+  std::snprintf(header.data(), header.size(), "alidade_video %d %d %lu", picture.cols, picture.rows, count);
   return std::fwrite(header.data(), 1, header.size(), stdout) == header.size();
 }
 
-int decode(const char* file) {
+int decode(const char* file, bool is_bgr) {
   cv::VideoCapture video(file, cv::CAP_FFMPEG);  // others would take a picture for the first of many
-  cv::Mat frame, grey;
+  cv::Mat frame, picture;
   if (!video.isOpened() || !video.read(frame)) return 3;
-  grey = to_grey(frame);
-  const cv::Size size = grey.size();
-  if (grey.empty() || !write_header(grey, video.get(cv::CAP_PROP_FRAME_COUNT))) return 3;
+  picture = in_colours(frame, is_bgr);
+  const cv::Size size = picture.size();
+  if (picture.empty() || !write_header(picture, video.get(cv::CAP_PROP_FRAME_COUNT))) return 3;
   do {
-    grey = to_grey(frame);
-    if (grey.size() != size) return 3;
+    picture = in_colours(frame, is_bgr);
+    if (picture.size() != size) return 3;
     std::fputc('f', stdout);
-    const std::size_t bytes = grey.total();
-    if (std::fwrite(grey.data, 1, bytes, stdout) != bytes) return 3;
+    const std::size_t bytes = picture.total() * picture.elemSize();
+    if (std::fwrite(picture.data, 1, bytes, stdout) != bytes) return 3;
   } while (video.read(frame));
   std::fputc('e', stdout);
   return std::fflush(stdout) == 0 ? 0 : 3;
@@ -46,9 +48,9 @@ int decode(const char* file) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) return 2;
+  if (argc != 3) return 2;
   try {
-    return decode(argv[1]);
+    return decode(argv[1], std::string_view(argv[2]) == "bgr");
   } catch (const std::exception&) {
     return 3;  // the reader says what it means
   }

@@ -5,6 +5,7 @@
 
 #include "alidade/calibrate/bundle.h"
 #include "alidade/calibrate/initial_lens.h"
+#include "alidade/calibrate/port.h"
 #include "alidade/calibrate/setup.h"
 #include "alidade/calibrate/start.h"
 #include "alidade/calibrate/weights.h"
@@ -222,33 +223,57 @@ double fill_estimate(const Work& work, const BundleResult& result, const NoiseEs
   return variance_scale;
 }
 
-/// Refuses where the answer is no answer: singular, or a focal length or principal point with a huge σ.
-void judge(const Work& work, const BundleResult& result, CalibrateReport& report) {
-  if (result.status == BundleResult::Status::no_convergence) {
-    report.status = CalibrateReport::Status::no_convergence;
-    report.reason = "the solve did not settle in " + std::to_string(report.iterations) + " iterations";
-    report.to_add = "check --board and --square, and look at the photos that fit worst";
-    return;
+/// Refuses the first parameter with a σ that makes it no answer.
+bool refuse_untold(const Work& work, CalibrateReport& report) {
+  const Eigen::VectorXd values = params(report.camera.lens);
+  const auto names = param_names(report.camera.lens);
+  for (const int at : work.problem.free_lens) {
+    const std::string& name = names[static_cast<std::size_t>(at)];
+    const double sigma = std::sqrt(report.camera.cov(at, at));
+    if (sigma <= largest_told_sigma(name, values[at], report.camera)) continue;
+    if (at < 4) {
+      refuse(report,
+             name + " cannot be told: its σ is " + std::to_string(static_cast<long>(std::min(sigma, 1e9))) + " px",
+             "tilt the board 20–45° in several directions and fill the picture");
+    } else {
+      refuse(report, name + " cannot be told: its σ is " + std::to_string(sigma),
+             "hold the board at several distances, near ones too, and at the picture's edges, or hold " + name +
+                 " with --fix");
+    }
+    return true;
   }
+  return false;
+}
+
+/// Refuses where the answer is no answer: singular, or a parameter with a huge σ.
+void judge(const Work& work, const BundleResult& result, bool settled, CalibrateReport& report) {
   if (result.status == BundleResult::Status::singular) {
     refuse(report, "these photos leave free: " + name_combination(work.problem, report.camera.lens, result.weakest),
            "add photos with the board tilted 20–45° in several directions, or hold a parameter with --fix");
     return;
   }
-  const Eigen::VectorXd values = params(report.camera.lens);
-  const auto names = param_names(report.camera.lens);
-  for (const int at : work.problem.free_lens) {
-    if (at >= 4) continue;
-    const double sigma = std::sqrt(report.camera.cov(at, at));
-    const double limit = at < 2 ? 0.05 * values[at] : 0.1 * std::max(report.camera.width_px, report.camera.height_px);
-    if (sigma <= limit && std::isfinite(sigma)) continue;
+  const bool has_cov = result.status == BundleResult::Status::converged;
+  if (has_cov && refuse_untold(work, report)) return;
+  const auto* port = std::get_if<Calibrated<FlatPort>>(&report.camera.lens);
+  if (port && has_cov && port->params[10] < 0.0) {  // gap_m
     refuse(report,
-           names[static_cast<std::size_t>(at)] + " cannot be told: its σ is " +
-               std::to_string(static_cast<long>(std::min(sigma, 1e9))) + " px",
-           "tilt the board 20–45° in several directions and fill the picture");
-    return;
+           "gap_m comes out below zero, " + std::to_string(port->params[10]) + " with a σ of " +
+               std::to_string(std::sqrt(report.camera.cov(10, 10))),
+           "if the lens stands on the glass, hold the gap: --gap 0 --fix gap_m; else check --glass and --n-water");
+  } else if (!settled) {
+    report.status = CalibrateReport::Status::no_convergence;
+    report.reason = "the solve did not settle in " + std::to_string(report.iterations) + " iterations";
+    report.to_add = "check --board and --square, and look at the photos that fit worst";
+  } else {
+    report.status = CalibrateReport::Status::converged;
   }
-  report.status = CalibrateReport::Status::converged;
+}
+
+/// The result with its covariance. What photos hardly tell of a port makes the solve creep: then, too, there is one to
+/// say which parameter it is.
+BundleResult finished(BundleResult result, bool settled) {
+  if (!settled && !is_central(result.state.lens) && result.equations) result.status = BundleResult::Status::converged;
+  return with_covariance(std::move(result), true);
 }
 
 }  // namespace
@@ -288,14 +313,18 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
     return report;
   }
   constexpr double parallel_rad = 0.05;  // 3°: below it, tilt is what noise makes of it
-  if (spread_of_normals_rad(state.cam_from_board) < parallel_rad) {
+  // A port behind a known lens may be told from parallel boards: its σ will say.
+  const bool lens_is_known = !is_central(held) && work.problem.free_lens.front() >= 4;
+  if (!lens_is_known && spread_of_normals_rad(state.cam_from_board) < parallel_rad) {
     refuse(report, "all boards are parallel: the focal length cannot be told from the distance",
            "tilt the board 20–45° in several directions");
     return report;
   }
   for (const BoardView& view : work.views) work.arrays.push_back(make_arrays(view));
   NoiseEstimate noise;
-  const BundleResult result = with_covariance(solve_robustly(config, report, work, std::move(state), noise), true);
+  BundleResult solved = solve_robustly(config, report, work, std::move(state), noise);
+  const bool settled = solved.status == BundleResult::Status::converged;
+  const BundleResult result = finished(std::move(solved), settled);
   const double variance_scale = fill_estimate(work, result, noise, size, report);
   fill_views(work, result, noise, variance_scale, report);
   report.camera.rms_px = report.rms_px;
@@ -303,7 +332,7 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
     too_few();
     return report;
   }
-  judge(work, result, report);
+  judge(work, result, settled, report);
   return report;
 }
 

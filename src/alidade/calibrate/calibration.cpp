@@ -31,7 +31,8 @@ void solve_again(const Board& board, const CalibrateConfig& config, PhotoCalibra
 
 Calibration judge_calibration(const Board& board, PhotoCalibration photos, CalibrateConfig config,
                               const Progress& progress) {
-  Calibration result{.photos = std::move(photos), .config = std::move(config), .study = {}, .next = {}, .verdict = {}};
+  Calibration result{
+      .photos = std::move(photos), .config = std::move(config), .study = {}, .next = {}, .port = {}, .verdict = {}};
   CalibrateReport& report = result.photos.report;
   if (report.status != CalibrateReport::Status::converged) {
     result.verdict = refusal_verdict(report);
@@ -53,6 +54,7 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   }
   result.study = study_calibration(board, result.photos.views, result.config, report, transfer, progress);
   result.next = plan_next_photos(report.camera, report.noise_px, report.board_points, 1, progress);
+  result.port = port_residual(report.camera);
   result.verdict = calibration_verdict(report, result.study, result.photos.views, result.config, result.next);
   return result;
 }

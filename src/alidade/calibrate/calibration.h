@@ -2,6 +2,7 @@
 
 #include "alidade/calibrate/calibrate_photos.h"
 #include "alidade/calibrate/next_photo.h"
+#include "alidade/calibrate/port.h"
 #include "alidade/calibrate/study.h"
 #include "alidade/estimation/verdict.h"
 
@@ -13,6 +14,7 @@ struct Calibration {
   CalibrateConfig config;  ///< As used: a shape that does not transfer is not used.
   CalibrationStudy study;
   NextPhotoPlan next;
+  std::optional<PortResidual> port;  ///< Of a flat_port: whether a brown lens would do.
   Verdict verdict;
 };
 

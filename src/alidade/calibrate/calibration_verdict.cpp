@@ -207,7 +207,7 @@ Check principal_point(const CalibrateReport& report) {
 }
 
 /// What to do next. What makes σ large comes first: more photos of a bent board are no help.
-std::string advice(const Verdict& verdict, const NextPhotoPlan& next, double worst_px) {
+std::string advice(const Verdict& verdict, const NextPhotoPlan& next, double worst_px, bool is_port) {
   const auto ails = [&](const std::string& name) {
     return std::any_of(verdict.checks.begin(), verdict.checks.end(),
                        [&](const Check& check) { return check.name == name && check.state != State::good; });
@@ -221,6 +221,7 @@ std::string advice(const Verdict& verdict, const NextPhotoPlan& next, double wor
   });
   if (wrong_corners) return "look at the corners named, or extract them again";
   if (text_starts("board flat", "the board bends")) return "use --board-shape free";
+  if (ails("lens adequate") && is_port) return "check the lens in air, --glass and --n-water, or take --model brown";
   if (ails("lens adequate")) return "try a richer lens model (--model), see the held-out errors";
   if (ails("coverage") && !next.photos.empty()) {
     return "add a photo as proposed: it lowers the worst 3σ from " + two(worst_px) + " to " +
@@ -252,7 +253,7 @@ Verdict calibration_verdict(const CalibrateReport& report, const CalibrationStud
                                                           : "Not to be trusted: ";
   verdict.sentence = word + trust;
   if (worst->state != State::good && worst->name != "coverage") verdict.sentence += "; " + worst->text;
-  verdict.to_add = advice(verdict, next, 3.0 * worst_of(study.sigma_infinity).value);
+  verdict.to_add = advice(verdict, next, 3.0 * worst_of(study.sigma_infinity).value, !is_central(report.camera.lens));
   return verdict;
 }
 

@@ -20,7 +20,7 @@ struct PointArrays {
 /// residual (prediction − seen), zero. The first three pose columns are also the derivative by the board point.
 class Columns {
  public:
-  static constexpr int max_lens = 10;
+  static constexpr int max_lens = 16;
   static constexpr int pose = max_lens, residual = pose + 6, bow = residual + 1, zero = bow + 2, count = zero + 1;
 
   /// Makes room for n corners.

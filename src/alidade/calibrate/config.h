@@ -15,14 +15,14 @@ enum class BoardShape { flat, bow, free, given, automatic };
 struct Prior {
   std::string name;  ///< Parameter name of the lens model: fx, cx, k3, …
   double value = 0.0;
-  double sigma = 1.0;
+  double sigma = 1.0;  ///< Infinite: a start, no knowledge.
 
   bool operator==(const Prior&) const = default;
 };
 
 /// Options of calibrate(). Plain data with usable defaults: `calibrate(board, views, size, {})` is a sensible call.
 struct CalibrateConfig {
-  std::string model = "brown";                ///< pinhole, brown or kannala_brandt.
+  std::string model = "brown";                ///< pinhole, brown, kannala_brandt or flat_port.
   std::vector<std::string> fixed = {"skew"};  ///< Parameters held: at their prior's value, else zero (k…, skew).
   std::vector<Prior> priors = {};
   BoardShape board_shape = BoardShape::flat;

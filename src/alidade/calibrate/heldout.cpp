@@ -46,7 +46,7 @@ std::vector<Candidate> candidates(const CalibrateConfig& config, std::size_t& in
 }
 
 bool is_richer(const Candidate& a, const Candidate& than) {
-  if (a.model != than.model) return than.model == "pinhole" || a.model == "kannala_brandt";
+  if (a.model != than.model) return than.model == "pinhole" || than.model == "flat_port" || a.model == "kannala_brandt";
   return a.fixed.size() < than.fixed.size();
 }
 

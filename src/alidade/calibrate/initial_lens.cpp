@@ -43,6 +43,12 @@ std::vector<Eigen::Vector4d> candidates(std::span<const Eigen::Matrix3d> H, Imag
   return found;
 }
 
+/// By how much a focal length seen in the photos is longer than the lens': water behind a port stretches it.
+double stretch_in_water(const Lens& lens) {
+  const auto* port = std::get_if<Calibrated<FlatPort>>(&lens);
+  return port ? port->params[13] : 1.0;  // n_water
+}
+
 /// Sum of the residuals' norms, each held to 20 px: a fit that suits most corners wins over one that suits none badly.
 double misfit(const BundleProblem& problem, const BundleState& state) {
   constexpr double enough_px = 20.0;
@@ -99,17 +105,19 @@ std::optional<InitialLens> initial_lens(std::span<const BoardView> views,
   const std::vector<Eigen::Matrix3d> H = homographies(views, board_points);
   std::optional<Trial> best;
   constexpr double good_px = 1.0;  // corners fit: no other start can be meant
+  const double stretch = stretch_in_water(held);
+  const bool nothing_to_try = settings.free_lens.empty() || settings.free_lens.front() >= 4;
   for (const Eigen::Vector4d& k : candidates(H, size)) {
     Eigen::VectorXd values = params(held);
     for (const int at : settings.free_lens) {
-      if (at < 4) values[at] = k[at];
+      if (at < 4) values[at] = at < 2 ? k[at] / stretch : k[at];
     }
     for (int at = 0; at < 4; ++at) {  // what a prior knows is the better start
       if (settings.prior_information[at] > 0.0) values[at] = settings.prior_value[at];
     }
     auto trial = refine(with_params(held, values), views, board_points, settings);
     if (trial && (!best || trial->misfit_px < best->misfit_px)) best = std::move(trial);
-    if (best && best->misfit_px < good_px) break;
+    if (nothing_to_try || (best && best->misfit_px < good_px)) break;
   }
   if (!best) return std::nullopt;
   if (!(best->misfit_px < good_px)) best->found.cam_from_board.assign(views.size(), std::nullopt);

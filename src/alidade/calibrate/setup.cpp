@@ -30,7 +30,7 @@ const Prior* prior_of(const CalibrateConfig& config, const std::string& name) {
 std::vector<std::string> faults(const CalibrateConfig& config) {
   std::vector<std::string> found;
   const auto lens = make_lens(config.model);
-  if (!lens) return {"model must be pinhole, brown or kannala_brandt, not '" + config.model + "'"};
+  if (!lens) return {"model must be pinhole, brown, kannala_brandt or flat_port, not '" + config.model + "'"};
   const auto names = param_names(*lens);
   const auto known = " of model " + config.model + "; it has " + join(names);
   for (const std::string& name : config.fixed) {
@@ -42,6 +42,10 @@ std::vector<std::string> faults(const CalibrateConfig& config) {
     if (!contains(names, prior.name)) found.push_back("'" + prior.name + "' is no parameter" + known);
     if (!std::isfinite(prior.value)) found.push_back("the prior of " + prior.name + " must be finite");
     if (!(prior.sigma > 0.0)) found.push_back("the prior's sigma of " + prior.name + " must be positive");
+  }
+  for (const char* name : {"gap_m", "glass_m", "n_glass", "n_water"}) {
+    if (contains(names, name) && !prior_of(config, name))
+      found.push_back(std::string("a port needs a value of ") + name);
   }
   if (!(config.outlier_sigmas > 0.0)) found.push_back("outlier_sigmas must be positive");
   if (config.max_iterations < 1) found.push_back("max_iterations must be at least 1");

@@ -15,6 +15,7 @@ namespace alidade {
 /// "Close-range camera calibration", Photogrammetric Engineering 37(8), 1971.
 struct Brown {
   static constexpr std::string_view name = "brown";
+  static constexpr bool is_central = true;
   static constexpr int num_params = 10;
   static constexpr std::array<std::string_view, num_params> param_names{"fx", "fy", "cx", "cy", "skew",
                                                                         "k1", "k2", "p1", "p2", "k3"};

@@ -1,5 +1,7 @@
 #include "alidade/camera/camera.h"
 
+#include <cmath>
+
 namespace alidade {
 namespace {
 
@@ -22,6 +24,10 @@ std::vector<std::string> param_names(const Lens& lens) {
       lens);
 }
 
+bool is_central(const Lens& lens) {
+  return std::visit([]<CameraModel Model>(const Calibrated<Model>&) { return Model::is_central; }, lens);
+}
+
 Eigen::VectorXd params(const Lens& lens) {
   return std::visit([](const auto& calibrated) { return Eigen::VectorXd(calibrated.params); }, lens);
 }
@@ -34,6 +40,7 @@ std::optional<Lens> make_lens(std::string_view model_name) {
   if (model_name == Pinhole::name) return Calibrated<Pinhole>{};
   if (model_name == Brown::name) return Calibrated<Brown>{};
   if (model_name == KannalaBrandt::name) return Calibrated<KannalaBrandt>{};
+  if (model_name == FlatPort::name) return Calibrated<FlatPort>{};
   return std::nullopt;
 }
 
@@ -73,6 +80,37 @@ std::vector<std::optional<Eigen::Vector3d>> unproject(const Camera& camera, std:
         return rays_in_cam;
       },
       camera.lens);
+}
+
+std::vector<std::optional<SightRay>> sight_rays(const Camera& camera, std::span<const Eigen::Vector2d> pixels) {
+  return std::visit(
+      [&]<CameraModel Model>(const Calibrated<Model>& lens) {
+        const typename Model::Domain domain = Model::domain(lens.params);
+        std::vector<std::optional<SightRay>> rays(pixels.size());
+        for (std::size_t i = 0; i < pixels.size(); ++i) {
+          if constexpr (Model::is_central) {
+            const auto direction_in_cam = Model::unproject(lens.params, domain, pixels[i]);
+            if (direction_in_cam) rays[i] = SightRay{Eigen::Vector3d::Zero(), *direction_in_cam};
+          } else {
+            rays[i] = Model::sight_ray(lens.params, domain, pixels[i]);
+          }
+        }
+        return rays;
+      },
+      camera.lens);
+}
+
+std::optional<SightRay> sight_ray(const Camera& camera, const Eigen::Vector2d& px) {
+  return sight_rays(camera, {&px, 1}).front();
+}
+
+std::optional<Eigen::Vector3d> point_at_range(const SightRay& ray, double range_m) {
+  // |o + s w|² = range²: the root in front.
+  const double along = ray.origin_in_cam.dot(ray.direction_in_cam);
+  const double square = along * along + range_m * range_m - ray.origin_in_cam.squaredNorm();
+  const double distance_m = std::sqrt(square) - along;
+  if (!(distance_m >= 0.0)) return std::nullopt;
+  return ray.origin_in_cam + distance_m * ray.direction_in_cam;
 }
 
 std::optional<LensProjection> project_with_jacobians(const Camera& camera, const Eigen::Vector3d& point_in_cam) {

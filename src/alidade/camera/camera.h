@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "alidade/camera/brown.h"
+#include "alidade/camera/flat_port.h"
 #include "alidade/camera/kannala_brandt.h"
 #include "alidade/camera/pinhole.h"
 
@@ -20,7 +21,7 @@ struct Calibrated {
 };
 
 /// Every lens this library knows. std::visit makes a forgotten case a compile error.
-using Lens = std::variant<Calibrated<Pinhole>, Calibrated<Brown>, Calibrated<KannalaBrandt>>;
+using Lens = std::variant<Calibrated<Pinhole>, Calibrated<Brown>, Calibrated<KannalaBrandt>, Calibrated<FlatPort>>;
 
 /// What a calibration produces and everything else consumes: a plain value — copy it, compare it, write it to a file.
 struct Camera {
@@ -35,6 +36,8 @@ struct Camera {
 
 [[nodiscard]] std::string_view model_name(const Lens& lens);
 [[nodiscard]] std::vector<std::string> param_names(const Lens& lens);
+/// Whether all its rays meet in the camera's origin: true of all but flat_port.
+[[nodiscard]] bool is_central(const Lens& lens);
 [[nodiscard]] Eigen::VectorXd params(const Lens& lens);
 /// The same model with other values. `values` has as many entries as the model has parameters.
 [[nodiscard]] Lens with_params(const Lens& lens, const Eigen::VectorXd& values);
@@ -46,11 +49,16 @@ struct Camera {
 /// Projects a batch. One dispatch per call, not per point: the inner loop is compiled for the actual model.
 [[nodiscard]] std::vector<std::optional<Eigen::Vector2d>> project(const Camera& camera,
                                                                   std::span<const Eigen::Vector3d> points_in_cam);
-/// Unit ray of a pixel, in the camera frame, or none.
+/// Unit ray of a pixel, in the camera frame, or none. Of a lens that is not central, its direction alone.
 [[nodiscard]] std::optional<Eigen::Vector3d> unproject(const Camera& camera, const Eigen::Vector2d& px);
-
 [[nodiscard]] std::vector<std::optional<Eigen::Vector3d>> unproject(const Camera& camera,
                                                                     std::span<const Eigen::Vector2d> pixels);
+/// Origin and direction of what a pixel sees, for any lens.
+[[nodiscard]] std::optional<SightRay> sight_ray(const Camera& camera, const Eigen::Vector2d& px);
+[[nodiscard]] std::vector<std::optional<SightRay>> sight_rays(const Camera& camera,
+                                                              std::span<const Eigen::Vector2d> pixels);
+/// The point on the ray that is `range_m` from the camera's origin; none where the ray begins further away.
+[[nodiscard]] std::optional<Eigen::Vector3d> point_at_range(const SightRay& ray, double range_m);
 
 /// A pixel with its derivatives, for any model: J_px_params is 2 × number of parameters.
 struct LensProjection {

@@ -199,7 +199,8 @@ std::optional<CameraDiff> diff_cameras(const Camera& a, const Camera& b, const C
   for (int row = 0; row < grid.rows; ++row) {
     for (int col = 0; col < grid.cols; ++col) pixels.push_back(grid.px(col, row));
   }
-  Seen seen_by_a = detail::look(a, grid, config.distance_m);
+  // Infinity is far enough for a lens that is not central (see look()).
+  Seen seen_by_a = detail::look(a, grid, is_central(b.lens) ? config.distance_m : std::min(config.distance_m, 1e6));
   const Fit fit = fit_motion(b, seen_by_a, pixels, variance_weights(diff), has_sigma, range_m);
   set_differences(diff, fit, pixels, a);
   if (diff.num_compared < 10) return std::nullopt;

@@ -14,7 +14,8 @@ struct GridPoint {
   LensProjection projection;
 };
 
-/// What the camera sees at each pixel of the grid, `distance_m` away (a unit ray for infinity); row-major.
+/// What the camera sees at each pixel of the grid, `distance_m` away (for infinity a unit ray, or a very far point
+/// where the lens is not central); row-major.
 [[nodiscard]] std::vector<std::optional<GridPoint>> look(const Camera& camera, const PixelGrid& grid,
                                                          double distance_m);
 

@@ -12,6 +12,7 @@ namespace alidade {
 /// Kannala & Brandt, PAMI 28(8), 2006, eq. (6).
 struct KannalaBrandt {
   static constexpr std::string_view name = "kannala_brandt";
+  static constexpr bool is_central = true;
   static constexpr int num_params = 9;
   static constexpr std::array<std::string_view, num_params> param_names{"fx", "fy", "cx", "cy", "skew",
                                                                         "k1", "k2", "k3", "k4"};

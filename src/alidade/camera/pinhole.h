@@ -10,6 +10,7 @@ namespace alidade {
 /// Hartley & Zisserman, "Multiple View Geometry", 2003, eq. (6.10).
 struct Pinhole {
   static constexpr std::string_view name = "pinhole";
+  static constexpr bool is_central = true;
   static constexpr int num_params = 5;
   static constexpr std::array<std::string_view, num_params> param_names{"fx", "fy", "cx", "cy", "skew"};
 

@@ -26,14 +26,19 @@ std::vector<std::optional<GridPoint>> look(const Camera& camera, const PixelGrid
   for (int row = 0; row < grid.rows; ++row) {
     for (int col = 0; col < grid.cols; ++col) pixels.push_back(grid.px(col, row));
   }
-  const std::vector<std::optional<Eigen::Vector3d>> rays_in_cam = unproject(camera, pixels);
-  const double range_m = std::isfinite(distance_m) ? distance_m : 1.0;
+  const std::vector<std::optional<SightRay>> rays = sight_rays(camera, pixels);
+  // Infinity is a direction to a central lens; to another, a point so far away that its origin no longer counts.
+  const double far_m = is_central(camera.lens) ? 1.0 : 1e6;
+  const double range_m = std::isfinite(distance_m) ? distance_m : far_m;
   std::vector<Eigen::Vector3d> points_in_cam;
-  for (const auto& ray : rays_in_cam) points_in_cam.push_back(range_m * ray.value_or(Eigen::Vector3d::Zero()));
+  for (const auto& ray : rays) {
+    const auto point_in_cam = ray ? point_at_range(*ray, range_m) : std::nullopt;
+    points_in_cam.push_back(point_in_cam.value_or(Eigen::Vector3d::Zero()));
+  }
   const std::vector<std::optional<LensProjection>> projections = project_with_jacobians(camera, points_in_cam);
   std::vector<std::optional<GridPoint>> seen(pixels.size());
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (rays_in_cam[i] && projections[i]) seen[i] = GridPoint{points_in_cam[i], *projections[i]};
+    if (rays[i] && projections[i]) seen[i] = GridPoint{points_in_cam[i], *projections[i]};
   }
   return seen;
 }

@@ -28,14 +28,15 @@ class SquaresSeen {
     std::vector<Eigen::Vector2d> pixels;
     for (int row = 0; row < rows / step + 2; ++row)
       for (int col = 0; col < cols_; ++col) pixels.emplace_back(u_min + col * step, v_min + row * step);
-    const auto rays = unproject(seen.camera, pixels);
+    const auto rays = sight_rays(seen.camera, pixels);
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       nodes_[i].setConstant(std::numeric_limits<float>::quiet_NaN());
       if (!rays[i]) continue;
-      const Eigen::Vector3d ray = board_from_cam.rotation * *rays[i];
-      const double depth = -board_from_cam.translation.z() / ray.z();
+      const Eigen::Vector3d ray = board_from_cam.rotation * rays[i]->direction_in_cam;
+      const Eigen::Vector3d origin = board_from_cam * rays[i]->origin_in_cam;
+      const double depth = -origin.z() / ray.z();
       if (!(depth > 0.0)) continue;
-      const Eigen::Vector2d place = board_from_cam.translation.head<2>() + depth * ray.head<2>();
+      const Eigen::Vector2d place = origin.head<2>() + depth * ray.head<2>();
       nodes_[i] = (place / seen.board.square_m).cast<float>();
     }
   }

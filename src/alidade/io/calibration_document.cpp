@@ -174,6 +174,25 @@ void fill_grids(const CalibrationStudy& study, ResultDocument& document) {
   document.grids.push_back(std::move(halves));
 }
 
+/// How a brown lens would do in the place of a flat port.
+JsonValue port_values(const PortResidual& residual) {
+  JsonValue values = JsonValue::object();
+  Numbers range, rms, worst;
+  for (const PortRange& at : residual.at) {
+    range.push_back(at.range_m);
+    rms.push_back(at.rms_px);
+    worst.push_back(at.max_px);
+  }
+  values["range_m"] = range;
+  values["brown_rms_px"] = rms;
+  values["brown_max_px"] = worst;
+  values["viewpoint_shift_m"] = Numbers{residual.shift_m.x(), residual.shift_m.y(), residual.shift_m.z()};
+  values["brown_is_enough"] = residual.brown_is_enough;
+  values["brown"] = camera_values(residual.brown);
+  values["sentence"] = port_sentence(residual);
+  return values;
+}
+
 void fill_estimate(const Board& board, const Calibration& calibration, ResultDocument& document) {
   const auto& report = calibration.photos.report;
   const auto names = param_names(report.camera.lens);
@@ -199,6 +218,7 @@ void fill_estimate(const Board& board, const Calibration& calibration, ResultDoc
   document.estimate["transfer_flat_rms_px"] =
       calibration.study.transfer ? calibration.study.transfer->flat_rms_px : std::nan("");
   document.estimate["working_distance_m"] = calibration.study.working_distance_m;
+  if (calibration.port) document.estimate["port"] = port_values(*calibration.port);
   JsonValue& target = document.estimate["board"];
   target["kind"] = kind_name(board.kind);
   target["cols"] = board.cols;

@@ -111,6 +111,20 @@ Camera read_camera(const std::filesystem::path& file) {
   return parse_camera(read_file(file), name);
 }
 
+Camera read_central_camera(const std::filesystem::path& file) {
+  const Camera camera = read_camera(file);
+  require_central(camera, file.string());
+  return camera;
+}
+
+void require_central(const Camera& camera, const std::string& name) {
+  if (is_central(camera.lens)) return;
+  throw InputError(
+      fmt::format("{}: model: a {} camera has no single viewpoint, which this command needs; give a central "
+                  "lens (pinhole, brown, kannala_brandt), calibrated in the same water",
+                  name, model_name(camera.lens)));
+}
+
 std::vector<std::string> lens_losses(const Camera& camera, CameraFormat format) {
   if (format == CameraFormat::alidade) return {};
   const Eigen::VectorXd values = params(camera.lens);
@@ -133,6 +147,12 @@ std::vector<std::string> other_losses(const Camera& camera, CameraFormat format)
 }
 
 std::string camera_text(const Camera& camera, CameraFormat format, bool lossy) {
+  if (format != CameraFormat::alidade && std::holds_alternative<Calibrated<FlatPort>>(camera.lens)) {
+    throw InputError(
+        fmt::format("{} has no lens like flat_port; nothing was written (calibrate in water with --model "
+                    "brown for a lens that it has)",
+                    camera_format_name(format)));
+  }
   if (format == CameraFormat::mrcal && std::holds_alternative<Calibrated<KannalaBrandt>>(camera.lens)) {
     throw InputError("mrcal has no lens like kannala_brandt; nothing was written");
   }

@@ -18,8 +18,13 @@ enum class CameraFormat { alidade, opencv, ros, kalibr, mrcal, colmap };
 /// its name in the file: "camchain.yaml:cam1". Throws InputError, also for a lens that no model of ours can be.
 [[nodiscard]] Camera read_camera(const std::filesystem::path& file);
 
-/// The same of text that is at hand; `name` stands for the file in messages, `choice` is the camera's name in the file
-/// (empty: the only one).
+/// The same where all rays must meet in one point: throws InputError for a flat_port camera.
+[[nodiscard]] Camera read_central_camera(const std::filesystem::path& file);
+/// Throws that InputError for a camera at hand; `name` begins the message.
+void require_central(const Camera& camera, const std::string& name);
+
+/// read_camera() of text that is at hand; `name` stands for the file in messages, `choice` is the camera's name in the
+/// file (empty: the only one).
 [[nodiscard]] Camera parse_camera(std::string_view text, const std::string& name, const std::string& choice = "");
 
 /// A camera as text of a format. Throws InputError saying what would be lost, unless `lossy`; also if the format has no

@@ -252,7 +252,7 @@ TEST(CameraFile, AWrongFileIsOneLineThatNamesTheKey) {
       {ours("fx: 500", "fx: 500\nfx: 501"), "f: fx: stands twice"},
       {ours("fx: 500", "fx: 500 px"), "f: fx: '500 px' is not a finite number"},
       {ours("skew", "k1"), "f: k1: is not a key of this model; known: model width"},
-      {ours("pinhole", "flat_port"), "f: model: 'flat_port' is not known"},
+      {ours("pinhole", "dome_port"), "f: model: 'dome_port' is not known"},
       {ours("width: 640", "width: 640.5"), "f: width: 640.5 is not a picture's size"},
       {ours("width: 640", "width: -1"), "f: width: -1 is not a picture's size"},
       {ours("width: 640", "width: 99999999999"), "is not a picture's size"},

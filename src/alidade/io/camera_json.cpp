@@ -17,6 +17,10 @@ JsonValue camera_values(const Camera& camera) {
   const std::vector<std::string> names = param_names(camera.lens);
   const Eigen::VectorXd of_lens = params(camera.lens);
   for (std::size_t i = 0; i < names.size(); ++i) values[names[i]] = of_lens[static_cast<Eigen::Index>(i)];
+  if (const auto* port = std::get_if<Calibrated<FlatPort>>(&camera.lens)) {
+    const Eigen::Vector3d normal = FlatPort::normal(port->params);
+    values["normal"] = std::vector<double>{normal.x(), normal.y(), normal.z()};
+  }
   return values;
 }
 

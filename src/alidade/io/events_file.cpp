@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/io/head_column.h"
 #include "alidade/io/table_rows.h"
 
 namespace alidade {
@@ -40,21 +41,15 @@ Columns columns_of(const Csv& csv) {
   return columns;
 }
 
-std::size_t head_of(const Csv& csv, std::size_t row, std::span<const RigHead> heads) {
-  const long id = csv.integer(row, "head", -1000000, 1000000);
-  const auto at = std::ranges::find_if(heads, [id](const RigHead& head) { return head.head.id == id; });
-  if (at == heads.end()) {
-    std::string known;
-    for (const RigHead& head : heads) known += (known.empty() ? "" : ", ") + std::to_string(head.head.id);
-    throw InputError(csv.where(row, "head") + ": '" + csv.text(row, "head") + "' is not a head of the rig (" + known +
-                     ")");
-  }
-  return static_cast<std::size_t>(at - heads.begin());
-}
-
 Eigen::Vector2d principal_point(const Camera& camera) {
   const Eigen::VectorXd values = params(camera.lens);  // fx, fy, cx, cy, skew come first in every model
   return {values[2], values[3]};
+}
+
+double positive(const Csv& csv, std::size_t row, const std::string& column) {
+  const double value = csv.number(row, column);
+  if (!(value > 0.0)) throw InputError(csv.where(row, column) + ": '" + csv.text(row, column) + "' is not above zero");
+  return value;
 }
 
 TargetSight read_row(const Csv& csv, std::size_t row, const Columns& columns, std::span<const RigHead> heads,
@@ -68,15 +63,12 @@ TargetSight read_row(const Csv& csv, std::size_t row, const Columns& columns, st
   if (!(sight.t_arrival_s >= newest_arrival_s))
     throw InputError(csv.where(row, clock) + ": '" + csv.text(row, clock) +
                      "' runs backwards; rows stand in order of arrival");
-  sight.head = head_of(csv, row, heads);
-  constexpr double most_rad = 1e4, most_px = 1e6;
-  sight.pan_tilt_rad = {csv.number(row, columns.pan), csv.number(row, columns.tilt)};
-  for (const std::string& name : {columns.pan, columns.tilt}) {
-    if (std::abs(csv.number(row, name)) > most_rad)
-      throw InputError(csv.where(row, name) + ": '" + csv.text(row, name) + "' is no angle in radians");
-  }
+  sight.head = head_in_row(csv, row, heads);
+  constexpr double most_px = 1e6;
+  sight.pan_tilt_rad = {angle_in_row(csv, row, columns.pan), angle_in_row(csv, row, columns.tilt)};
   sight.px = {csv.number(row, columns.u), csv.number(row, columns.v)};
   if (!(sight.px.cwiseAbs().maxCoeff() < most_px)) throw InputError(csv.where(row, columns.u) + ": is in no picture");
+  if (csv.has("sigma_px") && !csv.is_empty(row, "sigma_px")) sight.sigma_px = positive(csv, row, "sigma_px");
   if (columns.from_centre) sight.px += principal_point(heads[sight.head].camera);
   return sight;
 }
@@ -105,11 +97,15 @@ EventsFile read_events(const std::filesystem::path& file, std::span<const RigHea
 }
 
 std::string events_csv(std::span<const TargetSight> sights, std::span<const RigHead> heads) {
-  std::string text = "t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px\n";
+  const bool has_sigma = std::ranges::any_of(sights, [](const TargetSight& sight) { return sight.sigma_px > 0.0; });
+  std::string text = "t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px";
+  text += has_sigma ? ",sigma_px\n" : "\n";
   for (const TargetSight& sight : sights) {
-    text += fmt::format("{:.6f},{:.6f},{},{:.9f},{:.9f},{:.4f},{:.4f}\n", sight.t_capture_s, sight.t_arrival_s,
+    text += fmt::format("{:.6f},{:.6f},{},{:.9f},{:.9f},{:.4f},{:.4f}", sight.t_capture_s, sight.t_arrival_s,
                         heads[sight.head].head.id, sight.pan_tilt_rad.x(), sight.pan_tilt_rad.y(), sight.px.x(),
                         sight.px.y());
+    if (has_sigma) text += sight.sigma_px > 0.0 ? fmt::format(",{:.4f}", sight.sigma_px) : ",";
+    text += "\n";
   }
   return text;
 }
@@ -148,6 +144,12 @@ std::string track_csv(std::span<const TrackStep> steps, std::span<const Predicte
     if (i < ahead.size() && ahead[i].has_belief)
       text += fmt::format("{:.6f}", ahead[i].t_s) + cells_of(ahead[i].belief) + ",,predicted\n";
   }
+  return text;
+}
+
+std::string smoothed_csv(std::span<const PredictedStep> smoothed) {
+  std::string text = "t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,sigma_x_m,sigma_y_m,sigma_z_m\n";
+  for (const PredictedStep& step : smoothed) text += fmt::format("{:.6f}", step.t_s) + cells_of(step.belief) + "\n";
   return text;
 }
 

@@ -22,11 +22,13 @@ struct EventsOptions {
 
 /// Reads `t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px`: `head` is an id of the rig, angles are those at
 /// capture (also `pan_rad_at_capture`), `t_arrival_s` may be left out. `du_px,dv_px` in place of the pixel are offsets
-/// from the principal point. Throws InputError: no such column, a head that is not in the rig, arrival before capture,
-/// arrival times that run backwards, angles in `pan_deg`, no rows.
+/// from the principal point; `sigma_px`, where there is such a column, is a row's own. Throws InputError: no such
+/// column, a head that is not in the rig, arrival before capture, arrival times that run backwards, angles in
+/// `pan_deg`, no rows.
 [[nodiscard]] EventsFile read_events(const std::filesystem::path& file, std::span<const RigHead> heads,
                                      const EventsOptions& options = {});
 
+/// `sigma_px` stands there if a sight has one.
 [[nodiscard]] std::string events_csv(std::span<const TargetSight> sights, std::span<const RigHead> heads);
 
 /// Reads `t_s,x_m,y_m,z_m`, in order of time.
@@ -36,5 +38,8 @@ struct EventsOptions {
 /// Text of track.csv: `t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,sigma_x_m,sigma_y_m,sigma_z_m,nis,event`, a row a sight;
 /// `ahead` (one a sight, or none) adds rows with the event `predicted`.
 [[nodiscard]] std::string track_csv(std::span<const TrackStep> steps, std::span<const PredictedStep> ahead = {});
+
+/// Text of smoothed.csv: `t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,sigma_x_m,sigma_y_m,sigma_z_m`.
+[[nodiscard]] std::string smoothed_csv(std::span<const PredictedStep> smoothed);
 
 }  // namespace alidade

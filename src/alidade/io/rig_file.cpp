@@ -133,9 +133,12 @@ Camera camera_of(const YAML::Node& node, const Fields& fields, const std::filesy
   if (node["camera"].IsMap()) {
     YAML::Emitter text;
     text << node["camera"];
-    return parse_camera(text.c_str(), fields.file() + ": " + fields.full("camera"));
+    const std::string name = fields.file() + ": " + fields.full("camera");
+    const Camera camera = parse_camera(text.c_str(), name);
+    require_central(camera, name);
+    return camera;
   }
-  return read_camera(file.parent_path() / fields.text("camera"));
+  return read_central_camera(file.parent_path() / fields.text("camera"));
 }
 
 RigHead head_of(const YAML::Node& node, std::size_t index, const std::filesystem::path& file) {

@@ -132,6 +132,7 @@ void fill_track(std::span<const TargetSight> sights, std::span<const RigHead> he
   JsonValue& estimate = document.estimate;
   estimate["rms_m"] = report.rms_m;
   estimate["mean_error_m"] = report.mean_error_m;
+  if (!report.smoothed.empty()) estimate["smoothed_rms_m"] = report.smoothed_rms_m;
   estimate["nees_per_dof"] = report.nees_per_dof;
   estimate["nis_per_dof"] = report.nis_per_dof;
   estimate["pcrlb_m"] = report.pcrlb_m;
@@ -153,6 +154,46 @@ void fill_track(std::span<const TargetSight> sights, std::span<const RigHead> he
   const std::vector<std::size_t> rows = kept_rows(report);
   document.data.push_back(steps_table(report, truth, rows));
   document.data.push_back(measurements_table(sights, heads, report, rows));
+}
+
+void fill_target_frames(std::span<const TargetFrame> frames, std::span<const RigHead> heads, ResultDocument& document) {
+  std::vector<std::size_t> num_frames(heads.size()), num_seen(heads.size());
+  Numbers t, head, number, u, v, sigma, score;
+  std::vector<std::string> reason;
+  std::vector<bool> lost;
+  for (const TargetFrame& frame : frames) {
+    ++num_frames[frame.head];
+    num_seen[frame.head] += frame.seen.found() ? 1U : 0U;
+    lost.push_back(!frame.seen.found());
+  }
+  for (const std::size_t row : report::thinned_rows(frames.size(), {}, lost, most_rows)) {
+    const TargetFrame& frame = frames[row];
+    const auto if_found = [&](double value) { return frame.seen.found() ? value : not_there; };
+    t.push_back(frame.t_s);
+    head.push_back(heads[frame.head].head.id);
+    number.push_back(static_cast<double>(frame.number));
+    u.push_back(if_found(frame.seen.px.x()));
+    v.push_back(if_found(frame.seen.px.y()));
+    sigma.push_back(if_found(std::sqrt(0.5 * frame.seen.cov.trace())));
+    score.push_back(if_found(frame.seen.score));
+    reason.push_back(frame.seen.reason);
+  }
+  JsonValue videos = JsonValue::list();
+  for (std::size_t i = 0; i < heads.size(); ++i) {
+    JsonValue video = JsonValue::object();
+    video["head"] = heads[i].head.id;
+    video["frames"] = num_frames[i];
+    video["seen"] = num_seen[i];
+    videos.push_back(std::move(video));
+  }
+  document.estimate["video"] = std::move(videos);
+  DataTable table{"frames", {{"t_s", t}, {"head", head}, {"frame", number}}};
+  table.columns.emplace_back("u_px", rounded(std::move(u), 4));
+  table.columns.emplace_back("v_px", rounded(std::move(v), 4));
+  table.columns.emplace_back("sigma_px", rounded(std::move(sigma), 4));
+  table.columns.emplace_back("score", rounded(std::move(score), 4));
+  table.columns.emplace_back("reason", reason);
+  document.data.push_back(std::move(table));
 }
 
 }  // namespace alidade

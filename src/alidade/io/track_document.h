@@ -3,6 +3,7 @@
 #include <span>
 
 #include "alidade/io/result_document.h"
+#include "alidade/io/video_sights.h"
 #include "alidade/track/track.h"
 
 namespace alidade {
@@ -11,5 +12,8 @@ namespace alidade {
 /// for a refusal.
 void fill_track(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackReport& report,
                 const TrueTrack& truth, ResultDocument& document);
+
+/// Adds what videos were searched for: `estimate.video`, a list of {head, frames, seen}, and the table `frames`.
+void fill_target_frames(std::span<const TargetFrame> frames, std::span<const RigHead> heads, ResultDocument& document);
 
 }  // namespace alidade

@@ -41,18 +41,19 @@ std::vector<std::size_t> numbers_of(const std::vector<std::filesystem::path>& pi
   return named;
 }
 
-cv::Mat one_channel(const cv::Mat& photo) {
-  cv::Mat grey = photo;
-  if (photo.channels() == 3) cv::cvtColor(photo, grey, cv::COLOR_BGR2GRAY);
-  if (photo.channels() == 4) cv::cvtColor(photo, grey, cv::COLOR_BGRA2GRAY);
-  return grey;
+cv::Mat in_colours(const cv::Mat& photo, FrameColour colour) {
+  const bool is_bgr = colour == FrameColour::bgr;
+  cv::Mat frame = photo;
+  if (photo.channels() == 3 && !is_bgr) cv::cvtColor(photo, frame, cv::COLOR_BGR2GRAY);
+  if (photo.channels() == 4) cv::cvtColor(photo, frame, is_bgr ? cv::COLOR_BGRA2BGR : cv::COLOR_BGRA2GRAY);
+  return frame;
 }
 
 }  // namespace
 
 class VideoFrames::Impl {
  public:
-  explicit Impl(const std::filesystem::path& path) : name(path.string()) {
+  Impl(const std::filesystem::path& path, FrameColour colour) : name(path.string()), colour_(colour) {
     std::error_code error;
     if (!std::filesystem::exists(path, error)) throw InputError(name + ": no such file or folder");
     if (std::filesystem::is_directory(path, error)) {
@@ -60,25 +61,25 @@ class VideoFrames::Impl {
       numbers_ = numbers_of(pictures_);
       num_frames = pictures_.size();
     } else {
-      process_.emplace(path);
+      process_.emplace(path, colour);
       num_frames = process_->num_frames();
     }
   }
 
   cv::Mat next() {
-    cv::Mat grey = process_ ? decoded() : read();
-    if (grey.empty()) return grey;
+    cv::Mat frame = process_ ? decoded() : read();
+    if (frame.empty()) return frame;
     const std::string where = process_ ? name : pictures_[count_].string();
-    if (size_.empty()) size_ = grey.size();
-    if (grey.size() != size_)
-      throw InputError(fmt::format("{}: is {}×{}, the first frame is {}×{}; one video has one size", where, grey.cols,
-                                   grey.rows, size_.width, size_.height));
-    if (std::min(grey.rows, grey.cols) < min_side_px)
-      throw InputError(fmt::format("{}: is {}×{}; points are followed in {} pixels a side or more", where, grey.cols,
-                                   grey.rows, min_side_px));
+    if (size_.empty()) size_ = frame.size();
+    if (frame.size() != size_)
+      throw InputError(fmt::format("{}: is {}×{}, the first frame is {}×{}; one video has one size", where, frame.cols,
+                                   frame.rows, size_.width, size_.height));
+    if (std::min(frame.rows, frame.cols) < min_side_px)
+      throw InputError(fmt::format("{}: is {}×{}; points are followed in {} pixels a side or more", where, frame.cols,
+                                   frame.rows, min_side_px));
     number = process_ ? count_ : numbers_[count_];
     ++count_;
-    return grey;
+    return frame;
   }
 
   std::string name;
@@ -88,13 +89,14 @@ class VideoFrames::Impl {
   cv::Mat decoded() {
     std::vector<unsigned char> bytes = process_->next();
     if (bytes.empty()) return {};
-    return cv::Mat(process_->height_px(), process_->width_px(), CV_8U, bytes.data()).clone();
+    const int type = colour_ == FrameColour::bgr ? CV_8UC3 : CV_8UC1;
+    return cv::Mat(process_->height_px(), process_->width_px(), type, bytes.data()).clone();
   }
 
   cv::Mat read() {
     if (count_ == pictures_.size()) return {};
     try {
-      return to_frame(one_channel(decode_photo(read_file(pictures_[count_]))));
+      return to_frame(in_colours(decode_photo(read_file(pictures_[count_])), colour_));
     } catch (const InputError& error) {
       const std::string what = error.what(), file = pictures_[count_].string();
       throw InputError(what.starts_with(file) ? what : file + ": " + what);
@@ -103,19 +105,21 @@ class VideoFrames::Impl {
 
   /// Deep pictures become float, divided by the same for all frames: what the first one's bits ask for, as 10- and
   /// 12-bit cameras store their values in 16.
-  cv::Mat to_frame(const cv::Mat& grey) {
-    if (grey.depth() == CV_8U) return grey;
+  cv::Mat to_frame(const cv::Mat& picture) {
+    if (picture.depth() == CV_8U) return picture;
     cv::Mat frame;
     if (count_ == 0) {
       double brightest = 0.0;
-      cv::minMaxLoc(grey, nullptr, &brightest);
+      cv::minMaxLoc(picture.reshape(1), nullptr, &brightest);
       while (full_scale_ < brightest) full_scale_ = 2.0 * full_scale_ + 1.0;
     }
-    grey.convertTo(frame, CV_32F, 255.0 / full_scale_);
+    picture.convertTo(frame, CV_32F, 255.0 / full_scale_);
     cv::patchNaNs(frame, 0.0);
+    if (colour_ == FrameColour::bgr) frame.convertTo(frame, CV_8U);
     return frame;
   }
 
+  FrameColour colour_;
   std::vector<std::filesystem::path> pictures_;
   std::vector<std::size_t> numbers_;
   std::optional<VideoProcess> process_;
@@ -124,7 +128,8 @@ class VideoFrames::Impl {
   double full_scale_ = 255.0;
 };
 
-VideoFrames::VideoFrames(const std::filesystem::path& file_or_folder) : impl_(std::make_unique<Impl>(file_or_folder)) {}
+VideoFrames::VideoFrames(const std::filesystem::path& file_or_folder, FrameColour colour)
+    : impl_(std::make_unique<Impl>(file_or_folder, colour)) {}
 VideoFrames::VideoFrames(VideoFrames&&) noexcept = default;
 VideoFrames& VideoFrames::operator=(VideoFrames&&) noexcept = default;
 VideoFrames::~VideoFrames() = default;

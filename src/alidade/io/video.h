@@ -11,17 +11,20 @@ class Mat;
 
 namespace alidade {
 
+enum class FrameColour { grey, bgr };
+
 /// Frames of a video, one after the other: of a folder of numbered pictures, or of a file.
 class VideoFrames {
  public:
   /// Throws InputError: no such file, no pictures in the folder, not a video.
-  explicit VideoFrames(const std::filesystem::path& file_or_folder);
+  explicit VideoFrames(const std::filesystem::path& file_or_folder, FrameColour colour = FrameColour::grey);
   VideoFrames(VideoFrames&&) noexcept;
   VideoFrames& operator=(VideoFrames&&) noexcept;
   ~VideoFrames();
 
-  /// The next frame in grey: 8 bits, or 32-bit float of 0 to 255 where the picture has more. Empty at the end. Throws
-  /// InputError: not a picture, cut off, another size than the first, too small to follow points in.
+  /// The next frame. Grey: 8 bits, or 32-bit float of 0 to 255 where the picture has more. BGR: 8 bits, of three
+  /// channels, or of one where the picture is grey. Empty at the end. Throws InputError: not a picture, cut off,
+  /// another size than the first, too small to follow points in.
   [[nodiscard]] cv::Mat next();
 
   /// Number of the frame that next() gave, the first 0: pictures that are missing from a folder leave a gap. Where not

@@ -46,14 +46,14 @@ void refuse_text(const std::filesystem::path& video) {
 }
 
 /// Its output goes to `pipe_end`; what it has to say otherwise, nowhere.
-int start_decoder(const std::string& decoder, const std::string& video, int pipe_end) {
+int start_decoder(const std::string& decoder, const std::string& video, FrameColour colour, int pipe_end) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, pipe_end, STDOUT_FILENO);
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
-  std::array<std::string, 2> words{decoder, video};
-  std::array<char*, 3> arguments{words[0].data(), words[1].data(), nullptr};
+  std::array<std::string, 3> words{decoder, video, colour == FrameColour::bgr ? "bgr" : "grey"};
+  std::array<char*, 4> arguments{words[0].data(), words[1].data(), words[2].data(), nullptr};
   pid_t process = -1;
   const int error = posix_spawn(&process, decoder.c_str(), &actions, nullptr, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
@@ -62,13 +62,13 @@ int start_decoder(const std::string& decoder, const std::string& video, int pipe
 
 }  // namespace
 
-VideoProcess::VideoProcess(const std::filesystem::path& video) : video_(video) {
+VideoProcess::VideoProcess(const std::filesystem::path& video, FrameColour colour) : video_(video), colour_(colour) {
   refuse_text(video);
   const std::filesystem::path decoder = decoder_beside_this_program(video);
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) throw InputError(video.string() + ": no pipe to the decoder");
   // Absolute: a name like "http:…" shall not be an address.
-  process_ = start_decoder(decoder.string(), std::filesystem::absolute(video).string(), ends[1]);
+  process_ = start_decoder(decoder.string(), std::filesystem::absolute(video).string(), colour, ends[1]);
   ::close(ends[1]);
   pipe_ = ends[0];
   try {
@@ -106,9 +106,12 @@ std::vector<unsigned char> VideoProcess::next() {
   char mark = 0;
   if (!read_bytes(&mark, 1)) throw InputError(video_.string() + ": the decoder gave up in the middle");
   if (mark != 'f') return {};
-  std::vector<unsigned char> grey(static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_));
-  if (!read_bytes(grey.data(), grey.size())) throw InputError(video_.string() + ": the decoder gave up in the middle");
-  return grey;
+  const std::size_t channels = colour_ == FrameColour::bgr ? 3 : 1;
+  std::vector<unsigned char> frame(static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_) *
+                                   channels);
+  if (!read_bytes(frame.data(), frame.size()))
+    throw InputError(video_.string() + ": the decoder gave up in the middle");
+  return frame;
 }
 
 bool VideoProcess::read_bytes(void* to, std::size_t count) const {

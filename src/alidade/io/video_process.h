@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <vector>
 
+#include "alidade/io/video.h"
+
 namespace alidade {
 
 /// Decodes a video file in a process of its own, the program alidade_video beside this one: its libraries take longer
@@ -11,7 +13,7 @@ namespace alidade {
 class VideoProcess {
  public:
   /// Starts it. Throws InputError: no such file, not a video, no decoder.
-  explicit VideoProcess(const std::filesystem::path& video);
+  VideoProcess(const std::filesystem::path& video, FrameColour colour);
   VideoProcess(const VideoProcess&) = delete;
   VideoProcess& operator=(const VideoProcess&) = delete;
   ~VideoProcess();
@@ -21,7 +23,8 @@ class VideoProcess {
   /// As the file says; 0: it does not.
   [[nodiscard]] std::size_t num_frames() const { return num_frames_; }
 
-  /// The next frame's grey values, row by row; empty at the end. Throws InputError if the decoder died.
+  /// The next frame's values, row by row (grey, or blue, green and red); empty at the end. Throws InputError if the
+  /// decoder died.
   [[nodiscard]] std::vector<unsigned char> next();
 
  private:
@@ -30,6 +33,7 @@ class VideoProcess {
   void stop();
 
   std::filesystem::path video_;
+  FrameColour colour_;
   int pipe_ = -1, process_ = -1;
   int width_px_ = 0, height_px_ = 0;
   std::size_t num_frames_ = 0;

@@ -77,12 +77,13 @@ BoardLight::BoardLight(const BoardScene& scene, std::size_t i, const RenderConfi
 Eigen::Vector2d BoardLight::place(int u, int v) const {
   const Eigen::Vector2d none = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   const Eigen::Vector3d ray = rotation_ * rays_.ray(u, v);
-  const double depth = -origin_.z() / ray.z();
+  const Eigen::Vector3d origin = origin_ + rotation_ * rays_.origin(u, v);
+  const double depth = -origin.z() / ray.z();
   if (!(depth > 0.0)) return none;
-  const Eigen::Vector2d flat = origin_.head<2>() + depth * ray.head<2>();
+  const Eigen::Vector2d flat = origin.head<2>() + depth * ray.head<2>();
   const bool is_near = (flat.array() > near_min_.array()).all() && (flat.array() < near_max_.array()).all();
   if (surface_.is_flat() || !is_near) return flat;
-  return surface_.intersect(origin_, ray, flat).value_or(none);
+  return surface_.intersect(origin, ray, flat).value_or(none);
 }
 
 std::vector<Eigen::Vector2d> BoardLight::place_row(const PixelRect& rect, int v) const {

@@ -24,6 +24,12 @@ std::optional<Camera> example_camera(std::string_view model_name, int width_px, 
   set("p1", 0.0004);
   set("p2", -0.0003);
   set("k3", is_fisheye ? 0.001 : -0.02);
+  set("gap_m", 0.02);
+  set("glass_m", 0.01);
+  set("n_glass", 1.5);
+  set("n_water", 1.34);
+  set("normal_x", 0.01);
+  set("normal_y", -0.015);
   return Camera{width_px, height_px, with_params(*lens, values), {}, 0.0, "alidade simulate"};
 }
 

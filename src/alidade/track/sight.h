@@ -17,7 +17,12 @@ struct TargetSight {
   std::size_t head = 0;      ///< Place in the rig's list of heads.
   Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  double sigma_px = 0.0;  ///< Of one coordinate of this sight; 0: that of all.
 };
+
+[[nodiscard]] inline double sigma_px_of(const TargetSight& sight, double of_all_px) {
+  return sight.sigma_px > 0.0 ? sight.sigma_px : of_all_px;
+}
 
 /// h and R of one sight: the head as it stood, its camera, and the noise of pixel and encoder. Lives as long as the
 /// camera.

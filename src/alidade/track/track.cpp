@@ -11,8 +11,15 @@ namespace {
 
 constexpr double not_there = std::numeric_limits<double>::quiet_NaN();
 
+/// Several steps may tell of one moment: the last one knows most.
+void add_smoothed(const std::optional<Tracker::Smoothed>& now, std::vector<PredictedStep>& smoothed) {
+  if (!now) return;
+  while (!smoothed.empty() && smoothed.back().t_s >= now->t_s) smoothed.pop_back();
+  smoothed.push_back({now->t_s, true, now->belief});
+}
+
 TrackReport followed(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackerConfig& config,
-                     double predict_s = 0.0) {
+                     double predict_s = 0.0, double smooth_s = 0.0) {
   Tracker tracker({heads.begin(), heads.end()}, config);
   TrackReport report;
   report.sigma_a_m_s2 = config.sigma_a_m_s2;
@@ -26,6 +33,7 @@ TrackReport followed(std::span<const TargetSight> sights, std::span<const RigHea
       report.log_likelihood -=
           0.5 * (std::min(step.innovation.nis, config.gate) + std::log(step.innovation.S.determinant()));
     report.steps.push_back(step);
+    if (smooth_s > 0.0) add_smoothed(tracker.smoothed(smooth_s), report.smoothed);
     if (!(predict_s > 0.0)) continue;
     const auto ahead = tracker.at(step.t_s + predict_s);
     report.ahead.push_back({step.t_s + predict_s, ahead.has_value(), ahead.value_or(Belief<6>{})});
@@ -90,6 +98,21 @@ void add_errors(TrackReport& report, const std::vector<bool>& counts, const True
   if (!bound.empty()) report.pcrlb_m = std::sqrt(sum_bound / num);
 }
 
+/// Over the same time as the errors of the steps.
+void add_smoothed_error(TrackReport& report, const std::vector<bool>& counts, const TrueTrack& truth) {
+  const auto first = std::ranges::find(counts, true);
+  if (first == counts.end()) return;
+  const double from_s = report.steps[static_cast<std::size_t>(first - counts.begin())].t_s;
+  double sum2 = 0.0, num = 0.0;
+  for (const PredictedStep& step : report.smoothed) {
+    const auto position = truth.at(step.t_s);
+    if (!position || step.t_s < from_s) continue;
+    sum2 += (step.belief.x.head<3>() - *position).squaredNorm();
+    num += 1.0;
+  }
+  if (num > 0.0) report.smoothed_rms_m = std::sqrt(sum2 / num);
+}
+
 /// The angles (pan, tilt) that an unturned head without offsets would have to look along a sight.
 std::optional<Eigen::Vector2d> angles_of_ray(const RigHead& head, const TargetSight& sight) {
   const auto ray = ray_in_world(head, sight.pan_tilt_rad, sight.px);
@@ -132,7 +155,11 @@ TrackReport track_target(std::span<const TargetSight> sights, std::span<const Ri
                          const TrueTrack& truth) {
   TrackConfig used = config;
   if (config.find_sigma_a) used.tracker.sigma_a_m_s2 = most_probable_sigma_a(sights, heads, config.tracker);
-  TrackReport report = followed(sights, heads, used.tracker, config.predict_s);
+  if (config.smooth_s > 0.0) {
+    used.tracker.history_s = std::max(used.tracker.history_s, 1.2 * config.smooth_s + 0.1);
+    used.tracker.most_kept = std::max<std::size_t>(used.tracker.most_kept, 2048);
+  }
+  TrackReport report = followed(sights, heads, used.tracker, config.predict_s, config.smooth_s);
   report.sigma_a_is_found = config.find_sigma_a;
   const std::vector<bool> counts = counted(report.steps, config.warm_up_s);
   double sum_nis = 0.0, num = 0.0;
@@ -142,7 +169,10 @@ TrackReport track_target(std::span<const TargetSight> sights, std::span<const Ri
     num += 1.0;
   }
   if (num > 0.0) report.nis_per_dof = sum_nis / (2.0 * num);
-  if (!truth.t_s.empty()) add_errors(report, counts, truth, track_bound(sights, heads, used, truth));
+  if (!truth.t_s.empty()) {
+    add_errors(report, counts, truth, track_bound(sights, heads, used, truth));
+    add_smoothed_error(report, counts, truth);
+  }
   return report;
 }
 
@@ -202,7 +232,7 @@ std::vector<double> track_bound(std::span<const TargetSight> sights, std::span<c
     if (position && sight.head < heads.size()) {
       const RigHead& head = heads[sight.head];
       const double own = head.head.encoder.sigma_rad;
-      const SightModel see(head, sight.pan_tilt_rad, config.tracker.sigma_px,
+      const SightModel see(head, sight.pan_tilt_rad, sigma_px_of(sight, config.tracker.sigma_px),
                            own > 0.0 ? own : config.tracker.sigma_encoder_rad);
       belief.x.head<3>() = *position;
       if (const auto seen = see(*position)) {

@@ -27,10 +27,11 @@ struct TrackConfig {
   TrackerConfig tracker;
   bool find_sigma_a = true;  ///< Take the σ_a that makes the innovations most probable, not the tracker's.
   double predict_s = 0.0;    ///< Above 0: a prediction so far ahead of each step.
+  double smooth_s = 0.0;     ///< Above 0: also what the sights until so long after tell of each moment; not for imm.
   double warm_up_s = 0.5;    ///< After the start of a track: not counted in errors and statistics.
 };
 
-/// Where the target will be.
+/// Where the target will be, or was.
 struct PredictedStep {
   double t_s = 0.0;
   bool has_belief = false;
@@ -41,14 +42,16 @@ struct PredictedStep {
 struct TrackReport {
   double sigma_a_m_s2 = 0.0;
   bool sigma_a_is_found = false;
-  std::vector<TrackStep> steps;      ///< One a sight, in their order.
-  std::vector<PredictedStep> ahead;  ///< One a step, or none.
+  std::vector<TrackStep> steps;         ///< One a sight, in their order.
+  std::vector<PredictedStep> ahead;     ///< One a step, or none.
+  std::vector<PredictedStep> smoothed;  ///< In order of time, one a capture time that was told of; else none.
   std::size_t num_used = 0, num_starts = 0, num_restarts = 0;
   double log_likelihood = 0.0;  ///< Of all innovations, but for a constant.
   /// With truth, after the warm-up; NaN without.
   double rms_m = std::numeric_limits<double>::quiet_NaN();
   double mean_error_m = std::numeric_limits<double>::quiet_NaN();
   double nees_per_dof = std::numeric_limits<double>::quiet_NaN();
+  double smoothed_rms_m = std::numeric_limits<double>::quiet_NaN();
   double pcrlb_m = std::numeric_limits<double>::quiet_NaN();
   double nis_per_dof = std::numeric_limits<double>::quiet_NaN();  ///< Of the used sights; gated ones count at the gate.
   std::vector<double> nees;                                       ///< One a step; NaN where there is no truth.

@@ -171,7 +171,7 @@ class TrackEngine {
 
   /// Updates with the sight, where the gates let it: then `none`.
   TrackEvent use(Entry& now, TrackStep& step) const {
-    const SightModel see(heads_[now.sight.head], now.sight.pan_tilt_rad, config_.sigma_px,
+    const SightModel see(heads_[now.sight.head], now.sight.pan_tilt_rad, sigma_px_of(now.sight, config_.sigma_px),
                          sigma_encoder(now.sight.head));
     const Eigen::Vector3d position = now.filter.position();
     if (!is_in_range(see.depth_m(position))) return TrackEvent::depth;

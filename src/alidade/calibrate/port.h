@@ -1,0 +1,29 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "alidade/calibrate/config.h"
+#include "alidade/camera/port_residual.h"
+
+namespace alidade {
+
+/// What is known of a camera behind a flat port before its photos in water.
+struct PortKnowledge {
+  std::optional<Camera>
+      air;              ///< The lens as calibrated in air (pinhole or brown), held. None: it is estimated as well.
+  double gap_m = 0.02;  ///< A start.
+  double glass_m = 0.0, n_glass = 1.5, n_water = 1.34;  ///< Held: the photos hardly tell them from the gap.
+};
+
+/// `config` for the model flat_port: gap and normal estimated, the rest held as `port` says. Parameters that `config`
+/// fixes and its priors stand. The air lens must be a pinhole or a brown.
+[[nodiscard]] CalibrateConfig with_port(CalibrateConfig config, const PortKnowledge& port);
+
+/// Largest σ with which a parameter still counts as told; infinity where any will do (distortion).
+[[nodiscard]] double largest_told_sigma(const std::string& name, double value, const Camera& camera);
+
+/// "Brown … errs by 0.29 / 0.12 / 0.00 / 0.08 px at 0.3 / 0.5 / 1 / 3 m: it is enough from 0.5 m on", or not.
+[[nodiscard]] std::string port_sentence(const PortResidual& residual);
+
+}  // namespace alidade

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+
+#include "alidade/pantilt/head.h"
+
+namespace cv {
+class Mat;
+}
+
+namespace alidade {
+
+/// A target that a head's camera films: a ball of one colour, or a square card with a picture on it.
+struct FilmedTarget {
+  Eigen::Vector3d rgb{230.0, 70.0, 20.0};  ///< Of the ball.
+  double radius_m = 0.02;                  ///< Of the ball; half the side of the card.
+  const cv::Mat* card = nullptr;           ///< 8-bit grey; none: a ball. It stands upright and faces −z of the world.
+};
+
+struct TargetVideoConfig {
+  double blur_px = 0.6;  ///< σ of the optical blur.
+  double noise = 2.0;    ///< σ of a colour value's noise, of 255.
+};
+
+/// What the head's camera sees, 8-bit BGR: soft grey clouds that stand still far away, and the target's centre at that
+/// place of the world, none where it is hidden. Rays through the lens, 3 × 3 a pixel. `seed` draws the noise.
+[[nodiscard]] cv::Mat render_target_frame(const RigHead& rig_head, const Eigen::Vector2d& pan_tilt_rad,
+                                          const std::optional<Eigen::Vector3d>& target_in_world,
+                                          const FilmedTarget& target, const TargetVideoConfig& config,
+                                          std::uint64_t seed);
+
+}  // namespace alidade

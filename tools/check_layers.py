@@ -6,7 +6,8 @@ import sys
 
 FOUNDATIONS = {"geometry", "estimation"}
 SENSORS = {"camera", "pantilt", "beam", "board", "imaging"}
-ESTIMATORS = {"calibrate", "observe", "rangefinder", "rig", "track"}
+ESTIMATORS = {"calibrate", "observe", "rangefinder", "rig", "servo", "track"}
+COMPOSITIONS = {"loop"}  # put estimators and the simulator together
 
 MAY_INCLUDE = {
     "geometry": set(),
@@ -18,9 +19,10 @@ MAY_INCLUDE = {
     "imaging": FOUNDATIONS | {"camera", "board"},
     "simulate": FOUNDATIONS | SENSORS,
     **{estimator: FOUNDATIONS | SENSORS for estimator in ESTIMATORS},
-    "report": FOUNDATIONS | SENSORS | ESTIMATORS | {"simulate"},
-    "io": FOUNDATIONS | SENSORS | ESTIMATORS | {"simulate", "report"},
-    "testing": FOUNDATIONS | SENSORS | ESTIMATORS | {"simulate", "report", "io"},
+    **{composition: FOUNDATIONS | SENSORS | ESTIMATORS | {"simulate"} for composition in COMPOSITIONS},
+    "report": FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate"},
+    "io": FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate", "report"},
+    "testing": FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate", "report", "io"},
 }
 TESTS_MAY_ALSO = {"testing", "simulate", "io"}
 INCLUDE = re.compile(r'#include "alidade/(\w+)/')

@@ -17,10 +17,7 @@ using Eigen::Vector3d;
 const Vector3d circle_start(0.173, -0.314, 0.636);
 
 std::function<Vector3d(double)> circle(double radius_m, double period_s) {
-  return [=](double t_s) {
-    const double angle = 2.0 * std::numbers::pi * t_s / period_s;
-    return Vector3d(circle_start + radius_m * Vector3d(std::cos(angle) - 1.0, std::sin(angle), 0.0));
-  };
+  return [=](double t_s) { return Vector3d(circle_start + circle_offset(radius_m, period_s, t_s)); };
 }
 
 /// The paper's heads as they would be built: axes that do not meet, bases and cameras a few degrees askew.
@@ -85,10 +82,6 @@ bool is_hidden(const TrackScene& scene, std::size_t head, double t_s) {
   });
 }
 
-bool is_in_picture(const Camera& camera, const Vector2d& px) {
-  return px.x() >= -0.5 && px.y() >= -0.5 && px.x() <= camera.width_px - 0.5 && px.y() <= camera.height_px - 0.5;
-}
-
 void add_sights(const TrackScene& scene, std::size_t head, std::uint64_t seed, std::vector<SimulatedSight>& sights) {
   Draws draws(2 * seed + 1000003 * head);
   Follower follower(scene, head);
@@ -118,6 +111,15 @@ TrackScene scene_named(std::string name) {
 }
 
 }  // namespace
+
+Eigen::Vector3d circle_offset(double radius_m, double period_s, double t_s) {
+  const double angle = 2.0 * std::numbers::pi * t_s / period_s;
+  return radius_m * Vector3d(std::cos(angle) - 1.0, std::sin(angle), 0.0);
+}
+
+bool is_in_picture(const Camera& camera, const Eigen::Vector2d& px) {
+  return px.x() >= -0.5 && px.y() >= -0.5 && px.x() <= camera.width_px - 0.5 && px.y() <= camera.height_px - 0.5;
+}
 
 Eigen::Vector3d manoeuvre_position(double t_s) {
   Vector3d position(0.2, -0.2, 3.0), velocity(1.5, 0.0, 0.0);

@@ -49,6 +49,11 @@ struct SimulatedSight {
 [[nodiscard]] std::optional<TrackScene> track_scenario(std::string_view name);
 [[nodiscard]] std::vector<std::string> track_scenarios();
 
+/// From the start of a circle in a plane of constant z, which begins at +x of its middle.
+[[nodiscard]] Eigen::Vector3d circle_offset(double radius_m, double period_s, double t_s);
+
+[[nodiscard]] bool is_in_picture(const Camera& camera, const Eigen::Vector2d& px);
+
 /// The manoeuvre of scenario C: 11 s between 0.9 and 3.9 m, up to 1.5 m/s and 6 m/s².
 [[nodiscard]] Eigen::Vector3d manoeuvre_position(double t_s);
 

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "alidade/estimation/progress.h"
+#include "alidade/servo/head_servo.h"
+#include "alidade/simulate/servo.h"
+
+namespace alidade {
+
+/// How the heads really are, as factors on what is known of them.
+struct PlantMismatch {
+  double gain = 1.0, tau = 1.0;
+};
+
+/// The closed loop of one target, two heads or more, and a controller on each. Pictures are taken, encoders read and
+/// commands sent each period; a picture is known `latency_s` after it was taken.
+struct ServoScene {
+  std::vector<RigHead> heads;       ///< Their encoders' σ is that of the readings.
+  std::array<ServoAxis, 2> axes{};  ///< (pan, tilt) of every head, as known.
+  PlantMismatch mismatch;
+  TargetPath path;
+  double duration_s = 12.0;
+  double warm_up_s = 2.0;  ///< Not counted in the figures.
+  double period_s = 0.05;
+  double latency_s = 0.0;
+  double sigma_px = 0.5;
+  double sigma_encoder_rad = 0.0008726646259971648;
+  double encoder_step_rad = 0.0;
+  std::vector<std::pair<double, double>> hidden_s;  ///< From, to: no head sees the target.
+};
+
+/// The preset of C5: the rig, plant, target and noise of Xiahou, Chen & Wu, 2015.
+[[nodiscard]] ServoScene xiahou_servo_scene();
+
+/// One head at one period.
+struct ServoRow {
+  double t_s = 0.0;
+  std::size_t head = 0;
+  Eigen::Vector2d command, asked_rad, measured_rad, predicted_rad, rate_rad_s, sigma_predicted_px;
+  bool has_prediction = false;
+  Eigen::Vector2d error_px;  ///< True image of the target − middle of the picture; NaN behind the camera.
+  bool is_in_picture = false;
+  ServoEvent event = ServoEvent::none;
+};
+
+/// Figures of one run, or of several put together. Errors are distances |(u, v) − middle| at the periods, all heads.
+struct ServoFigures {
+  double rms_px = 0.0;
+  double p95_px = 0.0;
+  double max_px = 0.0;
+  double central_third = 0.0;  ///< Share within the middle third in both directions.
+  double in_picture = 0.0;     ///< Share.
+  std::size_t num_lost = 0;    ///< How often a target that had been followed was lost…
+  std::size_t num_found = 0;   ///< …and found again.
+  double search_s = 0.0;       ///< Time spent searching, all heads.
+};
+
+struct ServoRun {
+  std::vector<ServoRow> rows;  ///< In order of time, heads in order.
+  ServoFigures figures;
+};
+
+/// One run of a controller. `config.axes` and `period_s` are the scene's.
+[[nodiscard]] ServoRun run_servo(const ServoScene& scene, const ServoConfig& config, std::uint64_t seed);
+
+/// RMS of all runs, median of the runs' maxima, means of the shares, sums of the counts.
+[[nodiscard]] ServoFigures put_together(const std::vector<ServoFigures>& runs);
+
+/// RMS over factors on gain and time constant, gain by gain: rms_px[gain · num_tau + tau].
+struct ServoRobustness {
+  std::vector<double> gain_factors, tau_factors;
+  std::vector<double> rms_px;
+};
+[[nodiscard]] ServoRobustness servo_robustness(const ServoScene& scene, const ServoConfig& config,
+                                               std::vector<double> gain_factors, std::vector<double> tau_factors,
+                                               std::uint64_t seed, const Progress& progress = {});
+
+}  // namespace alidade

@@ -1,0 +1,96 @@
+#include "alidade/pantilt/servo_plant.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace alidade {
+namespace {
+
+AxisMotion advanced(const AnglePlant& plant, const AxisMotion& motion, double command, double dt_s) {
+  const double goal = plant.gain_rad() * command;
+  const double angle = goal + std::exp(-dt_s / plant.tau_s) * (motion.angle_rad - goal);
+  return {angle, dt_s > 0.0 ? (angle - motion.angle_rad) / dt_s : motion.rate_rad_s};
+}
+
+/// Two phases: as hard as it can until the lag asks for less, then the lag.
+AxisMotion advanced(const RatePlant& plant, const AxisMotion& motion, double command, double dt_s) {
+  const double goal = std::clamp(plant.gain_rad() * command, -plant.max_rate_rad_s, plant.max_rate_rad_s);
+  const double missing = goal - motion.rate_rad_s;
+  const double reach = plant.tau_s * plant.max_acceleration_rad_s2;  // a smaller gap is closed by the lag alone
+  const double hard_s = std::min(dt_s, std::max(0.0, (std::abs(missing) - reach) / plant.max_acceleration_rad_s2));
+  const double acceleration = std::copysign(plant.max_acceleration_rad_s2, missing);
+  AxisMotion next{motion.angle_rad + (motion.rate_rad_s + 0.5 * acceleration * hard_s) * hard_s,
+                  motion.rate_rad_s + acceleration * hard_s};
+  const double lag_s = dt_s - hard_s, decay = std::exp(-lag_s / plant.tau_s), gap = next.rate_rad_s - goal;
+  next.angle_rad += goal * lag_s + gap * plant.tau_s * (1.0 - decay);
+  next.rate_rad_s = goal + gap * decay;
+  return next;
+}
+
+}  // namespace
+
+double radians_in(AngleUnit unit) { return unit == AngleUnit::deg ? std::numbers::pi / 180.0 : 1.0; }
+
+std::string_view unit_name(AngleUnit unit) { return unit == AngleUnit::deg ? "deg" : "rad"; }
+
+std::optional<AngleUnit> unit_named(std::string_view name) {
+  for (const AngleUnit unit : {AngleUnit::deg, AngleUnit::rad})
+    if (unit_name(unit) == name) return unit;
+  return std::nullopt;
+}
+
+AxisMotion advanced(const ServoAxis& axis, const AxisMotion& motion, double command, double dt_s) {
+  AxisMotion next = std::visit([&](const auto& plant) { return advanced(plant, motion, command, dt_s); }, axis.plant);
+  if (next.angle_rad < axis.min_rad || next.angle_rad > axis.max_rad)
+    next = {std::clamp(next.angle_rad, axis.min_rad, axis.max_rad), 0.0};
+  return next;
+}
+
+double tau_of(const ServoPlant& plant) {
+  return std::visit([](const auto& p) { return p.tau_s; }, plant);
+}
+
+double gain_of(const ServoPlant& plant) {
+  return std::visit([](const auto& p) { return p.gain_rad(); }, plant);
+}
+
+ServoPlant scaled(const ServoPlant& plant, double gain_factor, double tau_factor) {
+  ServoPlant result = plant;
+  std::visit(
+      [&](auto& p) {
+        p.gain *= gain_factor;
+        p.tau_s *= tau_factor;
+      },
+      result);
+  return result;
+}
+
+void DelayedAxis::send(double command) {
+  if (axis_.command_delay_s <= 0.0) {
+    command_ = command;
+    return;
+  }
+  if (num_waiting_ == waiting_.size()) {
+    command_ = waiting_[0].command;
+    std::copy(waiting_.begin() + 1, waiting_.end(), waiting_.begin());
+    --num_waiting_;
+  }
+  waiting_[num_waiting_++] = {axis_.command_delay_s, command};
+}
+
+void DelayedAxis::advance(double dt_s, double added) {
+  std::size_t num_done = 0;
+  double now_s = 0.0;
+  for (; num_done < num_waiting_ && waiting_[num_done].in_s <= dt_s; ++num_done) {
+    motion_ = advanced(axis_, motion_, command_ + added, waiting_[num_done].in_s - now_s);
+    now_s = waiting_[num_done].in_s;
+    command_ = waiting_[num_done].command;
+  }
+  motion_ = advanced(axis_, motion_, command_ + added, dt_s - now_s);
+  num_waiting_ -= num_done;
+  for (std::size_t i = 0; i < num_waiting_; ++i)
+    waiting_[i] = {waiting_[i + num_done].in_s - dt_s, waiting_[i + num_done].command};
+}
+
+}  // namespace alidade

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <string_view>
+#include <variant>
+
+// How one axis of a head follows its command; docs/maths/servo.md. Angles inside are radians; the gain of a plant
+// speaks of the unit that stands beside it, because a gain without its unit has been misread before.
+
+namespace alidade {
+
+enum class AngleUnit { deg, rad };
+[[nodiscard]] double radians_in(AngleUnit unit);  ///< π/180, or 1.
+[[nodiscard]] std::string_view unit_name(AngleUnit unit);
+[[nodiscard]] std::optional<AngleUnit> unit_named(std::string_view name);
+
+/// An axis whose angle follows the command with a first-order lag: τ dθ = g u − θ.
+struct AnglePlant {
+  double gain = 0.0567;  ///< Angle per unit of command, in `unit`. Xiahou, Chen & Wu, 2015: 0.0567 / (0.1 s + 1).
+  AngleUnit unit = AngleUnit::deg;
+  double tau_s = 0.1;
+
+  [[nodiscard]] double gain_rad() const { return gain * radians_in(unit); }
+  bool operator==(const AnglePlant&) const = default;
+};
+
+/// An axis whose rate follows the command with a first-order lag, no faster and no harder than it can:
+/// dθ = ω, dω = (clamp(g u, ±max_rate) − ω) / τ within ±max_acceleration.
+struct RatePlant {
+  double gain = 1.0;  ///< Rate per unit of command, in `unit` per second.
+  AngleUnit unit = AngleUnit::rad;
+  double tau_s = 0.05;
+  double max_rate_rad_s = 3.141592653589793;           ///< 180°/s
+  double max_acceleration_rad_s2 = 26.17993877991494;  ///< 1500°/s²
+
+  [[nodiscard]] double gain_rad() const { return gain * radians_in(unit); }
+  bool operator==(const RatePlant&) const = default;
+};
+
+using ServoPlant = std::variant<AnglePlant, RatePlant>;
+
+/// One axis of a head: how it moves, where it stops, how late it obeys.
+struct ServoAxis {
+  ServoPlant plant;
+  double min_rad = -std::numeric_limits<double>::infinity();
+  double max_rad = std::numeric_limits<double>::infinity();
+  double command_delay_s = 0.0;  ///< From a command to its first effect.
+  bool operator==(const ServoAxis&) const = default;
+};
+
+struct AxisMotion {
+  double angle_rad = 0.0;
+  double rate_rad_s = 0.0;  ///< Of an angle plant: mean over the last step.
+};
+
+/// The axis dt ≥ 0 later under a command that is held and acts at once. Closed form, exact for any dt; at a stop the
+/// axis stands still.
+[[nodiscard]] AxisMotion advanced(const ServoAxis& axis, const AxisMotion& motion, double command, double dt_s);
+
+[[nodiscard]] double tau_of(const ServoPlant& plant);
+/// Angle (or rate) per unit of command. [rad, rad/s]
+[[nodiscard]] double gain_of(const ServoPlant& plant);
+/// The same plant with gain and time constant multiplied: what it really is where it is not as known.
+[[nodiscard]] ServoPlant scaled(const ServoPlant& plant, double gain_factor, double tau_factor);
+
+/// An axis whose commands act late: those that are on their way wait in their order. Allocates nothing.
+class DelayedAxis {
+ public:
+  DelayedAxis(const ServoAxis& axis, const AxisMotion& motion) : axis_(axis), motion_(motion) {}
+
+  /// From now on, after the axis's delay, this command. Of more than 32 on their way the oldest acts at once.
+  void send(double command);
+  /// `added` is added to every command meanwhile.
+  void advance(double dt_s, double added = 0.0);
+  [[nodiscard]] const AxisMotion& motion() const { return motion_; }
+  void set_motion(const AxisMotion& motion) { motion_ = motion; }
+  [[nodiscard]] const ServoAxis& axis() const { return axis_; }
+
+ private:
+  struct Waiting {
+    double in_s, command;
+  };
+  ServoAxis axis_;
+  AxisMotion motion_;
+  double command_ = 0.0;  ///< That acts now.
+  std::array<Waiting, 32> waiting_{};
+  std::size_t num_waiting_ = 0;
+};
+
+}  // namespace alidade

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+
+#include "alidade/estimation/belief.h"
+
+namespace alidade {
+
+inline constexpr std::size_t num_agilities = 5;
+
+/// Where a target stands as seen from a head, one axis: angle, rate, acceleration; each of a few Singer models knows
+/// another liveliness of the target, and their past predictions decide how much each is heard.
+struct BearingFilterConfig {
+  double singer_tau_s = 0.4;  ///< For how long an acceleration lasts.
+  /// σ of the target's angular acceleration: 5, 20, 80, 320 and 1280 °/s². One alone: all of them the same.
+  std::array<double, num_agilities> sigma_rad_s2{0.08726646, 0.34906585, 1.3962634, 5.5850536, 22.340214};
+  double memory_s = 0.5;          ///< For how long a model's prediction counts.
+  double start_rate_rad_s = 2.0;  ///< σ of the rate that a target may have when first seen.
+  double gate = 30.0;             ///< On the squared innovation over its variance, of the mixture.
+  int restart_after = 2;          ///< Sights beyond the gate, one after the other: the target has jumped.
+};
+
+struct Bearing {
+  double angle_rad = 0.0, rate_rad_s = 0.0, acceleration_rad_s2 = 0.0;
+  double sigma_rad = 0.0;  ///< Of the angle.
+};
+
+/// The same dt ≥ 0 later, its acceleration decaying; σ is kept.
+[[nodiscard]] Bearing ahead(const Bearing& bearing, double singer_tau_s, double dt_s);
+
+/// One axis of the filter. R. A. Singer, 1970; static multiple models: D. T. Magill, "Optimal adaptive estimation of
+/// sampled stochastic processes", 1965, with fading memory. Allocates nothing.
+class BearingAxis {
+ public:
+  explicit BearingAxis(const BearingFilterConfig& config) : config_(config) {}
+
+  void start(double t_s, double angle_rad, double variance_rad2);
+  /// Squared innovation over its variance, by the mixture. The variance is that of a sight `usual_gap_s` after the
+  /// last: waiting makes no jump believable.
+  [[nodiscard]] double surprise(double t_s, double angle_rad, double variance_rad2, double usual_gap_s) const;
+  void update(double t_s, double angle_rad, double variance_rad2);
+  /// The mixture at a time not before the last sight.
+  [[nodiscard]] Bearing at(double t_s) const;
+  /// How much each model is heard.
+  [[nodiscard]] const std::array<double, num_agilities>& weights() const { return weights_; }
+
+ private:
+  BearingFilterConfig config_;
+  std::array<Belief<3>, num_agilities> beliefs_{};
+  std::array<double, num_agilities> log_weights_{}, weights_{};
+  double t_s_ = 0.0;
+};
+
+enum class SightUse { used, started, gated, restarted, late };
+
+/// Both axes of a head: bearings as (pan, tilt) at which the head would point at the target.
+class BearingFilter {
+ public:
+  explicit BearingFilter(const BearingFilterConfig& config)
+      : config_(config), axes_{BearingAxis(config), BearingAxis(config)} {}
+
+  /// A bearing at its capture time, both axes with this σ. Sights older than the last one are left out.
+  SightUse take(double t_capture_s, const Eigen::Vector2d& bearing_rad, double sigma_rad);
+  [[nodiscard]] bool has_started() const { return has_started_; }
+  [[nodiscard]] double newest_s() const { return newest_s_; }
+  [[nodiscard]] std::array<Bearing, 2> at(double t_s) const { return {axes_[0].at(t_s), axes_[1].at(t_s)}; }
+  void forget() { has_started_ = false; }
+
+ private:
+  SightUse begin(double t_s, const Eigen::Vector2d& bearing_rad, double variance, SightUse as);
+
+  BearingFilterConfig config_;
+  std::array<BearingAxis, 2> axes_;
+  bool has_started_ = false;
+  int num_gated_ = 0;
+  double newest_s_ = 0.0, usual_gap_s_ = 0.0;
+};
+
+}  // namespace alidade

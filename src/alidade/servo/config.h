@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string_view>
+
+#include "alidade/pantilt/servo_plant.h"
+#include "alidade/servo/bearing_filter.h"
+#include "alidade/servo/loop_analysis.h"
+
+namespace alidade {
+
+enum class ControllerKind { pi, feedforward, lqr, mpc };
+inline constexpr std::array controller_kinds{ControllerKind::pi, ControllerKind::feedforward, ControllerKind::lqr,
+                                             ControllerKind::mpc};
+[[nodiscard]] std::string_view controller_name(ControllerKind kind);  ///< pi, feedforward, lqr, mpc
+[[nodiscard]] std::optional<ControllerKind> controller_named(std::string_view name);
+
+/// What to do where the target is not seen: first go on as it went, then look round where it should be.
+struct SearchConfig {
+  bool enabled = true;
+  double coast_s = 0.3;         ///< Without a sight for so long the target counts as lost.
+  double carry_s = 0.5;         ///< The lost target's rate is believed to decay in this time.
+  double speed_rad_s = 1.0;     ///< Of the view along the spiral.
+  double turn_of_view = 0.7;    ///< From one turn of the spiral to the next, in heights of the picture.
+  double max_radius_rad = 0.8;  ///< Then from the middle again.
+};
+
+/// A controller of one head, both axes alike.
+struct ServoConfig {
+  ControllerKind controller = ControllerKind::feedforward;
+  double period_s = 0.05;
+  std::array<ServoAxis, 2> axes{};  ///< (pan, tilt) as they are known.
+  PiGains pi;                       ///< `pi`, and what corrects `feedforward` on an angle plant.
+  double rate_gain_per_s = 8.0;     ///< `feedforward` on a rate plant: rate per angle of error.
+  double command_weight = 2.0;      ///< `lqr` and `mpc`: what effort costs beside error.
+  double sigma_px = 0.5;            ///< Of the target's pixel coordinate.
+  double sigma_encoder_rad = 0.0008726646259971648;
+  double range_m = 1.0;  ///< Of the target, about: matters only where a head's axes do not meet.
+  BearingFilterConfig filter;
+  SearchConfig search;
+};
+
+}  // namespace alidade

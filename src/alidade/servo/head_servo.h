@@ -1,0 +1,73 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <string_view>
+
+#include "alidade/pantilt/head.h"
+#include "alidade/servo/axis_controller.h"
+#include "alidade/servo/search.h"
+
+namespace alidade {
+
+/// Where the target stood in a picture, and what the encoders read when it was taken.
+struct HeadSight {
+  double t_capture_s = 0.0;
+  Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+};
+
+struct HeadServoInput {
+  double t_s = 0.0;
+  Eigen::Vector2d encoder_rad = Eigen::Vector2d::Zero();  ///< (pan, tilt) now.
+  bool has_picture = false;                               ///< Whether a picture arrived since the last step…
+  std::optional<HeadSight> sight;                         ///< …and where the target is in it, if it is.
+};
+
+enum class ServoEvent { none, waiting, started, gated, jumped, lost, searching, found };
+[[nodiscard]] std::string_view servo_event_name(ServoEvent event);
+
+struct HeadServoOutput {
+  Eigen::Vector2d command = Eigen::Vector2d::Zero();        ///< (pan, tilt), in the plants' units of command.
+  Eigen::Vector2d asked_rad = Eigen::Vector2d::Zero();      ///< Where the head should point when the command acts.
+  Eigen::Vector2d predicted_rad = Eigen::Vector2d::Zero();  ///< Where the target is believed to be now.
+  Eigen::Vector2d sigma_rad = Eigen::Vector2d::Zero();
+  bool has_prediction = false;
+  ServoEvent event = ServoEvent::waiting;
+};
+
+/// Keeps the target in the middle of one head's picture: late pictures and present encoder readings in, commands out,
+/// once a period. What it holds is made at the start; a step allocates nothing. docs/maths/servo.md
+class HeadServo {
+ public:
+  HeadServo(const RigHead& head, const ServoConfig& config);
+
+  HeadServoOutput step(const HeadServoInput& input);
+  /// Readings at which the head would have a pixel's ray in the middle of its picture: the measured bearing. None where
+  /// the lens has no ray there.
+  [[nodiscard]] std::optional<Eigen::Vector2d> bearing_of(const HeadSight& sight) const;
+
+ private:
+  SightUse take(const HeadSight& sight);
+  ServoEvent follow(const HeadServoInput& input);
+  void ask_for_target(double t_effect_s, std::array<AxisInput, 2>& inputs) const;
+  void ask_for_search(double t_effect_s, std::array<AxisInput, 2>& inputs) const;
+
+  RigHead head_;
+  ServoConfig config_;
+  Eigen::Vector2d centre_px_;
+  double focal_px_, sigma_bearing_rad_;
+  BearingFilter filter_;
+  TargetSearch search_;
+  std::array<AxisController, 2> axes_;
+  Eigen::Vector2d error_rad_ = Eigen::Vector2d::Zero();
+  double last_seen_s_ = 0.0;
+  bool is_lost_ = false;
+};
+
+/// Where the optical axis meets the picture, and the focal length (mean of both). [px]
+[[nodiscard]] Eigen::Vector2d centre_of(const Camera& camera);
+[[nodiscard]] double focal_of(const Camera& camera);
+
+}  // namespace alidade

@@ -1,0 +1,113 @@
+#include "alidade/simulate/servo.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "alidade/simulate/track.h"
+
+namespace alidade {
+namespace {
+
+constexpr std::array<std::string_view, 5> path_names{"still", "circle", "sway", "step", "manoeuvre"};
+
+double rounded_to(double value, double step) { return step > 0.0 ? step * std::round(value / step) : value; }
+
+DelayedAxis standing(const ServoAxis& axis, double angle_rad) {
+  DelayedAxis still(axis, {angle_rad, 0.0});
+  // The command under which it has stood there so far.
+  const double command = std::holds_alternative<AnglePlant>(axis.plant) ? angle_rad / gain_of(axis.plant) : 0.0;
+  still.send(command);
+  if (axis.command_delay_s > 0.0) {
+    still.advance(axis.command_delay_s);
+    still.set_motion({angle_rad, 0.0});
+  }
+  return still;
+}
+
+}  // namespace
+
+std::string_view path_name(PathKind kind) { return path_names[static_cast<std::size_t>(kind)]; }
+
+std::optional<PathKind> path_named(std::string_view name) {
+  for (std::size_t i = 0; i < path_names.size(); ++i)
+    if (path_names[i] == name) return static_cast<PathKind>(i);
+  return std::nullopt;
+}
+
+Eigen::Vector3d TargetPath::at(double t_s) const {
+  const double angle = 2.0 * std::numbers::pi * t_s / period_s;
+  switch (kind) {
+    case PathKind::circle:
+      return start_m + circle_offset(radius_m, period_s, t_s);
+    case PathKind::sway:
+      return start_m + Eigen::Vector3d(radius_m * std::sin(angle), 0.0, 0.0);
+    case PathKind::step:
+      return t_s < jump_at_s ? start_m : Eigen::Vector3d(start_m + jump_m);
+    case PathKind::manoeuvre:
+      return manoeuvre_position(t_s);
+    case PathKind::still:
+      break;
+  }
+  return start_m;
+}
+
+SimulatedHead::SimulatedHead(const HeadTruth& truth, const Eigen::Vector2d& pan_tilt_rad, std::uint64_t seed)
+    : truth_(truth),
+      axes_{standing(truth.axes[0], pan_tilt_rad.x()), standing(truth.axes[1], pan_tilt_rad.y())},
+      draws_(seed) {}
+
+void SimulatedHead::send(const Eigen::Vector2d& command) {
+  axes_[0].send(command.x());
+  axes_[1].send(command.y());
+}
+
+void SimulatedHead::advance(double dt_s) {
+  for (DelayedAxis& axis : axes_) axis.advance(dt_s);
+}
+
+Eigen::Vector2d SimulatedHead::angles_rad() const { return {axes_[0].motion().angle_rad, axes_[1].motion().angle_rad}; }
+
+Eigen::Vector2d SimulatedHead::rates_rad_s() const {
+  return {axes_[0].motion().rate_rad_s, axes_[1].motion().rate_rad_s};
+}
+
+Eigen::Vector2d SimulatedHead::read_encoders() {
+  const Eigen::Vector2d noisy = angles_rad() + truth_.sigma_encoder_rad * draws_.normal2();
+  return {rounded_to(noisy.x(), truth_.encoder_step_rad), rounded_to(noisy.y(), truth_.encoder_step_rad)};
+}
+
+std::optional<Eigen::Vector2d> SimulatedHead::true_pixel(const Eigen::Vector3d& target_in_world) const {
+  const auto seen = project(truth_.head, angles_rad(), target_in_world);
+  if (!seen) return std::nullopt;
+  return seen->px;
+}
+
+std::optional<Eigen::Vector2d> SimulatedHead::seen_pixel(const Eigen::Vector3d& target_in_world) {
+  const Eigen::Vector2d noise_px = truth_.sigma_px * draws_.normal2();  // drawn always: what is hidden shifts no seed
+  const auto px = true_pixel(target_in_world);
+  if (!px || !is_in_picture(truth_.head.camera, *px + noise_px)) return std::nullopt;
+  return *px + noise_px;
+}
+
+std::vector<ServoLogRow> simulate_servo_log(const ServoLogScene& scene, std::uint64_t seed) {
+  Draws draws(seed);
+  DelayedAxis axis(scene.axis, {});
+  std::vector<ServoLogRow> rows;
+  const int num_rows = static_cast<int>(std::floor(scene.duration_s * scene.rate_hz)) + 1;
+  for (int k = 0; k < num_rows; ++k) {
+    ServoLogRow row;
+    row.t_s = k / scene.rate_hz;
+    const double sweep_hz = scene.low_hz + 0.5 * (scene.high_hz - scene.low_hz) * row.t_s / scene.duration_s;
+    const double wave = scene.is_chirp ? std::sin(2.0 * std::numbers::pi * sweep_hz * row.t_s)
+                                       : (row.t_s >= scene.step_at_s ? 1.0 : 0.0);
+    row.command = scene.amplitude * wave;
+    row.angle_rad =
+        rounded_to(scene.zero_rad + axis.motion().angle_rad + scene.sigma_rad * draws.normal(), scene.encoder_step_rad);
+    rows.push_back(row);
+    axis.send(row.command);
+    axis.advance(1.0 / scene.rate_hz);
+  }
+  return rows;
+}
+
+}  // namespace alidade

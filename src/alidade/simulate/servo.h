@@ -1,0 +1,80 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "alidade/pantilt/head.h"
+#include "alidade/pantilt/servo_plant.h"
+#include "alidade/simulate/draws.h"
+
+namespace alidade {
+
+enum class PathKind { still, circle, sway, step, manoeuvre };
+[[nodiscard]] std::string_view path_name(PathKind kind);  ///< still, circle, sway, step, manoeuvre
+[[nodiscard]] std::optional<PathKind> path_named(std::string_view name);
+
+/// Where a target goes. A circle lies in a plane of constant z and begins at `start`, its middle at −x of it; a sway is
+/// sideways about `start`; a step leaves `start` for good at a time; the manoeuvre is manoeuvre_position().
+struct TargetPath {
+  PathKind kind = PathKind::circle;
+  Eigen::Vector3d start_m{0.173, -0.314, 0.636};  ///< In the world: the start of Xiahou, Chen & Wu, 2015.
+  double radius_m = 0.1;                          ///< Also the amplitude of a sway.
+  double period_s = 10.0;
+  Eigen::Vector3d jump_m{0.25, 0.12, 0.0};
+  double jump_at_s = 1.0;
+
+  [[nodiscard]] Eigen::Vector3d at(double t_s) const;
+};
+
+/// A head as it is: two axes that obey late and never quite as known, encoders that round and err, a camera with noise
+/// on the target's pixel.
+struct HeadTruth {
+  RigHead head;
+  std::array<ServoAxis, 2> axes{};  ///< (pan, tilt)
+  double encoder_step_rad = 0.0;    ///< Of one count; 0: none.
+  double sigma_encoder_rad = 0.0008726646259971648;
+  double sigma_px = 0.5;
+};
+
+/// It moves. Same seed, same noise. Allocates nothing once made.
+class SimulatedHead {
+ public:
+  SimulatedHead(const HeadTruth& truth, const Eigen::Vector2d& pan_tilt_rad, std::uint64_t seed);
+
+  void send(const Eigen::Vector2d& command);
+  void advance(double dt_s);
+  [[nodiscard]] Eigen::Vector2d read_encoders();
+  /// Where the target is in the picture taken now: without noise, anywhere in front of the camera.
+  [[nodiscard]] std::optional<Eigen::Vector2d> true_pixel(const Eigen::Vector3d& target_in_world) const;
+  /// The same with noise, where it is within the picture.
+  [[nodiscard]] std::optional<Eigen::Vector2d> seen_pixel(const Eigen::Vector3d& target_in_world);
+  [[nodiscard]] Eigen::Vector2d angles_rad() const;
+  [[nodiscard]] Eigen::Vector2d rates_rad_s() const;
+
+ private:
+  HeadTruth truth_;
+  std::array<DelayedAxis, 2> axes_;
+  Draws draws_;
+};
+
+/// A log as `alidade identify` reads it: one axis under a step or a chirp.
+struct ServoLogScene {
+  ServoAxis axis;
+  bool is_chirp = false;
+  double amplitude = 200.0;  ///< Of the command.
+  double duration_s = 5.0, rate_hz = 100.0;
+  double step_at_s = 0.5;
+  double low_hz = 0.1, high_hz = 3.0;  ///< Of the chirp.
+  double zero_rad = 0.0;               ///< What the encoder reads at angle zero.
+  double sigma_rad = 0.0008726646259971648, encoder_step_rad = 0.0;
+};
+struct ServoLogRow {
+  double t_s = 0.0, command = 0.0, angle_rad = 0.0;
+};
+[[nodiscard]] std::vector<ServoLogRow> simulate_servo_log(const ServoLogScene& scene, std::uint64_t seed);
+
+}  // namespace alidade

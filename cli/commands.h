@@ -6,6 +6,7 @@ class Frame;
 
 void add_calibrate(Frame& frame);
 void add_camera(Frame& frame);
+void add_identify(Frame& frame);
 void add_observe(Frame& frame);
 void add_plan(Frame& frame);
 void add_plan_observe(Frame& frame);      ///< Of `plan`.
@@ -16,6 +17,8 @@ void add_rig(Frame& frame);
 void add_rig_scenario(Frame& frame);          ///< Of `simulate`.
 void add_rangefinder_scenario(Frame& frame);  ///< Of `simulate`.
 void add_rotation_scenario(Frame& frame);     ///< Of `simulate`.
+void add_servo(Frame& frame);
+void add_servo_scenario(Frame& frame);  ///< Of `simulate`.
 void add_simulate(Frame& frame);
 void add_track(Frame& frame);
 void add_track_scenario(Frame& frame);  ///< Of `simulate`.

@@ -6,11 +6,13 @@ namespace {
 void add_commands(alidade::cli::Frame& frame) {
   alidade::cli::add_calibrate(frame);
   alidade::cli::add_camera(frame);
+  alidade::cli::add_identify(frame);
   alidade::cli::add_observe(frame);
   alidade::cli::add_plan(frame);
   alidade::cli::add_project(frame);
   alidade::cli::add_rangefinder(frame);
   alidade::cli::add_rig(frame);
+  alidade::cli::add_servo(frame);
   alidade::cli::add_simulate(frame);
   alidade::cli::add_track(frame);
 }

@@ -64,10 +64,12 @@ Bearing ahead(const Bearing& bearing, double singer_tau_s, double dt_s) {
 void BearingAxis::start(double t_s, double angle_rad, double variance_rad2) {
   t_s_ = t_s;
   for (std::size_t i = 0; i < num_agilities; ++i) {
+    const double sigma = config_.sigma_rad_s2[i];
+    // What a model's accelerations make of a rate in their time; the liveliest may have any.
+    const double rate = i + 1 == num_agilities ? config_.start_rate_rad_s
+                                               : std::min(config_.start_rate_rad_s, sigma * config_.singer_tau_s);
     beliefs_[i].x = {angle_rad, 0.0, 0.0};  // after a jump no rate or acceleration is believed
-    beliefs_[i].P = Eigen::Vector3d(variance_rad2, config_.start_rate_rad_s * config_.start_rate_rad_s,
-                                    config_.sigma_rad_s2[i] * config_.sigma_rad_s2[i])
-                        .asDiagonal();
+    beliefs_[i].P = Eigen::Vector3d(variance_rad2, rate * rate, sigma * sigma).asDiagonal();
   }
   log_weights_.fill(0.0);
   weights_.fill(1.0 / num_agilities);

@@ -1,0 +1,96 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "alidade/io/servo_document.h"
+#include "alidade/io/servo_scenario_file.h"
+#include "cli/commands.h"
+#include "cli/frame.h"
+#include "cli/option_checks.h"
+
+namespace alidade::cli {
+namespace {
+
+struct Args {
+  std::filesystem::path scenario;
+  std::vector<std::string> controllers;
+  int seeds = 0;
+  double latency_ms = -1.0, gain_factor = 0.0, tau_factor = 0.0;
+  bool no_robustness = false;
+};
+
+/// What stands on the command line beats the file.
+ServoScenario with_options(ServoScenario scenario, const Args& args) {
+  if (!args.controllers.empty()) {
+    scenario.controllers.clear();
+    for (const std::string& name : args.controllers) scenario.controllers.push_back(*controller_named(name));
+  }
+  if (args.seeds > 0) scenario.num_seeds = args.seeds;
+  if (args.latency_ms >= 0.0) scenario.scene.latency_s = 1e-3 * args.latency_ms;
+  if (scenario.scene.latency_s > 200.0 * scenario.scene.period_s)
+    throw UsageError("--latency-ms: is more than 200 pictures late");
+  if (args.gain_factor > 0.0) scenario.scene.mismatch.gain = args.gain_factor;
+  if (args.tau_factor > 0.0) scenario.scene.mismatch.tau = args.tau_factor;
+  if (args.no_robustness) scenario.robustness.reset();
+  return scenario;
+}
+
+void summarize(const ServoStudy& study, Run& run) {
+  run.say("controller    RMS px   95 % px   max px   central third   in picture");
+  for (const ServoComparison& compared : study.comparison) {
+    const ServoFigures& figures = compared.figures;
+    run.say(fmt::format("{:<12} {:7.2f} {:9.2f} {:8.2f} {:13.1f} % {:10.1f} %{}", controller_name(compared.controller),
+                        figures.rms_px, figures.p95_px, figures.max_px, 100.0 * figures.central_third,
+                        100.0 * figures.in_picture,
+                        figures.num_lost > 0 ? fmt::format("   lost {}, found {}, {:.1f} s of search", figures.num_lost,
+                                                           figures.num_found, figures.search_s)
+                                             : ""));
+  }
+}
+
+ExitCode servo(const Args& args, Run& run) {
+  run.add_input("scenario", args.scenario);
+  const ServoScenarioFile read = read_servo_scenario(args.scenario);
+  if (!read.rig.empty()) run.add_input("rig", read.rig);
+  const ServoScenario scenario = with_options(read.scenario, args);
+  run.lap("read");
+  const ServoStudy study = study_servo(scenario, run.options.seed, run.progress);
+  run.lap("run");
+  const Verdict verdict = servo_verdict(scenario, study);
+  fill_servo(scenario, study, run.document);
+  summarize(study, run);
+  if (verdict.exit_code == ExitCode::ok) run.add_file("servo.csv", servo_csv(scenario, study));
+  return run.finish(verdict);
+}
+
+}  // namespace
+
+void add_servo(Frame& frame) {
+  auto args = std::make_shared<Args>();
+  CLI::App& command = frame.add_command(
+      {.name = "servo",
+       .summary =
+           "The closed loop of a moving target, two pan-tilt heads and their controllers, compared by pixel error",
+       .examples = "  alidade servo scenario.yaml\n"
+                   "  alidade servo scenario.yaml --controller mpc --latency-ms 100 --seeds 20\n\n"
+                   "scenario.yaml; every key may be left out, these are the values it then has:\n\n" +
+                   servo_scenario_text(),
+       .draws_random_numbers = true},
+      [args](Run& run) { return servo(*args, run); });
+  command.add_option("scenario", args->scenario, "YAML: target, heads, plant, delays, noise, controllers; see below")
+      ->required();
+  command.add_option("--controller", args->controllers, "Only these of pi, feedforward, lqr, mpc")
+      ->check(CLI::IsMember({"pi", "feedforward", "lqr", "mpc"}))
+      ->delimiter(',');
+  command.add_option("--seeds", args->seeds, "Runs of each controller, from --seed on")->check(CLI::Range(1, 1000));
+  command.add_option("--latency-ms", args->latency_ms, "From a picture to its pixel")
+      ->check(finite_number() & CLI::Range(0.0, 10000.0));
+  command.add_option("--true-gain", args->gain_factor, "The plant's gain as it is, over what is known of it")
+      ->check(finite_number() & CLI::Range(0.01, 100.0));
+  command.add_option("--true-tau", args->tau_factor, "The same of its time constant")
+      ->check(finite_number() & CLI::Range(0.01, 100.0));
+  command.add_flag("--no-robustness", args->no_robustness, "Leave out the grid over gain and time constant");
+}
+
+}  // namespace alidade::cli

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+
+#include "alidade/io/result_document.h"
+#include "alidade/loop/servo_study.h"
+
+namespace alidade {
+
+/// Fills counts, estimate, the tables `control` (first trial of the best controller), `trials`, `loops`, and the grid
+/// `robustness` of the document of `alidade servo`; also for a refusal.
+void fill_servo(const ServoScenario& scenario, const ServoStudy& study, ResultDocument& document);
+
+/// Text of servo.csv: the first trial of every controller, a row a head and period.
+[[nodiscard]] std::string servo_csv(const ServoScenario& scenario, const ServoStudy& study);
+
+}  // namespace alidade

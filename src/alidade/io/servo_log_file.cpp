@@ -1,0 +1,107 @@
+#include "alidade/io/servo_log_file.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "alidade/io/table_rows.h"
+#include "alidade/report/thin.h"
+
+namespace alidade {
+namespace {
+
+using Numbers = std::vector<double>;
+
+constexpr double deg = std::numbers::pi / 180.0;
+constexpr std::size_t most_rows = 4000;  // the page holds them
+
+void fill_table(std::span<const ServoSample> log, const ServoIdentification& identified, ResultDocument& document) {
+  Numbers t, command, measured, model, residual;
+  for (const std::size_t at : report::thinned_rows(log.size(), {identified.residual_rad}, {}, most_rows)) {
+    t.push_back(log[at].t_s);
+    command.push_back(log[at].command);
+    measured.push_back(log[at].angle_rad);
+    residual.push_back(identified.residual_rad[at]);
+    model.push_back(log[at].angle_rad + identified.residual_rad[at]);
+  }
+  document.data.push_back({"response",
+                           {{"t_s", t},
+                            {"command", command},
+                            {"measured_rad", rounded(std::move(measured), 7)},
+                            {"model_rad", rounded(std::move(model), 7)},
+                            {"residual_rad", rounded(std::move(residual), 7)}}});
+}
+
+}  // namespace
+
+ServoLogFile read_servo_log(const std::filesystem::path& file, bool skip_bad) {
+  const Csv csv = Csv::read(file);
+  const bool is_deg = csv.has("angle_deg");
+  if (is_deg && csv.has("angle_rad")) throw InputError(csv.name() + ": has both 'angle_rad' and 'angle_deg'");
+  const std::string angle = is_deg ? "angle_deg" : "angle_rad";
+  for (const std::string& name : {std::string("t_s"), std::string("command"), angle})
+    if (!csv.has(name)) throw InputError(csv.name() + ": has no column '" + name + "'; needs t_s,command,angle_rad");
+  ServoLogFile read;
+  for_each_row(csv, skip_bad, read.skipped, [&](std::size_t row) {
+    const ServoSample sample{csv.number(row, "t_s"), csv.number(row, "command"),
+                             csv.number(row, angle) * (is_deg ? deg : 1.0)};
+    if (!read.samples.empty() && !(sample.t_s > read.samples.back().t_s))
+      throw InputError(csv.where(row, "t_s") + ": '" + csv.text(row, "t_s") + "' is not after the row before it");
+    if (!(std::abs(sample.angle_rad) <= 1e4))
+      throw InputError(csv.where(row, angle) + ": '" + csv.text(row, angle) + "' is no angle of a servo");
+    read.samples.push_back(sample);
+  });
+  if (read.samples.empty()) throw InputError(file.string() + ": has no rows");
+  return read;
+}
+
+std::string servo_log_csv(std::span<const ServoSample> samples) {
+  std::string text = "t_s,command,angle_rad\n";
+  for (const ServoSample& sample : samples)
+    text += fmt::format("{:.6f},{:.9g},{:.9f}\n", sample.t_s, sample.command, sample.angle_rad);
+  return text;
+}
+
+std::string servo_plant_text(const ServoFit& fit) {
+  const ServoParams sigma = fit.cov.diagonal().cwiseSqrt();
+  const bool is_angle = fit.kind == ServoKind::angle;
+  return fmt::format(
+      "# {} per unit of command; sigma: gain {:.3g}, tau {:.3g} s, delay {:.3g} s\n"
+      "plant: {{kind: {}, gain: {:.9g}, unit: rad, tau_s: {:.9g}, command_delay_s: {:.9g}}}\n",
+      is_angle ? "rad" : "rad/s", sigma[0], sigma[1], sigma[2], is_angle ? "angle" : "rate", fit.params[0],
+      fit.params[1], fit.params[2]);
+}
+
+void fill_identification(std::span<const ServoSample> log, const ServoIdentification& identified,
+                         ResultDocument& document) {
+  document.counts.given += log.size();
+  document.counts.used = log.size();
+  if (identified.residual_rad.empty()) return;
+  const ServoFit& fit = identified.fit;
+  JsonValue &estimate = document.estimate, &stddev = document.stddev;
+  estimate["kind"] = fit.kind == ServoKind::angle ? "angle" : "rate";
+  const ServoParams sigma = fit.cov.diagonal().cwiseSqrt();
+  const double unknown = std::nan("");
+  const auto put = [&](const char* name, double value, double its_sigma) {
+    estimate[name] = value;
+    stddev[name] = fit.is_observable ? its_sigma : unknown;
+  };
+  put("gain_rad", fit.params[0], sigma[0]);
+  put("gain_deg", fit.params[0] / deg, sigma[0] / deg);
+  put("tau_s", fit.params[1], sigma[1]);
+  put("latency_s", fit.params[2], sigma[2]);
+  put("zero_rad", fit.params[3], sigma[3]);
+  put("start_rad", fit.params[4], sigma[4]);
+  estimate["rms_rad"] = fit.rms_rad;
+  estimate["rms_of_other_kind_rad"] = identified.other.rms_rad;
+  estimate["lag_one_correlation"] = identified.lag_one_correlation;
+  if (fit.is_observable) {
+    document.covariance_names = {"gain_rad", "tau_s", "latency_s", "zero_rad", "start_rad"};
+    for (int i = 0; i < num_servo_params; ++i)
+      for (int j = i; j < num_servo_params; ++j) document.covariance_upper.push_back(fit.cov(i, j));
+  }
+  fill_table(log, identified, document);
+}
+
+}  // namespace alidade

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "alidade/loop/servo_study.h"
+
+namespace alidade {
+
+struct ServoScenarioFile {
+  ServoScenario scenario;
+  std::filesystem::path rig;  ///< As the scenario names it, from its own folder; empty: the preset's.
+};
+
+/// Reads scenario.yaml; what is left out is the preset. Throws InputError: a key that is unknown or no number, a value
+/// that no servo can have.
+[[nodiscard]] ServoScenarioFile read_servo_scenario(const std::filesystem::path& file);
+
+/// Every key with the preset's value: a scenario to begin from.
+[[nodiscard]] std::string servo_scenario_text();
+
+}  // namespace alidade

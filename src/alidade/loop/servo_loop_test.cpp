@@ -1,0 +1,189 @@
+#include "alidade/loop/servo_loop.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "alidade/loop/servo_study.h"
+
+namespace alidade {
+namespace {
+
+ServoFigures figures(const ServoScene& scene, ControllerKind kind, int num_seeds = 8) {
+  ServoConfig config;
+  config.controller = kind;
+  std::vector<ServoFigures> runs;
+  for (int seed = 1; seed <= num_seeds; ++seed)
+    runs.push_back(run_servo(scene, config, static_cast<std::uint64_t>(seed)).figures);
+  return put_together(runs);
+}
+
+struct Circle {
+  double radius_m, period_s;
+};
+constexpr std::array<Circle, 3> circles{{{0.1, 10.0}, {0.2, 3.0}, {0.3, 2.0}}};
+
+ServoScene circling(const Circle& circle, double latency_s, const PlantMismatch& mismatch) {
+  ServoScene scene = xiahou_servo_scene();
+  scene.path.radius_m = circle.radius_m;
+  scene.path.period_s = circle.period_s;
+  scene.latency_s = latency_s;
+  scene.mismatch = mismatch;
+  return scene;
+}
+
+/// PI's RMS over each predictive controller's is at least this, on the three circles.
+void expect_ratios(double latency_s, const PlantMismatch& mismatch, const std::array<double, 3>& least) {
+  for (std::size_t i = 0; i < circles.size(); ++i) {
+    const ServoScene scene = circling(circles[i], latency_s, mismatch);
+    const double pi_px = figures(scene, ControllerKind::pi).rms_px;
+    for (const ControllerKind kind : {ControllerKind::feedforward, ControllerKind::lqr, ControllerKind::mpc}) {
+      const ServoFigures own = figures(scene, kind);
+      EXPECT_GE(pi_px / own.rms_px, least[i]) << controller_name(kind) << " on circle " << i;
+      if (mismatch.gain == 1.0) {
+        EXPECT_EQ(own.central_third, 1.0) << controller_name(kind) << " on circle " << i;
+      }
+      EXPECT_EQ(own.num_lost, 0u);
+    }
+  }
+}
+
+// One setting of the filter for all of them: the figures asked for were reached with one set for each circle.
+TEST(ServoLoop, PredictionBeatsThePapersController) { expect_ratios(0.0, {}, {8.0, 18.0, 15.0}); }
+TEST(ServoLoop, PredictionBeatsItWithLatePictures) { expect_ratios(0.1, {}, {5.0, 8.0, 5.0}); }
+TEST(ServoLoop, PredictionBeatsItOnAPlantThatIsNotAsKnown) {
+  for (const PlantMismatch& mismatch : {PlantMismatch{0.8, 1.3}, PlantMismatch{1.2, 0.7}}) {
+    expect_ratios(0.0, mismatch, {3.5, 3.0, 2.5});
+    expect_ratios(0.1, mismatch, {2.5, 2.7, 2.0});
+  }
+}
+
+/// The paper's loop as an independent simulation found it: 8.6, 43.1 and 74.9 px, of circles whose place was not said.
+TEST(ServoLoop, ThePapersControllerIsAsSlowAsFoundElsewhere) {
+  constexpr std::array<double, 3> elsewhere_px{8.6, 43.1, 74.9};
+  for (std::size_t i = 0; i < circles.size(); ++i)
+    EXPECT_NEAR(figures(circling(circles[i], 0.0, {}), ControllerKind::pi).rms_px, elsewhere_px[i],
+                0.1 * elsewhere_px[i]);
+}
+
+/// 30°/s at the most, pictures 0.1 s late: the paper's controller is off by about 33 px.
+TEST(ServoLoop, SwayOfThirtyDegreesASecond) {
+  ServoScene scene = xiahou_servo_scene();
+  scene.path.kind = PathKind::sway;
+  scene.path.start_m = {0.25, -0.314, 0.636};
+  scene.path.radius_m = 0.19;
+  scene.path.period_s = 3.2;
+  scene.latency_s = 0.1;
+  double peak_rad_s = 0.0;
+  for (double t_s = 0.0; t_s < 3.2; t_s += 0.01) {
+    for (const RigHead& head : scene.heads) {
+      const auto from = aim(head.head, scene.path.at(t_s)), to = aim(head.head, scene.path.at(t_s + 1e-4));
+      peak_rad_s = std::max(peak_rad_s, (*to - *from).cwiseAbs().maxCoeff() / 1e-4);
+    }
+  }
+  EXPECT_NEAR(peak_rad_s * 180.0 / std::numbers::pi, 30.0, 1.0);
+  EXPECT_NEAR(figures(scene, ControllerKind::pi).rms_px, 33.0, 3.3);
+  for (const ControllerKind kind : {ControllerKind::feedforward, ControllerKind::lqr, ControllerKind::mpc}) {
+    scene.mismatch = {};
+    EXPECT_LE(figures(scene, kind).rms_px, 4.0) << controller_name(kind);
+    for (const double gain : {0.8, 1.2}) {
+      for (const double tau : {0.7, 1.3}) {
+        scene.mismatch = {gain, tau};
+        EXPECT_LE(figures(scene, kind).rms_px, 8.0) << controller_name(kind) << gain << tau;
+      }
+    }
+  }
+}
+
+ServoScene stepping(double latency_s, double size) {
+  ServoScene scene = xiahou_servo_scene();
+  scene.path.kind = PathKind::step;
+  scene.path.start_m = {0.173, -0.314, 1.5};
+  scene.path.jump_m *= size;
+  scene.duration_s = 4.0;
+  scene.latency_s = latency_s;
+  return scene;
+}
+
+/// How far the error goes beyond the middle, away from the jump; mean of the seeds, of head 1.
+double overshoot_px(const ServoScene& scene, ControllerKind kind) {
+  ServoConfig config;
+  config.controller = kind;
+  double sum = 0.0;
+  constexpr int num_seeds = 8;
+  for (int seed = 1; seed <= num_seeds; ++seed) {
+    Eigen::Vector2d jump = Eigen::Vector2d::Zero();
+    double most = 0.0;
+    for (const ServoRow& row : run_servo(scene, config, static_cast<std::uint64_t>(seed)).rows) {
+      if (row.head != 0 || row.t_s < scene.path.jump_at_s - 1e-9) continue;
+      if (jump.isZero()) jump = row.error_px.normalized();
+      most = std::max(most, -row.error_px.dot(jump));
+    }
+    sum += most / num_seeds;
+  }
+  return sum;
+}
+
+TEST(ServoLoop, NothingOvershootsAfterAJumpMoreThanPi) {
+  for (const double latency_s : {0.0, 0.1}) {
+    for (const double size : {0.1, 0.4, 1.0}) {
+      const ServoScene scene = stepping(latency_s, size);
+      const double pi_px = overshoot_px(scene, ControllerKind::pi);
+      for (const ControllerKind kind : {ControllerKind::feedforward, ControllerKind::lqr, ControllerKind::mpc}) {
+        // 2.5 px of 61: noise of the settled axis, whose largest of 60 values is meant here; PI is slower and shakes
+        // less.
+        EXPECT_LT(overshoot_px(scene, kind), pi_px + 2.5) << controller_name(kind) << latency_s << " " << size;
+      }
+    }
+  }
+}
+
+TEST(ServoLoop, LosesATargetAndFindsItAgain) {
+  for (const Circle& circle : circles) {
+    ServoScene scene = circling(circle, 0.1, {});
+    scene.hidden_s = {{4.0, 5.0}};
+    scene.duration_s = 14.0;
+    for (const ControllerKind kind : {ControllerKind::feedforward, ControllerKind::lqr, ControllerKind::mpc}) {
+      const ServoFigures own = figures(scene, kind);
+      EXPECT_GE(own.num_lost, 16u);  // two heads, eight seeds
+      EXPECT_EQ(own.num_found, own.num_lost) << controller_name(kind) << circle.radius_m;
+      EXPECT_GT(own.search_s, 16.0 * 0.5);
+    }
+  }
+}
+
+TEST(ServoLoop, SameSeedSameRun) {
+  const ServoScene scene = circling(circles[1], 0.1, {});
+  const ServoRun a = run_servo(scene, {}, 5), b = run_servo(scene, {}, 5), c = run_servo(scene, {}, 6);
+  EXPECT_EQ(a.figures.rms_px, b.figures.rms_px);
+  EXPECT_NE(a.figures.rms_px, c.figures.rms_px);
+}
+
+TEST(ServoStudy, RefusesTheRadianReadingBeforeItRuns) {
+  ServoScenario scenario;
+  for (ServoAxis& axis : scenario.scene.axes) axis.plant = AnglePlant{0.0567, AngleUnit::rad, 0.1};
+  const ServoStudy study = study_servo(scenario, 1);
+  EXPECT_TRUE(study.trials.empty());
+  const Verdict verdict = servo_verdict(scenario, study);
+  EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_NE(verdict.sentence.find("14.22"), std::string::npos) << verdict.sentence;
+  EXPECT_NE(verdict.to_add.find("deg"), std::string::npos) << verdict.to_add;
+}
+
+TEST(ServoStudy, ComparesOverTheSameSeeds) {
+  ServoScenario scenario;
+  scenario.num_seeds = 3;
+  scenario.robustness->points = 2;
+  const ServoStudy study = study_servo(scenario, 7);
+  ASSERT_EQ(study.trials.size(), 12u);
+  EXPECT_EQ(study.trials[0].seed, study.trials[3].seed);
+  ASSERT_EQ(study.comparison.size(), 4u);
+  ASSERT_TRUE(study.robustness);
+  EXPECT_EQ(study.robustness->rms_px.size(), 4u);
+  EXPECT_EQ(servo_verdict(scenario, study).state, State::good);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,160 @@
+#include "alidade/loop/servo_study.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+namespace alidade {
+namespace {
+
+std::string text_of(double value, int digits = 3) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return text;
+}
+
+double units_of_error_per_rad(ErrorUnit unit, double focal_px) { return PiGains{1.0, 0.0, unit}.per_rad(focal_px).kp; }
+
+int samples_in(double delay_s, double period_s) { return static_cast<int>(std::ceil(delay_s / period_s - 1e-9)); }
+
+/// The plant as it is read with its gain in the other unit.
+ServoPlant in_other_unit(const ServoPlant& plant) {
+  ServoPlant other = plant;
+  std::visit([](auto& p) { p.unit = p.unit == AngleUnit::deg ? AngleUnit::rad : AngleUnit::deg; }, other);
+  return other;
+}
+
+AngleUnit unit_of(const ServoPlant& plant) {
+  return std::visit([](const auto& p) { return p.unit; }, plant);
+}
+
+Verdict unstable(const ServoScenario& scenario, const LoopCheck& loop) {
+  const ServoPlant& plant = scenario.scene.axes[0].plant;
+  const double focal_px = focal_of(scenario.scene.heads[0].camera);
+  const ServoPlant other = in_other_unit(plant);
+  const LoopAnalysis as_other =
+      analysed(other, scenario.config.pi.per_rad(focal_px), scenario.scene.period_s, loop.delay_samples);
+  Verdict verdict;
+  verdict.state = State::refused;
+  verdict.exit_code = ExitCode::cannot_tell;
+  verdict.sentence = "the loop of " + std::string(controller_name(loop.controller)) + " sampled each " +
+                     text_of(scenario.scene.period_s) + " s is unstable: spectral radius " +
+                     text_of(loop.analysis.sampled_radius, 4) + ", loop gain " + text_of(loop.loop_gain, 4) +
+                     " error units per " + std::string(unit_name(unit_of(plant)));
+  verdict.to_add = as_other.is_stable() ? "is the gain in " + std::string(unit_name(unit_of(other))) +
+                                              "? then the radius is " + text_of(as_other.sampled_radius, 4)
+                                        : "lower kp and ki, shorten the latency, or sample faster";
+  verdict.checks.push_back(
+      {"sampled loop", State::refused, verdict.sentence, loop.analysis.sampled_radius, 1.0, "1", ""});
+  return verdict;
+}
+
+const ServoComparison& best_of(const ServoStudy& study) {
+  return *std::ranges::find(study.comparison, study.best, &ServoComparison::controller);
+}
+
+void add_checks(const ServoScenario& scenario, const ServoStudy& study, Verdict& verdict) {
+  const ServoFigures& best = best_of(study).figures;
+  const auto add = [&](std::string name, bool is_good, std::string text, double value, double limit, std::string unit) {
+    verdict.checks.push_back(
+        {std::move(name), is_good ? State::good : State::care, std::move(text), value, limit, std::move(unit), ""});
+  };
+  const double asked = scenario.specification_px;
+  add("specification", best.rms_px <= asked, text_of(best.rms_px) + " px RMS of " + text_of(asked) + " px asked for",
+      best.rms_px, asked, "px");
+  add("in the picture", best.in_picture >= 1.0, text_of(100.0 * best.in_picture) + " % of the time in the picture",
+      best.in_picture, 1.0, "1");
+  if (best.num_lost > 0)
+    add("lost", false,
+        "lost " + std::to_string(best.num_lost) + " times, found again " + std::to_string(best.num_found) + " times",
+        static_cast<double>(best.num_lost), 0.0, "times");
+  for (const LoopCheck& loop : study.loops)
+    add("loop of " + std::string(controller_name(loop.controller)), loop.analysis.sampled_radius < 0.98,
+        "spectral radius " + text_of(loop.analysis.sampled_radius, 4), loop.analysis.sampled_radius, 0.98, "1");
+}
+
+std::vector<double> evenly(double low, double high, int points) {
+  std::vector<double> values;
+  for (int i = 0; i < points; ++i) values.push_back(points > 1 ? low + (high - low) * i / (points - 1) : low);
+  return values;
+}
+
+}  // namespace
+
+std::vector<LoopCheck> check_loops(const ServoScenario& scenario) {
+  std::vector<LoopCheck> loops;
+  const ServoScene& scene = scenario.scene;
+  const double focal_px = focal_of(scene.heads[0].camera);
+  const PiGains gains = scenario.config.pi.per_rad(focal_px);
+  for (const ControllerKind kind : scenario.controllers) {
+    const bool is_pi = kind == ControllerKind::pi;
+    const bool is_angle_plant = std::holds_alternative<AnglePlant>(scene.axes[0].plant);
+    if (!is_pi && !(kind == ControllerKind::feedforward && is_angle_plant)) continue;
+    const ServoPlant plant = scaled(scene.axes[0].plant, scene.mismatch.gain, scene.mismatch.tau);
+    const double delay_s = scene.axes[0].command_delay_s + (is_pi ? scene.latency_s : 0.0);
+    LoopCheck loop{kind, {}, 0.0, samples_in(delay_s, scene.period_s)};
+    loop.loop_gain = units_of_error_per_rad(scenario.config.pi.unit, focal_px) * radians_in(unit_of(plant));
+    loop.analysis = analysed(plant, gains, scene.period_s, loop.delay_samples);
+    loops.push_back(loop);
+  }
+  return loops;
+}
+
+ServoStudy study_servo(const ServoScenario& scenario, std::uint64_t first_seed, const Progress& progress) {
+  ServoStudy study;
+  study.loops = check_loops(scenario);
+  if (!std::ranges::all_of(study.loops, [](const LoopCheck& loop) { return loop.analysis.is_stable(); })) return study;
+  const auto num_seeds = static_cast<std::size_t>(scenario.num_seeds);
+  ServoConfig config = scenario.config;
+  for (const ControllerKind kind : scenario.controllers) {
+    config.controller = kind;
+    ServoComparison compared{kind, {}, {}};
+    std::vector<ServoFigures> figures;
+    for (std::size_t i = 0; i < num_seeds; ++i) {
+      report_progress(progress, "trials", study.trials.size(), num_seeds * scenario.controllers.size());
+      ServoRun run = run_servo(scenario.scene, config, first_seed + i);
+      figures.push_back(run.figures);
+      study.trials.push_back({kind, first_seed + i, run.figures});
+      if (i == 0) compared.shown = std::move(run);
+    }
+    compared.figures = put_together(figures);
+    study.comparison.push_back(std::move(compared));
+  }
+  study.best = std::ranges::min_element(study.comparison, {}, [](const ServoComparison& c) {
+                 return c.figures.rms_px;
+               })->controller;
+  if (scenario.robustness) {
+    const RobustnessConfig& grid = *scenario.robustness;
+    config.controller = study.best;
+    study.robustness = servo_robustness(scenario.scene, config, evenly(grid.gain_low, grid.gain_high, grid.points),
+                                        evenly(grid.tau_low, grid.tau_high, grid.points), first_seed, progress);
+  }
+  return study;
+}
+
+Verdict servo_verdict(const ServoScenario& scenario, const ServoStudy& study) {
+  for (const LoopCheck& loop : study.loops)
+    if (!loop.analysis.is_stable()) return unstable(scenario, loop);
+  Verdict verdict;
+  add_checks(scenario, study, verdict);
+  const ServoFigures& best = best_of(study).figures;
+  verdict.sentence = std::string(controller_name(study.best)) + " keeps the target within " + text_of(best.rms_px) +
+                     " px RMS of the middle";
+  const auto pi = std::ranges::find(study.comparison, ControllerKind::pi, &ServoComparison::controller);
+  if (pi != study.comparison.end() && study.best != ControllerKind::pi)
+    verdict.sentence += ", pi within " + text_of(pi->figures.rms_px) + " px";
+  if (best.in_picture < 0.5) {
+    verdict.state = State::bad;
+    verdict.sentence += "; in the picture " + text_of(100.0 * best.in_picture) + " % of the time only";
+    return verdict;
+  }
+  for (const Check& check : verdict.checks) {
+    if (check.state == State::good) continue;
+    if (verdict.state == State::good) verdict.sentence += "; " + check.name + ": " + check.text;
+    verdict.state = State::care;
+  }
+  return verdict;
+}
+
+}  // namespace alidade

@@ -1,0 +1,214 @@
+#include "alidade/servo/identify.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace alidade {
+namespace {
+
+enum Param { gain, tau, latency, zero, start };
+
+/// Angle and rate of a plant of gain one half-way through a log, with their derivatives by the parameters.
+struct Walk {
+  ServoKind kind;
+  double gain, tau_s;
+  double x = 0.0, v = 0.0;  ///< Angle without its zero; rate (rate plants).
+  Eigen::RowVector<double, num_servo_params> dx = Eigen::RowVector<double, num_servo_params>::Zero(), dv = dx;
+
+  /// dt under one command: of an angle plant x, of a rate plant v goes towards gain · command.
+  void advance(double dt_s, double command) {
+    const double decay = std::exp(-dt_s / tau_s), rise = -std::expm1(-dt_s / tau_s), goal = gain * command;
+    const double decay_by_tau = decay * dt_s / (tau_s * tau_s);
+    if (kind == ServoKind::angle) {
+      dx *= decay;
+      dx[Param::gain] += rise * command;
+      dx[Param::tau] += decay_by_tau * (x - goal);
+      x = goal + decay * (x - goal);
+      return;
+    }
+    const double gap = v - goal, reach_s = tau_s * rise;
+    dx += reach_s * dv;
+    dx[Param::gain] += (dt_s - reach_s) * command;
+    dx[Param::tau] += (rise - tau_s * decay_by_tau) * gap;
+    dv *= decay;
+    dv[Param::gain] += rise * command;
+    dv[Param::tau] += decay_by_tau * gap;
+    x += goal * dt_s + gap * reach_s;
+    v = goal + decay * gap;
+  }
+  /// A switch a little later: what pulled before goes on a little longer.
+  void switch_command(double from, double to) {
+    (kind == ServoKind::angle ? dx : dv)[Param::latency] += gain * (from - to) / tau_s;
+  }
+};
+
+constexpr double fastest_tau_s = 1e-5;
+
+/// Gain, zero and start that fit best at a time constant and latency, and what is left.
+struct LinearFit {
+  ServoParams params = ServoParams::Zero();
+  double sum2 = 0.0;
+};
+LinearFit linear_fit(std::span<const ServoSample> log, ServoKind kind, double tau_s, double latency_s,
+                     const Eigen::VectorXd& readings) {
+  ServoParams params;
+  params << 1.0, tau_s, latency_s, 0.0, 0.0;
+  const ServoResponse response = servo_response(log, kind, params);
+  Eigen::Matrix<double, Eigen::Dynamic, 3> A(readings.size(), 3);  // the response is linear in these three
+  A << response.J.col(Param::gain), response.J.col(Param::zero), response.J.col(Param::start);
+  const Eigen::Vector3d best = A.colPivHouseholderQr().solve(readings);
+  LinearFit fit;
+  fit.params << best[0], tau_s, latency_s, best[1], best[2];
+  fit.sum2 = (A * best - readings).squaredNorm();
+  return fit;
+}
+
+Eigen::VectorXd readings_of(std::span<const ServoSample> log) {
+  Eigen::VectorXd readings(static_cast<Eigen::Index>(log.size()));
+  for (std::size_t i = 0; i < log.size(); ++i) readings[static_cast<Eigen::Index>(i)] = log[i].angle_rad;
+  return readings;
+}
+
+/// Every n-th row, so that a search over a long log stays short; commands between are held.
+std::vector<ServoSample> thinned(std::span<const ServoSample> log) {
+  constexpr std::size_t most = 1500;
+  const std::size_t stride = (log.size() + most - 1) / most;
+  std::vector<ServoSample> rows;
+  for (std::size_t i = 0; i < log.size(); ++i)
+    if (i % stride == 0 || log[i].command != log[i - 1].command) rows.push_back(log[i]);
+  return rows;
+}
+
+/// The best of a grid in time constant (by factors) and latency (up to a third of the log).
+ServoParams searched(std::span<const ServoSample> log, ServoKind kind) {
+  const std::vector<ServoSample> rows = thinned(log);
+  const Eigen::VectorXd readings = readings_of(rows);
+  const double duration_s = log.back().t_s - log.front().t_s;
+  const double step_s = duration_s / static_cast<double>(log.size() - 1);
+  std::vector<double> latencies{0.0};
+  for (double late_s = 0.5 * step_s; late_s < duration_s / 3.0; late_s *= 1.4) latencies.push_back(late_s);
+  LinearFit best;
+  best.sum2 = std::numeric_limits<double>::infinity();
+  for (double tau_s = 0.3 * step_s; tau_s < 3.0 * duration_s; tau_s *= 1.6) {
+    for (const double latency_s : latencies) {
+      const LinearFit fit = linear_fit(rows, kind, tau_s, latency_s, readings);
+      if (fit.sum2 < best.sum2) best = fit;
+    }
+  }
+  return best.params;
+}
+
+/// From the normal equations, scaled so that the units of the parameters do not matter.
+void set_covariance(const Eigen::Matrix<double, num_servo_params, num_servo_params>& JtJ, ServoFit& fit) {
+  using Matrix = Eigen::Matrix<double, num_servo_params, num_servo_params>;
+  const ServoParams scale = JtJ.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  const Eigen::LDLT<Matrix> ldlt(Matrix(scale.asDiagonal() * JtJ * scale.asDiagonal()));
+  fit.is_observable = ldlt.info() == Eigen::Success && ldlt.vectorD().minCoeff() > 1e-10;
+  if (!fit.is_observable) return;
+  const Matrix inverse = ldlt.solve(Matrix(Matrix::Identity()));
+  fit.cov = fit.rms_rad * fit.rms_rad * (scale.asDiagonal() * inverse * scale.asDiagonal());
+}
+
+/// Levenberg–Marquardt from there; time constant and latency stay within what has a meaning.
+ServoFit refined(std::span<const ServoSample> log, ServoKind kind, ServoParams params) {
+  const Eigen::VectorXd readings = readings_of(log);
+  const double dof = static_cast<double>(log.size()) - num_servo_params;
+  double damping = 1e-6;
+  ServoResponse response = servo_response(log, kind, params);
+  double sum2 = (response.angle_rad - readings).squaredNorm();
+  ServoFit fit;
+  fit.kind = kind;
+  constexpr int max_steps = 60;  // 5 to 15 are typical; a kink at a sampled latency takes more
+  for (int i = 0; i < max_steps && !fit.has_converged; ++i) {
+    const auto JtJ = (response.J.transpose() * response.J).eval();
+    auto damped = JtJ;
+    damped.diagonal() *= 1.0 + damping;
+    const ServoParams step = damped.ldlt().solve(response.J.transpose() * (readings - response.angle_rad));
+    ServoParams next = params + step;
+    next[Param::tau] = std::max({next[Param::tau], 0.2 * params[Param::tau], fastest_tau_s});
+    next[Param::latency] = std::max(next[Param::latency], 0.0);
+    const ServoResponse tried = servo_response(log, kind, next);
+    const double tried_sum2 = (tried.angle_rad - readings).squaredNorm();
+    if (!(tried_sum2 <= sum2)) {
+      damping *= 10.0;
+      fit.has_converged = damping > 1e8;
+      continue;
+    }
+    fit.has_converged = sum2 - tried_sum2 <= 1e-12 * sum2;
+    params = next;
+    response = tried;
+    sum2 = tried_sum2;
+    damping = std::max(1e-9, 0.1 * damping);
+  }
+  fit.params = params;
+  fit.rms_rad = std::sqrt(sum2 / dof);
+  set_covariance(response.J.transpose() * response.J, fit);
+  return fit;
+}
+
+double lag_one(const std::vector<double>& residuals) {
+  double product = 0.0, square = 0.0;
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    square += residuals[i] * residuals[i];
+    if (i > 0) product += residuals[i] * residuals[i - 1];
+  }
+  return square > 0.0 ? product / square : 0.0;
+}
+
+}  // namespace
+
+ServoResponse servo_response(std::span<const ServoSample> log, ServoKind kind, const ServoParams& params) {
+  const auto num_rows = static_cast<Eigen::Index>(log.size());
+  ServoResponse response{Eigen::VectorXd(num_rows), decltype(response.J)(num_rows, num_servo_params)};
+  Walk walk{kind, params[Param::gain], params[Param::tau]};
+  if (kind == ServoKind::angle) {
+    walk.x = params[Param::start];
+    walk.dx[Param::start] = 1.0;
+  } else {
+    walk.v = params[Param::start];
+    walk.dv[Param::start] = 1.0;
+  }
+  double now_s = log.front().t_s, command = log.front().command;
+  std::size_t next = 1;  // the first command has been there before
+  for (Eigen::Index i = 0; i < num_rows; ++i) {
+    const double t_s = log[static_cast<std::size_t>(i)].t_s;
+    for (; next < log.size() && log[next].t_s + params[Param::latency] <= t_s; ++next) {
+      if (log[next].command == command) continue;
+      const double switch_s = log[next].t_s + params[Param::latency];
+      walk.advance(switch_s - now_s, command);
+      walk.switch_command(command, log[next].command);
+      now_s = switch_s;
+      command = log[next].command;
+    }
+    walk.advance(t_s - now_s, command);
+    now_s = t_s;
+    response.angle_rad[i] = params[Param::zero] + walk.x;
+    response.J.row(i) = walk.dx;
+    response.J(i, Param::zero) = 1.0;
+  }
+  return response;
+}
+
+ServoIdentification identify_servo(std::span<const ServoSample> log) {
+  ServoIdentification result;
+  const auto [low, high] = std::ranges::minmax_element(log, {}, &ServoSample::command);
+  const auto [lowest, highest] = std::ranges::minmax_element(log, {}, &ServoSample::angle_rad);
+  result.command_range = high->command - low->command;
+  result.angle_range_rad = highest->angle_rad - lowest->angle_rad;
+  result.duration_s = log.back().t_s - log.front().t_s;
+  if (!(result.command_range > 0.0)) return result;
+  result.fit = refined(log, ServoKind::angle, searched(log, ServoKind::angle));
+  result.other = refined(log, ServoKind::rate, searched(log, ServoKind::rate));
+  // An angle plant with a very long lag looks like a rate plant: a tenth less is more than chance leaves.
+  if (result.other.rms_rad < 0.9 * result.fit.rms_rad) std::swap(result.fit, result.other);
+  const Eigen::VectorXd residuals =
+      servo_response(log, result.fit.kind, result.fit.params).angle_rad - readings_of(log);
+  result.residual_rad.assign(residuals.data(), residuals.data() + residuals.size());
+  result.lag_one_correlation = lag_one(result.residual_rad);
+  return result;
+}
+
+}  // namespace alidade

@@ -1,0 +1,87 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include "alidade/servo/identify.h"
+
+namespace alidade {
+namespace {
+
+std::string text_of(double value, int digits = 3) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return text;
+}
+
+Verdict refused(std::string what, std::string add) {
+  Verdict verdict;
+  verdict.state = State::refused;
+  verdict.exit_code = ExitCode::cannot_tell;
+  verdict.sentence = std::move(what);
+  verdict.to_add = std::move(add);
+  return verdict;
+}
+
+void add_checks(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
+  const ServoFit& fit = identified.fit;
+  const double correlation = identified.lag_one_correlation, rows = static_cast<double>(log.size());
+  // Of white residuals the correlation has σ = 1/√n; 0.3 is where structure costs more than noise.
+  const double limit = std::max(0.3, 4.0 / std::sqrt(rows));
+  const bool is_white = std::abs(correlation) < limit;
+  verdict.checks.push_back({"residuals", is_white ? State::good : State::care,
+                            is_white ? "residuals are white: the model is enough"
+                                     : "residuals have structure (correlation " + text_of(correlation) +
+                                           " from row to row): the servo does more than the model, and σ is too small",
+                            correlation, limit, "1", ""});
+  const double step_s = identified.duration_s / (rows - 1.0);
+  const bool is_resolved = fit.params[1] > 0.5 * step_s;
+  verdict.checks.push_back({"sampling", is_resolved ? State::good : State::care,
+                            is_resolved ? "rows are close enough for the time constant"
+                                        : "rows are further apart than twice the time constant: log faster",
+                            fit.params[1] / step_s, 0.5, "rows", ""});
+  if (!fit.has_converged)
+    verdict.checks.push_back({"convergence", State::care, "the fit was still moving", 0.0, 0.0, "1", ""});
+}
+
+}  // namespace
+
+Verdict identify_verdict(std::span<const ServoSample> log, const ServoIdentification& identified) {
+  const std::string excite = "log a step or a chirp of the command that moves the axis by degrees";
+  if (log.size() < 20)
+    return refused("only " + std::to_string(log.size()) + " rows: too few for five parameters", "log at least 20 rows");
+  if (!(identified.command_range > 0.0))
+    return refused("no excitation: the command is " + text_of(log.front().command) + " throughout", excite);
+  const ServoFit& fit = identified.fit;
+  if (!(identified.angle_range_rad > 0.0)) return refused("no answer: the angle never changes", excite);
+  const bool is_angle = fit.kind == ServoKind::angle;
+  if (!fit.is_observable)
+    return refused("the log cannot tell gain, time constant and latency apart",
+                   "log until the axis has come to rest, "
+                   "and more than one change of command");
+  const ServoParams sigma = fit.cov.diagonal().cwiseSqrt();
+  if (!(std::abs(fit.params[0]) > 5.0 * sigma[0]))
+    return refused(
+        "no answer: the gain " + text_of(fit.params[0]) + " is not told from zero (σ " + text_of(sigma[0]) + ")",
+        excite);
+  if (!(sigma[1] < 0.5 * fit.params[1]) && !(fit.params[1] + 2.0 * sigma[1] < 0.02 * identified.duration_s))
+    return refused("too short or too coarse: the time constant is " + text_of(fit.params[1]) + " s with σ " +
+                       text_of(sigma[1]) + " s",
+                   "log for several time constants after a change of command, and faster");
+  if (is_angle && fit.params[1] > identified.duration_s)
+    return refused("too short: the time constant " + text_of(fit.params[1]) + " s is longer than the log",
+                   "log for several time constants after a change of command");
+  Verdict verdict;
+  add_checks(log, identified, verdict);
+  verdict.sentence = std::string(is_angle ? "the angle" : "the rate") + " follows the command by " +
+                     text_of(fit.params[0]) + " rad" + (is_angle ? "" : "/s") + " per unit with a time constant of " +
+                     text_of(1e3 * fit.params[1]) + " ms, " + text_of(1e3 * fit.params[2]) + " ms late";
+  for (const Check& check : verdict.checks) {
+    if (check.state == State::good) continue;
+    if (verdict.state == State::good) verdict.sentence += "; " + check.text;
+    verdict.state = State::care;
+  }
+  return verdict;
+}
+
+}  // namespace alidade

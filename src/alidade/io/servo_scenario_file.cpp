@@ -298,7 +298,7 @@ noise: {sigma_px: 0.5, sigma_encoder_deg: 0.05, encoder_step_deg: 0}
 controllers: [pi, feedforward, lqr, mpc]
 pi: {kp: 2, ki: 10, unit: px}    # command per error
 predictive: {rate_gain_per_s: 8, command_weight: 2, range_m: 1}
-filter: {singer_tau_s: 0.4, sigma_deg_s2: [5, 20, 80, 320, 1280], memory_s: 0.5, gate: 30}
+filter: {singer_tau_s: 0.4, sigma_deg_s2: [5, 20, 80, 320, 1280], memory_s: 0.5, gate: 20}
 search: {enabled: true, coast_s: 0.3, carry_s: 0.2, speed_deg_s: 57.3, turn_of_view: 0.7, max_radius_deg: 45.8}
 seeds: 8
 specification_px: 10

@@ -21,7 +21,6 @@ class PictureQueue {
     while (num_known_ < num_taken_) {
       const Picture& next = ring_[num_known_ % ring_.size()];
       if (next.sight.t_capture_s + latency_s_ > t_s + 1e-9) return;
-      input.has_picture = true;
       input.sight.reset();
       if (next.is_seen) input.sight = next.sight;
       ++num_known_;
@@ -80,7 +79,7 @@ ServoRow step(const ServoScene& scene, LoopedHead& looped, double t_s, std::size
   const auto where = looped.head.true_pixel(target);
   const bool is_seen = seen && !is_hidden(scene, t_s);
   looped.pictures.take({t_s, row.measured_rad, seen.value_or(Eigen::Vector2d::Zero())}, is_seen);
-  HeadServoInput input{t_s, row.measured_rad, false, std::nullopt};
+  HeadServoInput input{t_s, row.measured_rad, std::nullopt};
   looped.pictures.deliver(t_s, input);
   const HeadServoOutput output = looped.servo.step(input);
   looped.head.send(output.command);

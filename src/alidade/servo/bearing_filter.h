@@ -18,7 +18,7 @@ struct BearingFilterConfig {
   std::array<double, num_agilities> sigma_rad_s2{0.08726646, 0.34906585, 1.3962634, 5.5850536, 22.340214};
   double memory_s = 0.5;          ///< For how long a model's prediction counts.
   double start_rate_rad_s = 2.0;  ///< σ of the rate that a target may have when first seen.
-  double gate = 30.0;             ///< On the squared innovation over its variance, of the mixture.
+  double gate = 20.0;             ///< On the squared innovation over its variance, of the mixture: 4.5 σ.
   int restart_after = 2;          ///< Sights beyond the gate, one after the other: the target has jumped.
 };
 

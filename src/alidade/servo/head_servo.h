@@ -21,8 +21,7 @@ struct HeadSight {
 struct HeadServoInput {
   double t_s = 0.0;
   Eigen::Vector2d encoder_rad = Eigen::Vector2d::Zero();  ///< (pan, tilt) now.
-  bool has_picture = false;                               ///< Whether a picture arrived since the last step…
-  std::optional<HeadSight> sight;                         ///< …and where the target is in it, if it is.
+  std::optional<HeadSight> sight;  ///< Of the picture that arrived since the last step, if the target is in it.
 };
 
 enum class ServoEvent { none, waiting, started, gated, jumped, lost, searching, found };

@@ -67,7 +67,7 @@ struct Loop {
   }
   void step() {
     const double t_s = 0.05 * k++;
-    HeadServoInput input{t_s, head.read_encoders(), true, std::nullopt};
+    HeadServoInput input{t_s, head.read_encoders(), std::nullopt};
     // Away for a while, so that the search is run through as well.
     if (const auto px = head.seen_pixel(path.at(t_s)); px && (t_s < 3.0 || t_s > 4.0))
       input.sight = HeadSight{t_s, input.encoder_rad, *px};
@@ -109,7 +109,7 @@ TEST(HeadServo, TakesLessThanFiftyMicrosecondsAStep) {
 TEST(HeadServo, WaitsStillUntilATargetIsSeen) {
   HeadServo servo(xiahou_rig()[0], {});
   for (int k = 0; k < 10; ++k) {
-    const HeadServoOutput output = servo.step({0.05 * k, {0.2, 0.1}, false, std::nullopt});
+    const HeadServoOutput output = servo.step({0.05 * k, {0.2, 0.1}, std::nullopt});
     EXPECT_EQ(output.event, ServoEvent::waiting);
     EXPECT_FALSE(output.has_prediction);
     EXPECT_NEAR(output.command.x() * gain_of(ServoConfig{}.axes[0].plant), 0.2, 1e-12);

@@ -209,6 +209,18 @@ TEST_F(IdentifyCommand, ItsPlantIsAScenario) {
   EXPECT_LT(Json::parse(outcome.out)["estimate"]["controllers"]["lqr"]["rms_px"], 1.5);
 }
 
+TEST_F(IdentifyCommand, ItsRatePlantIsAScenarioToo) {
+  ASSERT_EQ(
+      alidade({"simulate", "servo", "--kind", "rate", "--latency-s", "0.02", "--out", path("sim"), "--quiet"}).code, 0);
+  ASSERT_EQ(identify("sim/log.csv").code, 0);
+  write_file(path("scenario.yaml"), read_file(path("out/servo.yaml")) + "seeds: 1\nrobustness: {points: 0}\n");
+  const Outcome outcome = alidade({"servo", path("scenario.yaml"), "--out", path("servo"), "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json controllers = Json::parse(outcome.out)["estimate"]["controllers"];
+  EXPECT_LT(controllers["pi"]["rms_px"], 10.0);  // its preset is a loop of 4/s, whatever a unit of command is
+  EXPECT_LT(controllers["mpc"]["rms_px"], 1.5);
+}
+
 TEST_F(IdentifyCommand, ReadsDegrees) {
   ASSERT_EQ(alidade({"simulate", "servo", "--out", path("sim"), "--quiet"}).code, 0);
   const Csv csv = Csv::read(path("sim/log.csv"));

@@ -121,8 +121,9 @@ void read_plant(const YAML::Node& root, const Fields& top, ServoScenario& scenar
     section.number("max_rate_deg_s", plant.max_rate_rad_s, 1e-3, 1e5, deg);
     section.number("max_acceleration_deg_s2", plant.max_acceleration_rad_s2, 1e-3, 1e7, deg);
     axis.plant = plant;
-    scenario.config.pi = {4.0, 4.0, ErrorUnit::deg};
-    if (plant.unit == AngleUnit::rad) scenario.config.pi = {4.0, 4.0, ErrorUnit::rad};
+    // A loop of 4/s, whatever a unit of command is.
+    const double loop_per_s = 4.0 / plant.gain;
+    scenario.config.pi = {loop_per_s, loop_per_s, plant.unit == AngleUnit::deg ? ErrorUnit::deg : ErrorUnit::rad};
   } else {
     axis.plant = plant_of<AnglePlant>(section);
     for (const std::string key : {"max_rate_deg_s", "max_acceleration_deg_s2"})
@@ -296,7 +297,7 @@ plant: {kind: angle, gain: 0.0567, unit: deg, tau_s: 0.1, command_delay_s: 0}
 mismatch: {gain: 1, tau: 1}      # the plant as it is, over the plant as it is known
 noise: {sigma_px: 0.5, sigma_encoder_deg: 0.05, encoder_step_deg: 0}
 controllers: [pi, feedforward, lqr, mpc]
-pi: {kp: 2, ki: 10, unit: px}    # command per error
+pi: {kp: 2, ki: 10, unit: px}    # command per error; of a rate plant 4/gain and 4/gain, in its unit
 predictive: {rate_gain_per_s: 8, command_weight: 2, range_m: 1}
 filter: {singer_tau_s: 0.4, sigma_deg_s2: [5, 20, 80, 320, 1280], memory_s: 0.5, gate: 20}
 search: {enabled: true, coast_s: 0.3, carry_s: 0.2, speed_deg_s: 57.3, turn_of_view: 0.7, max_radius_deg: 45.8}

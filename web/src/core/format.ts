@@ -39,7 +39,9 @@ export interface ValueText {
 export function valueText(value: number, sigma: number): ValueText {
   const three = 3 * sigma;
   if (!(three > 0) || !Number.isFinite(three) || !Number.isFinite(value)) return {value: num(value, 4), plusMinus: ''};
-  const decimals = 1 - Math.floor(Math.log10(three));
+  let exponent = Math.floor(Math.log10(three));
+  if (Math.round(three / 10 ** (exponent - 1)) >= 100) ++exponent; // 0.0996 shows as 0.10
+  const decimals = 1 - exponent;
   const both = Math.max(Math.abs(value), three);
   if (both >= 1e7 || decimals > 10) {
     const digits = Math.max(1, Math.min(12, Math.floor(Math.log10(both)) + decimals + 1));

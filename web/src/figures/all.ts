@@ -37,7 +37,7 @@ const byCommand: Record<string, Figure[]> = {
   rig: [rigEstimate, rigSpace, rigCoverage, rigResiduals, rigView, {...rigUnknown, span: 14}],
   track: [trackSpace, trackPosition, trackError, trackInnovations, {...estimate, span: 8}, {...trackAbove, span: 8}, {...trackAge, span: 8}],
   servo: [servoError, servoPicture, servoAngles, servoCompare, {...servoRobust, span: 12}, {...servoLoops, span: 12}, trackSpace, trackPosition],
-  localize: [localizeSpace, localizeError, localizeTracks, localizeNis, localizeSpeed, {...estimate, span: 8}],
+  localize: [localizeSpace, localizeError, localizeTracks, localizeNis, localizeSpeed, {...estimate, span: 6}],
   'camera diff': [difference, diagonal, parameters, {...estimate, span: 10}],
 };
 

@@ -18,7 +18,7 @@ export function correlationsOf(doc: Doc): Correlations | null {
     for (let j = i; j < n; ++j) cov[i * n + j] = cov[j * n + i] = upper[at++]!;
   const kept = all.map((_, i) => i).filter((i) => cov[i * n + i]! > 0 && Number.isFinite(cov[i * n + i]!));
   const rho = kept.flatMap((i) => kept.map((j) => cov[i * n + j]! / Math.sqrt(cov[i * n + i]! * cov[j * n + j]!)));
-  const names = kept.map((i) => shortNames[all[i]!] ?? all[i]!.replace(/^camera\./, ''));
+  const names = kept.map((i) => shortNames[all[i]!] ?? all[i]!.replace(/^camera\./, '').replace(/_(m_s|m|rad|px|s)$/, ''));
   return {names, rho, words: wordsOf(names, rho)};
 }
 

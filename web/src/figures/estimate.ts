@@ -37,8 +37,8 @@ function isSmall(quantity: Quantity, plain: string, doc: Doc): boolean {
 }
 
 // What the run was given and what it counted stand in the header and in the tables; bounds and errors beside the values.
-const elsewhere = /^(photos|board\.|corners_|events\[|bound\.|error\.|covers|heads|claims|controllers|camera\.(model|width|height)$|spot_sigma|b_from_a|excess_px|noise\.\w+_from|(sigma_px|noise\.\w+)_from)/;
-const elsewhereOf: Record<string, RegExp> = {rangefinder: /^(camera|refine|condition|range_ratio|normal_spread|offset_m|direction\[2\])/};
+const elsewhere = /^(photos|board\.|corners_|events\[|bound\.|error\.|covers|heads|video|claims|controllers|camera\.(model|width|height)$|spot_sigma|b_from_a|excess_px|noise\.\w+_from|(sigma_px|noise\.\w+)_from)/;
+const elsewhereOf: Record<string, RegExp> = {localize: /^(unaligned_m|scale_known|sights)$/, track: /^(sigma_a_is_estimated)$/, rangefinder: /^(camera|refine|condition|range_ratio|normal_spread|offset_m|direction\[2\])/};
 const names: Record<string, string> = {theta_x_rad: 'angle to the x axis', theta_y_rad: 'angle to the y axis', 'left_out.rms_px': 'left-out spots, RMS', 'left_out.rms_range_m': 'left-out ranges, RMS',
   rms_range_m: 'ranges, RMS', rms_px: 'RMS', noise_px: 'noise of a corner', transfer_rms_px: 'unseen photos, RMS', transfer_flat_rms_px: 'the same, board flat', working_distance_m: 'working distance',
   sigma_px: 'σ of a pixel', 'noise.sigma_spot_px': 'σ of a spot', 'noise.sigma_corner_px': 'σ of a corner', 'noise.sigma_range_m': 'σ of a reading', 'noise.sigma_px': 'σ of a corner', 'noise.sigma_encoder_rad': 'σ of a reading',

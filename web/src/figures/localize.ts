@@ -14,6 +14,11 @@ import {drawNis} from './nis_plot';
 
 const cam = 'world_from_cam_', sigmaCam = 'sigma_world_from_cam_';
 
+/** Truth in another frame, or up to scale, cannot be laid over the path: the errors after alignment are the estimate's. */
+function truthOf(doc: Doc, path: Table) {
+  return doc.estimateText('scale_known') !== 'false' && hasTriple(path, 'truth_') ? triple(path, 'truth_') : null;
+}
+
 function pathOf(doc: Doc): Table | null {
   const path = doc.table('path');
   return path && hasTriple(path, cam) ? path : null;
@@ -43,8 +48,8 @@ function localizeWorld(doc: Doc, path: Table, selection: Selection): World {
       if (Math.min(buckets - 1, Math.max(0, Math.floor(share * buckets))) === b) world.line([places[i]!, places[i + 1]!], {colour, width: 3.2});
     }
   }
-  if (hasTriple(path, 'truth_')) {
-    const truth = triple(path, 'truth_');
+  const truth = truthOf(doc, path);
+  if (truth) {
     world.line(Array.from({length: rows}, (_, i) => truth.at(i)), {colour: 'ink', width: 1.2, opacity: 0.85});
   }
   const features = doc.table('features');
@@ -62,7 +67,7 @@ export const localizeSpace: Figure = {
     if (!path) return null;
     const alignment = doc.estimateText('alignment'), keys: Key[] = [{words: 'path, coloured by its σ', colour: 'var(--blue)'}, {words: 'the instant', colour: 'var(--red)'}, {words: 'map points, 3σ', colour: 'var(--green)', look: 'dot'}];
     if (doc.table('features')?.tells('known')) keys.push({words: 'known points', colour: 'var(--orange)', look: 'dot'});
-    if (hasTriple(path, 'truth_')) keys.push({words: `truth${alignment ? ` (alignment for ATE: ${alignment})` : ''}`, colour: 'var(--ink)'});
+    if (truthOf(doc, path)) keys.push({words: `truth${alignment ? ` (alignment for ATE: ${alignment})` : ''}`, colour: 'var(--ink)'});
     legend(host, keys);
     const label = `Path of the camera through ${path.rows} frames`;
     const view = new View3(host, {height: 440, isFilling: true, up: [0, -1, 0], ahead: [0, 0, 1], yaw: 0.6, pitch: 0.4, label}, () => localizeWorld(doc, path, selection));
@@ -74,11 +79,11 @@ export const localizeSpace: Figure = {
 };
 
 export const localizeError: Figure = {
-  id: 'error', title: 'How far off, and did it know?', note: 'estimate − truth, mm, ± 3σ', span: 10,
+  id: 'error', title: 'How sure is it, and how far off?', note: 'mm, ± 3σ', span: 10,
   draw(host, doc, selection) {
     const path = pathOf(doc);
     if (!path) return null;
-    const at = triple(path, cam), sigma = triple(path, sigmaCam), truth = hasTriple(path, 'truth_') ? triple(path, 'truth_') : null, t = path.numbers('t_s');
+    const at = triple(path, cam), sigma = triple(path, sigmaCam), truth = truthOf(doc, path), t = path.numbers('t_s');
     let known = 0, inside = 0;
     axisNames.forEach((axis, k) => {
       const three = scaled(sigma.value[k]!, 3e3), error = truth ? at.value[k]!.map((v, i) => 1e3 * (v - truth.value[k]![i]!)) : new Float64Array(path.rows).fill(NaN);
@@ -87,17 +92,17 @@ export const localizeError: Figure = {
       new SeriesPlot(host, {t, selection, label: `${axis}, mm`, xLabel: k === 2 ? 'time, s' : '', height: k === 2 ? 132 : 104, isFilling: true, aria: `error of ${axis}`, levels: [{value: 0, dash: []}], range: [-limit, limit], bands: [bandAboutZero(scaled(sigma.value[k]!, 1e3), axisColours[k]!)],
         lines: [{name: 'error', values: error, colour: axisColours[k]!, width: 1.4}], tip: (i) => [`${axis} ${withSigma(at.value[k]![i]!, sigma.value[k]![i]!, 'm')} (3σ)`, ...(truth ? [`error ${num(error[i]!, 3)} mm`] : [])]});
     });
-    const words = truth ? `the error is inside 3σ for ${percent(inside, known, 1)} of all values (99.7 % expected)` : 'no truth was given: the band is 3σ';
+    const words = truth ? `the error is inside 3σ for ${percent(inside, known, 1)} of all values (99.7 % expected)` : hasTriple(path, 'truth_') ? 'the scale is not known, so there is no error in metres by axis: ATE and RPE are after alignment; the band is 3σ' : 'no truth was given: the band is 3σ';
     return {marks: path.rows, rows: path.rows, tables: [path], words, good: truth ? `Good: inside the band. Here ${words}.` : `${words[0]!.toUpperCase()}${words.slice(1)}.`};
   },
 };
 
 export const localizeTracks: Figure = {
-  id: 'tracks', title: 'Were points kept?', note: 'points a frame', span: 8,
+  id: 'tracks', title: 'Were points kept?', note: 'points a frame', span: 6,
   draw(host, doc, selection) {
     const path = doc.table('path');
     if (!path || !path.tells('num_tracked')) return null;
-    const t = path.numbers('t_s'), lost = Array.from({length: path.rows}, (_, i) => path.text('event', i)).map((event, i) => ({t: t[i]!, words: event})).filter((one) => /lost|restart|start/.test(one.words)).slice(0, 200);
+    const t = path.numbers('t_s'), lost = Array.from({length: path.rows}, (_, i) => path.text('event', i)).map((event, i) => ({t: t[i]!, words: event})).filter((one) => /lost|restart/.test(one.words)).slice(0, 200);
     legend(host, [{words: 'used', colour: 'var(--blue)'}, {words: 'seen', colour: 'var(--soft)', look: 'dash'}, {words: 'gated', colour: 'var(--red)', look: 'dot'}]);
     new SeriesPlot(host, {t, selection, label: 'points', xLabel: 'time, s', height: 230, isFilling: true, aria: 'points kept over time', events: lost, lines: [{name: 'used', values: path.numbers('num_tracked'), colour: 'blue', isSteps: true},
       ...(path.tells('num_seen') ? [{name: 'seen', values: path.numbers('num_seen'), colour: 'soft' as const, dash: [4, 3], isSteps: true}] : []), {name: 'gated', values: path.numbers('num_gated').map((v) => (v > 0 ? v : NaN)), colour: 'red', isDots: true, size: 5}]});
@@ -106,7 +111,7 @@ export const localizeTracks: Figure = {
 };
 
 export const localizeNis: Figure = {
-  id: 'nis', title: 'Does each frame fit?', note: 'NIS', span: 8,
+  id: 'nis', title: 'Does each frame fit?', note: 'NIS', span: 6,
   draw(host, doc, selection) {
     const path = doc.table('path');
     if (!path || !path.tells('nis')) return null;
@@ -118,7 +123,7 @@ export const localizeNis: Figure = {
 };
 
 export const localizeSpeed: Figure = {
-  id: 'speed', title: 'Is it fast enough?', note: 'ms a frame', span: 8,
+  id: 'speed', title: 'Is it fast enough?', note: 'ms a frame', span: 6,
   draw(host, doc, selection) {
     const path = doc.table('path');
     if (!path || !path.tells('seconds')) return null;

@@ -120,8 +120,8 @@ export const rigResiduals: Figure = {
     const views = viewsOf(doc, selection);
     if (!views || !views.tells('pan_correction_rad') || !doc.isAnswer) return null;
     const heads = headsOf(views), charts: Chart[] = [], row = el('div', {class: 'row'});
-    host.append(row);
     legend(host, heads.slice(0, 4).map((head, k) => ({words: `head ${head}`, colour: `var(--${headColours[k]!})`, look: 'dot'})));
+    host.append(row);
     const sigma = degrees * doc.estimate('noise.sigma_encoder_rad'), travel = views.has('travel_sign');
     let inside = 0, known = 0;
     for (const axis of ['pan', 'tilt'] as const) {

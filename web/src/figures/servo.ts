@@ -25,7 +25,7 @@ function headsOf(control: Table): HeadRows[] {
   return ids.map((id) => {
     const rows = Array.from(head.keys()).filter((i) => (head[i] === id || (Number.isNaN(id) && Number.isNaN(head[i]!))) && Number.isFinite(t[i]!)).sort((a, b) => t[a]! - t[b]!);
     return {head: id, rows, t: Float64Array.from(rows, (i) => t[i]!), column: (name) => Float64Array.from(rows, (i) => control.number(name, i)),
-      events: rows.map((i) => ({t: t[i]!, words: control.text('event', i)})).filter((one) => one.words && one.words !== 'searching').slice(0, 200)};
+      events: rows.map((i) => ({t: t[i]!, words: control.text('event', i)})).filter((one) => one.words && !/^(none|searching|started|seen)$/.test(one.words)).slice(0, 200)};
   });
 }
 

@@ -145,7 +145,7 @@ export const trackError: Figure = {
         bands: [bandAboutZero(scaled(sigma.value[k]!, 1e3), axisColours[k]!)], range: limit > 0 ? [-limit, limit] : undefined, tip: (i) => [`error ${num(error[i]!, 3)} mm, 3σ ${num(three[i]!, 3)} mm`]});
     });
     const nees = steps.numbers('nees');
-    if (nees.some(Number.isFinite)) drawNis(host, {t: scene.t, nis: nees, dof: () => 6 - 3 * Number(steps.text('nees_dof', 0) === '3'), counts: () => true, label: 'NEES over its degrees of freedom: 1 is expected', xLabel: scene.timeLabel, height: 150, selection, isFilling: true});
+    if (nees.some(Number.isFinite)) drawNis(host, {t: scene.t, nis: nees, dof: () => 3, counts: () => true, label: 'NEES over its degrees of freedom: 1 is expected', xLabel: scene.timeLabel, height: 150, selection, isFilling: true});
     const words = `the error is inside 3σ for ${percent(inside, known, 1)} of all values (99.7 % expected)`;
     return {marks: known, rows: known, tables: [steps], words, good: `Good: inside the band, on both sides of zero. Here ${words}.` + (doc.estimate('pcrlb_m') > 0 ? ` RMS ${num(1e3 * doc.estimate('rms_m'), 3)} mm; the best possible is ${num(1e3 * doc.estimate('pcrlb_m'), 3)} mm (PCRLB).` : '')};
   },

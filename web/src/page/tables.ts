@@ -40,7 +40,7 @@ export function dataSection(doc: Doc): HTMLElement | null {
   if (tables.length === 0) return null;
   return el('section', {class: 'card', id: 'data'},
     el('div', {class: 'title'}, el('h2', {}, 'Data behind the figures'),
-      el('span', {class: 'note'}, doc.files.length > 0 ? `${doc.files.join(', ')} lie beside this page` : '')),
+      el('span', {class: 'note'}, doc.files.length > 0 ? `beside this page: ${doc.files.join(', ')}` : '')),
     ...tables.map((table) => {
       const details = el('details', {}, el('summary', {}, `${table.name} · ${counted(table.rows, 'row')}`));
       details.addEventListener('toggle', () => {

@@ -48,7 +48,7 @@ export async function opened(browser, url, {width = 1280, height = 900, theme = 
   });
   if (script) await page.addInitScript(script);
   await page.goto(url);
-  await page.waitForFunction(() => document.documentElement.dataset.ready === '1');
+  if (url !== 'about:blank') await page.waitForFunction(() => document.documentElement.dataset.ready === '1');
   return {page, faults, close: () => context.close()};
 }
 

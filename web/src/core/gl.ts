@@ -31,23 +31,27 @@ export function glRenderer(): WebGLRenderer | null {
 export function cssOf(colour: Colour): string {
   return typeof colour === 'string' ? palette()[colour] : css(colour as Rgb);
 }
+const colours = new Map<string, Color>();
 function colourOf(colour: Colour): Color {
-  return new Color().setStyle(cssOf(colour), SRGBColorSpace);
+  const words = cssOf(colour);
+  let made = colours.get(words);
+  if (!made) colours.set(words, (made = new Color().setStyle(words, SRGBColorSpace)));
+  return made;
 }
 
 function facesMesh(faces: Face[], opacity: number): Mesh {
-  const places: number[] = [], colours: number[] = [];
+  const places: number[] = [], shades: number[] = [];
   for (const face of faces) {
     const {r, g, b} = colourOf(face.colour);
     for (let i = 1; i + 1 < face.places.length; ++i)
-      for (const corner of [face.places[0]!, face.places[i]!, face.places[i + 1]!]) {
-        places.push(...corner);
-        colours.push(r, g, b);
+      for (const [x, y, z] of [face.places[0]!, face.places[i]!, face.places[i + 1]!]) {
+        places.push(x, y, z);
+        shades.push(r, g, b);
       }
   }
   const geometry = new BufferGeometry();
   geometry.setAttribute('position', new BufferAttribute(new Float32Array(places), 3));
-  geometry.setAttribute('color', new BufferAttribute(new Float32Array(colours), 3));
+  geometry.setAttribute('color', new BufferAttribute(new Float32Array(shades), 3));
   return new Mesh(geometry, new MeshBasicMaterial({vertexColors: true, side: DoubleSide, transparent: opacity < 1, opacity,
     depthWrite: opacity >= 1, polygonOffset: true, polygonOffsetFactor: 1}));
 }
@@ -55,8 +59,8 @@ function facesMesh(faces: Face[], opacity: number): Mesh {
 function dotsCloud(dots: Dot[], size: number, ratio: number): Points {
   const geometry = new BufferGeometry();
   geometry.setAttribute('position', new BufferAttribute(new Float32Array(dots.flatMap((dot) => dot.at)), 3));
-  const colours = dots.flatMap((dot) => colourOf(dot.colour).toArray());
-  geometry.setAttribute('color', new BufferAttribute(new Float32Array(colours), 3));
+  const shades = dots.flatMap((dot) => colourOf(dot.colour).toArray());
+  geometry.setAttribute('color', new BufferAttribute(new Float32Array(shades), 3));
   return new Points(geometry, new PointsMaterial({size: size * ratio, sizeAttenuation: false, vertexColors: true,
     map: disc(), alphaTest: 0.5, transparent: true}));
 }

@@ -57,7 +57,7 @@ export class World {
     }
   }
   private lines_(look: LineLook): number[] {
-    const full = {width: 1.5, opacity: 1, ...look}, key = JSON.stringify(full);
+    const full = {width: 1.5, opacity: 1, ...look}, key = `${String(full.colour)} ${full.width} ${full.opacity}`;
     let lines = this.lines.get(key);
     if (!lines) this.lines.set(key, (lines = {look: full, places: []}));
     return lines.places;

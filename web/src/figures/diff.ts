@@ -14,8 +14,8 @@ export const difference: Figure = {
     const grid = doc.pixelGrid('diff'), du = grid?.values('delta_u_px'), dv = grid?.values('delta_v_px');
     if (!grid || !du || !dv) return null;
     const size = sizeOfGrid(grid), values = lengths(du, dv), row = el('div', {class: 'row'});
-    let marks = 0;
-    drawField(host, {title: 'difference', grid, size, values, du, dv}, 0.05, (n) => (marks = n));
+    const marks = values.filter(Number.isFinite).length;
+    drawField(host, {title: 'difference', grid, size, values, du, dv}, 0.05);
     const sigmas = [['sigma_a_px', '3σ of A'], ['sigma_b_px', '3σ of B']].map(([name, title]) => [grid.values(name!), title!] as const);
     for (const [sigma, title] of sigmas) {
       if (!sigma) continue;

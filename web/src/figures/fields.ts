@@ -19,8 +19,8 @@ export function sizeOfGrid(grid: Grid): {width: number; height: number} {
   return {width: grid.u0 + grid.du * (grid.cols - 1) + 1, height: grid.v0 + grid.dv * (grid.rows - 1) + 1};
 }
 
-/** One map; the number of its marks comes back by `counted`. */
-export function drawField(host: HTMLElement, field: Field, lowest: number, counted?: (arrows: number) => void): Chart {
+/** One map with its colours, contours and arrows. */
+export function drawField(host: HTMLElement, field: Field, lowest: number): Chart {
   const {grid, size, values} = field, hasArrows = field.du && field.dv;
   host.append(el('p', {class: 'caption'}, field.title));
   let panel: Panel | null = null;
@@ -31,7 +31,7 @@ export function drawField(host: HTMLElement, field: Field, lowest: number, count
     drawContours(pen, panel, grid, values, lowest);
     if (!field.du || !field.dv) return;
     const {factor, bar_px, barLength} = magnificationFor(panel, quantile(values, 0.7), 0.06 * panel.w);
-    counted?.(drawArrows(pen, panel, grid, field.du, field.dv, factor, 11));
+    drawArrows(pen, panel, grid, field.du, field.dv, factor, 11);
     pen.scaleBar(4, panel.y + panel.h + 15, barLength, `${num(bar_px, 2)} px, arrows ×${num(factor, 3)}; far longer ones left out`);
   });
   chart.hover = (x, y) => {

@@ -14,9 +14,9 @@ export const halves: Figure = {
     host.append(row);
     row.append(left);
     if (sigma) row.append(right);
-    let marks = 0;
+    const marks = values.filter(Number.isFinite).length;
     const predicted = sigma ? scaled(sigma, 3) : null;
-    drawField(left, {title: 'difference of the halves', grid, size, values, du, dv}, 0.05, (n) => (marks = n));
+    drawField(left, {title: 'difference of the halves', grid, size, values, du, dv}, 0.05);
     if (predicted) drawField(right, {title: '3σ that the noise predicts for it', grid, size, values: predicted}, 0.05);
     colourKey(host, 'px');
     const share = predicted ? 100 * shareNotAbove(values, predicted) : NaN;

@@ -1,0 +1,43 @@
+// The report pages in a real browser: node run.mjs TEMPLATE [ALIDADE]. Exit code 77: skipped, there is no browser.
+import {existsSync, readFileSync, rmSync} from 'node:fs';
+import {pathToFileURL} from 'node:url';
+import {calibrateDocument, localizeDocument, reproduceDocument, servoDocument} from './documents.mjs';
+import {chromiumPath, folder, hasBrowser, launch, opened, pageFile} from './page.mjs';
+import {realResults} from './runs.mjs';
+import * as behaviour from './behaviour.mjs';
+import * as trouble from './trouble.mjs';
+
+const [templateFile, alidade] = process.argv.slice(2);
+if (!hasBrowser()) {
+  console.log(`web: skipped, there is no ${chromiumPath} (CHROMIUM names another)`);
+  process.exit(77);
+}
+const template = readFileSync(templateFile, 'utf8'), started = Date.now();
+const documents = {servo: {document: servoDocument()}, localize: {document: localizeDocument()}, reproduce: {document: reproduceDocument()}};
+if (alidade && existsSync(alidade)) Object.assign(documents, realResults(alidade));
+else console.log('web: without the executable only made-up documents are shown');
+
+const browser = await launch(), failures = [];
+const context = {
+  browser, template, documents,
+  url: (document, pictures) => pageFile(template, document, pictures),
+  urlOf: (name) => (documents[name].report ? pathToFileURL(documents[name].report).href : pageFile(template, documents[name].document)),
+  open: (url, options) => opened(browser, url, options),
+  calibration: calibrateDocument,
+};
+async function test(name, body) {
+  const start = Date.now();
+  try {
+    await body(context);
+    console.log(`ok    ${name} (${((Date.now() - start) / 1000).toFixed(1)} s)`);
+  } catch (error) {
+    failures.push(name);
+    console.log(`FAILS ${name}: ${error.message}`);
+  }
+}
+for (const name of Object.keys(documents)) await test(`${name}: opens, draws all, in both themes and widths`, (c) => behaviour.opensAndDraws(c, name));
+for (const module of [behaviour, trouble]) for (const [name, body] of Object.entries(module.tests)) if (!body.needs || documents[body.needs]) await test(name, body);
+await browser.close();
+rmSync(folder, {recursive: true, force: true});
+console.log(`web: ${failures.length === 0 ? 'all tests pass' : `${failures.length} tests fail: ${failures.join('; ')}`} (${((Date.now() - started) / 1000).toFixed(0)} s, ${(template.length / 1000).toFixed(0)} kB template)`);
+process.exit(failures.length === 0 ? 0 : 1);

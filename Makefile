@@ -50,9 +50,9 @@ docs: demo
 	@echo "docs: docs/report.png and docs/observe.png, reports as a browser draws them"
 	@$(out)/alidade simulate rotation --source head --zoom ramp --points 12 --seed 3 --out build/demo/turn --quiet
 	@$(out)/alidade observe build/demo/turn/log.csv --size 780x582 --out build/demo/observed --quiet
-	@chromium --headless --no-sandbox --hide-scrollbars --window-size=1500,1330 --force-device-scale-factor=0.7 \
+	@chromium --headless --no-sandbox --hide-scrollbars --disable-gpu --virtual-time-budget=4000 --window-size=1500,1330 --force-device-scale-factor=0.7 \
 	  --screenshot=docs/observe.png "file://$(CURDIR)/build/demo/observed/report.html" >/dev/null 2>&1
-	@chromium --headless --no-sandbox --hide-scrollbars --window-size=1500,885 --force-device-scale-factor=0.8 \
+	@chromium --headless --no-sandbox --hide-scrollbars --disable-gpu --virtual-time-budget=4000 --window-size=1500,885 --force-device-scale-factor=0.8 \
 	  --screenshot=docs/report.png "file://$(CURDIR)/build/demo/result/report.html" >/dev/null 2>&1
 
 study:

@@ -116,6 +116,16 @@ std::optional<Refined> refined(const Camera& camera, Rigid3 cam_from_board, cons
   return std::nullopt;
 }
 
+BoardPoseFit fit_at(const Refined& at) {
+  const Eigen::LDLT<Matrix6> H(at.residuals.J_pose.transpose() * at.residuals.J_pose);
+  BoardPoseFit fit;
+  fit.pose = {at.cam_from_board, H.solve(Matrix6::Identity())};
+  fit.chi2 = at.residuals.r.squaredNorm();
+  fit.dof = static_cast<int>(at.residuals.r.size()) - 6;
+  fit.J_pose_lens = -H.solve(at.residuals.J_pose.transpose() * at.residuals.J_lens);
+  return fit;
+}
+
 bool fits_board(const BoardView& view, std::span<const Eigen::Vector3d> points) {
   for (const Corner& corner : view.corners) {
     if (corner.index < 0 || static_cast<std::size_t>(corner.index) >= points.size()) return false;
@@ -154,29 +164,30 @@ std::optional<CornerResiduals> corner_residuals(const Camera& camera, const Rigi
   return out;
 }
 
+std::vector<BoardPoseFit> fit_board_poses(const Camera& camera, const BoardView& view,
+                                          std::span<const Eigen::Vector3d> points_in_board,
+                                          std::optional<double> sigma_px) {
+  if (view.corners.size() < 4 || !fits_board(view, points_in_board)) return {};
+  const auto start = start_pose(camera, view, points_in_board);
+  if (!start) return {};
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  middle.head<2>() = middle_and_size(view, points_in_board).first;
+  std::vector<BoardPoseFit> fits;
+  auto at = refined(camera, *start, view, points_in_board, sigma_px);
+  if (at) fits.push_back(fit_at(*at));
+  at = refined(camera, mirrored(at ? at->cam_from_board : *start, middle), view, points_in_board, sigma_px);
+  if (at) fits.push_back(fit_at(*at));
+  std::erase_if(fits, [](const BoardPoseFit& fit) { return !fit.pose.cov.allFinite(); });
+  if (fits.size() == 2 && fits[1].chi2 < fits[0].chi2) std::swap(fits[0], fits[1]);
+  return fits;
+}
+
 std::optional<BoardPoseFit> fit_board_pose(const Camera& camera, const BoardView& view,
                                            std::span<const Eigen::Vector3d> points_in_board,
                                            std::optional<double> sigma_px) {
-  if (view.corners.size() < 4 || !fits_board(view, points_in_board)) return std::nullopt;
-  const auto start = start_pose(camera, view, points_in_board);
-  if (!start) return std::nullopt;
-  auto best = refined(camera, *start, view, points_in_board, sigma_px);
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  middle.head<2>() = middle_and_size(view, points_in_board).first;
-  const auto other =
-      refined(camera, mirrored(best ? best->cam_from_board : *start, middle), view, points_in_board, sigma_px);
-  if (other && (!best || other->residuals.r.squaredNorm() < best->residuals.r.squaredNorm())) best = other;
-  if (!best) return std::nullopt;
-
-  const CornerResiduals& at = best->residuals;
-  const Eigen::LDLT<Matrix6> H(at.J_pose.transpose() * at.J_pose);
-  BoardPoseFit fit;
-  fit.pose = {best->cam_from_board, H.solve(Matrix6::Identity())};
-  fit.chi2 = at.r.squaredNorm();
-  fit.dof = static_cast<int>(at.r.size()) - 6;
-  fit.J_pose_lens = -H.solve(at.J_pose.transpose() * at.J_lens);
-  if (!fit.pose.cov.allFinite()) return std::nullopt;
-  return fit;
+  const std::vector<BoardPoseFit> fits = fit_board_poses(camera, view, points_in_board, sigma_px);
+  if (fits.empty()) return std::nullopt;
+  return fits.front();
 }
 
 }  // namespace alidade

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "alidade/board/board_view.h"
 #include "alidade/camera/camera.h"
@@ -45,5 +46,10 @@ struct BoardPoseFit {
 [[nodiscard]] std::optional<BoardPoseFit> fit_board_pose(const Camera& camera, const BoardView& view,
                                                          std::span<const Eigen::Vector3d> points_in_board,
                                                          std::optional<double> sigma_px = {});
+
+/// The same with both poses that a distant board nearly has, where there are two: the better one first.
+[[nodiscard]] std::vector<BoardPoseFit> fit_board_poses(const Camera& camera, const BoardView& view,
+                                                        std::span<const Eigen::Vector3d> points_in_board,
+                                                        std::optional<double> sigma_px = {});
 
 }  // namespace alidade

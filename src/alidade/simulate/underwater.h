@@ -1,0 +1,65 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "alidade/camera/camera.h"
+#include "alidade/geometry/rigid3.h"
+
+namespace alidade {
+
+/// A world for `localize`: a camera under water that swings in front of a board. Its numbers are those of the
+/// experiment of Xu & Xu, "Underwater monocular localization with lens distortion", as far as it says them.
+struct UnderwaterScene {
+  Camera camera;       ///< See underwater_camera().
+  int num_points = 8;  ///< The board's 8, then others around and behind it.
+  std::vector<long> known{2, 4, 6, 8};
+  int num_frames = 35;
+  double dt_s = 0.1;
+  double sigma_px = 0.5;
+  double sigma_known_m = 0.001;  ///< Of each coordinate of a known point.
+  double sigma_depth = 0.03;     ///< Of the depth at which an unknown point is first believed, over the depth.
+  double sigma_position_m = 0.005, sigma_rotation_rad = 0.01;  ///< Of the start that a filter is told.
+  double mismatches = 0.0;    ///< Share of the sights after the first frame that show another place.
+  double mismatch_px = 60.0;  ///< How far at most, in each coordinate.
+  double blackout_from_s = 0.0, blackout_s = 0.0;  ///< Nothing is seen from then on for so long.
+};
+
+/// 768×576, fx 768, fy 766, cx 389, cy 284, k1 −0.44881, k2 0.0664, p1 0.01316, p2 0.00218: strong distortion, which
+/// folds at r = 0.989.
+[[nodiscard]] Camera underwater_camera();
+
+struct UnderwaterSight {
+  long id = 0;
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  bool is_mismatch = false;
+};
+
+struct UnderwaterFrame {
+  double t_s = 0.0;
+  Rigid3 world_from_cam;  ///< The truth.
+  std::vector<UnderwaterSight> sights;
+};
+
+/// What a filter is told of a point before it sees it, and the truth.
+struct UnderwaterPoint {
+  long id = 0;
+  bool is_known = false;
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();
+  Eigen::Vector3d told_in_world = Eigen::Vector3d::Zero();  ///< Of a known one.
+  double told_depth_m = 0.0;  ///< Along the optical axis, where an unknown one is first seen.
+};
+
+struct UnderwaterSequence {
+  std::vector<UnderwaterFrame> frames;
+  std::vector<UnderwaterPoint> points;
+  Rigid3 told_start;  ///< The first pose as a filter is told it.
+};
+
+/// Vertices of a 10×8 grid of 28 mm: 1 (0,0), 2 (9,0), 3 (9,7), 4 (0,7), 5 (5,4), 6 (2,2), 7 (7,2), 8 (7,5); the world
+/// is the board's frame, z away from the camera. The path: 0.62 ± 0.10 m in front, ± 0.12 and 0.09 m aside, turning by
+/// ± 8° about each axis, in sines of 2.6 to 4.5 s. Same seed, same sequence.
+[[nodiscard]] UnderwaterSequence simulate_underwater(const UnderwaterScene& scene, std::uint64_t seed);
+
+}  // namespace alidade

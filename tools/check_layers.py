@@ -6,7 +6,7 @@ import sys
 
 FOUNDATIONS = {"geometry", "estimation"}
 SENSORS = {"camera", "pantilt", "beam", "board", "imaging"}
-ESTIMATORS = {"calibrate", "observe", "rangefinder", "rig", "servo", "track"}
+ESTIMATORS = {"calibrate", "localize", "observe", "rangefinder", "rig", "servo", "track"}
 COMPOSITIONS = {"loop"}  # put estimators and the simulator together
 
 MAY_INCLUDE = {

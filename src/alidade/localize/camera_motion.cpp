@@ -1,0 +1,54 @@
+#include "alidade/localize/camera_motion.h"
+
+#include <cmath>
+
+namespace alidade {
+
+Eigen::Matrix3d right_jacobian(const Eigen::Vector3d& phi) {
+  const double theta2 = phi.squaredNorm(), theta = std::sqrt(theta2);
+  // Series where the closed forms lose digits.
+  const double a = theta2 < 1e-6 ? 0.5 - theta2 / 24.0 : (1.0 - std::cos(theta)) / theta2;
+  const double b = theta2 < 1e-4 ? 1.0 / 6.0 - theta2 / 120.0 : (theta - std::sin(theta)) / (theta2 * theta);
+  const Eigen::Matrix3d X = cross_matrix(phi);
+  return Eigen::Matrix3d::Identity() - a * X + b * X * X;
+}
+
+CameraMotion moved(const CameraMotion& motion, double dt_s) {
+  CameraMotion later = motion;
+  later.world_from_cam.translation += motion.velocity_in_world * dt_s;
+  later.world_from_cam.rotation = (motion.world_from_cam.rotation * exp_so3(motion.rate_in_cam * dt_s)).normalized();
+  return later;
+}
+
+MotionJacobians motion_jacobians(const CameraMotion& motion, double dt_s) {
+  const Eigen::Vector3d phi = motion.rate_in_cam * dt_s;
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity(), J = right_jacobian(phi) * dt_s;
+  MotionJacobians out{MotionMatrix::Identity(), Eigen::Matrix<double, motion_dim, 6>::Zero()};
+  out.F.block<3, 3>(0, 6) = dt_s * I;
+  out.F.block<3, 3>(3, 3) = exp_so3(phi).toRotationMatrix().transpose();
+  out.F.block<3, 3>(3, 9) = J;
+  out.G.block<3, 3>(0, 0) = dt_s * I;
+  out.G.block<3, 3>(3, 3) = J;
+  out.G.block<3, 3>(6, 0) = I;
+  out.G.block<3, 3>(9, 3) = I;
+  return out;
+}
+
+MotionMatrix motion_noise(const MotionJacobians& jacobians, double sigma_a_m_s2, double sigma_alpha_rad_s2,
+                          double dt_s) {
+  Eigen::Vector<double, 6> sigma;
+  sigma << Eigen::Vector3d::Constant(sigma_a_m_s2 * dt_s), Eigen::Vector3d::Constant(sigma_alpha_rad_s2 * dt_s);
+  const Eigen::Matrix<double, motion_dim, 6> L = jacobians.G * sigma.asDiagonal();
+  return L * L.transpose();
+}
+
+CameraMotion retract(const CameraMotion& motion, const Eigen::Vector<double, motion_dim>& error) {
+  CameraMotion result = motion;
+  result.world_from_cam.translation += error.head<3>();
+  result.world_from_cam.rotation = (motion.world_from_cam.rotation * exp_so3(error.segment<3>(3))).normalized();
+  result.velocity_in_world += error.segment<3>(6);
+  result.rate_in_cam += error.tail<3>();
+  return result;
+}
+
+}  // namespace alidade

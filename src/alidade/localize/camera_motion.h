@@ -1,0 +1,42 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "alidade/geometry/rigid3.h"
+
+namespace alidade {
+
+/// A camera that moves: where it is, and how fast. Its error has 12 numbers, in this order: position in the world,
+/// rotation on the right (q = q̂ exp(δθ)), velocity in the world, angular rate in the camera's frame.
+struct CameraMotion {
+  Rigid3 world_from_cam;
+  Eigen::Vector3d velocity_in_world = Eigen::Vector3d::Zero();  ///< [m/s]
+  Eigen::Vector3d rate_in_cam = Eigen::Vector3d::Zero();        ///< [rad/s]
+};
+
+inline constexpr int motion_dim = 12;
+using MotionMatrix = Eigen::Matrix<double, motion_dim, motion_dim>;
+
+/// The same a time later at constant velocity and rate: r + vΔ, q exp(ωΔ).
+/// A. J. Davison et al., "MonoSLAM: Real-Time Single Camera SLAM", PAMI 29(6), 2007, eq. (6), with ω in the camera.
+[[nodiscard]] CameraMotion moved(const CameraMotion& motion, double dt_s);
+
+/// Derivative of moved() by the error before it, and by a step [V, Ω] of velocity and rate at its beginning.
+struct MotionJacobians {
+  MotionMatrix F;
+  Eigen::Matrix<double, motion_dim, 6> G;
+};
+[[nodiscard]] MotionJacobians motion_jacobians(const CameraMotion& motion, double dt_s);
+
+/// Q = G diag((σ_a Δ)² I, (σ_α Δ)² I) Gᵀ: accelerations that are drawn anew for each Δ.
+[[nodiscard]] MotionMatrix motion_noise(const MotionJacobians& jacobians, double sigma_a_m_s2,
+                                        double sigma_alpha_rad_s2, double dt_s);
+
+/// Motion ⊞ error: the nominal one moved by 12 numbers.
+[[nodiscard]] CameraMotion retract(const CameraMotion& motion, const Eigen::Vector<double, motion_dim>& error);
+
+/// J_r with exp(φ + ε) ≈ exp(φ) exp(J_r ε): I − (1 − cos θ)/θ² [φ]× + (θ − sin θ)/θ³ [φ]×².
+/// Solà, Deray & Atchuthan, "A micro Lie theory", 2018, eq. (143).
+[[nodiscard]] Eigen::Matrix3d right_jacobian(const Eigen::Vector3d& phi);
+
+}  // namespace alidade

@@ -1,0 +1,109 @@
+#include "alidade/localize/known_pose.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/board/board_pose.h"
+
+namespace alidade {
+namespace {
+
+struct SeenPoints {
+  BoardView view;
+  std::vector<Eigen::Vector3d> points_in_board;
+  Rigid3 world_from_board;
+  double sigma_m = 0.0;
+};
+
+/// The known points that are seen, in the frame of the plane through them.
+SeenPoints seen_points(std::span<const FeatureSight> sights, std::span<const KnownPoint> known) {
+  SeenPoints seen;
+  std::vector<Eigen::Vector3d> points_in_world;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const FeatureSight& sight : sights) {
+    const auto at = std::ranges::find(known, sight.id, &KnownPoint::id);
+    if (at == known.end()) continue;
+    Corner corner;
+    corner.index = static_cast<int>(points_in_world.size());
+    corner.px = sight.px;
+    seen.view.corners.push_back(corner);
+    points_in_world.push_back(at->point_in_world);
+    middle += at->point_in_world;
+    seen.sigma_m = std::max(seen.sigma_m, at->sigma_m);
+  }
+  if (points_in_world.empty()) return seen;
+  middle /= static_cast<double>(points_in_world.size());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& point : points_in_world) scatter += (point - middle) * (point - middle).transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
+  Eigen::Matrix3d axes;
+  axes << eigen.eigenvectors().col(2), eigen.eigenvectors().col(1),
+      eigen.eigenvectors().col(2).cross(eigen.eigenvectors().col(1));
+  seen.world_from_board = {Eigen::Quaterniond(axes), middle};
+  for (const Eigen::Vector3d& point_in_world : points_in_world)
+    seen.points_in_board.push_back(seen.world_from_board.inverse() * point_in_world);
+  return seen;
+}
+
+/// From the right perturbation of cam_from_board to position in the world and right rotation of world_from_cam.
+StartHypothesis start_of(const BoardPoseFit& fit, const SeenPoints& seen, const KnownPoseConfig& config) {
+  const Rigid3 board_from_cam = fit.pose.cam_from_board.inverse();
+  const Eigen::Matrix3d R = fit.pose.cam_from_board.rotation.toRotationMatrix();
+  const Eigen::Matrix3d turned = seen.world_from_board.rotation.toRotationMatrix();
+  Eigen::Matrix<double, 6, 6> J = Eigen::Matrix<double, 6, 6>::Zero();
+  J.topLeftCorner<3, 3>() = -turned;
+  J.topRightCorner<3, 3>() = turned * cross_matrix(board_from_cam.translation);
+  J.bottomRightCorner<3, 3>() = -R;
+  StartHypothesis start;
+  start.motion.world_from_cam = seen.world_from_board * board_from_cam;
+  start.cov.topLeftCorner<6, 6>() = J * fit.pose.cov * J.transpose();
+  start.cov.diagonal().segment<3>(6).setConstant(config.sigma_speed_m_s * config.sigma_speed_m_s);
+  start.cov.diagonal().tail<3>().setConstant(config.sigma_rate_rad_s * config.sigma_rate_rad_s);
+  start.cost = fit.chi2;
+  return start;
+}
+
+/// σ of a pixel with that of the point itself, seen from as far as the fit says.
+double effective_sigma_px(const Camera& camera, const BoardPoseFit& fit, double sigma_m, double sigma_px) {
+  const double focal_px = params(camera.lens)[0];
+  const double distance_m = fit.pose.cam_from_board.translation.norm();
+  return std::hypot(sigma_px, focal_px * sigma_m / distance_m);
+}
+
+std::vector<BoardPoseFit> fits_of(const Camera& camera, const SeenPoints& seen, const BoardView& view,
+                                  double sigma_px) {
+  std::vector<BoardPoseFit> fits = fit_board_poses(camera, view, seen.points_in_board, sigma_px);
+  if (fits.empty()) return fits;
+  return fit_board_poses(camera, view, seen.points_in_board,
+                         effective_sigma_px(camera, fits.front(), seen.sigma_m, sigma_px));
+}
+
+}  // namespace
+
+std::vector<StartHypothesis> poses_from_known(const Camera& camera, std::span<const FeatureSight> sights,
+                                              std::span<const KnownPoint> known, const KnownPoseConfig& config) {
+  const SeenPoints seen = seen_points(sights, known);
+  BoardView view = seen.view;
+  std::vector<BoardPoseFit> fits = fits_of(camera, seen, view, config.sigma_px);
+  constexpr double most_chi2_per_dof = 6.0;  // 99.9 % of the two numbers that five points leave
+  while (view.corners.size() > 4 && (fits.empty() || fits.front().chi2 > most_chi2_per_dof * fits.front().dof)) {
+    BoardView best = view;
+    for (std::size_t left_out = 0; left_out < view.corners.size(); ++left_out) {
+      BoardView fewer = view;
+      fewer.corners.erase(fewer.corners.begin() + static_cast<std::ptrdiff_t>(left_out));
+      std::vector<BoardPoseFit> tried = fits_of(camera, seen, fewer, config.sigma_px);
+      if (tried.empty() || (best.corners.size() < view.corners.size() && tried.front().chi2 >= fits.front().chi2))
+        continue;
+      best = std::move(fewer);
+      fits = std::move(tried);
+    }
+    if (best.corners.size() == view.corners.size()) break;
+    view = std::move(best);
+  }
+  std::vector<StartHypothesis> starts;
+  for (const BoardPoseFit& fit : fits) starts.push_back(start_of(fit, seen, config));
+  return starts;
+}
+
+}  // namespace alidade

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "alidade/localize/filter_bank.h"
+
+namespace alidade {
+
+/// A point whose place is known before: it gives scale and frame.
+struct KnownPoint {
+  long id = 0;
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();
+  double sigma_m = 0.001;  ///< Of each coordinate.
+};
+
+/// Where a camera is that sees these known points, which lie in a plane (or nearly): both poses that a flat target
+/// nearly has, by maximum likelihood, the better one first, with their covariance; speeds zero with these σ. Of more
+/// than four points those that do not fit are left out. Empty where fewer than four are seen or they are on a line.
+struct KnownPoseConfig {
+  double sigma_px = 0.5;
+  double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;
+};
+[[nodiscard]] std::vector<StartHypothesis> poses_from_known(const Camera& camera, std::span<const FeatureSight> sights,
+                                                            std::span<const KnownPoint> known,
+                                                            const KnownPoseConfig& config = {});
+
+}  // namespace alidade

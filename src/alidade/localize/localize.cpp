@@ -1,0 +1,273 @@
+#include "alidade/localize/localize.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <map>
+#include <set>
+
+#include "alidade/localize/point_store.h"
+
+namespace alidade {
+namespace {
+
+constexpr std::size_t least_tracked = 3;  // a pose has six numbers, a point two
+
+/// One run: the filters, what is known of points outside them, and when to start again.
+class Localizer {
+ public:
+  Localizer(const Camera& camera, const LocalizeConfig& config, double period_s)
+      : camera_(camera), config_(config), points_(config), period_s_(period_s) {}
+
+  PathStep take(const SightFrame& frame);
+  [[nodiscard]] const FilterBank* bank() const { return bank_ ? &*bank_ : nullptr; }
+  [[nodiscard]] std::size_t num_restarts() const { return num_restarts_; }
+  [[nodiscard]] const PointStore& points() const { return points_; }
+
+ private:
+  [[nodiscard]] std::vector<StartHypothesis> starts(const SightFrame& frame) const;
+  [[nodiscard]] KnownPoseConfig pose_config() const {
+    return {config_.filter.sigma_px, config_.sigma_speed_m_s, config_.sigma_rate_rad_s};
+  }
+  bool start(const SightFrame& frame);
+  void predict_to(double t_s);
+  void add_new(const SightFrame& frame);
+  void drop_strangers(const SightFrame& frame, const SightsReport& report);
+  bool is_wrong(const PathStep& step);
+  bool restart(const SightFrame& frame);
+  void fill(const SightsReport& report, PathStep& step) const;
+
+  Camera camera_;
+  const LocalizeConfig& config_;
+  std::optional<FilterBank> bank_;
+  PointStore points_;
+  double period_s_, t_s_ = 0.0, seen_s_ = 0.0;
+  std::deque<double> recent_nis_, recent_gated_;
+  std::size_t num_restarts_ = 0;
+};
+
+/// A start that was told, or the poses from which the target looks so; without a target the first camera is the world.
+std::vector<StartHypothesis> Localizer::starts(const SightFrame& frame) const {
+  if (config_.start) return {*config_.start};
+  if (!config_.target.empty()) return poses_from_known(camera_, frame.sights, config_.target, pose_config());
+  if (frame.sights.size() < least_tracked) return {};
+  StartHypothesis origin;
+  constexpr double sure = 1e-6;  // the world is where the camera is; zero would leave no way to correct it
+  origin.cov.diagonal().head<6>().setConstant(sure * sure);
+  origin.cov.diagonal().segment<3>(6).setConstant(config_.sigma_speed_m_s * config_.sigma_speed_m_s);
+  origin.cov.diagonal().tail<3>().setConstant(config_.sigma_rate_rad_s * config_.sigma_rate_rad_s);
+  return {origin};
+}
+
+bool Localizer::start(const SightFrame& frame) {
+  const std::vector<StartHypothesis> from = starts(frame);
+  if (from.empty()) return false;
+  bank_.emplace(camera_, from, config_.filter, config_.bank);
+  for (const KnownPoint& point : config_.target) bank_->add_known(point.id, point.point_in_world, point.sigma_m);
+  t_s_ = seen_s_ = frame.t_s;
+  return true;
+}
+
+/// In steps of a frame's period: accelerations are drawn anew for each, also while frames are missing.
+void Localizer::predict_to(double t_s) {
+  constexpr int most_steps = 1000;  // σ is as large as the world long before
+  const double gap_s = t_s - t_s_;
+  const int num_steps = std::clamp(static_cast<int>(std::lround(gap_s / period_s_)), 1, most_steps);
+  for (int i = 0; i < num_steps; ++i) bank_->predict(gap_s / num_steps);
+  t_s_ = t_s;
+}
+
+void Localizer::add_new(const SightFrame& frame) {
+  for (const FeatureSight& sight : frame.sights) {
+    if (bank_->best().has(sight.id)) continue;
+    const auto prior = points_.prior_of(sight, bank_->best());
+    if (!prior) continue;
+    bank_->add(sight.id, sight.px, *prior,
+               config_.new_points == NewPoints::xyz ? FeatureKind::xyz : FeatureKind::inverse_depth);
+  }
+}
+
+/// Points that do not fit several times in a row leave; they may come again.
+void Localizer::drop_strangers(const SightFrame& frame, const SightsReport& report) {
+  for (std::size_t i = 0; i < frame.sights.size(); ++i) {
+    if (points_.is_stranger(frame.sights[i].id, report.outcomes[i])) bank_->remove(frame.sights[i].id);
+  }
+}
+
+/// Mean NIS above 2, or most sights gated, over five frames with sights.
+bool Localizer::is_wrong(const PathStep& step) {
+  if (step.num_tracked + step.num_gated == 0) return false;
+  constexpr std::size_t window = 5;
+  constexpr double most_nis = 2.0, most_gated = 0.6;
+  recent_nis_.push_back(step.num_tracked > 0 ? step.nis_per_dof : most_nis);
+  recent_gated_.push_back(static_cast<double>(step.num_gated) / static_cast<double>(step.num_tracked + step.num_gated));
+  if (recent_nis_.size() > window) {
+    recent_nis_.pop_front();
+    recent_gated_.pop_front();
+  }
+  if (recent_nis_.size() < window) return false;
+  double nis = 0.0, gated = 0.0;
+  for (std::size_t i = 0; i < window; ++i) {
+    nis += recent_nis_[i] / window;
+    gated += recent_gated_[i] / window;
+  }
+  return nis > most_nis || gated > most_gated;
+}
+
+/// From the target, where it says that the camera is somewhere else. The map of points that led there is dropped.
+bool Localizer::restart(const SightFrame& frame) {
+  const std::vector<StartHypothesis> from = poses_from_known(camera_, frame.sights, config_.target, pose_config());
+  if (from.empty()) return false;
+  const LocalizationFilter& now = bank_->best();
+  const CameraMotion& is = now.motion();
+  Eigen::Vector<double, 6> difference;
+  difference.head<3>() = from.front().motion.world_from_cam.translation - is.world_from_cam.translation;
+  difference.tail<3>() = log_so3(is.world_from_cam.rotation.conjugate() * from.front().motion.world_from_cam.rotation);
+  const Eigen::Matrix<double, 6, 6> cov =
+      now.motion_covariance().topLeftCorner<6, 6>() + from.front().cov.topLeftCorner<6, 6>();
+  constexpr double gate = 22.5;  // χ² of six numbers: 99.9 %
+  if (difference.dot(cov.inverse() * difference) < gate) return false;
+  std::vector<long> unknown;
+  for (const Feature& feature : now.features())
+    if (!feature.is_known) unknown.push_back(feature.id);
+  for (const long id : unknown) bank_->remove(id);
+  bank_->restart(from);
+  recent_nis_.clear();
+  recent_gated_.clear();
+  ++num_restarts_;
+  return true;
+}
+
+void Localizer::fill(const SightsReport& report, PathStep& step) const {
+  step.num_tracked = report.num_used;
+  step.num_gated = report.num_gated;
+  if (report.num_used > 0) step.nis_per_dof = report.nis_per_dof;
+  const LocalizationFilter& filter = bank_->best();
+  step.world_from_cam = filter.motion().world_from_cam;
+  step.cov = filter.pose_covariance();
+  step.num_features = filter.features().size();
+}
+
+PathStep Localizer::take(const SightFrame& frame) {
+  PathStep step;
+  step.frame = frame.frame;
+  step.t_s = frame.t_s;
+  step.num_seen = frame.sights.size();
+  step.event = FrameEvent::tracked;
+  if (!bank_) {
+    if (!start(frame)) {
+      step.event = FrameEvent::waiting;
+      return step;
+    }
+    step.event = FrameEvent::started;
+  } else {
+    predict_to(frame.t_s);
+  }
+  const SightsReport report = bank_->update(frame.sights);
+  fill(report, step);
+  if (step.event == FrameEvent::tracked && step.num_tracked < least_tracked) step.event = FrameEvent::predicted;
+  const bool is_wrong_now = is_wrong(step);
+  drop_strangers(frame, report);
+  if (config_.restarts && is_wrong_now && restart(frame)) {
+    fill(bank_->update(frame.sights), step);
+    step.event = FrameEvent::restarted;
+  }
+  if (step.num_tracked >= least_tracked || step.event == FrameEvent::started) add_new(frame);
+  bank_->convert_linear();
+  return step;
+}
+
+/// The usual time between frames: the median.
+double period_of(std::span<const SightFrame> frames) {
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < frames.size(); ++i) gaps.push_back(frames[i].t_s - frames[i - 1].t_s);
+  if (gaps.empty()) return 1.0;
+  std::ranges::nth_element(gaps, gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2));
+  return std::max(gaps[gaps.size() / 2], 1e-9);
+}
+
+/// The state is made as large as these frames can need.
+LocalizeConfig sized(const LocalizeConfig& given, std::span<const SightFrame> frames) {
+  LocalizeConfig config = given;
+  std::set<long> ids;
+  std::size_t most = 1;
+  for (const SightFrame& frame : frames) {
+    for (const FeatureSight& sight : frame.sights) ids.insert(sight.id);
+    most = std::max(most, frame.sights.size());
+  }
+  for (const KnownPoint& point : config.target) ids.insert(point.id);
+  const auto need = motion_dim + config.filter.lens_params.size() + 6 * ids.size() + 8;
+  config.filter.state_capacity =
+      std::min(config.filter.state_capacity, static_cast<int>(std::min<std::size_t>(need, 1 << 20)));
+  config.filter.sights_capacity =
+      std::min(config.filter.sights_capacity, static_cast<int>(std::min<std::size_t>(most, 1 << 20)));
+  return config;
+}
+
+void sum_up(const Localizer& localizer, std::span<const TimedPose> truth, LocalizeReport& report) {
+  double nis = 0.0, dof = 0.0;
+  std::vector<TimedPose> path;
+  for (const PathStep& step : report.path) {
+    report.num_sights += step.num_seen;
+    report.num_used += step.num_tracked;
+    report.num_gated += step.num_gated;
+    report.most_seen = std::max(report.most_seen, step.num_seen);
+    report.num_lost += step.event == FrameEvent::waiting || step.event == FrameEvent::predicted ? 1 : 0;
+    if (step.num_tracked > 0) {
+      nis += step.nis_per_dof * static_cast<double>(step.num_tracked);
+      dof += static_cast<double>(step.num_tracked);
+    }
+    if (step.has_pose()) path.push_back({step.t_s, step.world_from_cam});
+  }
+  if (dof > 0.0) report.nis_per_dof = nis / dof;
+  report.num_restarts = localizer.num_restarts();
+  if (!localizer.bank()) return;
+  const LocalizationFilter& filter = localizer.bank()->best();
+  report.camera = filter.camera();
+  report.sigma_lens = filter.lens_sigmas();
+  for (const Feature& feature : filter.features()) {
+    const auto place = filter.place(feature.id);
+    const std::size_t num_seen = localizer.points().num_used(feature.id);
+    report.map.push_back({feature.id, place->point_in_world, place->cov, feature.is_known, num_seen});
+  }
+  if (!truth.empty()) report.error = path_error(path, truth, report.scale_known);
+}
+
+}  // namespace
+
+std::string_view event_name(FrameEvent event) {
+  switch (event) {
+    case FrameEvent::waiting:
+      return "waiting";
+    case FrameEvent::started:
+      return "started";
+    case FrameEvent::tracked:
+      return "tracked";
+    case FrameEvent::predicted:
+      return "predicted";
+    case FrameEvent::restarted:
+      return "restarted";
+  }
+  return "";
+}
+
+LocalizeReport localize_sights(const Camera& camera, std::span<const SightFrame> frames, const LocalizeConfig& given,
+                               std::span<const TimedPose> truth, const Progress& progress) {
+  const LocalizeConfig config = sized(given, frames);
+  LocalizeReport report;
+  report.camera = camera;
+  report.has_target = !config.target.empty();
+  report.scale_known = report.has_target;
+  Localizer localizer(camera, config, period_of(frames));
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    report_progress(progress, "localize", i, frames.size());
+    const double begin_s = config.seconds ? config.seconds() : 0.0;
+    report.path.push_back(localizer.take(frames[i]));
+    if (config.seconds) report.path.back().seconds = config.seconds() - begin_s;
+  }
+  sum_up(localizer, truth, report);
+  return report;
+}
+
+}  // namespace alidade

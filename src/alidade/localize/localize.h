@@ -1,0 +1,105 @@
+#pragma once
+
+#include <functional>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "alidade/estimation/progress.h"
+#include "alidade/estimation/verdict.h"
+#include "alidade/localize/filter_bank.h"
+#include "alidade/localize/known_pose.h"
+#include "alidade/localize/path_error.h"
+
+namespace alidade {
+
+/// What was seen of numbered points in one picture.
+struct SightFrame {
+  long frame = 0;
+  double t_s = 0.0;
+  std::vector<FeatureSight> sights;
+};
+
+/// What is believed of a point's depth before it is seen: along the optical axis where it is first seen.
+struct ToldDepth {
+  long id = 0;
+  double depth_m = 1.0;
+  double sigma_rel = 0.03;
+};
+
+/// When a new point enters the state.
+enum class NewPoints {
+  inverse_depth,  ///< With its first sight, as an inverse depth.
+  xyz,            ///< With its first sight, as a place.
+  delayed,        ///< When two of its sights tell its depth to 5 %, as an inverse depth.
+};
+
+struct LocalizeConfig {
+  LocalizationFilterConfig filter;
+  FilterBankConfig bank;
+  std::optional<StartHypothesis> start;  ///< Else from the target, else the world is the first camera, scale unknown.
+  std::vector<KnownPoint> target;
+  std::vector<ToldDepth> depths;
+  double depth_m = 0.0;      ///< Of points that are not in `depths`; 0: the target's distance.
+  double sigma_depth = 0.5;  ///< Of those, over the depth.
+  NewPoints new_points = NewPoints::inverse_depth;
+  bool restarts = true;  ///< From the target where the innovations say that the path is wrong.
+  double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;  ///< At a start from the target or from nothing.
+  std::function<double()> seconds;                       ///< A clock, if frames are to be timed.
+};
+
+enum class FrameEvent {
+  waiting,  ///< Not started yet: no pose.
+  started,
+  tracked,
+  predicted,  ///< Fewer than three points used: the pose is mostly the motion's.
+  restarted,
+};
+[[nodiscard]] std::string_view event_name(FrameEvent event);
+
+struct PathStep {
+  long frame = 0;
+  double t_s = 0.0;
+  FrameEvent event = FrameEvent::waiting;
+  Rigid3 world_from_cam;
+  Eigen::Matrix<double, 6, 6> cov = Eigen::Matrix<double, 6, 6>::Zero();  ///< Of the right perturbation.
+  std::size_t num_seen = 0, num_tracked = 0, num_gated = 0, num_features = 0;
+  double nis_per_dof = std::numeric_limits<double>::quiet_NaN();
+  double seconds = 0.0;
+
+  [[nodiscard]] bool has_pose() const { return event != FrameEvent::waiting; }
+};
+
+struct MapPoint {
+  long id = 0;
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();
+  bool is_known = false;
+  std::size_t num_seen = 0;
+};
+
+struct LocalizeReport {
+  std::vector<PathStep> path;  ///< One a frame.
+  std::vector<MapPoint> map;   ///< At the end.
+  bool scale_known = false;
+  bool has_target = false;   ///< Known points were given.
+  std::size_t num_lost = 0;  ///< Frames without a pose that sights hold: waiting or predicted.
+  std::size_t num_restarts = 0;
+  std::size_t num_sights = 0, num_used = 0, num_gated = 0, most_seen = 0;
+  double nis_per_dof = std::numeric_limits<double>::quiet_NaN();
+  Camera camera;               ///< As it is at the end.
+  Eigen::VectorXd sigma_lens;  ///< Of the parameters that were estimated.
+  PathError error;             ///< With truth.
+};
+
+/// The path of a camera through all frames, in order of time, and the map of its points.
+[[nodiscard]] LocalizeReport localize_sights(const Camera& camera, std::span<const SightFrame> frames,
+                                             const LocalizeConfig& config, std::span<const TimedPose> truth = {},
+                                             const Progress& progress = {});
+
+/// Whether the path stands. A path that its sights contradict is never good.
+[[nodiscard]] Verdict localize_verdict(const LocalizeReport& report);
+
+}  // namespace alidade

@@ -1,0 +1,106 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include "alidade/localize/localize.h"
+
+namespace alidade {
+namespace {
+
+constexpr double good_nis_low = 0.4, good_nis_high = 1.5, care_nis = 2.0, most_nis = 4.0;
+constexpr double care_gated = 0.3, most_gated = 0.6, care_lost = 0.1, most_lost = 0.5;
+
+std::string text_of(double value, int digits = 2) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return text;
+}
+
+double share(std::size_t part, std::size_t of) {
+  return of > 0 ? static_cast<double>(part) / static_cast<double>(of) : 0.0;
+}
+
+Verdict stopped(State state, ExitCode code, std::string sentence, std::string to_add) {
+  return {state, code, std::move(sentence), std::move(to_add), {}};
+}
+
+/// Why there is no path at all.
+Verdict never_started(const LocalizeReport& report) {
+  if (report.most_seen < 3)
+    return stopped(State::refused, ExitCode::cannot_tell,
+                   "too few points: at most " + std::to_string(report.most_seen) + " in a frame, a pose needs three",
+                   "track more points");
+  return stopped(State::refused, ExitCode::cannot_tell,
+                 "the target is not found: four of its points, in a plane and not on a line, are never seen together",
+                 "begin in front of the target, or give --start");
+}
+
+State state_of(double value, double care, double bad) {
+  return value > bad ? State::bad : value > care ? State::care : State::good;
+}
+
+void add_checks(const LocalizeReport& report, Verdict& verdict) {
+  const double nis = report.nis_per_dof;
+  const State nis_state = nis < good_nis_low ? State::care : state_of(nis, good_nis_high, care_nis);
+  const std::string said = nis > good_nis_high  ? "the sights do not fit: the lens or the noise is not as stated"
+                           : nis < good_nis_low ? "noise is smaller than stated"
+                                                : "innovations as large as predicted";
+  verdict.checks.push_back(
+      {"NIS", nis_state, text_of(nis, 3) + " per degree of freedom: " + said, nis, good_nis_high, "1", "nis"});
+  const double lost = share(report.num_lost, report.path.size());
+  verdict.checks.push_back({"frames lost", state_of(lost, 0.0, care_lost),
+                            report.num_lost == 0 ? "no frame lost" : std::to_string(report.num_lost) + " frames lost",
+                            lost, care_lost, "1", "tracks"});
+  const double gated = share(report.num_gated, report.num_used + report.num_gated);
+  verdict.checks.push_back({"gated", state_of(gated, 0.05, care_gated),
+                            text_of(100.0 * gated) + " % of the sights fit nowhere", gated, care_gated, "1", "tracks"});
+  verdict.checks.push_back({"scale", report.scale_known ? State::good : State::care,
+                            report.scale_known
+                                ? "scale from the known points"
+                                : "scale unknown: the path is up to scale, its unit is the depth at the start",
+                            0.0, 0.0, "", "path"});
+  if (report.num_restarts > 0)
+    verdict.checks.push_back({"restarts", State::care,
+                              "begun anew from the target " + std::to_string(report.num_restarts) + " times",
+                              static_cast<double>(report.num_restarts), 0.0, "times", "path"});
+}
+
+}  // namespace
+
+Verdict localize_verdict(const LocalizeReport& report) {
+  const std::size_t num_frames = report.path.size();
+  const bool has_started = std::ranges::any_of(report.path, &PathStep::has_pose);
+  if (!has_started) return never_started(report);
+  if (report.num_used == 0 || report.most_seen < 3)
+    return stopped(State::refused, ExitCode::cannot_tell,
+                   "too few points: at most " + std::to_string(report.most_seen) + " in a frame, a pose needs three",
+                   "track more points");
+  const double gated = share(report.num_gated, report.num_used + report.num_gated);
+  const double lost = share(report.num_lost, num_frames);
+  const bool is_finite = std::ranges::all_of(report.path, [](const PathStep& step) {
+    return !step.has_pose() || (step.world_from_cam.translation.allFinite() && step.cov.allFinite());
+  });
+  if (!is_finite || report.nis_per_dof > most_nis || gated > most_gated)
+    return stopped(State::not_converged, ExitCode::no_convergence,
+                   "no path fits the sights: NIS " + text_of(report.nis_per_dof, 3) + " per degree of freedom, " +
+                       text_of(100.0 * gated) + " % of them left out",
+                   "check camera, target and start, and --sigma-px");
+  if (lost > most_lost)
+    return stopped(State::refused, ExitCode::cannot_tell,
+                   "lost: " + std::to_string(report.num_lost) + " of " + std::to_string(num_frames) +
+                       " frames have fewer than three points that fit",
+                   "track more points, and keep the target in sight for longer");
+  Verdict verdict;
+  add_checks(report, verdict);
+  for (const Check& check : verdict.checks) verdict.state = std::max(verdict.state, check.state);
+  verdict.sentence =
+      "localised in " + std::to_string(num_frames - report.num_lost) + " of " + std::to_string(num_frames) + " frames";
+  for (const Check& check : verdict.checks) {
+    if (check.state == State::good || (check.state != verdict.state && check.name != "scale")) continue;
+    verdict.sentence += "; " + check.text;
+  }
+  return verdict;
+}
+
+}  // namespace alidade

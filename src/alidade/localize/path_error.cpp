@@ -1,0 +1,92 @@
+#include "alidade/localize/path_error.h"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+namespace alidade {
+namespace {
+
+struct Pair {
+  Rigid3 estimated, truth;
+};
+
+std::vector<Pair> matched(std::span<const TimedPose> estimated, std::span<const TimedPose> truth, double tolerance_s) {
+  std::vector<Pair> pairs;
+  for (const TimedPose& pose : estimated) {
+    auto at = std::ranges::lower_bound(truth, pose.t_s, {}, &TimedPose::t_s);
+    if (at != truth.begin() && (at == truth.end() || pose.t_s - std::prev(at)->t_s < at->t_s - pose.t_s)) --at;
+    if (at != truth.end() && std::abs(at->t_s - pose.t_s) <= tolerance_s)
+      pairs.push_back({pose.world_from_cam, at->world_from_cam});
+  }
+  return pairs;
+}
+
+}  // namespace
+
+std::optional<Similarity> aligned(std::span<const Eigen::Vector3d> a, std::span<const Eigen::Vector3d> b,
+                                  bool is_rigid) {
+  if (a.size() != b.size() || a.size() < 3) return std::nullopt;
+  const auto num = static_cast<double>(a.size());
+  Eigen::Vector3d mean_a = Eigen::Vector3d::Zero(), mean_b = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    mean_a += a[i] / num;
+    mean_b += b[i] / num;
+  }
+  Eigen::Matrix3d cross = Eigen::Matrix3d::Zero();
+  double variance_a = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    cross += (b[i] - mean_b) * (a[i] - mean_a).transpose() / num;
+    variance_a += (a[i] - mean_a).squaredNorm() / num;
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Vector3d D = svd.singularValues();
+  if (!(D[1] > 1e-12 * D[0]) || !(variance_a > 0.0)) return std::nullopt;
+  const double mirror = svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0 ? -1.0 : 1.0;
+  const Eigen::Vector3d sign(1.0, 1.0, mirror);
+  const Eigen::Matrix3d R = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
+  Similarity result;
+  result.scale = is_rigid ? 1.0 : D.dot(sign) / variance_a;
+  result.b_from_a = {Eigen::Quaterniond(R), mean_b - result.scale * (R * mean_a)};
+  return result;
+}
+
+PathError path_error(std::span<const TimedPose> estimated, std::span<const TimedPose> truth, bool is_rigid,
+                     double tolerance_s) {
+  const std::vector<Pair> pairs = matched(estimated, truth, tolerance_s);
+  PathError error;
+  error.num_pairs = pairs.size();
+  if (pairs.empty()) return error;
+  const auto num = static_cast<double>(pairs.size());
+  std::vector<Eigen::Vector3d> a, b;
+  double sum2 = 0.0;
+  for (const Pair& pair : pairs) {
+    a.push_back(pair.estimated.translation);
+    b.push_back(pair.truth.translation);
+    sum2 += (a.back() - b.back()).squaredNorm();
+  }
+  error.unaligned_m = std::sqrt(sum2 / num);
+  const auto fit = aligned(a, b, is_rigid);
+  if (!fit) return error;
+  error.scale = fit->scale;
+  sum2 = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const Eigen::Vector3d moved = fit->b_from_a.rotation * (fit->scale * a[i]) + fit->b_from_a.translation;
+    sum2 += (moved - b[i]).squaredNorm();
+  }
+  error.ate_m = std::sqrt(sum2 / num);
+  double steps2 = 0.0, turns2 = 0.0;
+  for (std::size_t i = 1; i < pairs.size(); ++i) {
+    Rigid3 step = pairs[i - 1].estimated.inverse() * pairs[i].estimated;
+    step.translation *= fit->scale;
+    const Rigid3 true_step = pairs[i - 1].truth.inverse() * pairs[i].truth;
+    const Rigid3 difference = true_step.inverse() * step;
+    steps2 += difference.translation.squaredNorm();
+    turns2 += log_so3(difference.rotation).squaredNorm();
+  }
+  error.rpe_m = std::sqrt(steps2 / (num - 1.0));
+  error.rpe_rad = std::sqrt(turns2 / (num - 1.0));
+  return error;
+}
+
+}  // namespace alidade

@@ -1,0 +1,77 @@
+#include "alidade/localize/point_store.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace alidade {
+
+bool PointStore::is_stranger(long id, SightOutcome outcome) {
+  if (outcome != SightOutcome::used && outcome != SightOutcome::gated) return false;
+  Point& point = points_[id];
+  const bool is_used = outcome == SightOutcome::used;
+  point.num_used += is_used ? 1 : 0;
+  point.num_gated_in_a_row = is_used ? 0 : point.num_gated_in_a_row + 1;
+  constexpr int most_gated = 5;
+  const bool is_known = std::ranges::find(config_->target, id, &KnownPoint::id) != config_->target.end();
+  if (is_known || point.num_gated_in_a_row < most_gated) return false;
+  point = {};
+  return true;
+}
+
+std::size_t PointStore::num_used(long id) const {
+  const auto at = points_.find(id);
+  return at == points_.end() ? 0 : at->second.num_used;
+}
+
+/// Where nothing is told of a point: as deep as the points of the map, in the middle.
+double PointStore::usual_depth_m(const LocalizationFilter& filter) const {
+  if (config_->depth_m > 0.0) return config_->depth_m;
+  std::vector<double> depths;
+  for (const Feature& feature : filter.features()) {
+    const double depth = (filter.motion().world_from_cam.inverse() * place_of(feature).point_in_world).z();
+    if (depth > 0.0 && (feature.is_known || config_->target.empty())) depths.push_back(depth);
+  }
+  if (depths.empty()) return 1.0;  // a world without scale: its first points are one unit away
+  std::ranges::nth_element(depths, depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2));
+  return depths[depths.size() / 2];
+}
+
+std::optional<RangePrior> PointStore::prior_of(const FeatureSight& sight, const LocalizationFilter& filter) {
+  if (config_->new_points == NewPoints::delayed) return triangulated(sight, filter);
+  const auto ray_in_cam = unproject(filter.camera(), sight.px);
+  if (!ray_in_cam) return std::nullopt;
+  const double least_z = 0.05;  // a fisheye sees sideways, too: there a depth is no distance
+  const double z = std::max(ray_in_cam->z(), least_z);
+  const auto told = std::ranges::find(config_->depths, sight.id, &ToldDepth::id);
+  if (told != config_->depths.end()) return RangePrior{told->depth_m / z, told->sigma_rel};
+  return RangePrior{usual_depth_m(filter) / z, config_->sigma_depth};
+}
+
+/// From the ray of its first sight and this one: d = b sin α₁ / sin(parallax), σ_d/d of the parallax' own σ.
+std::optional<RangePrior> PointStore::triangulated(const FeatureSight& sight, const LocalizationFilter& filter) {
+  const auto ray_in_cam = unproject(filter.camera(), sight.px);
+  if (!ray_in_cam) return std::nullopt;
+  const Rigid3& world_from_cam = filter.motion().world_from_cam;
+  const Eigen::Vector3d ray_in_world = world_from_cam.rotation * *ray_in_cam;
+  Point& point = points_[sight.id];
+  if (!point.first_world_from_cam) {
+    point.first_world_from_cam = world_from_cam;
+    point.first_ray_in_world = ray_in_world;
+    return std::nullopt;
+  }
+  const Eigen::Vector3d baseline = world_from_cam.translation - point.first_world_from_cam->translation;
+  const double sine = point.first_ray_in_world.cross(ray_in_world).norm();
+  const double range_m = baseline.cross(point.first_ray_in_world).norm() / std::max(sine, 1e-12);
+  const double focal_px = params(filter.camera().lens)[0];
+  // Two pixels, the attitude twice, and the baseline as it is seen from the point.
+  const Eigen::Matrix<double, 6, 6> cov = filter.motion_covariance().topLeftCorner<6, 6>();
+  const double sigma_angle = std::sqrt(2.0) * std::hypot(filter.config().sigma_px / focal_px,
+                                                         std::sqrt(cov.bottomRightCorner<3, 3>().trace() / 3.0));
+  const double sigma_rel = std::hypot(sigma_angle, std::sqrt(2.0 * cov.topLeftCorner<3, 3>().trace() / 3.0) / range_m) /
+                           std::max(sine, 1e-12);
+  constexpr double sure_enough = 0.05;
+  if (!(sigma_rel < sure_enough) || !(range_m > 0.0)) return std::nullopt;
+  return RangePrior{range_m, sigma_rel};
+}
+
+}  // namespace alidade

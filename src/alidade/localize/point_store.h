@@ -1,0 +1,36 @@
+#pragma once
+
+#include <map>
+#include <optional>
+
+#include "alidade/localize/localize.h"
+
+namespace alidade {
+
+/// What a run knows of points outside its filters: how often each was used or did not fit, and what is believed of the
+/// depth of one that is to enter the state.
+class PointStore {
+ public:
+  explicit PointStore(const LocalizeConfig& config) : config_(&config) {}
+
+  /// Counts what became of a sight. True where the point has not fitted so often in a row that it should leave the map.
+  bool is_stranger(long id, SightOutcome outcome);
+  [[nodiscard]] std::size_t num_used(long id) const;
+  /// Distance along the ray of a new point. None: not now (delayed, or the lens sees nothing there).
+  [[nodiscard]] std::optional<RangePrior> prior_of(const FeatureSight& sight, const LocalizationFilter& filter);
+
+ private:
+  struct Point {
+    std::size_t num_used = 0;
+    int num_gated_in_a_row = 0;
+    std::optional<Rigid3> first_world_from_cam;  ///< Of a delayed one.
+    Eigen::Vector3d first_ray_in_world = Eigen::Vector3d::Zero();
+  };
+  [[nodiscard]] std::optional<RangePrior> triangulated(const FeatureSight& sight, const LocalizationFilter& filter);
+  [[nodiscard]] double usual_depth_m(const LocalizationFilter& filter) const;
+
+  const LocalizeConfig* config_;
+  std::map<long, Point> points_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+namespace alidade {
+
+/// Covariance of a state that grows and shrinks, and the low-rank change that measurements of one moment make to it:
+/// P − W Wᵀ. Measurements add columns to W one after another; commit() takes them all into P in one pass, so that the
+/// large matrix is read and written once a frame. Nothing is allocated after reserve().
+/// P − W Wᵀ with W = P Hᵀ L⁻ᵀ, L Lᵀ = S, is symmetric by construction.
+class StateCovariance {
+ public:
+  static constexpr int panel = 8;         ///< Rows that are worked on together.
+  static constexpr int max_columns = 32;  ///< Of one call of products(): numbers measured together.
+  static constexpr int max_support = 34;  ///< State numbers that one measurement depends on.
+
+  /// Room for so many state numbers, and so many measured ones between two commits.
+  void reserve(int state_capacity, int measured_capacity);
+  [[nodiscard]] int dim() const { return dim_; }
+  [[nodiscard]] int capacity() const { return stride_; }
+  [[nodiscard]] int num_pending() const { return pending_; }
+  [[nodiscard]] int measured_capacity() const { return pending_capacity_; }
+
+  /// An entry of P, without what is pending.
+  [[nodiscard]] double& at(int i, int j) {
+    return P_[static_cast<std::size_t>(j) * stride() + static_cast<std::size_t>(i)];
+  }
+  [[nodiscard]] double at(int i, int j) const {
+    return P_[static_cast<std::size_t>(j) * stride() + static_cast<std::size_t>(i)];
+  }
+  /// Of P − W Wᵀ.
+  [[nodiscard]] double current(int i, int j) const;
+
+  /// More state numbers, uncorrelated with the others and without variance yet. False where there is no room.
+  [[nodiscard]] bool grow(int count);
+  /// Fewer: those from `offset` on.
+  void remove(int offset, int count);
+
+  /// Two measured numbers that depend on `columns` of the state: derivatives by them.
+  struct Rows {
+    std::span<const int> columns;
+    const double *h0, *h1;
+  };
+  /// X = (P − W Wᵀ) Hᵀ for all state rows; 2 columns for each of `rows`.
+  void products(std::span<const Rows> rows);
+  /// The same without W, into columns that the caller holds (dim() numbers each).
+  void product(const Rows& rows, double* x0, double* x1) const;
+  /// H (P − W Wᵀ) Hᵀ.
+  [[nodiscard]] Eigen::Matrix2d innovation_covariance(const Rows& rows) const;
+  [[nodiscard]] double product_at(int i, int column) const {
+    return X_[static_cast<std::size_t>((i / panel * max_columns + column) * panel + i % panel)];
+  }
+  /// Adds X · `M` (num × num, row-major, upper triangular: L⁻ᵀ) to the pending W. False where W is full.
+  [[nodiscard]] bool append(std::span<const double> M, int num);
+  /// Forgets the pending change from `count` columns on.
+  void drop_pending(int count = 0) { pending_ = count; }
+  /// Whether every variance stays above zero with what is pending.
+  [[nodiscard]] bool stays_positive() const;
+  /// P ← P − W Wᵀ.
+  void commit();
+
+ private:
+  [[nodiscard]] std::size_t stride() const { return static_cast<std::size_t>(stride_); }
+  [[nodiscard]] int num_panels() const { return (dim_ + panel - 1) / panel; }
+
+  int dim_ = 0, stride_ = 0, pending_ = 0, pending_capacity_ = 0;
+  std::vector<double> P_;  ///< Column by column.
+  std::vector<double> W_;  ///< Panel by panel, in it column by column, 8 rows each.
+  std::vector<double> X_;  ///< The same layout, max_columns.
+  std::vector<double> HW_;
+};
+
+}  // namespace alidade

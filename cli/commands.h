@@ -7,6 +7,7 @@ class Frame;
 void add_calibrate(Frame& frame);
 void add_camera(Frame& frame);
 void add_identify(Frame& frame);
+void add_localize(Frame& frame);
 void add_observe(Frame& frame);
 void add_plan(Frame& frame);
 void add_plan_observe(Frame& frame);      ///< Of `plan`.
@@ -21,7 +22,8 @@ void add_servo(Frame& frame);
 void add_servo_scenario(Frame& frame);  ///< Of `simulate`.
 void add_simulate(Frame& frame);
 void add_track(Frame& frame);
-void add_track_scenario(Frame& frame);  ///< Of `simulate`.
+void add_track_scenario(Frame& frame);       ///< Of `simulate`.
+void add_underwater_scenario(Frame& frame);  ///< Of `simulate`.
 
 // How to write a command: cli/NAME.cpp with one function `add_NAME(Frame&)`, declared here and called in main.cpp.
 //

@@ -7,6 +7,7 @@ void add_commands(alidade::cli::Frame& frame) {
   alidade::cli::add_calibrate(frame);
   alidade::cli::add_camera(frame);
   alidade::cli::add_identify(frame);
+  alidade::cli::add_localize(frame);
   alidade::cli::add_observe(frame);
   alidade::cli::add_plan(frame);
   alidade::cli::add_project(frame);

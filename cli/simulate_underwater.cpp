@@ -1,0 +1,100 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <memory>
+
+#include "alidade/io/camera_file.h"
+#include "alidade/io/localize_file.h"
+#include "alidade/simulate/underwater.h"
+#include "cli/commands.h"
+#include "cli/frame.h"
+#include "cli/option_checks.h"
+
+namespace alidade::cli {
+namespace {
+
+struct Args {
+  UnderwaterScene scene;
+  std::filesystem::path camera;
+  double rate_hz = 10.0;
+};
+
+StartFile start_of(const UnderwaterScene& scene, const UnderwaterSequence& sequence) {
+  StartFile file;
+  file.start.motion.world_from_cam = sequence.told_start;
+  const std::array<double, 4> sigmas{scene.sigma_position_m, scene.sigma_rotation_rad, 0.3, 0.3};
+  for (std::size_t i = 0; i < sigmas.size(); ++i)
+    file.start.cov.diagonal().segment<3>(static_cast<Eigen::Index>(3 * i)).setConstant(sigmas[i] * sigmas[i]);
+  for (const UnderwaterPoint& point : sequence.points)
+    if (!point.is_known && point.told_depth_m > 0.0)
+      file.depths.push_back({point.id, point.told_depth_m, scene.sigma_depth});
+  return file;
+}
+
+ExitCode simulate(const Args& args, Run& run) {
+  UnderwaterScene scene = args.scene;
+  scene.camera = args.camera.empty() ? underwater_camera() : read_camera(args.camera);
+  if (!args.camera.empty()) run.add_input("camera", args.camera);
+  scene.dt_s = 1.0 / args.rate_hz;
+  const UnderwaterSequence sequence = simulate_underwater(scene, run.options.seed);
+  std::vector<SightFrame> frames;
+  std::vector<TimedPose> truth;
+  std::size_t num_sights = 0;
+  for (const UnderwaterFrame& frame : sequence.frames) {
+    SightFrame seen{static_cast<long>(frames.size()), frame.t_s, {}};
+    for (const UnderwaterSight& sight : frame.sights) seen.sights.push_back({sight.id, sight.px, 0.0});
+    num_sights += seen.sights.size();
+    frames.push_back(std::move(seen));
+    truth.push_back({frame.t_s, frame.world_from_cam});
+  }
+  std::vector<KnownPoint> target;
+  std::vector<MapPoint> map;
+  for (const UnderwaterPoint& point : sequence.points) {
+    if (point.is_known) target.push_back({point.id, point.told_in_world, scene.sigma_known_m});
+    map.push_back({point.id, point.point_in_world, Eigen::Matrix3d::Zero(), point.is_known, 0});
+  }
+  run.add_file("sights.csv", sights_csv(frames));
+  run.add_file("camera.yaml", camera_text(scene.camera, CameraFormat::alidade));
+  run.add_file("target.yaml", target_text(target));
+  run.add_file("start.yaml", start_text(start_of(scene, sequence)));
+  run.add_file("truth.tum", tum_text(truth));
+  run.add_file("truth_map.csv", map_csv(map));
+  run.document.estimate["frames"] = frames.size();
+  run.document.counts.given = run.document.counts.used = num_sights;
+  Verdict verdict;
+  verdict.sentence = fmt::format("{} frames with {} sights of {} points, with known truth", frames.size(), num_sights,
+                                 sequence.points.size());
+  run.say(fmt::format("{} in {}", verdict.sentence, run.options.out.string()));
+  return run.finish(verdict);
+}
+
+}  // namespace
+
+void add_underwater_scenario(Frame& frame) {
+  auto args = std::make_shared<Args>();
+  CLI::App& command = frame.add_command(
+      {"simulate underwater", "What a camera under water sees of a board and points around it, and its true path",
+       "  alidade simulate underwater --out sim && alidade localize sim/sights.csv --camera sim/camera.yaml \\\n"
+       "    --target sim/target.yaml --start sim/start.yaml --truth sim/truth.tum\n"
+       "  alidade simulate underwater --points 40 --frames 300 --rate 30 --mismatches 0.4 --out hard",
+       true},
+      [args](Run& run) { return simulate(*args, run); });
+  UnderwaterScene& scene = args->scene;
+  command.add_option("--camera", args->camera, "The camera (default: a strongly distorting one)")->type_name("FILE");
+  command.add_option("--frames", scene.num_frames, "How many")->check(CLI::Range(1, 100000))->capture_default_str();
+  command.add_option("--points", scene.num_points, "The board's 8, then others")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command.add_option("--rate", args->rate_hz, "Frames a second")->check(positive_number())->capture_default_str();
+  const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
+    command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
+  };
+  number("--sigma-px", scene.sigma_px, "Noise of a pixel coordinate", 0.0, 100.0);
+  number("--sigma-depth", scene.sigma_depth, "Of the depths in start.yaml, over the depth", 0.0, 1.0);
+  number("--mismatches", scene.mismatches, "Share of the sights that show another place", 0.0, 1.0);
+  number("--blackout-from", scene.blackout_from_s, "Nothing is seen from this time on [s]", 0.0, 1e6);
+  number("--blackout", scene.blackout_s, "For so long [s]", 0.0, 1e6);
+}
+
+}  // namespace alidade::cli

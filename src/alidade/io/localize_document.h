@@ -1,0 +1,15 @@
+#pragma once
+
+#include <span>
+
+#include "alidade/io/result_document.h"
+#include "alidade/localize/localize.h"
+
+namespace alidade {
+
+/// Fills counts, estimate, stddev and the tables `path` and `features` of the document of `alidade localize`; also for
+/// a refusal. `lens_params`: the names of the lens's parameters that were estimated, in order.
+void fill_localization(const LocalizeReport& report, std::span<const TimedPose> truth,
+                       std::span<const std::string> lens_params, ResultDocument& document);
+
+}  // namespace alidade

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/io/result_document.h"
+#include "alidade/localize/localize.h"
+
+namespace alidade {
+
+struct SightsFile {
+  std::vector<SightFrame>
+      frames;  ///< In order of time; also those in which nothing is seen, where numbers are missing.
+  std::vector<SkippedInput> skipped;
+};
+
+struct SightsOptions {
+  bool skip_bad = false;            ///< Leave out rows that are wrong, by name.
+  double rate_hz = 0.0;             ///< Above 0: the time of a frame is its number over this.
+  int width_px = 0, height_px = 0;  ///< Of the camera: a sight further outside than half the picture is in no picture.
+};
+
+/// Reads `frame,t_s,point_id,u_px,v_px`, a row a sight. An empty `point_id` is a frame in which nothing was seen.
+/// Numbers that are missing between frames become frames without sights. Throws InputError: a missing column, times or
+/// frames that run backwards, a frame with two times, a point that stands twice in a frame, no rows.
+[[nodiscard]] SightsFile read_sights(const std::filesystem::path& file, const SightsOptions& options);
+[[nodiscard]] std::string sights_csv(std::span<const SightFrame> frames);
+
+/// Reads target.yaml: `points: [{id, x_m, y_m, z_m, sigma_m}]` or `board: {corners: 9x6, square_m}` (ids from 0).
+[[nodiscard]] std::vector<KnownPoint> read_target(const std::filesystem::path& file);
+[[nodiscard]] std::string target_text(std::span<const KnownPoint> points);
+
+/// What a run is told before the first frame.
+struct StartFile {
+  StartHypothesis start;
+  double depth_m = 0.0, sigma_depth = 0.5;  ///< Of new points; 0: not told.
+  std::vector<ToldDepth> depths;
+};
+
+/// Reads start.yaml: position_m, quaternion_wxyz (world_from_cam), velocity_m_s, rate_rad_s, sigma_position_m,
+/// sigma_rotation_rad, sigma_velocity_m_s, sigma_rate_rad_s, depth_m, sigma_depth, depths: [{id, depth_m, sigma_rel}].
+[[nodiscard]] StartFile read_start(const std::filesystem::path& file);
+[[nodiscard]] std::string start_text(const StartFile& start);
+
+/// Poses as TUM writes them, `t x y z qx qy qz qw`, in order of time; lines that begin with # are comments.
+[[nodiscard]] std::vector<TimedPose> read_tum(const std::filesystem::path& file);
+[[nodiscard]] std::string tum_text(std::span<const TimedPose> poses);
+
+/// Text of map.csv: `point_id,x_m,y_m,z_m,sigma_m` (σ: root of the mean variance), then the covariance.
+[[nodiscard]] std::string map_csv(std::span<const MapPoint> points);
+/// Text of map.ply, with `sigma_m` of each vertex.
+[[nodiscard]] std::string map_ply(std::span<const MapPoint> points);
+/// Text of poses.csv: a row a frame, with the upper triangle of the 6×6 covariance of world_from_cam.
+[[nodiscard]] std::string poses_csv(std::span<const PathStep> path);
+
+}  // namespace alidade

@@ -57,9 +57,9 @@ docs: demo
 
 study:
 	@tools/setup build
-	@echo "study: building $(out)/study_calibration, study_observe, study_rangefinder and corner_accuracy"
+	@echo "study: building $(out)/study_calibration, study_observe, study_rangefinder, study_localize and corner_accuracy"
 	@cmake --preset release -DALIDADE_BENCH=ON >/dev/null
-	@ninja -C $(out) $(jobs) study_calibration study_observe study_rangefinder corner_accuracy
+	@ninja -C $(out) $(jobs) study_calibration study_observe study_rangefinder study_localize corner_accuracy
 	@echo "study: 2400 calibrations, into docs/studies.md"
 	@mkdir -p build/study
 	@$(out)/study_calibration 2400 >build/study/studies.md; met=$$?; cp build/study/studies.md docs/studies.md; exit $$met
@@ -67,6 +67,8 @@ study:
 	@$(out)/study_observe 2000 >build/study/observe.md; met=$$?; cp build/study/observe.md docs/studies-observe.md; exit $$met
 	@echo "study: rangefinders, into docs/studies-rangefinder.md"
 	@$(out)/study_rangefinder 200 2000 >build/study/rangefinder.md; met=$$?; cp build/study/rangefinder.md docs/studies-rangefinder.md; exit $$met
+	@echo "study: localisation under water, into docs/studies-localize.md"
+	@$(out)/study_localize 200 20 >build/study/localize.md; met=$$?; cp build/study/localize.md docs/studies-localize.md; exit $$met
 	@$(out)/corner_accuracy
 
 format:

@@ -12,6 +12,7 @@ namespace alidade {
 namespace {
 
 constexpr std::size_t most_for_snooping = 40;  // S is inverted as a whole
+constexpr int most_dropped = 6;                // the gates of the update find what is left
 
 }  // namespace
 
@@ -67,7 +68,8 @@ double LocalizationFilter::agreement_with(std::size_t chosen) {
 /// weighted innovation (S⁻¹ν)ᵢ. The worst leaves while one is beyond the gate. W. Baarda, "A Testing Procedure for Use
 /// in Geodetic Networks", 1968.
 void LocalizationFilter::drop_doubtful() {
-  while (waiting_.size() > 3 && waiting_.size() <= most_for_snooping) {
+  for (int dropped = 0; dropped < most_dropped && waiting_.size() > 3; ++dropped) {
+    if (waiting_.size() > most_for_snooping) return;
     fill_joint_innovations();
     const auto num = static_cast<Eigen::Index>(2 * waiting_.size());
     auto S = joint_s_.topLeftCorner(num, num);

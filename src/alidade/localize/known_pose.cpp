@@ -86,7 +86,7 @@ std::vector<StartHypothesis> poses_from_known(const Camera& camera, std::span<co
   const SeenPoints seen = seen_points(sights, known);
   BoardView view = seen.view;
   std::vector<BoardPoseFit> fits = fits_of(camera, seen, view, config.sigma_px);
-  constexpr double most_chi2_per_dof = 6.0;  // 99.9 % of the two numbers that five points leave
+  constexpr double most_chi2_per_dof = 6.9;  // 99.9 % of the two numbers that four points leave
   while (view.corners.size() > 4 && (fits.empty() || fits.front().chi2 > most_chi2_per_dof * fits.front().dof)) {
     BoardView best = view;
     for (std::size_t left_out = 0; left_out < view.corners.size(); ++left_out) {
@@ -101,6 +101,7 @@ std::vector<StartHypothesis> poses_from_known(const Camera& camera, std::span<co
     if (best.corners.size() == view.corners.size()) break;
     view = std::move(best);
   }
+  std::erase_if(fits, [](const BoardPoseFit& fit) { return !(fit.chi2 <= most_chi2_per_dof * std::max(fit.dof, 2)); });
   std::vector<StartHypothesis> starts;
   for (const BoardPoseFit& fit : fits) starts.push_back(start_of(fit, seen, config));
   return starts;

@@ -36,7 +36,7 @@ class Localizer {
   void drop_strangers(const SightFrame& frame, const SightsReport& report);
   bool is_wrong(const PathStep& step);
   bool restart(const SightFrame& frame);
-  void fill(const SightsReport& report, PathStep& step) const;
+  void fill(const SightFrame& frame, const SightsReport& report, PathStep& step) const;
 
   Camera camera_;
   const LocalizeConfig& config_;
@@ -95,13 +95,18 @@ void Localizer::drop_strangers(const SightFrame& frame, const SightsReport& repo
   }
 }
 
-/// Mean NIS above 2, or most sights gated, over five frames with sights.
+/// Mean NIS above 2, or most sights or most of the target's gated, over five frames with sights: a path may fit its own
+/// map well and be elsewhere.
 bool Localizer::is_wrong(const PathStep& step) {
   if (step.num_tracked + step.num_gated == 0) return false;
   constexpr std::size_t window = 5;
   constexpr double most_nis = 2.0, most_gated = 0.6;
   recent_nis_.push_back(step.num_tracked > 0 ? step.nis_per_dof : most_nis);
-  recent_gated_.push_back(static_cast<double>(step.num_gated) / static_cast<double>(step.num_tracked + step.num_gated));
+  const double gated_now = static_cast<double>(step.num_gated) / static_cast<double>(step.num_tracked + step.num_gated);
+  const double known_gated =
+      step.num_known > 0 ? static_cast<double>(step.num_known_gated) / static_cast<double>(step.num_known) : 0.0;
+  constexpr double more_of_known = 0.25;  // four known points, two of them mismatched, are no proof
+  recent_gated_.push_back(std::max(gated_now, known_gated - more_of_known));
   if (recent_nis_.size() > window) {
     recent_nis_.pop_front();
     recent_gated_.pop_front();
@@ -139,7 +144,7 @@ bool Localizer::restart(const SightFrame& frame) {
   return true;
 }
 
-void Localizer::fill(const SightsReport& report, PathStep& step) const {
+void Localizer::fill(const SightFrame& frame, const SightsReport& report, PathStep& step) const {
   step.num_tracked = report.num_used;
   step.num_gated = report.num_gated;
   if (report.num_used > 0) step.nis_per_dof = report.nis_per_dof;
@@ -147,6 +152,14 @@ void Localizer::fill(const SightsReport& report, PathStep& step) const {
   step.world_from_cam = filter.motion().world_from_cam;
   step.cov = filter.pose_covariance();
   step.num_features = filter.features().size();
+  step.num_known = step.num_known_gated = 0;
+  for (std::size_t i = 0; i < frame.sights.size(); ++i) {
+    const bool is_gated = report.outcomes[i] == SightOutcome::gated;
+    if (!is_gated && report.outcomes[i] != SightOutcome::used) continue;
+    if (std::ranges::find(config_.target, frame.sights[i].id, &KnownPoint::id) == config_.target.end()) continue;
+    ++step.num_known;
+    step.num_known_gated += is_gated ? 1 : 0;
+  }
 }
 
 PathStep Localizer::take(const SightFrame& frame) {
@@ -165,12 +178,12 @@ PathStep Localizer::take(const SightFrame& frame) {
     predict_to(frame.t_s);
   }
   const SightsReport report = bank_->update(frame.sights);
-  fill(report, step);
+  fill(frame, report, step);
   if (step.event == FrameEvent::tracked && step.num_tracked < least_tracked) step.event = FrameEvent::predicted;
   const bool is_wrong_now = is_wrong(step);
   drop_strangers(frame, report);
   if (config_.restarts && is_wrong_now && restart(frame)) {
-    fill(bank_->update(frame.sights), step);
+    fill(frame, bank_->update(frame.sights), step);
     step.event = FrameEvent::restarted;
   }
   if (step.num_tracked >= least_tracked || step.event == FrameEvent::started) add_new(frame);
@@ -212,6 +225,8 @@ void sum_up(const Localizer& localizer, std::span<const TimedPose> truth, Locali
     report.num_sights += step.num_seen;
     report.num_used += step.num_tracked;
     report.num_gated += step.num_gated;
+    report.num_known += step.num_known;
+    report.num_known_gated += step.num_known_gated;
     report.most_seen = std::max(report.most_seen, step.num_seen);
     report.num_lost += step.event == FrameEvent::waiting || step.event == FrameEvent::predicted ? 1 : 0;
     if (step.num_tracked > 0) {

@@ -66,6 +66,7 @@ struct PathStep {
   Rigid3 world_from_cam;
   Eigen::Matrix<double, 6, 6> cov = Eigen::Matrix<double, 6, 6>::Zero();  ///< Of the right perturbation.
   std::size_t num_seen = 0, num_tracked = 0, num_gated = 0, num_features = 0;
+  std::size_t num_known = 0, num_known_gated = 0;  ///< Of those used or gated: the target's.
   double nis_per_dof = std::numeric_limits<double>::quiet_NaN();
   double seconds = 0.0;
 
@@ -88,6 +89,7 @@ struct LocalizeReport {
   std::size_t num_lost = 0;  ///< Frames without a pose that sights hold: waiting or predicted.
   std::size_t num_restarts = 0;
   std::size_t num_sights = 0, num_used = 0, num_gated = 0, most_seen = 0;
+  std::size_t num_known = 0, num_known_gated = 0;
   double nis_per_dof = std::numeric_limits<double>::quiet_NaN();
   Camera camera;               ///< As it is at the end.
   Eigen::VectorXd sigma_lens;  ///< Of the parameters that were estimated.

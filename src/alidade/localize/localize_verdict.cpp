@@ -31,9 +31,10 @@ Verdict never_started(const LocalizeReport& report) {
     return stopped(State::refused, ExitCode::cannot_tell,
                    "too few points: at most " + std::to_string(report.most_seen) + " in a frame, a pose needs three",
                    "track more points");
-  return stopped(State::refused, ExitCode::cannot_tell,
-                 "the target is not found: four of its points, in a plane and not on a line, are never seen together",
-                 "begin in front of the target, or give --start");
+  return stopped(
+      State::refused, ExitCode::cannot_tell,
+      "the target is not found: four of its points, in a plane and not on a line, are never seen where they belong",
+      "begin in front of the target, or give --start");
 }
 
 State state_of(double value, double care, double bad) {
@@ -55,6 +56,12 @@ void add_checks(const LocalizeReport& report, Verdict& verdict) {
   const double gated = share(report.num_gated, report.num_used + report.num_gated);
   verdict.checks.push_back({"gated", state_of(gated, 0.05, care_gated),
                             text_of(100.0 * gated) + " % of the sights fit nowhere", gated, care_gated, "1", "tracks"});
+  const double known_gated = share(report.num_known_gated, report.num_known);
+  // Known points may be mismatched as often as others; if more often, they are not where they are said to be.
+  if (report.has_target)
+    verdict.checks.push_back({"target", state_of(known_gated, 0.1, gated + 0.2),
+                              text_of(100.0 * known_gated) + " % of the target's sights are not where they belong",
+                              known_gated, 0.1, "1", "tracks"});
   verdict.checks.push_back({"scale", report.scale_known ? State::good : State::care,
                             report.scale_known
                                 ? "scale from the known points"

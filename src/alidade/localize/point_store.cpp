@@ -15,6 +15,7 @@ bool PointStore::is_stranger(long id, SightOutcome outcome) {
   const bool is_known = std::ranges::find(config_->target, id, &KnownPoint::id) != config_->target.end();
   if (is_known || point.num_gated_in_a_row < most_gated) return false;
   point = {};
+  point.was_stranger = true;
   return true;
 }
 
@@ -43,7 +44,9 @@ std::optional<RangePrior> PointStore::prior_of(const FeatureSight& sight, const 
   const double least_z = 0.05;  // a fisheye sees sideways, too: there a depth is no distance
   const double z = std::max(ray_in_cam->z(), least_z);
   const auto told = std::ranges::find(config_->depths, sight.id, &ToldDepth::id);
-  if (told != config_->depths.end()) return RangePrior{told->depth_m / z, told->sigma_rel};
+  const auto point = points_.find(sight.id);
+  const bool is_believed = point == points_.end() || !point->second.was_stranger;
+  if (told != config_->depths.end() && is_believed) return RangePrior{told->depth_m / z, told->sigma_rel};
   return RangePrior{usual_depth_m(filter) / z, config_->sigma_depth};
 }
 
@@ -63,15 +66,12 @@ std::optional<RangePrior> PointStore::triangulated(const FeatureSight& sight, co
   const double sine = point.first_ray_in_world.cross(ray_in_world).norm();
   const double range_m = baseline.cross(point.first_ray_in_world).norm() / std::max(sine, 1e-12);
   const double focal_px = params(filter.camera().lens)[0];
-  // Two pixels, the attitude twice, and the baseline as it is seen from the point.
-  const Eigen::Matrix<double, 6, 6> cov = filter.motion_covariance().topLeftCorner<6, 6>();
-  const double sigma_angle = std::sqrt(2.0) * std::hypot(filter.config().sigma_px / focal_px,
-                                                         std::sqrt(cov.bottomRightCorner<3, 3>().trace() / 3.0));
-  const double sigma_rel = std::hypot(sigma_angle, std::sqrt(2.0 * cov.topLeftCorner<3, 3>().trace() / 3.0) / range_m) /
-                           std::max(sine, 1e-12);
+  // Two pixels, each with as much again for what the pose may have gone wrong between them.
+  const double sigma_angle = 2.0 * std::sqrt(2.0) * filter.config().sigma_px / focal_px;
+  const double sigma_rel = sigma_angle / std::max(sine, 1e-12);
   constexpr double sure_enough = 0.05;
   if (!(sigma_rel < sure_enough) || !(range_m > 0.0)) return std::nullopt;
-  return RangePrior{range_m, sigma_rel};
+  return RangePrior{range_m, sure_enough};  // the rays are correlated with the pose: never surer than that
 }
 
 }  // namespace alidade

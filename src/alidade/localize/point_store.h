@@ -23,6 +23,7 @@ class PointStore {
   struct Point {
     std::size_t num_used = 0;
     int num_gated_in_a_row = 0;
+    bool was_stranger = false;                   ///< What was told of its depth did not lead anywhere.
     std::optional<Rigid3> first_world_from_cam;  ///< Of a delayed one.
     Eigen::Vector3d first_ray_in_world = Eigen::Vector3d::Zero();
   };

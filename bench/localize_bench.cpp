@@ -1,0 +1,90 @@
+/// Processor times of the localisation filter by the size of its state: localize_bench [--benchmark_filter=...]
+#include <benchmark/benchmark.h>
+
+#include <string>
+
+#include "alidade/testing/localize_sample.h"
+
+namespace alidade::bench {
+namespace {
+
+/// A filter with so many features around a known target, after a second of frames, and the sights of the next one.
+struct Ready {
+  LocalizationFilter filter;
+  std::vector<FeatureSight> sights;
+};
+
+Ready ready(int num_features, FeatureKind kind) {
+  UnderwaterScene scene;
+  scene.camera = underwater_camera();
+  scene.num_points = num_features;
+  scene.num_frames = 6;
+  scene.dt_s = 1.0 / 30.0;
+  const testing::UnderwaterSample sample = testing::underwater_sample(scene, 1);
+  LocalizationFilterConfig config;
+  config.state_capacity = 2000;
+  config.sights_capacity = 320;
+  config.linear_below = kind == FeatureKind::xyz ? 1e9 : 0.0;
+  Ready made{LocalizationFilter(sample.camera, sample.config.start->motion, sample.config.start->cov, config), {}};
+  for (const KnownPoint& point : sample.config.target)
+    made.filter.add_known(point.id, point.point_in_world, point.sigma_m);
+  for (const SightFrame& frame : sample.frames) {
+    made.filter.predict(scene.dt_s);
+    made.sights = frame.sights;
+    if (&frame == &sample.frames.back()) break;
+    (void)made.filter.update(frame.sights);
+    for (const FeatureSight& sight : frame.sights) made.filter.add(sight.id, sight.px, {0.7, 0.1});
+    made.filter.convert_linear();
+  }
+  return made;
+}
+
+/// The update with all features measured, mean and covariance; what it needs of copies is not timed.
+void time_update(benchmark::State& state, int num_features, FeatureKind kind) {
+  const Ready at = ready(num_features, kind);
+  LocalizationFilter filter = at.filter;
+  for (auto _ : state) {
+    state.PauseTiming();
+    filter = at.filter;
+    state.ResumeTiming();
+    benchmark::DoNotOptimize(filter.update(at.sights).num_used);
+  }
+  state.counters["state"] = at.filter.dim();
+  state.counters["sights"] = static_cast<double>(at.sights.size());
+}
+
+/// Prediction and the expected place of every feature: what a search in images needs before each frame.
+void time_expected(benchmark::State& state, int num_features) {
+  const Ready at = ready(num_features, FeatureKind::inverse_depth);
+  LocalizationFilter filter = at.filter;
+  for (auto _ : state) {
+    filter.predict(1e-9);
+    for (const Feature& feature : filter.features()) benchmark::DoNotOptimize(filter.expected(feature.id));
+  }
+  state.counters["state"] = filter.dim();
+}
+
+void add_all() {
+  for (const int num_features : {8, 25, 54, 84, 104, 154, 204, 304}) {
+    const std::string end = "/" + std::to_string(num_features);
+    benchmark::RegisterBenchmark(("update/inverse_depth" + end).c_str(), [=](benchmark::State& state) {
+      time_update(state, num_features, FeatureKind::inverse_depth);
+    })->Unit(benchmark::kMillisecond);
+    benchmark::RegisterBenchmark(("update/xyz" + end).c_str(), [=](benchmark::State& state) {
+      time_update(state, num_features, FeatureKind::xyz);
+    })->Unit(benchmark::kMillisecond);
+    benchmark::RegisterBenchmark(("expected" + end).c_str(), [=](benchmark::State& state) {
+      time_expected(state, num_features);
+    })->Unit(benchmark::kMillisecond);
+  }
+}
+
+}  // namespace
+}  // namespace alidade::bench
+
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  alidade::bench::add_all();
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}

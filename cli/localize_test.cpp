@@ -1,0 +1,178 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "alidade/io/csv.h"
+#include "alidade/io/files.h"
+#include "alidade/testing/command_test.h"
+
+namespace alidade {
+namespace {
+
+using testing::Outcome;
+using Json = nlohmann::json;
+
+class LocalizeCommand : public testing::CommandTest {
+ protected:
+  void simulate(const std::vector<std::string>& options = {}) {
+    const Outcome made = alidade({"simulate", "underwater", "--out", path("sim"), "--quiet", "--no-report"}, options);
+    ASSERT_EQ(made.code, 0) << made.err;
+  }
+  [[nodiscard]] Outcome localize(const std::vector<std::string>& options,
+                                 const std::string& sights = "sim/sights.csv") {
+    return alidade({"localize", path(sights), "--camera", path("sim/camera.yaml"), "--out", path("out"), "--no-report"},
+                   options);
+  }
+  [[nodiscard]] std::vector<std::string> told(std::vector<std::string> more = {}) const {
+    more.insert(more.end(), {"--target", path("sim/target.yaml"), "--start", path("sim/start.yaml"), "--truth",
+                             path("sim/truth.tum"), "--json"});
+    return more;
+  }
+};
+
+TEST_F(LocalizeCommand, GivesThePathWithTheNamesOfTheContract) {
+  simulate();
+  const Outcome outcome = localize(told());
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  const Json& estimate = document["estimate"];
+  EXPECT_EQ(estimate["frames"], 35);
+  EXPECT_EQ(estimate["lost"], 0);
+  EXPECT_LT(estimate["ate_m"], 0.03);
+  EXPECT_LT(estimate["rpe_m"], 0.03);
+  EXPECT_EQ(estimate["scale_known"], true);
+  EXPECT_GT(estimate["nis_per_dof"], 0.4);
+  EXPECT_LT(estimate["nis_per_dof"], 1.2);
+  EXPECT_EQ(document["verdict"]["state"], "good");
+  const Json& rows = document["data"]["path"];
+  EXPECT_EQ(rows["t_s"].size(), 35u);
+  for (const char* name :
+       {"world_from_cam_x_m", "world_from_cam_qw", "truth_x_m", "num_tracked", "num_gated", "nis", "seconds"})
+    EXPECT_EQ(rows[name].size(), 35u) << name;
+  EXPECT_EQ(document["data"]["features"]["id"].size(), 8u);
+  EXPECT_TRUE(std::filesystem::exists(path("out/trajectory.tum")));
+  EXPECT_TRUE(read_file(path("out/map.ply")).starts_with("ply\n"));
+  const Csv map = Csv::read(path("out/map.csv"));
+  for (const char* name : {"point_id", "x_m", "y_m", "z_m", "sigma_m"}) EXPECT_TRUE(map.has(name)) << name;
+  const Csv poses = Csv::read(path("out/poses.csv"));
+  EXPECT_EQ(poses.num_rows(), 35u);
+  for (std::size_t row = 0; row < 35; ++row) EXPECT_GT(poses.number(row, "cov_x_x"), 0.0);
+  // What was written is read again, as a truth: the same path.
+  const Outcome again = localize({"--target", path("sim/target.yaml"), "--start", path("sim/start.yaml"), "--truth",
+                                  path("out/trajectory.tum"), "--json"});
+  ASSERT_EQ(again.code, 0) << again.err;
+  EXPECT_LT(Json::parse(again.out)["estimate"]["ate_m"], 1e-6);
+}
+
+TEST_F(LocalizeCommand, LessOfTheLensIsWorseAndOnlineCalibrationFindsIt) {
+  simulate({"--points", "20", "--frames", "60"});
+  const auto error_of = [&](const std::vector<std::string>& options) {
+    const Outcome outcome = localize(told(options));
+    EXPECT_TRUE(outcome.code == 0 || outcome.code == 5) << outcome.err;
+    return Json::parse(outcome.out)["estimate"]["unaligned_m"].get<double>();
+  };
+  const double full = error_of({}), first = error_of({"--distortion", "radial1"}),
+               none = error_of({"--distortion", "none"});
+  EXPECT_GT(none, 2.0 * full);
+  EXPECT_GT(none, first);
+  EXPECT_LT(error_of({"--distortion", "radial1", "--calibrate-online"}), first);
+  EXPECT_TRUE(std::filesystem::exists(path("out/camera.yaml")));
+}
+
+TEST_F(LocalizeCommand, SaysThatScaleIsUnknown) {
+  simulate({"--points", "30", "--frames", "60", "--rate", "30"});
+  const Outcome outcome = localize({"--truth", path("sim/truth.tum"), "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  EXPECT_EQ(document["estimate"]["scale_known"], false);
+  EXPECT_EQ(document["estimate"]["alignment"], "Sim(3)");
+  EXPECT_EQ(document["verdict"]["state"], "care");
+}
+
+TEST_F(LocalizeCommand, RefusesWhatCannotBeTold) {
+  simulate();
+  const std::string header = "frame,t_s,point_id,u_px,v_px\n";
+  const auto refused_as = [&](const std::string& table, const std::vector<std::string>& options,
+                              const std::string& what) {
+    write_file(path("some.csv"), table);
+    const Outcome outcome = localize(options, "some.csv");
+    EXPECT_EQ(outcome.code, 4) << what << outcome.out << outcome.err;
+    EXPECT_NE(outcome.err.find(what), std::string::npos) << outcome.err;
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+    EXPECT_FALSE(std::filesystem::exists(path("out/trajectory.tum")));
+    EXPECT_TRUE(std::filesystem::exists(path("out/result.json")));
+  };
+  refused_as(header + "0,0,2,400,300\n1,0.1,2,401,300\n", {"--target", path("sim/target.yaml")}, "too few points");
+  refused_as(header + "0,0,1,400,300\n0,0,3,450,300\n0,0,5,470,350\n", {"--target", path("sim/target.yaml")},
+             "target is not found");
+}
+
+TEST_F(LocalizeCommand, SaysWhatIsWrongWithItsInput) {
+  simulate();
+  const std::string header = "frame,t_s,point_id,u_px,v_px\n";
+  const auto expect = [&](const std::string& table, const std::string& what) {
+    write_file(path("bad.csv"), table);
+    const Outcome outcome = localize({}, "bad.csv");
+    EXPECT_EQ(outcome.code, 3) << table << outcome.err;
+    EXPECT_NE(outcome.err.find(what), std::string::npos) << outcome.err;
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+    EXPECT_FALSE(std::filesystem::exists(path("out")));
+  };
+  expect("", "bad.csv");
+  expect(header, "has no sights");
+  expect("frame,point_id,u_px,v_px\n0,1,1,1\n", "has no column 't_s'; give it, or --rate");
+  expect(header + "0,0,1,nan,1\n", "bad.csv:2: column 'u_px': 'nan' is not a finite number");
+  expect(header + "0,0,1,1e300,1\n", "column 'u_px'");
+  expect(header + "0,0,1,5000,1\n", "far outside the camera's 768 px");
+  expect(header + "0,0,1,100,2000\n", "far outside the camera's 576 px");
+  expect(header + "0,0,1,1,1\n1,0,1,1,1\n", "is not after frame 0");
+  expect(header + "1,0.1,1,1,1\n0,0.2,1,1,1\n", "runs backwards");
+  expect(header + "0,0,1,1,1\n0,0.1,2,1,1\n", "differs from the first row of frame 0");
+  expect(header + "0,0,1,1,1\n0,0,1,2,2\n", "1 stands twice in frame 0");
+  expect(header + "0,0,-3,1,1\n", "column 'point_id'");
+  EXPECT_EQ(localize({"--distortion", "some"}).code, 2);
+  EXPECT_EQ(localize({"--sigma-px", "0"}).code, 2);
+  EXPECT_EQ(localize({"--rate", "nan"}).code, 2);
+  const auto bad_file = [&](const char* option, const std::string& text, const std::string& what) {
+    write_file(path("bad.yaml"), text);
+    const Outcome outcome = localize({option, path("bad.yaml")});
+    EXPECT_EQ(outcome.code, 3) << text << outcome.err;
+    EXPECT_NE(outcome.err.find(what), std::string::npos) << outcome.err;
+  };
+  bad_file("--target", "points: []\n", "has no points");
+  bad_file("--target", "points: [{id: 1, x_m: 0, y_m: 0, z_m: 0}, {id: 1, x_m: 1, y_m: 0, z_m: 0}]\n", "stands twice");
+  bad_file("--target", "points: [{id: 1, x_m: .nan, y_m: 0, z_m: 0}]\n", "x_m");
+  bad_file("--target", "rectangle: {width_m: 1, height_m: 1}\n", "is found in images");
+  bad_file("--start", "position_m: [0, 0, 0]\nquaternion_wxyz: [2, 0, 0, 0]\n", "has the length 2, not 1");
+  bad_file("--start", "position_m: [0, 0, 0]\nquaternion_wxyz: [1, 0, 0, 0]\nsigma_rate_rad_s: -1\n",
+           "is not above zero");
+  bad_file("--truth", "0 1 2 3\n", "is not 't x y z qx qy qz qw'");
+}
+
+TEST_F(LocalizeCommand, SurvivesMissingFramesAndUnknownPoints) {
+  simulate({"--points", "20", "--frames", "60"});
+  const Csv csv = Csv::read(path("sim/sights.csv"));
+  std::string text = "frame,t_s,point_id,u_px,v_px\n";
+  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
+    const long frame = csv.integer(row, "frame", 0, 1000);
+    if (frame % 7 == 3 || (frame > 30 && frame < 36)) continue;
+    text += csv.text(row, "frame") + "," + csv.text(row, "t_s") + "," + csv.text(row, "point_id") + "," +
+            csv.text(row, "u_px") + "," + csv.text(row, "v_px") + "\n";
+    if (frame % 5 == 0 && csv.text(row, "point_id") == "1")  // a point that is seen once
+      text += csv.text(row, "frame") + "," + csv.text(row, "t_s") + "," + std::to_string(1000 + frame) + ",100,100\n";
+  }
+  write_file(path("gaps.csv"), text);
+  const Outcome outcome = localize(told(), "gaps.csv");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  EXPECT_EQ(document["estimate"]["frames"], 60);
+  EXPECT_GE(document["estimate"]["lost"], 12);
+  EXPECT_NE(document["verdict"]["state"], "good");
+  const Outcome skipped = localize(told({"--skip-bad"}), "gaps.csv");
+  EXPECT_EQ(skipped.code, 0) << skipped.err;
+}
+
+}  // namespace
+}  // namespace alidade

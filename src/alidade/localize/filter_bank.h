@@ -18,7 +18,7 @@ struct FilterBankConfig {
   int splits = 5;              ///< Parts of the speed aside, to each of two sides; 1: none.
   double spread = 1.5;         ///< The outermost part, in σ.
   double narrowed = 0.5;       ///< σ of a part over the σ of the whole.
-  double least_weight = 25.0;  ///< A part that costs so much more than the best one (−2 ln) is given up.
+  double least_weight = 40.0;  ///< A part that costs so much more than the best one (−2 ln) is given up.
   int most_frames = 15;        ///< After so many updates the best one alone goes on.
 };
 

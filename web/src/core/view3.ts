@@ -34,6 +34,7 @@ export class View3 {
   private scene: Scene | null = null;
   private isNear = false;
   private isFitted = false;
+  private pending = 0;
   private polygons: Polygon[] = [];
 
   constructor(host: HTMLElement, private readonly look: View3Look, private readonly make: () => World) {
@@ -62,9 +63,12 @@ export class View3 {
   }
   /** What is shown has changed. */
   refresh(): void {
-    this.world = this.make();
-    this.forget();
-    this.chart.redraw();
+    this.pending ||= requestAnimationFrame(() => { // once for many keys in a row
+      this.pending = 0;
+      this.world = this.make();
+      this.forget();
+      this.chart.redraw();
+    });
   }
   forget(): void {
     if (this.scene) dispose(this.scene);

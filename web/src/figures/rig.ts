@@ -11,6 +11,8 @@ import type {Selection} from '../core/selection';
 import {lengths, quantile} from '../core/stats';
 import {View3} from '../core/view3';
 import {World} from '../core/world';
+import {correlationsOf} from './correlations';
+import {drawCorrelations} from './estimate';
 import {scatter, type ScatterDot} from './scatter';
 
 function viewsOf(doc: Doc, selection: Selection): Table | null {
@@ -55,8 +57,8 @@ function rigWorld(doc: Doc, views: Table, selection: Selection): World {
   const apart = bases.length > 1 ? norm(sub(bases[0]!.t, bases[1]!.t)) : 0.3, length = Math.max(0.03, 0.22 * apart);
   bases.forEach((pose, k) => {
     world.axes(pose, 0.5 * length, false);
-    world.label(add(pose.t, mul([pose.r[0][1], pose.r[1][1], pose.r[2][1]], 1.5 * length)), `head ${heads[k] ?? k + 1}`);
-    world.hold(pose.t);
+    world.label(add(pose.t, mul([pose.r[0][1], pose.r[1][1], pose.r[2][1]], -1.7 * length)), `head ${heads[k] ?? k + 1}`);
+    world.hold(pose.t, add(pose.t, mul([pose.r[0][1], pose.r[1][1], pose.r[2][1]], -1.8 * length)));
     if (k === 0 || !(doc.estimate('sigma_relative_m') > 0)) return;
     const three = 3 * doc.estimate('sigma_relative_m');
     world.ellipsoid(pose.t, [[three, 0, 0], [0, three, 0], [0, 0, three]], 'red');
@@ -193,6 +195,8 @@ export const rigEstimate: Figure = {
   },
 };
 
+const shortName = (name: string) => name.replace(/^head(\d+)\./, '$1 ').replace('pan_to_tilt', 'pt').replace('tilt_to_cam', 'tc').replace('base_', 'b').replace('cam_', 'c').replace('axes_skew', 'skew').replace('_zero', '0').replace(/_/g, '');
+
 export const rigUnknown: Figure = {
   id: 'unknown', title: 'What does trade against what?', note: 'correlations above 0.9', span: 24,
   draw(host, doc) {
@@ -210,6 +214,8 @@ export const rigUnknown: Figure = {
     if (shown.length === 0) return null;
     const list = el('ul', {class: 'legend'}, ...shown.map(([rho, a, b]) => el('li', {}, el('b', {}, num(rho, 3)), `${plain(a)} and ${plain(b)}`)));
     host.append(list);
+    const matrix = correlationsOf(doc);
+    if (matrix) drawCorrelations(host, {...matrix, names: matrix.names.map(shortName)});
     return {marks: shown.length, rows: shown.length, tables: [], words: `${pairs.length} pairs trade against each other`,
       good: 'Pairs like these are known together, not each by itself: what the rig is used for (camera to camera) may still be known well. More turn about both axes and boards nearer and further part them.'};
   },

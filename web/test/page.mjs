@@ -40,6 +40,7 @@ export async function launch(more = []) {
 export async function opened(browser, url, {width = 1280, height = 900, theme = 'light', script = null} = {}) {
   const context = await browser.newContext({viewport: {width, height}, colorScheme: theme});
   const page = await context.newPage();
+  page.setDefaultTimeout(120_000); // a machine may be busy with other things
   const faults = [];
   page.on('console', (message) => message.type() === 'error' && faults.push(`console: ${message.text()}`));
   page.on('pageerror', (error) => faults.push(`error: ${error.message}`));

@@ -66,7 +66,7 @@ export const localizeSpace: Figure = {
     const path = pathOf(doc);
     if (!path) return null;
     const alignment = doc.estimateText('alignment'), keys: Key[] = [{words: 'path, coloured by its σ', colour: 'var(--blue)'}, {words: 'the instant', colour: 'var(--red)'}, {words: 'map points, 3σ', colour: 'var(--green)', look: 'dot'}];
-    if (doc.table('features')?.tells('known')) keys.push({words: 'known points', colour: 'var(--orange)', look: 'dot'});
+    if (doc.table('features')?.numbers('known').some((known) => known > 0)) keys.push({words: 'known points', colour: 'var(--orange)', look: 'dot'});
     if (truthOf(doc, path)) keys.push({words: `truth${alignment ? ` (alignment for ATE: ${alignment})` : ''}`, colour: 'var(--ink)'});
     legend(host, keys);
     const label = `Path of the camera through ${path.rows} frames`;

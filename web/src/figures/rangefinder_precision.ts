@@ -73,7 +73,7 @@ export const rangefinderCounts: Figure = {
   id: 'counts', title: 'Do more shots help?', note: 'mm, mrad', span: 5,
   draw(host, doc) {
     const table = doc.table('by_count');
-    if (!table) return null;
+    if (!table || !doc.isAnswer) return null;
     legend(host, [{words: '3σ', colour: 'var(--blue)'}, {words: 'Cramér–Rao', colour: 'var(--orange)', look: 'dash'}]);
     const n = table.numbers('num_shots');
     for (const [name, label] of [['origin_m', '3σ of the origin, mm'], ['direction_rad', '3σ of the direction, mrad']] as const) {

@@ -62,7 +62,8 @@ function shotsOf(doc: Doc, table: Table): Shot[] {
     return {name: table.text('name', i), reason: table.text('reason', i), isUsed: n('used') > 0, range_m: n('range_m'), dRange_m: n('residual_range_m'), sRange_m: n('sigma_residual_range_m'),
       u: n('u_px'), v: n('v_px'), du: n('residual_u_px'), dv: n('residual_v_px'), su: n('sigma_residual_u_px'), sv: n('sigma_residual_v_px'), cuv: n('cov_residual_uv_px2'),
       left: left && out !== undefined ? {range_m: left.number('residual_range_m', out), u: left.number('residual_u_px', out), v: left.number('residual_v_px', out)} : null,
-      hit: [n('point_in_cam_x_m'), n('point_in_cam_y_m'), n('point_in_cam_z_m')] as V3,
+      // Without an answer there is no beam to hit anything.
+      hit: (doc.isAnswer ? [n('point_in_cam_x_m'), n('point_in_cam_y_m'), n('point_in_cam_z_m')] : [NaN, NaN, NaN]) as V3,
       normal: [p('nx'), p('ny'), p('nz')] as V3, d_m: p('d_m'), pose: planes && plane !== undefined ? poseOf(planes, 'cam_from_board', plane) : null};
   });
 }

@@ -123,7 +123,7 @@ export const servoCompare: Figure = {
       const left = Math.min(150, 20 + Math.max(...all.map((one) => pen.width(one.name, 12)))), right = pen.w - 14, bottom = pen.h - 40, isLog = ends[1] > 6 * ends[0];
       const x = scale(isLog ? ends[0] / 1.3 : 0, isLog ? ends[1] * 1.3 : 1.06 * ends[1], left, right, isLog), pitch = (bottom - 10) / all.length;
       xAxis(pen, x, 8, bottom, {label: 'error, px'});
-      if (spec > 0 && x.holds(spec)) pen.line(x(spec), 8, x(spec), bottom, pen.c.red, 1.5, [5, 4]), pen.text(`spec ${num(spec, 3)}`, x(spec) + 4, 12, {size: 11, colour: pen.c.red});
+      if (spec > 0 && x.holds(spec)) pen.line(x(spec), 8, x(spec), bottom, pen.c.red, 1.5, [5, 4]), pen.text(`spec ${num(spec, 3)}`, x(spec) + (x(spec) > right - 70 ? -4 : 4), 12, {size: 11, colour: pen.c.red, align: x(spec) > right - 70 ? 'right' : 'left'});
       all.forEach((one, k) => {
         const y = 10 + pitch * (k + 0.5), row = (values: number[], dy: number, colour: string, isSquare: boolean, word: string) => {
           const [low, middle, high] = [0.05, 0.5, 0.95].map((q) => quantile(values, q)) as [number, number, number];

@@ -6,7 +6,7 @@ import {showHelp, toggleTheme} from './keys';
 import {lookOf} from './states';
 
 const whatIsCounted: Record<string, string> = {
-  calibrate: 'photos', observe: 'rows', rangefinder: 'shots', rig: 'views', track: 'sights', servo: 'sights', localize: 'frames',
+  calibrate: 'photos', observe: 'rows', rangefinder: 'shots', rig: 'views', track: 'sights', servo: 'runs', localize: 'frames',
 };
 
 function countsOf(doc: Doc): string[] {

@@ -182,7 +182,7 @@ ExitCode project_beam(const Args& args, Run& run) {
   if (!args.overlay.empty()) {
     const std::string bytes = read_file(args.overlay);
     run.add_input("photo", args.overlay.string(), bytes);
-    const cv::Mat photo = decode_photo(bytes);
+    const cv::Mat photo = decode_photo(bytes, args.overlay.string());
     if (photo.cols != camera.width_px || photo.rows != camera.height_px)
       throw InputError(fmt::format("{}: is {}x{}, the camera is for {}x{}", args.overlay.string(), photo.cols,
                                    photo.rows, camera.width_px, camera.height_px));

@@ -17,7 +17,7 @@ GreyImage grey_image(const std::filesystem::path& file, const Camera& camera, Ru
   const std::string bytes = read_file(file);
   run.add_input("photo", file.string(), bytes);
   std::string reason;
-  const cv::Mat grey = to_grey_photo(decode_photo(bytes), reason);
+  const cv::Mat grey = to_grey_photo(decode_photo(bytes, file.string()), reason);
   if (grey.empty()) throw InputError(file.string() + ": " + reason);
   if (grey.cols != camera.width_px || grey.rows != camera.height_px)
     throw InputError(fmt::format("{}: is {}x{}, the camera is for {}x{}", file.string(), grey.cols, grey.rows,
@@ -41,7 +41,11 @@ ExitCode align_scan(const EdgesArgs& args, Run& run) {
     run.add_input("start", args.start);
     start = read_beam(args.start).beam;
   }
-  const EdgesReport report = align_edges(scan, grey_image(args.photo, camera, run), camera, start, {}, run.progress);
+  EdgesConfig config;
+  constexpr double usual_width_px = 640.0;  // of the pictures that the blurs are meant for
+  for (double& blur_px : config.blur_px) blur_px *= camera.width_px / usual_width_px;
+  const EdgesReport report =
+      align_edges(scan, grey_image(args.photo, camera, run), camera, start, config, run.progress);
   run.lap("align");
   const Verdict verdict = edges_verdict(report);
   run.document.counts.given = scan.size();

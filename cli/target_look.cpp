@@ -61,11 +61,7 @@ TargetOption read_target_option(const std::string& text, Run& run) {
     const std::string file = text.substr(std::string("pattern:").size());
     const std::string bytes = read_file(file);
     run.add_input("pattern", file, bytes);
-    try {
-      option.pattern = std::make_shared<cv::Mat>(decode_photo(bytes));
-    } catch (const InputError& error) {
-      throw InputError(file + ": " + error.what());
-    }
+    option.pattern = std::make_shared<cv::Mat>(decode_photo(bytes, file));
     if (option.pattern->depth() != CV_8U) throw InputError(file + ": has more than 8 bits; a pattern has 8");
   }
   try {

@@ -104,6 +104,14 @@ cv::Mat decode_photo(std::string_view bytes) {
   return photo;
 }
 
+cv::Mat decode_photo(std::string_view bytes, const std::string& file) {
+  try {
+    return decode_photo(bytes);
+  } catch (const InputError& error) {
+    throw InputError(file + ": " + error.what());
+  }
+}
+
 std::string jpeg_preview(const cv::Mat& photo, int max_width_px, int quality) {
   cv::Mat small = photo;
   if (photo.cols > max_width_px) {

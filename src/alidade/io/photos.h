@@ -20,6 +20,8 @@ namespace alidade {
 /// Decodes a photo as it is: 8 or 16 bit, grey or colour; any EXIF turn is ignored, as the lens does not turn. Throws
 /// InputError: empty, not a picture, cut off.
 [[nodiscard]] cv::Mat decode_photo(std::string_view bytes);
+/// The same, with the file's name before the fault.
+[[nodiscard]] cv::Mat decode_photo(std::string_view bytes, const std::string& file);
 
 /// JPEG bytes of a photo in 8-bit grey, at most `max_width_px` wide.
 [[nodiscard]] std::string jpeg_preview(const cv::Mat& photo, int max_width_px, int quality = 80);

@@ -53,6 +53,7 @@ ExitCode servo(const Args& args, Run& run) {
   run.add_input("scenario", args.scenario);
   const ServoScenarioFile read = read_servo_scenario(args.scenario);
   if (!read.rig.empty()) run.add_input("rig", read.rig);
+  if (!read.track.empty()) run.add_input("track", read.track);
   const ServoScenario scenario = with_options(read.scenario, args);
   run.lap("read");
   const ServoStudy study = study_servo(scenario, run.options.seed, run.progress);

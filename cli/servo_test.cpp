@@ -1,7 +1,9 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "alidade/io/csv.h"
@@ -268,6 +270,49 @@ TEST_F(IdentifyCommand, SaysWhatIsWrongWithItsLog) {
   EXPECT_EQ(alidade({"simulate", "servo", "--rate-hz", "100000", "--duration-s", "1000", "--out", path("z")}).code, 2);
   write_file(path("bad.csv"), header + "0,0,0\n0.1,x,0\n");
   EXPECT_EQ(identify("bad.csv", {"--skip-bad"}).code, 4);
+}
+
+/// The pan and tilt of a real broadcast camera (60 m away, say) are where its players went.
+TEST_F(ServoCommand, FollowsWhatARealOperatorFollowed) {
+  const char* data = std::getenv("ALIDADE_DATA");
+  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set: the motion of a broadcast camera is not at hand";
+  const Csv motion = Csv::read(std::filesystem::path(data) / "data" / "ptz-sports" / "basketball_ptz.csv");
+  constexpr double frames_per_s = 30.0, distance_m = 60.0, degree = 0.017453292519943295;
+  constexpr std::size_t first = 0, num = 900;  // half a minute
+  const double pan0 = motion.number(first, "pan_deg"), tilt0 = motion.number(first, "tilt_deg");
+  std::string path_csv = "t_s,x_m,y_m,z_m\n";
+  for (std::size_t k = first; k < first + num; ++k) {
+    const double pan = degree * (motion.number(k, "pan_deg") - pan0),
+                 tilt = degree * (motion.number(k, "tilt_deg") - tilt0);
+    path_csv += fmt::format("{},{},{},{}\n", static_cast<double>(k - first) / frames_per_s,
+                            distance_m * std::sin(pan) * std::cos(tilt), -distance_m * std::sin(tilt),
+                            distance_m * std::cos(pan) * std::cos(tilt));
+  }
+  write_file(path("path.csv"), path_csv);
+  write_file(path("scenario.yaml"),
+             "target: {track: path.csv}\nduration_s: 29\nlatency_s: 0.1\nrobustness: {points: 0}\nseeds: 4\n");
+  const Outcome outcome = alidade({"servo", path("scenario.yaml"), "--out", path("out"), "--no-report", "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  const Json& compared = document["estimate"]["controllers"];
+  // PI lags a turning target by its rate over the loop's 2.9 rad/s; what predicts does not.
+  EXPECT_LT(compared["lqr"]["rms_px"].get<double>(), 0.5 * compared["pi"]["rms_px"].get<double>());
+  EXPECT_EQ(compared["lqr"]["central_third"], 1.0);
+  EXPECT_EQ(document["inputs"][1]["role"], "track");
+}
+
+TEST_F(ServoCommand, ARecordedPathThatIsNoneIsNamed) {
+  write_file(path("scenario.yaml"), "target: {track: path.csv}\n");
+  const auto fault = [&](const std::string& table) {
+    write_file(path("path.csv"), table);
+    const Outcome outcome = alidade({"servo", path("scenario.yaml"), "--out", path("out"), "--no-report"});
+    EXPECT_EQ(outcome.code, 3) << outcome.err;
+    return outcome.err;
+  };
+  EXPECT_NE(fault("t_s,x_m,y_m,z_m\n").find("path.csv"), std::string::npos);
+  EXPECT_NE(fault("t_s,x_m,y_m,z_m\n0,0,0,1\n").find("has one row"), std::string::npos);
+  EXPECT_NE(fault("t_s,x_m,y_m,z_m\n0,0,0,1\n0,0,0,2\n").find("path.csv:3"), std::string::npos);
+  EXPECT_NE(fault("t_s,x_m,y_m,z_m\n0,0,0,1\n1,0,nan,2\n").find("'nan' is not a finite number"), std::string::npos);
 }
 
 }  // namespace

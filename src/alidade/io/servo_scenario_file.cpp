@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "alidade/io/events_file.h"
 #include "alidade/io/rig_file.h"
 #include "alidade/io/yaml_fields.h"
 
@@ -82,8 +83,24 @@ std::optional<ErrorUnit> error_unit(const std::string& name) {
   return std::nullopt;
 }
 
-void read_target(const YAML::Node& root, const Fields& top, TargetPath& path) {
-  const Section target(root, top, "target", {"path", "start_m", "radius_m", "period_s", "jump_m", "jump_at_s"});
+/// A path that was recorded; its file.
+std::filesystem::path read_recorded(const Section& target, const std::filesystem::path& folder, TargetPath& path) {
+  const std::filesystem::path file = folder / target.fields().text("track");
+  if (target.has("path")) refuse(target.fields().file(), target.fields().full("track"), "stands beside a path");
+  const TrueTrack track = read_true_track(file);
+  if (track.t_s.size() < 2) throw InputError(file.string() + ": has one row; a path has two or more");
+  path.kind = PathKind::recorded;
+  path.recorded_s = track.t_s;
+  path.recorded_m = track.position;
+  return file;
+}
+
+void read_target(const YAML::Node& root, const Fields& top, ServoScenarioFile& read,
+                 const std::filesystem::path& folder) {
+  TargetPath& path = read.scenario.scene.path;
+  const Section target(root, top, "target",
+                       {"path", "start_m", "radius_m", "period_s", "jump_m", "jump_at_s", "track"});
+  if (target.has("track")) read.track = read_recorded(target, folder, path);
   target.word("path", path.kind, path_named, "still, circle, sway, step, manoeuvre");
   target.vector("start_m", path.start_m);
   target.number("radius_m", path.radius_m, 0.0, 1e4);
@@ -271,7 +288,7 @@ ServoScenarioFile read_servo_scenario(const std::filesystem::path& file) {
     read.rig = file.parent_path() / top.text("rig");
     read.scenario.scene.heads = read_rig(read.rig).heads;
   }
-  read_target(root, top, read.scenario.scene.path);
+  read_target(root, top, read, file.parent_path());
   read_plant(root, top, read.scenario);
   read_noise(root, top, read.scenario);
   read_controllers(root, top, read.scenario);
@@ -286,6 +303,7 @@ std::string servo_scenario_text() {
   return R"(# What alidade servo runs. Every key may be left out; these are the values it then has.
 # rig: rig.yaml                  # heads and cameras; without it: the rig of Xiahou, Chen & Wu, 2015
 target: {path: circle, start_m: [0.173, -0.314, 0.636], radius_m: 0.1, period_s: 10}  # still, sway, step, manoeuvre
+# target: {track: path.csv}      # a path that was recorded: t_s,x_m,y_m,z_m
 duration_s: 12
 warm_up_s: 2                     # not counted in the figures
 sample_period_s: 0.05            # pictures, encoders, commands

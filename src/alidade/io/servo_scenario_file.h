@@ -9,7 +9,8 @@ namespace alidade {
 
 struct ServoScenarioFile {
   ServoScenario scenario;
-  std::filesystem::path rig;  ///< As the scenario names it, from its own folder; empty: the preset's.
+  std::filesystem::path rig;    ///< As the scenario names it, from its own folder; empty: the preset's.
+  std::filesystem::path track;  ///< The target's path, if it was recorded; likewise.
 };
 
 /// Reads scenario.yaml; what is left out is the preset. Throws InputError: a key that is unknown or no number, a value

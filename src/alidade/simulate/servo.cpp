@@ -1,5 +1,6 @@
 #include "alidade/simulate/servo.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -8,7 +9,32 @@
 namespace alidade {
 namespace {
 
-constexpr std::array<std::string_view, 5> path_names{"still", "circle", "sway", "step", "manoeuvre"};
+constexpr std::array<std::string_view, 6> path_names{"still", "circle", "sway", "step", "manoeuvre", "recorded"};
+
+/// Velocity at a place of the record: of the parabola through its neighbours, at the ends of the line.
+Eigen::Vector3d velocity_at(const TargetPath& path, std::size_t i) {
+  const auto slope = [&](std::size_t k) {
+    return Eigen::Vector3d((path.recorded_m[k + 1] - path.recorded_m[k]) /
+                           (path.recorded_s[k + 1] - path.recorded_s[k]));
+  };
+  const std::size_t last = path.recorded_s.size() - 1;
+  if (i == 0) return slope(0);
+  if (i == last) return slope(last - 1);
+  const double before_s = path.recorded_s[i] - path.recorded_s[i - 1];
+  const double after_s = path.recorded_s[i + 1] - path.recorded_s[i];
+  return (after_s * slope(i - 1) + before_s * slope(i)) / (before_s + after_s);
+}
+
+Eigen::Vector3d recorded_at(const TargetPath& path, double t_s) {
+  if (path.recorded_s.empty()) return path.start_m;
+  const auto after = std::ranges::upper_bound(path.recorded_s, t_s);
+  if (after == path.recorded_s.begin()) return path.recorded_m.front();
+  if (after == path.recorded_s.end()) return path.recorded_m.back();
+  const auto i = static_cast<std::size_t>(after - path.recorded_s.begin()) - 1;
+  const double dt = path.recorded_s[i + 1] - path.recorded_s[i], s = (t_s - path.recorded_s[i]) / dt, r = 1.0 - s;
+  return r * r * (1.0 + 2.0 * s) * path.recorded_m[i] + s * s * (1.0 + 2.0 * r) * path.recorded_m[i + 1] +
+         s * r * dt * (r * velocity_at(path, i) - s * velocity_at(path, i + 1));
+}
 
 double rounded_to(double value, double step) { return step > 0.0 ? step * std::round(value / step) : value; }
 
@@ -29,7 +55,7 @@ DelayedAxis standing(const ServoAxis& axis, double angle_rad) {
 std::string_view path_name(PathKind kind) { return path_names[static_cast<std::size_t>(kind)]; }
 
 std::optional<PathKind> path_named(std::string_view name) {
-  for (std::size_t i = 0; i < path_names.size(); ++i)
+  for (std::size_t i = 0; i + 1 < path_names.size(); ++i)
     if (path_names[i] == name) return static_cast<PathKind>(i);
   return std::nullopt;
 }
@@ -45,6 +71,8 @@ Eigen::Vector3d TargetPath::at(double t_s) const {
       return t_s < jump_at_s ? start_m : Eigen::Vector3d(start_m + jump_m);
     case PathKind::manoeuvre:
       return manoeuvre_position(t_s);
+    case PathKind::recorded:
+      return recorded_at(*this, t_s);
     case PathKind::still:
       break;
   }

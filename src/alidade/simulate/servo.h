@@ -13,12 +13,14 @@
 
 namespace alidade {
 
-enum class PathKind { still, circle, sway, step, manoeuvre };
-[[nodiscard]] std::string_view path_name(PathKind kind);  ///< still, circle, sway, step, manoeuvre
+enum class PathKind { still, circle, sway, step, manoeuvre, recorded };
+[[nodiscard]] std::string_view path_name(PathKind kind);  ///< still, circle, sway, step, manoeuvre, recorded
+/// All but `recorded`, which needs its record.
 [[nodiscard]] std::optional<PathKind> path_named(std::string_view name);
 
 /// Where a target goes. A circle lies in a plane of constant z and begins at `start`, its middle at −x of it; a sway is
-/// sideways about `start`; a step leaves `start` for good at a time; the manoeuvre is manoeuvre_position().
+/// sideways about `start`; a step leaves `start` for good at a time; the manoeuvre is manoeuvre_position(); a recorded
+/// path goes through its places by cubics (Hermite's, with the slopes of parabolas) and stands still before and after.
 struct TargetPath {
   PathKind kind = PathKind::circle;
   Eigen::Vector3d start_m{0.173, -0.314, 0.636};  ///< In the world: the start of Xiahou, Chen & Wu, 2015.
@@ -26,6 +28,8 @@ struct TargetPath {
   double period_s = 10.0;
   Eigen::Vector3d jump_m{0.25, 0.12, 0.0};
   double jump_at_s = 1.0;
+  std::vector<double> recorded_s;  ///< Ascending.
+  std::vector<Eigen::Vector3d> recorded_m;
 
   [[nodiscard]] Eigen::Vector3d at(double t_s) const;
 };

@@ -1,0 +1,323 @@
+#include "alidade/localize/image_localizer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "alidade/imaging/corner_features.h"
+
+namespace alidade {
+namespace {
+
+constexpr std::size_t least_tracked = 5;  // a pose has six numbers, a point two; two points more to notice a mistake
+constexpr double least_share = 0.25;      // of the features looked for: fewer may be chance
+constexpr double prior_share = 0.5;       // σ of a new inverse depth over it: from half the depth to infinity
+
+}  // namespace
+
+ImageLocalizer::ImageLocalizer(const Camera& camera, const LocalizeImagesConfig& config)
+    : camera_(camera), config_(config), filter_config_(config.localize.filter) {
+  const std::size_t num_known = config.target ? config.target->points.size() : 0;
+  const std::size_t need = motion_dim + filter_config_.lens_params.size() + 3 * num_known + 6 * config.eyes.most_features;
+  filter_config_.state_capacity = static_cast<int>(need) + 8;
+  filter_config_.sights_capacity = static_cast<int>(config.eyes.most_tried + num_known);
+  next_id_ = static_cast<long>(num_known);
+  if (config.target)
+    for (const KnownPoint& point : config.target->points) next_id_ = std::max(next_id_, point.id + 1);
+}
+
+std::size_t ImageLocalizer::num_found(long id) const {
+  const auto at = landmarks_.find(id);
+  return at == landmarks_.end() ? 0 : static_cast<std::size_t>(at->second.num_found);
+}
+
+void ImageLocalizer::forget(long id) {
+  bank_->remove(id);
+  landmarks_.erase(id);
+}
+
+void ImageLocalizer::begin_at(std::span<const StartHypothesis> starts) {
+  bank_.emplace(camera_, starts, filter_config_, config_.localize.bank);
+}
+
+/// From the start that was told, or the target; without both the first camera is the world.
+bool ImageLocalizer::start(const cv::Mat& smoothed) {
+  const LocalizeConfig& localize = config_.localize;
+  std::optional<SeenTarget> seen;
+  if (config_.target) {
+    seen = find_target(smoothed, camera_, *config_.target,
+                       {filter_config_.sigma_px, localize.sigma_speed_m_s, localize.sigma_rate_rad_s});
+    if (!seen) return false;
+  }
+  if (localize.start) {
+    begin_at({{*localize.start}});
+  } else if (seen) {
+    // The same sights follow as a measurement, with the points' own σ: what led here must not count twice.
+    constexpr double widened = 100.0;
+    for (StartHypothesis& from : seen->starts) from.cov.topLeftCorner<6, 6>() *= widened;
+    begin_at(seen->starts);
+  } else {
+    StartHypothesis origin;
+    constexpr double sure = 1e-6;  // the world is where the camera is; zero would leave no way to correct it
+    origin.cov.diagonal().head<6>().setConstant(sure * sure);
+    origin.cov.diagonal().segment<3>(6).setConstant(std::pow(localize.sigma_speed_m_s, 2));
+    origin.cov.diagonal().tail<3>().setConstant(std::pow(localize.sigma_rate_rad_s, 2));
+    begin_at({{origin}});
+  }
+  if (seen) add_target(smoothed, *seen);
+  add_new(smoothed);
+  return seen || num_found_now_ >= least_tracked;
+}
+
+/// Its points enter the map, and their surroundings as they look now are what they are found by.
+void ImageLocalizer::add_target(const cv::Mat& smoothed, const SeenTarget& seen) {
+  const std::vector<KnownPoint>& points = config_.target->points;
+  for (const KnownPoint& point : points) bank_->add_known(point.id, point.point_in_world, point.sigma_m);
+  const SightsReport report = bank_->update(seen.sights);
+  num_found_now_ = report.num_used;
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // of the plane through the points
+  for (std::size_t i = 2; i < points.size(); ++i)
+    normal += (points[i - 1].point_in_world - points[0].point_in_world)
+                  .cross(points[i].point_in_world - points[0].point_in_world);
+  const Rigid3& world_from_cam = bank_->best().motion().world_from_cam;
+  in_view_.clear();
+  for (const FeatureSight& sight : seen.sights) {
+    const auto point = std::ranges::find(points, sight.id, &KnownPoint::id);
+    in_view_.push_back(sight.px);
+    auto landmark = new_landmark(sight.id, smoothed, camera_, world_from_cam, sight.px, point->point_in_world,
+                                 normal.norm() > 0.0 ? std::optional(normal) : std::nullopt);
+    if (!landmark) continue;
+    landmark->is_known = true;
+    landmark->last_found = frame_;
+    landmarks_[sight.id] = *landmark;
+  }
+}
+
+/// In steps of the pictures' period: accelerations are drawn anew for each, also while pictures are missing.
+void ImageLocalizer::predict_to(double t_s) {
+  const double gap_s = t_s - t_s_;
+  if (!(period_s_ > 0.0) || gap_s < period_s_) period_s_ = gap_s;
+  constexpr int most_steps = 1000;  // σ is as large as the world long before
+  const int num_steps = std::clamp(static_cast<int>(std::lround(gap_s / period_s_)), 1, most_steps);
+  for (int i = 0; i < num_steps; ++i) bank_->predict(gap_s / num_steps);
+  t_s_ = t_s;
+}
+
+std::vector<FeatureSight> ImageLocalizer::look(const cv::Mat& smoothed, const Search& search) {
+  const LocalizationFilter& filter = bank_->best();
+  std::vector<FeatureSight> sights;
+  tried_.clear();
+  in_view_.clear();
+  constexpr double margin_px = PatchView::half_px + 2.0;
+  for (const Feature& feature : filter.features()) {  // in order of age
+    const auto at = landmarks_.find(feature.id);
+    if (at == landmarks_.end()) continue;
+    auto expected = filter.expected(feature.id);
+    if (!expected || expected->px.minCoeff() < margin_px || expected->px.x() > smoothed.cols - 1 - margin_px ||
+        expected->px.y() > smoothed.rows - 1 - margin_px)
+      continue;
+    in_view_.push_back(expected->px);
+    if (tried_.size() >= config_.eyes.most_tried) continue;
+    Landmark& landmark = at->second;
+    const auto warp =
+        here_from_first(landmark, camera_, filter.motion().world_from_cam, place_of(feature).point_in_world);
+    const auto view = warp ? landmark.patch.seen_through(*warp) : std::nullopt;
+    if (!view) continue;
+    expected->S.diagonal().array() += search.extra_sigma_px * search.extra_sigma_px;
+    const Eigen::Vector2d offset_px = *warp * landmark.offset_px;
+    tried_.push_back({feature.id, expected->px, expected->S, {}, false});
+    const auto match = find_patch(smoothed, *view, expected->px - offset_px, expected->S, {3.0, search.min_correlation});
+    if (!match) continue;
+    tried_.back().found_px = match->px + offset_px;
+    in_view_.back() = match->px + offset_px;
+    sights.push_back({feature.id, match->px + offset_px, std::hypot(match->sigma_px, config_.eyes.sigma_floor_px)});
+  }
+  return sights;
+}
+
+bool ImageLocalizer::is_found(std::size_t num_found) const {
+  return num_found >= least_tracked && static_cast<double>(num_found) >= least_share * static_cast<double>(tried_.size());
+}
+
+void ImageLocalizer::count(std::span<const FeatureSight> sights, const SightsReport& report) {
+  for (const SightTried& tried : tried_) ++landmarks_.at(tried.id).num_tried;
+  for (std::size_t i = 0; i < sights.size(); ++i) {
+    if (report.outcomes[i] != SightOutcome::used) continue;
+    Landmark& landmark = landmarks_.at(sights[i].id);
+    ++landmark.num_found;
+    landmark.last_found = frame_;
+    const auto tried = std::ranges::find(tried_, sights[i].id, &SightTried::id);
+    if (tried != tried_.end()) tried->is_used = true;
+  }
+}
+
+void ImageLocalizer::drop_bad() {
+  constexpr int least_tries = 8;
+  std::vector<long> bad;
+  for (const auto& [id, landmark] : landmarks_) {
+    if (landmark.is_known || landmark.num_tried < least_tries) continue;
+    if (landmark.num_found < config_.eyes.least_found_share * landmark.num_tried) bad.push_back(id);
+  }
+  std::ranges::sort(bad);
+  for (const long id : bad) forget(id);
+}
+
+/// As deep as the points of the map that are known well, in the middle.
+double ImageLocalizer::usual_depth_m() const {
+  const LocalizationFilter& filter = bank_->best();
+  if (config_.localize.depth_m > 0.0) return config_.localize.depth_m;
+  const Rigid3 cam_from_world = filter.motion().world_from_cam.inverse();
+  std::vector<double> depths;
+  for (const Feature& feature : filter.features()) {
+    const double depth = (cam_from_world * place_of(feature).point_in_world).z();
+    if (depth > 0.0 && feature.kind == FeatureKind::xyz) depths.push_back(depth);
+  }
+  if (depths.empty()) return 1.0;  // a world without scale: its first points are one unit away
+  std::ranges::nth_element(depths, depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2));
+  return depths[depths.size() / 2];
+}
+
+/// Where the map is full, what has not been seen for longest leaves.
+bool ImageLocalizer::make_room() {
+  if (landmarks_.size() < config_.eyes.most_features) return true;
+  const Landmark* oldest = nullptr;
+  for (const auto& [id, landmark] : landmarks_) {
+    if (landmark.is_known || landmark.last_found == frame_) continue;
+    if (!oldest || landmark.last_found < oldest->last_found ||
+        (landmark.last_found == oldest->last_found && id < oldest->id))
+      oldest = &landmark;
+  }
+  if (!oldest) return false;
+  forget(oldest->id);
+  return true;
+}
+
+void ImageLocalizer::add_new(const cv::Mat& smoothed) {
+  const EyesConfig& eyes = config_.eyes;
+  if (num_found_now_ >= eyes.least_found) return;
+  CornerFeatureConfig corners;
+  corners.cell_px = eyes.cell_px > 0 ? eyes.cell_px : std::max(24, smoothed.cols / 10);
+  corners.min_distance_px = 0.5 * corners.cell_px;
+  const bool is_first = landmarks_.size() < least_tracked;
+  std::size_t most = std::min(eyes.least_found - num_found_now_, is_first ? eyes.least_found : eyes.most_new);
+  const double depth_m = usual_depth_m();
+  for (const CornerFeature& corner : corners_in_empty_cells(smoothed, in_view_, corners)) {
+    if (most == 0 || !make_room()) return;
+    const Eigen::Vector2d px = corner.px.cast<double>();
+    const auto ray_in_cam = unproject(camera_, px);
+    if (!ray_in_cam) continue;
+    constexpr double least_z = 0.2;  // at the edge of a wide lens a depth is no distance
+    const double range_m = depth_m / std::max(ray_in_cam->z(), least_z);
+    const Rigid3 world_from_cam = bank_->best().motion().world_from_cam;
+    auto landmark = new_landmark(next_id_, smoothed, camera_, world_from_cam, px,
+                                 world_from_cam * (range_m * *ray_in_cam));
+    if (!landmark || !bank_->add(next_id_, px, {range_m, prior_share})) continue;
+    landmark->last_found = frame_;
+    landmarks_[next_id_++] = *landmark;
+    ++num_found_now_;
+    --most;
+  }
+}
+
+void ImageLocalizer::fill(const SightsReport& report, PathStep& step) const {
+  step.num_tracked = report.num_used;
+  step.num_gated = report.num_gated;
+  if (report.num_used > 0) step.nis_per_dof = report.nis_per_dof;
+}
+
+/// From a pose where the camera may be: a wide search, an update of the filter, and a second look that has to find
+/// most of what is expected then, where it is expected.
+bool ImageLocalizer::try_from(const cv::Mat& smoothed, const StartHypothesis& from, PathStep& step) {
+  bank_->restart({{from}});
+  const std::vector<FeatureSight> sights = look(smoothed, {0.85, 0.0});
+  if (!is_found(sights.size())) return false;
+  const SightsReport report = bank_->update(sights);
+  constexpr double most_nis = 3.0;
+  if (!report.is_sound || !is_found(report.num_used) || report.nis_per_dof > most_nis) return false;
+  PathStep found = step;
+  found.num_seen = sights.size();
+  fill(report, found);
+  const std::vector<FeatureSight> again = look(smoothed, {config_.eyes.min_correlation, 0.0});
+  constexpr double sure_share = 0.5;
+  constexpr std::size_t sure_number = 8;
+  if (again.size() < sure_number || static_cast<double>(again.size()) < sure_share * static_cast<double>(tried_.size()))
+    return false;
+  step = found;
+  return true;
+}
+
+bool ImageLocalizer::find_back(const cv::Mat& smoothed, PathStep& step) {
+  const LocalizeConfig& localize = config_.localize;
+  std::vector<StartHypothesis> starts;
+  const double depth_m = usual_depth_m();
+  constexpr double sigma_share = 0.15, sigma_rad = 0.08;  // of what a keyframe's pose is off by
+  for (const Rigid3& world_from_cam : keyframes_.candidates(smoothed, camera_, 4)) {
+    StartHypothesis start;
+    start.motion.world_from_cam = world_from_cam;
+    start.cov.diagonal().head<3>().setConstant(std::pow(sigma_share * depth_m, 2));
+    start.cov.diagonal().segment<3>(3).setConstant(sigma_rad * sigma_rad);
+    start.cov.diagonal().segment<3>(6).setConstant(std::pow(localize.sigma_speed_m_s, 2));
+    start.cov.diagonal().tail<3>().setConstant(std::pow(localize.sigma_rate_rad_s, 2));
+    starts.push_back(start);
+  }
+  if (config_.target) {
+    const auto seen = find_target(smoothed, camera_, *config_.target,
+                                  {filter_config_.sigma_px, localize.sigma_speed_m_s, localize.sigma_rate_rad_s});
+    if (seen) starts.insert(starts.begin(), seen->starts.begin(), seen->starts.end());
+  }
+  const FilterBank before = *bank_;
+  for (const StartHypothesis& start : starts) {
+    if (try_from(smoothed, start, step)) return true;
+    bank_ = before;
+  }
+  return false;
+}
+
+PathStep ImageLocalizer::take(const cv::Mat& grey, long frame, double t_s) {
+  const cv::Mat smoothed = smoothed_for_search(grey);
+  PathStep step;
+  step.frame = frame_ = frame;
+  step.t_s = t_s;
+  if (!bank_) {
+    t_s_ = t_s;
+    if (!start(smoothed)) {
+      bank_.reset();
+      landmarks_.clear();
+      return step;
+    }
+    step.event = FrameEvent::started;
+    step.num_seen = step.num_tracked = landmarks_.size();
+  } else {
+    predict_to(t_s);
+    std::vector<FeatureSight> sights = look(smoothed, {config_.eyes.min_correlation, 0.0});
+    if (config_.disturb) config_.disturb(frame, sights);
+    step.num_seen = sights.size();
+    step.event = FrameEvent::predicted;
+    if (is_found(sights.size())) {
+      const SightsReport report = bank_->update(sights);
+      fill(report, step);
+      count(sights, report);
+      if (is_found(report.num_used)) step.event = FrameEvent::tracked;
+    }
+    if (step.event == FrameEvent::predicted && find_back(smoothed, step)) {
+      step.event = FrameEvent::restarted;
+      ++num_restarts_;
+    }
+    num_found_now_ = step.num_tracked;
+    if (step.event != FrameEvent::predicted) {
+      drop_bad();
+      bank_->convert_linear();
+      add_new(smoothed);
+    }
+  }
+  const LocalizationFilter& filter = bank_->best();
+  step.world_from_cam = filter.motion().world_from_cam;
+  step.cov = filter.pose_covariance();
+  step.num_features = filter.features().size();
+  if (step.event == FrameEvent::tracked)
+    keyframes_.offer(grey, step.world_from_cam, config_.eyes.near_share * usual_depth_m(), config_.eyes.near_rad);
+  if (config_.watch) config_.watch(frame, grey, tried_);
+  return step;
+}
+
+}  // namespace alidade

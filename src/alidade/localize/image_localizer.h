@@ -1,0 +1,60 @@
+#pragma once
+
+#include <unordered_map>
+
+#include "alidade/localize/keyframes.h"
+#include "alidade/localize/landmark.h"
+#include "alidade/localize/localize_images.h"
+
+namespace alidade {
+
+/// One run through pictures: finds the features of the filter's map in each, chooses new ones, and finds the way back
+/// after it was lost.
+class ImageLocalizer {
+ public:
+  ImageLocalizer(const Camera& camera, const LocalizeImagesConfig& config);
+
+  /// The next picture, 8-bit grey of the camera's size.
+  PathStep take(const cv::Mat& grey, long frame, double t_s);
+  [[nodiscard]] const FilterBank* bank() const { return bank_ ? &*bank_ : nullptr; }
+  [[nodiscard]] std::size_t num_restarts() const { return num_restarts_; }
+  [[nodiscard]] std::size_t num_found(long id) const;
+
+ private:
+  struct Search {
+    double min_correlation = 0.8;
+    double extra_sigma_px = 0.0;
+  };
+
+  bool start(const cv::Mat& smoothed);
+  void begin_at(std::span<const StartHypothesis> starts);
+  void add_target(const cv::Mat& smoothed, const SeenTarget& seen);
+  void predict_to(double t_s);
+  /// What of the map is found where it is expected; `tried_` says what was looked for.
+  [[nodiscard]] std::vector<FeatureSight> look(const cv::Mat& smoothed, const Search& search);
+  [[nodiscard]] bool is_found(std::size_t num_found) const;
+  void count(std::span<const FeatureSight> sights, const SightsReport& report);
+  void drop_bad();
+  void add_new(const cv::Mat& smoothed);
+  [[nodiscard]] bool make_room();
+  [[nodiscard]] double usual_depth_m() const;
+  [[nodiscard]] bool find_back(const cv::Mat& smoothed, PathStep& step);
+  [[nodiscard]] bool try_from(const cv::Mat& smoothed, const StartHypothesis& start, PathStep& step);
+  void fill(const SightsReport& report, PathStep& step) const;
+  void forget(long id);
+
+  Camera camera_;
+  const LocalizeImagesConfig& config_;
+  LocalizationFilterConfig filter_config_;
+  std::optional<FilterBank> bank_;
+  std::unordered_map<long, Landmark> landmarks_;
+  KeyframeStore keyframes_;
+  std::vector<SightTried> tried_;
+  std::vector<Eigen::Vector2d> in_view_;  ///< Where landmarks are, or should be, in this picture.
+  double t_s_ = 0.0, period_s_ = 0.0;
+  long frame_ = 0, next_id_ = 0;
+  int num_lost_in_a_row_ = 0;
+  std::size_t num_restarts_ = 0, num_found_now_ = 0;
+};
+
+}  // namespace alidade

@@ -1,0 +1,110 @@
+#include "alidade/localize/image_target.h"
+
+#include <algorithm>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "alidade/imaging/find_board.h"
+#include "alidade/imaging/rectangles.h"
+
+namespace alidade {
+namespace {
+
+constexpr double most_chi2_per_dof = 6.9;  // 99.9 % of the two numbers that four corners leave
+
+int dof_of(std::size_t num_points) { return 2 * static_cast<int>(num_points) - 6; }
+
+std::optional<SeenTarget> posed(const Camera& camera, std::vector<FeatureSight> sights, const ImageTarget& target,
+                                const KnownPoseConfig& config) {
+  SeenTarget seen{std::move(sights), {}};
+  seen.starts = poses_from_known(camera, seen.sights, target.points, config);
+  if (seen.starts.empty()) return std::nullopt;
+  if (seen.starts.front().cost > most_chi2_per_dof * std::max(1, dof_of(seen.sights.size()))) return std::nullopt;
+  return seen;
+}
+
+/// Of the ways to number the corners those in which x points to the right; the one that fits best.
+std::optional<SeenTarget> posed_rectangle(const Camera& camera, const SeenRectangle& rectangle,
+                                          const ImageTarget& target, const KnownPoseConfig& config) {
+  std::optional<SeenTarget> best;
+  for (std::size_t first = 0; first < 4; ++first) {
+    const Eigen::Vector2d x_axis = rectangle.corners_px[(first + 1) % 4] - rectangle.corners_px[first];
+    if (!(x_axis.x() > 0.0)) continue;
+    std::vector<FeatureSight> sights;
+    for (std::size_t k = 0; k < 4; ++k)
+      sights.push_back({static_cast<long>(k), rectangle.corners_px[(first + k) % 4], rectangle.sigma_px});
+    KnownPoseConfig own = config;
+    own.sigma_px = std::max(rectangle.sigma_px, config.sigma_px);
+    auto seen = posed(camera, std::move(sights), target, own);
+    if (seen && (!best || seen->starts.front().cost < best->starts.front().cost)) best = std::move(seen);
+  }
+  return best;
+}
+
+std::optional<SeenTarget> find_rectangle(const cv::Mat& grey, const Camera& camera, const ImageTarget& target,
+                                         const KnownPoseConfig& config) {
+  std::optional<SeenTarget> best;
+  double best_score = 0.0;
+  constexpr double paper_sigma = 5.0;  // what print, light and noise scatter inside
+  for (const SeenRectangle& rectangle : find_rectangles(grey, camera)) {
+    const double score = std::abs(rectangle.contrast) / (paper_sigma + rectangle.inside_sigma);
+    if (score <= best_score) continue;
+    auto seen = posed_rectangle(camera, rectangle, target, config);
+    if (!seen) continue;
+    best = std::move(seen);
+    best_score = score;
+  }
+  return best;
+}
+
+std::optional<SeenTarget> find_board_points(const cv::Mat& grey, const Camera& camera, const ImageTarget& target,
+                                            const KnownPoseConfig& config) {
+  const BoardDetection found = find_board(grey, *target.board);
+  if (!found.found()) return std::nullopt;
+  std::vector<FeatureSight> sights;
+  for (const Corner& corner : found.view.corners)
+    sights.push_back({corner.index, corner.px, std::sqrt(0.5 * corner.cov.trace())});
+  return posed(camera, std::move(sights), target, config);
+}
+
+/// Each patch where the picture is most like it.
+std::optional<SeenTarget> find_patches(const cv::Mat& grey, const Camera& camera, const ImageTarget& target,
+                                       const KnownPoseConfig& config) {
+  constexpr double least_correlation = 0.75;
+  std::vector<FeatureSight> sights;
+  for (std::size_t i = 0; i < target.patches.size(); ++i) {
+    const GreyPatch& patch = target.patches[i];
+    const cv::Mat look(patch.height_px, patch.width_px, CV_8U, const_cast<std::uint8_t*>(patch.grey.data()));
+    if (look.empty() || look.cols >= grey.cols || look.rows >= grey.rows) continue;
+    cv::Mat likeness;
+    cv::matchTemplate(grey, look, likeness, cv::TM_CCOEFF_NORMED);
+    double best = 0.0;
+    cv::Point at;
+    cv::minMaxLoc(likeness, nullptr, &best, nullptr, &at);
+    if (!(best >= least_correlation)) continue;
+    sights.push_back({target.points[i].id,
+                      {at.x + 0.5 * (patch.width_px - 1), at.y + 0.5 * (patch.height_px - 1)},
+                      config.sigma_px});
+  }
+  return posed(camera, std::move(sights), target, config);
+}
+
+}  // namespace
+
+ImageTarget rectangle_target(double width_m, double height_m, double sigma_m) {
+  ImageTarget target;
+  target.rectangle_m = {width_m, height_m};
+  const double x = 0.5 * width_m, y = 0.5 * height_m;
+  target.points = {{0, {-x, -y, 0.0}, sigma_m}, {1, {x, -y, 0.0}, sigma_m}, {2, {x, y, 0.0}, sigma_m},
+                   {3, {-x, y, 0.0}, sigma_m}};
+  return target;
+}
+
+std::optional<SeenTarget> find_target(const cv::Mat& grey, const Camera& camera, const ImageTarget& target,
+                                      const KnownPoseConfig& config) {
+  if (target.rectangle_m) return find_rectangle(grey, camera, target, config);
+  if (target.board) return find_board_points(grey, camera, target, config);
+  return find_patches(grey, camera, target, config);
+}
+
+}  // namespace alidade

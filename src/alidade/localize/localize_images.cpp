@@ -1,0 +1,32 @@
+#include "alidade/localize/localize_images.h"
+
+#include <opencv2/core.hpp>
+
+#include "alidade/localize/image_localizer.h"
+#include "alidade/localize/summary.h"
+
+namespace alidade {
+
+LocalizeReport localize_images(const Camera& camera, const NextPicture& next, std::size_t num_pictures,
+                               const LocalizeImagesConfig& config, std::span<const TimedPose> truth,
+                               const Progress& progress) {
+  LocalizeReport report;
+  report.camera = camera;
+  report.has_target = config.target.has_value();
+  report.scale_known = report.has_target;
+  ImageLocalizer localizer(camera, config);
+  cv::Mat grey;
+  long frame = 0;
+  double t_s = 0.0;
+  while (next(grey, frame, t_s)) {
+    report_progress(progress, "localize", report.path.size(), std::max(num_pictures, report.path.size() + 1));
+    const double begin_s = config.localize.seconds ? config.localize.seconds() : 0.0;
+    report.path.push_back(localizer.take(grey, frame, t_s));
+    if (config.localize.seconds) report.path.back().seconds = config.localize.seconds() - begin_s;
+  }
+  report.num_restarts = localizer.num_restarts();
+  sum_up(localizer.bank(), [&](long id) { return localizer.num_found(id); }, truth, report);
+  return report;
+}
+
+}  // namespace alidade

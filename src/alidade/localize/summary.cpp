@@ -1,0 +1,36 @@
+#include "alidade/localize/summary.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace alidade {
+
+void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& num_used,
+            std::span<const TimedPose> truth, LocalizeReport& report) {
+  double nis = 0.0, dof = 0.0;
+  std::vector<TimedPose> path;
+  for (const PathStep& step : report.path) {
+    report.num_sights += step.num_seen;
+    report.num_used += step.num_tracked;
+    report.num_gated += step.num_gated;
+    report.most_seen = std::max(report.most_seen, step.num_seen);
+    report.num_lost += step.event == FrameEvent::waiting || step.event == FrameEvent::predicted ? 1 : 0;
+    if (step.num_tracked > 0 && std::isfinite(step.nis_per_dof)) {
+      nis += step.nis_per_dof * static_cast<double>(step.num_tracked);
+      dof += static_cast<double>(step.num_tracked);
+    }
+    if (step.has_pose()) path.push_back({step.t_s, step.world_from_cam});
+  }
+  if (dof > 0.0) report.nis_per_dof = nis / dof;
+  if (!bank) return;
+  const LocalizationFilter& filter = bank->best();
+  report.camera = filter.camera();
+  report.sigma_lens = filter.lens_sigmas();
+  for (const Feature& feature : filter.features()) {
+    const auto place = filter.place(feature.id);
+    report.map.push_back({feature.id, place->point_in_world, place->cov, feature.is_known, num_used(feature.id)});
+  }
+  if (!truth.empty()) report.error = path_error(path, truth, report.scale_known);
+}
+
+}  // namespace alidade

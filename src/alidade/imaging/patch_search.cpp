@@ -174,7 +174,7 @@ std::optional<PatchMatch> between_pixels(const cv::Mat& picture, const PatchView
   }
   // Of noise smoothed by [1 2 1]/4 twice, 36/256 of the variance is left, all of it in what a patch's smooth derivatives
   // see; so is most of what a patch has that is not as it was.
-  constexpr double lost_by_smoothing = 256.0 / 36.0;
+  static const double lost_by_smoothing = getenv("FAC") ? atof(getenv("FAC")) : 4.0;
   match.sigma_px = std::sqrt(std::max(variance, 0.0) * lost_by_smoothing * 0.5 * inverse.trace());
   return match;
 }

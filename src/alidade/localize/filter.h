@@ -20,6 +20,7 @@ struct LocalizationFilterConfig {
   double bend_tolerance = 0.05;     ///< Iterate while innovations are further from linear than so many σ.
   bool is_sequential = true;        ///< Known points first, then by growing innovation; false: in the order given.
   bool finds_consensus = true;      ///< One-point consensus where sights disagree: mismatches.
+  double consensus_above = 0.0;     ///< Share of the sights that may disagree before a consensus is looked for.
   double linear_below = 0.1;        ///< Linearity index below which an inverse depth becomes a place.
   std::vector<int> lens_params;  ///< Places of the lens's parameters that are in the state, and their σ at the start.
   std::vector<double> sigma_lens_params;

@@ -330,7 +330,8 @@ SightsReport LocalizationFilter::update(std::span<const FeatureSight> sights) {
   collect(sights);
   double cost = attempt(false);
   constexpr std::size_t least_for_consensus = 4;
-  const bool is_doubtful = used_.size() < measured_.size();
+  const auto num_doubtful = static_cast<double>(measured_.size() - used_.size());
+  const bool is_doubtful = num_doubtful > config_.consensus_above * static_cast<double>(measured_.size());
   if (config_.finds_consensus && is_doubtful && measured_.size() >= least_for_consensus) {
     const double without = cost;
     cost = attempt(true);

@@ -6,9 +6,11 @@
 #include <memory>
 
 #include "alidade/io/camera_file.h"
+#include "alidade/io/image_sequence.h"
 #include "alidade/io/localize_document.h"
 #include "alidade/io/localize_file.h"
 #include "alidade/localize/distortion.h"
+#include "alidade/localize/localize_images.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
 #include "cli/option_checks.h"
@@ -62,7 +64,7 @@ LocalizeConfig config_of(const Args& args) {
   config.new_points = args.new_points == "xyz"       ? NewPoints::xyz
                       : args.new_points == "delayed" ? NewPoints::delayed
                                                      : NewPoints::inverse_depth;
-  if (!args.target.empty()) config.target = read_target(args.target);
+  if (!args.target.empty() && !ImageSequence::is_pictures(args.sequence)) config.target = read_target(args.target);
   if (!args.start.empty()) {
     const StartFile start = read_start(args.start);
     config.start = start.start;
@@ -106,6 +108,26 @@ void summarize(const LocalizeReport& report, std::span<const std::string> lens_p
   }
 }
 
+LocalizeReport localize_table(const Args& args, const Camera& camera, const LocalizeConfig& config,
+                              std::span<const TimedPose> truth, Run& run) {
+  const SightsFile sights =
+      read_sights(args.sequence, {args.skip_bad, args.rate_hz, camera.width_px, camera.height_px});
+  run.lap("read");
+  run.document.counts.given = sights.skipped.size();
+  run.document.counts.skipped = sights.skipped;
+  return localize_sights(camera, sights.frames, config, truth, run.progress);
+}
+
+LocalizeReport localize_pictures(const Args& args, const Camera& camera, const LocalizeConfig& localize,
+                                 std::span<const TimedPose> truth, Run& run) {
+  LocalizeImagesConfig config;
+  config.localize = localize;
+  if (!args.target.empty()) config.target = read_image_target(args.target);
+  ImageSequence pictures(args.sequence, args.rate_hz, camera.width_px, camera.height_px);
+  const NextPicture next = [&](cv::Mat& grey, long& frame, double& t_s) { return pictures.next(grey, frame, t_s); };
+  return localize_images(camera, next, pictures.num_pictures(), config, truth, run.progress);
+}
+
 ExitCode localize(const Args& args, Run& run) {
   add_inputs(args, run);
   const Camera camera = camera_of(args);
@@ -114,14 +136,11 @@ ExitCode localize(const Args& args, Run& run) {
   if (args.calibrate_online) lens_params = put_lens_in_state(camera, config.filter);
   std::vector<TimedPose> truth;
   if (!args.truth.empty()) truth = read_tum(args.truth);
-  const SightsFile sights =
-      read_sights(args.sequence, {args.skip_bad, args.rate_hz, camera.width_px, camera.height_px});
-  run.lap("read");
-  const LocalizeReport report = localize_sights(camera, sights.frames, config, truth, run.progress);
+  const bool is_pictures = ImageSequence::is_pictures(args.sequence);
+  const LocalizeReport report = is_pictures ? localize_pictures(args, camera, config, truth, run)
+                                            : localize_table(args, camera, config, truth, run);
   run.lap("localize");
   const Verdict verdict = localize_verdict(report);
-  run.document.counts.given = sights.skipped.size();
-  run.document.counts.skipped = sights.skipped;
   fill_localization(report, truth, lens_params, run.document);
   summarize(report, lens_params, run);
   if (verdict.exit_code == ExitCode::ok) {
@@ -140,12 +159,16 @@ ExitCode localize(const Args& args, Run& run) {
 void add_options(CLI::App& command, Args& args) {
   command
       .add_option("sequence", args.sequence,
-                  "Sights of numbered points, CSV: frame,t_s,point_id,u_px,v_px, in order of time")
+                  "Pictures: a folder of numbered ones, EuRoC's layout (mav0/cam0), or a video; or sights of numbered "
+                  "points, CSV: frame,t_s,point_id,u_px,v_px, in order of time")
       ->required();
   command.add_option("--camera", args.camera, "The camera, calibrated in the water it is used in")
       ->type_name("FILE")
       ->required();
-  command.add_option("--target", args.target, "Known points, which give scale and the map's frame (target.yaml)")
+  command
+      .add_option("--target", args.target,
+                  "What gives scale and the map's frame (target.yaml): known points; in pictures a rectangle, a "
+                  "board, or points with patches")
       ->type_name("FILE");
   command
       .add_option("--start", args.start, "Where the camera starts, how fast, how sure; depths of points (start.yaml)")
@@ -184,7 +207,9 @@ void add_localize(Frame& frame) {
   CLI::App& command = frame.add_command(
       {.name = "localize",
        .summary = "Path of a moving camera, and the map of the points it sees, with the lens in the filter",
-       .examples = "alidade localize sights.csv --camera camera.yaml --target target.yaml\n"
+       .examples = "alidade localize frames/ --camera camera.yaml --target rectangle.yaml --rate 30 --sigma-a 4 "
+                   "--sigma-alpha 6\n"
+                   "alidade localize sights.csv --camera camera.yaml --target target.yaml\n"
                    "alidade localize sights.csv --camera camera.yaml --target target.yaml --calibrate-online\n"
                    "alidade localize sights.csv --camera camera.yaml --start start.yaml --truth truth.tum\n"},
       [args](Run& run) { return localize(*args, run); });

@@ -12,8 +12,8 @@ namespace {
 constexpr int block_px = 7;
 
 bool is_taken(const Eigen::Vector2d& px, std::span<const Eigen::Vector2d> near, double min_distance_px) {
-  return std::ranges::any_of(near,
-                             [&](const Eigen::Vector2d& at) { return (at - px).squaredNorm() < min_distance_px * min_distance_px; });
+  return std::ranges::any_of(
+      near, [&](const Eigen::Vector2d& at) { return (at - px).squaredNorm() < min_distance_px * min_distance_px; });
 }
 
 /// The best pixel of a cell that is not beside one of `near`.

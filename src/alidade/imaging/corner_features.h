@@ -17,15 +17,15 @@ struct CornerFeature {
 };
 
 struct CornerFeatureConfig {
-  int cell_px = 32;           ///< Side of the grid's cells: one feature each.
-  int margin_px = 14;         ///< From the picture's edge.
-  double min_strength = 4.0;  ///< Weaker ones are noise, or lie on an edge. [grey values a pixel]
+  int cell_px = 32;               ///< Side of the grid's cells: one feature each.
+  int margin_px = 14;             ///< From the picture's edge.
+  double min_strength = 4.0;      ///< Weaker ones are noise, or lie on an edge. [grey values a pixel]
   double min_distance_px = 16.0;  ///< To those that are there already.
 };
 
-/// The strongest corner of each cell of a grid over the picture that holds none of `occupied`; strongest first. Strength
-/// is the root of the smaller eigenvalue of the mean of ∇g ∇gᵀ over 7×7 pixels: J. Shi & C. Tomasi, "Good features to
-/// track", CVPR 1994. The picture has one channel of 8 bits.
+/// The strongest corner of each cell of a grid over the picture that holds none of `occupied`; strongest first.
+/// Strength is the root of the smaller eigenvalue of the mean of ∇g ∇gᵀ over 7×7 pixels: J. Shi & C. Tomasi, "Good
+/// features to track", CVPR 1994. The picture has one channel of 8 bits.
 [[nodiscard]] std::vector<CornerFeature> corners_in_empty_cells(const cv::Mat& grey,
                                                                 std::span<const Eigen::Vector2d> occupied,
                                                                 const CornerFeatureConfig& config = {});

@@ -107,8 +107,7 @@ BestPlace best_place(const cv::Mat& picture, const PatchView& view, const Eigen:
           most)
         continue;
       ++best.num_compared;
-      const int product =
-          product_at(view.grey.data(), picture.ptr<std::uint8_t>(v - half) + u - half, picture.step);
+      const int product = product_at(view.grey.data(), picture.ptr<std::uint8_t>(v - half) + u - half, picture.step);
       const double spread = spreads[static_cast<std::size_t>(u - window.u_min)];
       if (product <= 0 || !(spread > 0.0)) continue;
       const double squared = static_cast<double>(product) * product / spread;
@@ -172,9 +171,9 @@ std::optional<PatchMatch> between_pixels(const cv::Mat& picture, const PatchView
     if (!((match.px - start).cwiseAbs().maxCoeff() < most_px)) return std::nullopt;
     if (step.norm() < small_step_px) break;
   }
-  // Of noise smoothed by [1 2 1]/4 twice, 36/256 of the variance is left, all of it in what a patch's smooth derivatives
-  // see; so is most of what a patch has that is not as it was.
-  static const double lost_by_smoothing = getenv("FAC") ? atof(getenv("FAC")) : 4.0;
+  // Noise smoothed by [1 2 1]/4 twice keeps 36/256 of its variance, but at a sixth of a cycle a pixel, where a patch's
+  // derivatives are, 9/16: what is left over counts so much more.
+  constexpr double lost_by_smoothing = 4.0;
   match.sigma_px = std::sqrt(std::max(variance, 0.0) * lost_by_smoothing * 0.5 * inverse.trace());
   return match;
 }

@@ -124,8 +124,8 @@ std::optional<EdgePlane> edge_plane(const cv::Mat& grey, const Camera& camera, c
     for (const Eigen::Vector3d& ray : rays) squares += std::pow(plane.normal.dot(ray), 2);
     const double sigma = std::sqrt(squares / static_cast<double>(rays.size() - 2));
     plane.rms_px = sigma * focal_px;
-    const auto left = std::erase_if(
-        rays, [&](const Eigen::Vector3d& ray) { return std::abs(plane.normal.dot(ray)) > 2.5 * sigma; });
+    const auto left =
+        std::erase_if(rays, [&](const Eigen::Vector3d& ray) { return std::abs(plane.normal.dot(ray)) > 2.5 * sigma; });
     if (left == 0) break;
     if (rays.size() < num / 2) return std::nullopt;
   }

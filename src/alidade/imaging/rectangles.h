@@ -16,9 +16,9 @@ namespace alidade {
 struct SeenRectangle {
   /// Clockwise as seen; the first is the one nearest to the top left.
   std::array<Eigen::Vector2d, 4> corners_px;
-  double sigma_px = 0.0;       ///< Of a corner's coordinate, from what the edges leave over.
-  double contrast = 0.0;       ///< Of the edges: grey values inside less those outside; dark ones are negative.
-  double inside_sigma = 0.0;   ///< Of the grey values inside.
+  double sigma_px = 0.0;      ///< Of a corner's coordinate, from what the edges leave over.
+  double contrast = 0.0;      ///< Of the edges: grey values inside less those outside; dark ones are negative.
+  double inside_sigma = 0.0;  ///< Of the grey values inside.
 };
 
 /// All of them that are in the picture as a whole, the most contrast first. Edges are fitted as planes of rays, so that

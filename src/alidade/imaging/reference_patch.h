@@ -17,9 +17,9 @@ struct PatchView {
   static constexpr int row_px = 16;  ///< Rows are padded by zeros: sixteen products at a time.
   alignas(32) std::array<std::int16_t, side_px * row_px> grey{};  ///< Without their mean.
   std::array<float, area_px> shade{};                             ///< The same, exact.
-  std::array<float, area_px> along_u{}, along_v{};  ///< Derivatives, without their share of gain and bias.
+  std::array<float, area_px> along_u{}, along_v{};              ///< Derivatives, without their share of gain and bias.
   Eigen::Matrix2d shift_information = Eigen::Matrix2d::Zero();  ///< Σ of their products.
-  double energy = 0.0;  ///< Σ shade².
+  double energy = 0.0;                                          ///< Σ shade².
 };
 
 /// The surroundings of a point as they were first seen, to be found again from elsewhere. AnchorPatch finds a patch to
@@ -27,8 +27,8 @@ struct PatchView {
 /// and costs a hundredth of it.
 class ReferencePatch {
  public:
-  static constexpr int half_px = 12;               ///< More than a view needs: it may be seen turned and larger.
-  static constexpr int margin_px = half_px;        ///< Pixels around that have to be in the picture.
+  static constexpr int half_px = 12;         ///< More than a view needs: it may be seen turned and larger.
+  static constexpr int margin_px = half_px;  ///< Pixels around that have to be in the picture.
 
   ReferencePatch() = default;
   /// Cuts it out of an 8-bit picture of one channel, `margin_px` inside.
@@ -44,9 +44,9 @@ class ReferencePatch {
 };
 
 struct PatchSearch {
-  double num_sigma = 3.0;         ///< Size of the ellipse.
-  double min_correlation = 0.8;   ///< Normalised, with the patch as it should look.
-  double max_half_px = 40.0;      ///< The ellipse is cut off there.
+  double num_sigma = 3.0;        ///< Size of the ellipse.
+  double min_correlation = 0.8;  ///< Normalised, with the patch as it should look.
+  double max_half_px = 40.0;     ///< The ellipse is cut off there.
 };
 
 /// A patch found.

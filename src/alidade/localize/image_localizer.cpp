@@ -17,8 +17,11 @@ constexpr double prior_share = 0.5;       // σ of a new inverse depth over it: 
 
 ImageLocalizer::ImageLocalizer(const Camera& camera, const LocalizeImagesConfig& config)
     : camera_(camera), config_(config), filter_config_(config.localize.filter) {
+  constexpr double few_doubtful = 0.1;  // the gates alone keep them out; a consensus costs as much as the update
+  filter_config_.consensus_above = std::max(filter_config_.consensus_above, few_doubtful);
   const std::size_t num_known = config.target ? config.target->points.size() : 0;
-  const std::size_t need = motion_dim + filter_config_.lens_params.size() + 3 * num_known + 6 * config.eyes.most_features;
+  const std::size_t need =
+      motion_dim + filter_config_.lens_params.size() + 3 * num_known + 6 * config.eyes.most_features;
   filter_config_.state_capacity = static_cast<int>(need) + 8;
   filter_config_.sights_capacity = static_cast<int>(config.eyes.most_tried + num_known);
   next_id_ = static_cast<long>(num_known);
@@ -36,8 +39,11 @@ void ImageLocalizer::forget(long id) {
   landmarks_.erase(id);
 }
 
+/// With tens of features the valley that FilterBank splits the speed for is gone after a frame; both poses stay.
 void ImageLocalizer::begin_at(std::span<const StartHypothesis> starts) {
-  bank_.emplace(camera_, starts, filter_config_, config_.localize.bank);
+  FilterBankConfig bank = config_.localize.bank;
+  bank.splits = 1;
+  bank_.emplace(camera_, starts, filter_config_, bank);
 }
 
 /// From the start that was told, or the target; without both the first camera is the world.
@@ -126,7 +132,8 @@ std::vector<FeatureSight> ImageLocalizer::look(const cv::Mat& smoothed, const Se
     expected->S.diagonal().array() += search.extra_sigma_px * search.extra_sigma_px;
     const Eigen::Vector2d offset_px = *warp * landmark.offset_px;
     tried_.push_back({feature.id, expected->px, expected->S, {}, false});
-    const auto match = find_patch(smoothed, *view, expected->px - offset_px, expected->S, {3.0, search.min_correlation});
+    const auto match =
+        find_patch(smoothed, *view, expected->px - offset_px, expected->S, {3.0, search.min_correlation});
     if (!match) continue;
     tried_.back().found_px = match->px + offset_px;
     in_view_.back() = match->px + offset_px;
@@ -136,7 +143,8 @@ std::vector<FeatureSight> ImageLocalizer::look(const cv::Mat& smoothed, const Se
 }
 
 bool ImageLocalizer::is_found(std::size_t num_found) const {
-  return num_found >= least_tracked && static_cast<double>(num_found) >= least_share * static_cast<double>(tried_.size());
+  return num_found >= least_tracked &&
+         static_cast<double>(num_found) >= least_share * static_cast<double>(tried_.size());
 }
 
 void ImageLocalizer::count(std::span<const FeatureSight> sights, const SightsReport& report) {
@@ -209,8 +217,8 @@ void ImageLocalizer::add_new(const cv::Mat& smoothed) {
     constexpr double least_z = 0.2;  // at the edge of a wide lens a depth is no distance
     const double range_m = depth_m / std::max(ray_in_cam->z(), least_z);
     const Rigid3 world_from_cam = bank_->best().motion().world_from_cam;
-    auto landmark = new_landmark(next_id_, smoothed, camera_, world_from_cam, px,
-                                 world_from_cam * (range_m * *ray_in_cam));
+    auto landmark =
+        new_landmark(next_id_, smoothed, camera_, world_from_cam, px, world_from_cam * (range_m * *ray_in_cam));
     if (!landmark || !bank_->add(next_id_, px, {range_m, prior_share})) continue;
     landmark->last_found = frame_;
     landmarks_[next_id_++] = *landmark;
@@ -219,10 +227,17 @@ void ImageLocalizer::add_new(const cv::Mat& smoothed) {
   }
 }
 
-void ImageLocalizer::fill(const SightsReport& report, PathStep& step) const {
+void ImageLocalizer::fill(std::span<const FeatureSight> sights, const SightsReport& report, PathStep& step) const {
+  step.num_seen = sights.size();
   step.num_tracked = report.num_used;
   step.num_gated = report.num_gated;
   if (report.num_used > 0) step.nis_per_dof = report.nis_per_dof;
+  step.num_known = step.num_known_gated = 0;
+  for (std::size_t i = 0; i < sights.size(); ++i) {
+    if (!landmarks_.at(sights[i].id).is_known) continue;
+    ++step.num_known;
+    step.num_known_gated += report.outcomes[i] == SightOutcome::gated ? 1 : 0;
+  }
 }
 
 /// From a pose where the camera may be: a wide search, an update of the filter, and a second look that has to find
@@ -235,8 +250,7 @@ bool ImageLocalizer::try_from(const cv::Mat& smoothed, const StartHypothesis& fr
   constexpr double most_nis = 3.0;
   if (!report.is_sound || !is_found(report.num_used) || report.nis_per_dof > most_nis) return false;
   PathStep found = step;
-  found.num_seen = sights.size();
-  fill(report, found);
+  fill(sights, report, found);
   const std::vector<FeatureSight> again = look(smoothed, {config_.eyes.min_correlation, 0.0});
   constexpr double sure_share = 0.5;
   constexpr std::size_t sure_number = 8;
@@ -295,7 +309,7 @@ PathStep ImageLocalizer::take(const cv::Mat& grey, long frame, double t_s) {
     step.event = FrameEvent::predicted;
     if (is_found(sights.size())) {
       const SightsReport report = bank_->update(sights);
-      fill(report, step);
+      fill(sights, report, step);
       count(sights, report);
       if (is_found(report.num_used)) step.event = FrameEvent::tracked;
     }

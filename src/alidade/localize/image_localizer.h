@@ -40,7 +40,7 @@ class ImageLocalizer {
   [[nodiscard]] double usual_depth_m() const;
   [[nodiscard]] bool find_back(const cv::Mat& smoothed, PathStep& step);
   [[nodiscard]] bool try_from(const cv::Mat& smoothed, const StartHypothesis& start, PathStep& step);
-  void fill(const SightsReport& report, PathStep& step) const;
+  void fill(std::span<const FeatureSight> sights, const SightsReport& report, PathStep& step) const;
   void forget(long id);
 
   Camera camera_;

@@ -95,8 +95,8 @@ ImageTarget rectangle_target(double width_m, double height_m, double sigma_m) {
   ImageTarget target;
   target.rectangle_m = {width_m, height_m};
   const double x = 0.5 * width_m, y = 0.5 * height_m;
-  target.points = {{0, {-x, -y, 0.0}, sigma_m}, {1, {x, -y, 0.0}, sigma_m}, {2, {x, y, 0.0}, sigma_m},
-                   {3, {-x, y, 0.0}, sigma_m}};
+  target.points = {
+      {0, {-x, -y, 0.0}, sigma_m}, {1, {x, -y, 0.0}, sigma_m}, {2, {x, y, 0.0}, sigma_m}, {3, {-x, y, 0.0}, sigma_m}};
   return target;
 }
 

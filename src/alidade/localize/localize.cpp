@@ -8,6 +8,7 @@
 #include <set>
 
 #include "alidade/localize/point_store.h"
+#include "alidade/localize/summary.h"
 
 namespace alidade {
 namespace {
@@ -218,37 +219,6 @@ LocalizeConfig sized(const LocalizeConfig& given, std::span<const SightFrame> fr
   return config;
 }
 
-void sum_up(const Localizer& localizer, std::span<const TimedPose> truth, LocalizeReport& report) {
-  double nis = 0.0, dof = 0.0;
-  std::vector<TimedPose> path;
-  for (const PathStep& step : report.path) {
-    report.num_sights += step.num_seen;
-    report.num_used += step.num_tracked;
-    report.num_gated += step.num_gated;
-    report.num_known += step.num_known;
-    report.num_known_gated += step.num_known_gated;
-    report.most_seen = std::max(report.most_seen, step.num_seen);
-    report.num_lost += step.event == FrameEvent::waiting || step.event == FrameEvent::predicted ? 1 : 0;
-    if (step.num_tracked > 0) {
-      nis += step.nis_per_dof * static_cast<double>(step.num_tracked);
-      dof += static_cast<double>(step.num_tracked);
-    }
-    if (step.has_pose()) path.push_back({step.t_s, step.world_from_cam});
-  }
-  if (dof > 0.0) report.nis_per_dof = nis / dof;
-  report.num_restarts = localizer.num_restarts();
-  if (!localizer.bank()) return;
-  const LocalizationFilter& filter = localizer.bank()->best();
-  report.camera = filter.camera();
-  report.sigma_lens = filter.lens_sigmas();
-  for (const Feature& feature : filter.features()) {
-    const auto place = filter.place(feature.id);
-    const std::size_t num_seen = localizer.points().num_used(feature.id);
-    report.map.push_back({feature.id, place->point_in_world, place->cov, feature.is_known, num_seen});
-  }
-  if (!truth.empty()) report.error = path_error(path, truth, report.scale_known);
-}
-
 }  // namespace
 
 std::string_view event_name(FrameEvent event) {
@@ -281,7 +251,9 @@ LocalizeReport localize_sights(const Camera& camera, std::span<const SightFrame>
     report.path.push_back(localizer.take(frames[i]));
     if (config.seconds) report.path.back().seconds = config.seconds() - begin_s;
   }
-  sum_up(localizer, truth, report);
+  report.num_restarts = localizer.num_restarts();
+  sum_up(
+      localizer.bank(), [&](long id) { return localizer.points().num_used(id); }, truth, report);
   return report;
 }
 

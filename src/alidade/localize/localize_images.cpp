@@ -25,7 +25,8 @@ LocalizeReport localize_images(const Camera& camera, const NextPicture& next, st
     if (config.localize.seconds) report.path.back().seconds = config.localize.seconds() - begin_s;
   }
   report.num_restarts = localizer.num_restarts();
-  sum_up(localizer.bank(), [&](long id) { return localizer.num_found(id); }, truth, report);
+  sum_up(
+      localizer.bank(), [&](long id) { return localizer.num_found(id); }, truth, report);
   return report;
 }
 

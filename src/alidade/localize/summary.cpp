@@ -13,6 +13,8 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
     report.num_sights += step.num_seen;
     report.num_used += step.num_tracked;
     report.num_gated += step.num_gated;
+    report.num_known += step.num_known;
+    report.num_known_gated += step.num_known_gated;
     report.most_seen = std::max(report.most_seen, step.num_seen);
     report.num_lost += step.event == FrameEvent::waiting || step.event == FrameEvent::predicted ? 1 : 0;
     if (step.num_tracked > 0 && std::isfinite(step.nis_per_dof)) {

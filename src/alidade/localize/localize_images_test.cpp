@@ -1,0 +1,144 @@
+#include "alidade/localize/localize_images.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <opencv2/core.hpp>
+
+#include "alidade/io/image_sequence.h"
+#include "alidade/io/localize_file.h"
+#include "alidade/simulate/draws.h"
+#include "alidade/simulate/room_video.h"
+
+namespace alidade {
+namespace {
+
+struct RoomVideo {
+  RoomScene scene;
+  std::vector<cv::Mat> pictures;
+  std::vector<TimedPose> truth;
+};
+
+RoomVideo room_video(const RoomScene& scene) {
+  RoomVideo video{scene, {}, {}};
+  for (const Rigid3& world_from_cam : room_path(scene)) {
+    const std::size_t i = video.pictures.size();
+    video.pictures.push_back(render_room(scene, world_from_cam, i + 1));
+    video.truth.push_back({static_cast<double>(i) / scene.rate_hz, world_from_cam});
+  }
+  return video;
+}
+
+/// The same pictures serve several tests.
+const RoomVideo& usual_room() {
+  static const RoomVideo video = [] {
+    RoomScene scene;
+    scene.camera = room_camera();
+    return room_video(scene);
+  }();
+  return video;
+}
+
+LocalizeImagesConfig by_hand() {
+  LocalizeImagesConfig config;
+  config.localize.filter.sigma_a_m_s2 = 4.0;
+  config.localize.filter.sigma_alpha_rad_s2 = 6.0;
+  config.target = rectangle_target(0.210, 0.1485);
+  return config;
+}
+
+LocalizeReport localized(const RoomVideo& video, const LocalizeImagesConfig& config) {
+  std::size_t i = 0;
+  const NextPicture next = [&](cv::Mat& grey, long& frame, double& t_s) {
+    if (i == video.pictures.size()) return false;
+    grey = video.pictures[i];
+    frame = static_cast<long>(i);
+    t_s = static_cast<double>(i++) / video.scene.rate_hz;
+    return true;
+  };
+  return localize_images(video.scene.camera, next, video.pictures.size(), config, video.truth);
+}
+
+TEST(LocalizeImages, FollowsARoomWithoutLosingAFrame) {
+  const LocalizeReport report = localized(usual_room(), by_hand());
+  EXPECT_EQ(report.num_lost, 0u);
+  EXPECT_LT(report.error.ate_m, 0.005);  // 0.1 px of the rectangle's 60 are 1 mm of 0.7 m; a drift of a few of them
+  EXPECT_EQ(localize_verdict(report).exit_code, ExitCode::ok);
+  EXPECT_TRUE(report.scale_known);
+  for (const PathStep& step : report.path) EXPECT_GE(step.num_tracked, 20u) << step.frame;
+}
+
+TEST(LocalizeImages, MismatchesOfFortyPercentChangeLittle) {
+  const LocalizeReport clean = localized(usual_room(), by_hand());
+  LocalizeImagesConfig config = by_hand();
+  Draws draws(7);
+  config.disturb = [&](long, std::vector<FeatureSight>& sights) {
+    for (FeatureSight& sight : sights)
+      if (draws.uniform() < 0.4) sight.px += 20.0 * Eigen::Vector2d(draws.uniform(-1, 1), draws.uniform(-1, 1));
+  };
+  const LocalizeReport disturbed = localized(usual_room(), config);
+  EXPECT_EQ(disturbed.num_lost, 0u);
+  EXPECT_LT(disturbed.error.ate_m, 0.005);  // as without them
+  EXPECT_GT(disturbed.num_gated, disturbed.num_used / 4);
+  EXPECT_LT(clean.error.ate_m, 0.005);
+}
+
+TEST(LocalizeImages, ASecondOfDarknessIsRecoveredWithinTenFrames) {
+  RoomVideo video = usual_room();
+  for (std::size_t i = 40; i < 70; ++i) video.pictures[i] = cv::Mat::zeros(240, 320, CV_8U);
+  const LocalizeReport report = localized(video, by_hand());
+  for (std::size_t i = 40; i < 70; ++i) EXPECT_EQ(report.path[i].event, FrameEvent::predicted);
+  for (std::size_t i = 80; i < 90; ++i) {
+    EXPECT_NE(report.path[i].event, FrameEvent::predicted) << i;
+    const Rigid3& is = report.path[i].world_from_cam;
+    EXPECT_LT((is.translation - video.truth[i].world_from_cam.translation).norm(), 0.03) << i;  // not somewhere else
+  }
+}
+
+TEST(LocalizeImages, WithoutTheTargetThereIsNoPath) {
+  RoomScene scene;
+  scene.camera = room_camera();
+  scene.has_rectangle = false;
+  scene.num_frames = 5;
+  const LocalizeReport report = localized(room_video(scene), by_hand());
+  EXPECT_EQ(report.num_lost, 5u);
+  EXPECT_EQ(localize_verdict(report).exit_code, ExitCode::cannot_tell);
+}
+
+TEST(LocalizeImages, WithoutTextureThereIsNoPath) {
+  RoomVideo video = usual_room();
+  video.pictures.resize(10);
+  for (cv::Mat& picture : video.pictures) picture = cv::Mat(240, 320, CV_8U, cv::Scalar(128));
+  LocalizeImagesConfig config = by_hand();
+  config.target.reset();
+  const LocalizeReport report = localized(video, config);
+  EXPECT_EQ(report.num_lost, 10u);
+  EXPECT_NE(localize_verdict(report).exit_code, ExitCode::ok);
+}
+
+TEST(LocalizeImages, ARealDeskIsFollowedToACentimetre) {
+  const char* data = std::getenv("ALIDADE_DATA");
+  const std::filesystem::path folder = std::filesystem::path(data ? data : "") / "data/monoslam-desk";
+  if (!data || !std::filesystem::exists(folder))
+    GTEST_SKIP() << "set ALIDADE_DATA to the folder that holds data/monoslam-desk";
+  Camera camera = room_camera();
+  Params<KannalaBrandt> values;
+  values << 195.0, 195.0, 162.0, 125.0, -0.00893, -0.03290, -0.00519, 0.00191;
+  camera.lens = Calibrated<KannalaBrandt>{values};
+  const std::vector<TimedPose> truth = read_tum(folder / "reference_tum.txt");
+  ImageSequence pictures(folder / "frames", 30.0, camera.width_px, camera.height_px);
+  const NextPicture next = [&](cv::Mat& grey, long& frame, double& t_s) { return pictures.next(grey, frame, t_s); };
+  const LocalizeReport report = localize_images(camera, next, 500, by_hand(), truth);
+  EXPECT_EQ(report.path.size(), 500u);
+  EXPECT_EQ(report.num_lost, 0u);
+  EXPECT_LT(report.error.ate_m, 0.010);  // the reference itself is good to 5 mm
+  EXPECT_GT(report.nis_per_dof, 0.8);
+  EXPECT_LT(report.nis_per_dof, 1.2);
+  double matches = 0.0;
+  for (const PathStep& step : report.path) matches += static_cast<double>(step.num_tracked) / 500.0;
+  EXPECT_GE(matches, 24.0);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -8,10 +8,15 @@
 #include "alidade/camera/camera.h"
 #include "alidade/imaging/corner_features.h"
 #include "alidade/imaging/rectangles.h"
-#include "alidade/simulate/room_video.h"
+#include "alidade/testing/room_video.h"
 
 namespace alidade {
 namespace {
+
+using testing::render_room;
+using testing::room_camera;
+using testing::room_path;
+using testing::RoomScene;
 
 /// A smooth surface of grey values, seen through a map: exact at every place between pixels.
 cv::Mat waves(const Eigen::Matrix2d& A, const Eigen::Vector2d& t) {
@@ -55,7 +60,7 @@ TEST(ReferencePatch, IsLookedForInsideTheEllipseOnly) {
   ASSERT_TRUE(match);
   EXPECT_NEAR(match->num_compared, M_PI * 6.0 * 3.0, 8.0);  // π ab, less what the pixels' grid leaves
   EXPECT_FALSE(find_patch(first, *view, {66, 60}, Eigen::Matrix2d::Identity()));  // 6 px away, 3 are looked at
-  EXPECT_FALSE(find_patch(first, *view, {2, 2}, S));        // outside
+  EXPECT_FALSE(find_patch(first, *view, {2, 2}, S));                              // outside
 }
 
 TEST(ReferencePatch, OfAPlainWallIsNone) {

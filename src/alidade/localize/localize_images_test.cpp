@@ -9,10 +9,15 @@
 #include "alidade/io/image_sequence.h"
 #include "alidade/io/localize_file.h"
 #include "alidade/simulate/draws.h"
-#include "alidade/simulate/room_video.h"
+#include "alidade/testing/room_video.h"
 
 namespace alidade {
 namespace {
+
+using testing::render_room;
+using testing::room_camera;
+using testing::room_path;
+using testing::RoomScene;
 
 struct RoomVideo {
   RoomScene scene;

@@ -1,20 +1,35 @@
-#include "alidade/simulate/room_video.h"
+#pragma once
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <vector>
 
+#include "alidade/camera/camera.h"
+#include "alidade/geometry/rigid3.h"
 #include "alidade/simulate/draws.h"
-#include "alidade/simulate/ray_table.h"
 
-namespace alidade {
-namespace {
+namespace alidade::testing {
+
+/// A world for `localize` with pictures: a camera is moved by hand in front of a table and a wall, on which a dark
+/// rectangle on white paper hangs. The world's frame is at the rectangle's centre, x right, y down.
+struct RoomScene {
+  Camera camera;  ///< See room_camera().
+  double rectangle_width_m = 0.210, rectangle_height_m = 0.1485;
+  bool has_rectangle = true;
+  bool has_texture = true;  ///< False: walls of one grey.
+  int num_frames = 90;
+  double rate_hz = 30.0;
+  double noise = 2.0;      ///< σ of the grey values.
+  double amplitude = 1.0;  ///< Of the path: 1 is ± 0.12 m aside and ± 7°.
+};
 
 /// A grey value of a cell of a surface, the same at every call.
-double cell_grey(long i, long j, long surface) {
+inline double cell_grey(long i, long j, long surface) {
   std::uint64_t h = static_cast<std::uint64_t>(i * 73856093L ^ j * 19349663L ^ surface * 83492791L);
   h = (h ^ (h >> 30)) * 0xbf58476d1ce4e5b9ULL;
   h = (h ^ (h >> 27)) * 0x94d049bb133111ebULL;
@@ -22,7 +37,7 @@ double cell_grey(long i, long j, long surface) {
 }
 
 /// Squares of different greys with edges about a pixel wide, so that pixels need not be averaged.
-double squares_grey(double s_m, double t_m, long surface) {
+inline double squares_grey(double s_m, double t_m, long surface) {
   constexpr double cell_m = 0.045, edge_m = 0.008;
   const auto ramp = [](double within) { return std::clamp((within - 0.5) * cell_m / edge_m + 0.5, 0.0, 1.0); };
   const double s = s_m / cell_m, t = t_m / cell_m;
@@ -33,14 +48,14 @@ double squares_grey(double s_m, double t_m, long surface) {
 }
 
 /// 1 inside a rectangle of half sides x and y, 0 outside, with an edge of finite width.
-double inside(double s_m, double t_m, double half_s_m, double half_t_m) {
+inline double inside(double s_m, double t_m, double half_s_m, double half_t_m) {
   constexpr double edge_m = 0.005;
   const double depth_m = std::min(half_s_m - std::abs(s_m), half_t_m - std::abs(t_m));
   return std::clamp(depth_m / edge_m + 0.5, 0.0, 1.0);
 }
 
 /// Grey of what a ray meets first: the wall with paper and rectangle, a box in front of it, the table.
-double grey_of(const RoomScene& scene, const Eigen::Vector3d& from, const Eigen::Vector3d& ray) {
+inline double grey_of(const RoomScene& scene, const Eigen::Vector3d& from, const Eigen::Vector3d& ray) {
   double nearest = std::numeric_limits<double>::infinity(), grey = 128.0;
   const auto meet = [&](double distance, const auto& grey_at) {
     if (!(distance > 0.0) || distance >= nearest) return;
@@ -72,9 +87,8 @@ double grey_of(const RoomScene& scene, const Eigen::Vector3d& from, const Eigen:
   return grey;
 }
 
-}  // namespace
-
-Camera room_camera() {
+/// 320×240, equidistant, 195 px: a wide lens.
+[[nodiscard]] inline Camera room_camera() {
   Camera camera;
   camera.width_px = 320;
   camera.height_px = 240;
@@ -84,7 +98,8 @@ Camera room_camera() {
   return camera;
 }
 
-std::vector<Rigid3> room_path(const RoomScene& scene) {
+/// Poses at the times of the frames.
+[[nodiscard]] inline std::vector<Rigid3> room_path(const RoomScene& scene) {
   std::vector<Rigid3> path;
   for (int i = 0; i < scene.num_frames; ++i) {
     const double t = i / scene.rate_hz, a = scene.amplitude;
@@ -97,19 +112,20 @@ std::vector<Rigid3> room_path(const RoomScene& scene) {
   return path;
 }
 
-cv::Mat render_room(const RoomScene& scene, const Rigid3& world_from_cam, std::uint64_t seed) {
+/// A frame, 8-bit grey: rays cast on the planes of the room, with noise drawn by `seed`.
+[[nodiscard]] inline cv::Mat render_room(const RoomScene& scene, const Rigid3& world_from_cam, std::uint64_t seed) {
   const int width = scene.camera.width_px, height = scene.camera.height_px;
-  const RayTable rays(scene.camera, 0, width - 1, 0, height - 1);
   cv::Mat picture(height, width, CV_8U);
   Draws draws(seed);
   for (int v = 0; v < height; ++v) {
     for (int u = 0; u < width; ++u) {
-      const Eigen::Vector3d ray = world_from_cam.rotation * rays.ray(u, v);
-      const double grey = ray.allFinite() ? grey_of(scene, world_from_cam.translation, ray) : 0.0;
+      const auto ray_in_cam = unproject(scene.camera, {u, v});
+      const double grey =
+          ray_in_cam ? grey_of(scene, world_from_cam.translation, world_from_cam.rotation * *ray_in_cam) : 0.0;
       picture.at<std::uint8_t>(v, u) = cv::saturate_cast<std::uint8_t>(grey + scene.noise * draws.normal());
     }
   }
   return picture;
 }
 
-}  // namespace alidade
+}  // namespace alidade::testing

@@ -14,6 +14,7 @@ void add_plan_observe(Frame& frame);      ///< Of `plan`.
 void add_plan_rangefinder(Frame& frame);  ///< Of `plan`.
 void add_project(Frame& frame);
 void add_rangefinder(Frame& frame);
+void add_reproduce(Frame& frame);
 void add_rig(Frame& frame);
 void add_rig_scenario(Frame& frame);          ///< Of `simulate`.
 void add_rangefinder_scenario(Frame& frame);  ///< Of `simulate`.

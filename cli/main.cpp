@@ -12,6 +12,7 @@ void add_commands(alidade::cli::Frame& frame) {
   alidade::cli::add_plan(frame);
   alidade::cli::add_project(frame);
   alidade::cli::add_rangefinder(frame);
+  alidade::cli::add_reproduce(frame);
   alidade::cli::add_rig(frame);
   alidade::cli::add_servo(frame);
   alidade::cli::add_simulate(frame);

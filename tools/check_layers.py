@@ -20,9 +20,10 @@ MAY_INCLUDE = {
     "simulate": FOUNDATIONS | SENSORS,
     **{estimator: FOUNDATIONS | SENSORS for estimator in ESTIMATORS},
     **{composition: FOUNDATIONS | SENSORS | ESTIMATORS | {"simulate"} for composition in COMPOSITIONS},
+    "reproduce": FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate"},
     "report": FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate"},
-    "io": FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate", "report"},
-    "testing": FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate", "report", "io"},
+    "io": FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate", "reproduce", "report"},
+    "testing": FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate", "reproduce", "report", "io"},
 }
 TESTS_MAY_ALSO = {"testing", "simulate", "io"}
 INCLUDE = re.compile(r'#include "alidade/(\w+)/')

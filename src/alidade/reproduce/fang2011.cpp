@@ -1,0 +1,230 @@
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/reproduce/fang_runs.h"
+#include "alidade/reproduce/papers.h"
+
+namespace alidade::reproduce {
+namespace {
+
+using Values = std::vector<double>;
+
+constexpr double observation_s = 20.0, burst_s = 6.0;
+/// Where an error counts as none: three standard deviations of the difference of two noisy pixels.
+const double error_floor_px = 3.0 * std::sqrt(2.0) * paper_sigma_px;
+
+int num_sets(const ReproduceConfig& config) { return config.quick ? 60 : 400; }
+
+std::uint64_t set_seed(const ReproduceConfig& config, int set) {
+  return 100000 * config.seed + static_cast<std::uint64_t>(set);
+}
+
+double larger_focal_share(const Eigen::Vector4d& rms) { return std::max(rms[0] / 710.0, rms[1] / 700.0); }
+
+/// What became of every set: of our default, of the paper's observer with gains that bear noise, and with fast ones.
+struct NoiseScores {
+  Values errors_settle, quiet_settle, best_settle, quiet_rms, fast_rms, best_rms;
+};
+
+NoiseScores score_noise(const ReproduceConfig& config) {
+  NoiseScores scores;
+  for (int set = 0; set < num_sets(config); ++set) {
+    report_progress(config.progress, "experiment 1", static_cast<std::size_t>(set),
+                    static_cast<std::size_t>(num_sets(config)));
+    const RotationLog clean = clean_log(draw_set(set_seed(config, set)));
+    RotationLog log = clean;
+    add_paper_noise(log, set_seed(config, set) + 1);
+    const FangRun quiet = run_observer(log, FangProfile::quiet, clean),
+                  fast = run_observer(log, FangProfile::fast, clean), best = run_hybrid(log);
+    scores.errors_settle.push_back(errors_settle_s(log, fast, error_floor_px));
+    scores.quiet_settle.push_back(settle_s(log, quiet.estimates, 0.05, 0.0, observation_s));
+    scores.best_settle.push_back(settle_s(log, best.estimates, 0.05, 0.0, observation_s));
+    scores.quiet_rms.push_back(100.0 * larger_focal_share(rms_px(log, quiet.estimates, 14.0, observation_s)));
+    scores.fast_rms.push_back(100.0 * larger_focal_share(rms_px(log, fast.estimates, 14.0, observation_s)));
+    scores.best_rms.push_back(100.0 * larger_focal_share(rms_px(log, best.estimates, 14.0, observation_s)));
+  }
+  return scores;
+}
+
+std::vector<Claim> noise_claims(const NoiseScores& scores) {
+  const auto median = [](const Values& values) { return quantile_of(values, 0.5); };
+  Claim errors{"exp1-errors-1s", "first six errors settle within 1 s", "s", 1.0, median(scores.errors_settle)};
+  errors.holds = at_most(scores.errors_settle, 1.0);
+  errors.words =
+      "With the fast gains; settled means below 1.3 px, three sigma of a difference. They begin at zero, so that "
+      "any gain k1 of 4/s or more does it, whatever the intrinsics are worth.";
+  errors.figure = "3";
+  Claim stable{
+      "exp1-stable-3s",          "intrinsics stable within 3 s under noise", "s", 3.0, median(scores.quiet_settle),
+      median(scores.best_settle)};
+  stable.holds = at_most(scores.quiet_settle, 3.0);
+  stable.words =
+      "Within 5 % and staying there. Gains that bear this noise take longer; gains that settle in 3 s do not "
+      "bear it.";
+  stable.figure = "4";
+  Claim robust{"exp1-robust",
+               "focal lengths after 14 s stay within 5 % under noise on every frame",
+               "%",
+               not_a_number,
+               median(scores.quiet_rms),
+               median(scores.best_rms)};
+  const bool quiet_holds = share_within(scores.quiet_rms, 5.0) >= 0.9,
+             fast_holds = share_within(scores.fast_rms, 5.0) >= 0.9;
+  robust.holds = quiet_holds ? (fast_holds ? Holds::reproduced : Holds::in_shape) : Holds::not_reproducible;
+  robust.words =
+      "RMS of the worse focal length, 14 to 20 s. It holds with quiet gains; with those that make experiments 2 "
+      "and 3 work the same noise leaves no value, or one that is hundreds of pixels off. One set of constant "
+      "gains cannot do both.";
+  robust.figure = "4";
+  return {errors, stable, robust};
+}
+
+Experiment experiment_1(const ReproduceConfig& config) {
+  Experiment experiment{
+      "exp1", "Noise of variance 0.1 on every frame",
+      "Four static points, seen by a camera of fx 710, fy 700, u0 390, v0 290 that sways by (27) for 20 s at 30 Hz, "
+      "noise of "
+      "variance 0.1 px² on x of points 1 and 3 and y of 2 and 4. The observer (14)–(25), with its errata corrected, "
+      "begins "
+      "at 500, 510, 400, 300. The figures show one set of points, the numbers are medians over random sets.",
+      "Gains: Γ = g Ḡ⁻¹ with Ḡ the mean of ΩΩᵀ over a period of the planned motion; quiet k1 = 2, g = 2 behind a low "
+      "pass of "
+      "0.3 Hz on both sides, fast k1 = 15, g = 1500. Implicit midpoint rule. Points: uniform, every triangle at least "
+      "40 px "
+      "high."};
+  experiment.claims = noise_claims(score_noise(config));
+  const RotationLog clean = clean_log(figure_points());
+  RotationLog log = clean;
+  add_paper_noise(log, config.seed);
+  experiment.figures = {errors_figure("3", log, run_observer(log, FangProfile::fast, clean)),
+                        intrinsics_figure("4", log, run_observer(log, FangProfile::quiet, clean), run_hybrid(log))};
+  return experiment;
+}
+
+Experiment experiment_2(const ReproduceConfig& config) {
+  Values settle, again, best_settle, best_again, after;
+  for (int set = 0; set < num_sets(config); ++set) {
+    report_progress(config.progress, "experiment 2", static_cast<std::size_t>(set),
+                    static_cast<std::size_t>(num_sets(config)));
+    const RotationLog clean = clean_log(draw_set(set_seed(config, set)));
+    RotationLog log = clean;
+    add_burst(log, 180, set_seed(config, set) + 2);
+    const FangRun ours = run_observer(log, FangProfile::fast, clean), best = run_hybrid(log);
+    settle.push_back(settle_s(log, ours.estimates, 0.01, 0.0, burst_s - 0.01));
+    again.push_back(settle_s(log, ours.estimates, 0.01, burst_s, observation_s));
+    after.push_back(rms_px(log, ours.estimates, 14.0, observation_s).maxCoeff());
+    best_settle.push_back(settle_s(log, best.estimates, 0.01, 0.0, burst_s - 0.01));
+    best_again.push_back(settle_s(log, best.estimates, 0.01, burst_s, observation_s));
+  }
+  Claim stable{"exp2-stable-3s",         "intrinsics stable within 3 s", "s", 3.0,
+               quantile_of(settle, 0.5), quantile_of(best_settle, 0.5)};
+  stable.holds = at_most(settle, 3.0);
+  stable.words =
+      "Within 1 %, without noise, in half of the sets of points; a tenth of them, with points badly spread, take "
+      "longer than the 6 s there are.";
+  stable.figure = "6";
+  Claim again_claim{"exp2-settles-again-2s",
+                    "settles again within 2 s after one frame with 3 px of noise",
+                    "s",
+                    2.0,
+                    quantile_of(again, 0.5),
+                    quantile_of(best_again, 0.5)};
+  again_claim.holds = at_most(again, 2.0);
+  again_claim.words =
+      "In the median about 2 s, nine in ten within five or more; focal lengths are wrong by thousands of "
+      "pixels in between. Ours leaves that frame out.";
+  again_claim.figure = "6";
+  Experiment experiment{
+      "exp2", "One frame with noise",
+      "As experiment 1 without noise; the pixels of the frame at 6 s are off by 3 px (standard deviation).",
+      "Gains: fast, which no noise would leave usable."};
+  experiment.claims = {stable, again_claim};
+  const RotationLog clean = clean_log(figure_points());
+  RotationLog log = clean;
+  add_burst(log, 180, config.seed);
+  const FangRun ours = run_observer(log, FangProfile::fast, clean);
+  experiment.figures = {errors_figure("5", log, ours), intrinsics_figure("6", log, ours, run_hybrid(log))};
+  return experiment;
+}
+
+struct ZoomScores {
+  Values ramp, after, best_ramp, best_after;
+};
+
+template <class MakeLog>
+ZoomScores score_zoom(const ReproduceConfig& config, MakeLog make_log, bool with_best) {
+  ZoomScores scores;
+  const int sets = num_sets(config) / 2;
+  for (int set = 0; set < sets; ++set) {
+    report_progress(config.progress, "experiment 3", static_cast<std::size_t>(set), static_cast<std::size_t>(sets));
+    const auto points = draw_set(set_seed(config, set));
+    const RotationLog log = make_log(points);
+    const FangRun ours = run_observer(log, FangProfile::fast, clean_log(points));
+    scores.ramp.push_back(100.0 * larger_focal_share(rms_px(log, ours.estimates, 6.0, 10.0)));
+    scores.after.push_back(rms_px(log, ours.estimates, 14.0, observation_s).maxCoeff());
+    if (!with_best) continue;
+    const FangRun best = run_hybrid(log);
+    scores.best_ramp.push_back(100.0 * larger_focal_share(rms_px(log, best.estimates, 6.0, 10.0)));
+    scores.best_after.push_back(rms_px(log, best.estimates, 14.0, observation_s).maxCoeff());
+  }
+  return scores;
+}
+
+std::vector<Claim> zoom_claims(const ZoomScores& flow_only, const ZoomScores& physical) {
+  constexpr double tracked_percent = 2.0;
+  const auto median = [](const Values& values) { return quantile_of(values, 0.5); };
+  Claim flow{"exp3-ramp-own-flow", "tracks the ramp, in pixels made by the paper's own flow", "%", tracked_percent,
+             median(flow_only.ramp)};
+  flow.holds = at_most(flow_only.ramp, tracked_percent);
+  flow.words =
+      "RMS of the worse focal length on the ramp; the paper shows a curve, 2 % is what we take for tracking. Pixels "
+      "by (11) with K(t) put in, which leaves out what a changing K itself moves.";
+  flow.figure = "8_own_flow";
+  Claim camera{"exp3-ramp-camera",
+               "tracks the ramp, in pixels as a camera has them",
+               "%",
+               tracked_percent,
+               median(physical.ramp),
+               median(physical.best_ramp)};
+  camera.holds = at_most(physical.ramp, tracked_percent);
+  camera.words =
+      "(11) lacks the flow of the zoom itself, f'/f (p - u) + u': with it the observer is lost on the ramp, "
+      "whatever its gains; no value, or hundreds of pixels.";
+  camera.figure = "8";
+  Claim zero{
+      "exp3-after-zero",          "errors go to zero after the ramp, without noise", "px", 0.5, median(physical.after),
+      median(physical.best_after)};
+  zero.holds = at_most(physical.after, 0.5);
+  zero.words = "Largest RMS of the four, 14 to 20 s; at most half a pixel counts as zero.";
+  zero.figure = "8";
+  return {flow, camera, zero};
+}
+
+Experiment experiment_3(const ReproduceConfig& config) {
+  Experiment experiment{"exp3", "A zoom of 24 px in 4 s",
+                        "As experiment 2 without the burst; fx, fy, u0, v0 grow by 6 px/s from 6 to 10 s (29). Once "
+                        "with pixels as a camera "
+                        "under such a zoom has them, once with pixels integrated from the paper's flow (11), as its "
+                        "simulation must have been.",
+                        "Gains: fast. What is called tracking: see the claims."};
+  experiment.claims = zoom_claims(score_zoom(config, flow_only_zoom_log, false), score_zoom(config, zoom_log, true));
+  const RotationLog clean = clean_log(figure_points()), own = flow_only_zoom_log(figure_points()),
+                    camera = zoom_log(figure_points());
+  const FangRun on_own = run_observer(own, FangProfile::fast, clean),
+                on_camera = run_observer(camera, FangProfile::fast, clean), best = run_hybrid(camera);
+  experiment.figures = {errors_figure("7", camera, on_camera), intrinsics_figure("8", camera, on_camera, best),
+                        intrinsics_figure("8_own_flow", own, on_own, run_hybrid(own))};
+  return experiment;
+}
+
+}  // namespace
+
+PaperReport reproduce_fang2011(const ReproduceConfig& config) {
+  PaperReport report{"fang2011",
+                     "Y. Fang, X. Liu, B. Li, X. Zhang, \"Visual servoing with an uncalibrated pan-tilt camera\", 2011",
+                     {}};
+  report.experiments = {experiment_1(config), experiment_2(config), experiment_3(config), fang_conditions(config)};
+  return report;
+}
+
+}  // namespace alidade::reproduce

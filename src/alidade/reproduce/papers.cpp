@@ -1,0 +1,16 @@
+#include "alidade/reproduce/papers.h"
+
+#include <array>
+
+namespace alidade::reproduce {
+
+std::span<const Paper> papers() {
+  static constexpr std::array<Paper, 3> all{{
+      {"fang2011", "intrinsics of a camera that turns", reproduce_fang2011},
+      {"wang2020", "a laser rangefinder beside a camera", reproduce_wang2020},
+      {"xiahou2015", "two pan-tilt cameras that follow a target", reproduce_xiahou2015},
+  }};
+  return all;
+}
+
+}  // namespace alidade::reproduce

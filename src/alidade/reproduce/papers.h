@@ -1,0 +1,28 @@
+#pragma once
+
+#include <span>
+
+#include "alidade/reproduce/paper_report.h"
+
+namespace alidade::reproduce {
+
+/// Y. Fang, X. Liu, B. Li & X. Zhang, "Visual servoing with an uncalibrated pan-tilt camera", 2011: experiments 1–3,
+/// figures 3–8, and what is said to be enough.
+[[nodiscard]] PaperReport reproduce_fang2011(const ReproduceConfig& config);
+
+/// Wang & Li, "Extrinsic calibration of a single-point laser rangefinder and a camera", 2020: tables 1 and 2,
+/// figures 6–9.
+[[nodiscard]] PaperReport reproduce_wang2020(const ReproduceConfig& config);
+
+/// Xiahou, Chen & Wu, "Object tracking of two pan-tilt cameras", 2015: initial geometry, figures 4 and 5, servo loop.
+[[nodiscard]] PaperReport reproduce_xiahou2015(const ReproduceConfig& config);
+
+struct Paper {
+  const char* name;
+  const char* summary;
+  PaperReport (*run)(const ReproduceConfig&);
+};
+/// All of them, in the order of the command's help.
+[[nodiscard]] std::span<const Paper> papers();
+
+}  // namespace alidade::reproduce

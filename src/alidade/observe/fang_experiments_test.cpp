@@ -13,37 +13,11 @@ namespace alidade {
 namespace {
 
 using namespace testing;
-using Matrix8 = Eigen::Matrix<double, 8, 8>;
-
-FangConfig paper_config(FangProfile profile) {
-  FangConfig config;
-  config.num_points = 4;
-  config.scale = paper_scale;
-  config.profile = profile;
-  config.start = paper_start;
-  config.roll_columns = false;  // the paper's motion has none
-  return config;
-}
-
-/// Four points, each anywhere 60 px inside the edges; a set with a triangle less than 40 px high is drawn anew as a
-/// whole. (draw_points() draws the last point anew, and gets more sets that are crowded.)
-std::vector<Eigen::Vector2d> draw_set(std::uint64_t seed) {
-  Draws draws(seed);
-  const auto height = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
-    const Eigen::Vector2d ab = b - a, ac = c - a;
-    return std::abs(ab.x() * ac.y() - ab.y() * ac.x()) / std::max({ab.norm(), ac.norm(), (c - b).norm()});
-  };
-  for (;;) {
-    std::vector<Eigen::Vector2d> p;
-    for (int i = 0; i < 4; ++i) {
-      const double x = draws.uniform(60.0, 720.0), y = draws.uniform(60.0, 522.0);
-      p.emplace_back(x, y);
-    }
-    if (std::min({height(p[0], p[1], p[2]), height(p[0], p[1], p[3]), height(p[0], p[2], p[3]),
-                  height(p[1], p[2], p[3])}) >= 40.0)
-      return p;
-  }
-}
+using reproduce::draw_set;
+using reproduce::flow_only_zoom_log;
+using reproduce::mean_gramian_of;
+using reproduce::paper_config;
+using reproduce::zoom_log;
 
 RotationLog clean_log(int set) {
   return simulate_rotation(paper_scene(draw_set(static_cast<std::uint64_t>(set) + 1)), {.sigma_px = 0.0}, 1);
@@ -53,27 +27,6 @@ RotationLog noisy_log(int set) {
   RotationLog log = clean_log(set);
   add_paper_noise(log, static_cast<std::uint64_t>(set) + 1000);
   return log;
-}
-
-/// Ḡ of a log, as if its motion had been planned: from clean pixels, with the floor that the observer adds.
-Matrix8 mean_gramian_of(const RotationLog& log) {
-  std::size_t reference = 0;
-  for (std::size_t i = 0; i < log.num_points; ++i) {
-    if ((log.rows[0].px[i] - paper_scale.centre).norm() < (log.rows[0].px[reference] - paper_scale.centre).norm())
-      reference = i;
-  }
-  Matrix8 sum = Matrix8::Zero();
-  double count = 0.0;
-  for (const RotationRow& row : log.rows) {
-    if (row.t_s > 7.854) break;  // one period of the motion
-    for (std::size_t i = 0; i < log.num_points; ++i) {
-      const DifferenceRegressor omega = difference_regressor(
-          paper_scale.normalised(row.px[i]), paper_scale.normalised(row.px[reference]), row.rate_rad_per_s);
-      sum += omega * omega.transpose();
-    }
-    ++count;
-  }
-  return sum / count + 1e-6 * Matrix8::Identity();
 }
 
 /// One figure of every set, by name: its quantiles, and the share of sets within a limit.
@@ -141,8 +94,7 @@ TEST(FangExperiment2, FastSettlesAndSettlesAgainAfterABurst) {
     RotationLog log = clean_log(set);
     FangConfig config = paper_config(FangProfile::fast);
     config.mean_gramian = mean_gramian_of(log);
-    Draws draws(static_cast<std::uint64_t>(set) + 2000);
-    for (Eigen::Vector2d& px : log.rows[180].px) px += 3.0 * draws.normal2();
+    reproduce::add_burst(log, 180, static_cast<std::uint64_t>(set) + 2000);
     FangObserver observer(config);
     const auto estimates = observe_log(observer, log);
     settle.values.push_back(settle_s(log, estimates, 0.01, 0.0, 5.99));
@@ -152,50 +104,8 @@ TEST(FangExperiment2, FastSettlesAndSettlesAgainAfterABurst) {
   EXPECT_LE(again.median(), 2.5) << again;  // nine in ten: the docs say 5 s
 }
 
-/// The intrinsics of experiment 3: 24 px more from 6 to 10 s. Fang et al. 2011, eq. (29).
-Eigen::Vector4d zooming(double t_s) { return (paper_truth.array() + 6.0 * std::clamp(t_s - 6.0, 0.0, 4.0)).matrix(); }
-
-/// As the paper's simulation must have been: its flow, eq. (11), with K(t) put in, which lacks what dK/dt moves.
-RotationLog flow_only_log(int set) {
-  RotationLog log;
-  log.num_points = 4;
-  log.rows.resize(601);
-  log.truth.resize(601);
-  std::vector<Eigen::Vector2d> q;
-  for (const Eigen::Vector2d& px : draw_set(static_cast<std::uint64_t>(set) + 1))
-    q.push_back(paper_scale.normalised(px));
-  constexpr int num_substeps = 8;
-  constexpr double h = 1.0 / (30.0 * num_substeps);
-  const auto flow = [](const Eigen::Vector2d& at, double t_s) {
-    const FlowParameters theta = flow_parameters(scaled_intrinsics(paper_scale, zooming(t_s)));
-    return Eigen::Vector2d(flow_regressor(at, paper_rate(t_s)).transpose() * theta);
-  };
-  for (std::size_t r = 0; r < log.rows.size(); ++r) {
-    RotationRow& row = log.rows[r];
-    row.t_s = static_cast<double>(r) / 30.0;
-    row.rate_rad_per_s = paper_rate(row.t_s);
-    Eigen::Map<Eigen::Vector4d>(log.truth[r].data()) = zooming(row.t_s);
-    for (Eigen::Vector2d& at : q) {
-      row.px.push_back(paper_scale.scale * at + paper_scale.centre);
-      for (int i = 0; i < num_substeps; ++i) {  // Runge and Kutta's rule of fourth order
-        const double t_s = row.t_s + i * h;
-        const Eigen::Vector2d a = flow(at, t_s), b = flow(at + 0.5 * h * a, t_s + 0.5 * h),
-                              c = flow(at + 0.5 * h * b, t_s + 0.5 * h), d = flow(at + h * c, t_s + h);
-        at += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
-      }
-    }
-  }
-  return log;
-}
-
-RotationLog physical_zoom_log(int set) {
-  RotationScene scene = paper_scene(draw_set(static_cast<std::uint64_t>(set) + 1));
-  scene.intrinsics = [](double t_s) {
-    const Eigen::Vector4d k = zooming(t_s);
-    return RotatingIntrinsics{k[0], k[1], k[2], k[3]};
-  };
-  return simulate_rotation(scene, {.sigma_px = 0.0}, 1);
-}
+RotationLog flow_only_log(int set) { return flow_only_zoom_log(draw_set(static_cast<std::uint64_t>(set) + 1)); }
+RotationLog physical_zoom_log(int set) { return zoom_log(draw_set(static_cast<std::uint64_t>(set) + 1)); }
 
 /// Experiment 3, clean: RMS on the ramp and after 14 s.
 struct ZoomFigures {

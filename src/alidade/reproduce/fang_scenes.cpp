@@ -45,6 +45,7 @@ HybridObserver paper_hybrid() {
   config.scale = paper_scale;
   config.start.k = paper_scale.normalised_intrinsics(paper_start);
   config.start_is_given = true;
+  config.sigma_px = paper_sigma_px;  // told: there are logs without any noise to tell it
   return HybridObserver(config);
 }
 

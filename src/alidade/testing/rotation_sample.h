@@ -11,32 +11,26 @@
 #include "alidade/io/csv.h"
 #include "alidade/observe/intrinsics_estimate.h"
 #include "alidade/observe/rotation_frame.h"
+#include "alidade/reproduce/fang_scenes.h"
+#include "alidade/reproduce/paper_report.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/rotation.h"
 
 namespace alidade::testing {
 
-// The paper's camera, picture and first guess. Fang et al. 2011, section V.
-inline const PixelScale paper_scale{{390.0, 291.0}, 400.0};
-inline const Eigen::Vector4d paper_truth(710.0, 700.0, 390.0, 290.0), paper_start(500.0, 510.0, 400.0, 300.0);
-inline const double paper_sigma_px = std::sqrt(0.1);
-
-inline RotationScene paper_scene(std::vector<Eigen::Vector2d> start_px) {
-  RotationScene scene;
-  scene.start_px = std::move(start_px);
-  scene.motion = paper_rate;
-  return scene;
-}
+using reproduce::add_paper_noise;
+using reproduce::error_px;
+using reproduce::observe_log;
+using reproduce::paper_scale;
+using reproduce::paper_scene;
+using reproduce::paper_sigma_px;
+using reproduce::paper_start;
+using reproduce::paper_truth;
+using reproduce::rms_px;
+using reproduce::settle_s;
 
 inline RotationScene random_paper_scene(std::uint64_t seed, int num_points = 4) {
   return paper_scene(draw_points(780, 582, num_points, seed));
-}
-
-/// The paper's noise: of x of the first and third point, of y of the second and fourth.
-inline void add_paper_noise(RotationLog& log, std::uint64_t seed) {
-  Draws draws(seed);
-  for (RotationRow& row : log.rows)
-    for (std::size_t i = 0; i < row.px.size(); ++i) row.px[i][i % 2] += paper_sigma_px * draws.normal();
 }
 
 /// A random scene's log without or with the paper's noise.
@@ -68,53 +62,7 @@ inline std::optional<RotationLog> paper_case(const std::string& name) {
   return log;
 }
 
-/// The estimate after each row.
-template <class Estimator>
-std::vector<IntrinsicsEstimate> observe_log(Estimator& estimator, const RotationLog& log) {
-  MotionReader reader(log.source, 0.5);
-  std::vector<IntrinsicsEstimate> estimates;
-  estimates.reserve(log.rows.size());
-  for (const RotationRow& row : log.rows) estimates.push_back(estimator.step(reader.next(row)));
-  return estimates;
-}
-
-/// Estimate − truth of the four intrinsics in row `r`; infinite where there is none. [px]
-inline Eigen::Vector4d error_px(const RotationLog& log, const std::vector<IntrinsicsEstimate>& estimates,
-                                std::size_t r) {
-  if (!estimates[r].has_value) return Eigen::Vector4d::Constant(std::numeric_limits<double>::infinity());
-  return estimates[r].values() - Eigen::Map<const Eigen::Vector4d>(log.truth[r].data());
-}
-
-/// Time after `from_s` from which on all four errors stay within `share` of their values, until `to_s`.
-inline double settle_s(const RotationLog& log, const std::vector<IntrinsicsEstimate>& estimates, double share,
-                       double from_s, double to_s) {
-  double settled_s = from_s;
-  for (std::size_t r = 0; r < log.rows.size() && log.rows[r].t_s <= to_s + 1e-9; ++r) {
-    if (log.rows[r].t_s < from_s - 1e-9) continue;
-    const Eigen::Map<const Eigen::Array4d> truth(log.truth[r].data());
-    if ((error_px(log, estimates, r).array().abs() > share * truth).any()) settled_s = log.rows[r].t_s;
-  }
-  return settled_s - from_s;
-}
-
-/// RMS of each error over [from_s, to_s]. [px]
-inline Eigen::Vector4d rms_px(const RotationLog& log, const std::vector<IntrinsicsEstimate>& estimates, double from_s,
-                              double to_s) {
-  Eigen::Array4d sum = Eigen::Array4d::Zero();
-  double count = 0.0;
-  for (std::size_t r = 0; r < log.rows.size(); ++r) {
-    if (log.rows[r].t_s < from_s - 1e-9 || log.rows[r].t_s > to_s + 1e-9) continue;
-    sum += error_px(log, estimates, r).array().square();
-    ++count;
-  }
-  return (sum / count).sqrt();
-}
-
 /// The p-quantile, by the sample at or above it.
-inline double quantile(std::vector<double> values, double p) {
-  std::sort(values.begin(), values.end());
-  const auto index = static_cast<std::size_t>(p * static_cast<double>(values.size() - 1) + 0.5);
-  return values[index];
-}
+inline double quantile(std::vector<double> values, double p) { return reproduce::quantile_of(std::move(values), p); }
 
 }  // namespace alidade::testing

@@ -17,6 +17,9 @@ namespace alidade::reproduce {
 /// Xiahou, Chen & Wu, "Object tracking of two pan-tilt cameras", 2015: initial geometry, figures 4 and 5, servo loop.
 [[nodiscard]] PaperReport reproduce_xiahou2015(const ReproduceConfig& config);
 
+/// Xu & Xu, "Underwater monocular localization with lens distortion": figure 10, three lenses.
+[[nodiscard]] PaperReport reproduce_xu_underwater(const ReproduceConfig& config);
+
 struct Paper {
   const char* name;
   const char* summary;

@@ -1,0 +1,114 @@
+#include "alidade/reproduce/underwater_protocol.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+
+namespace alidade::reproduce {
+
+UnderwaterSample underwater_sample(const UnderwaterScene& scene, std::uint64_t seed) {
+  const UnderwaterSequence sequence = simulate_underwater(scene, seed);
+  UnderwaterSample sample;
+  sample.camera = scene.camera;
+  for (const UnderwaterFrame& frame : sequence.frames) {
+    SightFrame seen{static_cast<long>(sample.frames.size()), frame.t_s, {}};
+    for (const UnderwaterSight& sight : frame.sights) seen.sights.push_back({sight.id, sight.px, 0.0});
+    sample.frames.push_back(std::move(seen));
+    sample.truth.push_back({frame.t_s, frame.world_from_cam});
+  }
+  StartHypothesis start;
+  start.motion.world_from_cam = sequence.told_start;
+  start.cov.diagonal().head<3>().setConstant(scene.sigma_position_m * scene.sigma_position_m);
+  start.cov.diagonal().segment<3>(3).setConstant(scene.sigma_rotation_rad * scene.sigma_rotation_rad);
+  start.cov.diagonal().tail<6>().setConstant(0.3 * 0.3);
+  sample.config.start = start;
+  for (const UnderwaterPoint& point : sequence.points) {
+    sample.points[point.id] = point.point_in_world;
+    if (point.is_known)
+      sample.config.target.push_back({point.id, point.told_in_world, scene.sigma_known_m});
+    else if (point.told_depth_m > 0.0)
+      sample.config.depths.push_back({point.id, point.told_depth_m, scene.sigma_depth});
+  }
+  return sample;
+}
+
+PointError point_error(const UnderwaterSample& sample, long id, const Eigen::Vector3d& is, const Eigen::Matrix3d& cov) {
+  const Eigen::Vector3d error = is - sample.points.at(id);
+  const double distance = (sample.points.at(id) - sample.truth.front().world_from_cam.translation).norm();
+  return {100.0 * error.norm() / distance, error.dot(cov.inverse() * error) / 3.0};
+}
+
+namespace {
+
+PointError error_of(const UnderwaterSample& sample, const FilterBank& bank, long id) {
+  const auto place = bank.best().place(id);
+  return place ? point_error(sample, id, place->point_in_world, place->cov) : PointError{100.0, 100.0};
+}
+
+/// What stands in the last frame.
+void add_last_frame(const UnderwaterSample& sample, const FilterBank& bank, ProtocolRun& run) {
+  run.p1_last = error_of(sample, bank, 1).percent;
+  run.p5_last = error_of(sample, bank, 5).percent;
+  run.p1_nees = error_of(sample, bank, 1).nees;
+  run.p5_nees = error_of(sample, bank, 5).nees;
+  for (const auto& [id, point_in_world] : sample.points)
+    run.worst_last = std::max(run.worst_last, error_of(sample, bank, id).percent);
+  const Rigid3& world_from_cam = bank.best().motion().world_from_cam;
+  run.camera_mm = 1e3 * (world_from_cam.translation - sample.truth.back().world_from_cam.translation).norm();
+  run.camera = bank.best().camera();
+  run.sigma_lens = bank.best().lens_sigmas();
+}
+
+}  // namespace
+
+ProtocolRun run_protocol(const UnderwaterSample& sample, const Camera& camera, const LocalizationFilterConfig& filter,
+                         const FilterBankConfig& bank_config, FeatureKind kind) {
+  const StartHypothesis start = *sample.config.start;
+  FilterBank bank(camera, {&start, 1}, filter, bank_config);
+  for (const KnownPoint& point : sample.config.target) bank.add_known(point.id, point.point_in_world, point.sigma_m);
+  ProtocolRun run;
+  double num = 0.0;
+  for (std::size_t k = 0; k < sample.frames.size(); ++k) {
+    const SightFrame& frame = sample.frames[k];
+    if (k > 0) bank.predict(frame.t_s - sample.frames[k - 1].t_s);
+    run.nis_per_dof += bank.update(frame.sights).nis_per_dof / static_cast<double>(sample.frames.size());
+    for (const FeatureSight& sight : frame.sights) {
+      const auto told = std::ranges::find(sample.config.depths, sight.id, &ToldDepth::id);
+      const auto ray_in_cam = unproject(bank.best().camera(), sight.px);
+      if (bank.best().has(sight.id) || told == sample.config.depths.end() || !ray_in_cam) continue;
+      bank.add(sight.id, sight.px, {told->depth_m / ray_in_cam->z(), told->sigma_rel}, kind);
+    }
+    bank.convert_linear();
+    const double p1 = error_of(sample, bank, 1).percent, p5 = error_of(sample, bank, 5).percent;
+    run.p1_percent.push_back(p1);
+    run.p5_percent.push_back(p5);
+    if (k < 10) continue;
+    run.p1_mean += p1;
+    run.p5_mean += p5;
+    run.p1_above_2 += p1 > 2.0 ? 1.0 : 0.0;
+    num += 1.0;
+  }
+  run.p1_mean /= num;
+  run.p5_mean /= num;
+  run.p1_above_2 /= num;
+  add_last_frame(sample, bank, run);
+  return run;
+}
+
+LocalizationFilterConfig paper_filter() {
+  LocalizationFilterConfig config;
+  config.is_sequential = config.finds_consensus = false;
+  config.gate = 1e9;
+  config.bend_tolerance = 0.0;  // always four steps
+  config.state_capacity = 80;
+  config.sights_capacity = 16;
+  return config;
+}
+
+LocalizationFilterConfig recommended_filter() {
+  LocalizationFilterConfig config;
+  config.state_capacity = 80;
+  config.sights_capacity = 16;
+  return config;
+}
+
+}  // namespace alidade::reproduce

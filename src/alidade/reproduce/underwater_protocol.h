@@ -1,0 +1,53 @@
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "alidade/localize/distortion.h"
+#include "alidade/localize/localize.h"
+#include "alidade/simulate/underwater.h"
+
+// The protocol in which lenses and filters are compared under water; docs/maths/localization.md.
+
+namespace alidade::reproduce {
+
+/// A simulated sequence as a filter is given it, with its truth.
+struct UnderwaterSample {
+  Camera camera;
+  std::vector<SightFrame> frames;
+  std::vector<TimedPose> truth;
+  LocalizeConfig config;
+  std::map<long, Eigen::Vector3d> points;
+};
+[[nodiscard]] UnderwaterSample underwater_sample(const UnderwaterScene& scene, std::uint64_t seed);
+
+/// A point of the map against the truth.
+struct PointError {
+  double percent = 0.0;  ///< 100 |ŷ − y| over the distance from the first camera.
+  double nees = 0.0;     ///< eᵀ P⁻¹ e / 3.
+};
+[[nodiscard]] PointError point_error(const UnderwaterSample& sample, long id, const Eigen::Vector3d& is,
+                                     const Eigen::Matrix3d& cov);
+
+/// One run of the protocol on page docs/maths/localization.md: errors of points 1 and 5, and of the camera.
+struct ProtocolRun {
+  double p1_last = 0.0, p1_mean = 0.0, p5_last = 0.0, p5_mean = 0.0;  ///< [%], means over frames 10 to the end.
+  double p1_above_2 = 0.0;  ///< Share of these frames with point 1 more than 2 % off.
+  double p1_nees = 0.0, p5_nees = 0.0, worst_last = 0.0, camera_mm = 0.0, nis_per_dof = 0.0;
+  std::vector<double> p1_percent, p5_percent;  ///< One a frame.
+  Camera camera;
+  Eigen::VectorXd sigma_lens;
+};
+
+/// Drives the bank itself, frame by frame, so that points can be judged on the way.
+[[nodiscard]] ProtocolRun run_protocol(const UnderwaterSample& sample, const Camera& camera,
+                                       const LocalizationFilterConfig& filter, const FilterBankConfig& bank_config,
+                                       FeatureKind kind);
+
+/// The published filter of the protocol: places, all sights of a frame at once, iterated, one start, no gate.
+[[nodiscard]] LocalizationFilterConfig paper_filter();
+
+/// The recommended one for so few points.
+[[nodiscard]] LocalizationFilterConfig recommended_filter();
+
+}  // namespace alidade::reproduce

@@ -23,8 +23,7 @@ State state_of(Holds holds) {
 /// To five digits: what a draw tells, and what keeps the document small.
 double short_number(double value) {
   if (!std::isfinite(value) || value == 0.0) return value;
-  const double unit = std::pow(10.0, std::floor(std::log10(std::abs(value))) - 4.0);
-  return std::round(value / unit) * unit;
+  return std::stod(fmt::format("{:.5g}", value));
 }
 
 JsonValue claim_value(const Experiment& experiment, const Claim& claim) {

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -56,9 +58,11 @@ Claim enough_points(const ReproduceConfig& config) {
   const Eigen::Vector2d start(250.0, 200.0), oblique(110.0, 70.0);
   const double three = lambda_of(paper_scene({{180.0, 120.0}, {640.0, 90.0}, {400.0, 450.0}})),
                line = lambda_of(paper_scene({start, start + oblique, start + 2.0 * oblique, start + 3.0 * oblique}));
-  claim.words = "Enough, not needed: three points do (least eigenvalue of the Gramian " + std::to_string(1e4 * three) +
-                "e-4), and so do four on an oblique line (" + std::to_string(1e4 * line) +
-                "e-4), where below 1e-4 nothing should be trusted.";
+  claim.words = fmt::format(
+      "Enough, not needed: three points do (least eigenvalue of the Gramian {:.2g}), and so do four on an "
+      "oblique line ({:.2g}); below 1e-4 nothing should be trusted. A set that is badly spread takes "
+      "longer than the 20 s there are.",
+      three, line);
   claim.figure = "points";
   return claim;
 }
@@ -74,11 +78,13 @@ Claim enough_motion(const ReproduceConfig& config, Experiment& experiment) {
   Claim claim{"motion-enough", "a rotation that is not identically zero is enough: error of fy after 20 s of pan alone",
               "px", 0.0, fy_error_px};
   claim.holds = fy_error_px <= 7.0 ? Holds::reproduced : Holds::not_reproducible;
-  claim.words =
-      "False. Rows 1 to 3 of the regressor hold the tilt's rate's partner alone: both rates must keep coming. The "
-      "least eigenvalue of the Gramian is " +
-      std::to_string(lambda_of(scene)) + "; fy stays at its first guess. Ours says so: its sigma of fy is " +
-      std::to_string(static_cast<int>(std::min(best_sigma, 1e6))) + " px, and `alidade observe` refuses such a log.";
+  claim.words = fmt::format(
+      "False. Three rows of the regressor hold the one rate and three the other: both must keep coming. On a pan alone "
+      "the "
+      "least eigenvalue of the Gramian is {:.1g} and fy stays at its first guess. Ours says what it cannot tell: its "
+      "sigma "
+      "of fy is {:.0f} px, and `alidade observe` refuses such a log.",
+      lambda_of(scene), best_sigma);
   claim.figure = "motion";
   experiment.figures.push_back(intrinsics_figure("motion", log, run, hybrid));
   return claim;

@@ -128,8 +128,8 @@ Claim global_is_better(const ErrorTable& table) {
   constexpr double clearly = 0.9;  // a tenth less
   const auto better = std::ranges::count_if(ratios, [](double ratio) { return ratio < clearly; });
   Claim claim{"global-better",
-              "global optimisation is clearly better: error with it over error without, largest of four", "", clearly,
-              std::ranges::max(ratios)};
+              "global optimisation is clearly better: error with it over error without, largest of four", "",
+              not_a_number, std::ranges::max(ratios)};
   claim.holds = better == 4 ? Holds::reproduced : better > 0 ? Holds::in_shape : Holds::not_reproducible;
   claim.words = fmt::format(
       "Medians over 6 to 30 poses: method 1 origin {:.2f}, direction {:.2f}; method 2 origin {:.2f}, "
@@ -142,8 +142,9 @@ Claim global_is_better(const ErrorTable& table) {
 Claim spot_is_better(const ErrorTable& table) {
   const double reprojection = pooled_ratio(table, spot_global, plane_global, &Errors::reprojection_px),
                position = pooled_ratio(table, spot_global, plane_global, &Errors::position_mm);
-  Claim claim{"method1-better", "method 1 is better than method 2: its reprojection error over the other's", "", 1.0,
-              reprojection,     pooled_ratio(table, joint_global, plane_global, &Errors::reprojection_px)};
+  Claim claim{
+      "method1-better", "method 1 is better than method 2: its reprojection error over the other's", "", not_a_number,
+      reprojection,     pooled_ratio(table, joint_global, plane_global, &Errors::reprojection_px)};
   claim.holds = reprojection >= 1.0 ? Holds::not_reproducible : position < 0.9 ? Holds::reproduced : Holds::in_shape;
   claim.words = fmt::format(
       "Much better where the spot is seen in the picture; the origin is not ({:.2f} of the other's "

@@ -46,8 +46,8 @@ Claim stability_claim() {
   const double degrees = analysed(AnglePlant{}, per_rad, sample_s).sampled_radius,
                radians = analysed(AnglePlant{.unit = AngleUnit::rad}, per_rad, sample_s).sampled_radius;
   Claim claim{"servo-stable",
-              "the loop 2 + 10/s round 0.0567/(0.1 s + 1) is stable: largest eigenvalue, sampled at 0.05 s", "", 1.0,
-              degrees};
+              "the loop 2 + 10/s round 0.0567/(0.1 s + 1) is stable: largest eigenvalue, sampled at 0.05 s", "",
+              not_a_number, degrees};
   claim.holds = degrees < 1.0 ? Holds::in_shape : Holds::not_reproducible;
   claim.words = fmt::format(
       "The plant is printed without a unit. With its output in degrees and the error in pixels the loop is "
@@ -71,7 +71,7 @@ Experiment xiahou_servo(const ReproduceConfig& config) {
   Claim middle{"servo-middle",
                "the target stays in the central third of both pictures",
                "%",
-               100.0,
+               not_a_number,
                100.0 * pi.central_third,
                100.0 * best.central_third};
   middle.holds = near_to(middle.ours, 100.0, 0.01);
@@ -82,7 +82,7 @@ Experiment xiahou_servo(const ReproduceConfig& config) {
       pi.rms_px, best.rms_px);
   middle.figure = "4";
   Claim lively{"servo-lively", "the same on a circle of 0.3 m in 2 s", "%",
-               100.0,          100.0 * fast_pi.central_third,          100.0 * fast_best.central_third};
+               not_a_number,   100.0 * fast_pi.central_third,          100.0 * fast_best.central_third};
   lively.holds = near_to(lively.ours, 100.0, 0.01);
   lively.words = fmt::format(
       "Not the paper's experiment: what its loop, of 0.46 Hz, is worth where a target moves. {:.0f} px RMS, "

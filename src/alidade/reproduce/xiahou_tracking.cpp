@@ -108,9 +108,9 @@ Experiment xiahou_tracking(const ReproduceConfig& config) {
   most.holds = at_most(first.most_cm, 8.0);
   most.words = fmt::format("Median over runs of the largest of 200 errors with Q = I6; with Q = GG' on 6 cm {:.2g} cm.",
                            quantile_of(other.most_cm, 0.5));
-  Claim sure{"covariance", "the filter's covariance covers its errors with Q = GG': NEES of three", "", 3.0,
-             quantile_of(other.nees, 0.5)};
-  sure.holds = near_to(sure.ours, sure.printed, 0.2);
+  Claim sure{"covariance", "the filter's covariance covers its errors with Q = GG': NEES, of which 3 is right", "",
+             not_a_number, quantile_of(other.nees, 0.5)};
+  sure.holds = near_to(sure.ours, 3.0, 0.2);
   sure.words = fmt::format("Far too sure: its lag is not noise. With Q = I6 {:.2g}.", quantile_of(first.nees, 0.5));
   for (Claim* claim : {&mean, &most, &sure}) claim->figure = "5";
   return {"tracking",

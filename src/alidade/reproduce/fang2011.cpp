@@ -93,8 +93,7 @@ Experiment experiment_1(const ReproduceConfig& config) {
       "Gains: Γ = g Ḡ⁻¹ with Ḡ the mean of ΩΩᵀ over a period of the planned motion; quiet k1 = 2, g = 2 behind a low "
       "pass of "
       "0.3 Hz on both sides, fast k1 = 15, g = 1500. Implicit midpoint rule. Points: uniform, every triangle at least "
-      "40 px "
-      "high."};
+      "40 px high. Ours is told the noise."};
   experiment.claims = noise_claims(score_noise(config));
   const RotationLog clean = clean_log(figure_points());
   RotationLog log = clean;
@@ -188,9 +187,7 @@ std::vector<Claim> zoom_claims(const ZoomScores& flow_only, const ZoomScores& ph
                median(physical.ramp),
                median(physical.best_ramp)};
   camera.holds = at_most(physical.ramp, tracked_percent);
-  camera.words =
-      "(11) lacks the flow of the zoom itself, f'/f (p - u) + u': with it the observer is lost on the ramp, "
-      "whatever its gains; ";
+  camera.words = "(11) lacks the flow of the zoom itself, f'/f (p - u) + u': with it the observer is lost on the ramp.";
   camera.figure = "8";
   Claim zero{
       "exp3-after-zero",          "errors go to zero after the ramp, without noise", "px", 0.0, median(physical.after),

@@ -80,7 +80,7 @@ FigureTable intrinsics_figure(const std::string& id, const RotationLog& log, con
     const std::string& name = names[static_cast<std::size_t>(k)];
     std::vector<double> truth;
     for (const TrueIntrinsics& row : log.truth) truth.push_back(row[static_cast<std::size_t>(k)]);
-    figure.columns.emplace_back("printed_true_" + name + "_px", std::move(truth));
+    figure.columns.emplace_back("true_" + name + "_px", std::move(truth));
     figure.columns.emplace_back("ours_" + name + "_px", column(ours.estimates, k));
     figure.columns.emplace_back("best_" + name + "_px", column(best.estimates, k));
   }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <opencv2/core.hpp>
@@ -75,18 +76,22 @@ TEST(LocalizeImages, FollowsARoomWithoutLosingAFrame) {
 }
 
 TEST(LocalizeImages, MismatchesOfFortyPercentChangeLittle) {
-  const LocalizeReport clean = localized(usual_room(), by_hand());
-  LocalizeImagesConfig config = by_hand();
-  Draws draws(7);
-  config.disturb = [&](long, std::vector<FeatureSight>& sights) {
-    for (FeatureSight& sight : sights)
-      if (draws.uniform() < 0.4) sight.px += 20.0 * Eigen::Vector2d(draws.uniform(-1, 1), draws.uniform(-1, 1));
-  };
-  const LocalizeReport disturbed = localized(usual_room(), config);
-  EXPECT_EQ(disturbed.num_lost, 0u);
-  EXPECT_LT(disturbed.error.ate_m, 0.005);  // as without them
-  EXPECT_GT(disturbed.num_gated, disturbed.num_used / 4);
-  EXPECT_LT(clean.error.ate_m, 0.005);
+  const double clean_m = localized(usual_room(), by_hand()).error.ate_m;
+  double sum2 = 0.0;
+  constexpr int num_draws = 6;
+  for (std::uint64_t seed = 1; seed <= num_draws; ++seed) {
+    LocalizeImagesConfig config = by_hand();
+    Draws draws(seed);
+    config.disturb = [&](long, std::vector<FeatureSight>& sights) {
+      for (FeatureSight& sight : sights)
+        if (draws.uniform() < 0.4) sight.px += 20.0 * Eigen::Vector2d(draws.uniform(-1, 1), draws.uniform(-1, 1));
+    };
+    const LocalizeReport disturbed = localized(usual_room(), config);
+    EXPECT_EQ(disturbed.num_lost, 0u) << seed;
+    EXPECT_GT(disturbed.num_gated, disturbed.num_used / 4) << seed;
+    sum2 += disturbed.error.ate_m * disturbed.error.ate_m / num_draws;
+  }
+  EXPECT_LT(std::sqrt(sum2), 1.2 * clean_m);  // the goal is 1.1; one draw scatters by a quarter, six by a tenth
 }
 
 TEST(LocalizeImages, ASecondOfDarknessIsRecoveredWithinTenFrames) {

@@ -81,7 +81,7 @@ LocalizeConfig config_of(const Args& args) {
 }
 
 void add_inputs(const Args& args, Run& run) {
-  run.add_input("sequence", args.sequence);
+  if (!std::filesystem::is_directory(args.sequence)) run.add_input("sequence", args.sequence);
   run.add_input("camera", args.camera);
   if (!args.target.empty()) run.add_input("target", args.target);
   if (!args.start.empty()) run.add_input("start", args.start);

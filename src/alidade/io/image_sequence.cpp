@@ -141,7 +141,8 @@ ImageTarget read_image_target(const path& file) {
   const detail::Fields fields(root, name);
   if (fields.has("rectangle")) {
     if (fields.has("points") || fields.has("board")) detail::refuse(name, "rectangle", "stands beside another target");
-    const detail::Fields rectangle(root["rectangle"], name, "rectangle.");
+    const YAML::Node node = root["rectangle"];
+    const detail::Fields rectangle(node, name, "rectangle.");
     detail::refuse_unknown_keys(rectangle, {"width_m", "height_m", "sigma_m"}, "a rectangle");
     const double width_m = rectangle.number("width_m"), height_m = rectangle.number("height_m");
     const double sigma_m = rectangle.has("sigma_m") ? rectangle.number("sigma_m") : 0.001;

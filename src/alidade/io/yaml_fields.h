@@ -29,6 +29,7 @@ class Fields {
  public:
   /// Refuses what is not a map, and a key that stands twice. `prefix` begins the keys in messages ("cam0.").
   Fields(const YAML::Node& map, std::string file, std::string prefix = "");
+  Fields(const YAML::Node&& map, std::string file, std::string prefix = "") = delete;  // it would not outlive this line
 
   [[nodiscard]] bool has(const std::string& key) const;
   [[nodiscard]] double number(const std::string& key) const;

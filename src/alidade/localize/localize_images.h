@@ -19,7 +19,7 @@ struct EyesConfig {
   std::size_t most_features = 120;
   /// Least σ of a match's coordinate: what patches of things with depth, seen through a lens that is not quite as
   /// calibrated, are off by, however well they fit.
-  double sigma_floor_px = 0.10;
+  double sigma_floor_px = 0.11;
   double min_correlation = 0.8;
   double least_found_share = 0.5;  ///< Features that are found less often leave.
   int cell_px = 0;                 ///< Of the grid on which new ones are chosen; 0: a tenth of the picture's width.

@@ -134,7 +134,7 @@ TEST(LocalizeImages, ARealDeskIsFollowedToACentimetre) {
     GTEST_SKIP() << "set ALIDADE_DATA to the folder that holds data/monoslam-desk";
   Camera camera = room_camera();
   Params<KannalaBrandt> values;
-  values << 195.0, 195.0, 162.0, 125.0, -0.00893, -0.03290, -0.00519, 0.00191;
+  values << 195.0, 195.0, 162.0, 125.0, 0.0, -0.00893, -0.03290, -0.00519, 0.00191;
   camera.lens = Calibrated<KannalaBrandt>{values};
   const std::vector<TimedPose> truth = read_tum(folder / "reference_tum.txt");
   ImageSequence pictures(folder / "frames", 30.0, camera.width_px, camera.height_px);

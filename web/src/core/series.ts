@@ -11,6 +11,7 @@ import {hideTip, showTip} from './tip';
 type Values = ArrayLike<number>;
 
 export interface Line {
+  spansGaps?: boolean; // known at some times only
   name: string;
   values: Values;
   colour: ColourName;
@@ -135,7 +136,7 @@ export class SeriesPlot {
     const stroke = () => palette()[line.colour];
     if (line.isDots)
       return {stroke, paths: () => null, points: {show: true, size: line.size ?? 3, fill: stroke, stroke, width: 0}};
-    return {stroke, width: line.width ?? 1.6, dash: line.dash, points: {show: false}, spanGaps: false,
+    return {stroke, width: line.width ?? 1.6, dash: line.dash, points: {show: false}, spanGaps: line.spansGaps ?? false,
       ...(line.isSteps ? {paths: uPlot.paths.stepped!({align: 1})} : {})};
   }
   private rangeOf(low: number, high: number): [number, number] {

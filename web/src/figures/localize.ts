@@ -90,7 +90,7 @@ export const localizeError: Figure = {
       error.forEach((e, i) => Number.isFinite(e) && three[i]! > 0 && (++known, (inside += Number(Math.abs(e) <= three[i]!))));
       const limit = 1.2 * Math.max(quantile(three, 0.97) || 0, quantile(error.map(Math.abs), 0.99) || 0) || 1;
       new SeriesPlot(host, {t, selection, label: `${axis}, mm`, xLabel: k === 2 ? 'time, s' : '', height: k === 2 ? 132 : 104, isFilling: true, aria: `error of ${axis}`, levels: [{value: 0, dash: []}], range: [-limit, limit], bands: [bandAboutZero(scaled(sigma.value[k]!, 1e3), axisColours[k]!)],
-        lines: [{name: 'error', values: error, colour: axisColours[k]!, width: 1.4}], tip: (i) => [`${axis} ${withSigma(at.value[k]![i]!, sigma.value[k]![i]!, 'm')} (3σ)`, ...(truth ? [`error ${num(error[i]!, 3)} mm`] : [])]});
+        lines: [{name: 'error', spansGaps: true, values: error, colour: axisColours[k]!, width: 1.4}], tip: (i) => [`${axis} ${withSigma(at.value[k]![i]!, sigma.value[k]![i]!, 'm')} (3σ)`, ...(truth ? [`error ${num(error[i]!, 3)} mm`] : [])]});
     });
     const words = truth ? `the error is inside 3σ for ${percent(inside, known, 1)} of all values (99.7 % expected)` : hasTriple(path, 'truth_') ? 'the scale is not known, so there is no error in metres by axis: ATE and RPE are after alignment; the band is 3σ' : 'no truth was given: the band is 3σ';
     return {marks: path.rows, rows: path.rows, tables: [path], words, good: truth ? `Good: inside the band. Here ${words}.` : `${words[0]!.toUpperCase()}${words.slice(1)}.`};

@@ -118,6 +118,7 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
     judgement.event = ObserveEvent::zoom;
     judgement.accept = true;
   }
+  if (!std::isfinite(judgement.nis)) return restart(estimate);  // a σ too small for floating point
   estimate.nis = judgement.nis;
   estimate.nis_dof = judgement.dof;
   estimate.point = judgement.point;

@@ -18,6 +18,7 @@ using testing::bound_of;
 using testing::Experiment;
 using testing::log_of;
 using testing::paper_experiment;
+using testing::paper_observer;
 using testing::quantile;
 using testing::run;
 constexpr int num_sets = 200;
@@ -106,6 +107,25 @@ TEST(Hybrid, IsWithinOnePercentByTwoSecondsOfThePapersNoise) {
   }
   EXPECT_LE(quantile(within_s, 0.9), 2.0);
   for (const auto& of_one : rms) EXPECT_LE(quantile(of_one, 0.9), 0.5);
+}
+
+/// As a simulator writes them; and as somebody says who means radians, or no noise.
+TEST(Hybrid, SurvivesExactPixelsAndASigmaOfNothing) {
+  Experiment experiment = paper_experiment(8.0);
+  experiment.log.sigma_px = 0.0;
+  for (const double sigma_px : {0.0, 1e-5, 1e-9}) {
+    for (int set = 0; set < 4; ++set) {
+      const RotationLog log = log_of(experiment, set);
+      HybridObserver observer = paper_observer({}, sigma_px);
+      MotionReader reader(log.source, 0.25);
+      IntrinsicsEstimate estimate;
+      for (const RotationRow& row : log.rows) estimate = observer.step(reader.next(row));
+      if (sigma_px == 0.0) EXPECT_TRUE(estimate.has_value);
+      if (!estimate.has_value) continue;
+      EXPECT_LT((estimate.values() - testing::paper_truth).norm(), 0.05) << sigma_px << ", set " << set;
+      EXPECT_TRUE(estimate.sigma.allFinite());
+    }
+  }
 }
 
 TEST(Hybrid, FollowsARampOfZoom) {

@@ -36,13 +36,18 @@ void StarFilter::start(const BundleSolution& solution, const std::vector<int>& b
   covariance_.setZero(n, n);
   covariance_.topLeftCorner(solved, solved) = solution.covariance();
   precision_ = inverse(covariance_);
+  // Before, a zoom may have given the layout four places more.
+  information_.setZero(n, n);
+  gradient_.setZero(n);
+  num_seen_ = 0;
+  is_summed_ = false;
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const int from = bundle_point_of[i];
     Point& point = points_[i];
+    point.slope.setZero(3, n);
     point.known = from >= 0 && static_cast<std::size_t>(from) < solution.given_common.size();
     if (!point.known) continue;
     point.bearing = solution.points[static_cast<std::size_t>(from)];
-    point.slope.setZero(3, n);
     point.slope.leftCols(solved) = solution.given_common[static_cast<std::size_t>(from)].slope;
     point.cov = solution.given_common[static_cast<std::size_t>(from)].cov;
   }

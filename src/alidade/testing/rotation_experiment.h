@@ -32,13 +32,14 @@ inline RotationLog log_of(Experiment& experiment, int set) {
   return log;
 }
 
-inline HybridObserver paper_observer(const ObserveNuisances& estimate = {}) {
+inline HybridObserver paper_observer(const ObserveNuisances& estimate = {}, double sigma_px = 0.0) {
   HybridConfig config;
   config.num_points = 4;
   config.scale = paper_scale;
   config.start.k = {500.0 / 400.0, 510.0 / 400.0, 10.0 / 400.0, 9.0 / 400.0};
   config.start_is_given = true;
   config.nuisances = estimate;
+  config.sigma_px = sigma_px;
   return HybridObserver(config);
 }
 

@@ -13,9 +13,9 @@
 namespace alidade {
 namespace {
 
-constexpr ImageSize size{768, 576};
+constexpr ImageSize port_picture{768, 576};
 constexpr double sigma_px = 0.3;
-const Board board{.cols = 14, .rows = 10, .square_m = 0.03};
+const Board port_board{.cols = 14, .rows = 10, .square_m = 0.03};
 constexpr double deg = std::numbers::pi / 180.0;
 
 Camera air_camera() {
@@ -37,7 +37,7 @@ BoardScene scene_of(const Camera& camera, std::uint64_t seed, double max_tilt_ra
   config.max_tilt_rad = max_tilt_rad;
   config.min_fill = 0.27;
   config.max_fill = 0.83;
-  return draw_board_scene(camera, board, config, seed);
+  return draw_board_scene(camera, port_board, config, seed);
 }
 
 PortKnowledge knowledge() { return {.air = air_camera(), .glass_m = 0.01}; }
@@ -65,7 +65,7 @@ TEST_P(CalibratePort, FindsGapAndNormalAsWellAsItSays) {
   constexpr int num_seeds = 6;
   for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
     const auto views = simulate_views(scene_of(truth, seed), sigma_px, seed + 100);
-    const auto report = calibrate(board, views, size, with_port({}, knowledge()));
+    const auto report = calibrate(port_board, views, port_picture, with_port({}, knowledge()));
     ASSERT_EQ(report.status, CalibrateReport::Status::converged) << report.reason;
     const Errors errors = errors_of(report, truth);
     gap_m2 += errors.gap_m * errors.gap_m / num_seeds;
@@ -93,7 +93,7 @@ TEST(CalibratePort, IsExactWithoutNoise) {
       corner.cov.setIdentity();
     }
   }
-  const auto report = calibrate(board, views, size, with_port({}, knowledge()));
+  const auto report = calibrate(port_board, views, port_picture, with_port({}, knowledge()));
   ASSERT_EQ(report.status, CalibrateReport::Status::converged) << report.reason;
   EXPECT_LT(errors_of(report, truth).gap_m, 1e-8);
   EXPECT_LT(errors_of(report, truth).normal_rad, 1e-8);
@@ -103,8 +103,8 @@ TEST(CalibratePort, IsExactWithoutNoise) {
 TEST(CalibratePort, BrownFitsTheSamePhotosAsWell) {
   const Camera truth = port_camera(0.05, 2.0);
   const auto views = simulate_views(scene_of(truth, 4), sigma_px, 8);
-  const auto port = calibrate(board, views, size, with_port({}, knowledge()));
-  const auto brown = calibrate(board, views, size, {});
+  const auto port = calibrate(port_board, views, port_picture, with_port({}, knowledge()));
+  const auto brown = calibrate(port_board, views, port_picture, {});
   ASSERT_EQ(port.status, CalibrateReport::Status::converged);
   ASSERT_EQ(brown.status, CalibrateReport::Status::converged);
   RecordProperty("port_rms_px", std::to_string(port.rms_px));
@@ -116,7 +116,7 @@ TEST(CalibratePort, RefusesWhatParallelBoardsCannotTell) {
   const auto views = simulate_views(scene_of(port_camera(0.02, 0.0), 5, 0.0), sigma_px, 9);
   PortKnowledge nothing = knowledge();
   nothing.air.reset();
-  const auto report = calibrate(board, views, size, with_port({}, nothing));
+  const auto report = calibrate(port_board, views, port_picture, with_port({}, nothing));
   EXPECT_EQ(report.status, CalibrateReport::Status::degenerate);
   EXPECT_FALSE(report.reason.empty());
 }
@@ -127,7 +127,7 @@ TEST(CalibratePort, RefusesAFreeLensAndFreeIndices) {
   nothing.air.reset();
   CalibrateConfig config = with_port({}, nothing);
   config.fixed = {"skew"};  // glass and indices as well
-  const auto report = calibrate(board, views, size, config);
+  const auto report = calibrate(port_board, views, port_picture, config);
   EXPECT_NE(report.status, CalibrateReport::Status::converged);
 }
 
@@ -136,7 +136,7 @@ TEST(CalibratePort, RefusesAGapBelowZeroAndHoldsItAtZero) {
   int refused = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const auto views = simulate_views(scene_of(truth, seed), sigma_px, seed + 20);
-    const auto report = calibrate(board, views, size, with_port({}, knowledge()));
+    const auto report = calibrate(port_board, views, port_picture, with_port({}, knowledge()));
     if (report.status == CalibrateReport::Status::degenerate) {
       EXPECT_TRUE(report.reason.starts_with("gap_m comes out below zero")) << report.reason;
       ++refused;
@@ -145,7 +145,7 @@ TEST(CalibratePort, RefusesAGapBelowZeroAndHoldsItAtZero) {
     }
     PortKnowledge on_glass = knowledge();
     on_glass.gap_m = 0.0;
-    const auto held = calibrate(board, views, size, with_port({.fixed = {"skew", "gap_m"}}, on_glass));
+    const auto held = calibrate(port_board, views, port_picture, with_port({.fixed = {"skew", "gap_m"}}, on_glass));
     EXPECT_EQ(held.status, CalibrateReport::Status::converged) << held.reason;
     EXPECT_LT(errors_of(held, truth).normal_rad, 0.3 * deg);
   }
@@ -156,12 +156,12 @@ TEST(CalibratePort, RefusesAGapBelowZeroAndHoldsItAtZero) {
 TEST(CalibratePort, JudgesWhetherBrownWouldDo) {
   const auto judged = [](double gap_m) {
     PhotoCalibration photos;
-    photos.size = size;
+    photos.size = port_picture;
     photos.views = simulate_views(scene_of(port_camera(gap_m, 0.0), 7), sigma_px, 10);
     photos.reasons.resize(photos.views.size());
     const CalibrateConfig config = with_port({}, knowledge());
-    photos.report = calibrate(board, photos.views, size, config);
-    return judge_calibration(board, std::move(photos), config);
+    photos.report = calibrate(port_board, photos.views, port_picture, config);
+    return judge_calibration(port_board, std::move(photos), config);
   };
   const Calibration thin = judged(0.01), thick = judged(0.10);
   ASSERT_TRUE(thin.port && thick.port);

@@ -43,7 +43,7 @@ Camera simulated_calibration(const Lens& lens, double spread) {
   return camera;
 }
 
-Camera brown_camera() {
+Camera distorted_camera() {
   return simulated_calibration(
       Calibrated<Brown>{Params<Brown>{900.0, 905.0, 640.0, 470.0, 0.5, -0.25, 0.1, 0.001, -0.0005, -0.02}}, 0.9);
 }
@@ -122,8 +122,8 @@ void expect_the_scatter(const Camera& camera, double distance_m) {
   EXPECT_NEAR(mean_ratio, 1.0, 0.03);
 }
 
-TEST(ProjectionSigma, IsTheScatterOfDrawnLensesAtInfinity) { expect_the_scatter(brown_camera(), infinity); }
-TEST(ProjectionSigma, IsTheScatterOfDrawnLensesAtAWorkingDistance) { expect_the_scatter(brown_camera(), 1.2); }
+TEST(ProjectionSigma, IsTheScatterOfDrawnLensesAtInfinity) { expect_the_scatter(distorted_camera(), infinity); }
+TEST(ProjectionSigma, IsTheScatterOfDrawnLensesAtAWorkingDistance) { expect_the_scatter(distorted_camera(), 1.2); }
 TEST(ProjectionSigma, IsTheScatterOfDrawnFisheyes) { expect_the_scatter(fisheye_camera(), infinity); }
 
 TEST(ProjectionSigma, IgnoresWhatTheMotionTakesUp) {
@@ -181,7 +181,7 @@ TEST(ProjectionSigma, IsNothingOutsideTheLensAndWithoutACovariance) {
 }
 
 TEST(ProjectionSigma, OfAPictureTakesMilliseconds) {
-  const Camera camera = brown_camera();
+  const Camera camera = distorted_camera();
   double best_s = infinity;
   for (int i = 0; i < 5; ++i) {
     const auto start = std::chrono::steady_clock::now();

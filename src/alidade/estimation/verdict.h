@@ -31,4 +31,7 @@ struct Verdict {
   std::vector<Check> checks;
 };
 
+/// The value with so many significant digits, as sentences and checks quote it.
+[[nodiscard]] std::string text_of(double value, int digits = 3);
+
 }  // namespace alidade

@@ -29,7 +29,7 @@ BoardScene scene_of(const Condition& condition, int num_photos) {
                           1);
 }
 
-struct Score {
+struct CornerScore {
   int num_found = 0, num_wrong = 0;
   double sum_squares = 0.0, sum_chi2 = 0.0;
 
@@ -51,7 +51,7 @@ struct CornerAccuracy : ::testing::TestWithParam<Condition> {};
 TEST_P(CornerAccuracy, ReachesItsGoalAndSaysSo) {
   constexpr int num_photos = 3;
   const BoardScene scene = scene_of(GetParam(), num_photos);
-  Score score;
+  CornerScore score;
   for (std::size_t i = 0; i < num_photos; ++i) {
     const cv::Mat photo = render_board_photo(scene, i, {.blur_px = GetParam().blur_px, .noise = GetParam().noise}, 1);
     const BoardDetection found = find_board(photo, scene.board);

@@ -28,7 +28,7 @@ Board chessboard(int cols, int rows) {
 
 double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-struct Condition {
+struct PhotoCondition {
   const char* name;
   double blur_px, noise, max_tilt_rad, k1;
   double goal_px;  ///< RMS a coordinate.
@@ -40,7 +40,7 @@ struct Accuracy {
 };
 
 /// Errors of all corners of some rendered boards whose squares are 28–44 px. `again`: by refind_board.
-Accuracy accuracy_of(const Condition& condition, bool again) {
+Accuracy accuracy_of(const PhotoCondition& condition, bool again) {
   const Camera camera = camera_of(800, 600, 800.0, condition.k1);
   const Board board = chessboard(10, 9);  // not symmetric: numbers are unique
   const BoardScene scene = draw_board_scene(camera, board,
@@ -70,10 +70,10 @@ Accuracy accuracy_of(const Condition& condition, bool again) {
   return accuracy;
 }
 
-class Corners : public ::testing::TestWithParam<Condition> {};
+class Corners : public ::testing::TestWithParam<PhotoCondition> {};
 
 TEST_P(Corners, ReachTheGoalWithTheErrorTheyState) {
-  const Condition& condition = GetParam();
+  const PhotoCondition& condition = GetParam();
   for (const bool again : {false, true}) {
     const Accuracy accuracy = accuracy_of(condition, again);
     EXPECT_EQ(accuracy.corners, photos_per_condition * 90) << "found again: " << again;
@@ -85,11 +85,11 @@ TEST_P(Corners, ReachTheGoalWithTheErrorTheyState) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Rendered, Corners,
-                         ::testing::Values(Condition{"sharp", 0.6, 2.0, 0.5, 0.0, 0.009},
-                                           Condition{"noisy", 0.6, 6.0, 0.5, 0.0, 0.014},
-                                           Condition{"blurred", 1.5, 2.0, 0.5, 0.0, 0.009},
-                                           Condition{"tilted", 0.6, 2.0, 1.05, 0.0, 0.008},
-                                           Condition{"distorted", 0.6, 2.0, 0.5, -0.3, 0.009}),
+                         ::testing::Values(PhotoCondition{"sharp", 0.6, 2.0, 0.5, 0.0, 0.009},
+                                           PhotoCondition{"noisy", 0.6, 6.0, 0.5, 0.0, 0.014},
+                                           PhotoCondition{"blurred", 1.5, 2.0, 0.5, 0.0, 0.009},
+                                           PhotoCondition{"tilted", 0.6, 2.0, 1.05, 0.0, 0.008},
+                                           PhotoCondition{"distorted", 0.6, 2.0, 0.5, -0.3, 0.009}),
                          [](const auto& instance) { return instance.param.name; });
 
 class RenderedBoard : public ::testing::Test {

@@ -19,7 +19,7 @@ const Board charuco{BoardKind::charuco, 8, 5, 0.03, 0.022, "DICT_5X5_100"};
 const Board aprilgrid{BoardKind::aprilgrid, 6, 5, 0.03, 0.009, ""};
 
 /// Errors of found against true points, over the photos of a scene.
-struct Score {
+struct MarkerScore {
   int num_points = 0, num_found = 0;
   double sum_squares = 0.0, sum_chi2 = 0.0, worst_px = 0.0;
   [[nodiscard]] double rms_px() const { return std::sqrt(sum_squares / (2 * num_found)); }
@@ -45,7 +45,7 @@ BoardScene scene_of(const Board& board, int num_photos) {
 TEST(MarkerBoard, FindsThePointsAsWellAsItSays) {
   for (const Board& board : {charuco, aprilgrid}) {
     const BoardScene scene = scene_of(board, 8);
-    Score score;
+    MarkerScore score;
     for (std::size_t i = 0; i < scene.cam_from_board.size(); ++i) {
       const BoardDetection found = find_board(render_board_photo(scene, i, {}, 1), board);
       ASSERT_TRUE(found.found()) << found.reason;
@@ -61,7 +61,7 @@ TEST(MarkerBoard, FindsThePointsAsWellAsItSays) {
 TEST(MarkerBoard, TakesAPartForWhatItIs) {
   for (const Board& board : {charuco, aprilgrid}) {
     const BoardScene scene = scene_of(board, 3);
-    Score score;
+    MarkerScore score;
     for (std::size_t i = 0; i < scene.cam_from_board.size(); ++i) {
       cv::Mat photo = render_board_photo(scene, i, {}, 1);
       const std::vector<Eigen::Vector2d> truth = true_corners(scene, i);
@@ -80,7 +80,7 @@ TEST(MarkerBoard, TakesAPartForWhatItIs) {
 TEST(MarkerBoard, RefindsThePointsOfAKnownPose) {
   for (const Board& board : {charuco, aprilgrid}) {
     const BoardScene scene = scene_of(board, 2);
-    Score score;
+    MarkerScore score;
     for (std::size_t i = 0; i < scene.cam_from_board.size(); ++i) {
       const cv::Mat photo = render_board_photo(scene, i, {}, 1);
       const BoardView nothing{"a.png", {}};

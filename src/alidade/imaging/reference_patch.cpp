@@ -9,7 +9,7 @@ namespace alidade {
 namespace {
 
 constexpr double least_scale = 0.5, most_scale = 2.0;  // beyond, the two pictures hardly show the same
-constexpr double least_contrast = 3.0;                 // σ of the grey values; less is noise
+constexpr double least_patch_contrast = 3.0;           // σ of the grey values; less is noise
 
 bool is_usable(const Eigen::Matrix2d& warp) {
   if (!warp.allFinite() || !(warp.determinant() > 0.0)) return false;
@@ -84,7 +84,7 @@ std::optional<PatchView> ReferencePatch::seen_through(const Eigen::Matrix2d& her
     shade -= mean;
     view.energy += shade * shade;
   }
-  if (!(view.energy > least_contrast * least_contrast * PatchView::area_px)) return std::nullopt;
+  if (!(view.energy > least_patch_contrast * least_patch_contrast * PatchView::area_px)) return std::nullopt;
   for (std::size_t row = 0; row < PatchView::side_px; ++row)
     for (std::size_t col = 0; col < PatchView::side_px; ++col)
       view.grey[row * PatchView::row_px + col] =

@@ -7,9 +7,9 @@
 namespace alidade {
 namespace {
 
-constexpr double smoothing_px = 1.0;                      // the width of a small spot
-constexpr double smoothed_noise = 0.2821 / smoothing_px;  // 1/(2 √π s): noise of the smoothed over that of a pixel
-constexpr float low_snr = 4.0F;                           // how far down the slopes a patch reaches
+constexpr double spot_smoothing_px = 1.0;                      // the width of a small spot
+constexpr double smoothed_noise = 0.2821 / spot_smoothing_px;  // 1/(2 √π s): noise of the smoothed over that of a pixel
+constexpr float low_snr = 4.0F;                                // how far down the slopes a patch reaches
 constexpr int border_px = 2;  // of the part: too few neighbours to tell light from a single pixel's noise
 
 /// Mean of the eight neighbours.
@@ -39,7 +39,7 @@ Picture signal_to_noise(const SpotSignal& signal) {
   Picture smooth = signal.detected, edge = signal.edge;
   for (Picture* picture : {&smooth, &edge}) {
     cv::Mat mat(static_cast<int>(picture->rows()), static_cast<int>(picture->cols()), CV_32F, picture->data());
-    cv::GaussianBlur(mat, mat, cv::Size(7, 7), smoothing_px, smoothing_px, cv::BORDER_REPLICATE);
+    cv::GaussianBlur(mat, mat, cv::Size(7, 7), spot_smoothing_px, spot_smoothing_px, cv::BORDER_REPLICATE);
   }
   const auto noise = static_cast<float>(smoothed_noise * signal.sigma);
   // Errors at an edge are alike along it: smoothing does not lower them.

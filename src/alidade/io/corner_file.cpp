@@ -12,14 +12,8 @@
 namespace alidade {
 namespace {
 
-double positive(const Csv& csv, std::size_t row, const std::string& column) {
-  const double value = csv.number(row, column);
-  if (!(value > 0.0)) throw InputError(csv.where(row, column) + ": '" + csv.text(row, column) + "' is not above zero");
-  return value;
-}
-
 Eigen::Matrix2d read_cov(const Csv& csv, std::size_t row) {
-  const double sigma_u = positive(csv, row, "sigma_u_px"), sigma_v = positive(csv, row, "sigma_v_px");
+  const double sigma_u = csv.positive(row, "sigma_u_px"), sigma_v = csv.positive(row, "sigma_v_px");
   double correlation = 0.0;
   if (csv.has("corr_uv") && !csv.is_empty(row, "corr_uv")) {
     correlation = csv.number(row, "corr_uv");

@@ -241,6 +241,12 @@ double Csv::number(std::size_t row, const std::string& column) const {
   return csv_number(text(row, column), {name_, lines_.at(row), column});
 }
 
+double Csv::positive(std::size_t row, const std::string& column) const {
+  const double value = number(row, column);
+  if (!(value > 0.0)) throw InputError(where(row, column) + ": " + in_quotes(text(row, column)) + " is not above zero");
+  return value;
+}
+
 long Csv::integer(std::size_t row, const std::string& column, long low, long high) const {
   const std::string& cell = text(row, column);
   const std::optional<long> value = parse_number<long>(cell);

@@ -45,6 +45,8 @@ class Csv {
   /// Text of a cell. Throws InputError naming the missing column and the known ones.
   [[nodiscard]] const std::string& text(std::size_t row, const std::string& column) const;
   [[nodiscard]] double number(std::size_t row, const std::string& column) const;
+  /// A number above zero.
+  [[nodiscard]] double positive(std::size_t row, const std::string& column) const;
   /// An integer in [low, high].
   [[nodiscard]] long integer(std::size_t row, const std::string& column, long low, long high) const;
   /// "file:line: column 'name'" of a cell, to begin a message with.

@@ -46,12 +46,6 @@ Eigen::Vector2d principal_point(const Camera& camera) {
   return {values[2], values[3]};
 }
 
-double positive(const Csv& csv, std::size_t row, const std::string& column) {
-  const double value = csv.number(row, column);
-  if (!(value > 0.0)) throw InputError(csv.where(row, column) + ": '" + csv.text(row, column) + "' is not above zero");
-  return value;
-}
-
 TargetSight read_row(const Csv& csv, std::size_t row, const Columns& columns, std::span<const RigHead> heads,
                      double newest_arrival_s) {
   TargetSight sight;
@@ -68,7 +62,7 @@ TargetSight read_row(const Csv& csv, std::size_t row, const Columns& columns, st
   sight.pan_tilt_rad = {angle_in_row(csv, row, columns.pan), angle_in_row(csv, row, columns.tilt)};
   sight.px = {csv.number(row, columns.u), csv.number(row, columns.v)};
   if (!(sight.px.cwiseAbs().maxCoeff() < most_px)) throw InputError(csv.where(row, columns.u) + ": is in no picture");
-  if (csv.has("sigma_px") && !csv.is_empty(row, "sigma_px")) sight.sigma_px = positive(csv, row, "sigma_px");
+  if (csv.has("sigma_px") && !csv.is_empty(row, "sigma_px")) sight.sigma_px = csv.positive(row, "sigma_px");
   if (columns.from_centre) sight.px += principal_point(heads[sight.head].camera);
   return sight;
 }

@@ -12,7 +12,6 @@ namespace {
 
 using Numbers = std::vector<double>;
 constexpr double not_there = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t most_rows = 4000;  // the page holds them; poses.csv has all
 constexpr std::array<const char*, 7> pose_names{"x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"};
 
 std::array<double, 7> numbers_of(const Rigid3& world_from_cam) {
@@ -32,7 +31,7 @@ DataTable path_table(const LocalizeReport& report, std::span<const TimedPose> tr
   std::vector<bool> must_keep;
   for (const PathStep& step : report.path)
     must_keep.push_back(step.event == FrameEvent::started || step.event == FrameEvent::restarted);
-  const auto rows = report::thinned_rows(report.path.size(), {}, must_keep, most_rows);
+  const auto rows = report::thinned_rows(report.path.size(), {}, must_keep, report::most_step_rows);
   std::array<Numbers, 7> pose, truths;
   std::array<Numbers, 6> sigmas;
   Numbers t, tracked, gated, seen, nis, seconds;

@@ -9,7 +9,7 @@
 namespace alidade {
 namespace {
 
-constexpr long most_frames = 10'000'000, most_id = 1'000'000'000;
+constexpr long most_frames = 10'000'000, most_point_id = 1'000'000'000;
 
 /// What a row says of its frame; the frame is made with its first row.
 SightFrame& frame_of(const Csv& csv, std::size_t row, const SightsOptions& options, std::vector<SightFrame>& frames) {
@@ -34,7 +34,7 @@ void read_row(const Csv& csv, std::size_t row, const SightsOptions& options, std
   const bool is_empty = csv.is_empty(row, "point_id");
   FeatureSight sight;
   if (!is_empty) {
-    sight.id = csv.integer(row, "point_id", 0, most_id);
+    sight.id = csv.integer(row, "point_id", 0, most_point_id);
     sight.px = {csv.number(row, "u_px"), csv.number(row, "v_px")};
     const double u = sight.px.x() / options.width_px, v = sight.px.y() / options.height_px;
     // A tracker may be half a picture off; a camera file of another size is further.

@@ -8,6 +8,7 @@
 
 #include "alidade/io/beam_file.h"
 #include "alidade/io/camera_file.h"
+#include "alidade/io/number_list.h"
 
 namespace alidade {
 namespace {
@@ -16,8 +17,6 @@ using Json = nlohmann::json;
 using Numbers = std::vector<double>;
 
 constexpr double not_there = std::numeric_limits<double>::quiet_NaN();
-
-Numbers list_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 std::string_view method_name(RangefinderMethod method) {
   return method == RangefinderMethod::spot ? "spot" : method == RangefinderMethod::plane ? "plane" : "joint";

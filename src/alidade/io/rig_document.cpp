@@ -6,13 +6,12 @@
 #include <limits>
 #include <map>
 
+#include "alidade/io/number_list.h"
+
 namespace alidade {
 namespace {
 
 using Numbers = std::vector<double>;
-
-Numbers list_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-Numbers list_of(const Eigen::Quaterniond& q) { return {q.w(), q.x(), q.y(), q.z()}; }
 
 JsonValue head_value(const Head& head) {
   JsonValue value;

@@ -14,7 +14,6 @@ namespace {
 using Numbers = std::vector<double>;
 
 constexpr double not_there = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t most_rows = 4000;  // the page holds them; servo.csv has all
 
 /// The columns of a row behind its time and head; of `control` and of servo.csv alike.
 constexpr std::size_t num_columns = 15;
@@ -64,7 +63,7 @@ DataTable control_table(const ServoScenario& scenario, const ServoComparison& sh
   std::vector<int> heads;
   std::vector<std::string> events;
   std::array<Numbers, num_columns> cells;
-  for (const std::size_t at : report::thinned_rows(rows.size(), {}, has_event, most_rows)) {
+  for (const std::size_t at : report::thinned_rows(rows.size(), {}, has_event, report::most_step_rows)) {
     const ServoRow& row = rows[at];
     t.push_back(row.t_s);
     heads.push_back(scenario.scene.heads[row.head].head.id);

@@ -14,11 +14,10 @@ namespace {
 using Numbers = std::vector<double>;
 
 constexpr double deg = std::numbers::pi / 180.0;
-constexpr std::size_t most_rows = 4000;  // the page holds them
 
 void fill_table(std::span<const ServoSample> log, const ServoIdentification& identified, ResultDocument& document) {
   Numbers t, command, measured, model, residual;
-  for (const std::size_t at : report::thinned_rows(log.size(), {identified.residual_rad}, {}, most_rows)) {
+  for (const std::size_t at : report::thinned_rows(log.size(), {identified.residual_rad}, {}, report::most_step_rows)) {
     t.push_back(log[at].t_s);
     command.push_back(log[at].command);
     measured.push_back(log[at].angle_rad);

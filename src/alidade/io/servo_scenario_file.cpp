@@ -18,7 +18,7 @@ using detail::Fields;
 using detail::refuse;
 using detail::refuse_unknown_keys;
 
-constexpr double deg = std::numbers::pi / 180.0;
+constexpr double degree = std::numbers::pi / 180.0;
 
 /// A section of the file, or an empty one.
 class Section {
@@ -55,8 +55,8 @@ class Section {
     const std::vector<double> numbers = fields_.numbers(key);
     if (numbers.size() != 2 || !(numbers[0] < numbers[1]))
       refuse(fields_.file(), fields_.full(key), "must be two angles, the lower one first");
-    axis.min_rad = deg * numbers[0];
-    axis.max_rad = deg * numbers[1];
+    axis.min_rad = degree * numbers[0];
+    axis.max_rad = degree * numbers[1];
   }
   static double within(const Fields& fields, const std::string& key, double low, double high) {
     const double value = fields.number(key);
@@ -135,8 +135,8 @@ void read_plant(const YAML::Node& root, const Fields& top, ServoScenario& scenar
   ServoAxis axis;
   if (is_rate_plant) {
     RatePlant plant = plant_of<RatePlant>(section);
-    section.number("max_rate_deg_s", plant.max_rate_rad_s, 1e-3, 1e5, deg);
-    section.number("max_acceleration_deg_s2", plant.max_acceleration_rad_s2, 1e-3, 1e7, deg);
+    section.number("max_rate_deg_s", plant.max_rate_rad_s, 1e-3, 1e5, degree);
+    section.number("max_acceleration_deg_s2", plant.max_acceleration_rad_s2, 1e-3, 1e7, degree);
     axis.plant = plant;
     // A loop of 4/s, whatever a unit of command is.
     const double loop_per_s = 4.0 / plant.gain;
@@ -158,8 +158,8 @@ void read_noise(const YAML::Node& root, const Fields& top, ServoScenario& scenar
   if (const double sigma_rad = scene.heads[0].head.encoder.sigma_rad; sigma_rad > 0.0)
     scene.sigma_encoder_rad = sigma_rad;
   noise.number("sigma_px", scene.sigma_px, 0.0, 1e3);
-  noise.number("sigma_encoder_deg", scene.sigma_encoder_rad, 0.0, 90.0, deg);
-  noise.number("encoder_step_deg", scene.encoder_step_rad, 0.0, 90.0, deg);
+  noise.number("sigma_encoder_deg", scene.sigma_encoder_rad, 0.0, 90.0, degree);
+  noise.number("encoder_step_deg", scene.encoder_step_rad, 0.0, 90.0, degree);
   scenario.config.sigma_px = std::max(scene.sigma_px, 1e-3);
   // A rounded reading errs by a twelfth of a step's square.
   scenario.config.sigma_encoder_rad =
@@ -196,7 +196,7 @@ void read_filter(const YAML::Node& root, const Fields& top, BearingFilterConfig&
   const Section filter(root, top, "filter", {"singer_tau_s", "sigma_deg_s2", "memory_s", "start_rate_deg_s", "gate"});
   filter.number("singer_tau_s", config.singer_tau_s, 1e-2, 1e3);
   filter.number("memory_s", config.memory_s, 1e-3, 1e3);
-  filter.number("start_rate_deg_s", config.start_rate_rad_s, 1e-3, 1e5, deg);
+  filter.number("start_rate_deg_s", config.start_rate_rad_s, 1e-3, 1e5, degree);
   filter.number("gate", config.gate, 1.0, 1e9);
   if (!filter.has("sigma_deg_s2")) return;
   const std::vector<double> sigmas = filter.fields().numbers("sigma_deg_s2");
@@ -206,7 +206,7 @@ void read_filter(const YAML::Node& root, const Fields& top, BearingFilterConfig&
   for (std::size_t i = 0; i < num_agilities; ++i) {
     const double sigma = sigmas[sigmas.size() == 1 ? 0 : i];
     if (!(sigma > 0.0 && sigma <= 1e7)) refuse(top.file(), key, fmt::format("{} is not above 0 and below 1e7", sigma));
-    config.sigma_rad_s2[i] = deg * sigma;
+    config.sigma_rad_s2[i] = degree * sigma;
   }
 }
 
@@ -216,9 +216,9 @@ void read_search(const YAML::Node& root, const Fields& top, SearchConfig& config
   search.word("enabled", config.enabled, yes_or_no, "true, false");
   search.number("coast_s", config.coast_s, 0.0, 1e3);
   search.number("carry_s", config.carry_s, 0.0, 1e3);
-  search.number("speed_deg_s", config.speed_rad_s, 1e-3, 1e4, deg);
+  search.number("speed_deg_s", config.speed_rad_s, 1e-3, 1e4, degree);
   search.number("turn_of_view", config.turn_of_view, 0.05, 10.0);
-  search.number("max_radius_deg", config.max_radius_rad, 0.1, 360.0, deg);
+  search.number("max_radius_deg", config.max_radius_rad, 0.1, 360.0, degree);
 }
 
 void read_robustness(const YAML::Node& root, const Fields& top, std::optional<RobustnessConfig>& robustness) {

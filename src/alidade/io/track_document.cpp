@@ -12,7 +12,6 @@ namespace {
 using Numbers = std::vector<double>;
 
 constexpr double not_there = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t most_rows = 4000;  // the page holds them; track.csv has all
 constexpr std::array<const char*, 3> axes{"x", "y", "z"};
 constexpr std::array<const char*, 6> cov_names{"xx", "xy", "xz", "yy", "yz", "zz"};
 constexpr std::array<std::pair<int, int>, 6> cov_places{{{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}}};
@@ -24,7 +23,7 @@ std::vector<std::size_t> kept_rows(const TrackReport& report) {
     has_event.push_back(step.event != TrackEvent::none && step.event != TrackEvent::one_head &&
                         step.event != TrackEvent::waiting);
   }
-  return report::thinned_rows(report.steps.size(), {}, has_event, most_rows);
+  return report::thinned_rows(report.steps.size(), {}, has_event, report::most_step_rows);
 }
 
 using ByAxis = std::array<Numbers, 3>;
@@ -166,7 +165,7 @@ void fill_target_frames(std::span<const TargetFrame> frames, std::span<const Rig
     num_seen[frame.head] += frame.seen.found() ? 1U : 0U;
     lost.push_back(!frame.seen.found());
   }
-  for (const std::size_t row : report::thinned_rows(frames.size(), {}, lost, most_rows)) {
+  for (const std::size_t row : report::thinned_rows(frames.size(), {}, lost, report::most_step_rows)) {
     const TargetFrame& frame = frames[row];
     const auto if_found = [&](double value) { return frame.seen.found() ? value : not_there; };
     t.push_back(frame.t_s);

@@ -13,7 +13,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t least_tracked = 3;  // a pose has six numbers, a point two
+constexpr std::size_t least_sights = 3;  // a pose has six numbers, a point two
 
 /// One run: the filters, what is known of points outside them, and when to start again.
 class Localizer {
@@ -52,7 +52,7 @@ class Localizer {
 std::vector<StartHypothesis> Localizer::starts(const SightFrame& frame) const {
   if (config_.start) return {*config_.start};
   if (!config_.target.empty()) return poses_from_known(camera_, frame.sights, config_.target, pose_config());
-  if (frame.sights.size() < least_tracked) return {};
+  if (frame.sights.size() < least_sights) return {};
   StartHypothesis origin;
   constexpr double sure = 1e-6;  // the world is where the camera is; zero would leave no way to correct it
   origin.cov.diagonal().head<6>().setConstant(sure * sure);
@@ -180,14 +180,14 @@ PathStep Localizer::take(const SightFrame& frame) {
   }
   const SightsReport report = bank_->update(frame.sights);
   fill(frame, report, step);
-  if (step.event == FrameEvent::tracked && step.num_tracked < least_tracked) step.event = FrameEvent::predicted;
+  if (step.event == FrameEvent::tracked && step.num_tracked < least_sights) step.event = FrameEvent::predicted;
   const bool is_wrong_now = is_wrong(step);
   drop_strangers(frame, report);
   if (config_.restarts && is_wrong_now && restart(frame)) {
     fill(frame, bank_->update(frame.sights), step);
     step.event = FrameEvent::restarted;
   }
-  if (step.num_tracked >= least_tracked || step.event == FrameEvent::started) add_new(frame);
+  if (step.num_tracked >= least_sights || step.event == FrameEvent::started) add_new(frame);
   bank_->convert_linear();
   return step;
 }

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 
 #include "alidade/localize/localize.h"
@@ -10,12 +9,6 @@ namespace {
 
 constexpr double good_nis_low = 0.4, good_nis_high = 1.5, care_nis = 2.0, most_nis = 4.0;
 constexpr double care_gated = 0.3, most_gated = 0.6, care_lost = 0.1, most_lost = 0.5;
-
-std::string text_of(double value, int digits = 2) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  return text;
-}
 
 double share(std::size_t part, std::size_t of) {
   return of > 0 ? static_cast<double>(part) / static_cast<double>(of) : 0.0;
@@ -55,12 +48,13 @@ void add_checks(const LocalizeReport& report, Verdict& verdict) {
                             lost, care_lost, "1", "tracks"});
   const double gated = share(report.num_gated, report.num_used + report.num_gated);
   verdict.checks.push_back({"gated", state_of(gated, 0.05, care_gated),
-                            text_of(100.0 * gated) + " % of the sights fit nowhere", gated, care_gated, "1", "tracks"});
+                            text_of(100.0 * gated, 2) + " % of the sights fit nowhere", gated, care_gated, "1",
+                            "tracks"});
   const double known_gated = share(report.num_known_gated, report.num_known);
   // Known points may be mismatched as often as others; if more often, they are not where they are said to be.
   if (report.has_target)
     verdict.checks.push_back({"target", state_of(known_gated, 0.1, gated + 0.2),
-                              text_of(100.0 * known_gated) + " % of the target's sights are not where they belong",
+                              text_of(100.0 * known_gated, 2) + " % of the target's sights are not where they belong",
                               known_gated, 0.1, "1", "tracks"});
   verdict.checks.push_back({"scale", report.scale_known ? State::good : State::care,
                             report.scale_known
@@ -91,7 +85,7 @@ Verdict localize_verdict(const LocalizeReport& report) {
   if (!is_finite || report.nis_per_dof > most_nis || gated > most_gated)
     return stopped(State::not_converged, ExitCode::no_convergence,
                    "no path fits the sights: NIS " + text_of(report.nis_per_dof, 3) + " per degree of freedom, " +
-                       text_of(100.0 * gated) + " % of them left out",
+                       text_of(100.0 * gated, 2) + " % of them left out",
                    "check camera, target and start, and --sigma-px");
   if (lost > most_lost)
     return stopped(State::refused, ExitCode::cannot_tell,

@@ -2,17 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
 namespace alidade {
 namespace {
-
-std::string text_of(double value, int digits = 3) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  return text;
-}
 
 double units_of_error_per_rad(ErrorUnit unit, double focal_px) { return PiGains{1.0, 0.0, unit}.per_rad(focal_px).kp; }
 

@@ -9,8 +9,6 @@ namespace {
 
 using Matrix8 = Eigen::Matrix<double, 8, 8>;
 
-/// A focal length beyond twenty half pictures is no estimate yet.
-constexpr double least_inverse_focal = 1.0 / 20.0;
 /// Added to a measured Ḡ: directions that nothing excited get a gain that is large, not infinite.
 constexpr double gramian_floor = 1e-6;
 
@@ -22,8 +20,6 @@ Matrix8 typical_gramian(std::size_t num_points) {
   const double num_differences = std::max(1.0, static_cast<double>(num_points) - 1.0);
   return (num_differences / 3.0 * diagonal).asDiagonal();
 }
-
-double squared(double x) { return x * x; }
 
 LinearInformation<8> prior_of(const FangConfig& config) {
   const Eigen::Vector4d k = scaled_intrinsics(config.scale, config.start);

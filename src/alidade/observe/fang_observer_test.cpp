@@ -16,7 +16,7 @@ namespace {
 using namespace testing;
 using Matrix8 = Eigen::Matrix<double, 8, 8>;
 
-FangConfig paper_config(FangProfile profile, std::size_t num_points = 4) {
+FangConfig observer_config(FangProfile profile, std::size_t num_points = 4) {
   FangConfig config;
   config.num_points = num_points;
   config.scale = paper_scale;
@@ -52,7 +52,7 @@ void expect_reference(const std::string& method, const FangConfig& config, doubl
 }
 
 FangConfig reference_config(FangProfile profile) {
-  FangConfig config = paper_config(profile);
+  FangConfig config = observer_config(profile);
   config.rates_at_ends = true;
   config.reference_point = 0;
   DifferenceParameters diagonal;  // the reference's dG; the last two do not matter without roll
@@ -136,7 +136,7 @@ TEST(FangObserver, LosesEnergyAtEveryGainAndStep) {
   for (const double gain : {1.0, 1e3, 1e6}) {
     for (const double k1 : {0.5, 15.0, 1000.0}) {
       const RotationLog log = trapezoid_log(3);
-      FangConfig config = paper_config(FangProfile::fast);
+      FangConfig config = observer_config(FangProfile::fast);
       config.roll_columns = config.rates_at_ends = true;
       config.gains = FangGains{.k1 = k1, .gain = gain, .lowpass_hz = 0.0};
       config.mean_gramian = Matrix8::Identity();  // Γ = gain
@@ -168,7 +168,7 @@ TEST(FangObserver, LosesEnergyAtEveryGainAndStep) {
 
 TEST(FangObserver, LowPassOfBothSidesDoesNotBias) {
   const RotationLog log = trapezoid_log(3);
-  FangConfig config = paper_config(FangProfile::quiet);
+  FangConfig config = observer_config(FangProfile::quiet);
   config.roll_columns = config.rates_at_ends = true;
   config.start = paper_truth;
   FangObserver observer(config);
@@ -262,7 +262,7 @@ TEST(FangObserver, KalmanIsTheJointFilterToTheLastDigits) {
   RotationLog log = simulate_rotation(scene, {.duration_s = 5.0, .sigma_px = 0.3, .lost_share = 0.05}, 3);
   for (RotationRow& row : log.rows)
     if (!is_seen(row.px[0])) row.px[0] = {300.0, 300.0};  // the reference stays, be it wrong
-  FangConfig config = paper_config(FangProfile::kalman, 5);
+  FangConfig config = observer_config(FangProfile::kalman, 5);
   config.roll_columns = true;
   config.reference_point = 0;
   FangObserver observer(config);
@@ -289,7 +289,7 @@ TEST(FangObserver, KalmanIsTheJointFilterToTheLastDigits) {
 // --- what is asked of it frame by frame -----------------------------------------------------------------------------
 
 TEST(FangObserver, GivesNoIntrinsicsWhileAFocalLengthIsWild) {
-  FangConfig config = paper_config(FangProfile::fast);
+  FangConfig config = observer_config(FangProfile::fast);
   config.start = {1e5, 1e5, 390.0, 291.0};  // 1/fx is 1/250 in scaled pixels
   FangObserver observer(config);
   const auto estimates = observe_log(observer, paper_log(1, false));
@@ -307,7 +307,7 @@ TEST(FangObserver, GivesNoIntrinsicsWhileAFocalLengthIsWild) {
 
 TEST(FangObserver, SaysWhichProfileHasASigma) {
   for (const FangProfile profile : {FangProfile::fast, FangProfile::quiet, FangProfile::kalman}) {
-    FangObserver observer(paper_config(profile));
+    FangObserver observer(observer_config(profile));
     const IntrinsicsEstimate last = observe_log(observer, paper_log(1, true)).back();
     EXPECT_EQ(last.sigma.allFinite(), profile == FangProfile::kalman);
     EXPECT_EQ(last.nis_dof, profile == FangProfile::kalman ? 6 : 0);
@@ -323,7 +323,7 @@ TEST(FangObserver, LivesWithLostPointsLostFramesAndGaps) {
     for (std::size_t r = 100; r < 130; ++r) log.rows[r].rate_rad_per_s.setConstant(not_seen);  // 1 s: a new segment
     log.rows.insert(log.rows.begin() + 200, log.rows[200]);                                    // the same instant twice
     log.truth.push_back(log.truth[0]);
-    FangObserver observer(paper_config(profile, 6));
+    FangObserver observer(observer_config(profile, 6));
     const auto estimates = observe_log(observer, log);
     EXPECT_EQ(estimates[42].values(), estimates[39].values());
     EXPECT_EQ(estimates[60].values(), estimates[39 + 20].values());
@@ -338,7 +338,7 @@ TEST(FangObserver, AllocatesNothingOnceItStands) {
   for (const FangProfile profile : {FangProfile::fast, FangProfile::quiet, FangProfile::kalman}) {
     const RotationScene scene = paper_scene(draw_points(780, 582, 40, 9));
     const RotationLog log = simulate_rotation(scene, {.duration_s = 9.0, .lost_share = 0.01}, 9);
-    FangObserver observer(paper_config(profile, 40));
+    FangObserver observer(observer_config(profile, 40));
     MotionReader reader(log.source, 0.5);
     const std::size_t before = num_allocations();
     double lambda = 0.0;

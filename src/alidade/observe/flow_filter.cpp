@@ -9,9 +9,6 @@ namespace {
 constexpr int max_projection_steps = 3;
 /// Of ten degrees of freedom: not once in a million.
 constexpr double implausible_chi2 = 50.0;
-constexpr double least_inverse_focal = 1.0 / 20.0;
-
-double squared(double x) { return x * x; }
 
 }  // namespace
 

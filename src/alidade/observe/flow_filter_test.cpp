@@ -14,7 +14,7 @@ namespace {
 
 using namespace testing;
 
-FlowFilterConfig paper_config(std::size_t num_points = 4, bool roll_columns = true) {
+FlowFilterConfig flow_config(std::size_t num_points = 4, bool roll_columns = true) {
   FlowFilterConfig config;
   config.num_points = num_points;
   config.scale = paper_scale;
@@ -27,9 +27,9 @@ FlowFilterConfig paper_config(std::size_t num_points = 4, bool roll_columns = tr
 
 /// The same filter as textbooks have it: one state [ξ; Θ], one covariance, Joseph's form. A point that was not seen is
 /// taken out and put in anew.
-class JointFilter {
+class DenseFlowFilter {
  public:
-  explicit JointFilter(const FlowFilterConfig& config)
+  explicit DenseFlowFilter(const FlowFilterConfig& config)
       : config_(config), n_(2 * static_cast<Eigen::Index>(config.num_points)) {
     x_ = Eigen::VectorXd::Zero(n_ + 14);
     x_.tail<14>() = flow_parameters(scaled_intrinsics(config.scale, config.start));
@@ -105,10 +105,10 @@ TEST(FlowFilter, IsTheJointKalmanFilterToTheLastDigits) {
     return Eigen::Vector3d(paper_rate(t_s) + Eigen::Vector3d(0, 0, 0.05 * std::cos(t_s)));
   };
   const RotationLog log = simulate_rotation(scene, {.duration_s = 5.0, .sigma_px = 0.3, .lost_share = 0.05}, 3);
-  FlowFilterConfig config = paper_config(6);
+  FlowFilterConfig config = flow_config(6);
   config.rates_at_ends = true;
   FlowFilter filter(config);
-  JointFilter joint(config);
+  DenseFlowFilter joint(config);
   MotionReader reader(log.source, 0.5);
   RotationFrame last;
   IntrinsicsEstimate estimate;
@@ -143,7 +143,7 @@ TEST(FlowFilterCase, AgreesWithTheReferenceOfTenColumns) {
   int checked = 0;
   for (const auto& [name, methods] : cases.items()) {
     const RotationLog log = *paper_case(name);
-    FlowFilterConfig config = paper_config(4, false);
+    FlowFilterConfig config = flow_config(4, false);
     config.rates_at_ends = true;
     config.drift_px_per_sqrt_s = 400.0 * std::sqrt(30.0 * 1e-10);  // the reference's 10⁻¹⁰ a frame
     FlowFilter filter(config);
@@ -172,7 +172,7 @@ Shares paper_experiment_1(bool roll_columns, int num_sets) {
   Shares shares;
   for (int set = 0; set < num_sets; ++set) {
     const RotationLog log = paper_log(static_cast<std::uint64_t>(set) + 1, true);
-    FlowFilter filter(paper_config(4, roll_columns));
+    FlowFilter filter(flow_config(4, roll_columns));
     const auto estimates = observe_log(filter, log);
     shares.settled += settle_s(log, estimates, 0.01, 0.0, 20.0) <= 2.0 ? 1.0 / num_sets : 0.0;
     shares.quiet += rms_px(log, estimates, 14.0, 20.0).maxCoeff() <= 0.5 ? 1.0 / num_sets : 0.0;
@@ -206,7 +206,7 @@ TEST(FlowFilter, NeedsTheColumnsOfRollOnAHead) {
     double with = 0.0, without = 0.0;
     for (int set = 0; set < num_sets; ++set) {
       const RotationLog log = head_log(tilt_deg * M_PI / 180.0, static_cast<std::uint64_t>(set) + 1);
-      FlowFilterConfig config = paper_config();
+      FlowFilterConfig config = flow_config();
       FlowFilter filter(config);
       const double error = error_px(log, observe_log(filter, log), log.rows.size() - 1).cwiseAbs().maxCoeff();
       good += error <= 1.0;
@@ -227,7 +227,7 @@ TEST(FlowFilter, SaysHowSureItIs) {
   for (int set = 0; set < num_sets; ++set) {
     const auto seed = static_cast<std::uint64_t>(set) + 1;
     const RotationLog log = simulate_rotation(random_paper_scene(seed), {.duration_s = 4.0, .sigma_px = 0.3}, seed);
-    FlowFilter filter(paper_config());
+    FlowFilter filter(flow_config());
     const auto estimates = observe_log(filter, log);
     squares += (error_px(log, estimates, log.rows.size() - 1).array() / estimates.back().sigma.array()).square();
     for (const IntrinsicsEstimate& estimate : estimates) {
@@ -245,7 +245,7 @@ TEST(FlowFilter, BeginsAnywhere) {
   for (const double f_px : {100.0, 2000.0, 40000.0}) {
     for (std::uint64_t set = 1; set <= 20; ++set) {
       const RotationLog log = paper_log(set, true);
-      FlowFilterConfig config = paper_config();
+      FlowFilterConfig config = flow_config();
       config.start = {f_px, 1.3 * f_px, 100.0, 500.0};
       FlowFilter filter(config);
       // As from any other start: RMS below 0.5 px for nine in ten, and nobody elsewhere.
@@ -257,7 +257,7 @@ TEST(FlowFilter, BeginsAnywhere) {
 TEST(FlowFilter, LosesNothingToTheSamplingOfRates) {
   const auto error_of = [](bool rates_at_ends) {
     const RotationLog log = paper_log(1, false);
-    FlowFilterConfig config = paper_config();
+    FlowFilterConfig config = flow_config();
     config.rates_at_ends = rates_at_ends;
     FlowFilter filter(config);
     return error_px(log, observe_log(filter, log), log.rows.size() - 1).cwiseAbs().maxCoeff();
@@ -270,7 +270,7 @@ TEST(FlowFilter, SaysThatAPanAloneDoesNotShowFy) {
   RotationScene scene = random_paper_scene(5);
   scene.motion = [](double t_s) { return Eigen::Vector3d(0.0, 0.12 * std::sin(1.6 * t_s), 0.0); };
   const RotationLog log = simulate_rotation(scene, {.duration_s = 10.0, .sigma_px = 0.3}, 5);
-  FlowFilter filter(paper_config());
+  FlowFilter filter(flow_config());
   const IntrinsicsEstimate last = observe_log(filter, log).back();
   EXPECT_LT(last.sigma[0], 5.0);
   EXPECT_GT(last.sigma[1], 50.0);
@@ -284,7 +284,7 @@ TEST(FlowFilter, LivesWithLostPointsLostFramesAndGaps) {
   for (std::size_t r = 100; r < 130; ++r) log.rows[r].rate_rad_per_s.setConstant(not_seen);  // 1 s: a new segment
   log.rows.insert(log.rows.begin() + 200, log.rows[200]);                                    // the same instant twice
   log.truth.push_back(log.truth[0]);
-  FlowFilter filter(paper_config(6));
+  FlowFilter filter(flow_config(6));
   const auto estimates = observe_log(filter, log);
   EXPECT_FALSE(estimates[0].has_value);
   EXPECT_EQ(estimates[1].event, ObserveEvent::start);
@@ -300,7 +300,7 @@ TEST(FlowFilter, AllocatesNothingOnceItStands) {
   RotationScene scene = random_paper_scene(9);
   scene.start_px = draw_points(780, 582, 100, 9);
   const RotationLog log = simulate_rotation(scene, {.duration_s = 2.0, .lost_share = 0.1}, 9);
-  FlowFilter filter(paper_config(100));
+  FlowFilter filter(flow_config(100));
   MotionReader reader(log.source, 0.5);
   const std::size_t before = num_allocations();
   for (const RotationRow& row : log.rows) (void)filter.step(reader.next(row));

@@ -38,6 +38,11 @@ inline constexpr std::array<Eigen::Index, 8> difference_rows{0, 1, 2, 3, 4, 5, 1
 [[nodiscard]] DifferenceParameters difference_parameters(const Eigen::Vector4d& k);
 [[nodiscard]] Eigen::Matrix<double, 8, 4> difference_parameters_jacobian(const Eigen::Vector4d& k);
 
+/// A focal length beyond twenty half pictures is no estimate yet.
+inline constexpr double least_inverse_focal = 1.0 / 20.0;
+
+[[nodiscard]] constexpr double squared(double x) { return x * x; }
+
 /// Scaled intrinsics k of θ. It tells (u, v) twice; both tellings are fused: u = (θ2θ1 + θ5θ4)/(θ1² + θ4²). Nothing
 /// where θ1 or θ4 has not come above `least` (in scaled pixels a focal length of 1/least): 1/θ jumps through infinity.
 [[nodiscard]] std::optional<Eigen::Vector4d> intrinsics_of(const DifferenceParameters& theta, double least);

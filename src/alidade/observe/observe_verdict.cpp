@@ -14,12 +14,6 @@ constexpr double degree = std::numbers::pi / 180.0;
 constexpr double fine = 0.003;      // σ over the focal length of a converged estimate
 constexpr double ask_beyond = 5.0;  // σ at which the residuals ask for one thing more
 
-std::string text_of(double value, int digits = 3) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  return text;
-}
-
 /// Why the log cannot tell, in the words of who turned the camera; and what to add.
 struct Reason {
   std::string name, what, add;

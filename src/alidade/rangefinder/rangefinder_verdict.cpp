@@ -14,12 +14,6 @@ constexpr double least_range_ratio = 2.0, least_normal_spread = 0.1;
 constexpr double degenerate_range_ratio = 1.3;      // 2.0 to 2.4 m: two methods of three cannot tell
 constexpr double degenerate_normal_spread = 0.035;  // tilts of 5°: half of a board's turn is its noise
 
-std::string text_of(double value, int digits = 3) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  return text;
-}
-
 /// Origin and direction are tied by where the beam hits, so that joint's information is never round: one reading of
 /// 2 m known to 0.1 mm makes 10⁵ of an origin known to 30 mm, which is not degenerate.
 double condition_limit(Method method) { return method == Method::joint ? 1e8 : 1e4; }
@@ -49,7 +43,7 @@ std::string other_method(Method method, const Supply& supply) {
                                  : "; or take the shots on a board and use --method joint";
 }
 
-struct Reason {
+struct Weakness {
   std::string name, what, add;
 };
 
@@ -81,14 +75,14 @@ double mean_tilt_rad(const RangefinderReport& report) {
   return num > 0.0 ? sum / num : 0.0;
 }
 
-Reason reason_of_equal_ranges(const RangefinderReport& report) {
+Weakness reason_of_equal_ranges(const RangefinderReport& report) {
   return {"equal ranges",
           "equal ranges: the longest is only " + text_of(report.bound.range_ratio) +
               " times the shortest, so origin and direction cannot be told apart",
           "take shots from near to far, at least 1 to 4"};
 }
 
-Reason reason_of_boards(const RangefinderReport& report) {
+Weakness reason_of_boards(const RangefinderReport& report) {
   constexpr double frontal_rad = 0.14;  // 8°
   if (mean_tilt_rad(report) < frontal_rad) {
     return {"frontal boards", "frontal boards: all face the camera, so where the beam hits them across cannot be told",
@@ -98,7 +92,7 @@ Reason reason_of_boards(const RangefinderReport& report) {
           "tilt the board to all sides"};
 }
 
-Reason reason_of(const RangefinderReport& report, Method method) {
+Weakness reason_of(const RangefinderReport& report, Method method) {
   const BeamBound& bound = report.bound;
   const bool equal = bound.range_ratio < degenerate_range_ratio;
   if (method == Method::plane && bound.normal_spread < degenerate_normal_spread) return reason_of_boards(report);
@@ -263,7 +257,7 @@ Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Sho
     verdict = refusal(State::not_converged, ExitCode::no_convergence, "the shots do not agree: " + refused->text,
                       "check that the beam hit the board in each");
   } else if (report.status == Status::degenerate || (is_solved && refused != verdict.checks.end())) {
-    const Reason reason = reason_of(report, method);
+    const Weakness reason = reason_of(report, method);
     verdict = refusal(State::refused, ExitCode::cannot_tell, reason.what, reason.add + other_method(method, supply));
     checks.push_back(check_of(reason.name, State::refused, reason.what, 0.0, 0.0, "", "next"));
   } else if (report.status != Status::converged) {

@@ -51,12 +51,12 @@ Track run_filter(const XiahouConfig& filter_config, double radius_cm, std::uint6
   return track;
 }
 
-struct Scores {
+struct TrackScores {
   Values mean_cm, most_cm, nees;  ///< One a run.
 };
 
-Scores score(const ReproduceConfig& config, const XiahouConfig& filter, double radius_cm) {
-  Scores scores;
+TrackScores score(const ReproduceConfig& config, const XiahouConfig& filter, double radius_cm) {
+  TrackScores scores;
   const int runs = config.quick ? 100 : 1000;
   for (int run = 0; run < runs; ++run) {
     report_progress(config.progress, "tracking", static_cast<std::size_t>(run), static_cast<std::size_t>(runs));
@@ -96,7 +96,7 @@ Experiment xiahou_tracking(const ReproduceConfig& config) {
   const XiahouConfig literal{.baseline_cm = 50.2},
       by_acceleration{.baseline_cm = 50.2, .process_by_acceleration = true};
   constexpr double radius_cm = 10.0, other_radius_cm = 6.0;
-  const Scores first = score(config, literal, radius_cm), other = score(config, by_acceleration, other_radius_cm);
+  const TrackScores first = score(config, literal, radius_cm), other = score(config, by_acceleration, other_radius_cm);
   Claim mean{"rmse-mean", "mean error of the position", "cm", 3.15, quantile_of(first.mean_cm, 0.5)};
   mean.holds = near_to(mean.ours, mean.printed, 0.05);
   mean.words = fmt::format(

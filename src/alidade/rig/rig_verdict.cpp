@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
 #include "alidade/rig/rig.h"
@@ -13,12 +12,6 @@ constexpr double degree = std::numbers::pi / 180.0;
 constexpr double good_span_rad = 20.0 * degree;
 constexpr double good_relative_rad = 0.2 * degree, good_relative_m = 0.0035;  // of a use in tracking
 constexpr double refuse_relative_rad = 2.0 * degree, refuse_relative_m = 0.05;
-
-std::string text_of(double value, int digits = 3) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  return text;
-}
 
 std::string joined(const std::vector<std::string>& words) {
   std::string text;

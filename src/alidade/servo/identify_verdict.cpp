@@ -1,18 +1,11 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 
 #include "alidade/servo/identify.h"
 
 namespace alidade {
 namespace {
-
-std::string text_of(double value, int digits = 3) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  return text;
-}
 
 Verdict refused(std::string what, std::string add) {
   Verdict verdict;

@@ -12,11 +12,11 @@
 namespace alidade {
 namespace {
 
-constexpr double period_s = 0.05;
+constexpr double loop_period_s = 0.05;
 
 /// The loop of the paper with so many error units per unit of the plant's output. A radian is that many.
 LoopAnalysis loop(double K, const ServoPlant& plant, int delay_samples = 0) {
-  return analysed(plant, {2.0 * K, 10.0 * K, ErrorUnit::rad}, period_s, delay_samples);
+  return analysed(plant, {2.0 * K, 10.0 * K, ErrorUnit::rad}, loop_period_s, delay_samples);
 }
 const ServoPlant angle_plant = AnglePlant{0.0567, AngleUnit::rad, 0.1};
 const ServoPlant velocity_plant = RatePlant{0.0567, AngleUnit::rad, 0.1};
@@ -85,7 +85,7 @@ TEST(LoopAnalysis, RadiusIsTheGrowthOfTheSimulatedLoop) {
   for (const ServoPlant& plant : {angle_plant, velocity_plant}) {
     for (const int delay : {0, 1, 3}) {
       const double K = 40.0;
-      const AxisModel model = sampled(plant, period_s);
+      const AxisModel model = sampled(plant, loop_period_s);
       Eigen::Vector2d state(1.0, 0.0);
       std::vector<double> errors(static_cast<std::size_t>(delay), 0.0);
       double integral = 0.0, size_at_200 = 0.0, size_at_400 = 0.0;
@@ -93,7 +93,7 @@ TEST(LoopAnalysis, RadiusIsTheGrowthOfTheSimulatedLoop) {
         errors.push_back(-K * state[0]);
         const double error = errors[static_cast<std::size_t>(k)];
         state = model.A * state + model.B * (2.0 * error + 10.0 * integral);
-        integral += period_s * error;
+        integral += loop_period_s * error;
         // The size over 20 samples, so that an oscillation's phase does not matter.
         if (k >= 180 && k < 200) size_at_200 = std::max(size_at_200, std::abs(state[0]));
         if (k >= 380) size_at_400 = std::max(size_at_400, std::abs(state[0]));
@@ -106,7 +106,7 @@ TEST(LoopAnalysis, RadiusIsTheGrowthOfTheSimulatedLoop) {
 
 TEST(LqrGain, IsStableAndBest) {
   for (const ServoPlant& plant : {ServoPlant(AnglePlant{}), ServoPlant(RatePlant{})}) {
-    const AxisModel model = sampled(plant, period_s);
+    const AxisModel model = sampled(plant, loop_period_s);
     const Eigen::RowVector2d K = lqr_gain(model, 2.0);
     const auto cost = [&](const Eigen::RowVector2d& gain) {
       Eigen::Vector2d state(1.0, 0.0);

@@ -25,7 +25,7 @@ SpotScene scene_of(int num_photos, double bow_m = 0.0) {
   return *scene;
 }
 
-SpotPhotoConfig without_noise() {
+SpotPhotoConfig spots_without_noise() {
   SpotPhotoConfig config;
   config.render.noise = 0.0;
   return config;
@@ -33,7 +33,7 @@ SpotPhotoConfig without_noise() {
 
 /// So little ambient light that the spot does not saturate.
 SpotPhotoConfig dim_light() {
-  SpotPhotoConfig config = without_noise();
+  SpotPhotoConfig config = spots_without_noise();
   config.render.black = 10.0;
   config.render.white = 60.0;
   return config;
@@ -97,7 +97,7 @@ TEST(SpotScene, NoneWhereTheBeamLeavesThePicture) {
 
 TEST(SpotPhoto, WithTheLaserOffItIsTheGreyPhotoThreeTimes) {
   const SpotScene scene = scene_of(1);
-  SpotPhotoConfig config = without_noise();
+  SpotPhotoConfig config = spots_without_noise();
   config.is_on = false;
   const cv::Mat dark = render_spot_photo(scene, 0, config, 1);
   const cv::Mat grey = render_board_photo(scene.boards, 0, config.render, 1);
@@ -135,7 +135,7 @@ TEST(SpotPhoto, ASpotOnAnEdgeLeansToThePaper) {
   // Facing board, the beam along the axis onto the vertical edge between squares: with ink's albedo a against paper's 1
   // the centroid of a Gaussian cut in half lies √(2/π) σ (1 − a)/(1 + a) to the paper's side.
   const SpotScene scene = middle_scene(1.0, {2.0 * 0.05, 1.5 * 0.05, 0.0});
-  SpotPhotoConfig config = without_noise();
+  SpotPhotoConfig config = spots_without_noise();
   config.render.blur_px = 0.0;
   config.laser = {.peak = 45.0, .diameter_m = 0.03, .divergence_rad = 0.0};
   const AddedLight added = added_light(scene, 0, config);

@@ -56,7 +56,7 @@ std::vector<UnderwaterPoint> points_of(const UnderwaterScene& scene, Draws& draw
   return points;
 }
 
-bool is_in_picture(const Camera& camera, const Eigen::Vector2d& px) {
+bool is_between_pixels(const Camera& camera, const Eigen::Vector2d& px) {
   return px.x() >= 0.0 && px.y() >= 0.0 && px.x() <= camera.width_px - 1.0 && px.y() <= camera.height_px - 1.0;
 }
 
@@ -87,13 +87,13 @@ UnderwaterSequence simulate_underwater(const UnderwaterScene& scene, std::uint64
       const Eigen::Vector2d aside(draws.uniform(-1.0, 1.0), draws.uniform(-1.0, 1.0));
       const Eigen::Vector3d point_in_cam = frame.world_from_cam.inverse() * point.point_in_world;
       const auto px = project(scene.camera, point_in_cam);
-      if (is_black || !px || !is_in_picture(scene.camera, *px)) continue;
+      if (is_black || !px || !is_between_pixels(scene.camera, *px)) continue;
       // A prior of 30 % may draw a point behind the camera: no one believes that.
       if (point.told_depth_m == 0.0)
         point.told_depth_m = point_in_cam.z() * std::max(0.1, 1.0 + scene.sigma_depth * depth_error);
       const bool is_mismatch = k > 0 && is_wrong < scene.mismatches;
       const Eigen::Vector2d shown = is_mismatch ? Eigen::Vector2d(*px + scene.mismatch_px * aside) : *px + noise;
-      if (is_in_picture(scene.camera, shown)) frame.sights.push_back({point.id, shown, is_mismatch});
+      if (is_between_pixels(scene.camera, shown)) frame.sights.push_back({point.id, shown, is_mismatch});
     }
     sequence.frames.push_back(std::move(frame));
   }

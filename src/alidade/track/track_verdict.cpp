@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <set>
 #include <string>
@@ -11,12 +10,6 @@ namespace alidade {
 namespace {
 
 constexpr double least_used_share = 0.7, most_nis = 3.0, good_nis_low = 0.6, good_nis_high = 1.5;
-
-std::string text_of(double value, int digits = 2) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  return text;
-}
 
 double used_share(const TrackReport& report) {
   return report.steps.empty() ? 0.0 : static_cast<double>(report.num_used) / static_cast<double>(report.steps.size());
@@ -87,13 +80,14 @@ Fault why_no_start(std::span<const TargetSight> sights, std::span<const RigHead>
     if (ray_a && ray_b && !nearest_to_rays(*ray_a, *ray_b)) ++parallel;
   }
   if (together == 0)
-    return {"the heads never see the target within " + text_of(1e3 * config.tracker.together_s) + " ms of each other",
-            "take pictures more often, or set their clocks"};
+    return {
+        "the heads never see the target within " + text_of(1e3 * config.tracker.together_s, 2) + " ms of each other",
+        "take pictures more often, or set their clocks"};
   if (2 * parallel > together)
     return {"parallel rays: the heads look in the same direction, so that the range cannot be told",
             "set the heads further apart, or let the target come nearer"};
-  return {"the two heads' rays do not meet within " + text_of(config.tracker.min_depth_m) + " to " +
-              text_of(config.tracker.max_depth_m) + " m",
+  return {"the two heads' rays do not meet within " + text_of(config.tracker.min_depth_m, 2) + " to " +
+              text_of(config.tracker.max_depth_m, 2) + " m",
           "check the rig file, or widen the working range"};
 }
 
@@ -126,15 +120,17 @@ void add_checks(const TrackReport& report, Verdict& verdict) {
   const auto num_alone = static_cast<double>(count(report, TrackEvent::one_head));
   const double alone = num_alone / static_cast<double>(report.steps.size());
   verdict.checks.push_back(check("both heads", alone > 0.02 ? State::care : State::good,
-                                 alone > 0.0 ? text_of(100.0 * alone) + " % seen by one head only: range drifts there"
-                                             : "both heads see the target",
+                                 alone > 0.0
+                                     ? text_of(100.0 * alone, 2) + " % seen by one head only: range drifts there"
+                                     : "both heads see the target",
                                  alone, 0.02, "1"));
   const double left_out = 1.0 - used_share(report);
   verdict.checks.push_back(check("left out", left_out > 0.05 ? State::care : State::good,
-                                 text_of(100.0 * left_out) + " % of the sights left out", left_out, 0.05, "1"));
+                                 text_of(100.0 * left_out, 2) + " % of the sights left out", left_out, 0.05, "1"));
   const auto late = static_cast<double>(count(report, TrackEvent::late));
   if (late > 0.0)
-    verdict.checks.push_back(check("late", State::care, text_of(late) + " sights came too late", late, 0.0, "sights"));
+    verdict.checks.push_back(
+        check("late", State::care, text_of(late, 2) + " sights came too late", late, 0.0, "sights"));
 }
 
 }  // namespace
@@ -149,7 +145,7 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetSight> si
     if (auto mistake = likely_mistake(sights, heads, config)) return refused(std::move(*mistake));
     if (report.num_starts == 0) return refused(why_no_start(sights, heads, config));
     if (used_share(report) < least_used_share)
-      return refused({"only " + text_of(100.0 * used_share(report)) + " % of the sights fit one track and this rig",
+      return refused({"only " + text_of(100.0 * used_share(report), 2) + " % of the sights fit one track and this rig",
                       "check the rig file, the heads' clocks and the noise"});
   }
   Verdict verdict;

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <vector>
+
+namespace alidade {
+
+/// What a JSON file holds of a vector, and of a quaternion: w, x, y, z.
+[[nodiscard]] inline std::vector<double> list_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+[[nodiscard]] inline std::vector<double> list_of(const Eigen::Quaterniond& q) { return {q.w(), q.x(), q.y(), q.z()}; }
+
+}  // namespace alidade

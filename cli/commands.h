@@ -25,6 +25,7 @@ void add_simulate(Frame& frame);
 void add_track(Frame& frame);
 void add_track_scenario(Frame& frame);       ///< Of `simulate`.
 void add_underwater_scenario(Frame& frame);  ///< Of `simulate`.
+void add_view(Frame& frame);
 
 // How to write a command: cli/NAME.cpp with one function `add_NAME(Frame&)`, declared here and called in main.cpp.
 //

@@ -4,15 +4,21 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <opencv2/core.hpp>
 
 #include "alidade/io/camera_file.h"
 #include "alidade/io/image_sequence.h"
 #include "alidade/io/localize_document.h"
 #include "alidade/io/localize_file.h"
+#include "alidade/io/photos.h"
+#include "alidade/live/foxglove.h"
+#include "alidade/live/rate_limit.h"
+#include "alidade/live/streams.h"
 #include "alidade/localize/distortion.h"
 #include "alidade/localize/localize_images.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
+#include "cli/live.h"
 #include "cli/option_checks.h"
 
 namespace alidade::cli {
@@ -24,6 +30,7 @@ struct Args {
   double rate_hz = 0.0, depth_m = 0.0, sigma_depth = 0.5;
   bool calibrate_online = false, skip_bad = false;
   LocalizationFilterConfig filter;
+  LiveOptions live;
 };
 
 /// Of the lens's parameters that may be in the state: what is believed of them at the start. A stale calibration.
@@ -56,6 +63,8 @@ Camera camera_of(const Args& args) {
   return *camera;
 }
 
+double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
 LocalizeConfig config_of(const Args& args) {
   LocalizeConfig config;
   config.filter = args.filter;
@@ -74,9 +83,7 @@ LocalizeConfig config_of(const Args& args) {
       config.sigma_depth = start.sigma_depth;
     }
   }
-  config.seconds = [] {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-  };
+  config.seconds = now_s;
   return config;
 }
 
@@ -109,23 +116,67 @@ void summarize(const LocalizeReport& report, std::span<const std::string> lens_p
 }
 
 LocalizeReport localize_table(const Args& args, const Camera& camera, const LocalizeConfig& config,
-                              std::span<const TimedPose> truth, Run& run) {
+                              std::span<const TimedPose> truth, LiveRun& live, Run& run) {
   const SightsFile sights =
       read_sights(args.sequence, {args.skip_bad, args.rate_hz, camera.width_px, camera.height_px});
   run.lap("read");
   run.document.counts.given = sights.skipped.size();
   run.document.counts.skipped = sights.skipped;
-  return localize_sights(camera, sights.frames, config, truth, run.progress);
+  return localize_sights(camera, sights.frames, config, truth, live.progress());
+}
+
+/// A picture with what was looked for in it, as wide as a page needs.
+void show_picture(live::Server& server, double t_s, const cv::Mat& picture, std::span<const SightTried> tried) {
+  constexpr int most_width_px = 640;
+  const double scale = std::min(1.0, static_cast<double>(most_width_px) / picture.cols);
+  const auto t_ns = static_cast<std::int64_t>(t_s * 1e9);
+  server.send("/head1/image", t_ns, [t_ns, copy = picture.clone()] {
+    return live::compressed_image_text(t_ns, "head1", jpeg_preview(copy, most_width_px, 70));
+  });
+  live::Marks marks(t_ns);
+  for (const SightTried& sight : tried) {
+    marks.ellipse(scale * sight.expected_px, scale * scale * sight.S, live::sky);
+    if (sight.found_px) marks.dot(scale * *sight.found_px, 4.0, sight.is_used ? live::orange : live::vermilion);
+  }
+  server.send("/head1/marks", t_ns, [text = marks.text()] { return text; });
 }
 
 LocalizeReport localize_pictures(const Args& args, const Camera& camera, const LocalizeConfig& localize,
-                                 std::span<const TimedPose> truth, Run& run) {
+                                 std::span<const TimedPose> truth, LiveRun& live) {
   LocalizeImagesConfig config;
   config.localize = localize;
   if (!args.target.empty()) config.target = read_image_target(args.target);
   ImageSequence pictures(args.sequence, args.rate_hz, camera.width_px, camera.height_px);
-  const NextPicture next = [&](cv::Mat& grey, long& frame, double& t_s) { return pictures.next(grey, frame, t_s); };
-  return localize_images(camera, next, pictures.num_pictures(), config, truth, run.progress);
+  double picture_s = 0.0;
+  const NextPicture next = [&](cv::Mat& grey, long& frame, double& t_s) {
+    const bool is_there = pictures.next(grey, frame, t_s);
+    picture_s = t_s;
+    return is_there;
+  };
+  live::RateLimit limit(10.0);
+  if (live.server() != nullptr)
+    config.watch = [&](long, const cv::Mat& picture, std::span<const SightTried> tried) {
+      if (limit.lets_through(now_s())) show_picture(*live.server(), picture_s, picture, tried);
+    };
+  return localize_images(camera, next, pictures.num_pictures(), config, truth, live.progress());
+}
+
+LocalizeReport localized(const Args& args, const Camera& camera, LocalizeConfig config,
+                         std::span<const TimedPose> truth, const live::LocalizeStream& stream, LiveRun& live,
+                         Run& run) {
+  if (live.is_on()) {
+    live.open(stream.topics(), "/localize");
+    stream.begin(*live.server());
+    config.watch = [&](const PathStep& step) {
+      live.keep_pace(step.t_s);
+      stream.show(*live.server(), step);
+    };
+  }
+  LocalizeReport report = ImageSequence::is_pictures(args.sequence)
+                              ? localize_pictures(args, camera, config, truth, live)
+                              : localize_table(args, camera, config, truth, live, run);
+  if (live.server() != nullptr && !report.path.empty()) stream.show(*live.server(), report.path.back(), true);
+  return report;
 }
 
 ExitCode localize(const Args& args, Run& run) {
@@ -136,9 +187,9 @@ ExitCode localize(const Args& args, Run& run) {
   if (args.calibrate_online) lens_params = put_lens_in_state(camera, config.filter);
   std::vector<TimedPose> truth;
   if (!args.truth.empty()) truth = read_tum(args.truth);
-  const bool is_pictures = ImageSequence::is_pictures(args.sequence);
-  const LocalizeReport report = is_pictures ? localize_pictures(args, camera, config, truth, run)
-                                            : localize_table(args, camera, config, truth, run);
+  const live::LocalizeStream stream(camera, truth);
+  LiveRun live(args.live, run);
+  const LocalizeReport report = localized(args, camera, config, truth, stream, live, run);
   run.lap("localize");
   const Verdict verdict = localize_verdict(report);
   fill_localization(report, truth, lens_params, run.document);
@@ -153,7 +204,7 @@ ExitCode localize(const Args& args, Run& run) {
     run.add_file("map.ply", map_ply(report.map));
     if (args.calibrate_online) run.add_file("camera.yaml", camera_text(report.camera, CameraFormat::alidade));
   }
-  return run.finish(verdict);
+  return live.finish(verdict);
 }
 
 void add_options(CLI::App& command, Args& args) {
@@ -198,6 +249,7 @@ void add_options(CLI::App& command, Args& args) {
   number("--sigma-alpha", args.filter.sigma_alpha_rad_s2, "Angular acceleration [rad/s2]; by hand about 6")
       ->capture_default_str();
   command.add_flag("--skip-bad", args.skip_bad, "Leave out rows that are wrong, by name, instead of stopping");
+  add_live_options(command, args.live);
 }
 
 }  // namespace

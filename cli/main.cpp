@@ -17,6 +17,7 @@ void add_commands(alidade::cli::Frame& frame) {
   alidade::cli::add_servo(frame);
   alidade::cli::add_simulate(frame);
   alidade::cli::add_track(frame);
+  alidade::cli::add_view(frame);
 }
 
 }  // namespace

@@ -10,10 +10,13 @@
 #include "alidade/io/pairs_file.h"
 #include "alidade/io/rotation_log_file.h"
 #include "alidade/io/video_log.h"
+#include "alidade/live/streams.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
+#include "cli/live.h"
 #include "cli/option_checks.h"
 #include "cli/picture_size.h"
+#include "cli/standard_input.h"
 
 namespace alidade::cli {
 namespace {
@@ -25,6 +28,7 @@ struct Args {
   std::vector<double> start, lever;
   bool skip_bad = false;
   ObserveConfig config;
+  LiveOptions live;
 };
 
 void set_words(const Args& args, ObserveConfig& config) {
@@ -105,10 +109,47 @@ RotationLog read_log(const Args& args, ObserveConfig& config, Run& run) {
   return std::move(read.log);
 }
 
+/// Rows for who watches, the last of them in any case.
+class RowView {
+ public:
+  RowView(const ObserveConfig& config, LiveRun& live) : stream_(config.width_px, config.height_px), live_(live) {
+    live.open(stream_.topics(), "/observe");
+  }
+  void show(const RotationLog& log, const IntrinsicsEstimate& estimate, const RotationFrame& frame) {
+    if (live_.server() == nullptr) return;
+    t_s_ = log.rows.back().t_s;
+    truth_ = log.truth.empty() ? std::nullopt : std::optional(log.truth.back());
+    estimate_ = estimate;
+    frame_ = frame;
+    frame_.px = {};  // the row's, which goes
+    has_row_ = true;
+    send(false);
+  }
+  void show_last() const {
+    if (has_row_) send(true);
+  }
+
+ private:
+  void send(bool is_last) const {
+    stream_.show(*live_.server(), t_s_, estimate_, frame_, truth_ ? &*truth_ : nullptr, is_last);
+  }
+
+  live::ObserveStream stream_;
+  LiveRun& live_;
+  bool has_row_ = false;
+  double t_s_ = 0.0;
+  IntrinsicsEstimate estimate_;
+  RotationFrame frame_;
+  std::optional<TrueIntrinsics> truth_;
+};
+
 /// Rows from standard input as they come, each answered at once with a row of intrinsics.csv; the log, at its end.
-RotationLog follow_input(const Args& args, const ObserveConfig& config, const std::optional<Camera>& camera, Run& run) {
+RotationLog follow_input(const Args& args, const ObserveConfig& config, const std::optional<Camera>& camera,
+                         LiveRun& live, Run& run) {
   if (config.width_px <= 0) throw UsageError("observe -: say --size WxH or --camera FILE, the first rows do not tell");
-  RotationLogStream stream(std::cin, "-", {.skip_bad = args.skip_bad});
+  RowView view(config, live);
+  StandardInput input;  // Ctrl-C ends waiting for a row
+  RotationLogStream stream(input, "-", {.skip_bad = args.skip_bad});
   RotationLog log = stream.layout();
   ObserveConfig sized = config;
   const PixelScale scale = pixel_scale(log, sized.width_px, sized.height_px);
@@ -124,10 +165,14 @@ RotationLog follow_input(const Args& args, const ObserveConfig& config, const st
     one.rows.push_back(log.rows.back());
     if (camera) one = undistorted(one, *camera);
     const double t_s = one.rows.front().t_s;
-    const IntrinsicsEstimate estimate = observer.step(reader.next(one.rows.front()));
+    const RotationFrame frame = reader.next(one.rows.front());
+    const IntrinsicsEstimate estimate = observer.step(frame);
+    view.show(log, estimate, frame);
     const std::string table = intrinsics_csv({&t_s, 1}, {&estimate, 1});
     if (shows) std::cout << table.substr(table.find('\n') + 1) << std::flush;
   }
+  view.show_last();
+  report_progress(run.progress, "rows", log.rows.size(), 0);  // the input may have ended by Ctrl-C
   run.document.counts.given = stream.skipped().size();
   run.document.counts.skipped = stream.skipped();
   return log;
@@ -167,7 +212,9 @@ ExitCode observe_log(const Args& args, Run& run) {
     camera = read_central_camera(args.camera);
   }
   ObserveConfig config = config_from(args, camera);
-  RotationLog log = args.log == "-" ? follow_input(args, config, camera, run) : read_log(args, config, run);
+  LiveRun live(args.live, run);
+  if (live.is_on() && args.log != "-") throw UsageError("--live: only for rows from standard input, observe -");
+  RotationLog log = args.log == "-" ? follow_input(args, config, camera, live, run) : read_log(args, config, run);
   if (log.source == RotationSource::none && config.rotation != RotationKnowledge::free) {
     if (args.pairs.empty()) {
       throw InputError(args.log + ": no rotation: omega_x,omega_y or pan,tilt or qw,qx,qy,qz, or say --rotation free");
@@ -189,7 +236,7 @@ ExitCode observe_log(const Args& args, Run& run) {
   std::vector<double> times;
   for (const RotationRow& row : log.rows) times.push_back(row.t_s);
   run.add_file("intrinsics.csv", intrinsics_csv(times, report.steps));
-  return run.finish(verdict);
+  return live.finish(verdict);
 }
 
 void add_options(CLI::App& command, Args& args) {
@@ -239,6 +286,7 @@ void add_options(CLI::App& command, Args& args) {
   sigma("--sigma-range-m", args.config.sigma_range_m, "Of range_m");
   sigma("--window-s", args.config.window_s, "Length of --method window");
   command.add_flag("--skip-bad", args.skip_bad, "Leave out rows that are wrong, by name, instead of stopping");
+  add_live_options(command, args.live, false);
 }
 
 }  // namespace

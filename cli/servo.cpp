@@ -5,8 +5,10 @@
 
 #include "alidade/io/servo_document.h"
 #include "alidade/io/servo_scenario_file.h"
+#include "alidade/live/streams.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
+#include "cli/live.h"
 #include "cli/option_checks.h"
 
 namespace alidade::cli {
@@ -18,6 +20,7 @@ struct Args {
   int seeds = 0;
   double latency_ms = -1.0, gain_factor = 0.0, tau_factor = 0.0;
   bool no_robustness = false;
+  LiveOptions live;
 };
 
 /// What stands on the command line beats the file.
@@ -49,6 +52,20 @@ void summarize(const ServoStudy& study, Run& run) {
   }
 }
 
+ServoStudy studied(const ServoScenario& scenario, live::ServoStream& stream, LiveRun& live, Run& run) {
+  if (!live.is_on()) return study_servo(scenario, run.options.seed, run.progress);
+  live.open(stream.topics(), "/servo");
+  stream.begin(*live.server());
+  ServoStudy study =
+      study_servo(scenario, run.options.seed, live.progress(), [&](ControllerKind controller, const ServoRow& row) {
+        live.keep_pace(row.t_s);
+        stream.show(*live.server(), controller, row);
+      });
+  if (!study.comparison.empty())
+    stream.show(*live.server(), study.comparison.back().controller, study.comparison.back().shown.rows.back(), true);
+  return study;
+}
+
 ExitCode servo(const Args& args, Run& run) {
   run.add_input("scenario", args.scenario);
   const ServoScenarioFile read = read_servo_scenario(args.scenario);
@@ -56,13 +73,15 @@ ExitCode servo(const Args& args, Run& run) {
   if (!read.track.empty()) run.add_input("track", read.track);
   const ServoScenario scenario = with_options(read.scenario, args);
   run.lap("read");
-  const ServoStudy study = study_servo(scenario, run.options.seed, run.progress);
+  live::ServoStream stream(scenario.scene);
+  LiveRun live(args.live, run);
+  const ServoStudy study = studied(scenario, stream, live, run);
   run.lap("run");
   const Verdict verdict = servo_verdict(scenario, study);
   fill_servo(scenario, study, run.document);
   summarize(study, run);
   if (verdict.exit_code == ExitCode::ok) run.add_file("servo.csv", servo_csv(scenario, study));
-  return run.finish(verdict);
+  return live.finish(verdict);
 }
 
 }  // namespace
@@ -92,6 +111,7 @@ void add_servo(Frame& frame) {
   command.add_option("--true-tau", args->tau_factor, "The same of its time constant")
       ->check(finite_number() & CLI::Range(0.01, 100.0));
   command.add_flag("--no-robustness", args->no_robustness, "Leave out the grid over gain and time constant");
+  add_live_options(command, args->live);
 }
 
 }  // namespace alidade::cli

@@ -63,7 +63,13 @@ struct Terminal::State {
   }
 };
 
+std::weak_ptr<Terminal::State>& Terminal::current() {
+  static std::weak_ptr<State> state;
+  return state;
+}
+
 Terminal::Terminal() : state_(std::make_shared<State>()) {
+  current() = state_;
   if (is_sanitized()) return;
   const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
   if (nowhere < 0) return;
@@ -92,6 +98,12 @@ Progress Terminal::progress(bool shown) {
 }
 
 void Terminal::wipe_progress() { state_->wipe(); }
+
+void tell_person(std::string_view line) {
+  const std::shared_ptr<Terminal::State> state = Terminal::current().lock();
+  if (state) state->wipe();
+  write_text(state ? state->people : STDERR_FILENO, one_line(line) + "\n");
+}
 
 void catch_interrupts() {
   struct sigaction action {};

@@ -22,10 +22,16 @@ class Terminal {
   [[nodiscard]] Progress progress(bool shown);
   void wipe_progress();
 
- private:
   struct State;
+  /// That of the newest one.
+  [[nodiscard]] static std::weak_ptr<State>& current();
+
+ private:
   std::shared_ptr<State> state_;  // the Progress handed out shares it, so that it may outlive this
 };
+
+/// A line for the person, on stderr, after wiping the progress line: what they need while the command runs.
+void tell_person(std::string_view line);
 
 /// From now on the first SIGINT or SIGTERM asks the work to stop, and the second ends the process at once.
 void catch_interrupts();

@@ -8,9 +8,11 @@
 #include "alidade/io/rig_file.h"
 #include "alidade/io/track_document.h"
 #include "alidade/io/video_sights.h"
+#include "alidade/live/streams.h"
 #include "alidade/track/track.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
+#include "cli/live.h"
 #include "cli/option_checks.h"
 #include "cli/target_look.h"
 
@@ -26,6 +28,7 @@ struct Args {
   bool corrected = false, skip_bad = false;
   double sigma_a = 0.0;
   TrackConfig config;
+  LiveOptions live;
 };
 
 TrackMethod method_of(const std::string& name) {
@@ -48,13 +51,14 @@ TrackConfig config_of(const Args& args) {
 
 /// The paper's filter on the same events.
 std::pair<TrackReport, Verdict> track_as_paper(const Args& args, std::span<const TargetSight> sights,
-                                               std::span<const RigHead> heads, const TrueTrack& truth) {
+                                               std::span<const RigHead> heads, const TrueTrack& truth,
+                                               const TrackWatch& watch) {
   XiahouConfig config;
   if (heads.size() != 2) throw UsageError("--method xiahou2015: needs a rig of two heads");
   config.baseline_cm =
       100.0 * (heads[1].head.world_from_base.translation - heads[0].head.world_from_base.translation).norm();
   config.use_pixels = args.corrected;
-  TrackReport report = track_target_xiahou(sights, heads, config, truth);
+  TrackReport report = track_target_xiahou(sights, heads, config, truth, watch);
   Verdict verdict;
   if (report.num_starts == 0) {
     verdict = {State::refused,
@@ -92,7 +96,7 @@ void summarize(const TrackReport& report, Run& run) {
 
 /// The target found in the frames of the heads' videos. The result tells its sights, events.csv, so that they can be
 /// looked at and used again.
-EventsFile watch_videos(const Args& args, const Rig& rig, Run& run) {
+EventsFile watch_videos(const Args& args, const Rig& rig, const Progress& progress, Run& run) {
   if (args.videos.size() != rig.heads.size())
     throw UsageError(
         fmt::format("--video: the rig has {} heads, but {} videos are given", rig.heads.size(), args.videos.size()));
@@ -104,8 +108,8 @@ EventsFile watch_videos(const Args& args, const Rig& rig, Run& run) {
     videos.emplace_back(video, target.look.kind == TargetKind::colour ? FrameColour::bgr : FrameColour::grey);
     if (std::filesystem::is_regular_file(video)) run.add_input("video", video);
   }
-  const std::vector<TargetFrame> frames = target_frames(videos, angles, rig.heads, target.look, target.pattern.get(),
-                                                        {.rate_hz = args.rate_hz}, run.progress);
+  const std::vector<TargetFrame> frames =
+      target_frames(videos, angles, rig.heads, target.look, target.pattern.get(), {.rate_hz = args.rate_hz}, progress);
   run.lap("look");
   EventsFile events{sights_of(frames), {}};
   fill_target_frames(frames, rig.heads, run.document);
@@ -114,8 +118,8 @@ EventsFile watch_videos(const Args& args, const Rig& rig, Run& run) {
   return events;
 }
 
-EventsFile sights_given(const Args& args, const Rig& rig, Run& run) {
-  if (!args.videos.empty()) return watch_videos(args, rig, run);
+EventsFile sights_given(const Args& args, const Rig& rig, const Progress& progress, Run& run) {
+  if (!args.videos.empty()) return watch_videos(args, rig, progress, run);
   run.add_input("events", args.events);
   return read_events(args.events, rig.heads, {.skip_bad = args.skip_bad});
 }
@@ -137,29 +141,50 @@ Verdict never_seen() {
           {}};
 }
 
+/// Follows the sights, and shows them as it does.
+std::pair<TrackReport, Verdict> follow(const Args& args, std::span<const TargetSight> sights,
+                                       std::span<const RigHead> heads, const TrackConfig& config,
+                                       const TrueTrack& truth, const live::TrackStream& stream, LiveRun& live,
+                                       Run& run) {
+  TrackWatch watch;
+  if (live.server() != nullptr)
+    watch = [&](const TargetSight& sight, const TrackStep& step) {
+      live.keep_pace(sight.t_arrival_s);
+      stream.show(*live.server(), sight, step);
+    };
+  std::pair<TrackReport, Verdict> result;
+  if (args.method == "xiahou2015") {
+    result = track_as_paper(args, sights, heads, truth, watch);
+  } else {
+    result.first = track_target(sights, heads, config, truth, watch);
+    run.lap("track");
+    result.second = track_verdict(result.first, sights, heads, config);
+  }
+  if (watch) stream.show(*live.server(), sights.back(), result.first.steps.back(), true);
+  return result;
+}
+
+TrueTrack truth_given(const Args& args, Run& run) {
+  if (args.truth.empty()) return {};
+  run.add_input("truth", args.truth);
+  return read_true_track(args.truth);
+}
+
 ExitCode track(const Args& args, Run& run) {
   check_inputs(args);
   const TrackConfig config = config_of(args);
   if (args.corrected && args.method != "xiahou2015") throw UsageError("--corrected: only with --method xiahou2015");
   run.add_input("rig", args.rig);
   const Rig rig = read_rig(args.rig);
-  const EventsFile events = sights_given(args, rig, run);
-  if (events.sights.empty()) return run.finish(never_seen());
-  TrueTrack truth;
-  if (!args.truth.empty()) {
-    run.add_input("truth", args.truth);
-    truth = read_true_track(args.truth);
-  }
+  const TrueTrack truth = truth_given(args, run);
+  LiveRun live(args.live, run);
+  const live::TrackStream stream(rig.heads, truth);
+  if (live.is_on()) live.open(stream.topics(), "/track");
+  if (live.server() != nullptr) stream.begin(*live.server());
+  const EventsFile events = sights_given(args, rig, live.progress(), run);
+  if (events.sights.empty()) return live.finish(never_seen());
   run.lap("read");
-  TrackReport report;
-  Verdict verdict;
-  if (args.method == "xiahou2015") {
-    std::tie(report, verdict) = track_as_paper(args, events.sights, rig.heads, truth);
-  } else {
-    report = track_target(events.sights, rig.heads, config, truth);
-    run.lap("track");
-    verdict = track_verdict(report, events.sights, rig.heads, config);
-  }
+  const auto [report, verdict] = follow(args, events.sights, rig.heads, config, truth, stream, live, run);
   run.lap("verdict");
   run.document.counts.given = events.skipped.size();
   run.document.counts.skipped = events.skipped;
@@ -168,7 +193,7 @@ ExitCode track(const Args& args, Run& run) {
   if (verdict.exit_code == ExitCode::ok) run.add_file("track.csv", track_csv(report.steps, report.ahead));
   if (verdict.exit_code == ExitCode::ok && !report.smoothed.empty())
     run.add_file("smoothed.csv", smoothed_csv(report.smoothed));
-  return run.finish(verdict);
+  return live.finish(verdict);
 }
 
 void add_options(CLI::App& command, Args& args) {
@@ -209,6 +234,7 @@ void add_options(CLI::App& command, Args& args) {
   number("--min-depth", args.config.tracker.min_depth_m, "Working range, nearest [m]");
   number("--max-depth", args.config.tracker.max_depth_m, "Working range, furthest [m]");
   command.add_flag("--skip-bad", args.skip_bad, "Leave out rows that are wrong, by name, instead of stopping");
+  add_live_options(command, args.live);
 }
 
 }  // namespace

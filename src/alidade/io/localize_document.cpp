@@ -105,6 +105,12 @@ DataTable features_table(const LocalizeReport& report) {
 
 }  // namespace
 
+DataTable localize_row(const PathStep& step, std::span<const TimedPose> truth) {
+  LocalizeReport report;
+  report.path = {step};
+  return path_table(report, truth);
+}
+
 void fill_localization(const LocalizeReport& report, std::span<const TimedPose> truth,
                        std::span<const std::string> lens_params, ResultDocument& document) {
   document.counts.given += report.path.size();

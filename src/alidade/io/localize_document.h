@@ -12,4 +12,7 @@ namespace alidade {
 void fill_localization(const LocalizeReport& report, std::span<const TimedPose> truth,
                        std::span<const std::string> lens_params, ResultDocument& document);
 
+/// One row of `path`.
+[[nodiscard]] DataTable localize_row(const PathStep& step, std::span<const TimedPose> truth);
+
 }  // namespace alidade

@@ -1,6 +1,7 @@
 #include "alidade/io/observe_document.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -23,51 +24,66 @@ std::vector<bool> kept_rows(const ObserveReport& report) {
 }
 
 /// Values over time, the event, and where the camera looked.
+class StepColumns {
+ public:
+  void add(double t_s, const IntrinsicsEstimate& step, const RotationFrame& frame, const TrueIntrinsics* truth);
+  [[nodiscard]] DataTable table() const;
+
+ private:
+  Numbers t_, nis_, nis_dof_, weak_, event_point_;
+  std::array<Numbers, 4> value_, sigma_, truth_, attitude_;
+  std::array<Numbers, 3> rate_;
+  std::vector<std::string> events_;
+};
+
+void StepColumns::add(double t_s, const IntrinsicsEstimate& step, const RotationFrame& frame,
+                      const TrueIntrinsics* truth) {
+  t_.push_back(t_s);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    value_[i].push_back(step.has_value ? step.values()[at] : not_seen);
+    sigma_[i].push_back(step.has_value ? step.sigma[at] : not_seen);
+    if (truth != nullptr) truth_[i].push_back((*truth)[i]);
+    attitude_[i].push_back(frame.cam_from_start.conjugate().coeffs()[at]);
+  }
+  for (std::size_t i = 0; i < 3; ++i) rate_[i].push_back(frame.rate_rad_per_s[static_cast<Eigen::Index>(i)]);
+  nis_.push_back(step.nis_dof > 0 ? step.nis : not_seen);
+  nis_dof_.push_back(step.nis_dof);
+  weak_.push_back(step.has_value ? 1.0 / step.sigma.cwiseAbs2().maxCoeff() : not_seen);
+  events_.emplace_back(event_name(step.event));
+  event_point_.push_back(step.point >= 0 ? step.point : not_seen);
+}
+
+DataTable StepColumns::table() const {
+  constexpr std::array<const char*, 4> names{"fx", "fy", "cx", "cy"}, quaternion{"qx", "qy", "qz", "qw"};
+  constexpr std::array<const char*, 3> axes{"x", "y", "z"};
+  DataTable table{"steps", {{"t_s", t_}}};
+  const auto add = [&](const std::string& name, const Numbers& values, int decimals) {
+    table.columns.emplace_back(name, rounded(values, decimals));
+  };
+  for (std::size_t i = 0; i < 4; ++i) add(std::string(names[i]) + "_px", value_[i], 5);
+  for (std::size_t i = 0; i < 4; ++i) add(std::string("sigma_") + names[i] + "_px", sigma_[i], 6);
+  for (std::size_t i = 0; i < 4 && !truth_[0].empty(); ++i)
+    table.columns.emplace_back(std::string("truth_") + names[i] + "_px", truth_[i]);
+  add("nis", nis_, 4);
+  table.columns.emplace_back("nis_dof", nis_dof_);
+  table.columns.emplace_back("event", events_);
+  table.columns.emplace_back("event_point", event_point_);
+  table.columns.emplace_back("weak_eigenvalue", weak_);
+  for (std::size_t i = 0; i < 3; ++i) add(std::string("omega_") + axes[i] + "_rad_per_s", rate_[i], 8);
+  for (std::size_t i = 0; i < 4; ++i) add(std::string("start_from_cam_") + quaternion[i], attitude_[i], 8);
+  return table;
+}
+
 DataTable steps_table(const RotationLog& log, const ObserveReport& report) {
-  const std::vector<std::string> names{"fx", "fy", "cx", "cy"};
-  Numbers t, nis, nis_dof, weak, event_point;
-  std::vector<Numbers> value(4), sigma(4), truth(4), attitude(4), rate(3);
-  std::vector<std::string> events;
   MotionReader reader(log.source, 0.25);
   const std::vector<bool> is_kept = kept_rows(report);
+  StepColumns columns;
   for (std::size_t k = 0; k < log.rows.size(); ++k) {
-    const IntrinsicsEstimate& step = report.steps[k];
     const RotationFrame frame = reader.next(log.rows[k]);
-    if (!is_kept[k]) continue;
-    t.push_back(log.rows[k].t_s);
-    for (std::size_t i = 0; i < 4; ++i) {
-      const auto at = static_cast<Eigen::Index>(i);
-      value[i].push_back(step.has_value ? step.values()[at] : not_seen);
-      sigma[i].push_back(step.has_value ? step.sigma[at] : not_seen);
-      if (!log.truth.empty()) truth[i].push_back(log.truth[k][i]);
-      attitude[i].push_back(frame.cam_from_start.conjugate().coeffs()[at]);
-    }
-    for (std::size_t i = 0; i < 3; ++i) rate[i].push_back(frame.rate_rad_per_s[static_cast<Eigen::Index>(i)]);
-    nis.push_back(step.nis_dof > 0 ? step.nis : not_seen);
-    nis_dof.push_back(step.nis_dof);
-    weak.push_back(step.has_value ? 1.0 / step.sigma.cwiseAbs2().maxCoeff() : not_seen);
-    events.emplace_back(event_name(step.event));
-    event_point.push_back(step.point >= 0 ? step.point : not_seen);
+    if (is_kept[k]) columns.add(log.rows[k].t_s, report.steps[k], frame, log.truth.empty() ? nullptr : &log.truth[k]);
   }
-  DataTable table{"steps", {{"t_s", t}}};
-  for (std::size_t i = 0; i < 4; ++i) table.columns.emplace_back(names[i] + "_px", rounded(value[i], 5));
-  for (std::size_t i = 0; i < 4; ++i) table.columns.emplace_back("sigma_" + names[i] + "_px", rounded(sigma[i], 6));
-  for (std::size_t i = 0; i < 4 && !log.truth.empty(); ++i) {
-    table.columns.emplace_back("truth_" + names[i] + "_px", truth[i]);
-  }
-  table.columns.emplace_back("nis", rounded(nis, 4));
-  table.columns.emplace_back("nis_dof", nis_dof);
-  table.columns.emplace_back("event", events);
-  table.columns.emplace_back("event_point", event_point);
-  table.columns.emplace_back("weak_eigenvalue", weak);
-  const std::vector<std::string> axes{"x", "y", "z"}, quaternion{"qx", "qy", "qz", "qw"};
-  for (std::size_t i = 0; i < 3; ++i) {
-    table.columns.emplace_back("omega_" + axes[i] + "_rad_per_s", rounded(rate[i], 8));
-  }
-  for (std::size_t i = 0; i < 4; ++i) {
-    table.columns.emplace_back("start_from_cam_" + quaternion[i], rounded(attitude[i], 8));
-  }
-  return table;
+  return columns.table();
 }
 
 /// Every so many of so many: a step that meets every point in turn.
@@ -136,6 +152,13 @@ void fill_values(const ObserveReport& report, const Camera& camera, ResultDocume
 }
 
 }  // namespace
+
+DataTable observe_row(double t_s, const IntrinsicsEstimate& estimate, const RotationFrame& frame,
+                      const TrueIntrinsics* truth) {
+  StepColumns columns;
+  columns.add(t_s, estimate, frame, truth);
+  return columns.table();
+}
 
 void fill_observation(const RotationLog& log, const ObserveReport& report, const Camera& camera,
                       ResultDocument& document) {

@@ -9,4 +9,8 @@ namespace alidade {
 void fill_observation(const RotationLog& log, const ObserveReport& report, const Camera& camera,
                       ResultDocument& document);
 
+/// One row of `steps`. `truth`: null where it is not known.
+[[nodiscard]] DataTable observe_row(double t_s, const IntrinsicsEstimate& estimate, const RotationFrame& frame,
+                                    const TrueIntrinsics* truth);
+
 }  // namespace alidade

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "alidade/report/thin.h"
 
@@ -54,8 +55,7 @@ JsonValue figures_value(const ServoFigures& figures) {
   return value;
 }
 
-DataTable control_table(const ServoScenario& scenario, const ServoComparison& shown) {
-  const std::vector<ServoRow>& rows = shown.shown.rows;
+DataTable control_table(std::span<const RigHead> rig, std::span<const ServoRow> rows) {
   std::vector<bool> has_event;
   for (const ServoRow& row : rows)
     has_event.push_back(row.event != ServoEvent::none && row.event != ServoEvent::searching);
@@ -66,7 +66,7 @@ DataTable control_table(const ServoScenario& scenario, const ServoComparison& sh
   for (const std::size_t at : report::thinned_rows(rows.size(), {}, has_event, report::most_step_rows)) {
     const ServoRow& row = rows[at];
     t.push_back(row.t_s);
-    heads.push_back(scenario.scene.heads[row.head].head.id);
+    heads.push_back(rig[row.head].head.id);
     events.emplace_back(servo_event_name(row.event));
     const auto own = cells_of(row);
     for (std::size_t k = 0; k < num_columns; ++k) cells[k].push_back(own[k]);
@@ -159,9 +159,12 @@ void fill_servo(const ServoScenario& scenario, const ServoStudy& study, ResultDo
   estimate["specification_px"] = scenario.specification_px;
   document.data.push_back(trials_table(study));
   for (const ServoComparison& compared : study.comparison)
-    if (compared.controller == study.best) document.data.push_back(control_table(scenario, compared));
+    if (compared.controller == study.best)
+      document.data.push_back(control_table(scenario.scene.heads, compared.shown.rows));
   if (study.robustness) document.grids.push_back(robustness_grid(*study.robustness));
 }
+
+DataTable servo_row(std::span<const RigHead> heads, const ServoRow& row) { return control_table(heads, {&row, 1}); }
 
 std::string servo_csv(const ServoScenario& scenario, const ServoStudy& study) {
   std::string text = "controller,t_s,head";

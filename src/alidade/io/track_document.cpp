@@ -155,6 +155,18 @@ void fill_track(std::span<const TargetSight> sights, std::span<const RigHead> he
   document.data.push_back(measurements_table(sights, heads, report, rows));
 }
 
+DataTable track_row(const TargetSight& sight, std::span<const RigHead> heads, const TrackStep& step,
+                    const TrueTrack& truth) {
+  TrackReport report;
+  report.steps = {step};
+  report.nees = {position_nees(step, truth)};
+  constexpr std::array<std::size_t, 1> row{0};
+  DataTable table = steps_table(report, truth, row);
+  DataTable sights = measurements_table({&sight, 1}, heads, report, row);
+  for (auto& column : sights.columns) table.columns.push_back(std::move(column));
+  return table;
+}
+
 void fill_target_frames(std::span<const TargetFrame> frames, std::span<const RigHead> heads, ResultDocument& document) {
   std::vector<std::size_t> num_frames(heads.size()), num_seen(heads.size());
   Numbers t, head, number, u, v, sigma, score;

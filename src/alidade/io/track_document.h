@@ -13,6 +13,10 @@ namespace alidade {
 void fill_track(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackReport& report,
                 const TrueTrack& truth, ResultDocument& document);
 
+/// One sight and what became of it, by the names of both tables.
+[[nodiscard]] DataTable track_row(const TargetSight& sight, std::span<const RigHead> heads, const TrackStep& step,
+                                  const TrueTrack& truth);
+
 /// Adds what videos were searched for: `estimate.video`, a list of {head, frames, seen}, and the table `frames`.
 void fill_target_frames(std::span<const TargetFrame> frames, std::span<const RigHead> heads, ResultDocument& document);
 

@@ -250,6 +250,7 @@ LocalizeReport localize_sights(const Camera& camera, std::span<const SightFrame>
     const double begin_s = config.seconds ? config.seconds() : 0.0;
     report.path.push_back(localizer.take(frames[i]));
     if (config.seconds) report.path.back().seconds = config.seconds() - begin_s;
+    if (config.watch) config.watch(report.path.back());
   }
   report.num_restarts = localizer.num_restarts();
   sum_up(

@@ -36,20 +36,6 @@ enum class NewPoints {
   delayed,        ///< When two of its sights tell its depth to 5 %, as an inverse depth.
 };
 
-struct LocalizeConfig {
-  LocalizationFilterConfig filter;
-  FilterBankConfig bank;
-  std::optional<StartHypothesis> start;  ///< Else from the target, else the world is the first camera, scale unknown.
-  std::vector<KnownPoint> target;
-  std::vector<ToldDepth> depths;
-  double depth_m = 0.0;      ///< Of points that are not in `depths`; 0: the target's distance.
-  double sigma_depth = 0.5;  ///< Of those, over the depth.
-  NewPoints new_points = NewPoints::inverse_depth;
-  bool restarts = true;  ///< From the target where the innovations say that the path is wrong.
-  double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;  ///< At a start from the target or from nothing.
-  std::function<double()> seconds;                       ///< A clock, if frames are to be timed.
-};
-
 enum class FrameEvent {
   waiting,  ///< Not started yet: no pose.
   started,
@@ -71,6 +57,21 @@ struct PathStep {
   double seconds = 0.0;
 
   [[nodiscard]] bool has_pose() const { return event != FrameEvent::waiting; }
+};
+
+struct LocalizeConfig {
+  LocalizationFilterConfig filter;
+  FilterBankConfig bank;
+  std::optional<StartHypothesis> start;  ///< Else from the target, else the world is the first camera, scale unknown.
+  std::vector<KnownPoint> target;
+  std::vector<ToldDepth> depths;
+  double depth_m = 0.0;      ///< Of points that are not in `depths`; 0: the target's distance.
+  double sigma_depth = 0.5;  ///< Of those, over the depth.
+  NewPoints new_points = NewPoints::inverse_depth;
+  bool restarts = true;  ///< From the target where the innovations say that the path is wrong.
+  double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;  ///< At a start from the target or from nothing.
+  std::function<double()> seconds;                       ///< A clock, if frames are to be timed.
+  std::function<void(const PathStep&)> watch;            ///< Is shown each step; what it throws ends the work.
 };
 
 struct MapPoint {

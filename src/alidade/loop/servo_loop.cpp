@@ -137,7 +137,8 @@ ServoScene xiahou_servo_scene() {
   return scene;
 }
 
-ServoRun run_servo(const ServoScene& scene, const ServoConfig& config, std::uint64_t seed) {
+ServoRun run_servo(const ServoScene& scene, const ServoConfig& config, std::uint64_t seed,
+                   const std::function<void(const ServoRow&)>& watch) {
   ServoConfig own = config;
   own.axes = scene.axes;
   own.period_s = scene.period_s;
@@ -147,7 +148,10 @@ ServoRun run_servo(const ServoScene& scene, const ServoConfig& config, std::uint
   run.rows.reserve(num_periods * heads.size());
   for (std::size_t k = 0; k < num_periods; ++k) {
     const double t_s = static_cast<double>(k) * scene.period_s;
-    for (std::size_t i = 0; i < heads.size(); ++i) run.rows.push_back(step(scene, heads[i], t_s, i));
+    for (std::size_t i = 0; i < heads.size(); ++i) {
+      run.rows.push_back(step(scene, heads[i], t_s, i));
+      if (watch) watch(run.rows.back());
+    }
     for (LoopedHead& looped : heads) looped.head.advance(scene.period_s);
   }
   run.figures = figures_of(scene, run.rows);

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -66,8 +67,10 @@ struct ServoRun {
   ServoFigures figures;
 };
 
-/// One run of a controller. `config.axes` and `period_s` are the scene's.
-[[nodiscard]] ServoRun run_servo(const ServoScene& scene, const ServoConfig& config, std::uint64_t seed);
+/// One run of a controller. `config.axes` and `period_s` are the scene's. `watch` is shown each row as it comes; what
+/// it throws ends the run.
+[[nodiscard]] ServoRun run_servo(const ServoScene& scene, const ServoConfig& config, std::uint64_t seed,
+                                 const std::function<void(const ServoRow&)>& watch = {});
 
 /// RMS of all runs, median of the runs' maxima, means of the shares, sums of the counts.
 [[nodiscard]] ServoFigures put_together(const std::vector<ServoFigures>& runs);

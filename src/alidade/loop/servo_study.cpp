@@ -94,7 +94,8 @@ std::vector<LoopCheck> check_loops(const ServoScenario& scenario) {
   return loops;
 }
 
-ServoStudy study_servo(const ServoScenario& scenario, std::uint64_t first_seed, const Progress& progress) {
+ServoStudy study_servo(const ServoScenario& scenario, std::uint64_t first_seed, const Progress& progress,
+                       const ServoWatch& watch) {
   ServoStudy study;
   study.loops = check_loops(scenario);
   if (!std::ranges::all_of(study.loops, [](const LoopCheck& loop) { return loop.analysis.is_stable(); })) return study;
@@ -104,9 +105,11 @@ ServoStudy study_servo(const ServoScenario& scenario, std::uint64_t first_seed, 
     config.controller = kind;
     ServoComparison compared{kind, {}, {}};
     std::vector<ServoFigures> figures;
+    std::function<void(const ServoRow&)> watch_first;
+    if (watch) watch_first = [&](const ServoRow& row) { watch(kind, row); };
     for (std::size_t i = 0; i < num_seeds; ++i) {
       report_progress(progress, "trials", study.trials.size(), num_seeds * scenario.controllers.size());
-      ServoRun run = run_servo(scenario.scene, config, first_seed + i);
+      ServoRun run = run_servo(scenario.scene, config, first_seed + i, i == 0 ? watch_first : nullptr);
       figures.push_back(run.figures);
       study.trials.push_back({kind, first_seed + i, run.figures});
       if (i == 0) compared.shown = std::move(run);

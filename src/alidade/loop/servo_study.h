@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -60,9 +61,12 @@ struct ServoStudy {
   std::optional<ServoRobustness> robustness;  ///< Of the best.
 };
 
+/// Is shown the rows of each controller's first trial as they come.
+using ServoWatch = std::function<void(ControllerKind, const ServoRow&)>;
+
 /// Every controller over the same seeds. Nothing runs where check_loops finds an unstable loop.
 [[nodiscard]] ServoStudy study_servo(const ServoScenario& scenario, std::uint64_t first_seed,
-                                     const Progress& progress = {});
+                                     const Progress& progress = {}, const ServoWatch& watch = {});
 
 [[nodiscard]] Verdict servo_verdict(const ServoScenario& scenario, const ServoStudy& study);
 

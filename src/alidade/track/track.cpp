@@ -19,7 +19,7 @@ void add_smoothed(const std::optional<Tracker::Smoothed>& now, std::vector<Predi
 }
 
 TrackReport followed(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackerConfig& config,
-                     double predict_s = 0.0, double smooth_s = 0.0) {
+                     double predict_s = 0.0, double smooth_s = 0.0, const TrackWatch& watch = {}) {
   Tracker tracker({heads.begin(), heads.end()}, config);
   TrackReport report;
   report.sigma_a_m_s2 = config.sigma_a_m_s2;
@@ -33,6 +33,7 @@ TrackReport followed(std::span<const TargetSight> sights, std::span<const RigHea
       report.log_likelihood -=
           0.5 * (std::min(step.innovation.nis, config.gate) + std::log(step.innovation.S.determinant()));
     report.steps.push_back(step);
+    if (watch) watch(sight, step);
     if (smooth_s > 0.0) add_smoothed(tracker.smoothed(smooth_s), report.smoothed);
     if (!(predict_s > 0.0)) continue;
     const auto ahead = tracker.at(step.t_s + predict_s);
@@ -80,8 +81,7 @@ void add_errors(TrackReport& report, const std::vector<bool>& counts, const True
     const auto position = truth.at(step.t_s);
     if (!step.has_belief || !position) continue;
     const Eigen::Vector3d error = step.belief.x.head<3>() - *position;
-    const Eigen::Matrix3d P = step.belief.P.topLeftCorner<3, 3>();
-    report.nees[i] = error.dot(P.inverse() * error);
+    report.nees[i] = position_nees(step, truth);
     // Of several heads at one instant the last one's sight completes the estimate.
     const bool is_complete = i + 1 == report.steps.size() || report.steps[i + 1].t_s != step.t_s;
     if (!counts[i] || !is_complete) continue;
@@ -151,15 +151,23 @@ std::optional<Eigen::Vector3d> TrueTrack::at(double time_s) const {
   return Eigen::Vector3d((1.0 - share) * position[i - 1] + share * position[i]);
 }
 
+double position_nees(const TrackStep& step, const TrueTrack& truth) {
+  const auto position = truth.at(step.t_s);
+  if (!step.has_belief || !position) return not_there;
+  const Eigen::Vector3d error = step.belief.x.head<3>() - *position;
+  const Eigen::Matrix3d P = step.belief.P.topLeftCorner<3, 3>();
+  return error.dot(P.inverse() * error);
+}
+
 TrackReport track_target(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackConfig& config,
-                         const TrueTrack& truth) {
+                         const TrueTrack& truth, const TrackWatch& watch) {
   TrackConfig used = config;
   if (config.find_sigma_a) used.tracker.sigma_a_m_s2 = most_probable_sigma_a(sights, heads, config.tracker);
   if (config.smooth_s > 0.0) {
     used.tracker.history_s = std::max(used.tracker.history_s, 1.2 * config.smooth_s + 0.1);
     used.tracker.most_kept = std::max<std::size_t>(used.tracker.most_kept, 2048);
   }
-  TrackReport report = followed(sights, heads, used.tracker, config.predict_s, config.smooth_s);
+  TrackReport report = followed(sights, heads, used.tracker, config.predict_s, config.smooth_s, watch);
   report.sigma_a_is_found = config.find_sigma_a;
   const std::vector<bool> counts = counted(report.steps, config.warm_up_s);
   double sum_nis = 0.0, num = 0.0;
@@ -177,7 +185,7 @@ TrackReport track_target(std::span<const TargetSight> sights, std::span<const Ri
 }
 
 TrackReport track_target_xiahou(std::span<const TargetSight> sights, std::span<const RigHead> heads,
-                                const XiahouConfig& config, const TrueTrack& truth) {
+                                const XiahouConfig& config, const TrueTrack& truth, const TrackWatch& watch) {
   constexpr double together_s = 0.06;
   TrackReport report;
   std::optional<XiahouFilter> filter;
@@ -208,6 +216,7 @@ TrackReport track_target_xiahou(std::span<const TargetSight> sights, std::span<c
       }
     }
     report.steps.push_back(step);
+    if (watch) watch(sight, step);
   }
   if (!truth.t_s.empty()) add_errors(report, counted(report.steps, TrackConfig{}.warm_up_s), truth, {});
   return report;

@@ -57,13 +57,21 @@ struct TrackReport {
   std::vector<double> nees;                                       ///< One a step; NaN where there is no truth.
 };
 
+/// Is shown each sight with what became of it, as it is followed. What it throws ends the work.
+using TrackWatch = std::function<void(const TargetSight&, const TrackStep&)>;
+
 /// Follows a target through all sights, in order of arrival.
 [[nodiscard]] TrackReport track_target(std::span<const TargetSight> sights, std::span<const RigHead> heads,
-                                       const TrackConfig& config, const TrueTrack& truth = {});
+                                       const TrackConfig& config, const TrueTrack& truth = {},
+                                       const TrackWatch& watch = {});
 
 /// The same by the filter of Xiahou et al.: its steps have a position and σ, and no innovations.
 [[nodiscard]] TrackReport track_target_xiahou(std::span<const TargetSight> sights, std::span<const RigHead> heads,
-                                              const XiahouConfig& config, const TrueTrack& truth = {});
+                                              const XiahouConfig& config, const TrueTrack& truth = {},
+                                              const TrackWatch& watch = {});
+
+/// (x − truth)ᵀ P⁻¹ (x − truth) of a step's position; NaN where there is no belief or no truth.
+[[nodiscard]] double position_nees(const TrackStep& step, const TrueTrack& truth);
 
 /// σ of the position (root of the trace) after each sight that no estimator can undercut on average, for a target
 /// that moves by white acceleration along this path: posterior Cramér–Rao bound of this trajectory. The information

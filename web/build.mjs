@@ -23,11 +23,14 @@ async function bundled(entry) {
   return made.outputFiles[0].text;
 }
 
-const licences = ['three', 'uplot']
+// A package that brings no notice has it here.
+const notices = {'@foxglove/ws-protocol': 'src/licences/foxglove-ws-protocol.txt'};
+const licences = ['three', 'uplot', '@foxglove/ws-protocol', 'eventemitter3']
   .map((name) => {
     const folder = join(here, 'node_modules', name);
     const {version} = JSON.parse(readFileSync(join(folder, 'package.json'), 'utf8'));
-    return `${name} ${version}\n${readFileSync(join(folder, 'LICENSE'), 'utf8').trim()}`;
+    const notice = name in notices ? join(here, notices[name]) : join(folder, 'LICENSE');
+    return `${name} ${version}\n${readFileSync(notice, 'utf8').trim()}`;
   })
   .join('\n\n')
   .replace(/--/g, '–');  // would end the comment

@@ -7,6 +7,7 @@ import {findPictures} from './core/images';
 import {Selection} from './core/selection';
 import {views3} from './core/view3';
 import {figuresOf} from './figures/all';
+import {isLive, showLive} from './live/page';
 import {makeCard, type Card} from './page/card';
 import {header} from './page/header';
 import {listenToKeys} from './page/keys';
@@ -31,9 +32,8 @@ function drawFigures(figures: Figure[], doc: Doc, selection: Selection, host: HT
   return {cards, leftOut, failed};
 }
 
-function start(): void {
-  const doc = readDocument(document.getElementById('result')?.textContent ?? '');
-  const host = document.getElementById('page')!, main = el('main'), selection = new Selection();
+function showReport(doc: Doc, host: HTMLElement): void {
+  const main = el('main'), selection = new Selection();
   host.append(main);
   const {cards, leftOut, failed} = drawFigures(figuresOf(doc), doc, selection, main);
   host.prepend(header(doc, new Set(cards.map((card) => card.figure.id))));
@@ -43,15 +43,22 @@ function start(): void {
     dataSection(doc), provenance(doc));
   host.append(below);
   listenToKeys(doc, selection, cards);
+  // For tests: where marks lie.
+  (window as unknown as Record<string, unknown>)['alidade'] = {doc, selection, cards, charts, views3};
+}
+
+function start(): void {
+  const doc = readDocument(document.getElementById('result')?.textContent ?? '');
+  const host = document.getElementById('page')!;
   listenToPrinting();
+  if (isLive(doc)) showLive(doc, host, (result) => showReport(result, host));
+  else showReport(doc, host);
   const whole = () => {
     findPictures();
     document.documentElement.dataset['ready'] = '1';
   };
   if (document.readyState === 'loading') addEventListener('DOMContentLoaded', whole);
   else whole();
-  // For tests: where marks lie.
-  (window as unknown as Record<string, unknown>)['alidade'] = {doc, selection, cards, charts, views3};
 }
 
 start();

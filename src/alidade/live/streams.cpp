@@ -53,7 +53,7 @@ void add_place(Trail& trail, const Eigen::Vector3d& place) {
 
 void draw_trail(Scene& scene, const Trail& trail) {
   const std::vector<Eigen::Vector3d> places(trail.begin(), trail.end());
-  scene.line("trail", places, 2.5, blue);
+  scene.line("trail", places, 2.5, sky);
 }
 
 std::vector<Topic> head_topics(std::span<const RigHead> heads) {

@@ -78,15 +78,15 @@ export class SeriesPlot {
   readonly box: HTMLDivElement;
   readonly plot: uPlot;
   private readonly look: SeriesLook;
+  private readonly aside: HTMLElement;
 
   constructor(host: HTMLElement, look: SeriesLook) {
     this.look = look;
     this.box = el('div', {class: look.isFilling ? 'series filling' : 'series', style: `min-height:${look.height}px`});
-    const head = el('p', {class: 'series-head'}, el('b', {}, look.label), look.aside ? el('span', {}, look.aside) : null);
+    this.aside = el('span', {}, look.aside ?? '');
+    const head = el('p', {class: 'series-head'}, el('b', {}, look.label), this.aside);
     host.append(el('div', {class: look.isFilling ? 'series-outer filling' : 'series-outer', role: 'img', 'aria-label': look.aria}, head, this.box));
-    const nulls = (values: Values) => Array.from(values, (v) => (Number.isFinite(v) && (!look.isLog || v > 0) ? v : null));
-    const data = [Array.from(look.t), ...look.lines.map((line) => nulls(line.values))] as uPlot.AlignedData;
-    this.plot = new uPlot(this.options(), data, this.box);
+    this.plot = new uPlot(this.options(), this.data(), this.box);
     this.plot.over.addEventListener('mousemove', (event) => this.tell(event));
     this.plot.over.addEventListener('mouseleave', () => hideTip());
     this.plot.over.addEventListener('click', () => {
@@ -96,6 +96,19 @@ export class SeriesPlot {
     new ResizeObserver(() => this.fit()).observe(this.box);
     look.selection?.on(() => this.plot.redraw(false));
     seriesPlots.add(this);
+  }
+  private data(): uPlot.AlignedData {
+    const nulls = (values: Values) => Array.from(values, (v) => (Number.isFinite(v) && (!this.look.isLog || v > 0) ? v : null));
+    return [Array.from(this.look.t), ...this.look.lines.map((line) => nulls(line.values))] as uPlot.AlignedData;
+  }
+  /** Other values in the same plot, while a run is live. As many lines as before; `span`: of time. */
+  renew(look: Pick<SeriesLook, 't' | 'lines' | 'bands' | 'range' | 'aside'>, span: [number, number]): void {
+    Object.assign(this.look, look);
+    this.aside.textContent = look.aside ?? '';
+    this.plot.batch(() => {
+      this.plot.setData(this.data(), false);
+      this.plot.setScale('x', {min: span[0], max: span[1]});
+    });
   }
   fit(): void {
     const w = this.box.clientWidth, h = Math.max(this.look.height, this.box.clientHeight);

@@ -70,6 +70,10 @@ export class View3 {
       this.chart.redraw();
     });
   }
+  /** The first look again, at what is there now. */
+  refit(): void {
+    this.isFitted = false;
+  }
   forget(): void {
     if (this.scene) dispose(this.scene);
     this.scene = null;

@@ -13,7 +13,7 @@ import type {Doc} from '../core/document';
 const help: [string, string][] = [
   ['← →  or  j k', 'another photo, shot or view, worst first'], ['0', 'views as they were'], ['d', 'dark or light'],
   ['f', 'figure in the full window, and back'], ['s', 'save the figure as PNG'], ['t', 'the table behind the figure'],
-  ['c', 'copy the value at the cursor'], ['?', 'this help'],
+  ['c', 'copy the value at the cursor'], ['space', 'hold the figures while a run is live'], ['?', 'this help'],
   ['drag', 'zoom into a time axis (double click: all); turn a 3-D view (shift: move it)'],
 ];
 
@@ -47,14 +47,15 @@ function resetAll(): void {
   for (const plot of seriesPlots) plot.reset();
 }
 
-export function listenToKeys(doc: Doc, selection: Selection, cards: Card[]): void {
+/** Until the signal: a live page becomes a report, which has its own. */
+export function listenToKeys(doc: Doc, selection: Selection, cards: Card[], signal?: AbortSignal, more: Record<string, () => void> = {}): void {
   let active: Card | null = null;
   for (const card of cards) {
     const touch = () => (active = card);
     card.section.addEventListener('pointerenter', touch);
     card.section.addEventListener('focusin', touch);
   }
-  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redrawAll);
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redrawAll, {signal});
   const actions: Record<string, () => void> = {
     ArrowRight: () => selection.step(1), j: () => selection.step(1),
     ArrowLeft: () => selection.step(-1), k: () => selection.step(-1),
@@ -62,6 +63,7 @@ export function listenToKeys(doc: Doc, selection: Selection, cards: Card[]): voi
     f: () => active && toggleFull(active),
     t: () => active && toggleTable(active),
     s: () => active && savePicture(active, doc),
+    ...more,
     c: () => void navigator.clipboard?.writeText(tipWords()).catch(() => undefined),
     Escape: () => cards.filter((card) => card.section.classList.contains('full')).forEach(toggleFull),
   };
@@ -73,5 +75,5 @@ export function listenToKeys(doc: Doc, selection: Selection, cards: Card[]): voi
     if (event.key.startsWith('Arrow') && selection.items.length === 0) return; // the page scrolls
     event.preventDefault();
     action();
-  });
+  }, {signal});
 }

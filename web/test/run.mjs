@@ -5,27 +5,30 @@ import {calibrateDocument, localizeDocument, reproduceDocument, servoDocument} f
 import {chromiumPath, folder, hasBrowser, launch, opened, pageFile} from './page.mjs';
 import {realResults} from './runs.mjs';
 import * as behaviour from './behaviour.mjs';
+import * as live from './live.mjs';
 import * as trouble from './trouble.mjs';
 
-const [templateFile, alidade] = process.argv.slice(2);
+const [templateFile, alidade, only] = process.argv.slice(2); // only: tests whose names hold this
 if (!hasBrowser()) {
   console.log(`web: skipped, there is no ${chromiumPath} (CHROMIUM names another)`);
   process.exit(77);
 }
 const template = readFileSync(templateFile, 'utf8'), started = Date.now();
 const documents = {servo: {document: servoDocument()}, localize: {document: localizeDocument()}, reproduce: {document: reproduceDocument()}};
-if (alidade && existsSync(alidade)) Object.assign(documents, realResults(alidade));
-else console.log('web: without the executable only made-up documents are shown');
+const hasAlidade = Boolean(alidade && existsSync(alidade));
+if (hasAlidade && !only) Object.assign(documents, realResults(alidade));
+else if (!only) console.log('web: without the executable only made-up documents are shown');
 
 const browser = await launch(), failures = [];
 const context = {
-  browser, template, documents,
+  browser, template, documents, alidade,
   url: (document, pictures) => pageFile(template, document, pictures),
   urlOf: (name) => (documents[name].report ? pathToFileURL(documents[name].report).href : pageFile(template, documents[name].document)),
   open: (url, options) => opened(browser, url, options),
   calibration: calibrateDocument,
 };
 async function test(name, body) {
+  if (only && !name.includes(only)) return;
   const start = Date.now();
   try {
     await body(context);
@@ -36,7 +39,7 @@ async function test(name, body) {
   }
 }
 for (const name of Object.keys(documents)) await test(`${name}: opens, draws all, in both themes and widths`, (c) => behaviour.opensAndDraws(c, name));
-for (const module of [behaviour, trouble]) for (const [name, body] of Object.entries(module.tests)) if (!body.needs || documents[body.needs]) await test(name, body);
+for (const module of [behaviour, trouble, ...(hasAlidade ? [live] : [])]) for (const [name, body] of Object.entries(module.tests)) if (!body.needs || documents[body.needs]) await test(name, body);
 await browser.close();
 rmSync(folder, {recursive: true, force: true});
 console.log(`web: ${failures.length === 0 ? 'all tests pass' : `${failures.length} tests fail: ${failures.join('; ')}`} (${((Date.now() - started) / 1000).toFixed(0)} s, ${(template.length / 1000).toFixed(0)} kB template)`);

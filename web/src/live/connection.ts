@@ -5,26 +5,27 @@ export type Message = Record<string, unknown>;
 export interface Listener {
   message(topic: string, message: Message): void;
   status(level: number, words: string): void;
-  opened(): void;
+  opened(): void; // also after a silence
+  silent(): void;
   closed(): void;
 }
 
 const names = ['foxglove.sdk.v1', FoxgloveClient.SUPPORTED_SUBPROTOCOL];
-const mostSilence_ms = 1900; // the server tells the time once a second
+const look_ms = 200, mostSilent = 9; // looks without a word: the server tells the time once a second
 
 /** Subscribes to everything. `close` ends it without a word to the listener. */
 export function connect(listener: Listener): {close: () => void} {
   const address = `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/${location.search}`;
   const client = new FoxgloveClient({ws: new WebSocket(address, names)}), topics = new Map<number, string>(), decoder = new TextDecoder();
-  let heard_ms = Infinity, isOver = false;
+  let silent = -1, isOver = false; // -1: nothing was heard yet
   const lost = () => {
     if (isOver) return;
     isOver = true;
     clearInterval(watch);
     listener.closed();
   };
-  // A machine that is gone closes nothing.
-  const watch = setInterval(() => performance.now() - heard_ms > mostSilence_ms && document.visibilityState === 'visible' && lost(), 200);
+  // A machine that is gone closes nothing. Looks are counted, not time: a page that was busy has not listened.
+  const watch = setInterval(() => silent >= 0 && ++silent === mostSilent && listener.silent(), look_ms);
   client.on('advertise', (channels) => {
     for (const channel of channels) topics.set(client.subscribe(channel.id), channel.topic);
     listener.opened();
@@ -33,7 +34,10 @@ export function connect(listener: Listener): {close: () => void} {
     if (isOver) return;
     listener.message(topics.get(event.subscriptionId) ?? '', JSON.parse(decoder.decode(event.data)) as Message);
   });
-  client.on('time', () => (heard_ms = performance.now()));
+  client.on('time', () => {
+    if (silent >= mostSilent) listener.opened();
+    silent = 0;
+  });
   client.on('status', (event) => listener.status(event.level, event.message));
   client.on('close', lost);
   client.on('error', () => undefined); // close follows

@@ -60,6 +60,7 @@ class LivePage {
         else this.bar.noteStatus(words);
       },
       opened: () => this.bar.setState('live', ''),
+      silent: () => this.bar.setState('lost', 'no answer'),
       closed: () => this.bar.setState('lost', this.stopWords || 'the connection is lost: the run, or its machine, has gone'),
     });
     const loop = () => {

@@ -98,6 +98,8 @@ async function whoJoinsSeesMarksAtOnce({browser, alidade}) {
   await until('two seconds of rows', () => live.feed.sent() > 100);
   const {page: seen, faults, close} = await page(browser, live.url);
   await seen.waitForFunction(() => window.alidade.page.updates > 0);
+  const stages = await seen.evaluate(() => performance.getEntriesByType('mark').map((one) => `${one.name} ${one.startTime.toFixed(0)}`).join(', '));
+  console.log(`      ${stages}`);
   const [shown_ms, first_s, now_s] = await seen.evaluate(() => [performance.now() - performance.getEntriesByType('navigation')[0].responseEnd, window.alidade.page.rows.first, window.alidade.page.rows.time]);
   console.log(`      marks ${shown_ms.toFixed(0)} ms after the page had arrived`);
   assert.ok(shown_ms < 1000 * slowness, `${shown_ms} ms`);
@@ -112,12 +114,11 @@ async function whoJoinsSeesMarksAtOnce({browser, alidade}) {
 }
 
 /** The package's client in a page of its own, with every message it gets. */
-async function packageClient(browser, url, name) {
+async function packageClient(browser) {
   const bundle = await build({stdin: {contents: "import C from '@foxglove/ws-protocol/dist/esm/src/FoxgloveClient'; window.FoxgloveClient = C;", resolveDir: import.meta.dirname ?? new URL('.', import.meta.url).pathname}, bundle: true, write: false, format: 'iife', logLevel: 'error'});
   const context = await browser.newContext(), tab = await context.newPage();
-  await tab.goto(`${url}favicon.ico`).catch(() => undefined); // 204: stays where it was
   await tab.evaluate(bundle.outputFiles[0].text);
-  await tab.evaluate(([address, protocol]) => {
+  const connect = (url, name) => tab.evaluate(([address, protocol]) => {
     const ws = new WebSocket(address, [protocol]), client = new window.FoxgloveClient({ws}), seen = (window.seen = {channels: [], last: {}, count: 0, statuses: [], closed: null, info: null, times: 0}), topics = new Map();
     client.on('serverInfo', (info) => (seen.info = info));
     client.on('advertise', (channels) => channels.forEach((one) => (seen.channels.push(one), topics.set(client.subscribe(one.id), one.topic))));
@@ -127,14 +128,15 @@ async function packageClient(browser, url, name) {
     client.on('close', (event) => (seen.closed = event.code));
     ws.addEventListener('open', () => (seen.protocol = ws.protocol));
   }, [url.replace(/^http/, 'ws'), name]);
-  return {seen: () => tab.evaluate(() => window.seen), close: () => context.close()};
+  return {connect, seen: () => tab.evaluate(() => window.seen), close: () => context.close()};
 }
 
 async function thePackagesClientConnectsUnderBothNames({browser, alidade}) {
   await run(alidade, ['simulate', 'track', '--scenario', 'C', '--out', at('track')]);
   for (const name of ['foxglove.sdk.v1', 'foxglove.websocket.v1']) {
-    const live = await started(alidade, ['track', at('track', 'events.csv'), '--rig', at('track', 'rig.yaml'), '--truth', at('track', 'truth.csv'), '--live-pace', '4', '--no-report', '--out', at('tracked')]);
-    const client = await packageClient(browser, live.url, name);
+    const client = await packageClient(browser);
+    const live = await started(alidade, ['track', at('track', 'events.csv'), '--rig', at('track', 'rig.yaml'), '--truth', at('track', 'truth.csv'), '--live-pace', '2', '--no-report', '--out', at('tracked')]);
+    await client.connect(live.url, name);
     await until('rows', async () => (await client.seen()).count > 50);
     const during = await client.seen();
     assert.equal(during.protocol, name);
@@ -208,10 +210,10 @@ async function aClientThatStopsReadingDoesNotSlowTheRun({alidade}) {
   };
   const without = [], withDeaf = [];
   for (let i = 0; i < 3; ++i) without.push(await timed(0)), withDeaf.push(await timed(4));
-  const best = (all) => Math.min(...all.map((one) => one.seconds));
-  const slower = best(withDeaf) / best(without) - 1;
-  console.log(`      four clients that do not read: ${(100 * slower).toFixed(1)} % slower (${best(without).toFixed(2)} s without)`);
-  assert.ok(slower < 0.01 + 0.1 * slowness, `${slower}`); // the share of one percent is measured on a quiet machine
+  const best = (all, what) => Math.min(...all.map((one) => one[what])), more = (what) => best(withDeaf, what) / best(without, what) - 1;
+  console.log(`      four clients that do not read: ${(100 * more('cpu')).toFixed(1)} % more processor time of ${best(without, 'cpu').toFixed(2)} s, ${(100 * more('seconds')).toFixed(1)} % more time`);
+  // Other programs take the processor away, but are not counted in its time.
+  assert.ok(more('cpu') < 0.01 + 0.04 * slowness, `${more('cpu')}`);
 }
 
 export const tests = {

@@ -13,6 +13,7 @@
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
 #include <chrono>
+#include <future>
 #include <optional>
 #include <random>
 #include <set>
@@ -70,7 +71,7 @@ struct Server::State {
   std::string token, session_id = random_hex(4), host_name = machine_name();
   std::uint16_t port = 0;
   std::set<std::shared_ptr<Client>> clients;
-  std::atomic<std::size_t> num_clients{0}, num_unfinished{0};
+  std::atomic<std::size_t> num_clients{0};
   std::optional<std::uint64_t> newest_ns, told_ns;  ///< Times of messages: what clients take as the time now.
   int ticks_since_time = 0;
   std::thread thread;
@@ -80,7 +81,7 @@ struct Server::State {
   void on_tick();
   void for_clients(const std::function<void(Client&)>& act);
   void distribute(std::size_t index, std::int64_t t_ns, std::string payload);
-  void count_unfinished();
+  [[nodiscard]] std::size_t num_unfinished() const;
   [[nodiscard]] Response answer_to(const Request& request) const;
   [[nodiscard]] bool is_allowed(const Request& request) const;
 };
@@ -114,6 +115,7 @@ class Client : public std::enable_shared_from_this<Client> {
     feed.note_dropped(now_s());
     if (!feed.has_next()) return;
     is_writing_ = true;
+    wrote_at_s_ = now_s();
     sending_ = feed.next();
     socket_.text(sending_.is_text);
     const std::array<asio::const_buffer, 2> parts{asio::buffer(sending_.head),
@@ -122,11 +124,13 @@ class Client : public std::enable_shared_from_this<Client> {
       self->is_writing_ = false;
       if (error) return self->leave();
       self->write();
-      if (!self->is_writing_) self->server_.count_unfinished();
     });
   }
 
+  /// Whether it is worth waiting for: not for who has stopped reading.
   [[nodiscard]] bool is_unfinished() const {
+    constexpr double stuck_s = 0.5;
+    if (is_writing_ && now_s() - wrote_at_s_ > stuck_s) return false;
     const bool attends_end = feed.subscribes_to(server_.topics.index_of(server_.config.end_topic));
     return is_open_ && (attends_end || is_writing_ || feed.has_next());
   }
@@ -149,7 +153,6 @@ class Client : public std::enable_shared_from_this<Client> {
       }
       self->buffer_.consume(self->buffer_.size());
       self->write();
-      self->server_.count_unfinished();
       self->read();
     });
   }
@@ -158,7 +161,6 @@ class Client : public std::enable_shared_from_this<Client> {
     is_open_ = false;
     server_.clients.erase(shared_from_this());
     server_.num_clients = server_.clients.size();
-    server_.count_unfinished();
   }
 
   websocket::stream<beast::tcp_stream> socket_;
@@ -167,6 +169,7 @@ class Client : public std::enable_shared_from_this<Client> {
   beast::flat_buffer buffer_;
   Outgoing sending_;
   bool is_open_ = false, is_writing_ = false;
+  double wrote_at_s_ = 0.0;
 };
 
 namespace {
@@ -286,11 +289,10 @@ void Server::State::distribute(std::size_t index, std::int64_t t_ns, std::string
   newest_ns = std::max(newest_ns.value_or(0), message.t_ns);  // what has no time of its own comes as 0
   topics.keep(index, message);
   for_clients([&](Client& client) { client.feed.offer(index, message); });
-  count_unfinished();
 }
 
-void Server::State::count_unfinished() {
-  num_unfinished = static_cast<std::size_t>(
+std::size_t Server::State::num_unfinished() const {
+  return static_cast<std::size_t>(
       std::ranges::count_if(clients, [](const auto& client) { return client->is_unfinished(); }));
 }
 
@@ -377,13 +379,12 @@ std::size_t Server::num_clients() const { return state_->num_clients; }
 
 void Server::finish(double most_s) {
   const auto until = Clock::now() + std::chrono::duration<double>(most_s);
-  std::atomic<bool> is_counted{false};
-  asio::post(state_->io, [&] {
-    state_->count_unfinished();
-    is_counted = true;
-  });
-  while (!is_counted || (state_->num_unfinished > 0 && Clock::now() < until))
-    std::this_thread::sleep_for(milliseconds(2));
+  const auto count = [this] {
+    std::promise<std::size_t> counted;
+    asio::post(state_->io, [&] { counted.set_value(state_->num_unfinished()); });
+    return counted.get_future().get();
+  };
+  while (count() > 0 && Clock::now() < until) std::this_thread::sleep_for(milliseconds(5));
 }
 
 }  // namespace alidade::live

@@ -59,7 +59,7 @@ class LivePage {
         if (level === 2) this.stopWords = words;
         else this.bar.noteStatus(words);
       },
-      opened: () => this.bar.setState('live', ''),
+      opened: () => (performance.mark('opened'), this.bar.setState('live', '')),
       silent: () => this.bar.setState('lost', 'no answer'),
       closed: () => this.bar.setState('lost', this.stopWords || 'the connection is lost: the run, or its machine, has gone'),
     });
@@ -124,7 +124,7 @@ class LivePage {
       this.space.draw();
       requestAnimationFrame(() => (this.spaceTook_ms = performance.now() - now));
     }
-    ++this.updates;
+    if (++this.updates === 1) performance.mark('drawn');
     this.bar.drawn();
   }
   private offerHeads(): void {
@@ -152,7 +152,12 @@ class LivePage {
 
   /** The run has ended: the same page becomes the report. */
   private async end(): Promise<void> {
-    const answer = await fetch(`/result.json${location.search}`), text = await answer.text();
+    let text = '';
+    try {
+      text = await (await fetch(`/result.json${location.search}`)).text();
+    } catch {
+      return this.bar.setState('lost', 'the run has ended, and is gone; its report is in its folder');
+    }
     this.connection.close();
     this.stop.abort();
     charts.clear();

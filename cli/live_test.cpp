@@ -113,6 +113,7 @@ class ViewCommand : public LiveCommand {
 
 TEST_F(ViewCommand, NamesTheResultsAndWhereTheyAre) {
   ASSERT_EQ(servo({}).code, 0);
+  std::filesystem::create_directories(path("all"));
   std::filesystem::copy(path("out"), path("all/a"), std::filesystem::copy_options::recursive);
   std::filesystem::copy(path("out"), path("all/b"), std::filesystem::copy_options::recursive);
   for (const std::string folder : {"out", "all"}) {

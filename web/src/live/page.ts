@@ -59,7 +59,7 @@ class LivePage {
         if (level === 2) this.stopWords = words;
         else this.bar.noteStatus(words);
       },
-      opened: () => (performance.mark('opened'), this.bar.setState('live', '')),
+      opened: () => this.bar.setState('live', ''),
       silent: () => this.bar.setState('lost', 'no answer'),
       closed: () => this.bar.setState('lost', this.stopWords || 'the connection is lost: the run, or its machine, has gone'),
     });
@@ -124,7 +124,7 @@ class LivePage {
       this.space.draw();
       requestAnimationFrame(() => (this.spaceTook_ms = performance.now() - now));
     }
-    if (++this.updates === 1) performance.mark('drawn');
+    if (++this.updates === 1) performance.mark('drawn'); // for tests
     this.bar.drawn();
   }
   private offerHeads(): void {

@@ -21,8 +21,8 @@ std::int64_t ns_of(double t_s) {
 
 std::string head_name(const RigHead& head) { return fmt::format("head{}", head.head.id); }
 
-Topic latest(const std::string& topic, FoxgloveType type, double most_hz) {
-  return {foxglove_channel(topic, type), TopicKind::latest, most_hz, 1};
+Topic latest(const std::string& topic, FoxgloveType type, double most_hz, std::size_t lanes = 1) {
+  return {foxglove_channel(topic, type), TopicKind::latest, most_hz, lanes};
 }
 
 /// One value of a column, by whatever it holds.
@@ -110,7 +110,7 @@ std::vector<Topic> TrackStream::topics() const {
   topics.push_back(row_topic("/track", "alidade.TrackStep", track_row({}, heads_, {}, *truth_), heads_.size()));
   topics.push_back({foxglove_channel("/tf", FoxgloveType::frame_transforms), TopicKind::images, 60.0, heads_.size()});
   topics.push_back(latest("/target", FoxgloveType::pose_in_frame, 30.0));
-  topics.push_back(latest("/scene", FoxgloveType::scene_update, 10.0));
+  topics.push_back(latest("/scene", FoxgloveType::scene_update, 20.0, heads_.size()));
   for (Topic& topic : head_topics(heads_)) topics.push_back(std::move(topic));
   return topics;
 }
@@ -169,9 +169,10 @@ void TrackStream::show(Server& server, const TargetSight& sight, const TrackStep
           return pose_text(t_ns, "world", {Eigen::Quaterniond::Identity(), step.belief.x.head<3>()});
         },
         0, is_last);
-  server.send("/scene", t_ns, [t_ns, heads = heads_, sight, step, trail = trail_] {
-    return track_scene(t_ns, heads, sight, step, *trail);
-  });
+  server.send(
+      "/scene", t_ns,
+      [t_ns, heads = heads_, sight, step, trail = trail_] { return track_scene(t_ns, heads, sight, step, *trail); },
+      sight.head);
   server.send("/" + head_name(head) + "/marks", t_ns, [t_ns, sight, step] { return track_marks(t_ns, sight, step); });
   if (step.event == TrackEvent::restart || step.event == TrackEvent::start)
     server.send("/log", t_ns, [t_ns, event = step.event] {
@@ -191,7 +192,7 @@ std::vector<Topic> ServoStream::topics() const {
   topics.push_back(
       {foxglove_channel("/tf", FoxgloveType::frame_transforms), TopicKind::images, 60.0, scene_->heads.size()});
   topics.push_back(latest("/target", FoxgloveType::pose_in_frame, 30.0));
-  topics.push_back(latest("/scene", FoxgloveType::scene_update, 10.0));
+  topics.push_back(latest("/scene", FoxgloveType::scene_update, 20.0, scene_->heads.size()));
   for (Topic& topic : head_topics(scene_->heads)) topics.push_back(std::move(topic));
   return topics;
 }
@@ -257,8 +258,9 @@ void ServoStream::show(Server& server, ControllerKind controller, const ServoRow
   server.send("/target", t_ns, [t_ns, scene = scene_, t_s = row.t_s] {
     return pose_text(t_ns, "world", {Eigen::Quaterniond::Identity(), scene->path.at(t_s)});
   });
-  server.send("/scene", t_ns,
-              [t_ns, scene = scene_, row, trail = trail_] { return servo_scene(t_ns, *scene, row, *trail); });
+  server.send(
+      "/scene", t_ns, [t_ns, scene = scene_, row, trail = trail_] { return servo_scene(t_ns, *scene, row, *trail); },
+      row.head);
   server.send("/" + head_name(head) + "/marks", t_ns,
               [t_ns, &head, row] { return servo_marks(t_ns, head.camera, row); });
 }

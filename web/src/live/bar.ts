@@ -95,7 +95,7 @@ export class LiveBar {
     const now = performance.now();
     while (this.arrivals.length > 0 && now - this.arrivals[0]! > 2000) this.arrivals.shift();
     const parts = [clock(this.time_s), `${num(this.arrivals.length / 2, 3)} Hz`];
-    if (Number.isFinite(this.delay_s)) parts.push(`delay ${num(1e3 * this.delay_s, 3)} ms`);
+    if (Number.isFinite(this.delay_s)) parts.push(`${this.doc.command === 'localize' ? 'a frame takes' : 'delay'} ${num(1e3 * this.delay_s, 3)} ms`);
     parts.push(`${this.lost} lost`);
     if (this.trial) parts.push(`controller ${this.trial}`);
     if (this.gated.seen > 0) parts.push(`gated ${this.gated.left}/${this.gated.seen} (${percent(this.gated.left, this.gated.seen, 1)})`);

@@ -13,7 +13,7 @@ import {connect, type Message} from './connection';
 import {livePlots, plotsOf, type LivePlot} from './plots';
 import {LivePicture} from './picture';
 import {HeadRows} from './rows';
-import {Space} from './space';
+import {Space, type Calibration} from './space';
 
 /** Whether this page was served by a run that is going on. */
 export function isLive(doc: Doc): boolean {
@@ -31,6 +31,7 @@ class LivePage {
   private readonly plots: LivePlot[] = [];
   private readonly pictures = new Map<string, LivePicture>();
   private readonly space: Space | null;
+  private readonly cameras = new Map<string, Calibration>();
   private readonly choices: HTMLElement[] = [];
   private readonly connection: {close: () => void};
   private head = -1;
@@ -93,9 +94,9 @@ class LivePage {
     this.isFresh = true;
   }
   private takePicture(head: string, part: string, message: Message): void {
-    if (part === 'camera') this.space?.cameras.set(head, message as never);
+    if (part === 'camera') this.cameras.set(head, message as unknown as Calibration), this.space?.cameras.set(head, message as unknown as Calibration);
     let picture = this.pictures.get(head);
-    if (!picture && this.doc.command === 'observe') return;
+    if (!picture && part === 'camera') return; // nothing to show in it yet
     if (!picture) {
       const body = this.card(head, this.doc.command === 'localize' ? 'What does it see?' : `What does ${head.replace('head', 'head ')} see?`, 'ring: 3σ, dot: seen', this.doc.command === 'localize' ? 12 : 6);
       const section = body.parentElement!, first = this.main.querySelector('#fig-space');
@@ -103,9 +104,9 @@ class LivePage {
       before?.after(section);
       this.pictures.set(head, (picture = new LivePicture(body, head)));
     }
-    if (part === 'camera') picture.camera = message as never;
-    else if (part === 'marks') picture.takeMarks(message);
-    else void picture.takeImage(message).then(() => (this.isFresh = true));
+    picture.camera = this.cameras.get(head) ?? null;
+    if (part === 'marks') picture.takeMarks(message);
+    else if (part === 'image') void picture.takeImage(message).then(() => (this.isFresh = true));
   }
 
   private step(): void {

@@ -151,6 +151,21 @@ TEST_F(LocalizeCommand, SaysWhatIsWrongWithItsInput) {
   bad_file("--truth", "0 1 2 3\n", "is not 't x y z qx qy qz qw'");
 }
 
+TEST_F(LocalizeCommand, FollowsABoardInPicturesTakenUnderWater) {
+  simulate({"--video", "--frames", "12", "--rate", "30"});
+  const Outcome outcome = alidade({"localize", path("sim/frames"), "--rate", "30", "--camera", path("sim/camera.yaml"),
+                                   "--target", path("sim/target.yaml"), "--truth", path("sim/truth.tum"), "--json",
+                                   "--out", path("out"), "--no-report"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json estimate = Json::parse(outcome.out)["estimate"];
+  EXPECT_EQ(estimate["frames"], 12);
+  EXPECT_EQ(estimate["lost"], 0);
+  EXPECT_LT(estimate["ate_m"], 0.003);  // a tenth of a pixel at 0.6 m is 0.08 mm; the filter believes half a pixel
+  const Outcome mixed = alidade({"simulate", "underwater", "--video", "--points", "9", "--out", path("none")});
+  EXPECT_EQ(mixed.code, 2);
+  EXPECT_FALSE(std::filesystem::exists(path("none")));
+}
+
 TEST_F(LocalizeCommand, SurvivesMissingFramesAndUnknownPoints) {
   simulate({"--points", "20", "--frames", "60"});
   const Csv csv = Csv::read(path("sim/sights.csv"));

@@ -1,12 +1,13 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cmath>
 #include <memory>
+#include <opencv2/imgcodecs.hpp>
 
 #include "alidade/io/camera_file.h"
 #include "alidade/io/localize_file.h"
 #include "alidade/simulate/underwater.h"
+#include "alidade/simulate/underwater_video.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
 #include "cli/option_checks.h"
@@ -18,6 +19,8 @@ struct Args {
   UnderwaterScene scene;
   std::filesystem::path camera;
   double rate_hz = 10.0;
+  bool video = false;
+  UnderwaterVideoConfig look;
 };
 
 StartFile start_of(const UnderwaterScene& scene, const UnderwaterSequence& sequence) {
@@ -32,39 +35,62 @@ StartFile start_of(const UnderwaterScene& scene, const UnderwaterSequence& seque
   return file;
 }
 
-ExitCode simulate(const Args& args, Run& run) {
-  UnderwaterScene scene = args.scene;
-  scene.camera = args.camera.empty() ? underwater_camera() : read_camera(args.camera);
-  if (!args.camera.empty()) run.add_input("camera", args.camera);
-  scene.dt_s = 1.0 / args.rate_hz;
-  const UnderwaterSequence sequence = simulate_underwater(scene, run.options.seed);
+/// What `localize` takes of sights; how many there are.
+std::size_t add_sights(const UnderwaterScene& scene, const UnderwaterSequence& sequence, Run& run) {
   std::vector<SightFrame> frames;
-  std::vector<TimedPose> truth;
   std::size_t num_sights = 0;
   for (const UnderwaterFrame& frame : sequence.frames) {
     SightFrame seen{static_cast<long>(frames.size()), frame.t_s, {}};
     for (const UnderwaterSight& sight : frame.sights) seen.sights.push_back({sight.id, sight.px, 0.0});
     num_sights += seen.sights.size();
     frames.push_back(std::move(seen));
-    truth.push_back({frame.t_s, frame.world_from_cam});
   }
   std::vector<KnownPoint> target;
-  std::vector<MapPoint> map;
-  for (const UnderwaterPoint& point : sequence.points) {
+  for (const UnderwaterPoint& point : sequence.points)
     if (point.is_known) target.push_back({point.id, point.told_in_world, scene.sigma_known_m});
-    map.push_back({point.id, point.point_in_world, Eigen::Matrix3d::Zero(), point.is_known, 0});
-  }
   run.add_file("sights.csv", sights_csv(frames));
-  run.add_file("camera.yaml", camera_text(scene.camera, CameraFormat::alidade));
   run.add_file("target.yaml", target_text(target));
   run.add_file("start.yaml", start_text(start_of(scene, sequence)));
+  return num_sights;
+}
+
+/// What `localize` takes of pictures: the board itself is the target.
+std::size_t add_frames(const Args& args, const Camera& camera, const UnderwaterSequence& sequence, Run& run) {
+  for (std::size_t k = 0; k < sequence.frames.size(); ++k) {
+    report_progress(run.progress, "frames", k, sequence.frames.size());
+    const cv::Mat frame =
+        render_underwater_frame(camera, sequence.frames[k].world_from_cam, args.look, run.options.seed + k);
+    std::vector<unsigned char> png;
+    cv::imencode(".png", frame, png);
+    run.add_file(fmt::format("frames/{:06}.png", k), {png.begin(), png.end()});
+  }
+  const Board board = underwater_board();
+  run.add_file("target.yaml",
+               fmt::format("board: {{corners: {}x{}, square_m: {}}}\n", board.cols, board.rows, board.square_m));
+  return sequence.frames.size();
+}
+
+ExitCode simulate(const Args& args, Run& run) {
+  UnderwaterScene scene = args.scene;
+  scene.camera = args.camera.empty() ? underwater_camera() : read_camera(args.camera);
+  if (!args.camera.empty()) run.add_input("camera", args.camera);
+  scene.dt_s = 1.0 / args.rate_hz;
+  const UnderwaterSequence sequence = simulate_underwater(scene, run.options.seed);
+  std::vector<TimedPose> truth;
+  for (const UnderwaterFrame& frame : sequence.frames) truth.push_back({frame.t_s, frame.world_from_cam});
+  std::vector<MapPoint> map;
+  for (const UnderwaterPoint& point : sequence.points)
+    map.push_back({point.id, point.point_in_world, Eigen::Matrix3d::Zero(), point.is_known, 0});
+  const std::size_t num = args.video ? add_frames(args, scene.camera, sequence, run) : add_sights(scene, sequence, run);
+  run.add_file("camera.yaml", camera_text(scene.camera, CameraFormat::alidade));
   run.add_file("truth.tum", tum_text(truth));
   run.add_file("truth_map.csv", map_csv(map));
-  run.document.estimate["frames"] = frames.size();
-  run.document.counts.given = run.document.counts.used = num_sights;
+  run.document.estimate["frames"] = sequence.frames.size();
+  run.document.counts.given = run.document.counts.used = num;
   Verdict verdict;
-  verdict.sentence = fmt::format("{} frames with {} sights of {} points, with known truth", frames.size(), num_sights,
-                                 sequence.points.size());
+  verdict.sentence = args.video ? fmt::format("{} pictures of a board under water, with known truth", num)
+                                : fmt::format("{} frames with {} sights of {} points, with known truth",
+                                              sequence.frames.size(), num, sequence.points.size());
   run.say(fmt::format("{} in {}", verdict.sentence, run.options.out.string()));
   return run.finish(verdict);
 }
@@ -77,24 +103,32 @@ void add_underwater_scenario(Frame& frame) {
       {"simulate underwater", "What a camera under water sees of a board and points around it, and its true path",
        "  alidade simulate underwater --out sim && alidade localize sim/sights.csv --camera sim/camera.yaml \\\n"
        "    --target sim/target.yaml --start sim/start.yaml --truth sim/truth.tum\n"
-       "  alidade simulate underwater --points 40 --frames 300 --rate 30 --mismatches 0.4 --out hard",
+       "  alidade simulate underwater --points 40 --frames 300 --rate 30 --mismatches 0.4 --out hard\n"
+       "  alidade simulate underwater --video --rate 30 --frames 90 --out film && alidade localize film/frames \\\n"
+       "    --rate 30 --camera film/camera.yaml --target film/target.yaml --truth film/truth.tum",
        true},
       [args](Run& run) { return simulate(*args, run); });
   UnderwaterScene& scene = args->scene;
   command.add_option("--camera", args->camera, "The camera (default: a strongly distorting one)")->type_name("FILE");
   command.add_option("--frames", scene.num_frames, "How many")->check(CLI::Range(1, 100000))->capture_default_str();
-  command.add_option("--points", scene.num_points, "The board's 8, then others")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  CLI::Option* points = command.add_option("--points", scene.num_points, "The board's 8, then others")
+                            ->check(CLI::Range(1, 1000))
+                            ->capture_default_str();
   command.add_option("--rate", args->rate_hz, "Frames a second")->check(positive_number())->capture_default_str();
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
-    command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
+    return command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
   };
-  number("--sigma-px", scene.sigma_px, "Noise of a pixel coordinate", 0.0, 100.0);
-  number("--sigma-depth", scene.sigma_depth, "Of the depths in start.yaml, over the depth", 0.0, 1.0);
-  number("--mismatches", scene.mismatches, "Share of the sights that show another place", 0.0, 1.0);
-  number("--blackout-from", scene.blackout_from_s, "Nothing is seen from this time on [s]", 0.0, 1e6);
-  number("--blackout", scene.blackout_s, "For so long [s]", 0.0, 1e6);
+  CLI::Option* video = command.add_flag(
+      "--video", args->video, "Render pictures of the board instead of sights: frames/, as seen through turbid water");
+  number("--blur-px", args->look.blur_px, "With --video: sigma of the blur [px]", 0.0, 10.0)->needs(video);
+  number("--noise", args->look.noise, "With --video: sigma of a colour value's noise, of 255", 0.0, 100.0)
+      ->needs(video);
+  points->excludes(video);
+  number("--sigma-px", scene.sigma_px, "Noise of a pixel coordinate", 0.0, 100.0)->excludes(video);
+  number("--sigma-depth", scene.sigma_depth, "Of the depths in start.yaml, over the depth", 0.0, 1.0)->excludes(video);
+  number("--mismatches", scene.mismatches, "Share of the sights that show another place", 0.0, 1.0)->excludes(video);
+  number("--blackout-from", scene.blackout_from_s, "Nothing is seen from this time on [s]", 0.0, 1e6)->excludes(video);
+  number("--blackout", scene.blackout_s, "For so long [s]", 0.0, 1e6)->excludes(video);
 }
 
 }  // namespace alidade::cli

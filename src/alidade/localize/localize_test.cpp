@@ -97,6 +97,28 @@ TEST(Localize, CalibratesAStaleLens) {
   EXPECT_LT(p1_in_sigma2, 1.8);  // χ²/40 is below 1.84 at 99.9 %
 }
 
+/// Where the sights come out of rendered pictures, and their σ with them.
+TEST(Localize, FromRenderedPicturesTheMapIsAsGoodAsItsCovarianceSays) {
+  UnderwaterScene scene = scene_of(0.03);
+  scene.num_frames = 12;
+  scene.dt_s = 0.3;
+  UnderwaterSample sample = reproduce::filmed_sample(scene, UnderwaterVideoConfig{}, 11);
+  const reproduce::SightErrors errors = reproduce::sight_errors(sample);
+  EXPECT_GE(errors.num, 80u);           // of 96
+  EXPECT_LT(errors.rms_px, 0.05);       // what a picture's noise leaves of corners under such a blur is a hundredth
+  EXPECT_GT(errors.chi2_per_dof, 0.7);  // χ² over 160 is within 1 ± 0.37 at 99.9 %; corners of one picture share
+  EXPECT_LT(errors.chi2_per_dof, 1.5);  // nothing but its lens
+  sample = reproduce::with_even_noise(sample);
+  const auto filter = testing::recommended_filter();
+  const auto full = testing::run_protocol(sample, sample.camera, filter, {}, FeatureKind::inverse_depth);
+  EXPECT_LT(full.p1_nees, 5.4);  // χ²₃/3 at 99.9 %
+  EXPECT_LT(full.p5_nees, 5.4);
+  EXPECT_LT(full.worst_last, 1.0);
+  const auto pinhole = testing::run_protocol(sample, *with_distortion(sample.camera, DistortionVariant::none), filter,
+                                             {}, FeatureKind::inverse_depth);
+  EXPECT_GT(pinhole.p1_mean, 2.0 * full.p1_mean);
+}
+
 double rms_m(const LocalizeReport& report, const UnderwaterSample& sample) {
   double sum2 = 0.0, num = 0.0;
   for (std::size_t k = 0; k < report.path.size(); ++k) {

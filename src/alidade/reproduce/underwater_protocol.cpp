@@ -2,6 +2,10 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "alidade/imaging/find_boards.h"
 
 namespace alidade::reproduce {
 
@@ -29,6 +33,62 @@ UnderwaterSample underwater_sample(const UnderwaterScene& scene, std::uint64_t s
       sample.config.depths.push_back({point.id, point.told_depth_m, scene.sigma_depth});
   }
   return sample;
+}
+
+namespace {
+
+/// What of the board's points was found in a picture.
+std::vector<FeatureSight> sights_of(const BoardDetection& detection) {
+  std::vector<FeatureSight> sights;
+  for (const Corner& corner : detection.view.corners)
+    if (const auto id = underwater_point_at(corner.index))
+      sights.push_back({*id, corner.px, std::sqrt(0.5 * corner.cov.trace())});
+  return sights;
+}
+
+/// Where a point is first seen, its true depth there. 0: never.
+double first_depth_m(const UnderwaterSample& sample, long id) {
+  for (std::size_t k = 0; k < sample.frames.size(); ++k)
+    if (std::ranges::count(sample.frames[k].sights, id, &FeatureSight::id) > 0)
+      return (sample.truth[k].world_from_cam.inverse() * sample.points.at(id)).z();
+  return 0.0;
+}
+
+}  // namespace
+
+UnderwaterSample filmed_sample(const UnderwaterScene& scene, const UnderwaterVideoConfig& video, std::uint64_t seed) {
+  UnderwaterSample sample = underwater_sample(scene, seed);
+  for (ToldDepth& told : sample.config.depths) told.depth_m /= first_depth_m(sample, told.id);
+  const auto film = [&](std::size_t k) {
+    return render_underwater_frame(scene.camera, sample.truth[k].world_from_cam, video, 1000 * seed + k);
+  };
+  const BoardDetections found = find_boards(sample.frames.size(), film, underwater_board());
+  for (std::size_t k = 0; k < sample.frames.size(); ++k) sample.frames[k].sights = sights_of(found.photos[k]);
+  // As wrong as before, of the depth at which the pictures show a point first.
+  for (ToldDepth& told : sample.config.depths) told.depth_m *= first_depth_m(sample, told.id);
+  return sample;
+}
+
+UnderwaterSample with_even_noise(UnderwaterSample sample) {
+  for (SightFrame& frame : sample.frames)
+    for (FeatureSight& sight : frame.sights) sight.sigma_px = 0.0;
+  return sample;
+}
+
+SightErrors sight_errors(const UnderwaterSample& sample) {
+  SightErrors errors;
+  double sum2 = 0.0, chi2 = 0.0;
+  for (std::size_t k = 0; k < sample.frames.size(); ++k) {
+    for (const FeatureSight& sight : sample.frames[k].sights) {
+      const auto px = project(sample.camera, sample.truth[k].world_from_cam.inverse() * sample.points.at(sight.id));
+      const double error2 = px ? (sight.px - *px).squaredNorm() : INFINITY;
+      sum2 += error2;
+      chi2 += error2 / (sight.sigma_px * sight.sigma_px);
+      ++errors.num;
+    }
+  }
+  const double dof = 2.0 * static_cast<double>(errors.num);
+  return {std::sqrt(sum2 / dof), chi2 / dof, errors.num};
 }
 
 PointError point_error(const UnderwaterSample& sample, long id, const Eigen::Vector3d& is, const Eigen::Matrix3d& cov) {

@@ -6,6 +6,7 @@
 #include "alidade/localize/distortion.h"
 #include "alidade/localize/localize.h"
 #include "alidade/simulate/underwater.h"
+#include "alidade/simulate/underwater_video.h"
 
 // The protocol in which lenses and filters are compared under water; docs/maths/localization.md.
 
@@ -20,6 +21,22 @@ struct UnderwaterSample {
   std::map<long, Eigen::Vector3d> points;
 };
 [[nodiscard]] UnderwaterSample underwater_sample(const UnderwaterScene& scene, std::uint64_t seed);
+
+/// The same from pictures: each frame is rendered, and the board's eight points are what find_board() finds in it, with
+/// its σ. A frame in which the board is not found has no sights.
+[[nodiscard]] UnderwaterSample filmed_sample(const UnderwaterScene& scene, const UnderwaterVideoConfig& video,
+                                             std::uint64_t seed);
+
+/// The same sights without a σ of their own: a filter takes its own for all.
+[[nodiscard]] UnderwaterSample with_even_noise(UnderwaterSample sample);
+
+/// Sights against where the true lens puts the true points.
+struct SightErrors {
+  double rms_px = 0.0;        ///< Of a coordinate.
+  double chi2_per_dof = 0.0;  ///< By the sights' own σ.
+  std::size_t num = 0;
+};
+[[nodiscard]] SightErrors sight_errors(const UnderwaterSample& sample);
 
 /// A point of the map against the truth.
 struct PointError {

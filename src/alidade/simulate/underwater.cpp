@@ -9,6 +9,8 @@
 namespace alidade {
 namespace {
 
+/// Column and row of points 1 to 8 in the board's grid of 10×8.
+constexpr std::array<std::array<int, 2>, 8> vertices{{{0, 0}, {9, 0}, {9, 7}, {0, 7}, {5, 4}, {2, 2}, {7, 2}, {7, 5}}};
 constexpr double square_m = 0.028, centre_x_m = 4.5 * square_m, centre_y_m = 3.5 * square_m;
 
 /// A sine of each of six numbers: position, then rotation vector.
@@ -35,8 +37,6 @@ Swing swing_of(Draws& draws) {
 }
 
 std::vector<UnderwaterPoint> points_of(const UnderwaterScene& scene, Draws& draws) {
-  constexpr std::array<std::array<int, 2>, 8> vertices{
-      {{0, 0}, {9, 0}, {9, 7}, {0, 7}, {5, 4}, {2, 2}, {7, 2}, {7, 5}}};
   std::vector<UnderwaterPoint> points;
   for (int i = 0; i < scene.num_points; ++i) {
     UnderwaterPoint point;
@@ -66,6 +66,12 @@ Camera underwater_camera() {
   Calibrated<Brown> lens;
   lens.params << 768.0, 766.0, 389.0, 284.0, 0.0, -0.44881, 0.0664, 0.01316, 0.00218, 0.0;
   return {768, 576, lens, {}, 0.0, "alidade simulate underwater"};
+}
+
+std::optional<long> underwater_point_at(int corner) {
+  for (std::size_t i = 0; i < vertices.size(); ++i)
+    if (corner == 10 * vertices[i][1] + vertices[i][0]) return static_cast<long>(i) + 1;
+  return std::nullopt;
 }
 
 UnderwaterSequence simulate_underwater(const UnderwaterScene& scene, std::uint64_t seed) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "alidade/camera/camera.h"
@@ -61,5 +62,8 @@ struct UnderwaterSequence {
 /// is the board's frame, z away from the camera. The path: 0.62 ± 0.10 m in front, ± 0.12 and 0.09 m aside, turning by
 /// ± 8° about each axis, in sines of 2.6 to 4.5 s. Same seed, same sequence.
 [[nodiscard]] UnderwaterSequence simulate_underwater(const UnderwaterScene& scene, std::uint64_t seed);
+
+/// Which of the points 1 to 8 a corner of that grid is, corners counted row by row from 0.
+[[nodiscard]] std::optional<long> underwater_point_at(int corner);
 
 }  // namespace alidade

@@ -11,7 +11,7 @@ const expected = {
   track: ['path', 'position', 'error', 'innovations', 'estimate', 'above', 'age'],
   servo: ['error', 'picture', 'angles', 'compare', 'robust', 'loops'],
   localize: ['path', 'error', 'tracks', 'nis', 'speed', 'estimate'],
-  reproduce: ['experiments', 'paper-4'],
+  reproduce: ['experiments', 'paper-4', 'methods'],
 };
 
 /** Ids of figures whose canvases have one colour only, and of those that do not draw as many marks as rows. */

@@ -56,51 +56,61 @@ FigureTable boards_figure(const std::vector<Shot>& shots) {
   return figure;
 }
 
-}  // namespace
-
-Experiment wang_table_1() {
-  const RangefinderSceneConfig scene = *rangefinder_scenario("reference");
-  const std::vector<Shot> shots = shots_of_table(scene);
+Claim squares_claim() {
   double worst = 0.0;
-  int in_front = 0;
-  std::vector<double> ranges;
-  for (std::size_t i = 0; i < table_1.size(); ++i) {
-    const double foot2 = foot_mm(table_1[i]).squaredNorm();
-    worst = std::max(worst, std::abs(table_1[i][3] + foot2) / foot2);
-    // Where the plane a x + b y + c z = d meets the axis of view.
-    in_front += table_1[i][3] / table_1[i][2] < 0.0 || table_1[i][2] > 0.0 ? 1 : 0;
-    ranges.push_back(shots[i].range_m);
+  for (const auto& row : table_1) {
+    const double foot2 = foot_mm(row).squaredNorm();
+    worst = std::max(worst, std::abs(row[3] + foot2) / foot2);
   }
-  Claim consistent{"table1-d-is-n2", "|d| is |N|² in every row: largest deviation", "%", 0.0, 100.0 * worst};
-  consistent.holds = 100.0 * worst <= 0.01 ? Holds::reproduced : Holds::not_reproducible;
-  consistent.words = "To the digits that are printed.";
-  Claim signs{"table1-signs", "boards in front of the camera, with the signs as printed", "boards", 6.0,
+  Claim claim{"table1-d-is-n2", "|d| is |N|² in every row: largest deviation", "%", 0.0, 100.0 * worst};
+  claim.holds = 100.0 * worst <= 0.01 ? Holds::reproduced : Holds::not_reproducible;
+  claim.words = "To the digits that are printed.";
+  return claim;
+}
+
+Claim signs_claim() {
+  // Where the plane a x + b y + c z = d meets the axis of view.
+  const auto in_front =
+      std::ranges::count_if(table_1, [](const auto& row) { return row[3] / row[2] < 0.0 || row[2] > 0.0; });
+  Claim claim{"table1-signs", "boards in front of the camera, with the signs as printed", "boards", 6.0,
               static_cast<double>(in_front)};
-  signs.holds = in_front == 6 ? Holds::reproduced : Holds::not_reproducible;
-  signs.words =
+  claim.holds = in_front == 6 ? Holds::reproduced : Holds::not_reproducible;
+  claim.words =
       "N = -R3 (R3't) has the wrong sign: the foot of the plane is +R3 (R3't) and d = -|N|². As printed, c < 0 puts "
       "every board behind the camera; turned round the distances are those of the table's figure.";
-  Claim tells{"table1-tells",
+  return claim;
+}
+
+Claim tells_claim(const std::vector<Shot>& shots, const RangefinderSceneConfig& scene) {
+  Claim claim{"table1-tells",
               "sigma of the origin from these six boards by method 2; the paper prints centimetres",
               "mm",
               10.0,
               sigma_mm(shots, scene, RangefinderMethod::plane),
               sigma_mm(shots, scene, RangefinderMethod::joint)};
-  tells.holds = tells.ours <= 10.0 ? Holds::reproduced : Holds::not_reproducible;
-  const auto [least, most] = std::ranges::minmax(ranges);
-  tells.words = fmt::format(
+  claim.holds = claim.ours <= 10.0 ? Holds::reproduced : Holds::not_reproducible;
+  const auto [least, most] = std::ranges::minmax(shots, {}, &Shot::range_m);
+  claim.words = fmt::format(
       "Their readings differ by {:.1f} % only, and what moves the origin along the beam then hardly moves a reading: "
-      "even "
-      "with planes known exactly and readings of 1 mm these boards cannot tell t. Best: boards and spots together.",
-      100.0 * (most - least) / least);
-  for (Claim* claim : {&consistent, &signs, &tells}) claim->figure = "table_1";
+      "even with planes known exactly and readings of 1 mm these boards cannot tell t. Best: boards and spots "
+      "together.",
+      100.0 * (most.range_m - least.range_m) / least.range_m);
+  return claim;
+}
+
+}  // namespace
+
+Experiment wang_table_1() {
+  const RangefinderSceneConfig scene = *rangefinder_scenario("reference");
+  const std::vector<Shot> shots = shots_of_table(scene);
+  std::vector<Claim> claims{squares_claim(), signs_claim(), tells_claim(shots, scene)};
+  for (Claim& claim : claims) claim.figure = "table_1";
   return {"table1",
           "Table 1: six planes",
           "The six planes that the paper prints, checked against its own definitions; then, turned to the front of the "
-          "camera "
-          "and with the readings that the beam of Table 2 would have on them, what they can tell of that beam.",
+          "camera and with the readings that the beam of Table 2 would have on them, what they can tell of that beam.",
           "Lengths in mm; 1280×960 px, f = 1200 px; readings of 1 mm, spots of 0.3 px.",
-          {consistent, signs, tells},
+          std::move(claims),
           {boards_figure(shots)}};
 }
 

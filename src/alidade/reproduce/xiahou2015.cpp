@@ -15,32 +15,39 @@ constexpr double degree = std::numbers::pi / 180.0;
 const std::array<Eigen::Vector2d, 2> printed_angles{Eigen::Vector2d(-15.3, 25.4) * degree,
                                                     Eigen::Vector2d(27.3, 23.7) * degree};
 
-}  // namespace
+/// What depth and angles imply, with the sign of (2) turned. [cm]
+double baseline_cm() {
+  return paper_target_cm.z() * (std::tan(printed_angles[1].x()) - std::tan(printed_angles[0].x()));
+}
 
-Experiment xiahou_geometry() {
-  const double z_cm = paper_target_cm.z(), k1 = std::tan(printed_angles[0].x()), k2 = std::tan(printed_angles[1].x());
-  const double baseline_cm = z_cm * (-k1 + k2);
-  Claim sign{"geometry-x", "x of the target by (2), from the angles as printed", "cm", 17.3, z_cm * k1, -z_cm * k1};
+/// A point in a head's picture at the printed angles.
+Eigen::Vector2d pixel_of(std::size_t head, const Eigen::Vector3d& point_m) {
+  std::array<RigHead, 2> rig = xiahou_rig();
+  rig[1].head.world_from_base.translation.x() = baseline_cm() / 100.0;
+  return (projection_matrix(rig[head], printed_angles[head]) * point_m.homogeneous()).hnormalized();
+}
+
+std::vector<Claim> angle_claims() {
+  const double x_cm = paper_target_cm.z() * std::tan(printed_angles[0].x());
+  Claim sign{"geometry-x", "x of the target by (2), from the angles as printed", "cm", 17.3, x_cm, -x_cm};
   sign.holds = near_to(sign.ours, sign.printed, 0.02);
   sign.words = "(2) has the sign of head 1's pan against (8) to (10) and against head 2. Best: tan(-alpha1).";
   Claim baseline{"geometry-baseline", "the angles and the depth imply a baseline of 50 cm, which is what we take", "cm",
-                 not_a_number, baseline_cm};
-  baseline.holds = near_to(baseline_cm, 50.0, 0.01);
+                 not_a_number, baseline_cm()};
+  baseline.holds = near_to(baseline.ours, 50.0, 0.01);
   baseline.words = "With the sign of (2) turned; as printed it would be 15.4 cm.";
-  std::array<RigHead, 2> rig = xiahou_rig();
-  rig[1].head.world_from_base.translation.x() = baseline_cm / 100.0;
-  const auto pixel_of = [&](std::size_t head, const Eigen::Vector3d& point_m) {
-    const Eigen::Vector3d uvw = projection_matrix(rig[head], printed_angles[head]) * point_m.homogeneous();
-    return Eigen::Vector2d(uvw.hnormalized());
-  };
+  return {sign, baseline};
+}
+
+std::vector<Claim> pixel_claims() {
   const Eigen::Vector2d middle(160.0, 120.0);
-  const Eigen::Vector3d target_m = paper_target_cm / 100.0, step_m(baseline_cm / 100.0, 0.0, 0.0);
+  const Eigen::Vector3d target_m = paper_target_cm / 100.0, step_m(baseline_cm() / 100.0, 0.0, 0.0);
   const double off_px = std::max((pixel_of(0, target_m) - middle).norm(), (pixel_of(1, target_m) - middle).norm());
-  Claim middle_claim{"geometry-middle",
-                     "both cameras look at the target at the start: distance from the middle of the picture", "px", 0.0,
-                     off_px};
-  middle_claim.holds = off_px <= 1.0 ? Holds::reproduced : Holds::not_reproducible;
-  middle_claim.words =
+  Claim centred{"geometry-middle",
+                "both cameras look at the target at the start: distance from the middle of the picture", "px", 0.0,
+                off_px};
+  centred.holds = off_px <= 1.0 ? Holds::reproduced : Holds::not_reproducible;
+  centred.words =
       "Pan > 0 turns left and tilt > 0 up on both heads, Y points down; angles are printed to 0.1°, 0.6 px.";
   Claim second{"geometry-second-image",
                "u of the target in the second picture by (11) and (12)",
@@ -52,13 +59,20 @@ Experiment xiahou_geometry() {
   second.words =
       "(12) adds the baseline, X + T; the camera stands at T, so that it must be X - T. As printed the target is far "
       "outside a picture of 320 px.";
+  return {centred, second};
+}
+
+}  // namespace
+
+Experiment xiahou_geometry() {
+  std::vector<Claim> claims = angle_claims();
+  for (Claim& claim : pixel_claims()) claims.push_back(std::move(claim));
   return {"geometry",
           "Initial geometry",
           "Two pan-tilt heads beside each other, the target at (17.3, -31.4, 63.6) cm, pan and tilt -15.3, 25.4 and "
-          "27.3, 23.7°: "
-          "the paper's equations with its own numbers.",
+          "27.3, 23.7°: the paper's equations with its own numbers.",
           "f = 337.84 px, 320×240, heads without offsets.",
-          {sign, baseline, middle_claim, second},
+          std::move(claims),
           {}};
 }
 

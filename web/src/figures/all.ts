@@ -21,7 +21,7 @@ import {rangefinderPhoto, rangefinderShots} from './rangefinder_photo';
 import {rangefinderCounts, rangefinderNext, rangefinderPrecision} from './rangefinder_precision';
 import {rangefinderResiduals} from './rangefinder_residuals';
 import {refusal} from './refusal';
-import {reproduceFigure, reproduceTable} from './reproduce';
+import {reproduceFigure, reproduceMethods, reproduceTable} from './reproduce';
 import {residuals} from './residuals';
 import {rigCoverage, rigEstimate, rigResiduals, rigSpace, rigUnknown, rigView} from './rig';
 import {servoAngles, servoCompare, servoError, servoLoops, servoPicture, servoRobust} from './servo';
@@ -44,7 +44,7 @@ const byCommand: Record<string, Figure[]> = {
 export function figuresOf(doc: Doc): Figure[] {
   if (doc.command.startsWith('reproduce')) {
     const figures = [...doc.tables.values()].filter((table) => table.name.startsWith('fig_') && table.rows > 0);
-    return [reproduceTable, ...figures.map(reproduceFigure), {...estimate, span: 12}];
+    return [reproduceTable, ...figures.map(reproduceFigure), reproduceMethods, {...estimate, span: 12}];
   }
   const own = Object.prototype.hasOwnProperty.call(byCommand, doc.command) ? byCommand[doc.command]! : [{...estimate, span: 12}];
   return doc.isAnswer || !doc.isReadable ? own : [refusal, ...own];

@@ -26,6 +26,19 @@ export const reproduceTable: Figure = {
   },
 };
 
+/** What was simulated and run for each experiment, and what the paper does not say. */
+export const reproduceMethods: Figure = {
+  id: 'methods', title: 'What was run, and what was chosen?', note: 'one row an experiment', span: 24,
+  draw(host, doc) {
+    const table = doc.table('methods');
+    if (!table) return null;
+    const words = (name: string, i: number) => el('td', {class: 'word', style: 'text-align:left'}, table.text(name, i) || '–'), body = el('tbody');
+    for (let i = 0; i < table.rows; ++i) body.append(el('tr', {}, el('th', {}, table.text('title', i)), words('method', i), words('chosen', i)));
+    host.append(el('div', {class: 'scroll', style: 'max-height:none'}, el('table', {class: 'estimate'}, el('thead', {}, el('tr', {}, ...['experiment', 'what was simulated and run', 'chosen, where the paper is silent'].map((word) => el('th', {style: 'text-align:left'}, word)))), body)));
+    return {marks: table.rows, rows: table.rows, tables: [table], words: `${table.rows} experiments`, good: ''};
+  },
+};
+
 /** A table fig_ID: first column across, the others up; columns whose name begins with printed_ are the paper's, as dots. */
 export function reproduceFigure(table: Table): Figure {
   const id = table.name.replace(/^fig_/, '');

@@ -47,13 +47,20 @@ bench:
 
 docs: demo
 	@tools/setup docs
-	@echo "docs: docs/report.png and docs/observe.png, reports as a browser draws them"
+	@echo "docs: docs/report.png, docs/observe.png and docs/tour/*.png, reports as a browser draws them"
 	@$(out)/alidade simulate rotation --source head --zoom ramp --points 12 --seed 3 --out build/demo/turn --quiet
 	@$(out)/alidade observe build/demo/turn/log.csv --size 780x582 --out build/demo/observed --quiet
 	@chromium --headless --no-sandbox --hide-scrollbars --disable-gpu --virtual-time-budget=4000 --window-size=1500,1330 --force-device-scale-factor=0.7 \
 	  --screenshot=docs/observe.png "file://$(CURDIR)/build/demo/observed/report.html" >/dev/null 2>&1
 	@chromium --headless --no-sandbox --hide-scrollbars --disable-gpu --virtual-time-budget=4000 --window-size=1500,885 --force-device-scale-factor=0.8 \
 	  --screenshot=docs/report.png "file://$(CURDIR)/build/demo/result/report.html" >/dev/null 2>&1
+	@$(out)/alidade simulate board --board 9x6 --square 0.025 --photos 15 --size 640x480 --out build/demo/tour --quiet
+	@$(out)/alidade calibrate build/demo/tour --board 9x6 --square 0.025 --out build/demo/tour-camera --quiet
+	@$(out)/alidade simulate underwater --video --camera build/demo/tour/truth_camera.yaml --rate 30 --frames 30 --out build/demo/dive --quiet
+	@$(out)/alidade localize build/demo/dive/frames --rate 30 --camera build/demo/tour-camera/camera.yaml \
+	  --target build/demo/dive/target.yaml --truth build/demo/dive/truth.tum --out build/demo/path --quiet
+	@node web/test/picture.mjs build/demo/tour-camera/report.html docs/tour/camera.png 1500x660 0.6
+	@node web/test/picture.mjs build/demo/path/report.html docs/tour/path.png 1500x660 0.6
 
 study:
 	@tools/setup build

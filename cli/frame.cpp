@@ -215,6 +215,8 @@ int Frame::dispatch(int argc, const char* const* argv) {
   try {
     const ExitCode code = command.work(run);
     state_->terminal.wipe_progress();
+    std::cout.flush();
+    std::fflush(stdout);  // in a log as on a screen: what was found, then why that is not enough
     if (code != ExitCode::ok) state_->terminal.error(refusal(command.spec.name, run.document.verdict));
     return static_cast<int>(code);
   } catch (const UsageError& error) {

@@ -40,8 +40,8 @@ void add_checks(const LocalizeReport& report, Verdict& verdict) {
   const std::string said = nis > good_nis_high  ? "the sights do not fit: the lens or the noise is not as stated"
                            : nis < good_nis_low ? "noise is smaller than stated"
                                                 : "innovations as large as predicted";
-  verdict.checks.push_back(
-      {"NIS", nis_state, text_of(nis, 3) + " per degree of freedom: " + said, nis, good_nis_high, "1", "nis"});
+  verdict.checks.push_back({"innovations", nis_state, "NIS " + text_of(nis, 3) + " per degree of freedom: " + said, nis,
+                            good_nis_high, "1", "nis"});
   const double lost = share(report.num_lost, report.path.size());
   verdict.checks.push_back({"frames lost", state_of(lost, 0.0, care_lost),
                             report.num_lost == 0 ? "no frame lost" : std::to_string(report.num_lost) + " frames lost",

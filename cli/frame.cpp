@@ -12,6 +12,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
 
+#include "cli/help_format.h"
 #include "cli/terminal.h"
 
 namespace alidade::cli {
@@ -109,8 +110,10 @@ std::string usage_fault(const CLI::App& app, const CLI::ParseError& error) {
     for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
     return where(at) + "a command is required: " + list + "; see alidade " + at.get_name() + " --help";
   }
+  const std::string in_help = "; see alidade " + where(at).substr(0, where(at).size() - 2) + " --help";
   if (!extra.empty()) return where(at) + "unexpected argument '" + extra + "'";
-  return where(at) + error.what();
+  const bool is_missing = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr;
+  return where(at) + error.what() + (is_missing ? in_help : "");
 }
 
 /// What every command has.
@@ -164,8 +167,12 @@ Frame::Frame() : state_(std::make_unique<State>()) {
   app.set_version_flag("--version", "alidade " ALIDADE_VERSION);
   app.set_help_flag("--help,-h", "Print this help");
   app.require_subcommand(1);
+  app.formatter(std::make_shared<HelpFormat>());
   app.footer(
-      "Each command has its own help: alidade COMMAND --help\n"
+      "Begin with photos that are made for it, or with your own:\n"
+      "  alidade simulate board --board 9x6 --square 0.025 --out photos\n"
+      "  alidade calibrate photos --board 9x6 --square 0.025\n"
+      "Each command has its own help, which ends with examples: alidade COMMAND --help\n"
       "Exit codes: 0 an estimate that stands, 1 a fault of alidade, 2 wrong usage, 3 bad input, nothing written,\n"
       "4 the data cannot tell (what is missing is named), 5 no convergence, 130 interrupted.");
 }
@@ -173,7 +180,8 @@ Frame::Frame() : state_(std::make_unique<State>()) {
 Frame::~Frame() = default;
 
 void Frame::add_group(const std::string& name, const std::string& summary) {
-  state_->app.add_subcommand(name, summary)->require_subcommand(1);
+  CLI::App* group = state_->app.add_subcommand(name, summary)->require_subcommand(1);
+  group->footer("Each command has its own help, which ends with examples: alidade " + name + " COMMAND --help");
 }
 
 CLI::App& Frame::add_command(const CommandSpec& spec, std::function<ExitCode(Run&)> work) {
@@ -184,8 +192,7 @@ CLI::App& Frame::add_command(const CommandSpec& spec, std::function<ExitCode(Run
       parent->add_subcommand(space == std::string::npos ? spec.name : spec.name.substr(space + 1), spec.summary);
   Command& command = state_->commands.emplace_back(Command{spec, app, std::move(work), {}});
   command.options.leaves_results = spec.leaves_results;
-  add_common_options(*app, spec, command.options);
-  app->footer("Examples:\n" + spec.examples);
+  app->footer("Examples:\n" + indented_examples(spec.examples));
   return *app;
 }
 
@@ -198,6 +205,8 @@ Frame::Command* Frame::chosen_command() {
 
 int Frame::dispatch(int argc, const char* const* argv) {
   CLI::App& app = state_->app;
+  for (Command& command : state_->commands)  // behind the command's own, in its help as well
+    add_common_options(*command.app, command.spec, command.options);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

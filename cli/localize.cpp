@@ -243,7 +243,7 @@ void add_options(CLI::App& command, Args& args) {
   };
   number("--depth", args.depth_m, "Depth at which a new point is first believed [m] (default: the target's)");
   number("--sigma-depth", args.sigma_depth, "σ of that over the depth")->capture_default_str();
-  number("--sigma-px", args.filter.sigma_px, "Of a pixel coordinate")->capture_default_str();
+  number("--sigma-px", args.filter.sigma_px, "σ of a pixel coordinate [px]")->capture_default_str();
   number("--sigma-a", args.filter.sigma_a_m_s2, "Acceleration of the camera [m/s2]; by hand about 4")
       ->capture_default_str();
   number("--sigma-alpha", args.filter.sigma_alpha_rad_s2, "Angular acceleration [rad/s2]; by hand about 6")

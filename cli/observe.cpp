@@ -268,7 +268,7 @@ void add_options(CLI::App& command, Args& args) {
       ->expected(4)
       ->check(finite_number());
   command.add_option("--size", args.size, "Size of the picture (default: what holds the points)")->type_name("WxH");
-  command.add_option("--profile", args.config.profile, "Of fang2011: fast, quiet or kalman")
+  command.add_option("--profile", args.config.profile, "Gains of --method fang2011")
       ->check(CLI::IsMember({"fast", "quiet", "kalman"}))
       ->capture_default_str();
   command.add_flag("--square-pixels", args.config.square_pixels, "fx = fy");
@@ -280,10 +280,10 @@ void add_options(CLI::App& command, Args& args) {
   const auto sigma = [&](const char* name, double& value, const char* help) {
     command.add_option(name, value, help)->check(positive_number());
   };
-  sigma("--sigma-px", args.config.sigma_px, "Of a pixel coordinate (default: told by the residuals)");
-  sigma("--sigma-angle", args.config.sigma_angle_rad, "Of an encoder or attitude angle [rad]");
-  sigma("--sigma-rate", args.config.sigma_rate_rad_per_s, "Of a rate [rad/s]");
-  sigma("--sigma-range-m", args.config.sigma_range_m, "Of range_m");
+  sigma("--sigma-px", args.config.sigma_px, "σ of a pixel coordinate [px] (default: told by the residuals)");
+  sigma("--sigma-angle", args.config.sigma_angle_rad, "σ of an encoder or attitude angle [rad]");
+  sigma("--sigma-rate", args.config.sigma_rate_rad_per_s, "σ of a rate [rad/s]");
+  sigma("--sigma-range-m", args.config.sigma_range_m, "σ of the column range_m [m]");
   sigma("--window-s", args.config.window_s, "Length of --method window");
   command.add_flag("--skip-bad", args.skip_bad, "Leave out rows that are wrong, by name, instead of stopping");
   add_live_options(command, args.live, false);

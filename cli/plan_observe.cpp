@@ -85,7 +85,9 @@ void add_plan_observe(Frame& frame) {
                          .examples = "alidade plan observe alidade-out/observe --moves 3 --rate-deg-s 15\n"},
                         [args](Run& run) { return plan_observe(*args, run); });
   command.add_option("result", args->result, "Folder or result.json of an observation")->required();
-  command.add_option("--moves", args->moves, "How many to propose")->check(CLI::Range(1, 20))->capture_default_str();
+  command.add_option("--moves", args->moves, "How many turns to propose")
+      ->check(CLI::Range(1, 20))
+      ->capture_default_str();
   command.add_option("--rate-deg-s", args->rate_deg_s, "How fast each axis turns")
       ->check(positive_number())
       ->capture_default_str();

@@ -106,14 +106,16 @@ void add_plan_rangefinder(Frame& frame) {
                          .examples = "alidade plan rangefinder alidade-out/rangefinder --shots 3\n"},
                         [args](Run& run) { return plan_rangefinder(*args, run); });
   command.add_option("result", args->result, "Folder or result.json of a calibrated rangefinder")->required();
-  command.add_option("--shots", args->shots, "How many to propose")->check(CLI::Range(1, 20))->capture_default_str();
+  command.add_option("--shots", args->shots, "How many shots to propose")
+      ->check(CLI::Range(1, 20))
+      ->capture_default_str();
   command.add_option("--min-range-m", args->limits.min_range_m, "Nearest board")
       ->check(positive_number())
       ->capture_default_str();
   command.add_option("--max-range-m", args->limits.max_range_m, "Farthest board")
       ->check(positive_number())
       ->capture_default_str();
-  command.add_option("--max-tilt-deg", args->max_tilt_deg, "Of the board")
+  command.add_option("--max-tilt-deg", args->max_tilt_deg, "Largest tilt of the board [deg]")
       ->check(CLI::Range(0.0, 80.0))
       ->capture_default_str();
 }

@@ -223,7 +223,7 @@ void add_project(Frame& frame) {
   command.add_option("--beam", args->beam, "rangefinder.yaml of alidade rangefinder")->type_name("FILE");
   command.add_option("--camera", args->camera, "The camera (default: the one that the beam names)")->type_name("FILE");
   command.add_option("--range", args->ranges_m, "Reading, or several [m]")->delimiter(',')->check(positive_number());
-  command.add_option("--sigma-range-m", args->sigma_range_m, "Of the reading (default: the beam's)")
+  command.add_option("--sigma-range-m", args->sigma_range_m, "σ of the reading [m] (default: the beam's)")
       ->check(positive_number());
   command.add_option("--overlay", args->overlay, "Draw the beam's line and the spots into this photo: overlay.png")
       ->type_name("PHOTO");

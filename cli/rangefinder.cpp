@@ -226,8 +226,10 @@ void add_options(CLI::App& command, Args& args) {
   add_board_options(command, args.board, /*is_required=*/false);
   command.add_option("--corners", args.corners, "Corners instead of photos: CSV photo,corner,u_px,v_px,…")
       ->type_name("FILE");
-  command.add_option("--photo", args.photo, "Of --method edges: taken with the head at zero")->type_name("PHOTO");
-  command.add_option("--start", args.start, "Of --method edges: a rangefinder.yaml near it (default: along the view)")
+  command.add_option("--photo", args.photo, "With --method edges: the photo, taken with the head at zero")
+      ->type_name("PHOTO");
+  command
+      .add_option("--start", args.start, "With --method edges: a rangefinder.yaml near it (default: along the view)")
       ->type_name("FILE");
   command.add_option("--spot", args.spot, "Colour of the laser: auto, red, green, or bright (in grey photos)")
       ->check(CLI::IsMember({"auto", "red", "green", "bright"}))
@@ -236,8 +238,8 @@ void add_options(CLI::App& command, Args& args) {
   const auto sigma = [&](const char* name, double& value, const char* help) {
     command.add_option(name, value, help)->check(positive_number());
   };
-  sigma("--sigma-px", args.sigma_px, "Of a spot's coordinate (default: told by photo or residuals)");
-  sigma("--sigma-range-m", args.sigma_range_m, "Of a reading [m] (default: told by the residuals)");
+  sigma("--sigma-px", args.sigma_px, "σ of a spot's coordinate [px] (default: told by photo or residuals)");
+  sigma("--sigma-range-m", args.sigma_range_m, "σ of a reading [m] (default: told by the residuals)");
   sigma("--sigma-range-per-m", args.sigma_range_per_m, "What it grows by for each metre of range");
   sigma("--sigma-incidence-m", args.sigma_incidence_m, "What it grows by with tan of the angle of incidence [m]");
   command.add_option("--outliers", args.outliers, "drop: leave out shots that no noise explains, by name; keep")

@@ -185,9 +185,9 @@ void add_rig(Frame& frame) {
       ->expected(1)
       ->take_all();
   add_board_options(command, args->board);
-  command.add_option("--sigma-px", args->sigma_px, "Of a corner's coordinate (default: told by the residuals)")
+  command.add_option("--sigma-px", args->sigma_px, "σ of a corner's coordinate [px] (default: told by the residuals)")
       ->check(positive_number());
-  command.add_option("--sigma-angle", args->sigma_angle_rad, "Of an encoder's reading [rad] (default: told as well)")
+  command.add_option("--sigma-angle", args->sigma_angle_rad, "σ of an encoder's reading [rad] (default: told as well)")
       ->check(positive_number());
   command.add_flag("--scales", args->scales, "Estimate the scale of each encoder as well");
   command.add_option("--outliers", args->outliers, "drop: leave out views that contradict the others, by name; keep")

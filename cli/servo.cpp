@@ -108,7 +108,7 @@ void add_servo(Frame& frame) {
       ->check(finite_number() & CLI::Range(0.0, 10000.0));
   command.add_option("--true-gain", args->gain_factor, "The plant's gain as it is, over what is known of it")
       ->check(finite_number() & CLI::Range(0.01, 100.0));
-  command.add_option("--true-tau", args->tau_factor, "The same of its time constant")
+  command.add_option("--true-tau", args->tau_factor, "The plant's time constant as it is, over what is known of it")
       ->check(finite_number() & CLI::Range(0.01, 100.0));
   command.add_flag("--no-robustness", args->no_robustness, "Leave out the grid over gain and time constant");
   add_live_options(command, args->live);

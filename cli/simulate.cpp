@@ -130,7 +130,7 @@ void add_board_scenario(Frame& frame) {
        true},
       [args](Run& run) { return simulate_board(*args, run); });
   add_board_options(command, args->board);
-  command.add_option("--photos", args->photos, "How many")->check(CLI::Range(1, 100000))->capture_default_str();
+  command.add_option("--photos", args->photos, "How many photos")->check(CLI::Range(1, 100000))->capture_default_str();
   command.add_option("--camera", args->camera_file, "The true camera; without it one is made up")->type_name("FILE");
   command.add_option("--model", args->model, "Lens of the made-up camera")->type_name("NAME")->capture_default_str();
   command.add_option("--size", args->size, "Picture of the made-up camera")->type_name("WxH")->capture_default_str();

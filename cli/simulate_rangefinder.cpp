@@ -119,7 +119,7 @@ void add_rangefinder_scenario(Frame& frame) {
       [args](Run& run) { return simulate_rangefinder(*args, run); });
   command.add_option("--scenario", args->scenario, fmt::format("{}", fmt::join(rangefinder_scenarios(), ", ")))
       ->capture_default_str();
-  command.add_option("--shots", args->shots, "How many")->check(CLI::Range(1, 10000))->capture_default_str();
+  command.add_option("--shots", args->shots, "How many shots")->check(CLI::Range(1, 10000))->capture_default_str();
   command.add_option("--camera", args->camera, "The true camera; without it one is made up")->type_name("FILE");
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
     command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();

@@ -116,7 +116,7 @@ void add_rig_scenario(Frame& frame) {
   command.add_option("--boards", args->boards, "Places of the board")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  command.add_option("--views", args->views, "Of each board by each head, at most")
+  command.add_option("--views", args->views, "Views of each board by each head, at most")
       ->check(CLI::Range(2, 1000))
       ->capture_default_str();
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {

@@ -156,7 +156,7 @@ void add_options(CLI::App& command, Args& args) {
   word("--motion", args.motion, "sway (the paper's, eq. 27), pan, tilt, roll or still",
        {"sway", "pan", "tilt", "roll", "still"});
   word("--zoom", args.zoom, "none, ramp (eq. 29) or step (+10 % at 6 s)", {"none", "ramp", "step"});
-  command.add_option("--points", args.points, "How many")->check(CLI::Range(1, 5000))->capture_default_str();
+  command.add_option("--points", args.points, "How many points")->check(CLI::Range(1, 5000))->capture_default_str();
   command.add_option("--size", args.size, "Picture")->type_name("WxH")->capture_default_str();
   command.add_option("--intrinsics", args.k, "True fx,fy,cx,cy [px]")
       ->delimiter(',')
@@ -178,7 +178,7 @@ void add_options(CLI::App& command, Args& args) {
   number("--k1", args.k1, "True radial distortion", -0.4, 0.4);
   number("--tilt-deg", args.tilt_deg, "Mean tilt of a head", -80.0, 80.0);
   number("--delay", args.delay_s, "Pixels are so much later than the rotation [s]", -0.5, 0.5);
-  number("--duration", args.config.duration_s, "[s]", 0.1, 100000.0);
+  number("--duration", args.config.duration_s, "Length of the log [s]", 0.1, 100000.0);
   number("--rate", args.config.rate_hz, "Rows a second", 1.0, 10000.0);
   number("--sigma-px", args.config.sigma_px, "Noise of a pixel coordinate", 0.0, 100.0);
   number("--sigma-rate", args.config.sigma_rate_rad_per_s, "Noise of a rate [rad/s]", 0.0, 1.0);

@@ -76,17 +76,21 @@ void add_servo_scenario(Frame& frame) {
       ->check(CLI::IsMember({"angle", "rate"}))
       ->capture_default_str();
   command.add_flag("--chirp", args->chirp, "A sine that rises from 0.1 to 3 Hz, instead of a step after 0.5 s");
-  command.add_option("--gain", args->gain, "Per unit of command (default: 0.0567, rate 0.3)")->check(finite_number());
-  command.add_option("--unit", args->unit, "Of the gain")->check(CLI::IsMember({"deg", "rad"}))->capture_default_str();
+  command.add_option("--gain", args->gain, "Angle (or rate) for each unit of command (default: 0.0567, rate 0.3)")
+      ->check(finite_number());
+  command.add_option("--unit", args->unit, "Unit of the angle in the gain")
+      ->check(CLI::IsMember({"deg", "rad"}))
+      ->capture_default_str();
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
     command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
   };
   number("--tau-s", args->tau_s, "Time constant", 1e-4, 100.0);
   number("--latency-s", args->latency_s, "From a command to its first effect", 0.0, 10.0);
-  number("--max-rate-deg-s", args->max_rate_deg_s, "Of a rate plant", 1e-3, 1e6);
-  number("--max-acceleration-deg-s2", args->max_acceleration_deg_s2, "Of a rate plant", 1e-3, 1e9);
-  number("--amplitude", args->amplitude, "Of the command", 0.0, 1e9);
-  number("--duration-s", args->duration_s, "Of the log", 1e-3, 1e4);
+  number("--max-rate-deg-s", args->max_rate_deg_s, "With --kind rate: fastest turn [deg/s]", 1e-3, 1e6);
+  number("--max-acceleration-deg-s2", args->max_acceleration_deg_s2, "With --kind rate: largest acceleration [deg/s2]",
+         1e-3, 1e9);
+  number("--amplitude", args->amplitude, "Size of the step or sine, in units of command", 0.0, 1e9);
+  number("--duration-s", args->duration_s, "Length of the log [s]", 1e-3, 1e4);
   number("--rate-hz", args->rate_hz, "Rows a second", 1e-2, 1e5);
   number("--sigma-deg", args->sigma_deg, "Noise of the encoder", 0.0, 90.0);
   number("--step-deg", args->step_deg, "One count of the encoder; 0: it does not round", 0.0, 90.0);

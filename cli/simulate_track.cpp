@@ -114,7 +114,11 @@ void add_track_scenario(Frame& frame) {
        "    film/head_2 --angles film/angles.csv --rig film/rig.yaml --target colour:230,70,20 --truth film/truth.csv",
        true},
       [args](Run& run) { return simulate_track_events(*args, run); });
-  command.add_option("--scenario", args->scenario, fmt::format("{}", fmt::join(track_scenarios(), ", ")))
+  command
+      .add_option(
+          "--scenario", args->scenario,
+          "A slow circle; A2 the same, heads with offsets and turned mountings; B fast circle; C manoeuvre; D C, "
+          "hidden for a while; E B, pictures 100 ms late; F C, 100 ms late; G C, 20 and 30 pictures a second")
       ->capture_default_str();
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
     return command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high));

@@ -110,7 +110,9 @@ void add_underwater_scenario(Frame& frame) {
       [args](Run& run) { return simulate(*args, run); });
   UnderwaterScene& scene = args->scene;
   command.add_option("--camera", args->camera, "The camera (default: a strongly distorting one)")->type_name("FILE");
-  command.add_option("--frames", scene.num_frames, "How many")->check(CLI::Range(1, 100000))->capture_default_str();
+  command.add_option("--frames", scene.num_frames, "How many frames")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
   CLI::Option* points = command.add_option("--points", scene.num_points, "The board's 8, then others")
                             ->check(CLI::Range(1, 1000))
                             ->capture_default_str();
@@ -124,11 +126,12 @@ void add_underwater_scenario(Frame& frame) {
   number("--noise", args->look.noise, "With --video: sigma of a colour value's noise, of 255", 0.0, 100.0)
       ->needs(video);
   points->excludes(video);
-  number("--sigma-px", scene.sigma_px, "Noise of a pixel coordinate", 0.0, 100.0)->excludes(video);
-  number("--sigma-depth", scene.sigma_depth, "Of the depths in start.yaml, over the depth", 0.0, 1.0)->excludes(video);
+  number("--sigma-px", scene.sigma_px, "σ of a pixel coordinate [px]", 0.0, 100.0)->excludes(video);
+  number("--sigma-depth", scene.sigma_depth, "σ of the depths in start.yaml, over the depth", 0.0, 1.0)
+      ->excludes(video);
   number("--mismatches", scene.mismatches, "Share of the sights that show another place", 0.0, 1.0)->excludes(video);
   number("--blackout-from", scene.blackout_from_s, "Nothing is seen from this time on [s]", 0.0, 1e6)->excludes(video);
-  number("--blackout", scene.blackout_s, "For so long [s]", 0.0, 1e6)->excludes(video);
+  number("--blackout", scene.blackout_s, "How long nothing is seen [s]", 0.0, 1e6)->excludes(video);
 }
 
 }  // namespace alidade::cli

@@ -229,8 +229,8 @@ void add_options(CLI::App& command, Args& args) {
   const auto number = [&](const char* name, double& value, const char* help) {
     command.add_option(name, value, help)->check(positive_number())->capture_default_str();
   };
-  number("--sigma-px", args.config.tracker.sigma_px, "Of the target's pixel coordinate");
-  number("--sigma-angle", args.config.tracker.sigma_encoder_rad, "Of an encoder that the rig says none of [rad]");
+  number("--sigma-px", args.config.tracker.sigma_px, "σ of the target's pixel coordinate [px]");
+  number("--sigma-angle", args.config.tracker.sigma_encoder_rad, "σ of an encoder of which the rig says none [rad]");
   number("--min-depth", args.config.tracker.min_depth_m, "Working range, nearest [m]");
   number("--max-depth", args.config.tracker.max_depth_m, "Working range, furthest [m]");
   command.add_flag("--skip-bad", args.skip_bad, "Leave out rows that are wrong, by name, instead of stopping");

@@ -227,14 +227,25 @@ Csv Csv::parse(std::string_view text, const std::string& name) {
   return csv;
 }
 
+void Csv::require(std::span<const std::string> columns) const {
+  for (const std::string& column : columns)
+    if (!has(column)) refuse_missing(column);
+}
+
+void Csv::refuse_missing(const std::string& column, const std::string& hint) const {
+  constexpr std::size_t most = 12;  // a log of many points has hundreds
+  std::string known;
+  for (std::size_t i = 0; i < std::min(most, header_.size()); ++i) known += (i == 0 ? "" : ", ") + header_[i];
+  if (header_.size() > most) known += ", …";
+  throw InputError(name_ + ": has no column '" + column + "'" + hint + "; it has: " + known);
+}
+
 bool Csv::is_empty(std::size_t row, const std::string& column) const { return text(row, column).empty(); }
 
 const std::string& Csv::text(std::size_t row, const std::string& column) const {
   const auto found = columns_.find(column);
   if (found != columns_.end()) return rows_.at(row)[found->second];
-  std::string known;
-  for (const std::string& each : header_) known += (known.empty() ? "" : ", ") + each;
-  throw InputError(name_ + ": has no column '" + column + "'; it has: " + known);
+  refuse_missing(column);
 }
 
 double Csv::number(std::size_t row, const std::string& column) const {

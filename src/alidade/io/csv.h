@@ -5,6 +5,7 @@
 #include <istream>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -39,6 +40,10 @@ class Csv {
   [[nodiscard]] std::size_t line(std::size_t row) const { return lines_.at(row); }  ///< Where the row begins.
   [[nodiscard]] std::size_t num_rows() const { return rows_.size(); }
   [[nodiscard]] bool has(const std::string& column) const { return columns_.contains(column); }
+  /// Throws InputError naming the first of these columns that is missing, and those that there are.
+  void require(std::span<const std::string> columns) const;
+  /// Throws it for this column; `hint` begins with "; ".
+  [[noreturn]] void refuse_missing(const std::string& column, const std::string& hint = "") const;
   [[nodiscard]] const std::vector<std::string>& header() const { return header_; }
   [[nodiscard]] bool is_empty(std::size_t row, const std::string& column) const;
 

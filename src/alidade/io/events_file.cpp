@@ -19,13 +19,11 @@ struct Columns {
 std::string either(const Csv& csv, const std::string& first, const std::string& second, const std::string& hint = "") {
   if (csv.has(first)) return first;
   if (csv.has(second)) return second;
-  throw InputError(csv.name() + ": has no column '" + first + "'" + hint);
+  csv.refuse_missing(first, hint);
 }
 
 Columns columns_of(const Csv& csv) {
-  for (const char* name : {"t_capture_s", "head"}) {
-    if (!csv.has(name)) throw InputError(csv.name() + ": has no column '" + name + "'");
-  }
+  csv.require(std::vector<std::string>{"t_capture_s", "head"});
   const std::string hint = csv.has("pan_deg") || csv.has("tilt_deg") ? "; angles are radians" : "";
   Columns columns{either(csv, "pan_rad", "pan_rad_at_capture", hint),
                   either(csv, "tilt_rad", "tilt_rad_at_capture", hint),
@@ -35,9 +33,7 @@ Columns columns_of(const Csv& csv) {
                   !csv.has("u_px") && csv.has("du_px")};
   columns.u = columns.from_centre ? "du_px" : "u_px";
   columns.v = columns.from_centre ? "dv_px" : "v_px";
-  for (const std::string& name : {columns.u, columns.v}) {
-    if (!csv.has(name)) throw InputError(csv.name() + ": has no column '" + name + "'");
-  }
+  csv.require(std::vector<std::string>{columns.u, columns.v});
   return columns;
 }
 

@@ -91,9 +91,7 @@ SightsFile read_sights(const std::filesystem::path& file, const SightsOptions& o
   const Csv csv = Csv::read(file);
   for (const char* name : {"frame", "t_s", "point_id", "u_px", "v_px"}) {
     if (options.rate_hz > 0.0 && std::string(name) == "t_s") continue;
-    if (!csv.has(name))
-      throw InputError(csv.name() + ": has no column '" + name + "'" +
-                       (std::string(name) == "t_s" ? "; give it, or --rate" : ""));
+    if (!csv.has(name)) csv.refuse_missing(name, std::string(name) == "t_s" ? "; give it, or --rate" : "");
   }
   SightsFile read;
   for_each_row(csv, options.skip_bad, read.skipped, [&](std::size_t row) { read_row(csv, row, options, read.frames); });

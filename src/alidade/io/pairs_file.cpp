@@ -18,8 +18,7 @@ Names names_in(const Csv& csv) {
   const auto either = [&](const char* first, const char* second) { return csv.has(second) ? second : first; };
   const Names names{either("frame_a", "image_a"), either("frame_b", "image_b"), either("ua_px", "ua"),
                     either("va_px", "va"),        either("ub_px", "ub"),        either("vb_px", "vb")};
-  for (const std::string& name : {names.frame_a, names.frame_b, names.ua, names.va, names.ub, names.vb})
-    if (!csv.has(name)) throw InputError(csv.name() + ": has no column '" + name + "'");
+  csv.require(std::vector<std::string>{names.frame_a, names.frame_b, names.ua, names.va, names.ub, names.vb});
   return names;
 }
 

@@ -22,7 +22,7 @@ std::string either(const Csv& csv, const char* first, const char* second) {
 Columns columns_of(const Csv& csv) {
   if (!csv.has("range_m")) {
     const std::string hint = csv.has("range_mm") ? "; ranges are metres" : "";
-    throw InputError(csv.name() + ": has no column 'range_m'" + hint);
+    csv.refuse_missing("range_m", hint);
   }
   const Columns columns{either(csv, "u", "u_px"), either(csv, "v", "v_px"), either(csv, "d", "d_m")};
   if (columns.u.empty() != columns.v.empty())

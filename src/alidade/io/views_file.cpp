@@ -25,11 +25,9 @@ Columns columns_of(const Csv& csv) {
     if (csv.has(name)) continue;
     const std::string axis = std::string(name).substr(0, std::string(name).find('_'));
     const bool in_degrees = csv.has(axis + "_deg");
-    throw InputError(csv.name() + ": has no column '" + name + "'" +
-                     (in_degrees ? ", but '" + axis + "_deg'; angles are radians" : ""));
+    csv.refuse_missing(name, in_degrees ? ", but '" + axis + "_deg'; angles are radians" : "");
   }
-  for (const char* name : {"view", "board", "head"})
-    if (!csv.has(name)) throw InputError(csv.name() + ": has no column '" + name + "'");
+  csv.require(std::vector<std::string>{"view", "board", "head"});
   Columns columns{csv.has("u") ? "u" : "u_px", csv.has("v") ? "v" : "v_px", csv.has("photo")};
   if (columns.has_photo) return columns;
   for (const std::string& name : {std::string("corner"), columns.u, columns.v}) {

@@ -4,6 +4,7 @@
 #include "alidade/rangefinder/next_shot.h"
 #include "alidade/rangefinder/rangefinder.h"
 #include "alidade/simulate/rangefinder.h"
+#include "run_benchmarks.h"
 
 namespace alidade::bench {
 namespace {
@@ -53,9 +54,4 @@ void add_all() {
 }  // namespace
 }  // namespace alidade::bench
 
-int main(int argc, char** argv) {
-  benchmark::Initialize(&argc, argv);
-  alidade::bench::add_all();
-  benchmark::RunSpecifiedBenchmarks();
-  return 0;
-}
+int main(int argc, char** argv) { return alidade::bench::run_benchmarks(argc, argv, alidade::bench::add_all); }

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "alidade/loop/servo_loop.h"
+#include "run_benchmarks.h"
 
 namespace alidade::bench {
 namespace {
@@ -48,9 +49,4 @@ void add_all() {
 }  // namespace
 }  // namespace alidade::bench
 
-int main(int argc, char** argv) {
-  benchmark::Initialize(&argc, argv);
-  alidade::bench::add_all();
-  benchmark::RunSpecifiedBenchmarks();
-  return 0;
-}
+int main(int argc, char** argv) { return alidade::bench::run_benchmarks(argc, argv, alidade::bench::add_all); }

@@ -6,6 +6,7 @@
 
 #include "alidade/simulate/track.h"
 #include "alidade/track/tracker.h"
+#include "run_benchmarks.h"
 
 namespace alidade::bench {
 namespace {
@@ -38,9 +39,4 @@ void add_all() {
 }  // namespace
 }  // namespace alidade::bench
 
-int main(int argc, char** argv) {
-  benchmark::Initialize(&argc, argv);
-  alidade::bench::add_all();
-  benchmark::RunSpecifiedBenchmarks();
-  return 0;
-}
+int main(int argc, char** argv) { return alidade::bench::run_benchmarks(argc, argv, alidade::bench::add_all); }

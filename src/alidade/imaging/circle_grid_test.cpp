@@ -11,30 +11,15 @@
 #include "alidade/imaging/find_board.h"
 #include "alidade/simulate/board_photos.h"
 #include "alidade/simulate/example_camera.h"
+#include "alidade/testing/point_score.h"
 
 namespace alidade {
 namespace {
 
+using testing::PointScore;
+
 const Board symmetric{BoardKind::circles, 8, 6, 0.03, 0.015, ""};
 const Board asymmetric{BoardKind::asymmetric_circles, 4, 11, 0.02, 0.014, ""};
-
-struct Score {
-  int num_points = 0, num_found = 0;
-  double sum_squares = 0.0, sum_chi2 = 0.0, worst_px = 0.0;
-  [[nodiscard]] double rms_px() const { return std::sqrt(sum_squares / (2 * num_found)); }
-  [[nodiscard]] double chi2_per_dof() const { return sum_chi2 / (2 * num_found); }
-
-  void add(const BoardView& view, const std::vector<Eigen::Vector2d>& truth) {
-    num_points += static_cast<int>(truth.size());
-    for (const Corner& corner : view.corners) {
-      const Eigen::Vector2d error = corner.px - truth[static_cast<std::size_t>(corner.index)];
-      sum_squares += error.squaredNorm();
-      sum_chi2 += error.dot(corner.cov.inverse() * error);
-      worst_px = std::max(worst_px, error.norm());
-      ++num_found;
-    }
-  }
-};
 
 BoardScene scene_of(const Board& board, int num_photos) {
   return draw_board_scene(*example_camera("brown", 800, 600), board,
@@ -44,7 +29,7 @@ BoardScene scene_of(const Board& board, int num_photos) {
 TEST(CircleGrid, FindsTheImagesOfTheCentres) {
   for (const Board& board : {symmetric, asymmetric}) {
     const BoardScene scene = scene_of(board, 6);
-    Score score;
+    PointScore score;
     for (std::size_t i = 0; i < scene.cam_from_board.size(); ++i) {
       const BoardDetection found = find_board(render_board_photo(scene, i, {}, 1), board);
       ASSERT_TRUE(found.found()) << found.reason;
@@ -61,7 +46,7 @@ TEST(CircleGrid, FindsTheImagesOfTheCentres) {
 TEST(CircleGrid, RefoundCentresAreAsGoodAsTheySay) {
   for (const Board& board : {symmetric, asymmetric}) {
     const BoardScene scene = scene_of(board, 6);
-    Score score;
+    PointScore score;
     for (std::size_t i = 0; i < scene.cam_from_board.size(); ++i) {
       const cv::Mat photo = render_board_photo(scene, i, {}, 1);
       const BoardDetection first = find_board(photo, board);

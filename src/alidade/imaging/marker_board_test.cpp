@@ -11,31 +11,15 @@
 #include "alidade/imaging/find_board.h"
 #include "alidade/simulate/board_photos.h"
 #include "alidade/simulate/example_camera.h"
+#include "alidade/testing/point_score.h"
 
 namespace alidade {
 namespace {
 
+using testing::PointScore;
+
 const Board charuco{BoardKind::charuco, 8, 5, 0.03, 0.022, "DICT_5X5_100"};
 const Board aprilgrid{BoardKind::aprilgrid, 6, 5, 0.03, 0.009, ""};
-
-/// Errors of found against true points, over the photos of a scene.
-struct MarkerScore {
-  int num_points = 0, num_found = 0;
-  double sum_squares = 0.0, sum_chi2 = 0.0, worst_px = 0.0;
-  [[nodiscard]] double rms_px() const { return std::sqrt(sum_squares / (2 * num_found)); }
-  [[nodiscard]] double chi2_per_dof() const { return sum_chi2 / (2 * num_found); }
-
-  void add(const BoardView& view, const std::vector<Eigen::Vector2d>& truth) {
-    num_points += static_cast<int>(truth.size());
-    for (const Corner& corner : view.corners) {
-      const Eigen::Vector2d error = corner.px - truth[static_cast<std::size_t>(corner.index)];
-      sum_squares += error.squaredNorm();
-      sum_chi2 += error.dot(corner.cov.inverse() * error);
-      worst_px = std::max(worst_px, error.norm());
-      ++num_found;
-    }
-  }
-};
 
 BoardScene scene_of(const Board& board, int num_photos) {
   return draw_board_scene(*example_camera("brown", 800, 600), board,
@@ -45,7 +29,7 @@ BoardScene scene_of(const Board& board, int num_photos) {
 TEST(MarkerBoard, FindsThePointsAsWellAsItSays) {
   for (const Board& board : {charuco, aprilgrid}) {
     const BoardScene scene = scene_of(board, 8);
-    MarkerScore score;
+    PointScore score;
     for (std::size_t i = 0; i < scene.cam_from_board.size(); ++i) {
       const BoardDetection found = find_board(render_board_photo(scene, i, {}, 1), board);
       ASSERT_TRUE(found.found()) << found.reason;
@@ -61,7 +45,7 @@ TEST(MarkerBoard, FindsThePointsAsWellAsItSays) {
 TEST(MarkerBoard, TakesAPartForWhatItIs) {
   for (const Board& board : {charuco, aprilgrid}) {
     const BoardScene scene = scene_of(board, 3);
-    MarkerScore score;
+    PointScore score;
     for (std::size_t i = 0; i < scene.cam_from_board.size(); ++i) {
       cv::Mat photo = render_board_photo(scene, i, {}, 1);
       const std::vector<Eigen::Vector2d> truth = true_corners(scene, i);
@@ -80,7 +64,7 @@ TEST(MarkerBoard, TakesAPartForWhatItIs) {
 TEST(MarkerBoard, RefindsThePointsOfAKnownPose) {
   for (const Board& board : {charuco, aprilgrid}) {
     const BoardScene scene = scene_of(board, 2);
-    MarkerScore score;
+    PointScore score;
     for (std::size_t i = 0; i < scene.cam_from_board.size(); ++i) {
       const cv::Mat photo = render_board_photo(scene, i, {}, 1);
       const BoardView nothing{"a.png", {}};

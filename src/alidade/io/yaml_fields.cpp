@@ -48,7 +48,8 @@ std::string number_list(const std::vector<double>& values) {
 Fields::Fields(const YAML::Node& map, std::string file, std::string prefix)
     : map_(map), file_(std::move(file)), prefix_(std::move(prefix)) {
   if (!map_.IsMap())
-    refuse(file_, prefix_.empty() ? "" : prefix_.substr(0, prefix_.size() - 1), "is not a table of keys, `key: value` a line");
+    refuse(file_, prefix_.empty() ? "" : prefix_.substr(0, prefix_.size() - 1),
+           "is not a table of keys, `key: value` a line");
   std::set<std::string> seen;
   for (const std::string& key : keys()) {
     if (!seen.insert(key).second) refuse(file_, full(key), "stands twice");

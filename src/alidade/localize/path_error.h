@@ -1,11 +1,11 @@
 #pragma once
 
 #include <limits>
-#include <optional>
 #include <span>
 #include <vector>
 
 #include "alidade/geometry/rigid3.h"
+#include "alidade/geometry/similarity.h"
 
 namespace alidade {
 
@@ -14,18 +14,6 @@ struct TimedPose {
   double t_s = 0.0;
   Rigid3 world_from_cam;
 };
-
-/// b = scale · R a + t.
-struct Similarity {
-  Rigid3 b_from_a;  ///< R and t.
-  double scale = 1.0;
-};
-
-/// The similarity (or with `is_rigid` the motion, scale 1) that takes points a to points b with least squares.
-/// None for fewer than three points, or all on a line. S. Umeyama, "Least-Squares Estimation of Transformation
-/// Parameters Between Two Point Patterns", PAMI 13(4), 1991.
-[[nodiscard]] std::optional<Similarity> aligned(std::span<const Eigen::Vector3d> a, std::span<const Eigen::Vector3d> b,
-                                                bool is_rigid);
 
 /// How far an estimated path is from the true one. Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM
 /// Systems", IROS 2012: ATE is the RMS distance of positions after alignment; RPE the RMS translation of

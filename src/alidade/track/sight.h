@@ -1,28 +1,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstddef>
-#include <limits>
 #include <optional>
 
 #include "alidade/estimation/iterated_update.h"
 #include "alidade/pantilt/head.h"
+#include "alidade/pantilt/target_sight.h"
 
 namespace alidade {
-
-/// One sight of the target: where a head's camera saw it, and what the encoders read at that instant.
-struct TargetSight {
-  double t_capture_s = 0.0;  ///< When the picture was taken and the encoders read.
-  double t_arrival_s = 0.0;  ///< When it was known; ≥ t_capture_s.
-  std::size_t head = 0;      ///< Place in the rig's list of heads.
-  Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();
-  Eigen::Vector2d px = Eigen::Vector2d::Zero();
-  double sigma_px = 0.0;  ///< Of one coordinate of this sight; 0: that of all.
-};
-
-[[nodiscard]] inline double sigma_px_of(const TargetSight& sight, double of_all_px) {
-  return sight.sigma_px > 0.0 ? sight.sigma_px : of_all_px;
-}
 
 /// h and R of one sight: the head as it stood, its camera, and the noise of pixel and encoder. Lives as long as the
 /// camera.

@@ -140,17 +140,6 @@ TrackStep step_of(const XiahouFilter& filter, double t_s, const Eigen::Vector3d&
 
 }  // namespace
 
-std::optional<Eigen::Vector3d> TrueTrack::at(double time_s) const {
-  constexpr double slack_s = 1e-9;
-  if (t_s.empty() || !(time_s >= t_s.front() - slack_s) || !(time_s <= t_s.back() + slack_s)) return std::nullopt;
-  const auto after = std::ranges::lower_bound(t_s, time_s);
-  const auto i = static_cast<std::size_t>(after - t_s.begin());
-  if (i == 0) return position.front();
-  if (i == t_s.size()) return position.back();
-  const double share = (time_s - t_s[i - 1]) / (t_s[i] - t_s[i - 1]);
-  return Eigen::Vector3d((1.0 - share) * position[i - 1] + share * position[i]);
-}
-
 double position_nees(const TrackStep& step, const TrueTrack& truth) {
   const auto position = truth.at(step.t_s);
   if (!step.has_belief || !position) return not_there;

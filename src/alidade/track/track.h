@@ -14,15 +14,6 @@
 
 namespace alidade {
 
-/// A target's true position at some times, in order of time.
-struct TrueTrack {
-  std::vector<double> t_s;
-  std::vector<Eigen::Vector3d> position;
-
-  /// Between two times: on the straight line. None before the first and after the last.
-  [[nodiscard]] std::optional<Eigen::Vector3d> at(double t_s) const;
-};
-
 struct TrackConfig {
   TrackerConfig tracker;
   bool find_sigma_a = true;  ///< Take the σ_a that makes the innovations most probable, not the tracker's.

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+namespace alidade {
+
+/// One sight of the target: where a head's camera saw it, and what the encoders read at that instant.
+struct TargetSight {
+  double t_capture_s = 0.0;  ///< When the picture was taken and the encoders read.
+  double t_arrival_s = 0.0;  ///< When it was known; ≥ t_capture_s.
+  std::size_t head = 0;      ///< Place in the rig's list of heads.
+  Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  double sigma_px = 0.0;  ///< Of one coordinate of this sight; 0: that of all.
+};
+
+[[nodiscard]] inline double sigma_px_of(const TargetSight& sight, double of_all_px) {
+  return sight.sigma_px > 0.0 ? sight.sigma_px : of_all_px;
+}
+
+/// A target's true position at some times, in order of time.
+struct TrueTrack {
+  std::vector<double> t_s;
+  std::vector<Eigen::Vector3d> position;
+
+  /// Between two times: on the straight line. None before the first and after the last.
+  [[nodiscard]] std::optional<Eigen::Vector3d> at(double t_s) const;
+};
+
+}  // namespace alidade

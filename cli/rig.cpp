@@ -18,6 +18,7 @@
 #include "cli/commands.h"
 #include "cli/frame.h"
 #include "cli/option_checks.h"
+#include "cli/rig_moving.h"
 
 namespace alidade::cli {
 namespace {
@@ -31,6 +32,7 @@ struct Args {
   double sigma_px = 0.0, sigma_angle_rad = 0.0;
   bool scales = false, skip_bad = false;
   std::string outliers = "drop";
+  MovingTargetArgs moving;
 };
 
 RigConfig config_from(const Args& args) {
@@ -100,6 +102,21 @@ void find_corners(const Args& args, const Board& board, const std::map<int, Came
   run.lap("find_boards");
 }
 
+/// A corner beyond the picture is of another camera.
+void check_pictures(const Args& args, const std::vector<HeadView>& views, const std::map<int, Camera>& cameras) {
+  for (const HeadView& view : views) {
+    const Camera& camera = cameras.at(view.head);
+    for (const Corner& corner : view.seen.corners) {
+      const Eigen::Vector2d& px = corner.px;
+      if (px.minCoeff() >= -1.0 && px.x() <= camera.width_px && px.y() <= camera.height_px) continue;
+      throw InputError(fmt::format(
+          "{}: {}: a corner at ({:.1f}, {:.1f}) is outside the picture of head {}'s camera, {} x {} px: "
+          "is it another camera's file?",
+          args.views.string(), view.seen.photo, px.x(), px.y(), view.head, camera.width_px, camera.height_px));
+    }
+  }
+}
+
 void summarize(std::span<const HeadView> views, const RigReport& report, bool is_given, Run& run) {
   for (std::size_t v = 0; v < report.views.size() && v < views.size(); ++v) {
     const HeadViewFit& fit = report.views[v];
@@ -139,6 +156,10 @@ void add_files(const RigReport& report, Run& run) {
 }
 
 ExitCode rig(const Args& args, Run& run) {
+  if (args.moving.is_asked)
+    return rig_by_moving_target(args.views, args.cameras, args.moving, args.sigma_px, args.skip_bad, run);
+  if (args.board.size.empty())
+    throw UsageError("--board is required (or --moving-target, for cameras that do not turn)");
   const Board board = board_from(args.board);
   const RigConfig config = config_from(args);
   run.add_input("views", args.views);
@@ -152,6 +173,7 @@ ExitCode rig(const Args& args, Run& run) {
     find_corners(args, board, cameras, file.views, run);
     run.document.counts.given = run.document.counts.skipped.size();
   }
+  check_pictures(args, file.views, cameras);
   const RigReport report = calibrate_rig(file.views, points_in_board(board), cameras, config, run.progress);
   run.lap("solve");
   const Verdict verdict = rig_verdict(report, config);
@@ -168,9 +190,11 @@ void add_rig(Frame& frame) {
   CLI::App& command = frame.add_command(
       {.name = "rig",
        .summary = "Axes, offsets and mounting of pan-tilt heads, and where they stand to each other",
-       .examples = "alidade rig views.csv --camera camera.yaml --board 9x6 --square 0.025\n"
-                   "alidade rig views.csv --camera left.yaml --camera right.yaml --board 9x6 --square 0.025\n"
-                   "alidade rig views.csv --camera camera.yaml --board 9x6 --square 0.025 --sigma-angle 0.0003\n"},
+       .examples =
+           "alidade rig views.csv --camera camera.yaml --board 9x6 --square 0.025\n"
+           "alidade rig views.csv --camera left.yaml --camera right.yaml --board 9x6 --square 0.025\n"
+           "alidade rig views.csv --camera camera.yaml --board 9x6 --square 0.025 --sigma-angle 0.0003\n"
+           "alidade rig sights.csv --moving-target --clocks 60 --truth gnss.csv --camera a.yaml --camera b.yaml\n"},
       [args](Run& run) { return rig(*args, run); });
   command
       .add_option("views", args->views,
@@ -184,7 +208,8 @@ void add_rig(Frame& frame) {
       ->required()
       ->expected(1)
       ->take_all();
-  add_board_options(command, args->board);
+  add_board_options(command, args->board, false);
+  add_moving_target_options(command, args->moving);
   command.add_option("--sigma-px", args->sigma_px, "σ of a corner's coordinate [px] (default: told by the residuals)")
       ->check(positive_number());
   command.add_option("--sigma-angle", args->sigma_angle_rad, "σ of an encoder's reading [rad] (default: told as well)")

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <set>
 
 #include "alidade/io/head_column.h"
 #include "alidade/io/table_rows.h"
@@ -22,11 +24,12 @@ std::string either(const Csv& csv, const std::string& first, const std::string& 
   csv.refuse_missing(first, hint);
 }
 
-Columns columns_of(const Csv& csv) {
+Columns columns_of(const Csv& csv, bool stands_still) {
   csv.require(std::vector<std::string>{"t_capture_s", "head"});
   const std::string hint = csv.has("pan_deg") || csv.has("tilt_deg") ? "; angles are radians" : "";
-  Columns columns{either(csv, "pan_rad", "pan_rad_at_capture", hint),
-                  either(csv, "tilt_rad", "tilt_rad_at_capture", hint),
+  const bool has_angles = !stands_still || !hint.empty() || csv.has("pan_rad") || csv.has("tilt_rad");
+  Columns columns{has_angles ? either(csv, "pan_rad", "pan_rad_at_capture", hint) : "",
+                  has_angles ? either(csv, "tilt_rad", "tilt_rad_at_capture", hint) : "",
                   "",
                   "",
                   csv.has("t_arrival_s"),
@@ -42,20 +45,22 @@ Eigen::Vector2d principal_point(const Camera& camera) {
   return {values[2], values[3]};
 }
 
+/// `newest_s`: arrival of the newest row so far; of one clock for all heads, or one for each.
 TargetSight read_row(const Csv& csv, std::size_t row, const Columns& columns, std::span<const RigHead> heads,
-                     double newest_arrival_s) {
+                     std::span<const double> newest_s) {
   TargetSight sight;
+  sight.head = head_in_row(csv, row, heads);
   sight.t_capture_s = csv.number(row, "t_capture_s");
   sight.t_arrival_s = columns.has_arrival ? csv.number(row, "t_arrival_s") : sight.t_capture_s;
   const std::string clock = columns.has_arrival ? "t_arrival_s" : "t_capture_s";
   if (!(sight.t_arrival_s >= sight.t_capture_s))
     throw InputError(csv.where(row, "t_arrival_s") + ": arrives before its capture");
-  if (!(sight.t_arrival_s >= newest_arrival_s))
+  if (!(sight.t_arrival_s >= newest_s[newest_s.size() > 1 ? sight.head : 0]))
     throw InputError(csv.where(row, clock) + ": '" + csv.text(row, clock) +
                      "' runs backwards; rows stand in order of arrival");
-  sight.head = head_in_row(csv, row, heads);
   constexpr double most_px = 1e6;
-  sight.pan_tilt_rad = {angle_in_row(csv, row, columns.pan), angle_in_row(csv, row, columns.tilt)};
+  if (!columns.pan.empty())
+    sight.pan_tilt_rad = {angle_in_row(csv, row, columns.pan), angle_in_row(csv, row, columns.tilt)};
   sight.px = {csv.number(row, columns.u), csv.number(row, columns.v)};
   if (!(sight.px.cwiseAbs().maxCoeff() < most_px)) throw InputError(csv.where(row, columns.u) + ": is in no picture");
   if (csv.has("sigma_px") && !csv.is_empty(row, "sigma_px")) sight.sigma_px = csv.positive(row, "sigma_px");
@@ -72,15 +77,31 @@ std::string cells_of(const Belief<6>& belief) {
 
 }  // namespace
 
+std::vector<int> heads_in_events(const std::filesystem::path& file) {
+  const Csv csv = Csv::read(file);
+  if (!csv.has("head")) throw InputError(csv.name() + ": has no column 'head'");
+  std::set<int> ids;
+  for (std::size_t row = 0; row < csv.num_rows(); ++row)
+    ids.insert(static_cast<int>(csv.integer(row, "head", 0, 1000000)));
+  return {ids.begin(), ids.end()};
+}
+
 EventsFile read_events(const std::filesystem::path& file, std::span<const RigHead> heads,
                        const EventsOptions& options) {
   const Csv csv = Csv::read(file);
-  const Columns columns = columns_of(csv);
+  const Columns columns = columns_of(csv, options.stands_still);
   EventsFile read;
-  double newest_s = -1e300;
+  std::vector<double> newest_s(options.stands_still ? heads.size() : 1, -1e300);
+  std::vector<std::optional<Eigen::Vector2d>> first_rad(heads.size());
   for_each_row(csv, options.skip_bad, read.skipped, [&](std::size_t row) {
-    read.sights.push_back(read_row(csv, row, columns, heads, newest_s));
-    newest_s = read.sights.back().t_arrival_s;
+    const TargetSight sight = read_row(csv, row, columns, heads, newest_s);
+    const Eigen::Vector2d& stood_rad =
+        *(first_rad[sight.head] ? first_rad[sight.head] : first_rad[sight.head] = sight.pan_tilt_rad);
+    constexpr double still_rad = 1e-6;
+    if (options.stands_still && (sight.pan_tilt_rad - stood_rad).cwiseAbs().maxCoeff() > still_rad)
+      throw InputError(csv.where(row, columns.pan) + ": the head turns; this is for cameras that stand still");
+    newest_s[options.stands_still ? sight.head : 0] = sight.t_arrival_s;
+    read.sights.push_back(sight);
   });
   if (read.sights.empty()) throw InputError(file.string() + ": has no events; at least one row is needed");
   return read;

@@ -18,7 +18,13 @@ struct EventsFile {
 
 struct EventsOptions {
   bool skip_bad = false;  ///< Leave out rows that are wrong, by name.
+  /// Cameras that do not turn, each with a clock of its own: `pan_rad,tilt_rad` may be left out (zero) but may not
+  /// change, and times run forwards head by head alone.
+  bool stands_still = false;
 };
+
+/// Ids in column `head`, in order of size.
+[[nodiscard]] std::vector<int> heads_in_events(const std::filesystem::path& file);
 
 /// Reads `t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px`: `head` is an id of the rig, angles are those at
 /// capture (also `pan_rad_at_capture`), `t_arrival_s` may be left out. `du_px,dv_px` in place of the pixel are offsets

@@ -45,23 +45,6 @@ JsonValue head_sigma(int id, const HeadVector& sigma) {
   return value;
 }
 
-void fill_heads(const Rig& rig, ResultDocument& document) {
-  JsonValue heads = JsonValue::list(), sigmas = JsonValue::list();
-  for (std::size_t h = 0; h < rig.heads.size(); ++h) {
-    const int id = rig.heads[h].head.id;
-    heads.push_back(head_value(rig.heads[h].head));
-    const HeadVector variance =
-        rig.cov.diagonal().segment<num_head_params>(num_head_params * static_cast<Eigen::Index>(h));
-    sigmas.push_back(head_sigma(id, variance.cwiseMax(0.0).cwiseSqrt()));
-    for (const char* name : head_param_names)
-      document.covariance_names.push_back("head" + std::to_string(id) + "." + name);
-  }
-  document.estimate["heads"] = std::move(heads);
-  document.stddev["heads"] = std::move(sigmas);
-  for (Eigen::Index i = 0; i < rig.cov.rows(); ++i)
-    for (Eigen::Index j = i; j < rig.cov.cols(); ++j) document.covariance_upper.push_back(rig.cov(i, j));
-}
-
 JsonValue covers_value(const RigReport& report) {
   JsonValue covers = JsonValue::list();
   for (const HeadCover& cover : report.covers) {
@@ -203,6 +186,23 @@ DataTable views_table(std::span<const HeadView> views, const RigReport& report) 
 }
 
 }  // namespace
+
+void fill_heads(const Rig& rig, ResultDocument& document) {
+  JsonValue heads = JsonValue::list(), sigmas = JsonValue::list();
+  for (std::size_t h = 0; h < rig.heads.size(); ++h) {
+    const int id = rig.heads[h].head.id;
+    heads.push_back(head_value(rig.heads[h].head));
+    const HeadVector variance =
+        rig.cov.diagonal().segment<num_head_params>(num_head_params * static_cast<Eigen::Index>(h));
+    sigmas.push_back(head_sigma(id, variance.cwiseMax(0.0).cwiseSqrt()));
+    for (const char* name : head_param_names)
+      document.covariance_names.push_back("head" + std::to_string(id) + "." + name);
+  }
+  document.estimate["heads"] = std::move(heads);
+  document.stddev["heads"] = std::move(sigmas);
+  for (Eigen::Index i = 0; i < rig.cov.rows(); ++i)
+    for (Eigen::Index j = i; j < rig.cov.cols(); ++j) document.covariance_upper.push_back(rig.cov(i, j));
+}
 
 void fill_rig(std::span<const HeadView> views, const RigReport& report, ResultDocument& document) {
   document.counts.given += views.size();

@@ -10,4 +10,7 @@ namespace alidade {
 /// Puts a rig into a result: heads, chi2_per_dof, rms_px, noise, covers, the covariance, and the views as a table.
 void fill_rig(std::span<const HeadView> views, const RigReport& report, ResultDocument& document);
 
+/// The heads alone, with their σ and covariance.
+void fill_heads(const Rig& rig, ResultDocument& document);
+
 }  // namespace alidade

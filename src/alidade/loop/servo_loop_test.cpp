@@ -11,12 +11,15 @@
 namespace alidade {
 namespace {
 
-ServoFigures figures(const ServoScene& scene, ControllerKind kind, int num_seeds = 8) {
+/// Settings were chosen on seeds below a thousand.
+constexpr std::uint64_t first_seed = 7001;
+
+ServoFigures figures(const ServoScene& scene, ControllerKind kind, std::uint64_t num_seeds = 8) {
   ServoConfig config;
   config.controller = kind;
   std::vector<ServoFigures> runs;
-  for (int seed = 1; seed <= num_seeds; ++seed)
-    runs.push_back(run_servo(scene, config, static_cast<std::uint64_t>(seed)).figures);
+  for (std::uint64_t seed = first_seed; seed < first_seed + num_seeds; ++seed)
+    runs.push_back(run_servo(scene, config, seed).figures);
   return put_together(runs);
 }
 
@@ -91,8 +94,6 @@ TEST(ServoLoop, SwayOfThirtyDegreesASecond) {
     for (const double gain : {0.8, 1.2}) {
       for (const double tau : {0.7, 1.3}) {
         scene.mismatch = {gain, tau};
-        // What is too strong and too slow at once leaves the paper's kp and ki 8.1 px.
-        if (kind == ControllerKind::feedforward && gain == 1.2 && tau == 1.3) continue;
         EXPECT_LE(figures(scene, kind).rms_px, 8.0) << controller_name(kind) << gain << tau;
       }
     }
@@ -118,7 +119,7 @@ double overshoot_px(const ServoScene& scene, ControllerKind kind) {
   for (int seed = 1; seed <= num_seeds; ++seed) {
     Eigen::Vector2d jump = Eigen::Vector2d::Zero();
     double most = 0.0;
-    for (const ServoRow& row : run_servo(scene, config, static_cast<std::uint64_t>(seed)).rows) {
+    for (const ServoRow& row : run_servo(scene, config, first_seed + static_cast<std::uint64_t>(seed)).rows) {
       if (row.head != 0 || row.t_s < scene.path.jump_at_s - 1e-9) continue;
       if (jump.isZero()) jump = row.error_px.normalized();
       most = std::max(most, -row.error_px.dot(jump));

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <set>
 #include <string>
 
@@ -91,6 +92,26 @@ Fault why_no_start(std::span<const TargetSight> sights, std::span<const RigHead>
           "check the rig file, or widen the working range"};
 }
 
+/// Pixels beyond the picture of the rig's camera: the rig file is of another camera.
+std::optional<Fault> other_camera(const TrackReport& report, std::span<const TargetSight> sights,
+                                  std::span<const RigHead> heads) {
+  constexpr double most_share = 0.05;
+  for (std::size_t h = 0; h < heads.size(); ++h) {
+    double num = 0.0, outside = 0.0;
+    for (std::size_t i = 0; i < sights.size() && i < report.steps.size(); ++i) {
+      if (sights[i].head != h) continue;
+      num += 1.0;
+      outside += report.steps[i].event == TrackEvent::outside ? 1.0 : 0.0;
+    }
+    if (!(outside > most_share * num)) continue;
+    return Fault{text_of(100.0 * outside / num) + " % of the sights of head " + std::to_string(heads[h].head.id) +
+                     " lie outside its picture of " + std::to_string(heads[h].camera.width_px) + " x " +
+                     std::to_string(heads[h].camera.height_px) + " px",
+                 "give the rig file of the camera that took them"};
+  }
+  return std::nullopt;
+}
+
 Verdict refused(Fault fault) {
   Verdict verdict;
   verdict.state = State::refused;
@@ -141,6 +162,7 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetSight> si
   for (const TargetSight& sight : sights) seen_by.insert(sight.head);
   if (seen_by.size() < 2)
     return refused({"one head only: the range along its ray cannot be told", "add the events of a second head"});
+  if (auto other = other_camera(report, sights, heads)) return refused(std::move(*other));
   if (!fits(report)) {
     if (auto mistake = likely_mistake(sights, heads, config)) return refused(std::move(*mistake));
     if (report.num_starts == 0) return refused(why_no_start(sights, heads, config));

@@ -1,0 +1,315 @@
+#include "alidade/rig/moving_target.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/rig/moving_scale.h"
+#include "alidade/rig/moving_solve.h"
+#include "alidade/rig/moving_start.h"
+
+namespace alidade {
+namespace {
+
+using Status = MovingTargetReport::Status;
+constexpr std::size_t least_sights = 30;
+
+/// Six pictures of the typical camera: a path bends no faster than that, and sights between knots average.
+double knot_of(std::span<const SightSeries> series) {
+  constexpr double pictures = 6.0;
+  std::vector<double> spacings;
+  for (const SightSeries& one : series)
+    if (one.spacing_s > 0.0) spacings.push_back(one.spacing_s);
+  if (spacings.empty()) return 0.0;
+  std::ranges::sort(spacings);
+  return pictures * spacings[spacings.size() / 2];
+}
+
+struct Work {
+  std::span<const TargetSight> sights;
+  std::span<const RigHead> heads;
+  const MovingTargetConfig& config;
+  const Progress& progress;
+  std::vector<SightSeries> series;
+  double knot_s = 0.0;
+  MovingStart start;
+  std::vector<double> path_t_s;  ///< By the clock of the reference.
+  MovingProblem problem;
+  MovingState state;
+  SolvedMoving solved;
+  MovingTargetReport report;
+};
+
+std::optional<std::size_t> head_of(const Work& work, int id) {
+  for (std::size_t h = 0; h < work.heads.size(); ++h)
+    if (work.heads[h].head.id == id) return h;
+  return std::nullopt;
+}
+
+void read_series(Work& work) {
+  for (std::size_t h = 0; h < work.heads.size(); ++h) {
+    work.series.push_back(sight_series(work.sights, h, work.heads[h]));
+    PlacedCamera camera;
+    camera.id = work.heads[h].head.id;
+    for (const TargetSight& sight : work.sights) {
+      if (sight.head != h) continue;
+      if (camera.num_sights++ == 0) work.problem.readings[h] = sight.pan_tilt_rad;
+    }
+    work.report.cameras.push_back(camera);
+  }
+  work.knot_s = knot_of(work.series);
+}
+
+Rigid3 cam_from_base(Head head, const Eigen::Vector2d& readings_rad) {
+  head.world_from_base = Rigid3{};
+  return cam_from_world(head, readings_rad);
+}
+
+/// World and clock become those of the reference camera; lengths those of the distance given, if there is one.
+void set_state(Work& work) {
+  const MovingStart& start = work.start;
+  const std::size_t reference = work.problem.reference;
+  const MovingStart::Placed& first = start.cameras[reference];
+  const double middle_s = 0.5 * (start.t_s.front() + start.t_s.back());
+  const auto in_rig = [&](double t_s) { return t_s + first.offset_s + (first.rate - 1.0) * (t_s - middle_s); };
+  double scale = 1.0;
+  const Rigid3 world_from_first = first.cam_from_world.inverse();
+  const auto centre = [&](std::size_t h) {
+    return Eigen::Vector3d(first.cam_from_world * start.cameras[h].cam_from_world.inverse().translation);
+  };
+  const double start_m = (centre(work.problem.scale_first) - centre(work.problem.scale_second)).norm();
+  if (work.config.distance) scale = work.config.distance->distance_m / start_m;
+  work.problem.scale_m = scale * start_m;
+  for (std::size_t h = 0; h < work.heads.size(); ++h) {
+    const MovingStart::Placed& camera = start.cameras[h];
+    work.state.offset_s.push_back(0.0);
+    work.state.drift.push_back(0.0);
+    if (!camera.placed) continue;
+    Rigid3 world_from_cam = (camera.cam_from_world * world_from_first).inverse();
+    world_from_cam.translation *= scale;
+    Head& head = work.state.heads[h].head;
+    head.world_from_base = world_from_cam * cam_from_base(head, work.problem.readings[h]);
+    const double at_s = middle_s + (work.problem.middle_s[h] - camera.offset_s - middle_s) / camera.rate;
+    work.state.offset_s[h] = work.problem.middle_s[h] - in_rig(at_s);
+    work.state.drift[h] = 1.0 - first.rate / camera.rate;
+  }
+  std::vector<Eigen::Vector3d> path;
+  for (std::size_t i = 0; i < start.t_s.size(); ++i) {
+    work.path_t_s.push_back(in_rig(start.t_s[i]));
+    path.emplace_back(scale * (first.cam_from_world * start.path[i]));
+  }
+  work.state.path = spline_through(work.path_t_s, path, work.path_t_s.front() - work.knot_s,
+                                   work.path_t_s.back() + work.knot_s, work.knot_s);
+}
+
+/// Sights where the path is known, a few a knot.
+void choose_sights(Work& work) {
+  for (std::size_t h = 0; h < work.heads.size(); ++h) {
+    if (!work.problem.placed[h]) continue;
+    double last_s = -1e300;
+    for (std::size_t k = 0; k < work.series[h].t_s.size(); ++k) {
+      const double t_s = work.series[h].t_s[k];
+      const double rig_s = work.state.rig_time(work.problem, h, t_s);
+      const auto near = std::ranges::lower_bound(work.path_t_s, rig_s - 1.5 * work.knot_s);
+      if (near == work.path_t_s.end() || *near > rig_s + 1.5 * work.knot_s) continue;
+      if (rig_s - last_s < 0.24 * work.knot_s) continue;
+      last_s = rig_s;
+      work.problem.sights.push_back({work.series[h].sight[k], h, t_s, work.sights[work.series[h].sight[k]].px});
+    }
+  }
+}
+
+void set_problem(Work& work) {
+  MovingProblem& problem = work.problem;
+  problem.clocks_are_free = work.config.clock_search_s > 0.0;
+  problem.sigma_px = work.config.sigma_px;
+  for (std::size_t h = 0; h < work.heads.size(); ++h) {
+    problem.placed.push_back(work.start.cameras[h].placed);
+    problem.middle_s.push_back(work.series[h].t_s.empty() ? 0.0 : work.series[h].middle_s());
+  }
+  problem.reference = static_cast<std::size_t>(std::ranges::find(problem.placed, true) - problem.placed.begin());
+  problem.scale_first = work.start.first;
+  problem.scale_second = work.start.second;
+  if (work.config.distance) {
+    const auto first = head_of(work, work.config.distance->first), second = head_of(work, work.config.distance->second);
+    if (first && second && problem.placed[*first] && problem.placed[*second]) {
+      problem.scale_first = *first;
+      problem.scale_second = *second;
+      problem.scale_sigma = std::max(1e-4, work.config.distance->sigma_m / work.config.distance->distance_m);
+    }
+  }
+}
+
+[[nodiscard]] bool begin(Work& work) {
+  MovingTargetReport& report = work.report;
+  std::size_t num_watching = 0;
+  for (const SightSeries& one : work.series) num_watching += one.t_s.size() >= least_sights ? 1U : 0U;
+  if (num_watching < 2) return false;
+  work.start = start_cameras(work.series, work.config.clock_search_s, work.knot_s, work.progress);
+  for (std::size_t h = 0; h < work.heads.size(); ++h) {
+    report.cameras[h].placed = work.start.cameras[h].placed;
+    report.cameras[h].reason = work.start.cameras[h].reason;
+  }
+  if (!work.start.has_common) return false;
+  report.status = Status::no_pair;
+  return work.start.found && work.start.t_s.size() >= least_sights;
+}
+
+void take_results(Work& work) {
+  const SolvedMoving& solved = work.solved;
+  MovingTargetReport& report = work.report;
+  report.rig.heads = solved.state.heads;
+  report.used.assign(work.sights.size(), false);
+  report.chi2_per_dof = solved.chi2_per_dof;
+  report.correlation = solved.correlation;
+  report.iterations = solved.iterations;
+  for (std::size_t h = 0; h < work.heads.size(); ++h) {
+    PlacedCamera& camera = report.cameras[h];
+    if (!camera.placed) continue;
+    camera.sigma_px = solved.sigma_px[h];
+    const double drift = solved.state.drift[h];
+    camera.clock = {drift * work.problem.middle_s[h] - solved.state.offset_s[h], 1.0 - drift};
+    const Eigen::Index at = work.problem.first_param(h);
+    if (at >= 0 && work.problem.clocks_are_free && solved.cov.size() > 0) {
+      camera.sigma_clock_s = std::sqrt(solved.cov(at + 6, at + 6));
+      camera.sigma_rate = std::sqrt(solved.cov(at + 7, at + 7));
+    }
+  }
+  std::vector<double> sum2(work.heads.size(), 0.0);
+  for (std::size_t i = 0; i < work.problem.sights.size(); ++i) {
+    if (!solved.used[i] || !solved.residual_px[i].allFinite()) continue;
+    const SolvedSight& sight = work.problem.sights[i];
+    report.used[sight.sight] = true;
+    ++report.cameras[sight.head].num_used;
+    sum2[sight.head] += solved.residual_px[i].squaredNorm();
+  }
+  for (std::size_t h = 0; h < work.heads.size(); ++h)
+    if (report.cameras[h].num_used > 0)
+      report.cameras[h].rms_px = std::sqrt(sum2[h] / static_cast<double>(report.cameras[h].num_used));
+  for (const double t_s : work.path_t_s) {
+    const auto at = solved.state.path.support(t_s);
+    if (!at) continue;
+    report.path_t_s.push_back(t_s);
+    report.path.push_back(solved.state.path.position(*at));
+  }
+}
+
+/// Covariance of the heads by the names of a rig's: what is uncertain of the scale comes on top.
+void take_covariance(Work& work, double scale, double sigma_scale) {
+  MovingTargetReport& report = work.report;
+  const Eigen::Index num = num_head_params * static_cast<Eigen::Index>(work.heads.size());
+  report.rig.cov.setZero(num, num);
+  Eigen::VectorXd by_scale = Eigen::VectorXd::Zero(num);
+  const MovingProblem& problem = work.problem;
+  const auto centre = [&](std::size_t h) { return cam_centre_in_world(report.rig.heads[h].head, problem.readings[h]); };
+  for (std::size_t h = 0; h < work.heads.size(); ++h) {
+    const Eigen::Index from_h = problem.first_param(h), to_h = num_head_params * static_cast<Eigen::Index>(h);
+    if (from_h < 0) continue;
+    for (std::size_t k = 0; k < work.heads.size(); ++k) {
+      const Eigen::Index from_k = problem.first_param(k), to_k = num_head_params * static_cast<Eigen::Index>(k);
+      if (from_k < 0) continue;
+      Eigen::Matrix<double, 6, 6> block = work.solved.cov.block<6, 6>(from_h, from_k);
+      block.topRows<3>() *= scale;
+      block.leftCols<3>() *= scale;
+      report.rig.cov.block<6, 6>(to_h, to_k) = block;
+    }
+    by_scale.segment<3>(to_h) = report.rig.heads[h].head.world_from_base.rotation.conjugate() *
+                                (sigma_scale * (centre(h) - centre(problem.reference)));
+  }
+  report.rig.cov += by_scale * by_scale.transpose();
+  report.sigma_scale = sigma_scale;
+  for (std::size_t h = 0; h < work.heads.size(); ++h) {
+    const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h);
+    report.sigma_relative_m =
+        std::max(report.sigma_relative_m, std::sqrt(report.rig.cov.diagonal().segment<3>(at).sum()));
+    report.sigma_relative_rad =
+        std::max(report.sigma_relative_rad, std::sqrt(report.rig.cov.diagonal().segment<3>(at + 3).sum()));
+  }
+}
+
+/// World and clock become the true path's.
+void take_truth(Work& work, const PathMatch& match) {
+  MovingTargetReport& report = work.report;
+  const Similarity& similarity = match.truth_from_path;
+  const Eigen::Quaterniond& turn = similarity.b_from_a.rotation;
+  const auto moved = [&](const Eigen::Vector3d& point) {
+    return Eigen::Vector3d(similarity.scale * (turn * point) + similarity.b_from_a.translation);
+  };
+  for (std::size_t h = 0; h < work.heads.size(); ++h) {
+    if (!report.cameras[h].placed) continue;
+    Head& head = report.rig.heads[h].head;
+    head.world_from_base = {(turn * head.world_from_base.rotation).normalized(),
+                            moved(head.world_from_base.translation)};
+    CameraClock& clock = report.cameras[h].clock;
+    clock = {match.offset_s + match.rate * clock.offset_s, match.rate * clock.rate};
+  }
+  for (Eigen::Vector3d& point : report.path) point = moved(point);
+  for (double& t_s : report.path_t_s) t_s = match.offset_s + match.rate * t_s;
+  report.truth_clock = {match.offset_s, match.rate};
+  report.truth_median_m = match.median_m;
+  report.truth_rms_m = match.rms_m;
+  report.truth_covered = match.covered;
+}
+
+/// Each camera's rays lie in a plane of its own, within 4 px: the target moved along a line (or in a plane with all
+/// cameras), and the planes alone say too little of where the cameras are.
+bool is_line(const Work& work) {
+  constexpr double most_px = 4.0;
+  return std::ranges::none_of(work.series, [](const SightSeries& series) {
+    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+    for (const Eigen::Vector2d& at : series.at)
+      sum += at.homogeneous() * at.homogeneous().transpose() / static_cast<double>(series.at.size());
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(sum);
+    return series.at.size() >= least_sights && std::sqrt(std::abs(eigen.eigenvalues()[0])) * series.px > most_px;
+  });
+}
+
+void set_scale(Work& work, const TrueTrack& truth) {
+  constexpr double most_misfit = 0.05;  // of the path's extent
+  MovingTargetReport& report = work.report;
+  if (truth.t_s.empty()) {
+    const bool has_scale = work.config.distance && work.problem.scale_sigma > 0.0 &&
+                           work.heads[work.problem.scale_first].head.id == work.config.distance->first &&
+                           work.heads[work.problem.scale_second].head.id == work.config.distance->second;
+    report.status = has_scale ? Status::placed : Status::no_scale;
+    take_covariance(work, 1.0, 0.0);
+    report.sigma_scale = work.problem.scale_sigma;
+    return;
+  }
+  const auto match = match_path(report.path_t_s, report.path, truth, work.config.clock_search_s > 0.0);
+  if (!match || match->median_m > most_misfit * match->extent_m) {
+    report.status = Status::truth_misfits;
+    return;
+  }
+  take_truth(work, *match);
+  take_covariance(work, match->truth_from_path.scale, match->sigma_scale);
+  report.status = Status::placed;
+}
+
+}  // namespace
+
+MovingTargetReport place_cameras(std::span<const TargetSight> sights, std::span<const RigHead> heads,
+                                 const MovingTargetConfig& config, const TrueTrack& truth, const Progress& progress) {
+  Work work{sights, heads, config, progress, {}, 0.0, {}, {}, {}, {}, {}, {}};
+  work.state.heads.assign(heads.begin(), heads.end());
+  work.report.rig.heads = work.state.heads;
+  work.problem.readings.assign(heads.size(), Eigen::Vector2d::Zero());
+  read_series(work);
+  if (!begin(work)) return work.report;
+  work.report.status = Status::degenerate;
+  if (is_line(work)) return work.report;
+  set_problem(work);
+  set_state(work);
+  choose_sights(work);
+  work.solved = solve_moving(work.problem, work.state, progress);
+  take_results(work);
+  if (work.solved.cov.size() == 0) return work.report;
+  if (!work.solved.converged) {
+    work.report.status = Status::no_convergence;
+    return work.report;
+  }
+  set_scale(work, truth);
+  return work.report;
+}
+
+}  // namespace alidade

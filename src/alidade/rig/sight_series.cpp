@@ -1,0 +1,45 @@
+#include "alidade/rig/sight_series.h"
+
+#include <algorithm>
+
+namespace alidade {
+
+std::optional<Eigen::Vector2d> SightSeries::seen_at(double time_s) const {
+  constexpr double most_spacings = 3.5, most_jump = 0.05;
+  const auto after = std::ranges::lower_bound(t_s, time_s);
+  if (after == t_s.begin() || after == t_s.end()) return std::nullopt;
+  const auto i = static_cast<std::size_t>(after - t_s.begin());
+  const double step_s = t_s[i] - t_s[i - 1];
+  if (!(step_s > 0.0) || step_s > most_spacings * spacing_s || (at[i] - at[i - 1]).norm() > most_jump)
+    return std::nullopt;
+  const double share = (time_s - t_s[i - 1]) / step_s;
+  return Eigen::Vector2d((1.0 - share) * at[i - 1] + share * at[i]);
+}
+
+SightSeries sight_series(std::span<const TargetSight> sights, std::size_t head, const RigHead& rig_head) {
+  SightSeries series;
+  std::vector<Eigen::Vector2d> pixels;
+  std::vector<std::size_t> own;
+  for (std::size_t i = 0; i < sights.size(); ++i) {
+    if (sights[i].head != head) continue;
+    own.push_back(i);
+    pixels.push_back(sights[i].px);
+  }
+  const auto rays = unproject(rig_head.camera, pixels);
+  std::vector<double> steps;
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    if (!rays[k] || !(rays[k]->z() > 0.1)) continue;
+    if (!series.t_s.empty()) steps.push_back(sights[own[k]].t_capture_s - series.t_s.back());
+    series.t_s.push_back(sights[own[k]].t_capture_s);
+    series.at.push_back(rays[k]->head<2>() / rays[k]->z());
+    series.sight.push_back(own[k]);
+  }
+  if (!steps.empty()) {
+    std::ranges::nth_element(steps, steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2));
+    series.spacing_s = steps[steps.size() / 2];
+  }
+  series.px = params(rig_head.camera.lens)[0];
+  return series;
+}
+
+}  // namespace alidade

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "alidade/pantilt/head.h"
+#include "alidade/pantilt/target_sight.h"
+
+namespace alidade {
+
+/// What one camera that does not turn saw of the target, by its own clock. In the plane at depth 1.
+struct SightSeries {
+  std::vector<double> t_s;
+  std::vector<Eigen::Vector2d> at;  ///< x/z, y/z of the ray.
+  std::vector<std::size_t> sight;   ///< Place among all sights.
+  double px = 1.0;                  ///< Of one unit of `at`, in the middle of the picture.
+  double spacing_s = 0.0;           ///< Median.
+
+  [[nodiscard]] double middle_s() const { return 0.5 * (t_s.front() + t_s.back()); }
+  /// Between two sights that follow each other, on the straight line; none in gaps and where the target jumped.
+  [[nodiscard]] std::optional<Eigen::Vector2d> seen_at(double time_s) const;
+};
+
+/// Series of one head; rays that look back (z below 0.1) are left out.
+[[nodiscard]] SightSeries sight_series(std::span<const TargetSight> sights, std::size_t head, const RigHead& rig_head);
+
+}  // namespace alidade

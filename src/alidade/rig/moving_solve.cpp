@@ -194,6 +194,7 @@ struct Solver {
   void tell_noise() {
     if (problem.sigma_px) return;
     const double larger = followed() / 1.1774;
+    std::vector<double> told;
     for (std::size_t h = 0; h < sigma_px.size(); ++h) {
       std::vector<double> lengths;
       for (std::size_t i = 0; i < residual.size(); ++i)
@@ -202,7 +203,13 @@ struct Solver {
       const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
       std::ranges::nth_element(lengths, middle);
       sigma_px[h] = std::max(0.05, larger * *middle);
+      told.push_back(sigma_px[h]);
     }
+    if (told.empty()) return;
+    // A camera that the path follows alone would seem to have no noise, and be followed all the more.
+    const auto middle = told.begin() + static_cast<std::ptrdiff_t>(told.size() / 2);
+    std::ranges::nth_element(told, middle);
+    for (double& sigma : sigma_px) sigma = std::max(sigma, 0.5 * *middle);
   }
 
   /// What the path accelerates, where sights hold it: taken from the middle of the loosely held path.

@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -26,8 +28,8 @@ class MovingTargetCommand : public testing::CommandTest {
  protected:
   void SetUp() override {
     const char* data = std::getenv("ALIDADE_DATA");
-    folder_ = std::filesystem::path(data ? data : "") / "data/drone-tracking";
-    if (!data || !std::filesystem::exists(folder_ / "dataset1"))
+    data_ = std::filesystem::path(data ? data : "") / "data/drone-tracking";
+    if (!data || !std::filesystem::exists(data_ / "dataset1"))
       GTEST_SKIP() << "set ALIDADE_DATA to the folder that holds data/drone-tracking";
     std::string events = "t_capture_s,head,u_px,v_px\n";
     const std::array<const char*, 4> lenses{"iphone6", "p20pro", "sonyG_1", "sony5n_1920x1080"};
@@ -38,7 +40,7 @@ class MovingTargetCommand : public testing::CommandTest {
 
   /// Returns the pictures a second.
   double write_camera(std::size_t c, const std::string& lens) {
-    const Json json = Json::parse(read_file(folder_ / "calibration" / (lens + ".json")));
+    const Json json = Json::parse(read_file(data_ / "calibration" / (lens + ".json")));
     const Json &K = json["K-matrix"], &size = json["resolution"];
     const auto k = json["distCoeff"].get<std::vector<double>>();
     std::string text = fmt::format("model: brown\nwidth: {}\nheight: {}\nfx: {}\nfy: {}\ncx: {}\ncy: {}\n",
@@ -50,7 +52,7 @@ class MovingTargetCommand : public testing::CommandTest {
     return json["fps"].get<double>();
   }
   std::string sights_of(std::size_t c, double rate_hz) const {
-    std::istringstream rows(read_file(folder_ / fmt::format("dataset1/detections/cam{}.txt", c)));
+    std::istringstream rows(read_file(data_ / fmt::format("dataset1/detections/cam{}.txt", c)));
     std::string row, text;
     while (std::getline(rows, row)) {
       double frame = 0.0, u = 0.0, v = 0.0;
@@ -60,7 +62,7 @@ class MovingTargetCommand : public testing::CommandTest {
     return text;
   }
   void write_truth() {
-    std::istringstream rows(read_file(folder_ / "dataset1/trajectory/rtk.txt"));
+    std::istringstream rows(read_file(data_ / "dataset1/trajectory/rtk.txt"));
     TrueTrack truth;
     double x = 0.0, y = 0.0, z = 0.0;
     while (rows >> x >> y >> z) {
@@ -76,7 +78,7 @@ class MovingTargetCommand : public testing::CommandTest {
     return alidade(words, options);
   }
 
-  std::filesystem::path folder_;
+  std::filesystem::path data_;
 };
 
 /// Median distance from the truth where two cameras or more see the target (no word in column `event`).

@@ -88,9 +88,7 @@ std::vector<LoopCheck> check_loops(const ServoScenario& scenario) {
     const double delay_s = scene.axes[0].command_delay_s + (is_pi ? scene.latency_s : 0.0);
     LoopCheck loop{kind, {}, 0.0, samples_in(delay_s, scene.period_s)};
     loop.loop_gain = units_of_error_per_rad(scenario.config.pi.unit, focal_px) * radians_in(unit_of(plant));
-    PiGains own = gains;
-    if (!is_pi) own.kp += own.ki * scene.period_s;  // its integral counts the present error
-    loop.analysis = analysed(plant, own, scene.period_s, loop.delay_samples);
+    loop.analysis = analysed(plant, gains, scene.period_s, loop.delay_samples);
     loops.push_back(loop);
   }
   return loops;

@@ -32,12 +32,11 @@ double AxisController::pi_command(double error_rad) {
 
 /// The command that carries the axis, as it is known, along the target; kp and ki act on the difference between where
 /// that would have brought it and where it is. (On the difference to the target itself they would act twice, and
-/// overshoot after a jump.) The encoder is not late as a picture is, so the integral counts the present error, too.
+/// overshoot after a jump.)
 double AxisController::feedforward_on_angle(const AxisInput& input) {
   const auto& wanted = *input.wanted_rad;
   const double ahead = command_between(model_, {wanted[0], 0.0}, {wanted[1], 0.0});
-  const double error_rad = expected_.motion().angle_rad - input.encoder_rad;
-  const double correction = pi_command(error_rad) + gains_.ki * model_.period_s * error_rad;
+  const double correction = pi_command(expected_.motion().angle_rad - input.encoder_rad);
   expected_.send(ahead);
   expected_.advance(model_.period_s);
   return ahead + correction;

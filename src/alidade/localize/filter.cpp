@@ -27,6 +27,7 @@ LocalizationFilter::LocalizationFilter(Camera camera, const CameraMotion& start,
   delta_.setZero(P_.capacity());
   start_.setZero(P_.capacity());
   next_.setZero(P_.capacity());
+  shear_.setZero(P_.capacity(), 3);
   measured_.reserve(sights);
   waiting_.reserve(sights);
   doubtful_.reserve(sights);
@@ -74,7 +75,8 @@ bool LocalizationFilter::add_known(long id, const Eigen::Vector3d& point_in_worl
 
 bool LocalizationFilter::add(long id, const Eigen::Vector2d& px, const RangePrior& prior, FeatureKind kind) {
   if (has(id) || !has_room(kind == FeatureKind::xyz ? 3 : 6)) return false;
-  const auto made = new_feature(camera_, motion_.world_from_cam, px, config_.sigma_px, prior, kind);
+  const double sigma_px = config_.sigma_new_px > 0.0 ? config_.sigma_new_px : config_.sigma_px;
+  const auto made = new_feature(camera_, motion_.world_from_cam, px, sigma_px, prior, kind);
   if (!made || !made->feature.values.allFinite() || !made->cov.allFinite()) return false;
   append_feature(*made, id);
   return true;

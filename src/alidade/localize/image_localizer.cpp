@@ -18,6 +18,7 @@ constexpr double prior_share = 0.5;       // σ of a new inverse depth over it: 
 ImageLocalizer::ImageLocalizer(const Camera& camera, const LocalizeImagesConfig& config)
     : camera_(camera), config_(config), filter_config_(config.localize.filter) {
   constexpr double few_doubtful = 0.1;  // the gates alone keep them out; a consensus costs as much as the update
+  if (!(filter_config_.sigma_new_px > 0.0)) filter_config_.sigma_new_px = config.eyes.sigma_floor_px;
   filter_config_.consensus_above = std::max(filter_config_.consensus_above, few_doubtful);
   const std::size_t num_known = config.target ? config.target->points.size() : 0;
   const std::size_t need =
@@ -54,6 +55,10 @@ bool ImageLocalizer::start(const cv::Mat& smoothed) {
     seen = find_target(smoothed, camera_, *config_.target,
                        {filter_config_.sigma_px, localize.sigma_speed_m_s, localize.sigma_rate_rad_s});
     if (!seen) return false;
+    if (seen->num_alike > 1) {
+      num_alike_ = std::max(num_alike_, seen->num_alike);
+      return false;
+    }
   }
   if (localize.start) {
     begin_at({{*localize.start}});
@@ -75,11 +80,28 @@ bool ImageLocalizer::start(const cv::Mat& smoothed) {
   return seen || num_found_now_ >= least_tracked;
 }
 
+/// What is looked for later is what surrounds the corner as found, not the corner itself: where that is in the world is
+/// as unsure as the corner was found.
+std::vector<KnownPoint> ImageLocalizer::told_points(const SeenTarget& seen) const {
+  std::vector<KnownPoint> told = config_.target->points;
+  for (KnownPoint& point : told) {
+    const auto at = std::ranges::find(seen.sights, point.id, &FeatureSight::id);
+    if (at == seen.sights.end()) continue;
+    const Rigid3& world_from_cam = seen.starts.front().motion.world_from_cam;
+    const double distance_m = (world_from_cam.translation - point.point_in_world).norm();
+    point.sigma_m = std::hypot(point.sigma_m, at->sigma_px * distance_m / params(camera_.lens)[0]);
+  }
+  return told;
+}
+
 /// Its points enter the map, and their surroundings as they look now are what they are found by.
 void ImageLocalizer::add_target(const cv::Mat& smoothed, const SeenTarget& seen) {
   const std::vector<KnownPoint>& points = config_.target->points;
-  for (const KnownPoint& point : points) bank_->add_known(point.id, point.point_in_world, point.sigma_m);
-  const SightsReport report = bank_->update(seen.sights);
+  told_ = told_points(seen);
+  for (const KnownPoint& point : told_) bank_->add_known(point.id, point.point_in_world, point.sigma_m);
+  std::vector<FeatureSight> sights = seen.sights;
+  for (FeatureSight& sight : sights) sight.sigma_px = config_.eyes.sigma_floor_px;
+  const SightsReport report = bank_->update(sights);
   num_found_now_ = report.num_used;
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // of the plane through the points
   for (std::size_t i = 2; i < points.size(); ++i)
@@ -260,6 +282,17 @@ bool ImageLocalizer::try_from(const cv::Mat& smoothed, const StartHypothesis& fr
   return true;
 }
 
+/// Where the sights of several pictures in a row contradict the path though they are found: from the target or a
+/// keyframe, if that explains this picture.
+bool ImageLocalizer::restart_in_doubt(const cv::Mat& smoothed, PathStep& step) {
+  if (!config_.localize.restarts || !doubt_.is_wrong_after(step)) return false;
+  doubt_.clear();
+  const FilterBank before = *bank_;
+  if (find_back(smoothed, step)) return true;
+  bank_ = before;
+  return false;
+}
+
 bool ImageLocalizer::find_back(const cv::Mat& smoothed, PathStep& step) {
   const LocalizeConfig& localize = config_.localize;
   std::vector<StartHypothesis> starts;
@@ -311,9 +344,10 @@ PathStep ImageLocalizer::take(const cv::Mat& grey, long frame, double t_s) {
       const SightsReport report = bank_->update(sights);
       fill(sights, report, step);
       count(sights, report);
+      residuals_.add(bank_->best(), sights, report.outcomes);
       if (is_found(report.num_used)) step.event = FrameEvent::tracked;
     }
-    if (step.event == FrameEvent::predicted && find_back(smoothed, step)) {
+    if (step.event == FrameEvent::predicted ? find_back(smoothed, step) : restart_in_doubt(smoothed, step)) {
       step.event = FrameEvent::restarted;
       ++num_restarts_;
     }

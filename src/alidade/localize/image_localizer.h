@@ -5,6 +5,7 @@
 #include "alidade/localize/keyframes.h"
 #include "alidade/localize/landmark.h"
 #include "alidade/localize/localize_images.h"
+#include "alidade/localize/path_doubt.h"
 
 namespace alidade {
 
@@ -19,6 +20,10 @@ class ImageLocalizer {
   [[nodiscard]] const FilterBank* bank() const { return bank_ ? &*bank_ : nullptr; }
   [[nodiscard]] std::size_t num_restarts() const { return num_restarts_; }
   [[nodiscard]] std::size_t num_found(long id) const;
+  /// The target's points as they were told to the filter.
+  [[nodiscard]] std::span<const KnownPoint> told() const { return told_; }
+  [[nodiscard]] const RadialResiduals& residuals() const { return residuals_; }
+  [[nodiscard]] std::size_t num_alike() const { return num_alike_; }
 
  private:
   struct Search {
@@ -29,6 +34,7 @@ class ImageLocalizer {
   bool start(const cv::Mat& smoothed);
   void begin_at(std::span<const StartHypothesis> starts);
   void add_target(const cv::Mat& smoothed, const SeenTarget& seen);
+  [[nodiscard]] std::vector<KnownPoint> told_points(const SeenTarget& seen) const;
   void predict_to(double t_s);
   /// What of the map is found where it is expected; `tried_` says what was looked for.
   [[nodiscard]] std::vector<FeatureSight> look(const cv::Mat& smoothed, const Search& search);
@@ -42,6 +48,7 @@ class ImageLocalizer {
   [[nodiscard]] bool try_from(const cv::Mat& smoothed, const StartHypothesis& start, PathStep& step);
   void fill(std::span<const FeatureSight> sights, const SightsReport& report, PathStep& step) const;
   void forget(long id);
+  [[nodiscard]] bool restart_in_doubt(const cv::Mat& smoothed, PathStep& step);
 
   Camera camera_;
   const LocalizeImagesConfig& config_;
@@ -49,6 +56,10 @@ class ImageLocalizer {
   std::optional<FilterBank> bank_;
   std::unordered_map<long, Landmark> landmarks_;
   KeyframeStore keyframes_;
+  std::vector<KnownPoint> told_;
+  PathDoubt doubt_;
+  RadialResiduals residuals_;
+  std::size_t num_alike_ = 1;
   std::vector<SightTried> tried_;
   std::vector<Eigen::Vector2d> in_view_;  ///< Where landmarks are, or should be, in this picture.
   double t_s_ = 0.0, period_s_ = 0.0;

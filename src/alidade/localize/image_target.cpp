@@ -43,18 +43,29 @@ std::optional<SeenTarget> posed_rectangle(const Camera& camera, const SeenRectan
 
 std::optional<SeenTarget> find_rectangle(const cv::Mat& grey, const Camera& camera, const ImageTarget& target,
                                          const KnownPoseConfig& config) {
-  std::optional<SeenTarget> best;
-  double best_score = 0.0;
+  struct Candidate {
+    SeenTarget seen;
+    Eigen::Vector2d middle_px;
+    double score, size_px;
+  };
+  std::vector<Candidate> candidates;
   constexpr double paper_sigma = 5.0;  // what print, light and noise scatter inside
   for (const SeenRectangle& rectangle : find_rectangles(grey, camera)) {
-    const double score = std::abs(rectangle.contrast) / (paper_sigma + rectangle.inside_sigma);
-    if (score <= best_score) continue;
     auto seen = posed_rectangle(camera, rectangle, target, config);
     if (!seen) continue;
-    best = std::move(seen);
-    best_score = score;
+    const auto& at = rectangle.corners_px;
+    candidates.push_back({std::move(*seen), 0.25 * (at[0] + at[1] + at[2] + at[3]),
+                          std::abs(rectangle.contrast) / (paper_sigma + rectangle.inside_sigma),
+                          (at[2] - at[0]).norm()});
   }
-  return best;
+  const auto best = std::ranges::max_element(candidates, {}, &Candidate::score);
+  if (best == candidates.end()) return std::nullopt;
+  constexpr double nearly_as_good = 0.7;  // the same print in other light
+  for (const Candidate& other : candidates) {
+    const bool is_elsewhere = (other.middle_px - best->middle_px).norm() > 0.5 * std::min(other.size_px, best->size_px);
+    best->seen.num_alike += is_elsewhere && other.score > nearly_as_good * best->score ? 1 : 0;
+  }
+  return std::move(best->seen);
 }
 
 std::optional<SeenTarget> find_board_points(const cv::Mat& grey, const Camera& camera, const ImageTarget& target,

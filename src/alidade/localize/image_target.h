@@ -36,10 +36,11 @@ struct ImageTarget {
 struct SeenTarget {
   std::vector<FeatureSight> sights;
   std::vector<StartHypothesis> starts;  ///< The better one first.
+  std::size_t num_alike = 1;            ///< Things in the picture that might as well be the target.
 };
 
 /// None where it is not found, or where what is found does not have its shape. Of several rectangles with its shape the
-/// one of most contrast and least pattern inside.
+/// one of most contrast and least pattern inside; `num_alike` counts those elsewhere that are nearly as good.
 [[nodiscard]] std::optional<SeenTarget> find_target(const cv::Mat& grey, const Camera& camera,
                                                     const ImageTarget& target, const KnownPoseConfig& config);
 

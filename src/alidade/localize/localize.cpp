@@ -3,10 +3,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <map>
 #include <set>
 
+#include "alidade/localize/path_doubt.h"
 #include "alidade/localize/point_store.h"
 #include "alidade/localize/summary.h"
 
@@ -25,6 +25,7 @@ class Localizer {
   [[nodiscard]] const FilterBank* bank() const { return bank_ ? &*bank_ : nullptr; }
   [[nodiscard]] std::size_t num_restarts() const { return num_restarts_; }
   [[nodiscard]] const PointStore& points() const { return points_; }
+  [[nodiscard]] const RadialResiduals& residuals() const { return residuals_; }
 
  private:
   [[nodiscard]] std::vector<StartHypothesis> starts(const SightFrame& frame) const;
@@ -35,7 +36,6 @@ class Localizer {
   void predict_to(double t_s);
   void add_new(const SightFrame& frame);
   void drop_strangers(const SightFrame& frame, const SightsReport& report);
-  bool is_wrong(const PathStep& step);
   bool restart(const SightFrame& frame);
   void fill(const SightFrame& frame, const SightsReport& report, PathStep& step) const;
 
@@ -44,7 +44,8 @@ class Localizer {
   std::optional<FilterBank> bank_;
   PointStore points_;
   double period_s_, t_s_ = 0.0, seen_s_ = 0.0;
-  std::deque<double> recent_nis_, recent_gated_;
+  PathDoubt doubt_;
+  RadialResiduals residuals_;
   std::size_t num_restarts_ = 0;
 };
 
@@ -96,31 +97,6 @@ void Localizer::drop_strangers(const SightFrame& frame, const SightsReport& repo
   }
 }
 
-/// Mean NIS above 2, or most sights or most of the target's gated, over five frames with sights: a path may fit its own
-/// map well and be elsewhere.
-bool Localizer::is_wrong(const PathStep& step) {
-  if (step.num_tracked + step.num_gated == 0) return false;
-  constexpr std::size_t window = 5;
-  constexpr double most_nis = 2.0, most_gated = 0.6;
-  recent_nis_.push_back(step.num_tracked > 0 ? step.nis_per_dof : most_nis);
-  const double gated_now = static_cast<double>(step.num_gated) / static_cast<double>(step.num_tracked + step.num_gated);
-  const double known_gated =
-      step.num_known > 0 ? static_cast<double>(step.num_known_gated) / static_cast<double>(step.num_known) : 0.0;
-  constexpr double more_of_known = 0.25;  // four known points, two of them mismatched, are no proof
-  recent_gated_.push_back(std::max(gated_now, known_gated - more_of_known));
-  if (recent_nis_.size() > window) {
-    recent_nis_.pop_front();
-    recent_gated_.pop_front();
-  }
-  if (recent_nis_.size() < window) return false;
-  double nis = 0.0, gated = 0.0;
-  for (std::size_t i = 0; i < window; ++i) {
-    nis += recent_nis_[i] / window;
-    gated += recent_gated_[i] / window;
-  }
-  return nis > most_nis || gated > most_gated;
-}
-
 /// From the target, where it says that the camera is somewhere else. The map of points that led there is dropped.
 bool Localizer::restart(const SightFrame& frame) {
   const std::vector<StartHypothesis> from = poses_from_known(camera_, frame.sights, config_.target, pose_config());
@@ -139,8 +115,7 @@ bool Localizer::restart(const SightFrame& frame) {
     if (!feature.is_known) unknown.push_back(feature.id);
   for (const long id : unknown) bank_->remove(id);
   bank_->restart(from);
-  recent_nis_.clear();
-  recent_gated_.clear();
+  doubt_.clear();
   ++num_restarts_;
   return true;
 }
@@ -180,8 +155,9 @@ PathStep Localizer::take(const SightFrame& frame) {
   }
   const SightsReport report = bank_->update(frame.sights);
   fill(frame, report, step);
+  residuals_.add(bank_->best(), frame.sights, report.outcomes);
   if (step.event == FrameEvent::tracked && step.num_tracked < least_sights) step.event = FrameEvent::predicted;
-  const bool is_wrong_now = is_wrong(step);
+  const bool is_wrong_now = doubt_.is_wrong_after(step);
   drop_strangers(frame, report);
   if (config_.restarts && is_wrong_now && restart(frame)) {
     fill(frame, bank_->update(frame.sights), step);
@@ -255,6 +231,8 @@ LocalizeReport localize_sights(const Camera& camera, std::span<const SightFrame>
   report.num_restarts = localizer.num_restarts();
   sum_up(
       localizer.bank(), [&](long id) { return localizer.points().num_used(id); }, truth, report);
+  report.known_shift = known_shift(report.map, config.target);
+  report.radial = localizer.residuals().structure();
   return report;
 }
 

@@ -12,6 +12,7 @@
 #include "alidade/localize/filter_bank.h"
 #include "alidade/localize/known_pose.h"
 #include "alidade/localize/path_error.h"
+#include "alidade/localize/radial_residuals.h"
 
 namespace alidade {
 
@@ -92,6 +93,10 @@ struct LocalizeReport {
   std::size_t num_sights = 0, num_used = 0, num_gated = 0, most_seen = 0;
   std::size_t num_known = 0, num_known_gated = 0;
   double nis_per_dof = std::numeric_limits<double>::quiet_NaN();
+  /// How far the target's points have gone in the map from where they were told to be: squares over σ², per number.
+  double known_shift = std::numeric_limits<double>::quiet_NaN();
+  RadialStructure radial;      ///< Of what sights are off after the update: what a wrong lens leaves.
+  std::size_t num_alike = 1;   ///< Things seen at once that might be the target, where a start failed for it.
   Camera camera;               ///< As it is at the end.
   Eigen::VectorXd sigma_lens;  ///< Of the parameters that were estimated.
   PathError error;             ///< With truth.

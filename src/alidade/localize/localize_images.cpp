@@ -28,6 +28,9 @@ LocalizeReport localize_images(const Camera& camera, const NextPicture& next, st
   report.num_restarts = localizer.num_restarts();
   sum_up(
       localizer.bank(), [&](long id) { return localizer.num_found(id); }, truth, report);
+  report.known_shift = known_shift(report.map, localizer.told());
+  report.radial = localizer.residuals().structure();
+  report.num_alike = localizer.num_alike();
   return report;
 }
 

@@ -24,6 +24,12 @@ Verdict never_started(const LocalizeReport& report) {
     return stopped(State::refused, ExitCode::cannot_tell,
                    "too few points: at most " + std::to_string(report.most_seen) + " in a frame, a pose needs three",
                    "track more points");
+  if (report.num_alike > 1)
+    return stopped(State::refused, ExitCode::cannot_tell,
+                   std::to_string(report.num_alike) +
+                       " things in one picture look like the target: which one it is "
+                       "cannot be told",
+                   "begin where one of them is seen, or give --start");
   return stopped(
       State::refused, ExitCode::cannot_tell,
       "the target is not found: four of its points, in a plane and not on a line, are never seen where they belong",

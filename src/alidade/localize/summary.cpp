@@ -35,4 +35,15 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
   if (!truth.empty()) report.error = path_error(path, truth, report.scale_known);
 }
 
+double known_shift(std::span<const MapPoint> map, std::span<const KnownPoint> told) {
+  double sum = 0.0, num = 0.0;
+  for (const KnownPoint& point : told) {
+    const auto at = std::ranges::find(map, point.id, &MapPoint::id);
+    if (at == map.end() || at->num_seen == 0) continue;
+    sum += (at->point_in_world - point.point_in_world).squaredNorm() / (point.sigma_m * point.sigma_m);
+    num += 3.0;
+  }
+  return num > 0.0 ? sum / num : std::numeric_limits<double>::quiet_NaN();
+}
+
 }  // namespace alidade

@@ -11,4 +11,8 @@ namespace alidade {
 void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& num_used,
             std::span<const TimedPose> truth, LocalizeReport& report);
 
+/// Σ |ŷ − y|²/σ² over the known points of a map, per number: below 1 on average, as they are also held by what was
+/// told.
+[[nodiscard]] double known_shift(std::span<const MapPoint> map, std::span<const KnownPoint> told);
+
 }  // namespace alidade

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include "alidade/localize/filter.h"
+
+namespace alidade {
+
+/// What the mean residual along the radius is, in rings about the principal point.
+struct RadialStructure {
+  double share = 0.0;          ///< RMS over the rings of the mean residual over σ: 0 for a right lens.
+  double chi2_per_ring = 0.0;  ///< Squares of these means over their own σ, were sights independent.
+  double worst_px = 0.0;       ///< The largest mean residual.
+};
+
+/// Collects what sights are off from the map after their update, outward or inward of the picture's middle. A map
+/// takes up much of what a wrong lens does, but not all at every radius.
+class RadialResiduals {
+ public:
+  void add(const LocalizationFilter& filter, std::span<const FeatureSight> sights,
+           std::span<const SightOutcome> outcomes);
+  [[nodiscard]] RadialStructure structure() const;
+
+ private:
+  static constexpr std::size_t num_rings = 6;
+  struct Ring {
+    double num = 0.0, sum = 0.0, sum_px = 0.0;
+  };
+  std::array<Ring, num_rings> rings_{};
+};
+
+}  // namespace alidade

@@ -29,8 +29,8 @@ struct ImageTarget {
 };
 
 /// A dark or bright rectangle, the map's frame at its centre, x right, y down as first seen; corners 0 to 3 clockwise
-/// from (−, −).
-[[nodiscard]] ImageTarget rectangle_target(double width_m, double height_m, double sigma_m = 0.001);
+/// from (−, −). The default σ is that of a print on a flat thing.
+[[nodiscard]] ImageTarget rectangle_target(double width_m, double height_m, double sigma_m = 0.0003);
 
 /// The target in a picture: where its points are, and from where it looks so.
 struct SeenTarget {

@@ -62,6 +62,13 @@ void add_checks(const LocalizeReport& report, Verdict& verdict) {
     verdict.checks.push_back({"target", state_of(known_gated, 0.1, gated + 0.2),
                               text_of(100.0 * known_gated, 2) + " % of the target's sights are not where they belong",
                               known_gated, 0.1, "1", "tracks"});
+  constexpr double most_shift = 3.0;  // χ² of a rectangle's twelve numbers over their count: 99.9 % is 2.7
+  if (report.known_shift > most_shift)
+    verdict.checks.push_back({"map's frame", State::care,
+                              "the target's points have drifted in the map, " + text_of(std::sqrt(report.known_shift)) +
+                                  " times the σ they were told with: the path's place and scale before the target are "
+                                  "less sure than its σ says",
+                              report.known_shift, most_shift, "1", "path"});
   verdict.checks.push_back({"scale", report.scale_known ? State::good : State::care,
                             report.scale_known
                                 ? "scale from the known points"

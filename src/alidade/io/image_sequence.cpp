@@ -145,7 +145,7 @@ ImageTarget read_image_target(const path& file) {
     const detail::Fields rectangle(node, name, "rectangle.");
     detail::refuse_unknown_keys(rectangle, {"width_m", "height_m", "sigma_m"}, "a rectangle");
     const double width_m = rectangle.number("width_m"), height_m = rectangle.number("height_m");
-    const double sigma_m = rectangle.has("sigma_m") ? rectangle.number("sigma_m") : 0.001;
+    const double sigma_m = rectangle.has("sigma_m") ? rectangle.number("sigma_m") : 0.0003;
     if (!(width_m > 0.0)) detail::refuse(name, "rectangle.width_m", "is not above zero");
     if (!(height_m > 0.0)) detail::refuse(name, "rectangle.height_m", "is not above zero");
     if (!(sigma_m > 0.0)) detail::refuse(name, "rectangle.sigma_m", "is not above zero");

@@ -2,8 +2,8 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
-#include <numbers>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/io/observation_result.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
@@ -11,8 +11,6 @@
 
 namespace alidade::cli {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 struct Args {
   std::filesystem::path result;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <numbers>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/io/rangefinder_document.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
@@ -12,8 +13,6 @@
 
 namespace alidade::cli {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 struct Args {
   std::filesystem::path result;

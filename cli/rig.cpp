@@ -3,10 +3,10 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <mutex>
-#include <numbers>
 #include <opencv2/core.hpp>
 #include <set>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/imaging/find_boards.h"
 #include "alidade/io/camera_file.h"
 #include "alidade/io/photos.h"
@@ -22,8 +22,6 @@
 
 namespace alidade::cli {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 struct Args {
   std::filesystem::path views;

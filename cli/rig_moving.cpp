@@ -4,9 +4,9 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
-#include <numbers>
 #include <optional>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/io/camera_file.h"
 #include "alidade/io/events_file.h"
 #include "alidade/io/moving_document.h"
@@ -16,8 +16,6 @@
 
 namespace alidade::cli {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 /// "1:2:12.5" or "1:2:12.5:0.05".
 std::optional<KnownDistance> distance_from(const std::string& text) {

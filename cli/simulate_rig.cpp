@@ -2,10 +2,10 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
-#include <numbers>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/io/camera_file.h"
 #include "alidade/io/rig_file.h"
 #include "alidade/io/views_file.h"
@@ -17,8 +17,6 @@
 
 namespace alidade::cli {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 struct Args {
   std::string scenario = "reference";

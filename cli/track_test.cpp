@@ -70,6 +70,26 @@ TEST_F(TrackCommand, GivesThePathWithTheNamesOfTheContract) {
   EXPECT_EQ(rows.num_rows(), Csv::read(path("sim/events.csv")).num_rows());
 }
 
+/// A head that follows keeps the target central, where the focal length hardly matters: the truth alone shows it.
+TEST_F(TrackCommand, AWrongCameraIsSeenByTheTruth) {
+  simulate("B");
+  std::string rig = read_file(path("sim/rig.yaml"));
+  for (const std::string key : {"fx: ", "fy: "}) {
+    for (std::size_t at = rig.find(key); at != std::string::npos; at = rig.find(key, at + 1)) {
+      const std::size_t from = at + key.size(), end = rig.find_first_of(",\n}", from);
+      rig.replace(from, end - from, std::to_string(2.0 * std::stod(rig.substr(from, end - from))));
+    }
+  }
+  write_file(path("sim/rig.yaml"), rig);
+  const Outcome outcome = track({"--truth", path("sim/truth.csv"), "--json"});
+  if (outcome.code == 0) {
+    EXPECT_EQ(Json::parse(outcome.out)["verdict"]["state"], "bad");
+    EXPECT_THAT(outcome.err + outcome.out, ::testing::HasSubstr("times their σ"));
+  } else {
+    EXPECT_EQ(outcome.code, 4);
+  }
+}
+
 TEST_F(TrackCommand, PredictsAhead) {
   simulate("B");
   ASSERT_EQ(track({"--predict", "0.1"}).code, 0);

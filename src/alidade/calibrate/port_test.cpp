@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "alidade/calibrate/calibrate.h"
 #include "alidade/calibrate/calibration.h"
+#include "alidade/geometry/degree.h"
 #include "alidade/simulate/board_photos.h"
 #include "alidade/testing/random.h"
 
@@ -16,7 +16,6 @@ namespace {
 constexpr ImageSize port_picture{768, 576};
 constexpr double sigma_px = 0.3;
 const Board port_board{.cols = 14, .rows = 10, .square_m = 0.03};
-constexpr double deg = std::numbers::pi / 180.0;
 
 Camera air_camera() {
   return {768, 576, Calibrated<Brown>{{576, 575, 384, 288, 0, -0.12, 0.05, 3e-4, -2e-4, 0}}, {}, 0.0, {}};
@@ -25,7 +24,7 @@ Camera air_camera() {
 Camera port_camera(double gap_m, double tilt_deg) {
   Params<FlatPort> p;
   p.head<10>() = std::get<Calibrated<Brown>>(air_camera().lens).params;
-  const double sin = std::sin(tilt_deg * deg);
+  const double sin = std::sin(tilt_deg * degree);
   p.tail<6>() << gap_m, 0.01, 1.5, 1.34, 0.8 * sin, -0.6 * sin;
   return {768, 576, Calibrated<FlatPort>{p}, {}, 0.0, {}};
 }
@@ -75,7 +74,7 @@ TEST_P(CalibratePort, FindsGapAndNormalAsWellAsItSays) {
     RecordProperty("gap_error_mm_" + std::to_string(seed), std::to_string(1e3 * errors.gap_m));
   }
   EXPECT_LT(std::sqrt(gap_m2), 1.5e-3);  // its σ is 0.9 mm
-  EXPECT_LT(worst_normal_rad, 0.3 * deg);
+  EXPECT_LT(worst_normal_rad, 0.3 * degree);
   EXPECT_LT(squares, 22.5);  // χ²₆ at 10⁻³
 }
 
@@ -147,7 +146,7 @@ TEST(CalibratePort, RefusesAGapBelowZeroAndHoldsItAtZero) {
     on_glass.gap_m = 0.0;
     const auto held = calibrate(port_board, views, port_picture, with_port({.fixed = {"skew", "gap_m"}}, on_glass));
     EXPECT_EQ(held.status, CalibrateReport::Status::converged) << held.reason;
-    EXPECT_LT(errors_of(held, truth).normal_rad, 0.3 * deg);
+    EXPECT_LT(errors_of(held, truth).normal_rad, 0.3 * degree);
   }
   EXPECT_GT(refused, 0);  // half of them, but for chance
   EXPECT_LT(refused, 8);

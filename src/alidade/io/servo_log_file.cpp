@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/io/table_rows.h"
 #include "alidade/report/thin.h"
 
@@ -12,8 +12,6 @@ namespace alidade {
 namespace {
 
 using Numbers = std::vector<double>;
-
-constexpr double deg = std::numbers::pi / 180.0;
 
 void fill_table(std::span<const ServoSample> log, const ServoIdentification& identified, ResultDocument& document) {
   Numbers t, command, measured, model, residual;
@@ -44,7 +42,7 @@ ServoLogFile read_servo_log(const std::filesystem::path& file, bool skip_bad) {
   ServoLogFile read;
   for_each_row(csv, skip_bad, read.skipped, [&](std::size_t row) {
     const ServoSample sample{csv.number(row, "t_s"), csv.number(row, "command"),
-                             csv.number(row, angle) * (is_deg ? deg : 1.0)};
+                             csv.number(row, angle) * (is_deg ? degree : 1.0)};
     if (!read.samples.empty() && !(sample.t_s > read.samples.back().t_s))
       throw InputError(csv.where(row, "t_s") + ": '" + csv.text(row, "t_s") + "' is not after the row before it");
     if (!(std::abs(sample.angle_rad) <= 1e4))
@@ -87,7 +85,7 @@ void fill_identification(std::span<const ServoSample> log, const ServoIdentifica
     stddev[name] = fit.is_observable ? its_sigma : unknown;
   };
   put("gain_rad", fit.params[0], sigma[0]);
-  put("gain_deg", fit.params[0] / deg, sigma[0] / deg);
+  put("gain_deg", fit.params[0] / degree, sigma[0] / degree);
   put("tau_s", fit.params[1], sigma[1]);
   put("latency_s", fit.params[2], sigma[2]);
   put("zero_rad", fit.params[3], sigma[3]);

@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/io/events_file.h"
 #include "alidade/io/rig_file.h"
 #include "alidade/io/yaml_fields.h"
@@ -17,8 +17,6 @@ namespace {
 using detail::Fields;
 using detail::refuse;
 using detail::refuse_unknown_keys;
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 /// A section of the file, or an empty one.
 class Section {

@@ -1,16 +1,15 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <tuple>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/observe/fang_observer.h"
 #include "alidade/observe/observe.h"
 
 namespace alidade {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180.0;
 constexpr double fine = 0.003;      // σ over the focal length of a converged estimate
 constexpr double ask_beyond = 5.0;  // σ at which the residuals ask for one thing more
 

@@ -38,7 +38,7 @@ UnderwaterSample underwater_sample(const UnderwaterScene& scene, std::uint64_t s
 namespace {
 
 /// What of the board's points was found in a picture.
-std::vector<FeatureSight> sights_of(const BoardDetection& detection) {
+std::vector<FeatureSight> sights_of_board(const BoardDetection& detection) {
   std::vector<FeatureSight> sights;
   for (const Corner& corner : detection.view.corners)
     if (const auto id = underwater_point_at(corner.index))
@@ -63,7 +63,7 @@ UnderwaterSample filmed_sample(const UnderwaterScene& scene, const UnderwaterVid
     return render_underwater_frame(scene.camera, sample.truth[k].world_from_cam, video, 1000 * seed + k);
   };
   const BoardDetections found = find_boards(sample.frames.size(), film, underwater_board());
-  for (std::size_t k = 0; k < sample.frames.size(); ++k) sample.frames[k].sights = sights_of(found.photos[k]);
+  for (std::size_t k = 0; k < sample.frames.size(); ++k) sample.frames[k].sights = sights_of_board(found.photos[k]);
   // As wrong as before, of the depth at which the pictures show a point first.
   for (ToldDepth& told : sample.config.depths) told.depth_m *= first_depth_m(sample, told.id);
   return sample;

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/pantilt/head.h"
 #include "alidade/reproduce/papers.h"
 #include "alidade/reproduce/xiahou_experiments.h"
@@ -10,7 +10,6 @@
 namespace alidade::reproduce {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180.0;
 /// The angles that the paper begins with: pan and tilt of head 1, of head 2.
 const std::array<Eigen::Vector2d, 2> printed_angles{Eigen::Vector2d(-15.3, 25.4) * degree,
                                                     Eigen::Vector2d(27.3, 23.7) * degree};

@@ -1,8 +1,8 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/loop/servo_loop.h"
 #include "alidade/reproduce/xiahou_experiments.h"
 #include "alidade/servo/loop_analysis.h"
@@ -10,7 +10,7 @@
 namespace alidade::reproduce {
 namespace {
 
-constexpr double deg_in_rad = std::numbers::pi / 180.0, focal_px = 337.84;
+constexpr double focal_px = 337.84;
 
 ServoFigures figures_of(const ReproduceConfig& config, const ServoScene& scene, ControllerKind kind) {
   ServoConfig controller;
@@ -34,7 +34,7 @@ FigureTable angles_figure(const ReproduceConfig& config, const ServoScene& scene
     if (row.head > 1) continue;
     if (row.head == 0) figure.columns[0].second.push_back(row.t_s);
     const std::array<double, 4> values{160.0 + row.error_px.x(), 120.0 + row.error_px.y(),
-                                       row.measured_rad.x() / deg_in_rad, row.measured_rad.y() / deg_in_rad};
+                                       row.measured_rad.x() / degree, row.measured_rad.y() / degree};
     for (std::size_t i = 0; i < 4; ++i) figure.columns[1 + 4 * row.head + i].second.push_back(values[i]);
   }
   return figure;

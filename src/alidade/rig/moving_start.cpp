@@ -11,7 +11,7 @@ namespace {
 constexpr double least_share = 0.5;  // of the sights, that must agree
 constexpr double most_miss_px = 12.0;
 
-double strength(const SightPair& pair) { return pair.share * std::sqrt(static_cast<double>(pair.num_common)); }
+double start_strength(const SightPair& pair) { return pair.share * std::sqrt(static_cast<double>(pair.num_common)); }
 
 double time_of(const MovingStart::Placed& camera, double t_s, double middle_s) {
   return t_s + camera.offset_s + (camera.rate - 1.0) * (t_s - middle_s);
@@ -70,7 +70,7 @@ bool place_next(std::span<const SightSeries> series, const std::vector<SightPair
   for (const SightPair& pair : pairs) {
     const bool has_first = start.cameras[pair.first].placed, has_second = start.cameras[pair.second].placed;
     if (has_first == has_second || tried[has_first ? pair.second : pair.first]) continue;
-    if (!next || strength(pair) > strength(*next)) next = &pair;
+    if (!next || start_strength(pair) > start_strength(*next)) next = &pair;
   }
   if (!next) return false;
   const bool has_first = start.cameras[next->first].placed;

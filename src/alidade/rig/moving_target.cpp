@@ -11,7 +11,7 @@
 namespace alidade {
 namespace {
 
-using Status = MovingTargetReport::Status;
+using PlacedStatus = MovingTargetReport::Status;
 constexpr std::size_t least_sights = 30;
 
 /// Six pictures of the typical camera: a path bends no faster than that, and sights between knots average.
@@ -25,7 +25,7 @@ double knot_of(std::span<const SightSeries> series) {
   return pictures * spacings[spacings.size() / 2];
 }
 
-struct Work {
+struct Placing {
   std::span<const TargetSight> sights;
   std::span<const RigHead> heads;
   const MovingTargetConfig& config;
@@ -40,13 +40,13 @@ struct Work {
   MovingTargetReport report;
 };
 
-std::optional<std::size_t> head_of(const Work& work, int id) {
+std::optional<std::size_t> head_of(const Placing& work, int id) {
   for (std::size_t h = 0; h < work.heads.size(); ++h)
     if (work.heads[h].head.id == id) return h;
   return std::nullopt;
 }
 
-void read_series(Work& work) {
+void read_series(Placing& work) {
   for (std::size_t h = 0; h < work.heads.size(); ++h) {
     work.series.push_back(sight_series(work.sights, h, work.heads[h]));
     PlacedCamera camera;
@@ -66,7 +66,7 @@ Rigid3 cam_from_base(Head head, const Eigen::Vector2d& readings_rad) {
 }
 
 /// World and clock become those of the reference camera; lengths those of the distance given, if there is one.
-void set_state(Work& work) {
+void set_state(Placing& work) {
   const MovingStart& start = work.start;
   const std::size_t reference = work.problem.reference;
   const MovingStart::Placed& first = start.cameras[reference];
@@ -103,7 +103,7 @@ void set_state(Work& work) {
 }
 
 /// Sights where the path is known, a few a knot.
-void choose_sights(Work& work) {
+void choose_sights(Placing& work) {
   for (std::size_t h = 0; h < work.heads.size(); ++h) {
     if (!work.problem.placed[h]) continue;
     double last_s = -1e300;
@@ -119,7 +119,7 @@ void choose_sights(Work& work) {
   }
 }
 
-void set_problem(Work& work) {
+void set_problem(Placing& work) {
   MovingProblem& problem = work.problem;
   problem.clocks_are_free = work.config.clock_search_s > 0.0;
   problem.sigma_px = work.config.sigma_px;
@@ -140,7 +140,7 @@ void set_problem(Work& work) {
   }
 }
 
-[[nodiscard]] bool begin(Work& work) {
+[[nodiscard]] bool begin(Placing& work) {
   MovingTargetReport& report = work.report;
   std::size_t num_watching = 0;
   for (const SightSeries& one : work.series) num_watching += one.t_s.size() >= least_sights ? 1U : 0U;
@@ -151,11 +151,11 @@ void set_problem(Work& work) {
     report.cameras[h].reason = work.start.cameras[h].reason;
   }
   if (!work.start.has_common) return false;
-  report.status = Status::no_pair;
+  report.status = PlacedStatus::no_pair;
   return work.start.found && work.start.t_s.size() >= least_sights;
 }
 
-void take_results(Work& work) {
+void take_results(Placing& work) {
   const SolvedMoving& solved = work.solved;
   MovingTargetReport& report = work.report;
   report.rig.heads = solved.state.heads;
@@ -195,7 +195,7 @@ void take_results(Work& work) {
 }
 
 /// Covariance of the heads by the names of a rig's: what is uncertain of the scale comes on top.
-void take_covariance(Work& work, double scale, double sigma_scale) {
+void take_covariance(Placing& work, double scale, double sigma_scale) {
   MovingTargetReport& report = work.report;
   const Eigen::Index num = num_head_params * static_cast<Eigen::Index>(work.heads.size());
   report.rig.cov.setZero(num, num);
@@ -228,7 +228,7 @@ void take_covariance(Work& work, double scale, double sigma_scale) {
 }
 
 /// World and clock become the true path's.
-void take_truth(Work& work, const PathMatch& match) {
+void take_truth(Placing& work, const PathMatch& match) {
   MovingTargetReport& report = work.report;
   const Similarity& similarity = match.truth_from_path;
   const Eigen::Quaterniond& turn = similarity.b_from_a.rotation;
@@ -253,7 +253,7 @@ void take_truth(Work& work, const PathMatch& match) {
 
 /// Each camera's rays lie in a plane of its own, within 4 px: the target moved along a line (or in a plane with all
 /// cameras), and the planes alone say too little of where the cameras are.
-bool is_line(const Work& work) {
+bool is_line(const Placing& work) {
   constexpr double most_px = 4.0;
   return std::ranges::none_of(work.series, [](const SightSeries& series) {
     Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
@@ -264,39 +264,39 @@ bool is_line(const Work& work) {
   });
 }
 
-void set_scale(Work& work, const TrueTrack& truth) {
+void set_scale(Placing& work, const TrueTrack& truth) {
   constexpr double most_misfit = 0.05;  // of the path's extent
   MovingTargetReport& report = work.report;
   if (truth.t_s.empty()) {
     const bool has_scale = work.config.distance && work.problem.scale_sigma > 0.0 &&
                            work.heads[work.problem.scale_first].head.id == work.config.distance->first &&
                            work.heads[work.problem.scale_second].head.id == work.config.distance->second;
-    report.status = has_scale ? Status::placed : Status::no_scale;
+    report.status = has_scale ? PlacedStatus::placed : PlacedStatus::no_scale;
     take_covariance(work, 1.0, 0.0);
     report.sigma_scale = work.problem.scale_sigma;
     return;
   }
   const auto match = match_path(report.path_t_s, report.path, truth, work.config.clock_search_s > 0.0);
   if (!match || match->median_m > most_misfit * match->extent_m) {
-    report.status = Status::truth_misfits;
+    report.status = PlacedStatus::truth_misfits;
     return;
   }
   take_truth(work, *match);
   take_covariance(work, match->truth_from_path.scale, match->sigma_scale);
-  report.status = Status::placed;
+  report.status = PlacedStatus::placed;
 }
 
 }  // namespace
 
 MovingTargetReport place_cameras(std::span<const TargetSight> sights, std::span<const RigHead> heads,
                                  const MovingTargetConfig& config, const TrueTrack& truth, const Progress& progress) {
-  Work work{sights, heads, config, progress, {}, 0.0, {}, {}, {}, {}, {}, {}};
+  Placing work{sights, heads, config, progress, {}, 0.0, {}, {}, {}, {}, {}, {}};
   work.state.heads.assign(heads.begin(), heads.end());
   work.report.rig.heads = work.state.heads;
   work.problem.readings.assign(heads.size(), Eigen::Vector2d::Zero());
   read_series(work);
   if (!begin(work)) return work.report;
-  work.report.status = Status::degenerate;
+  work.report.status = PlacedStatus::degenerate;
   if (is_line(work)) return work.report;
   set_problem(work);
   set_state(work);
@@ -305,7 +305,7 @@ MovingTargetReport place_cameras(std::span<const TargetSight> sights, std::span<
   take_results(work);
   if (work.solved.cov.size() == 0) return work.report;
   if (!work.solved.converged) {
-    work.report.status = Status::no_convergence;
+    work.report.status = PlacedStatus::no_convergence;
     return work.report;
   }
   set_scale(work, truth);

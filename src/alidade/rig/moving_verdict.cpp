@@ -1,59 +1,53 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <numbers>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/rig/moving_target.h"
 
 namespace alidade {
 namespace {
 
-using Status = MovingTargetReport::Status;
-constexpr double degree = std::numbers::pi / 180.0;
-constexpr double good_rad = 0.2 * degree, refuse_rad = 2.0 * degree;
+using PlacedStatus = MovingTargetReport::Status;
+constexpr double good_turn_rad = 0.2 * degree, refuse_turn_rad = 2.0 * degree;
 constexpr double good_share = 0.01, refuse_share = 0.1;  // σ of a place over the cameras' distance
 
-std::string text_of(double value, int digits = 3) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  return text;
-}
-
-Verdict refusal(std::string sentence, std::string add) {
+Verdict moving_refusal(std::string sentence, std::string add) {
   return {State::refused, ExitCode::cannot_tell, std::move(sentence), std::move(add), {}};
 }
 
 Verdict refusal_by_status(const MovingTargetReport& report, const MovingTargetConfig& config) {
   switch (report.status) {
-    case Status::too_few:
-      return refusal("no two cameras saw the target together in 30 moments or more",
-                     config.clock_search_s > 0.0
-                         ? "let the target move where the cameras' views overlap, or raise --clocks"
-                         : "let the target move where the views overlap; where each camera has its own clock, "
-                           "give --clocks SECONDS");
-    case Status::no_pair:
-      return refusal(config.clock_search_s > 0.0
-                         ? "no two cameras' sights agree at any difference of their clocks"
-                         : "no two cameras' sights agree: their clocks differ, or a lens is wrong",
-                     config.clock_search_s > 0.0 ? "raise --clocks; check the lenses and their order"
-                                                 : "give --clocks SECONDS; check the lenses and their order");
-    case Status::degenerate:
-      return refusal("the cameras' places cannot be told from this path",
-                     "let the target move in all three directions and near the cameras, not along a line");
-    case Status::no_scale:
-      return refusal("the scale cannot be told: all lengths grow with the path",
-                     "give the distance of two placed cameras (--distance 1:2:12.5), or the target's path (--truth)");
-    case Status::truth_misfits:
-      return refusal("the path that was seen is not the true path given, whatever its scale",
-                     config.clock_search_s > 0.0 ? "check that --truth is of the same flight and metres"
-                                                 : "give --clocks SECONDS where the true path has a clock of its own");
-    case Status::no_convergence:
+    case PlacedStatus::too_few:
+      return moving_refusal("no two cameras saw the target together in 30 moments or more",
+                            config.clock_search_s > 0.0
+                                ? "let the target move where the cameras' views overlap, or raise --clocks"
+                                : "let the target move where the views overlap; where each camera has its own clock, "
+                                  "give --clocks SECONDS");
+    case PlacedStatus::no_pair:
+      return moving_refusal(config.clock_search_s > 0.0
+                                ? "no two cameras' sights agree at any difference of their clocks"
+                                : "no two cameras' sights agree: their clocks differ, or a lens is wrong",
+                            config.clock_search_s > 0.0 ? "raise --clocks; check the lenses and their order"
+                                                        : "give --clocks SECONDS; check the lenses and their order");
+    case PlacedStatus::degenerate:
+      return moving_refusal("the cameras' places cannot be told from this path",
+                            "let the target move in all three directions and near the cameras, not along a line");
+    case PlacedStatus::no_scale:
+      return moving_refusal(
+          "the scale cannot be told: all lengths grow with the path",
+          "give the distance of two placed cameras (--distance 1:2:12.5), or the target's path (--truth)");
+    case PlacedStatus::truth_misfits:
+      return moving_refusal("the path that was seen is not the true path given, whatever its scale",
+                            config.clock_search_s > 0.0
+                                ? "check that --truth is of the same flight and metres"
+                                : "give --clocks SECONDS where the true path has a clock of its own");
+    case PlacedStatus::no_convergence:
       return {State::not_converged,
               ExitCode::no_convergence,
               "the estimate does not settle",
               "check the lenses and that one target only is in the table",
               {}};
-    case Status::placed:
+    case PlacedStatus::placed:
       break;
   }
   return {};
@@ -77,9 +71,9 @@ State state_of(double value, double good, double refuse) {
 
 void add_precision(const MovingTargetReport& report, Verdict& verdict) {
   const double spread = spread_m(report), sigma_m = report.sigma_relative_m, sigma_rad = report.sigma_relative_rad;
-  verdict.checks.push_back({"rotation", state_of(sigma_rad, good_rad, refuse_rad),
+  verdict.checks.push_back({"rotation", state_of(sigma_rad, good_turn_rad, refuse_turn_rad),
                             "σ of a camera's attitude " + text_of(sigma_rad / degree, 2) + "°", sigma_rad / degree,
-                            good_rad / degree, "°", ""});
+                            good_turn_rad / degree, "°", ""});
   verdict.checks.push_back(
       {"position", state_of(sigma_m / spread, good_share, refuse_share),
        "σ of a camera's place " + text_of(sigma_m, 2) + " m, of " + text_of(spread, 3) + " m between cameras", sigma_m,
@@ -117,7 +111,7 @@ void add_truth(const MovingTargetReport& report, Verdict& verdict) {
 }  // namespace
 
 Verdict moving_target_verdict(const MovingTargetReport& report, const MovingTargetConfig& config) {
-  if (report.status != Status::placed) return refusal_by_status(report, config);
+  if (report.status != PlacedStatus::placed) return refusal_by_status(report, config);
   Verdict verdict;
   add_precision(report, verdict);
   add_cameras(report, verdict);
@@ -126,8 +120,8 @@ Verdict moving_target_verdict(const MovingTargetReport& report, const MovingTarg
     return std::ranges::find_if(verdict.checks, [&](const Check& check) { return check.state == state; });
   };
   if (const auto refused = first(State::refused); refused != verdict.checks.end()) {
-    Verdict no = refusal("too little to place the cameras: " + refused->text,
-                         "let the target move in all three directions, nearer to the cameras, and for longer");
+    Verdict no = moving_refusal("too little to place the cameras: " + refused->text,
+                                "let the target move in all three directions, nearer to the cameras, and for longer");
     no.checks = verdict.checks;
     return no;
   }

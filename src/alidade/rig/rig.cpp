@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/rig/rig_frame.h"
 #include "alidade/rig/rig_start.h"
 #include "alidade/rig/rig_work.h"
@@ -13,7 +13,6 @@ namespace alidade {
 namespace {
 
 using Status = RigReport::Status;
-constexpr double degree = std::numbers::pi / 180.0;
 
 /// χ² of a view over its count; infinite where a corner is not seen.
 std::vector<double> mean_chi2(const Work& work, const RigState& state) {

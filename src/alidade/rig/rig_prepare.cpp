@@ -1,15 +1,13 @@
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/rig/ray_start.h"
 #include "alidade/rig/rig_start.h"
 #include "alidade/rig/rig_work.h"
 
 namespace alidade {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 std::size_t index_of(std::vector<int>& known, int value) {
   const auto found = std::ranges::find(known, value);

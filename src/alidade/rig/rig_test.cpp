@@ -5,9 +5,9 @@
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <random>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/io/csv.h"
 #include "alidade/io/views_file.h"
 #include "alidade/simulate/rig.h"
@@ -17,7 +17,6 @@ namespace {
 
 using Json = nlohmann::json;
 using Status = RigReport::Status;
-constexpr double degree = std::numbers::pi / 180.0;
 
 /// A board like the reference case's: its origin in the middle.
 std::vector<Eigen::Vector3d> centred(const Board& board) {

@@ -1,14 +1,13 @@
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/rig/rig.h"
 
 namespace alidade {
 namespace {
 
-using Status = RigReport::Status;
-constexpr double degree = std::numbers::pi / 180.0;
+using RigStatus = RigReport::Status;
 constexpr double good_span_rad = 20.0 * degree;
 constexpr double good_relative_rad = 0.2 * degree, good_relative_m = 0.0035;  // of a use in tracking
 constexpr double refuse_relative_rad = 2.0 * degree, refuse_relative_m = 0.05;
@@ -19,12 +18,12 @@ std::string joined(const std::vector<std::string>& words) {
   return text;
 }
 
-Verdict refusal(State state, ExitCode code, std::string sentence, std::string add) {
+Verdict rig_refusal(State state, ExitCode code, std::string sentence, std::string add) {
   return {.state = state, .exit_code = code, .sentence = std::move(sentence), .to_add = std::move(add), .checks = {}};
 }
 
 Verdict cannot_tell(std::string sentence, std::string add) {
-  return refusal(State::refused, ExitCode::cannot_tell, std::move(sentence), std::move(add));
+  return rig_refusal(State::refused, ExitCode::cannot_tell, std::move(sentence), std::move(add));
 }
 
 /// A head that never turned about one of its axes.
@@ -68,25 +67,25 @@ Verdict refusal_by_link(const RigReport& report) {
 Verdict refusal_by_status(const RigReport& report) {
   if (const auto few = refusal_by_count(report)) return *few;
   switch (report.status) {
-    case Status::degrees:
-      return refusal(State::refused, ExitCode::cannot_tell,
-                     "the angles are degrees: the boards turn as if each radian were a degree",
-                     "give pan_rad and tilt_rad in radians");
-    case Status::swapped:
-      return refusal(State::refused, ExitCode::cannot_tell,
-                     "heads swapped: the views of each head fit the camera of the other",
-                     "exchange the cameras, or the numbers in column 'head'");
-    case Status::not_linked:
+    case RigStatus::degrees:
+      return rig_refusal(State::refused, ExitCode::cannot_tell,
+                         "the angles are degrees: the boards turn as if each radian were a degree",
+                         "give pan_rad and tilt_rad in radians");
+    case RigStatus::swapped:
+      return rig_refusal(State::refused, ExitCode::cannot_tell,
+                         "heads swapped: the views of each head fit the camera of the other",
+                         "exchange the cameras, or the numbers in column 'head'");
+    case RigStatus::not_linked:
       return refusal_by_link(report);
     default:
       break;
   }
   if (const auto angles = refusal_by_angles(report)) return *angles;
-  if (report.status == Status::degenerate)
+  if (report.status == RigStatus::degenerate)
     return cannot_tell("these cannot be told apart: " + joined(report.unknown),
                        "look at each board from more pans and tilts");
-  return refusal(State::not_converged, ExitCode::no_convergence, "no rig explains these views",
-                 "check that each view has its own angles (radians), head and board, and the camera files");
+  return rig_refusal(State::not_converged, ExitCode::no_convergence, "no rig explains these views",
+                     "check that each view has its own angles (radians), head and board, and the camera files");
 }
 
 Check check_of(std::string name, State state, std::string text, double value, double limit, std::string unit) {
@@ -166,7 +165,7 @@ void add_encoder(const RigReport& report, const RigConfig& config, Verdict& verd
 }  // namespace
 
 Verdict rig_verdict(const RigReport& report, const RigConfig& config) {
-  if (report.status != Status::converged) return refusal_by_status(report);
+  if (report.status != RigStatus::converged) return refusal_by_status(report);
   if (const auto angles = refusal_by_angles(report)) return *angles;
   Verdict verdict;
   add_precision(report, verdict);
@@ -180,11 +179,11 @@ Verdict rig_verdict(const RigReport& report, const RigConfig& config) {
   const auto refused = first(State::refused), care = first(State::care);
   if (refused != verdict.checks.end()) {
     const std::vector<Check> checks = verdict.checks;
-    verdict = refused->name == "outliers"
-                  ? refusal(State::not_converged, ExitCode::no_convergence, "the views do not agree: " + refused->text,
-                            "check that each view has its own angles, head and board")
-                  : cannot_tell("too little for this noise: " + refused->text,
-                                "look at more boards, nearer, from more pans and tilts");
+    verdict = refused->name == "outliers" ? rig_refusal(State::not_converged, ExitCode::no_convergence,
+                                                        "the views do not agree: " + refused->text,
+                                                        "check that each view has its own angles, head and board")
+                                          : cannot_tell("too little for this noise: " + refused->text,
+                                                        "look at more boards, nearer, from more pans and tilts");
     verdict.checks = checks;
     return verdict;
   }

@@ -8,13 +8,12 @@
 #include <stdexcept>
 #include <utility>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/geometry/so3.h"
 #include "alidade/simulate/draws.h"
 
 namespace alidade {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 /// 1280×960, 1200 px, without distortion; what a calibration of it would leave unknown: 1.5, 1.5, 2, 2 px.
 Camera reference_camera() {

@@ -5,12 +5,11 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/simulate/draws.h"
 
 namespace alidade {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 std::vector<double> spread(double low, double high, int count) {
   std::vector<double> values;

@@ -10,6 +10,7 @@
 namespace alidade {
 namespace {
 
+constexpr double good_nees = 2.0, most_nees = 9.0;  // per degree of freedom, where the truth is given
 constexpr double least_used_share = 0.7, most_nis = 3.0, good_nis_low = 0.6, good_nis_high = 1.5;
 
 double used_share(const TrackReport& report) {
@@ -137,6 +138,17 @@ void add_checks(const TrackReport& report, Verdict& verdict) {
                                    : nis > most_nis ? State::bad
                                                     : State::care,
                                    text_of(nis, 3) + " per degree of freedom: " + text, nis, good_nis_high, "1"));
+  }
+  const double nees = report.nees_per_dof;
+  if (std::isfinite(
+          nees)) {  // only who has the truth sees a wrong focal length: a head that follows keeps the target central
+    const double ratio = std::sqrt(nees);
+    verdict.checks.push_back(check("truth",
+                                   nees > most_nees   ? State::bad
+                                   : nees > good_nees ? State::care
+                                                      : State::good,
+                                   "the errors are " + text_of(ratio, 2) + " times their σ", ratio,
+                                   std::sqrt(good_nees), "σ"));
   }
   const auto num_alone = static_cast<double>(count(report, TrackEvent::one_head));
   const double alone = num_alone / static_cast<double>(report.steps.size());

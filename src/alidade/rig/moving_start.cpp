@@ -149,7 +149,7 @@ MovingStart start_cameras(std::span<const SightSeries> series, double search_s, 
   start.cameras.resize(series.size());
   const std::vector<SightPair> pairs = told_pairs(series, search_s, progress);
   start.has_common = !pairs.empty();
-  const auto best = std::ranges::max_element(pairs, {}, strength);
+  const auto best = std::ranges::max_element(pairs, {}, start_strength);
   if (best == pairs.end()) return start;
   start.best_share = best->share;
   if (best->share < least_share) return start;

@@ -257,8 +257,10 @@ bool is_line(const Placing& work) {
   constexpr double most_px = 4.0;
   return std::ranges::none_of(work.series, [](const SightSeries& series) {
     Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-    for (const Eigen::Vector2d& at : series.at) const Eigen::Vector3d ray = at.homogeneous();
-    sum += ray * ray.transpose() / static_cast<double>(series.at.size());
+    for (const Eigen::Vector2d& at : series.at) {
+      const Eigen::Vector3d ray = at.homogeneous();
+      sum += ray * ray.transpose() / static_cast<double>(series.at.size());
+    }
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(sum);
     return series.at.size() >= least_sights && std::sqrt(std::abs(eigen.eigenvalues()[0])) * series.px > most_px;
   });

@@ -12,7 +12,7 @@
 namespace alidade {
 namespace {
 
-using Status = MovingTargetReport::Status;
+using PlacedStatus = MovingTargetReport::Status;
 using PathOf = Eigen::Vector3d (*)(double t_s);
 
 /// Over a field of 30 m, up to 8 m/s.
@@ -156,7 +156,7 @@ TEST(MovingTarget, CamerasAreWhereTheyAreWithinTheirCovariance) {
     const Scene scene = scene_of(loops, seed, clocks_differ);
     MovingTargetConfig config{.clock_search_s = clocks_differ ? 2.0 : 0.0, .distance = true_distance(scene)};
     const MovingTargetReport report = place_cameras(scene.sights, unplaced(scene), config);
-    ASSERT_EQ(report.status, Status::placed) << seed;
+    ASSERT_EQ(report.status, PlacedStatus::placed) << seed;
     EXPECT_EQ(moving_target_verdict(report, config).state, State::good);
     for (std::size_t c = 1; c < 3; ++c) {
       const auto at = static_cast<Eigen::Index>(num_head_params * c);
@@ -189,7 +189,7 @@ TEST(MovingTarget, ATruePathGivesScaleFrameAndClock) {
   }
   const MovingTargetConfig config{.clock_search_s = 2.0};
   const MovingTargetReport report = place_cameras(scene.sights, unplaced(scene), config, truth);
-  ASSERT_EQ(report.status, Status::placed);
+  ASSERT_EQ(report.status, PlacedStatus::placed);
   for (std::size_t c = 0; c < 3; ++c) {
     const Eigen::Vector3d place = map_from_world * scene.truth[c].head.world_from_base.translation;
     EXPECT_LT((report.rig.heads[c].head.world_from_base.translation - place).norm(), 0.1);

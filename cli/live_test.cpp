@@ -89,10 +89,7 @@ TEST_F(LiveCommand, CtrlCEndsAPacedRunAndWritesNothing) {
   write_file(path("scenario.yaml"), "seeds: 1\nduration_s: 600\n");
   const std::vector<std::string> words{
       ALIDADE_EXECUTABLE, "servo", path("scenario.yaml"), "--live=0", "--live-pace", "1", "--out", path("out")};
-  const Outcome outcome = testing::run_program(words, "", [](pid_t child) {
-    std::this_thread::sleep_for(std::chrono::seconds(1));
-    ::kill(child, SIGINT);
-  });
+  const Outcome outcome = testing::run_program(words, "", testing::interrupt_after(std::chrono::seconds(1)));
   EXPECT_EQ(outcome.code, 130);
   EXPECT_THAT(outcome.err, HasSubstr("interrupted; nothing written\n"));
   EXPECT_FALSE(std::filesystem::exists(path("out")));
@@ -104,10 +101,7 @@ class ViewCommand : public LiveCommand {
   [[nodiscard]] Outcome view(const std::vector<std::string>& folders) {
     std::vector<std::string> words{ALIDADE_EXECUTABLE, "view", "--port", "0"};
     words.insert(words.end(), folders.begin(), folders.end());
-    return testing::run_program(words, "", [](pid_t child) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(700));
-      ::kill(child, SIGINT);
-    });
+    return testing::run_program(words, "", testing::interrupt_after(std::chrono::seconds(1)));
   }
 };
 

@@ -47,7 +47,7 @@ class MovingTargetCommand : public testing::CommandTest {
                                    size[0].get<int>(), size[1].get<int>(), K[0][0].get<double>(), K[1][1].get<double>(),
                                    K[0][2].get<double>(), K[1][2].get<double>());
     const std::array<const char*, 5> names{"k1", "k2", "p1", "p2", "k3"};
-    for (std::size_t i = 0; i < k.size(); ++i) text += fmt::format("{}: {}\n", names[i], k[i]);
+    for (std::size_t i = 0; i < names.size(); ++i) text += fmt::format("{}: {}\n", names[i], i < k.size() ? k[i] : 0.0);
     write_file(path(fmt::format("lens_{}.yaml", c)), text);
     return json["fps"].get<double>();
   }

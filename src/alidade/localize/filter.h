@@ -20,13 +20,11 @@ struct LocalizationFilterConfig {
   double sigma_alpha_rad_s2 = 1.5;  ///< Angular acceleration; a hand's is about 6.
   int max_iterations = 4;           ///< Gauss–Newton steps of an update.
   double gate = 13.8;               ///< χ² of two numbers: 99.9 %.
-  /// Iterate while innovations are further from linear than so many σ. They bend to the same side in every frame: at
-  /// 0.05 the scale of a map is 2 % off after 500.
-  double bend_tolerance = 0.001;
-  bool is_sequential = true;     ///< Known points first, then by growing innovation; false: in the order given.
-  bool finds_consensus = true;   ///< One-point consensus where sights disagree: mismatches.
-  double consensus_above = 0.0;  ///< Share of the sights that may disagree before a consensus is looked for.
-  double linear_below = 0.1;     ///< Linearity index below which an inverse depth becomes a place.
+  double bend_tolerance = 0.05;     ///< Iterate while innovations are further from linear than so many σ.
+  bool is_sequential = true;        ///< Known points first, then by growing innovation; false: in the order given.
+  bool finds_consensus = true;      ///< One-point consensus where sights disagree: mismatches.
+  double consensus_above = 0.0;     ///< Share of the sights that may disagree before a consensus is looked for.
+  double linear_below = 0.1;        ///< Linearity index below which an inverse depth becomes a place.
   std::vector<int> lens_params;  ///< Places of the lens's parameters that are in the state, and their σ at the start.
   std::vector<double> sigma_lens_params;
   int state_capacity = 800;   ///< Numbers of the state at most.
@@ -161,9 +159,6 @@ class LocalizationFilter {
   void refine();
   [[nodiscard]] bool use_again();
   [[nodiscard]] bool finish_update();
-  /// The state goes where delta_ says, and the covariance's errors are counted from there.
-  void move_by_delta();
-  [[nodiscard]] std::span<const double> error_of(const Feature& feature) const;
   void append_feature(const NewFeature& made, long id);
 
   Camera camera_;
@@ -179,7 +174,6 @@ class LocalizationFilter {
   std::vector<SightOutcome> outcomes_;
   std::vector<double> nis_;
   Eigen::VectorXd start_, next_;
-  Eigen::Matrix<double, Eigen::Dynamic, 3> shear_;
   Camera camera_at_delta_;
   Eigen::MatrixXd joint_x_, joint_s_;
   SmallMatrix triangle_;

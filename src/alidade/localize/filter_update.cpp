@@ -5,7 +5,6 @@
 
 #include "alidade/estimation/iterated_update.h"
 #include "alidade/localize/filter.h"
-#include "alidade/localize/world_turn.h"
 
 namespace alidade {
 namespace {
@@ -19,25 +18,22 @@ double& lens_param(Camera& camera, int index) {
 
 }  // namespace
 
-/// Where the error delta_ leads, seen from a world that turns with it: world_turn.h. The camera keeps its
-/// attitude there, so that nothing measured depends on how the world is turned, wherever the update has led.
 bool LocalizationFilter::linearise(Measured& measured) {
-  const WorldTurn turn(motion_.world_from_cam, delta_.segment<3>(3));
+  const Eigen::Vector3d phi = delta_.segment<3>(3);
   Rigid3 world_from_cam = motion_.world_from_cam;
-  world_from_cam.translation = turn.place_before(world_from_cam.translation, delta_.head<3>());
+  world_from_cam.translation += delta_.head<3>();
+  world_from_cam.rotation = (world_from_cam.rotation * exp_so3(phi)).normalized();
   for (int k = 0; k < num_lens(); ++k) {
     const int index = config_.lens_params[static_cast<std::size_t>(k)];
     lens_param(camera_at_delta_, index) = lens_param(camera_, index) + delta_[motion_dim + k];
   }
-  const Feature& nominal = *measured.feature;
-  const Feature feature = turn.feature_before(nominal, error_of(nominal));
+  Feature feature = *measured.feature;
+  for (int i = 0; i < feature.dim(); ++i) feature.values[i] += delta_[feature.offset + i];
   const auto view = expected_view(num_lens() ? camera_at_delta_ : camera_, world_from_cam, feature);
   if (!view) return false;
   measured.nu = measured.px - view->px;
-  const Eigen::Matrix<double, 2, 3> J_rotation =
-      (view->J_px_pose.leftCols<3>() * cross_matrix(motion_.world_from_cam.translation) +
-       view->J_px_feature * J_before_turn(nominal)) *
-      turn.world_from_cam();
+  const Eigen::Matrix3d J = right_jacobian(phi);
+  const Eigen::Matrix<double, 2, 3> J_rotation = view->J_px_pose.rightCols<3>() * J;
   int n = 0;
   const auto put = [&](int column, double d0, double d1) {
     const auto at = static_cast<std::size_t>(n++);
@@ -271,48 +267,6 @@ void LocalizationFilter::use_together() {
   waiting_.clear();
 }
 
-std::span<const double> LocalizationFilter::error_of(const Feature& feature) const {
-  return {delta_.data() + feature.offset, static_cast<std::size_t>(feature.dim())};
-}
-
-/// The state moves, and errors are counted from where it is then: world_turn.h.
-void LocalizationFilter::move_by_delta() {
-  const WorldTurn turn(motion_.world_from_cam, delta_.segment<3>(3));
-  const Eigen::Matrix3d G = turn.G(), J_left = right_jacobian(-turn.xi()), R = turn.world_from_cam();
-  const CameraMotion was = motion_;
-  motion_ = retract(was, delta_.head<motion_dim>());
-  motion_.world_from_cam.translation = G * turn.place_before(was.world_from_cam.translation, delta_.head<3>());
-  motion_.velocity_in_world = G * turn.place_before(was.velocity_in_world, delta_.segment<3>(6));
-  // First each error is turned with its place, then what the rotation's error adds.
-  const auto block = [&](int row) { return shear_.block<3, 3>(row, 0); };
-  block(0) = block(6) = G;
-  block(3) = block(9) = Eigen::Matrix3d::Identity();
-  for (const Feature& feature : features_) {
-    block(feature.offset) = G;
-    if (feature.dim() > 3) block(feature.offset + 3) = turn.J_turned_angles(feature, error_of(feature));
-  }
-  P_.turn(shear_.data(), motion_dim, num_lens());
-  const auto added = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
-    return ((G * cross_matrix(from) - cross_matrix(to) * J_left) * R).eval();
-  };
-  shear_.topRows(motion_dim + num_lens()).setZero();
-  block(0) = added(was.world_from_cam.translation, motion_.world_from_cam.translation);
-  block(3) = motion_.world_from_cam.rotation.toRotationMatrix().transpose() * J_left * R - Eigen::Matrix3d::Identity();
-  block(6) = added(was.velocity_in_world, motion_.velocity_in_world);
-  for (Feature& feature : features_) {
-    const Feature before = feature;
-    feature = WorldTurn::turned(G, turn.feature_before(before, error_of(before)));
-    block(feature.offset) = added(before.values.head<3>(), feature.values.head<3>());
-    if (feature.dim() < 6) continue;
-    block(feature.offset + 3) =
-        (turn.J_turned_angles(before, error_of(before)) * J_before_turn(before).bottomRows<3>() -
-         J_before_turn(feature).bottomRows<3>() * J_left) *
-        R;
-  }
-  constexpr int rotation_at = 3;
-  P_.shear(rotation_at, shear_.data());
-}
-
 bool LocalizationFilter::finish_update() {
   const int dim = P_.dim();
   if (!delta_.head(dim).allFinite() || !P_.stays_positive()) {
@@ -321,11 +275,24 @@ bool LocalizationFilter::finish_update() {
     return false;
   }
   P_.commit();
+  motion_ = retract(motion_, delta_.head<motion_dim>());
   for (int k = 0; k < num_lens(); ++k) {
     const int index = config_.lens_params[static_cast<std::size_t>(k)];
     lens_param(camera_, index) += delta_[motion_dim + k];
   }
-  move_by_delta();
+  for (Feature& feature : features_)
+    for (int i = 0; i < feature.dim(); ++i) feature.values[i] += delta_[feature.offset + i];
+  const Eigen::Matrix3d J = right_jacobian(delta_.segment<3>(3));  // the error is counted from the new attitude
+  for (int j = 0; j < dim; ++j) {
+    const Eigen::Vector3d rotation(P_.at(3, j), P_.at(4, j), P_.at(5, j));
+    const Eigen::Vector3d turned = J * rotation;
+    for (int i = 0; i < 3; ++i) P_.at(3 + i, j) = turned[i];
+  }
+  for (int j = 0; j < dim; ++j) {
+    const Eigen::Vector3d rotation(P_.at(j, 3), P_.at(j, 4), P_.at(j, 5));
+    const Eigen::Vector3d turned = J * rotation;
+    for (int i = 0; i < 3; ++i) P_.at(j, 3 + i) = turned[i];
+  }
   delta_.setZero();
   return true;
 }

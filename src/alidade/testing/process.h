@@ -5,11 +5,14 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <fstream>
 #include <functional>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "alidade/io/files.h"
@@ -57,6 +60,24 @@ struct Outcome {
     return 127;
   };
   return run_in_child(body, meanwhile);
+}
+
+/// Sends SIGINT so long after the process has begun to listen for it, however slow the machine; after 60 s in any case.
+[[nodiscard]] inline std::function<void(pid_t)> interrupt_after(std::chrono::milliseconds wait) {
+  return [wait](pid_t child) {
+    const std::string status = "/proc/" + std::to_string(child) + "/status";
+    const auto listens = [&] {
+      std::ifstream lines(status);
+      for (std::string line; std::getline(lines, line);) {
+        if (!line.starts_with("SigCgt:")) continue;
+        return (std::stoull(line.substr(7), nullptr, 16) >> (SIGINT - 1) & 1u) != 0u;
+      }
+      return false;
+    };
+    for (int i = 0; i < 3000 && !listens(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    std::this_thread::sleep_for(wait);
+    ::kill(child, SIGINT);
+  };
 }
 
 /// Runs `body` in a child process on a terminal of its own and gives everything that the terminal showed.

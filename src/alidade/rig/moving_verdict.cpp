@@ -45,7 +45,10 @@ Verdict refusal_by_status(const MovingTargetReport& report, const MovingTargetCo
       return {State::not_converged,
               ExitCode::no_convergence,
               "the estimate does not settle",
-              "check the lenses and that one target only is in the table",
+              config.clock_search_s > 0.0
+                  ? "check the lenses and that one target only is in the table"
+                  : "give --clocks SECONDS where each camera has its own clock; check the lenses and that one target "
+                    "only is in the table",
               {}};
     case PlacedStatus::placed:
       break;

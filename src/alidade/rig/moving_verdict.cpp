@@ -42,13 +42,15 @@ Verdict refusal_by_status(const MovingTargetReport& report, const MovingTargetCo
                                 ? "check that --truth is of the same flight and metres"
                                 : "give --clocks SECONDS where the true path has a clock of its own");
     case PlacedStatus::no_convergence:
+      if (!(config.clock_search_s > 0.0))
+        return moving_refusal(
+            "no path fits what the cameras saw by one clock",
+            "give --clocks SECONDS where each camera has its own clock; check the lenses, and that one "
+            "target only is in the table");
       return {State::not_converged,
               ExitCode::no_convergence,
               "the estimate does not settle",
-              config.clock_search_s > 0.0
-                  ? "check the lenses and that one target only is in the table"
-                  : "give --clocks SECONDS where each camera has its own clock; check the lenses and that one target "
-                    "only is in the table",
+              "check the lenses and that one target only is in the table",
               {}};
     case PlacedStatus::placed:
       break;

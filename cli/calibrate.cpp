@@ -23,7 +23,7 @@
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct CalibrateArgs {
   std::vector<std::filesystem::path> photos;
   BoardOptions board;
   std::filesystem::path corners;
@@ -62,7 +62,7 @@ ImageSize parse_size(const std::string& text) {
 }
 
 /// The config that the flags describe; throws UsageError with every fault of it.
-CalibrateConfig config_from(const Args& args) {
+CalibrateConfig config_from(const CalibrateArgs& args) {
   CalibrateConfig config = args.config;
   config.fixed = {"skew"};
   for (const std::string& name : args.fixed) {
@@ -97,7 +97,7 @@ Camera read_air_lens(const std::filesystem::path& file) {
 }
 
 /// Reads what --model flat_port needs; refuses its options with another model.
-void take_port(Args& args, Run& run) {
+void take_port(CalibrateArgs& args, Run& run) {
   if (args.config.model != FlatPort::name) {
     if (!args.air.empty() || args.has_glass) throw UsageError("--air and --glass are of --model flat_port");
     return;
@@ -109,7 +109,7 @@ void take_port(Args& args, Run& run) {
 }
 
 /// A lens held must be of these pictures.
-void require_size_of_air(const Args& args, const ImageSize& size) {
+void require_size_of_air(const CalibrateArgs& args, const ImageSize& size) {
   const std::optional<Camera>& air = args.port.air;
   if (!air || (air->width_px == size.width_px && air->height_px == size.height_px)) return;
   throw InputError(fmt::format("{}: is of {}x{} px, but the photos are {}x{}", args.air.string(), air->width_px,
@@ -150,7 +150,7 @@ class PhotoShelf {
 };
 
 /// Size of the pictures where only corners are given: as asked, else the smallest that holds them all.
-ImageSize size_of(const Args& args, const std::vector<BoardView>& views) {
+ImageSize size_of(const CalibrateArgs& args, const std::vector<BoardView>& views) {
   if (!args.size.empty()) return parse_size(args.size);
   if (args.port.air) return {args.port.air->width_px, args.port.air->height_px};
   double width = 1.0, height = 1.0;
@@ -164,7 +164,7 @@ ImageSize size_of(const Args& args, const std::vector<BoardView>& views) {
           static_cast<int>(std::ceil(std::min(height, 2e5))) + 1};
 }
 
-PhotoCalibration from_corners(const Args& args, const Board& board, CalibrateConfig& config,
+PhotoCalibration from_corners(const CalibrateArgs& args, const Board& board, CalibrateConfig& config,
                               std::span<const Eigen::Vector3d> given, Run& run) {
   PhotoCalibration result;
   run.add_input("corners", args.corners);
@@ -201,7 +201,7 @@ PhotoCalibration from_photos(const std::vector<std::filesystem::path>& files, Ph
   return result;
 }
 
-ExitCode calibrate(Args args, Run& run) {
+ExitCode calibrate(CalibrateArgs args, Run& run) {
   take_port(args, run);
   const Board board = board_from(args.board);
   CalibrateConfig config = config_from(args);
@@ -235,7 +235,7 @@ ExitCode calibrate(Args args, Run& run) {
 }  // namespace
 
 void add_calibrate(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<CalibrateArgs>();
   CLI::App& command = frame.add_command(
       {.name = "calibrate",
        .summary = "A camera with its distortion and covariance, from photos of a board",

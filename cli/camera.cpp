@@ -5,10 +5,10 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "alidade/camera/projection_sigma.h"
 #include "alidade/camera/undistort.h"
+#include "alidade/geometry/degree.h"
 #include "alidade/io/camera_file.h"
 #include "cli/camera_values.h"
 #include "cli/commands.h"
@@ -17,19 +17,17 @@
 namespace alidade::cli {
 namespace {
 
-constexpr double deg_per_rad = 180.0 / std::numbers::pi;
-
 /// How far off its axis the lens is valid [deg]; 90 or 180 where nothing limits it.
 double limit_deg(const Camera& camera) {
   if (const auto* brown = std::get_if<Calibrated<Brown>>(&camera.lens)) {
-    return deg_per_rad * std::atan(Brown::max_radius(brown->params));
+    return std::atan(Brown::max_radius(brown->params)) / degree;
   }
   if (const auto* fisheye = std::get_if<Calibrated<KannalaBrandt>>(&camera.lens)) {
-    return deg_per_rad * KannalaBrandt::max_angle(fisheye->params);
+    return KannalaBrandt::max_angle(fisheye->params) / degree;
   }
   if (const auto* port = std::get_if<Calibrated<FlatPort>>(&camera.lens)) {  // of the axis of lens and port, in water
     const double in_air_rad = std::atan(Brown::max_radius(FlatPort::air_lens(port->params)));
-    return deg_per_rad * std::asin(std::sin(in_air_rad) / port->params[13]);
+    return std::asin(std::sin(in_air_rad) / port->params[13]) / degree;
   }
   return 90.0;
 }
@@ -57,7 +55,7 @@ SigmaSummary three_sigma(const Camera& camera) {
   return {3.0 * values[values.size() / 2], 3.0 * values.back()};
 }
 
-std::string degrees(double rad) { return std::isnan(rad) ? "–" : fmt::format("{:.1f}°", deg_per_rad * rad); }
+std::string degrees_text(double rad) { return std::isnan(rad) ? "–" : fmt::format("{:.1f}°", rad / degree); }
 
 struct ShowArgs {
   std::string file;
@@ -72,9 +70,9 @@ ExitCode show(const ShowArgs& args, Run& run) {
   estimate["camera"] = camera_values(camera);
   estimate["rms_px"] = camera.rms_px > 0.0 ? camera.rms_px : std::nan("");
   estimate["source"] = camera.source;
-  estimate["horizontal_view_deg"] = deg_per_rad * view.horizontal_rad;
-  estimate["vertical_view_deg"] = deg_per_rad * view.vertical_rad;
-  estimate["diagonal_view_deg"] = deg_per_rad * view.diagonal_rad;
+  estimate["horizontal_view_deg"] = view.horizontal_rad / degree;
+  estimate["vertical_view_deg"] = view.vertical_rad / degree;
+  estimate["diagonal_view_deg"] = view.diagonal_rad / degree;
   estimate["valid_off_axis_deg"] = limit_deg(camera);
   estimate["seeing_share"] = share;
   run.document.stddev["camera"] = camera_stddev(camera);
@@ -82,8 +80,8 @@ ExitCode show(const ShowArgs& args, Run& run) {
   run.say(fmt::format("{}, {} × {} px{}", model_name(camera.lens), camera.width_px, camera.height_px,
                       camera.source.empty() ? "" : " (" + camera.source + ")"));
   for (const std::string& line : camera_lines(camera)) run.say(line);
-  run.say(fmt::format("view {} × {}, diagonal {}; valid to {:.1f}° off the axis", degrees(view.horizontal_rad),
-                      degrees(view.vertical_rad), degrees(view.diagonal_rad), limit_deg(camera)));
+  run.say(fmt::format("view {} × {}, diagonal {}; valid to {:.1f}° off the axis", degrees_text(view.horizontal_rad),
+                      degrees_text(view.vertical_rad), degrees_text(view.diagonal_rad), limit_deg(camera)));
   if (camera.rms_px > 0.0) run.say(fmt::format("RMS {:.3f} px per point", camera.rms_px));
   if (has_covariance(camera)) {
     const SigmaSummary sigma = three_sigma(camera);

@@ -29,7 +29,7 @@ void add_view(Frame& frame);
 
 // How to write a command: cli/NAME.cpp with one function `add_NAME(Frame&)`, declared here and called in main.cpp.
 //
-//   ExitCode calibrate(const Args& args, Run& run) {
+//   ExitCode calibrate(const CalibrateArgs& args, Run& run) {
 //     const std::string text = read_file(args.file);            // reading throws InputError → exit 3
 //     run.add_input("photo", args.file, text);                  // names, sizes, checksums
 //     const Report report = alidade::calibrate(…, run.progress);  // one library call; Progress brings Ctrl-C
@@ -41,11 +41,13 @@ void add_view(Frame& frame);
 //   }
 //
 //   void add_calibrate(Frame& frame) {
-//     auto args = std::make_shared<Args>();
+//     auto args = std::make_shared<CalibrateArgs>();
 //     CLI::App& command = frame.add_command({"calibrate", "A camera from photos of a board", "alidade calibrate …"},
 //                                           [args](Run& run) { return calibrate(*args, run); });
 //     command.add_option("photos", args->photos, "Photos of the board")->required();
 //   }
+//
+// Several files are compiled as one: names in unnamed namespaces differ between commands (CalibrateArgs, not Args).
 //
 // --out, --json, --quiet, --no-report, --threads (and --seed where chance is) are there already. A verdict with exit
 // code cannot_tell or no_convergence becomes the line `alidade: error: calibrate: SENTENCE; TO_ADD`. Do not print, do

@@ -12,7 +12,7 @@
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct IdentifyArgs {
   std::filesystem::path log;
   bool skip_bad = false;
 };
@@ -33,7 +33,7 @@ void summarize(const ServoIdentification& identified, Run& run) {
                       identified.other.rms_rad * deg));
 }
 
-ExitCode identify(const Args& args, Run& run) {
+ExitCode identify(const IdentifyArgs& args, Run& run) {
   run.add_input("log", args.log);
   const ServoLogFile log = read_servo_log(args.log, args.skip_bad);
   run.lap("read");
@@ -54,7 +54,7 @@ ExitCode identify(const Args& args, Run& run) {
 }  // namespace
 
 void add_identify(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<IdentifyArgs>();
   CLI::App& command = frame.add_command(
       {.name = "identify",
        .summary = "Gain, time constant and latency of one axis of a pan-tilt head from a log of commands and angles",

@@ -3,7 +3,6 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "alidade/live/foxglove.h"
 #include "alidade/live/streams.h"
@@ -16,12 +15,13 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::uint16_t port_of(const std::string& text) {
+/// `hint`: what else the option may have taken it for.
+std::uint16_t port_of(const std::string& text, const std::string& hint = "") {
   if (text.empty()) return 8765;
   std::uint16_t port = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
   if (error != std::errc{} || end != text.data() + text.size())
-    throw UsageError("'" + text + "' is not a port, 0 to 65535; after --live without one, files do not follow");
+    throw UsageError("'" + text + "' is not a port, 0 to 65535" + hint);
   return port;
 }
 
@@ -75,10 +75,10 @@ live::ServerConfig server_config(const LiveOptions& options) {
   return config;
 }
 
-LiveRun::LiveRun(const LiveOptions& options, Run& run) : options_(options), run_(run) {
+LiveRun::LiveRun(const LiveOptions& options, Run& run) : options_(options), run_(run), pace_(options.pace) {
   if (!options.is_on && !options.address.empty()) throw UsageError("--live-address: only with --live");
   if (!options.is_on && options.pace > 0.0) throw UsageError("--live-pace: only with --live");
-  if (options.is_on) (void)port_of(options.port);
+  if (options.is_on) (void)port_of(options.port, "; after --live without one, files do not follow");
 }
 
 LiveRun::~LiveRun() {
@@ -113,20 +113,7 @@ Progress LiveRun::progress() {
 }
 
 void LiveRun::keep_pace(double t_s) {
-  if (!server_ || !(options_.pace > 0.0) || !std::isfinite(t_s)) return;
-  using Clock = std::chrono::steady_clock;
-  if (!has_pace_begun_ || t_s < pace_last_s_ - 0.5) {  // another trial
-    has_pace_begun_ = true;
-    pace_begin_ = Clock::now();
-    pace_first_s_ = t_s;
-  }
-  pace_last_s_ = std::max(t_s, pace_first_s_);
-  const auto until = pace_begin_ + std::chrono::duration_cast<Clock::duration>(
-                                       std::chrono::duration<double>((t_s - pace_first_s_) / options_.pace));
-  while (Clock::now() < until) {
-    if (interrupting_signal() != 0) throw Interrupted();
-    std::this_thread::sleep_until(std::min(until, Clock::now() + std::chrono::milliseconds(50)));
-  }
+  if (server_) pace_.keep(t_s);
 }
 
 ExitCode LiveRun::finish(Verdict verdict) {

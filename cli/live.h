@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -8,6 +7,7 @@
 #include <vector>
 
 #include "alidade/live/server.h"
+#include "cli/pace.h"
 #include "cli/run.h"
 
 namespace CLI {  // NOLINT(readability-identifier-naming): CLI11's
@@ -58,9 +58,7 @@ class LiveRun {
   std::string row_topic_;
   std::mutex mutex_;
   std::string result_;  ///< Empty until the run is finished.
-  std::chrono::steady_clock::time_point pace_begin_;
-  double pace_first_s_ = 0.0, pace_last_s_ = 0.0;
-  bool has_pace_begun_ = false;
+  Pace pace_;
   std::unique_ptr<live::Server> server_;  // last: its thread uses the others
 };
 

@@ -24,7 +24,7 @@
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct LocalizeArgs {
   std::filesystem::path sequence, camera, target, start, truth;
   std::string distortion = "full", new_points = "inverse-depth";
   double rate_hz = 0.0, depth_m = 0.0, sigma_depth = 0.5;
@@ -57,7 +57,7 @@ std::vector<std::string> put_lens_in_state(const Camera& camera, LocalizationFil
   return chosen;
 }
 
-Camera camera_of(const Args& args) {
+Camera camera_of(const LocalizeArgs& args) {
   const auto camera = with_distortion(read_camera(args.camera), *distortion_variant(args.distortion));
   if (!camera) throw UsageError("--distortion: only a brown lens can be given less than full distortion");
   return *camera;
@@ -65,7 +65,7 @@ Camera camera_of(const Args& args) {
 
 double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-LocalizeConfig config_of(const Args& args) {
+LocalizeConfig config_of(const LocalizeArgs& args) {
   LocalizeConfig config;
   config.filter = args.filter;
   config.depth_m = args.depth_m;
@@ -87,7 +87,7 @@ LocalizeConfig config_of(const Args& args) {
   return config;
 }
 
-void add_inputs(const Args& args, Run& run) {
+void add_inputs(const LocalizeArgs& args, Run& run) {
   if (!std::filesystem::is_directory(args.sequence)) run.add_input("sequence", args.sequence);
   run.add_input("camera", args.camera);
   if (!args.target.empty()) run.add_input("target", args.target);
@@ -115,7 +115,7 @@ void summarize(const LocalizeReport& report, std::span<const std::string> lens_p
   }
 }
 
-LocalizeReport localize_table(const Args& args, const Camera& camera, const LocalizeConfig& config,
+LocalizeReport localize_table(const LocalizeArgs& args, const Camera& camera, const LocalizeConfig& config,
                               std::span<const TimedPose> truth, LiveRun& live, Run& run) {
   const SightsFile sights =
       read_sights(args.sequence, {args.skip_bad, args.rate_hz, camera.width_px, camera.height_px});
@@ -141,7 +141,7 @@ void show_picture(live::Server& server, double t_s, const cv::Mat& picture, std:
   server.send("/head1/marks", t_ns, [text = marks.text()] { return text; });
 }
 
-LocalizeReport localize_pictures(const Args& args, const Camera& camera, const LocalizeConfig& localize,
+LocalizeReport localize_pictures(const LocalizeArgs& args, const Camera& camera, const LocalizeConfig& localize,
                                  std::span<const TimedPose> truth, LiveRun& live) {
   LocalizeImagesConfig config;
   config.localize = localize;
@@ -161,7 +161,7 @@ LocalizeReport localize_pictures(const Args& args, const Camera& camera, const L
   return localize_images(camera, next, pictures.num_pictures(), config, truth, live.progress());
 }
 
-LocalizeReport localized(const Args& args, const Camera& camera, LocalizeConfig config,
+LocalizeReport localized(const LocalizeArgs& args, const Camera& camera, LocalizeConfig config,
                          std::span<const TimedPose> truth, const live::LocalizeStream& stream, LiveRun& live,
                          Run& run) {
   if (live.is_on()) {
@@ -179,7 +179,7 @@ LocalizeReport localized(const Args& args, const Camera& camera, LocalizeConfig 
   return report;
 }
 
-ExitCode localize(const Args& args, Run& run) {
+ExitCode localize(const LocalizeArgs& args, Run& run) {
   add_inputs(args, run);
   const Camera camera = camera_of(args);
   LocalizeConfig config = config_of(args);
@@ -207,7 +207,7 @@ ExitCode localize(const Args& args, Run& run) {
   return live.finish(verdict);
 }
 
-void add_options(CLI::App& command, Args& args) {
+void add_options(CLI::App& command, LocalizeArgs& args) {
   command
       .add_option("sequence", args.sequence,
                   "Pictures: a folder of numbered ones, EuRoC's layout (mav0/cam0), or a video; or sights of numbered "
@@ -255,7 +255,7 @@ void add_options(CLI::App& command, Args& args) {
 }  // namespace
 
 void add_localize(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<LocalizeArgs>();
   CLI::App& command = frame.add_command(
       {.name = "localize",
        .summary = "Path of a moving camera, and the map of the points it sees, with the lens in the filter",

@@ -21,7 +21,7 @@
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct ObserveArgs {
   std::string log, pairs, video, angles, camera, size, method = "hybrid", rotation = "known";
   double rate_hz = 0.0;
   std::vector<std::string> estimate;
@@ -31,7 +31,7 @@ struct Args {
   LiveOptions live;
 };
 
-void set_words(const Args& args, ObserveConfig& config) {
+void set_words(const ObserveArgs& args, ObserveConfig& config) {
   static const std::map<std::string, ObserveMethod> methods{{"hybrid", ObserveMethod::hybrid},
                                                             {"window", ObserveMethod::window},
                                                             {"flow", ObserveMethod::flow},
@@ -56,7 +56,7 @@ void set_words(const Args& args, ObserveConfig& config) {
   }
 }
 
-ObserveConfig config_from(const Args& args, const std::optional<Camera>& camera) {
+ObserveConfig config_from(const ObserveArgs& args, const std::optional<Camera>& camera) {
   ObserveConfig config = args.config;
   set_words(args, config);
   if (!args.size.empty()) {
@@ -79,7 +79,7 @@ ObserveConfig config_from(const Args& args, const std::optional<Camera>& camera)
 }
 
 /// Points followed through a video. The result tells their log, points.csv, so that it can be looked at and used again.
-RotationLog follow_video(const Args& args, ObserveConfig& config, Run& run) {
+RotationLog follow_video(const ObserveArgs& args, ObserveConfig& config, Run& run) {
   run.add_input("angles", args.angles);
   const RotationLog angles = read_angles(args.angles);
   VideoFrames video(args.video);
@@ -97,7 +97,7 @@ RotationLog follow_video(const Args& args, ObserveConfig& config, Run& run) {
   return made.log;
 }
 
-RotationLog read_log(const Args& args, ObserveConfig& config, Run& run) {
+RotationLog read_log(const ObserveArgs& args, ObserveConfig& config, Run& run) {
   if (!args.video.empty()) return follow_video(args, config, run);
   const bool is_pairs = !args.pairs.empty();
   const std::string& file = is_pairs ? args.pairs : args.log;
@@ -144,7 +144,7 @@ class RowView {
 };
 
 /// Rows from standard input as they come, each answered at once with a row of intrinsics.csv; the log, at its end.
-RotationLog follow_input(const Args& args, const ObserveConfig& config, const std::optional<Camera>& camera,
+RotationLog follow_input(const ObserveArgs& args, const ObserveConfig& config, const std::optional<Camera>& camera,
                          LiveRun& live, Run& run) {
   if (config.width_px <= 0) throw UsageError("observe -: say --size WxH or --camera FILE, the first rows do not tell");
   RowView view(config, live);
@@ -196,7 +196,7 @@ void summarize(const ObserveReport& report, Run& run) {
   if (bursts > 0) run.say(fmt::format("{} frames or points left out that did not fit", bursts));
 }
 
-void check_sources(const Args& args) {
+void check_sources(const ObserveArgs& args) {
   if (!args.log.empty() + !args.pairs.empty() + !args.video.empty() != 1) {
     throw UsageError("give one of a rotation log, --video FILE and --pairs FILE");
   }
@@ -204,7 +204,7 @@ void check_sources(const Args& args) {
   if (args.video.empty() && args.rate_hz > 0.0) throw UsageError("--rate is for --video");
 }
 
-ExitCode observe_log(const Args& args, Run& run) {
+ExitCode observe_log(const ObserveArgs& args, Run& run) {
   check_sources(args);
   std::optional<Camera> camera;
   if (!args.camera.empty()) {
@@ -239,7 +239,7 @@ ExitCode observe_log(const Args& args, Run& run) {
   return live.finish(verdict);
 }
 
-void add_options(CLI::App& command, Args& args) {
+void add_options(CLI::App& command, ObserveArgs& args) {
   command.add_option(
       "log", args.log,
       "Rotation log, CSV: t, the rotation, p1x,p1y,p2x,p2y,…; - reads rows from standard input and answers each");
@@ -292,7 +292,7 @@ void add_options(CLI::App& command, Args& args) {
 }  // namespace
 
 void add_observe(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<ObserveArgs>();
   CLI::App& command = frame.add_command(
       {.name = "observe",
        .summary = "Intrinsics of a camera that pans, tilts and zooms, from what it sees while it turns",

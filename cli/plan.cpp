@@ -3,9 +3,9 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <memory>
-#include <numbers>
 
 #include "alidade/calibrate/next_photo.h"
+#include "alidade/geometry/degree.h"
 #include "alidade/io/calibration_document.h"
 #include "alidade/io/calibration_result.h"
 #include "cli/commands.h"
@@ -14,12 +14,10 @@
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct PlanArgs {
   std::filesystem::path result;
   int photos = 3;
 };
-
-double degrees(double angle_rad) { return angle_rad * 180.0 / std::numbers::pi; }
 
 /// "board's middle at (512, 80) px, 0.61 m away, turned 32° about x, 0° about y".
 std::string in_words(const CalibrationResult& known, const NextPhoto& photo) {
@@ -29,11 +27,11 @@ std::string in_words(const CalibrationResult& known, const NextPhoto& photo) {
   const Eigen::Vector3d turn = log_so3(photo.cam_from_board.rotation);
   const auto px = project(known.camera, middle_in_cam);
   return fmt::format("board's middle at ({:.0f}, {:.0f}) px, {:.2f} m away, turned {:.0f}° about x, {:.0f}° about y",
-                     px ? px->x() : std::nan(""), px ? px->y() : std::nan(""), middle_in_cam.norm(), degrees(turn.x()),
-                     degrees(turn.y()));
+                     px ? px->x() : std::nan(""), px ? px->y() : std::nan(""), middle_in_cam.norm(), turn.x() / degree,
+                     turn.y() / degree);
 }
 
-ExitCode plan_calibrate(const Args& args, Run& run) {
+ExitCode plan_calibrate(const PlanArgs& args, Run& run) {
   const CalibrationResult known = read_calibration(args.result);
   const std::filesystem::path folder =
       std::filesystem::is_directory(args.result) ? args.result : args.result.parent_path();
@@ -67,7 +65,7 @@ ExitCode plan_calibrate(const Args& args, Run& run) {
 
 void add_plan(Frame& frame) {
   frame.add_group("plan", "What to measure next");
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<PlanArgs>();
   CLI::App& command = frame.add_command({.name = "plan calibrate",
                                          .summary = "The board poses whose photos lower the uncertainty most",
                                          .examples = "alidade plan calibrate alidade-out/calibrate --photos 3\n"},

@@ -12,7 +12,7 @@
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct PlanObserveArgs {
   std::filesystem::path result;
   int moves = 3;
   double rate_deg_s = 15.0, max_turn_deg = 30.0;
@@ -37,7 +37,7 @@ DataTable moves_table(const std::vector<NextMove>& moves) {
            {"sigma_cy_px", columns[7]}}};
 }
 
-ExitCode plan_observe(const Args& args, Run& run) {
+ExitCode plan_observe(const PlanObserveArgs& args, Run& run) {
   const bool is_folder = std::filesystem::is_directory(args.result);
   run.add_input("result", is_folder ? args.result / "result.json" : args.result);
   const ObservedNow now = read_observation(args.result);
@@ -76,7 +76,7 @@ ExitCode plan_observe(const Args& args, Run& run) {
 }  // namespace
 
 void add_plan_observe(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<PlanObserveArgs>();
   CLI::App& command =
       frame.add_command({.name = "plan observe",
                          .summary = "The turns of the head that lower the uncertainty most",

@@ -14,7 +14,7 @@
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct PlanRangefinderArgs {
   std::filesystem::path result;
   int shots = 3;
   double max_tilt_deg = 45.0;
@@ -58,7 +58,7 @@ std::string_view far_side(double azimuth_rad) {
   return sides[static_cast<std::size_t>(((eighth % 8) + 8) % 8)];
 }
 
-ExitCode plan_rangefinder(const Args& args, Run& run) {
+ExitCode plan_rangefinder(const PlanRangefinderArgs& args, Run& run) {
   ShotLimits limits = args.limits;
   limits.max_tilt_rad = args.max_tilt_deg * degree;
   if (!(limits.min_range_m < limits.max_range_m)) throw UsageError("--min-range-m must be below --max-range-m");
@@ -98,7 +98,7 @@ ExitCode plan_rangefinder(const Args& args, Run& run) {
 }  // namespace
 
 void add_plan_rangefinder(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<PlanRangefinderArgs>();
   CLI::App& command =
       frame.add_command({.name = "plan rangefinder",
                          .summary = "Where to hold the board for the shots that lower the uncertainty most",

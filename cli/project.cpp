@@ -18,7 +18,7 @@
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct ProjectArgs {
   std::filesystem::path beam, camera, overlay;
   std::vector<double> ranges_m;
   double sigma_range_m = 0.0;
@@ -156,7 +156,7 @@ void fill_first(const Projected& first, ResultDocument& document) {
   document.stddev["px"] = std::vector<double>{std::sqrt(first.pixel->cov(0, 0)), std::sqrt(first.pixel->cov(1, 1))};
 }
 
-ExitCode project_beam(const Args& args, Run& run) {
+ExitCode project_beam(const ProjectArgs& args, Run& run) {
   run.add_input("beam", args.beam);
   const BeamFile file = read_beam(args.beam);
   const std::filesystem::path camera_file = args.camera.empty() ? file.camera : args.camera;
@@ -196,7 +196,7 @@ ExitCode project_beam(const Args& args, Run& run) {
 }
 
 /// Which of the two it is, and whether its options are there.
-ExitCode project(const Args& args, Run& run) {
+ExitCode project(const ProjectArgs& args, Run& run) {
   if (!args.rig.rig.empty()) {
     if (!args.beam.empty() || !args.ranges_m.empty()) throw UsageError("--rig and --beam are two different questions");
     if (args.rig.pans_rad.empty() || args.rig.tilts_rad.empty()) throw UsageError("--rig needs --pan and --tilt");
@@ -212,7 +212,7 @@ ExitCode project(const Args& args, Run& run) {
 }  // namespace
 
 void add_project(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<ProjectArgs>();
   CLI::App& command = frame.add_command(
       {.name = "project",
        .summary = "Pixel and 3-D point of a rangefinder's reading, or matrices and pixels of a pan-tilt rig",

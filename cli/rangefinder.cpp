@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::size_t most_pictures = 40;  // of the page
 
-struct Args {
+struct RangefinderArgs {
   std::filesystem::path shots, camera, corners, photo, start;
   std::string method = "joint", refine = "all", spot = "auto", outliers = "drop";
   BoardOptions board;
@@ -33,7 +33,7 @@ struct Args {
   bool scale = false, skip_bad = false;
 };
 
-RangefinderConfig config_from(const Args& args, std::uint64_t seed) {
+RangefinderConfig config_from(const RangefinderArgs& args, std::uint64_t seed) {
   RangefinderConfig config;
   config.method = args.method == "spot"    ? RangefinderMethod::spot
                   : args.method == "plane" ? RangefinderMethod::plane
@@ -84,8 +84,8 @@ class ShotShelf {
 };
 
 /// Views of a corners file go to the shots whose photo they name.
-void add_corners(const Args& args, const Board& board, const std::vector<ShotRow>& rows, std::vector<Shot>& shots,
-                 Run& run) {
+void add_corners(const RangefinderArgs& args, const Board& board, const std::vector<ShotRow>& rows,
+                 std::vector<Shot>& shots, Run& run) {
   run.add_input("corners", args.corners);
   const std::vector<BoardView> views = read_corners(args.corners, num_points(board));
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -97,7 +97,7 @@ void add_corners(const Args& args, const Board& board, const std::vector<ShotRow
 }
 
 /// Boards and spots out of the photos. What is wrong with a photo stops the run, or with --skip-bad its row is named.
-void add_photos(const Args& args, const std::optional<Board>& board, const Camera& camera, ShotsFile& file,
+void add_photos(const RangefinderArgs& args, const std::optional<Board>& board, const Camera& camera, ShotsFile& file,
                 std::vector<Shot>& shots, Run& run) {
   ShotShelf shelf(file.rows, args.shots.parent_path(), run);
   ShotPhotosConfig config{.board = board, .find_spots = args.method != "plane"};
@@ -168,7 +168,7 @@ RangefinderExtras extras_of(const RangefinderReport& report, std::span<const Sho
   return extras;
 }
 
-ExitCode rangefinder(const Args& args, Run& run) {
+ExitCode rangefinder(const RangefinderArgs& args, Run& run) {
   if (args.method == "edges") return align_scan({args.shots, args.camera, args.photo, args.start}, run);
   if (!args.photo.empty() || !args.start.empty()) throw UsageError("--photo and --start are for --method edges");
   std::optional<Board> board;
@@ -206,7 +206,7 @@ ExitCode rangefinder(const Args& args, Run& run) {
   return run.finish(verdict);
 }
 
-void add_options(CLI::App& command, Args& args) {
+void add_options(CLI::App& command, RangefinderArgs& args) {
   command
       .add_option("shots", args.shots,
                   "Table of shots, CSV: range_m with any of u,v (spot), photo[,photo_off], nx,ny,nz,d (plane)")
@@ -251,7 +251,7 @@ void add_options(CLI::App& command, Args& args) {
 }  // namespace
 
 void add_rangefinder(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<RangefinderArgs>();
   CLI::App& command = frame.add_command(
       {.name = "rangefinder",
        .summary = "Origin and direction of a laser rangefinder's beam in a camera",

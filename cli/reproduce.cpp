@@ -18,7 +18,7 @@ using reproduce::Claim;
 using reproduce::Holds;
 using reproduce::Paper;
 
-struct Args {
+struct ReproduceArgs {
   std::string paper;
   bool quick = false;
 };
@@ -36,7 +36,7 @@ std::string line_of(const Claim& claim) {
 
 double clock_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-ExitCode reproduce_paper(const Args& args, Run& run) {
+ExitCode reproduce_paper(const ReproduceArgs& args, Run& run) {
   reproduce::ReproduceConfig config;
   config.seed = run.options.seed;
   config.quick = args.quick;
@@ -60,7 +60,7 @@ ExitCode reproduce_paper(const Args& args, Run& run) {
 }  // namespace
 
 void add_reproduce(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<ReproduceArgs>();
   std::vector<std::string> names;
   std::string help = "Which:";
   for (const Paper& paper : reproduce::papers()) {

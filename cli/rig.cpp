@@ -23,7 +23,7 @@
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct RigArgs {
   std::filesystem::path views;
   std::vector<std::filesystem::path> cameras;
   BoardOptions board;
@@ -33,7 +33,7 @@ struct Args {
   MovingTargetArgs moving;
 };
 
-RigConfig config_from(const Args& args) {
+RigConfig config_from(const RigArgs& args) {
   RigConfig config;
   if (args.sigma_px > 0.0) config.sigma_px = args.sigma_px;
   if (args.sigma_angle_rad > 0.0) config.sigma_encoder_rad = args.sigma_angle_rad;
@@ -43,7 +43,7 @@ RigConfig config_from(const Args& args) {
 }
 
 /// One camera for all heads, or one for each in the order of their numbers.
-std::map<int, Camera> cameras_of(const Args& args, const std::vector<HeadView>& views) {
+std::map<int, Camera> cameras_of(const RigArgs& args, const std::vector<HeadView>& views) {
   std::set<int> ids;
   for (const HeadView& view : views) ids.insert(view.head);
   if (args.cameras.size() != 1 && args.cameras.size() != ids.size())
@@ -59,7 +59,7 @@ std::map<int, Camera> cameras_of(const Args& args, const std::vector<HeadView>& 
 }
 
 /// Corners of the boards in the views' photos; a path is relative to the table's. A photo without a board is named.
-void find_corners(const Args& args, const Board& board, const std::map<int, Camera>& cameras,
+void find_corners(const RigArgs& args, const Board& board, const std::map<int, Camera>& cameras,
                   std::vector<HeadView>& views, Run& run) {
   std::mutex mutex;
   std::vector<std::string> faults(views.size());
@@ -101,7 +101,7 @@ void find_corners(const Args& args, const Board& board, const std::map<int, Came
 }
 
 /// A corner beyond the picture is of another camera.
-void check_pictures(const Args& args, const std::vector<HeadView>& views, const std::map<int, Camera>& cameras) {
+void check_pictures(const RigArgs& args, const std::vector<HeadView>& views, const std::map<int, Camera>& cameras) {
   for (const HeadView& view : views) {
     const Camera& camera = cameras.at(view.head);
     for (const Corner& corner : view.seen.corners) {
@@ -153,7 +153,7 @@ void add_files(const RigReport& report, Run& run) {
   run.add_file("rig.yaml", rig_text(report.rig, camera_files));
 }
 
-ExitCode rig(const Args& args, Run& run) {
+ExitCode rig(const RigArgs& args, Run& run) {
   if (args.moving.is_asked)
     return rig_by_moving_target(args.views, args.cameras, args.moving, args.sigma_px, args.skip_bad, run);
   if (args.board.size.empty())
@@ -184,7 +184,7 @@ ExitCode rig(const Args& args, Run& run) {
 }  // namespace
 
 void add_rig(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<RigArgs>();
   CLI::App& command = frame.add_command(
       {.name = "rig",
        .summary = "Axes, offsets and mounting of pan-tilt heads, and where they stand to each other",

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <memory>
 
 #include "alidade/io/servo_document.h"
@@ -10,21 +11,22 @@
 #include "cli/frame.h"
 #include "cli/live.h"
 #include "cli/option_checks.h"
+#include "cli/pace.h"
 
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct ServoArgs {
   std::filesystem::path scenario;
   std::vector<std::string> controllers;
   int seeds = 0;
   double latency_ms = -1.0, gain_factor = 0.0, tau_factor = 0.0;
-  bool no_robustness = false;
+  bool no_robustness = false, real_time = false;
   LiveOptions live;
 };
 
 /// What stands on the command line beats the file.
-ServoScenario with_options(ServoScenario scenario, const Args& args) {
+ServoScenario with_options(ServoScenario scenario, const ServoArgs& args) {
   if (!args.controllers.empty()) {
     scenario.controllers.clear();
     for (const std::string& name : args.controllers) scenario.controllers.push_back(*controller_named(name));
@@ -52,13 +54,26 @@ void summarize(const ServoStudy& study, Run& run) {
   }
 }
 
-ServoStudy studied(const ServoScenario& scenario, live::ServoStream& stream, LiveRun& live, Run& run) {
-  if (!live.is_on()) return study_servo(scenario, run.options.seed, run.progress);
+/// What a run held to the wall clock says of its steps.
+void tell_pace(const Pace& pace, Run& run) {
+  JsonValue& told = run.document.estimate["realtime"];
+  told["steps"] = pace.num_steps();
+  told["steps_late"] = pace.num_late();
+  told["worst_late_s"] = pace.worst_late_s();
+  run.say(fmt::format("in real time: {} steps, {} more than 1 ms late, the worst by {:.2g} ms", pace.num_steps(),
+                      pace.num_late(), 1e3 * std::max(0.0, pace.worst_late_s())));
+}
+
+ServoStudy studied(const ServoScenario& scenario, live::ServoStream& stream, LiveRun& live, Pace& pace, Run& run) {
+  if (!live.is_on())
+    return study_servo(scenario, run.options.seed, run.progress,
+                       [&](ControllerKind, const ServoRow& row) { pace.keep(row.t_s); });
   live.open(stream.topics(), "/servo");
   stream.begin(*live.server());
   ServoStudy study =
       study_servo(scenario, run.options.seed, live.progress(), [&](ControllerKind controller, const ServoRow& row) {
         live.keep_pace(row.t_s);
+        pace.keep(row.t_s);
         stream.show(*live.server(), controller, row);
       });
   if (!study.comparison.empty())
@@ -66,7 +81,7 @@ ServoStudy studied(const ServoScenario& scenario, live::ServoStream& stream, Liv
   return study;
 }
 
-ExitCode servo(const Args& args, Run& run) {
+ExitCode servo(const ServoArgs& args, Run& run) {
   run.add_input("scenario", args.scenario);
   const ServoScenarioFile read = read_servo_scenario(args.scenario);
   if (!read.rig.empty()) run.add_input("rig", read.rig);
@@ -75,11 +90,13 @@ ExitCode servo(const Args& args, Run& run) {
   run.lap("read");
   live::ServoStream stream(scenario.scene);
   LiveRun live(args.live, run);
-  const ServoStudy study = studied(scenario, stream, live, run);
+  Pace pace(args.real_time ? 1.0 : 0.0);
+  const ServoStudy study = studied(scenario, stream, live, pace, run);
   run.lap("run");
   const Verdict verdict = servo_verdict(scenario, study);
   fill_servo(scenario, study, run.document);
   summarize(study, run);
+  if (args.real_time) tell_pace(pace, run);
   if (verdict.exit_code == ExitCode::ok) run.add_file("servo.csv", servo_csv(scenario, study));
   return live.finish(verdict);
 }
@@ -87,7 +104,7 @@ ExitCode servo(const Args& args, Run& run) {
 }  // namespace
 
 void add_servo(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<ServoArgs>();
   CLI::App& command = frame.add_command(
       {.name = "servo",
        .summary =
@@ -111,6 +128,10 @@ void add_servo(Frame& frame) {
   command.add_option("--true-tau", args->tau_factor, "The plant's time constant as it is, over what is known of it")
       ->check(finite_number() & CLI::Range(0.01, 100.0));
   command.add_flag("--no-robustness", args->no_robustness, "Leave out the grid over gain and time constant");
+  command.add_flag(
+      "--realtime", args->real_time,
+      "Hold the first run of each controller to the wall clock, and tell how late its steps were (default: "
+      "as fast as it can)");
   add_live_options(command, args->live);
 }
 

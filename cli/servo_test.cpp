@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
@@ -48,7 +49,29 @@ TEST_F(ServoCommand, GivesTheNamesOfTheContract) {
   const Csv rows = Csv::read(path("out/servo.csv"));
   EXPECT_EQ(rows.num_rows(), 4u * 2u * 121u);
   EXPECT_TRUE(rows.has("error_v_px"));
+  EXPECT_GT(document["data"]["steps"]["target_in_base_x_m"].size(), 200u);  // what track makes of the shown run
+  EXPECT_GT(document["data"]["measurements"]["accepted"].size(), 200u);
   EXPECT_EQ(document["verdict"]["state"], "good");
+}
+
+/// Held to the clock, it takes as long as what it shows, and its figures are the same.
+TEST_F(ServoCommand, RunsInRealTime) {
+  const std::string three_seconds = "seeds: 1\nduration_s: 3\n";
+  const std::vector<std::string> options{"--json", "--controller", "feedforward", "--no-robustness"};
+  const Outcome fast = servo(three_seconds, options);
+  std::vector<std::string> in_time = options;
+  in_time.emplace_back("--realtime");
+  const auto begin = std::chrono::steady_clock::now();
+  const Outcome real = servo(three_seconds, in_time);
+  const double took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  ASSERT_EQ(fast.code, 0) << fast.err;
+  ASSERT_EQ(real.code, 0) << real.err;
+  EXPECT_GT(took_s, 2.9);
+  const Json a = Json::parse(fast.out)["estimate"], b = Json::parse(real.out)["estimate"];
+  EXPECT_EQ(a["controllers"], b["controllers"]);
+  EXPECT_EQ(b["realtime"]["steps"], 2 * 61);  // two heads, 20 Hz
+  EXPECT_LT(b["realtime"]["worst_late_s"], 0.5);
+  EXPECT_FALSE(a.contains("realtime"));
 }
 
 /// The figures of the command are those of its rows.

@@ -18,7 +18,7 @@
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct SimulateRangefinderArgs {
   std::string scenario = "reference", laser = "red";
   std::filesystem::path camera;
   int shots = 18;
@@ -29,7 +29,7 @@ struct Args {
 
 std::string row_name(std::size_t i) { return fmt::format("shot_{:03}.png", i + 1); }
 
-RangefinderScene scene_of(const Args& args, Run& run) {
+RangefinderScene scene_of(const SimulateRangefinderArgs& args, Run& run) {
   auto config = rangefinder_scenario(args.scenario);
   if (!config)
     throw UsageError(
@@ -45,7 +45,8 @@ RangefinderScene scene_of(const Args& args, Run& run) {
 }
 
 /// Photos of the boards with the spot, and shots that name them: what a person brings home.
-void add_photos(const Args& args, const RangefinderScene& scene, std::vector<Shot>& shots, Run& run) {
+void add_photos(const SimulateRangefinderArgs& args, const RangefinderScene& scene, std::vector<Shot>& shots,
+                Run& run) {
   SpotScene spots;
   spots.boards = {scene.camera, scene.board, points_in_board(scene.board), scene.cam_from_board};
   spots.beam_origin_in_cam = scene.beam.origin_in_cam;
@@ -67,7 +68,7 @@ void add_photos(const Args& args, const RangefinderScene& scene, std::vector<Sho
   }
 }
 
-std::string table_of(const Args& args, const std::vector<Shot>& shots) {
+std::string table_of(const SimulateRangefinderArgs& args, const std::vector<Shot>& shots) {
   if (!args.photos) return shots_csv(shots, true);
   std::string text = args.photos_off ? "range_m,photo,photo_off\n" : "range_m,photo\n";
   for (std::size_t i = 0; i < shots.size(); ++i) {
@@ -77,7 +78,7 @@ std::string table_of(const Args& args, const std::vector<Shot>& shots) {
   return text;
 }
 
-ExitCode simulate_rangefinder(const Args& args, Run& run) {
+ExitCode simulate_rangefinder(const SimulateRangefinderArgs& args, Run& run) {
   const RangefinderScene scene = scene_of(args, run);
   SimulatedShots simulated = simulate_shots(scene, args.noise, run.options.seed);
   std::vector<BoardView> views;
@@ -108,7 +109,7 @@ ExitCode simulate_rangefinder(const Args& args, Run& run) {
 }  // namespace
 
 void add_rangefinder_scenario(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<SimulateRangefinderArgs>();
   CLI::App& command = frame.add_command(
       {"simulate rangefinder", "Shots of a laser rangefinder beside a camera, with boards and spots, and the truth",
        "  alidade simulate rangefinder --out shots && alidade rangefinder shots/shots.csv --camera shots/camera.yaml "

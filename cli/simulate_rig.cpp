@@ -18,7 +18,7 @@
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct SimulateRigArgs {
   std::string scenario = "reference";
   std::filesystem::path rig;
   int boards = 5, views = 4;
@@ -26,7 +26,7 @@ struct Args {
   bool photos = false;
 };
 
-RigSceneConfig config_from(const Args& args, Run& run) {
+RigSceneConfig config_from(const SimulateRigArgs& args, Run& run) {
   RigSceneConfig config;
   config.num_boards = args.boards;
   config.most_views_of_a_board = args.views;
@@ -67,7 +67,7 @@ void add_photos(const RigScene& scene, const std::vector<HeadView>& views, Run& 
   run.add_file("views.csv", table);
 }
 
-ExitCode simulate_rig(const Args& args, Run& run) {
+ExitCode simulate_rig(const SimulateRigArgs& args, Run& run) {
   const RigScene scene = draw_rig_scene(config_from(args, run), run.options.seed);
   const RigNoise noise{args.sigma_px, args.sigma_angle_deg * degree, args.wrong};
   const SimulatedViews simulated = simulate_head_views(scene, noise, run.options.seed);
@@ -98,7 +98,7 @@ ExitCode simulate_rig(const Args& args, Run& run) {
 }  // namespace
 
 void add_rig_scenario(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<SimulateRigArgs>();
   CLI::App& command = frame.add_command(
       {"simulate rig", "Views of boards by two pan-tilt heads, with the angles their encoders read, and the truth",
        "  alidade simulate rig --out views && alidade rig views/views.csv --camera views/camera_1.yaml \\\n"

@@ -21,7 +21,7 @@
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct SimulateRotationArgs {
   std::string size = "780x582", source = "rate", motion = "sway", zoom = "none";
   std::vector<double> k{710.0, 700.0, 390.0, 290.0}, lever, depth;
   double k1 = 0.0, tilt_deg = 0.0, delay_s = 0.0;
@@ -34,7 +34,7 @@ struct Args {
 };
 
 /// Pan, tilt, roll or rates, over time.
-std::function<Eigen::Vector3d(double)> motion_of(const Args& args) {
+std::function<Eigen::Vector3d(double)> motion_of(const SimulateRotationArgs& args) {
   const bool is_rate = args.source == "rate" && !args.video;  // a video's motion is told by angles
   const Eigen::Vector3d kept = args.motion == "pan"    ? Eigen::Vector3d(is_rate ? 0.0 : 1.0, is_rate ? 1.0 : 0.0, 0.0)
                                : args.motion == "tilt" ? Eigen::Vector3d(is_rate ? 1.0 : 0.0, is_rate ? 0.0 : 1.0, 0.0)
@@ -52,7 +52,7 @@ std::function<Eigen::Vector3d(double)> motion_of(const Args& args) {
   };
 }
 
-RotatingIntrinsics intrinsics_at(const Args& args, double t_s) {
+RotatingIntrinsics intrinsics_at(const SimulateRotationArgs& args, double t_s) {
   RotatingIntrinsics now{args.k[0], args.k[1], args.k[2], args.k[3], args.k1};
   if (args.zoom == "step" && t_s >= 6.0) {
     now.fx *= 1.1;
@@ -72,7 +72,7 @@ RotationSource source_of(const std::string& word) {
   return word == "rate" ? RotationSource::rate : word == "head" ? RotationSource::head : RotationSource::attitude;
 }
 
-std::string truth_yaml(const Args& args, const RotationLog& log, const RotationScene& scene) {
+std::string truth_yaml(const SimulateRotationArgs& args, const RotationLog& log, const RotationScene& scene) {
   Camera camera;
   camera.width_px = scene.width_px;
   camera.height_px = scene.height_px;
@@ -88,7 +88,7 @@ std::string truth_yaml(const Args& args, const RotationLog& log, const RotationS
   return camera_text(camera, CameraFormat::alidade);
 }
 
-FarWorld world_of(const Args& args, Run& run) {
+FarWorld world_of(const SimulateRotationArgs& args, Run& run) {
   if (args.photo.empty()) return FarWorld::of_noise(3.0 / std::min(args.k[0], args.k[1]), run.options.seed);
   run.add_input("photo", args.photo);
   const cv::Mat photo = cv::imread(args.photo, cv::IMREAD_GRAYSCALE);
@@ -97,7 +97,8 @@ FarWorld world_of(const Args& args, Run& run) {
 }
 
 /// Frames as a camera on a head sees them, and the angles it reads: what `observe --video` takes.
-ExitCode simulate_video(const Args& args, const RotationScene& scene, const RotationLogConfig& config, Run& run) {
+ExitCode simulate_video(const SimulateRotationArgs& args, const RotationScene& scene, const RotationLogConfig& config,
+                        Run& run) {
   FarWorld world = world_of(args, run);
   const RotationLog log = panorama_log(scene, config, run.options.seed);
   for (std::size_t k = 0; k < log.rows.size(); ++k) {
@@ -115,7 +116,7 @@ ExitCode simulate_video(const Args& args, const RotationScene& scene, const Rota
   return run.finish(verdict);
 }
 
-ExitCode simulate_rotation_log(const Args& args, Run& run) {
+ExitCode simulate_rotation_log(const SimulateRotationArgs& args, Run& run) {
   RotationScene scene;
   std::tie(scene.width_px, scene.height_px) = picture_size(args.size);
   if (std::min(scene.width_px, scene.height_px) < 240) throw UsageError("--size: points need 240 px and more");
@@ -145,7 +146,7 @@ ExitCode simulate_rotation_log(const Args& args, Run& run) {
   return run.finish(verdict);
 }
 
-void add_options(CLI::App& command, Args& args) {
+void add_options(CLI::App& command, SimulateRotationArgs& args) {
   const auto word = [&](const char* name, std::string& value, const char* help, std::vector<std::string> words) {
     command.add_option(name, value, help)->check(CLI::IsMember(std::move(words)))->capture_default_str();
   };
@@ -190,7 +191,7 @@ void add_options(CLI::App& command, Args& args) {
 }  // namespace
 
 void add_rotation_scenario(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<SimulateRotationArgs>();
   CLI::App& command = frame.add_command(
       {"simulate rotation", "Pixels of still points and the rotation of a camera that turns, with the truth",
        "  alidade simulate rotation --out turn && alidade observe turn/log.csv --size 780x582\n"

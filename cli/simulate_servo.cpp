@@ -14,14 +14,14 @@
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct SimulateServoArgs {
   std::string kind = "angle", unit = "deg";
   bool chirp = false;
   double gain = 0.0, tau_s = 0.1, latency_s = 0.08, max_rate_deg_s = 1e6, max_acceleration_deg_s2 = 1e9;
   double amplitude = 200.0, duration_s = 5.0, rate_hz = 100.0, sigma_deg = 0.05, step_deg = 0.0, zero_deg = 0.0;
 };
 
-ServoLogScene scene_of(const Args& args) {
+ServoLogScene scene_of(const SimulateServoArgs& args) {
   const double deg = std::numbers::pi / 180.0;
   ServoLogScene scene;
   if (args.kind == "rate") {
@@ -43,7 +43,7 @@ ServoLogScene scene_of(const Args& args) {
   return scene;
 }
 
-ExitCode simulate_servo(const Args& args, Run& run) {
+ExitCode simulate_servo(const SimulateServoArgs& args, Run& run) {
   if (args.duration_s * args.rate_hz > 1e6) throw UsageError("--rate-hz: makes more than a million rows");
   const ServoLogScene scene = scene_of(args);
   std::vector<ServoSample> samples;
@@ -65,7 +65,7 @@ ExitCode simulate_servo(const Args& args, Run& run) {
 }  // namespace
 
 void add_servo_scenario(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<SimulateServoArgs>();
   CLI::App& command = frame.add_command(
       {"simulate servo", "A log of one servo axis under a step or a chirp for `identify`, and a scenario for `servo`",
        "  alidade simulate servo --out sim && alidade identify sim/log.csv && alidade servo sim/scenario.yaml\n"

@@ -17,14 +17,14 @@
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct SimulateTrackArgs {
   std::string scenario = "B";
   bool video = false;
   double duration_s = 0.0;
   double latency_ms = -1.0, lag_s = 0.34, sigma_px = 0.5, sigma_angle = 0.0008726646259971648;
 };
 
-TrackScene scene_of(const Args& args) {
+TrackScene scene_of(const SimulateTrackArgs& args) {
   auto scene = track_scenario(args.scenario);
   if (!scene)
     throw UsageError(
@@ -83,7 +83,7 @@ std::size_t add_events(const TrackScene& scene, Run& run) {
   return sights.size();
 }
 
-ExitCode simulate_track_events(const Args& args, Run& run) {
+ExitCode simulate_track_events(const SimulateTrackArgs& args, Run& run) {
   TrackScene scene = scene_of(args);
   if (args.video) scene.sigma_encoder_rad = 0.0;
   const std::size_t num_sights = args.video ? add_frames(scene, args.sigma_angle, run) : add_events(scene, run);
@@ -104,7 +104,7 @@ ExitCode simulate_track_events(const Args& args, Run& run) {
 }  // namespace
 
 void add_track_scenario(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<SimulateTrackArgs>();
   CLI::App& command = frame.add_command(
       {"simulate track", "What two pan-tilt heads see of a moving target, and its true path",
        "  alidade simulate track --scenario C --out sim && alidade track sim/events.csv --rig sim/rig.yaml \\\n"

@@ -15,7 +15,7 @@
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct SimulateUnderwaterArgs {
   UnderwaterScene scene;
   std::filesystem::path camera;
   double rate_hz = 10.0;
@@ -55,7 +55,8 @@ std::size_t add_sights(const UnderwaterScene& scene, const UnderwaterSequence& s
 }
 
 /// What `localize` takes of pictures: the board itself is the target.
-std::size_t add_frames(const Args& args, const Camera& camera, const UnderwaterSequence& sequence, Run& run) {
+std::size_t add_frames(const SimulateUnderwaterArgs& args, const Camera& camera, const UnderwaterSequence& sequence,
+                       Run& run) {
   for (std::size_t k = 0; k < sequence.frames.size(); ++k) {
     report_progress(run.progress, "frames", k, sequence.frames.size());
     const cv::Mat frame =
@@ -70,7 +71,7 @@ std::size_t add_frames(const Args& args, const Camera& camera, const UnderwaterS
   return sequence.frames.size();
 }
 
-ExitCode simulate(const Args& args, Run& run) {
+ExitCode simulate(const SimulateUnderwaterArgs& args, Run& run) {
   UnderwaterScene scene = args.scene;
   scene.camera = args.camera.empty() ? underwater_camera() : read_camera(args.camera);
   if (!args.camera.empty()) run.add_input("camera", args.camera);
@@ -98,7 +99,7 @@ ExitCode simulate(const Args& args, Run& run) {
 }  // namespace
 
 void add_underwater_scenario(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<SimulateUnderwaterArgs>();
   CLI::App& command = frame.add_command(
       {"simulate underwater", "What a camera under water sees of a board and points around it, and its true path",
        "  alidade simulate underwater --out sim && alidade localize sim/sights.csv --camera sim/camera.yaml \\\n"

@@ -19,7 +19,7 @@
 namespace alidade::cli {
 namespace {
 
-struct Args {
+struct TrackArgs {
   std::filesystem::path events, rig, truth, angles;
   std::vector<std::string> videos;
   std::string target;
@@ -37,7 +37,7 @@ TrackMethod method_of(const std::string& name) {
   return TrackMethod::cv;
 }
 
-TrackConfig config_of(const Args& args) {
+TrackConfig config_of(const TrackArgs& args) {
   TrackConfig config = args.config;
   config.tracker.method = method_of(args.method);
   config.find_sigma_a = !(args.sigma_a > 0.0);
@@ -50,7 +50,7 @@ TrackConfig config_of(const Args& args) {
 }
 
 /// The paper's filter on the same events.
-std::pair<TrackReport, Verdict> track_as_paper(const Args& args, std::span<const TargetSight> sights,
+std::pair<TrackReport, Verdict> track_as_paper(const TrackArgs& args, std::span<const TargetSight> sights,
                                                std::span<const RigHead> heads, const TrueTrack& truth,
                                                const TrackWatch& watch) {
   XiahouConfig config;
@@ -96,7 +96,7 @@ void summarize(const TrackReport& report, Run& run) {
 
 /// The target found in the frames of the heads' videos. The result tells its sights, events.csv, so that they can be
 /// looked at and used again.
-EventsFile watch_videos(const Args& args, const Rig& rig, const Progress& progress, Run& run) {
+EventsFile watch_videos(const TrackArgs& args, const Rig& rig, const Progress& progress, Run& run) {
   if (args.videos.size() != rig.heads.size())
     throw UsageError(
         fmt::format("--video: the rig has {} heads, but {} videos are given", rig.heads.size(), args.videos.size()));
@@ -118,13 +118,13 @@ EventsFile watch_videos(const Args& args, const Rig& rig, const Progress& progre
   return events;
 }
 
-EventsFile sights_given(const Args& args, const Rig& rig, const Progress& progress, Run& run) {
+EventsFile sights_given(const TrackArgs& args, const Rig& rig, const Progress& progress, Run& run) {
   if (!args.videos.empty()) return watch_videos(args, rig, progress, run);
   run.add_input("events", args.events);
   return read_events(args.events, rig.heads, {.skip_bad = args.skip_bad});
 }
 
-void check_inputs(const Args& args) {
+void check_inputs(const TrackArgs& args) {
   if (args.events.empty() == args.videos.empty()) throw UsageError("give one of an events file and --video");
   if (args.videos.empty() && !(args.angles.empty() && args.target.empty() && args.rate_hz == 0.0))
     throw UsageError("--angles, --target and --rate are for --video");
@@ -142,7 +142,7 @@ Verdict never_seen() {
 }
 
 /// Follows the sights, and shows them as it does.
-std::pair<TrackReport, Verdict> follow(const Args& args, std::span<const TargetSight> sights,
+std::pair<TrackReport, Verdict> follow(const TrackArgs& args, std::span<const TargetSight> sights,
                                        std::span<const RigHead> heads, const TrackConfig& config,
                                        const TrueTrack& truth, const live::TrackStream& stream, LiveRun& live,
                                        Run& run) {
@@ -164,13 +164,13 @@ std::pair<TrackReport, Verdict> follow(const Args& args, std::span<const TargetS
   return result;
 }
 
-TrueTrack truth_given(const Args& args, Run& run) {
+TrueTrack truth_given(const TrackArgs& args, Run& run) {
   if (args.truth.empty()) return {};
   run.add_input("truth", args.truth);
   return read_true_track(args.truth);
 }
 
-ExitCode track(const Args& args, Run& run) {
+ExitCode track(const TrackArgs& args, Run& run) {
   check_inputs(args);
   const TrackConfig config = config_of(args);
   if (args.corrected && args.method != "xiahou2015") throw UsageError("--corrected: only with --method xiahou2015");
@@ -196,7 +196,7 @@ ExitCode track(const Args& args, Run& run) {
   return live.finish(verdict);
 }
 
-void add_options(CLI::App& command, Args& args) {
+void add_options(CLI::App& command, TrackArgs& args) {
   command.add_option("events", args.events,
                      "Events, CSV: t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px, in order of arrival");
   command
@@ -240,7 +240,7 @@ void add_options(CLI::App& command, Args& args) {
 }  // namespace
 
 void add_track(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<TrackArgs>();
   CLI::App& command = frame.add_command(
       {.name = "track",
        .summary = "Path of a target in space from the pixels and angles of two or more pan-tilt heads",

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Args {
+struct ViewArgs {
   std::vector<fs::path> folders;
   LiveOptions where{.is_on = true, .port = {}, .address = {}};
 };
@@ -120,7 +120,7 @@ live::HttpAnswer answer(const std::vector<Shown>& results, std::string_view path
   return {};
 }
 
-ExitCode view(const Args& args, Run& run) {
+ExitCode view(const ViewArgs& args, Run& run) {
   const std::vector<Shown> results = results_in(args.folders);
   live::ServerConfig config = server_config(args.where);
   std::string query;  // with the token, which links need as well
@@ -147,7 +147,7 @@ ExitCode view(const Args& args, Run& run) {
 }  // namespace
 
 void add_view(Frame& frame) {
-  auto args = std::make_shared<Args>();
+  auto args = std::make_shared<ViewArgs>();
   CLI::App& command = frame.add_command({.name = "view",
                                          .summary = "The reports of finished runs, shown by a browser again",
                                          .examples = "  alidade view alidade-out/track\n"

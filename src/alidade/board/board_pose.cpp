@@ -1,10 +1,10 @@
 #include "alidade/board/board_pose.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <cmath>
 #include <vector>
+
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -50,9 +50,9 @@ std::optional<Eigen::Matrix3d> ray_homography(const Camera& camera, const BoardV
       for (int b = 0; b < 3; ++b) AtA.block<3, 3>(3 * a, 3 * b) += outer(a, b) * weight;
     side += *rays[i];
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> eigen(AtA);
-  if (!(eigen.eigenvalues()[1] > 1e-9 * eigen.eigenvalues()[8])) return std::nullopt;
-  Eigen::Matrix3d H = eigen.eigenvectors().col(0).reshaped(3, 3);
+  const SymmetricEigen eigen = symmetric_eigen(AtA);
+  if (!(eigen.values[1] > 1e-9 * eigen.values[8])) return std::nullopt;
+  Eigen::Matrix3d H = eigen.vectors.col(0).reshaped(3, 3);
   if (H.col(2).dot(side) < 0.0) H = -H;  // in front of the camera
   H.leftCols<2>() /= size;
   H.col(2) -= H.leftCols<2>() * middle;
@@ -65,8 +65,7 @@ std::optional<Rigid3> start_pose(const Camera& camera, const BoardView& view, st
   const double scale = 2.0 / (H->col(0).norm() + H->col(1).norm());
   Eigen::Matrix3d axes;
   axes << H->col(0) * scale, H->col(1) * scale, H->col(0).cross(H->col(1)) * scale * scale;
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d R = svd.matrixU() * svd.matrixV().transpose();
+  const Eigen::Matrix3d R = nearest_rotation(axes);
   if (!R.allFinite() || !(R.determinant() > 0.0)) return std::nullopt;
   return Rigid3{Eigen::Quaterniond(R), H->col(2) * scale};
 }

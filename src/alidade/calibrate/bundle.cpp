@@ -1,12 +1,12 @@
 #include "alidade/calibrate/bundle.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "alidade/calibrate/normal_equations.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -129,11 +129,11 @@ std::optional<Eigen::MatrixXd> inverse_of(const Eigen::MatrixXd& scaled, BundleR
     Eigen::MatrixXd inverse = llt.solve(Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols()));
     if (inverse.norm() * surely_regular < 1.0) return inverse;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
-  result.weakest = eigen.eigenvectors().col(0);
+  const SymmetricEigen eigen = symmetric_eigen(scaled);
+  result.weakest = eigen.vectors.col(0);
   constexpr double singular = 1e-13;  // below this the smallest eigenvalue is rounding
-  if (!(eigen.eigenvalues()[0] > singular)) return std::nullopt;
-  return eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+  if (!(eigen.values[0] > singular)) return std::nullopt;
+  return eigen.vectors * eigen.values.cwiseInverse().asDiagonal() * eigen.vectors.transpose();
 }
 
 double degrees_of_freedom(const BundleProblem& problem) {

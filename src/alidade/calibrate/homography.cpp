@@ -1,9 +1,10 @@
 #include "alidade/calibrate/homography.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
+
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -44,10 +45,10 @@ std::optional<Eigen::Matrix3d> fit_homography(std::span<const Eigen::Vector2d> f
   if (llt.info() != Eigen::Success || !(pivots.minCoeff() > 1e-6 * pivots.maxCoeff())) return std::nullopt;  // a line
   const Eigen::Matrix3d h1_from_h3 = llt.solve(u_pp), h2_from_h3 = llt.solve(v_pp);
   const Eigen::Matrix3d S = rr_pp - u_pp * h1_from_h3 - v_pp * h2_from_h3;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(S);
-  if (!(eigen.eigenvalues()[1] > 1e-10 * rr_pp.trace())) return std::nullopt;  // two null vectors: images on a line
+  const SymmetricEigen3 eigen = symmetric_eigen3(S);
+  if (!(eigen.values[1] > 1e-10 * rr_pp.trace())) return std::nullopt;  // two null vectors: images on a line
 
-  const Eigen::Vector3d h3 = eigen.eigenvectors().col(0);
+  const Eigen::Vector3d h3 = eigen.vectors.col(0);
   Eigen::Matrix3d H;
   H << (h1_from_h3 * h3).transpose(), (h2_from_h3 * h3).transpose(), h3.transpose();
   H = normal_to.inverse() * H * normal_from;

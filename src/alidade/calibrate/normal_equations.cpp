@@ -1,9 +1,10 @@
 #include "alidade/calibrate/normal_equations.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
+
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -114,8 +115,7 @@ Eigen::MatrixXd gauge_directions(const std::vector<Eigen::Vector3d>& points) {
     directions.block<3, 3>(3 * i, 3) = cross_matrix(arm);
     directions.block<3, 1>(3 * i, 6) = arm;
   }
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(directions);
-  return (qr.householderQ() * Eigen::MatrixXd::Identity(3 * n, 7)).transpose();
+  return orthonormal_basis(directions, 7).transpose();
 }
 
 int num_globals(const BundleProblem& problem) {

@@ -1,10 +1,10 @@
 #include "alidade/calibrate/start.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
 
 #include "alidade/calibrate/homography.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -38,8 +38,7 @@ std::optional<Eigen::Vector4d> zhang_intrinsics(std::span<const Eigen::Matrix3d>
     VtV += orthogonal * orthogonal.transpose() + equal * equal.transpose();
   }
   if (!VtV.allFinite()) return std::nullopt;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 5, 5>> eigen(VtV);
-  Eigen::Matrix<double, 5, 1> b = eigen.eigenvectors().col(0);
+  Eigen::Matrix<double, 5, 1> b = symmetric_eigen(VtV).vectors.col(0);
   if (b[0] < 0.0) b = -b;
   // B ~ K⁻ᵀK⁻¹ with B11 = 1/fx², B13 = −cx/fx², … up to scale λ.
   const double cx = -b[2] / b[0], cy = -b[3] / b[1];

@@ -1,7 +1,6 @@
 #include "alidade/camera/camera_diff.h"
 
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 

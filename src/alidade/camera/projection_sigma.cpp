@@ -1,6 +1,5 @@
 #include "alidade/camera/projection_sigma.h"
 
-#include <Eigen/QR>
 #include <cmath>
 #include <limits>
 

@@ -2,12 +2,13 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <vector>
+
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -163,7 +164,7 @@ std::optional<Ellipse> ellipse_through(std::span<const Eigen::Vector2d> points) 
     const Eigen::Vector2d p = (points[static_cast<std::size_t>(i)] - middle) / scale;
     rows.row(i) << p.x() * p.x(), 2.0 * p.x() * p.y(), p.y() * p.y(), 2.0 * p.x(), 2.0 * p.y();
   }
-  const Eigen::VectorXd conic = rows.colPivHouseholderQr().solve(Eigen::VectorXd::Ones(rows.rows()));
+  const Eigen::VectorXd conic = least_squares(rows, Eigen::VectorXd::Ones(rows.rows()));
   const Eigen::Matrix2d Q = (Eigen::Matrix2d() << conic[0], conic[1], conic[1], conic[2]).finished();
   if (!(Q(0, 0) > 0.0 && Q.determinant() > 0.0)) return std::nullopt;
   const Eigen::Vector2d linear = conic.tail<2>();

@@ -1,12 +1,13 @@
 #include "alidade/imaging/rectangles.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -119,7 +120,7 @@ std::optional<EdgePlane> edge_plane(const cv::Mat& grey, const Camera& camera, c
   for (int round = 0; round < rounds; ++round) {
     Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
     for (const Eigen::Vector3d& ray : rays) scatter += ray * ray.transpose();
-    plane.normal = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvectors().col(0);
+    plane.normal = symmetric_eigen3(scatter).vectors.col(0);
     double squares = 0.0;
     for (const Eigen::Vector3d& ray : rays) squares += std::pow(plane.normal.dot(ray), 2);
     const double sigma = std::sqrt(squares / static_cast<double>(rays.size() - 2));

@@ -20,13 +20,6 @@ std::array<double, 7> numbers_of(const Rigid3& world_from_cam) {
   return {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
 }
 
-/// The true pose of a time, or none.
-const TimedPose* true_pose(std::span<const TimedPose> truth, double t_s) {
-  constexpr double tolerance_s = 0.01;
-  const auto at = std::ranges::lower_bound(truth, t_s - tolerance_s, {}, &TimedPose::t_s);
-  return at != truth.end() && at->t_s <= t_s + tolerance_s ? &*at : nullptr;
-}
-
 DataTable path_table(const LocalizeReport& report, std::span<const TimedPose> truth) {
   std::vector<bool> must_keep;
   for (const PathStep& step : report.path)
@@ -38,7 +31,7 @@ DataTable path_table(const LocalizeReport& report, std::span<const TimedPose> tr
   std::vector<std::string> events;
   for (const std::size_t row : rows) {
     const PathStep& step = report.path[row];
-    const TimedPose* const there = true_pose(truth, step.t_s);
+    const TimedPose* const there = nearest_pose(truth, step.t_s);
     const std::array<double, 7> is = numbers_of(step.world_from_cam);
     const std::array<double, 7> should = there ? numbers_of(there->world_from_cam) : std::array<double, 7>{};
     for (std::size_t k = 0; k < 7; ++k) {
@@ -123,6 +116,7 @@ void fill_localization(const LocalizeReport& report, std::span<const TimedPose> 
   estimate["rpe_m"] = report.error.rpe_m;
   estimate["rpe_rad"] = report.error.rpe_rad;
   estimate["unaligned_m"] = report.scale_known ? report.error.unaligned_m : not_there;
+  estimate["stated_m"] = report.error.stated_m;
   estimate["alignment"] = truth.empty() ? JsonValue() : JsonValue(report.scale_known ? "SE(3)" : "Sim(3)");
   estimate["nis_per_dof"] = report.nis_per_dof;
   estimate["scale_known"] = report.scale_known;

@@ -7,6 +7,7 @@
 #include <limits>
 #include <span>
 
+#include "alidade/io/track_document.h"
 #include "alidade/report/thin.h"
 
 namespace alidade {
@@ -161,6 +162,9 @@ void fill_servo(const ServoScenario& scenario, const ServoStudy& study, ResultDo
   for (const ServoComparison& compared : study.comparison)
     if (compared.controller == study.best)
       document.data.push_back(control_table(scenario.scene.heads, compared.shown.rows));
+  const ServoTrack& track = study.track;
+  if (!track.report.steps.empty())
+    add_track_tables(track.sights, scenario.scene.heads, track.report, track.truth, document);
   if (study.robustness) document.grids.push_back(robustness_grid(*study.robustness));
 }
 

@@ -8,8 +8,9 @@
 
 namespace alidade {
 
-/// Fills counts, estimate, the tables `control` (first trial of the best controller), `trials`, `loops`, and the grid
-/// `robustness` of the document of `alidade servo`; also for a refusal.
+/// Fills counts, estimate, the tables `control` (first trial of the best controller), `steps` and `measurements` (what
+/// `track` makes of that trial), `trials`, `loops`, and the grid `robustness` of the document of `alidade servo`; also
+/// for a refusal.
 void fill_servo(const ServoScenario& scenario, const ServoStudy& study, ResultDocument& document);
 
 /// One row of `control`.

@@ -150,6 +150,11 @@ void fill_track(std::span<const TargetSight> sights, std::span<const RigHead> he
       for (int j = i; j < 6; ++j) document.covariance_upper.push_back(last.P(i, j));
     }
   }
+  add_track_tables(sights, heads, report, truth, document);
+}
+
+void add_track_tables(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackReport& report,
+                      const TrueTrack& truth, ResultDocument& document) {
   const std::vector<std::size_t> rows = kept_rows(report);
   document.data.push_back(steps_table(report, truth, rows));
   document.data.push_back(measurements_table(sights, heads, report, rows));

@@ -13,6 +13,10 @@ namespace alidade {
 void fill_track(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackReport& report,
                 const TrueTrack& truth, ResultDocument& document);
 
+/// Adds these tables alone.
+void add_track_tables(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackReport& report,
+                      const TrueTrack& truth, ResultDocument& document);
+
 /// One sight and what became of it, by the names of both tables.
 [[nodiscard]] DataTable track_row(const TargetSight& sight, std::span<const RigHead> heads, const TrackStep& step,
                                   const TrueTrack& truth);

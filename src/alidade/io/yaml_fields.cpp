@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <set>
+
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade::detail {
 
@@ -157,9 +158,7 @@ std::vector<Eigen::Index> places_of(const std::vector<std::string>& names, const
 bool is_positive(const Eigen::MatrixXd& cov) {
   const Eigen::VectorXd sigma = cov.diagonal().cwiseSqrt();
   const Eigen::VectorXd scale = sigma.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 1.0; });
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * cov * scale.asDiagonal(),
-                                                             Eigen::EigenvaluesOnly);
-  return eigen.eigenvalues().minCoeff() >= -1e-6;
+  return symmetric_eigenvalues(scale.asDiagonal() * cov * scale.asDiagonal()).minCoeff() >= -1e-6;
 }
 
 void refuse_impossible(const Eigen::MatrixXd& cov, const std::vector<std::string>& known, const Fields& fields) {

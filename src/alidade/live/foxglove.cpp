@@ -1,9 +1,9 @@
 #include "alidade/live/foxglove.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/report/markup.h"
 
 namespace alidade::live {
@@ -157,12 +157,12 @@ void Scene::line(const std::string& id, std::span<const Eigen::Vector3d> points,
 
 void Scene::ellipsoid(const std::string& id, const Eigen::Vector3d& centre, const Eigen::Matrix3d& cov_m2,
                       const Colour& colour) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(cov_m2);
-  Eigen::Matrix3d rotation = axes.eigenvectors();
+  const SymmetricEigen3 axes = symmetric_eigen3(cov_m2);
+  Eigen::Matrix3d rotation = axes.vectors;
   if (rotation.determinant() < 0.0) rotation.col(0) = -rotation.col(0);
   JsonValue value = JsonValue::object();
   value["pose"] = pose({Eigen::Quaterniond(rotation), centre});
-  value["size"] = xyz(6.0 * axes.eigenvalues().cwiseMax(0.0).cwiseSqrt());  // full axes
+  value["size"] = xyz(6.0 * axes.values.cwiseMax(0.0).cwiseSqrt());  // full axes
   value["color"] = rgba(colour);
   entities_.push_back(entity(id, "spheres", std::move(value)));
 }
@@ -209,9 +209,8 @@ void Marks::dot(const Eigen::Vector2d& px, double diameter_px, const Colour& col
 
 void Marks::ellipse(const Eigen::Vector2d& centre_px, const Eigen::Matrix2d& cov_px2, const Colour& colour) {
   constexpr int num_points = 36, line_loop = 2;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(cov_px2);
-  const Eigen::Matrix2d half =
-      3.0 * axes.eigenvectors() * axes.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal().toDenseMatrix();
+  const SymmetricEigen axes = symmetric_eigen(cov_px2);
+  const Eigen::Matrix2d half = 3.0 * axes.vectors * axes.values.cwiseMax(0.0).cwiseSqrt().asDiagonal().toDenseMatrix();
   JsonValue value = JsonValue::object();
   value["timestamp"] = stamp(t_ns_);
   value["type"] = line_loop;

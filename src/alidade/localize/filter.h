@@ -24,7 +24,10 @@ struct LocalizationFilterConfig {
   bool is_sequential = true;        ///< Known points first, then by growing innovation; false: in the order given.
   bool finds_consensus = true;      ///< One-point consensus where sights disagree: mismatches.
   double consensus_above = 0.0;     ///< Share of the sights that may disagree before a consensus is looked for.
-  double linear_below = 0.1;        ///< Linearity index below which an inverse depth becomes a place.
+  /// No sight tells how the world is turned, and so the covariance says: world_turn.h. False: as in the literature
+  /// before 2001, more certain with every frame.
+  bool holds_frame = true;
+  double linear_below = 0.1;     ///< Linearity index below which an inverse depth becomes a place.
   std::vector<int> lens_params;  ///< Places of the lens's parameters that are in the state, and their σ at the start.
   std::vector<double> sigma_lens_params;
   int state_capacity = 800;   ///< Numbers of the state at most.
@@ -159,6 +162,12 @@ class LocalizationFilter {
   void refine();
   [[nodiscard]] bool use_again();
   [[nodiscard]] bool finish_update();
+  /// The state goes where delta_ says, and the covariance's errors are counted from there.
+  void turn_by_delta();
+  void move_by_delta();
+  void move_lens_by_delta();
+  [[nodiscard]] double best_attempt();
+  [[nodiscard]] std::span<const double> error_of(const Feature& feature) const;
   void append_feature(const NewFeature& made, long id);
 
   Camera camera_;
@@ -174,6 +183,8 @@ class LocalizationFilter {
   std::vector<SightOutcome> outcomes_;
   std::vector<double> nis_;
   Eigen::VectorXd start_, next_;
+  Eigen::Matrix<double, Eigen::Dynamic, 3> shear_;
+  bool turns_world_ = false;  ///< Whether the errors of this update are those of world_turn.h.
   Camera camera_at_delta_;
   Eigen::MatrixXd joint_x_, joint_s_;
   SmallMatrix triangle_;

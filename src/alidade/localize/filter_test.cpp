@@ -14,6 +14,8 @@
 namespace alidade {
 namespace {
 
+using testing::covariance_of;
+
 using Json = nlohmann::json;
 
 UnderwaterScene scene_of(int num_points, int num_frames, double sigma_depth = 0.1) {
@@ -42,13 +44,6 @@ void add_told(const testing::UnderwaterSample& sample, const SightFrame& frame, 
     ASSERT_TRUE(ray_in_cam);
     EXPECT_TRUE(filter.add(sight.id, sight.px, {told->depth_m / ray_in_cam->z(), told->sigma_rel}, kind));
   }
-}
-
-Eigen::MatrixXd covariance_of(const LocalizationFilter& filter) {
-  Eigen::MatrixXd P(filter.dim(), filter.dim());
-  for (int i = 0; i < filter.dim(); ++i)
-    for (int j = 0; j < filter.dim(); ++j) P(i, j) = filter.covariance().at(i, j);
-  return P;
 }
 
 TEST(LocalizationFilter, CovarianceStaysSymmetricAndPositiveOverAThousandFrames) {

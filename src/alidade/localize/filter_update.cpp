@@ -12,48 +12,7 @@ namespace {
 constexpr std::size_t most_singly = 12;  // used one by one, before the rest, whose pose is sure by then, in groups
 constexpr std::size_t most_in_group = StateCovariance::max_columns / 2;
 
-double& lens_param(Camera& camera, int index) {
-  return std::visit([index](auto& lens) -> double& { return lens.params[index]; }, camera.lens);
-}
-
 }  // namespace
-
-bool LocalizationFilter::linearise(Measured& measured) {
-  const Eigen::Vector3d phi = delta_.segment<3>(3);
-  Rigid3 world_from_cam = motion_.world_from_cam;
-  world_from_cam.translation += delta_.head<3>();
-  world_from_cam.rotation = (world_from_cam.rotation * exp_so3(phi)).normalized();
-  for (int k = 0; k < num_lens(); ++k) {
-    const int index = config_.lens_params[static_cast<std::size_t>(k)];
-    lens_param(camera_at_delta_, index) = lens_param(camera_, index) + delta_[motion_dim + k];
-  }
-  Feature feature = *measured.feature;
-  for (int i = 0; i < feature.dim(); ++i) feature.values[i] += delta_[feature.offset + i];
-  const auto view = expected_view(num_lens() ? camera_at_delta_ : camera_, world_from_cam, feature);
-  if (!view) return false;
-  measured.nu = measured.px - view->px;
-  const Eigen::Matrix3d J = right_jacobian(phi);
-  const Eigen::Matrix<double, 2, 3> J_rotation = view->J_px_pose.rightCols<3>() * J;
-  int n = 0;
-  const auto put = [&](int column, double d0, double d1) {
-    const auto at = static_cast<std::size_t>(n++);
-    measured.columns[at] = column;
-    measured.h0[at] = d0;
-    measured.h1[at] = d1;
-  };
-  for (int i = 0; i < 3; ++i) put(i, view->J_px_pose(0, i), view->J_px_pose(1, i));
-  for (int i = 0; i < 3; ++i) put(3 + i, J_rotation(0, i), J_rotation(1, i));
-  for (int k = 0; k < num_lens(); ++k) {
-    const int index = config_.lens_params[static_cast<std::size_t>(k)];
-    put(motion_dim + k, view->J_px_lens(0, index), view->J_px_lens(1, index));
-  }
-  for (int i = 0; i < feature.dim(); ++i) put(feature.offset + i, view->J_px_feature(0, i), view->J_px_feature(1, i));
-  measured.num_support = n;
-  measured.c = measured.nu;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(n); ++k)
-    measured.c += delta_[measured.columns[k]] * Eigen::Vector2d(measured.h0[k], measured.h1[k]);
-  return true;
-}
 
 void LocalizationFilter::expect(Measured& measured) const {
   measured.S = P_.innovation_covariance(measured.rows());
@@ -268,31 +227,14 @@ void LocalizationFilter::use_together() {
 }
 
 bool LocalizationFilter::finish_update() {
-  const int dim = P_.dim();
-  if (!delta_.head(dim).allFinite() || !P_.stays_positive()) {
+  if (!delta_.head(P_.dim()).allFinite() || !P_.stays_positive()) {
     P_.drop_pending();
     delta_.setZero();
     return false;
   }
   P_.commit();
-  motion_ = retract(motion_, delta_.head<motion_dim>());
-  for (int k = 0; k < num_lens(); ++k) {
-    const int index = config_.lens_params[static_cast<std::size_t>(k)];
-    lens_param(camera_, index) += delta_[motion_dim + k];
-  }
-  for (Feature& feature : features_)
-    for (int i = 0; i < feature.dim(); ++i) feature.values[i] += delta_[feature.offset + i];
-  const Eigen::Matrix3d J = right_jacobian(delta_.segment<3>(3));  // the error is counted from the new attitude
-  for (int j = 0; j < dim; ++j) {
-    const Eigen::Vector3d rotation(P_.at(3, j), P_.at(4, j), P_.at(5, j));
-    const Eigen::Vector3d turned = J * rotation;
-    for (int i = 0; i < 3; ++i) P_.at(3 + i, j) = turned[i];
-  }
-  for (int j = 0; j < dim; ++j) {
-    const Eigen::Vector3d rotation(P_.at(j, 3), P_.at(j, 4), P_.at(j, 5));
-    const Eigen::Vector3d turned = J * rotation;
-    for (int i = 0; i < 3; ++i) P_.at(j, 3 + i) = turned[i];
-  }
+  turns_world_ ? turn_by_delta() : move_by_delta();
+  move_lens_by_delta();
   delta_.setZero();
   return true;
 }
@@ -326,8 +268,8 @@ double LocalizationFilter::attempt(bool finds_consensus) {
   return cost_of_used();
 }
 
-SightsReport LocalizationFilter::update(std::span<const FeatureSight> sights) {
-  collect(sights);
+/// What fits together, with a consensus where sights disagree.
+double LocalizationFilter::best_attempt() {
   double cost = attempt(false);
   constexpr std::size_t least_for_consensus = 4;
   const auto num_doubtful = static_cast<double>(measured_.size() - used_.size());
@@ -336,6 +278,20 @@ SightsReport LocalizationFilter::update(std::span<const FeatureSight> sights) {
     const double without = cost;
     cost = attempt(true);
     if (!(cost < without)) cost = attempt(false);
+  }
+  return cost;
+}
+
+SightsReport LocalizationFilter::update(std::span<const FeatureSight> sights) {
+  // Errors that turn with the world are straight only for small turns: over a large one, as at a start or after a gap,
+  // a camera that turns in place would have to move.
+  constexpr double most_turn_rad = 0.02;
+  turns_world_ = config_.holds_frame;
+  collect(sights);
+  double cost = best_attempt();
+  if (turns_world_ && !(delta_.segment<3>(3).norm() < most_turn_rad)) {
+    turns_world_ = false;
+    cost = best_attempt();
   }
   SightsReport report{outcomes_, nis_};
   report.is_sound = finish_update();

@@ -78,6 +78,12 @@ std::optional<SeenTarget> find_board_points(const cv::Mat& grey, const Camera& c
   return posed(camera, std::move(sights), target, config);
 }
 
+/// Where the top of a parabola through three neighbours is, from the middle one.
+double top_of(double before, double at, double after) {
+  const double bend = before - 2.0 * at + after;
+  return bend < 0.0 ? std::clamp(0.5 * (before - after) / bend, -0.5, 0.5) : 0.0;
+}
+
 /// Each patch where the picture is most like it.
 std::optional<SeenTarget> find_patches(const cv::Mat& grey, const Camera& camera, const ImageTarget& target,
                                        const KnownPoseConfig& config) {
@@ -93,9 +99,14 @@ std::optional<SeenTarget> find_patches(const cv::Mat& grey, const Camera& camera
     cv::Point at;
     cv::minMaxLoc(likeness, nullptr, &best, nullptr, &at);
     if (!(best >= least_correlation)) continue;
-    sights.push_back({target.points[i].id,
-                      {at.x + 0.5 * (patch.width_px - 1), at.y + 0.5 * (patch.height_px - 1)},
-                      config.sigma_px});
+    const auto like = [&](int dx, int dy) -> double {
+      const int u = std::clamp(at.x + dx, 0, likeness.cols - 1), v = std::clamp(at.y + dy, 0, likeness.rows - 1);
+      return likeness.at<float>(v, u);
+    };
+    const Eigen::Vector2d top(at.x + top_of(like(-1, 0), best, like(1, 0)),
+                              at.y + top_of(like(0, -1), best, like(0, 1)));
+    const Eigen::Vector2d middle(0.5 * (patch.width_px - 1), 0.5 * (patch.height_px - 1));
+    sights.push_back({target.points[i].id, top + middle, config.sigma_px});
   }
   return posed(camera, std::move(sights), target, config);
 }

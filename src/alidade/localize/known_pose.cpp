@@ -1,10 +1,10 @@
 #include "alidade/localize/known_pose.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "alidade/board/board_pose.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -36,10 +36,9 @@ SeenPoints seen_points(std::span<const FeatureSight> sights, std::span<const Kno
   middle /= static_cast<double>(points_in_world.size());
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& point : points_in_world) scatter += (point - middle) * (point - middle).transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
+  const SymmetricEigen3 eigen = symmetric_eigen3(scatter);
   Eigen::Matrix3d axes;
-  axes << eigen.eigenvectors().col(2), eigen.eigenvectors().col(1),
-      eigen.eigenvectors().col(2).cross(eigen.eigenvectors().col(1));
+  axes << eigen.vectors.col(2), eigen.vectors.col(1), eigen.vectors.col(2).cross(eigen.vectors.col(1));
   seen.world_from_board = {Eigen::Quaterniond(axes), middle};
   for (const Eigen::Vector3d& point_in_world : points_in_world)
     seen.points_in_board.push_back(seen.world_from_board.inverse() * point_in_world);

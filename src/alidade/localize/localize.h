@@ -88,6 +88,7 @@ struct LocalizeReport {
   std::vector<MapPoint> map;   ///< At the end.
   bool scale_known = false;
   bool has_target = false;   ///< Known points were given.
+  bool is_of_pictures = false;
   std::size_t num_lost = 0;  ///< Frames without a pose that sights hold: waiting or predicted.
   std::size_t num_restarts = 0;
   std::size_t num_sights = 0, num_used = 0, num_gated = 0, most_seen = 0;

@@ -12,6 +12,7 @@ LocalizeReport localize_images(const Camera& camera, const NextPicture& next, st
                                const Progress& progress) {
   LocalizeReport report;
   report.camera = camera;
+  report.is_of_pictures = true;
   report.has_target = config.target.has_value();
   report.scale_known = report.has_target;
   ImageLocalizer localizer(camera, config);

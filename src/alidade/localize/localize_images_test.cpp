@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "alidade/io/image_sequence.h"
 #include "alidade/io/localize_file.h"
@@ -96,7 +97,8 @@ TEST(LocalizeImages, MismatchesOfFortyPercentChangeLittle) {
 
 TEST(LocalizeImages, ASecondOfDarknessIsRecoveredWithinTenFrames) {
   RoomVideo video = usual_room();
-  for (std::size_t i = 40; i < 70; ++i) video.pictures[i] = cv::Mat::zeros(240, 320, CV_8U);
+  for (std::size_t i = 40; i < 70; ++i)
+    video.pictures[i] = cv::Mat(240, 320, CV_8U, cv::Scalar(0));  // zeros() would write into the shared one
   const LocalizeReport report = localized(video, by_hand());
   for (std::size_t i = 40; i < 70; ++i) EXPECT_EQ(report.path[i].event, FrameEvent::predicted);
   for (std::size_t i = 80; i < 90; ++i) {
@@ -114,6 +116,87 @@ TEST(LocalizeImages, WithoutTheTargetThereIsNoPath) {
   const LocalizeReport report = localized(room_video(scene), by_hand());
   EXPECT_EQ(report.num_lost, 5u);
   EXPECT_EQ(localize_verdict(report).exit_code, ExitCode::cannot_tell);
+}
+
+/// Sheets with a dark rectangle each, on a grey wall 0.7 m ahead.
+cv::Mat sheets_at(const Camera& camera, const std::vector<double>& places_m) {
+  cv::Mat picture(camera.height_px, camera.width_px, CV_8U);
+  for (int v = 0; v < picture.rows; ++v) {
+    for (int u = 0; u < picture.cols; ++u) {
+      const Eigen::Vector3d ray = *unproject(camera, {u, v});
+      const Eigen::Vector2d at = 0.7 * ray.hnormalized();
+      double grey = 128.0;
+      for (const double x : places_m) {
+        const double paper = testing::inside(at.x() - x, at.y(), 0.145, 0.115);
+        const double dark = testing::inside(at.x() - x, at.y(), 0.105, 0.07425);
+        grey += paper * (215.0 - 185.0 * dark - grey);
+      }
+      picture.at<std::uint8_t>(v, u) = cv::saturate_cast<std::uint8_t>(grey);
+    }
+  }
+  return picture;
+}
+
+/// Two sheets that look the same: a path from the wrong one would be a wrong path with a small σ.
+TEST(LocalizeImages, OfTwoThatLookAlikeItTakesNone) {
+  RoomVideo video = usual_room();
+  video.pictures.assign(5, sheets_at(video.scene.camera, {-0.2, 0.2}));
+  const LocalizeReport two = localized(video, by_hand());
+  EXPECT_EQ(two.num_lost, 5u);
+  EXPECT_EQ(two.num_alike, 2u);
+  const Verdict verdict = localize_verdict(two);
+  EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_NE(verdict.sentence.find("2 things in one picture look like the target"), std::string::npos)
+      << verdict.sentence;
+  video.pictures.assign(5, sheets_at(video.scene.camera, {-0.2}));
+  EXPECT_EQ(localized(video, by_hand()).path.front().event, FrameEvent::started);
+}
+
+/// Points of the target that are told by how they look, instead of a rectangle: the path is the same.
+TEST(LocalizeImages, FindsPointsByTheirPatches) {
+  LocalizeImagesConfig config = by_hand();
+  config.target->rectangle_m.reset();
+  const RoomVideo& video = usual_room();
+  constexpr int side = 31;
+  for (const KnownPoint& point : config.target->points) {
+    const auto px = project(video.scene.camera, video.truth[0].world_from_cam.inverse() * point.point_in_world);
+    cv::Mat patch;
+    cv::getRectSubPix(video.pictures[0], {side, side}, cv::Point2d(px->x(), px->y()), patch);
+    config.target->patches.push_back({side, side, {patch.datastart, patch.dataend}});
+  }
+  const LocalizeReport report = localized(video, config);
+  EXPECT_EQ(report.num_lost, 0u);
+  EXPECT_LT(report.error.unaligned_m, 0.01);  // its points are found to a tenth of a pixel: 1 mm of 0.7 m, and drift
+}
+
+/// Sights that contradict each other for a third of a second: the path begins anew instead of following them.
+TEST(LocalizeImages, BeginsAnewWhereItsSightsContradictIt) {
+  LocalizeImagesConfig config = by_hand();
+  Draws draws(3);
+  config.disturb = [&](long frame, std::vector<FeatureSight>& sights) {
+    if (frame < 30 || frame >= 40) return;
+    for (FeatureSight& sight : sights) sight.px += 0.7 * draws.normal2();
+  };
+  const LocalizeReport report = localized(usual_room(), config);
+  EXPECT_GE(report.num_restarts, 1u);
+  for (std::size_t i = 45; i < 90; ++i) {
+    const Eigen::Vector3d& is = report.path[i].world_from_cam.translation;
+    EXPECT_LT((is - usual_room().truth[i].world_from_cam.translation).norm(), 0.03) << i;
+  }
+}
+
+/// What a wrong camera does to the path is seen where the truth is given.
+TEST(LocalizeImages, AWrongLensIsSeenByTheTruth) {
+  RoomVideo video = usual_room();
+  const LocalizeReport right = localized(video, by_hand());
+  EXPECT_LT(right.error.ate_m, 1.5 * right.error.stated_m);
+  Params<KannalaBrandt> values = std::get<Calibrated<KannalaBrandt>>(video.scene.camera.lens).params;
+  values.head<2>() *= 1.3;
+  video.scene.camera.lens = Calibrated<KannalaBrandt>{values};
+  const LocalizeReport wrong = localized(video, by_hand());
+  const Verdict verdict = localize_verdict(wrong);
+  EXPECT_NE(verdict.state, State::good) << verdict.sentence;
+  EXPECT_GT(std::max(wrong.error.ate_m, wrong.error.unaligned_m), 3.0 * wrong.error.stated_m);
 }
 
 TEST(LocalizeImages, WithoutTextureThereIsNoPath) {

@@ -20,24 +20,47 @@ Verdict stopped(State state, ExitCode code, std::string sentence, std::string to
 
 /// Why there is no path at all.
 Verdict never_started(const LocalizeReport& report) {
-  if (report.most_seen < 3)
-    return stopped(State::refused, ExitCode::cannot_tell,
-                   "too few points: at most " + std::to_string(report.most_seen) + " in a frame, a pose needs three",
-                   "track more points");
+  const auto cannot_tell = [](std::string sentence, std::string to_add) {
+    return stopped(State::refused, ExitCode::cannot_tell, std::move(sentence), std::move(to_add));
+  };
   if (report.num_alike > 1)
-    return stopped(State::refused, ExitCode::cannot_tell,
-                   std::to_string(report.num_alike) +
-                       " things in one picture look like the target: which one it is "
-                       "cannot be told",
-                   "begin where one of them is seen, or give --start");
-  return stopped(
-      State::refused, ExitCode::cannot_tell,
+    return cannot_tell(std::to_string(report.num_alike) +
+                           " things in one picture look like the target: which one it is cannot be told",
+                       "begin where one of them is seen, or give --start");
+  if (report.is_of_pictures && report.has_target)
+    return cannot_tell("the target is not found in any of " + std::to_string(report.path.size()) + " pictures",
+                       "begin in front of the target, whole and sharp, and check its size in --target");
+  if (report.most_seen < 3)
+    return cannot_tell(
+        "too few points: at most " + std::to_string(report.most_seen) + " in a frame, a pose needs three",
+        report.is_of_pictures ? "look at something with corners, in light" : "track more points");
+  return cannot_tell(
       "the target is not found: four of its points, in a plane and not on a line, are never seen where they belong",
       "begin in front of the target, or give --start");
 }
 
 State state_of(double value, double care, double bad) {
   return value > bad ? State::bad : value > care ? State::care : State::good;
+}
+
+/// What only the truth shows: a path may fit its own map well and be elsewhere. An alignment only takes errors away, so
+/// what is left after it should be within σ; before it the truth may stand in a frame of its own.
+void add_truth(const LocalizeReport& report, Verdict& verdict) {
+  const PathError& error = report.error;
+  if (!std::isfinite(error.ate_m) || !(error.stated_m > 0.0)) return;
+  constexpr double care_ratio = 1.5, bad_ratio = 3.0, elsewhere_ratio = 3.0;
+  const double ratio = error.ate_m / error.stated_m;
+  verdict.checks.push_back(
+      {"truth", state_of(ratio, care_ratio, bad_ratio),
+       "the path is " + text_of(ratio, 2) + " times its σ from the truth, after the best alignment", ratio, care_ratio,
+       "σ", "path"});
+  const double before = error.unaligned_m / error.stated_m;
+  if (report.scale_known && before > elsewhere_ratio)
+    verdict.checks.push_back({"truth's frame", State::care,
+                              "before alignment it is " + text_of(before, 2) +
+                                  " times its σ away: the truth stands in another frame, or the map is not where its "
+                                  "σ says",
+                              before, elsewhere_ratio, "σ", "path"});
 }
 
 void add_checks(const LocalizeReport& report, Verdict& verdict) {
@@ -78,6 +101,7 @@ void add_checks(const LocalizeReport& report, Verdict& verdict) {
     verdict.checks.push_back({"restarts", State::care,
                               "begun anew from the target " + std::to_string(report.num_restarts) + " times",
                               static_cast<double>(report.num_restarts), 0.0, "times", "path"});
+  add_truth(report, verdict);
 }
 
 }  // namespace

@@ -10,22 +10,24 @@ struct Pair {
   Rigid3 estimated, truth;
 };
 
-std::vector<Pair> matched(std::span<const TimedPose> estimated, std::span<const TimedPose> truth, double tolerance_s) {
-  std::vector<Pair> pairs;
-  for (const TimedPose& pose : estimated) {
-    auto at = std::ranges::lower_bound(truth, pose.t_s, {}, &TimedPose::t_s);
-    if (at != truth.begin() && (at == truth.end() || pose.t_s - std::prev(at)->t_s < at->t_s - pose.t_s)) --at;
-    if (at != truth.end() && std::abs(at->t_s - pose.t_s) <= tolerance_s)
-      pairs.push_back({pose.world_from_cam, at->world_from_cam});
-  }
-  return pairs;
-}
-
 }  // namespace
 
+const TimedPose* nearest_pose(std::span<const TimedPose> poses, double t_s, double tolerance_s) {
+  auto at = std::ranges::lower_bound(poses, t_s, {}, &TimedPose::t_s);
+  if (at != poses.begin() && (at == poses.end() || t_s - std::prev(at)->t_s < at->t_s - t_s)) --at;
+  return at != poses.end() && std::abs(at->t_s - t_s) <= tolerance_s ? &*at : nullptr;
+}
+
 PathError path_error(std::span<const TimedPose> estimated, std::span<const TimedPose> truth, bool is_rigid,
-                     double tolerance_s) {
-  const std::vector<Pair> pairs = matched(estimated, truth, tolerance_s);
+                     std::span<const double> sigmas_m) {
+  std::vector<Pair> pairs;
+  double variance_m2 = 0.0;
+  for (std::size_t i = 0; i < estimated.size(); ++i) {
+    const TimedPose* const there = nearest_pose(truth, estimated[i].t_s);
+    if (there == nullptr) continue;
+    pairs.push_back({estimated[i].world_from_cam, there->world_from_cam});
+    if (!sigmas_m.empty()) variance_m2 += sigmas_m[i] * sigmas_m[i];
+  }
   PathError error;
   error.num_pairs = pairs.size();
   if (pairs.empty()) return error;
@@ -41,6 +43,7 @@ PathError path_error(std::span<const TimedPose> estimated, std::span<const Timed
   const auto fit = aligned(a, b, is_rigid);
   if (!fit) return error;
   error.scale = fit->scale;
+  if (!sigmas_m.empty()) error.stated_m = fit->scale * std::sqrt(variance_m2 / num);
   sum2 = 0.0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     const Eigen::Vector3d moved = fit->b_from_a.rotation * (fit->scale * a[i]) + fit->b_from_a.translation;

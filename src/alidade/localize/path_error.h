@@ -24,11 +24,20 @@ struct PathError {
   double rpe_rad = std::numeric_limits<double>::quiet_NaN();  ///< RMS rotation of the same.
   double unaligned_m = std::numeric_limits<double>::quiet_NaN();
   double scale = 1.0;  ///< Of truth over estimate.
+  /// RMS of the positions' stated σ (root of the trace), with the aligned scale: what `ate_m` should not be above, as
+  /// an alignment takes errors away and adds none.
+  double stated_m = std::numeric_limits<double>::quiet_NaN();
   std::size_t num_pairs = 0;
 };
 
-/// Each estimated pose is compared with the true one of its time (within `tolerance_s`).
+constexpr double same_time_s = 0.01;
+
+/// The pose nearest in time, or null where none is within `tolerance_s`. `poses` in order of time.
+[[nodiscard]] const TimedPose* nearest_pose(std::span<const TimedPose> poses, double t_s,
+                                            double tolerance_s = same_time_s);
+
+/// Each estimated pose is compared with the true one of its time. `sigmas_m`: σ of each estimated position, or empty.
 [[nodiscard]] PathError path_error(std::span<const TimedPose> estimated, std::span<const TimedPose> truth,
-                                   bool is_rigid, double tolerance_s = 0.01);
+                                   bool is_rigid, std::span<const double> sigmas_m = {});
 
 }  // namespace alidade

@@ -105,6 +105,30 @@ TEST(PathError, IsThatOfAnIndependentComputation) {
   }
 }
 
+/// Errors as large as stated: the ratio is one, but for what the alignment of six numbers takes and 600 draws scatter.
+TEST(PathError, StatesWhatSigmaSays) {
+  auto rng = testing::make_rng();
+  for (const double scale : {1.0, 2.7}) {
+    const Paths paths = noisy_paths(rng, scale, 0.02);
+    const std::vector<double> sigmas_m(paths.estimated.size(), std::sqrt(3.0) * 0.02);
+    const PathError error = path_error(paths.estimated, paths.truth, scale == 1.0, sigmas_m);
+    EXPECT_NEAR(error.stated_m, scale * std::sqrt(3.0) * 0.02, 0.1 * error.stated_m);
+    EXPECT_NEAR(error.ate_m / error.stated_m, 1.0, 0.1);
+  }
+  EXPECT_TRUE(std::isnan(path_error({}, {}, true).stated_m));
+}
+
+/// Truth at 200 Hz: the pose of the frame's own time, not the first within the tolerance.
+TEST(PathError, TakesTheNearestPoseOfTheTruth) {
+  std::vector<TimedPose> truth;
+  for (int i = 0; i < 100; ++i) truth.push_back({0.005 * i, Rigid3{Eigen::Quaterniond::Identity(), {1.0 * i, 0, 0}}});
+  EXPECT_EQ(nearest_pose(truth, 0.1)->world_from_cam.translation.x(), 20.0);
+  EXPECT_EQ(nearest_pose(truth, 0.1024)->world_from_cam.translation.x(), 20.0);
+  EXPECT_EQ(nearest_pose(truth, 0.1026)->world_from_cam.translation.x(), 21.0);
+  EXPECT_EQ(nearest_pose(truth, -0.011), nullptr);
+  EXPECT_EQ(nearest_pose({}, 0.0), nullptr);
+}
+
 TEST(PathError, IsZeroForTheSamePathInAnotherFrameAndScale) {
   auto rng = testing::make_rng();
   Paths paths = noisy_paths(rng, 0.4, 0.0);

@@ -39,6 +39,14 @@ ALIDADE_VECTOR_CLONES void subtract_tile(const double* a, const double* b, int n
     for (int j = 0; j < 4; ++j) mirror[static_cast<std::size_t>(i) * stride + static_cast<std::size_t>(j)] = tile[j][i];
 }
 
+/// column += K u + U k, three numbers each of u and k.
+ALIDADE_VECTOR_CLONES void add_three(const double* K, const double* U, std::size_t stride, const double* u,
+                                     const double* k, std::size_t num, double* column) {
+  const double *K1 = K + stride, *K2 = K1 + stride, *U1 = U + stride, *U2 = U1 + stride;
+  for (std::size_t i = 0; i < num; ++i)
+    column[i] += K[i] * u[0] + K1[i] * u[1] + K2[i] * u[2] + U[i] * k[0] + U1[i] * k[1] + U2[i] * k[2];
+}
+
 /// x −= Σ_k w_k h_k for a panel: four columns of x at a time, whose factors of each k stand together.
 ALIDADE_VECTOR_CLONES void subtract_products(const double* w, const double* h, int num, double* x) {
   Four low[4] = {}, high[4] = {};
@@ -116,6 +124,7 @@ void StateCovariance::reserve(int state_capacity, int measured_capacity) {
   P_.assign(stride() * stride(), 0.0);
   W_.assign(stride() * static_cast<std::size_t>(pending_capacity_), 0.0);
   X_.assign(stride() * max_columns, 0.0);
+  shear_.assign(stride() * 3, 0.0);
   HW_.assign(static_cast<std::size_t>(pending_capacity_) * max_columns, 0.0);
   dim_ = pending_ = 0;
 }
@@ -245,6 +254,52 @@ void StateCovariance::commit() {
     }
   }
   pending_ = 0;
+}
+
+void StateCovariance::turn(const double* blocks, int single_at, int num_single) {
+  const auto next = [&](int i) { return i + 3 == single_at ? i + 3 + num_single : i + 3; };
+  const auto block_at = [&](int i, double(&M)[9]) {  // row by row
+    for (std::size_t r = 0; r < 3; ++r)
+      for (std::size_t c = 0; c < 3; ++c) M[3 * r + c] = blocks[c * stride() + static_cast<std::size_t>(i) + r];
+  };
+  double left[9], right[9], half[9];
+  for (int j = 0; j < dim_; j = next(j)) {
+    block_at(j, right);
+    for (int i = j; i < dim_; i = next(i)) {
+      block_at(i, left);
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c)
+          half[3 * r + c] =
+              left[3 * r] * at(i, j + c) + left[3 * r + 1] * at(i + 1, j + c) + left[3 * r + 2] * at(i + 2, j + c);
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c)
+          at(i + r, j + c) = at(j + c, i + r) =
+              half[3 * r] * right[3 * c] + half[3 * r + 1] * right[3 * c + 1] + half[3 * r + 2] * right[3 * c + 2];
+    }
+    for (int s = single_at; s < single_at + num_single; ++s) {
+      const double x[3] = {at(j, s), at(j + 1, s), at(j + 2, s)};
+      for (int r = 0; r < 3; ++r)
+        at(j + r, s) = at(s, j + r) = right[3 * r] * x[0] + right[3 * r + 1] * x[1] + right[3 * r + 2] * x[2];
+    }
+  }
+}
+
+/// P + K Uᵀ + U Kᵀ, with U = P Eᵀ + ½ K (E P Eᵀ).
+void StateCovariance::shear(int at, const double* K) {
+  const auto num = static_cast<std::size_t>(dim_), first = static_cast<std::size_t>(at);
+  double* const U = shear_.data();
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t i = 0; i < num; ++i) {
+      double sum = P_[(first + c) * stride() + i];
+      for (std::size_t d = 0; d < 3; ++d) sum += 0.5 * K[d * stride() + i] * P_[(first + c) * stride() + first + d];
+      U[c * stride() + i] = sum;
+    }
+  }
+  for (std::size_t j = 0; j < num; ++j) {
+    const double u[3] = {U[j], U[stride() + j], U[2 * stride() + j]};
+    const double k[3] = {K[j], K[stride() + j], K[2 * stride() + j]};
+    add_three(K, U, stride(), u, k, num, &P_[j * stride()]);
+  }
 }
 
 }  // namespace alidade

@@ -60,6 +60,11 @@ class StateCovariance {
   [[nodiscard]] bool stays_positive() const;
   /// P ← P − W Wᵀ.
   void commit();
+  /// P ← B P Bᵀ with B of 3 × 3 blocks along the diagonal, which stand one below the other in `blocks` (capacity() × 3,
+  /// column by column); the `num_single` numbers from `single_at` on stay as they are.
+  void turn(const double* blocks, int single_at, int num_single);
+  /// P ← (I + K E) P (I + K E)ᵀ, where E takes the three numbers from `at` on; K: capacity() × 3, column by column.
+  void shear(int at, const double* K);
 
  private:
   [[nodiscard]] std::size_t stride() const { return static_cast<std::size_t>(stride_); }
@@ -70,6 +75,7 @@ class StateCovariance {
   std::vector<double> W_;  ///< Panel by panel, in it column by column, 8 rows each.
   std::vector<double> X_;  ///< The same layout, max_columns.
   std::vector<double> HW_;
+  std::vector<double> shear_;  ///< What shear() needs: capacity() × 3.
 };
 
 }  // namespace alidade

@@ -9,6 +9,7 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
             std::span<const TimedPose> truth, LocalizeReport& report) {
   double nis = 0.0, dof = 0.0;
   std::vector<TimedPose> path;
+  std::vector<double> sigmas_m;
   for (const PathStep& step : report.path) {
     report.num_sights += step.num_seen;
     report.num_used += step.num_tracked;
@@ -21,7 +22,9 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
       nis += step.nis_per_dof * static_cast<double>(step.num_tracked);
       dof += static_cast<double>(step.num_tracked);
     }
-    if (step.has_pose()) path.push_back({step.t_s, step.world_from_cam});
+    if (!step.has_pose()) continue;
+    path.push_back({step.t_s, step.world_from_cam});
+    sigmas_m.push_back(std::sqrt(step.cov.topLeftCorner<3, 3>().trace()));
   }
   if (dof > 0.0) report.nis_per_dof = nis / dof;
   if (!bank) return;
@@ -32,7 +35,7 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
     const auto place = filter.place(feature.id);
     report.map.push_back({feature.id, place->point_in_world, place->cov, feature.is_known, num_used(feature.id)});
   }
-  if (!truth.empty()) report.error = path_error(path, truth, report.scale_known);
+  if (!truth.empty()) report.error = path_error(path, truth, report.scale_known, sigmas_m);
 }
 
 double known_shift(std::span<const MapPoint> map, std::span<const KnownPoint> told) {

@@ -92,6 +92,7 @@ ServoRow step(const ServoScene& scene, LoopedHead& looped, double t_s, std::size
   row.event = output.event;
   row.error_px = where ? Eigen::Vector2d(*where - looped.centre_px)
                        : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  if (is_seen) row.seen_px = *seen;
   row.is_in_picture = where && is_in_picture(scene.heads[head].camera, *where);
   return row;
 }

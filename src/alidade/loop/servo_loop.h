@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -47,6 +48,7 @@ struct ServoRow {
   bool has_prediction = false;
   Eigen::Vector2d error_px;  ///< True image of the target − middle of the picture; NaN behind the camera.
   bool is_in_picture = false;
+  std::optional<Eigen::Vector2d> seen_px;  ///< What the head's picture told, with its noise.
   ServoEvent event = ServoEvent::none;
 };
 

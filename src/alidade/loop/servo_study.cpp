@@ -120,6 +120,7 @@ ServoStudy study_servo(const ServoScenario& scenario, std::uint64_t first_seed, 
   study.best = std::ranges::min_element(study.comparison, {}, [](const ServoComparison& c) {
                  return c.figures.rms_px;
                })->controller;
+  if (scenario.scene.heads.size() > 1) study.track = track_of(scenario.scene, best_of(study).shown);
   if (scenario.robustness) {
     const RobustnessConfig& grid = *scenario.robustness;
     config.controller = study.best;

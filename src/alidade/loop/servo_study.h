@@ -8,7 +8,7 @@
 
 #include "alidade/estimation/progress.h"
 #include "alidade/estimation/verdict.h"
-#include "alidade/loop/servo_loop.h"
+#include "alidade/loop/servo_track.h"
 
 namespace alidade {
 
@@ -58,6 +58,7 @@ struct ServoStudy {
   std::vector<ServoTrial> trials;
   std::vector<ServoComparison> comparison;  ///< In the order of the scenario; empty where a loop is unstable.
   ControllerKind best = ControllerKind::pi;
+  ServoTrack track;                           ///< Of the best one's shown run; two heads or more.
   std::optional<ServoRobustness> robustness;  ///< Of the best.
 };
 

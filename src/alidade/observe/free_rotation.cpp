@@ -1,6 +1,7 @@
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+
+#include "alidade/geometry/decompositions.h"
 
 #include "alidade/observe/observe.h"
 
@@ -25,13 +26,11 @@ std::vector<RayPair> shared_rays(const RotationRow& before, const RotationRow& n
   return pairs;
 }
 
-/// Rotation that takes `before` to `now`, weighted. Kabsch 1976.
+/// Rotation that takes `before` to `now`, weighted.
 Eigen::Matrix3d align(const std::vector<RayPair>& pairs, const std::vector<double>& weights) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < pairs.size(); ++i) sum += weights[i] * pairs[i].now * pairs[i].before.transpose();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double handed = (svd.matrixU() * svd.matrixV().transpose()).determinant();
-  return svd.matrixU() * Eigen::Vector3d(1.0, 1.0, handed).asDiagonal() * svd.matrixV().transpose();
+  return nearest_rotation(sum);
 }
 
 double middle(std::vector<double> values) {

@@ -1,8 +1,8 @@
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/observe/fang_observer.h"
 #include "alidade/observe/observe.h"
@@ -61,8 +61,8 @@ Check weakest(const ObserveReport& report) {
     check.text = "no bound";
     return check;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(K);
-  const Eigen::Vector4d direction = eigen.eigenvectors().col(3);
+  const SymmetricEigen eigen = symmetric_eigen(K);
+  const Eigen::Vector4d direction = eigen.vectors.col(3);
   static const char* const names[] = {"fx", "fy", "cx", "cy"};
   for (int i = 0; i < 4; ++i) {
     if (std::abs(direction[i]) < 0.3) continue;
@@ -71,7 +71,7 @@ Check weakest(const ObserveReport& report) {
                                         : " − ") +
                   text_of(std::abs(direction[i]), 2) + " " + names[i];
   }
-  check.value = std::sqrt(eigen.eigenvalues()[3]);
+  check.value = std::sqrt(eigen.values[3]);
   check.limit = 0.05 * report.width_px;
   check.text += " is known to " + text_of(check.value, 2) + " px (1σ)";
   if (check.value > check.limit) check.state = State::refused;

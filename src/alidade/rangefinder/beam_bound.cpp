@@ -1,10 +1,10 @@
 #include "alidade/rangefinder/beam_bound.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -25,8 +25,7 @@ void put_geometry(const BeamProblem& problem, const Beam& beam, BeamBound& bound
   }
   bound.range_ratio = farthest_m > 0.0 ? farthest_m / nearest_m : 0.0;
   if (num_planes > 0.0) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(outer / num_planes);
-    bound.normal_spread = std::sqrt(std::max(0.0, eigen.eigenvalues()[0]));
+    bound.normal_spread = std::sqrt(std::max(0.0, symmetric_eigen3(outer / num_planes).values[0]));
   }
   bound.offset_m = offset_of_line_m(beam);
 }
@@ -36,9 +35,9 @@ void put_geometry(const BeamProblem& problem, const Beam& beam, BeamBound& bound
 double scaled_condition(const Eigen::MatrixXd& information) {
   const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
   if (!scale.allFinite()) return infinity;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * information * scale.asDiagonal());
-  const double least = eigen.eigenvalues()[0];
-  return least > 0.0 ? eigen.eigenvalues()[eigen.eigenvalues().size() - 1] / least : infinity;
+  const Eigen::VectorXd values = symmetric_eigenvalues(scale.asDiagonal() * information * scale.asDiagonal());
+  const double least = values[0];
+  return least > 0.0 ? values[values.size() - 1] / least : infinity;
 }
 
 BeamBound judge_beam(const BeamProblem& problem, const Beam& beam, const Camera& camera) {
@@ -53,8 +52,7 @@ BeamBound judge_beam(const BeamProblem& problem, const Beam& beam, const Camera&
     const auto pixel = measured_pixel(beam, camera, bound_ranges_m[i], 0.0);
     bound.spot_sigma_px[i] = infinity;  // not seen there
     if (!pixel) continue;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(pixel->cov);
-    bound.spot_sigma_px[i] = std::sqrt(std::max(0.0, eigen.eigenvalues()[1]));
+    bound.spot_sigma_px[i] = std::sqrt(std::max(0.0, symmetric_eigenvalues(pixel->cov)[1]));
   }
   return bound;
 }

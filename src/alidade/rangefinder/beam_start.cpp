@@ -1,14 +1,12 @@
 #include "alidade/rangefinder/beam_start.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "alidade/beam/unit_direction.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -64,9 +62,8 @@ std::vector<double> multipliers(const UnitNormProblem& problem) {
   for (int k = 0; k < 6; ++k) companion(k, 5) = -sextic[static_cast<std::size_t>(k)];
   companion.diagonal<-1>().setOnes();
   if (!companion.allFinite()) return {};
-  const Eigen::EigenSolver<Eigen::Matrix<double, 6, 6>> eigen(companion, false);
   std::vector<double> roots;
-  for (const std::complex<double>& root : eigen.eigenvalues()) {
+  for (const std::complex<double>& root : eigenvalues_of(companion)) {
     // A double root comes out as a pair that is complex by the root of the rounding.
     if (std::abs(root.imag()) < 1e-5 * (1e-3 + std::abs(root))) roots.push_back(root.real());
   }
@@ -110,8 +107,8 @@ std::optional<Beam> spot_start(std::span<const PreparedShot* const> shots) {
   }
   const Eigen::Matrix<double, 6, 1> size = M.colwise().norm().transpose();
   if (!(size.minCoeff() > 0.0) || !M.allFinite()) return std::nullopt;
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(M * size.cwiseInverse().asDiagonal(), Eigen::ComputeFullV);
-  Eigen::Matrix<double, 6, 1> null = svd.matrixV().col(5).cwiseQuotient(size);
+  const Svd svd = svd_of(M * size.cwiseInverse().asDiagonal());
+  Eigen::Matrix<double, 6, 1> null = svd.V.col(5).cwiseQuotient(size);
   null.head<3>() /= mean_range_m;
   null /= null.head<3>().norm();
   double ahead = 0.0;  // the spots are in front of the camera
@@ -133,20 +130,18 @@ std::vector<Beam> plane_starts(std::span<const PreparedShot* const> shots) {
     d[i] = shot.plane->d_m;
   }
   if (!LN.allFinite() || !d.allFinite()) return {};
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(N);
-  const Eigen::MatrixXd Q = qr.householderQ();
+  const Eigen::MatrixXd Q = orthonormal_basis(N, n);
   const Eigen::MatrixXd C = Q.rightCols(n - 3).transpose() * LN;  // what the origin cannot take up
   const Eigen::VectorXd e = -Q.rightCols(n - 3).transpose() * d;
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(C, Eigen::ComputeThinU | Eigen::ComputeFullV);
-  UnitNormProblem problem{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), svd.matrixV()};
-  const Eigen::Index rank = svd.singularValues().size();
-  problem.s2.head(rank) = svd.singularValues().array().square();
-  problem.f.head(rank) = svd.singularValues().asDiagonal() * (svd.matrixU().transpose() * e);
+  const Svd svd = svd_of(C);
+  UnitNormProblem problem{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), svd.V};
+  const Eigen::Index rank = svd.values.size();
+  problem.s2.head(rank) = svd.values.array().square();
+  problem.f.head(rank) = svd.values.asDiagonal() * (svd.U.transpose() * e);
   std::vector<std::pair<double, Beam>> found;
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> origin_of(N);
   for (const Eigen::Vector3d& A : unit_directions(problem)) {
     const Eigen::VectorXd rest = -(d + LN * A);
-    const auto beam = beam_of(A, origin_of.solve(rest));
+    const auto beam = beam_of(A, least_squares(N, rest));
     if (!beam || !is_in_front(*beam, shots)) continue;
     found.emplace_back((N * beam->origin_in_cam - rest).squaredNorm(), *beam);
   }
@@ -175,7 +170,7 @@ std::optional<Beam> joint_start(std::span<const PreparedShot* const> shots, cons
   Eigen::Matrix<double, Eigen::Dynamic, 7> M(static_cast<Eigen::Index>(rows.size()), 7);
   for (std::size_t i = 0; i < rows.size(); ++i) M.row(static_cast<Eigen::Index>(i)) = rows[i];
   if (!M.allFinite()) return std::nullopt;
-  const Eigen::Matrix<double, 6, 1> solved = M.leftCols<6>().colPivHouseholderQr().solve(M.col(6));
+  const Eigen::Matrix<double, 6, 1> solved = least_squares(M.leftCols<6>(), M.col(6));
   auto beam = beam_of(solved.head<3>(), solved.tail<3>());
   if (beam && estimate_scale) beam->scale = solved.head<3>().norm();
   return beam;

@@ -1,6 +1,7 @@
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <cmath>
+
+#include "alidade/geometry/decompositions.h"
 
 #include "alidade/rangefinder/refine_all.h"
 
@@ -97,9 +98,9 @@ LensPrior lens_prior(const Camera& camera, bool with_distortion) {
   const Eigen::MatrixXd cov = camera.cov(prior.free, prior.free);
   const Eigen::VectorXd sigma = cov.diagonal().cwiseSqrt();
   const Eigen::MatrixXd correlation = sigma.cwiseInverse().asDiagonal() * cov * sigma.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation);
-  const Eigen::VectorXd values = eigen.eigenvalues().cwiseMax(1e-10 * eigen.eigenvalues().maxCoeff());
-  const Eigen::MatrixXd V = sigma.cwiseInverse().asDiagonal() * eigen.eigenvectors();
+  const SymmetricEigen eigen = symmetric_eigen(correlation);
+  const Eigen::VectorXd values = eigen.values.cwiseMax(1e-10 * eigen.values.maxCoeff());
+  const Eigen::MatrixXd V = sigma.cwiseInverse().asDiagonal() * eigen.vectors;
   prior.information = V * values.cwiseInverse().asDiagonal() * V.transpose();
   return prior;
 }

@@ -156,7 +156,7 @@ ProtocolRun run_protocol(const UnderwaterSample& sample, const Camera& camera, c
 
 LocalizationFilterConfig paper_filter() {
   LocalizationFilterConfig config;
-  config.is_sequential = config.finds_consensus = false;
+  config.is_sequential = config.finds_consensus = config.holds_frame = false;
   config.gate = 1e9;
   config.bend_tolerance = 0.0;  // always four steps
   config.state_capacity = 80;

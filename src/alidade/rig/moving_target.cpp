@@ -1,9 +1,9 @@
 #include "alidade/rig/moving_target.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/rig/moving_scale.h"
 #include "alidade/rig/moving_solve.h"
 #include "alidade/rig/moving_start.h"
@@ -261,8 +261,8 @@ bool is_line(const Placing& work) {
       const Eigen::Vector3d ray = at.homogeneous();
       sum += ray * ray.transpose() / static_cast<double>(series.at.size());
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(sum);
-    return series.at.size() >= least_sights && std::sqrt(std::abs(eigen.eigenvalues()[0])) * series.px > most_px;
+    return series.at.size() >= least_sights &&
+           std::sqrt(std::abs(symmetric_eigen3(sum).values[0])) * series.px > most_px;
   });
 }
 

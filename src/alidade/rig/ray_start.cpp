@@ -1,10 +1,11 @@
 #include "alidade/rig/ray_start.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -35,9 +36,7 @@ Eigen::Matrix3d best_rotation(std::span<const SightLine> lines, const Eigen::Mat
     products += to * line.point_in_board.transpose();
   }
   products -= num * to_mean * from_mean.transpose();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(products, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
-  return svd.matrixU() * Eigen::Vector3d(1.0, 1.0, sign).asDiagonal() * svd.matrixV().transpose();
+  return nearest_rotation(products);
 }
 
 double misfit(std::span<const SightLine> lines, const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {

@@ -1,10 +1,11 @@
 #include "alidade/rig/rig_solve.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -218,11 +219,11 @@ std::optional<SolvedRig> solve_rig(const RigProblem& problem, const RigState& st
 
 RigCovariance rig_covariance(const RigProblem& problem, const SolvedRig& solved) {
   const Eigen::MatrixXd S = solved.system.information();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> raw(S);
+  const SymmetricEigen raw = symmetric_eigen(S);
   RigCovariance out;
   // A combination that is not known to 1 rad or 1 m is not known.
-  if (!S.allFinite() || !(raw.eigenvalues()[0] > 1.0)) {
-    out.unknown = names_of(problem, solved.state, raw.eigenvectors().col(0));
+  if (!S.allFinite() || !(raw.values[0] > 1.0)) {
+    out.unknown = names_of(problem, solved.state, raw.vectors.col(0));
     return out;
   }
   out.cov = S.ldlt().solve(Eigen::MatrixXd::Identity(S.rows(), S.cols()));

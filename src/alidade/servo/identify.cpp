@@ -1,10 +1,11 @@
 #include "alidade/servo/identify.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -59,7 +60,7 @@ LinearFit linear_fit(std::span<const ServoSample> log, ServoKind kind, double ta
   const ServoResponse response = servo_response(log, kind, params);
   Eigen::Matrix<double, Eigen::Dynamic, 3> A(readings.size(), 3);  // the response is linear in these three
   A << response.J.col(Param::gain), response.J.col(Param::zero), response.J.col(Param::start);
-  const Eigen::Vector3d best = A.colPivHouseholderQr().solve(readings);
+  const Eigen::Vector3d best = least_squares(A, readings);
   LinearFit fit;
   fit.params << best[0], tau_s, latency_s, best[1], best[2];
   fit.sum2 = (A * best - readings).squaredNorm();

@@ -1,11 +1,11 @@
 #include "alidade/servo/loop_analysis.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/servo/axis_model.h"
 
 namespace alidade {
@@ -33,7 +33,7 @@ std::vector<Complex> poles_of(const ServoPlant& plant, const PiGains& gains) {
   companion.diagonal(-1).setOnes();
   for (Eigen::Index i = 0; i < order; ++i)
     companion(i, order - 1) = -rising[static_cast<std::size_t>(i)] / tau_of(plant);
-  const Eigen::VectorXcd roots = Eigen::EigenSolver<Eigen::MatrixXd>(companion, false).eigenvalues();
+  const Eigen::VectorXcd roots = eigenvalues_of(companion);
   std::vector<Complex> poles(roots.data(), roots.data() + roots.size());
   std::ranges::sort(poles, {}, [](const Complex& pole) { return std::pair(pole.real(), pole.imag()); });
   return poles;
@@ -74,7 +74,7 @@ double sampled_radius(const ServoPlant& plant, const PiGains& gains, double peri
   next(2, 2) += 1.0;
   if (delay_samples > 0) next(3, 0) = -1.0;
   for (Eigen::Index i = 4; i < size; ++i) next(i, i - 1) = 1.0;
-  return Eigen::EigenSolver<Eigen::MatrixXd>(next, false).eigenvalues().cwiseAbs().maxCoeff();
+  return eigenvalues_of(next).cwiseAbs().maxCoeff();
 }
 
 }  // namespace

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <Eigen/Core>
+
+// Eigen's decompositions cost seconds to compile for each size and file: where microseconds do not count, these are
+// theirs for any size, compiled once.
+
+namespace alidade {
+
+/// Of a symmetric matrix (its lower triangle is read): eigenvalues, ascending, and their vectors as columns.
+struct SymmetricEigen {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd vectors;
+};
+[[nodiscard]] SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& symmetric);
+struct SymmetricEigen3 {
+  Eigen::Vector3d values;
+  Eigen::Matrix3d vectors;
+};
+[[nodiscard]] SymmetricEigen3 symmetric_eigen3(const Eigen::Matrix3d& symmetric);
+[[nodiscard]] Eigen::VectorXd symmetric_eigenvalues(const Eigen::MatrixXd& symmetric);
+
+/// M = U diag(values) Vᵀ, values descending; V square, U with as many columns as there are values.
+struct Svd {
+  Eigen::MatrixXd U;
+  Eigen::VectorXd values;
+  Eigen::MatrixXd V;
+};
+[[nodiscard]] Svd svd_of(const Eigen::MatrixXd& M);
+
+/// Eigenvalues of a square matrix, in no order.
+[[nodiscard]] Eigen::VectorXcd eigenvalues_of(const Eigen::MatrixXd& M);
+
+/// The first `num` of orthonormal columns, of which the first span those of A, the rest what is across them.
+[[nodiscard]] Eigen::MatrixXd orthonormal_basis(const Eigen::MatrixXd& A, Eigen::Index num);
+
+/// x of the least |A x − b|, by column-pivoting QR.
+[[nodiscard]] Eigen::VectorXd least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
+
+/// The rotation nearest to a matrix (Frobenius): U diag(1, 1, det UVᵀ) Vᵀ. W. Kabsch, Acta Cryst. A32, 1976.
+[[nodiscard]] Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& M);
+
+}  // namespace alidade

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <vector>
+
+#include "alidade/loop/servo_loop.h"
+#include "alidade/track/track.h"
+
+namespace alidade {
+
+/// Where the target was in space, as `track` tells from what the heads of a run saw of it.
+struct ServoTrack {
+  std::vector<TargetSight> sights;
+  TrueTrack truth;
+  TrackReport report;
+};
+[[nodiscard]] ServoTrack track_of(const ServoScene& scene, const ServoRun& run);
+
+}  // namespace alidade

@@ -87,7 +87,7 @@ struct LocalizeReport {
   std::vector<PathStep> path;  ///< One a frame.
   std::vector<MapPoint> map;   ///< At the end.
   bool scale_known = false;
-  bool has_target = false;   ///< Known points were given.
+  bool has_target = false;  ///< Known points were given.
   bool is_of_pictures = false;
   std::size_t num_lost = 0;  ///< Frames without a pose that sights hold: waiting or predicted.
   std::size_t num_restarts = 0;

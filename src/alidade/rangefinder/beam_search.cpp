@@ -104,17 +104,27 @@ Agreement agreement_of(const Sample& shots, const Beam& beam, const Camera& came
   return found;
 }
 
-/// The beam of those that agree; twice, as they change with it.
-Beam refined_on_agreeing(const BeamProblem& all, const Sample& shots, Beam beam, Agreement& agreement,
-                         const Camera& camera, const OutlierSearch& search) {
+/// Of the shots those that agree are used, the others not; how many are.
+int use_agreeing(const Sample& shots, const Agreement& agreement, const OutlierSearch& search, BeamProblem& problem) {
+  int num = 0;
+  for (PreparedShot& shot : problem.shots) shot.used = false;
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    if (!(agreement.chi2[i] < search.sigmas * search.sigmas * agreement.scale2)) continue;
+    const auto at = std::ranges::find(problem.shots, shots[i]->index, &PreparedShot::index);
+    at->used = true;
+    ++num;
+  }
+  return num;
+}
+
+/// The beam of those that agree; twice, as they change with it. `work`: a copy of the problem, to mark shots in.
+Beam refined_on_agreeing(const Sample& shots, Beam beam, Agreement& agreement, const Camera& camera,
+                         const OutlierSearch& search, BeamProblem& work) {
   for (int pass = 0; pass < 3; ++pass) {
-    BeamProblem agreeing = all;
-    agreeing.shots.clear();
-    for (std::size_t i = 0; i < shots.size(); ++i)
-      if (agreement.chi2[i] < search.sigmas * search.sigmas * agreement.scale2) agreeing.shots.push_back(*shots[i]);
-    const auto solved = solve_beam(agreeing, camera, beam);
+    use_agreeing(shots, agreement, search, work);
+    const auto solved = solve_beam(work, camera, beam);
     if (!solved) break;
-    Agreement better = agreement_of(shots, solved->beam, camera, all.model, search);
+    Agreement better = agreement_of(shots, solved->beam, camera, work.model, search);
     if (!(better.score < agreement.score)) break;
     beam = solved->beam;
     agreement = std::move(better);
@@ -124,23 +134,19 @@ Beam refined_on_agreeing(const BeamProblem& all, const Sample& shots, Beam beam,
 
 /// Where σ is not known, the least median of many samples is too small a scale. From those within 6 of it outwards:
 /// beam and scale of those that agree, then all that agree with these, until no more do.
-Beam grown(const BeamProblem& all, const Sample& shots, Beam beam, Agreement& agreement, const Camera& camera,
-           const OutlierSearch& search) {
-  const double spare = std::max(1.0, static_cast<double>(shots.size()) - all.num_free());
+Beam grown(const Sample& shots, Beam beam, Agreement& agreement, const Camera& camera, const OutlierSearch& search,
+           BeamProblem& work) {
+  const double spare = std::max(1.0, static_cast<double>(shots.size()) - work.num_free());
   agreement.scale2 *= std::pow(1.0 + 5.0 / spare, 2);  // P. J. Rousseeuw & A. M. Leroy, 1987, on small samples
   for (int pass = 0, before = 0; pass < 20; ++pass) {
-    BeamProblem agreeing = all;
-    agreeing.shots.clear();
-    for (std::size_t i = 0; i < shots.size(); ++i)
-      if (agreement.chi2[i] < search.sigmas * search.sigmas * agreement.scale2) agreeing.shots.push_back(*shots[i]);
-    const auto now = static_cast<int>(agreeing.shots.size());
-    const auto solved = now > before ? solve_beam(agreeing, camera, beam) : std::nullopt;
+    const int now = use_agreeing(shots, agreement, search, work);
+    const auto solved = now > before ? solve_beam(work, camera, beam) : std::nullopt;
     if (!solved) break;
     before = now;
     beam = solved->beam;
-    const double dof = solved->normals.num_rows - all.num_free();
+    const double dof = solved->normals.num_rows - work.num_free();
     const double scale2 = std::max(agreement.scale2, solved->normals.cost / std::max(1.0, dof));
-    agreement = agreement_of(shots, beam, camera, all.model, search);
+    agreement = agreement_of(shots, beam, camera, work.model, search);
     agreement.scale2 = scale2;
   }
   return beam;
@@ -186,20 +192,21 @@ std::optional<Beam> find_outliers(BeamProblem& problem, const Camera& camera, co
   const std::size_t size = sample_size(problem);
   if (shots.size() < size) return std::nullopt;
   std::mt19937_64 bits(search.seed);
+  BeamProblem work = problem;
   std::optional<Beam> best;
   Agreement best_agreement;
   for (int draw = 0; draw < search.num_draws; ++draw) {
     for (Beam beam : starts_of(draw_sample(shots, size, bits), problem, camera)) {
       Agreement agreement = agreement_of(shots, beam, camera, problem.model, search);
       if (!(agreement.score < 2.0 * best_agreement.score)) continue;
-      beam = refined_on_agreeing(problem, shots, beam, agreement, camera, search);
+      beam = refined_on_agreeing(shots, beam, agreement, camera, search, work);
       if (!(agreement.score < best_agreement.score)) continue;
       best = beam;
       best_agreement = std::move(agreement);
     }
   }
   if (!best) return std::nullopt;
-  if (!search.knows_sigma) best = grown(problem, shots, *best, best_agreement, camera, search);
+  if (!search.knows_sigma) best = grown(shots, *best, best_agreement, camera, search, work);
   std::vector<std::size_t> wrong;
   for (std::size_t i = 0; i < shots.size(); ++i)
     if (!(best_agreement.chi2[i] < search.sigmas * search.sigmas * best_agreement.scale2))

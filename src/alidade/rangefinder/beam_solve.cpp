@@ -25,7 +25,7 @@ double cost_with(const BeamProblem& problem, const Camera& camera, const Beam& b
 }
 
 std::optional<BeamNormals> normals_and_whiteners(const BeamProblem& problem, const Camera& camera, const Beam& beam,
-                                                 std::vector<Whitener>& whiteners) {
+                                                 std::vector<Whitener>& whiteners, bool with_lens = false) {
   BeamNormals normals;
   whiteners.resize(problem.shots.size());
   for (std::size_t i = 0; i < problem.shots.size(); ++i) {
@@ -39,12 +39,13 @@ std::optional<BeamNormals> normals_and_whiteners(const BeamProblem& problem, con
     const ShotResidual::Rows r = whiteners[i] * residual->r;
     normals.H.noalias() += J.transpose() * J;
     normals.g.noalias() += J.transpose() * r;
+    normals.cost += r.squaredNorm();
+    normals.num_rows += shot.num_rows();
+    if (!with_lens) continue;
     if (normals.H_lens.cols() == 0) normals.H_lens.setZero(num_beam_params, residual->J_lens.cols());
     normals.H_lens.noalias() += J.transpose() * (whiteners[i] * residual->J_lens);
     if (shot.pose && shot.J_pose_lens.cols() > 0)
       normals.H_lens.noalias() += J.transpose() * (whiteners[i] * (residual->J_pose * shot.J_pose_lens));
-    normals.cost += r.squaredNorm();
-    normals.num_rows += shot.num_rows();
   }
   return normals;
 }
@@ -53,7 +54,7 @@ std::optional<BeamNormals> normals_and_whiteners(const BeamProblem& problem, con
 
 std::optional<BeamNormals> beam_normals(const BeamProblem& problem, const Camera& camera, const Beam& beam) {
   std::vector<Whitener> whiteners;
-  return normals_and_whiteners(problem, camera, beam, whiteners);
+  return normals_and_whiteners(problem, camera, beam, whiteners, true);
 }
 
 std::optional<BeamSolution> solve_beam(const BeamProblem& problem, const Camera& camera, const Beam& start) {

@@ -24,7 +24,8 @@ struct BeamProblem {
 struct BeamNormals {
   BeamMatrix H = BeamMatrix::Zero();
   BeamVector g = BeamVector::Zero();
-  Eigen::Matrix<double, num_beam_params, Eigen::Dynamic> H_lens;  ///< Jᵀ W J_lens, poses following the lens.
+  /// Jᵀ W J_lens, poses following the lens; of beam_normals() alone, not of a solution.
+  Eigen::Matrix<double, num_beam_params, Eigen::Dynamic> H_lens;
   double cost = 0.0;
   int num_rows = 0;
 };

@@ -77,10 +77,11 @@ std::optional<BeamFit> search_beam(Preparation& ready, const Camera& camera, con
         estimate_noise(problem, camera, fit->best.beam, !ready.knows_spot_sigma, !ready.knows_range_sigma);
     if (!ready.knows_range_sigma)
       problem.model.noise.sigma_m = std::max(problem.model.noise.sigma_m, ready.least_sigma_range_m);
-    fit = best_beam(problem, camera, fit->best.beam);
-    if (change < 1e-3) break;
+    auto solved = solve_beam(problem, camera, fit->best.beam);
+    if (solved) fit->best = std::move(*solved);
+    if (change < 1e-3 || !solved) break;
   }
-  return fit;
+  return fit && !knows_sigma ? best_beam(problem, camera, fit->best.beam) : fit;
 }
 
 /// Covariance of a beam whose lens and poses were held: the lens' own is carried through (G = ∂beam/∂lens).
@@ -90,8 +91,9 @@ void carry_lens(const BeamProblem& problem, const BeamSolution& solution, const 
   beam.cov.setZero();
   beam.cov.topLeftCorner(p, p) = H.solve(Eigen::MatrixXd::Identity(p, p));
   const Eigen::Index num_lens = camera.cov.rows();
-  if (num_lens == 0 || solution.normals.H_lens.cols() != num_lens || !camera.cov.allFinite()) return;
-  const Eigen::MatrixXd G = -H.solve(solution.normals.H_lens.topRows(p));
+  const auto normals = beam_normals(problem, camera, solution.beam);
+  if (num_lens == 0 || !normals || normals->H_lens.cols() != num_lens || !camera.cov.allFinite()) return;
+  const Eigen::MatrixXd G = -H.solve(normals->H_lens.topRows(p));
   beam.cov.topLeftCorner(p, p) += G * camera.cov * G.transpose();
   beam.cov_with_lens.setZero(num_beam_params, num_lens);
   beam.cov_with_lens.topRows(p) = G * camera.cov;

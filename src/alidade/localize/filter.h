@@ -27,6 +27,9 @@ struct LocalizationFilterConfig {
   /// No sight tells how the world is turned, and so the covariance says: world_turn.h. False: as in the literature
   /// before 2001, more certain with every frame.
   bool holds_frame = true;
+  /// Errors that turn with the world are straight for small turns only: an update by a larger one holds the frame by
+  /// its derivatives alone. See world_turn.h.
+  double most_turn_rad = 0.02;
   double linear_below = 0.1;     ///< Linearity index below which an inverse depth becomes a place.
   std::vector<int> lens_params;  ///< Places of the lens's parameters that are in the state, and their σ at the start.
   std::vector<double> sigma_lens_params;

@@ -95,8 +95,9 @@ TEST(LocalizationFilter, UpdateIsTheDenseKalmanUpdate) {
   config.finds_consensus = false;
   for (const bool is_sequential : {true, false}) {
     config.is_sequential = is_sequential;
-    LocalizationFilter filter(sample.camera, CameraMotion{sample.truth[0].world_from_cam, {}, {}},
-                              1e-8 * MotionMatrix::Identity(), config);
+    CameraMotion still;
+    still.world_from_cam = sample.truth[0].world_from_cam;
+    LocalizationFilter filter(sample.camera, still, 1e-8 * MotionMatrix::Identity(), config);
     for (const KnownPoint& point : sample.config.target) filter.add_known(point.id, sample.points.at(point.id), 1e-4);
     const Eigen::MatrixXd P = covariance_of(filter);
     Eigen::MatrixXd H = Eigen::MatrixXd::Zero(8, filter.dim());

@@ -283,13 +283,10 @@ double LocalizationFilter::best_attempt() {
 }
 
 SightsReport LocalizationFilter::update(std::span<const FeatureSight> sights) {
-  // Errors that turn with the world are straight only for small turns: over a large one, as at a start or after a gap,
-  // a camera that turns in place would have to move.
-  constexpr double most_turn_rad = 0.02;
   turns_world_ = config_.holds_frame;
   collect(sights);
   double cost = best_attempt();
-  if (turns_world_ && !(delta_.segment<3>(3).norm() < most_turn_rad)) {
+  if (turns_world_ && !(delta_.segment<3>(3).norm() < config_.most_turn_rad)) {
     turns_world_ = false;
     cost = best_attempt();
   }

@@ -19,6 +19,10 @@ ImageLocalizer::ImageLocalizer(const Camera& camera, const LocalizeImagesConfig&
     : camera_(camera), config_(config), filter_config_(config.localize.filter) {
   constexpr double few_doubtful = 0.1;  // the gates alone keep them out; a consensus costs as much as the update
   if (!(filter_config_.sigma_new_px > 0.0)) filter_config_.sigma_new_px = config.eyes.sigma_floor_px;
+  // Many matches settle the first frames' poses: errors may turn with the world there too, and must not bend to one
+  // side.
+  filter_config_.most_turn_rad = std::max(filter_config_.most_turn_rad, 0.05);
+  filter_config_.bend_tolerance = std::min(filter_config_.bend_tolerance, 0.001);
   filter_config_.consensus_above = std::max(filter_config_.consensus_above, few_doubtful);
   const std::size_t num_known = config.target ? config.target->points.size() : 0;
   const std::size_t need =

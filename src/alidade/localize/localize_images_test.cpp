@@ -77,22 +77,29 @@ TEST(LocalizeImages, FollowsARoomWithoutLosingAFrame) {
 }
 
 TEST(LocalizeImages, MismatchesOfFortyPercentChangeLittle) {
-  const double clean_m = localized(usual_room(), by_hand()).error.ate_m;
-  double sum2 = 0.0;
-  constexpr int num_draws = 6;
-  for (std::uint64_t seed = 1; seed <= num_draws; ++seed) {
-    LocalizeImagesConfig config = by_hand();
-    Draws draws(seed);
-    config.disturb = [&](long, std::vector<FeatureSight>& sights) {
-      for (FeatureSight& sight : sights)
-        if (draws.uniform() < 0.4) sight.px += 20.0 * Eigen::Vector2d(draws.uniform(-1, 1), draws.uniform(-1, 1));
-    };
-    const LocalizeReport disturbed = localized(usual_room(), config);
-    EXPECT_EQ(disturbed.num_lost, 0u) << seed;
-    EXPECT_GT(disturbed.num_gated, disturbed.num_used / 4) << seed;
-    sum2 += disturbed.error.ate_m * disturbed.error.ate_m / num_draws;
+  double clean2 = 0.0, disturbed2 = 0.0;
+  constexpr int num_draws = 2;
+  for (const double amplitude : {1.0, 1.4, 1.8}) {
+    RoomScene scene;
+    scene.camera = room_camera();
+    scene.amplitude = amplitude;
+    const RoomVideo video = amplitude == 1.0 ? usual_room() : room_video(scene);
+    clean2 += std::pow(localized(video, by_hand()).error.ate_m, 2);
+    for (std::uint64_t seed = 1; seed <= num_draws; ++seed) {
+      LocalizeImagesConfig config = by_hand();
+      Draws draws(seed);
+      config.disturb = [&](long, std::vector<FeatureSight>& sights) {
+        for (FeatureSight& sight : sights)
+          if (draws.uniform() < 0.4) sight.px += 20.0 * Eigen::Vector2d(draws.uniform(-1, 1), draws.uniform(-1, 1));
+      };
+      const LocalizeReport disturbed = localized(video, config);
+      EXPECT_EQ(disturbed.num_lost, 0u) << amplitude << ' ' << seed;
+      EXPECT_GT(disturbed.num_gated, disturbed.num_used / 4) << amplitude << ' ' << seed;
+      disturbed2 += std::pow(disturbed.error.ate_m, 2) / num_draws;
+    }
   }
-  EXPECT_LT(std::sqrt(sum2), 1.2 * clean_m);  // the goal is 1.1; one draw scatters by a quarter, six by a tenth
+  // The goal is 1.1; one draw scatters by a quarter, six by a tenth. As many sights less, and none wrong, cost 1.08.
+  EXPECT_LT(std::sqrt(disturbed2 / clean2), 1.2);
 }
 
 TEST(LocalizeImages, ASecondOfDarknessIsRecoveredWithinTenFrames) {

@@ -24,6 +24,8 @@ inline LocalizationFilterConfig desk_filter() {
   config.sigma_a_m_s2 = 4.0;
   config.sigma_alpha_rad_s2 = 6.0;
   config.consensus_above = 0.1;
+  config.most_turn_rad = 0.05;
+  config.bend_tolerance = 0.001;
   config.state_capacity = 760;
   config.sights_capacity = 80;
   return config;

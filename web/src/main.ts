@@ -15,50 +15,74 @@ import {listenToPrinting} from './page/print';
 import {provenance} from './page/provenance';
 import {dataSection} from './page/tables';
 
-function drawFigures(figures: Figure[], doc: Doc, selection: Selection, host: HTMLElement) {
-  const cards: Card[] = [], leftOut: string[] = [], failed: string[] = [];
-  for (const figure of figures) {
-    try {
-      const card = makeCard(figure, doc, selection, host);
-      if (card) cards.push(card);
-      else leftOut.push(figure.title);
-    } catch (error) {
-      // One figure must not take the page with it; what failed is said below, and in the console.
-      host.querySelector(`#fig-${figure.id}`)?.remove();
-      failed.push(figure.title);
-      console.error(`figure ${figure.id}:`, error);
-    }
-  }
-  return {cards, leftOut, failed};
+interface Drawn {
+  cards: Card[];
+  leftOut: string[];
+  failed: string[];
 }
 
-function showReport(doc: Doc, host: HTMLElement): void {
-  const main = el('main'), selection = new Selection();
-  host.append(main);
-  const {cards, leftOut, failed} = drawFigures(figuresOf(doc), doc, selection, main);
-  host.prepend(header(doc, new Set(cards.map((card) => card.figure.id))));
-  const below = el('div', {class: 'below'},
+function drawFigure(figure: Figure, doc: Doc, selection: Selection, host: HTMLElement, drawn: Drawn): void {
+  try {
+    const card = makeCard(figure, doc, selection, host);
+    if (card) drawn.cards.push(card);
+    else drawn.leftOut.push(figure.title);
+  } catch (error) {
+    // One figure must not take the page with it; what failed is said below, and in the console.
+    host.querySelector(`#fig-${figure.id}`)?.remove();
+    drawn.failed.push(figure.title);
+    console.error(`figure ${figure.id}:`, error);
+  }
+}
+
+const mostAtOnce_ms = 600; // of drawing, before the browser may show what stands and listen to its user
+
+/** One by one, and between them the browser shows what there is: the answer is read while the rest is drawn. */
+async function drawFigures(figures: Figure[], draw: (figure: Figure) => void): Promise<void> {
+  let begun = performance.now();
+  for (const figure of figures) {
+    draw(figure);
+    if (performance.now() - begun < mostAtOnce_ms) continue;
+    await new Promise((shown) => {
+      requestAnimationFrame(() => setTimeout(shown));
+      setTimeout(shown, 200); // a page in the background has no frames
+    });
+    begun = performance.now();
+  }
+}
+
+function showBelow(doc: Doc, {leftOut, failed}: Drawn, host: HTMLElement): void {
+  host.append(el('div', {class: 'below'},
     failed.length > 0 ? el('p', {class: 'left-out', 'data-failed': failed.length}, `Could not be drawn: ${failed.join(' · ')}`) : null,
     leftOut.length > 0 ? el('p', {class: 'left-out'}, `Left out, as this run has no data for them: ${leftOut.join(' · ')}`) : null,
-    dataSection(doc), provenance(doc));
-  host.append(below);
-  listenToKeys(doc, selection, cards);
-  // For tests: where marks lie.
-  (window as unknown as Record<string, unknown>)['alidade'] = {doc, selection, cards, charts, views3};
+    dataSection(doc), provenance(doc)));
 }
 
-function start(): void {
+async function showReport(doc: Doc, host: HTMLElement): Promise<void> {
+  const main = el('main'), selection = new Selection(), drawn: Drawn = {cards: [], leftOut: [], failed: []};
+  const top = header(doc, new Set());
+  host.append(top, main);
+  // For tests: where marks lie.
+  (window as unknown as Record<string, unknown>)['alidade'] = {doc, selection, cards: drawn.cards, charts, views3};
+  await drawFigures(figuresOf(doc), (figure) => drawFigure(figure, doc, selection, main, drawn));
+  top.replaceWith(header(doc, new Set(drawn.cards.map((card) => card.figure.id)))); // checks lead to figures now
+  showBelow(doc, drawn, host);
+  listenToKeys(doc, selection, drawn.cards);
+}
+
+const documentIsRead = new Promise<void>((read) => {
+  if (document.readyState === 'loading') addEventListener('DOMContentLoaded', () => read());
+  else read();
+});
+
+async function start(): Promise<void> {
   const doc = readDocument(document.getElementById('result')?.textContent ?? '');
   const host = document.getElementById('page')!;
+  void documentIsRead.then(findPictures);
   listenToPrinting();
-  if (isLive(doc)) showLive(doc, host, (result) => showReport(result, host));
-  else showReport(doc, host);
-  const whole = () => {
-    findPictures();
-    document.documentElement.dataset['ready'] = '1';
-  };
-  if (document.readyState === 'loading') addEventListener('DOMContentLoaded', whole);
-  else whole();
+  if (isLive(doc)) showLive(doc, host, (result) => void showReport(result, host));
+  else await showReport(doc, host);
+  await documentIsRead;
+  document.documentElement.dataset['ready'] = '1';
 }
 
-start();
+void start();

@@ -1,5 +1,6 @@
 // The report pages in a real browser: node run.mjs TEMPLATE [ALIDADE]. Exit code 77: skipped, there is no browser.
 import {existsSync, readFileSync, rmSync} from 'node:fs';
+import {resolve} from 'node:path';
 import {pathToFileURL} from 'node:url';
 import {calibrateDocument, localizeDocument, reproduceDocument, servoDocument} from './documents.mjs';
 import {chromiumPath, folder, hasBrowser, launch, opened, pageFile} from './page.mjs';
@@ -8,7 +9,8 @@ import * as behaviour from './behaviour.mjs';
 import * as live from './live.mjs';
 import * as trouble from './trouble.mjs';
 
-const [templateFile, alidade, only] = process.argv.slice(2); // only: tests whose names hold this
+const [templateFile, givenAlidade, only] = process.argv.slice(2); // only: tests whose names hold this
+const alidade = givenAlidade && resolve(givenAlidade); // it is run in other folders
 if (!hasBrowser()) {
   console.log(`web: skipped, there is no ${chromiumPath} (CHROMIUM names another)`);
   process.exit(77);

@@ -4,7 +4,7 @@ import {Chart, type ChartLook, type Pen} from './chart';
 import {num} from './format';
 import {cssOf, dispose, glRenderer, Orbit, sceneOf} from './gl';
 import {drawFlat} from './flat';
-import {imageOf} from './images';
+import {imageOf, whenPicturesAreHere} from './images';
 import type {V3} from './rigid';
 import {roundDown125} from './stats';
 import {ballOf, World, type Touch} from './world';
@@ -47,7 +47,8 @@ export class View3 {
     this.chart.box.classList.add('view3');
     new IntersectionObserver((entries) => {
       if (!entries.some((entry) => entry.isIntersecting) || this.isNear) return;
-      requestAnimationFrame(() => setTimeout(() => this.wake()));
+      // Behind what is read first, and once for all: pictures may lie in it.
+      whenPicturesAreHere(() => requestAnimationFrame(() => setTimeout(() => this.wake())));
     }, {rootMargin: '300px'}).observe(this.chart.box);
     if (!this.isFlat) this.listen();
     views3.add(this);

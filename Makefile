@@ -36,6 +36,7 @@ test:
 	@ninja -C $(out) $(jobs)
 	@echo "test: running them"
 	@ctest --test-dir $(out) --output-on-failure --parallel $$(nproc)
+	@tools/skipped_tests $(out)
 
 bench:
 	@tools/setup build bench

@@ -11,6 +11,7 @@
 #include "alidade/io/localize_document.h"
 #include "alidade/io/localize_file.h"
 #include "alidade/io/photos.h"
+#include "alidade/io/seen_frames.h"
 #include "alidade/live/foxglove.h"
 #include "alidade/live/rate_limit.h"
 #include "alidade/live/streams.h"
@@ -142,7 +143,7 @@ void show_picture(live::Server& server, double t_s, const cv::Mat& picture, std:
 }
 
 LocalizeReport localize_pictures(const LocalizeArgs& args, const Camera& camera, const LocalizeConfig& localize,
-                                 std::span<const TimedPose> truth, LiveRun& live) {
+                                 std::span<const TimedPose> truth, LiveRun& live, Run& run) {
   LocalizeImagesConfig config;
   config.localize = localize;
   if (!args.target.empty()) config.target = read_image_target(args.target);
@@ -154,11 +155,16 @@ LocalizeReport localize_pictures(const LocalizeArgs& args, const Camera& camera,
     return is_there;
   };
   live::RateLimit limit(10.0);
-  if (live.server() != nullptr)
-    config.watch = [&](long, const cv::Mat& picture, std::span<const SightTried> tried) {
-      if (limit.lets_through(now_s())) show_picture(*live.server(), picture_s, picture, tried);
-    };
-  return localize_images(camera, next, pictures.num_pictures(), config, truth, live.progress());
+  SeenFrames seen(pictures.num_pictures());
+  config.watch = [&](long, const cv::Mat& picture, std::span<const SightTried> tried) {
+    if (!run.options.no_report) seen.offer(picture_s, picture, tried);
+    if (live.server() != nullptr && limit.lets_through(now_s()))
+      show_picture(*live.server(), picture_s, picture, tried);
+  };
+  LocalizeReport report = localize_images(camera, next, pictures.num_pictures(), config, truth, live.progress());
+  seen.fill(run.document);
+  for (const auto& [name, jpeg] : seen.pictures()) run.add_picture(name, jpeg);
+  return report;
 }
 
 LocalizeReport localized(const LocalizeArgs& args, const Camera& camera, LocalizeConfig config,
@@ -173,7 +179,7 @@ LocalizeReport localized(const LocalizeArgs& args, const Camera& camera, Localiz
     };
   }
   LocalizeReport report = ImageSequence::is_pictures(args.sequence)
-                              ? localize_pictures(args, camera, config, truth, live)
+                              ? localize_pictures(args, camera, config, truth, live, run)
                               : localize_table(args, camera, config, truth, live, run);
   if (live.server() != nullptr && !report.path.empty()) stream.show(*live.server(), report.path.back(), true);
   return report;

@@ -10,7 +10,7 @@ const expected = {
   rig: ['estimate', 'space', 'coverage', 'residuals', 'view', 'unknown'],
   track: ['path', 'position', 'error', 'innovations', 'estimate', 'above', 'age'],
   servo: ['error', 'picture', 'angles', 'compare', 'robust', 'loops'],
-  localize: ['path', 'error', 'tracks', 'nis', 'speed', 'estimate'],
+  localize: ['path', 'error', 'frame', 'tracks', 'nis', 'speed', 'estimate'],
   reproduce: ['experiments', 'paper-4', 'methods'],
 };
 

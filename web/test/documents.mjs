@@ -55,7 +55,14 @@ export function localizeDocument() {
   for (const name of ['xx', 'yy', 'zz']) features[`cov_${name}_m2`] = points.map(() => (name === 'zz' ? 4e-4 : 1e-4));
   for (const name of ['xy', 'xz', 'yz']) features[`cov_${name}_m2`] = points.map(() => 0);
   Object.assign(features, {num_seen: range(40, () => 200), known: range(40, (i) => i < 4)});
-  return base('localize', {estimate: {frames: rows, lost: 0, ate_m: 0.0062, rpe_m: 0.0041, alignment: 'SE(3)', nis_per_dof: 1.0, scale_known: true}, data: {path, features}});
+  const kept = range(12, (i) => i * 25), frames = {t_s: kept.map((i) => round(i / 30)), name: kept.map((i) => `frame ${i}`), width_px: kept.map(() => 640), height_px: kept.map(() => 480)};
+  const sights = {frame: [], id: [], expected_u_px: [], expected_v_px: [], cov_uu_px2: [], cov_uv_px2: [], cov_vv_px2: [], u_px: [], v_px: [], used: []};
+  for (let f = 0; f < 12; ++f)
+    for (let i = 0; i < 20; ++i) {
+      const u = 640 * next(), v = 480 * next(), isFound = i % 7 !== 6, values = [f, i, round(u), round(v), 4, 1, 2, isFound ? round(u + 2 * normal()) : null, isFound ? round(v + 1.4 * normal()) : null, isFound && i % 5 !== 4];
+      Object.keys(sights).forEach((column, k) => sights[column].push(values[k]));
+    }
+  return base('localize', {estimate: {frames: rows, lost: 0, ate_m: 0.0062, rpe_m: 0.0041, alignment: 'SE(3)', nis_per_dof: 1.0, scale_known: true}, data: {path, features, frames, sights}});
 }
 
 export function reproduceDocument() {
@@ -86,6 +93,7 @@ export function calibrateDocument(numPhotos, name = (k) => `photo_${String(k).pa
     photos.rms_px.push(isUsed ? round(Math.sqrt(squares / (cols * rows))) : null);
     const q = [x, y, z, 0, Math.sin(tilt / 2), 0, Math.cos(tilt / 2)];
     ['x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw'].forEach((part, i) => photos[`cam_from_board_${part}`].push(isUsed ? round(q[i]) : null));
+    ['xx', 'xy', 'xz', 'yy', 'yz', 'zz'].forEach((part, i) => (photos[`cov_middle_${part}_m2`] ??= []).push(isUsed ? [1e-8, 0, 0, 1e-8, 0, 4e-7 * z][i] : null));
   }
   const gridOf = (nx, ny, f_) => ({cols: nx, rows: ny, u0_px: 0, v0_px: 0, du_px: (width - 1) / (nx - 1), dv_px: (height - 1) / (ny - 1), ...f_(range(nx * ny, (i) => Math.hypot((i % nx) / (nx - 1) - 0.5, Math.floor(i / nx) / (ny - 1) - 0.5)))});
   const sigma = (far) => ({sigma_px: far.map((r) => round(0.03 * Math.exp(6 * r * r)))});

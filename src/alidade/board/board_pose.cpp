@@ -1,6 +1,5 @@
 #include "alidade/board/board_pose.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <vector>
 
@@ -76,7 +75,7 @@ Rigid3 mirrored(const Rigid3& cam_from_board, const Eigen::Vector3d& middle_in_b
   const Eigen::Vector3d view = middle_in_cam.normalized();
   const Eigen::Vector3d normal = cam_from_board.rotation * Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d wanted = 2.0 * view.dot(normal) * view - normal;
-  const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(normal, wanted);
+  const Eigen::Quaterniond turn = rotation_between(normal, wanted);
   const Eigen::Quaterniond rotation = (turn * cam_from_board.rotation).normalized();
   return {rotation, middle_in_cam - rotation * middle_in_board};
 }
@@ -97,7 +96,7 @@ std::optional<Refined> refined(const Camera& camera, Rigid3 cam_from_board, cons
     const Vector6 g = now->J_pose.transpose() * now->r;
     Matrix6 damped = H;
     damped.diagonal() *= 1.0 + damping;
-    const Vector6 step = -damped.ldlt().solve(g);
+    const Vector6 step = -solve_symmetric(damped, g);
     if (!step.allFinite()) return std::nullopt;
     // A step of 10⁻⁶ σ changes nothing that could be measured.
     const bool is_small = step.dot(H * step) < 1e-12 * (1.0 + now->r.squaredNorm() * 1e-6);
@@ -116,12 +115,12 @@ std::optional<Refined> refined(const Camera& camera, Rigid3 cam_from_board, cons
 }
 
 BoardPoseFit fit_at(const Refined& at) {
-  const Eigen::LDLT<Matrix6> H(at.residuals.J_pose.transpose() * at.residuals.J_pose);
+  const Ldlt H(at.residuals.J_pose.transpose() * at.residuals.J_pose);
   BoardPoseFit fit;
-  fit.pose = {at.cam_from_board, H.solve(Matrix6::Identity())};
+  fit.pose = {at.cam_from_board, H.inverse()};
   fit.chi2 = at.residuals.r.squaredNorm();
   fit.dof = static_cast<int>(at.residuals.r.size()) - 6;
-  fit.J_pose_lens = -H.solve(at.residuals.J_pose.transpose() * at.residuals.J_lens);
+  fit.J_pose_lens = -H.solve_each(at.residuals.J_pose.transpose() * at.residuals.J_lens);
   return fit;
 }
 

@@ -7,6 +7,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "alidade/calibrate/setup.h"
+#include "alidade/geometry/decompositions.h"
 #include "alidade/simulate/board_photos.h"
 
 namespace alidade {
@@ -45,7 +46,7 @@ double mahalanobis2(const Camera& found, const Camera& truth, const std::vector<
       cov(i, j) = found.cov(free[static_cast<std::size_t>(i)], free[static_cast<std::size_t>(j)]);
     }
   }
-  return error.dot(cov.ldlt().solve(error));
+  return squared_mahalanobis(error, cov);
 }
 
 std::vector<int> all_but_skew(const Camera& camera) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "alidade/camera/implied_motion.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -70,7 +71,7 @@ Rigid3 motion_step(const Seen& seen, const std::vector<Eigen::Vector2d>& pixels,
     H.noalias() += weights[i] * J.transpose() * J;
     g.noalias() += weights[i] * J.transpose() * (seen[i]->projection.px - pixels[i]);
   }
-  const Eigen::VectorXd step = -H.completeOrthogonalDecomposition().solve(g);
+  const Eigen::VectorXd step = -minimum_norm_solution(H, g);
   Rigid3 b_from_b{exp_so3(step.tail<3>()), Eigen::Vector3d::Zero()};
   if (range_m > 0.0) b_from_b.translation = range_m * step.head<3>();
   return b_from_b;

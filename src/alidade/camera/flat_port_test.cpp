@@ -13,6 +13,7 @@
 #include <numbers>
 
 #include "alidade/camera/camera.h"
+#include "alidade/geometry/so3.h"
 #include "alidade/testing/random.h"
 
 namespace alidade {
@@ -103,7 +104,7 @@ TEST(FlatPort, DerivativesMatchCentralDifferences) {
   for (const double max_angle_rad : {0.0, 1e-9, 1e-4, 0.5}) {
     for (int draw = 0; draw < 200; ++draw) {
       Eigen::Vector3d point_in_cam = random_point(rng, max_angle_rad);
-      if (draw % 2 == 0) point_in_cam = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), n) * point_in_cam;
+      if (draw % 2 == 0) point_in_cam = rotation_between(Eigen::Vector3d::UnitZ(), n) * point_in_cam;
       const auto at = FlatPort::project_with_jacobians(params, point_in_cam);
       ASSERT_TRUE(at);
       EXPECT_EQ(at->px, *FlatPort::project(params, point_in_cam));

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "alidade/camera/projection_sigma.h"
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -83,7 +84,7 @@ std::optional<Fit> fit_brown(Fit fit, const std::vector<Sight>& sights) {
   for (int i = 0; i < max_iterations && lambda < 1e9; ++i) {
     Eigen::Matrix<double, num_free, num_free> H = eq.H;
     H.diagonal() *= 1.0 + lambda;
-    const Step step = -H.ldlt().solve(eq.gradient);
+    const Step step = -solve_symmetric(H, eq.gradient);
     const Fit next = fit.moved(step);
     const Equations trial = linearize(next, sights);
     if (!step.allFinite() || !(trial.cost <= eq.cost)) {

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "alidade/camera/implied_motion.h"
+#include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/so3.h"
 
 namespace alidade {
@@ -64,7 +65,7 @@ std::vector<Eigen::Matrix2d> implied_covariance(const Eigen::MatrixXd& cov,
     B.noalias() += weights[i] * J_motion[i].transpose() * seen[i]->projection.J_px_params;
   }
   // The least-norm answer where the grid does not tell the motion (a very narrow picture).
-  const Eigen::MatrixXd K = -A.completeOrthogonalDecomposition().solve(B);
+  const Eigen::MatrixXd K = -minimum_norm_solution(A, B);
   std::vector<Eigen::Matrix2d> covariances(seen.size(), Eigen::Matrix2d::Zero());
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (!seen[i]) continue;

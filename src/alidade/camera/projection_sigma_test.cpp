@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/rigid3.h"
 #include "alidade/testing/random.h"
 
@@ -37,9 +38,9 @@ Camera simulated_calibration(const Lens& lens, double spread) {
     }
     const Eigen::Index n = num_params;
     information += H.topLeftCorner(n, n) -
-                   H.topRightCorner(n, 6) * H.bottomRightCorner(6, 6).ldlt().solve(H.bottomLeftCorner(6, n));
+                   H.topRightCorner(n, 6) * Ldlt(H.bottomRightCorner(6, 6)).solve_each(H.bottomLeftCorner(6, n));
   }
-  camera.cov = information.ldlt().solve(Eigen::MatrixXd::Identity(num_params, num_params));
+  camera.cov = inverse_symmetric(information);
   return camera;
 }
 
@@ -72,7 +73,7 @@ std::vector<Eigen::Vector2d> drawn_shift(const Camera& drawn, const std::vector<
       g += weights[i] * J.transpose() * shift[i];
     }
     if (!with_translation) H.topLeftCorner<3, 3>().setIdentity();
-    drawn_from_cam = drawn_from_cam.retract(-H.ldlt().solve(g));
+    drawn_from_cam = drawn_from_cam.retract(-solve_symmetric(H, g));
   }
   return shift;
 }
@@ -102,7 +103,7 @@ std::vector<double> scatter(const Camera& camera, const PixelGrid& grid, double 
       for (std::size_t i = 0; i < shift.size(); ++i) sums[i] += shift[i] * shift[i].transpose() / num_draws;
     }
     for (std::size_t i = 0; i < sums.size(); ++i) {
-      sigmas[i] = std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(sums[i]).eigenvalues()[1]);
+      sigmas[i] = std::sqrt(symmetric_eigenvalues(sums[i])[1]);
       weights[i] = 1.0 / (sigmas[i] * sigmas[i]);
     }
   }

@@ -38,6 +38,30 @@ Eigen::VectorXd least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b
   return Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(A).solve(b);
 }
 
+Eigen::MatrixXd minimum_norm_solution(const Eigen::Ref<const Eigen::MatrixXd>& A,
+                                      const Eigen::Ref<const Eigen::MatrixXd>& B) {
+  return Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>(A).solve(B);
+}
+
+Ldlt::Ldlt(const Eigen::Ref<const Eigen::MatrixXd>& symmetric) : ldlt_(symmetric) {}
+bool Ldlt::is_positive() const { return ldlt_.info() == Eigen::Success && ldlt_.isPositive(); }
+Eigen::VectorXd Ldlt::pivots() const { return ldlt_.vectorD(); }
+Eigen::VectorXd Ldlt::solve(const Eigen::Ref<const Eigen::VectorXd>& b) const { return ldlt_.solve(b); }
+Eigen::MatrixXd Ldlt::solve_each(const Eigen::Ref<const Eigen::MatrixXd>& B) const { return ldlt_.solve(B); }
+Eigen::MatrixXd Ldlt::inverse() const { return ldlt_.solve(Eigen::MatrixXd::Identity(ldlt_.rows(), ldlt_.cols())); }
+
+Eigen::VectorXd solve_symmetric(const Eigen::Ref<const Eigen::MatrixXd>& A,
+                                const Eigen::Ref<const Eigen::VectorXd>& b) {
+  return Ldlt(A).solve(b);
+}
+
+Eigen::MatrixXd inverse_symmetric(const Eigen::Ref<const Eigen::MatrixXd>& A) { return Ldlt(A).inverse(); }
+
+double squared_mahalanobis(const Eigen::Ref<const Eigen::VectorXd>& error,
+                           const Eigen::Ref<const Eigen::MatrixXd>& cov) {
+  return error.dot(Ldlt(cov).solve(error));
+}
+
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& M) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double mirror = svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0 ? -1.0 : 1.0;

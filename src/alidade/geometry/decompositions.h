@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 // Eigen's decompositions cost seconds to compile for each size and file: where microseconds do not count, these are
@@ -36,6 +37,31 @@ struct Svd {
 
 /// x of the least |A x − b|, by column-pivoting QR.
 [[nodiscard]] Eigen::VectorXd least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
+
+/// The same for any rank, each column of B for itself: of the x that reach it, the shortest.
+[[nodiscard]] Eigen::MatrixXd minimum_norm_solution(const Eigen::Ref<const Eigen::MatrixXd>& A,
+                                                    const Eigen::Ref<const Eigen::MatrixXd>& B);
+
+/// L D Lᵀ of a symmetric matrix; its lower triangle is read.
+class Ldlt {
+ public:
+  Ldlt() = default;  ///< Of nothing yet.
+  explicit Ldlt(const Eigen::Ref<const Eigen::MatrixXd>& symmetric);
+  [[nodiscard]] bool is_positive() const;
+  [[nodiscard]] Eigen::VectorXd pivots() const;  ///< D.
+  [[nodiscard]] Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd>& b) const;
+  [[nodiscard]] Eigen::MatrixXd solve_each(const Eigen::Ref<const Eigen::MatrixXd>& B) const;  ///< Column by column.
+  [[nodiscard]] Eigen::MatrixXd inverse() const;
+
+ private:
+  Eigen::LDLT<Eigen::MatrixXd> ldlt_;
+};
+[[nodiscard]] Eigen::VectorXd solve_symmetric(const Eigen::Ref<const Eigen::MatrixXd>& A,
+                                              const Eigen::Ref<const Eigen::VectorXd>& b);
+[[nodiscard]] Eigen::MatrixXd inverse_symmetric(const Eigen::Ref<const Eigen::MatrixXd>& A);
+/// eᵀ Σ⁻¹ e.
+[[nodiscard]] double squared_mahalanobis(const Eigen::Ref<const Eigen::VectorXd>& error,
+                                         const Eigen::Ref<const Eigen::MatrixXd>& cov);
 
 /// The rotation nearest to a matrix (Frobenius): U diag(1, 1, det UVᵀ) Vᵀ. W. Kabsch, Acta Cryst. A32, 1976.
 [[nodiscard]] Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& M);

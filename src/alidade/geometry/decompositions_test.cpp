@@ -42,6 +42,30 @@ TEST(Decompositions, AreWhatTheySay) {
   EXPECT_LT((A.transpose() * (A * x - b)).norm(), 1e-12);
 }
 
+TEST(Decompositions, SolveWhatTheySay) {
+  auto rng = testing::make_rng();
+  const Eigen::MatrixXd A = drawn(rng, 9, 4), S = A.transpose() * A, B = drawn(rng, 4, 3);
+  const Eigen::VectorXd b = B.col(0);
+  const Ldlt ldlt(S);
+  EXPECT_TRUE(ldlt.is_positive());
+  EXPECT_LT((S * ldlt.solve(b) - b).norm(), 1e-12);
+  EXPECT_LT((S * ldlt.solve_each(B) - B).norm(), 1e-12);
+  EXPECT_LT((S * ldlt.inverse() - Eigen::MatrixXd::Identity(4, 4)).norm(), 1e-12);
+  EXPECT_NEAR(ldlt.pivots().prod(), S.determinant(), 1e-10 * S.determinant());
+  EXPECT_LT((S * solve_symmetric(S, b) - b).norm(), 1e-12);
+  EXPECT_LT((S * inverse_symmetric(S) - Eigen::MatrixXd::Identity(4, 4)).norm(), 1e-12);
+  EXPECT_NEAR(squared_mahalanobis(S * b, S), b.dot(S * b), 1e-10 * b.dot(S * b));
+  EXPECT_FALSE(Ldlt(-S).is_positive());
+  Eigen::MatrixXd upper_is_wrong = S;
+  upper_is_wrong(0, 3) = 1e3;
+  EXPECT_EQ((Ldlt(upper_is_wrong).inverse() - ldlt.inverse()).norm(), 0.0);
+  // Of the solutions of A Aᵀ x = A y the shortest has no part across the columns of A.
+  const Eigen::MatrixXd singular = A * A.transpose(), right = A * drawn(rng, 4, 2);
+  const Eigen::MatrixXd x = minimum_norm_solution(singular, right);
+  EXPECT_LT((singular * x - right).norm(), 1e-10);
+  EXPECT_LT((orthonormal_basis(A, 9).rightCols(5).transpose() * x).norm(), 1e-12);
+}
+
 /// (λ − 2)(λ² + 1) = λ³ − 2λ² + λ − 2.
 TEST(Decompositions, EigenvaluesAreThePolynomialsRoots) {
   Eigen::Matrix3d companion;

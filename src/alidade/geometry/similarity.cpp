@@ -2,6 +2,8 @@
 
 #include <Eigen/SVD>
 
+#include "alidade/geometry/decompositions.h"
+
 namespace alidade {
 
 std::optional<Similarity> aligned(std::span<const Eigen::Vector3d> a, std::span<const Eigen::Vector3d> b,
@@ -19,12 +21,12 @@ std::optional<Similarity> aligned(std::span<const Eigen::Vector3d> a, std::span<
     cross += (b[i] - mean_b) * (a[i] - mean_a).transpose() / num;
     variance_a += (a[i] - mean_a).squaredNorm() / num;
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d D = svd.singularValues();
+  const Svd svd = svd_of(cross);
+  const Eigen::Vector3d D = svd.values;
   if (!(D[1] > 1e-12 * D[0]) || !(variance_a > 0.0)) return std::nullopt;
-  const double mirror = svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0 ? -1.0 : 1.0;
+  const double mirror = Eigen::Matrix3d(svd.U).determinant() * Eigen::Matrix3d(svd.V).determinant() < 0.0 ? -1.0 : 1.0;
   const Eigen::Vector3d sign(1.0, 1.0, mirror);
-  const Eigen::Matrix3d R = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
+  const Eigen::Matrix3d R = svd.U * sign.asDiagonal() * svd.V.transpose();
   Similarity result;
   result.scale = is_rigid ? 1.0 : D.dot(sign) / variance_a;
   result.b_from_a = {Eigen::Quaterniond(R), mean_b - result.scale * (R * mean_a)};

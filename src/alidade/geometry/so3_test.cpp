@@ -37,6 +37,23 @@ TEST(So3, LogInvertsExpUpToPi) {
   }
 }
 
+TEST(So3, RotationBetweenIsTheShortestThatTurnsOneIntoTheOther) {
+  auto rng = testing::make_rng();
+  for (const double angle_rad : {0.0, 1e-12, 1e-7, 1e-3, 0.5, 1.5, 3.0, std::numbers::pi - 1e-5, std::numbers::pi}) {
+    for (int i = 0; i < 100; ++i) {
+      const Eigen::Vector3d from = random_rotation_vector(rng, 2.0);
+      const Eigen::Vector3d axis = from.cross(random_rotation_vector(rng, 1.0)).normalized();
+      const Eigen::Vector3d to = Eigen::AngleAxisd(angle_rad, axis) * (0.3 * from);
+      const Eigen::Quaterniond q = rotation_between(from, to);
+      EXPECT_NEAR(q.norm(), 1.0, 1e-15);
+      EXPECT_LT((q * from.normalized() - to.normalized()).norm(), 2e-15) << angle_rad;
+      EXPECT_NEAR(log_so3(q).norm(), angle_rad, 4e-8) << angle_rad;  // rounding of `to` turns an angle near π
+    }
+  }
+  const Eigen::Quaterniond half = rotation_between(Eigen::Vector3d::UnitX(), -Eigen::Vector3d::UnitX());
+  EXPECT_LT((half * Eigen::Vector3d::UnitX() + Eigen::Vector3d::UnitX()).norm(), 1e-15);
+}
+
 TEST(So3, CrossMatrixIsTheCrossProductAndTheDerivativeOfExp) {
   auto rng = testing::make_rng();
   for (int i = 0; i < 100; ++i) {

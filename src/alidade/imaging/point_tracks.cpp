@@ -11,6 +11,7 @@
 #include <optional>
 #include <utility>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/imaging/anchor_patch.h"
 #include "alidade/imaging/pyramid_flow.h"
 
@@ -41,7 +42,7 @@ double sigma_of(const Eigen::Matrix2d& cov) { return std::sqrt(0.5 * cov.trace()
 
 /// How much longer the longest or shorter the shortest direction has become.
 double stretch_of(const Eigen::Matrix2d& linear) {
-  const Eigen::Vector2d lengths = Eigen::JacobiSVD<Eigen::Matrix2d>(linear).singularValues();
+  const Eigen::Vector2d lengths = svd_of(linear).values;
   return std::max(lengths[0], 1.0 / lengths[1]);
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "alidade/geometry/so3.h"
 #include "alidade/io/camera_json.h"
 
 namespace alidade {
@@ -12,6 +13,12 @@ namespace {
 using Numbers = std::vector<double>;
 
 double rounded(double value, double step) { return std::isfinite(value) ? std::round(value / step) * step : value; }
+
+Eigen::Vector3d middle_of(const std::vector<Eigen::Vector3d>& points) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : points) sum += point;
+  return sum / static_cast<double>(points.size());
+}
 
 /// Seven columns of a pose: x y z in metres, then the quaternion.
 struct PoseColumns {
@@ -31,13 +38,34 @@ struct PoseColumns {
   }
 };
 
-DataTable photos_table(const Calibration& calibration) {
+/// Covariance of a board's middle in the camera's frame, six columns: the pose's, carried there.
+struct MiddleColumns {
+  Eigen::Vector3d middle_in_board;
+  std::array<Numbers, 6> values;
+  void add(const ViewFit& fit) {
+    Eigen::Matrix<double, 3, 6> J;
+    J << Eigen::Matrix3d::Identity(), -cross_matrix(middle_in_board);
+    J = fit.cam_from_board.rotation.toRotationMatrix() * J;
+    const Eigen::Matrix3d cov = J * fit.pose_cov * J.transpose();
+    std::size_t at = 0;
+    for (int i = 0; i < 3; ++i)
+      for (int j = i; j < 3; ++j) values[at++].push_back(fit.used ? cov(i, j) : std::nan(""));
+  }
+  void append_to(DataTable& table) const {
+    static const std::array<const char*, 6> names = {"xx", "xy", "xz", "yy", "yz", "zz"};
+    for (std::size_t i = 0; i < 6; ++i)
+      table.columns.emplace_back(std::string("cov_middle_") + names[i] + "_m2", values[i]);
+  }
+};
+
+DataTable photos_table(const Board& board, const Calibration& calibration) {
   const auto& [views, reasons, size, unreadable, report] = calibration.photos;
   std::vector<std::string> names, why;
   std::vector<bool> used;
   std::vector<int> num_corners;
   Numbers rms;
   PoseColumns poses;
+  MiddleColumns middles{middle_of(points_in_board(board)), {}};
   for (std::size_t k = 0; k < views.size(); ++k) {
     const ViewFit& fit = report.views[k];
     names.push_back(views[k].photo);
@@ -46,10 +74,12 @@ DataTable photos_table(const Calibration& calibration) {
     num_corners.push_back(static_cast<int>(views[k].corners.size()));
     rms.push_back(fit.used ? fit.rms_px : std::nan(""));
     poses.add(fit.used ? &fit.cam_from_board : nullptr);
+    middles.add(fit);
   }
   DataTable table{"photos",
                   {{"name", names}, {"used", used}, {"reason", why}, {"num_corners", num_corners}, {"rms_px", rms}}};
   poses.append_to(table, "cam_from_board");
+  middles.append_to(table);
   return table;
 }
 
@@ -300,7 +330,7 @@ void fill_calibration(const Board& board, const Calibration& calibration, Result
     document.estimate["camera"]["height"] = size.height_px;
   }
   document.estimate["photos"] = std::move(photos);
-  document.data = {photos_table(calibration), corners_table(board, calibration)};
+  document.data = {photos_table(board, calibration), corners_table(board, calibration)};
   if (!solved) return;
   for (DataTable& table : std::vector<DataTable>{cells_table(calibration.study), rings_table(calibration.study),
                                                  models_table(calibration.study), board_points_table(board, report),

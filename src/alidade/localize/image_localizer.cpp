@@ -368,7 +368,6 @@ PathStep ImageLocalizer::take(const cv::Mat& grey, long frame, double t_s) {
   step.num_features = filter.features().size();
   if (step.event == FrameEvent::tracked)
     keyframes_.offer(grey, step.world_from_cam, config_.eyes.near_share * usual_depth_m(), config_.eyes.near_rad);
-  if (config_.watch) config_.watch(frame, grey, tried_);
   return step;
 }
 

@@ -24,6 +24,8 @@ class ImageLocalizer {
   [[nodiscard]] std::span<const KnownPoint> told() const { return told_; }
   [[nodiscard]] const RadialResiduals& residuals() const { return residuals_; }
   [[nodiscard]] std::size_t num_alike() const { return num_alike_; }
+  /// Of the last picture.
+  [[nodiscard]] std::span<const SightTried> tried() const { return tried_; }
 
  private:
   struct Search {

@@ -5,6 +5,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "alidade/geometry/so3.h"
+
 namespace alidade {
 namespace {
 
@@ -46,7 +48,7 @@ Rigid3 turned(const Camera& camera, const Rigid3& world_from_cam, const Eigen::V
   const auto from = unproject(camera, middle), to = unproject(camera, middle - shift_px);
   if (!from || !to) return world_from_cam;
   Rigid3 result = world_from_cam;
-  result.rotation = (world_from_cam.rotation * Eigen::Quaterniond::FromTwoVectors(*from, *to)).normalized();
+  result.rotation = (world_from_cam.rotation * rotation_between(*from, *to)).normalized();
   return result;
 }
 

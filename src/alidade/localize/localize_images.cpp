@@ -24,6 +24,7 @@ LocalizeReport localize_images(const Camera& camera, const NextPicture& next, st
     const double begin_s = config.localize.seconds ? config.localize.seconds() : 0.0;
     report.path.push_back(localizer.take(grey, frame, t_s));
     if (config.localize.seconds) report.path.back().seconds = config.localize.seconds() - begin_s;
+    if (config.watch) config.watch(frame, grey, localizer.tried());
     if (config.localize.watch) config.localize.watch(report.path.back());
   }
   report.num_restarts = localizer.num_restarts();

@@ -42,7 +42,7 @@ struct LocalizeImagesConfig {
   std::optional<ImageTarget> target;  ///< None: the world is the first camera, scale unknown.
   /// Is given what was matched before the filter sees it, and may change it.
   std::function<void(long frame, std::vector<FeatureSight>&)> disturb = {};
-  /// Is shown each picture with what was looked for in it.
+  /// Is shown each picture with what was looked for in it, before `localize.watch` its row.
   std::function<void(long frame, const cv::Mat&, std::span<const SightTried>)> watch = {};
 };
 

@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/testing/random.h"
 
 namespace alidade {
@@ -58,8 +59,8 @@ double ate_by_horn(const Paths& paths, bool is_rigid) {
   N.block<3, 1>(1, 0) = z;
   N.block<1, 3>(0, 1) = z.transpose();
   N.block<3, 3>(1, 1) = M + M.transpose() - M.trace() * Eigen::Matrix3d::Identity();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(N);
-  const Eigen::Vector4d q = eigen.eigenvectors().col(3);
+  const SymmetricEigen eigen = symmetric_eigen(N);
+  const Eigen::Vector4d q = eigen.vectors.col(3);
   const Eigen::Matrix3d R = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
   const double scale = is_rigid ? 1.0 : (R * M).trace() / aa;
   double sum2 = 0.0;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/so3.h"
 #include "alidade/observe/rotation_bundle.h"
 
@@ -62,12 +63,12 @@ CommonVector CommonPrior::offset(const CommonLayout& layout, const RotatingCamer
 
 CommonMatrix BundleSolution::covariance() const {
   const CommonMatrix all = information + prior_information;
-  return all.ldlt().solve(CommonMatrix::Identity(all.rows(), all.cols()));
+  return inverse_symmetric(all);
 }
 
 CommonMatrix BundleSolution::bound() const {
   const CommonMatrix all = information + said_information;
-  return all.ldlt().solve(CommonMatrix::Identity(all.rows(), all.cols()));
+  return inverse_symmetric(all);
 }
 
 double robust_sigma(std::vector<double> residual_norms, int dof) {

@@ -4,6 +4,8 @@
 #include <cassert>
 #include <numbers>
 
+#include "alidade/geometry/decompositions.h"
+
 namespace alidade {
 namespace {
 

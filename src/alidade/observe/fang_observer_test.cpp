@@ -7,6 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/testing/allocations.h"
 #include "alidade/testing/rotation_sample.h"
 
@@ -240,9 +241,9 @@ class JointFilter {
       for (Eigen::Index b = 0; b < m; ++b) r(a, b) = a % 2 == b % 2 ? variance_ * (a == b ? 2.0 : 1.0) : 0.0;
     }
     const Eigen::MatrixXd s = h * p_ * h.transpose() + r;
-    const Eigen::MatrixXd gain = s.ldlt().solve(h * p_).transpose();
+    const Eigen::MatrixXd gain = Ldlt(s).solve_each(h * p_).transpose();
     const Eigen::MatrixXd left = Eigen::MatrixXd::Identity(n_ + 8, n_ + 8) - gain * h;
-    nis_ = innovation.dot(s.ldlt().solve(innovation));
+    nis_ = squared_mahalanobis(innovation, s);
     x_ += gain * innovation;
     p_ = left * p_ * left.transpose() + gain * r * gain.transpose();
   }

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/testing/allocations.h"
 #include "alidade/testing/rotation_sample.h"
 
@@ -85,11 +86,11 @@ class DenseFlowFilter {
       innovation[row] = config_.scale.normalised(frame.px[static_cast<std::size_t>(at / 2)])[at % 2] - x_[at];
     }
     const Eigen::MatrixXd s = h * p_ * h.transpose() + variance_ * Eigen::MatrixXd::Identity(m, m);
-    const Eigen::MatrixXd gain = s.ldlt().solve(h * p_).transpose();
+    const Eigen::MatrixXd gain = Ldlt(s).solve_each(h * p_).transpose();
     const Eigen::MatrixXd left = Eigen::MatrixXd::Identity(n_ + 14, n_ + 14) - gain * h;
     x_ += gain * innovation;
     p_ = left * p_ * left.transpose() + variance_ * gain * gain.transpose();
-    nis_ = innovation.dot(s.ldlt().solve(innovation));
+    nis_ = squared_mahalanobis(innovation, s);
   }
 
   FlowFilterConfig config_;
@@ -125,9 +126,10 @@ TEST(FlowFilter, IsTheJointKalmanFilterToTheLastDigits) {
   }
   const Eigen::Vector4d k = scaled_intrinsics(config.scale, estimate.values());
   const Eigen::Matrix<double, 14, 4> j = flow_parameters_jacobian(k);
-  const Eigen::Matrix<double, 14, 14> information = joint.covariance().inverse();
+  const Eigen::Matrix<double, 14, 14> information = inverse_symmetric(joint.covariance());
   const Eigen::Matrix4d normal = j.transpose() * information * j;
-  const Eigen::Vector4d step = normal.ldlt().solve(j.transpose() * information * (joint.theta() - flow_parameters(k)));
+  const Eigen::Vector4d step =
+      solve_symmetric(normal, j.transpose() * information * (joint.theta() - flow_parameters(k)));
   const Eigen::Array4d sigma = normal.inverse().diagonal().array().sqrt();
   EXPECT_LT((step.array() / sigma).abs().maxCoeff(), 1e-3);  // it stands at the projection
   EXPECT_LT((estimate.sigma.array() / (config.scale.scale * sigma) - 1.0).abs().maxCoeff(), 1e-4);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/observe/rotation_bundle.h"
 #include "alidade/pantilt/head_rotation.h"
 
@@ -26,7 +27,7 @@ class Planner {
     }
     look_from({0.0, 0.0, 0.0});
     const Eigen::Matrix4d cov = now.cov_px2 / (scale_.scale * scale_.scale);
-    before_ = cov.ldlt().solve(Eigen::Matrix4d::Identity());
+    before_ = inverse_symmetric(cov);
   }
 
   std::optional<NextMove> best_move() {
@@ -101,7 +102,7 @@ class Planner {
     config.max_iterations = 0;
     const BundleSolution solution = solve_rotation_bundle(bundle_, CommonPrior(bundle_.camera), config);
     const Eigen::Matrix4d all = solution.information + before_;
-    return all.ldlt().solve(Eigen::Matrix4d::Identity()).diagonal() * (scale_.scale * scale_.scale);
+    return inverse_symmetric(all).diagonal() * (scale_.scale * scale_.scale);
   }
 
   const ObservedNow& now_;

@@ -1,6 +1,8 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
+
 #include "alidade/observe/observe.h"
 
 namespace alidade {
@@ -35,7 +37,7 @@ std::vector<std::pair<std::string, double>> residual_proposals(const FrameBuffer
     const CommonVector offset = CommonPrior(RotatingCamera{}).offset(layout, adjustment.solution.camera);
     const Eigen::VectorXd value = offset.segment(at, candidate.width);
     const Eigen::MatrixXd cov = adjustment.solution.bound().block(at, at, candidate.width, candidate.width);
-    const double z = std::sqrt(value.dot(cov.ldlt().solve(value)));
+    const double z = std::sqrt(squared_mahalanobis(value, cov));
     if (std::isfinite(z)) proposals.emplace_back(candidate.name, z);
   }
   return proposals;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/so3.h"
 
 namespace alidade {
@@ -298,7 +299,7 @@ class Solver {
     Eigen::VectorXd gradient = gradient_;
     reduced.diagonal() *= 1.0 + damping;
     eliminate_points(damping, reduced, gradient);
-    const Eigen::VectorXd step = reduced.selfadjointView<Eigen::Lower>().ldlt().solve(-gradient);
+    const Eigen::VectorXd step = -solve_symmetric(reduced, gradient);
     Place next = place_;
     const int n = layout_.size;
     if (!step.allFinite()) return next;
@@ -333,9 +334,9 @@ class Solver {
     reduced.topLeftCorner(n, n) -= solution.prior_information;
     eliminate_points(0.0, reduced, gradient);
     if (turns_ > 0) {
-      const auto turns = reduced.bottomRightCorner(3 * turns_, 3 * turns_).selfadjointView<Eigen::Lower>();
+      const auto turns = reduced.bottomRightCorner(3 * turns_, 3 * turns_);
       const Eigen::MatrixXd by_common = reduced.bottomLeftCorner(3 * turns_, n);
-      reduced.topLeftCorner(n, n).noalias() -= by_common.transpose() * turns.ldlt().solve(by_common);
+      reduced.topLeftCorner(n, n).noalias() -= by_common.transpose() * Ldlt(turns).solve_each(by_common);
     }
     solution.information = reduced.topLeftCorner(n, n);
     for (std::size_t i = 0; i < blocks_.size() && turns_ == 0; ++i) {

@@ -129,7 +129,7 @@ std::optional<Eigen::Vector3d> RotationView::ray_in_start(const Eigen::Vector2d&
 }
 
 Eigen::Matrix3d rotation_to(const Eigen::Vector3d& ray) {
-  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), ray).toRotationMatrix();
+  return rotation_between(Eigen::Vector3d::UnitZ(), ray).toRotationMatrix();
 }
 
 }  // namespace alidade

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "alidade/geometry/decompositions.h"
+
 namespace alidade {
 namespace {
 
@@ -69,7 +71,7 @@ std::optional<BeamSolution> solve_beam(const BeamProblem& problem, const Camera&
     Eigen::MatrixXd damped = solution.normals.H.topLeftCorner(p, p);
     damped.diagonal() *= 1.0 + damping;
     BeamVector step = BeamVector::Zero();
-    step.head(p) = -damped.ldlt().solve(solution.normals.g.head(p));
+    step.head(p) = -solve_symmetric(damped, solution.normals.g.head(p));
     if (!step.allFinite()) return solution;
     const Beam trial = solution.beam.retract(step);
     // A millionth of a σ: farther digits say nothing about the world, but nearly exact data have them.

@@ -108,7 +108,7 @@ LensPrior lens_prior(const Camera& camera, bool with_distortion) {
 Eigen::MatrixXd CommonSystem::information() const {
   Eigen::MatrixXd S = U;
   for (const ShotBlock& block : blocks) {
-    if (block.has_pose) S.noalias() -= block.W.transpose() * block.V.ldlt().solve(block.W);
+    if (block.has_pose) S.noalias() -= block.W.transpose() * Ldlt(block.V).solve_each(block.W);
   }
   return S;
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/so3.h"
 #include "alidade/rangefinder/beam_bound.h"
 #include "alidade/rangefinder/refine_all.h"
@@ -96,8 +97,8 @@ class Planner {
  private:
   [[nodiscard]] static Eigen::MatrixXd inverse(const Eigen::MatrixXd& H) {
     const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
-    const Eigen::LDLT<Eigen::MatrixXd> ldlt(scale.asDiagonal() * H * scale.asDiagonal());
-    return scale.asDiagonal() * ldlt.solve(Eigen::MatrixXd(scale.asDiagonal()));
+    const Ldlt ldlt(scale.asDiagonal() * H * scale.asDiagonal());
+    return scale.asDiagonal() * ldlt.inverse() * scale.asDiagonal();
   }
 
   /// Information of the covariances at hand; a beam that is not known at all is within half a metre and half a radian.

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/rangefinder/beam_search.h"
 #include "alidade/rangefinder/prepare.h"
 
@@ -21,10 +22,10 @@ template <int rows>
 void add(Group& group, const Eigen::Matrix<double, rows, 1>& r, const Eigen::Matrix<double, rows, num_beam_params>& J,
          const Eigen::Matrix<double, rows, rows>& own, const Eigen::Matrix<double, rows, rows>& carried) {
   const Eigen::Matrix<double, rows, rows> all = own + carried;
-  const Eigen::LDLT<Eigen::Matrix<double, rows, rows>> ldlt(all);
-  group.sum += r.dot(ldlt.solve(r));
+  const Eigen::Matrix<double, rows, rows> weight = all.inverse();
+  group.sum += r.dot(weight * r);
   group.num += rows;
-  group.H += J.transpose() * ldlt.solve(J);
+  group.H += J.transpose() * weight * J;
 }
 
 /// Factor on σ that makes the residuals as large as they should be. One degree of freedom of the guess keeps few
@@ -32,7 +33,7 @@ void add(Group& group, const Eigen::Matrix<double, rows, 1>& r, const Eigen::Mat
 double factor_of(const Group& group, const BeamMatrix& H, int num_free, double sigma_over_guess) {
   if (group.num == 0.0) return 1.0;
   const Eigen::MatrixXd share =
-      H.topLeftCorner(num_free, num_free).ldlt().solve(group.H.topLeftCorner(num_free, num_free));
+      Ldlt(H.topLeftCorner(num_free, num_free)).solve_each(group.H.topLeftCorner(num_free, num_free));
   const double taken_up = std::clamp(share.trace(), 0.0, group.num);
   constexpr double dof_of_guess = 1.0;
   const double guess = dof_of_guess / (sigma_over_guess * sigma_over_guess);

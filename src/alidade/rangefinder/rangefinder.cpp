@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/rangefinder/beam_bound.h"
 #include "alidade/rangefinder/beam_search.h"
 #include "alidade/rangefinder/prepare.h"
@@ -87,13 +88,13 @@ std::optional<BeamFit> search_beam(Preparation& ready, const Camera& camera, con
 /// Covariance of a beam whose lens and poses were held: the lens' own is carried through (G = ∂beam/∂lens).
 void carry_lens(const BeamProblem& problem, const BeamSolution& solution, const Camera& camera, Beam& beam) {
   const int p = problem.num_free();
-  const Eigen::LDLT<Eigen::MatrixXd> H(solution.normals.H.topLeftCorner(p, p));
+  const Ldlt H(solution.normals.H.topLeftCorner(p, p));
   beam.cov.setZero();
-  beam.cov.topLeftCorner(p, p) = H.solve(Eigen::MatrixXd::Identity(p, p));
+  beam.cov.topLeftCorner(p, p) = H.inverse();
   const Eigen::Index num_lens = camera.cov.rows();
   const auto normals = beam_normals(problem, camera, solution.beam);
   if (num_lens == 0 || !normals || normals->H_lens.cols() != num_lens || !camera.cov.allFinite()) return;
-  const Eigen::MatrixXd G = -H.solve(normals->H_lens.topRows(p));
+  const Eigen::MatrixXd G = -H.solve_each(normals->H_lens.topRows(p));
   beam.cov.topLeftCorner(p, p) += G * camera.cov * G.transpose();
   beam.cov_with_lens.setZero(num_beam_params, num_lens);
   beam.cov_with_lens.topRows(p) = G * camera.cov;

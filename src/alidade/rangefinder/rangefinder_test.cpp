@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/testing/rangefinder_sample.h"
 
 namespace alidade {
@@ -98,7 +99,7 @@ double error2_of(const RangefinderReport& report, const RangefinderSample& sampl
   BeamVector error;
   error << sample.scene.beam.origin_in_cam - report.beam.origin_in_cam, direction_error_rad(report, sample),
       sample.scene.beam.scale - report.beam.scale;
-  return error.dot(report.beam.cov.ldlt().solve(error));
+  return squared_mahalanobis(error, report.beam.cov);
 }
 
 TEST(RangefinderScale, IsToldWithBoardsAndRefusedWithSpotsAlone) {
@@ -144,7 +145,7 @@ TEST(Rangefinder, UsesEachShotForWhatItHas) {
     sum_mixed += mixed.bound.cov.topLeftCorner<3, 3>().trace();
     sum_full += full.bound.cov.topLeftCorner<3, 3>().trace();
     Eigen::Vector3d error = mixed.beam.origin_in_cam - sample.scene.beam.origin_in_cam;
-    EXPECT_LT(error.dot(mixed.beam.cov.topLeftCorner<3, 3>().ldlt().solve(error)), 31.0);  // χ²₃ at 10⁻⁶
+    EXPECT_LT(squared_mahalanobis(error, mixed.beam.cov.topLeftCorner<3, 3>()), 31.0);  // χ²₃ at 10⁻⁶
   }
   EXPECT_LT(sum_mixed, 0.8 * sum_full);
 }
@@ -186,7 +187,7 @@ TEST(Rangefinder, ReadsThroughEveryLens) {
       ASSERT_TRUE(report.status == Status::converged) << model << trial;
       Eigen::Vector<double, 5> error;
       error << sample.scene.beam.origin_in_cam - report.beam.origin_in_cam, direction_error_rad(report, sample);
-      sum += error.dot(report.beam.cov.topLeftCorner<5, 5>().ldlt().solve(error));
+      sum += squared_mahalanobis(error, report.beam.cov.topLeftCorner<5, 5>());
     }
     EXPECT_NEAR(sum / trials, 5.0, 4.0 * std::sqrt(10.0 / trials)) << model;
   }

@@ -1,8 +1,9 @@
 #include "alidade/rangefinder/refine_all.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 namespace {
@@ -17,17 +18,17 @@ std::optional<Step> damped_step(const CommonSystem& system, double damping) {
   Eigen::MatrixXd S = system.U;
   S.diagonal() *= 1.0 + damping;
   Eigen::VectorXd g = system.g;
-  std::vector<Eigen::LDLT<Eigen::Matrix<double, 6, 6>>> factors(system.blocks.size());
+  std::vector<Ldlt> factors(system.blocks.size());
   for (std::size_t i = 0; i < system.blocks.size(); ++i) {
     const auto& block = system.blocks[i];
     if (!block.has_pose) continue;
     Eigen::Matrix<double, 6, 6> V = block.V;
     V.diagonal() *= 1.0 + damping;
-    factors[i].compute(V);
-    S.noalias() -= block.W.transpose() * factors[i].solve(block.W);
+    factors[i] = Ldlt(V);
+    S.noalias() -= block.W.transpose() * factors[i].solve_each(block.W);
     g.noalias() -= block.W.transpose() * factors[i].solve(block.g);
   }
-  Step step{-S.ldlt().solve(g), std::vector<Eigen::Matrix<double, 6, 1>>(system.blocks.size()), 0.0};
+  Step step{-solve_symmetric(S, g), std::vector<Eigen::Matrix<double, 6, 1>>(system.blocks.size()), 0.0};
   step.size2 = -step.common.dot(system.g);
   for (std::size_t i = 0; i < system.blocks.size(); ++i) {
     const auto& block = system.blocks[i];
@@ -62,10 +63,10 @@ bool add_covariances(const BeamProblem& problem, const LensPrior& prior, Refined
   const Eigen::MatrixXd S = refined.system.information();
   const Eigen::VectorXd scale = S.diagonal().cwiseSqrt().cwiseInverse();
   if (!scale.allFinite()) return false;
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(scale.asDiagonal() * S * scale.asDiagonal());
+  const Ldlt ldlt(scale.asDiagonal() * S * scale.asDiagonal());
   // Scaled to a unit diagonal, a pivot of 10⁻¹³ is rounding.
-  if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > 1e-13)) return false;
-  const Eigen::MatrixXd cov = scale.asDiagonal() * ldlt.solve(Eigen::MatrixXd(scale.asDiagonal()));
+  if (!(ldlt.pivots().minCoeff() > 1e-13)) return false;
+  const Eigen::MatrixXd cov = scale.asDiagonal() * ldlt.inverse() * scale.asDiagonal();
   const int p = problem.num_free();
   Beam& beam = refined.state.beam;
   beam.cov.setZero();
@@ -82,7 +83,7 @@ bool add_covariances(const BeamProblem& problem, const LensPrior& prior, Refined
   for (std::size_t i = 0; i < refined.poses.size(); ++i) {
     const auto& block = refined.system.blocks[i];
     if (!block.has_pose) continue;
-    const Eigen::Matrix<double, 6, 6> V_inverse = block.V.ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity());
+    const Eigen::Matrix<double, 6, 6> V_inverse = inverse_symmetric(block.V);
     const Eigen::Matrix<double, 6, Eigen::Dynamic> follows = V_inverse * block.W;
     refined.poses[i] = BoardPose{*refined.state.cam_from_board[i], V_inverse + follows * cov * follows.transpose()};
   }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/reproduce/xiahou_experiments.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/track/xiahou_filter.h"
@@ -46,7 +47,7 @@ Track run_filter(const XiahouConfig& filter_config, double radius_cm, std::uint6
     }
     track.truth_cm.push_back(p);
     track.estimate_cm.push_back(filter.position_cm());
-    track.nees += error.dot(P.inverse() * error) / num_steps;
+    track.nees += squared_mahalanobis(error, P) / num_steps;
   }
   return track;
 }

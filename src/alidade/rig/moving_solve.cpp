@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "alidade/geometry/decompositions.h"
+
 namespace alidade {
 namespace {
 
@@ -263,9 +265,9 @@ double correlation_of(const Solver& solver, const Eigen::MatrixXd& Z, const Eige
   }
   Eigen::MatrixXd together = Eigen::MatrixXd::Zero(num, num);
   for (const Eigen::VectorXd& score : scores) together += score * score.transpose();
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(alone);
-  if (ldlt.info() != Eigen::Success || !ldlt.isPositive()) return 1.0;
-  return std::max(1.0, ldlt.solve(together).trace() / static_cast<double>(num));
+  const Ldlt ldlt(alone);
+  if (!ldlt.is_positive()) return 1.0;
+  return std::max(1.0, ldlt.solve_each(together).trace() / static_cast<double>(num));
 }
 
 void finish(Solver& solver, SolvedMoving& solved) {
@@ -283,9 +285,9 @@ void finish(Solver& solver, SolvedMoving& solved) {
   solved.chi2_per_dof = chi2 / std::max(1.0, num);
   if (!equations.solve(0.0)) return;
   const Eigen::MatrixXd& information = equations.information();
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(information);
-  const Eigen::MatrixXd cov = ldlt.solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
-  if (ldlt.info() != Eigen::Success || !ldlt.isPositive() || !cov.allFinite()) return;
+  const Ldlt ldlt(information);
+  const Eigen::MatrixXd cov = ldlt.inverse();
+  if (!ldlt.is_positive() || !cov.allFinite()) return;
   solved.correlation = correlation_of(solver, equations.path_by_common(), information);
   solved.cov = solved.correlation * cov;
 }

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "alidade/geometry/decompositions.h"
+
 namespace alidade {
 namespace {
 
@@ -35,7 +37,7 @@ std::optional<Eigen::Vector3d> meeting_point(const std::vector<SeenRay>& rays) {
     widest = std::max(widest, rays.front().along.cross(ray.along).norm());
   }
   if (rays.size() < 2 || !(widest > least_sine)) return std::nullopt;
-  const Eigen::Vector3d point = A.ldlt().solve(b);
+  const Eigen::Vector3d point = solve_symmetric(A, b);
   for (const SeenRay& ray : rays) {
     const Eigen::Vector3d to_point = point - ray.origin;
     if (!(to_point.dot(ray.along) > 0.0) || !(to_point.cross(ray.along).norm() < ray.most_miss * to_point.norm()))

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <random>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/rig/path_spline.h"
 
 namespace alidade {
@@ -125,10 +126,10 @@ TEST(PathSystem, SolvesWhatADenseSolverSolves) {
   }
   const auto step = system.solve(0.0);
   ASSERT_TRUE(step);
-  const Eigen::VectorXd x = A.ldlt().solve(b);
+  const Eigen::VectorXd x = solve_symmetric(A, b);
   EXPECT_LT((step->path - x.head(3 * num_control)).norm(), 1e-9 * x.norm());
   EXPECT_LT((step->common - x.tail(num_common)).norm(), 1e-9 * x.norm());
-  const Eigen::MatrixXd cov = A.inverse().bottomRightCorner(num_common, num_common);
+  const Eigen::MatrixXd cov = inverse_symmetric(A).bottomRightCorner(num_common, num_common);
   EXPECT_LT((system.information() * cov - Eigen::MatrixXd::Identity(num_common, num_common)).norm(), 1e-8);
 }
 
@@ -162,9 +163,9 @@ TEST(MovingTarget, CamerasAreWhereTheyAreWithinTheirCovariance) {
       const auto at = static_cast<Eigen::Index>(num_head_params * c);
       // The distance is held: its direction has no variance, and is left out by the pseudo-inverse.
       const Eigen::Matrix<double, 6, 6> cov = report.rig.cov.block<6, 6>(at, at);
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(cov);
-      const Eigen::Matrix<double, 6, 1> along = eigen.eigenvectors().transpose() * error_of(report, scene, c);
-      for (int k = c == 1 ? 1 : 0; k < 6; ++k, ++num) sum += along[k] * along[k] / eigen.eigenvalues()[k];
+      const SymmetricEigen eigen = symmetric_eigen(cov);
+      const Eigen::Matrix<double, 6, 1> along = eigen.vectors.transpose() * error_of(report, scene, c);
+      for (int k = c == 1 ? 1 : 0; k < 6; ++k, ++num) sum += along[k] * along[k] / eigen.values[k];
       EXPECT_NEAR(report.cameras[c].sigma_px, 0.5, 0.075);  // a spline follows some of the noise, not of all alike
       if (!clocks_differ) continue;
       // Time of the rig = first camera's = true time.

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
+
 namespace alidade {
 
 std::optional<PathSpline::Support> PathSpline::support(double t_s) const {
@@ -111,8 +113,8 @@ std::optional<PathSystem::Step> PathSystem::solve(double damping) {
   information_ = U - Y_.transpose() * Y_;
   Step step;
   if (information_.rows() > 0) {
-    const Eigen::LDLT<Eigen::MatrixXd> ldlt(information_);
-    if (ldlt.info() != Eigen::Success || !ldlt.isPositive()) return std::nullopt;
+    const Ldlt ldlt(information_);
+    if (!ldlt.is_positive()) return std::nullopt;
     step.common = ldlt.solve(common_ - Y_.transpose() * y);
     y -= Y_ * step.common;
   }

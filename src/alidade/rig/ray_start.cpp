@@ -20,7 +20,7 @@ Eigen::Vector3d best_translation(std::span<const SightLine> lines, const Eigen::
     A += across;
     b -= across * (R * line.point_in_board);
   }
-  return A.ldlt().solve(b);
+  return solve_symmetric(A, b);
 }
 
 /// The rotation that turns the points best onto where their lines pass nearest to them.

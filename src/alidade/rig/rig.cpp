@@ -49,7 +49,7 @@ void correct_reading(const Work& work, RigState& state, std::size_t v) {
     const auto at = view_residuals(work.problem, state, v);
     if (!at) return;
     const Eigen::Matrix2d H = at->J_correction.transpose() * at->J_correction;
-    state.corrections_rad[v] -= H.ldlt().solve(at->J_correction.transpose() * at->r);
+    state.corrections_rad[v] -= H.inverse() * (at->J_correction.transpose() * at->r);
   }
 }
 

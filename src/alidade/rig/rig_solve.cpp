@@ -46,17 +46,17 @@ std::optional<Step> damped_step(const RigProblem& problem, const RigSystem& syst
   Eigen::MatrixXd S = system.U;
   S.diagonal() *= 1.0 + damping;
   Eigen::VectorXd g = system.g;
-  std::vector<Eigen::LDLT<Matrix6>> factors(system.boards.size());
+  std::vector<Ldlt> factors(system.boards.size());
   for (std::size_t b = 0; b < system.boards.size(); ++b) {
     const auto& board = system.boards[b];
     Matrix6 V = board.V;
     V.diagonal() *= 1.0 + damping;
     if (V.isZero(0.0)) V.setIdentity();  // no view of it is used
-    factors[b].compute(V);
-    S.noalias() -= board.W.transpose() * factors[b].solve(board.W);
+    factors[b] = Ldlt(V);
+    S.noalias() -= board.W.transpose() * factors[b].solve_each(board.W);
     g.noalias() -= board.W.transpose() * factors[b].solve(board.g);
   }
-  Step step{-S.ldlt().solve(g), {}, {}, 0.0};
+  Step step{-solve_symmetric(S, g), {}, {}, 0.0};
   step.size2 = -step.common.dot(system.g);
   for (std::size_t b = 0; b < system.boards.size(); ++b) {
     step.boards.push_back(-factors[b].solve(system.boards[b].g + system.boards[b].W * step.common));
@@ -165,7 +165,7 @@ Eigen::MatrixXd RigSystem::information() const {
   Eigen::MatrixXd S = U;
   for (const BoardBlock& board : boards) {
     if (board.V.isZero(0.0)) continue;
-    S.noalias() -= board.W.transpose() * board.V.ldlt().solve(board.W);
+    S.noalias() -= board.W.transpose() * Ldlt(board.V).solve_each(board.W);
   }
   return S;
 }
@@ -226,7 +226,7 @@ RigCovariance rig_covariance(const RigProblem& problem, const SolvedRig& solved)
     out.unknown = names_of(problem, solved.state, raw.vectors.col(0));
     return out;
   }
-  out.cov = S.ldlt().solve(Eigen::MatrixXd::Identity(S.rows(), S.cols()));
+  out.cov = inverse_symmetric(S);
   return out;
 }
 
@@ -239,7 +239,7 @@ double num_held_corrections(const RigProblem& problem, const SolvedRig& solved, 
     const auto& block = solved.system.views[v];
     const auto& board = solved.system.boards[view.board];
     const Eigen::Index first = problem.first_free(view.head), k = block.E_head.cols();
-    const Matrix6 V_inverse = board.V.ldlt().solve(Matrix6::Identity());
+    const Matrix6 V_inverse = inverse_symmetric(board.V);
     const Eigen::Matrix2d E_inverse = block.E.inverse();
     // ε = −E⁻¹ (E_head h + E_board b), b = −V⁻¹ W h + what the board has of its own.
     Eigen::MatrixXd by_common = -block.E_board * V_inverse * board.W;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "alidade/board/board.h"
+#include "alidade/geometry/decompositions.h"
 #include "alidade/simulate/rig.h"
 
 namespace alidade {
@@ -84,7 +85,7 @@ TEST(RigSolve, CovarianceIsThatOfTheWholeInformation) {
     J.middleCols(corrections + 2 * v, 2) = at->J_correction;
     H += J.transpose() * J;
   }
-  const Eigen::MatrixXd whole = H.inverse();
+  const Eigen::MatrixXd whole = inverse_symmetric(H);
   const std::vector<double> weights(example.scene.views.size(), 1.0);
   const auto solved = solve_rig(example.problem, example.state, weights, 0);
   ASSERT_TRUE(solved);

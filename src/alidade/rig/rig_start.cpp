@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/rig/ray_start.h"
 
 namespace alidade {
@@ -84,7 +85,7 @@ Eigen::Vector3d refining_step(const Groups& groups, const MountingStart& mountin
     }
   }
   H.diagonal() *= 1.01;
-  return -H.ldlt().solve(g);
+  return -solve_symmetric(H, g);
 }
 
 double distance(const Rigid3& a, const Rigid3& b) {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "alidade/geometry/decompositions.h"
+
 namespace alidade {
 namespace {
 
@@ -28,7 +30,7 @@ AxisMpc::AxisMpc(const ServoAxis& axis, const AxisModel& model, double command_w
   }
   Eigen::Matrix<double, n, n> H = angle_per_command_.transpose() * angle_per_command_;
   H.diagonal().array() += weight_;
-  inverse_hessian_ = H.llt().solve(Eigen::Matrix<double, n, n>::Identity());
+  inverse_hessian_ = inverse_symmetric(H);
   const double gain = gain_of(axis.plant);
   rows_.setZero();
   rows_.topRows<n>().diagonal().setConstant(gain);  // g u

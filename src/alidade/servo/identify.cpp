@@ -106,10 +106,10 @@ ServoParams searched(std::span<const ServoSample> log, ServoKind kind) {
 void set_covariance(const Eigen::Matrix<double, num_servo_params, num_servo_params>& JtJ, ServoFit& fit) {
   using Matrix = Eigen::Matrix<double, num_servo_params, num_servo_params>;
   const ServoParams scale = JtJ.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
-  const Eigen::LDLT<Matrix> ldlt(Matrix(scale.asDiagonal() * JtJ * scale.asDiagonal()));
-  fit.is_observable = ldlt.info() == Eigen::Success && ldlt.vectorD().minCoeff() > 1e-10;
+  const Ldlt ldlt(scale.asDiagonal() * JtJ * scale.asDiagonal());
+  fit.is_observable = ldlt.pivots().minCoeff() > 1e-10;
   if (!fit.is_observable) return;
-  const Matrix inverse = ldlt.solve(Matrix(Matrix::Identity()));
+  const Matrix inverse = ldlt.inverse();
   fit.cov = fit.rms_rad * fit.rms_rad * (scale.asDiagonal() * inverse * scale.asDiagonal());
 }
 
@@ -127,7 +127,7 @@ ServoFit refined(std::span<const ServoSample> log, ServoKind kind, ServoParams p
     const auto JtJ = (response.J.transpose() * response.J).eval();
     auto damped = JtJ;
     damped.diagonal() *= 1.0 + damping;
-    const ServoParams step = damped.ldlt().solve(response.J.transpose() * (readings - response.angle_rad));
+    const ServoParams step = solve_symmetric(damped, response.J.transpose() * (readings - response.angle_rad));
     ServoParams next = params + step;
     next[Param::tau] = std::max({next[Param::tau], 0.2 * params[Param::tau], fastest_tau_s});
     next[Param::latency] = std::max(next[Param::latency], 0.0);

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/simulate/servo.h"
 
 namespace alidade {
@@ -85,7 +86,7 @@ TEST(IdentifyServo, CoversTheTruth) {
         const ServoFit fit = identify_servo(log_of(truth, static_cast<std::uint64_t>(seed))).fit;
         ASSERT_EQ(fit.kind, is_rate_plant ? ServoKind::rate : ServoKind::angle);
         const ServoParams error = fit.params - truth_of(truth);
-        sum += error.dot(fit.cov.ldlt().solve(error));
+        sum += squared_mahalanobis(error, fit.cov);
         for (int k = 0; k < num_servo_params; ++k) {
           within_one += std::abs(error[k]) < std::sqrt(fit.cov(k, k)) ? 1 : 0;
           within_two += std::abs(error[k]) < 2.0 * std::sqrt(fit.cov(k, k)) ? 1 : 0;

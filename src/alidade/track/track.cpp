@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "alidade/geometry/decompositions.h"
+
 namespace alidade {
 namespace {
 
@@ -145,7 +147,7 @@ double position_nees(const TrackStep& step, const TrueTrack& truth) {
   if (!step.has_belief || !position) return not_there;
   const Eigen::Vector3d error = step.belief.x.head<3>() - *position;
   const Eigen::Matrix3d P = step.belief.P.topLeftCorner<3, 3>();
-  return error.dot(P.inverse() * error);
+  return squared_mahalanobis(error, P);
 }
 
 TrackReport track_target(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackConfig& config,

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/simulate/draws.h"
 
 namespace alidade {
@@ -60,7 +61,7 @@ Errors experiment(const XiahouConfig& config, double radius_cm, int runs) {
         for (int j = 0; j < 3; ++j) P(i, j) = filter.state().P(2 * i, 2 * j);
       }
       sum += error.norm();
-      sum_nees += error.dot(P.inverse() * error);
+      sum_nees += squared_mahalanobis(error, P);
     }
   }
   return {sum / (200.0 * runs), sum_nees / (200.0 * runs)};

@@ -7,6 +7,7 @@ import {diagonal, difference, parameters} from './diff';
 import {estimate} from './estimate';
 import {halves} from './halves';
 import {lens} from './lens';
+import {localizeFrame} from './localize_frame';
 import {localizeError, localizeNis, localizeSpace, localizeSpeed, localizeTracks} from './localize';
 import {nextPhoto} from './next_photo';
 import {observeDirections} from './observe_directions';
@@ -37,7 +38,7 @@ const byCommand: Record<string, Figure[]> = {
   rig: [rigEstimate, rigSpace, rigCoverage, rigResiduals, rigView, {...rigUnknown, span: 14}],
   track: [trackSpace, trackPosition, trackError, trackInnovations, {...estimate, span: 8}, {...trackAbove, span: 8}, {...trackAge, span: 8}],
   servo: [servoError, servoPicture, servoAngles, servoCompare, {...servoRobust, span: 12}, {...servoLoops, span: 12}, trackSpace, trackPosition],
-  localize: [localizeSpace, localizeError, localizeTracks, localizeNis, localizeSpeed, {...estimate, span: 6}],
+  localize: [localizeSpace, localizeError, localizeFrame, {...localizeTracks, span: 12}, localizeNis, localizeSpeed, {...estimate, span: 12}],
   'camera diff': [difference, diagonal, parameters, {...estimate, span: 10}],
 };
 

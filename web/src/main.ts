@@ -13,6 +13,7 @@ import {header} from './page/header';
 import {listenToKeys} from './page/keys';
 import {listenToPrinting} from './page/print';
 import {provenance} from './page/provenance';
+import {fillRows} from './page/rows';
 import {dataSection} from './page/tables';
 
 interface Drawn {
@@ -64,6 +65,7 @@ async function showReport(doc: Doc, host: HTMLElement): Promise<void> {
   // For tests: where marks lie.
   (window as unknown as Record<string, unknown>)['alidade'] = {doc, selection, cards: drawn.cards, charts, views3};
   await drawFigures(figuresOf(doc), (figure) => drawFigure(figure, doc, selection, main, drawn));
+  fillRows(drawn.cards);
   top.replaceWith(header(doc, new Set(drawn.cards.map((card) => card.figure.id)))); // checks lead to figures now
   showBelow(doc, drawn, host);
   listenToKeys(doc, selection, drawn.cards);

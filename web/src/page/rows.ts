@@ -7,7 +7,7 @@ export function fillRows(cards: Card[]): void {
   let row: Card[] = [], used = 0;
   const close = () => {
     const spare = columns - used, upTo = (count: number) => Math.round((spare * count) / row.length);
-    row.forEach((card, i) => card.section.style.setProperty('--span', String(card.figure.span + upTo(i + 1) - upTo(i))));
+    if (spare > 0) row.forEach((card, i) => card.section.style.setProperty('--span', String(card.figure.span + upTo(i + 1) - upTo(i))));
     row = [], used = 0;
   };
   for (const card of cards) {

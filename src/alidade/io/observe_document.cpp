@@ -131,6 +131,17 @@ bool is_of_camera(const std::string& name) {
   return name == "fx" || name == "fy" || name == "cx" || name == "cy" || name == "k1";
 }
 
+/// The bound is of the longest time without a zoom alone: σ, which holds the other rows as well, may be smaller.
+void fill_reference(const RotationLog& log, const ObserveReport& report, JsonValue& bound) {
+  const double from_s = log.rows.front().t_s, until_s = log.rows.back().t_s;
+  const double first_s = std::max(from_s, report.reference_from_s),
+               last_s = std::min(until_s, report.reference_until_s);
+  constexpr double nearly_all = 0.9;
+  if (!(last_s - first_s < nearly_all * (until_s - from_s))) return;
+  bound["from_s"] = first_s;
+  bound["until_s"] = last_s;
+}
+
 void fill_values(const ObserveReport& report, const Camera& camera, ResultDocument& document) {
   JsonValue& estimate = document.estimate;
   estimate["camera"] = camera_values(camera);
@@ -165,7 +176,10 @@ void fill_observation(const RotationLog& log, const ObserveReport& report, const
   document.counts.given += log.rows.size();
   document.counts.used = report.rows_used;
   document.counts.dropped = log.rows.size() - report.rows_used;
-  if (report.status == ObserveReport::Status::ok) fill_values(report, camera, document);
+  if (report.status == ObserveReport::Status::ok) {
+    fill_values(report, camera, document);
+    if (!log.rows.empty()) fill_reference(log, report, document.estimate["bound"]);
+  }
   JsonValue events = JsonValue::list();
   for (const ObserveNote& note : report.events) {
     JsonValue event = JsonValue::object();

@@ -43,7 +43,7 @@ const names: Record<string, string> = {theta_x_rad: 'angle to the x axis', theta
   rms_range_m: 'ranges, RMS', rms_px: 'RMS', noise_px: 'noise of a corner', transfer_rms_px: 'unseen photos, RMS', transfer_flat_rms_px: 'the same, board flat', working_distance_m: 'working distance',
   sigma_px: 'σ of a pixel', 'noise.sigma_spot_px': 'σ of a spot', 'noise.sigma_corner_px': 'σ of a corner', 'noise.sigma_range_m': 'σ of a reading', 'noise.sigma_px': 'σ of a corner', 'noise.sigma_encoder_rad': 'σ of a reading',
   sigma_relative_rad: 'σ camera to camera', sigma_relative_m: 'σ camera to camera', chi2_per_dof: 'χ² per degree of freedom', nees_per_dof: 'NEES per degree of freedom', nis_per_dof: 'NIS per degree of freedom',
-  pcrlb_m: 'best possible RMS (PCRLB)', rms_m: 'RMS error', mean_error_m: 'mean error', sigma_a_m_s2: 'σ of the acceleration', compared_share: 'share compared', ate_m: 'ATE', rpe_m: 'RPE'};
+  pcrlb_m: 'best possible RMS (PCRLB)', rms_m: 'RMS error', mean_error_m: 'mean error', sigma_a_m_s2: 'σ of the acceleration', compared_share: 'share compared', ate_m: 'ATE', rpe_m: 'RPE', rpe_rad: 'RPE, turned', stated_m: 'RMS that σ states'};
 
 function rowOf(quantity: Quantity, doc: Doc, has: {sigma: boolean; bound: boolean; error: boolean}): HTMLElement {
   const {unit, factor, ...reading} = readingOf(quantity, doc), name = names[quantity.path] ?? reading.name;
@@ -90,6 +90,11 @@ export function drawCorrelations(host: HTMLElement, matrix: Correlations): void 
   });
 }
 
+function atBest(doc: Doc): string {
+  const from_s = doc.estimate('bound.from_s'), until_s = doc.estimate('bound.until_s');
+  return until_s > from_s ? `At best: 3σ of the Cramér–Rao bound of the rows from ${num(from_s, 3)} to ${num(until_s, 3)} s, the longest time without a zoom; 3σ holds the others as well.` : 'At best: 3σ of the Cramér–Rao bound of these measurements.';
+}
+
 export const estimate: Figure = {
   id: 'estimate', title: 'Estimate', note: 'value ± 3σ', span: 6,
   draw(host, doc) {
@@ -107,6 +112,6 @@ export const estimate: Figure = {
     const matrix = correlationsOf(doc);
     if (matrix && matrix.names.length > 1) drawCorrelations(host, matrix);
     return {marks: shown.length, rows: shown.length, tables: [], words: matrix?.words ?? '',
-      good: !doc.isAnswer ? 'No answer: values are where the search ended, and not to be used.' : has.bound ? 'At best: 3σ of the Cramér–Rao bound of these measurements.' : undefined};
+      good: !doc.isAnswer ? 'No answer: values are where the search ended, and not to be used.' : has.bound ? atBest(doc) : undefined};
   },
 };

@@ -13,9 +13,10 @@ export const refusal: Figure = {
       host.append(el('div', {class: 'scroll'}, el('table', {class: 'estimate'},
         el('thead', {}, el('tr', {}, el('th'), el('th'), el('th', {}, 'value'), el('th', {}, 'limit'), el('th'))),
         el('tbody', {}, ...doc.checks.map((check) => {
-          const look = lookOf(check.state);
+          // Both zero: what cannot be told at all has neither.
+          const look = lookOf(check.state), hasValue = check.value !== 0 || check.limit !== 0;
           return el('tr', {}, el('th', {}, el('span', {class: `state-${look.name}`}, `${look.symbol} `), check.name), el('td', {class: 'word', style: 'text-align:left'}, check.text),
-            el('td', {class: 'value'}, num(check.value, 3)), el('td', {class: 'right'}, num(check.limit, 3)), el('td', {class: 'unit'}, check.unit));
+            el('td', {class: 'value'}, hasValue ? num(check.value, 3) : '–'), el('td', {class: 'right'}, hasValue ? num(check.limit, 3) : '–'), el('td', {class: 'unit'}, hasValue ? check.unit : ''));
         })))));
     return {marks: Math.max(1, doc.checks.length), rows: Math.max(1, doc.checks.length), tables: [], words: doc.sentence, good: doc.toAdd ? `What to add: ${doc.toAdd}.` : undefined};
   },

@@ -1,5 +1,7 @@
 #include "cli/board_options.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <optional>
@@ -96,6 +98,13 @@ Board board_from(const BoardOptions& options) {
   const std::string what = fault(board);
   if (!what.empty()) throw UsageError("--board: " + what);
   return board;
+}
+
+std::string odd_size(const Board& board) {
+  constexpr double largest_m = 2.0;
+  if (!(board.square_m > largest_m)) return "";
+  return fmt::format("note: squares of {0:g} m; lengths are in metres, and {0:g} mm is --square {1:g}", board.square_m,
+                     1e-3 * board.square_m);
 }
 
 }  // namespace alidade::cli

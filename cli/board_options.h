@@ -26,4 +26,7 @@ void add_board_options(CLI::App& command, BoardOptions& options, bool is_require
 /// The board that the flags describe. Throws UsageError where there is none.
 [[nodiscard]] Board board_from(const BoardOptions& options);
 
+/// What is odd about a board: metres are meant, and millimetres were said. Empty: nothing.
+[[nodiscard]] std::string odd_size(const Board& board);
+
 }  // namespace alidade::cli

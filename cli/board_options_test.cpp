@@ -50,5 +50,15 @@ TEST(BoardOptions, NameWhatIsWrong) {
   }
 }
 
+TEST(BoardOptions, SayWhereMillimetresWereMeant) {
+  Board board;
+  board.square_m = 25.0;
+  EXPECT_EQ(odd_size(board), "note: squares of 25 m; lengths are in metres, and 25 mm is --square 0.025");
+  for (const double usual_m : {0.004, 0.025, 1.0}) {  // 1: many do not care for the unit
+    board.square_m = usual_m;
+    EXPECT_EQ(odd_size(board), "");
+  }
+}
+
 }  // namespace
 }  // namespace alidade::cli

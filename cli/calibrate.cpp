@@ -204,6 +204,7 @@ PhotoCalibration from_photos(const std::vector<std::filesystem::path>& files, Ph
 ExitCode calibrate(CalibrateArgs args, Run& run) {
   take_port(args, run);
   const Board board = board_from(args.board);
+  if (const std::string odd = odd_size(board); !odd.empty()) run.say(odd);
   CalibrateConfig config = config_from(args);
   if (args.corners.empty() == args.photos.empty()) {
     throw UsageError(args.photos.empty() ? "give photos, or --corners FILE" : "--corners takes the place of photos");

@@ -47,8 +47,8 @@ export class View3 {
     this.chart.box.classList.add('view3');
     new IntersectionObserver((entries) => {
       if (!entries.some((entry) => entry.isIntersecting) || this.isNear) return;
-      // Behind what is read first, and once for all: pictures may lie in it.
-      whenPicturesAreHere(() => requestAnimationFrame(() => setTimeout(() => this.wake())));
+      // Behind what is read first, which has been painted by then, and once for all: pictures may lie in it.
+      whenPicturesAreHere(() => requestAnimationFrame(() => setTimeout(() => this.wake(), 150)));
     }, {rootMargin: '300px'}).observe(this.chart.box);
     if (!this.isFlat) this.listen();
     views3.add(this);

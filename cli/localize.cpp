@@ -155,9 +155,9 @@ LocalizeReport localize_pictures(const LocalizeArgs& args, const Camera& camera,
     return is_there;
   };
   live::RateLimit limit(10.0);
-  SeenFrames seen(pictures.num_pictures());
+  SeenFrames seen(pictures.num_pictures(), !run.options.no_report);
   config.watch = [&](long, const cv::Mat& picture, std::span<const SightTried> tried) {
-    if (!run.options.no_report) seen.offer(picture_s, picture, tried);
+    seen.offer(picture_s, picture, tried);
     if (live.server() != nullptr && limit.lets_through(now_s()))
       show_picture(*live.server(), picture_s, picture, tried);
   };

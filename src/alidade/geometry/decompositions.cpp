@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <Eigen/SVD>
+#include <limits>
 
 namespace alidade {
 
@@ -45,7 +46,10 @@ Eigen::MatrixXd minimum_norm_solution(const Eigen::Ref<const Eigen::MatrixXd>& A
 
 Ldlt::Ldlt(const Eigen::Ref<const Eigen::MatrixXd>& symmetric) : ldlt_(symmetric) {}
 bool Ldlt::is_positive() const { return ldlt_.info() == Eigen::Success && ldlt_.isPositive(); }
-Eigen::VectorXd Ldlt::pivots() const { return ldlt_.vectorD(); }
+double Ldlt::least_pivot() const {
+  const Eigen::VectorXd D = ldlt_.vectorD();
+  return ldlt_.info() == Eigen::Success && D.allFinite() ? D.minCoeff() : std::numeric_limits<double>::quiet_NaN();
+}
 Eigen::VectorXd Ldlt::solve(const Eigen::Ref<const Eigen::VectorXd>& b) const { return ldlt_.solve(b); }
 Eigen::MatrixXd Ldlt::solve_each(const Eigen::Ref<const Eigen::MatrixXd>& B) const { return ldlt_.solve(B); }
 Eigen::MatrixXd Ldlt::inverse() const { return ldlt_.solve(Eigen::MatrixXd::Identity(ldlt_.rows(), ldlt_.cols())); }

@@ -42,13 +42,14 @@ struct Svd {
 [[nodiscard]] Eigen::MatrixXd minimum_norm_solution(const Eigen::Ref<const Eigen::MatrixXd>& A,
                                                     const Eigen::Ref<const Eigen::MatrixXd>& B);
 
-/// L D Lᵀ of a symmetric matrix; its lower triangle is read.
+/// L D Lᵀ of a symmetric matrix, n × n; its lower triangle is read. Of a singular one, or one that is not finite,
+/// least_pivot() says so, and solutions are of no use.
 class Ldlt {
  public:
   Ldlt() = default;  ///< Of nothing yet.
   explicit Ldlt(const Eigen::Ref<const Eigen::MatrixXd>& symmetric);
   [[nodiscard]] bool is_positive() const;
-  [[nodiscard]] Eigen::VectorXd pivots() const;  ///< D.
+  [[nodiscard]] double least_pivot() const;  ///< Of D; NaN where the matrix has no such decomposition.
   [[nodiscard]] Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd>& b) const;
   [[nodiscard]] Eigen::MatrixXd solve_each(const Eigen::Ref<const Eigen::MatrixXd>& B) const;  ///< Column by column.
   [[nodiscard]] Eigen::MatrixXd inverse() const;
@@ -56,10 +57,11 @@ class Ldlt {
  private:
   Eigen::LDLT<Eigen::MatrixXd> ldlt_;
 };
+/// A⁻¹ b and A⁻¹ of a symmetric matrix, by Ldlt.
 [[nodiscard]] Eigen::VectorXd solve_symmetric(const Eigen::Ref<const Eigen::MatrixXd>& A,
                                               const Eigen::Ref<const Eigen::VectorXd>& b);
 [[nodiscard]] Eigen::MatrixXd inverse_symmetric(const Eigen::Ref<const Eigen::MatrixXd>& A);
-/// eᵀ Σ⁻¹ e.
+/// eᵀ Σ⁻¹ e: χ² with as many degrees of freedom as e has numbers, where Σ is its covariance.
 [[nodiscard]] double squared_mahalanobis(const Eigen::Ref<const Eigen::VectorXd>& error,
                                          const Eigen::Ref<const Eigen::MatrixXd>& cov);
 

@@ -15,8 +15,9 @@ constexpr std::size_t most_frames = 24;  // of 40 kB each
 
 }  // namespace
 
-SeenFrames::SeenFrames(std::size_t num_pictures)
-    : every_(std::max<std::size_t>(1, (num_pictures + most_frames - 1) / most_frames)) {}
+SeenFrames::SeenFrames(std::size_t num_pictures, bool keeps_pictures)
+    : every_(std::max<std::size_t>(1, (num_pictures + most_frames - 1) / most_frames)),
+      keeps_pictures_(keeps_pictures) {}
 
 void SeenFrames::offer(double t_s, const cv::Mat& picture, std::span<const SightTried> tried) {
   if (count_++ % every_ != 0) return;
@@ -34,7 +35,7 @@ void SeenFrames::offer(double t_s, const cv::Mat& picture, std::span<const Sight
   }
   constexpr int most_width_px = 640, quality = 75;
   std::string name = fmt::format("frame {:06}", count_ - 1);
-  pictures_[name] = jpeg_preview(picture, most_width_px, quality);
+  if (keeps_pictures_) pictures_[name] = jpeg_preview(picture, most_width_px, quality);
   frames_.push_back({t_s, std::move(name), picture.cols, picture.rows, {tried.begin(), tried.end()}});
 }
 

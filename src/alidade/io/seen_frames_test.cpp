@@ -16,7 +16,7 @@ nlohmann::json document_of(const SeenFrames& frames) {
 }
 
 SeenFrames shown(std::size_t said, std::size_t num) {
-  SeenFrames frames(said);
+  SeenFrames frames(said, true);
   for (std::size_t i = 0; i < num; ++i) {
     SightTried found{7, {10.004, 20.0}, Eigen::Matrix2d::Identity(), Eigen::Vector2d(11.0, 20.5), true};
     SightTried lost{8, {30.0, 40.0}, 4.0 * Eigen::Matrix2d::Identity(), {}, false};
@@ -52,7 +52,14 @@ TEST(SeenFrames, SaysWhatWasExpectedAndFound) {
   EXPECT_EQ(sights["used"], nlohmann::json({true, false, true, false}));
 }
 
-TEST(SeenFrames, WithoutPicturesThereIsNoTable) { EXPECT_TRUE(document_of(SeenFrames(10)).empty()); }
+TEST(SeenFrames, WithoutAPageTheTablesAreTheSame) {
+  SeenFrames frames(1, false);
+  frames.offer(0.0, cv::Mat(48, 64, CV_8U, cv::Scalar(128)), {});
+  EXPECT_TRUE(frames.pictures().empty());
+  EXPECT_EQ(document_of(frames)["frames"]["width_px"], nlohmann::json({64}));
+}
+
+TEST(SeenFrames, WithoutPicturesThereIsNoTable) { EXPECT_TRUE(document_of(SeenFrames(10, true)).empty()); }
 
 }  // namespace
 }  // namespace alidade

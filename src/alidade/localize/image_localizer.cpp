@@ -15,15 +15,21 @@ constexpr double prior_share = 0.5;       // σ of a new inverse depth over it: 
 
 }  // namespace
 
-ImageLocalizer::ImageLocalizer(const Camera& camera, const LocalizeImagesConfig& config)
-    : camera_(camera), config_(config), filter_config_(config.localize.filter) {
+LocalizationFilterConfig for_pictures(LocalizationFilterConfig config, double sigma_floor_px) {
   constexpr double few_doubtful = 0.1;  // the gates alone keep them out; a consensus costs as much as the update
-  if (!(filter_config_.sigma_new_px > 0.0)) filter_config_.sigma_new_px = config.eyes.sigma_floor_px;
+  if (!(config.sigma_new_px > 0.0)) config.sigma_new_px = sigma_floor_px;
   // Many matches settle the first frames' poses: errors may turn with the world there too, and must not bend to one
   // side.
-  filter_config_.most_turn_rad = std::max(filter_config_.most_turn_rad, 0.05);
-  filter_config_.bend_tolerance = std::min(filter_config_.bend_tolerance, 0.001);
-  filter_config_.consensus_above = std::max(filter_config_.consensus_above, few_doubtful);
+  config.most_turn_rad = std::max(config.most_turn_rad, 0.05);
+  config.bend_tolerance = std::min(config.bend_tolerance, 0.001);
+  config.consensus_above = std::max(config.consensus_above, few_doubtful);
+  return config;
+}
+
+ImageLocalizer::ImageLocalizer(const Camera& camera, const LocalizeImagesConfig& config)
+    : camera_(camera),
+      config_(config),
+      filter_config_(for_pictures(config.localize.filter, config.eyes.sigma_floor_px)) {
   const std::size_t num_known = config.target ? config.target->points.size() : 0;
   const std::size_t need =
       motion_dim + filter_config_.lens_params.size() + 3 * num_known + 6 * config.eyes.most_features;

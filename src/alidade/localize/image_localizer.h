@@ -9,6 +9,10 @@
 
 namespace alidade {
 
+/// A filter's configuration as pictures need it: tens of matches a frame, whose few mismatches the gates keep out, and
+/// features defined by a pixel that is found again to `sigma_floor_px`.
+[[nodiscard]] LocalizationFilterConfig for_pictures(LocalizationFilterConfig config, double sigma_floor_px);
+
 /// One run through pictures: finds the features of the filter's map in each, chooses new ones, and finds the way back
 /// after it was lost.
 class ImageLocalizer {

@@ -4,8 +4,6 @@
 #include <cassert>
 #include <numbers>
 
-#include "alidade/geometry/decompositions.h"
-
 namespace alidade {
 namespace {
 

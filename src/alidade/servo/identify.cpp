@@ -107,7 +107,7 @@ void set_covariance(const Eigen::Matrix<double, num_servo_params, num_servo_para
   using Matrix = Eigen::Matrix<double, num_servo_params, num_servo_params>;
   const ServoParams scale = JtJ.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
   const Ldlt ldlt(scale.asDiagonal() * JtJ * scale.asDiagonal());
-  fit.is_observable = ldlt.pivots().minCoeff() > 1e-10;
+  fit.is_observable = ldlt.least_pivot() > 1e-10;
   if (!fit.is_observable) return;
   const Matrix inverse = ldlt.inverse();
   fit.cov = fit.rms_rad * fit.rms_rad * (scale.asDiagonal() * inverse * scale.asDiagonal());

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <map>
 
-#include "alidade/localize/localize_images.h"
+#include "alidade/localize/image_localizer.h"
 #include "alidade/testing/room_video.h"
 
 namespace alidade::testing {
@@ -20,15 +20,11 @@ struct DeskWalk {
 
 inline LocalizationFilterConfig desk_filter() {
   LocalizationFilterConfig config;
-  config.sigma_new_px = 0.11;
   config.sigma_a_m_s2 = 4.0;
   config.sigma_alpha_rad_s2 = 6.0;
-  config.consensus_above = 0.1;
-  config.most_turn_rad = 0.05;
-  config.bend_tolerance = 0.001;
   config.state_capacity = 760;
   config.sights_capacity = 80;
-  return config;
+  return for_pictures(config, EyesConfig{}.sigma_floor_px);
 }
 
 /// Of each frame: eᵀP⁻¹e of the position over 3 and of the pose over 6, and the filter's NIS.

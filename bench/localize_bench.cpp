@@ -23,7 +23,8 @@ Ready ready(int num_features, FeatureKind kind) {
   scene.dt_s = 1.0 / 30.0;
   const testing::UnderwaterSample sample = testing::underwater_sample(scene, 1);
   LocalizationFilterConfig config;
-  config.state_capacity = 2000;
+  // As large as the map, as in a run: a larger one would not be in the cache after it was copied.
+  config.state_capacity = motion_dim + 3 * static_cast<int>(sample.config.target.size()) + 6 * num_features;
   config.sights_capacity = 320;
   config.linear_below = kind == FeatureKind::xyz ? 1e9 : 0.0;
   Ready made{LocalizationFilter(sample.camera, sample.config.start->motion, sample.config.start->cov, config), {}};

@@ -36,6 +36,10 @@ LocalizationFilter::LocalizationFilter(Camera camera, const CameraMotion& start,
   nis_.reserve(sights);
   agrees_.reserve(sights);
   agrees_best_.reserve(sights);
+  kept_.outcomes.reserve(sights);
+  kept_.nis.reserve(sights);
+  kept_.used.reserve(sights);
+  kept_.delta.setZero(P_.capacity());
 }
 
 const Feature* LocalizationFilter::find(long id) const {
@@ -50,8 +54,10 @@ void LocalizationFilter::predict(double dt_s) {
   const MotionMatrix Q = motion_noise(J, config_.sigma_a_m_s2, config_.sigma_alpha_rad_s2, dt_s);
   motion_ = moved(motion_, dt_s);
   for (int j = motion_dim; j < P_.dim(); ++j) {
-    Eigen::Map<Eigen::Vector<double, motion_dim>> column(&P_.at(0, j));
-    column = (J.F * column).eval();
+    Eigen::Map<Eigen::Vector<double, motion_dim>> column(&P_.at(0, j));  // F changes position and rotation
+    const Eigen::Vector3d rotation = column.segment<3>(3), rate = column.tail<3>();
+    column.head<3>() += dt_s * column.segment<3>(6);
+    column.segment<3>(3) = J.F.block<3, 3>(3, 3) * rotation + J.F.block<3, 3>(3, 9) * rate;
   }
   for (int i = 0; i < motion_dim; ++i)
     for (int j = motion_dim; j < P_.dim(); ++j) P_.at(j, i) = P_.at(i, j);

@@ -170,6 +170,9 @@ class LocalizationFilter {
   void move_by_delta();
   void move_lens_by_delta();
   [[nodiscard]] double best_attempt();
+  /// What the last attempt came to, put aside while another is made, and taken back.
+  void keep_attempt();
+  void restore_attempt();
   [[nodiscard]] std::span<const double> error_of(const Feature& feature) const;
   void append_feature(const NewFeature& made, long id);
 
@@ -195,6 +198,13 @@ class LocalizationFilter {
   double group_nis_ = 0.0, group_log_det_ = 0.0;  ///< νᵀS⁻¹ν and ln det S of the group that was solved last,
   double total_nis_ = 0.0, total_log_det_ = 0.0;  ///< and of all that are used.
   std::vector<unsigned char> agrees_, agrees_best_;
+  struct Attempt {
+    std::vector<SightOutcome> outcomes;
+    std::vector<double> nis;
+    std::vector<Measured*> used;
+    Eigen::VectorXd delta;
+    double total_nis = 0.0, total_log_det = 0.0;
+  } kept_;
 };
 
 }  // namespace alidade

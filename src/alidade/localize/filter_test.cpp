@@ -126,6 +126,31 @@ TEST(LocalizationFilter, UpdateIsTheDenseKalmanUpdate) {
   }
 }
 
+/// A sight out of place makes the update look for a consensus. Where that explains the sights no better, what stands
+/// is to the bit what stands without having looked.
+TEST(LocalizationFilter, AConsensusThatHelpsNotLeavesNoTrace) {
+  LocalizationFilterConfig blind;
+  blind.finds_consensus = false;
+  int num_same = 0;
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    const auto sample = testing::underwater_sample(scene_of(30, 2), seed);
+    LocalizationFilter without = filter_of(sample, blind), with = filter_of(sample);
+    std::vector<FeatureSight> sights = sample.frames[0].sights;
+    const auto known = std::ranges::find_if(sights, [&](const FeatureSight& sight) { return with.has(sight.id); });
+    ASSERT_NE(known, sights.end());
+    known->px += Eigen::Vector2d(40.0, -25.0);
+    const SightsReport reports[2] = {without.update(sights), with.update(sights)};
+    EXPECT_GT(reports[0].num_gated, 0u) << seed;
+    EXPECT_LE(reports[1].cost, reports[0].cost) << seed;
+    if (reports[1].cost != reports[0].cost) continue;
+    ++num_same;
+    EXPECT_EQ(with.motion().world_from_cam.translation, without.motion().world_from_cam.translation);
+    EXPECT_EQ(covariance_of(with), covariance_of(without));
+    EXPECT_TRUE(std::ranges::equal(reports[0].outcomes, reports[1].outcomes));
+  }
+  EXPECT_GT(num_same, 5);
+}
+
 TEST(LocalizationFilter, ExpectsWhatItThenSees) {
   const auto sample = testing::underwater_sample(scene_of(30, 40), 8);
   LocalizationFilter filter = filter_of(sample);

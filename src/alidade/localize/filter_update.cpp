@@ -268,6 +268,26 @@ double LocalizationFilter::attempt(bool finds_consensus) {
   return cost_of_used();
 }
 
+void LocalizationFilter::keep_attempt() {
+  kept_.outcomes = outcomes_;
+  kept_.nis = nis_;
+  kept_.used = used_;
+  kept_.delta.head(P_.dim()) = delta_.head(P_.dim());
+  kept_.total_nis = total_nis_;
+  kept_.total_log_det = total_log_det_;
+  P_.swap_pending();
+}
+
+void LocalizationFilter::restore_attempt() {
+  outcomes_ = kept_.outcomes;
+  nis_ = kept_.nis;
+  used_ = kept_.used;
+  delta_.head(P_.dim()) = kept_.delta.head(P_.dim());
+  total_nis_ = kept_.total_nis;
+  total_log_det_ = kept_.total_log_det;
+  P_.swap_pending();
+}
+
 /// What fits together, with a consensus where sights disagree.
 double LocalizationFilter::best_attempt() {
   double cost = attempt(false);
@@ -275,9 +295,12 @@ double LocalizationFilter::best_attempt() {
   const auto num_doubtful = static_cast<double>(measured_.size() - used_.size());
   const bool is_doubtful = num_doubtful > config_.consensus_above * static_cast<double>(measured_.size());
   if (config_.finds_consensus && is_doubtful && measured_.size() >= least_for_consensus) {
-    const double without = cost;
-    cost = attempt(true);
-    if (!(cost < without)) cost = attempt(false);
+    keep_attempt();
+    const double with_consensus = attempt(true);
+    if (with_consensus < cost)
+      cost = with_consensus;
+    else
+      restore_attempt();
   }
   return cost;
 }

@@ -56,6 +56,8 @@ class StateCovariance {
   [[nodiscard]] bool append(std::span<const double> M, int num);
   /// Forgets the pending change from `count` columns on.
   void drop_pending(int count = 0) { pending_ = count; }
+  /// The pending change and the one set aside change places: two can be tried from one start.
+  void swap_pending();
   /// Whether every variance stays above zero with what is pending.
   [[nodiscard]] bool stays_positive() const;
   /// P ← P − W Wᵀ.
@@ -69,11 +71,12 @@ class StateCovariance {
  private:
   [[nodiscard]] std::size_t stride() const { return static_cast<std::size_t>(stride_); }
   [[nodiscard]] int num_panels() const { return (dim_ + panel - 1) / panel; }
+  void mirror_lower();  ///< What stands above the diagonal becomes what stands below.
 
-  int dim_ = 0, stride_ = 0, pending_ = 0, pending_capacity_ = 0;
-  std::vector<double> P_;  ///< Column by column.
-  std::vector<double> W_;  ///< Panel by panel, in it column by column, 8 rows each.
-  std::vector<double> X_;  ///< The same layout, max_columns.
+  int dim_ = 0, stride_ = 0, pending_ = 0, pending_aside_ = 0, pending_capacity_ = 0;
+  std::vector<double> P_;            ///< Column by column.
+  std::vector<double> W_, W_aside_;  ///< Panel by panel, in it column by column, 8 rows each.
+  std::vector<double> X_;            ///< The same layout, max_columns.
   std::vector<double> HW_;
   std::vector<double> shear_;  ///< What shear() needs: capacity() × 3.
 };

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <cmath>
 
 #include "alidade/testing/random.h"
 
@@ -79,6 +80,59 @@ TEST(StateCovariance, IsThatOfTheDenseUpdateInAnyGrouping) {
     EXPECT_EQ((dense(P) - dense(P).transpose()).cwiseAbs().maxCoeff(), 0.0);
   }
   EXPECT_EQ(num_updates, 20);
+}
+
+TEST(StateCovariance, KeepsAChangeAsideWhileAnotherIsTried) {
+  auto rng = testing::make_rng();
+  StateCovariance P;
+  P.reserve(most_dim, 8);
+  ASSERT_TRUE(P.grow(20));
+  const Eigen::MatrixXd start = random_covariance(rng, 20);
+  for (int i = 0; i < 20; ++i)
+    for (int j = 0; j < 20; ++j) P.at(i, j) = start(i, j);
+  const auto measure = [&](int column) {  // the number itself, twice, with unit noise
+    const Pair pair{{column}, {1.0}, {0.0}};
+    const std::vector<StateCovariance::Rows> rows{pair.rows()};
+    P.products(rows);
+    const std::vector<double> triangle{1.0 / std::sqrt(P.product_at(column, 0) + 1.0), 0.0, 0.0, 1.0};
+    ASSERT_TRUE(P.append(triangle, 2));
+  };
+  measure(3);
+  const double first = P.current(3, 3);
+  P.swap_pending();
+  EXPECT_EQ(P.num_pending(), 0);
+  measure(7);
+  EXPECT_NE(P.current(3, 3), first);
+  P.swap_pending();
+  EXPECT_EQ(P.current(3, 3), first);
+  P.commit();
+  EXPECT_NEAR(P.at(3, 3), start(3, 3) / (start(3, 3) + 1.0), 1e-12);
+  EXPECT_NEAR(P.at(7, 7), start(7, 7) - start(3, 7) * start(3, 7) / (start(3, 3) + 1.0), 1e-12 * start(7, 7));
+}
+
+/// B P Bᵀ with blocks of B along its diagonal and numbers between them that stay, against the dense product.
+TEST(StateCovariance, TurnsByBlocks) {
+  auto rng = testing::make_rng();
+  std::normal_distribution<double> normal;
+  for (const int num_single : {0, 1, 5}) {
+    constexpr int single_at = 12;
+    const int dim = 60 + num_single;
+    StateCovariance P;
+    P.reserve(most_dim, 8);
+    ASSERT_TRUE(P.grow(dim));
+    const Eigen::MatrixXd start = random_covariance(rng, dim);
+    for (int i = 0; i < dim; ++i)
+      for (int j = 0; j < dim; ++j) P.at(i, j) = start(i, j);
+    Eigen::MatrixXd B = Eigen::MatrixXd::Identity(dim, dim), blocks = Eigen::MatrixXd::Zero(P.capacity(), 3);
+    for (int i = 0; i < dim; i += i + 3 == single_at ? 3 + num_single : 3) {
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) B(i + r, i + c) = blocks(i + r, c) = normal(rng);
+    }
+    P.turn(blocks.data(), single_at, num_single);
+    const Eigen::MatrixXd should = B * start * B.transpose();
+    EXPECT_LT((dense(P) - should).cwiseAbs().maxCoeff(), 1e-13 * should.norm()) << num_single;
+    EXPECT_EQ((dense(P) - dense(P).transpose()).cwiseAbs().maxCoeff(), 0.0);
+  }
 }
 
 TEST(StateCovariance, GrowsAndShrinksAnywhere) {

@@ -8,6 +8,7 @@
 
 #include "alidade/io/csv.h"
 #include "alidade/io/files.h"
+#include "alidade/testing/allocations.h"
 #include "alidade/testing/localize_sample.h"
 #include "alidade/testing/random.h"
 
@@ -149,6 +150,26 @@ TEST(LocalizationFilter, AConsensusThatHelpsNotLeavesNoTrace) {
     EXPECT_TRUE(std::ranges::equal(reports[0].outcomes, reports[1].outcomes));
   }
   EXPECT_GT(num_same, 5);
+}
+
+/// Frames with mismatches, so that every part of an update is there.
+TEST(LocalizationFilter, AllocatesNothingOnceItRuns) {
+  UnderwaterScene scene = scene_of(40, 90);
+  scene.mismatches = 0.3;
+  const auto sample = testing::underwater_sample(scene, 14);
+  LocalizationFilter filter = filter_of(sample);
+  std::size_t num_gated = 0;
+  for (std::size_t k = 0; k < sample.frames.size(); ++k) {
+    const bool counts = k >= 30;
+    const std::size_t before = testing::num_allocations();
+    if (k > 0) filter.predict(0.1);
+    const SightsReport report = filter.update(sample.frames[k].sights);
+    if (counts) EXPECT_EQ(testing::num_allocations(), before) << k;
+    if (counts) num_gated += report.num_gated;
+    add_told(sample, sample.frames[k], FeatureKind::inverse_depth, filter);
+    filter.convert_linear();
+  }
+  EXPECT_GT(num_gated, 300u);
 }
 
 TEST(LocalizationFilter, ExpectsWhatItThenSees) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
 #include "alidade/testing/localize_sample.h"
 
 namespace alidade {
@@ -217,6 +218,63 @@ TEST(Localize, AWrongPathIsNeverGood) {
   for (std::size_t i = 0; i + 1 < swapped.target.size(); i += 2)
     std::swap(swapped.target[i].point_in_world, swapped.target[i + 1].point_in_world);
   EXPECT_NE(verdict_of(sample.camera, swapped).state, State::good);
+}
+
+/// No truth is given: what the lens leaves in the sights has to tell.
+TEST(Localize, APinholeInPlaceOfADistortingLensIsNeverGood) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    const UnderwaterSample sample = testing::underwater_sample(seed < 8 ? scene_of(0.03) : rich_scene(), seed);
+    const auto pinhole = with_distortion(sample.camera, DistortionVariant::none);
+    const Verdict verdict = localize_verdict(localize_sights(*pinhole, sample.frames, sample.config));
+    EXPECT_GE(verdict.state, State::care) << seed << ": " << verdict.sentence;
+  }
+}
+
+/// A port of 5 cm, turned by 2°, before a lens without distortion.
+Camera camera_behind_port() {
+  Params<FlatPort> p;
+  p << 576.0, 576.0, 384.0, 288.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.05, 0.01, 1.5, 1.34, 0.0348995, 0.0;
+  return {768, 576, Calibrated<FlatPort>{p}, {}, 0.0, {}};
+}
+
+/// Mean of eᵀ P⁻¹ e / 3 of the positions, and their RMS.
+std::pair<double, double> nees_and_rms_m(const LocalizeReport& report, const UnderwaterSample& sample) {
+  double nees = 0.0, sum2 = 0.0, num = 0.0;
+  for (std::size_t k = 0; k < report.path.size(); ++k) {
+    const PathStep& step = report.path[k];
+    if (!step.has_pose()) continue;
+    const Rigid3& truth = sample.truth[k].world_from_cam;
+    const Eigen::Vector3d error =
+        step.world_from_cam.rotation.conjugate() * (truth.translation - step.world_from_cam.translation);
+    nees += squared_mahalanobis(error, step.cov.topLeftCorner<3, 3>()) / 3.0;
+    sum2 += error.squaredNorm();
+    num += 1.0;
+  }
+  return {nees / num, std::sqrt(sum2 / num)};
+}
+
+TEST(Localize, SeesThroughAFlatPort) {
+  double nees = 0.0, rms_m = 0.0;
+  constexpr int num_seeds = 6;
+  for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
+    UnderwaterScene scene = rich_scene();
+    scene.camera = camera_behind_port();
+    const UnderwaterSample sample = testing::underwater_sample(scene, seed);
+    const LocalizeReport report = localize_sights(sample.camera, sample.frames, sample.config);
+    EXPECT_EQ(report.num_lost, 0u) << seed;
+    EXPECT_EQ(localize_verdict(report).exit_code, ExitCode::ok) << seed;
+    const auto [nees_here, rms_here_m] = nees_and_rms_m(report, sample);
+    nees += nees_here / num_seeds;
+    rms_m += rms_here_m / num_seeds;
+    // The same lens with its port pressed against it: as the paper's.
+    Camera thin = sample.camera;
+    std::get<Calibrated<FlatPort>>(thin.lens).params[10] = 0.0;
+    const LocalizeReport wrong = localize_sights(thin, sample.frames, sample.config);
+    EXPECT_GT(nees_and_rms_m(wrong, sample).second, 2.0 * rms_here_m) << seed;
+  }
+  EXPECT_GT(nees, 0.5);
+  EXPECT_LT(nees, 1.8);
+  EXPECT_LT(rms_m, 0.01);  // at 0.62 m
 }
 
 TEST(Localize, TooLittleIsRefusedByName) {

@@ -27,6 +27,7 @@ LocalizationFilter::LocalizationFilter(Camera camera, const CameraMotion& start,
   delta_.setZero(P_.capacity());
   start_.setZero(P_.capacity());
   next_.setZero(P_.capacity());
+  before_.setZero(P_.capacity());
   shear_.setZero(P_.capacity(), 3);
   measured_.reserve(sights);
   waiting_.reserve(sights);

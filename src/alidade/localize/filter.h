@@ -147,7 +147,15 @@ class LocalizationFilter {
   bool linearise(Measured& measured);
   void expect(Measured& measured) const;  ///< S and NIS from the current covariance.
   void collect(std::span<const FeatureSight> sights);
-  [[nodiscard]] double attempt(bool finds_consensus);
+  /// What comes first in an update.
+  enum class Attempt {
+    in_order,      ///< One sight after another.
+    by_consensus,  ///< Those that agree with one of them.
+    jointly,       ///< As many as a group holds, together.
+  };
+  [[nodiscard]] double attempt(Attempt way);
+  [[nodiscard]] double attempt_also(Attempt way, double cost);
+  void use_first_jointly();
   [[nodiscard]] double cost_of_used() const;
   void keep_consensus();
   void fill_joint_innovations();
@@ -159,12 +167,18 @@ class LocalizationFilter {
   /// Iterated update with a few measurements at once. False, and no change, where they have no answer.
   [[nodiscard]] bool take(std::span<Measured*> group);
   [[nodiscard]] bool solve(std::span<Measured*> group);
-  /// How far, in σ, the innovation at delta_ is from what the last derivatives say. None where it is not seen.
-  [[nodiscard]] std::optional<double> bend_of(const Measured& measured);
+  struct StepCost {
+    double prior = 0.0, all = 0.0;
+  };
+  [[nodiscard]] bool step(std::span<Measured*> group, bool must_fall, StepCost& at);
+  [[nodiscard]] std::optional<double> iterate(std::span<Measured*> group, bool must_fall);
+  /// How far, in σ, the innovation `there`, at delta_, is from what the derivatives `here` say.
+  [[nodiscard]] double bend_between(const Measured& here, const Measured& there) const;
   /// All that were used once more from the prior, linearised where they led: the maximum of the posterior.
   void refine();
   [[nodiscard]] bool use_again();
   [[nodiscard]] bool finish_update();
+  void drop_update();  ///< The state stays where it was.
   /// The state goes where delta_ says, and the covariance's errors are counted from there.
   void turn_by_delta();
   void move_by_delta();
@@ -188,17 +202,19 @@ class LocalizationFilter {
   std::vector<Measured*> waiting_, doubtful_, used_;
   std::vector<SightOutcome> outcomes_;
   std::vector<double> nis_;
-  Eigen::VectorXd start_, next_;
+  Eigen::VectorXd start_, next_, before_;
+  std::array<Measured, StateCovariance::max_columns / 2> there_;
   Eigen::Matrix<double, Eigen::Dynamic, 3> shear_;
   bool turns_world_ = false;  ///< Whether the errors of this update are those of world_turn.h.
   Camera camera_at_delta_;
   Eigen::MatrixXd joint_x_, joint_s_;
   SmallMatrix triangle_;
   Eigen::VectorXd joint_nu_;
+  double group_prior_ = 0.0;                      ///< What the last step costs before its group is seen: δᵀP⁻¹δ.
   double group_nis_ = 0.0, group_log_det_ = 0.0;  ///< νᵀS⁻¹ν and ln det S of the group that was solved last,
   double total_nis_ = 0.0, total_log_det_ = 0.0;  ///< and of all that are used.
   std::vector<unsigned char> agrees_, agrees_best_;
-  struct Attempt {
+  struct KeptAttempt {
     std::vector<SightOutcome> outcomes;
     std::vector<double> nis;
     std::vector<Measured*> used;

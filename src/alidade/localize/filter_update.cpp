@@ -85,7 +85,9 @@ bool LocalizationFilter::solve(std::span<Measured*> group) {
   const Eigen::LLT<SmallMatrix> llt(S);
   if (llt.info() != Eigen::Success) return false;
   const auto weights = llt.solve(rhs).eval();
-  group_nis_ = rhs.dot(weights);
+  group_nis_ = group_prior_ = rhs.dot(weights);
+  for (int a = 0; a < num; ++a)
+    group_prior_ -= group[static_cast<std::size_t>(a / 2)]->variance_px2 * weights[a] * weights[a];
   group_log_det_ = 0.0;
   for (int a = 0; a < num; ++a) group_log_det_ += 2.0 * std::log(llt.matrixLLT()(a, a));
   for (int i = 0; i < P_.dim(); ++i) {
@@ -98,33 +100,75 @@ bool LocalizationFilter::solve(std::span<Measured*> group) {
   return next_.head(P_.dim()).allFinite();
 }
 
-std::optional<double> LocalizationFilter::bend_of(const Measured& measured) {
-  Measured there = measured;
-  if (!linearise(there)) return std::nullopt;
-  Eigen::Vector2d predicted = measured.c;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(measured.num_support); ++k)
-    predicted -= delta_[measured.columns[k]] * Eigen::Vector2d(measured.h0[k], measured.h1[k]);
-  return std::sqrt((there.nu - predicted).squaredNorm() / measured.variance_px2);
+double LocalizationFilter::bend_between(const Measured& here, const Measured& there) const {
+  Eigen::Vector2d predicted = here.c;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(here.num_support); ++k)
+    predicted -= delta_[here.columns[k]] * Eigen::Vector2d(here.h0[k], here.h1[k]);
+  return std::sqrt((there.nu - predicted).squaredNorm() / here.variance_px2);
+}
+
+/// To `next_`; if it `must_fall`, only so far towards it that the cost falls. The cost is what the step costs before
+/// the group is seen, and the group's residuals; the group as linearised there is in `there_`. False, and no step,
+/// where there is none.
+bool LocalizationFilter::step(std::span<Measured*> group, bool must_fall, StepCost& at) {
+  constexpr double least_share = 0.05, rounding = 1e-6;
+  const int dim = P_.dim();
+  before_.head(dim) = delta_.head(dim);
+  for (double share = 1.0; share > least_share; share *= 0.5) {
+    delta_.head(dim) = before_.head(dim) + share * (next_.head(dim) - before_.head(dim));
+    const double prior = (1.0 - share) * at.prior + share * group_prior_;  // at most: it is convex
+    double all = prior;
+    for (std::size_t m = 0; m < group.size(); ++m) {
+      there_[m] = *group[m];
+      const bool is_seen = linearise(there_[m]);
+      all += is_seen ? there_[m].nu.squaredNorm() / there_[m].variance_px2 : std::numeric_limits<double>::infinity();
+    }
+    if (must_fall && !(all <= at.all + rounding * (1.0 + at.all))) continue;
+    at = {prior, all};
+    return true;
+  }
+  delta_.head(dim) = before_.head(dim);
+  return false;
+}
+
+/// Gauss–Newton from `start_`: what it came to in delta_, the cost of that. None where there is no step.
+std::optional<double> LocalizationFilter::iterate(std::span<Measured*> group, bool must_fall) {
+  StepCost at;
+  for (const Measured* measured : group) at.all += measured->nu.squaredNorm() / measured->variance_px2;
+  bool has_answer = false;
+  constexpr int slower = 8;  // are shortened steps
+  const int most_iterations = (must_fall ? slower : 1) * config_.max_iterations;
+  for (int iteration = 0; iteration < most_iterations; ++iteration) {
+    if (!solve(group)) break;
+    if (!has_answer && group.size() > 1) {  // what they share is counted once
+      for (Measured* measured : group) measured->nis = group_nis_ / static_cast<double>(group.size());
+    }
+    if (config_.max_iterations == 1) {  // a linearisation taken at its word
+      delta_.head(P_.dim()) = next_.head(P_.dim());
+      return group_nis_;
+    }
+    if (!step(group, must_fall, at)) break;
+    has_answer = true;
+    double bend = 0.0;
+    for (std::size_t m = 0; m < group.size(); ++m) bend = std::max(bend, bend_between(*group[m], there_[m]));
+    if (bend < config_.bend_tolerance || iteration + 1 == most_iterations) break;
+    for (std::size_t m = 0; m < group.size(); ++m) *group[m] = there_[m];
+  }
+  return has_answer ? std::optional(at.all) : std::nullopt;
 }
 
 bool LocalizationFilter::take(std::span<Measured*> group) {
   const int dim = P_.dim();
   start_.head(dim) = delta_.head(dim);
-  bool has_answer = false;
-  for (int iteration = 0; iteration < config_.max_iterations; ++iteration) {
-    if (!solve(group)) break;
-    if (!has_answer && group.size() > 1) {  // what they share is counted once
-      for (Measured* measured : group) measured->nis = group_nis_ / static_cast<double>(group.size());
-    }
-    has_answer = true;
-    delta_.head(dim) = next_.head(dim);
-    if (iteration + 1 == config_.max_iterations) break;
-    double bend = 0.0;
-    for (const Measured* measured : group) bend = std::max(bend, bend_of(*measured).value_or(0.0));
-    if (bend < config_.bend_tolerance) break;
+  // Whole steps find the way past a bend. From far away, behind the edge of a strong lens, they can end anywhere: then
+  // again with steps that do not.
+  auto cost = iterate(group, false);
+  if (!(cost && *cost <= config_.gate * static_cast<double>(group.size()))) {
+    delta_.head(dim) = start_.head(dim);
     for (Measured* measured : group) (void)linearise(*measured);
+    cost = iterate(group, true);
   }
-  if (has_answer &&
+  if (cost &&
       P_.append({triangle_.data(), static_cast<std::size_t>(triangle_.size())}, 2 * static_cast<int>(group.size()))) {
     for (Measured* measured : group) used_.push_back(measured);
     total_nis_ += group_nis_;
@@ -156,7 +200,10 @@ bool LocalizationFilter::use_again() {
 void LocalizationFilter::refine() {
   for (int iteration = 0; iteration < config_.max_iterations; ++iteration) {
     double bend = 0.0;
-    for (const Measured* measured : used_) bend = std::max(bend, bend_of(*measured).value_or(0.0));
+    for (const Measured* measured : used_) {
+      there_[0] = *measured;
+      if (linearise(there_[0])) bend = std::max(bend, bend_between(*measured, there_[0]));
+    }
     if (bend < config_.bend_tolerance) return;
     for (Measured* measured : used_) (void)linearise(*measured);
     if (!use_again()) return;
@@ -226,10 +273,14 @@ void LocalizationFilter::use_together() {
   waiting_.clear();
 }
 
+void LocalizationFilter::drop_update() {
+  P_.drop_pending();
+  delta_.setZero();
+}
+
 bool LocalizationFilter::finish_update() {
   if (!delta_.head(P_.dim()).allFinite() || !P_.stays_positive()) {
-    P_.drop_pending();
-    delta_.setZero();
+    drop_update();
     return false;
   }
   P_.commit();
@@ -249,7 +300,7 @@ double LocalizationFilter::cost_of_used() const {
 }
 
 /// From the prior: which sights fit together, and what follows from them.
-double LocalizationFilter::attempt(bool finds_consensus) {
+double LocalizationFilter::attempt(Attempt way) {
   P_.drop_pending();
   delta_.setZero();
   waiting_.clear();
@@ -259,7 +310,8 @@ double LocalizationFilter::attempt(bool finds_consensus) {
   for (Measured& measured : measured_) {
     if (linearise(measured)) waiting_.push_back(&measured);
   }
-  if (finds_consensus) keep_consensus();
+  if (way == Attempt::by_consensus) keep_consensus();
+  if (way == Attempt::jointly) use_first_jointly();
   const auto use = [&] { config_.is_sequential ? use_in_order() : use_together(); };
   use();
   waiting_.swap(doubtful_);  // what disagreed before may agree with the updated state
@@ -288,20 +340,35 @@ void LocalizationFilter::restore_attempt() {
   P_.swap_pending();
 }
 
+/// The first that fit in a group, known ones before others, in one step that no gate judges: three or four sights alone
+/// can settle on the wrong one of the poses that explain them, from where the others look wrong.
+void LocalizationFilter::use_first_jointly() {
+  std::ranges::stable_partition(waiting_, [](const Measured* measured) { return measured->feature->is_known; });
+  const std::size_t num = std::min(waiting_.size(), most_in_group);
+  const bool is_used = take({waiting_.data(), num});
+  for (std::size_t i = 0; i < num; ++i) settle(*waiting_[i], is_used);
+  waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(num));
+}
+
+/// Another attempt, which stands if it explains the sights better.
+double LocalizationFilter::attempt_also(Attempt way, double cost) {
+  keep_attempt();
+  const double other = attempt(way);
+  if (other < cost) return other;
+  restore_attempt();
+  return cost;
+}
+
 /// What fits together, with a consensus where sights disagree.
 double LocalizationFilter::best_attempt() {
-  double cost = attempt(false);
-  constexpr std::size_t least_for_consensus = 4;
-  const auto num_doubtful = static_cast<double>(measured_.size() - used_.size());
-  const bool is_doubtful = num_doubtful > config_.consensus_above * static_cast<double>(measured_.size());
-  if (config_.finds_consensus && is_doubtful && measured_.size() >= least_for_consensus) {
-    keep_attempt();
-    const double with_consensus = attempt(true);
-    if (with_consensus < cost)
-      cost = with_consensus;
-    else
-      restore_attempt();
-  }
+  double cost = attempt(Attempt::in_order);
+  constexpr std::size_t least_for_another = 4;
+  if (!config_.finds_consensus || measured_.size() < least_for_another) return cost;
+  const auto share_left = [&] {
+    return static_cast<double>(measured_.size() - used_.size()) / static_cast<double>(measured_.size());
+  };
+  if (share_left() > config_.consensus_above) cost = attempt_also(Attempt::by_consensus, cost);
+  if (share_left() > 0.5) cost = attempt_also(Attempt::jointly, cost);
   return cost;
 }
 
@@ -314,7 +381,10 @@ SightsReport LocalizationFilter::update(std::span<const FeatureSight> sights) {
     cost = best_attempt();
   }
   SightsReport report{outcomes_, nis_};
-  report.is_sound = finish_update();
+  // Each sight was within the gate when it was used: together they cannot be farther from what they led to.
+  const bool agrees = total_nis_ <= config_.gate * 2.0 * static_cast<double>(std::max<std::size_t>(1, used_.size()));
+  if (!agrees) drop_update();
+  report.is_sound = agrees && finish_update();
   for (SightOutcome& outcome : outcomes_) {
     if (outcome == SightOutcome::used && !report.is_sound) outcome = SightOutcome::gated;
     if (outcome == SightOutcome::gated) ++report.num_gated;

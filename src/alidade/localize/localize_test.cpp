@@ -151,8 +151,9 @@ TEST(Localize, FindsMismatches) {
   EXPECT_LT(std::sqrt(with2 / without2), 1.2);  // the goal is 1.1 over many sequences; three scatter by 10 %
 }
 
+/// Whole Gauss–Newton steps alone lose one camera in four here: a second in the dark is a tenth of a radian.
 TEST(Localize, RecoversFromABlackout) {
-  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     UnderwaterScene scene = rich_scene();
     scene.blackout_from_s = 2.0;
     scene.blackout_s = 1.0;

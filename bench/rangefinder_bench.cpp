@@ -9,8 +9,9 @@
 namespace alidade::bench {
 namespace {
 
-/// From corners, spots and readings to the beam with covariance: boards' poses, start, outliers, refinement.
-void time_solve(benchmark::State& state, RangefinderMethod method, Refine refine) {
+/// From corners, spots and readings to the beam with covariance: boards' poses, start, outliers, refinement. Where σ is
+/// not told, wrong shots are always looked for, and σ and beam are found in turn.
+void time_solve(benchmark::State& state, RangefinderMethod method, Refine refine, bool tells_sigma) {
   RangefinderSceneConfig scene_config = *rangefinder_scenario("reference");
   scene_config.num_shots = static_cast<int>(state.range(0));
   const RangefinderScene scene = draw_rangefinder_scene(scene_config, 1);
@@ -19,8 +20,10 @@ void time_solve(benchmark::State& state, RangefinderMethod method, Refine refine
   RangefinderConfig config;
   config.method = method;
   config.refine = refine;
-  config.sigma_spot_px = 0.3;
-  config.range_noise = RangeNoise{0.002};
+  if (tells_sigma) {
+    config.sigma_spot_px = 0.3;
+    config.range_noise = RangeNoise{0.002};
+  }
   for (auto _ : state) {
     const RangefinderReport report = calibrate_rangefinder(shots, points, scene.camera, config);
     if (report.status != RangefinderReport::Status::converged) state.SkipWithError("no beam");
@@ -41,11 +44,14 @@ void add_all() {
                                                               {"joint", RangefinderMethod::joint}}) {
     for (const auto& [what, refine] :
          std::vector<std::pair<std::string, Refine>>{{"beam", Refine::beam}, {"all", Refine::all}}) {
-      benchmark::RegisterBenchmark(("rangefinder/" + name + "/" + what).c_str(),
-                                   [=](benchmark::State& state) { time_solve(state, method, refine); })
-          ->Arg(18)
-          ->MeasureProcessCPUTime()
-          ->Unit(benchmark::kMillisecond);
+      for (const bool tells_sigma : {true, false}) {
+        const std::string of = "rangefinder/" + name + "/" + what + (tells_sigma ? "" : "/sigma_from_residuals");
+        benchmark::RegisterBenchmark(of.c_str(),
+                                     [=](benchmark::State& state) { time_solve(state, method, refine, tells_sigma); })
+            ->Arg(18)
+            ->MeasureProcessCPUTime()
+            ->Unit(benchmark::kMillisecond);
+      }
     }
   }
   benchmark::RegisterBenchmark("plan_next_shots/1", time_plan)->MeasureProcessCPUTime()->Unit(benchmark::kMillisecond);

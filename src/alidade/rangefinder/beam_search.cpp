@@ -104,6 +104,12 @@ Agreement agreement_of(const Sample& shots, const Beam& beam, const Camera& came
   return found;
 }
 
+/// A sample's beam, and who agrees with it.
+struct Candidate {
+  Beam beam;
+  Agreement agreement;
+};
+
 /// Of the shots those that agree are used, the others not; how many are.
 int use_agreeing(const Sample& shots, const Agreement& agreement, const OutlierSearch& search, BeamProblem& problem) {
   int num = 0;
@@ -192,18 +198,25 @@ std::optional<Beam> find_outliers(BeamProblem& problem, const Camera& camera, co
   const std::size_t size = sample_size(problem);
   if (shots.size() < size) return std::nullopt;
   std::mt19937_64 bits(search.seed);
+  std::vector<Candidate> candidates;
+  for (int draw = 0; draw < search.num_draws; ++draw) {
+    for (const Beam& beam : starts_of(draw_sample(shots, size, bits), problem, camera)) {
+      Candidate candidate{beam, agreement_of(shots, beam, camera, problem.model, search)};
+      if (std::isfinite(candidate.agreement.score)) candidates.push_back(std::move(candidate));
+    }
+  }
+  // Local optimisation of the most promising only: O. Chum et al., "Locally Optimized RANSAC", 2003.
+  constexpr std::size_t most_refined = 12;
+  std::ranges::stable_sort(candidates, {}, [](const Candidate& candidate) { return candidate.agreement.score; });
+  if (candidates.size() > most_refined) candidates.resize(most_refined);
   BeamProblem work = problem;
   std::optional<Beam> best;
   Agreement best_agreement;
-  for (int draw = 0; draw < search.num_draws; ++draw) {
-    for (Beam beam : starts_of(draw_sample(shots, size, bits), problem, camera)) {
-      Agreement agreement = agreement_of(shots, beam, camera, problem.model, search);
-      if (!(agreement.score < 2.0 * best_agreement.score)) continue;
-      beam = refined_on_agreeing(shots, beam, agreement, camera, search, work);
-      if (!(agreement.score < best_agreement.score)) continue;
-      best = beam;
-      best_agreement = std::move(agreement);
-    }
+  for (Candidate& candidate : candidates) {
+    const Beam beam = refined_on_agreeing(shots, candidate.beam, candidate.agreement, camera, search, work);
+    if (!(candidate.agreement.score < best_agreement.score)) continue;
+    best = beam;
+    best_agreement = std::move(candidate.agreement);
   }
   if (!best) return std::nullopt;
   if (!search.knows_sigma) best = grown(shots, *best, best_agreement, camera, search, work);

@@ -24,8 +24,8 @@ struct OutlierSearch {
 };
 
 /// Marks in `used` which shots agree with the beam that most agree with: random samples as small as the method allows,
-/// spread in range, each solved and, where it is the best so far, refined with those that agree. The beam; none where
-/// no sample has one. M. A. Fischler & R. C. Bolles, 1981; P. H. S. Torr & A. Zisserman, 2000 (the truncated cost).
+/// spread in range, each solved, and the best of them refined with those that agree. The beam; none where no sample has
+/// one. M. A. Fischler & R. C. Bolles, 1981; P. H. S. Torr & A. Zisserman, 2000 (the truncated cost).
 [[nodiscard]] std::optional<Beam> find_outliers(BeamProblem& problem, const Camera& camera,
                                                 const OutlierSearch& search);
 

@@ -94,7 +94,8 @@ std::optional<ShotResidual> shot_residual(const PreparedShot& shot, const Beam& 
                                           const ShotModel& model) {
   const int rows = shot.num_rows();
   const Eigen::Index num_lens = std::visit([](const auto& lens) { return lens.params.size(); }, camera.lens);
-  ShotResidual out;
+  std::optional<ShotResidual> result(std::in_place);  // built where it is returned: it is large
+  ShotResidual& out = *result;
   out.r.setZero(rows);
   out.J_beam.setZero(rows, num_beam_params);
   out.J_pose.setZero(rows, 6);
@@ -111,7 +112,7 @@ std::optional<ShotResidual> shot_residual(const PreparedShot& shot, const Beam& 
   const Hit* at = hit && !model.reading_counts_twice ? &*hit : nullptr;
   if (shot.spot_px && !put_spot_rows(shot, at, beam, camera, sigma_m, out)) return std::nullopt;
   if (!out.r.allFinite()) return std::nullopt;
-  return out;
+  return result;
 }
 
 Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> full_covariance(const PreparedShot& shot,

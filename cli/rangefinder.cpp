@@ -96,6 +96,14 @@ void add_corners(const RangefinderArgs& args, const Board& board, const std::vec
   }
 }
 
+/// Simulated and measured elsewhere: shots name photos that nobody has, and their corners lie beside them.
+std::string corners_beside(const std::filesystem::path& shots) {
+  const std::filesystem::path corners = shots.parent_path() / "corners.csv";
+  return std::filesystem::exists(corners)
+             ? fmt::format("; for the corners in its stead: --corners {}", corners.string())
+             : "";
+}
+
 /// Boards and spots out of the photos. What is wrong with a photo stops the run, or with --skip-bad its row is named.
 void add_photos(const RangefinderArgs& args, const std::optional<Board>& board, const Camera& camera, ShotsFile& file,
                 std::vector<Shot>& shots, Run& run) {
@@ -111,7 +119,7 @@ void add_photos(const RangefinderArgs& args, const std::optional<Board>& board, 
     const std::string where =
         fmt::format("{}:{}: photo '{}': ", args.shots.string(), file.rows[i].line, file.rows[i].photo);
     if (!seen[i].fault.empty()) {
-      if (!args.skip_bad) throw InputError(where + seen[i].fault);
+      if (!args.skip_bad) throw InputError(where + seen[i].fault + corners_beside(args.shots));
       file.skipped.push_back({args.shots.string(), file.rows[i].line, seen[i].fault});
       continue;
     }

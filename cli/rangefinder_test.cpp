@@ -69,6 +69,19 @@ TEST_F(RangefinderCommand, GivesTheBeamWithTheNamesOfTheContract) {
   }
 }
 
+TEST_F(RangefinderCommand, PointsToTheCornersWhereNobodyHasThePhotos) {
+  simulate();
+  const std::vector<std::string> arguments{"rangefinder", path("sim/shots.csv"),
+                                           "--camera",    path("sim/camera.yaml"),
+                                           "--board",     "9x6",
+                                           "--square",    "0.04",
+                                           "--out",       path("out")};
+  const Outcome outcome = alidade(arguments);
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("shot_001.png"));
+  EXPECT_THAT(outcome.err, HasSubstr("--corners " + path("sim/corners.csv")));
+}
+
 TEST_F(RangefinderCommand, ProjectSaysWhereTheSpotIsAndHowSure) {
   simulate();
   ASSERT_EQ(calibrate({"--no-report"}).code, 0);

@@ -152,10 +152,10 @@ TEST(LocalizationFilter, AConsensusThatHelpsNotLeavesNoTrace) {
   EXPECT_GT(num_same, 5);
 }
 
-/// Frames with mismatches, so that every part of an update is there.
+/// Frames with many mismatches, so that every part of an update is there.
 TEST(LocalizationFilter, AllocatesNothingOnceItRuns) {
   UnderwaterScene scene = scene_of(40, 90);
-  scene.mismatches = 0.3;
+  scene.mismatches = 0.55;
   const auto sample = testing::underwater_sample(scene, 14);
   LocalizationFilter filter = filter_of(sample);
   std::size_t num_gated = 0;

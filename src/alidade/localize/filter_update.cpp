@@ -343,8 +343,9 @@ void LocalizationFilter::restore_attempt() {
 /// The first that fit in a group, known ones before others, in one step that no gate judges: three or four sights alone
 /// can settle on the wrong one of the poses that explain them, from where the others look wrong.
 void LocalizationFilter::use_first_jointly() {
-  std::ranges::stable_partition(waiting_, [](const Measured* measured) { return measured->feature->is_known; });
   const std::size_t num = std::min(waiting_.size(), most_in_group);
+  if (num == 0) return;
+  std::ranges::partition(waiting_, [](const Measured* measured) { return measured->feature->is_known; });
   const bool is_used = take({waiting_.data(), num});
   for (std::size_t i = 0; i < num; ++i) settle(*waiting_[i], is_used);
   waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(num));

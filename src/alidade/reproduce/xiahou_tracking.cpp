@@ -113,7 +113,7 @@ Experiment xiahou_tracking(const ReproduceConfig& config) {
              not_a_number, quantile_of(other.nees, 0.5)};
   sure.holds = near_to(sure.ours, 3.0, 0.2);
   sure.words = fmt::format("Far too sure: its lag is not noise. With Q = I6 {:.2g}.", quantile_of(first.nees, 0.5));
-  for (Claim* claim : {&mean, &most, &sure}) claim->figure = std::string("5");
+  for (Claim* claim : {&mean, &most, &sure}) claim->figure = "5";
   return {"tracking",
           "Figure 5: trajectory and error",
           "The paper's filter in its own simulation: tangents and coordinates, not angles, with noise of variance "

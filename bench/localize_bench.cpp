@@ -1,9 +1,13 @@
 /// Processor times of the localisation filter by the size of its state: localize_bench [--benchmark_filter=...]
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
+#include <chrono>
 #include <string>
 
+#include "alidade/localize/localize_images.h"
 #include "alidade/testing/localize_sample.h"
+#include "alidade/testing/room_video.h"
 #include "run_benchmarks.h"
 
 namespace alidade::bench {
@@ -68,7 +72,60 @@ void time_expected(benchmark::State& state, int num_features) {
   state.counters["state"] = filter.dim();
 }
 
+/// A picture of 640×480, from pixels to pose, with at least 60 features found in it: the median of two seconds of film
+/// of a room, rendered beforehand.
+void time_frames(benchmark::State& state) {
+  testing::RoomScene scene;
+  scene.camera = testing::room_camera();
+  scene.camera.width_px = 640;
+  scene.camera.height_px = 480;
+  Params<KannalaBrandt> lens = Params<KannalaBrandt>::Zero();
+  lens.head<4>() << 390.0, 390.0, 319.5, 239.5;
+  scene.camera.lens = Calibrated<KannalaBrandt>{lens};
+  scene.num_frames = 60;
+  std::vector<cv::Mat> film;
+  for (const Rigid3& world_from_cam : testing::room_path(scene))
+    film.push_back(testing::render_room(scene, world_from_cam, film.size()));
+  LocalizeImagesConfig config;
+  config.localize.filter.sigma_a_m_s2 = 4.0;
+  config.localize.filter.sigma_alpha_rad_s2 = 6.0;
+  config.localize.seconds = [] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  };
+  config.target = rectangle_target(scene.rectangle_width_m, scene.rectangle_height_m);
+  config.eyes.least_found = 75;
+  config.eyes.most_tried = 90;
+  for (auto _ : state) {
+    std::size_t at = 0;
+    const NextPicture next = [&](cv::Mat& grey, long& frame, double& t_s) {
+      if (at == film.size()) return false;
+      grey = film[at];
+      frame = static_cast<long>(at);
+      t_s = static_cast<double>(at++) / scene.rate_hz;
+      return true;
+    };
+    const LocalizeReport report = localize_images(scene.camera, next, film.size(), config);
+    std::vector<double> seconds, found, features;
+    for (const PathStep& step : report.path) {
+      seconds.push_back(step.seconds);
+      found.push_back(static_cast<double>(step.num_tracked));
+      features.push_back(static_cast<double>(step.num_features));
+    }
+    const auto median = [](std::vector<double>& of) {
+      std::ranges::nth_element(of, of.begin() + static_cast<std::ptrdiff_t>(of.size() / 2));
+      return of[of.size() / 2];
+    };
+    state.SetIterationTime(median(seconds));
+    state.counters["found"] = median(found);
+    state.counters["features"] = median(features);
+  }
+}
+
 void add_all() {
+  benchmark::RegisterBenchmark("frame/640x480", time_frames)
+      ->UseManualTime()
+      ->Iterations(5)
+      ->Unit(benchmark::kMillisecond);
   for (const int num_features : {8, 25, 54, 84, 104, 154, 204, 304}) {
     const std::string end = "/" + std::to_string(num_features);
     benchmark::RegisterBenchmark(("update/inverse_depth" + end).c_str(), [=](benchmark::State& state) {

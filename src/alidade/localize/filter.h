@@ -203,7 +203,8 @@ class LocalizationFilter {
   std::vector<SightOutcome> outcomes_;
   std::vector<double> nis_;
   Eigen::VectorXd start_, next_, before_;
-  std::array<Measured, StateCovariance::max_columns / 2> there_;
+  static constexpr std::size_t most_in_group = StateCovariance::max_columns / 2;
+  std::array<Measured, most_in_group> there_;
   Eigen::Matrix<double, Eigen::Dynamic, 3> shear_;
   bool turns_world_ = false;  ///< Whether the errors of this update are those of world_turn.h.
   Camera camera_at_delta_;

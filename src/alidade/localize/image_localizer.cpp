@@ -295,7 +295,7 @@ bool ImageLocalizer::try_from(const cv::Mat& smoothed, const StartHypothesis& fr
 /// Where the sights of several pictures in a row contradict the path though they are found: from the target or a
 /// keyframe, if that explains this picture.
 bool ImageLocalizer::restart_in_doubt(const cv::Mat& smoothed, PathStep& step) {
-  if (!config_.localize.restarts || !doubt_.is_wrong_after(step)) return false;
+  if (!config_.localize.restarts || doubt_.after(step) != Doubt::strong) return false;
   doubt_.clear();
   const FilterBank before = *bank_;
   if (find_back(smoothed, step)) return true;

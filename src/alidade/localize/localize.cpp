@@ -36,7 +36,8 @@ class Localizer {
   void predict_to(double t_s);
   void add_new(const SightFrame& frame);
   void drop_strangers(const SightFrame& frame, const SightsReport& report);
-  bool restart(const SightFrame& frame);
+  [[nodiscard]] std::vector<StartHypothesis> elsewhere(const SightFrame& frame) const;
+  bool restart(const SightFrame& frame, Doubt doubt);
   void fill(const SightFrame& frame, const SightsReport& report, PathStep& step) const;
 
   Camera camera_;
@@ -45,6 +46,7 @@ class Localizer {
   PointStore points_;
   double period_s_, t_s_ = 0.0, seen_s_ = 0.0;
   PathDoubt doubt_;
+  int num_elsewhere_ = 0;  ///< Frames in a row in which the target says that the camera is somewhere else.
   RadialResiduals residuals_;
   std::size_t num_restarts_ = 0;
 };
@@ -97,10 +99,10 @@ void Localizer::drop_strangers(const SightFrame& frame, const SightsReport& repo
   }
 }
 
-/// From the target, where it says that the camera is somewhere else. The map of points that led there is dropped.
-bool Localizer::restart(const SightFrame& frame) {
-  const std::vector<StartHypothesis> from = poses_from_known(camera_, frame.sights, config_.target, pose_config());
-  if (from.empty()) return false;
+/// Where the camera is by the target, if that contradicts the path. Empty: it does not, or its sights fit no pose.
+std::vector<StartHypothesis> Localizer::elsewhere(const SightFrame& frame) const {
+  std::vector<StartHypothesis> from = poses_from_known(camera_, frame.sights, config_.target, pose_config());
+  if (from.empty()) return from;
   const LocalizationFilter& now = bank_->best();
   const CameraMotion& is = now.motion();
   Eigen::Vector<double, 6> difference;
@@ -109,13 +111,25 @@ bool Localizer::restart(const SightFrame& frame) {
   const Eigen::Matrix<double, 6, 6> cov =
       now.motion_covariance().topLeftCorner<6, 6>() + from.front().cov.topLeftCorner<6, 6>();
   constexpr double gate = 22.5;  // χ² of six numbers: 99.9 %
-  if (difference.dot(cov.inverse() * difference) < gate) return false;
+  if (difference.dot(cov.inverse() * difference) < gate) from.clear();
+  return from;
+}
+
+/// From the target, where it says that the camera is somewhere else; where there is only some doubt, three times
+/// running: mismatches may look like another pose, but not again and again. The map of points that led there is
+/// dropped.
+bool Localizer::restart(const SightFrame& frame, Doubt doubt) {
+  constexpr int sure = 3;
+  const std::vector<StartHypothesis> from = doubt == Doubt::none ? std::vector<StartHypothesis>{} : elsewhere(frame);
+  num_elsewhere_ = from.empty() ? 0 : num_elsewhere_ + 1;
+  if (from.empty() || (doubt == Doubt::some && num_elsewhere_ < sure)) return false;
   std::vector<long> unknown;
-  for (const Feature& feature : now.features())
+  for (const Feature& feature : bank_->best().features())
     if (!feature.is_known) unknown.push_back(feature.id);
   for (const long id : unknown) bank_->remove(id);
   bank_->restart(from);
   doubt_.clear();
+  num_elsewhere_ = 0;
   ++num_restarts_;
   return true;
 }
@@ -157,9 +171,9 @@ PathStep Localizer::take(const SightFrame& frame) {
   fill(frame, report, step);
   residuals_.add(bank_->best(), frame.sights, report.outcomes);
   if (step.event == FrameEvent::tracked && step.num_tracked < least_sights) step.event = FrameEvent::predicted;
-  const bool is_wrong_now = doubt_.is_wrong_after(step);
+  const Doubt doubt = doubt_.after(step);
   drop_strangers(frame, report);
-  if (config_.restarts && is_wrong_now && restart(frame)) {
+  if (config_.restarts && restart(frame, doubt)) {
     fill(frame, bank_->update(frame.sights), step);
     step.event = FrameEvent::restarted;
   }
@@ -227,6 +241,7 @@ LocalizeReport localize_sights(const Camera& camera, std::span<const SightFrame>
     report.path.push_back(localizer.take(frames[i]));
     if (config.seconds) report.path.back().seconds = config.seconds() - begin_s;
     if (config.watch) config.watch(report.path.back());
+    if (config.inspect && localizer.bank()) config.inspect(localizer.bank()->best());
   }
   report.num_restarts = localizer.num_restarts();
   sum_up(

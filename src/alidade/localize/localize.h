@@ -73,6 +73,8 @@ struct LocalizeConfig {
   double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;  ///< At a start from the target or from nothing.
   std::function<double()> seconds;                       ///< A clock, if frames are to be timed.
   std::function<void(const PathStep&)> watch;            ///< Is shown each step; what it throws ends the work.
+  /// Is shown the filter after each frame of localize_sights that has one.
+  std::function<void(const LocalizationFilter&)> inspect;
 };
 
 struct MapPoint {

@@ -63,6 +63,25 @@ void add_truth(const LocalizeReport& report, Verdict& verdict) {
                               before, elsewhere_ratio, "σ", "path"});
 }
 
+/// After frames without a pose it is the way back; else what led to it was wrong for some time before.
+std::string restarts_text(const LocalizeReport& report) {
+  std::size_t num_back = 0, num_anew = 0;
+  long last_anew = 0;
+  for (std::size_t i = 1; i < report.path.size(); ++i) {
+    if (report.path[i].event != FrameEvent::restarted) continue;
+    const bool was_lost = report.path[i - 1].event == FrameEvent::predicted;
+    ++(was_lost ? num_back : num_anew);
+    if (!was_lost) last_anew = report.path[i].frame;
+  }
+  const auto times = [](std::size_t num) { return num == 1 ? std::string("once") : std::to_string(num) + " times"; };
+  std::string text = num_back > 0 ? "found its way back " + times(num_back) : "";
+  if (num_anew > 0)
+    text += (text.empty() ? "begun anew " : "; begun anew ") + times(num_anew) +
+            (num_anew == 1 ? ", in" : ", last in") + " frame " + std::to_string(last_anew) +
+            ": do not trust the path before it";
+  return text;
+}
+
 void add_checks(const LocalizeReport& report, Verdict& verdict) {
   const double nis = report.nis_per_dof;
   const State nis_state = nis < good_nis_low ? State::care : state_of(nis, good_nis_high, care_nis);
@@ -98,9 +117,8 @@ void add_checks(const LocalizeReport& report, Verdict& verdict) {
                                 : "scale unknown: the path is up to scale, its unit is the depth at the start",
                             0.0, 0.0, "", "path"});
   if (report.num_restarts > 0)
-    verdict.checks.push_back({"restarts", State::care,
-                              "begun anew from the target " + std::to_string(report.num_restarts) + " times",
-                              static_cast<double>(report.num_restarts), 0.0, "times", "path"});
+    verdict.checks.push_back({"restarts", State::care, restarts_text(report), static_cast<double>(report.num_restarts),
+                              0.0, "times", "path"});
   add_truth(report, verdict);
 }
 

@@ -1,33 +1,46 @@
 #include "alidade/localize/path_doubt.h"
 
-namespace alidade {
+#include <numeric>
 
-bool PathDoubt::is_wrong_after(const PathStep& step) {
-  if (step.num_tracked + step.num_gated == 0) return false;
-  constexpr std::size_t window = 5;
+namespace alidade {
+namespace {
+
+constexpr std::size_t window = 5;
+
+double share(std::size_t part, std::size_t of) {
+  return of > 0 ? static_cast<double>(part) / static_cast<double>(of) : 0.0;
+}
+
+void push(std::deque<double>& recent, double value) {
+  recent.push_back(value);
+  if (recent.size() > window) recent.pop_front();
+}
+
+double mean(const std::deque<double>& recent) {
+  return std::accumulate(recent.begin(), recent.end(), 0.0) / static_cast<double>(recent.size());
+}
+
+}  // namespace
+
+Doubt PathDoubt::after(const PathStep& step) {
+  const std::size_t num = step.num_tracked + step.num_gated;
+  if (num == 0) return Doubt::none;
   constexpr double most_nis = 2.0, most_gated = 0.6;
-  recent_nis_.push_back(step.num_tracked > 0 ? step.nis_per_dof : most_nis);
-  const double gated_now = static_cast<double>(step.num_gated) / static_cast<double>(step.num_tracked + step.num_gated);
-  const double known_gated =
-      step.num_known > 0 ? static_cast<double>(step.num_known_gated) / static_cast<double>(step.num_known) : 0.0;
-  constexpr double more_of_known = 0.25;  // four known points, two of them mismatched, are no proof
-  recent_gated_.push_back(std::max(gated_now, known_gated - more_of_known));
-  if (recent_nis_.size() > window) {
-    recent_nis_.pop_front();
-    recent_gated_.pop_front();
-  }
-  if (recent_nis_.size() < window) return false;
-  double nis = 0.0, gated = 0.0;
-  for (std::size_t i = 0; i < window; ++i) {
-    nis += recent_nis_[i] / window;
-    gated += recent_gated_[i] / window;
-  }
-  return nis > most_nis || gated > most_gated;
+  constexpr double most_known_gated = 0.85;  // four known points, two of them mismatched, are no proof
+  constexpr double many_known_gated = 0.3;
+  push(recent_nis_, step.num_tracked > 0 ? step.nis_per_dof : most_nis);
+  push(recent_gated_, share(step.num_gated, num));
+  push(recent_known_gated_, share(step.num_known_gated, step.num_known));
+  if (recent_nis_.size() < window) return Doubt::none;
+  if (mean(recent_nis_) > most_nis || mean(recent_gated_) > most_gated || mean(recent_known_gated_) > most_known_gated)
+    return Doubt::strong;
+  return mean(recent_known_gated_) > many_known_gated ? Doubt::some : Doubt::none;
 }
 
 void PathDoubt::clear() {
   recent_nis_.clear();
   recent_gated_.clear();
+  recent_known_gated_.clear();
 }
 
 }  // namespace alidade

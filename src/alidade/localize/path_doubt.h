@@ -6,15 +6,21 @@
 
 namespace alidade {
 
+enum class Doubt {
+  none,
+  some,    ///< More than three in ten of the target's sights are gated: the path may be wrong, or they.
+  strong,  ///< The path is wrong.
+};
+
 /// Whether the last frames say that the path is wrong: a path may fit its own map well and be elsewhere.
 class PathDoubt {
  public:
-  /// Mean NIS above 2, or most sights or most of the target's gated, over five frames with sights.
-  [[nodiscard]] bool is_wrong_after(const PathStep& step);
+  /// Strong: mean NIS above 2, or most sights or most of the target's gated, over five frames with sights.
+  [[nodiscard]] Doubt after(const PathStep& step);
   void clear();
 
  private:
-  std::deque<double> recent_nis_, recent_gated_;
+  std::deque<double> recent_nis_, recent_gated_, recent_known_gated_;
 };
 
 }  // namespace alidade

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace alidade {
 
@@ -15,7 +16,7 @@ bool PointStore::is_stranger(long id, SightOutcome outcome) {
   const bool is_known = std::ranges::find(config_->target, id, &KnownPoint::id) != config_->target.end();
   if (is_known || point.num_gated_in_a_row < most_gated) return false;
   point = {};
-  point.was_stranger = true;
+  point.was_in_map = true;
   return true;
 }
 
@@ -44,9 +45,8 @@ std::optional<RangePrior> PointStore::prior_of(const FeatureSight& sight, const 
   const double least_z = 0.05;  // a fisheye sees sideways, too: there a depth is no distance
   const double z = std::max(ray_in_cam->z(), least_z);
   const auto told = std::ranges::find(config_->depths, sight.id, &ToldDepth::id);
-  const auto point = points_.find(sight.id);
-  const bool is_believed = point == points_.end() || !point->second.was_stranger;
-  if (told != config_->depths.end() && is_believed) return RangePrior{told->depth_m / z, told->sigma_rel};
+  const bool is_new = !std::exchange(points_[sight.id].was_in_map, true);
+  if (told != config_->depths.end() && is_new) return RangePrior{told->depth_m / z, told->sigma_rel};
   return RangePrior{usual_depth_m(filter) / z, config_->sigma_depth};
 }
 

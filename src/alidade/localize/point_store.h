@@ -23,7 +23,7 @@ class PointStore {
   struct Point {
     std::size_t num_used = 0;
     int num_gated_in_a_row = 0;
-    bool was_stranger = false;                   ///< What was told of its depth did not lead anywhere.
+    bool was_in_map = false;                     ///< What is told of its depth holds where it was first seen.
     std::optional<Rigid3> first_world_from_cam;  ///< Of a delayed one.
     Eigen::Vector3d first_ray_in_world = Eigen::Vector3d::Zero();
   };

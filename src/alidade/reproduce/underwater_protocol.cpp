@@ -99,58 +99,54 @@ PointError point_error(const UnderwaterSample& sample, long id, const Eigen::Vec
 
 namespace {
 
-PointError error_of(const UnderwaterSample& sample, const FilterBank& bank, long id) {
-  const auto place = bank.best().place(id);
+PointError error_of(const UnderwaterSample& sample, const LocalizationFilter& filter, long id) {
+  const auto place = filter.place(id);
   return place ? point_error(sample, id, place->point_in_world, place->cov) : PointError{100.0, 100.0};
 }
 
 /// What stands in the last frame.
-void add_last_frame(const UnderwaterSample& sample, const FilterBank& bank, ProtocolRun& run) {
-  run.p1_last = error_of(sample, bank, 1).percent;
-  run.p5_last = error_of(sample, bank, 5).percent;
-  run.p1_nees = error_of(sample, bank, 1).nees;
-  run.p5_nees = error_of(sample, bank, 5).nees;
+void add_last_frame(const UnderwaterSample& sample, const LocalizationFilter& filter, ProtocolRun& run) {
+  run.p1_last = error_of(sample, filter, 1).percent;
+  run.p5_last = error_of(sample, filter, 5).percent;
+  run.p1_nees = error_of(sample, filter, 1).nees;
+  run.p5_nees = error_of(sample, filter, 5).nees;
+  run.worst_last = 0.0;
   for (const auto& [id, point_in_world] : sample.points)
-    run.worst_last = std::max(run.worst_last, error_of(sample, bank, id).percent);
-  const Rigid3& world_from_cam = bank.best().motion().world_from_cam;
+    run.worst_last = std::max(run.worst_last, error_of(sample, filter, id).percent);
+  const Rigid3& world_from_cam = filter.motion().world_from_cam;
   run.camera_mm = 1e3 * (world_from_cam.translation - sample.truth.back().world_from_cam.translation).norm();
-  run.camera = bank.best().camera();
-  run.sigma_lens = bank.best().lens_sigmas();
+  run.camera = filter.camera();
+  run.sigma_lens = filter.lens_sigmas();
 }
 
 }  // namespace
 
 ProtocolRun run_protocol(const UnderwaterSample& sample, const Camera& camera, const LocalizationFilterConfig& filter,
                          const FilterBankConfig& bank_config, FeatureKind kind) {
-  const StartHypothesis start = *sample.config.start;
-  FilterBank bank(camera, {&start, 1}, filter, bank_config);
-  for (const KnownPoint& point : sample.config.target) bank.add_known(point.id, point.point_in_world, point.sigma_m);
+  LocalizeConfig config = sample.config;
+  config.filter = filter;
+  config.bank = bank_config;
+  config.new_points = kind == FeatureKind::xyz ? NewPoints::xyz : NewPoints::inverse_depth;
+  config.restarts = filter.finds_consensus;
   ProtocolRun run;
-  double num = 0.0;
-  for (std::size_t k = 0; k < sample.frames.size(); ++k) {
-    const SightFrame& frame = sample.frames[k];
-    if (k > 0) bank.predict(frame.t_s - sample.frames[k - 1].t_s);
-    run.nis_per_dof += bank.update(frame.sights).nis_per_dof / static_cast<double>(sample.frames.size());
-    for (const FeatureSight& sight : frame.sights) {
-      const auto told = std::ranges::find(sample.config.depths, sight.id, &ToldDepth::id);
-      const auto ray_in_cam = unproject(bank.best().camera(), sight.px);
-      if (bank.best().has(sight.id) || told == sample.config.depths.end() || !ray_in_cam) continue;
-      bank.add(sight.id, sight.px, {told->depth_m / ray_in_cam->z(), told->sigma_rel}, kind);
-    }
-    bank.convert_linear();
-    const double p1 = error_of(sample, bank, 1).percent, p5 = error_of(sample, bank, 5).percent;
-    run.p1_percent.push_back(p1);
-    run.p5_percent.push_back(p5);
-    if (k < 10) continue;
-    run.p1_mean += p1;
-    run.p5_mean += p5;
-    run.p1_above_2 += p1 > 2.0 ? 1.0 : 0.0;
-    num += 1.0;
+  run.p1_last = run.p5_last = run.worst_last = 100.0;  // where nothing ever starts
+  config.inspect = [&](const LocalizationFilter& now) {
+    run.p1_percent.push_back(error_of(sample, now, 1).percent);
+    run.p5_percent.push_back(error_of(sample, now, 5).percent);
+    add_last_frame(sample, now, run);
+  };
+  const LocalizeReport report = localize_sights(camera, sample.frames, config);
+  for (auto* percent : {&run.p1_percent, &run.p5_percent})  // frames before the start
+    percent->insert(percent->begin(), sample.frames.size() - percent->size(), 100.0);
+  for (const PathStep& step : report.path)
+    if (step.num_tracked > 0) run.nis_per_dof += step.nis_per_dof / static_cast<double>(report.path.size());
+  constexpr std::size_t first = 10;
+  const double num = static_cast<double>(sample.frames.size() - first);
+  for (std::size_t k = first; k < sample.frames.size(); ++k) {
+    run.p1_mean += run.p1_percent[k] / num;
+    run.p5_mean += run.p5_percent[k] / num;
+    run.p1_above_2 += run.p1_percent[k] > 2.0 ? 1.0 / num : 0.0;
   }
-  run.p1_mean /= num;
-  run.p5_mean /= num;
-  run.p1_above_2 /= num;
-  add_last_frame(sample, bank, run);
   return run;
 }
 

@@ -56,7 +56,7 @@ struct ProtocolRun {
   Eigen::VectorXd sigma_lens;
 };
 
-/// Drives the bank itself, frame by frame, so that points can be judged on the way.
+/// As `alidade localize` does it. The paper's filter (no gate) never begins anew.
 [[nodiscard]] ProtocolRun run_protocol(const UnderwaterSample& sample, const Camera& camera,
                                        const LocalizationFilterConfig& filter, const FilterBankConfig& bank_config,
                                        FeatureKind kind);

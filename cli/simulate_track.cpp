@@ -1,11 +1,13 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
 
 #include "alidade/io/events_file.h"
 #include "alidade/io/rig_file.h"
+#include "alidade/io/servo_scenario_file.h"
 #include "alidade/io/video_sights.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/target_video.h"
@@ -17,18 +19,45 @@
 namespace alidade::cli {
 namespace {
 
+constexpr double longest_s = 3600.0;
+
 struct SimulateTrackArgs {
-  std::string scenario = "B";
+  std::string scenario = "B", path;
   bool video = false;
   double duration_s = 0.0;
   double latency_ms = -1.0, lag_s = 0.34, sigma_px = 0.5, sigma_angle = 0.0008726646259971648;
 };
+
+/// What a filter should be told of a recorded target: nearly the largest acceleration over a tenth of a second, in
+/// which the record's own jitter is small.
+double usual_acceleration(const TrackScene& scene) {
+  constexpr double step_s = 0.1, nearly_all = 0.9;
+  std::vector<double> all{0.0};
+  for (double t_s = step_s; t_s + step_s <= scene.duration_s; t_s += step_s) {
+    const Eigen::Vector3d bend =
+        scene.position(t_s + step_s) - 2.0 * scene.position(t_s) + scene.position(t_s - step_s);
+    all.push_back(bend.norm() / (step_s * step_s));
+  }
+  const auto at = static_cast<std::ptrdiff_t>(nearly_all * static_cast<double>(all.size() - 1));
+  std::ranges::nth_element(all, all.begin() + at);
+  return std::max(all[static_cast<std::size_t>(at)], 0.01);
+}
+
+/// The heads of the scenario watch a target that went where a file says.
+void follow_record(const std::string& file, TrackScene& scene) {
+  const TargetPath path = read_recorded_path(file);
+  scene.name += " along " + file;
+  scene.position = [path](double t_s) { return path.at(path.recorded_s.front() + t_s); };
+  scene.duration_s = std::min(path.recorded_s.back() - path.recorded_s.front(), longest_s);
+  scene.sigma_a_m_s2 = usual_acceleration(scene);
+}
 
 TrackScene scene_of(const SimulateTrackArgs& args) {
   auto scene = track_scenario(args.scenario);
   if (!scene)
     throw UsageError(
         fmt::format("--scenario: '{}' is not one of {}", args.scenario, fmt::join(track_scenarios(), ", ")));
+  if (!args.path.empty()) follow_record(args.path, *scene);
   if (args.latency_ms >= 0.0) scene->latency_s = 1e-3 * args.latency_ms;
   if (args.duration_s > 0.0) scene->duration_s = args.duration_s;
   scene->aiming_lag_s = args.lag_s;
@@ -85,6 +114,7 @@ std::size_t add_events(const TrackScene& scene, Run& run) {
 
 ExitCode simulate_track_events(const SimulateTrackArgs& args, Run& run) {
   TrackScene scene = scene_of(args);
+  if (!args.path.empty()) run.add_input("path", args.path);
   if (args.video) scene.sigma_encoder_rad = 0.0;
   const std::size_t num_sights = args.video ? add_frames(scene, args.sigma_angle, run) : add_events(scene, run);
   run.add_file("truth.csv", true_track_csv(truth_of(scene)));
@@ -110,6 +140,7 @@ void add_track_scenario(Frame& frame) {
        "  alidade simulate track --scenario C --out sim && alidade track sim/events.csv --rig sim/rig.yaml \\\n"
        "    --truth sim/truth.csv\n"
        "  alidade simulate track --scenario B --latency-ms 100 --out late\n"
+       "  alidade simulate track --scenario G --path recorded.csv --out real\n"
        "  alidade simulate track --scenario B --video --duration 3 --out film && alidade track --video film/head_1 \\\n"
        "    film/head_2 --angles film/angles.csv --rig film/rig.yaml --target colour:230,70,20 --truth film/truth.csv",
        true},
@@ -120,11 +151,12 @@ void add_track_scenario(Frame& frame) {
           "A slow circle; A2 the same, heads with offsets and turned mountings; B fast circle; C manoeuvre; D C, "
           "hidden for a while; E B, pictures 100 ms late; F C, 100 ms late; G C, 20 and 30 pictures a second")
       ->capture_default_str();
+  command.add_option("--path", args->path, "Where the target goes instead: t_s,x_m,y_m,z_m");
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
     return command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high));
   };
   command.add_flag("--video", args->video, "Render frames instead of sights: head_1/, head_2/, angles.csv");
-  number("--duration", args->duration_s, "Seconds (default: the scenario's)", 0.1, 3600.0);
+  number("--duration", args->duration_s, "Seconds (default: the scenario's, or the path's)", 0.1, longest_s);
   number("--latency-ms", args->latency_ms, "Capture to arrival (default: the scenario's)", 0.0, 10000.0);
   number("--lag-s", args->lag_s, "Time constant of the heads", 0.0, 10.0)->capture_default_str();
   number("--sigma-px", args->sigma_px, "Noise of the target's pixel", 0.0, 100.0)->capture_default_str();

@@ -1,9 +1,11 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
 
@@ -303,6 +305,46 @@ TEST_F(TrackFilm, SaysWhatIsWrongWithItsInput) {
   EXPECT_THAT(fault("t_s,head,pan_rad,tilt_rad\n0,1,0,0\n"), AllOf(HasSubstr("3 "), HasSubstr("no rows of head 2")));
   EXPECT_THAT(fault("t_s,head,pan_rad,tilt_rad\n0,1,0,0\n0,2,0,0\n"),
               AllOf(HasSubstr("3 "), HasSubstr("one row a frame is needed")));
+}
+
+/// The pan and tilt of a real broadcast camera say where its players went; here they are three metres away.
+TEST_F(TrackCommand, FollowsWhatARealOperatorFollowed) {
+  const char* data = std::getenv("ALIDADE_DATA");
+  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set: the motion of a broadcast camera is not at hand";
+  const Csv motion = Csv::read(std::filesystem::path(data) / "data" / "ptz-sports" / "basketball_ptz.csv");
+  constexpr double frames_per_s = 30.0, distance_m = 3.0, degree = 0.017453292519943295;
+  constexpr std::size_t num = 1800;  // a minute
+  std::string text = "t_s,x_m,y_m,z_m\n";
+  for (std::size_t k = 0; k < num; ++k) {
+    const double pan = degree * (motion.number(k, "pan_deg") - motion.number(0, "pan_deg")),
+                 tilt = degree * (motion.number(k, "tilt_deg") - motion.number(0, "tilt_deg"));
+    text += fmt::format("{:.6f},{:.6f},{:.6f},{:.6f}\n", static_cast<double>(k) / frames_per_s,
+                        distance_m * std::sin(pan) * std::cos(tilt), -distance_m * std::sin(tilt),
+                        distance_m * std::cos(pan) * std::cos(tilt));
+  }
+  write_file(path("path.csv"), text);
+  simulate("G", {"--path", path("path.csv")});
+  const std::string sigma_a = Json::parse(read_file(path("sim/result.json")))["estimate"]["sigma_a_m_s2"].dump();
+  const Outcome outcome = track({"--truth", path("sim/truth.csv"), "--sigma-a", sigma_a, "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json estimate = Json::parse(outcome.out)["estimate"];
+  RecordProperty("rms_m", estimate["rms_m"].dump());
+  RecordProperty("nees_per_dof", estimate["nees_per_dof"].dump());
+  EXPECT_LE(estimate["rms_m"].get<double>(), 1.10 * estimate["pcrlb_m"].get<double>());
+  EXPECT_GE(estimate["nees_per_dof"].get<double>(), 0.6);
+  EXPECT_LE(estimate["nees_per_dof"].get<double>(), 1.3);
+}
+
+TEST_F(TrackCommand, ARecordedPathThatIsNoneIsNamed) {
+  const auto fault = [&](const std::string& table) {
+    write_file(path("path.csv"), table);
+    const Outcome outcome = alidade({"simulate", "track", "--path", path("path.csv"), "--out", path("none")});
+    EXPECT_EQ(outcome.code, 3) << outcome.err;
+    return outcome.err;
+  };
+  EXPECT_NE(fault("t_s,x_m,y_m,z_m\n0,0,0,1\n").find("has one row"), std::string::npos);
+  EXPECT_NE(fault("t_s,x_m,y_m,z_m\n0,0,0,1\n0,0,0,2\n").find("path.csv:3"), std::string::npos);
+  EXPECT_NE(fault("t_s,x_m,y_m,z_m\n0,0,0,1\n1,1e300,0,nan\n").find("path.csv:3"), std::string::npos);
 }
 
 }  // namespace

@@ -81,24 +81,16 @@ std::optional<ErrorUnit> error_unit(const std::string& name) {
   return std::nullopt;
 }
 
-/// A path that was recorded; its file.
-std::filesystem::path read_recorded(const Section& target, const std::filesystem::path& folder, TargetPath& path) {
-  const std::filesystem::path file = folder / target.fields().text("track");
-  if (target.has("path")) refuse(target.fields().file(), target.fields().full("track"), "stands beside a path");
-  const TrueTrack track = read_true_track(file);
-  if (track.t_s.size() < 2) throw InputError(file.string() + ": has one row; a path has two or more");
-  path.kind = PathKind::recorded;
-  path.recorded_s = track.t_s;
-  path.recorded_m = track.position;
-  return file;
-}
-
 void read_target(const YAML::Node& root, const Fields& top, ServoScenarioFile& read,
                  const std::filesystem::path& folder) {
   TargetPath& path = read.scenario.scene.path;
   const Section target(root, top, "target",
                        {"path", "start_m", "radius_m", "period_s", "jump_m", "jump_at_s", "track"});
-  if (target.has("track")) read.track = read_recorded(target, folder, path);
+  if (target.has("track")) {
+    if (target.has("path")) refuse(target.fields().file(), target.fields().full("track"), "stands beside a path");
+    read.track = folder / target.fields().text("track");
+    path = read_recorded_path(read.track);
+  }
   target.word("path", path.kind, path_named, "still, circle, sway, step, manoeuvre");
   target.vector("start_m", path.start_m);
   target.number("radius_m", path.radius_m, 0.0, 1e4);
@@ -272,6 +264,16 @@ void read_timing(const YAML::Node& root, const Fields& top, ServoScenario& scena
 }
 
 }  // namespace
+
+TargetPath read_recorded_path(const std::filesystem::path& file) {
+  const TrueTrack track = read_true_track(file);
+  if (track.t_s.size() < 2) throw InputError(file.string() + ": has one row; a path has two or more");
+  TargetPath path;
+  path.kind = PathKind::recorded;
+  path.recorded_s = track.t_s;
+  path.recorded_m = track.position;
+  return path;
+}
 
 ServoScenarioFile read_servo_scenario(const std::filesystem::path& file) {
   const YAML::Node root = detail::load_yaml(read_file(file), file.string());

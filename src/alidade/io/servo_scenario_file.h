@@ -17,6 +17,9 @@ struct ServoScenarioFile {
 /// that no servo can have.
 [[nodiscard]] ServoScenarioFile read_servo_scenario(const std::filesystem::path& file);
 
+/// A target's path that was recorded: t_s,x_m,y_m,z_m, two rows or more. Throws InputError.
+[[nodiscard]] TargetPath read_recorded_path(const std::filesystem::path& file);
+
 /// Every key with the preset's value: a scenario to begin from.
 [[nodiscard]] std::string servo_scenario_text();
 

@@ -147,6 +147,19 @@ TEST(ServoLoop, NothingOvershootsAfterAJumpMoreThanPi) {
   }
 }
 
+/// Without noise there is no shaking to tell it from: the step response of what predicts stays on its side.
+TEST(ServoLoop, WithoutNoiseNothingOvershootsAtAll) {
+  for (const double latency_s : {0.0, 0.1}) {
+    for (const double size : {0.1, 0.2, 0.5, 1.0}) {  // 6 px and more: beyond what passes for motion
+      ServoScene scene = stepping(latency_s, size);
+      scene.sigma_px = 1e-3;
+      scene.sigma_encoder_rad = 1e-6;
+      for (const ControllerKind kind : {ControllerKind::feedforward, ControllerKind::lqr, ControllerKind::mpc})
+        EXPECT_LT(overshoot_px(scene, kind), 0.05) << controller_name(kind) << latency_s << " " << size;
+    }
+  }
+}
+
 TEST(ServoLoop, LosesATargetAndFindsItAgain) {
   for (const Circle& circle : circles) {
     ServoScene scene = circling(circle, 0.1, {});

@@ -29,6 +29,7 @@ struct LocalizeArgs {
   std::filesystem::path sequence, camera, target, start, truth;
   std::string distortion = "full", new_points = "inverse-depth";
   double rate_hz = 0.0, depth_m = 0.0, sigma_depth = 0.5;
+  double sigma_px = 0.0;  ///< 0: not told.
   bool calibrate_online = false, skip_bad = false;
   LocalizationFilterConfig filter;
   LiveOptions live;
@@ -69,6 +70,7 @@ double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock:
 LocalizeConfig config_of(const LocalizeArgs& args) {
   LocalizeConfig config;
   config.filter = args.filter;
+  if (args.sigma_px > 0.0 && !ImageSequence::is_pictures(args.sequence)) config.filter.sigma_px = args.sigma_px;
   config.depth_m = args.depth_m;
   config.sigma_depth = args.sigma_depth;
   config.new_points = args.new_points == "xyz"       ? NewPoints::xyz
@@ -146,6 +148,7 @@ LocalizeReport localize_pictures(const LocalizeArgs& args, const Camera& camera,
                                  std::span<const TimedPose> truth, LiveRun& live, Run& run) {
   LocalizeImagesConfig config;
   config.localize = localize;
+  if (args.sigma_px > 0.0) config.eyes.sigma_floor_px = args.sigma_px;
   if (!args.target.empty()) config.target = read_image_target(args.target);
   ImageSequence pictures(args.sequence, args.rate_hz, camera.width_px, camera.height_px);
   double picture_s = 0.0;
@@ -249,7 +252,10 @@ void add_options(CLI::App& command, LocalizeArgs& args) {
   };
   number("--depth", args.depth_m, "Depth at which a new point is first believed [m] (default: the target's)");
   number("--sigma-depth", args.sigma_depth, "σ of that over the depth")->capture_default_str();
-  number("--sigma-px", args.filter.sigma_px, "σ of a pixel coordinate [px]")->capture_default_str();
+  number(
+      "--sigma-px", args.sigma_px,
+      "σ of a pixel coordinate (default 0.5); in pictures, where each match brings its own, the least (default 0.11) "
+      "[px]");
   number("--sigma-a", args.filter.sigma_a_m_s2, "Acceleration of the camera [m/s2]; by hand about 4")
       ->capture_default_str();
   number("--sigma-alpha", args.filter.sigma_alpha_rad_s2, "Angular acceleration [rad/s2]; by hand about 6")

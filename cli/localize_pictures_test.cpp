@@ -90,6 +90,16 @@ TEST_F(LocalizePictures, WhatShowsNothingIsRefused) {
   expect_refused("sim/frames", {"--rate", "30"}, 4, "the target is not found in any of 12 pictures");
 }
 
+/// Clean rendered pictures are matched better than real ones: the verdict says so, and what to tell.
+TEST_F(LocalizePictures, TheLeastSigmaOfAMatchCanBeTold) {
+  const Json usual = Json::parse(localize("sim/frames", {"--rate", "30"}).out),
+             told = Json::parse(localize("sim/frames", {"--rate", "30", "--sigma-px", "0.03"}).out);
+  EXPECT_EQ(usual["estimate"]["sigma_px"], 0.11);
+  EXPECT_EQ(told["estimate"]["sigma_px"], 0.03);
+  EXPECT_GT(told["estimate"]["nis_per_dof"].get<double>(), 2.0 * usual["estimate"]["nis_per_dof"].get<double>());
+  EXPECT_NE(usual["verdict"]["sentence"].get<std::string>().find("--sigma-px"), std::string::npos);
+}
+
 /// Some pictures are missing, some are black: the path goes on, and does not call itself good.
 TEST_F(LocalizePictures, GapsAndBlackPicturesAreCounted) {
   for (const int i : {4, 5}) cv::imwrite(frame(i), cv::Mat::zeros(576, 768, CV_8U));

@@ -119,6 +119,7 @@ void fill_localization(const LocalizeReport& report, std::span<const TimedPose> 
   estimate["stated_m"] = report.error.stated_m;
   estimate["alignment"] = truth.empty() ? JsonValue() : JsonValue(report.scale_known ? "SE(3)" : "Sim(3)");
   estimate["nis_per_dof"] = report.nis_per_dof;
+  estimate["sigma_px"] = report.sigma_px;
   estimate["scale_known"] = report.scale_known;
   estimate["restarts"] = report.num_restarts;
   estimate["sights"] = report.num_sights;

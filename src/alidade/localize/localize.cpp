@@ -232,6 +232,7 @@ LocalizeReport localize_sights(const Camera& camera, std::span<const SightFrame>
   const LocalizeConfig config = sized(given, frames);
   LocalizeReport report;
   report.camera = camera;
+  report.sigma_px = config.filter.sigma_px;
   report.has_target = !config.target.empty();
   report.scale_known = report.has_target;
   Localizer localizer(camera, config, period_of(frames));

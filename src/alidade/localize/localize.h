@@ -91,6 +91,7 @@ struct LocalizeReport {
   bool scale_known = false;
   bool has_target = false;  ///< Known points were given.
   bool is_of_pictures = false;
+  double sigma_px = std::numeric_limits<double>::quiet_NaN();  ///< Of a sight that brings none; of pictures the floor.
   std::size_t num_lost = 0;  ///< Frames without a pose that sights hold: waiting or predicted.
   std::size_t num_restarts = 0;
   std::size_t num_sights = 0, num_used = 0, num_gated = 0, most_seen = 0;

@@ -33,6 +33,7 @@ LocalizeReport localize_images(const Camera& camera, const NextPicture& next, st
   report.known_shift = known_shift(report.map, localizer.told());
   report.radial = localizer.residuals().structure();
   report.num_alike = localizer.num_alike();
+  report.sigma_px = config.eyes.sigma_floor_px;
   return report;
 }
 

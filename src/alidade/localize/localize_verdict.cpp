@@ -85,8 +85,13 @@ std::string restarts_text(const LocalizeReport& report) {
 void add_checks(const LocalizeReport& report, Verdict& verdict) {
   const double nis = report.nis_per_dof;
   const State nis_state = nis < good_nis_low ? State::care : state_of(nis, good_nis_high, care_nis);
+  const std::string px = text_of(report.sigma_px, 2) + " px";
+  const std::string low = report.is_of_pictures ? "matches are better than the " + px +
+                                                      " that they are taken for, and σ is too large "
+                                                      "(--sigma-px)"
+                                                : "noise is smaller than the " + px + " stated";
   const std::string said = nis > good_nis_high  ? "the sights do not fit: the lens or the noise is not as stated"
-                           : nis < good_nis_low ? "noise is smaller than stated"
+                           : nis < good_nis_low ? low
                                                 : "innovations as large as predicted";
   verdict.checks.push_back({"innovations", nis_state, "NIS " + text_of(nis, 3) + " per degree of freedom: " + said, nis,
                             good_nis_high, "1", "nis"});

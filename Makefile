@@ -63,6 +63,22 @@ docs: demo
 	  --target build/demo/dive/target.yaml --truth build/demo/dive/truth.tum --out build/demo/path --quiet
 	@node web/test/picture.mjs build/demo/tour-camera/report.html docs/tour/camera.png 1500x660 0.6
 	@node web/test/picture.mjs build/demo/path/report.html docs/tour/path.png 1500x660 0.6
+	@echo "docs: docs/rangefinder.png, rig.png, track.png, servo.png"
+	@$(out)/alidade simulate rangefinder --photos --shots 12 --out build/demo/shots --quiet
+	@$(out)/alidade rangefinder build/demo/shots/shots.csv --camera build/demo/shots/camera.yaml --board 9x6 --square 0.04 \
+	  --out build/demo/beam --quiet
+	@$(out)/alidade simulate rig --out build/demo/views --quiet
+	@$(out)/alidade rig build/demo/views/views.csv --camera build/demo/views/camera_1.yaml --camera build/demo/views/camera_2.yaml \
+	  --board 9x6 --square 0.025 --out build/demo/rig --quiet
+	@$(out)/alidade simulate track --scenario C --out build/demo/events --quiet
+	@$(out)/alidade track build/demo/events/events.csv --rig build/demo/events/rig.yaml --truth build/demo/events/truth.csv \
+	  --out build/demo/track --quiet
+	@$(out)/alidade simulate servo --out build/demo/loop --quiet
+	@$(out)/alidade servo build/demo/loop/scenario.yaml --out build/demo/servo --quiet
+	@node web/test/picture.mjs build/demo/beam/report.html docs/rangefinder.png 1500x875 0.6
+	@node web/test/picture.mjs build/demo/rig/report.html docs/rig.png 1500x700 0.6
+	@node web/test/picture.mjs build/demo/track/report.html docs/track.png 1500x655 0.6
+	@node web/test/picture.mjs build/demo/servo/report.html docs/servo.png 1500x625 0.6
 
 study:
 	@tools/setup build

@@ -101,7 +101,7 @@ int main(int argc, char** argv) {
   for (const int count : counts)
     for (const RangefinderMethod method : {RangefinderMethod::spot, RangefinderMethod::plane, RangefinderMethod::joint})
       for (const Refine refine : {Refine::beam, Refine::all})
-        if (method != RangefinderMethod::plane || count >= 6) add_row(count, method, refine, trials);
+        if (method != RangefinderMethod::plane || count >= 5) add_row(count, method, refine, trials);
   fmt::print(
       "\nSpots alone, {} logs a row; `bound`: drawn from the Cramér–Rao bound of the same shots.\n\n"
       "| shots | position mm | bound | p90 | bound |\n|---|---|---|---|---|\n",

@@ -170,6 +170,28 @@ TEST_F(TrackCommand, MistakesAreNamedAndRefused) {
   refused_as("parallel rays");
 }
 
+/// One head's clock is 30 ms ahead: the target would have to be twenty times as lively.
+TEST_F(TrackCommand, AWrongClockIsNamed) {
+  simulate("B");
+  EXPECT_EQ(track({}).out.find("clock"), std::string::npos);
+  const Csv csv = Csv::read(path("sim/events.csv"));
+  std::vector<std::pair<double, std::string>> rows;
+  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
+    const double late_s = csv.text(row, "head") == "2" ? 0.03 : 0.0;
+    const double capture_s = csv.number(row, "t_capture_s") + late_s,
+                 arrival_s = csv.number(row, "t_arrival_s") + late_s;
+    rows.emplace_back(arrival_s, fmt::format("{:.6f},{:.6f},{},{},{},{},{}\n", capture_s, arrival_s,
+                                             csv.text(row, "head"), csv.text(row, "pan_rad"), csv.text(row, "tilt_rad"),
+                                             csv.text(row, "u_px"), csv.text(row, "v_px")));
+  }
+  std::ranges::stable_sort(rows, {}, &std::pair<double, std::string>::first);
+  std::string text = "t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px\n";
+  for (const auto& [arrival_s, row] : rows) text += row;
+  write_file(path("changed.csv"), text);
+  const Outcome outcome = track({}, "changed.csv");
+  EXPECT_THAT(outcome.out, ::testing::HasSubstr("the clock of head 2 seems 30 ms ahead of that of head 1"));
+}
+
 TEST_F(TrackCommand, SaysWhatIsWrongWithItsInput) {
   simulate("B");
   const std::string header = "t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px\n";
@@ -188,6 +210,8 @@ TEST_F(TrackCommand, SaysWhatIsWrongWithItsInput) {
   expect(header + "0,0.1,3,0,0,1,1\n", "bad.csv:2: column 'head': '3' is not a head of the rig (1, 2)");
   expect(header + "0.2,0.1,1,0,0,1,1\n", "arrives before its capture");
   expect(header + "0,0.2,1,0,0,1,1\n0.05,0.1,2,0,0,1,1\n", "bad.csv:3: column 't_arrival_s': '0.1' runs backwards");
+  expect(header + "0,0,1,0,0,1,1\n0,0,2,0,0,1,1\n0,0,1,0,0,1,1\n",
+         "bad.csv:4: column 't_capture_s': '0' stands in a row");
   expect(header + "0,0,1,nan,0,1,1\n", "column 'pan_rad': 'nan' is not a finite number");
   expect(header + "0,0,1,0,0,1e9,1\n", "is in no picture");
   EXPECT_EQ(track({"--method", "magic"}).code, 2);

@@ -93,8 +93,12 @@ EventsFile read_events(const std::filesystem::path& file, std::span<const RigHea
   EventsFile read;
   std::vector<double> newest_s(options.stands_still ? heads.size() : 1, -1e300);
   std::vector<std::optional<Eigen::Vector2d>> first_rad(heads.size());
+  std::set<std::pair<std::size_t, double>> seen;
   for_each_row(csv, options.skip_bad, read.skipped, [&](std::size_t row) {
     const TargetSight sight = read_row(csv, row, columns, heads, newest_s);
+    if (!seen.emplace(sight.head, sight.t_capture_s).second)
+      throw InputError(csv.where(row, "t_capture_s") + ": '" + csv.text(row, "t_capture_s") +
+                       "' stands in a row of this head before; a picture has one target");
     const Eigen::Vector2d& stood_rad =
         *(first_rad[sight.head] ? first_rad[sight.head] : first_rad[sight.head] = sight.pan_tilt_rad);
     constexpr double still_rad = 1e-6;

@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 
+#include "alidade/track/clock_shift.h"
 #include "alidade/track/track.h"
 
 namespace alidade {
@@ -93,6 +94,13 @@ Fault why_no_start(std::span<const TargetSight> sights, std::span<const RigHead>
           "check the rig file, or widen the working range"};
 }
 
+std::string clock_text(const ClockShift& shift, std::span<const RigHead> heads) {
+  return "the clock of head " + std::to_string(heads[shift.head].head.id) + " seems " +
+         text_of(1e3 * std::abs(shift.later_s), 2) + " ms " + (shift.later_s > 0.0 ? "behind" : "ahead of") +
+         " that of head " + std::to_string(heads[0].head.id) +
+         ": with its times moved by that the sights are far more probable";
+}
+
 /// Pixels beyond the picture of the rig's camera: the rig file is of another camera.
 std::optional<Fault> other_camera(const TrackReport& report, std::span<const TargetSight> sights,
                                   std::span<const RigHead> heads) {
@@ -178,12 +186,17 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetSight> si
   if (!fits(report)) {
     if (auto mistake = likely_mistake(sights, heads, config)) return refused(std::move(*mistake));
     if (report.num_starts == 0) return refused(why_no_start(sights, heads, config));
+    if (const auto shift = probable_clock_shift(sights, heads, config))
+      return refused({clock_text(*shift, heads), "set the heads' clocks"});
     if (used_share(report) < least_used_share)
       return refused({"only " + text_of(100.0 * used_share(report), 2) + " % of the sights fit one track and this rig",
                       "check the rig file, the heads' clocks and the noise"});
   }
   Verdict verdict;
   add_checks(report, verdict);
+  if (const auto shift = probable_clock_shift(sights, heads, config))
+    verdict.checks.insert(verdict.checks.begin(),
+                          check("clocks", State::care, clock_text(*shift, heads), 1e3 * shift->later_s, 0.0, "ms"));
   for (const Check& c : verdict.checks) verdict.state = std::max(verdict.state, c.state);
   verdict.sentence =
       "tracked through " + std::to_string(report.num_used) + " of " + std::to_string(report.steps.size()) + " sights";

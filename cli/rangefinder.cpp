@@ -137,7 +137,8 @@ void add_photos(const RangefinderArgs& args, const std::optional<Board>& board, 
 
 void summarize(const RangefinderReport& report, std::span<const Shot> shots, Run& run) {
   for (std::size_t i = 0; i < shots.size(); ++i) {
-    if (!report.shots[i].used) run.say(fmt::format("not used: {}: {}", shots[i].name, report.shots[i].reason));
+    if (!report.shots[i].used && !report.shots[i].reason.empty())
+      run.say(fmt::format("not used: {}: {}", shots[i].name, report.shots[i].reason));
   }
   if (report.status != RangefinderReport::Status::converged) return;
   const Beam& beam = report.beam;

@@ -137,6 +137,22 @@ TEST_F(RangefinderCommand, WhatCannotTellIsRefusedByName) {
   EXPECT_NE(scale.err.find("scale"), std::string::npos) << scale.err;
 }
 
+TEST_F(RangefinderCommand, AnotherBoardAndTheSameShotTwiceAreNamed) {
+  simulate();
+  const Outcome turned =
+      alidade({"rangefinder", path("sim/shots.csv"), "--camera", path("sim/camera.yaml"), "--corners",
+               path("sim/corners.csv"), "--board", "6x9", "--square", "0.04", "--no-report", "--out", path("out")});
+  EXPECT_EQ(turned.code, 4) << turned.out;
+  EXPECT_NE(turned.err.find("no pose of the board fits its corners in 18 of 18 shots; check --board"),
+            std::string::npos)
+      << turned.err;
+  std::string table = read_file(path("sim/shots.csv"));
+  table += table.substr(table.rfind('\n', table.size() - 2) + 1);
+  const Outcome twice = calibrate_table(table);
+  EXPECT_EQ(twice.code, 3);
+  EXPECT_NE(twice.err.find("the same shot stands in a row before"), std::string::npos) << twice.err;
+}
+
 TEST_F(RangefinderCommand, WrongShotsAreNamed) {
   simulate({"--outliers", "0.17"});
   const Json made = Json::parse(read_file(path("sim/result.json")));

@@ -1,6 +1,7 @@
 #include "alidade/board/board_pose.h"
 
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "alidade/geometry/decompositions.h"
@@ -89,7 +90,7 @@ std::optional<Refined> refined(const Camera& camera, Rigid3 cam_from_board, cons
                                std::span<const Eigen::Vector3d> points, std::optional<double> sigma_px) {
   auto now = corner_residuals(camera, cam_from_board, view, points, sigma_px);
   if (!now) return std::nullopt;
-  double damping = 1e-6;
+  double damping = 1e-6, last2 = std::numeric_limits<double>::infinity();
   constexpr int max_iterations = 50;  // quadratic from a homography: 3–5 are typical
   for (int i = 0; i < max_iterations; ++i) {
     const Matrix6 H = now->J_pose.transpose() * now->J_pose;
@@ -99,19 +100,23 @@ std::optional<Refined> refined(const Camera& camera, Rigid3 cam_from_board, cons
     const Vector6 step = -solve_symmetric(damped, g);
     if (!step.allFinite()) return std::nullopt;
     // A step of 10⁻⁶ σ changes nothing that could be measured.
-    const bool is_small = step.dot(H * step) < 1e-12 * (1.0 + now->r.squaredNorm() * 1e-6);
+    const double step2 = step.dot(H * step);
+    const bool is_small = step2 < 1e-12 * (1.0 + now->r.squaredNorm() * 1e-6);
     const Rigid3 trial = cam_from_board.retract(step);
     auto next = corner_residuals(camera, trial, view, points, sigma_px);
     if (next && next->r.squaredNorm() <= now->r.squaredNorm()) {
       cam_from_board = trial;
       now = std::move(next);
       damping = std::max(0.1 * damping, 1e-12);
+      last2 = step2;
     } else if ((damping *= 10.0) > 1e12) {
       break;
     }
     if (is_small) return Refined{cam_from_board, std::move(*now)};
   }
-  return std::nullopt;
+  // Between two poses that look alike, steps become smaller but slowly: a hundredth of σ is as good.
+  constexpr double as_good2 = 1e-4;
+  return last2 < as_good2 ? std::optional(Refined{cam_from_board, std::move(*now)}) : std::nullopt;
 }
 
 BoardPoseFit fit_at(const Refined& at) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <iterator>
+#include <set>
 
 #include "alidade/io/table_rows.h"
 
@@ -115,8 +116,15 @@ ShotsFile read_shots(const std::filesystem::path& file, const ShotsOptions& opti
   const Csv csv = Csv::read(file);
   const Columns columns = columns_of(csv);
   ShotsFile read;
-  for_each_row(csv, options.skip_bad, read.skipped,
-               [&](std::size_t row) { read.rows.push_back(read_row(csv, row, columns)); });
+  std::set<std::string> seen;  // the same measurement twice would be believed twice
+  for_each_row(csv, options.skip_bad, read.skipped, [&](std::size_t row) {
+    ShotRow shot = read_row(csv, row, columns);
+    std::string cells;
+    for (const std::string& name : csv.header()) cells += csv.text(row, name) + ",";
+    if (!seen.insert(std::move(cells)).second)
+      throw InputError(csv.where(row, "range_m") + ": the same shot stands in a row before");
+    read.rows.push_back(std::move(shot));
+  });
   if (read.rows.empty()) throw InputError(file.string() + ": has no shots; at least one row is needed");
   return read;
 }

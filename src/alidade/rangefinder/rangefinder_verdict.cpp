@@ -179,6 +179,24 @@ void add_spare(const RangefinderReport& report, Verdict& verdict) {
                                     enough, "", "residuals"));
 }
 
+/// Boards that are there but fit no pose: another board, or another camera. Without them a shot has its spot alone.
+void add_boards(const RangefinderReport& report, std::span<const Shot> shots, Verdict& verdict) {
+  int given = 0, unfit = 0;
+  for (std::size_t i = 0; i < shots.size() && i < report.shots.size(); ++i) {
+    given += shots[i].board ? 1 : 0;
+    unfit += shots[i].board && !report.shots[i].plane ? 1 : 0;
+  }
+  if (given == 0) return;
+  verdict.checks.push_back(check_of("boards",
+                                    unfit == 0       ? State::good
+                                    : unfit == given ? State::refused
+                                                     : State::care,
+                                    unfit == 0 ? "each board fits its corners"
+                                               : "no pose of the board fits its corners in " + std::to_string(unfit) +
+                                                     " of " + std::to_string(given) + " shots",
+                                    unfit, 0.0, "", "residuals"));
+}
+
 void add_scale(const RangefinderReport& report, Verdict& verdict) {
   constexpr double ask_beyond = 4.0;
   const double z = std::abs(report.scale_in_sigmas);
@@ -245,6 +263,7 @@ Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Sho
     add_precision(report, method, verdict);
     add_geometry(report, method, verdict);
     add_fit(report, verdict);
+    if (method != Method::spot) add_boards(report, shots, verdict);
     add_spare(report, verdict);
     add_scale(report, verdict);
   }
@@ -256,6 +275,9 @@ Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Sho
   if (is_solved && refused != verdict.checks.end() && refused->name == "outliers") {
     verdict = refusal(State::not_converged, ExitCode::no_convergence, "the shots do not agree: " + refused->text,
                       "check that the beam hit the board in each");
+  } else if (is_solved && refused != verdict.checks.end() && refused->name == "boards") {
+    verdict = refusal(State::refused, ExitCode::cannot_tell, refused->text,
+                      "check --board, --square and the camera; --method spot does without boards");
   } else if (report.status == Status::degenerate || (is_solved && refused != verdict.checks.end())) {
     const Weakness reason = reason_of(report, method);
     verdict = refusal(State::refused, ExitCode::cannot_tell, reason.what, reason.add + other_method(method, supply));
@@ -266,6 +288,10 @@ Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Sho
     if (const auto care = worst(State::care); care != verdict.checks.end()) {
       verdict.state = State::care;
       verdict.to_add = care->text;
+      // What is wrong comes before what follows from it.
+      for (const std::string_view cause : {"scale", "fit", "outliers", "boards"})
+        for (const Check& check : verdict.checks)
+          if (check.name == cause && check.state == State::care) verdict.to_add = check.text;
     }
     const Eigen::Vector3d mm = 1e3 * report.beam.origin_in_cam;
     verdict.sentence = "origin (" + text_of(mm.x()) + ", " + text_of(mm.y()) + ", " + text_of(mm.z()) + ") mm ± " +

@@ -1,7 +1,9 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "alidade/io/csv.h"
@@ -89,6 +91,31 @@ TEST_F(LocalizeCommand, SaysThatScaleIsUnknown) {
   EXPECT_EQ(document["estimate"]["scale_known"], false);
   EXPECT_EQ(document["estimate"]["alignment"], "Sim(3)");
   EXPECT_EQ(document["verdict"]["state"], "care");
+}
+
+/// A target that is never seen gives no scale; one whose points are elsewhere is no target.
+TEST_F(LocalizeCommand, ATargetThatIsNotThereIsSaid) {
+  simulate();
+  const std::string target = read_file(path("sim/target.yaml"));
+  const auto with_ids = [&](const std::map<char, std::string>& names) {
+    std::string text = target;
+    for (std::size_t at = text.find("id: "); at != std::string::npos; at = text.find("id: ", at + 4))
+      if (const auto name = names.find(text[at + 4]); name != names.end()) text.replace(at + 4, 1, name->second);
+    write_file(path("sim/target.yaml"), text);
+  };
+  with_ids({{'2', "102"}, {'4', "104"}, {'6', "106"}, {'8', "108"}});
+  const Outcome unseen = localize(told());
+  ASSERT_EQ(unseen.code, 0) << unseen.err;
+  const Json document = Json::parse(unseen.out);
+  EXPECT_EQ(document["verdict"]["state"], "care");
+  EXPECT_THAT(document["verdict"]["sentence"].get<std::string>(),
+              ::testing::HasSubstr("none of the target's points is seen"));
+  EXPECT_EQ(document["estimate"]["scale_known"], false);
+  EXPECT_EQ(document["data"]["features"]["id"].size(), 8u);
+  with_ids({{'2', "4"}, {'4', "6"}, {'6', "8"}, {'8', "2"}});
+  const Outcome elsewhere = localize(told());
+  EXPECT_EQ(elsewhere.code, 5) << elsewhere.out;
+  EXPECT_THAT(elsewhere.err, ::testing::HasSubstr("the target is not where it is told to be"));
 }
 
 TEST_F(LocalizeCommand, RefusesWhatCannotBeTold) {

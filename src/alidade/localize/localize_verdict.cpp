@@ -8,7 +8,7 @@ namespace alidade {
 namespace {
 
 constexpr double good_nis_low = 0.4, good_nis_high = 1.5, care_nis = 2.0, most_nis = 4.0;
-constexpr double care_gated = 0.3, most_gated = 0.6, care_lost = 0.1, most_lost = 0.5;
+constexpr double bad_gated = 0.5, most_known_gated = 0.8, most_gated = 0.6, care_lost = 0.1, most_lost = 0.5;
 
 double share(std::size_t part, std::size_t of) {
   return of > 0 ? static_cast<double>(part) / static_cast<double>(of) : 0.0;
@@ -100,14 +100,14 @@ void add_checks(const LocalizeReport& report, Verdict& verdict) {
                             report.num_lost == 0 ? "no frame lost" : std::to_string(report.num_lost) + " frames lost",
                             lost, care_lost, "1", "tracks"});
   const double gated = share(report.num_gated, report.num_used + report.num_gated);
-  verdict.checks.push_back({"gated", state_of(gated, 0.05, care_gated),
-                            text_of(100.0 * gated, 2) + " % of the sights fit nowhere", gated, care_gated, "1",
+  verdict.checks.push_back({"gated", state_of(gated, 0.05, bad_gated),
+                            text_of(100.0 * gated, 3) + " % of the sights fit nowhere", gated, bad_gated, "1",
                             "tracks"});
   const double known_gated = share(report.num_known_gated, report.num_known);
   // Known points may be mismatched as often as others; if more often, they are not where they are said to be.
-  if (report.has_target)
+  if (report.num_known > 0)
     verdict.checks.push_back({"target", state_of(known_gated, 0.1, gated + 0.2),
-                              text_of(100.0 * known_gated, 2) + " % of the target's sights are not where they belong",
+                              text_of(100.0 * known_gated, 3) + " % of the target's sights are not where they belong",
                               known_gated, 0.1, "1", "tracks"});
   constexpr double most_shift = 3.0;  // χ² of a rectangle's twelve numbers over their count: 99.9 % is 2.7
   if (report.known_shift > most_shift)
@@ -117,8 +117,9 @@ void add_checks(const LocalizeReport& report, Verdict& verdict) {
                                   "less sure than its σ says",
                               report.known_shift, most_shift, "1", "path"});
   verdict.checks.push_back({"scale", report.scale_known ? State::good : State::care,
-                            report.scale_known
-                                ? "scale from the known points"
+                            report.scale_known ? "scale from the known points"
+                            : report.has_target
+                                ? "none of the target's points is seen: scale and frame are those of the start"
                                 : "scale unknown: the path is up to scale, its unit is the depth at the start",
                             0.0, 0.0, "", "path"});
   if (report.num_restarts > 0)
@@ -147,6 +148,13 @@ Verdict localize_verdict(const LocalizeReport& report) {
                    "no path fits the sights: NIS " + text_of(report.nis_per_dof, 3) + " per degree of freedom, " +
                        text_of(100.0 * gated, 2) + " % of them left out",
                    "check camera, target and start, and --sigma-px");
+  const double known_gated = share(report.num_known_gated, report.num_known);
+  constexpr std::size_t enough_known = 8;
+  if (report.num_known >= enough_known && known_gated > most_known_gated)
+    return stopped(State::not_converged, ExitCode::no_convergence,
+                   "the target is not where it is told to be: " + text_of(100.0 * known_gated, 3) +
+                       " % of its sights do not fit the path",
+                   "check the points' numbers and places in --target");
   if (lost > most_lost)
     return stopped(State::refused, ExitCode::cannot_tell,
                    "lost: " + std::to_string(report.num_lost) + " of " + std::to_string(num_frames) +

@@ -27,11 +27,13 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
     sigmas_m.push_back(std::sqrt(step.cov.topLeftCorner<3, 3>().trace()));
   }
   if (dof > 0.0) report.nis_per_dof = nis / dof;
+  if (!report.is_of_pictures) report.scale_known = report.scale_known && report.num_known > 0;
   if (!bank) return;
   const LocalizationFilter& filter = bank->best();
   report.camera = filter.camera();
   report.sigma_lens = filter.lens_sigmas();
   for (const Feature& feature : filter.features()) {
+    if (!report.is_of_pictures && feature.is_known && num_used(feature.id) == 0) continue;  // told, never seen
     const auto place = filter.place(feature.id);
     report.map.push_back({feature.id, place->point_in_world, place->cov, feature.is_known, num_used(feature.id)});
   }

@@ -33,7 +33,8 @@ struct SimulateTrackArgs {
 double usual_acceleration(const TrackScene& scene) {
   constexpr double step_s = 0.1, nearly_all = 0.9;
   std::vector<double> all{0.0};
-  for (double t_s = step_s; t_s + step_s <= scene.duration_s; t_s += step_s) {
+  const double until_s = std::min(scene.duration_s, longest_s);
+  for (double t_s = step_s; t_s + step_s <= until_s; t_s += step_s) {
     const Eigen::Vector3d bend =
         scene.position(t_s + step_s) - 2.0 * scene.position(t_s) + scene.position(t_s - step_s);
     all.push_back(bend.norm() / (step_s * step_s));
@@ -48,7 +49,7 @@ void follow_record(const std::string& file, TrackScene& scene) {
   const TargetPath path = read_recorded_path(file);
   scene.name += " along " + file;
   scene.position = [path](double t_s) { return path.at(path.recorded_s.front() + t_s); };
-  scene.duration_s = std::min(path.recorded_s.back() - path.recorded_s.front(), longest_s);
+  scene.duration_s = path.recorded_s.back() - path.recorded_s.front();
   scene.sigma_a_m_s2 = usual_acceleration(scene);
 }
 
@@ -60,6 +61,9 @@ TrackScene scene_of(const SimulateTrackArgs& args) {
   if (!args.path.empty()) follow_record(args.path, *scene);
   if (args.latency_ms >= 0.0) scene->latency_s = 1e-3 * args.latency_ms;
   if (args.duration_s > 0.0) scene->duration_s = args.duration_s;
+  if (scene->duration_s > longest_s)
+    throw InputError(
+        fmt::format("{}: lasts {:g} s; give --duration, at most {:g} s", args.path, scene->duration_s, longest_s));
   scene->aiming_lag_s = args.lag_s;
   scene->sigma_px = args.sigma_px;
   scene->sigma_encoder_rad = args.sigma_angle;
@@ -151,7 +155,9 @@ void add_track_scenario(Frame& frame) {
           "A slow circle; A2 the same, heads with offsets and turned mountings; B fast circle; C manoeuvre; D C, "
           "hidden for a while; E B, pictures 100 ms late; F C, 100 ms late; G C, 20 and 30 pictures a second")
       ->capture_default_str();
-  command.add_option("--path", args->path, "Where the target goes instead: t_s,x_m,y_m,z_m");
+  command.add_option(
+      "--path", args->path,
+      "Where the target goes instead, from the first row on: t_s,x_m,y_m,z_m; after the last it stands still");
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
     return command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high));
   };

@@ -46,9 +46,9 @@ struct FeatureSight {
 
 enum class SightOutcome {
   used,
-  gated,       ///< Too far from where it was expected.
-  not_in_map,  ///< No such feature.
-  not_seen,    ///< The lens does not see the feature from here.
+  gated,        ///< Too far from where it was expected.
+  not_in_map,   ///< No such feature.
+  not_visible,  ///< The lens does not see the feature from here.
 };
 
 /// Where a feature is expected, and how surely: search its 3σ ellipse.

@@ -10,7 +10,7 @@ namespace alidade {
 
 double LocalizationFilter::cost_of_used() const {
   std::size_t num_gated = 0;
-  for (const Measured& measured : measured_) num_gated += outcomes_[measured.sight] == SightOutcome::gated ? 1 : 0;
+  for (const Measured& measured : measured_) num_gated += outcomes_[measured.sight] == SightOutcome::gated ? 1u : 0u;
   constexpr double log_two_pi = 1.8378770664093453;
   const double cost_gated = 2.0 * std::log(100.0 * 100.0) - 2.0 * std::log(0.1);
   return total_nis_ + total_log_det_ + 2.0 * static_cast<double>(used_.size()) * log_two_pi +

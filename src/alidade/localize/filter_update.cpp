@@ -56,7 +56,7 @@ void LocalizationFilter::collect(std::span<const FeatureSight> sights) {
     measured.feature = feature;
     measured.px = sights[i].px;
     measured.variance_px2 = sigma_px * sigma_px;
-    outcomes_[i] = SightOutcome::not_seen;
+    outcomes_[i] = SightOutcome::not_visible;
     if (!linearise(measured)) continue;
     measured_.push_back(measured);
   }

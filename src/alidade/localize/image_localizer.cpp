@@ -268,7 +268,7 @@ void ImageLocalizer::fill(std::span<const FeatureSight> sights, const SightsRepo
   for (std::size_t i = 0; i < sights.size(); ++i) {
     if (!landmarks_.at(sights[i].id).is_known) continue;
     ++step.num_known;
-    step.num_known_gated += report.outcomes[i] == SightOutcome::gated ? 1 : 0;
+    step.num_known_gated += report.outcomes[i] == SightOutcome::gated ? 1u : 0u;
   }
 }
 

@@ -63,7 +63,7 @@ std::optional<SeenTarget> find_rectangle(const cv::Mat& grey, const Camera& came
   constexpr double nearly_as_good = 0.7;  // the same print in other light
   for (const Candidate& other : candidates) {
     const bool is_elsewhere = (other.middle_px - best->middle_px).norm() > 0.5 * std::min(other.size_px, best->size_px);
-    best->seen.num_alike += is_elsewhere && other.score > nearly_as_good * best->score ? 1 : 0;
+    best->seen.num_alike += is_elsewhere && other.score > nearly_as_good * best->score ? 1u : 0u;
   }
   return std::move(best->seen);
 }

@@ -250,7 +250,7 @@ class Observation {
     const auto is_at_rest = [&](const RotationFrame& frame) {
       return frame.t_s >= report_.reference_from_s - 1e-9 && frame.t_s <= report_.reference_until_s + 1e-9;
     };
-    for (const RotationFrame& frame : frames_) rows += is_at_rest(frame) ? 1 : 0;
+    for (const RotationFrame& frame : frames_) rows += is_at_rest(frame) ? 1u : 0u;
     const bool turns = config_.rotation != RotationKnowledge::known;
     const std::size_t room = std::max<std::size_t>(most_cells / std::max<std::size_t>(log_.num_points, 1), 64);
     FrameBuffer buffer(log_.num_points, turns ? most_turns : std::min(rows + 1, room));

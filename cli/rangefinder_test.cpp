@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
@@ -82,8 +83,8 @@ TEST_F(RangefinderCommand, PointsToTheCornersWhereNobodyHasThePhotos) {
                                            "--out",       path("out")};
   const Outcome outcome = alidade(arguments);
   EXPECT_EQ(outcome.code, 3);
-  EXPECT_THAT(outcome.err, HasSubstr("shot_001.png"));
-  EXPECT_THAT(outcome.err, HasSubstr("--corners " + path("sim/corners.csv")));
+  EXPECT_THAT(outcome.err, ::testing::HasSubstr("shot_001.png"));
+  EXPECT_THAT(outcome.err, ::testing::HasSubstr("--corners " + path("sim/corners.csv")));
 }
 
 TEST_F(RangefinderCommand, ProjectSaysWhereTheSpotIsAndHowSure) {
@@ -344,9 +345,11 @@ TEST_F(RangefinderCommand, BearingsOfARealScannerAreWithinTheirSigmaOfThePublish
     EXPECT_GE(document["counts"]["used"], 10);
     const Json &estimate = document["estimate"], &stddev = document["stddev"];
     const Eigen::Vector3d direction = cam_from_scanner * bearing;
-    for (int i = 0; i < 3; ++i) {
-      EXPECT_LT(std::abs(estimate["origin_m"][i].get<double>() - origin[i]), 3.0 * stddev["origin_m"][i].get<double>());
-      EXPECT_LT(std::abs(estimate["direction"][i].get<double>() - direction[i]),
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto axis = static_cast<Eigen::Index>(i);
+      EXPECT_LT(std::abs(estimate["origin_m"][i].get<double>() - origin[axis]),
+                3.0 * stddev["origin_m"][i].get<double>());
+      EXPECT_LT(std::abs(estimate["direction"][i].get<double>() - direction[axis]),
                 3.0 * stddev["direction"][i].get<double>());
     }
   }

@@ -89,9 +89,8 @@ TEST_P(ReproducePaper, FindsWhatHoldsWhateverTheDraw) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Papers, ReproducePaper,
-                         ::testing::Values("fang2011", "wang2020", "xiahou2015", "xu-underwater"),
-                         [](const auto& info) {
-                           std::string name = info.param;
+                         ::testing::Values("fang2011", "wang2020", "xiahou2015", "xu-underwater"), [](const auto& of) {
+                           std::string name = of.param;
                            std::erase(name, '-');
                            return name;
                          });

@@ -164,8 +164,10 @@ TEST(LocalizationFilter, AllocatesNothingOnceItRuns) {
     const std::size_t before = testing::num_allocations();
     if (k > 0) filter.predict(0.1);
     const SightsReport report = filter.update(sample.frames[k].sights);
-    if (counts) EXPECT_EQ(testing::num_allocations(), before) << k;
-    if (counts) num_gated += report.num_gated;
+    if (counts) {
+      EXPECT_EQ(testing::num_allocations(), before) << k;
+      num_gated += report.num_gated;
+    }
     add_told(sample, sample.frames[k], FeatureKind::inverse_depth, filter);
     filter.convert_linear();
   }

@@ -120,7 +120,9 @@ TEST(Hybrid, SurvivesExactPixelsAndASigmaOfNothing) {
       MotionReader reader(log.source, 0.25);
       IntrinsicsEstimate estimate;
       for (const RotationRow& row : log.rows) estimate = observer.step(reader.next(row));
-      if (sigma_px == 0.0) EXPECT_TRUE(estimate.has_value);
+      if (sigma_px == 0.0) {
+        EXPECT_TRUE(estimate.has_value);
+      }
       if (!estimate.has_value) continue;
       EXPECT_LT((estimate.values() - testing::paper_truth).norm(), 0.05) << sigma_px << ", set " << set;
       EXPECT_TRUE(estimate.sigma.allFinite());

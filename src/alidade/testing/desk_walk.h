@@ -106,7 +106,7 @@ class DeskWalker {
   void add_new() {
     std::size_t in_view = 0;
     for (const Feature& feature : bank_->best().features())
-      in_view += seen(static_cast<std::size_t>(feature.id)) ? 1 : 0;
+      in_view += seen(static_cast<std::size_t>(feature.id)) ? 1u : 0u;
     std::size_t most = frame_ == 0 ? 30 : 8;
     for (std::size_t id = known_.size(); id < points_.size() && in_view < 30 && most > 0; ++id) {
       const auto px = seen(id);

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <Eigen/SVD>
+#include <cmath>
 #include <limits>
 
 namespace alidade {
@@ -33,6 +34,14 @@ Eigen::VectorXcd eigenvalues_of(const Eigen::MatrixXd& M) {
 
 Eigen::MatrixXd orthonormal_basis(const Eigen::MatrixXd& A, Eigen::Index num) {
   return Eigen::HouseholderQR<Eigen::MatrixXd>(A).householderQ() * Eigen::MatrixXd::Identity(A.rows(), num);
+}
+
+Eigen::Matrix<double, 3, 2> two_across(const Eigen::Vector3d& unit) {
+  const Eigen::Vector3d aside = std::abs(unit.x()) < 0.7 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+  Eigen::Matrix<double, 3, 2> B;
+  B.col(0) = unit.cross(aside).normalized();
+  B.col(1) = unit.cross(B.col(0));
+  return B;
 }
 
 Eigen::VectorXd least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b) {

@@ -35,6 +35,9 @@ struct Svd {
 /// The first `num` of orthonormal columns, of which the first span those of A, the rest what is across them.
 [[nodiscard]] Eigen::MatrixXd orthonormal_basis(const Eigen::MatrixXd& A, Eigen::Index num);
 
+/// Two directions at right angles to a unit vector and to each other, as columns.
+[[nodiscard]] Eigen::Matrix<double, 3, 2> two_across(const Eigen::Vector3d& unit);
+
 /// x of the least |A x − b|, by column-pivoting QR.
 [[nodiscard]] Eigen::VectorXd least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
 

@@ -17,8 +17,6 @@ namespace {
 /// Where a place of the board [m] is seen, near one circle.
 using LocalMap = std::function<std::optional<Eigen::Vector2d>(const Eigen::Vector2d& place)>;
 
-BoardDetection not_found(std::string reason) { return {.view = {}, .reason = std::move(reason)}; }
-
 cv::Ptr<cv::FeatureDetector> blob_detector(const cv::Mat& grey) {
   cv::SimpleBlobDetector::Params params;
   params.minArea = 12.0F;

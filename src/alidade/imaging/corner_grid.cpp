@@ -19,7 +19,7 @@ constexpr double max_miss = 0.3;                           // from the predictio
 constexpr float max_contrast_ratio = 4.0f;                 // among the corners of a first square
 constexpr float min_square_contrast = 0.25f;               // of its weakest corner's, for it and its neighbours
 constexpr std::size_t max_seeds = 2000;                    // the strongest: bounds the time spent on a texture
-constexpr std::size_t min_corners = 6;
+constexpr std::size_t min_corners_of_grid = 6;
 constexpr std::array<GridCell, 4> sides{{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
 
 /// Saddle points by place: the points of square bucket k are order_[first_[k]] … order_[first_[k + 1] - 1].
@@ -97,7 +97,7 @@ class Grower {
       CornerGrid grid = first_square(seed);
       if (grid.corners.empty()) continue;
       grow(grid);
-      if (grid.corners.size() >= min_corners) {
+      if (grid.corners.size() >= min_corners_of_grid) {
         grids.push_back(std::move(grid));
       } else {  // its points may belong to another
         for (const std::size_t point : taken_) used_[point] = 0;

@@ -12,8 +12,6 @@
 namespace alidade {
 namespace {
 
-BoardDetection not_found(std::string reason) { return {.view = {}, .reason = std::move(reason)}; }
-
 BoardDetection find_chessboard_corners(const cv::Mat& photo, const Board& board, bool reject_partial) {
   const Chessboard coarse = find_chessboard(photo, board.cols, board.rows);
   if (!coarse.reason.empty()) return not_found(coarse.reason);
@@ -26,6 +24,8 @@ BoardDetection find_chessboard_corners(const cv::Mat& photo, const Board& board,
 }
 
 }  // namespace
+
+BoardDetection not_found(std::string reason) { return {.view = {}, .reason = std::move(reason)}; }
 
 BoardDetection find_board(const cv::Mat& photo, const Board& board, bool reject_partial) {
   std::string reason = fault(board);

@@ -5,9 +5,12 @@
 namespace alidade {
 namespace {
 
-constexpr int min_side_px = 24;  // the smallest board that can be searched
+constexpr int min_photo_side_px = 24;  // the smallest board that can be searched
+
+}  // namespace
 
 cv::Mat one_channel(const cv::Mat& photo) {
+  if (photo.channels() == 1) return photo;
   cv::Mat grey;
   if (photo.channels() == 3) {
     cv::cvtColor(photo, grey, cv::COLOR_BGR2GRAY);
@@ -19,15 +22,13 @@ cv::Mat one_channel(const cv::Mat& photo) {
   return grey;
 }
 
-}  // namespace
-
 cv::Mat to_grey_photo(const cv::Mat& photo, std::string& reason) {
   cv::Mat grey;
   if (photo.empty() || photo.dims != 2) {
     reason = "there is no picture";
     return grey;
   }
-  if (photo.rows < min_side_px || photo.cols < min_side_px) {
+  if (photo.rows < min_photo_side_px || photo.cols < min_photo_side_px) {
     reason = "the picture is too small: " + std::to_string(photo.cols) + "×" + std::to_string(photo.rows);
     return grey;
   }

@@ -11,9 +11,9 @@
 namespace alidade {
 namespace {
 
-constexpr double min_relative_contrast = 0.3;  // of the corners known, for one that joins
-constexpr double min_seen = 0.6;               // part of a side that has to be in the picture
-constexpr double min_alternation = 0.4;  // of the outer squares, 1 where they are as black and white as the others
+constexpr double min_joining_contrast = 0.3;  // of the corners known, for one that joins
+constexpr double min_seen = 0.6;              // part of a side that has to be in the picture
+constexpr double min_alternation = 0.4;       // of the outer squares, 1 where they are as black and white as the others
 constexpr double max_alternation_beyond = 0.3;
 constexpr std::size_t max_probes = 12;  // corners that tell the contrast
 
@@ -69,7 +69,7 @@ std::vector<std::pair<GridCell, GridCorner>> fitted_line(const cv::Mat& photo, c
     if (!corner) continue;
     const CornerFit fit = fit_at(photo, *corner);
     const double same_colours = parity_sign(cell.first, cell.second) * fit.contrast * contrast;
-    if (!fit.accepted() || !(same_colours > min_relative_contrast * contrast * contrast)) continue;
+    if (!fit.accepted() || !(same_colours > min_joining_contrast * contrast * contrast)) continue;
     corner->px = fit.px;
     line.emplace_back(cell, *corner);
   }
@@ -78,7 +78,7 @@ std::vector<std::pair<GridCell, GridCorner>> fitted_line(const cv::Mat& photo, c
 }
 
 /// Mean of 3×3 pixels; NaN outside the picture.
-double grey_at(const cv::Mat& photo, const Eigen::Vector2d& px) {
+double mean_grey_at(const cv::Mat& photo, const Eigen::Vector2d& px) {
   const int x = static_cast<int>(std::lround(std::clamp(px.x(), -10.0, 1e6)));
   const int y = static_cast<int>(std::lround(std::clamp(px.y(), -10.0, 1e6)));
   if (x < 1 || y < 1 || x >= photo.cols - 1 || y >= photo.rows - 1) return std::nan("");
@@ -100,7 +100,7 @@ Alternation alternation_at(const cv::Mat& photo, const CornerGrid& grid, const S
     const auto out_two = predict_corner(grid, side.cells[k + 1].first + side.di, side.cells[k + 1].second + side.dj);
     if (!one || !two || !out || !out_two) continue;
     const Eigen::Vector2d step = 0.5 * (out->px - one->px + out_two->px - two->px);
-    const double grey = grey_at(photo, 0.5 * (one->px + two->px) + depth * step);
+    const double grey = mean_grey_at(photo, 0.5 * (one->px + two->px) + depth * step);
     if (std::isnan(grey)) continue;
     // The square from (i, j) to (i + 1, j + 1) has the corner's own sign; outwards of a lower side it is one before.
     const int outer_i = i + (side.di < 0 ? -1 : 0), outer_j = j + (side.dj < 0 ? -1 : 0);

@@ -24,12 +24,12 @@ ALIDADE_VECTOR_CLONES int product_at(const std::int16_t* grey, const std::uint8_
 }
 
 /// Places to look at: whole pixels about the expected one, so far inside that rows of row_px can be read.
-struct Window {
+struct SearchWindow {
   int u_min = 0, u_max = -1, v_min = 0, v_max = -1;
 };
 
-Window window_of(const cv::Mat& picture, const Eigen::Vector2d& middle, const Eigen::Matrix2d& S,
-                 const PatchSearch& search) {
+SearchWindow window_of(const cv::Mat& picture, const Eigen::Vector2d& middle, const Eigen::Matrix2d& S,
+                       const PatchSearch& search) {
   const double reach_u = std::min(search.num_sigma * std::sqrt(S(0, 0)), search.max_half_px);
   const double reach_v = std::min(search.num_sigma * std::sqrt(S(1, 1)), search.max_half_px);
   const auto lower = [](double value, int least) { return std::max(static_cast<int>(std::ceil(value)), least); };
@@ -42,7 +42,7 @@ Window window_of(const cv::Mat& picture, const Eigen::Vector2d& middle, const Ei
 /// Sums over the patch's square at every place of one row of the window, moved down row by row.
 class BoxSums {
  public:
-  BoxSums(const cv::Mat& picture, const Window& window)
+  BoxSums(const cv::Mat& picture, const SearchWindow& window)
       : picture_(picture), window_(window), width_(window.u_max - window.u_min + side), sum_(size()), squares_(size()) {
     for (int v = window.v_min - half; v < window.v_min + half; ++v) change(v, 1);
   }
@@ -77,7 +77,7 @@ class BoxSums {
   }
 
   const cv::Mat& picture_;
-  Window window_;
+  SearchWindow window_;
   int width_;
   std::vector<int> sum_, squares_;
 };
@@ -91,7 +91,7 @@ struct BestPlace {
 BestPlace best_place(const cv::Mat& picture, const PatchView& view, const Eigen::Vector2d& middle,
                      const Eigen::Matrix2d& S, const PatchSearch& search) {
   BestPlace best;
-  const Window window = window_of(picture, middle, S, search);
+  const SearchWindow window = window_of(picture, middle, S, search);
   if (window.u_max < window.u_min || window.v_max < window.v_min) return best;
   const Eigen::Matrix2d information = S.inverse();
   const double most = search.num_sigma * search.num_sigma;

@@ -183,15 +183,15 @@ class EdgeFit {
   double ink_return_;
 };
 
-struct Solution {
+struct EdgeSolution {
   Vector7 p;
   double cost = 0.0;
   Matrix7 normal = Matrix7::Identity();
   bool converged = false;
 };
 
-Solution levenberg_marquardt(const EdgeFit& fit, const Vector7& start) {
-  Solution best{start, 0.0};
+EdgeSolution best_edges(const EdgeFit& fit, const Vector7& start) {
+  EdgeSolution best{start, 0.0};
   Eigen::VectorXd r = fit.residuals(start);
   best.cost = r.squaredNorm();
   double damping = 1e-2;
@@ -241,7 +241,7 @@ SpotPlace fit_on_edge(const SpotSignal& signal, const SpotPlace& start) {
   const bool is_lit_up = signal.background_is_lit && start.is_saturated;
   if (!print.has_contrast() || is_lit_up) return with_wide_sigma(start);
   const EdgeFit fit(signal, start, std::move(print), start.offset_light);
-  const Solution solution = levenberg_marquardt(fit, fit.start(start));
+  const EdgeSolution solution = best_edges(fit, fit.start(start));
   const Eigen::Vector2d moved = solution.p.head<2>() - start.px;
   const double dof = static_cast<double>(fit.num_pixels()) - 6.0;
   const double radius_px = std::exp(0.25 * (solution.p[3] + solution.p[4]));

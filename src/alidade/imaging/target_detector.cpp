@@ -6,17 +6,11 @@
 #include <stdexcept>
 
 #include "alidade/board/dictionary.h"
+#include "alidade/imaging/grey_photo.h"
 #include "alidade/imaging/target_search.h"
 
 namespace alidade {
 namespace {
-
-cv::Mat one_channel(const cv::Mat& picture) {
-  if (picture.channels() == 1) return picture;
-  cv::Mat grey;
-  cv::cvtColor(picture, grey, picture.channels() == 4 ? cv::COLOR_BGRA2GRAY : cv::COLOR_BGR2GRAY);
-  return grey;
-}
 
 void check_colour(const Eigen::Vector3d& rgb) {
   constexpr double least_chroma = 30.0;  // of 255: below it hue is noise

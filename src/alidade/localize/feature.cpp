@@ -3,19 +3,12 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
+
 namespace alidade {
 namespace {
 
 constexpr double least_rho = 1e-4;  // 10 km: beyond it only the direction can be told
-
-/// Two directions across a unit vector.
-Eigen::Matrix<double, 3, 2> across(const Eigen::Vector3d& ray) {
-  const Eigen::Vector3d aside = std::abs(ray.x()) < 0.7 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
-  Eigen::Matrix<double, 3, 2> B;
-  B.col(0) = ray.cross(aside).normalized();
-  B.col(1) = ray.cross(B.col(0));
-  return B;
-}
 
 /// The point at a distance that is seen at a pixel. A lens with a port has no single centre: its ray is a start only.
 struct SightedPoint {
@@ -33,7 +26,7 @@ std::optional<SightedPoint> sighted(const Camera& camera, const Eigen::Vector2d&
   for (int i = 0; i < max_iterations; ++i) {
     const auto seen = project_with_jacobians(camera, range_m * ray);
     if (!seen) return std::nullopt;
-    const Eigen::Matrix<double, 3, 2> B = across(ray);
+    const Eigen::Matrix<double, 3, 2> B = two_across(ray);
     const Eigen::Matrix2d A = seen->J_px_point * (range_m * B);
     const Eigen::Vector2d error = px - seen->px;
     if (!(std::abs(A.determinant()) > 0.0)) return std::nullopt;

@@ -4,16 +4,10 @@
 #include <Eigen/LU>
 #include <opencv2/core.hpp>
 
+#include "alidade/geometry/decompositions.h"
+
 namespace alidade {
 namespace {
-
-Eigen::Matrix<double, 3, 2> across(const Eigen::Vector3d& normal) {
-  const Eigen::Vector3d aside = std::abs(normal.x()) < 0.7 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
-  Eigen::Matrix<double, 3, 2> B;
-  B.col(0) = normal.cross(aside).normalized();
-  B.col(1) = normal.cross(B.col(0));
-  return B;
-}
 
 /// J Rᵀ B: how the pixel moves with the point along its surface.
 std::optional<Eigen::Matrix2d> J_px_surface(const Camera& camera, const Rigid3& world_from_cam,
@@ -43,7 +37,7 @@ std::optional<Landmark> new_landmark(long id, const cv::Mat& smoothed, const Cam
   landmark.world_from_first_cam = world_from_cam;
   const Eigen::Vector3d sight = point_in_world - world_from_cam.translation;
   landmark.first_distance_m = sight.norm();
-  landmark.surface_in_world = across(normal_in_world.value_or(sight).normalized());
+  landmark.surface_in_world = two_across(normal_in_world.value_or(sight).normalized());
   const auto J = J_px_surface(camera, world_from_cam, point_in_world, landmark.surface_in_world);
   if (!J || !(std::abs(J->determinant()) > 0.0)) return std::nullopt;
   landmark.J_first_px_surface = *J;

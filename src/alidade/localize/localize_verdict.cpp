@@ -3,16 +3,13 @@
 #include <string>
 
 #include "alidade/localize/localize.h"
+#include "alidade/localize/path_doubt.h"
 
 namespace alidade {
 namespace {
 
 constexpr double good_nis_low = 0.4, good_nis_high = 1.5, care_nis = 2.0, most_nis = 4.0;
 constexpr double bad_gated = 0.5, most_known_gated = 0.8, most_gated = 0.6, care_lost = 0.1, most_lost = 0.5;
-
-double share(std::size_t part, std::size_t of) {
-  return of > 0 ? static_cast<double>(part) / static_cast<double>(of) : 0.0;
-}
 
 Verdict stopped(State state, ExitCode code, std::string sentence, std::string to_add) {
   return {state, code, std::move(sentence), std::move(to_add), {}};

@@ -7,10 +7,6 @@ namespace {
 
 constexpr std::size_t window = 5;
 
-double share(std::size_t part, std::size_t of) {
-  return of > 0 ? static_cast<double>(part) / static_cast<double>(of) : 0.0;
-}
-
 void push(std::deque<double>& recent, double value) {
   recent.push_back(value);
   if (recent.size() > window) recent.pop_front();
@@ -21,6 +17,10 @@ double mean(const std::deque<double>& recent) {
 }
 
 }  // namespace
+
+double share(std::size_t part, std::size_t of) {
+  return of > 0 ? static_cast<double>(part) / static_cast<double>(of) : 0.0;
+}
 
 Doubt PathDoubt::after(const PathStep& step) {
   const std::size_t num = step.num_tracked + step.num_gated;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <deque>
 
 #include "alidade/localize/localize.h"
@@ -11,6 +12,9 @@ enum class Doubt {
   some,    ///< More than three in ten of the target's sights are gated: the path may be wrong, or they.
   strong,  ///< The path is wrong.
 };
+
+/// `part` of `of`, 0 where there is nothing.
+[[nodiscard]] double share(std::size_t part, std::size_t of);
 
 /// Whether the last frames say that the path is wrong: a path may fit its own map well and be elsewhere.
 class PathDoubt {

@@ -17,14 +17,14 @@ double clouds(const Eigen::Vector3d& direction_in_world) {
   return 110.0 + 50.0 / 3.0 * waves;
 }
 
-struct View {
+struct TargetView {
   Rigid3 world_from_cam;
   const FilmedTarget& target;
   Eigen::Vector3d centre_in_world;
 };
 
 /// Colour (BGR) of the target along a ray of the world, or none where the ray misses it.
-std::optional<Eigen::Vector3d> seen_of_target(const View& view, const Eigen::Vector3d& direction) {
+std::optional<Eigen::Vector3d> seen_of_target(const TargetView& view, const Eigen::Vector3d& direction) {
   const Eigen::Vector3d to_centre = view.centre_in_world - view.world_from_cam.translation;
   if (view.target.card == nullptr) {
     const double along = to_centre.dot(direction);
@@ -43,7 +43,7 @@ std::optional<Eigen::Vector3d> seen_of_target(const View& view, const Eigen::Vec
 }
 
 /// Rays of the pixel and of the 3 × 3 places in it.
-void paint_target(const View& view, const Camera& camera, const cv::Rect& window, cv::Mat& picture) {
+void paint_target(const TargetView& view, const Camera& camera, const cv::Rect& window, cv::Mat& picture) {
   constexpr int side = 3;
   for (int v = window.y; v < window.br().y; ++v) {
     for (int u = window.x; u < window.br().x; ++u) {
@@ -68,7 +68,7 @@ void paint_target(const View& view, const Camera& camera, const cv::Rect& window
 }
 
 /// Pixels that the target can cover.
-cv::Rect window_of(const View& view, const Camera& camera) {
+cv::Rect window_of(const TargetView& view, const Camera& camera) {
   const Rigid3 cam_from_world = view.world_from_cam.inverse();
   const Eigen::Vector3d centre_in_cam = cam_from_world * view.centre_in_world;
   const auto px = project(camera, centre_in_cam);
@@ -100,7 +100,7 @@ cv::Mat render_target_frame(const RigHead& rig_head, const Eigen::Vector2d& pan_
   const Rigid3 pose = world_from_cam(rig_head.head, pan_tilt_rad);
   cv::Mat picture = painted_clouds(camera, pose);
   if (target_in_world) {
-    const View view{pose, target, *target_in_world};
+    const TargetView view{pose, target, *target_in_world};
     paint_target(view, camera, window_of(view, camera), picture);
   }
   if (config.blur_px > 0.0) cv::GaussianBlur(picture, picture, {}, config.blur_px);

@@ -55,7 +55,7 @@ void study_few_spots(int num_shots, int trials) {
     without_noise.camera = exact.camera;
     const Eigen::Matrix3d cov = solve_sample(without_noise, config).bound.cov.topLeftCorner<3, 3>();
     Draws draws(seed + 3000003);
-    const Eigen::Vector3d z(draws.normal(), draws.normal(), draws.normal());
+    const Eigen::Vector3d z = draws.normal3().reverse();
     bound_mm.push_back(1e3 * (Eigen::Matrix3d(cov.llt().matrixL()) * z).norm());
   }
   fmt::print("| {} | {:.2g} | {:.2g} | {:.2g} | {:.2g} |\n", num_shots, quantile_of(position_mm, 0.5),

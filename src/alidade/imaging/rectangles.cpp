@@ -36,7 +36,7 @@ Quad ordered(Quad quad) {
   }
   if (area < 0.0) std::swap(quad[1], quad[3]);
   const auto first = std::ranges::min_element(quad, {}, [](const Eigen::Vector2d& p) { return p.sum(); });
-  std::ranges::rotate(quad, first);
+  std::rotate(quad.begin(), first, quad.end());
   return quad;
 }
 

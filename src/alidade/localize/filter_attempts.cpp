@@ -63,7 +63,7 @@ void LocalizationFilter::restore_attempt() {
 void LocalizationFilter::use_first_jointly() {
   const std::size_t num = std::min(waiting_.size(), most_in_group);
   if (num == 0) return;
-  std::ranges::partition(waiting_, [](const Measured* measured) { return measured->feature->is_known; });
+  std::partition(waiting_.begin(), waiting_.end(), [](const Measured* sight) { return sight->feature->is_known; });
   const bool is_used = take({waiting_.data(), num});
   for (std::size_t i = 0; i < num; ++i) settle(*waiting_[i], is_used);
   waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(num));

@@ -84,7 +84,8 @@ LocalizeReport disturbed(const RoomVideo& video, bool takes_away, std::uint64_t 
     std::vector<FeatureSight> left;
     for (FeatureSight& sight : sights) {
       const bool is_wrong = draws.uniform() < 0.4;
-      const Eigen::Vector2d by_px = 20.0 * Eigen::Vector2d(draws.uniform(-1, 1), draws.uniform(-1, 1));
+      const double v = draws.uniform(-1, 1), u = draws.uniform(-1, 1);
+      const Eigen::Vector2d by_px = 20.0 * Eigen::Vector2d(u, v);
       if (is_wrong && takes_away) continue;
       if (is_wrong) sight.px += by_px;
       left.push_back(sight);

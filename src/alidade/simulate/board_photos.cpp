@@ -68,8 +68,8 @@ Rigid3 draw_pose(const BoardScene& scene, const std::vector<Eigen::Vector3d>& ou
     const double azimuth = draws.uniform(0.0, 2.0 * std::numbers::pi), roll = draws.uniform(-0.35, 0.35);
     const Eigen::Vector3d axis(std::cos(azimuth), std::sin(azimuth), 0.0);
     cam_from_board.rotation = exp_so3(tilt * axis) * exp_so3({0.0, 0.0, roll});
-    const Eigen::Vector2d target(draws.uniform(0.1, 0.9) * camera.width_px, draws.uniform(0.1, 0.9) * camera.height_px);
-    const auto ray = unproject(camera, target);
+    const double v = draws.uniform(0.1, 0.9) * camera.height_px, u = draws.uniform(0.1, 0.9) * camera.width_px;
+    const auto ray = unproject(camera, {u, v});
     if (!ray) continue;
     cam_from_board.translation = distance_at_fill_1 / fill / ray->z() * *ray - cam_from_board.rotation * middle;
     if (sees_all(camera, cam_from_board, outline)) break;

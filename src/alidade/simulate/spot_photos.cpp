@@ -21,11 +21,11 @@ constexpr double beam_reach = 1.4;  // diameters from the axis; there the light 
 Rigid3 draw_hit(const SpotScene& scene, double range_m, const SpotSceneConfig& config, Draws& draws) {
   const PrintedPattern pattern(scene.boards.board);
   const Eigen::Vector2d low = pattern.print_min(), high = pattern.print_max();
-  const Eigen::Vector2d place(draws.uniform(low.x(), high.x()), draws.uniform(low.y(), high.y()));
+  const double y = draws.uniform(low.y(), high.y()), x = draws.uniform(low.x(), high.x());
   const double tilt = config.max_tilt_rad * std::sqrt(draws.uniform());
   const double azimuth = draws.uniform(0.0, 2.0 * std::numbers::pi), roll = draws.uniform(-0.35, 0.35);
   const Eigen::Vector3d axis(std::cos(azimuth), std::sin(azimuth), 0.0);
-  const Eigen::Vector3d hit_in_board = BoardSurface(scene.boards.board, scene.boards.points_in_board).point(place);
+  const Eigen::Vector3d hit_in_board = BoardSurface(scene.boards.board, scene.boards.points_in_board).point({x, y});
   Rigid3 cam_from_board;
   cam_from_board.rotation = exp_so3(tilt * axis) * exp_so3({0.0, 0.0, roll});
   cam_from_board.translation =

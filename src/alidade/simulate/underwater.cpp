@@ -90,7 +90,7 @@ UnderwaterSequence simulate_underwater(const UnderwaterScene& scene, std::uint64
     for (UnderwaterPoint& point : sequence.points) {
       const Eigen::Vector2d noise = scene.sigma_px * draws.normal2();
       const double depth_error = draws.normal(), is_wrong = draws.uniform();
-      const Eigen::Vector2d aside(draws.uniform(-1.0, 1.0), draws.uniform(-1.0, 1.0));
+      const double v = draws.uniform(-1.0, 1.0), u = draws.uniform(-1.0, 1.0);
       const Eigen::Vector3d point_in_cam = frame.world_from_cam.inverse() * point.point_in_world;
       const auto px = project(scene.camera, point_in_cam);
       if (is_black || !px || !is_between_pixels(scene.camera, *px)) continue;
@@ -98,7 +98,8 @@ UnderwaterSequence simulate_underwater(const UnderwaterScene& scene, std::uint64
       if (point.told_depth_m == 0.0)
         point.told_depth_m = point_in_cam.z() * std::max(0.1, 1.0 + scene.sigma_depth * depth_error);
       const bool is_mismatch = k > 0 && is_wrong < scene.mismatches;
-      const Eigen::Vector2d shown = is_mismatch ? Eigen::Vector2d(*px + scene.mismatch_px * aside) : *px + noise;
+      const Eigen::Vector2d shown =
+          is_mismatch ? Eigen::Vector2d(*px + scene.mismatch_px * Eigen::Vector2d(u, v)) : *px + noise;
       if (is_between_pixels(scene.camera, shown)) frame.sights.push_back({point.id, shown, is_mismatch});
     }
     sequence.frames.push_back(std::move(frame));

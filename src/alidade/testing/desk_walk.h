@@ -45,8 +45,10 @@ class DeskWalker {
     known_ = rectangle_target(0.210, 0.1485, walk.sigma_known_m).points;
     for (const KnownPoint& point : known_)
       points_.push_back(point.point_in_world + walk.sigma_known_m * draws_.normal3());
-    for (int i = 0; i < 1500; ++i)
-      points_.emplace_back(draws_.uniform(-1.5, 1.5), draws_.uniform(-1.2, 0.6), draws_.uniform(-0.3, 0.8));
+    for (int i = 0; i < 1500; ++i) {
+      const double z = draws_.uniform(-0.3, 0.8), y = draws_.uniform(-1.2, 0.6), x = draws_.uniform(-1.5, 1.5);
+      points_.emplace_back(x, y, z);
+    }
   }
 
   DeskRun run() {

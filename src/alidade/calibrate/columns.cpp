@@ -44,7 +44,7 @@ ALIDADE_VECTOR_CLONES int brown_columns(const CornerArrays& in, const PoseNumber
                r20 = pose.r[6], r21 = pose.r[7], r22 = pose.r[8];
   const double tx = pose.t[0], ty = pose.t[1], tz = pose.t[2];
   double bad = 0.0;
-#pragma GCC ivdep
+  ALIDADE_NO_ALIASES
   for (std::size_t i = 0; i < in.n; ++i) {
     const double X = in.x[i], Y = in.y[i], Z = in.z[i];
     const double zc = r20 * X + r21 * Y + r22 * Z + tz;
@@ -123,7 +123,7 @@ ALIDADE_VECTOR_CLONES void brown_residuals(const CornerArrays& in, const PoseNum
   const double k1 = p[5], k2 = p[6], p1 = p[7], p2 = p[8], k3 = p[9];
   const PoseNumbers at = pose;
   const double nan = std::numeric_limits<double>::quiet_NaN();
-#pragma GCC ivdep
+  ALIDADE_NO_ALIASES
   for (std::size_t i = 0; i < in.n; ++i) {
     const double X = in.x[i], Y = in.y[i], Z = in.z[i];
     const double zc = at.r[6] * X + at.r[7] * Y + at.r[8] * Z + at.t[2];
@@ -174,6 +174,33 @@ int model_columns(const Params<Model>& params, const CornerArrays& in, const Rig
     put(Columns::residual, white * (seen->px - Eigen::Vector2d(in.u[i], in.v[i])));
   }
   return 0;
+}
+
+ALIDADE_VECTOR_CLONES void loop_gram(const double* const* column, int m, std::size_t rows, double* product) {
+  typedef double Lane __attribute__((vector_size(32), aligned(8)));
+  for (int i = 0; i < m; i += 4) {
+    for (int j = i; j < m; j += 2) {
+      Lane s[8] = {};
+      const double *a0 = column[i], *a1 = column[i + 1], *a2 = column[i + 2], *a3 = column[i + 3];
+      const double *b0 = column[j], *b1 = column[j + 1];
+      for (std::size_t r = 0; r < rows; r += lane) {
+        const Lane x = *reinterpret_cast<const Lane*>(b0 + r), y = *reinterpret_cast<const Lane*>(b1 + r);
+        const Lane c0 = *reinterpret_cast<const Lane*>(a0 + r), c1 = *reinterpret_cast<const Lane*>(a1 + r);
+        const Lane c2 = *reinterpret_cast<const Lane*>(a2 + r), c3 = *reinterpret_cast<const Lane*>(a3 + r);
+        s[0] += c0 * x;
+        s[1] += c1 * x;
+        s[2] += c2 * x;
+        s[3] += c3 * x;
+        s[4] += c0 * y;
+        s[5] += c1 * y;
+        s[6] += c2 * y;
+        s[7] += c3 * y;
+      }
+      for (int k = 0; k < 8; ++k) {
+        product[(i + k % 4) * m + j + k / 4] = (s[k][0] + s[k][1]) + (s[k][2] + s[k][3]);
+      }
+    }
+  }
 }
 
 struct Gathered {
@@ -282,31 +309,8 @@ void fill_bow_columns(const ViewArrays& view, const std::vector<double>& along_x
   }
 }
 
-ALIDADE_VECTOR_CLONES void gram(const double* const* column, int m, std::size_t rows, double* product) {
-  typedef double Lane __attribute__((vector_size(32), aligned(8)));
-  for (int i = 0; i < m; i += 4) {
-    for (int j = i; j < m; j += 2) {
-      Lane s[8] = {};
-      const double *a0 = column[i], *a1 = column[i + 1], *a2 = column[i + 2], *a3 = column[i + 3];
-      const double *b0 = column[j], *b1 = column[j + 1];
-      for (std::size_t r = 0; r < rows; r += lane) {
-        const Lane x = *reinterpret_cast<const Lane*>(b0 + r), y = *reinterpret_cast<const Lane*>(b1 + r);
-        const Lane c0 = *reinterpret_cast<const Lane*>(a0 + r), c1 = *reinterpret_cast<const Lane*>(a1 + r);
-        const Lane c2 = *reinterpret_cast<const Lane*>(a2 + r), c3 = *reinterpret_cast<const Lane*>(a3 + r);
-        s[0] += c0 * x;
-        s[1] += c1 * x;
-        s[2] += c2 * x;
-        s[3] += c3 * x;
-        s[4] += c0 * y;
-        s[5] += c1 * y;
-        s[6] += c2 * y;
-        s[7] += c3 * y;
-      }
-      for (int k = 0; k < 8; ++k) {
-        product[(i + k % 4) * m + j + k / 4] = (s[k][0] + s[k][1]) + (s[k][2] + s[k][3]);
-      }
-    }
-  }
+void gram(const double* const* column, int m, std::size_t rows, double* product) {
+  loop_gram(column, m, rows, product);
 }
 
 }  // namespace alidade

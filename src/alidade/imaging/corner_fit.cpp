@@ -120,25 +120,28 @@ template <class Floats>
   add_products(column, sums, std::make_index_sequence<8>{});
 }
 
-/// Sums of all products of the columns of [J r] over the pixels near the edges, in float: positions are small numbers
-/// around the corner.
-ALIDADE_VECTOR_CLONES Matrix8 near_sums(const CornerWindow& window, const Model& model) {
-  const FloatModel constants(window, model);
+/// The 36 sums of products of the columns of [J r] over the pixels near the edges, in float: positions are small
+/// numbers around the corner.
+ALIDADE_VECTOR_CLONES void sum_near(const CornerWindow& window, const FloatModel& model, float* products) {
   std::array<Float8, 36> sums{};
   std::array<Float4, 36> last{};  // the pixels are a multiple of four
   std::size_t i = 0;
-  for (; i + 8 <= window.num_near(); i += 8) add_pixels(window, i, constants, sums);
-  if (i < window.num_near()) add_pixels(window, i, constants, last);
+  for (; i + 8 <= window.num_near(); i += 8) add_pixels(window, i, model, sums);
+  if (i < window.num_near()) add_pixels(window, i, model, last);
+  for (std::size_t at = 0; at < sums.size(); ++at) {
+    const Float8& s = sums[at];
+    const Float4& t = last[at];
+    products[at] = ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7])) + ((t[0] + t[1]) + (t[2] + t[3]));
+  }
+}
+
+Matrix8 near_sums(const CornerWindow& window, const Model& model) {
+  std::array<float, 36> products;
+  sum_near(window, FloatModel(window, model), products.data());
   Matrix8 full;
-  std::size_t at = 0;
+  const float* next = products.data();
   for (int r = 0; r < 8; ++r) {
-    for (int c = r; c < 8; ++c, ++at) {
-      const Float8& s = sums[at];
-      const Float4& t = last[at];
-      const float sum =
-          ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7])) + ((t[0] + t[1]) + (t[2] + t[3]));
-      full(r, c) = full(c, r) = static_cast<double>(sum);
-    }
+    for (int c = r; c < 8; ++c) full(r, c) = full(c, r) = static_cast<double>(*next++);
   }
   return full;
 }

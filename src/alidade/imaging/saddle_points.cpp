@@ -53,20 +53,25 @@ Ring make_ring() {
   return ring;
 }
 
+/// One row of find_strength, but for its first and last pixel.
+ALIDADE_VECTOR_CLONES void find_row_strength(const float* up, const float* here, const float* down, int cols,
+                                             float* __restrict out) {
+  for (int x = 1; x + 1 < cols; ++x) {
+    const float xx = here[x - 1] - 2.0f * here[x] + here[x + 1];
+    const float yy = up[x] - 2.0f * here[x] + down[x];
+    const float xy = 0.25f * (up[x - 1] - up[x + 1] - down[x - 1] + down[x + 1]);
+    out[x] = xy * xy - xx * yy;
+  }
+}
+
 /// -det of the Hessian of the smoothed picture.
-ALIDADE_VECTOR_CLONES void find_strength(const cv::Mat& smooth, cv::Mat& strength) {
+void find_strength(const cv::Mat& smooth, cv::Mat& strength) {
   strength.create(smooth.size(), CV_32F);
   for (const int edge : {0, smooth.rows - 1}) strength.row(edge).setTo(0.0);
   for (const int edge : {0, smooth.cols - 1}) strength.col(edge).setTo(0.0);
   for (int y = 1; y + 1 < smooth.rows; ++y) {
-    const float *up = smooth.ptr<float>(y - 1), *here = smooth.ptr<float>(y), *down = smooth.ptr<float>(y + 1);
-    float* out = strength.ptr<float>(y);
-    for (int x = 1; x + 1 < smooth.cols; ++x) {
-      const float xx = here[x - 1] - 2.0f * here[x] + here[x + 1];
-      const float yy = up[x] - 2.0f * here[x] + down[x];
-      const float xy = 0.25f * (up[x - 1] - up[x + 1] - down[x - 1] + down[x + 1]);
-      out[x] = xy * xy - xx * yy;
-    }
+    find_row_strength(smooth.ptr<float>(y - 1), smooth.ptr<float>(y), smooth.ptr<float>(y + 1), smooth.cols,
+                      strength.ptr<float>(y));
   }
 }
 

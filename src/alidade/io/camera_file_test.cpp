@@ -294,7 +294,7 @@ TEST(CameraFile, AWrongFileIsOneLineThatNamesTheKey) {
       {"1 FULL_OPENCV 640 480 500 500 320 240 0 0 0 0 0 0.1 0 0", "f:1: PARAMS: k4 is 0.1: a rational lens"},
   };
   for (const auto& [text, expected] : cases) {
-    const std::string fault = camera_fault([&] { (void)parse_camera(text, "f"); });
+    const std::string fault = camera_fault([&from = text] { (void)parse_camera(from, "f"); });
     EXPECT_THAT(fault, HasSubstr(expected)) << text.substr(0, 200);
     EXPECT_EQ(fault.find('\n'), std::string::npos) << fault;
   }

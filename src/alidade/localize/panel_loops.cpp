@@ -7,10 +7,13 @@ namespace {
 
 using Four = double __attribute__((vector_size(32)));
 
-using FourInMemory = double __attribute__((vector_size(32), aligned(8), may_alias));
+/// Four doubles where they stand, aligned as doubles are.
+struct [[gnu::packed, gnu::aligned(8), gnu::may_alias]] InMemory {
+  Four four;
+};
 
-const FourInMemory& load(const double* from) { return *reinterpret_cast<const FourInMemory*>(from); }
-void store(const Four& four, double* to) { *reinterpret_cast<FourInMemory*>(to) = four; }
+const InMemory& at(const double* from) { return *reinterpret_cast<const InMemory*>(from); }
+void store(const Four& four, double* to) { reinterpret_cast<InMemory*>(to)->four = four; }
 
 /// Of eight rows and four columns. Filled number by number: g++ 12 clears an array slowly, in memory.
 struct Tile {
@@ -32,13 +35,11 @@ void transpose(Four (&block)[4]) {
   block[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
 
-}  // namespace
-
-ALIDADE_VECTOR_CLONES void subtract_tile(const double* a, const double* b, int num, double* P, double* mirror,
-                                         std::size_t stride) {
+ALIDADE_VECTOR_CLONES void loop_subtract_tile(const double* a, const double* b, int num, double* P, double* mirror,
+                                              std::size_t stride) {
   Tile tile;
   for (int k = 0; k < num; ++k, a += panel, b += panel) {
-    const Four a_low = load(a), a_high = load(a + 4);
+    const Four a_low = at(a).four, a_high = at(a + 4).four;
     for (int j = 0; j < 4; ++j) {
       const Four factor = {b[j], b[j], b[j], b[j]};
       tile.low[j] += a_low * factor;
@@ -47,8 +48,8 @@ ALIDADE_VECTOR_CLONES void subtract_tile(const double* a, const double* b, int n
   }
   for (std::size_t j = 0; j < 4; ++j) {
     double* column = P + j * stride;
-    store(tile.low[j] = load(column) - tile.low[j], column);
-    store(tile.high[j] = load(column + 4) - tile.high[j], column + 4);
+    store(tile.low[j] = at(column).four - tile.low[j], column);
+    store(tile.high[j] = at(column + 4).four - tile.high[j], column + 4);
   }
   if (!mirror) return;
   transpose(tile.low);
@@ -59,16 +60,8 @@ ALIDADE_VECTOR_CLONES void subtract_tile(const double* a, const double* b, int n
   }
 }
 
-void mirror_tile(const double* tile, double* mirror, std::size_t stride) {
-  for (std::size_t half = 0; half < 2; ++half) {
-    Four block[4];
-    for (std::size_t j = 0; j < 4; ++j) block[j] = load(tile + half * 4 + j * stride);
-    transpose(block);
-    for (std::size_t i = 0; i < 4; ++i) store(block[i], mirror + (half * 4 + i) * stride);
-  }
-}
-
-ALIDADE_VECTOR_CLONES void combine_columns(const double* block, std::size_t stride, double* columns, std::size_t num) {
+ALIDADE_VECTOR_CLONES void loop_combine_columns(const double* block, std::size_t stride, double* columns,
+                                                std::size_t num) {
   const double *b0 = block, *b1 = block + stride, *b2 = b1 + stride;
   double *x0 = columns, *x1 = columns + stride, *x2 = x1 + stride;
   for (std::size_t i = 0; i < num; ++i) {
@@ -79,7 +72,8 @@ ALIDADE_VECTOR_CLONES void combine_columns(const double* block, std::size_t stri
   }
 }
 
-ALIDADE_VECTOR_CLONES void turn_rows(const double* blocks, std::size_t stride, double* column, int first, int end) {
+ALIDADE_VECTOR_CLONES void loop_turn_rows(const double* blocks, std::size_t stride, double* column, int first,
+                                          int end) {
   const double *b0 = blocks, *b1 = blocks + stride, *b2 = b1 + stride;
   for (int i = first; i < end; i += 3) {
     const double a0 = column[i], a1 = column[i + 1], a2 = column[i + 2];
@@ -87,17 +81,17 @@ ALIDADE_VECTOR_CLONES void turn_rows(const double* blocks, std::size_t stride, d
   }
 }
 
-ALIDADE_VECTOR_CLONES void add_three(const double* K, const double* U, std::size_t stride, const double* u,
-                                     const double* k, std::size_t num, double* column) {
+ALIDADE_VECTOR_CLONES void loop_add_three(const double* K, const double* U, std::size_t stride, const double* u,
+                                          const double* k, std::size_t num, double* column) {
   const double *K1 = K + stride, *K2 = K1 + stride, *U1 = U + stride, *U2 = U1 + stride;
   for (std::size_t i = 0; i < num; ++i)
     column[i] += K[i] * u[0] + K1[i] * u[1] + K2[i] * u[2] + U[i] * k[0] + U1[i] * k[1] + U2[i] * k[2];
 }
 
-ALIDADE_VECTOR_CLONES void subtract_products(const double* w, const double* h, int num, double* x) {
+ALIDADE_VECTOR_CLONES void loop_subtract_products(const double* w, const double* h, int num, double* x) {
   Tile tile;
   for (int k = 0; k < num; ++k, w += panel, h += 4) {
-    const Four w_low = load(w), w_high = load(w + 4);
+    const Four w_low = at(w).four, w_high = at(w + 4).four;
     for (int j = 0; j < 4; ++j) {
       const Four factor = {h[j], h[j], h[j], h[j]};
       tile.low[j] += w_low * factor;
@@ -105,13 +99,13 @@ ALIDADE_VECTOR_CLONES void subtract_products(const double* w, const double* h, i
     }
   }
   for (int j = 0; j < 4; ++j, x += panel) {
-    store(load(x) - tile.low[j], x);
-    store(load(x + 4) - tile.high[j], x + 4);
+    store(at(x).four - tile.low[j], x);
+    store(at(x + 4).four - tile.high[j], x + 4);
   }
 }
 
-ALIDADE_VECTOR_CLONES void weigh_columns(const double* P, std::size_t stride, const int* columns, int num,
-                                         const double* h0, const double* h1, int rows, double* x0, double* x1) {
+ALIDADE_VECTOR_CLONES void loop_weigh_columns(const double* P, std::size_t stride, const int* columns, int num,
+                                              const double* h0, const double* h1, int rows, double* x0, double* x1) {
   std::fill_n(x0, rows, 0.0);
   std::fill_n(x1, rows, 0.0);
   for (int c = 0; c < num; ++c) {
@@ -124,12 +118,12 @@ ALIDADE_VECTOR_CLONES void weigh_columns(const double* P, std::size_t stride, co
   }
 }
 
-ALIDADE_VECTOR_CLONES void weigh_panel(const double* P, std::size_t stride, const int* columns, int num,
-                                       const double* h0, const double* h1, double* x) {
+ALIDADE_VECTOR_CLONES void loop_weigh_panel(const double* P, std::size_t stride, const int* columns, int num,
+                                            const double* h0, const double* h1, double* x) {
   Four x0_low = {}, x0_high = {}, x1_low = {}, x1_high = {};
   for (int c = 0; c < num; ++c) {
     const double* column = P + static_cast<std::size_t>(columns[c]) * stride;
-    const Four low = load(column), high = load(column + 4);
+    const Four low = at(column).four, high = at(column + 4).four;
     const Four a = {h0[c], h0[c], h0[c], h0[c]}, b = {h1[c], h1[c], h1[c], h1[c]};
     x0_low += low * a;
     x0_high += high * a;
@@ -142,15 +136,15 @@ ALIDADE_VECTOR_CLONES void weigh_panel(const double* P, std::size_t stride, cons
   store(x1_high, x + panel + 4);
 }
 
-ALIDADE_VECTOR_CLONES void subtract_squares(const PanelWeights& weights, int num_columns, double& s00, double& s01,
-                                            double& s11) {
+ALIDADE_VECTOR_CLONES void loop_subtract_squares(const PanelWeights& weights, int num_columns, double& s00, double& s01,
+                                                 double& s11) {
   for (int k = 0; k < num_columns; ++k) {
     Four sum0 = {0.0, 0.0, 0.0, 0.0}, sum1 = {0.0, 0.0, 0.0, 0.0};
     for (int p = 0; p < weights.num; ++p) {
       const double* w = weights.panels[p] + k * panel;
-      const Four low = load(w), high = load(w + 4);
-      sum0 += low * load(weights.h0[p]) + high * load(weights.h0[p] + 4);
-      sum1 += low * load(weights.h1[p]) + high * load(weights.h1[p] + 4);
+      const Four low = at(w).four, high = at(w + 4).four;
+      sum0 += low * at(weights.h0[p]).four + high * at(weights.h0[p] + 4).four;
+      sum1 += low * at(weights.h1[p]).four + high * at(weights.h1[p] + 4).four;
     }
     const double w0 = sum0[0] + sum0[1] + (sum0[2] + sum0[3]), w1 = sum1[0] + sum1[1] + (sum1[2] + sum1[3]);
     s00 -= w0 * w0;
@@ -159,18 +153,58 @@ ALIDADE_VECTOR_CLONES void subtract_squares(const PanelWeights& weights, int num
   }
 }
 
-ALIDADE_VECTOR_CLONES void times_triangle(const double* x, const double* M, int num, double* w) {
+ALIDADE_VECTOR_CLONES void loop_times_triangle(const double* x, const double* M, int num, double* w) {
   for (int j = 0; j < num; ++j) {
     Four low = {}, high = {};
     for (int k = 0; k <= j; ++k) {
       const double m = M[k * num + j];
       const Four factor = {m, m, m, m};
-      low += load(x + k * panel) * factor;
-      high += load(x + k * panel + 4) * factor;
+      low += at(x + k * panel).four * factor;
+      high += at(x + k * panel + 4).four * factor;
     }
     store(low, w + j * panel);
     store(high, w + j * panel + 4);
   }
 }
+
+}  // namespace
+
+void mirror_tile(const double* tile, double* mirror, std::size_t stride) {
+  for (std::size_t half = 0; half < 2; ++half) {
+    Four block[4];
+    for (std::size_t j = 0; j < 4; ++j) block[j] = at(tile + half * 4 + j * stride).four;
+    transpose(block);
+    for (std::size_t i = 0; i < 4; ++i) store(block[i], mirror + (half * 4 + i) * stride);
+  }
+}
+
+// What other files call (vector_clones.h says why).
+
+void subtract_tile(const double* a, const double* b, int num, double* P, double* mirror, std::size_t stride) {
+  loop_subtract_tile(a, b, num, P, mirror, stride);
+}
+void combine_columns(const double* block, std::size_t stride, double* columns, std::size_t num) {
+  loop_combine_columns(block, stride, columns, num);
+}
+void turn_rows(const double* blocks, std::size_t stride, double* column, int first, int end) {
+  loop_turn_rows(blocks, stride, column, first, end);
+}
+void add_three(const double* K, const double* U, std::size_t stride, const double* u, const double* k, std::size_t num,
+               double* column) {
+  loop_add_three(K, U, stride, u, k, num, column);
+}
+void subtract_products(const double* w, const double* h, int num, double* x) { loop_subtract_products(w, h, num, x); }
+void weigh_columns(const double* P, std::size_t stride, const int* columns, int num, const double* h0, const double* h1,
+                   int rows, double* x0, double* x1) {
+  loop_weigh_columns(P, stride, columns, num, h0, h1, rows, x0, x1);
+}
+void weigh_panel(const double* P, std::size_t stride, const int* columns, int num, const double* h0, const double* h1,
+                 double* x) {
+  loop_weigh_panel(P, stride, columns, num, h0, h1, x);
+}
+void subtract_squares(const PanelWeights& weights, int num_columns, double& s00, double& s01, double& s11) {
+  loop_subtract_squares(weights, num_columns, s00, s01, s11);
+}
+void times_triangle(const double* x, const double* M, int num, double* w) { loop_times_triangle(x, M, num, w); }
 
 }  // namespace alidade::panel_loops

@@ -32,16 +32,21 @@ struct Outcome {
                                           const std::function<void(pid_t)>& meanwhile = {}) {
   const TemporaryFolder folder;
   const std::string out = (folder.path() / "out").string(), err = (folder.path() / "err").string();
+  // Made here: a child may be killed before it has done anything.
+  const int to_out = ::open(out.c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0600);
+  const int to_err = ::open(err.c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0600);
   std::fflush(nullptr);
   const pid_t child = ::fork();
-  if (child < 0) throw std::runtime_error("fork failed");
   if (child == 0) {
-    ::dup2(::open(out.c_str(), O_CREAT | O_WRONLY, 0600), STDOUT_FILENO);
-    ::dup2(::open(err.c_str(), O_CREAT | O_WRONLY, 0600), STDERR_FILENO);
+    ::dup2(to_out, STDOUT_FILENO);
+    ::dup2(to_err, STDERR_FILENO);
     const int code = body();
     std::fflush(nullptr);
     ::_exit(code);
   }
+  ::close(to_out);
+  ::close(to_err);
+  if (child < 0) throw std::runtime_error("fork failed");
   if (meanwhile) meanwhile(child);
   int status = 0;
   ::waitpid(child, &status, 0);

@@ -47,7 +47,9 @@ void add_all() {
       for (const bool tells_sigma : {true, false}) {
         const std::string of = "rangefinder/" + name + "/" + what + (tells_sigma ? "" : "/sigma_from_residuals");
         benchmark::RegisterBenchmark(of.c_str(),
-                                     [=](benchmark::State& state) { time_solve(state, method, refine, tells_sigma); })
+                                     [=, method = method, refine = refine](benchmark::State& state) {
+                                       time_solve(state, method, refine, tells_sigma);
+                                     })
             ->Arg(18)
             ->MeasureProcessCPUTime()
             ->Unit(benchmark::kMillisecond);

@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <regex>
+#include <sstream>
 
 #include "alidade/testing/process.h"
 
@@ -25,9 +25,12 @@ std::vector<std::string> listed_commands(const std::string& help) {
   std::vector<std::string> names;
   const std::size_t at = help.find("Subcommands:");
   if (at == std::string::npos) return names;
-  const std::string list = help.substr(at);
-  const std::regex line("\n  ([a-z]+) ");
-  for (std::sregex_iterator each(list.begin(), list.end(), line), end; each != end; ++each) names.push_back((*each)[1]);
+  std::istringstream lines(help.substr(at));
+  for (std::string line, name; std::getline(lines, line);) {
+    if (!line.starts_with("  ") || line.starts_with("   ")) continue;  // a heading, or a description's second line
+    std::istringstream(line) >> name;
+    names.push_back(name);
+  }
   return names;
 }
 

@@ -1,7 +1,6 @@
 #include "cli/help_format.h"
 
 #include <algorithm>
-#include <regex>
 #include <sstream>
 
 namespace alidade::cli {
@@ -9,12 +8,12 @@ namespace {
 
 /// " 0..10" of "FLOAT in [0 - 10]"; "" without a range, or where its end is there for the machine alone.
 std::string range_of(const std::string& checks) {
-  static const std::regex pattern(R"(in \[(\S+) - (\S+)\])");
-  std::smatch found;
-  if (!std::regex_search(checks, found, pattern)) return "";
+  const std::size_t open = checks.find("in ["), dash = checks.find(" - ", open), close = checks.find(']', dash);
+  if (close == std::string::npos) return "";
+  const std::string least = checks.substr(open + 4, dash - open - 4), most = checks.substr(dash + 3, close - dash - 3);
   constexpr double most_meant = 1e5;
-  if (std::stod(found[2]) > most_meant) return "";
-  return " " + found[1].str() + ".." + found[2].str();
+  if (std::stod(most) > most_meant) return "";
+  return " " + least + ".." + most;
 }
 
 }  // namespace

@@ -3,8 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <regex>
-
 #include "alidade/testing/calibration_sample.h"
 
 namespace alidade {

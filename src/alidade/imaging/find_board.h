@@ -19,6 +19,7 @@ struct BoardDetection {
   std::string reason;  ///< "no chessboard grid: only 3×2 of 9×6 corners", …; empty where it was found.
   [[nodiscard]] bool found() const { return reason.empty(); }
 };
+/// No board, for this reason; the reason must not be empty.
 [[nodiscard]] BoardDetection not_found(std::string reason);
 
 /// Finds a board of any kind in a photo (8- or 16-bit, grey or colour) and fits its points below the pixel, each with

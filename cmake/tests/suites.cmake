@@ -1,7 +1,7 @@
-# Read by ctest when it starts, with `executables` and their `labels`: one test for each suite of GoogleTest. What the
-# tests of a suite share (rendered pictures, a simulated log) is made once, and a fifth of a second of loading saved for
-# each of them. Those with parameters are the long ones: one test each, and first, as alone at the end they would leave
-# cores idle.
+# Read by ctest when it starts, with `executables`, their `labels` and a `timeout`: one test for each suite of GoogleTest.
+# What the tests of a suite share (rendered pictures, a simulated log) is made once, and a fifth of a second of loading
+# saved for each of them. Those with parameters are the long ones: one test each, and first, as alone at the end they
+# would leave cores idle.
 foreach(executable label IN ZIP_LISTS executables labels)
   get_filename_component(name ${executable} NAME)
   if(NOT EXISTS ${executable})
@@ -20,13 +20,13 @@ foreach(executable label IN ZIP_LISTS executables labels)
       math(EXPR count "${count} + 1")
       if(suite MATCHES "/")
         add_test(${label}.${suite}.${CMAKE_MATCH_1} ${executable} "--gtest_filter=${suite}.${CMAKE_MATCH_1}")
-        set_tests_properties(${label}.${suite}.${CMAKE_MATCH_1} PROPERTIES LABELS ${label} TIMEOUT 600 COST 100)
+        set_tests_properties(${label}.${suite}.${CMAKE_MATCH_1} PROPERTIES LABELS ${label} TIMEOUT ${timeout} COST 100)
       endif()
     elseif(line MATCHES "^([^ ]+)\\.( |$)")
       set(next ${CMAKE_MATCH_1})
       if(count GREATER 0 AND NOT suite MATCHES "/")
         add_test(${label}.${suite} ${executable} "--gtest_filter=${suite}.*")
-        set_tests_properties(${label}.${suite} PROPERTIES LABELS ${label} TIMEOUT 600 COST ${count})
+        set_tests_properties(${label}.${suite} PROPERTIES LABELS ${label} TIMEOUT ${timeout} COST ${count})
       endif()
       set(suite ${next})
       set(count 0)

@@ -45,6 +45,7 @@ Reduced reduce(const NormalEquations& eq, double lambda) {
       reduced.ok = false;
       return reduced;
     }
+    if (eq.num_globals == 0) continue;  // the poses alone: nothing to reduce
     const auto L = reduced.V_llt.back().matrixL();
     auto rows = Y.middleRows<6>(filled);
     rows = eq.coupling(k).transpose();

@@ -101,7 +101,10 @@ async function whoJoinsSeesMarksAtOnce({browser, alidade}) {
   const [shown_ms, first_s, now_s] = await seen.evaluate(() => [performance.getEntriesByName('drawn')[0].startTime - performance.getEntriesByType('navigation')[0].responseEnd, window.alidade.page.rows.first, window.alidade.page.rows.time]);
   console.log(`      marks ${shown_ms.toFixed(0)} ms after the page had arrived`);
   assert.ok(shown_ms < 1000 * slowness, `${shown_ms} ms`);
-  assert.ok(now_s - first_s > 1.5, `what was before is there: ${first_s} … ${now_s} s`);
+  // The run itself may be behind what it was fed, so what came before the page is told by its first row.
+  assert.ok(first_s < 0.1, `what was before is there: ${first_s} … ${now_s} s`);
+  await seen.waitForFunction(() => window.alidade.page.rows.time > 1.5);
+  assert.ok((await seen.evaluate(() => window.alidade.page.rows.first)) < 0.1, 'and stays');
   assert.deepEqual(faults, []);
   live.child.kill('SIGKILL');
   const took_ms = await until('the cross', async () => (await seen.locator('.top.live .symbol').innerText()) === '✕', 10_000);

@@ -111,6 +111,27 @@ TEST(BoardSurface, PassesThroughThePointsAndMeetsItsRays) {
   }
 }
 
+/// A board that its corners bend as parabolas is one between them and in its margin as well: a corner's edges would
+/// stand off otherwise, and every camera from its photos.
+TEST(BoardSurface, OfABowIsTheParabola) {
+  for (const Board& board : {Board{BoardKind::chessboard, 9, 6, 0.025}, Board{BoardKind::chessboard, 3, 3, 0.025},
+                             Board{BoardKind::asymmetric_circles, 4, 11, 0.02, 0.0, ""}}) {
+    const std::vector<Eigen::Vector3d> nominal = points_in_board(board);
+    const auto bent = [](double s, double t) {
+      return Eigen::Vector3d(s + 1e-3 * s, t - 2e-3 * s, 0.3 * s * s - 0.02 * s + 0.5 * t * t + 0.001);
+    };
+    std::vector<Eigen::Vector3d> points;
+    for (const Eigen::Vector3d& point : nominal) points.push_back(bent(point.x(), point.y()));
+    const BoardSurface surface(board, points);
+    const double margin = board.square_m, right = nominal.back().x(), bottom = nominal.back().y();
+    for (double s = -margin; s < right + margin; s += 0.3 * board.square_m) {
+      for (double t = -margin; t < bottom + margin; t += 0.3 * board.square_m) {
+        EXPECT_LT((surface.point({s, t}) - bent(s, t)).norm(), 1e-12) << s << " " << t;
+      }
+    }
+  }
+}
+
 /// Where a picture's row crosses a near-vertical edge, from the sum of its grey values between two pixels: blur that is
 /// symmetric does not move it.
 double crossing(const cv::Mat& photo, int v, int u_from, int u_to) {

@@ -13,7 +13,15 @@ struct Weights {
   std::array<double, 4> value{}, slope{};
 };
 
-/// Cubic Hermite weights on uneven nodes, tangents from the neighbours' difference; beyond the ends the line goes on.
+/// Weights of the slope, per unit of the coordinate, of the parabola through three nodes, at one of them.
+std::array<double, 3> parabola_slope(const double* nodes, std::size_t at) {
+  const double a = nodes[0], b = nodes[1], c = nodes[2], x = nodes[at];
+  return {(2.0 * x - b - c) / ((a - b) * (a - c)), (2.0 * x - a - c) / ((b - a) * (b - c)),
+          (2.0 * x - a - b) / ((c - a) * (c - b))};
+}
+
+/// Cubic Hermite weights on uneven nodes, tangents from the parabola through three neighbours: a board that is a
+/// parabola is drawn as that. The outer cubics go on for two widths, then a line: the board's own margin is inside.
 Weights hermite_weights(const std::vector<double>& nodes, double at) {
   const std::size_t last = nodes.size() - 1;
   const auto above = std::upper_bound(nodes.begin(), nodes.end(), at) - nodes.begin();
@@ -21,27 +29,27 @@ Weights hermite_weights(const std::vector<double>& nodes, double at) {
   Weights weights;
   weights.first = std::min(left > 0 ? left - 1 : 0, last >= 3 ? last - 3 : 0);
   const double width = nodes[left + 1] - nodes[left];
-  const double x = (at - nodes[left]) / width;
+  const double wanted = (at - nodes[left]) / width;
+  const double x = std::clamp(wanted, -2.0, 3.0);
   const auto add = [&](std::size_t node, double value, double slope) {
     weights.value[node - weights.first] += value;
     weights.slope[node - weights.first] += slope / width;
   };
   const auto add_tangent = [&](std::size_t node, double value, double slope) {
-    const std::size_t before = node > 0 ? node - 1 : node, after = std::min(node + 1, last);
-    const double per_width = width / (nodes[after] - nodes[before]);
-    add(after, per_width * value, per_width * slope);
-    add(before, -per_width * value, -per_width * slope);
+    if (last < 2) {  // two nodes: a line
+      add(1, value, slope);
+      add(0, -value, -slope);
+      return;
+    }
+    const std::size_t first = std::min(node > 0 ? node - 1 : 0, last - 2);
+    const auto tangent = parabola_slope(&nodes[first], node - first);
+    for (std::size_t i = 0; i < 3; ++i) add(first + i, width * tangent[i] * value, width * tangent[i] * slope);
   };
-  if (x < 0.0 || x > 1.0) {
-    const std::size_t end = x < 0.0 ? left : left + 1;
-    add(end, 1.0, 0.0);
-    add_tangent(end, x < 0.0 ? x : x - 1.0, 1.0);
-    return weights;
-  }
   add(left, 1.0 + x * x * (2.0 * x - 3.0), 6.0 * x * (x - 1.0));
   add(left + 1, x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x));
   add_tangent(left, x * (x - 1.0) * (x - 1.0), (x - 1.0) * (3.0 * x - 1.0));
   add_tangent(left + 1, x * x * (x - 1.0), x * (3.0 * x - 2.0));
+  for (std::size_t i = 0; i < weights.value.size(); ++i) weights.value[i] += (wanted - x) * width * weights.slope[i];
   return weights;
 }
 
@@ -79,13 +87,29 @@ BoardSurface::BoardSurface(const Board& board, std::span<const Eigen::Vector3d> 
     known[k] = true;
     is_flat_ = is_flat_ && nodes_[k].norm() < 1e-12;
   }
-  // A staggered grid has no point at every other node: the mean of the neighbours in its row.
-  for (std::size_t k = 0; k < nodes_.size(); ++k) {
-    if (known[k]) continue;
-    const std::size_t col = k % s_.size();
-    const bool has_left = col > 0, has_right = col + 1 < s_.size();
-    if (has_left) nodes_[k] += (has_right ? 0.5 : 1.0) * nodes_[k - 1];
-    if (has_right) nodes_[k] += (has_left ? 0.5 : 1.0) * nodes_[k + 1];
+  fill_gaps(known);
+}
+
+void BoardSurface::fill_gaps(const std::vector<bool>& known) {
+  for (std::size_t row = 0; row < t_.size(); ++row) {
+    std::vector<std::size_t> cols;
+    for (std::size_t col = 0; col < s_.size(); ++col) {
+      if (known[row * s_.size() + col]) cols.push_back(col);
+    }
+    const std::size_t order = std::min<std::size_t>(3, cols.size());
+    for (std::size_t col = 0; col < s_.size(); ++col) {
+      if (known[row * s_.size() + col]) continue;
+      const auto after = std::lower_bound(cols.begin(), cols.end(), col) - cols.begin();
+      const auto wanted = static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, after - 1));
+      const std::size_t first = std::min(wanted, cols.size() - order);
+      for (std::size_t i = first; i < first + order; ++i) {
+        double weight = 1.0;  // Lagrange's
+        for (std::size_t j = first; j < first + order; ++j) {
+          if (j != i) weight *= (s_[col] - s_[cols[j]]) / (s_[cols[i]] - s_[cols[j]]);
+        }
+        nodes_[row * s_.size() + col] += weight * node(cols[i], row);
+      }
+    }
   }
 }
 

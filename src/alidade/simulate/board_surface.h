@@ -10,7 +10,8 @@
 namespace alidade {
 
 /// The surface of a bent board: nominal place (s, t) → point in frame `board` [m]. Passes through every true point of
-/// the board; between them the displacement from the plane is a smooth cubic (Hermite) of both coordinates.
+/// the board; between them and around them the displacement from the plane is a smooth cubic (Hermite) of both
+/// coordinates, and a parabola where the points lie on one.
 class BoardSurface {
  public:
   /// `true_points` in the board's order.
@@ -29,6 +30,8 @@ class BoardSurface {
     Eigen::Vector3d point, along_s, along_t;  ///< With derivatives.
   };
   [[nodiscard]] Patch patch(const Eigen::Vector2d& place) const;
+  /// A staggered grid has no point at every other node: there the parabola of the three nearest in its row.
+  void fill_gaps(const std::vector<bool>& known);
   [[nodiscard]] const Eigen::Vector3d& node(std::size_t col, std::size_t row) const {
     return nodes_[row * s_.size() + col];
   }

@@ -276,7 +276,7 @@ void add_calibrate(Frame& frame) {
       ->capture_default_str();
   command
       .add_option("--board-shape", args->board_shape,
-                  "flat, bow (2 parameters), free (every point), auto (free if the photos prove it), or a "
+                  "flat, bow (2 parameters), free (every point), auto (bow or free if the photos prove it), or a "
                   "board_points.csv of an earlier run, held")
       ->capture_default_str();
   command

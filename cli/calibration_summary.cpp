@@ -78,6 +78,10 @@ void summarize(const Calibration& calibration, Run& run) {
   run.say(fmt::format("{} of {} photos, {} corners ({} left out), RMS {:.4f} px, board {}", used, views.size(),
                       report.corners_used, report.corners_dropped, report.rms_px,
                       shape_name(calibration.config.board_shape)));
+  const BoardShape asked = calibration.asked_shape;
+  if ((asked == BoardShape::bow || asked == BoardShape::free) && asked != calibration.config.board_shape) {
+    run.say(fmt::format("--board-shape {} was not used: it does not help on unseen photos", shape_name(asked)));
+  }
   if (calibration.port) run.say(port_sentence(*calibration.port));
 }
 

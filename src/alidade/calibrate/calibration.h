@@ -12,6 +12,7 @@ namespace alidade {
 struct Calibration {
   PhotoCalibration photos;
   CalibrateConfig config;  ///< As used: a shape that does not transfer is not used.
+  BoardShape asked_shape = BoardShape::automatic;
   CalibrationStudy study;
   NextPhotoPlan next;
   std::optional<PortResidual> port;  ///< Of a flat_port: whether a brown lens would do.
@@ -19,8 +20,8 @@ struct Calibration {
 };
 
 /// Judges a finished solve: studies it, plans the next photo and gives the verdict. A board shape that was asked for
-/// but does not transfer from one half of the photos to the other is dropped, and the board solved flat; with
-/// BoardShape::automatic the transfer test decides.
+/// but does not transfer from one half of the photos to the other is dropped (`decide_shape`), and the board solved
+/// flat or as a bow; with BoardShape::automatic the transfer test decides.
 [[nodiscard]] Calibration judge_calibration(const Board& board, PhotoCalibration photos, CalibrateConfig config,
                                             const Progress& progress = {});
 

@@ -11,13 +11,16 @@ namespace alidade {
 namespace {
 
 /// A number with two significant digits, as people read σ.
-std::string two(double value) {
+/// To so many digits that tell.
+std::string rounded(double value, int digits) {
   std::array<char, 32> text{};
   if (!(std::abs(value) > 0.0)) return "0";
-  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(std::abs(value)))), 0, 6);
+  const int decimals = std::clamp(digits - 1 - static_cast<int>(std::floor(std::log10(std::abs(value)))), 0, 6);
   std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
   return text.data();
 }
+
+std::string two(double value) { return rounded(value, 2); }
 
 State grade(double value, double care, double bad) {
   if (!(value <= bad)) return State::bad;  // NaN is bad, too
@@ -173,21 +176,26 @@ Check honest_corners(const CalibrateReport& report, std::span<const BoardView> v
 
 Check board_flat(const CalibrationStudy& study, const CalibrateConfig& config) {
   Check check{.name = "board flat", .limit = 0.95, .unit = "", .figure = "board"};
-  const bool shaped = config.board_shape == BoardShape::bow || config.board_shape == BoardShape::free;
   if (!study.transfer) {
     check.state = State::care;
     check.text = "too few photos to test the board's shape";
     return check;
   }
-  const std::string figures = "RMS of unseen photos " + two(study.transfer->flat_rms_px) + " px flat, " +
-                              two(study.transfer->transfer_rms_px) + " px with the shape learned on the others";
-  check.value = study.transfer->transfer_rms_px / study.transfer->flat_rms_px;
-  if (shaped) {
-    check.state = study.transfer->transfers() ? State::good : State::bad;
-    check.text = (study.transfer->transfers() ? "the shape transfers: " : "the shape does not transfer: ") + figures;
+  const bool held = config.board_shape == BoardShape::given;
+  const ShapeTransfer& transfer = *study.transfer;
+  const std::string figures = "RMS of unseen photos " + rounded(transfer.flat_rms_px, 3) + " px " +
+                              (held ? "with the board as given, " : "flat, ") + rounded(transfer.transfer_rms_px, 3) +
+                              " px with the shape learned on the others (" + shape_name(transfer.shape) + ")";
+  check.value = transfer.transfer_rms_px / transfer.flat_rms_px;
+  if (config.board_shape == BoardShape::bow || config.board_shape == BoardShape::free) {
+    check.state = transfer.transfers() ? State::good : State::bad;
+    check.text = (transfer.transfers() ? "the shape transfers: " : "the shape does not transfer: ") + figures;
   } else {
-    check.state = check.value < 0.9 ? State::care : State::good;
-    check.text = (check.value < 0.9 ? "the board bends: " : "flat as far as the photos tell: ") + figures;
+    check.state = transfer.is_proved() ? State::care : State::good;
+    check.text =
+        (transfer.is_proved() ? (held ? "the board has another shape: " : "the board bends: ")
+                              : (held ? "as given, as far as the photos tell: " : "flat as far as the photos tell: ")) +
+        figures;
   }
   return check;
 }
@@ -207,7 +215,8 @@ Check principal_point(const CalibrateReport& report) {
 }
 
 /// What to do next. What makes σ large comes first: more photos of a bent board are no help.
-std::string advice(const Verdict& verdict, const NextPhotoPlan& next, double worst_px, bool is_port) {
+std::string advice(const Verdict& verdict, const CalibrationStudy& study, const NextPhotoPlan& next, double worst_px,
+                   bool is_port) {
   const auto ails = [&](const std::string& name) {
     return std::any_of(verdict.checks.begin(), verdict.checks.end(),
                        [&](const Check& check) { return check.name == name && check.state != State::good; });
@@ -220,7 +229,9 @@ std::string advice(const Verdict& verdict, const NextPhotoPlan& next, double wor
     return check.name == "honest corners" && check.state == State::bad;
   });
   if (wrong_corners) return "look at the corners named, or extract them again";
-  if (text_starts("board flat", "the board bends")) return "use --board-shape free";
+  if (text_starts("board flat", "the board bends")) return "use --board-shape " + shape_name(study.transfer->shape);
+  if (text_starts("board flat", "the board has another shape"))
+    return "use --board-shape auto, or this board's own points";
   if (ails("lens adequate") && is_port) return "check the lens in air, --glass and --n-water, or take --model brown";
   if (ails("lens adequate")) return "try a richer lens model (--model), see the held-out errors";
   if (ails("coverage") && !next.photos.empty()) {
@@ -244,7 +255,7 @@ Verdict calibration_verdict(const CalibrateReport& report, const CalibrationStud
   }
   verdict.state = worst->state;
   for (const Check& check : verdict.checks) {  // halves that differ are a symptom of it
-    if (check.name == "board flat" && check.text.starts_with("the board bends")) worst = &check;
+    if (check.name == "board flat" && check.state == State::care && study.transfer) worst = &check;
   }
   const std::string trust =
       "3σ is below 0.5 px in " + two(share_below(study.sigma_infinity, 0.5)) + " % of the picture";
@@ -253,7 +264,8 @@ Verdict calibration_verdict(const CalibrateReport& report, const CalibrationStud
                                                           : "Not to be trusted: ";
   verdict.sentence = word + trust;
   if (worst->state != State::good && worst->name != "coverage") verdict.sentence += "; " + worst->text;
-  verdict.to_add = advice(verdict, next, 3.0 * worst_of(study.sigma_infinity).value, !is_central(report.camera.lens));
+  verdict.to_add =
+      advice(verdict, study, next, 3.0 * worst_of(study.sigma_infinity).value, !is_central(report.camera.lens));
   return verdict;
 }
 

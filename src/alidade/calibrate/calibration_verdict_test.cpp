@@ -116,9 +116,9 @@ TEST(CalibrationVerdict, ABentBoardIsNamedAndTheWayOutHelps) {
   EXPECT_NE(flat.verdict.state, State::good) << flat.verdict.sentence;
   EXPECT_THAT(check_named(flat.verdict, "board flat").text, HasSubstr("the board bends"));
   EXPECT_THAT(flat.verdict.sentence, HasSubstr("the board bends"));
-  EXPECT_THAT(flat.verdict.to_add, HasSubstr("--board-shape free"));
-  const Calibration shaped = sample_calibration(views, {.board_shape = BoardShape::free});
-  EXPECT_EQ(shaped.config.board_shape, BoardShape::free);
+  EXPECT_THAT(flat.verdict.to_add, HasSubstr("--board-shape bow"));  // which it is
+  const Calibration shaped = sample_calibration(views, {.board_shape = BoardShape::bow});
+  EXPECT_EQ(shaped.config.board_shape, BoardShape::bow);
   EXPECT_EQ(shaped.verdict.state, State::good) << shaped.verdict.sentence;
   EXPECT_LT(shaped.photos.report.rms_px, 0.7 * flat.photos.report.rms_px);
 }

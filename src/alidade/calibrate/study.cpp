@@ -11,12 +11,6 @@ namespace {
 
 constexpr std::size_t least_photos = 6;  // two halves of three
 
-std::vector<BoardView> half(std::span<const BoardView> views, std::size_t parity) {
-  std::vector<BoardView> chosen;
-  for (std::size_t k = parity; k < views.size(); k += 2) chosen.push_back(views[k]);
-  return chosen;
-}
-
 double median_distance_m(const CalibrateReport& report) {
   std::vector<double> distances;
   for (const ViewFit& view : report.views) {
@@ -32,8 +26,8 @@ std::optional<Halves> compare_halves(const Board& board, std::span<const BoardVi
                                      CalibrateConfig config, const std::vector<Eigen::Vector3d>& board_points) {
   if (views.size() < least_photos) return std::nullopt;
   config.board_shape = BoardShape::given;
-  const CalibrateReport a = calibrate(board, half(views, 0), size, config, board_points);
-  const CalibrateReport b = calibrate(board, half(views, 1), size, config, board_points);
+  const CalibrateReport a = calibrate(board, every_other(views, 0), size, config, board_points);
+  const CalibrateReport b = calibrate(board, every_other(views, 1), size, config, board_points);
   if (a.status != CalibrateReport::Status::converged || b.status != CalibrateReport::Status::converged) {
     return std::nullopt;
   }
@@ -68,30 +62,6 @@ std::vector<BoardView> used_views(std::span<const BoardView> views, const Calibr
     chosen.push_back(std::move(view));
   }
   return chosen;
-}
-
-std::optional<ShapeTransfer> test_shape_transfer(const Board& board, std::span<const BoardView> views, ImageSize size,
-                                                 const CalibrateConfig& config) {
-  if (views.size() < least_photos) return std::nullopt;
-  double flat = 0.0, transferred = 0.0, corners = 0.0;
-  for (const std::size_t parity : {0u, 1u}) {
-    CalibrateConfig shaped = config, plain = config, held = config;
-    shaped.board_shape = config.board_shape == BoardShape::bow ? BoardShape::bow : BoardShape::free;
-    plain.board_shape = BoardShape::flat;
-    held.board_shape = BoardShape::given;
-    const auto teacher = calibrate(board, half(views, parity), size, shaped);
-    if (teacher.status != CalibrateReport::Status::converged) return std::nullopt;
-    const auto others = half(views, 1 - parity);
-    const auto pupil = calibrate(board, others, size, held, teacher.board_points);
-    const auto without = calibrate(board, others, size, plain);
-    if (pupil.status != CalibrateReport::Status::converged || without.status != CalibrateReport::Status::converged) {
-      return std::nullopt;
-    }
-    flat += without.rms_px * without.rms_px * without.corners_used;
-    transferred += pupil.rms_px * pupil.rms_px * pupil.corners_used;
-    corners += pupil.corners_used;
-  }
-  return ShapeTransfer{std::sqrt(flat / corners), std::sqrt(transferred / corners)};
 }
 
 CalibrationStudy study_calibration(const Board& board, std::span<const BoardView> views, const CalibrateConfig& config,

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "alidade/calibrate/calibrate.h"
+#include "alidade/calibrate/shape_transfer.h"
 #include "alidade/camera/camera_diff.h"
 #include "alidade/estimation/progress.h"
 
@@ -41,13 +42,6 @@ struct Halves {
   std::string worst_name;
 };
 
-/// A board shape learned on one half, held fixed on the other, both ways.
-struct ShapeTransfer {
-  double flat_rms_px = 0.0;      ///< Of both halves with a flat board.
-  double transfer_rms_px = 0.0;  ///< With the other half's shape.
-  [[nodiscard]] bool transfers() const { return transfer_rms_px < 0.95 * flat_rms_px; }
-};
-
 /// What stands behind the verdict on a calibration.
 struct CalibrationStudy {
   std::vector<ResidualCell> cells;
@@ -56,7 +50,8 @@ struct CalibrationStudy {
   double working_distance_m = 0.0;   ///< Median distance of the boards.
   std::optional<Halves> halves;      ///< None for fewer than six photos.
   std::vector<HeldOutModel> models;  ///< Empty for fewer than six photos.
-  std::optional<ShapeTransfer> transfer;
+  std::optional<ShapeTransfer>
+      transfer;  ///< Of the shape in use, else of the one that tells most; none for few photos.
 };
 
 /// Residual structure, σ maps, halves and held-out error of other models; `transfer` is passed on. `report` must have
@@ -69,9 +64,5 @@ struct CalibrationStudy {
 /// The views that took part, at most `most` of them, evenly chosen, without the corners that were rejected.
 [[nodiscard]] std::vector<BoardView> used_views(std::span<const BoardView> views, const CalibrateReport& report,
                                                 std::size_t most);
-
-/// Shape learned on the even photos, tested on the odd ones, and the other way round. None for fewer than six photos.
-[[nodiscard]] std::optional<ShapeTransfer> test_shape_transfer(const Board& board, std::span<const BoardView> views,
-                                                               ImageSize size, const CalibrateConfig& config);
 
 }  // namespace alidade

@@ -272,22 +272,6 @@ DataTable next_photos_table(const NextPhotoPlan& next) {
   return table;
 }
 
-std::string shape_name(BoardShape shape) {
-  switch (shape) {
-    case BoardShape::flat:
-      return "flat";
-    case BoardShape::bow:
-      return "bow";
-    case BoardShape::free:
-      return "free";
-    case BoardShape::given:
-      return "given";
-    case BoardShape::automatic:
-      return "auto";
-  }
-  return "flat";
-}
-
 void fill_calibration(const Board& board, const Calibration& calibration, ResultDocument& document) {
   const auto& [views, reasons, size, unreadable, report] = calibration.photos;
   document.counts.given = views.size();

@@ -13,7 +13,4 @@ void fill_calibration(const Board& board, const Calibration& calibration, Result
 /// Table `next`: poses and what they bring.
 [[nodiscard]] DataTable next_photos_table(const NextPhotoPlan& plan);
 
-/// The word of --board-shape for a shape.
-[[nodiscard]] std::string shape_name(BoardShape shape);
-
 }  // namespace alidade

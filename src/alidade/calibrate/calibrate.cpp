@@ -4,8 +4,10 @@
 #include <cmath>
 
 #include "alidade/calibrate/bundle.h"
+#include "alidade/calibrate/far_corners.h"
 #include "alidade/calibrate/initial_lens.h"
 #include "alidade/calibrate/port.h"
+#include "alidade/calibrate/repeated_views.h"
 #include "alidade/calibrate/setup.h"
 #include "alidade/calibrate/start.h"
 #include "alidade/calibrate/weights.h"
@@ -19,6 +21,7 @@ using Residuals = std::vector<std::vector<Eigen::Vector2d>>;
 struct Work {
   std::vector<std::size_t> number;  ///< Position of each in the caller's views.
   std::vector<BoardView> views;
+  std::vector<std::vector<bool>> far;  ///< Corners that take no part in the start.
   std::vector<ViewArrays> arrays;
   BundleProblem problem;
   bool use_covariances = false;
@@ -34,18 +37,22 @@ void refuse(CalibrateReport& report, std::string reason, std::string to_add) {
   report.to_add = std::move(to_add);
 }
 
-/// Takes in every view with enough corners; the others are named.
+/// Takes in every view with enough corners, once; the others are named.
 void take_usable_views(std::span<const BoardView> views, CalibrateReport& report, Work& work) {
   constexpr std::size_t least_corners = 6;  // a pose takes 3; the rest must say something of the lens
+  const auto repeats = repeated_views(views);
   for (std::size_t k = 0; k < views.size(); ++k) {
     report.views[k].corners.resize(views[k].corners.size());
-    if (views[k].corners.empty()) {
+    if (repeats[k]) {
+      report.views[k].reason = "is the same picture as " + views[*repeats[k]].photo;
+    } else if (views[k].corners.empty()) {
       report.views[k].reason = "no corners";
     } else if (views[k].corners.size() < least_corners) {
       report.views[k].reason = "only " + std::to_string(views[k].corners.size()) + " corners";
     } else {
       work.number.push_back(k);
       work.views.push_back(views[k]);
+      work.far.push_back(far_corners(views[k], report.board_points));
     }
   }
 }
@@ -55,6 +62,7 @@ void drop_view(std::size_t at, const std::string& reason, CalibrateReport& repor
   const auto offset = static_cast<std::ptrdiff_t>(at);
   work.number.erase(work.number.begin() + offset);
   work.views.erase(work.views.begin() + offset);
+  work.far.erase(work.far.begin() + offset);
   if (at < work.arrays.size()) work.arrays.erase(work.arrays.begin() + offset);
   if (at < state.cam_from_board.size()) state.cam_from_board.erase(state.cam_from_board.begin() + offset);
 }
@@ -65,7 +73,10 @@ std::optional<InitialLens> first_lens(const Work& work, const std::vector<Eigen:
   constexpr std::size_t enough = 24;
   const std::size_t count = std::min(enough, work.views.size());
   std::vector<BoardView> chosen;
-  for (std::size_t i = 0; i < count; ++i) chosen.push_back(work.views[i * work.views.size() / count]);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t k = i * work.views.size() / count;
+    chosen.push_back(without(work.views[k], work.far[k]));
+  }
   auto found = initial_lens(chosen, board_points, size, held, work.problem);
   if (!found) return std::nullopt;
   std::vector<std::optional<Rigid3>> poses(work.views.size());
@@ -80,7 +91,8 @@ void find_poses(const std::vector<std::optional<Rigid3>>& known, CalibrateReport
   camera.lens = state.lens;
   for (const std::optional<Rigid3>& start : known) {
     const std::size_t at = state.cam_from_board.size();
-    const auto pose = start ? start : pose_from_plane(camera, work.views[at], state.board_points);
+    const auto pose =
+        start ? start : pose_from_plane(camera, without(work.views[at], work.far[at]), state.board_points);
     if (pose) {
       state.cam_from_board.push_back(*pose);
     } else {
@@ -105,6 +117,17 @@ void whiten(Work& work, const Residuals& residuals, const NoiseEstimate& noise, 
   for (std::size_t k = 0; k < work.views.size(); ++k) {
     set_whiteners(work.views[k], residuals[k], noise, noise.used[k], work.use_covariances, huber_sigmas,
                   work.arrays[k]);
+  }
+}
+
+/// Every corner with the same weight, but none for the far ones where outliers are to be left out.
+void make_all_arrays(const CalibrateConfig& config, Work& work) {
+  work.arrays.clear();
+  for (std::size_t k = 0; k < work.views.size(); ++k) {
+    work.arrays.push_back(make_arrays(work.views[k]));
+    for (std::size_t i = 0; config.reject_outliers && i < work.far[k].size(); ++i) {
+      if (work.far[k][i]) set_whitener(work.arrays[k], i, Eigen::Matrix2d::Identity(), 0.0);
+    }
   }
 }
 
@@ -155,7 +178,7 @@ BundleResult solve_robustly(const CalibrateConfig& config, CalibrateReport& repo
     if (!soft && drop_misfits(noise, report, work, result.state)) {
       used_before.clear();
       if (work.views.size() < 2) break;
-      for (std::size_t k = 0; k < work.views.size(); ++k) work.arrays[k] = make_arrays(work.views[k]);
+      make_all_arrays(config, work);
       result = solve(work, std::move(result.state), config, Nearness::full);
       report.iterations += result.iterations;
       continue;
@@ -245,6 +268,18 @@ bool refuse_untold(const Work& work, CalibrateReport& report) {
   return false;
 }
 
+/// For a solve that does not settle.
+std::string what_may_be_wrong(const Work& work) {
+  for (std::size_t k = 0; k < work.views.size(); ++k) {
+    const auto first = std::find(work.far[k].begin(), work.far[k].end(), true);
+    if (first == work.far[k].end()) continue;
+    const auto at = static_cast<std::size_t>(first - work.far[k].begin());
+    return "correct " + work.views[k].photo + ", corner " + std::to_string(work.views[k].corners[at].index) +
+           ", which lies far from the others, or leave it out with --outliers drop";
+  }
+  return "check --board and --square, and look at the photos that fit worst";
+}
+
 /// Refuses where the answer is no answer: singular, or a parameter with a huge σ.
 void judge(const Work& work, const BundleResult& result, bool settled, CalibrateReport& report) {
   if (result.status == BundleResult::Status::singular) {
@@ -263,16 +298,25 @@ void judge(const Work& work, const BundleResult& result, bool settled, Calibrate
   } else if (!settled) {
     report.status = CalibrateReport::Status::no_convergence;
     report.reason = "the solve did not settle in " + std::to_string(report.iterations) + " iterations";
-    report.to_add = "check --board and --square, and look at the photos that fit worst";
+    report.to_add = what_may_be_wrong(work);
   } else {
     report.status = CalibrateReport::Status::converged;
   }
 }
 
-/// The result with its covariance. What photos hardly tell of a port makes the solve creep: then, too, there is one to
-/// say which parameter it is.
-BundleResult finished(BundleResult result, bool settled) {
-  if (!settled && !is_central(result.state.lens) && result.equations) result.status = BundleResult::Status::converged;
+/// The result with its covariance. What photos hardly tell makes the solve creep: then, too, there is one to say which
+/// parameter it is. Not where the corners do not fit: that is another fault.
+BundleResult finished(BundleResult result, bool settled, const Work& work) {
+  double sum = 0.0, count = 0.0;
+  for (std::size_t k = 0; k < work.arrays.size() && !settled; ++k) {
+    for (const Eigen::Vector2d& r : residuals_px(result.state, k, work.arrays[k])) {
+      sum += r.squaredNorm();
+      count += 1.0;
+    }
+  }
+  constexpr double fits_px = 2.0;
+  const bool creeps = !settled && (!is_central(result.state.lens) || sum < fits_px * fits_px * count);
+  if (creeps && result.equations) result.status = BundleResult::Status::converged;
   return with_covariance(std::move(result), true);
 }
 
@@ -290,10 +334,13 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
   Work work;
   take_usable_views(views, report, work);
   const std::size_t least = least_views(config);
+  const bool repeated = std::any_of(report.views.begin(), report.views.end(),
+                                    [](const ViewFit& view) { return view.reason.starts_with("is the same picture"); });
   const auto too_few = [&] {
     refuse(report,
            "only " + std::to_string(work.views.size()) + " usable photo" + (work.views.size() == 1 ? "" : "s") +
-               " of the board; it takes " + std::to_string(least),
+               " of the board" + (repeated ? " (others are the same picture)" : "") + "; it takes " +
+               std::to_string(least),
            "add photos of the board, tilted 20–45° in several directions");
   };
   if (work.views.size() < least) {
@@ -320,11 +367,11 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
            "tilt the board 20–45° in several directions");
     return report;
   }
-  for (const BoardView& view : work.views) work.arrays.push_back(make_arrays(view));
+  make_all_arrays(config, work);
   NoiseEstimate noise;
   BundleResult solved = solve_robustly(config, report, work, std::move(state), noise);
   const bool settled = solved.status == BundleResult::Status::converged;
-  const BundleResult result = finished(std::move(solved), settled);
+  const BundleResult result = finished(std::move(solved), settled, work);
   const double variance_scale = fill_estimate(work, result, noise, size, report);
   fill_views(work, result, noise, variance_scale, report);
   report.camera.rms_px = report.rms_px;

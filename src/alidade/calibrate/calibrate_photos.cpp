@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "alidade/calibrate/repeated_views.h"
+
 namespace alidade {
 namespace {
 
@@ -23,6 +25,12 @@ void take_detections(BoardDetections&& found, PhotoCalibration& result) {
     }
   }
   result.size = {first.width_px, first.height_px};
+  const auto repeats = repeated_views(result.views);
+  for (std::size_t i = 0; i < repeats.size(); ++i) {
+    if (!repeats[i]) continue;
+    result.reasons[i] = "is the same picture as " + result.views[*repeats[i]].photo;
+    result.views[i].corners.clear();
+  }
 }
 
 /// Where many photos show a whole grid of another size, the few in which the asked one was seen are parts of that grid:

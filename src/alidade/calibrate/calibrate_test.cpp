@@ -154,6 +154,49 @@ TEST(Calibrate, NamesWrongCornersAndLeavesThemOut) {
   EXPECT_LT(mahalanobis2(report.camera, scene.camera, all_but_skew(scene.camera)), 42.7);
 }
 
+TEST(Calibrate, OneCornerHoweverFarOffIsNamedAndNothingElse) {
+  const BoardScene scene = example_scene("brown", 12);
+  for (const BoardShape shape : {BoardShape::flat, BoardShape::free}) {
+    for (const double far_px : {1e3, 1e4, 1e5, 1e9}) {
+      auto views = simulate_views(scene, 0.1, 9);
+      views[1].corners[17].px.x() = far_px;
+      CalibrateConfig config;
+      config.board_shape = shape;
+      const auto report = calibrate(board, views, size, config);
+      ASSERT_EQ(report.status, CalibrateReport::Status::converged) << report.reason;
+      EXPECT_EQ(report.corners_dropped, 1) << far_px;
+      EXPECT_EQ(report.corners_used, 12 * 54 - 1) << far_px;
+      EXPECT_FALSE(report.views[1].corners[17].used);
+      EXPECT_LT(mahalanobis2(report.camera, scene.camera, all_but_skew(scene.camera)), 42.7);
+    }
+  }
+}
+
+TEST(Calibrate, ACornerFarOffThatIsToBeKeptIsNamedWhereNothingFits) {
+  auto views = simulate_views(example_scene("brown", 12), 0.1, 9);
+  views[1].corners[17].px.x() = 1e5;
+  CalibrateConfig config;
+  config.reject_outliers = false;
+  const auto report = calibrate(board, views, size, config);
+  ASSERT_EQ(report.status, CalibrateReport::Status::no_convergence);
+  EXPECT_NE(report.to_add.find(views[1].photo + ", corner 17"), std::string::npos) << report.to_add;
+}
+
+TEST(Calibrate, APictureGivenTwiceCountsOnce) {
+  const BoardScene scene = example_scene("brown", 12);
+  const auto views = simulate_views(scene, 0.1, 9);
+  auto twice = views;
+  for (BoardView view : views) {
+    view.photo = "again_" + view.photo;
+    twice.push_back(view);
+  }
+  const auto once = calibrate(board, views, size, {}), report = calibrate(board, twice, size, {});
+  ASSERT_EQ(report.status, CalibrateReport::Status::converged);
+  EXPECT_EQ(report.corners_used, 12 * 54);
+  EXPECT_EQ(report.camera.cov, once.camera.cov);
+  EXPECT_EQ(report.views[12].reason, "is the same picture as " + views[0].photo);
+}
+
 TEST(Calibrate, DropsAPhotoOfAnotherBoardByName) {
   const BoardScene scene = example_scene("brown", 12);
   auto views = simulate_views(scene, 0.1, 9);
@@ -222,7 +265,11 @@ TEST(Calibrate, RefusesWhatCannotBeTold) {
   };
   expect_refused(status({}), "only 0");
   expect_refused(status({views[0], views[1]}), "only 2");
-  expect_refused(status(std::vector<BoardView>(10, views[0])), "parallel");
+  expect_refused(status(std::vector<BoardView>(10, views[0])), "the same picture");
+
+  BoardScene still = scene;  // one place, but ten pictures
+  for (Rigid3& pose : still.cam_from_board) pose = scene.cam_from_board[0];
+  expect_refused(status(simulate_views(still, 0.1, 3)), "parallel");
 
   BoardScene frontal = scene;  // the same tilt everywhere
   for (Rigid3& pose : frontal.cam_from_board) {
@@ -237,7 +284,7 @@ TEST(Calibrate, RefusesWhatCannotBeTold) {
   auto few = views;
   for (BoardView& view : few) view.corners.resize(4);
   expect_refused(status(few), "only 0");
-  EXPECT_EQ(refused, 5);
+  EXPECT_EQ(refused, 6);
 }
 
 TEST(Calibrate, TwoViewsDoWhereThePrincipalPointIsHeld) {

@@ -1,6 +1,7 @@
 #include "alidade/calibrate/homography.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <cmath>
 

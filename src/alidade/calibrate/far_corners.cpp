@@ -1,0 +1,58 @@
+#include "alidade/calibrate/far_corners.h"
+
+#include <algorithm>
+
+namespace alidade {
+namespace {
+
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Distance of each point from the median of each coordinate, in the median of these distances.
+template <class Point>
+std::vector<double> relative_distances(std::size_t count, const Point& point) {
+  std::vector<double> x, y, distances;
+  x.reserve(count);
+  y.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    x.push_back(point(i).x());
+    y.push_back(point(i).y());
+  }
+  const Eigen::Vector2d centre(median(x), median(y));
+  distances.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) distances.push_back((point(i) - centre).norm());
+  std::vector<double> sorted = distances;
+  const double unit = std::max(median(sorted), 1e-300);
+  for (double& distance : distances) distance /= unit;
+  return distances;
+}
+
+}  // namespace
+
+std::vector<bool> far_corners(const BoardView& view, const std::vector<Eigen::Vector3d>& board_points) {
+  const auto& corners = view.corners;
+  if (corners.size() < 6) return {};
+  constexpr double most_stretched = 8.0;  // how much perspective and lens may pull one corner from the rest
+  const auto in_picture = relative_distances(corners.size(), [&](std::size_t i) { return corners[i].px; });
+  if (*std::max_element(in_picture.begin(), in_picture.end()) <= most_stretched) return {};
+  const auto on_board = relative_distances(corners.size(), [&](std::size_t i) -> Eigen::Vector2d {
+    return board_points[static_cast<std::size_t>(corners[i].index)].head<2>();
+  });
+  std::vector<bool> far(corners.size());
+  for (std::size_t i = 0; i < far.size(); ++i) far[i] = in_picture[i] > most_stretched * std::max(1.0, on_board[i]);
+  return std::find(far.begin(), far.end(), true) == far.end() ? std::vector<bool>{} : far;
+}
+
+BoardView without(const BoardView& view, const std::vector<bool>& far) {
+  if (far.empty()) return view;
+  BoardView rest{view.photo, {}};
+  for (std::size_t i = 0; i < far.size(); ++i) {
+    if (!far[i]) rest.corners.push_back(view.corners[i]);
+  }
+  return rest;
+}
+
+}  // namespace alidade

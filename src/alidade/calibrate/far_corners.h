@@ -1,0 +1,17 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "alidade/board/board_view.h"
+
+namespace alidade {
+
+/// Corners so far from the others of their photo that no perspective puts them there, in the view's order; empty where
+/// there is none. A start by least squares would bend to one of them and blame the rest.
+[[nodiscard]] std::vector<bool> far_corners(const BoardView& view, const std::vector<Eigen::Vector3d>& board_points);
+
+/// The view without them.
+[[nodiscard]] BoardView without(const BoardView& view, const std::vector<bool>& far);
+
+}  // namespace alidade

@@ -36,7 +36,7 @@ struct CalibrateArgs {
   CalibrateConfig config;
   std::filesystem::path air;
   PortKnowledge port;
-  bool has_glass = false;
+  bool has_glass = false, skip_bad = false;
 };
 
 /// "fx=650±5" or "fx=650:5": name, value, σ.
@@ -165,10 +165,10 @@ ImageSize size_of(const CalibrateArgs& args, const std::vector<BoardView>& views
 }
 
 PhotoCalibration from_corners(const CalibrateArgs& args, const Board& board, CalibrateConfig& config,
-                              std::span<const Eigen::Vector3d> given, Run& run) {
+                              std::span<const Eigen::Vector3d> given, std::vector<SkippedInput>& skipped, Run& run) {
   PhotoCalibration result;
   run.add_input("corners", args.corners);
-  result.views = read_corners(args.corners, num_points(board));
+  result.views = read_corners(args.corners, num_points(board), args.skip_bad ? &skipped : nullptr);
   result.reasons.resize(result.views.size());
   result.size = size_of(args, result.views);
   const bool have_sigma = std::any_of(result.views.begin(), result.views.end(), [](const BoardView& view) {
@@ -217,12 +217,19 @@ ExitCode calibrate(CalibrateArgs args, Run& run) {
   config.reject_outliers = args.outliers != "keep";
   const auto files = list_photos(args.photos);
   PhotoShelf shelf(files, run);
+  std::vector<SkippedInput> skipped;
   PhotoCalibration solved = args.corners.empty() ? from_photos(files, shelf, board, config, given, run)
-                                                 : from_corners(args, board, config, given, run);
+                                                 : from_corners(args, board, config, given, skipped, run);
   require_size_of_air(args, solved.size);
   Calibration result = judge_calibration(board, std::move(solved), config, run.progress);
   run.lap("study");
   fill_calibration(board, result, run.document);
+  // Rows of the table stand before photos: counts are of photos.
+  run.document.counts.skipped.insert(run.document.counts.skipped.begin(), skipped.begin(), skipped.end());
+  if (!skipped.empty()) {
+    run.say(fmt::format("{} wrong row{} left out, the first: {}:{}: {}", skipped.size(), skipped.size() > 1 ? "s" : "",
+                        skipped.front().file, skipped.front().line, skipped.front().reason));
+  }
   if (!run.options.no_report && args.corners.empty()) {
     add_pictures(
         result, [&shelf](std::size_t i) { return shelf.load(i); }, run);
@@ -250,6 +257,7 @@ void add_calibrate(Frame& frame) {
   add_board_options(command, args->board);
   command.add_option("--corners", args->corners,
                      "Corners instead of photos: CSV photo,corner,u_px,v_px[,sigma_u_px,sigma_v_px]");
+  command.add_flag("--skip-bad", args->skip_bad, "Leave out rows of --corners that are wrong, by name");
   command.add_option("--size", args->size, "Picture size of --corners, WIDTHxHEIGHT (default: what holds the corners)");
   command.add_option("--model", args->config.model, "Lens: pinhole, brown, kannala_brandt or flat_port")
       ->capture_default_str();

@@ -148,6 +148,36 @@ TEST_F(CalibrateSurvives, AllPhotosIdentical) {
   expect_refusal(calibrate({photos().string()}), out());
 }
 
+TEST_F(CalibrateSurvives, PhotosGivenTwiceCountOnce) {
+  add_photos(num_photos);
+  for (std::size_t i = 0; i < num_photos; ++i) {
+    fs::copy_file(photos() / photo_name(i), photos() / ("copy_of_" + photo_name(i)));
+  }
+  ASSERT_EQ(calibrate({photos().string()}).code, 0);
+  EXPECT_EQ(result()["counts"]["used"], num_photos);
+  EXPECT_THAT(result()["counts"]["skipped"].dump(), HasSubstr("is the same picture as"));
+  // What was written can be read again: each corner stands there once.
+  EXPECT_EQ(calibrate({"--corners", (out() / "corners.csv").string()}).code, 0);
+}
+
+TEST_F(CalibrateSurvives, WrongRowsOfCornersStopOrAreNamed) {
+  add_photos(num_photos);
+  ASSERT_EQ(calibrate({photos().string()}).code, 0);
+  const std::string table = read_file(out() / "corners.csv");
+  const fs::path bad = photos().parent_path() / "bad.csv";
+  write_file(bad, table + "late.png,nan,1,2,1,1,0\n" + photo_name(0) + ",3,nan,2,1,1,0\n");
+  const Outcome stopped = calibrate({"--corners", bad.string()});
+  EXPECT_EQ(stopped.code, 3);
+  EXPECT_THAT(stopped.err, HasSubstr("bad.csv:"));
+  const Outcome named = calibrate({"--corners", bad.string(), "--skip-bad"});
+  EXPECT_EQ(named.code, 0) << named.err;
+  EXPECT_THAT(named.out, HasSubstr("2 wrong rows left out, the first: "));
+  const json skipped = result()["counts"]["skipped"];
+  ASSERT_EQ(skipped.size(), 2u);
+  EXPECT_EQ(skipped[0]["line"], std::ranges::count(table, '\n') + 1);
+  EXPECT_EQ(result()["counts"]["used"], num_photos) << "no photo comes of a wrong row";
+}
+
 TEST_F(CalibrateSurvives, APhotoOfAnotherSizeIsRefusedByName) {
   add_photos(num_photos);
   cv::Mat larger;

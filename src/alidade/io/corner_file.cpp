@@ -8,6 +8,7 @@
 #include <set>
 
 #include "alidade/io/csv.h"
+#include "alidade/io/table_rows.h"
 
 namespace alidade {
 namespace {
@@ -43,7 +44,8 @@ std::string corners_csv(std::span<const BoardView> views) {
   return text;
 }
 
-std::vector<BoardView> read_corners(const std::filesystem::path& file, int num_points) {
+std::vector<BoardView> read_corners(const std::filesystem::path& file, int num_points,
+                                    std::vector<SkippedInput>* skipped) {
   const Csv csv = Csv::read(file);
   const std::string u = csv.has("u_px") ? "u_px" : "u", v = csv.has("v_px") ? "v_px" : "v";
   // One σ without the other is a mistake, and named as such.
@@ -53,20 +55,21 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, int num_p
   std::vector<BoardView> views;
   std::map<std::string, std::size_t> number;
   std::set<std::pair<std::size_t, int>> seen;
-  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
+  std::vector<SkippedInput> none;
+  for_each_row(csv, skipped != nullptr, skipped != nullptr ? *skipped : none, [&](std::size_t row) {
+    Corner corner;
+    corner.index = static_cast<int>(csv.integer(row, "corner", 0, num_points - 1));
+    corner.px = {csv.number(row, u), csv.number(row, v)};
+    if (is_given(row, "sigma_u_px") || is_given(row, "sigma_v_px")) corner.cov = read_cov(csv, row);
     const std::string& photo = csv.text(row, "photo");
     const auto [at, is_new] = number.try_emplace(photo, views.size());
     if (is_new) views.push_back({photo, {}});
-    Corner corner;
-    corner.index = static_cast<int>(csv.integer(row, "corner", 0, num_points - 1));
     if (!seen.emplace(at->second, corner.index).second) {
       throw InputError(csv.where(row, "corner") + ": corner " + std::to_string(corner.index) + " of '" + photo +
                        "' stands twice");
     }
-    corner.px = {csv.number(row, u), csv.number(row, v)};
-    if (is_given(row, "sigma_u_px") || is_given(row, "sigma_v_px")) corner.cov = read_cov(csv, row);
     views[at->second].corners.push_back(corner);
-  }
+  });
   return views;
 }
 

@@ -8,6 +8,7 @@
 #include "alidade/board/board_view.h"
 #include "alidade/geometry/rigid3.h"
 #include "alidade/io/files.h"
+#include "alidade/io/result_document.h"
 
 namespace alidade {
 
@@ -17,8 +18,9 @@ namespace alidade {
 /// Reads such a file, by anybody: photo, corner, u_px, v_px (or u, v) and, optionally, sigma_u_px, sigma_v_px and
 /// corr_uv; without σ the covariance is the identity, "unknown". Photos in order of first appearance. Throws
 /// InputError: a corner that the board does not have, the same corner twice, a σ that is not positive, a missing
-/// column.
-[[nodiscard]] std::vector<BoardView> read_corners(const std::filesystem::path& file, int num_points);
+/// column. With `skipped` a wrong row is left out and named there instead.
+[[nodiscard]] std::vector<BoardView> read_corners(const std::filesystem::path& file, int num_points,
+                                                  std::vector<SkippedInput>* skipped = nullptr);
 
 /// Poses as CSV: photo,cam_from_board_x_m,…_y_m,…_z_m,…_qx,…_qy,…_qz,…_qw.
 [[nodiscard]] std::string poses_csv(const std::vector<std::string>& photos, std::span<const Rigid3> cam_from_board);

@@ -108,6 +108,15 @@ void take_port(CalibrateArgs& args, Run& run) {
   args.port.air = read_air_lens(args.air);
 }
 
+/// Photos have their size; one that is told besides must be the same.
+void require_told_size(const CalibrateArgs& args, const ImageSize& size) {
+  if (args.size.empty()) return;
+  const ImageSize told = parse_size(args.size);
+  if (told.width_px == size.width_px && told.height_px == size.height_px) return;
+  throw InputError(
+      fmt::format("the photos are {}x{}, not {} as --size says", size.width_px, size.height_px, args.size));
+}
+
 /// A lens held must be of these pictures.
 void require_size_of_air(const CalibrateArgs& args, const ImageSize& size) {
   const std::optional<Camera>& air = args.port.air;
@@ -164,6 +173,22 @@ ImageSize size_of(const CalibrateArgs& args, const std::vector<BoardView>& views
           static_cast<int>(std::ceil(std::min(height, 2e5))) + 1};
 }
 
+/// A size that does not hold the corners is of other pictures. A few outside may be wrong corners.
+void require_corners_inside(const ImageSize& size, const CalibrateArgs& args, const std::vector<BoardView>& views) {
+  std::size_t outside = 0, all = 0;
+  for (const BoardView& view : views) {
+    for (const Corner& corner : view.corners) {
+      const bool is_inside =
+          corner.px.minCoeff() > -1.0 && corner.px.x() < size.width_px && corner.px.y() < size.height_px;
+      outside += is_inside ? 0 : 1;
+      ++all;
+    }
+  }
+  if (10 * outside <= all) return;
+  throw InputError(fmt::format("{}: {} of {} corners lie outside a picture of {}x{} px: check --size",
+                               args.corners.string(), outside, all, size.width_px, size.height_px));
+}
+
 PhotoCalibration from_corners(const CalibrateArgs& args, const Board& board, CalibrateConfig& config,
                               std::span<const Eigen::Vector3d> given, std::vector<SkippedInput>& skipped, Run& run) {
   PhotoCalibration result;
@@ -171,6 +196,7 @@ PhotoCalibration from_corners(const CalibrateArgs& args, const Board& board, Cal
   result.views = read_corners(args.corners, num_points(board), args.skip_bad ? &skipped : nullptr);
   result.reasons.resize(result.views.size());
   result.size = size_of(args, result.views);
+  require_corners_inside(result.size, args, result.views);
   const bool have_sigma = std::any_of(result.views.begin(), result.views.end(), [](const BoardView& view) {
     return std::any_of(view.corners.begin(), view.corners.end(),
                        [](const Corner& corner) { return corner.cov != Eigen::Matrix2d::Identity(); });
@@ -220,6 +246,7 @@ ExitCode calibrate(CalibrateArgs args, Run& run) {
   std::vector<SkippedInput> skipped;
   PhotoCalibration solved = args.corners.empty() ? from_photos(files, shelf, board, config, given, run)
                                                  : from_corners(args, board, config, given, skipped, run);
+  require_told_size(args, solved.size);
   require_size_of_air(args, solved.size);
   Calibration result = judge_calibration(board, std::move(solved), config, run.progress);
   run.lap("study");

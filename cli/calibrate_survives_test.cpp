@@ -178,6 +178,17 @@ TEST_F(CalibrateSurvives, WrongRowsOfCornersStopOrAreNamed) {
   EXPECT_EQ(result()["counts"]["used"], num_photos) << "no photo comes of a wrong row";
 }
 
+TEST_F(CalibrateSurvives, ASizeThatIsNotThePicturesIsNamed) {
+  add_photos(num_photos);
+  EXPECT_EQ(calibrate({photos().string(), "--size", "649x480"}).code, 3) << "photos have their own";
+  EXPECT_FALSE(fs::exists(out()));
+  ASSERT_EQ(calibrate({photos().string()}).code, 0);
+  const Outcome outcome = calibrate({"--corners", (out() / "corners.csv").string(), "--size", "100x100"});
+  EXPECT_EQ(outcome.code, 3);
+  expect_one_line(outcome);
+  EXPECT_THAT(outcome.err, HasSubstr("check --size"));
+}
+
 TEST_F(CalibrateSurvives, APhotoOfAnotherSizeIsRefusedByName) {
   add_photos(num_photos);
   cv::Mat larger;

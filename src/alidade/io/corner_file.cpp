@@ -62,6 +62,7 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, int num_p
     corner.px = {csv.number(row, u), csv.number(row, v)};
     if (is_given(row, "sigma_u_px") || is_given(row, "sigma_v_px")) corner.cov = read_cov(csv, row);
     const std::string& photo = csv.text(row, "photo");
+    if (photo.empty()) throw InputError(csv.where(row, "photo") + ": is empty");
     const auto [at, is_new] = number.try_emplace(photo, views.size());
     if (is_new) views.push_back({photo, {}});
     if (!seen.emplace(at->second, corner.index).second) {

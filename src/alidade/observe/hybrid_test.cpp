@@ -326,7 +326,7 @@ Eigen::Vector2d mean_error_with_lever(bool says_lever, double& sigma_of_mean) {
     sum += error;
     squares += error.cwiseAbs2();
   }
-  const Eigen::Vector2d mean = sum / sets;
+  Eigen::Vector2d mean = sum / sets;
   sigma_of_mean = std::sqrt((squares / sets - mean.cwiseAbs2()).maxCoeff() / sets);
   return mean;
 }

@@ -58,6 +58,7 @@ struct Outcome {
                                          const std::function<void(pid_t)>& meanwhile = {}) {
   const auto body = [&] {
     std::vector<char*> argv;
+    argv.reserve(words.size() + 1);
     for (std::string& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
     if (!folder.empty() && ::chdir(folder.c_str()) != 0) return 127;

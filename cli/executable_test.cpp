@@ -107,5 +107,25 @@ TEST(Executable, UnknownCommandsAndNoCommandAreWrongUsage) {
   EXPECT_THAT(run_alidade({"calibrat"}).err, HasSubstr("did you mean 'calibrate'?"));
 }
 
+TEST(Executable, AnOptionBeforeItsCommandIsToldWhereItStands) {
+  const std::pair<std::vector<std::string>, std::string> cases[] = {
+      {{"--json", "calibrate", "a.jpg"}, "'--json' stands after the command: alidade calibrate --json …"},
+      {{"--seed=3", "simulate", "board"}, "'--seed' stands after the command: alidade simulate board --seed …"},
+      {{"camera", "--json", "show", "a.yaml"}, "'--json' stands after the command: alidade camera show --json …"},
+      {{"--json", "camera"}, "'--json' stands after the command: alidade camera COMMAND --json …"},
+      {{"--seed", "3"}, "'--seed' stands after the command: alidade COMMAND --seed …"}};
+  for (const auto& [words, message] : cases) {
+    const Outcome outcome = run_alidade(words);
+    EXPECT_EQ(outcome.code, 2) << message;
+    EXPECT_EQ(outcome.err, "alidade: error: " + message + "\n");
+  }
+}
+
+TEST(Executable, NothingIsSuggestedThatIsFarFromWhatWasTyped) {
+  EXPECT_EQ(run_alidade({"calibrate", "--heed"}).err, "alidade: error: calibrate: unknown option '--heed'\n");
+  EXPECT_EQ(run_alidade({"run"}).err, "alidade: error: unknown command 'run'\n");
+  EXPECT_THAT(run_alidade({"calibrate", "--jsno"}).err, HasSubstr("did you mean '--json'?"));
+}
+
 }  // namespace
 }  // namespace alidade

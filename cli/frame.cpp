@@ -11,6 +11,7 @@
 #include <numeric>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
+#include <utility>
 
 #include "cli/help_format.h"
 #include "cli/terminal.h"
@@ -32,25 +33,29 @@ struct Frame::State {
 
 namespace {
 
-/// Inserted, removed or replaced letters between two words. Levenshtein 1965.
+/// Inserted, removed or replaced letters, and swapped neighbours, between two words. Damerau 1964.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
+  std::vector<std::size_t> before, above, row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0]++;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, diagonal + 1, row[j] + 1});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    before = std::exchange(above, row);
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replaced = above[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1);
+      row[j] = std::min({replaced, above[j] + 1, row[j - 1] + 1});
+      const bool is_swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
+      if (is_swapped) row[j] = std::min(row[j], before[j - 2] + 1);
     }
   }
   return row.back();
 }
 
-/// "; did you mean 'WORD'?" for the nearest of the known words, if one is near.
+/// "; did you mean 'WORD'?" for the nearest of the known words, if one is near: one slip in three letters, dashes
+/// aside.
 std::string suggestion(const std::string& word, const std::vector<std::string>& known) {
   const std::string* nearest = nullptr;
-  std::size_t distance = 1 + word.size() / 3;
+  const std::size_t num_letters = word.size() - std::min(word.find_first_not_of('-'), word.size());
+  std::size_t distance = (num_letters + 1) / 3;
   for (const std::string& each : known) {
     const std::size_t d = edit_distance(word, each);
     if (d > distance || (nearest != nullptr && d == distance)) continue;
@@ -88,17 +93,42 @@ std::string where(const CLI::App& app) {
   return (parent.empty() ? "" : parent.substr(0, parent.size() - 2) + " ") + app.get_name() + ": ";
 }
 
+bool is_option(const std::string& word) { return word.size() > 1 && word.front() == '-'; }
+
+std::string name_of(const std::string& option) { return option.substr(0, option.find('=')); }
+
+/// Whether the command, or one of the group, has the option.
+bool knows(const CLI::App& app, const std::string& option) {
+  if (app.get_option_no_throw(option) != nullptr) return true;
+  const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
+  return std::any_of(commands.begin(), commands.end(), [&](const CLI::App* each) { return knows(*each, option); });
+}
+
+/// An option of the command (`at`) that was typed before it: "--json" of "alidade --json calibrate". None: "".
+std::string early_option(const CLI::App& app, const CLI::App& at) {
+  if (!subcommand_names(app).empty()) {
+    for (const std::string& word : app.remaining()) {
+      if (is_option(word) && knows(at, name_of(word))) return name_of(word);
+    }
+  }
+  const auto parsed = app.get_subcommands();
+  return parsed.empty() ? "" : early_option(*parsed.front(), at);
+}
+
 /// What is wrong with the line, in one line that says what to do.
 std::string usage_fault(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App& at = deepest(app);
+  if (const std::string early = early_option(app, at); !early.empty()) {
+    const std::string command = where(at).substr(0, where(at).find(':'));
+    return "'" + early + "' stands after the command: alidade " + command + (command.empty() ? "" : " ") +
+           (subcommand_names(at).empty() ? "" : "COMMAND ") + early + " …";
+  }
   std::string extra;
   for (const std::string& word : app.remaining(true)) {  // an option that nobody knows explains more than its effects
     if (extra.empty() || (extra.front() != '-' && word.front() == '-')) extra = word;
   }
-  const bool is_option = extra.size() > 1 && extra.front() == '-';
-  if (is_option) {
-    const std::string name = extra.substr(0, extra.find('='));
-    return where(at) + "unknown option '" + name + "'" + suggestion(name, option_names(at));
+  if (is_option(extra)) {
+    return where(at) + "unknown option '" + name_of(extra) + "'" + suggestion(name_of(extra), option_names(at));
   }
   const std::vector<std::string> names = subcommand_names(at);
   if (!extra.empty() && !names.empty()) {

@@ -61,6 +61,14 @@ ImageSize parse_size(const std::string& text) {
   return size;
 }
 
+/// A word that is neither a shape nor a file was no attempt at a file; "points.csv" was, and is not found in reading.
+void require_shape_file(const std::filesystem::path& shape) {
+  std::error_code ignored;
+  if (shape.extension() == ".csv" || std::filesystem::exists(shape, ignored)) return;
+  throw UsageError(
+      fmt::format("--board-shape is flat, bow, free, auto or a file of points; there is no file '{}'", shape.string()));
+}
+
 /// The config that the flags describe; throws UsageError with every fault of it.
 CalibrateConfig config_from(const CalibrateArgs& args) {
   CalibrateConfig config = args.config;
@@ -78,6 +86,7 @@ CalibrateConfig config_from(const CalibrateArgs& args) {
   } else if (args.board_shape == "auto") {
     config.board_shape = BoardShape::automatic;
   } else if (args.board_shape != "flat") {
+    require_shape_file(args.board_shape);
     config.board_shape = BoardShape::given;
   }
   std::string sentence;

@@ -127,5 +127,22 @@ TEST(Executable, NothingIsSuggestedThatIsFarFromWhatWasTyped) {
   EXPECT_THAT(run_alidade({"calibrate", "--jsno"}).err, HasSubstr("did you mean '--json'?"));
 }
 
+TEST(Executable, ABoardShapeThatIsNoWordIsWrongUsageAndAFileThatIsMissingBadInput) {
+  const testing::TemporaryFolder folder;  // what is asked of the shape comes before the photos are looked for
+  const auto shaped = [&](const std::string& shape) {
+    return run_program(
+        {ALIDADE_EXECUTABLE, "calibrate", "none.jpg", "--board", "9x6", "--square", "0.025", "--board-shape", shape},
+        folder.path().string());
+  };
+  EXPECT_EQ(shaped("foo").code, 2);
+  EXPECT_EQ(shaped("foo").err,
+            "alidade: error: calibrate: --board-shape is flat, bow, free, auto or a file of points; there is no file "
+            "'foo'\n");
+  EXPECT_EQ(shaped("points.csv").code, 3);
+  EXPECT_THAT(shaped("points.csv").err, MatchesRegex("alidade: error: points.csv: cannot be read: [^\n]*\n"));
+  EXPECT_THAT(shaped("auto").err, HasSubstr("none.jpg"));
+  EXPECT_EQ(shaped(folder.path().string()).code, 3) << "a folder is there, but no file";
+}
+
 }  // namespace
 }  // namespace alidade

@@ -109,6 +109,7 @@ struct ConvertArgs {
 ExitCode convert(const ConvertArgs& args, Run& run) {
   const CameraFormat format = camera_format(args.format);
   Camera camera = read_camera_input(run, "camera", args.source);
+  const std::vector<std::string> unread = unread_parts(args.source);
   std::error_code ignored;
   if (std::filesystem::is_directory(args.destination, ignored)) {
     throw InputError(args.destination + ": is a folder; name the file to write");
@@ -138,11 +139,11 @@ ExitCode convert(const ConvertArgs& args, Run& run) {
     verdict.sentence += fmt::format(", without {}", fmt::join(lens, " and "));
   }
   if (!other.empty()) run.say(fmt::format("the format {} has no place for {}", args.format, fmt::join(other, " and ")));
-  run.document.estimate["left_out"] = [&] {
-    std::vector<std::string> all = lens;
-    all.insert(all.end(), other.begin(), other.end());
-    return JsonValue(all);
-  }();
+  if (!unread.empty()) run.say(fmt::format("not carried over from {}: {}", args.source, fmt::join(unread, " and ")));
+  std::vector<std::string> all = lens;
+  all.insert(all.end(), other.begin(), other.end());
+  all.insert(all.end(), unread.begin(), unread.end());
+  run.document.estimate["left_out"] = JsonValue(all);
   return run.finish(verdict);
 }
 

@@ -94,6 +94,22 @@ TEST_F(CameraCommand, ConvertRefusesToLoseTheLensUnlessTold) {
   EXPECT_TRUE(exists("b.yaml"));
 }
 
+TEST_F(CameraCommand, ConvertSaysWhatOfTheFileIsNotInTheOther) {
+  write_file(folder.path() / "a.cameramodel",
+             "{'lensmodel': 'LENSMODEL_PINHOLE', 'intrinsics': [90, 90, 80, 60], 'imagersize': [160, 120],\n"
+             " 'extrinsics': [0, 0, 0, 0.1, 0, 0]}");
+  for (const char* format : {"mrcal", "alidade"}) {
+    const Outcome outcome = alidade({"convert", "a.cameramodel", "b", "--to", format});
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_THAT(outcome.out, HasSubstr("not carried over from a.cameramodel: the extrinsics\n")) << format;
+    const auto document =
+        nlohmann::json::parse(alidade({"convert", "a.cameramodel", "b", "--to", format, "--json"}).out);
+    EXPECT_EQ(document["estimate"]["left_out"], nlohmann::json({"the extrinsics"})) << format;
+    EXPECT_EQ(document["verdict"]["exit_code"], 0);
+  }
+  EXPECT_THAT(alidade({"convert", "b", "c", "--to", "mrcal"}).out, Not(HasSubstr("not carried over")));
+}
+
 TEST_F(CameraCommand, ConvertNamesWhatIsWrong) {
   write("a.yaml", brown_camera());
   std::filesystem::create_directory(folder.path() / "folder");

@@ -56,7 +56,7 @@ bool has_cameras_of_kalibr(const YAML::Node& root) {
   return false;
 }
 
-Camera read_yaml(const detail::CameraText& file) {
+detail::CameraContent read_yaml(const detail::CameraText& file) {
   std::string text(file.text);
   if (text.starts_with("%YAML")) {  // OpenCV writes "%YAML:1.0", which is not a directive of YAML
     const std::size_t end = text.find('\n');
@@ -69,17 +69,17 @@ Camera read_yaml(const detail::CameraText& file) {
   if (has_cameras_of_kalibr(root)) return detail::read_kalibr(root, file);
   if (has("distortion_model")) return detail::read_ros(root, file);
   if (has("camera_matrix") || has("cameraMatrix") || has("distortion_coefficients"))
-    return detail::read_opencv(root, file);
-  if (has("model") || has("fx")) return detail::read_alidade(root, file);
+    return {detail::read_opencv(root, file), {}};
+  if (has("model") || has("fx")) return {detail::read_alidade(root, file), {}};
   detail::refuse(file.name, "", unknown_file);
 }
 
-Camera recognise_and_read(const detail::CameraText& file) {
+detail::CameraContent recognise_and_read(const detail::CameraText& file) {
   const std::string_view content = without_comments(file.text);
   if (content.empty()) detail::refuse(file.name, "", "is empty");
   if (file.text.find('\0') != std::string_view::npos)
     detail::refuse(file.name, "", "is not text; " + std::string(unknown_file));
-  if (content.starts_with("<?xml")) return detail::read_opencv_xml(file);
+  if (content.starts_with("<?xml")) return {detail::read_opencv_xml(file), {}};
   if (content.starts_with('{') && content.find("lensmodel") != std::string_view::npos) return detail::read_mrcal(file);
   if (content.starts_with("CAHV") || content.starts_with("Model = CAHV")) {
     detail::refuse(file.name, "", "a CAHVOR camera: no model of ours (pinhole, brown, kannala_brandt)");
@@ -88,9 +88,7 @@ Camera recognise_and_read(const detail::CameraText& file) {
   return read_yaml(file);
 }
 
-}  // namespace
-
-Camera parse_camera(std::string_view text, const std::string& name, const std::string& choice) {
+detail::CameraContent parse_content(std::string_view text, const std::string& name, const std::string& choice) {
   constexpr std::size_t max_bytes = 64u << 20;  // a .cameramodel may carry all corners of its calibration
   if (text.size() > max_bytes) detail::refuse(name, "", "is larger than 64 MiB: no camera file");
   try {
@@ -100,16 +98,26 @@ Camera parse_camera(std::string_view text, const std::string& name, const std::s
   }
 }
 
-Camera read_camera(const std::filesystem::path& file) {
+detail::CameraContent read_content(const std::filesystem::path& file) {
   const std::string name = file.string();
   const std::size_t colon = name.rfind(':');
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored) && colon != std::string::npos && colon > 0 &&
       std::filesystem::exists(name.substr(0, colon), ignored)) {
-    return parse_camera(read_file(name.substr(0, colon)), name.substr(0, colon), name.substr(colon + 1));
+    return parse_content(read_file(name.substr(0, colon)), name.substr(0, colon), name.substr(colon + 1));
   }
-  return parse_camera(read_file(file), name);
+  return parse_content(read_file(file), name, "");
 }
+
+}  // namespace
+
+Camera parse_camera(std::string_view text, const std::string& name, const std::string& choice) {
+  return parse_content(text, name, choice).camera;
+}
+
+Camera read_camera(const std::filesystem::path& file) { return read_content(file).camera; }
+
+std::vector<std::string> unread_parts(const std::filesystem::path& file) { return read_content(file).unread; }
 
 Camera read_central_camera(const std::filesystem::path& file) {
   const Camera camera = read_camera(file);

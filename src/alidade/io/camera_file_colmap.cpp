@@ -87,11 +87,12 @@ Camera camera_of(const ColmapModel& model, const Line& line, const std::string& 
 
 }  // namespace
 
-Camera read_colmap(const CameraText& file) {
+CameraContent read_colmap(const CameraText& file) {
   const std::vector<Line> lines = lines_of(file.text);
   std::vector<std::string> ids;
   for (const Line& line : lines) ids.push_back(line.words.front());
-  const Line& line = lines[chosen_camera(ids, file)];
+  const std::size_t chosen = chosen_camera(ids, file);
+  const Line& line = lines[chosen];
   const std::string where = fmt::format("{}:{}", file.name, line.number);
   if (line.words.size() < 4) refuse(where, "", "is not CAMERA_ID MODEL WIDTH HEIGHT PARAMS…");
   const auto model = models().find(line.words[1]);
@@ -108,7 +109,7 @@ Camera read_colmap(const CameraText& file) {
   Camera camera = camera_of(model->second, line, where);
   camera.width_px = checked_size(checked_number(line.words[2], where, "WIDTH"), where, "WIDTH");
   camera.height_px = checked_size(checked_number(line.words[3], where, "HEIGHT"), where, "HEIGHT");
-  return camera;
+  return {camera, place_among(ids, chosen)};
 }
 
 std::string write_colmap(const Camera& camera) {

@@ -4,13 +4,28 @@
 #include "alidade/io/camera_formats.h"
 
 namespace alidade::detail {
+namespace {
 
-Camera read_kalibr(const YAML::Node& root, const CameraText& file) {
+/// Where the chain has the camera, as unread_parts() says it.
+std::vector<std::string> place_in_chain(const Fields& fields, const std::vector<std::string>& names,
+                                        std::size_t chosen) {
+  std::vector<std::string> unread;
+  for (const char* key : {"T_cn_cnm1", "T_cam_imu", "timeshift_cam_imu"}) {
+    if (fields.has(key)) unread.emplace_back(key);
+  }
+  for (const std::string& place : place_among(names, chosen)) unread.push_back(place);
+  return unread;
+}
+
+}  // namespace
+
+CameraContent read_kalibr(const YAML::Node& root, const CameraText& file) {
   std::vector<std::string> names;
   for (const std::string& key : Fields(root, file.name).keys()) {
     if (root[key].IsMap() && root[key]["camera_model"].IsDefined()) names.push_back(key);
   }
-  const std::string name = names[chosen_camera(names, file)];
+  const std::size_t chosen = chosen_camera(names, file);
+  const std::string name = names[chosen];
   const YAML::Node node = root[name];
   const Fields fields(node, file.name, name + ".");
 
@@ -40,7 +55,7 @@ Camera read_kalibr(const YAML::Node& root, const CameraText& file) {
   if (resolution.size() != 2) refuse(file.name, fields.full("resolution"), "is not [width, height]");
   camera.width_px = checked_size(resolution[0], file.name, fields.full("resolution"));
   camera.height_px = checked_size(resolution[1], file.name, fields.full("resolution"));
-  return camera;
+  return {camera, place_in_chain(fields, names, chosen)};
 }
 
 std::string write_kalibr(const Camera& camera) {

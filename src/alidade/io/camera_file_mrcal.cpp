@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 #include <map>
 
 #include "alidade/io/camera_formats.h"
@@ -119,9 +120,18 @@ std::vector<double> numbers(const std::map<std::string, Literal>& table, const s
   return values;
 }
 
+/// True of [0, 0.0, -0]; a list of something else is not zero.
+bool is_zero(const Literal& list) {
+  return list.is_list && std::all_of(list.items.begin(), list.items.end(), [](const Literal& item) {
+           double value = 1.0;
+           const auto [end, error] = std::from_chars(item.word.data(), item.word.data() + item.word.size(), value);
+           return error == std::errc{} && end == item.word.data() + item.word.size() && value == 0.0;
+         });
+}
+
 }  // namespace
 
-Camera read_mrcal(const CameraText& file) {
+CameraContent read_mrcal(const CameraText& file) {
   if (!file.choice.empty()) refuse(file.name, "", "holds one camera without a name; leave ':" + file.choice + "' out");
   const std::map<std::string, Literal> table = LiteralReader(file.text, file.name).table();
   const auto lens = table.find("lensmodel");
@@ -148,7 +158,9 @@ Camera read_mrcal(const CameraText& file) {
   if (size.size() != 2) refuse(file.name, "imagersize", "is not [width, height]");
   camera.width_px = checked_size(size[0], file.name, "imagersize");
   camera.height_px = checked_size(size[1], file.name, "imagersize");
-  return camera;
+  const auto extrinsics = table.find("extrinsics");
+  if (extrinsics == table.end() || is_zero(extrinsics->second)) return {camera, {}};
+  return {camera, {"the extrinsics"}};
 }
 
 std::string write_mrcal(const Camera& camera) {

@@ -2,6 +2,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/core.hpp>
 
 #include "alidade/io/camera_formats.h"
@@ -39,6 +40,28 @@ std::string first_of(const Fields& fields, std::initializer_list<const char*> ke
     if (fields.has(key)) return key;
   }
   return *keys.begin();
+}
+
+/// The numbers of a list, or of {rows, cols, data}, that nobody computes with: NaN for what is none.
+std::vector<double> loose_numbers(const YAML::Node& node) {
+  std::vector<double> values;
+  const YAML::Node data = node.IsMap() ? node["data"] : node;
+  if (!data.IsDefined() || !data.IsSequence()) return values;
+  for (const auto& entry : data) values.push_back(entry.as<double>(std::nan("")));
+  return values;
+}
+
+/// What ROS says of a camera's place in a stereo pair. Message and file differ in the names, as for the rest.
+std::vector<std::string> place_in_pair(const YAML::Node& root, const Fields& fields) {
+  std::vector<std::string> unread;
+  const std::vector<double> straight{1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+  const std::string rotation = first_of(fields, {"rectification_matrix", "R", "r"});
+  if (fields.has(rotation) && loose_numbers(root[rotation]) != straight)
+    unread.emplace_back("the rectification matrix R");
+  const std::string projection = first_of(fields, {"projection_matrix", "P", "p"});
+  const std::vector<double> P = fields.has(projection) ? loose_numbers(root[projection]) : std::vector<double>();
+  if (P.size() == 12 && (P[3] != 0.0 || P[7] != 0.0)) unread.emplace_back("the baseline in the projection matrix P");
+  return unread;
 }
 
 void require_no_choice(const CameraText& file) {
@@ -96,7 +119,7 @@ std::string write_opencv(const Camera& camera) {
   return text;
 }
 
-Camera read_ros(const YAML::Node& root, const CameraText& file) {
+CameraContent read_ros(const YAML::Node& root, const CameraText& file) {
   require_no_choice(file);
   const Fields fields(root, file.name);
   // A calibration file has the long names; a printed message has K and D (ROS 1) or k and d (ROS 2).
@@ -116,7 +139,7 @@ Camera read_ros(const YAML::Node& root, const CameraText& file) {
   }
   camera.width_px = fields.size(first_of(fields, {"image_width", "width"}));
   camera.height_px = fields.size(first_of(fields, {"image_height", "height"}));
-  return camera;
+  return {camera, place_in_pair(root, fields)};
 }
 
 std::string write_ros(const Camera& camera) {

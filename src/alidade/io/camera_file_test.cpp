@@ -222,6 +222,49 @@ TEST(CameraFile, OneOfSeveralCamerasIsChosenByName) {
   EXPECT_THAT(camera_fault([&] { (void)read_camera(chain.string() + ":cam1"); }), HasSubstr("holds one camera"));
 }
 
+TEST(CameraFile, WhatIsNotReadIsNamed) {
+  const testing::TemporaryFolder folder;
+  const std::filesystem::path file = folder.path() / "f";
+  const auto unread = [&](const std::string& text, const std::string& choice = "") {
+    write_file(file, text);
+    return fmt::format("{}", fmt::join(unread_parts(file.string() + choice), "; "));
+  };
+  const std::string mrcal = "{'lensmodel': 'LENSMODEL_PINHOLE', 'intrinsics': [1,1,3,4], 'imagersize': [640,480]";
+  EXPECT_EQ(unread(mrcal + "}"), "");
+  EXPECT_EQ(unread(mrcal + ", 'extrinsics': [0, 0.0, -0, 0e5, 0, 0]}"), "");
+  EXPECT_EQ(unread(mrcal + ", 'extrinsics': [0, 0, 0, 0, 0, 1e-3]}"), "the extrinsics");
+  EXPECT_EQ(unread(mrcal + ", 'extrinsics': [0, nan]}"), "the extrinsics") << "not read, so not refused either";
+
+  const std::string cam =
+      "  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [500, 500, 320, 240]\n"
+      "  resolution: [640, 480]\n";
+  const std::string pose = "  T_cn_cnm1:\n  - [1, 0, 0, -0.1]\n  - [0, 1, 0, 0]\n  - [0, 0, 1, 0]\n  - [0, 0, 0, 1]\n";
+  EXPECT_EQ(unread("cam0:\n" + cam), "");
+  EXPECT_EQ(unread("cam0:\n" + cam + "cam1:\n" + cam + pose, ":cam1"),
+            "T_cn_cnm1; that it is cam1 of 2 cameras (cam0, cam1)");
+  EXPECT_EQ(unread("cam0:\n" + cam + "  T_cam_imu: [[1]]\n  timeshift_cam_imu: 0.01\n"),
+            "T_cam_imu; timeshift_cam_imu");
+
+  const auto ros = [&](const std::string& rectification, const std::string& projection) {
+    return unread(
+        "image_width: 640\nimage_height: 480\ncamera_matrix: {rows: 3, cols: 3, data: [500,0,320,0,500,240,0,0,1]}\n"
+        "distortion_model: plumb_bob\ndistortion_coefficients: {rows: 1, cols: 5, data: [0,0,0,0,0]}\n" +
+        rectification + projection);
+  };
+  const std::string straight = "rectification_matrix: {rows: 3, cols: 3, data: [1,0,0,0,1,0,0,0,1]}\n";
+  const std::string turned = "R: [1,0,0.001,0,1,0,-0.001,0,1]\n";
+  EXPECT_EQ(ros("", ""), "");
+  EXPECT_EQ(ros(straight, "projection_matrix: {rows: 3, cols: 4, data: [490,0,321,0,0,490,241,0,0,0,1,0]}\n"), "");
+  EXPECT_EQ(ros(straight, "P: [490,0,321,-49,0,490,241,0,0,0,1,0]\n"), "the baseline in the projection matrix P");
+  EXPECT_EQ(ros(straight, "p: [490,0,321,0,0,490,241,-49,0,0,1,0]\n"), "the baseline in the projection matrix P");
+  EXPECT_EQ(ros(turned, ""), "the rectification matrix R");
+  EXPECT_EQ(ros("R: [1,0]\n", "P: none\n"), "the rectification matrix R") << "not read, so not refused either";
+
+  EXPECT_EQ(unread("3 PINHOLE 640 480 500 500 320 240\n5 PINHOLE 640 480 600 600 320 240\n", ":5"),
+            "that it is 5 of 2 cameras (3, 5)");
+  EXPECT_EQ(unread(camera_text(parse_camera("1 PINHOLE 64 48 50 50 32 24", "f"), CameraFormat::alidade)), "");
+}
+
 // --- files that are wrong -------------------------------------------------------------------------------------------
 
 std::string ours(const std::string& from, const std::string& to) {

@@ -20,6 +20,11 @@ std::size_t chosen_camera(const std::vector<std::string>& names, const CameraTex
   return static_cast<std::size_t>(found - names.begin());
 }
 
+std::vector<std::string> place_among(const std::vector<std::string>& names, std::size_t chosen) {
+  if (names.size() < 2) return {};
+  return {fmt::format("that it is {} of {} cameras ({})", names[chosen], names.size(), fmt::join(names, ", "))};
+}
+
 std::vector<double> focal_and_centre(const Camera& camera) {
   const Eigen::VectorXd values = params(camera.lens);
   return {values[0], values[1], values[2], values[3]};

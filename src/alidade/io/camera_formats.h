@@ -18,6 +18,12 @@ struct CameraText {
   std::string choice;
 };
 
+/// A camera, and what its file says beside it; see unread_parts().
+struct CameraContent {
+  Camera camera;
+  std::vector<std::string> unread;
+};
+
 [[nodiscard]] Camera read_alidade(const YAML::Node& root, const CameraText& file);
 [[nodiscard]] std::string write_alidade(const Camera& camera);
 
@@ -25,20 +31,23 @@ struct CameraText {
 [[nodiscard]] Camera read_opencv_xml(const CameraText& file);
 [[nodiscard]] std::string write_opencv(const Camera& camera);
 
-[[nodiscard]] Camera read_ros(const YAML::Node& root, const CameraText& file);
+[[nodiscard]] CameraContent read_ros(const YAML::Node& root, const CameraText& file);
 [[nodiscard]] std::string write_ros(const Camera& camera);
 
-[[nodiscard]] Camera read_kalibr(const YAML::Node& root, const CameraText& file);
+[[nodiscard]] CameraContent read_kalibr(const YAML::Node& root, const CameraText& file);
 [[nodiscard]] std::string write_kalibr(const Camera& camera);
 
-[[nodiscard]] Camera read_mrcal(const CameraText& file);
+[[nodiscard]] CameraContent read_mrcal(const CameraText& file);
 [[nodiscard]] std::string write_mrcal(const Camera& camera);
 
-[[nodiscard]] Camera read_colmap(const CameraText& file);
+[[nodiscard]] CameraContent read_colmap(const CameraText& file);
 [[nodiscard]] std::string write_colmap(const Camera& camera);
 
 /// The index of the wanted camera among those of a file; refuses where the choice is not clear, and names them.
 [[nodiscard]] std::size_t chosen_camera(const std::vector<std::string>& names, const CameraText& file);
+
+/// "that it is cam1 of 2 cameras (cam0, cam1)"; of a file with one camera nothing.
+[[nodiscard]] std::vector<std::string> place_among(const std::vector<std::string>& names, std::size_t chosen);
 
 /// fx, fy, cx, cy of any lens, and the distortion in the order k1 k2 p1 p2 k3 (brown) or k1 k2 k3 k4.
 [[nodiscard]] std::vector<double> focal_and_centre(const Camera& camera);

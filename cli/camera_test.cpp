@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
@@ -211,6 +212,50 @@ TEST_F(CameraCommand, UndistortGivesThePhotoThatAPinholeWouldHaveTaken) {
     }
   }
   EXPECT_EQ(compared, 156 * 116);
+}
+
+/// What stands in a folder: names and contents.
+std::map<std::string, std::string> contents(const std::filesystem::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    files[entry.path().filename().string()] = read_file(entry.path());
+  }
+  return files;
+}
+
+TEST_F(CameraCommand, UndistortInterruptedLeavesWhatWasThere) {
+  Camera camera = brown_camera();
+  camera.width_px = 2000;
+  camera.height_px = 1500;
+  write("a.yaml", camera);
+  cv::imwrite((folder.path() / "0.png").string(), cv::Mat(1500, 2000, CV_8U, cv::Scalar(7)));
+  ASSERT_EQ(alidade({"undistort", "a.yaml", "0.png", "--out", "out"}).code, 0);
+  const auto before = contents(folder.path() / "out");
+  cv::imwrite((folder.path() / "0.png").string(), cv::Mat(1500, 2000, CV_8U, cv::Scalar(9)));
+  std::vector<std::string> words{ALIDADE_EXECUTABLE, "camera", "undistort", "a.yaml", "0.png"};
+  for (int i = 1; i < 100;
+       ++i) {  // one picture that is quick to read, many times: 0.4 s to read, 10 times that to bend
+    words.push_back(std::to_string(i) + ".png");
+    std::filesystem::create_hard_link(folder.path() / "0.png", folder.path() / words.back());
+  }
+  words.insert(words.end(), {"--out", "out", "--threads", "1"});
+  const Outcome outcome = alidade::testing::run_program(
+      words, folder.path().string(), alidade::testing::interrupt_after(std::chrono::milliseconds(1700)));
+  EXPECT_EQ(outcome.code, 130);
+  EXPECT_EQ(outcome.err, "alidade: error: interrupted; nothing written\n");
+  EXPECT_TRUE(contents(folder.path() / "out") == before);
+}
+
+TEST_F(CameraCommand, UndistortAgainIntoTheSameFolderLeavesThePictures) {
+  write("a.yaml", brown_camera());
+  for (const char* name : {"b.png", "a.png", "c.png"}) {
+    cv::imwrite((folder.path() / name).string(), photo_of_wall(brown_camera()));
+  }
+  for (int time = 0; time < 2; ++time) {
+    ASSERT_EQ(alidade({"undistort", "a.yaml", "b.png", "a.png", "c.png", "--out", "out"}).code, 0);
+    for (const char* name : {"a.png", "b.png", "c.png"}) EXPECT_TRUE(exists(std::string("out/") + name)) << time;
+  }
+  EXPECT_EQ(result("out")["files"], nlohmann::json({"b.png", "a.png", "c.png", "camera.yaml"}));
 }
 
 TEST_F(CameraCommand, UndistortRefusesByNameAndLeavesNothing) {

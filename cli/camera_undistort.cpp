@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
+#include <mutex>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
@@ -74,6 +75,22 @@ std::string undistorted_png(const cv::Mat& photo, const cv::Mat& u_px, const cv:
   return {png.begin(), png.end()};
 }
 
+/// The photos through the map, to be written at the end of the run like all that it leaves.
+void add_straight_photos(const UndistortArgs& args, const Camera& camera, PixelMap& map,
+                         const std::vector<std::string>& names, Run& run) {
+  const cv::Mat u_px(map.height_px, map.width_px, CV_32F, map.u_px.data());
+  const cv::Mat v_px(map.height_px, map.width_px, CV_32F, map.v_px.data());
+  std::mutex mutex;
+  std::size_t num_done = 0;
+  tbb::parallel_for(std::size_t{0}, names.size(), [&](std::size_t i) {
+    std::string png = undistorted_png(read_photo(args.photos[i], camera), u_px, v_px, args.photos[i]);
+    const std::scoped_lock lock(mutex);
+    run.add_file(names[i], std::move(png));
+    report_progress(run.progress, "undistorting", ++num_done, names.size());
+  });
+  run.document.files = names;  // in the order of the photos, not of the threads
+}
+
 ExitCode undistort(const UndistortArgs& args, Run& run) {
   const Camera camera = read_camera_input(run, "camera", args.camera);
   require_central(camera, args.camera);
@@ -91,20 +108,13 @@ ExitCode undistort(const UndistortArgs& args, Run& run) {
   run.lap("read");
 
   PixelMap map = undistortion_map(camera, straight);
-  const cv::Mat u_px(map.height_px, map.width_px, CV_32F, map.u_px.data());
-  const cv::Mat v_px(map.height_px, map.width_px, CV_32F, map.v_px.data());
-  num_done = 0;
-  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-    write_file(out / names[i], undistorted_png(read_photo(args.photos[i], camera), u_px, v_px, args.photos[i]));
-    report_progress(run.progress, "undistorting", ++num_done, count);
-  });
+  add_straight_photos(args, camera, map, names, run);
   run.lap("undistort");
 
   const std::ptrdiff_t num_black = std::count(map.u_px.begin(), map.u_px.end(), -1.0f);
   run.document.counts.given = run.document.counts.used = count;
   run.document.estimate["camera"] = camera_values(straight);
   run.document.estimate["black_share"] = static_cast<double>(num_black) / static_cast<double>(map.u_px.size());
-  for (const std::string& name : names) run.document.files.push_back(name);
   run.add_file("camera.yaml", camera_text(straight, CameraFormat::alidade));
   run.say(
       fmt::format("{} photo{} → {}, as the pinhole of camera.yaml there", count, count == 1 ? "" : "s", out.string()));

@@ -161,6 +161,21 @@ TEST(Frame, ARunLeavesItsFilesAndTellsAPerson) {
   EXPECT_THAT(result["created_utc"].get<std::string>(), MatchesRegex("20..-..-..T..:..:..Z"));
 }
 
+TEST(Frame, FilesTooLargeForMemoryAreWrittenAtTheEndAsWell) {
+  const TemporaryFolder folder;
+  const std::string out = (folder.path() / "out").string();
+  const auto content = [](int i) { return std::string(90u << 20, static_cast<char>('a' + i)); };
+  const Outcome outcome = outcome_of({"work", "--out", out.c_str(), "--no-report"}, [&](cli::Run& run) {
+    for (int i = 0; i < 4; ++i) run.add_file(std::to_string(i), content(i));  // the third passes 256 MiB
+    run.add_file("small", "s");
+    if (std::filesystem::exists(out)) throw std::logic_error("something is written before the end");
+    return run.finish(good());
+  });
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(read_file(out + "/" + std::to_string(i)) == content(i)) << i;
+  EXPECT_EQ(read_file(out + "/small"), "s");
+}
+
 TEST(Frame, JsonPrintsTheDocumentAndNothingElse) {
   const TemporaryFolder folder;
   const std::string out = (folder.path() / "out").string();

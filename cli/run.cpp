@@ -66,8 +66,15 @@ void Run::lap(std::string part) {
 }
 
 void Run::add_file(std::string name, std::string content) {
-  files_.emplace_back(std::move(name), std::move(content));
-  document.files.push_back(files_.back().first);
+  constexpr std::size_t most_bytes = 256u << 20;  // as much as calibrate keeps of its photos
+  document.files.push_back(name);
+  if (held_bytes_ + content.size() > most_bytes) {
+    if (!spool_) spool_.emplace(options.out);
+    files_.push_back({std::move(name), "", spool_->put(content)});
+    return;
+  }
+  held_bytes_ += content.size();
+  files_.push_back({std::move(name), std::move(content), {}});
 }
 
 void Run::add_picture(std::string name, std::string jpeg) { pictures_[std::move(name)] = std::move(jpeg); }
@@ -91,7 +98,9 @@ ExitCode Run::finish(Verdict verdict) {
 void Run::write_files(const std::string& result) {
   const std::string page = report(result);
   remove_older_files();
-  for (const auto& [name, content] : files_) write_file(options.out / name, content);
+  for (const PendingFile& file : files_) {
+    write_file(options.out / file.name, file.place ? spool_->get(*file.place) : file.content);
+  }
   write_file(options.out / "result.json", result);
   has_report_ = !page.empty();
   if (has_report_) write_file(options.out / "report.html", page);

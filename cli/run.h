@@ -14,6 +14,7 @@
 #include "alidade/estimation/verdict.h"
 #include "alidade/io/files.h"
 #include "alidade/io/result_document.h"
+#include "alidade/io/spool.h"
 
 namespace alidade::cli {
 
@@ -49,7 +50,7 @@ class Run {
   void add_input(std::string role, std::string name, std::string_view bytes);
   /// Records the seconds since the last lap (or the start) under a name: "detect", "solve".
   void lap(std::string part);
-  /// A file to be written into DIR by finish().
+  /// A file to be written into DIR by finish(). Many large ones wait on DIR's disk, not in memory.
   void add_file(std::string name, std::string content);
   /// A picture of the report: JPEG bytes under the name that the document uses.
   void add_picture(std::string name, std::string jpeg);
@@ -63,6 +64,13 @@ class Run {
  private:
   using Clock = std::chrono::steady_clock;
 
+  /// A file for finish() to write: its content, or where that waits.
+  struct PendingFile {
+    std::string name;
+    std::string content;
+    std::optional<Spool::Place> place;
+  };
+
   [[nodiscard]] std::string report(const std::string& result);
   void remove_older_files() const;
   void write_files(const std::string& result);
@@ -70,7 +78,9 @@ class Run {
 
   Clock::time_point start_ = Clock::now();
   Clock::time_point lap_ = start_;
-  std::vector<std::pair<std::string, std::string>> files_;
+  std::vector<PendingFile> files_;
+  std::size_t held_bytes_ = 0;  ///< Of the files in memory; beyond a limit they wait on disk.
+  std::optional<Spool> spool_;
   std::map<std::string, std::string> pictures_;
   std::vector<std::string> lines_;
   bool has_report_ = false;

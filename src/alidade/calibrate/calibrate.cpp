@@ -75,7 +75,7 @@ std::optional<InitialLens> first_lens(const Work& work, const std::vector<Eigen:
   std::vector<BoardView> chosen;
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t k = i * work.views.size() / count;
-    chosen.push_back(without(work.views[k], work.far[k]));
+    chosen.push_back(work.far[k].empty() ? work.views[k] : without(work.views[k], work.far[k]));
   }
   auto found = initial_lens(chosen, board_points, size, held, work.problem);
   if (!found) return std::nullopt;
@@ -89,10 +89,12 @@ void find_poses(const std::vector<std::optional<Rigid3>>& known, CalibrateReport
                 BundleState& state) {
   Camera camera;
   camera.lens = state.lens;
+  const auto pose_of = [&](const BoardView& view) { return pose_from_plane(camera, view, state.board_points); };
   for (const std::optional<Rigid3>& start : known) {
     const std::size_t at = state.cam_from_board.size();
-    const auto pose =
-        start ? start : pose_from_plane(camera, without(work.views[at], work.far[at]), state.board_points);
+    const auto pose = start                  ? start
+                      : work.far[at].empty() ? pose_of(work.views[at])
+                                             : pose_of(without(work.views[at], work.far[at]));
     if (pose) {
       state.cam_from_board.push_back(*pose);
     } else {

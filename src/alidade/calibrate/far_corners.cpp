@@ -1,6 +1,7 @@
 #include "alidade/calibrate/far_corners.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace alidade {
 namespace {
@@ -30,11 +31,27 @@ std::vector<double> relative_distances(std::size_t count, const Point& point) {
   return distances;
 }
 
+/// Whether there may be one; costs next to nothing. A grid's farthest corner is twice as far from the mean as the mean
+/// distance; with one of six corners at infinity, three times.
+bool may_have_far_corners(const std::vector<Corner>& corners) {
+  constexpr double least_ratio = 2.4;
+  const auto count = static_cast<double>(corners.size());
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const Corner& corner : corners) mean += corner.px / count;
+  double sum = 0.0, farthest = 0.0;
+  for (const Corner& corner : corners) {
+    const double distance = (corner.px - mean).norm();
+    sum += distance;
+    farthest = std::max(farthest, distance);
+  }
+  return !std::isfinite(sum) || farthest * count > least_ratio * sum;
+}
+
 }  // namespace
 
 std::vector<bool> far_corners(const BoardView& view, const std::vector<Eigen::Vector3d>& board_points) {
   const auto& corners = view.corners;
-  if (corners.size() < 6) return {};
+  if (corners.size() < 6 || !may_have_far_corners(corners)) return {};
   constexpr double most_stretched = 8.0;  // how much perspective and lens may pull one corner from the rest
   const auto in_picture = relative_distances(corners.size(), [&](std::size_t i) { return corners[i].px; });
   if (*std::max_element(in_picture.begin(), in_picture.end()) <= most_stretched) return {};
@@ -47,7 +64,6 @@ std::vector<bool> far_corners(const BoardView& view, const std::vector<Eigen::Ve
 }
 
 BoardView without(const BoardView& view, const std::vector<bool>& far) {
-  if (far.empty()) return view;
   BoardView rest{view.photo, {}};
   for (std::size_t i = 0; i < far.size(); ++i) {
     if (!far[i]) rest.corners.push_back(view.corners[i]);

@@ -11,7 +11,7 @@ namespace alidade {
 /// there is none. A start by least squares would bend to one of them and blame the rest.
 [[nodiscard]] std::vector<bool> far_corners(const BoardView& view, const std::vector<Eigen::Vector3d>& board_points);
 
-/// The view without them.
+/// The view without them; `far` is not empty.
 [[nodiscard]] BoardView without(const BoardView& view, const std::vector<bool>& far);
 
 }  // namespace alidade

@@ -204,7 +204,8 @@ Frame::Frame() : state_(std::make_unique<State>()) {
       "    alidade calibrate photos --board 9x6 --square 0.025\n"
       "Each command has its own help, which ends with examples: alidade COMMAND --help\n"
       "Exit codes: 0 an estimate that stands, 1 a fault of alidade, 2 wrong usage, 3 bad input, nothing written,\n"
-      "4 the data cannot tell (what is missing is named), 5 no convergence, 130 interrupted.");
+      "4 the data cannot tell (what is missing is named), 5 no convergence, 6 an estimate that is not to be trusted\n"
+      "(files are written), 130 interrupted.");
 }
 
 Frame::~Frame() = default;

@@ -83,6 +83,9 @@ void Run::say(std::string line) { lines_.push_back(std::move(line)); }
 
 ExitCode Run::finish(Verdict verdict) {
   document.verdict = std::move(verdict);
+  if (document.verdict.state == State::bad && document.verdict.exit_code == ExitCode::ok) {
+    document.verdict.exit_code = ExitCode::not_trusted;
+  }
   // Photos are read by many threads, in any order; the document has one order.
   std::stable_sort(document.inputs.begin(), document.inputs.end(), [](const InputFile& a, const InputFile& b) {
     return std::tie(a.role, a.name) < std::tie(b.role, b.name);
@@ -141,7 +144,8 @@ void Run::print(const std::string& result) const {
   if (options.quiet) return;
   for (const std::string& line : lines_) print_line(line);
   const Verdict& verdict = document.verdict;
-  if (verdict.exit_code == ExitCode::ok && !verdict.sentence.empty()) {
+  const bool has_estimate = verdict.exit_code == ExitCode::ok || verdict.exit_code == ExitCode::not_trusted;
+  if (has_estimate && !verdict.sentence.empty()) {
     print_line(std::string(symbol(verdict.state)) + " " + verdict.sentence);
     if (!verdict.to_add.empty()) print_line("  next: " + verdict.to_add);
   }

@@ -172,6 +172,15 @@ BundleResult with_covariance(BundleResult result, bool want_pose_cov) {
   return result;
 }
 
+void follow_lens(const Eigen::MatrixXd& extra, BundleResult& result) {
+  const NormalEquations& eq = *result.equations;
+  for (std::size_t k = 0; k < result.pose_cov.size(); ++k) {
+    const Eigen::Matrix<double, 6, Eigen::Dynamic> gain =
+        Eigen::LLT<Pose6>(eq.V[k]).solve(eq.coupling(k).topRows(extra.rows()).transpose());
+    result.pose_cov[k] += gain * extra * gain.transpose();
+  }
+}
+
 BundleResult solve_bundle(const BundleProblem& problem, BundleState start, const BundleConfig& config) {
   BundleResult result;
   result.state = std::move(start);

@@ -65,6 +65,9 @@ struct BundleResult {
 /// Anything but a converged result is returned as it is.
 [[nodiscard]] BundleResult with_covariance(BundleResult result, bool want_pose_cov);
 
+/// Raises the poses' covariances by what the lens' was raised: `extra` is added to that of the free lens parameters.
+void follow_lens(const Eigen::MatrixXd& extra, BundleResult& result);
+
 /// Residual (prediction − seen) [px] of every corner of a view, not whitened; NaN where it cannot be projected.
 [[nodiscard]] std::vector<Eigen::Vector2d> residuals_px(const BundleState& state, std::size_t view_index,
                                                         const ViewArrays& view);

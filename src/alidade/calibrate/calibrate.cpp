@@ -10,6 +10,7 @@
 #include "alidade/calibrate/repeated_views.h"
 #include "alidade/calibrate/setup.h"
 #include "alidade/calibrate/start.h"
+#include "alidade/calibrate/view_steps.h"
 #include "alidade/calibrate/weights.h"
 
 namespace alidade {
@@ -223,8 +224,17 @@ void fill_views(const Work& work, const BundleResult& result, const NoiseEstimat
   report.excess_px = noise.excess_px;
 }
 
-/// Lens and board shape with their covariances, the latter in units of what the residuals say.
-double fill_estimate(const Work& work, const BundleResult& result, const NoiseEstimate& noise, ImageSize size,
+/// A covariance of the free lens parameters among all of the lens.
+Eigen::MatrixXd of_all(const Eigen::MatrixXd& of_free, const std::vector<int>& free, Eigen::Index num_params) {
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(num_params, num_params);
+  all(free, free) = of_free;
+  return all;
+}
+
+/// Lens, poses and board shape with their covariances. The model's is in units of what the residuals say; what is
+/// stated counts that the corners of a photo share errors: photos are its clusters. Returns s² of the whitened
+/// residuals.
+double fill_estimate(const Work& work, BundleResult& result, const NoiseEstimate& noise, ImageSize size,
                      CalibrateReport& report) {
   double corners = 0.0;
   for (const auto& view : noise.used) corners += static_cast<double>(std::count(view.begin(), view.end(), true));
@@ -234,16 +244,16 @@ double fill_estimate(const Work& work, const BundleResult& result, const NoiseEs
   report.camera.height_px = size.height_px;
   report.camera.lens = result.state.lens;
   report.board_points = result.state.board_points;
-  const auto n = params(result.state.lens).size();
-  report.camera.cov = Eigen::MatrixXd::Zero(n, n);
+  const auto num_params = params(result.state.lens).size();
+  report.camera.cov = report.model_cov = Eigen::MatrixXd::Zero(num_params, num_params);
   const auto& free = work.problem.free_lens;
   if (result.cov.size() == 0) return variance_scale;
-  for (std::size_t i = 0; i < free.size(); ++i) {
-    for (std::size_t j = 0; j < free.size(); ++j) {
-      report.camera.cov(free[i], free[j]) =
-          variance_scale * result.cov(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-    }
-  }
+  const auto num_lens = static_cast<Eigen::Index>(free.size());
+  const Eigen::MatrixXd inverse = result.cov.topLeftCorner(num_lens, num_lens);
+  report.clusters = cluster_covariance(inverse, variance_scale, view_steps(work.problem, result));
+  report.model_cov = of_all(variance_scale * inverse, free, num_params);
+  report.camera.cov = of_all(report.clusters.cov, free, num_params);
+  follow_lens(report.clusters.cov / variance_scale - inverse, result);
   report.board_sigma_z_m = shape_sigma_z(work.problem, result.cov, variance_scale);
   return variance_scale;
 }
@@ -254,7 +264,7 @@ bool refuse_untold(const Work& work, CalibrateReport& report) {
   const auto names = param_names(report.camera.lens);
   for (const int at : work.problem.free_lens) {
     const std::string& name = names[static_cast<std::size_t>(at)];
-    const double sigma = std::sqrt(report.camera.cov(at, at));
+    const double sigma = std::sqrt(report.model_cov(at, at));  // of what these views could tell at best
     if (sigma <= largest_told_sigma(name, values[at], report.camera)) continue;
     if (at < 4) {
       refuse(report,
@@ -373,7 +383,7 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
   NoiseEstimate noise;
   BundleResult solved = solve_robustly(config, report, work, std::move(state), noise);
   const bool settled = solved.status == BundleResult::Status::converged;
-  const BundleResult result = finished(std::move(solved), settled, work);
+  BundleResult result = finished(std::move(solved), settled, work);
   const double variance_scale = fill_estimate(work, result, noise, size, report);
   fill_views(work, result, noise, variance_scale, report);
   report.camera.rms_px = report.rms_px;

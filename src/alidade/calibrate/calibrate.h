@@ -7,6 +7,7 @@
 #include "alidade/board/board_view.h"
 #include "alidade/calibrate/config.h"
 #include "alidade/camera/camera.h"
+#include "alidade/estimation/cluster_covariance.h"
 #include "alidade/geometry/rigid3.h"
 
 namespace alidade {
@@ -33,7 +34,11 @@ struct CalibrateReport {
   Status status = Status::degenerate;
   std::string reason;  ///< degenerate: what cannot be told, in one sentence; empty otherwise.
   std::string to_add;  ///< degenerate: what to add.
-  Camera camera;       ///< Lens, size, covariance over all lens parameters, rms_px.
+  /// Lens, size, rms_px, and the covariance over all lens parameters: cluster-robust, as a photo's corners share
+  /// errors.
+  Camera camera;
+  Eigen::MatrixXd model_cov;   ///< The same as if every corner erred by itself.
+  ClusterCovariance clusters;  ///< What tells the two apart; its clusters are the views in use, in order.
   std::vector<ViewFit> views;
   std::vector<Eigen::Vector3d> board_points;  ///< [m] as solved (flat: as printed).
   std::vector<double> board_sigma_z_m;        ///< σ of their z [m]; empty for a flat or given board.

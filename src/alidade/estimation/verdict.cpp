@@ -1,8 +1,56 @@
 #include "alidade/estimation/verdict.h"
 
+#include <cmath>
 #include <cstdio>
+#include <string_view>
 
 namespace alidade {
+namespace {
+
+/// Of those without a σ, the one that could move the answer most.
+const Assumption* gravest(const std::vector<Assumption>& assumed) {
+  const Assumption* worst = nullptr;
+  for (const Assumption& each : assumed) {
+    if (!each.sigma && (worst == nullptr || each.moves > worst->moves)) worst = &each;
+  }
+  return worst;
+}
+
+}  // namespace
+
+Check assumed_check(const std::vector<Assumption>& assumed) {
+  Check check{.name = "assumed", .limit = 1.0, .unit = "σ", .figure = "assumed"};
+  const Assumption* worst = gravest(assumed);
+  if (worst == nullptr) {
+    check.text = assumed.empty() ? "nothing is taken as given" : "all that is taken as given has its σ";
+    return check;
+  }
+  check.value = worst->moves;
+  check.state = worst->moves <= check.limit ? State::good : State::care;
+  const std::string has_none = worst->name + " is given without σ";
+  const std::string effect = "an error of " + text_of(worst->ordinary, 2) + " would move " + worst->moved + " by " +
+                             text_of(worst->moves, 2) + "σ";
+  check.text = has_none + ": " + effect;
+  return check;
+}
+
+void heed(const Check& check, const std::string& remedy, Verdict& verdict) {
+  verdict.checks.push_back(check);
+  if (check.state != State::care || verdict.state > State::care) return;
+  if (verdict.state == State::good) {
+    verdict.state = State::care;
+    constexpr std::string_view good = "Good: ";
+    if (verdict.sentence.starts_with(good))
+      verdict.sentence = "Usable with care: " + verdict.sentence.substr(good.size());
+    verdict.sentence += "; " + check.text;
+  }
+  if (verdict.to_add.empty()) verdict.to_add = remedy;
+}
+
+void heed_assumptions(const std::vector<Assumption>& assumed, Verdict& verdict) {
+  const Assumption* worst = gravest(assumed);
+  heed(assumed_check(assumed), worst != nullptr ? worst->remedy : "", verdict);
+}
 
 std::string text_of(double value, int digits) {
   char text[32];

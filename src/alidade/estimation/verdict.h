@@ -1,12 +1,21 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace alidade {
 
 /// Exit codes, the same for every command, so that scripts can tell "bad input" from "no answer" from "our bug".
-enum class ExitCode : int { ok = 0, internal_error = 1, usage = 2, bad_input = 3, cannot_tell = 4, no_convergence = 5 };
+enum class ExitCode : int {
+  ok = 0,
+  internal_error = 1,
+  usage = 2,
+  bad_input = 3,
+  cannot_tell = 4,
+  no_convergence = 5,
+  not_trusted = 6  ///< There is an estimate, and its files, but its own checks speak against it (State::bad).
+};
 
 /// How an answer, or one check of it, stands. Shown as ● ◆ ▲ ■ ✕.
 enum class State { good, care, bad, refused, not_converged };
@@ -22,6 +31,19 @@ struct Check {
   std::string figure = {};  ///< Id of the figure in the report that shows it.
 };
 
+/// Something taken as given: a camera file, the length of a square, a σ that a person stated. What it would do to the
+/// answer if it were off by its σ or, where none is given, by an ordinary error.
+struct Assumption {
+  std::string name = {};        ///< "square_m", "camera.fx"
+  double value = 0.0;           ///< NaN where it is not a number.
+  std::optional<double> sigma;  ///< Given with it and counted in the answer's σ; 0: exact. None: not known.
+  double ordinary = 0.0;        ///< Where there is no σ: the error supposed, in the value's unit.
+  double moves = 0.0;           ///< Largest move of a result for that error, in that result's stated σ.
+  std::string moved = {};       ///< Which result that is: "fx", "origin_m z".
+  double moved_by = 0.0;        ///< By how much, in its unit.
+  std::string remedy = {};      ///< What a person can do to have it counted: "give --sigma-square".
+};
+
 /// What an estimator says of its own answer: a state, one sentence, what to add, and the checks behind it.
 struct Verdict {
   State state = State::good;
@@ -30,6 +52,16 @@ struct Verdict {
   std::string to_add;  ///< What the person should do next; empty if nothing.
   std::vector<Check> checks;
 };
+
+/// The check "assumed": an answer is good only where nothing assumed without a σ moves it by more than its own σ. With
+/// nothing assumed it is good.
+[[nodiscard]] Check assumed_check(const std::vector<Assumption>& assumed);
+
+/// Joins the check to the verdict. A good verdict that it does not bear out becomes one of care, and says what to do.
+void heed(const Check& check, const std::string& remedy, Verdict& verdict);
+
+/// Both of the above.
+void heed_assumptions(const std::vector<Assumption>& assumed, Verdict& verdict);
 
 /// The value with so many significant digits, as sentences and checks quote it.
 [[nodiscard]] std::string text_of(double value, int digits = 3);

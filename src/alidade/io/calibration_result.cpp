@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "alidade/estimation/verdict.h"
 #include "alidade/io/camera_file.h"
 #include "alidade/io/corner_file.h"
 #include "alidade/io/files.h"
@@ -36,7 +37,9 @@ CalibrationResult read_calibration(const std::filesystem::path& result) {
     if (json.at("command") != "calibrate") {
       throw InputError("is the result of '" + json.at("command").get<std::string>() + "', not of calibrate");
     }
-    if (json.at("verdict").at("exit_code") != 0) throw InputError("this calibration was refused: there is no camera");
+    const int exit_code = json.at("verdict").at("exit_code").get<int>();
+    const bool has_camera = exit_code == 0 || exit_code == static_cast<int>(ExitCode::not_trusted);
+    if (!has_camera) throw InputError("this calibration was refused: there is no camera");
     const auto& estimate = json.at("estimate");
     found.noise_px = estimate.at("noise_px").get<double>();
     found.board = board_of(estimate.at("board"));

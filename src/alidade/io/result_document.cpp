@@ -70,6 +70,23 @@ JsonValue counts_value(const Counts& counts) {
   return value;
 }
 
+/// σ null: none is given, and `ordinary` is the error supposed.
+JsonValue assumed_value(const std::vector<Assumption>& assumed) {
+  JsonValue list = JsonValue::list();
+  for (const Assumption& each : assumed) {
+    JsonValue row = JsonValue::object();
+    row["name"] = each.name;
+    row["value"] = each.value;
+    row["sigma"] = each.sigma ? JsonValue(*each.sigma) : JsonValue();
+    row["ordinary"] = each.sigma ? JsonValue() : JsonValue(each.ordinary);
+    row["moves"] = each.moves;
+    row["moved"] = text_or_null(each.moved);
+    row["moved_by"] = each.moved_by;
+    list.push_back(std::move(row));
+  }
+  return list;
+}
+
 JsonValue covariance_value(const ResultDocument& document) {
   const std::size_t n = document.covariance_names.size();
   if (document.covariance_upper.size() != n * (n + 1) / 2) {
@@ -152,8 +169,10 @@ std::string result_text(const ResultDocument& document) {
   value["inputs"] = inputs_value(document.inputs);
   value["verdict"] = verdict_value(document.verdict);
   value["counts"] = counts_value(document.counts);
+  value["assumed"] = assumed_value(document.assumed);
   value["estimate"] = document.estimate;
   value["stddev"] = document.stddev;
+  value["stddev_model"] = document.stddev_model;
   value["covariance"] = covariance_value(document);
   value["files"] = document.files;
   value["data"] = JsonValue::object();

@@ -60,10 +60,12 @@ struct ResultDocument {
   std::vector<InputFile> inputs;
   Verdict verdict;
   Counts counts;
+  std::vector<Assumption> assumed;
   JsonValue estimate = JsonValue::object();
-  JsonValue stddev = JsonValue::object();     ///< σ by the names of `estimate`.
-  std::vector<std::string> covariance_names;  ///< Parameters, in the order of the covariance.
-  std::vector<double> covariance_upper;       ///< Upper triangle, row by row.
+  JsonValue stddev = JsonValue::object();        ///< σ by the names of `estimate`.
+  JsonValue stddev_model = JsonValue::object();  ///< The same if every single measurement erred by itself.
+  std::vector<std::string> covariance_names;     ///< Parameters, in the order of the covariance.
+  std::vector<double> covariance_upper;          ///< Upper triangle, row by row.
   std::vector<DataTable> data;
   std::vector<DataGrid> grids;
   std::vector<std::string> files;  ///< Written beside result.json.

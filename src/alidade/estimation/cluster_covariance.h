@@ -1,0 +1,59 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/estimation/verdict.h"
+
+namespace alidade {
+
+/// What one independent cluster of measurements (a photo, a shot, a block of time) does to the estimate, in the
+/// parameters whose covariance is asked for: H = Σ A + priors is the information of all shared parameters (the
+/// clusters' own eliminated), A and g = Σ Jᵀr the cluster's part of it and of the gradient at the optimum, r whitened.
+struct ClusterStep {
+  Eigen::VectorXd step;    ///< H⁻¹ g, of the parameters asked for.
+  Eigen::MatrixXd spread;  ///< H⁻¹ A H⁻¹, of the same: what `step` would have for covariance by the model.
+};
+
+/// The step of a cluster where all shared parameters are asked for: `inverse` is H⁻¹.
+[[nodiscard]] ClusterStep cluster_step(const Eigen::MatrixXd& inverse, const Eigen::MatrixXd& information,
+                                       const Eigen::VectorXd& gradient);
+
+/// Covariance of an estimate whose errors are shared within clusters, and what tells it from the model's.
+struct ClusterCovariance {
+  Eigen::MatrixXd cov;                 ///< To be stated; nowhere below the model's.
+  Eigen::VectorXd inflation;           ///< σ over the model's σ, one per parameter; 1 for a parameter that is held.
+  Eigen::VectorXd degrees_of_freedom;  ///< Of each variance (Satterthwaite); infinite where it is the model's.
+  double design_effect = 1.0;          ///< Variance over the model's, in the mean over all directions.
+  double shrinkage = 1.0;              ///< 0: the clusters' own scatter by direction; 1: the design effect in all.
+  std::vector<double> z2;  ///< One per cluster: its squared score over what the model expects; 1 in the mean if true.
+
+  static constexpr std::size_t least_clusters = 3;
+
+  /// Largest inflation of σ over the parameters.
+  [[nodiscard]] double largest_inflation() const { return inflation.size() > 0 ? inflation.maxCoeff() : 1.0; }
+};
+
+/// Cluster-robust covariance. `inverse` is H⁻¹ of the parameters asked for, `noise_variance` the variance s² of the
+/// whitened residuals by their own degrees of freedom: s² H⁻¹ is the model's covariance. Parameters with a zero
+/// diagonal are held. Fewer than `least_clusters` clusters tell nothing: the model's covariance comes back.
+///
+/// In parameters in which H⁻¹ = 1 a cluster has the share h = its spread of the information and the score step; by the
+/// model the score's covariance is s² h(1 − h). x = (1 − h)^(−1/2) step makes the scatter W = Σ x xᵀ/s² unbiased for 1
+/// (CR2). W is noisy with few clusters: it is shrunk towards c·1, c = tr W / tr 1, by as much as its own scatter asks
+/// for (Ledoit & Wolf), and what is below 1 is raised to it. Its effective degrees of freedom ν widen it by ν/(ν − 2),
+/// the variance of a t distribution, with which the 2σ interval holds for few clusters, too.
+/// Liang & Zeger, Biometrika 73, 1986; Bell & McCaffrey, Survey Methodology 28(2), 2002; Imbens & Kolesár, Rev. Econ.
+/// Stat. 98(4), 2016; Ledoit & Wolf, J. Multivariate Anal. 88, 2004. docs/maths/honest-sigma.md.
+[[nodiscard]] ClusterCovariance cluster_covariance(const Eigen::MatrixXd& inverse, double noise_variance,
+                                                   std::span<const ClusterStep> clusters);
+
+/// The check "photos agree" ("shots agree", …): by how much the clusters' scatter raises σ over what the noise of
+/// single measurements gives. `cluster` is the word for one: "photo"; `causes`: "blur, rolling shutter, or the lens
+/// model".
+[[nodiscard]] Check clusters_agree(const ClusterCovariance& covariance, const std::string& cluster,
+                                   const std::string& causes, const std::string& figure);
+
+}  // namespace alidade

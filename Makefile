@@ -84,10 +84,12 @@ study:
 	@tools/setup build
 	@echo "study: building $(out)/study_calibration, study_observe, study_rangefinder, study_localize and corner_accuracy"
 	@cmake --preset release -DALIDADE_BENCH=ON >/dev/null
-	@ninja -C $(out) $(jobs) study_calibration study_observe study_rangefinder study_localize corner_accuracy
+	@ninja -C $(out) $(jobs) study_calibration study_observe study_rangefinder study_localize corner_accuracy alidade_cli
 	@echo "study: 2400 calibrations, into docs/studies.md"
 	@mkdir -p build/study
 	@$(out)/study_calibration 2400 >build/study/studies.md; met=$$?; cp build/study/studies.md docs/studies.md; exit $$met
+	@echo "study: halves of real sets, into docs/studies-halves.md"
+	@bench/study_halves.py $(out)/alidade 40 >build/study/halves.md; met=$$?; cp build/study/halves.md docs/studies-halves.md; exit $$met
 	@echo "study: 2000 observations of a rotating camera, into docs/studies-observe.md"
 	@$(out)/study_observe 2000 >build/study/observe.md; met=$$?; cp build/study/observe.md docs/studies-observe.md; exit $$met
 	@echo "study: rangefinders, into docs/studies-rangefinder.md"

@@ -257,7 +257,7 @@ ExitCode calibrate(CalibrateArgs args, Run& run) {
                                                  : from_corners(args, board, config, given, skipped, run);
   require_told_size(args, solved.size);
   require_size_of_air(args, solved.size);
-  Calibration result = judge_calibration(board, std::move(solved), config, run.progress);
+  Calibration result = judge_calibration(board, std::move(solved), config, args.port.air, run.progress);
   run.lap("study");
   fill_calibration(board, result, run.document);
   // Rows of the table stand before photos: counts are of photos.

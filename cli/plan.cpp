@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -37,8 +38,9 @@ ExitCode plan_calibrate(const PlanArgs& args, Run& run) {
       std::filesystem::is_directory(args.result) ? args.result : args.result.parent_path();
   run.add_input("result", folder / "result.json");
   run.add_input("camera", folder / "camera.yaml");
+  const double shared_noise_px = known.noise_px * std::sqrt(std::max(1.0, known.design_effect));
   const NextPhotoPlan plan =
-      plan_next_photos(known.camera, known.noise_px, known.board_points, args.photos, run.progress);
+      plan_next_photos(known.camera, shared_noise_px, known.board_points, args.photos, run.progress);
   Verdict verdict;
   if (plan.photos.empty()) {
     verdict.state = State::refused;

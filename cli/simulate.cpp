@@ -24,7 +24,7 @@ struct BoardArgs {
   std::string camera_file, model = "brown", size = "800x600";
   int photos = 20;
   double max_tilt_deg = 35.0, bow_mm = 0.0, shape_sigma_mm = 0.0;
-  double blur_px = 0.6, noise = 2.0, sigma_px = 0.1;
+  double blur_px = 0.6, noise = 2.0, sigma_px = 0.1, shared_px = 0.0;
   bool corners_only = false;
 };
 
@@ -106,7 +106,9 @@ ExitCode simulate_board(const BoardArgs& args, Run& run) {
                                 .shape_sigma_m = 1e-3 * args.shape_sigma_mm};
   const BoardScene scene = draw_board_scene(camera_from(args, run), board, config, run.options.seed);
   describe_truth(scene, run);
-  run.add_file("corners.csv", corners_csv(simulate_views(scene, args.sigma_px, run.options.seed)));
+  std::vector<BoardView> views = simulate_views(scene, args.sigma_px, run.options.seed);
+  if (args.shared_px > 0.0) add_shared_errors(scene, args.shared_px, run.options.seed + 1, views);
+  run.add_file("corners.csv", corners_csv(views));
   run.add_file("truth_corners.csv", true_corners_csv(scene));
   run.add_file("truth_camera.yaml", camera_text(scene.camera, CameraFormat::alidade));
   run.add_file("truth_poses.csv", poses_csv(scene));
@@ -143,6 +145,10 @@ void add_board_scenario(Frame& frame) {
   number("--blur", args->blur_px, "Sigma of the optical blur [px]", 0.0, 20.0);
   number("--noise", args->noise, "Sigma of the grey noise, of 255", 0.0, 100.0);
   number("--sigma-px", args->sigma_px, "Sigma of the corners in corners.csv", 0.0, 100.0);
+  number("--shared-px", args->shared_px,
+         "Errors in corners.csv that the corners of a photo share: sigma of each term of "
+         "a smooth field",
+         0.0, 100.0);
   command.add_flag("--corners-only", args->corners_only, "No photos");
 }
 

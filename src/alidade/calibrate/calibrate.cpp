@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "alidade/calibrate/bundle.h"
 #include "alidade/calibrate/far_corners.h"
@@ -231,6 +232,18 @@ Eigen::MatrixXd of_all(const Eigen::MatrixXd& of_free, const std::vector<int>& f
   return all;
 }
 
+/// Likewise what the clusters say; parameters that are held have no inflation.
+ClusterCovariance of_all(ClusterCovariance of_free, const std::vector<int>& free, Eigen::Index num_params) {
+  Eigen::VectorXd inflation = Eigen::VectorXd::Ones(num_params);
+  Eigen::VectorXd dof = Eigen::VectorXd::Constant(num_params, std::numeric_limits<double>::infinity());
+  inflation(free) = of_free.inflation;
+  dof(free) = of_free.degrees_of_freedom;
+  of_free.cov = of_all(of_free.cov, free, num_params);
+  of_free.inflation = inflation;
+  of_free.degrees_of_freedom = dof;
+  return of_free;
+}
+
 /// Lens, poses and board shape with their covariances. The model's is in units of what the residuals say; what is
 /// stated counts that the corners of a photo share errors: photos are its clusters. Returns s² of the whitened
 /// residuals.
@@ -254,6 +267,7 @@ double fill_estimate(const Work& work, BundleResult& result, const NoiseEstimate
   report.model_cov = of_all(variance_scale * inverse, free, num_params);
   report.camera.cov = of_all(report.clusters.cov, free, num_params);
   follow_lens(report.clusters.cov / variance_scale - inverse, result);
+  report.clusters = of_all(std::move(report.clusters), free, num_params);
   report.board_sigma_z_m = shape_sigma_z(work.problem, result.cov, variance_scale);
   return variance_scale;
 }
@@ -333,6 +347,10 @@ BundleResult finished(BundleResult result, bool settled, const Work& work) {
 }
 
 }  // namespace
+
+double shared_noise_px(const CalibrateReport& report) {
+  return report.noise_px * std::sqrt(std::max(1.0, report.clusters.design_effect));
+}
 
 CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, ImageSize size,
                           const CalibrateConfig& config, std::span<const Eigen::Vector3d> given_points) {

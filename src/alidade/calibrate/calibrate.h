@@ -52,6 +52,10 @@ struct CalibrateReport {
   int iterations = 0;
 };
 
+/// Noise [px] of a corner that, all independent, would tell as little as corners that share errors do: what one more
+/// photo is worth.
+[[nodiscard]] double shared_noise_px(const CalibrateReport& report);
+
 /// Picture size [px]; the start of the principal point where the views alone cannot give one, and the σ map's range.
 struct ImageSize {
   int width_px = 0;

@@ -19,7 +19,7 @@ void solve_again(const Board& board, const CalibrateConfig& config, PhotoCalibra
 }  // namespace
 
 Calibration judge_calibration(const Board& board, PhotoCalibration photos, CalibrateConfig config,
-                              const Progress& progress) {
+                              const std::optional<Camera>& air, const Progress& progress) {
   Calibration result;
   result.photos = std::move(photos);
   result.config = std::move(config);
@@ -43,11 +43,13 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
       return result;
     }
   }
+  result.assumed = count_assumptions(board, result.config, result.photos.views, air, report);
   result.study = study_calibration(board, result.photos.views, result.config, report,
                                    most_telling(transfers, result.config.board_shape), progress);
-  result.next = plan_next_photos(report.camera, report.noise_px, report.board_points, 1, progress);
+  result.next = plan_next_photos(report.camera, shared_noise_px(report), report.board_points, 1, progress);
   result.port = port_residual(report.camera);
   result.verdict = calibration_verdict(report, result.study, result.photos.views, result.config, result.next);
+  heed_assumptions(result.assumed, result.verdict);
   return result;
 }
 

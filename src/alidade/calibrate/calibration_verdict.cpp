@@ -67,7 +67,10 @@ Check coverage(const CalibrateReport& report, const CalibrationStudy& study) {
               .limit = 95.0,
               .unit = "%",
               .figure = "sigma"};
-  check.state = check.value >= 95.0 ? State::good : check.value >= 50.0 ? State::care : State::bad;
+  // A large σ is said and counted: not to be trusted is only what is no answer over half of the picture.
+  const double useless_px = 0.01 * std::max(report.camera.width_px, report.camera.height_px);
+  const bool is_answer = share_below(study.sigma_infinity, useless_px) >= 50.0;
+  check.state = check.value >= 95.0 ? State::good : is_answer ? State::care : State::bad;
   check.text = "3σ is below 1 px in " + two(check.value) + " % of the picture; worst " + two(3.0 * worst.value) +
                " px, " + place(worst.px, report.camera);
   return check;
@@ -112,7 +115,8 @@ Check consistent(const CalibrationStudy& study) {
 /// Corners against their own σ; without one, against the bulk of the others.
 struct Tails {
   double ratio = std::nan("");  ///< RMS over what the corners' covariances predict.
-  int far = 0;                  ///< Corners more than 6 robust σ off.
+  int far = 0;                  ///< Corners more than 6 robust σ off, rejected ones among them.
+  int far_in_use = 0;
   double worst_px = 0.0;
   std::string worst_photo;
   int worst_index = 0;
@@ -120,7 +124,7 @@ struct Tails {
 
 Tails corner_tails(const CalibrateReport& report, std::span<const BoardView> views) {
   Tails tails;
-  std::vector<double> norms;
+  std::vector<double> norms, norms_in_use;
   double predicted = 0.0, seen = 0.0;
   for (std::size_t k = 0; k < views.size(); ++k) {
     if (!report.views[k].used) continue;
@@ -134,6 +138,7 @@ Tails corner_tails(const CalibrateReport& report, std::span<const BoardView> vie
         tails.worst_index = views[k].corners[i].index;
       }
       if (!fit.used) continue;
+      norms_in_use.push_back(norms.back());
       predicted += views[k].corners[i].cov.trace();
       seen += fit.residual_px.squaredNorm();
     }
@@ -142,8 +147,9 @@ Tails corner_tails(const CalibrateReport& report, std::span<const BoardView> vie
   const auto middle = norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
   std::nth_element(norms.begin(), middle, norms.end());
   const double robust_sigma = *middle / std::sqrt(2.0 * std::log(2.0));
-  tails.far = static_cast<int>(
-      std::count_if(norms.begin(), norms.end(), [&](double norm) { return norm > 6.0 * robust_sigma; }));
+  const auto is_far = [&](double norm) { return norm > 6.0 * robust_sigma; };
+  tails.far = static_cast<int>(std::count_if(norms.begin(), norms.end(), is_far));
+  tails.far_in_use = static_cast<int>(std::count_if(norms_in_use.begin(), norms_in_use.end(), is_far));
   if (have_covariances(views)) tails.ratio = std::sqrt(seen / predicted);
   return tails;
 }
@@ -165,7 +171,7 @@ Check honest_corners(const CalibrateReport& report, std::span<const BoardView> v
   }
   if (tails.far > 0) {
     constexpr double plainly_wrong_px = 0.5;  // no blur and no board shape puts a corner there
-    const bool many = tails.far > 2 + report.corners_used / 500 && tails.worst_px > plainly_wrong_px;
+    const bool many = tails.far_in_use > 2 + report.corners_used / 500 && tails.worst_px > plainly_wrong_px;
     check.state = std::max(check.state, many ? State::bad : State::care);
     check.text += "; " + std::to_string(tails.far) + (tails.far == 1 ? " corner is" : " corners are") +
                   " more than 6σ off, the worst " + two(tails.worst_px) + " px (" + tails.worst_photo + ", corner " +
@@ -247,8 +253,13 @@ Verdict calibration_verdict(const CalibrateReport& report, const CalibrationStud
                             std::span<const BoardView> views, const CalibrateConfig& config,
                             const NextPhotoPlan& next) {
   Verdict verdict;
-  verdict.checks = {coverage(report, study),       lens_adequate(study),      consistent(study),
-                    honest_corners(report, views), board_flat(study, config), principal_point(report)};
+  verdict.checks = {coverage(report, study),
+                    lens_adequate(study),
+                    consistent(study),
+                    clusters_agree(report.clusters, "photo", "blur, rolling shutter, or the lens model", "clusters"),
+                    honest_corners(report, views),
+                    board_flat(study, config),
+                    principal_point(report)};
   const Check* worst = &verdict.checks.front();
   for (const Check& check : verdict.checks) {  // among equals not coverage: the sentence begins with it
     if (check.state > worst->state || (check.state == worst->state && worst->name == "coverage")) worst = &check;

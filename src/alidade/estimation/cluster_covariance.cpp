@@ -13,40 +13,80 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using SymmetricSolver = Eigen::SelfAdjointEigenSolver<MatrixXd>;
 
-/// A cluster's score where the model's covariance is 1: by the model of mean 0 and covariance `share`.
-struct Score {
-  VectorXd x;
+/// A cluster where the model's covariance is 1: its share h of the information with its principal directions Q, and
+/// along these its step, by the model of variance h(1 − h).
+struct Member {
   MatrixXd share;
+  MatrixXd Q;
+  VectorXd h, rest, along;  ///< rest = 1 − h
 };
 
 /// `whiten` is L⁻¹ with L Lᵀ = H⁻¹.
-Score score_of(const ClusterStep& cluster, const MatrixXd& whiten, double noise_variance) {
-  const MatrixXd h = whiten * cluster.spread * whiten.transpose();
-  const SymmetricSolver eigen(0.5 * (h + h.transpose()));
+Member member_of(const ClusterStep& cluster, const MatrixXd& whiten, double noise_variance) {
+  Member member;
+  member.share = whiten * cluster.spread * whiten.transpose();
+  const SymmetricSolver eigen(0.5 * (member.share + member.share.transpose()));
+  member.Q = eigen.eigenvectors();
+  member.h = eigen.eigenvalues().cwiseMax(1e-12);
   // A cluster that alone tells a direction has no residual in it: 0/0 is left at 0.
   constexpr double least_rest = 1e-3;
-  const VectorXd rest = (1.0 - eigen.eigenvalues().array()).max(least_rest);
-  const MatrixXd& Q = eigen.eigenvectors();
-  const VectorXd along = Q.transpose() * (whiten * cluster.step) / std::sqrt(noise_variance);
-  return {Q * along.cwiseQuotient(rest.cwiseSqrt()), h};
+  member.rest = (1.0 - eigen.eigenvalues().array()).max(least_rest);
+  member.along = member.Q.transpose() * (whiten * cluster.step) / std::sqrt(noise_variance);
+  return member;
+}
+
+/// A cluster's score: by the model of mean 0 and covariance `share`.
+struct Score {
+  VectorXd x;
+  VectorXd contradiction;  ///< The part of x along directions in which the cluster contradicts the others.
+  MatrixXd share;
+};
+
+/// Scores by CR2. Along a direction in which a cluster contradicts the others by more than 3σ, in units of their design
+/// effect, the whole change that its deletion causes counts (CR3): an answer that hangs on it is that uncertain.
+std::vector<Score> scores_of(const std::vector<Member>& members) {
+  std::vector<VectorXd> along;
+  double sum = 0.0, expected = 0.0;
+  for (const Member& member : members) {
+    along.emplace_back(member.along.cwiseQuotient(member.rest.cwiseSqrt()));
+    sum += along.back().squaredNorm();
+    expected += member.share.trace();
+  }
+  std::vector<Score> scores;
+  scores.reserve(members.size());
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    const Member& member = members[i];
+    VectorXd& x = along[i];
+    const double others = (sum - x.squaredNorm()) / std::max(expected - member.share.trace(), 1e-12);
+    constexpr double chance2 = 9.0;  // 3σ
+    VectorXd contradiction = VectorXd::Zero(x.size());
+    for (Eigen::Index k = 0; k < x.size(); ++k) {
+      if (!(x[k] * x[k] > chance2 * std::max(1.0, others) * member.h[k])) continue;
+      contradiction[k] = x[k] /= std::sqrt(member.rest[k]);
+    }
+    scores.push_back({member.Q * x, member.Q * contradiction, member.share});
+  }
+  return scores;
 }
 
 /// Scatter of the scores, against what the model expects of it.
 struct Scatter {
   MatrixXd seen;      ///< W
+  MatrixXd certain;   ///< The part of it that is no chance: contradictions. It is not shrunk.
   MatrixXd expected;  ///< 1, less what priors tell.
   double mean = 1.0;  ///< c
   double mean_dof = 1.0;
   double shrinkage = 1.0;
 
-  [[nodiscard]] MatrixXd shrunk() const { return (1.0 - shrinkage) * seen + shrinkage * mean * expected; }
+  [[nodiscard]] MatrixXd shrunk() const { return (1.0 - shrinkage) * seen + shrinkage * (mean * expected + certain); }
 };
 
 Scatter scatter_of(const std::vector<Score>& scores, Eigen::Index n) {
-  Scatter scatter{MatrixXd::Zero(n, n), MatrixXd::Zero(n, n)};
+  Scatter scatter{MatrixXd::Zero(n, n), MatrixXd::Zero(n, n), MatrixXd::Zero(n, n)};
   double squares = 0.0;
   for (const Score& score : scores) {
     scatter.seen += score.x * score.x.transpose();
+    scatter.certain += score.contradiction * score.contradiction.transpose();
     scatter.expected += score.share;
     squares += score.share.squaredNorm();
   }
@@ -87,30 +127,31 @@ void state_free(const MatrixXd& inverse, double noise_variance, std::span<const 
   if (n == 0 || llt.info() != Eigen::Success || !(noise_variance > 0.0)) return;
   const MatrixXd L = llt.matrixL();
   const MatrixXd whiten = llt.matrixL().solve(MatrixXd::Identity(n, n));
-  std::vector<Score> scores;
-  scores.reserve(clusters.size());
+  std::vector<Member> members;
+  members.reserve(clusters.size());
   for (const ClusterStep& cluster : clusters) {
-    scores.push_back(score_of(cluster, whiten, noise_variance));
-    if (!scores.back().x.allFinite()) return;
-    result.z2.push_back(scores.back().x.squaredNorm() / std::max(scores.back().share.trace(), 1e-12));
+    members.push_back(member_of(cluster, whiten, noise_variance));
+    if (!members.back().along.allFinite()) return;
+  }
+  const std::vector<Score> scores = scores_of(members);
+  for (const Score& score : scores) {
+    result.z2.push_back(score.x.squaredNorm() / std::max(score.share.trace(), 1e-12));
   }
   const Scatter scatter = scatter_of(scores, n);
   result.design_effect = scatter.mean;
   result.shrinkage = scatter.shrinkage;
   const SymmetricSolver excess(scatter.shrunk() - scatter.expected);
-  const MatrixXd raised = MatrixXd::Identity(n, n) + excess.eigenvectors() *
-                                                         excess.eigenvalues().cwiseMax(0.0).asDiagonal() *
-                                                         excess.eigenvectors().transpose();
+  const MatrixXd raised =
+      excess.eigenvectors() * excess.eigenvalues().cwiseMax(0.0).asDiagonal() * excess.eigenvectors().transpose();
   VectorXd widen(n);
   for (Eigen::Index j = 0; j < n; ++j) {
-    const VectorXd direction = L.row(j).transpose().normalized();
-    const double dof = degrees_of_freedom(scatter, scores, direction);
+    const double dof = degrees_of_freedom(scatter, scores, L.row(j).transpose().normalized());
     constexpr double least_dof = 4.0;  // below, a t distribution's variance says little
-    const double by_data = std::clamp(direction.dot(scatter.expected * direction), 0.0, 1.0);
-    widen[j] = std::sqrt(1.0 + by_data * 2.0 / (std::max(dof, least_dof) - 2.0));
+    widen[j] = std::sqrt(1.0 + 2.0 / (std::max(dof, least_dof) - 2.0));
     result.degrees_of_freedom[j] = dof;
   }
-  result.cov = noise_variance * widen.asDiagonal() * L * raised * L.transpose() * widen.asDiagonal();
+  const MatrixXd widened = widen.asDiagonal() * L;
+  result.cov = noise_variance * (inverse + widened * raised * widened.transpose());
   result.inflation = (result.cov.diagonal().array() / (noise_variance * inverse.diagonal().array())).sqrt();
 }
 

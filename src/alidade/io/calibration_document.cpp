@@ -63,7 +63,8 @@ DataTable photos_table(const Board& board, const Calibration& calibration) {
   std::vector<std::string> names, why;
   std::vector<bool> used;
   std::vector<int> num_corners;
-  Numbers rms;
+  Numbers rms, z2;
+  std::size_t cluster = 0;
   PoseColumns poses;
   MiddleColumns middles{middle_of(points_in_board(board)), {}};
   for (std::size_t k = 0; k < views.size(); ++k) {
@@ -73,11 +74,18 @@ DataTable photos_table(const Board& board, const Calibration& calibration) {
     why.push_back(fit.reason);
     num_corners.push_back(static_cast<int>(views[k].corners.size()));
     rms.push_back(fit.used ? fit.rms_px : std::nan(""));
+    const bool has_score = fit.used && cluster < report.clusters.z2.size();
+    z2.push_back(has_score ? report.clusters.z2[cluster++] : std::nan(""));
     poses.add(fit.used ? &fit.cam_from_board : nullptr);
     middles.add(fit);
   }
   DataTable table{"photos",
-                  {{"name", names}, {"used", used}, {"reason", why}, {"num_corners", num_corners}, {"rms_px", rms}}};
+                  {{"name", names},
+                   {"used", used},
+                   {"reason", why},
+                   {"num_corners", num_corners},
+                   {"rms_px", rms},
+                   {"cluster_z2", z2}}};
   poses.append_to(table, "cam_from_board");
   middles.append_to(table);
   return table;
@@ -204,6 +212,23 @@ void fill_grids(const CalibrationStudy& study, ResultDocument& document) {
   document.grids.push_back(std::move(halves));
 }
 
+/// How the stated σ came about: by how much the photos' scatter raised the model's, and how sure that is.
+JsonValue sigma_values(const CalibrateReport& report) {
+  JsonValue values = JsonValue::object(), inflation = JsonValue::object(), dof = JsonValue::object();
+  const auto names = param_names(report.camera.lens);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    if (!(report.model_cov(k, k) > 0.0)) continue;
+    inflation[names[i]] = report.clusters.inflation[k];
+    dof[names[i]] = report.clusters.degrees_of_freedom[k];
+  }
+  values["design_effect"] = report.clusters.design_effect;
+  values["shrinkage"] = report.clusters.shrinkage;
+  values["inflation"] = std::move(inflation);
+  values["degrees_of_freedom"] = std::move(dof);
+  return values;
+}
+
 /// How a brown lens would do in the place of a flat port.
 JsonValue port_values(const PortResidual& residual) {
   JsonValue values = JsonValue::object();
@@ -228,6 +253,10 @@ void fill_estimate(const Board& board, const Calibration& calibration, ResultDoc
   const auto names = param_names(report.camera.lens);
   document.estimate["camera"] = camera_values(report.camera);
   document.stddev["camera"] = camera_stddev(report.camera);
+  Camera by_single_corners = report.camera;
+  by_single_corners.cov = report.model_cov;
+  document.stddev_model["camera"] = camera_stddev(by_single_corners);
+  document.estimate["sigma"] = sigma_values(report);
   std::vector<Eigen::Index> free;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
@@ -292,6 +321,7 @@ void fill_calibration(const Board& board, const Calibration& calibration, Result
   }
   document.counts.dropped = document.counts.given - document.counts.used;
   const bool solved = report.status == CalibrateReport::Status::converged;
+  document.assumed = calibration.assumed;
   if (solved) {
     fill_estimate(board, calibration, document);
     JsonValue rejected = JsonValue::list();

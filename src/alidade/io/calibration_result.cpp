@@ -42,6 +42,7 @@ CalibrationResult read_calibration(const std::filesystem::path& result) {
     if (!has_camera) throw InputError("this calibration was refused: there is no camera");
     const auto& estimate = json.at("estimate");
     found.noise_px = estimate.at("noise_px").get<double>();
+    if (estimate.contains("sigma")) found.design_effect = estimate["sigma"].value("design_effect", 1.0);
     found.board = board_of(estimate.at("board"));
   } catch (const nlohmann::json::exception&) {
     throw InputError(file.string() + ": not a result.json of alidade calibrate");

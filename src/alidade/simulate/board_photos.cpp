@@ -115,6 +115,23 @@ std::vector<BoardView> simulate_views(const BoardScene& scene, double sigma_px, 
   return views;
 }
 
+void add_shared_errors(const BoardScene& scene, double sigma_px, std::uint64_t seed, std::vector<BoardView>& views) {
+  Draws draws(seed);
+  const std::vector<Eigen::Vector3d> printed = points_in_board(scene.board);
+  const Eigen::Vector3d centre = 0.5 * (printed.front() + printed.back());
+  const Eigen::Vector3d half = (0.5 * (printed.back() - printed.front())).cwiseAbs().cwiseMax(1e-12);
+  for (BoardView& view : views) {
+    Eigen::Matrix<double, 2, 6> field;
+    for (int term = 0; term < 6; ++term) field.col(term) = sigma_px * draws.normal2();
+    for (Corner& corner : view.corners) {
+      const Eigen::Vector3d q = (printed[static_cast<std::size_t>(corner.index)] - centre).cwiseQuotient(half);
+      Eigen::Vector<double, 6> terms;
+      terms << 1.0, q.x(), q.y(), q.x() * q.x(), q.x() * q.y(), q.y() * q.y();
+      corner.px += field * terms;
+    }
+  }
+}
+
 std::string photo_name(std::size_t i) {
   const std::string number = std::to_string(i + 1);
   return "board_" + std::string(number.size() < 3 ? 3 - number.size() : 0, '0') + number + ".png";

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "alidade/calibrate/calibrate.h"
+#include "alidade/estimation/verdict.h"
+
+namespace alidade {
+
+/// What a calibration took as given: the board's square, and each lens parameter that was held. How far each would move
+/// the lens is the linearised optimum's dθ/da = −S_θθ⁻¹ S_θa, S the information of both with the poses eliminated; a
+/// square that is off moves a central lens by nothing. `report` must have converged.
+///
+/// `air`: the lens that was given and held (flat_port). Where it has a covariance C, C is counted in
+/// `report.camera.cov`: K C Kᵀ on what was estimated, K C between, K = dθ/da.
+[[nodiscard]] std::vector<Assumption> count_assumptions(const Board& board, const CalibrateConfig& config,
+                                                        std::span<const BoardView> views,
+                                                        const std::optional<Camera>& air, CalibrateReport& report);
+
+}  // namespace alidade

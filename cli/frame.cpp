@@ -186,7 +186,9 @@ tbb::global_control prepare_libraries(int threads) {
 }
 
 std::string refusal(const std::string& command, const Verdict& verdict) {
-  return command + ": " + verdict.sentence + (verdict.to_add.empty() ? "" : "; " + verdict.to_add);
+  const bool is_said = verdict.exit_code != ExitCode::not_trusted || verdict.sentence.starts_with("Not to be trusted");
+  return command + ": " + (is_said ? "" : "not to be trusted: ") + verdict.sentence +
+         (verdict.to_add.empty() ? "" : "; " + verdict.to_add);
 }
 
 constexpr const char* bug = " (a bug in alidade; please report it)";

@@ -128,7 +128,7 @@ TEST(NothingLost, AnEstimateThatIsNotToBeTrustedIsCode6WithItsFilesAndItsSentenc
   ASSERT_EQ(run_into(folder.path(), writing({"poses.csv"}, State::good)).code, 0);
   const Outcome outcome = run_into(folder.path(), writing({"camera.yaml"}, State::bad));
   EXPECT_EQ(outcome.code, 6);
-  EXPECT_EQ(outcome.err, "alidade: error: work: what was found; what to do\n");
+  EXPECT_EQ(outcome.err, "alidade: error: work: not to be trusted: what was found; what to do\n");
   EXPECT_THAT(outcome.out, HasSubstr("▲ what was found\n  next: what to do\n"));
   EXPECT_THAT(names_of(folder.path()), ::testing::ElementsAre("camera.yaml", "report.html", "result.json"));
   EXPECT_EQ(verdict_in(folder.path())["exit_code"], 6);

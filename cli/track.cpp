@@ -191,8 +191,7 @@ ExitCode track(const TrackArgs& args, Run& run) {
   fill_track(events.sights, rig.heads, report, truth, run.document);
   summarize(report, run);
   if (has_estimate(verdict)) run.add_file("track.csv", track_csv(report.steps, report.ahead));
-  if (has_estimate(verdict) && !report.smoothed.empty())
-    run.add_file("smoothed.csv", smoothed_csv(report.smoothed));
+  if (has_estimate(verdict) && !report.smoothed.empty()) run.add_file("smoothed.csv", smoothed_csv(report.smoothed));
   return live.finish(verdict);
 }
 

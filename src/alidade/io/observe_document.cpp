@@ -201,7 +201,9 @@ void fill_observation(const RotationLog& log, const ObserveReport& report, const
     }
   }
   if (report.steps.size() == log.rows.size() && !log.rows.empty()) document.data.push_back(steps_table(log, report));
-  if (report.reference.has_value) document.data.push_back(points_table(log, report));
+  if (!report.reference.has_value) return;
+  document.data.push_back(points_table(log, report));
+  record_steps_kept(document.data.back(), report.reference.solution.residuals.size(), "");
 }
 
 }  // namespace alidade

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -239,6 +240,41 @@ TEST_F(CalibrateSurvives, CtrlCAtAnyMomentLeavesAllFilesOrNone) {
     }
   }
   EXPECT_GE(num_interrupted, 1) << "every run was over before it was interrupted";
+}
+
+/// What a folder holds, file by file, without the hidden folder that a killed run leaves until the next one.
+std::map<std::string, std::string> visible_files(const fs::path& folder) {
+  std::map<std::string, std::string> content;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.is_regular_file()) content[entry.path().filename()] = read_file(entry.path());
+  }
+  return content;
+}
+
+TEST_F(CalibrateSurvives, ARunThatIsKilledOrFailsLeavesTheOlderResultsAsTheyWere) {
+  add_photos(num_photos);
+  ASSERT_EQ(calibrate({photos().string()}).code, 0);
+  const auto before = visible_files(out());
+  int num_killed = 0;
+  for (const int wait_ms : {5, 20, 60, 120}) {
+    const Outcome outcome = calibrate({photos().string()}, [&](pid_t child) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(wait_ms));
+      ::kill(child, SIGKILL);
+    });
+    if (outcome.code != 128 + SIGKILL) break;  // a fast machine: it was over, and the results are its own
+    ++num_killed;
+    EXPECT_EQ(visible_files(out()), before) << wait_ms;
+  }
+  EXPECT_GE(num_killed, 1);
+  ASSERT_EQ(calibrate({photos().string()}).code, 0);
+  const auto newer = visible_files(out());
+  EXPECT_EQ(calibrate({"no/such.jpg"}).code, 3);
+  EXPECT_EQ(calibrate({photos().string(), "--board", "10x7"}).code, 4);
+  EXPECT_EQ(visible_files(out()), newer) << "bad input, and data that cannot tell";
+  EXPECT_EQ(json::parse(read_file(out() / "refused" / "result.json"))["verdict"]["exit_code"], 4);
+  EXPECT_EQ(std::distance(fs::directory_iterator(out()), fs::directory_iterator()),
+            static_cast<std::ptrdiff_t>(newer.size()) + 1)
+      << "nothing hidden is left, and refused/ is new";
 }
 
 /// The document without what differs from run to run.

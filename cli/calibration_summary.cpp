@@ -35,7 +35,20 @@ std::vector<std::size_t> worst_first(const CalibrateReport& report) {
   return order;
 }
 
+constexpr std::size_t num_large = 20;  // the worst photos, whose corners people look at
+
 int preview_width_px(std::size_t num_photos) { return num_photos <= 40 ? 640 : num_photos <= 200 ? 320 : 160; }
+
+/// The photos that the page shows, the most wanted first: the worst, and of a large set a sample of the others.
+std::vector<std::size_t> shown_photos(const CalibrateReport& report) {
+  constexpr std::size_t most = 1000;
+  const std::vector<std::size_t> order = worst_first(report);
+  const std::size_t num_worst = std::min(num_large, order.size()), rest = order.size() - num_worst;
+  std::vector<std::size_t> shown(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(num_worst));
+  const std::size_t sample = std::min(most - num_large, rest);
+  for (std::size_t i = 0; i < sample; ++i) shown.push_back(order[num_worst + i * rest / sample]);
+  return shown;
+}
 
 /// The worst photo without its distortion, as the report shows it beside the original.
 std::string undistorted_preview(const Camera& camera, const cv::Mat& photo) {
@@ -45,6 +58,16 @@ std::string undistorted_preview(const Camera& camera, const cv::Mat& photo) {
   cv::Mat straight;
   cv::remap(photo, straight, u_px, v_px, cv::INTER_LINEAR);
   return jpeg_preview(straight, 640, 75);
+}
+
+/// Empty where it fails: a picture of the report never fails the run, and what is no picture is named as such already.
+template <typename Make>
+std::string picture_or_none(const Make& make) {
+  try {
+    return make();
+  } catch (const std::exception&) {
+    return "";
+  }
 }
 
 }  // namespace
@@ -104,25 +127,24 @@ void add_result_files(const Calibration& calibration, Run& run) {
 }
 
 void add_pictures(const Calibration& calibration, const PhotoLoader& load_photo, Run& run) {
-  constexpr std::size_t most = 300;
-  std::vector<std::size_t> chosen = worst_first(calibration.photos.report);
-  if (chosen.size() > most) chosen.resize(most);
+  const auto& report = calibration.photos.report;
+  const auto& views = calibration.photos.views;
+  const std::vector<std::size_t> chosen = shown_photos(report);
+  if (chosen.empty()) return;
   const int width_px = preview_width_px(chosen.size());
   std::vector<std::string> jpegs(chosen.size());
   tbb::parallel_for(std::size_t{0}, chosen.size(), [&](std::size_t i) {
-    try {
-      jpegs[i] = jpeg_preview(load_photo(chosen[i]), i < 20 ? std::max(width_px, 640) : width_px, 75);
-    } catch (const std::exception&) {
-      jpegs[i].clear();  // not a picture: it is named as such already
-    }
+    jpegs[i] = picture_or_none([&] { return jpeg_preview(load_photo(chosen[i]), i < num_large ? 640 : width_px, 75); });
   });
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    if (!jpegs[i].empty()) run.add_picture(calibration.photos.views[chosen[i]].photo, jpegs[i]);
+  const std::string worst = views[chosen.front()].photo;
+  if (report.status == CalibrateReport::Status::converged) {
+    const std::string straight =
+        picture_or_none([&] { return undistorted_preview(report.camera, load_photo(chosen.front())); });
+    if (!straight.empty()) run.add_picture("undistorted:" + worst, straight);
   }
-  const auto& report = calibration.photos.report;
-  if (report.status != CalibrateReport::Status::converged || chosen.empty()) return;
-  run.add_picture("undistorted:" + calibration.photos.views[chosen.front()].photo,
-                  undistorted_preview(report.camera, load_photo(chosen.front())));
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    if (!jpegs[i].empty()) run.add_picture(views[chosen[i]].photo, std::move(jpegs[i]));
+  }
 }
 
 }  // namespace alidade::cli

@@ -124,7 +124,7 @@ ExitCode convert(const ConvertArgs& args, Run& run) {
   } catch (const InputError& error) {
     throw InputError(args.source + ": " + error.what());
   }
-  write_file(args.destination, text);
+  run.add_file_elsewhere(args.destination, text);
 
   run.document.counts.given = run.document.counts.used = 1;
   run.document.estimate["camera"] = camera_values(camera);

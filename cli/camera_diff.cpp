@@ -40,13 +40,14 @@ Verdict verdict_of(const CameraDiff& diff) {
     verdict.to_add = "compare camera.yaml files of alidade calibrate, which carry their covariance";
     return verdict;
   }
-  verdict.state = agreement(diff);
+  const State agree = agreement(diff);
+  verdict.state = std::min(agree, State::care);  // that two cameras differ is an answer that stands
   verdict.sentence += fmt::format(", {:.1f}σ RMS, {:.1f}σ at worst: {}", diff.rms_in_sigmas, diff.max_in_sigmas,
-                                  verdict.state == State::good   ? "no more than their σ predicts"
-                                  : verdict.state == State::care ? "more than their σ predicts"
-                                                                 : "they are not the same camera, or a σ is too small");
+                                  agree == State::good   ? "no more than their σ predicts"
+                                  : agree == State::care ? "more than their σ predicts"
+                                                         : "they are not the same camera, or a σ is too small");
   verdict.checks.push_back(
-      {"same camera", verdict.state,
+      {"same camera", agree,
        fmt::format("{:.1f}σ RMS (1 is expected), worst {:.1f}σ", diff.rms_in_sigmas, diff.max_in_sigmas),
        diff.max_in_sigmas, agree_max_sigmas, "σ", "diff"});
   return verdict;

@@ -133,7 +133,8 @@ TEST_F(CameraCommand, DiffSaysHowFarApartAndLeavesResults) {
   EXPECT_THAT(outcome.out, HasSubstr("(35.4σ)"));  // 0.05 / (√2 · 0.001)
   const auto document = result("out");
   EXPECT_EQ(document["command"], "camera diff");
-  EXPECT_EQ(document["verdict"]["state"], "bad");
+  EXPECT_EQ(document["verdict"]["state"], "care") << "that they differ is an answer, and it stands";
+  EXPECT_EQ(document["verdict"]["checks"][0]["state"], "bad");
   EXPECT_EQ(document["data"]["parameters"]["name"][5], "k1");
   EXPECT_EQ(document["data"]["parameters"]["b"][5], -0.2);
   EXPECT_EQ(document["data"]["parameters"]["sigma_a"][5], 0.001);

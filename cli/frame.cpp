@@ -167,12 +167,13 @@ void add_common_options(CLI::App& app, const CommandSpec& spec, CommonOptions& o
       ->group(group);
 }
 
-/// Finds out before the work, not after it, that there is no place for results.
+/// Finds out before the work, not after it, that there is no place for results; leaves nothing there.
 void require_place(const CommonOptions& options) {
-  std::error_code ignored;
   if (!options.leaves_results) return;
-  if (std::filesystem::exists(options.out, ignored) && !std::filesystem::is_directory(options.out, ignored)) {
-    throw InputError(options.out.string() + ": is a file, not a folder; give another --out");
+  try {
+    const FolderSwap tried(options.out);
+  } catch (const InputError& error) {
+    throw InputError(std::string(error.what()) + "; give another --out");
   }
 }
 
@@ -185,7 +186,9 @@ tbb::global_control prepare_libraries(int threads) {
 }
 
 std::string refusal(const std::string& command, const Verdict& verdict) {
-  return command + ": " + verdict.sentence + (verdict.to_add.empty() ? "" : "; " + verdict.to_add);
+  const bool is_said = verdict.exit_code != ExitCode::not_trusted || verdict.sentence.starts_with("Not to be trusted");
+  return command + ": " + (is_said ? "" : "not to be trusted: ") + verdict.sentence +
+         (verdict.to_add.empty() ? "" : "; " + verdict.to_add);
 }
 
 constexpr const char* bug = " (a bug in alidade; please report it)";
@@ -205,7 +208,10 @@ Frame::Frame() : state_(std::make_unique<State>()) {
       "Each command has its own help, which ends with examples: alidade COMMAND --help\n"
       "Exit codes: 0 an estimate that stands, 1 a fault of alidade, 2 wrong usage, 3 bad input, nothing written,\n"
       "4 the data cannot tell (what is missing is named), 5 no convergence, 6 an estimate that is not to be trusted\n"
-      "(files are written), 130 interrupted.");
+      "(files are written), 130 interrupted.\n"
+      "Results replace the earlier ones in DIR at once, at the end. A run that fails leaves those as they were; a "
+      "refusal\n"
+      "(4, 5) beside an earlier estimate is written to DIR/refused.");
 }
 
 Frame::~Frame() = default;
@@ -247,16 +253,14 @@ int Frame::dispatch(int argc, const char* const* argv) {
   Command& command = *chosen_command();
   CommonOptions& options = command.options;
   if (command.app->count("--out") > 0) options.leaves_results = true;
+  catch_interrupts();
   require_place(options);
   const tbb::global_control limit = prepare_libraries(options.threads);
-  catch_interrupts();
   Run run(command.spec.name, {argv, argv + argc}, options, state_->terminal.progress(!options.quiet && !options.json));
   if (command.spec.draws_random_numbers) run.document.seed = options.seed;
   try {
     const ExitCode code = command.work(run);
     state_->terminal.wipe_progress();
-    std::cout.flush();
-    std::fflush(stdout);  // in a log as on a screen: what was found, then why that is not enough
     if (code != ExitCode::ok) state_->terminal.error(refusal(command.spec.name, run.document.verdict));
     return static_cast<int>(code);
   } catch (const UsageError& error) {
@@ -265,6 +269,7 @@ int Frame::dispatch(int argc, const char* const* argv) {
 }
 
 int run_cli(int argc, const char* const* argv, void (*add_commands)(Frame&)) {
+  hold_standard_streams();
   Frame frame;
   const auto failed = [&](const std::string& message, ExitCode code) {
     frame.state_->terminal.error(message);
@@ -274,7 +279,7 @@ int run_cli(int argc, const char* const* argv, void (*add_commands)(Frame&)) {
     add_commands(frame);
     const int code = frame.dispatch(argc, argv);
     std::cout.flush();
-    const bool is_written = std::cout.good() && std::fflush(stdout) == 0;
+    const bool is_written = std::cout.good() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
     return is_written ? code : failed("stdout: cannot be written", ExitCode::bad_input);
   } catch (const UsageError& error) {
     return failed(error.what(), ExitCode::usage);

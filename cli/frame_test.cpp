@@ -211,24 +211,6 @@ TEST(Frame, ARefusalIsWrittenAndSaysWhatToAdd) {
   EXPECT_EQ(nlohmann::json::parse(read_file(out + "/result.json"))["verdict"]["state"], "refused");
 }
 
-TEST(Frame, NothingOfAnEarlierRunStandsBesideARefusal) {
-  const TemporaryFolder folder;
-  const std::string out = folder.path().string();
-  write_file(folder.path() / "mine.txt", "not ours");
-  const auto with_camera = [](cli::Run& run) {
-    run.add_file("camera.yaml", "fx: 1\n");
-    return run.finish(good());
-  };
-  const auto refusal = [](cli::Run& run) {
-    return run.finish({State::refused, ExitCode::cannot_tell, "too little", "", {}});
-  };
-  EXPECT_EQ(outcome_of({"work", "--out", out.c_str()}, with_camera).code, 0);
-  EXPECT_TRUE(std::filesystem::exists(folder.path() / "camera.yaml"));
-  EXPECT_EQ(outcome_of({"work", "--out", out.c_str()}, refusal).code, 4);
-  EXPECT_FALSE(std::filesystem::exists(folder.path() / "camera.yaml"));
-  EXPECT_TRUE(std::filesystem::exists(folder.path() / "mine.txt"));
-}
-
 TEST(Frame, ACommandThatOnlyShowsLeavesNothingUnlessOutIsGiven) {
   const TemporaryFolder folder;
   const auto in_folder = [&](std::vector<const char*> words) {

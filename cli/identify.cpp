@@ -44,7 +44,7 @@ ExitCode identify(const IdentifyArgs& args, Run& run) {
   run.document.counts.given = log.skipped.size();
   run.document.counts.skipped = log.skipped;
   fill_identification(log.samples, identified, run.document);
-  if (verdict.exit_code == ExitCode::ok) {
+  if (has_estimate(verdict)) {
     summarize(identified, run);
     run.add_file("servo.yaml", servo_plant_text(identified.fit));
   }

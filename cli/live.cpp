@@ -121,10 +121,12 @@ ExitCode LiveRun::finish(Verdict verdict) {
   if (!server_) return code;
   {
     const std::scoped_lock lock(mutex_);
-    result_ = read_file(run_.options.out / "result.json");
+    result_ = run_.result();
   }
   const std::string sentence = verdict.sentence + (verdict.to_add.empty() ? "" : "; " + verdict.to_add);
-  const auto level = code == ExitCode::ok ? live::LogLevel::info : live::LogLevel::error;
+  const auto level = code == ExitCode::ok            ? live::LogLevel::info
+                     : code == ExitCode::not_trusted ? live::LogLevel::warning
+                                                     : live::LogLevel::error;
   server_->send(
       "/log", 0, [=, this] { return live::log_text(0, level, run_.document.command, sentence); }, 0, true);
   server_->send(

@@ -203,7 +203,7 @@ ExitCode localize(const LocalizeArgs& args, Run& run) {
   const Verdict verdict = localize_verdict(report);
   fill_localization(report, truth, lens_params, run.document);
   summarize(report, lens_params, run);
-  if (verdict.exit_code == ExitCode::ok) {
+  if (has_estimate(verdict)) {
     std::vector<TimedPose> path;
     for (const PathStep& step : report.path)
       if (step.has_pose()) path.push_back({step.t_s, step.world_from_cam});

@@ -72,7 +72,7 @@ TEST_F(LocalizeCommand, LessOfTheLensIsWorseAndOnlineCalibrationFindsIt) {
   simulate({"--points", "20", "--frames", "60"});
   const auto error_of = [&](const std::vector<std::string>& options) {
     const Outcome outcome = localize(told(options));
-    EXPECT_TRUE(outcome.code == 0 || outcome.code == 5) << outcome.err;
+    EXPECT_TRUE(outcome.code == 0 || outcome.code == 5 || outcome.code == 6) << outcome.err;  // the truth is told: ▲
     return Json::parse(outcome.out)["estimate"]["unaligned_m"].get<double>();
   };
   const double full = error_of({}), first = error_of({"--distortion", "radial1"}),
@@ -207,13 +207,13 @@ TEST_F(LocalizeCommand, SurvivesMissingFramesAndUnknownPoints) {
   }
   write_file(path("gaps.csv"), text);
   const Outcome outcome = localize(told(), "gaps.csv");
-  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  ASSERT_EQ(outcome.code, 6) << outcome.err << "more than a tenth of the frames is lost";
   const Json document = Json::parse(outcome.out);
   EXPECT_EQ(document["estimate"]["frames"], 59);  // the last one is among the missing
   EXPECT_GE(document["estimate"]["lost"], 12);
-  EXPECT_NE(document["verdict"]["state"], "good");
+  EXPECT_EQ(document["verdict"]["state"], "bad");
   const Outcome skipped = localize(told({"--skip-bad"}), "gaps.csv");
-  EXPECT_EQ(skipped.code, 0) << skipped.err;
+  EXPECT_EQ(skipped.code, 6) << skipped.err;
 }
 
 }  // namespace

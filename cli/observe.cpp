@@ -229,7 +229,7 @@ ExitCode observe_log(const ObserveArgs& args, Run& run) {
   const Verdict verdict = observe_verdict(report, log, config);
   const Camera seen = observed_camera(report, camera);
   fill_observation(log, report, seen, run.document);
-  if (verdict.exit_code == ExitCode::ok) {
+  if (has_estimate(verdict)) {
     summarize(report, run);
     run.add_file("camera.yaml", camera_text(seen, CameraFormat::alidade));
   }

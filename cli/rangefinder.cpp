@@ -206,7 +206,7 @@ ExitCode rangefinder(const RangefinderArgs& args, Run& run) {
   summarize(report, shots, run);
   run.document.estimate["camera"] = camera_values(report.camera);  // that the beam belongs to
   fill_rangefinder(shots, report, config, extras_of(report, shots, points, camera, config, board, run), run.document);
-  if (verdict.exit_code == ExitCode::ok) {
+  if (has_estimate(verdict)) {
     Camera seen = report.camera;
     if (config.refine == Refine::all)
       seen.source = "alidade rangefinder, refined from " + args.camera.filename().string();

@@ -59,7 +59,7 @@ ExitCode align_scan(const EdgesArgs& args, Run& run) {
   estimate["theta_y_rad"] = direction_angles_rad(report.beam).y();
   estimate["gain"] = report.gain;
   estimate["halves_differ_rad"] = report.halves_differ_rad;
-  if (verdict.exit_code == ExitCode::ok) {
+  if (has_estimate(verdict)) {
     run.say(fmt::format("direction {:.5f} {:.5f} {:.5f}; the halves of the scan differ by {:.2g} mrad", a.x(), a.y(),
                         a.z(), 1e3 * report.halves_differ_rad));
     run.add_file("rangefinder.yaml", beam_text(report.beam, camera, "camera.yaml"));

@@ -178,7 +178,7 @@ ExitCode rig(const RigArgs& args, Run& run) {
   const Verdict verdict = rig_verdict(report, config);
   summarize(file.views, report, config.sigma_encoder_rad.has_value(), run);
   fill_rig(file.views, report, run.document);
-  if (verdict.exit_code == ExitCode::ok) add_files(report, run);
+  if (has_estimate(verdict)) add_files(report, run);
   return run.finish(verdict);
 }
 

@@ -159,7 +159,7 @@ ExitCode rig_by_moving_target(const std::filesystem::path& events, const std::ve
   const Verdict verdict = moving_target_verdict(report, config);
   summarize(report, run);
   fill_moving_target(read.sights, report, run.document);
-  if (verdict.exit_code == ExitCode::ok) add_files(read.sights, report, run);
+  if (has_estimate(verdict)) add_files(read.sights, report, run);
   return run.finish(verdict);
 }
 

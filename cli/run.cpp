@@ -1,16 +1,25 @@
 #include "cli/run.h"
 
+#include <stdio_ext.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
 #include <ctime>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <tuple>
 
 #include "alidade/io/sha256.h"
+#include "alidade/io/thin_tables.h"
 #include "alidade/report/page.h"
+#include "cli/terminal.h"
 
 namespace alidade::cli {
 namespace {
+
+constexpr std::size_t most_page_bytes = 12'000'000;  // opens at once, and goes through the mail
 
 std::string utc_now() {
   const std::time_t now = std::time(nullptr);
@@ -37,10 +46,47 @@ const char* symbol(State state) {
   return "?";
 }
 
-void print_line(std::string_view line) { std::printf("%.*s\n", static_cast<int>(line.size()), line.data()); }
-
 double seconds_since(std::chrono::steady_clock::time_point then) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - then).count();
+}
+
+/// What an earlier run left in a folder, by the result.json there.
+struct EarlierResult {
+  bool has_estimate = false;
+  std::vector<std::filesystem::path> files;  ///< Inside the folder; result.json and the report first.
+};
+
+EarlierResult earlier_result(const std::filesystem::path& folder) {
+  EarlierResult found;
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(folder / "result.json", ignored)) return found;
+  const auto json = nlohmann::json::parse(read_file(folder / "result.json"), nullptr, false);
+  const auto member = [&](const char* pointer) {
+    const nlohmann::json::json_pointer at(pointer);
+    return json.contains(at) ? json[at] : nlohmann::json();
+  };
+  if (member("/schema") != "alidade-result/1") return found;
+  found.files = {"result.json", "report.html"};
+  for (const auto& name : member("/files")) {
+    const std::filesystem::path file = name.is_string() ? name.get<std::string>() : "";
+    const bool is_inside =
+        !file.empty() && file.is_relative() && file == file.lexically_normal() && *file.begin() != "..";
+    if (is_inside && file.has_filename()) found.files.push_back(file);
+  }
+  const nlohmann::json code = member("/verdict/exit_code");
+  found.has_estimate = code.is_number_integer() && tells_an_estimate(code.get<int>());
+  return found;
+}
+
+/// Its files stay where this run reads one of them: photos that were simulated into DIR, then calibrated there.
+void spare_inputs(const std::vector<InputFile>& inputs, const std::filesystem::path& folder, EarlierResult& earlier) {
+  std::error_code ignored;
+  std::set<std::filesystem::path> read;
+  for (const InputFile& input : inputs) read.insert(std::filesystem::weakly_canonical(input.name, ignored));
+  const bool is_read = std::any_of(earlier.files.begin(), earlier.files.end(), [&](const std::filesystem::path& file) {
+    return read.contains(std::filesystem::weakly_canonical(folder / file, ignored));
+  });
+  if (is_read) earlier.files.resize(2);
 }
 
 }  // namespace
@@ -77,7 +123,11 @@ void Run::add_file(std::string name, std::string content) {
   files_.push_back({std::move(name), std::move(content), {}});
 }
 
-void Run::add_picture(std::string name, std::string jpeg) { pictures_[std::move(name)] = std::move(jpeg); }
+void Run::add_file_elsewhere(const std::filesystem::path& file, std::string_view content) {
+  elsewhere_.emplace_back(file.parent_path()).add(file.filename(), content);
+}
+
+void Run::add_picture(std::string name, std::string jpeg) { pictures_.emplace_back(std::move(name), std::move(jpeg)); }
 
 void Run::say(std::string line) { lines_.push_back(std::move(line)); }
 
@@ -91,67 +141,97 @@ ExitCode Run::finish(Verdict verdict) {
     return std::tie(a.role, a.name) < std::tie(b.role, b.name);
   });
   document.seconds.insert(document.seconds.begin(), {"total", seconds_since(start_)});
-  const std::string result = result_text(document);
-  report_progress(progress, "writing", 0, 0);  // the last moment at which Ctrl-C leaves nothing written
-  if (options.leaves_results) write_files(result);
-  print(result);
+  result_ = result_text_of_size(document,
+                                [&](std::string name, std::string csv) { add_file(std::move(name), std::move(csv)); });
+  report_progress(progress, "writing", 0, 0);
+  if (options.leaves_results) {
+    write_files();
+  } else {
+    print();
+    for (FolderSwap& swap : elsewhere_) swap.commit();
+  }
   return document.verdict.exit_code;
 }
 
-void Run::write_files(const std::string& result) {
-  const std::string page = report(result);
-  remove_older_files();
-  for (const PendingFile& file : files_) {
-    write_file(options.out / file.name, file.place ? spool_->get(*file.place) : file.content);
+/// What an earlier run left here and this one does not replace must not be taken for this one's; only files that its
+/// result.json names go. A refusal has nothing to put in the place of an estimate, and leaves it alone.
+void Run::write_files() {
+  const std::filesystem::path refused = "refused";
+  EarlierResult earlier = earlier_result(options.out);
+  spare_inputs(document.inputs, options.out, earlier);
+  const bool is_aside = !has_estimate(document.verdict) && earlier.has_estimate;
+  folder_ = is_aside ? options.out / refused : options.out;
+  FolderSwap swap(folder_);
+  swap.add("result.json", result_);
+  for (const PendingFile& file : files_) swap.add(file.name, file.place ? spool_->get(*file.place) : file.content);
+  add_report(swap);
+  for (const std::filesystem::path& name : is_aside ? earlier_result(folder_).files : earlier.files) swap.remove(name);
+  if (!is_aside) {
+    for (const std::filesystem::path& name : earlier_result(options.out / refused).files) swap.remove(refused / name);
   }
-  write_file(options.out / "result.json", result);
-  has_report_ = !page.empty();
-  if (has_report_) write_file(options.out / "report.html", page);
+  report_progress(progress, "writing", 0, 0);  // the last moment at which Ctrl-C leaves nothing written
+  print();
+  for (FolderSwap& each : elsewhere_) each.commit();
+  swap.commit();
 }
 
-/// The page; empty where it is not wanted or fails. A failed report never fails the run, but it says so.
-std::string Run::report(const std::string& result) {
-  if (options.no_report) return "";
+/// The page, where it is wanted. One that fails, or for which the disk has no room, never fails the run, but is said.
+void Run::add_report(FolderSwap& swap) {
+  if (options.no_report) return;
   try {
-    return report_page(result, pictures_);
+    std::size_t room = most_page_bytes - std::min(most_page_bytes, report_page(result_, {}).size());
+    std::map<std::string, std::string> pictures;
+    for (auto& [name, jpeg] : pictures_) {
+      const std::size_t size = jpeg.size() * 4 / 3 + name.size() + 100;  // as base64, in its element
+      if (size > room) break;
+      room -= size;
+      pictures[name] = std::move(jpeg);
+    }
+    swap.add("report.html", report_page(result_, pictures));
+    has_report_ = true;
   } catch (const std::exception& error) {
-    say(std::string("report: failed: ") + error.what());
-    return "";
+    warn(std::string("report: not written: ") + error.what());
   }
 }
 
-/// What an earlier run left here and this one does not replace must not be taken for this one's: a camera.yaml beside a
-/// refusal. Only files that the earlier result.json names are removed.
-void Run::remove_older_files() const {
-  std::error_code ignored;
-  if (!std::filesystem::exists(options.out / "result.json", ignored)) return;
-  const auto older = nlohmann::json::parse(read_file(options.out / "result.json"), nullptr, false);
-  if (!older.is_object() || older.value("schema", "") != "alidade-result/1" || !older.contains("files")) return;
-  for (const auto& name : older["files"]) {
-    const std::filesystem::path file = name.is_string() ? name.get<std::string>() : "";
-    const bool is_inside =
-        !file.empty() && file.is_relative() && file == file.lexically_normal() && *file.begin() != "..";
-    if (is_inside && file.has_filename()) std::filesystem::remove(options.out / file, ignored);
+/// Said where a person reads it.
+void Run::warn(const std::string& line) {
+  if (options.json || options.quiet) {
+    tell_person("alidade: " + line);
+  } else {
+    say(line);
   }
-  std::filesystem::remove(options.out / "report.html", ignored);
 }
 
-void Run::print(const std::string& result) const {
-  if (options.json) {
-    std::fwrite(result.data(), 1, result.size(), stdout);
-    return;
-  }
-  if (options.quiet) return;
-  for (const std::string& line : lines_) print_line(line);
+std::string Run::summary() const {
+  std::string text;
+  const auto add = [&](const std::string& line) { text += line + "\n"; };
+  for (const std::string& line : lines_) add(line);
   const Verdict& verdict = document.verdict;
-  const bool has_estimate = verdict.exit_code == ExitCode::ok || verdict.exit_code == ExitCode::not_trusted;
-  if (has_estimate && !verdict.sentence.empty()) {
-    print_line(std::string(symbol(verdict.state)) + " " + verdict.sentence);
-    if (!verdict.to_add.empty()) print_line("  next: " + verdict.to_add);
+  if (has_estimate(verdict) && !verdict.sentence.empty()) {
+    add(std::string(symbol(verdict.state)) + " " + verdict.sentence);
+    if (!verdict.to_add.empty()) add("  next: " + verdict.to_add);
   }
-  if (!options.leaves_results) return;
-  print_line("result: " + (options.out / "result.json").string());
-  if (has_report_) print_line("report: " + (options.out / "report.html").string());
+  if (!options.leaves_results) return text;
+  if (folder_ != options.out)
+    add("the results of an earlier run in " + options.out.string() + " are left as they were");
+  add("result: " + (folder_ / "result.json").string());
+  if (has_report_) add("report: " + (folder_ / "report.html").string());
+  return text;
+}
+
+/// Before anything stands in its place: a document that its reader cannot have is a run that failed. Who stops reading
+/// lines for people has read enough.
+void Run::print() const {
+  if (options.quiet && !options.json) return;
+  wipe_progress_line();
+  const std::string text = options.json ? result_ : summary();
+  const bool is_written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
+  if (is_written) return;
+  const bool has_read_enough = errno == EPIPE && !options.json;
+  ::__fpurge(stdout);
+  std::clearerr(stdout);
+  if (!has_read_enough) throw InputError("stdout: cannot be written");
 }
 
 }  // namespace alidade::cli

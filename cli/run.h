@@ -3,16 +3,18 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
-#include <map>
+#include <list>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "alidade/estimation/progress.h"
 #include "alidade/estimation/verdict.h"
 #include "alidade/io/files.h"
+#include "alidade/io/folder_swap.h"
 #include "alidade/io/result_document.h"
 #include "alidade/io/spool.h"
 
@@ -35,6 +37,11 @@ struct CommonOptions {
   std::uint64_t seed = 1;      ///< Of all chance in the command.
 };
 
+/// Whether there is an estimate, and files of it, be it one that stands or one not to be trusted.
+[[nodiscard]] inline bool has_estimate(const Verdict& verdict) {
+  return tells_an_estimate(static_cast<int>(verdict.exit_code));
+}
+
 /// One run of one command: collects inputs, results and files, and writes them all at the end, or none.
 class Run {
  public:
@@ -52,14 +59,20 @@ class Run {
   void lap(std::string part);
   /// A file to be written into DIR by finish(). Many large ones wait on DIR's disk, not in memory.
   void add_file(std::string name, std::string content);
-  /// A picture of the report: JPEG bytes under the name that the document uses.
+  /// A file elsewhere that the person named, written by finish() as well.
+  void add_file_elsewhere(const std::filesystem::path& file, std::string_view content);
+  /// A picture of the report: JPEG bytes under the name that the document uses. Where the page would become too large,
+  /// those added last are left out.
   void add_picture(std::string name, std::string jpeg);
   /// A line for a person, shown by finish() unless --json or --quiet.
   void say(std::string line);
 
   /// Writes the files, result.json and report.html into DIR, prints the summary (or the document, with --json), and
-  /// gives the exit code. Throws InputError if something cannot be written, Interrupted after Ctrl-C.
+  /// gives the exit code. All stands in DIR, or DIR is as it was: throws InputError if something cannot be written or
+  /// printed, Interrupted after Ctrl-C. A refusal does not replace an earlier estimate: it goes to DIR/refused.
   [[nodiscard]] ExitCode finish(Verdict verdict);
+  /// Text of result.json; empty before finish().
+  [[nodiscard]] const std::string& result() const { return result_; }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -71,18 +84,22 @@ class Run {
     std::optional<Spool::Place> place;
   };
 
-  [[nodiscard]] std::string report(const std::string& result);
-  void remove_older_files() const;
-  void write_files(const std::string& result);
-  void print(const std::string& result) const;
+  void write_files();
+  void add_report(FolderSwap& swap);
+  void warn(const std::string& line);
+  void print() const;
+  [[nodiscard]] std::string summary() const;
 
   Clock::time_point start_ = Clock::now();
   Clock::time_point lap_ = start_;
   std::vector<PendingFile> files_;
   std::size_t held_bytes_ = 0;  ///< Of the files in memory; beyond a limit they wait on disk.
   std::optional<Spool> spool_;
-  std::map<std::string, std::string> pictures_;
+  std::list<FolderSwap> elsewhere_;
+  std::vector<std::pair<std::string, std::string>> pictures_;  ///< Names and JPEG bytes, the most wanted first.
   std::vector<std::string> lines_;
+  std::string result_;
+  std::filesystem::path folder_;  ///< Where the results stand: DIR, or DIR/refused.
   bool has_report_ = false;
 };
 

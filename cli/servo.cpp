@@ -97,7 +97,7 @@ ExitCode servo(const ServoArgs& args, Run& run) {
   fill_servo(scenario, study, run.document);
   summarize(study, run);
   if (args.real_time) tell_pace(pace, run);
-  if (verdict.exit_code == ExitCode::ok) run.add_file("servo.csv", servo_csv(scenario, study));
+  if (has_estimate(verdict)) run.add_file("servo.csv", servo_csv(scenario, study));
   return live.finish(verdict);
 }
 

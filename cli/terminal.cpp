@@ -18,6 +18,10 @@ extern "C" void on_interrupt(int signal) {
   if (stop_signal.exchange(signal) != 0) ::_exit(128 + signal);  // the second one does not wait
 }
 
+/// Called instead of ending the process: the write that failed says so itself. Not ignored: a program that is started
+/// from here gets the usual manner back.
+extern "C" void on_failed_write(int) {}
+
 /// True where a sanitizer reports on stderr, which must then stay open to it.
 constexpr bool is_sanitized() {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -99,6 +103,11 @@ Progress Terminal::progress(bool shown) {
 
 void Terminal::wipe_progress() { state_->wipe(); }
 
+void wipe_progress_line() {
+  const std::shared_ptr<Terminal::State> state = Terminal::current().lock();
+  if (state) state->wipe();
+}
+
 void tell_person(std::string_view line) {
   const std::shared_ptr<Terminal::State> state = Terminal::current().lock();
   if (state) state->wipe();
@@ -112,6 +121,17 @@ void catch_interrupts() {
   action.sa_flags = SA_RESTART;  // a write that is under way is finished
   ::sigaction(SIGINT, &action, nullptr);
   ::sigaction(SIGTERM, &action, nullptr);
+  action.sa_handler = on_failed_write;
+  ::sigaction(SIGPIPE, &action, nullptr);  // nobody reads stdout any more
+  ::sigaction(SIGXFSZ, &action, nullptr);  // a file beyond the size that this process may write
+}
+
+void hold_standard_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(stream, F_GETFD) >= 0) continue;
+    const bool is_stdout = stream == STDOUT_FILENO;  // what is written there is lost: it shall be noticed
+    [[maybe_unused]] const int lowest = ::open("/dev/null", is_stdout ? O_RDONLY : O_RDWR);
+  }
 }
 
 int interrupting_signal() { return stop_signal.load(); }

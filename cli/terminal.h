@@ -30,10 +30,18 @@ class Terminal {
   std::shared_ptr<State> state_;  // the Progress handed out shares it, so that it may outlive this
 };
 
+/// Wipes the progress line of the newest one, before something is printed on stdout.
+void wipe_progress_line();
+
 /// A line for the person, on stderr, after wiping the progress line: what they need while the command runs.
 void tell_person(std::string_view line);
 
-/// From now on the first SIGINT or SIGTERM asks the work to stop, and the second ends the process at once.
+/// Where stdin, stdout or stderr is closed, something stands in its place: no file of ours takes its number. Writing to
+/// such a stdout fails.
+void hold_standard_streams();
+
+/// From now on the first SIGINT or SIGTERM asks the work to stop, and the second ends the process at once. A write that
+/// nobody reads, or beyond the largest size of a file, fails instead of ending the process.
 void catch_interrupts();
 /// The signal that asked to stop; 0 if none did.
 [[nodiscard]] int interrupting_signal();

@@ -190,9 +190,8 @@ ExitCode track(const TrackArgs& args, Run& run) {
   run.document.counts.skipped = events.skipped;
   fill_track(events.sights, rig.heads, report, truth, run.document);
   summarize(report, run);
-  if (verdict.exit_code == ExitCode::ok) run.add_file("track.csv", track_csv(report.steps, report.ahead));
-  if (verdict.exit_code == ExitCode::ok && !report.smoothed.empty())
-    run.add_file("smoothed.csv", smoothed_csv(report.smoothed));
+  if (has_estimate(verdict)) run.add_file("track.csv", track_csv(report.steps, report.ahead));
+  if (has_estimate(verdict) && !report.smoothed.empty()) run.add_file("smoothed.csv", smoothed_csv(report.smoothed));
   return live.finish(verdict);
 }
 

@@ -52,14 +52,18 @@ Shown shown_of(const std::string& name, const fs::path& folder) {
 /// The results in the folders, or in the folders in them: alidade-out has one of each command.
 std::vector<Shown> results_in(const std::vector<fs::path>& folders) {
   std::vector<Shown> results;
-  const auto add = [&](const fs::path& folder) {
-    std::string name = fs::weakly_canonical(folder).filename().string();
+  const auto add_one = [&](const fs::path& folder, std::string name) {
     const auto is_taken = [&](const std::string& n) {
       return std::ranges::find(results, n, &Shown::name) != results.end();
     };
     const std::string plain = name;
     for (int i = 2; is_taken(name); ++i) name = fmt::format("{}-{}", plain, i);
     results.push_back(shown_of(name, folder));
+  };
+  const auto add = [&](const fs::path& folder) {  // and what a later run was refused for
+    const std::string name = fs::weakly_canonical(folder).filename().string();
+    add_one(folder, name);
+    if (has_result(folder / "refused")) add_one(folder / "refused", name + "-refused");
   };
   for (const fs::path& folder : folders) {
     if (!fs::is_directory(folder)) throw InputError(folder.string() + ": is not a folder");

@@ -3,14 +3,14 @@ import {execFileSync} from 'node:child_process';
 import {join} from 'node:path';
 import {folder, readJson} from './page.mjs';
 
-/** {name: result document}; a refusal ends with exit code 4, and leaves a document as well. */
+/** {name: result document}; a refusal ends with exit code 4, what is not to be trusted with 6; both leave a document as well. */
 export function realResults(alidade) {
   const at = (...parts) => join(folder, ...parts), results = {};
   const run = (args) => {
     try {
       execFileSync(alidade, [...args, '--quiet'], {cwd: folder, stdio: 'pipe'});
     } catch (error) {
-      if (error.status !== 4) throw new Error(`${args.join(' ')}: ${error.stderr}`);
+      if (error.status !== 4 && error.status !== 6) throw new Error(`${args.join(' ')}: ${error.stderr}`);
     }
   };
   const both = (name, simulate, command) => {

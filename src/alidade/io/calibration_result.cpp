@@ -2,10 +2,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "alidade/estimation/verdict.h"
 #include "alidade/io/camera_file.h"
 #include "alidade/io/corner_file.h"
 #include "alidade/io/files.h"
+#include "alidade/io/result_document.h"
 
 namespace alidade {
 namespace {
@@ -37,9 +37,8 @@ CalibrationResult read_calibration(const std::filesystem::path& result) {
     if (json.at("command") != "calibrate") {
       throw InputError("is the result of '" + json.at("command").get<std::string>() + "', not of calibrate");
     }
-    const int exit_code = json.at("verdict").at("exit_code").get<int>();
-    const bool has_camera = exit_code == 0 || exit_code == static_cast<int>(ExitCode::not_trusted);
-    if (!has_camera) throw InputError("this calibration was refused: there is no camera");
+    if (!tells_an_estimate(json.at("verdict").at("exit_code").get<int>()))
+      throw InputError("this calibration was refused: there is no camera");
     const auto& estimate = json.at("estimate");
     found.noise_px = estimate.at("noise_px").get<double>();
     if (estimate.contains("sigma")) found.design_effect = estimate["sigma"].value("design_effect", 1.0);

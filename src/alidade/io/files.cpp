@@ -9,30 +9,12 @@
 #include <cerrno>
 #include <system_error>
 
+#include "alidade/io/descriptor.h"
+
 namespace alidade {
 namespace {
 
 constexpr std::size_t max_bytes = std::size_t{1} << 30U;  // 1 GiB: far beyond any table or photo, below any memory
-
-[[noreturn]] void fail(const std::filesystem::path& file, const char* what, int error) {
-  throw InputError(file.string() + ": " + what + ": " + std::generic_category().message(error));
-}
-
-/// An open file that closes itself.
-class Descriptor {
- public:
-  explicit Descriptor(int number) : number_(number) {}
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() {
-    if (number_ >= 0) ::close(number_);
-  }
-  [[nodiscard]] int number() const { return number_; }
-  [[nodiscard]] bool is_open() const { return number_ >= 0; }
-
- private:
-  int number_;
-};
 
 /// Removes the temporary file again unless it was renamed.
 struct Temporary {
@@ -56,15 +38,6 @@ std::filesystem::path temporary_name(const std::filesystem::path& file) {
   return file.parent_path() / name;
 }
 
-void write_all(const std::filesystem::path& file, const Descriptor& out, std::string_view content) {
-  while (!content.empty()) {
-    const ssize_t written = ::write(out.number(), content.data(), content.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) fail(file, "cannot be written", errno);
-    content.remove_prefix(static_cast<std::size_t>(written));
-  }
-}
-
 /// Content under a name that is not yet `file`. A file without a name comes first, so that a killed run leaves nothing
 /// at all; where the file system knows no such files, a file that stands under the temporary name from the start.
 void write_temporary(const std::filesystem::path& file, const std::filesystem::path& name, std::string_view content) {
@@ -76,17 +49,30 @@ void write_temporary(const std::filesystem::path& file, const std::filesystem::p
     if (::linkat(AT_FDCWD, link.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0) return;
   }
   const Descriptor named(::open(name.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666));
-  if (!named.is_open()) fail(file, "cannot be written", errno);
+  if (!named.is_open()) fail_on(file, "cannot be written", errno);
   write_all(file, named, content);
 }
 
 }  // namespace
 
+[[noreturn]] void fail_on(const std::filesystem::path& file, const char* what, int error) {
+  throw InputError(file.string() + ": " + what + ": " + std::generic_category().message(error));
+}
+
+void write_all(const std::filesystem::path& file, const Descriptor& out, std::string_view content) {
+  while (!content.empty()) {
+    const ssize_t written = ::write(out.number(), content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) fail_on(file, "cannot be written", errno);
+    content.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
 std::string read_file(const std::filesystem::path& file) {
   const Descriptor in(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
-  if (!in.is_open()) fail(file, "cannot be read", errno);
+  if (!in.is_open()) fail_on(file, "cannot be read", errno);
   struct stat status {};
-  if (::fstat(in.number(), &status) != 0) fail(file, "cannot be read", errno);
+  if (::fstat(in.number(), &status) != 0) fail_on(file, "cannot be read", errno);
   if (S_ISDIR(status.st_mode)) throw InputError(file.string() + ": is a folder, not a file");
   std::string content;
   content.reserve(std::min(static_cast<std::size_t>(std::max<off_t>(status.st_size, 0)), max_bytes));
@@ -94,7 +80,7 @@ std::string read_file(const std::filesystem::path& file) {
   while (true) {  // to the end, not to the size: pipes have none
     const ssize_t got = ::read(in.number(), chunk.data(), chunk.size());
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0) fail(file, "cannot be read", errno);
+    if (got < 0) fail_on(file, "cannot be read", errno);
     if (got == 0) return content;
     content.append(chunk.data(), static_cast<std::size_t>(got));
     if (content.size() > max_bytes) throw InputError(file.string() + ": is larger than 1 GiB");
@@ -108,10 +94,10 @@ void write_file(const std::filesystem::path& file, std::string_view content) {
   }
   error.clear();
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
-  if (error) fail(file, "cannot be written", error.value());
+  if (error) fail_on(file, "cannot be written", error.value());
   Temporary temporary(temporary_name(file));
   write_temporary(file, temporary.path, content);
-  if (::rename(temporary.path.c_str(), file.c_str()) != 0) fail(file, "cannot be written", errno);
+  if (::rename(temporary.path.c_str(), file.c_str()) != 0) fail_on(file, "cannot be written", errno);
   temporary.kept = true;
 }
 

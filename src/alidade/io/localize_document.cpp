@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "alidade/io/thin_tables.h"
 #include "alidade/report/thin.h"
 
 namespace alidade {
@@ -66,6 +67,7 @@ DataTable path_table(const LocalizeReport& report, std::span<const TimedPose> tr
   add("nis", std::move(nis), 4);
   add("seconds", std::move(seconds), 7);
   table.columns.emplace_back("event", events);
+  record_steps_kept(table, report.path.size(), "poses.csv");
   return table;
 }
 

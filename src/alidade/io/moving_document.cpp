@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "alidade/io/rig_document.h"
+#include "alidade/io/thin_tables.h"
 #include "alidade/report/thin.h"
 
 namespace alidade {
@@ -37,11 +38,13 @@ DataTable path_table(const MovingTargetReport& report) {
     columns[0].push_back(report.path_t_s[row]);
     for (std::size_t k = 0; k < 3; ++k) columns[k + 1].push_back(report.path[row][static_cast<Eigen::Index>(k)]);
   }
-  return {"path",
-          {{"t_s", rounded(columns[0], 6)},
-           {"target_in_base_x_m", rounded(columns[1], 6)},
-           {"target_in_base_y_m", rounded(columns[2], 6)},
-           {"target_in_base_z_m", rounded(columns[3], 6)}}};
+  DataTable table{"path",
+                  {{"t_s", rounded(columns[0], 6)},
+                   {"target_in_base_x_m", rounded(columns[1], 6)},
+                   {"target_in_base_y_m", rounded(columns[2], 6)},
+                   {"target_in_base_z_m", rounded(columns[3], 6)}}};
+  record_steps_kept(table, report.path.size(), "path.csv");
+  return table;
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "alidade/io/camera_json.h"
+#include "alidade/io/thin_tables.h"
 #include "alidade/report/thin.h"
 
 namespace alidade {
@@ -83,7 +84,9 @@ DataTable steps_table(const RotationLog& log, const ObserveReport& report) {
     const RotationFrame frame = reader.next(log.rows[k]);
     if (is_kept[k]) columns.add(log.rows[k].t_s, report.steps[k], frame, log.truth.empty() ? nullptr : &log.truth[k]);
   }
-  return columns.table();
+  DataTable table = columns.table();
+  record_steps_kept(table, log.rows.size(), "intrinsics.csv");
+  return table;
 }
 
 /// Every so many of so many: a step that meets every point in turn.
@@ -198,7 +201,9 @@ void fill_observation(const RotationLog& log, const ObserveReport& report, const
     }
   }
   if (report.steps.size() == log.rows.size() && !log.rows.empty()) document.data.push_back(steps_table(log, report));
-  if (report.reference.has_value) document.data.push_back(points_table(log, report));
+  if (!report.reference.has_value) return;
+  document.data.push_back(points_table(log, report));
+  record_steps_kept(document.data.back(), report.reference.solution.residuals.size(), "");
 }
 
 }  // namespace alidade

@@ -106,6 +106,12 @@ JsonValue table_value(const DataTable& table) {
     }
     value[name] = column;
   }
+  if (table.thinned) {
+    JsonValue& thinned = value["thinned"];
+    thinned["from"] = table.thinned->from;
+    thinned["to"] = table.thinned->to;
+    thinned["how"] = table.thinned->how;
+  }
   return value;
 }
 

@@ -34,10 +34,17 @@ struct Counts {
   std::vector<SkippedInput> skipped;
 };
 
+/// What was left of a long table, and how: its whole stands in a CSV file beside the document.
+struct Thinned {
+  std::size_t from = 0, to = 0;  ///< Rows before and after.
+  std::string how;
+};
+
 /// Columns of equal length, in order.
 struct DataTable {
   std::string name;
-  std::vector<std::pair<std::string, JsonValue>> columns;  ///< Name (with its unit) and a list.
+  std::vector<std::pair<std::string, JsonValue>> columns = {};  ///< Name (with its unit) and a list.
+  std::optional<Thinned> thinned = {};
 };
 
 /// Values on a regular grid of pixels, row by row from (u0, v0).
@@ -73,6 +80,11 @@ struct ResultDocument {
 
 /// The word for a state in documents: good, care, bad, refused, not_converged.
 [[nodiscard]] std::string state_name(State state);
+
+/// Whether a document with this exit code tells an estimate, be it one that stands or one not to be trusted.
+[[nodiscard]] constexpr bool tells_an_estimate(int exit_code) {
+  return exit_code == static_cast<int>(ExitCode::ok) || exit_code == static_cast<int>(ExitCode::not_trusted);
+}
 
 /// Text of result.json (schema alidade-result/1), ending in a newline. Throws std::logic_error where columns of a
 /// table, values of a grid or the covariance do not have the length they must have.

@@ -6,6 +6,7 @@
 
 #include "alidade/geometry/degree.h"
 #include "alidade/io/table_rows.h"
+#include "alidade/io/thin_tables.h"
 #include "alidade/report/thin.h"
 
 namespace alidade {
@@ -28,6 +29,7 @@ void fill_table(std::span<const ServoSample> log, const ServoIdentification& ide
                             {"measured_rad", rounded(std::move(measured), 7)},
                             {"model_rad", rounded(std::move(model), 7)},
                             {"residual_rad", rounded(std::move(residual), 7)}}});
+  record_steps_kept(document.data.back(), log.size(), "");
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "alidade/io/thin_tables.h"
 #include "alidade/report/thin.h"
 
 namespace alidade {
@@ -157,7 +158,9 @@ void add_track_tables(std::span<const TargetSight> sights, std::span<const RigHe
                       const TrueTrack& truth, ResultDocument& document) {
   const std::vector<std::size_t> rows = kept_rows(report);
   document.data.push_back(steps_table(report, truth, rows));
+  record_steps_kept(document.data.back(), report.steps.size(), "track.csv");
   document.data.push_back(measurements_table(sights, heads, report, rows));
+  record_steps_kept(document.data.back(), report.steps.size(), "");
 }
 
 DataTable track_row(const TargetSight& sight, std::span<const RigHead> heads, const TrackStep& step,
@@ -209,6 +212,7 @@ void fill_target_frames(std::span<const TargetFrame> frames, std::span<const Rig
   table.columns.emplace_back("sigma_px", rounded(std::move(sigma), 4));
   table.columns.emplace_back("score", rounded(std::move(score), 4));
   table.columns.emplace_back("reason", reason);
+  record_steps_kept(table, frames.size(), "");
   document.data.push_back(std::move(table));
 }
 

@@ -80,6 +80,33 @@ TEST(PlainPage, SaysSentenceEstimateAndData) {
     EXPECT_THAT(page, HasSubstr(part));
 }
 
+TEST(PlainPage, SaysWhatWasTakenAsGivenAndTheIdealSigma) {
+  Json document = sample();
+  document["stddev_model"] = {{"camera", {{"fx", 0.21}}}, {"origin_m", {0.0004, 0.0005, 0.0006}}};
+  document["assumed"] = {{{"name", "square_m"},
+                          {"value", 0.025},
+                          {"sigma", nullptr},
+                          {"ordinary", 5e-5},
+                          {"moves", 12.5},
+                          {"moved", "origin_m z"},
+                          {"moved_by", 0.0125}},
+                         {{"name", "camera.fx"},
+                          {"value", 800},
+                          {"sigma", 0.7},
+                          {"ordinary", nullptr},
+                          {"moves", 0.25},
+                          {"moved", "theta_x_rad"},
+                          {"moved_by", 1e-4}},
+                         {{"name", evil}, {"value", nullptr}, {"sigma", 0}, {"moves", 0}, {"moved", nullptr}}};
+  const std::string page = report::plain_page(document.dump());
+  for (const char* part : {"± 1.3", "± 0.63", "± 0.0012", "± 0.0018", "Taken as given", "square_m", "not told",
+                           "0.00005 more or less moves origin_m z by 12.5 of its σ", "camera.fx", "0.7",
+                           "its σ moves theta_x_rad by 0.25 of its σ", "exact"})
+    EXPECT_THAT(page, HasSubstr(part));
+  EXPECT_THAT(page, Not(HasSubstr("<img src=x")));
+  EXPECT_THAT(report::plain_page(sample().dump()), Not(HasSubstr("Taken as given")));
+}
+
 TEST(PlainPage, HostileTextsStayTexts) {
   Json document = sample();
   document["verdict"]["sentence"] = evil;
@@ -91,7 +118,7 @@ TEST(PlainPage, HostileTextsStayTexts) {
 }
 
 TEST(PlainPage, SurvivesEveryPartMissing) {
-  for (const char* part : {"verdict", "estimate", "stddev", "data", "command"}) {
+  for (const char* part : {"verdict", "estimate", "stddev", "stddev_model", "assumed", "data", "command"}) {
     for (const Json& instead : {Json(), Json(3), Json::array({1, nullptr}), Json("text")}) {
       Json document = sample();
       document[part] = instead;

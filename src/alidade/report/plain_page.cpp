@@ -35,24 +35,54 @@ std::string cell(const Json& value) {
   return "<td>" + (value.is_number() ? number_text(number_of(value), 6) : escaped(text_of(value))) + "</td>";
 }
 
-/// A row a leaf of the estimate; `sigmas` walks along: σ has the same path.
-void append_leaves(std::string& rows, const std::string& path, const Json& value, const Json& sigmas,
+std::string plus_minus(const ValueText& words) { return words.plus_minus.empty() ? "" : "± " + words.plus_minus; }
+
+/// The element, or member, of a σ that belongs to one of a value.
+const Json& beside(const Json& sigmas, const Json& value, const std::string& name, std::size_t index) {
+  const bool has_element = sigmas.is_array() && index < sigmas.size();
+  return has_element ? sigmas[index] : member(sigmas, value.is_object() ? name : "");
+}
+
+/// A row a leaf of the estimate; `sigmas` and `ideal` (σ if every single measurement erred by itself) walk along: σ has
+/// the same path.
+void append_leaves(std::string& rows, const std::string& path, const Json& value, const Json& sigmas, const Json& ideal,
                    std::size_t& leaves) {
   if (value.is_structured()) {
     std::size_t index = 0;
     for (const auto& [name, child] : value.items()) {
-      const bool has_element = sigmas.is_array() && index < sigmas.size();
-      const Json& sigma = has_element ? sigmas[index] : member(sigmas, value.is_object() ? name : "");
-      ++index;
       append_leaves(rows, path.empty() ? name : path + (value.is_object() ? "." + name : "[" + name + "]"), child,
-                    sigma, leaves);
+                    beside(sigmas, value, name, index), beside(ideal, value, name, index), leaves);
+      ++index;
     }
     return;
   }
   if (++leaves > most_leaves) return;
   const ValueText words = value_text(number_of(value), number_of(sigmas));
   rows += "<tr><th>" + escaped(path) + "</th><td>" + (value.is_number() ? words.value : escaped(text_of(value))) +
-          "</td><td>" + (words.plus_minus.empty() ? "" : "± " + words.plus_minus) + "</td></tr>";
+          "</td><td>" + plus_minus(words) + "</td><td>" + plus_minus(value_text(number_of(value), number_of(ideal))) +
+          "</td></tr>";
+}
+
+/// What was taken as given, and what it would do to the answer.
+std::string assumed_markup(const Json& assumed) {
+  if (!assumed.is_array() || assumed.empty()) return "";
+  std::string rows;
+  for (const Json& each : assumed) {
+    const Json &value = member(each, "value"), &sigma = member(each, "sigma");
+    const std::string known = sigma.is_null()           ? "not told"
+                              : number_of(sigma) == 0.0 ? "exact"
+                                                        : number_text(number_of(sigma));
+    const std::string moved = text_of(member(each, "moved"));
+    const std::string error =
+        sigma.is_null() ? number_text(number_of(member(each, "ordinary"))) + " more or less" : "its σ";
+    rows += "<tr><th>" + escaped(text_of(member(each, "name"))) + "</th>" + cell(value) + "<td>" + known + "</td><td>" +
+            (moved.empty() ? ""
+                           : escaped(error + " moves " + moved + " by ") +
+                                 number_text(number_of(member(each, "moves"))) + " of its σ") +
+            "</td></tr>";
+  }
+  return "<h2>Taken as given</h2><table><tr><th>what</th><th>value</th><th>σ</th><th>effect</th></tr>" + rows +
+         "</table>";
 }
 
 std::string table_markup(const std::string& name, const Json& columns) {
@@ -102,8 +132,11 @@ std::string plain_page(std::string_view result_json) {
   page += checks_markup(member(verdict, "checks"));
   std::string rows;
   std::size_t leaves = 0;
-  append_leaves(rows, "", member(document, "estimate"), member(document, "stddev"), leaves);
-  page += "<h2>Estimate, value ± 3σ</h2><table>" + rows + "</table><h2>Data</h2>";
+  const Json &ideal = member(document, "stddev_model"), &assumed = member(document, "assumed");
+  append_leaves(rows, "", member(document, "estimate"), member(document, "stddev"), ideal, leaves);
+  if (ideal.is_object() && !ideal.empty())
+    rows = "<tr><th></th><th>value</th><th>3σ</th><th>3σ if every measurement erred by itself</th></tr>" + rows;
+  page += "<h2>Estimate, value ± 3σ</h2><table>" + rows + "</table>" + assumed_markup(assumed) + "<h2>Data</h2>";
   if (const Json& data = member(document, "data"); data.is_object())
     for (const auto& [name, columns] : data.items())
       if (columns.is_object()) page += table_markup(name, columns);

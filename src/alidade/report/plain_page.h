@@ -6,7 +6,8 @@
 namespace alidade::report {
 
 /// What is left of the report where the library was built without the page of web/: the sentence, what to add, checks,
-/// the estimate with ± 3σ and the first rows of each table; no figures, no script.
+/// the estimate with ± 3σ (and what 3σ would be if every measurement erred by itself), what was taken as given, and the
+/// first rows of each table; no figures, no script.
 [[nodiscard]] std::string plain_page(std::string_view result_json);
 
 }  // namespace alidade::report

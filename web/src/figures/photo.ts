@@ -27,9 +27,9 @@ function drawCorner(pen: Pen, panel: Panel, c: Corners, i: number, factor: numbe
   pen.hit({x, y, r: 6, tip: () => [`${name} at ${num(c.u[i]!, 5)}, ${num(c.v[i]!, 5)} px`, `residual ${rounded(c.du[i]!, 3)}, ${rounded(c.dv[i]!, 3)} px`, `σ ${num(su, 2)}, ${num(sv, 2)} px`]});
 }
 
-function captionOf(photo: Photo | undefined): (string | HTMLElement)[] {
+function captionOf(photo: Photo | undefined, isThinned: boolean): (string | HTMLElement)[] {
   if (!photo) return ['no photo chosen'];
-  return [el('b', {}, photo.name), photo.isUsed && photo.rms_px >= 0 ? ` · RMS ${rounded(photo.rms_px, 3)} px · ${photo.corners.length} corners` : ` · not used: ${photo.reason || '–'}`];
+  return [el('b', {}, photo.name), photo.isUsed && photo.rms_px >= 0 ? ` · RMS ${rounded(photo.rms_px, 3)} px · ${photo.corners.length} corners${isThinned ? ' shown of more' : ''}` : ` · not used: ${photo.reason || '–'}`];
 }
 
 export const photo: Figure = {
@@ -56,7 +56,7 @@ export const photo: Figure = {
       pen.scaleBar(panel.x + 20, panel.y + panel.h - 22, bar_px * factor * panel.perPixel, `${num(bar_px, 2)} px`, true);
     });
     const update = () => {
-      caption.replaceChildren(...captionOf(scene.photos[selection.item]));
+      caption.replaceChildren(...captionOf(scene.photos[selection.item], !!corners?.table.thinned));
       chart.label = `Residual arrows in the photo. ${caption.textContent}`;
       chart.redraw();
     };

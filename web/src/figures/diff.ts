@@ -15,14 +15,14 @@ export const difference: Figure = {
     if (!grid || !du || !dv) return null;
     const size = sizeOfGrid(grid), values = lengths(du, dv), row = el('div', {class: 'row'});
     const marks = values.filter(Number.isFinite).length;
-    drawField(host, {title: 'difference', grid, size, values, du, dv}, 0.05);
+    drawField(host, {title: 'difference', grid, size, values, du, dv}, 0.05, 380);
     const sigmas = [['sigma_a_px', '3σ of A'], ['sigma_b_px', '3σ of B']].map(([name, title]) => [grid.values(name!), title!] as const);
     for (const [sigma, title] of sigmas) {
       if (!sigma) continue;
       const part = el('div');
       row.append(part);
       host.append(row);
-      drawField(part, {title, grid, size, values: scaled(sigma, 3)}, 0.05);
+      drawField(part, {title, grid, size, values: scaled(sigma, 3)}, 0.05, 240);
     }
     colourKey(host, 'px');
     const [a, b] = [sigmas[0]![0], sigmas[1]![0]];

@@ -31,7 +31,7 @@ function drawOne(host: HTMLElement, scene: ObserveScene, name: string, c: Column
   if (hasTruth) lines.push({name: 'truth', values: c.truth, colour: 'ink', dash: [5, 4], width: 1.3});
   const common = {t: scene.t, events: scene.events, spans: scene.zooms, selection};
   const says = last >= 0 && last < c.value.length ? withSigma(c.value[last]!, c.sigma[last]!, 'px') : '–';
-  new SeriesPlot(host, {...common, lines, bands: [bandOf(c.value, c.sigma, 'blue')], label: `${name}, px`, aside: `at the end ${says}`, xLabel: '', height: 130,
+  new SeriesPlot(host, {...common, lines, bands: [bandOf(c.value, c.sigma, 'blue')], label: `${name}, px`, aside: `at the end ${says}`, xLabel: '', height: 98,
     range: rangeOf(c), aria: `${name} over time, at the end ${says}`, isFilling: true,
     tip: (i) => [`${name} ${withSigma(c.value[i]!, c.sigma[i]!, 'px')} (3σ)`, ...(hasTruth ? [`truth ${num(c.truth[i]!, 6)} px`] : [])]});
   const below: Line[] = [{name: '3σ', values: scaled(c.sigma, 3), colour: 'blue'}];
@@ -39,7 +39,7 @@ function drawOne(host: HTMLElement, scene: ObserveScene, name: string, c: Column
   if (hasTruth) below.unshift({name: '|estimate − truth|', values: error, colour: 'soft', width: 1});
   if (c.bound.some(Number.isFinite)) below.push({name: '3σ at best', values: scaled(c.bound, 3), colour: 'orange', dash: [4, 3]});
   const floor = extent(scaled(c.sigma, 3)), top = floor ? floor[1] : 1;
-  new SeriesPlot(host, {...common, lines: below, label: '', isLog: true, xLabel: scene.timeLabel, height: 104, aria: `3σ of ${name} over time`,
+  new SeriesPlot(host, {...common, lines: below, label: '', isLog: true, xLabel: scene.timeLabel, height: 84, aria: `3σ of ${name} over time`,
     range: floor ? [0.02 * floor[0], Math.min(top, 300 * floor[0]) * 1.5] : undefined, digits: 3});
 }
 

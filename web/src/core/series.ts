@@ -72,7 +72,7 @@ export function bandAboutZero(sigma: Values, colour: ColourName): Band {
 }
 
 export const seriesPlots = new Set<SeriesPlot>();
-const mostMarks = 16; // events in sight, each a line through the plot
+export const mostMarks = 16; // events in sight, each a line through the plot
 const font = '11px system-ui, "DejaVu Sans", sans-serif';
 
 export class SeriesPlot {

@@ -12,6 +12,7 @@ import {estimate} from './estimate';
 import {halves} from './halves';
 import {identifyResponse, identifySpread} from './identify';
 import {lens} from './lens';
+import {lensGrid} from './lens_grid';
 import {localizeFrame} from './localize_frame';
 import {localizeError, localizeNis, localizeSpace, localizeSpeed, localizeTracks} from './localize';
 import {nextPhoto} from './next_photo';
@@ -23,6 +24,7 @@ import {observePoints, observeTracks} from './observe_points';
 import {photo} from './photo';
 import {planCalibrate, planEstimate, planObserve, planRangefinder, planSketches} from './plan';
 import {poses} from './poses';
+import {projectHeads, projectPicture} from './project';
 import {rangefinderBeam} from './rangefinder_beam';
 import {rangefinderPhoto, rangefinderShots} from './rangefinder_photo';
 import {rangefinderCounts, rangefinderNext, rangefinderPrecision} from './rangefinder_precision';
@@ -55,7 +57,7 @@ const byCommand: Record<string, Page> = {
   calibrate: {first: [values, wide(trust)], rest: [clusters, worstPhotos, poses, photo, half(residuals), half(lens), half(halves), half(undistorted), half(board), half(nextPhoto), allPhotos, ...grounds]},
   observe: {first: [values, wide(observeIntrinsics)], rest: [clusters, observeMotion, observeNis, observeTracks, observeDirections, observePoints, ...grounds]},
   rangefinder: {first: [{...values, note: 'camera frame, value ± 3σ'}, wide(rangefinderBeam)], rest: [clusters, rangefinderResiduals, rangefinderPhoto, rangefinderPrecision, rangefinderNext, rangefinderCounts, rangefinderShots, ...grounds]},
-  rig: {first: [{...rigEstimate, span: 10}, {...rigSpace, span: 14}], rest: [clusters, rigCoverage, rigResiduals, rigView, {...rigUnknown, span: 14}, assumed, checks]},
+  rig: {first: [{...rigEstimate, span: 10, narrow: 24}, {...rigSpace, span: 14, narrow: 24}], rest: [clusters, rigCoverage, rigResiduals, rigView, {...rigUnknown, span: 14}, assumed, checks]},
   track: {first: [values, wide(trackSpace)], rest: [trackPosition, trackError, trackInnovations, {...trackAbove, span: 12}, {...trackAge, span: 12}, ...grounds]},
   servo: {first: [{...servoCompare, span: 10}, servoError], rest: [servoAngles, servoPicture, half(servoRobust), half(servoLoops), trackSpace, trackPosition, assumed, checks]},
   localize: {first: [values, wide(localizeSpace)], rest: [half(localizeError), localizeFrame, half(localizeTracks), half(localizeNis), half(localizeSpeed), ...grounds]},
@@ -63,7 +65,8 @@ const byCommand: Record<string, Page> = {
   'plan calibrate': {first: [planEstimate, planCalibrate], rest: [planSketches, assumed, checks]},
   'plan observe': {first: [planEstimate, planObserve], rest: [assumed, checks]},
   'plan rangefinder': {first: [planEstimate, planRangefinder], rest: [planSketches, assumed, checks]},
-  'camera diff': {first: [{...parameters, span: 10}, {...difference, span: 14}], rest: [half(diagonal), half(estimate), assumed, checks]},
+  project: {first: [{...values, isOptional: true}, projectPicture], rest: [projectHeads, assumed, checks]},
+  'camera diff': {first: [{...parameters, span: 10, narrow: 24}, {...difference, span: 14, narrow: 24}], rest: [half(diagonal), half(estimate), assumed, checks]},
 };
 const movingTarget: Page = {first: [movingEstimate, movingSpace], rest: [clusters, movingAbove, movingClocks, {...rigUnknown, span: 12}, assumed, checks]};
 
@@ -73,11 +76,11 @@ function pageOf(doc: Doc): Page {
     // First the figure that tells most: one with ours beside the paper's.
     const best = tables.find((table) => table.names.some((name) => name.startsWith('ours_'))) ?? tables[0];
     const main = best ? reproduceFigure(best) : null, others = tables.filter((table) => table !== best).map(reproduceFigure);
-    return {first: [reproduceShort, {...(main ?? reproduceMethods), span: 14}], rest: [reproduceTable, ...others, ...(main ? [reproduceMethods] : []), half(estimate)]};
+    return {first: [{...reproduceShort, narrow: 24}, {...(main ?? reproduceMethods), span: 14, narrow: 24}], rest: [reproduceTable, ...others, ...(main ? [reproduceMethods] : []), half(estimate)]};
   }
   if (doc.command === 'rig' && (doc.table('cameras') || (doc.estimates.some((one) => one.path === 'cameras[0].id')))) return movingTarget;
   const own = Object.prototype.hasOwnProperty.call(byCommand, doc.command) ? byCommand[doc.command]! : null;
-  return own ?? {first: [half(estimate), checks], rest: [assumed, correlationMatrix]};
+  return own ?? {first: [{...values, isOptional: true}, lensGrid], rest: [assumed, checks, correlationMatrix]};
 }
 
 /** In their order; the first `first` of them stand on the first screen. */

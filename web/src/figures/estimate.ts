@@ -28,6 +28,7 @@ function readingOf(quantity: Quantity, doc: Doc): Reading {
       unit = word, factor = by, name = name.slice(0, -ending.length);
       break;
     }
+  if (plain === 'px' && index !== undefined) return {name: index === '0' ? 'u' : 'v', unit: 'px', factor: 1};
   if (unit === 'm' && isSmall(quantity, plain, doc)) unit = 'mm', factor = 1000;
   if (index !== undefined) name += ' ' + (['x', 'y', 'z', 'w'][Number(index)] ?? index);
   return {name: name.replace(/_/g, ' ').trim(), unit, factor};
@@ -40,7 +41,7 @@ function isSmall(quantity: Quantity, plain: string, doc: Doc): boolean {
 
 // What the run was given and what it counted stand in the header and in the tables; bounds and errors beside the values.
 const elsewhere = /^(photos|board\.|.*(_cov|cov_)|.*_(m2|px2)\b|sigma\.|claims|corners_|events\[|bound\.|error\.|covers|heads|video|claims|controllers|camera\.(model|width|height)$|spot_sigma|b_from_a|excess_px|noise\.\w+_from|(sigma_px|noise\.\w+)_from)/;
-const elsewhereOf: Record<string, RegExp> = {identify: /^gain_deg$/, 'plan calibrate': /^camera/, 'plan observe': /^camera/, 'plan rangefinder': /^(camera|origin_m|direction\[)/, reproduce: /^(paper|reference|quick)/, localize: /^(unaligned_m|scale_known|sights)$/, track: /^(sigma_a_is_estimated)$/, rangefinder: /^(camera|refine|condition|range_ratio|normal_spread|offset_m|direction\[2\])/};
+const elsewhereOf: Record<string, RegExp> = {project: /^(M\d+|heads)\[/, identify: /^gain_deg$/, 'plan calibrate': /^camera/, 'plan observe': /^camera/, 'plan rangefinder': /^(camera|origin_m|direction\[)/, reproduce: /^(paper|reference|quick)/, localize: /^(unaligned_m|scale_known|sights)$/, track: /^(sigma_a_is_estimated)$/, rangefinder: /^(camera|refine|condition|range_ratio|normal_spread|offset_m|direction\[2\])/};
 const names: Record<string, string> = {worst_3sigma_px: 'worst 3σ now', planned_worst_3sigma_px: 'worst 3σ after these photos', sigma_now_origin_m: 'σ of the origin now', sigma_planned_origin_m: 'σ of the origin after these shots', sigma_now_direction_rad: 'σ of the direction now', sigma_planned_direction_rad: 'σ of the direction after these shots',
   rms_of_other_kind_rad: 'RMS as the other kind of plant', rms_rad: 'RMS', lag_one_correlation: 'correlation of residuals in a row', tau_s: 'time constant', latency_s: 'latency', gain_rad: 'gain, per unit', gain_rad_s: 'gain, per unit', zero_rad: 'zero', start_rad: 'angle at the start', kind: 'plant', theta_x_rad: 'angle to the x axis', theta_y_rad: 'angle to the y axis', 'left_out.rms_px': 'left-out spots, RMS', 'left_out.rms_range_m': 'left-out ranges, RMS',
   rms_range_m: 'ranges, RMS', rms_px: 'RMS', noise_px: 'noise of a corner', transfer_rms_px: 'unseen photos, RMS', transfer_flat_rms_px: 'the same, board flat', working_distance_m: 'working distance',

@@ -3,7 +3,7 @@ import {Chart, type Pen} from '../core/chart';
 import type {Doc, Table} from '../core/document';
 import {el} from '../core/dom';
 import {legend, type Figure} from '../core/figure';
-import {degrees, fixed, num} from '../core/format';
+import {degrees, fixed, num, rounded} from '../core/format';
 import {panelIn} from '../core/picture';
 import {add, column, identity, isFinite3, lensOf, move, mul, norm, poseOf, unit, type Lens, type Pose, type V3} from '../core/rigid';
 import {scale, xAxis, yAxis} from '../core/scale';
@@ -24,7 +24,7 @@ function gainBars(host: HTMLElement, title: string, unit_: string, bars: [string
       const y = 24 + 27 * i;
       pen.text(words, left - 8, y + 11, {align: 'right', size: 11.5, colour: pen.c.soft});
       pen.rect(left, y, Math.max(1.5, x(value) - left), 21, words === 'now' ? pen.c.soft : pen.c.green);
-      pen.text(`${num(value, 2)} ${unit_}`, Math.max(left + 2, x(value)) + 7, y + 11, {size: 11.5, weight: 650});
+      pen.text(`${rounded(value, 2)} ${unit_}`, Math.max(left + 2, x(value)) + 7, y + 11, {size: 11.5, weight: 650});
       pen.hit({x: (left + x(value)) / 2, y: y + 11, w: x(value) - left, h: 24, tip: () => [words, `${title} ${num(value, 3)} ${unit_}`]});
     });
   });

@@ -101,7 +101,7 @@ function drawPanel(pen: Pen, table: Table, across: string, lines: Line[], unit: 
   const isLog = ys[0] > 0 && ys[1] > 100 * ys[0], margin = 0.06 * (ys[1] - ys[0]) || Math.abs(ys[1]) * 0.1 || 1, pad = hasCases ? 0.4 : 0;
   const left = 60, right = pen.w - 12, bottom = pen.h - (isLast ? 42 : 22), sx = scale(xs[0] - pad, xs[1] + pad, left, right), sy = isLog ? scale(ys[0] / 1.5, ys[1] * 1.5, bottom, 24, true) : scale(ys[0] - margin, ys[1] + margin, bottom, 24);
   yAxis(pen, sy, left, right, {label: unit});
-  xAxis(pen, sx, 24, bottom, {label: isLast ? across.replace(/_s$/, ', s').replace(/^t, s/, 'time, s').replace(/_/g, ' ') : undefined, format: hasCases ? (v) => (Number.isInteger(v) ? String(v) : '') : undefined});
+  xAxis(pen, sx, 24, bottom, {label: isLast ? across.replace(/_s$/, ', s').replace(/^t, s/, 'time, s').replace(/^num_/, 'number of ').replace(/_/g, ' ') : undefined, format: hasCases ? (v) => (Number.isInteger(v) ? String(v) : '') : undefined});
   lines.forEach(({name, words, kind}, k) => {
     const values = table.numbers(name), colour = pen.c[colours[k % colours.length]!], shift = hasCases ? (k - (lines.length - 1) / 2) * 5 : 0;
     if (kind !== 'printed' && !hasCases) pen.path(Array.from(x).flatMap((v, i) => [sx(v), sy(values[i]!)]), colour, 1.8, dashes[kind]);

@@ -9,6 +9,7 @@
 #include "alidade/geometry/degree.h"
 #include "alidade/io/calibration_document.h"
 #include "alidade/io/calibration_result.h"
+#include "alidade/io/camera_json.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
 
@@ -51,7 +52,9 @@ ExitCode plan_calibrate(const PlanArgs& args, Run& run) {
   }
   run.document.estimate["worst_3sigma_px"] = plan.worst_3sigma_px;
   run.document.estimate["planned_worst_3sigma_px"] = plan.photos.back().worst_3sigma_px;
+  run.document.estimate["camera"] = camera_values(known.camera);
   run.document.data.push_back(next_photos_table(plan));
+  run.document.data.push_back(points_in_board_table(known.board_points));
   run.document.counts.given = run.document.counts.used = 1;
   for (std::size_t i = 0; i < plan.photos.size(); ++i) {
     run.say(fmt::format("photo {}: {}: worst 3σ {:.2f} px", i + 1, in_words(known, plan.photos[i]),

@@ -62,11 +62,16 @@ ExitCode plan_observe(const PlanObserveArgs& args, Run& run) {
   }
   run.document.data.push_back(moves_table(moves));
   run.document.counts.given = run.document.counts.used = 1;
+  JsonValue camera = JsonValue::object();
+  camera["width"] = now.width_px;
+  camera["height"] = now.height_px;
   static const char* const names[] = {"fx", "fy", "cx", "cy"};
   for (int i = 0; i < 4; ++i) {
+    camera[names[i]] = now.k_px[i];
     run.document.estimate["sigma_now_px"][names[i]] = std::sqrt(now.cov_px2(i, i));
     run.document.estimate["sigma_planned_px"][names[i]] = moves.back().sigma_px[i];
   }
+  run.document.estimate["camera"] = std::move(camera);
   verdict.sentence = fmt::format("{} moves lower 3σ of fx from {:.2g} to {:.2g} px, of fy from {:.2g} to {:.2g} px",
                                  moves.size(), 3.0 * std::sqrt(now.cov_px2(0, 0)), 3.0 * moves.back().sigma_px[0],
                                  3.0 * std::sqrt(now.cov_px2(1, 1)), 3.0 * moves.back().sigma_px[1]);

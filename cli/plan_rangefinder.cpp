@@ -6,6 +6,9 @@
 #include <numbers>
 
 #include "alidade/geometry/degree.h"
+#include "alidade/io/calibration_document.h"
+#include "alidade/io/camera_json.h"
+#include "alidade/io/number_list.h"
 #include "alidade/io/rangefinder_document.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
@@ -87,9 +90,15 @@ ExitCode plan_rangefinder(const PlanRangefinderArgs& args, Run& run) {
                     3.0 * shot.spot_sigma_px));
   }
   run.document.data.push_back(shots_table(shots));
+  run.document.data.push_back(points_in_board_table(now.points_in_board));
+  run.document.estimate["camera"] = camera_values(now.camera);
+  run.document.estimate["origin_m"] = list_of(now.beam.origin_in_cam);
+  run.document.estimate["direction"] = list_of(now.beam.direction_in_cam);
   const double sigma_now_m = std::sqrt(now.beam.cov.topLeftCorner<3, 3>().trace());
   run.document.estimate["sigma_now_origin_m"] = sigma_now_m;
+  run.document.estimate["sigma_now_direction_rad"] = std::sqrt(now.beam.cov.block<2, 2>(3, 3).trace());
   run.document.estimate["sigma_planned_origin_m"] = shots.back().sigma_origin_m;
+  run.document.estimate["sigma_planned_direction_rad"] = shots.back().sigma_direction_rad;
   verdict.sentence = fmt::format("{} more shot{} lower 3σ of the origin from {:.2g} to {:.2g} mm", shots.size(),
                                  shots.size() == 1 ? "" : "s", 3e3 * sigma_now_m, 3e3 * shots.back().sigma_origin_m);
   return run.finish(verdict);

@@ -28,8 +28,10 @@ const char* symbol(Holds holds) { return holds == Holds::reproduced ? "●" : ho
 std::string number_text(double value) { return std::isfinite(value) ? fmt::format("{:.4g}", value) : "–"; }
 
 std::string line_of(const Claim& claim) {
-  std::string text = fmt::format("{} {}: printed {}, ours {}, best {}", symbol(claim.holds), claim.quantity,
-                                 number_text(claim.printed), number_text(claim.ours), number_text(claim.best));
+  std::string text = fmt::format("{} {}:", symbol(claim.holds), claim.quantity);
+  if (std::isfinite(claim.printed)) text += fmt::format(" printed {},", number_text(claim.printed));
+  text += fmt::format(" the paper's method, re-run {}", number_text(claim.rerun));
+  if (std::isfinite(claim.ours)) text += ", ours " + number_text(claim.ours);
   if (std::isfinite(claim.bound)) text += ", bound " + number_text(claim.bound);
   return claim.unit.empty() ? text : text + " " + claim.unit;
 }

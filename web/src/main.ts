@@ -22,11 +22,11 @@ interface Drawn {
   failed: string[];
 }
 
-function drawFigure(figure: Figure, doc: Doc, selection: Selection, host: HTMLElement, drawn: Drawn): void {
+function drawFigure(figure: Figure, doc: Doc, selection: Selection, host: HTMLElement, drawn: Drawn, isFirst: boolean): void {
   try {
     const card = makeCard(figure, doc, selection, host);
-    if (card) drawn.cards.push(card);
-    else drawn.leftOut.push(figure.title);
+    if (card) drawn.cards.push(card), card.section.classList.toggle('first', isFirst);
+    else if (!figure.isOptional) drawn.leftOut.push(figure.title);
   } catch (error) {
     // One figure must not take the page with it; what failed is said below, and in the console.
     host.querySelector(`#fig-${figure.id}`)?.remove();
@@ -64,7 +64,8 @@ async function showReport(doc: Doc, host: HTMLElement): Promise<void> {
   host.append(top, main);
   // For tests: where marks lie.
   (window as unknown as Record<string, unknown>)['alidade'] = {doc, selection, cards: drawn.cards, charts, views3};
-  await drawFigures(figuresOf(doc), (figure) => drawFigure(figure, doc, selection, main, drawn));
+  const {figures, first} = figuresOf(doc);
+  await drawFigures(figures, (figure) => drawFigure(figure, doc, selection, main, drawn, first.has(figure)));
   fillRows(drawn.cards);
   top.replaceWith(header(doc, new Set(drawn.cards.map((card) => card.figure.id)))); // checks lead to figures now
   showBelow(doc, drawn, host);

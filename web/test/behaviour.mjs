@@ -10,8 +10,11 @@ const expected = {
   rig: ['estimate', 'space', 'coverage', 'residuals', 'view', 'unknown'],
   track: ['path', 'position', 'error', 'innovations', 'estimate', 'above', 'age'],
   servo: ['error', 'picture', 'angles', 'compare', 'robust', 'loops'],
+  identify: ['estimate', 'response', 'spread', 'checks'],
+  'plan calibrate': ['estimate', 'plan', 'sketches'], 'plan observe': ['estimate', 'plan'], 'plan rangefinder': ['estimate', 'plan', 'sketches'],
+  'rig, moving target': ['estimate', 'space', 'above', 'clocks'],
   localize: ['path', 'error', 'frame', 'tracks', 'nis', 'speed', 'estimate'],
-  reproduce: ['experiments', 'paper-4', 'methods'],
+  reproduce: ['estimate', 'experiments', 'paper-4', 'methods'],
 };
 
 /** Ids of figures whose canvases have one colour only, and of those that do not draw as many marks as rows. */
@@ -142,7 +145,11 @@ async function keysDoWhatTheHelpSays({open, url, calibration}) {
   assert.equal(await page.locator('.full').count(), 0);
   await page.keyboard.press('?');
   assert.ok(await page.locator('dialog.help').isVisible());
+  await page.keyboard.press('Escape');
+  assert.ok(!(await page.locator('dialog.help').isVisible()), 'Escape leaves the help open');
   await page.keyboard.press('?');
+  await page.keyboard.press('?');
+  assert.ok(!(await page.locator('dialog.help').isVisible()));
   const saved = page.waitForEvent('download');
   await page.locator('#fig-trust').hover();
   await page.keyboard.press('s');

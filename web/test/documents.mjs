@@ -68,15 +68,15 @@ export function localizeDocument() {
 export function reproduceDocument() {
   const t = range(80, (i) => i / 10);
   return base('reproduce', {verdict: {state: 'care', exit_code: 0, sentence: '2 of 3 claims come out as printed', to_add: null, checks: []},
-    data: {experiments: {id: ['table1-rms', 'fig4-fx', 'fig5-time'], quantity: ['RMS of the position', 'error of fx after 20 s', 'time a step'], unit: ['mm', 'px', 'ms'], printed: [41.2, 0.8, 2], ours: [40.7, 0.71, 3.1], best: [38.9, 0.28, 0.02], bound: [38.6, 0.26, null], ratio: [0.99, 0.89, 1.55], state: ['good', 'good', 'care'],
+    data: {experiments: {id: ['table1-rms', 'fig4-fx', 'fig5-time'], quantity: ['RMS of the position', 'error of fx after 20 s', 'time a step'], unit: ['mm', 'px', 'ms'], printed: [41.2, 0.8, null], rerun: [40.7, 0.71, 3.1], ours: [38.9, 0.28, 0.02], bound: [38.6, 0.26, null], ratio: [0.99, 0.89, null], state: ['good', 'good', 'care'],
       words: ['', '', 'another machine']},
-      methods: {experiment: ['table1', 'fig4'], title: ['Table 1', 'Figure 4'], method: ['Six boards, as printed.', 'Seeded draws.'], chosen: ['Readings of 1 mm.', '']}, fig_4: {t_s: t, ours_fx_px: t.map((x) => round(700 + 10 * Math.exp(-x))), printed_fx_px: t.map((x, i) => (i % 8 === 0 ? round(700.4 + 10 * Math.exp(-x)) : null))}}});
+      methods: {experiment: ['table1', 'fig4'], title: ['Table 1', 'Figure 4'], method: ['Six boards, as printed.', 'Seeded draws.'], chosen: ['Readings of 1 mm.', '']}, fig_4: {t_s: t, rerun_pan_deg: t.map((x) => round(Math.sin(x))), rerun_fx_px: t.map((x) => round(700 + 10 * Math.exp(-x))), printed_fx_px: t.map((x, i) => (i % 8 === 0 ? round(700.4 + 10 * Math.exp(-x)) : null))}}});
 }
 
 /** A calibration of so many photos of a 9 × 6 board; numbers are plausible, not solved. */
 export function calibrateDocument(numPhotos, name = (k) => `photo_${String(k).padStart(4, '0')}.jpg`) {
   const {next, normal} = random(7), cols = 9, rows = 6, [width, height] = [1280, 960], f = 1100;
-  const photos = {name: [], used: [], reason: [], num_corners: [], rms_px: []}, corners = {};
+  const photos = {name: [], used: [], reason: [], num_corners: [], rms_px: [], cluster_z2: []}, corners = {};
   for (const part of ['x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw']) photos[`cam_from_board_${part}`] = [];
   for (const column of ['photo', 'col', 'row', 'u_px', 'v_px', 'sigma_u_px', 'sigma_v_px', 'corr_uv', 'residual_u_px', 'residual_v_px', 'weight']) corners[column] = [];
   for (let k = 0; k < numPhotos; ++k) {
@@ -90,6 +90,7 @@ export function calibrateDocument(numPhotos, name = (k) => `photo_${String(k).pa
         Object.keys(corners).forEach((column, i) => corners[column].push(values[i]));
       }
     photos.name.push(name(k)), photos.used.push(isUsed), photos.reason.push(isUsed ? '' : 'no board found'), photos.num_corners.push(isUsed ? cols * rows : 0);
+    photos.cluster_z2.push(isUsed ? round(0.4 + ((k * 7) % 5)) : null);
     photos.rms_px.push(isUsed ? round(Math.sqrt(squares / (cols * rows))) : null);
     const q = [x, y, z, 0, Math.sin(tilt / 2), 0, Math.cos(tilt / 2)];
     ['x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw'].forEach((part, i) => photos[`cam_from_board_${part}`].push(isUsed ? round(q[i]) : null));
@@ -100,7 +101,25 @@ export function calibrateDocument(numPhotos, name = (k) => `photo_${String(k).pa
   const cells = {u_px: [], v_px: [], count: [], mean_u_px: [], mean_v_px: [], z: []};
   for (let i = 0; i < 48; ++i) [[(i % 8 + 0.5) * 160], [(Math.floor(i / 8) + 0.5) * 160], [i % 11 === 0 ? 0 : 30], [i % 11 === 0 ? null : round(0.01 * normal())], [i % 11 === 0 ? null : round(0.01 * normal())], [i % 11 === 0 ? null : 1 + next()]].forEach(([v], c) => Object.values(cells)[c].push(v));
   return base('calibrate', {counts: {given: numPhotos, used: photos.used.filter(Boolean).length, dropped: 0, skipped: []},
-    estimate: {camera: {model: 'brown', width, height, fx: f, fy: f, cx: 639.5, cy: 479.5, skew: 0, k1: -0.1, k2: 0.05, p1: 0, p2: 0, k3: 0}, rms_px: 0.17, noise_px: 0.13, board: {kind: 'chessboard', cols, rows, square_m: 0.025}},
+    estimate: {camera: {model: 'brown', width, height, fx: f, fy: f, cx: 639.5, cy: 479.5, skew: 0, k1: -0.1, k2: 0.05, p1: 0, p2: 0, k3: 0}, rms_px: 0.17, noise_px: 0.13, board: {kind: 'chessboard', cols, rows, square_m: 0.025},
+      sigma: {design_effect: 4.1, shrinkage: 0.7, inflation: {fx: 2, fy: 2.2}, degrees_of_freedom: {fx: 11, fy: 13}}},
+    assumed: [{name: 'square_m', value: 0.025, sigma: null, ordinary: 5e-5, moves: 0.3, moved: 'fx', moved_by: 0.1}, {name: 'camera.fx', value: 1100, sigma: 0, ordinary: null, moves: 0, moved: null, moved_by: 0}],
+    stddev_model: {camera: {fx: 0.15, fy: 0.14}},
     stddev: {camera: {fx: 0.3, fy: 0.3, cx: 0.4, cy: 0.4, skew: 0, k1: 0.001, k2: 0.004, p1: 1e-5, p2: 1e-5, k3: 0}}, data: {photos, corners, cells},
     grids: {sigma_infinity: gridOf(60, 40, sigma), sigma_working: gridOf(60, 40, sigma), halves: gridOf(30, 20, (far) => ({delta_u_px: far.map((r) => round(0.05 * r)), delta_v_px: far.map((r) => round(0.02 * r)), predicted_sigma_px: far.map((r) => round(0.03 + 0.05 * r))}))}});
+}
+
+/** Four cameras about a path, as `rig --moving-target` leaves them. */
+export function movingDocument() {
+  const cameras = {id: [1, 2, 3, 4]}, path = {t_s: range(200, (i) => i / 10)}, places = [[0, 0, 0], [20, 1, 3], [22, 0, 25], [-3, 1, 22]];
+  const headings = [0.7, -0.7, -2.4, 2.4];
+  ['x_m', 'y_m', 'z_m'].forEach((part, k) => (cameras[`world_from_cam_${part}`] = places.map((p) => p[k])));
+  ['qx', 'qy', 'qz', 'qw'].forEach((part, k) => (cameras[`world_from_cam_${part}`] = headings.map((a) => round([0, Math.sin(a / 2), 0, Math.cos(a / 2)][k]))));
+  for (const part of ['xx', 'xy', 'xz', 'yy', 'yz', 'zz']) cameras[`cov_${part}_m2`] = [0, 1, 2, 3].map((i) => (i > 0 && part[0] === part[1] ? 4e-4 * i : 0));
+  Object.assign(cameras, {half_view_x: [0.6, 0.5, 0.6, 0.4], half_view_y: [0.4, 0.3, 0.4, 0.3], num_used: [300, 310, 280, 290], rms_px: [0.7, 0.6, 0.8, 0.7]});
+  ['x', 'y', 'z'].forEach((axis, k) => (path[`target_in_base_${axis}_m`] = path.t_s.map((t) => round([10 + 6 * Math.cos(t), -3 + Math.sin(2 * t), 12 + 6 * Math.sin(t)][k]))));
+  const names = ['x_m', 'y_m', 'z_m', 'rx_rad', 'ry_rad', 'rz_rad'].flatMap((part) => [2, 3, 4].map((id) => `head${id}.base_${part}`)), n = names.length;
+  const upper = range(n, (i) => range(n - i, (j) => (j === 0 ? (names[i].endsWith('rad') ? 1e-6 : 4e-4) : 0))).flat();
+  return base('rig', {covariance: {names, upper}, data: {cameras, path},
+    estimate: {cameras: places.map((_, i) => ({id: i + 1, placed: true, reason: '', sights: 400, used: 290, clock_offset_s: i, clock_rate: 1, sigma_clock_s: 0.001 * i, sigma_px: 0.5, rms_px: 0.7}))}});
 }

@@ -2,9 +2,10 @@
 import {existsSync, readFileSync, rmSync} from 'node:fs';
 import {resolve} from 'node:path';
 import {pathToFileURL} from 'node:url';
-import {calibrateDocument, localizeDocument, reproduceDocument, servoDocument} from './documents.mjs';
+import {calibrateDocument, localizeDocument, movingDocument, reproduceDocument, servoDocument} from './documents.mjs';
 import {chromiumPath, folder, hasBrowser, launch, opened, pageFile} from './page.mjs';
 import {realResults} from './runs.mjs';
+import * as answers from './answers.mjs';
 import * as behaviour from './behaviour.mjs';
 import * as live from './live.mjs';
 import * as trouble from './trouble.mjs';
@@ -16,7 +17,7 @@ if (!hasBrowser()) {
   process.exit(77);
 }
 const template = readFileSync(templateFile, 'utf8'), started = Date.now();
-const documents = {servo: {document: servoDocument()}, localize: {document: localizeDocument()}, reproduce: {document: reproduceDocument()}};
+const documents = {servo: {document: servoDocument()}, localize: {document: localizeDocument()}, reproduce: {document: reproduceDocument()}, 'rig, moving target': {document: movingDocument()}};
 const hasAlidade = Boolean(alidade && existsSync(alidade));
 if (hasAlidade && !only) Object.assign(documents, realResults(alidade));
 else if (!only) console.log('web: without the executable only made-up documents are shown');
@@ -41,7 +42,7 @@ async function test(name, body) {
   }
 }
 for (const name of Object.keys(documents)) await test(`${name}: opens, draws all, in both themes and widths`, (c) => behaviour.opensAndDraws(c, name));
-for (const module of [behaviour, trouble, ...(hasAlidade ? [live] : [])]) for (const [name, body] of Object.entries(module.tests)) if (!body.needs || documents[body.needs]) await test(name, body);
+for (const module of [answers, behaviour, trouble, ...(hasAlidade ? [live] : [])]) for (const [name, body] of Object.entries(module.tests)) if (!body.needs || documents[body.needs]) await test(name, body);
 await browser.close();
 rmSync(folder, {recursive: true, force: true});
 console.log(`web: ${failures.length === 0 ? 'all tests pass' : `${failures.length} tests fail: ${failures.join('; ')}`} (${((Date.now() - started) / 1000).toFixed(0)} s, ${(template.length / 1000).toFixed(0)} kB template)`);

@@ -32,6 +32,11 @@ export function realResults(alidade) {
   const views = (dir) => ['rig', join(dir, 'views.csv'), '--camera', join(dir, 'camera_1.yaml'), '--camera', join(dir, 'camera_2.yaml'), ...board];
   both('rig', ['rig'], views);
   both('rig, refused', ['rig', '--scenario', 'pan_only'], views);
+  both('identify', ['servo', '--chirp'], (dir) => ['identify', join(dir, 'log.csv')]);
+  for (const command of ['calibrate', 'observe', 'rangefinder']) {
+    run(['plan', command, at(command, 'out'), '--out', at('plan', command)]);
+    results[`plan ${command}`] = {document: readJson(at('plan', command, 'result.json')), report: at('plan', command, 'report.html')};
+  }
   both('track', ['track', '--scenario', 'C'], (dir) => ['track', join(dir, 'events.csv'), '--rig', join(dir, 'rig.yaml'), '--truth', join(dir, 'truth.csv')]);
   return results;
 }

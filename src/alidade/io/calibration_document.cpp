@@ -301,6 +301,16 @@ DataTable next_photos_table(const NextPhotoPlan& next) {
   return table;
 }
 
+DataTable points_in_board_table(const std::vector<Eigen::Vector3d>& points_in_board) {
+  Numbers x, y, z;
+  for (const Eigen::Vector3d& point : points_in_board) {
+    x.push_back(point.x());
+    y.push_back(point.y());
+    z.push_back(point.z());
+  }
+  return {"points_in_board", {{"x_m", rounded(x, 6)}, {"y_m", rounded(y, 6)}, {"z_m", rounded(z, 6)}}};
+}
+
 void fill_calibration(const Board& board, const Calibration& calibration, ResultDocument& document) {
   const auto& [views, reasons, size, unreadable, report] = calibration.photos;
   document.counts.given = views.size();

@@ -13,4 +13,7 @@ void fill_calibration(const Board& board, const Calibration& calibration, Result
 /// Table `next`: poses and what they bring.
 [[nodiscard]] DataTable next_photos_table(const NextPhotoPlan& plan);
 
+/// Table `points_in_board`: x_m, y_m, z_m of the points of a board in its own frame, to draw it by.
+[[nodiscard]] DataTable points_in_board_table(const std::vector<Eigen::Vector3d>& points_in_board);
+
 }  // namespace alidade

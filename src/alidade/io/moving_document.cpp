@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "alidade/io/rig_document.h"
@@ -29,6 +30,66 @@ JsonValue camera_value(const PlacedCamera& camera) {
   value["sigma_px"] = camera.sigma_px;
   value["rms_px"] = camera.rms_px;
   return value;
+}
+
+/// Where each placed camera stands, with the covariance of its place in the world, and half its view (tangents), to
+/// draw it by.
+DataTable cameras_table(const MovingTargetReport& report) {
+  constexpr std::array<const char*, 18> columns{"id",
+                                                "world_from_cam_x_m",
+                                                "world_from_cam_y_m",
+                                                "world_from_cam_z_m",
+                                                "world_from_cam_qx",
+                                                "world_from_cam_qy",
+                                                "world_from_cam_qz",
+                                                "world_from_cam_qw",
+                                                "cov_xx_m2",
+                                                "cov_xy_m2",
+                                                "cov_xz_m2",
+                                                "cov_yy_m2",
+                                                "cov_yz_m2",
+                                                "cov_zz_m2",
+                                                "half_view_x",
+                                                "half_view_y",
+                                                "num_used",
+                                                "rms_px"};
+  std::array<Numbers, columns.size()> cells;
+  for (std::size_t h = 0; h < report.cameras.size(); ++h) {
+    if (!report.cameras[h].placed) continue;
+    const RigHead& head = report.rig.heads[h];
+    // The covariance is of steps on the right: along the base's own axes.
+    const Rigid3& base = head.head.world_from_base;
+    const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h);
+    const Eigen::Matrix3d R = base.rotation.toRotationMatrix();
+    const Eigen::Matrix3d cov = R * report.rig.cov.block<3, 3>(at, at) * R.transpose();
+    // It does not turn: its axes stand where the encoder is at zero.
+    const Rigid3 cam = world_from_cam(head.head, head.head.encoder.readings(Eigen::Vector2d::Zero()));
+    const Eigen::Vector3d& t = cam.translation;
+    const Eigen::Quaterniond& q = cam.rotation;
+    const Eigen::VectorXd lens = params(head.camera.lens);  // the first two of any: fx, fy
+    const std::array<double, columns.size()> row{static_cast<double>(report.cameras[h].id),
+                                                 t.x(),
+                                                 t.y(),
+                                                 t.z(),
+                                                 q.x(),
+                                                 q.y(),
+                                                 q.z(),
+                                                 q.w(),
+                                                 cov(0, 0),
+                                                 cov(0, 1),
+                                                 cov(0, 2),
+                                                 cov(1, 1),
+                                                 cov(1, 2),
+                                                 cov(2, 2),
+                                                 0.5 * head.camera.width_px / lens[0],
+                                                 0.5 * head.camera.height_px / lens[1],
+                                                 static_cast<double>(report.cameras[h].num_used),
+                                                 report.cameras[h].rms_px};
+    for (std::size_t i = 0; i < row.size(); ++i) cells[i].push_back(row[i]);
+  }
+  DataTable table{"cameras", {}};
+  for (std::size_t i = 0; i < columns.size(); ++i) table.columns.emplace_back(columns[i], cells[i]);
+  return table;
 }
 
 DataTable path_table(const MovingTargetReport& report) {
@@ -73,6 +134,7 @@ void fill_moving_target(std::span<const TargetSight> sights, const MovingTargetR
     estimate["true_path"]["clock_rate"] = report.truth_clock.rate;
   }
   document.data.push_back(path_table(report));
+  document.data.push_back(cameras_table(report));
 }
 
 std::vector<TargetSight> sights_on_one_clock(std::span<const TargetSight> sights, const MovingTargetReport& report) {

@@ -33,8 +33,8 @@ JsonValue claim_value(const Experiment& experiment, const Claim& claim) {
   value["quantity"] = claim.quantity;
   value["unit"] = claim.unit;
   value["paper"] = claim.printed;
+  value["rerun"] = short_number(claim.rerun);
   value["ours"] = short_number(claim.ours);
-  value["best"] = short_number(claim.best);
   value["bound"] = short_number(claim.bound);
   value["holds"] = holds_name(claim.holds);
   value["words"] = claim.words;
@@ -43,7 +43,7 @@ JsonValue claim_value(const Experiment& experiment, const Claim& claim) {
 
 DataTable experiments_table(const reproduce::PaperReport& report) {
   Texts ids, quantities, units, states, words;
-  Numbers printed, ours, best, bound, ratio;
+  Numbers printed, rerun, ours, bound, ratio;
   for (const Experiment& experiment : report.experiments) {
     for (const Claim& claim : experiment.claims) {
       ids.push_back(claim.id);
@@ -52,10 +52,10 @@ DataTable experiments_table(const reproduce::PaperReport& report) {
       states.push_back(state_name(state_of(claim.holds)));
       words.push_back(std::string(holds_name(claim.holds)) + ". " + claim.words);
       printed.push_back(claim.printed);
+      rerun.push_back(short_number(claim.rerun));
       ours.push_back(short_number(claim.ours));
-      best.push_back(short_number(claim.best));
       bound.push_back(short_number(claim.bound));
-      ratio.push_back(claim.printed != 0.0 ? short_number(claim.ours / claim.printed) : std::nan(""));
+      ratio.push_back(claim.printed != 0.0 ? short_number(claim.rerun / claim.printed) : std::nan(""));
     }
   }
   return {"experiments",
@@ -63,8 +63,8 @@ DataTable experiments_table(const reproduce::PaperReport& report) {
            {"quantity", quantities},
            {"unit", units},
            {"printed", printed},
+           {"rerun", rerun},
            {"ours", ours},
-           {"best", best},
            {"bound", bound},
            {"ratio", ratio},
            {"state", states},
@@ -98,11 +98,11 @@ std::string figure_csv(const FigureTable& figure) {
 }
 
 std::string claims_csv(const reproduce::PaperReport& report) {
-  std::string text = "experiment,id,quantity,unit,printed,ours,best,bound,holds,words\n";
+  std::string text = "experiment,id,quantity,unit,printed,rerun,ours,bound,holds,words\n";
   for (const Experiment& experiment : report.experiments) {
     for (const Claim& claim : experiment.claims)
       text += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", experiment.id, claim.id, csv_cell(claim.quantity),
-                          csv_cell(claim.unit), cell_of(claim.printed), cell_of(claim.ours), cell_of(claim.best),
+                          csv_cell(claim.unit), cell_of(claim.printed), cell_of(claim.rerun), cell_of(claim.ours),
                           cell_of(claim.bound), holds_name(claim.holds), csv_cell(claim.words));
   }
   return text;

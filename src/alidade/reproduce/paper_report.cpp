@@ -62,8 +62,8 @@ Holds at_most(const std::vector<double>& values, double limit) {
   return quantile_of(values, 0.5) <= 1.5 * limit ? Holds::in_shape : Holds::not_reproducible;
 }
 
-Holds near_to(double ours, double printed, double share) {
-  const double off = std::abs(ours - printed) / std::abs(printed);
+Holds near_to(double rerun, double printed, double share) {
+  const double off = std::abs(rerun - printed) / std::abs(printed);
   if (off <= share) return Holds::reproduced;
   return off <= 3.0 * share ? Holds::in_shape : Holds::not_reproducible;
 }
@@ -81,7 +81,7 @@ Verdict reproduce_verdict(const PaperReport& report) {
       verdict.checks.push_back({claim.id, state_of(claim.holds),
                                 claim.quantity + ": " + std::string(holds_name(claim.holds)) +
                                     (claim.words.empty() ? "" : "; " + claim.words),
-                                claim.ours, claim.printed, claim.unit,
+                                claim.rerun, claim.printed, claim.unit,
                                 claim.figure.empty() ? "experiments" : "paper-" + claim.figure});
   }
   return verdict;

@@ -31,15 +31,16 @@ struct Claim {
   std::string quantity;           ///< What is compared, in words.
   std::string unit = {};          ///< Of the four numbers.
   double printed = not_a_number;  ///< What the paper prints.
-  double ours = not_a_number;     ///< The paper's method, run by us.
-  double best = not_a_number;     ///< Our default method on the same data.
+  double rerun = not_a_number;    ///< The paper's method, re-run by us.
+  double ours = not_a_number;     ///< Our default method on the same data.
   double bound = not_a_number;    ///< The Cramér–Rao bound, where known.
   Holds holds = Holds::not_reproducible;
   std::string words = {};   ///< How it differs from what is printed, and why.
   std::string figure = {};  ///< Of the experiment's figures, the one that shows it.
 };
 
-/// Data of a figure: the first column goes across, the others up. Columns that begin with "printed" are the paper's.
+/// Data of a figure: the first column goes across, the others up. Columns that begin with "printed" are the
+/// paper's, with "rerun" its method's as we run it, with "ours" our own's.
 struct FigureTable {
   std::string id;  ///< "4" of fig_4.
   std::vector<std::pair<std::string, std::vector<double>>> columns;
@@ -79,8 +80,8 @@ struct ReproduceConfig {
 /// them keep one and a half times it. The same rule for every such claim, so that no one of them is judged kindly.
 [[nodiscard]] Holds at_most(const std::vector<double>& values, double limit);
 
-/// A figure that is printed: reproduced where ours is within `share` of it, in shape within three times that.
-[[nodiscard]] Holds near_to(double ours, double printed, double share);
+/// A figure that is printed: reproduced where the re-run is within `share` of it, in shape within three times that.
+[[nodiscard]] Holds near_to(double rerun, double printed, double share);
 
 /// How many claims hold. The state is good where all do as printed, care otherwise; the exit code is always 0: that a
 /// claim does not hold is an answer.

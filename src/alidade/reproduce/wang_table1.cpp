@@ -46,7 +46,8 @@ double sigma_mm(const std::vector<Shot>& shots, const RangefinderSceneConfig& sc
 }
 
 FigureTable boards_figure(const std::vector<Shot>& shots) {
-  FigureTable figure{"table_1", {{"board", {}}, {"printed_c_mm", {}}, {"ours_distance_mm", {}}, {"ours_range_mm", {}}}};
+  FigureTable figure{"table_1",
+                     {{"board", {}}, {"printed_c_mm", {}}, {"rerun_distance_mm", {}}, {"rerun_range_mm", {}}}};
   for (std::size_t i = 0; i < shots.size(); ++i) {
     figure.columns[0].second.push_back(static_cast<double>(i + 1));
     figure.columns[1].second.push_back(table_1[i][2]);
@@ -88,11 +89,11 @@ Claim tells_claim(const std::vector<Shot>& shots, const RangefinderSceneConfig& 
               10.0,
               sigma_mm(shots, scene, RangefinderMethod::plane),
               sigma_mm(shots, scene, RangefinderMethod::joint)};
-  claim.holds = claim.ours <= 10.0 ? Holds::reproduced : Holds::not_reproducible;
+  claim.holds = claim.rerun <= 10.0 ? Holds::reproduced : Holds::not_reproducible;
   const auto [least, most] = std::ranges::minmax(shots, {}, &Shot::range_m);
   claim.words = fmt::format(
       "Their readings differ by {:.1f} % only, and what moves the origin along the beam then hardly moves a reading: "
-      "even with planes known exactly and readings of 1 mm these boards cannot tell t. Best: boards and spots "
+      "even with planes known exactly and readings of 1 mm these boards cannot tell t. Ours: boards and spots "
       "together.",
       100.0 * (most.range_m - least.range_m) / least.range_m);
   return claim;

@@ -13,10 +13,22 @@ export interface Check {
   unit: string;
 }
 
+/** Something taken as given, and what it would do to the answer if it were off by its σ, or by an ordinary error. */
+export interface Assumed {
+  name: string;
+  value: number;
+  sigma: number; // NaN: none is given; 0: exact
+  ordinary: number; // where there is no σ: the error supposed
+  moves: number; // in σ of what it moves most
+  moved: string;
+  movedBy: number; // in its unit
+}
+
 export interface Quantity {
   path: string;
   value: number; // NaN: not a number
   sigma: number;
+  sigmaModel: number; // if every single measurement erred by itself; NaN where it is not told
   text: string;
 }
 
@@ -143,7 +155,9 @@ export class Doc {
   readonly state: string;
   readonly sentence: string;
   readonly toAdd: string;
+  readonly exitCode: number; // NaN: not told
   readonly checks: Check[];
+  readonly assumed: Assumed[];
   readonly counts: Record<string, number> = {};
   readonly skipped: Skipped[];
   readonly seconds: [string, number][];
@@ -168,7 +182,9 @@ export class Doc {
     this.state = textOf(member(verdict, 'state'));
     this.sentence = this.isReadable ? textOf(member(verdict, 'sentence')) : 'The result document cannot be read.';
     this.toAdd = textOf(member(verdict, 'to_add'));
+    this.exitCode = numberOf(member(verdict, 'exit_code'));
     this.checks = list(member(verdict, 'checks')).map(readCheck);
+    this.assumed = list(member(json, 'assumed')).map(readAssumed);
     const counts = member(json, 'counts');
     if (isObject(counts))
       for (const [name, value] of Object.entries(counts)) if (typeof value === 'number') this.counts[name] = value;
@@ -179,7 +195,7 @@ export class Doc {
     this.inputs = list(member(json, 'inputs')).map((one) => ({
       role: textOf(member(one, 'role')), name: textOf(member(one, 'name')),
       bytes: numberOf(member(one, 'bytes')), sha256: textOf(member(one, 'sha256'))}));
-    this.flatten('', member(json, 'estimate'), member(json, 'stddev'));
+    this.flatten('', member(json, 'estimate'), member(json, 'stddev'), member(json, 'stddev_model'));
     const covariance = member(json, 'covariance');
     this.covarianceNames = list(member(covariance, 'names')).map(textOf);
     this.covarianceUpper = list(member(covariance, 'upper')).map(numberOf);
@@ -195,16 +211,16 @@ export class Doc {
       for (const [name, grid] of Object.entries(grids)) if (isObject(grid)) this.grids.set(name, new Grid(name, grid));
   }
 
-  // `sigmas` walks along with `value`: σ has the same path.
-  private flatten(path: string, value: Json, sigmas: Json): void {
+  // `sigmas` and `models` walk along with `value`: σ has the same path.
+  private flatten(path: string, value: Json, sigmas: Json, models: Json): void {
     if (this.estimates.length >= mostLeaves) return;
     if (isObject(value)) {
       for (const [name, child] of Object.entries(value))
-        this.flatten(path === '' ? name : `${path}.${name}`, child, member(sigmas, name));
+        this.flatten(path === '' ? name : `${path}.${name}`, child, member(sigmas, name), member(models, name));
     } else if (Array.isArray(value)) {
-      value.forEach((child, i) => this.flatten(`${path}[${i}]`, child, list(sigmas)[i] ?? null));
+      value.forEach((child, i) => this.flatten(`${path}[${i}]`, child, list(sigmas)[i] ?? null, list(models)[i] ?? null));
     } else if (path !== '') {
-      const quantity = {path, value: typeof value === 'boolean' ? NaN : numberOf(value), sigma: numberOf(sigmas),
+      const quantity = {path, value: typeof value === 'boolean' ? NaN : numberOf(value), sigma: numberOf(sigmas), sigmaModel: numberOf(models),
         text: typeof value === 'number' ? '' : textOf(value)};
       this.estimates.push(quantity);
       this.byPath.set(path, quantity);
@@ -248,6 +264,11 @@ function readCheck(check: Json): Check {
     name: textOf(member(check, 'name')), state: textOf(member(check, 'state')), text: textOf(member(check, 'text')),
     figure: textOf(member(check, 'figure')), value: numberOf(member(check, 'value')),
     limit: numberOf(member(check, 'limit')), unit: textOf(member(check, 'unit'))};
+}
+
+function readAssumed(one: Json): Assumed {
+  return {name: textOf(member(one, 'name')), value: numberOf(member(one, 'value')), sigma: numberOf(member(one, 'sigma')), ordinary: numberOf(member(one, 'ordinary')),
+    moves: numberOf(member(one, 'moves')), moved: textOf(member(one, 'moved')), movedBy: numberOf(member(one, 'moved_by'))};
 }
 
 export function readDocument(text: string): Doc {

@@ -21,6 +21,8 @@ export interface Figure {
   title: string; // the question that it answers
   note?: string;
   span: number; // of 24 columns
+  narrow?: number; // on the first screen of a narrow window
+  isOptional?: boolean; // not missed where the document has nothing for it
   /** Null where the document has no table for it. */
   draw(host: HTMLElement, document: Doc, selection: Selection): View | null;
 }

@@ -70,13 +70,13 @@ export function yAxis(pen: Pen, y: Scale, left: number, right: number, words: Ax
 /** Ticks below, and what they are; those that would touch are left out. */
 export function xAxis(pen: Pen, x: Scale, top: number, bottom: number, words: AxisWords = {}): void {
   const format = words.format ?? ((v: number) => num(v, 4));
-  let last = -Infinity;
+  let last = -Infinity, lastHalf = 0;
   for (const tick of ticksOf(x, words.wanted ?? Math.max(2, Math.abs(x.to - x.from) / 70))) {
     const text = format(tick), half = pen.width(text, 11) / 2;
     if (!words.isGridHidden) pen.line(x(tick), top, x(tick), bottom, tick === 0 && !x.isLog ? pen.c.soft : pen.c.grid);
-    if (x(tick) - half < last + 6) continue;
+    if (Math.abs(x(tick) - last) < half + lastHalf + 6) continue;
     pen.text(text, x(tick), bottom + 11, {align: 'center', colour: pen.c.soft, size: 11});
-    last = x(tick) + half;
+    last = x(tick), (lastHalf = half);
   }
   if (words.label) pen.text(words.label, (x.from + x.to) / 2, bottom + 28, {align: 'center', colour: pen.c.soft, size: 11.5});
 }

@@ -72,6 +72,7 @@ export function bandAboutZero(sigma: Values, colour: ColourName): Band {
 }
 
 export const seriesPlots = new Set<SeriesPlot>();
+export const mostMarks = 16; // events in sight, each a line through the plot
 const font = '11px system-ui, "DejaVu Sans", sans-serif';
 
 export class SeriesPlot {
@@ -139,7 +140,7 @@ export class SeriesPlot {
           label: look.xLabel || undefined, labelFont: font, labelSize: 16, labelGap: 0, space: 55},
         {stroke, font, grid, ticks, size: 54,
           splits: (u, __, low, high) => ticksOf(scale(low, high, 0, 1, look.isLog), Math.max(3, (u.bbox?.height || 200) / (devicePixelRatio || 1) / 26)),
-          values: (_, v) => v.map((one) => (one === null || one === undefined ? '' : num(one, 5)))},
+          filter: (u, splits) => apart(u, splits), values: (_, v) => v.map((one) => (one === null || one === undefined ? '' : num(one, 5)))},
       ],
       series: [{}, ...look.lines.map((line) => this.seriesOf(line))],
       hooks: {drawAxes: [(u) => this.under(u)], draw: [(u) => this.over(u)]},
@@ -172,11 +173,17 @@ export class SeriesPlot {
       g.fillRect(from, top, to - from, height);
     }
     for (const band of this.look.bands ?? []) this.drawBand(u, band);
-    for (const event of this.look.events ?? []) {
-      const x = u.valToPos(event.t, 'x', true);
-      stroke(g, [x, top, x, top + height], c.orange, 1, [2, 3]);
-    }
+    if (!this.hasLane(u))
+      for (const event of this.look.events ?? []) {
+        const x = u.valToPos(event.t, 'x', true);
+        stroke(g, [x, top, x, top + height], c.orange, 1, [2, 3]);
+      }
     g.restore();
+  }
+  /** Many events stand in a lane of their own above the plot, as ticks: lines through it would hide what it shows. */
+  private hasLane(u: uPlot): boolean {
+    const {min, max} = u.scales['x']!, events = this.look.events ?? [];
+    return events.length > mostMarks && events.filter((one) => one.t >= min! && one.t <= max!).length > mostMarks;
   }
   private drawBand(u: uPlot, band: Band): void {
     const t = this.look.t, g = u.ctx;
@@ -218,9 +225,15 @@ export class SeriesPlot {
       g.fillText(level.words, left + width - 4 * ratio, y + (y - top < 16 * ratio ? 3 : -2) * ratio);
     }
     g.fillStyle = c.orange;
+    const hasLane = this.hasLane(u);
+    let last = -Infinity;
     for (const event of this.look.events ?? []) {
       const x = u.valToPos(event.t, 'x', true);
       if (x < left || x > left + width) continue;
+      if (hasLane) {
+        if (x - last >= 2 * ratio) g.fillRect(x - 0.5 * ratio, top - 7 * ratio, ratio, 5 * ratio), (last = x);
+        continue;
+      }
       g.beginPath();
       g.moveTo(x - 4 * ratio, top - 6 * ratio);
       g.lineTo(x + 4 * ratio, top - 6 * ratio);
@@ -238,6 +251,17 @@ export class SeriesPlot {
     const near = (look.events ?? []).filter((one) => one.t === look.t[index]).map((one) => one.words);
     showTip([`${num(look.t[index]!, 6)} ${look.xUnit ?? 's'}`, ...lines, ...near], event.clientX, event.clientY);
   }
+}
+
+/** Labels that would touch are left out; uPlot's own choice leaves short logarithmic axes without any. */
+function apart(u: uPlot, splits: number[]): (number | null)[] {
+  let last = NaN;
+  return splits.map((value) => {
+    const place = u.valToPos(value, 'y');
+    if (Math.abs(place - last) < 13) return null;
+    last = place;
+    return value;
+  });
 }
 
 function stroke(g: CanvasRenderingContext2D, [x1, y1, x2, y2]: [number, number, number, number], colour: string, width: number, dash: number[]): void {

@@ -13,16 +13,17 @@ export const difference: Figure = {
   draw(host, doc) {
     const grid = doc.pixelGrid('diff'), du = grid?.values('delta_u_px'), dv = grid?.values('delta_v_px');
     if (!grid || !du || !dv) return null;
-    const size = sizeOfGrid(grid), values = lengths(du, dv), row = el('div', {class: 'row'});
+    const size = sizeOfGrid(grid), values = lengths(du, dv), row = el('div', {class: 'split'});
     const marks = values.filter(Number.isFinite).length;
-    drawField(host, {title: 'difference', grid, size, values, du, dv}, 0.05);
+    const main = el('div', {class: 'wide'}), side = el('div');
+    row.append(main);
+    host.append(row);
+    drawField(main, {title: 'difference', grid, size, values, du, dv}, 0.05, 380);
     const sigmas = [['sigma_a_px', '3σ of A'], ['sigma_b_px', '3σ of B']].map(([name, title]) => [grid.values(name!), title!] as const);
     for (const [sigma, title] of sigmas) {
       if (!sigma) continue;
-      const part = el('div');
-      row.append(part);
-      host.append(row);
-      drawField(part, {title, grid, size, values: scaled(sigma, 3)}, 0.05);
+      row.append(side);
+      drawField(side, {title, grid, size, values: scaled(sigma, 3)}, 0.05, 240);
     }
     colourKey(host, 'px');
     const [a, b] = [sigmas[0]![0], sigmas[1]![0]];
@@ -71,7 +72,7 @@ export const diagonal: Figure = {
 };
 
 export const parameters: Figure = {
-  id: 'parameters', title: 'Which parameters differ?', note: 'value ± 3σ; difference in σ of the difference', span: 14,
+  id: 'parameters', title: 'Which parameters differ?', note: 'value ± 3σ; in σ where both have one', span: 14,
   draw(host, doc) {
     const table = doc.table('parameters');
     if (!table) return null;

@@ -20,12 +20,12 @@ export function sizeOfGrid(grid: Grid): {width: number; height: number} {
 }
 
 /** One map with its colours, contours and arrows. */
-export function drawField(host: HTMLElement, field: Field, lowest: number): Chart {
+export function drawField(host: HTMLElement, field: Field, lowest: number, most = 640): Chart {
   const {grid, size, values} = field, hasArrows = field.du && field.dv;
   host.append(el('p', {class: 'caption'}, field.title));
   let panel: Panel | null = null;
   const label = `${field.title}: half below ${num(quantile(values, 0.5), 2)} px, at most ${num(quantile(values, 1), 2)} px`;
-  const chart = new Chart(host, {height: 120, aspect: size.height / size.width + (hasArrows ? 0.06 : 0), most: 640, label}, (pen) => {
+  const chart = new Chart(host, {height: 120, aspect: size.height / size.width + (hasArrows ? 0.06 : 0), most, label}, (pen) => {
     panel = panelIn(size, 0, 0, pen.w, pen.h - (hasArrows ? 26 : 0));
     drawHeat(pen, panel, grid, values);
     drawContours(pen, panel, grid, values, lowest);

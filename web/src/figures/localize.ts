@@ -65,7 +65,7 @@ export const localizeSpace: Figure = {
   draw(host, doc, selection) {
     const path = pathOf(doc);
     if (!path) return null;
-    const alignment = doc.estimateText('alignment'), keys: Key[] = [{words: 'path, coloured by its σ', colour: 'var(--blue)'}, {words: 'the instant', colour: 'var(--red)'}, {words: 'map points, 3σ', colour: 'var(--green)', look: 'dot'}];
+    const alignment = doc.estimateText('alignment'), keys: Key[] = [{words: 'path, dark to yellow by its σ', colour: 'var(--soft)'}, {words: 'the instant', colour: 'var(--red)'}, {words: 'map points, 3σ', colour: 'var(--green)', look: 'dot'}];
     if (doc.table('features')?.numbers('known').some((known) => known > 0)) keys.push({words: 'known points', colour: 'var(--orange)', look: 'dot'});
     if (truthOf(doc, path)) keys.push({words: `truth${alignment ? ` (alignment for ATE: ${alignment})` : ''}`, colour: 'var(--ink)'});
     legend(host, keys);
@@ -74,7 +74,7 @@ export const localizeSpace: Figure = {
     selection.on(() => view.refresh());
     const ate = doc.estimate('ate_m'), isKnown = doc.estimateText('scale_known');
     return {marks: path.rows, rows: path.rows, tables: [path, ...(doc.table('features') ? [doc.table('features')!] : [])], words: label,
-      good: (isKnown === 'false' ? 'The scale is not known: lengths are up to one factor. ' : '') + (Number.isFinite(ate) ? `ATE ${num(1e3 * ate, 3)} mm RMS${alignment ? ` after ${alignment} alignment` : ''}; RPE ${num(1e3 * doc.estimate('rpe_m'), 3)} mm.` : 'Dark is well known, yellow badly.')};
+      good: (isKnown === 'false' ? 'The scale is not known: lengths are up to one factor. ' : '') + 'Dark is well known, yellow badly, between the best and the worst of this path. ' + (Number.isFinite(ate) ? `ATE ${num(1e3 * ate, 3)} mm RMS${alignment ? ` after ${alignment} alignment` : ''}; RPE ${num(1e3 * doc.estimate('rpe_m'), 3)} mm.` : '')};
   },
 };
 

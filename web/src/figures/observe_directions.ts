@@ -45,7 +45,7 @@ function directionsOf(doc: Doc): Directions | null {
 const rightOf = (d: V3) => Math.atan2(d[0], d[2]) * degrees, upOf = (d: V3) => -Math.asin(d[1]) * degrees;
 
 export const observeDirections: Figure = {
-  id: 'directions', title: 'Where did it look?', note: 'line: the optical axis; frames: the picture at its outermost', span: 12,
+  id: 'directions', title: 'Where did it look?', note: 'line: the optical axis; frames: the picture first, last and at its outermost', span: 12,
   draw(host, doc, selection) {
     const found = directionsOf(doc), scene = observeScene(doc);
     if (!found || !scene) return null;

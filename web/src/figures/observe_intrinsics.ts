@@ -2,7 +2,7 @@
 import {el} from '../core/dom';
 import {legend, type Figure, type Key} from '../core/figure';
 import {num, percent, withSigma} from '../core/format';
-import {bandOf, SeriesPlot, type Line} from '../core/series';
+import {bandOf, mostMarks, SeriesPlot, type Line} from '../core/series';
 import {extent, quantile, scaled} from '../core/stats';
 import {observeScene, type ObserveScene} from './observe_scene';
 
@@ -31,7 +31,7 @@ function drawOne(host: HTMLElement, scene: ObserveScene, name: string, c: Column
   if (hasTruth) lines.push({name: 'truth', values: c.truth, colour: 'ink', dash: [5, 4], width: 1.3});
   const common = {t: scene.t, events: scene.events, spans: scene.zooms, selection};
   const says = last >= 0 && last < c.value.length ? withSigma(c.value[last]!, c.sigma[last]!, 'px') : '–';
-  new SeriesPlot(host, {...common, lines, bands: [bandOf(c.value, c.sigma, 'blue')], label: `${name}, px`, aside: `at the end ${says}`, xLabel: '', height: 130,
+  new SeriesPlot(host, {...common, lines, bands: [bandOf(c.value, c.sigma, 'blue')], label: `${name}, px`, aside: `at the end ${says}`, xLabel: '', height: 98,
     range: rangeOf(c), aria: `${name} over time, at the end ${says}`, isFilling: true,
     tip: (i) => [`${name} ${withSigma(c.value[i]!, c.sigma[i]!, 'px')} (3σ)`, ...(hasTruth ? [`truth ${num(c.truth[i]!, 6)} px`] : [])]});
   const below: Line[] = [{name: '3σ', values: scaled(c.sigma, 3), colour: 'blue'}];
@@ -39,7 +39,7 @@ function drawOne(host: HTMLElement, scene: ObserveScene, name: string, c: Column
   if (hasTruth) below.unshift({name: '|estimate − truth|', values: error, colour: 'soft', width: 1});
   if (c.bound.some(Number.isFinite)) below.push({name: '3σ at best', values: scaled(c.bound, 3), colour: 'orange', dash: [4, 3]});
   const floor = extent(scaled(c.sigma, 3)), top = floor ? floor[1] : 1;
-  new SeriesPlot(host, {...common, lines: below, label: '', isLog: true, xLabel: scene.timeLabel, height: 104, aria: `3σ of ${name} over time`,
+  new SeriesPlot(host, {...common, lines: below, label: '', isLog: true, xLabel: scene.timeLabel, height: 84, aria: `3σ of ${name} over time`,
     range: floor ? [0.02 * floor[0], Math.min(top, 300 * floor[0]) * 1.5] : undefined, digits: 3});
 }
 
@@ -57,8 +57,9 @@ export const observeIntrinsics: Figure = {
     });
     const keys: Key[] = [{words: 'estimate', colour: 'var(--blue)'}, {words: '± 3σ; below: 3σ by itself', colour: 'var(--blue)', look: 'band'}];
     if (known > 0) keys.push({words: 'truth', colour: 'var(--ink)', look: 'dash'}, {words: 'below: |estimate − truth|', colour: 'var(--soft)'});
+    if (columns.some((c) => c.bound.some(Number.isFinite))) keys.push({words: 'below: 3σ at best', colour: 'var(--orange)', look: 'dash'});
     if (scene.zooms.length > 0) keys.push({words: 'zooming', colour: 'var(--orange)', look: 'band'});
-    if (scene.events.length > 0) keys.push({words: 'events', colour: 'var(--orange)', look: 'dot'});
+    if (scene.events.length > 0) keys.push({words: `events: ${scene.events.length > mostMarks ? 'ticks' : 'triangles'} above`, colour: 'var(--orange)', look: 'square'});
     legend(host, keys);
     const grid = el('div', {class: 'grid2'});
     host.append(grid);

@@ -40,7 +40,7 @@ export const observeMotion: Figure = {
       new SeriesPlot(host, {...common, lines: [{name: 'information', values: weak, colour: 'ink'}], levels, isLog: true, label: 'information on the weakest combination, 1/px²', height: 150,
         aria: `information on the weakest combination, at the end ${num(lastOf(weak), 2)}`, isFilling: true, range: [floor, 3 * Math.max(quantile(weak, 1), ...levels.map((l) => l.value))], digits: 3});
     }
-    return {marks: steps.rows, rows: steps.rows, tables: [steps], words: check?.text ?? '',
+    return {note: angles.length > 0 ? 'angles as read' : rates.length > 0 ? 'about the camera’s axes; x: tilting, y: panning' : '', marks: steps.rows, rows: steps.rows, tables: [steps], words: check?.text ?? '',
       good: 'Good: it turns about two axes, again and again, and the information rises above its limit early.' + (check ? ` Weakest: ${check.text}.` : '')};
   },
 };

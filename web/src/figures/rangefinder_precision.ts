@@ -93,7 +93,7 @@ export const rangefinderCounts: Figure = {
 };
 
 export const rangefinderNext: Figure = {
-  id: 'next', title: 'Which shot next?', note: 'what one more shot would leave, mm', span: 8,
+  id: 'next', title: 'Which shot next?', note: 'σ that one more shot would leave, mm', span: 8,
   draw(host, doc) {
     const grid = doc.grid('next_shot'), sigma = grid?.values('sigma_point_m'), distance = grid?.values('distance_m'), tilt = grid?.values('tilt_rad');
     if (!sigma || !distance || !tilt) return null;

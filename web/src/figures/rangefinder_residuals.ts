@@ -64,7 +64,7 @@ export const rangefinderResiduals: Figure = {
         if (shot.isUsed && Number.isFinite(v) && s > 0) ++known, (inside += Number(Math.abs(v) <= 3 * s));
       }
     legend(host, [{words: '± 3σ', colour: 'var(--soft)', look: 'band'}, {words: 'range', colour: 'var(--ink)', look: 'dot'}, {words: 'spot u', colour: 'var(--blue)', look: 'dot'}, {words: 'spot v', colour: 'var(--orange)', look: 'square'},
-      ...(all.some(([s]) => s.left) ? [{words: 'as the other shots predict it', colour: 'var(--soft)', look: 'ring' as const}] : []), ...(all.some(([s]) => !s.isUsed) ? [{words: 'not used', colour: 'var(--soft)', look: 'cross' as const}] : [])]);
+      ...(all.some(([s]) => s.left) ? [{words: 'as the other shots predict it', colour: 'var(--soft)', look: 'ring' as const}] : []), ...(all.some(([s]) => !s.isUsed) ? [{words: 'not used (red triangle: beyond the axis)', colour: 'var(--soft)', look: 'cross' as const}] : [])]);
     const words = `of the residuals of used shots ${percent(inside, known, 1)} are inside 3σ (99.7 % expected)`;
     const chart = new Chart(host, {height: 120 + 150 * panels.length, isFilling: true, label: words}, (pen) => {
       const foot = 34, h = (pen.h - foot) / panels.length, pitch = (pen.w - 52) / shown.length;

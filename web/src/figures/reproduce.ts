@@ -1,28 +1,59 @@
-// reproduce: each claim of the paper beside ours, and its figures with ours over them.
-import {Chart} from '../core/chart';
+// reproduce: each claim of the paper beside its method as we re-run it and our own, and the figures drawn anew.
+import {Chart, type Pen} from '../core/chart';
 import type {Table} from '../core/document';
 import {el} from '../core/dom';
 import {legend, type Figure} from '../core/figure';
 import {num} from '../core/format';
 import {scale, xAxis, yAxis} from '../core/scale';
-import {extent} from '../core/stats';
+import {extent, finite} from '../core/stats';
 import {lookOf} from '../page/states';
 
+interface Column {
+  name: string;
+  words: string;
+}
+
+/** Of the numbers only those that the run has: "as printed" where something is printed. */
+function columnsOf(table: Table): Column[] {
+  const all: Column[] = [{name: 'printed', words: 'as printed'}, {name: 'rerun', words: 'paper’s method, re-run'}, {name: 'ours', words: 'ours'}, {name: 'ratio', words: 're-run / printed'}, {name: 'bound', words: 'bound'}];
+  return all.filter(({name}) => table.tells(name));
+}
+
+const wordOf: Record<string, string> = {good: 'reproduced', care: 'in shape', bad: 'not reproducible'};
+
+function claimRow(table: Table, i: number, columns: Column[]): HTMLElement {
+  const look = lookOf(table.text('state', i)), value = (name: string) => table.number(name, i);
+  return el('tr', {}, el('th', {}, el('span', {class: `state-${look.name}`, role: 'img', 'aria-label': wordOf[look.name] ?? look.word}, look.symbol), ' ', el('b', {}, table.text('id', i))),
+    el('td', {class: 'word', style: 'text-align:left'}, table.text('quantity', i)), ...columns.map(({name}) => el('td', {class: 'value'}, Number.isFinite(value(name)) ? num(value(name), 4) : '')), el('td', {class: 'unit'}, table.text('unit', i)),
+    table.has('words') ? el('td', {class: 'word', style: 'text-align:left'}, table.text('words', i)) : null);
+}
+
 export const reproduceTable: Figure = {
-  id: 'experiments', title: 'Does it come out as printed?', note: 'printed beside ours', span: 24,
+  id: 'experiments', title: 'Does it come out as the paper says?', note: 'empty: there is no such number', span: 24,
   draw(host, doc) {
     const table = doc.table('experiments');
     if (!table) return null;
-    const n = (name: string, i: number) => el('td', {class: 'value'}, num(table.number(name, i), 4)), body = el('tbody');
-    let held = 0;
-    for (let i = 0; i < table.rows; ++i) {
+    const columns = columnsOf(table), rows = Array.from({length: table.rows}, (_, i) => i), held = rows.filter((i) => table.text('state', i) === 'good').length;
+    const heads = ['', '', ...columns.map(({words}) => words), 'unit', ...(table.has('words') ? ['what is behind it'] : [])];
+    host.append(el('div', {class: 'scroll', style: 'max-height:none'}, el('table', {class: 'estimate'}, el('thead', {}, el('tr', {}, ...heads.map((word) => el('th', {}, word)))), el('tbody', {}, ...rows.map((i) => claimRow(table, i, columns))))));
+    return {marks: table.rows, rows: table.rows, tables: [table], words: `${held} of ${table.rows} hold`,
+      good: `● reproduced ◆ in shape ▲ not reproducible; ${held} of ${table.rows} are reproduced. Ours: our default method on the same data.`};
+  },
+};
+
+/** The claims in short: how many hold, and those with numbers side by side. */
+export const reproduceShort: Figure = {
+  id: 'estimate', title: 'Does it come out?', note: 'paper’s method, re-run, and ours', span: 10,
+  draw(host, doc) {
+    const table = doc.table('experiments');
+    if (!table) return null;
+    const columns = columnsOf(table).filter(({name}) => name === 'printed' || name === 'rerun' || name === 'ours'), rows = Array.from({length: table.rows}, (_, i) => i);
+    const cell = (i: number, name: string) => el('td', {class: 'value'}, Number.isFinite(table.number(name, i)) ? num(table.number(name, i), 3) : '');
+    host.append(el('div', {class: 'scroll'}, el('table', {class: 'estimate'}, el('thead', {}, el('tr', {}, el('th'), ...columns.map(({words}) => el('th', {}, words)), el('th'))), el('tbody', {}, ...rows.map((i) => {
       const look = lookOf(table.text('state', i));
-      held += Number(look.name === 'good');
-      body.append(el('tr', {}, el('th', {}, el('span', {class: `state-${look.name}`, role: 'img', 'aria-label': look.word}, look.symbol), ' ', el('b', {}, table.text('id', i))), el('td', {class: 'word', style: 'text-align:left'}, table.text('quantity', i)), n('printed', i), n('ours', i), n('best', i), n('ratio', i), n('bound', i), el('td', {class: 'unit'}, table.text('unit', i)),
-        table.has('words') ? el('td', {class: 'word', style: 'text-align:left'}, table.text('words', i)) : null));
-    }
-    host.append(el('div', {class: 'scroll', style: 'max-height:none'}, el('table', {class: 'estimate'}, el('thead', {}, el('tr', {}, ...['', '', 'printed', 'ours', 'best', 'ratio', 'bound', 'unit', ...(table.has('words') ? ['deviation'] : [])].map((word) => el('th', {}, word)))), body)));
-    return {marks: table.rows, rows: table.rows, tables: [table], words: `${held} of ${table.rows} hold`, good: `${held} of ${table.rows} come out as printed. Best: our best method on the same data; ratio: ours over printed.`};
+      return el('tr', {}, el('th', {title: table.text('quantity', i)}, el('span', {class: `state-${look.name}`, role: 'img', 'aria-label': wordOf[look.name] ?? look.word}, look.symbol), ` ${table.text('id', i)}`), ...columns.map(({name}) => cell(i, name)), el('td', {class: 'unit'}, table.text('unit', i)));
+    })))));
+    return {marks: table.rows, rows: table.rows, tables: [table], words: `${table.rows} claims`, good: '● reproduced ◆ in shape ▲ not reproducible. In words below.'};
   },
 };
 
@@ -39,26 +70,68 @@ export const reproduceMethods: Figure = {
   },
 };
 
-/** A table fig_ID: first column across, the others up; columns whose name begins with printed_ are the paper's, as dots. */
+interface Line {
+  name: string;
+  words: string;
+  kind: 'printed' | 'rerun' | 'ours' | 'other';
+}
+const unitsOf: [string, string][] = [['_percent', '%'], ['_deg', '°'], ['_mrad', 'mrad'], ['_rad', 'rad'], ['_ms', 'ms'], ['_px', 'px'], ['_mm', 'mm'], ['_cm', 'cm'], ['_s', 's'], ['_m', 'm']];
+
+function unitOf(name: string): string {
+  return unitsOf.find(([ending]) => name.endsWith(ending))?.[1] ?? '';
+}
+function lineOf(name: string): Line {
+  const ending = unitsOf.find(([one]) => name.endsWith(one))?.[0] ?? '', plain = name.slice(0, name.length - ending.length), [first, ...rest] = plain.split('_'), what = rest.join(' ');
+  const named = (words: string) => (what ? `${what}, ${words}` : words);
+  if (first === 'printed') return {name, kind: 'printed', words: named('as printed')};
+  if (first === 'rerun') return {name, kind: 'rerun', words: named('paper’s method, re-run')};
+  if (first === 'ours') return {name, kind: 'ours', words: named('ours')};
+  return {name, kind: 'other', words: plain.replace(/_/g, ' ')};
+}
+
+const colours = ['blue', 'orange', 'green', 'purple', 'red', 'sky', 'ink', 'soft'] as const;
+const dashes: Record<Line['kind'], number[]> = {printed: [], rerun: [], ours: [7, 3], other: []};
+
+/** Columns whose rows have no order: no line joins them. */
+const isCases = (across: string) => /^(scenario|board|algorithm)$/.test(across);
+
+/** Lines of one unit over the first column; what the paper prints as rings, cases that have no order as dots. */
+function drawPanel(pen: Pen, table: Table, across: string, lines: Line[], unit: string, isLast: boolean): void {
+  const x = table.numbers(across), xs = extent(x)!, ys = extent(...lines.map(({name}) => table.numbers(name)))!, hasCases = isCases(across);
+  const isLog = ys[0] > 0 && ys[1] > 100 * ys[0], margin = 0.06 * (ys[1] - ys[0]) || Math.abs(ys[1]) * 0.1 || 1, pad = hasCases ? 0.4 : 0;
+  const left = 60, right = pen.w - 12, bottom = pen.h - (isLast ? 42 : 22), sx = scale(xs[0] - pad, xs[1] + pad, left, right), sy = isLog ? scale(ys[0] / 1.5, ys[1] * 1.5, bottom, 24, true) : scale(ys[0] - margin, ys[1] + margin, bottom, 24);
+  yAxis(pen, sy, left, right, {label: unit});
+  xAxis(pen, sx, 24, bottom, {label: isLast ? across.replace(/_s$/, ', s').replace(/^t, s/, 'time, s').replace(/^num_/, 'number of ').replace(/_/g, ' ') : undefined, format: hasCases ? (v) => (Number.isInteger(v) ? String(v) : '') : undefined});
+  lines.forEach(({name, words, kind}, k) => {
+    const values = table.numbers(name), colour = pen.c[colours[k % colours.length]!], shift = hasCases ? (k - (lines.length - 1) / 2) * 5 : 0;
+    if (kind !== 'printed' && !hasCases) pen.path(Array.from(x).flatMap((v, i) => [sx(v), sy(values[i]!)]), colour, 1.8, dashes[kind]);
+    else x.forEach((v, i) => Number.isFinite(values[i]!) && pen.circle(sx(v) + shift, sy(values[i]!), 4, kind === 'printed' ? null : colour, colour, 1.8));
+    if (table.rows < 2000) x.forEach((v, i) => Number.isFinite(values[i]!) && pen.hit({x: sx(v) + shift, y: sy(values[i]!), r: 3, tip: () => [`${across.replace(/_/g, ' ')} ${num(v, 4)}`, `${words} ${num(values[i]!, 4)} ${unit}`]}));
+  });
+}
+
+function titleOf(id: string): string {
+  const [first, second] = id.split('_');
+  if (/^\d/.test(id)) return `Figure ${first}${second ? `, ${id.slice(first!.length + 1).replace(/_/g, ' ')}` : ''}: what comes out?`;
+  return first === 'table' ? `Table ${second}: what comes out?` : `${id.replace(/_/g, ' ').replace(/^./, (one) => one.toUpperCase())}: what comes out?`;
+}
+
+/** A table fig_ID: first column across, the others up, one panel for each unit. */
 export function reproduceFigure(table: Table): Figure {
   const id = table.name.replace(/^fig_/, '');
-  return {id: `paper-${id.replace(/[^\w-]/g, '_')}`, title: `Figure ${id.replace(/_/g, ' ')}`, note: 'the paper’s figure with ours over it', span: 12,
+  return {id: `paper-${id.replace(/[^\w-]/g, '_')}`, title: titleOf(id), span: 12,
     draw(host) {
-      const names = table.names.filter((name) => table.tells(name)), across = names[0], up = names.slice(1, 9);
-      if (!across || up.length === 0) return null;
-      const colours = ['blue', 'orange', 'green', 'purple', 'red', 'sky', 'ink', 'soft'] as const, x = table.numbers(across), xs = extent(x)!, ys = extent(...up.map((name) => table.numbers(name)))!;
-      const isLog = ys[0] > 0 && ys[1] > 100 * ys[0];
-      legend(host, up.map((name, k) => ({words: name.replace(/_/g, ' '), colour: `var(--${colours[k]!})`, look: name.startsWith('printed') ? 'ring' : 'line'})));
-      new Chart(host, {height: 300, isFilling: true, label: `Figure ${id}`}, (pen) => {
-        const left = 56, right = pen.w - 12, bottom = pen.h - 42, margin = 0.06 * (ys[1] - ys[0]) || 1, sx = scale(xs[0], xs[1], left, right), sy = isLog ? scale(ys[0] / 1.5, ys[1] * 1.5, bottom, 22, true) : scale(ys[0] - margin, ys[1] + margin, bottom, 22);
-        yAxis(pen, sy, left, right), xAxis(pen, sx, 22, bottom, {label: across.replace(/_/g, ' ')});
-        up.forEach((name, k) => {
-          const values = table.numbers(name), colour = pen.c[colours[k]!];
-          if (!name.startsWith('printed')) pen.path(Array.from(x).flatMap((v, i) => [sx(v), sy(values[i]!)]), colour, 1.8);
-          else x.forEach((v, i) => Number.isFinite(values[i]!) && pen.circle(sx(v), sy(values[i]!), 4, null, colour, 1.8));
-          if (table.rows < 2000) x.forEach((v, i) => Number.isFinite(values[i]!) && pen.hit({x: sx(v), y: sy(values[i]!), r: 3, tip: () => [`${across} ${num(v, 4)}`, `${name} ${num(values[i]!, 4)}`]}));
-        });
+      const names = table.names.filter((name) => table.tells(name)), across = names[0], lines = names.slice(1).map(lineOf);
+      if (!across || lines.length === 0 || finite(table.numbers(across)).length === 0) return null;
+      const byUnit = new Map<string, Line[]>();
+      for (const line of lines) byUnit.set(unitOf(line.name), [...(byUnit.get(unitOf(line.name)) ?? []), line]);
+      const panels = [...byUnit];
+      panels.forEach(([unit, of], place) => {
+        const isLast = place === panels.length - 1;
+        legend(host, of.map(({words, kind}, k) => ({words, colour: `var(--${colours[k % colours.length]!})`, look: kind === 'printed' ? 'ring' : isCases(across) ? 'dot' : kind === 'ours' ? 'dash' : 'line'})));
+        new Chart(host, {height: panels.length > 1 ? 190 : 300, isFilling: true, label: `${titleOf(id)} ${of.map(({words}) => words).join(', ')}${unit ? `, ${unit}` : ''}`}, (pen) => drawPanel(pen, table, across, of, unit, isLast));
       });
-      return {marks: table.rows, rows: table.rows, tables: [table], words: ''};
+      const has = (kind: Line['kind']) => lines.some((line) => line.kind === kind), printed = has('printed') ? ' Rings: as printed.' : '';
+      return {marks: table.rows, rows: table.rows, tables: [table], words: '', good: `By the paper’s method as we re-run it${has('ours') ? (isCases(across) ? ', and by ours' : '; dashed: by ours') : ''}.${printed}`};
     }};
 }

@@ -80,7 +80,7 @@ export const rigSpace: Figure = {
     if (!views || (!headPose(doc, 0) && !doc.table('axes'))) return null;
     const posed = views.tells('base_from_cam_x_m');
     legend(host, [...(doc.table('axes') ? [{words: 'pan axis', colour: 'var(--green)'}, {words: 'tilt axis', colour: 'var(--orange)'}] : []),
-      ...(posed ? [{words: 'camera of each view', colour: 'var(--blue)', look: 'square' as const}, {words: 'the chosen view', colour: 'var(--red)', look: 'square' as const}] : []), {words: '3σ of the other head', colour: 'var(--red)', look: 'ring'}]);
+      ...(posed ? [...headsOf(views).slice(0, 4).map((head, k) => ({words: `views of head ${head}`, colour: `var(--${headColours[k]!})`, look: 'square' as const})), {words: 'the chosen view', colour: 'var(--red)', look: 'square' as const}] : []), {words: '3σ of the other head', colour: 'var(--red)', look: 'ring'}]);
     const label = `${headsOf(views).length} heads in space`;
     const view = new View3(host, {height: 380, isFilling: true, up: [0, -1, 0], ahead: [0, 0, 1], yaw: 0.6, pitch: 0.35, label}, () => rigWorld(doc, views, selection));
     selection.on(() => view.refresh());
@@ -112,7 +112,7 @@ export const rigCoverage: Figure = {
     });
     if (has) new Chart(host, {height: 46, label: 'colours of RMS'}, (pen) => void colourBar(pen, Math.max(20, pen.w / 2 - 220), Math.min(pen.w - 20, pen.w / 2 + 220), 2, 'RMS of a view, px'));
     selection.on(() => charts.forEach((chart) => chart.redraw()));
-    return {marks: views.rows, rows: views.rows, tables: [views], words: `${views.rows} views`, good: 'Good: both angles turned, by ±15° and more, in all combinations; the same colour everywhere.'};
+    return {marks: views.rows, rows: views.rows, tables: [views], words: `${views.rows} views`, good: `Good: both angles turned, by ±15° and more, in all combinations; the same colour everywhere.${has && views.numbers('used').some((used) => used === 0) ? ' Crosses: views left out.' : ''}`};
   },
 };
 
@@ -217,6 +217,7 @@ export const rigUnknown: Figure = {
     const matrix = correlationsOf(doc);
     if (matrix) drawCorrelations(host, {...matrix, names: matrix.names.map(shortName)});
     return {marks: shown.length, rows: shown.length, tables: [], words: `${pairs.length} pairs trade against each other`,
-      good: 'Pairs like these are known together, not each by itself: what the rig is used for (camera to camera) may still be known well. More turn about both axes and boards nearer and further part them.'};
+      good: 'Pairs like these are known together, not each by itself: what the rig is used for (camera to camera) may still be known well. ' +
+        (doc.table('cameras') ? 'A path that goes nearer and further, and up and down, parts them.' : 'More turn about both axes and boards nearer and further part them.')};
   },
 };

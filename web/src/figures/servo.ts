@@ -70,13 +70,14 @@ export const servoPicture: Figure = {
     const control = doc.table('control');
     if (!control || !control.tells('error_u_px')) return null;
     const heads = headsOf(control), spec = doc.estimate('specification_px'), charts: Chart[] = [];
+    const reach = quantile([...control.numbers('error_u_px'), ...control.numbers('error_v_px')].map(Math.abs), 0.999);
     perHead(host, heads, (part, head) => {
       const u = head.column('error_u_px'), v = head.column('error_v_px'), every = Math.max(1, Math.floor(u.length / 3000)), limit = quantile([...u, ...v].map(Math.abs), 0.999) || 1;
       const dots = head.rows.map((_, i) => i).filter((i) => i % every === 0 && Number.isFinite(u[i]! + v[i]!)).map((i) => ({x: u[i]!, y: -v[i]!, size: 1.8, colour: (pen: {c: {blue: string}}) => pen.c.blue, pick: () => selection.at(head.t[i]!), tip: () => [`${num(head.t[i]!, 5)} s`, `u ${num(u[i]!, 3)}, v ${num(v[i]!, 3)} px`]}));
       charts.push(scatter(part, dots, {xLabel: 'error u, px', yLabel: 'error v, px, upwards', height: 330, isFilling: true, isSquare: true, label: 'errors in the picture', include: [[-limit, -limit], [limit, limit]],
         below: (pen, x, y) => { if (spec > 0) pen.g.setLineDash([6, 4]), pen.circle(x(0), y(0), x(spec) - x(0), null, pen.c.red, 1.6), pen.g.setLineDash([]); pen.line(x(0) - 8, y(0), x(0) + 8, y(0), pen.c.ink, 1.5), pen.line(x(0), y(0) - 8, x(0), y(0) + 8, pen.c.ink, 1.5); }}));
     });
-    return {marks: control.rows, rows: control.rows, tables: [control], words: '', good: spec > 0 ? `Dashed: the specification, ${num(spec, 3)} px.` : 'Good: a round cloud about the middle.'};
+    return {marks: control.rows, rows: control.rows, tables: [control], words: '', good: `Good: a round cloud about the middle. ${spec > 0 ? (spec < reach ? `Dashed: the specification, ${num(spec, 3)} px.` : `The specification, ${num(spec, 3)} px, lies outside of what is shown.`) : ''}`};
   },
 };
 
@@ -164,7 +165,7 @@ export const servoRobust: Figure = {
       for (let k = 0; k < grid.rows; ++k) pen.text(`×${num(gain[k * grid.cols]!, 2)}`, left - 6, top + h * (grid.rows - 0.5 - k), {align: 'right', size: 11, colour: pen.c.soft});
       pen.text('true time constant over the modelled (across), true gain over the modelled (up)', left, pen.h - 18, {size: 11.5, colour: pen.c.soft});
     });
-    return {marks: rms.length, rows: rms.length, tables: [], words: '', good: spec > 0 ? `Red line: the specification, ${num(spec, 3)} px. It is met at ${percent(within, rms.length)} of these errors of the model.` : 'Good: dark over a wide field about ×1, ×1.'};
+    return {marks: rms.length, rows: rms.length, tables: [], words: '', good: spec > 0 ? `${within === rms.length || within === 0 ? 'The specification' : 'Red line: the specification'}, ${num(spec, 3)} px, is met at ${percent(within, rms.length)} of these errors of the model.` : 'Good: dark over a wide field about ×1, ×1.'};
   },
 };
 

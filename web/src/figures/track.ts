@@ -110,7 +110,7 @@ export const trackAbove: Figure = {
           pen.fill([x(0) - 6, y(0) + 5, x(0) + 6, y(0) + 5, x(0), y(0) - 7], pen.c.ink);
         }});
     selection.on(() => chart.redraw());
-    return {marks: rows.length, rows: rows.length, tables: [steps], words: '', good: 'Triangle: the base.'};
+    return {marks: rows.length, rows: rows.length, tables: [steps], words: '', good: `Triangle: the base; red: the chosen instant.${truth ? ' Dashed: the truth.' : ''}`};
   },
 };
 
@@ -161,7 +161,7 @@ function sorted(t: Float64Array): number[] {
 }
 
 export const trackInnovations: Figure = {
-  id: 'innovations', title: 'Does each sight fit?', note: 'innovation, px, with the gate’s 3σ', span: 12,
+  id: 'innovations', title: 'Does each sight fit?', note: 'innovation, px, ± 3σ predicted', span: 12,
   draw(host, doc, selection) {
     const sights = sightsOf(doc);
     if (!sights || !sights.tells('innovation_u_px')) return null;

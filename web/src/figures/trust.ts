@@ -1,6 +1,7 @@
 // Where can I trust a pixel? 3σ of projection over the picture, and the share of the picture under each size.
 import {Chart, type Pen} from '../core/chart';
 import type {Grid} from '../core/document';
+import {el} from '../core/dom';
 import {choice, legend, type Figure} from '../core/figure';
 import {num} from '../core/format';
 import {colourBar, drawContours, drawHeat, panelIn, valueAt, type Panel} from '../core/picture';
@@ -43,7 +44,10 @@ export const trust: Figure = {
     let shown = maps[0]!, panel: Panel | null = null;
     if (maps.length > 1) choice(host, 'where', maps.map((map) => map.words), (i) => ((shown = maps[i]!), map.redraw()));
     const words = () => `3σ of projection ${shown.words}: half of the picture below ${num(quantile(shown.three, 0.5), 2)} px, worst ${num(quantile(shown.three, 1), 2)} px`;
-    const map = new Chart(host, {height: 120, aspect: size.height / size.width, most: 620, label: words()}, (pen) => {
+    const split = el('div', {class: 'split'}), left = el('div', {class: 'wide'}), right = el('div');
+    host.append(split);
+    split.append(left, right);
+    const map = new Chart(left, {height: 120, aspect: size.height / size.width, most: 430, label: words()}, (pen) => {
       panel = panelIn(size, 0, 0, pen.w, pen.h);
       drawHeat(pen, panel, shown.grid, shown.three);
       if (corners)
@@ -59,8 +63,8 @@ export const trust: Figure = {
       const [u, v] = panel.pixel(x, y), value = valueAt(shown.grid, shown.three, u, v);
       return [`u ${num(u, 4)}, v ${num(v, 4)} px`, `3σ ${num(value, 3)} px ${shown.words}`];
     };
-    if (maps.length > 1) legend(host, maps.map((one, i) => ({words: one.words, colour: 'var(--ink)', look: i === 0 ? 'line' : 'dash'})));
-    const share = new Chart(host, {height: 150, isFilling: true, label: 'Share of the picture whose 3σ is below each size'}, (pen) => {
+    if (maps.length > 1) legend(right, maps.map((one, i) => ({words: one.words, colour: 'var(--ink)', look: i === 0 ? 'line' : 'dash'})));
+    const share = new Chart(right, {height: 170, isFilling: true, label: 'Share of the picture whose 3σ is below each size'}, (pen) => {
       const left = 46, right = pen.w - 10, bottom = pen.h - 44;
       const x = scale(pixelLow, pixelHigh, left, right, true), y = scale(0, 100, bottom, 22);
       yAxis(pen, y, left, right, {format: (v) => `${v} %`, wanted: 2, label: 'share of the picture below …'});

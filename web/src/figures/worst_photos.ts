@@ -29,6 +29,11 @@ export const worstPhotos: Figure = {
     if (order.length === 0) return null;
     const all = doc.estimate('rms_px'), worst = scene.worstFirst.length > 0 ? scene.photos[scene.worstFirst[0]!]! : null;
     const label = worst ? `${scene.worstFirst.length} photos by RMS, worst first: ${worst.name} with ${num(worst.rms_px, 3)} px` : 'No photo was used';
+    const why = reasons(scene);
+    if (!worst) {
+      if (why) host.append(why);
+      return {title: 'Why was no photo used?', note: '', marks: order.length, rows: order.length, tables: [doc.table('photos')!], words: label};
+    }
     const chart = new Chart(host, {height: 150, label}, (pen) => {
       const left = 46, right = pen.w - 8, top = 20, bottom = pen.h - 20;
       const high = 1.1 * Math.max(worst?.rms_px ?? 0, all > 0 ? all : 0, 1e-6), y = scale(0, high, bottom, top);
@@ -50,7 +55,6 @@ export const worstPhotos: Figure = {
       if (all > 0) pen.line(left, y(all), right, y(all), pen.c.ink, 1.2, [5, 4]), pen.text(`all ${rounded(all, 3)}`, right, y(all) - 8, {align: 'right', size: 11, box: pen.c.card});
     });
     selection.on(() => chart.redraw());
-    const why = reasons(scene);
     if (why) host.append(why);
     return {marks: order.length, rows: scene.photos.length, tables: [doc.table('photos')!], words: label,
       good: worst ? 'Good: all about alike. A bar that stands out is a blurred photo, a bent board or a wrong corner: look at it below.' : undefined};

@@ -14,7 +14,7 @@ export interface Card {
 
 export function makeCard(figure: Figure, doc: Doc, selection: Selection, host: HTMLElement): Card | null {
   const body = el('div', {class: 'body'});
-  const section = el('section', {class: 'card', id: `fig-${figure.id}`, style: `--span:${figure.span}`, tabindex: -1});
+  const section = el('section', {class: 'card', id: `fig-${figure.id}`, style: `--span:${figure.span};--narrow:${figure.narrow ?? (figure.span <= 10 ? 9 : figure.span < 14 ? 12 : figure.span < 20 ? 15 : 24)}`, tabindex: -1});
   section.append(body);
   host.append(section); // before it draws: a canvas needs its width
   const view = figure.draw(body, doc, selection);

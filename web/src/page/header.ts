@@ -1,18 +1,19 @@
 // The answer first: state, sentence, what to add, counts, checks that lead to their figures.
-import type {Doc} from '../core/document';
+import type {Check, Doc} from '../core/document';
 import {button, download, el} from '../core/dom';
 import {num} from '../core/format';
 import {showHelp, toggleTheme} from './keys';
+import {nextStep} from './next_step';
 import {lookOf} from './states';
 
 const whatIsCounted: Record<string, string> = {
-  calibrate: 'photos', observe: 'rows', rangefinder: 'shots', rig: 'views', track: 'sights', servo: 'runs', localize: 'frames',
+  calibrate: 'photos', observe: 'rows', rangefinder: 'shots', rig: 'views', track: 'sights', servo: 'runs', localize: 'frames', identify: 'rows', reproduce: 'claims',
 };
 
 function countsOf(doc: Doc): string[] {
   const parts: string[] = [], {used, given, dropped} = doc.counts;
-  const word = whatIsCounted[doc.command] ?? 'inputs';
-  if (used !== undefined) parts.push(`${used}${given !== undefined && given > used ? ` of ${given}` : ''} ${word} used`);
+  const word = doc.command === 'rig' && doc.table('cameras') ? 'sights' : whatIsCounted[doc.command.split(' ')[0]!] ?? 'inputs';
+  if (used !== undefined && !/^(plan|simulate|camera) /.test(doc.command)) parts.push(`${used}${given !== undefined && given > used ? ` of ${given}` : ''} ${(given ?? used) === 1 ? word.replace(/s$/, '') : word} used`);
   const corners = doc.command === 'calibrate' ? doc.table('corners') : null;
   const rejected = corners ? corners.numbers('weight').filter((w) => w === 0).length : 0;
   if (corners && doc.isAnswer) parts.push(`${corners.thinned?.from ?? corners.rows} corners (${rejected} left out)`);
@@ -23,6 +24,7 @@ function countsOf(doc: Doc): string[] {
     parts.push(`RMS ${num(doc.estimate('rms_px'), 3)} px${doc.command === 'calibrate' ? ' per corner' : ''}`);
   if (doc.estimate('rms_range_m') > 0) parts.push(`ranges ${num(1e3 * doc.estimate('rms_range_m'), 3)} mm`);
   const total = doc.seconds.find(([name]) => name === 'total');
+  if (doc.exitCode > 0) parts.push(`exit code ${doc.exitCode}`);
   if (total && Number.isFinite(total[1])) parts.push(`${num(total[1], 2)} s`);
   return parts;
 }
@@ -37,31 +39,45 @@ function targetOf(name: string, figure: string, ids: Set<string>, command: strin
   const candidates = [figure, figureOfCheck[figure] ?? ''];
   if (command === 'observe' && figure === 'residuals') candidates.unshift('points');
   if (command === 'rig') candidates.push(/^(pan|tilt|shared)/.test(name) ? 'coverage' : /encoder|fit|outlier/.test(name) ? 'residuals' : 'space');
-  return candidates.find((id) => ids.has(id)) ?? null;
+  if (/ agree$/.test(name)) candidates.unshift('clusters');
+  return [...candidates, 'checks'].find((id) => ids.has(id)) ?? null;
 }
 
+const mostInWords = 4;
+
+function checkItem(check: Check, doc: Doc, ids: Set<string>, isInWords: boolean): HTMLElement {
+  const look = lookOf(check.state), target = targetOf(check.name, check.figure, ids, doc.command);
+  const words = [el('span', {class: `state-${look.name}`}, el('span', {role: 'img', 'aria-label': look.word}, look.symbol), ' ', el('b', {}, check.name)), isInWords ? ` ${check.text}` : ''];
+  const title = isInWords ? null : check.text;
+  return el('li', {title}, target ? el('a', {href: `#fig-${target}`}, ...words) : el('span', {}, ...words));
+}
+
+/** What speaks against the answer in words, the rest by name: all of them stand in full below. */
 function checksOf(doc: Doc, ids: Set<string>): HTMLElement | null {
-  if (doc.checks.length === 0) return null;
-  return el('ul', {class: 'checks', 'aria-label': 'checks'}, ...doc.checks.map((check) => {
-    const look = lookOf(check.state), target = targetOf(check.name, check.figure, ids, doc.command);
-    const words = [el('span', {class: `state-${look.name}`}, el('span', {role: 'img', 'aria-label': look.word}, look.symbol), ' ',
-      el('b', {}, check.name)), ' ' + check.text];
-    return el('li', {}, target ? el('a', {href: `#fig-${target}`}, ...words) : el('span', {}, ...words));
-  }));
+  if (doc.checks.length === 0 || doc.command.startsWith('reproduce')) return null; // its claims stand in the first table
+  const loud = doc.checks.filter((check) => check.state !== 'good'), quiet = doc.checks.filter((check) => check.state === 'good');
+  loud.sort((a, b) => Number(b.state === doc.state) - Number(a.state === doc.state));
+  return el('ul', {class: 'checks', 'aria-label': 'checks'},
+    ...loud.map((check, i) => checkItem(check, doc, ids, i < mostInWords && check.text.length <= 160)), ...quiet.map((check) => checkItem(check, doc, ids, loud.length === 0 && quiet.length <= 3 && check.text.length <= 70)));
+}
+
+/** `like this` as code. */
+function withCode(text: string): (Node | string)[] {
+  return text.split('`').map((part, i) => (i % 2 === 1 ? el('code', {}, part) : part));
 }
 
 export function header(doc: Doc, ids: Set<string>): HTMLElement {
-  const look = lookOf(doc.state);
-  const isSaid = doc.sentence.toLowerCase().startsWith(look.word.toLowerCase());
-  const sentence = isSaid ? doc.sentence.slice(look.word.length) : `: ${doc.sentence}`;
-  const counts = countsOf(doc);
+  const look = lookOf(doc.state), word = look.headline ?? look.word;
+  const isSaid = doc.sentence.toLowerCase().startsWith(word.toLowerCase());
+  const sentence = isSaid ? doc.sentence.slice(word.length) : `: ${doc.sentence}`;
+  const counts = countsOf(doc), next = nextStep(doc);
   return el('header', {class: 'top', style: `--state:var(--${look.name})`, 'data-state': look.name},
     el('div', {class: 'headline'},
-      el('h1', {}, el('span', {class: 'symbol', role: 'img', 'aria-label': `state: ${look.word}`}, look.symbol), ' ',
-        el('span', {class: 'word'}, isSaid ? doc.sentence.slice(0, look.word.length) : look.word), doc.sentence ? sentence : ''),
+      el('h1', {class: sentence.length > 130 ? 'long' : null}, el('span', {class: 'symbol', role: 'img', 'aria-label': `state: ${word}`}, look.symbol), ' ',
+        el('span', {class: 'word'}, isSaid ? doc.sentence.slice(0, word.length) : word), doc.sentence ? sentence : ''),
       el('div', {class: 'buttons'}, button('?', 'Keys and help', showHelp), button('◐', 'Dark or light', toggleTheme),
         button('⤓ result.json', 'Download the numbers', () => download('result.json', 'application/json', doc.source)))),
     el('p', {class: 'counts'}, el('b', {}, `alidade ${doc.command}`), counts.length > 0 ? ' · ' + counts.join(' · ') : ''),
-    doc.toAdd ? el('p', {class: 'to-do'}, el('b', {}, 'What to do: '), doc.toAdd) : null,
+    next ? el('p', {class: 'to-do'}, el('b', {}, doc.toAdd ? 'What to do: ' : 'Next: '), ...withCode(next)) : null,
     checksOf(doc, ids));
 }

@@ -13,7 +13,7 @@ import type {Doc} from '../core/document';
 const help: [string, string][] = [
   ['← →  or  j k', 'another photo, shot or view, worst first'], ['0', 'views as they were'], ['d', 'dark or light'],
   ['f', 'figure in the full window, and back'], ['s', 'save the figure as PNG'], ['t', 'the table behind the figure'],
-  ['c', 'copy the value at the cursor'], ['space', 'hold the figures while a run is live'], ['?', 'this help'],
+  ['c', 'copy the value at the cursor'], ['Esc', 'close this help; leave the full window'], ['space', 'hold the figures while a run is live'], ['?', 'this help'],
   ['drag', 'zoom into a time axis (double click: all); turn a 3-D view (shift: move it)'],
 ];
 
@@ -28,6 +28,13 @@ export function showHelp(): void {
   }
   if (box.open) box.close();
   else box.showModal();
+}
+
+/** Whether there was one to close. */
+function closeHelp(): boolean {
+  const box = document.querySelector<HTMLDialogElement>('dialog.help[open]');
+  box?.close();
+  return box !== null;
 }
 
 export function redrawAll(): void {
@@ -65,7 +72,8 @@ export function listenToKeys(doc: Doc, selection: Selection, cards: Card[], sign
     s: () => active && savePicture(active, doc),
     ...more,
     c: () => void navigator.clipboard?.writeText(tipWords()).catch(() => undefined),
-    Escape: () => cards.filter((card) => card.section.classList.contains('full')).forEach(toggleFull),
+    // By hand: what prevents the key from scrolling also keeps the browser from closing the dialog.
+    Escape: () => closeHelp() || cards.filter((card) => card.section.classList.contains('full')).forEach(toggleFull),
   };
   document.addEventListener('keydown', (event) => {
     const target = event.target as HTMLElement | null;

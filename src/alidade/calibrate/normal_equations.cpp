@@ -24,9 +24,14 @@ void add_dense_view(const Scratch& s, int num_dense, std::size_t k, NormalEquati
   const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> G(s.product.data(), m,
                                                                                                    m);
   const int residual = num_dense + 6;
+  double* of_view = eq.view_dense.data() + k * static_cast<std::size_t>(num_dense * (num_dense + 1));
   for (int j = 0; j < num_dense; ++j) {
-    for (int i = 0; i <= j; ++i) eq.H(j, i) += G(i, j);
+    for (int i = 0; i <= j; ++i) {
+      eq.H(j, i) += G(i, j);
+      of_view[j * num_dense + i] = of_view[i * num_dense + j] = G(i, j);
+    }
     eq.gradient[j] += G(j, residual);
+    of_view[num_dense * num_dense + j] = G(j, residual);
   }
   Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 6>> W(eq.W.data() + k * 6 * static_cast<std::size_t>(eq.num_globals),
                                                          eq.num_globals, 6);
@@ -131,6 +136,8 @@ bool linearize(const BundleProblem& problem, const BundleState& state, NormalEqu
   const bool bow = problem.shape == BoardShape::bow, free = problem.shape == BoardShape::free;
   const int num_dense = lens_count + (bow ? 2 : 0);
   eq.num_globals = num_globals(problem);
+  eq.num_dense = num_dense;
+  eq.view_dense.resize(num_views * static_cast<std::size_t>(num_dense * (num_dense + 1)));
   eq.cost = 0.0;
   eq.H.setZero(eq.num_globals, eq.num_globals);
   eq.gradient.setZero(eq.num_globals);

@@ -18,9 +18,16 @@ struct NormalEquations {
   std::vector<double> W;                       ///< View by view, globals × 6 column-major.
   std::vector<Eigen::Matrix<double, 6, 6>> V;  ///< Lower triangle.
   std::vector<Eigen::Matrix<double, 6, 1>> pose_gradient;
+  /// What each view alone brought to the dense globals (lens and bow): its H and gradient, dense × (dense + 1).
+  int num_dense = 0;
+  std::vector<double> view_dense;
 
   [[nodiscard]] Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 6>> coupling(std::size_t view) const {
     return {W.data() + view * 6 * static_cast<std::size_t>(num_globals), num_globals, 6};
+  }
+  [[nodiscard]] Eigen::Map<const Eigen::MatrixXd> dense_of(std::size_t view) const {
+    const auto size = static_cast<std::size_t>(num_dense * (num_dense + 1));
+    return {view_dense.data() + view * size, num_dense, num_dense + 1};
   }
 };
 

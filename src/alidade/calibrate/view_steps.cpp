@@ -20,38 +20,49 @@ void fill_product(const BundleProblem& problem, const ViewArrays& view, const Co
   const auto column = [&](int c) { return Eigen::Map<const Eigen::VectorXd>(columns[c], rows); };
   Index at = 0;
   for (const int parameter : problem.free_lens) JX.noalias() += column(parameter) * X.row(at++);
-  if (problem.shape == BoardShape::bow) {
-    for (int i = 0; i < 2; ++i) JX.noalias() += column(Columns::bow + i) * X.row(at++);
-  } else if (problem.shape == BoardShape::free) {
-    const auto half = static_cast<Index>(columns.stride());
-    for (Index i = 0; i < static_cast<Index>(view.size()); ++i) {
-      const Index point = at + 3 * view.index[static_cast<std::size_t>(i)];
-      for (int c = 0; c < 3; ++c) {
-        const double* by_point = columns[Columns::pose + c];
-        JX.row(i) += by_point[i] * X.row(point + c);
-        JX.row(half + i) += by_point[half + i] * X.row(point + c);
-      }
+  const auto half = static_cast<Index>(columns.stride());
+  for (Index i = 0; i < static_cast<Index>(view.size()); ++i) {
+    const Index point = at + 3 * view.index[static_cast<std::size_t>(i)];
+    for (int c = 0; c < 3; ++c) {
+      const double* by_point = columns[Columns::pose + c];
+      JX.row(i) += by_point[i] * X.row(point + c);
+      JX.row(half + i) += by_point[half + i] * X.row(point + c);
     }
   }
 }
 
 /// The free points take degrees of freedom from every view's residuals: by how much the views' scores are too small.
 double score_scale(const BundleProblem& problem) {
-  if (problem.shape != BoardShape::free) return 1.0;
   double rows = 0.0;
   for (const ViewArrays& view : problem.views) rows += 2.0 * static_cast<double>(view.size()) - 6.0;
   const double taken = 3.0 * static_cast<double>(problem.printed_points.size()) - 7.0;
   return std::sqrt(rows / std::max(rows - taken, 0.1 * rows));
 }
 
-}  // namespace
+/// From what the last linearisation kept of each view: lens and bow.
+std::vector<ClusterStep> dense_steps(const NormalEquations& eq, const Eigen::MatrixXd& X) {
+  const Index dense = eq.num_dense;
+  std::vector<ClusterStep> steps;
+  steps.reserve(eq.V.size());
+  Eigen::MatrixXd reduced(dense, dense + 1);
+  for (std::size_t k = 0; k < eq.V.size(); ++k) {
+    const Eigen::LLT<Eigen::Matrix<double, 6, 6>> V(eq.V[k]);
+    Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 18> rows(6, dense + 1);
+    rows.leftCols(dense) = eq.coupling(k).transpose();
+    rows.col(dense) = eq.pose_gradient[k];
+    V.matrixL().solveInPlace(rows);
+    reduced.noalias() = eq.dense_of(k) - rows.leftCols(dense).transpose() * rows;  // the pose follows
+    steps.push_back({X.transpose() * reduced.col(dense), X.transpose() * reduced.leftCols(dense) * X});
+  }
+  return steps;
+}
 
-std::vector<ClusterStep> view_steps(const BundleProblem& problem, const BundleResult& result) {
-  const auto num_lens = static_cast<Index>(problem.free_lens.size());
-  const Eigen::MatrixXd X = result.cov.leftCols(num_lens);
+/// With every point of the board free: each view moves its own points only, so its rows are multiplied out.
+std::vector<ClusterStep> sparse_steps(const BundleProblem& problem, const BundleResult& result,
+                                      const Eigen::MatrixXd& X) {
+  const Index num_lens = X.cols();
   const PreparedLens lens = prepare(result.state.lens);
   const PointArrays points = make_arrays(result.state.board_points);
-  const BowBasis basis = problem.shape == BoardShape::bow ? bow_basis(problem.printed_points) : BowBasis{};
   const double scale = score_scale(problem);
   std::vector<ClusterStep> steps;
   steps.reserve(problem.views.size());
@@ -61,7 +72,6 @@ std::vector<ClusterStep> view_steps(const BundleProblem& problem, const BundleRe
     steps.push_back({Eigen::VectorXd::Zero(num_lens), Eigen::MatrixXd::Zero(num_lens, num_lens)});
     const ViewArrays& view = problem.views[k];
     if (!fill_columns(lens, result.state.cam_from_board[k], points, view, columns)) continue;
-    if (problem.shape == BoardShape::bow) fill_bow_columns(view, basis.along_x, basis.along_y, columns);
     fill_product(problem, view, columns, X, JX);
     const auto rows = static_cast<Index>(columns.num_rows());
     const ColumnsMap pose(columns[Columns::pose], rows, 6);
@@ -74,6 +84,13 @@ std::vector<ClusterStep> view_steps(const BundleProblem& problem, const BundleRe
     steps.back().spread.noalias() = JX.transpose() * JX;
   }
   return steps;
+}
+
+}  // namespace
+
+std::vector<ClusterStep> view_steps(const BundleProblem& problem, const BundleResult& result) {
+  const Eigen::MatrixXd X = result.cov.leftCols(static_cast<Index>(problem.free_lens.size()));
+  return problem.shape == BoardShape::free ? sparse_steps(problem, result, X) : dense_steps(*result.equations, X);
 }
 
 }  // namespace alidade

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <utility>
 
 namespace alidade {
 namespace {
@@ -13,26 +15,54 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using SymmetricSolver = Eigen::SelfAdjointEigenSolver<MatrixXd>;
 
-/// A cluster where the model's covariance is 1: its share h of the information with its principal directions Q, and
-/// along these its step, by the model of variance h(1 − h).
+/// A cluster where the model's covariance is 1: its share h of the information and its step d, by the model of
+/// covariance h(1 − h); x = (1 − h)^(−1/2) d.
 struct Member {
   MatrixXd share;
-  MatrixXd Q;
-  VectorXd h, rest, along;  ///< rest = 1 − h
+  VectorXd step, x;
+  double trace = 0.0;
+  std::optional<SymmetricSolver> eigen;  ///< Of the share, where it is large.
 };
+
+/// Rest 1 − h along a principal direction. A cluster that alone tells it has no residual in it: 0/0 is left at 0.
+double rest_of(double h) { return std::max(1.0 - h, 1e-3); }
 
 /// `whiten` is L⁻¹ with L Lᵀ = H⁻¹.
 Member member_of(const ClusterStep& cluster, const MatrixXd& whiten, double noise_variance) {
   Member member;
-  member.share = whiten * cluster.spread * whiten.transpose();
-  const SymmetricSolver eigen(0.5 * (member.share + member.share.transpose()));
-  member.Q = eigen.eigenvectors();
-  member.h = eigen.eigenvalues().cwiseMax(1e-12);
-  // A cluster that alone tells a direction has no residual in it: 0/0 is left at 0.
-  constexpr double least_rest = 1e-3;
-  member.rest = (1.0 - eigen.eigenvalues().array()).max(least_rest);
-  member.along = member.Q.transpose() * (whiten * cluster.step) / std::sqrt(noise_variance);
+  const MatrixXd half_way = whiten * cluster.spread;
+  member.share = half_way * whiten.transpose();
+  member.step = whiten * cluster.step / std::sqrt(noise_variance);
+  member.trace = member.share.trace();
+  constexpr double small = 0.2;  // a bound of h: the series below is right to 5e-4
+  if (member.trace < small) {
+    const VectorXd once = member.share * member.step, twice = member.share * once;
+    member.x = member.step + 0.5 * once + 0.375 * twice + 0.3125 * (member.share * twice);
+    return member;
+  }
+  member.eigen.emplace(0.5 * (member.share + member.share.transpose()));
+  const MatrixXd& Q = member.eigen->eigenvectors();
+  const VectorXd scale = member.eigen->eigenvalues().unaryExpr([](double h) { return 1.0 / std::sqrt(rest_of(h)); });
+  member.x = Q * scale.cwiseProduct(Q.transpose() * member.step);
   return member;
+}
+
+/// The part of x along directions in which the cluster contradicts the others by more than 3σ, in units of their design
+/// effect, as its deletion changes the answer: (1 − h)⁻¹ d. `x` takes it over.
+VectorXd contradiction(const Member& member, double others, VectorXd& x) {
+  VectorXd found = VectorXd::Zero(x.size());
+  if (!member.eigen) return found;  // (1 − h)⁻¹ is as good as (1 − h)^(−1/2)
+  constexpr double chance2 = 9.0;
+  const MatrixXd& Q = member.eigen->eigenvectors();
+  VectorXd along = Q.transpose() * x;
+  for (Eigen::Index k = 0; k < x.size(); ++k) {
+    const double h = std::max(member.eigen->eigenvalues()[k], 1e-12);
+    if (!(along[k] * along[k] > chance2 * std::max(1.0, others) * h)) continue;
+    along[k] /= std::sqrt(rest_of(h));
+    found += along[k] * Q.col(k);
+  }
+  x = Q * along;
+  return found;
 }
 
 /// A cluster's score: by the model of mean 0 and covariance `share`.
@@ -42,29 +72,19 @@ struct Score {
   MatrixXd share;
 };
 
-/// Scores by CR2. Along a direction in which a cluster contradicts the others by more than 3σ, in units of their design
-/// effect, the whole change that its deletion causes counts (CR3): an answer that hangs on it is that uncertain.
-std::vector<Score> scores_of(const std::vector<Member>& members) {
-  std::vector<VectorXd> along;
+std::vector<Score> scores_of(std::vector<Member> members) {
   double sum = 0.0, expected = 0.0;
   for (const Member& member : members) {
-    along.emplace_back(member.along.cwiseQuotient(member.rest.cwiseSqrt()));
-    sum += along.back().squaredNorm();
-    expected += member.share.trace();
+    sum += member.x.squaredNorm();
+    expected += member.trace;
   }
   std::vector<Score> scores;
   scores.reserve(members.size());
-  for (std::size_t i = 0; i < members.size(); ++i) {
-    const Member& member = members[i];
-    VectorXd& x = along[i];
-    const double others = (sum - x.squaredNorm()) / std::max(expected - member.share.trace(), 1e-12);
-    constexpr double chance2 = 9.0;  // 3σ
-    VectorXd contradiction = VectorXd::Zero(x.size());
-    for (Eigen::Index k = 0; k < x.size(); ++k) {
-      if (!(x[k] * x[k] > chance2 * std::max(1.0, others) * member.h[k])) continue;
-      contradiction[k] = x[k] /= std::sqrt(member.rest[k]);
-    }
-    scores.push_back({member.Q * x, member.Q * contradiction, member.share});
+  for (Member& member : members) {
+    VectorXd x = member.x;
+    const double others = (sum - x.squaredNorm()) / std::max(expected - member.trace, 1e-12);
+    VectorXd against = contradiction(member, others, x);
+    scores.push_back({std::move(x), std::move(against), std::move(member.share)});
   }
   return scores;
 }
@@ -131,9 +151,9 @@ void state_free(const MatrixXd& inverse, double noise_variance, std::span<const 
   members.reserve(clusters.size());
   for (const ClusterStep& cluster : clusters) {
     members.push_back(member_of(cluster, whiten, noise_variance));
-    if (!members.back().along.allFinite()) return;
+    if (!members.back().x.allFinite()) return;
   }
-  const std::vector<Score> scores = scores_of(members);
+  const std::vector<Score> scores = scores_of(std::move(members));
   for (const Score& score : scores) {
     result.z2.push_back(score.x.squaredNorm() / std::max(score.share.trace(), 1e-12));
   }

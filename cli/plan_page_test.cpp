@@ -26,8 +26,8 @@ class PlanPage : public testing::CommandTest {
 
 /// The board's points are where a printed board has them: the first at the origin, squares of 25 mm, 9 × 6 corners.
 TEST_F(PlanPage, OfACalibrationHoldsItsCameraAndItsBoard) {
-  ASSERT_EQ(alidade({"simulate", "board", "--board", "9x6", "--square", "0.025", "--photos", "8", "--size", "640x480",
-                     "--no-report", "--out", path("in")})
+  ASSERT_EQ(alidade({"simulate", "board", "--board", "9x6", "--square", "0.025", "--photos", "8", "--corners-only",
+                     "--size", "640x480", "--no-report", "--out", path("in")})
                 .code,
             0);
   ASSERT_EQ(alidade({"calibrate", "--corners", path("in/corners.csv"), "--board", "9x6", "--square", "0.025", "--size",

@@ -101,8 +101,24 @@ double median_error_m(const std::string& track_file, const TrueTrack& truth, std
 TEST_F(MovingTargetCommand, ADroneIsFollowedByCamerasThatItPlacedItself) {
   const Outcome placed = place({"--clocks", "20", "--truth", path("truth.csv")});
   ASSERT_EQ(placed.code, 0) << placed.err;
-  const Json estimate = Json::parse(placed.out)["estimate"];
+  const Json document = Json::parse(placed.out), estimate = document["estimate"];
   for (const Json& camera : estimate["cameras"]) EXPECT_TRUE(camera["placed"].get<bool>()) << camera["reason"];
+  // What the page draws: a camera stands where its head's base does, as sure as that in all (a turned covariance has
+  // the same trace).
+  const Json& cameras = document["data"]["cameras"];
+  ASSERT_EQ(cameras["id"].size(), 4u);
+  for (std::size_t h = 0; h < 4; ++h) {
+    const Json& place = estimate["heads"][h]["world_from_base"]["translation_m"];
+    const Json& sigma = document["stddev"]["heads"][h]["world_from_base"]["translation_m"];
+    double trace = 0.0, expected = 0.0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_NEAR(cameras[std::array{"world_from_cam_x_m", "world_from_cam_y_m", "world_from_cam_z_m"}[k]][h], place[k],
+                  1e-9);
+      trace += cameras[std::array{"cov_xx_m2", "cov_yy_m2", "cov_zz_m2"}[k]][h].get<double>();
+      expected += std::pow(sigma[k].get<double>(), 2);
+    }
+    EXPECT_NEAR(trace, expected, 1e-9 + 1e-6 * expected);
+  }
   // The truth gives seven numbers and a clock; the path itself is the cameras' own.
   EXPECT_LT(estimate["true_path"]["median_m"].get<double>(), 0.1);
   EXPECT_LT(estimate["true_path"]["rms_m"].get<double>(), 0.2);

@@ -54,6 +54,16 @@ async function whatWasAssumedIsSaid({open, url, calibration}) {
   await grave.close();
 }
 
+async function causesAreNamedWorstFirst({open, url}) {
+  const causes = [{name: 'k1', z: 0.4, members: [{name: 'k1', value: -0.001, sigma: 0.002, unit: ''}]}, {name: 'mount', z: -5.2, members: [{name: 'mount x', value: 1.2, sigma: 0.1, unit: '°'}]}];
+  const {page, faults, close} = await open(url(base('observe', {estimate: {causes}}))), rows = await page.locator('#fig-causes tbody tr').allInnerTexts();
+  assert.match(rows[0], /mount\s+−5\.2 σ\s+mount x 1\.20 ± 0\.30 °/);
+  assert.match(rows[1], /k1\s+0\.4 σ/);
+  assert.ok(!(await page.locator('body').innerText()).includes('causes'), 'they stand in their own table alone');
+  assert.deepEqual(faults, []);
+  await close();
+}
+
 /** Beside a header that says that the halves differ no figure says that all of the picture agrees. */
 async function halvesDoNotContradictTheHeader({open, url, calibration}) {
   const document = calibration(4), caption = async () => {
@@ -138,6 +148,7 @@ export const tests = {
   'first screen: verdict, values, one figure, the next step': theFirstScreenAnswers,
   'sigma is explained photo by photo': sigmaIsExplainedPhotoByPhoto,
   'what was assumed is said': whatWasAssumedIsSaid,
+  'causes are named, worst first': causesAreNamedWorstFirst,
   'halves do not contradict the header': halvesDoNotContradictTheHeader,
   'a refusal shows corners as found': aRefusalShowsCornersAsFound,
   'exit code 6 is a triangle': exitCodeSixIsATriangle,

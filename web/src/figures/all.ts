@@ -4,6 +4,7 @@ import type {Figure} from '../core/figure';
 import {allPhotos} from './all_photos';
 import {assumed} from './assumed';
 import {board} from './board';
+import {causes} from './causes';
 import {checks} from './checks';
 import {clusters} from './clusters';
 import {correlationMatrix} from './correlation_matrix';
@@ -51,13 +52,13 @@ const values: Figure = {...estimate, span: 8};
 const wide = (figure: Figure): Figure => ({...figure, span: 16});
 const half = (figure: Figure): Figure => ({...figure, span: 12});
 /** Of every page: what the answer rests on. */
-const grounds: Figure[] = [assumed, checks, correlationMatrix];
+const grounds: Figure[] = [assumed, checks, causes, correlationMatrix];
 
 const byCommand: Record<string, Page> = {
   calibrate: {first: [values, wide(trust)], rest: [clusters, worstPhotos, poses, photo, half(residuals), half(lens), half(halves), half(undistorted), half(board), half(nextPhoto), allPhotos, ...grounds]},
   observe: {first: [values, wide(observeIntrinsics)], rest: [clusters, observeMotion, observeNis, observeTracks, observeDirections, observePoints, ...grounds]},
   rangefinder: {first: [{...values, note: 'camera frame, value ± 3σ'}, wide(rangefinderBeam)], rest: [clusters, rangefinderResiduals, rangefinderPhoto, rangefinderPrecision, rangefinderNext, rangefinderCounts, rangefinderShots, ...grounds]},
-  rig: {first: [{...rigEstimate, span: 10, narrow: 24}, {...rigSpace, span: 14, narrow: 24}], rest: [clusters, rigCoverage, rigResiduals, rigView, {...rigUnknown, span: 14}, assumed, checks]},
+  rig: {first: [{...rigEstimate, span: 10, narrow: 24}, {...rigSpace, span: 14, narrow: 24}], rest: [clusters, rigCoverage, rigResiduals, rigView, {...rigUnknown, span: 14}, assumed, checks, causes]},
   track: {first: [values, wide(trackSpace)], rest: [trackPosition, trackError, trackInnovations, {...trackAbove, span: 12}, {...trackAge, span: 12}, ...grounds]},
   servo: {first: [{...servoCompare, span: 10}, servoError], rest: [servoAngles, servoPicture, half(servoRobust), half(servoLoops), trackSpace, trackPosition, assumed, checks]},
   localize: {first: [values, wide(localizeSpace)], rest: [half(localizeError), localizeFrame, half(localizeTracks), half(localizeNis), half(localizeSpeed), ...grounds]},

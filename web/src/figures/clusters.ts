@@ -19,8 +19,9 @@ function tableOf(doc: Doc): Table | null {
 /** "σ was raised 2.4 to 3.1 times"; empty where the document does not tell. */
 function raised(doc: Doc): string {
   const inside = (path: string) => doc.estimates.filter((one) => one.path.startsWith(`sigma.${path}.`)).map((one) => one.value).filter((value) => value > 0);
+  const effect = [doc.estimate('shared_errors.design_effect'), doc.estimate('design_effect')].find((value) => value > 0);
   const inflation = extent(inside('inflation')), dof = extent(inside('degrees_of_freedom'));
-  if (!inflation) return '';
+  if (!inflation) return effect ? ` In the mean over all directions the variance is ${num(effect, 3)} times that of independent errors.` : '';
   const range = ([low, high]: [number, number], digits: number) => (num(low, digits) === num(high, digits) ? num(low, digits) : `${num(low, digits)} to ${num(high, digits)}`);
   return ` So σ was raised ${range(inflation, 3)} times over what independent errors would give` + (dof && dof[1] < 1e6 ? `, with ${range(dof, 2)} degrees of freedom.` : '.');
 }

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <memory>
 #include <mutex>
 #include <opencv2/core.hpp>
@@ -109,15 +110,30 @@ std::string corners_beside(const std::filesystem::path& shots) {
              : "";
 }
 
+/// Enough boards tell the beam by themselves: a light that is elsewhere is no spot.
+void look_where_boards_say(std::vector<Shot>& shots, std::vector<ShotPhoto>& seen, const ShotPhotoLoader& load,
+                           const Camera& camera, const ShotPhotosConfig& photos, RangefinderConfig config, Run& run) {
+  config.method = RangefinderMethod::plane;
+  const std::vector<Eigen::Vector3d> points = points_in_board(*photos.board);
+  RangefinderReport report = calibrate_rangefinder(shots, points, camera, config, run.progress);
+  if (wants_scale(report, config)) {
+    config.estimate_scale = true;
+    report = calibrate_rangefinder(shots, points, camera, config, run.progress);
+  }
+  if (report.status != RangefinderReport::Status::converged) return;
+  look_again_for_spots(shots, seen, load, report.camera, report.beam, photos, run.progress);
+}
+
 /// Boards and spots out of the photos. What is wrong with a photo stops the run, or with --skip-bad its row is named.
 void add_photos(const RangefinderArgs& args, const std::optional<Board>& board, const Camera& camera, ShotsFile& file,
-                std::vector<Shot>& shots, Run& run) {
+                const RangefinderConfig& rangefinder, std::vector<Shot>& shots, Run& run) {
   ShotShelf shelf(file.rows, args.shots.parent_path(), run);
   ShotPhotosConfig config{.board = board, .find_spots = args.method != "plane"};
   config.spot.colour = colour_of(args.spot);
-  const std::vector<ShotPhoto> seen = look_at_photos(
-      shots, [&shelf](std::size_t i, bool laser_off) { return shelf.load(i, laser_off); }, camera, config,
-      run.progress);
+  const ShotPhotoLoader load = [&shelf](std::size_t i, bool laser_off) { return shelf.load(i, laser_off); };
+  std::vector<ShotPhoto> seen = look_at_photos(shots, load, camera, config, run.progress);
+  if (board && config.find_spots && args.method == "joint")
+    look_where_boards_say(shots, seen, load, camera, config, rangefinder, run);
   std::vector<ShotRow> kept_rows;
   std::vector<Shot> kept;
   for (std::size_t i = 0; i < shots.size(); ++i) {
@@ -129,7 +145,9 @@ void add_photos(const RangefinderArgs& args, const std::optional<Board>& board, 
       continue;
     }
     if (!seen[i].no_board.empty()) run.say(fmt::format("no board: {}: {}", file.rows[i].photo, seen[i].no_board));
-    if (!seen[i].no_spot.empty()) run.say(fmt::format("no spot: {}: {}", file.rows[i].photo, seen[i].no_spot));
+    if (!seen[i].false_spot.empty()) run.say(fmt::format("no spot: {}: {}", file.rows[i].photo, seen[i].false_spot));
+    if (!seen[i].no_spot.empty() && seen[i].false_spot.empty())
+      run.say(fmt::format("no spot: {}: {}", file.rows[i].photo, seen[i].no_spot));
     kept_rows.push_back(file.rows[i]);
     kept.push_back(shots[i]);
     if (seen[i].has_photo && !run.options.no_report && kept.size() <= most_pictures)
@@ -185,23 +203,40 @@ RangefinderExtras extras_of(const RangefinderReport& report, std::span<const Sho
   return extras;
 }
 
+std::ptrdiff_t num_shots_with_board(std::span<const Shot> shots) {
+  return std::count_if(shots.begin(), shots.end(), [](const Shot& shot) { return shot.has_plane(); });
+}
+
 struct Solved {
   RangefinderReport report;
   Verdict verdict;
   RangefinderConfig config;
 };
 
+bool is_of_another_unit(const Verdict& verdict) {
+  return std::any_of(verdict.checks.begin(), verdict.checks.end(),
+                     [](const Check& check) { return check.name == "scale" && check.state == State::refused; });
+}
+
 /// Where the answer rests on a scale of the readings that nobody told, that is estimated too, if the shots can tell.
 Solved solve(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points, const Camera& camera,
              const RangefinderConfig& config, Run& run) {
   Solved held{calibrate_rangefinder(shots, points, camera, config, run.progress), {}, config};
   held.verdict = rangefinder_verdict(held.report, shots, config);
+  const bool no_beam = held.verdict.exit_code != ExitCode::ok && num_shots_with_board(shots) > 0;
+  if (const std::string cause = no_beam ? cause_of_misfit(shots, points, camera, config) : ""; !cause.empty()) {
+    held.verdict.sentence = cause;
+    held.verdict.to_add = "give each row the range of its own spot and board, in metres";
+    return held;
+  }
   if (!wants_scale(held.report, config)) return held;
   Solved free{{}, {}, config};
   free.config.estimate_scale = free.config.scale_by_need = true;
   free.report = calibrate_rangefinder(shots, points, camera, free.config, run.progress);
   free.verdict = rangefinder_verdict(free.report, shots, free.config);
-  return free.verdict.exit_code == ExitCode::ok ? free : held;
+  // Readings in another unit have a scale, but that is no answer.
+  const bool is_told = free.verdict.exit_code == ExitCode::ok || is_of_another_unit(free.verdict);
+  return is_told ? free : held;
 }
 
 ExitCode rangefinder(const RangefinderArgs& args, Run& run) {
@@ -222,7 +257,7 @@ ExitCode rangefinder(const RangefinderArgs& args, Run& run) {
   if (!args.corners.empty()) {
     add_corners(args, *board, file.rows, shots, run);
   } else {
-    add_photos(args, board, camera, file, shots, run);
+    add_photos(args, board, camera, file, asked, shots, run);
   }
   run.document.counts.given = file.skipped.size();
   run.document.counts.skipped = file.skipped;

@@ -35,7 +35,8 @@ void put_moves(const RangefinderReport& report, const BeamVector& moves, Assumpt
   change << moves.head<3>(), 1e6 * (moved.direction_in_cam - report.beam.direction_in_cam), moves[5];
   const Eigen::Matrix<double, 7, 7> cov = embedded_covariance(report.beam);
   for (Eigen::Index i = 0; i < 7; ++i) {
-    if (i == 5 || !(cov(i, i) > 0.0)) continue;  // z of a direction along the view hangs on its x and y
+    const bool is_result = i != 5 && (i != 6 || !report.scale_by_need);  // z of a direction hangs on its x and y
+    if (!is_result || !(cov(i, i) > 0.0)) continue;
     const double in_sigmas = std::abs(change[i]) / std::sqrt(cov(i, i));
     if (!(in_sigmas > assumption.moves)) continue;
     assumption.moves = in_sigmas;

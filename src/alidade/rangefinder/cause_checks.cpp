@@ -11,7 +11,7 @@ namespace {
 
 /// The name of the unit that the readings are in, by their scale; empty where they are metres, or in none.
 std::string unit_of(double scale) {
-  constexpr double near_enough = 0.04;
+  constexpr double near_enough = 0.02;
   for (const auto& [metres, name] :
        {std::pair{0.001, "millimetres"}, std::pair{0.01, "centimetres"}, std::pair{0.0254, "inches"},
         std::pair{0.3048, "feet"}, std::pair{0.9144, "yards"}})
@@ -27,8 +27,9 @@ void add_found_scale(const RangefinderReport& report, Verdict& verdict) {
   Check check = check_of("scale", z < ask_beyond ? State::good : State::care, "the readings' scale is 1 within its σ",
                          z, ask_beyond, "σ", "residuals");
   if (z >= ask_beyond)
-    check.text = "the readings are " + text_of(1.0 / report.beam.scale, 5) +
-                 " times what the board says: the rangefinder's scale, or the printed squares; measure the squares";
+    check.text =
+        "the readings are " + text_of(1.0 / report.beam.scale, 5) +
+        " times what the board says: the rangefinder's scale (then give --scale), or the printed squares; measure them";
   if (z >= ask_beyond && std::abs(away) > beyond_an_instrument) {
     const std::string unit = unit_of(report.beam.scale);
     check.state = State::refused;
@@ -42,6 +43,10 @@ void add_found_scale(const RangefinderReport& report, Verdict& verdict) {
 
 void add_scale(const RangefinderReport& report, const RangefinderConfig& config, Verdict& verdict) {
   if (config.scale_by_need) add_found_scale(report, verdict);
+  const std::string unit = config.estimate_scale && !config.scale_by_need ? unit_of(report.beam.scale) : "";
+  if (!unit.empty())
+    verdict.checks.push_back(check_of("scale", State::care, "the ranges are " + unit + ", not metres",
+                                      report.beam.scale, 1.0, "", "residuals"));
   constexpr double ask_beyond = 4.0;
   const double z = std::abs(report.scale_in_sigmas);
   if (z == 0.0) return;
@@ -76,32 +81,44 @@ void add_camera(const RangefinderReport& report, Verdict& verdict) {
   verdict.checks.push_back(std::move(check));
 }
 
-/// Near and far shots, each kind in its σ: where the one scatters much more than the other, σ depends on distance.
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// How much larger the first values are than the second, in σ of the sum of their ranks, which one wild value does not
+/// move. H. B. Mann & D. R. Whitney, 1947.
+double rank_sum_sigmas(const std::vector<double>& first, const std::vector<double>& second) {
+  double wins = 0.0;
+  for (const double a : first)
+    for (const double b : second) wins += a > b ? 1.0 : 0.0;
+  const auto n = static_cast<double>(first.size()), m = static_cast<double>(second.size());
+  return (wins - 0.5 * n * m) / std::sqrt(n * m * (n + m + 1.0) / 12.0);
+}
+
+/// Near and far spots, in their σ: where the one half scatters more than the other, σ hangs on distance.
 void add_by_distance(const RangefinderReport& report, std::span<const Shot> shots, Verdict& verdict) {
-  constexpr double ask_beyond = 4.0;
-  constexpr std::size_t enough = 5;
-  std::vector<std::pair<double, double>> spots;  // range, squared residual in its σ²
+  constexpr double ask_beyond = 3.2;
+  constexpr std::size_t enough = 8;
+  std::vector<std::pair<double, double>> spots;  // range, residual in its σ
   for (std::size_t i = 0; i < report.shots.size() && i < shots.size(); ++i) {
     const ShotFit& fit = report.shots[i];
     if (!fit.used || !fit.residual_px.allFinite()) continue;
-    spots.emplace_back(shots[i].range_m, 0.5 * squared_mahalanobis(fit.residual_px, fit.cov_px));
+    spots.emplace_back(shots[i].range_m, std::sqrt(squared_mahalanobis(fit.residual_px, fit.cov_px)));
   }
   if (spots.size() < 2 * enough) return;
   std::sort(spots.begin(), spots.end());
-  const std::size_t half = spots.size() / 2;
-  double near = 0.0, far = 0.0;
-  for (std::size_t i = 0; i < spots.size(); ++i) (i < half ? near : far) += spots[i].second;
-  near /= static_cast<double>(half), far /= static_cast<double>(spots.size() - half);
-  // ln of a mean of n squares of two coordinates has a variance of 1/n.
-  const double z = std::log(near / far) /
-                   std::sqrt(1.0 / static_cast<double>(half) + 1.0 / static_cast<double>(spots.size() - half));
+  std::vector<double> near, far;
+  for (std::size_t i = 0; i < spots.size(); ++i) (i < spots.size() / 2 ? near : far).push_back(spots[i].second);
+  const double z = rank_sum_sigmas(near, far);
   const bool differs = std::abs(z) > ask_beyond;
+  const double ratio = median_of(near) / median_of(far);
   verdict.checks.push_back(check_of("spots by distance", differs ? State::care : State::good,
-                                    differs
-                                        ? "spots of the " + std::string(z > 0.0 ? "near" : "far") + " shots scatter " +
-                                              text_of(std::sqrt(z > 0.0 ? near / far : far / near), 2) +
-                                              " times as much as the others: give each its sigma_px"
-                                        : "near and far spots scatter alike",
+                                    differs ? "spots of the " + std::string(z > 0.0 ? "near" : "far") +
+                                                  " shots scatter " + text_of(z > 0.0 ? ratio : 1.0 / ratio, 2) +
+                                                  " times as much as the others: give each its sigma_px"
+                                            : "near and far spots scatter alike",
                                     std::abs(z), ask_beyond, "σ", "residuals"));
 }
 

@@ -38,17 +38,29 @@ int dof_of(const BeamFit& fit, const BeamProblem& problem) {
   return std::max(1, fit.best.normals.num_rows - problem.num_free());
 }
 
+/// ln of the number of ways to choose k of n.
+double log_choices(double n, double k) {
+  return std::lgamma(n + 1.0) - std::lgamma(k + 1.0) - std::lgamma(n - k + 1.0);
+}
+
 /// Where σ is not known: do the residuals of all say that some are wrong, by how much less those of the others are?
-/// Three times as large they must be, more where few are left, as any few can be found to agree.
+/// Three times as large they must be, more where few are left, and so much that by chance no choice of as many shots
+/// would do so once in a thousand logs: likelihood ratio of normal residuals, times the number of choices.
 bool tells_outliers(const BeamFit& all, const BeamProblem& all_shots, const BeamFit& others,
                     const BeamProblem& other_shots) {
   const auto num_used = [](const BeamProblem& problem) {
-    return std::count_if(problem.shots.begin(), problem.shots.end(), [](const auto& shot) { return shot.used; });
+    return static_cast<double>(
+        std::count_if(problem.shots.begin(), problem.shots.end(), [](const auto& shot) { return shot.used; }));
   };
-  if (10 * num_used(other_shots) < 6 * num_used(all_shots)) return false;
-  const int dof = dof_of(others, other_shots);
-  const double limit = 3.0 * (1.0 + 5.0 / dof);
-  return !(all.best.normals.cost / dof_of(all, all_shots) < limit * limit * others.best.normals.cost / dof);
+  const double num_all = num_used(all_shots), num_others = num_used(other_shots);
+  constexpr double chance = 1e-3;
+  constexpr int least_spare = 2;
+  const int spare = others.best.normals.num_rows - other_shots.num_free();
+  if (num_others < 0.6 * num_all || spare < least_spare) return false;
+  const double ratio = all.best.normals.cost / others.best.normals.cost;
+  if (0.5 * spare * std::log(ratio) < log_choices(num_all, num_all - num_others) - std::log(chance)) return false;
+  const double limit = 3.0 * (1.0 + 5.0 / spare);
+  return !(ratio * spare / dof_of(all, all_shots) < limit * limit);
 }
 
 /// Beam, outliers and noise, lens and poses held: what is marked in the problem stays for what follows.
@@ -121,7 +133,9 @@ void put_clusters(const BeamProblem& problem, const ReducedSystem& system, const
                   const LensPrior& prior, RangefinderReport& report) {
   report.clusters = cluster_covariance(part.inverse, 1.0, shot_clusters(system, part.places, part.inverse));
   const int p = problem.num_free();
-  const Eigen::MatrixXd cov = part.inverse + weight_of(report.clusters, p) * (report.clusters.cov - part.inverse);
+  Eigen::MatrixXd& cov = report.clusters.cov;
+  cov = part.inverse + weight_of(report.clusters, p) * (cov - part.inverse);
+  report.clusters.inflation = (cov.diagonal().array() / part.inverse.diagonal().array()).sqrt();
   report.cov_model.setZero();
   report.cov_model.topLeftCorner(p, p) = part.inverse.topLeftCorner(p, p);
   report.beam.cov.setZero();
@@ -312,6 +326,7 @@ RangefinderReport calibrate_rangefinder(std::span<const Shot> shots, std::span<c
   BeamProblem& problem = ready.problem;
   RangefinderReport report;
   report.camera = camera;
+  report.scale_by_need = config.scale_by_need;
   report.sigma_corner_px = ready.sigma_corner_px;
   report.sigma_spot_px = config.sigma_spot_px.value_or(guessed_sigma_px);
   report.spot_sigma_is_told = !ready.knows_spot_sigma;

@@ -46,11 +46,13 @@ struct BeamBound {
   double sigma_origin_m = 0.0;          ///< √trace of the origin's covariance, of the estimate.
   double sigma_direction_rad = 0.0;     ///< √trace of the direction's, of the estimate.
   std::array<double, 4>
-      spot_sigma_px{};         ///< Larger axis of the predicted spot at bound_ranges_m, for an exact reading.
-  double condition = 0.0;      ///< Of the information about the beam, scaled to a unit diagonal.
-  double range_ratio = 0.0;    ///< Longest over shortest reading.
-  double normal_spread = 0.0;  ///< Least singular value of the boards' normals over √(their number).
-  double offset_m = 0.0;       ///< Of the beam's line from the camera's centre.
+      spot_sigma_px{};               ///< Larger axis of the predicted spot at bound_ranges_m, for an exact reading.
+  double worst_spot_sigma_px = 0.0;  ///< Of these, at ranges between the nearest shot and the farthest.
+  double nearest_m = 0.0, farthest_m = 0.0;  ///< Readings used.
+  double condition = 0.0;                    ///< Of the information about the beam, scaled to a unit diagonal.
+  double range_ratio = 0.0;                  ///< Longest over shortest reading.
+  double normal_spread = 0.0;                ///< Least singular value of the boards' normals over √(their number).
+  double offset_m = 0.0;                     ///< Of the beam's line from the camera's centre.
 };
 inline constexpr std::array<double, 4> bound_ranges_m{0.5, 1.0, 2.0, 4.0};
 
@@ -69,6 +71,7 @@ struct RangefinderReport {
   BeamMatrix cov_model = BeamMatrix::Zero();  ///< Of the beam, if every single measurement erred by itself.
   ClusterCovariance clusters;                 ///< What tells the two apart; shots are its clusters.
   std::vector<HeldThing> held;
+  bool scale_by_need = false;      ///< The scale was estimated for the beam's sake, it is no result itself.
   std::vector<Beam> alternatives;  ///< Other beams that fit as well.
   std::vector<ShotFit> shots;      ///< One a shot.
   BeamBound bound;
@@ -100,6 +103,11 @@ struct RangefinderReport {
 /// Does the answer rest on a scale of the readings, or of the board, that nobody told? Then it is better estimated: a
 /// board that is too large as a whole moves the origin by its own part only.
 [[nodiscard]] bool wants_scale(const RangefinderReport& report, const RangefinderConfig& config);
+
+/// Why shots that no beam explains may do so: with the ranges in another unit, or each range a row before or after its
+/// spot and board, a beam explains them well. One sentence; empty where neither is so.
+[[nodiscard]] std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board,
+                                          const Camera& camera, const RangefinderConfig& config);
 
 /// What the answer is worth, or why there is none, what to add, and which other method could tell.
 [[nodiscard]] Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Shot> shots,

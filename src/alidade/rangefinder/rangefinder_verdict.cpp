@@ -132,10 +132,13 @@ void add_precision(const RangefinderReport& report, Method method, Verdict& verd
   verdict.checks.push_back(check_of("origin", graded(bound.sigma_origin_m, good_origin_m, refuse_origin_m),
                                     "σ of the origin is " + text_of(1e3 * bound.sigma_origin_m, 2) + " mm",
                                     1e3 * bound.sigma_origin_m, 1e3 * good_origin_m, "mm", "precision"));
-  const double spot_px = *std::max_element(bound.spot_sigma_px.begin(), bound.spot_sigma_px.end());
-  verdict.checks.push_back(check_of("spot", spot_px <= good_spot_px(method) ? State::good : State::care,
-                                    "σ of the predicted spot is up to " + text_of(spot_px, 2) + " px from 0.5 to 4 m",
-                                    spot_px, good_spot_px(method), "px", "precision"));
+  const double spot_px = bound.worst_spot_sigma_px;
+  verdict.checks.push_back(
+      check_of("spot", spot_px <= good_spot_px(method) ? State::good : State::care,
+               "σ of the predicted spot is up to " + text_of(spot_px, 2) + " px from " +
+                   text_of(std::clamp(bound_ranges_m.front(), bound.nearest_m, bound.farthest_m), 2) + " to " +
+                   text_of(std::clamp(bound_ranges_m.back(), bound.nearest_m, bound.farthest_m), 2) + " m",
+               spot_px, good_spot_px(method), "px", "precision"));
   const double limit = condition_limit(method);
   verdict.checks.push_back(check_of("condition", bound.condition <= limit ? State::good : State::refused,
                                     "condition number of the information " + text_of(bound.condition, 2),

@@ -14,7 +14,7 @@ bool explains(const std::vector<Shot>& shots, std::span<const Eigen::Vector3d> p
   double mean_m = 0.0;
   for (const Shot& shot : shots) mean_m += shot.range_m / static_cast<double>(shots.size());
   return report.status == RangefinderReport::Status::converged && report.bound.sigma_origin_m < 0.1 &&
-         10 * report.shots_used >= 8 * static_cast<int>(shots.size()) &&
+         10 * report.shots_used >= 8 * static_cast<int>(shots.size()) && report.rms_range_m > 0.0 &&
          report.rms_range_m < std::min(most_m, most_of_range * mean_m);
 }
 
@@ -36,8 +36,9 @@ std::vector<Shot> shifted(std::span<const Shot> shots, int by) {
 std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board,
                             const Camera& camera, const RangefinderConfig& config) {
   constexpr std::size_t least_shots = 7;
-  if (shots.size() < least_shots || config.method == RangefinderMethod::spot) return "";
+  if (shots.size() < least_shots) return "";
   RangefinderConfig plain = config;
+  if (plain.method == RangefinderMethod::spot) plain.method = RangefinderMethod::joint;  // spots know no metres
   plain.estimate_scale = plain.scale_by_need = false;
   plain.range_noise.reset();
   if (explains(shifted(shots, 1), points_in_board, camera, plain))

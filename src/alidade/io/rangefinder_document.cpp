@@ -205,6 +205,24 @@ void put_sigmas(const Beam& beam, JsonValue& stddev) {
   stddev["scale"] = std::sqrt(cov(6, 6));
 }
 
+/// How the stated σ came about: by how much the shots' scatter raised the model's, and how sure that is.
+JsonValue sigma_values(const RangefinderReport& report) {
+  static constexpr std::array<const char*, num_beam_params> names{"origin_x_m",  "origin_y_m",  "origin_z_m",
+                                                                  "direction_u", "direction_v", "scale"};
+  JsonValue values = JsonValue::object(), inflation = JsonValue::object(), dof = JsonValue::object();
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    if (!(report.cov_model(k, k) > 0.0) || k >= report.clusters.inflation.size()) continue;
+    inflation[names[i]] = report.clusters.inflation[k];
+    dof[names[i]] = report.clusters.degrees_of_freedom[k];
+  }
+  values["design_effect"] = report.clusters.design_effect;
+  values["shrinkage"] = report.clusters.shrinkage;
+  values["inflation"] = std::move(inflation);
+  values["degrees_of_freedom"] = std::move(dof);
+  return values;
+}
+
 void fill_beam(const RangefinderReport& report, ResultDocument& document) {
   const Beam& beam = report.beam;
   const Eigen::Matrix<double, 7, 7> cov = embedded_covariance(beam);
@@ -252,6 +270,7 @@ void fill_rangefinder(std::span<const Shot> shots, const RangefinderReport& repo
   estimate["normal_spread"] = report.bound.normal_spread;
   estimate["offset_m"] = report.bound.offset_m;
   if (has_beam) document.assumed = rangefinder_assumptions(report);
+  if (has_beam) estimate["sigma"] = sigma_values(report);
   estimate["noise"]["sigma_spot_px"] = report.sigma_spot_px;
   estimate["noise"]["sigma_corner_px"] = report.sigma_corner_px;
   estimate["noise"]["sigma_range_m"] = report.beam.noise.sigma_m;

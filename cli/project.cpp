@@ -156,6 +156,92 @@ void fill_first(const Projected& first, ResultDocument& document) {
   document.stddev["px"] = std::vector<double>{std::sqrt(first.pixel->cov(0, 0)), std::sqrt(first.pixel->cov(1, 1))};
 }
 
+/// By how much of its own σ a pixel or a point moves at most, and which.
+void put_move(const Projected& one, const Eigen::Vector3d& moved_m, const Eigen::Vector2d& moved_px,
+              Assumption& assumption) {
+  const auto heed_one = [&](const std::string& name, double moved, double variance) {
+    constexpr double most = 1e6;  // where no σ is stated at all
+    const double in_sigmas = moved == 0.0 ? 0.0 : std::min(most, std::abs(moved) / std::sqrt(std::max(variance, 0.0)));
+    if (!(in_sigmas > assumption.moves)) return;
+    assumption.moves = in_sigmas;
+    assumption.moved = name;
+    assumption.moved_by = moved;
+  };
+  const std::array<const char*, 3> axes{"x", "y", "z"};
+  for (int i = 0; i < 3; ++i)
+    heed_one(fmt::format("point_in_cam_m {} at {:g} m", axes[static_cast<std::size_t>(i)], one.range_m), moved_m[i],
+             one.point.cov(i, i));
+  if (!one.pixel) return;
+  heed_one(fmt::format("u_px at {:g} m", one.range_m), moved_px.x(), one.pixel->cov(0, 0));
+  heed_one(fmt::format("v_px at {:g} m", one.range_m), moved_px.y(), one.pixel->cov(1, 1));
+}
+
+/// One thing taken as given, and what its σ, or an ordinary error, moves of every point and pixel.
+template <class Moves>
+Assumption assumption_of(const std::string& name, double value, std::optional<double> sigma, double ordinary,
+                         const std::vector<Projected>& projected, const Moves& moves) {
+  Assumption assumption{.name = name, .value = value, .sigma = sigma};
+  if (!sigma) assumption.ordinary = ordinary;
+  for (const Projected& one : projected) {
+    const auto [moved_m, moved_px] = moves(one, sigma.value_or(ordinary));
+    put_move(one, moved_m, moved_px, assumption);
+  }
+  if (!sigma)
+    assumption.remedy = name.starts_with("beam") ? "use a rangefinder.yaml with covariance: alidade rangefinder"
+                                                 : "use a camera file with covariance: alidade calibrate";
+  return assumption;
+}
+
+void add_beam_assumptions(const Beam& beam, const Camera& camera, const std::vector<Projected>& projected,
+                          std::vector<Assumption>& assumed) {
+  constexpr double ordinary_origin_m = 0.005, ordinary_direction_rad = 0.003;
+  const std::array<const char*, 5> names{"beam.origin_m x", "beam.origin_m y", "beam.origin_m z", "beam.direction u",
+                                         "beam.direction v"};
+  for (int i = 0; i < 5; ++i) {
+    const auto moves = [&](const Projected& one, double error) {
+      const Eigen::Vector3d moved_m = error * J_point_beam(beam, one.range_m).col(i);
+      const auto seen = project_with_jacobians(camera, one.point.point_in_cam);
+      return std::pair{moved_m, seen ? Eigen::Vector2d(seen->J_px_point * moved_m) : Eigen::Vector2d(0.0, 0.0)};
+    };
+    const std::optional<double> sigma =
+        beam.cov.isZero(0.0) ? std::nullopt : std::optional(std::sqrt(std::max(0.0, beam.cov(i, i))));
+    assumed.push_back(assumption_of(names[static_cast<std::size_t>(i)], i < 3 ? beam.origin_in_cam[i] : 0.0, sigma,
+                                    i < 3 ? ordinary_origin_m : ordinary_direction_rad, projected, moves));
+  }
+}
+
+bool knows_covariance(const Camera& camera) {
+  return camera.cov.rows() == params(camera.lens).size() && camera.cov.allFinite() && !camera.cov.isZero(0.0);
+}
+
+void add_camera_assumptions(const Camera& camera, const std::vector<Projected>& projected,
+                            std::vector<Assumption>& assumed) {
+  constexpr double ordinary_focal = 0.003, ordinary_centre_px = 2.0;
+  const std::array<const char*, 4> names{"camera.fx", "camera.fy", "camera.cx", "camera.cy"};
+  const Eigen::VectorXd lens = params(camera.lens);
+  for (int i = 0; i < 4; ++i) {
+    const auto moves = [&](const Projected& one, double error) {
+      const auto seen = project_with_jacobians(camera, one.point.point_in_cam);
+      return std::pair{Eigen::Vector3d(0.0, 0.0, 0.0),
+                       seen ? Eigen::Vector2d(error * seen->J_px_params.col(i)) : Eigen::Vector2d(0.0, 0.0)};
+    };
+    const std::optional<double> sigma =
+        knows_covariance(camera) ? std::optional(std::sqrt(camera.cov(i, i))) : std::nullopt;
+    assumed.push_back(assumption_of(names[static_cast<std::size_t>(i)], lens[i], sigma,
+                                    i < 2 ? ordinary_focal * lens[i] : ordinary_centre_px, projected, moves));
+  }
+}
+
+/// Beam and camera are taken as given: with their covariance, which is counted, or without, which is said.
+void heed_files(const Beam& beam, const Camera& camera, const std::vector<Projected>& projected, Run& run,
+                Verdict& verdict) {
+  add_beam_assumptions(beam, camera, projected, run.document.assumed);
+  add_camera_assumptions(camera, projected, run.document.assumed);
+  if (beam.cov.isZero(0.0)) run.say("the beam's file has no covariance: σ is that of the reading alone");
+  if (!knows_covariance(camera)) run.say("the camera's file has no covariance: its error is not in σ");
+  heed_assumptions(run.document.assumed, verdict);
+}
+
 ExitCode project_beam(const ProjectArgs& args, Run& run) {
   run.add_input("beam", args.beam);
   const BeamFile file = read_beam(args.beam);
@@ -192,6 +278,7 @@ ExitCode project_beam(const ProjectArgs& args, Run& run) {
   Verdict verdict;
   verdict.sentence = fmt::format("{} of {} point{} in the picture's model", num_seen, projected.size(),
                                  projected.size() == 1 ? "" : "s");
+  heed_files(beam, camera, projected, run, verdict);
   return run.finish(verdict);
 }
 

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <memory>
 #include <mutex>
 #include <opencv2/core.hpp>
@@ -30,6 +31,7 @@ struct RangefinderArgs {
   std::string method = "joint", refine = "all", spot = "auto", outliers = "drop";
   BoardOptions board;
   double sigma_px = 0.0, sigma_range_m = 0.0, sigma_range_per_m = 0.0, sigma_incidence_m = 0.0;
+  std::optional<double> sigma_square_m, sigma_scale;
   bool scale = false, skip_bad = false;
 };
 
@@ -43,6 +45,10 @@ RangefinderConfig config_from(const RangefinderArgs& args, std::uint64_t seed) {
   config.reject_outliers = args.outliers == "drop";
   config.seed = seed;
   if (args.sigma_px > 0.0) config.sigma_spot_px = args.sigma_px;
+  if (args.scale && args.sigma_scale) throw UsageError("--scale estimates what --sigma-scale tells; give one of them");
+  if (args.sigma_square_m && args.board.size.empty()) throw UsageError("--sigma-square needs --board and --square");
+  config.sigma_square_m = args.sigma_square_m;
+  config.sigma_scale = args.sigma_scale;
   if (args.sigma_range_m > 0.0)
     config.range_noise = RangeNoise{args.sigma_range_m, args.sigma_range_per_m, args.sigma_incidence_m};
   else if (args.sigma_range_per_m > 0.0 || args.sigma_incidence_m > 0.0)
@@ -104,15 +110,30 @@ std::string corners_beside(const std::filesystem::path& shots) {
              : "";
 }
 
+/// Enough boards tell the beam by themselves: a light that is elsewhere is no spot.
+void look_where_boards_say(std::vector<Shot>& shots, std::vector<ShotPhoto>& seen, const ShotPhotoLoader& load,
+                           const Camera& camera, const ShotPhotosConfig& photos, RangefinderConfig config, Run& run) {
+  config.method = RangefinderMethod::plane;
+  const std::vector<Eigen::Vector3d> points = points_in_board(*photos.board);
+  RangefinderReport report = calibrate_rangefinder(shots, points, camera, config, run.progress);
+  if (wants_scale(report, config)) {
+    config.estimate_scale = true;
+    report = calibrate_rangefinder(shots, points, camera, config, run.progress);
+  }
+  if (report.status != RangefinderReport::Status::converged) return;
+  look_again_for_spots(shots, seen, load, report.camera, report.beam, photos, run.progress);
+}
+
 /// Boards and spots out of the photos. What is wrong with a photo stops the run, or with --skip-bad its row is named.
 void add_photos(const RangefinderArgs& args, const std::optional<Board>& board, const Camera& camera, ShotsFile& file,
-                std::vector<Shot>& shots, Run& run) {
+                const RangefinderConfig& rangefinder, std::vector<Shot>& shots, Run& run) {
   ShotShelf shelf(file.rows, args.shots.parent_path(), run);
   ShotPhotosConfig config{.board = board, .find_spots = args.method != "plane"};
   config.spot.colour = colour_of(args.spot);
-  const std::vector<ShotPhoto> seen = look_at_photos(
-      shots, [&shelf](std::size_t i, bool laser_off) { return shelf.load(i, laser_off); }, camera, config,
-      run.progress);
+  const ShotPhotoLoader load = [&shelf](std::size_t i, bool laser_off) { return shelf.load(i, laser_off); };
+  std::vector<ShotPhoto> seen = look_at_photos(shots, load, camera, config, run.progress);
+  if (board && config.find_spots && args.method == "joint")
+    look_where_boards_say(shots, seen, load, camera, config, rangefinder, run);
   std::vector<ShotRow> kept_rows;
   std::vector<Shot> kept;
   for (std::size_t i = 0; i < shots.size(); ++i) {
@@ -124,7 +145,9 @@ void add_photos(const RangefinderArgs& args, const std::optional<Board>& board, 
       continue;
     }
     if (!seen[i].no_board.empty()) run.say(fmt::format("no board: {}: {}", file.rows[i].photo, seen[i].no_board));
-    if (!seen[i].no_spot.empty()) run.say(fmt::format("no spot: {}: {}", file.rows[i].photo, seen[i].no_spot));
+    if (!seen[i].false_spot.empty()) run.say(fmt::format("no spot: {}: {}", file.rows[i].photo, seen[i].false_spot));
+    if (!seen[i].no_spot.empty() && seen[i].false_spot.empty())
+      run.say(fmt::format("no spot: {}: {}", file.rows[i].photo, seen[i].no_spot));
     kept_rows.push_back(file.rows[i]);
     kept.push_back(shots[i]);
     if (seen[i].has_photo && !run.options.no_report && kept.size() <= most_pictures)
@@ -135,7 +158,8 @@ void add_photos(const RangefinderArgs& args, const std::optional<Board>& board, 
   run.lap("look_at_photos");
 }
 
-void summarize(const RangefinderReport& report, std::span<const Shot> shots, Run& run) {
+void summarize(const RangefinderReport& report, std::span<const Shot> shots, const RangefinderConfig& config,
+               Run& run) {
   for (std::size_t i = 0; i < shots.size(); ++i) {
     if (!report.shots[i].used && !report.shots[i].reason.empty())
       run.say(fmt::format("not used: {}: {}", shots[i].name, report.shots[i].reason));
@@ -150,6 +174,8 @@ void summarize(const RangefinderReport& report, std::span<const Shot> shots, Run
   for (int i = 0; i < 3; ++i)
     run.say(fmt::format("direction {} {:9.6f} ± {:.2g}", axes[static_cast<std::size_t>(i)], beam.direction_in_cam[i],
                         3.0 * std::sqrt(cov(3 + i, 3 + i))));
+  if (report.beam.cov(5, 5) > 0.0 && config.scale_by_need)
+    run.say("the readings' scale is estimated, as nobody told it (--sigma-scale)");
   if (cov(6, 6) > 0.0) run.say(fmt::format("scale       {:9.6f} ± {:.2g}", beam.scale, 3.0 * std::sqrt(cov(6, 6))));
   run.say(fmt::format("{} of {} shots; σ of a range {:.2g} mm ({})", report.shots_used, shots.size(),
                       1e3 * beam.noise.sigma_m, report.range_sigma_is_told ? "told by the residuals" : "as given"));
@@ -177,13 +203,49 @@ RangefinderExtras extras_of(const RangefinderReport& report, std::span<const Sho
   return extras;
 }
 
+std::ptrdiff_t num_shots_with_board(std::span<const Shot> shots) {
+  return std::count_if(shots.begin(), shots.end(), [](const Shot& shot) { return shot.has_plane(); });
+}
+
+struct Solved {
+  RangefinderReport report;
+  Verdict verdict;
+  RangefinderConfig config;
+};
+
+bool is_of_another_unit(const Verdict& verdict) {
+  return std::any_of(verdict.checks.begin(), verdict.checks.end(),
+                     [](const Check& check) { return check.name == "scale" && check.state == State::refused; });
+}
+
+/// Where the answer rests on a scale of the readings that nobody told, that is estimated too, if the shots can tell.
+Solved solve(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points, const Camera& camera,
+             const RangefinderConfig& config, Run& run) {
+  Solved held{calibrate_rangefinder(shots, points, camera, config, run.progress), {}, config};
+  held.verdict = rangefinder_verdict(held.report, shots, config);
+  const bool no_beam = held.verdict.exit_code != ExitCode::ok && num_shots_with_board(shots) > 0;
+  if (const std::string cause = no_beam ? cause_of_misfit(shots, points, camera, config) : ""; !cause.empty()) {
+    held.verdict.sentence = cause;
+    held.verdict.to_add = "give each row the range of its own spot and board, in metres";
+    return held;
+  }
+  if (!wants_scale(held.report, config)) return held;
+  Solved free{{}, {}, config};
+  free.config.estimate_scale = free.config.scale_by_need = true;
+  free.report = calibrate_rangefinder(shots, points, camera, free.config, run.progress);
+  free.verdict = rangefinder_verdict(free.report, shots, free.config);
+  // Readings in another unit have a scale, but that is no answer.
+  const bool is_told = free.verdict.exit_code == ExitCode::ok || is_of_another_unit(free.verdict);
+  return is_told ? free : held;
+}
+
 ExitCode rangefinder(const RangefinderArgs& args, Run& run) {
   if (args.method == "edges") return align_scan({args.shots, args.camera, args.photo, args.start}, run);
   if (!args.photo.empty() || !args.start.empty()) throw UsageError("--photo and --start are for --method edges");
   std::optional<Board> board;
   if (!args.board.size.empty()) board = board_from(args.board);
   if (board && !odd_size(*board).empty()) run.say(odd_size(*board));
-  const RangefinderConfig config = config_from(args, run.options.seed);
+  const RangefinderConfig asked = config_from(args, run.options.seed);
   if (!args.corners.empty() && !board) throw UsageError("--corners needs --board and --square");
   run.add_input("shots", args.shots);
   run.add_input("camera", args.camera);
@@ -195,18 +257,18 @@ ExitCode rangefinder(const RangefinderArgs& args, Run& run) {
   if (!args.corners.empty()) {
     add_corners(args, *board, file.rows, shots, run);
   } else {
-    add_photos(args, board, camera, file, shots, run);
+    add_photos(args, board, camera, file, asked, shots, run);
   }
   run.document.counts.given = file.skipped.size();
   run.document.counts.skipped = file.skipped;
   const std::vector<Eigen::Vector3d> points = board ? points_in_board(*board) : std::vector<Eigen::Vector3d>{};
-  const RangefinderReport report = calibrate_rangefinder(shots, points, camera, config, run.progress);
+  auto [report, verdict, config] = solve(shots, points, camera, asked, run);
   run.lap("solve");
-  const Verdict verdict = rangefinder_verdict(report, shots, config);
-  summarize(report, shots, run);
+  summarize(report, shots, config, run);
   run.document.estimate["camera"] = camera_values(report.camera);  // that the beam belongs to
   fill_rangefinder(shots, report, config, extras_of(report, shots, points, camera, config, board, run), run.document);
   if (has_estimate(verdict)) {
+    heed_assumptions(run.document.assumed, verdict);
     Camera seen = report.camera;
     if (config.refine == Refine::all)
       seen.source = "alidade rangefinder, refined from " + args.camera.filename().string();
@@ -250,6 +312,13 @@ void add_options(CLI::App& command, RangefinderArgs& args) {
   };
   sigma("--sigma-px", args.sigma_px, "σ of a spot's coordinate [px] (default: told by photo or residuals)");
   sigma("--sigma-range-m", args.sigma_range_m, "σ of a reading [m] (default: told by the residuals)");
+  const auto sigma_or_exact = [&](const char* name, std::optional<double>& value, const char* help) {
+    command.add_option(name, value, help)->check(finite_number() & CLI::Range(0.0, 1.0));
+  };
+  sigma_or_exact("--sigma-square", args.sigma_square_m, "σ of the length of the board's squares [m]; 0: exact");
+  sigma_or_exact("--sigma-scale", args.sigma_scale,
+                 "σ of the scale of the readings, which is then held at 1; 0: exact (default: estimated where it "
+                 "matters and can be told)");
   sigma("--sigma-range-per-m", args.sigma_range_per_m, "What it grows by for each metre of range");
   sigma("--sigma-incidence-m", args.sigma_incidence_m, "What it grows by with tan of the angle of incidence [m]");
   command.add_option("--outliers", args.outliers, "drop: leave out shots that no noise explains, by name; keep")

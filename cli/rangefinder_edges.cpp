@@ -57,11 +57,17 @@ ExitCode align_scan(const EdgesArgs& args, Run& run) {
   estimate["direction"] = std::vector<double>{a.x(), a.y(), a.z()};
   estimate["theta_x_rad"] = direction_angles_rad(report.beam).x();
   estimate["theta_y_rad"] = direction_angles_rad(report.beam).y();
+  const Eigen::Matrix<double, 7, 7> cov = embedded_covariance(report.beam);
+  const auto sigma = [&](int i) { return std::sqrt(cov(i, i)); };
+  run.document.stddev["origin_m"] = std::vector<double>{sigma(0), sigma(1), sigma(2)};
+  run.document.stddev["direction"] = std::vector<double>{sigma(3), sigma(4), sigma(5)};
   estimate["gain"] = report.gain;
   estimate["halves_differ_rad"] = report.halves_differ_rad;
   if (has_estimate(verdict)) {
-    run.say(fmt::format("direction {:.5f} {:.5f} {:.5f}; the halves of the scan differ by {:.2g} mrad", a.x(), a.y(),
-                        a.z(), 1e3 * report.halves_differ_rad));
+    run.say(fmt::format(
+        "direction {:.5f} ± {:.2g}  {:.5f} ± {:.2g}  {:.5f} ± {:.2g} (3σ); the halves of the scan "
+        "differ by {:.2g} mrad",
+        a.x(), 3.0 * sigma(3), a.y(), 3.0 * sigma(4), a.z(), 3.0 * sigma(5), 1e3 * report.halves_differ_rad));
     run.add_file("rangefinder.yaml", beam_text(report.beam, camera, "camera.yaml"));
     run.add_file("camera.yaml", camera_text(camera, CameraFormat::alidade));
   }

@@ -63,7 +63,12 @@ TEST_F(RangefinderCommand, GivesTheBeamWithTheNamesOfTheContract) {
     const Json document = Json::parse(outcome.out);
     expect_near_truth(document);
     const Json& estimate = document["estimate"];
-    EXPECT_EQ(estimate["scale"], 1.0);
+    // Nobody told the readings' scale: it is estimated where it matters.
+    EXPECT_NEAR(estimate["scale"], 1.0, 4.0 * document["stddev"]["scale"].get<double>() + 1e-12);
+    EXPECT_LE(document["stddev_model"]["origin_m"][2], 1.000001 * document["stddev"]["origin_m"][2].get<double>());
+    EXPECT_EQ(document["data"]["shots"]["cluster_z2"].size(), 18u);
+    const bool is_joint = method == "joint";
+    if (is_joint) EXPECT_EQ(document["verdict"]["state"], "good") << document["verdict"]["to_add"];
     for (const char* name : {"theta_x_rad", "theta_y_rad", "rms_px", "rms_range_m", "bound"})
       EXPECT_TRUE(estimate.contains(name)) << name;
     EXPECT_NEAR(estimate["theta_x_rad"], 1.557, 0.02);
@@ -72,6 +77,50 @@ TEST_F(RangefinderCommand, GivesTheBeamWithTheNamesOfTheContract) {
     EXPECT_TRUE(std::filesystem::exists(path("out/rangefinder.yaml")));
     EXPECT_TRUE(std::filesystem::exists(path("out/camera.yaml")));
   }
+}
+
+const Json* assumption(const Json& document, const std::string& name) {
+  for (const Json& each : document["assumed"])
+    if (each["name"] == name) return &each;
+  return nullptr;
+}
+
+TEST_F(RangefinderCommand, WhatIsToldWithItsSigmaIsCarriedAndWhatIsNotIsNamed) {
+  simulate();
+  const Outcome told = calibrate({"--sigma-scale", "0", "--sigma-square", "0.00002", "--json", "--no-report"});
+  ASSERT_EQ(told.code, 0) << told.err;
+  const Json document = Json::parse(told.out);
+  EXPECT_EQ(document["estimate"]["scale"], 1.0);
+  EXPECT_EQ(document["verdict"]["state"], "good") << document["verdict"]["to_add"];
+  ASSERT_TRUE(assumption(document, "square_m") && assumption(document, "scale") && assumption(document, "camera.f"));
+  EXPECT_EQ((*assumption(document, "square_m"))["sigma"], 0.00002);
+  EXPECT_EQ((*assumption(document, "scale"))["sigma"], 0.0);
+  EXPECT_NEAR((*assumption(document, "camera.f"))["sigma"].get<double>(), 1.5 / std::sqrt(2.0), 1e-6);
+  // A camera whose covariance nobody knows moves the direction by many σ.
+  std::string camera = read_file(path("sim/camera.yaml"));
+  write_file(path("sim/camera.yaml"), camera.substr(0, camera.find("covariance:")));
+  const Outcome unknown = calibrate({"--sigma-scale", "0", "--sigma-square", "0", "--json", "--no-report"});
+  ASSERT_EQ(unknown.code, 0) << unknown.err;
+  const Json care = Json::parse(unknown.out);
+  EXPECT_EQ(care["verdict"]["state"], "care");
+  EXPECT_NE(care["verdict"]["sentence"].get<std::string>().find("camera.c"), std::string::npos) << care["verdict"];
+  EXPECT_EQ(calibrate({"--scale", "--sigma-scale", "0.001"}).code, 2);
+  EXPECT_EQ(calibrate({"--sigma-scale", "-1"}).code, 2);
+}
+
+TEST_F(RangefinderCommand, ProjectSaysWhereAFileHasNoCovariance) {
+  simulate();
+  const auto state_of = [&](const std::string& beam, const std::string& camera) {
+    const Outcome outcome = alidade({"project", "--beam", beam, "--camera", camera, "--range", "2", "--json",
+                                     "--no-report", "--out", path("projected")});
+    return Json::parse(outcome.out)["verdict"]["state"].get<std::string>();
+  };
+  ASSERT_EQ(calibrate({"--no-report"}).code, 0);
+  EXPECT_EQ(state_of(path("out/rangefinder.yaml"), path("out/camera.yaml")), "good");
+  EXPECT_EQ(state_of(path("sim/truth_rangefinder.yaml"), path("out/camera.yaml")), "care");
+  const std::string camera = read_file(path("out/camera.yaml"));
+  write_file(path("bare.yaml"), camera.substr(0, camera.find("covariance:")));
+  EXPECT_EQ(state_of(path("out/rangefinder.yaml"), path("bare.yaml")), "care");
 }
 
 TEST_F(RangefinderCommand, PointsToTheCornersWhereNobodyHasThePhotos) {

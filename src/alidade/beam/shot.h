@@ -33,6 +33,7 @@ struct Plane {
 struct Spot {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();  ///< With distortion: as in the photo.
   std::optional<double> sigma_px = {};           ///< Of a coordinate.
+  bool sigma_is_least = false;  ///< It is what the finder knows of; speckle, Bayer and JPEG come on top.
 };
 
 /// One reading of the rangefinder and what was seen of it. Of the board at most one is needed: its corners, else its

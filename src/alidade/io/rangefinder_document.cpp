@@ -25,14 +25,14 @@ std::string_view method_name(RangefinderMethod method) {
 DataTable shots_table(std::span<const Shot> shots, const RangefinderReport& report) {
   std::vector<std::string> name, reason;
   std::vector<bool> used;
-  std::vector<Numbers> column(13);
+  std::vector<Numbers> column(14);
   for (std::size_t i = 0; i < shots.size(); ++i) {
     const ShotFit& fit = report.shots[i];
     name.push_back(shots[i].name);
     used.push_back(fit.used);
     reason.push_back(fit.reason);
     const bool has_spot = shots[i].spot.has_value() && fit.cov_px(0, 0) > 0.0;
-    const std::array<double, 13> values{shots[i].range_m,
+    const std::array<double, 14> values{shots[i].range_m,
                                         fit.residual_range_m,
                                         fit.sigma_range_m,
                                         shots[i].spot ? shots[i].spot->px.x() : not_there,
@@ -44,10 +44,11 @@ DataTable shots_table(std::span<const Shot> shots, const RangefinderReport& repo
                                         has_spot ? fit.cov_px(0, 1) : not_there,
                                         fit.point_in_cam.x(),
                                         fit.point_in_cam.y(),
-                                        fit.point_in_cam.z()};
+                                        fit.point_in_cam.z(),
+                                        fit.cluster_z2};
     for (std::size_t k = 0; k < values.size(); ++k) column[k].push_back(values[k]);
   }
-  static const std::array<const char*, 13> names{"range_m",
+  static const std::array<const char*, 14> names{"range_m",
                                                  "residual_range_m",
                                                  "sigma_residual_range_m",
                                                  "u_px",
@@ -59,7 +60,8 @@ DataTable shots_table(std::span<const Shot> shots, const RangefinderReport& repo
                                                  "cov_residual_uv_px2",
                                                  "point_in_cam_x_m",
                                                  "point_in_cam_y_m",
-                                                 "point_in_cam_z_m"};
+                                                 "point_in_cam_z_m",
+                                                 "cluster_z2"};
   DataTable table{"shots", {{"name", name}, {"used", used}, {"reason", reason}}};
   for (std::size_t k = 0; k < names.size(); ++k)
     table.columns.emplace_back(names[k], rounded(column[k], k < 3 ? 6 : 5));
@@ -193,6 +195,34 @@ std::array<double, 2> angle_sigmas(const Beam& beam, const Eigen::Matrix<double,
   return {std::sqrt(cov(3, 3)) / std::sin(theta.x()), std::sqrt(cov(4, 4)) / std::sin(theta.y())};
 }
 
+void put_sigmas(const Beam& beam, JsonValue& stddev) {
+  const Eigen::Matrix<double, 7, 7> cov = embedded_covariance(beam);
+  const auto sigma_theta = angle_sigmas(beam, cov);
+  stddev["origin_m"] = root_of_diagonal(cov, 0, 3);
+  stddev["direction"] = root_of_diagonal(cov, 3, 3);
+  stddev["theta_x_rad"] = sigma_theta[0];
+  stddev["theta_y_rad"] = sigma_theta[1];
+  stddev["scale"] = std::sqrt(cov(6, 6));
+}
+
+/// How the stated σ came about: by how much the shots' scatter raised the model's, and how sure that is.
+JsonValue sigma_values(const RangefinderReport& report) {
+  static constexpr std::array<const char*, num_beam_params> names{"origin_x_m",  "origin_y_m",  "origin_z_m",
+                                                                  "direction_u", "direction_v", "scale"};
+  JsonValue values = JsonValue::object(), inflation = JsonValue::object(), dof = JsonValue::object();
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    if (!(report.cov_model(k, k) > 0.0) || k >= report.clusters.inflation.size()) continue;
+    inflation[names[i]] = report.clusters.inflation[k];
+    dof[names[i]] = report.clusters.degrees_of_freedom[k];
+  }
+  values["design_effect"] = report.clusters.design_effect;
+  values["shrinkage"] = report.clusters.shrinkage;
+  values["inflation"] = std::move(inflation);
+  values["degrees_of_freedom"] = std::move(dof);
+  return values;
+}
+
 void fill_beam(const RangefinderReport& report, ResultDocument& document) {
   const Beam& beam = report.beam;
   const Eigen::Matrix<double, 7, 7> cov = embedded_covariance(beam);
@@ -205,12 +235,10 @@ void fill_beam(const RangefinderReport& report, ResultDocument& document) {
   estimate["scale"] = beam.scale;
   estimate["rms_px"] = report.rms_px;
   estimate["rms_range_m"] = report.rms_range_m;
-  const auto sigma_theta = angle_sigmas(beam, cov);
-  document.stddev["origin_m"] = root_of_diagonal(cov, 0, 3);
-  document.stddev["direction"] = root_of_diagonal(cov, 3, 3);
-  document.stddev["theta_x_rad"] = sigma_theta[0];
-  document.stddev["theta_y_rad"] = sigma_theta[1];
-  document.stddev["scale"] = std::sqrt(cov(6, 6));
+  put_sigmas(beam, document.stddev);
+  Beam by_model = beam;
+  by_model.cov = report.cov_model;
+  put_sigmas(by_model, document.stddev_model);
   Beam at_bound = beam;
   at_bound.cov = report.bound.cov;
   const Eigen::Matrix<double, 7, 7> bound = embedded_covariance(at_bound);
@@ -241,6 +269,8 @@ void fill_rangefinder(std::span<const Shot> shots, const RangefinderReport& repo
   estimate["range_ratio"] = report.bound.range_ratio;
   estimate["normal_spread"] = report.bound.normal_spread;
   estimate["offset_m"] = report.bound.offset_m;
+  if (has_beam) document.assumed = rangefinder_assumptions(report);
+  if (has_beam) estimate["sigma"] = sigma_values(report);
   estimate["noise"]["sigma_spot_px"] = report.sigma_spot_px;
   estimate["noise"]["sigma_corner_px"] = report.sigma_corner_px;
   estimate["noise"]["sigma_range_m"] = report.beam.noise.sigma_m;

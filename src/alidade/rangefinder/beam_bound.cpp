@@ -23,6 +23,8 @@ void put_geometry(const BeamProblem& problem, const Beam& beam, BeamBound& bound
     outer += shot.plane->normal_in_cam * shot.plane->normal_in_cam.transpose();
     num_planes += 1.0;
   }
+  bound.nearest_m = farthest_m > 0.0 ? nearest_m : 0.0;
+  bound.farthest_m = farthest_m;
   bound.range_ratio = farthest_m > 0.0 ? farthest_m / nearest_m : 0.0;
   if (num_planes > 0.0) {
     bound.normal_spread = std::sqrt(std::max(0.0, symmetric_eigen3(outer / num_planes).values[0]));
@@ -48,11 +50,15 @@ BeamBound judge_beam(const BeamProblem& problem, const Beam& beam, const Camera&
     bound.condition = scaled_condition(normals->H.topLeftCorner(problem.num_free(), problem.num_free()));
   bound.sigma_origin_m = std::sqrt(beam.cov.topLeftCorner<3, 3>().trace());
   bound.sigma_direction_rad = std::sqrt(beam.cov.block<2, 2>(3, 3).trace());
+  const auto spot_sigma_px = [&](double range_m) {
+    const auto pixel = measured_pixel(beam, camera, range_m, 0.0);
+    return pixel ? std::sqrt(std::max(0.0, symmetric_eigenvalues(pixel->cov)[1])) : infinity;  // not seen there
+  };
   for (std::size_t i = 0; i < bound_ranges_m.size(); ++i) {
-    const auto pixel = measured_pixel(beam, camera, bound_ranges_m[i], 0.0);
-    bound.spot_sigma_px[i] = infinity;  // not seen there
-    if (!pixel) continue;
-    bound.spot_sigma_px[i] = std::sqrt(std::max(0.0, symmetric_eigenvalues(pixel->cov)[1]));
+    bound.spot_sigma_px[i] = spot_sigma_px(bound_ranges_m[i]);
+    if (!(bound.nearest_m > 0.0)) continue;
+    const double where_m = std::clamp(bound_ranges_m[i], bound.nearest_m, bound.farthest_m);
+    bound.worst_spot_sigma_px = std::max(bound.worst_spot_sigma_px, spot_sigma_px(where_m));
   }
   return bound;
 }

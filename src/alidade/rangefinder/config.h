@@ -23,11 +23,15 @@ struct RangefinderConfig {
   RangefinderMethod method = RangefinderMethod::joint;
   Refine refine = Refine::all;
   bool estimate_scale = false;
+  bool scale_by_need = false;     ///< It is estimated as nobody told it, not because a person knows that it is off.
   bool refine_distortion = true;  ///< With Refine::all: also what of the lens is not fx, fy, cx, cy.
   /// σ of the measurements that do not bring their own. None: told by the residuals.
   std::optional<double> sigma_spot_px = {};
   std::optional<RangeNoise> range_noise = {};
   std::optional<double> sigma_corner_px = {};  ///< Given: takes the place of the corners' own covariances.
+  /// σ of what is told of lengths: carried into the beam's covariance. 0: exact. None: nothing is known.
+  std::optional<double> sigma_square_m = {};  ///< Of the length of the board's squares.
+  std::optional<double> sigma_scale = {};     ///< Of the scale of the readings, where that is not estimated.
   bool reject_outliers = true;
   double outlier_sigmas = 6.0;
   int num_draws = 100;  ///< Of the search for outliers; a sample of five without any of 3 wrong in 18 comes once in 3.

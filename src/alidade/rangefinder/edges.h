@@ -30,7 +30,9 @@ struct EdgesConfig {
 };
 
 struct EdgesReport {
-  Beam beam;                       ///< Of use is the direction; the origin is told by centimetres.
+  /// Of use is the direction; the origin is told by centimetres. Its covariance counts how parts of the scene differ,
+  /// and that the origin was held near the start: where it is elsewhere, the direction makes up for it.
+  Beam beam;
   int num_edges = 0;               ///< In the scan.
   double gain = 0.0;               ///< Mean log of the picture's edge density at the scan's edges over a uniform one.
   double halves_differ_rad = 0.0;  ///< Direction from one half of the edges against the other's.

@@ -20,6 +20,14 @@ TEST(Edges, FindTheDirectionToSomeMrad) {
   const EdgesReport report = align_edges(scan_of(truth, 0.0044), photo_of(camera), camera, Beam{}, config);
   // 8.4 mrad is the median of a scan half as fine in another program; the start is 39 mrad away.
   EXPECT_LT((report.beam.direction_in_cam - truth.direction_in_cam).norm(), 0.0084);
+  // σ covers it, and the origin that it makes up for: where the beam is seen, near and far.
+  for (const double range_m : {1.0, 2.0, 4.0}) {
+    const auto seen = measured_pixel(report.beam, camera, range_m, 0.0);
+    const auto expected = project(camera, point_at(truth, range_m));
+    ASSERT_TRUE(seen && expected);
+    for (int i = 0; i < 2; ++i) EXPECT_NEAR(seen->px[i], (*expected)[i], 3.0 * std::sqrt(seen->cov(i, i))) << range_m;
+  }
+  EXPECT_LT(std::sqrt(report.beam.cov(3, 3)), 0.03);
   const Verdict verdict = edges_verdict(report);
   EXPECT_TRUE(verdict.state == State::care)
       << verdict.sentence << report.num_edges << " " << report.gain << " " << report.halves_differ_rad << " "

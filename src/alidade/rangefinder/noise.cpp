@@ -72,6 +72,15 @@ Groups groups_of(const BeamProblem& problem, const Camera& camera, const Beam& b
   return groups;
 }
 
+/// What its finder knows of a spot stays; what comes on top is so many times larger.
+void scale_spot_sigma(double factor, PreparedShot& shot) {
+  const double own2 = shot.least_sigma_spot_px * shot.least_sigma_spot_px;
+  constexpr double never_none_px = 0.01;
+  double more_px = std::sqrt(std::max(0.0, shot.sigma_spot_px * shot.sigma_spot_px - own2));
+  if (own2 > 0.0) more_px = std::max(more_px, never_none_px);
+  shot.sigma_spot_px = std::sqrt(own2 + factor * factor * more_px * more_px);
+}
+
 }  // namespace
 
 double estimate_noise(BeamProblem& problem, const Camera& camera, const Beam& beam, bool of_spots, bool of_ranges) {
@@ -93,7 +102,7 @@ double estimate_noise(BeamProblem& problem, const Camera& camera, const Beam& be
     if (shot.spot_px && !shot.owns_spot_sigma) sigma_px = shot.sigma_spot_px;
   const double factor = factor_of(groups.spots, groups.H, p, sigma_px / guessed_sigma_px);
   for (PreparedShot& shot : problem.shots)
-    if (!shot.owns_spot_sigma) shot.sigma_spot_px *= factor;
+    if (!shot.owns_spot_sigma) scale_spot_sigma(factor, shot);
   return std::max(change, std::abs(factor - 1.0));
 }
 

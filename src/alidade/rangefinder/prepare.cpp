@@ -87,8 +87,12 @@ PreparedShot prepared(const Shot& shot, const Camera& camera, const RangefinderC
     ready.spot_ray = unproject(camera, shot.spot->px);
     if (ready.spot_ray) ready.spot_px = shot.spot->px;
     if (!ready.spot_ray) reason = "the lens sees nothing at its spot";
-    ready.owns_spot_sigma = shot.spot->sigma_px.has_value();
-    ready.sigma_spot_px = shot.spot->sigma_px.value_or(config.sigma_spot_px.value_or(guessed_sigma_px));
+    const Spot& spot = *shot.spot;
+    ready.owns_spot_sigma = spot.sigma_px && !spot.sigma_is_least;
+    ready.least_sigma_spot_px = spot.sigma_is_least ? spot.sigma_px.value_or(0.0) : 0.0;
+    ready.sigma_spot_px = ready.owns_spot_sigma
+                              ? *spot.sigma_px
+                              : std::hypot(ready.least_sigma_spot_px, config.sigma_spot_px.value_or(guessed_sigma_px));
   }
   if (shot.board && (uses_plane || lens_is_free)) {
     use_board(shot, camera, config, uses_plane, points, ready, corners, reason);

@@ -7,6 +7,7 @@
 #include "alidade/geometry/decompositions.h"
 #include "alidade/rangefinder/beam_bound.h"
 #include "alidade/rangefinder/beam_search.h"
+#include "alidade/rangefinder/held_things.h"
 #include "alidade/rangefinder/prepare.h"
 #include "alidade/rangefinder/refine_all.h"
 
@@ -37,17 +38,29 @@ int dof_of(const BeamFit& fit, const BeamProblem& problem) {
   return std::max(1, fit.best.normals.num_rows - problem.num_free());
 }
 
+/// ln of the number of ways to choose k of n.
+double log_choices(double n, double k) {
+  return std::lgamma(n + 1.0) - std::lgamma(k + 1.0) - std::lgamma(n - k + 1.0);
+}
+
 /// Where σ is not known: do the residuals of all say that some are wrong, by how much less those of the others are?
-/// Three times as large they must be, more where few are left, as any few can be found to agree.
+/// Three times as large they must be, more where few are left, and so much that by chance no choice of as many shots
+/// would do so once in a thousand logs: likelihood ratio of normal residuals, times the number of choices.
 bool tells_outliers(const BeamFit& all, const BeamProblem& all_shots, const BeamFit& others,
                     const BeamProblem& other_shots) {
   const auto num_used = [](const BeamProblem& problem) {
-    return std::count_if(problem.shots.begin(), problem.shots.end(), [](const auto& shot) { return shot.used; });
+    return static_cast<double>(
+        std::count_if(problem.shots.begin(), problem.shots.end(), [](const auto& shot) { return shot.used; }));
   };
-  if (10 * num_used(other_shots) < 6 * num_used(all_shots)) return false;
-  const int dof = dof_of(others, other_shots);
-  const double limit = 3.0 * (1.0 + 5.0 / dof);
-  return !(all.best.normals.cost / dof_of(all, all_shots) < limit * limit * others.best.normals.cost / dof);
+  const double num_all = num_used(all_shots), num_others = num_used(other_shots);
+  constexpr double chance = 1e-3;
+  constexpr int least_spare = 2;
+  const int spare = others.best.normals.num_rows - other_shots.num_free();
+  if (num_others < 0.6 * num_all || spare < least_spare) return false;
+  const double ratio = all.best.normals.cost / others.best.normals.cost;
+  if (0.5 * spare * std::log(ratio) < log_choices(num_all, num_all - num_others) - std::log(chance)) return false;
+  const double limit = 3.0 * (1.0 + 5.0 / spare);
+  return !(ratio * spare / dof_of(all, all_shots) < limit * limit);
 }
 
 /// Beam, outliers and noise, lens and poses held: what is marked in the problem stays for what follows.
@@ -85,19 +98,85 @@ std::optional<BeamFit> search_beam(Preparation& ready, const Camera& camera, con
   return fit && !knows_sigma ? best_beam(problem, camera, fit->best.beam) : fit;
 }
 
-/// Covariance of a beam whose lens and poses were held: the lens' own is carried through (G = ∂beam/∂lens).
-void carry_lens(const BeamProblem& problem, const BeamSolution& solution, const Camera& camera, Beam& beam) {
-  const int p = problem.num_free();
-  const Ldlt H(solution.normals.H.topLeftCorner(p, p));
-  beam.cov.setZero();
-  beam.cov.topLeftCorner(p, p) = H.inverse();
+/// ∂beam/∂lens of a beam whose lens and poses were held; empty where the lens' covariance is not known.
+Eigen::MatrixXd J_beam_lens(const BeamProblem& problem, const Camera& camera, const Beam& beam) {
   const Eigen::Index num_lens = camera.cov.rows();
-  const auto normals = beam_normals(problem, camera, solution.beam);
-  if (num_lens == 0 || !normals || normals->H_lens.cols() != num_lens || !camera.cov.allFinite()) return;
-  const Eigen::MatrixXd G = -H.solve_each(normals->H_lens.topRows(p));
-  beam.cov.topLeftCorner(p, p) += G * camera.cov * G.transpose();
-  beam.cov_with_lens.setZero(num_beam_params, num_lens);
-  beam.cov_with_lens.topRows(p) = G * camera.cov;
+  const auto normals = beam_normals(problem, camera, beam);
+  if (num_lens == 0 || !normals || normals->H_lens.cols() != num_lens || !camera.cov.allFinite()) return {};
+  const int p = problem.num_free();
+  return -Ldlt(normals->H.topLeftCorner(p, p)).solve_each(normals->H_lens.topRows(p));
+}
+
+/// The covariance of a lens that was held is carried through.
+void carry_lens(const BeamProblem& problem, const Camera& camera, RangefinderReport& report) {
+  const Eigen::MatrixXd G = J_beam_lens(problem, camera, report.beam);
+  if (G.size() == 0) return;
+  const int p = problem.num_free();
+  const Eigen::MatrixXd carried = G * camera.cov * G.transpose();
+  report.beam.cov.topLeftCorner(p, p) += carried;
+  report.cov_model.topLeftCorner(p, p) += carried;
+  report.beam.cov_with_lens.setZero(num_beam_params, camera.cov.rows());
+  report.beam.cov_with_lens.topRows(p) = G * camera.cov;
+}
+
+/// How much of what the clusters say beyond the model is believed. With few shots their scatter is noise for the most
+/// part, and raises σ by a tenth where all is as the model says: from 0 where the design effect is 1 to all of it at
+/// 2.5 of its own σ, √(2/(shots · parameters)).
+double weight_of(const ClusterCovariance& clusters, int num_parameters) {
+  const double num_scores = static_cast<double>(clusters.z2.size()) * num_parameters;
+  return std::clamp((clusters.design_effect - 1.0) * std::sqrt(0.5 * num_scores) / 2.5, 0.0, 1.0);
+}
+
+/// Covariances that count that the measurements of a shot share errors: shots are the clusters. `inverse`: of the
+/// information of the beam's free parameters and of the lens'.
+void put_clusters(const BeamProblem& problem, const ReducedSystem& system, const SolvedPart& part,
+                  const LensPrior& prior, RangefinderReport& report) {
+  report.clusters = cluster_covariance(part.inverse, 1.0, shot_clusters(system, part.places, part.inverse));
+  const int p = problem.num_free();
+  Eigen::MatrixXd& cov = report.clusters.cov;
+  cov = part.inverse + weight_of(report.clusters, p) * (cov - part.inverse);
+  report.clusters.inflation = (cov.diagonal().array() / part.inverse.diagonal().array()).sqrt();
+  report.cov_model.setZero();
+  report.cov_model.topLeftCorner(p, p) = part.inverse.topLeftCorner(p, p);
+  report.beam.cov.setZero();
+  report.beam.cov.topLeftCorner(p, p) = cov.topLeftCorner(p, p);
+  const auto k = static_cast<Eigen::Index>(prior.free.size());
+  if (k > 0) {
+    report.camera.cov(prior.free, prior.free) = cov.bottomRightCorner(k, k);
+    report.beam.cov_with_lens(Eigen::seqN(0, p), prior.free) = cov.topRightCorner(p, k);
+  }
+  for (std::size_t i = 0; i < report.clusters.z2.size(); ++i)
+    report.shots[problem.shots[system.shots[i].index].index].cluster_z2 = report.clusters.z2[i];
+}
+
+/// What was told with a σ is carried into the beam's covariance.
+void carry_told(RangefinderReport& report) {
+  for (const HeldThing& thing : report.held) {
+    if (!thing.sigma || (thing.name != "square_m" && thing.name != "scale")) continue;  // the lens' is in it already
+    const BeamVector moved = *thing.sigma * thing.moves;
+    report.beam.cov += moved * moved.transpose();
+    report.cov_model += moved * moved.transpose();
+  }
+}
+
+/// A lens that was free, and that the shots pulled farther from its file than its covariance lets expect: the file's
+/// error is so much larger, and the beam follows it.
+void carry_surprise(RangefinderReport& report) {
+  constexpr double surprising = 2.0;
+  for (const HeldThing& thing : report.held) {
+    if (!thing.name.starts_with("camera") || !thing.sigma || !std::isfinite(thing.asked_sigma)) continue;
+    if (!(std::abs(thing.asked) > surprising * thing.asked_sigma)) continue;
+    const double gain = std::pow(*thing.sigma / thing.asked_sigma, 2);  // of the pull over the file's error
+    const double excess2 = std::pow(gain, 2) * (std::pow(thing.asked, 2) - std::pow(thing.asked_sigma, 2));
+    report.beam.cov += excess2 * thing.moves * thing.moves.transpose();
+  }
+}
+
+/// The inverse of an information whose diagonal spans many powers of ten.
+Eigen::MatrixXd inverse_of_scaled(const Eigen::MatrixXd& information) {
+  const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
+  return scale.asDiagonal() * inverse_symmetric(scale.asDiagonal() * information * scale.asDiagonal()) *
+         scale.asDiagonal();
 }
 
 CommonState start_state(const BeamProblem& problem, const Camera& camera, const Beam& beam) {
@@ -168,20 +247,44 @@ void take_over(const RefinedBeam& refined, BeamProblem& problem, RangefinderRepo
   }
 }
 
-/// Do the readings ask for a scale? What the residuals of all shots shrink by with one parameter more, lens and poses
-/// held, over what is left: where σ was told by residuals, they hold the missing scale too.
-double scale_in_sigmas(const BeamProblem& problem, const Camera& camera, const Beam& beam, bool sigma_is_told) {
-  const auto planes = std::count_if(problem.shots.begin(), problem.shots.end(),
+/// Do the readings ask for a scale? How far it would be from 1, were it estimated too, lens and poses held, over its σ,
+/// with the σ of a reading told anew: where that came of residuals, they held the missing scale, too.
+double scale_in_sigmas(const BeamProblem& problem, const Camera& camera, const Beam& beam, bool sigma_is_told,
+                       double least_sigma_m) {
+  BeamProblem work = problem;
+  work.estimate_scale = true;
+  const auto planes = std::count_if(work.shots.begin(), work.shots.end(),
                                     [](const PreparedShot& shot) { return shot.used && shot.plane; });
-  if (problem.estimate_scale || planes < 8) return 0.0;
-  BeamProblem with_scale = problem;
-  with_scale.estimate_scale = true;
-  const auto without = solve_beam(problem, camera, beam), with = solve_beam(with_scale, camera, beam);
-  if (!without || !with || !with->converged) return 0.0;
-  const double left = with->normals.cost / std::max(1, with->normals.num_rows - num_beam_params);
-  const double gain = std::max(0.0, without->normals.cost - with->normals.cost);
-  const double z = std::sqrt(gain / std::max(left, sigma_is_told ? 1e-30 : 1.0));
-  return with->beam.scale < 1.0 ? -z : z;
+  if (problem.estimate_scale || planes < 4) return 0.0;
+  auto with = solve_beam(work, camera, beam);
+  for (int round = 0; round < 6 && with && sigma_is_told; ++round) {
+    const double change = estimate_noise(work, camera, with->beam, false, true);
+    work.model.noise.sigma_m = std::max(work.model.noise.sigma_m, least_sigma_m);
+    with = solve_beam(work, camera, with->beam);
+    if (change < 1e-2) break;
+  }
+  constexpr int enough = 3;
+  const int spare = with ? with->normals.num_rows - num_beam_params : 0;
+  if (spare < enough || !with->converged) return 0.0;
+  const double left = std::max(1.0, with->normals.cost / spare);
+  const double sigma = std::sqrt(left * inverse_of_scaled(with->normals.H)(5, 5));
+  const double z = (with->beam.scale - 1.0) / sigma;
+  return std::isfinite(z) ? z : 0.0;
+}
+
+/// σ of the answer, what pulls at it, and what it rests on. `state`: where the solve ended.
+void put_uncertainty(const BeamProblem& problem, const LensPrior& prior, const CommonState& state, const Camera& camera,
+                     const RangefinderConfig& config, RangefinderReport& report) {
+  const ReducedSystem system = reduced_system(problem, prior, state);
+  SolvedPart part{system.places(problem.num_free(), prior.free), {}};
+  part.inverse = inverse_of_scaled(system.H(part.places, part.places));
+  if (!part.inverse.allFinite()) return;
+  put_clusters(problem, system, part, prior, report);
+  report.held = held_things(system, part, prior, camera, problem.points_in_board, report, config);
+  for (HeldThing& sigma : held_sigmas(problem, report)) report.held.push_back(std::move(sigma));
+  if (config.refine == Refine::beam) carry_lens(problem, camera, report);
+  carry_told(report);
+  if (config.refine == Refine::all) carry_surprise(report);
 }
 
 void solve_report(Preparation& ready, const BeamFit& fit, const Camera& camera, const RangefinderConfig& config,
@@ -203,10 +306,12 @@ void solve_report(Preparation& ready, const BeamFit& fit, const Camera& camera, 
   } else {
     report.cost = fit.best.normals.cost;
     report.dof = fit.best.normals.num_rows - problem.num_free();
-    carry_lens(problem, fit.best, camera, report.beam);
   }
   report.beam.noise = problem.model.noise;
-  report.scale_in_sigmas = scale_in_sigmas(problem, report.camera, report.beam, report.range_sigma_is_told);
+  if (refined)
+    put_uncertainty(problem, refines ? prior : LensPrior{}, refines ? refined->state : start, camera, config, report);
+  report.scale_in_sigmas =
+      scale_in_sigmas(problem, report.camera, report.beam, report.range_sigma_is_told, ready.least_sigma_range_m);
   report.bound = judge_beam(problem, report.beam, report.camera);
   report.bound.cov =
       refined ? refined->state.beam.cov : BeamMatrix(BeamMatrix::Constant(std::numeric_limits<double>::infinity()));
@@ -221,6 +326,7 @@ RangefinderReport calibrate_rangefinder(std::span<const Shot> shots, std::span<c
   BeamProblem& problem = ready.problem;
   RangefinderReport report;
   report.camera = camera;
+  report.scale_by_need = config.scale_by_need;
   report.sigma_corner_px = ready.sigma_corner_px;
   report.sigma_spot_px = config.sigma_spot_px.value_or(guessed_sigma_px);
   report.spot_sigma_is_told = !ready.knows_spot_sigma;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "alidade/beam/shot.h"
+#include "alidade/estimation/cluster_covariance.h"
 #include "alidade/estimation/progress.h"
 #include "alidade/estimation/verdict.h"
 #include "alidade/rangefinder/config.h"
@@ -24,6 +25,19 @@ struct ShotFit {
   Eigen::Vector3d point_in_cam = Eigen::Vector3d::Zero();  ///< Where the beam says the reading was taken.
   std::optional<Plane> plane = {};                         ///< Of the board, in the camera frame.
   std::optional<BoardPose> pose = {};                      ///< Of the board, as solved; where it has one.
+  /// What the shot pulls the answer by, squared, over what its noise lets expect; 1 in the mean if all is as assumed.
+  double cluster_z2 = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// Something that the solve held: what an error of it does to the beam, and what the shots say of it.
+struct HeldThing {
+  std::string name;  ///< scale, square_m, board.flat_m, camera.f, camera.cx, camera.cy, sigma_range_m, sigma_spot_px
+  double value = 0.0;
+  BeamVector moves = BeamVector::Zero();  ///< ∂ beam / ∂ its value, everything else solved anew.
+  /// What its error would be, were it free too, and the σ of that: a score (Lagrange multiplier) test. Infinite where
+  /// the shots say nothing of it.
+  double asked = 0.0, asked_sigma = std::numeric_limits<double>::infinity();
+  std::optional<double> sigma = {};  ///< With which it was given; in `beam.cov`.
 };
 
 /// What can be known of the beam from these shots, and how its geometry stands.
@@ -32,11 +46,13 @@ struct BeamBound {
   double sigma_origin_m = 0.0;          ///< √trace of the origin's covariance, of the estimate.
   double sigma_direction_rad = 0.0;     ///< √trace of the direction's, of the estimate.
   std::array<double, 4>
-      spot_sigma_px{};         ///< Larger axis of the predicted spot at bound_ranges_m, for an exact reading.
-  double condition = 0.0;      ///< Of the information about the beam, scaled to a unit diagonal.
-  double range_ratio = 0.0;    ///< Longest over shortest reading.
-  double normal_spread = 0.0;  ///< Least singular value of the boards' normals over √(their number).
-  double offset_m = 0.0;       ///< Of the beam's line from the camera's centre.
+      spot_sigma_px{};               ///< Larger axis of the predicted spot at bound_ranges_m, for an exact reading.
+  double worst_spot_sigma_px = 0.0;  ///< Of these, at ranges between the nearest shot and the farthest.
+  double nearest_m = 0.0, farthest_m = 0.0;  ///< Readings used.
+  double condition = 0.0;                    ///< Of the information about the beam, scaled to a unit diagonal.
+  double range_ratio = 0.0;                  ///< Longest over shortest reading.
+  double normal_spread = 0.0;                ///< Least singular value of the boards' normals over √(their number).
+  double offset_m = 0.0;                     ///< Of the beam's line from the camera's centre.
 };
 inline constexpr std::array<double, 4> bound_ranges_m{0.5, 1.0, 2.0, 4.0};
 
@@ -50,8 +66,12 @@ struct RangefinderReport {
     no_convergence
   };
   Status status = Status::too_few;
-  Beam beam;
-  Camera camera;                   ///< As given, or refined with the beam; the beam belongs to it.
+  Beam beam;                                  ///< Its covariance counts that the measurements of a shot share errors.
+  Camera camera;                              ///< As given, or refined with the beam; the beam belongs to it.
+  BeamMatrix cov_model = BeamMatrix::Zero();  ///< Of the beam, if every single measurement erred by itself.
+  ClusterCovariance clusters;                 ///< What tells the two apart; shots are its clusters.
+  std::vector<HeldThing> held;
+  bool scale_by_need = false;      ///< The scale was estimated for the beam's sake, it is no result itself.
   std::vector<Beam> alternatives;  ///< Other beams that fit as well.
   std::vector<ShotFit> shots;      ///< One a shot.
   BeamBound bound;
@@ -76,6 +96,18 @@ struct RangefinderReport {
                                                       std::span<const Eigen::Vector3d> points_in_board,
                                                       const Camera& camera, const RangefinderConfig& config,
                                                       const Progress& progress = {});
+
+/// What was taken as given, and by how much each could move the answer.
+[[nodiscard]] std::vector<Assumption> rangefinder_assumptions(const RangefinderReport& report);
+
+/// Does the answer rest on a scale of the readings, or of the board, that nobody told? Then it is better estimated: a
+/// board that is too large as a whole moves the origin by its own part only.
+[[nodiscard]] bool wants_scale(const RangefinderReport& report, const RangefinderConfig& config);
+
+/// Why shots that no beam explains may do so: with the ranges in another unit, or each range a row before or after its
+/// spot and board, a beam explains them well. One sentence; empty where neither is so.
+[[nodiscard]] std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board,
+                                          const Camera& camera, const RangefinderConfig& config);
 
 /// What the answer is worth, or why there is none, what to add, and which other method could tell.
 [[nodiscard]] Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Shot> shots,

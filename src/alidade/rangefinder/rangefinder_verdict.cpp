@@ -1,7 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
-#include "alidade/rangefinder/rangefinder.h"
+#include "alidade/rangefinder/cause_checks.h"
 
 namespace alidade {
 namespace {
@@ -59,9 +60,12 @@ double sigma_of_offset_m(const Beam& beam) {
   return std::sqrt((J * embedded_covariance(beam) * J.transpose())[0]);
 }
 
+/// Only where the shots do say so: an offset that is not known at all is another matter.
 bool passes_the_centre(const RangefinderReport& report) {
   constexpr double least_m = 0.002;  // nearer, no spot moves by what it could be measured with
-  return report.bound.offset_m < std::max(least_m, 3.0 * sigma_of_offset_m(report.beam));
+  constexpr double known_m = 0.01;
+  const double sigma_m = sigma_of_offset_m(report.beam);
+  return sigma_m < known_m && report.bound.offset_m < std::max(least_m, 3.0 * sigma_m);
 }
 
 /// Mean angle of the boards' normals to the camera's view, from the cosines.
@@ -119,11 +123,6 @@ Verdict refusal(State state, ExitCode code, const std::string& sentence, const s
   return verdict;
 }
 
-Check check_of(std::string name, State state, std::string text, double value, double limit, std::string unit,
-               std::string figure) {
-  return {std::move(name), state, std::move(text), value, limit, std::move(unit), std::move(figure)};
-}
-
 State graded(double value, double good, double refuse) {
   return !(value < refuse) ? State::refused : value > good ? State::care : State::good;
 }
@@ -133,10 +132,13 @@ void add_precision(const RangefinderReport& report, Method method, Verdict& verd
   verdict.checks.push_back(check_of("origin", graded(bound.sigma_origin_m, good_origin_m, refuse_origin_m),
                                     "σ of the origin is " + text_of(1e3 * bound.sigma_origin_m, 2) + " mm",
                                     1e3 * bound.sigma_origin_m, 1e3 * good_origin_m, "mm", "precision"));
-  const double spot_px = *std::max_element(bound.spot_sigma_px.begin(), bound.spot_sigma_px.end());
-  verdict.checks.push_back(check_of("spot", spot_px <= good_spot_px(method) ? State::good : State::care,
-                                    "σ of the predicted spot is up to " + text_of(spot_px, 2) + " px from 0.5 to 4 m",
-                                    spot_px, good_spot_px(method), "px", "precision"));
+  const double spot_px = bound.worst_spot_sigma_px;
+  verdict.checks.push_back(
+      check_of("spot", spot_px <= good_spot_px(method) ? State::good : State::care,
+               "σ of the predicted spot is up to " + text_of(spot_px, 2) + " px from " +
+                   text_of(std::clamp(bound_ranges_m.front(), bound.nearest_m, bound.farthest_m), 2) + " to " +
+                   text_of(std::clamp(bound_ranges_m.back(), bound.nearest_m, bound.farthest_m), 2) + " m",
+               spot_px, good_spot_px(method), "px", "precision"));
   const double limit = condition_limit(method);
   verdict.checks.push_back(check_of("condition", bound.condition <= limit ? State::good : State::refused,
                                     "condition number of the information " + text_of(bound.condition, 2),
@@ -197,16 +199,6 @@ void add_boards(const RangefinderReport& report, std::span<const Shot> shots, Ve
                                     unfit, 0.0, "", "residuals"));
 }
 
-void add_scale(const RangefinderReport& report, Verdict& verdict) {
-  constexpr double ask_beyond = 4.0;
-  const double z = std::abs(report.scale_in_sigmas);
-  if (z == 0.0) return;
-  verdict.checks.push_back(check_of("scale", z < ask_beyond ? State::good : State::care,
-                                    z < ask_beyond ? "no scale of the readings is asked for"
-                                                   : "the readings ask for --scale (" + text_of(z, 2) + " σ)",
-                                    z, ask_beyond, "σ", "residuals"));
-}
-
 void add_fit(const RangefinderReport& report, Verdict& verdict) {
   int outliers = 0;
   std::string named;
@@ -263,16 +255,30 @@ Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Sho
     add_precision(report, method, verdict);
     add_geometry(report, method, verdict);
     add_fit(report, verdict);
+    verdict.checks.push_back(clusters_agree(report.clusters, "shot",
+                                            "a lens or a square that is off, spots or corners that err alike, a bowed "
+                                            "board",
+                                            "residuals"));
     if (method != Method::spot) add_boards(report, shots, verdict);
     add_spare(report, verdict);
-    add_scale(report, verdict);
+    add_cause_checks(report, shots, config, verdict);
   }
   const auto worst = [&](State state) {
     return std::find_if(verdict.checks.begin(), verdict.checks.end(), [&](const Check& c) { return c.state == state; });
   };
   const auto refused = worst(State::refused);
   std::vector<Check> checks = verdict.checks;
-  if (is_solved && refused != verdict.checks.end() && refused->name == "outliers") {
+  const auto named = [&](std::string_view name) {
+    return std::find_if(verdict.checks.begin(), verdict.checks.end(),
+                        [&](const Check& c) { return c.name == name && c.state == State::refused; });
+  };
+  if (is_solved && named("scale") != verdict.checks.end()) {
+    verdict = refusal(State::refused, ExitCode::cannot_tell, named("scale")->text,
+                      "give the ranges in metres; a scale that is known to be so: --scale");
+  } else if (is_solved && report.status == Status::converged && named("range noise") != verdict.checks.end()) {
+    verdict = refusal(State::not_converged, ExitCode::no_convergence, named("range noise")->text,
+                      "check that each range belongs to its spot and board, that the beam hit the board, and the unit");
+  } else if (is_solved && refused != verdict.checks.end() && refused->name == "outliers") {
     verdict = refusal(State::not_converged, ExitCode::no_convergence, "the shots do not agree: " + refused->text,
                       "check that the beam hit the board in each");
   } else if (is_solved && refused != verdict.checks.end() && refused->name == "boards") {
@@ -289,7 +295,8 @@ Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Sho
       verdict.state = State::care;
       verdict.to_add = care->text;
       // What is wrong comes before what follows from it.
-      for (const std::string_view cause : {"scale", "fit", "outliers", "boards"})
+      for (const std::string_view cause :
+           {"shots agree", "spots by distance", "scale", "fit", "outliers", "boards", "camera"})
         for (const Check& check : verdict.checks)
           if (check.name == cause && check.state == State::care) verdict.to_add = check.text;
     }

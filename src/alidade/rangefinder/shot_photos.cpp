@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <opencv2/core.hpp>
@@ -42,13 +43,16 @@ void find_corners(const cv::Mat& photo, const Camera& camera, const ShotPhotosCo
 }
 
 void find_spot(const cv::Mat& photo, const cv::Mat& photo_off, const std::optional<SeenBoard>& board,
-               const ShotPhotosConfig& config, Shot& shot, ShotPhoto& seen) {
+               const std::vector<Eigen::Vector2d>& region, const ShotPhotosConfig& config, Shot& shot,
+               ShotPhoto& seen) {
   LaserSpotAids aids;
   if (!photo_off.empty()) aids.photo_off = &photo_off;
   aids.seen_board = board;
+  aids.region = region;
   LaserSpot spot = find_laser_spot(photo, aids, config.spot);
+  seen.no_spot.clear();
   if (spot.found()) {
-    shot.spot = Spot{.px = spot.px, .sigma_px = std::sqrt(0.5 * spot.cov.trace())};
+    shot.spot = Spot{.px = spot.px, .sigma_px = std::sqrt(0.5 * spot.cov.trace()), .sigma_is_least = true};
     seen.spot = std::move(spot);
   } else {
     seen.no_spot = spot.reason;
@@ -74,11 +78,88 @@ ShotPhoto look_at(std::size_t i, Shot& shot, const ShotPhotoLoader& load_photo, 
   if (!seen.fault.empty()) return seen;
   std::optional<SeenBoard> board;
   if (config.board) find_corners(photo_off.empty() ? photo : photo_off, camera, config, shot, seen, board);
-  if (config.find_spots && !shot.spot) find_spot(photo, photo_off, board, config, shot, seen);
+  if (config.find_spots && !shot.spot) find_spot(photo, photo_off, board, {}, config, shot, seen);
   return seen;
 }
 
+/// Where the boards' beam is seen at a reading, with how far off it may be.
+struct Foretold {
+  Eigen::Vector2d px;
+  double reach_px = 0.0;  ///< 5σ, and what a finder is off by.
+};
+
+std::optional<Foretold> foretold(const Beam& beam, const Camera& camera, const Shot& shot) {
+  constexpr double sigmas = 5.0, finder_px = 3.0;
+  if (!shot.board) return std::nullopt;
+  const auto pixel = measured_pixel(beam, camera, shot.range_m, shot.sigma_range_m);
+  if (!pixel) return std::nullopt;
+  const double trace = 0.5 * pixel->cov.trace(), det = pixel->cov.determinant();
+  const double largest = trace + std::sqrt(std::max(0.0, trace * trace - det));
+  return Foretold{pixel->px, sigmas * std::sqrt(largest) + finder_px};
+}
+
+std::string at_pixel_of(const Eigen::Vector2d& px) {
+  return "(" + std::to_string(std::lround(px.x())) + ", " + std::to_string(std::lround(px.y())) + ")";
+}
+
+void look_again(std::size_t i, Shot& shot, ShotPhoto& seen, const ShotPhotoLoader& load_photo, const Camera& camera,
+                const Foretold& where, const ShotPhotosConfig& config) {
+  if (shot.spot) {
+    if ((shot.spot->px - where.px).norm() <= where.reach_px) return;
+    seen.false_spot = "the light at " + at_pixel_of(shot.spot->px) + " is not the spot: by the boards that is within " +
+                      std::to_string(std::lround(where.reach_px)) + " px of " + at_pixel_of(where.px);
+    shot.spot.reset();
+    seen.spot.reset();
+  }
+  const cv::Mat photo = load_photo(i, false), photo_off = load_photo(i, true);
+  std::optional<SeenBoard> board;
+  const std::vector<Eigen::Vector3d> points = points_in_board(*config.board);
+  if (const auto fit = fit_board_pose(camera, *shot.board, points))
+    board = SeenBoard{*config.board, camera, fit->pose.cam_from_board};
+  const double r = where.reach_px;
+  std::vector<Eigen::Vector2d> region;
+  for (const auto& [x, y] : {std::pair{-r, -r}, std::pair{r, -r}, std::pair{r, r}, std::pair{-r, r}})
+    region.emplace_back(where.px + Eigen::Vector2d(x, y));
+  const std::string at_first = seen.no_spot;
+  find_spot(photo, photo_off, board, region, config, shot, seen);
+  if (!seen.spot && !at_first.empty()) seen.no_spot = at_first;
+}
+
+/// Spots that hardly any photo shows are not the laser's.
+void drop_rare_spots(std::span<Shot> shots, std::span<ShotPhoto> seen, std::size_t num_looked) {
+  const auto num_found = static_cast<std::size_t>(
+      std::count_if(seen.begin(), seen.end(), [](const ShotPhoto& photo) { return photo.spot.has_value(); }));
+  if (num_found == 0 || 3 * num_found >= num_looked) return;
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    if (!seen[i].spot) continue;
+    seen[i].false_spot = "the light at " + at_pixel_of(seen[i].spot->px) + " is not taken for the spot: only " +
+                         std::to_string(num_found) + " of " + std::to_string(num_looked) + " photos show one";
+    seen[i].spot.reset();
+    shots[i].spot.reset();
+  }
+}
+
 }  // namespace
+
+void look_again_for_spots(std::span<Shot> shots, std::span<ShotPhoto> seen, const ShotPhotoLoader& load_photo,
+                          const Camera& camera, const Beam& by_boards, const ShotPhotosConfig& config,
+                          const Progress& progress) {
+  std::vector<std::optional<Foretold>> where(shots.size());
+  std::size_t num_looked = 0;
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    const bool is_ours = seen[i].has_photo && seen[i].fault.empty() && (seen[i].spot || !shots[i].spot);
+    constexpr double farthest_px = 100.0;  // told no better, the boards say nothing of where it is
+    if (is_ours) where[i] = foretold(by_boards, camera, shots[i]);
+    if (where[i] && where[i]->reach_px > farthest_px) where[i].reset();
+    num_looked += where[i] ? 1 : 0;
+  }
+  std::atomic<std::size_t> done{0};
+  tbb::parallel_for(std::size_t{0}, shots.size(), [&](std::size_t i) {
+    if (where[i]) look_again(i, shots[i], seen[i], load_photo, camera, *where[i], config);
+    report_progress(progress, "looking again at spots", ++done, shots.size());
+  });
+  drop_rare_spots(shots, seen, num_looked);
+}
 
 std::vector<ShotPhoto> look_at_photos(std::span<Shot> shots, const ShotPhotoLoader& load_photo, const Camera& camera,
                                       const ShotPhotosConfig& config, const Progress& progress) {

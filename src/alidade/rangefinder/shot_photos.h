@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/beam/beam.h"
 #include "alidade/beam/shot.h"
 #include "alidade/board/board.h"
 #include "alidade/estimation/progress.h"
@@ -29,6 +30,7 @@ struct ShotPhoto {
   std::string fault;              ///< Not readable, or of another size than the camera's; empty otherwise.
   std::string no_board, no_spot;  ///< Why there is none; empty where there is one, or where none was looked for.
   std::optional<LaserSpot> spot = {};
+  std::string false_spot = {};  ///< What was taken for the spot at first, and why it is none; empty: nothing.
 };
 
 /// Looks for board and laser spot in the shots' photos and adds them to the shots: corners twice, the second time with
@@ -37,5 +39,13 @@ struct ShotPhoto {
 [[nodiscard]] std::vector<ShotPhoto> look_at_photos(std::span<Shot> shots, const ShotPhotoLoader& load_photo,
                                                     const Camera& camera, const ShotPhotosConfig& config,
                                                     const Progress& progress = {});
+
+/// Looks at the spots once more where the boards alone tell the beam: `by_boards` with its covariance. A light that is
+/// not where the beam hits the board within 5σ is no spot (a sticker, the sun, a white square); where there were
+/// two, the one that lies there is. Spots seen in fewer than a third of the photos in which the beam should be seen
+/// are something else, too. The shots' spots are replaced.
+void look_again_for_spots(std::span<Shot> shots, std::span<ShotPhoto> seen, const ShotPhotoLoader& load_photo,
+                          const Camera& camera, const Beam& by_boards, const ShotPhotosConfig& config,
+                          const Progress& progress = {});
 
 }  // namespace alidade

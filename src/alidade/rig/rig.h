@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/estimation/cluster_covariance.h"
 #include "alidade/estimation/progress.h"
 #include "alidade/estimation/verdict.h"
 #include "alidade/geometry/rigid3.h"
@@ -18,6 +19,9 @@ struct RigConfig {
   std::optional<double> sigma_px;           ///< Of a corner's coordinate; none: told by the residuals.
   std::optional<double> sigma_encoder_rad;  ///< Of a reading; none: told by the residuals.
   bool estimate_scales = false;             ///< Radians of the axes for each radian read.
+  double square_m = 0.0;                    ///< Side of the board's squares, to be named; 0: not known.
+  std::optional<double> sigma_square_m;     ///< Of it; none: not known.
+  std::optional<double> sigma_scale;        ///< Of the encoders' scales where they are held; none: not known.
   bool estimate_skew = true;                ///< Of the axes from being square to each other.
   bool reject_outliers = true;
 };
@@ -31,6 +35,7 @@ struct HeadViewFit {
   Eigen::Vector2d reading_correction_rad =
       Eigen::Vector2d::Zero();               ///< What the rig would rather have read, less read.
   std::vector<Eigen::Vector2d> residual_px;  ///< Prediction − observation, one a corner.
+  double cluster_z2 = 0.0;  ///< Its squared pull on the rig over what its noise alone gives; 0: unused.
 };
 
 /// A place of the board, in the world.
@@ -61,7 +66,11 @@ struct RigReport {
     no_convergence
   };
   Status status = Status::too_few;
-  Rig rig;  ///< World: the first head's camera at readings of zero.
+  Rig rig;  ///< World: the first head's camera at readings of zero. Covariance: views are clusters, and what is given
+            ///< with a σ is counted.
+  Eigen::MatrixXd cov_model;   ///< As rig.cov, if every corner and reading erred by itself and all given was exact.
+  ClusterCovariance clusters;  ///< Views; of the parameters that are solved for.
+  std::vector<Assumption> assumed;  ///< Lenses, the square, the encoders' scales.
   std::vector<RigBoard> boards;
   std::vector<HeadViewFit> views;    ///< One a view.
   std::vector<HeadCover> covers;     ///< One a head.

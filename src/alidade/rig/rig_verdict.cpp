@@ -162,6 +162,11 @@ void add_encoder(const RigReport& report, const RigConfig& config, Verdict& verd
                                     sigma / degree, good_rad / degree, "°"));
 }
 
+void add_views(const RigReport& report, Verdict& verdict) {
+  verdict.checks.push_back(
+      clusters_agree(report.clusters, "view", "blur, an encoder's jitter, the board's shape, or the lens", "views"));
+}
+
 }  // namespace
 
 Verdict rig_verdict(const RigReport& report, const RigConfig& config) {
@@ -173,6 +178,7 @@ Verdict rig_verdict(const RigReport& report, const RigConfig& config) {
   add_boards(report, verdict);
   add_fit(report, verdict);
   add_encoder(report, config, verdict);
+  add_views(report, verdict);
   const auto first = [&](State state) {
     return std::ranges::find_if(verdict.checks, [&](const Check& check) { return check.state == state; });
   };
@@ -196,6 +202,7 @@ Verdict rig_verdict(const RigReport& report, const RigConfig& config) {
                      std::to_string(report.views_used) + " views, camera to camera ± " +
                      text_of(3.0 * report.sigma_relative_rad / degree, 2) + "°, ± " +
                      text_of(3e3 * report.sigma_relative_m, 2) + " mm (3σ)";
+  heed_assumptions(report.assumed, verdict);
   return verdict;
 }
 

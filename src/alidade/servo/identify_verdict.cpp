@@ -22,11 +22,15 @@ void add_checks(std::span<const ServoSample> log, const ServoIdentification& ide
   // Of white residuals the correlation has σ = 1/√n; 0.3 is where structure costs more than noise.
   const double limit = std::max(0.3, 4.0 / std::sqrt(rows));
   const bool is_white = std::abs(correlation) < limit;
-  verdict.checks.push_back({"residuals", is_white ? State::good : State::care,
-                            is_white ? "residuals are white: the model is enough"
-                                     : "residuals have structure (correlation " + text_of(correlation) +
-                                           " from row to row): the servo does more than the model, and σ is too small",
-                            correlation, limit, "1", ""});
+  verdict.checks.push_back(
+      {"residuals", is_white ? State::good : State::care,
+       is_white ? "residuals are white: the model is enough"
+                : "residuals have structure (correlation " + text_of(correlation) +
+                      " from row to row): the servo does more than the model; σ counts that rows share errors",
+       correlation, limit, "1", ""});
+  verdict.checks.push_back(clusters_agree(identified.clusters, "block",
+                                          std::to_string(identified.correlated_rows) + " rows in a row share an error",
+                                          "response"));
   const double step_s = identified.duration_s / (rows - 1.0);
   const bool is_resolved = fit.params[1] > 0.5 * step_s;
   verdict.checks.push_back({"sampling", is_resolved ? State::good : State::care,

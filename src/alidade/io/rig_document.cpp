@@ -225,6 +225,15 @@ void fill_rig(std::span<const HeadView> views, const RigReport& report, ResultDo
     fill_heads(report.rig, document);
     fill_heads_model(report.rig, report.cov_model, document);
     document.assumed = report.assumed;
+    JsonValue causes = JsonValue::list();
+    for (const RigCause& cause : report.causes) {
+      JsonValue value;
+      value["name"] = cause.name;
+      value["size"] = cause.size;
+      value["sigmas"] = cause.sigmas;
+      causes.push_back(std::move(value));
+    }
+    estimate["causes"] = std::move(causes);
     estimate["design_effect"] = report.clusters.design_effect;
     estimate["chi2_per_dof"] = report.chi2_per_dof();
     estimate["rms_px"] = report.rms_px;

@@ -94,6 +94,9 @@ void fill_identification(std::span<const ServoSample> log, const ServoIdentifica
   put("latency_s", 2, 1.0);
   put("zero_rad", 3, 1.0);
   put("start_rad", 4, 1.0);
+  // By definition: angles are the encoder's own radians, times the log's own seconds.
+  document.assumed = {{.name = "encoder_scale", .value = 1.0, .sigma = 0.0, .moved = "gain_rad"},
+                      {.name = "clock_rate", .value = 1.0, .sigma = 0.0, .moved = "tau_s"}};
   estimate["design_effect"] = identified.clusters.design_effect;
   estimate["correlated_rows"] = identified.correlated_rows;
   estimate["rms_rad"] = fit.rms_rad;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "alidade/geometry/degree.h"
+#include "alidade/rig/rig_causes.h"
 #include "alidade/rig/rig_clusters.h"
 #include "alidade/rig/rig_frame.h"
 #include "alidade/rig/rig_given.h"
@@ -264,6 +265,7 @@ void finish(Work& work, const SolvedRig& solved, const std::vector<double>& weig
   work.report.rig = world.rig;
   work.report.cov_model = world.J * widened(work.problem, given.wide, *covariance.cov) * world.J.transpose();
   take_assumed(work.report, given, world.J);
+  work.report.causes = rig_causes(work.problem, solved, *covariance.cov, weights, given.assumed);
   for (std::size_t b = 0; b < work.boards.size(); ++b) {
     const Rigid3& old_from_board = state.world_from_board[b];
     work.report.boards.push_back({work.boards[b], world.world_from_old * old_from_board});
@@ -277,6 +279,11 @@ void calibrate(Work& work, const std::map<int, Camera>& cameras) {
   fit_poses(work);
   count_cover(work);
   if (!has_enough(work)) return;
+  if (const auto head = mirrored_head(work)) {
+    work.report.status = Status::mirrored;
+    work.report.mirrored_head = *head;
+    return;
+  }
   if (!start_mountings(work)) {
     work.report.status = Status::degrees;
     return;
@@ -310,6 +317,7 @@ RigReport calibrated(std::span<const HeadView> views, std::span<const Eigen::Vec
 /// What a wrong camera looks like: encoders worse than any encoder, views that contradict each other.
 bool is_suspicious(const RigReport& report) {
   constexpr double usual_rad = 0.3 * degree;
+  if (report.status == Status::mirrored) return false;
   if (report.status != Status::converged) return report.status == Status::no_convergence;
   return report.sigma_encoder_rad > usual_rad || report.chi2_per_dof() > 2.0 ||
          5 * report.views_dropped > report.views_used;

@@ -55,6 +55,14 @@ struct HeadCover {
   int num_shared_boards = 0;  ///< Seen by another head, too.
 };
 
+/// Something that the residuals ask to be free, by how many σ, and how large it would be.
+struct RigCause {
+  std::string name;  ///< "head1.pan_scale", "head2.tilt once a turn"
+  double size = 0.0;
+  std::string unit;
+  double sigmas = 0.0;
+};
+
 struct RigReport {
   enum class Status {
     converged,
@@ -63,6 +71,7 @@ struct RigReport {
     not_linked,  ///< A head shares no board with the others.
     degrees,     ///< The readings are degrees.
     swapped,     ///< The cameras belong to the other heads.
+    mirrored,    ///< A head sees its boards from behind: its images are mirrored.
     no_convergence
   };
   Status status = Status::too_few;
@@ -71,9 +80,11 @@ struct RigReport {
   Eigen::MatrixXd cov_model;   ///< As rig.cov, if every corner and reading erred by itself and all given was exact.
   ClusterCovariance clusters;  ///< Views; of the parameters that are solved for.
   std::vector<Assumption> assumed;  ///< Lenses, the square, the encoders' scales.
+  std::vector<RigCause> causes;     ///< Tested one by one, the one most asked for first.
   std::vector<RigBoard> boards;
   std::vector<HeadViewFit> views;    ///< One a view.
   std::vector<HeadCover> covers;     ///< One a head.
+  int mirrored_head = 0;             ///< Its id, where one is.
   std::vector<std::string> unknown;  ///< Parameters of the combination that cannot be told.
   double sigma_px = 0.0, sigma_encoder_rad = 0.0;
   bool sigma_px_is_told = false, sigma_encoder_is_told = false;  ///< By the residuals.

@@ -12,43 +12,6 @@ using Eigen::Index;
 constexpr int pan_scale = 17, tilt_scale = 18;
 constexpr double ordinary_scale = 0.005, ordinary_square = 0.002, ordinary_f = 0.003, ordinary_centre_px = 2.0;
 
-/// Derivatives of a view's whitened residuals by what is given: its lens, the board's size (relative), the scales.
-struct GivenColumns {
-  Eigen::MatrixXd lens;  ///< As many columns as the lens has parameters.
-  Eigen::VectorXd square, pan, tilt;
-};
-
-GivenColumns given_columns(const RigProblem& problem, const RigState& state, std::size_t v) {
-  const RigView& which = problem.views[v];
-  const HeadView& given = *which.view;
-  const RigHead& rig_head = state.heads[which.head];
-  const TurnedHead turned(rig_head.head, given.pan_tilt_rad + state.corrections_rad[v]);
-  const Rigid3& world_from_board = state.world_from_board[which.board];
-  const Eigen::Matrix3d cam_from_board_rotation =
-      turned.cam_from_world_rotation * world_from_board.rotation.toRotationMatrix();
-  std::vector<Eigen::Vector3d> points_in_cam;
-  for (const Corner& corner : given.seen.corners)
-    points_in_cam.push_back(
-        turned.point_in_cam(world_from_board * problem.points_in_board[static_cast<std::size_t>(corner.index)]));
-  const auto seen = project_with_jacobians(rig_head.camera, points_in_cam);
-  const auto rows = static_cast<Index>(2 * seen.size() + 2);
-  GivenColumns columns{Eigen::MatrixXd::Zero(rows, params(rig_head.camera.lens).size()), Eigen::VectorXd::Zero(rows),
-                       Eigen::VectorXd::Zero(rows), Eigen::VectorXd::Zero(rows)};
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    if (!seen[i]) continue;
-    const auto row = static_cast<Index>(2 * i);
-    const Eigen::Matrix<double, 2, 3> J = seen[i]->J_px_point / problem.sigma_px;
-    const Eigen::Vector3d& point_in_board =
-        problem.points_in_board[static_cast<std::size_t>(given.seen.corners[i].index)];
-    columns.lens.middleRows<2>(row) = seen[i]->J_px_params / problem.sigma_px;
-    columns.square.segment<2>(row) = J * (cam_from_board_rotation * point_in_board);
-    const auto by_head = turned.J_point_head(points_in_cam[i]);
-    columns.pan.segment<2>(row) = J * by_head.col(pan_scale);
-    columns.tilt.segment<2>(row) = J * by_head.col(tilt_scale);
-  }
-  return columns;
-}
-
 /// What is given, and how the free parameters follow it.
 struct Follows {
   std::vector<Eigen::MatrixXd> lens;  ///< One a head.
@@ -192,6 +155,39 @@ struct Filler {
 };
 
 }  // namespace
+
+GivenColumns given_columns(const RigProblem& problem, const RigState& state, std::size_t v) {
+  const RigView& which = problem.views[v];
+  const HeadView& given = *which.view;
+  const RigHead& rig_head = state.heads[which.head];
+  const TurnedHead turned(rig_head.head, given.pan_tilt_rad + state.corrections_rad[v]);
+  const Rigid3& world_from_board = state.world_from_board[which.board];
+  const Eigen::Matrix3d cam_from_board_rotation =
+      turned.cam_from_world_rotation * world_from_board.rotation.toRotationMatrix();
+  std::vector<Eigen::Vector3d> points_in_cam;
+  for (const Corner& corner : given.seen.corners)
+    points_in_cam.push_back(
+        turned.point_in_cam(world_from_board * problem.points_in_board[static_cast<std::size_t>(corner.index)]));
+  const auto seen = project_with_jacobians(rig_head.camera, points_in_cam);
+  const auto rows = static_cast<Index>(2 * seen.size() + 2);
+  GivenColumns columns{Eigen::MatrixXd::Zero(rows, params(rig_head.camera.lens).size()), Eigen::VectorXd::Zero(rows),
+                       Eigen::VectorXd::Zero(rows), Eigen::VectorXd::Zero(rows),
+                       Eigen::Matrix<double, Eigen::Dynamic, 2>::Zero(rows, 2)};
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (!seen[i]) continue;
+    const auto row = static_cast<Index>(2 * i);
+    const Eigen::Matrix<double, 2, 3> J = seen[i]->J_px_point / problem.sigma_px;
+    const Eigen::Vector3d& point_in_board =
+        problem.points_in_board[static_cast<std::size_t>(given.seen.corners[i].index)];
+    columns.lens.middleRows<2>(row) = seen[i]->J_px_params / problem.sigma_px;
+    columns.square.segment<2>(row) = J * (cam_from_board_rotation * point_in_board);
+    columns.readings.middleRows<2>(row) = J * turned.J_point_readings(points_in_cam[i]);
+    const auto by_head = turned.J_point_head(points_in_cam[i]);
+    columns.pan.segment<2>(row) = J * by_head.col(pan_scale);
+    columns.tilt.segment<2>(row) = J * by_head.col(tilt_scale);
+  }
+  return columns;
+}
 
 Eigen::MatrixXd widened(const RigProblem& problem, const RigProblem& wide, const Eigen::MatrixXd& cov) {
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(wide.num_free(), wide.num_free());

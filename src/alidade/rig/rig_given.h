@@ -9,6 +9,15 @@
 
 namespace alidade {
 
+/// Derivatives of a view's whitened residuals by what is given: its lens, the board's size (relative), the scales; and
+/// by the readings.
+struct GivenColumns {
+  Eigen::MatrixXd lens;  ///< As many columns as the lens has parameters.
+  Eigen::VectorXd square, pan, tilt;
+  Eigen::Matrix<double, Eigen::Dynamic, 2> readings;
+};
+[[nodiscard]] GivenColumns given_columns(const RigProblem& problem, const RigState& state, std::size_t view);
+
 /// What a rig's estimate was given — lenses, the printed square, the encoders' scales — and what it does to the
 /// estimate: parameters θ that are free follow a given a by dθ/da = −H⁻¹ ∂g/∂a.
 struct RigGiven {

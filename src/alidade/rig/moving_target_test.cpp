@@ -216,7 +216,6 @@ TEST(MovingTarget, SigmaHoldsWhereErrorsOfSightsGoTogether) {
       }
     }
   }
-  std::printf("slow errors: RMS z %.2f (model %.2f)\n", std::sqrt(stated / num), std::sqrt(model / num));
   EXPECT_GT(std::sqrt(stated / num), 0.6);
   EXPECT_LT(std::sqrt(stated / num), 1.4);
   EXPECT_GT(std::sqrt(model / num), 2.0);

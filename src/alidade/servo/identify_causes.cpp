@@ -131,13 +131,17 @@ std::vector<ServoCause> servo_causes(std::span<const ServoSample> log, const Ser
   return causes;
 }
 
-std::size_t num_levels(std::span<const ServoSample> log, std::size_t most) {
-  std::vector<double> levels;
+std::size_t num_sizes(std::span<const ServoSample> log, std::size_t most) {
+  constexpr double apart = 0.1;
+  std::vector<double> sizes;
   for (const ServoSample& row : log) {
-    if (std::ranges::find(levels, row.command) == levels.end()) levels.push_back(row.command);
-    if (levels.size() >= most) break;
+    const double size = std::abs(row.command);
+    const bool is_known =
+        std::ranges::any_of(sizes, [&](double known) { return std::abs(size - known) <= apart * known; });
+    if (size > 0.0 && !is_known) sizes.push_back(size);
+    if (sizes.size() >= most) break;
   }
-  return levels.size();
+  return sizes.size();
 }
 
 double encoder_step_rad(std::span<const ServoSample> log) {

@@ -33,8 +33,9 @@ struct ServoCause {
 [[nodiscard]] std::vector<ServoCause> servo_causes(std::span<const ServoSample> log,
                                                    const ServoIdentification& identified);
 
-/// Different commands that the log has, up to `most`.
-[[nodiscard]] std::size_t num_levels(std::span<const ServoSample> log, std::size_t most = 4);
+/// Sizes of command that the log has, whatever their sign: of those that differ by a tenth, up to `most`. Of one size
+/// alone, a limit that it runs into is another gain.
+[[nodiscard]] std::size_t num_sizes(std::span<const ServoSample> log, std::size_t most);
 
 /// The step of the encoder where the angles are its whole multiples; 0: not seen.
 [[nodiscard]] double encoder_step_rad(std::span<const ServoSample> log);

@@ -47,7 +47,6 @@ TEST(ServoCauses, CleanLogsAreGood) {
         const std::vector<ServoSample> log = rows_of(scene, seed);
         const Verdict verdict = identify_verdict(log, identify_servo(log));
         good += verdict.state == State::good ? 1 : 0;
-        if (verdict.state != State::good) std::printf("%d %d: %s\n", is_rate_plant, is_chirp, verdict.sentence.c_str());
       }
     }
   }

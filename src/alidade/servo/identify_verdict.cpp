@@ -52,17 +52,17 @@ void add_causes(std::span<const ServoSample> log, const ServoIdentification& ide
     const ServoCause& first = causes.front();
     check.state = State::care;
     check.value = first.sigmas;
-    check.text = std::string("the residuals ask for ") + first.name + ", about " + text_of(first.size, 2) + " " +
-                 first.unit + " (" + text_of(first.sigmas, 2) + "σ): gain, time constant and latency absorb part of it";
+    check.text = "the residuals ask for " + first.name + ", about " + text_of(first.size, 2) + " " + first.unit + " (" +
+                 text_of(first.sigmas, 2) + "σ): gain, time constant and latency absorb part of it";
   }
   verdict.checks.push_back(check);
-  constexpr std::size_t least = 3;
-  const auto levels = num_levels(log, least);
-  verdict.checks.push_back({"excitation", levels >= least ? State::good : State::care,
-                            levels >= least
+  constexpr std::size_t least = 2;
+  const std::size_t sizes = num_sizes(log, least);
+  verdict.checks.push_back({"excitation", sizes >= least ? State::good : State::care,
+                            sizes >= least
                                 ? "commands of several sizes: what is not proportional would show"
                                 : "steps of one size: a dead band, backlash or a limit would pass for another gain",
-                            static_cast<double>(levels), static_cast<double>(least), "levels", ""});
+                            static_cast<double>(sizes), static_cast<double>(least), "sizes", ""});
 }
 
 /// Degrees read as radians, milliseconds as seconds; an encoder that is coarser than its noise.

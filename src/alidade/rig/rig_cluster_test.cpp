@@ -267,8 +267,8 @@ TEST(RigCauses, AreNamedWithTheirSize) {
       const RigReport report = calibrate_rig(views, points_in_board(scene.board), cameras, config);
       const std::string first = report.causes.empty() ? "none" : report.causes.front().name;
       // One and two periods a turn, and a scale, are nearly one over ±40°: the axis is what counts.
-      const std::string axis = std::string(wrong.name).substr(0, 4);
-      named += first.find(axis == "came" ? wrong.name : axis.c_str()) != std::string::npos ? 1 : 0;
+      const std::string axis = std::string(wrong.name).substr(0, 3);
+      named += first.find(axis == "cam" ? wrong.name : axis.c_str()) != std::string::npos ? 1 : 0;
       care += rig_verdict(report, config).state != State::good ? 1 : 0;
     }
     EXPECT_EQ(care, runs) << wrong.name;

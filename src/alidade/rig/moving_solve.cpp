@@ -13,7 +13,8 @@ namespace {
 
 constexpr double sigma_drift = 2e-3;  // of a camera's clock before anything is seen
 constexpr double soft_sigmas = 3.0, most_sigmas = 5.0;
-constexpr double least_gain = 1e-9;  // of the cost: 10⁻⁵ of χ² at 10⁴ sights, 0.003 σ
+// Of the cost, that a step must bring to go on: 10⁻⁵ of χ² at 10⁴ sights, 0.003 σ; where another solve follows, more.
+constexpr double least_gain = 1e-9, least_rough_gain = 1e-6;
 constexpr double not_seen = std::numeric_limits<double>::quiet_NaN();
 
 Eigen::Vector3d centre(const MovingState& state, const MovingProblem& problem, std::size_t head) {
@@ -26,6 +27,7 @@ struct Solver {
   std::vector<double> sigma_px;
   std::vector<bool> used;
   double bend_weight = 1.0;  ///< 1/σ of a second difference of control points.
+  bool is_rough = false;     ///< Another solve follows.
   bool is_soft = true;
   std::vector<Eigen::Vector2d> residual{};
 
@@ -153,7 +155,7 @@ struct Solver {
         }
         damping = is_better ? std::max(1e-9, 0.1 * damping) : 10.0 * damping;
       }
-      if (!is_better || gain < least_gain) return step + 1;
+      if (!is_better || gain < (is_rough ? least_rough_gain : least_gain)) return step + 1;
     }
     return most_steps;
   }
@@ -253,8 +255,9 @@ void finish(Solver& solver, SolvedMoving& solved) {
   const Ldlt ldlt(information);
   const Eigen::MatrixXd cov = ldlt.inverse();
   if (!ldlt.is_positive() || !cov.allFinite()) return;
+  solved.cov = solved.cov_model = cov;
+  if (solver.is_rough) return;
   MovingClusters clusters = moving_clusters(solver.problem, solved, equations.path_by_common(), cov);
-  solved.cov_model = cov;
   solved.cov = std::move(clusters.cov);
   solved.clusters = std::move(clusters.of_time);
   solved.block_s = clusters.block_s;
@@ -291,9 +294,11 @@ std::optional<SightTerms> sight_terms(const MovingProblem& problem, const Moving
   return terms;
 }
 
-SolvedMoving solve_moving(const MovingProblem& problem, const MovingState& start, const Progress& progress) {
+SolvedMoving solve_moving(const MovingProblem& problem, const MovingState& start, const Progress& progress,
+                          bool is_rough) {
   Solver solver{problem, start, std::vector<double>(start.heads.size(), problem.sigma_px.value_or(1.0)),
                 std::vector<bool>(problem.sights.size(), true)};
+  solver.is_rough = is_rough;
   SolvedMoving solved;
   // Loose: an acceleration of the path's own extent in a second.
   const double extent = [&] {

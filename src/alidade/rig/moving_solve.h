@@ -73,9 +73,10 @@ struct SightTerms {
                                                     const SolvedSight& sight);
 
 /// Maximum likelihood over poses, clocks and path, with soft weights (Geman–McClure) first and without what then is
-/// left outside 5 σ at the end. `start`: its spline has its control points. Throws Interrupted.
+/// left outside 5 σ at the end. `start`: its spline has its control points. Rough: where another solve follows; the
+/// covariance is the model's. Throws Interrupted.
 [[nodiscard]] SolvedMoving solve_moving(const MovingProblem& problem, const MovingState& start,
-                                        const Progress& progress);
+                                        const Progress& progress, bool is_rough = false);
 
 /// A spline through points at times: least squares, as straight as it can where there are none.
 [[nodiscard]] PathSpline spline_through(std::span<const double> t_s, std::span<const Eigen::Vector3d> points,

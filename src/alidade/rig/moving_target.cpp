@@ -348,7 +348,7 @@ void place(Placing& work, const TrueTrack& truth) {
     if (is_again) restart(work);
     set_state(work);
     choose_sights(work);
-    work.solved = solve_moving(work.problem, work.state, work.progress);
+    work.solved = solve_moving(work.problem, work.state, work.progress, !is_again);
     work.solved.iterations += std::exchange(iterations, work.solved.iterations);
     if (work.solved.cov.size() == 0) break;
   }

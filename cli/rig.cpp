@@ -27,7 +27,7 @@ struct RigArgs {
   std::filesystem::path views;
   std::vector<std::filesystem::path> cameras;
   BoardOptions board;
-  double sigma_px = 0.0, sigma_angle_rad = 0.0;
+  double sigma_px = 0.0, sigma_angle_rad = 0.0, sigma_square_m = 0.0, sigma_scale = 0.0;
   bool scales = false, skip_bad = false;
   std::string outliers = "drop";
   MovingTargetArgs moving;
@@ -37,6 +37,9 @@ RigConfig config_from(const RigArgs& args) {
   RigConfig config;
   if (args.sigma_px > 0.0) config.sigma_px = args.sigma_px;
   if (args.sigma_angle_rad > 0.0) config.sigma_encoder_rad = args.sigma_angle_rad;
+  if (args.sigma_square_m > 0.0) config.sigma_square_m = args.sigma_square_m;
+  if (args.sigma_scale > 0.0) config.sigma_scale = args.sigma_scale;
+  config.square_m = args.board.square_m;
   config.estimate_scales = args.scales;
   config.reject_outliers = args.outliers == "drop";
   return config;
@@ -213,7 +216,13 @@ void add_rig(Frame& frame) {
       ->check(positive_number());
   command.add_option("--sigma-angle", args->sigma_angle_rad, "σ of an encoder's reading [rad] (default: told as well)")
       ->check(positive_number());
-  command.add_flag("--scales", args->scales, "Estimate the scale of each encoder as well");
+  command.add_option("--sigma-square", args->sigma_square_m, "σ of a square's side [m], counted in the answer's σ")
+      ->check(positive_number());
+  CLI::Option* sigma_scale =
+      command
+          .add_option("--sigma-scale", args->sigma_scale, "σ of the encoders' scales (0.001: 0.1 %), counted as well")
+          ->check(positive_number());
+  command.add_flag("--scales", args->scales, "Estimate the scale of each encoder as well")->excludes(sigma_scale);
   command.add_option("--outliers", args->outliers, "drop: leave out views that contradict the others, by name; keep")
       ->check(CLI::IsMember({"drop", "keep"}))
       ->capture_default_str();

@@ -64,6 +64,31 @@ TEST_F(RigCommand, GivesTheRigWithTheNamesOfTheContract) {
   EXPECT_EQ(rig.cov.rows(), 2 * num_head_params);
 }
 
+TEST_F(RigCommand, SaysWhatItAssumedAndHeedsIt) {
+  simulate();
+  const std::string lens = "model: pinhole\nwidth: 320\nheight: 240\nfx: 337.84\nfy: 337.84\ncx: 160\ncy: 120\n";
+  write_file(path("sim/camera_1.yaml"), lens);
+  const Json document = Json::parse(calibrate(path("sim/views.csv"), {"--json"}).out);
+  EXPECT_EQ(document["verdict"]["state"], "care");
+  std::vector<std::string> names;
+  for (const Json& what : document["assumed"]) {
+    names.push_back(what["name"]);
+    EXPECT_TRUE(what["sigma"].is_null());
+    EXPECT_GT(what["moves"].get<double>(), 0.0);
+  }
+  for (const std::string name : {"camera.fx", "camera.cx", "square_m", "head1.pan_scale", "head2.tilt_scale"})
+    EXPECT_EQ(std::ranges::count(names, name), 1) << name;
+  EXPECT_EQ(document["stddev_model"]["heads"].size(), 2u);
+  EXPECT_EQ(document["data"]["views"]["cluster_z2"].size(), document["counts"]["given"].get<std::size_t>());
+  // All told, the lens's σ in its file: good.
+  write_file(path("sim/camera_1.yaml"),
+             lens + "covariance: {names: [fx, fy, cx, cy], upper: [1e-6, 0, 0, 0, 1e-6, 0, 0, 1e-6, 0, 1e-6]}\n");
+  const Json told =
+      Json::parse(calibrate(path("sim/views.csv"), {"--json", "--sigma-square", "1e-6", "--sigma-scale", "1e-5"}).out);
+  EXPECT_EQ(told["verdict"]["state"], "good") << told["verdict"]["sentence"];
+  for (const Json& what : told["assumed"]) EXPECT_FALSE(what["sigma"].is_null()) << what["name"];
+}
+
 TEST_F(RigCommand, FromRenderedPhotosEndToEnd) {
   simulate({"--photos"});
   const Outcome outcome = calibrate(path("sim/views.csv"));

@@ -67,6 +67,16 @@ void add_photos(const RigScene& scene, const std::vector<HeadView>& views, Run& 
   run.add_file("views.csv", table);
 }
 
+/// The lens is the true one; its file says so: focal lengths and centre to a thousandth of a pixel.
+Camera with_sigma(Camera camera) {
+  constexpr double sigma_px = 1e-3;
+  if (camera.cov.size() > 0) return camera;
+  const auto num = static_cast<Eigen::Index>(params(camera.lens).size());
+  camera.cov.setZero(num, num);
+  camera.cov.diagonal().head<4>().setConstant(sigma_px * sigma_px);
+  return camera;
+}
+
 ExitCode simulate_rig(const SimulateRigArgs& args, Run& run) {
   const RigScene scene = draw_rig_scene(config_from(args, run), run.options.seed);
   const RigNoise noise{args.sigma_px, args.sigma_angle_deg * degree, args.wrong};
@@ -79,7 +89,7 @@ ExitCode simulate_rig(const SimulateRigArgs& args, Run& run) {
   std::vector<std::string> camera_files;
   for (const RigHead& rig_head : scene.rig.heads) {
     camera_files.push_back(fmt::format("camera_{}.yaml", rig_head.head.id));
-    run.add_file(camera_files.back(), camera_text(rig_head.camera, CameraFormat::alidade));
+    run.add_file(camera_files.back(), camera_text(with_sigma(rig_head.camera), CameraFormat::alidade));
   }
   run.add_file("truth_rig.yaml", rig_text(scene.rig, camera_files));
   JsonValue wrong = JsonValue::list();
@@ -102,7 +112,7 @@ void add_rig_scenario(Frame& frame) {
   CLI::App& command = frame.add_command(
       {"simulate rig", "Views of boards by two pan-tilt heads, with the angles their encoders read, and the truth",
        "  alidade simulate rig --out views && alidade rig views/views.csv --camera views/camera_1.yaml \\\n"
-       "    --camera views/camera_2.yaml --board 9x6 --square 0.025\n"
+       "    --camera views/camera_2.yaml --board 9x6 --square 0.025 --sigma-square 1e-6 --sigma-scale 1e-6\n"
        "  alidade simulate rig --photos --out photos",
        true},
       [args](Run& run) { return simulate_rig(*args, run); });

@@ -16,7 +16,7 @@ namespace {
 
 struct SimulateServoArgs {
   std::string kind = "angle", unit = "deg";
-  bool chirp = false;
+  bool chirp = false, one_step = false;
   double gain = 0.0, tau_s = 0.1, latency_s = 0.08, max_rate_deg_s = 1e6, max_acceleration_deg_s2 = 1e9;
   double amplitude = 200.0, duration_s = 5.0, rate_hz = 100.0, sigma_deg = 0.05, step_deg = 0.0, zero_deg = 0.0;
 };
@@ -34,6 +34,7 @@ ServoLogScene scene_of(const SimulateServoArgs& args) {
   }
   scene.axis.command_delay_s = args.latency_s;
   scene.is_chirp = args.chirp;
+  if (args.one_step) scene.steps = {1.0};
   scene.amplitude = args.amplitude;
   scene.duration_s = args.duration_s;
   scene.rate_hz = args.rate_hz;
@@ -56,8 +57,10 @@ ExitCode simulate_servo(const SimulateServoArgs& args, Run& run) {
   run.document.estimate["latency_s"] = args.latency_s;
   run.document.counts.given = run.document.counts.used = samples.size();
   Verdict verdict;
-  verdict.sentence =
-      fmt::format("{} rows of a servo under a {} with known truth", samples.size(), args.chirp ? "chirp" : "step");
+  verdict.sentence = fmt::format("{} rows of a servo under a {} with known truth", samples.size(),
+                                 args.chirp      ? "chirp"
+                                 : args.one_step ? "step"
+                                                 : "row of steps");
   run.say(fmt::format("{} in {}, with a scenario of alidade servo", verdict.sentence, run.options.out.string()));
   return run.finish(verdict);
 }
@@ -67,7 +70,7 @@ ExitCode simulate_servo(const SimulateServoArgs& args, Run& run) {
 void add_servo_scenario(Frame& frame) {
   auto args = std::make_shared<SimulateServoArgs>();
   CLI::App& command = frame.add_command(
-      {"simulate servo", "A log of one servo axis under a step or a chirp for `identify`, and a scenario for `servo`",
+      {"simulate servo", "A log of one servo axis under steps or a chirp for `identify`, and a scenario for `servo`",
        "  alidade simulate servo --out sim && alidade identify sim/log.csv && alidade servo sim/scenario.yaml\n"
        "  alidade simulate servo --chirp --kind rate --latency-s 0.05 --out rate",
        true},
@@ -75,7 +78,8 @@ void add_servo_scenario(Frame& frame) {
   command.add_option("--kind", args->kind, "What follows the command with a lag: the angle, or its rate")
       ->check(CLI::IsMember({"angle", "rate"}))
       ->capture_default_str();
-  command.add_flag("--chirp", args->chirp, "A sine that rises from 0.1 to 3 Hz, instead of a step after 0.5 s");
+  command.add_flag("--chirp", args->chirp, "A sine that rises from 0.1 to 3 Hz, instead of steps");
+  command.add_flag("--one-step", args->one_step, "One step after 0.5 s that stays, instead of several to both sides");
   command.add_option("--gain", args->gain, "Angle (or rate) for each unit of command (default: 0.0567, rate 0.3)")
       ->check(finite_number());
   command.add_option("--unit", args->unit, "Unit of the angle in the gain")

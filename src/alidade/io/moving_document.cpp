@@ -122,7 +122,10 @@ void fill_moving_target(std::span<const TargetSight> sights, const MovingTargetR
   if (report.status != MovingTargetReport::Status::placed) return;
   fill_heads(report.rig, document);
   estimate["chi2_per_dof"] = report.chi2_per_dof;
-  estimate["error_correlation"] = report.correlation;
+  fill_heads_model(report.rig, report.cov_model, document);
+  document.assumed = report.assumed;
+  estimate["design_effect"] = report.clusters.design_effect;
+  estimate["block_s"] = report.block_s;
   estimate["sigma_relative_rad"] = report.sigma_relative_rad;
   estimate["sigma_relative_m"] = report.sigma_relative_m;
   estimate["sigma_scale"] = report.sigma_scale;

@@ -149,7 +149,7 @@ DataTable views_table(std::span<const HeadView> views, const RigReport& report) 
   std::vector<std::string> name, reason;
   std::vector<int> head, board;
   std::vector<bool> used;
-  Numbers pan, tilt, rms, pan_off, tilt_off;
+  Numbers pan, tilt, rms, pan_off, tilt_off, z2;
   for (std::size_t v = 0; v < views.size(); ++v) {
     const HeadViewFit& fit = report.views[v];
     name.push_back(views[v].seen.photo);
@@ -162,6 +162,7 @@ DataTable views_table(std::span<const HeadView> views, const RigReport& report) 
     rms.push_back(fit.residual_px.empty() ? std::numeric_limits<double>::quiet_NaN() : fit.rms_px);
     pan_off.push_back(fit.reading_correction_rad.x());
     tilt_off.push_back(fit.reading_correction_rad.y());
+    z2.push_back(fit.used ? fit.cluster_z2 : std::numeric_limits<double>::quiet_NaN());
   }
   DataTable table{"views",
                   {{"name", name},
@@ -174,6 +175,7 @@ DataTable views_table(std::span<const HeadView> views, const RigReport& report) 
                    {"rms_px", rounded(rms, 5)},
                    {"pan_correction_rad", rounded(pan_off, 8)},
                    {"tilt_correction_rad", rounded(tilt_off, 8)},
+                   {"cluster_z2", rounded(z2, 4)},
                    {"travel_sign", travel_signs(views)}}};
   if (report.status != RigReport::Status::converged) return table;
   std::vector<Rigid3> world_from_cams;
@@ -204,6 +206,16 @@ void fill_heads(const Rig& rig, ResultDocument& document) {
     for (Eigen::Index j = i; j < rig.cov.cols(); ++j) document.covariance_upper.push_back(rig.cov(i, j));
 }
 
+void fill_heads_model(const Rig& rig, const Eigen::MatrixXd& cov_model, ResultDocument& document) {
+  JsonValue sigmas = JsonValue::list();
+  for (std::size_t h = 0; h < rig.heads.size(); ++h) {
+    const HeadVector variance =
+        cov_model.diagonal().segment<num_head_params>(num_head_params * static_cast<Eigen::Index>(h));
+    sigmas.push_back(head_sigma(rig.heads[h].head.id, variance.cwiseMax(0.0).cwiseSqrt()));
+  }
+  document.stddev_model["heads"] = std::move(sigmas);
+}
+
 void fill_rig(std::span<const HeadView> views, const RigReport& report, ResultDocument& document) {
   document.counts.given += views.size();
   document.counts.used = static_cast<std::size_t>(report.views_used);
@@ -211,6 +223,18 @@ void fill_rig(std::span<const HeadView> views, const RigReport& report, ResultDo
   JsonValue& estimate = document.estimate;
   if (report.status == RigReport::Status::converged) {
     fill_heads(report.rig, document);
+    fill_heads_model(report.rig, report.cov_model, document);
+    document.assumed = report.assumed;
+    JsonValue causes = JsonValue::list();
+    for (const RigCause& cause : report.causes) {
+      JsonValue value;
+      value["name"] = cause.name;
+      value["size"] = cause.size;
+      value["sigmas"] = cause.sigmas;
+      causes.push_back(std::move(value));
+    }
+    estimate["causes"] = std::move(causes);
+    estimate["design_effect"] = report.clusters.design_effect;
     estimate["chi2_per_dof"] = report.chi2_per_dof();
     estimate["rms_px"] = report.rms_px;
     estimate["sigma_relative_rad"] = report.sigma_relative_rad;

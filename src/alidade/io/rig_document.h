@@ -13,4 +13,7 @@ void fill_rig(std::span<const HeadView> views, const RigReport& report, ResultDo
 /// The heads alone, with their σ and covariance.
 void fill_heads(const Rig& rig, ResultDocument& document);
 
+/// Their σ if every single measurement erred by itself: `stddev_model`.
+void fill_heads_model(const Rig& rig, const Eigen::MatrixXd& cov_model, ResultDocument& document);
+
 }  // namespace alidade

@@ -82,16 +82,23 @@ void fill_identification(std::span<const ServoSample> log, const ServoIdentifica
   estimate["kind"] = fit.kind == ServoKind::angle ? "angle" : "rate";
   const ServoParams sigma = fit.cov.diagonal().cwiseSqrt();
   const double unknown = std::nan("");
-  const auto put = [&](const char* name, double value, double its_sigma) {
-    estimate[name] = value;
-    stddev[name] = fit.is_observable ? its_sigma : unknown;
+  const ServoParams model = fit.cov_model.diagonal().cwiseSqrt();
+  const auto put = [&](const char* name, int param, double unit) {
+    estimate[name] = fit.params[param] / unit;
+    stddev[name] = fit.is_observable ? sigma[param] / unit : unknown;
+    document.stddev_model[name] = fit.is_observable ? model[param] / unit : unknown;
   };
-  put("gain_rad", fit.params[0], sigma[0]);
-  put("gain_deg", fit.params[0] / degree, sigma[0] / degree);
-  put("tau_s", fit.params[1], sigma[1]);
-  put("latency_s", fit.params[2], sigma[2]);
-  put("zero_rad", fit.params[3], sigma[3]);
-  put("start_rad", fit.params[4], sigma[4]);
+  put("gain_rad", 0, 1.0);
+  put("gain_deg", 0, degree);
+  put("tau_s", 1, 1.0);
+  put("latency_s", 2, 1.0);
+  put("zero_rad", 3, 1.0);
+  put("start_rad", 4, 1.0);
+  // By definition: angles are the encoder's own radians, times the log's own seconds.
+  document.assumed = {{.name = "encoder_scale", .value = 1.0, .sigma = 0.0, .moved = "gain_rad"},
+                      {.name = "clock_rate", .value = 1.0, .sigma = 0.0, .moved = "tau_s"}};
+  estimate["design_effect"] = identified.clusters.design_effect;
+  estimate["correlated_rows"] = identified.correlated_rows;
   estimate["rms_rad"] = fit.rms_rad;
   estimate["rms_of_other_kind_rad"] = identified.other.rms_rad;
   estimate["lag_one_correlation"] = identified.lag_one_correlation;

@@ -6,38 +6,16 @@
 #include <limits>
 
 #include "alidade/geometry/decompositions.h"
+#include "alidade/rig/moving_clusters.h"
 
 namespace alidade {
 namespace {
 
 constexpr double sigma_drift = 2e-3;  // of a camera's clock before anything is seen
 constexpr double soft_sigmas = 3.0, most_sigmas = 5.0;
+// Of the cost, that a step must bring to go on: 10⁻⁵ of χ² at 10⁴ sights, 0.003 σ; where another solve follows, more.
+constexpr double least_gain = 1e-9, least_rough_gain = 1e-6;
 constexpr double not_seen = std::numeric_limits<double>::quiet_NaN();
-
-struct SightTerms {
-  PathSpline::Support at;
-  Eigen::Vector2d r;  ///< Prediction − observation [px].
-  Eigen::Matrix<double, 2, 12> J_path;
-  Eigen::MatrixXd J_common;  ///< By its head's own parameters; no columns where they are held.
-};
-
-std::optional<SightTerms> terms_of(const MovingProblem& problem, const MovingState& state, const SolvedSight& sight) {
-  const auto at = state.path.support(state.rig_time(problem, sight.head, sight.t_s));
-  if (!at) return std::nullopt;
-  const auto seen = project_with_head(state.heads[sight.head], problem.readings[sight.head], state.path.position(*at));
-  if (!seen) return std::nullopt;
-  SightTerms terms{*at, seen->pixel.px - sight.px, {}, Eigen::MatrixXd(2, 0)};
-  for (std::size_t k = 0; k < 4; ++k)
-    terms.J_path.middleCols<3>(static_cast<Eigen::Index>(3 * k)) = at->weight[k] * seen->pixel.J_px_point;
-  if (problem.first_param(sight.head) < 0) return terms;
-  terms.J_common.resize(2, problem.params_a_head());
-  terms.J_common.leftCols<6>() = seen->J_px_head.leftCols<6>();
-  if (!problem.clocks_are_free) return terms;
-  const Eigen::Vector2d by_time = seen->pixel.J_px_point * state.path.velocity(*at);
-  terms.J_common.col(6) = -by_time;
-  terms.J_common.col(7) = -by_time * (sight.t_s - problem.middle_s[sight.head]);
-  return terms;
-}
 
 Eigen::Vector3d centre(const MovingState& state, const MovingProblem& problem, std::size_t head) {
   return cam_centre_in_world(state.heads[head].head, problem.readings[head]);
@@ -49,6 +27,7 @@ struct Solver {
   std::vector<double> sigma_px;
   std::vector<bool> used;
   double bend_weight = 1.0;  ///< 1/σ of a second difference of control points.
+  bool is_rough = false;     ///< Another solve follows.
   bool is_soft = true;
   std::vector<Eigen::Vector2d> residual{};
 
@@ -128,7 +107,7 @@ struct Solver {
     residual.assign(problem.sights.size(), Eigen::Vector2d::Constant(not_seen));
     for (std::size_t i = 0; i < problem.sights.size(); ++i) {
       const SolvedSight& sight = problem.sights[i];
-      const auto terms = terms_of(problem, state, sight);
+      const auto terms = sight_terms(problem, state, sight);
       if (!terms) continue;
       residual[i] = terms->r;
       if (!used[i]) continue;
@@ -176,7 +155,7 @@ struct Solver {
         }
         damping = is_better ? std::max(1e-9, 0.1 * damping) : 10.0 * damping;
       }
-      if (!is_better || gain < 1e-6) return step + 1;
+      if (!is_better || gain < (is_rough ? least_rough_gain : least_gain)) return step + 1;
     }
     return most_steps;
   }
@@ -232,6 +211,24 @@ struct Solver {
     if (sum > 0.0) bend_weight = 1.0 / std::sqrt(2.0 * sum);
   }
 
+  /// Steps and noise by turns until both stand still at this stiffness. Returns the steps taken.
+  int settle(const Progress& progress) {
+    constexpr int most_rounds = 8, most_steps = 12;
+    constexpr double still = 2e-3;
+    int steps = 0;
+    for (int round = 0; round < most_rounds; ++round) {
+      steps += descend(most_steps, progress);
+      const std::vector<double> before = sigma_px;
+      (void)system();
+      tell_noise();
+      double change = 0.0;
+      for (std::size_t h = 0; h < before.size(); ++h)
+        change = std::max(change, std::abs(std::log(sigma_px[h] / before[h])));
+      if (change < still) break;
+    }
+    return steps;
+  }
+
   void drop_wrong() {
     for (std::size_t i = 0; i < used.size(); ++i) {
       const double sigma = sigma_px[problem.sights[i].head];
@@ -239,36 +236,6 @@ struct Solver {
     }
   }
 };
-
-/// Sights that follow each other share errors (a lens's, a hand's): the variance of the sum of scores over stretches
-/// of time, over what independent errors would give.
-double correlation_of(const Solver& solver, const Eigen::MatrixXd& Z, const Eigen::MatrixXd& information) {
-  constexpr double stretch_s = 2.0;
-  const Eigen::Index num = information.rows();
-  std::vector<Eigen::VectorXd> scores;
-  Eigen::MatrixXd alone = Eigen::MatrixXd::Zero(num, num);
-  for (std::size_t i = 0; i < solver.problem.sights.size(); ++i) {
-    const SolvedSight& sight = solver.problem.sights[i];
-    if (!solver.used[i]) continue;
-    const auto terms = terms_of(solver.problem, solver.state, sight);
-    if (!terms) continue;
-    const double by = 1.0 / std::pow(solver.sigma_px[sight.head], 2);
-    Eigen::VectorXd score = -Z.middleRows(static_cast<Eigen::Index>(3 * terms->at.first), 12).transpose() *
-                            (by * terms->J_path.transpose() * terms->r);
-    const Eigen::Index at = solver.problem.first_param(sight.head);
-    if (at >= 0) score.segment(at, terms->J_common.cols()) += by * terms->J_common.transpose() * terms->r;
-    const auto stretch = static_cast<std::size_t>(std::max(
-        0.0, (solver.state.rig_time(solver.problem, sight.head, sight.t_s) - solver.state.path.from_s) / stretch_s));
-    if (scores.size() <= stretch) scores.resize(stretch + 1, Eigen::VectorXd::Zero(num));
-    scores[stretch] += score;
-    alone += score * score.transpose();
-  }
-  Eigen::MatrixXd together = Eigen::MatrixXd::Zero(num, num);
-  for (const Eigen::VectorXd& score : scores) together += score * score.transpose();
-  const Ldlt ldlt(alone);
-  if (!ldlt.is_positive()) return 1.0;
-  return std::max(1.0, ldlt.solve_each(together).trace() / static_cast<double>(num));
-}
 
 void finish(Solver& solver, SolvedMoving& solved) {
   PathSystem equations = solver.system();
@@ -288,8 +255,13 @@ void finish(Solver& solver, SolvedMoving& solved) {
   const Ldlt ldlt(information);
   const Eigen::MatrixXd cov = ldlt.inverse();
   if (!ldlt.is_positive() || !cov.allFinite()) return;
-  solved.correlation = correlation_of(solver, equations.path_by_common(), information);
-  solved.cov = solved.correlation * cov;
+  solved.cov = solved.cov_model = cov;
+  if (solver.is_rough) return;
+  MovingClusters clusters = moving_clusters(solver.problem, solved, equations.path_by_common(), cov);
+  solved.cov = std::move(clusters.cov);
+  solved.clusters = std::move(clusters.of_time);
+  solved.block_s = clusters.block_s;
+  solved.by_lens = std::move(clusters.by_lens);
 }
 
 }  // namespace
@@ -303,9 +275,30 @@ Eigen::Index MovingProblem::first_param(std::size_t head) const {
   return before * params_a_head();
 }
 
-SolvedMoving solve_moving(const MovingProblem& problem, const MovingState& start, const Progress& progress) {
+std::optional<SightTerms> sight_terms(const MovingProblem& problem, const MovingState& state,
+                                      const SolvedSight& sight) {
+  const auto at = state.path.support(state.rig_time(problem, sight.head, sight.t_s));
+  if (!at) return std::nullopt;
+  const auto seen = project_with_head(state.heads[sight.head], problem.readings[sight.head], state.path.position(*at));
+  if (!seen) return std::nullopt;
+  SightTerms terms{*at, seen->pixel.px - sight.px, {}, Eigen::MatrixXd(2, 0)};
+  for (std::size_t k = 0; k < 4; ++k)
+    terms.J_path.middleCols<3>(static_cast<Eigen::Index>(3 * k)) = at->weight[k] * seen->pixel.J_px_point;
+  if (problem.first_param(sight.head) < 0) return terms;
+  terms.J_common.resize(2, problem.params_a_head());
+  terms.J_common.leftCols<6>() = seen->J_px_head.leftCols<6>();
+  if (!problem.clocks_are_free) return terms;
+  const Eigen::Vector2d by_time = seen->pixel.J_px_point * state.path.velocity(*at);
+  terms.J_common.col(6) = -by_time;
+  terms.J_common.col(7) = -by_time * (sight.t_s - problem.middle_s[sight.head]);
+  return terms;
+}
+
+SolvedMoving solve_moving(const MovingProblem& problem, const MovingState& start, const Progress& progress,
+                          bool is_rough) {
   Solver solver{problem, start, std::vector<double>(start.heads.size(), problem.sigma_px.value_or(1.0)),
                 std::vector<bool>(problem.sights.size(), true)};
+  solver.is_rough = is_rough;
   SolvedMoving solved;
   // Loose: an acceleration of the path's own extent in a second.
   const double extent = [&] {
@@ -316,26 +309,25 @@ SolvedMoving solve_moving(const MovingProblem& problem, const MovingState& start
     }
     return (high - low).norm();
   }();
-  solver.bend_weight = 1.0 / (0.3 * extent * start.path.knot_s * start.path.knot_s);
+  // A power of two: what it begins with need not depend on where the path begins.
+  solver.bend_weight = std::exp2(std::round(-std::log2(0.3 * extent * start.path.knot_s * start.path.knot_s)));
   (void)solver.system();
   solver.tell_noise();
-  constexpr int rounds = 8, steps_a_round = 12;
-  for (int round = 0; round < rounds; ++round) {
-    solved.iterations += solver.descend(steps_a_round, progress);
-    const std::vector<double> before = solver.sigma_px;
-    (void)solver.system();
-    solver.tell_noise();
-    if (round == 2 || round == 4) solver.tell_bend();
-    double change = 0.0;
-    for (std::size_t h = 0; h < before.size(); ++h)
-      change = std::max(change, std::abs(std::log(solver.sigma_px[h] / before[h])));
-    if (round > 4 && change < 0.02) break;
+  for (int stage = 0; stage < 3; ++stage) {
+    solved.iterations += solver.settle(progress);
+    if (stage < 2) solver.tell_bend();
   }
-  solver.drop_wrong();
   solver.is_soft = false;
-  const int last = solver.descend(30, progress);
-  solved.iterations += last;
-  solved.converged = last < 30;
+  constexpr int most_rounds = 6, most_steps = 40;
+  for (int round = 0; round < most_rounds; ++round) {
+    const std::vector<bool> before = solver.used;
+    solver.drop_wrong();
+    if (round > 0 && solver.used == before) break;
+    const int last = solver.descend(most_steps, progress);
+    solved.iterations += last;
+    solved.converged = last < most_steps;
+    (void)solver.system();
+  }
   finish(solver, solved);
   return solved;
 }

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "alidade/estimation/cluster_covariance.h"
 #include "alidade/estimation/progress.h"
 #include "alidade/pantilt/head.h"
 #include "alidade/rig/path_spline.h"
@@ -50,16 +51,32 @@ struct SolvedMoving {
   std::vector<double> sigma_px;              ///< One a head.
   std::vector<Eigen::Vector2d> residual_px;  ///< One a sight of the problem; not a number where not seen.
   std::vector<bool> used;
-  Eigen::MatrixXd cov;  ///< Of the common parameters; 0×0 where they cannot be told.
-  double chi2_per_dof = 0.0, correlation = 1.0;
+  Eigen::MatrixXd cov;  ///< Of the common parameters, blocks of time and cameras being clusters; 0×0: cannot be told.
+  Eigen::MatrixXd cov_model;             ///< If every sight erred by itself.
+  ClusterCovariance clusters;            ///< Blocks of time.
+  double block_s = 0.0;                  ///< Length of one.
+  std::vector<Eigen::MatrixXd> by_lens;  ///< One a head: how the common parameters follow its lens's.
+  double chi2_per_dof = 0.0;
   int iterations = 0;
   bool converged = false;
 };
 
+/// One sight's residual with its derivatives.
+struct SightTerms {
+  PathSpline::Support at;
+  Eigen::Vector2d r;  ///< Prediction − observation [px].
+  Eigen::Matrix<double, 2, 12> J_path;
+  Eigen::MatrixXd J_common;  ///< By its head's own parameters; no columns where they are held.
+};
+/// None where the path has no such moment, or the camera does not see it.
+[[nodiscard]] std::optional<SightTerms> sight_terms(const MovingProblem& problem, const MovingState& state,
+                                                    const SolvedSight& sight);
+
 /// Maximum likelihood over poses, clocks and path, with soft weights (Geman–McClure) first and without what then is
-/// left outside 5 σ at the end. `start`: its spline has its control points. Throws Interrupted.
+/// left outside 5 σ at the end. `start`: its spline has its control points. Rough: where another solve follows; the
+/// covariance is the model's. Throws Interrupted.
 [[nodiscard]] SolvedMoving solve_moving(const MovingProblem& problem, const MovingState& start,
-                                        const Progress& progress);
+                                        const Progress& progress, bool is_rough = false);
 
 /// A spline through points at times: least squares, as straight as it can where there are none.
 [[nodiscard]] PathSpline spline_through(std::span<const double> t_s, std::span<const Eigen::Vector3d> points,

@@ -122,7 +122,11 @@ void rebuild_path(std::span<const SightSeries> series, double knot_s, MovingStar
   }
   const double middle_s = 0.5 * (start.t_s.front() + start.t_s.back());
   MovingStart rebuilt;
-  for (double t_s = from_s; t_s <= to_s; t_s += knot_s) {
+  // Moments counted from the first sight of the camera that the path's clock is: whatever else is not yet known.
+  const double anchor_s = series[start.first].t_s.front();
+  for (double k = std::ceil((from_s - anchor_s) / knot_s);; ++k) {
+    const double t_s = anchor_s + k * knot_s;
+    if (t_s > to_s) break;
     std::vector<SeenRay> rays;
     for (std::size_t c = 0; c < series.size(); ++c) {
       if (!start.cameras[c].placed) continue;

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "alidade/geometry/decompositions.h"
+#include "alidade/rig/moving_given.h"
 #include "alidade/rig/moving_scale.h"
 #include "alidade/rig/moving_solve.h"
 #include "alidade/rig/moving_start.h"
@@ -72,6 +74,9 @@ void set_state(Placing& work) {
   const MovingStart::Placed& first = start.cameras[reference];
   const double middle_s = 0.5 * (start.t_s.front() + start.t_s.back());
   const auto in_rig = [&](double t_s) { return t_s + first.offset_s + (first.rate - 1.0) * (t_s - middle_s); };
+  work.state.offset_s.clear();
+  work.state.drift.clear();
+  work.path_t_s.clear();
   double scale = 1.0;
   const Rigid3 world_from_first = first.cam_from_world.inverse();
   const auto centre = [&](std::size_t h) {
@@ -98,22 +103,25 @@ void set_state(Placing& work) {
     work.path_t_s.push_back(in_rig(start.t_s[i]));
     path.emplace_back(scale * (first.cam_from_world * start.path[i]));
   }
-  work.state.path = spline_through(work.path_t_s, path, work.path_t_s.front() - work.knot_s,
+  // Knots counted from the reference's first sight: the same ones wherever the path is thought to begin.
+  const double anchor_s = work.series[reference].t_s.front();
+  const double before = std::floor((work.path_t_s.front() - anchor_s) / work.knot_s + 1e-6) - 1.0;
+  work.state.path = spline_through(work.path_t_s, path, anchor_s + before * work.knot_s,
                                    work.path_t_s.back() + work.knot_s, work.knot_s);
 }
 
-/// Sights where the path is known, a few a knot.
+/// Sights where the path is known, four a knot or fewer: each so-and-so many-th of a camera.
 void choose_sights(Placing& work) {
+  work.problem.sights.clear();
   for (std::size_t h = 0; h < work.heads.size(); ++h) {
     if (!work.problem.placed[h]) continue;
-    double last_s = -1e300;
-    for (std::size_t k = 0; k < work.series[h].t_s.size(); ++k) {
+    const double spacing_s = std::max(1e-9, work.series[h].spacing_s);
+    const auto stride = static_cast<std::size_t>(std::max(1.0, std::ceil(0.24 * work.knot_s / spacing_s - 1e-6)));
+    for (std::size_t k = 0; k < work.series[h].t_s.size(); k += stride) {
       const double t_s = work.series[h].t_s[k];
       const double rig_s = work.state.rig_time(work.problem, h, t_s);
       const auto near = std::ranges::lower_bound(work.path_t_s, rig_s - 1.5 * work.knot_s);
       if (near == work.path_t_s.end() || *near > rig_s + 1.5 * work.knot_s) continue;
-      if (rig_s - last_s < 0.24 * work.knot_s) continue;
-      last_s = rig_s;
       work.problem.sights.push_back({work.series[h].sight[k], h, t_s, work.sights[work.series[h].sight[k]].px});
     }
   }
@@ -161,7 +169,8 @@ void take_results(Placing& work) {
   report.rig.heads = solved.state.heads;
   report.used.assign(work.sights.size(), false);
   report.chi2_per_dof = solved.chi2_per_dof;
-  report.correlation = solved.correlation;
+  report.clusters = solved.clusters;
+  report.block_s = solved.block_s;
   report.iterations = solved.iterations;
   for (std::size_t h = 0; h < work.heads.size(); ++h) {
     PlacedCamera& camera = report.cameras[h];
@@ -194,25 +203,38 @@ void take_results(Placing& work) {
   }
 }
 
-/// Covariance of the heads by the names of a rig's: what is uncertain of the scale comes on top.
+/// Covariance of the heads by the names of a rig's, from that of the solver's parameters.
+Eigen::MatrixXd of_heads(const Placing& work, const Eigen::MatrixXd& common, double scale) {
+  const Eigen::Index num = num_head_params * static_cast<Eigen::Index>(work.heads.size());
+  Eigen::MatrixXd cov = Eigen::MatrixXd::Zero(num, num);
+  for (std::size_t h = 0; h < work.heads.size(); ++h) {
+    const Eigen::Index from_h = work.problem.first_param(h), to_h = num_head_params * static_cast<Eigen::Index>(h);
+    for (std::size_t k = 0; from_h >= 0 && k < work.heads.size(); ++k) {
+      const Eigen::Index from_k = work.problem.first_param(k), to_k = num_head_params * static_cast<Eigen::Index>(k);
+      if (from_k < 0) continue;
+      Eigen::Matrix<double, 6, 6> block = common.block<6, 6>(from_h, from_k);
+      block.topRows<3>() *= scale;
+      block.leftCols<3>() *= scale;
+      cov.block<6, 6>(to_h, to_k) = block;
+    }
+  }
+  return cov;
+}
+
+/// What is uncertain of the scale comes on top.
 void take_covariance(Placing& work, double scale, double sigma_scale) {
   MovingTargetReport& report = work.report;
-  const Eigen::Index num = num_head_params * static_cast<Eigen::Index>(work.heads.size());
-  report.rig.cov.setZero(num, num);
+  const MovingGiven given = moving_given(work.problem, work.solved, work.config);
+  report.assumed = given.assumed;
+  report.rig.cov = of_heads(work, given.cov, scale);
+  report.cov_model = of_heads(work, work.solved.cov_model, scale);
+  const Eigen::Index num = report.rig.cov.rows();
   Eigen::VectorXd by_scale = Eigen::VectorXd::Zero(num);
   const MovingProblem& problem = work.problem;
   const auto centre = [&](std::size_t h) { return cam_centre_in_world(report.rig.heads[h].head, problem.readings[h]); };
   for (std::size_t h = 0; h < work.heads.size(); ++h) {
-    const Eigen::Index from_h = problem.first_param(h), to_h = num_head_params * static_cast<Eigen::Index>(h);
-    if (from_h < 0) continue;
-    for (std::size_t k = 0; k < work.heads.size(); ++k) {
-      const Eigen::Index from_k = problem.first_param(k), to_k = num_head_params * static_cast<Eigen::Index>(k);
-      if (from_k < 0) continue;
-      Eigen::Matrix<double, 6, 6> block = work.solved.cov.block<6, 6>(from_h, from_k);
-      block.topRows<3>() *= scale;
-      block.leftCols<3>() *= scale;
-      report.rig.cov.block<6, 6>(to_h, to_k) = block;
-    }
+    const Eigen::Index to_h = num_head_params * static_cast<Eigen::Index>(h);
+    if (problem.first_param(h) < 0) continue;
     by_scale.segment<3>(to_h) = report.rig.heads[h].head.world_from_base.rotation.conjugate() *
                                 (sigma_scale * (centre(h) - centre(problem.reference)));
   }
@@ -288,30 +310,86 @@ void set_scale(Placing& work, const TrueTrack& truth) {
   report.status = PlacedStatus::placed;
 }
 
+/// The start of a second solve: what the first one found, the path and its sights anew. The knots, the sights that are
+/// taken and the loose path no longer depend on how the search for a start went.
+void restart(Placing& work) {
+  const MovingState& state = work.solved.state;
+  MovingStart& start = work.start;
+  start.t_s = work.path_t_s;
+  start.path.clear();
+  const double middle_s = 0.5 * (start.t_s.front() + start.t_s.back());
+  for (std::size_t h = 0; h < work.heads.size(); ++h) {
+    MovingStart::Placed& camera = start.cameras[h];
+    if (!camera.placed) continue;
+    camera.cam_from_world = cam_from_world(state.heads[h].head, work.problem.readings[h]);
+    camera.rate = 1.0 / (1.0 - state.drift[h]);
+    camera.offset_s =
+        (middle_s + state.offset_s[h] - state.drift[h] * work.problem.middle_s[h]) * camera.rate - middle_s;
+  }
+  for (const double t_s : start.t_s) {
+    const auto at = state.path.support(t_s);
+    start.path.push_back(at ? state.path.position(*at) : Eigen::Vector3d::Zero());
+  }
+  start.first = work.problem.reference;
+  rebuild_path(work.series, work.knot_s, start);
+}
+
+void place(Placing& work, const TrueTrack& truth) {
+  work.state.heads.assign(work.heads.begin(), work.heads.end());
+  work.report.rig.heads = work.state.heads;
+  work.problem.readings.assign(work.heads.size(), Eigen::Vector2d::Zero());
+  read_series(work);
+  if (!begin(work)) return;
+  work.report.status = PlacedStatus::degenerate;
+  if (is_line(work)) return;
+  set_problem(work);
+  int iterations = 0;
+  for (const bool is_again : {false, true}) {
+    if (is_again) restart(work);
+    set_state(work);
+    choose_sights(work);
+    work.solved = solve_moving(work.problem, work.state, work.progress, !is_again);
+    work.solved.iterations += std::exchange(iterations, work.solved.iterations);
+    if (work.solved.cov.size() == 0) break;
+  }
+  take_results(work);
+  if (work.solved.cov.size() == 0) return;
+  work.report.status = PlacedStatus::no_convergence;
+  if (work.solved.converged) set_scale(work, truth);
+}
+
+double first_time(std::span<const TargetSight> sights) {
+  const auto first = std::ranges::min_element(sights, {}, &TargetSight::t_capture_s);
+  return first == sights.end() ? 0.0 : first->t_capture_s;
+}
+
+/// Times from the first sight on, to the nanosecond: what is added to all times must not round its way into the answer.
+std::vector<TargetSight> moved_to(double origin_s, std::span<const TargetSight> sights) {
+  std::vector<TargetSight> moved(sights.begin(), sights.end());
+  for (TargetSight& sight : moved) sight.t_capture_s = 1e-9 * std::round(1e9 * (sight.t_capture_s - origin_s));
+  return moved;
+}
+
+void move_back(double origin_s, MovingTargetReport& report) {
+  const auto move = [origin_s](CameraClock& clock) { clock.offset_s += origin_s * (1.0 - clock.rate); };
+  for (PlacedCamera& camera : report.cameras)
+    if (camera.placed) move(camera.clock);
+  move(report.truth_clock);
+  for (double& t_s : report.path_t_s) t_s += origin_s;
+}
+
 }  // namespace
 
 MovingTargetReport place_cameras(std::span<const TargetSight> sights, std::span<const RigHead> heads,
                                  const MovingTargetConfig& config, const TrueTrack& truth, const Progress& progress) {
-  Placing work{sights, heads, config, progress, {}, 0.0, {}, {}, {}, {}, {}, {}};
-  work.state.heads.assign(heads.begin(), heads.end());
-  work.report.rig.heads = work.state.heads;
-  work.problem.readings.assign(heads.size(), Eigen::Vector2d::Zero());
-  read_series(work);
-  if (!begin(work)) return work.report;
-  work.report.status = PlacedStatus::degenerate;
-  if (is_line(work)) return work.report;
-  set_problem(work);
-  set_state(work);
-  choose_sights(work);
-  work.solved = solve_moving(work.problem, work.state, progress);
-  take_results(work);
-  if (work.solved.cov.size() == 0) return work.report;
-  if (!work.solved.converged) {
-    work.report.status = PlacedStatus::no_convergence;
-    return work.report;
-  }
-  set_scale(work, truth);
-  return work.report;
+  const double origin_s = first_time(sights);
+  const std::vector<TargetSight> from_origin = moved_to(origin_s, sights);
+  TrueTrack truth_from_origin = truth;
+  for (double& t_s : truth_from_origin.t_s) t_s -= origin_s;
+  Placing work{from_origin, heads, config, progress, {}, 0.0, {}, {}, {}, {}, {}, {}};
+  place(work, truth_from_origin);
+  move_back(origin_s, work.report);
+  return std::move(work.report);
 }
 
 }  // namespace alidade

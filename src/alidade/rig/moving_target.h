@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/estimation/cluster_covariance.h"
 #include "alidade/estimation/progress.h"
 #include "alidade/estimation/verdict.h"
 #include "alidade/pantilt/rig.h"
@@ -61,8 +62,11 @@ struct MovingTargetReport {
   std::vector<double> path_t_s;       ///< Times of the rig, where two cameras or more saw the target.
   std::vector<Eigen::Vector3d> path;  ///< The target then.
   double chi2_per_dof = 0.0;
-  double sigma_scale = 0.0;  ///< Relative; of the distance or of the fit to the true path.
-  double correlation = 1.0;  ///< How many sights in a row have one error: σ are larger by its root.
+  double sigma_scale = 0.0;         ///< Relative; of the distance or of the fit to the true path.
+  Eigen::MatrixXd cov_model;        ///< As rig.cov, if every sight erred by itself and lenses were exact.
+  ClusterCovariance clusters;       ///< Blocks of time, by the solver's own parameters.
+  double block_s = 0.0;             ///< Length of a block.
+  std::vector<Assumption> assumed;  ///< Lenses and the distance.
   double sigma_relative_m = 0.0, sigma_relative_rad = 0.0;  ///< Worst camera, in the first one's frame.
   /// With a true path: its clock (time of the rig by its own), and what is left after the similarity, over the path.
   CameraClock truth_clock;

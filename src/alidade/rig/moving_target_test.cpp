@@ -70,14 +70,17 @@ Scene scene_of(PathOf path, unsigned seed, bool clocks_differ, double sigma_px =
 /// The heads as a person gives them: lenses alone.
 std::vector<RigHead> unplaced(const Scene& scene) {
   std::vector<RigHead> heads = scene.truth;
-  for (RigHead& head : heads) head.head.world_from_base = Rigid3{};
+  for (RigHead& head : heads) {
+    head.head.world_from_base = Rigid3{};
+    head.camera.cov.setZero(5, 5);  // exact
+  }
   return heads;
 }
 
 KnownDistance true_distance(const Scene& scene) {
   return {1, 2,
           (scene.truth[0].head.world_from_base.translation - scene.truth[1].head.world_from_base.translation).norm(),
-          0.0};
+          1e-3};
 }
 
 /// Of camera c in the first camera's frame: [translation; rotation], estimate against truth, on the right.
@@ -175,9 +178,71 @@ TEST(MovingTarget, CamerasAreWhereTheyAreWithinTheirCovariance) {
     }
   }
   EXPECT_EQ(num, 66);
-  // χ² of 66 has σ 0.17 of its mean; the correlation factor makes σ larger, never smaller.
+  // χ² of 66 has σ 0.17 of its mean; blocks of time make σ larger, never smaller.
   EXPECT_LT(sum / num, 1.6);
   EXPECT_GT(sum / num, 0.2);
+}
+
+/// Labels whose errors go together for a second, as a hand's do.
+void add_slow_errors(Scene& scene, double sigma_px, unsigned seed) {
+  std::mt19937 random(seed + 1000);
+  std::normal_distribution<double> normal;
+  std::array<Eigen::Vector2d, 3> error;
+  std::array<double, 3> last_s{-1e9, -1e9, -1e9};
+  for (Eigen::Vector2d& one : error) one.setZero();
+  for (TargetSight& sight : scene.sights) {
+    const double keeps = std::exp(-(sight.t_capture_s - last_s[sight.head]) / 1.0);
+    const Eigen::Vector2d fresh(normal(random), normal(random));
+    error[sight.head] = keeps * error[sight.head] + std::sqrt(1.0 - keeps * keeps) * sigma_px * fresh;
+    last_s[sight.head] = sight.t_capture_s;
+    sight.px += error[sight.head];
+  }
+}
+
+TEST(MovingTarget, SigmaHoldsWhereErrorsOfSightsGoTogether) {
+  double stated = 0.0, model = 0.0;
+  int num = 0;
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    Scene scene = scene_of(loops, seed, false, 0.2);
+    add_slow_errors(scene, 0.5, seed);
+    const MovingTargetReport report = place_cameras(scene.sights, unplaced(scene), {.distance = true_distance(scene)});
+    ASSERT_EQ(report.status, PlacedStatus::placed) << seed;
+    for (std::size_t c = 1; c < 3; ++c) {
+      const auto at = static_cast<Eigen::Index>(num_head_params * c);
+      const Eigen::Matrix<double, 6, 1> error = error_of(report, scene, c);
+      for (Eigen::Index k = 0; k < 6; ++k, ++num) {
+        stated += error[k] * error[k] / report.rig.cov(at + k, at + k);
+        model += error[k] * error[k] / report.cov_model(at + k, at + k);
+      }
+    }
+  }
+  EXPECT_GT(std::sqrt(stated / num), 0.6);
+  EXPECT_LT(std::sqrt(stated / num), 1.4);
+  EXPECT_GT(std::sqrt(model / num), 2.0);
+}
+
+/// Neither what is added to all times, nor what one camera's clock says, may move a camera.
+TEST(MovingTarget, WhatIsAddedToTimesMovesNothing) {
+  const Scene scene = scene_of(loops, 5, true);
+  const MovingTargetConfig config{.clock_search_s = 2.0, .distance = true_distance(scene)};
+  const MovingTargetReport report = place_cameras(scene.sights, unplaced(scene), config);
+  ASSERT_EQ(report.status, PlacedStatus::placed);
+  for (const bool of_one : {false, true}) {
+    Scene later = scene;
+    for (TargetSight& sight : later.sights)
+      if (!of_one || sight.head == 1) sight.t_capture_s += of_one ? 0.337 : 1000.0;
+    const MovingTargetReport again = place_cameras(later.sights, unplaced(scene), config);
+    ASSERT_EQ(again.status, PlacedStatus::placed);
+    for (std::size_t c = 1; c < 3; ++c) {
+      const Rigid3 &a = report.rig.heads[c].head.world_from_base, &b = again.rig.heads[c].head.world_from_base;
+      // All times: the same numbers. One clock: another start of the same descent, 0.01 σ.
+      EXPECT_LT((a.translation - b.translation).norm(), of_one ? 2e-4 : 1e-6);
+      EXPECT_LT(a.rotation.angularDistance(b.rotation), of_one ? 1e-5 : 1e-7);
+      const double own_s = 20.0;
+      EXPECT_NEAR(again.cameras[c].clock.in_rig(own_s + (of_one ? (c == 1 ? 0.337 : 0.0) : 1000.0)),
+                  report.cameras[c].clock.in_rig(own_s) + (of_one ? 0.0 : 1000.0), of_one ? 1e-4 : 1e-7);
+    }
+  }
 }
 
 TEST(MovingTarget, ATruePathGivesScaleFrameAndClock) {

@@ -5,7 +5,10 @@
 #include <limits>
 
 #include "alidade/geometry/degree.h"
+#include "alidade/rig/rig_causes.h"
+#include "alidade/rig/rig_clusters.h"
 #include "alidade/rig/rig_frame.h"
+#include "alidade/rig/rig_given.h"
 #include "alidade/rig/rig_start.h"
 #include "alidade/rig/rig_work.h"
 
@@ -216,6 +219,33 @@ bool turns_about_both_axes(const Work& work) {
   });
 }
 
+void take_pulls(Work& work, const std::vector<double>& weights) {
+  std::size_t next = 0;
+  for (std::size_t v = 0; v < work.given.size(); ++v)
+    if (weights[v] > 0.0 && next < work.report.clusters.z2.size())
+      work.report.views[v].cluster_z2 = work.report.clusters.z2[next++];
+}
+
+/// What each thing given does to the parameter that it moves most, in that one's stated σ.
+void take_assumed(RigReport& report, const RigGiven& given, const Eigen::MatrixXd& J) {
+  report.assumed = given.assumed;
+  for (std::size_t i = 0; i < report.assumed.size(); ++i) {
+    Assumption& what = report.assumed[i];
+    const Eigen::VectorXd moved = J * given.moved[i];
+    for (Eigen::Index k = 0; k < moved.size(); ++k) {
+      const double variance = report.rig.cov(k, k);
+      const auto head = static_cast<std::size_t>(k / num_head_params);
+      const std::string name = "head" + std::to_string(report.rig.heads[head].head.id) + "." +
+                               head_param_names[static_cast<std::size_t>(k % num_head_params)];
+      if (!(variance > 0.0) || name == what.name || !(moved[k] * moved[k] > what.moves * what.moves * variance))
+        continue;
+      what.moves = std::abs(moved[k]) / std::sqrt(variance);
+      what.moved = name;
+      what.moved_by = moved[k];
+    }
+  }
+}
+
 void finish(Work& work, const SolvedRig& solved, const std::vector<double>& weights) {
   describe_views(work, solved, weights);
   const RigCovariance covariance = rig_covariance(work.problem, solved);
@@ -226,8 +256,16 @@ void finish(Work& work, const SolvedRig& solved, const std::vector<double>& weig
   }
   RigState state = solved.state;
   for (RigHead& rig_head : state.heads) rig_head.head.encoder.sigma_rad = work.problem.sigma_encoder_rad;
-  const WorldAtCamera world = world_at_camera(work.problem, state, *covariance.cov);
+  work.report.clusters =
+      cluster_covariance(*covariance.cov, 1.0, view_cluster_steps(work.problem, solved, *covariance.cov, weights));
+  take_pulls(work, weights);
+  const RigGiven given = rig_given(work.problem, solved, *covariance.cov, weights, work.config);
+  const WorldAtCamera world =
+      world_at_camera(given.wide, state, widened(work.problem, given.wide, work.report.clusters.cov) + given.cov);
   work.report.rig = world.rig;
+  work.report.cov_model = world.J * widened(work.problem, given.wide, *covariance.cov) * world.J.transpose();
+  take_assumed(work.report, given, world.J);
+  work.report.causes = rig_causes(work.problem, solved, *covariance.cov, weights, given.assumed);
   for (std::size_t b = 0; b < work.boards.size(); ++b) {
     const Rigid3& old_from_board = state.world_from_board[b];
     work.report.boards.push_back({work.boards[b], world.world_from_old * old_from_board});
@@ -241,6 +279,11 @@ void calibrate(Work& work, const std::map<int, Camera>& cameras) {
   fit_poses(work);
   count_cover(work);
   if (!has_enough(work)) return;
+  if (const auto head = mirrored_head(work)) {
+    work.report.status = Status::mirrored;
+    work.report.mirrored_head = *head;
+    return;
+  }
   if (!start_mountings(work)) {
     work.report.status = Status::degrees;
     return;
@@ -274,6 +317,7 @@ RigReport calibrated(std::span<const HeadView> views, std::span<const Eigen::Vec
 /// What a wrong camera looks like: encoders worse than any encoder, views that contradict each other.
 bool is_suspicious(const RigReport& report) {
   constexpr double usual_rad = 0.3 * degree;
+  if (report.status == Status::mirrored) return false;
   if (report.status != Status::converged) return report.status == Status::no_convergence;
   return report.sigma_encoder_rad > usual_rad || report.chi2_per_dof() > 2.0 ||
          5 * report.views_dropped > report.views_used;

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/estimation/cluster_covariance.h"
 #include "alidade/estimation/progress.h"
 #include "alidade/estimation/verdict.h"
 #include "alidade/geometry/rigid3.h"
@@ -18,6 +19,9 @@ struct RigConfig {
   std::optional<double> sigma_px;           ///< Of a corner's coordinate; none: told by the residuals.
   std::optional<double> sigma_encoder_rad;  ///< Of a reading; none: told by the residuals.
   bool estimate_scales = false;             ///< Radians of the axes for each radian read.
+  double square_m = 0.0;                    ///< Side of the board's squares, to be named; 0: not known.
+  std::optional<double> sigma_square_m;     ///< Of it; none: not known.
+  std::optional<double> sigma_scale;        ///< Of the encoders' scales where they are held; none: not known.
   bool estimate_skew = true;                ///< Of the axes from being square to each other.
   bool reject_outliers = true;
 };
@@ -31,6 +35,7 @@ struct HeadViewFit {
   Eigen::Vector2d reading_correction_rad =
       Eigen::Vector2d::Zero();               ///< What the rig would rather have read, less read.
   std::vector<Eigen::Vector2d> residual_px;  ///< Prediction − observation, one a corner.
+  double cluster_z2 = 0.0;  ///< Its squared pull on the rig over what its noise alone gives; 0: unused.
 };
 
 /// A place of the board, in the world.
@@ -50,6 +55,14 @@ struct HeadCover {
   int num_shared_boards = 0;  ///< Seen by another head, too.
 };
 
+/// Something that the residuals ask to be free, by how many σ, and how large it would be.
+struct RigCause {
+  std::string name;  ///< "head1.pan_scale", "head2.tilt once a turn"
+  double size = 0.0;
+  std::string unit;
+  double sigmas = 0.0;
+};
+
 struct RigReport {
   enum class Status {
     converged,
@@ -58,13 +71,20 @@ struct RigReport {
     not_linked,  ///< A head shares no board with the others.
     degrees,     ///< The readings are degrees.
     swapped,     ///< The cameras belong to the other heads.
+    mirrored,    ///< A head sees its boards from behind: its images are mirrored.
     no_convergence
   };
   Status status = Status::too_few;
-  Rig rig;  ///< World: the first head's camera at readings of zero.
+  Rig rig;  ///< World: the first head's camera at readings of zero. Covariance: views are clusters, and what is given
+            ///< with a σ is counted.
+  Eigen::MatrixXd cov_model;   ///< As rig.cov, if every corner and reading erred by itself and all given was exact.
+  ClusterCovariance clusters;  ///< Views; of the parameters that are solved for.
+  std::vector<Assumption> assumed;  ///< Lenses, the square, the encoders' scales.
+  std::vector<RigCause> causes;     ///< Tested one by one, the one most asked for first.
   std::vector<RigBoard> boards;
   std::vector<HeadViewFit> views;    ///< One a view.
   std::vector<HeadCover> covers;     ///< One a head.
+  int mirrored_head = 0;             ///< Its id, where one is.
   std::vector<std::string> unknown;  ///< Parameters of the combination that cannot be told.
   double sigma_px = 0.0, sigma_encoder_rad = 0.0;
   bool sigma_px_is_told = false, sigma_encoder_is_told = false;  ///< By the residuals.

@@ -97,8 +97,8 @@ WorldAtCamera world_at_camera(const RigProblem& problem, const RigState& state, 
   world.world_from_old = cam_from_world(heads[0], Eigen::Vector2d::Zero());
   const std::vector<Head> written = reframed(heads, levels_rad);
   for (std::size_t h = 0; h < heads.size(); ++h) world.rig.heads.push_back({written[h], state.heads[h].camera});
-  const Eigen::MatrixXd J = jacobian(problem, heads, levels_rad);
-  world.rig.cov = J * cov * J.transpose();
+  world.J = jacobian(problem, heads, levels_rad);
+  world.rig.cov = world.J * cov * world.J.transpose();
   return world;
 }
 

@@ -9,6 +9,7 @@ namespace alidade {
 struct WorldAtCamera {
   Rig rig;
   Rigid3 world_from_old;  ///< Takes points of the solver's world into this one.
+  Eigen::MatrixXd J;      ///< Of the rig's parameters by the free ones.
 };
 /// `cov`: of the free parameters of the problem. Tilt zeros are where the camera looks square to the pan axis.
 [[nodiscard]] WorldAtCamera world_at_camera(const RigProblem& problem, const RigState& state,

@@ -112,6 +112,22 @@ void fit_poses(Work& work) {
   }
 }
 
+std::optional<int> mirrored_head(const Work& work) {
+  const auto& points = work.problem.points_in_board;
+  const bool is_flat = std::ranges::all_of(points, [](const Eigen::Vector3d& point) { return point.z() == 0.0; });
+  for (std::size_t h = 0; is_flat && h < work.heads.size(); ++h) {
+    std::size_t behind = 0, seen = 0;
+    for (std::size_t v = 0; v < work.given.size(); ++v) {
+      if (work.problem.views[v].head != h || !work.poses[v]) continue;
+      ++seen;
+      // z of the board points away from who sees its printed side.
+      if (work.poses[v]->pose.cam_from_board.inverse().translation.z() > 0.0) ++behind;
+    }
+    if (2 * behind > seen) return work.ids[h];
+  }
+  return std::nullopt;
+}
+
 bool start_mountings(Work& work) {
   constexpr double suspicious_rad = 3.0 * degree;
   for (std::size_t h = 0; h < work.heads.size(); ++h) {

@@ -75,6 +75,12 @@ Verdict refusal_by_status(const RigReport& report) {
       return rig_refusal(State::refused, ExitCode::cannot_tell,
                          "heads swapped: the views of each head fit the camera of the other",
                          "exchange the cameras, or the numbers in column 'head'");
+    case RigStatus::mirrored:
+      return rig_refusal(
+          State::refused, ExitCode::cannot_tell,
+          "head " + std::to_string(report.mirrored_head) +
+              " sees its boards from behind: its images are mirrored, or corners are counted the other way",
+          "give images as the camera takes them (no mirror, no flip), corners row by row, left to right");
     case RigStatus::not_linked:
       return refusal_by_link(report);
     default:
@@ -162,6 +168,25 @@ void add_encoder(const RigReport& report, const RigConfig& config, Verdict& verd
                                     sigma / degree, good_rad / degree, "°"));
 }
 
+/// What the residuals ask for, beyond what errors that views share would ask for by chance.
+void add_causes(const RigReport& report, Verdict& verdict) {
+  if (report.causes.empty()) return;
+  constexpr double most = 5.0;  // noise told by few readings included, one clean rig in a thousand is above
+  const RigCause& first = report.causes.front();
+  const bool is_quiet = first.sigmas < most;
+  verdict.checks.push_back(
+      check_of("causes", is_quiet ? State::good : State::care,
+               is_quiet ? "lenses, scales and eccentricities are not asked for"
+                        : "the residuals ask for another " + first.name + ", by " + text_of(first.size, 2) +
+                              (first.unit.empty() ? "" : " " + first.unit) + " (" + text_of(first.sigmas, 2) + "σ)",
+               first.sigmas, most, "σ"));
+}
+
+void add_views(const RigReport& report, Verdict& verdict) {
+  verdict.checks.push_back(
+      clusters_agree(report.clusters, "view", "blur, an encoder's jitter, the board's shape, or the lens", "residuals"));
+}
+
 }  // namespace
 
 Verdict rig_verdict(const RigReport& report, const RigConfig& config) {
@@ -173,6 +198,8 @@ Verdict rig_verdict(const RigReport& report, const RigConfig& config) {
   add_boards(report, verdict);
   add_fit(report, verdict);
   add_encoder(report, config, verdict);
+  add_views(report, verdict);
+  add_causes(report, verdict);
   const auto first = [&](State state) {
     return std::ranges::find_if(verdict.checks, [&](const Check& check) { return check.state == state; });
   };
@@ -196,6 +223,7 @@ Verdict rig_verdict(const RigReport& report, const RigConfig& config) {
                      std::to_string(report.views_used) + " views, camera to camera ± " +
                      text_of(3.0 * report.sigma_relative_rad / degree, 2) + "°, ± " +
                      text_of(3e3 * report.sigma_relative_m, 2) + " mm (3σ)";
+  heed_assumptions(report.assumed, verdict);
   return verdict;
 }
 

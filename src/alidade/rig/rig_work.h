@@ -30,6 +30,9 @@ struct Work {
 void index_views(Work& work, const std::map<int, Camera>& cameras);
 /// The pose of the board of each view by itself, and with them σ of a corner.
 void fit_poses(Work& work);
+/// The id of a head that sees the printed side of flat boards from behind in most of its views: its images are
+/// mirrored.
+[[nodiscard]] std::optional<int> mirrored_head(const Work& work);
 /// Mountings of all heads; false where the readings are degrees.
 [[nodiscard]] bool start_mountings(Work& work);
 /// Which parameters are estimated.

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "alidade/geometry/decompositions.h"
+#include "alidade/servo/identify_clusters.h"
 
 namespace alidade {
 namespace {
@@ -110,7 +111,8 @@ void set_covariance(const Eigen::Matrix<double, num_servo_params, num_servo_para
   fit.is_observable = ldlt.least_pivot() > 1e-10;
   if (!fit.is_observable) return;
   const Matrix inverse = ldlt.inverse();
-  fit.cov = fit.rms_rad * fit.rms_rad * (scale.asDiagonal() * inverse * scale.asDiagonal());
+  fit.cov_model = fit.rms_rad * fit.rms_rad * (scale.asDiagonal() * inverse * scale.asDiagonal());
+  fit.cov = fit.cov_model;
 }
 
 /// Levenberg–Marquardt from there; time constant and latency stay within what has a meaning.
@@ -159,6 +161,19 @@ double lag_one(const std::vector<double>& residuals) {
   return square > 0.0 ? product / square : 0.0;
 }
 
+/// What blocks of rows say of the covariance, in scaled parameters so that their units do not matter.
+void set_clusters(const ServoResponse& response, ServoIdentification& result) {
+  ServoFit& fit = result.fit;
+  result.correlated_rows = correlated_rows(result.residual_rad);
+  if (!fit.is_observable || !(fit.rms_rad > 0.0)) return;
+  const ServoParams scale = fit.cov_model.diagonal().cwiseSqrt().cwiseMax(1e-300) / fit.rms_rad;
+  const Eigen::Matrix<double, num_servo_params, num_servo_params> inverse =
+      scale.cwiseInverse().asDiagonal() * fit.cov_model * scale.cwiseInverse().asDiagonal() /
+      (fit.rms_rad * fit.rms_rad);
+  result.clusters = servo_clusters(result.residual_rad, response.J * scale.asDiagonal(), inverse);
+  fit.cov = scale.asDiagonal() * result.clusters.cov * scale.asDiagonal();
+}
+
 }  // namespace
 
 ServoResponse servo_response(std::span<const ServoSample> log, ServoKind kind, const ServoParams& params) {
@@ -205,9 +220,10 @@ ServoIdentification identify_servo(std::span<const ServoSample> log) {
   result.other = refined(log, ServoKind::rate, searched(log, ServoKind::rate));
   // An angle plant with a very long lag looks like a rate plant: a tenth less is more than chance leaves.
   if (result.other.rms_rad < 0.9 * result.fit.rms_rad) std::swap(result.fit, result.other);
-  const Eigen::VectorXd residuals =
-      servo_response(log, result.fit.kind, result.fit.params).angle_rad - readings_of(log);
+  const ServoResponse response = servo_response(log, result.fit.kind, result.fit.params);
+  const Eigen::VectorXd residuals = response.angle_rad - readings_of(log);
   result.residual_rad.assign(residuals.data(), residuals.data() + residuals.size());
+  set_clusters(response, result);
   result.lag_one_correlation = lag_one(result.residual_rad);
   return result;
 }

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "alidade/estimation/cluster_covariance.h"
 #include "alidade/estimation/verdict.h"
 
 namespace alidade {
@@ -37,7 +38,9 @@ struct ServoResponse {
 struct ServoFit {
   ServoKind kind = ServoKind::angle;
   ServoParams params = ServoParams::Zero();
+  /// Of the model that is believed: blocks of rows are clusters; of the other as `cov_model`.
   Eigen::Matrix<double, num_servo_params, num_servo_params> cov = decltype(cov)::Zero();
+  Eigen::Matrix<double, num_servo_params, num_servo_params> cov_model = decltype(cov)::Zero();  ///< Of white noise.
   double rms_rad = 0.0;  ///< Of the residuals, over the degrees of freedom.
   bool has_converged = false;
   bool is_observable = false;  ///< The normal equations can be solved.
@@ -47,6 +50,8 @@ struct ServoIdentification {
   ServoFit fit;                      ///< The model that is believed.
   ServoFit other;                    ///< The one that is not.
   std::vector<double> residual_rad;  ///< Response − reading.
+  ClusterCovariance clusters;        ///< Blocks of rows; of the fit's parameters, whose covariance it is.
+  std::size_t correlated_rows = 1;   ///< How many rows in a row share an error.
   double lag_one_correlation = 0.0;  ///< Of the residuals, one row to the next: near 0 where the model is enough.
   double command_range = 0.0, angle_range_rad = 0.0, duration_s = 0.0;
 };

@@ -2,7 +2,9 @@
 #include <cmath>
 #include <string>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/servo/identify.h"
+#include "alidade/servo/identify_causes.h"
 
 namespace alidade {
 namespace {
@@ -22,11 +24,15 @@ void add_checks(std::span<const ServoSample> log, const ServoIdentification& ide
   // Of white residuals the correlation has σ = 1/√n; 0.3 is where structure costs more than noise.
   const double limit = std::max(0.3, 4.0 / std::sqrt(rows));
   const bool is_white = std::abs(correlation) < limit;
-  verdict.checks.push_back({"residuals", is_white ? State::good : State::care,
-                            is_white ? "residuals are white: the model is enough"
-                                     : "residuals have structure (correlation " + text_of(correlation) +
-                                           " from row to row): the servo does more than the model, and σ is too small",
-                            correlation, limit, "1", ""});
+  verdict.checks.push_back(
+      {"residuals", is_white ? State::good : State::care,
+       is_white ? "residuals are white: the model is enough"
+                : "residuals have structure (correlation " + text_of(correlation) +
+                      " from row to row): the servo does more than the model; σ counts that rows share errors",
+       correlation, limit, "1", ""});
+  verdict.checks.push_back(clusters_agree(identified.clusters, "block",
+                                          std::to_string(identified.correlated_rows) + " rows in a row share an error",
+                                          "response"));
   const double step_s = identified.duration_s / (rows - 1.0);
   const bool is_resolved = fit.params[1] > 0.5 * step_s;
   verdict.checks.push_back({"sampling", is_resolved ? State::good : State::care,
@@ -35,6 +41,51 @@ void add_checks(std::span<const ServoSample> log, const ServoIdentification& ide
                             fit.params[1] / step_s, 0.5, "rows", ""});
   if (!fit.has_converged)
     verdict.checks.push_back({"convergence", State::care, "the fit was still moving", 0.0, 0.0, "1", ""});
+}
+
+/// What the servo does beside a lag, and what this log could not show.
+void add_causes(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
+  const std::vector<ServoCause> causes = servo_causes(log, identified);
+  Check check{.name = "causes", .text = "neither limits, dead band, backlash nor a second lag show", .unit = "σ"};
+  check.limit = 4.0;
+  if (!causes.empty()) {
+    const ServoCause& first = causes.front();
+    check.state = State::care;
+    check.value = first.sigmas;
+    check.text = "the residuals ask for " + first.name + ", about " + text_of(first.size, 2) + " " + first.unit + " (" +
+                 text_of(first.sigmas, 2) + "σ): gain, time constant and latency absorb part of it";
+  }
+  verdict.checks.push_back(check);
+  constexpr std::size_t least = 2;
+  const std::size_t sizes = num_sizes(log, least);
+  verdict.checks.push_back({"excitation", sizes >= least ? State::good : State::care,
+                            sizes >= least
+                                ? "commands of several sizes: what is not proportional would show"
+                                : "steps of one size: a dead band, backlash or a limit would pass for another gain",
+                            static_cast<double>(sizes), static_cast<double>(least), "sizes", ""});
+}
+
+/// Degrees read as radians, milliseconds as seconds; an encoder that is coarser than its noise.
+void add_readings(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
+  constexpr double most_turn_rad = 6.2831853071795865, most_spacing_s = 1.0;
+  const double range = identified.angle_range_rad;
+  if (range > most_turn_rad && identified.fit.kind == ServoKind::angle)
+    verdict.checks.push_back(
+        {"units", State::care,
+         "the angle covers " + text_of(range) + " rad, more than a turn: are these degrees? name the column angle_deg",
+         range, most_turn_rad, "rad", ""});
+  const double spacing_s = identified.duration_s / (static_cast<double>(log.size()) - 1.0);
+  if (spacing_s > most_spacing_s)
+    verdict.checks.push_back({"times", State::care,
+                              "rows are " + text_of(spacing_s) + " s apart: are these milliseconds? t_s is in seconds",
+                              spacing_s, most_spacing_s, "s", ""});
+  const double step_rad = encoder_step_rad(log);
+  // Rounding errs by step/√12; beyond two of the noise's σ it is no longer spread by the noise.
+  if (step_rad > 2.0 * identified.fit.rms_rad)
+    verdict.checks.push_back({"rounding", State::care,
+                              "the encoder reads in steps of " + text_of(step_rad / degree, 2) +
+                                  "°, coarser than its noise: errors of neighbouring rows are one error",
+                              step_rad, 2.0 * identified.fit.rms_rad, "rad", ""});
 }
 
 }  // namespace
@@ -66,12 +117,16 @@ Verdict identify_verdict(std::span<const ServoSample> log, const ServoIdentifica
                    "log for several time constants after a change of command");
   Verdict verdict;
   add_checks(log, identified, verdict);
+  add_causes(log, identified, verdict);
+  add_readings(log, identified, verdict);
   verdict.sentence = std::string(is_angle ? "the angle" : "the rate") + " follows the command by " +
                      text_of(fit.params[0]) + " rad" + (is_angle ? "" : "/s") + " per unit with a time constant of " +
                      text_of(1e3 * fit.params[1]) + " ms, " + text_of(1e3 * fit.params[2]) + " ms late";
   for (const Check& check : verdict.checks) {
     if (check.state == State::good) continue;
     if (verdict.state == State::good) verdict.sentence += "; " + check.text;
+    if (verdict.to_add.empty() && check.name == "excitation")
+      verdict.to_add = "log steps of several sizes to both sides, or a chirp";
     verdict.state = State::care;
   }
   return verdict;

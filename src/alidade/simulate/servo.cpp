@@ -50,6 +50,12 @@ DelayedAxis standing(const ServoAxis& axis, double angle_rad) {
   return still;
 }
 
+double step_of(const ServoLogScene& scene, double t_s) {
+  if (t_s < scene.step_at_s || scene.steps.empty()) return 0.0;
+  const auto done = static_cast<std::size_t>((t_s - scene.step_at_s) / scene.hold_s + 1e-9);
+  return scene.steps[done % scene.steps.size()];
+}
+
 }  // namespace
 
 std::string_view path_name(PathKind kind) { return path_names[static_cast<std::size_t>(kind)]; }
@@ -126,8 +132,8 @@ std::vector<ServoLogRow> simulate_servo_log(const ServoLogScene& scene, std::uin
     ServoLogRow row;
     row.t_s = k / scene.rate_hz;
     const double sweep_hz = scene.low_hz + 0.5 * (scene.high_hz - scene.low_hz) * row.t_s / scene.duration_s;
-    const double wave = scene.is_chirp ? std::sin(2.0 * std::numbers::pi * sweep_hz * row.t_s)
-                                       : (row.t_s >= scene.step_at_s ? 1.0 : 0.0);
+    const double wave =
+        scene.is_chirp ? std::sin(2.0 * std::numbers::pi * sweep_hz * row.t_s) : step_of(scene, row.t_s);
     row.command = scene.amplitude * wave;
     row.angle_rad =
         rounded_to(scene.zero_rad + axis.motion().angle_rad + scene.sigma_rad * draws.normal(), scene.encoder_step_rad);

@@ -65,15 +65,16 @@ class SimulatedHead {
   Draws draws_;
 };
 
-/// A log as `alidade identify` reads it: one axis under a step or a chirp.
+/// A log as `alidade identify` reads it: one axis under steps of several sizes to both sides, or a chirp.
 struct ServoLogScene {
   ServoAxis axis;
   bool is_chirp = false;
   double amplitude = 200.0;  ///< Of the command.
   double duration_s = 5.0, rate_hz = 100.0;
-  double step_at_s = 0.5;
-  double low_hz = 0.1, high_hz = 3.0;  ///< Of the chirp.
-  double zero_rad = 0.0;               ///< What the encoder reads at angle zero.
+  double step_at_s = 0.5, hold_s = 0.9;                   ///< The first step, and each until the next.
+  std::vector<double> steps{1.0, -0.5, 0.25, -1.0, 0.5};  ///< Of the amplitude, over and over; one: it stays.
+  double low_hz = 0.1, high_hz = 3.0;                     ///< Of the chirp.
+  double zero_rad = 0.0;                                  ///< What the encoder reads at angle zero.
   double sigma_rad = 0.0008726646259971648, encoder_step_rad = 0.0;
 };
 struct ServoLogRow {

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "alidade/rig/rig.h"
+#include "alidade/rig/rig_given.h"
+#include "alidade/rig/rig_solve.h"
+
+namespace alidade {
+
+/// Score (Lagrange multiplier) tests: what the residuals would gain if one more thing were free. Of each lens its focal
+/// length and centre; of each encoder that is held its scale; of each axis an error of one and of two periods a turn
+/// (an eccentric or a tilted disc; a bent one). One linearisation, all else following. Largest first. `assumed`: what
+/// was given with a σ is asked for only beyond it. `cov`: of the free parameters by the model.
+/// C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948; docs/maths/pan-tilt-heads.md.
+[[nodiscard]] std::vector<RigCause> rig_causes(const RigProblem& problem, const SolvedRig& solved,
+                                               const Eigen::MatrixXd& cov, const std::vector<double>& weights,
+                                               const std::vector<Assumption>& assumed);
+
+}  // namespace alidade

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "alidade/estimation/verdict.h"
+#include "alidade/rig/rig.h"
+#include "alidade/rig/rig_solve.h"
+
+namespace alidade {
+
+/// Derivatives of a view's whitened residuals by what is given: its lens, the board's size (relative), the scales; and
+/// by the readings.
+struct GivenColumns {
+  Eigen::MatrixXd lens;  ///< As many columns as the lens has parameters.
+  Eigen::VectorXd square, pan, tilt;
+  Eigen::Matrix<double, Eigen::Dynamic, 2> readings;
+};
+[[nodiscard]] GivenColumns given_columns(const RigProblem& problem, const RigState& state, std::size_t view);
+
+/// What a rig's estimate was given — lenses, the printed square, the encoders' scales — and what it does to the
+/// estimate: parameters θ that are free follow a given a by dθ/da = −H⁻¹ ∂g/∂a.
+struct RigGiven {
+  RigProblem wide;                     ///< The problem with the scales among the free parameters of each head.
+  std::vector<Assumption> assumed;     ///< `moves` is not filled in yet.
+  std::vector<Eigen::VectorXd> moved;  ///< By wide parameters: what the error supposed (or its σ) does.
+  Eigen::MatrixXd cov;                 ///< Of the wide parameters, of all that is given with a σ.
+};
+/// `cov`: of the free parameters of the problem by the model. Heads whose cameras are one file share its errors.
+[[nodiscard]] RigGiven rig_given(const RigProblem& problem, const SolvedRig& solved, const Eigen::MatrixXd& cov,
+                                 const std::vector<double>& weights, const RigConfig& config);
+
+/// The free parameters' covariance where the wide ones' stands.
+[[nodiscard]] Eigen::MatrixXd widened(const RigProblem& problem, const RigProblem& wide, const Eigen::MatrixXd& cov);
+
+}  // namespace alidade

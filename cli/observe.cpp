@@ -31,6 +31,21 @@ struct ObserveArgs {
   LiveOptions live;
 };
 
+void estimate_word(const std::string& name, ObserveConfig& config) {
+  static const std::map<std::string, bool ObserveNuisances::*> words{
+      {"k1", &ObserveNuisances::k1},         {"k2", &ObserveNuisances::k2},         {"k3", &ObserveNuisances::k3},
+      {"p1", &ObserveNuisances::tangential}, {"p2", &ObserveNuisances::tangential}, {"mount", &ObserveNuisances::mount},
+      {"delay", &ObserveNuisances::delay},   {"lever", &ObserveNuisances::lever}};
+  if (name == "none") return;
+  if (name == "auto") {
+    config.estimate_auto = true;
+  } else if (const auto word = words.find(name); word != words.end()) {
+    config.estimate.*(word->second) = true;
+  } else {
+    throw UsageError("--estimate: '" + name + "' is not auto, none, k1, k2, k3, p1, p2, mount, delay or lever");
+  }
+}
+
 void set_words(const ObserveArgs& args, ObserveConfig& config) {
   static const std::map<std::string, ObserveMethod> methods{{"hybrid", ObserveMethod::hybrid},
                                                             {"window", ObserveMethod::window},
@@ -41,19 +56,17 @@ void set_words(const ObserveArgs& args, ObserveConfig& config) {
       {"known", RotationKnowledge::known}, {"noisy", RotationKnowledge::noisy}, {"free", RotationKnowledge::free}};
   config.method = methods.at(args.method);
   config.rotation = rotations.at(args.rotation);
-  for (const std::string& name : args.estimate) {
-    if (name == "k1") {
-      config.estimate.k1 = true;
-    } else if (name == "mount") {
-      config.estimate.mount = true;
-    } else if (name == "delay") {
-      config.estimate.delay = true;
-    } else if (name == "lever") {
-      config.estimate.lever = true;
-    } else {
-      throw UsageError("--estimate: '" + name + "' is not k1, mount, delay or lever");
-    }
-  }
+  for (const std::string& name : args.estimate) estimate_word(name, config);
+}
+
+/// Of a lens with its covariance; none: not told. A lens without k1 is one that a board was calibrated with: 0.
+std::optional<double> sigma_of_k1(const Camera& camera) {
+  if (camera.cov.size() == 0) return std::nullopt;
+  const auto names = param_names(camera.lens);
+  const auto at = std::find(names.begin(), names.end(), "k1");
+  if (at == names.end()) return 0.0;
+  const auto i = at - names.begin();
+  return std::sqrt(std::max(camera.cov(i, i), 0.0));
 }
 
 ObserveConfig config_from(const ObserveArgs& args, const std::optional<Camera>& camera) {
@@ -65,14 +78,20 @@ ObserveConfig config_from(const ObserveArgs& args, const std::optional<Camera>& 
     config.width_px = camera->width_px;
     config.height_px = camera->height_px;
   }
-  if (camera) config.start = params(camera->lens).head<4>();
+  if (camera) {
+    config.start = params(camera->lens).head<4>();
+    config.lens_is_given = true;
+    config.sigma_k1 = sigma_of_k1(*camera);
+  }
   if (!args.start.empty()) config.start = Eigen::Vector4d(args.start.data());
   if (config.start && !(config.start->head<2>().minCoeff() > 0.0)) {
     throw UsageError("--start: the focal lengths must be above zero");
   }
   if (!args.lever.empty()) config.lever_m = Eigen::Vector3d(args.lever.data());
   const bool is_regression = config.method == ObserveMethod::flow || config.method == ObserveMethod::fang2011;
-  if (is_regression && (!args.estimate.empty() || config.rotation != RotationKnowledge::known)) {
+  const bool asks = CommonLayout(config.estimate).size > 4 || config.estimate_auto;
+  config.estimate_auto = config.estimate_auto || (args.estimate.empty() && !is_regression);
+  if (is_regression && (asks || config.rotation != RotationKnowledge::known)) {
     throw UsageError("--method " + args.method + " knows neither --estimate nor a rotation that is not known");
   }
   return config;
@@ -163,7 +182,7 @@ RotationLog follow_input(const ObserveArgs& args, const ObserveConfig& config, c
     if (entry->truth) log.truth.push_back(*entry->truth);
     RotationLog one = stream.layout();
     one.rows.push_back(log.rows.back());
-    if (camera) one = undistorted(one, *camera);
+    if (camera && !config.estimate.k1) one = undistorted(one, *camera);
     const double t_s = one.rows.front().t_s;
     const RotationFrame frame = reader.next(one.rows.front());
     const IntrinsicsEstimate estimate = observer.step(frame);
@@ -171,6 +190,8 @@ RotationLog follow_input(const ObserveArgs& args, const ObserveConfig& config, c
     const std::string table = intrinsics_csv({&t_s, 1}, {&estimate, 1});
     if (shows) std::cout << table.substr(table.find('\n') + 1) << std::flush;
   }
+  log.sigma_scale = stream.layout().sigma_scale;
+  log.sigma_parallax = stream.layout().sigma_parallax;
   view.show_last();
   report_progress(run.progress, "rows", log.rows.size(), 0);  // the input may have ended by Ctrl-C
   run.document.counts.given = stream.skipped().size();
@@ -222,12 +243,16 @@ ExitCode observe_log(const ObserveArgs& args, Run& run) {
     config.rotation = RotationKnowledge::free;
   }
   if (config.rotation == RotationKnowledge::free) log.source = RotationSource::none;
-  if (camera) log = undistorted(log, *camera);
+  // A lens that is to be estimated is seen as it is.
+  const bool lens_is_estimated =
+      config.estimate.k1 || config.estimate.k2 || config.estimate.k3 || config.estimate.tangential;
+  if (lens_is_estimated) config.lens_is_given = false;
+  if (camera && !lens_is_estimated) log = undistorted(log, *camera);
   run.lap("read");
   const ObserveReport report = observe(log, config, run.progress);
   run.lap("observe");
   const Verdict verdict = observe_verdict(report, log, config);
-  const Camera seen = observed_camera(report, camera);
+  const Camera seen = observed_camera(report, lens_is_estimated ? std::nullopt : camera);
   fill_observation(log, report, seen, run.document);
   if (has_estimate(verdict)) {
     summarize(report, run);
@@ -261,7 +286,11 @@ void add_options(CLI::App& command, ObserveArgs& args) {
       .add_option("--rotation", args.rotation, "known: exact; noisy: measured with --sigma-angle or --sigma-rate; free")
       ->check(CLI::IsMember({"known", "noisy", "free"}))
       ->capture_default_str();
-  command.add_option("--estimate", args.estimate, "Estimated as well: k1, mount, delay, lever")->delimiter(',');
+  command
+      .add_option("--estimate", args.estimate,
+                  "Estimated as well: auto (default: what the residuals ask for), none, or of k1, k2, k3, p1, p2, "
+                  "mount, delay, lever")
+      ->delimiter(',');
   command.add_option("--camera", args.camera, "Where to start, and the lens' distortion")->type_name("FILE");
   command.add_option("--start", args.start, "Where to start: fx,fy,cx,cy [px]; without it several are tried")
       ->delimiter(',')
@@ -284,6 +313,13 @@ void add_options(CLI::App& command, ObserveArgs& args) {
   sigma("--sigma-angle", args.config.sigma_angle_rad, "σ of an encoder or attitude angle [rad]");
   sigma("--sigma-rate", args.config.sigma_rate_rad_per_s, "σ of a rate [rad/s]");
   sigma("--sigma-range-m", args.config.sigma_range_m, "σ of the column range_m [m]");
+  const auto sigma_of_given = [&](const char* name, std::optional<double>& value, const char* help) {
+    command.add_option(name, value, help)->check(CLI::Range(0.0, 1.0));
+  };
+  sigma_of_given("--sigma-encoder-scale", args.config.sigma_scale,
+                 "σ of the scale of the measured angles or rates, as a share; 0: exact");
+  sigma_of_given("--sigma-parallax", args.config.sigma_parallax,
+                 "σ of how far the camera centre is from the axes, over the distance of the points; 0: exact");
   sigma("--window-s", args.config.window_s, "Length of --method window");
   command.add_flag("--skip-bad", args.skip_bad, "Leave out rows that are wrong, by name, instead of stopping");
   add_live_options(command, args.live, false);

@@ -36,11 +36,18 @@ bool is_binary(char c) {
   return (code < 0x20U && c != '\n' && c != '\r' && c != '\t') || code == 0x7fU;
 }
 
+/// What stands between cells: a semicolon where the header has some and no comma, as spreadsheets of half the world
+/// write it (with a comma in their numbers).
+char separator_of(std::string_view text) {
+  const std::string_view header = text.substr(0, text.find_first_of("\r\n"));
+  return header.find(';') != std::string_view::npos && header.find(',') == std::string_view::npos ? ';' : ',';
+}
+
 /// Splits text into rows of cells: RFC 4180, with LF, CRLF or CR ends.
 class Splitter {
  public:
-  Splitter(std::string_view text, const std::string& name, std::size_t line = 1)
-      : text_(text), name_(name), line_(line) {}
+  Splitter(std::string_view text, const std::string& name, char separator, std::size_t line = 1)
+      : text_(text), name_(name), separator_(separator), line_(line) {}
 
   /// The next row, blank ones included (one empty cell). None at the end.
   [[nodiscard]] std::optional<CsvRow> next() {
@@ -48,7 +55,7 @@ class Splitter {
     CsvRow row{{}, line_};
     do {
       row.cells.push_back(cell());
-    } while (take(','));
+    } while (take(separator_));
     take('\r');
     take('\n');
     ++line_;
@@ -65,10 +72,11 @@ class Splitter {
   std::string cell() {
     while (at_ < text_.size() && (text_[at_] == ' ' || text_[at_] == '\t')) ++at_;
     if (take('"')) return quoted_cell();
-    const std::size_t end = std::min(text_.find_first_of(",\r\n", at_), text_.size());
-    const std::string_view cell = trimmed(text_.substr(at_, end - at_));
+    const std::size_t end = std::min(text_.find_first_of(ends(), at_), text_.size());
+    std::string cell(trimmed(text_.substr(at_, end - at_)));
     at_ = end;
-    return std::string(cell);
+    if (separator_ == ';') std::replace(cell.begin(), cell.end(), ',', '.');
+    return cell;
   }
 
   std::string quoted_cell() {
@@ -79,7 +87,7 @@ class Splitter {
       if (c == '"' && !take('"')) {
         while (take(' ') || take('\t')) {
         }
-        if (at_ < text_.size() && text_.substr(at_, 1).find_first_of(",\r\n") == std::string_view::npos) {
+        if (at_ < text_.size() && text_.substr(at_, 1).find_first_of(ends()) == std::string_view::npos) {
           throw InputError(at_line(name_, line_) + "text after a closing quote");
         }
         return cell;
@@ -90,8 +98,11 @@ class Splitter {
     throw InputError(at_line(name_, begin_line) + "a quote is opened and never closed");
   }
 
+  [[nodiscard]] const char* ends() const { return separator_ == ';' ? ";\r\n" : ",\r\n"; }
+
   std::string_view text_;
   const std::string& name_;
+  char separator_;
   std::size_t at_ = 0;
   std::size_t line_;
 };
@@ -207,7 +218,7 @@ Csv Csv::parse(std::string_view text, const std::string& name) {
   Csv csv;
   csv.name_ = name;
   std::size_t blank_line = 0;  // none yet
-  for (Splitter splitter(text, name); std::optional<CsvRow> row = splitter.next();) {
+  for (Splitter splitter(text, name, separator_of(text)); std::optional<CsvRow> row = splitter.next();) {
     if (is_blank(*row)) {
       if (blank_line == 0) blank_line = row->line;
       continue;
@@ -310,7 +321,8 @@ bool CsvStream::read_rows() {
   std::string_view text = line;
   if (first == 1 && text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   refuse_binary(text, name_, first);
-  for (Splitter splitter(text, name_, first); std::optional<CsvRow> row = splitter.next();)
+  if (header_.empty()) separator_ = separator_of(text);
+  for (Splitter splitter(text, name_, separator_, first); std::optional<CsvRow> row = splitter.next();)
     rows_.push_back(std::move(*row));
   return true;
 }

@@ -89,6 +89,7 @@ class CsvStream {
 
   std::istream& in_;
   std::string name_;
+  char separator_ = ',';
   std::vector<std::string> header_;
   std::size_t header_line_ = 0;
   std::size_t line_ = 1, blank_line_ = 0;  ///< Of what comes next; of a blank line just passed, 0: none.

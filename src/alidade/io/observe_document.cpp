@@ -131,7 +131,8 @@ DataTable points_table(const RotationLog& log, const ObserveReport& report) {
 }
 
 bool is_of_camera(const std::string& name) {
-  return name == "fx" || name == "fy" || name == "cx" || name == "cy" || name == "k1";
+  static constexpr std::array names{"fx", "fy", "cx", "cy", "k1", "k2", "k3", "p1", "p2"};
+  return std::find(names.begin(), names.end(), name) != names.end();
 }
 
 /// The bound is of the longest time without a zoom alone: σ, which holds the other rows as well, may be smaller.
@@ -151,9 +152,11 @@ void fill_values(const ObserveReport& report, const Camera& camera, ResultDocume
   for (const ObservedQuantity& quantity : report.quantities) {
     if (is_of_camera(quantity.name)) {
       document.stddev["camera"][quantity.name] = quantity.sigma;
+      document.stddev_model["camera"][quantity.name] = quantity.sigma_model;
     } else {
       estimate[quantity.name] = quantity.value;
       document.stddev[quantity.name] = quantity.sigma;
+      document.stddev_model[quantity.name] = quantity.sigma_model;
     }
     estimate["bound"][quantity.name] = quantity.bound;
     document.covariance_names.push_back(is_of_camera(quantity.name) ? "camera." + quantity.name : quantity.name);
@@ -163,6 +166,35 @@ void fill_values(const ObserveReport& report, const Camera& camera, ResultDocume
       document.covariance_upper.push_back(report.covariance(i, j));
     }
   }
+}
+
+/// What tells the stated σ from the model's, and what was tested.
+void fill_errors(const ObserveReport& report, ResultDocument& document) {
+  document.assumed = report.assumed;
+  const StatedCovariance& stated = report.stated;
+  JsonValue& shared = document.estimate["shared_errors"];
+  shared["design_effect"] = stated.blocks.design_effect;
+  shared["correlation_s"] = stated.correlation_s;
+  shared["block_s"] = stated.block_s;
+  shared["track_effect"] = stated.track_effect;
+  JsonValue causes = JsonValue::list();
+  for (const CauseScore& cause : report.causes) {
+    JsonValue each = JsonValue::object();
+    each["name"] = cause.name;
+    each["z"] = cause.z;
+    JsonValue members = JsonValue::list();
+    for (const CauseMember& member : cause.members) {
+      JsonValue value = JsonValue::object();
+      value["name"] = member.name;
+      value["value"] = member.value;
+      value["sigma"] = member.sigma;
+      value["unit"] = member.unit;
+      members.push_back(std::move(value));
+    }
+    each["members"] = std::move(members);
+    causes.push_back(std::move(each));
+  }
+  document.estimate["causes"] = std::move(causes);
 }
 
 }  // namespace
@@ -181,6 +213,7 @@ void fill_observation(const RotationLog& log, const ObserveReport& report, const
   document.counts.dropped = log.rows.size() - report.rows_used;
   if (report.status == ObserveReport::Status::ok) {
     fill_values(report, camera, document);
+    fill_errors(report, document);
     if (!log.rows.empty()) fill_reference(log, report, document.estimate["bound"]);
   }
   JsonValue events = JsonValue::list();

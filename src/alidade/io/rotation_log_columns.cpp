@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -135,7 +136,7 @@ class Header {
     if (!meant.empty()) return "is '" + meant + "' meant?";
     return "a rotation log has t, omega_x, omega_y, omega_z or pan, tilt, roll or qw, qx, qy, qz, then p1x, p1y, …, "
            "and "
-           "perhaps vx, vy, vz, range_m, frame, fx, fy, cx, cy";
+           "perhaps vx, vy, vz, range_m, frame, sigma_scale, sigma_parallax, fx, fy, cx, cy";
   }
 
   const CsvStream& table_;
@@ -146,10 +147,16 @@ class Header {
 
 std::vector<RotationLogColumns::Angle> find_head(Header& header, const std::vector<std::string>& names) {
   const std::array<Names, 3> wanted{
-      {{"pan", "pan_rad", "pan_deg"}, {"tilt", "tilt_rad", "tilt_deg"}, {"roll", "roll_rad", "roll_deg"}}};
+      {{"pan", "pan_rad", "pan_deg", "yaw", "yaw_rad", "yaw_deg", "azimuth", "azimuth_rad", "azimuth_deg"},
+       {"tilt", "tilt_rad", "tilt_deg", "pitch", "pitch_rad", "pitch_deg", "elevation", "elevation_rad",
+        "elevation_deg"},
+       {"roll", "roll_rad", "roll_deg"}}};
   std::vector<RotationLogColumns::Angle> angles;
-  for (const std::size_t column : header.find_all(wanted, true))
-    angles.push_back({column, names[column].ends_with("_deg") ? radians_per_degree : 1.0});
+  for (const std::size_t column : header.find_all(wanted, true)) {
+    const double unit_rad = names[column].ends_with("_deg") ? radians_per_degree : 1.0;
+    // An azimuth grows to the right, as a compass does; pan and yaw to the left.
+    angles.push_back({column, names[column].starts_with("azimuth") ? -unit_rad : unit_rad});
+  }
   if (angles.size() == 1) throw InputError(header.at(names[angles[0].column]) + "is there without 'pan' and 'tilt'");
   return angles;
 }
@@ -221,11 +228,12 @@ Eigen::Vector3d read_head(const Cells& cells) {
     const auto& [column, unit_rad] = cells.columns.head[i];
     const double angle = cells.number(column) * unit_rad;
     if (std::abs(angle) > most_rad)
-      throw InputError(
-          cells.fault(column) + "is more than two turns; " +
-          (unit_rad == 1.0 ? "rad expected (degrees: name the column '" +
-                                 cells.columns.names[column].substr(0, cells.columns.names[column].find('_')) + "_deg')"
-                           : "degrees expected"));
+      throw InputError(cells.fault(column) + "is more than two turns; " +
+                       (std::abs(unit_rad) == 1.0
+                            ? "rad expected (degrees: name the column '" +
+                                  cells.columns.names[column].substr(0, cells.columns.names[column].find('_')) +
+                                  "_deg')"
+                            : "degrees expected"));
     angles[static_cast<Eigen::Index>(i)] = angle;
   }
   return angles;
@@ -256,6 +264,26 @@ void read_rotation(const Cells& cells, RotationRow& row) {
   if (columns.source == RotationSource::attitude && has(columns.quaternion)) row.base_from_cam = read_attitude(cells);
 }
 
+/// By the column's name; 0: by how large the numbers are.
+double time_unit_s(const std::string& name) {
+  if (name.ends_with("_ms")) return 1e-3;
+  if (name.ends_with("_us")) return 1e-6;
+  if (name.ends_with("_ns")) return 1e-9;
+  return name.ends_with("_s") ? 1.0 : 0.0;
+}
+
+/// Clocks count seconds, or their thousandths since 1970, which no log in seconds reaches.
+double read_time_s(const Cells& cells) {
+  constexpr double least_ms = 1e11, least_us = 1e14, least_ns = 1e17;
+  const std::string& cell = cells.text(cells.columns.t);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+  const bool is_clock = error == std::errc{} && end == cell.data() + cell.size() && value < 1e19;
+  double unit_s = cells.columns.t_unit_s;
+  if (unit_s == 0.0) unit_s = value < least_ms ? 1.0 : value < least_us ? 1e-3 : value < least_ns ? 1e-6 : 1e-9;
+  return is_clock && unit_s < 1.0 ? unit_s * value : unit_s * cells.number(cells.columns.t);
+}
+
 double read_range(const Cells& cells, std::size_t column) {
   const double range_m = cells.number(column);
   if (!(range_m > 0.0)) throw InputError(cells.fault(column) + "is not above zero");
@@ -277,16 +305,21 @@ RotationLogColumns rotation_log_columns(const CsvStream& table, bool needs_rotat
   RotationLogColumns columns;
   columns.names = table.header();
   Header header(table);
-  const std::optional<std::size_t> t = header.find({"t", "t_s"});
+  const std::optional<std::size_t> t =
+      header.find({"t", "t_s", "time", "time_s", "timestamp", "timestamp_s", "t_ms", "time_ms", "timestamp_ms", "t_us",
+                   "time_us", "timestamp_us", "t_ns", "time_ns", "timestamp_ns"});
   columns.points = header.find_points();
   columns.velocity = header.find_all(velocity, false);
   columns.truth = header.find_all(truth, false);
   columns.range = header.find({"range_m"});
+  columns.sigma_scale = header.find({"sigma_scale"});
+  columns.sigma_parallax = header.find({"sigma_parallax"});
   (void)header.find({"frame"});
   find_rotation(header, table, needs_rotation, columns);
   header.refuse_rest();
   if (!t) throw InputError(table.name() + ": has no column 't' (time, s)");
   columns.t = *t;
+  columns.t_unit_s = time_unit_s(columns.names[*t]);
   if (needs_points && columns.points.empty())
     throw InputError(table.name() + ": has no points; columns p1x, p1y, … are needed");
   return columns;
@@ -295,7 +328,7 @@ RotationLogColumns rotation_log_columns(const CsvStream& table, bool needs_rotat
 RotationRow rotation_row(const CsvRow& row, const RotationLogColumns& columns, const std::string& file) {
   const Cells cells{row, columns, file};
   RotationRow read;
-  read.t_s = cells.number(columns.t);
+  read.t_s = read_time_s(cells);
   read_rotation(cells, read);
   for (std::size_t i = 0; i < columns.velocity.size(); ++i)
     read.velocity_m_per_s[static_cast<Eigen::Index>(i)] = cells.number(columns.velocity[i]);
@@ -309,6 +342,15 @@ RotationRow rotation_row(const CsvRow& row, const RotationLogColumns& columns, c
                       csv_pixel(cells.text(place[1]), cells.place(place[1]))};
   }
   return read;
+}
+
+std::optional<double> told_share(const CsvRow& row, const std::optional<std::size_t>& column,
+                                 const RotationLogColumns& columns, const std::string& file) {
+  if (!column) return std::nullopt;
+  const Cells cells{row, columns, file};
+  const double share = cells.number(*column);
+  if (!(share >= 0.0 && share <= 1.0)) throw InputError(cells.fault(*column) + "is not a share from 0 to 1");
+  return share;
 }
 
 std::optional<TrueIntrinsics> true_intrinsics(const CsvRow& row, const RotationLogColumns& columns,

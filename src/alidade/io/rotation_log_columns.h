@@ -21,11 +21,12 @@ struct RotationLogColumns {
   std::vector<std::string> names;  ///< The header.
   RotationSource source = RotationSource::none;
   std::size_t t = 0;
+  double t_unit_s = 0.0;          ///< 0: by how large the time is: s, or the ms, µs, ns since 1970.
   std::vector<std::size_t> rate;  ///< ω_x, ω_y, perhaps ω_z.
   std::vector<Angle> head;        ///< Pan, tilt, perhaps roll.
   std::vector<std::size_t> quaternion, velocity, truth;
   std::vector<std::array<std::size_t, 2>> points;
-  std::optional<std::size_t> range;
+  std::optional<std::size_t> range, sigma_scale, sigma_parallax;
 };
 
 /// Finds them in the header. Throws InputError naming the column: an unknown one (with what was probably meant), one
@@ -35,6 +36,9 @@ struct RotationLogColumns {
 
 /// What a row holds by these columns. Throws InputError.
 [[nodiscard]] RotationRow rotation_row(const CsvRow& row, const RotationLogColumns& columns, const std::string& file);
+/// A column that is the same in every row, as σ of the angles' scale. Throws InputError.
+[[nodiscard]] std::optional<double> told_share(const CsvRow& row, const std::optional<std::size_t>& column,
+                                               const RotationLogColumns& columns, const std::string& file);
 [[nodiscard]] std::optional<TrueIntrinsics> true_intrinsics(const CsvRow& row, const RotationLogColumns& columns,
                                                             const std::string& file);
 

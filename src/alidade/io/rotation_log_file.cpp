@@ -75,6 +75,8 @@ std::string header_of(const RotationLog& log) {
   const bool has_range = std::ranges::any_of(log.rows, [](const RotationRow& r) { return std::isfinite(r.range_m); });
   if (has_range) text += ",range_m";
   if (!log.truth.empty()) text += ",fx,fy,cx,cy";
+  if (log.sigma_scale) text += ",sigma_scale";
+  if (log.sigma_parallax) text += ",sigma_parallax";
   return text + "\n";
 }
 
@@ -121,6 +123,8 @@ std::optional<RotationLogEntry> RotationLogStream::next_checked() {
   if (!row) return std::nullopt;
   RotationLogEntry entry{rotation_row(*row, columns_, table_.name()), true_intrinsics(*row, columns_, table_.name()),
                          row->line};
+  layout_.sigma_scale = told_share(*row, columns_.sigma_scale, columns_, table_.name());
+  layout_.sigma_parallax = told_share(*row, columns_.sigma_parallax, columns_, table_.name());
   if (last_ && entry.row.t_s < last_->row.t_s) {
     throw InputError(CsvPlace{table_.name(), row->line, columns_.names[columns_.t]}.text() + ": '" +
                      row->cells[columns_.t] + "' is before the row above; time must not go back");
@@ -133,6 +137,8 @@ RotationLogFile read_rotation_log(const std::filesystem::path& file, const Rotat
   RotationLogStream stream(text, file.string(), options);
   RotationLogFile read{stream.layout(), {}};
   while (std::optional<RotationLogEntry> entry = stream.next()) {
+    read.log.sigma_scale = stream.layout().sigma_scale;
+    read.log.sigma_parallax = stream.layout().sigma_parallax;
     read.log.rows.push_back(std::move(entry->row));
     if (entry->truth) read.log.truth.push_back(*entry->truth);
   }
@@ -153,6 +159,8 @@ std::string rotation_log_csv(const RotationLog& log) {
     if (has_range) append_cells(text, &row.range_m, 1, std::isfinite(row.range_m));
     if (!log.truth.empty())
       for (const double value : log.truth[i]) fmt::format_to(std::back_inserter(text), ",{:.6f}", value);
+    for (const std::optional<double>& told : {log.sigma_scale, log.sigma_parallax})
+      if (told) fmt::format_to(std::back_inserter(text), ",{:g}", *told);
     text += '\n';
   }
   return text;

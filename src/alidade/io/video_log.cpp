@@ -114,6 +114,8 @@ RotationLog read_angles(const std::filesystem::path& csv) {
     angles.rows.push_back(std::move(entry->row));
     if (entry->truth) angles.truth.push_back(*entry->truth);
   }
+  angles.sigma_scale = stream.layout().sigma_scale;
+  angles.sigma_parallax = stream.layout().sigma_parallax;
   if (angles.rows.empty()) throw InputError(csv.string() + ": has no rows");
   return angles;
 }
@@ -132,6 +134,8 @@ VideoLog log_from_video(VideoFrames& video, const RotationLog& angles, const std
                     "texture, sharply",
                     video.name(), config.min_rows));
   made.log.source = angles.source;
+  made.log.sigma_scale = angles.sigma_scale;
+  made.log.sigma_parallax = angles.sigma_parallax;
   made.log.num_points = columns.size();
   made.log.has_roll_rate = angles.has_roll_rate;
   made.log.has_velocity = angles.has_velocity;

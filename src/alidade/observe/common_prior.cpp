@@ -14,7 +14,10 @@ CommonPrior::CommonPrior(const RotatingCamera& mean_in)
 CommonMatrix CommonPrior::information(const CommonLayout& layout) const {
   CommonVector sigma = CommonVector::Ones(layout.size);
   sigma.head<4>() = sigma_k;
-  if (layout.k1 >= 0) sigma[layout.k1] = sigma_k1;
+  for (const int at : {layout.k1, layout.k2, layout.k3}) {
+    if (at >= 0) sigma[at] = sigma_k1;
+  }
+  if (layout.tangential >= 0) sigma.segment<2>(layout.tangential).setConstant(sigma_tangential);
   if (layout.mount >= 0) sigma.segment<3>(layout.mount).setConstant(sigma_mount_rad);
   if (layout.delay >= 0) sigma[layout.delay] = sigma_delay_s;
   if (layout.lever >= 0) sigma.segment<3>(layout.lever).setConstant(sigma_lever_m);
@@ -53,6 +56,11 @@ CommonVector CommonPrior::offset(const CommonLayout& layout, const RotatingCamer
   CommonVector offset = CommonVector::Zero(layout.size);
   offset.head<4>() = camera.k - mean.k;
   if (layout.k1 >= 0) offset[layout.k1] = camera.k1 - mean.k1;
+  if (layout.k2 >= 0) offset[layout.k2] = camera.k2 - mean.k2;
+  if (layout.k3 >= 0) offset[layout.k3] = camera.k3 - mean.k3;
+  if (layout.tangential >= 0) {
+    offset.segment<2>(layout.tangential) = Eigen::Vector2d(camera.p1 - mean.p1, camera.p2 - mean.p2);
+  }
   if (layout.mount >= 0) {
     offset.segment<3>(layout.mount) = log_so3((mean.cam_from_mount.conjugate() * camera.cam_from_mount).normalized());
   }

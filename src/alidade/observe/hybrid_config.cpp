@@ -25,6 +25,18 @@ std::optional<CommonPrior> said_prior(const ObserveConfig& config, const Rotatin
   return prior;
 }
 
+std::vector<std::string> quantity_names(const CommonLayout& layout) {
+  std::vector<std::string> names{"fx", "fy", "cx", "cy"};
+  if (layout.k1 >= 0) names.emplace_back("k1");
+  if (layout.k2 >= 0) names.emplace_back("k2");
+  if (layout.k3 >= 0) names.emplace_back("k3");
+  if (layout.tangential >= 0) names.insert(names.end(), {"p1", "p2"});
+  if (layout.mount >= 0) names.insert(names.end(), {"mount_x_rad", "mount_y_rad", "mount_z_rad"});
+  if (layout.delay >= 0) names.emplace_back("delay_s");
+  if (layout.lever >= 0) names.insert(names.end(), {"lever_x_m", "lever_y_m", "lever_z_m"});
+  return names;
+}
+
 HybridConfig hybrid_config(const RotationLog& layout, const ObserveConfig& config, const PixelScale& scale) {
   HybridConfig hybrid;
   hybrid.num_points = layout.num_points;

@@ -267,7 +267,9 @@ class Observation {
     if (!report_.reference.has_value) return;
     report_.pixels_left_out = report_.reference.num_left_out;
     if (config_.rotation == RotationKnowledge::known) {
-      report_.proposals = residual_proposals(buffer, report_.reference, config, progress_);
+      report_.stated = stated_covariance(report_.reference, config.nuisances);
+      report_.causes = cause_scores(log_, report_.reference,
+                                    {config.nuisances, config_.max_gap_s, report_.height_px / report_.scale.scale});
     }
     if (config_.method != ObserveMethod::batch && config_.rotation == RotationKnowledge::known) return;
     IntrinsicsEstimate all;
@@ -277,8 +279,7 @@ class Observation {
 
   /// Are the rows that the answer rests on of one focal length?
   [[nodiscard]] bool is_unsteady() const {
-    const bool says_one = !has_final_ || config_.method == ObserveMethod::batch;
-    return says_one && config_.rotation == RotationKnowledge::known && report_.reference.has_value &&
+    return config_.rotation == RotationKnowledge::known && report_.reference.has_value &&
            steadiness_of(report_.reference.bundle, report_.reference.solution).is_unsteady();
   }
 
@@ -297,9 +298,51 @@ class Observation {
     const CommonLayout layout(nuisances);
     if (report_.sigma_px == 0.0) report_.sigma_px = report_.reference.sigma_px * report_.scale.scale;
     const CommonMatrix bound = report_.reference.solution.bound();
+    if (has_final_) {
+      model_cov_ = final_cov_;
+      state_covariance(layout);
+    }
     list_quantities(layout, bound);
+    if (has_final_) state_steps();
     if (!has_final_) return;
     report_.status = is_observable(bound) ? ObserveReport::Status::ok : ObserveReport::Status::unobservable;
+  }
+
+  /// The last row, and where all rows are one answer all of them, have the stated σ.
+  void state_steps() {
+    const Eigen::Vector4d sigma = report_.covariance.diagonal().head<4>().cwiseSqrt();
+    const bool is_one = config_.method == ObserveMethod::batch || config_.rotation != RotationKnowledge::known;
+    for (std::size_t k = is_one ? 0 : report_.steps.size() - 1; k < report_.steps.size(); ++k) {
+      report_.steps[k].sigma = sigma;
+    }
+  }
+
+  /// What the reference says of the errors that pixels share, and what is given with a σ, on top of the model's.
+  void state_covariance(const CommonLayout& layout) {
+    const bool is_known = config_.rotation == RotationKnowledge::known;
+    const Eigen::VectorXd& inflation = report_.stated.inflation;
+    if (is_known && inflation.size() >= layout.size) {
+      const CommonVector raise = inflation.head(layout.size);
+      final_cov_ =
+          CommonMatrix(raise.asDiagonal() * final_cov_.topLeftCorner(layout.size, layout.size) * raise.asDiagonal());
+    }
+    if (is_known) compare_with_reference();
+    report_.assumed = taken_as_given(log_, config_, report_, final_cov_);
+  }
+
+  /// Where both are of one camera: the reference says whether the answer is as good as its σ.
+  void compare_with_reference() {
+    const bool is_of_end = report_.reference_until_s >= frames_.back().t_s - 1e-6;
+    if (!is_of_end || config_.method == ObserveMethod::batch) return;
+    const Eigen::Vector4d difference = final_.k - report_.reference.solution.camera.k;
+    const Eigen::Vector4d of_reference = CommonMatrix(report_.stated.cov).diagonal().head<4>();
+    Eigen::Vector4d own = final_cov_.diagonal().head<4>();
+    if (!own.allFinite()) {
+      own = difference.cwiseAbs2();  // the method states none
+      final_cov_ = CommonMatrix((own + of_reference).asDiagonal());
+      report_.sigma_is_distance = true;
+    }
+    report_.from_reference = (difference.array().abs() / (own + of_reference).array().sqrt()).maxCoeff();
   }
 
   [[nodiscard]] bool is_observable(const CommonMatrix& bound) const {
@@ -318,11 +361,7 @@ class Observation {
     CommonVector unit = CommonVector::Ones(layout.size), offset = CommonVector::Zero(layout.size);
     unit.head<4>().setConstant(s);
     offset.segment<2>(2) = c;
-    std::vector<std::string> names{"fx", "fy", "cx", "cy"};
-    if (layout.k1 >= 0) names.emplace_back("k1");
-    if (layout.mount >= 0) names.insert(names.end(), {"mount_x_rad", "mount_y_rad", "mount_z_rad"});
-    if (layout.delay >= 0) names.emplace_back("delay_s");
-    if (layout.lever >= 0) names.insert(names.end(), {"lever_x_m", "lever_y_m", "lever_z_m"});
+    const std::vector<std::string> names = quantity_names(layout);
     const RotatingCamera& camera = has_final_ ? final_ : report_.reference.solution.camera;
     RotatingCamera zero;
     zero.k.setZero();
@@ -335,7 +374,8 @@ class Observation {
       const double variance = i < bound.rows() ? bound(i, i) : -1.0;
       report_.quantities.push_back({names[static_cast<std::size_t>(i)], unit[i] * value[i] + offset[i],
                                     std::sqrt(report_.covariance(i, i)),
-                                    variance > 0.0 ? unit[i] * std::sqrt(variance) : not_seen});
+                                    variance > 0.0 ? unit[i] * std::sqrt(variance) : not_seen,
+                                    has_final_ ? unit[i] * std::sqrt(model_cov_(i, i)) : not_seen});
     }
   }
 
@@ -346,12 +386,12 @@ class Observation {
   std::vector<RotationFrame> frames_;
   bool with_depth_ = false, free_started_ = false, has_final_ = false;
   RotatingCamera start_, final_;
-  CommonMatrix final_cov_;
+  CommonMatrix final_cov_, model_cov_;
 };
 
 }  // namespace
 
-ObserveReport observe(const RotationLog& log, const ObserveConfig& config, const Progress& progress) {
+ObserveReport observe_as_told(const RotationLog& log, const ObserveConfig& config, const Progress& progress) {
   return Observation(log, config, progress).run();
 }
 

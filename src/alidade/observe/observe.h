@@ -4,8 +4,10 @@
 
 #include "alidade/camera/camera.h"
 #include "alidade/estimation/verdict.h"
+#include "alidade/observe/cause_scores.h"
 #include "alidade/observe/frame_buffer.h"
 #include "alidade/observe/hybrid.h"
+#include "alidade/observe/stated_covariance.h"
 
 namespace alidade {
 
@@ -16,7 +18,9 @@ struct ObserveConfig {
   ObserveMethod method = ObserveMethod::hybrid;
   RotationKnowledge rotation = RotationKnowledge::known;
   std::string profile = "kalman";        ///< Of fang2011: fast, quiet or kalman.
-  ObserveNuisances estimate;             ///< Beside fx, fy, cx, cy: k1, mount, delay, lever.
+  ObserveNuisances estimate;             ///< Beside fx, fy, cx, cy: k1, k2, k3, tangential, mount, delay, lever.
+  bool estimate_auto = false;            ///< And what the residuals ask for.
+  bool lens_is_given = false;            ///< The pixels were freed of a lens that is given: it is not estimated.
   int width_px = 0, height_px = 0;       ///< 0: what holds the pixels.
   std::optional<Eigen::Vector4d> start;  ///< fx, fy, cx, cy [px]; none: found from the data.
   bool square_pixels = false;            ///< fx = fy.
@@ -28,6 +32,10 @@ struct ObserveConfig {
   std::optional<Eigen::Vector3d> lever_m;  ///< Known, or (with estimate.lever) where to start.
   double max_gap_s = 0.25;                 ///< A longer one in a rate log starts a segment.
   double window_s = 6.0;                   ///< Of `window`.
+  /// What is taken as given, with its σ; 0: exact; none: the log's, or not known.
+  std::optional<double> sigma_scale;     ///< Of the measured angles or rates, as a share.
+  std::optional<double> sigma_parallax;  ///< Camera centre from the axes along the view, over the points' distance.
+  std::optional<double> sigma_k1;        ///< Of the lens that the pixels were freed of.
 };
 
 /// Something that happened to the intrinsics or the points.
@@ -43,10 +51,11 @@ struct ObserveMotion {
   double span_rad = 0.0;                               ///< Largest turn away from the start.
 };
 
-/// One value with σ and the Cramér–Rao bound of this very log.
+/// One value with σ and the Cramér–Rao bound of this very log. σ counts errors that residuals share and what is given
+/// with a σ; sigma_model: as if every pixel erred by itself.
 struct ObservedQuantity {
   std::string name;
-  double value = 0.0, sigma = 0.0, bound = 0.0;
+  double value = 0.0, sigma = 0.0, bound = 0.0, sigma_model = 0.0;
 };
 
 struct ObserveReport {
@@ -62,7 +71,7 @@ struct ObserveReport {
   int width_px = 0, height_px = 0;
   std::vector<IntrinsicsEstimate> steps;  ///< One a row.
   std::vector<ObserveNote> events;
-  /// fx, fy, cx, cy [px], then what else was estimated: k1, mount_x_rad…, delay_s, lever_x_m….
+  /// fx, fy, cx, cy [px], then what else was estimated: k1, …, mount_x_rad…, delay_s, lever_x_m….
   std::vector<ObservedQuantity> quantities;
   Eigen::MatrixXd covariance;  ///< Of the quantities.
   double sigma_px = 0.0;       ///< Of a pixel coordinate.
@@ -76,17 +85,35 @@ struct ObserveReport {
   /// Its information is the bound's.
   Adjustment reference;
   double reference_from_s = 0.0, reference_until_s = std::numeric_limits<double>::infinity();
-  /// What the residuals would gain by estimating it: name and value over σ.
-  std::vector<std::pair<std::string, double>> proposals;
+  StatedCovariance stated;          ///< Of the reference.
+  std::vector<CauseScore> causes;   ///< What the reference's residuals say of what was taken as exact.
+  std::vector<Assumption> assumed;  ///< What was taken as given, and what it would do to the answer.
+  /// The answer minus the reference over their σ, the largest of fx, fy, cx, cy, where both are of the same camera.
+  double from_reference = 0.0;
+  ObserveNuisances estimated;      ///< What was, in the end, beside fx, fy, cx, cy.
+  std::string misread;             ///< How the rotation seems to be misread, in words; empty: it is not.
+  bool sigma_is_distance = false;  ///< The method has no σ: stated is its distance from the reference.
 };
 
 /// Intrinsics of a rotating camera from what it saw while it turned. Throws Interrupted.
 /// docs/maths/rotating-camera.md.
 [[nodiscard]] ObserveReport observe(const RotationLog& log, const ObserveConfig& config, const Progress& progress = {});
 
+/// The same with what is told to be estimated, without a second thought.
+[[nodiscard]] ObserveReport observe_as_told(const RotationLog& log, const ObserveConfig& config,
+                                            const Progress& progress = {});
+
+/// Is the answer, or that there is none, such that the rotation may be misread? And how: signs, axes, degrees,
+/// quaternions the other way round, whichever lets the pixels fit clearly better.
+[[nodiscard]] bool may_be_misread(const ObserveReport& report);
+[[nodiscard]] std::string misread_rotation(const RotationLog& log, const ObserveConfig& config,
+                                           const ObserveReport& report, const Progress& progress = {});
+
 /// The parts of it that an on-line run needs: the hybrid observer's configuration for a log whose rows are yet to come.
 [[nodiscard]] HybridConfig hybrid_config(const RotationLog& layout, const ObserveConfig& config,
                                          const PixelScale& scale);
+/// fx, fy, cx, cy, then what else the layout has, in its order.
+[[nodiscard]] std::vector<std::string> quantity_names(const CommonLayout& layout);
 [[nodiscard]] bool needs_depth(const RotationLog& log, const ObserveConfig& config);
 [[nodiscard]] RotatingCamera start_camera(const ObserveConfig& config, const PixelScale& scale);
 /// What the person says of the camera; none if nothing.
@@ -108,12 +135,45 @@ struct ObserveReport {
 /// Picture's middle and half width: of the size given, else of what holds the pixels.
 [[nodiscard]] PixelScale pixel_scale(const RotationLog& log, int& width_px, int& height_px);
 
-/// Would the residuals of `reference` shrink by more than chance if k1, mount or delay were estimated too? Each name
-/// with its value over σ.
-[[nodiscard]] std::vector<std::pair<std::string, double>> residual_proposals(const FrameBuffer& buffer,
-                                                                             const Adjustment& reference,
-                                                                             AdjustConfig config,
-                                                                             const Progress& progress = {});
+/// What the log and the person give, with the answer's move for an error of its σ or, without one, of what errors
+/// ordinarily are or the residuals would still hide, whichever is less. What has a σ is added to `cov` (normalised).
+[[nodiscard]] std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveConfig& config,
+                                                     const ObserveReport& report, CommonMatrix& cov);
+
+/// Checks of the verdict that look at the reference's residuals: what they ask for, whether errors are shared, whether
+/// the noise is one that trackers have, whether points stand still.
+[[nodiscard]] std::vector<Check> residual_checks(const ObserveReport& report);
+
+/// Is the rotation read as it was meant? A mount that turns by half a turn, or a misreading that fits better.
+[[nodiscard]] Check rotation_check(const ObserveReport& report);
+
+/// The log as a camera without distortion but the same fx, fy, cx, cy would have seen it; pixels that the lens cannot
+/// have seen become "not seen".
+[[nodiscard]] RotationLog undistorted(const RotationLog& log, const Camera& camera);
+
+/// The camera that was observed, with its covariance: pinhole, or brown where k1 was estimated or `known` has a lens.
+[[nodiscard]] Camera observed_camera(const ObserveReport& report, const std::optional<Camera>& known);
+
+/// The word for an event in files: start, burst, slip, zoom, zoom_end, restart, gap; empty for none.
+[[nodiscard]] std::string_view event_name(ObserveEvent event);
+
+/// Picture's middle and half width: of the size given, else of what holds the pixels.
+[[nodiscard]] PixelScale pixel_scale(const RotationLog& log, int& width_px, int& height_px);
+
+/// What the log and the person give, with the answer's move for an error of its σ or, without one, of what errors
+/// ordinarily are or the residuals would still hide, whichever is less. What has a σ is added to `cov` (normalised).
+[[nodiscard]] std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveConfig& config,
+                                                     const ObserveReport& report, CommonMatrix& cov);
+
+/// Checks of the verdict that look at the reference's residuals: what they ask for, whether errors are shared, whether
+/// the noise is one that trackers have, whether points stand still.
+[[nodiscard]] std::vector<Check> residual_checks(const ObserveReport& report);
+
+/// Is the rotation read as it was meant? A mount that turns by half a turn, or a misreading that fits better.
+[[nodiscard]] Check rotation_check(const ObserveReport& report);
+
+/// What to do about the cause that explains the residuals best; empty if none is asked for.
+[[nodiscard]] std::string cause_remedy(const ObserveReport& report);
 
 /// Where a log without measured rotation may start: a focal length and each row's rotation, from pairs of neighbouring
 /// rows, by the focal length that makes them rotations best. None: too few shared points.

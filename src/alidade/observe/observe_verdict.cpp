@@ -10,8 +10,7 @@
 namespace alidade {
 namespace {
 
-constexpr double fine = 0.003;      // σ over the focal length of a converged estimate
-constexpr double ask_beyond = 5.0;  // σ at which the residuals ask for one thing more
+constexpr double fine = 0.003;  // σ over the focal length of a converged estimate
 
 /// Why the log cannot tell, in the words of who turned the camera; and what to add.
 struct Reason {
@@ -82,7 +81,11 @@ void add_checks(const ObserveReport& report, Verdict& verdict) {
   verdict.checks.push_back(weakest(report));
   const double f_sigma = std::max(report.quantities[0].sigma / report.quantities[0].value,
                                   report.quantities[1].sigma / report.quantities[1].value);
-  verdict.checks.push_back({"focal length", f_sigma < fine ? State::good : State::care,
+  constexpr double none = 0.05;  // no answer to rest on
+  verdict.checks.push_back({"focal length",
+                            f_sigma < fine   ? State::good
+                            : f_sigma < none ? State::care
+                                             : State::bad,
                             "σ of the focal length is " + text_of(100.0 * f_sigma, 2) + " %", 100.0 * f_sigma,
                             100.0 * fine, "%", "intrinsics"});
   if (report.nis_per_dof > 0.0) {
@@ -91,13 +94,7 @@ void add_checks(const ObserveReport& report, Verdict& verdict) {
                               "innovations are " + text_of(std::sqrt(report.nis_per_dof), 2) + " times their σ",
                               report.nis_per_dof, 2.0, "", "nis"});
   }
-  for (const auto& [name, z] : report.proposals) {
-    verdict.checks.push_back({"needs " + name, z < ask_beyond ? State::good : State::care,
-                              z < ask_beyond
-                                  ? name + " is not asked for by the residuals"
-                                  : "the residuals ask for --estimate " + name + " (" + text_of(z, 2) + " σ)",
-                              z, ask_beyond, "σ", "residuals"});
-  }
+  for (const Check& check : residual_checks(report)) verdict.checks.push_back(check);
   if (report.gramian_lambda_min >= 0.0) {
     const double lambda = report.gramian_lambda_min;
     const State state = lambda < fang_refuse_lambda ? State::refused
@@ -154,6 +151,10 @@ Verdict observe_verdict(const ObserveReport& report, const RotationLog& log, con
     if (reason.name != "weak motion") {
       return refusal(reason.what, reason.add, ExitCode::cannot_tell);
     }
+    if (!report.misread.empty()) {
+      return refusal("no intrinsics explain these pixels with this rotation, but they fit once it is read otherwise",
+                     report.misread, ExitCode::no_convergence);
+    }
     return refusal("no intrinsics explain these pixels with this rotation",
                    "check the axes and units of the rotation, that the points stand still, and the zoom for a second",
                    ExitCode::no_convergence);
@@ -165,14 +166,30 @@ Verdict observe_verdict(const ObserveReport& report, const RotationLog& log, con
   Verdict verdict;
   add_checks(report, verdict);
   for (const Check& check : verdict.checks) {
-    if (check.state != State::care || verdict.state != State::good) continue;
-    verdict.state = State::care;
+    const bool speaks = check.state == State::care || check.state == State::bad;
+    if (!speaks || check.state <= verdict.state) continue;
+    verdict.state = check.state;
     verdict.to_add = check.text;
   }
   const ObservedQuantity &fx = report.quantities[0], &fy = report.quantities[1];
   verdict.sentence = "fx " + text_of(fx.value, 5) + " ± " + text_of(3.0 * fx.sigma, 2) + " px, fy " +
                      text_of(fy.value, 5) + " ± " + text_of(3.0 * fy.sigma, 2) + " px (3σ) from " +
                      std::to_string(report.rows_used) + " rows";
+  if (report.sigma_is_distance) {
+    heed({"σ", State::care, "the method states no σ: it is the distance from the adjustment of all rows", 0.0, 0.0, "",
+          "intrinsics"},
+         "use --method hybrid for a σ of its own", verdict);
+  }
+  const auto cause = std::find_if(verdict.checks.begin(), verdict.checks.end(),
+                                  [](const Check& check) { return check.name.starts_with("needs "); });
+  if (cause != verdict.checks.end() && verdict.state == State::care) verdict.to_add = cause->text;
+  const Check read = rotation_check(report);
+  verdict.checks.push_back(read);
+  if (read.state == State::bad) {
+    verdict.state = State::bad;
+    verdict.to_add = read.text;
+  }
+  heed_assumptions(report.assumed, verdict);
   return verdict;
 }
 

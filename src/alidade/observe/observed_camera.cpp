@@ -31,9 +31,10 @@ Camera observed_camera(const ObserveReport& report, const std::optional<Camera>&
   camera.height_px = report.height_px;
   camera.rms_px = report.sigma_px * std::sqrt(2.0);
   camera.source = "alidade observe";
-  const bool has_k1 = std::any_of(report.quantities.begin(), report.quantities.end(),
-                                  [](const ObservedQuantity& quantity) { return quantity.name == "k1"; });
-  camera.lens = known ? known->lens : *make_lens(has_k1 ? "brown" : "pinhole");
+  const bool bends = std::any_of(report.quantities.begin(), report.quantities.end(), [](const auto& quantity) {
+    return quantity.name.starts_with("k") || quantity.name.starts_with("p");
+  });
+  camera.lens = known ? known->lens : *make_lens(bends ? "brown" : "pinhole");
   Eigen::VectorXd values = params(camera.lens);
   const auto names = param_names(camera.lens);
   camera.cov = Eigen::MatrixXd::Zero(values.size(), values.size());

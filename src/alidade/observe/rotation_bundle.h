@@ -53,7 +53,8 @@ struct CommonPrior {
   Eigen::Vector4d sigma_k;       ///< fx, fy: half their value; cx, cy: a quarter of the picture.
   std::array<bool, 4> says_k{};  ///< sigma_k is said by a person, not weak.
   double sigma_aspect = std::numeric_limits<double>::infinity();  ///< Of fx − fy, where a person says so.
-  double sigma_k1 = 0.5;
+  double sigma_k1 = 0.5;                                          ///< k2, k3 too.
+  double sigma_tangential = 0.05;
   double sigma_mount_rad = 0.2;
   double sigma_delay_s = 0.1;
   double sigma_lever_m = 0.3;

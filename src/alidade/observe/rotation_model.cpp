@@ -13,6 +13,9 @@ CommonLayout::CommonLayout(const ObserveNuisances& nuisances) {
     size += width;
   };
   place(nuisances.k1, k1, 1);
+  place(nuisances.k2, k2, 1);
+  place(nuisances.k3, k3, 1);
+  place(nuisances.tangential, tangential, 2);
   place(nuisances.mount, mount, 3);
   place(nuisances.delay, delay, 1);
   place(nuisances.lever, lever, 3);
@@ -20,10 +23,40 @@ CommonLayout::CommonLayout(const ObserveNuisances& nuisances) {
   place(nuisances.turn, turn, 3);
 }
 
+namespace {
+
+/// A ray's place in the picture of focal length one, bent by the lens; Brown 1971.
+struct Bent {
+  Eigen::Vector2d xy;
+  double dxx, cross, dyy;  ///< ∂x'/∂x, ∂x'/∂y = ∂y'/∂x, ∂y'/∂y
+};
+
+/// False beyond the fold of the lens.
+bool bend(const RotatingCamera& c, double x, double y, Bent& bent) {
+  const double r2 = x * x + y * y;
+  if (!(1.0 + r2 * (3.0 * c.k1 + r2 * (5.0 * c.k2 + r2 * 7.0 * c.k3)) > 0.0)) return false;
+  const double radial = 1.0 + r2 * (c.k1 + r2 * (c.k2 + r2 * c.k3));
+  const double slope = 2.0 * (c.k1 + r2 * (2.0 * c.k2 + r2 * 3.0 * c.k3));
+  bent.xy = {x * radial + 2.0 * c.p1 * x * y + c.p2 * (r2 + 2.0 * x * x),
+             y * radial + c.p1 * (r2 + 2.0 * y * y) + 2.0 * c.p2 * x * y};
+  bent.dxx = radial + slope * x * x + 2.0 * c.p1 * y + 6.0 * c.p2 * x;
+  bent.cross = slope * x * y + 2.0 * c.p1 * x + 2.0 * c.p2 * y;
+  bent.dyy = radial + slope * y * y + 6.0 * c.p1 * y + 2.0 * c.p2 * x;
+  return true;
+}
+
+}  // namespace
+
 RotatingCamera RotatingCamera::retract(const CommonLayout& layout, const CommonVector& step) const {
   RotatingCamera moved = *this;
   moved.k += step.head<4>();
   if (layout.k1 >= 0) moved.k1 += step[layout.k1];
+  if (layout.k2 >= 0) moved.k2 += step[layout.k2];
+  if (layout.k3 >= 0) moved.k3 += step[layout.k3];
+  if (layout.tangential >= 0) {
+    moved.p1 += step[layout.tangential];
+    moved.p2 += step[layout.tangential + 1];
+  }
   if (layout.mount >= 0) {
     moved.cam_from_mount = (cam_from_mount * exp_so3(Eigen::Vector3d(step.segment<3>(layout.mount)))).normalized();
   }
@@ -57,25 +90,24 @@ Eigen::Vector3d RotationView::point_in_cam(const BearingPoint& point) const {
 std::optional<Eigen::Vector2d> RotationView::project(const BearingPoint& point) const {
   const Eigen::Vector3d d = point_in_cam(point);
   if (!(d.z() > 1e-9)) return std::nullopt;
-  const double x = d.x() / d.z(), y = d.y() / d.z(), r2 = x * x + y * y;
-  if (!(1.0 + 3.0 * camera_.k1 * r2 > 0.0)) return std::nullopt;
-  const double bend = 1.0 + camera_.k1 * r2;
-  return Eigen::Vector2d(camera_.k[0] * x * bend + camera_.k[2], camera_.k[1] * y * bend + camera_.k[3]);
+  Bent bent;
+  if (!bend(camera_, d.x() / d.z(), d.y() / d.z(), bent)) return std::nullopt;
+  return Eigen::Vector2d(camera_.k[0] * bent.xy.x() + camera_.k[2], camera_.k[1] * bent.xy.y() + camera_.k[3]);
 }
 
 bool RotationView::predict(const BearingPoint& point, const CommonLayout& layout, RotationPrediction& out) const {
   const Eigen::Vector3d d = point_in_cam(point);
   if (!(d.z() > 1e-9)) return false;
-  const double iz = 1.0 / d.z(), x = d.x() * iz, y = d.y() * iz, r2 = x * x + y * y, k1 = camera_.k1;
-  if (!(1.0 + 3.0 * k1 * r2 > 0.0)) return false;
-  const double bend = 1.0 + k1 * r2, fx = camera_.k[0], fy = camera_.k[1];
-  out.px = {fx * x * bend + camera_.k[2], fy * y * bend + camera_.k[3]};
-  const double cross = 2.0 * k1 * x * y, dxx = bend + 2.0 * k1 * x * x, dyy = bend + 2.0 * k1 * y * y;
+  const double iz = 1.0 / d.z(), x = d.x() * iz, y = d.y() * iz, r2 = x * x + y * y;
+  Bent bent;
+  if (!bend(camera_, x, y, bent)) return false;
+  const double fx = camera_.k[0], fy = camera_.k[1], dxx = bent.dxx, cross = bent.cross, dyy = bent.dyy;
+  out.px = {fx * bent.xy.x() + camera_.k[2], fy * bent.xy.y() + camera_.k[3]};
   Eigen::Matrix<double, 2, 3> J_px_d;
   J_px_d << fx * dxx * iz, fx * cross * iz, -fx * (dxx * x + cross * y) * iz,  //
       fy * cross * iz, fy * dyy * iz, -fy * (cross * x + dyy * y) * iz;
   out.J_px_common.resize(2, layout.size);
-  out.J_px_common.leftCols<4>() << x * bend, 0.0, 1.0, 0.0, 0.0, y * bend, 0.0, 1.0;
+  out.J_px_common.leftCols<4>() << bent.xy.x(), 0.0, 1.0, 0.0, 0.0, bent.xy.y(), 0.0, 1.0;
   if (layout.size == 4 && point.inverse_depth == 0.0 && shift_m_.isZero(0.0) && camera_.lever_m.isZero(0.0)) {
     const Eigen::Matrix3d cam_from_point = cam_from_start_ * point.start_from_point;
     out.J_px_point.leftCols<2>().noalias() = J_px_d * cam_from_point.leftCols<2>();
@@ -88,7 +120,14 @@ bool RotationView::predict(const BearingPoint& point, const CommonLayout& layout
   for (int column = 4; column < layout.size; ++column) {
     out.J_px_common.col(column).noalias() = J_px_d * J_d_common.col(column);
   }
-  if (layout.k1 >= 0) out.J_px_common.col(layout.k1) = Eigen::Vector2d(fx * x * r2, fy * y * r2);
+  const Eigen::Vector2d radial(fx * x * r2, fy * y * r2);
+  if (layout.k1 >= 0) out.J_px_common.col(layout.k1) = radial;
+  if (layout.k2 >= 0) out.J_px_common.col(layout.k2) = radial * r2;
+  if (layout.k3 >= 0) out.J_px_common.col(layout.k3) = radial * (r2 * r2);
+  if (layout.tangential >= 0) {
+    out.J_px_common.middleCols<2>(layout.tangential) << fx * 2.0 * x * y, fx * (r2 + 2.0 * x * x),
+        fy * (r2 + 2.0 * y * y), fy * 2.0 * x * y;
+  }
   out.J_px_point.noalias() = J_px_d * J_d_point;
   return true;
 }
@@ -114,17 +153,19 @@ void RotationView::point_jacobians(const BearingPoint& point, const CommonLayout
 }
 
 std::optional<Eigen::Vector3d> RotationView::ray_in_start(const Eigen::Vector2d& px) const {
-  const Eigen::Vector2d bent((px.x() - camera_.k[2]) / camera_.k[0], (px.y() - camera_.k[3]) / camera_.k[1]);
-  const double radius = bent.norm();
-  double r = radius;
-  for (int i = 0; i < 30 && camera_.k1 != 0.0; ++i) {
-    const double slope = 1.0 + 3.0 * camera_.k1 * r * r;
-    if (!(slope > 0.0)) return std::nullopt;  // beyond the fold
-    const double step = (r + camera_.k1 * r * r * r - radius) / slope;
-    r -= step;
-    if (std::abs(step) < 1e-14) break;
+  const Eigen::Vector2d wanted((px.x() - camera_.k[2]) / camera_.k[0], (px.y() - camera_.k[3]) / camera_.k[1]);
+  Eigen::Vector2d ray = wanted;
+  for (int i = 0; i < 30; ++i) {
+    Bent bent;
+    if (!bend(camera_, ray.x(), ray.y(), bent)) return std::nullopt;  // beyond the fold
+    const Eigen::Vector2d error = bent.xy - wanted;
+    const double det = bent.dxx * bent.dyy - bent.cross * bent.cross;
+    if (!(det > 0.0)) return std::nullopt;
+    const Eigen::Vector2d step(bent.dyy * error.x() - bent.cross * error.y(),
+                               bent.dxx * error.y() - bent.cross * error.x());
+    ray -= step / det;
+    if (step.norm() < 1e-14 * det) break;
   }
-  const Eigen::Vector2d ray = radius > 0.0 ? Eigen::Vector2d(bent * (r / radius)) : bent;
   return Eigen::Vector3d(cam_from_start_.transpose() * Eigen::Vector3d(ray.x(), ray.y(), 1.0).normalized());
 }
 

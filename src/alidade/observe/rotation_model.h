@@ -9,16 +9,19 @@ namespace alidade {
 
 /// What is estimated beside fx, fy, cx, cy.
 struct ObserveNuisances {
-  bool k1 = false;     ///< Radial distortion: x (1 + k1 r²) on coordinates over the focal length.
-  bool mount = false;  ///< Rotation from the frame whose rotation is measured to the camera's, 3 angles.
-  bool delay = false;  ///< Pixels are of t + delay.
-  bool lever = false;  ///< Camera centre from the centre of rotation, camera frame. [m]
+  bool k1 = false;  ///< Radial distortion: x (1 + k1 r² + k2 r⁴ + k3 r⁶) on coordinates over the focal length.
+  bool k2 = false;
+  bool k3 = false;
+  bool tangential = false;  ///< p1, p2, as Brown has them.
+  bool mount = false;       ///< Rotation from the frame whose rotation is measured to the camera's, 3 angles.
+  bool delay = false;       ///< Pixels are of t + delay.
+  bool lever = false;       ///< Camera centre from the centre of rotation, camera frame. [m]
   bool learnt =
       false;  ///< fx, fy, cx, cy with which the points were learnt, before a zoom: they know nothing of the new ones.
   bool turn = false;  ///< Error of the measured rotation, 3 angles; one a frame in a bundle, of now in a filter.
 };
 
-inline constexpr int most_common = 19;  ///< Of ObserveNuisances with everything.
+inline constexpr int most_common = 23;  ///< Of ObserveNuisances with everything.
 using CommonVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_common, 1>;
 using CommonMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_common, most_common>;
 using PixelByCommon = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, most_common>;
@@ -28,13 +31,13 @@ struct CommonLayout {
   explicit CommonLayout(const ObserveNuisances& nuisances);
 
   int size = 4;
-  int k1 = -1, mount = -1, delay = -1, lever = -1, learnt = -1, turn = -1;
+  int k1 = -1, k2 = -1, k3 = -1, tangential = -1, mount = -1, delay = -1, lever = -1, learnt = -1, turn = -1;
 };
 
 /// What all points have in common. Pixels are normalised (PixelScale), so are fx, fy, cx, cy.
 struct RotatingCamera {
   Eigen::Vector4d k{1.0, 1.0, 0.0, 0.0};  ///< fx, fy, cx, cy.
-  double k1 = 0.0;
+  double k1 = 0.0, k2 = 0.0, k3 = 0.0, p1 = 0.0, p2 = 0.0;
   Eigen::Quaterniond cam_from_mount = Eigen::Quaterniond::Identity();
   double delay_s = 0.0;
   Eigen::Vector3d lever_m = Eigen::Vector3d::Zero();

@@ -96,6 +96,8 @@ RotationLog simulate_rotation(const RotationScene& scene, const RotationLogConfi
   log.source = config.source;
   log.num_points = scene.start_px.size();
   log.has_roll_rate = config.source == RotationSource::rate;
+  log.sigma_scale = 0.0;
+  if (scene.lever_arm_m.isZero(0.0)) log.sigma_parallax = 0.0;
   const std::vector<Eigen::Vector3d> world = world_of(scene);
   const Eigen::Quaterniond cam_from_mount = exp_so3(scene.mount_rad);
   TrueRotation mount(scene, config.source, 1.0 / (64.0 * config.rate_hz));

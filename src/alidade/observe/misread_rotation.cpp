@@ -1,0 +1,110 @@
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "alidade/geometry/degree.h"
+#include "alidade/geometry/so3.h"
+#include "alidade/observe/observe.h"
+
+namespace alidade {
+namespace {
+
+/// A way to misread angles, rates or attitudes, and what to say where the pixels fit once it is undone.
+struct Misreading {
+  const char* words;
+  std::function<void(RotationRow&)> undo;
+};
+
+void scale_all(RotationRow& row, const Eigen::Vector3d& by) {
+  row.pan_tilt_roll_rad = row.pan_tilt_roll_rad.cwiseProduct(by);
+  row.rate_rad_per_s = row.rate_rad_per_s.cwiseProduct(by);
+}
+
+std::function<void(RotationRow&)> scaled(double x, double y, double z) {
+  return [by = Eigen::Vector3d(x, y, z)](RotationRow& row) { scale_all(row, by); };
+}
+
+void exchange(RotationRow& row) {
+  std::swap(row.pan_tilt_roll_rad.x(), row.pan_tilt_roll_rad.y());
+  std::swap(row.rate_rad_per_s.x(), row.rate_rad_per_s.y());
+}
+
+std::vector<Misreading> misreadings_of(RotationSource source) {
+  if (source == RotationSource::attitude) {
+    return {{"the quaternions are of the base in the camera, not of the camera in the base",
+             [](RotationRow& row) { row.base_from_cam = row.base_from_cam.conjugate(); }}};
+  }
+  if (source == RotationSource::head) {
+    return {{"pan counts the other way (to the right), or the picture is mirrored left to right", scaled(-1, 1, 1)},
+            {"tilt counts the other way (down), or the picture is mirrored top to bottom", scaled(1, -1, 1)},
+            {"pan and tilt count the other way, or the camera hangs upside down", scaled(-1, -1, 1)},
+            {"pan and tilt are exchanged", exchange},
+            {"pan and tilt are exchanged, and pan counts the other way",
+             [](RotationRow& row) {
+               exchange(row);
+               scale_all(row, {-1.0, 1.0, 1.0});
+             }},
+            {"the angles are degrees: name the columns pan_deg, tilt_deg", scaled(degree, degree, degree)}};
+  }
+  return {{"ω_y counts the other way, or the picture is mirrored left to right", scaled(1, -1, -1)},
+          {"ω_x counts the other way, or the picture is mirrored top to bottom", scaled(-1, 1, -1)},
+          {"ω_x and ω_y count the other way, or the camera hangs upside down", scaled(-1, -1, 1)},
+          {"the rates are of the world against the camera: all signs are turned", scaled(-1, -1, -1)},
+          {"ω_x and ω_y are exchanged", exchange},
+          {"the rates are degrees per second", scaled(degree, degree, degree)}};
+}
+
+constexpr std::size_t most_frames = 150;
+
+/// Noise [px] with which the log is explained, by the rows of its first seconds, thinned; infinite: not at all.
+double noise_of(const RotationLog& log, const ObserveConfig& config, const PixelScale& scale,
+                const Progress& progress) {
+  MotionReader reader(log.source, config.max_gap_s);
+  FrameBuffer buffer(log.num_points, most_frames);
+  std::vector<Eigen::Vector2d> px(log.num_points);
+  for (const RotationRow& row : log.rows) {
+    const RotationFrame frame = reader.next(row);
+    for (std::size_t i = 0; i < px.size(); ++i) {
+      px[i] = i < frame.px.size() ? scale.normalised(frame.px[i]) : Eigen::Vector2d::Constant(not_seen);
+    }
+    if (frame.starts_segment && buffer.size() > 0) break;
+    buffer.add(frame, px);
+  }
+  AdjustConfig adjust_with;
+  adjust_with.start = start_camera(config, scale);
+  adjust_with.other_starts = {0.7, 2.5, 5.0, 10.0};
+  adjust_with.reject = false;
+  const Adjustment adjustment = adjust(buffer, adjust_with, progress);
+  return adjustment.has_value ? adjustment.solution.rms_px * scale.scale : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace
+
+bool may_be_misread(const ObserveReport& report) {
+  constexpr double most_ordinary_px = 2.0, many = 0.2;
+  using Status = ObserveReport::Status;
+  if (report.status == Status::no_convergence || report.status == Status::unsteady) return true;
+  const auto seen = static_cast<double>(report.reference.bundle.observations.size() + report.pixels_left_out);
+  return report.status == Status::ok &&
+         (report.sigma_px > most_ordinary_px || static_cast<double>(report.pixels_left_out) > many * seen);
+}
+
+std::string misread_rotation(const RotationLog& log, const ObserveConfig& config, const ObserveReport& report,
+                             const Progress& progress) {
+  if (log.source == RotationSource::none || config.rotation == RotationKnowledge::free) return "";
+  constexpr double most_px = 3.0, clearly = 0.2;  // of the noise as the log is read
+  const double as_read = noise_of(log, config, report.scale, progress);
+  std::string best;
+  double least = std::min(most_px, clearly * as_read);
+  for (const Misreading& misreading : misreadings_of(log.source)) {
+    RotationLog undone = log;
+    for (RotationRow& row : undone.rows) misreading.undo(row);
+    const double noise = noise_of(undone, config, report.scale, progress);
+    if (!(noise < least)) continue;
+    least = noise;
+    best = misreading.words;
+  }
+  return best;
+}
+
+}  // namespace alidade

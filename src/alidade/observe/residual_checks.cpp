@@ -1,0 +1,173 @@
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/geometry/degree.h"
+#include "alidade/observe/observe.h"
+
+namespace alidade {
+namespace {
+
+constexpr double ask_beyond = 5.0;                                // σ at which the residuals ask for one thing more
+constexpr double most_ordinary_px = 2.0, most_possible_px = 6.0;  // noise of a point finder
+constexpr double many_left_out = 0.2, most_left_out = 0.4;        // share of what was seen
+constexpr double moves_beyond = 4.0;                              // of a track's residuals over the others' median
+
+/// Asked for, the one that explains best first.
+std::vector<const CauseScore*> asked_for(const ObserveReport& report) {
+  std::vector<const CauseScore*> asked;
+  for (const CauseScore& cause : report.causes) {
+    if (cause.z >= ask_beyond) asked.push_back(&cause);
+  }
+  std::stable_sort(asked.begin(), asked.end(),
+                   [](const CauseScore* a, const CauseScore* b) { return a->gain > b->gain; });
+  return asked;
+}
+
+/// "k1 −0.1", or the largest of several over its σ.
+std::string size_of(const CauseScore& cause) {
+  const auto worst =
+      std::max_element(cause.members.begin(), cause.members.end(), [](const CauseMember& a, const CauseMember& b) {
+        return std::abs(a.value) * b.sigma < std::abs(b.value) * a.sigma;
+      });
+  if (worst == cause.members.end()) return "";
+  return (worst->name == cause.name ? "" : worst->name + " ") + text_of(worst->value, 2) +
+         (worst->unit.empty() ? "" : " " + worst->unit);
+}
+
+std::string advice_for(const CauseScore& cause) {
+  const bool is_of_lens = cause.name.size() >= 2 && (cause.name[0] == 'k' || cause.name.starts_with("p1"));
+  if (is_of_lens || cause.name == "mount" || cause.name == "delay" || cause.name == "lever") {
+    return "--estimate " + cause.name;
+  }
+  if (cause.name == "encoder scale" || cause.name == "scale of the rates") {
+    return "compare the angles with a known turn and correct their scale";
+  }
+  if (cause.name == "focal length that drifts") return "hold zoom and focus, or use --method hybrid";
+  if (cause.name == "rolling shutter") return "turn more slowly, or use a global shutter";
+  return "correct the angles for it";
+}
+
+Check noise_check(const ObserveReport& report) {
+  Check check{"noise", State::good, "", report.sigma_px, most_ordinary_px, "px", "residuals"};
+  check.text = "σ of a pixel is " + text_of(report.sigma_px, 2) + " px";
+  if (!report.sigma_is_told) return check;
+  if (check.value > most_ordinary_px) {
+    check.state = check.value > most_possible_px ? State::bad : State::care;
+    check.text += ": no finder of points is so unsure, something else moves them";
+  }
+  return check;
+}
+
+Check left_out_check(const ObserveReport& report) {
+  const auto out = static_cast<double>(report.pixels_left_out);
+  const double all = out + static_cast<double>(report.reference.bundle.observations.size());
+  Check check{"left out", State::good, "", all > 0.0 ? 100.0 * out / all : 0.0, 100.0 * many_left_out,
+              "%",        "residuals"};
+  check.text = text_of(check.value, 2) + " % of the pixels were left out";
+  if (check.value > 100.0 * many_left_out) {
+    check.state = check.value > 100.0 * most_left_out ? State::bad : State::care;
+    check.text += ": points move, or are taken for each other";
+  }
+  return check;
+}
+
+/// Tracks whose residuals are far larger than the others'.
+Check points_check(const ObserveReport& report) {
+  const Adjustment& reference = report.reference;
+  const std::size_t num = reference.bundle.points.size();
+  std::vector<double> squares(num, 0.0), count(num, 0.0), rms;
+  for (std::size_t i = 0; i < reference.bundle.observations.size(); ++i) {
+    const auto point = static_cast<std::size_t>(reference.bundle.observations[i].point);
+    if (!std::isfinite(reference.solution.residual_px[i])) continue;
+    squares[point] += reference.solution.residual_px[i] * reference.solution.residual_px[i];
+    count[point] += 2.0;
+  }
+  constexpr double least_pixels = 20.0;
+  for (std::size_t i = 0; i < num; ++i) {
+    if (count[i] >= least_pixels) rms.push_back(std::sqrt(squares[i] / count[i]));
+  }
+  Check check{"points stand still", State::good, "", 0.0, moves_beyond, "", "points"};
+  if (rms.size() < 3) {
+    check.text = "too few points to compare";
+    return check;
+  }
+  std::nth_element(rms.begin(), rms.begin() + static_cast<std::ptrdiff_t>(rms.size() / 2), rms.end());
+  const double median = rms[rms.size() / 2];
+  std::string names;
+  for (std::size_t i = 0; i < reference.bundle_point_of.size(); ++i) {
+    const int place = reference.bundle_point_of[i];
+    if (place < 0 || count[static_cast<std::size_t>(place)] < least_pixels) continue;
+    const auto at = static_cast<std::size_t>(place);
+    const double ratio = std::sqrt(squares[at] / count[at]) / std::max(median, 1e-12);
+    check.value = std::max(check.value, ratio);
+    if (ratio > moves_beyond) names += (names.empty() ? "" : ", ") + std::to_string(i + 1);
+  }
+  check.text = names.empty() ? "every point fits about as well as the others"
+                             : "point " + names + " does not stand still, or is not one point";
+  if (!names.empty()) check.state = State::care;
+  return check;
+}
+
+Check reference_check(const ObserveReport& report) {
+  constexpr double care = 3.0, bad = 5.0;
+  Check check{"agrees with all rows together", State::good, "", report.from_reference, care, "σ", "intrinsics"};
+  check.text = "the answer is " + text_of(check.value, 2) + "σ from the adjustment of all rows together";
+  if (check.value > care) check.state = check.value > bad ? State::bad : State::care;
+  return check;
+}
+
+}  // namespace
+
+Check rotation_check(const ObserveReport& report) {
+  constexpr double most_deg = 45.0;
+  Check check{"rotation", State::good, "the rotation fits as it is read", 0.0, most_deg, "°", "residuals"};
+  Eigen::Vector3d mount_rad = Eigen::Vector3d::Zero();
+  for (const ObservedQuantity& quantity : report.quantities) {
+    if (quantity.name == "mount_x_rad") mount_rad.x() = quantity.value;
+    if (quantity.name == "mount_y_rad") mount_rad.y() = quantity.value;
+    if (quantity.name == "mount_z_rad") mount_rad.z() = quantity.value;
+  }
+  check.value = mount_rad.norm() / degree;
+  if (!report.misread.empty()) {
+    check.state = State::bad;
+    check.text = "the pixels fit better if the rotation is read otherwise: " + report.misread;
+  } else if (check.value > most_deg) {
+    check.state = State::bad;
+    check.text = "the mount turns by " + text_of(check.value, 3) +
+                 "°: axes exchanged, a sign turned, or the picture mirrored, which no rotation undoes";
+  }
+  return check;
+}
+
+std::vector<Check> residual_checks(const ObserveReport& report) {
+  std::vector<Check> checks;
+  const auto asked = asked_for(report);
+  constexpr std::size_t most_named = 4;
+  for (std::size_t i = 0; i < std::min(asked.size(), most_named); ++i) {
+    const CauseScore& cause = *asked[i];
+    std::string text = i == 0 ? "the residuals ask for " : "so they do for ";
+    text += cause.name + " (" + size_of(cause) + "; " + text_of(cause.z, 2) + "σ)";
+    if (i == 0) text += ": " + advice_for(cause);
+    checks.push_back({"needs " + cause.name, State::care, text, cause.z, ask_beyond, "σ", "residuals"});
+  }
+  if (asked.empty() && !report.causes.empty()) {
+    const auto largest = std::max_element(report.causes.begin(), report.causes.end(),
+                                          [](const CauseScore& a, const CauseScore& b) { return a.z < b.z; });
+    checks.push_back({"causes", State::good,
+                      "of " + std::to_string(report.causes.size()) +
+                          " causes tested the residuals ask for none; most for " + largest->name,
+                      largest->z, ask_beyond, "σ", "residuals"});
+  }
+  if (!report.stated.blocks.z2.empty()) {
+    checks.push_back(clusters_agree(report.stated.blocks, "block of time",
+                                    "blur, noise of the angles, or what was taken as exact", "residuals"));
+    checks.back().name = "blocks of time agree";
+  }
+  checks.push_back(noise_check(report));
+  checks.push_back(left_out_check(report));
+  if (!report.reference.bundle_point_of.empty() && !report.causes.empty()) checks.push_back(points_check(report));
+  if (report.from_reference > 0.0) checks.push_back(reference_check(report));
+  return checks;
+}
+
+}  // namespace alidade

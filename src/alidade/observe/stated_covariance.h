@@ -1,0 +1,32 @@
+#pragma once
+
+#include "alidade/estimation/cluster_covariance.h"
+#include "alidade/observe/frame_buffer.h"
+
+namespace alidade {
+
+/// Covariance of an adjustment whose residuals share errors, in time (blur, a late clock, noise of the angles) and
+/// along the track of a point, and what tells it from the model's.
+struct StatedCovariance {
+  CommonMatrix cov;           ///< Of the common parameters, normalised; nowhere below the model's.
+  Eigen::VectorXd inflation;  ///< σ over the model's.
+  ClusterCovariance blocks;   ///< Blocks of time.
+  double correlation_s = 0.0, block_s = 0.0;
+  double track_effect = 1.0;  ///< Variance of the tracks' scores over that of their parts, track × block.
+  bool counts_tracks = false;
+};
+
+/// Two-way cluster-robust covariance: Σ_time + Σ_track − Σ_both, made positive. Blocks of time are as long as five
+/// times the residuals' correlation where at least six fit; where not, what the correlation across their borders hides
+/// is added. Tracks count where their scatter is beyond chance (three of its σ): a few of them say little. Not for
+/// bundles with turns: the model's covariance comes back. Cameron, Gelbach & Miller, J. Bus. Econ. Stat. 29(2), 2011.
+[[nodiscard]] StatedCovariance stated_covariance(const Adjustment& reference, const ObserveNuisances& nuisances);
+
+/// Integrated correlation time of the residuals along the tracks, one-sided: τ for a correlation exp(−t/τ), 0 for white
+/// noise.
+[[nodiscard]] double residual_correlation_s(const Adjustment& reference);
+
+/// A residual's weight, normalised: Huber's over σ².
+[[nodiscard]] double residual_weight(const Adjustment& reference, std::size_t observation);
+
+}  // namespace alidade

@@ -3,8 +3,10 @@
 reached: real_boards_test.py ALIDADE. The data lie in the folder that ALIDADE_DATA names; without it: skipped (77)."""
 import csv
 import json
+import math
 import os
 import pathlib
+import random
 import struct
 import subprocess
 import sys
@@ -51,11 +53,11 @@ class RealBoards(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
 
-    def calibrate(self, *words, out="out"):
+    def calibrate(self, *words, out="out", allowed=(0,)):
         out = self.folder / out
         run = subprocess.run([alidade, "calibrate", *map(str, words), "--out", out, "--no-report", "--quiet"],
                              capture_output=True, text=True)
-        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertIn(run.returncode, allowed, run.stderr)
         return json.loads((out / "result.json").read_text())
 
     def found(self, result):
@@ -103,6 +105,37 @@ class RealBoards(unittest.TestCase):
         self.assertLessEqual(result["estimate"]["rms_px"], 0.5)
         self.assertAlmostEqual(result["estimate"]["camera"]["fx"], 560.2, delta=3.0)
         self.assertAlmostEqual(result["estimate"]["camera"]["fy"], 561.3, delta=3.0)
+
+    def test_well_taken_photos_are_not_called_untrustworthy(self):
+        sets = (("bouguet-stereo5/left*.jpg", "9x6"), ("bouguet-example1/*.tif", "12x13"),
+                ("underwater-dome/air1100/*.png", "8x6"))
+        for pattern, board in sets:
+            result = self.calibrate(*sorted(DATA.glob(pattern)), "--board", board, "--square", "0.03")
+            self.assertIn(result["verdict"]["state"], ("good", "care"), result["verdict"]["sentence"])
+
+    def test_halves_differ_by_what_sigma_says(self):
+        """The short form of bench/study_halves.py: 3 splits of 3 sets, 81 differences of 9 parameters, which hang
+        together: RMS z of a true σ scatters by about 0.15."""
+        stated, model = [], []
+        for pattern, board in (("bouguet-stereo5/left*.jpg", "9x6"), ("bouguet-stereo5/right*.jpg", "9x6"),
+                               ("bouguet-example1/*.tif", "12x13")):
+            photos = sorted(DATA.glob(pattern))
+            for split in range(3):
+                shuffled = photos[:]
+                random.Random(split).shuffle(shuffled)
+                half = len(shuffled) // 2
+                a, b = (self.calibrate(*part, "--board", board, "--square", "0.03", allowed=(0, 6))
+                        for part in (shuffled[:half], shuffled[half:]))
+                for z, kind in ((stated, "stddev"), (model, "stddev_model")):
+                    for name, sigma in a[kind]["camera"].items():
+                        if sigma:
+                            moved = a["estimate"]["camera"][name] - b["estimate"]["camera"][name]
+                            z.append(moved / math.hypot(sigma, b[kind]["camera"][name]))
+        rms = {kind: math.sqrt(sum(value ** 2 for value in z) / len(z))
+               for kind, z in (("stated", stated), ("model", model))}
+        self.assertGreaterEqual(len(stated), 81)
+        self.assertTrue(0.6 <= rms["stated"] <= 1.4, rms)
+        self.assertGreater(rms["model"], 2.0, "what σ of single corners says of these photos")
 
     def test_the_focal_length_under_water_is_that_much_longer(self):
         focal = {}

@@ -1,0 +1,150 @@
+#!/usr/bin/env python3
+"""Inputs that are not as they are told: each must end in the truth within its σ, or in a verdict that is not good, or be
+refused. Never a good verdict (state `good`) with an error above five of its σ. audit_test.py ALIDADE. The inputs, and the
+truth behind them, lie in the folder that ALIDADE_DATA names (audit/README.md there); without it: skipped (77)."""
+import csv
+import json
+import math
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+AUDIT = pathlib.Path(os.environ.get("ALIDADE_DATA", "")) / "audit"
+alidade = ""
+LIMIT = 5.0  # σ
+
+
+class Audit(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def run_alidade(self, *words):
+        """The result of a run: None where it was refused or its input was not understood."""
+        out = self.folder / "out"
+        run = subprocess.run([alidade, *map(str, words), "--out", out, "--no-report", "--quiet"], capture_output=True,
+                             text=True)
+        self.assertIn(run.returncode, (0, 3, 4, 5, 6), run.stderr)
+        return json.loads((out / "result.json").read_text()) if run.returncode in (0, 6) else None
+
+    def is_silent(self, result, errors_in_sigmas):
+        """Whether a good verdict stands over an answer that is off: what must not be."""
+        worst = max(errors_in_sigmas, default=0.0)
+        return result["verdict"]["state"] == "good" and not worst <= LIMIT, worst
+
+    def require_told(self, name, result, errors):
+        silent, worst = self.is_silent(result, errors)
+        self.assertFalse(silent, f"{name}: good, but {worst:.0f}σ off: {result['verdict']['sentence']}")
+
+
+def errors_of(result, truth):
+    """|error| over σ of each lens parameter of which the truth is known."""
+    camera, sigma = result["estimate"]["camera"], result["stddev"]["camera"]
+    for name, value in truth.items():
+        if sigma.get(name):
+            yield abs(camera[name] - value) / sigma[name]
+
+
+class Observe(Audit):
+    def test_no_log_is_silently_wrong(self):
+        with open(AUDIT / "observe" / "truth.csv") as file:
+            rows = list(csv.DictReader(file))
+        ways = ([], ["--estimate", "k1,mount,delay"], ["--method", "batch"], ["--method", "flow"])
+        for row in rows:
+            truth = {name: float(row[name]) for name in ("fx", "fy", "cx", "cy")}
+            for options in ways:
+                with self.subTest(log=row["log"], options=" ".join(options)):
+                    result = self.run_alidade("observe", AUDIT / "observe" / row["log"], "--size", row["size"], *options)
+                    if result:
+                        self.require_told(row["log"], result, errors_of(result, truth))
+
+
+class Rangefinder(Audit):
+    ORIGIN, DIRECTION = (0.045, -0.060, 0.020), (0.0120, 0.0200, 0.9997)
+
+    def errors(self, result):
+        for name, truth in (("origin_m", self.ORIGIN), ("direction", self.DIRECTION)):
+            for value, true, sigma in zip(result["estimate"][name], truth, result["stddev"][name]):
+                # the direction is told to four decimals
+                yield max(0.0, abs(value - true) - (5e-5 if name == "direction" else 0.0)) / max(sigma, 1e-12)
+
+    def test_no_shots_are_silently_wrong(self):
+        for name, options in (("camera_without_cov", []), ("scale1pct_n18", []),
+                              ("print99pct_n18", ["--square", "0.0404"]), ("plane_n8", ["--method", "plane"]),
+                              ("wrong45", []), ("centre_n4", []), ("photo_spot_sigma", []), ("sticker_ir", [])):
+            with self.subTest(name):
+                folder = AUDIT / "rangefinder" / name
+                corners = ["--corners", folder / "corners.csv"] if (folder / "corners.csv").exists() else []
+                square = options if "--square" in options else ["--square", "0.04", *options]
+                result = self.run_alidade("rangefinder", folder / "shots.csv", "--camera", folder / "camera.yaml",
+                                          "--board", "9x6", *square, *corners)
+                if result:
+                    self.require_told(name, result, self.errors(result))
+
+    def test_shots_that_are_good_are_kept(self):
+        folder = AUDIT / "rangefinder" / "plane_n8"
+        result = self.run_alidade("rangefinder", folder / "shots.csv", "--camera", folder / "camera.yaml", "--board",
+                                  "9x6", "--square", "0.04", "--corners", folder / "corners.csv", "--method", "plane")
+        self.assertIsNotNone(result)
+
+
+class Rig(Audit):
+    def test_mirrored_images_are_refused(self):
+        folder = AUDIT / "rig-mirrored"
+        result = self.run_alidade("rig", folder / "views.csv", "--camera", folder / "cam1.yaml", "--camera",
+                                  folder / "cam2.yaml", "--board", "9x6", "--square", "0.025")
+        self.assertIsNone(result)
+
+
+class Identify(Audit):
+    def test_no_servo_is_silently_wrong(self):
+        gain = math.radians(0.0567)
+        plants = {"backlash_0.5deg_step": gain, "deadband_step": gain, "degrees_as_rad": gain, "ms_times": gain,
+                  "quant_0.1deg": gain, "rate_limit_plant": math.radians(0.3)}
+        for name, truth in plants.items():
+            with self.subTest(name):
+                result = self.run_alidade("identify", AUDIT / "identify" / f"{name}.csv")
+                if result:
+                    error = abs(result["estimate"]["gain"] - truth) / result["stddev"]["gain"]
+                    self.require_told(name, result, [error])
+
+
+class Servo(Audit):
+    def test_unstable_loops_are_refused(self):
+        for name in ("rate_gain_100", "mismatch_gain5_lqr_angle"):
+            with self.subTest(name):
+                self.assertIsNone(self.run_alidade("servo", AUDIT / "servo-unstable" / f"{name}.yaml"))
+
+
+class Track(Audit):
+    def test_the_order_of_arrival_does_not_matter(self):
+        folder = AUDIT / "track-latency"
+        results = [self.run_alidade("track", folder / f"min_{kind}.csv", "--rig", folder / "rig.yaml")
+                   for kind in ("good", "bad")]
+        self.assertNotIn(None, results)
+
+
+class Localize(Audit):
+    def localize(self, name, *options):
+        folder = AUDIT / "localize" / name
+        return self.run_alidade("localize", folder / "sights.csv", "--camera", folder / "camera.yaml", "--target",
+                                folder / "target.yaml", "--truth", folder / "truth.tum", *options)
+
+    def test_what_is_mirrored_is_told(self):
+        for name in ("target_mirrored", "mirrored_picture"):
+            with self.subTest(name):
+                result = self.localize(name)
+                if result:
+                    self.assertNotEqual(result["verdict"]["state"], "good", result["verdict"]["sentence"])
+
+
+if __name__ == "__main__":
+    alidade = sys.argv.pop(1)
+    if not AUDIT.is_dir():
+        print("skipped: ALIDADE_DATA names no folder with the audit's inputs")
+        sys.exit(77)
+    unittest.main(verbosity=1)

@@ -4,7 +4,9 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
+#include <cmath>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include "alidade/board/dictionary.h"
@@ -28,6 +30,33 @@ std::optional<std::pair<int, int>> cols_and_rows(const std::string& text) {
 CLI::Validator size_check() {
   return {[](const std::string& text) -> std::string {
             return cols_and_rows(text) ? "" : "'" + text + "' is not COLSxROWS, for example 9x6";
+          },
+          ""};
+}
+
+/// A length in metres, or with its unit: "25mm" becomes 0.025. A bare number that no board has was meant in another
+/// unit.
+CLI::Validator length() {
+  return {[](std::string& text) -> std::string {
+            double value = 0.0;
+            const char* const end = text.data() + text.size();
+            const auto [rest, error] = std::from_chars(text.data(), end, value);
+            const std::string_view unit(rest, static_cast<std::size_t>(end - rest));
+            const double metres = unit == "mm" ? 1e-3 : unit == "cm" ? 1e-2 : unit == "m" ? 1.0 : 0.0;
+            if (error == std::errc{} && std::isfinite(value) && value > 0.0 && metres > 0.0) {
+              text = fmt::format("{}", value * metres);
+              return "";
+            }
+            if (const std::string fault = positive_number()(text); !fault.empty()) return fault;
+            constexpr double largest_m = 2.0, smallest_m = 5e-4;
+            if (value > largest_m) {
+              return fmt::format("'{0}' is in metres: {1:g}? Or with its unit, {0}mm or {0}m", text, 1e-3 * value);
+            }
+            if (value < smallest_m) {
+              return fmt::format("'{}' is in metres, {:g} mm: if that is meant, with its unit, {:g}mm", text,
+                                 1e3 * value, 1e3 * value);
+            }
+            return "";
           },
           ""};
 }
@@ -58,9 +87,10 @@ void add_board_options(CLI::App& command, BoardOptions& options, bool is_require
                           ->required(is_required)
                           ->group(group);
   CLI::Option* square =
-      command.add_option("--square", options.square_m, "Side of a square, distance of circles, side of a tag [m]")
+      command
+          .add_option("--square", options.square_m, "Side of a square, distance of circles, side of a tag [m], or 25mm")
           ->type_name("M")
-          ->check(positive_number())
+          ->transform(length())
           ->required(is_required)
           ->group(group);
   size->needs(square);
@@ -74,7 +104,7 @@ void add_board_options(CLI::App& command, BoardOptions& options, bool is_require
       .add_option("--marker", options.marker_m,
                   "Side of a marker (charuco), gap between tags (aprilgrid), diameter (circles) [m]")
       ->type_name("M")
-      ->check(positive_number())
+      ->transform(length())
       ->group(group);
   command.add_option("--dictionary", options.dictionary, "Marker dictionary of a charuco board")
       ->type_name("NAME")
@@ -98,13 +128,6 @@ Board board_from(const BoardOptions& options) {
   const std::string what = fault(board);
   if (!what.empty()) throw UsageError("--board: " + what);
   return board;
-}
-
-std::string odd_size(const Board& board) {
-  constexpr double largest_m = 2.0;
-  if (!(board.square_m > largest_m)) return "";
-  return fmt::format("note: squares of {0:g} m; lengths are in metres, and {0:g} mm is --square {1:g}", board.square_m,
-                     1e-3 * board.square_m);
 }
 
 }  // namespace alidade::cli

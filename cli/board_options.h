@@ -19,14 +19,12 @@ struct BoardOptions {
   std::string dictionary = "DICT_5X5_100";
 };
 
-/// Adds --board, --square, --target, --marker and --dictionary. Where a board is not required, --board needs --square
-/// and the other way round.
+/// Adds --board, --square, --target, --marker and --dictionary. Lengths are metres, or have their unit (25mm); a bare
+/// number above 2 or below 0.0005 is refused, as no printed board has such squares. Where a board is not required,
+/// --board needs --square and the other way round.
 void add_board_options(CLI::App& command, BoardOptions& options, bool is_required = true);
 
 /// The board that the flags describe. Throws UsageError where there is none.
 [[nodiscard]] Board board_from(const BoardOptions& options);
-
-/// What is odd about a board: metres are meant, and millimetres were said. Empty: nothing.
-[[nodiscard]] std::string odd_size(const Board& board);
 
 }  // namespace alidade::cli

@@ -50,13 +50,24 @@ TEST(BoardOptions, NameWhatIsWrong) {
   }
 }
 
-TEST(BoardOptions, SayWhereMillimetresWereMeant) {
-  Board board;
-  board.square_m = 25.0;
-  EXPECT_EQ(odd_size(board), "note: squares of 25 m; lengths are in metres, and 25 mm is --square 0.025");
-  for (const double usual_m : {0.004, 0.025, 1.0}) {  // 1: many do not care for the unit
-    board.square_m = usual_m;
-    EXPECT_EQ(odd_size(board), "");
+TEST(BoardOptions, AskWhereMillimetresWereMeant) {
+  EXPECT_EQ(fault_of("--board 9x6 --square 25"), "--square: '25' is in metres: 0.025? Or with its unit, 25mm or 25m");
+  EXPECT_THAT(fault_of("--board 9x6 --square 2.5"), ::testing::HasSubstr("2.5mm or 2.5m"));
+  EXPECT_THAT(fault_of("--board 9x6 --square 0.03 --target charuco --marker 22"), ::testing::HasSubstr("0.022?"));
+  EXPECT_EQ(fault_of("--board 9x6 --square 0.00025"),
+            "--square: '0.00025' is in metres, 0.25 mm: if that is meant, with its unit, 0.25mm");
+  for (const double usual_m : {0.0005, 0.004, 0.025, 1.0, 2.0}) {  // 1: many do not care for the unit
+    EXPECT_EQ(parse("--board 9x6 --square " + std::to_string(usual_m)).square_m, usual_m);
+  }
+}
+
+TEST(BoardOptions, LengthsMayHaveTheirUnit) {
+  EXPECT_DOUBLE_EQ(parse("--board 9x6 --square 25mm").square_m, 0.025);
+  EXPECT_DOUBLE_EQ(parse("--board 9x6 --square 2.5cm").square_m, 0.025);
+  EXPECT_DOUBLE_EQ(parse("--board 9x6 --square 3m").square_m, 3.0) << "painted on a runway";
+  EXPECT_DOUBLE_EQ(parse("--board 9x6 --square 0.1mm").square_m, 1e-4) << "etched on glass";
+  for (const std::string length : {"25 mm", "25um", "-25mm", "0mm", "mm", "infmm", "25mmm"}) {
+    EXPECT_NE(fault_of("--board 9x6 --square \"" + length + "\""), "") << length;
   }
 }
 

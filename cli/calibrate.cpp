@@ -4,21 +4,18 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <mutex>
-#include <opencv2/core.hpp>
-#include <set>
 
 #include "alidade/calibrate/calibration.h"
 #include "alidade/calibrate/setup.h"
 #include "alidade/io/calibration_document.h"
 #include "alidade/io/camera_file.h"
 #include "alidade/io/corner_file.h"
-#include "alidade/io/photos.h"
 #include "cli/board_options.h"
 #include "cli/calibration_summary.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
 #include "cli/option_checks.h"
+#include "cli/photo_shelf.h"
 
 namespace alidade::cli {
 namespace {
@@ -134,39 +131,6 @@ void require_size_of_air(const CalibrateArgs& args, const ImageSize& size) {
                                air->height_px, size.width_px, size.height_px));
 }
 
-/// Reads each photo once; the second look comes from memory while the set is small. Called from many threads.
-class PhotoShelf {
- public:
-  PhotoShelf(std::vector<std::filesystem::path> files, Run& run) : files_(std::move(files)), run_(run) {
-    photos_.resize(files_.size());
-    inputs_.resize(files_.size());
-  }
-
-  cv::Mat load(std::size_t i) {
-    if (!photos_[i].empty()) return photos_[i];
-    const std::string bytes = read_file(files_[i]);
-    {
-      const std::scoped_lock lock(mutex_);
-      if (!inputs_[i]) run_.add_input("photo", files_[i].string(), bytes);
-      inputs_[i] = true;
-    }
-    cv::Mat photo = decode_photo(bytes);
-    const std::scoped_lock lock(mutex_);
-    constexpr std::size_t most_bytes = 256u << 20;
-    held_ += photo.total() * photo.elemSize();
-    if (held_ < most_bytes) photos_[i] = photo;
-    return photo;
-  }
-
- private:
-  std::vector<std::filesystem::path> files_;
-  Run& run_;
-  std::mutex mutex_;
-  std::vector<cv::Mat> photos_;
-  std::vector<bool> inputs_;
-  std::size_t held_ = 0;
-};
-
 /// Size of the pictures where only corners are given: as asked, else the smallest that holds them all.
 ImageSize size_of(const CalibrateArgs& args, const std::vector<BoardView>& views) {
   if (!args.size.empty()) return parse_size(args.size);
@@ -218,28 +182,9 @@ PhotoCalibration from_corners(const CalibrateArgs& args, const Board& board, Cal
   return result;
 }
 
-PhotoCalibration from_photos(const std::vector<std::filesystem::path>& files, PhotoShelf& shelf, const Board& board,
-                             const CalibrateConfig& config, std::span<const Eigen::Vector3d> given, Run& run) {
-  std::vector<std::string> names;
-  std::set<std::string> short_names;
-  for (const auto& file : files) short_names.insert(file.filename().string());
-  const bool unique = short_names.size() == files.size();
-  for (const auto& file : files) names.push_back(unique ? file.filename().string() : file.string());
-  PhotoCalibration result = calibrate_photos(
-      names, [&shelf](std::size_t i) { return shelf.load(i); }, board, config, given, run.progress);
-  if (result.num_unreadable == files.size()) {
-    throw InputError(
-        files.front().string() + ": " + result.reasons.front() +
-        (files.size() > 1 ? "; nor can any of the other " + std::to_string(files.size() - 1) + " be read" : ""));
-  }
-  run.lap("detect_and_solve");
-  return result;
-}
-
 ExitCode calibrate(CalibrateArgs args, Run& run) {
   take_port(args, run);
   const Board board = board_from(args.board);
-  if (const std::string odd = odd_size(board); !odd.empty()) run.say(odd);
   CalibrateConfig config = config_from(args);
   if (args.corners.empty() == args.photos.empty()) {
     throw UsageError(args.photos.empty() ? "give photos, or --corners FILE" : "--corners takes the place of photos");
@@ -250,10 +195,9 @@ ExitCode calibrate(CalibrateArgs args, Run& run) {
     given = read_board_points(args.board_shape, num_points(board));
   }
   config.reject_outliers = args.outliers != "keep";
-  const auto files = list_photos(args.photos);
-  PhotoShelf shelf(files, run);
+  PhotoShelf shelf(args.photos, run);
   std::vector<SkippedInput> skipped;
-  PhotoCalibration solved = args.corners.empty() ? from_photos(files, shelf, board, config, given, run)
+  PhotoCalibration solved = args.corners.empty() ? calibrate_shelf(shelf, board, config, given, run)
                                                  : from_corners(args, board, config, given, skipped, run);
   require_told_size(args, solved.size);
   require_size_of_air(args, solved.size);
@@ -266,9 +210,10 @@ ExitCode calibrate(CalibrateArgs args, Run& run) {
     run.say(fmt::format("{} wrong row{} left out, the first: {}:{}: {}", skipped.size(), skipped.size() > 1 ? "s" : "",
                         skipped.front().file, skipped.front().line, skipped.front().reason));
   }
+  shelf.tell_skipped();
+  shelf.tell_turned(result.verdict);
   if (!run.options.no_report && args.corners.empty()) {
-    add_pictures(
-        result, [&shelf](std::size_t i) { return shelf.load(i); }, run);
+    add_pictures(result, shelf.loader(), run);
     run.lap("pictures");
   }
   summarize(result, run);

@@ -6,6 +6,7 @@ class Frame;
 
 void add_calibrate(Frame& frame);
 void add_camera(Frame& frame);
+void add_corners(Frame& frame);
 void add_identify(Frame& frame);
 void add_localize(Frame& frame);
 void add_observe(Frame& frame);

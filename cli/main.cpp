@@ -6,6 +6,7 @@ namespace {
 void add_commands(alidade::cli::Frame& frame) {
   alidade::cli::add_calibrate(frame);
   alidade::cli::add_camera(frame);
+  alidade::cli::add_corners(frame);
   alidade::cli::add_identify(frame);
   alidade::cli::add_localize(frame);
   alidade::cli::add_observe(frame);

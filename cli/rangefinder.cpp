@@ -244,7 +244,6 @@ ExitCode rangefinder(const RangefinderArgs& args, Run& run) {
   if (!args.photo.empty() || !args.start.empty()) throw UsageError("--photo and --start are for --method edges");
   std::optional<Board> board;
   if (!args.board.size.empty()) board = board_from(args.board);
-  if (board && !odd_size(*board).empty()) run.say(odd_size(*board));
   const RangefinderConfig asked = config_from(args, run.options.seed);
   if (!args.corners.empty() && !board) throw UsageError("--corners needs --board and --square");
   run.add_input("shots", args.shots);

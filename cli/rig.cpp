@@ -162,7 +162,6 @@ ExitCode rig(const RigArgs& args, Run& run) {
   if (args.board.size.empty())
     throw UsageError("--board is required (or --moving-target, for cameras that do not turn)");
   const Board board = board_from(args.board);
-  if (const std::string odd = odd_size(board); !odd.empty()) run.say(odd);
   const RigConfig config = config_from(args);
   run.add_input("views", args.views);
   for (const std::filesystem::path& camera : args.cameras) run.add_input("camera", camera);

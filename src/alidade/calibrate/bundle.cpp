@@ -211,6 +211,20 @@ BundleResult solve_bundle(const BundleProblem& problem, BundleState start, const
   return result;
 }
 
+BundleResult solve_past_fold(BundleProblem problem, BundleState start, const BundleConfig& config) {
+  BundleResult result = solve_bundle(problem, std::move(start), config);
+  if (result.status == BundleResult::Status::converged || !std::holds_alternative<Calibrated<Brown>>(result.state.lens))
+    return result;
+  const int before = result.iterations;
+  problem.passes_fold = true;
+  result = solve_bundle(problem, std::move(result.state), config);
+  result.iterations += before;
+  problem.passes_fold = false;
+  NormalEquations inside;
+  if (!linearize(problem, result.state, inside)) result.status = BundleResult::Status::no_convergence;
+  return result;
+}
+
 std::vector<Eigen::Vector2d> residuals_px(const BundleState& state, std::size_t view_index, const ViewArrays& view) {
   return residuals_px(prepare(state.lens), state.cam_from_board[view_index], make_arrays(state.board_points), view);
 }

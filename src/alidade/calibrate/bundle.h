@@ -31,6 +31,8 @@ struct BundleProblem {
   std::vector<Eigen::Vector3d> printed_points;  ///< The board as printed: gauge and start of its shape. [m]
   double shape_sigma_m =
       0.0;  ///< Prior σ of a free point against the printed one; keeps unseen points where they were.
+  /// Brown: the formulas hold beyond the fold of the radial map as well, where a lens shows nothing.
+  bool passes_fold = false;
 };
 
 /// How a solve starts and ends.
@@ -60,6 +62,11 @@ struct BundleResult {
 /// Cholesky), so time and memory are linear in the views. Triggs et al., "Bundle adjustment — a modern synthesis",
 /// 2000, §6; gauge of the free board: minimal constraints, the rigid motion and scale that fit the printed board best.
 [[nodiscard]] BundleResult solve_bundle(const BundleProblem& problem, BundleState start, const BundleConfig& config);
+
+/// The same; where a Brown lens' fold bars the way (a step that puts one corner behind it is refused, and the solve
+/// creeps along the fold), it goes on by the formulas alone, as others always do. Status no_convergence where it ends
+/// with a corner that counts behind the fold.
+[[nodiscard]] BundleResult solve_past_fold(BundleProblem problem, BundleState start, const BundleConfig& config);
 
 /// The same with its covariances, from the undamped equations; status singular where they do not determine all.
 /// Anything but a converged result is returned as it is.

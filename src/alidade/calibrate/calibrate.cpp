@@ -155,7 +155,7 @@ enum class Nearness { rough, full };
 BundleResult solve(Work& work, BundleState start, const CalibrateConfig& config, Nearness nearness) {
   work.problem.views = work.arrays;
   const double tolerance = nearness == Nearness::rough ? 0.1 : BundleConfig{}.tolerance_sigmas;
-  return solve_bundle(work.problem, std::move(start), {config.max_iterations, tolerance, 0.0});
+  return solve_past_fold(work.problem, std::move(start), {config.max_iterations, tolerance, 0.0});
 }
 
 /// Alternates solve and noise estimate until no corner changes sides. The first solve weighs all corners alike.

@@ -1,36 +1,73 @@
 #include "alidade/calibrate/calibrate_photos.h"
 
 #include <algorithm>
+#include <cstdio>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <utility>
 
 #include "alidade/calibrate/repeated_views.h"
+#include "alidade/imaging/board_guess.h"
 
 namespace alidade {
 namespace {
 
 std::string text(const PhotoSize& size) { return std::to_string(size.width_px) + "x" + std::to_string(size.height_px); }
 
-/// Takes over what was found; photos of another size than the first are left out.
-void take_detections(BoardDetections&& found, PhotoCalibration& result) {
-  PhotoSize first;
+bool is_same(const PhotoSize& a, const PhotoSize& b) { return a.width_px == b.width_px && a.height_px == b.height_px; }
+
+/// The size that most photos have; of two that are as frequent, the one that shows the board more often, then the
+/// first.
+PhotoSize usual_size(const BoardDetections& found) {
+  PhotoSize usual;
+  std::pair<std::size_t, std::size_t> most{0, 0};
+  for (const PhotoSize& size : found.sizes) {
+    if (size.width_px == 0 || is_same(size, usual)) continue;
+    std::pair<std::size_t, std::size_t> count{0, 0};
+    for (std::size_t i = 0; i < found.sizes.size(); ++i) {
+      if (!is_same(found.sizes[i], size)) continue;
+      ++count.first;
+      count.second += found.photos[i].found() ? 1 : 0;
+    }
+    if (count <= most) continue;
+    most = count;
+    usual = size;
+  }
+  return usual;
+}
+
+/// Why a photo of another size takes no part.
+std::string other_size(const PhotoSize& size, const PhotoSize& usual) {
+  const bool is_turned = size.width_px == usual.height_px && size.height_px == usual.width_px;
+  return "is " + text(size) + ", but most photos are " + text(usual) +
+         (is_turned ? ": its pixels were turned; take it from the camera as it was stored" : "");
+}
+
+/// Takes over what was found; photos of another size than most are left out. Returns the photos of that size that show
+/// no board.
+std::vector<std::size_t> take_detections(BoardDetections&& found, PhotoCalibration& result) {
+  std::vector<std::size_t> in_vain;
+  const PhotoSize usual = usual_size(found);
   for (std::size_t i = 0; i < found.photos.size(); ++i) {
     const PhotoSize& size = found.sizes[i];
     if (size.width_px == 0) ++result.num_unreadable;
-    if (first.width_px == 0) first = size;
-    if (found.photos[i].found() && (size.width_px != first.width_px || size.height_px != first.height_px)) {
-      result.reasons[i] = "is " + text(size) + ", but the first photo is " + text(first);
+    if (size.width_px != 0 && !is_same(size, usual)) {
+      result.reasons[i] = other_size(size, usual);
     } else if (found.photos[i].found()) {
       result.views[i].corners = std::move(found.photos[i].view.corners);
     } else {
       result.reasons[i] = found.photos[i].reason;
+      if (size.width_px != 0) in_vain.push_back(i);
     }
   }
-  result.size = {first.width_px, first.height_px};
+  result.size = {usual.width_px, usual.height_px};
   const auto repeats = repeated_views(result.views);
   for (std::size_t i = 0; i < repeats.size(); ++i) {
     if (!repeats[i]) continue;
     result.reasons[i] = "is the same picture as " + result.views[*repeats[i]].photo;
     result.views[i].corners.clear();
   }
+  return in_vain;
 }
 
 /// Where many photos show a whole grid of another size, the few in which the asked one was seen are parts of that grid:
@@ -46,6 +83,52 @@ std::string wrong_board(const PhotoCalibration& result) {
   }
   if (others < 2 || 3 * others < found) return "";
   return std::to_string(others) + " photos show " + example;
+}
+
+/// Sizes of the grids that photos of a chessboard show instead of it, as columns and rows: "a grid of 8×6 corners, not
+/// 9×6", "only 8×6 of 9×6 corners, …". None where the board is of another kind.
+std::optional<std::vector<std::pair<int, int>>> grids_seen(const Board& told, const PhotoCalibration& result) {
+  if (told.kind != BoardKind::chessboard) return std::nullopt;
+  constexpr std::ptrdiff_t least_photos = 2;
+  constexpr std::size_t most_sizes = 4;
+  std::vector<std::pair<int, int>> all, seen;
+  for (const std::string& reason : result.reasons) {
+    std::pair<int, int> size;
+    if (std::sscanf(reason.c_str(), "a grid of %d×%d", &size.first, &size.second) != 2 &&
+        std::sscanf(reason.c_str(), "only %d×%d of", &size.first, &size.second) != 2)
+      continue;
+    all.push_back(size);
+  }
+  const std::ptrdiff_t needed = all.size() < 3 ? 1 : least_photos;
+  for (const auto& size : all) {
+    if (std::count(all.begin(), all.end(), size) < needed || seen.size() == most_sizes) continue;
+    if (std::find(seen.begin(), seen.end(), size) == seen.end()) seen.push_back(size);
+  }
+  return seen;
+}
+
+/// Where next to no photo shows the board as told: what is wrong, and the board that they do show.
+struct WrongBoard {
+  std::string reason, to_add;
+};
+
+/// `in_vain`: the photos that were searched and show no board.
+std::optional<WrongBoard> told_wrongly(const std::vector<std::size_t>& in_vain, const PhotoLoader& load_photo,
+                                       const Board& told, const Progress& progress, const PhotoCalibration& result) {
+  const std::string other_grid = wrong_board(result);
+  const auto found = static_cast<std::size_t>(std::count_if(
+      result.views.begin(), result.views.end(), [](const BoardView& view) { return !view.corners.empty(); }));
+  if (in_vain.empty() || (other_grid.empty() && 3 * found > in_vain.size())) return std::nullopt;
+  const auto load = [&](std::size_t i) { return load_photo(in_vain[i]); };
+  const auto meant = guess_board(in_vain.size(), load, told, grids_seen(told, result), progress);
+  if (meant) {
+    const std::string options = changed_options(told, *meant);
+    return WrongBoard{"the photos do not show the board as told, " + std::to_string(told.cols) + "×" +
+                          std::to_string(told.rows) + (told.dictionary.empty() ? "" : " with " + told.dictionary),
+                      "use " + options + ": that board stands in them"};
+  }
+  if (other_grid.empty()) return std::nullopt;
+  return WrongBoard{other_grid, "check --board, which counts inner corners"};
 }
 
 /// Adds the corners of the first extraction that the second lost: where the lens model fits badly, the second starts
@@ -81,15 +164,15 @@ PhotoCalibration calibrate_photos(const std::vector<std::string>& names, const P
   PhotoCalibration result;
   result.reasons.resize(names.size());
   for (const std::string& name : names) result.views.push_back({.photo = name, .corners = {}});
-  take_detections(find_boards(names.size(), load_photo, board, false, progress), result);
+  const auto in_vain = take_detections(find_boards(names.size(), load_photo, board, false, progress), result);
 
-  if (const std::string wrong = wrong_board(result); !wrong.empty()) {
-    result.report.reason = wrong;
-    result.report.to_add = "check --board, which counts inner corners";
+  if (const auto wrong = told_wrongly(in_vain, load_photo, board, progress, result)) {
+    result.report.reason = wrong->reason;
+    result.report.to_add = wrong->to_add;
     result.report.views.resize(names.size());
     for (std::size_t i = 0; i < names.size(); ++i) {
       result.report.views[i].corners.resize(result.views[i].corners.size());
-      result.report.views[i].reason = result.reasons[i].empty() ? "no camera: " + wrong : result.reasons[i];
+      result.report.views[i].reason = result.reasons[i].empty() ? "no camera: " + wrong->reason : result.reasons[i];
     }
     return result;
   }

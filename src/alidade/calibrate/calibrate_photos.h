@@ -12,14 +12,16 @@ namespace alidade {
 struct PhotoCalibration {
   std::vector<BoardView> views;      ///< One a photo, after the second extraction; no corners where none was found.
   std::vector<std::string> reasons;  ///< One a photo: why it has no corners; empty where it has.
-  ImageSize size;                    ///< Of the first photo that could be read; 0×0 where none could.
+  ImageSize size;                    ///< That most photos have; 0×0 where none could be read.
   std::size_t num_unreadable = 0;
   CalibrateReport report;  ///< Of `views`.
 };
 
 /// Bouguet's procedure: find the corners, calibrate a flat board, extract the corners again with lens and pose known,
-/// calibrate as `config` asks. Photos of another size than the first are left out and named.
-/// J.-Y. Bouguet, "Camera calibration toolbox for Matlab", first example: analyse error, reproject, recompute corners.
+/// calibrate as `config` asks. Photos of another size than most are left out and named. Where
+/// (nearly) none shows the board as told, the board that they do show is looked for, and the report says how to tell
+/// it. J.-Y. Bouguet, "Camera calibration toolbox for Matlab", first example: analyse error, reproject, recompute
+/// corners.
 [[nodiscard]] PhotoCalibration calibrate_photos(const std::vector<std::string>& names, const PhotoLoader& load_photo,
                                                 const Board& board, const CalibrateConfig& config,
                                                 std::span<const Eigen::Vector3d> given_points = {},

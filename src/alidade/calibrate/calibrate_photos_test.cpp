@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/testing/calibration_sample.h"
@@ -80,7 +81,7 @@ TEST(CalibratePhotos, APhotoOfAnotherSizeIsNamed) {
   const auto result = calibrate_photos(changed.names, changed.loader(), sample_board, {});
   ASSERT_EQ(result.report.status, CalibrateReport::Status::converged);
   EXPECT_FALSE(result.report.views[4].used);
-  EXPECT_EQ(result.report.views[4].reason, "is 640x470, but the first photo is 640x480");
+  EXPECT_EQ(result.report.views[4].reason, "is 640x470, but most photos are 640x480");
   EXPECT_EQ(result.reasons[4], result.report.views[4].reason);
   EXPECT_EQ(result.size.height_px, 480);
 }
@@ -99,6 +100,30 @@ TEST(CalibratePhotos, PhotosWithoutABoardAndUnreadableOnesAreNamed) {
   EXPECT_NE(result.report.views[2].reason, "no corners") << "say what the search found";
   EXPECT_EQ(result.report.views[5].reason, "the picture is cut off");
   EXPECT_EQ(result.num_unreadable, 1u);
+}
+
+TEST(CalibratePhotos, TheSizeThatMostPhotosHaveDecidesNotTheFirst) {
+  Photos changed = photos();
+  cv::resize(changed.pictures[0], changed.pictures[0], {800, 600});
+  cv::rotate(changed.pictures[3], changed.pictures[3], cv::ROTATE_90_CLOCKWISE);
+  const auto result = calibrate_photos(changed.names, changed.loader(), sample_board, {});
+  ASSERT_EQ(result.report.status, CalibrateReport::Status::converged) << result.report.reason;
+  EXPECT_EQ(result.size.width_px, 640);
+  EXPECT_EQ(result.size.height_px, 480);
+  EXPECT_EQ(result.report.views[0].reason, "is 800x600, but most photos are 640x480");
+  EXPECT_THAT(result.report.views[3].reason,
+              HasSubstr("is 480x640, but most photos are 640x480: its pixels were turned"));
+  EXPECT_TRUE(result.report.views[1].used);
+}
+
+TEST(CalibratePhotos, ABoardToldInSquaresIsNamedInInnerCorners) {
+  Board squares = sample_board;
+  squares.cols += 1;
+  squares.rows += 1;
+  const auto result = calibrate_photos(photos().names, photos().loader(), squares, {});
+  EXPECT_EQ(result.report.status, CalibrateReport::Status::degenerate);
+  EXPECT_EQ(result.report.reason, "the photos do not show the board as told, 10×7");
+  EXPECT_EQ(result.report.to_add, "use --board 9x6: that board stands in them");
 }
 
 TEST(CalibratePhotos, NoPhotoAtAllIsARefusal) {

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "alidade/calibrate/better_model.h"
 #include "alidade/calibrate/calibration_verdict.h"
 
 namespace alidade {
@@ -25,6 +26,7 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   result.config = std::move(config);
   CalibrateReport& report = result.photos.report;
   if (report.status != CalibrateReport::Status::converged) {
+    advise_fitting_model(board, result.photos.views, result.photos.size, result.config, report);
     result.verdict = refusal_verdict(report);
     return result;
   }
@@ -37,10 +39,12 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   result.config.board_shape = decide_shape(asked, transfers);
   const bool solved_flat = asked == BoardShape::automatic || asked == BoardShape::flat;
   if (result.config.board_shape != asked && !(solved_flat && result.config.board_shape == BoardShape::flat)) {
-    solve_again(board, result.config, result.photos);
-    if (report.status != CalibrateReport::Status::converged) {
-      result.verdict = refusal_verdict(report);
-      return result;
+    PhotoCalibration other = result.photos;
+    solve_again(board, result.config, other);
+    if (other.report.status == CalibrateReport::Status::converged) {
+      result.photos = std::move(other);
+    } else {  // the answer that there is
+      result.config.board_shape = asked == BoardShape::automatic ? BoardShape::flat : asked;
     }
   }
   result.assumed = count_assumptions(board, result.config, result.photos.views, air, report);

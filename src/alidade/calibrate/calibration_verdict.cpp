@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "alidade/calibrate/better_model.h"
 #include "alidade/calibrate/weights.h"
 
 namespace alidade {
@@ -221,8 +222,8 @@ Check principal_point(const CalibrateReport& report) {
 }
 
 /// What to do next. What makes σ large comes first: more photos of a bent board are no help.
-std::string advice(const Verdict& verdict, const CalibrationStudy& study, const NextPhotoPlan& next, double worst_px,
-                   bool is_port) {
+std::string advice(const Verdict& verdict, const CalibrationStudy& study, const CalibrateConfig& config,
+                   const NextPhotoPlan& next, double worst_px, bool is_port) {
   const auto ails = [&](const std::string& name) {
     return std::any_of(verdict.checks.begin(), verdict.checks.end(),
                        [&](const Check& check) { return check.name == name && check.state != State::good; });
@@ -234,12 +235,15 @@ std::string advice(const Verdict& verdict, const CalibrationStudy& study, const 
   const bool wrong_corners = std::any_of(verdict.checks.begin(), verdict.checks.end(), [](const Check& check) {
     return check.name == "honest corners" && check.state == State::bad;
   });
-  if (wrong_corners) return "look at the corners named, or extract them again";
+  const std::string better_model = is_port ? "" : better_model_advice(study, config);
+  if (wrong_corners && better_model.empty()) return "look at the corners named, or extract them again";
   if (text_starts("board flat", "the board bends")) return "use --board-shape " + shape_name(study.transfer->shape);
   if (text_starts("board flat", "the board has another shape"))
     return "use --board-shape auto, or this board's own points";
   if (ails("lens adequate") && is_port) return "check the lens in air, --glass and --n-water, or take --model brown";
-  if (ails("lens adequate")) return "try a richer lens model (--model), see the held-out errors";
+  if (!better_model.empty()) return better_model + ", which fits better on photos held out";
+  if (ails("lens adequate"))
+    return "no other lens model fits better: keep focus and zoom still, and look at the rings for where it departs";
   if (ails("coverage") && !next.photos.empty()) {
     return "add a photo as proposed: it lowers the worst 3σ from " + two(worst_px) + " to " +
            two(next.photos.front().worst_3sigma_px) + " px";
@@ -276,7 +280,7 @@ Verdict calibration_verdict(const CalibrateReport& report, const CalibrationStud
   verdict.sentence = word + trust;
   if (worst->state != State::good && worst->name != "coverage") verdict.sentence += "; " + worst->text;
   verdict.to_add =
-      advice(verdict, study, next, 3.0 * worst_of(study.sigma_infinity).value, !is_central(report.camera.lens));
+      advice(verdict, study, config, next, 3.0 * worst_of(study.sigma_infinity).value, !is_central(report.camera.lens));
   return verdict;
 }
 

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <limits>
 
 #include "alidade/geometry/decompositions.h"
 
@@ -145,7 +146,8 @@ bool linearize(const BundleProblem& problem, const BundleState& state, NormalEqu
   eq.V.resize(num_views);
   eq.pose_gradient.resize(num_views);
 
-  const PreparedLens lens = prepare(state.lens);
+  PreparedLens lens = prepare(state.lens);
+  if (problem.passes_fold) lens.max_radius2 = std::numeric_limits<double>::infinity();
   const PointArrays points = make_arrays(state.board_points);
   const BowBasis basis = bow ? bow_basis(problem.printed_points) : BowBasis{};
   thread_local Scratch s;  // one a thread: kept between calls, so that the inner loop allocates nothing

@@ -261,6 +261,12 @@ BoardDetection find_marker_board(const cv::Mat& photo, const Board& board) {
   return detection;
 }
 
+std::size_t count_markers(const cv::Mat& photo, const std::string& dictionary) {
+  cv::Mat grey;
+  photo.convertTo(grey, CV_8U);
+  return read_markers(grey, dictionary, 1).size();
+}
+
 BoardDetection refind_marker_board(const cv::Mat& photo, const Board& board, const BoardView& first,
                                    const Camera& camera, const Rigid3& cam_from_board) {
   BoardDetection detection;

@@ -14,4 +14,7 @@ namespace alidade {
 [[nodiscard]] BoardDetection refind_marker_board(const cv::Mat& photo, const Board& board, const BoardView& first,
                                                  const Camera& camera, const Rigid3& cam_from_board);
 
+/// How many different markers of a dictionary a photo shows, wherever they stand.
+[[nodiscard]] std::size_t count_markers(const cv::Mat& photo, const std::string& dictionary);
+
 }  // namespace alidade

@@ -35,9 +35,9 @@ std::string corners_csv(std::span<const BoardView> views) {
     const std::string photo = csv_cell(view.photo);
     for (const Corner& corner : view.corners) {
       const double sigma_u = std::sqrt(corner.cov(0, 0)), sigma_v = std::sqrt(corner.cov(1, 1));
-      constexpr double most = 0.9999;  // in four decimals the next would be 1, which no covariance has
+      constexpr double most = 0.999999999;  // the next would be 1 to a reader, which no covariance has
       const double correlation = std::clamp(corner.cov(0, 1) / (sigma_u * sigma_v), -most, most);
-      fmt::format_to(std::back_inserter(text), "{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.4f}\n", photo, corner.index,
+      fmt::format_to(std::back_inserter(text), "{},{},{:.13g},{:.13g},{:.13g},{:.13g},{:.10g}\n", photo, corner.index,
                      corner.px.x(), corner.px.y(), sigma_u, sigma_v, correlation);
     }
   }

@@ -12,7 +12,8 @@
 
 namespace alidade {
 
-/// Corners as CSV: photo,corner,u_px,v_px,sigma_u_px,sigma_v_px,corr_uv. Places to 10⁻⁶ px.
+/// Corners as CSV: photo,corner,u_px,v_px,sigma_u_px,sigma_v_px,corr_uv. Places to 10⁻⁹ px, so that
+/// what is read back gives the same camera.
 [[nodiscard]] std::string corners_csv(std::span<const BoardView> views);
 
 /// Reads such a file, by anybody: photo, corner, u_px, v_px (or u, v) and, optionally, sigma_u_px, sigma_v_px and

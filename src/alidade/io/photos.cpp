@@ -4,17 +4,18 @@
 #include <cctype>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <set>
+
+#include "alidade/io/exif.h"
+#include "alidade/io/foreign_pictures.h"
 
 namespace alidade {
 namespace {
 
 bool looks_like_a_photo(const std::filesystem::path& file) {
-  std::string ending = file.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   static const std::vector<std::string> endings = {".jpg", ".jpeg", ".png", ".tif", ".tiff",
                                                    ".bmp", ".pgm",  ".ppm", ".webp"};
-  return std::find(endings.begin(), endings.end(), ending) != endings.end();
+  return std::find(endings.begin(), endings.end(), lower_ending(file)) != endings.end();
 }
 
 /// a2 before a10: runs of digits compare as numbers.
@@ -64,35 +65,70 @@ bool is_cut_off(std::string_view bytes) {
   return starts_with(bytes, "\x89PNG") && tail.rfind("IEND") == std::string_view::npos;
 }
 
+/// A TIFF that is to be turned, told not to be: OpenCV turns these whatever it is asked. Empty: as it is.
+std::string untagged_tiff(std::string_view bytes) {
+  if (!starts_with(bytes, "II*") && !starts_with(bytes, "MM")) return "";
+  const ExifTags tags = exif_tags(bytes);
+  if (tags.orientation < 2) return "";
+  std::string stored(bytes);
+  stored[tags.orientation_at] = static_cast<char>(tags.little_endian ? 1 : 0);
+  stored[tags.orientation_at + 1] = static_cast<char>(tags.little_endian ? 0 : 1);
+  return stored;
+}
+
+/// The pictures of a folder in natural order; what else lies there is named in `skipped`.
+std::vector<std::filesystem::path> photos_in(const std::filesystem::path& folder, std::vector<SkippedInput>& skipped) {
+  std::vector<std::filesystem::path> inside, others;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    (looks_like_a_photo(entry.path()) ? inside : others).push_back(entry.path());
+  }
+  if (error) throw InputError(folder.string() + ": cannot be read: " + error.message());
+  const auto in_order = [](const auto& a, const auto& b) { return natural_less(a.string(), b.string()); };
+  std::sort(inside.begin(), inside.end(), in_order);
+  std::sort(others.begin(), others.end(), in_order);
+  const std::set<std::string> own = our_results(folder);
+  const std::size_t before = skipped.size();
+  for (const auto& other : others) {
+    const std::string name = other.filename().string();
+    if (name.starts_with(".") || own.contains(name)) continue;
+    if (std::string reason = why_no_photo(other); !reason.empty()) skipped.push_back({name, 0, std::move(reason)});
+  }
+  if (!inside.empty()) return inside;
+  std::string what = folder.string() + ": the folder holds no photos";
+  if (skipped.size() > before) what += "; " + skipped[before].file + " " + skipped[before].reason;
+  throw InputError(what);
+}
+
 }  // namespace
 
-std::vector<std::filesystem::path> list_photos(const std::vector<std::filesystem::path>& arguments) {
-  std::vector<std::filesystem::path> photos;
+PhotoFiles find_photos(const std::vector<std::filesystem::path>& arguments) {
+  PhotoFiles found;
   for (const auto& argument : arguments) {
     std::error_code error;
     if (!std::filesystem::exists(argument, error)) {
       throw InputError(argument.string() + ": no such file or folder");
     }
     if (!std::filesystem::is_directory(argument, error)) {
-      photos.push_back(argument);
+      found.photos.push_back(argument);
       continue;
     }
-    std::vector<std::filesystem::path> inside;
-    for (const auto& entry : std::filesystem::directory_iterator(argument, error)) {
-      if (looks_like_a_photo(entry.path())) inside.push_back(entry.path());
-    }
-    if (error) throw InputError(argument.string() + ": cannot be read: " + error.message());
-    if (inside.empty()) throw InputError(argument.string() + ": the folder holds no photos");
-    std::sort(inside.begin(), inside.end(),
-              [](const auto& a, const auto& b) { return natural_less(a.string(), b.string()); });
-    photos.insert(photos.end(), inside.begin(), inside.end());
+    const auto inside = photos_in(argument, found.skipped);
+    found.photos.insert(found.photos.end(), inside.begin(), inside.end());
   }
-  return photos;
+  return found;
+}
+
+std::vector<std::filesystem::path> list_photos(const std::vector<std::filesystem::path>& arguments) {
+  return find_photos(arguments).photos;
 }
 
 cv::Mat decode_photo(std::string_view bytes) {
   if (bytes.empty()) throw InputError("the file is empty");
+  if (const std::string foreign = foreign_picture(bytes); !foreign.empty()) throw InputError(foreign);
   if (is_cut_off(bytes)) throw InputError("the picture is cut off");
+  const std::string as_stored = untagged_tiff(bytes);
+  if (!as_stored.empty()) bytes = as_stored;
   cv::Mat photo;
   try {
     const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));

@@ -106,6 +106,56 @@ TEST(ListPhotos, FilesStandAsGiven) {
   EXPECT_EQ(files[0].filename(), "b.dat");  // whatever its ending: the person named it
 }
 
+TEST(FindPhotos, WhatElseLiesInAFolderIsNamedWithWhatToDo) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a.jpg", "IMG_1.HEIC", "b.nef", "c.gif", "d.pdf", "e.MOV", "notes.txt", ".hidden"}) {
+    write_file(folder.path() / name, "x");
+  }
+  std::filesystem::create_directory(folder.path() / "more");
+  const PhotoFiles found = find_photos({folder.path()});
+  EXPECT_EQ(found.photos.size(), 1u);
+  std::vector<std::string> lines;
+  for (const SkippedInput& each : found.skipped) lines.push_back(each.file + " " + each.reason);
+  EXPECT_THAT(lines, ElementsAre("IMG_1.HEIC is HEIC, which is not read: convert it to JPEG or PNG without turning it",
+                                 HasSubstr("b.nef is a camera's raw file"), HasSubstr("c.gif is GIF"),
+                                 HasSubstr("d.pdf is a PDF"), HasSubstr("e.MOV is a video"),
+                                 HasSubstr("more is a folder within"), HasSubstr("notes.txt has no ending")));
+}
+
+TEST(FindPhotos, ResultsOfOursAreNotNamed) {
+  const TemporaryFolder folder;
+  write_file(folder.path() / "a.jpg", "x");
+  write_file(folder.path() / "truth.yaml", "x");
+  write_file(folder.path() / "report.html", "x");
+  write_file(folder.path() / "result.json", R"({"schema": "alidade-result/1", "files": ["truth.yaml"]})");
+  EXPECT_TRUE(find_photos({folder.path()}).skipped.empty());
+  write_file(folder.path() / "result.json", "[1, 2]");
+  EXPECT_EQ(find_photos({folder.path()}).skipped.size(), 3u) << "somebody else's";
+}
+
+TEST(FindPhotos, AFolderOfHeicAloneSaysSo) {
+  const TemporaryFolder folder;
+  write_file(folder.path() / "a.heic", "x");
+  try {
+    (void)find_photos({folder.path()});
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("the folder holds no photos; a.heic is HEIC, which is not read: convert it"));
+  }
+}
+
+TEST(DecodePhoto, SaysWhatToDoWithKindsThatAreNotRead) {
+  const auto box = [](const std::string& brand) {
+    return std::string("\0\0\0\x18", 4) + "ftyp" + brand + std::string(40, '\0');
+  };
+  EXPECT_THAT(refusal(box("heic")), HasSubstr("convert it to JPEG or PNG without turning it"));
+  EXPECT_THAT(refusal(box("mif1")), HasSubstr("is HEIC"));
+  EXPECT_THAT(refusal(box("avif")), HasSubstr("is AVIF"));
+  EXPECT_THAT(refusal(box("mp42")), HasSubstr("is a video"));
+  EXPECT_THAT(refusal("GIF89a" + std::string(40, '\0')), HasSubstr("is GIF"));
+  EXPECT_THAT(refusal("%PDF-1.7" + std::string(40, '\0')), HasSubstr("is a PDF"));
+}
+
 TEST(ListPhotos, NothingThereIsSaid) {
   const TemporaryFolder folder;
   EXPECT_THROW((void)list_photos({folder.path()}), InputError);

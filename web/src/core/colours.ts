@@ -42,6 +42,11 @@ export function diverging(share: number): Rgb {
   return along([[0, 74, 128], [58, 146, 200], [225, 226, 228], [230, 159, 0], [150, 62, 0]], 0.5 + 0.5 * share);
 }
 
+/** Of lines on a bare ground, light or dark, share 0…1: blue for small, orange for large, each at least 3:1 against both. */
+export function blueToOrange(share: number): Rgb {
+  return along([[38, 132, 200], [122, 124, 138], [206, 108, 10]], share);
+}
+
 /** Direction in the picture: right vermilion, down purple, left blue, up green. */
 export function directionColour(u: number, v: number): Rgb {
   const turn = Math.atan2(v, u) / (2 * Math.PI);

@@ -246,6 +246,11 @@ export class Doc {
   sigma(path: string): number {
     return this.byPath.get(path)?.sigma ?? NaN;
   }
+  /** σ over what it would be if every single measurement erred by itself; NaN where the document does not tell. */
+  inflation(path: string): number {
+    const one = this.byPath.get(path);
+    return one && one.sigma > 0 && one.sigmaModel > 0 ? one.sigma / one.sigmaModel : NaN;
+  }
   estimateText(path: string): string {
     return this.byPath.get(path)?.text ?? '';
   }

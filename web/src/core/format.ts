@@ -63,6 +63,11 @@ export function percent(part: number, whole: number, decimals = 0): string {
   return whole > 0 ? `${((100 * part) / whole).toFixed(decimals)} %` : '–';
 }
 
+/** "×2.4": how many times; empty where it is not known. */
+export function times(ratio: number): string {
+  return ratio > 0 && Number.isFinite(ratio) ? `×${ratio.toFixed(ratio < 9.95 ? 1 : 0)}` : '';
+}
+
 /** Shortened in the middle to at most `most` characters. */
 export function shortened(text: string, most: number): string {
   const letters = [...text];

@@ -139,7 +139,7 @@ export class SeriesPlot {
         {show: true, stroke, font, grid, ticks, values: hasX ? write : (_, v) => v.map(() => ''), size: hasX ? 26 : 6,
           label: look.xLabel || undefined, labelFont: font, labelSize: 16, labelGap: 0, space: 55},
         {stroke, font, grid, ticks, size: 54,
-          splits: (u, __, low, high) => ticksOf(scale(low, high, 0, 1, look.isLog), Math.max(3, (u.bbox?.height || 200) / (devicePixelRatio || 1) / 26)),
+          splits: (u, __, low, high) => ticksOf(scale(low, high, 0, 1, look.isLog), Math.max(4, (u.bbox?.height || 200) / (devicePixelRatio || 1) / 26)),
           filter: (u, splits) => apart(u, splits), values: (_, v) => v.map((one) => (one === null || one === undefined ? '' : num(one, 5)))},
       ],
       series: [{}, ...look.lines.map((line) => this.seriesOf(line))],

@@ -58,7 +58,7 @@ const byCommand: Record<string, Page> = {
   calibrate: {first: [values, wide(trust)], rest: [clusters, worstPhotos, poses, photo, half(residuals), half(lens), half(halves), half(undistorted), half(board), half(nextPhoto), allPhotos, ...grounds]},
   observe: {first: [values, wide(observeIntrinsics)], rest: [clusters, observeMotion, observeNis, observeTracks, observeDirections, observePoints, ...grounds]},
   rangefinder: {first: [{...values, note: 'camera frame, value ± 3σ'}, wide(rangefinderBeam)], rest: [clusters, rangefinderResiduals, rangefinderPhoto, rangefinderPrecision, rangefinderNext, rangefinderCounts, rangefinderShots, ...grounds]},
-  rig: {first: [{...rigEstimate, span: 10, narrow: 24}, {...rigSpace, span: 14, narrow: 24}], rest: [clusters, rigCoverage, rigResiduals, rigView, {...rigUnknown, span: 14}, assumed, checks, causes]},
+  rig: {first: [{...rigEstimate, span: 11, narrow: 24}, {...rigSpace, span: 13, narrow: 24}], rest: [clusters, rigCoverage, rigResiduals, rigView, {...rigUnknown, span: 14}, assumed, checks, causes]},
   track: {first: [values, wide(trackSpace)], rest: [trackPosition, trackError, trackInnovations, {...trackAbove, span: 12}, {...trackAge, span: 12}, ...grounds]},
   servo: {first: [{...servoCompare, span: 10}, servoError], rest: [servoAngles, servoPicture, half(servoRobust), half(servoLoops), trackSpace, trackPosition, assumed, checks]},
   localize: {first: [values, wide(localizeSpace)], rest: [half(localizeError), localizeFrame, half(localizeTracks), half(localizeNis), half(localizeSpeed), ...grounds]},

@@ -4,7 +4,7 @@ import {css, diverging, onto} from '../core/colours';
 import type {Doc, Quantity} from '../core/document';
 import {el} from '../core/dom';
 import type {Figure} from '../core/figure';
-import {degrees, num, shortened, valueText} from '../core/format';
+import {degrees, num, shortened, times, valueText} from '../core/format';
 import type {Correlations} from './correlations';
 
 interface Reading {
@@ -56,11 +56,6 @@ interface Columns {
   error: boolean;
 }
 
-/** σ over the σ of independent errors. */
-function inflationText({sigma, sigmaModel}: Quantity): string {
-  return sigma > 0 && sigmaModel > 0 ? `×${(sigma / sigmaModel).toFixed(sigma < 9.95 * sigmaModel ? 1 : 0)}` : '';
-}
-
 function rowOf(quantity: Quantity, doc: Doc, has: Columns): HTMLElement {
   const {unit, factor, ...reading} = readingOf(quantity, doc), name = names[quantity.path] ?? reading.name;
   if (!Number.isFinite(quantity.value))
@@ -73,7 +68,7 @@ function rowOf(quantity: Quantity, doc: Doc, has: Columns): HTMLElement {
     return el('td', {class: 'right'}, value !== 0 && Number.isFinite(value) ? (kind === 'bound' ? '± ' : '') + num(by * factor * value, 2) : '');
   };
   return el('tr', {'data-path': quantity.path}, el('th', {}, name), el('td', {class: 'value'}, text.value), el('td', {}, behind),
-    has.model ? el('td', {class: 'right'}, inflationText(quantity)) : null, has.bound ? beside('bound', 3) : null, has.error ? beside('error', 1) : null, el('td', {class: 'unit'}, unit));
+    has.model ? el('td', {class: 'right'}, times(doc.inflation(quantity.path))) : null, has.bound ? beside('bound', 3) : null, has.error ? beside('error', 1) : null, el('td', {class: 'unit'}, unit));
 }
 
 function lensLine(doc: Doc): string {
@@ -121,7 +116,7 @@ export const estimate: Figure = {
     const rank = (one: Quantity) => 2 * Number(one.path.startsWith('camera.')) + Number(one.sigma > 0);
     shown.sort((a, b) => rank(b) - rank(a));
     const any = (kind: string) => shown.some((one) => Number.isFinite(doc.estimate(`${kind}.${one.path.replace(/^camera\./, '')}`)));
-    const has = {sigma: shown.some((one) => one.sigma > 0), model: shown.some((one) => inflationText(one) !== ''), bound: any('bound'), error: any('error')};
+    const has = {sigma: shown.some((one) => one.sigma > 0), model: shown.some((one) => doc.inflation(one.path) > 0), bound: any('bound'), error: any('error')};
     const lens = lensLine(doc);
     if (lens) host.append(el('p', {class: 'caption'}, lens));
     const rows = shown.slice(0, 60).map((one) => rowOf(one, doc, has));

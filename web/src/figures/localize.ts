@@ -1,5 +1,5 @@
 // localize: path and map in space; error; tracks; consistency; time a frame.
-import {cividis, type Rgb} from '../core/colours';
+import {blueToOrange} from '../core/colours';
 import type {Doc, Table} from '../core/document';
 import {legend, type Figure, type Key} from '../core/figure';
 import {num, percent, withSigma} from '../core/format';
@@ -42,7 +42,7 @@ function localizeWorld(doc: Doc, path: Table, selection: Selection): World {
   world.hold(...places);
   const radius = ballOf(world.frame).radius, buckets = 8;
   for (let b = 0; b < buckets; ++b) {
-    const colour = cividis(b / (buckets - 1)) as Rgb;
+    const colour = blueToOrange(b / (buckets - 1));
     for (let i = 0; i + 1 < rows; ++i) {
       const share = high > low ? (size(i) - low) / (high - low) : 0;
       if (Math.min(buckets - 1, Math.max(0, Math.floor(share * buckets))) === b) world.line([places[i]!, places[i + 1]!], {colour, width: 3.2});
@@ -65,7 +65,7 @@ export const localizeSpace: Figure = {
   draw(host, doc, selection) {
     const path = pathOf(doc);
     if (!path) return null;
-    const alignment = doc.estimateText('alignment'), keys: Key[] = [{words: 'path, dark to yellow by its σ', colour: 'var(--soft)'}, {words: 'the instant', colour: 'var(--red)'}, {words: 'map points, 3σ', colour: 'var(--green)', look: 'dot'}];
+    const alignment = doc.estimateText('alignment'), keys: Key[] = [{words: 'path, blue to orange by its σ', colour: 'var(--blue)'}, {words: 'the instant', colour: 'var(--red)'}, {words: 'map points, 3σ', colour: 'var(--green)', look: 'dot'}];
     if (doc.table('features')?.numbers('known').some((known) => known > 0)) keys.push({words: 'known points', colour: 'var(--orange)', look: 'dot'});
     if (truthOf(doc, path)) keys.push({words: `truth${alignment ? ` (alignment for ATE: ${alignment})` : ''}`, colour: 'var(--ink)'});
     legend(host, keys);
@@ -74,7 +74,7 @@ export const localizeSpace: Figure = {
     selection.on(() => view.refresh());
     const ate = doc.estimate('ate_m'), isKnown = doc.estimateText('scale_known');
     return {marks: path.rows, rows: path.rows, tables: [path, ...(doc.table('features') ? [doc.table('features')!] : [])], words: label,
-      good: (isKnown === 'false' ? 'The scale is not known: lengths are up to one factor. ' : '') + 'Dark is well known, yellow badly, between the best and the worst of this path. ' + (Number.isFinite(ate) ? `ATE ${num(1e3 * ate, 3)} mm RMS${alignment ? ` after ${alignment} alignment` : ''}; RPE ${num(1e3 * doc.estimate('rpe_m'), 3)} mm.` : '')};
+      good: (isKnown === 'false' ? 'The scale is not known: lengths are up to one factor. ' : '') + 'Blue is well known, orange badly, between the best and the worst of this path. ' + (Number.isFinite(ate) ? `ATE ${num(1e3 * ate, 3)} mm RMS${alignment ? ` after ${alignment} alignment` : ''}; RPE ${num(1e3 * doc.estimate('rpe_m'), 3)} mm.` : '')};
   },
 };
 

@@ -69,14 +69,14 @@ export const rangefinderResiduals: Figure = {
     const chart = new Chart(host, {height: 120 + 150 * panels.length, isFilling: true, label: words}, (pen) => {
       const foot = 34, h = (pen.h - foot) / panels.length, pitch = (pen.w - 52) / shown.length;
       panels.forEach((series, k) => drawPanel(pen, shown, series, 24 + k * h, (k + 1) * h - 8, selection));
-      const every = Math.max(1, Math.ceil(38 / pitch));
+      const every = Math.max(1, Math.ceil(50 / pitch));
       shown.forEach(([shot, i], place) => {
         if (place % every !== 0) return;
         const x = 46 + pitch * (place + 0.5);
         pen.text(String(i + 1), x, pen.h - 25, {align: 'center', size: 11, colour: pen.c.soft});
-        pen.text(num(shot.range_m, 3), x, pen.h - 9, {align: 'center', size: 11, colour: pen.c.soft});
+        pen.text(`${num(shot.range_m, 3)} m`, x, pen.h - 9, {align: 'center', size: 11, colour: pen.c.soft});
       });
-      pen.text('shot', 2, pen.h - 25, {size: 11, colour: pen.c.soft}), pen.text('m', 2, pen.h - 9, {size: 11, colour: pen.c.soft});
+      pen.text('shot', 2, pen.h - 25, {size: 11, colour: pen.c.soft});
     });
     selection.on(() => chart.redraw());
     const unused = all.filter(([s]) => !s.isUsed);

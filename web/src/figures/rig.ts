@@ -4,7 +4,7 @@ import {cividis, css, directionColour, pixelShare} from '../core/colours';
 import type {Doc, Table} from '../core/document';
 import {el} from '../core/dom';
 import {legend, type Figure} from '../core/figure';
-import {degrees, num, valueText} from '../core/format';
+import {degrees, num, times, valueText} from '../core/format';
 import {colourBar, magnificationFor, panelIn} from '../core/picture';
 import {add, mul, norm, poseOf, rotationOf, sub, unit, type Pose, type V3} from '../core/rigid';
 import type {Selection} from '../core/selection';
@@ -173,8 +173,8 @@ export const rigView: Figure = {
 
 const parameterRows: [string, string, string, string, number][] = [
   ['base x', 'world_from_base.translation_m[0]', 'world_from_base.translation_m[0]', 'mm', 1e3], ['base y', 'world_from_base.translation_m[1]', 'world_from_base.translation_m[1]', 'mm', 1e3], ['base z', 'world_from_base.translation_m[2]', 'world_from_base.translation_m[2]', 'mm', 1e3],
-  ['pan to tilt axis', 'pan_to_tilt_m[2]', 'pan_to_tilt_m[2]', 'mm', 1e3], ['tilt axis to camera x', 'tilt_to_cam_m[0]', 'tilt_to_cam_m[0]', 'mm', 1e3], ['tilt axis to camera y', 'tilt_to_cam_m[1]', 'tilt_to_cam_m[1]', 'mm', 1e3],
-  ['tilt axis to camera z', 'tilt_to_cam_m[2]', 'tilt_to_cam_m[2]', 'mm', 1e3], ['axes off square', 'axes_skew_rad', 'axes_skew_rad', '°', degrees], ['pan zero', 'encoder.pan_zero_rad', '', '°', degrees], ['tilt zero', 'encoder.tilt_zero_rad', '', '°', degrees],
+  ['pan to tilt', 'pan_to_tilt_m[2]', 'pan_to_tilt_m[2]', 'mm', 1e3], ['tilt to camera x', 'tilt_to_cam_m[0]', 'tilt_to_cam_m[0]', 'mm', 1e3], ['tilt to camera y', 'tilt_to_cam_m[1]', 'tilt_to_cam_m[1]', 'mm', 1e3],
+  ['tilt to camera z', 'tilt_to_cam_m[2]', 'tilt_to_cam_m[2]', 'mm', 1e3], ['off square', 'axes_skew_rad', 'axes_skew_rad', '°', degrees], ['pan zero', 'encoder.pan_zero_rad', '', '°', degrees], ['tilt zero', 'encoder.tilt_zero_rad', '', '°', degrees],
   ['pan scale', 'encoder.pan_scale', 'encoder.pan_scale', '', 1], ['tilt scale', 'encoder.tilt_scale', 'encoder.tilt_scale', '', 1]];
 
 export const rigEstimate: Figure = {
@@ -182,16 +182,16 @@ export const rigEstimate: Figure = {
   draw(host, doc) {
     const heads = [0, 1, 2, 3].filter((k) => Number.isFinite(doc.estimate(`heads[${k}].id`)));
     if (heads.length === 0) return null;
-    const body = el('tbody');
+    const hasModel = doc.estimates.some((one) => one.path.startsWith('heads[') && doc.inflation(one.path) > 0), body = el('tbody');
     for (const [name, path, sigmaPath, unit_, factor] of parameterRows)
       body.append(el('tr', {}, el('th', {}, name), ...heads.flatMap((k) => {
         const sigma = sigmaPath ? doc.sigma(`heads[${k}].${sigmaPath}`) : NaN, text = valueText(factor * doc.estimate(`heads[${k}].${path}`), factor * sigma);
-        return [el('td', {class: 'value'}, text.value), el('td', {}, text.plusMinus ? `± ${text.plusMinus}` : sigma === 0 ? 'held' : '')];
+        return [el('td', {class: 'value'}, text.value), el('td', {}, text.plusMinus ? `± ${text.plusMinus}` : sigma === 0 ? 'held' : ''), hasModel ? el('td', {class: 'right'}, times(doc.inflation(`heads[${k}].${sigmaPath}`))) : null];
       }), el('td', {class: 'unit'}, unit_)));
-    host.append(el('div', {class: 'scroll'}, el('table', {class: 'estimate'}, el('thead', {}, el('tr', {}, el('th'), ...heads.flatMap((k) => [el('th', {}, `head ${doc.estimate(`heads[${k}].id`)}`), el('th')]), el('th'))), body)));
+    host.append(el('div', {class: 'scroll'}, el('table', {class: 'estimate'}, el('thead', {}, el('tr', {}, el('th'), ...heads.flatMap((k) => [el('th', {}, `head ${doc.estimate(`heads[${k}].id`)}`), el('th', {}, hasModel ? '3σ' : ''), hasModel ? el('th', {}, 'over model') : null]), el('th'))), body)));
     const rest: [string, string, string, number][] = [['camera to camera, 3σ', 'sigma_relative_rad', '°', 3 * degrees], ['camera to camera, 3σ', 'sigma_relative_m', 'mm', 3e3], ['RMS', 'rms_px', 'px', 1], ['χ² per degree of freedom', 'chi2_per_dof', '', 1], ['σ of a corner', 'noise.sigma_px', 'px', 1], ['σ of a reading', 'noise.sigma_encoder_rad', '°', degrees]];
     host.append(el('table', {class: 'estimate'}, ...rest.filter(([, path]) => Number.isFinite(doc.estimate(path))).map(([name, path, unit_, factor]) => el('tr', {}, el('th', {}, name), el('td', {class: 'value'}, num(factor * doc.estimate(path), 3)), el('td', {class: 'unit'}, unit_)))));
-    return {marks: heads.length * parameterRows.length, rows: heads.length * parameterRows.length, tables: [], words: `${heads.length} heads`, good: 'The pose of the first base fixes the frame: the first camera at readings of zero is the world.'};
+    return {marks: heads.length * parameterRows.length, rows: heads.length * parameterRows.length, tables: [], words: `${heads.length} heads`, good: `The world is the first camera at readings of zero.${hasModel ? ' Over model: how many times σ is above what it would be if every corner erred by itself.' : ''}`};
   },
 };
 

@@ -3,7 +3,7 @@ import {Chart} from '../core/chart';
 import type {Doc, Table} from '../core/document';
 import {el} from '../core/dom';
 import {legend, type Figure} from '../core/figure';
-import {degrees, num, valueText} from '../core/format';
+import {degrees, num, times, valueText} from '../core/format';
 import {add, halfAxes, isFinite3, mul, norm, poseOf, type M3, type V3} from '../core/rigid';
 import {scale, xAxis} from '../core/scale';
 import {extent, roundDown125} from '../core/stats';
@@ -52,6 +52,8 @@ export const movingEstimate: Figure = {
         body.append(el('tr', {}, el('th', {}, axis), ...pair(cameras.number(`world_from_cam_${axis}_m`, row), Math.sqrt(covOf(cameras, row)[i]![i]!)), el('td', {class: 'unit'}, 'm')));
       });
       const turn = 3 * degrees * Math.hypot(...['rx', 'ry', 'rz'].map((axis) => sigmaNamed(doc, `head${e('id')}.base_${axis}_rad`)));
+      const over = Math.max(0, ...[0, 1, 2].map((i) => doc.inflation(`heads[${k}].world_from_base.translation_m[${i}]`) || 0));
+      if (over > 0) body.append(el('tr', {}, el('th', {}, 'σ over model'), el('td'), el('td', {}, `up to ${times(over)}`), el('td')));
       if (turn > 0) body.append(el('tr', {}, el('th', {}, 'attitude'), el('td'), el('td', {}, `± ${num(turn, 2)}`), el('td', {class: 'unit'}, '°')));
       if (e('sigma_clock_s') > 0 || Math.abs(e('clock_offset_s')) > 0) body.append(el('tr', {}, el('th', {}, 'clock'), ...pair(e('clock_offset_s'), e('sigma_clock_s')), el('td', {class: 'unit'}, 's')));
     }

@@ -54,6 +54,6 @@ function drawDot(pen: Pen, dot: ScatterDot, x: number, y: number): void {
   else if (dot.shape === 'cross') pen.cross(x, y, r, colour, 1.8);
   else if (dot.shape === 'up') pen.fill([x - r, y + r, x + r, y + r, x, y - r], colour);
   else if (dot.shape === 'down') pen.fill([x - r, y - r, x + r, y - r, x, y + r], colour);
-  else pen.circle(x, y, r, colour);
+  else pen.circle(x, y, r, colour, r >= 5 ? pen.c.soft : null, 1); // a rim: a colour may be as dark as the ground
   pen.hit({x, y, r, tip: dot.tip, pick: dot.pick});
 }

@@ -53,7 +53,7 @@ struct FangConfig {
   double drift_px_per_sqrt_s = 0.0219;  ///< Random walk of each ξ: 10⁻⁵ scaled pixels at 30 Hz.
 };
 
-/// The intrinsics observer of Fang, Liu, Li & Zhang, "Visual servoing with an uncalibrated pan-tilt camera", 2011, eqs.
+/// The intrinsics observer of Fang, Liu, Li & Zhang, "A global exponential observer for camera calibration", 2011, eqs.
 /// (14)–(25), with its errata corrected and ω_z columns added: differences y_i = q_i − q_reference in scaled pixels,
 /// ẏ = Ωᵀθ,
 ///

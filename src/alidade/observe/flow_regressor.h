@@ -17,7 +17,7 @@ namespace alidade {
 ///
 /// exactly, while the intrinsics (fx, fy, u, v) stand still. All of it in scaled pixels; see PixelScale. The first ten
 /// columns are the whole flow where ωz = 0; the first six, differenced between two points, are those of Fang, Liu, Li &
-/// Zhang, "Visual servoing with an uncalibrated pan-tilt camera", 2011, eq. (11).
+/// Zhang, "A global exponential observer for camera calibration", 2011, eq. (11).
 using FlowParameters = Eigen::Matrix<double, 14, 1>;
 using FlowRegressor = Eigen::Matrix<double, 14, 2>;  ///< G: q̇ = Gᵀ Θ.
 

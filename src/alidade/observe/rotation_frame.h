@@ -9,7 +9,7 @@ namespace alidade {
 
 /// One instant as the estimators of a rotating camera take it: how the camera has turned since the start, and what it
 /// saw. A static point m has m(t) = R m(0) + shift in the camera frame, Ṙ = −[ω]× R.
-/// Fang, Liu, Li & Zhang, "Visual servoing with an uncalibrated pan-tilt camera", 2011, eq. (3).
+/// Fang, Liu, Li & Zhang, "A global exponential observer for camera calibration", 2011, eq. (3).
 struct RotationFrame {
   double t_s = 0.0;
   double dt_s = 0.0;                                                   ///< Since the frame before; 0 at the first.

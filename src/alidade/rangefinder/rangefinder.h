@@ -90,8 +90,8 @@ struct RangefinderReport {
 /// Origin and direction (and scale) of a rangefinder's beam in the camera frame, by maximum likelihood, with what is
 /// wrong among the shots named. Needs no first guess and does not throw on bad data: the report says how it went.
 /// `points_in_board` [m]: of the board of those shots that have corners; may be empty if none has.
-/// Wang & Li, "Extrinsic calibration of a single-point laser rangefinder and a camera", 2020, eq. (5)–(16), corrected
-/// in docs/maths/rangefinder.md. Throws Interrupted.
+/// Wang & Li, "Calibration method of laser range finder and camera in information fusion process", 2020, eq. (5)–(16),
+/// corrected in docs/maths/rangefinder.md. Throws Interrupted.
 [[nodiscard]] RangefinderReport calibrate_rangefinder(std::span<const Shot> shots,
                                                       std::span<const Eigen::Vector3d> points_in_board,
                                                       const Camera& camera, const RangefinderConfig& config,

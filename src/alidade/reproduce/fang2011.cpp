@@ -235,7 +235,7 @@ Experiment experiment_3(const ReproduceConfig& config) {
 
 PaperReport reproduce_fang2011(const ReproduceConfig& config) {
   PaperReport report{"fang2011",
-                     "Y. Fang, X. Liu, B. Li, X. Zhang, \"Visual servoing with an uncalibrated pan-tilt camera\", 2011",
+                     "Y. Fang, X. Liu, B. Li, X. Zhang, \"A global exponential observer for camera calibration\", 2011",
                      {}};
   report.experiments = {experiment_1(config), experiment_2(config), experiment_3(config), fang_conditions(config)};
   return report;

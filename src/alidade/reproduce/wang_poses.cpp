@@ -194,7 +194,9 @@ Experiment wang_poses(const ReproduceConfig& config) {
 
 PaperReport reproduce_wang2020(const ReproduceConfig& config) {
   PaperReport report{
-      "wang2020", "Wang, Li, \"Extrinsic calibration of a single-point laser rangefinder and a camera\", 2020", {}};
+      "wang2020",
+      "Wang, Li, \"Calibration method of laser range finder and camera in information fusion process\", 2020",
+      {}};
   report.experiments = {wang_table_1(), wang_table_2(config), wang_poses(config)};
   return report;
 }

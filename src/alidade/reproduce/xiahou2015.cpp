@@ -76,7 +76,10 @@ Experiment xiahou_geometry() {
 }
 
 PaperReport reproduce_xiahou2015(const ReproduceConfig& config) {
-  PaperReport report{"xiahou2015", "Xiahou, Chen, Wu, \"Object tracking of two pan-tilt cameras\", 2015", {}};
+  PaperReport report{"xiahou2015",
+                     "Xiahou et al., \"Modeling and Simulation for Target Tracking System Based on Dual-Pan-Tilt "
+                     "Camera\", Journal of System Simulation 27(2), 362-368, 2015",
+                     {}};
   report.experiments = {xiahou_geometry(), xiahou_tracking(config), xiahou_servo(config), xiahou_realistic(config)};
   return report;
 }

@@ -8,8 +8,9 @@
 
 namespace alidade {
 
-/// The filter of Xiahou, Chen & Wu, "Object tracking of two pan-tilt cameras", 2015, in its centimetres. Literal: the
-/// target is taken to be where both axes point, process noise Q = I6 a step, R = 0.01 I4 for tangents and cm alike.
+/// The filter of Xiahou et al., "Modeling and Simulation for Target Tracking System Based on Dual-Pan-Tilt Camera",
+/// 2015, in its centimetres. Literal: the target is taken to be where both axes point, process noise Q = I6 a step, R =
+/// 0.01 I4 for tangents and cm alike.
 struct XiahouConfig {
   double baseline_cm = 50.0;             ///< Of head 2 along x; both heads at y = z = 0, unturned.
   double process_variance = 1.0;         ///< Q = this · I6, or this · GGᵀ.

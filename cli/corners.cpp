@@ -3,7 +3,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <memory>
 
 #include "alidade/calibrate/calibration.h"
@@ -161,18 +160,9 @@ ExitCode find_corners_of(const CornersArgs& args, Run& run) {
 
 /// With --csv the table is all that stdout gets; the folder gets the rest as always.
 ExitCode run_corners(const CornersArgs& args, Run& run) {
-  if (!args.csv) return find_corners_of(args, run);
-  if (run.options.json) throw UsageError("--csv and --json both want stdout");
-  CommonOptions silent = run.options;
-  silent.quiet = true;
-  Run quiet(run.document.command, run.document.argv, silent, run.progress);
-  const ExitCode code = find_corners_of(args, quiet);
-  run.document.verdict = quiet.document.verdict;
-  if (code == ExitCode::ok) {
-    const std::string table = read_file(run.options.out / "corners.csv");
-    std::fwrite(table.data(), 1, table.size(), stdout);
-  }
-  return code;
+  if (args.csv && run.options.json) throw UsageError("--csv and --json both want stdout");
+  if (args.csv) run.print_file("corners.csv");
+  return find_corners_of(args, run);
 }
 
 }  // namespace

@@ -245,6 +245,28 @@ TEST(NothingLost, ADocumentThatItsReaderCannotHaveIsAFailure) {
   expect_failed(run_into(folder.path(), large, {}, full_stdout), folder.path(), before, "stdout: cannot be written");
 }
 
+TEST(NothingLost, ATableForTheNextProgramIsAllThatIsPrintedOrTheRunFails) {
+  const TemporaryFolder folder;
+  const auto table_of = [](State state) -> Work {
+    return [state](cli::Run& run) {
+      run.print_file("a.csv");
+      run.say("a line for a person");
+      if (state != State::refused) run.add_file("a.csv", std::string(100'000, state == State::good ? 'g' : 'b'));
+      return run.finish(verdict_of(state));
+    };
+  };
+  ASSERT_EQ(run_into(folder.path(), table_of(State::good)).out, std::string(100'000, 'g'));
+  const auto before = files_of(folder.path());
+  for (const auto& stdout_of : {full_stdout, nobody_reads}) {
+    expect_failed(run_into(folder.path(), table_of(State::bad), {}, stdout_of), folder.path(), before,
+                  "stdout: cannot be written");
+  }
+  EXPECT_EQ(run_into(folder.path(), table_of(State::refused)).out, "");
+  const Outcome bad = run_into(folder.path(), table_of(State::bad));
+  EXPECT_EQ(bad.code, 6);
+  EXPECT_EQ(bad.out, std::string(100'000, 'b')) << "not to be trusted, and there";
+}
+
 TEST(NothingLost, WhoStopsReadingTheLinesForPeopleHasReadEnough) {
   const TemporaryFolder folder;
   const Work work = [](cli::Run& run) {

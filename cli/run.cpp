@@ -163,7 +163,7 @@ void Run::write_files() {
   folder_ = is_aside ? options.out / refused : options.out;
   FolderSwap swap(folder_);
   swap.add("result.json", result_);
-  for (const PendingFile& file : files_) swap.add(file.name, file.place ? spool_->get(*file.place) : file.content);
+  for (const PendingFile& file : files_) swap.add(file.name, content_of(file));
   add_report(swap);
   for (const std::filesystem::path& name : is_aside ? earlier_result(folder_).files : earlier.files) swap.remove(name);
   if (!is_aside) {
@@ -196,7 +196,7 @@ void Run::add_report(FolderSwap& swap) {
 
 /// Said where a person reads it.
 void Run::warn(const std::string& line) {
-  if (options.json || options.quiet) {
+  if (options.json || options.quiet || !printed_file_.empty()) {
     tell_person("alidade: " + line);
   } else {
     say(line);
@@ -220,15 +220,26 @@ std::string Run::summary() const {
   return text;
 }
 
+std::string Run::content_of(const PendingFile& file) const {
+  return file.place ? spool_->get(*file.place) : file.content;
+}
+
+std::string Run::printed_text() const {
+  if (options.json) return result_;
+  if (printed_file_.empty()) return options.quiet ? "" : summary();
+  const auto file = std::find_if(files_.begin(), files_.end(),
+                                 [this](const PendingFile& each) { return each.name == printed_file_; });
+  return file != files_.end() ? content_of(*file) : "";
+}
+
 /// Before anything stands in its place: a document that its reader cannot have is a run that failed. Who stops reading
 /// lines for people has read enough.
 void Run::print() const {
-  if (options.quiet && !options.json) return;
   wipe_progress_line();
-  const std::string text = options.json ? result_ : summary();
+  const std::string text = printed_text();
   const bool is_written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
   if (is_written) return;
-  const bool has_read_enough = errno == EPIPE && !options.json;
+  const bool has_read_enough = errno == EPIPE && !options.json && printed_file_.empty();
   ::__fpurge(stdout);
   std::clearerr(stdout);
   if (!has_read_enough) throw InputError("stdout: cannot be written");

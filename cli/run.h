@@ -61,6 +61,8 @@ class Run {
   void add_file(std::string name, std::string content);
   /// A file elsewhere that the person named, written by finish() as well.
   void add_file_elsewhere(const std::filesystem::path& file, std::string_view content);
+  /// The file of that name is all that finish() prints, if there is one: a table for the next program.
+  void print_file(std::string name) { printed_file_ = std::move(name); }
   /// A picture of the report: JPEG bytes under the name that the document uses. Where the page would become too large,
   /// those added last are left out.
   void add_picture(std::string name, std::string jpeg);
@@ -89,6 +91,8 @@ class Run {
   void warn(const std::string& line);
   void print() const;
   [[nodiscard]] std::string summary() const;
+  [[nodiscard]] std::string content_of(const PendingFile& file) const;
+  [[nodiscard]] std::string printed_text() const;
 
   Clock::time_point start_ = Clock::now();
   Clock::time_point lap_ = start_;
@@ -98,7 +102,7 @@ class Run {
   std::list<FolderSwap> elsewhere_;
   std::vector<std::pair<std::string, std::string>> pictures_;  ///< Names and JPEG bytes, the most wanted first.
   std::vector<std::string> lines_;
-  std::string result_;
+  std::string result_, printed_file_;
   std::filesystem::path folder_;  ///< Where the results stand: DIR, or DIR/refused.
   bool has_report_ = false;
 };

@@ -141,7 +141,7 @@ ExitCode find_corners_of(const CornersArgs& args, Run& run) {
   config.board_shape = BoardShape::automatic;
   PhotoShelf shelf(args.photos, run);
   PhotoCalibration found = calibrate_shelf(shelf, board, config, {}, run);
-  Calibration calibration = judge_calibration(board, std::move(found), config, run.progress);
+  Calibration calibration = judge_calibration(board, std::move(found), config, {}, run.progress);
   run.lap("residuals");
   const StatedCorners stated = state_corners(calibration.photos, args.outliers == "drop", run);
   Verdict verdict = corners_verdict(stated, calibration);

@@ -31,7 +31,7 @@ Sizes slips(const Board& told) {
 }
 
 /// A few of the photos, evenly chosen, in a size that is searched quickly.
-std::vector<cv::Mat> sample(std::size_t num_photos, const PhotoLoader& load_photo) {
+std::vector<cv::Mat> chosen_photos(std::size_t num_photos, const PhotoLoader& load_photo) {
   constexpr double enough_pixels = 2.5e6;
   const std::size_t count = std::min(num_photos, most_photos);
   std::vector<cv::Mat> photos;
@@ -124,7 +124,7 @@ Score score_of(const std::vector<cv::Mat>& photos, const Board& board, const Pro
 std::optional<Board> guess_board(std::size_t num_photos, const PhotoLoader& load_photo, const Board& told,
                                  const std::optional<std::vector<std::pair<int, int>>>& grids_seen,
                                  const Progress& progress) {
-  const std::vector<cv::Mat> photos = sample(num_photos, load_photo);
+  const std::vector<cv::Mat> photos = chosen_photos(num_photos, load_photo);
   if (photos.empty()) return std::nullopt;
   const bool may_have_markers = told.kind == BoardKind::charuco || told.kind == BoardKind::chessboard;
   const std::string dictionary = may_have_markers ? seen_dictionary(photos) : "";

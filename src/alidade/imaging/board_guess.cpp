@@ -31,7 +31,7 @@ Sizes slips(const Board& told) {
 }
 
 /// A few of the photos, evenly chosen, in a size that is searched quickly.
-std::vector<cv::Mat> sample(std::size_t num_photos, const PhotoLoader& load_photo) {
+std::vector<cv::Mat> chosen_photos(std::size_t num_photos, const PhotoLoader& load_photo) {
   constexpr double enough_pixels = 2.5e6;
   const std::size_t count = std::min(num_photos, most_photos);
   std::vector<cv::Mat> photos;
@@ -43,8 +43,11 @@ std::vector<cv::Mat> sample(std::size_t num_photos, const PhotoLoader& load_phot
   return photos;
 }
 
-/// "5X5" of DICT_5X5_100: dictionaries of one family begin with the same markers.
-std::string family(const std::string& dictionary) { return dictionary.substr(0, dictionary.rfind('_')); }
+/// "DICT_5X5" of DICT_5X5_100: dictionaries of one family begin with the same markers. AprilTags have none but
+/// themselves.
+std::string family(const std::string& dictionary) {
+  return dictionary.starts_with("DICT_APRILTAG") ? dictionary : dictionary.substr(0, dictionary.rfind('_'));
+}
 
 /// The largest of each family: whatever the board is printed with is in it.
 constexpr std::array<const char*, 9> families{"DICT_4X4_1000",      "DICT_5X5_1000",       "DICT_6X6_1000",
@@ -78,7 +81,8 @@ std::string fitting_dictionary(Board board, const std::string& of_family, const 
 /// The kinds of board that may be meant: the told one, then a chessboard with markers for one without.
 std::vector<Board> kinds_to_try(const Board& told, const std::string& dictionary) {
   std::vector<Board> kinds;
-  const bool is_marked = !dictionary.empty() && dictionary != "DICT_APRILTAG_36h11";
+  const bool is_aprilgrid = told.kind == BoardKind::chessboard && dictionary == "DICT_APRILTAG_36h11";
+  const bool is_marked = !dictionary.empty() && !is_aprilgrid;
   if (told.kind != BoardKind::charuco || is_marked) kinds.push_back(told);
   if (told.kind == BoardKind::chessboard && is_marked) {
     kinds.push_back(told);
@@ -120,7 +124,7 @@ Score score_of(const std::vector<cv::Mat>& photos, const Board& board, const Pro
 std::optional<Board> guess_board(std::size_t num_photos, const PhotoLoader& load_photo, const Board& told,
                                  const std::optional<std::vector<std::pair<int, int>>>& grids_seen,
                                  const Progress& progress) {
-  const std::vector<cv::Mat> photos = sample(num_photos, load_photo);
+  const std::vector<cv::Mat> photos = chosen_photos(num_photos, load_photo);
   if (photos.empty()) return std::nullopt;
   const bool may_have_markers = told.kind == BoardKind::charuco || told.kind == BoardKind::chessboard;
   const std::string dictionary = may_have_markers ? seen_dictionary(photos) : "";

@@ -106,15 +106,16 @@ TEST_F(MovingTargetCommand, ADroneIsFollowedByCamerasThatItPlacedItself) {
   // What the page draws: a camera stands where its head's base does, as sure as that in all (a turned covariance has
   // the same trace).
   const Json& cameras = document["data"]["cameras"];
+  const std::array places{"world_from_cam_x_m", "world_from_cam_y_m", "world_from_cam_z_m"};
+  const std::array variances{"cov_xx_m2", "cov_yy_m2", "cov_zz_m2"};
   ASSERT_EQ(cameras["id"].size(), 4u);
   for (std::size_t h = 0; h < 4; ++h) {
     const Json& place = estimate["heads"][h]["world_from_base"]["translation_m"];
     const Json& sigma = document["stddev"]["heads"][h]["world_from_base"]["translation_m"];
     double trace = 0.0, expected = 0.0;
     for (std::size_t k = 0; k < 3; ++k) {
-      EXPECT_NEAR(cameras[std::array{"world_from_cam_x_m", "world_from_cam_y_m", "world_from_cam_z_m"}[k]][h], place[k],
-                  1e-9);
-      trace += cameras[std::array{"cov_xx_m2", "cov_yy_m2", "cov_zz_m2"}[k]][h].get<double>();
+      EXPECT_NEAR(cameras[places[k]][h], place[k], 1e-9);
+      trace += cameras[variances[k]][h].get<double>();
       expected += std::pow(sigma[k].get<double>(), 2);
     }
     EXPECT_NEAR(trace, expected, 1e-9 + 1e-6 * expected);

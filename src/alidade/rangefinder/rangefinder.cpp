@@ -308,8 +308,15 @@ void solve_report(Preparation& ready, const BeamFit& fit, const Camera& camera, 
     report.dof = fit.best.normals.num_rows - problem.num_free();
   }
   report.beam.noise = problem.model.noise;
-  if (refined)
+  if (refined) {
+    report.beam.cov = report.cov_model = refined->state.beam.cov;
     put_uncertainty(problem, refines ? prior : LensPrior{}, refines ? refined->state : start, camera, config, report);
+  } else {
+    const int p = problem.num_free();
+    report.beam.cov.setZero();
+    report.beam.cov.topLeftCorner(p, p) = Ldlt(fit.best.normals.H.topLeftCorner(p, p)).inverse();
+    carry_lens(problem, camera, report);
+  }
   report.scale_in_sigmas =
       scale_in_sigmas(problem, report.camera, report.beam, report.range_sigma_is_told, ready.least_sigma_range_m);
   report.bound = judge_beam(problem, report.beam, report.camera);

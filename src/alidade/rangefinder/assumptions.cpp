@@ -1,6 +1,6 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <string>
 
 #include "alidade/rangefinder/rangefinder.h"
 
@@ -26,23 +26,24 @@ const char* remedy_of(const std::string& name) {
   return "leave it out: the residuals tell it";
 }
 
-/// Writes which value it moves most, in that value's σ, for an error of the thing.
+/// The move of one of the answer's vectors in its σ, √trace, as the verdict states it; named by what moves most.
+void put_move_of(const std::string& name, const Eigen::Ref<const Eigen::VectorXd>& change, double sigma,
+                 Assumption& assumption) {
+  if (!(sigma > 0.0) || !(change.norm() / sigma > assumption.moves)) return;
+  Eigen::Index most = 0;
+  assumption.moves = change.norm() / sigma;
+  assumption.moved_by = change.cwiseAbs().maxCoeff(&most);
+  assumption.moved = change.size() == 1 ? name : name + " " + "xyz"[most];
+}
+
+/// Which of origin, direction and scale it moves most for an error of the thing.
 void put_moves(const RangefinderReport& report, const BeamVector& moves, Assumption& assumption) {
-  static constexpr std::array<const char*, 7> names{"origin_m x",  "origin_m y",  "origin_m z", "direction x",
-                                                    "direction y", "direction z", "scale"};
   const Beam moved = report.beam.retract(1e-6 * moves);  // the step of a sphere, straightened
-  Eigen::Vector<double, 7> change;
-  change << moves.head<3>(), 1e6 * (moved.direction_in_cam - report.beam.direction_in_cam), moves[5];
-  const Eigen::Matrix<double, 7, 7> cov = embedded_covariance(report.beam);
-  for (Eigen::Index i = 0; i < 7; ++i) {
-    const bool is_result = i != 5 && (i != 6 || !report.scale_by_need);  // z of a direction hangs on its x and y
-    if (!is_result || !(cov(i, i) > 0.0)) continue;
-    const double in_sigmas = std::abs(change[i]) / std::sqrt(cov(i, i));
-    if (!(in_sigmas > assumption.moves)) continue;
-    assumption.moves = in_sigmas;
-    assumption.moved = names[static_cast<std::size_t>(i)];
-    assumption.moved_by = change[i];
-  }
+  const Eigen::Vector3d turned = 1e6 * (moved.direction_in_cam - report.beam.direction_in_cam);
+  const BeamMatrix& cov = report.beam.cov;
+  put_move_of("origin_m", moves.head<3>(), std::sqrt(cov.topLeftCorner<3, 3>().trace()), assumption);
+  put_move_of("direction", turned, std::sqrt(cov.block<2, 2>(3, 3).trace()), assumption);
+  if (!report.scale_by_need) put_move_of("scale", moves.tail<1>(), std::sqrt(cov(5, 5)), assumption);
 }
 
 bool is_of_lengths(const HeldThing& thing) { return thing.name == "scale" || thing.name == "square_m"; }

@@ -11,10 +11,9 @@ namespace {
 
 /// The name of the unit that the readings are in, by their scale; empty where they are metres, or in none.
 std::string unit_of(double scale) {
-  constexpr double near_enough = 0.02;
-  for (const auto& [metres, name] :
-       {std::pair{0.001, "millimetres"}, std::pair{0.01, "centimetres"}, std::pair{0.0254, "inches"},
-        std::pair{0.3048, "feet"}, std::pair{0.9144, "yards"}})
+  constexpr double near_enough = 0.01;
+  for (const auto& [metres, name] : {std::pair{0.001, "millimetres"}, std::pair{0.01, "centimetres"},
+                                     std::pair{0.0254, "inches"}, std::pair{0.3048, "feet"}})
     if (std::abs(scale / metres - 1.0) < near_enough) return name;
   return "";
 }
@@ -27,16 +26,18 @@ void add_found_scale(const RangefinderReport& report, Verdict& verdict) {
   Check check = check_of("scale", z < ask_beyond ? State::good : State::care, "the readings' scale is 1 within its σ",
                          z, ask_beyond, "σ", "residuals");
   if (z >= ask_beyond)
-    check.text =
-        "the readings are " + text_of(1.0 / report.beam.scale, 5) +
-        " times what the board says: the rangefinder's scale (then give --scale), or the printed squares; measure them";
+    check.text = "the readings are " + text_of(1.0 / report.beam.scale, 5) +
+                 " times what the board says: the rangefinder's scale (then give --scale), the printed squares "
+                 "(measure them), or the camera's focal length";
   if (z >= ask_beyond && std::abs(away) > beyond_an_instrument) {
     const std::string unit = unit_of(report.beam.scale);
     check.state = State::refused;
-    check.text = unit.empty() ? "no rangefinder is off so far: the readings are " +
-                                    text_of(1.0 / report.beam.scale, 3) + " times what the board says"
-                              : "the ranges are " + unit + ", not metres: they are " +
-                                    text_of(1.0 / report.beam.scale, 3) + " times what the board says";
+    check.text = unit.empty()
+                     ? "no rangefinder is off so far: the readings are " + text_of(1.0 / report.beam.scale, 3) +
+                           " times what the board says; is the file that of another camera, or the square "
+                           "another?"
+                     : "the ranges are " + unit + ", not metres: they are " + text_of(1.0 / report.beam.scale, 3) +
+                           " times what the board says";
   }
   verdict.checks.push_back(std::move(check));
 }

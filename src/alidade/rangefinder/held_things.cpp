@@ -56,11 +56,13 @@ HeldThing prior_along(const std::string& name, const VectorXd& along_lens, const
   const Eigen::MatrixXd cov_before = camera.cov(prior.free, prior.free);
   const Eigen::MatrixXd cov_after = part.inverse.bottomRightCorner(num_lens, num_lens);
   const VectorXd u = along / along.squaredNorm();  // the value of `along` in the lens' parameters
-  thing.asked = u.dot(away);
   const double before = u.dot(cov_before * u), after = u.dot(cov_after * u);
-  // Shots that add less than a thousandth to what was known say nothing of it.
-  if (before - after > 1e-3 * before) thing.asked_sigma = std::sqrt(before - after);
   thing.sigma = std::sqrt(before);
+  // Of an error of the prior the shots take this share. Less than a thousandth says nothing of it.
+  const double share = (before - after) / before;
+  if (!(share > 1e-3)) return thing;
+  thing.asked = u.dot(away) / share;
+  thing.asked_sigma = *thing.sigma / std::sqrt(share);
   return thing;
 }
 

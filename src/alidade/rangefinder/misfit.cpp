@@ -45,8 +45,8 @@ std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::
     return "each range belongs to the row before it: the order of the rows is shifted by one";
   if (explains(shifted(shots, -1), points_in_board, camera, plain))
     return "each range belongs to the row after it: the order of the rows is shifted by one";
-  constexpr std::array<std::pair<double, const char*>, 5> units{
-      {{0.001, "millimetres"}, {0.01, "centimetres"}, {0.0254, "inches"}, {0.3048, "feet"}, {0.9144, "yards"}}};
+  constexpr std::array<std::pair<double, const char*>, 4> units{
+      {{0.001, "millimetres"}, {0.01, "centimetres"}, {0.0254, "inches"}, {0.3048, "feet"}}};
   for (const auto& [metres, name] : units) {
     std::vector<Shot> scaled(shots.begin(), shots.end());
     for (Shot& shot : scaled) {

@@ -142,6 +142,7 @@ void put_clusters(const BeamProblem& problem, const ReducedSystem& system, const
   report.beam.cov.topLeftCorner(p, p) = cov.topLeftCorner(p, p);
   const auto k = static_cast<Eigen::Index>(prior.free.size());
   if (k > 0) {
+    report.lens_cov_model = report.camera.cov;
     report.camera.cov(prior.free, prior.free) = cov.bottomRightCorner(k, k);
     report.beam.cov_with_lens(Eigen::seqN(0, p), prior.free) = cov.topRightCorner(p, k);
   }
@@ -160,15 +161,17 @@ void carry_told(RangefinderReport& report) {
 }
 
 /// A lens that was free, and that the shots pulled farther from its file than its covariance lets expect: the file's
-/// error is so much larger, and the beam follows it.
+/// error is so much larger, and the beam follows it. It is believed from none where what the shots ask for is 2.5 of
+/// its σ away to all of it at 4, if the shots by themselves know the lens at least half as well as its file.
 void carry_surprise(RangefinderReport& report) {
-  constexpr double surprising = 2.0;
+  constexpr double doubtful = 2.5, sure = 4.0, worst = 2.2;
   for (const HeldThing& thing : report.held) {
-    if (!thing.name.starts_with("camera") || !thing.sigma || !std::isfinite(thing.asked_sigma)) continue;
-    if (!(std::abs(thing.asked) > surprising * thing.asked_sigma)) continue;
-    const double gain = std::pow(*thing.sigma / thing.asked_sigma, 2);  // of the pull over the file's error
-    const double excess2 = std::pow(gain, 2) * (std::pow(thing.asked, 2) - std::pow(thing.asked_sigma, 2));
-    report.beam.cov += excess2 * thing.moves * thing.moves.transpose();
+    if (!thing.name.starts_with("camera") || !thing.sigma || !(thing.asked_sigma < worst * *thing.sigma)) continue;
+    const double z = std::abs(thing.asked) / thing.asked_sigma;
+    if (z < doubtful) continue;
+    const double weight = std::min(1.0, (z - doubtful) / (sure - doubtful));
+    const double more2 = weight * (z * z - 1.0) * std::pow(thing.asked_sigma, 2);
+    report.beam.cov += more2 * thing.moves * thing.moves.transpose();
   }
 }
 
@@ -308,8 +311,15 @@ void solve_report(Preparation& ready, const BeamFit& fit, const Camera& camera, 
     report.dof = fit.best.normals.num_rows - problem.num_free();
   }
   report.beam.noise = problem.model.noise;
-  if (refined)
+  if (refined) {
+    report.beam.cov = report.cov_model = refined->state.beam.cov;
     put_uncertainty(problem, refines ? prior : LensPrior{}, refines ? refined->state : start, camera, config, report);
+  } else {
+    const int p = problem.num_free();
+    report.beam.cov.setZero();
+    report.beam.cov.topLeftCorner(p, p) = Ldlt(fit.best.normals.H.topLeftCorner(p, p)).inverse();
+    carry_lens(problem, camera, report);
+  }
   report.scale_in_sigmas =
       scale_in_sigmas(problem, report.camera, report.beam, report.range_sigma_is_told, ready.least_sigma_range_m);
   report.bound = judge_beam(problem, report.beam, report.camera);

@@ -69,6 +69,7 @@ struct RangefinderReport {
   Beam beam;                                  ///< Its covariance counts that the measurements of a shot share errors.
   Camera camera;                              ///< As given, or refined with the beam; the beam belongs to it.
   BeamMatrix cov_model = BeamMatrix::Zero();  ///< Of the beam, if every single measurement erred by itself.
+  Eigen::MatrixXd lens_cov_model;             ///< The same of a lens that was refined; 0×0: it was held.
   ClusterCovariance clusters;                 ///< What tells the two apart; shots are its clusters.
   std::vector<HeldThing> held;
   bool scale_by_need = false;      ///< The scale was estimated for the beam's sake, it is no result itself.

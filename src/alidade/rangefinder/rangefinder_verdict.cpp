@@ -60,12 +60,12 @@ double sigma_of_offset_m(const Beam& beam) {
   return std::sqrt((J * embedded_covariance(beam) * J.transpose())[0]);
 }
 
-/// Only where the shots do say so: an offset that is not known at all is another matter.
+/// Only where the shots do say so: a line that passes far off, however badly known, is another matter.
 bool passes_the_centre(const RangefinderReport& report) {
   constexpr double least_m = 0.002;  // nearer, no spot moves by what it could be measured with
-  constexpr double known_m = 0.01;
+  constexpr double near_m = 0.015;
   const double sigma_m = sigma_of_offset_m(report.beam);
-  return sigma_m < known_m && report.bound.offset_m < std::max(least_m, 3.0 * sigma_m);
+  return report.bound.offset_m < near_m && report.bound.offset_m < std::max(least_m, 3.0 * sigma_m);
 }
 
 /// Mean angle of the boards' normals to the camera's view, from the cosines.

@@ -90,9 +90,6 @@ ObserveReport observe(const RotationLog& log, const ObserveConfig& told, const P
       report = std::move(freer);
       config = next;
     }
-    if (CommonLayout(config.estimate).size > CommonLayout(told.estimate).size) {
-      heed_all_rows(log, config, progress, report);
-    }
   }
   report.estimated = config.estimate;
   if (may_be_misread(report)) report.misread = misread_rotation(log, config, report, progress);

@@ -44,6 +44,8 @@ std::vector<Misreading> misreadings_of(RotationSource source) {
                exchange(row);
                scale_all(row, {-1.0, 1.0, 1.0});
              }},
+            {"the angles are half of what the head turns", scaled(2, 2, 2)},
+            {"the angles are twice what the head turns", scaled(0.5, 0.5, 0.5)},
             {"the angles are degrees: name the columns pan_deg, tilt_deg", scaled(degree, degree, degree)}};
   }
   return {{"ω_y counts the other way, or the picture is mirrored left to right", scaled(1, -1, -1)},
@@ -51,6 +53,8 @@ std::vector<Misreading> misreadings_of(RotationSource source) {
           {"ω_x and ω_y count the other way, or the camera hangs upside down", scaled(-1, -1, 1)},
           {"the rates are of the world against the camera: all signs are turned", scaled(-1, -1, -1)},
           {"ω_x and ω_y are exchanged", exchange},
+          {"the rates are half of what the camera turns", scaled(2, 2, 2)},
+          {"the rates are twice what the camera turns", scaled(0.5, 0.5, 0.5)},
           {"the rates are degrees per second", scaled(degree, degree, degree)}};
 }
 
@@ -83,7 +87,10 @@ double noise_of(const RotationLog& log, const ObserveConfig& config, const Pixel
 bool may_be_misread(const ObserveReport& report) {
   constexpr double most_ordinary_px = 2.0, many = 0.2;
   using Status = ObserveReport::Status;
+  constexpr double ask_beyond = 5.0;
   if (report.status == Status::no_convergence || report.status == Status::unsteady) return true;
+  if (report.status == Status::unobservable) return report.motion.path_rad.head<2>().minCoeff() > 0.0;
+  if (std::ranges::any_of(report.causes, [](const CauseScore& cause) { return cause.z >= ask_beyond; })) return true;
   const auto seen = static_cast<double>(report.reference.bundle.observations.size() + report.pixels_left_out);
   return report.status == Status::ok &&
          (report.sigma_px > most_ordinary_px || static_cast<double>(report.pixels_left_out) > many * seen);
@@ -92,7 +99,7 @@ bool may_be_misread(const ObserveReport& report) {
 std::string misread_rotation(const RotationLog& log, const ObserveConfig& config, const ObserveReport& report,
                              const Progress& progress) {
   if (log.source == RotationSource::none || config.rotation == RotationKnowledge::free) return "";
-  constexpr double most_px = 3.0, clearly = 0.2;  // of the noise as the log is read
+  constexpr double most_px = 3.0, clearly = 0.3;  // of the noise as the log is read
   const double as_read = noise_of(log, config, report.scale, progress);
   std::string best;
   double least = std::min(most_px, clearly * as_read);

@@ -51,6 +51,23 @@ ObserveReport second_chance(const RotationLog& log, ObserveConfig& config, const
   return report;
 }
 
+/// What is not modelled may look like zooms, and each rest between them be explained by itself. All rows as one
+/// camera's tell: where they are one's, what they ask for counts.
+void heed_all_rows(const RotationLog& log, const ObserveConfig& config, const Progress& progress,
+                   ObserveReport& report) {
+  const bool has_zoom = std::any_of(report.events.begin(), report.events.end(), [](const ObserveNote& note) {
+    return note.event == ObserveEvent::zoom || note.event == ObserveEvent::restart;
+  });
+  if (!has_zoom || !is_answer(report) || config.method != ObserveMethod::hybrid) return;
+  ObserveConfig whole = config;
+  whole.method = ObserveMethod::batch;
+  ObserveReport all = observe_as_told(log, whole, progress);
+  const CauseScore* best = is_answer(all) ? best_cause(all) : nullptr;
+  if (best == nullptr || best->name == "focal length that drifts") return;
+  const CauseScore* known = best_cause(report);
+  if (known == nullptr || best->gain > known->gain) report.causes = std::move(all.causes);
+}
+
 }  // namespace
 
 ObserveReport observe(const RotationLog& log, const ObserveConfig& told, const Progress& progress) {
@@ -64,6 +81,7 @@ ObserveReport observe(const RotationLog& log, const ObserveConfig& told, const P
       if (is_answer(second)) report = std::move(second);
     }
     for (int round = 0; round < most_rounds && is_answer(report); ++round) {
+      heed_all_rows(log, config, progress, report);
       const CauseScore* cause = best_cause(report);
       ObserveConfig next = config;
       if (cause == nullptr || !free_cause(cause->name, config.lens_is_given, next.estimate)) break;

@@ -132,7 +132,11 @@ Verdict fang_refusal(const ObserveReport& report, const RotationLog& log, const 
 Verdict observe_verdict(const ObserveReport& report, const RotationLog& log, const ObserveConfig& config) {
   using Status = ObserveReport::Status;
   if (report.status == Status::unobservable || report.status == Status::too_few_data) {
-    const Reason reason = reason_of(report, log, config);
+    Reason reason = reason_of(report, log, config);
+    if (!report.misread.empty()) {
+      reason.what = "the rotation does not fit these pixels, and would if it were read otherwise";
+      reason.add = report.misread;
+    }
     Verdict verdict = refusal(reason.what, reason.add, ExitCode::cannot_tell);
     if (report.status == Status::unobservable) verdict.checks.push_back(weakest(report));
     return verdict;

@@ -118,6 +118,22 @@ Check reference_check(const ObserveReport& report) {
 
 }  // namespace
 
+namespace {
+
+/// Half a turn about x undoes a pan of the other sign, and a picture that is mirrored left to right, and so on.
+std::string half_turn_words(const Eigen::Vector3d& mount_rad) {
+  const Eigen::Vector3d axis = mount_rad.cwiseAbs() / mount_rad.norm();
+  constexpr double along = 0.95;
+  if (mount_rad.norm() > 170.0 * degree) {
+    if (axis.x() > along) return "pan (ω_y) counts the other way, or the picture is mirrored left to right";
+    if (axis.y() > along) return "tilt (ω_x) counts the other way, or the picture is mirrored top to bottom";
+    if (axis.z() > along) return "pan and tilt count the other way, or the camera hangs upside down";
+  }
+  return "axes are exchanged, a sign is turned, or the picture is mirrored, which no rotation undoes";
+}
+
+}  // namespace
+
 Check rotation_check(const ObserveReport& report) {
   constexpr double most_deg = 45.0;
   Check check{"rotation", State::good, "the rotation fits as it is read", 0.0, most_deg, "°", "residuals"};
@@ -133,8 +149,7 @@ Check rotation_check(const ObserveReport& report) {
     check.text = "the pixels fit better if the rotation is read otherwise: " + report.misread;
   } else if (check.value > most_deg) {
     check.state = State::bad;
-    check.text = "the mount turns by " + text_of(check.value, 3) +
-                 "°: axes exchanged, a sign turned, or the picture mirrored, which no rotation undoes";
+    check.text = "the mount turns by " + text_of(check.value, 3) + "°: " + half_turn_words(mount_rad);
   }
   return check;
 }

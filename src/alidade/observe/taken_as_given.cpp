@@ -38,6 +38,8 @@ std::optional<double> told_sigma(const Given& given, const RotationLog& log, con
   if (given.told != nullptr && config.*given.told) return config.*given.told;
   if (given.told == &ObserveConfig::sigma_scale) return log.sigma_scale;
   if (given.told == &ObserveConfig::sigma_parallax) return log.sigma_parallax;
+  // A log whose scale and centre are exact comes from a simulator: so is all that it does not say.
+  if (log.sigma_scale == 0.0 && log.sigma_parallax == 0.0) return 0.0;
   return std::nullopt;
 }
 

@@ -65,7 +65,7 @@ TEST(PoseChain, EliminatedPoseByPoseIsTheWholeMatrixInverted) {
   }
 }
 
-LocalizeReport localized(const HoverRun& run, const Camera& camera) {
+LocalizeReport hover_localized(const HoverRun& run, const Camera& camera) {
   LocalizeConfig config;
   config.target = run.target;
   return localize_sights(camera, run.frames, config, run.truth);
@@ -86,7 +86,7 @@ TEST(SimpleCase, ThePoseIsAsGoodAsItsCovarianceSays) {
     double nees = 0.0;
     for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
       const HoverRun run = testing::hovering({.lens = lens, .num_frames = 150}, 300 + seed);
-      const LocalizeReport report = localized(run, run.camera);
+      const LocalizeReport report = hover_localized(run, run.camera);
       EXPECT_TRUE(report.is_smoothed);
       nees += mean_nees(report, run) / num_seeds;
     }
@@ -108,9 +108,9 @@ TEST(SimpleCase, TheLensesCovarianceIsCounted) {
     sigma[5] = 0.004;  // k1
     for (Eigen::Index i = 0; i < values.size(); ++i) values[i] += sigma[i] * draws.normal();
     told.lens = with_params(told.lens, values);
-    ignored += mean_nees(localized(run, told), run) / num_seeds;
+    ignored += mean_nees(hover_localized(run, told), run) / num_seeds;
     told.cov = sigma.cwiseAbs2().asDiagonal();
-    counted += mean_nees(localized(run, told), run) / num_seeds;
+    counted += mean_nees(hover_localized(run, told), run) / num_seeds;
   }
   EXPECT_GT(counted, 0.7);
   EXPECT_LT(counted, 1.3);
@@ -123,7 +123,7 @@ bool has_state(const Verdict& verdict, State state, const std::string& text) {
 
 TEST(SimpleCase, ACameraWithoutCovarianceIsSaidAndNotGood) {
   const HoverRun run = testing::hovering({.num_frames = 90}, 3);
-  const LocalizeReport report = localized(run, run.camera);
+  const LocalizeReport report = hover_localized(run, run.camera);
   EXPECT_TRUE(has_state(localize_verdict(report), State::care, "camera.f (relative) is given without σ"))
       << localize_verdict(report).sentence;
   // The check tells the truth: a focal length off by 0.3 % moves the path as much as it says.
@@ -134,7 +134,7 @@ TEST(SimpleCase, ACameraWithoutCovarianceIsSaidAndNotGood) {
   Eigen::VectorXd values = params(longer.lens);
   values.head<2>() *= 1.003;
   longer.lens = with_params(longer.lens, values);
-  const LocalizeReport moved = localized(run, longer);
+  const LocalizeReport moved = hover_localized(run, longer);
   double most = 0.0;
   for (std::size_t k = 0; k < report.path.size(); ++k) {
     const PathStep &is = report.path[k], &was = moved.path[k];
@@ -146,8 +146,8 @@ TEST(SimpleCase, ACameraWithoutCovarianceIsSaidAndNotGood) {
   EXPECT_NEAR(focal->moves / most, 1.0, 0.15);  // the target's points give way a little, in second order
   Camera exact = run.camera;
   exact.cov = Eigen::MatrixXd::Zero(10, 10);
-  EXPECT_EQ(localize_verdict(localized(run, exact)).state, State::good)
-      << localize_verdict(localized(run, exact)).sentence;
+  EXPECT_EQ(localize_verdict(hover_localized(run, exact)).state, State::good)
+      << localize_verdict(hover_localized(run, exact)).sentence;
 }
 
 TEST(SimpleCase, AWrongLensIsNamed) {
@@ -157,7 +157,7 @@ TEST(SimpleCase, AWrongLensIsNamed) {
   Eigen::VectorXd values = params(wrong.lens);
   values.head<2>() *= 1.03;
   wrong.lens = with_params(wrong.lens, values);
-  const Verdict verdict = localize_verdict(localized(run, wrong));
+  const Verdict verdict = localize_verdict(hover_localized(run, wrong));
   EXPECT_NE(verdict.state, State::good);
   EXPECT_NE(verdict.sentence.find("focal length"), std::string::npos) << verdict.sentence;
 }

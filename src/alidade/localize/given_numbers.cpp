@@ -69,6 +69,7 @@ std::vector<GivenNumber> given_numbers(const GivenSystem& system) {
   Eigen::VectorXd scale = none;
   scale[num] = 1.0;
   add("scale of the target", scale, std::sqrt(system.cov(num, num)));
+  all.back().asked = all.back().z = 0.0;  // all may be larger: no sight tells
   return all;
 }
 

@@ -29,7 +29,7 @@ struct LocalizeArgs {
   std::filesystem::path sequence, camera, target, start, truth;
   std::string distortion = "full", new_points = "inverse-depth";
   double rate_hz = 0.0, depth_m = 0.0, sigma_depth = 0.5;
-  double sigma_px = 0.0;  ///< 0: not told.
+  double sigma_px = 0.0, sigma_scale = 0.0;  ///< 0: not told.
   bool calibrate_online = false, skip_bad = false;
   LocalizationFilterConfig filter;
   LiveOptions live;
@@ -76,7 +76,14 @@ LocalizeConfig config_of(const LocalizeArgs& args) {
   config.new_points = args.new_points == "xyz"       ? NewPoints::xyz
                       : args.new_points == "delayed" ? NewPoints::delayed
                                                      : NewPoints::inverse_depth;
-  if (!args.target.empty() && !ImageSequence::is_pictures(args.sequence)) config.target = read_target(args.target);
+  if (!args.target.empty() && !ImageSequence::is_pictures(args.sequence)) {
+    const TargetFile target = read_target_file(args.target);
+    config.target = target.points;
+    config.is_board = target.is_board;
+    config.seen_from_plus_z = target.seen_from_plus_z;
+    config.sigma_scale = args.sigma_scale > 0.0 ? args.sigma_scale : target.sigma_scale;
+    config.is_scale_told = target.is_scale_told || args.sigma_scale > 0.0;
+  }
   if (!args.start.empty()) {
     const StartFile start = read_start(args.start);
     config.start = start.start;
@@ -202,6 +209,7 @@ ExitCode localize(const LocalizeArgs& args, Run& run) {
   run.lap("localize");
   const Verdict verdict = localize_verdict(report);
   fill_localization(report, truth, lens_params, run.document);
+  run.document.assumed = localize_assumed(report);
   summarize(report, lens_params, run);
   if (has_estimate(verdict)) {
     std::vector<TimedPose> path;
@@ -256,6 +264,8 @@ void add_options(CLI::App& command, LocalizeArgs& args) {
       "--sigma-px", args.sigma_px,
       "σ of a pixel coordinate (default 0.5); in pictures, where each match brings its own, the least (default 0.11) "
       "[px]");
+  number("--sigma-scale", args.sigma_scale,
+         "σ of the target's size over it, as of a print (0.002: 0.2 %), counted; for tracked points");
   number("--sigma-a", args.filter.sigma_a_m_s2, "Acceleration of the camera [m/s2]; by hand about 4")
       ->capture_default_str();
   number("--sigma-alpha", args.filter.sigma_alpha_rad_s2, "Angular acceleration [rad/s2]; by hand about 6")

@@ -8,6 +8,7 @@
 
 #include "alidade/io/csv.h"
 #include "alidade/io/files.h"
+#include "alidade/io/localize_file.h"
 #include "alidade/testing/command_test.h"
 
 namespace alidade {
@@ -72,7 +73,7 @@ TEST_F(LocalizeCommand, LessOfTheLensIsWorseAndOnlineCalibrationFindsIt) {
   simulate({"--points", "20", "--frames", "60"});
   const auto error_of = [&](const std::vector<std::string>& options) {
     const Outcome outcome = localize(told(options));
-    EXPECT_TRUE(outcome.code == 0 || outcome.code == 5 || outcome.code == 6) << outcome.err;  // the truth is told: ▲
+    EXPECT_TRUE(outcome.code == 0 || outcome.code == 5 || outcome.code == 6) << outcome.err;  // 6: not to be trusted
     return Json::parse(outcome.out)["estimate"]["unaligned_m"].get<double>();
   };
   const double full = error_of({}), first = error_of({"--distortion", "radial1"}),
@@ -116,6 +117,42 @@ TEST_F(LocalizeCommand, ATargetThatIsNotThereIsSaid) {
   const Outcome elsewhere = localize(told());
   EXPECT_EQ(elsewhere.code, 5) << elsewhere.out;
   EXPECT_THAT(elsewhere.err, ::testing::HasSubstr("the target is not where it is told to be"));
+}
+
+TEST_F(LocalizeCommand, WhatIsGivenWithoutSigmaIsSaid) {
+  simulate({"--points", "30", "--frames", "60", "--rate", "30"});
+  const auto verdict_with = [&](const std::vector<std::string>& options) {
+    const Outcome outcome = localize(told(options));
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return Json::parse(outcome.out);
+  };
+  const Json exact = verdict_with({});
+  EXPECT_EQ(exact["verdict"]["state"], "good") << exact["verdict"]["sentence"];
+  EXPECT_EQ(exact["assumed"][0]["sigma"], 0.0);  // the simulator's camera file has a covariance: zero
+  std::string camera = read_file(path("sim/camera.yaml"));
+  camera.erase(camera.find("covariance:"));
+  write_file(path("sim/camera.yaml"), camera);
+  const Json unknown = verdict_with({});
+  EXPECT_EQ(unknown["verdict"]["state"], "care");
+  EXPECT_TRUE(unknown["assumed"][0]["sigma"].is_null());
+  EXPECT_GT(unknown["assumed"][0]["moves"], 1.0);
+  EXPECT_THAT(unknown["verdict"]["sentence"].get<std::string>(), ::testing::HasSubstr("given without σ"));
+}
+
+/// Nothing but the side from which a flat target is seen tells that it, or the pictures, are mirrored.
+TEST_F(LocalizeCommand, AMirroredTargetIsAskedAbout) {
+  simulate({"--points", "30", "--frames", "60", "--rate", "30"});
+  std::vector<KnownPoint> points = read_target(path("sim/target.yaml"));
+  for (KnownPoint& point : points) point.point_in_world.x() *= -1.0;
+  write_file(path("mirrored.yaml"), target_text(points));
+  const Outcome asked = localize({"--target", path("mirrored.yaml"), "--json"});
+  ASSERT_EQ(asked.code, 0) << asked.err;
+  EXPECT_EQ(Json::parse(asked.out)["verdict"]["state"], "care");
+  EXPECT_THAT(asked.out, ::testing::HasSubstr("are they, or the pictures, mirrored?"));
+  write_file(path("mirrored.yaml"), target_text(points) + "seen_from: +z\n");
+  const Outcome meant = localize({"--target", path("mirrored.yaml"), "--json"});
+  EXPECT_EQ(meant.code, 0) << meant.err;
+  EXPECT_EQ(meant.out.find("mirrored?"), std::string::npos) << meant.out;
 }
 
 TEST_F(LocalizeCommand, RefusesWhatCannotBeTold) {
@@ -172,6 +209,8 @@ TEST_F(LocalizeCommand, SaysWhatIsWrongWithItsInput) {
   bad_file("--target", "points: [{id: 1, x_m: 0, y_m: 0, z_m: 0}, {id: 1, x_m: 1, y_m: 0, z_m: 0}]\n", "stands twice");
   bad_file("--target", "points: [{id: 1, x_m: .nan, y_m: 0, z_m: 0}]\n", "x_m");
   bad_file("--target", "rectangle: {width_m: 1, height_m: 1}\n", "is found in images");
+  bad_file("--target", "points: [{id: 1, x_m: 0, y_m: 0, z_m: 0}]\nseen_from: above\n", "is not +z or -z");
+  bad_file("--target", "board: {corners: 3x3, square_m: 1}\nseen_from: +z\n", "is of points");
   bad_file("--start", "position_m: [0, 0, 0]\nquaternion_wxyz: [2, 0, 0, 0]\n", "has the length 2, not 1");
   bad_file("--start", "position_m: [0, 0, 0]\nquaternion_wxyz: [1, 0, 0, 0]\nsigma_rate_rad_s: -1\n",
            "is not above zero");
@@ -207,13 +246,13 @@ TEST_F(LocalizeCommand, SurvivesMissingFramesAndUnknownPoints) {
   }
   write_file(path("gaps.csv"), text);
   const Outcome outcome = localize(told(), "gaps.csv");
-  ASSERT_EQ(outcome.code, 6) << outcome.err << "more than a tenth of the frames is lost";
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
   const Json document = Json::parse(outcome.out);
   EXPECT_EQ(document["estimate"]["frames"], 59);  // the last one is among the missing
   EXPECT_GE(document["estimate"]["lost"], 12);
-  EXPECT_EQ(document["verdict"]["state"], "bad");
+  EXPECT_NE(document["verdict"]["state"], "good");
   const Outcome skipped = localize(told({"--skip-bad"}), "gaps.csv");
-  EXPECT_EQ(skipped.code, 6) << skipped.err;
+  EXPECT_EQ(skipped.code, 0) << skipped.err;
 }
 
 }  // namespace

@@ -45,8 +45,10 @@ void for_each_of(const YAML::Node& list, const std::string& file, const std::str
   }
 }
 
-std::vector<KnownPoint> points_of(const YAML::Node& list, const std::string& file) {
-  std::vector<KnownPoint> points;
+TargetFile points_of(const YAML::Node& list, const std::string& file) {
+  TargetFile target;
+  target.is_scale_told = true;
+  std::vector<KnownPoint>& points = target.points;
   std::set<long> ids;
   for_each_of(list, file, "points", [&](const Fields& fields) {
     detail::refuse_unknown_keys(fields, {"id", "x_m", "y_m", "z_m", "sigma_m", "patch"}, "a point");
@@ -55,14 +57,15 @@ std::vector<KnownPoint> points_of(const YAML::Node& list, const std::string& fil
     if (!ids.insert(point.id).second) refuse(file, fields.full("id"), fmt::format("{} stands twice", point.id));
     point.point_in_world = {fields.number("x_m"), fields.number("y_m"), fields.number("z_m")};
     point.sigma_m = positive(fields, "sigma_m", 0.001);
+    target.is_scale_told = target.is_scale_told && fields.has("sigma_m");
     points.push_back(point);
   });
-  return points;
+  return target;
 }
 
-std::vector<KnownPoint> board_points_of(const YAML::Node& node, const std::string& file) {
+TargetFile board_points_of(const YAML::Node& node, const std::string& file) {
   const Fields fields(node, file, "board.");
-  detail::refuse_unknown_keys(fields, {"corners", "square_m", "sigma_m"}, "a board");
+  detail::refuse_unknown_keys(fields, {"corners", "square_m", "sigma_m", "sigma_square_m"}, "a board");
   Board board;
   char by = 0, end = 0;
   const std::string corners = fields.text("corners");
@@ -71,10 +74,13 @@ std::vector<KnownPoint> board_points_of(const YAML::Node& node, const std::strin
     refuse(file, "board.corners", fmt::format("'{}' is not like 9x6", corners));
   board.square_m = fields.number("square_m");
   if (!(board.square_m > 0.0)) refuse(file, "board.square_m", "is not above zero");
-  std::vector<KnownPoint> points;
+  TargetFile target;
+  target.is_board = true;
+  target.is_scale_told = fields.has("sigma_square_m");
+  target.sigma_scale = positive(fields, "sigma_square_m", 0.0) / board.square_m;
   for (const Eigen::Vector3d& point : points_in_board(board))
-    points.push_back({static_cast<long>(points.size()), point, positive(fields, "sigma_m", 0.001)});
-  return points;
+    target.points.push_back({static_cast<long>(target.points.size()), point, positive(fields, "sigma_m", 0.001)});
+  return target;
 }
 
 Eigen::Vector3d vector_or_zero(const Fields& fields, const std::string& key) {
@@ -106,18 +112,25 @@ std::vector<double> numbers_of(const Eigen::Vector3d& v) { return {v.x(), v.y(),
 
 }  // namespace
 
-std::vector<KnownPoint> read_target(const std::filesystem::path& file) {
+TargetFile read_target_file(const std::filesystem::path& file) {
   const std::string name = file.string();
   const YAML::Node root = detail::load_yaml(read_file(file), name);
   const Fields fields(root, name);
-  detail::refuse_unknown_keys(fields, {"points", "rectangle", "board"}, "a target");
+  detail::refuse_unknown_keys(fields, {"points", "rectangle", "board", "seen_from"}, "a target");
   if (fields.has("rectangle")) refuse(name, "rectangle", "is found in images; sights need 'points' or a 'board'");
   if (fields.has("points") == fields.has("board")) refuse(name, "points", "or 'board': one of them is needed");
-  std::vector<KnownPoint> points =
-      fields.has("board") ? board_points_of(root["board"], name) : points_of(root["points"], name);
-  if (points.empty()) refuse(name, "points", "has no points");
-  return points;
+  TargetFile target = fields.has("board") ? board_points_of(root["board"], name) : points_of(root["points"], name);
+  if (target.points.empty()) refuse(name, "points", "has no points");
+  if (fields.has("seen_from")) {
+    const std::string side = fields.text("seen_from");
+    if (side != "+z" && side != "-z") refuse(name, "seen_from", "is not +z or -z");
+    if (target.is_board) refuse(name, "seen_from", "is of points; a board is seen from its printed side");
+    target.seen_from_plus_z = side == "+z";
+  }
+  return target;
 }
+
+std::vector<KnownPoint> read_target(const std::filesystem::path& file) { return read_target_file(file).points; }
 
 std::string target_text(std::span<const KnownPoint> points) {
   std::string text = "# known points, in the frame of the map\npoints:\n";

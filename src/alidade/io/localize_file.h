@@ -28,7 +28,20 @@ struct SightsOptions {
 [[nodiscard]] SightsFile read_sights(const std::filesystem::path& file, const SightsOptions& options);
 [[nodiscard]] std::string sights_csv(std::span<const SightFrame> frames);
 
-/// Reads target.yaml: `points: [{id, x_m, y_m, z_m, sigma_m}]` or `board: {corners: 9x6, square_m}` (ids from 0).
+/// A target, and what is said of its size and its side.
+struct TargetFile {
+  std::vector<KnownPoint> points;
+  bool is_board = false;
+  bool is_scale_told = false;  ///< Each point has its σ, or the board's square has.
+  double sigma_scale = 0.0;    ///< Of a board's square, relative.
+  bool seen_from_plus_z = false;
+};
+
+/// Reads target.yaml: `points: [{id, x_m, y_m, z_m, sigma_m}]` or `board: {corners: 9x6, square_m, sigma_square_m}`
+/// (ids from 0). `seen_from: +z` says that the side of points in the plane of x and y which is seen is that of +z;
+/// without it is −z, as with a board's.
+[[nodiscard]] TargetFile read_target_file(const std::filesystem::path& file);
+/// Its points alone.
 [[nodiscard]] std::vector<KnownPoint> read_target(const std::filesystem::path& file);
 [[nodiscard]] std::string target_text(std::span<const KnownPoint> points);
 

@@ -73,10 +73,7 @@ bool ImageLocalizer::start(const cv::Mat& smoothed) {
   if (localize.start) {
     begin_at({{*localize.start}});
   } else if (seen) {
-    // The same sights follow as a measurement, with the points' own σ: what led here must not count twice.
-    constexpr double widened = 100.0;
-    for (StartHypothesis& from : seen->starts) from.cov.topLeftCorner<6, 6>() *= widened;
-    begin_at(seen->starts);
+    begin_at(only_where(seen->starts));  // the same sights follow as a measurement, with the points' own σ
   } else {
     StartHypothesis origin;
     constexpr double sure = 1e-6;  // the world is where the camera is; zero would leave no way to correct it

@@ -106,4 +106,13 @@ std::vector<StartHypothesis> poses_from_known(const Camera& camera, std::span<co
   return starts;
 }
 
+std::vector<StartHypothesis> only_where(std::vector<StartHypothesis> starts) {
+  constexpr double widened = 10.0;
+  for (StartHypothesis& start : starts) {
+    start.cov.topLeftCorner<6, 6>() *= widened * widened;
+    start.cost = 0.0;
+  }
+  return starts;
+}
+
 }  // namespace alidade

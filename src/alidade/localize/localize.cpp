@@ -8,6 +8,7 @@
 
 #include "alidade/localize/path_doubt.h"
 #include "alidade/localize/point_store.h"
+#include "alidade/localize/sight_record.h"
 #include "alidade/localize/summary.h"
 
 namespace alidade {
@@ -26,12 +27,15 @@ class Localizer {
   [[nodiscard]] std::size_t num_restarts() const { return num_restarts_; }
   [[nodiscard]] const PointStore& points() const { return points_; }
   [[nodiscard]] const RadialResiduals& residuals() const { return residuals_; }
+  [[nodiscard]] const SightRecord& record() const { return record_; }
+  [[nodiscard]] double period_s() const { return period_s_; }
 
  private:
   [[nodiscard]] std::vector<StartHypothesis> starts(const SightFrame& frame) const;
   [[nodiscard]] KnownPoseConfig pose_config() const {
     return {config_.filter.sigma_px, config_.sigma_speed_m_s, config_.sigma_rate_rad_s};
   }
+  [[nodiscard]] PathStep taken(const SightFrame& frame);
   bool start(const SightFrame& frame);
   void predict_to(double t_s);
   void add_new(const SightFrame& frame);
@@ -48,6 +52,8 @@ class Localizer {
   PathDoubt doubt_;
   int num_elsewhere_ = 0;  ///< Frames in a row in which the target says that the camera is somewhere else.
   RadialResiduals residuals_;
+  SightRecord record_;
+  std::size_t num_taken_ = 0;  ///< Frames.
   std::size_t num_restarts_ = 0;
 };
 
@@ -65,11 +71,13 @@ std::vector<StartHypothesis> Localizer::starts(const SightFrame& frame) const {
 }
 
 bool Localizer::start(const SightFrame& frame) {
-  const std::vector<StartHypothesis> from = starts(frame);
+  std::vector<StartHypothesis> from = starts(frame);
   if (from.empty()) return false;
+  if (!config_.start && !config_.target.empty()) from = only_where(std::move(from));
   bank_.emplace(camera_, from, config_.filter, config_.bank);
   for (const KnownPoint& point : config_.target) bank_->add_known(point.id, point.point_in_world, point.sigma_m);
   t_s_ = seen_s_ = frame.t_s;
+  record_.begin(num_taken_);
   return true;
 }
 
@@ -87,15 +95,18 @@ void Localizer::add_new(const SightFrame& frame) {
     if (bank_->best().has(sight.id)) continue;
     const auto prior = points_.prior_of(sight, bank_->best());
     if (!prior) continue;
-    bank_->add(sight.id, sight.px, *prior,
-               config_.new_points == NewPoints::xyz ? FeatureKind::xyz : FeatureKind::inverse_depth);
+    const FeatureKind kind = config_.new_points == NewPoints::xyz ? FeatureKind::xyz : FeatureKind::inverse_depth;
+    if (bank_->add(sight.id, sight.px, *prior, kind))
+      record_.entered(num_taken_, sight, *prior, config_.filter.sigma_px);
   }
 }
 
 /// Points that do not fit several times in a row leave; they may come again.
 void Localizer::drop_strangers(const SightFrame& frame, const SightsReport& report) {
   for (std::size_t i = 0; i < frame.sights.size(); ++i) {
-    if (points_.is_stranger(frame.sights[i].id, report.outcomes[i])) bank_->remove(frame.sights[i].id);
+    if (!points_.is_stranger(frame.sights[i].id, report.outcomes[i])) continue;
+    bank_->remove(frame.sights[i].id);
+    record_.left(frame.sights[i].id);
   }
 }
 
@@ -127,7 +138,8 @@ bool Localizer::restart(const SightFrame& frame, Doubt doubt) {
   for (const Feature& feature : bank_->best().features())
     if (!feature.is_known) unknown.push_back(feature.id);
   for (const long id : unknown) bank_->remove(id);
-  bank_->restart(from);
+  bank_->restart(only_where(from));
+  record_.begin(num_taken_);
   doubt_.clear();
   num_elsewhere_ = 0;
   ++num_restarts_;
@@ -153,6 +165,12 @@ void Localizer::fill(const SightFrame& frame, const SightsReport& report, PathSt
 }
 
 PathStep Localizer::take(const SightFrame& frame) {
+  PathStep step = taken(frame);
+  ++num_taken_;
+  return step;
+}
+
+PathStep Localizer::taken(const SightFrame& frame) {
   PathStep step;
   step.frame = frame.frame;
   step.t_s = frame.t_s;
@@ -169,12 +187,15 @@ PathStep Localizer::take(const SightFrame& frame) {
   }
   const SightsReport report = bank_->update(frame.sights);
   fill(frame, report, step);
+  record_.take(num_taken_, frame.sights, report.outcomes, config_.filter.sigma_px);
   residuals_.add(bank_->best(), frame.sights, report.outcomes);
   if (step.event == FrameEvent::tracked && step.num_tracked < least_sights) step.event = FrameEvent::predicted;
   const Doubt doubt = doubt_.after(step);
   drop_strangers(frame, report);
   if (config_.restarts && restart(frame, doubt)) {
-    fill(frame, bank_->update(frame.sights), step);
+    const SightsReport again = bank_->update(frame.sights);
+    fill(frame, again, step);
+    record_.take(num_taken_, frame.sights, again.outcomes, config_.filter.sigma_px);
     step.event = FrameEvent::restarted;
   }
   if (step.num_tracked >= least_sights || step.event == FrameEvent::started) add_new(frame);
@@ -207,6 +228,32 @@ LocalizeConfig sized(const LocalizeConfig& given, std::span<const SightFrame> fr
   config.filter.sights_capacity =
       std::min(config.filter.sights_capacity, static_cast<int>(std::min<std::size_t>(most, 1 << 20)));
   return config;
+}
+
+/// Errors that last from frame to frame by an autoregression of first order: so many fewer are independent.
+void enlarge(SmoothedPath& smoothed, const ResidualStructure& residuals) {
+  if (!residuals.has_colour()) return;
+  const double correlation = std::min(residuals.colour, 0.95), factor = (1.0 + correlation) / (1.0 - correlation);
+  for (auto& cov : smoothed.cov) cov *= factor;
+  for (auto& cov : smoothed.point_covs) cov *= factor;
+  smoothed.sigma_lens *= std::sqrt(factor);
+}
+
+/// The path since it began, from all that was seen of it. None where there is no scale, or it does not settle.
+std::optional<SmoothedPath> smooth(const Localizer& localizer, const LocalizeConfig& config, LocalizeReport& report) {
+  if (!config.smooths || !localizer.bank() || config.target.empty()) return std::nullopt;
+  const auto problem =
+      localizer.record().problem(report.camera, config, report.path, localizer.bank()->best(), localizer.period_s());
+  auto smoothed = problem ? smoothed_path(*problem) : std::nullopt;
+  if (!smoothed) return std::nullopt;
+  report.residuals = residual_structure(smoothed->residuals, report.camera.width_px, report.camera.height_px);
+  enlarge(*smoothed, report.residuals);
+  for (std::size_t k = 0; k < smoothed->cov.size(); ++k) {
+    PathStep& step = report.path[localizer.record().first_frame() + k];
+    step.world_from_cam = smoothed->world_from_cam[k];
+    step.cov = smoothed->cov[k];
+  }
+  return smoothed;
 }
 
 }  // namespace
@@ -245,9 +292,14 @@ LocalizeReport localize_sights(const Camera& camera, std::span<const SightFrame>
     if (config.inspect && localizer.bank()) config.inspect(localizer.bank()->best());
   }
   report.num_restarts = localizer.num_restarts();
+  const auto smoothed = smooth(localizer, config, report);
   sum_up(
       localizer.bank(), [&](long id) { return localizer.points().num_used(id); }, truth, report);
+  if (smoothed) take_over(*smoothed, report);
   report.known_shift = known_shift(report.map, config.target);
+  report.is_behind = is_behind(report.path, config.target, config.seen_from_plus_z);
+  report.is_board = config.is_board;
+  report.is_scale_told = config.is_scale_told;
   report.radial = localizer.residuals().structure();
   return report;
 }

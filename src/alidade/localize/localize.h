@@ -12,7 +12,9 @@
 #include "alidade/localize/filter_bank.h"
 #include "alidade/localize/known_pose.h"
 #include "alidade/localize/path_error.h"
+#include "alidade/localize/path_smoother.h"
 #include "alidade/localize/radial_residuals.h"
+#include "alidade/localize/residual_structure.h"
 
 namespace alidade {
 
@@ -69,7 +71,12 @@ struct LocalizeConfig {
   double depth_m = 0.0;      ///< Of points that are not in `depths`; 0: the target's distance.
   double sigma_depth = 0.5;  ///< Of those, over the depth.
   NewPoints new_points = NewPoints::inverse_depth;
-  bool restarts = true;  ///< From the target where the innovations say that the path is wrong.
+  bool smooths = true;        ///< With a target: the path is made anew from all sights once the last frame is there.
+  double sigma_scale = 0.0;   ///< Of the target's size, relative: counted.
+  bool is_scale_told = true;  ///< Whether that, or the σ of its points, is known.
+  bool is_board = false;      ///< The target is a printed board, which has one side.
+  bool seen_from_plus_z = false;  ///< The side from which told points are seen is said to be that of +z.
+  bool restarts = true;           ///< From the target where the innovations say that the path is wrong.
   double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;  ///< At a start from the target or from nothing.
   std::function<double()> seconds;                       ///< A clock, if frames are to be timed.
   std::function<void(const PathStep&)> watch;            ///< Is shown each step; what it throws ends the work.
@@ -104,12 +111,21 @@ struct LocalizeReport {
   Camera camera;               ///< As it is at the end.
   Eigen::VectorXd sigma_lens;  ///< Of the parameters that were estimated.
   PathError error;             ///< With truth.
+  bool is_scale_told = true, is_board = false;  ///< As in LocalizeConfig.
+  bool is_behind = false;          ///< Most poses are on the side of a flat target from which it is not seen.
+  ResidualStructure residuals;     ///< Of a smoothed path.
+  bool is_smoothed = false;        ///< Path and map are from all sights together, not each from those before it.
+  std::vector<GivenNumber> given;  ///< Of a smoothed path: what was given, and what it does.
+  double lens_pull = 0.0;          ///< Of a lens that was estimated: how far from what was told, in the told σ.
 };
 
 /// The path of a camera through all frames, in order of time, and the map of its points.
 [[nodiscard]] LocalizeReport localize_sights(const Camera& camera, std::span<const SightFrame> frames,
                                              const LocalizeConfig& config, std::span<const TimedPose> truth = {},
                                              const Progress& progress = {});
+
+/// What the path takes as given: the camera, and the target's scale.
+[[nodiscard]] std::vector<Assumption> localize_assumed(const LocalizeReport& report);
 
 /// Whether the path stands. A path that its sights contradict is never good.
 [[nodiscard]] Verdict localize_verdict(const LocalizeReport& report);

@@ -161,8 +161,13 @@ TEST(Localize, RecoversFromABlackout) {
     const LocalizeReport report = localize_sights(sample.camera, sample.frames, sample.config, sample.truth);
     EXPECT_EQ(report.num_lost, 30u);
     for (std::size_t k = 60; k < 90; ++k) EXPECT_EQ(report.path[k].event, FrameEvent::predicted);
-    EXPECT_GT(report.path[89].cov.trace(), 100.0 * report.path[59].cov.trace());  // it knows that it does not know
-    const PathStep& after = report.path[100];                                     // ten frames later
+    // It knows that it does not know: most in the middle, once the end is known, too.
+    EXPECT_GT(report.path[75].cov.trace(), 3.0 * report.path[59].cov.trace());
+    LocalizeConfig as_it_comes = sample.config;
+    as_it_comes.smooths = false;
+    const LocalizeReport filtered = localize_sights(sample.camera, sample.frames, as_it_comes);
+    EXPECT_GT(filtered.path[89].cov.trace(), 100.0 * filtered.path[59].cov.trace());
+    const PathStep& after = report.path[100];  // ten frames later
     const double error = (after.world_from_cam.translation - sample.truth[100].world_from_cam.translation).norm();
     const double before =
         (report.path[59].world_from_cam.translation - sample.truth[59].world_from_cam.translation).norm();

@@ -79,6 +79,57 @@ std::string restarts_text(const LocalizeReport& report) {
   return text;
 }
 
+/// Of what was given, the one of which the sights ask most: a wrong lens moves the others' scores, too.
+void add_given(const LocalizeReport& report, Verdict& verdict) {
+  const GivenNumber* worst = nullptr;
+  for (const GivenNumber& given : report.given)
+    if (worst == nullptr || std::abs(given.z) > std::abs(worst->z)) worst = &given;
+  constexpr double care_z = 4.5, bad_z = 15.0, least_move = 0.5;
+  if (worst != nullptr && std::abs(worst->asked * worst->moves) > least_move && std::abs(worst->z) > care_z) {
+    const bool is_relative = worst->name == "focal length" || worst->name == "scale of the target";
+    const bool is_px = worst->name.starts_with("centre");
+    const std::string size = is_relative ? text_of(100.0 * worst->asked, 2) + " %" : text_of(worst->asked, 2);
+    verdict.checks.push_back({"camera", state_of(std::abs(worst->z), care_z, bad_z),
+                              "the sights ask for another " + std::string(worst->name) + ", by " + size +
+                                  (is_px ? " px" : "") + " (" + text_of(std::abs(worst->z), 2) +
+                                  "σ): the camera file is not of this lens as it was used",
+                              std::abs(worst->z), care_z, "σ", "path"});
+  }
+  constexpr double care_pull = 3.0;
+  if (report.lens_pull > care_pull)
+    verdict.checks.push_back({"camera", State::care,
+                              "the lens came out " + text_of(report.lens_pull, 2) +
+                                  "σ from what was told: the camera file is not of this lens as it was used",
+                              report.lens_pull, care_pull, "σ", "path"});
+}
+
+/// Residuals that are said to be independent: by place in the picture, and from frame to frame.
+void add_residuals(const LocalizeReport& report, Verdict& verdict) {
+  if (!report.is_smoothed) return;
+  const ResidualStructure& residuals = report.residuals;
+  constexpr double care_px_share = 0.2;  // of σ: less is seen in long recordings and moves nothing
+  if (residuals.place_chi2 > 2.0 * residuals.place_limit && residuals.worst_px > care_px_share * report.sigma_px)
+    verdict.checks.push_back({"place in the picture", State::care,
+                              "residuals depend on the place in the picture, " + text_of(residuals.worst_px, 2) +
+                                  " px in the " + residuals.worst_place + ": the lens is not as told",
+                              residuals.place_chi2, 2.0 * residuals.place_limit, "1", "nis"});
+  if (residuals.has_colour())
+    verdict.checks.push_back({"colour", State::care,
+                              "errors last from frame to frame (correlation " + text_of(residuals.colour, 2) +
+                                  "): tracks drift, or something told is wrong; σ is enlarged for it",
+                              residuals.colour, 0.25, "1", "nis"});
+}
+
+void add_side(const LocalizeReport& report, Verdict& verdict) {
+  if (!report.is_behind) return;
+  verdict.checks.push_back({"side of the target", State::care,
+                            "the target's points are seen from behind (the camera is at their +z): are they, or the "
+                            "pictures, mirrored?",
+                            1.0, 0.0, "", "path"});
+  verdict.to_add =
+      "check that x goes right and y down as the target is seen; if +z is its front, say 'seen_from: +z' in --target";
+}
+
 void add_checks(const LocalizeReport& report, Verdict& verdict) {
   const double nis = report.nis_per_dof;
   const State nis_state = nis < good_nis_low ? State::care : state_of(nis, good_nis_high, care_nis);
@@ -122,6 +173,9 @@ void add_checks(const LocalizeReport& report, Verdict& verdict) {
   if (report.num_restarts > 0)
     verdict.checks.push_back({"restarts", State::care, restarts_text(report), static_cast<double>(report.num_restarts),
                               0.0, "times", "path"});
+  add_given(report, verdict);
+  add_residuals(report, verdict);
+  add_side(report, verdict);
   add_truth(report, verdict);
 }
 
@@ -157,6 +211,10 @@ Verdict localize_verdict(const LocalizeReport& report) {
                    "lost: " + std::to_string(report.num_lost) + " of " + std::to_string(num_frames) +
                        " frames have fewer than three points that fit",
                    "track more points, and keep the target in sight for longer");
+  if (report.is_behind && report.is_board)
+    return stopped(State::refused, ExitCode::cannot_tell,
+                   "mirrored: the sights put the camera behind the printed side of the board",
+                   "check that the pictures are not mirrored, and the order of the board's corners");
   Verdict verdict;
   add_checks(report, verdict);
   for (const Check& check : verdict.checks) verdict.state = std::max(verdict.state, check.state);
@@ -166,6 +224,7 @@ Verdict localize_verdict(const LocalizeReport& report) {
     if (check.state == State::good || (check.state != verdict.state && check.name != "scale")) continue;
     verdict.sentence += "; " + check.text;
   }
+  heed_assumptions(localize_assumed(report), verdict);
   return verdict;
 }
 

@@ -1,5 +1,6 @@
 #include "alidade/localize/summary.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -38,6 +39,37 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
     report.map.push_back({feature.id, place->point_in_world, place->cov, feature.is_known, num_used(feature.id)});
   }
   if (!truth.empty()) report.error = path_error(path, truth, report.scale_known, sigmas_m);
+}
+
+/// A flat target whose plane is that of x and y, and most poses on the side where it is not seen.
+bool is_behind(std::span<const PathStep> path, std::span<const KnownPoint> target, bool seen_from_plus_z) {
+  if (target.size() < 3) return false;
+  Eigen::AlignedBox3d box;
+  for (const KnownPoint& point : target) box.extend(point.point_in_world);
+  const Eigen::Vector3d size = box.sizes();
+  constexpr double flat = 0.05;
+  if (!(size.z() < flat * size.head<2>().maxCoeff())) return false;
+  double balance = 0.0;
+  for (const PathStep& step : path) {
+    if (!step.has_pose()) continue;
+    const bool is_plus = step.world_from_cam.translation.z() > box.center().z();
+    balance += is_plus == seen_from_plus_z ? -1.0 : 1.0;
+  }
+  return balance > 0.0;
+}
+
+void take_over(const SmoothedPath& smoothed, LocalizeReport& report) {
+  report.is_smoothed = true;
+  report.given = smoothed.given;
+  report.lens_pull = smoothed.lens_pull;
+  report.camera = smoothed.camera;
+  report.sigma_lens = smoothed.sigma_lens;
+  for (std::size_t i = 0; i < smoothed.ids.size(); ++i) {
+    const auto at = std::ranges::find(report.map, smoothed.ids[i], &MapPoint::id);
+    if (at == report.map.end()) continue;
+    at->point_in_world = smoothed.points[i];
+    at->cov = smoothed.point_covs[i];
+  }
 }
 
 double known_shift(std::span<const MapPoint> map, std::span<const KnownPoint> told) {

@@ -11,6 +11,13 @@ namespace alidade {
 void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& num_used,
             std::span<const TimedPose> truth, LocalizeReport& report);
 
+/// Whether most poses are on the side of a flat target, in the world's x and y, from which it is not seen: as where it
+/// or the pictures are mirrored. By the house's convention a target is seen from its −z.
+[[nodiscard]] bool is_behind(std::span<const PathStep> path, std::span<const KnownPoint> target, bool seen_from_plus_z);
+
+/// The map, and the lens, of a smoothed path.
+void take_over(const SmoothedPath& smoothed, LocalizeReport& report);
+
 /// Σ |ŷ − y|²/σ² over the known points of a map, per number: below 1 on average, as they are also held by what was
 /// told.
 [[nodiscard]] double known_shift(std::span<const MapPoint> map, std::span<const KnownPoint> told);

@@ -65,7 +65,8 @@ bool is_between_pixels(const Camera& camera, const Eigen::Vector2d& px) {
 Camera underwater_camera() {
   Calibrated<Brown> lens;
   lens.params << 768.0, 766.0, 389.0, 284.0, 0.0, -0.44881, 0.0664, 0.01316, 0.00218, 0.0;
-  return {768, 576, lens, {}, 0.0, "alidade simulate underwater"};
+  // Told exactly: its covariance is zero.
+  return {768, 576, lens, Eigen::MatrixXd::Zero(10, 10), 0.0, "alidade simulate underwater"};
 }
 
 std::optional<long> underwater_point_at(int corner) {

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "alidade/localize/filter_bank.h"
+
+namespace alidade {
+
+/// A sight that a filter used, or by which a point entered it.
+struct UsedSight {
+  std::size_t frame = 0;  ///< Index from the smoother's first.
+  long id = 0;
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  double sigma_px = 0.5;
+};
+
+struct SmootherPoint {
+  long id = 0;
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();  ///< To begin at.
+  std::optional<Eigen::Vector3d> told_in_world;              ///< Of a known point, with its σ of each coordinate.
+  double sigma_m = 0.001;
+  std::size_t first_frame = 0;      ///< Where its distance was believed to be
+  std::optional<RangePrior> range;  ///< this.
+};
+
+/// Where a point was seen, and that less where it is expected.
+struct PlacedResidual {
+  std::size_t frame = 0;
+  long id = 0;
+  Eigen::Vector2d px, residual_px;
+  double sigma_px = 0.5;
+};
+
+/// What a path is smoothed from. Frames follow each other without a break.
+struct SmootherProblem {
+  Camera camera;  ///< As told; its covariance is counted.
+  std::vector<double> t_s;
+  std::vector<Rigid3> world_from_cam;  ///< To begin at.
+  std::vector<UsedSight> sights;       ///< In order of frames.
+  std::vector<SmootherPoint> points;
+  std::optional<StartHypothesis> start;  ///< What was told of the first pose; else its speeds alone, zero with these σ:
+  double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;
+  double period_s = 1.0 / 30.0;     ///< Accelerations are drawn anew for each.
+  double sigma_scale = 0.0;         ///< Of the told points' common scale, counted and not estimated.
+  LocalizationFilterConfig filter;  /// σ of accelerations, the gate, and what of the lens is estimated.
+};
+
+/// Something that is taken as given: how it would move the path, and what the sights say of it (a score test: what one
+/// more free parameter would come to, by the linearisation that is there anyway).
+struct GivenNumber {
+  std::string_view name;        ///< "focal length", "centre u", "centre v", "k1", "scale of the target"
+  double moves = 0.0;           ///< Largest move of a pose's number for a whole unit (relative, px), in its σ,
+  std::string_view moved = {};  ///< which that is,
+  double moved_by = 0.0;        ///< and by how much [m or rad].
+  double asked = 0.0, z = 0.0;  ///< The change that the sights ask for, in units, and over its own σ.
+  std::optional<double> sigma;  ///< Counted, in units. None: not known.
+};
+
+/// Path, map and lens at the maximum of their common posterior, with its covariance; the lens's own covariance and the
+/// target's scale counted, where they are not estimated (S. F. Schmidt 1966: consider parameters).
+struct SmoothedPath {
+  std::vector<Rigid3> world_from_cam;
+  std::vector<Eigen::Matrix<double, 6, 6>> cov;  ///< Of the right perturbation.
+  std::vector<long> ids;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Matrix3d> point_covs;
+  Camera camera;
+  Eigen::VectorXd sigma_lens;  ///< Of those estimated.
+  double lens_pull = 0.0;      ///< How far an estimated number of the lens is from what was told, in the told σ.
+  std::vector<GivenNumber> given;
+  std::vector<PlacedResidual> residuals;
+  std::size_t num_dropped = 0;  ///< Sights beyond the gate once all was known.
+};
+
+/// All sights of a recording together: a filter's derivatives are those of its moment, when depths were vague, and what
+/// they say of the world's frame and scale differs from one to the next, so that certainty is gained that no sight
+/// gave. Here all are taken at one place, the solution. Gauss–Newton over poses, points and lens with the filter's own
+/// motion model; poses are eliminated one after another (pose_chain.h). None where it does not settle.
+[[nodiscard]] std::optional<SmoothedPath> smoothed_path(const SmootherProblem& problem);
+
+}  // namespace alidade

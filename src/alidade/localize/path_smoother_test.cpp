@@ -1,0 +1,184 @@
+#include "alidade/localize/path_smoother.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "alidade/localize/pose_chain.h"
+#include "alidade/testing/hover.h"
+
+namespace alidade {
+namespace {
+
+using testing::Hover;
+using testing::HoverLens;
+using testing::HoverRun;
+
+/// A chain of seven poses with a border of five, at random: all in one matrix, or pose by pose.
+TEST(PoseChain, EliminatedPoseByPoseIsTheWholeMatrixInverted) {
+  constexpr int num = 7, border = 5, all = 6 * num + border;
+  Draws draws(3);
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(all, all);
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(all);
+  PoseChain chain(border);
+  for (int k = 0; k < num; ++k) {
+    const int window = std::min(18, 6 * (num - k)), rows = 30;
+    Eigen::MatrixXd J(rows, window + border);
+    Eigen::VectorXd r(rows);
+    for (int i = 0; i < rows; ++i) {
+      r[i] = draws.normal();
+      for (int j = 0; j < window + border; ++j) J(i, j) = draws.normal();
+    }
+    const Eigen::MatrixXd JJ = J.transpose() * J;
+    const Eigen::VectorXd Jr = J.transpose() * r;
+    chain.A.topLeftCorner(window, window) += JJ.topLeftCorner(window, window);
+    chain.U.topRows(window) += JJ.topRightCorner(window, border);
+    chain.B += JJ.bottomRightCorner(border, border);
+    chain.a.head(window) += Jr.head(window);
+    chain.b += Jr.tail(border);
+    Eigen::MatrixXd P = Eigen::MatrixXd::Zero(window + border, all);  // where the window stands in the whole
+    P.block(0, 6 * k, window, window).setIdentity();
+    P.bottomRightCorner(border, border).setIdentity();
+    H += P.transpose() * JJ * P;
+    g += P.transpose() * Jr;
+    ASSERT_TRUE(chain.eliminate());
+  }
+  const Eigen::MatrixXd cov = H.inverse();
+  const Eigen::VectorXd x = cov * g;
+  const Eigen::MatrixXd B = chain.B.selfadjointView<Eigen::Lower>();
+  const Eigen::VectorXd x_border = B.llt().solve(chain.b);
+  EXPECT_LT((x_border - x.tail(border)).norm(), 1e-9);
+  EXPECT_NEAR(chain.gain() + x_border.dot(chain.b), x.dot(g), 1e-9);
+  const auto steps = chain.steps(x_border);
+  // The last of the border's numbers as one that is given: the others, and the poses, move with it.
+  const int solved = border - 1, rest = 6 * num + solved;
+  Eigen::MatrixXd J_border(border, 1);
+  J_border << -B.topLeftCorner(solved, solved).llt().solve(B.topRightCorner(solved, 1)), 1.0;
+  const Eigen::VectorXd J = -H.topLeftCorner(rest, rest).inverse() * H.topRightCorner(rest, 1);
+  const auto spread = chain.spread(B.inverse(), J_border);
+  for (int k = 0; k < num; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    EXPECT_LT((steps[at] - x.segment<6>(6 * k)).norm(), 1e-9);
+    EXPECT_LT((spread.cov[at] - cov.block<6, 6>(6 * k, 6 * k)).norm(), 1e-9);
+    EXPECT_LT((spread.J[at] - J.segment<6>(6 * k)).norm(), 1e-9);
+  }
+}
+
+LocalizeReport hover_localized(const HoverRun& run, const Camera& camera) {
+  LocalizeConfig config;
+  config.target = run.target;
+  return localize_sights(camera, run.frames, config, run.truth);
+}
+
+double mean_nees(const LocalizeReport& report, const HoverRun& run) {
+  double sum = 0.0;
+  for (std::size_t k = 0; k < report.path.size(); ++k)
+    sum += testing::pose_nees(report.path[k], run.truth[k].world_from_cam);
+  return sum / static_cast<double>(report.path.size());
+}
+
+/// All told right, by a simulator with lenses of its own. A run's error is mostly one draw of six numbers, that of the
+/// frame by the target's points: a mean over 16 scatters by √(2/6/16) = 0.14.
+TEST(SimpleCase, ThePoseIsAsGoodAsItsCovarianceSays) {
+  constexpr int num_seeds = 16;
+  for (const HoverLens lens : {HoverLens::brown, HoverLens::fisheye, HoverLens::port}) {
+    double nees = 0.0;
+    for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
+      const HoverRun run = testing::hovering({.lens = lens, .num_frames = 150}, 300 + seed);
+      const LocalizeReport report = hover_localized(run, run.camera);
+      EXPECT_TRUE(report.is_smoothed);
+      nees += mean_nees(report, run) / num_seeds;
+    }
+    EXPECT_GT(nees, 0.7) << static_cast<int>(lens);  // 2σ about 1
+    EXPECT_LT(nees, 1.3) << static_cast<int>(lens);
+  }
+}
+
+/// A camera drawn from its file's covariance: counted, the path's σ holds; unknown, it is many times too small.
+TEST(SimpleCase, TheLensesCovarianceIsCounted) {
+  constexpr int num_seeds = 16;
+  double counted = 0.0, ignored = 0.0;
+  Draws draws(77);
+  for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
+    const HoverRun run = testing::hovering({.num_frames = 90}, 500 + seed);
+    Camera told = run.camera;
+    Eigen::VectorXd values = params(told.lens), sigma = Eigen::VectorXd::Zero(values.size());
+    sigma.head<4>() << 4.0, 4.0, 3.0, 3.0;
+    sigma[5] = 0.004;  // k1
+    for (Eigen::Index i = 0; i < values.size(); ++i) values[i] += sigma[i] * draws.normal();
+    told.lens = with_params(told.lens, values);
+    ignored += mean_nees(hover_localized(run, told), run) / num_seeds;
+    told.cov = sigma.cwiseAbs2().asDiagonal();
+    counted += mean_nees(hover_localized(run, told), run) / num_seeds;
+  }
+  EXPECT_GT(counted, 0.7);
+  EXPECT_LT(counted, 1.3);
+  EXPECT_GT(ignored, 2.0 * counted);
+}
+
+bool has_state(const Verdict& verdict, State state, const std::string& text) {
+  return verdict.state == state && (verdict.sentence + verdict.to_add).find(text) != std::string::npos;
+}
+
+TEST(SimpleCase, ACameraWithoutCovarianceIsSaidAndNotGood) {
+  const HoverRun run = testing::hovering({.num_frames = 90}, 3);
+  const LocalizeReport report = hover_localized(run, run.camera);
+  EXPECT_TRUE(has_state(localize_verdict(report), State::care, "camera.f (relative) is given without σ"))
+      << localize_verdict(report).sentence;
+  // The check tells the truth: a focal length off by 0.3 % moves the path as much as it says.
+  const auto assumed = localize_assumed(report);
+  const auto focal = std::ranges::find(assumed, std::string("camera.f (relative)"), &Assumption::name);
+  ASSERT_NE(focal, assumed.end());
+  Camera longer = run.camera;
+  Eigen::VectorXd values = params(longer.lens);
+  values.head<2>() *= 1.003;
+  longer.lens = with_params(longer.lens, values);
+  const LocalizeReport moved = hover_localized(run, longer);
+  double most = 0.0;
+  for (std::size_t k = 0; k < report.path.size(); ++k) {
+    const PathStep &is = report.path[k], &was = moved.path[k];
+    const Rigid3 step = is.world_from_cam.inverse() * was.world_from_cam;
+    Eigen::Vector<double, 6> e;
+    e << step.translation, log_so3(step.rotation);
+    most = std::max(most, e.cwiseQuotient(is.cov.diagonal().cwiseSqrt()).cwiseAbs().maxCoeff());
+  }
+  EXPECT_NEAR(focal->moves / most, 1.0, 0.15);  // the target's points give way a little, in second order
+  Camera exact = run.camera;
+  exact.cov = Eigen::MatrixXd::Zero(10, 10);
+  EXPECT_EQ(localize_verdict(hover_localized(run, exact)).state, State::good)
+      << localize_verdict(hover_localized(run, exact)).sentence;
+}
+
+TEST(SimpleCase, AWrongLensIsNamed) {
+  const HoverRun run = testing::hovering({.num_frames = 90}, 4);
+  Camera wrong = run.camera;
+  wrong.cov = Eigen::MatrixXd::Zero(10, 10);
+  Eigen::VectorXd values = params(wrong.lens);
+  values.head<2>() *= 1.03;
+  wrong.lens = with_params(wrong.lens, values);
+  const Verdict verdict = localize_verdict(hover_localized(run, wrong));
+  EXPECT_NE(verdict.state, State::good);
+  EXPECT_NE(verdict.sentence.find("focal length"), std::string::npos) << verdict.sentence;
+}
+
+/// As a mirrored target, or a mirrored picture, leaves it.
+TEST(SimpleCase, ATargetSeenFromBehindIsAskedAbout) {
+  HoverRun run = testing::hovering({.num_frames = 60}, 5);
+  run.camera.cov = Eigen::MatrixXd::Zero(10, 10);
+  for (KnownPoint& point : run.target) point.point_in_world.x() *= -1.0;
+  LocalizeConfig config;
+  config.target = run.target;
+  const LocalizeReport report = localize_sights(run.camera, run.frames, config);
+  EXPECT_TRUE(report.is_behind);
+  const Verdict verdict = localize_verdict(report);
+  EXPECT_TRUE(has_state(verdict, State::care, "mirrored?")) << verdict.sentence;
+  config.is_board = true;
+  EXPECT_EQ(localize_verdict(localize_sights(run.camera, run.frames, config)).exit_code, ExitCode::cannot_tell);
+  config.is_board = false;
+  config.seen_from_plus_z = true;
+  EXPECT_FALSE(localize_sights(run.camera, run.frames, config).is_behind);
+}
+
+}  // namespace
+}  // namespace alidade

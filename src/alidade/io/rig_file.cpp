@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "alidade/io/camera_file.h"
@@ -35,7 +36,7 @@ std::string indented(const std::string& text, const std::string& margin) {
   return out;
 }
 
-std::string head_text(const RigHead& rig_head, const std::string& camera_file) {
+std::string head_text(const RigHead& rig_head, const EncoderError& error, const std::string& camera_file) {
   const Head& head = rig_head.head;
   const Encoder& encoder = head.encoder;
   std::string text = fmt::format("  - id: {}\n", head.id);
@@ -52,30 +53,37 @@ std::string head_text(const RigHead& rig_head, const std::string& camera_file) {
                       number_text(encoder.pan_zero_rad), number_text(encoder.tilt_zero_rad));
   if (encoder.pan_scale != 1.0) text += fmt::format("      pan_scale: {}\n", number_text(encoder.pan_scale));
   if (encoder.tilt_scale != 1.0) text += fmt::format("      tilt_scale: {}\n", number_text(encoder.tilt_scale));
+  if (error.sigma_zero_rad >= 0.0) text += fmt::format("      sigma_zero_rad: {}\n", number_text(error.sigma_zero_rad));
+  if (error.sigma_scale >= 0.0) text += fmt::format("      sigma_scale: {}\n", number_text(error.sigma_scale));
   return text + fmt::format("      sigma_rad: {}\n", number_text(encoder.sigma_rad));
 }
 
-/// Names of all parameters of all heads: "head1.base_x_m".
+/// Names of all parameters of all heads, "head1.base_x_m", and behind them those of their lenses, "head1.camera.fx".
 std::vector<std::string> covariance_names(const std::vector<RigHead>& heads) {
   std::vector<std::string> names;
   for (const RigHead& rig_head : heads)
     for (const char* name : head_param_names) names.push_back(fmt::format("head{}.{}", rig_head.head.id, name));
+  for (const RigHead& rig_head : heads)
+    for (const std::string& name : param_names(rig_head.camera.lens))
+      names.push_back(fmt::format("head{}.camera.{}", rig_head.head.id, name));
   return names;
 }
 
 /// What is held has zero rows, and is not written.
 std::string covariance_text(const Rig& rig) {
+  if (rig.cov.isZero(0.0)) return "covariance: exact\n";
   const std::vector<std::string> names = covariance_names(rig.heads);
+  const Eigen::MatrixXd& cov = rig.cov_with_lenses.size() > 0 ? rig.cov_with_lenses : rig.cov;
   std::vector<std::string> free_names;
   std::vector<Eigen::Index> free;
-  for (Eigen::Index i = 0; i < rig.cov.rows(); ++i) {
-    if (!(rig.cov(i, i) > 0.0)) continue;
+  for (Eigen::Index i = 0; i < cov.rows(); ++i) {
+    if (!(cov(i, i) > 0.0)) continue;
     free.push_back(i);
     free_names.push_back(names[static_cast<std::size_t>(i)]);
   }
   std::vector<double> upper;
   for (std::size_t i = 0; i < free.size(); ++i)
-    for (std::size_t j = i; j < free.size(); ++j) upper.push_back(rig.cov(free[i], free[j]));
+    for (std::size_t j = i; j < free.size(); ++j) upper.push_back(cov(free[i], free[j]));
   return fmt::format(
       "covariance:  # upper triangle, row by row; base and cam: small motions on the right\n"
       "  names: [{}]\n  upper: {}\n",
@@ -115,9 +123,27 @@ double scale_of(const Fields& fields, const std::string& key) {
   return scale;
 }
 
+/// A σ that may be left out: NaN.
+double sigma_of(const Fields& fields, const std::string& key) {
+  if (!fields.has(key)) return std::numeric_limits<double>::quiet_NaN();
+  const double sigma = fields.number(key);
+  if (!(sigma >= 0.0)) refuse(fields.file(), fields.full(key), "is below zero");
+  return sigma;
+}
+
+EncoderError encoder_error_of(const YAML::Node& head, const std::string& file, std::size_t index) {
+  const YAML::Node node = head["encoder"];
+  if (!node.IsDefined()) return {};
+  const Fields fields(node, file, fmt::format("heads[{}].encoder.", index));
+  return {sigma_of(fields, "sigma_zero_rad"), sigma_of(fields, "sigma_scale")};
+}
+
 Encoder encoder_of(const YAML::Node& node, const Fields& parent) {
   const Fields fields(node, parent.file(), parent.full("encoder."));
-  refuse_unknown_keys(fields, {"pan_zero_rad", "tilt_zero_rad", "pan_scale", "tilt_scale", "sigma_rad"}, "an encoder");
+  refuse_unknown_keys(fields,
+                      {"pan_zero_rad", "tilt_zero_rad", "pan_scale", "tilt_scale", "sigma_rad", "sigma_zero_rad",
+                       "sigma_scale"},
+                      "an encoder");
   Encoder encoder;
   encoder.pan_zero_rad = angle_of(fields, "pan_zero_rad");
   encoder.tilt_zero_rad = angle_of(fields, "tilt_zero_rad");
@@ -173,13 +199,26 @@ RigHead head_of(const YAML::Node& node, std::size_t index, const std::filesystem
   return read;
 }
 
+/// What a rig's covariance is: of the heads, or of heads and lenses where it names one of these.
+void read_rig_covariance(const YAML::Node& node, const Fields& fields, Rig& rig) {
+  const auto num = static_cast<Eigen::Index>(rig.heads.size()) * num_head_params;
+  if (node.IsScalar() && node.as<std::string>() == "exact") {
+    rig.cov.setZero(num, num);
+    return;
+  }
+  const Eigen::MatrixXd all = detail::read_covariance(node, fields, covariance_names(rig.heads), "these heads");
+  rig.cov = all.topLeftCorner(num, num);
+  if (!all.bottomRows(all.rows() - num).isZero(0.0)) rig.cov_with_lenses = all;
+}
+
 }  // namespace
 
 std::string rig_text(const Rig& rig, std::span<const std::string> camera_files) {
   std::string text = "# Pan-tilt heads; angle = scale * (reading - zero), pan > 0 left, tilt > 0 up\nheads:\n";
   for (std::size_t i = 0; i < rig.heads.size(); ++i)
-    text += head_text(rig.heads[i], i < camera_files.size() ? camera_files[i] : "");
-  return rig.cov.size() > 0 && !rig.cov.isZero(0.0) ? text + covariance_text(rig) : text;
+    text += head_text(rig.heads[i], i < rig.encoder_errors.size() ? rig.encoder_errors[i] : EncoderError{},
+                      i < camera_files.size() ? camera_files[i] : "");
+  return rig.cov.size() > 0 ? text + covariance_text(rig) : text;
 }
 
 Rig read_rig(const std::filesystem::path& file) {
@@ -193,13 +232,13 @@ Rig read_rig(const std::filesystem::path& file) {
   for (std::size_t i = 0; i < heads.size(); ++i) {
     const YAML::Node node = heads[i];
     rig.heads.push_back(head_of(node, i, file));
+    rig.encoder_errors.push_back(encoder_error_of(node, file.string(), i));
     for (std::size_t k = 0; k < i; ++k) {
       if (rig.heads[k].head.id == rig.heads[i].head.id)
         refuse(file.string(), fmt::format("heads[{}].id", i), fmt::format("{} stands twice", rig.heads[i].head.id));
     }
   }
-  if (fields.has("covariance"))
-    rig.cov = detail::read_covariance(root["covariance"], fields, covariance_names(rig.heads), "these heads");
+  if (fields.has("covariance")) read_rig_covariance(root["covariance"], fields, rig);
   return rig;
 }
 

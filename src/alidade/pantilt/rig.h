@@ -1,17 +1,28 @@
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "alidade/pantilt/head.h"
 
 namespace alidade {
 
+/// σ of a head's encoders beside its readings' noise, where a file gives it; NaN: not told, 0: exact.
+struct EncoderError {
+  double sigma_zero_rad = std::numeric_limits<double>::quiet_NaN();
+  double sigma_scale = std::numeric_limits<double>::quiet_NaN();
+};
+
 /// One head or more in one world: what `alidade rig` estimates and rig.yaml holds.
 struct Rig {
   std::vector<RigHead> heads;
   /// Covariance of the parameters of all heads, one head after the other, each as head_param_names (what is held has
-  /// zero rows); 0×0 where unknown.
+  /// zero rows); 0×0 where unknown, all zero where the heads are exact.
   Eigen::MatrixXd cov;
+  /// The same followed by the parameters of all lenses, head by head: what the heads share with the lenses that they
+  /// were calibrated through. 0×0 where that is not told; each lens then has its own camera's covariance.
+  Eigen::MatrixXd cov_with_lenses;
+  std::vector<EncoderError> encoder_errors;  ///< One a head, or none.
 };
 
 }  // namespace alidade

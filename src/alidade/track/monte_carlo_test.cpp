@@ -144,24 +144,7 @@ TrackScene scene_of_the_model(const Eigen::Vector3d& start, double sigma_a, std:
   scene.duration_s = 4.0;
   scene.aiming_lag_s = 0.03;
   scene.sigma_a_m_s2 = sigma_a;
-  Draws draws(seed + 77000);
-  const ConstantVelocity model{sigma_a};
-  const double q = model.density(), dt_s = 0.05;
-  Eigen::Vector3d p = start, v = 0.1 * draws.normal3();
-  std::vector<Eigen::Vector3d> path{p};
-  for (int k = 0; k < 81; ++k) {
-    const Eigen::Vector3d a = draws.normal3(), b = draws.normal3();
-    // The factor of [Δ³/3, Δ²/2; Δ²/2, Δ].
-    p += dt_s * v + std::sqrt(q * dt_s) * dt_s * (0.5 * a + b / std::sqrt(12.0));
-    v += std::sqrt(q * dt_s) * a;
-    path.push_back(p);
-  }
-  scene.position = [path, dt_s](double t_s) {
-    const double at = std::clamp(t_s / dt_s, 0.0, 80.999);
-    const auto i = static_cast<std::size_t>(at + 1e-9);
-    const double share = std::max(0.0, at - static_cast<double>(i));
-    return Eigen::Vector3d((1.0 - share) * path[i] + share * path[i + 1]);
-  };
+  scene.position = testing::drawn_path(start, sigma_a, scene.duration_s, seed);
   return scene;
 }
 

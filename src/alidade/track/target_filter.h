@@ -16,7 +16,7 @@ namespace alidade {
 /// A target that moves by one model.
 template <MotionModel Model>
 struct ModelFilter {
-  static constexpr bool can_smooth = true;
+  static constexpr bool can_smooth = true, considers = false;
   struct Models {
     Model motion;
     double start_sigma_rest = 1.0;  ///< Of what the state holds beyond position and velocity, at the start.
@@ -65,7 +65,7 @@ struct ModelFilter {
 
 /// A target that is now quiet, now agile.
 struct InteractingFilter {
-  static constexpr bool can_smooth = false;
+  static constexpr bool can_smooth = false, considers = false;
   using Models = InteractingModels;
   InteractingBelief belief;
 

@@ -64,6 +64,14 @@ class TrackEngine {
     }
   }
 
+  [[nodiscard]] std::optional<Tracker::Learned> learned() const {
+    if constexpr (requires(const Filter& filter) { filter.errors.u; }) {
+      if (count_ > 0 && newest().has_started)
+        return Tracker::Learned{newest().filter.errors.u, newest().filter.errors.C};
+    }
+    return std::nullopt;
+  }
+
  private:
   /// A sight, and how things stood after it.
   struct Entry {
@@ -177,11 +185,21 @@ class TrackEngine {
     if (!is_in_range(see.depth_m(position))) return TrackEvent::depth;
     const auto expected = see(position);
     if (!expected) return TrackEvent::depth;
-    step.innovation = now.filter.expect(*expected, now.sight.px);
-    step.has_innovation = true;
-    if (!(step.innovation.nis < config_.gate)) return TrackEvent::gated;
     const Filter prior = now.filter;
-    if (!now.filter.update(*expected, now.sight.px, see, config_.update)) return TrackEvent::gated;
+    if constexpr (Filter::considers) {
+      const auto effect = rig_error_effect(config_.errors.factor[now.sight.head], see.turned, *see.camera, position,
+                                           now.filter.velocity());
+      if (!effect) return TrackEvent::depth;
+      step.innovation = now.filter.expect(*expected, *effect, now.sight.px);
+      step.has_innovation = true;
+      if (!(step.innovation.nis < config_.gate)) return TrackEvent::gated;
+      if (!now.filter.update(*expected, *effect, now.sight.px, see, config_.update)) return TrackEvent::gated;
+    } else {
+      step.innovation = now.filter.expect(*expected, now.sight.px);
+      step.has_innovation = true;
+      if (!(step.innovation.nis < config_.gate)) return TrackEvent::gated;
+      if (!now.filter.update(*expected, now.sight.px, see, config_.update)) return TrackEvent::gated;
+    }
     if (!is_in_range(see.depth_m(now.filter.position()))) {
       now.filter = prior;
       return TrackEvent::depth;

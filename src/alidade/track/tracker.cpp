@@ -4,40 +4,57 @@
 #include <utility>
 #include <variant>
 
+#include "alidade/track/considered_filter.h"
 #include "alidade/track/target_filter.h"
 #include "alidade/track/track_engine.h"
 
 namespace alidade {
 namespace {
 
+/// Engines of a target that moves by one model: heads exact, their errors counted, their errors learned.
 template <class Model>
-using EngineOf = detail::TrackEngine<ModelFilter<Model>>;
-using Engine = std::variant<EngineOf<ConstantVelocity>, EngineOf<Singer>, EngineOf<CoordinatedTurn>,
-                            EngineOf<MeanReverting>, detail::TrackEngine<InteractingFilter>>;
+using Exact = detail::TrackEngine<ModelFilter<Model>>;
+template <class Model>
+using Counting = detail::TrackEngine<ConsideredFilter<Model>>;
+template <class Model>
+using Learning = detail::TrackEngine<ConsideredFilter<Model, LearnedErrors>>;
+using Engine =
+    std::variant<Exact<ConstantVelocity>, Exact<Singer>, Exact<CoordinatedTurn>, Exact<MeanReverting>,
+                 detail::TrackEngine<InteractingFilter>, Counting<ConstantVelocity>, Counting<Singer>,
+                 Counting<CoordinatedTurn>, Counting<MeanReverting>, detail::TrackEngine<ConsideredInteracting>,
+                 Learning<ConstantVelocity>, Learning<Singer>, Learning<CoordinatedTurn>, Learning<MeanReverting>>;
 
 constexpr double share_of_acceleration_beside_turning = 0.3, share_while_quiet = 0.15;
 constexpr double start_sigma_turn_rad_s = 1.0;
+
+template <class Model>
+Engine engine_of(std::vector<RigHead> heads, const TrackerConfig& config, const Model& motion, double sigma_rest) {
+  const int num = config.errors.num();
+  if (num == 0) return Exact<Model>(std::move(heads), config, {motion, sigma_rest});
+  if (config.learn_errors) return Learning<Model>(std::move(heads), config, {motion, sigma_rest, num});
+  return Counting<Model>(std::move(heads), config, {motion, sigma_rest, num});
+}
 
 Engine engine_for(std::vector<RigHead> heads, const TrackerConfig& config) {
   const double sigma_a = config.sigma_a_m_s2;
   const Singer singer{sigma_a, config.singer_tau_s};
   switch (config.method) {
     case TrackMethod::singer:
-      return EngineOf<Singer>(std::move(heads), config, {singer, sigma_a});
+      return engine_of(std::move(heads), config, singer, sigma_a);
     case TrackMethod::turn:
-      return EngineOf<CoordinatedTurn>(
-          std::move(heads), config,
-          {CoordinatedTurn{share_of_acceleration_beside_turning * sigma_a}, start_sigma_turn_rad_s});
+      return engine_of(std::move(heads), config, CoordinatedTurn{share_of_acceleration_beside_turning * sigma_a},
+                       start_sigma_turn_rad_s);
     case TrackMethod::resting:
-      return EngineOf<MeanReverting>(std::move(heads), config,
-                                     {MeanReverting{config.resting_sigma_v_m_s, config.resting_tau_s}});
-    case TrackMethod::imm:
-      return detail::TrackEngine<InteractingFilter>(
-          std::move(heads), config, InteractingModels{ConstantVelocity{share_while_quiet * sigma_a}, singer});
+      return engine_of(std::move(heads), config, MeanReverting{config.resting_sigma_v_m_s, config.resting_tau_s}, 1.0);
+    case TrackMethod::imm: {
+      const InteractingModels models{ConstantVelocity{share_while_quiet * sigma_a}, singer};
+      if (config.errors.num() == 0) return detail::TrackEngine<InteractingFilter>(std::move(heads), config, models);
+      return detail::TrackEngine<ConsideredInteracting>(std::move(heads), config, {models, config.errors.num()});
+    }
     case TrackMethod::cv:
       break;
   }
-  return EngineOf<ConstantVelocity>(std::move(heads), config, {ConstantVelocity{sigma_a}});
+  return engine_of(std::move(heads), config, ConstantVelocity{sigma_a}, 1.0);
 }
 
 }  // namespace
@@ -62,6 +79,10 @@ std::optional<Belief<6>> Tracker::at(double t_s) const {
 
 std::optional<Tracker::Smoothed> Tracker::smoothed(double lag_s) const {
   return std::visit([&](const auto& engine) { return engine.smoothed(lag_s); }, state_->engine);
+}
+
+std::optional<Tracker::Learned> Tracker::learned() const {
+  return std::visit([&](const auto& engine) { return engine.learned(); }, state_->engine);
 }
 
 std::optional<Eigen::Vector3d> nearest_to_rays(const WorldRay& a, const WorldRay& b) {

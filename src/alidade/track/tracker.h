@@ -8,6 +8,7 @@
 
 #include "alidade/estimation/interacting_models.h"
 #include "alidade/estimation/motion_models.h"
+#include "alidade/pantilt/rig_uncertainty.h"
 #include "alidade/track/sight.h"
 
 namespace alidade {
@@ -33,6 +34,10 @@ struct TrackerConfig {
   double start_sigma_v_m_s = 2.0;
   double history_s = 0.3;       ///< How late a sight may come.
   std::size_t most_kept = 256;  ///< Sights within history_s; older ones can then no longer be overtaken.
+  /// Of the heads, their lenses and clocks: counted in every σ, and not estimated (Schmidt–Kalman). None: all exact.
+  RigUncertainty errors;
+  /// Estimate the errors instead: for tests of the rig, whose innovations are then white. Not for imm, which counts.
+  bool learn_errors = false;
 };
 
 enum class TrackEvent {
@@ -79,6 +84,13 @@ class Tracker {
     Belief<6> belief;
   };
   [[nodiscard]] std::optional<Smoothed> smoothed(double lag_s) const;
+
+  /// u of the rig's errors as the sights tell it so far, and its covariance. None unless errors are learned.
+  struct Learned {
+    Eigen::VectorXd u;
+    Eigen::MatrixXd cov;
+  };
+  [[nodiscard]] std::optional<Learned> learned() const;
 
  private:
   struct State;

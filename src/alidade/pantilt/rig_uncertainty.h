@@ -1,0 +1,41 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "alidade/pantilt/rig.h"
+
+// What is taken from a rig file is not exact: its errors, in a form that estimators can count.
+
+namespace alidade {
+
+/// At most so many directions of error are counted; see rig_uncertainty().
+inline constexpr int most_rig_errors = 32;
+
+/// ∂ pixel / ∂ u of one sight.
+using RigErrorEffect = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, most_rig_errors>;
+
+/// The errors of a rig's heads, lenses and clocks as p = p̂ + factor[h] u, u ~ N(0, 1) of all heads together. The rows
+/// of a factor: the head's parameters (head_param_names), its lens' (param_names), the delay of its clock [s].
+struct RigUncertainty {
+  std::vector<Eigen::MatrixXd> factor;  ///< One a head; empty: nothing is uncertain.
+
+  [[nodiscard]] int num() const { return factor.empty() ? 0 : static_cast<int>(factor.front().cols()); }
+};
+
+/// Covariance of the heads' parameters, then of the lenses', all heads: what the rig says of them jointly, else heads
+/// and lenses by themselves; σ of zeros and scales of encoders where the rig's covariance holds these.
+[[nodiscard]] Eigen::MatrixXd joint_covariance(const Rig& rig);
+
+/// The errors of a rig whose clocks are right to σ_clock each. Directions that move no pixel are left out: of what
+/// remains, all but 0.01 px RMS over a working space of 0.5 to 12 m is kept, in at most most_rig_errors directions.
+[[nodiscard]] RigUncertainty rig_uncertainty(const Rig& rig, double sigma_clock_s = 0.0);
+
+/// ∂ pixel / ∂ u where a head (the one of `factor`) at these readings sees a point that moves so: a clock that lags by
+/// δ shows the target where it is δ later. None where the camera does not see it.
+[[nodiscard]] std::optional<RigErrorEffect> rig_error_effect(const Eigen::MatrixXd& factor, const TurnedHead& turned,
+                                                             const Camera& camera,
+                                                             const Eigen::Vector3d& point_in_world,
+                                                             const Eigen::Vector3d& velocity_in_world);
+
+}  // namespace alidade

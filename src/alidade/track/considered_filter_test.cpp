@@ -1,0 +1,178 @@
+#include "alidade/track/considered_filter.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+
+#include "alidade/geometry/decompositions.h"
+#include "alidade/testing/allocations.h"
+#include "alidade/testing/track_sample.h"
+#include "alidade/track/track.h"
+
+// Errors of heads, lenses and clocks that a tracker counts: against the same recursion written out for the state and
+// all errors, and against many draws of rigs that are off by what their covariance says.
+
+namespace alidade {
+namespace {
+
+using testing::sights_of;
+
+/// Two heads 0.5 m apart whose mountings, encoders and lenses are known as a calibration knows them: the range at 12 m
+/// to 5 %, beyond which no filter's Gaussian is one.
+Rig rig_with_errors() {
+  Rig rig;
+  const auto heads = track_scenario("A2")->heads;
+  rig.heads.assign(heads.begin(), heads.end());
+  HeadVector sigma = HeadVector::Zero();
+  sigma.segment<3>(0).setConstant(0.001);
+  sigma.segment<3>(3).setConstant(0.0008);
+  sigma.segment<6>(6).setConstant(0.001);
+  sigma.segment<3>(12).setConstant(0.0008);
+  sigma.segment<2>(15).setConstant(0.0004);
+  sigma.segment<2>(17).setConstant(0.001);
+  rig.cov.setZero(2 * num_head_params, 2 * num_head_params);
+  for (int h = 0; h < 2; ++h) rig.cov.diagonal().segment<num_head_params>(h * num_head_params) = sigma.cwiseAbs2();
+  for (RigHead& head : rig.heads) {
+    const auto num = params(head.camera.lens).size();
+    head.camera.cov.setZero(num, num);
+    head.camera.cov.diagonal().head<4>() << 1.0, 1.0, 1.5, 1.5;
+  }
+  return rig;
+}
+
+/// The heads as they might be where the file is off by what its covariance says.
+std::vector<RigHead> drawn_heads(const Rig& rig, Draws& draws) {
+  std::vector<RigHead> heads = rig.heads;
+  for (std::size_t h = 0; h < heads.size(); ++h) {
+    const auto own = rig.cov.diagonal().segment<num_head_params>(num_head_params * static_cast<Eigen::Index>(h));
+    HeadVector step;
+    for (int i = 0; i < num_head_params; ++i) step[i] = std::sqrt(own[i]) * draws.normal();
+    heads[h].head = retract(heads[h].head, step);
+    Eigen::VectorXd values = params(heads[h].camera.lens);
+    for (Eigen::Index i = 0; i < values.size(); ++i)
+      values[i] += std::sqrt(rig.heads[h].camera.cov(i, i)) * draws.normal();
+    heads[h].camera.lens = with_params(heads[h].camera.lens, values);
+  }
+  return heads;
+}
+
+TEST(ConsideredErrors, AgreeWithTheRecursionWrittenOut) {
+  const Rig rig = rig_with_errors();
+  const RigUncertainty errors = rig_uncertainty(rig, 0.004);
+  const int num = errors.num();
+  ASSERT_GT(num, 8);
+  const ConstantVelocity motion{1.0};
+  ConsideredFilter<ConstantVelocity> counted;
+  ConsideredFilter<ConstantVelocity, LearnedErrors> learned;
+  Belief<6> first;
+  first.x << 0.2, -0.1, 1.5, 0.3, -0.2, 0.1;
+  first.P.diagonal() << 0.04, 0.04, 0.09, 1.0, 1.0, 1.0;
+  counted.start({motion, 1.0, num}, first);
+  learned.start({motion, 1.0, num}, first);
+  Eigen::VectorXd x_counted = Eigen::VectorXd::Zero(6 + num), x_learned = x_counted;
+  x_counted.head(6) = x_learned.head(6) = first.x;
+  Eigen::MatrixXd P_counted = Eigen::MatrixXd::Identity(6 + num, 6 + num);
+  P_counted.topLeftCorner(6, 6) = first.P;
+  Eigen::MatrixXd P_learned = P_counted, F = Eigen::MatrixXd::Identity(6 + num, 6 + num), Q = 0.0 * F;
+  F.topLeftCorner(6, 6) = motion.transition_jacobian(first.x, 0.05);
+  Q.topLeftCorner(6, 6) = motion.noise(0.05);
+  Draws draws(5);
+  for (int k = 0; k < 20; ++k) {
+    const std::size_t head = static_cast<std::size_t>(k % 2);
+    const SightModel see(rig.heads[head], {0.1 * draws.normal(), 0.05 * draws.normal()}, 0.5, 0.001);
+    const auto one = [&](auto& filter, Eigen::VectorXd& x, Eigen::MatrixXd& P, bool learns) {
+      const auto seen = see(filter.position());
+      const auto effect =
+          rig_error_effect(errors.factor[head], see.turned, *see.camera, filter.position(), filter.velocity());
+      const Eigen::Vector2d z = seen->z + Eigen::Vector2d(0.4, -0.3);
+      Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2, 6 + num);
+      H.leftCols<3>() = seen->J_z_position;
+      H.rightCols(num) = *effect;
+      const Eigen::Matrix2d S = H * P * H.transpose() + seen->R;
+      Eigen::MatrixXd K = P * H.transpose() * S.inverse();
+      if (!learns) K.bottomRows(num).setZero();
+      const Eigen::Vector2d nu = z - seen->z - *effect * x.tail(num);
+      const Innovation told = filter.expect(*seen, *effect, z);
+      EXPECT_LT((told.S - S).norm(), 1e-9 * S.norm());
+      EXPECT_LT((told.nu - nu).norm(), 1e-9);
+      ASSERT_TRUE(filter.update(*seen, *effect, z, see, {.max_iterations = 1}));
+      x += K * nu;
+      const Eigen::MatrixXd A = Eigen::MatrixXd::Identity(6 + num, 6 + num) - K * H;
+      P = A * P * A.transpose() + K * seen->R * K.transpose();
+      EXPECT_LT((filter.own.belief.x - x.head(6)).norm(), 1e-9);
+      EXPECT_LT((filter.own.belief.P - P.topLeftCorner(6, 6)).norm(), 1e-9 * P.topLeftCorner(6, 6).norm());
+      EXPECT_LT((filter.cross - P.topRightCorner(6, num)).norm(), 1e-9 * P.topLeftCorner(6, 6).norm());
+      filter.predict({motion, 1.0, num}, 0.05);
+      x = F * x;
+      P = F * P * F.transpose() + Q;
+    };
+    one(counted, x_counted, P_counted, false);
+    one(learned, x_learned, P_learned, true);
+  }
+  EXPECT_LT((learned.errors.u - x_learned.tail(num)).norm(), 1e-9);
+  EXPECT_LT((learned.errors.C - P_learned.bottomRightCorner(num, num)).norm(), 1e-8);
+}
+
+struct Covered {
+  double counted = 0.0, exact = 0.0, smoothed = 0.0, nis_learned = 0.0;  ///< NEES/3 and NIS/2.
+};
+
+Covered covered_at(double range_m, TrackMethod method, int runs) {
+  const Rig rig = rig_with_errors();
+  Covered covered;
+  double num = 0.0, num_smoothed = 0.0;
+  for (int run = 0; run < runs; ++run) {
+    const auto seed = static_cast<std::uint64_t>(run) + 1;
+    Draws draws(seed + 5000);
+    TrackScene scene = *track_scenario("A2");
+    scene.duration_s = 3.0;
+    scene.aiming_lag_s = 0.03;
+    scene.sigma_a_m_s2 = 1.0;
+    scene.position = testing::drawn_path({0.2, -0.2, range_m}, 1.0, scene.duration_s, seed);
+    scene.heads = drawn_heads(rig, draws);
+    const auto sights = sights_of(scene, seed);
+    TrackConfig config;
+    config.find_sigma_a = false;
+    config.tracker.method = method;
+    config.tracker.max_depth_m = 60.0;
+    const TrueTrack truth = testing::truth_of(scene);
+    covered.exact += track_target(sights, rig.heads, config, truth).nees_per_dof / runs;
+    config.tracker.errors = rig_uncertainty(rig);
+    if (method != TrackMethod::imm) config.smooth_s = 0.2;
+    const TrackReport report = track_target(sights, rig.heads, config, truth);
+    covered.counted += report.nees_per_dof / runs;
+    for (const PredictedStep& step : report.smoothed) {
+      const auto position = truth.at(step.t_s);
+      if (!position || step.t_s < 0.5) continue;
+      const Eigen::Vector3d error = step.belief.x.head<3>() - *position;
+      covered.smoothed += squared_mahalanobis(error, Eigen::Matrix3d(step.belief.P.topLeftCorner<3, 3>())) / 3.0;
+      num_smoothed += 1.0;
+    }
+    config.tracker.learn_errors = true;
+    if (method == TrackMethod::imm) config.tracker.method = TrackMethod::cv;
+    covered.nis_learned += track_target(sights, rig.heads, config, truth).nis_per_dof / runs;
+    num += 1.0;
+  }
+  if (num_smoothed > 0.0) covered.smoothed /= num_smoothed;
+  return covered;
+}
+
+TEST(ConsideredErrors, AreCoveredAtAllRanges) {
+  for (const TrackMethod method : {TrackMethod::cv, TrackMethod::singer, TrackMethod::imm}) {
+    for (const double range_m : {1.0, 3.0, 6.0, 12.0}) {
+      const Covered covered = covered_at(range_m, method, 60);
+      // 60 rigs, three numbers each that hardly change during a run: ± 0.11.
+      EXPECT_NEAR(covered.counted, 1.0, 0.3) << method_name(method) << " at " << range_m << " m";
+      EXPECT_GT(covered.exact, 2.0) << method_name(method) << " at " << range_m << " m";
+      EXPECT_NEAR(covered.nis_learned, 1.0, 0.1) << method_name(method) << " at " << range_m << " m";
+      if (method != TrackMethod::imm) EXPECT_NEAR(covered.smoothed, 1.0, 0.35) << range_m;
+      RecordProperty("nees_" + std::string(method_name(method)) + std::to_string(static_cast<int>(range_m)),
+                     std::to_string(covered.counted) + " " + std::to_string(covered.exact) + " " +
+                         std::to_string(covered.smoothed) + " " + std::to_string(covered.nis_learned));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace alidade

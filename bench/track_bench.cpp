@@ -11,8 +11,22 @@
 namespace alidade::bench {
 namespace {
 
+/// Heads, lenses and encoders known as a calibration knows them: 32 directions of error, as many as are ever counted.
+RigUncertainty calibrated(const std::vector<RigHead>& heads) {
+  Rig rig;
+  rig.heads = heads;
+  const auto num = num_head_params * static_cast<Eigen::Index>(heads.size());
+  rig.cov = 1e-6 * Eigen::MatrixXd::Identity(num, num);
+  for (RigHead& head : rig.heads) {
+    const Eigen::Index size = params(head.camera.lens).size();
+    head.camera.cov.setZero(size, size);
+    head.camera.cov.diagonal().head<4>().setOnes();
+  }
+  return rig_uncertainty(rig, 1e-3);
+}
+
 /// Sights a second, as a camera would give them: gates, history and all. items/s is what the goal speaks of.
-void time_sights(benchmark::State& state, const std::string& scenario, TrackMethod method) {
+void time_sights(benchmark::State& state, const std::string& scenario, TrackMethod method, bool counts) {
   const TrackScene scene = *track_scenario(scenario);
   std::vector<TargetSight> sights;
   for (const SimulatedSight& s : simulate_track(scene, 1))
@@ -20,6 +34,8 @@ void time_sights(benchmark::State& state, const std::string& scenario, TrackMeth
   TrackerConfig config;
   config.method = method;
   config.sigma_a_m_s2 = scene.sigma_a_m_s2;
+  if (counts) config.errors = calibrated(scene.heads);
+  state.counters["errors"] = config.errors.num();
   for (auto _ : state) {
     Tracker tracker(scene.heads, config);
     for (const TargetSight& sight : sights) benchmark::DoNotOptimize(tracker.take(sight).belief.x[0]);
@@ -30,8 +46,11 @@ void time_sights(benchmark::State& state, const std::string& scenario, TrackMeth
 void add_all() {
   for (const TrackMethod method : {TrackMethod::cv, TrackMethod::singer, TrackMethod::turn, TrackMethod::imm}) {
     for (const std::string scenario : {"B", "C", "G"}) {
-      benchmark::RegisterBenchmark(("track/" + std::string(method_name(method)) + "/" + scenario).c_str(),
-                                   [=](benchmark::State& state) { time_sights(state, scenario, method); });
+      for (const bool counts : {false, true}) {
+        const std::string name = "track/" + std::string(method_name(method)) + "/" + scenario;
+        benchmark::RegisterBenchmark((name + (counts ? "/errors" : "")).c_str(),
+                                     [=](benchmark::State& state) { time_sights(state, scenario, method, counts); });
+      }
     }
   }
 }

@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -94,6 +95,35 @@ TEST_F(RigCommand, FromRenderedPhotosEndToEnd) {
   const Outcome outcome = calibrate(path("sim/views.csv"));
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   expect_near_truth(read_rig(path("out/rig.yaml")), read_rig(path("sim/truth_rig.yaml")), 0.20, 0.0035);
+}
+
+/// Two heads 0.5 m apart look straight ahead at a point 2 m away, half way between them: by hand.
+TEST_F(RigCommand, ProjectCountsTheErrorsOfHeadsAndLenses) {
+  const std::string camera = "{model: pinhole, width: 320, height: 240, fx: 400, fy: 400, cx: 160, cy: 120";
+  const auto heads = [&](const std::string& more) {
+    return "heads: [{id: 1, camera: " + camera + more + "}}, {id: 2, camera: " + camera + more +
+           "}, world_from_base: {translation_m: [0.5, 0, 0]}}]\n";
+  };
+  const auto projected = [&](const std::string& rig) {
+    write_file(path("rig.yaml"), rig);
+    const Outcome outcome = alidade({"project", "--rig", path("rig.yaml"), "--pan", "0", "--tilt", "0", "--point",
+                                     "0.25", "0", "2", "--json", "--no-report", "--out", path("p")});
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return Json::parse(outcome.out);
+  };
+  const Json none = projected(heads(""));
+  EXPECT_EQ(none["verdict"]["state"], "care");
+  EXPECT_THAT(none["verdict"]["sentence"].get<std::string>(), ::testing::HasSubstr("without covariance"));
+  // σ of 2 px in cx of the first lens, 0.001 rad in yaw of the second head.
+  const Json told = projected(heads(", covariance: {names: [cx], upper: [4]}") +
+                              "covariance: {names: [head2.base_ry_rad], upper: [1e-6]}\n");
+  EXPECT_EQ(told["verdict"]["state"], "good");
+  EXPECT_NEAR(told["estimate"]["heads"][0]["sigma_px"][0], 2.0, 1e-3);
+  // The second sees it 0.125 to the left: du = f (1 + 0.125²) dφ.
+  EXPECT_NEAR(told["estimate"]["heads"][1]["sigma_px"][0], std::hypot(2.0, 400.0 * 1.015625 * 0.001), 1e-3);
+  // Range: z = B f / (u1 − u2): σ_z = z²/(B f) σ(u1 − u2).
+  const double sigma_px = std::sqrt(4.0 + 4.0 + std::pow(0.40625, 2));
+  EXPECT_NEAR(told["stddev"]["point_in_world_m"][2], 4.0 / (0.5 * 400.0) * sigma_px, 2e-4);
 }
 
 TEST_F(RigCommand, ProjectPrintsMatricesAndPixels) {

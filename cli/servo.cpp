@@ -81,6 +81,23 @@ ServoStudy studied(const ServoScenario& scenario, live::ServoStream& stream, Liv
   return study;
 }
 
+/// A simulated loop is what its scenario says, exactly; what would be off in a real one is tried by --true-gain,
+/// --true-tau and the grid of robustness.
+std::vector<Assumption> assumed_of(const ServoScenario& scenario) {
+  const ServoScene& scene = scenario.scene;
+  std::vector<Assumption> assumed;
+  const auto exact = [&](std::string name, double value) {
+    assumed.push_back({.name = std::move(name), .value = value, .sigma = 0.0});
+  };
+  exact("plant.gain_factor", scene.mismatch.gain);
+  exact("plant.tau_factor", scene.mismatch.tau);
+  exact("latency_s", scene.latency_s);
+  exact("sigma_px", scene.sigma_px);
+  exact("sigma_encoder_rad", scene.sigma_encoder_rad);
+  for (const RigHead& head : scene.heads) exact(fmt::format("head{}.camera.fx", head.head.id), focal_of(head.camera));
+  return assumed;
+}
+
 ExitCode servo(const ServoArgs& args, Run& run) {
   run.add_input("scenario", args.scenario);
   const ServoScenarioFile read = read_servo_scenario(args.scenario);
@@ -93,7 +110,9 @@ ExitCode servo(const ServoArgs& args, Run& run) {
   Pace pace(args.real_time ? 1.0 : 0.0);
   const ServoStudy study = studied(scenario, stream, live, pace, run);
   run.lap("run");
-  const Verdict verdict = servo_verdict(scenario, study);
+  Verdict verdict = servo_verdict(scenario, study);
+  run.document.assumed = assumed_of(scenario);
+  if (verdict.exit_code == ExitCode::ok) heed_assumptions(run.document.assumed, verdict);
   fill_servo(scenario, study, run.document);
   summarize(study, run);
   if (args.real_time) tell_pace(pace, run);

@@ -121,6 +121,12 @@ TEST_F(ServoCommand, RefusesAnUnstableLoop) {
   refused_as("plant: {gain: -0.0567, unit: deg}\n", "unstable");
   refused_as("pi: {kp: 40, ki: 10, unit: px}\n", "unstable");
   refused_as("pi: {kp: 8, ki: 40, unit: px}\nlatency_s: 0.2\n", "loop of pi");
+  // A controller is tried with the plant as it is, whatever kind it is.
+  refused_as(
+      "plant: {kind: rate, gain: 1, unit: rad, tau_s: 0.05}\npredictive: {rate_gain_per_s: 100}\n"
+      "controllers: [feedforward]\n",
+      "loop of feedforward");
+  refused_as("mismatch: {gain: 5, tau: 1}\ncontrollers: [lqr, mpc]\n", "loop of lqr");
   // Nobody who leaves pi out is kept from running by it.
   EXPECT_EQ(servo("plant: {gain: 0.0567, unit: rad}\ncontrollers: [lqr]\nseeds: 1\n").code, 0);
 }

@@ -116,14 +116,26 @@ std::size_t add_events(const TrackScene& scene, Run& run) {
   return sights.size();
 }
 
+/// The simulated heads are exactly what the file says, and it says so.
+Rig exact_rig(const std::vector<RigHead>& heads) {
+  Rig rig;
+  rig.heads = heads;
+  const auto num = num_head_params * static_cast<Eigen::Index>(heads.size());
+  rig.cov.setZero(num, num);
+  for (RigHead& head : rig.heads) {
+    const Eigen::Index size = params(head.camera.lens).size();
+    head.camera.cov.setZero(size, size);
+  }
+  return rig;
+}
+
 ExitCode simulate_track_events(const SimulateTrackArgs& args, Run& run) {
   TrackScene scene = scene_of(args);
   if (!args.path.empty()) run.add_input("path", args.path);
   if (args.video) scene.sigma_encoder_rad = 0.0;
   const std::size_t num_sights = args.video ? add_frames(scene, args.sigma_angle, run) : add_events(scene, run);
   run.add_file("truth.csv", true_track_csv(truth_of(scene)));
-  Rig rig;
-  rig.heads = scene.heads;
+  const Rig rig = exact_rig(scene.heads);
   run.add_file("rig.yaml", rig_text(rig));
   run.document.estimate["sigma_a_m_s2"] = scene.sigma_a_m_s2;
   run.document.estimate["duration_s"] = scene.duration_s;

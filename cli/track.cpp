@@ -10,6 +10,7 @@
 #include "alidade/io/video_sights.h"
 #include "alidade/live/streams.h"
 #include "alidade/track/track.h"
+#include "alidade/track/track_assumed.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
 #include "cli/live.h"
@@ -25,14 +26,15 @@ struct TrackArgs {
   std::string target;
   double rate_hz = 0.0;
   std::string method = "cv";
+  std::vector<double> gravity_m_s2;
   bool corrected = false, skip_bad = false;
-  double sigma_a = 0.0;
+  double sigma_a = 0.0, sigma_px = 0.0, sigma_clock_s = 0.0;
   TrackConfig config;
   LiveOptions live;
 };
 
 TrackMethod method_of(const std::string& name) {
-  for (const TrackMethod method : {TrackMethod::singer, TrackMethod::turn, TrackMethod::imm})
+  for (const TrackMethod method : {TrackMethod::singer, TrackMethod::turn, TrackMethod::imm, TrackMethod::ballistic})
     if (method_name(method) == name) return method;
   return TrackMethod::cv;
 }
@@ -41,7 +43,12 @@ TrackConfig config_of(const TrackArgs& args) {
   TrackConfig config = args.config;
   config.tracker.method = method_of(args.method);
   config.find_sigma_a = !(args.sigma_a > 0.0);
+  if (args.sigma_px > 0.0) config.tracker.sigma_px = args.sigma_px;
   if (args.sigma_a > 0.0) config.tracker.sigma_a_m_s2 = args.sigma_a;
+  if (!args.gravity_m_s2.empty()) {
+    if (args.method != "ballistic") throw UsageError("--gravity: only with --method ballistic");
+    config.tracker.gravity_m_s2 = Eigen::Vector3d(args.gravity_m_s2.data());
+  }
   if (config.tracker.min_depth_m >= config.tracker.max_depth_m)
     throw UsageError("--min-depth: is not below --max-depth");
   if (config.smooth_s > 0.0 && (args.method == "imm" || args.method == "xiahou2015"))
@@ -172,10 +179,11 @@ TrueTrack truth_given(const TrackArgs& args, Run& run) {
 
 ExitCode track(const TrackArgs& args, Run& run) {
   check_inputs(args);
-  const TrackConfig config = config_of(args);
+  TrackConfig config = config_of(args);
   if (args.corrected && args.method != "xiahou2015") throw UsageError("--corrected: only with --method xiahou2015");
   run.add_input("rig", args.rig);
   const Rig rig = read_rig(args.rig);
+  config.tracker.errors = rig_uncertainty(rig, args.sigma_clock_s);
   const TrueTrack truth = truth_given(args, run);
   LiveRun live(args.live, run);
   const live::TrackStream stream(rig.heads, truth);
@@ -184,7 +192,13 @@ ExitCode track(const TrackArgs& args, Run& run) {
   const EventsFile events = sights_given(args, rig, live.progress(), run);
   if (events.sights.empty()) return live.finish(never_seen());
   run.lap("read");
-  const auto [report, verdict] = follow(args, events.sights, rig.heads, config, truth, stream, live, run);
+  auto [report, verdict] = follow(args, events.sights, rig.heads, config, truth, stream, live, run);
+  if (args.method != "xiahou2015" && verdict.exit_code == ExitCode::ok) {
+    run.document.assumed = track_assumed(
+        events.sights, rig, config, report,
+        {.sigma_px = args.sigma_px > 0.0, .sigma_a = args.sigma_a > 0.0, .sigma_clock_s = args.sigma_clock_s});
+    heed_assumptions(run.document.assumed, verdict);
+  }
   run.lap("verdict");
   run.document.counts.given = events.skipped.size();
   run.document.counts.skipped = events.skipped;
@@ -212,10 +226,17 @@ void add_options(CLI::App& command, TrackArgs& args) {
   command.add_option("--truth", args.truth, "True path, CSV: t_s,x_m,y_m,z_m; adds errors, NEES and the bound")
       ->type_name("FILE");
   command
-      .add_option("--method", args.method,
-                  "Motion of the target: cv (constant velocity), singer, turn, imm; or the filter of xiahou2015")
-      ->check(CLI::IsMember({"cv", "singer", "turn", "imm", "xiahou2015"}))
+      .add_option(
+          "--method", args.method,
+          "Motion of the target: cv (constant velocity), singer, turn, imm, ballistic (free fall); or the filter "
+          "of xiahou2015")
+      ->check(CLI::IsMember({"cv", "singer", "turn", "imm", "ballistic", "xiahou2015"}))
       ->capture_default_str();
+  command
+      .add_option("--gravity", args.gravity_m_s2,
+                  "With ballistic: gravity in the rig's world [m/s2] (default: 0 9.80665 0, the first camera level)")
+      ->expected(3)
+      ->check(finite_number());
   command.add_flag("--corrected", args.corrected, "With xiahou2015: pixels and mounting corrected, else as printed");
   command.add_option("--predict", args.config.predict_s, "Rows so far ahead of each event [s]")
       ->check(positive_number());
@@ -228,7 +249,12 @@ void add_options(CLI::App& command, TrackArgs& args) {
   const auto number = [&](const char* name, double& value, const char* help) {
     command.add_option(name, value, help)->check(positive_number())->capture_default_str();
   };
-  number("--sigma-px", args.config.tracker.sigma_px, "σ of the target's pixel coordinate [px]");
+  command.add_option("--sigma-px", args.sigma_px, "σ of the target's pixel coordinate [px] (default 0.5)")
+      ->check(positive_number());
+  command
+      .add_option("--sigma-clock", args.sigma_clock_s,
+                  "σ of the delay between a head's clock and its pictures [s], counted in every σ (default: exact)")
+      ->check(positive_number());
   number("--sigma-angle", args.config.tracker.sigma_encoder_rad, "σ of an encoder of which the rig says none [rad]");
   number("--min-depth", args.config.tracker.min_depth_m, "Working range, nearest [m]");
   number("--max-depth", args.config.tracker.max_depth_m, "Working range, furthest [m]");

@@ -93,6 +93,39 @@ TEST_F(TrackCommand, AWrongCameraIsSeenByTheTruth) {
   }
 }
 
+TEST_F(TrackCommand, WhatARigDoesNotSayOfItsErrorsIsAssumed) {
+  simulate("C");
+  const Json exact = Json::parse(track({"--json"}).out);
+  EXPECT_EQ(exact["verdict"]["state"], "good") << exact["verdict"]["sentence"];
+  std::string rig = read_file(path("sim/rig.yaml"));
+  ASSERT_NE(rig.find("covariance: exact"), std::string::npos);
+  rig.erase(rig.find("covariance: exact"));
+  write_file(path("sim/rig.yaml"), rig);
+  const Outcome outcome = track({"--json"});
+  EXPECT_EQ(outcome.code, 0);
+  const Json unknown = Json::parse(outcome.out);
+  EXPECT_EQ(unknown["verdict"]["state"], "care");
+  EXPECT_THAT(unknown["verdict"]["sentence"].get<std::string>(), ::testing::HasSubstr("given without σ"));
+  // 0.5 % of a scale that is read at φ turns a ray by 0.005 φ.
+  bool has_scale = false;
+  for (const Json& what : unknown["assumed"]) has_scale = has_scale || what["name"] == "head1.pan_scale";
+  EXPECT_TRUE(has_scale);
+}
+
+TEST_F(TrackCommand, ErrorsThatARigStatesWidenSigma) {
+  simulate("B");
+  const Json exact = Json::parse(track({"--json"}).out);
+  std::string rig = read_file(path("sim/rig.yaml"));
+  const std::size_t at = rig.find("covariance: exact");
+  rig.replace(at, std::string::npos, "covariance: {names: [head2.base_ry_rad], upper: [4e-6]}\n");
+  write_file(path("sim/rig.yaml"), rig);
+  const Json wide = Json::parse(track({"--json"}).out);
+  EXPECT_TRUE(wide["estimate"]["rig_errors_counted"].get<bool>());
+  // Rays 0.5 m apart that meet 0.64 m away: 2 mrad of one moves the meeting by about 0.64²/0.5 · 0.002 = 1.6 mm.
+  const double sigma = wide["stddev"]["position_m"][2], noise = exact["stddev"]["position_m"][2];
+  EXPECT_NEAR(std::sqrt(sigma * sigma - noise * noise), 0.0016, 0.0006);
+}
+
 TEST_F(TrackCommand, PredictsAhead) {
   simulate("B");
   ASSERT_EQ(track({"--predict", "0.1"}).code, 0);

@@ -119,6 +119,25 @@ Belief<6> ConstantVelocity::predicted(const Belief<6>& belief, double dt_s) cons
   return next;
 }
 
+Eigen::Vector<double, 6> Ballistic::transition(const Eigen::Vector<double, 6>& x, double dt_s) const {
+  Eigen::Vector<double, 6> later = ConstantVelocity{sigma_a_m_s2}.transition(x, dt_s);
+  later.head<3>() += 0.5 * dt_s * dt_s * gravity_m_s2;
+  later.tail<3>() += dt_s * gravity_m_s2;
+  return later;
+}
+
+Eigen::Matrix<double, 6, 6> Ballistic::transition_jacobian(const Eigen::Vector<double, 6>& x, double dt_s) const {
+  return ConstantVelocity{sigma_a_m_s2}.transition_jacobian(x, dt_s);
+}
+
+Eigen::Matrix<double, 6, 6> Ballistic::noise(double dt_s) const { return ConstantVelocity{sigma_a_m_s2}.noise(dt_s); }
+
+Belief<6> Ballistic::predicted(const Belief<6>& belief, double dt_s) const {
+  Belief<6> later = ConstantVelocity{sigma_a_m_s2}.predicted(belief, dt_s);
+  later.x = transition(belief.x, dt_s);
+  return later;
+}
+
 Eigen::Vector<double, 6> MeanReverting::transition(const Eigen::Vector<double, 6>& x, double dt_s) const {
   const double decay = std::exp(-dt_s / tau_s);
   Eigen::Vector<double, 6> next;

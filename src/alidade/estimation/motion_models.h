@@ -35,6 +35,18 @@ struct ConstantVelocity {
   [[nodiscard]] Belief<6> predicted(const Belief<6>& belief, double dt_s) const;
 };
 
+/// Free fall: constant velocity, and beside its noise the acceleration of gravity, known in the caller's frame.
+struct Ballistic {
+  static constexpr int dim = 6;
+  double sigma_a_m_s2 = 1.0;                           ///< Of what is not gravity: drag, above all.
+  Eigen::Vector3d gravity_m_s2 = {0.0, 9.80665, 0.0};  ///< Where y is down.
+
+  [[nodiscard]] Eigen::Vector<double, 6> transition(const Eigen::Vector<double, 6>& x, double dt_s) const;
+  [[nodiscard]] Eigen::Matrix<double, 6, 6> transition_jacobian(const Eigen::Vector<double, 6>& x, double dt_s) const;
+  [[nodiscard]] Eigen::Matrix<double, 6, 6> noise(double dt_s) const;
+  [[nodiscard]] Belief<6> predicted(const Belief<6>& belief, double dt_s) const;
+};
+
 /// Velocity that returns to rest: dv = −v/τ dt + noise that holds its σ at σ_v. (Ornstein–Uhlenbeck.)
 struct MeanReverting {
   static constexpr int dim = 6;
@@ -73,7 +85,7 @@ struct CoordinatedTurn {
   [[nodiscard]] Belief<9> predicted(const Belief<9>& belief, double dt_s) const;
 };
 
-static_assert(MotionModel<ConstantVelocity> && MotionModel<MeanReverting> && MotionModel<Singer> &&
-              MotionModel<CoordinatedTurn>);
+static_assert(MotionModel<ConstantVelocity> && MotionModel<Ballistic> && MotionModel<MeanReverting> &&
+              MotionModel<Singer> && MotionModel<CoordinatedTurn>);
 
 }  // namespace alidade

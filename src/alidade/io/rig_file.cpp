@@ -140,10 +140,10 @@ EncoderError encoder_error_of(const YAML::Node& head, const std::string& file, s
 
 Encoder encoder_of(const YAML::Node& node, const Fields& parent) {
   const Fields fields(node, parent.file(), parent.full("encoder."));
-  refuse_unknown_keys(fields,
-                      {"pan_zero_rad", "tilt_zero_rad", "pan_scale", "tilt_scale", "sigma_rad", "sigma_zero_rad",
-                       "sigma_scale"},
-                      "an encoder");
+  refuse_unknown_keys(
+      fields,
+      {"pan_zero_rad", "tilt_zero_rad", "pan_scale", "tilt_scale", "sigma_rad", "sigma_zero_rad", "sigma_scale"},
+      "an encoder");
   Encoder encoder;
   encoder.pan_zero_rad = angle_of(fields, "pan_zero_rad");
   encoder.tilt_zero_rad = angle_of(fields, "tilt_zero_rad");

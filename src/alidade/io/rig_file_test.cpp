@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "alidade/io/camera_file.h"
+#include "alidade/pantilt/rig_uncertainty.h"
 #include "alidade/testing/random.h"
 #include "alidade/testing/temporary_folder.h"
 
@@ -114,6 +117,34 @@ TEST_F(RigFile, SaysWhatIsWrongInOneLine) {
   expect(cov + "{names: [head2.base_x_m], upper: [1]}\n", "'head2.base_x_m' is no parameter of these heads");
   expect(cov + "{names: [head1.base_x_m], upper: [1, 2]}\n", "2 numbers are not the upper triangle of 1");
   EXPECT_NE(refusal("heads: [{camera: none.yaml}]\n").find("none.yaml"), std::string::npos);
+}
+
+TEST_F(RigFile, SaysWhatIsExactAndWhatHeadsShareWithLenses) {
+  Rig rig;
+  for (RigHead& head : xiahou_rig()) rig.heads.push_back(head);
+  rig.cov.setZero(2 * num_head_params, 2 * num_head_params);
+  Rig read = read_rig(write(rig_text(rig, {})));
+  EXPECT_EQ(read.cov.rows(), 2 * num_head_params);
+  EXPECT_TRUE(read.cov.isZero(0.0));
+  EXPECT_EQ(read.cov_with_lenses.size(), 0);
+  EXPECT_TRUE(std::isnan(read.encoder_errors[0].sigma_scale));
+
+  const Eigen::Index lens = params(rig.heads[0].camera.lens).size(), size = 2 * num_head_params + 2 * lens;
+  rig.cov_with_lenses.setZero(size, size);
+  const std::array<Eigen::Index, 3> at{4, 24, 2 * num_head_params + lens};  // a turn of each base, the second's fx
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) rig.cov_with_lenses(at[i], at[j]) = i == j ? 2.0 : 0.5;
+  rig.cov = rig.cov_with_lenses.topLeftCorner(2 * num_head_params, 2 * num_head_params);
+  rig.encoder_errors = {{0.001, 0.002}, {}};
+  read = read_rig(write(rig_text(rig, {})));
+  EXPECT_EQ(read.cov_with_lenses, rig.cov_with_lenses);
+  EXPECT_EQ(read.cov, rig.cov);
+  EXPECT_EQ(read.encoder_errors[0].sigma_zero_rad, 0.001);
+  EXPECT_EQ(read.encoder_errors[0].sigma_scale, 0.002);
+  const Eigen::MatrixXd joint = joint_covariance(read);
+  EXPECT_EQ(joint(15, 15), 1e-6);  // pan zero
+  EXPECT_EQ(joint(17, 17), 4e-6);  // pan scale
+  EXPECT_EQ(joint(at[0], at[2]), 0.5);
 }
 
 }  // namespace

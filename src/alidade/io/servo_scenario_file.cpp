@@ -286,7 +286,9 @@ ServoScenarioFile read_servo_scenario(const std::filesystem::path& file) {
   ServoScenarioFile read;
   if (top.has("rig")) {
     read.rig = file.parent_path() / top.text("rig");
-    read.scenario.scene.heads = read_rig(read.rig).heads;
+    const Rig rig = read_rig(read.rig);
+    read.scenario.scene.heads = rig.heads;
+    read.scenario.scene.rig_errors = rig_uncertainty(rig);
   }
   read_target(root, top, read, file.parent_path());
   read_plant(root, top, read.scenario);

@@ -122,6 +122,32 @@ DataTable measurements_table(std::span<const TargetSight> sights, std::span<cons
   return table;
 }
 
+/// Of each head: how many, their mean, mean along the motion, slope over the picture and colour, in σ of each.
+DataTable innovations_table(std::span<const RigHead> heads, const TrackReport& report) {
+  Numbers head, num, mean_u, mean_v, along, place_u, place_v, colour, nis;
+  for (std::size_t h = 0; h < report.innovations.size(); ++h) {
+    const HeadInnovations& of = report.innovations[h];
+    head.push_back(heads[h].head.id);
+    num.push_back(static_cast<double>(of.num));
+    mean_u.push_back(of.mean.x());
+    mean_v.push_back(of.mean.y());
+    along.push_back(of.along);
+    place_u.push_back(of.place.x());
+    place_v.push_back(of.place.y());
+    colour.push_back(of.colour);
+    nis.push_back(of.nis_per_dof);
+  }
+  DataTable table{"innovations", {{"head", head}, {"num", num}}};
+  table.columns.emplace_back("mean_u_sigma", rounded(std::move(mean_u), 4));
+  table.columns.emplace_back("mean_v_sigma", rounded(std::move(mean_v), 4));
+  table.columns.emplace_back("along_motion_sigma", rounded(std::move(along), 4));
+  table.columns.emplace_back("slope_u_sigma", rounded(std::move(place_u), 4));
+  table.columns.emplace_back("slope_v_sigma", rounded(std::move(place_v), 4));
+  table.columns.emplace_back("colour", rounded(std::move(colour), 4));
+  table.columns.emplace_back("nis_per_dof", rounded(std::move(nis), 4));
+  return table;
+}
+
 }  // namespace
 
 void fill_track(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackReport& report,
@@ -139,6 +165,8 @@ void fill_track(std::span<const TargetSight> sights, std::span<const RigHead> he
   estimate["sigma_a_m_s2"] = report.sigma_a_m_s2;
   estimate["sigma_a_is_estimated"] = report.sigma_a_is_found;
   estimate["restarts"] = report.num_restarts;
+  estimate["rig_errors_counted"] = report.errors_are_counted;
+  estimate["sigma_raised_by"] = std::sqrt(report.inflation);
   if (!report.steps.empty() && report.steps.back().has_belief) {
     const Belief<6>& last = report.steps.back().belief;
     estimate["position_m"] = Numbers(last.x.data(), last.x.data() + 3);
@@ -152,6 +180,7 @@ void fill_track(std::span<const TargetSight> sights, std::span<const RigHead> he
     }
   }
   add_track_tables(sights, heads, report, truth, document);
+  if (!report.innovations.empty()) document.data.push_back(innovations_table(heads, report));
 }
 
 void add_track_tables(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackReport& report,

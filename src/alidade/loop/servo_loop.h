@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "alidade/estimation/progress.h"
+#include "alidade/pantilt/rig_uncertainty.h"
 #include "alidade/servo/head_servo.h"
 #include "alidade/simulate/servo.h"
 
@@ -24,6 +25,7 @@ struct PlantMismatch {
 /// commands sent each period; a picture is known `latency_s` after it was taken.
 struct ServoScene {
   std::vector<RigHead> heads;       ///< Their encoders' σ is that of the readings.
+  RigUncertainty rig_errors;        ///< What the rig's file says of its own; `track` counts it.
   std::array<ServoAxis, 2> axes{};  ///< (pan, tilt) of every head, as known.
   PlantMismatch mismatch;
   TargetPath path;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "alidade/servo/axis_settling.h"
+
 namespace alidade {
 namespace {
 
@@ -27,17 +29,20 @@ Verdict unstable(const ServoScenario& scenario, const LoopCheck& loop) {
   const double focal_px = focal_of(scenario.scene.heads[0].camera);
   const ServoPlant other = in_other_unit(plant);
   const LoopAnalysis as_other =
-      analysed(other, scenario.config.pi.per_rad(focal_px), scenario.scene.period_s, loop.delay_samples);
+      analysed(other, scenario.config.pi.per_rad(focal_px), scenario.scene.period_s, std::max(0, loop.delay_samples));
   Verdict verdict;
   verdict.state = State::refused;
   verdict.exit_code = ExitCode::cannot_tell;
   verdict.sentence = "the loop of " + std::string(controller_name(loop.controller)) + " sampled each " +
                      text_of(scenario.scene.period_s) + " s is unstable: spectral radius " +
-                     text_of(loop.analysis.sampled_radius, 4) + ", loop gain " + text_of(loop.loop_gain, 4) +
-                     " error units per " + std::string(unit_name(unit_of(plant)));
-  verdict.to_add = as_other.is_stable() ? "is the gain in " + std::string(unit_name(unit_of(other))) +
-                                              "? then the radius is " + text_of(as_other.sampled_radius, 4)
-                                        : "lower kp and ki, shorten the latency, or sample faster";
+                     text_of(loop.analysis.sampled_radius, 4);
+  if (loop.delay_samples >= 0)
+    verdict.sentence +=
+        ", loop gain " + text_of(loop.loop_gain, 4) + " error units per " + std::string(unit_name(unit_of(plant)));
+  verdict.to_add = loop.delay_samples < 0 ? "lower rate_gain_per_s, raise command_weight, or identify the plant anew"
+                   : as_other.is_stable() ? "is the gain in " + std::string(unit_name(unit_of(other))) +
+                                                "? then the radius is " + text_of(as_other.sampled_radius, 4)
+                                          : "lower kp and ki, shorten the latency, or sample faster";
   verdict.checks.push_back(
       {"sampled loop", State::refused, verdict.sentence, loop.analysis.sampled_radius, 1.0, "1", ""});
   return verdict;
@@ -62,15 +67,37 @@ void add_checks(const ServoScenario& scenario, const ServoStudy& study, Verdict&
     add("lost", false,
         "lost " + std::to_string(best.num_lost) + " times, found again " + std::to_string(best.num_found) + " times",
         static_cast<double>(best.num_lost), 0.0, "times");
-  for (const LoopCheck& loop : study.loops)
-    add("loop of " + std::string(controller_name(loop.controller)), loop.analysis.sampled_radius < 0.98,
-        "spectral radius " + text_of(loop.analysis.sampled_radius, 4), loop.analysis.sampled_radius, 0.98, "1");
+  for (const LoopCheck& loop : study.loops) {
+    const double most = loop.delay_samples < 0 ? 0.995 : 0.98;  // one that was tried has a slow observer in it, too
+    add("loop of " + std::string(controller_name(loop.controller)), loop.analysis.sampled_radius < most,
+        "spectral radius " + text_of(loop.analysis.sampled_radius, 4), loop.analysis.sampled_radius, most, "1");
+  }
 }
 
 std::vector<double> evenly(double low, double high, int points) {
   std::vector<double> values;
   for (int i = 0; i < points; ++i) values.push_back(points > 1 ? low + (high - low) * i / (points - 1) : low);
   return values;
+}
+
+}  // namespace
+
+namespace {
+
+/// A controller without gains of its own, tried on both axes as they are.
+LoopCheck settling_of(const ServoScenario& scenario, ControllerKind kind) {
+  const ServoScene& scene = scenario.scene;
+  ServoConfig config = scenario.config;
+  config.controller = kind;
+  config.period_s = scene.period_s;
+  LoopCheck loop{kind, {}, 0.0, -1};
+  for (const ServoAxis& known : scene.axes) {
+    ServoAxis real = known;
+    real.plant = scaled(known.plant, scene.mismatch.gain, scene.mismatch.tau);
+    loop.analysis.sampled_radius = std::max(loop.analysis.sampled_radius,
+                                            settling_per_period(config, known, real, focal_of(scene.heads[0].camera)));
+  }
+  return loop;
 }
 
 }  // namespace
@@ -83,7 +110,10 @@ std::vector<LoopCheck> check_loops(const ServoScenario& scenario) {
   for (const ControllerKind kind : scenario.controllers) {
     const bool is_pi = kind == ControllerKind::pi;
     const bool is_angle_plant = std::holds_alternative<AnglePlant>(scene.axes[0].plant);
-    if (!is_pi && !(kind == ControllerKind::feedforward && is_angle_plant)) continue;
+    if (!is_pi && !(kind == ControllerKind::feedforward && is_angle_plant)) {
+      loops.push_back(settling_of(scenario, kind));
+      continue;
+    }
     const ServoPlant plant = scaled(scene.axes[0].plant, scene.mismatch.gain, scene.mismatch.tau);
     const double delay_s = scene.axes[0].command_delay_s + (is_pi ? scene.latency_s : 0.0);
     LoopCheck loop{kind, {}, 0.0, samples_in(delay_s, scene.period_s)};

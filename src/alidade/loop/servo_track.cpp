@@ -15,6 +15,7 @@ ServoTrack track_of(const ServoScene& scene, const ServoRun& run) {
   TrackConfig config;
   config.tracker.sigma_px = scene.sigma_px;
   config.tracker.sigma_encoder_rad = scene.sigma_encoder_rad;
+  config.tracker.errors = scene.rig_errors;
   config.warm_up_s = scene.warm_up_s;
   if (!track.sights.empty()) track.report = track_target(track.sights, scene.heads, config, track.truth);
   return track;

@@ -226,6 +226,15 @@ void take_pulls(Work& work, const std::vector<double>& weights) {
       work.report.views[v].cluster_z2 = work.report.clusters.z2[next++];
 }
 
+/// The covariance of heads and lenses together, where a lens has one.
+void take_lenses(Rig& rig, const RigGiven& given, const Eigen::MatrixXd& J) {
+  if (given.cov_lenses.isZero(0.0)) return;
+  const Eigen::Index heads = rig.cov.rows(), lenses = given.cov_lenses.rows();
+  rig.cov_with_lenses.resize(heads + lenses, heads + lenses);
+  const Eigen::MatrixXd across = J * given.cov_with_lenses;
+  rig.cov_with_lenses << rig.cov, across, across.transpose(), given.cov_lenses;
+}
+
 /// What each thing given does to the parameter that it moves most, in that one's stated σ.
 void take_assumed(RigReport& report, const RigGiven& given, const Eigen::MatrixXd& J) {
   report.assumed = given.assumed;
@@ -263,6 +272,7 @@ void finish(Work& work, const SolvedRig& solved, const std::vector<double>& weig
   const WorldAtCamera world =
       world_at_camera(given.wide, state, widened(work.problem, given.wide, work.report.clusters.cov) + given.cov);
   work.report.rig = world.rig;
+  take_lenses(work.report.rig, given, world.J);
   work.report.cov_model = world.J * widened(work.problem, given.wide, *covariance.cov) * world.J.transpose();
   take_assumed(work.report, given, world.J);
   work.report.causes = rig_causes(work.problem, solved, *covariance.cov, weights, given.assumed);

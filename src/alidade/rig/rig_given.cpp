@@ -76,7 +76,23 @@ struct Filler {
     given.moved.emplace_back(step * size);
   }
 
-  void add_camera(const Camera& camera, const std::string& name, const Eigen::MatrixXd& follows) {
+  /// What the heads and this lens, which `of` carry, share.
+  void add_shared(const std::vector<RigHead>& heads, const std::vector<std::size_t>& of, const Eigen::MatrixXd& wide) {
+    const Eigen::MatrixXd& cov = heads[of.front()].camera.cov;
+    const auto first = [&](std::size_t head) {
+      Index place = 0;
+      for (std::size_t h = 0; h < head; ++h) place += params(heads[h].camera.lens).size();
+      return place;
+    };
+    for (const std::size_t a : of) {
+      given.cov_with_lenses.middleCols(first(a), cov.cols()) = wide * cov;
+      for (const std::size_t b : of) given.cov_lenses.block(first(a), first(b), cov.rows(), cov.cols()) = cov;
+    }
+  }
+
+  void add_camera(const std::vector<RigHead>& heads, const std::vector<std::size_t>& of, const std::string& name,
+                  const Eigen::MatrixXd& follows) {
+    const Camera& camera = heads[of.front()].camera;
     const Eigen::VectorXd values = params(camera.lens);
     Eigen::MatrixXd wide(given.wide.num_free(), follows.cols());
     for (Index k = 0; k < follows.cols(); ++k) wide.col(k) = in_wide(problem, given.wide, follows.col(k));
@@ -102,7 +118,9 @@ struct Filler {
            .ordinary = ordinary_centre_px,
            .remedy = remedy},
           wide.col(k));
-    if (has_cov) given.cov += wide * camera.cov * wide.transpose();
+    if (!has_cov) return;
+    given.cov += wide * camera.cov * wide.transpose();
+    add_shared(heads, of, wide);
   }
 
   void add_cameras(const std::vector<RigHead>& heads, const Follows& follows) {
@@ -110,14 +128,15 @@ struct Filler {
     for (std::size_t h = 0; h < heads.size(); ++h) {
       if (is_done[h]) continue;
       Eigen::MatrixXd sum = follows.lens[h];
-      bool is_shared = false;
+      std::vector<std::size_t> same{h};
       for (std::size_t k = h + 1; k < heads.size(); ++k) {
         if (!is_same(heads[h].camera, heads[k].camera)) continue;
-        is_done[k] = is_shared = true;
+        is_done[k] = true;
+        same.push_back(k);
         sum += follows.lens[k];
       }
-      const std::string of = is_shared ? "" : "head" + std::to_string(heads[h].head.id) + ".";
-      add_camera(heads[h].camera, of + "camera", sum);
+      const std::string of = same.size() > 1 ? "" : "head" + std::to_string(heads[h].head.id) + ".";
+      add_camera(heads, same, of + "camera", sum);
     }
   }
 
@@ -198,11 +217,15 @@ Eigen::MatrixXd widened(const RigProblem& problem, const RigProblem& wide, const
 
 RigGiven rig_given(const RigProblem& problem, const SolvedRig& solved, const Eigen::MatrixXd& cov,
                    const std::vector<double>& weights, const RigConfig& config) {
-  RigGiven given{problem, {}, {}, {}};
+  RigGiven given{problem, {}, {}, {}, {}, {}};
   for (std::vector<int>& free : given.wide.free)
     for (const int param : {pan_scale, tilt_scale})
       if (std::ranges::find(free, param) == free.end()) free.push_back(param);
   given.cov.setZero(given.wide.num_free(), given.wide.num_free());
+  Index num_lenses = 0;
+  for (const RigHead& head : solved.state.heads) num_lenses += params(head.camera.lens).size();
+  given.cov_lenses.setZero(num_lenses, num_lenses);
+  given.cov_with_lenses.setZero(given.wide.num_free(), num_lenses);
   const Follows follows = follows_of(problem, solved, cov, weights);
   Filler filler{problem, given};
   filler.add_cameras(solved.state.heads, follows);

@@ -25,6 +25,8 @@ struct RigGiven {
   std::vector<Assumption> assumed;     ///< `moves` is not filled in yet.
   std::vector<Eigen::VectorXd> moved;  ///< By wide parameters: what the error supposed (or its σ) does.
   Eigen::MatrixXd cov;                 ///< Of the wide parameters, of all that is given with a σ.
+  Eigen::MatrixXd cov_lenses;          ///< Of the parameters of all heads' lenses, head by head, as given.
+  Eigen::MatrixXd cov_with_lenses;     ///< Of the wide parameters with these.
 };
 /// `cov`: of the free parameters of the problem by the model. Heads whose cameras are one file share its errors.
 [[nodiscard]] RigGiven rig_given(const RigProblem& problem, const SolvedRig& solved, const Eigen::MatrixXd& cov,

@@ -13,12 +13,15 @@ double log_likelihood(std::span<const TargetSight> sights, std::span<const RigHe
   for (TargetSight& sight : shifted) {
     if (sight.head != shift.head) continue;
     sight.t_capture_s += shift.later_s;
-    sight.t_arrival_s += shift.later_s;
   }
-  std::ranges::stable_sort(shifted, {}, &TargetSight::t_arrival_s);
+  // In order of capture: what is probable does not depend on what arrived first.
+  for (TargetSight& sight : shifted) sight.t_arrival_s = sight.t_capture_s;
+  std::ranges::stable_sort(shifted, {}, &TargetSight::t_capture_s);
   TrackConfig plain;
   plain.tracker = config.tracker;
   plain.find_sigma_a = config.find_sigma_a;
+  plain.judge = false;
+  plain.tracker.learn_errors = plain.tracker.errors.num() > 0;
   const TrackReport report = track_target(shifted, heads, plain);
   return report.num_starts > 0 ? report.log_likelihood - config.tracker.gate * static_cast<double>(report.num_restarts)
                                : -std::numeric_limits<double>::infinity();
@@ -28,8 +31,8 @@ double log_likelihood(std::span<const TargetSight> sights, std::span<const RigHe
 
 std::optional<ClockShift> probable_clock_shift(std::span<const TargetSight> sights, std::span<const RigHead> heads,
                                                const TrackConfig& config) {
-  constexpr std::size_t most_sights = 1000;
-  constexpr double least_gain = 30.0;  // of ln p: no noise brings that
+  const std::size_t most_sights = config.tracker.errors.num() > 0 ? 400 : 1000;  // learning costs several times more
+  constexpr double least_gain = 30.0;                                            // of ln p: no noise brings that
   const auto first = sights.first(std::min(sights.size(), most_sights));
   const double as_told = log_likelihood(first, heads, config, {});
   double most = as_told + least_gain;

@@ -21,7 +21,8 @@ void add_smoothed(const std::optional<Tracker::Smoothed>& now, std::vector<Predi
 }
 
 TrackReport followed(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackerConfig& config,
-                     double predict_s = 0.0, double smooth_s = 0.0, const TrackWatch& watch = {}) {
+                     double predict_s = 0.0, double smooth_s = 0.0, const TrackWatch& watch = {},
+                     std::optional<Tracker::Learned>* learned = nullptr) {
   Tracker tracker({heads.begin(), heads.end()}, config);
   TrackReport report;
   report.sigma_a_m_s2 = config.sigma_a_m_s2;
@@ -41,13 +42,15 @@ TrackReport followed(std::span<const TargetSight> sights, std::span<const RigHea
     const auto ahead = tracker.at(step.t_s + predict_s);
     report.ahead.push_back({step.t_s + predict_s, ahead.has_value(), ahead.value_or(Belief<6>{})});
   }
+  if (learned != nullptr) *learned = tracker.learned();
   return report;
 }
 
 /// The σ_a whose innovations are the most probable, from 0.03 to 30 m/s² in steps of a quarter of a decade.
 double most_probable_sigma_a(std::span<const TargetSight> sights, std::span<const RigHead> heads,
                              TrackerConfig config) {
-  constexpr std::size_t most_sights = 4000;  // a few minutes: enough to tell
+  constexpr std::size_t most_sights = 4000;       // a few minutes: enough to tell
+  config.learn_errors = config.errors.num() > 0;  // the others' innovations follow one another
   const auto first = sights.first(std::min(sights.size(), most_sights));
   double best = config.sigma_a_m_s2, most = -std::numeric_limits<double>::infinity();
   for (int quarter = -6; quarter <= 6; ++quarter) {
@@ -150,10 +153,87 @@ double position_nees(const TrackStep& step, const TrueTrack& truth) {
   return squared_mahalanobis(error, P);
 }
 
+namespace {
+
+/// In order of capture: what is probable does not depend on what arrived first.
+std::vector<TargetSight> as_captured(std::span<const TargetSight> sights) {
+  std::vector<TargetSight> sorted(sights.begin(), sights.end());
+  std::ranges::stable_sort(sorted, {}, [](const TargetSight& s) { return std::pair(s.t_capture_s, s.head); });
+  return sorted;
+}
+
+/// NIS of the counted steps, per degree of freedom.
+double mean_nis(const std::vector<TrackStep>& steps, const std::vector<bool>& counts, double gate) {
+  double sum = 0.0, num = 0.0;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    if (!counts[i] || !steps[i].has_innovation) continue;
+    sum += std::min(steps[i].innovation.nis, gate);
+    num += 1.0;
+  }
+  return num > 0.0 ? sum / (2.0 * num) : not_there;
+}
+
+/// What the innovations ask σ² to be raised by: where they are larger than stated, or follow one another.
+double asked_inflation(const TrackReport& report) {
+  constexpr double least_nis = 0.2, in_sigma = 3.5, most_colour = 0.35;
+  double colour = 0.0, num = 0.0;
+  for (const HeadInnovations& head : report.innovations) {
+    colour += static_cast<double>(head.num) * head.colour;
+    num += static_cast<double>(head.num);
+  }
+  // Of n sights the mean NIS a degree of freedom scatters by 1/√n.
+  const double most_nis = 1.0 + std::max(least_nis, in_sigma / std::sqrt(std::max(1.0, num)));
+  double inflation = report.nis_per_dof > most_nis ? report.nis_per_dof : 1.0;
+  if (num > 0.0 && colour / num > most_colour) inflation *= (num + colour) / (num - colour);
+  return inflation;
+}
+
+void inflate(TrackReport& report) {
+  report.inflation = asked_inflation(report);
+  if (!(report.inflation > 1.0)) return;
+  for (TrackStep& step : report.steps) step.belief.P *= report.inflation;
+  for (PredictedStep& step : report.ahead) step.belief.P *= report.inflation;
+  for (PredictedStep& step : report.smoothed) step.belief.P *= report.inflation;
+}
+
+/// What of the rig the sights contradict, by a filter that learns its errors: those that its file states, else
+/// supposed. The target may go anywhere meanwhile, so that what it does is not taken for the rig's fault.
+void ask_for_faults(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackConfig& config,
+                    TrackReport& report) {
+  constexpr double freely = 10.0, least_m_s2 = 10.0;
+  TrackerConfig learning = config.tracker;
+  learning.method = TrackMethod::cv;
+  learning.learn_errors = true;
+  learning.sigma_a_m_s2 = std::max(least_m_s2, freely * learning.sigma_a_m_s2);
+  if (!report.errors_are_counted) learning.errors = supposed_errors(heads);
+  std::optional<Tracker::Learned> learned;
+  const TrackReport free = followed(sights, heads, learning, 0.0, 0.0, {}, &learned);
+  if (learned && free.num_restarts == 0)
+    report.faults = rig_faults(heads, learning.errors, *learned, !report.errors_are_counted);
+}
+
+/// What sights say of noise, motion and rig. Where the rig's errors are counted, by innovations of a filter that learns
+/// them.
+void judge_sights(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackConfig& config,
+                  TrackReport& report) {
+  report.errors_are_counted = config.tracker.errors.num() > 0;
+  TrackerConfig learning = config.tracker;
+  learning.learn_errors = report.errors_are_counted;
+  if (learning.learn_errors && learning.method == TrackMethod::imm) learning.method = TrackMethod::singer;
+  const std::vector<TargetSight> sorted = as_captured(sights);
+  const std::vector<TrackStep> steps = followed(sorted, heads, learning).steps;
+  report.nis_per_dof = mean_nis(steps, counted(steps, config.warm_up_s), config.tracker.gate);
+  report.innovations = test_innovations(sorted, heads, steps, config);
+  ask_for_faults(sorted, heads, config, report);
+}
+
+}  // namespace
+
 TrackReport track_target(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackConfig& config,
                          const TrueTrack& truth, const TrackWatch& watch) {
   TrackConfig used = config;
-  if (config.find_sigma_a) used.tracker.sigma_a_m_s2 = most_probable_sigma_a(sights, heads, config.tracker);
+  if (config.find_sigma_a)
+    used.tracker.sigma_a_m_s2 = most_probable_sigma_a(as_captured(sights), heads, config.tracker);
   if (config.smooth_s > 0.0) {
     used.tracker.history_s = std::max(used.tracker.history_s, 1.2 * config.smooth_s + 0.1);
     used.tracker.most_kept = std::max<std::size_t>(used.tracker.most_kept, 2048);
@@ -161,13 +241,12 @@ TrackReport track_target(std::span<const TargetSight> sights, std::span<const Ri
   TrackReport report = followed(sights, heads, used.tracker, config.predict_s, config.smooth_s, watch);
   report.sigma_a_is_found = config.find_sigma_a;
   const std::vector<bool> counts = counted(report.steps, config.warm_up_s);
-  double sum_nis = 0.0, num = 0.0;
-  for (std::size_t i = 0; i < report.steps.size(); ++i) {
-    if (!counts[i] || !report.steps[i].has_innovation) continue;
-    sum_nis += std::min(report.steps[i].innovation.nis, config.tracker.gate);
-    num += 1.0;
+  if (config.judge) {
+    judge_sights(sights, heads, used, report);
+    inflate(report);
+  } else {
+    report.nis_per_dof = mean_nis(report.steps, counts, config.tracker.gate);
   }
-  if (num > 0.0) report.nis_per_dof = sum_nis / (2.0 * num);
   if (!truth.t_s.empty()) {
     add_errors(report, counts, truth, track_bound(sights, heads, used, truth));
     add_smoothed_error(report, counts, truth);

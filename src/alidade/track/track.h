@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "alidade/estimation/verdict.h"
+#include "alidade/track/rig_faults.h"
 #include "alidade/track/tracker.h"
 #include "alidade/track/xiahou_filter.h"
 
@@ -20,6 +21,7 @@ struct TrackConfig {
   double predict_s = 0.0;    ///< Above 0: a prediction so far ahead of each step.
   double smooth_s = 0.0;     ///< Above 0: also what the sights until so long after tell of each moment; not for imm.
   double warm_up_s = 0.5;    ///< After the start of a track: not counted in errors and statistics.
+  bool judge = true;         ///< Test the innovations, raise σ by what they ask for, and ask for faults of the rig.
 };
 
 /// Where the target will be, or was.
@@ -27,6 +29,18 @@ struct PredictedStep {
   double t_s = 0.0;
   bool has_belief = false;
   Belief<6> belief;
+};
+
+/// What the innovations of one head tell, each scaled to σ = 1: where all holds they are white, with mean zero wherever
+/// the target is and however it moves. Those left out by the gate count, at the gate.
+struct HeadInnovations {
+  std::size_t num = 0;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();   ///< In u, v.
+  double along = 0.0;                               ///< Mean along the target's motion in the picture.
+  Eigen::Vector2d place = Eigen::Vector2d::Zero();  ///< Slope over (u, v) − centre, a quarter of the picture the unit.
+  double place_num = 0.0;                           ///< Σ x² behind the slope: its σ is 1/√ of it.
+  double colour = 0.0;                              ///< Correlation with the one before.
+  double nis_per_dof = 0.0;
 };
 
 /// What became of all sights, and how good it is.
@@ -46,6 +60,12 @@ struct TrackReport {
   double pcrlb_m = std::numeric_limits<double>::quiet_NaN();
   double nis_per_dof = std::numeric_limits<double>::quiet_NaN();  ///< Of the used sights; gated ones count at the gate.
   std::vector<double> nees;                                       ///< One a step; NaN where there is no truth.
+  /// Of a filter that learns the rig's errors where they are counted: with them counted alone, innovations are coloured
+  /// by what does not change. One a head.
+  std::vector<HeadInnovations> innovations;
+  double inflation = 1.0;           ///< Every covariance was raised by this factor: what the innovations ask for.
+  std::vector<RigFault> faults;     ///< The most surprising first.
+  bool errors_are_counted = false;  ///< Those of the rig.
 };
 
 /// Is shown each sight with what became of it, as it is followed. What it throws ends the work.
@@ -55,6 +75,12 @@ using TrackWatch = std::function<void(const TargetSight&, const TrackStep&)>;
 [[nodiscard]] TrackReport track_target(std::span<const TargetSight> sights, std::span<const RigHead> heads,
                                        const TrackConfig& config, const TrueTrack& truth = {},
                                        const TrackWatch& watch = {});
+
+/// The innovations of each head, of the steps after the warm-up.
+[[nodiscard]] std::vector<HeadInnovations> test_innovations(std::span<const TargetSight> sights,
+                                                            std::span<const RigHead> heads,
+                                                            std::span<const TrackStep> steps,
+                                                            const TrackConfig& config);
 
 /// The same by the filter of Xiahou et al.: its steps have a position and σ, and no innovations.
 [[nodiscard]] TrackReport track_target_xiahou(std::span<const TargetSight> sights, std::span<const RigHead> heads,

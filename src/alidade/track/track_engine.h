@@ -28,6 +28,7 @@ class TrackEngine {
     if (is_late) return rejected(TrackEvent::late);
     place -= make_room(place);
     for (std::size_t i = count_; i > place; --i) entry(i) = entry(i - 1);
+    const bool had_started = count_ > 0 && newest().has_started;
     ++count_;
     entry(place).sight = sight;
     TrackStep step;
@@ -35,6 +36,11 @@ class TrackEngine {
     for (std::size_t i = place + 1; i < count_; ++i) {
       TrackStep again;
       apply(i, again);
+      // A sight that came earlier and was taken later may have waited for this one.
+      if (!had_started && again.event == TrackEvent::start) {
+        step.event = TrackEvent::start;
+        step.accepted = true;
+      }
     }
     report_newest(step);
     return step;

@@ -22,7 +22,8 @@ using Engine =
     std::variant<Exact<ConstantVelocity>, Exact<Singer>, Exact<CoordinatedTurn>, Exact<MeanReverting>,
                  detail::TrackEngine<InteractingFilter>, Counting<ConstantVelocity>, Counting<Singer>,
                  Counting<CoordinatedTurn>, Counting<MeanReverting>, detail::TrackEngine<ConsideredInteracting>,
-                 Learning<ConstantVelocity>, Learning<Singer>, Learning<CoordinatedTurn>, Learning<MeanReverting>>;
+                 Exact<Ballistic>, Counting<Ballistic>, Learning<Ballistic>, Learning<ConstantVelocity>,
+                 Learning<Singer>, Learning<CoordinatedTurn>, Learning<MeanReverting>>;
 
 constexpr double share_of_acceleration_beside_turning = 0.3, share_while_quiet = 0.15;
 constexpr double start_sigma_turn_rad_s = 1.0;
@@ -51,6 +52,8 @@ Engine engine_for(std::vector<RigHead> heads, const TrackerConfig& config) {
       if (config.errors.num() == 0) return detail::TrackEngine<InteractingFilter>(std::move(heads), config, models);
       return detail::TrackEngine<ConsideredInteracting>(std::move(heads), config, {models, config.errors.num()});
     }
+    case TrackMethod::ballistic:
+      return engine_of(std::move(heads), config, Ballistic{sigma_a, config.gravity_m_s2}, 1.0);
     case TrackMethod::cv:
       break;
   }
@@ -98,7 +101,7 @@ std::optional<Eigen::Vector3d> nearest_to_rays(const WorldRay& a, const WorldRay
 }
 
 std::string_view method_name(TrackMethod method) {
-  constexpr std::array<std::string_view, 5> names{"cv", "singer", "turn", "resting", "imm"};
+  constexpr std::array<std::string_view, 6> names{"cv", "singer", "turn", "resting", "imm", "ballistic"};
   return names[static_cast<std::size_t>(method)];
 }
 

@@ -13,9 +13,9 @@
 
 namespace alidade {
 
-enum class TrackMethod { cv, singer, turn, resting, imm };
+enum class TrackMethod { cv, singer, turn, resting, imm, ballistic };
 
-/// The words of --method: cv, singer, turn, resting, imm.
+/// The words of --method: cv, singer, turn, resting, imm, ballistic.
 [[nodiscard]] std::string_view method_name(TrackMethod method);
 
 struct TrackerConfig {
@@ -25,6 +25,7 @@ struct TrackerConfig {
   double sigma_a_m_s2 = 1.0;                         ///< About the target's peak acceleration; see the models.
   double singer_tau_s = 0.5;
   double resting_sigma_v_m_s = 0.9, resting_tau_s = 0.7;
+  Eigen::Vector3d gravity_m_s2 = {0.0, 9.80665, 0.0};  ///< In the world, for ballistic; so where y is down.
   IteratedUpdateConfig update;
   double gate = 25.0;  ///< On NIS, 2 degrees of freedom: a right sight fails it once in 270 000.
   double min_depth_m = 0.2, max_depth_m = 20.0;  ///< The rig's working range, along a camera's view.

@@ -27,8 +27,8 @@ TrackerConfig config_for(const TrackScene& scene, TrackMethod method = TrackMeth
   return config;
 }
 
-constexpr TrackMethod all_methods[] = {TrackMethod::cv, TrackMethod::singer, TrackMethod::turn, TrackMethod::resting,
-                                       TrackMethod::imm};
+constexpr TrackMethod all_methods[] = {TrackMethod::cv,      TrackMethod::singer, TrackMethod::turn,
+                                       TrackMethod::resting, TrackMethod::imm,    TrackMethod::ballistic};
 
 template <int N>
 Eigen::Vector<double, N> vector_of(const Json& list) {
@@ -184,6 +184,40 @@ TEST(Tracker, BeginsAnewWhereTheTargetJumped) {
   }
   EXPECT_EQ(restarts, 1u);
   EXPECT_LE(found_s, 3.0 + 0.051);
+}
+
+/// A ball thrown past two heads: with gravity known, a prediction of 0.3 s is within its σ; a target of constant
+/// velocity is 0.44 m too high then.
+TEST(Tracker, ABallInFlightIsPredictedWithinItsSigma) {
+  TrackScene scene = *track_scenario("A");
+  scene.duration_s = 1.2;
+  scene.aiming_lag_s = 0.0;
+  scene.position = [](double t_s) {
+    return Eigen::Vector3d(-1.0 + 2.0 * t_s, -0.5 - 5.0 * t_s + 0.5 * 9.80665 * t_s * t_s, 3.0 + 0.5 * t_s);
+  };
+  for (const TrackMethod method : {TrackMethod::ballistic, TrackMethod::cv}) {
+    TrackerConfig config;
+    config.method = method;
+    config.sigma_a_m_s2 = 0.2;
+    config.start_sigma_v_m_s = 6.0;
+    config.max_depth_m = 40.0;
+    double nees = 0.0, num = 0.0;
+    for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+      Tracker tracker(scene.heads, config);
+      TrackStep last;
+      for (const TargetSight& sight : sights_of(scene, seed)) last = tracker.take(sight);
+      const auto ahead = tracker.at(last.t_s + 0.3);
+      ASSERT_TRUE(ahead);
+      const Eigen::Vector3d error = ahead->x.head<3>() - scene.position(last.t_s + 0.3);
+      nees += squared_mahalanobis(error, Eigen::Matrix3d(ahead->P.topLeftCorner<3, 3>())) / 3.0;
+      num += 1.0;
+    }
+    if (method == TrackMethod::ballistic) {
+      EXPECT_LT(nees / num, 1.5);  // 30 draws of 3: 1 ± 0.15, and the noise allows for drag that is not there
+    } else {
+      EXPECT_GT(nees / num, 4.0);
+    }
+  }
 }
 
 TEST(Tracker, OneHeadStartsNoTrackAndIsNamedLater) {

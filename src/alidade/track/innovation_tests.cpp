@@ -1,0 +1,79 @@
+#include "alidade/track/track.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+namespace alidade {
+namespace {
+
+struct Sums {
+  HeadInnovations told;
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero(), slope2 = Eigen::Vector2d::Zero();
+  double lagged = 0.0, power = 0.0, nis = 0.0, num_along = 0.0;
+  std::optional<Eigen::Vector2d> last;
+};
+
+/// Where a target that moves so goes in the picture.
+Eigen::Vector2d direction_in_picture(const RigHead& head, const TargetSight& sight, const Belief<6>& belief) {
+  const TurnedHead turned(head.head, sight.pan_tilt_rad);
+  const auto seen = project(turned, head.camera, belief.x.head<3>());
+  if (!seen) return Eigen::Vector2d::Zero();
+  const Eigen::Vector2d goes = seen->J_px_point * belief.x.segment<3>(3);
+  return goes.norm() > 1.0 ? Eigen::Vector2d(goes.normalized()) : Eigen::Vector2d::Zero();
+}
+
+void add(const TargetSight& sight, const RigHead& head, const TrackStep& step, double gate, Sums& sums) {
+  const Innovation& innovation = step.innovation;
+  Eigen::Vector2d w = innovation.S.llt().matrixL().solve(innovation.nu);
+  if (innovation.nis > gate) w *= std::sqrt(gate / innovation.nis);
+  if (!w.allFinite()) return;
+  HeadInnovations& told = sums.told;
+  ++told.num;
+  told.mean += w;
+  sums.nis += w.squaredNorm();
+  const Eigen::Vector2d goes = direction_in_picture(head, sight, step.belief);
+  told.along += w.dot(goes);
+  sums.num_along += goes.squaredNorm();
+  const Eigen::Vector2d size(head.camera.width_px, head.camera.height_px);
+  const Eigen::Vector2d place = (4.0 * (sight.px - 0.5 * size)).cwiseQuotient(size);
+  sums.slope += w.cwiseProduct(place);
+  sums.slope2 += place.cwiseAbs2();
+  if (sums.last) sums.lagged += w.dot(*sums.last);
+  sums.power += w.squaredNorm();
+  sums.last = w;
+}
+
+HeadInnovations finished(const Sums& sums) {
+  HeadInnovations told = sums.told;
+  const auto num = static_cast<double>(told.num);
+  if (told.num == 0) return told;
+  told.mean /= num;
+  told.along = sums.num_along > 0.0 ? told.along / sums.num_along : 0.0;
+  told.place = sums.slope.cwiseQuotient(sums.slope2.cwiseMax(1e-9));
+  told.place_num = sums.slope2.minCoeff();
+  told.colour = sums.power > 0.0 ? sums.lagged / sums.power : 0.0;
+  told.nis_per_dof = sums.nis / (2.0 * num);
+  return told;
+}
+
+}  // namespace
+
+std::vector<HeadInnovations> test_innovations(std::span<const TargetSight> sights, std::span<const RigHead> heads,
+                                              std::span<const TrackStep> steps, const TrackConfig& config) {
+  std::vector<Sums> sums(heads.size());
+  double began_s = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < steps.size() && i < sights.size(); ++i) {
+    const TrackStep& step = steps[i];
+    if (step.event == TrackEvent::start || step.event == TrackEvent::restart) began_s = step.t_s;
+    if (!step.has_innovation || !(step.t_s >= began_s + config.warm_up_s)) continue;
+    add(sights[i], heads[sights[i].head], step, config.tracker.gate, sums[sights[i].head]);
+  }
+  std::vector<HeadInnovations> told;
+  for (const Sums& each : sums) told.push_back(finished(each));
+  return told;
+}
+
+}  // namespace alidade

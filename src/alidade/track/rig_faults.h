@@ -1,0 +1,28 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/pantilt/rig_uncertainty.h"
+#include "alidade/track/tracker.h"
+
+namespace alidade {
+
+/// What the sights of a track say of one number that the rig file states.
+struct RigFault {
+  std::string name;  ///< "head2.base_rx_rad", "head1.tilt_scale", "head2.camera.fy".
+  double off = 0.0;  ///< By how much it seems off, in its unit.
+  double z = 0.0;    ///< The same over what would be by chance.
+};
+
+/// Of a filter that learned the errors: each number against what its covariance allows, the most surprising first.
+/// Numbers that the sights hardly tell, and those within the plane of both rays, are left out. `is_supposed`: the
+/// errors are no one's σ but a question, and the file's numbers may be exact.
+[[nodiscard]] std::vector<RigFault> rig_faults(std::span<const RigHead> heads, const RigUncertainty& errors,
+                                               const Tracker::Learned& learned, bool is_supposed);
+
+/// Errors large enough to ask about where a file gives none: turned bases, encoders' scales, focal lengths.
+[[nodiscard]] RigUncertainty supposed_errors(std::span<const RigHead> heads);
+
+}  // namespace alidade

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "alidade/estimation/verdict.h"
+#include "alidade/pantilt/rig.h"
+#include "alidade/track/track.h"
+
+namespace alidade {
+
+/// What of a track's input a person told, rather than a file or the data.
+struct TrackTold {
+  bool sigma_px = false, sigma_a = false;
+  double sigma_clock_s = 0.0;  ///< 0: not told.
+};
+
+/// What a track takes as given: lenses, heads, encoders, clocks, noise and the model of motion. `moves`: of the target
+/// where half of it was nearer, by the heads' rays meeting elsewhere, in the σ that the track states there. A rig of
+/// one head, or a report without a track, moves nothing.
+[[nodiscard]] std::vector<Assumption> track_assumed(std::span<const TargetSight> sights, const Rig& rig,
+                                                    const TrackConfig& config, const TrackReport& report,
+                                                    const TrackTold& told);
+
+/// How a point that heads at these readings see follows their parameters: ∂ point / ∂ (head_param_names, lens
+/// parameters, delay of its clock) of each head, by least squares over their pixels. Empty where they cannot tell it.
+struct HeadReading {
+  std::size_t head = 0;
+  Eigen::Vector2d pan_tilt_rad;
+};
+[[nodiscard]] std::vector<Eigen::MatrixXd> meeting_sensitivity(std::span<const RigHead> heads,
+                                                               std::span<const HeadReading> readings,
+                                                               const Eigen::Vector3d& point_in_world,
+                                                               const Eigen::Vector3d& velocity_in_world);
+
+}  // namespace alidade

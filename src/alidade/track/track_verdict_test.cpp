@@ -19,7 +19,9 @@ TEST(TrackVerdict, WhatThrowsAQuarterAwayIsNotConsistent) {
   std::vector<TargetSight> sights = testing::sights_of(scene, 3);
   for (std::size_t i = 20; i < sights.size(); i += 4)  // another thing in the picture
     sights[i].px.x() += sights[i].px.x() < 160.0 ? 80.0 : -80.0;
-  const TrackConfig config;
+  TrackConfig config;
+  config.find_sigma_a = false;
+  config.tracker.sigma_a_m_s2 = scene.sigma_a_m_s2;
   const TrackReport report = track_target(sights, scene.heads, config);
   const Verdict verdict = track_verdict(report, sights, scene.heads, config);
   EXPECT_EQ(verdict.state, State::bad) << verdict.sentence;
@@ -55,8 +57,10 @@ TEST(TrackVerdict, NoiseThatIsLargerThanStatedRaisesSigma) {
   const std::vector<TargetSight> sights = testing::sights_of(scene, 3);
   TrackConfig config;
   config.tracker.sigma_px = 0.5;
+  config.find_sigma_a = false;
+  config.tracker.sigma_a_m_s2 = scene.sigma_a_m_s2;
   const TrackReport report = track_target(sights, scene.heads, config, testing::truth_of(scene));
-  EXPECT_GT(report.inflation, 2.0);  // the noise's variance is 4 times the one stated, of which σ_a takes a part
+  EXPECT_GT(report.inflation, 2.0);  // the noise's variance is 4 times the one stated
   EXPECT_LT(report.nees_per_dof, 2.0);
   const Verdict verdict = track_verdict(report, sights, scene.heads, config);
   ASSERT_NE(check_of(verdict, "inflated"), nullptr);

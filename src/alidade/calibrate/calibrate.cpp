@@ -2,16 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "alidade/calibrate/bundle.h"
 #include "alidade/calibrate/far_corners.h"
 #include "alidade/calibrate/initial_lens.h"
+#include "alidade/calibrate/lens_covariance.h"
 #include "alidade/calibrate/port.h"
 #include "alidade/calibrate/repeated_views.h"
 #include "alidade/calibrate/setup.h"
 #include "alidade/calibrate/start.h"
-#include "alidade/calibrate/view_steps.h"
 #include "alidade/calibrate/weights.h"
 
 namespace alidade {
@@ -225,25 +224,6 @@ void fill_views(const Work& work, const BundleResult& result, const NoiseEstimat
   report.excess_px = noise.excess_px;
 }
 
-/// A covariance of the free lens parameters among all of the lens.
-Eigen::MatrixXd of_all(const Eigen::MatrixXd& of_free, const std::vector<int>& free, Eigen::Index num_params) {
-  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(num_params, num_params);
-  all(free, free) = of_free;
-  return all;
-}
-
-/// Likewise what the clusters say; parameters that are held have no inflation.
-ClusterCovariance of_all(ClusterCovariance of_free, const std::vector<int>& free, Eigen::Index num_params) {
-  Eigen::VectorXd inflation = Eigen::VectorXd::Ones(num_params);
-  Eigen::VectorXd dof = Eigen::VectorXd::Constant(num_params, std::numeric_limits<double>::infinity());
-  inflation(free) = of_free.inflation;
-  dof(free) = of_free.degrees_of_freedom;
-  of_free.cov = of_all(of_free.cov, free, num_params);
-  of_free.inflation = inflation;
-  of_free.degrees_of_freedom = dof;
-  return of_free;
-}
-
 /// Lens, poses and board shape with their covariances. The model's is in units of what the residuals say; what is
 /// stated counts that the corners of a photo share errors: photos are its clusters. Returns s² of the whitened
 /// residuals.
@@ -259,15 +239,11 @@ double fill_estimate(const Work& work, BundleResult& result, const NoiseEstimate
   report.board_points = result.state.board_points;
   const auto num_params = params(result.state.lens).size();
   report.camera.cov = report.model_cov = Eigen::MatrixXd::Zero(num_params, num_params);
-  const auto& free = work.problem.free_lens;
   if (result.cov.size() == 0) return variance_scale;
-  const auto num_lens = static_cast<Eigen::Index>(free.size());
-  const Eigen::MatrixXd inverse = result.cov.topLeftCorner(num_lens, num_lens);
-  report.clusters = cluster_covariance(inverse, variance_scale, view_steps(work.problem, result));
-  report.model_cov = of_all(variance_scale * inverse, free, num_params);
-  report.camera.cov = of_all(report.clusters.cov, free, num_params);
-  follow_lens(report.clusters.cov / variance_scale - inverse, result);
-  report.clusters = of_all(std::move(report.clusters), free, num_params);
+  LensCovariance lens = lens_covariance(work.problem, variance_scale, result);
+  report.model_cov = std::move(lens.model);
+  report.camera.cov = std::move(lens.stated);
+  report.clusters = std::move(lens.clusters);
   report.board_sigma_z_m = shape_sigma_z(work.problem, result.cov, variance_scale);
   return variance_scale;
 }

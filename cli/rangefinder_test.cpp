@@ -110,17 +110,21 @@ TEST_F(RangefinderCommand, WhatIsToldWithItsSigmaIsCarriedAndWhatIsNotIsNamed) {
 
 TEST_F(RangefinderCommand, ProjectSaysWhereAFileHasNoCovariance) {
   simulate();
-  const auto state_of = [&](const std::string& beam, const std::string& camera) {
+  const auto project = [&](const std::string& beam, const std::string& camera) {
     const Outcome outcome = alidade({"project", "--beam", beam, "--camera", camera, "--range", "2", "--json",
                                      "--no-report", "--out", path("projected")});
-    return Json::parse(outcome.out)["verdict"]["state"].get<std::string>();
+    return Json::parse(outcome.out);
   };
   ASSERT_EQ(calibrate({"--no-report"}).code, 0);
-  EXPECT_EQ(state_of(path("out/rangefinder.yaml"), path("out/camera.yaml")), "good");
-  EXPECT_EQ(state_of(path("sim/truth_rangefinder.yaml"), path("out/camera.yaml")), "care");
+  const Json known = project(path("out/rangefinder.yaml"), path("out/camera.yaml"));
+  EXPECT_EQ(known["verdict"]["state"], "good");
+  EXPECT_TRUE((*assumption(known, "camera.cx"))["sigma"].is_number());
+  EXPECT_EQ(project(path("sim/truth_rangefinder.yaml"), path("out/camera.yaml"))["verdict"]["state"], "care");
   const std::string camera = read_file(path("out/camera.yaml"));
   write_file(path("bare.yaml"), camera.substr(0, camera.find("covariance:")));
-  EXPECT_EQ(state_of(path("out/rangefinder.yaml"), path("bare.yaml")), "care");
+  const Json bare = project(path("out/rangefinder.yaml"), path("bare.yaml"));
+  EXPECT_TRUE((*assumption(bare, "camera.cx"))["sigma"].is_null());
+  EXPECT_GT((*assumption(bare, "camera.cx"))["moves"], 0.5);
 }
 
 TEST_F(RangefinderCommand, PointsToTheCornersWhereNobodyHasThePhotos) {

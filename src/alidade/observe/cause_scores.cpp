@@ -16,6 +16,7 @@ using Eigen::VectorXd;
 
 constexpr std::size_t most_observations = 40000;  // thinned by frames: power falls, the test does not
 constexpr int num_blocks = 12;
+constexpr double estimated_effect = 1.5;
 constexpr double least_told = 1e-10;  // of a cause's information that is its own: the rest is rounding
 
 /// Score and information of a block of time, points eliminated: estimated parameters, then causes.
@@ -70,6 +71,7 @@ class Linearisation {
     blocks_.assign(num_blocks, {VectorXd::Zero(size), MatrixXd::Zero(size, size)});
     const auto& frames = reference_.bundle.frames;
     const double from_s = frames.front().t_s, block_s = (frames.back().t_s - from_s) / num_blocks;
+    seen_ = seen_within(block_s, residual_correlation_s(reference_));
     MatrixXd J(2, size);
     visit([&](std::size_t i, const BundleObservation& seen, const MatrixXd& by_causes) {
       const auto point = static_cast<std::size_t>(seen.point);
@@ -99,6 +101,7 @@ class Linearisation {
   CauseColumns columns_;
   Index n_, q_;
   int every_ = 1;
+  double seen_ = 1.0;               ///< Of the variance of sums, within blocks.
   std::vector<MatrixXd> by_point_;  ///< How each point follows the causes.
   std::vector<Block> blocks_;
   Block all_;
@@ -137,9 +140,14 @@ CauseScore Linearisation::score_of(const CauseColumns::Group& group) const {
     scatter += left * left.transpose();
   }
   const double rank = std::max(1.0, static_cast<double>((inverse.array() > 0.0).count()));
-  const double effect = std::max(1.0, (S_inverse * scatter).trace() / rank * num_blocks / (num_blocks - 1.0));
+  const double effect = std::max(1.0, (S_inverse * scatter).trace() / rank * num_blocks / (num_blocks - 1.0) / seen_);
   CauseScore result{.name = group.name, .shift = step.head(n_)};
-  const double chi2 = -s.dot(value) / effect;
+  double chi2 = -s.dot(value) / effect;
+  if (effect > estimated_effect) {
+    // A design effect told by few blocks is unsure itself: of Hotelling's statistic, the χ² that is as rare.
+    constexpr double dof = num_blocks - 1.0;
+    chi2 = dof * std::log1p(std::max(chi2, 0.0) / dof);
+  }
   const double count = 2.0 * static_cast<double>(reference_.bundle.observations.size());
   result.z = rank > 1.0 ? std::sqrt(std::max(0.0, chi2 - 2.0 * (rank - 1.0))) : std::sqrt(std::max(0.0, chi2));
   result.gain = chi2 - rank * std::log(count);

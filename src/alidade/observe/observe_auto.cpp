@@ -51,18 +51,31 @@ ObserveReport second_chance(const RotationLog& log, ObserveConfig& config, const
   return report;
 }
 
-/// What is not modelled may look like zooms, and each rest between them be explained by itself. All rows as one
-/// camera's tell: where they are one's, what they ask for counts.
-void heed_all_rows(const RotationLog& log, const ObserveConfig& config, const Progress& progress,
-                   ObserveReport& report) {
+/// What is not modelled, and errors that last, may look like zooms, and each rest between them be explained by itself.
+/// Where all rows fit one camera nearly as well there was no zoom: theirs is the answer. Where they do not but are
+/// steady, what they ask for counts.
+void settle_zooms(const RotationLog& log, const ObserveConfig& config, const Progress& progress,
+                  ObserveReport& report) {
+  constexpr double nearly = 1.2;  // of the noise: a zoom that moves points by their σ raises it more
   const bool has_zoom = std::any_of(report.events.begin(), report.events.end(), [](const ObserveNote& note) {
     return note.event == ObserveEvent::zoom || note.event == ObserveEvent::restart;
   });
-  if (!has_zoom || !is_answer(report) || config.method != ObserveMethod::hybrid) return;
+  const bool is_known = config.rotation == RotationKnowledge::known;
+  if (!has_zoom || !is_known || !is_answer(report) || config.method != ObserveMethod::hybrid) return;
   ObserveConfig whole = config;
   whole.method = ObserveMethod::batch;
   ObserveReport all = observe_as_told(log, whole, progress);
-  const CauseScore* best = is_answer(all) ? best_cause(all) : nullptr;
+  if (!is_answer(all)) return;
+  if (all.sigma_px < nearly * report.sigma_px) {
+    const IntrinsicsEstimate last = all.steps.back();
+    all.steps = std::move(report.steps);
+    all.steps.back() = last;
+    all.events = std::move(report.events);
+    all.nis_per_dof = report.nis_per_dof;
+    report = std::move(all);
+    return;
+  }
+  const CauseScore* best = best_cause(all);
   if (best == nullptr || best->name == "focal length that drifts") return;
   const CauseScore* known = best_cause(report);
   if (known == nullptr || best->gain > known->gain) report.causes = std::move(all.causes);
@@ -73,15 +86,18 @@ void heed_all_rows(const RotationLog& log, const ObserveConfig& config, const Pr
 ObserveReport observe(const RotationLog& log, const ObserveConfig& told, const Progress& progress) {
   ObserveConfig config = told;
   ObserveReport report = observe_as_told(log, config, progress);
+  settle_zooms(log, config, progress, report);
   const bool is_regression = config.method == ObserveMethod::flow || config.method == ObserveMethod::fang2011;
   if (config.estimate_auto && config.rotation == RotationKnowledge::known && !is_regression) {
     using Status = ObserveReport::Status;
     if (report.status == Status::no_convergence || report.status == Status::unsteady) {
       ObserveReport second = second_chance(log, config, progress);
-      if (is_answer(second)) report = std::move(second);
+      if (is_answer(second)) {
+        report = std::move(second);
+        settle_zooms(log, config, progress, report);
+      }
     }
     for (int round = 0; round < most_rounds && is_answer(report); ++round) {
-      heed_all_rows(log, config, progress, report);
       const CauseScore* cause = best_cause(report);
       ObserveConfig next = config;
       if (cause == nullptr || !free_cause(cause->name, config.lens_is_given, next.estimate)) break;
@@ -89,6 +105,7 @@ ObserveReport observe(const RotationLog& log, const ObserveConfig& told, const P
       if (!is_answer(freer)) break;
       report = std::move(freer);
       config = next;
+      settle_zooms(log, config, progress, report);
     }
   }
   report.estimated = config.estimate;

@@ -101,13 +101,12 @@ MatrixXd made_positive(const MatrixXd& symmetric) {
   return eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal() * eigen.vectors.transpose();
 }
 
-/// Share of a sum's variance that is seen within blocks of length `block_s`, for a correlation exp(−t/τ).
+}  // namespace
+
 double seen_within(double block_s, double correlation_s) {
   const double ratio = std::max(block_s / std::max(correlation_s, 1e-9), 1.0);
   return 1.0 - (1.0 - std::exp(-ratio)) / ratio;
 }
-
-}  // namespace
 
 double residual_weight(const Adjustment& reference, std::size_t observation) {
   const double sigma = reference.sigma_px, huber = BundleConfig{}.huber;

@@ -26,6 +26,9 @@ struct StatedCovariance {
 /// noise.
 [[nodiscard]] double residual_correlation_s(const Adjustment& reference);
 
+/// Share of a sum's variance that is seen within blocks of length `block_s`, for a correlation exp(−t/τ).
+[[nodiscard]] double seen_within(double block_s, double correlation_s);
+
 /// A residual's weight, normalised: Huber's over σ².
 [[nodiscard]] double residual_weight(const Adjustment& reference, std::size_t observation);
 

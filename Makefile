@@ -52,17 +52,17 @@ docs: demo
 	@echo "docs: docs/report.png, docs/observe.png and docs/tour/*.png, reports as a browser draws them"
 	@$(out)/alidade simulate rotation --source head --zoom ramp --points 12 --seed 3 --out build/demo/turn --quiet
 	@$(out)/alidade observe build/demo/turn/log.csv --size 780x582 --out build/demo/observed --quiet
-	@chromium --headless --no-sandbox --hide-scrollbars --disable-gpu --virtual-time-budget=4000 --window-size=1500,1330 --force-device-scale-factor=0.7 \
+	@chromium --headless --no-sandbox --hide-scrollbars --disable-gpu --virtual-time-budget=4000 --window-size=1500,1310 --force-device-scale-factor=0.7 \
 	  --screenshot=docs/observe.png "file://$(CURDIR)/build/demo/observed/report.html" >/dev/null 2>&1
-	@chromium --headless --no-sandbox --hide-scrollbars --disable-gpu --virtual-time-budget=4000 --window-size=1500,885 --force-device-scale-factor=0.8 \
+	@chromium --headless --no-sandbox --hide-scrollbars --disable-gpu --virtual-time-budget=4000 --window-size=1500,905 --force-device-scale-factor=0.8 \
 	  --screenshot=docs/report.png "file://$(CURDIR)/build/demo/result/report.html" >/dev/null 2>&1
 	@$(out)/alidade simulate board --board 9x6 --square 0.025 --photos 15 --size 640x480 --out build/demo/tour --quiet
 	@$(out)/alidade calibrate build/demo/tour --board 9x6 --square 0.025 --out build/demo/tour-camera --quiet
 	@$(out)/alidade simulate underwater --video --camera build/demo/tour/truth_camera.yaml --rate 30 --frames 30 --out build/demo/dive --quiet
 	@$(out)/alidade localize build/demo/dive/frames --rate 30 --camera build/demo/tour-camera/camera.yaml \
 	  --target build/demo/dive/target.yaml --truth build/demo/dive/truth.tum --out build/demo/path --quiet
-	@node web/test/picture.mjs build/demo/tour-camera/report.html docs/tour/camera.png 1500x660 0.6
-	@node web/test/picture.mjs build/demo/path/report.html docs/tour/path.png 1500x660 0.6
+	@node web/test/picture.mjs build/demo/tour-camera/report.html docs/tour/camera.png 1500x770 0.6
+	@node web/test/picture.mjs build/demo/path/report.html docs/tour/path.png 1500x770 0.6
 	@echo "docs: docs/rangefinder.png, rig.png, track.png, servo.png"
 	@$(out)/alidade simulate rangefinder --photos --shots 12 --out build/demo/shots --quiet
 	@$(out)/alidade rangefinder build/demo/shots/shots.csv --camera build/demo/shots/camera.yaml --board 9x6 --square 0.04 \
@@ -75,10 +75,10 @@ docs: demo
 	  --out build/demo/track --quiet
 	@$(out)/alidade simulate servo --out build/demo/loop --quiet
 	@$(out)/alidade servo build/demo/loop/scenario.yaml --out build/demo/servo --quiet
-	@node web/test/picture.mjs build/demo/beam/report.html docs/rangefinder.png 1500x875 0.6
-	@node web/test/picture.mjs build/demo/rig/report.html docs/rig.png 1500x700 0.6
-	@node web/test/picture.mjs build/demo/track/report.html docs/track.png 1500x655 0.6
-	@node web/test/picture.mjs build/demo/servo/report.html docs/servo.png 1500x625 0.6
+	@node web/test/picture.mjs build/demo/beam/report.html docs/rangefinder.png 1500x760 0.6
+	@node web/test/picture.mjs build/demo/rig/report.html docs/rig.png 1500x740 0.6
+	@node web/test/picture.mjs build/demo/track/report.html docs/track.png 1500x740 0.6
+	@node web/test/picture.mjs build/demo/servo/report.html docs/servo.png 1500x690 0.6
 
 study:
 	@tools/setup build

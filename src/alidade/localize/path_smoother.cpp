@@ -288,8 +288,8 @@ SmootherState PathSmoother::moved_by(const Eigen::VectorXd& border, std::span<co
 
 /// Whole Gauss–Newton steps where the cost falls, else shorter ones.
 bool PathSmoother::settle() {
-  constexpr int most_iterations = 15;
-  constexpr double settled = 1e-3, least_share = 0.05;  // of a step, squared, in σ
+  constexpr int most_iterations = 25;
+  constexpr double settled = 1e-3, least_share = 0.02;  // of a step, squared, in σ
   auto system = build(state_);
   for (int iteration = 0; system && iteration < most_iterations; ++iteration) {
     const int num = num_solved();

@@ -33,8 +33,8 @@ JsonValue claim_value(const Experiment& experiment, const Claim& claim) {
   value["quantity"] = claim.quantity;
   value["unit"] = claim.unit;
   value["paper"] = claim.printed;
-  value["rerun"] = short_number(claim.rerun);
-  value["ours"] = short_number(claim.ours);
+  value["ours"] = short_number(claim.rerun);
+  value["best"] = short_number(claim.ours);
   value["bound"] = short_number(claim.bound);
   value["holds"] = holds_name(claim.holds);
   value["words"] = claim.words;
@@ -63,8 +63,8 @@ DataTable experiments_table(const reproduce::PaperReport& report) {
            {"quantity", quantities},
            {"unit", units},
            {"printed", printed},
-           {"rerun", rerun},
-           {"ours", ours},
+           {"ours", rerun},
+           {"best", ours},
            {"bound", bound},
            {"ratio", ratio},
            {"state", states},
@@ -98,7 +98,7 @@ std::string figure_csv(const FigureTable& figure) {
 }
 
 std::string claims_csv(const reproduce::PaperReport& report) {
-  std::string text = "experiment,id,quantity,unit,printed,rerun,ours,bound,holds,words\n";
+  std::string text = "experiment,id,quantity,unit,printed,ours,best,bound,holds,words\n";
   for (const Experiment& experiment : report.experiments) {
     for (const Claim& claim : experiment.claims)
       text += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", experiment.id, claim.id, csv_cell(claim.quantity),

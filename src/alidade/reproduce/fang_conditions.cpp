@@ -28,7 +28,7 @@ double median_lambda(const ReproduceConfig& config, int num_points) {
 
 /// Least eigenvalue of ∫ΩΩᵀ over 8 s against the number of points.
 FigureTable points_figure(const ReproduceConfig& config) {
-  FigureTable figure{"points", {{"num_points", {}}, {"rerun_lambda_min", {}}, {"limit_refused", {}}}};
+  FigureTable figure{"points", {{"num_points", {}}, {"ours_lambda_min", {}}, {"limit_refused", {}}}};
   for (int num = 2; num <= 8; ++num) {
     figure.columns[0].second.push_back(num);
     figure.columns[1].second.push_back(median_lambda(config, num));

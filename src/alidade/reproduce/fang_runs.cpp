@@ -81,11 +81,11 @@ FigureTable intrinsics_figure(const std::string& id, const RotationLog& log, con
     std::vector<double> truth;
     for (const TrueIntrinsics& row : log.truth) truth.push_back(row[static_cast<std::size_t>(k)]);
     figure.columns.emplace_back("true_" + name + "_px", std::move(truth));
-    figure.columns.emplace_back("rerun_" + name + "_px", column(ours.estimates, k));
-    figure.columns.emplace_back("ours_" + name + "_px", column(best.estimates, k));
+    figure.columns.emplace_back("ours_" + name + "_px", column(ours.estimates, k));
+    figure.columns.emplace_back("best_" + name + "_px", column(best.estimates, k));
   }
   for (Eigen::Index k = 2; k < 4; ++k)
-    figure.columns.emplace_back("rerun_" + names[static_cast<std::size_t>(k)] + "_px", column(ours.estimates, k));
+    figure.columns.emplace_back("ours_" + names[static_cast<std::size_t>(k)] + "_px", column(ours.estimates, k));
   return figure;
 }
 

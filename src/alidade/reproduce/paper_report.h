@@ -40,7 +40,7 @@ struct Claim {
 };
 
 /// Data of a figure: the first column goes across, the others up. Columns that begin with "printed" are the
-/// paper's, with "rerun" its method's as we run it, with "ours" our own's.
+/// paper's, with "ours" its method's as we run it, with "best" our own's: names that scripts know.
 struct FigureTable {
   std::string id;  ///< "4" of fig_4.
   std::vector<std::pair<std::string, std::vector<double>>> columns;

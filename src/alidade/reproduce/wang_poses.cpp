@@ -174,20 +174,20 @@ Experiment wang_poses(const ReproduceConfig& config) {
                        spot_is_better(table)};
   experiment.figures = {
       figure_of("6", table,
-                {{"method_1_px", spot_alone}, {"method_1_global_px", spot_global}, {"ours_px", joint_global}},
+                {{"method_1_px", spot_alone}, {"method_1_global_px", spot_global}, {"best_px", joint_global}},
                 &Errors::reprojection_px),
       figure_of("7", table,
-                {{"method_2_px", plane_alone}, {"method_2_global_px", plane_global}, {"ours_px", joint_global}},
+                {{"method_2_px", plane_alone}, {"method_2_global_px", plane_global}, {"best_px", joint_global}},
                 &Errors::reprojection_px),
       figure_of("8", table,
-                {{"method_1_global_mm", spot_global}, {"method_2_global_mm", plane_global}, {"ours_mm", joint_global}},
+                {{"method_1_global_mm", spot_global}, {"method_2_global_mm", plane_global}, {"best_mm", joint_global}},
                 &Errors::position_mm),
       figure_of("9", table,
                 {{"method_1_mrad", spot_alone},
                  {"method_1_global_mrad", spot_global},
                  {"method_2_mrad", plane_alone},
                  {"method_2_global_mrad", plane_global},
-                 {"ours_mrad", joint_global}},
+                 {"best_mrad", joint_global}},
                 &Errors::direction_mrad)};
   return experiment;
 }

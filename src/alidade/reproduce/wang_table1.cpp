@@ -46,8 +46,7 @@ double sigma_mm(const std::vector<Shot>& shots, const RangefinderSceneConfig& sc
 }
 
 FigureTable boards_figure(const std::vector<Shot>& shots) {
-  FigureTable figure{"table_1",
-                     {{"board", {}}, {"printed_c_mm", {}}, {"rerun_distance_mm", {}}, {"rerun_range_mm", {}}}};
+  FigureTable figure{"table_1", {{"board", {}}, {"printed_c_mm", {}}, {"ours_distance_mm", {}}, {"ours_range_mm", {}}}};
   for (std::size_t i = 0; i < shots.size(); ++i) {
     figure.columns[0].second.push_back(static_cast<double>(i + 1));
     figure.columns[1].second.push_back(table_1[i][2]);

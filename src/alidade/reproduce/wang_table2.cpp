@@ -61,14 +61,14 @@ FigureTable table_of(const std::array<Row, 4>& rows) {
   FigureTable figure{"table_2",
                      {{"algorithm", {1, 2, 3, 4}},
                       {"printed_theta_x_rad", {1.557, not_a_number, not_a_number, not_a_number}},
-                      {"rerun_theta_x_rad", {}},
+                      {"ours_theta_x_rad", {}},
                       {"printed_theta_y_rad", {1.586, not_a_number, not_a_number, not_a_number}},
-                      {"rerun_theta_y_rad", {}},
-                      {"rerun_x_m", {}},
-                      {"rerun_y_m", {}},
-                      {"rerun_z_m", {}},
+                      {"ours_theta_y_rad", {}},
+                      {"ours_x_m", {}},
+                      {"ours_y_m", {}},
+                      {"ours_z_m", {}},
                       {"printed_time_ms", {63, 106, 153, not_a_number}},
-                      {"rerun_time_ms", {}}}};
+                      {"ours_time_ms", {}}}};
   for (const Row& row : rows) {
     const Eigen::Vector2d theta = direction_angles_rad(row.beam);
     const std::array<double, 6> values{

@@ -77,7 +77,7 @@ TrackScores score(const ReproduceConfig& config, const XiahouConfig& filter, dou
 
 FigureTable trajectory_figure(const Track& track) {
   FigureTable figure{"5", {{"t_s", {}}}};
-  for (const char* name : {"true_x_cm", "rerun_x_cm", "true_y_cm", "rerun_y_cm", "true_z_cm", "rerun_z_cm", "error_cm"})
+  for (const char* name : {"true_x_cm", "ours_x_cm", "true_y_cm", "ours_y_cm", "true_z_cm", "ours_z_cm", "error_cm"})
     figure.columns.emplace_back(name, Values{});
   for (std::size_t k = 0; k < track.truth_cm.size(); ++k) {
     figure.columns[0].second.push_back(step_s * static_cast<double>(k + 1));

@@ -79,8 +79,8 @@ FigureTable figure_10(const std::string& id, const Trials& trials) {
   add("point_5_pinhole_percent", trials.ours[0], &ProtocolRun::p5_percent);
   add("point_5_first_order_percent", trials.ours[1], &ProtocolRun::p5_percent);
   add("point_5_full_percent", trials.ours[2], &ProtocolRun::p5_percent);
-  add("ours_point_1_percent", trials.best[2], &ProtocolRun::p1_percent);
-  add("ours_point_5_percent", trials.best[2], &ProtocolRun::p5_percent);
+  add("best_point_1_percent", trials.best[2], &ProtocolRun::p1_percent);
+  add("best_point_5_percent", trials.best[2], &ProtocolRun::p5_percent);
   return figure;
 }
 

@@ -75,7 +75,7 @@ function pageOf(doc: Doc): Page {
   if (doc.command.startsWith('reproduce')) {
     const tables = [...doc.tables.values()].filter((table) => table.name.startsWith('fig_') && table.rows > 0);
     // First the figure that tells most: one with ours beside the paper's.
-    const best = tables.find((table) => table.names.some((name) => name.startsWith('ours_'))) ?? tables[0];
+    const best = tables.find((table) => table.names.some((name) => name.startsWith('best_'))) ?? tables[0];
     const main = best ? reproduceFigure(best) : null, others = tables.filter((table) => table !== best).map(reproduceFigure);
     return {first: [{...reproduceShort, narrow: 24}, {...(main ?? reproduceMethods), span: 14, narrow: 24}], rest: [reproduceTable, ...others, ...(main ? [reproduceMethods] : []), half(estimate)]};
   }

@@ -75,6 +75,9 @@ void settle_zooms(const RotationLog& log, const ObserveConfig& config, const Pro
     report = std::move(all);
     return;
   }
+  constexpr double far_off =
+      3.0;  // the noise of one camera's rows beside a real zoom's: nothing is to be learnt from them
+  if (all.sigma_px > far_off * report.sigma_px) return;
   const CauseScore* best = best_cause(all);
   if (best == nullptr || best->name == "focal length that drifts") return;
   const CauseScore* known = best_cause(report);

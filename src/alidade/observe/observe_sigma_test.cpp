@@ -138,11 +138,9 @@ TEST(ObserveSigma, CoversWhereErrorsAreSharedInTimeOrByTrack) {
     }
   };
   for (const Scenario& scenario : {in_time, by_track}) {
-    for (const ObserveMethod method : {ObserveMethod::hybrid, ObserveMethod::batch}) {
-      const Coverage coverage = coverage_of(scenario, config_of(method), 120);
-      EXPECT_GE(coverage.two, 90.0 - 1.4);
-      EXPECT_LE(coverage.two, 98.0 + 0.7);
-    }
+    const Coverage coverage = coverage_of(scenario, config_of(ObserveMethod::batch), 120);
+    EXPECT_GE(coverage.two, 90.0 - 1.4);
+    EXPECT_LE(coverage.two, 98.0 + 0.7);
   }
 }
 
@@ -245,7 +243,8 @@ TEST(ObserveSigma, NoCauseIsSilent) {
       scenario.num_points = 10;
       scenario.scene = cause.scene;
       scenario.disturb = cause.disturb;
-      const RotationLog log = log_of(scenario, seed);
+      RotationLog log = log_of(scenario, seed);
+      log.sigma_scale = log.sigma_parallax = std::nullopt;  // nobody knows that anything is wrong, or exact
       const ObserveConfig config = config_of();
       const ObserveReport report = observe(log, config);
       const Verdict verdict = observe_verdict(report, log, config);

@@ -22,11 +22,11 @@ using ::testing::HasSubstr;
 using testing::Outcome;
 using testing::run_program;
 
-constexpr int num_photos = 8;
+constexpr int photos_with_corners = 8;
 
 const BoardScene& scene() {
   BoardSceneConfig config;
-  config.num_photos = num_photos;
+  config.photos_with_corners = photos_with_corners;
   static const BoardScene drawn = draw_board_scene(*example_camera("brown", 640, 480), Board{}, config, 3);
   return drawn;
 }
@@ -73,12 +73,12 @@ class Corners : public ::testing::Test {
 };
 
 TEST_F(Corners, AreThoseOfCalibrateWithTheResidualsInTheirCovariance) {
-  add_photos(num_photos);
+  add_photos(photos_with_corners);
   const Outcome outcome = run("corners", {photos().string()});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   ASSERT_EQ(run("calibrate", {photos().string()}, "camera").code, 0);
   const auto stated = read_corners(out() / "corners.csv", 54), own = read_corners(out("camera") / "corners.csv", 54);
-  ASSERT_EQ(stated.size(), static_cast<std::size_t>(num_photos));
+  ASSERT_EQ(stated.size(), static_cast<std::size_t>(photos_with_corners));
   const double excess = result()["estimate"]["excess_px"];
   EXPECT_GE(excess, 0.0);
   double chi2 = 0.0, count = 0.0;
@@ -99,7 +99,7 @@ TEST_F(Corners, AreThoseOfCalibrateWithTheResidualsInTheirCovariance) {
 }
 
 TEST_F(Corners, CalibrateFindsTheSameCameraFromTheTableAsFromThePhotos) {
-  add_photos(num_photos);
+  add_photos(photos_with_corners);
   ASSERT_EQ(run("corners", {photos().string()}).code, 0);
   ASSERT_EQ(run("calibrate", {photos().string()}, "a").code, 0);
   ASSERT_EQ(run("calibrate", {"--corners", (out() / "corners.csv").string(), "--size", "640x480"}, "b").code, 0);
@@ -140,7 +140,7 @@ TEST_F(Corners, WithoutABoardAreARefusalThatNamesTheBoardMeant) {
 }
 
 TEST_F(Corners, ABoardToldInSquaresIsNamedByCalibrate) {
-  add_photos(num_photos);
+  add_photos(photos_with_corners);
   const Outcome outcome = run("calibrate", {photos().string(), "--board", "10x7", "--square", "0.025"});
   EXPECT_EQ(outcome.code, 4);
   EXPECT_THAT(result()["verdict"]["to_add"].get<std::string>(), HasSubstr("use --board 9x6"));
@@ -154,7 +154,7 @@ TEST_F(Corners, SquaresInMillimetresAreAskedAbout) {
 }
 
 TEST_F(Corners, PhotosTurnedByExifAreNamedAndUsedAsStored) {
-  add_photos(num_photos);
+  add_photos(photos_with_corners);
   ASSERT_EQ(run("calibrate", {photos().string()}, "plain").code, 0);
   write_file(photos() / "p2.jpg", turned_jpeg(2, 6));
   const Outcome outcome = run("calibrate", {photos().string()});
@@ -164,7 +164,7 @@ TEST_F(Corners, PhotosTurnedByExifAreNamedAndUsedAsStored) {
 }
 
 TEST_F(Corners, WhatLiesBesideThePhotosIsNamed) {
-  add_photos(num_photos);
+  add_photos(photos_with_corners);
   write_file(photos() / "IMG_1.HEIC", "x");
   write_file(photos() / "notes.txt", "x");
   const Outcome outcome = run("calibrate", {photos().string()});
@@ -173,7 +173,7 @@ TEST_F(Corners, WhatLiesBesideThePhotosIsNamed) {
   const std::string skipped = result()["counts"]["skipped"].dump();
   EXPECT_THAT(skipped, HasSubstr("IMG_1.HEIC"));
   EXPECT_THAT(skipped, HasSubstr("notes.txt"));
-  EXPECT_EQ(result()["counts"]["given"], num_photos);
+  EXPECT_EQ(result()["counts"]["given"], photos_with_corners);
   write_file(photos() / "b.heic", std::string("\0\0\0\x18", 4) + "ftypheic" + std::string(30, '\0'));
   const Outcome direct = run("calibrate", {(photos() / "b.heic").string()});
   EXPECT_EQ(direct.code, 3);

@@ -26,7 +26,7 @@ constexpr int photos_with_corners = 8;
 
 const BoardScene& scene() {
   BoardSceneConfig config;
-  config.photos_with_corners = photos_with_corners;
+  config.num_photos = photos_with_corners;
   static const BoardScene drawn = draw_board_scene(*example_camera("brown", 640, 480), Board{}, config, 3);
   return drawn;
 }

@@ -375,8 +375,9 @@ class ScannersBearing {
   std::map<int, std::vector<Eigen::Vector3d>> scans_;
 };
 
-/// The boards stood at nearly one distance: the data cannot tell, and what they do tell is within its σ of the
-/// published pose of scanner and camera.
+/// The boards stood at nearly one distance: the data cannot tell. By the published pose two of the bearings passed 9 of
+/// 14 and 13 of 15 boards, and read what stood behind, up to 46 cm off: that is told first. What the data do tell is
+/// within its σ of the pose.
 TEST_F(RangefinderCommand, BearingsOfARealScannerAreWithinTheirSigmaOfThePublishedPose) {
   const char* data = std::getenv("ALIDADE_DATA");
   if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set: the scans are not at hand";
@@ -387,13 +388,21 @@ TEST_F(RangefinderCommand, BearingsOfARealScannerAreWithinTheirSigmaOfThePublish
   Eigen::Matrix3d cam_from_scanner;
   cam_from_scanner << -0.527226, 0.849650, -0.011278, 0.111189, 0.055825, -0.992230, -0.842419, -0.524383, -0.123904;
   const Eigen::Vector3d origin(-0.198980, 0.016672, -0.091506);
-  for (const auto& [azimuth_deg, elevation_deg] : {std::pair{-156.0, -16.0}, {-152.0, -13.0}, {-144.0, -13.0}}) {
+  struct Asked {
+    double azimuth_deg, elevation_deg;
+    int code;
+    const char* reason;
+  };
+  for (const auto& [azimuth_deg, elevation_deg, code, reason] : {Asked{-156.0, -16.0, 4, "equal ranges"},
+                                                                 {-152.0, -13.0, 5, "that the beam hit the board"},
+                                                                 {-144.0, -13.0, 5, "that the beam hit the board"}}) {
     const Eigen::Vector3d bearing = ScannersBearing::direction(azimuth_deg, elevation_deg);
     write_file(path("shots.csv"), scanner.shots(bearing));
     const Outcome outcome =
         alidade({"rangefinder", path("shots.csv"), "--camera", path("camera.yaml"), "--board", "7x5", "--square",
                  "0.03", "--method", "plane", "--no-report", "--out", path("out"), "--json"});
-    EXPECT_EQ(outcome.code, 4) << outcome.err;
+    EXPECT_EQ(outcome.code, code) << outcome.err;
+    EXPECT_NE(outcome.err.find(reason), std::string::npos) << outcome.err;
     const Json document = Json::parse(read_file(path("out/result.json")));
     EXPECT_GE(document["counts"]["used"], 10);
     const Json &estimate = document["estimate"], &stddev = document["stddev"];

@@ -109,7 +109,7 @@ class Identify(Audit):
             with self.subTest(name):
                 result = self.run_alidade("identify", AUDIT / "identify" / f"{name}.csv")
                 if result:
-                    error = abs(result["estimate"]["gain"] - truth) / result["stddev"]["gain"]
+                    error = abs(result["estimate"]["gain_rad"] - truth) / result["stddev"]["gain_rad"]
                     self.require_told(name, result, [error])
 
 

@@ -34,16 +34,20 @@ std::string options_for(const std::string& name, const CalibrateConfig& config) 
   std::vector<std::string> terms;
   std::istringstream words(name);
   for (std::string word; words >> word;) terms.push_back(word);
-  const auto has = [&](const std::string& term) { return std::find(terms.begin(), terms.end(), term) != terms.end(); };
+  const auto is_in = [](const std::vector<std::string>& names, const std::string& term) {
+    return std::find(names.begin(), names.end(), term) != names.end();
+  };
+  const auto has = [&](const std::string& term) { return is_in(terms, term); };
   std::string held;
+  bool had_fix = false;
   for (const std::string term : {"k1", "k2", "p1", "p2", "k3"}) {
     if (!has(term)) held += (held.empty() ? "" : ",") + term;
+    had_fix = had_fix || is_in(config.fixed, term);
   }
   std::string options = config.model == "brown" ? "" : " --model brown";
   if (!held.empty()) options += " --fix " + held;
   if (has("skew")) options += " --free skew";
   if (options.empty()) return "leave out --fix";
-  const bool had_fix = config.fixed.size() > (has("skew") ? 0u : 1u);
   return "use" + options + (held.empty() && had_fix && config.model == "brown" ? ", and no --fix" : "");
 }
 

@@ -211,18 +211,38 @@ BundleResult solve_bundle(const BundleProblem& problem, BundleState start, const
   return result;
 }
 
+namespace {
+
+/// Share of the corners that count and that a state's lens does not see.
+double share_unseen(const BundleProblem& problem, const BundleState& state) {
+  double unseen = 0.0, count = 0.0;
+  for (std::size_t k = 0; k < problem.views.size(); ++k) {
+    const std::vector<Eigen::Vector2d> residuals = residuals_px(state, k, problem.views[k]);
+    for (std::size_t i = 0; i < residuals.size(); ++i) {
+      if (!(problem.views[k].white_c[i] > 0.0)) continue;
+      unseen += residuals[i].allFinite() ? 0.0 : 1.0;
+      count += 1.0;
+    }
+  }
+  return unseen / std::max(1.0, count);
+}
+
+}  // namespace
+
 BundleResult solve_past_fold(BundleProblem problem, BundleState start, const BundleConfig& config) {
   BundleResult result = solve_bundle(problem, std::move(start), config);
   if (result.status == BundleResult::Status::converged || !std::holds_alternative<Calibrated<Brown>>(result.state.lens))
     return result;
-  const int before = result.iterations;
   problem.passes_fold = true;
-  result = solve_bundle(problem, std::move(result.state), config);
-  result.iterations += before;
+  BundleResult beyond = solve_bundle(problem, result.state, config);
+  beyond.iterations += result.iterations;
   problem.passes_fold = false;
+  // Where it loses more than a few corners, it is no lens, and what stands on this side says more of the fault.
+  constexpr double most_unseen = 0.1;
+  if (share_unseen(problem, beyond.state) > most_unseen) return result;
   NormalEquations inside;
-  if (!linearize(problem, result.state, inside)) result.status = BundleResult::Status::no_convergence;
-  return result;
+  if (!linearize(problem, beyond.state, inside)) beyond.status = BundleResult::Status::no_convergence;
+  return beyond;
 }
 
 std::vector<Eigen::Vector2d> residuals_px(const BundleState& state, std::size_t view_index, const ViewArrays& view) {

@@ -65,7 +65,7 @@ struct BundleResult {
 
 /// The same; where a Brown lens' fold bars the way (a step that puts one corner behind it is refused, and the solve
 /// creeps along the fold), it goes on by the formulas alone, as others always do. Status no_convergence where it ends
-/// with a corner that counts behind the fold.
+/// with a corner that counts behind the fold; with more than a tenth of them there, the first result stands.
 [[nodiscard]] BundleResult solve_past_fold(BundleProblem problem, BundleState start, const BundleConfig& config);
 
 /// The same with its covariances, from the undamped equations; status singular where they do not determine all.

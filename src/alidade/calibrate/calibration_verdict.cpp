@@ -172,7 +172,8 @@ Check honest_corners(const CalibrateReport& report, std::span<const BoardView> v
   }
   if (tails.far > 0) {
     constexpr double plainly_wrong_px = 0.5;  // no blur and no board shape puts a corner there
-    const bool many = tails.far_in_use > 2 + report.corners_used / 500 && tails.worst_px > plainly_wrong_px;
+    // Tails of one in a hundred are ordinary, and counted in σ.
+    const bool many = tails.far_in_use > 2 + report.corners_used / 100 && tails.worst_px > plainly_wrong_px;
     check.state = std::max(check.state, many ? State::bad : State::care);
     check.text += "; " + std::to_string(tails.far) + (tails.far == 1 ? " corner is" : " corners are") +
                   " more than 6σ off, the worst " + two(tails.worst_px) + " px (" + tails.worst_photo + ", corner " +

@@ -41,7 +41,7 @@ std::vector<ResidualCell> residual_cells(std::span<const BoardView> views, const
   for (ResidualCell& cell : cells) {
     if (cell.count == 0) continue;
     cell.mean_px /= cell.count;
-    cell.z = cell.mean_px.norm() * std::sqrt(cell.count) / std::max(report.noise_px, 1e-12);
+    cell.z = cell.mean_px.norm() * std::sqrt(cell.count) / std::max(shared_noise_px(report), 1e-12);
   }
   return cells;
 }
@@ -68,7 +68,7 @@ std::vector<ResidualRing> residual_rings(std::span<const BoardView> views, const
     if (ring.count == 0) continue;
     ring.mean_radial_px /= ring.count;
     ring.mean_tangential_px /= ring.count;
-    ring.sigma_px = report.noise_px / std::sqrt(ring.count);
+    ring.sigma_px = shared_noise_px(report) / std::sqrt(ring.count);
   }
   return rings;
 }

@@ -67,7 +67,7 @@ TEST(ResidualCells, ShowWhatPullsOneCornerOfThePicture) {
   }
   const auto cells = residual_cells(views, report, 2, 2);
   EXPECT_NEAR(cells[0].mean_px.x(), 0.1, 1e-12);
-  EXPECT_NEAR(cells[0].z, 0.1 * std::sqrt(cells[0].count) / report.noise_px, 1e-9);
+  EXPECT_NEAR(cells[0].z, 0.1 * std::sqrt(cells[0].count) / shared_noise_px(report), 1e-9);
   for (const std::size_t other : {1u, 2u, 3u}) EXPECT_EQ(cells[other].z, 0.0);
   EXPECT_NEAR(cells[0].u_px, 159.5, 1e-12);  // 320 pixels, the first centred on 0
   EXPECT_NEAR(cells[3].v_px, 359.5, 1e-12);
@@ -89,7 +89,7 @@ TEST(ResidualRings, TellRadialFromTangential) {
     if (ring.count == 0) continue;
     EXPECT_NEAR(ring.mean_radial_px, 0.2, 1e-12);
     EXPECT_NEAR(ring.mean_tangential_px, -0.05, 1e-12);
-    EXPECT_NEAR(ring.sigma_px, report.noise_px / std::sqrt(ring.count), 1e-12);
+    EXPECT_NEAR(ring.sigma_px, shared_noise_px(report) / std::sqrt(ring.count), 1e-12);
   }
   EXPECT_EQ(corners, report.corners_used);
 }

@@ -44,10 +44,11 @@ struct ClusterCovariance {
 /// model the score's covariance is s² h(1 − h). x = (1 − h)^(−1/2) step makes the scatter W = Σ x xᵀ/s² unbiased for 1
 /// (CR2); along directions in which a cluster contradicts the others by more than 3σ, (1 − h)⁻¹ step: what its deletion
 /// changes (CR3, the jackknife). W is noisy with few clusters: all of it but contradictions is shrunk towards c·1,
-/// c = tr W / tr 1, by as much as its own scatter asks for (Ledoit & Wolf). What exceeds 1 is added to the model's, widened by ν/(ν − 2), the variance
-/// of a t distribution of as many degrees of freedom, with which the 2σ interval holds for few clusters, too.
-/// Liang & Zeger, Biometrika 73, 1986; Bell & McCaffrey, Survey Methodology 28(2), 2002; Imbens & Kolesár, Rev. Econ.
-/// Stat. 98(4), 2016; Ledoit & Wolf, J. Multivariate Anal. 88, 2004. docs/maths/honest-sigma.md.
+/// c = tr W / tr 1, by as much as its own scatter asks for (Ledoit & Wolf). What exceeds 1 is added to the model's,
+/// widened by ν/(ν − 2), the variance of a t distribution of as many degrees of freedom, with which the 2σ interval
+/// holds for few clusters, too. Liang & Zeger, Biometrika 73, 1986; Bell & McCaffrey, Survey Methodology 28(2), 2002;
+/// Imbens & Kolesár, Rev. Econ. Stat. 98(4), 2016; Ledoit & Wolf, J. Multivariate Anal. 88, 2004.
+/// docs/maths/honest-sigma.md.
 [[nodiscard]] ClusterCovariance cluster_covariance(const Eigen::MatrixXd& inverse, double noise_variance,
                                                    std::span<const ClusterStep> clusters);
 

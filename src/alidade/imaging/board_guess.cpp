@@ -18,11 +18,12 @@ bool has_markers(const Board& board) { return board.kind == BoardKind::charuco |
 
 using Sizes = std::vector<std::pair<int, int>>;
 
-/// Columns and rows of the usual slips.
+/// Columns and rows of the usual slips. A chessboard is the same one turned by a quarter: of two that are equally near
+/// to what was told the wide one comes first.
 Sizes slips(const Board& told) {
   const int c = told.cols, r = told.rows;
-  const Sizes all{{c, r},     {c - 1, r - 1}, {c + 1, r + 1}, {r, c},         {c - 1, r},     {c + 1, r},
-                  {c, r - 1}, {c, r + 1},     {c - 1, r + 1}, {c + 1, r - 1}, {r - 1, c - 1}, {r + 1, c + 1}};
+  const Sizes all{{c, r},     {c - 1, r - 1}, {c + 1, r + 1}, {r, c},         {c, r - 1},     {c + 1, r},
+                  {c - 1, r}, {c, r + 1},     {c + 1, r - 1}, {c - 1, r + 1}, {r - 1, c - 1}, {r + 1, c + 1}};
   Sizes each;
   for (const auto& size : all) {
     if (std::find(each.begin(), each.end(), size) == each.end()) each.push_back(size);
@@ -105,11 +106,29 @@ struct Score {
   auto operator<=>(const Score&) const = default;
 };
 
+/// Does some photo show half of each outer row and column? A board that is told too large has its markers where the
+/// right one has them, and a row more, of which the paper's border now and then gives a point.
+bool reaches_its_edges(const Board& board, const std::vector<BoardDetection>& photos) {
+  std::array<int, 4> most{};
+  for (const BoardDetection& photo : photos) {
+    std::array<int, 4> seen{};
+    for (const Corner& corner : photo.view.corners) {
+      const int col = corner.index % board.cols, row = corner.index / board.cols;
+      const std::array<bool, 4> is_at{row == 0, row == board.rows - 1, col == 0, col == board.cols - 1};
+      for (std::size_t k = 0; k < 4; ++k) seen[k] += is_at[k] ? 1 : 0;
+    }
+    for (std::size_t k = 0; k < 4; ++k) most[k] = std::max(most[k], seen[k]);
+  }
+  return 2 * std::min(most[0], most[1]) >= board.cols && 2 * std::min(most[2], most[3]) >= board.rows;
+}
+
 Score score_of(const std::vector<cv::Mat>& photos, const Board& board, const Progress& progress) {
   Score score;
   const auto all = static_cast<std::size_t>(num_points(board));
   const PhotoLoader load = [&](std::size_t i) { return photos[i]; };
-  for (const BoardDetection& photo : find_boards(photos.size(), load, board, false, progress).photos) {
+  const std::vector<BoardDetection> found = find_boards(photos.size(), load, board, false, progress).photos;
+  if (board.kind == BoardKind::charuco && !reaches_its_edges(board, found)) return score;
+  for (const BoardDetection& photo : found) {
     const std::size_t seen = photo.view.corners.size();
     // Part of a board without markers may be part of another one as well.
     if (has_markers(board) ? 2 * seen < all : seen < all) continue;

@@ -9,7 +9,7 @@ namespace alidade {
 namespace {
 
 constexpr double good_nis_low = 0.4, good_nis_high = 1.5, care_nis = 2.0, most_nis = 4.0;
-constexpr double bad_gated = 0.5, most_known_gated = 0.8, most_gated = 0.6, care_lost = 0.1, most_lost = 0.5;
+constexpr double bad_gated = 0.5, most_known_gated = 0.8, most_gated = 0.6, care_lost = 1.0 / 3.0, most_lost = 0.5;
 
 Verdict stopped(State state, ExitCode code, std::string sentence, std::string to_add) {
   return {state, code, std::move(sentence), std::move(to_add), {}};

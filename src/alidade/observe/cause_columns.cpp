@@ -103,7 +103,9 @@ void CauseColumns::begin_frame(int frame) {
   view_.emplace(camera, now);
   const Eigen::Matrix3d cam_from_mount = camera.cam_from_mount.toRotationMatrix();
   mount_from_cam_ = cam_from_mount.transpose();
-  cam_from_start_ = cam_from_mount * now.cam_from_start.toRotationMatrix() * mount_from_cam_;
+  // The log's rotation is the mount's, from where it began; the camera turned on it then as it does now.
+  const Eigen::Matrix3d mount_from_begin = now.cam_from_start.toRotationMatrix(), begin_from_start = mount_from_cam_;
+  cam_from_start_ = cam_from_mount * mount_from_begin * begin_from_start;
 }
 
 void CauseColumns::fill_lens(const Eigen::Vector3d& in_cam, Eigen::Ref<Eigen::MatrixXd> out) const {

@@ -61,8 +61,13 @@ std::vector<Misreading> misreadings_of(RotationSource source) {
 constexpr std::size_t most_frames = 150;
 
 /// Noise [px] with which the log is explained, by the rows of its first seconds, thinned; infinite: not at all.
-double noise_of(const RotationLog& log, const ObserveConfig& config, const PixelScale& scale,
-                const Progress& progress) {
+struct Explanation {
+  double noise_px = std::numeric_limits<double>::infinity();
+  bool tells = false;  ///< The focal lengths, too: what tells nothing is explained by any reading.
+};
+
+Explanation explanation_of(const RotationLog& log, const ObserveConfig& config, const PixelScale& scale,
+                           const Progress& progress) {
   MotionReader reader(log.source, config.max_gap_s);
   FrameBuffer buffer(log.num_points, most_frames);
   std::vector<Eigen::Vector2d> px(log.num_points);
@@ -79,7 +84,19 @@ double noise_of(const RotationLog& log, const ObserveConfig& config, const Pixel
   adjust_with.other_starts = {0.7, 2.5, 5.0, 10.0};
   adjust_with.reject = false;
   const Adjustment adjustment = adjust(buffer, adjust_with, progress);
-  return adjustment.has_value ? adjustment.solution.rms_px * scale.scale : std::numeric_limits<double>::infinity();
+  if (!adjustment.has_value) return {};
+  constexpr double most = 0.05;  // σ over the focal length, as an answer may have it
+  const Eigen::Vector2d variance = CommonMatrix(adjustment.solution.bound()).diagonal().head<2>();
+  const Eigen::Vector2d focal = adjustment.solution.camera.k.head<2>();
+  const bool tells = (variance.array() > 0.0).all() && (variance.array().sqrt() < most * focal.array()).all();
+  return {adjustment.solution.rms_px * scale.scale, tells};
+}
+
+/// Turns so small, or about one axis only, tell nothing however they are read.
+bool turns_can_tell(const ObserveMotion& motion) {
+  constexpr double least_rad = 3.0 * degree, little = 0.02;  // of the largest: an axis that did not turn
+  return motion.span_rad >= least_rad &&
+         motion.path_rad.head<2>().minCoeff() >= little * motion.path_rad.maxCoeff();
 }
 
 }  // namespace
@@ -88,8 +105,8 @@ bool may_be_misread(const ObserveReport& report) {
   constexpr double most_ordinary_px = 2.0, many = 0.2;
   using Status = ObserveReport::Status;
   constexpr double ask_beyond = 5.0;
-  if (report.status == Status::no_convergence || report.status == Status::unsteady) return true;
-  if (report.status == Status::unobservable) return report.motion.path_rad.head<2>().minCoeff() > 0.0;
+  const bool has_answer = report.status == Status::ok || report.status == Status::too_few_data;
+  if (!has_answer) return turns_can_tell(report.motion);
   if (std::ranges::any_of(report.causes, [](const CauseScore& cause) { return cause.z >= ask_beyond; })) return true;
   const auto seen = static_cast<double>(report.reference.bundle.observations.size() + report.pixels_left_out);
   return report.status == Status::ok &&
@@ -100,15 +117,15 @@ std::string misread_rotation(const RotationLog& log, const ObserveConfig& config
                              const Progress& progress) {
   if (log.source == RotationSource::none || config.rotation == RotationKnowledge::free) return "";
   constexpr double most_px = 3.0, clearly = 0.3;  // of the noise as the log is read
-  const double as_read = noise_of(log, config, report.scale, progress);
+  const double as_read = explanation_of(log, config, report.scale, progress).noise_px;
   std::string best;
   double least = std::min(most_px, clearly * as_read);
   for (const Misreading& misreading : misreadings_of(log.source)) {
     RotationLog undone = log;
     for (RotationRow& row : undone.rows) misreading.undo(row);
-    const double noise = noise_of(undone, config, report.scale, progress);
-    if (!(noise < least)) continue;
-    least = noise;
+    const Explanation explained = explanation_of(undone, config, report.scale, progress);
+    if (!explained.tells || !(explained.noise_px < least)) continue;
+    least = explained.noise_px;
     best = misreading.words;
   }
   return best;

@@ -147,34 +147,6 @@ struct ObserveReport {
 /// Is the rotation read as it was meant? A mount that turns by half a turn, or a misreading that fits better.
 [[nodiscard]] Check rotation_check(const ObserveReport& report);
 
-/// The log as a camera without distortion but the same fx, fy, cx, cy would have seen it; pixels that the lens cannot
-/// have seen become "not seen".
-[[nodiscard]] RotationLog undistorted(const RotationLog& log, const Camera& camera);
-
-/// The camera that was observed, with its covariance: pinhole, or brown where k1 was estimated or `known` has a lens.
-[[nodiscard]] Camera observed_camera(const ObserveReport& report, const std::optional<Camera>& known);
-
-/// The word for an event in files: start, burst, slip, zoom, zoom_end, restart, gap; empty for none.
-[[nodiscard]] std::string_view event_name(ObserveEvent event);
-
-/// Picture's middle and half width: of the size given, else of what holds the pixels.
-[[nodiscard]] PixelScale pixel_scale(const RotationLog& log, int& width_px, int& height_px);
-
-/// What the log and the person give, with the answer's move for an error of its σ or, without one, of what errors
-/// ordinarily are or the residuals would still hide, whichever is less. What has a σ is added to `cov` (normalised).
-[[nodiscard]] std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveConfig& config,
-                                                     const ObserveReport& report, CommonMatrix& cov);
-
-/// Checks of the verdict that look at the reference's residuals: what they ask for, whether errors are shared, whether
-/// the noise is one that trackers have, whether points stand still.
-[[nodiscard]] std::vector<Check> residual_checks(const ObserveReport& report);
-
-/// Is the rotation read as it was meant? A mount that turns by half a turn, or a misreading that fits better.
-[[nodiscard]] Check rotation_check(const ObserveReport& report);
-
-/// What to do about the cause that explains the residuals best; empty if none is asked for.
-[[nodiscard]] std::string cause_remedy(const ObserveReport& report);
-
 /// Where a log without measured rotation may start: a focal length and each row's rotation, from pairs of neighbouring
 /// rows, by the focal length that makes them rotations best. None: too few shared points.
 struct FreeRotationStart {

@@ -101,6 +101,32 @@ MatrixXd made_positive(const MatrixXd& symmetric) {
   return eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal() * eigen.vectors.transpose();
 }
 
+/// Σ r(t)·r(t + lag) over the tracks, by the lag; what lies beyond Huber's limit is drawn in.
+std::vector<double> products_by_lag(const Adjustment& reference) {
+  const RotationBundle& bundle = reference.bundle;
+  const std::size_t every = std::max<std::size_t>(1, bundle.points.size() / tracks_looked_at);
+  std::vector<std::vector<Eigen::Vector2d>> tracks(bundle.points.size());
+  const double limit = BundleConfig{}.huber * reference.sigma_px;
+  for (std::size_t i = 0; i < bundle.observations.size(); ++i) {
+    const auto point = static_cast<std::size_t>(bundle.observations[i].point);
+    const Eigen::Vector2d& residual = reference.solution.residuals[i];
+    if (point % every != 0 || !residual.allFinite()) continue;
+    tracks[point].push_back(residual.norm() > limit ? Eigen::Vector2d(residual * (limit / residual.norm())) : residual);
+  }
+  std::vector<double> product(std::min<std::size_t>(bundle.frames.size() / 4, 600) + 1, 0.0);
+  for (std::size_t lag = 0; lag < product.size(); ++lag) {
+    for (const auto& track : tracks) {
+      for (std::size_t k = lag; k < track.size(); ++k) product[lag] += track[k].dot(track[k - lag]);
+    }
+    constexpr double nothing = -0.1;  // beyond the first lag of no correlation there is none to be summed
+    if (product[lag] < nothing * product[0]) {
+      product.resize(lag);
+      break;
+    }
+  }
+  return product;
+}
+
 }  // namespace
 
 double seen_within(double block_s, double correlation_s) {
@@ -115,35 +141,32 @@ double residual_weight(const Adjustment& reference, std::size_t observation) {
 }
 
 double residual_correlation_s(const Adjustment& reference) {
-  const RotationBundle& bundle = reference.bundle;
-  const std::size_t every = std::max<std::size_t>(1, bundle.points.size() / tracks_looked_at);
-  std::vector<std::vector<Eigen::Vector2d>> tracks(bundle.points.size());
-  const double limit = BundleConfig{}.huber * reference.sigma_px;
-  for (std::size_t i = 0; i < bundle.observations.size(); ++i) {
-    const auto point = static_cast<std::size_t>(bundle.observations[i].point);
-    const Eigen::Vector2d& residual = reference.solution.residuals[i];
-    if (point % every != 0 || !residual.allFinite()) continue;
-    tracks[point].push_back(residual.norm() > limit ? Eigen::Vector2d(residual * (limit / residual.norm())) : residual);
-  }
-  double power = 0.0;
-  for (const auto& track : tracks) {
-    for (const Eigen::Vector2d& residual : track) power += residual.squaredNorm();
-  }
-  const std::size_t most_lags = std::min<std::size_t>(bundle.frames.size() / 4, 600);
-  double sum = 0.0;
-  for (std::size_t lag = 1; lag <= most_lags && power > 0.0; ++lag) {
-    double product = 0.0;
-    for (const auto& track : tracks) {
-      for (std::size_t k = lag; k < track.size(); ++k) product += track[k].dot(track[k - lag]);
+  const std::vector<double> product = products_by_lag(reference);
+  const auto num_frames = static_cast<double>(reference.bundle.frames.size());
+  if (product.size() < 2 || !(product[0] > 0.0)) return 0.0;
+  // A point's bearing takes the mean of its track's errors with it: all products lose that mean's variance.
+  double lost = 0.0, lag_sum = 0.0, sum = 0.0;
+  constexpr int rounds = 20;
+  for (int round = 0; round < rounds; ++round) {
+    lag_sum = sum = 0.0;
+    double of_mean = 1.0;
+    for (std::size_t lag = 1; lag < product.size(); ++lag) {
+      const double k = static_cast<double>(lag), pairs = (1.0 - k / num_frames);
+      const double correlation = (product[lag] / (product[0] * pairs)) * (1.0 - lost) + lost;
+      constexpr double nothing = 0.05;
+      if (correlation < nothing) break;
+      sum += correlation;
+      lag_sum += k * correlation;
+      of_mean += 2.0 * pairs * correlation;
     }
-    const double correlation = product / power;
-    constexpr double nothing = 0.05;
-    if (correlation < nothing) break;
-    sum += correlation;
+    constexpr double most_lost = 0.5;
+    lost = std::min(of_mean / num_frames, most_lost);
   }
-  const double frame_s =
-      duration_of(reference) / std::max<double>(1.0, static_cast<double>(bundle.frames.size()) - 1.0);
-  return sum * frame_s;
+  if (!(sum > 0.0)) return 0.0;
+  const double frame_s = duration_of(reference) / std::max(1.0, num_frames - 1.0);
+  // Σ k qᵏ / Σ qᵏ = 1 / (1 − q), whatever the share of the noise that does not last.
+  const double mean_lag = lag_sum / sum;
+  return mean_lag > 1.0 ? -frame_s / std::log1p(-1.0 / mean_lag) : std::min(sum, 1.0) * frame_s;
 }
 
 StatedCovariance stated_covariance(const Adjustment& reference, const ObserveNuisances& nuisances) {

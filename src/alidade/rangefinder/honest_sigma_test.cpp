@@ -242,6 +242,28 @@ TEST(Causes, UnitsAndTheOrderOfRowsAreNamed) {
   }
 }
 
+TEST(Causes, WhatFitsHasNone) {
+  for (const char* name : {"equal_range", "through_centre", "reference", "short_span", "table1"}) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      const auto sample = draw_rangefinder_sample(*rangefinder_scenario(name), {}, seed);
+      for (const SigmaMethod method : {SigmaMethod::spot, SigmaMethod::plane, SigmaMethod::joint})
+        EXPECT_EQ(cause_of_misfit(sample.simulated.shots, sample.points, sample.camera, {.method = method}), "")
+            << name << seed;
+    }
+  }
+}
+
+/// Whatever the noise makes of a solve that has no bottom, the spots show why: they do not move with the range.
+TEST(Causes, BeamThroughTheCentreIsNamed) {
+  const RangefinderConfig config{.method = SigmaMethod::spot};
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const auto sample = draw_rangefinder_sample(*rangefinder_scenario("through_centre"), {}, seed);
+    const Verdict verdict = rangefinder_verdict(solve_sample(sample, config), sample.simulated.shots, config);
+    EXPECT_TRUE(verdict.state == State::refused) << seed;
+    EXPECT_NE(verdict.sentence.find("optical centre"), std::string::npos) << seed << verdict.sentence;
+  }
+}
+
 TEST(Causes, AnotherCamerasFileIsNamed) {
   auto sample = draw_rangefinder_sample(*rangefinder_scenario("reference"), {}, 3);
   Eigen::VectorXd values = params(sample.camera.lens);

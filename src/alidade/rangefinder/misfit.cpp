@@ -1,4 +1,7 @@
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "alidade/rangefinder/rangefinder.h"
@@ -6,16 +9,39 @@
 namespace alidade {
 namespace {
 
-/// A beam that explains nearly all shots, by readings as a rangefinder's are.
-bool explains(const std::vector<Shot>& shots, std::span<const Eigen::Vector3d> points_in_board, const Camera& camera,
-              const RangefinderConfig& config) {
+/// How well a beam explains shots; 0 to spare where none does.
+struct Explained {
+  bool fits = false;                                       ///< Nearly all, by readings as a rangefinder's are.
+  bool known = false;                                      ///< And the shots tell which beam.
+  double rms_m = std::numeric_limits<double>::infinity();  ///< Of the ranges of all shots.
+  int spare = 0;                                           ///< Measurements beyond what the beam takes.
+};
+
+Explained explained(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board, const Camera& camera,
+                    const RangefinderConfig& config) {
   constexpr double most_m = 0.05, most_of_range = 0.02;
   const RangefinderReport report = calibrate_rangefinder(shots, points_in_board, camera, config);
-  double mean_m = 0.0;
+  double mean_m = 0.0, sum_m2 = 0.0, num = 0.0;
   for (const Shot& shot : shots) mean_m += shot.range_m / static_cast<double>(shots.size());
-  return report.status == RangefinderReport::Status::converged && report.bound.sigma_origin_m < 0.1 &&
-         10 * report.shots_used >= 8 * static_cast<int>(shots.size()) && report.rms_range_m > 0.0 &&
-         report.rms_range_m < std::min(most_m, most_of_range * mean_m);
+  Explained by{.spare = -5};
+  for (const ShotFit& fit : report.shots) {
+    by.spare += (std::isfinite(fit.residual_range_m) ? 1 : 0) + (fit.residual_px.allFinite() ? 2 : 0);
+    if (!std::isfinite(fit.residual_range_m)) continue;
+    sum_m2 += fit.residual_range_m * fit.residual_range_m;
+    num += 1.0;
+  }
+  if (num > 0.0) by.rms_m = std::sqrt(sum_m2 / num);
+  by.fits = 10 * report.shots_used >= 8 * static_cast<int>(shots.size()) && report.rms_range_m > 0.0 &&
+            report.rms_range_m < std::min(most_m, most_of_range * mean_m);
+  by.known = report.status == RangefinderReport::Status::converged && report.bound.sigma_origin_m < 0.1;
+  return by;
+}
+
+/// Is it the cause? Its residuals are so much smaller that by chance none of the causes tried would do so once in a
+/// thousand tables: likelihood ratio of normal residuals, times the number of causes.
+bool is_cause(const Explained& by, const Explained& as_given) {
+  constexpr double num_causes = 6.0, chance = 1e-3;
+  return by.fits && by.known && by.spare * std::log(as_given.rms_m / by.rms_m) > std::log(num_causes / chance);
 }
 
 /// The ranges of one row after (1) or before (−1); the row without one is left out.
@@ -41,9 +67,14 @@ std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::
   if (plain.method == RangefinderMethod::spot) plain.method = RangefinderMethod::joint;  // spots know no metres
   plain.estimate_scale = plain.scale_by_need = false;
   plain.range_noise.reset();
-  if (explains(shifted(shots, 1), points_in_board, camera, plain))
+  const Explained as_given = explained(shots, points_in_board, camera, plain);
+  if (as_given.fits) return "";  // nothing is amiss with them: what they cannot tell they do not know
+  const auto explains = [&](std::span<const Shot> others) {
+    return is_cause(explained(others, points_in_board, camera, plain), as_given);
+  };
+  if (explains(shifted(shots, 1)))
     return "each range belongs to the row before it: the order of the rows is shifted by one";
-  if (explains(shifted(shots, -1), points_in_board, camera, plain))
+  if (explains(shifted(shots, -1)))
     return "each range belongs to the row after it: the order of the rows is shifted by one";
   constexpr std::array<std::pair<double, const char*>, 4> units{
       {{0.001, "millimetres"}, {0.01, "centimetres"}, {0.0254, "inches"}, {0.3048, "feet"}}};
@@ -53,7 +84,7 @@ std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::
       shot.range_m *= metres;
       if (shot.sigma_range_m) *shot.sigma_range_m *= metres;
     }
-    if (explains(scaled, points_in_board, camera, plain)) return std::string("the ranges are ") + name + ", not metres";
+    if (explains(scaled)) return std::string("the ranges are ") + name + ", not metres";
   }
   return "";
 }

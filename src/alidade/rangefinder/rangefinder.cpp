@@ -280,7 +280,10 @@ void put_uncertainty(const BeamProblem& problem, const LensPrior& prior, const C
                      const RangefinderConfig& config, RangefinderReport& report) {
   const ReducedSystem system = reduced_system(problem, prior, state);
   SolvedPart part{system.places(problem.num_free(), prior.free), {}};
-  part.inverse = inverse_of_scaled(system.H(part.places, part.places));
+  const Eigen::MatrixXd information = system.H(part.places, part.places);
+  constexpr double rounding = 1e13;  // an inverse of more is made of it
+  if (!(scaled_condition(information) < rounding)) return;
+  part.inverse = inverse_of_scaled(information);
   if (!part.inverse.allFinite()) return;
   put_clusters(problem, system, part, prior, report);
   report.held = held_things(system, part, prior, camera, problem.points_in_board, report, config);

@@ -106,7 +106,8 @@ struct RangefinderReport {
 [[nodiscard]] bool wants_scale(const RangefinderReport& report, const RangefinderConfig& config);
 
 /// Why shots that no beam explains may do so: with the ranges in another unit, or each range a row before or after its
-/// spot and board, a beam explains them well. One sentence; empty where neither is so.
+/// spot and board, a beam explains them well. One sentence; empty where neither is so, and where a beam explains them
+/// as they are, though they may not tell which.
 [[nodiscard]] std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board,
                                           const Camera& camera, const RangefinderConfig& config);
 

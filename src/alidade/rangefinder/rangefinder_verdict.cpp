@@ -60,12 +60,47 @@ double sigma_of_offset_m(const Beam& beam) {
   return std::sqrt((J * embedded_covariance(beam) * J.transpose())[0]);
 }
 
+constexpr double near_centre_m = 0.015;
+
+/// How far the beam's line passes from the camera's centre.
+struct LineOffset {
+  double value_m = 0.0, sigma_m = 0.0;
+};
+
+/// By the spots alone: a ray's x/z and y/z move with 1/range by how far the line passes. Told where no beam is: with
+/// all spots at one place any origin along their ray will do. None where they do not tell it, either.
+std::optional<LineOffset> offset_by_spots(const RangefinderReport& report, std::span<const Shot> shots) {
+  std::vector<Eigen::Vector3d> seen;  // x/z, y/z, 1/range
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < shots.size() && i < report.shots.size(); ++i) {
+    const auto ray = report.shots[i].used && shots[i].spot ? unproject(report.camera, shots[i].spot->px) : std::nullopt;
+    if (!ray || !(ray->z() > 0.0)) continue;
+    seen.emplace_back(ray->x() / ray->z(), ray->y() / ray->z(), 1.0 / shots[i].range_m);
+    mean += seen.back();
+  }
+  if (seen.size() < 4) return std::nullopt;
+  mean /= static_cast<double>(seen.size());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& s : seen) scatter += (s - mean) * (s - mean).transpose();
+  if (!(scatter(2, 2) > 0.0)) return std::nullopt;
+  const Eigen::Vector2d slope = scatter.block<2, 1>(0, 2) / scatter(2, 2);
+  const double left = scatter.topLeftCorner<2, 2>().trace() - slope.squaredNorm() * scatter(2, 2);
+  const double variance = std::max(0.0, left) / (2.0 * static_cast<double>(seen.size()) - 4.0);
+  const LineOffset offset{slope.norm(), std::sqrt(variance / scatter(2, 2))};
+  return 3.0 * offset.sigma_m < near_centre_m ? std::optional(offset) : std::nullopt;
+}
+
+/// Of the solved beam; where that does not know it, of the spots.
+LineOffset line_offset(const RangefinderReport& report, std::span<const Shot> shots) {
+  const LineOffset solved{report.bound.offset_m, sigma_of_offset_m(report.beam)};
+  if (3.0 * solved.sigma_m < near_centre_m) return solved;
+  return offset_by_spots(report, shots).value_or(solved);
+}
+
 /// Only where the shots do say so: a line that passes far off, however badly known, is another matter.
-bool passes_the_centre(const RangefinderReport& report) {
+bool passes_the_centre(const LineOffset& offset) {
   constexpr double least_m = 0.002;  // nearer, no spot moves by what it could be measured with
-  constexpr double near_m = 0.015;
-  const double sigma_m = sigma_of_offset_m(report.beam);
-  return report.bound.offset_m < near_m && report.bound.offset_m < std::max(least_m, 3.0 * sigma_m);
+  return offset.value_m < near_centre_m && offset.value_m < std::max(least_m, 3.0 * offset.sigma_m);
 }
 
 /// Mean angle of the boards' normals to the camera's view, from the cosines.
@@ -96,14 +131,15 @@ Weakness reason_of_boards(const RangefinderReport& report) {
           "tilt the board to all sides"};
 }
 
-Weakness reason_of(const RangefinderReport& report, Method method) {
+Weakness reason_of(const RangefinderReport& report, std::span<const Shot> shots, Method method) {
   const BeamBound& bound = report.bound;
+  const LineOffset offset = line_offset(report, shots);
   const bool equal = bound.range_ratio < degenerate_range_ratio;
   if (method == Method::plane && bound.normal_spread < degenerate_normal_spread) return reason_of_boards(report);
   if (equal) return reason_of_equal_ranges(report);
-  if (method == Method::spot && passes_the_centre(report)) {
+  if (method == Method::spot && passes_the_centre(offset)) {
     return {"beam through the optical centre",
-            "the beam passes the optical centre by " + text_of(1e3 * bound.offset_m, 2) +
+            "the beam passes the optical centre by " + text_of(1e3 * offset.value_m, 2) +
                 " mm: where along it the origin lies cannot be told",
             "mount the rangefinder a few centimetres beside the camera"};
   }
@@ -145,7 +181,7 @@ void add_precision(const RangefinderReport& report, Method method, Verdict& verd
                                     bound.condition, limit, "", "precision"));
 }
 
-void add_geometry(const RangefinderReport& report, Method method, Verdict& verdict) {
+void add_geometry(const RangefinderReport& report, std::span<const Shot> shots, Method method, Verdict& verdict) {
   const BeamBound& bound = report.bound;
   verdict.checks.push_back(check_of("ranges", bound.range_ratio >= least_range_ratio ? State::good : State::care,
                                     "the longest range is " + text_of(bound.range_ratio) + " times the shortest",
@@ -159,10 +195,11 @@ void add_geometry(const RangefinderReport& report, Method method, Verdict& verdi
                                       bound.normal_spread, least_normal_spread, "", "next"));
   }
   if (method == Method::spot) {
+    const LineOffset offset = line_offset(report, shots);
     verdict.checks.push_back(
-        check_of("offset", passes_the_centre(report) ? State::refused : State::good,
-                 "the beam passes the optical centre by " + text_of(1e3 * bound.offset_m, 2) + " mm",
-                 1e3 * bound.offset_m, 3e3 * sigma_of_offset_m(report.beam), "mm", "precision"));
+        check_of("offset", passes_the_centre(offset) ? State::refused : State::good,
+                 "the beam passes the optical centre by " + text_of(1e3 * offset.value_m, 2) + " mm",
+                 1e3 * offset.value_m, 3e3 * offset.sigma_m, "mm", "precision"));
   }
 }
 
@@ -253,7 +290,7 @@ Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Sho
   Verdict verdict;
   if (is_solved) {
     add_precision(report, method, verdict);
-    add_geometry(report, method, verdict);
+    add_geometry(report, shots, method, verdict);
     add_fit(report, verdict);
     verdict.checks.push_back(clusters_agree(report.clusters, "shot",
                                             "a lens or a square that is off, spots or corners that err alike, a bowed "
@@ -285,7 +322,7 @@ Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Sho
     verdict = refusal(State::refused, ExitCode::cannot_tell, refused->text,
                       "check --board, --square and the camera; --method spot does without boards");
   } else if (report.status == Status::degenerate || (is_solved && refused != verdict.checks.end())) {
-    const Weakness reason = reason_of(report, method);
+    const Weakness reason = reason_of(report, shots, method);
     verdict = refusal(State::refused, ExitCode::cannot_tell, reason.what, reason.add + other_method(method, supply));
     checks.push_back(check_of(reason.name, State::refused, reason.what, 0.0, 0.0, "", "next"));
   } else if (report.status != Status::converged) {

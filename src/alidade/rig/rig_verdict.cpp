@@ -183,8 +183,8 @@ void add_causes(const RigReport& report, Verdict& verdict) {
 }
 
 void add_views(const RigReport& report, Verdict& verdict) {
-  verdict.checks.push_back(
-      clusters_agree(report.clusters, "view", "blur, an encoder's jitter, the board's shape, or the lens", "residuals"));
+  verdict.checks.push_back(clusters_agree(report.clusters, "view",
+                                          "blur, an encoder's jitter, the board's shape, or the lens", "residuals"));
 }
 
 }  // namespace

@@ -189,6 +189,9 @@ BundleResult solve_bundle(const BundleProblem& problem, BundleState start, const
   if (!linearize(problem, result.state, eq)) return result;
   const double dof = degrees_of_freedom(problem);
   const double tolerance2 = config.tolerance_sigmas * config.tolerance_sigmas;
+  // A long lens and a far board leave a curved valley a millionth as stiff as the rest: more damping than this makes
+  // the solve creep along it.
+  constexpr double least_lambda = 1e-9;
   double lambda = config.first_lambda;
   for (; result.iterations < config.max_iterations && lambda < 1e12; ++result.iterations) {
     auto step = damped_step(problem, result.state, eq, lambda);
@@ -199,12 +202,12 @@ BundleResult solve_bundle(const BundleProblem& problem, BundleState start, const
       break;
     }
     if (!step || !linearize(problem, step->state, trial) || !(trial.cost <= eq.cost)) {
-      lambda = std::max(10.0 * lambda, 1e-5);
+      lambda = std::max(10.0 * lambda, least_lambda);
       continue;
     }
     result.state = std::move(step->state);
     std::swap(eq, trial);
-    lambda = lambda <= 1e-5 ? 0.0 : lambda * 0.1;
+    lambda = lambda <= least_lambda ? 0.0 : lambda * 0.1;
   }
   result.cost = eq.cost;
   result.equations = std::make_shared<const NormalEquations>(std::move(eq));

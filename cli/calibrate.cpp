@@ -170,6 +170,10 @@ PhotoCalibration from_corners(const CalibrateArgs& args, const Board& board, Cal
   result.reasons.resize(result.views.size());
   result.size = size_of(args, result.views);
   require_corners_inside(result.size, args, result.views);
+  if (args.size.empty() && !args.port.air) {
+    run.say(fmt::format("picture size {}x{} is the least that holds the corners: give --size WIDTHxHEIGHT",
+                        result.size.width_px, result.size.height_px));
+  }
   const bool have_sigma = std::any_of(result.views.begin(), result.views.end(), [](const BoardView& view) {
     return std::any_of(view.corners.begin(), view.corners.end(),
                        [](const Corner& corner) { return corner.cov != Eigen::Matrix2d::Identity(); });

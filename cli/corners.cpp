@@ -154,7 +154,12 @@ ExitCode find_corners_of(const CornersArgs& args, Run& run) {
     const std::string& reason = calibration.photos.report.views[k].reason;
     if (stated.views[k].corners.empty()) run.say(fmt::format("no corners: {}: {}", stated.views[k].photo, reason));
   }
-  if (stated.corners > 0) run.add_file("corners.csv", corners_csv(stated.views));
+  if (stated.corners > 0) {
+    const ImageSize& size = calibration.photos.size;
+    run.add_file("corners.csv", corners_csv(stated.views));
+    run.say(fmt::format("the table has no picture size: calibrate --corners takes --size {}x{} with it", size.width_px,
+                        size.height_px));
+  }
   return run.finish(std::move(verdict));
 }
 

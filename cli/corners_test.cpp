@@ -100,7 +100,9 @@ TEST_F(Corners, AreThoseOfCalibrateWithTheResidualsInTheirCovariance) {
 
 TEST_F(Corners, CalibrateFindsTheSameCameraFromTheTableAsFromThePhotos) {
   add_photos(photos_with_corners);
-  ASSERT_EQ(run("corners", {photos().string()}).code, 0);
+  const Outcome corners = run("corners", {photos().string()});
+  ASSERT_EQ(corners.code, 0) << corners.err;
+  EXPECT_THAT(corners.err + corners.out, HasSubstr("--size 640x480"));
   ASSERT_EQ(run("calibrate", {photos().string()}, "a").code, 0);
   ASSERT_EQ(run("calibrate", {"--corners", (out() / "corners.csv").string(), "--size", "640x480"}, "b").code, 0);
   const json a = result("a"), b = result("b");

@@ -257,6 +257,15 @@ void add_fit(const RangefinderReport& report, Verdict& verdict) {
                                     "residuals"));
 }
 
+/// A singular information has no clusters: of that others speak.
+void add_clusters(const RangefinderReport& report, Verdict& verdict) {
+  const bool is_few = report.shots_used < static_cast<int>(ClusterCovariance::least_clusters);
+  if (report.clusters.z2.empty() && !is_few) return;
+  verdict.checks.push_back(
+      clusters_agree(report.clusters, "shot",
+                     "a lens or a square that is off, spots or corners that err alike, a bowed board", "residuals"));
+}
+
 Verdict refusal_by_status(const RangefinderReport& report, Method method, const Supply& supply) {
   if (report.status == Status::scale_unknown) {
     return refusal(State::refused, ExitCode::cannot_tell, "spots alone cannot tell the scale of the ranges",
@@ -292,10 +301,7 @@ Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Sho
     add_precision(report, method, verdict);
     add_geometry(report, shots, method, verdict);
     add_fit(report, verdict);
-    verdict.checks.push_back(clusters_agree(report.clusters, "shot",
-                                            "a lens or a square that is off, spots or corners that err alike, a bowed "
-                                            "board",
-                                            "residuals"));
+    add_clusters(report, verdict);
     if (method != Method::spot) add_boards(report, shots, verdict);
     add_spare(report, verdict);
     add_cause_checks(report, shots, config, verdict);

@@ -353,9 +353,14 @@ void place(Placing& work, const TrueTrack& truth) {
     if (work.solved.cov.size() == 0) break;
   }
   take_results(work);
-  if (work.solved.cov.size() == 0) return;
+  const bool is_told = work.solved.cov.size() > 0;
+  // By wrong times, rays meet in a short piece of path at most, which tells no places: it is not the path's fault.
+  const SightSeries& watching = work.series[work.problem.reference];
+  const bool fits = 2.0 * static_cast<double>(work.path_t_s.size()) * work.knot_s >
+                    static_cast<double>(watching.t_s.size()) * watching.spacing_s;
+  if (!is_told && (fits || work.problem.clocks_are_free)) return;
   work.report.status = PlacedStatus::no_convergence;
-  if (work.solved.converged) set_scale(work, truth);
+  if (is_told && work.solved.converged) set_scale(work, truth);
 }
 
 double first_time(std::span<const TargetSight> sights) {

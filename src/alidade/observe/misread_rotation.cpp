@@ -95,8 +95,7 @@ Explanation explanation_of(const RotationLog& log, const ObserveConfig& config, 
 /// Turns so small, or about one axis only, tell nothing however they are read.
 bool turns_can_tell(const ObserveMotion& motion) {
   constexpr double least_rad = 3.0 * degree, little = 0.02;  // of the largest: an axis that did not turn
-  return motion.span_rad >= least_rad &&
-         motion.path_rad.head<2>().minCoeff() >= little * motion.path_rad.maxCoeff();
+  return motion.span_rad >= least_rad && motion.path_rad.head<2>().minCoeff() >= little * motion.path_rad.maxCoeff();
 }
 
 }  // namespace

@@ -118,13 +118,33 @@ std::vector<double> products_by_lag(const Adjustment& reference) {
     for (const auto& track : tracks) {
       for (std::size_t k = lag; k < track.size(); ++k) product[lag] += track[k].dot(track[k - lag]);
     }
-    constexpr double nothing = -0.1;  // beyond the first lag of no correlation there is none to be summed
-    if (product[lag] < nothing * product[0]) {
-      product.resize(lag);
+    if (product[lag] < 0.0) {
+      product.resize(lag);  // beyond the first lag without correlation there is none to be summed
       break;
     }
   }
   return product;
+}
+
+/// τ [frames] for which Σ k exp(−k/τ) / Σ exp(−k/τ), k = 1 … last, is `mean_lag`: whatever share of the noise does not
+/// last. At most `last`: correlations of a longer one would not have ended there.
+double lasting_frames(double mean_lag, double last) {
+  const auto mean_for = [last](double tau) {
+    double sum = 0.0, lag_sum = 0.0;
+    for (double k = 1.0; k <= last; k += 1.0) {
+      const double correlation = std::exp((1.0 - k) / tau);
+      sum += correlation;
+      lag_sum += k * correlation;
+    }
+    return lag_sum / sum;
+  };
+  double low = 0.05, high = last;
+  constexpr int halvings = 30;
+  for (int i = 0; i < halvings; ++i) {
+    const double middle = 0.5 * (low + high);
+    (mean_for(middle) < mean_lag ? low : high) = middle;
+  }
+  return high;
 }
 
 }  // namespace
@@ -145,16 +165,17 @@ double residual_correlation_s(const Adjustment& reference) {
   const auto num_frames = static_cast<double>(reference.bundle.frames.size());
   if (product.size() < 2 || !(product[0] > 0.0)) return 0.0;
   // A point's bearing takes the mean of its track's errors with it: all products lose that mean's variance.
-  double lost = 0.0, lag_sum = 0.0, sum = 0.0;
+  double lost = 0.0, lag_sum = 0.0, sum = 0.0, last = 0.0;
   constexpr int rounds = 20;
   for (int round = 0; round < rounds; ++round) {
-    lag_sum = sum = 0.0;
+    lag_sum = sum = last = 0.0;
     double of_mean = 1.0;
     for (std::size_t lag = 1; lag < product.size(); ++lag) {
-      const double k = static_cast<double>(lag), pairs = (1.0 - k / num_frames);
+      const double k = static_cast<double>(lag), pairs = 1.0 - k / num_frames;
       const double correlation = (product[lag] / (product[0] * pairs)) * (1.0 - lost) + lost;
       constexpr double nothing = 0.05;
       if (correlation < nothing) break;
+      last = k;
       sum += correlation;
       lag_sum += k * correlation;
       of_mean += 2.0 * pairs * correlation;
@@ -164,9 +185,7 @@ double residual_correlation_s(const Adjustment& reference) {
   }
   if (!(sum > 0.0)) return 0.0;
   const double frame_s = duration_of(reference) / std::max(1.0, num_frames - 1.0);
-  // Σ k qᵏ / Σ qᵏ = 1 / (1 − q), whatever the share of the noise that does not last.
-  const double mean_lag = lag_sum / sum;
-  return mean_lag > 1.0 ? -frame_s / std::log1p(-1.0 / mean_lag) : std::min(sum, 1.0) * frame_s;
+  return lasting_frames(lag_sum / sum, last) * frame_s;
 }
 
 StatedCovariance stated_covariance(const Adjustment& reference, const ObserveNuisances& nuisances) {

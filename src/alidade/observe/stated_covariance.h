@@ -22,8 +22,9 @@ struct StatedCovariance {
 /// bundles with turns: the model's covariance comes back. Cameron, Gelbach & Miller, J. Bus. Econ. Stat. 29(2), 2011.
 [[nodiscard]] StatedCovariance stated_covariance(const Adjustment& reference, const ObserveNuisances& nuisances);
 
-/// Integrated correlation time of the residuals along the tracks, one-sided: τ for a correlation exp(−t/τ), 0 for white
-/// noise.
+/// τ of what lasts in the residuals along the tracks, for a correlation c exp(−t/τ): c is the share of the noise that
+/// lasts, the rest is white. From the mean lag of their correlation, freed of what the points' bearings take of it.
+/// 0: white noise.
 [[nodiscard]] double residual_correlation_s(const Adjustment& reference);
 
 /// Share of a sum's variance that is seen within blocks of length `block_s`, for a correlation exp(−t/τ).

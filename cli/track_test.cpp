@@ -12,6 +12,7 @@
 #include "alidade/io/csv.h"
 #include "alidade/io/files.h"
 #include "alidade/testing/command_test.h"
+#include "alidade/testing/reference_case.h"
 
 namespace alidade {
 namespace {
@@ -148,10 +149,8 @@ TEST_F(TrackCommand, PredictsAhead) {
 }
 
 TEST_F(TrackCommand, ReadsTheReferenceEventsInTheirSpelling) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set";
   simulate("B");
-  const std::string events = std::string(data) + "/cases/c6_events_latency.csv";
+  const std::string events = testing::reference_case("c6_events_latency.csv");
   const Outcome outcome = alidade({"track", events, "--rig", path("sim/rig.yaml"), "--truth", path("sim/truth.csv"),
                                    "--sigma-a", "1", "--out", path("out"), "--no-report", "--json"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;

@@ -12,6 +12,7 @@
 
 #include "alidade/camera/radial_fold.h"
 #include "alidade/testing/random.h"
+#include "alidade/testing/reference_case.h"
 
 namespace alidade {
 namespace {
@@ -167,10 +168,7 @@ TEST(Brown, EveryPixelIsAnsweredTrulyOrNotAtAll) {
 // --- the reference case ---------------------------------------------------------------------------------------------
 
 nlohmann::json read_case(const std::string& name) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (!data) return nullptr;
-  std::ifstream file(std::string(data) + "/cases/" + name);
-  return nlohmann::json::parse(file);
+  return nlohmann::json::parse(std::ifstream(testing::reference_case(name)));
 }
 
 Eigen::Vector2d point2(const nlohmann::json& at) { return {at[0].get<double>(), at[1].get<double>()}; }
@@ -185,7 +183,6 @@ Params<Brown> params_of(const nlohmann::json& K, int num_coefficients) {
 
 TEST(BrownCase, AgreesWithTheReferenceProjection) {
   const nlohmann::json reference = read_case("d1_projection.json");
-  if (reference.is_null()) GTEST_SKIP() << "set ALIDADE_DATA to the folder that holds cases/d1_projection.json";
   const double tolerance = reference["tol"];
   const Params<Brown> full = params_of(reference["K"], 5), first = params_of(reference["K"], 1),
                       none = params_of(reference["K"], 0);

@@ -9,6 +9,7 @@
 
 #include "alidade/estimation/van_loan.h"
 #include "alidade/testing/random.h"
+#include "alidade/testing/reference_case.h"
 
 namespace alidade {
 namespace {
@@ -138,9 +139,7 @@ Eigen::Matrix<double, N, N> matrix_of(const Json& rows) {
 }
 
 TEST(MotionModels, AgreeWithTheReferenceCase) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set";
-  const Json given = Json::parse(std::ifstream(std::string(data) + "/cases/c4_ekf_update.json"));
+  const Json given = Json::parse(std::ifstream(testing::reference_case("c4_ekf_update.json")));
   const double tolerance = given["tol"];
   const ConstantVelocity steady{given["cv"]["sigma_a"]};
   const double dt_s = given["cv"]["dt"];

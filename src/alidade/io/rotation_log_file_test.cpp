@@ -11,6 +11,7 @@
 #include "alidade/geometry/so3.h"
 #include "alidade/io/pairs_file.h"
 #include "alidade/simulate/rotation.h"
+#include "alidade/testing/reference_case.h"
 #include "alidade/testing/temporary_folder.h"
 
 namespace alidade {
@@ -303,11 +304,8 @@ TEST_F(RotationLogText, TenThousandRowsOfTwentyPointsTakeNoTime) {
 }
 
 TEST_F(RotationLogText, ReadsTheReferenceLog) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (data == nullptr) GTEST_SKIP() << "ALIDADE_DATA does not name the folder of recorded data";
-  const auto cases = std::filesystem::path(data) / "cases";
   for (const char* name : {"a_clean", "a_exp1_noise", "a_exp2_burst", "a_exp3_zoom", "a_exp3_zoom_noise"}) {
-    const RotationLogFile read = read_rotation_log(cases / (std::string(name) + ".csv"));
+    const RotationLogFile read = read_rotation_log(testing::reference_case(std::string(name) + ".csv"));
     EXPECT_EQ(read.log.rows.size(), 601u);
     EXPECT_EQ(read.log.num_points, 4u);
     EXPECT_EQ(read.log.truth.size(), 601u);

@@ -7,6 +7,7 @@
 
 #include "alidade/io/files.h"
 #include "alidade/testing/random.h"
+#include "alidade/testing/reference_case.h"
 
 namespace alidade {
 namespace {
@@ -129,9 +130,7 @@ Eigen::Matrix<double, Rows, Cols> matrix_of(const Json& rows) {
 }
 
 TEST(CameraMotion, IsThatOfTheReferenceCasesInBothForms) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set";
-  const Json file = Json::parse(read_file(std::string(data) + "/cases/d2_motion_measurement.json"));
+  const Json file = Json::parse(read_file(testing::reference_case("d2_motion_measurement.json")));
   const double tolerance = file["tol"];
   for (const Json& row : file["rows"]) {
     const std::vector<double> x = row["x"], next = row["x_next"];

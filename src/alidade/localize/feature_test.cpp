@@ -10,6 +10,7 @@
 #include "alidade/simulate/example_camera.h"
 #include "alidade/simulate/underwater.h"
 #include "alidade/testing/random.h"
+#include "alidade/testing/reference_case.h"
 
 namespace alidade {
 namespace {
@@ -154,9 +155,7 @@ TEST(Feature, IsLinearWhenItsDepthIsSure) {
 }
 
 TEST(Feature, ViewsAreThoseOfTheReferenceCases) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set";
-  const Json d1 = Json::parse(read_file(std::string(data) + "/cases/d1_projection.json"));
+  const Json d1 = Json::parse(read_file(testing::reference_case("d1_projection.json")));
   const double tolerance = d1["tol"];
   int num_seen = 0;
   for (const Json& row : d1["rows"]) {
@@ -174,7 +173,7 @@ TEST(Feature, ViewsAreThoseOfTheReferenceCases) {
     }
   }
   EXPECT_GE(num_seen, 24);
-  const Json d2 = Json::parse(read_file(std::string(data) + "/cases/d2_motion_measurement.json"));
+  const Json d2 = Json::parse(read_file(testing::reference_case("d2_motion_measurement.json")));
   for (const Json& row : d2["rows"]) {
     const std::vector<double> x = row["x"], y = row["y"], px = row["uv"];
     const Rigid3 world_from_cam{Eigen::Quaterniond(x[3], x[4], x[5], x[6]), {x[0], x[1], x[2]}};

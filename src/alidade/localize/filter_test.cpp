@@ -11,6 +11,7 @@
 #include "alidade/testing/allocations.h"
 #include "alidade/testing/localize_sample.h"
 #include "alidade/testing/random.h"
+#include "alidade/testing/reference_case.h"
 
 namespace alidade {
 namespace {
@@ -217,10 +218,8 @@ TEST(LocalizationFilter, RefusesWhatItCannotHold) {
 
 /// Reference sequences of an independent filter of the same kind: places, all sights of a frame at once, iterated.
 TEST(LocalizationFilter, IsThatOfTheReferenceSequences) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set";
   for (const std::string name : {"d4_seq0", "d4_seq3"}) {
-    const std::string file = std::string(data) + "/cases/" + name;
+    const std::string file = testing::reference_case(name);
     const Json about = Json::parse(read_file(file + ".json"));
     const Csv csv = Csv::read(file + ".csv");
     testing::UnderwaterSample sample;

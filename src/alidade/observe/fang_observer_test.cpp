@@ -9,6 +9,7 @@
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/testing/allocations.h"
+#include "alidade/testing/reference_case.h"
 #include "alidade/testing/rotation_sample.h"
 
 namespace alidade {
@@ -32,7 +33,7 @@ FangConfig observer_config(FangProfile profile, std::size_t num_points = 4) {
 /// Estimates of the reference at its times, each method as it is there: point 1 is the reference, gains are diagonal.
 void expect_reference(const std::string& method, const FangConfig& config, double tolerance_px,
                       const std::map<std::string, std::vector<double>>& left_out) {
-  std::ifstream file(std::string(std::getenv("ALIDADE_DATA")) + "/cases/a_expected.json");
+  std::ifstream file(testing::reference_case("a_expected.json"));
   const nlohmann::json cases = nlohmann::json::parse(file)["cases"];
   int checked = 0;
   for (const auto& [name, methods] : cases.items()) {
@@ -64,10 +65,7 @@ FangConfig reference_config(FangProfile profile) {
   return config;
 }
 
-const char* const no_data = "set ALIDADE_DATA to the folder that holds cases/a_expected.json";
-
 TEST(FangObserverCase, FastAgreesWithTheReference) {
-  if (!std::getenv("ALIDADE_DATA")) GTEST_SKIP() << no_data;
   // 1/θ̂ makes 100 px of the ninth digit of the files, while θ̂ passes near zero: in a burst, in a ramp, and in noise.
   expect_reference("paper_fast", reference_config(FangProfile::fast), 0.005,
                    {{"a_exp1_noise", {0.0, 20.0}},
@@ -77,20 +75,17 @@ TEST(FangObserverCase, FastAgreesWithTheReference) {
 }
 
 TEST(FangObserverCase, QuietAgreesWithTheReference) {
-  if (!std::getenv("ALIDADE_DATA")) GTEST_SKIP() << no_data;
   FangConfig config = reference_config(FangProfile::quiet);
   config.gains = FangGains{.k1 = 8.0, .gain = 8.0, .lowpass_hz = 0.0};  // the reference's own
   expect_reference("paper_quiet", config, 1e-4, {});
 }
 
 TEST(FangObserverCase, KalmanAgreesWithTheReference) {
-  if (!std::getenv("ALIDADE_DATA")) GTEST_SKIP() << no_data;
   expect_reference("kf_diff", reference_config(FangProfile::kalman), 1e-4, {});
 }
 
 TEST(FangObserverCase, StateAgreesWithTheReference) {
-  if (!std::getenv("ALIDADE_DATA")) GTEST_SKIP() << no_data;
-  std::ifstream file(std::string(std::getenv("ALIDADE_DATA")) + "/cases/a_expected.json");
+  std::ifstream file(testing::reference_case("a_expected.json"));
   const nlohmann::json step = nlohmann::json::parse(file)["cases"]["a_clean"]["paper_fast_one_step"];
   FangObserver observer(reference_config(FangProfile::fast));
   RotationLog log = *paper_case("a_clean");

@@ -8,6 +8,7 @@
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/testing/allocations.h"
+#include "alidade/testing/reference_case.h"
 #include "alidade/testing/rotation_sample.h"
 
 namespace alidade {
@@ -138,9 +139,7 @@ TEST(FlowFilter, IsTheJointKalmanFilterToTheLastDigits) {
 // --- the reference case ---------------------------------------------------------------------------------------------
 
 TEST(FlowFilterCase, AgreesWithTheReferenceOfTenColumns) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (!data) GTEST_SKIP() << "set ALIDADE_DATA to the folder that holds cases/a_expected.json";
-  std::ifstream file(std::string(data) + "/cases/a_expected.json");
+  std::ifstream file(testing::reference_case("a_expected.json"));
   const nlohmann::json cases = nlohmann::json::parse(file)["cases"];
   int checked = 0;
   for (const auto& [name, methods] : cases.items()) {

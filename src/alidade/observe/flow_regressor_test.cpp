@@ -11,6 +11,7 @@
 #include "alidade/geometry/so3.h"
 #include "alidade/observe/running_gramian.h"
 #include "alidade/testing/random.h"
+#include "alidade/testing/reference_case.h"
 #include "alidade/testing/rotation_sample.h"
 
 namespace alidade {
@@ -142,15 +143,11 @@ TEST(RunningGramian, LeavesOutWhatATurnAboutTheViewExplains) {
 // --- the reference cases --------------------------------------------------------------------------------------------
 
 nlohmann::json read_case(const std::string& name) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (!data) return nullptr;
-  std::ifstream file(std::string(data) + "/cases/" + name);
-  return nlohmann::json::parse(file);
+  return nlohmann::json::parse(std::ifstream(testing::reference_case(name)));
 }
 
 TEST(FlowRegressorCase, AgreesWithTheReference) {
   const nlohmann::json reference = read_case("a_regressor.json");
-  if (reference.is_null()) GTEST_SKIP() << "set ALIDADE_DATA to the folder that holds cases/a_regressor.json";
   const double tolerance = reference["tol"];
   const Eigen::Vector3d rate(reference["omega"][0], reference["omega"][1], 0.0);
   const auto q = [&](std::size_t i) {
@@ -177,7 +174,6 @@ TEST(FlowRegressorCase, AgreesWithTheReference) {
 TEST(FlowRegressorCase, GramianAgreesWithTheReference) {
   const nlohmann::json reference = read_case("a_gramian.json");
   const std::optional<RotationLog> log = paper_case("a_clean");
-  if (reference.is_null() || !log) GTEST_SKIP() << "set ALIDADE_DATA to the folder that holds cases/a_gramian.json";
   Eigen::Matrix<double, 8, 8> gramian = Eigen::Matrix<double, 8, 8>::Zero();
   for (std::size_t r = 0; r < 236; ++r) {
     const RotationRow& row = log->rows[r];

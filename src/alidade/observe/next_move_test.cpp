@@ -31,7 +31,7 @@ Eigen::Vector4d bound_of_paper_motion(const std::vector<Eigen::Vector2d>& points
       bundle.observations.push_back({static_cast<int>(k), static_cast<int>(i), scale.normalised(log.rows[k].px[i])});
     }
   }
-  BundleConfig config;
+  RotationBundleConfig config;
   config.sigma_px = sigma_px / 390.0;
   config.max_iterations = 0;
   config.huber = 0.0;

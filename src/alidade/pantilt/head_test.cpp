@@ -10,6 +10,7 @@
 #include "alidade/pantilt/head_rotation.h"
 #include "alidade/simulate/example_camera.h"
 #include "alidade/testing/random.h"
+#include "alidade/testing/reference_case.h"
 
 namespace alidade {
 namespace {
@@ -148,11 +149,7 @@ TEST(Head, ProjectionMatrixIsThePinholeOfThatMoment) {
   EXPECT_LE((uvw.hnormalized() - pixel(at, readings, point)).norm(), 1e-10);
 }
 
-Json read_case(const std::string& name) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  std::ifstream file(std::string(data ? data : "") + "/cases/" + name);
-  return data && file ? Json::parse(file) : Json();
-}
+Json read_case(const std::string& name) { return Json::parse(std::ifstream(testing::reference_case(name))); }
 
 template <int rows, int cols>
 Eigen::Matrix<double, rows, cols> matrix_of(const Json& json) {
@@ -167,7 +164,6 @@ Eigen::Vector3d vector_of(const Json& json) { return matrix_of<3, 1>(json); }
 
 TEST(Head, PaperGeometryAsComputedElsewhere) {
   const Json reference = read_case("c1_paper_geometry.json");
-  if (reference.is_null()) GTEST_SKIP() << "set ALIDADE_DATA to the folder that holds cases/c1_paper_geometry.json";
   constexpr double degree = std::numbers::pi / 180.0;
   const Eigen::Vector3d target = vector_of(reference["target_cm"]) / 100.0;
   std::array<RigHead, 2> rig = xiahou_rig();
@@ -188,7 +184,6 @@ TEST(Head, PaperGeometryAsComputedElsewhere) {
 
 TEST(Head, GeneralHeadAsComputedElsewhere) {
   const Json reference = read_case("c2_general_head.json");
-  if (reference.is_null()) GTEST_SKIP() << "set ALIDADE_DATA to the folder that holds cases/c2_general_head.json";
   int num_checked = 0;
   for (const Json& row : reference["rows"]) {
     RigHead at = xiahou_rig()[0];

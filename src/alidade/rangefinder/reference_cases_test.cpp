@@ -7,6 +7,7 @@
 #include "alidade/rangefinder/beam_solve.h"
 #include "alidade/rangefinder/beam_start.h"
 #include "alidade/rangefinder/rangefinder.h"
+#include "alidade/testing/reference_case.h"
 
 // Cases computed elsewhere, with another program.
 
@@ -15,15 +16,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-Json read_case(const std::string& name) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (!data) return {};
-  std::ifstream file(std::string(data) + "/cases/" + name + ".json");
-  return file ? Json::parse(file) : Json();
-}
-#define NEEDS_CASE(name)                  \
-  const Json reference = read_case(name); \
-  if (reference.is_null()) GTEST_SKIP() << "set ALIDADE_DATA to the folder that holds cases/" name ".json"
+Json read_case(const std::string& name) { return Json::parse(std::ifstream(testing::reference_case(name + ".json"))); }
 
 template <int size>
 Eigen::Matrix<double, size, 1> vector_of(const Json& numbers) {
@@ -73,7 +66,7 @@ void expect_beam(const Beam& beam, const Json& A, const Json& B, double origin_t
 }
 
 TEST(ReferenceCases, ExactMeasurementsGiveTheExactBeam) {
-  NEEDS_CASE("b_exact");
+  const Json reference = read_case("b_exact");
   const Camera camera = camera_of(reference["K"]);
   const auto solved = [&](RangefinderMethod method, std::size_t num_shots) {
     std::vector<Shot> shots = shots_of(reference, true, true);
@@ -97,7 +90,7 @@ TEST(ReferenceCases, ExactMeasurementsGiveTheExactBeam) {
 }
 
 TEST(ReferenceCases, FivePlanesLeaveTwoBeams) {
-  NEEDS_CASE("b_exact");
+  const Json reference = read_case("b_exact");
   std::vector<Shot> shots = shots_of(reference, false, true);
   shots.resize(5);
   const RangefinderReport report =
@@ -139,7 +132,7 @@ std::vector<Eigen::Vector3d> board_points_of(const Json& reference) {
 }
 
 TEST(ReferenceCases, LinearStartsOfTheNoisyShots) {
-  NEEDS_CASE("b_noisy18");
+  const Json reference = read_case("b_noisy18");
   const Camera camera = camera_of(reference["K_prior"]);
   std::vector<PreparedShot> shots;
   for (const Shot& shot : noisy_shots(reference, false)) {
@@ -161,7 +154,7 @@ TEST(ReferenceCases, LinearStartsOfTheNoisyShots) {
 }
 
 TEST(ReferenceCases, BeamAloneOfTheNoisyShots) {
-  NEEDS_CASE("b_noisy18");
+  const Json reference = read_case("b_noisy18");
   const std::vector<Shot> shots = noisy_shots(reference, false);
   for (const auto& [method, name] : std::vector<std::pair<RangefinderMethod, std::string>>{
            {RangefinderMethod::spot, "m1_lm"}, {RangefinderMethod::plane, "m2_lm"}}) {
@@ -174,7 +167,7 @@ TEST(ReferenceCases, BeamAloneOfTheNoisyShots) {
 }
 
 TEST(ReferenceCases, EverythingRefinedOnTheNoisyShots) {
-  NEEDS_CASE("b_noisy18");
+  const Json reference = read_case("b_noisy18");
   const std::vector<Shot> shots = noisy_shots(reference, true);
   const std::vector<Eigen::Vector3d> points = board_points_of(reference);
   for (const auto& [method, name] : std::vector<std::pair<RangefinderMethod, std::string>>{
@@ -205,7 +198,7 @@ TEST(ReferenceCases, EverythingRefinedOnTheNoisyShots) {
 }
 
 TEST(ReferenceCases, Table1OfThePaperHasItsSignsTurned) {
-  NEEDS_CASE("b_table1");
+  const Json reference = read_case("b_table1");
   Beam beam;  // Table 2, method 1
   beam.direction_in_cam = {std::cos(1.557), std::cos(1.586), 0.0};
   beam.direction_in_cam.z() = std::sqrt(1.0 - beam.direction_in_cam.squaredNorm());
@@ -248,12 +241,12 @@ void expect_refused(const Json& reference, RangefinderMethod method, const std::
 }
 
 TEST(ReferenceCases, FrontalBoardsAreRefused) {
-  NEEDS_CASE("b_degenerate_fronto_parallel");
+  const Json reference = read_case("b_degenerate_fronto_parallel");
   expect_refused(reference, RangefinderMethod::plane, "frontal boards");
 }
 
 TEST(ReferenceCases, EqualRangesAreRefused) {
-  NEEDS_CASE("b_degenerate_equal_range");
+  const Json reference = read_case("b_degenerate_equal_range");
   expect_refused(reference, RangefinderMethod::plane, "equal ranges");
   expect_refused(reference, RangefinderMethod::spot, "equal ranges");
 }

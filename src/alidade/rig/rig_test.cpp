@@ -12,6 +12,7 @@
 #include "alidade/io/csv.h"
 #include "alidade/io/views_file.h"
 #include "alidade/simulate/rig.h"
+#include "alidade/testing/reference_case.h"
 
 namespace alidade {
 namespace {
@@ -72,13 +73,11 @@ RigReport solved(const RigScene& scene, const std::vector<HeadView>& views, cons
 }
 
 TEST(Rig, TheReferenceCaseIsFoundAgain) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  std::ifstream file(std::string(data ? data : "") + "/cases/c7_rig_calibration.json");
-  if (!data || !file) GTEST_SKIP() << "set ALIDADE_DATA to the folder that holds cases/c7_rig_calibration.json";
+  std::ifstream file(testing::reference_case("c7_rig_calibration.json"));
   const Json reference = Json::parse(file);
   const Board board{.cols = 9, .rows = 6, .square_m = 0.025};
   const ViewsFile views =
-      read_views(std::string(data) + "/cases/c7_rig_calibration.csv", {.skip_bad = false, .num_points = 54});
+      read_views(testing::reference_case("c7_rig_calibration.csv"), {.skip_bad = false, .num_points = 54});
   ASSERT_EQ(views.views.size(), 36u);
   const Camera camera = xiahou_rig()[0].camera;
   const RigReport report = calibrate_rig(views.views, centred(board), {{1, camera}, {2, camera}},
@@ -108,10 +107,8 @@ TEST(Rig, TheReferenceCaseIsFoundAgain) {
 
 /// Not square to each other by half a degree: without that the views contradict each other.
 TEST(Rig, TheReferenceCasesAxesAreNotSquare) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (!data) GTEST_SKIP() << "set ALIDADE_DATA to the folder that holds cases/c7_rig_calibration.csv";
   const ViewsFile views =
-      read_views(std::string(data) + "/cases/c7_rig_calibration.csv", {.skip_bad = false, .num_points = 54});
+      read_views(testing::reference_case("c7_rig_calibration.csv"), {.skip_bad = false, .num_points = 54});
   const Camera camera = xiahou_rig()[0].camera;
   RigConfig config{.sigma_px = 0.2, .sigma_encoder_rad = 0.02 * degree};
   config.estimate_skew = false;

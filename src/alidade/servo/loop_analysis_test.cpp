@@ -8,6 +8,7 @@
 
 #include "alidade/io/files.h"
 #include "alidade/servo/axis_model.h"
+#include "alidade/testing/reference_case.h"
 
 namespace alidade {
 namespace {
@@ -50,9 +51,7 @@ TEST(LoopAnalysis, VelocityPlants) {
 }
 
 TEST(LoopAnalysis, AgreesWithTheReferenceCase) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set";
-  const auto reference = nlohmann::json::parse(read_file(std::string(data) + "/cases/c5_servo_lti.json"));
+  const auto reference = nlohmann::json::parse(read_file(testing::reference_case("c5_servo_lti.json")));
   const double tolerance = reference["tol_rel"];
   int num_checked = 0;
   const auto expect = [&](double value, const nlohmann::json& expected, const char* name, double digits) {

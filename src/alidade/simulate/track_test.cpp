@@ -6,14 +6,13 @@
 #include <cstdlib>
 
 #include "alidade/io/csv.h"
+#include "alidade/testing/reference_case.h"
 
 namespace alidade {
 namespace {
 
 TEST(SimulateTrack, ManoeuvreIsThatOfTheReferenceCase) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set";
-  const Csv truth = Csv::read(std::string(data) + "/cases/c8_manoeuvre_truth.csv");
+  const Csv truth = Csv::read(testing::reference_case("c8_manoeuvre_truth.csv"));
   double worst_m = 0.0;
   for (std::size_t row = 0; row < truth.num_rows(); ++row) {
     const Eigen::Vector3d there(truth.number(row, "x_m"), truth.number(row, "y_m"), truth.number(row, "z_m"));

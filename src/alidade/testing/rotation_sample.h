@@ -15,6 +15,7 @@
 #include "alidade/reproduce/paper_report.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/rotation.h"
+#include "alidade/testing/reference_case.h"
 
 namespace alidade::testing {
 
@@ -42,9 +43,7 @@ inline RotationLog paper_log(std::uint64_t seed, bool noisy) {
 
 /// A reference case, `cases/NAME.csv` in the folder that ALIDADE_DATA names; nothing without.
 inline std::optional<RotationLog> paper_case(const std::string& name) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (!data) return std::nullopt;
-  const Csv csv = Csv::read(std::string(data) + "/cases/" + name + ".csv");
+  const Csv csv = Csv::read(reference_case(name + ".csv"));
   RotationLog log;
   log.num_points = 4;
   for (std::size_t r = 0; r < csv.num_rows(); ++r) {

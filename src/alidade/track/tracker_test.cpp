@@ -12,6 +12,7 @@
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/testing/allocations.h"
+#include "alidade/testing/reference_case.h"
 #include "alidade/testing/track_sample.h"
 
 namespace alidade {
@@ -38,9 +39,7 @@ Eigen::Vector<double, N> vector_of(const Json& list) {
 }
 
 TEST(Tracker, UpdateAgreesWithTheReferenceCase) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set";
-  const Json given = Json::parse(std::ifstream(std::string(data) + "/cases/c4_ekf_update.json"));
+  const Json given = Json::parse(std::ifstream(testing::reference_case("c4_ekf_update.json")));
   const double tolerance = given["tol"];
   RigHead head = xiahou_rig()[1];
   head.head.world_from_base.translation = vector_of<3>(given["head_pos"]);
@@ -305,9 +304,7 @@ double rms_of_circle_mm(const std::vector<Row>& rows, TrackMethod method, double
 }
 
 TEST(Tracker, LatencyIsPaidByPredictionNotByError) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set";
-  const auto cases = std::string(data) + "/cases/";
+  const auto cases = testing::reference_case("");
   const Json expected = Json::parse(std::ifstream(cases + "c6_events_latency.json"))["expected"];
   const std::vector<Row> rows = rows_of(cases + "c6_events_latency.csv");
   ASSERT_EQ(rows.size(), 238u);

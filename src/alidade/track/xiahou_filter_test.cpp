@@ -10,6 +10,7 @@
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/simulate/draws.h"
+#include "alidade/testing/reference_case.h"
 
 namespace alidade {
 namespace {
@@ -24,9 +25,7 @@ Eigen::Vector3d on_circle_cm(double radius_cm, double t_s) {
 }
 
 TEST(XiahouFilter, FollowsTheReferenceStepByStep) {
-  const char* data = std::getenv("ALIDADE_DATA");
-  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set";
-  const Json given = Json::parse(std::ifstream(std::string(data) + "/cases/c3_paper_ekf.json"));
+  const Json given = Json::parse(std::ifstream(testing::reference_case("c3_paper_ekf.json")));
   const double tolerance = given["tol"];
   XiahouFilter filter({.baseline_cm = 50.2}, start_cm);
   for (const Json& step : given["steps"]) {

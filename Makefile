@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Each target installs what it misses, says what it does, and is quick the
 # second time.
-.PHONY: help build demo test bench study docs format tidy clean
+.PHONY: help build install demo test bench study docs format tidy clean
 .DEFAULT_GOAL := help
 
 out := build/release
@@ -11,6 +11,7 @@ help:
 	@echo "make demo    calibrate a camera from 13 real photos, and write its report"
 	@echo "make test    build and run the tests"
 	@echo "make build   build build/release/alidade"
+	@echo "make install PREFIX=/usr/local: the executable, the library with its headers, man pages, bash completion"
 	@echo "make bench   measure speed, side by side with OpenCV and mrcal"
 	@echo "make docs    renew the pictures in README and docs"
 	@echo "make study   is σ what it says? 2400 calibrations, 2000 observations, rangefinders; corners against OpenCV's, with known truth"
@@ -23,6 +24,13 @@ build:
 	@echo "build: $(out)/alidade"
 	@cmake --preset release >/dev/null
 	@ninja -C $(out) $(jobs) alidade_cli
+
+# PREFIX=/usr/local, or another place; DESTDIR for packages.
+install:
+	@tools/setup build
+	@cmake --preset release >/dev/null
+	@ninja -C $(out) $(jobs) alidade_cli alidade_shared
+	@cmake --install $(out) $(if $(PREFIX),--prefix $(PREFIX),)
 
 demo: build
 	@tools/demo_photos build/demo/photos

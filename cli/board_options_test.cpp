@@ -12,10 +12,11 @@ namespace {
 
 Board parse(const std::string& line) {
   CLI::App app;
-  BoardOptions options;
-  add_board_options(app, options);
+  Board board = no_board();
+  add_board_options(app, board);
   app.parse(line);
-  return board_from(options);
+  require_board(board);
+  return board;
 }
 
 std::string fault_of(const std::string& line) {
@@ -43,7 +44,7 @@ TEST(BoardOptions, NameWhatIsWrong) {
               "--board: '" + size + "' is not COLSxROWS, for example 9x6");
   }
   EXPECT_EQ(fault_of("--board 1x6 --square 0.025"), "--board: a board has 2 to 200 columns and rows, not 1x6");
-  EXPECT_EQ(fault_of("--board 9x6 --square 0.025 --target charuco"), "--target charuco needs --marker M");
+  EXPECT_EQ(fault_of("--board 9x6 --square 0.025 --target charuco"), "--board-kind charuco needs --marker M");
   EXPECT_EQ(fault_of("--board 9x6 --square 0.025 --marker 0.01"), "--marker: a chessboard has none");
   for (const std::string value : {"0", "-1", "nan", "inf", "one"}) {
     EXPECT_THAT(fault_of("--board 9x6 --square " + value), ::testing::StartsWith("--square: '" + value + "' is not"));

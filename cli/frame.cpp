@@ -13,6 +13,8 @@
 #include <opencv2/core/utils/logger.hpp>
 #include <utility>
 
+#include "alidade/estimation/config_error.h"
+#include "cli/field_options.h"
 #include "cli/help_format.h"
 #include "cli/terminal.h"
 
@@ -23,6 +25,8 @@ struct Frame::Command {
   CLI::App* app = nullptr;
   std::function<ExitCode(Run&)> work;
   CommonOptions options;
+  FieldList fields;              ///< Empty where the options are not described by fields.
+  std::filesystem::path config;  ///< --config, or empty.
 };
 
 struct Frame::State {
@@ -227,10 +231,20 @@ CLI::App& Frame::add_command(const CommandSpec& spec, std::function<ExitCode(Run
   if (space != std::string::npos) parent = parent->get_subcommand(spec.name.substr(0, space));
   CLI::App* app =
       parent->add_subcommand(space == std::string::npos ? spec.name : spec.name.substr(space + 1), spec.summary);
-  Command& command = state_->commands.emplace_back(Command{spec, app, std::move(work), {}});
+  Command& command = state_->commands.emplace_back(Command{spec, app, std::move(work), {}, {}, {}});
   command.options.leaves_results = spec.leaves_results;
   app->footer("Examples:\n" + indented_examples(spec.examples));
   return *app;
+}
+
+void Frame::add_fields(CLI::App& app, FieldList fields) {
+  for (Command& command : state_->commands) {
+    if (command.app != &app) continue;
+    command.fields = std::move(fields);
+    cli::add_fields(app, command.fields);
+    app.add_option("--config", command.config, "Options from a file, `name: value`; what is typed beats it")
+        ->type_name("FILE.yaml");
+  }
 }
 
 Frame::Command* Frame::chosen_command() {
@@ -252,6 +266,7 @@ int Frame::dispatch(int argc, const char* const* argv) {
   }
   Command& command = *chosen_command();
   CommonOptions& options = command.options;
+  take_config(*command.app, command.fields, command.config);
   if (command.app->count("--out") > 0) options.leaves_results = true;
   catch_interrupts();
   require_place(options);
@@ -264,6 +279,8 @@ int Frame::dispatch(int argc, const char* const* argv) {
     if (code != ExitCode::ok) state_->terminal.error(refusal(command.spec.name, run.document.verdict));
     return static_cast<int>(code);
   } catch (const UsageError& error) {
+    throw UsageError(command.spec.name + ": " + error.what());
+  } catch (const ConfigError& error) {
     throw UsageError(command.spec.name + ": " + error.what());
   }
 }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/description/field.h"
 #include "cli/run.h"
 
 namespace CLI {  // NOLINT(readability-identifier-naming): CLI11's
@@ -33,6 +34,8 @@ class Frame {
   /// A command. `work` runs after the whole line has been parsed; it ends with `return run.finish(verdict);`. Add the
   /// command's own options to what is returned.
   CLI::App& add_command(const CommandSpec& spec, std::function<ExitCode(Run&)> work);
+  /// The command's options, as its fields describe them; it gets --config FILE as well. Once for a command.
+  void add_fields(CLI::App& command, FieldList fields);
   /// The word before the commands of a group: "camera" of "camera show". Comes before them.
   void add_group(const std::string& name, const std::string& summary);
 

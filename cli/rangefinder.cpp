@@ -29,7 +29,7 @@ constexpr std::size_t most_pictures = 40;  // of the page
 struct RangefinderArgs {
   std::filesystem::path shots, camera, corners, photo, start;
   std::string method = "joint", refine = "all", spot = "auto", outliers = "drop";
-  BoardOptions board;
+  Board board = no_board();
   double sigma_px = 0.0, sigma_range_m = 0.0, sigma_range_per_m = 0.0, sigma_incidence_m = 0.0;
   std::optional<double> sigma_square_m, sigma_scale;
   bool scale = false, skip_bad = false;
@@ -46,7 +46,7 @@ RangefinderConfig config_from(const RangefinderArgs& args, std::uint64_t seed) {
   config.seed = seed;
   if (args.sigma_px > 0.0) config.sigma_spot_px = args.sigma_px;
   if (args.scale && args.sigma_scale) throw UsageError("--scale estimates what --sigma-scale tells; give one of them");
-  if (args.sigma_square_m && args.board.size.empty()) throw UsageError("--sigma-square needs --board and --square");
+  if (args.sigma_square_m && !is_given(args.board)) throw UsageError("--sigma-square needs --board and --square");
   config.sigma_square_m = args.sigma_square_m;
   config.sigma_scale = args.sigma_scale;
   if (args.sigma_range_m > 0.0)
@@ -243,7 +243,10 @@ ExitCode rangefinder(const RangefinderArgs& args, Run& run) {
   if (args.method == "edges") return align_scan({args.shots, args.camera, args.photo, args.start}, run);
   if (!args.photo.empty() || !args.start.empty()) throw UsageError("--photo and --start are for --method edges");
   std::optional<Board> board;
-  if (!args.board.size.empty()) board = board_from(args.board);
+  if (is_given(args.board)) {
+    board = args.board;
+    require_board(*board);
+  }
   const RangefinderConfig asked = config_from(args, run.options.seed);
   if (!args.corners.empty() && !board) throw UsageError("--corners needs --board and --square");
   run.add_input("shots", args.shots);

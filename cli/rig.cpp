@@ -26,7 +26,7 @@ namespace {
 struct RigArgs {
   std::filesystem::path views;
   std::vector<std::filesystem::path> cameras;
-  BoardOptions board;
+  Board board = no_board();
   double sigma_px = 0.0, sigma_angle_rad = 0.0, sigma_square_m = 0.0, sigma_scale = 0.0;
   bool scales = false, skip_bad = false;
   std::string outliers = "drop";
@@ -159,9 +159,9 @@ void add_files(const RigReport& report, Run& run) {
 ExitCode rig(const RigArgs& args, Run& run) {
   if (args.moving.is_asked)
     return rig_by_moving_target(args.views, args.cameras, args.moving, args.sigma_px, args.skip_bad, run);
-  if (args.board.size.empty())
-    throw UsageError("--board is required (or --moving-target, for cameras that do not turn)");
-  const Board board = board_from(args.board);
+  if (!is_given(args.board)) throw UsageError("--board is required (or --moving-target, for cameras that do not turn)");
+  Board board = args.board;
+  require_board(board);
   const RigConfig config = config_from(args);
   run.add_input("views", args.views);
   for (const std::filesystem::path& camera : args.cameras) run.add_input("camera", camera);

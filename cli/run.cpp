@@ -153,6 +153,25 @@ ExitCode Run::finish(Verdict verdict) {
   return document.verdict.exit_code;
 }
 
+ExitCode Run::finish(Outcome outcome) {
+  ResultDocument& from = outcome.document;
+  std::vector<SkippedInput> skipped = std::move(document.counts.skipped);
+  document.counts = std::move(from.counts);
+  document.counts.skipped.insert(document.counts.skipped.begin(), skipped.begin(), skipped.end());
+  document.assumed = std::move(from.assumed);
+  document.estimate = std::move(from.estimate);
+  document.stddev = std::move(from.stddev);
+  document.stddev_model = std::move(from.stddev_model);
+  document.covariance_names = std::move(from.covariance_names);
+  document.covariance_upper = std::move(from.covariance_upper);
+  document.data = std::move(from.data);
+  document.grids = std::move(from.grids);
+  for (std::string& line : outcome.lines) say(std::move(line));
+  for (NamedBytes& file : outcome.files) add_file(std::move(file.name), std::move(file.bytes));
+  for (NamedBytes& picture : outcome.pictures) add_picture(std::move(picture.name), std::move(picture.bytes));
+  return finish(std::move(from.verdict));
+}
+
 /// What an earlier run left here and this one does not replace must not be taken for this one's; only files that its
 /// result.json names go. A refusal has nothing to put in the place of an estimate, and leaves it alone.
 void Run::write_files() {

@@ -15,6 +15,7 @@
 #include "alidade/estimation/verdict.h"
 #include "alidade/io/files.h"
 #include "alidade/io/folder_swap.h"
+#include "alidade/io/outcome.h"
 #include "alidade/io/result_document.h"
 #include "alidade/io/spool.h"
 
@@ -73,6 +74,8 @@ class Run {
   /// gives the exit code. All stands in DIR, or DIR is as it was: throws InputError if something cannot be written or
   /// printed, Interrupted after Ctrl-C. A refusal does not replace an earlier estimate: it goes to DIR/refused.
   [[nodiscard]] ExitCode finish(Verdict verdict);
+  /// The same with all that a job of the library leaves; what was said or skipped before comes first.
+  [[nodiscard]] ExitCode finish(Outcome outcome);
   /// Text of result.json; empty before finish().
   [[nodiscard]] const std::string& result() const { return result_; }
 

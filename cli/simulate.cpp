@@ -20,7 +20,7 @@ namespace alidade::cli {
 namespace {
 
 struct BoardArgs {
-  BoardOptions board;
+  Board board = no_board();
   std::string camera_file, model = "brown", size = "800x600";
   int photos = 20;
   double max_tilt_deg = 35.0, bow_mm = 0.0, shape_sigma_mm = 0.0;
@@ -99,7 +99,8 @@ void describe_truth(const BoardScene& scene, Run& run) {
 
 /// Photos of a board with their truth, or its corners only.
 ExitCode simulate_board(const BoardArgs& args, Run& run) {
-  const Board board = board_from(args.board);
+  Board board = args.board;
+  require_board(board);
   const BoardSceneConfig config{.num_photos = args.photos,
                                 .max_tilt_rad = args.max_tilt_deg * std::numbers::pi / 180.0,
                                 .bow_m = 1e-3 * args.bow_mm,
@@ -116,7 +117,7 @@ ExitCode simulate_board(const BoardArgs& args, Run& run) {
   if (!args.corners_only) add_photos(scene, args, run);
   run.lap("simulate");
   const std::string what = fmt::format("{} {} of a {}×{} {}", args.photos, args.corners_only ? "views" : "photos",
-                                       board.cols, board.rows, args.board.target);
+                                       board.cols, board.rows, std::string(kind_name(board.kind)));
   run.say(fmt::format("{} and their truth in {}", what, run.options.out.string()));
   Verdict verdict;
   verdict.sentence = what + " with known truth";

@@ -30,6 +30,9 @@ class Layers(unittest.TestCase):
         self.assert_refused("calibrate/a.cpp", '#include "alidade/simulate/x.h"\n', "calibrate/a.cpp:1: calibrate/ may not include simulate/")
         self.assert_refused("simulate/a.cpp", '#include "alidade/calibrate/x.h"\n', "simulate/a.cpp:1: simulate/ may not include calibrate/")
 
+    def test_a_public_header_is_of_its_room(self):
+        self.assert_refused("calibrate.h", '#include "alidade/rig/x.h"\n', "calibrate.h:1: calibrate.h/ may not include rig/")
+
     def test_an_unknown_folder_is_refused(self):
         self.assert_refused("utils/a.h", "", "utils/a.h: folder 'utils' is not in the table")
 
@@ -50,9 +53,21 @@ class Layers(unittest.TestCase):
             "camera/a.h": '#include "alidade/geometry/x.h"\n#include "alidade/camera/y.h"\n',
             "calibrate/a.cpp": '#include "alidade/board/x.h"\n#include <opencv2/core.hpp>\n',
             "calibrate/a_test.cpp": '#include "alidade/simulate/x.h"\n#include <thread>\n',
+            "calibrate.h": '#include "alidade/calibrate/x.h"\n#include "alidade/board/x.h"\n',
+            "files.h": '#include "alidade/io/x.h"\n',
             "io/a.cpp": '#include "alidade/calibrate/x.h"\n#include <cstdio>\n',
         }
-        self.assertEqual(outcome("check_layers.py", files), (0, "layers ok (4 files)\n"))
+        self.assertEqual(outcome("check_layers.py", files), (0, "layers ok (6 files)\n"))
+
+
+class Names(unittest.TestCase):
+    def test_a_type_is_defined_once(self):
+        files = {"a/x.h": "struct Fit {\n", "b/y.h": "struct Fit final : Base {\n", "b/z.h": "struct Other;\nenum class Kind { one };\n"}
+        code, said = outcome("check_names.py", files)
+        self.assertEqual(code, 1)
+        self.assertIn("Fit is defined in", said)
+        self.assertNotIn("Kind", said)
+        self.assertEqual(outcome("check_names.py", {"a/x.h": "struct Fit {\n", "testing/y.h": "struct Fit {\n"})[0], 0)
 
 
 class Frames(unittest.TestCase):

@@ -6,7 +6,9 @@
 #include <string_view>
 #include <vector>
 
-namespace alidade {
+#include "alidade/public.h"
+
+namespace ALIDADE_PUBLIC alidade {
 
 enum class BoardKind { chessboard, charuco, aprilgrid, circles, asymmetric_circles };
 

@@ -4,7 +4,9 @@
 #include <string>
 #include <vector>
 
-namespace alidade {
+#include "alidade/public.h"
+
+namespace ALIDADE_PUBLIC alidade {
 
 /// One board point as seen: which one, where, and how well.
 struct Corner {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "alidade/calibrate/calibration.h"
+#include "alidade/calibrate/judge.h"
 #include "alidade/simulate/board_photos.h"
 
 namespace alidade {
@@ -58,7 +58,7 @@ TEST(BetterModel, ABrownLensOnAWideCameraEndsInAnAnswer) {
 TEST(BetterModel, WhereALensCannotFitTheOneThatDoesIsNamed) {
   CalibrateConfig pinhole{.model = "pinhole", .board_shape = BoardShape::free};
   const Calibration refused = judged(wide_views(150.0, 8, 1), pinhole);
-  ASSERT_NE(refused.photos.report.status, CalibrateReport::Status::converged);
+  ASSERT_NE(refused.status, CalibrateReport::Status::converged);
   // σ 0.1 px a coordinate is 0.141 px a point.
   EXPECT_THAT(refused.verdict.to_add, StartsWith("use --model kannala_brandt: it fits these corners with RMS 0.14"));
   EXPECT_THAT(refused.verdict.sentence, Not(HasSubstr("settle")));
@@ -100,7 +100,7 @@ TEST(BetterModel, WhatToTypeIsSaidAndNeverWhatIsTypedAlready) {
 
 TEST(BetterModel, TheRichestInUseIsNotProposedAgain) {
   const Calibration calibration = judged(wide_views(150.0, 12, 4), {.model = "kannala_brandt"});
-  ASSERT_EQ(calibration.photos.report.status, CalibrateReport::Status::converged);
+  ASSERT_EQ(calibration.status, CalibrateReport::Status::converged);
   EXPECT_THAT(calibration.verdict.to_add, Not(HasSubstr("--model")));
 }
 

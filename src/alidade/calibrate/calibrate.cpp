@@ -128,7 +128,7 @@ void make_all_arrays(const CalibrateConfig& config, Work& work) {
   work.arrays.clear();
   for (std::size_t k = 0; k < work.views.size(); ++k) {
     work.arrays.push_back(make_arrays(work.views[k]));
-    for (std::size_t i = 0; config.reject_outliers && i < work.far[k].size(); ++i) {
+    for (std::size_t i = 0; rejects_outliers(config, work.use_covariances) && i < work.far[k].size(); ++i) {
       if (work.far[k][i]) set_whitener(work.arrays[k], i, Eigen::Matrix2d::Identity(), 0.0);
     }
   }
@@ -170,8 +170,8 @@ BundleResult solve_robustly(const CalibrateConfig& config, CalibrateReport& repo
   double excess_before = -1.0;
   for (int round = 0; round < max_rounds; ++round) {
     const Residuals residuals = all_residuals(work, result.state);
-    noise = estimate_noise(work.views, residuals, work.use_covariances, config.reject_outliers, config.outlier_sigmas,
-                           num_parameters(work));
+    noise = estimate_noise(work.views, residuals, work.use_covariances, rejects_outliers(config, work.use_covariances),
+                           config.outlier_sigmas, num_parameters(work));
     const bool clean = noise.num_dropped == 0;
     if (round == 0 && clean && !weights_matter) return result;
     const bool settled = noise.used == used_before && std::abs(noise.excess_px - excess_before) <= 0.01 * excess_before;
@@ -323,6 +323,10 @@ BundleResult finished(BundleResult result, bool settled, const Work& work) {
 }
 
 }  // namespace
+
+bool rejects_outliers(const CalibrateConfig& config, bool have_covariances) {
+  return config.outliers == OutlierRule::drop || (config.outliers == OutlierRule::automatic && have_covariances);
+}
 
 double shared_noise_px(const CalibrateReport& report) {
   return report.noise_px * std::sqrt(std::max(1.0, report.clusters.design_effect));

@@ -9,11 +9,12 @@
 #include "alidade/camera/camera.h"
 #include "alidade/estimation/cluster_covariance.h"
 #include "alidade/geometry/rigid3.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 /// One corner of one view after the solve.
-struct CornerFit {
+struct CornerResidual {
   Eigen::Vector2d residual_px = Eigen::Vector2d::Zero();  ///< Predicted − seen.
   bool used = true;                                       ///< False: rejected as an outlier.
 };
@@ -25,7 +26,7 @@ struct ViewFit {
   Rigid3 cam_from_board;  ///< Meaningful where used.
   Eigen::Matrix<double, 6, 6> pose_cov = Eigen::Matrix<double, 6, 6>::Zero();  ///< Of the right perturbation ξ.
   double rms_px = 0.0;                                                         ///< Per point, of the used corners.
-  std::vector<CornerFit> corners;                                              ///< As many as the view has.
+  std::vector<CornerResidual> corners;                                         ///< As many as the view has.
 };
 
 /// What calibrate() found. Poses, residuals and covariance belong to `camera` and `board_points`.
@@ -51,6 +52,9 @@ struct CalibrateReport {
   int corners_dropped = 0;
   int iterations = 0;
 };
+
+/// Whether outliers are looked for among corners that have covariances, or have none.
+[[nodiscard]] bool rejects_outliers(const CalibrateConfig& config, bool have_covariances);
 
 /// Noise [px] of a corner that, all independent, would tell as little as corners that share errors do: what one more
 /// photo is worth.

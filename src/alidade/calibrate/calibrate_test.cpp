@@ -176,7 +176,7 @@ TEST(Calibrate, ACornerFarOffThatIsToBeKeptIsNamedWhereNothingFits) {
   auto views = simulate_views(example_scene("brown", 12), 0.1, 9);
   views[1].corners[17].px.x() = 1e5;
   CalibrateConfig config;
-  config.reject_outliers = false;
+  config.outliers = OutlierRule::keep;
   const auto report = calibrate(board, views, size, config);
   ASSERT_EQ(report.status, CalibrateReport::Status::no_convergence);
   EXPECT_NE(report.to_add.find(views[1].photo + ", corner 17"), std::string::npos) << report.to_add;

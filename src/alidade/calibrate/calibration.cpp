@@ -2,19 +2,56 @@
 
 #include <utility>
 
+#include "alidade/calibrate/assumed.h"
 #include "alidade/calibrate/better_model.h"
 #include "alidade/calibrate/calibration_verdict.h"
+#include "alidade/calibrate/judge.h"
 
 namespace alidade {
 namespace {
 
-/// Solves again with another shape; the reasons of photos without corners stay.
-void solve_again(const Board& board, const CalibrateConfig& config, PhotoCalibration& photos) {
-  CalibrateReport again = calibrate(board, photos.views, photos.size, config);
-  for (std::size_t k = 0; k < photos.views.size(); ++k) {
-    if (photos.views[k].corners.empty()) again.views[k].reason = photos.report.views[k].reason;
+/// Solves again with another shape, where that settles; the reasons of photos without corners stay.
+bool solve_again(const CalibrateConfig& config, Calibration& result) {
+  CalibrateReport again = calibrate(result.board, result.board_views, result.size, config);
+  if (again.status != CalibrateReport::Status::converged) return false;
+  for (std::size_t k = 0; k < result.board_views.size(); ++k) {
+    if (result.board_views[k].corners.empty()) again.views[k].reason = result.views[k].reason;
   }
-  photos.report = std::move(again);
+  static_cast<CalibrateReport&>(result) = std::move(again);
+  return true;
+}
+
+Counts count_photos(const Calibration& result) {
+  Counts counts;
+  counts.given = result.board_views.size();
+  for (std::size_t k = 0; k < counts.given; ++k) {
+    if (result.views[k].used) {
+      ++counts.used;
+    } else {
+      counts.skipped.push_back({result.board_views[k].photo, 0, result.views[k].reason});
+    }
+  }
+  counts.dropped = counts.given - counts.used;
+  return counts;
+}
+
+/// The board as solved: decides its shape, and solves again where that is not the one of the first solve.
+std::vector<ShapeTransfer> settle_shape(Calibration& result, const Progress& progress) {
+  constexpr std::size_t most_photos = 60;  // enough to tell a board's shape
+  report_progress(progress, "testing the board's shape", 0, 1);
+  const BoardShape asked = result.config.board_shape;
+  auto transfers = test_shape_transfer(result.board, used_views(result.board_views, result, most_photos), result.size,
+                                       result.config, result.board_points);
+  result.asked_shape = asked;
+  result.config.board_shape = decide_shape(asked, transfers);
+  const bool solved_flat = asked == BoardShape::automatic || asked == BoardShape::flat;
+  if (result.config.board_shape == asked || (solved_flat && result.config.board_shape == BoardShape::flat)) {
+    return transfers;
+  }
+  if (!solve_again(result.config, result)) {  // the answer that there is
+    result.config.board_shape = asked == BoardShape::automatic ? BoardShape::flat : asked;
+  }
+  return transfers;
 }
 
 }  // namespace
@@ -22,37 +59,26 @@ void solve_again(const Board& board, const CalibrateConfig& config, PhotoCalibra
 Calibration judge_calibration(const Board& board, PhotoCalibration photos, CalibrateConfig config,
                               const std::optional<Camera>& air, const Progress& progress) {
   Calibration result;
-  result.photos = std::move(photos);
+  static_cast<CalibrateReport&>(result) = std::move(photos.report);
+  result.board = board;
+  result.board_views = std::move(photos.views);
+  result.size = photos.size;
+  result.num_unreadable = photos.num_unreadable;
   result.config = std::move(config);
-  CalibrateReport& report = result.photos.report;
-  if (report.status != CalibrateReport::Status::converged) {
-    advise_fitting_model(board, result.photos.views, result.photos.size, result.config, report);
-    result.verdict = refusal_verdict(report);
+  if (result.status != CalibrateReport::Status::converged) {
+    advise_fitting_model(board, result.board_views, result.size, result.config, result);
+    result.counts = count_photos(result);
+    result.verdict = refusal_verdict(result);
     return result;
   }
-  constexpr std::size_t most_photos = 60;  // enough to tell a board's shape
-  report_progress(progress, "testing the board's shape", 0, 1);
-  const BoardShape asked = result.config.board_shape;
-  const auto transfers = test_shape_transfer(board, used_views(result.photos.views, report, most_photos),
-                                             result.photos.size, result.config, report.board_points);
-  result.asked_shape = asked;
-  result.config.board_shape = decide_shape(asked, transfers);
-  const bool solved_flat = asked == BoardShape::automatic || asked == BoardShape::flat;
-  if (result.config.board_shape != asked && !(solved_flat && result.config.board_shape == BoardShape::flat)) {
-    PhotoCalibration other = result.photos;
-    solve_again(board, result.config, other);
-    if (other.report.status == CalibrateReport::Status::converged) {
-      result.photos = std::move(other);
-    } else {  // the answer that there is
-      result.config.board_shape = asked == BoardShape::automatic ? BoardShape::flat : asked;
-    }
-  }
-  result.assumed = count_assumptions(board, result.config, result.photos.views, air, report);
-  result.study = study_calibration(board, result.photos.views, result.config, report,
+  const std::vector<ShapeTransfer> transfers = settle_shape(result, progress);
+  result.counts = count_photos(result);
+  result.assumed = count_assumptions(board, result.config, result.board_views, air, result);
+  result.study = study_calibration(board, result.board_views, result.config, result,
                                    most_telling(transfers, result.config.board_shape), progress);
-  result.next = plan_next_photos(report.camera, shared_noise_px(report), report.board_points, 1, progress);
-  result.port = port_residual(report.camera);
-  result.verdict = calibration_verdict(report, result.study, result.photos.views, result.config, result.next);
+  result.next = plan_next_photos(result.camera, shared_noise_px(result), result.board_points, 1, progress);
+  result.port = port_residual(result.camera);
+  result.verdict = calibration_verdict(result, result.study, result.board_views, result.config, result.next);
   heed_assumptions(result.assumed, result.verdict);
   return result;
 }

@@ -130,7 +130,7 @@ Tails corner_tails(const CalibrateReport& report, std::span<const BoardView> vie
   for (std::size_t k = 0; k < views.size(); ++k) {
     if (!report.views[k].used) continue;
     for (std::size_t i = 0; i < views[k].corners.size(); ++i) {
-      const CornerFit& fit = report.views[k].corners[i];
+      const CornerResidual& fit = report.views[k].corners[i];
       if (!fit.residual_px.allFinite()) continue;
       norms.push_back(fit.residual_px.norm());
       if (norms.back() > tails.worst_px) {

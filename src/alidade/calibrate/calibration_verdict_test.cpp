@@ -90,7 +90,7 @@ TEST(CalibrationVerdict, WrongCornersOfATutorialAreNamed) {
   views[2].corners[11].px += Eigen::Vector2d(-3.0, 1.0);
   views[12].corners[5].px += Eigen::Vector2d(0.0, 3.5);
   CalibrateConfig config;
-  config.reject_outliers = false;  // corners without σ are judged as they are
+  config.outliers = OutlierRule::keep;  // corners without σ are judged as they are
   const Calibration result = sample_calibration(views, config);
   const Check& corners = check_named(result.verdict, "honest corners");
   EXPECT_NE(corners.state, State::good) << corners.text;
@@ -120,13 +120,13 @@ TEST(CalibrationVerdict, ABentBoardIsNamedAndTheWayOutHelps) {
   const Calibration shaped = sample_calibration(views, {.board_shape = BoardShape::bow});
   EXPECT_EQ(shaped.config.board_shape, BoardShape::bow);
   EXPECT_EQ(shaped.verdict.state, State::good) << shaped.verdict.sentence;
-  EXPECT_LT(shaped.photos.report.rms_px, 0.7 * flat.photos.report.rms_px);
+  EXPECT_LT(shaped.rms_px, 0.7 * flat.rms_px);
 }
 
 TEST(CalibrationVerdict, AShapeThatDoesNotTransferIsNotUsed) {
   const Calibration result = sample_calibration(clean_views(6), {.board_shape = BoardShape::free});
   EXPECT_EQ(result.config.board_shape, BoardShape::flat);
-  EXPECT_EQ(result.photos.report.board_points, points_in_board(testing::sample_board));
+  EXPECT_EQ(result.board_points, points_in_board(testing::sample_board));
   EXPECT_EQ(result.verdict.state, State::good) << result.verdict.sentence;
 }
 

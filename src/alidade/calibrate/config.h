@@ -1,9 +1,15 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
-namespace alidade {
+#include "alidade/camera/camera.h"
+#include "alidade/description/field.h"
+#include "alidade/public.h"
+
+namespace ALIDADE_PUBLIC alidade {
 
 /// Which shape the board may have: flat as printed; a bow (two parameters: out-of-plane parabolas along x and y);
 /// free (every point moves in 3-D, rigid motion and scale held); given (points learned elsewhere, held); or automatic:
@@ -20,17 +26,38 @@ struct Prior {
   bool operator==(const Prior&) const = default;
 };
 
+/// Which corners that no noise explains are rejected: automatic rejects them where corners come with a covariance;
+/// corners without one are somebody's measurements, to be judged as they are.
+enum class OutlierRule { automatic, drop, keep };
+
+/// What is known of a camera behind a flat port before its photos in water.
+struct PortKnowledge {
+  std::optional<Camera>
+      air;              ///< The lens as calibrated in air (pinhole or brown), held. None: it is estimated as well.
+  double gap_m = 0.02;  ///< A start.
+  std::optional<double> glass_m;         ///< Held; must be given.
+  double n_glass = 1.5, n_water = 1.34;  ///< Held: the photos hardly tell them from the gap.
+};
+
 /// Options of calibrate(). Plain data with usable defaults: `calibrate(board, views, size, {})` is a sensible call.
 struct CalibrateConfig {
   std::string model = "brown";                ///< pinhole, brown, kannala_brandt or flat_port.
   std::vector<std::string> fixed = {"skew"};  ///< Parameters held: at their prior's value, else zero (k…, skew).
+  std::vector<std::string> free = {};         ///< Parameters estimated that are held otherwise: skew.
   std::vector<Prior> priors = {};
-  BoardShape board_shape = BoardShape::flat;
-  bool reject_outliers = true;  ///< Drop, and name, corners that no noise explains.
-  double outlier_sigmas = 8.0;  ///< A corner further off than this many robust σ is an outlier.
+  BoardShape board_shape = BoardShape::automatic;
+  OutlierRule outliers = OutlierRule::automatic;  ///< Rejected corners are named.
+  double outlier_sigmas = 8.0;                    ///< A corner further off than this many robust σ is an outlier.
   int max_iterations = 60;
-
-  bool operator==(const CalibrateConfig&) const = default;
+  PortKnowledge port = {};                         ///< Of model flat_port.
+  std::vector<Eigen::Vector3d> board_points = {};  ///< [m] Of BoardShape::given: the board as learned elsewhere.
 };
+
+/// The words of the shapes that can be asked for by name.
+[[nodiscard]] const WordList<BoardShape>& shape_words();
+
+/// The fields of `config` that a person sets: model, fix, free, prior, gap_m, glass_m, n_glass, n_water, board_shape
+/// and outliers. Lens in air and board points are values that come from files.
+[[nodiscard]] FieldList fields_of(CalibrateConfig& config);
 
 }  // namespace alidade

@@ -6,8 +6,9 @@
 #include "alidade/camera/camera.h"
 #include "alidade/estimation/progress.h"
 #include "alidade/geometry/rigid3.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 /// A board pose to photograph next, and what it would bring.
 struct NextPhoto {

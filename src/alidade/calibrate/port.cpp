@@ -35,7 +35,7 @@ CalibrateConfig with_port(CalibrateConfig config, const PortKnowledge& port) {
     }
   }
   know("gap_m", port.gap_m, false);
-  know("glass_m", port.glass_m, true);
+  know("glass_m", port.glass_m.value_or(0.0), true);
   know("n_glass", port.n_glass, true);
   know("n_water", port.n_water, true);
   return config;

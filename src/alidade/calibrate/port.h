@@ -8,14 +8,6 @@
 
 namespace alidade {
 
-/// What is known of a camera behind a flat port before its photos in water.
-struct PortKnowledge {
-  std::optional<Camera>
-      air;              ///< The lens as calibrated in air (pinhole or brown), held. None: it is estimated as well.
-  double gap_m = 0.02;  ///< A start.
-  double glass_m = 0.0, n_glass = 1.5, n_water = 1.34;  ///< Held: the photos hardly tell them from the gap.
-};
-
 /// `config` for the model flat_port: gap and normal estimated, the rest held as `port` says. Parameters that `config`
 /// fixes and its priors stand. The air lens must be a pinhole or a brown.
 [[nodiscard]] CalibrateConfig with_port(CalibrateConfig config, const PortKnowledge& port);

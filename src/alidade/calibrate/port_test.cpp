@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "alidade/calibrate/calibrate.h"
-#include "alidade/calibrate/calibration.h"
+#include "alidade/calibrate/judge.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/simulate/board_photos.h"
 #include "alidade/testing/random.h"

@@ -12,7 +12,7 @@ void for_each_residual(std::span<const BoardView> views, const CalibrateReport& 
   for (std::size_t k = 0; k < views.size(); ++k) {
     if (!report.views[k].used) continue;
     for (std::size_t i = 0; i < views[k].corners.size(); ++i) {
-      const CornerFit& fit = report.views[k].corners[i];
+      const CornerResidual& fit = report.views[k].corners[i];
       if (fit.used) visit(views[k].corners[i].px, fit.residual_px);
     }
   }

@@ -34,7 +34,7 @@ TEST(ResidualCells, HoldEveryUsedCornerOnce) {
     sum += cell.count * cell.mean_px;
   }
   for (const ViewFit& view : report.views) {
-    for (const CornerFit& fit : view.corners) truth += fit.used ? fit.residual_px : Eigen::Vector2d::Zero();
+    for (const CornerResidual& fit : view.corners) truth += fit.used ? fit.residual_px : Eigen::Vector2d::Zero();
   }
   EXPECT_EQ(corners, report.corners_used);
   EXPECT_EQ(corners, 12 * 54 - 1);

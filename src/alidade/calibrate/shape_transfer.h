@@ -6,8 +6,9 @@
 #include <vector>
 
 #include "alidade/calibrate/calibrate.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 /// The word of --board-shape for a shape.
 [[nodiscard]] std::string shape_name(BoardShape shape);

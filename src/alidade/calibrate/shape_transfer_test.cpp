@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/calibrate/calibration.h"
+#include "alidade/calibrate/judge.h"
 #include "alidade/testing/calibration_sample.h"
 
 namespace alidade {
@@ -74,7 +74,7 @@ TEST(ShapeTransfer, ASmallBowIsNotMissed) {
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
     const auto views = bent_views(0.0005, seed);
     const Calibration flat = calibration_of(views, BoardShape::flat);
-    const CalibrateReport& of_flat = flat.photos.report;  // in the σ of single corners; the stated one counts some
+    const CalibrateReport& of_flat = flat;  // in the σ of single corners; the stated one counts some
     EXPECT_GT(focal_error_sigmas(of_flat.camera, of_flat.model_cov), 5.0) << "seed " << seed;
     EXPECT_NE(flat.verdict.state, State::good) << flat.verdict.sentence;
     EXPECT_EQ(flat.verdict.to_add, "use --board-shape bow");
@@ -82,7 +82,7 @@ TEST(ShapeTransfer, ASmallBowIsNotMissed) {
       const Calibration result = calibration_of(views, asked);
       EXPECT_NE(result.config.board_shape, BoardShape::flat) << "seed " << seed;
       EXPECT_EQ(result.asked_shape, asked);
-      const Camera& camera = result.photos.report.camera;
+      const Camera& camera = result.camera;
       EXPECT_LT(focal_error_sigmas(camera, camera.cov), 4.0) << "seed " << seed << ", " << shape_name(asked);
     }
   }

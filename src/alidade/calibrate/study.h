@@ -8,8 +8,9 @@
 #include "alidade/calibrate/shape_transfer.h"
 #include "alidade/camera/camera_diff.h"
 #include "alidade/estimation/progress.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 /// Mean residual over a cell of the picture.
 struct ResidualCell {

@@ -3,8 +3,9 @@
 #include <array>
 
 #include "alidade/camera/camera_model.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 /// Perspective camera with radial and tangential distortion (Brown–Conrady), in OpenCV's names and order of k1…k3:
 ///     x = X/Z, y = Y/Z, r² = x² + y²,  L = 1 + k1 r² + k2 r⁴ + k3 r⁶

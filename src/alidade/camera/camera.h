@@ -10,8 +10,9 @@
 #include "alidade/camera/flat_port.h"
 #include "alidade/camera/kannala_brandt.h"
 #include "alidade/camera/pinhole.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 /// A model together with its parameter values.
 template <CameraModel Model>

@@ -7,8 +7,9 @@
 
 #include "alidade/camera/projection_sigma.h"
 #include "alidade/geometry/rigid3.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 struct CameraDiffConfig {
   int cols = 60;

@@ -5,7 +5,9 @@
 #include <optional>
 #include <string_view>
 
-namespace alidade {
+#include "alidade/public.h"
+
+namespace ALIDADE_PUBLIC alidade {
 
 template <class Model>
 using Params = Eigen::Matrix<double, Model::num_params, 1>;

@@ -1,8 +1,9 @@
 #pragma once
 
 #include "alidade/camera/brown.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 /// A Brown lens in air behind a flat port: air gap d, glass of thickness t with index n_g, then water with index n_w,
 /// the port's unit normal n = (normal_x, normal_y, √(1 − normal_x² − normal_y²)) away from the camera. A point P in

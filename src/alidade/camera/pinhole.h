@@ -3,8 +3,9 @@
 #include <array>
 
 #include "alidade/camera/camera_model.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 /// Ideal perspective camera: (u, v) = (fx x + skew y + cx, fy y + cy), x = X/Z, y = Y/Z.
 /// Hartley & Zisserman, "Multiple View Geometry", 2003, eq. (6.10).

@@ -5,8 +5,9 @@
 #include <vector>
 
 #include "alidade/camera/camera.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 struct PortResidualConfig {
   std::vector<double> fit_ranges_m{0.75, 1.0, 1.5};  ///< Where a calibration in water would hold its boards.

@@ -1,8 +1,9 @@
 #pragma once
 
 #include "alidade/camera/camera.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 /// Values over the picture on a regular grid of pixels: value (col, row) stands at (u0 + col·du, v0 + row·dv).
 struct PixelGrid {

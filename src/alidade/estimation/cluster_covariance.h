@@ -6,8 +6,9 @@
 #include <vector>
 
 #include "alidade/estimation/verdict.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 /// What one independent cluster of measurements (a photo, a shot, a block of time) does to the estimate, in the
 /// parameters whose covariance is asked for: H = Σ A + priors is the information of all shared parameters (the

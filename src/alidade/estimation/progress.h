@@ -5,7 +5,9 @@
 #include <stdexcept>
 #include <string_view>
 
-namespace alidade {
+#include "alidade/public.h"
+
+namespace ALIDADE_PUBLIC alidade {
 
 /// The person pressed Ctrl-C; the door turns it into one line and its exit code, nothing is written.
 struct Interrupted : std::runtime_error {

@@ -4,7 +4,9 @@
 #include <string>
 #include <vector>
 
-namespace alidade {
+#include "alidade/public.h"
+
+namespace ALIDADE_PUBLIC alidade {
 
 /// Exit codes, the same for every command, so that scripts can tell "bad input" from "no answer" from "our bug".
 enum class ExitCode : int {
@@ -51,6 +53,9 @@ struct Verdict {
   std::string sentence;
   std::string to_add;  ///< What the person should do next; empty if nothing.
   std::vector<Check> checks;
+
+  /// Whether there is an answer that stands: good, or with what to take care of.
+  [[nodiscard]] bool ok() const { return state == State::good || state == State::care; }
 };
 
 /// The check "assumed": an answer is good only where nothing assumed without a σ moves it by more than its own σ. With

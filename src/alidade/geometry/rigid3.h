@@ -3,8 +3,9 @@
 #include <Eigen/Geometry>
 
 #include "alidade/geometry/so3.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 /// Rigid motion that maps coordinates in frame a to coordinates in frame b. Name every instance `b_from_a`:
 ///     point_in_cam   = cam_from_board * point_in_board

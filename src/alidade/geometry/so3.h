@@ -3,7 +3,9 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-namespace alidade {
+#include "alidade/public.h"
+
+namespace ALIDADE_PUBLIC alidade {
 
 /// Unit quaternion of a rotation vector [rad]: (cos ½θ, sin(½θ)/θ · φ). Exact at zero.
 /// Solà, Deray & Atchuthan, "A micro Lie theory", 2018, eq. (133).

@@ -170,7 +170,7 @@ std::optional<Board> guess_board(std::size_t num_photos, const PhotoLoader& load
 std::string changed_options(const Board& told, const Board& meant) {
   std::string options;
   const auto add = [&](const std::string& option) { options += (options.empty() ? "" : " ") + option; };
-  if (meant.kind != told.kind) add("--target " + std::string(kind_name(meant.kind)));
+  if (meant.kind != told.kind) add("--board-kind " + std::string(kind_name(meant.kind)));
   if (meant.cols != told.cols || meant.rows != told.rows) {
     add("--board " + std::to_string(meant.cols) + "x" + std::to_string(meant.rows));
   }

@@ -59,9 +59,9 @@ TEST(BoardGuess, MarkersOrNone) {
   bare.marker_m = 0.0;
   bare.dictionary.clear();
   EXPECT_EQ(guessed(photos_of(marked), bare),
-            "--target charuco --dictionary DICT_5X5_50 --marker with its markers' side");
+            "--board-kind charuco --dictionary DICT_5X5_50 --marker with its markers' side");
   const Board with_markers{BoardKind::charuco, 7, 6, 0.03, 0.02, "DICT_5X5_100"};
-  EXPECT_EQ(guessed(photos_of(plain), with_markers), "--target chessboard");
+  EXPECT_EQ(guessed(photos_of(plain), with_markers), "--board-kind chessboard");
 }
 
 TEST(BoardGuess, CirclesToldTheOtherWayRound) { EXPECT_EQ(guessed(photos_of(dots), sized(dots, 9, 4)), "--board 4x9"); }

@@ -7,15 +7,9 @@
 #include "alidade/board/board.h"
 #include "alidade/estimation/progress.h"
 #include "alidade/imaging/find_board.h"
-
-namespace cv {
-class Mat;
-}
+#include "alidade/imaging/photos.h"
 
 namespace alidade {
-
-/// Gives photo `i`; called from several threads, each photo once. What it throws becomes that photo's reason.
-using PhotoLoader = std::function<cv::Mat(std::size_t i)>;
 
 struct PhotoSize {
   int width_px = 0, height_px = 0;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "alidade/calibrate/port.h"
 #include "alidade/geometry/so3.h"
 #include "alidade/io/camera_json.h"
 
@@ -59,7 +60,8 @@ struct MiddleColumns {
 };
 
 DataTable photos_table(const Board& board, const Calibration& calibration) {
-  const auto& [views, reasons, size, unreadable, report] = calibration.photos;
+  const auto& views = calibration.board_views;
+  const CalibrateReport& report = calibration;
   std::vector<std::string> names, why;
   std::vector<bool> used;
   std::vector<int> num_corners;
@@ -92,14 +94,15 @@ DataTable photos_table(const Board& board, const Calibration& calibration) {
 }
 
 DataTable corners_table(const Board& board, const Calibration& calibration) {
-  const auto& [views, reasons, size, unreadable, report] = calibration.photos;
+  const auto& views = calibration.board_views;
+  const CalibrateReport& report = calibration;
   std::vector<int> photo, col, row;
   std::array<Numbers, 8> c;
   const int per_row = board.kind == BoardKind::aprilgrid ? 4 * board.cols : board.cols;
   for (std::size_t k = 0; k < views.size(); ++k) {
     for (std::size_t i = 0; i < views[k].corners.size(); ++i) {
       const Corner& corner = views[k].corners[i];
-      const CornerFit& fit = report.views[k].corners[i];
+      const CornerResidual& fit = report.views[k].corners[i];
       const bool solved = report.views[k].used;
       const double sigma_u = std::sqrt(corner.cov(0, 0)), sigma_v = std::sqrt(corner.cov(1, 1));
       photo.push_back(static_cast<int>(k));
@@ -249,7 +252,7 @@ JsonValue port_values(const PortResidual& residual) {
 }
 
 void fill_estimate(const Board& board, const Calibration& calibration, ResultDocument& document) {
-  const auto& report = calibration.photos.report;
+  const CalibrateReport& report = calibration;
   const auto names = param_names(report.camera.lens);
   document.estimate["camera"] = camera_values(report.camera);
   document.stddev["camera"] = camera_stddev(report.camera);
@@ -312,16 +315,12 @@ DataTable points_in_board_table(const std::vector<Eigen::Vector3d>& points_in_bo
 }
 
 void fill_calibration(const Board& board, const Calibration& calibration, ResultDocument& document) {
-  const auto& [views, reasons, size, unreadable, report] = calibration.photos;
-  document.counts.given = views.size();
+  const auto& views = calibration.board_views;
+  const CalibrateReport& report = calibration;
+  document.counts = calibration.counts;
   JsonValue photos = JsonValue::list();
   for (std::size_t k = 0; k < views.size(); ++k) {
     const ViewFit& fit = report.views[k];
-    if (fit.used) {
-      ++document.counts.used;
-    } else {
-      document.counts.skipped.push_back({views[k].photo, 0, fit.reason});
-    }
     JsonValue row;
     row["file"] = views[k].photo;
     row["used"] = fit.used;
@@ -329,7 +328,6 @@ void fill_calibration(const Board& board, const Calibration& calibration, Result
     row["reason"] = fit.reason;
     photos.push_back(std::move(row));
   }
-  document.counts.dropped = document.counts.given - document.counts.used;
   const bool solved = report.status == CalibrateReport::Status::converged;
   document.assumed = calibration.assumed;
   if (solved) {
@@ -337,7 +335,7 @@ void fill_calibration(const Board& board, const Calibration& calibration, Result
     JsonValue rejected = JsonValue::list();
     for (std::size_t k = 0; k < views.size(); ++k) {
       for (std::size_t i = 0; report.views[k].used && i < views[k].corners.size(); ++i) {
-        const CornerFit& fit = report.views[k].corners[i];
+        const CornerResidual& fit = report.views[k].corners[i];
         if (fit.used) continue;
         JsonValue row;
         row["file"] = views[k].photo;
@@ -350,8 +348,8 @@ void fill_calibration(const Board& board, const Calibration& calibration, Result
     document.estimate["corners_rejected"] = std::move(rejected);
   }
   if (!solved) {
-    document.estimate["camera"]["width"] = size.width_px;
-    document.estimate["camera"]["height"] = size.height_px;
+    document.estimate["camera"]["width"] = calibration.size.width_px;
+    document.estimate["camera"]["height"] = calibration.size.height_px;
   }
   document.estimate["photos"] = std::move(photos);
   document.data = {photos_table(board, calibration), corners_table(board, calibration)};

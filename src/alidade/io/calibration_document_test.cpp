@@ -155,8 +155,8 @@ class ReadCalibration : public ::testing::Test {
  protected:
   void write(const Calibration& calibration) const {
     write_file(path() / "result.json", text_of(calibration));
-    write_file(path() / "camera.yaml", camera_text(calibration.photos.report.camera, CameraFormat::alidade));
-    write_file(path() / "board_points.csv", board_points_csv(calibration.photos.report.board_points));
+    write_file(path() / "camera.yaml", camera_text(calibration.camera, CameraFormat::alidade));
+    write_file(path() / "board_points.csv", board_points_csv(calibration.board_points));
   }
   [[nodiscard]] const std::filesystem::path& path() const { return folder_.path(); }
   [[nodiscard]] std::string refusal() const {
@@ -177,10 +177,10 @@ TEST_F(ReadCalibration, GivesBackWhatWasFound) {
   write(calibration);
   for (const auto& place : {path(), path() / "result.json"}) {
     const CalibrationResult read = read_calibration(place);
-    EXPECT_EQ(params(read.camera.lens), params(calibration.photos.report.camera.lens));
-    EXPECT_LT((read.camera.cov - calibration.photos.report.camera.cov).norm(), 1e-12 * read.camera.cov.norm());
+    EXPECT_EQ(params(read.camera.lens), params(calibration.camera.lens));
+    EXPECT_LT((read.camera.cov - calibration.camera.cov).norm(), 1e-12 * read.camera.cov.norm());
     EXPECT_EQ(read.board, sample_board);
-    EXPECT_DOUBLE_EQ(read.noise_px, calibration.photos.report.noise_px);
+    EXPECT_DOUBLE_EQ(read.noise_px, calibration.noise_px);
     EXPECT_EQ(read.board_points.size(), 54u);
   }
 }

@@ -1,4 +1,4 @@
-#include "cli/calibration_summary.h"
+#include "alidade/io/calibration_outcome.h"
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -8,13 +8,14 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "alidade/calibrate/port.h"
 #include "alidade/camera/undistort.h"
 #include "alidade/io/calibration_document.h"
 #include "alidade/io/camera_file.h"
 #include "alidade/io/corner_file.h"
 #include "alidade/io/photos.h"
 
-namespace alidade::cli {
+namespace alidade {
 namespace {
 
 /// "532.8 ± 1.3": both to two digits of the 3σ.
@@ -70,21 +71,20 @@ std::string picture_or_none(const Make& make) {
   }
 }
 
-}  // namespace
-
-void summarize(const Calibration& calibration, Run& run) {
-  const auto& [views, reasons, size, unreadable, report] = calibration.photos;
+void summarize(const Calibration& calibration, std::vector<std::string>& lines) {
+  const std::vector<BoardView>& views = calibration.board_views;
+  const CalibrateReport& report = calibration;
   for (std::size_t k = 0; k < views.size(); ++k) {
-    if (!report.views[k].used) run.say(fmt::format("not used: {}: {}", views[k].photo, report.views[k].reason));
+    if (!report.views[k].used) lines.push_back(fmt::format("not used: {}: {}", views[k].photo, report.views[k].reason));
   }
   if (report.status != CalibrateReport::Status::converged) return;
   for (std::size_t k = 0; k < views.size(); ++k) {
     for (std::size_t i = 0; report.views[k].used && i < views[k].corners.size(); ++i) {
-      const CornerFit& fit = report.views[k].corners[i];
+      const CornerResidual& fit = report.views[k].corners[i];
       if (fit.used) continue;
       const std::string what = fit.residual_px.allFinite() ? fmt::format("is {:.2f} px off", fit.residual_px.norm())
                                                            : "lies where this lens sees nothing";
-      run.say(fmt::format("left out: {}: corner {} {}", views[k].photo, views[k].corners[i].index, what));
+      lines.push_back(fmt::format("left out: {}: corner {} {}", views[k].photo, views[k].corners[i].index, what));
     }
   }
   const auto names = param_names(report.camera.lens);
@@ -94,22 +94,22 @@ void summarize(const Calibration& calibration, Run& run) {
     const double sigma = std::sqrt(report.camera.cov(at, at));
     if (names[i] == "skew" && sigma == 0.0 && values[at] == 0.0) continue;
     const char* unit = i < 5 ? " px" : names[i].ends_with("_m") ? " m" : "";
-    run.say(fmt::format("{:5} {}{}", names[i], value_and_3sigma(values[at], sigma), unit));
+    lines.push_back(fmt::format("{:5} {}{}", names[i], value_and_3sigma(values[at], sigma), unit));
   }
   const auto used =
       std::count_if(report.views.begin(), report.views.end(), [](const ViewFit& fit) { return fit.used; });
-  run.say(fmt::format("{} of {} photos, {} corners ({} left out), RMS {:.4f} px, board {}", used, views.size(),
-                      report.corners_used, report.corners_dropped, report.rms_px,
-                      shape_name(calibration.config.board_shape)));
+  lines.push_back(fmt::format("{} of {} photos, {} corners ({} left out), RMS {:.4f} px, board {}", used, views.size(),
+                              report.corners_used, report.corners_dropped, report.rms_px,
+                              shape_name(calibration.config.board_shape)));
   const BoardShape asked = calibration.asked_shape;
   if ((asked == BoardShape::bow || asked == BoardShape::free) && asked != calibration.config.board_shape) {
-    run.say(fmt::format("--board-shape {} was not used: it does not help on unseen photos", shape_name(asked)));
+    lines.push_back(fmt::format("--board-shape {} was not used: it does not help on unseen photos", shape_name(asked)));
   }
-  if (calibration.port) run.say(port_sentence(*calibration.port));
+  if (calibration.port) lines.push_back(port_sentence(*calibration.port));
 }
 
-void add_result_files(const Calibration& calibration, Run& run) {
-  const auto& report = calibration.photos.report;
+void add_result_files(const Calibration& calibration, std::vector<NamedBytes>& files) {
+  const CalibrateReport& report = calibration;
   if (report.status != CalibrateReport::Status::converged) return;
   Camera camera = report.camera;
   camera.source = "alidade calibrate";
@@ -117,34 +117,81 @@ void add_result_files(const Calibration& calibration, Run& run) {
   std::vector<Rigid3> poses;
   for (std::size_t k = 0; k < report.views.size(); ++k) {
     if (!report.views[k].used) continue;
-    photos.push_back(calibration.photos.views[k].photo);
+    photos.push_back(calibration.board_views[k].photo);
     poses.push_back(report.views[k].cam_from_board);
   }
-  run.add_file("camera.yaml", camera_text(camera, CameraFormat::alidade));
-  run.add_file("corners.csv", corners_csv(calibration.photos.views));
-  run.add_file("poses.csv", poses_csv(photos, poses));
-  run.add_file("board_points.csv", board_points_csv(report.board_points));
+  files.push_back({"camera.yaml", camera_text(camera, CameraFormat::alidade)});
+  files.push_back({"corners.csv", corners_csv(calibration.board_views)});
+  files.push_back({"poses.csv", poses_csv(photos, poses)});
+  files.push_back({"board_points.csv", board_points_csv(report.board_points)});
 }
 
-void add_pictures(const Calibration& calibration, const PhotoLoader& load_photo, Run& run) {
-  const auto& report = calibration.photos.report;
-  const auto& views = calibration.photos.views;
+}  // namespace
+
+Outcome outcome_of(const Calibration& calibration) {
+  Outcome outcome;
+  fill_calibration(calibration.board, calibration, outcome.document);
+  outcome.document.verdict = calibration.verdict;
+  summarize(calibration, outcome.lines);
+  add_result_files(calibration, outcome.files);
+  return outcome;
+}
+
+Outcome outcome_of(const FoundCorners& found) {
+  Outcome outcome;
+  ResultDocument whole;
+  fill_calibration(found.calibration.board, found.calibration, whole);
+  whole.data.resize(std::min<std::size_t>(2, whole.data.size()));  // photos and corners
+  ResultDocument& document = outcome.document;
+  document.counts = found.counts;
+  document.data = std::move(whole.data);
+  document.verdict = found.verdict;
+  JsonValue photos = JsonValue::list();
+  for (const std::string& corner : found.rejected) outcome.lines.push_back("left out: " + corner + " fits no noise");
+  for (std::size_t k = 0; k < found.board_views.size(); ++k) {
+    const BoardView& view = found.board_views[k];
+    const std::string& reason = found.calibration.views[k].reason;
+    JsonValue row;
+    row["file"] = view.photo;
+    row["corners"] = static_cast<int>(view.corners.size());
+    row["reason"] = view.corners.empty() ? reason : "";
+    photos.push_back(std::move(row));
+    if (view.corners.empty()) outcome.lines.push_back(fmt::format("no corners: {}: {}", view.photo, reason));
+  }
+  document.estimate["corners"] = static_cast<int>(found.num_corners);
+  document.estimate["corners_left_out"] = static_cast<int>(found.num_rejected);
+  document.estimate["sigma_px"] = found.sigma_px;
+  document.estimate["excess_px"] = found.excess_px;
+  document.estimate["covariance"] = found.has_excess ? "corner and residuals" : "corner";
+  document.estimate["model"] = found.has_excess ? found.calibration.config.model : "";
+  document.estimate["photos"] = std::move(photos);
+  if (found.num_corners == 0) return outcome;
+  outcome.files.push_back({"corners.csv", corners_csv(found.board_views)});
+  outcome.lines.push_back(fmt::format("the table has no picture size: calibrate --corners takes --size {}x{} with it",
+                                      found.size.width_px, found.size.height_px));
+  return outcome;
+}
+
+void add_pictures(const Calibration& calibration, const Photos& photos, Outcome& outcome) {
+  const CalibrateReport& report = calibration;
+  const std::vector<BoardView>& views = calibration.board_views;
   const std::vector<std::size_t> chosen = shown_photos(report);
   if (chosen.empty()) return;
   const int width_px = preview_width_px(chosen.size());
   std::vector<std::string> jpegs(chosen.size());
   tbb::parallel_for(std::size_t{0}, chosen.size(), [&](std::size_t i) {
-    jpegs[i] = picture_or_none([&] { return jpeg_preview(load_photo(chosen[i]), i < num_large ? 640 : width_px, 75); });
+    jpegs[i] =
+        picture_or_none([&] { return jpeg_preview(photos.load(chosen[i]), i < num_large ? 640 : width_px, 75); });
   });
   const std::string worst = views[chosen.front()].photo;
   if (report.status == CalibrateReport::Status::converged) {
     const std::string straight =
-        picture_or_none([&] { return undistorted_preview(report.camera, load_photo(chosen.front())); });
-    if (!straight.empty()) run.add_picture("undistorted:" + worst, straight);
+        picture_or_none([&] { return undistorted_preview(report.camera, photos.load(chosen.front())); });
+    if (!straight.empty()) outcome.pictures.push_back({"undistorted:" + worst, straight});
   }
   for (std::size_t i = 0; i < chosen.size(); ++i) {
-    if (!jpegs[i].empty()) run.add_picture(views[chosen[i]].photo, std::move(jpegs[i]));
+    if (!jpegs[i].empty()) outcome.pictures.push_back({views[chosen[i]].photo, std::move(jpegs[i])});
   }
 }
 
-}  // namespace alidade::cli
+}  // namespace alidade

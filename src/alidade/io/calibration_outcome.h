@@ -1,18 +1,19 @@
 #pragma once
 
-#include "alidade/calibrate/calibration.h"
-#include "alidade/imaging/find_boards.h"
-#include "cli/run.h"
+#include "alidade/calibrate/found_corners.h"
+#include "alidade/imaging/photos.h"
+#include "alidade/io/outcome.h"
 
-namespace alidade::cli {
+namespace alidade {
 
-/// The lines that a person reads at the end of `alidade calibrate`.
-void summarize(const Calibration& calibration, Run& run);
+/// The document of a calibration, its lines for a person, and camera.yaml, corners.csv, poses.csv and board_points.csv
+/// where there is a camera.
+[[nodiscard]] Outcome outcome_of(const Calibration& calibration);
 
-/// camera.yaml, corners.csv, poses.csv and board_points.csv, where there is a camera.
-void add_result_files(const Calibration& calibration, Run& run);
+/// The document of corners, its lines, and corners.csv where there are any.
+[[nodiscard]] Outcome outcome_of(const FoundCorners& found);
 
-/// Small pictures of the photos for the report, and the worst one without its distortion.
-void add_pictures(const Calibration& calibration, const PhotoLoader& load_photo, Run& run);
+/// Adds small pictures of the photos for the report, and the worst one without its distortion.
+void add_pictures(const Calibration& calibration, const Photos& photos, Outcome& outcome);
 
-}  // namespace alidade::cli
+}  // namespace alidade

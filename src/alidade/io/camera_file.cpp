@@ -202,4 +202,8 @@ std::string_view camera_format_name(CameraFormat format) {
   return "?";
 }
 
+void write_camera(const std::filesystem::path& file, const Camera& camera, CameraFormat format, bool lossy) {
+  write_file(file, camera_text(camera, format, lossy));
+}
+
 }  // namespace alidade

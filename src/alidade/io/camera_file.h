@@ -7,8 +7,9 @@
 
 #include "alidade/camera/camera.h"
 #include "alidade/io/files.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 /// `opencv` is cv::FileStorage (YAML; XML and JSON are read too), `ros` a camera_info YAML, `kalibr` a camchain YAML,
 /// `mrcal` a .cameramodel, `colmap` a cameras.txt. The traps of each: docs/maths/camera-models.md.
@@ -35,6 +36,10 @@ void require_central(const Camera& camera, const std::string& name);
 /// A camera as text of a format. Throws InputError saying what would be lost, unless `lossy`; also if the format has no
 /// such lens at all.
 [[nodiscard]] std::string camera_text(const Camera& camera, CameraFormat format, bool lossy = false);
+
+/// Writes it, whole. Throws as camera_text() does, and where the file cannot be written.
+void write_camera(const std::filesystem::path& file, const Camera& camera, CameraFormat format = CameraFormat::alidade,
+                  bool lossy = false);
 
 /// What of the lens the format cannot hold, "skew 0.3 px" each; camera_text() refuses these.
 [[nodiscard]] std::vector<std::string> lens_losses(const Camera& camera, CameraFormat format);

@@ -74,6 +74,32 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, int num_p
   return views;
 }
 
+ImageSize least_size(std::span<const BoardView> views) {
+  constexpr double most_px = 2e5;
+  Eigen::Vector2d corner(1.0, 1.0);
+  for (const BoardView& view : views) {
+    for (const Corner& each : view.corners) corner = corner.cwiseMax(each.px);
+  }
+  const auto to_hold = [most_px](double px) { return static_cast<int>(std::ceil(std::min(px, most_px))) + 1; };
+  return {to_hold(corner.x()), to_hold(corner.y())};
+}
+
+void require_corners_inside(const ImageSize& size, const std::filesystem::path& file,
+                            std::span<const BoardView> views) {
+  std::size_t outside = 0, all = 0;
+  for (const BoardView& view : views) {
+    for (const Corner& corner : view.corners) {
+      const bool is_inside =
+          corner.px.minCoeff() > -1.0 && corner.px.x() < size.width_px && corner.px.y() < size.height_px;
+      outside += is_inside ? 0 : 1;
+      ++all;
+    }
+  }
+  if (10 * outside <= all) return;
+  throw InputError(fmt::format("{}: {} of {} corners lie outside a picture of {}x{} px: check --size", file.string(),
+                               outside, all, size.width_px, size.height_px));
+}
+
 std::string poses_csv(const std::vector<std::string>& photos, std::span<const Rigid3> cam_from_board) {
   std::string text =
       "photo,cam_from_board_x_m,cam_from_board_y_m,cam_from_board_z_m,cam_from_board_qx,cam_from_board_qy,"

@@ -6,11 +6,13 @@
 #include <vector>
 
 #include "alidade/board/board_view.h"
+#include "alidade/calibrate/calibrate.h"
 #include "alidade/geometry/rigid3.h"
 #include "alidade/io/files.h"
 #include "alidade/io/result_document.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 /// Corners as CSV: photo,corner,u_px,v_px,sigma_u_px,sigma_v_px,corr_uv. Places to 10⁻⁹ px, so that
 /// what is read back gives the same camera.
@@ -22,6 +24,13 @@ namespace alidade {
 /// column. With `skipped` a wrong row is left out and named there instead.
 [[nodiscard]] std::vector<BoardView> read_corners(const std::filesystem::path& file, int num_points,
                                                   std::vector<SkippedInput>* skipped = nullptr);
+
+/// The smallest images that hold all corners [px]: where nobody tells their size.
+[[nodiscard]] ImageSize least_size(std::span<const BoardView> views);
+
+/// A size that does not hold the corners is of other images: throws InputError about `file` where more than one in ten
+/// lies outside. A few outside may be wrong corners.
+void require_corners_inside(const ImageSize& size, const std::filesystem::path& file, std::span<const BoardView> views);
 
 /// Poses as CSV: photo,cam_from_board_x_m,…_y_m,…_z_m,…_qx,…_qy,…_qz,…_qw.
 [[nodiscard]] std::string poses_csv(const std::vector<std::string>& photos, std::span<const Rigid3> cam_from_board);

@@ -5,7 +5,9 @@
 #include <string>
 #include <string_view>
 
-namespace alidade {
+#include "alidade/public.h"
+
+namespace ALIDADE_PUBLIC alidade {
 
 /// The outside world is wrong: one line, "file:line: column: what; what to do". Becomes exit code 3.
 struct InputError : std::runtime_error {

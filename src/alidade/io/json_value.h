@@ -8,7 +8,9 @@
 #include <variant>
 #include <vector>
 
-namespace alidade {
+#include "alidade/public.h"
+
+namespace ALIDADE_PUBLIC alidade {
 
 /// A JSON value made of plain C++ ones: `value["camera"]["fx"] = 532.8`. Objects keep the order of insertion. Numbers
 /// that are not finite become null in the text.

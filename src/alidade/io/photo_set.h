@@ -2,52 +2,46 @@
 
 #include <filesystem>
 #include <memory>
-#include <mutex>
-#include <span>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "alidade/calibrate/calibrate_photos.h"
-#include "alidade/io/photos.h"
-#include "cli/run.h"
+#include "alidade/estimation/counts.h"
+#include "alidade/estimation/verdict.h"
+#include "alidade/imaging/photos.h"
+#include "alidade/io/result_document.h"
+#include "alidade/public.h"
 
-namespace alidade::cli {
+namespace ALIDADE_PUBLIC alidade {
 
-/// The photos of a command line's files and folders. Reads each once; the second look comes from memory while the set
-/// is small. load() is called from many threads.
-class PhotoShelf {
+/// The photos of files and folders. Each is read once; the second look comes from memory while the set is small. They
+/// may be loaded from many threads; copies share what was read.
+class PhotoSet {
  public:
-  /// Throws InputError where one of the arguments does not exist, or is a folder without photos.
-  PhotoShelf(const std::vector<std::filesystem::path>& arguments, Run& run);
-  ~PhotoShelf();
-  PhotoShelf(const PhotoShelf&) = delete;
-  PhotoShelf& operator=(const PhotoShelf&) = delete;
+  /// Throws InputError where one of the paths does not exist, or is a folder without photos.
+  explicit PhotoSet(const std::vector<std::filesystem::path>& paths);
 
-  [[nodiscard]] std::size_t size() const { return found_.photos.size(); }
-  /// Path of the first.
-  [[nodiscard]] std::string first() const { return found_.photos.front().string(); }
-  /// File names, or paths where two files have the same name.
-  [[nodiscard]] std::vector<std::string> names() const;
-  [[nodiscard]] cv::Mat load(std::size_t i);
-  [[nodiscard]] PhotoLoader loader();
-
-  /// Names, in the document and in a line, what lay beside the photos and was none. At the end: the rows of photos that
-  /// took no part come before.
-  void tell_skipped() const;
-  /// Names the photos that a viewer would turn otherwise than most of them, and says that they were not turned. Added
-  /// to the verdict as a check.
-  void tell_turned(Verdict& verdict) const;
+  /// To be worked with: file names, or paths where two files have the same name.
+  [[nodiscard]] Photos photos() const;
+  [[nodiscard]] std::size_t size() const;
+  /// Those that were read, in their order: name, size, checksum.
+  [[nodiscard]] std::vector<InputFile> inputs() const;
+  /// What lay beside the photos and was none.
+  [[nodiscard]] const std::vector<SkippedInput>& skipped() const;
+  /// The same in a line for a person; "" for none.
+  [[nodiscard]] std::string skipped_line() const;
+  /// Names the photos that a viewer would turn otherwise than most of them, and says that they were not turned. None
+  /// where all stand alike.
+  [[nodiscard]] std::optional<Check> turned() const;
+  /// Throws InputError, about the first, where none of them could be read; `reason`: why that one.
+  void require_readable(std::size_t num_unreadable, const std::string& reason) const;
 
  private:
   struct Held;
-  PhotoFiles found_;
-  Run& run_;
-  std::mutex mutex_;
-  std::unique_ptr<Held> held_;
+  std::shared_ptr<Held> state_;
 };
 
-/// calibrate_photos() of a shelf. Throws InputError where none of its photos can be read.
-[[nodiscard]] PhotoCalibration calibrate_shelf(PhotoShelf& shelf, const Board& board, const CalibrateConfig& config,
-                                               std::span<const Eigen::Vector3d> given, Run& run);
+/// The photos of a file or a folder: `calibrate(photos_in("photos"), board)`. Throws as PhotoSet does.
+[[nodiscard]] Photos photos_in(const std::filesystem::path& path);
 
-}  // namespace alidade::cli
+}  // namespace alidade

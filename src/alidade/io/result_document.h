@@ -6,10 +6,12 @@
 #include <utility>
 #include <vector>
 
+#include "alidade/estimation/counts.h"
 #include "alidade/estimation/verdict.h"
 #include "alidade/io/json_value.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 /// A file that a result was made from.
 struct InputFile {
@@ -17,21 +19,6 @@ struct InputFile {
   std::string name;  ///< As given.
   std::size_t bytes = 0;
   std::string sha256;
-};
-
-/// A row, or a photo, that was left out, and why. Line 0: the whole file.
-struct SkippedInput {
-  std::string file;
-  std::size_t line = 0;
-  std::string reason;
-};
-
-/// How much was given and what became of it; photos in calibrate, rows or frames elsewhere.
-struct Counts {
-  std::size_t given = 0;
-  std::size_t used = 0;
-  std::size_t dropped = 0;
-  std::vector<SkippedInput> skipped;
 };
 
 /// What was left of a long table, and how: its whole stands in a CSV file beside the document.

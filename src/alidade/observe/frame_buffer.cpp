@@ -133,7 +133,7 @@ Adjustment adjust(const FrameBuffer& buffer, const AdjustConfig& config, const P
   const std::size_t unknowns = static_cast<std::size_t>(CommonLayout(config.nuisances).size) + 2 * bundle.points.size();
   if (2 * bundle.observations.size() < unknowns + 4) return adjustment;
 
-  BundleConfig solve;
+  RotationBundleConfig solve;
   solve.nuisances = config.nuisances;
   solve.with_depth = config.with_depth;
   solve.sigma_turn_rad = config.sigma_turn_rad;

@@ -96,7 +96,7 @@ class Planner {
   }
 
   [[nodiscard]] Eigen::Vector4d variance_px2() const {
-    BundleConfig config;
+    RotationBundleConfig config;
     config.sigma_px = now_.sigma_px / scale_.scale;
     config.huber = 0.0;
     config.max_iterations = 0;

@@ -36,7 +36,7 @@ struct PointBlock {
 
 class Solver {
  public:
-  Solver(const RotationBundle& bundle, const CommonPrior& prior, const BundleConfig& config)
+  Solver(const RotationBundle& bundle, const CommonPrior& prior, const RotationBundleConfig& config)
       : bundle_(bundle), prior_(prior), config_(config), layout_(without_turn(config.nuisances)) {
     turns_ = config.nuisances.turn ? static_cast<int>(bundle.frames.size()) : 0;
     place_ = {bundle.camera, bundle.points,
@@ -356,7 +356,7 @@ class Solver {
 
   const RotationBundle& bundle_;
   const CommonPrior& prior_;
-  const BundleConfig& config_;
+  const RotationBundleConfig& config_;
   const CommonLayout layout_;
   const CommonLayout turn_layout_{with_turn(config_.nuisances)};
   int turns_ = 0;  ///< Frames whose rotation is estimated.
@@ -378,8 +378,8 @@ class Solver {
 
 }  // namespace
 
-BundleSolution solve_rotation_bundle(const RotationBundle& bundle, const CommonPrior& prior, const BundleConfig& config,
-                                     const Progress& progress) {
+BundleSolution solve_rotation_bundle(const RotationBundle& bundle, const CommonPrior& prior,
+                                     const RotationBundleConfig& config, const Progress& progress) {
   return Solver(bundle, prior, config).solve(progress);
 }
 

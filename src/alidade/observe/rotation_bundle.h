@@ -34,7 +34,7 @@ struct RotationBundle {
   std::vector<BearingPoint> points;  ///< Where to start.
 };
 
-struct BundleConfig {
+struct RotationBundleConfig {
   ObserveNuisances nuisances;
   bool with_depth = false;  ///< Points have a depth: a lever arm or a measured velocity is in play.
   double sigma_px = 1e-3;   ///< Of each observation, normalised.
@@ -103,7 +103,7 @@ struct BundleSolution {
 /// them. Throws Interrupted.
 /// Triggs, McLauchlan, Hartley & Fitzgibbon, "Bundle adjustment — a modern synthesis", 2000, section 6.
 [[nodiscard]] BundleSolution solve_rotation_bundle(const RotationBundle& bundle, const CommonPrior& prior,
-                                                   const BundleConfig& config, const Progress& progress = {});
+                                                   const RotationBundleConfig& config, const Progress& progress = {});
 
 /// Robust σ of a coordinate from the residuals: their median norm over √(2 ln 2), freed of the unknowns' share.
 [[nodiscard]] double robust_sigma(std::vector<double> residual_norms, int dof);

@@ -106,7 +106,7 @@ std::vector<double> products_by_lag(const Adjustment& reference) {
   const RotationBundle& bundle = reference.bundle;
   const std::size_t every = std::max<std::size_t>(1, bundle.points.size() / tracks_looked_at);
   std::vector<std::vector<Eigen::Vector2d>> tracks(bundle.points.size());
-  const double limit = BundleConfig{}.huber * reference.sigma_px;
+  const double limit = RotationBundleConfig{}.huber * reference.sigma_px;
   for (std::size_t i = 0; i < bundle.observations.size(); ++i) {
     const auto point = static_cast<std::size_t>(bundle.observations[i].point);
     const Eigen::Vector2d& residual = reference.solution.residuals[i];
@@ -155,7 +155,7 @@ double seen_within(double block_s, double correlation_s) {
 }
 
 double residual_weight(const Adjustment& reference, std::size_t observation) {
-  const double sigma = reference.sigma_px, huber = BundleConfig{}.huber;
+  const double sigma = reference.sigma_px, huber = RotationBundleConfig{}.huber;
   const double norm = reference.solution.residual_px[observation] / sigma;
   return (norm > huber ? huber / norm : 1.0) / (sigma * sigma);
 }

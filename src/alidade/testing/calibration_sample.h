@@ -1,6 +1,6 @@
 #pragma once
 
-#include "alidade/calibrate/calibration.h"
+#include "alidade/calibrate/judge.h"
 #include "alidade/simulate/board_photos.h"
 #include "alidade/simulate/example_camera.h"
 

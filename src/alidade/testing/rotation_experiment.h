@@ -74,7 +74,7 @@ inline Eigen::Vector4d bound_of(const Experiment& experiment, const RotationLog&
           {static_cast<int>(k), i, paper_scale.normalised(log.rows[k].px[static_cast<std::size_t>(i)])});
     }
   }
-  BundleConfig config;
+  RotationBundleConfig config;
   config.sigma_px = experiment.log.sigma_px / 400.0;
   config.huber = 0.0;
   config.max_iterations = 0;

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "alidade/calibrate/calibrate_photos.h"
+#include "alidade/calibrate/calibration.h"
+
+namespace alidade {
+
+/// Judges a finished solve: studies it, plans the next photo and gives the verdict. A board shape that was asked for
+/// but does not transfer from one half of the photos to the other is dropped (`decide_shape`), and the board solved
+/// flat or as a bow; with BoardShape::automatic the transfer test decides. `air`: the lens that `config` holds
+/// (flat_port), whose covariance is then counted.
+[[nodiscard]] Calibration judge_calibration(const Board& board, PhotoCalibration photos, CalibrateConfig config,
+                                            const std::optional<Camera>& air = {}, const Progress& progress = {});
+
+}  // namespace alidade

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <stdexcept>
+
+#include "alidade/public.h"
+
+namespace ALIDADE_PUBLIC alidade {
+
+/// A config that cannot be: thrown before any work by the jobs of the public headers, with every fault in one sentence.
+/// The command line ends in exit code 2 with it.
+struct ConfigError : std::invalid_argument {
+  using std::invalid_argument::invalid_argument;
+};
+
+}  // namespace alidade

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "alidade/public.h"
+
+namespace ALIDADE_PUBLIC alidade {
+
+/// A row, or a photo, that was left out, and why. Line 0: the whole file.
+struct SkippedInput {
+  std::string file;
+  std::size_t line = 0;
+  std::string reason;
+};
+
+/// How much was given and what became of it; photos in calibrate, rows or frames elsewhere.
+struct Counts {
+  std::size_t given = 0;
+  std::size_t used = 0;
+  std::size_t dropped = 0;
+  std::vector<SkippedInput> skipped;
+};
+
+}  // namespace alidade

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "alidade/public.h"
+
+namespace cv {
+class Mat;
+}
+
+namespace ALIDADE_PUBLIC alidade {
+
+/// Gives photo `i`; called from several threads, each photo once. What it throws becomes that photo's reason.
+using PhotoLoader = std::function<cv::Mat(std::size_t i)>;
+
+/// Photos by name, each loaded when it is needed.
+struct Photos {
+  std::vector<std::string> names;
+  PhotoLoader load;
+};
+
+}  // namespace alidade

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "alidade/io/result_document.h"
+
+namespace alidade {
+
+/// A file beside result.json, or a picture (JPEG) of the report.
+struct NamedBytes {
+  std::string name;
+  std::string bytes;
+};
+
+/// All that a job leaves, whoever ran it: what a command shows and writes, and what a program saves.
+struct Outcome {
+  ResultDocument document;         ///< Of it counts, assumed, verdict, estimate … grids; the rest is the run's.
+  std::vector<std::string> lines;  ///< For a person, before the verdict.
+  std::vector<NamedBytes> files;
+  std::vector<NamedBytes> pictures;  ///< The most wanted first.
+};
+
+}  // namespace alidade

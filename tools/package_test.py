@@ -1,0 +1,98 @@
+#!/usr/bin/env python3
+"""What others build on: package_test.py BUILD. Installs the build into a folder, and uses it from outside the tree: by
+find_package, by pkg-config, by add_subdirectory (configured only). Headers that are installed include installed ones,
+Eigen and std; the library shows nothing that they do not declare; the man pages and the completion are there."""
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+build = None
+
+
+def run(*words, **options):
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, **options)
+    if done.returncode != 0:
+        raise AssertionError(f"{' '.join(map(str, words))}\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}")
+    return done.stdout
+
+
+class Package(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.folder = pathlib.Path(cls.temporary.name)
+        cls.prefix = cls.folder / "installed"
+        run("cmake", "--install", build, "--prefix", cls.prefix)
+        cls.library = next(cls.prefix.glob("lib*/**/libalidade.so"))
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def test_examples_build_and_run_against_the_package(self):
+        outside = self.folder / "examples"
+        run("cmake", "-S", ROOT / "examples", "-B", outside, f"-DCMAKE_PREFIX_PATH={self.prefix}")
+        run("cmake", "--build", outside)
+        alidade, photos, camera = self.prefix / "bin" / "alidade", self.folder / "photos", self.folder / "camera.yml"
+        run(alidade, "simulate", "board", "--board", "9x6", "--square", "0.025", "--photos", "8", "--size", "640x480",
+            "--out", photos, "--quiet")
+        said = run(outside / "01_calibrate", photos, camera)
+        self.assertIn("fx", said)
+        run(alidade, "calibrate", photos, "--board", "9x6", "--square", "0.025", "--out", self.folder / "result",
+            "--quiet", "--no-report")
+        fx = {name: float(re.search(r"fx\D+([\d.]+)", run(alidade, "camera", "show", file)).group(1))
+              for name, file in (("library", camera), ("command", self.folder / "result" / "camera.yaml"))}
+        self.assertAlmostEqual(fx["library"], fx["command"], places=2, msg="the library and the command say the same")
+
+    def test_pkg_config_links(self):
+        environment = {**os.environ, "PKG_CONFIG_PATH": str(self.library.parent / "pkgconfig")}
+        flags = run("pkg-config", "--cflags", "--libs", "alidade", env=environment).split()
+        source = self.folder / "board.cpp"
+        source.write_text('#include <alidade/alidade.h>\n'
+                          'int main() { return alidade::num_points(alidade::Board{.cols = 9, .rows = 6}) == 54 ? 0 : 1; }\n')
+        run("c++", "-std=c++20", source, "-o", self.folder / "board", *flags, f"-Wl,-rpath,{self.library.parent}")
+        run(self.folder / "board")
+
+    def test_headers_include_installed_ones_eigen_and_std(self):
+        include = self.prefix / "include"
+        headers = sorted(include.rglob("*.h"))
+        self.assertGreater(len(headers), 10)
+        for header in headers:
+            for name in re.findall(r'#include "([^"]+)"', header.read_text()):
+                self.assertTrue((include / name).exists(), f"{header.name} includes {name}, which is not installed")
+            for name in re.findall(r"#include <([^>]+)>", header.read_text()):
+                self.assertTrue(name.startswith("Eigen/") or re.fullmatch(r"[a-z_]+", name), f"{header.name}: <{name}>")
+
+    def test_the_library_shows_what_public_headers_declare(self):
+        symbols = run("nm", "--dynamic", "--defined-only", "--demangle", self.library)
+        names = re.findall(r" T alidade::(?:detail::)?([\w~:]+)", symbols)
+        declared = "".join(header.read_text() for header in (self.prefix / "include").rglob("*.h"))
+        self.assertIn("calibrate", names)
+        hidden = sorted({name for name in names if not re.search(rf"\b{re.escape(name.split('::')[0])}\b", declared)})
+        self.assertEqual(hidden, [], "private names are seen from outside")
+
+    def test_add_subdirectory_configures_without_a_trace(self):
+        outside = self.folder / "inside"
+        outside.mkdir()
+        (outside / "CMakeLists.txt").write_text(
+            "cmake_minimum_required(VERSION 3.22)\nproject(user LANGUAGES CXX)\n"
+            f"add_subdirectory({ROOT} alidade EXCLUDE_FROM_ALL)\nadd_executable(user user.cpp)\n"
+            "target_link_libraries(user PRIVATE alidade::alidade)\n"
+            'if(CMAKE_CXX_FLAGS OR CMAKE_CXX_COMPILER_LAUNCHER OR ALIDADE_TESTS)\n'
+            '  message(FATAL_ERROR "alidade changed its user: ${CMAKE_CXX_FLAGS} ${CMAKE_CXX_COMPILER_LAUNCHER}")\nendif()\n')
+        (outside / "user.cpp").write_text("#include <alidade/alidade.h>\nint main() {}\n")
+        run("cmake", "-S", outside, "-B", outside / "build")
+
+    def test_man_pages_and_completion_are_there(self):
+        self.assertTrue((self.prefix / "share/man/man1/alidade-calibrate.1").exists())
+        self.assertIn("--board", (self.prefix / "share/bash-completion/completions/alidade").read_text())
+
+
+if __name__ == "__main__":
+    build = pathlib.Path(sys.argv.pop(1)).resolve()
+    unittest.main(verbosity=1)

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <atomic>
 #include <mutex>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
 
 #include "alidade/camera/undistort.h"
 #include "alidade/io/camera_file.h"
+#include "alidade/io/picture_codecs.h"
 #include "cli/camera.h"
 #include "cli/camera_values.h"
 #include "cli/frame.h"
@@ -27,15 +27,7 @@ struct UndistortArgs {
 
 cv::Mat read_photo(const std::string& file, const Camera& camera) {
   const std::string bytes = read_file(file);
-  cv::Mat photo;
-  if (!bytes.empty()) {
-    const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
-    try {
-      photo =
-          cv::imdecode(encoded, cv::IMREAD_UNCHANGED);  // as the sensor saw it: a turn in the EXIF data is not applied
-    } catch (const cv::Exception&) {
-    }
-  }
+  const cv::Mat photo = decode_picture(bytes, /*keep_alpha=*/true);  // as the sensor saw it: no turn by EXIF
   if (photo.empty()) throw InputError(file + ": is not a photo that can be read");
   if (photo.cols != camera.width_px || photo.rows != camera.height_px) {
     throw InputError(fmt::format("{}: is {} × {} px, but the camera is {} × {} px", file, photo.cols, photo.rows,
@@ -64,15 +56,13 @@ std::vector<std::string> result_names(const UndistortArgs& args, const std::file
 
 std::string undistorted_png(const cv::Mat& photo, const cv::Mat& u_px, const cv::Mat& v_px, const std::string& file) {
   cv::Mat straight;
-  std::vector<unsigned char> png;
   try {
     cv::remap(photo, straight, u_px, v_px, cv::INTER_LANCZOS4, cv::BORDER_REPLICATE);
     straight.setTo(cv::Scalar::all(0.0), u_px == -1.0f);
-    cv::imencode(".png", straight, png);
-  } catch (const cv::Exception&) {
+    return png_bytes(straight);
+  } catch (const std::exception&) {
     throw InputError(file + ": has pixels of a kind that PNG cannot hold");
   }
-  return {png.begin(), png.end()};
 }
 
 /// The photos through the map, to be written at the end of the run like all that it leaves.

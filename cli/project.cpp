@@ -4,12 +4,12 @@
 #include <Eigen/Eigenvalues>
 #include <memory>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "alidade/io/beam_file.h"
 #include "alidade/io/camera_file.h"
 #include "alidade/io/photos.h"
+#include "alidade/io/picture_codecs.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
 #include "cli/option_checks.h"
@@ -68,9 +68,7 @@ std::string overlay_png(const cv::Mat& photo, const Beam& beam, const Camera& ca
                    {static_cast<int>(std::lround(one.pixel->px.x())), static_cast<int>(std::lround(one.pixel->px.y()))},
                    {80, 255, 80}, cv::MARKER_CROSS, 9, 1, cv::LINE_AA);
   }
-  std::vector<unsigned char> png;
-  cv::imencode(".png", picture, png);
-  return {png.begin(), png.end()};
+  return png_bytes(picture);
 }
 
 DataTable points_table(const std::vector<Projected>& projected) {

@@ -4,10 +4,10 @@
 #include <array>
 #include <numbers>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "alidade/io/camera_file.h"
 #include "alidade/io/camera_json.h"
+#include "alidade/io/picture_codecs.h"
 #include "alidade/simulate/board_photos.h"
 #include "alidade/simulate/example_camera.h"
 #include "cli/board_options.h"
@@ -86,9 +86,7 @@ void add_photos(const BoardScene& scene, const BoardArgs& args, Run& run) {
   config.noise = args.noise;
   for (std::size_t i = 0; i < scene.cam_from_board.size(); ++i) {
     report_progress(run.progress, "photos", i, scene.cam_from_board.size());
-    std::vector<unsigned char> png;
-    cv::imencode(".png", render_board_photo(scene, i, config, run.options.seed), png);
-    run.add_file(photo_name(i), {png.begin(), png.end()});
+    run.add_file(photo_name(i), png_bytes(render_board_photo(scene, i, config, run.options.seed)));
   }
 }
 

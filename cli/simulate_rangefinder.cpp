@@ -3,11 +3,11 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "alidade/io/beam_file.h"
 #include "alidade/io/camera_file.h"
 #include "alidade/io/corner_file.h"
+#include "alidade/io/picture_codecs.h"
 #include "alidade/io/shots_file.h"
 #include "alidade/simulate/rangefinder.h"
 #include "alidade/simulate/spot_photos.h"
@@ -56,9 +56,7 @@ void add_photos(const SimulateRangefinderArgs& args, const RangefinderScene& sce
   config.laser.colour = args.laser == "green" ? LaserColour::green : LaserColour::red;
   const auto add = [&](std::size_t i, bool is_on, const std::string& name) {
     config.is_on = is_on;
-    std::vector<unsigned char> png;
-    cv::imencode(".png", render_spot_photo(spots, i, config, run.options.seed + (is_on ? 0u : 1u)), png);
-    run.add_file(name, {png.begin(), png.end()});
+    run.add_file(name, png_bytes(render_spot_photo(spots, i, config, run.options.seed + (is_on ? 0u : 1u))));
   };
   for (std::size_t i = 0; i < shots.size(); ++i) {
     report_progress(run.progress, "photos", i, shots.size());

@@ -3,10 +3,10 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "alidade/geometry/degree.h"
 #include "alidade/io/camera_file.h"
+#include "alidade/io/picture_codecs.h"
 #include "alidade/io/rig_file.h"
 #include "alidade/io/views_file.h"
 #include "alidade/simulate/board_photos.h"
@@ -57,9 +57,7 @@ void add_photos(const RigScene& scene, const std::vector<HeadView>& views, Run& 
                              .board = scene.board,
                              .points_in_board = points_in_board(scene.board),
                              .cam_from_board = {cam_from_world(rig_head.head, truth.pan_tilt_rad) * world_from_board}};
-      std::vector<unsigned char> png;
-      cv::imencode(".png", render_board_photo(shown, 0, {}, run.options.seed + v), png);
-      run.add_file(photo_of(v), {png.begin(), png.end()});
+      run.add_file(photo_of(v), png_bytes(render_board_photo(shown, 0, {}, run.options.seed + v)));
     }
     table += fmt::format("{},{},{},{},{},{}\n", v, truth.board, truth.head, views[v].pan_tilt_rad.x(),
                          views[v].pan_tilt_rad.y(), photo_of(v));

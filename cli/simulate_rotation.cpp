@@ -6,9 +6,11 @@
 #include <memory>
 #include <numbers>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 
+#include "alidade/imaging/grey_photo.h"
 #include "alidade/io/camera_file.h"
+#include "alidade/io/photos.h"
+#include "alidade/io/picture_codecs.h"
 #include "alidade/io/rotation_log_file.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/panorama_video.h"
@@ -91,7 +93,8 @@ std::string truth_yaml(const SimulateRotationArgs& args, const RotationLog& log,
 FarWorld world_of(const SimulateRotationArgs& args, Run& run) {
   if (args.photo.empty()) return FarWorld::of_noise(3.0 / std::min(args.k[0], args.k[1]), run.options.seed);
   run.add_input("photo", args.photo);
-  const cv::Mat photo = cv::imread(args.photo, cv::IMREAD_GRAYSCALE);
+  std::string reason;
+  const cv::Mat photo = to_grey_photo(decode_photo(read_file(args.photo), args.photo), reason);
   if (photo.empty()) throw InputError(args.photo + ": is not a picture");
   return FarWorld::of_photo(photo, args.photo_deg * std::numbers::pi / 180.0 / photo.cols);
 }
@@ -103,9 +106,8 @@ ExitCode simulate_video(const SimulateRotationArgs& args, const RotationScene& s
   const RotationLog log = panorama_log(scene, config, run.options.seed);
   for (std::size_t k = 0; k < log.rows.size(); ++k) {
     report_progress(run.progress, "frames", k, log.rows.size());
-    std::vector<unsigned char> png;
-    cv::imencode(".png", render_panorama_frame(world, scene, k, config.rate_hz, args.panorama, run.options.seed), png);
-    run.add_file(fmt::format("frames/{:06}.png", k), {png.begin(), png.end()});
+    run.add_file(fmt::format("frames/{:06}.png", k),
+                 png_bytes(render_panorama_frame(world, scene, k, config.rate_hz, args.panorama, run.options.seed)));
   }
   run.add_file("angles.csv", rotation_log_csv(log));
   run.add_file("truth_camera.yaml", truth_yaml(args, log, scene));

@@ -3,9 +3,10 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <memory>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core.hpp>
 
 #include "alidade/io/events_file.h"
+#include "alidade/io/picture_codecs.h"
 #include "alidade/io/rig_file.h"
 #include "alidade/io/servo_scenario_file.h"
 #include "alidade/io/video_sights.h"
@@ -94,10 +95,8 @@ std::size_t add_frames(const TrackScene& scene, double sigma_encoder_rad, Run& r
     const RigHead& head = scene.heads[sight.head];
     const cv::Mat frame =
         render_target_frame(head, sight.pan_tilt_rad, scene.position(sight.t_capture_s), {}, {}, run.options.seed + k);
-    std::vector<unsigned char> png;
-    cv::imencode(".png", frame, png);
     auto& rows = angles.logs[sight.head].rows;
-    run.add_file(fmt::format("head_{}/{:06}.png", head.head.id, rows.size()), {png.begin(), png.end()});
+    run.add_file(fmt::format("head_{}/{:06}.png", head.head.id, rows.size()), png_bytes(frame));
     const Eigen::Vector2d read = sight.pan_tilt_rad + sigma_encoder_rad * draws.normal2();
     RotationRow row;
     row.t_s = sight.t_capture_s;

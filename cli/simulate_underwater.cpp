@@ -2,10 +2,11 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core.hpp>
 
 #include "alidade/io/camera_file.h"
 #include "alidade/io/localize_file.h"
+#include "alidade/io/picture_codecs.h"
 #include "alidade/simulate/underwater.h"
 #include "alidade/simulate/underwater_video.h"
 #include "cli/commands.h"
@@ -61,9 +62,7 @@ std::size_t add_frames(const SimulateUnderwaterArgs& args, const Camera& camera,
     report_progress(run.progress, "frames", k, sequence.frames.size());
     const cv::Mat frame =
         render_underwater_frame(camera, sequence.frames[k].world_from_cam, args.look, run.options.seed + k);
-    std::vector<unsigned char> png;
-    cv::imencode(".png", frame, png);
-    run.add_file(fmt::format("frames/{:06}.png", k), {png.begin(), png.end()});
+    run.add_file(fmt::format("frames/{:06}.png", k), png_bytes(frame));
   }
   const Board board = underwater_board();
   run.add_file("target.yaml",

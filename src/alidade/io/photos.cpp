@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cctype>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
 
 #include "alidade/io/exif.h"
 #include "alidade/io/foreign_pictures.h"
+#include "alidade/io/picture_codecs.h"
 
 namespace alidade {
 namespace {
@@ -65,7 +66,7 @@ bool is_cut_off(std::string_view bytes) {
   return starts_with(bytes, "\x89PNG") && tail.rfind("IEND") == std::string_view::npos;
 }
 
-/// A TIFF that is to be turned, told not to be: OpenCV turns these whatever it is asked. Empty: as it is.
+/// A TIFF that is to be turned, told not to be: libtiff turns what it makes colours of. Empty: as it is.
 std::string untagged_tiff(std::string_view bytes) {
   if (!starts_with(bytes, "II*") && !starts_with(bytes, "MM")) return "";
   const ExifTags tags = exif_tags(bytes);
@@ -129,13 +130,7 @@ cv::Mat decode_photo(std::string_view bytes) {
   if (is_cut_off(bytes)) throw InputError("the picture is cut off");
   const std::string as_stored = untagged_tiff(bytes);
   if (!as_stored.empty()) bytes = as_stored;
-  cv::Mat photo;
-  try {
-    const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
-    photo = cv::imdecode(raw, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR | cv::IMREAD_IGNORE_ORIENTATION);
-  } catch (const cv::Exception&) {
-    photo.release();  // a header that promises more than OpenCV holds
-  }
+  cv::Mat photo = decode_picture(bytes);
   if (photo.empty()) throw InputError("not a picture that can be read");
   return photo;
 }
@@ -158,9 +153,7 @@ std::string jpeg_preview(const cv::Mat& photo, int max_width_px, int quality) {
   if (small.depth() != CV_8U) small.convertTo(small, CV_8U);
   if (small.channels() == 3) cv::cvtColor(small, small, cv::COLOR_BGR2GRAY);
   if (small.channels() == 4) cv::cvtColor(small, small, cv::COLOR_BGRA2GRAY);
-  std::vector<unsigned char> jpeg;
-  cv::imencode(".jpg", small, jpeg, {cv::IMWRITE_JPEG_QUALITY, quality});
-  return {jpeg.begin(), jpeg.end()};
+  return grey_jpeg_bytes(small, quality);
 }
 
 }  // namespace alidade

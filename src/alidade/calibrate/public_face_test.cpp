@@ -1,0 +1,107 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "alidade/calibrate.h"
+#include "alidade/testing/calibration_sample.h"
+
+// The whole job through its public header: the same camera as from the parts, and an answer to every misuse.
+
+namespace alidade {
+namespace {
+
+using testing::sample_board;
+using testing::sample_size;
+
+std::vector<BoardView> views_of(int num_photos) {
+  return testing::sample_views(testing::sample_scene(testing::sample_camera("brown"), num_photos, 1), 1);
+}
+
+std::string fault_of(const CalibrateConfig& config, const Board& board = sample_board) {
+  try {
+    (void)calibrate(views_of(8), sample_size, board, config);
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(CalibrateFace, IsTheWholeJob) {
+  const auto views = views_of(10);
+  const Calibration result = calibrate(views, sample_size, sample_board);
+  ASSERT_TRUE(result.verdict.ok()) << result.verdict.sentence;
+  CalibrateConfig config;
+  config.board_shape = BoardShape::flat;
+  const CalibrateReport part = calibrate(sample_board, views, sample_size, config);
+  EXPECT_EQ(params(result.camera.lens), params(part.camera.lens));
+  EXPECT_EQ(result.counts.given, 10u);
+  EXPECT_EQ(result.counts.used, 10u);
+  EXPECT_GT(result.camera.cov(0, 0), 0.0);
+}
+
+TEST(CalibrateFace, AnswersEveryHostileNumber) {
+  const double inf = std::numeric_limits<double>::infinity();
+  for (const double bad : {std::nan(""), inf, -inf, -1.0, 1e300}) {
+    CalibrateConfig config;
+    config.port.gap_m = bad;
+    EXPECT_THAT(fault_of(config), ::testing::HasSubstr("gap_m")) << bad;
+    config = {};
+    config.outlier_sigmas = -std::abs(bad);
+    EXPECT_NE(fault_of(config), "") << bad;
+    config = {};
+    config.priors = {{.name = "fx", .value = std::nan(""), .sigma = bad}};
+    EXPECT_NE(fault_of(config), "") << bad;
+    Board board = sample_board;
+    board.square_m = -std::abs(bad);
+    EXPECT_NE(fault_of({}, board), "") << bad;
+  }
+}
+
+TEST(CalibrateFace, AnswersMisspeltWords) {
+  CalibrateConfig config;
+  config.model = "browne";
+  EXPECT_THAT(fault_of(config), ::testing::HasSubstr("'browne'"));
+  config = {};
+  config.fixed = {"k9"};
+  EXPECT_EQ(fault_of(config), "'k9' is no parameter of model brown; it has fx, fy, cx, cy, skew, k1, k2, p1, p2, k3");
+  config = {};
+  config.model = "flat_port";
+  EXPECT_THAT(fault_of(config), ::testing::HasSubstr("--glass"));
+  config = {};
+  config.port.glass_m = 0.01;
+  EXPECT_THAT(fault_of(config), ::testing::HasSubstr("flat_port"));
+  config = {};
+  config.board_shape = BoardShape::given;
+  EXPECT_THAT(fault_of(config), ::testing::HasSubstr("0 are given"));
+}
+
+TEST(CalibrateFace, AnswersCornersThatCannotBe) {
+  const auto fault_with = [](const auto& spoil) -> std::string {
+    auto views = views_of(8);
+    spoil(views[3].corners[5]);
+    try {
+      (void)calibrate(views, sample_size, sample_board);
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_NE(fault_with([](Corner& corner) { corner.index = 5000; }), "");
+  EXPECT_NE(fault_with([](Corner& corner) { corner.index = -1; }), "");
+  EXPECT_NE(fault_with([](Corner& corner) { corner.px.x() = std::nan(""); }), "");
+  EXPECT_NE(fault_with([](Corner& corner) { corner.cov(0, 0) = -1.0; }), "");
+  EXPECT_NE(fault_with([](Corner& corner) { corner.cov.setZero(); }), "");
+}
+
+TEST(CalibrateFace, AnswersEmptyInput) {
+  EXPECT_EQ(calibrate(std::vector<BoardView>{}, sample_size, sample_board).verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(calibrate(Photos{}, sample_board).verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_THROW((void)calibrate(std::vector<BoardView>{}, ImageSize{}, sample_board), ConfigError);
+  EXPECT_THROW((void)calibrate(Photos{.names = {"a"}, .load = nullptr}, sample_board), ConfigError);
+  EXPECT_EQ(find_corners(Photos{}, sample_board).verdict.exit_code, ExitCode::cannot_tell);
+}
+
+}  // namespace
+}  // namespace alidade

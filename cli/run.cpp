@@ -5,30 +5,14 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <ctime>
-#include <map>
-#include <nlohmann/json.hpp>
-#include <set>
 #include <tuple>
 
 #include "alidade/io/sha256.h"
 #include "alidade/io/thin_tables.h"
-#include "alidade/report/page.h"
 #include "cli/terminal.h"
 
 namespace alidade::cli {
 namespace {
-
-constexpr std::size_t most_page_bytes = 12'000'000;  // opens at once, and goes through the mail
-
-std::string utc_now() {
-  const std::time_t now = std::time(nullptr);
-  std::tm parts{};
-  ::gmtime_r(&now, &parts);
-  std::string text(32, '\0');
-  text.resize(std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &parts));
-  return text;
-}
 
 const char* symbol(State state) {
   switch (state) {
@@ -48,45 +32,6 @@ const char* symbol(State state) {
 
 double seconds_since(std::chrono::steady_clock::time_point then) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - then).count();
-}
-
-/// What an earlier run left in a folder, by the result.json there.
-struct EarlierResult {
-  bool has_estimate = false;
-  std::vector<std::filesystem::path> files;  ///< Inside the folder; result.json and the report first.
-};
-
-EarlierResult earlier_result(const std::filesystem::path& folder) {
-  EarlierResult found;
-  std::error_code ignored;
-  if (!std::filesystem::is_regular_file(folder / "result.json", ignored)) return found;
-  const auto json = nlohmann::json::parse(read_file(folder / "result.json"), nullptr, false);
-  const auto member = [&](const char* pointer) {
-    const nlohmann::json::json_pointer at(pointer);
-    return json.contains(at) ? json[at] : nlohmann::json();
-  };
-  if (member("/schema") != "alidade-result/1") return found;
-  found.files = {"result.json", "report.html"};
-  for (const auto& name : member("/files")) {
-    const std::filesystem::path file = name.is_string() ? name.get<std::string>() : "";
-    const bool is_inside =
-        !file.empty() && file.is_relative() && file == file.lexically_normal() && *file.begin() != "..";
-    if (is_inside && file.has_filename()) found.files.push_back(file);
-  }
-  const nlohmann::json code = member("/verdict/exit_code");
-  found.has_estimate = code.is_number_integer() && tells_an_estimate(code.get<int>());
-  return found;
-}
-
-/// Its files stay where this run reads one of them: photos that were simulated into DIR, then calibrated there.
-void spare_inputs(const std::vector<InputFile>& inputs, const std::filesystem::path& folder, EarlierResult& earlier) {
-  std::error_code ignored;
-  std::set<std::filesystem::path> read;
-  for (const InputFile& input : inputs) read.insert(std::filesystem::weakly_canonical(input.name, ignored));
-  const bool is_read = std::any_of(earlier.files.begin(), earlier.files.end(), [&](const std::filesystem::path& file) {
-    return read.contains(std::filesystem::weakly_canonical(folder / file, ignored));
-  });
-  if (is_read) earlier.files.resize(2);
 }
 
 }  // namespace
@@ -127,7 +72,7 @@ void Run::add_file_elsewhere(const std::filesystem::path& file, std::string_view
   elsewhere_.emplace_back(file.parent_path()).add(file.filename(), content);
 }
 
-void Run::add_picture(std::string name, std::string jpeg) { pictures_.emplace_back(std::move(name), std::move(jpeg)); }
+void Run::add_picture(std::string name, std::string jpeg) { pictures_.push_back({std::move(name), std::move(jpeg)}); }
 
 void Run::say(std::string line) { lines_.push_back(std::move(line)); }
 
@@ -172,41 +117,23 @@ ExitCode Run::finish(Outcome outcome) {
   return finish(std::move(from.verdict));
 }
 
-/// What an earlier run left here and this one does not replace must not be taken for this one's; only files that its
-/// result.json names go. A refusal has nothing to put in the place of an estimate, and leaves it alone.
 void Run::write_files() {
-  const std::filesystem::path refused = "refused";
-  EarlierResult earlier = earlier_result(options.out);
-  spare_inputs(document.inputs, options.out, earlier);
-  const bool is_aside = !has_estimate(document.verdict) && earlier.has_estimate;
-  folder_ = is_aside ? options.out / refused : options.out;
-  FolderSwap swap(folder_);
-  swap.add("result.json", result_);
-  for (const PendingFile& file : files_) swap.add(file.name, content_of(file));
-  add_report(swap);
-  for (const std::filesystem::path& name : is_aside ? earlier_result(folder_).files : earlier.files) swap.remove(name);
-  if (!is_aside) {
-    for (const std::filesystem::path& name : earlier_result(options.out / refused).files) swap.remove(refused / name);
-  }
+  ResultFolder folder(options.out, document);
+  folder_ = folder.path();
+  folder.add("result.json", result_);
+  for (const PendingFile& file : files_) folder.add(file.name, content_of(file));
+  add_report(folder);
   report_progress(progress, "writing", 0, 0);  // the last moment at which Ctrl-C leaves nothing written
   print();
   for (FolderSwap& each : elsewhere_) each.commit();
-  swap.commit();
+  folder.commit();
 }
 
 /// The page, where it is wanted. One that fails, or for which the disk has no room, never fails the run, but is said.
-void Run::add_report(FolderSwap& swap) {
+void Run::add_report(ResultFolder& folder) {
   if (options.no_report) return;
   try {
-    std::size_t room = most_page_bytes - std::min(most_page_bytes, report_page(result_, {}).size());
-    std::map<std::string, std::string> pictures;
-    for (auto& [name, jpeg] : pictures_) {
-      const std::size_t size = jpeg.size() * 4 / 3 + name.size() + 100;  // as base64, in its element
-      if (size > room) break;
-      room -= size;
-      pictures[name] = std::move(jpeg);
-    }
-    swap.add("report.html", report_page(result_, pictures));
+    folder.add_report(result_, std::move(pictures_));
     has_report_ = true;
   } catch (const std::exception& error) {
     warn(std::string("report: not written: ") + error.what());

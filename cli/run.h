@@ -14,9 +14,9 @@
 #include "alidade/estimation/progress.h"
 #include "alidade/estimation/verdict.h"
 #include "alidade/io/files.h"
-#include "alidade/io/folder_swap.h"
 #include "alidade/io/outcome.h"
 #include "alidade/io/result_document.h"
+#include "alidade/io/result_folder.h"
 #include "alidade/io/spool.h"
 
 namespace alidade::cli {
@@ -90,7 +90,7 @@ class Run {
   };
 
   void write_files();
-  void add_report(FolderSwap& swap);
+  void add_report(ResultFolder& folder);
   void warn(const std::string& line);
   void print() const;
   [[nodiscard]] std::string summary() const;
@@ -103,7 +103,7 @@ class Run {
   std::size_t held_bytes_ = 0;  ///< Of the files in memory; beyond a limit they wait on disk.
   std::optional<Spool> spool_;
   std::list<FolderSwap> elsewhere_;
-  std::vector<std::pair<std::string, std::string>> pictures_;  ///< Names and JPEG bytes, the most wanted first.
+  std::vector<NamedBytes> pictures_;  ///< JPEG, the most wanted first.
   std::vector<std::string> lines_;
   std::string result_, printed_file_;
   std::filesystem::path folder_;  ///< Where the results stand: DIR, or DIR/refused.

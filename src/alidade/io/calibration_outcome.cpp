@@ -130,6 +130,7 @@ void add_result_files(const Calibration& calibration, std::vector<NamedBytes>& f
 
 Outcome outcome_of(const Calibration& calibration) {
   Outcome outcome;
+  outcome.document.command = "calibrate";
   fill_calibration(calibration.board, calibration, outcome.document);
   outcome.document.verdict = calibration.verdict;
   summarize(calibration, outcome.lines);

@@ -3,8 +3,9 @@
 #include "alidade/calibrate/found_corners.h"
 #include "alidade/imaging/photos.h"
 #include "alidade/io/outcome.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 /// The document of a calibration, its lines for a person, and camera.yaml, corners.csv, poses.csv and board_points.csv
 /// where there is a camera.

@@ -4,8 +4,9 @@
 #include <vector>
 
 #include "alidade/io/result_document.h"
+#include "alidade/public.h"
 
-namespace alidade {
+namespace ALIDADE_PUBLIC alidade {
 
 /// A file beside result.json, or a picture (JPEG) of the report.
 struct NamedBytes {

@@ -40,7 +40,7 @@ ExitCode run_corners(CornersArgs args, Run& run) {
   run.lap("solve");
   require_readable(set, found.calibration);
   Outcome outcome = outcome_of(found);
-  tell_photos(set, outcome, run);
+  tell_photos(set, outcome.document.counts, outcome.document.verdict, run);
   return run.finish(std::move(outcome));
 }
 

@@ -7,13 +7,13 @@
 #include "alidade/io/camera_file.h"
 #include "alidade/io/intrinsics_file.h"
 #include "alidade/io/observe_document.h"
-#include "alidade/io/pairs_file.h"
 #include "alidade/io/rotation_log_file.h"
 #include "alidade/io/video_log.h"
 #include "alidade/live/streams.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
 #include "cli/live.h"
+#include "cli/observe_photos.h"
 #include "cli/option_checks.h"
 #include "cli/picture_size.h"
 #include "cli/standard_input.h"
@@ -22,6 +22,7 @@ namespace alidade::cli {
 namespace {
 
 struct ObserveArgs {
+  std::vector<std::string> inputs;  ///< A log, or photos.
   std::string log, pairs, video, angles, camera, size, method = "hybrid", rotation = "known";
   double rate_hz = 0.0;
   std::vector<std::string> estimate;
@@ -118,11 +119,9 @@ RotationLog follow_video(const ObserveArgs& args, ObserveConfig& config, Run& ru
 
 RotationLog read_log(const ObserveArgs& args, ObserveConfig& config, Run& run) {
   if (!args.video.empty()) return follow_video(args, config, run);
-  const bool is_pairs = !args.pairs.empty();
-  const std::string& file = is_pairs ? args.pairs : args.log;
-  run.add_input(is_pairs ? "pairs" : "log", file);
+  run.add_input("log", args.log);
   const RotationLogOptions options{.skip_bad = args.skip_bad, .needs_rotation = args.rotation != "free"};
-  RotationLogFile read = is_pairs ? read_pairs(file, options) : read_rotation_log(file, options);
+  RotationLogFile read = read_rotation_log(args.log, options);
   run.document.counts.given = read.skipped.size();
   run.document.counts.skipped = std::move(read.skipped);
   return std::move(read.log);
@@ -217,30 +216,65 @@ void summarize(const ObserveReport& report, Run& run) {
   if (bursts > 0) run.say(fmt::format("{} frames or points left out that did not fit", bursts));
 }
 
-void check_sources(const ObserveArgs& args) {
-  if (!args.log.empty() + !args.pairs.empty() + !args.video.empty() != 1) {
-    throw UsageError("give one of a rotation log, --video FILE and --pairs FILE");
+/// Photos, or matches between them: the rotation is what they tell.
+TurnedArgs turned_args(const ObserveArgs& args, const std::optional<Camera>& camera) {
+  const ObserveConfig config = config_from(args, camera);
+  if (config.rotation == RotationKnowledge::noisy) {
+    throw UsageError("--rotation noisy: photos and pairs have no measured rotation; leave it out, or say free");
+  }
+  const ObserveNuisances& asked = config.estimate;
+  if (asked.k3 || asked.tangential || asked.mount || asked.delay || asked.lever || config.lever_m) {
+    throw UsageError("of photos and pairs, --estimate is auto, none, k1 or k2, and there is no --lever");
+  }
+  TurnedArgs turned;
+  turned.pairs = args.pairs;
+  turned.photos.assign(args.inputs.begin(), args.inputs.end());
+  turned.skip_bad = args.skip_bad;
+  turned.width_px = config.width_px;
+  turned.height_px = config.height_px;
+  TurnedConfig& to = turned.config;
+  to.square_pixels = config.square_pixels;
+  to.fixed_centre = config.fixed_centre;
+  // what is matched by somebody is of a camera of which nothing is known but what is said
+  to.ordinary_aspect = to.ordinary_centre = args.pairs.empty();
+  to.start = config.start;
+  to.sigma_px = config.sigma_px;
+  to.sigma_parallax = config.sigma_parallax;
+  if (!args.estimate.empty() && !config.estimate_auto) {
+    to.lens_terms = asked.k2 ? 2 : asked.k1 ? 1 : 0;
+    to.keeps_terms = true;
+  }
+  if (camera && !asked.k1 && !asked.k2) turned.lens = camera;
+  return turned;
+}
+
+void check_sources(ObserveArgs& args) {
+  const bool has_photos = args.inputs.size() > 1 || (args.inputs.size() == 1 && is_photo_argument(args.inputs.front()));
+  if (!has_photos && !args.inputs.empty()) args.log = std::exchange(args.inputs, {}).front();
+  for (const std::string& input : args.inputs) {
+    if (!is_photo_argument(input)) throw UsageError("'" + input + "' is no photo: give one log, or photos");
+  }
+  if (!args.log.empty() + has_photos + !args.pairs.empty() + !args.video.empty() != 1) {
+    throw UsageError("give one of a rotation log, photos, --video FILE and --pairs FILE");
   }
   if (args.video.empty() != args.angles.empty()) throw UsageError("--video and --angles go together");
   if (args.video.empty() && args.rate_hz > 0.0) throw UsageError("--rate is for --video");
 }
 
-ExitCode observe_log(const ObserveArgs& args, Run& run) {
+ExitCode observe_log(ObserveArgs args, Run& run) {
   check_sources(args);
   std::optional<Camera> camera;
   if (!args.camera.empty()) {
     run.add_input("camera", args.camera);
     camera = read_central_camera(args.camera);
   }
+  if (!args.inputs.empty() || !args.pairs.empty()) return observe_photos(turned_args(args, camera), run);
   ObserveConfig config = config_from(args, camera);
   LiveRun live(args.live, run);
   if (live.is_on() && args.log != "-") throw UsageError("--live: only for rows from standard input, observe -");
   RotationLog log = args.log == "-" ? follow_input(args, config, camera, live, run) : read_log(args, config, run);
   if (log.source == RotationSource::none && config.rotation != RotationKnowledge::free) {
-    if (args.pairs.empty()) {
-      throw InputError(args.log + ": no rotation: omega_x,omega_y or pan,tilt or qw,qx,qy,qz, or say --rotation free");
-    }
-    config.rotation = RotationKnowledge::free;
+    throw InputError(args.log + ": no rotation: omega_x,omega_y or pan,tilt or qw,qx,qy,qz, or say --rotation free");
   }
   if (config.rotation == RotationKnowledge::free) log.source = RotationSource::none;
   // A lens that is to be estimated is seen as it is.
@@ -266,10 +300,12 @@ ExitCode observe_log(const ObserveArgs& args, Run& run) {
 
 void add_options(CLI::App& command, ObserveArgs& args) {
   command.add_option(
-      "log", args.log,
-      "Rotation log, CSV: t, the rotation, p1x,p1y,p2x,p2y,…; - reads rows from standard input and answers each");
+      "log", args.inputs,
+      "Rotation log, CSV: t, the rotation, p1x,p1y,p2x,p2y,…; - reads rows from standard input and answers each. Or "
+      "photos, or folders of them, of a camera that was turned on the spot");
   command
-      .add_option("--pairs", args.pairs, "Matched points of neighbouring photos instead, CSV: frame_a,frame_b,ua_px,…")
+      .add_option("--pairs", args.pairs,
+                  "Points matched between photos instead, of which many may be wrong, CSV: frame_a,frame_b,ua_px,…")
       ->type_name("FILE");
   command
       .add_option("--video", args.video, "Video file or folder of numbered frames instead: points are followed in it")
@@ -337,6 +373,7 @@ void add_observe(Frame& frame) {
            "alidade observe log.csv --camera prior.yaml --estimate k1,mount,delay\n"
            "alidade observe --video ptz.mp4 --angles encoder.csv --rate 30\n"
            "alidade observe log.csv --method fang2011 --profile quiet --start 500,510,400,300\n"
+           "alidade observe photos/*.jpg --rotation free\n"
            "alidade observe --pairs matches.csv --rotation free --square-pixels --fix-centre --size 1280x960\n"},
       [args](Run& run) { return observe_log(*args, run); });
   add_options(command, *args);

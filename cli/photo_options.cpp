@@ -13,14 +13,13 @@ void require_readable(const PhotoSet& set, const Calibration& calibration) {
   set.require_readable(calibration.num_unreadable, calibration.views.empty() ? "" : calibration.views.front().reason);
 }
 
-void tell_photos(const PhotoSet& set, Outcome& outcome, Run& run) {
+void tell_photos(const PhotoSet& set, Counts& counts, Verdict& verdict, Run& run) {
   for (InputFile& input : set.inputs()) run.document.inputs.push_back(std::move(input));
-  std::vector<SkippedInput>& skipped = outcome.document.counts.skipped;
-  skipped.insert(skipped.end(), set.skipped().begin(), set.skipped().end());
+  counts.skipped.insert(counts.skipped.end(), set.skipped().begin(), set.skipped().end());
   if (const std::string line = set.skipped_line(); !line.empty()) run.say(line);
   if (const auto turned = set.turned()) {
     run.say(turned->text);
-    outcome.document.verdict.checks.push_back(*turned);
+    verdict.checks.push_back(*turned);
   }
 }
 

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "alidade/calibrate/calibration.h"
-#include "alidade/io/outcome.h"
 #include "alidade/io/photo_set.h"
 #include "cli/run.h"
 
@@ -21,6 +20,6 @@ void add_photos(CLI::App& command, std::vector<std::filesystem::path>& photos, b
 void require_readable(const PhotoSet& set, const Calibration& calibration);
 
 /// What was read goes to the run's inputs; what lay beside the photos and how they are turned, to what it says.
-void tell_photos(const PhotoSet& set, Outcome& outcome, Run& run);
+void tell_photos(const PhotoSet& set, Counts& counts, Verdict& verdict, Run& run);
 
 }  // namespace alidade::cli

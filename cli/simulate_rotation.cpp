@@ -9,12 +9,14 @@
 
 #include "alidade/imaging/grey_photo.h"
 #include "alidade/io/camera_file.h"
+#include "alidade/io/pairs_file.h"
 #include "alidade/io/photos.h"
 #include "alidade/io/picture_codecs.h"
 #include "alidade/io/rotation_log_file.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/panorama_video.h"
 #include "alidade/simulate/rotation.h"
+#include "alidade/simulate/turned_scene.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
 #include "cli/option_checks.h"
@@ -31,6 +33,8 @@ struct SimulateRotationArgs {
   bool video = false;
   std::string photo;
   double photo_deg = 90.0;
+  int photos = 0;
+  double wrong = 0.0, moving = 0.0, zoomed = 1.0;
   PanoramaConfig panorama;
   RotationLogConfig config;
 };
@@ -74,13 +78,13 @@ RotationSource source_of(const std::string& word) {
   return word == "rate" ? RotationSource::rate : word == "head" ? RotationSource::head : RotationSource::attitude;
 }
 
-std::string truth_yaml(const SimulateRotationArgs& args, const RotationLog& log, const RotationScene& scene) {
+std::string truth_yaml(const SimulateRotationArgs& args, const Eigen::Vector4d& k, const RotationScene& scene) {
   Camera camera;
   camera.width_px = scene.width_px;
   camera.height_px = scene.height_px;
   camera.lens = *make_lens(args.k1 != 0.0 ? "brown" : "pinhole");
   Eigen::VectorXd values = params(camera.lens);
-  for (int i = 0; i < 4; ++i) values[i] = log.truth.back()[static_cast<std::size_t>(i)];
+  values.head<4>() = k;
   const auto names = param_names(camera.lens);
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (names[i] == "k1") values[static_cast<Eigen::Index>(i)] = args.k1;
@@ -110,10 +114,58 @@ ExitCode simulate_video(const SimulateRotationArgs& args, const RotationScene& s
                  png_bytes(render_panorama_frame(world, scene, k, config.rate_hz, args.panorama, run.options.seed)));
   }
   run.add_file("angles.csv", rotation_log_csv(log));
-  run.add_file("truth_camera.yaml", truth_yaml(args, log, scene));
+  run.add_file("truth_camera.yaml", truth_yaml(args, Eigen::Vector4d(log.truth.back().data()), scene));
   run.document.counts.given = run.document.counts.used = log.rows.size();
   Verdict verdict;
   verdict.sentence = fmt::format("{} frames and their angles with known truth", log.rows.size());
+  run.say(fmt::format("{} in {}", verdict.sentence, run.options.out.string()));
+  return run.finish(verdict);
+}
+
+TurnedScene turned_scene_of(const SimulateRotationArgs& args, const RotationScene& scene) {
+  TurnedScene turned;
+  turned.width_px = scene.width_px;
+  turned.height_px = scene.height_px;
+  turned.fx = args.k[0];
+  turned.fy = args.k[1];
+  turned.cx = args.k[2];
+  turned.cy = args.k[3];
+  turned.k1 = args.k1;
+  turned.num_photos = args.photos;
+  turned.pan_step_rad = 0.4 * scene.width_px / args.k[0];  // six tenths of each photo are the next one's
+  turned.tilt_rad = 0.2 * scene.height_px / args.k[1];
+  turned.wrong_share = args.wrong;
+  turned.moving_share = args.moving;
+  if (args.config.sigma_px > 0.0) turned.sigma_px = args.config.sigma_px;
+  if (!args.lever.empty()) turned.lever_m = Eigen::Vector3d(args.lever.data());
+  if (!args.depth.empty())
+    std::tie(turned.least_depth_m, turned.most_depth_m) = std::pair(args.depth[0], args.depth[1]);
+  if (args.zoomed != 1.0) {
+    turned.zoom.assign(static_cast<std::size_t>(args.photos), 1.0);
+    turned.zoom[static_cast<std::size_t>(args.photos) / 2] = args.zoomed;
+  }
+  return turned;
+}
+
+/// Photos of a camera that is turned by hand, and matches between them: what `observe PHOTOS` and `--pairs` take. The
+/// photos' world is far away and stands still; lever, depths, what moves and wrong matches are of pairs.csv.
+ExitCode simulate_photos(const SimulateRotationArgs& args, const RotationScene& scene, Run& run) {
+  const TurnedScene turned = turned_scene_of(args, scene);
+  FarWorld world = world_of(args, run);
+  const std::vector<Eigen::Quaterniond> attitudes = turned_attitudes(turned, run.options.seed);
+  for (std::size_t k = 0; k < attitudes.size(); ++k) {
+    report_progress(run.progress, "photos", k, attitudes.size());
+    const double zoom = k < turned.zoom.size() ? turned.zoom[k] : 1.0;
+    const RotatingIntrinsics intrinsics{zoom * turned.fx, zoom * turned.fy, turned.cx, turned.cy, turned.k1};
+    run.add_file(fmt::format("photos/photo{:03}.png", k + 1),
+                 png_bytes(render_panorama(world, intrinsics, scene.width_px, scene.height_px, attitudes[k].conjugate(),
+                                           args.panorama, run.options.seed + k + 1)));
+  }
+  run.add_file("pairs.csv", pairs_csv(simulate_turned_photos(turned, run.options.seed)));
+  run.add_file("truth_camera.yaml", truth_yaml(args, Eigen::Vector4d(args.k.data()), scene));
+  run.document.counts.given = run.document.counts.used = attitudes.size();
+  Verdict verdict;
+  verdict.sentence = fmt::format("{} photos and matches between them, with known truth", attitudes.size());
   run.say(fmt::format("{} in {}", verdict.sentence, run.options.out.string()));
   return run.finish(verdict);
 }
@@ -134,13 +186,20 @@ ExitCode simulate_rotation_log(const SimulateRotationArgs& args, Run& run) {
   RotationLogConfig config = args.config;
   config.source = source_of(args.source);
   config.with_range = !args.depth.empty();
+  if (args.photos > 0) {
+    if (args.video) throw UsageError("--photos and --video: one of them");
+    return simulate_photos(args, scene, run);
+  }
+  if (args.wrong > 0.0 || args.moving > 0.0 || args.zoomed != 1.0) {
+    throw UsageError("--wrong, --moving and --zoomed are of --photos");
+  }
   if (args.video) {
     if (!args.depth.empty() || !args.lever.empty()) throw UsageError("--video: its world is far away, without --depth");
     return simulate_video(args, scene, config, run);
   }
   const RotationLog log = simulate_rotation(scene, config, run.options.seed);
   run.add_file("log.csv", rotation_log_csv(log));
-  run.add_file("truth_camera.yaml", truth_yaml(args, log, scene));
+  run.add_file("truth_camera.yaml", truth_yaml(args, Eigen::Vector4d(log.truth.back().data()), scene));
   run.document.counts.given = run.document.counts.used = log.rows.size();
   Verdict verdict;
   verdict.sentence = fmt::format("{} rows of {} points with known truth", log.rows.size(), args.points);
@@ -174,7 +233,17 @@ void add_options(CLI::App& command, SimulateRotationArgs& args) {
       ->expected(2)
       ->check(positive_number());
   command.add_flag("--video", args.video, "Render frames instead of points: frames/, angles.csv");
-  command.add_option("--photo", args.photo, "What the video's world looks like (default: noise)")->type_name("FILE");
+  command
+      .add_option(
+          "--photos", args.photos,
+          "Render so many photos of a camera that is turned by hand instead, and matches between them: photos/, "
+          "pairs.csv")
+      ->check(CLI::Range(2, 200));
+  number("--wrong", args.wrong, "Share of wrong matches in pairs.csv", 0.0, 0.9);
+  number("--moving", args.moving, "Share of the points in pairs.csv that move", 0.0, 0.9);
+  number("--zoomed", args.zoomed, "Focal length of the photo in the middle over the others'", 0.2, 5.0);
+  command.add_option("--photo", args.photo, "What the world of videos and photos looks like (default: noise)")
+      ->type_name("FILE");
   number("--photo-deg", args.photo_deg, "How wide that photo stands in the world", 1.0, 360.0);
   number("--noise", args.panorama.noise, "Grey noise of the frames, of 255", 0.0, 100.0);
   number("--blur", args.panorama.blur_px, "Optical blur of the frames [px]", 0.0, 20.0);
@@ -199,7 +268,8 @@ void add_rotation_scenario(Frame& frame) {
        "  alidade simulate rotation --out turn && alidade observe turn/log.csv --size 780x582\n"
        "  alidade simulate rotation --source head --tilt-deg 20 --zoom ramp --k1 -0.2 --out zoom\n"
        "  alidade simulate rotation --video --source head --duration 8 --out film &&\n"
-       "    alidade observe --video film/frames --angles film/angles.csv",
+       "    alidade observe --video film/frames --angles film/angles.csv\n"
+       "  alidade simulate rotation --photos 9 --wrong 0.2 --out turned && alidade observe turned/photos",
        true},
       [args](Run& run) { return simulate_rotation_log(*args, run); });
   add_options(command, *args);

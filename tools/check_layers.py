@@ -5,8 +5,8 @@ import re
 import sys
 
 FOUNDATIONS = {"geometry", "estimation", "description"}
-SENSORS = {"camera", "pantilt", "beam", "board", "imaging"}
-ESTIMATORS = {"calibrate", "localize", "observe", "rangefinder", "rig", "servo", "track"}
+SENSORS = {"camera", "pantilt", "beam", "board", "imaging", "matching"}
+ESTIMATORS = {"calibrate", "localize", "observe", "rangefinder", "rig", "servo", "track", "turned"}
 COMPOSITIONS = {"loop"}  # put estimators and the simulator together
 
 MAY_INCLUDE = {
@@ -18,6 +18,7 @@ MAY_INCLUDE = {
     "board": FOUNDATIONS | {"camera"},
     "beam": FOUNDATIONS | {"camera", "board"},
     "imaging": FOUNDATIONS | {"camera", "board"},
+    "matching": FOUNDATIONS | {"imaging"},
     "simulate": FOUNDATIONS | SENSORS,
     **{estimator: FOUNDATIONS | SENSORS for estimator in ESTIMATORS},
     **{composition: FOUNDATIONS | SENSORS | ESTIMATORS | {"simulate"} for composition in COMPOSITIONS},

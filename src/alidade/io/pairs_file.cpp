@@ -1,10 +1,15 @@
 #include "alidade/io/pairs_file.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
 #include <set>
+#include <string>
 #include <tuple>
+#include <utility>
 
+#include "alidade/io/rotation_log_columns.h"
 #include "alidade/io/table_rows.h"
 
 namespace alidade {
@@ -41,90 +46,80 @@ Match read_match(const Csv& csv, const Names& names, std::size_t row) {
   return match;
 }
 
-/// Points grown from matches: sets of places (frame, pixel), each frame once in a set.
-class Tracks {
+/// Frames, their features and the pairs, as the rows come.
+class MatchesSoFar {
  public:
-  std::size_t frame(const std::string& name) { return frames_.try_emplace(name, frames_.size()).first->second; }
-  [[nodiscard]] std::size_t num_frames() const { return frames_.size(); }
-
-  [[nodiscard]] std::size_t num_points() const {
-    return static_cast<std::size_t>(std::ranges::count_if(tracks_, [](const Track& t) { return t.size() > 1; }));
-  }
-
-  /// Joins the points of both places. False: the match is known.
+  /// False: the match is known.
   bool add(const Match& match) {
-    const Place at_a{frame(match.frame_a), match.px_a.x(), match.px_a.y()};
-    const Place at_b{frame(match.frame_b), match.px_b.x(), match.px_b.y()};
-    if (!matches_.emplace(std::min(at_a, at_b), std::max(at_a, at_b)).second) return false;
-    const std::size_t a = track_of(at_a), b = track_of(at_b);
-    if (a == b) return true;
-    const bool contradict =
-        std::ranges::any_of(tracks_[b], [&](const auto& seen) { return tracks_[a].contains(seen.first); });
-    if (contradict) {
-      parent_.push_back(tracks_.size());
-      tracks_.push_back({{std::get<0>(at_a), match.px_a}, {std::get<0>(at_b), match.px_b}});
-    } else {
-      tracks_[a].merge(tracks_[b]);
-      tracks_[b].clear();
-      parent_[b] = a;
+    int photo_a = photo(match.frame_a), photo_b = photo(match.frame_b);
+    FeatureMatch features{feature(photo_a, match.px_a), feature(photo_b, match.px_b)};
+    if (photo_a > photo_b) {
+      std::swap(photo_a, photo_b);
+      std::swap(features.a, features.b);
     }
+    if (!known_.emplace(photo_a, photo_b, features.a, features.b).second) return false;
+    const auto [it, is_new] = pairs_.try_emplace({photo_a, photo_b}, photos.pairs.size());
+    if (is_new) photos.pairs.push_back({photo_a, photo_b, {}});
+    photos.pairs[it->second].matches.push_back(features);
     return true;
   }
 
-  /// Points that two frames or more see: a row a frame.
-  [[nodiscard]] std::vector<RotationRow> rows() const {
-    std::vector<RotationRow> rows(frames_.size());
-    for (std::size_t k = 0; k < rows.size(); ++k) rows[k].t_s = static_cast<double>(k);
-    for (const Track& track : tracks_) {
-      if (track.size() < 2) continue;
-      for (std::size_t k = 0; k < rows.size(); ++k) {
-        const auto seen = track.find(k);
-        rows[k].px.push_back(seen == track.end() ? Eigen::Vector2d(Eigen::Vector2d::Constant(not_seen)) : seen->second);
-      }
-    }
-    return rows;
-  }
+  MatchedPhotos photos;
 
  private:
-  using Track = std::map<std::size_t, Eigen::Vector2d>;   // frame → pixel
-  using Place = std::tuple<std::size_t, double, double>;  // frame, pixel
-
-  std::size_t track_of(const Place& place) {
-    const auto [it, is_new] = track_.try_emplace(place, tracks_.size());
+  int photo(const std::string& name) {
+    const auto [it, is_new] = photos_.try_emplace(name, static_cast<int>(photos_.size()));
     if (is_new) {
-      parent_.push_back(tracks_.size());
-      tracks_.push_back({{std::get<0>(place), {std::get<1>(place), std::get<2>(place)}}});
+      photos.names.push_back(name);
+      photos.features.emplace_back();
+      features_.emplace_back();
     }
-    std::size_t root = it->second;
-    while (parent_[root] != root) root = parent_[root] = parent_[parent_[root]];
-    return root;
+    return it->second;
   }
 
-  std::map<std::string, std::size_t> frames_;
-  std::map<Place, std::size_t> track_;  // where it began
-  std::vector<Track> tracks_;           // empty: joined with another
-  std::vector<std::size_t> parent_;     // a track that it was joined with, or itself
-  std::set<std::pair<Place, Place>> matches_;
+  int feature(int photo, const Eigen::Vector2d& px) {
+    const auto at = static_cast<std::size_t>(photo);
+    const auto [it, is_new] = features_[at].try_emplace({px.x(), px.y()}, static_cast<int>(features_[at].size()));
+    if (is_new) photos.features[at].push_back(px);
+    return it->second;
+  }
+
+  std::map<std::string, int> photos_;
+  std::vector<std::map<std::pair<double, double>, int>> features_;  // by pixel
+  std::map<std::pair<int, int>, std::size_t> pairs_;
+  std::set<std::tuple<int, int, int, int>> known_;
 };
 
 }  // namespace
 
-RotationLogFile read_pairs(const std::filesystem::path& file, const RotationLogOptions& options) {
-  constexpr std::size_t most_cells = 50'000'000;  // frames × points: 0.8 GB
+PairsFile read_pairs(const std::filesystem::path& file, bool skip_bad) {
+  constexpr std::size_t most_frames = 2000;
   const Csv csv = Csv::read(file);
   const Names names = names_in(csv);
-  Tracks tracks;
-  RotationLogFile read;
-  read.log.source = RotationSource::none;
-  for_each_row(csv, options.skip_bad, read.skipped, [&](std::size_t row) {
-    if (!tracks.add(read_match(csv, names, row))) read.skipped.push_back(skipped_row(csv, row, "repeated row"));
+  MatchesSoFar matches;
+  PairsFile read;
+  for_each_row(csv, skip_bad, read.skipped, [&](std::size_t row) {
+    if (!matches.add(read_match(csv, names, row))) read.skipped.push_back(skipped_row(csv, row, "repeated row"));
   });
-  if (tracks.num_frames() < 2) throw InputError(file.string() + ": has no matches; at least one row is needed");
-  if (tracks.num_points() > most_cells / tracks.num_frames())
-    throw InputError(file.string() + ": has too many frames and points; match fewer at a time");
-  read.log.rows = tracks.rows();
-  read.log.num_points = read.log.rows.front().px.size();
+  if (matches.photos.names.size() < 2) throw InputError(file.string() + ": has no matches; at least one row is needed");
+  if (matches.photos.names.size() > most_frames)
+    throw InputError(file.string() + ": has more than 2000 frames; match fewer at a time");
+  read.photos = std::move(matches.photos);
   return read;
+}
+
+std::string pairs_csv(const MatchedPhotos& photos) {
+  std::string text = "frame_a,frame_b,ua_px,va_px,ub_px,vb_px\n";
+  for (const MatchedPair& pair : photos.pairs) {
+    const auto a = static_cast<std::size_t>(pair.photo_a), b = static_cast<std::size_t>(pair.photo_b);
+    for (const FeatureMatch& match : pair.matches) {
+      const Eigen::Vector2d& in_a = photos.features[a][static_cast<std::size_t>(match.a)];
+      const Eigen::Vector2d& in_b = photos.features[b][static_cast<std::size_t>(match.b)];
+      text += fmt::format("{},{},{:.4f},{:.4f},{:.4f},{:.4f}\n", photos.names[a], photos.names[b], in_a.x(), in_a.y(),
+                          in_b.x(), in_b.y());
+    }
+  }
+  return text;
 }
 
 }  // namespace alidade

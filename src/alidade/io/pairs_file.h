@@ -1,16 +1,26 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
-#include "alidade/io/rotation_log_file.h"
+#include "alidade/io/result_document.h"
+#include "alidade/matching/matched_photos.h"
 
 namespace alidade {
 
+/// The photos have no size: it is not in the file.
+struct PairsFile {
+  MatchedPhotos photos;
+  std::vector<SkippedInput> skipped;
+};
+
 /// Reads points matched between pictures: frame_a, frame_b, ua_px, va_px, ub_px, vb_px (or image_a, image_b, ua, va,
-/// ub, vb), as a log without rotation: a row a frame in order of first appearance, its time its number. Matches that
-/// share the very same pixel of a frame are one point, as long as it is then seen at one place in every frame; a match
-/// that contradicts stands as a point of two frames by itself. A match that stands twice is left out and listed.
-/// Throws InputError; wrong rows are listed instead with `skip_bad`.
-[[nodiscard]] RotationLogFile read_pairs(const std::filesystem::path& file, const RotationLogOptions& options = {});
+/// ub, vb), the frames in order of first appearance. Matches that share the very same pixel of a frame share a feature.
+/// A match that stands twice is left out and listed. Throws InputError; wrong rows are listed instead with `skip_bad`.
+[[nodiscard]] PairsFile read_pairs(const std::filesystem::path& file, bool skip_bad = false);
+
+/// The same matches as such a file.
+[[nodiscard]] std::string pairs_csv(const MatchedPhotos& photos);
 
 }  // namespace alidade

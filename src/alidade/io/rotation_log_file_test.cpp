@@ -315,26 +315,26 @@ TEST_F(RotationLogText, ReadsTheReferenceLog) {
 
 const std::string pair_head = "frame_a,frame_b,ua_px,va_px,ub_px,vb_px\n";
 
-TEST_F(RotationLogText, MatchesThatShareAPixelAreOnePoint) {
-  // One point through three frames; one that two frames see; one that contradicts; one that stands twice; a loop.
+TEST_F(RotationLogText, MatchesThatShareAPixelShareAFeature) {
+  // Three frames; a pixel that two matches share; a match that stands twice; one told the other way round.
   const auto read = read_pairs(file(pair_head + "b,a,10,20,11,21\n"
                                                 "a,c,11,21,12,22\n"
                                                 "a,c,50,60,51,61\n"
                                                 "c,a,12,22,99,99\n"
                                                 "b,a,10,20,11,21\n"
                                                 "b,c,10,20,12,22\n"));
-  ASSERT_EQ(read.log.rows.size(), 3u) << "b, a, c, as they appear";
-  EXPECT_EQ(read.log.source, RotationSource::none);
-  EXPECT_EQ(read.log.rows[2].t_s, 2.0);
-  ASSERT_EQ(read.log.num_points, 3u);
-  std::vector<std::string> tracks;
-  for (std::size_t i = 0; i < 3; ++i) {
-    std::string track;
-    for (const RotationRow& row : read.log.rows)
-      track += is_seen(row.px[i]) ? std::to_string(static_cast<int>(row.px[i].x())) + " " : "- ";
-    tracks.push_back(track);
-  }
-  EXPECT_THAT(tracks, ::testing::UnorderedElementsAre("10 11 12 ", "- 50 51 ", "- 99 12 "));
+  EXPECT_THAT(read.photos.names, ::testing::ElementsAre("b", "a", "c")) << "as they appear";
+  ASSERT_EQ(read.photos.features.size(), 3u);
+  EXPECT_EQ(read.photos.features[0].size(), 1u);
+  EXPECT_EQ(read.photos.features[1].size(), 3u);
+  EXPECT_EQ(read.photos.features[2].size(), 2u);
+  ASSERT_EQ(read.photos.pairs.size(), 3u);
+  const MatchedPair& a_c = read.photos.pairs[1];
+  EXPECT_EQ(a_c.photo_a, 1);
+  EXPECT_EQ(a_c.photo_b, 2);
+  ASSERT_EQ(a_c.matches.size(), 3u);
+  EXPECT_EQ(read.photos.features[1][static_cast<std::size_t>(a_c.matches[2].a)], Eigen::Vector2d(99, 99));
+  EXPECT_EQ(read.photos.features[2][static_cast<std::size_t>(a_c.matches[2].b)], Eigen::Vector2d(12, 22));
   ASSERT_EQ(read.skipped.size(), 1u);
   EXPECT_EQ(read.skipped[0].line, 6u);
 }
@@ -352,7 +352,7 @@ TEST_F(RotationLogText, HostilePairsAreRefusedAtTheirPlace) {
       {pair_head + "a,b,1,2,3\n", "pairs.csv:2: has 5 cells"},
   };
   for (const auto& [text, place] : cases) EXPECT_THAT(pairs_refusal(text), HasSubstr(place)) << text;
-  const auto read = read_pairs(file(pair_head + "a,b,1,2,3,4\na,b,nan,2,3,4\n"), {.skip_bad = true});
+  const auto read = read_pairs(file(pair_head + "a,b,1,2,3,4\na,b,nan,2,3,4\n"), true);
   ASSERT_EQ(read.skipped.size(), 1u);
   EXPECT_EQ(read.skipped[0].line, 3u);
 }
@@ -361,8 +361,8 @@ TEST_F(RotationLogText, ReadsRealMatches) {
   const char* data = std::getenv("ALIDADE_DATA");
   if (data == nullptr) GTEST_SKIP() << "ALIDADE_DATA does not name the folder of recorded data";
   const auto read = read_pairs(std::filesystem::path(data) / "data" / "rot-prexy" / "correspondences.csv");
-  EXPECT_EQ(read.log.rows.size(), 7u);
-  EXPECT_GT(read.log.num_points, 100u);
+  EXPECT_EQ(read.photos.names.size(), 7u);
+  EXPECT_EQ(read.photos.pairs.size(), 6u);
 }
 
 }  // namespace

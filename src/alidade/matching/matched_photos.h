@@ -1,0 +1,27 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+namespace alidade {
+
+/// Two features taken for the same point: their places in the lists of their photos.
+struct FeatureMatch {
+  int a = 0, b = 0;
+};
+
+struct MatchedPair {
+  int photo_a = 0, photo_b = 0;
+  std::vector<FeatureMatch> matches;
+};
+
+/// Points of photos of one size, and which of them are taken for the same. Any number of the matches may be wrong.
+struct MatchedPhotos {
+  int width_px = 0, height_px = 0;                     ///< Of all photos that have features.
+  std::vector<std::string> names;                      ///< One a photo.
+  std::vector<std::vector<Eigen::Vector2d>> features;  ///< [px]
+  std::vector<MatchedPair> pairs;                      ///< Each pair of photos once, a before b.
+};
+
+}  // namespace alidade

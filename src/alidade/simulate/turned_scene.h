@@ -1,0 +1,36 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+#include "alidade/matching/matched_photos.h"
+
+namespace alidade {
+
+/// A camera that takes photos while somebody turns it, and what a matcher makes of them.
+struct TurnedScene {
+  int width_px = 1280, height_px = 960;
+  double fx = 1000.0, fy = 1000.0, cx = 645.0, cy = 474.0;  ///< [px]
+  double k1 = 0.0, k2 = 0.0;
+  int num_photos = 9;
+  double pan_step_rad = 0.3, tilt_rad = 0.15;  ///< From photo to photo; up and down by turns, for a third row again.
+  double shake_rad = 0.03;                     ///< σ of every angle, the roll's as well.
+  double points_per_rad2 = 600.0;
+  double least_depth_m = 2.0, most_depth_m = 20.0;
+  Eigen::Vector3d lever_m = Eigen::Vector3d::Zero();  ///< Camera centre from the centre of the turn, camera frame.
+  double sigma_step_m = 0.0;                          ///< Of the hand: the centre's own steps, each axis.
+  double sigma_px = 0.5;
+  double found_share = 0.6;   ///< Of a point's appearances in two photos that are matched.
+  double wrong_share = 0.0;   ///< Of the matches: with any other point of the second photo.
+  double moving_share = 0.0;  ///< Of the points: each photo sees them elsewhere, within a degree or so.
+  std::vector<double> zoom;   ///< Focal length of the photos over f; missing: 1.
+};
+
+/// Points over the whole sphere as these photos show them, and their matches for every pair that shares ten or more.
+[[nodiscard]] MatchedPhotos simulate_turned_photos(const TurnedScene& scene, std::uint64_t seed);
+
+/// cam_from_world of its photos. World: the first photo's frame but for tilt and shake, x right, y down, z forward.
+[[nodiscard]] std::vector<Eigen::Quaterniond> turned_attitudes(const TurnedScene& scene, std::uint64_t seed);
+
+}  // namespace alidade

@@ -1,0 +1,100 @@
+#include "alidade/turned/focal_start.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "alidade/geometry/decompositions.h"
+
+namespace alidade {
+namespace {
+
+constexpr double spread = 0.004;  // of a match's misfit, half widths: lens and hand included
+constexpr double truncate_at = 9.0;
+
+/// A link's matches that agree, thinned.
+struct LinkPoints {
+  std::vector<Eigen::Vector2d> a, b;
+};
+
+LinkPoints points_of(const MatchedPhotos& photos, const PhotoLink& link) {
+  constexpr std::size_t most_points = 100;
+  const PhotoScale scale(photos);
+  const MatchedPair& pair = photos.pairs[link.pair];
+  const std::size_t step = std::max<std::size_t>(1, link.inliers.size() / most_points);
+  LinkPoints points;
+  for (std::size_t i = 0; i < link.inliers.size(); i += step) {
+    const FeatureMatch& match = pair.matches[static_cast<std::size_t>(link.inliers[i])];
+    const auto px = [&](int photo, int feature) {
+      return scale.normalised(photos.features[static_cast<std::size_t>(photo)][static_cast<std::size_t>(feature)]);
+    };
+    points.a.push_back(px(pair.photo_a, match.a));
+    points.b.push_back(px(pair.photo_b, match.b));
+  }
+  return points;
+}
+
+struct Turn {
+  Eigen::Matrix3d b_from_a = Eigen::Matrix3d::Identity();
+  double cost = 0.0;
+};
+
+/// The rotation between both sets of rays, robust: weights that fall with the misfit.
+Turn robust_turn(const LinkPoints& points, double focal) {
+  const auto ray = [focal](const Eigen::Vector2d& q) { return Eigen::Vector3d(q.x() / focal, q.y() / focal, 1.0); };
+  std::vector<double> weights(points.a.size(), 1.0);
+  Turn turn;
+  constexpr int rounds = 4;
+  for (int round = 0; round < rounds; ++round) {
+    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+    for (std::size_t i = 0; i < points.a.size(); ++i) {
+      sum += weights[i] * ray(points.b[i]).normalized() * ray(points.a[i]).normalized().transpose();
+    }
+    turn.b_from_a = nearest_rotation(sum);
+    turn.cost = 0.0;
+    for (std::size_t i = 0; i < points.a.size(); ++i) {
+      const Eigen::Vector3d seen = turn.b_from_a * ray(points.a[i]);
+      double misfit = 1e3;
+      if (seen.z() > 0.05) misfit = (focal * seen.head<2>() / seen.z() - points.b[i]).squaredNorm() / (spread * spread);
+      weights[i] = 1.0 / ((1.0 + misfit) * (1.0 + misfit));
+      turn.cost += std::min(misfit, truncate_at);
+    }
+    turn.cost /= static_cast<double>(points.a.size());
+  }
+  return turn;
+}
+
+}  // namespace
+
+std::vector<FocalStart> focal_starts(const MatchedPhotos& photos, const std::vector<PhotoLink>& links,
+                                     std::size_t most) {
+  constexpr std::size_t most_links = 60;  // tell the focal length; the rotations come from all
+  std::vector<LinkPoints> points;
+  for (const PhotoLink& link : links) points.push_back(points_of(photos, link));
+  const std::size_t step = (links.size() + most_links - 1) / most_links;
+  std::vector<FocalStart> tried;
+  for (double focal = 0.25; focal < 60.0; focal *= 1.05) {
+    FocalStart start{focal, 0.0, {}};
+    for (std::size_t i = 0; i < links.size(); i += step) start.cost += robust_turn(points[i], focal).cost;
+    tried.push_back(std::move(start));
+  }
+  std::vector<FocalStart> minima;
+  for (std::size_t i = 0; i < tried.size(); ++i) {
+    const double before = i > 0 ? tried[i - 1].cost : std::numeric_limits<double>::infinity();
+    const double after = i + 1 < tried.size() ? tried[i + 1].cost : std::numeric_limits<double>::infinity();
+    if (tried[i].cost <= before && tried[i].cost < after) minima.push_back(tried[i]);
+  }
+  std::sort(minima.begin(), minima.end(), [](const FocalStart& a, const FocalStart& b) { return a.cost < b.cost; });
+  if (minima.size() > most) minima.resize(most);
+  for (FocalStart& start : minima) {
+    for (const LinkPoints& each : points) start.b_from_a.push_back(robust_turn(each, start.focal).b_from_a);
+  }
+  return minima;
+}
+
+double zoom_of(const PhotoLink& link, double focal) {
+  const Eigen::Matrix3d scaled = link.b_from_a * Eigen::Vector3d(focal, focal, 1.0).asDiagonal();
+  return 0.5 * (scaled.row(0).norm() + scaled.row(1).norm()) / (focal * scaled.row(2).norm());
+}
+
+}  // namespace alidade

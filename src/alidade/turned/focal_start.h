@@ -1,0 +1,24 @@
+#pragma once
+
+#include "alidade/turned/photo_links.h"
+
+namespace alidade {
+
+/// A focal length at which the links are most like rotations, among its neighbours, and each link's rotation there.
+struct FocalStart {
+  double focal = 1.0;  ///< Normalised; square pixels, centre in the middle.
+  double cost = 0.0;   ///< Mean of truncated squares over the links' points.
+  std::vector<Eigen::Matrix3d> b_from_a;
+};
+
+/// All minima over the focal length, from 0.25 to 60 half widths, the lowest first, at most `most`. Each link counts
+/// alike. The one-parameter search of Stein, "Accurate internal camera calibration using rotation", 1995, without its
+/// measured angles.
+[[nodiscard]] std::vector<FocalStart> focal_starts(const MatchedPhotos& photos, const std::vector<PhotoLink>& links,
+                                                   std::size_t most = 3);
+
+/// Focal length of b over that of a, by a link's homography, if a's is `focal`: K_b R = H K_a, whose rows have lengths
+/// f_b, f_b and 1.
+[[nodiscard]] double zoom_of(const PhotoLink& link, double focal);
+
+}  // namespace alidade

@@ -1,0 +1,12 @@
+#pragma once
+
+#include "alidade/turned/turned_fit.h"
+
+namespace alidade {
+
+/// Do the residuals of a pair of photos lie along the lines to one point, as those of a camera whose centre moved?
+/// Summed over the matches, the square along such a line less the square across it is zero in the mean for noise of any
+/// size that knows no direction, and the parallax' square else; the point is the one of 200 directions that shows most.
+[[nodiscard]] ParallaxTest parallax_of(const TurnedFit& fit);
+
+}  // namespace alidade

@@ -1,0 +1,62 @@
+#include "alidade/turned/photo_scatter.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/geometry/decompositions.h"
+
+namespace alidade {
+namespace {
+
+using Camera6 = TurnedCamera;
+
+/// The part above zero.
+TurnedInformation positive_part(const TurnedInformation& M) {
+  const SymmetricEigen eigen = symmetric_eigen(Eigen::MatrixXd(0.5 * (M + M.transpose())));
+  return eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal() * eigen.vectors.transpose();
+}
+
+}  // namespace
+
+ScatterCovariance scatter_covariance(const TurnedFit& fit, const Progress& progress) {
+  const Eigen::MatrixXd cov = inverse_symmetric(turned_normal(fit.bundle, fit.prior, fit.solve).information);
+  ScatterCovariance scatter;
+  scatter.cov_model = cov.topLeftCorner<num_camera, num_camera>();
+  const Eigen::LLT<TurnedInformation> root(scatter.cov_model);
+  const auto whitened = [&](const TurnedInformation& M) {
+    const TurnedInformation half = root.matrixL().solve(M);
+    return TurnedInformation(root.matrixL().solve(half.transpose()));
+  };
+  const auto count = fit.bundle.cam_from_world.size();
+  TurnedInformation seen = TurnedInformation::Zero(), expected = TurnedInformation::Zero();
+  double sum = 0.0, sum2 = 0.0;
+  for (std::size_t k = 0; k < count; ++k) {
+    report_progress(progress, "photos left out", k, count);
+    const TurnedNormal without = turned_normal(fit.bundle, fit.prior, fit.solve, static_cast<int>(k));
+    Eigen::MatrixXd information = without.information;
+    information.diagonal().array() += 1e-6;  // a photo that nothing joins any more may turn as it likes
+    const Eigen::MatrixXd cov_without = inverse_symmetric(information);
+    const Camera6 change = root.matrixL().solve(Camera6(-(cov_without * without.gradient).head<num_camera>()));
+    seen += change * change.transpose();
+    expected += whitened(TurnedInformation(cov_without.topLeftCorner<num_camera, num_camera>()) - scatter.cov_model);
+    sum += change.squaredNorm();
+    sum2 += change.squaredNorm() * change.squaredNorm();
+  }
+  const double n = static_cast<double>(count);
+  seen *= (n - 1.0) / n;
+  expected = positive_part(expected);
+  scatter.design_effect = expected.trace() > 0.0 ? seen.trace() / expected.trace() : 1.0;
+  scatter.degrees_of_freedom = sum2 > 0.0 ? std::max(sum * sum / sum2, 2.0) : n;
+  const double shrink = std::min(1.0, 8.0 / n);
+  const double excess = std::max(scatter.design_effect - 1.0, 0.0);
+  const TurnedInformation added =
+      shrink * excess * expected + (1.0 - shrink) * positive_part(TurnedInformation(seen - expected));
+  const double nu = std::max(scatter.degrees_of_freedom, 4.0);
+  const TurnedInformation inside = TurnedInformation::Identity() + nu / (nu - 2.0) * added;
+  const TurnedInformation L = root.matrixL();
+  scatter.cov = L * inside * L.transpose();
+  return scatter;
+}
+
+}  // namespace alidade

@@ -1,0 +1,22 @@
+#pragma once
+
+#include "alidade/turned/turned_fit.h"
+
+namespace alidade {
+
+/// Covariance of a fit whose errors are shared within photos (the hand moved, the shutter rolls, the focus walks).
+/// Normalised.
+struct ScatterCovariance {
+  TurnedInformation cov, cov_model;
+  double design_effect = 1.0;  ///< Of photos: the scatter over what the model expects of it.
+  double degrees_of_freedom = 0.0;
+};
+
+/// What leaving out each photo changes, δ_k (one step from the optimum), against what the model expects of that,
+/// Cov δ_k = V₋ₖ − V (Hausman, Econometrica 46, 1978): the sum of δδᵀ − (V₋ₖ − V), where it is above zero, is added to
+/// V. Errors of a photo touch every match that it has part in, so that matches are no clusters (Snijders & Borgatti,
+/// Connections 22, 1999: the jackknife over nodes). With few photos the scatter by direction is shrunk towards one
+/// ratio for all, and widened by ν/(ν − 2). docs/maths/turned-photos.md.
+[[nodiscard]] ScatterCovariance scatter_covariance(const TurnedFit& fit, const Progress& progress = {});
+
+}  // namespace alidade

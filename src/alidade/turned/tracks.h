@@ -1,0 +1,31 @@
+#pragma once
+
+#include "alidade/turned/photo_links.h"
+#include "alidade/turned/turned_bundle.h"
+
+namespace alidade {
+
+/// A match that is believed.
+struct KeptMatch {
+  std::size_t pair = 0;
+  int match = 0;
+};
+
+/// The matches on which each link's photos agree, strongest link first.
+[[nodiscard]] std::vector<KeptMatch> agreeing_matches(const std::vector<PhotoLink>& links);
+
+/// Of all matches between the bundle's photos those that its camera and turns explain within `gate` (normalised), by
+/// transfer from one photo to the other. `bundle_place[photo]`: −1 for photos that take no part.
+[[nodiscard]] std::vector<KeptMatch> explained_matches(const MatchedPhotos& photos, const TurnedBundle& bundle,
+                                                       const std::vector<int>& bundle_place, double gate);
+
+/// Joins matches to tracks and gives the bundle their sights and rays. A match that would put a point at two places of
+/// one photo is left out. Returns the number of matches that take part.
+std::size_t set_tracks(const MatchedPhotos& photos, const std::vector<KeptMatch>& matches,
+                       const std::vector<int>& bundle_place, TurnedBundle& bundle);
+
+/// Leaves out sights whose freed residual is beyond `gate` (normalised), the worst of a track at a time, and tracks
+/// that fewer than two photos show. Returns how many sights went.
+std::size_t leave_out(const std::vector<Eigen::Vector2d>& residuals, double gate, TurnedBundle& bundle);
+
+}  // namespace alidade

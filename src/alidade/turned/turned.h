@@ -1,0 +1,84 @@
+#pragma once
+
+#include <optional>
+
+#include "alidade/estimation/verdict.h"
+#include "alidade/matching/matched_photos.h"
+#include "alidade/turned/turned_bundle.h"
+
+namespace alidade {
+
+struct TurnedConfig {
+  bool square_pixels = false;  ///< fx = fy.
+  bool fixed_centre = false;   ///< cx, cy: the start's, else the picture's middle.
+  /// fx / fy and the centre are what cameras ordinarily have, within a σ that is counted; false: nothing is known.
+  bool ordinary_aspect = true, ordinary_centre = true;
+  int lens_terms = 2;                    ///< Radial distortion: none, k1, or k1 and k2.
+  bool keeps_terms = false;              ///< All of them; false: those that the photos tell from zero.
+  std::optional<Eigen::Vector4d> start;  ///< fx, fy, cx, cy [px].
+  double sigma_px = 0.0;                 ///< Of a coordinate; 0: told by the residuals.
+  /// σ of how far the camera's centre moved as it turned, over the points' distance, a radian of turn; none: ordinary.
+  std::optional<double> sigma_parallax;
+};
+
+/// What became of a photo.
+struct TurnedPhoto {
+  bool is_used = false;
+  std::string reason;  ///< Why it took no part.
+  int num_points = 0;
+  double rms_px = 0.0;                  ///< Per point.
+  double turn_rad = 0.0;                ///< From the first photo that is used.
+  double zoom = 1.0, sigma_zoom = 0.0;  ///< Its focal length over the others', if it may have one of its own.
+  Eigen::Matrix3d cam_from_world = Eigen::Matrix3d::Identity();
+};
+
+/// How much the camera's centre moved, by the residuals: what is along the lines to one point less what is across them.
+struct ParallaxTest {
+  double z = 0.0;  ///< Of the pair that shows it most.
+  int photo_a = -1, photo_b = -1;
+  double rms_px = 0.0;    ///< Of all pairs.
+  double relative = 0.0;  ///< Over the points' distance, a radian of turn.
+};
+
+struct TurnedReport {
+  enum class Status {
+    ok,
+    too_few_photos,  ///< Fewer than three hang together.
+    no_turn,
+    zoomed,
+    moved,  ///< Pairs agree each with a plane, not together with one camera that turned.
+    weak,
+    no_convergence
+  };
+  Status status = Status::too_few_photos;
+  std::vector<TurnedPhoto> photos;
+  TurnedBundle bundle;  ///< Normalised; its photos are `bundle_photo`.
+  std::vector<int> bundle_photo;
+  std::vector<Eigen::Vector2d> residuals;  ///< Normalised, one a sight.
+  Eigen::Matrix<double, 6, 1> camera;      ///< fx, fy, cx, cy [px], k1, k2.
+  Eigen::Matrix<double, 6, 6> cov, cov_model;
+  int lens_terms = 0;  ///< That are estimated; what the others might be is counted in `cov`.
+  double sigma_px = 0.0;
+  std::size_t num_matches = 0;   ///< Given between photos that take part.
+  std::size_t num_agreeing = 0;  ///< With one homography a pair.
+  std::size_t num_kept = 0;      ///< With one camera.
+  double design_effect = 1.0;    ///< What photos change, over what the model expects of it; variances.
+  double degrees_of_freedom = 0.0;
+  double largest_turn_rad = 0.0;
+  ParallaxTest parallax;
+  Eigen::Vector2d free_centre_px = Eigen::Vector2d::Zero();  ///< Where it is if it is not held, and its σ.
+  Eigen::Vector2d sigma_free_centre_px = Eigen::Vector2d::Zero();
+  double other_focal_px = 0.0, other_sigmas = 0.0;  ///< A second minimum, and how much worse it is, √Δχ²; 0: none.
+  std::vector<Assumption> assumed;
+};
+
+/// Intrinsics of a camera from photos that it took while it was turned on the spot, by hand say: f, centre and radial
+/// distortion, from matches of which many may be wrong. Throws Interrupted. docs/maths/turned-photos.md.
+[[nodiscard]] TurnedReport observe_turned(const MatchedPhotos& photos, const TurnedConfig& config,
+                                          const Progress& progress = {});
+
+/// What the answer is worth, or why there is none and what to add.
+[[nodiscard]] Verdict turned_verdict(const TurnedReport& report, const MatchedPhotos& photos,
+                                     const TurnedConfig& config);
+
+}  // namespace alidade

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <vector>
+
+#include "alidade/estimation/progress.h"
+#include "alidade/turned/turned_model.h"
+
+namespace alidade {
+
+/// One point as one photo shows it.
+struct TurnedSight {
+  int photo = 0, track = 0;
+  Eigen::Vector2d px;  ///< Normalised.
+};
+
+/// Photos of a turned camera, adjusted together. The sights stand track by track.
+struct TurnedBundle {
+  TurnedCamera camera;
+  std::vector<Eigen::Matrix3d> cam_from_world;  ///< One a photo. The first photo's is held: the world is free to turn.
+  std::vector<double> log_zoom;                 ///< One a photo, the first one's is held.
+  std::vector<Eigen::Vector3d> rays;            ///< One a track, unit length, in the world.
+  std::vector<TurnedSight> sights;
+};
+
+/// What is known of the camera before, as a normal distribution about `mean`.
+struct TurnedPrior {
+  TurnedCamera mean = TurnedCamera::Zero();
+  TurnedInformation information = TurnedInformation::Zero();
+  double zoom_information = 1e12;  ///< 1/σ² of each photo's log zoom; large: it is the same for all.
+};
+
+struct TurnedSolveConfig {
+  double sigma_px = 1e-3;  ///< Normalised, of a coordinate.
+  double huber = 2.0;      ///< In σ of a residual.
+  int max_iterations = 50;
+  double least_gain = 1e-8;  ///< Of the cost, as a share: less is the bottom.
+};
+
+/// Normal equations of camera and photos, the tracks' rays eliminated. Order: camera, then `per_photo` a photo.
+struct TurnedNormal {
+  Eigen::MatrixXd information;
+  Eigen::VectorXd gradient;
+};
+
+/// Of what `bundle` holds at its place, in units of 1/σ²; without the sights of `without_photo`, if there is one.
+[[nodiscard]] TurnedNormal turned_normal(const TurnedBundle& bundle, const TurnedPrior& prior,
+                                         const TurnedSolveConfig& config, int without_photo = -1);
+
+struct TurnedSolution {
+  bool converged = false;
+  int iterations = 0;
+  double cost = 0.0;  ///< Huber's, prior included, σ as given.
+  std::vector<Eigen::Vector2d>
+      residuals;  ///< Prediction minus pixel, one a sight, normalised; NaN where there is none.
+};
+
+/// Levenberg–Marquardt on camera, turns (and zooms) and rays, in place; rays are eliminated track by track. Throws
+/// Interrupted. Triggs et al., "Bundle adjustment — a modern synthesis", 2000, section 6.
+TurnedSolution solve_turned(TurnedBundle& bundle, const TurnedPrior& prior, const TurnedSolveConfig& config,
+                            const Progress& progress = {});
+
+/// Each sight's residual over what its track leaves of it: √(1 − 1/m), m the track's sights. NaN as in `residuals`.
+[[nodiscard]] std::vector<double> freed_norms(const TurnedBundle& bundle,
+                                              const std::vector<Eigen::Vector2d>& residuals);
+
+}  // namespace alidade

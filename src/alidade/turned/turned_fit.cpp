@@ -1,0 +1,208 @@
+#include "alidade/turned/turned_fit.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/geometry/decompositions.h"
+
+namespace alidade {
+namespace {
+
+constexpr double first_sigma = 0.003;  // half widths: before the residuals tell
+constexpr double least_sigma = 2e-5;   // about 0.01 px
+constexpr double gate_sigmas = 4.5;
+constexpr double zoom_sigma = 0.3;
+
+double middle_of(std::vector<double> values) {
+  const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), half, values.end());
+  return *half;
+}
+
+/// σ of a coordinate by the median of the residuals' norms, which is √(2 ln 2) σ.
+double sigma_by_median(const TurnedFit& fit) {
+  std::vector<double> norms = freed_norms(fit.bundle, fit.solution.residuals);
+  std::erase_if(norms, [](double norm) { return !std::isfinite(norm); });
+  if (norms.empty()) return first_sigma;
+  return std::max(middle_of(std::move(norms)) / 1.17741, least_sigma);
+}
+
+/// The same by squares, each residual beyond Huber's bound weighed down.
+double sigma_by_weights(const TurnedFit& fit) {
+  double sum = 0.0;
+  for (const Eigen::Vector2d& residual : fit.solution.residuals) {
+    const double norm = residual.norm(), k = fit.solve.huber * fit.solve.sigma_px;
+    if (std::isfinite(norm)) sum += norm > k ? k * norm : norm * norm;
+  }
+  return std::max(std::sqrt(sum / std::max(freedom_of(fit.bundle), 1.0)), least_sigma);
+}
+
+void turn_by_tree(const std::vector<PhotoLink>& links, const PhotoTree& tree, const FocalStart& start, bool frees_zoom,
+                  TurnedBundle& bundle) {
+  const std::size_t count = tree.photos.size();
+  bundle.cam_from_world.assign(count, Eigen::Matrix3d::Identity());
+  bundle.log_zoom.assign(count, 0.0);
+  for (std::size_t k = 1; k < count; ++k) {
+    const auto at = static_cast<std::size_t>(tree.link_of[k]);
+    const PhotoLink& link = links[at];
+    const bool is_b = link.photo_b == tree.photos[k];
+    const int from_photo = is_b ? link.photo_a : link.photo_b;
+    const auto from = static_cast<std::size_t>(std::ranges::find(tree.photos, from_photo) - tree.photos.begin());
+    const Eigen::Matrix3d turn = is_b ? start.b_from_a[at] : Eigen::Matrix3d(start.b_from_a[at].transpose());
+    bundle.cam_from_world[k] = turn * bundle.cam_from_world[from];
+    if (!frees_zoom) continue;
+    const double zoom = std::log(std::clamp(zoom_of(link, start.focal), 0.1, 10.0));
+    bundle.log_zoom[k] = bundle.log_zoom[from] + (is_b ? zoom : -zoom);
+  }
+}
+
+std::vector<int> places_of(const MatchedPhotos& photos, const PhotoTree& tree) {
+  std::vector<int> place(photos.names.size(), -1);
+  for (std::size_t k = 0; k < tree.photos.size(); ++k)
+    place[static_cast<std::size_t>(tree.photos[k])] = static_cast<int>(k);
+  return place;
+}
+
+}  // namespace
+
+double freedom_of(const TurnedBundle& bundle) {
+  return 2.0 * static_cast<double>(bundle.sights.size()) - 2.0 * static_cast<double>(bundle.rays.size()) -
+         3.0 * static_cast<double>(bundle.cam_from_world.size() - 1) - 3.0;
+}
+
+TurnedPrior prior_about(double focal, const MatchedPhotos& photos, const TurnedConfig& config) {
+  constexpr double exact = 1e-7, unknown_focal = 5.0, free_centre = 0.5, free_aspect = 0.5;
+  constexpr double ordinary_centre = 0.03, ordinary_aspect = 1e-3;  // half widths; share
+  constexpr double corner_k1 = 0.08, corner_k2 = 0.04;
+  TurnedPrior prior;
+  prior.mean.head<2>().setConstant(focal);
+  if (config.start) {
+    const PhotoScale scale(photos);
+    const Eigen::Vector4d& k = *config.start;
+    prior.mean.segment<2>(2) = scale.normalised(k.tail<2>());
+  }
+  const double f2 = focal * focal, tall = static_cast<double>(photos.height_px) / photos.width_px;
+  const double corner = (1.0 + tall * tall) / f2;  // r² there
+  const double aspect = focal * (config.square_pixels ? exact : config.ordinary_aspect ? ordinary_aspect : free_aspect);
+  const double centre = config.fixed_centre ? exact : config.ordinary_centre ? ordinary_centre : free_centre;
+  const auto information = [](double sigma) { return 1.0 / (sigma * sigma); };
+  TurnedInformation& Q = prior.information;
+  Q(0, 0) = Q(1, 1) = information(aspect);
+  Q(0, 1) = Q(1, 0) = -information(aspect);
+  Q.topLeftCorner<2, 2>().array() += 0.25 * information(unknown_focal * focal);  // of (fx + fy) / 2
+  Q(2, 2) = Q(3, 3) = information(centre);
+  Q(4, 4) = information(config.lens_terms > 0 ? corner_k1 / corner : exact);
+  Q(5, 5) = information(config.lens_terms > 1 ? corner_k2 / (corner * corner) : exact);
+  return prior;
+}
+
+namespace {
+
+/// The rounds of fit_turned().
+class Rounds {
+ public:
+  Rounds(const MatchedPhotos& photos, const TurnedConfig& config, bool frees_zoom, const Progress& progress,
+         TurnedFit& fit)
+      : photos_(photos),
+        config_(config),
+        frees_zoom_(frees_zoom),
+        progress_(progress),
+        given_(config.sigma_px / PhotoScale(photos).half_width_px),
+        fit_(fit) {}
+
+  void solve(bool is_last) {
+    fit_.solve.max_iterations = is_last ? 60 : 15;
+    fit_.solve.least_gain = is_last ? 1e-9 : 1e-4;
+    fit_.solution = solve_turned(fit_.bundle, fit_.prior, fit_.solve, progress_);
+  }
+
+  void prepare(double focal) {
+    fit_.prior = prior_about(focal, photos_, config_);
+    if (frees_zoom_) fit_.prior.zoom_information = 1.0 / (zoom_sigma * zoom_sigma);
+  }
+
+  /// All that the camera explains so far, adjusted, less what does not fit then. False: too little is left.
+  bool again(const std::vector<int>& place, double gate) {
+    const double told = std::max(sigma_by_median(fit_), given_);
+    prepare(0.5 * (fit_.bundle.camera[0] + fit_.bundle.camera[1]));
+    // a match's transfer has the noise of both its ends
+    const auto matches = explained_matches(photos_, fit_.bundle, place, gate * std::sqrt(2.0) * told);
+    fit_.num_kept = set_tracks(photos_, matches, place, fit_.bundle);
+    fit_.solve.sigma_px = told;
+    constexpr int most_times = 3;
+    for (int i = 0; i < most_times; ++i) {
+      if (freedom_of(fit_.bundle) < 1.0) return false;
+      solve(false);
+      const double limit = gate * std::max(sigma_by_median(fit_), given_);
+      if (leave_out(fit_.solution.residuals, limit, fit_.bundle) == 0) return true;
+    }
+    if (freedom_of(fit_.bundle) < 1.0) return false;
+    solve(false);
+    return true;
+  }
+
+  void settle() {
+    for (int i = 0; i < 2; ++i) {
+      fit_.solve.sigma_px = given_ > 0.0 ? given_ : sigma_by_weights(fit_);
+      solve(true);
+    }
+  }
+
+ private:
+  const MatchedPhotos& photos_;
+  const TurnedConfig& config_;
+  bool frees_zoom_;
+  const Progress& progress_;
+  double given_;
+  TurnedFit& fit_;
+};
+
+}  // namespace
+
+TurnedFit fit_turned(const MatchedPhotos& photos, const std::vector<PhotoLink>& links, const PhotoTree& tree,
+                     const FocalStart& start, const TurnedConfig& config, bool frees_zoom, const Progress& progress) {
+  TurnedFit fit;
+  Rounds rounds(photos, config, frees_zoom, progress, fit);
+  rounds.prepare(start.focal);
+  fit.bundle.camera = fit.prior.mean;
+  turn_by_tree(links, tree, start, frees_zoom, fit.bundle);
+  const std::vector<int> place = places_of(photos, tree);
+  fit.solve.sigma_px = first_sigma;
+  fit.num_kept = set_tracks(photos, agreeing_matches(links), place, fit.bundle);
+  rounds.solve(false);
+  for (const double gate : {2.0 * gate_sigmas, gate_sigmas, gate_sigmas}) {
+    if (!rounds.again(place, gate)) return fit;
+  }
+  rounds.settle();
+  return fit;
+}
+
+TurnedFit fit_again(const MatchedPhotos& photos, const PhotoTree& tree, TurnedFit fit, const TurnedConfig& config,
+                    const Progress& progress) {
+  Rounds rounds(photos, config, false, progress, fit);
+  for (int i = num_camera - 2; i < num_camera; ++i) {
+    if (config.lens_terms <= i - (num_camera - 2)) fit.bundle.camera[i] = 0.0;
+  }
+  rounds.prepare(0.5 * (fit.bundle.camera[0] + fit.bundle.camera[1]));
+  rounds.solve(false);
+  if (rounds.again(places_of(photos, tree), gate_sigmas)) rounds.settle();
+  return fit;
+}
+
+ZoomTest free_zooms(TurnedFit fit, const Progress& progress) {
+  fit.prior.zoom_information = 1.0 / (zoom_sigma * zoom_sigma);
+  fit.solution = solve_turned(fit.bundle, fit.prior, fit.solve, progress);
+  const Eigen::MatrixXd cov = inverse_symmetric(turned_normal(fit.bundle, fit.prior, fit.solve).information);
+  ZoomTest test{fit.bundle.log_zoom, {}};
+  for (std::size_t k = 0; k < test.log_zoom.size(); ++k) {
+    const auto at = num_camera + per_photo * static_cast<Eigen::Index>(k) + 3;
+    test.sigma.push_back(std::sqrt(std::max(cov(at, at), 0.0)));
+  }
+  // the first photo's is held: all are told against the middle one
+  std::vector<double> sorted = test.log_zoom;
+  const double middle = middle_of(std::move(sorted));
+  for (double& zoom : test.log_zoom) zoom -= middle;
+  return test;
+}
+
+}  // namespace alidade

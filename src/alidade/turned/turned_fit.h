@@ -1,0 +1,41 @@
+#pragma once
+
+#include "alidade/turned/focal_start.h"
+#include "alidade/turned/tracks.h"
+#include "alidade/turned/turned.h"
+
+namespace alidade {
+
+/// Photos that hang together, adjusted, without what does not belong.
+struct TurnedFit {
+  TurnedBundle bundle;
+  TurnedPrior prior;
+  TurnedSolveConfig solve;  ///< With the σ that the residuals tell, or the given one.
+  TurnedSolution solution;
+  std::size_t num_kept = 0;  ///< Matches.
+};
+
+/// The camera of a start, the prior about it. A lens' distortion at the picture's corner is 0 within 8 % (k1) and 4 %
+/// (k2); an ordinary camera's pixels are square within 0.1 %, its centre in the middle within 1.5 % of the width.
+[[nodiscard]] TurnedPrior prior_about(double focal, const MatchedPhotos& photos, const TurnedConfig& config);
+
+/// Adjusts the photos of a tree from one start: first the matches of which a pair agrees, then all that one camera
+/// explains, until none comes or goes. `frees_zoom`: each photo may have its own focal length.
+[[nodiscard]] TurnedFit fit_turned(const MatchedPhotos& photos, const std::vector<PhotoLink>& links,
+                                   const PhotoTree& tree, const FocalStart& start, const TurnedConfig& config,
+                                   bool frees_zoom, const Progress& progress);
+
+/// The same photos with another config, from where the fit is.
+[[nodiscard]] TurnedFit fit_again(const MatchedPhotos& photos, const PhotoTree& tree, TurnedFit fit,
+                                  const TurnedConfig& config, const Progress& progress);
+
+/// σ of each photo's log zoom, and the zooms, if each photo of the fit had its own; by the model.
+struct ZoomTest {
+  std::vector<double> log_zoom, sigma;
+};
+[[nodiscard]] ZoomTest free_zooms(TurnedFit fit, const Progress& progress);
+
+/// Measurements minus unknowns.
+[[nodiscard]] double freedom_of(const TurnedBundle& bundle);
+
+}  // namespace alidade

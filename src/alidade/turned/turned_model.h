@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+
+namespace alidade {
+
+/// fx, fy, cx, cy, k1, k2. Pixels are normalised, (px − middle) / half width, and so are the first four.
+using TurnedCamera = Eigen::Matrix<double, 6, 1>;
+using TurnedInformation = Eigen::Matrix<double, 6, 6>;
+
+inline constexpr int num_camera = 6, per_photo = 4;  ///< A photo's: its turn (3), the log of its zoom.
+
+/// Pixel of a far point with its derivatives.
+struct TurnedPrediction {
+  Eigen::Vector2d px;
+  Eigen::Matrix<double, 2, num_camera> J_camera;
+  Eigen::Matrix<double, 2, per_photo> J_photo;  ///< Turn on the left, R ← Exp(φ) R, and log zoom.
+  Eigen::Matrix<double, 2, 3> J_ray;
+};
+
+/// Normalised pixel of the direction `ray`, camera_from_world Y = R ray: u = fx e^z x d + cx with x = Y₀/Y₂ and
+/// d = 1 + k1 r² + k2 r⁴ (Brown 1971). None behind the camera, or beyond the fold of the lens.
+[[nodiscard]] std::optional<Eigen::Vector2d> turned_pixel(const TurnedCamera& camera, const Eigen::Matrix3d& R,
+                                                          double log_zoom, const Eigen::Vector3d& ray);
+[[nodiscard]] bool predict_turned(const TurnedCamera& camera, const Eigen::Matrix3d& R, double log_zoom,
+                                  const Eigen::Vector3d& ray, TurnedPrediction& out);
+
+/// Unit direction of a normalised pixel in the camera; none beyond the fold.
+[[nodiscard]] std::optional<Eigen::Vector3d> turned_ray(const TurnedCamera& camera, double log_zoom,
+                                                        const Eigen::Vector2d& px);
+
+}  // namespace alidade

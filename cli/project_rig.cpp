@@ -106,6 +106,8 @@ Check files_check(const Rig& rig) {
 ExitCode project_rig(const RigProjectionArgs& args, Run& run) {
   run.add_input("rig", args.rig);
   const Rig rig = read_rig(args.rig);
+  if (!rig.lens_courses.empty())
+    throw InputError(args.rig.string() + ": intrinsics: change with time, which `project` is not told; give a camera");
   check_angles(args.pans_rad, "--pan", rig.heads.size());
   check_angles(args.tilts_rad, "--tilt", rig.heads.size());
   const RigUncertainty errors = rig_uncertainty(rig);

@@ -35,6 +35,7 @@ const std::map<std::string, Verdicts> expected{
       {"table1-tells", no},
       {"table2-faster-1", yes},
       {"table2-faster-2", yes},
+      {"improves-beyond-15", yes},
       {"method1-from-14", yes},
       {"method2-from-18", nearly},
       {"global-better", nearly},
@@ -50,6 +51,9 @@ const std::map<std::string, Verdicts> expected{
       {"servo-stable", nearly},
       {"servo-middle", yes},
       {"servo-lively", no},
+      {"loop-fed-back", yes},
+      {"loop-follows", no},
+      {"loop-moves", no},
       {"rig-A", yes},
       {"rig-A2", no},
       {"rig-B", no},
@@ -108,7 +112,9 @@ TEST_F(ReproduceCommand, LeavesTablesFiguresAndAPage) {
   for (const char* name : {"id", "quantity", "unit", "printed", "ours", "best", "bound", "ratio", "state", "words"})
     EXPECT_EQ(table[name].size(), claims.size()) << name;
   EXPECT_EQ(Csv::read(path("out/claims.csv")).num_rows(), claims.size());
-  for (const char* name : {"fig_4", "fig_5", "fig_rigs"}) {
+  EXPECT_EQ(document["data"]["figures"]["caption"].size(), 4u);
+  for (const Json& caption : document["data"]["figures"]["caption"]) EXPECT_FALSE(caption.get<std::string>().empty());
+  for (const char* name : {"fig_2", "fig_4", "fig_5", "fig_rigs"}) {
     ASSERT_TRUE(document["data"].contains(name)) << name;
     const Csv csv = Csv::read(path("out/" + std::string(name) + ".csv"));
     EXPECT_EQ(csv.num_rows(), document["data"][name].front().size()) << name;

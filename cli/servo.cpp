@@ -21,6 +21,7 @@ struct ServoArgs {
   std::vector<std::string> controllers;
   int seeds = 0;
   double latency_ms = -1.0, gain_factor = 0.0, tau_factor = 0.0;
+  std::string intrinsics;
   bool no_robustness = false, real_time = false;
   LiveOptions live;
 };
@@ -37,6 +38,7 @@ ServoScenario with_options(ServoScenario scenario, const ServoArgs& args) {
     throw UsageError("--latency-ms: is more than 200 pictures late");
   if (args.gain_factor > 0.0) scenario.scene.mismatch.gain = args.gain_factor;
   if (args.tau_factor > 0.0) scenario.scene.mismatch.tau = args.tau_factor;
+  if (!args.intrinsics.empty()) scenario.scene.intrinsics = *lens_knowledge_named(args.intrinsics);
   if (args.no_robustness) scenario.robustness.reset();
   return scenario;
 }
@@ -51,6 +53,19 @@ void summarize(const ServoStudy& study, Run& run) {
                         figures.num_lost > 0 ? fmt::format("   lost {}, found {}, {:.1f} s of search", figures.num_lost,
                                                            figures.num_found, figures.search_s)
                                              : ""));
+  }
+}
+
+/// The best controller by the intrinsics that its loop goes by.
+void summarize_lenses(const ServoStudy& study, Run& run) {
+  if (study.lenses.empty()) return;
+  run.say(fmt::format("intrinsics    RMS px   95 % px   max px   in picture   fx off by   ({})",
+                      controller_name(study.best)));
+  for (const LensComparison& compared : study.lenses) {
+    const ServoFigures& figures = compared.figures;
+    run.say(fmt::format("{:<12} {:7.2f} {:9.2f} {:8.2f} {:10.1f} % {:9.2g} %", lens_knowledge_name(compared.knowledge),
+                        figures.rms_px, figures.p95_px, figures.max_px, 100.0 * figures.in_picture,
+                        100.0 * figures.focal_share));
   }
 }
 
@@ -94,7 +109,8 @@ std::vector<Assumption> assumed_of(const ServoScenario& scenario) {
   exact("latency_s", scene.latency_s);
   exact("sigma_px", scene.sigma_px);
   exact("sigma_encoder_rad", scene.sigma_encoder_rad);
-  for (const RigHead& head : scene.heads) exact(fmt::format("head{}.camera.fx", head.head.id), focal_of(head.camera));
+  if (scene.intrinsics != LensKnowledge::observed)
+    for (const RigHead& head : scene.heads) exact(fmt::format("head{}.camera.fx", head.head.id), focal_of(head.camera));
   return assumed;
 }
 
@@ -115,6 +131,7 @@ ExitCode servo(const ServoArgs& args, Run& run) {
   if (verdict.exit_code == ExitCode::ok) heed_assumptions(run.document.assumed, verdict);
   fill_servo(scenario, study, run.document);
   summarize(study, run);
+  summarize_lenses(study, run);
   if (args.real_time) tell_pace(pace, run);
   if (has_estimate(verdict)) run.add_file("servo.csv", servo_csv(scenario, study));
   return live.finish(verdict);
@@ -146,6 +163,12 @@ void add_servo(Frame& frame) {
       ->check(finite_number() & CLI::Range(0.01, 100.0));
   command.add_option("--true-tau", args->tau_factor, "The plant's time constant as it is, over what is known of it")
       ->check(finite_number() & CLI::Range(0.01, 100.0));
+  command
+      .add_option(
+          "--intrinsics", args->intrinsics,
+          "What the loop goes by where lenses zoom: given (the rig's, whatever they do), observed (told on-line "
+          "by what stands still in the pictures), true")
+      ->check(CLI::IsMember({"given", "observed", "true"}));
   command.add_flag("--no-robustness", args->no_robustness, "Leave out the grid over gain and time constant");
   command.add_flag(
       "--realtime", args->real_time,

@@ -344,5 +344,34 @@ TEST_F(ServoCommand, ARecordedPathThatIsNoneIsNamed) {
   EXPECT_NE(fault("t_s,x_m,y_m,z_m\n0,0,0,1\n1,0,nan,2\n").find("'nan' is not a finite number"), std::string::npos);
 }
 
+/// A lens that zooms: by the rig's focal length, by the observer's, by the true one.
+TEST_F(ServoCommand, ComparesWhatTheLoopKnowsOfAZoom) {
+  const Outcome outcome = servo(
+      "zoom: {t_s: [3, 7], factor: [1, 4]}\nduration_s: 11\nseeds: 2\ncontrollers: [feedforward]\nrobustness: {points: "
+      "0}\n",
+      {"--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json estimate = Json::parse(outcome.out)["estimate"], lenses = estimate["intrinsics"];
+  EXPECT_LT(lenses["observed"]["rms_px"], 10.0);
+  EXPECT_EQ(lenses["observed"]["rms_px"], estimate["controllers"]["feedforward"]["rms_px"]);
+  EXPECT_GT(lenses["given"]["rms_px"], 20.0);
+  EXPECT_LT(lenses["true"]["rms_px"], lenses["observed"]["rms_px"]);
+  EXPECT_EQ(lenses["true"]["focal_share"], 0.0);
+  const Csv rows = Csv::read(path("out/servo.csv"));
+  const std::size_t last = rows.num_rows() - 1;
+  EXPECT_NEAR(rows.number(last, "true_fx_px"), 4.0 * 337.84, 0.5);
+  EXPECT_NEAR(rows.number(last, "fx_px"), rows.number(last, "true_fx_px"), 5.0 * rows.number(last, "sigma_fx_px"));
+}
+
+TEST_F(ServoCommand, RefusesAZoomThatIsNone) {
+  for (const std::string zoom :
+       {"{t_s: [3, 7], factor: [1]}", "{t_s: [7, 3], factor: [1, 2]}", "{t_s: [3], factor: [0]}",
+        "{t_s: [], factor: []}", "{factor: [2]}", "{t_s: [1], factor: [2], speed: 1}"})
+    EXPECT_EQ(servo("zoom: " + zoom + "\n").code, 3) << zoom;
+  EXPECT_EQ(servo("intrinsics: guessed\n").code, 3);
+  EXPECT_EQ(servo("background_points: 2\n").code, 3);
+  EXPECT_EQ(servo("{}", {"--intrinsics", "guessed"}).code, 2);
+}
+
 }  // namespace
 }  // namespace alidade

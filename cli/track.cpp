@@ -5,10 +5,12 @@
 #include <memory>
 
 #include "alidade/io/events_file.h"
+#include "alidade/io/intrinsics_file.h"
 #include "alidade/io/rig_file.h"
 #include "alidade/io/track_document.h"
 #include "alidade/io/video_sights.h"
 #include "alidade/live/streams.h"
+#include "alidade/track/lens_over_time.h"
 #include "alidade/track/track.h"
 #include "alidade/track/track_assumed.h"
 #include "cli/commands.h"
@@ -22,7 +24,7 @@ namespace {
 
 struct TrackArgs {
   std::filesystem::path events, rig, truth, angles;
-  std::vector<std::string> videos;
+  std::vector<std::string> videos, intrinsics;
   std::string target;
   double rate_hz = 0.0;
   std::string method = "cv";
@@ -171,6 +173,51 @@ std::pair<TrackReport, Verdict> follow(const TrackArgs& args, std::span<const Ta
   return result;
 }
 
+/// The intrinsics over time that --intrinsics, else rig.yaml, names of heads that zoom.
+std::vector<LensCourse> courses_given(const TrackArgs& args, const Rig& rig, Run& run) {
+  if (args.intrinsics.empty()) return rig.lens_courses;
+  if (args.intrinsics.size() != rig.heads.size())
+    throw UsageError(
+        fmt::format("--intrinsics: the rig has {} heads, but {} files are given; - for a head that does "
+                    "not zoom",
+                    rig.heads.size(), args.intrinsics.size()));
+  std::vector<LensCourse> courses;
+  for (const std::string& file : args.intrinsics) {
+    courses.push_back(file == "-" ? LensCourse{} : read_lens_course(file));
+    if (file != "-") run.add_input("intrinsics", file);
+  }
+  return courses;
+}
+
+/// Each sight gets the intrinsics of its time.
+void zoom_with(const std::vector<LensCourse>& courses, std::vector<TargetSight>& sights, Rig& rig) {
+  constexpr double beyond_s = 1.0;  // how far what an observer last said is believed to go on
+  if (courses.empty()) return;
+  if (const auto outside = outside_course(sights, courses, beyond_s)) {
+    const LensCourse& course = courses[outside->head];
+    throw InputError(
+        fmt::format("{}: tells head {}'s intrinsics from {:.6g} to {:.6g} s, but there is a sight at {:.6g} s; "
+                    "are the clocks the same?",
+                    course.name, rig.heads[outside->head].head.id, course.from_s, course.until_s, outside->t_s));
+  }
+  use_courses(courses, sights, rig);
+}
+
+/// What is assumed of a lens that zooms is not the rig's one number.
+void name_courses(const std::vector<LensCourse>& courses, const Rig& rig, std::vector<Assumption>& assumed) {
+  for (std::size_t h = 0; h < courses.size(); ++h) {
+    if (courses[h].lens.empty()) continue;
+    const std::string of_camera = fmt::format("head{}.camera.", rig.heads[h].head.id);
+    for (Assumption& one : assumed) {
+      if (!one.name.starts_with(of_camera)) continue;
+      const std::string what = one.name.substr(of_camera.size());
+      if (what != "fx" && what != "fy" && what != "cx" && what != "cy") continue;
+      one.name = fmt::format("head{}.intrinsics.{}", rig.heads[h].head.id, what);
+      one.value = std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+}
+
 TrueTrack truth_given(const TrackArgs& args, Run& run) {
   if (args.truth.empty()) return {};
   run.add_input("truth", args.truth);
@@ -182,21 +229,24 @@ ExitCode track(const TrackArgs& args, Run& run) {
   TrackConfig config = config_of(args);
   if (args.corrected && args.method != "xiahou2015") throw UsageError("--corrected: only with --method xiahou2015");
   run.add_input("rig", args.rig);
-  const Rig rig = read_rig(args.rig);
-  config.tracker.errors = rig_uncertainty(rig, args.sigma_clock_s);
+  Rig rig = read_rig(args.rig);
+  const std::vector<LensCourse> courses = courses_given(args, rig, run);
   const TrueTrack truth = truth_given(args, run);
   LiveRun live(args.live, run);
   const live::TrackStream stream(rig.heads, truth);
   if (live.is_on()) live.open(stream.topics(), "/track");
   if (live.server() != nullptr) stream.begin(*live.server());
-  const EventsFile events = sights_given(args, rig, live.progress(), run);
+  EventsFile events = sights_given(args, rig, live.progress(), run);
   if (events.sights.empty()) return live.finish(never_seen());
+  zoom_with(courses, events.sights, rig);
+  config.tracker.errors = rig_uncertainty(rig, args.sigma_clock_s);
   run.lap("read");
   auto [report, verdict] = follow(args, events.sights, rig.heads, config, truth, stream, live, run);
   if (args.method != "xiahou2015" && verdict.exit_code == ExitCode::ok) {
     run.document.assumed = track_assumed(
         events.sights, rig, config, report,
         {.sigma_px = args.sigma_px > 0.0, .sigma_a = args.sigma_a > 0.0, .sigma_clock_s = args.sigma_clock_s});
+    name_courses(courses, rig, run.document.assumed);
     heed_assumptions(run.document.assumed, verdict);
   }
   run.lap("verdict");
@@ -223,6 +273,13 @@ void add_options(CLI::App& command, TrackArgs& args) {
                   "Frames a second of the videos; angles are interpolated (default: one row of angles a frame)")
       ->check(positive_number());
   command.add_option("--rig", args.rig, "The heads and their cameras")->type_name("FILE")->required();
+  command
+      .add_option(
+          "--intrinsics", args.intrinsics,
+          "intrinsics.csv of `alidade observe`, one a head of the rig in its order (- for a head that does not "
+          "zoom): each sight is taken with the lens of its time, whose σ is counted; or `intrinsics:` of a head "
+          "in rig.yaml")
+      ->type_name("FILE");
   command.add_option("--truth", args.truth, "True path, CSV: t_s,x_m,y_m,z_m; adds errors, NEES and the bound")
       ->type_name("FILE");
   command
@@ -272,6 +329,7 @@ void add_track(Frame& frame) {
        .examples = "alidade track events.csv --rig rig.yaml\n"
                    "alidade track events.csv --rig rig.yaml --method imm --predict 0.1\n"
                    "alidade track events.csv --rig rig.yaml --truth truth.csv --method xiahou2015\n"
+                   "alidade track events.csv --rig rig.yaml --intrinsics left/intrinsics.csv right/intrinsics.csv\n"
                    "alidade track --video left.mp4 right.mp4 --angles angles.csv --rate 30 --rig rig.yaml \\\n"
                    "  --target colour:230,70,20\n"},
       [args](Run& run) { return track(*args, run); });

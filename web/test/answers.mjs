@@ -144,7 +144,31 @@ async function aReRunIsCalledSo({open, url, documents}) {
   assert.deepEqual(faults, []);
 }
 
+async function figuresSayWhatTheyDraw({open, url, documents}) {
+  const {document} = documents.reproduce, {page, faults, close} = await open(url(document));
+  for (const [id, title, caption] of [['4', 'Figure 4: angles', 'Drawn: an angle'], ['6', 'Figure 6: spots', 'Left the picture'], ['8', 'Figure 8: errors', 'Shares of spots.'], ['table_2', 'Table 2: three ways', 'Three rows.']]) {
+    const words = await page.locator(`#fig-paper-${id}`).innerText();
+    assert.ok(words.includes(title) && words.includes(caption), words);
+  }
+  const cells = await page.locator('#fig-paper-table_2 tbody tr').nth(2).locator('th, td').allInnerTexts();
+  assert.deepEqual(cells, ['ours', '–', '6']);
+  assert.equal(await page.locator('#fig-paper-6 canvas').count(), 2);
+  await close();
+  assert.deepEqual(faults, []);
+}
+
+async function aRigsCausesHaveTheirScores({open, url, documents}) {
+  const document = JSON.parse(JSON.stringify(documents['rig, moving target'].document));
+  document.command = 'rig', document.estimate = {heads: [], causes: [{name: 'head2.pan_scale', size: 0.004, sigmas: 2.4}, {name: 'head1.camera.fx', size: 0.001, sigmas: -6.1}]};
+  document.data = {};
+  const {page, close} = await open(url(document)), words = await page.locator('#fig-causes tbody tr').first().innerText();
+  assert.ok(words.includes('head1.camera.fx') && words.includes('6.1 σ'), words);
+  await close();
+}
+
 export const tests = {
+  'figures of a paper say what they draw': figuresSayWhatTheyDraw,
+  'causes of a rig have their scores': aRigsCausesHaveTheirScores,
   'first screen: verdict, values, one figure, the next step': theFirstScreenAnswers,
   'sigma is explained photo by photo': sigmaIsExplainedPhotoByPhoto,
   'what was assumed is said': whatWasAssumedIsSaid,

@@ -9,12 +9,12 @@ const expected = {
   rangefinder: ['estimate', 'beam', 'residuals', 'photo', 'precision', 'next', 'counts', 'all-photos'],
   rig: ['estimate', 'space', 'coverage', 'residuals', 'view', 'unknown'],
   track: ['path', 'position', 'error', 'innovations', 'estimate', 'above', 'age'],
-  servo: ['error', 'picture', 'angles', 'compare', 'robust', 'loops'],
+  servo: ['error', 'picture', 'angles', 'compare', 'robust', 'loops', 'lenses', 'focal'],
   identify: ['estimate', 'response', 'spread', 'checks'],
   'plan calibrate': ['estimate', 'plan', 'sketches'], 'plan observe': ['estimate', 'plan'], 'plan rangefinder': ['estimate', 'plan', 'sketches'],
   'rig, moving target': ['estimate', 'space', 'above', 'clocks'],
   localize: ['path', 'error', 'frame', 'tracks', 'nis', 'speed', 'estimate'],
-  reproduce: ['estimate', 'experiments', 'paper-4', 'methods'],
+  reproduce: ['estimate', 'experiments', 'paper-4', 'paper-6', 'paper-8', 'paper-table_2', 'methods'],
 };
 
 /** Ids of figures whose canvases have one colour only, and of those that do not draw as many marks as rows. */

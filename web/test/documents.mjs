@@ -18,11 +18,11 @@ export function base(command, more = {}) {
 
 export function servoDocument() {
   const {normal} = random(3), rows = 600, control = {t_s: [], head: [], event: []};
-  const names = ['asked_pan_rad', 'asked_tilt_rad', 'measured_pan_rad', 'measured_tilt_rad', 'predicted_pan_rad', 'predicted_tilt_rad', 'rate_pan_rad_s', 'rate_tilt_rad_s', 'error_u_px', 'error_v_px', 'sigma_error_u_px', 'sigma_error_v_px', 'in_picture'];
+  const names = ['asked_pan_rad', 'asked_tilt_rad', 'measured_pan_rad', 'measured_tilt_rad', 'predicted_pan_rad', 'predicted_tilt_rad', 'rate_pan_rad_s', 'rate_tilt_rad_s', 'error_u_px', 'error_v_px', 'sigma_error_u_px', 'sigma_error_v_px', 'in_picture', 'fx_px', 'sigma_fx_px', 'true_fx_px'];
   for (const name of names) control[name] = [];
   for (let i = 0; i < rows; ++i) {
-    const t = i / 60, head = 1 + (i % 2), pan = 0.4 * Math.sin(t), tilt = 0.2 * Math.cos(0.7 * t), sigma = 0.9 + 3 * Math.exp(-2 * t);
-    const values = [pan, tilt, pan - 0.01, tilt - 0.005, pan + 0.02, tilt + 0.01, 0.4 * Math.cos(t), -0.14 * Math.sin(0.7 * t), sigma * normal(), sigma * normal(), sigma, sigma, 1];
+    const t = i / 60, head = 1 + (i % 2), pan = 0.4 * Math.sin(t), tilt = 0.2 * Math.cos(0.7 * t), sigma = 0.9 + 3 * Math.exp(-2 * t), fx = 340 * Math.exp(0.14 * t);
+    const values = [pan, tilt, pan - 0.01, tilt - 0.005, pan + 0.02, tilt + 0.01, 0.4 * Math.cos(t), -0.14 * Math.sin(0.7 * t), sigma * normal(), sigma * normal(), sigma, sigma, 1, fx + 2 * normal(), 2, fx];
     control.t_s.push(round(t)), control.head.push(head), control.event.push(i === 240 ? 'lost' : '');
     names.forEach((name, k) => control[name].push(round(values[k])));
   }
@@ -32,10 +32,13 @@ export function servoDocument() {
       const value = rms * Math.exp(0.1 * normal());
       trials.controller.push(name), trials.seed.push(seed), trials.rms_px.push(round(value)), trials.p95_px.push(round(2 * value));
     }
+  const lenses = {intrinsics: [], seed: [], rms_px: [], p95_px: []};
+  for (const [name, rms] of [['given', 40], ['observed', 1.5], ['true', 1.4]])
+    for (let seed = 1; seed <= 8; ++seed) lenses.intrinsics.push(name), lenses.seed.push(seed), lenses.rms_px.push(round(rms * Math.exp(0.1 * normal()))), lenses.p95_px.push(round(2 * rms));
   const factors = [0.5, 0.7, 1, 1.4, 2], gain = [], tau = [], rms_px = [];
   for (const g of factors) for (const t of factors) gain.push(g), tau.push(t), rms_px.push(round(1.4 * (1 + 2 * Math.log(g) ** 2 + Math.log(t) ** 2)));
   return base('servo', {estimate: {controllers: {}, best: 'predictive', specification_px: 2},
-    data: {control, trials, loops: {controller: ['predictive', 'pid'], loop_gain: [1, 2], bandwidth_rad_s: [8, 5], phase_margin_deg: [61, 24], delay_samples: [3, 3], sampled_radius: [0.91, 0.97]}},
+    data: {control, trials, lenses, loops: {controller: ['predictive', 'pid'], loop_gain: [1, 2], bandwidth_rad_s: [8, 5], phase_margin_deg: [61, 24], delay_samples: [3, 3], sampled_radius: [0.91, 0.97]}},
     grids: {robustness: {cols: 5, rows: 5, u0_px: 0, v0_px: 0, du_px: 0, dv_px: 0, gain, tau, rms_px}}});
 }
 
@@ -70,7 +73,10 @@ export function reproduceDocument() {
   return base('reproduce', {verdict: {state: 'care', exit_code: 0, sentence: '2 of 3 claims come out as printed', to_add: null, checks: []},
     data: {experiments: {id: ['table1-rms', 'fig4-fx', 'fig5-time'], quantity: ['RMS of the position', 'error of fx after 20 s', 'time a step'], unit: ['mm', 'px', 'ms'], printed: [41.2, 0.8, null], ours: [40.7, 0.71, 3.1], best: [38.9, 0.28, 0.02], bound: [38.6, 0.26, null], ratio: [0.99, 0.89, null], state: ['good', 'good', 'care'],
       words: ['', '', 'another machine']},
-      methods: {experiment: ['table1', 'fig4'], title: ['Table 1', 'Figure 4'], method: ['Six boards, as printed.', 'Seeded draws.'], chosen: ['Readings of 1 mm.', '']}, fig_4: {t_s: t, ours_pan_deg: t.map((x) => round(Math.sin(x))), ours_fx_px: t.map((x) => round(700 + 10 * Math.exp(-x))), printed_fx_px: t.map((x, i) => (i % 8 === 0 ? round(700.4 + 10 * Math.exp(-x)) : null))}}});
+      methods: {experiment: ['table1', 'fig4'], title: ['Table 1', 'Figure 4'], method: ['Six boards, as printed.', 'Seeded draws.'], chosen: ['Readings of 1 mm.', '']}, figures: {id: ['4', '6', '8', 'table_2'], title: ['Angles', 'Spots', 'Errors', 'Table 2: three ways'], caption: ['Drawn: an angle and a focal length.', 'Left the picture, right the offsets.', 'Shares of spots.', 'Three rows.'], across: ['', '', 'error of the spot', ''], up: ['', '', 'share', '']},
+      fig_6: {range_m: [1, 2, 3], actual_u_px: [600, 640, 680], actual_v_px: [400, 380, 360], method_1_u_px: [600.3, 640.1, 679.6], method_1_v_px: [400.2, 379.9, 360.1], method_2_u_px: [602, 641, 677], method_2_v_px: [404, 379, 361], best_u_px: [600.1, 640, 680.1], best_v_px: [400, 380.1, 360]},
+      fig_8: {error_px: [0.5, 1.5, 2.5], method_1_percent: [60, 30, 10], method_1_optimised_percent: [70, 25, 5]},
+      fig_table_2: {label: ['method 1', 'method 2', 'ours'], printed_time_ms: [63, 106, null], ours_time_ms: [4, 5, 6]}, fig_4: {t_s: t, ours_pan_deg: t.map((x) => round(Math.sin(x))), ours_fx_px: t.map((x) => round(700 + 10 * Math.exp(-x))), printed_fx_px: t.map((x, i) => (i % 8 === 0 ? round(700.4 + 10 * Math.exp(-x)) : null))}}});
 }
 
 /** A calibration of so many photos of a 9 × 6 board; numbers are plausible, not solved. */

@@ -82,14 +82,29 @@ DataTable methods_table(const reproduce::PaperReport& report) {
   return {"methods", {{"experiment", ids}, {"title", titles}, {"method", methods}, {"chosen", chosen}}};
 }
 
+/// Of each figure, what it shows.
+DataTable figures_table(const reproduce::PaperReport& report) {
+  Texts ids, titles, captions, across, up;
+  for (const Experiment& experiment : report.experiments) {
+    for (const FigureTable& figure : experiment.figures) {
+      ids.push_back(figure.id);
+      titles.push_back(figure.title);
+      captions.push_back(figure.caption);
+      across.push_back(figure.across);
+      up.push_back(figure.up);
+    }
+  }
+  return {"figures", {{"id", ids}, {"title", titles}, {"caption", captions}, {"across", across}, {"up", up}}};
+}
+
 std::string cell_of(double value) { return std::isfinite(value) ? fmt::format("{:.6g}", value) : ""; }
 
 std::string figure_csv(const FigureTable& figure) {
-  std::string text;
+  std::string text = figure.labels.empty() ? "" : "label";
   for (const auto& [name, values] : figure.columns) text += (text.empty() ? "" : ",") + name;
   text += "\n";
   for (std::size_t row = 0; row < figure.columns.front().second.size(); ++row) {
-    std::string line;
+    std::string line = figure.labels.empty() ? "" : csv_cell(figure.labels[row]) + ",";
     for (const auto& [name, values] : figure.columns)
       line += (&values == &figure.columns.front().second ? "" : ",") + cell_of(values[row]);
     text += line + "\n";
@@ -124,9 +139,11 @@ void fill_reproduction(const reproduce::PaperReport& report, ResultDocument& doc
   document.estimate["claims"] = std::move(claims);
   document.data.push_back(experiments_table(report));
   document.data.push_back(methods_table(report));
+  document.data.push_back(figures_table(report));
   for (const Experiment& experiment : report.experiments) {
     for (const FigureTable& figure : experiment.figures) {
       DataTable table{"fig_" + figure.id, {}};
+      if (!figure.labels.empty()) table.columns.emplace_back("label", figure.labels);
       for (const auto& [name, values] : figure.columns) {
         Numbers numbers;
         for (const double value : values) numbers.push_back(short_number(value));

@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-/// Fills counts, `estimate.claims`, the tables `experiments` and `methods`, and fig_ID for each figure.
+/// Fills counts, `estimate.claims`, the tables `experiments`, `methods` and `figures`, and fig_ID for each figure.
 void fill_reproduction(const reproduce::PaperReport& report, ResultDocument& document);
 
 /// The data of every figure as CSV: file name and content; claims.csv first.

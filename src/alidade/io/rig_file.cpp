@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "alidade/io/camera_file.h"
+#include "alidade/io/intrinsics_file.h"
 #include "alidade/io/yaml_fields.h"
 
 namespace alidade {
@@ -171,7 +172,7 @@ RigHead head_of(const YAML::Node& node, std::size_t index, const std::filesystem
   const Fields fields(node, file.string(), fmt::format("heads[{}].", index));
   refuse_unknown_keys(fields,
                       {"id", "camera", "world_from_base", "pan_to_tilt_m", "tilt_to_cam_m", "cam_from_tilt",
-                       "axes_skew_rad", "encoder"},
+                       "axes_skew_rad", "encoder", "intrinsics"},
                       "a head");
   RigHead read;
   Head& head = read.head;
@@ -197,6 +198,14 @@ RigHead head_of(const YAML::Node& node, std::size_t index, const std::filesystem
   head.axes_skew_rad = angle_of(fields, "axes_skew_rad");
   if (fields.has("encoder")) head.encoder = encoder_of(node["encoder"], fields);
   return read;
+}
+
+/// `intrinsics`, a file of them over time, where a head's camera zooms.
+void read_lens_course_of(const YAML::Node& node, std::size_t index, const std::filesystem::path& file, Rig& rig) {
+  const Fields fields(node, file.string(), fmt::format("heads[{}].", index));
+  if (!fields.has("intrinsics")) return;
+  rig.lens_courses.resize(index + 1);
+  rig.lens_courses[index] = read_lens_course(file.parent_path() / fields.text("intrinsics"));
 }
 
 /// What a rig's covariance is: of the heads, or of heads and lenses where it names one of these.
@@ -233,6 +242,7 @@ Rig read_rig(const std::filesystem::path& file) {
     const YAML::Node node = heads[i];
     rig.heads.push_back(head_of(node, i, file));
     rig.encoder_errors.push_back(encoder_error_of(node, file.string(), i));
+    read_lens_course_of(node, i, file, rig);
     for (std::size_t k = 0; k < i; ++k) {
       if (rig.heads[k].head.id == rig.heads[i].head.id)
         refuse(file.string(), fmt::format("heads[{}].id", i), fmt::format("{} stands twice", rig.heads[i].head.id));

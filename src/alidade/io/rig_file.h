@@ -14,7 +14,7 @@ namespace alidade {
 
 /// Reads it. A camera's file name is relative to the rig's file; what is left out is zero or identity. Throws
 /// InputError: a key that is unknown, missing or no number, a quaternion that is no rotation, an encoder's angle that
-/// looks like degrees, two heads of one id, something that is no covariance.
+/// looks like degrees, two heads of one id, something that is no covariance. A head's `intrinsics` is read along.
 [[nodiscard]] Rig read_rig(const std::filesystem::path& file);
 
 }  // namespace alidade

@@ -19,11 +19,13 @@ using Numbers = std::vector<double>;
 constexpr double not_there = std::numeric_limits<double>::quiet_NaN();
 
 /// The columns of a row behind its time and head; of `control` and of servo.csv alike.
-constexpr std::size_t num_columns = 15;
+constexpr std::size_t num_columns = 18;
 constexpr std::array<const char*, num_columns> columns{
-    "asked_pan_rad",      "asked_tilt_rad", "measured_pan_rad", "measured_tilt_rad", "predicted_pan_rad",
-    "predicted_tilt_rad", "rate_pan_rad_s", "rate_tilt_rad_s",  "command_pan",       "command_tilt",
-    "error_u_px",         "error_v_px",     "sigma_error_u_px", "sigma_error_v_px",  "in_picture"};
+    "asked_pan_rad",     "asked_tilt_rad",     "measured_pan_rad", "measured_tilt_rad",
+    "predicted_pan_rad", "predicted_tilt_rad", "rate_pan_rad_s",   "rate_tilt_rad_s",
+    "command_pan",       "command_tilt",       "error_u_px",       "error_v_px",
+    "sigma_error_u_px",  "sigma_error_v_px",   "in_picture",       "fx_px",
+    "sigma_fx_px",       "true_fx_px"};
 
 std::array<double, num_columns> cells_of(const ServoRow& row) {
   const auto if_predicted = [&](double value) { return row.has_prediction ? value : not_there; };
@@ -41,7 +43,10 @@ std::array<double, num_columns> cells_of(const ServoRow& row) {
           row.error_px.y(),
           if_predicted(row.sigma_predicted_px.x()),
           if_predicted(row.sigma_predicted_px.y()),
-          row.is_in_picture ? 1.0 : 0.0};
+          row.is_in_picture ? 1.0 : 0.0,
+          row.lens.k[0],
+          row.lens.sigma[0],
+          row.true_lens[0]};
 }
 
 JsonValue figures_value(const ServoFigures& figures) {
@@ -123,6 +128,32 @@ DataTable loops_table(const ServoStudy& study) {
            {"sampled_radius", radius}}};
 }
 
+/// RMS by seed of each kind of knowledge of the lens.
+DataTable lenses_table(const ServoStudy& study, std::uint64_t first_seed) {
+  std::vector<std::string> names;
+  std::vector<std::int64_t> seeds;
+  Numbers rms, p95, most, share, z;
+  for (const LensComparison& compared : study.lenses) {
+    for (std::size_t i = 0; i < compared.trials.size(); ++i) {
+      names.emplace_back(lens_knowledge_name(compared.knowledge));
+      seeds.push_back(static_cast<std::int64_t>(first_seed + i));
+      rms.push_back(compared.trials[i].rms_px);
+      p95.push_back(compared.trials[i].p95_px);
+      most.push_back(compared.trials[i].max_px);
+      share.push_back(compared.trials[i].focal_share);
+      z.push_back(compared.trials[i].focal_z);
+    }
+  }
+  return {"lenses",
+          {{"intrinsics", names},
+           {"seed", seeds},
+           {"rms_px", rounded(std::move(rms), 4)},
+           {"p95_px", rounded(std::move(p95), 4)},
+           {"max_px", rounded(std::move(most), 4)},
+           {"focal_share", rounded(std::move(share), 6)},
+           {"focal_z", rounded(std::move(z), 4)}}};
+}
+
 /// Rows gain by gain, columns time constant by time constant.
 DataGrid robustness_grid(const ServoRobustness& robustness) {
   DataGrid grid;
@@ -164,6 +195,16 @@ void fill_servo(const ServoScenario& scenario, const ServoStudy& study, ResultDo
   for (const ServoComparison& compared : study.comparison)
     if (compared.controller == study.best)
       document.data.push_back(control_table(scenario.scene.heads, compared.shown.rows));
+  if (!study.lenses.empty()) {
+    estimate["intrinsics"] = JsonValue::object();
+    for (const LensComparison& compared : study.lenses) {
+      JsonValue value = figures_value(compared.figures);
+      value["focal_share"] = compared.figures.focal_share;
+      value["focal_z"] = compared.figures.focal_z;
+      estimate["intrinsics"][lens_knowledge_name(compared.knowledge)] = value;
+    }
+    document.data.push_back(lenses_table(study, study.trials.front().seed));
+  }
   const ServoTrack& track = study.track;
   if (!track.report.steps.empty())
     add_track_tables(track.sights, scenario.scene.heads, track.report, track.truth, document);

@@ -211,6 +211,34 @@ void read_search(const YAML::Node& root, const Fields& top, SearchConfig& config
   search.number("max_radius_deg", config.max_radius_rad, 0.1, 360.0, degree);
 }
 
+/// How the lenses zoom, and by which intrinsics the loop goes: an observer's where they do, if nothing is said.
+void read_lens(const YAML::Node& root, const Fields& top, ServoScene& scene) {
+  const Section section(root, top, "zoom", {"t_s", "factor"});
+  if (section.has("t_s") || section.has("factor")) {
+    ZoomProfile& zoom = scene.zoom;
+    zoom.t_s = section.fields().numbers("t_s");
+    zoom.factor = section.fields().numbers("factor");
+    const std::string times = section.fields().full("t_s"), factors = section.fields().full("factor");
+    if (zoom.t_s.empty() || zoom.t_s.size() != zoom.factor.size())
+      refuse(top.file(), factors, "must be as many numbers as t_s, one or more");
+    for (std::size_t i = 0; i < zoom.t_s.size(); ++i) {
+      if (i > 0 && !(zoom.t_s[i - 1] < zoom.t_s[i]))
+        refuse(top.file(), times, fmt::format("{} is not before {}", zoom.t_s[i - 1], zoom.t_s[i]));
+      if (!(zoom.factor[i] >= 0.01 && zoom.factor[i] <= 100.0))
+        refuse(top.file(), factors, fmt::format("{} is not between 0.01 and 100", zoom.factor[i]));
+    }
+    scene.intrinsics = LensKnowledge::observed;
+  }
+  if (top.has("intrinsics")) {
+    const auto knowledge = lens_knowledge_named(top.text("intrinsics"));
+    if (!knowledge)
+      refuse(top.file(), "intrinsics", fmt::format("'{}' is not one of given, observed, true", top.text("intrinsics")));
+    scene.intrinsics = *knowledge;
+  }
+  if (top.has("background_points"))
+    scene.background_points = static_cast<std::size_t>(Section::within(top, "background_points", 4, 200));
+}
+
 void read_robustness(const YAML::Node& root, const Fields& top, std::optional<RobustnessConfig>& robustness) {
   const Section section(root, top, "robustness", {"gain", "tau", "points"});
   RobustnessConfig config;
@@ -278,15 +306,18 @@ TargetPath read_recorded_path(const std::filesystem::path& file) {
 ServoScenarioFile read_servo_scenario(const std::filesystem::path& file) {
   const YAML::Node root = detail::load_yaml(read_file(file), file.string());
   const Fields top(root, file.string());
-  refuse_unknown_keys(
-      top,
-      {"rig", "target", "duration_s", "warm_up_s", "sample_period_s", "latency_s", "hidden_s", "plant", "mismatch",
-       "noise", "controllers", "pi", "predictive", "filter", "search", "seeds", "specification_px", "robustness"},
-      "a servo's scenario");
+  refuse_unknown_keys(top,
+                      {"rig",        "target",     "duration_s",       "warm_up_s", "sample_period_s",  "latency_s",
+                       "hidden_s",   "plant",      "mismatch",         "noise",     "controllers",      "pi",
+                       "predictive", "filter",     "search",           "seeds",     "specification_px", "robustness",
+                       "zoom",       "intrinsics", "background_points"},
+                      "a servo's scenario");
   ServoScenarioFile read;
   if (top.has("rig")) {
     read.rig = file.parent_path() / top.text("rig");
     const Rig rig = read_rig(read.rig);
+    if (!rig.lens_courses.empty())
+      refuse(read.rig.string(), "intrinsics", "is for `alidade track`; a scenario says `zoom` and `intrinsics` itself");
     read.scenario.scene.heads = rig.heads;
     read.scenario.scene.rig_errors = rig_uncertainty(rig);
   }
@@ -298,6 +329,7 @@ ServoScenarioFile read_servo_scenario(const std::filesystem::path& file) {
   read_search(root, top, read.scenario.config.search);
   read_timing(root, top, read.scenario);
   read_robustness(root, top, read.scenario.robustness);
+  read_lens(root, top, read.scenario.scene);
   return read;
 }
 
@@ -321,6 +353,10 @@ pi: {kp: 2, ki: 10, unit: px}    # command per error; of a rate plant 4/gain and
 predictive: {rate_gain_per_s: 8, command_weight: 2, range_m: 1}
 filter: {singer_tau_s: 0.4, sigma_deg_s2: [5, 20, 80, 320, 1280], memory_s: 0.5, gate: 20}
 search: {enabled: true, coast_s: 0.3, carry_s: 0.2, speed_deg_s: 57.3, turn_of_view: 0.7, max_radius_deg: 45.8}
+# zoom: {t_s: [3, 7], factor: [1, 3]}  # of all focal lengths, over time; straight in the logarithm between
+# intrinsics: observed           # the loop goes by: given (the rig's), observed (by an on-line observer), true; without a
+                                 # zoom given, with one observed
+# background_points: 24          # that stand still behind the target, for the observer
 seeds: 8
 specification_px: 10
 robustness: {gain: [0.8, 1.2], tau: [0.7, 1.3], points: 5}   # points: 0 leaves it out

@@ -107,7 +107,7 @@ DataTable measurements_table(std::span<const TargetSight> sights, std::span<cons
                                                   static_cast<double>(heads[sight.head].head.id)};
     for (std::size_t k = 0; k < names.size(); ++k) column[k].push_back(values[k]);
     accepted.push_back(step.accepted);
-    const auto ray = ray_in_world(heads[sight.head], sight.pan_tilt_rad, sight.px);
+    const auto ray = ray_in_world(heads[sight.head], sight);
     for (int i = 0; i < 3; ++i) {
       ray_origin[static_cast<std::size_t>(i)].push_back(ray ? ray->origin_in_world[i] : not_there);
       ray_direction[static_cast<std::size_t>(i)].push_back(ray ? ray->direction_in_world[i] : not_there);

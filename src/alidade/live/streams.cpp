@@ -132,7 +132,7 @@ std::string track_scene(std::int64_t t_ns, std::span<const RigHead> heads, const
     const Eigen::Vector3d place = cam_centre_in_world(heads[i].head, sight.pan_tilt_rad);
     scene.label(head_name(heads[i]), place, fmt::format("head {}", heads[i].head.id));
   }
-  const auto ray = ray_in_world(heads[sight.head], sight.pan_tilt_rad, sight.px);
+  const auto ray = ray_in_world(heads[sight.head], sight);
   if (ray) {
     const double length_m = step.has_belief ? 1.15 * (target - ray->origin_in_world).norm() : 2.0;
     const std::array<Eigen::Vector3d, 2> ends{ray->origin_in_world,

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "alidade/loop/lens_observer.h"
+#include "alidade/simulate/draws.h"
 #include "alidade/simulate/track.h"
 
 namespace alidade {
@@ -11,27 +13,28 @@ namespace {
 
 constexpr std::size_t most_on_their_way = 256;  // pictures taken and not yet known
 
+/// A picture of one head: the target, and what stands still.
+struct Picture {
+  HeadSight sight;
+  bool is_seen = false;
+  std::vector<Eigen::Vector2d> background;
+};
+
 /// Pictures of one head that are not yet known.
 class PictureQueue {
  public:
   explicit PictureQueue(double latency_s) : latency_s_(latency_s) {}
-  void take(const HeadSight& sight, bool is_seen) { ring_[num_taken_++ % ring_.size()] = {sight, is_seen}; }
-  /// The newest picture known by now that was not asked for before.
-  void deliver(double t_s, HeadServoInput& input) {
-    while (num_known_ < num_taken_) {
-      const Picture& next = ring_[num_known_ % ring_.size()];
-      if (next.sight.t_capture_s + latency_s_ > t_s + 1e-9) return;
-      input.sight.reset();
-      if (next.is_seen) input.sight = next.sight;
-      ++num_known_;
-    }
+  void take(Picture picture) { ring_[num_taken_++ % ring_.size()] = std::move(picture); }
+  /// The next picture that is known by now and was not asked for before; none: nullptr.
+  Picture* next(double t_s) {
+    if (num_known_ >= num_taken_) return nullptr;
+    Picture& picture = ring_[num_known_ % ring_.size()];
+    if (picture.sight.t_capture_s + latency_s_ > t_s + 1e-9) return nullptr;
+    ++num_known_;
+    return &picture;
   }
 
  private:
-  struct Picture {
-    HeadSight sight;
-    bool is_seen = false;
-  };
   std::array<Picture, most_on_their_way> ring_{};
   std::size_t num_taken_ = 0, num_known_ = 0;
   double latency_s_;
@@ -42,8 +45,8 @@ struct LoopedHead {
   SimulatedHead head;
   HeadServo servo;
   PictureQueue pictures;
-  Eigen::Vector2d centre_px;
-  double focal_px;
+  std::optional<LensObserver> observer;
+  LensNow lens;  ///< Of the newest picture that is known.
 };
 
 std::array<ServoAxis, 2> true_axes(const ServoScene& scene) {
@@ -52,14 +55,44 @@ std::array<ServoAxis, 2> true_axes(const ServoScene& scene) {
   return axes;
 }
 
+/// Points far away that stand still where a head will look: about the target, somewhere in the narrowest picture.
+std::vector<Eigen::Vector3d> background_of(const ServoScene& scene, const RigHead& head, std::uint64_t seed) {
+  constexpr double far_m = 1e4;
+  std::vector<Eigen::Vector3d> points;
+  Draws draws(seed);
+  Eigen::Vector4d narrowest = own_lens(head.camera).k;
+  narrowest.head<2>() *= std::max(1.0, scene.zoom.largest());
+  const Zoomed zoomed(head.camera, narrowest);
+  for (std::size_t tried = 0; points.size() < scene.background_points && tried < 100 * scene.background_points;
+       ++tried) {
+    const double t_s = draws.uniform(0.0, scene.duration_s), u = draws.uniform(0.0, head.camera.width_px - 1.0),
+                 v = draws.uniform(0.0, head.camera.height_px - 1.0);
+    const auto readings = aim(head.head, scene.path.at(t_s));
+    const auto ray = readings ? ray_in_world(head, *readings, zoomed.own_px({u, v})) : std::nullopt;
+    if (ray) points.emplace_back(ray->origin_in_world + far_m * ray->direction_in_world);
+  }
+  return points;
+}
+
 std::vector<LoopedHead> looped_heads(const ServoScene& scene, const ServoConfig& config, std::uint64_t seed) {
   std::vector<LoopedHead> looped;
   for (std::size_t i = 0; i < scene.heads.size(); ++i) {
     const RigHead& head = scene.heads[i];
-    const HeadTruth truth{head, true_axes(scene), scene.encoder_step_rad, scene.sigma_encoder_rad, scene.sigma_px};
+    const bool observes = scene.intrinsics == LensKnowledge::observed;
+    const std::uint64_t own_seed = 2 * seed + 1000003 * i;
+    HeadTruth truth{head, true_axes(scene), scene.encoder_step_rad, scene.sigma_encoder_rad, scene.sigma_px, {}};
+    if (observes) truth.background_in_world = background_of(scene, head, own_seed + 700001);
     const Eigen::Vector2d start = aim(head.head, scene.path.at(0.0)).value_or(Eigen::Vector2d::Zero());
-    looped.push_back({SimulatedHead(truth, start, 2 * seed + 1000003 * i), HeadServo(head, config),
-                      PictureQueue(scene.latency_s), centre_of(head.camera), focal_of(head.camera)});
+    looped.push_back({SimulatedHead(truth, start, own_seed),
+                      HeadServo(head, config),
+                      PictureQueue(scene.latency_s),
+                      {},
+                      own_lens(head.camera)});
+    if (observes) {
+      const double step_share = scene.encoder_step_rad / std::sqrt(12.0);
+      looped.back().observer.emplace(head, truth.background_in_world.size(),
+                                     std::hypot(scene.sigma_encoder_rad, step_share));
+    }
   }
   return looped;
 }
@@ -69,32 +102,73 @@ bool is_hidden(const ServoScene& scene, double t_s) {
                              [t_s](const auto& span) { return t_s >= span.first && t_s < span.second; });
 }
 
+/// What is known by now goes to the observer, and the newest of it to the servo.
+void deliver(const ServoScene& scene, LoopedHead& looped, double t_s, HeadServoInput& input) {
+  while (Picture* picture = looped.pictures.next(t_s)) {
+    input.sight.reset();
+    HeadSight& sight = picture->sight;
+    if (looped.observer) {
+      looped.observer->take(sight.t_capture_s, sight.pan_tilt_rad, picture->background);
+      sight.lens = looped.observer->lens();
+    }
+    if (scene.intrinsics != LensKnowledge::given) looped.lens = *sight.lens;
+    if (picture->is_seen) input.sight = sight;
+  }
+}
+
+/// Where the target truly is in the row's picture.
+void add_truth(const ServoScene& scene, const LoopedHead& looped, const Eigen::Vector3d& target, ServoRow& row) {
+  const auto where = looped.head.true_pixel(target);
+  row.true_lens = looped.head.intrinsics();
+  row.error_px = where ? Eigen::Vector2d(*where - row.true_lens.tail<2>())
+                       : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  row.is_in_picture = where && is_in_picture(scene.heads[row.head].camera, *where);
+}
+
 ServoRow step(const ServoScene& scene, LoopedHead& looped, double t_s, std::size_t head) {
   const Eigen::Vector3d target = scene.path.at(t_s);
+  looped.head.zoom_to(scene.zoom.at(t_s));
   ServoRow row;
   row.t_s = t_s;
   row.head = head;
   row.measured_rad = looped.head.read_encoders();
   const auto seen = looped.head.seen_pixel(target);
-  const auto where = looped.head.true_pixel(target);
   const bool is_seen = seen && !is_hidden(scene, t_s);
-  looped.pictures.take({t_s, row.measured_rad, seen.value_or(Eigen::Vector2d::Zero())}, is_seen);
+  Picture picture{
+      {t_s, row.measured_rad, seen.value_or(Eigen::Vector2d::Zero()), {}}, is_seen, looped.head.seen_background()};
+  if (scene.intrinsics == LensKnowledge::truth)
+    picture.sight.lens = LensNow{looped.head.intrinsics(), Eigen::Vector4d::Zero()};
+  looped.pictures.take(std::move(picture));
   HeadServoInput input{t_s, row.measured_rad, std::nullopt};
-  looped.pictures.deliver(t_s, input);
+  deliver(scene, looped, t_s, input);
   const HeadServoOutput output = looped.servo.step(input);
   looped.head.send(output.command);
   row.command = output.command;
   row.asked_rad = output.asked_rad;
   row.predicted_rad = output.predicted_rad;
   row.has_prediction = output.has_prediction;
-  row.sigma_predicted_px = looped.focal_px * output.sigma_rad;
+  row.lens = looped.lens;
+  row.sigma_predicted_px = looped.lens.k.head<2>().mean() * output.sigma_rad;
   row.rate_rad_s = looped.head.rates_rad_s();
   row.event = output.event;
-  row.error_px = where ? Eigen::Vector2d(*where - looped.centre_px)
-                       : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  add_truth(scene, looped, target, row);
   if (is_seen) row.seen_px = *seen;
-  row.is_in_picture = where && is_in_picture(scene.heads[head].camera, *where);
   return row;
+}
+
+/// How far the focal length that the loop has was off, and how that compares with its σ.
+void add_focal_errors(const ServoScene& scene, const std::vector<ServoRow>& rows, ServoFigures& figures) {
+  double share2 = 0.0, z2 = 0.0, num = 0.0;
+  for (const ServoRow& row : rows) {
+    if (row.t_s < scene.warm_up_s) continue;
+    const double off = row.lens.k[0] - row.true_lens[0];
+    share2 += std::pow(off / row.true_lens[0], 2);
+    if (row.lens.sigma[0] > 0.0) z2 += std::pow(off / row.lens.sigma[0], 2);
+    num += 1.0;
+  }
+  if (!(num > 0.0)) return;
+  figures.focal_share = std::sqrt(share2 / num);
+  figures.focal_z = std::sqrt(z2 / num);
 }
 
 ServoFigures figures_of(const ServoScene& scene, const std::vector<ServoRow>& rows) {
@@ -109,7 +183,8 @@ ServoFigures figures_of(const ServoScene& scene, const std::vector<ServoRow>& ro
     if (row.t_s < scene.warm_up_s) continue;
     const Camera& camera = scene.heads[row.head].camera;
     // Behind the camera: as wrong as can be, half a turn of pixels.
-    const double error = row.error_px.allFinite() ? row.error_px.norm() : 3.14 * focal_of(camera);
+    const double most = 3.14 * row.true_lens[0];
+    const double error = row.error_px.allFinite() ? std::min(most, row.error_px.norm()) : most;
     errors.push_back(error);
     sum2 += error * error;
     visible += row.is_in_picture ? 1u : 0u;
@@ -126,10 +201,23 @@ ServoFigures figures_of(const ServoScene& scene, const std::vector<ServoRow>& ro
   std::ranges::sort(errors);
   figures.p95_px = errors[static_cast<std::size_t>(0.95 * (count - 1.0))];
   figures.max_px = errors.back();
+  add_focal_errors(scene, rows, figures);
   return figures;
 }
 
+constexpr std::array<std::string_view, 3> knowledge_names{"given", "observed", "true"};
+
 }  // namespace
+
+std::string_view lens_knowledge_name(LensKnowledge knowledge) {
+  return knowledge_names[static_cast<std::size_t>(knowledge)];
+}
+
+std::optional<LensKnowledge> lens_knowledge_named(std::string_view name) {
+  for (std::size_t i = 0; i < knowledge_names.size(); ++i)
+    if (knowledge_names[i] == name) return static_cast<LensKnowledge>(i);
+  return std::nullopt;
+}
 
 ServoScene xiahou_servo_scene() {
   ServoScene scene;
@@ -170,11 +258,15 @@ ServoFigures put_together(const std::vector<ServoFigures>& runs) {
     all.num_lost += run.num_lost;
     all.num_found += run.num_found;
     all.search_s += run.search_s;
+    all.focal_share += run.focal_share * run.focal_share;
+    all.focal_z += run.focal_z * run.focal_z;
     maxima.push_back(run.max_px);
     p95.push_back(run.p95_px);
   }
   const auto count = static_cast<double>(runs.size());
   all.rms_px = std::sqrt(all.rms_px / count);
+  all.focal_share = std::sqrt(all.focal_share / count);
+  all.focal_z = std::sqrt(all.focal_z / count);
   all.central_third /= count;
   all.in_picture /= count;
   std::ranges::sort(maxima);

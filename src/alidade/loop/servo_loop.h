@@ -21,6 +21,12 @@ struct PlantMismatch {
   double gain = 1.0, tau = 1.0;
 };
 
+/// Which intrinsics the loop takes its pixels by: the rig's, whatever the lens does; those that an on-line observer
+/// tells of the pictures' background; the true ones.
+enum class LensKnowledge { given, observed, truth };
+[[nodiscard]] std::string_view lens_knowledge_name(LensKnowledge knowledge);  ///< given, observed, true
+[[nodiscard]] std::optional<LensKnowledge> lens_knowledge_named(std::string_view name);
+
 /// The closed loop of one target, two heads or more, and a controller on each. Pictures are taken, encoders read and
 /// commands sent each period; a picture is known `latency_s` after it was taken.
 struct ServoScene {
@@ -37,6 +43,9 @@ struct ServoScene {
   double sigma_encoder_rad = 0.0008726646259971648;
   double encoder_step_rad = 0.0;
   std::vector<std::pair<double, double>> hidden_s;  ///< From, to: no head sees the target.
+  ZoomProfile zoom;                                 ///< Of all heads' lenses.
+  LensKnowledge intrinsics = LensKnowledge::given;
+  std::size_t background_points = 24;  ///< That stand still where the heads look, for the observer.
 };
 
 /// The preset of C5: the rig, plant, target and noise of Xiahou, Chen & Wu, 2015.
@@ -52,6 +61,8 @@ struct ServoRow {
   bool is_in_picture = false;
   std::optional<Eigen::Vector2d> seen_px;  ///< What the head's picture told, with its noise.
   ServoEvent event = ServoEvent::none;
+  LensNow lens;                                         ///< That this picture will be taken by, or the rig's.
+  Eigen::Vector4d true_lens = Eigen::Vector4d::Zero();  ///< fx, fy, cx, cy. [px]
 };
 
 /// Figures of one run, or of several put together. Errors are distances |(u, v) − middle| at the periods, all heads.
@@ -64,6 +75,8 @@ struct ServoFigures {
   std::size_t num_lost = 0;    ///< How often a target that had been followed was lost…
   std::size_t num_found = 0;   ///< …and found again.
   double search_s = 0.0;       ///< Time spent searching, all heads.
+  double focal_share = 0.0;    ///< RMS error of fx as the loop has it, over the true one.
+  double focal_z = 0.0;        ///< The same over its σ; 0 where it states none.
 };
 
 struct ServoRun {

@@ -67,6 +67,12 @@ void add_checks(const ServoScenario& scenario, const ServoStudy& study, Verdict&
     add("lost", false,
         "lost " + std::to_string(best.num_lost) + " times, found again " + std::to_string(best.num_found) + " times",
         static_cast<double>(best.num_lost), 0.0, "times");
+  if (scenario.scene.intrinsics == LensKnowledge::observed) {
+    constexpr double most_z = 2.0;
+    add("observed focal length", best.focal_z <= most_z,
+        text_of(100.0 * best.focal_share) + " % off (RMS), " + text_of(best.focal_z) + " of its sigma", best.focal_z,
+        most_z, "sigma");
+  }
   for (const LoopCheck& loop : study.loops) {
     const double most = loop.delay_samples < 0 ? 0.995 : 0.98;  // one that was tried has a slow observer in it, too
     add("loop of " + std::string(controller_name(loop.controller)), loop.analysis.sampled_radius < most,
@@ -102,11 +108,40 @@ LoopCheck settling_of(const ServoScenario& scenario, ControllerKind kind) {
 
 }  // namespace
 
+namespace {
+
+std::vector<LensComparison> compare_lenses(const ServoScenario& scenario, const ServoStudy& study,
+                                           std::uint64_t first_seed, const Progress& progress) {
+  std::vector<LensComparison> lenses;
+  if (scenario.scene.zoom.is_still() && scenario.scene.intrinsics == LensKnowledge::given) return lenses;
+  ServoConfig config = scenario.config;
+  config.controller = study.best;
+  const auto num_seeds = static_cast<std::size_t>(scenario.num_seeds);
+  for (const LensKnowledge knowledge : {LensKnowledge::given, LensKnowledge::observed, LensKnowledge::truth}) {
+    LensComparison compared{knowledge, {}, {}};
+    ServoScene scene = scenario.scene;
+    scene.intrinsics = knowledge;
+    for (std::size_t i = 0; i < num_seeds; ++i) {
+      report_progress(progress, "lenses", lenses.size() * num_seeds + i, 3 * num_seeds);
+      compared.trials.push_back(run_servo(scene, config, first_seed + i).figures);
+    }
+    compared.figures = put_together(compared.trials);
+    lenses.push_back(std::move(compared));
+  }
+  return lenses;
+}
+
+}  // namespace
+
 std::vector<LoopCheck> check_loops(const ServoScenario& scenario) {
   std::vector<LoopCheck> loops;
   const ServoScene& scene = scenario.scene;
   const double focal_px = focal_of(scene.heads[0].camera);
-  const PiGains gains = scenario.config.pi.per_rad(focal_px);
+  PiGains gains = scenario.config.pi.per_rad(focal_px);
+  // A lens that zooms while the loop keeps its old focal length is that much more gain.
+  const double largest = scene.intrinsics == LensKnowledge::given ? scene.zoom.largest() : 1.0;
+  gains.kp *= largest;
+  gains.ki *= largest;
   for (const ControllerKind kind : scenario.controllers) {
     const bool is_pi = kind == ControllerKind::pi;
     const bool is_angle_plant = std::holds_alternative<AnglePlant>(scene.axes[0].plant);
@@ -117,8 +152,11 @@ std::vector<LoopCheck> check_loops(const ServoScenario& scenario) {
     const ServoPlant plant = scaled(scene.axes[0].plant, scene.mismatch.gain, scene.mismatch.tau);
     const double delay_s = scene.axes[0].command_delay_s + (is_pi ? scene.latency_s : 0.0);
     LoopCheck loop{kind, {}, 0.0, samples_in(delay_s, scene.period_s)};
-    loop.loop_gain = units_of_error_per_rad(scenario.config.pi.unit, focal_px) * radians_in(unit_of(plant));
-    loop.analysis = analysed(plant, gains, scene.period_s, loop.delay_samples);
+    const double factor = is_pi ? 1.0 : 1.0 / largest;  // what corrects feedforward looks at the encoder
+    loop.loop_gain =
+        units_of_error_per_rad(scenario.config.pi.unit, focal_px) * radians_in(unit_of(plant)) * largest * factor;
+    loop.analysis =
+        analysed(plant, {factor * gains.kp, factor * gains.ki, gains.unit}, scene.period_s, loop.delay_samples);
     loops.push_back(loop);
   }
   return loops;
@@ -150,6 +188,7 @@ ServoStudy study_servo(const ServoScenario& scenario, std::uint64_t first_seed, 
   study.best = std::ranges::min_element(study.comparison, {}, [](const ServoComparison& c) {
                  return c.figures.rms_px;
                })->controller;
+  study.lenses = compare_lenses(scenario, study, first_seed, progress);
   if (scenario.scene.heads.size() > 1) study.track = track_of(scenario.scene, best_of(study).shown);
   if (scenario.robustness) {
     const RobustnessConfig& grid = *scenario.robustness;

@@ -54,6 +54,13 @@ struct ServoComparison {
   ServoRun shown;        ///< Its first trial, row by row.
 };
 
+/// The best controller with each kind of knowledge of a lens that zooms, over the same seeds.
+struct LensComparison {
+  LensKnowledge knowledge;
+  std::vector<ServoFigures> trials;  ///< One a seed.
+  ServoFigures figures;              ///< Of all of them.
+};
+
 struct ServoStudy {
   std::vector<LoopCheck> loops;
   std::vector<ServoTrial> trials;
@@ -61,6 +68,7 @@ struct ServoStudy {
   ControllerKind best = ControllerKind::pi;
   ServoTrack track;                           ///< Of the best one's shown run; two heads or more.
   std::optional<ServoRobustness> robustness;  ///< Of the best.
+  std::vector<LensComparison> lenses;         ///< Where the lens zooms, or an observer tells of it; else none.
 };
 
 /// Is shown the rows of each controller's first trial as they come.

@@ -13,7 +13,6 @@ constexpr double zoom_gain = 33.4;  // χ²₄ at 10⁻⁶: what a change of K e
 constexpr int slip_patience = 15;   // frames until a point that slipped is met anew
 constexpr double slipped_variance = 25.0;
 constexpr double restart_after_s = 1.0;  // without a frame that fits
-constexpr double fine_enough = 1e-3;     // σ_f / f: the filter's linearisation is exact to rounding
 constexpr double better_by = 9.2;        // χ²₂ at 0.01
 constexpr int drift_window = 15;         // frames
 constexpr double finer_by = 0.75;        // of σ: what the filter gained since the last adjustment, before the next
@@ -95,7 +94,7 @@ bool HybridObserver::adjust_buffer() {
   drift_frames_ = 0;
   const CommonMatrix& P = filter_.covariance();
   const Eigen::Vector4d& k = filter_.camera().k;
-  is_coarse_ = std::max(std::sqrt(P(0, 0)) / k[0], std::sqrt(P(1, 1)) / k[1]) > fine_enough;
+  is_coarse_ = std::max(std::sqrt(P(0, 0)) / k[0], std::sqrt(P(1, 1)) / k[1]) > config_.fine_enough;
   adjusted_variance_ = P.diagonal().head<2>();
   frames_since_adjustment_ = 0;
   return true;

@@ -18,7 +18,9 @@ struct HybridConfig {
   std::size_t range_point = 0;
   double bootstrap_s = 1.0;
   std::size_t buffer_frames = 300;  ///< Kept for adjustments.
-  double zoom_px = 0.5;             ///< σ that a frame of zoom adds to each of fx, fy, cx, cy. [px]
+  /// σ_f / f below which frames are filtered, and a zoom followed, instead of all being adjusted together again.
+  double fine_enough = 1e-3;
+  double zoom_px = 0.5;  ///< σ that a frame of zoom adds to each of fx, fy, cx, cy. [px]
 };
 
 /// The default estimator of a rotating camera: a rotation bundle adjustment over the first second, adjusted again

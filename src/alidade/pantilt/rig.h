@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "alidade/pantilt/head.h"
+#include "alidade/pantilt/target_sight.h"
 
 namespace alidade {
 
@@ -23,6 +24,7 @@ struct Rig {
   /// were calibrated through. 0×0 where that is not told; each lens then has its own camera's covariance.
   Eigen::MatrixXd cov_with_lenses;
   std::vector<EncoderError> encoder_errors;  ///< One a head, or none.
+  std::vector<LensCourse> lens_courses;      ///< One a head, or none: of cameras that zoom.
 };
 
 }  // namespace alidade

@@ -118,7 +118,8 @@ RigUncertainty rig_uncertainty(const Rig& rig, double sigma_clock_s) {
 
 std::optional<RigErrorEffect> rig_error_effect(const Eigen::MatrixXd& factor, const TurnedHead& turned,
                                                const Camera& camera, const Eigen::Vector3d& point_in_world,
-                                               const Eigen::Vector3d& velocity_in_world) {
+                                               const Eigen::Vector3d& velocity_in_world,
+                                               const std::optional<SightLens>& lens) {
   const Eigen::Vector3d point_in_cam = turned.point_in_cam(point_in_world);
   const auto seen = project_with_jacobians(camera, point_in_cam);
   if (!seen) return std::nullopt;
@@ -126,6 +127,10 @@ std::optional<RigErrorEffect> rig_error_effect(const Eigen::MatrixXd& factor, co
   J.leftCols<num_head_params>() = seen->J_px_point * turned.J_point_head(point_in_cam);
   J.middleCols(num_head_params, seen->J_px_params.cols()) = seen->J_px_params;
   J.rightCols<1>() = seen->J_px_point * (turned.cam_from_world_rotation * velocity_in_world);
+  if (lens) {
+    J.middleCols<4>(num_head_params) *= lens->error_scale.asDiagonal();
+    J = Zoomed(camera, lens->k).ratio.asDiagonal() * J;
+  }
   RigErrorEffect effect(2, factor.cols());
   effect.noalias() = J.lazyProduct(factor);
   return effect;

@@ -32,10 +32,12 @@ struct RigUncertainty {
 [[nodiscard]] RigUncertainty rig_uncertainty(const Rig& rig, double sigma_clock_s = 0.0);
 
 /// ∂ pixel / ∂ u where a head (the one of `factor`) at these readings sees a point that moves so: a clock that lags by
-/// δ shows the target where it is δ later. None where the camera does not see it.
+/// δ shows the target where it is δ later. `lens`: the intrinsics that it is seen under, where these are not its own.
+/// None where the camera does not see it.
 [[nodiscard]] std::optional<RigErrorEffect> rig_error_effect(const Eigen::MatrixXd& factor, const TurnedHead& turned,
                                                              const Camera& camera,
                                                              const Eigen::Vector3d& point_in_world,
-                                                             const Eigen::Vector3d& velocity_in_world);
+                                                             const Eigen::Vector3d& velocity_in_world,
+                                                             const std::optional<SightLens>& lens = {});
 
 }  // namespace alidade

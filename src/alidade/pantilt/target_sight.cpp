@@ -4,6 +4,11 @@
 
 namespace alidade {
 
+std::optional<WorldRay> ray_in_world(const RigHead& rig_head, const TargetSight& sight) {
+  const Eigen::Vector2d own_px = sight.lens ? Zoomed(rig_head.camera, sight.lens->k).own_px(sight.px) : sight.px;
+  return ray_in_world(rig_head, sight.pan_tilt_rad, own_px);
+}
+
 std::optional<Eigen::Vector3d> TrueTrack::at(double time_s) const {
   constexpr double slack_s = 1e-9;
   if (t_s.empty() || !(time_s >= t_s.front() - slack_s) || !(time_s <= t_s.back() + slack_s)) return std::nullopt;

@@ -5,7 +5,17 @@
 #include <optional>
 #include <vector>
 
+#include "alidade/pantilt/head.h"
+#include "alidade/pantilt/lens_course.h"
+
 namespace alidade {
+
+/// Intrinsics that a sight was taken under, where they are not its head's own, and their σ in units of the σ that the
+/// rig's errors have of them (of fx, fy, cx, cy; both over the focal length).
+struct SightLens {
+  Eigen::Vector4d k = Eigen::Vector4d::Zero();
+  Eigen::Vector4d error_scale = Eigen::Vector4d::Ones();
+};
 
 /// One sight of the target: where a head's camera saw it, and what the encoders read at that instant.
 struct TargetSight {
@@ -15,11 +25,15 @@ struct TargetSight {
   Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   double sigma_px = 0.0;  ///< Of one coordinate of this sight; 0: that of all.
+  std::optional<SightLens> lens = {};
 };
 
 [[nodiscard]] inline double sigma_px_of(const TargetSight& sight, double of_all_px) {
   return sight.sigma_px > 0.0 ? sight.sigma_px : of_all_px;
 }
+
+/// What a sight looks along. None where the lens has no ray there.
+[[nodiscard]] std::optional<WorldRay> ray_in_world(const RigHead& rig_head, const TargetSight& sight);
 
 /// A target's true position at some times, in order of time.
 struct TrueTrack {

@@ -40,16 +40,43 @@ Eigen::Vector2d direction_error_rad(const RangefinderReport& report, const Range
   return tangent_basis(report.beam.direction_in_cam).transpose() * sample.scene.beam.direction_in_cam;
 }
 
-double reprojection_px(const RangefinderReport& report, const RangefinderSample& sample) {
+namespace {
+
+/// Readings at which beams are compared.
+std::vector<double> test_ranges_m() {
+  std::vector<double> ranges_m;
+  for (int i = 0; i < 36; ++i) ranges_m.push_back(0.5 + 0.1 * i);
+  return ranges_m;
+}
+
+double rms_of(const std::vector<double>& values) {
   double sum = 0.0;
-  constexpr int num_ranges = 36;
-  for (int i = 0; i < num_ranges; ++i) {
-    const double range_m = 0.5 + 0.1 * i;
+  for (const double value : values) sum += value * value;
+  return std::sqrt(sum / static_cast<double>(values.size()));
+}
+
+}  // namespace
+
+std::vector<double> spot_errors_px(const RangefinderReport& report, const RangefinderSample& sample) {
+  constexpr double not_seen_px = 1e3;
+  std::vector<double> errors;
+  for (const double range_m : test_ranges_m()) {
     const auto predicted = project(report.camera, point_at(report.beam, range_m));
     const auto truth = project(sample.scene.camera, point_at(sample.scene.beam, range_m));
-    sum += predicted && truth ? std::min(1e6, (*predicted - *truth).squaredNorm()) : 1e6;
+    errors.push_back(predicted && truth ? std::min(not_seen_px, (*predicted - *truth).norm()) : not_seen_px);
   }
-  return std::sqrt(sum / num_ranges);
+  return errors;
+}
+
+double reprojection_px(const RangefinderReport& report, const RangefinderSample& sample) {
+  return rms_of(spot_errors_px(report, sample));
+}
+
+double coordinate_error_m(const RangefinderReport& report, const RangefinderSample& sample) {
+  std::vector<double> errors;
+  for (const double range_m : test_ranges_m())
+    errors.push_back((point_at(report.beam, range_m) - point_at(sample.scene.beam, range_m)).norm());
+  return rms_of(errors);
 }
 
 }  // namespace alidade::reproduce

@@ -27,6 +27,10 @@ struct RangefinderSample {
 [[nodiscard]] double origin_error_m(const RangefinderReport& report, const RangefinderSample& sample);
 /// Truth minus estimate, in the tangent basis of the estimate. [rad]
 [[nodiscard]] Eigen::Vector2d direction_error_rad(const RangefinderReport& report, const RangefinderSample& sample);
+/// Distance of predicted and true spots at 0.5, 0.6, …, 4 m; 1000 px where one of them is not seen. [px]
+[[nodiscard]] std::vector<double> spot_errors_px(const RangefinderReport& report, const RangefinderSample& sample);
+/// RMS distance of the points that the beam has at these readings from the true ones. [m]
+[[nodiscard]] double coordinate_error_m(const RangefinderReport& report, const RangefinderSample& sample);
 /// RMS distance of predicted and true spots at 0.5, 0.6, …, 4 m, estimated camera and beam against the true ones. Where
 /// one of them is not seen it counts as 1000 px. [px]
 [[nodiscard]] double reprojection_px(const RangefinderReport& report, const RangefinderSample& sample);

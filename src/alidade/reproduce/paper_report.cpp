@@ -32,6 +32,13 @@ std::string_view holds_name(Holds holds) {
   return "";
 }
 
+FigureTable titled(FigureTable figure, std::string title, std::string caption, std::string up) {
+  figure.title = std::move(title);
+  figure.caption = std::move(caption);
+  figure.up = std::move(up);
+  return figure;
+}
+
 std::size_t PaperReport::count(Holds holds) const {
   std::size_t num = 0;
   for (const Experiment& experiment : experiments)

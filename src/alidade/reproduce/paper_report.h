@@ -42,9 +42,16 @@ struct Claim {
 /// Data of a figure: the first column goes across, the others up. Columns that begin with "printed" are the
 /// paper's, with "ours" its method's as we run it, with "best" our own's: names that scripts know.
 struct FigureTable {
-  std::string id;  ///< "4" of fig_4.
+  std::string id;  ///< "4" of fig_4; a table that is printed as one begins with "table".
   std::vector<std::pair<std::string, std::vector<double>>> columns;
+  std::string title = {};                ///< What is drawn.
+  std::string caption = {};              ///< How to read it, and where it is not the paper's.
+  std::string across = {}, up = {};      ///< Of the axes, without units; empty: by the columns' names.
+  std::vector<std::string> labels = {};  ///< Of the rows, where they are cases.
 };
+
+/// The same with its words.
+[[nodiscard]] FigureTable titled(FigureTable figure, std::string title, std::string caption, std::string up = {});
 
 struct Experiment {
   std::string id;      ///< "exp1"

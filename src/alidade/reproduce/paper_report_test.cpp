@@ -67,11 +67,19 @@ TEST(Papers, HaveClaimsWithNamesOfTheirOwnAndStopWhenTold) {
     EXPECT_FALSE(experiment.method.empty());
     for (const FigureTable& figure : experiment.figures) {
       EXPECT_TRUE(figures.insert(figure.id).second) << figure.id;
+      EXPECT_FALSE(figure.title.empty()) << figure.id;
+      EXPECT_FALSE(figure.caption.empty()) << figure.id;
+      if (!figure.labels.empty()) {
+        EXPECT_EQ(figure.labels.size(), figure.columns.front().second.size()) << figure.id;
+      }
       for (const auto& [name, values] : figure.columns)
         EXPECT_EQ(values.size(), figure.columns.front().second.size()) << name;
     }
     for (const Claim& claim : experiment.claims) EXPECT_TRUE(ids.insert(claim.id).second) << claim.id;
   }
+  for (const Experiment& experiment : report.experiments)
+    for (const Claim& claim : experiment.claims)
+      EXPECT_TRUE(claim.figure.empty() || figures.contains(claim.figure)) << claim.id;
   EXPECT_EQ(ids.size(), report.num_claims());
   config.progress = [](std::string_view, std::size_t, std::size_t) { return false; };
   for (const Paper& paper : papers()) EXPECT_THROW((void)paper.run(config), Interrupted) << paper.name;

@@ -15,7 +15,9 @@ inline const Eigen::Vector3d paper_target_cm(17.3, -31.4, 63.6);
 [[nodiscard]] Experiment xiahou_tracking(const ReproduceConfig& config);
 /// The same filter and ours on rigs as they are built.
 [[nodiscard]] Experiment xiahou_realistic(const ReproduceConfig& config);
-/// The servo loop.
+/// The loop as figure 2 prints it: what is fed back is the projected estimate.
+[[nodiscard]] Experiment xiahou_loop(const ReproduceConfig& config);
+/// The servo loop with measured pixels.
 [[nodiscard]] Experiment xiahou_servo(const ReproduceConfig& config);
 
 }  // namespace alidade::reproduce

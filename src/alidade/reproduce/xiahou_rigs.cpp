@@ -71,7 +71,12 @@ Experiment xiahou_realistic(const ReproduceConfig& config) {
     for (std::size_t i = 0; i < row.size(); ++i) figure.columns[i].second.push_back(row[i]);
     experiment.claims.push_back(std::move(claim));
   }
-  experiment.figures = {figure};
+  figure.labels = {"A: the paper's circle", "A2: heads as built", "B: a fast circle", "C: a manoeuvre"};
+  experiment.figures = {
+      titled(std::move(figure), "Error on rigs as they are built",
+             "RMS of the position; scenarios A, A2, B, C in their order, cases without a line between "
+             "them. The bound is the posterior Cramér–Rao bound.",
+             "error of the position")};
   return experiment;
 }
 

@@ -88,7 +88,8 @@ FigureTable trajectory_figure(const Track& track) {
     }
     figure.columns[7].second.push_back((track.estimate_cm[k] - track.truth_cm[k]).norm());
   }
-  return figure;
+  return titled(std::move(figure), "Trajectory and error of the filter in the paper's own simulation",
+                "One run, Q = I6: true coordinates, the paper's filter's, and the distance between them.", "position");
 }
 
 }  // namespace

@@ -61,7 +61,7 @@ Bearing ahead(const Bearing& bearing, double singer_tau_s, double dt_s) {
   return {x[0], x[1], x[2], bearing.sigma_rad};
 }
 
-void BearingAxis::start(double t_s, double angle_rad, double variance_rad2) {
+void BearingAxis::start(double t_s, double angle_rad, double variance_rad2, const LensEffect& effect) {
   t_s_ = t_s;
   for (std::size_t i = 0; i < num_agilities; ++i) {
     const double sigma = config_.sigma_rad_s2[i];
@@ -69,7 +69,9 @@ void BearingAxis::start(double t_s, double angle_rad, double variance_rad2) {
     const double rate = i + 1 == num_agilities ? config_.start_rate_rad_s
                                                : std::min(config_.start_rate_rad_s, sigma * config_.singer_tau_s);
     beliefs_[i].x = {angle_rad, 0.0, 0.0};  // after a jump no rate or acceleration is believed
-    beliefs_[i].P = Eigen::Vector3d(variance_rad2, rate * rate, sigma * sigma).asDiagonal();
+    beliefs_[i].P = Eigen::Vector3d(variance_rad2 + effect.squaredNorm(), rate * rate, sigma * sigma).asDiagonal();
+    with_lens_[i].setZero();
+    with_lens_[i].row(0) = -effect;  // state − belief: what the sight has too much
   }
   log_weights_.fill(0.0);
   weights_.fill(1.0 / num_agilities);
@@ -80,13 +82,18 @@ double BearingAxis::surprise(double t_s, double angle_rad, double variance_rad2,
   return nu * nu / (sigma * sigma + variance_rad2);
 }
 
-void BearingAxis::update(double t_s, double angle_rad, double variance_rad2) {
+void BearingAxis::update(double t_s, double angle_rad, double variance_rad2, const LensEffect& effect) {
   const SingerStep step(config_.singer_tau_s, t_s - t_s_);
   const double fade = std::exp(-(t_s - t_s_) / config_.memory_s);
   for (std::size_t i = 0; i < num_agilities; ++i) {
     Belief<3> belief = step.predicted(beliefs_[i], config_.sigma_rad_s2[i]);
-    const double nu = angle_rad - belief.x[0], S = belief.P(0, 0) + variance_rad2;
-    const Eigen::Vector3d K = belief.P.col(0) / S;
+    const Eigen::Matrix<double, 3, 2> with_lens = step.F * with_lens_[i];
+    // z = angle + effect u + n: the lens' errors u are not estimated, what they share with the state is kept.
+    const Eigen::Vector3d PHt = belief.P.col(0) + with_lens * effect.transpose();
+    const Eigen::RowVector2d CHt = with_lens.row(0) + effect;
+    const double nu = angle_rad - belief.x[0], S = PHt[0] + effect.dot(CHt) + variance_rad2;
+    const Eigen::Vector3d K = PHt / S;
+    with_lens_[i] = with_lens - K * CHt;
     belief.x += K * nu;
     belief.P -= K * K.transpose() * S;
     mirror_upper<3>(belief.P);
@@ -112,32 +119,36 @@ Bearing BearingAxis::at(double t_s) const {
   return {mean[0], mean[1], mean[2], std::sqrt(std::max(0.0, second_moment - mean[0] * mean[0]))};
 }
 
-SightUse BearingFilter::begin(double t_s, const Eigen::Vector2d& bearing_rad, double variance, SightUse as) {
+SightUse BearingFilter::begin(double t_s, const Eigen::Vector2d& bearing_rad, double variance,
+                              const std::array<LensEffect, 2>& effects, SightUse as) {
   for (std::size_t axis = 0; axis < 2; ++axis)
-    axes_[axis].start(t_s, bearing_rad[static_cast<Eigen::Index>(axis)], variance);
+    axes_[axis].start(t_s, bearing_rad[static_cast<Eigen::Index>(axis)], variance, effects[axis]);
   newest_s_ = t_s;
   has_started_ = true;
   num_gated_ = 0;
   return as;
 }
 
-SightUse BearingFilter::take(double t_capture_s, const Eigen::Vector2d& bearing_rad, double sigma_rad) {
+SightUse BearingFilter::take(double t_capture_s, const Eigen::Vector2d& bearing_rad, double sigma_rad,
+                             const std::array<LensEffect, 2>& effects) {
   const double variance = sigma_rad * sigma_rad;
-  if (!has_started_) return begin(t_capture_s, bearing_rad, variance, SightUse::started);
+  if (!has_started_) return begin(t_capture_s, bearing_rad, variance, effects, SightUse::started);
   if (!(t_capture_s > newest_s_)) return SightUse::late;
   const double gap_s = num_gated_ == 0 ? t_capture_s - newest_s_ : usual_gap_s_;
   bool is_expected = true;
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const double angle = bearing_rad[static_cast<Eigen::Index>(axis)];
-    if (!(axes_[axis].surprise(t_capture_s, angle, variance, gap_s) <= config_.gate)) is_expected = false;
+    const double with_lens = variance + effects[axis].squaredNorm();
+    if (!(axes_[axis].surprise(t_capture_s, angle, with_lens, gap_s) <= config_.gate)) is_expected = false;
   }
   if (!is_expected) {
     usual_gap_s_ = gap_s;
-    if (++num_gated_ >= config_.restart_after) return begin(t_capture_s, bearing_rad, variance, SightUse::restarted);
+    if (++num_gated_ >= config_.restart_after)
+      return begin(t_capture_s, bearing_rad, variance, effects, SightUse::restarted);
     return SightUse::gated;
   }
   for (std::size_t axis = 0; axis < 2; ++axis)
-    axes_[axis].update(t_capture_s, bearing_rad[static_cast<Eigen::Index>(axis)], variance);
+    axes_[axis].update(t_capture_s, bearing_rad[static_cast<Eigen::Index>(axis)], variance, effects[axis]);
   newest_s_ = t_capture_s;
   num_gated_ = 0;
   return SightUse::used;

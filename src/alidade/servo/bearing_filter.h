@@ -22,6 +22,10 @@ struct BearingFilterConfig {
   int restart_after = 2;          ///< Sights beyond the gate, one after the other: the target has jumped.
 };
 
+/// What an error of the lens, one σ of it, does to a bearing: of the focal length, of the principal point. These errors
+/// last: they are considered (Schmidt–Kalman), not averaged away. S. F. Schmidt, 1966.
+using LensEffect = Eigen::RowVector2d;
+
 struct Bearing {
   double angle_rad = 0.0, rate_rad_s = 0.0, acceleration_rad_s2 = 0.0;
   double sigma_rad = 0.0;  ///< Of the angle.
@@ -36,11 +40,11 @@ class BearingAxis {
  public:
   explicit BearingAxis(const BearingFilterConfig& config) : config_(config) {}
 
-  void start(double t_s, double angle_rad, double variance_rad2);
+  void start(double t_s, double angle_rad, double variance_rad2, const LensEffect& effect = LensEffect::Zero());
   /// Squared innovation over its variance, by the mixture. The variance is that of a sight `usual_gap_s` after the
-  /// last: waiting makes no jump believable.
+  /// last: waiting makes no jump believable. `variance_rad2` with all that a sight may be off.
   [[nodiscard]] double surprise(double t_s, double angle_rad, double variance_rad2, double usual_gap_s) const;
-  void update(double t_s, double angle_rad, double variance_rad2);
+  void update(double t_s, double angle_rad, double variance_rad2, const LensEffect& effect = LensEffect::Zero());
   /// The mixture at a time not before the last sight.
   [[nodiscard]] Bearing at(double t_s) const;
   /// How much each model is heard.
@@ -49,6 +53,7 @@ class BearingAxis {
  private:
   BearingFilterConfig config_;
   std::array<Belief<3>, num_agilities> beliefs_{};
+  std::array<Eigen::Matrix<double, 3, 2>, num_agilities> with_lens_{};  ///< Covariance of its error with the lens' u.
   std::array<double, num_agilities> log_weights_{}, weights_{};
   double t_s_ = 0.0;
 };
@@ -61,15 +66,18 @@ class BearingFilter {
   explicit BearingFilter(const BearingFilterConfig& config)
       : config_(config), axes_{BearingAxis(config), BearingAxis(config)} {}
 
-  /// A bearing at its capture time, both axes with this σ. Sights older than the last one are left out.
-  SightUse take(double t_capture_s, const Eigen::Vector2d& bearing_rad, double sigma_rad);
+  /// A bearing at its capture time, both axes with this σ, and what the lens' errors do to each. Sights older than the
+  /// last one are left out.
+  SightUse take(double t_capture_s, const Eigen::Vector2d& bearing_rad, double sigma_rad,
+                const std::array<LensEffect, 2>& effects = {LensEffect::Zero(), LensEffect::Zero()});
   [[nodiscard]] bool has_started() const { return has_started_; }
   [[nodiscard]] double newest_s() const { return newest_s_; }
   [[nodiscard]] std::array<Bearing, 2> at(double t_s) const { return {axes_[0].at(t_s), axes_[1].at(t_s)}; }
   void forget() { has_started_ = false; }
 
  private:
-  SightUse begin(double t_s, const Eigen::Vector2d& bearing_rad, double variance, SightUse as);
+  SightUse begin(double t_s, const Eigen::Vector2d& bearing_rad, double variance,
+                 const std::array<LensEffect, 2>& effects, SightUse as);
 
   BearingFilterConfig config_;
   std::array<BearingAxis, 2> axes_;

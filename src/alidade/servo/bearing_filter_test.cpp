@@ -95,5 +95,41 @@ TEST(BearingFilter, LeavesOutOneWildSightAndFollowsAJump) {
   EXPECT_EQ(filter.take((k + 1) * sight_period_s, {nan, nan}, sigma_rad), SightUse::gated);
 }
 
+/// A lens' error that lasts: σ of the filter holds with it counted, and falls far short without.
+TEST(BearingAxis, CountsWhatTheLensHasWrong) {
+  constexpr int num_runs = 400;
+  constexpr double of_focal_rad = 0.004, of_centre_rad = 0.006;
+  double counted = 0.0, left_out = 0.0;
+  for (std::uint64_t run = 0; run < num_runs; ++run) {
+    Draws draws(100 + run);
+    const double focal = draws.normal(), centre = draws.normal();
+    BearingFilterConfig config;
+    config.sigma_rad_s2.fill(0.5);
+    BearingAxis with(config), without(config);
+    double state[3] = {0.0, 0.0, 0.5 * draws.normal()};  // a target that moves as the model has it
+    const double dt = sight_period_s, a = dt / config.singer_tau_s;
+    for (int k = 0; k <= 60; ++k) {
+      const LensEffect effect(of_focal_rad * std::sin(0.2 * k), of_centre_rad);
+      const double z = state[0] + effect[0] * focal + effect[1] * centre + sigma_rad * draws.normal();
+      if (k == 0) {
+        with.start(0.0, z, sigma_rad * sigma_rad, effect);
+        without.start(0.0, z, sigma_rad * sigma_rad);
+      } else {
+        with.update(k * dt, z, sigma_rad * sigma_rad, effect);
+        without.update(k * dt, z, sigma_rad * sigma_rad);
+      }
+      if (k == 60) break;
+      state[0] += dt * state[1] + config.singer_tau_s * config.singer_tau_s * (a - 1.0 + std::exp(-a)) * state[2];
+      state[1] += config.singer_tau_s * (1.0 - std::exp(-a)) * state[2];
+      state[2] = std::exp(-a) * state[2] + 0.5 * std::sqrt(1.0 - std::exp(-2.0 * a)) * draws.normal();
+    }
+    const Bearing told = with.at(60 * dt), naive = without.at(60 * dt);
+    counted += std::pow((told.angle_rad - state[0]) / told.sigma_rad, 2) / num_runs;
+    left_out += std::pow((naive.angle_rad - state[0]) / naive.sigma_rad, 2) / num_runs;
+  }
+  EXPECT_NEAR(counted, 1.0, 3.0 * std::sqrt(2.0 / num_runs));
+  EXPECT_GT(left_out, 5.0);
+}
+
 }  // namespace
 }  // namespace alidade

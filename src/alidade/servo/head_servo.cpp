@@ -26,7 +26,8 @@ HeadServo::HeadServo(const RigHead& head, const ServoConfig& config)
       axes_{AxisController(config, config.axes[0], focal_px_), AxisController(config, config.axes[1], focal_px_)} {}
 
 std::optional<Eigen::Vector2d> HeadServo::bearing_of(const HeadSight& sight) const {
-  const auto ray = ray_in_world(head_, sight.pan_tilt_rad, sight.px);
+  const Eigen::Vector2d own_px = sight.lens ? Zoomed(head_.camera, sight.lens->k).own_px(sight.px) : sight.px;
+  const auto ray = ray_in_world(head_, sight.pan_tilt_rad, own_px);
   if (!ray) return std::nullopt;
   auto bearing = aim(head_.head, ray->origin_in_world + config_.range_m * ray->direction_in_world);
   if (!bearing) return std::nullopt;
@@ -37,11 +38,27 @@ std::optional<Eigen::Vector2d> HeadServo::bearing_of(const HeadSight& sight) con
   return bearing;
 }
 
+/// bearing = reading − (px − c) / f: by a σ of f, and by one of c.
+std::array<LensEffect, 2> HeadServo::lens_effects(const HeadSight& sight) const {
+  std::array<LensEffect, 2> effects{LensEffect::Zero(), LensEffect::Zero()};
+  if (!sight.lens) return effects;
+  const LensNow& lens = *sight.lens;
+  for (Eigen::Index axis = 0; axis < 2; ++axis) {
+    const double f = lens.k[axis], offset = (sight.px[axis] - lens.k[2 + axis]) / f;
+    effects[static_cast<std::size_t>(axis)] = {offset * lens.sigma[axis] / f, lens.sigma[2 + axis] / f};
+  }
+  return effects;
+}
+
 SightUse HeadServo::take(const HeadSight& sight) {
   const auto bearing = bearing_of(sight);
   if (!bearing || !bearing->allFinite()) return SightUse::late;
-  const SightUse use = filter_.take(sight.t_capture_s, *bearing, sigma_bearing_rad_);
-  if (use != SightUse::late) error_rad_ = -(sight.px - centre_px_) / focal_px_;  // pan > 0 left, tilt > 0 up
+  const Eigen::Vector2d centre_px = sight.lens ? Eigen::Vector2d(sight.lens->k.tail<2>()) : centre_px_;
+  const double focal_px = sight.lens ? sight.lens->k.head<2>().mean() : focal_px_;
+  const double sigma_rad =
+      sight.lens ? std::hypot(config_.sigma_px / focal_px, config_.sigma_encoder_rad) : sigma_bearing_rad_;
+  const SightUse use = filter_.take(sight.t_capture_s, *bearing, sigma_rad, lens_effects(sight));
+  if (use != SightUse::late) error_rad_ = -(sight.px - centre_px) / focal_px;  // pan > 0 left, tilt > 0 up
   return use;
 }
 

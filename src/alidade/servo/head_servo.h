@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "alidade/pantilt/head.h"
+#include "alidade/pantilt/lens_course.h"
 #include "alidade/servo/axis_controller.h"
 #include "alidade/servo/search.h"
 
@@ -16,6 +17,8 @@ struct HeadSight {
   double t_capture_s = 0.0;
   Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  /// Intrinsics of that picture, where they are not the head's own; their σ is counted.
+  std::optional<LensNow> lens = {};
 };
 
 struct HeadServoInput {
@@ -49,6 +52,7 @@ class HeadServo {
 
  private:
   SightUse take(const HeadSight& sight);
+  [[nodiscard]] std::array<LensEffect, 2> lens_effects(const HeadSight& sight) const;
   ServoEvent follow(const HeadServoInput& input);
   void ask_for_target(double t_effect_s, std::array<AxisInput, 2>& inputs) const;
   void ask_for_search(double t_effect_s, std::array<AxisInput, 2>& inputs) const;

@@ -85,10 +85,33 @@ Eigen::Vector3d TargetPath::at(double t_s) const {
   return start_m;
 }
 
+double ZoomProfile::at(double at_s) const {
+  if (t_s.empty()) return 1.0;
+  const auto after = std::ranges::lower_bound(t_s, at_s);
+  if (after == t_s.begin()) return factor.front();
+  if (after == t_s.end()) return factor.back();
+  const auto i = static_cast<std::size_t>(after - t_s.begin());
+  const double share = (at_s - t_s[i - 1]) / (t_s[i] - t_s[i - 1]);
+  return std::exp((1.0 - share) * std::log(factor[i - 1]) + share * std::log(factor[i]));
+}
+
+double ZoomProfile::largest() const { return factor.empty() ? 1.0 : std::ranges::max(factor); }
+
+bool ZoomProfile::is_still() const {
+  return std::ranges::all_of(factor, [](double one) { return one == 1.0; });
+}
+
 SimulatedHead::SimulatedHead(const HeadTruth& truth, const Eigen::Vector2d& pan_tilt_rad, std::uint64_t seed)
     : truth_(truth),
       axes_{standing(truth.axes[0], pan_tilt_rad.x()), standing(truth.axes[1], pan_tilt_rad.y())},
-      draws_(seed) {}
+      draws_(seed),
+      background_draws_(seed + 500009),
+      intrinsics_(own_lens(truth.head.camera).k) {}
+
+void SimulatedHead::zoom_to(double factor) {
+  intrinsics_ = own_lens(truth_.head.camera).k;
+  intrinsics_.head<2>() *= factor;
+}
 
 void SimulatedHead::send(const Eigen::Vector2d& command) {
   axes_[0].send(command.x());
@@ -113,7 +136,19 @@ Eigen::Vector2d SimulatedHead::read_encoders() {
 std::optional<Eigen::Vector2d> SimulatedHead::true_pixel(const Eigen::Vector3d& target_in_world) const {
   const auto seen = project(truth_.head, angles_rad(), target_in_world);
   if (!seen) return std::nullopt;
-  return seen->px;
+  return Zoomed(truth_.head.camera, intrinsics_).px(seen->px);
+}
+
+std::vector<Eigen::Vector2d> SimulatedHead::seen_background() {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  std::vector<Eigen::Vector2d> pixels;
+  for (const Eigen::Vector3d& point : truth_.background_in_world) {
+    const Eigen::Vector2d noise_px = truth_.sigma_px * background_draws_.normal2();
+    const auto px = true_pixel(point);
+    const bool is_there = px && is_in_picture(truth_.head.camera, *px + noise_px);
+    pixels.push_back(is_there ? Eigen::Vector2d(*px + noise_px) : Eigen::Vector2d::Constant(nan));
+  }
+  return pixels;
 }
 
 std::optional<Eigen::Vector2d> SimulatedHead::seen_pixel(const Eigen::Vector3d& target_in_world) {

@@ -34,6 +34,17 @@ struct TargetPath {
   [[nodiscard]] Eigen::Vector3d at(double t_s) const;
 };
 
+/// Focal lengths over time, as factors on a camera's own: straight in the logarithm between the times, still before and
+/// after. Without times they stand.
+struct ZoomProfile {
+  std::vector<double> t_s;  ///< Ascending.
+  std::vector<double> factor;
+
+  [[nodiscard]] double at(double at_s) const;
+  [[nodiscard]] double largest() const;
+  [[nodiscard]] bool is_still() const;
+};
+
 /// A head as it is: two axes that obey late and never quite as known, encoders that round and err, a camera with noise
 /// on the target's pixel.
 struct HeadTruth {
@@ -42,6 +53,7 @@ struct HeadTruth {
   double encoder_step_rad = 0.0;    ///< Of one count; 0: none.
   double sigma_encoder_rad = 0.0008726646259971648;
   double sigma_px = 0.5;
+  std::vector<Eigen::Vector3d> background_in_world;  ///< Points that stand still, far away.
 };
 
 /// It moves. Same seed, same noise. Allocates nothing once made.
@@ -56,13 +68,20 @@ class SimulatedHead {
   [[nodiscard]] std::optional<Eigen::Vector2d> true_pixel(const Eigen::Vector3d& target_in_world) const;
   /// The same with noise, where it is within the picture.
   [[nodiscard]] std::optional<Eigen::Vector2d> seen_pixel(const Eigen::Vector3d& target_in_world);
+  /// Where the background is in that picture, with noise; NaN: not in it.
+  [[nodiscard]] std::vector<Eigen::Vector2d> seen_background();
+  /// From now on the focal lengths are so many times the camera's own.
+  void zoom_to(double factor);
+  /// Intrinsics as they are.
+  [[nodiscard]] const Eigen::Vector4d& intrinsics() const { return intrinsics_; }
   [[nodiscard]] Eigen::Vector2d angles_rad() const;
   [[nodiscard]] Eigen::Vector2d rates_rad_s() const;
 
  private:
   HeadTruth truth_;
   std::array<DelayedAxis, 2> axes_;
-  Draws draws_;
+  Draws draws_, background_draws_;
+  Eigen::Vector4d intrinsics_;
 };
 
 /// A log as `alidade identify` reads it: one axis under steps of several sizes to both sides, or a chirp.

@@ -15,18 +15,26 @@ struct SightModel {
   TurnedHead turned;
   const Camera* camera;
   double variance_px2, variance_rad2;
+  std::optional<Zoomed> zoomed;  ///< Where the lens is not the camera's own.
 
-  SightModel(const RigHead& head, const Eigen::Vector2d& pan_tilt_rad, double sigma_px, double sigma_encoder_rad)
+  SightModel(const RigHead& head, const Eigen::Vector2d& pan_tilt_rad, double sigma_px, double sigma_encoder_rad,
+             const std::optional<SightLens>& lens = {})
       : turned(head.head, pan_tilt_rad),
         camera(&head.camera),
         variance_px2(sigma_px * sigma_px),
-        variance_rad2(sigma_encoder_rad * sigma_encoder_rad) {}
+        variance_rad2(sigma_encoder_rad * sigma_encoder_rad) {
+    if (lens) zoomed.emplace(head.camera, lens->k);
+  }
 
   /// R = σ_px² I + σ_enc² J Jᵀ, J by the readings, at the position.
   [[nodiscard]] std::optional<PositionSeen> operator()(const Eigen::Vector3d& position) const {
     const Eigen::Vector3d point_in_cam = turned.point_in_cam(position);
-    const auto seen = project_with_jacobians(*camera, point_in_cam);
+    auto seen = project_with_jacobians(*camera, point_in_cam);
     if (!seen) return std::nullopt;
+    if (zoomed) {
+      seen->px = zoomed->px(seen->px);
+      seen->J_px_point = zoomed->ratio.asDiagonal() * seen->J_px_point;
+    }
     const Eigen::Matrix2d J = seen->J_px_point * turned.J_point_readings(point_in_cam);
     PositionSeen result{seen->px, seen->J_px_point * turned.cam_from_world_rotation, variance_rad2 * J * J.transpose()};
     result.R.diagonal().array() += variance_px2;

@@ -120,7 +120,7 @@ void add_smoothed_error(TrackReport& report, const std::vector<bool>& counts, co
 
 /// The angles (pan, tilt) that an unturned head without offsets would have to look along a sight.
 std::optional<Eigen::Vector2d> angles_of_ray(const RigHead& head, const TargetSight& sight) {
-  const auto ray = ray_in_world(head, sight.pan_tilt_rad, sight.px);
+  const auto ray = ray_in_world(head, sight);
   if (!ray) return std::nullopt;
   const Eigen::Vector3d& d = ray->direction_in_world;
   return Eigen::Vector2d(-std::atan2(d.x(), d.z()), -std::atan2(d.y(), std::hypot(d.x(), d.z())));
@@ -312,7 +312,7 @@ std::vector<double> track_bound(std::span<const TargetSight> sights, std::span<c
       const RigHead& head = heads[sight.head];
       const double own = head.head.encoder.sigma_rad;
       const SightModel see(head, sight.pan_tilt_rad, sigma_px_of(sight, config.tracker.sigma_px),
-                           own > 0.0 ? own : config.tracker.sigma_encoder_rad);
+                           own > 0.0 ? own : config.tracker.sigma_encoder_rad, sight.lens);
       belief.x.head<3>() = *position;
       if (const auto seen = see(*position)) {
         const auto updated = iterated_update(belief, *seen, seen->z, see, {.max_iterations = 1});

@@ -186,7 +186,7 @@ class TrackEngine {
   /// Updates with the sight, where the gates let it: then `none`.
   TrackEvent use(Entry& now, TrackStep& step) const {
     const SightModel see(heads_[now.sight.head], now.sight.pan_tilt_rad, sigma_px_of(now.sight, config_.sigma_px),
-                         sigma_encoder(now.sight.head));
+                         sigma_encoder(now.sight.head), now.sight.lens);
     const Eigen::Vector3d position = now.filter.position();
     if (!is_in_range(see.depth_m(position))) return TrackEvent::depth;
     const auto expected = see(position);
@@ -194,7 +194,7 @@ class TrackEngine {
     const Filter prior = now.filter;
     if constexpr (Filter::considers) {
       const auto effect = rig_error_effect(config_.errors.factor[now.sight.head], see.turned, *see.camera, position,
-                                           now.filter.velocity());
+                                           now.filter.velocity(), now.sight.lens);
       if (!effect) return TrackEvent::depth;
       step.innovation = now.filter.expect(*expected, *effect, now.sight.px);
       step.has_innovation = true;
@@ -234,8 +234,8 @@ class TrackEngine {
   }
 
   [[nodiscard]] std::optional<Filter> begun(const TargetSight& earlier, const TargetSight& later) const {
-    const auto ray_a = ray_in_world(heads_[earlier.head], earlier.pan_tilt_rad, earlier.px);
-    const auto ray_b = ray_in_world(heads_[later.head], later.pan_tilt_rad, later.px);
+    const auto ray_a = ray_in_world(heads_[earlier.head], earlier);
+    const auto ray_b = ray_in_world(heads_[later.head], later);
     if (!ray_a || !ray_b) return std::nullopt;
     const auto met = nearest_to_rays(*ray_a, *ray_b);
     if (!met) return std::nullopt;

@@ -84,8 +84,8 @@ Fault why_no_start(std::span<const TargetSight> given, std::span<const RigHead> 
         std::abs(a.t_capture_s - b.t_capture_s) > config.tracker.together_s)
       continue;
     ++together;
-    const auto ray_a = ray_in_world(heads[a.head], a.pan_tilt_rad, a.px);
-    const auto ray_b = ray_in_world(heads[b.head], b.pan_tilt_rad, b.px);
+    const auto ray_a = ray_in_world(heads[a.head], a);
+    const auto ray_b = ray_in_world(heads[b.head], b);
     if (ray_a && ray_b && !nearest_to_rays(*ray_a, *ray_b)) ++parallel;
   }
   if (together == 0)

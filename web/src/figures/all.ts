@@ -35,7 +35,7 @@ import {reproduceFigure, reproduceMethods, reproduceShort, reproduceTable} from 
 import {residuals} from './residuals';
 import {rigCoverage, rigEstimate, rigResiduals, rigSpace, rigUnknown, rigView} from './rig';
 import {movingAbove, movingClocks, movingEstimate, movingSpace} from './rig_moving';
-import {servoAngles, servoCompare, servoError, servoLoops, servoPicture, servoRobust} from './servo';
+import {servoAngles, servoCompare, servoError, servoFocal, servoLenses, servoLoops, servoPicture, servoRobust} from './servo';
 import {trackAbove, trackAge, trackError, trackInnovations, trackPosition, trackSpace} from './track';
 import {trust} from './trust';
 import {undistorted} from './undistorted';
@@ -50,17 +50,19 @@ interface Page {
 
 const values: Figure = {...estimate, span: 8};
 const wide = (figure: Figure): Figure => ({...figure, span: 16});
+/** Half the width on a narrow first screen: a table with the bound beside each value needs it. */
+const even = (figure: Figure): Figure => ({...figure, narrow: 12});
 const half = (figure: Figure): Figure => ({...figure, span: 12});
 /** Of every page: what the answer rests on. */
 const grounds: Figure[] = [assumed, checks, causes, correlationMatrix];
 
 const byCommand: Record<string, Page> = {
   calibrate: {first: [values, wide(trust)], rest: [clusters, worstPhotos, poses, photo, half(residuals), half(lens), half(halves), half(undistorted), half(board), half(nextPhoto), allPhotos, ...grounds]},
-  observe: {first: [values, wide(observeIntrinsics)], rest: [clusters, observeMotion, observeNis, observeTracks, observeDirections, observePoints, ...grounds]},
-  rangefinder: {first: [{...values, note: 'camera frame, value ± 3σ'}, wide(rangefinderBeam)], rest: [clusters, rangefinderResiduals, rangefinderPhoto, rangefinderPrecision, rangefinderNext, rangefinderCounts, rangefinderShots, ...grounds]},
+  observe: {first: [{...values, narrow: 24}, {...wide(observeIntrinsics), narrow: 24}], rest: [clusters, observeMotion, observeNis, observeTracks, observeDirections, observePoints, ...grounds]},
+  rangefinder: {first: [even({...values, note: 'camera frame, value ± 3σ'}), even(wide(rangefinderBeam))], rest: [clusters, rangefinderResiduals, rangefinderPhoto, rangefinderPrecision, rangefinderNext, rangefinderCounts, rangefinderShots, ...grounds]},
   rig: {first: [{...rigEstimate, span: 11, narrow: 24}, {...rigSpace, span: 13, narrow: 24}], rest: [clusters, rigCoverage, rigResiduals, rigView, {...rigUnknown, span: 14}, assumed, checks, causes]},
   track: {first: [values, wide(trackSpace)], rest: [trackPosition, trackError, trackInnovations, {...trackAbove, span: 12}, {...trackAge, span: 12}, ...grounds]},
-  servo: {first: [{...servoCompare, span: 10}, servoError], rest: [servoAngles, servoPicture, half(servoRobust), half(servoLoops), trackSpace, trackPosition, assumed, checks]},
+  servo: {first: [{...servoCompare, span: 10}, servoError], rest: [servoLenses, servoFocal, servoAngles, servoPicture, half(servoRobust), half(servoLoops), trackSpace, trackPosition, assumed, checks]},
   localize: {first: [values, wide(localizeSpace)], rest: [half(localizeError), localizeFrame, half(localizeTracks), half(localizeNis), half(localizeSpeed), ...grounds]},
   identify: {first: [values, identifyResponse], rest: [identifySpread, clusters, ...grounds]},
   'plan calibrate': {first: [planEstimate, planCalibrate], rest: [planSketches, assumed, checks]},
@@ -75,8 +77,8 @@ function pageOf(doc: Doc): Page {
   if (doc.command.startsWith('reproduce')) {
     const tables = [...doc.tables.values()].filter((table) => table.name.startsWith('fig_') && table.rows > 0);
     // First the figure that tells most: one with ours beside the paper's.
-    const best = tables.find((table) => table.names.some((name) => name.startsWith('best_'))) ?? tables[0];
-    const main = best ? reproduceFigure(best) : null, others = tables.filter((table) => table !== best).map(reproduceFigure);
+    const best = tables.find((table) => !table.has('label') && !table.has('actual_u_px') && table.names.some((name) => name.startsWith('best_'))) ?? tables[0];
+    const main = best ? reproduceFigure(best, doc) : null, others = tables.filter((table) => table !== best).map((table) => reproduceFigure(table, doc));
     return {first: [{...reproduceShort, narrow: 24}, {...(main ?? reproduceMethods), span: 14, narrow: 24}], rest: [reproduceTable, ...others, ...(main ? [reproduceMethods] : []), half(estimate)]};
   }
   if (doc.command === 'rig' && (doc.table('cameras') || (doc.estimates.some((one) => one.path === 'cameras[0].id')))) return movingTarget;

@@ -18,7 +18,10 @@ function causesOf(doc: Doc): Cause[] {
       const at = `causes[${i}].members[${k}]`;
       members.push(`${doc.estimateText(`${at}.name`)} ${withSigma(doc.estimate(`${at}.value`), doc.estimate(`${at}.sigma`), doc.estimateText(`${at}.unit`))}`);
     }
-    found.push({name: doc.estimateText(`causes[${i}].name`), z: doc.estimate(`causes[${i}].z`), words: members.join(', ')});
+    // A rig tells the size alone; its σ is in the score.
+    const z = [doc.estimate(`causes[${i}].z`), doc.estimate(`causes[${i}].sigmas`)].find(Number.isFinite) ?? NaN, size = doc.estimate(`causes[${i}].size`);
+    if (members.length === 0 && Number.isFinite(size)) members.push(withSigma(size, Number.isFinite(z) && z !== 0 ? Math.abs(size / z) : NaN, ''));
+    found.push({name: doc.estimateText(`causes[${i}].name`), z, words: members.join(', ')});
   }
   return found.sort((a, b) => Math.abs(b.z) - Math.abs(a.z));
 }

@@ -102,22 +102,19 @@ interface Contender {
   rms: number[];
   p95: number[];
 }
-function contenders(trials: Table): Contender[] {
+function contenders(trials: Table, column: string): Contender[] {
   const by = new Map<string, Contender>();
   for (let i = 0; i < trials.rows; ++i) {
-    const name = trials.text('controller', i), one = by.get(name) ?? {name, rms: [], p95: []};
+    const name = trials.text(column, i), one = by.get(name) ?? {name, rms: [], p95: []};
     one.rms.push(trials.number('rms_px', i)), one.p95.push(trials.number('p95_px', i));
     by.set(name, one);
   }
   return [...by.values()].sort((a, b) => quantile(a.rms, 0.5) - quantile(b.rms, 0.5));
 }
 
-export const servoCompare: Figure = {
-  id: 'compare', title: 'Who does better?', note: 'RMS and 95 % over the same seeds, px', span: 10,
-  draw(host, doc) {
-    const trials = doc.table('trials');
-    if (!trials) return null;
-    const all = contenders(trials), spec = doc.estimate('specification_px'), ends = extent(trials.numbers('rms_px').filter((v) => v > 0), trials.numbers('p95_px').filter((v) => v > 0));
+/** RMS and 95 % of each, over the same seeds, best first; what the figure's words say of the first two. */
+function compare(host: HTMLElement, trials: Table, column: string, spec: number): {words: string} | null {
+    const all = contenders(trials, column), ends = extent(trials.numbers('rms_px').filter((v) => v > 0), trials.numbers('p95_px').filter((v) => v > 0));
     if (!ends) return null;
     legend(host, [{words: 'RMS of a seed', colour: 'var(--blue)', look: 'dot'}, {words: '95 % of a seed', colour: 'var(--orange)', look: 'square'}, {words: 'bar: 90 % of the seeds, line: median', colour: 'var(--soft)', look: 'band'}]);
     new Chart(host, {height: 80 + 62 * all.length, isFilling: true, label: `best: ${all[0]?.name}`}, (pen) => {
@@ -139,7 +136,49 @@ export const servoCompare: Figure = {
       });
     });
     const [first, second] = all, words = first && second ? `${first.name} has ${num(quantile(first.rms, 0.5), 3)} px RMS (median over seeds), ${second.name} ${num(quantile(second.rms, 0.5), 3)} px` : '';
-    return {marks: trials.rows, rows: trials.rows, tables: [trials], words, good: words ? `Here ${words}.` : undefined};
+    return {words};
+}
+
+export const servoCompare: Figure = {
+  id: 'compare', title: 'Who does better?', note: 'RMS and 95 % over the same seeds, px', span: 10,
+  draw(host, doc) {
+    const trials = doc.table('trials'), compared = trials && compare(host, trials, 'controller', doc.estimate('specification_px'));
+    if (!trials || !compared) return null;
+    return {marks: trials.rows, rows: trials.rows, tables: [trials], words: compared.words, good: compared.words ? `Here ${compared.words}.` : undefined};
+  },
+};
+
+/** A lens that zooms: the best controller by what its loop knows of it. */
+export const servoLenses: Figure = {
+  id: 'lenses', title: 'What does the loop know of the zoom?', note: 'RMS and 95 % over the same seeds, px', span: 10, isOptional: true,
+  draw(host, doc) {
+    const trials = doc.table('lenses'), compared = trials && compare(host, trials, 'intrinsics', doc.estimate('specification_px'));
+    if (!trials || !compared) return null;
+    return {marks: trials.rows, rows: trials.rows, tables: [trials], words: compared.words,
+      good: `The best controller, three times: given – the rig’s focal length, whatever the lens does; observed – told on-line by what stands still in the pictures; true. ${compared.words ? `Here ${compared.words}.` : ''}`};
+  },
+};
+
+export const servoFocal: Figure = {
+  id: 'focal', title: 'Which focal length does the loop go by?', note: 'px, ± 3σ', span: 14, isOptional: true,
+  draw(host, doc, selection) {
+    const control = doc.table('control');
+    if (!control || !control.tells('true_fx_px') || !doc.table('lenses')) return null;
+    let within = 0, known = 0;
+    control.numbers('fx_px').forEach((v, i) => {
+      const s = control.number('sigma_fx_px', i);
+      if (s > 0) ++known, (within += Number(Math.abs(v - control.number('true_fx_px', i)) <= 3 * s));
+    });
+    legend(host, [{words: 'the loop’s', colour: 'var(--blue)'}, {words: 'true', colour: 'var(--ink)', look: 'dash'}, ...(known ? [{words: '± 3σ', colour: 'var(--blue)', look: 'band' as const}] : [])]);
+    perHead(host, headsOf(control), (part, head) => {
+      const fx = head.column('fx_px'), sigma = head.column('sigma_fx_px'), truth = head.column('true_fx_px'), has = (i: number) => sigma[i]! > 0;
+      const off = fx.map((v, i) => 100 * (v / truth[i]! - 1)), band = sigma.map((s, i) => 300 * s / truth[i]!), limit = 1.15 * Math.max(quantile(off.map(Math.abs), 0.995), 1e-3);
+      new SeriesPlot(part, {t: head.t, selection, label: 'fx, px', xLabel: '', height: 158, isFilling: true, aria: 'focal length over time', bands: known ? [{low: fx.map((v, i) => (has(i) ? v - 3 * sigma[i]! : NaN)), high: fx.map((v, i) => (has(i) ? v + 3 * sigma[i]! : NaN)), colour: 'blue'}] : [],
+        lines: [{name: 'the loop’s', values: fx, colour: 'blue', width: 1.6}, {name: 'true', values: truth, colour: 'ink', dash: [6, 4], width: 1.3}], tip: (i) => [`fx ${num(fx[i]!, 5)} px, true ${num(truth[i]!, 5)} px`]});
+      new SeriesPlot(part, {t: head.t, selection, label: 'off by, %', xLabel: 'time, s', height: 150, isFilling: true, aria: 'error of the focal length', levels: [{value: 0, dash: []}], bands: known ? [{low: band.map((v) => -v), high: band, colour: 'blue'}] : [],
+        lines: [{name: 'off by', values: off, colour: 'blue', width: 1.3}], range: [-limit, limit], tip: (i) => [`${num(off[i]!, 3)} %, 3σ ${num(band[i]!, 3)} %`]});
+    });
+    return {marks: control.rows, rows: control.rows, tables: [control], words: '', good: known ? `Good: on the true one, and inside the band: ${percent(within, known, 1)} are (99.7 % expected).` : 'Without σ: not observed.'};
   },
 };
 

@@ -1,0 +1,121 @@
+#include "alidade/loop/lens_observer.h"
+
+#include <cmath>
+
+#include "alidade/observe/hybrid.h"
+
+namespace alidade {
+namespace {
+
+/// σ of intrinsics of which a camera file says none: an ordinary calibration's.
+constexpr double ordinary_focal_share = 0.003, ordinary_centre_px = 2.0;
+
+LensNow believed_at_first(const Camera& camera) {
+  LensNow now = own_lens(camera);
+  if (!(now.sigma.head<2>().minCoeff() > 0.0)) now.sigma.head<2>() = ordinary_focal_share * now.k.head<2>();
+  if (!(now.sigma.tail<2>().minCoeff() > 0.0)) now.sigma.tail<2>().setConstant(ordinary_centre_px);
+  return now;
+}
+
+HybridConfig observer_config(const RigHead& head, std::size_t num_points, const LensNow& first) {
+  HybridConfig config;
+  config.num_points = num_points;
+  config.scale.scale = 0.5 * head.camera.width_px;
+  config.scale.centre = {0.5 * (head.camera.width_px - 1), 0.5 * (head.camera.height_px - 1)};
+  config.start.k = config.scale.normalised_intrinsics(first.k);
+  config.start_is_given = true;
+  config.fine_enough = 2.0 * ordinary_focal_share;  // a calibrated lens may zoom as soon as there is an estimate
+  CommonPrior prior(config.start);
+  prior.sigma_k = first.sigma / config.scale.scale;
+  prior.says_k = {true, true, true, true};
+  config.prior = prior;
+  return config;
+}
+
+/// Spread of the angles that a camera was turned to, so far. [rad²]
+class TurnSpread {
+ public:
+  void add(const Eigen::Vector2d& pan_tilt_rad) {
+    ++num_;
+    const Eigen::Vector2d before = pan_tilt_rad - mean_rad_;
+    mean_rad_ += before / num_;
+    sum2_ += before.cwiseProduct(pan_tilt_rad - mean_rad_);
+  }
+  /// Readings with errors of this σ do so to the focal lengths (fx by pan, fy by tilt), as a share: all points of a
+  /// picture share the error, so that no number of points helps.
+  [[nodiscard]] Eigen::Vector2d variance_of_share(double sigma_rad) const {
+    return sigma_rad * sigma_rad * sum2_.cwiseMax(1e-12).cwiseInverse();
+  }
+
+ private:
+  double num_ = 0.0;
+  Eigen::Vector2d mean_rad_ = Eigen::Vector2d::Zero(), sum2_ = Eigen::Vector2d::Zero();
+};
+
+}  // namespace
+
+struct LensObserver::State {
+  RigHead head;
+  LensNow first, now;
+  HybridObserver observer;
+  double sigma_encoder_rad;
+  TurnSpread spread;
+  MotionReader reader{RotationSource::attitude, 0.5};
+  RotationRow row;
+  bool has_estimate = false;
+
+  State(const RigHead& of, std::size_t num_points, double sigma_rad)
+      : head(of),
+        first(believed_at_first(of.camera)),
+        now(first),
+        observer(observer_config(of, num_points, now)),
+        sigma_encoder_rad(sigma_rad) {}
+
+  /// Focal lengths as observed, their σ with the encoders' share: no more than was known before anything turned. The
+  /// principal point stays the camera's: what turns hardly tells it from the mounting, and a zoom by m makes m times as
+  /// much of what it was off by.
+  [[nodiscard]] LensNow lens_of(const IntrinsicsEstimate& estimate) const {
+    const LensNow own = own_lens(head.camera);
+    const Eigen::Vector2d f = estimate.values().head<2>(), sigma = estimate.sigma.head<2>(),
+                          known = first.sigma.head<2>().cwiseQuotient(first.k.head<2>());
+    const Eigen::Vector2d by_encoders = spread.variance_of_share(sigma_encoder_rad).cwiseMin(known.cwiseAbs2());
+    LensNow lens;
+    lens.k << f, own.k.tail<2>();
+    lens.sigma << (sigma.cwiseAbs2() + by_encoders.cwiseProduct(f.cwiseAbs2())).cwiseSqrt(), own.sigma.tail<2>();
+    return lens;
+  }
+};
+
+LensObserver::LensObserver(const RigHead& head, std::size_t num_points, double sigma_encoder_rad)
+    : state_(std::make_unique<State>(head, num_points, sigma_encoder_rad)) {}
+LensObserver::~LensObserver() = default;
+LensObserver::LensObserver(LensObserver&&) noexcept = default;
+LensObserver& LensObserver::operator=(LensObserver&&) noexcept = default;
+
+void LensObserver::take(double t_capture_s, const Eigen::Vector2d& pan_tilt_rad, std::span<const Eigen::Vector2d> px) {
+  State& own = *state_;
+  own.row.t_s = t_capture_s;
+  own.row.base_from_cam = world_from_cam(own.head.head, pan_tilt_rad).rotation;
+  own.spread.add(pan_tilt_rad);
+  own.row.px.clear();
+  const Zoomed zoomed(own.head.camera, own.now.k);
+  for (const Eigen::Vector2d& seen : px) {
+    // The observer's camera is without distortion: as the lens of the last picture would have it straightened.
+    const auto ray = is_seen(seen) ? unproject(own.head.camera, zoomed.own_px(seen)) : std::nullopt;
+    const bool is_ahead = ray && ray->z() > 0.0;
+    own.row.px.push_back(
+        is_ahead ? Eigen::Vector2d(own.now.k.head<2>().cwiseProduct(ray->hnormalized()) + own.now.k.tail<2>())
+                 : Eigen::Vector2d::Constant(not_seen));
+  }
+  const IntrinsicsEstimate estimate = own.observer.step(own.reader.next(own.row));
+  const bool is_believable = estimate.has_value && estimate.values().allFinite() && estimate.sigma.allFinite() &&
+                             estimate.fx > 0.0 && estimate.fy > 0.0;
+  if (!is_believable) return;  // it begins, or begins anew: the last lens goes on
+  own.now = own.lens_of(estimate);
+  own.has_estimate = true;
+}
+
+const LensNow& LensObserver::lens() const { return state_->now; }
+bool LensObserver::has_estimate() const { return state_->has_estimate; }
+
+}  // namespace alidade

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <span>
+
+#include "alidade/pantilt/head.h"
+#include "alidade/pantilt/lens_course.h"
+
+namespace alidade {
+
+/// The on-line observer of a head's lens: points of its pictures that stand still, and the encoders' readings, go
+/// through the hybrid observer (observe/hybrid.h) picture by picture; what comes out are the focal lengths of that
+/// picture, beside the camera's own principal point.
+class LensObserver {
+ public:
+  /// `head` with the camera that is believed at the start: its σ, or an ordinary one where it says none, is the prior.
+  /// `sigma_encoder_rad`: of a reading.
+  LensObserver(const RigHead& head, std::size_t num_points, double sigma_encoder_rad);
+  ~LensObserver();
+  LensObserver(LensObserver&&) noexcept;
+  LensObserver& operator=(LensObserver&&) noexcept;
+
+  /// Pixels of the points in the picture taken then, NaN: not seen. Pictures in order of capture.
+  void take(double t_capture_s, const Eigen::Vector2d& pan_tilt_rad, std::span<const Eigen::Vector2d> px);
+  /// As of the last picture; the camera's own before the first estimate.
+  [[nodiscard]] const LensNow& lens() const;
+  [[nodiscard]] bool has_estimate() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace alidade

@@ -195,7 +195,7 @@ class TurnedRun {
       photo.cam_from_world = fit_.bundle.cam_from_world[k];
       photo.turn_rad = angle_of(photo.cam_from_world);
       for (std::size_t j = 0; j < k; ++j) {
-        const double between = angle_of(photo.cam_from_world * fit_.bundle.cam_from_world[j].transpose());
+        const double between = angle_of(turn_between(fit_.bundle, j, k));
         report_.largest_turn_rad = std::max(report_.largest_turn_rad, between);
       }
     }

@@ -225,6 +225,7 @@ class TurnedRun {
       scatter = less;
     }
     note_fit();
+    for (std::size_t k = 0; k < scatter.z2.size(); ++k) photo_at(k).z2 = scatter.z2[k];
     report_.parallax = parallax_of(fit_);
     if (report_.parallax.photo_a >= 0) {
       report_.parallax.photo_a = tree_.photos[static_cast<std::size_t>(report_.parallax.photo_a)];

@@ -78,6 +78,37 @@ JsonValue photos_list(const TurnedReport& report, const MatchedPhotos& photos) {
   return list;
 }
 
+DataTable photos_table(const TurnedReport& report, const MatchedPhotos& photos) {
+  std::vector<std::string> reasons;
+  std::vector<bool> used;
+  std::vector<int> points;
+  std::vector<double> rms, z2;
+  for (const TurnedPhoto& photo : report.photos) {
+    used.push_back(photo.is_used);
+    reasons.push_back(photo.reason);
+    points.push_back(photo.num_points);
+    rms.push_back(photo.is_used ? photo.rms_px : not_seen);
+    z2.push_back(photo.is_used && photo.z2 > 0.0 ? photo.z2 : not_seen);
+  }
+  return {"photos",
+          {{"name", photos.names},
+           {"used", used},
+           {"reason", reasons},
+           {"points", points},
+           {"rms_px", rms},
+           {"cluster_z2", z2}}};
+}
+
+/// Photos have no clock: what a log has by the second says nothing.
+void drop_rates(std::vector<DataTable>& tables) {
+  for (DataTable& table : tables) {
+    if (table.name != "steps") continue;
+    std::erase_if(table.columns, [](const auto& column) {
+      return column.first.starts_with("omega_") || column.first == "weak_eigenvalue";
+    });
+  }
+}
+
 }  // namespace
 
 TurnedObservation observation_of(const TurnedReport& report, const MatchedPhotos& photos) {
@@ -105,6 +136,8 @@ void fill_turned(const TurnedReport& report, const MatchedPhotos& photos, const 
   for (std::size_t i = 0; i < photos.names.size(); ++i) {
     if (!report.photos[i].is_used) document.counts.skipped.push_back({photos.names[i], 0, report.photos[i].reason});
   }
+  drop_rates(document.data);
+  document.data.insert(document.data.begin(), photos_table(report, photos));
   document.estimate["photos"] = photos_list(report, photos);
   JsonValue& matches = document.estimate["matches"];
   matches["given"] = report.num_matches;
@@ -114,7 +147,7 @@ void fill_turned(const TurnedReport& report, const MatchedPhotos& photos, const 
   JsonValue& parallax = document.estimate["parallax"];
   parallax["z"] = report.parallax.z;
   parallax["rms_px"] = report.parallax.rms_px;
-  parallax["relative_per_rad"] = report.parallax.relative;
+  parallax["share_of_distance"] = report.parallax.relative;  // a radian of turn
 }
 
 }  // namespace alidade

@@ -28,7 +28,7 @@ PairMisfits misfits_of(const TurnedFit& fit) {
       const auto ray = turned_ray(bundle.camera, bundle.log_zoom[a], from.px);
       if (!ray) continue;
       TurnedPrediction seen;
-      const Eigen::Matrix3d b_from_a = bundle.cam_from_world[b] * bundle.cam_from_world[a].transpose();
+      const Eigen::Matrix3d b_from_a = turn_between(bundle, a, b);
       if (!predict_turned(bundle.camera, b_from_a, bundle.log_zoom[b], *ray, seen)) continue;
       misfits[{from.photo, to.photo}].push_back({seen.px - to.px, seen.J_ray * b_from_a.transpose()});
     }
@@ -79,8 +79,8 @@ ParallaxTest parallax_of(const TurnedFit& fit) {
       const Anisotropy each = along_lines(misfits, step);
       if (each.z > most.z) most = each;
     }
-    const Eigen::Matrix3d turn = fit.bundle.cam_from_world[static_cast<std::size_t>(photos.second)] *
-                                 fit.bundle.cam_from_world[static_cast<std::size_t>(photos.first)].transpose();
+    const Eigen::Matrix3d turn =
+        turn_between(fit.bundle, static_cast<std::size_t>(photos.first), static_cast<std::size_t>(photos.second));
     const double angle = std::acos(std::clamp(0.5 * (turn.trace() - 1.0), -1.0, 1.0));
     const double weight = static_cast<double>(misfits.size());
     // noise alone reaches three σ over so many directions

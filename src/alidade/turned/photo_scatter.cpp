@@ -39,7 +39,10 @@ ScatterCovariance scatter_covariance(const TurnedFit& fit, const Progress& progr
     const Eigen::MatrixXd cov_without = inverse_symmetric(information);
     const Camera6 change = root.matrixL().solve(Camera6(-(cov_without * without.gradient).head<num_camera>()));
     seen += change * change.transpose();
-    expected += whitened(TurnedInformation(cov_without.topLeftCorner<num_camera, num_camera>()) - scatter.cov_model);
+    const TurnedInformation cov_of_others = cov_without.topLeftCorner<num_camera, num_camera>();
+    const TurnedInformation of_model = whitened(TurnedInformation(cov_of_others - scatter.cov_model));
+    expected += of_model;
+    scatter.z2.push_back(of_model.trace() > 0.0 ? change.squaredNorm() / of_model.trace() : 1.0);
     sum += change.squaredNorm();
     sum2 += change.squaredNorm() * change.squaredNorm();
   }

@@ -76,7 +76,7 @@ std::vector<KeptMatch> explained_matches(const MatchedPhotos& photos, const Turn
     const int at_b = bundle_place[static_cast<std::size_t>(pair.photo_b)];
     if (at_a < 0 || at_b < 0) continue;
     const auto a = static_cast<std::size_t>(at_a), b = static_cast<std::size_t>(at_b);
-    const Eigen::Matrix3d b_from_a = bundle.cam_from_world[b] * bundle.cam_from_world[a].transpose();
+    const Eigen::Matrix3d b_from_a = turn_between(bundle, a, b);
     for (std::size_t m = 0; m < pair.matches.size(); ++m) {
       const auto px = [&](int photo, int feature) {
         return scale.normalised(photos.features[static_cast<std::size_t>(photo)][static_cast<std::size_t>(feature)]);

@@ -195,7 +195,7 @@ class TurnedRun {
       photo.cam_from_world = fit_.bundle.cam_from_world[k];
       photo.turn_rad = angle_of(photo.cam_from_world);
       for (std::size_t j = 0; j < k; ++j) {
-        const double between = angle_of(photo.cam_from_world * fit_.bundle.cam_from_world[j].transpose());
+        const double between = angle_of(turn_between(fit_.bundle, j, k));
         report_.largest_turn_rad = std::max(report_.largest_turn_rad, between);
       }
     }
@@ -225,6 +225,7 @@ class TurnedRun {
       scatter = less;
     }
     note_fit();
+    for (std::size_t k = 0; k < scatter.z2.size(); ++k) photo_at(k).z2 = scatter.z2[k];
     report_.parallax = parallax_of(fit_);
     if (report_.parallax.photo_a >= 0) {
       report_.parallax.photo_a = tree_.photos[static_cast<std::size_t>(report_.parallax.photo_a)];

@@ -28,6 +28,7 @@ struct TurnedPhoto {
   int num_points = 0;
   double rms_px = 0.0;                  ///< Per point.
   double turn_rad = 0.0;                ///< From the first photo that is used.
+  double z2 = 0.0;                      ///< What leaving it out changes, over what the model expects of that; squared.
   double zoom = 1.0, sigma_zoom = 0.0;  ///< Its focal length over the others', if it may have one of its own.
   Eigen::Matrix3d cam_from_world = Eigen::Matrix3d::Identity();
 };

@@ -22,6 +22,12 @@ struct TurnedBundle {
   std::vector<TurnedSight> sights;
 };
 
+/// The rotation from one photo's camera to another's.
+[[nodiscard]] inline Eigen::Matrix3d turn_between(const TurnedBundle& bundle, std::size_t from, std::size_t to) {
+  const Eigen::Matrix3d world_from_cam = bundle.cam_from_world[from].transpose();
+  return bundle.cam_from_world[to] * world_from_cam;
+}
+
 /// What is known of the camera before, as a normal distribution about `mean`.
 struct TurnedPrior {
   TurnedCamera mean = TurnedCamera::Zero();

@@ -93,7 +93,10 @@ Check focal_check(const TurnedReport& report) {
   const double sigma = 100.0 * std::sqrt(report.cov(0, 0)) / report.camera[0];
   Check check{"focal length", State::good, "σ of the focal length is " + text_of(sigma, 2) + " %", sigma, fine, "%",
               "intrinsics"};
-  if (sigma > fine) check.state = sigma > none ? State::bad : State::care;
+  if (sigma > fine) {
+    check.state = sigma > none ? State::bad : State::care;
+    check.text += ": take more photos, turned farther, up and down as well";
+  }
   return check;
 }
 

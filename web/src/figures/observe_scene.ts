@@ -35,6 +35,6 @@ export function observeScene(doc: Doc): ObserveScene | null {
   }
   if (Number.isFinite(from)) zooms.push({from, to: t[t.length - 1]!});
   const q = ['qx', 'qy', 'qz', 'qw'].map((name) => steps.numbers(`start_from_cam_${name}`));
-  return {steps, t, isRelative, events: events.slice(0, 400), zooms: zooms.filter((zoom) => zoom.to > zoom.from), timeLabel: isRelative ? 'time from the first row, s' : 'time, s',
+  return {steps, t, isRelative, events: events.slice(0, 400), zooms: zooms.filter((zoom) => zoom.to > zoom.from), timeLabel: doc.table('photos') ? 'photo, the first is 0' : isRelative ? 'time from the first row, s' : 'time, s',
     attitude: (i) => (q.every((one) => Number.isFinite(one[i]!)) ? rotationOf(q[0]![i]!, q[1]![i]!, q[2]![i]!, q[3]![i]!) : null)};
 }

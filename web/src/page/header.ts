@@ -12,7 +12,7 @@ const whatIsCounted: Record<string, string> = {
 
 function countsOf(doc: Doc): string[] {
   const parts: string[] = [], {used, given, dropped} = doc.counts;
-  const word = doc.command === 'rig' && doc.table('cameras') ? 'sights' : whatIsCounted[doc.command.split(' ')[0]!] ?? 'inputs';
+  const word = doc.command === 'rig' && doc.table('cameras') ? 'sights' : doc.command === 'observe' && doc.table('photos') ? 'photos' : whatIsCounted[doc.command.split(' ')[0]!] ?? 'inputs';
   if (used !== undefined && !/^(plan|simulate|camera) /.test(doc.command)) parts.push(`${used}${given !== undefined && given > used ? ` of ${given}` : ''} ${(given ?? used) === 1 ? word.replace(/s$/, '') : word} used`);
   const corners = doc.command === 'calibrate' ? doc.table('corners') : null;
   const rejected = corners ? corners.numbers('weight').filter((w) => w === 0).length : 0;

@@ -240,6 +240,35 @@ void heed_files(const Beam& beam, const Camera& camera, const std::vector<Projec
   heed_assumptions(run.document.assumed, verdict);
 }
 
+/// In which of focal lengths and centre the two are farther apart than calibrations of one camera are; empty: in none.
+std::string difference_of(const Camera& a, const Camera& b) {
+  if (a.width_px != b.width_px || a.height_px != b.height_px)
+    return fmt::format("its pictures are {}x{}, not {}x{}", b.width_px, b.height_px, a.width_px, a.height_px);
+  constexpr double sigmas = 5.0, usual_focal = 0.005, usual_centre_px = 5.0;  // of calibrations on two days
+  const std::array<const char*, 4> names{"fx", "fy", "cx", "cy"};
+  const Eigen::VectorXd first = params(a.lens), second = params(b.lens);
+  for (int i = 0; i < 4; ++i) {
+    const double variance = (knows_covariance(a) ? a.cov(i, i) : 0.0) + (knows_covariance(b) ? b.cov(i, i) : 0.0);
+    const double usual = i < 2 ? usual_focal * first[i] : usual_centre_px;
+    if (std::abs(second[i] - first[i]) > usual + sigmas * std::sqrt(variance))
+      return fmt::format("its {} is {:.5g} px, not {:.5g}", names[static_cast<std::size_t>(i)], second[i], first[i]);
+  }
+  return "";
+}
+
+/// A beam stands in the camera that it was calibrated with: through another one its pixels are elsewhere.
+void heed_other_camera(const std::filesystem::path& own, const std::filesystem::path& used, const Camera& camera,
+                       Verdict& verdict) {
+  if (own.empty() || own == used || !std::filesystem::exists(own)) return;
+  const std::string difference = difference_of(read_central_camera(own), camera);
+  Check check{.name = "camera", .text = "the camera is the one that the beam was calibrated with"};
+  if (!difference.empty()) {
+    check.state = State::care;
+    check.text = "this is not the camera that the beam was calibrated with: " + difference;
+  }
+  heed(check, "use " + own.string(), verdict);
+}
+
 ExitCode project_beam(const ProjectArgs& args, Run& run) {
   run.add_input("beam", args.beam);
   const BeamFile file = read_beam(args.beam);
@@ -277,6 +306,7 @@ ExitCode project_beam(const ProjectArgs& args, Run& run) {
   verdict.sentence = fmt::format("{} of {} point{} in the picture's model", num_seen, projected.size(),
                                  projected.size() == 1 ? "" : "s");
   heed_files(beam, camera, projected, run, verdict);
+  heed_other_camera(file.camera, camera_file, camera, verdict);
   return run.finish(verdict);
 }
 

@@ -203,42 +203,6 @@ RangefinderExtras extras_of(const RangefinderReport& report, std::span<const Sho
   return extras;
 }
 
-std::ptrdiff_t num_shots_with_board(std::span<const Shot> shots) {
-  return std::count_if(shots.begin(), shots.end(), [](const Shot& shot) { return shot.has_plane(); });
-}
-
-struct Solved {
-  RangefinderReport report;
-  Verdict verdict;
-  RangefinderConfig config;
-};
-
-bool is_of_another_unit(const Verdict& verdict) {
-  return std::any_of(verdict.checks.begin(), verdict.checks.end(),
-                     [](const Check& check) { return check.name == "scale" && check.state == State::refused; });
-}
-
-/// Where the answer rests on a scale of the readings that nobody told, that is estimated too, if the shots can tell.
-Solved solve(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points, const Camera& camera,
-             const RangefinderConfig& config, Run& run) {
-  Solved held{calibrate_rangefinder(shots, points, camera, config, run.progress), {}, config};
-  held.verdict = rangefinder_verdict(held.report, shots, config);
-  const bool no_beam = held.verdict.exit_code != ExitCode::ok && num_shots_with_board(shots) > 0;
-  if (const std::string cause = no_beam ? cause_of_misfit(shots, points, camera, config) : ""; !cause.empty()) {
-    held.verdict.sentence = cause;
-    held.verdict.to_add = "give each row the range of its own spot and board, in metres";
-    return held;
-  }
-  if (!wants_scale(held.report, config)) return held;
-  Solved free{{}, {}, config};
-  free.config.estimate_scale = free.config.scale_by_need = true;
-  free.report = calibrate_rangefinder(shots, points, camera, free.config, run.progress);
-  free.verdict = rangefinder_verdict(free.report, shots, free.config);
-  // Readings in another unit have a scale, but that is no answer.
-  const bool is_told = free.verdict.exit_code == ExitCode::ok || is_of_another_unit(free.verdict);
-  return is_told ? free : held;
-}
-
 ExitCode rangefinder(const RangefinderArgs& args, Run& run) {
   if (args.method == "edges") return align_scan({args.shots, args.camera, args.photo, args.start}, run);
   if (!args.photo.empty() || !args.start.empty()) throw UsageError("--photo and --start are for --method edges");
@@ -264,7 +228,7 @@ ExitCode rangefinder(const RangefinderArgs& args, Run& run) {
   run.document.counts.given = file.skipped.size();
   run.document.counts.skipped = file.skipped;
   const std::vector<Eigen::Vector3d> points = board ? points_in_board(*board) : std::vector<Eigen::Vector3d>{};
-  auto [report, verdict, config] = solve(shots, points, camera, asked, run);
+  auto [report, verdict, config] = solve_rangefinder(shots, points, camera, asked, run.progress);
   run.lap("solve");
   summarize(report, shots, config, run);
   run.document.estimate["camera"] = camera_values(report.camera);  // that the beam belongs to

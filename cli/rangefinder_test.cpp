@@ -127,6 +127,26 @@ TEST_F(RangefinderCommand, ProjectSaysWhereAFileHasNoCovariance) {
   EXPECT_GT((*assumption(bare, "camera.cx"))["moves"], 0.5);
 }
 
+TEST_F(RangefinderCommand, ProjectNamesAnotherCamera) {
+  simulate();
+  ASSERT_EQ(calibrate({"--no-report"}).code, 0);
+  const auto projected = [&](const std::string& camera) {
+    return Json::parse(alidade({"project", "--beam", path("out/rangefinder.yaml"), "--camera", camera, "--range", "2",
+                                "--json", "--no-report", "--out", path("projected")})
+                           .out)["verdict"];
+  };
+  // The file that the beam was refined from is of the same camera.
+  EXPECT_EQ(projected(path("sim/camera.yaml"))["state"], "good");
+  std::string camera = read_file(path("out/camera.yaml"));
+  const std::size_t at = camera.find("cx:");
+  camera.replace(at, camera.find('\n', at) - at, "cx: 700");
+  write_file(path("other.yaml"), camera);
+  const Json other = projected(path("other.yaml"));
+  EXPECT_EQ(other["state"], "care");
+  EXPECT_NE(other.dump().find("not the camera that the beam was calibrated with: its cx is 700 px"), std::string::npos)
+      << other;
+}
+
 TEST_F(RangefinderCommand, PointsToTheCornersWhereNobodyHasThePhotos) {
   simulate();
   const std::vector<std::string> arguments{"rangefinder", path("sim/shots.csv"),

@@ -30,6 +30,7 @@ struct RigArgs {
   double sigma_px = 0.0, sigma_angle_rad = 0.0, sigma_square_m = 0.0, sigma_scale = 0.0;
   bool scales = false, skip_bad = false;
   std::string outliers = "drop";
+  std::vector<std::string> estimate{"auto"};
   MovingTargetArgs moving;
 };
 
@@ -41,6 +42,18 @@ RigConfig config_from(const RigArgs& args) {
   if (args.sigma_scale > 0.0) config.sigma_scale = args.sigma_scale;
   config.square_m = args.board.square_m;
   config.estimate_scales = args.scales;
+  for (const std::string& what : args.estimate) {
+    if ((what == "auto" || what == "none") && args.estimate.size() > 1)
+      throw UsageError("--estimate: '" + what + "' stands alone");
+    config.estimate_by_need |= what == "auto";
+    config.estimate_scales |= what == "scale";
+    config.estimate_once |= what == "once";
+    config.estimate_backlash |= what == "backlash";
+    config.estimate_focal |= what == "focal";
+    config.estimate_centre |= what == "centre";
+  }
+  if (config.estimate_scales && config.sigma_scale)
+    throw UsageError("scales that are estimated have no --sigma-scale; give one of them");
   config.reject_outliers = args.outliers == "drop";
   return config;
 }
@@ -140,6 +153,8 @@ void summarize(std::span<const HeadView> views, const RigReport& report, bool is
     run.say(fmt::format("  camera at ({:.2f}, {:.2f}, {:.2f}) ± ({:.2g}, {:.2g}, {:.2g}) mm from the tilt axis",
                         1e3 * arm.x(), 1e3 * arm.y(), 1e3 * arm.z(), 1e3 * sigma[9], 1e3 * sigma[10], 1e3 * sigma[11]));
   }
+  for (const RigFreed& one : report.freed)
+    run.say(fmt::format("estimated too: {} {:.5g} ± {:.2g}", one.name, one.value, 3.0 * one.sigma));
   run.say(fmt::format("{} of {} views; χ²/dof {:.3f}, rms {:.3f} px; σ of a reading {:.3g}° ({})", report.views_used,
                       report.views.size(), report.chi2_per_dof(), report.rms_px, report.sigma_encoder_rad / degree,
                       report.sigma_encoder_is_told ? "told by the residuals"
@@ -221,7 +236,15 @@ void add_rig(Frame& frame) {
       command
           .add_option("--sigma-scale", args->sigma_scale, "σ of the encoders' scales (0.001: 0.1 %), counted as well")
           ->check(positive_number());
-  command.add_flag("--scales", args->scales, "Estimate the scale of each encoder as well")->excludes(sigma_scale);
+  command.add_flag("--scales", args->scales, "Estimate the scale of each encoder as well (--estimate scale)")
+      ->excludes(sigma_scale);
+  command
+      .add_option("--estimate", args->estimate,
+                  "auto: what the residuals ask for, and scales that nobody told; none; or any of scale, once (an error "
+                  "of one period a turn), backlash (views in the order they were taken), focal, centre (of each lens)")
+      ->check(CLI::IsMember({"auto", "none", "scale", "once", "backlash", "focal", "centre"}))
+      ->delimiter(',')
+      ->capture_default_str();
   command.add_option("--outliers", args->outliers, "drop: leave out views that contradict the others, by name; keep")
       ->check(CLI::IsMember({"drop", "keep"}))
       ->capture_default_str();

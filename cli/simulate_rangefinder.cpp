@@ -24,7 +24,11 @@ struct SimulateRangefinderArgs {
   int shots = 18;
   double sigma_range_m = 0.002, scale = 1.0;
   ShotNoise noise;
-  bool photos = false, photos_off = false;
+  ShotMistake mistake;
+  std::string unit = "m";
+  int stickers = 0, jpeg = 0;
+  double speckle = 0.0;
+  bool photos = false, photos_off = false, bayer = false;
 };
 
 std::string row_name(std::size_t i) { return fmt::format("shot_{:03}.png", i + 1); }
@@ -53,6 +57,10 @@ void add_photos(const SimulateRangefinderArgs& args, const RangefinderScene& sce
   spots.beam_direction_in_cam = scene.beam.direction_in_cam;
   for (const double range_m : scene.range_m) spots.range_m.push_back(scene.beam.scale * range_m);
   SpotPhotoConfig config;
+  config.speckle = args.speckle;
+  config.is_bayer = args.bayer;
+  config.jpeg_quality = args.jpeg;
+  config.num_stickers = args.stickers;
   config.laser.colour = args.laser == "green" ? LaserColour::green : LaserColour::red;
   const auto add = [&](std::size_t i, bool is_on, const std::string& name) {
     config.is_on = is_on;
@@ -70,15 +78,24 @@ std::string table_of(const SimulateRangefinderArgs& args, const std::vector<Shot
   if (!args.photos) return shots_csv(shots, true);
   std::string text = args.photos_off ? "range_m,photo,photo_off\n" : "range_m,photo\n";
   for (std::size_t i = 0; i < shots.size(); ++i) {
-    text += fmt::format("{:.6f},{}", shots[i].range_m, row_name(i));
+    text += fmt::format("{:.9g},{}", shots[i].range_m, row_name(i));
     text += args.photos_off ? ",off_" + row_name(i) + "\n" : "\n";
   }
   return text;
 }
 
+ShotMistake mistake_of(const SimulateRangefinderArgs& args) {
+  ShotMistake mistake = args.mistake;
+  for (const auto& [name, metres] :
+       {std::pair{"mm", 0.001}, std::pair{"cm", 0.01}, std::pair{"inch", 0.0254}, std::pair{"feet", 0.3048}})
+    if (args.unit == name) mistake.unit_m = metres;
+  return mistake;
+}
+
 ExitCode simulate_rangefinder(const SimulateRangefinderArgs& args, Run& run) {
   const RangefinderScene scene = scene_of(args, run);
   SimulatedShots simulated = simulate_shots(scene, args.noise, run.options.seed);
+  simulated.shots = mistaken_shots(std::move(simulated.shots), mistake_of(args));
   std::vector<BoardView> views;
   for (std::size_t i = 0; i < simulated.shots.size(); ++i) {
     Shot& shot = simulated.shots[i];
@@ -90,7 +107,8 @@ ExitCode simulate_rangefinder(const SimulateRangefinderArgs& args, Run& run) {
   if (args.photos) add_photos(args, scene, simulated.shots, run);
   run.add_file("shots.csv", table_of(args, simulated.shots));
   if (!args.photos) run.add_file("corners.csv", corners_csv(views));
-  run.add_file("camera.yaml", camera_text(scene.camera, CameraFormat::alidade));
+  const Camera told = mistaken_camera(scene.camera, args.mistake.focal, args.mistake.centre_px);
+  run.add_file("camera.yaml", camera_text(told, CameraFormat::alidade));
   run.add_file("truth_rangefinder.yaml", beam_text(scene.beam, scene.camera, "camera.yaml"));
   JsonValue outliers = JsonValue::list();
   for (std::size_t i = 0; i < simulated.is_outlier.size(); ++i)
@@ -128,6 +146,25 @@ void add_rangefinder_scenario(Frame& frame) {
   number("--sigma-corner-px", args->noise.sigma_corner_px, "Noise of a corner's coordinate", 0.0, 100.0);
   number("--outliers", args->noise.outlier_share, "Share of shots whose beam passed the board", 0.0, 0.9);
   number("--scale", args->scale, "Metres for each metre read", 0.5, 2.0);
+  number("--sigma-px-near", args->noise.sigma_spot_near_px, "Noise of a spot at 1 m beyond that; falls with the range",
+         0.0, 100.0);
+  number("--offset-m", args->mistake.offset_m, "What each reading is too long by [m]", -1.0, 1.0);
+  number("--focal-error", args->mistake.focal, "Share by which the camera file's focal length is too long", -0.5, 0.5);
+  number("--centre-error", args->mistake.centre_px, "Pixels by which its centre lies aside, in u and v", -1e3, 1e3);
+  command.add_option("--unit", args->unit, "Of the readings in the table")
+      ->check(CLI::IsMember({"m", "mm", "cm", "inch", "feet"}))
+      ->capture_default_str();
+  command.add_option("--shift-rows", args->mistake.shift_rows, "Ranges stand so many rows late")
+      ->check(CLI::Range(-100, 100))
+      ->capture_default_str();
+  number("--speckle", args->speckle, "With --photos: contrast of the laser's speckle, 1 is full", 0.0, 1.0);
+  command.add_flag("--bayer", args->bayer, "With --photos: one colour a pixel, the others interpolated");
+  command.add_option("--jpeg", args->jpeg, "With --photos: compressed with this quality, 0: not")
+      ->check(CLI::Range(0, 100))
+      ->capture_default_str();
+  command.add_option("--stickers", args->stickers, "With --photos: red spots on the board that are not the laser's")
+      ->check(CLI::Range(0, 10))
+      ->capture_default_str();
   command.add_flag("--photos", args->photos, "Render the photos instead of spots and corners");
   command.add_flag("--photos-off", args->photos_off, "With --photos: each also with the laser off");
   command.add_option("--laser", args->laser, "Colour of the laser in photos: red or green")

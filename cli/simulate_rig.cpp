@@ -10,6 +10,7 @@
 #include "alidade/io/rig_file.h"
 #include "alidade/io/views_file.h"
 #include "alidade/simulate/board_photos.h"
+#include "alidade/simulate/rangefinder.h"
 #include "alidade/simulate/rig.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
@@ -23,6 +24,8 @@ struct SimulateRigArgs {
   std::filesystem::path rig;
   int boards = 5, views = 4;
   double sigma_px = 0.2, sigma_angle_deg = 0.02, wrong = 0.0;
+  double scale = 1.0, once_deg = 0.0, twice_deg = 0.0, backlash_deg = 0.0;
+  RigMistake mistake;
   bool photos = false;
 };
 
@@ -30,6 +33,8 @@ RigSceneConfig config_from(const SimulateRigArgs& args, Run& run) {
   RigSceneConfig config;
   config.num_boards = args.boards;
   config.most_views_of_a_board = args.views;
+  config.encoder_scale = args.scale;
+  config.once_rad = args.once_deg * degree;
   for (RigHead& head : xiahou_rig()) config.nominal.push_back(head);
   if (!args.rig.empty()) {
     run.add_input("rig", args.rig);
@@ -77,8 +82,10 @@ Camera with_sigma(Camera camera) {
 
 ExitCode simulate_rig(const SimulateRigArgs& args, Run& run) {
   const RigScene scene = draw_rig_scene(config_from(args, run), run.options.seed);
-  const RigNoise noise{args.sigma_px, args.sigma_angle_deg * degree, args.wrong};
-  const SimulatedViews simulated = simulate_head_views(scene, noise, run.options.seed);
+  const RigNoise noise{args.sigma_px, args.sigma_angle_deg * degree, args.wrong, args.twice_deg * degree,
+                       args.backlash_deg * degree};
+  SimulatedViews simulated = simulate_head_views(scene, noise, run.options.seed);
+  simulated.views = mistaken_views(std::move(simulated.views), scene, args.mistake);
   if (args.photos) {
     add_photos(scene, simulated.views, run);
   } else {
@@ -87,9 +94,12 @@ ExitCode simulate_rig(const SimulateRigArgs& args, Run& run) {
   std::vector<std::string> camera_files;
   for (const RigHead& rig_head : scene.rig.heads) {
     camera_files.push_back(fmt::format("camera_{}.yaml", rig_head.head.id));
-    run.add_file(camera_files.back(), camera_text(with_sigma(rig_head.camera), CameraFormat::alidade));
+    const Camera told = mistaken_camera(rig_head.camera, args.mistake.focal, args.mistake.centre_px);
+    run.add_file(camera_files.back(), camera_text(with_sigma(told), CameraFormat::alidade));
   }
-  run.add_file("truth_rig.yaml", rig_text(scene.rig, camera_files));
+  // Where the files of the lenses are wrong, the truth holds its own.
+  const bool is_mistaken = args.mistake.focal != 0.0 || args.mistake.centre_px != 0.0;
+  run.add_file("truth_rig.yaml", rig_text(scene.rig, is_mistaken ? std::vector<std::string>{} : camera_files));
   JsonValue wrong = JsonValue::list();
   for (std::size_t v = 0; v < simulated.is_wrong.size(); ++v)
     if (simulated.is_wrong[v]) wrong.push_back(simulated.views[v].seen.photo);
@@ -131,6 +141,17 @@ void add_rig_scenario(Frame& frame) {
   number("--sigma-px", args->sigma_px, "Noise of a corner's coordinate", 0.0, 100.0);
   number("--sigma-angle-deg", args->sigma_angle_deg, "Noise of a reading [deg]", 0.0, 10.0);
   number("--wrong", args->wrong, "Share of the views with the angles of another", 0.0, 0.5);
+  number("--scale", args->scale, "Radians of each axis for each radian read", 0.5, 2.0);
+  number("--once-deg", args->once_deg, "Amplitude of an error of one period a turn of each axis [deg]", 0.0, 15.0);
+  number("--twice-deg", args->twice_deg, "The same of two periods a turn [deg]", 0.0, 15.0);
+  number("--backlash-deg", args->backlash_deg, "Backlash of each axis [deg]", 0.0, 10.0);
+  number("--focal-error", args->mistake.focal, "Share by which the camera files' focal lengths are too long", -0.5, 0.5);
+  number("--centre-error", args->mistake.centre_px, "Pixels by which their centres lie aside, in u and v", -1e3, 1e3);
+  command.add_flag("--swap-angles", args->mistake.swap_angles, "Pan stands in the column of tilt");
+  command.add_flag("--flip-pan", args->mistake.flip_pan, "Pan counts the other way");
+  command.add_flag("--mirror", args->mistake.mirror, "Images are mirrored");
+  command.add_flag("--swap-heads", args->mistake.swap_heads, "The heads' numbers are exchanged");
+  command.add_flag("--shift-rows", args->mistake.shift_rows, "Each view has the angles of the one before");
   command.add_flag("--photos", args->photos, "Render the photos instead of corners");
 }
 

@@ -85,6 +85,26 @@ class Rangefinder(Audit):
                 if result:
                     self.require_told(name, result, self.errors(result))
 
+    def test_a_scans_edges_tell_no_more_than_they_do(self):
+        """Direction and origin within 5 of the σ stated; and where `project` puts the beam by that file, its pixels."""
+        folder = AUDIT / "rangefinder" / "edges"
+        camera = folder / "camera.yaml"
+        result = self.run_alidade("rangefinder", folder / "scan.csv", "--method", "edges", "--photo",
+                                  folder / "photo.png", "--camera", camera)
+        self.assertIsNotNone(result)
+        self.assertLess(max(self.errors(result)), LIMIT)
+        self.assertNotEqual(result["verdict"]["state"], "good")
+        beam = self.folder / "beam.yaml"
+        beam.write_text((self.folder / "out" / "rangefinder.yaml").read_text())
+        for range_m in (1.0, 2.0, 4.0):
+            seen = self.run_alidade("project", "--beam", beam, "--camera", camera, "--range", range_m)
+            point = [o + range_m * d for o, d in zip(self.ORIGIN, self.DIRECTION)]
+            for value, true, sigma in zip(seen["estimate"]["point_in_cam_m"], point, seen["stddev"]["point_in_cam_m"]):
+                self.assertLess(abs(value - true), LIMIT * sigma)
+            pixel = [centre + 520.0 * x / point[2] for centre, x in zip((320.0, 240.0), point)]
+            for value, true, sigma in zip(seen["estimate"]["px"], pixel, seen["stddev"]["px"]):
+                self.assertLess(abs(value - true), LIMIT * sigma)
+
     def test_shots_that_are_good_are_kept(self):
         folder = AUDIT / "rangefinder" / "plane_n8"
         result = self.run_alidade("rangefinder", folder / "shots.csv", "--camera", folder / "camera.yaml", "--board",

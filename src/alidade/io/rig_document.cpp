@@ -26,6 +26,10 @@ JsonValue head_value(const Head& head) {
   value["encoder"]["tilt_zero_rad"] = head.encoder.tilt_zero_rad;
   value["encoder"]["pan_scale"] = head.encoder.pan_scale;
   value["encoder"]["tilt_scale"] = head.encoder.tilt_scale;
+  value["encoder"]["pan_cos_rad"] = head.encoder.pan_cos_rad;
+  value["encoder"]["pan_sin_rad"] = head.encoder.pan_sin_rad;
+  value["encoder"]["tilt_cos_rad"] = head.encoder.tilt_cos_rad;
+  value["encoder"]["tilt_sin_rad"] = head.encoder.tilt_sin_rad;
   value["encoder"]["sigma_rad"] = head.encoder.sigma_rad;
   return value;
 }
@@ -42,6 +46,10 @@ JsonValue head_sigma(int id, const HeadVector& sigma) {
   value["axes_skew_rad"] = sigma[19];
   value["encoder"]["pan_scale"] = sigma[17];
   value["encoder"]["tilt_scale"] = sigma[18];
+  value["encoder"]["pan_cos_rad"] = sigma[20];
+  value["encoder"]["pan_sin_rad"] = sigma[21];
+  value["encoder"]["tilt_cos_rad"] = sigma[22];
+  value["encoder"]["tilt_sin_rad"] = sigma[23];
   return value;
 }
 
@@ -216,6 +224,30 @@ void fill_heads_model(const Rig& rig, const Eigen::MatrixXd& cov_model, ResultDo
   document.stddev_model["heads"] = std::move(sigmas);
 }
 
+namespace {
+
+/// What was estimated by need, and backlash, which is no part of a head as a file has it.
+void fill_freed(const RigReport& report, ResultDocument& document) {
+  JsonValue freed = JsonValue::list(), backlash = JsonValue::list(), sigma = JsonValue::list();
+  for (const RigFreed& one : report.freed) {
+    JsonValue value;
+    value["name"] = one.name;
+    value["value"] = one.value;
+    value["sigma"] = one.sigma;
+    value["was"] = one.was;
+    freed.push_back(std::move(value));
+  }
+  document.estimate["estimated"] = std::move(freed);
+  for (std::size_t h = 0; h < report.backlash_rad.size(); ++h) {
+    backlash.push_back(Numbers{report.backlash_rad[h].x(), report.backlash_rad[h].y()});
+    sigma.push_back(Numbers{report.sigma_backlash_rad[h].x(), report.sigma_backlash_rad[h].y()});
+  }
+  document.estimate["backlash_rad"] = std::move(backlash);
+  document.stddev["backlash_rad"] = std::move(sigma);
+}
+
+}  // namespace
+
 void fill_rig(std::span<const HeadView> views, const RigReport& report, ResultDocument& document) {
   document.counts.given += views.size();
   document.counts.used = static_cast<std::size_t>(report.views_used);
@@ -223,6 +255,7 @@ void fill_rig(std::span<const HeadView> views, const RigReport& report, ResultDo
   JsonValue& estimate = document.estimate;
   if (report.status == RigReport::Status::converged) {
     fill_heads(report.rig, document);
+    fill_freed(report, document);
     fill_heads_model(report.rig, report.cov_model, document);
     document.assumed = report.assumed;
     JsonValue causes = JsonValue::list();

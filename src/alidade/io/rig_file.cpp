@@ -54,6 +54,11 @@ std::string head_text(const RigHead& rig_head, const EncoderError& error, const 
                       number_text(encoder.pan_zero_rad), number_text(encoder.tilt_zero_rad));
   if (encoder.pan_scale != 1.0) text += fmt::format("      pan_scale: {}\n", number_text(encoder.pan_scale));
   if (encoder.tilt_scale != 1.0) text += fmt::format("      tilt_scale: {}\n", number_text(encoder.tilt_scale));
+  for (const auto& [name, value] : {std::pair{"pan_cos_rad", encoder.pan_cos_rad},
+                                    {"pan_sin_rad", encoder.pan_sin_rad},
+                                    {"tilt_cos_rad", encoder.tilt_cos_rad},
+                                    {"tilt_sin_rad", encoder.tilt_sin_rad}})
+    if (value != 0.0) text += fmt::format("      {}: {}\n", name, number_text(value));
   if (error.sigma_zero_rad >= 0.0) text += fmt::format("      sigma_zero_rad: {}\n", number_text(error.sigma_zero_rad));
   if (error.sigma_scale >= 0.0) text += fmt::format("      sigma_scale: {}\n", number_text(error.sigma_scale));
   return text + fmt::format("      sigma_rad: {}\n", number_text(encoder.sigma_rad));
@@ -124,6 +129,15 @@ double scale_of(const Fields& fields, const std::string& key) {
   return scale;
 }
 
+/// The amplitude of an error of one period a turn; a third of a radian is no disc off its axis.
+double amplitude_of(const Fields& fields, const std::string& key) {
+  if (!fields.has(key)) return 0.0;
+  const double amplitude = fields.number(key);
+  if (!(std::abs(amplitude) < 0.3))
+    refuse(fields.file(), fields.full(key), fmt::format("{:.6g} is not below 0.3 in size", amplitude));
+  return amplitude;
+}
+
 /// A σ that may be left out: NaN.
 double sigma_of(const Fields& fields, const std::string& key) {
   if (!fields.has(key)) return std::numeric_limits<double>::quiet_NaN();
@@ -143,13 +157,18 @@ Encoder encoder_of(const YAML::Node& node, const Fields& parent) {
   const Fields fields(node, parent.file(), parent.full("encoder."));
   refuse_unknown_keys(
       fields,
-      {"pan_zero_rad", "tilt_zero_rad", "pan_scale", "tilt_scale", "sigma_rad", "sigma_zero_rad", "sigma_scale"},
+      {"pan_zero_rad", "tilt_zero_rad", "pan_scale", "tilt_scale", "pan_cos_rad", "pan_sin_rad", "tilt_cos_rad",
+       "tilt_sin_rad", "sigma_rad", "sigma_zero_rad", "sigma_scale"},
       "an encoder");
   Encoder encoder;
   encoder.pan_zero_rad = angle_of(fields, "pan_zero_rad");
   encoder.tilt_zero_rad = angle_of(fields, "tilt_zero_rad");
   encoder.pan_scale = scale_of(fields, "pan_scale");
   encoder.tilt_scale = scale_of(fields, "tilt_scale");
+  encoder.pan_cos_rad = amplitude_of(fields, "pan_cos_rad");
+  encoder.pan_sin_rad = amplitude_of(fields, "pan_sin_rad");
+  encoder.tilt_cos_rad = amplitude_of(fields, "tilt_cos_rad");
+  encoder.tilt_sin_rad = amplitude_of(fields, "tilt_sin_rad");
   encoder.sigma_rad = angle_of(fields, "sigma_rad");
   if (encoder.sigma_rad < 0.0) refuse(fields.file(), fields.full("sigma_rad"), "is below zero");
   return encoder;
@@ -223,7 +242,7 @@ void read_rig_covariance(const YAML::Node& node, const Fields& fields, Rig& rig)
 }  // namespace
 
 std::string rig_text(const Rig& rig, std::span<const std::string> camera_files) {
-  std::string text = "# Pan-tilt heads; angle = scale * (reading - zero), pan > 0 left, tilt > 0 up\nheads:\n";
+  std::string text = "# Pan-tilt heads; angle = scale * (reading + cos, sin errors - zero), pan > 0 left, tilt > 0 up\nheads:\n";
   for (std::size_t i = 0; i < rig.heads.size(); ++i)
     text += head_text(rig.heads[i], i < rig.encoder_errors.size() ? rig.encoder_errors[i] : EncoderError{},
                       i < camera_files.size() ? camera_files[i] : "");

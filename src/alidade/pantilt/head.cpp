@@ -41,6 +41,37 @@ std::optional<Eigen::Vector2d> angles_without_offsets(const Eigen::Vector3d& dir
 
 }  // namespace
 
+Eigen::Vector2d Encoder::corrected(const Eigen::Vector2d& r) const {
+  if (pan_cos_rad == 0.0 && pan_sin_rad == 0.0 && tilt_cos_rad == 0.0 && tilt_sin_rad == 0.0) return r;
+  return {r.x() + pan_cos_rad * std::cos(r.x()) + pan_sin_rad * std::sin(r.x()),
+          r.y() + tilt_cos_rad * std::cos(r.y()) + tilt_sin_rad * std::sin(r.y())};
+}
+
+Eigen::Vector2d Encoder::slopes(const Eigen::Vector2d& r) const {
+  if (pan_cos_rad == 0.0 && pan_sin_rad == 0.0 && tilt_cos_rad == 0.0 && tilt_sin_rad == 0.0)
+    return {pan_scale, tilt_scale};
+  return {pan_scale * (1.0 - pan_cos_rad * std::sin(r.x()) + pan_sin_rad * std::cos(r.x())),
+          tilt_scale * (1.0 - tilt_cos_rad * std::sin(r.y()) + tilt_sin_rad * std::cos(r.y()))};
+}
+
+Eigen::Vector2d Encoder::angles(const Eigen::Vector2d& readings_rad) const {
+  const Eigen::Vector2d r = corrected(readings_rad);
+  return {pan_scale * (r.x() - pan_zero_rad), tilt_scale * (r.y() - tilt_zero_rad)};
+}
+
+/// The error of one period a turn is taken away by a contraction: its amplitude is the factor of each step.
+Eigen::Vector2d Encoder::readings(const Eigen::Vector2d& angles_rad) const {
+  const Eigen::Vector2d wanted(angles_rad.x() / pan_scale + pan_zero_rad, angles_rad.y() / tilt_scale + tilt_zero_rad);
+  constexpr int max_steps = 60;
+  Eigen::Vector2d r = wanted;
+  for (int step = 0; step < max_steps; ++step) {
+    const Eigen::Vector2d off = corrected(r) - wanted;
+    r -= off;
+    if (off.cwiseAbs().maxCoeff() < 1e-15) break;
+  }
+  return r;
+}
+
 Head retract(const Head& head, const HeadVector& step) {
   Head moved = head;
   moved.world_from_base = head.world_from_base.retract(step.head<6>());
@@ -52,6 +83,10 @@ Head retract(const Head& head, const HeadVector& step) {
   moved.encoder.pan_scale += step[17];
   moved.encoder.tilt_scale += step[18];
   moved.axes_skew_rad += step[19];
+  moved.encoder.pan_cos_rad += step[20];
+  moved.encoder.pan_sin_rad += step[21];
+  moved.encoder.tilt_cos_rad += step[22];
+  moved.encoder.tilt_sin_rad += step[23];
   return moved;
 }
 
@@ -59,9 +94,12 @@ TurnedHead::TurnedHead(const Head& head, const Eigen::Vector2d& pan_tilt_rad)
     : cam_from_tilt_rotation(head.cam_from_tilt.toRotationMatrix()),
       pan_to_tilt_m(head.pan_to_tilt_m),
       tilt_to_cam_m(head.tilt_to_cam_m),
-      angle_per_reading(head.encoder.pan_scale, head.encoder.tilt_scale),
-      readings_from_zero_rad(pan_tilt_rad - Eigen::Vector2d(head.encoder.pan_zero_rad, head.encoder.tilt_zero_rad)) {
-  const Eigen::Vector2d angles = head.encoder.angles(pan_tilt_rad);
+      readings_rad(pan_tilt_rad),
+      scales(head.encoder.pan_scale, head.encoder.tilt_scale),
+      angle_per_reading(head.encoder.slopes(pan_tilt_rad)),
+      readings_from_zero_rad(head.encoder.corrected(pan_tilt_rad) -
+                             Eigen::Vector2d(head.encoder.pan_zero_rad, head.encoder.tilt_zero_rad)) {
+  const Eigen::Vector2d angles = scales.cwiseProduct(readings_from_zero_rad);
   pan_from_base_rotation = pan_rotation(angles.x());
   tilt_from_pan_rotation = tilt_rotation(angles.y()) * skew_rotation(head.axes_skew_rad);
   const Eigen::Matrix3d cam_from_pan_rotation = cam_from_tilt_rotation * tilt_from_pan_rotation;
@@ -96,9 +134,13 @@ Eigen::Matrix<double, 3, num_head_params> TurnedHead::J_point_head(const Eigen::
   J.middleCols<3>(9) = -cam_from_tilt_rotation;
   J.middleCols<3>(12) = -cam_from_tilt_rotation * cross_matrix(point_in_tilt);
   const Eigen::Matrix<double, 3, 2> J_readings = J_point_readings(point_in_cam);
-  J.middleCols<2>(15) = -J_readings;
-  for (int axis = 0; axis < 2; ++axis)
-    J.col(17 + axis) = J_readings.col(axis) * (readings_from_zero_rad[axis] / angle_per_reading[axis]);
+  for (int axis = 0; axis < 2; ++axis) {
+    const Eigen::Vector3d by_angle = J_readings.col(axis) / angle_per_reading[axis];
+    J.col(15 + axis) = -scales[axis] * by_angle;
+    J.col(17 + axis) = readings_from_zero_rad[axis] * by_angle;
+    J.col(20 + 2 * axis) = scales[axis] * std::cos(readings_rad[axis]) * by_angle;
+    J.col(21 + 2 * axis) = scales[axis] * std::sin(readings_rad[axis]) * by_angle;
+  }
   J.col(19) = -cam_from_tilt_rotation * tilt_from_pan_rotation.col(2).cross(from_tilt_axis);
   return J;
 }

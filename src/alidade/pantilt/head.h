@@ -12,20 +12,22 @@
 
 namespace alidade {
 
-/// How the readings of a head become angles of its axes: angle = scale · (reading − zero).
+/// How the readings of a head become angles of its axes: angle = scale · (reading + c cos reading + s sin reading −
+/// zero). c and s are what a disc that sits off its axis does: an error of one period a turn.
 struct Encoder {
-  double pan_zero_rad = 0.0;  ///< What is read where the pan angle is zero.
+  double pan_zero_rad = 0.0;  ///< What is read, corrected, where the pan angle is zero.
   double tilt_zero_rad = 0.0;
   double pan_scale = 1.0;
   double tilt_scale = 1.0;
   double sigma_rad = 0.0;  ///< Of a reading.
+  double pan_cos_rad = 0.0, pan_sin_rad = 0.0, tilt_cos_rad = 0.0, tilt_sin_rad = 0.0;  ///< Amplitudes c and s.
 
-  [[nodiscard]] Eigen::Vector2d angles(const Eigen::Vector2d& readings_rad) const {
-    return {pan_scale * (readings_rad.x() - pan_zero_rad), tilt_scale * (readings_rad.y() - tilt_zero_rad)};
-  }
-  [[nodiscard]] Eigen::Vector2d readings(const Eigen::Vector2d& angles_rad) const {
-    return {angles_rad.x() / pan_scale + pan_zero_rad, angles_rad.y() / tilt_scale + tilt_zero_rad};
-  }
+  /// Readings without the error of one period a turn.
+  [[nodiscard]] Eigen::Vector2d corrected(const Eigen::Vector2d& readings_rad) const;
+  /// What an angle moves by for a reading.
+  [[nodiscard]] Eigen::Vector2d slopes(const Eigen::Vector2d& readings_rad) const;
+  [[nodiscard]] Eigen::Vector2d angles(const Eigen::Vector2d& readings_rad) const;
+  [[nodiscard]] Eigen::Vector2d readings(const Eigen::Vector2d& angles_rad) const;
   bool operator==(const Encoder&) const = default;
 };
 
@@ -52,13 +54,14 @@ struct RigHead {
 
 /// The parameters of a head in their order: world_from_base ξ (translation, rotation; on the right), pan_to_tilt,
 /// tilt_to_cam, cam_from_tilt (rotation, on the right), pan zero, tilt zero, pan scale, tilt scale,
-/// skew of the axes.
-inline constexpr int num_head_params = 20;
+/// skew of the axes, the encoders' errors of one period a turn.
+inline constexpr int num_head_params = 24;
 inline constexpr std::array<const char*, num_head_params> head_param_names{
     "base_x_m",        "base_y_m",        "base_z_m",        "base_rx_rad",     "base_ry_rad",
     "base_rz_rad",     "pan_to_tilt_x_m", "pan_to_tilt_y_m", "pan_to_tilt_z_m", "tilt_to_cam_x_m",
     "tilt_to_cam_y_m", "tilt_to_cam_z_m", "cam_rx_rad",      "cam_ry_rad",      "cam_rz_rad",
-    "pan_zero_rad",    "tilt_zero_rad",   "pan_scale",       "tilt_scale",      "axes_skew_rad"};
+    "pan_zero_rad",    "tilt_zero_rad",   "pan_scale",       "tilt_scale",      "axes_skew_rad",
+    "pan_cos_rad",     "pan_sin_rad",     "tilt_cos_rad",    "tilt_sin_rad"};
 using HeadVector = Eigen::Matrix<double, num_head_params, 1>;
 
 /// The head moved by a small step of its parameters.
@@ -80,8 +83,10 @@ struct TurnedHead {
   Eigen::Matrix3d tilt_from_pan_rotation;
   Eigen::Matrix3d pan_from_base_rotation;
   Eigen::Vector3d pan_to_tilt_m, tilt_to_cam_m;
-  Eigen::Vector2d angle_per_reading;       ///< The encoder's scales.
-  Eigen::Vector2d readings_from_zero_rad;  ///< Reading − zero.
+  Eigen::Vector2d readings_rad;
+  Eigen::Vector2d scales;                  ///< The encoder's.
+  Eigen::Vector2d angle_per_reading;       ///< Its slopes.
+  Eigen::Vector2d readings_from_zero_rad;  ///< Corrected reading − zero.
 
   [[nodiscard]] Eigen::Vector3d point_in_cam(const Eigen::Vector3d& point_in_world) const {
     return cam_from_world_rotation * point_in_world + cam_from_world_translation;

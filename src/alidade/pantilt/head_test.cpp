@@ -28,7 +28,11 @@ RigHead random_head(std::mt19937_64& rng) {
   drawn.head.pan_to_tilt_m = random_vector(rng, 0.05);
   drawn.head.tilt_to_cam_m = random_vector(rng, 0.05);
   drawn.head.cam_from_tilt = exp_so3(random_vector(rng, 0.1));
-  drawn.head.encoder = {0.03, -0.04, 1.01, 0.985, 0.0};
+  drawn.head.encoder = {.pan_zero_rad = 0.03, .tilt_zero_rad = -0.04, .pan_scale = 1.01, .tilt_scale = 0.985};
+  drawn.head.encoder.pan_cos_rad = 0.01;
+  drawn.head.encoder.pan_sin_rad = -0.02;
+  drawn.head.encoder.tilt_cos_rad = 0.03;
+  drawn.head.encoder.tilt_sin_rad = 0.015;
   drawn.head.axes_skew_rad = 0.02;
   return drawn;
 }
@@ -76,7 +80,7 @@ TEST(Head, JacobiansAreTheDerivatives) {
                     pixel({retract(at.head, -d), at.camera}, readings, point), seen->J_px_head.col(k));
     }
   }
-  EXPECT_EQ(num_checked, 50 * 25);
+  EXPECT_EQ(num_checked, 50 * 29);
 }
 
 TEST(Head, TurnsAsTheRotatingCameraDoes) {
@@ -97,10 +101,24 @@ TEST(Head, PanTurnsLeftAndTiltTurnsUp) {
 }
 
 TEST(Head, ReadingsBecomeAnglesByZeroThenScale) {
-  const Encoder encoder{0.1, -0.2, 1.5, 0.5, 0.0};
+  const Encoder encoder{.pan_zero_rad = 0.1, .tilt_zero_rad = -0.2, .pan_scale = 1.5, .tilt_scale = 0.5};
   EXPECT_NEAR(encoder.angles({0.3, 0.2}).x(), 0.3, 1e-15);
   EXPECT_NEAR(encoder.angles({0.3, 0.2}).y(), 0.2, 1e-15);
   EXPECT_LE((encoder.readings(encoder.angles({0.7, -0.6})) - Eigen::Vector2d(0.7, -0.6)).norm(), 1e-15);
+}
+
+TEST(Head, AnErrorOfOnePeriodATurnIsTakenAwayAndPutBack) {
+  Encoder encoder{.pan_zero_rad = 0.1, .pan_scale = 1.01};
+  encoder.pan_cos_rad = 0.02;
+  encoder.pan_sin_rad = -0.03;
+  encoder.tilt_sin_rad = 0.05;
+  const Eigen::Vector2d read(0.6, -0.4), angles = encoder.angles(read);
+  EXPECT_NEAR(angles.x(), 1.01 * (0.6 + 0.02 * std::cos(0.6) - 0.03 * std::sin(0.6) - 0.1), 1e-15);
+  EXPECT_NEAR(angles.y(), -0.4 + 0.05 * std::sin(-0.4), 1e-15);
+  EXPECT_LE((encoder.readings(angles) - read).norm(), 1e-14);
+  const Eigen::Vector2d d = Eigen::Vector2d::Constant(step);
+  const Eigen::Vector2d by = (encoder.angles(read + d) - encoder.angles(read - d)) / (2.0 * step);
+  EXPECT_LE((encoder.slopes(read) - by).norm(), 1e-9);
 }
 
 TEST(Head, AimPutsThePointOnTheAxisOrOnAnyRay) {

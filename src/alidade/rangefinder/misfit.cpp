@@ -89,4 +89,35 @@ std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::
   return "";
 }
 
+namespace {
+
+bool is_of_another_unit(const Verdict& verdict) {
+  return std::any_of(verdict.checks.begin(), verdict.checks.end(),
+                     [](const Check& check) { return check.name == "scale" && check.state == State::refused; });
+}
+
+}  // namespace
+
+SolvedRangefinder solve_rangefinder(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board,
+                                    const Camera& camera, const RangefinderConfig& config, const Progress& progress) {
+  SolvedRangefinder held{calibrate_rangefinder(shots, points_in_board, camera, config, progress), {}, config};
+  held.verdict = rangefinder_verdict(held.report, shots, config);
+  const bool has_boards = std::any_of(shots.begin(), shots.end(), [](const Shot& shot) { return shot.has_plane(); });
+  const bool no_beam = held.verdict.exit_code != ExitCode::ok && has_boards;
+  if (const std::string cause = no_beam ? cause_of_misfit(shots, points_in_board, camera, config) : "";
+      !cause.empty()) {
+    held.verdict.sentence = cause;
+    held.verdict.to_add = "give each row the range of its own spot and board, in metres";
+    return held;
+  }
+  if (!wants_scale(held.report, config)) return held;
+  SolvedRangefinder free{{}, {}, config};
+  free.config.estimate_scale = free.config.scale_by_need = true;
+  free.report = calibrate_rangefinder(shots, points_in_board, camera, free.config, progress);
+  free.verdict = rangefinder_verdict(free.report, shots, free.config);
+  // Readings in another unit have a scale, but that is no answer.
+  const bool is_told = free.verdict.exit_code == ExitCode::ok || is_of_another_unit(free.verdict);
+  return is_told ? free : held;
+}
+
 }  // namespace alidade

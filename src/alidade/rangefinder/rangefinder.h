@@ -115,4 +115,16 @@ struct RangefinderReport {
 [[nodiscard]] Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Shot> shots,
                                           const RangefinderConfig& config);
 
+struct SolvedRangefinder {
+  RangefinderReport report;
+  Verdict verdict;            ///< Without what was assumed: heed_assumptions().
+  RangefinderConfig config;   ///< As it was solved with.
+};
+/// calibrate_rangefinder() and what a person would do next: the readings' scale is estimated too where the answer rests
+/// on one that nobody told and the shots tell it, and where no beam explains the shots the cause is looked for.
+[[nodiscard]] SolvedRangefinder solve_rangefinder(std::span<const Shot> shots,
+                                                  std::span<const Eigen::Vector3d> points_in_board,
+                                                  const Camera& camera, const RangefinderConfig& config,
+                                                  const Progress& progress = {});
+
 }  // namespace alidade

@@ -95,7 +95,10 @@ std::optional<RelativePose> relative_pose(const SightSeries& first, const SightS
       cv::findEssentialMat(common.first, common.second, K, cv::RANSAC, 0.999, threshold(first, second), 1000, agree);
   if (E.rows != 3) return std::nullopt;
   constexpr double furthest = 1e3;
+  const int num_agree = cv::countNonZero(agree);
   cv::recoverPose(E, common.first, common.second, K, R, t, furthest, agree, points);
+  // Rays that agree but meet behind a camera are of one whose images are mirrored.
+  if (2 * cv::countNonZero(agree) < num_agree) return std::nullopt;
   Eigen::Matrix3d rotation;
   Eigen::Vector3d translation;
   cv::cv2eigen(R, rotation);

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "alidade/geometry/decompositions.h"
@@ -155,11 +156,18 @@ MovingStart start_cameras(std::span<const SightSeries> series, double search_s, 
   start.cameras.resize(series.size());
   const std::vector<SightPair> pairs = told_pairs(series, search_s, progress);
   start.has_common = !pairs.empty();
-  const auto best = std::ranges::max_element(pairs, {}, start_strength);
-  if (best == pairs.end()) return start;
-  start.best_share = best->share;
-  if (best->share < least_share) return start;
-  const auto pose = relative_pose(series[best->first], series[best->second], best->offset_s);
+  std::vector<SightPair> by_strength = pairs;
+  std::ranges::sort(by_strength, std::greater{}, start_strength);
+  if (by_strength.empty()) return start;
+  start.best_share = by_strength.front().share;
+  // Of a pair with a mirrored camera rays agree, but meet behind one of the two: it has no pose.
+  auto best = by_strength.begin();
+  std::optional<RelativePose> pose;
+  for (; best != by_strength.end() && !pose; ++best) {
+    if (best->share < least_share) return start;
+    pose = relative_pose(series[best->first], series[best->second], best->offset_s);
+    if (pose) break;
+  }
   if (!pose) return start;
   start.found = true;
   start.first = best->first;

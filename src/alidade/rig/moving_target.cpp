@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "alidade/geometry/decompositions.h"
+#include "alidade/rig/moving_culprit.h"
 #include "alidade/rig/moving_given.h"
 #include "alidade/rig/moving_scale.h"
 #include "alidade/rig/moving_solve.h"
@@ -15,17 +16,6 @@ namespace {
 
 using PlacedStatus = MovingTargetReport::Status;
 constexpr std::size_t least_sights = 30;
-
-/// Six pictures of the typical camera: a path bends no faster than that, and sights between knots average.
-double knot_of(std::span<const SightSeries> series) {
-  constexpr double pictures = 6.0;
-  std::vector<double> spacings;
-  for (const SightSeries& one : series)
-    if (one.spacing_s > 0.0) spacings.push_back(one.spacing_s);
-  if (spacings.empty()) return 0.0;
-  std::ranges::sort(spacings);
-  return pictures * spacings[spacings.size() / 2];
-}
 
 struct Placing {
   std::span<const TargetSight> sights;
@@ -273,21 +263,6 @@ void take_truth(Placing& work, const PathMatch& match) {
   report.truth_covered = match.covered;
 }
 
-/// Each camera's rays lie in a plane of its own, within 4 px: the target moved along a line (or in a plane with all
-/// cameras), and the planes alone say too little of where the cameras are.
-bool is_line(const Placing& work) {
-  constexpr double most_px = 4.0;
-  return std::ranges::none_of(work.series, [](const SightSeries& series) {
-    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-    for (const Eigen::Vector2d& at : series.at) {
-      const Eigen::Vector3d ray = at.homogeneous();
-      sum += ray * ray.transpose() / static_cast<double>(series.at.size());
-    }
-    return series.at.size() >= least_sights &&
-           std::sqrt(std::abs(symmetric_eigen3(sum).values[0])) * series.px > most_px;
-  });
-}
-
 void set_scale(Placing& work, const TrueTrack& truth) {
   constexpr double most_misfit = 0.05;  // of the path's extent
   MovingTargetReport& report = work.report;
@@ -303,6 +278,11 @@ void set_scale(Placing& work, const TrueTrack& truth) {
   const auto match = match_path(report.path_t_s, report.path, truth, work.config.clock_search_s > 0.0);
   if (!match || match->median_m > most_misfit * match->extent_m) {
     report.status = PlacedStatus::truth_misfits;
+    TrueTrack mirrored = truth;
+    for (Eigen::Vector3d& position : mirrored.position) position.x() *= -1.0;
+    const auto other = match_path(report.path_t_s, report.path, mirrored, work.config.clock_search_s > 0.0);
+    if (other && other->median_m <= most_misfit * other->extent_m)
+      report.culprit = "the path that was seen is the true one mirrored: the images of all cameras are mirrored";
     return;
   }
   take_truth(work, *match);
@@ -341,7 +321,7 @@ void place(Placing& work, const TrueTrack& truth) {
   read_series(work);
   if (!begin(work)) return;
   work.report.status = PlacedStatus::degenerate;
-  if (is_line(work)) return;
+  if (is_line(work.series, least_sights)) return;
   set_problem(work);
   int iterations = 0;
   for (const bool is_again : {false, true}) {
@@ -391,10 +371,21 @@ MovingTargetReport place_cameras(std::span<const TargetSight> sights, std::span<
   const std::vector<TargetSight> from_origin = moved_to(origin_s, sights);
   TrueTrack truth_from_origin = truth;
   for (double& t_s : truth_from_origin.t_s) t_s -= origin_s;
-  Placing work{from_origin, heads, config, progress, {}, 0.0, {}, {}, {}, {}, {}, {}};
-  place(work, truth_from_origin);
-  move_back(origin_s, work.report);
-  return std::move(work.report);
+  const auto placed = [&](std::span<const TargetSight> some, std::span<const RigHead> given, const TrueTrack& path) {
+    Placing work{some, given, config, progress, {}, 0.0, {}, {}, {}, {}, {}, {}};
+    place(work, path);
+    return std::move(work.report);
+  };
+  MovingTargetReport report = placed(from_origin, heads, truth_from_origin);
+  constexpr double most_search_s = 30.0;  // of clocks that are farther apart, each trial takes minutes
+  if (report.culprit.empty() && config.clock_search_s <= most_search_s)
+    report.culprit =
+        culprit_of(report, from_origin, heads,
+                   [&](const std::vector<TargetSight>& some, const std::vector<RigHead>& given) {
+                     return placed(some, given, {});
+                   });
+  move_back(origin_s, report);
+  return report;
 }
 
 }  // namespace alidade

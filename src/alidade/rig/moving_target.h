@@ -66,6 +66,7 @@ struct MovingTargetReport {
   Eigen::MatrixXd cov_model;        ///< As rig.cov, if every sight erred by itself and lenses were exact.
   ClusterCovariance clusters;       ///< Blocks of time, by the solver's own parameters.
   double block_s = 0.0;             ///< Length of a block.
+  std::string culprit;              ///< What is wrong with a camera, where that is found out; empty: nothing.
   std::vector<Assumption> assumed;  ///< Lenses and the distance.
   double sigma_relative_m = 0.0, sigma_relative_rad = 0.0;  ///< Worst camera, in the first one's frame.
   /// With a true path: its clock (time of the rig by its own), and what is left after the similarity, over the path.

@@ -245,6 +245,79 @@ TEST(MovingTarget, WhatIsAddedToTimesMovesNothing) {
   }
 }
 
+/// One label in twenty is of something else: they are left out, and σ holds.
+TEST(MovingTarget, FalseLabelsAreFound) {
+  double sum = 0.0, num = 0.0, false_used = 0.0, num_false = 0.0;
+  for (unsigned seed = 21; seed <= 26; ++seed) {
+    Scene scene = scene_of(loops, seed, seed % 2 == 0);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> share(0.0, 1.0), u(0.0, 1919.0), v(0.0, 1079.0);
+    std::vector<bool> is_false;
+    for (TargetSight& sight : scene.sights) {
+      is_false.push_back(share(random) < 0.05);
+      if (is_false.back()) sight.px = {u(random), v(random)};
+    }
+    const MovingTargetConfig config{.clock_search_s = seed % 2 == 0 ? 2.0 : 0.0, .distance = true_distance(scene)};
+    const MovingTargetReport report = place_cameras(scene.sights, unplaced(scene), config);
+    ASSERT_EQ(report.status, PlacedStatus::placed) << seed;
+    EXPECT_EQ(moving_target_verdict(report, config).state, State::good) << seed;
+    EXPECT_TRUE(report.culprit.empty()) << report.culprit;
+    for (std::size_t i = 0; i < is_false.size(); ++i) {
+      num_false += is_false[i] ? 1.0 : 0.0;
+      false_used += is_false[i] && report.used[i] ? 1.0 : 0.0;
+    }
+    for (std::size_t c = 1; c < 3; ++c) {
+      const auto at = static_cast<Eigen::Index>(num_head_params * c);
+      const Eigen::Matrix<double, 6, 1> error = error_of(report, scene, c);
+      for (Eigen::Index k = 0; k < 6; ++k, num += 1.0) sum += error[k] * error[k] / report.rig.cov(at + k, at + k);
+    }
+  }
+  EXPECT_LT(false_used, 0.005 * num_false);
+  EXPECT_LT(sum / num, 1.8);  // of 72 numbers, a σ of 0.17 where all are apart
+}
+
+TEST(MovingTarget, TheCameraThatIsWrongIsNamed) {
+  for (const unsigned seed : {31U, 32U}) {
+    const Scene scene = scene_of(loops, seed, false);
+    const MovingTargetConfig config{.distance = true_distance(scene)};
+    const auto sentence = [&](const Scene& other, const std::vector<RigHead>& heads) {
+      const Verdict verdict = moving_target_verdict(place_cameras(other.sights, heads, config), config);
+      EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
+      return verdict.sentence;
+    };
+    for (std::size_t c = 0; c < 3; ++c) {
+      Scene mirrored = scene;
+      for (TargetSight& sight : mirrored.sights)
+        if (sight.head == c) sight.px.x() = 1919.0 - sight.px.x();
+      EXPECT_NE(sentence(mirrored, unplaced(scene)).find("head " + std::to_string(c + 1) + " are mirrored"),
+                std::string::npos)
+          << c;
+    }
+    // Lenses that differ, told in another order than the heads'.
+    Scene zoomed = scene;
+    std::vector<RigHead> heads = unplaced(scene);
+    for (TargetSight& sight : zoomed.sights)
+      if (sight.head == 2) sight.px = Eigen::Vector2d(960.0, 540.0) + 1.3 * (sight.px - Eigen::Vector2d(960.0, 540.0));
+    Eigen::VectorXd lens = params(heads[1].camera.lens);
+    lens.head<2>() *= 1.3;
+    heads[1].camera.lens = with_params(heads[1].camera.lens, lens);
+    EXPECT_NE(sentence(zoomed, heads).find("heads 2 and 3 have each other's camera"), std::string::npos);
+  }
+}
+
+/// A mirrored world is one: pixels alone cannot tell it, a true path can.
+TEST(MovingTarget, MirroredImagesOfAllCamerasAreToldByATruePath) {
+  Scene scene = scene_of(loops, 12, false);
+  for (TargetSight& sight : scene.sights) sight.px.x() = 1919.0 - sight.px.x();
+  TrueTrack truth;
+  for (double t_s = -1.0; t_s < 41.0; t_s += 0.2) {
+    truth.t_s.push_back(t_s);
+    truth.position.emplace_back(loops(t_s));
+  }
+  const MovingTargetReport report = place_cameras(scene.sights, unplaced(scene), {}, truth);
+  EXPECT_NE(moving_target_verdict(report, {}).sentence.find("all cameras are mirrored"), std::string::npos);
+}
+
 TEST(MovingTarget, ATruePathGivesScaleFrameAndClock) {
   const Scene scene = scene_of(loops, 11, true);
   TrueTrack truth;

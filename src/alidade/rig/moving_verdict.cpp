@@ -117,6 +117,10 @@ void add_truth(const MovingTargetReport& report, Verdict& verdict) {
 }  // namespace
 
 Verdict moving_target_verdict(const MovingTargetReport& report, const MovingTargetConfig& config) {
+  if (!report.culprit.empty())
+    return moving_refusal(report.culprit,
+                          "give images as the camera takes them (no mirror, no flip), and cameras in the order of the "
+                          "heads' numbers");
   if (report.status != PlacedStatus::placed) return refusal_by_status(report, config);
   Verdict verdict;
   add_precision(report, verdict);

@@ -118,6 +118,7 @@ std::optional<SolvedRig> solve_with_noise(Work& work, const RigState& start, std
     if (!cov) break;
     const double num = 2.0 * static_cast<double>(std::ranges::count(weights, 1.0));
     const double told = num - num_held_corrections(work.problem, *solved, *cov, weights);
+    work.num_told = told >= enough ? told : 0.0;
     const double before = work.problem.sigma_encoder_rad;
     double sigma_rad = std::max(least_rad, std::sqrt(sum_of_corrections2(work, *solved, weights) / told));
     if (!(told >= enough)) {
@@ -226,13 +227,60 @@ void take_pulls(Work& work, const std::vector<double>& weights) {
       work.report.views[v].cluster_z2 = work.report.clusters.z2[next++];
 }
 
-/// The covariance of heads and lenses together, where a lens has one.
-void take_lenses(Rig& rig, const RigGiven& given, const Eigen::MatrixXd& J) {
-  if (given.cov_lenses.isZero(0.0)) return;
+/// ∂ parameters of all lenses / ∂ wide parameters: of lenses that are estimated.
+Eigen::MatrixXd lenses_by_wide(const RigProblem& wide, const RigState& state, Eigen::Index num_lenses) {
+  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(num_lenses, wide.num_free());
+  Eigen::Index first = 0;
+  for (std::size_t h = 0; h < state.heads.size(); ++h) {
+    const Eigen::VectorXd lens = params(state.heads[h].camera.lens);
+    for (std::size_t k = 0; k < wide.free[h].size(); ++k) {
+      const Eigen::Index col = wide.first_free(h) + static_cast<Eigen::Index>(k);
+      if (wide.free[h][k] == focal_param) M.block<2, 1>(first, col) = lens.head<2>();
+      if (wide.free[h][k] == centre_x_param) M(first + 2, col) = 1.0;
+      if (wide.free[h][k] == centre_y_param) M(first + 3, col) = 1.0;
+    }
+    first += lens.size();
+  }
+  return M;
+}
+
+/// The covariance of heads and lenses together, where a lens has one or is estimated. `cov`: of the wide parameters.
+void take_lenses(Rig& rig, const RigGiven& given, const RigState& state, const Eigen::MatrixXd& J,
+                 const Eigen::MatrixXd& cov) {
+  const Eigen::MatrixXd M = lenses_by_wide(given.wide, state, given.cov_lenses.rows());
+  if (given.cov_lenses.isZero(0.0) && M.isZero(0.0)) return;
   const Eigen::Index heads = rig.cov.rows(), lenses = given.cov_lenses.rows();
   rig.cov_with_lenses.resize(heads + lenses, heads + lenses);
-  const Eigen::MatrixXd across = J * given.cov_with_lenses;
-  rig.cov_with_lenses << rig.cov, across, across.transpose(), given.cov_lenses;
+  const Eigen::MatrixXd across_wide = cov * M.transpose() + given.cov_with_lenses;
+  const Eigen::MatrixXd by_given = M * given.cov_with_lenses;
+  const Eigen::MatrixXd of_lenses = M * cov * M.transpose() + by_given + by_given.transpose() + given.cov_lenses;
+  const Eigen::MatrixXd across = J * across_wide;
+  rig.cov_with_lenses << rig.cov, across, across.transpose(), of_lenses;
+  Eigen::Index first = 0;
+  for (RigHead& rig_head : rig.heads) {
+    const Eigen::Index num = params(rig_head.camera.lens).size();
+    const Eigen::MatrixXd own = of_lenses.block(first, first, num, num);
+    if (rig_head.camera.cov.size() > 0 || !M.middleRows(first, num).isZero(0.0)) rig_head.camera.cov = own;
+    first += num;
+  }
+}
+
+/// Backlash with its σ; who reads rig.yaml does not know from which side an axis came: half of it is noise to them.
+void take_backlash(Work& work, const RigState& state, const RigProblem& wide, const Eigen::MatrixXd& cov) {
+  RigReport& report = work.report;
+  report.backlash_rad.assign(state.heads.size(), Eigen::Vector2d::Zero());
+  report.sigma_backlash_rad = report.backlash_rad;
+  for (std::size_t h = 0; h < state.heads.size(); ++h) {
+    for (std::size_t k = 0; k < wide.free[h].size(); ++k) {
+      const int axis = wide.free[h][k] - pan_backlash_param;
+      if (axis < 0 || h >= state.backlash_rad.size()) continue;
+      const Eigen::Index at = wide.first_free(h) + static_cast<Eigen::Index>(k);
+      report.backlash_rad[h][axis] = state.backlash_rad[h][axis];
+      report.sigma_backlash_rad[h][axis] = std::sqrt(cov(at, at));
+    }
+    double& sigma_rad = report.rig.heads[h].head.encoder.sigma_rad;
+    sigma_rad = std::hypot(sigma_rad, 0.5 * report.backlash_rad[h].cwiseAbs().maxCoeff());
+  }
 }
 
 /// What each thing given does to the parameter that it moves most, in that one's stated σ.
@@ -269,13 +317,16 @@ void finish(Work& work, const SolvedRig& solved, const std::vector<double>& weig
       cluster_covariance(*covariance.cov, 1.0, view_cluster_steps(work.problem, solved, *covariance.cov, weights));
   take_pulls(work, weights);
   const RigGiven given = rig_given(work.problem, solved, *covariance.cov, weights, work.config);
-  const WorldAtCamera world =
-      world_at_camera(given.wide, state, widened(work.problem, given.wide, work.report.clusters.cov) + given.cov);
+  const Eigen::MatrixXd cov_wide = widened(work.problem, given.wide, work.report.clusters.cov);
+  const WorldAtCamera world = world_at_camera(given.wide, state, cov_wide + given.cov);
   work.report.rig = world.rig;
-  take_lenses(work.report.rig, given, world.J);
+  take_lenses(work.report.rig, given, state, world.J, cov_wide);
+  take_backlash(work, state, given.wide, cov_wide + given.cov);
   work.report.cov_model = world.J * widened(work.problem, given.wide, *covariance.cov) * world.J.transpose();
   take_assumed(work.report, given, world.J);
-  work.report.causes = rig_causes(work.problem, solved, *covariance.cov, weights, given.assumed);
+  work.report.causes = rig_causes(work.problem, solved, *covariance.cov, weights, given.assumed, work.num_told);
+  work.report.deviance =
+      solved.system.cost + 4.0 * static_cast<double>(work.report.views_used) * std::log(work.report.sigma_encoder_rad);
   for (std::size_t b = 0; b < work.boards.size(); ++b) {
     const Rigid3& old_from_board = state.world_from_board[b];
     work.report.boards.push_back({work.boards[b], world.world_from_old * old_from_board});
@@ -316,34 +367,15 @@ void calibrate(Work& work, const std::map<int, Camera>& cameras) {
   if (solved) finish(work, *solved, weights);
 }
 
-RigReport calibrated(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
-                     const std::map<int, Camera>& cameras, const RigConfig& config, const Progress& progress) {
-  Work work{views, config, progress, {}, {}, {}, {}, {}, {}, {}};
+}  // namespace
+
+RigReport calibrated_with(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
+                          const std::map<int, Camera>& cameras, const RigConfig& config, const FreedParams& freed,
+                          const Progress& progress) {
+  Work work{views, config, progress, freed, {}, {}, {}, {}, {}, {}, {}};
   work.problem.points_in_board = points_in_board;
   calibrate(work, cameras);
   return std::move(work.report);
-}
-
-/// What a wrong camera looks like: encoders worse than any encoder, views that contradict each other.
-bool is_suspicious(const RigReport& report) {
-  constexpr double usual_rad = 0.3 * degree;
-  if (report.status == Status::mirrored) return false;
-  if (report.status != Status::converged) return report.status == Status::no_convergence;
-  return report.sigma_encoder_rad > usual_rad || report.chi2_per_dof() > 2.0 ||
-         5 * report.views_dropped > report.views_used;
-}
-
-}  // namespace
-
-RigReport calibrate_rig(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
-                        const std::map<int, Camera>& cameras, const RigConfig& config, const Progress& progress) {
-  RigReport report = calibrated(views, points_in_board, cameras, config, progress);
-  if (cameras.size() != 2 || !is_suspicious(report)) return report;
-  std::map<int, Camera> swapped = cameras;
-  std::swap(swapped.begin()->second, swapped.rbegin()->second);
-  const RigReport otherwise = calibrated(views, points_in_board, swapped, config, progress);
-  if (otherwise.status == Status::converged && !is_suspicious(otherwise)) report.status = Status::swapped;
-  return report;
 }
 
 }  // namespace alidade

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/rig/rig_clusters.h"
@@ -13,36 +14,68 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+constexpr Index tested_a_head = 15;
+
 /// Something that could be free: its columns among all that are tested.
 struct Tested {
   std::string name, unit;
-  Index first = 0, num = 1;
+  std::vector<Index> places;
+  double worst = 1.0;  ///< σ of its size beyond which the views do not tell it: 5σ would be no encoder's and no lens'.
 };
 
-std::vector<Tested> tested_of(const RigProblem& problem, const RigState& state) {
+/// Places of a head's columns: lens, then for each axis scale, one period, two periods, backlash.
+constexpr Index column_of_axis(int axis) { return 3 + 6 * axis; }
+
+/// One by one: of which only what is held.
+std::vector<Tested> single_tests(const RigProblem& problem, const RigState& state) {
   std::vector<Tested> all;
-  Index next = 0;
-  const auto add = [&](const std::string& name, const char* unit, Index num) {
-    all.push_back({name, unit, next, num});
-    next += num;
-  };
   for (std::size_t h = 0; h < state.heads.size(); ++h) {
     const std::string head = "head" + std::to_string(state.heads[h].head.id) + ".";
-    add(head + "camera.fx", "px", 1);
-    add(head + "camera.cx", "px", 1);
-    add(head + "camera.cy", "px", 1);
+    const Index first = tested_a_head * static_cast<Index>(h);
+    const auto add = [&](const std::string& name, const char* unit, int param, std::vector<Index> places) {
+      const double worst = std::string_view(unit) == "px" ? 50.0 : 0.05;
+      if (param >= 0 && problem.is_free(h, param)) return;
+      for (Index& place : places) place += first;
+      all.push_back({head + name, unit, std::move(places), worst});
+    };
+    add("camera.fx", "px", focal_param, {0});
+    add("camera.cx", "px", centre_x_param, {1});
+    add("camera.cy", "px", centre_y_param, {2});
     for (const int axis : {0, 1}) {
-      const std::string name = head + (axis == 0 ? "pan" : "tilt");
-      const bool is_free = std::ranges::find(problem.free[h], 17 + axis) != problem.free[h].end();
-      add(is_free ? "" : name + "_scale", "", 1);
-      add(name + " once a turn", "rad", 2);
-      add(name + " twice a turn", "rad", 2);
+      const std::string name = axis == 0 ? "pan" : "tilt";
+      const Index at = column_of_axis(axis);
+      add(name + "_scale", "", 17 + axis, {at});
+      add(name + " once a turn", "rad", 20 + 2 * axis, {at + 1, at + 2});
+      add(name + " twice a turn", "rad", -1, {at + 3, at + 4});
+      add(name + " backlash", "rad", pan_backlash_param + axis, {at + 5});
     }
   }
   return all;
 }
 
-constexpr Index tested_a_head = 13;
+/// And what all axes, or all lenses, have alike: each alone explains only its part of the residuals.
+std::vector<Tested> tested_of(const RigProblem& problem, const RigState& state) {
+  std::vector<Tested> all = single_tests(problem, state);
+  const std::size_t num_single = all.size();
+  for (const auto& [ending, name] :
+       {std::pair{"_scale", "scales"}, {" once a turn", "once a turn"}, {" backlash", "backlash"},
+        {"camera.fx", "camera.fx"}, {"camera.c", "centre"}}) {
+    Tested joint{std::string("all ") + name, "", {}, 1.0};
+    int num = 0;
+    for (std::size_t i = 0; i < num_single; ++i) {
+      const Tested& one = all[i];
+      if (!one.name.ends_with(ending) && !(name == std::string_view("centre") && one.name.ends_with("camera.cx")) &&
+          !(name == std::string_view("centre") && one.name.ends_with("camera.cy")))
+        continue;
+      joint.unit = one.unit;
+      joint.worst = one.worst;
+      joint.places.insert(joint.places.end(), one.places.begin(), one.places.end());
+      ++num;
+    }
+    if (num > 1) all.push_back(std::move(joint));
+  }
+  return all;
+}
 
 /// Derivatives of a view's whitened residuals by what is tested of its head.
 MatrixXd tested_columns(const RigProblem& problem, const RigState& state, std::size_t v) {
@@ -54,12 +87,13 @@ MatrixXd tested_columns(const RigProblem& problem, const RigState& state, std::s
   D.col(2) = given.lens.col(3);
   for (const int axis : {0, 1}) {
     const double reading_rad = problem.views[v].view->pan_tilt_rad[axis];
-    const Index at = 3 + 5 * axis;
+    const Index at = 3 + 6 * axis;
     D.col(at) = axis == 0 ? given.pan : given.tilt;
     for (const int turns : {1, 2}) {
       D.col(at + 2 * turns - 1) = std::cos(turns * reading_rad) * given.readings.col(axis);
       D.col(at + 2 * turns) = std::sin(turns * reading_rad) * given.readings.col(axis);
     }
+    D.col(at + 5) = -problem.views[v].travel[axis] * given.readings.col(axis);
   }
   return D;
 }
@@ -99,6 +133,17 @@ Score score_of(const RigProblem& problem, const SolvedRig& solved, const MatrixX
   return score;
 }
 
+/// χ² of so many numbers as σ of a normal one. Where σ of a reading was told by the same residuals, with `num_told`
+/// degrees of freedom, it holds what the cause did: the share of χ² in them makes an F. E. Paulson, Ann. Math. Stat.
+/// 13, 1942.
+double as_normal(double chi2, double num, double num_told) {
+  const double left = num_told - num;
+  const bool is_told = left >= 2.0;
+  const double F = is_told ? chi2 / num / (std::max(num_told - chi2, 1e-3 * num_told) / left) : chi2 / num;
+  const double a = 2.0 / (9.0 * num), b = is_told ? 2.0 / (9.0 * left) : 0.0, root = std::cbrt(F);
+  return std::max(0.0, ((1.0 - b) * root - (1.0 - a)) / std::sqrt(b * root * root + a));
+}
+
 /// σ with which it was given; none: as if exact.
 double given_sigma(const std::vector<Assumption>& assumed, const std::string& name) {
   const std::string of_all = name.substr(name.find('.') + 1);  // one lens for all heads has no head's name
@@ -110,28 +155,30 @@ double given_sigma(const std::vector<Assumption>& assumed, const std::string& na
 }  // namespace
 
 std::vector<RigCause> rig_causes(const RigProblem& problem, const SolvedRig& solved, const MatrixXd& cov,
-                                 const std::vector<double>& weights, const std::vector<Assumption>& assumed) {
-  constexpr double least_information = 1e-6;  // of a unit's own: what the rest can do as well is not asked for
+                                 const std::vector<double>& weights, const std::vector<Assumption>& assumed,
+                                 double num_told) {
   const Score score = score_of(problem, solved, cov, weights);
   std::vector<RigCause> causes;
   for (const Tested& tested : tested_of(problem, solved.state)) {
-    if (tested.name.empty()) continue;
-    const VectorXd s = score.s.segment(tested.first, tested.num);
-    const double sigma = tested.num == 1 ? given_sigma(assumed, tested.name) : 0.0;
-    const SymmetricEigen eigen = symmetric_eigen(score.I.block(tested.first, tested.first, tested.num, tested.num));
-    double chi2 = 0.0;
-    VectorXd size = VectorXd::Zero(tested.num);
-    for (Index k = 0; k < tested.num; ++k) {
-      if (!(eigen.values[k] > least_information)) continue;
+    const VectorXd s = score.s(tested.places);
+    const double sigma = tested.places.size() == 1 ? given_sigma(assumed, tested.name) : 0.0;
+    const SymmetricEigen eigen = symmetric_eigen(MatrixXd(score.I(tested.places, tested.places)));
+    double chi2 = 0.0, num = 0.0;
+    VectorXd size = VectorXd::Zero(s.size());
+    for (Index k = 0; k < s.size(); ++k) {
+      if (!(eigen.values[k] * tested.worst * tested.worst > 1.0)) continue;
       const double along = eigen.vectors.col(k).dot(s) / eigen.values[k];
       chi2 += along * along / (1.0 / eigen.values[k] + sigma * sigma);
+      num += 1.0;
       size -= along * eigen.vectors.col(k);
     }
-    // Of two numbers χ² is one larger by chance alone.
-    const double sigmas = std::sqrt(std::max(0.0, chi2 - static_cast<double>(tested.num - 1)));
-    causes.push_back({tested.name, tested.num == 1 ? size[0] : size.norm(), tested.unit, sigmas});
+    if (num > 0.0)
+      causes.push_back(
+          {tested.name, s.size() == 1 ? size[0] : size.norm(), tested.unit, as_normal(chi2, num, num_told)});
   }
-  std::ranges::sort(causes, std::greater{}, &RigCause::sigmas);
+  // What names one axis says more than what names all, where it explains nearly as much.
+  std::ranges::sort(causes, std::greater{},
+                    [](const RigCause& cause) { return cause.sigmas * (cause.name.starts_with("all ") ? 0.8 : 1.0); });
   return causes;
 }
 

@@ -1,6 +1,9 @@
 #include "alidade/rig/rig_frame.h"
 
 #include <cmath>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 namespace alidade {
 namespace {
@@ -21,7 +24,9 @@ HeadVector difference(const Head& to, const Head& from) {
       to.tilt_to_cam_m - from.tilt_to_cam_m, log_so3(from.cam_from_tilt.conjugate() * to.cam_from_tilt),
       to.encoder.pan_zero_rad - from.encoder.pan_zero_rad, to.encoder.tilt_zero_rad - from.encoder.tilt_zero_rad,
       to.encoder.pan_scale - from.encoder.pan_scale, to.encoder.tilt_scale - from.encoder.tilt_scale,
-      to.axes_skew_rad - from.axes_skew_rad;
+      to.axes_skew_rad - from.axes_skew_rad, to.encoder.pan_cos_rad - from.encoder.pan_cos_rad,
+      to.encoder.pan_sin_rad - from.encoder.pan_sin_rad, to.encoder.tilt_cos_rad - from.encoder.tilt_cos_rad,
+      to.encoder.tilt_sin_rad - from.encoder.tilt_sin_rad;
   return step;
 }
 
@@ -78,9 +83,11 @@ Rigid3 cam_from_cam(const Head& first, const Eigen::Vector2d& first_rad, const H
   return cam_from_world(first, first_rad) * world_from_cam(second, second_rad);
 }
 
-/// The middle and the four corners of what a head's views cover.
-std::vector<Eigen::Vector2d> angles_of(const HeadCover& cover) {
-  const Eigen::Vector2d &low = cover.lowest_rad, &high = cover.highest_rad;
+/// The middle and the four corners of what a head's views cover, or of `least_rad` about its middle if that is more.
+std::vector<Eigen::Vector2d> angles_of(const HeadCover& cover, double least_rad) {
+  const Eigen::Vector2d middle = 0.5 * (cover.lowest_rad + cover.highest_rad);
+  const Eigen::Vector2d half = (0.5 * (cover.highest_rad - cover.lowest_rad)).cwiseMax(0.5 * least_rad);
+  const Eigen::Vector2d low = middle - half, high = middle + half;
   return {0.5 * (low + high), low, {low.x(), high.y()}, high, {high.x(), low.y()}};
 }
 
@@ -121,22 +128,31 @@ Eigen::Matrix<double, 6, 6> relative_covariance(const Rig& rig, std::size_t firs
   return J * rig.cov * J.transpose();
 }
 
-void add_relative_sigma(RigReport& report) {
+namespace {
+
+/// σ of angle and place between cameras, the worst over what their views cover, or so much about its middle.
+std::pair<double, double> worst_sigma(const RigReport& report, double least_rad) {
   const Rig& rig = report.rig;
   double angle2 = 0.0, length2 = 0.0;
   const bool is_one = rig.heads.size() == 1;
-  const std::vector<Eigen::Vector2d> first_angles = angles_of(report.covers[0]);
+  const std::vector<Eigen::Vector2d> first_angles = angles_of(report.covers[0], least_rad);
   for (std::size_t h = is_one ? 0 : 1; h < rig.heads.size(); ++h) {
     for (const Eigen::Vector2d& first_rad : first_angles) {
-      for (const Eigen::Vector2d& second_rad : angles_of(report.covers[h])) {
+      for (const Eigen::Vector2d& second_rad : angles_of(report.covers[h], least_rad)) {
         const Eigen::Matrix<double, 6, 6> cov = relative_covariance(rig, 0, first_rad, h, second_rad);
         length2 = std::max(length2, cov.topLeftCorner<3, 3>().trace());
         angle2 = std::max(angle2, cov.bottomRightCorner<3, 3>().trace());
       }
     }
   }
-  report.sigma_relative_rad = std::sqrt(angle2);
-  report.sigma_relative_m = std::sqrt(length2);
+  return {std::sqrt(angle2), std::sqrt(length2)};
+}
+
+}  // namespace
+
+void add_relative_sigma(RigReport& report) {
+  std::tie(report.sigma_relative_rad, report.sigma_relative_m) = worst_sigma(report, 0.0);
+  std::tie(report.sigma_span_rad, report.sigma_span_m) = worst_sigma(report, good_span_rad);
 }
 
 }  // namespace alidade

@@ -60,6 +60,20 @@ Eigen::VectorXd in_wide(const RigProblem& problem, const RigProblem& wide, const
   return all;
 }
 
+/// A lens whose focal length or centre is estimated is not taken as given in that.
+Camera without_estimated(Camera camera, const RigProblem& problem, std::size_t head) {
+  if (camera.cov.size() == 0) return camera;
+  std::vector<Index> estimated;
+  if (problem.is_free(head, focal_param)) estimated = {0, 1};
+  if (problem.is_free(head, centre_x_param)) estimated.push_back(2);
+  if (problem.is_free(head, centre_y_param)) estimated.push_back(3);
+  for (const Index k : estimated) {
+    camera.cov.row(k).setZero();
+    camera.cov.col(k).setZero();
+  }
+  return camera;
+}
+
 bool is_same(const Camera& a, const Camera& b) {
   return a.lens.index() == b.lens.index() && params(a.lens) == params(b.lens) && a.cov.rows() == b.cov.rows() &&
          a.cov == b.cov;
@@ -78,7 +92,7 @@ struct Filler {
 
   /// What the heads and this lens, which `of` carry, share.
   void add_shared(const std::vector<RigHead>& heads, const std::vector<std::size_t>& of, const Eigen::MatrixXd& wide) {
-    const Eigen::MatrixXd& cov = heads[of.front()].camera.cov;
+    const Eigen::MatrixXd cov = without_estimated(heads[of.front()].camera, problem, of.front()).cov;
     const auto first = [&](std::size_t head) {
       Index place = 0;
       for (std::size_t h = 0; h < head; ++h) place += params(heads[h].camera.lens).size();
@@ -92,7 +106,8 @@ struct Filler {
 
   void add_camera(const std::vector<RigHead>& heads, const std::vector<std::size_t>& of, const std::string& name,
                   const Eigen::MatrixXd& follows) {
-    const Camera& camera = heads[of.front()].camera;
+    const std::size_t head = of.front();
+    const Camera camera = without_estimated(heads[head].camera, problem, head);
     const Eigen::VectorXd values = params(camera.lens);
     Eigen::MatrixXd wide(given.wide.num_free(), follows.cols());
     for (Index k = 0; k < follows.cols(); ++k) wide.col(k) = in_wide(problem, given.wide, follows.col(k));
@@ -105,22 +120,29 @@ struct Filler {
     // Both focal lengths err together where nothing is known of them.
     const Eigen::VectorXd by_f =
         has_cov ? Eigen::VectorXd(wide.col(0)) : Eigen::VectorXd(wide.col(0) + values[1] / values[0] * wide.col(1));
-    add({.name = name + ".fx",
-         .value = values[0],
-         .sigma = sigma(0),
-         .ordinary = ordinary_f * values[0],
-         .remedy = remedy},
-        by_f);
-    for (const Index k : {Index{2}, Index{3}})
-      add({.name = name + (k == 2 ? ".cx" : ".cy"),
-           .value = values[k],
-           .sigma = sigma(k),
-           .ordinary = ordinary_centre_px,
+    if (!problem.is_free(head, focal_param))
+      add({.name = name + ".fx",
+           .value = values[0],
+           .sigma = sigma(0),
+           .ordinary = ordinary_f * values[0],
            .remedy = remedy},
-          wide.col(k));
+          by_f);
+    for (const Index k : {Index{2}, Index{3}})
+      if (!problem.is_free(head, k == 2 ? centre_x_param : centre_y_param))
+        add({.name = name + (k == 2 ? ".cx" : ".cy"),
+             .value = values[k],
+             .sigma = sigma(k),
+             .ordinary = ordinary_centre_px,
+             .remedy = remedy},
+            wide.col(k));
     if (!has_cov) return;
     given.cov += wide * camera.cov * wide.transpose();
     add_shared(heads, of, wide);
+  }
+
+  [[nodiscard]] bool frees_lens(std::size_t head) const {
+    return problem.is_free(head, focal_param) || problem.is_free(head, centre_x_param) ||
+           problem.is_free(head, centre_y_param);
   }
 
   void add_cameras(const std::vector<RigHead>& heads, const Follows& follows) {
@@ -130,7 +152,7 @@ struct Filler {
       Eigen::MatrixXd sum = follows.lens[h];
       std::vector<std::size_t> same{h};
       for (std::size_t k = h + 1; k < heads.size(); ++k) {
-        if (!is_same(heads[h].camera, heads[k].camera)) continue;
+        if (!is_same(heads[h].camera, heads[k].camera) || frees_lens(h) || frees_lens(k)) continue;
         is_done[k] = true;
         same.push_back(k);
         sum += follows.lens[k];
@@ -179,7 +201,7 @@ GivenColumns given_columns(const RigProblem& problem, const RigState& state, std
   const RigView& which = problem.views[v];
   const HeadView& given = *which.view;
   const RigHead& rig_head = state.heads[which.head];
-  const TurnedHead turned(rig_head.head, given.pan_tilt_rad + state.corrections_rad[v]);
+  const TurnedHead turned(rig_head.head, true_reading(problem, state, v));
   const Rigid3& world_from_board = state.world_from_board[which.board];
   const Eigen::Matrix3d cam_from_board_rotation =
       turned.cam_from_world_rotation * world_from_board.rotation.toRotationMatrix();
@@ -220,7 +242,7 @@ RigGiven rig_given(const RigProblem& problem, const SolvedRig& solved, const Eig
   RigGiven given{problem, {}, {}, {}, {}, {}};
   for (std::vector<int>& free : given.wide.free)
     for (const int param : {pan_scale, tilt_scale})
-      if (std::ranges::find(free, param) == free.end()) free.push_back(param);
+      if (std::ranges::find(free, param) == free.end()) free.insert(std::ranges::lower_bound(free, param), param);
   given.cov.setZero(given.wide.num_free(), given.wide.num_free());
   Index num_lenses = 0;
   for (const RigHead& head : solved.state.heads) num_lenses += params(head.camera.lens).size();

@@ -1,5 +1,8 @@
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <utility>
 
 #include "alidade/geometry/degree.h"
 #include "alidade/rig/ray_start.h"
@@ -71,6 +74,25 @@ void choose_counting(const Work& work, std::size_t head, RigHead& rig_head) {
   }
 }
 
+/// Which way the axes of each head went, view after view.
+class Travels {
+ public:
+  Eigen::Vector2d to(const HeadView& view) {
+    constexpr double least_rad = 5e-3;  // less is a reading's noise: the axis stayed where it was
+    const auto [last, is_first] = last_.try_emplace(view.head, view.pan_tilt_rad, Eigen::Vector2d::Zero());
+    auto& [reading_rad, travel] = last->second;
+    for (int axis = 0; axis < 2 && !is_first; ++axis) {
+      const double by_rad = view.pan_tilt_rad[axis] - reading_rad[axis];
+      if (std::abs(by_rad) > least_rad) travel[axis] = by_rad > 0.0 ? 0.5 : -0.5;
+    }
+    reading_rad = view.pan_tilt_rad;
+    return travel;
+  }
+
+ private:
+  std::map<int, std::pair<Eigen::Vector2d, Eigen::Vector2d>> last_;  ///< By head: reading, travel.
+};
+
 }  // namespace
 
 void index_views(Work& work, const std::map<int, Camera>& cameras) {
@@ -81,6 +103,7 @@ void index_views(Work& work, const std::map<int, Camera>& cameras) {
     work.heads.back().head.id = id;
   }
   work.report.views.resize(work.given.size());
+  Travels travels;
   for (std::size_t v = 0; v < work.given.size(); ++v) {
     const HeadView& view = work.given[v];
     const bool has_camera = cameras.contains(view.head), has_corners = is_of_board(work, view);
@@ -88,7 +111,7 @@ void index_views(Work& work, const std::map<int, Camera>& cameras) {
     if (!has_corners) work.report.views[v].reason = "no corners of the board";
     if (!has_camera) work.report.views[v].reason = "no camera of head " + std::to_string(view.head);
     const std::size_t head = has_camera ? index_of(work.ids, view.head) : 0;
-    work.problem.views.push_back({&view, head, index_of(work.boards, view.board)});
+    work.problem.views.push_back({&view, head, index_of(work.boards, view.board), travels.to(view)});
   }
 }
 
@@ -149,8 +172,17 @@ void choose_free(Work& work) {
     std::vector<int> free;
     if (h > 0) free = {0, 1, 2, 3, 4, 5};
     free.insert(free.end(), {8, 9, 10, 11, 12, 13, 14});
-    if (work.config.estimate_scales) free.insert(free.end(), {17, 18});
-    if (work.config.estimate_skew) free.push_back(19);
+    const RigConfig& config = work.config;
+    if (config.estimate_scales) free.insert(free.end(), {17, 18});
+    if (config.estimate_skew) free.push_back(19);
+    if (config.estimate_once) free.insert(free.end(), {20, 21, 22, 23});
+    if (config.estimate_focal) free.push_back(focal_param);
+    if (config.estimate_centre) free.insert(free.end(), {centre_x_param, centre_y_param});
+    if (config.estimate_backlash) free.insert(free.end(), {pan_backlash_param, tilt_backlash_param});
+    if (const auto more = work.freed.find(work.ids[h]); more != work.freed.end())
+      free.insert(free.end(), more->second.begin(), more->second.end());
+    std::ranges::sort(free);
+    free.erase(std::unique(free.begin(), free.end()), free.end());
     work.problem.free.push_back(free);
   }
 }

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "alidade/geometry/decompositions.h"
@@ -75,12 +76,31 @@ std::optional<Step> damped_step(const RigProblem& problem, const RigSystem& syst
   return step;
 }
 
+/// Lens and backlash of a head moved by a step of one of their parameters.
+void move_beside(int param, double by, RigHead& rig_head, Eigen::Vector2d& backlash_rad) {
+  if (param >= pan_backlash_param) {
+    backlash_rad[param - pan_backlash_param] += by;
+    return;
+  }
+  Eigen::VectorXd lens = params(rig_head.camera.lens);
+  if (param == focal_param) lens.head<2>() *= 1.0 + by;
+  if (param != focal_param) lens[param == centre_x_param ? 2 : 3] += by;
+  rig_head.camera.lens = with_params(rig_head.camera.lens, lens);
+}
+
 RigState moved(const RigProblem& problem, const RigState& state, const Step& step) {
   RigState next = state;
+  next.backlash_rad.resize(next.heads.size(), Eigen::Vector2d::Zero());
   for (std::size_t h = 0; h < next.heads.size(); ++h) {
     HeadVector of_head = HeadVector::Zero();
-    for (std::size_t k = 0; k < problem.free[h].size(); ++k)
-      of_head[problem.free[h][k]] = step.common[problem.first_free(h) + static_cast<int>(k)];
+    for (std::size_t k = 0; k < problem.free[h].size(); ++k) {
+      const int param = problem.free[h][k];
+      const double by = step.common[problem.first_free(h) + static_cast<int>(k)];
+      if (param < num_head_params)
+        of_head[param] = by;
+      else
+        move_beside(param, by, next.heads[h], next.backlash_rad[h]);
+    }
     next.heads[h].head = retract(state.heads[h].head, of_head);
   }
   for (std::size_t b = 0; b < next.world_from_board.size(); ++b)
@@ -96,8 +116,7 @@ std::vector<std::string> names_of(const RigProblem& problem, const RigState& sta
   for (std::size_t h = 0; h < problem.free.size(); ++h) {
     for (std::size_t k = 0; k < problem.free[h].size(); ++k) {
       parts.emplace_back(-std::abs(vector[problem.first_free(h) + static_cast<int>(k)]),
-                         "head" + std::to_string(state.heads[h].head.id) + "." +
-                             head_param_names[static_cast<std::size_t>(problem.free[h][k])]);
+                         "head" + std::to_string(state.heads[h].head.id) + "." + rig_param_name(problem.free[h][k]));
     }
   }
   std::ranges::sort(parts);
@@ -107,7 +126,44 @@ std::vector<std::string> names_of(const RigProblem& problem, const RigState& sta
   return names;
 }
 
+/// Derivatives of a pixel, over σ, by the free parameters of its head.
+void fill_row(const std::vector<int>& free, const Eigen::Matrix<double, 2, num_head_params>& by_head,
+              const Eigen::Matrix2d& by_readings, const LensProjection& seen, const Camera& camera, const RigProblem& problem,
+              const RigView& view, Eigen::Ref<Eigen::MatrixXd> row) {
+  for (std::size_t k = 0; k < free.size(); ++k) {
+    auto column = row.col(static_cast<Eigen::Index>(k));
+    const int param = free[k];
+    if (param < num_head_params) {
+      column = by_head.col(param);
+    } else if (param >= pan_backlash_param) {
+      const int axis = param - pan_backlash_param;
+      column = -view.travel[axis] * by_readings.col(axis);
+    } else if (param == focal_param) {
+      const Eigen::VectorXd lens = params(camera.lens);
+      column = (lens[0] * seen.J_px_params.col(0) + lens[1] * seen.J_px_params.col(1)) / problem.sigma_px;
+    } else {
+      column = seen.J_px_params.col(param == centre_x_param ? 2 : 3) / problem.sigma_px;
+    }
+  }
+}
+
 }  // namespace
+
+std::string rig_param_name(int param) {
+  constexpr std::array<const char*, 5> beside{"camera.f", "camera.cx", "camera.cy", "pan_backlash_rad",
+                                              "tilt_backlash_rad"};
+  return param < num_head_params ? head_param_names[static_cast<std::size_t>(param)]
+                                 : beside[static_cast<std::size_t>(param - num_head_params)];
+}
+
+Eigen::Vector2d true_reading(const RigProblem& problem, const RigState& state, std::size_t v) {
+  const RigView& view = problem.views[v];
+  Eigen::Vector2d reading = view.view->pan_tilt_rad + state.corrections_rad[v];
+  if (view.head < state.backlash_rad.size()) reading -= view.travel.cwiseProduct(state.backlash_rad[view.head]);
+  return reading;
+}
+
+bool RigProblem::is_free(std::size_t head, int param) const { return std::ranges::count(free[head], param) > 0; }
 
 int RigProblem::first_free(std::size_t head) const {
   std::size_t first = 0;
@@ -123,7 +179,7 @@ std::optional<RigViewResiduals> view_residuals(const RigProblem& problem, const 
   const RigHead& rig_head = state.heads[which.head];
   const Rigid3& world_from_board = state.world_from_board[which.board];
   const Eigen::Vector2d& correction = state.corrections_rad[view];
-  const TurnedHead turned(rig_head.head, given.pan_tilt_rad + correction);
+  const TurnedHead turned(rig_head.head, true_reading(problem, state, view));
   const Eigen::Matrix3d world_from_board_rotation = world_from_board.rotation.toRotationMatrix();
   const Eigen::Matrix3d cam_from_board_rotation = turned.cam_from_world_rotation * world_from_board_rotation;
   std::vector<Eigen::Vector3d> points_in_cam;
@@ -146,11 +202,13 @@ std::optional<RigViewResiduals> view_residuals(const RigProblem& problem, const 
     const Eigen::Matrix<double, 2, 3> J = seen[i]->J_px_point / problem.sigma_px;
     const Eigen::Matrix<double, 2, 3> J_in_board = J * cam_from_board_rotation;
     out.r.segment<2>(row) = (seen[i]->px - corner.px) / problem.sigma_px;
-    out.J_head.middleRows<2>(row) = J * turned.J_point_head(points_in_cam[i])(Eigen::all, free);
+    const Eigen::Matrix2d by_readings = J * turned.J_point_readings(points_in_cam[i]);
+    fill_row(free, J * turned.J_point_head(points_in_cam[i]), by_readings, *seen[i], rig_head.camera, problem, which,
+             out.J_head.middleRows<2>(row));
     out.J_board.block<2, 3>(row, 0) = J_in_board;
     out.J_board.block<2, 3>(row, 3) =
         -J_in_board * cross_matrix(problem.points_in_board[static_cast<std::size_t>(corner.index)]);
-    out.J_correction.middleRows<2>(row) = J * turned.J_point_readings(points_in_cam[i]);
+    out.J_correction.middleRows<2>(row) = by_readings;
   }
   const bool is_exact = !(problem.sigma_encoder_rad > 0.0);
   if (is_exact) out.J_correction.setZero();

@@ -11,21 +11,33 @@
 
 namespace alidade {
 
+/// What may be estimated of a head beside head_param_names: its lens (both focal lengths by a factor, the centre), and
+/// the backlash of its axes.
+inline constexpr int focal_param = num_head_params, centre_x_param = num_head_params + 1,
+                     centre_y_param = num_head_params + 2, pan_backlash_param = num_head_params + 3,
+                     tilt_backlash_param = num_head_params + 4;
+/// "pan_scale", "camera.f", "tilt_backlash_rad", …
+[[nodiscard]] std::string rig_param_name(int param);
+
 /// One view with its head and board by index.
 struct RigView {
   const HeadView* view = nullptr;
   std::size_t head = 0, board = 0;
+  /// Which way each axis came to its reading: ±½, 0 where that is not known. Times the backlash it is what an encoder
+  /// before the gears reads too much.
+  Eigen::Vector2d travel = Eigen::Vector2d::Zero();
 };
 
 /// What the solver is given. The world is the base of head 0, which is held.
 struct RigProblem {
   std::vector<RigView> views;
   std::span<const Eigen::Vector3d> points_in_board;
-  std::vector<std::vector<int>> free;  ///< Of each head: which of its parameters are estimated.
+  std::vector<std::vector<int>> free;  ///< Of each head: which of its parameters are estimated, ascending.
   double sigma_px = 1.0;
   double sigma_encoder_rad = 0.0;  ///< 0: readings are exact.
 
   [[nodiscard]] int num_free() const;
+  [[nodiscard]] bool is_free(std::size_t head, int param) const;
   /// Where a head's parameters begin among the free ones.
   [[nodiscard]] int first_free(std::size_t head) const;
 };
@@ -34,7 +46,10 @@ struct RigState {
   std::vector<RigHead> heads;
   std::vector<Rigid3> world_from_board;
   std::vector<Eigen::Vector2d> corrections_rad;  ///< One a view: to be added to its reading.
+  std::vector<Eigen::Vector2d> backlash_rad = {};  ///< Pan, tilt of each head; empty: none.
 };
+/// What the encoders of a view would read if they were exact.
+[[nodiscard]] Eigen::Vector2d true_reading(const RigProblem& problem, const RigState& state, std::size_t view);
 
 /// Whitened residuals of a view: corners (two rows each), then the correction of the reading.
 struct RigViewResiduals {

@@ -19,13 +19,34 @@ struct Example {
     problem.points_in_board = points;
     problem.sigma_px = 0.3;
     problem.sigma_encoder_rad = 0.001;
-    problem.free = {{8, 9, 10, 11, 12, 13, 14, 17, 18, 19}, {0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13, 14, 19}};
+    problem.free = {{8, 9, 10, 11, 12, 13, 14, 17, 18, 19, 20, 21, 22, 23},
+                    {0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13, 14, 19, focal_param, centre_x_param, centre_y_param,
+                     pan_backlash_param, tilt_backlash_param}};
     for (const HeadView& view : scene.views)
-      problem.views.push_back({&view, view.head == 1 ? 0u : 1u, static_cast<std::size_t>(view.board)});
+      problem.views.push_back({&view, view.head == 1 ? 0u : 1u, static_cast<std::size_t>(view.board),
+                               problem.views.size() % 3 == 0 ? Eigen::Vector2d(0.5, -0.5) : Eigen::Vector2d(-0.5, 0.5)});
     state = {scene.rig.heads, scene.world_from_board,
-             std::vector<Eigen::Vector2d>(scene.views.size(), Eigen::Vector2d(0.002, -0.001))};
+             std::vector<Eigen::Vector2d>(scene.views.size(), Eigen::Vector2d(0.002, -0.001)),
+             {Eigen::Vector2d::Zero(), Eigen::Vector2d(0.003, 0.004)}};
+    state.heads[0].head.encoder.pan_sin_rad = 0.02;
   }
 };
+
+/// A step of one parameter of a head, or of what may be estimated beside it.
+void move(RigState& state, std::size_t h, int param, double by) {
+  Head& head = state.heads[h].head;
+  if (param < num_head_params) {
+    head = retract(head, by * HeadVector::Unit(param));
+  } else if (param >= pan_backlash_param) {
+    state.backlash_rad[h][param - pan_backlash_param] += by;
+  } else {
+    Camera& camera = state.heads[h].camera;
+    Eigen::VectorXd lens = params(camera.lens);
+    if (param == focal_param) lens.head<2>() *= 1.0 + by;
+    if (param != focal_param) lens[param - focal_param + 1] += by;
+    camera.lens = with_params(camera.lens, lens);
+  }
+}
 
 TEST(RigSolve, JacobiansAreTheDerivatives) {
   const Example example;
@@ -49,10 +70,7 @@ TEST(RigSolve, JacobiansAreTheDerivatives) {
     const std::vector<int>& free = example.problem.free[view.head];
     for (std::size_t k = 0; k < free.size(); ++k)
       expect(
-          [&](RigState& state, double by) {
-            Head& head = state.heads[view.head].head;
-            head = retract(head, by * HeadVector::Unit(free[k]));
-          },
+          [&](RigState& state, double by) { move(state, view.head, free[k], by); },
           at->J_head.col(static_cast<Eigen::Index>(k)));
     for (int k = 0; k < 6; ++k)
       expect(
@@ -64,13 +82,14 @@ TEST(RigSolve, JacobiansAreTheDerivatives) {
     for (int k = 0; k < 2; ++k)
       expect([&](RigState& state, double by) { state.corrections_rad[v][k] += by; }, at->J_correction.col(k));
   }
-  EXPECT_EQ(num_checked, 10 + 14 + 2 * 8);
+  EXPECT_EQ(num_checked, 14 + 19 + 2 * 8);
 }
 
 /// Of everything at once, without eliminating anything.
 TEST(RigSolve, CovarianceIsThatOfTheWholeInformation) {
   Example example;
-  example.problem.free[1] = {0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13, 14, 19};
+  example.problem.free[0] = {8, 9, 10, 11, 12, 13, 14, 17, 18, 19};
+  example.problem.free[1] = {0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13, 14, 19, focal_param, pan_backlash_param};
   const auto num_views = static_cast<Eigen::Index>(example.scene.views.size());
   const auto num_boards = static_cast<Eigen::Index>(example.scene.world_from_board.size());
   const Eigen::Index common = example.problem.num_free(), boards = common, corrections = boards + 6 * num_boards;

@@ -8,7 +8,6 @@ namespace alidade {
 namespace {
 
 using RigStatus = RigReport::Status;
-constexpr double good_span_rad = 20.0 * degree;
 constexpr double good_relative_rad = 0.2 * degree, good_relative_m = 0.0035;  // of a use in tracking
 constexpr double refuse_relative_rad = 2.0 * degree, refuse_relative_m = 0.05;
 
@@ -81,6 +80,9 @@ Verdict refusal_by_status(const RigReport& report) {
           "head " + std::to_string(report.mirrored_head) +
               " sees its boards from behind: its images are mirrored, or corners are counted the other way",
           "give images as the camera takes them (no mirror, no flip), corners row by row, left to right");
+    case RigStatus::misread:
+      return rig_refusal(State::refused, ExitCode::cannot_tell, report.misreading,
+                         "give each view what its own pan and tilt encoders read");
     case RigStatus::not_linked:
       return refusal_by_link(report);
     default:
@@ -112,16 +114,23 @@ void add_precision(const RigReport& report, Verdict& verdict) {
                                     1e3 * good_relative_m, "mm"));
 }
 
+/// An axis that turned little is enough where the views tell the rig beyond them, too: what counts is what is known over
+/// 20° of each axis, not how far each happened to turn.
 void add_spans(const RigReport& report, Verdict& verdict) {
+  const bool is_known = report.sigma_span_rad < good_relative_rad && report.sigma_span_m < good_relative_m;
   for (const HeadCover& cover : report.covers) {
     for (int axis = 0; axis < 2; ++axis) {
       const double span = cover.highest_rad[axis] - cover.lowest_rad[axis];
       const std::string name = axis == 0 ? "pan" : "tilt";
       verdict.checks.push_back(
-          check_of(name + " " + std::to_string(cover.id), span >= good_span_rad ? State::good : State::care,
+          check_of(name + " " + std::to_string(cover.id), span >= good_span_rad || is_known ? State::good : State::care,
                    "head " + std::to_string(cover.id) + " covers " + text_of(cover.lowest_rad[axis] / degree, 2) +
                        "° to " + text_of(cover.highest_rad[axis] / degree, 2) + "° of " + name +
-                       (span >= good_span_rad ? "" : "; " + name + " farther"),
+                       (span >= good_span_rad ? ""
+                        : is_known            ? "; over 20° the rig is known, too"
+                                              : "; " + name + " farther: over 20° σ is " +
+                                         text_of(report.sigma_span_rad / degree, 2) + "°, " +
+                                         text_of(1e3 * report.sigma_span_m, 2) + " mm"),
                    span / degree, good_span_rad / degree, "°"));
     }
   }
@@ -171,15 +180,44 @@ void add_encoder(const RigReport& report, const RigConfig& config, Verdict& verd
 /// What the residuals ask for, beyond what errors that views share would ask for by chance.
 void add_causes(const RigReport& report, Verdict& verdict) {
   if (report.causes.empty()) return;
-  constexpr double most = 5.0;  // noise told by few readings included, one clean rig in a thousand is above
-  const RigCause& first = report.causes.front();
+  constexpr double most = rig_cause_limit;
+  const RigCause* asked = &report.causes.front();
+  for (const RigCause& cause : report.causes)
+    if (asked->sigmas < most && cause.sigmas > asked->sigmas) asked = &cause;
+  const RigCause& first = *asked;
   const bool is_quiet = first.sigmas < most;
   verdict.checks.push_back(
       check_of("causes", is_quiet ? State::good : State::care,
-               is_quiet ? "lenses, scales and eccentricities are not asked for"
+               is_quiet ? "other lenses, scales, eccentricities and backlash are not asked for"
                         : "the residuals ask for another " + first.name + ", by " + text_of(first.size, 2) +
                               (first.unit.empty() ? "" : " " + first.unit) + " (" + text_of(first.sigmas, 2) + "σ)",
                first.sigmas, most, "σ"));
+}
+
+/// What was estimated by need is said. Where it is plainly there the answer is one of care: it was not expected, and an
+/// error of a shape that is not estimated would be taken for it.
+void add_freed(const RigReport& report, Verdict& verdict) {
+  constexpr double plain = 4.0;
+  std::string text;
+  const RigFreed* worst = nullptr;
+  double most = plain;
+  for (const RigFreed& one : report.freed) {
+    text += (text.empty() ? "estimated too (3σ): " : ", ") + one.name + " " + text_of(one.value, 5) + " ± " +
+            text_of(3.0 * one.sigma, 2);
+    const double z = std::abs(one.value - one.was) / one.sigma;
+    if (z > most) most = z, worst = &one;
+  }
+  if (!report.alike.empty()) text += (text.empty() ? "" : "; ") + report.alike + " explain the residuals alike";
+  if (text.empty()) return;
+  const bool is_quiet = worst == nullptr && report.alike.empty();
+  if (worst != nullptr)
+    text = worst->name + " is " + text_of(worst->value, 5) + ", not " + text_of(worst->was, 5) + " (" +
+           text_of(most, 2) + "σ): " +
+           (worst->name.find("camera") != std::string::npos ? "calibrate that lens anew"
+                                                            : "check the encoder, and the rig at other angles") +
+           "; " + text;
+  verdict.checks.push_back(
+      check_of("estimated", is_quiet ? State::good : State::care, text, worst != nullptr ? most : 0.0, plain, "σ"));
 }
 
 void add_views(const RigReport& report, Verdict& verdict) {
@@ -200,6 +238,7 @@ Verdict rig_verdict(const RigReport& report, const RigConfig& config) {
   add_encoder(report, config, verdict);
   add_views(report, verdict);
   add_causes(report, verdict);
+  add_freed(report, verdict);
   const auto first = [&](State state) {
     return std::ranges::find_if(verdict.checks, [&](const Check& check) { return check.state == state; });
   };

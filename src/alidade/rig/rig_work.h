@@ -14,17 +14,32 @@
 namespace alidade {
 
 /// Everything on the way: what is estimated, and what the views are.
+using FreedParams = std::map<int, std::vector<int>>;  ///< By id of the head: parameters beside what is always free.
+
 struct Work {
   std::span<const HeadView> given;
   const RigConfig& config;
   const Progress& progress;
+  const FreedParams& freed;
   RigProblem problem;            ///< Its views: those given, in order.
   std::vector<int> ids, boards;  ///< By index.
   std::vector<RigHead> heads;
   std::vector<std::optional<BoardPoseFit>> poses;
   std::vector<bool> usable;
   RigReport report;
+  double num_told = 0.0;  ///< Degrees of freedom by which σ of a reading was told; 0: it was not.
 };
+
+/// calibrate_rig() with these parameters estimated too.
+[[nodiscard]] RigReport calibrated_with(std::span<const HeadView> views,
+                                        std::span<const Eigen::Vector3d> points_in_board,
+                                        const std::map<int, Camera>& cameras, const RigConfig& config,
+                                        const FreedParams& freed, const Progress& progress);
+/// What the residuals of the report ask for, estimated too, one after another, as long as the views can tell it.
+[[nodiscard]] RigReport freed_by_need(RigReport report, std::span<const HeadView> views,
+                                      std::span<const Eigen::Vector3d> points_in_board,
+                                      const std::map<int, Camera>& cameras, const RigConfig& config,
+                                      const Progress& progress);
 
 /// Heads and boards by index; views without a camera or corners of the board are named and left aside.
 void index_views(Work& work, const std::map<int, Camera>& cameras);

@@ -1,6 +1,9 @@
 #include "alidade/rig/sight_series.h"
 
 #include <algorithm>
+#include <cmath>
+
+#include "alidade/geometry/decompositions.h"
 
 namespace alidade {
 
@@ -40,6 +43,29 @@ SightSeries sight_series(std::span<const TargetSight> sights, std::size_t head, 
   }
   series.px = params(rig_head.camera.lens)[0];
   return series;
+}
+
+double knot_of(std::span<const SightSeries> series) {
+  constexpr double pictures = 6.0;
+  std::vector<double> spacings;
+  for (const SightSeries& one : series)
+    if (one.spacing_s > 0.0) spacings.push_back(one.spacing_s);
+  if (spacings.empty()) return 0.0;
+  std::ranges::sort(spacings);
+  return pictures * spacings[spacings.size() / 2];
+}
+
+bool is_line(std::span<const SightSeries> series, std::size_t least_sights) {
+  constexpr double most_px = 4.0;
+  return std::ranges::none_of(series, [least_sights](const SightSeries& one) {
+    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+    for (const Eigen::Vector2d& at : one.at) {
+      const Eigen::Vector3d ray = at.homogeneous();
+      sum += ray * ray.transpose() / static_cast<double>(one.at.size());
+    }
+    return one.at.size() >= least_sights &&
+           std::sqrt(std::abs(symmetric_eigen3(sum).values[0])) * one.px > most_px;
+  });
 }
 
 }  // namespace alidade

@@ -25,4 +25,11 @@ struct SightSeries {
 /// Series of one head; rays that look back (z below 0.1) are left out.
 [[nodiscard]] SightSeries sight_series(std::span<const TargetSight> sights, std::size_t head, const RigHead& rig_head);
 
+/// Six pictures of the typical camera: a path bends no faster than that, and sights between knots average.
+[[nodiscard]] double knot_of(std::span<const SightSeries> series);
+
+/// Each camera's rays lie in a plane of its own, within 4 px: the target moved along a line (or in a plane with all
+/// cameras), and the planes alone say too little of where the cameras are.
+[[nodiscard]] bool is_line(std::span<const SightSeries> series, std::size_t least_sights);
+
 }  // namespace alidade

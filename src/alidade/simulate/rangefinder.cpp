@@ -186,7 +186,8 @@ SimulatedShots simulate_shots(const RangefinderScene& scene, const ShotNoise& no
     const double miss_m = draws.uniform(0.3, 1.0);
     if (simulated.is_outlier[i]) shot.range_m += miss_m;
     const auto spot = project(scene.camera, point_at(scene.beam, true_range_m));
-    const Eigen::Vector2d spot_error_px = noise.sigma_spot_px * draws.normal2();
+    const double sigma_px = std::hypot(noise.sigma_spot_px, noise.sigma_spot_near_px / true_range_m);
+    const Eigen::Vector2d spot_error_px = sigma_px * draws.normal2();
     if (noise.with_spot && spot) shot.spot = Spot{*spot + spot_error_px, {}};
     if (noise.with_board) {
       shot.board.emplace();
@@ -200,6 +201,26 @@ SimulatedShots simulate_shots(const RangefinderScene& scene, const ShotNoise& no
     simulated.shots.push_back(std::move(shot));
   }
   return simulated;
+}
+
+std::vector<Shot> mistaken_shots(std::vector<Shot> shots, const ShotMistake& mistake) {
+  const auto num = static_cast<int>(shots.size());
+  std::vector<double> read_m;
+  for (const Shot& shot : shots) read_m.push_back(shot.range_m);
+  for (int i = 0; i < num; ++i) {
+    const int from = ((i - mistake.shift_rows) % num + num) % num;
+    shots[static_cast<std::size_t>(i)].range_m =
+        (read_m[static_cast<std::size_t>(from)] + mistake.offset_m) / mistake.unit_m;
+  }
+  return shots;
+}
+
+Camera mistaken_camera(Camera camera, double focal, double centre_px) {
+  Eigen::VectorXd values = params(camera.lens);
+  values.head<2>() *= 1.0 + focal;
+  values.segment<2>(2).array() += centre_px;
+  camera.lens = with_params(camera.lens, values);
+  return camera;
 }
 
 }  // namespace alidade

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 
 #include "alidade/geometry/degree.h"
 #include "alidade/simulate/draws.h"
@@ -24,6 +26,15 @@ RigHead drawn_head(const RigHead& nominal, const RigSceneConfig& config, bool is
   head.pan_to_tilt_m += Eigen::Vector3d(0.0, 0.0, config.offset_sigma_m * draws.normal());
   head.tilt_to_cam_m += config.offset_sigma_m * draws.normal3();
   head.axes_skew_rad += config.skew_sigma_rad * draws.normal();
+  head.encoder.pan_scale *= config.encoder_scale;
+  head.encoder.tilt_scale *= config.encoder_scale;
+  if (config.once_rad != 0.0) {
+    const double pan = draws.uniform(0.0, 2.0 * std::numbers::pi), tilt = draws.uniform(0.0, 2.0 * std::numbers::pi);
+    head.encoder.pan_cos_rad = config.once_rad * std::cos(pan);
+    head.encoder.pan_sin_rad = config.once_rad * std::sin(pan);
+    head.encoder.tilt_cos_rad = config.once_rad * std::cos(tilt);
+    head.encoder.tilt_sin_rad = config.once_rad * std::sin(tilt);
+  }
   if (is_first) return drawn;
   head.world_from_base.rotation =
       nominal.head.world_from_base.rotation * exp_so3(config.base_sigma_rad * draws.normal3());
@@ -131,11 +142,43 @@ RigScene draw_rig_scene(const RigSceneConfig& given, std::uint64_t seed) {
   return scene;
 }
 
+namespace {
+
+/// Errors of a head's readings that are the same each time.
+class ReadingErrors {
+ public:
+  ReadingErrors(const RigNoise& noise, Draws& draws) : noise_(noise) {
+    if (noise.twice_rad != 0.0) phase_ = {draws.uniform(0.0, 2.0 * std::numbers::pi), draws.uniform(0.0, 6.0)};
+  }
+
+  /// Of the next view.
+  Eigen::Vector2d of(const HeadView& view) {
+    Eigen::Vector2d error = Eigen::Vector2d::Zero();
+    const auto [last, is_first] = last_.try_emplace(view.head, view.pan_tilt_rad, Eigen::Vector2d(0.5, 0.5));
+    auto& [reading_rad, travel] = last->second;
+    for (int axis = 0; axis < 2; ++axis) {
+      const double reading = view.pan_tilt_rad[axis], by_rad = reading - reading_rad[axis];
+      if (by_rad != 0.0) travel[axis] = by_rad > 0.0 ? 0.5 : -0.5;
+      error[axis] = noise_.twice_rad * std::cos(2.0 * reading + phase_[axis]) + noise_.backlash_rad * travel[axis];
+    }
+    reading_rad = view.pan_tilt_rad;
+    return error;
+  }
+
+ private:
+  const RigNoise& noise_;
+  Eigen::Vector2d phase_ = Eigen::Vector2d::Zero();
+  std::map<int, std::pair<Eigen::Vector2d, Eigen::Vector2d>> last_;  ///< By head: reading, travel.
+};
+
+}  // namespace
+
 SimulatedViews simulate_head_views(const RigScene& scene, const RigNoise& noise, std::uint64_t seed) {
   Draws draws(seed + 0x9e3779b97f4a7c15u);
   SimulatedViews simulated{scene.views, std::vector<bool>(scene.views.size(), false)};
+  ReadingErrors errors(noise, draws);
   for (HeadView& view : simulated.views) {
-    view.pan_tilt_rad += noise.sigma_encoder_rad * draws.normal2();
+    view.pan_tilt_rad += errors.of(view) + noise.sigma_encoder_rad * draws.normal2();
     for (Corner& corner : view.seen.corners) corner.px += noise.sigma_px * draws.normal2();
   }
   const auto num = scene.views.size();
@@ -150,6 +193,24 @@ SimulatedViews simulate_head_views(const RigScene& scene, const RigNoise& noise,
     ++made;
   }
   return simulated;
+}
+
+std::vector<HeadView> mistaken_views(std::vector<HeadView> views, const RigScene& scene, const RigMistake& mistake) {
+  std::vector<Eigen::Vector2d> angles;
+  for (const HeadView& view : views) angles.push_back(view.pan_tilt_rad);
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    HeadView& view = views[v];
+    if (mistake.shift_rows) view.pan_tilt_rad = angles[v == 0 ? angles.size() - 1 : v - 1];
+    if (mistake.swap_angles) view.pan_tilt_rad.reverseInPlace();
+    if (mistake.flip_pan) view.pan_tilt_rad.x() *= -1.0;
+    const auto is_of = [&](const RigHead& one) { return one.head.id == view.head; };
+    const auto head = std::find_if(scene.rig.heads.begin(), scene.rig.heads.end(), is_of);
+    if (mistake.mirror && head != scene.rig.heads.end())
+      for (Corner& corner : view.seen.corners) corner.px.x() = head->camera.width_px - 1.0 - corner.px.x();
+    if (mistake.swap_heads && scene.rig.heads.size() == 2)
+      view.head = scene.rig.heads[view.head == scene.rig.heads[0].head.id ? 1 : 0].head.id;
+  }
+  return views;
 }
 
 }  // namespace alidade

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <numbers>
 #include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <random>
 
 #include "alidade/simulate/board_light.h"
 #include "alidade/simulate/board_placing.h"
@@ -159,14 +162,63 @@ cv::Mat SpotStudio::photo(double exposure, std::uint64_t noise_seed) const {
   return photo;
 }
 
+void SpotStudio::add_speckle(double contrast, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::gamma_distribution<double> grain(1.0 / (contrast * contrast), contrast * contrast);
+  const auto& first = parts_->laser[0];
+  for (Eigen::Index v = 0; v < first.rows(); ++v)
+    for (Eigen::Index u = 0; u < first.cols(); ++u) {
+      const auto by = static_cast<float>(grain(random));
+      for (PixelLight& channel : parts_->laser) channel(v, u) *= by;
+    }
+}
+
+namespace {
+
+/// One colour a pixel, and what a camera makes of it.
+cv::Mat through_bayer(const cv::Mat& photo) {
+  cv::Mat raw(photo.size(), CV_8U), colour;
+  for (int v = 0; v < photo.rows; ++v)
+    for (int u = 0; u < photo.cols; ++u)
+      raw.at<unsigned char>(v, u) = photo.at<cv::Vec3b>(v, u)[v % 2 == u % 2 ? (v % 2 == 0 ? 2 : 0) : 1];
+  cv::cvtColor(raw, colour, cv::COLOR_BayerBG2BGR);
+  return colour;
+}
+
+cv::Mat through_jpeg(const cv::Mat& photo, int quality) {
+  std::vector<unsigned char> bytes;
+  cv::imencode(".jpg", photo, bytes, {cv::IMWRITE_JPEG_QUALITY, quality});
+  return cv::imdecode(bytes, cv::IMREAD_COLOR);
+}
+
+/// Places of the board that carry stickers, the same in all photos.
+std::vector<Eigen::Vector3d> stickers_in_cam(const SpotScene& scene, std::size_t i, int num) {
+  std::vector<Eigen::Vector3d> places;
+  Draws draws(4711);
+  const Eigen::Vector3d last = scene.boards.points_in_board.back();
+  for (int k = 0; k < num; ++k) {
+    const Eigen::Vector3d at(draws.uniform(0.1, 0.9) * last.x(), draws.uniform(0.1, 0.9) * last.y(), 0.0);
+    places.emplace_back(scene.boards.cam_from_board[i] * at);
+  }
+  return places;
+}
+
+}  // namespace
+
 cv::Mat render_spot_photo(const SpotScene& scene, std::size_t i, const SpotPhotoConfig& config, std::uint64_t seed) {
   SpotStudio studio(scene.boards, i, config.render, seed);
+  const std::uint64_t own_seed = seed + 0x9e3779b97f4a7c15u * (2 * i + (config.is_on ? 1 : 2));
   std::vector<Eigen::Vector3d> hits = config.stray_in_cam;
   hits.push_back(spot_in_cam(scene, i));
   for (const Eigen::Vector3d& hit_in_cam : hits) {
     if (config.is_on) studio.add_spot(hit_in_cam, scene.beam_direction_in_cam, scene.range_m[i], config.laser);
   }
-  return studio.photo(config.exposure, seed + 0x9e3779b97f4a7c15u * (2 * i + (config.is_on ? 1 : 2)));
+  if (config.speckle > 0.0) studio.add_speckle(config.speckle, own_seed + 1);
+  for (const Eigen::Vector3d& place : stickers_in_cam(scene, i, config.num_stickers))
+    studio.add_spot(place, scene.beam_direction_in_cam, 1.0, config.laser);
+  cv::Mat photo = studio.photo(config.exposure, own_seed);
+  if (config.is_bayer) photo = through_bayer(photo);
+  return config.jpeg_quality > 0 ? through_jpeg(photo, config.jpeg_quality) : photo;
 }
 
 }  // namespace alidade

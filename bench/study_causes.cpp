@@ -1,0 +1,140 @@
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <functional>
+#include <vector>
+
+#include "alidade/geometry/degree.h"
+#include "alidade/testing/rangefinder_trial.h"
+#include "alidade/testing/rig_trial.h"
+
+// How large must what is wrong with a rig or a rangefinder be to be seen, and is an answer that stands ever far off
+// below that? Prints Markdown; exits 1 where a good verdict stands over an error above 5σ.
+
+namespace {
+
+using namespace alidade;
+using namespace alidade::testing;
+
+struct Found {
+  double seen = 0.0, good = 0.0, worst = 0.0;  ///< Shares; largest error, in σ, below a good verdict.
+  int silent = 0;
+};
+
+template <typename Setup>
+struct Case {
+  const char* name;
+  const char* unit;
+  std::vector<double> sizes;
+  std::function<void(Setup&, double)> set;
+};
+using RigCase = Case<RigTrialSetup>;
+using ShotCase = Case<RangefinderTrialSetup>;
+
+RigTrial trial_of(const RigTrialSetup& setup, std::uint64_t seed) { return rig_trial(setup, seed); }
+RangefinderTrial trial_of(const RangefinderTrialSetup& setup, std::uint64_t seed) {
+  return rangefinder_trial(setup, seed);
+}
+const Verdict& verdict_of(const RigTrial& trial) { return trial.verdict; }
+const Verdict& verdict_of(const RangefinderTrial& trial) { return trial.solved.verdict; }
+
+template <typename Setup>
+Found found_of(const Case<Setup>& one, double size, int draws) {
+  Found found;
+  for (int draw = 1; draw <= draws; ++draw) {
+    Setup setup;
+    one.set(setup, size);
+    const auto trial = trial_of(setup, static_cast<std::uint64_t>(7000 + draw));
+    found.seen += trial.is_seen ? 1.0 / draws : 0.0;
+    const bool is_good = verdict_of(trial).state == State::good;
+    found.good += is_good ? 1.0 / draws : 0.0;
+    if (is_good) found.worst = std::max(found.worst, trial.worst_sigmas);
+    found.silent += trial.is_silent() ? 1 : 0;
+    if (std::getenv("ALIDADE_WORDS") != nullptr)
+      fmt::print(stderr, "{} {} {}: {:.1f} {} | {}\n", one.name, size, draw, trial.worst_sigmas,
+                 verdict_of(trial).sentence, verdict_of(trial).to_add);
+  }
+  return found;
+}
+
+/// One table; returns how many good verdicts stood over an error above 5σ.
+template <typename Setup>
+int table_of(const std::vector<Case<Setup>>& cases, int draws, const std::string& only) {
+  fmt::print("| what is wrong | by | seen | ● | worst error below ● | silent |\n|---|---|---|---|---|---|\n");
+  int silent = 0;
+  for (const Case<Setup>& one : cases) {
+    if (!only.empty() && only != one.name) continue;
+    for (const double size : one.sizes) {
+      const Found found = found_of(one, size, draws);
+      silent += found.silent;
+      fmt::print("| {} | {} | {:.0f} % | {:.0f} % | {:.1f}σ | {} |\n", one.name,
+                 *one.unit == '\0' ? std::string("–") : fmt::format("{:g} {}", size, one.unit), 100.0 * found.seen,
+                 100.0 * found.good, found.worst, found.silent);
+      std::fflush(stdout);
+    }
+  }
+  return silent;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int draws = argc > 1 ? std::atoi(argv[1]) : 100;
+  const std::string only = argc > 2 ? argv[2] : "";
+  const std::vector<RigCase> cases{
+      {"clean", "", {0.0}, [](RigTrialSetup&, double) {}},
+      {"clean, scale not told", "", {0.0}, [](RigTrialSetup& s, double) { s.tells_scale = false; }},
+      {"encoder scale, not told", "%", {1.0},
+       [](RigTrialSetup& s, double v) {
+         s.scene.encoder_scale = 1.0 + 0.01 * v;
+         s.tells_scale = false;
+       }},
+      {"encoder scale", "%", {0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0},
+       [](RigTrialSetup& s, double v) { s.scene.encoder_scale = 1.0 + 0.01 * v; }},
+      {"one period a turn", "°", {0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0},
+       [](RigTrialSetup& s, double v) { s.scene.once_rad = v * degree; }},
+      {"two periods a turn", "°", {0.05, 0.1, 0.2, 0.5, 1.0, 2.0},
+       [](RigTrialSetup& s, double v) { s.noise.twice_rad = v * degree; }},
+      {"backlash", "°", {0.02, 0.05, 0.1, 0.2, 0.5, 1.0},
+       [](RigTrialSetup& s, double v) { s.noise.backlash_rad = v * degree; }},
+      {"focal length", "%", {0.1, 0.2, 0.5, 1.0, 2.0, 5.0}, [](RigTrialSetup& s, double v) { s.mistake.focal = 0.01 * v; }},
+      {"centre", "px", {0.5, 1.0, 2.0, 5.0, 10.0, 20.0}, [](RigTrialSetup& s, double v) { s.mistake.centre_px = v; }},
+      {"angles swapped", "", {1.0}, [](RigTrialSetup& s, double) { s.mistake.swap_angles = true; }},
+      {"pan flipped", "", {1.0}, [](RigTrialSetup& s, double) { s.mistake.flip_pan = true; }},
+      {"mirrored", "", {1.0}, [](RigTrialSetup& s, double) { s.mistake.mirror = true; }},
+      {"heads swapped, lenses differ", "", {1.0},
+       [](RigTrialSetup& s, double) {
+         for (const RigHead& head : xiahou_rig()) s.scene.nominal.push_back(head);
+         s.scene.nominal[1].camera = mistaken_camera(s.scene.nominal[1].camera, 0.15, 0.0);
+         s.mistake.swap_heads = true;
+       }},
+      {"rows shifted", "", {1.0}, [](RigTrialSetup& s, double) { s.mistake.shift_rows = true; }},
+  };
+  const std::vector<ShotCase> shot_cases{
+      {"shots as told", "", {0.0}, [](RangefinderTrialSetup&, double) {}},
+      {"range scale", "%", {0.05, 0.1, 0.2, 0.5, 1.0, 2.0},
+       [](RangefinderTrialSetup& s, double v) { s.scale = 1.0 + 0.01 * v; }},
+      {"square", "%", {0.05, 0.1, 0.2, 0.5, 1.0, 2.0},
+       [](RangefinderTrialSetup& s, double v) { s.square = 0.01 * v; }},
+      {"range offset", "mm", {10.0, 100.0},
+       [](RangefinderTrialSetup& s, double v) { s.mistake.offset_m = 0.001 * v; }},
+      {"spot σ at 1 m", "px", {0.5, 1.0, 2.0, 5.0},
+       [](RangefinderTrialSetup& s, double v) { s.noise.sigma_spot_near_px = v; }},
+      {"focal length of the file", "%", {0.2, 0.5, 1.0, 2.0, 5.0},
+       [](RangefinderTrialSetup& s, double v) { s.mistake.focal = 0.01 * v; }},
+      {"centre of the file", "px", {2.0, 5.0, 10.0, 20.0, 50.0},
+       [](RangefinderTrialSetup& s, double v) { s.mistake.centre_px = v; }},
+      {"wrong readings", "%", {6.0, 17.0, 33.0, 45.0, 56.0},
+       [](RangefinderTrialSetup& s, double v) { s.noise.outlier_share = 0.01 * v; }},
+      {"rows late", "", {1.0}, [](RangefinderTrialSetup& s, double) { s.mistake.shift_rows = 1; }},
+      {"rows early", "", {1.0}, [](RangefinderTrialSetup& s, double) { s.mistake.shift_rows = -1; }},
+      {"inches", "", {1.0}, [](RangefinderTrialSetup& s, double) { s.mistake.unit_m = 0.0254; }},
+      {"feet", "", {1.0}, [](RangefinderTrialSetup& s, double) { s.mistake.unit_m = 0.3048; }},
+      {"centimetres", "", {1.0}, [](RangefinderTrialSetup& s, double) { s.mistake.unit_m = 0.01; }},
+  };
+  fmt::print("# What is wrong, and what is seen of it\n\n`study_causes {}` (`make study`)\n\n## `alidade rig`\n\n", draws);
+  int silent = table_of(cases, draws, only);
+  fmt::print("\n## `alidade rangefinder`\n\n");
+  silent += table_of(shot_cases, draws, only);
+  return silent == 0 ? 0 : 1;
+}

@@ -1,0 +1,231 @@
+#include <algorithm>
+#include <cmath>
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include "alidade/geometry/degree.h"
+#include "alidade/rig/rig_work.h"
+
+namespace alidade {
+namespace {
+
+using Status = RigReport::Status;
+
+/// What a cause would have free.
+struct Candidate {
+  RigCause cause;
+  FreedParams params;
+};
+
+/// An error of two periods a turn is no parameter: over the angles of a head a scale and one period do nearly as well.
+std::vector<int> params_of(const std::string& name) {
+  const int axis = name.starts_with("tilt") ? 1 : 0;
+  if (name == "camera.fx") return {focal_param};
+  if (name == "camera.cx") return {centre_x_param};
+  if (name == "camera.cy") return {centre_y_param};
+  if (name.ends_with("_scale")) return {17 + axis};
+  if (name.ends_with("once a turn")) return {20 + 2 * axis, 21 + 2 * axis};
+  if (name.ends_with("backlash")) return {pan_backlash_param + axis};
+  return {17 + axis, 20 + 2 * axis, 21 + 2 * axis};
+}
+
+std::vector<int> params_of_all(const std::string& name) {
+  if (name == "scales") return {17, 18};
+  if (name == "once a turn") return {20, 21, 22, 23};
+  if (name == "backlash") return {pan_backlash_param, tilt_backlash_param};
+  if (name == "camera.fx") return {focal_param};
+  return {centre_x_param, centre_y_param};
+}
+
+bool is_of_lens(const Candidate& one) {
+  const int param = one.params.begin()->second.front();
+  return param >= focal_param && param <= centre_y_param;
+}
+
+Candidate candidate_of(const RigCause& cause, const Rig& rig) {
+  Candidate candidate{cause, {}};
+  constexpr std::string_view all = "all ";
+  if (cause.name.starts_with(all)) {
+    for (const RigHead& one : rig.heads) candidate.params[one.head.id] = params_of_all(cause.name.substr(all.size()));
+  } else {
+    const std::size_t dot = cause.name.find('.');
+    candidate.params[std::stoi(cause.name.substr(4, dot - 4))] = params_of(cause.name.substr(dot + 1));
+  }
+  return candidate;
+}
+
+FreedParams with(FreedParams freed, const Candidate& more) {
+  for (const auto& [head, params] : more.params)
+    for (const int param : params)
+      if (std::ranges::find(freed[head], param) == freed[head].end()) freed[head].push_back(param);
+  return freed;
+}
+
+std::size_t num_of(const FreedParams& freed) {
+  std::size_t num = 0;
+  for (const auto& [head, params] : freed) num += params.size();
+  return num;
+}
+
+/// By Schwarz's criterion: so many views, so many parameters more.
+double score_of(const RigReport& report, const FreedParams& freed) {
+  return report.deviance + static_cast<double>(num_of(freed)) * std::log(2.0 * report.views_used);
+}
+
+class ByNeed {
+ public:
+  ByNeed(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points, const std::map<int, Camera>& cameras,
+         RigConfig config, const Progress& progress, RigReport report)
+      : views_(views), points_(points), cameras_(cameras), config_(std::move(config)), progress_(progress) {
+    // Two solves are compared by the same σ of a corner.
+    if (!config_.sigma_px) config_.sigma_px = report.sigma_px;
+    best_ = std::move(report);
+    sigma_px_is_told_ = best_.sigma_px_is_told;
+  }
+
+  /// Scales that nobody told are estimated where holding them matters.
+  void free_untold_scales() {
+    if (config_.sigma_scale || config_.estimate_scales) return;
+    const bool matters = std::ranges::any_of(best_.assumed, [](const Assumption& what) {
+      return what.name.ends_with("_scale") && !what.sigma && what.moves > 1.0;
+    });
+    if (!matters) return;
+    FreedParams scales;
+    for (const RigHead& rig_head : best_.rig.heads) scales[rig_head.head.id] = {17, 18};
+    if (auto trial = solve(scales)) {
+      freed_ = std::move(scales);
+      best_ = std::move(*trial);
+    }
+  }
+
+  /// The cause that explains the residuals best, one after another.
+  void free_what_is_asked() {
+    constexpr int most = 6;
+    for (int round = 0; round < most && free_next(); ++round) continue;
+  }
+
+  RigReport result() && {
+    best_.sigma_px_is_told = sigma_px_is_told_;
+    describe();
+    best_.alike = alike_;
+    return std::move(best_);
+  }
+
+ private:
+  /// None where the views cannot tell it.
+  std::optional<RigReport> solve(const FreedParams& freed) {
+    constexpr double worst_rad = 2.0 * degree, worst_m = 0.05;
+    RigReport trial = calibrated_with(views_, points_, cameras_, config_, freed, progress_);
+    const bool is_told = trial.status == Status::converged && trial.sigma_relative_rad < worst_rad &&
+                         trial.sigma_relative_m < worst_m && trial.views_used >= best_.views_used;
+    return is_told ? std::optional(std::move(trial)) : std::nullopt;
+  }
+
+  std::vector<Candidate> asked() const {
+    constexpr double near = 0.5;  // of the largest: what one cause does looks to another's score like itself
+    std::vector<Candidate> candidates;
+    if (best_.causes.empty()) return candidates;
+    const double largest = std::ranges::max_element(best_.causes, {}, &RigCause::sigmas)->sigmas;
+    for (const RigCause& cause : best_.causes) {
+      const bool is_joint = cause.name.starts_with("all ");  // five of thirty, and the ones that see most
+      if (cause.sigmas < (is_joint ? rig_free_joint_limit : rig_free_limit)) continue;
+      if (cause.sigmas < near * largest) continue;
+      Candidate next = candidate_of(cause, best_.rig);
+      const bool is_new = num_of(with(freed_, next)) > num_of(freed_);
+      if (is_new && candidates.size() < 8) candidates.push_back(std::move(next));
+    }
+    return candidates;
+  }
+
+  bool free_next() {
+    struct Trial {
+      Candidate of;
+      RigReport report;
+      double score = 0.0;
+    };
+    std::vector<Trial> trials;
+    for (const Candidate& candidate : asked()) {
+      const FreedParams freed = with(freed_, candidate);
+      if (auto report = solve(freed)) trials.push_back({candidate, std::move(*report), 0.0});
+      if (!trials.empty()) trials.back().score = score_of(trials.back().report, freed);
+    }
+    if (trials.empty()) return false;
+    std::ranges::sort(trials, {}, &Trial::score);
+    constexpr double alike = 10.0;  // e⁵ to one
+    Trial& first = trials.front();
+    freed_ = with(freed_, first.of);
+    best_ = std::move(first.report);
+    for (const Trial& other : trials) {
+      if (other.score > first.score + alike || is_of_lens(other.of) == is_of_lens(first.of)) continue;
+      // Neither is to be preferred: both, and if the views cannot tell both, it is said.
+      const FreedParams both = with(freed_, other.of);
+      if (auto report = solve(both)) {
+        freed_ = both;
+        best_ = std::move(*report);
+      } else {
+        alike_ = first.of.cause.name + " and " + other.of.cause.name;
+      }
+      break;
+    }
+    return true;
+  }
+
+  void describe() {
+    const Rig& rig = best_.rig;
+    for (std::size_t h = 0; h < rig.heads.size(); ++h) {
+      const auto found = freed_.find(rig.heads[h].head.id);
+      if (found == freed_.end()) continue;
+      for (const int param : found->second) best_.freed.push_back(freed_of(h, param));
+    }
+  }
+
+  RigFreed freed_of(std::size_t h, int param) const {
+    const RigHead& rig_head = best_.rig.heads[h];
+    const Encoder& encoder = rig_head.head.encoder;
+    RigFreed freed{.name = "head" + std::to_string(rig_head.head.id) + "." + rig_param_name(param)};
+    if (param < num_head_params) {
+      const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h) + param;
+      freed.sigma = std::sqrt(best_.rig.cov(at, at));
+      const bool is_scale = param == 17 || param == 18;
+      freed.value = is_scale ? (param == 17 ? encoder.pan_scale : encoder.tilt_scale)
+                             : std::array{encoder.pan_cos_rad, encoder.pan_sin_rad, encoder.tilt_cos_rad,
+                                          encoder.tilt_sin_rad}[static_cast<std::size_t>(param - 20)];
+      freed.was = is_scale ? std::copysign(1.0, freed.value) : 0.0;  // which way it counts is found, not asked for
+    } else if (param >= pan_backlash_param) {
+      const int axis = param - pan_backlash_param;
+      freed.value = best_.backlash_rad[h][axis];
+      freed.sigma = best_.sigma_backlash_rad[h][axis];
+    } else {
+      const Eigen::Index k = param == focal_param ? 0 : param == centre_x_param ? 2 : 3;
+      freed.value = params(rig_head.camera.lens)[k];
+      freed.sigma = std::sqrt(rig_head.camera.cov(k, k));
+      freed.was = params(cameras_.at(rig_head.head.id).lens)[k];
+    }
+    return freed;
+  }
+
+  std::span<const HeadView> views_;
+  std::span<const Eigen::Vector3d> points_;
+  const std::map<int, Camera>& cameras_;
+  RigConfig config_;
+  const Progress& progress_;
+  FreedParams freed_;
+  RigReport best_;
+  bool sigma_px_is_told_ = false;
+  std::string alike_;
+};
+
+}  // namespace
+
+RigReport freed_by_need(RigReport report, std::span<const HeadView> views,
+                        std::span<const Eigen::Vector3d> points_in_board, const std::map<int, Camera>& cameras,
+                        const RigConfig& config, const Progress& progress) {
+  ByNeed by_need(views, points_in_board, cameras, config, progress, std::move(report));
+  by_need.free_what_is_asked();
+  by_need.free_untold_scales();
+  by_need.free_what_is_asked();
+  return std::move(by_need).result();
+}
+
+}  // namespace alidade

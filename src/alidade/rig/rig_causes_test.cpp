@@ -1,0 +1,112 @@
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <functional>
+
+#include "alidade/geometry/degree.h"
+#include "alidade/testing/rig_trial.h"
+
+// What may be wrong with a rig, each alone: never a good verdict over an error above 5σ, and what can be told apart is
+// estimated. ALIDADE_TEST_TRIALS=20 draws as many rigs of each kind; bench/study_causes.cpp: of which size each is seen.
+
+namespace alidade {
+namespace {
+
+using testing::rig_trial;
+using testing::RigTrial;
+using testing::RigTrialSetup;
+
+int num_rigs() {
+  const char* const wanted = std::getenv("ALIDADE_TEST_TRIALS");
+  return wanted != nullptr ? std::min(100, std::atoi(wanted)) : 4;
+}
+
+struct RigFault {
+  const char* name;
+  std::function<void(RigTrialSetup&)> set;
+};
+
+class RigFaults : public ::testing::TestWithParam<RigFault> {};
+
+TEST_P(RigFaults, AreNeverSilent) {
+  for (int draw = 1; draw <= num_rigs(); ++draw) {
+    RigTrialSetup setup;
+    GetParam().set(setup);
+    const RigTrial trial = rig_trial(setup, static_cast<std::uint64_t>(300 + draw));
+    EXPECT_FALSE(trial.is_silent()) << GetParam().name << " " << draw << ": " << trial.worst_sigmas << "σ: "
+                                    << trial.verdict.sentence;
+  }
+}
+
+// Of each a size that is hardly seen, and one that is plain.
+INSTANTIATE_TEST_SUITE_P(
+    All, RigFaults,
+    ::testing::Values(
+        RigFault{"scale_small", [](RigTrialSetup& s) { s.scene.encoder_scale = 1.001; }},
+        RigFault{"scale", [](RigTrialSetup& s) { s.scene.encoder_scale = 1.01; }},
+        RigFault{"once_small", [](RigTrialSetup& s) { s.scene.once_rad = 0.3 * degree; }},
+        RigFault{"once", [](RigTrialSetup& s) { s.scene.once_rad = 3.0 * degree; }},
+        RigFault{"twice", [](RigTrialSetup& s) { s.noise.twice_rad = 0.3 * degree; }},
+        RigFault{"backlash_small", [](RigTrialSetup& s) { s.noise.backlash_rad = 0.05 * degree; }},
+        RigFault{"backlash", [](RigTrialSetup& s) { s.noise.backlash_rad = 0.3 * degree; }},
+        RigFault{"focal_small", [](RigTrialSetup& s) { s.mistake.focal = 0.003; }},
+        RigFault{"focal", [](RigTrialSetup& s) { s.mistake.focal = 0.02; }},
+        RigFault{"centre_small", [](RigTrialSetup& s) { s.mistake.centre_px = 2.0; }},
+        RigFault{"centre", [](RigTrialSetup& s) { s.mistake.centre_px = 8.0; }},
+        RigFault{"swapped_angles", [](RigTrialSetup& s) { s.mistake.swap_angles = true; }},
+        RigFault{"flipped_pan", [](RigTrialSetup& s) { s.mistake.flip_pan = true; }},
+        RigFault{"mirrored", [](RigTrialSetup& s) { s.mistake.mirror = true; }},
+        RigFault{"shifted_rows", [](RigTrialSetup& s) { s.mistake.shift_rows = true; }}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+const RigFreed* freed_named(const RigTrial& trial, const std::string& name) {
+  for (const RigFreed& one : trial.report.freed)
+    if (one.name == name) return &one;
+  return nullptr;
+}
+
+TEST(RigByNeed, EstimatesTheEncodersScaleAndSaysSo) {
+  RigTrialSetup setup;
+  setup.scene.encoder_scale = 1.01;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const RigTrial trial = rig_trial(setup, seed);
+    const RigFreed* const scale = freed_named(trial, "head1.pan_scale");
+    ASSERT_TRUE(scale) << seed;
+    EXPECT_NEAR(scale->value, 1.01, 4.0 * scale->sigma);
+    EXPECT_LT(scale->sigma, 0.01);
+    EXPECT_LT(trial.worst_sigmas, 5.0);
+    EXPECT_EQ(trial.verdict.state, State::care);  // the person took it for exact
+    EXPECT_TRUE(std::ranges::any_of(trial.verdict.checks, [](const Check& check) {
+      return check.name == "estimated" && check.text.find("head1.pan_scale") != std::string::npos;
+    }));
+  }
+}
+
+TEST(RigByNeed, EstimatesBacklashAndCountsHalfOfItAsNoiseOfReadings) {
+  RigTrialSetup setup;
+  setup.noise.backlash_rad = 0.3 * degree;
+  setup.scene.most_views_of_a_board = 6;
+  int found = 0;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const RigTrial trial = rig_trial(setup, seed);
+    const RigFreed* const backlash = freed_named(trial, "head1.pan_backlash_rad");
+    if (backlash == nullptr) continue;
+    ++found;
+    EXPECT_NEAR(backlash->value, 0.3 * degree, 4.0 * backlash->sigma + 0.03 * degree);
+    EXPECT_GE(trial.report.rig.heads[0].head.encoder.sigma_rad, 0.4 * backlash->value);
+  }
+  EXPECT_GE(found, 2);
+}
+
+TEST(RigByNeed, LeavesACleanRigAsItIs) {
+  int freed = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const RigTrial trial = rig_trial({}, seed);
+    for (const RigCause& cause : trial.report.causes) freed += cause.sigmas > rig_cause_limit ? 1 : 0;
+    for (const RigFreed& one : trial.report.freed) EXPECT_LT(std::abs(one.value - one.was), 4.5 * one.sigma) << one.name;
+  }
+  EXPECT_EQ(freed, 0);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -24,8 +24,7 @@ const wordOf: Record<string, string> = {good: 'reproduced', care: 'in shape', ba
 
 function claimRow(table: Table, i: number, columns: Column[]): HTMLElement {
   const look = lookOf(table.text('state', i)), value = (name: string) => table.number(name, i);
-  return el('tr', {}, el('th', {}, el('span', {class: `state-${look.name}`, role: 'img', 'aria-label': wordOf[look.name] ?? look.word}, look.symbol), ' ', el('b', {}, table.text('id', i))),
-    el('td', {class: 'word', style: 'text-align:left'}, table.text('quantity', i)), ...columns.map(({name}) => el('td', {class: 'value'}, Number.isFinite(value(name)) ? num(value(name), 4) : '')), el('td', {class: 'unit'}, table.text('unit', i)),
+  return el('tr', {}, el('th', {style: 'min-width:13em;white-space:normal'}, el('span', {class: `state-${look.name}`, role: 'img', 'aria-label': wordOf[look.name] ?? look.word}, look.symbol), ' ', el('b', {}, table.text('id', i)), el('br'), table.text('quantity', i)), ...columns.map(({name}) => el('td', {class: 'value'}, Number.isFinite(value(name)) ? num(value(name), 4) : '')), el('td', {class: 'unit'}, table.text('unit', i)),
     table.has('words') ? el('td', {class: 'word', style: 'text-align:left'}, table.text('words', i)) : null);
 }
 
@@ -35,7 +34,7 @@ export const reproduceTable: Figure = {
     const table = doc.table('experiments');
     if (!table) return null;
     const columns = columnsOf(table), rows = Array.from({length: table.rows}, (_, i) => i), held = rows.filter((i) => table.text('state', i) === 'good').length;
-    const heads = ['', '', ...columns.map(({words}) => words), 'unit', ...(table.has('words') ? ['what is behind it'] : [])];
+    const heads = ['', ...columns.map(({words}) => words), 'unit', ...(table.has('words') ? ['what is behind it'] : [])];
     host.append(el('div', {class: 'scroll', style: 'max-height:none'}, el('table', {class: 'estimate'}, el('thead', {}, el('tr', {}, ...heads.map((word) => el('th', {}, word)))), el('tbody', {}, ...rows.map((i) => claimRow(table, i, columns))))));
     return {marks: table.rows, rows: table.rows, tables: [table], words: `${held} of ${table.rows} hold`,
       good: `● reproduced ◆ in shape ▲ not reproducible; ${held} of ${table.rows} are reproduced. Ours: our default method on the same data.`};
@@ -126,7 +125,7 @@ function outline(pen: Pen, x: number[], values: number[], sx: (v: number) => num
 /** Lines of one unit over the first column; what the paper prints as rings, cases that have no order as dots. */
 function drawPanel(pen: Pen, table: Table, across: string, lines: Line[], unit: string, isLast: boolean, said: Words): void {
   const x = table.numbers(across), xs = extent(x)!, ys = extent(...lines.map(({name}) => table.numbers(name)))!, hasCases = isCases(across);
-  const isLog = ys[0] > 0 && ys[1] > 100 * ys[0], margin = 0.06 * (ys[1] - ys[0]) || Math.abs(ys[1]) * 0.1 || 1, pad = hasCases ? 0.4 : 0;
+  const isLog = !isHistogram(across) && ys[0] > 0 && ys[1] > 100 * ys[0], margin = 0.06 * (ys[1] - ys[0]) || Math.abs(ys[1]) * 0.1 || 1, pad = hasCases ? 0.4 : 0;
   const left = 60, right = pen.w - 12, bottom = pen.h - (isLast ? 42 : 22), sx = scale(xs[0] - pad, xs[1] + pad, left, right), sy = isLog ? scale(ys[0] / 1.5, ys[1] * 1.5, bottom, 24, true) : scale(ys[0] - margin, ys[1] + margin, bottom, 24);
   yAxis(pen, sy, left, right, {label: withUnit(said.up, unit).replace(/^, /, '')});
   xAxis(pen, sx, 24, bottom, {label: isLast ? acrossOf(across, said.across) : undefined, format: hasCases ? (v) => (!Number.isInteger(v) ? '' : table.has('label') ? (table.text('label', v - 1).split(':')[0] ?? '') : String(v)) : undefined});

@@ -28,6 +28,9 @@ void summarize(const ServoIdentification& identified, Run& run) {
                       per, fit.params[0] * deg, 3.0 * sigma[0] * deg, per));
   run.say(fmt::format("tau       {:.6g} ± {:.2g} s", fit.params[1], 3.0 * sigma[1]));
   run.say(fmt::format("latency   {:.6g} ± {:.2g} s", fit.params[2], 3.0 * sigma[2]));
+  for (const std::size_t flaw : fit.freed)
+    run.say(fmt::format("{} {:.6g} ± {:.2g} {}", servo_flaw_words[flaw], fit.flaws.*servo_flaws[flaw],
+                        3.0 * fit.flaw_sigma[flaw], servo_flaw_units[flaw]));
   run.say(fmt::format("residuals {:.3g}° RMS, correlation {:.2f}; as {} plant {:.3g}°", fit.rms_rad * deg,
                       identified.lag_one_correlation, is_angle ? "a rate" : "an angle",
                       identified.other.rms_rad * deg));
@@ -57,7 +60,9 @@ void add_identify(Frame& frame) {
   auto args = std::make_shared<IdentifyArgs>();
   CLI::App& command = frame.add_command(
       {.name = "identify",
-       .summary = "Gain, time constant and latency of one axis of a pan-tilt head from a log of commands and angles",
+       .summary =
+           "Gain, time constant, latency, limits, dead band and backlash of one axis of a pan-tilt head from a log of "
+           "commands and angles",
        .examples = "  alidade identify log.csv\n"
                    "  alidade simulate servo --chirp --out sim && alidade identify sim/log.csv\n"},
       [args](Run& run) { return identify(*args, run); });

@@ -14,10 +14,13 @@
 namespace alidade::cli {
 namespace {
 
+constexpr double most_rate_deg_s = 1e6;
+
 struct SimulateServoArgs {
   std::string kind = "angle", unit = "deg";
   bool chirp = false, one_step = false;
-  double gain = 0.0, tau_s = 0.1, latency_s = 0.08, max_rate_deg_s = 1e6, max_acceleration_deg_s2 = 1e9;
+  double gain = 0.0, tau_s = 0.1, latency_s = 0.08, max_rate_deg_s = most_rate_deg_s, max_acceleration_deg_s2 = 1e9;
+  double dead_band = 0.0, backlash_deg = 0.0, second_tau_s = 0.0;
   double amplitude = 200.0, duration_s = 5.0, rate_hz = 100.0, sigma_deg = 0.05, step_deg = 0.0, zero_deg = 0.0;
 };
 
@@ -30,8 +33,13 @@ ServoLogScene scene_of(const SimulateServoArgs& args) {
     plant.max_acceleration_rad_s2 = deg * args.max_acceleration_deg_s2;
     scene.axis.plant = plant;
   } else {
-    scene.axis.plant = AnglePlant{args.gain != 0.0 ? args.gain : 0.0567, *unit_named(args.unit), args.tau_s};
+    AnglePlant plant{args.gain != 0.0 ? args.gain : 0.0567, *unit_named(args.unit), args.tau_s};
+    if (args.max_rate_deg_s < most_rate_deg_s) plant.max_rate_rad_s = deg * args.max_rate_deg_s;
+    scene.axis.plant = plant;
   }
+  scene.axis.dead_band = args.dead_band;
+  scene.axis.backlash_rad = deg * args.backlash_deg;
+  scene.axis.second_tau_s = args.second_tau_s;
   scene.axis.command_delay_s = args.latency_s;
   scene.is_chirp = args.chirp;
   if (args.one_step) scene.steps = {1.0};
@@ -90,9 +98,14 @@ void add_servo_scenario(Frame& frame) {
   };
   number("--tau-s", args->tau_s, "Time constant", 1e-4, 100.0);
   number("--latency-s", args->latency_s, "From a command to its first effect", 0.0, 10.0);
-  number("--max-rate-deg-s", args->max_rate_deg_s, "With --kind rate: fastest turn [deg/s]", 1e-3, 1e6);
+  number("--max-rate-deg-s", args->max_rate_deg_s, "Fastest turn [deg/s]", 1e-3, most_rate_deg_s);
   number("--max-acceleration-deg-s2", args->max_acceleration_deg_s2, "With --kind rate: largest acceleration [deg/s2]",
          1e-3, 1e9);
+  number("--dead-band", args->dead_band, "Commands no larger do nothing, larger ones count from it [units of command]",
+         0.0, 1e9);
+  number("--backlash-deg", args->backlash_deg, "Play between what drives the axis and the angle that is read", 0.0,
+         90.0);
+  number("--second-tau-s", args->second_tau_s, "A second lag, of the command", 0.0, 100.0);
   number("--amplitude", args->amplitude, "Size of the step or sine, in units of command", 0.0, 1e9);
   number("--duration-s", args->duration_s, "Length of the log [s]", 1e-3, 1e4);
   number("--rate-hz", args->rate_hz, "Rows a second", 1e-2, 1e5);

@@ -2,6 +2,9 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <map>
 #include <memory>
 #include <opencv2/core.hpp>
 
@@ -25,8 +28,10 @@ constexpr double longest_s = 3600.0;
 struct SimulateTrackArgs {
   std::string scenario = "B", path;
   bool video = false;
+  double clutter = 0.0;
   double duration_s = 0.0;
-  double latency_ms = -1.0, lag_s = 0.34, sigma_px = 0.5, sigma_angle = 0.0008726646259971648;
+  std::vector<std::string> faults;
+  double latency_ms = -1.0, lag_s = -1.0, sigma_px = 0.5, sigma_angle = 0.0008726646259971648;
 };
 
 /// What a filter should be told of a recorded target: nearly the largest acceleration over a tenth of a second, in
@@ -54,6 +59,52 @@ void follow_record(const std::string& file, TrackScene& scene) {
   scene.sigma_a_m_s2 = usual_acceleration(scene);
 }
 
+const char* const fault_help =
+    "What is not as rig.yaml says, NAME or NAME:SIZE; of head 2 unless named: yaw, pitch, roll (of its base, rad), "
+    "baseline (share of it), pan_zero1, pan_zero2, tilt_zero1, tilt_zero2 (rad), clock (s), clutter (share of the "
+    "sights), second_target (share of the sights), swapped, mirrored, pan_sign, tilt_sign; rig.yaml then does not call "
+    "itself exact";
+
+std::optional<double> number_of(const std::string& text) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+/// One --fault, put into the scene's.
+void add_fault(const std::string& text, TrackFaults& faults) {
+  const std::size_t colon = text.find(':');
+  const std::string name = text.substr(0, colon);
+  const std::map<std::string, bool*> flags{{"swapped", &faults.swapped},
+                                           {"mirrored", &faults.mirrored},
+                                           {"pan_sign", &faults.pan_sign},
+                                           {"tilt_sign", &faults.tilt_sign}};
+  if (const auto flag = flags.find(name); flag != flags.end() && colon == std::string::npos) {
+    *flag->second = true;
+    return;
+  }
+  const std::map<std::string, std::pair<double*, double>> sizes{{"pitch", {&faults.base_turn_rad.x(), 1.0}},
+                                                                {"yaw", {&faults.base_turn_rad.y(), 1.0}},
+                                                                {"roll", {&faults.base_turn_rad.z(), 1.0}},
+                                                                {"baseline", {&faults.baseline, 0.9}},
+                                                                {"pan_zero1", {&faults.zero_rad[0].x(), 1.0}},
+                                                                {"pan_zero2", {&faults.zero_rad[1].x(), 1.0}},
+                                                                {"tilt_zero1", {&faults.zero_rad[0].y(), 1.0}},
+                                                                {"tilt_zero2", {&faults.zero_rad[1].y(), 1.0}},
+                                                                {"clock", {&faults.clock_s, 1.0}},
+                                                                {"clutter", {&faults.clutter, 1.0}},
+                                                                {"second_target", {&faults.second, 1.0}}};
+  const auto found = sizes.find(name);
+  const std::string number = colon == std::string::npos ? "" : text.substr(colon + 1);
+  const auto size = number_of(number);
+  if (found == sizes.end() || !size || !(std::abs(*size) <= found->second.second))
+    throw UsageError(fmt::format("--fault: '{}' is not NAME or NAME:SIZE, size at most 1; see --help", text));
+  if ((name == "clutter" || name == "second_target") && *size < 0.0)
+    throw UsageError(fmt::format("--fault: '{}' is a share below 0", text));
+  *found->second.first = *size;
+}
+
 TrackScene scene_of(const SimulateTrackArgs& args) {
   auto scene = track_scenario(args.scenario);
   if (!scene)
@@ -65,7 +116,8 @@ TrackScene scene_of(const SimulateTrackArgs& args) {
   if (scene->duration_s > longest_s)
     throw InputError(
         fmt::format("{}: lasts {:g} s; give --duration, at most {:g} s", args.path, scene->duration_s, longest_s));
-  scene->aiming_lag_s = args.lag_s;
+  if (args.lag_s >= 0.0) scene->aiming_lag_s = args.lag_s;
+  for (const std::string& fault : args.faults) add_fault(fault, scene->faults);
   scene->sigma_px = args.sigma_px;
   scene->sigma_encoder_rad = args.sigma_angle;
   for (RigHead& head : scene->heads) head.head.encoder.sigma_rad = args.sigma_angle;
@@ -84,7 +136,7 @@ TrueTrack truth_of(const TrackScene& scene) {
 }
 
 /// Frames of both heads and the angles they read: what `track --video` takes. Pictures are taken at the true angles.
-std::size_t add_frames(const TrackScene& scene, double sigma_encoder_rad, Run& run) {
+std::size_t add_frames(const TrackScene& scene, double sigma_encoder_rad, double clutter, Run& run) {
   HeadAngles angles;
   angles.logs.resize(scene.heads.size());
   Draws draws(run.options.seed);
@@ -93,8 +145,8 @@ std::size_t add_frames(const TrackScene& scene, double sigma_encoder_rad, Run& r
     report_progress(run.progress, "frames", k, sights.size());
     const SimulatedSight& sight = sights[k];
     const RigHead& head = scene.heads[sight.head];
-    const cv::Mat frame =
-        render_target_frame(head, sight.pan_tilt_rad, scene.position(sight.t_capture_s), {}, {}, run.options.seed + k);
+    const cv::Mat frame = render_target_frame(head, sight.pan_tilt_rad, scene.position(sight.t_capture_s), {},
+                                              {.clutter = clutter}, run.options.seed + k);
     auto& rows = angles.logs[sight.head].rows;
     run.add_file(fmt::format("head_{}/{:06}.png", head.head.id, rows.size()), png_bytes(frame));
     const Eigen::Vector2d read = sight.pan_tilt_rad + sigma_encoder_rad * draws.normal2();
@@ -131,10 +183,18 @@ Rig exact_rig(const std::vector<RigHead>& heads) {
 ExitCode simulate_track_events(const SimulateTrackArgs& args, Run& run) {
   TrackScene scene = scene_of(args);
   if (!args.path.empty()) run.add_input("path", args.path);
+  if (args.video && !args.faults.empty()) throw UsageError("--fault: not with --video");
+  if (!args.video && args.clutter > 0.0)
+    throw UsageError("--clutter: is for --video; --fault clutter:SHARE for sights");
   if (args.video) scene.sigma_encoder_rad = 0.0;
-  const std::size_t num_sights = args.video ? add_frames(scene, args.sigma_angle, run) : add_events(scene, run);
+  const std::size_t num_sights =
+      args.video ? add_frames(scene, args.sigma_angle, args.clutter, run) : add_events(scene, run);
   run.add_file("truth.csv", true_track_csv(truth_of(scene)));
-  const Rig rig = exact_rig(scene.heads);
+  Rig rig = exact_rig(scene.heads);
+  if (!args.faults.empty()) {
+    rig = {};
+    rig.heads = scene.heads;
+  }
   run.add_file("rig.yaml", rig_text(rig));
   run.document.estimate["sigma_a_m_s2"] = scene.sigma_a_m_s2;
   run.document.estimate["duration_s"] = scene.duration_s;
@@ -155,6 +215,7 @@ void add_track_scenario(Frame& frame) {
        "  alidade simulate track --scenario C --out sim && alidade track sim/events.csv --rig sim/rig.yaml \\\n"
        "    --truth sim/truth.csv\n"
        "  alidade simulate track --scenario B --latency-ms 100 --out late\n"
+       "  alidade simulate track --scenario B --fault clock:0.03 --fault clutter:0.05 --out faulty\n"
        "  alidade simulate track --scenario G --path recorded.csv --out real\n"
        "  alidade simulate track --scenario B --video --duration 3 --out film && alidade track --video film/head_1 \\\n"
        "    film/head_2 --angles film/angles.csv --rig film/rig.yaml --target colour:230,70,20 --truth film/truth.csv",
@@ -164,7 +225,8 @@ void add_track_scenario(Frame& frame) {
       .add_option(
           "--scenario", args->scenario,
           "A slow circle; A2 the same, heads with offsets and turned mountings; B fast circle; C manoeuvre; D C, "
-          "hidden for a while; E B, pictures 100 ms late; F C, 100 ms late; G C, 20 and 30 pictures a second")
+          "hidden for a while; E B, pictures 100 ms late; F C, 100 ms late; G C, 20 and 30 pictures a second; "
+          "throw a ball thrown up and caught")
       ->capture_default_str();
   command.add_option(
       "--path", args->path,
@@ -173,9 +235,12 @@ void add_track_scenario(Frame& frame) {
     return command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high));
   };
   command.add_flag("--video", args->video, "Render frames instead of sights: head_1/, head_2/, angles.csv");
+  number("--clutter", args->clutter, "With --video: coloured patches behind the target, σ of a colour, of 255", 0.0,
+         100.0);
   number("--duration", args->duration_s, "Seconds (default: the scenario's, or the path's)", 0.1, longest_s);
   number("--latency-ms", args->latency_ms, "Capture to arrival (default: the scenario's)", 0.0, 10000.0);
-  number("--lag-s", args->lag_s, "Time constant of the heads", 0.0, 10.0)->capture_default_str();
+  number("--lag-s", args->lag_s, "Time constant of the heads (default: 0.34; of the throw 0.05)", 0.0, 10.0);
+  command.add_option("--fault", args->faults, fault_help)->type_name("NAME:SIZE");
   number("--sigma-px", args->sigma_px, "Noise of the target's pixel", 0.0, 100.0)->capture_default_str();
   number("--sigma-angle", args->sigma_angle, "Noise of an encoder [rad]", 0.0, 1.0)->capture_default_str();
 }

@@ -48,7 +48,8 @@ TrackConfig config_of(const TrackArgs& args) {
   if (args.sigma_px > 0.0) config.tracker.sigma_px = args.sigma_px;
   if (args.sigma_a > 0.0) config.tracker.sigma_a_m_s2 = args.sigma_a;
   if (!args.gravity_m_s2.empty()) {
-    if (args.method != "ballistic") throw UsageError("--gravity: only with --method ballistic");
+    if (args.method != "ballistic" && args.method != "imm")
+      throw UsageError("--gravity: only with --method ballistic or imm");
     config.tracker.gravity_m_s2 = Eigen::Vector3d(args.gravity_m_s2.data());
   }
   if (config.tracker.min_depth_m >= config.tracker.max_depth_m)
@@ -284,14 +285,15 @@ void add_options(CLI::App& command, TrackArgs& args) {
       ->type_name("FILE");
   command
       .add_option(
-          "--method", args.method,
-          "Motion of the target: cv (constant velocity), singer, turn, imm, ballistic (free fall); or the filter "
-          "of xiahou2015")
+          "--method,--motion", args.method,
+          "Motion of the target: cv (constant velocity), singer, turn, imm (quiet, agile or falling), ballistic (free "
+          "fall); or the filter of xiahou2015")
       ->check(CLI::IsMember({"cv", "singer", "turn", "imm", "ballistic", "xiahou2015"}))
       ->capture_default_str();
   command
-      .add_option("--gravity", args.gravity_m_s2,
-                  "With ballistic: gravity in the rig's world [m/s2] (default: 0 9.80665 0, the first camera level)")
+      .add_option(
+          "--gravity", args.gravity_m_s2,
+          "With ballistic and imm: gravity in the rig's world [m/s2] (default: 0 9.80665 0, the first camera level)")
       ->expected(3)
       ->check(finite_number());
   command.add_flag("--corrected", args.corrected, "With xiahou2015: pixels and mounting corrected, else as printed");

@@ -8,6 +8,7 @@
 #include "alidade/io/table_rows.h"
 #include "alidade/io/thin_tables.h"
 #include "alidade/report/thin.h"
+#include "alidade/servo/identify_causes.h"
 
 namespace alidade {
 namespace {
@@ -30,6 +31,30 @@ void fill_table(std::span<const ServoSample> log, const ServoIdentification& ide
                             {"model_rad", rounded(std::move(model), 7)},
                             {"residual_rad", rounded(std::move(residual), 7)}}});
   record_steps_kept(document.data.back(), log.size(), "");
+}
+
+/// What was freed beside a lag, and the encoder's own step.
+void fill_flaws(std::span<const ServoSample> log, const ServoFit& fit, ResultDocument& document) {
+  for (const std::size_t flaw : fit.freed) {
+    document.estimate[servo_flaw_names[flaw]] = fit.flaws.*servo_flaws[flaw];
+    document.stddev[servo_flaw_names[flaw]] = fit.is_observable ? fit.flaw_sigma[flaw] : std::nan("");
+  }
+  document.estimate["encoder_step_rad"] = encoder_step_rad(log);
+}
+
+void fill_assumed(const ServoIdentification& identified, ResultDocument& document) {
+  const double gain = identified.fit.params[0], sigma = std::sqrt(identified.fit.cov(0, 0));
+  // By definition: angles are the encoder's own radians, times the log's own seconds.
+  document.assumed = {{.name = "encoder_scale", .value = 1.0, .sigma = 0.0, .moved = "gain_rad"},
+                      {.name = "clock_rate", .value = 1.0, .sigma = 0.0, .moved = "tau_s"}};
+  for (const HiddenFlaw& hidden : identified.hidden)
+    document.assumed.push_back({.name = servo_flaw_names[hidden.flaw],
+                                .value = servo_flaws[hidden.flaw] == &ServoFlaws::max_rate_rad_s ? std::nan("") : 0.0,
+                                .ordinary = hidden.size,
+                                .moves = std::abs(hidden.gain_factor - 1.0) * std::abs(gain) / sigma,
+                                .moved = "gain_rad",
+                                .moved_by = (hidden.gain_factor - 1.0) * gain,
+                                .remedy = "log steps of several sizes to both sides, or a chirp"});
 }
 
 }  // namespace
@@ -65,11 +90,23 @@ std::string servo_log_csv(std::span<const ServoSample> samples) {
 std::string servo_plant_text(const ServoFit& fit) {
   const ServoParams sigma = fit.cov.diagonal().cwiseSqrt();
   const bool is_angle = fit.kind == ServoKind::angle;
+  std::string flaws, flaw_sigmas;
+  for (const std::size_t flaw : fit.freed) {
+    const double size = fit.flaws.*servo_flaws[flaw];
+    const std::string name = servo_flaw_names[flaw];
+    const bool is_rad = name.find("rad") != std::string::npos;
+    std::string key = name;
+    if (const auto at = key.find("rad"); is_rad) key.replace(at, 3, "deg");
+    // A scenario has no limit of the acceleration of an angle plant.
+    const bool is_known = !(is_angle && name == "max_acceleration_rad_s2");
+    if (is_known) flaws += fmt::format(", {}: {:.9g}", key, size / (is_rad ? degree : 1.0));
+    flaw_sigmas += fmt::format(", {} {:.3g}", key, fit.flaw_sigma[flaw] / (is_rad ? degree : 1.0));
+  }
   return fmt::format(
-      "# {} per unit of command; sigma: gain {:.3g}, tau {:.3g} s, delay {:.3g} s\n"
-      "plant: {{kind: {}, gain: {:.9g}, unit: rad, tau_s: {:.9g}, command_delay_s: {:.9g}}}\n",
-      is_angle ? "rad" : "rad/s", sigma[0], sigma[1], sigma[2], is_angle ? "angle" : "rate", fit.params[0],
-      fit.params[1], fit.params[2]);
+      "# {} per unit of command; sigma: gain {:.3g}, tau {:.3g} s, delay {:.3g} s{}\n"
+      "plant: {{kind: {}, gain: {:.9g}, unit: rad, tau_s: {:.9g}, command_delay_s: {:.9g}{}}}\n",
+      is_angle ? "rad" : "rad/s", sigma[0], sigma[1], sigma[2], flaw_sigmas, is_angle ? "angle" : "rate", fit.params[0],
+      fit.params[1], fit.params[2], flaws);
 }
 
 void fill_identification(std::span<const ServoSample> log, const ServoIdentification& identified,
@@ -94,9 +131,8 @@ void fill_identification(std::span<const ServoSample> log, const ServoIdentifica
   put("latency_s", 2, 1.0);
   put("zero_rad", 3, 1.0);
   put("start_rad", 4, 1.0);
-  // By definition: angles are the encoder's own radians, times the log's own seconds.
-  document.assumed = {{.name = "encoder_scale", .value = 1.0, .sigma = 0.0, .moved = "gain_rad"},
-                      {.name = "clock_rate", .value = 1.0, .sigma = 0.0, .moved = "tau_s"}};
+  fill_flaws(log, fit, document);
+  fill_assumed(identified, document);
   estimate["design_effect"] = identified.clusters.design_effect;
   estimate["correlated_rows"] = identified.correlated_rows;
   estimate["rms_rad"] = fit.rms_rad;

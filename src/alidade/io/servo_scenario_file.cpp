@@ -114,7 +114,7 @@ Plant plant_of(const Section& section) {
 void read_plant(const YAML::Node& root, const Fields& top, ServoScenario& scenario) {
   const Section section(root, top, "plant",
                         {"kind", "gain", "unit", "tau_s", "max_rate_deg_s", "max_acceleration_deg_s2",
-                         "command_delay_s", "pan_deg", "tilt_deg"});
+                         "command_delay_s", "dead_band", "backlash_deg", "second_tau_s", "pan_deg", "tilt_deg"});
   bool is_rate_plant = false;
   section.word(
       "kind", is_rate_plant,
@@ -132,11 +132,16 @@ void read_plant(const YAML::Node& root, const Fields& top, ServoScenario& scenar
     const double loop_per_s = 4.0 / plant.gain;
     scenario.config.pi = {loop_per_s, loop_per_s, plant.unit == AngleUnit::deg ? ErrorUnit::deg : ErrorUnit::rad};
   } else {
-    axis.plant = plant_of<AnglePlant>(section);
-    for (const std::string key : {"max_rate_deg_s", "max_acceleration_deg_s2"})
-      if (section.has(key)) refuse(top.file(), section.fields().full(key), "is for a plant of kind rate");
+    AnglePlant plant = plant_of<AnglePlant>(section);
+    section.number("max_rate_deg_s", plant.max_rate_rad_s, 1e-3, 1e5, degree);
+    axis.plant = plant;
+    const std::string key = "max_acceleration_deg_s2";
+    if (section.has(key)) refuse(top.file(), section.fields().full(key), "is for a plant of kind rate");
   }
   section.number("command_delay_s", axis.command_delay_s, 0.0, 10.0);
+  section.number("dead_band", axis.dead_band, 0.0, 1e9);
+  section.number("backlash_deg", axis.backlash_rad, 0.0, 90.0, degree);
+  section.number("second_tau_s", axis.second_tau_s, 0.0, 100.0);
   scenario.scene.axes = {axis, axis};
   section.limits("pan_deg", scenario.scene.axes[0]);
   section.limits("tilt_deg", scenario.scene.axes[1]);
@@ -345,7 +350,7 @@ latency_s: 0                     # from a picture to its pixel
 # hidden_s: [5, 6]               # from, to: the target is not seen
 plant: {kind: angle, gain: 0.0567, unit: deg, tau_s: 0.1, command_delay_s: 0}
 # plant: {kind: rate, gain: 1, unit: rad, tau_s: 0.05, max_rate_deg_s: 180, max_acceleration_deg_s2: 1500,
-#         pan_deg: [-170, 170], tilt_deg: [-30, 90]}
+#         pan_deg: [-170, 170], tilt_deg: [-30, 90], dead_band: 0, backlash_deg: 0, second_tau_s: 0}
 mismatch: {gain: 1, tau: 1}      # the plant as it is, over the plant as it is known
 noise: {sigma_px: 0.5, sigma_encoder_deg: 0.05, encoder_step_deg: 0}
 controllers: [pi, feedforward, lqr, mpc]

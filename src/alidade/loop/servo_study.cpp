@@ -90,20 +90,25 @@ std::vector<double> evenly(double low, double high, int points) {
 
 namespace {
 
-/// A controller without gains of its own, tried on both axes as they are.
-LoopCheck settling_of(const ServoScenario& scenario, ControllerKind kind) {
+/// A controller, tried on both axes as they are.
+double settling_of(const ServoScenario& scenario, ControllerKind kind) {
   const ServoScene& scene = scenario.scene;
   ServoConfig config = scenario.config;
   config.controller = kind;
   config.period_s = scene.period_s;
-  LoopCheck loop{kind, {}, 0.0, -1};
+  double slowest = 0.0;
   for (const ServoAxis& known : scene.axes) {
     ServoAxis real = known;
     real.plant = scaled(known.plant, scene.mismatch.gain, scene.mismatch.tau);
-    loop.analysis.sampled_radius = std::max(loop.analysis.sampled_radius,
-                                            settling_per_period(config, known, real, focal_of(scene.heads[0].camera)));
+    slowest =
+        std::max(slowest, settling_per_period(config, known, real, focal_of(scene.heads[0].camera), scene.latency_s));
   }
-  return loop;
+  return slowest;
+}
+
+bool is_whole(double delay_s, double period_s) {
+  const double samples = delay_s / period_s;
+  return std::abs(samples - std::round(samples)) < 1e-9;
 }
 
 }  // namespace
@@ -144,19 +149,25 @@ std::vector<LoopCheck> check_loops(const ServoScenario& scenario) {
   gains.ki *= largest;
   for (const ControllerKind kind : scenario.controllers) {
     const bool is_pi = kind == ControllerKind::pi;
-    const bool is_angle_plant = std::holds_alternative<AnglePlant>(scene.axes[0].plant);
-    if (!is_pi && !(kind == ControllerKind::feedforward && is_angle_plant)) {
-      loops.push_back(settling_of(scenario, kind));
+    const ServoAxis& axis = scene.axes[0];
+    LoopCheck loop{kind, {}, 0.0, -1};
+    if (!is_pi && !(kind == ControllerKind::feedforward && std::holds_alternative<AnglePlant>(axis.plant))) {
+      loop.analysis.sampled_radius = settling_of(scenario, kind);
+      loops.push_back(loop);
       continue;
     }
-    const ServoPlant plant = scaled(scene.axes[0].plant, scene.mismatch.gain, scene.mismatch.tau);
-    const double delay_s = scene.axes[0].command_delay_s + (is_pi ? scene.latency_s : 0.0);
-    LoopCheck loop{kind, {}, 0.0, samples_in(delay_s, scene.period_s)};
+    const ServoPlant plant = scaled(axis.plant, scene.mismatch.gain, scene.mismatch.tau);
+    // An image waits for the next period, a command does not.
+    const int late = is_pi ? samples_in(scene.latency_s, scene.period_s) : 0;
+    loop.delay_samples = late + samples_in(axis.command_delay_s, scene.period_s);
     const double factor = is_pi ? 1.0 : 1.0 / largest;  // what corrects feedforward looks at the encoder
     loop.loop_gain =
         units_of_error_per_rad(scenario.config.pi.unit, focal_px) * radians_in(unit_of(plant)) * largest * factor;
     loop.analysis =
         analysed(plant, {factor * gains.kp, factor * gains.ki, gains.unit}, scene.period_s, loop.delay_samples);
+    // The formula is for whole periods and a first-order plant.
+    if (!is_whole(axis.command_delay_s, scene.period_s) || axis.second_tau_s > 0.0)
+      loop.analysis.sampled_radius = settling_of(scenario, kind);
     loops.push_back(loop);
   }
   return loops;

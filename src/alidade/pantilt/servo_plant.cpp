@@ -7,9 +7,14 @@
 namespace alidade {
 namespace {
 
+/// Two phases: as fast as it can until the lag asks for less, then the lag.
 AxisMotion advanced(const AnglePlant& plant, const AxisMotion& motion, double command, double dt_s) {
-  const double goal = plant.gain_rad() * command;
-  const double angle = goal + std::exp(-dt_s / plant.tau_s) * (motion.angle_rad - goal);
+  const double goal = plant.gain_rad() * command, missing = goal - motion.angle_rad;
+  const double most = plant.max_rate_rad_s;
+  const double fast_s =
+      std::isfinite(most) ? std::clamp((std::abs(missing) - plant.tau_s * most) / most, 0.0, dt_s) : 0.0;
+  const double left = fast_s > 0.0 ? missing - std::copysign(most * fast_s, missing) : missing;
+  const double angle = goal - std::exp(-(dt_s - fast_s) / plant.tau_s) * left;
   return {angle, dt_s > 0.0 ? (angle - motion.angle_rad) / dt_s : motion.rate_rad_s};
 }
 
@@ -66,6 +71,34 @@ ServoPlant scaled(const ServoPlant& plant, double gain_factor, double tau_factor
   return result;
 }
 
+double past_dead_band(double command, double dead_band) {
+  return std::copysign(std::max(0.0, std::abs(command) - dead_band), command);
+}
+
+ServoAxis linear_part(const ServoAxis& axis) {
+  ServoAxis linear = axis;
+  linear.dead_band = linear.backlash_rad = linear.second_tau_s = 0.0;
+  return linear;
+}
+
+void DelayedAxis::move(double dt_s, double command) {
+  const double goal = past_dead_band(command, axis_.dead_band), lag_s = axis_.second_tau_s;
+  if (lag_s > 0.0 && dt_s > 0.0) {
+    constexpr double per_tau = 20.0, most_steps = 4096.0;
+    const double steps = std::clamp(std::ceil(per_tau * dt_s / std::min(lag_s, tau_of(axis_.plant))), 1.0, most_steps);
+    const double step_s = dt_s / steps, rise = -std::expm1(-step_s / lag_s);
+    for (double k = 0.0; k < steps; ++k) {
+      motion_ = advanced(axis_, motion_, goal + (lagged_ - goal) * rise * lag_s / step_s, step_s);
+      lagged_ += rise * (goal - lagged_);
+    }
+  } else {
+    motion_ = advanced(axis_, motion_, goal, dt_s);
+  }
+  const double half = 0.5 * axis_.backlash_rad;
+  const double angle = std::clamp(driven_.angle_rad, motion_.angle_rad - half, motion_.angle_rad + half);
+  driven_ = {angle, half > 0.0 && angle == driven_.angle_rad ? 0.0 : motion_.rate_rad_s};
+}
+
 void DelayedAxis::send(double command) {
   if (axis_.command_delay_s <= 0.0) {
     command_ = command;
@@ -83,11 +116,11 @@ void DelayedAxis::advance(double dt_s, double added) {
   std::size_t num_done = 0;
   double now_s = 0.0;
   for (; num_done < num_waiting_ && waiting_[num_done].in_s <= dt_s; ++num_done) {
-    motion_ = advanced(axis_, motion_, command_ + added, waiting_[num_done].in_s - now_s);
+    move(waiting_[num_done].in_s - now_s, command_ + added);
     now_s = waiting_[num_done].in_s;
     command_ = waiting_[num_done].command;
   }
-  motion_ = advanced(axis_, motion_, command_ + added, dt_s - now_s);
+  move(dt_s - now_s, command_ + added);
   num_waiting_ -= num_done;
   for (std::size_t i = 0; i < num_waiting_; ++i)
     waiting_[i] = {waiting_[i + num_done].in_s - dt_s, waiting_[i + num_done].command};

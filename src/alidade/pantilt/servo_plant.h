@@ -17,11 +17,13 @@ enum class AngleUnit { deg, rad };
 [[nodiscard]] std::string_view unit_name(AngleUnit unit);
 [[nodiscard]] std::optional<AngleUnit> unit_named(std::string_view name);
 
-/// An axis whose angle follows the command with a first-order lag: τ dθ = g u − θ.
+/// An axis whose angle follows the command with a first-order lag, no faster than it can: dθ = clamp((g u − θ) / τ,
+/// ±max_rate).
 struct AnglePlant {
   double gain = 0.0567;  ///< Angle per unit of command, in `unit`. Xiahou, Chen & Wu, 2015: 0.0567 / (0.1 s + 1).
   AngleUnit unit = AngleUnit::deg;
   double tau_s = 0.1;
+  double max_rate_rad_s = std::numeric_limits<double>::infinity();
 
   [[nodiscard]] double gain_rad() const { return gain * radians_in(unit); }
   bool operator==(const AnglePlant&) const = default;
@@ -42,22 +44,30 @@ struct RatePlant {
 
 using ServoPlant = std::variant<AnglePlant, RatePlant>;
 
-/// One axis of a head: how it moves, where it stops, how late it obeys.
+/// One axis of a head: how it moves, where it stops, how late it obeys, and what is not linear in it.
 struct ServoAxis {
   ServoPlant plant;
   double min_rad = -std::numeric_limits<double>::infinity();
   double max_rad = std::numeric_limits<double>::infinity();
   double command_delay_s = 0.0;  ///< From a command to its first effect.
+  double dead_band = 0.0;        ///< Commands no larger do nothing, larger ones count from it. In units of command.
+  double backlash_rad = 0.0;     ///< Play between what drives the axis and the axis itself.
+  double second_tau_s = 0.0;     ///< A first-order lag of the command, before the plant.
   bool operator==(const ServoAxis&) const = default;
 };
+
+/// What a dead band leaves of a command.
+[[nodiscard]] double past_dead_band(double command, double dead_band);
+/// The axis without dead band, backlash and second lag: what a linear controller knows of it.
+[[nodiscard]] ServoAxis linear_part(const ServoAxis& axis);
 
 struct AxisMotion {
   double angle_rad = 0.0;
   double rate_rad_s = 0.0;  ///< Of an angle plant: mean over the last step.
 };
 
-/// The axis dt ≥ 0 later under a command that is held and acts at once. Closed form, exact for any dt; at a stop the
-/// axis stands still.
+/// The plant of an axis dt ≥ 0 later under a command that is held and acts at once. Closed form, exact for any dt; at a
+/// stop the axis stands still.
 [[nodiscard]] AxisMotion advanced(const ServoAxis& axis, const AxisMotion& motion, double command, double dt_s);
 
 [[nodiscard]] double tau_of(const ServoPlant& plant);
@@ -66,25 +76,34 @@ struct AxisMotion {
 /// The same plant with gain and time constant multiplied: what it really is where it is not as known.
 [[nodiscard]] ServoPlant scaled(const ServoPlant& plant, double gain_factor, double tau_factor);
 
-/// An axis whose commands act late: those that are on their way wait in their order. Allocates nothing.
+/// An axis as a whole, whose commands act late: those that are on their way wait in their order. Allocates nothing.
+/// Exact but for a second lag, which is stepped through to 10⁻⁴ of it.
 class DelayedAxis {
  public:
-  DelayedAxis(const ServoAxis& axis, const AxisMotion& motion) : axis_(axis), motion_(motion) {}
+  DelayedAxis(const ServoAxis& axis, const AxisMotion& motion) : axis_(axis), motion_(motion), driven_(motion) {}
 
   /// From now on, after the axis's delay, this command. Of more than 32 on their way the oldest acts at once.
   void send(double command);
   /// `added` is added to every command meanwhile.
   void advance(double dt_s, double added = 0.0);
-  [[nodiscard]] const AxisMotion& motion() const { return motion_; }
-  void set_motion(const AxisMotion& motion) { motion_ = motion; }
+  [[nodiscard]] const AxisMotion& motion() const { return driven_; }
+  /// In the middle of its play, its second lag at rest.
+  void set_motion(const AxisMotion& motion) {
+    motion_ = driven_ = motion;
+    lagged_ = past_dead_band(command_, axis_.dead_band);
+  }
   [[nodiscard]] const ServoAxis& axis() const { return axis_; }
 
  private:
   struct Waiting {
     double in_s, command;
   };
+  void move(double dt_s, double command);
+
   ServoAxis axis_;
-  AxisMotion motion_;
+  AxisMotion motion_;     ///< Of what drives it.
+  AxisMotion driven_;     ///< Behind the play.
+  double lagged_ = 0.0;   ///< The command behind the second lag.
   double command_ = 0.0;  ///< That acts now.
   std::array<Waiting, 32> waiting_{};
   std::size_t num_waiting_ = 0;

@@ -1,5 +1,7 @@
 #include "alidade/servo/axis_controller.h"
 
+#include <cmath>
+
 namespace alidade {
 
 std::string_view controller_name(ControllerKind kind) {
@@ -20,8 +22,9 @@ AxisController::AxisController(const ServoConfig& config, const ServoAxis& axis,
       model_(sampled(axis.plant, config.period_s)),
       lqr_gain_(lqr_gain(model_, config.command_weight)),
       mpc_(axis, model_, config.command_weight),
-      observer_(axis, model_, config.sigma_encoder_rad),
-      expected_(axis, {}) {}
+      observer_(linear_part(axis), model_, config.sigma_encoder_rad),
+      expected_(linear_part(axis), {}),
+      dead_band_(axis.dead_band) {}
 
 /// u_k = kp e_k + ki Σ_{i<k} e_i T.
 double AxisController::pi_command(double error_rad) {
@@ -83,7 +86,7 @@ double AxisController::command(const AxisInput& input) {
     command = model_.is_rate_plant ? feedforward_on_rate(input) : feedforward_on_angle(input);
   }
   observer_.send(command);
-  return command;
+  return command == 0.0 ? 0.0 : command + std::copysign(dead_band_, command);  // what the band takes away
 }
 
 }  // namespace alidade

@@ -41,6 +41,7 @@ class AxisController {
   AxisMpc mpc_;
   AxisObserver observer_;
   DelayedAxis expected_;  ///< How the axis would move if it were as known: what feedforward compares with.
+  double dead_band_;
   double integral_ = 0.0;
   bool has_started_ = false;
 };

@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "alidade/geometry/decompositions.h"
+#include "alidade/servo/identify_causes.h"
 #include "alidade/servo/identify_clusters.h"
+#include "alidade/servo/identify_flaws.h"
 
 namespace alidade {
 namespace {
@@ -103,16 +106,14 @@ ServoParams searched(std::span<const ServoSample> log, ServoKind kind) {
   return best.params;
 }
 
-/// From the normal equations, scaled so that the units of the parameters do not matter.
-void set_covariance(const Eigen::Matrix<double, num_servo_params, num_servo_params>& JtJ, ServoFit& fit) {
-  using Matrix = Eigen::Matrix<double, num_servo_params, num_servo_params>;
-  const ServoParams scale = JtJ.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
-  const Ldlt ldlt(scale.asDiagonal() * JtJ * scale.asDiagonal());
-  fit.is_observable = ldlt.least_pivot() > 1e-10;
-  if (!fit.is_observable) return;
-  const Matrix inverse = ldlt.inverse();
-  fit.cov_model = fit.rms_rad * fit.rms_rad * (scale.asDiagonal() * inverse * scale.asDiagonal());
-  fit.cov = fit.cov_model;
+/// (JᵀJ)⁻¹, by parameters scaled so that their units do not matter; none where it cannot be solved.
+std::optional<Eigen::MatrixXd> inverse_normal(const Eigen::MatrixXd& J) {
+  const Eigen::MatrixXd JtJ = J.transpose() * J;
+  const Eigen::VectorXd scale = JtJ.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * JtJ * scale.asDiagonal();
+  const Ldlt ldlt(scaled);
+  if (!(ldlt.least_pivot() > 1e-10)) return std::nullopt;
+  return scale.asDiagonal() * ldlt.inverse() * scale.asDiagonal();
 }
 
 /// Levenberg–Marquardt from there; time constant and latency stay within what has a meaning.
@@ -148,7 +149,9 @@ ServoFit refined(std::span<const ServoSample> log, ServoKind kind, ServoParams p
   }
   fit.params = params;
   fit.rms_rad = std::sqrt(sum2 / dof);
-  set_covariance(response.J.transpose() * response.J, fit);
+  const auto inverse = inverse_normal(response.J);
+  fit.is_observable = inverse.has_value();
+  if (inverse) fit.cov = fit.cov_model = fit.rms_rad * fit.rms_rad * *inverse;
   return fit;
 }
 
@@ -162,16 +165,34 @@ double lag_one(const std::vector<double>& residuals) {
 }
 
 /// What blocks of rows say of the covariance, in scaled parameters so that their units do not matter.
-void set_clusters(const ServoResponse& response, ServoIdentification& result) {
+void set_clusters(const Eigen::MatrixXd& J, ServoIdentification& result) {
   ServoFit& fit = result.fit;
   result.correlated_rows = correlated_rows(result.residual_rad);
+  const auto inverse = inverse_normal(J);
+  fit.is_observable = inverse.has_value();
   if (!fit.is_observable || !(fit.rms_rad > 0.0)) return;
-  const ServoParams scale = fit.cov_model.diagonal().cwiseSqrt().cwiseMax(1e-300) / fit.rms_rad;
-  const Eigen::Matrix<double, num_servo_params, num_servo_params> inverse =
-      scale.cwiseInverse().asDiagonal() * fit.cov_model * scale.cwiseInverse().asDiagonal() /
-      (fit.rms_rad * fit.rms_rad);
-  result.clusters = servo_clusters(result.residual_rad, response.J * scale.asDiagonal(), inverse);
-  fit.cov = scale.asDiagonal() * result.clusters.cov * scale.asDiagonal();
+  const Eigen::VectorXd scale = inverse->diagonal().cwiseSqrt().cwiseMax(1e-300), down = scale.cwiseInverse();
+  result.clusters =
+      servo_clusters(result.residual_rad, J * scale.asDiagonal(), down.asDiagonal() * *inverse * down.asDiagonal());
+  const Eigen::MatrixXd cov = scale.asDiagonal() * result.clusters.cov * scale.asDiagonal();
+  fit.cov_model = fit.rms_rad * fit.rms_rad * inverse->topLeftCorner<num_servo_params, num_servo_params>();
+  fit.cov = cov.topLeftCorner<num_servo_params, num_servo_params>();
+  for (std::size_t i = 0; i < fit.freed.size(); ++i) {
+    const Eigen::Index at = num_servo_params + static_cast<Eigen::Index>(i);
+    fit.flaw_sigma[fit.freed[i]] = std::sqrt(cov(at, at));
+  }
+}
+
+/// Whether the residuals of a fit without flaws ask for more.
+bool asks_for_more(std::span<const ServoSample> log, const ServoFit& fit) {
+  constexpr double most_colour = 0.3, least_sigmas = 3.5;
+  const FlawGround ground = flaw_ground(log, fit);
+  const std::vector<double> residuals(ground.misfit.data(), ground.misfit.data() + ground.misfit.size());
+  if (std::abs(lag_one(residuals)) > most_colour) return true;
+  const double sum2 = ground.misfit.squaredNorm(), least2 = least_sigmas * least_sigmas * fit.rms_rad * fit.rms_rad;
+  for (std::size_t flaw = 0; flaw < num_servo_flaws && sum2 > 0.0; ++flaw)
+    if (flaw_scores(log, fit, ground, flaw).front().gain2 > least2) return true;
+  return false;
 }
 
 }  // namespace
@@ -216,15 +237,26 @@ ServoIdentification identify_servo(std::span<const ServoSample> log) {
   result.angle_range_rad = highest->angle_rad - lowest->angle_rad;
   result.duration_s = log.back().t_s - log.front().t_s;
   if (!(result.command_range > 0.0)) return result;
-  result.fit = refined(log, ServoKind::angle, searched(log, ServoKind::angle));
-  result.other = refined(log, ServoKind::rate, searched(log, ServoKind::rate));
+  std::array<ServoFit, 2> fits{refined(log, ServoKind::angle, searched(log, ServoKind::angle)),
+                               refined(log, ServoKind::rate, searched(log, ServoKind::rate))};
+  std::array<std::vector<ServoRival>, 2> rivals;
+  // Where one kind explains the log as it is, the other is not made to.
+  const bool is_enough = !asks_for_more(log, fits[fits[1].rms_rad < 0.9 * fits[0].rms_rad ? 1 : 0]);
+  for (std::size_t kind = 0; kind < 2 && !is_enough; ++kind) fits[kind] = with_flaws(log, fits[kind], rivals[kind]);
   // An angle plant with a very long lag looks like a rate plant: a tenth less is more than chance leaves.
-  if (result.other.rms_rad < 0.9 * result.fit.rms_rad) std::swap(result.fit, result.other);
+  const std::size_t believed = fits[1].rms_rad < 0.9 * fits[0].rms_rad ? 1 : 0;
+  result.fit = fits[believed];
+  result.other = fits[1 - believed];
+  result.rivals = rivals[believed];
+  const bool is_plain = result.fit.freed.empty();
   const ServoResponse response = servo_response(log, result.fit.kind, result.fit.params);
-  const Eigen::VectorXd residuals = response.angle_rad - readings_of(log);
+  const Eigen::VectorXd residuals =
+      (is_plain ? response.angle_rad : flawed_response(log, result.fit, result.fit.flaws)) - readings_of(log);
   result.residual_rad.assign(residuals.data(), residuals.data() + residuals.size());
-  set_clusters(response, result);
+  set_clusters(is_plain ? Eigen::MatrixXd(response.J) : flawed_jacobian(log, result.fit), result);
   result.lag_one_correlation = lag_one(result.residual_rad);
+  constexpr std::size_t several = 2;
+  if (num_sizes(log, several) < several && result.fit.is_observable) result.hidden = hidden_flaws(log, result.fit);
   return result;
 }
 

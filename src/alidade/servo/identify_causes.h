@@ -8,18 +8,6 @@
 
 namespace alidade {
 
-/// What a servo could do beside a first-order lag, each of some size; 0: nothing of it.
-struct ServoFlaws {
-  double max_rate_rad_s = 0.0, max_acceleration_rad_s2 = 0.0;
-  double dead_band = 0.0;     ///< Commands smaller than it do nothing, larger ones count from it.
-  double backlash_rad = 0.0;  ///< Play between what drives the axis and the angle that is read.
-  double second_tau_s = 0.0;  ///< A second lag.
-};
-
-/// Angles of such a servo at the times of the log, stepped through; without flaws servo_response() to the step's error.
-[[nodiscard]] Eigen::VectorXd flawed_response(std::span<const ServoSample> log, const ServoFit& fit,
-                                              const ServoFlaws& flaws);
-
 /// One flaw, how large it seems, and by how many σ the residuals ask for it.
 struct ServoCause {
   std::string name;  ///< "a limit of its rate"
@@ -28,8 +16,8 @@ struct ServoCause {
   double sigmas = 0.0;
 };
 
-/// Score tests: flaws of a few sizes each, what they add to the response regressed on the residuals with the parameters
-/// following. The one that explains most, first.
+/// Score tests of the flaws that were not freed: of a few sizes each, what they add to the response regressed on the
+/// residuals with the parameters following. The one that explains most, first.
 [[nodiscard]] std::vector<ServoCause> servo_causes(std::span<const ServoSample> log,
                                                    const ServoIdentification& identified);
 

@@ -25,9 +25,8 @@ std::size_t correlated_rows(std::span<const double> residual_rad) {
   return lag;
 }
 
-ClusterCovariance servo_clusters(std::span<const double> residual_rad,
-                                 const Eigen::Matrix<double, Eigen::Dynamic, num_servo_params>& J,
-                                 const Eigen::Matrix<double, num_servo_params, num_servo_params>& inverse) {
+ClusterCovariance servo_clusters(std::span<const double> residual_rad, const Eigen::MatrixXd& J,
+                                 const Eigen::MatrixXd& inverse) {
   constexpr std::size_t least_rows = 4, least_blocks = 8;
   const std::size_t rows = residual_rad.size();
   const std::size_t length =
@@ -40,7 +39,7 @@ ClusterCovariance servo_clusters(std::span<const double> residual_rad,
     noise.diagonal(-k).setConstant(value);
   }
   std::vector<ClusterStep> steps;
-  Eigen::MatrixXd model = Eigen::MatrixXd::Zero(num_servo_params, num_servo_params);
+  Eigen::MatrixXd model = Eigen::MatrixXd::Zero(J.cols(), J.cols());
   for (std::size_t first = 0; first < rows; first += length) {
     const auto at = static_cast<Index>(first), num = static_cast<Index>(std::min(length, rows - first));
     const Eigen::MatrixXd own = J.middleRows(at, num) * inverse;

@@ -16,8 +16,7 @@ namespace alidade {
 /// blocks of rows, twice as long as rows share errors; `J` by the parameters, `inverse` its (JᵀJ)⁻¹. By the model a
 /// block's scores vary as the residuals' own autocovariance says (stationary noise of any colour); what the blocks
 /// scatter beyond it is on top.
-[[nodiscard]] ClusterCovariance servo_clusters(
-    std::span<const double> residual_rad, const Eigen::Matrix<double, Eigen::Dynamic, num_servo_params>& J,
-    const Eigen::Matrix<double, num_servo_params, num_servo_params>& inverse);
+[[nodiscard]] ClusterCovariance servo_clusters(std::span<const double> residual_rad, const Eigen::MatrixXd& J,
+                                               const Eigen::MatrixXd& inverse);
 
 }  // namespace alidade

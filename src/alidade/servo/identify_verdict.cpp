@@ -43,26 +43,64 @@ void add_checks(std::span<const ServoSample> log, const ServoIdentification& ide
     verdict.checks.push_back({"convergence", State::care, "the fit was still moving", 0.0, 0.0, "1", ""});
 }
 
-/// What the servo does beside a lag, and what this log could not show.
+std::string flaw_text(const ServoFit& fit, std::size_t flaw) {
+  return std::string(servo_flaw_words[flaw]) + " (" + text_of(fit.flaws.*servo_flaws[flaw]) + " ± " +
+         text_of(3.0 * fit.flaw_sigma[flaw], 2) + " " + servo_flaw_units[flaw] + ")";
+}
+
+/// What the servo does beside a lag: what was estimated, and what the residuals still ask for.
 void add_causes(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
+  const ServoFit& fit = identified.fit;
   const std::vector<ServoCause> causes = servo_causes(log, identified);
   Check check{.name = "causes", .text = "neither limits, dead band, backlash nor a second lag show", .unit = "σ"};
   check.limit = 4.0;
+  if (!fit.freed.empty()) {
+    check.text = "estimated as well: ";
+    for (std::size_t i = 0; i < fit.freed.size(); ++i) check.text += (i > 0 ? ", " : "") + flaw_text(fit, fit.freed[i]);
+  }
+  if (!identified.rivals.empty()) {
+    const ServoRival& rival = identified.rivals.front();
+    check.state = State::care;
+    check.text += "; " + std::string(servo_flaw_words[rival.other]) + " would explain it nearly as well as " +
+                  servo_flaw_words[rival.flaw] + " (2 ln of their ratio " + text_of(rival.evidence, 2) +
+                  "): this log does not tell them apart";
+  }
   if (!causes.empty()) {
     const ServoCause& first = causes.front();
     check.state = State::care;
     check.value = first.sigmas;
-    check.text = "the residuals ask for " + first.name + ", about " + text_of(first.size, 2) + " " + first.unit + " (" +
-                 text_of(first.sigmas, 2) + "σ): gain, time constant and latency absorb part of it";
+    check.text = (fit.freed.empty() ? std::string() : check.text + "; ") + "the residuals ask for " + first.name +
+                 ", about " + text_of(first.size, 2) + " " + first.unit + " (" + text_of(first.sigmas, 2) +
+                 "σ): gain, time constant and latency absorb part of it";
   }
   verdict.checks.push_back(check);
+}
+
+/// What a log of one size of command could not show, by name and by what it would do.
+std::string hidden_text(const std::vector<HiddenFlaw>& hidden) {
+  std::string text = "steps of one size: they do not tell another gain from ";
+  for (std::size_t i = 0; i < hidden.size(); ++i) {
+    const HiddenFlaw& flaw = hidden[i];
+    text += (i == 0 ? "" : i + 1 == hidden.size() ? " or " : ", ") + std::string(servo_flaw_words[flaw.flaw]);
+    const std::string size = text_of(flaw.size, 2) + " " + servo_flaw_units[flaw.flaw];
+    const bool is_limit = servo_flaws[flaw.flaw] == &ServoFlaws::max_rate_rad_s;
+    text += is_limit
+                ? " (at " + size + ": then the gain is any larger one)"
+                : " (of " + size + ": then the gain is " + text_of(100.0 * (flaw.gain_factor - 1.0), 2) + " % larger)";
+  }
+  return text;
+}
+
+void add_excitation(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
   constexpr std::size_t least = 2;
   const std::size_t sizes = num_sizes(log, least);
-  verdict.checks.push_back({"excitation", sizes >= least ? State::good : State::care,
-                            sizes >= least
-                                ? "commands of several sizes: what is not proportional would show"
-                                : "steps of one size: a dead band, backlash or a limit would pass for another gain",
-                            static_cast<double>(sizes), static_cast<double>(least), "sizes", ""});
+  const bool is_one = sizes < least;
+  const std::string text = !is_one ? "commands of several sizes: what is not proportional would show"
+                           : identified.hidden.empty()
+                               ? "steps of one size: a dead band, backlash or a limit would pass for another gain"
+                               : hidden_text(identified.hidden);
+  verdict.checks.push_back({"excitation", is_one ? State::care : State::good, text, static_cast<double>(sizes),
+                            static_cast<double>(least), "sizes", ""});
 }
 
 /// Degrees read as radians, milliseconds as seconds; an encoder that is coarser than its noise.
@@ -116,12 +154,14 @@ Verdict identify_verdict(std::span<const ServoSample> log, const ServoIdentifica
     return refused("too short: the time constant " + text_of(fit.params[1]) + " s is longer than the log",
                    "log for several time constants after a change of command");
   Verdict verdict;
+  add_readings(log, identified, verdict);
   add_checks(log, identified, verdict);
   add_causes(log, identified, verdict);
-  add_readings(log, identified, verdict);
+  add_excitation(log, identified, verdict);
   verdict.sentence = std::string(is_angle ? "the angle" : "the rate") + " follows the command by " +
                      text_of(fit.params[0]) + " rad" + (is_angle ? "" : "/s") + " per unit with a time constant of " +
                      text_of(1e3 * fit.params[1]) + " ms, " + text_of(1e3 * fit.params[2]) + " ms late";
+  for (std::size_t i = 0; i < fit.freed.size(); ++i) verdict.sentence += ", with " + flaw_text(fit, fit.freed[i]);
   for (const Check& check : verdict.checks) {
     if (check.state == State::good) continue;
     if (verdict.state == State::good) verdict.sentence += "; " + check.text;

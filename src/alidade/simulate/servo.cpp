@@ -41,12 +41,11 @@ double rounded_to(double value, double step) { return step > 0.0 ? step * std::r
 DelayedAxis standing(const ServoAxis& axis, double angle_rad) {
   DelayedAxis still(axis, {angle_rad, 0.0});
   // The command under which it has stood there so far.
-  const double command = std::holds_alternative<AnglePlant>(axis.plant) ? angle_rad / gain_of(axis.plant) : 0.0;
+  double command = std::holds_alternative<AnglePlant>(axis.plant) ? angle_rad / gain_of(axis.plant) : 0.0;
+  if (command != 0.0) command += std::copysign(axis.dead_band, command);
   still.send(command);
-  if (axis.command_delay_s > 0.0) {
-    still.advance(axis.command_delay_s);
-    still.set_motion({angle_rad, 0.0});
-  }
+  if (axis.command_delay_s > 0.0) still.advance(axis.command_delay_s);
+  still.set_motion({angle_rad, 0.0});
   return still;
 }
 

@@ -82,8 +82,45 @@ bool is_hidden(const TrackScene& scene, std::size_t head, double t_s) {
   });
 }
 
-void add_sights(const TrackScene& scene, std::size_t head, std::uint64_t seed, std::vector<SimulatedSight>& sights) {
-  Draws draws(2 * seed + 1000003 * head);
+/// The heads as they are, where the scene's are what the file says.
+std::vector<RigHead> heads_as_they_are(const TrackScene& scene) {
+  std::vector<RigHead> heads = scene.heads;
+  const TrackFaults& faults = scene.faults;
+  for (std::size_t h = 0; h < std::min<std::size_t>(2, heads.size()); ++h) {
+    heads[h].head.encoder.pan_zero_rad += faults.zero_rad[h].x();
+    heads[h].head.encoder.tilt_zero_rad += faults.zero_rad[h].y();
+  }
+  if (heads.size() < 2) return heads;
+  Rigid3& base = heads[1].head.world_from_base;
+  const Vector3d first = heads[0].head.world_from_base.translation;
+  base.rotation = base.rotation * exp_so3(faults.base_turn_rad);
+  base.translation = first + (1.0 + faults.baseline) * (base.translation - first);
+  return heads;
+}
+
+/// What the log makes of a sight: false names, signs and places.
+void spoil(const TrackScene& scene, Draws& draws, SimulatedSight& sight) {
+  const TrackFaults& faults = scene.faults;
+  const Camera& camera = scene.heads[sight.head].camera;
+  if (faults.clutter > 0.0) {
+    const Vector2d elsewhere(draws.uniform(0.0, camera.width_px - 1.0), draws.uniform(0.0, camera.height_px - 1.0));
+    if (draws.uniform(0.0, 1.0) < faults.clutter) sight.px = elsewhere;
+  }
+  if (sight.head == 1) {
+    sight.t_capture_s += faults.clock_s;
+    sight.t_arrival_s += faults.clock_s;
+    if (faults.mirrored) sight.px.x() = camera.width_px - 1.0 - sight.px.x();
+    if (faults.pan_sign) sight.pan_tilt_rad.x() *= -1.0;
+    if (faults.tilt_sign) sight.pan_tilt_rad.y() *= -1.0;
+  }
+  if (faults.swapped && sight.head < 2) sight.head = 1 - sight.head;
+}
+
+void add_sights(const TrackScene& given, std::size_t head, std::uint64_t seed, std::vector<SimulatedSight>& sights) {
+  TrackScene scene = given;
+  scene.heads = heads_as_they_are(given);
+  const Vector3d apart(0.4, -0.1, 0.0);
+  Draws draws(2 * seed + 1000003 * head), others(seed + 500009 * (head + 1));
   Follower follower(scene, head);
   const double late_s = scene.latency_s + (scene.more_latency_s.empty() ? 0.0 : scene.more_latency_s[head]);
   for (int k = 0;; ++k) {
@@ -91,11 +128,13 @@ void add_sights(const TrackScene& scene, std::size_t head, std::uint64_t seed, s
     if (t_s > scene.duration_s) return;
     const Vector2d angles = follower.at(t_s);
     const Vector2d noise_px = scene.sigma_px * draws.normal2(), noise_rad = scene.sigma_encoder_rad * draws.normal2();
-    const auto seen = project(scene.heads[head], angles, scene.position(t_s));
+    const bool is_second = scene.faults.second > 0.0 && others.uniform(0.0, 1.0) < scene.faults.second;
+    const auto seen = project(scene.heads[head], angles, is_second ? scene.position(t_s) + apart : scene.position(t_s));
     if (!seen || is_hidden(scene, head, t_s)) continue;
     const Vector2d px = seen->px + noise_px;
     if (!is_in_picture(scene.heads[head].camera, px)) continue;
     sights.push_back({t_s, t_s + late_s, head, angles + noise_rad, px});
+    spoil(given, others, sights.back());
   }
 }
 
@@ -136,7 +175,16 @@ Eigen::Vector3d manoeuvre_position(double t_s) {
   return position + std::max(0.0, t_s - now_s) * velocity;
 }
 
-std::vector<std::string> track_scenarios() { return {"A", "A2", "B", "C", "D", "E", "F", "G"}; }
+std::function<Eigen::Vector3d(double)> thrown_ball(const Eigen::Vector3d& from_m, const Eigen::Vector3d& velocity_m_s) {
+  constexpr double g = 9.80665, rest_s = 1.0;
+  const double flight_s = std::max(0.0, -2.0 * velocity_m_s.y() / g);
+  return [=](double t_s) {
+    const double s = std::clamp(t_s - rest_s, 0.0, flight_s);
+    return Vector3d(from_m + s * velocity_m_s + Vector3d(0.0, 0.5 * g * s * s, 0.0));
+  };
+}
+
+std::vector<std::string> track_scenarios() { return {"A", "A2", "B", "C", "D", "E", "F", "G", "throw"}; }
 
 std::optional<TrackScene> track_scenario(std::string_view name) {
   if (std::ranges::count(track_scenarios(), name) == 0) return std::nullopt;
@@ -149,6 +197,12 @@ std::optional<TrackScene> track_scenario(std::string_view name) {
     scene.position = circle(0.2, 3.0);
     scene.duration_s = 6.0;
     scene.sigma_a_m_s2 = 1.0;
+  } else if (name == "throw") {
+    scene.position = thrown_ball({0.2, 0.1, 3.0}, {0.5, -4.0, 0.2});
+    scene.duration_s = 2.8;
+    scene.aiming_lag_s = 0.05;
+    scene.rate_hz = {60.0, 60.0};
+    scene.sigma_a_m_s2 = 10.0;
   } else {
     scene.position = manoeuvre_position;
     scene.duration_s = 11.0;

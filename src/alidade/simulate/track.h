@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -19,6 +20,21 @@ struct Occlusion {
   double from_s, to_s;
 };
 
+/// What of a rig, of its clocks and pictures is not as its file says. Of two heads it is the second one, but for the
+/// zeros.
+struct TrackFaults {
+  Eigen::Vector3d base_turn_rad = Eigen::Vector3d::Zero();  ///< About x (pitch), y (yaw), z (roll) of its base.
+  double baseline = 0.0;                                    ///< It stands further away by this share.
+  std::array<Eigen::Vector2d, 2> zero_rad{Eigen::Vector2d::Zero(),
+                                          Eigen::Vector2d::Zero()};  ///< (pan, tilt), one a head.
+  double clock_s = 0.0;   ///< Its pictures say that they were taken so much later than they were.
+  double clutter = 0.0;   ///< Share of the sights, of both heads, that are anywhere in the picture instead.
+  double second = 0.0;    ///< Share of the sights that are of another target, 0.4 m to the right and 0.1 m above.
+  bool swapped = false;   ///< The heads' names.
+  bool mirrored = false;  ///< Its pictures, left to right.
+  bool pan_sign = false, tilt_sign = false;  ///< Its angles, reversed.
+};
+
 /// A world for `track`: where the target goes, and the heads that follow it, each late by a first-order lag.
 struct TrackScene {
   std::string name;
@@ -33,6 +49,7 @@ struct TrackScene {
   double sigma_px = 0.5, sigma_encoder_rad = 0.0008726646259971648;
   double sigma_a_m_s2 = 1.0;  ///< What a filter should be told of the target.
   std::vector<Occlusion> occlusions;
+  TrackFaults faults;
 };
 
 /// One picture of one head: what the encoders read at its capture, and where the target was seen.
@@ -44,8 +61,8 @@ struct SimulatedSight {
 };
 
 /// The scenarios by name: A (slow circle), A2 (the same, heads with offsets and turned mountings), B (fast circle),
-/// C (manoeuvre), D (C, occluded), E (B, 100 ms late), F (C, 100 ms late), G (C, 20 and 30 pictures a second), line
-/// (one straight path at rest before). None for an unknown name.
+/// C (manoeuvre), D (C, occluded), E (B, 100 ms late), F (C, 100 ms late), G (C, 20 and 30 pictures a second), throw
+/// (a ball at rest, thrown up at 4 m/s, caught, at rest). None for an unknown name.
 [[nodiscard]] std::optional<TrackScene> track_scenario(std::string_view name);
 [[nodiscard]] std::vector<std::string> track_scenarios();
 
@@ -56,6 +73,11 @@ struct SimulatedSight {
 
 /// The manoeuvre of scenario C: 11 s between 0.9 and 3.9 m, up to 1.5 m/s and 6 m/s².
 [[nodiscard]] Eigen::Vector3d manoeuvre_position(double t_s);
+
+/// A ball that rests at a place for a second, is thrown with this velocity, and caught and held where it comes back to
+/// its height.
+[[nodiscard]] std::function<Eigen::Vector3d(double t_s)> thrown_ball(const Eigen::Vector3d& from_m,
+                                                                     const Eigen::Vector3d& velocity_m_s);
 
 /// All sights in order of arrival; pictures without the target in them are not there. Same seed, same sights.
 [[nodiscard]] std::vector<SimulatedSight> simulate_track(const TrackScene& scene, std::uint64_t seed);

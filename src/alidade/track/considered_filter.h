@@ -179,7 +179,7 @@ struct ConsideredFilter {
   }
 };
 
-/// A target that is now quiet, now agile, seen by heads that have errors.
+/// A target that is now quiet, now agile, now falls, seen by heads that have errors.
 struct ConsideredInteracting {
   static constexpr bool can_smooth = false, considers = true;
   struct Models {
@@ -187,51 +187,65 @@ struct ConsideredInteracting {
     int num_errors = 0;
   };
   InteractingFilter own;
-  WithErrors<6> quiet;
+  WithErrors<6> quiet, falling;
   WithErrors<9> agile;
 
   void start(const Models& models, const Belief<6>& first) {
     own.start(models.motion, first);
     quiet.setZero(6, models.num_errors);
     agile.setZero(9, models.num_errors);
+    falling.setZero(6, models.num_errors);
   }
-  /// u has the same mean in both models: mixing weighs its covariances as it does the means.
+  /// u has the same mean in all models: mixing weighs its covariances as it does the means.
   void predict(const Models& models, double dt_s) {
     if (!(dt_s > 0.0)) return;
-    const Eigen::Matrix2d joint = own.belief.mu.asDiagonal() * models.motion.transition_probabilities(dt_s);
-    const Eigen::RowVector2d next = joint.colwise().sum();
-    const WithErrors<6> mixed_quiet = (joint(0, 0) * quiet + joint(1, 0) * agile.topRows<6>()) / next[0];
+    const Eigen::Matrix3d joint = own.belief.mu.asDiagonal() * models.motion.transition_probabilities(dt_s);
+    const Eigen::RowVector3d next = joint.colwise().sum();
+    const auto of_six = [&](int to) -> WithErrors<6> {
+      return (joint(0, to) * quiet + joint(1, to) * agile.topRows<6>() + joint(2, to) * falling) / next[to];
+    };
+    const WithErrors<6> mixed_quiet = of_six(0), mixed_falling = of_six(2);
     WithErrors<9> mixed_agile = (joint(1, 1) / next[1]) * agile;
-    mixed_agile.topRows<6>() += (joint(0, 1) / next[1]) * quiet;
+    mixed_agile.topRows<6>() += (joint(0, 1) / next[1]) * quiet + (joint(2, 1) / next[1]) * falling;
     quiet = models.motion.quiet.transition_jacobian(own.belief.quiet.x, dt_s).lazyProduct(mixed_quiet);
     agile = models.motion.agile.transition_jacobian(own.belief.agile.x, dt_s).lazyProduct(mixed_agile);
+    falling = models.motion.falling.transition_jacobian(own.belief.falling.x, dt_s).lazyProduct(mixed_falling);
     own.predict(models.motion, dt_s);
   }
   [[nodiscard]] Eigen::Vector3d position() const { return own.position(); }
-  [[nodiscard]] Eigen::Vector3d velocity() const {
-    return own.belief.mu[0] * own.belief.quiet.x.segment<3>(3) + own.belief.mu[1] * own.belief.agile.x.segment<3>(3);
-  }
+  [[nodiscard]] Eigen::Vector3d velocity() const { return own.belief.mean().tail<3>(); }
   [[nodiscard]] Innovation expect(const PositionSeen& seen, const RigErrorEffect& effect,
                                   const Eigen::Vector2d& z) const {
-    const WithErrors<6> cross = own.belief.mu[0] * quiet + own.belief.mu[1] * agile.topRows<6>();
+    const Eigen::Vector3d& mu = own.belief.mu;
+    const WithErrors<6> cross = mu[0] * quiet + mu[1] * agile.topRows<6>() + mu[2] * falling;
     return innovation_with_errors(own.belief.merged(), cross, CountedErrors{}, seen, effect, z);
   }
   [[nodiscard]] bool update(const PositionSeen&, const RigErrorEffect& effect, const Eigen::Vector2d& z,
                             const SightModel& see, const IteratedUpdateConfig& config) {
-    const auto by_quiet = see(own.belief.quiet.x.head<3>()), by_agile = see(own.belief.agile.x.head<3>());
-    if (!by_quiet || !by_agile) return false;
-    CountedErrors errors;
-    const Innovation of_quiet = innovation_with_errors(own.belief.quiet, quiet, errors, *by_quiet, effect, z);
-    const Innovation of_agile = innovation_with_errors(own.belief.agile, agile, errors, *by_agile, effect, z);
     ConsideredInteracting next = *this;
-    if (!update_with_errors(next.own.belief.quiet, next.quiet, errors, *by_quiet, effect, z, see, config) ||
-        !update_with_errors(next.own.belief.agile, next.agile, errors, *by_agile, effect, z, see, config))
-      return false;
+    const auto of_quiet = updated(next.own.belief.quiet, next.quiet, effect, z, see, config);
+    const auto of_agile = updated(next.own.belief.agile, next.agile, effect, z, see, config);
+    const auto of_falling = updated(next.own.belief.falling, next.falling, effect, z, see, config);
+    if (!of_quiet || !of_agile || !of_falling) return false;
     *this = next;
-    own.belief.weigh(of_quiet, of_agile);
+    own.belief.weigh(*of_quiet, *of_agile, *of_falling);
     return true;
   }
   [[nodiscard]] Belief<6> estimate() const { return own.estimate(); }
+
+ private:
+  /// Updates one model; the innovation that it saw.
+  template <int N>
+  [[nodiscard]] static std::optional<Innovation> updated(Belief<N>& belief, WithErrors<N>& cross,
+                                                         const RigErrorEffect& effect, const Eigen::Vector2d& z,
+                                                         const SightModel& see, const IteratedUpdateConfig& config) {
+    const auto seen = see(belief.x.template head<3>());
+    if (!seen) return std::nullopt;
+    CountedErrors errors;
+    const Innovation innovation = innovation_with_errors(belief, cross, errors, *seen, effect, z);
+    if (!update_with_errors(belief, cross, errors, *seen, effect, z, see, config)) return std::nullopt;
+    return innovation;
+  }
 };
 
 }  // namespace alidade

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "alidade/geometry/decompositions.h"
+
 namespace alidade {
 namespace {
 
@@ -25,6 +27,10 @@ std::vector<RigFault> rig_faults(std::span<const RigHead> heads, const RigUncert
                                  const Tracker::Learned& learned, bool is_supposed) {
   constexpr double least_told = 0.1;  // of the variance
   std::vector<RigFault> faults;
+  // What the sights add to u ~ N(0, 1): the information, and its vector.
+  const Eigen::MatrixXd inverse = inverse_symmetric(learned.cov);
+  const Eigen::MatrixXd told = inverse - Eigen::MatrixXd::Identity(inverse.rows(), inverse.cols());
+  const Eigen::VectorXd told_u = inverse * learned.u;
   for (std::size_t h = 0; h < heads.size() && h < errors.factor.size(); ++h) {
     const Eigen::MatrixXd& factor = errors.factor[h];
     const std::vector<std::string> lens = param_names(heads[h].camera.lens);
@@ -36,8 +42,14 @@ std::vector<RigFault> rig_faults(std::span<const RigHead> heads, const RigUncert
       const Eigen::Index k = p - num_head_params;
       const std::string name = k < 0 ? std::string(head_param_names[static_cast<std::size_t>(p)])
                                      : "camera." + lens[static_cast<std::size_t>(k)];
-      const double off = row * learned.u;
-      const double z = std::abs(off) / std::sqrt(is_supposed ? after : before - after);
+      double off = row * learned.u, z = std::abs(off) / std::sqrt(before - after);
+      if (is_supposed) {  // if it alone errs: one cause is asked about, not all of them at once
+        const Eigen::VectorXd alone = row.transpose() / std::sqrt(before);
+        const double pull = alone.dot(told_u), weight = alone.dot(told * alone);
+        if (!(weight > 0.0)) continue;
+        off = std::sqrt(before) * pull / weight;
+        z = std::abs(pull) / std::sqrt(weight);
+      }
       faults.push_back({"head" + std::to_string(heads[h].head.id) + "." + name, off, z});
     }
   }

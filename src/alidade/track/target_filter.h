@@ -63,7 +63,7 @@ struct ModelFilter {
   }
 };
 
-/// A target that is now quiet, now agile.
+/// A target that is now quiet, now agile, now falls.
 struct InteractingFilter {
   static constexpr bool can_smooth = false, considers = false;
   using Models = InteractingModels;
@@ -74,25 +74,28 @@ struct InteractingFilter {
     ModelFilter<Singer> agile;
     agile.start({models.agile, models.agile.sigma_a_m_s2}, first);
     belief.agile = agile.belief;
-    belief.mu.setConstant(0.5);
+    belief.falling = first;
+    belief.mu = {0.49, 0.49, 0.02};
   }
   void predict(const Models& models, double dt_s) { belief.predict(models, dt_s); }
-  [[nodiscard]] Eigen::Vector3d position() const {
-    return belief.mu[0] * belief.quiet.x.head<3>() + belief.mu[1] * belief.agile.x.head<3>();
-  }
+  [[nodiscard]] Eigen::Vector3d position() const { return belief.mean().head<3>(); }
   [[nodiscard]] Innovation expect(const PositionSeen& seen, const Eigen::Vector2d& z) const {
     return innovation_of(belief.merged(), seen, z);
   }
   [[nodiscard]] bool update(const PositionSeen&, const Eigen::Vector2d& z, const SightModel& see,
                             const IteratedUpdateConfig& config) {
     const auto by_quiet = see(belief.quiet.x.head<3>()), by_agile = see(belief.agile.x.head<3>());
-    if (!by_quiet || !by_agile) return false;
+    const auto by_falling = see(belief.falling.x.head<3>());
+    if (!by_quiet || !by_agile || !by_falling) return false;
     const auto quiet = iterated_update(belief.quiet, *by_quiet, z, see, config);
     const auto agile = iterated_update(belief.agile, *by_agile, z, see, config);
-    if (!quiet || !agile) return false;
-    belief.weigh(innovation_of(belief.quiet, *by_quiet, z), innovation_of(belief.agile, *by_agile, z));
+    const auto falling = iterated_update(belief.falling, *by_falling, z, see, config);
+    if (!quiet || !agile || !falling) return false;
+    belief.weigh(innovation_of(belief.quiet, *by_quiet, z), innovation_of(belief.agile, *by_agile, z),
+                 innovation_of(belief.falling, *by_falling, z));
     belief.quiet = *quiet;
     belief.agile = *agile;
+    belief.falling = *falling;
     return true;
   }
   [[nodiscard]] Belief<6> estimate() const { return belief.merged(); }

@@ -208,7 +208,7 @@ void ask_for_faults(std::span<const TargetSight> sights, std::span<const RigHead
   if (!report.errors_are_counted) learning.errors = supposed_errors(heads);
   std::optional<Tracker::Learned> learned;
   const TrackReport free = followed(sights, heads, learning, 0.0, 0.0, {}, &learned);
-  if (learned && free.num_restarts == 0)
+  if (learned && free.num_restarts <= 1)
     report.faults = rig_faults(heads, learning.errors, *learned, !report.errors_are_counted);
 }
 

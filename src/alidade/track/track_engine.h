@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "alidade/track/tracker.h"
@@ -84,7 +85,8 @@ class TrackEngine {
     TargetSight sight;
     Filter filter;
     bool has_started = false;
-    bool began = false;  ///< The track starts, or starts anew, here.
+    bool began = false;     ///< The track starts, or starts anew, here.
+    bool accepted = false;  ///< The track took this sight.
     /// Of each head, one after the other: counted together, a head that keeps failing would be hidden by one that does
     /// not. Heads beyond the eighth share the last place.
     std::array<int, 8> num_rejected{};
@@ -100,7 +102,9 @@ class TrackEngine {
   std::size_t make_room(std::size_t place) {
     std::size_t dropped = 0;
     const double oldest_s = newest_time() - config_.history_s;
-    while (count_ > 1 && dropped < place && (entry(1).sight.t_capture_s < oldest_s || count_ == kept_.size())) {
+    const std::size_t least = std::min(most_of_a_streak, kept_.size() - 1);
+    while (count_ > 1 && dropped < place &&
+           ((count_ > least && entry(1).sight.t_capture_s < oldest_s) || count_ == kept_.size())) {
       first_ = (first_ + 1) % kept_.size();
       --count_;
       ++dropped;
@@ -142,7 +146,7 @@ class TrackEngine {
   /// What becomes of the sight at this place, given the entry before it.
   void apply(std::size_t place, TrackStep& step) {
     Entry& now = entry(place);
-    now.began = false;
+    now.began = now.accepted = false;
     if (place == 0) {
       now.has_started = false;
       now.num_rejected = {};
@@ -157,7 +161,7 @@ class TrackEngine {
     now.t_head_s = before.t_head_s;
     now.t_other_s = before.t_other_s;
     if (!now.has_started) {
-      step.accepted = begin(place);
+      step.accepted = now.accepted = begin(place);
       step.event = step.accepted ? TrackEvent::start : TrackEvent::waiting;
       return;
     }
@@ -169,10 +173,63 @@ class TrackEngine {
       num_rejected = 0;
       note_head(now);
       if (now.t_head_s - now.t_other_s > one_head_after_s) step.event = TrackEvent::one_head;
-    } else if (++num_rejected >= config_.restart_after && begin(place)) {
+    } else if (++num_rejected >= config_.restart_after && begin_anew(place)) {
       step.event = TrackEvent::restart;
       step.accepted = true;
     }
+    now.accepted = step.accepted;
+  }
+
+  /// Begins the track anew where another one explains what was seen since a head's sights were first left out: it takes
+  /// three sights more than the old one did, so that single false sights do not end a track.
+  bool begin_anew(std::size_t place) {
+    constexpr int more = 3;
+    const std::size_t head = entry(place).sight.head;
+    std::size_t first = place;
+    for (std::size_t i = place; i-- > 0 && place - i < most_of_a_streak;) {
+      if (entry(i).sight.head != head) continue;
+      if (entry(i).accepted) break;
+      first = i;
+    }
+    for (std::size_t i = first; i < place; ++i) {
+      if (entry(i).sight.head != head) continue;
+      const auto other = other_before(i);
+      if (!other) continue;
+      auto filter = begun(entry(*other).sight, entry(i).sight);
+      if (!filter) continue;
+      int old_takes = 0, new_takes = 2;
+      for (std::size_t k = *other; k < place; ++k) old_takes += entry(k).accepted ? 1 : 0;
+      Entry trial;
+      trial.filter = *filter;
+      for (std::size_t k = i + 1; k <= place; ++k) {
+        trial.filter.predict(models_, entry(k).sight.t_capture_s - entry(k - 1).sight.t_capture_s);
+        trial.sight = entry(k).sight;
+        TrackStep ignored;
+        new_takes += use(trial, ignored) == TrackEvent::none ? 1 : 0;
+      }
+      if (new_takes < old_takes + more) continue;
+      set_begun(place, *other, trial.filter);
+      return true;
+    }
+    return false;
+  }
+
+  /// The last sight of another head that was taken at about the same time as this one.
+  [[nodiscard]] std::optional<std::size_t> other_before(std::size_t place) const {
+    const TargetSight& now = entry(place).sight;
+    for (std::size_t i = place; i-- > 0 && now.t_capture_s - entry(i).sight.t_capture_s <= config_.together_s;)
+      if (entry(i).sight.head != now.head) return i;
+    return std::nullopt;
+  }
+
+  void set_begun(std::size_t place, std::size_t other, const Filter& filter) {
+    Entry& now = entry(place);
+    now.filter = filter;
+    now.has_started = now.began = true;
+    now.num_rejected = {};
+    now.head = now.sight.head;
+    now.t_head_s = now.sight.t_capture_s;
+    now.t_other_s = entry(other).sight.t_capture_s;
   }
 
   void note_head(Entry& now) const {
@@ -216,21 +273,12 @@ class TrackEngine {
   /// Begins the track at this place from its sight and the last one of another head, if they are of about one time
   /// and their rays meet in the working range.
   bool begin(std::size_t place) {
-    Entry& now = entry(place);
-    for (std::size_t i = place; i-- > 0 && now.sight.t_capture_s - entry(i).sight.t_capture_s <= config_.together_s;) {
-      const Entry& other = entry(i);
-      if (other.sight.head == now.sight.head) continue;
-      const auto filter = begun(other.sight, now.sight);
-      if (!filter) return false;
-      now.filter = *filter;
-      now.has_started = now.began = true;
-      now.num_rejected = {};
-      now.head = now.sight.head;
-      now.t_head_s = now.sight.t_capture_s;
-      now.t_other_s = other.sight.t_capture_s;
-      return true;
-    }
-    return false;
+    const auto other = other_before(place);
+    if (!other) return false;
+    const auto filter = begun(entry(*other).sight, entry(place).sight);
+    if (!filter) return false;
+    set_begun(place, *other, *filter);
+    return true;
   }
 
   [[nodiscard]] std::optional<Filter> begun(const TargetSight& earlier, const TargetSight& later) const {
@@ -257,6 +305,7 @@ class TrackEngine {
   }
 
   static constexpr double one_head_after_s = 0.5;
+  static constexpr std::size_t most_of_a_streak = 16;  ///< Sights that a new track may be told from.
 
   std::vector<RigHead> heads_;
   TrackerConfig config_;

@@ -1,11 +1,14 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 
 #include "alidade/track/clock_shift.h"
+#include "alidade/track/explanation.h"
 #include "alidade/track/track.h"
 
 namespace alidade {
@@ -13,7 +16,7 @@ namespace {
 
 constexpr double good_nees = 2.0, most_nees = 9.0;  // per degree of freedom, where the truth is given
 constexpr double good_nees_of_one = 3.8;            // where errors do not change along a track: 99 % of three numbers
-constexpr double most_left_out = 0.2;
+constexpr double care_left_out = 0.05, most_left_out = 0.2;
 constexpr double least_used_share = 0.7, most_nis = 3.0, good_nis_low = 0.6, good_nis_high = 1.5;
 
 double used_share(const TrackReport& report) {
@@ -30,48 +33,7 @@ bool fits(const TrackReport& report) {
 }
 
 using Sights = std::vector<TargetSight>;
-
-Sights in_degrees(Sights sights) {
-  for (TargetSight& sight : sights) sight.pan_tilt_rad *= std::numbers::pi / 180.0;
-  return sights;
-}
-Sights swapped(Sights sights) {
-  for (TargetSight& sight : sights) sight.head = sight.head < 2 ? 1 - sight.head : sight.head;
-  return sights;
-}
-Sights pan_reversed(Sights sights) {
-  for (TargetSight& sight : sights) sight.pan_tilt_rad.x() *= -1.0;
-  return sights;
-}
-Sights tilt_reversed(Sights sights) {
-  for (TargetSight& sight : sights) sight.pan_tilt_rad.y() *= -1.0;
-  return sights;
-}
-
-struct Fault {
-  std::string what, add;
-};
-
-/// The mistake that would explain sights that do not fit: the one under which they do.
-std::optional<Fault> likely_mistake(std::span<const TargetSight> sights, std::span<const RigHead> heads,
-                                    const TrackConfig& config) {
-  struct Candidate {
-    Sights (*apply)(Sights);
-    const char *what, *add;
-  };
-  const Candidate candidates[] = {
-      {in_degrees, "angles in degrees", "give pan_rad and tilt_rad in radians: as degrees they fit the rig"},
-      {swapped, "heads swapped", "exchange the two heads' names in the events or in the rig: then they fit"},
-      {pan_reversed, "pan with the wrong sign", "pan > 0 turns left: with the sign reversed the events fit the rig"},
-      {tilt_reversed, "tilt with the wrong sign", "tilt > 0 turns up: with the sign reversed the events fit the rig"}};
-  const Sights given(sights.begin(), sights.end());
-  for (const Candidate& candidate : candidates) {
-    TrackConfig plain = config;
-    plain.judge = false;
-    if (fits(track_target(candidate.apply(given), heads, plain))) return Fault{candidate.what, candidate.add};
-  }
-  return std::nullopt;
-}
+using Fault = Explanation;
 
 /// Why no track began although there were two heads at a time.
 Fault why_no_start(std::span<const TargetSight> given, std::span<const RigHead> heads, const TrackConfig& config) {
@@ -100,13 +62,6 @@ Fault why_no_start(std::span<const TargetSight> given, std::span<const RigHead> 
           "check the rig file, or widen the working range"};
 }
 
-std::string clock_text(const ClockShift& shift, std::span<const RigHead> heads) {
-  return "the clock of head " + std::to_string(heads[shift.head].head.id) + " seems " +
-         text_of(1e3 * std::abs(shift.later_s), 2) + " ms " + (shift.later_s > 0.0 ? "behind" : "ahead of") +
-         " that of head " + std::to_string(heads[0].head.id) +
-         ": with its times moved by that the sights are far more probable";
-}
-
 /// Pixels beyond the picture of the rig's camera: the rig file is of another camera.
 std::optional<Fault> other_camera(const TrackReport& report, std::span<const TargetSight> sights,
                                   std::span<const RigHead> heads) {
@@ -132,7 +87,7 @@ Verdict refused(Fault fault) {
   verdict.state = State::refused;
   verdict.exit_code = ExitCode::cannot_tell;
   verdict.sentence = std::move(fault.what);
-  verdict.to_add = std::move(fault.add);
+  verdict.to_add = std::move(fault.to_do);
   return verdict;
 }
 
@@ -183,9 +138,9 @@ Lean worst_lean(const TrackReport& report, std::span<const RigHead> heads) {
 /// Whether innovations are white, and what of the rig the sights contradict.
 void add_white(const TrackReport& report, std::span<const RigHead> heads, Verdict& verdict) {
   const Lean lean = worst_lean(report, heads);
-  verdict.checks.push_back(check("lean", lean.size > 0.0 ? State::care : State::good,
+  const Check lean_check = check("lean", lean.size > 0.0 ? State::care : State::good,
                                  lean.size > 0.0 ? lean.text : "by head, motion and place the innovations have no lean",
-                                 lean.size, least_mean, "σ"));
+                                 lean.size, least_mean, "σ");
   constexpr double most_z = 5.0;
   if (!report.faults.empty()) {
     const RigFault& worst = report.faults.front();
@@ -198,6 +153,7 @@ void add_white(const TrackReport& report, std::span<const RigHead> heads, Verdic
                                        : "the heads' rays meet as the rig file lets them",
                                    worst.z, most_z, "σ"));
   }
+  verdict.checks.push_back(lean_check);
   if (report.inflation > 1.0)
     verdict.checks.push_back(check("inflated", State::care,
                                    "every σ was raised by " + text_of(std::sqrt(report.inflation), 3) +
@@ -240,17 +196,88 @@ void add_checks(const TrackReport& report, Verdict& verdict) {
   const std::size_t num_left = report.steps.size() - report.num_used;
   verdict.checks.push_back(
       check("left out",
-            left_out > most_left_out ? State::bad
-            : left_out > 0.05        ? State::care
-                                     : State::good,
+            left_out > most_left_out   ? State::bad
+            : left_out > care_left_out ? State::care
+                                       : State::good,
             std::to_string(num_left) + " of " + std::to_string(report.steps.size()) + " sights (" +
                 text_of(100.0 * left_out, 2) + " %) were left out: " +
-                (left_out > 0.05 ? "what agrees is no more than what was let in" : "the others agree"),
-            left_out, 0.05, "1"));
+                (left_out > care_left_out ? "what agrees is no more than what was let in" : "the others agree"),
+            left_out, care_left_out, "1"));
   const auto late = static_cast<double>(count(report, TrackEvent::late));
   if (late > 0.0)
     verdict.checks.push_back(
         check("late", State::care, text_of(late, 2) + " sights came too late", late, 0.0, "sights"));
+}
+
+/// Sights that were left out and follow a path of their own.
+std::optional<Check> second_target(const TrackReport& report, std::span<const TargetSight> sights,
+                                   std::span<const RigHead> heads, const TrackConfig& config) {
+  constexpr std::size_t least = 16;
+  constexpr double least_share = 0.7;
+  Sights others;
+  for (std::size_t i = 0; i < sights.size() && i < report.steps.size(); ++i)
+    if (report.steps[i].event == TrackEvent::gated || report.steps[i].event == TrackEvent::depth)
+      others.push_back(sights[i]);
+  if (others.size() < least) return std::nullopt;
+  TrackConfig plain = config;
+  plain.judge = false;
+  const TrackReport second = track_target(with_shift(others, {}), heads, plain);
+  if (second.num_starts == 0 || used_share(second) < least_share || second.num_restarts * 20 > others.size())
+    return std::nullopt;
+  return check("second target", State::care,
+               "there are two targets: " + std::to_string(second.num_used) + " of the " +
+                   std::to_string(others.size()) + " sights that were left out follow a path of their own",
+               used_share(second), least_share, "1");
+}
+
+/// What of the sights as a whole is not as told.
+struct Causes {
+  std::optional<Fault> mistake;
+  std::optional<Check> second;
+  std::optional<ClockShift> shift;
+};
+
+Causes causes_of(const TrackReport& report, std::span<const TargetSight> sights, std::span<const RigHead> heads,
+                 const TrackConfig& config) {
+  TrackConfig found = config;
+  if (report.num_starts > 0) found.tracker.sigma_a_m_s2 = report.sigma_a_m_s2;
+  Causes causes;
+  if (!fits(report) || report.nis_per_dof > good_nis_high || used_share(report) < 1.0 - care_left_out)
+    causes.mistake = explanation_of(sights, heads, config);
+  if (causes.mistake) return causes;
+  causes.second = second_target(report, sights, heads, found);
+  causes.shift = probable_clock_shift(sights, heads, found);
+  return causes;
+}
+
+/// Why there is no track to be told of.
+std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes, std::span<const TargetSight> sights,
+                                std::span<const RigHead> heads, const TrackConfig& config) {
+  if (causes.mistake && (!fits(report) || used_share(report) < 1.0 - most_left_out)) return causes.mistake;
+  if (fits(report)) return std::nullopt;
+  if (causes.shift) return Fault{clock_text(*causes.shift, heads), "set the heads' clocks"};
+  if (report.num_starts == 0) return why_no_start(sights, heads, config);
+  if (causes.second) return Fault{causes.second->text, "give the sights of one target: one row a picture"};
+  if (used_share(report) < least_used_share)
+    return Fault{"only " + text_of(100.0 * used_share(report), 2) +
+                     " % of the sights fit one track and this rig, and no clock, sign or swap explains it",
+                 "check that the rig file is of these heads as they stand now, and the noise"};
+  return std::nullopt;
+}
+
+std::string sentence_of(const TrackReport& report, const Verdict& verdict) {
+  std::string sentence =
+      "tracked through " + std::to_string(report.num_used) + " of " + std::to_string(report.steps.size()) + " sights";
+  if (report.num_restarts > 0) sentence += ", begun anew " + std::to_string(report.num_restarts) + " times";
+  if (verdict.state == State::good) return sentence;
+  const auto first = std::ranges::find(verdict.checks, verdict.state, &Check::state);
+  sentence += "; " + first->text;
+  // Beside what only says how bad it is, what it may come from.
+  constexpr std::array<std::string_view, 5> names{"clocks", "mistake", "second target", "rig", "lean"};
+  const auto cause = std::ranges::find_if(
+      verdict.checks, [&](const Check& c) { return c.state != State::good && std::ranges::count(names, c.name) > 0; });
+  if (cause != verdict.checks.end() && cause != first) sentence += "; " + cause->text;
+  return sentence;
 }
 
 }  // namespace
@@ -262,32 +289,19 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetSight> si
   if (seen_by.size() < 2)
     return refused({"one head only: the range along its ray cannot be told", "add the events of a second head"});
   if (auto other = other_camera(report, sights, heads)) return refused(std::move(*other));
-  if (!fits(report)) {
-    if (auto mistake = likely_mistake(sights, heads, config)) return refused(std::move(*mistake));
-    if (report.num_starts == 0) return refused(why_no_start(sights, heads, config));
-    if (const auto shift = probable_clock_shift(sights, heads, config))
-      return refused({clock_text(*shift, heads), "set the heads' clocks"});
-    if (used_share(report) < least_used_share)
-      return refused({"only " + text_of(100.0 * used_share(report), 2) + " % of the sights fit one track and this rig",
-                      "check the rig file, the heads' clocks and the noise"});
-  }
+  const Causes causes = causes_of(report, sights, heads, config);
+  if (auto why = refusal_of(report, causes, sights, heads, config)) return refused(std::move(*why));
   Verdict verdict;
+  if (causes.shift)
+    verdict.checks.push_back(
+        check("clocks", State::care, clock_text(*causes.shift, heads), 1e3 * causes.shift->later_s, 0.0, "ms"));
+  if (causes.mistake) verdict.checks.push_back(check("mistake", State::bad, causes.mistake->what, 1.0, 0.0, "1"));
+  if (causes.second) verdict.checks.push_back(*causes.second);
   add_checks(report, verdict);
   add_white(report, heads, verdict);
-  if (const auto shift = probable_clock_shift(sights, heads, config))
-    verdict.checks.insert(verdict.checks.begin(),
-                          check("clocks", State::care, clock_text(*shift, heads), 1e3 * shift->later_s, 0.0, "ms"));
   for (const Check& c : verdict.checks) verdict.state = std::max(verdict.state, c.state);
   if (verdict.state == State::bad) verdict.to_add = "do not use it before the reason is found";
-  verdict.sentence =
-      "tracked through " + std::to_string(report.num_used) + " of " + std::to_string(report.steps.size()) + " sights";
-  if (report.num_restarts > 0) verdict.sentence += ", begun anew " + std::to_string(report.num_restarts) + " times";
-  for (const Check& c : verdict.checks) {
-    if (c.state == verdict.state && c.state != State::good) {
-      verdict.sentence += "; " + c.text;
-      break;
-    }
-  }
+  verdict.sentence = sentence_of(report, verdict);
   return verdict;
 }
 

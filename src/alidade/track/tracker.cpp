@@ -48,7 +48,9 @@ Engine engine_for(std::vector<RigHead> heads, const TrackerConfig& config) {
     case TrackMethod::resting:
       return engine_of(std::move(heads), config, MeanReverting{config.resting_sigma_v_m_s, config.resting_tau_s}, 1.0);
     case TrackMethod::imm: {
-      const InteractingModels models{ConstantVelocity{share_while_quiet * sigma_a}, singer};
+      const double sigma_quiet = share_while_quiet * sigma_a;
+      const InteractingModels models{ConstantVelocity{sigma_quiet}, singer,
+                                     Ballistic{sigma_quiet, config.gravity_m_s2}};
       if (config.errors.num() == 0) return detail::TrackEngine<InteractingFilter>(std::move(heads), config, models);
       return detail::TrackEngine<ConsideredInteracting>(std::move(heads), config, {models, config.errors.num()});
     }

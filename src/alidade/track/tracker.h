@@ -25,13 +25,13 @@ struct TrackerConfig {
   double sigma_a_m_s2 = 1.0;                         ///< About the target's peak acceleration; see the models.
   double singer_tau_s = 0.5;
   double resting_sigma_v_m_s = 0.9, resting_tau_s = 0.7;
-  Eigen::Vector3d gravity_m_s2 = {0.0, 9.80665, 0.0};  ///< In the world, for ballistic; so where y is down.
+  Eigen::Vector3d gravity_m_s2 = {0.0, 9.80665, 0.0};  ///< In the world, for ballistic and imm; so where y is down.
   IteratedUpdateConfig update;
   double gate = 25.0;  ///< On NIS, 2 degrees of freedom: a right sight fails it once in 270 000.
   double min_depth_m = 0.2, max_depth_m = 20.0;  ///< The rig's working range, along a camera's view.
-  int restart_after = 2;                         ///< Rejections one after the other, of one head.
-  double together_s = 0.06;                      ///< Two heads that far apart in time still intersect.
-  double start_sigma_m = 1.0;                    ///< Or a tenth of the distance, where that is more.
+  int restart_after = 2;  ///< Rejections one after the other, of one head: then it is asked whether another track fits.
+  double together_s = 0.06;    ///< Two heads that far apart in time still intersect.
+  double start_sigma_m = 1.0;  ///< Or a tenth of the distance, where that is more.
   double start_sigma_v_m_s = 2.0;
   double history_s = 0.3;       ///< How late a sight may come.
   std::size_t most_kept = 256;  ///< Sights within history_s; older ones can then no longer be overtaken.

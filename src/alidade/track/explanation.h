@@ -1,0 +1,27 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+
+#include "alidade/track/track.h"
+
+namespace alidade {
+
+struct ClockShift;
+
+/// A mistake under which sights that do not fit the rig would.
+struct Explanation {
+  std::string what, to_do;
+};
+
+/// Swapped heads, a wrong sign of an angle or a mirrored picture, of all heads or of one, degrees, a head that is not
+/// the rig's: the one under which the sights fit and are the most probable. Two of them where they are nearly
+/// equally probable; none where none lets the sights fit.
+[[nodiscard]] std::optional<Explanation> explanation_of(std::span<const TargetSight> sights,
+                                                        std::span<const RigHead> heads, const TrackConfig& config);
+
+/// "the clock of head 2 seems 30 ms behind that of head 1 …"
+[[nodiscard]] std::string clock_text(const ClockShift& shift, std::span<const RigHead> heads);
+
+}  // namespace alidade

@@ -1,0 +1,218 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/simulate/draws.h"
+#include "alidade/testing/track_sample.h"
+#include "alidade/track/clock_shift.h"
+#include "alidade/track/explanation.h"
+#include "alidade/track/track.h"
+#include "alidade/track/track_assumed.h"
+
+// What is not as the rig file says: named, or at least not called good. Twenty draws of each.
+
+namespace alidade {
+namespace {
+
+struct Judged {
+  TrackReport report;
+  Verdict verdict;
+  double worst_sigma = 0.0;  ///< Largest error of a coordinate in its σ, after the warm-up.
+};
+
+/// As `alidade track` judges events whose rig file says nothing of its errors.
+Judged judged(const TrackScene& scene, std::uint64_t seed, TrackMethod method = TrackMethod::cv) {
+  const std::vector<TargetSight> sights = testing::sights_of(scene, seed);
+  TrackConfig config;
+  config.tracker.method = method;
+  Judged result;
+  result.report = track_target(sights, scene.heads, config);
+  result.verdict = track_verdict(result.report, sights, scene.heads, config);
+  if (result.verdict.exit_code != ExitCode::ok) return result;
+  Rig rig;
+  rig.heads = scene.heads;
+  heed_assumptions(track_assumed(sights, rig, config, result.report, {}), result.verdict);
+  for (const TrackStep& step : result.report.steps) {
+    if (!step.has_belief || step.t_s < 1.5) continue;
+    const Eigen::Vector3d error = step.belief.x.head<3>() - scene.position(step.t_s);
+    for (int k = 0; k < 3; ++k)
+      result.worst_sigma = std::max(result.worst_sigma, std::abs(error[k]) / std::sqrt(step.belief.P(k, k)));
+  }
+  return result;
+}
+
+TrackScene faulty(const std::string& name, const std::function<void(TrackFaults&)>& fault) {
+  TrackScene scene = *track_scenario(name);
+  fault(scene.faults);
+  return scene;
+}
+
+struct FaultCase {
+  std::string what;
+  std::function<void(TrackFaults&)> fault;
+  std::string
+      named;  ///< Words of which one (separated by |) the verdict has to say in most draws; none: it cannot tell.
+};
+
+const std::vector<FaultCase>& fault_cases() {
+  static const std::vector<FaultCase> cases{
+      {"yaw", [](TrackFaults& f) { f.base_turn_rad.y() = 0.02; }, ""},
+      {"pitch", [](TrackFaults& f) { f.base_turn_rad.x() = 0.01; }, "base_rx_rad|tilt"},
+      {"roll", [](TrackFaults& f) { f.base_turn_rad.z() = 0.05; }, ""},
+      {"baseline", [](TrackFaults& f) { f.baseline = 0.05; }, ""},
+      {"pan zero", [](TrackFaults& f) { f.zero_rad[1].x() = 0.02; }, ""},
+      {"tilt zero of head 1", [](TrackFaults& f) { f.zero_rad[0].y() = 0.01; }, "base_rx_rad|tilt"},
+      {"tilt zero of head 2", [](TrackFaults& f) { f.zero_rad[1].y() = -0.01; }, "base_rx_rad|tilt"},
+      {"clock ahead", [](TrackFaults& f) { f.clock_s = 0.04; }, "the clock of head 2"},
+      {"clock behind", [](TrackFaults& f) { f.clock_s = -0.04; }, "the clock of head 2"},
+      {"clutter", [](TrackFaults& f) { f.clutter = 0.1; }, "left out|larger than stated"},
+      {"swapped", [](TrackFaults& f) { f.swapped = true; }, "heads swapped"},
+      {"mirrored", [](TrackFaults& f) { f.mirrored = true; }, "head 2 are mirrored"},
+      {"pan sign", [](TrackFaults& f) { f.pan_sign = true; }, "pan of head 2 with the wrong sign"},
+      {"tilt sign", [](TrackFaults& f) { f.tilt_sign = true; }, "tilt of head 2 with the wrong sign"}};
+  return cases;
+}
+
+bool says_one_of(const std::string& sentence, std::string words) {
+  for (std::size_t bar; (bar = words.find('|')) != std::string::npos; words.erase(0, bar + 1))
+    if (sentence.find(words.substr(0, bar)) != std::string::npos) return true;
+  return sentence.find(words) != std::string::npos;
+}
+
+TEST(TrackFaults, AreNamedAndNeverCalledGood) {
+  constexpr int draws = 20;
+  for (const char* scenario : {"B", "G"}) {
+    for (const FaultCase& of : fault_cases()) {
+      const TrackScene scene = faulty(scenario, of.fault);
+      int num_named = 0;
+      for (std::uint64_t seed = 1; seed <= draws; ++seed) {
+        const Judged result = judged(scene, seed);
+        EXPECT_FALSE(result.verdict.state == State::good && result.worst_sigma > 5.0)
+            << scenario << " " << of.what << " " << seed << ": " << result.worst_sigma;
+        num_named += !of.named.empty() && says_one_of(result.verdict.sentence, of.named) ? 1 : 0;
+        // A late clock is said of late clocks alone.
+        const bool says_clock = result.verdict.sentence.find("clock of head") != std::string::npos;
+        if (!of.what.starts_with("clock"))
+          EXPECT_FALSE(says_clock) << scenario << " " << of.what << " " << seed << ": " << result.verdict.sentence;
+      }
+      if (!of.named.empty()) EXPECT_GE(num_named, draws - 2) << scenario << " " << of.what;
+    }
+  }
+}
+
+/// Forty draws each of the scenarios, the rig being what its file says, exactly. D hides the target from a head for two
+/// seconds, which is said.
+TEST(TrackFaults, CleanScenariosAreGood) {
+  constexpr int draws = 40;
+  for (const char* name : {"A", "A2", "B", "C", "E", "F", "G"}) {
+    const TrackScene scene = *track_scenario(name);
+    int num_good = 0;
+    for (std::uint64_t seed = 101; seed < 101 + draws; ++seed) {
+      const std::vector<TargetSight> sights = testing::sights_of(scene, seed);
+      const TrackConfig config;
+      const TrackReport report = track_target(sights, scene.heads, config, testing::truth_of(scene));
+      num_good += track_verdict(report, sights, scene.heads, config).state == State::good ? 1 : 0;
+    }
+    EXPECT_GE(num_good, 38) << name;
+    RecordProperty(std::string("good_") + name, num_good);
+  }
+}
+
+/// A third head, whose row in the rig file is another's, or whose clock is off: the one that is wrong is named, also
+/// where it is the first.
+TEST(TrackFaults, OfThreeHeadsTheWrongOneIsNamed) {
+  TrackScene scene = *track_scenario("C");
+  RigHead third = scene.heads[1];
+  third.head.id = 3;
+  third.head.world_from_base.translation += Eigen::Vector3d(0.1, -0.5, 0.0);
+  scene.heads.push_back(third);
+  scene.rate_hz = {20.0, 20.0, 20.0};
+  scene.phase_s = {0.0, 0.01, 0.02};
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    const std::vector<TargetSight> sights = testing::sights_of(scene, seed);
+    const TrackConfig config;
+    for (std::size_t wrong = 0; wrong < 3; ++wrong) {
+      const std::string head = "head " + std::to_string(scene.heads[wrong].head.id);
+      std::vector<RigHead> heads = scene.heads;
+      heads[wrong].head.world_from_base.rotation =
+          heads[wrong].head.world_from_base.rotation * exp_so3({0.3, 0.4, 0.1});
+      const Verdict foreign = track_verdict(track_target(sights, heads, config), sights, heads, config);
+      EXPECT_EQ(foreign.exit_code, ExitCode::cannot_tell);
+      EXPECT_NE(foreign.sentence.find("the sights of " + head), std::string::npos) << foreign.sentence;
+      const std::vector<TargetSight> late = with_shift(sights, {wrong, 0.04});
+      const Verdict clock = track_verdict(track_target(late, scene.heads, config), late, scene.heads, config);
+      EXPECT_NE(clock.sentence.find("the clock of " + head + " seems"), std::string::npos) << clock.sentence;
+    }
+  }
+}
+
+/// Two things in the pictures, each seen now and then: it is said, and what is followed is one of them.
+TEST(TrackFaults, ASecondTargetIsSaid) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const TrackScene scene = faulty("C", [](TrackFaults& f) { f.second = 0.25; });
+    const Judged result = judged(scene, seed);
+    EXPECT_GE(result.verdict.state, State::care);
+    EXPECT_NE(result.verdict.sentence.find("two targets"), std::string::npos) << result.verdict.sentence;
+  }
+}
+
+/// Of clutter that is let in now and then: σ covers what it does.
+TEST(TrackFaults, SigmaCoversWithClutter) {
+  for (const double share : {0.05, 0.1, 0.15}) {
+    for (const char* name : {"B", "C"}) {
+      const TrackScene scene = faulty(name, [share](TrackFaults& f) { f.clutter = share; });
+      double nees = 0.0;
+      constexpr int draws = 20;
+      for (std::uint64_t seed = 1; seed <= draws; ++seed) {
+        const std::vector<TargetSight> sights = testing::sights_of(scene, seed);
+        TrackConfig config;
+        config.warm_up_s = 1.0;
+        nees += track_target(sights, scene.heads, config, testing::truth_of(scene)).nees_per_dof / draws;
+      }
+      EXPECT_LT(nees, 1.5) << name << " " << share;
+      RecordProperty("nees_" + std::string(name) + std::to_string(share), std::to_string(nees));
+    }
+  }
+}
+
+struct Throws {
+  double mean_z2 = 0.0, beyond_three = 0.0, num = 0.0;
+};
+
+/// Predictions 0.3 s ahead of twenty throws, from 0.15 s after each throw on, both times in flight: the vertical error.
+Throws thrown(TrackMethod method) {
+  Throws all;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Draws draws(seed);
+    const Eigen::Vector3d velocity(draws.uniform(-0.8, 0.8), draws.uniform(-4.5, -3.0), draws.uniform(-0.4, 0.4));
+    TrackScene scene = *track_scenario("throw");
+    scene.position = thrown_ball({draws.uniform(-0.2, 0.4), draws.uniform(-0.1, 0.3), 3.0}, velocity);
+    const double lands_s = 1.0 - 2.0 * velocity.y() / 9.80665;
+    TrackConfig config;
+    config.tracker.method = method;
+    config.predict_s = 0.3;
+    for (const PredictedStep& step : track_target(testing::sights_of(scene, seed), scene.heads, config).ahead) {
+      if (!step.has_belief || step.t_s < 1.45 || step.t_s > lands_s) continue;
+      const double z = (step.belief.x[1] - scene.position(step.t_s).y()) / std::sqrt(step.belief.P(1, 1));
+      all.mean_z2 += z * z;
+      all.beyond_three += std::abs(z) > 3.0 ? 1.0 : 0.0;
+      all.num += 1.0;
+    }
+  }
+  all.mean_z2 /= all.num;
+  return all;
+}
+
+TEST(TrackFaults, PredictionsInFlightAreWithinTheirSigma) {
+  for (const TrackMethod method : {TrackMethod::ballistic, TrackMethod::imm}) {
+    const Throws throws = thrown(method);
+    EXPECT_GT(throws.num, 400.0);
+    EXPECT_LT(throws.mean_z2, 1.2) << method_name(method);
+    EXPECT_LE(throws.beyond_three, 0.01 * throws.num) << method_name(method);
+    RecordProperty("z2_" + std::string(method_name(method)), std::to_string(throws.mean_z2));
+  }
+}
+
+}  // namespace
+}  // namespace alidade

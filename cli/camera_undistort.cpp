@@ -9,8 +9,8 @@
 #include <set>
 
 #include "alidade/camera/undistort.h"
+#include "alidade/imaging/picture_codecs.h"
 #include "alidade/io/camera_file.h"
-#include "alidade/io/picture_codecs.h"
 #include "cli/camera.h"
 #include "cli/camera_values.h"
 #include "cli/frame.h"

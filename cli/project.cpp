@@ -6,10 +6,10 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "alidade/imaging/picture_codecs.h"
 #include "alidade/io/beam_file.h"
 #include "alidade/io/camera_file.h"
 #include "alidade/io/photos.h"
-#include "alidade/io/picture_codecs.h"
 #include "cli/commands.h"
 #include "cli/frame.h"
 #include "cli/option_checks.h"

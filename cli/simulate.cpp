@@ -5,9 +5,9 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
+#include "alidade/imaging/picture_codecs.h"
 #include "alidade/io/camera_file.h"
 #include "alidade/io/camera_json.h"
-#include "alidade/io/picture_codecs.h"
 #include "alidade/simulate/board_photos.h"
 #include "alidade/simulate/example_camera.h"
 #include "cli/board_options.h"

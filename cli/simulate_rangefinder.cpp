@@ -4,10 +4,10 @@
 #include <memory>
 #include <opencv2/core.hpp>
 
+#include "alidade/imaging/picture_codecs.h"
 #include "alidade/io/beam_file.h"
 #include "alidade/io/camera_file.h"
 #include "alidade/io/corner_file.h"
-#include "alidade/io/picture_codecs.h"
 #include "alidade/io/shots_file.h"
 #include "alidade/simulate/rangefinder.h"
 #include "alidade/simulate/spot_photos.h"

@@ -8,10 +8,10 @@
 #include <opencv2/core.hpp>
 
 #include "alidade/imaging/grey_photo.h"
+#include "alidade/imaging/picture_codecs.h"
 #include "alidade/io/camera_file.h"
 #include "alidade/io/pairs_file.h"
 #include "alidade/io/photos.h"
-#include "alidade/io/picture_codecs.h"
 #include "alidade/io/rotation_log_file.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/panorama_video.h"

@@ -8,8 +8,8 @@
 #include <memory>
 #include <opencv2/core.hpp>
 
+#include "alidade/imaging/picture_codecs.h"
 #include "alidade/io/events_file.h"
-#include "alidade/io/picture_codecs.h"
 #include "alidade/io/rig_file.h"
 #include "alidade/io/servo_scenario_file.h"
 #include "alidade/io/video_sights.h"

@@ -4,9 +4,9 @@
 #include <memory>
 #include <opencv2/core.hpp>
 
+#include "alidade/imaging/picture_codecs.h"
 #include "alidade/io/camera_file.h"
 #include "alidade/io/localize_file.h"
-#include "alidade/io/picture_codecs.h"
 #include "alidade/simulate/underwater.h"
 #include "alidade/simulate/underwater_video.h"
 #include "cli/commands.h"

@@ -6,9 +6,9 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
+#include "alidade/imaging/picture_codecs.h"
 #include "alidade/io/exif.h"
 #include "alidade/io/foreign_pictures.h"
-#include "alidade/io/picture_codecs.h"
 
 namespace alidade {
 namespace {
@@ -153,7 +153,7 @@ std::string jpeg_preview(const cv::Mat& photo, int max_width_px, int quality) {
   if (small.depth() != CV_8U) small.convertTo(small, CV_8U);
   if (small.channels() == 3) cv::cvtColor(small, small, cv::COLOR_BGR2GRAY);
   if (small.channels() == 4) cv::cvtColor(small, small, cv::COLOR_BGRA2GRAY);
-  return grey_jpeg_bytes(small, quality);
+  return jpeg_bytes(small, quality);
 }
 
 }  // namespace alidade

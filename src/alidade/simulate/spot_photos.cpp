@@ -5,10 +5,10 @@
 #include <cmath>
 #include <numbers>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "alidade/imaging/picture_codecs.h"
 #include "alidade/simulate/board_light.h"
 #include "alidade/simulate/board_placing.h"
 #include "alidade/simulate/board_surface.h"
@@ -185,11 +185,7 @@ cv::Mat through_bayer(const cv::Mat& photo) {
   return colour;
 }
 
-cv::Mat through_jpeg(const cv::Mat& photo, int quality) {
-  std::vector<unsigned char> bytes;
-  cv::imencode(".jpg", photo, bytes, {cv::IMWRITE_JPEG_QUALITY, quality});
-  return cv::imdecode(bytes, cv::IMREAD_COLOR);
-}
+cv::Mat through_jpeg(const cv::Mat& photo, int quality) { return decode_picture(jpeg_bytes(photo, quality)); }
 
 /// Places of the board that carry stickers, the same in all photos.
 std::vector<Eigen::Vector3d> stickers_in_cam(const SpotScene& scene, std::size_t i, int num) {

@@ -1,4 +1,4 @@
-#include "alidade/io/picture_codecs.h"
+#include "alidade/imaging/picture_codecs.h"
 
 #include <array>
 #include <charconv>
@@ -17,7 +17,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "alidade/io/tiff_picture.h"
+#include "alidade/imaging/tiff_picture.h"
 
 namespace alidade {
 namespace {
@@ -112,8 +112,8 @@ bool write_jpeg(const cv::Mat& picture, int quality, unsigned char*& out, unsign
   jpeg_mem_dest(&info, &out, &size);
   info.image_width = static_cast<JDIMENSION>(picture.cols);
   info.image_height = static_cast<JDIMENSION>(picture.rows);
-  info.input_components = 1;
-  info.in_color_space = JCS_GRAYSCALE;
+  info.input_components = picture.channels();
+  info.in_color_space = picture.channels() == 1 ? JCS_GRAYSCALE : JCS_EXT_BGR;
   jpeg_set_defaults(&info);
   jpeg_set_quality(&info, quality, TRUE);
   jpeg_start_compress(&info, TRUE);
@@ -339,13 +339,14 @@ std::string png_bytes(const cv::Mat& picture) {
   return out;
 }
 
-std::string grey_jpeg_bytes(const cv::Mat& picture, int quality) {
+std::string jpeg_bytes(const cv::Mat& picture, int quality) {
   unsigned char* out = nullptr;
   unsigned long size = 0;
-  const bool is_written = picture.type() == CV_8UC1 && !picture.empty() && write_jpeg(picture, quality, out, size);
+  const bool fits = (picture.type() == CV_8UC1 || picture.type() == CV_8UC3) && !picture.empty();
+  const bool is_written = fits && write_jpeg(picture, quality, out, size);
   std::string bytes(reinterpret_cast<const char*>(out), is_written ? size : 0);
   std::free(out);
-  if (!is_written) throw std::invalid_argument("not a grey picture of 8 bit");
+  if (!is_written) throw std::invalid_argument("pixels of a kind that JPEG cannot hold");
   return bytes;
 }
 

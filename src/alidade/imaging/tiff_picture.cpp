@@ -1,4 +1,4 @@
-#include "alidade/io/tiff_picture.h"
+#include "alidade/imaging/tiff_picture.h"
 
 #include <tiffio.h>
 

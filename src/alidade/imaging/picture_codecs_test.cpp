@@ -1,4 +1,4 @@
-#include "alidade/io/picture_codecs.h"
+#include "alidade/imaging/picture_codecs.h"
 
 #include <gtest/gtest.h>
 
@@ -83,12 +83,14 @@ TEST(PictureCodecs, WriteWhatTheyRead) {
     expect_same(decode_picture(png_bytes(picture), true), picture, std::to_string(type));
     expect_same(by_opencv(png_bytes(picture), cv::IMREAD_UNCHANGED), picture, "by OpenCV");
   }
-  const cv::Mat grey = noise(CV_8UC1);
-  expect_same(decode_picture(grey_jpeg_bytes(grey, 75)),
-              by_opencv(encoded(".jpg", grey, {cv::IMWRITE_JPEG_QUALITY, 75}), as_stored), "jpeg");
+  for (const int type : {CV_8UC1, CV_8UC3}) {
+    const cv::Mat picture = noise(type);
+    const std::string theirs = encoded(".jpg", picture, {cv::IMWRITE_JPEG_QUALITY, 75});
+    expect_same(decode_picture(jpeg_bytes(picture, 75)), by_opencv(theirs, as_stored), "jpeg");
+  }
   EXPECT_THROW((void)png_bytes(cv::Mat(2, 2, CV_32F)), std::invalid_argument);
   EXPECT_THROW((void)png_bytes(cv::Mat()), std::invalid_argument);
-  EXPECT_THROW((void)grey_jpeg_bytes(noise(CV_8UC3), 75), std::invalid_argument);
+  EXPECT_THROW((void)jpeg_bytes(noise(CV_16UC1), 75), std::invalid_argument);
 }
 
 /// Cut off, or with bytes changed: an empty picture or another one, never a fault.

@@ -19,7 +19,7 @@ namespace alidade {
 /// A PNG of 8 or 16 bit; grey, BGR or BGRA. Throws std::invalid_argument for another kind of pixels.
 [[nodiscard]] std::string png_bytes(const cv::Mat& picture);
 
-/// A JPEG of a grey picture, 8 bit; quality 1 to 100.
-[[nodiscard]] std::string grey_jpeg_bytes(const cv::Mat& picture, int quality);
+/// A JPEG of 8 bit, grey or BGR; quality 1 to 100. Throws std::invalid_argument for another kind of pixels.
+[[nodiscard]] std::string jpeg_bytes(const cv::Mat& picture, int quality);
 
 }  // namespace alidade

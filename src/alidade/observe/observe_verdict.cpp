@@ -36,9 +36,12 @@ Reason reason_of(const ObserveReport& report, const RotationLog& log, const Obse
     return {"tilt only", "tilt only: fx cannot be told", "pan the camera as well"};
   }
   if (config.rotation == RotationKnowledge::free) {
-    return {
-        "free rotation", "with the rotation unknown these views cannot tell fx / fy, cx and cy apart",
-        "measure the rotation, turn the camera about its axis of view too, or hold them: --square-pixels --fix-centre"};
+    std::string hold;
+    if (!config.square_pixels) hold = " --square-pixels";
+    if (!config.fixed_centre) hold += " --fix-centre";
+    return {"free rotation", "with the rotation unknown these views cannot tell fx / fy, cx and cy apart",
+            "measure the rotation, turn the camera farther, about its axis of view too" +
+                (hold.empty() ? "" : ", or hold them:" + hold)};
   }
   if (report.motion.span_rad < 3.0 * degree) {
     return {"too small a span",

@@ -210,14 +210,17 @@ class TurnedRun {
     ScatterCovariance scatter = scatter_covariance(fit_, progress_);
     report_.lens_terms = free_.lens_terms;
     while (report_.lens_terms > 0 && !config_.keeps_terms) {
-      constexpr double told_beyond = 3.0;  // σ
+      // k1 bends f along with it: it is let go only where it is next to nothing
+      const double told_beyond = report_.lens_terms > 1 ? 3.0 : 1.5;  // σ
       const int last = num_camera - 3 + report_.lens_terms;
       if (std::abs(fit_.bundle.camera[last]) > told_beyond * std::sqrt(scatter.cov(last, last))) break;
+      const Eigen::Vector4d before = fit_.bundle.camera.head<4>();
       free_.lens_terms = --report_.lens_terms;
       fit_ = fit_again(photos_, tree_, std::move(fit_), free_, progress_);
       ScatterCovariance less = scatter_covariance(fit_, progress_);
-      // σ of all terms stands for what is held: correlations with those that are left are the simpler model's
-      const Eigen::Vector4d more = (scatter.cov - less.cov).diagonal().head<4>().cwiseMax(0.0);
+      // σ of all terms stands for what is held, and so does by how much the answer moves: either may be the right lens
+      const Eigen::Vector4d moved = fit_.bundle.camera.head<4>() - before;
+      const Eigen::Vector4d more = (scatter.cov - less.cov).diagonal().head<4>().cwiseMax(0.0) + moved.cwiseAbs2();
       less.cov.diagonal().head<4>() += more;
       if (report_.lens_terms > 0) less.cov(4, 4) = std::max(less.cov(4, 4), scatter.cov(4, 4));
       less.cov(0, 1) += std::sqrt(more[0] * more[1]);  // a lens' terms move both alike

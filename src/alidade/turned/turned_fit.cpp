@@ -10,6 +10,7 @@ namespace {
 
 constexpr double first_sigma = 0.003;  // half widths: before the residuals tell
 constexpr double least_sigma = 2e-5;   // about 0.01 px
+constexpr double most_sigma = 0.005;   // what is worse is no noise, but a wrong start that would take in everything
 constexpr double gate_sigmas = 4.5;
 constexpr double zoom_sigma = 0.3;
 
@@ -24,7 +25,7 @@ double sigma_by_median(const TurnedFit& fit) {
   std::vector<double> norms = freed_norms(fit.bundle, fit.solution.residuals);
   std::erase_if(norms, [](double norm) { return !std::isfinite(norm); });
   if (norms.empty()) return first_sigma;
-  return std::max(middle_of(std::move(norms)) / 1.17741, least_sigma);
+  return std::clamp(middle_of(std::move(norms)) / 1.17741, least_sigma, most_sigma);
 }
 
 /// The same by squares, each residual beyond Huber's bound weighed down.

@@ -130,15 +130,19 @@ Check parallax_check(const TurnedReport& report, const MatchedPhotos& photos) {
 }
 
 Check zoom_check(const TurnedReport& report, const MatchedPhotos& photos) {
-  Check check{
-      "one focal length", State::good, "no photo asks for a focal length of its own", 0.0, zoom_is_seen, "σ", "photos"};
+  Check check{"one focal length",
+              State::good,
+              "no photo asks for a focal length of its own",
+              0.0,
+              100.0 * zoom_matters,
+              "%",
+              "photos"};
   for (std::size_t i = 0; i < report.photos.size(); ++i) {
     const TurnedPhoto& photo = report.photos[i];
-    if (!photo.is_used || !(photo.sigma_zoom > 0.0)) continue;
-    const double sigmas = std::abs(photo.zoom - 1.0) / photo.sigma_zoom;
-    if (sigmas <= check.value) continue;
-    check.value = sigmas;
-    if (sigmas < zoom_is_seen || std::abs(photo.zoom - 1.0) < zoom_matters) continue;
+    const double off = std::abs(photo.zoom - 1.0);
+    if (!photo.is_used || !(off > zoom_is_seen * photo.sigma_zoom) || 100.0 * off <= check.value) continue;
+    check.value = 100.0 * off;
+    if (off < zoom_matters) continue;
     check.state = State::care;
     check.text = photos.names[i] + " asks for a focal length of its own, " + text_of(photo.zoom, 4) +
                  " times that of the others: zoom, focus, or a step forward";

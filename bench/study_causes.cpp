@@ -62,17 +62,24 @@ template <typename Setup>
 int table_of(const std::vector<Case<Setup>>& cases, int draws, const std::string& only) {
   fmt::print("| what is wrong | by | seen | ● | worst error below ● | silent |\n|---|---|---|---|---|---|\n");
   int silent = 0;
+  std::string power;
   for (const Case<Setup>& one : cases) {
     if (!only.empty() && only != one.name) continue;
+    double seen_from = -1.0;
     for (const double size : one.sizes) {
       const Found found = found_of(one, size, draws);
       silent += found.silent;
+      if (found.seen < 0.99) seen_from = -1.0;
+      if (found.seen >= 0.99 && seen_from < 0.0) seen_from = size;
       fmt::print("| {} | {} | {:.0f} % | {:.0f} % | {:.1f}σ | {} |\n", one.name,
                  *one.unit == '\0' ? std::string("–") : fmt::format("{:g} {}", size, one.unit), 100.0 * found.seen,
                  100.0 * found.good, found.worst, found.silent);
       std::fflush(stdout);
     }
+    if (*one.unit != '\0' && seen_from >= 0.0)
+      power += fmt::format("{}{} {:g} {}", power.empty() ? "" : ", ", one.name, seen_from, one.unit);
   }
+  if (!power.empty()) fmt::print("\nSeen at 99 % of the draws or more from: {}.\n", power);
   return silent;
 }
 
@@ -132,9 +139,17 @@ int main(int argc, char** argv) {
       {"feet", "", {1.0}, [](RangefinderTrialSetup& s, double) { s.mistake.unit_m = 0.3048; }},
       {"centimetres", "", {1.0}, [](RangefinderTrialSetup& s, double) { s.mistake.unit_m = 0.01; }},
   };
-  fmt::print("# What is wrong, and what is seen of it\n\n`study_causes {}` (`make study`)\n\n## `alidade rig`\n\n", draws);
+  fmt::print(
+      "# What is wrong with a rig or a rangefinder, and what is seen of it\n\n`study_causes {}` (`make study` draws 100): "
+      "one thing wrong at a time, {} draws a row. Seen: refused, of care, or estimated. The last columns: the largest "
+      "error below a good verdict, in its stated σ, and how many draws were good and off by more than 5σ.\n\n"
+      "## `alidade rig`\n\nTwo heads, 320×240, f 338 px, corners 0.2 px, readings 0.02°, five places of a board, four "
+      "views a head and place; lenses, square and (but where it is said) the encoders' scales told as exact.\n\n",
+      draws, draws);
   int silent = table_of(cases, draws, only);
-  fmt::print("\n## `alidade rangefinder`\n\n");
+  fmt::print(
+      "\n## `alidade rangefinder`\n\n18 shots from 0.5 to 4 m with board and spot, corners 0.2 px, spots 0.3 px, "
+      "readings 2 mm, a lens known to 1.5, 1.5, 2, 2 px; no σ told.\n\n");
   silent += table_of(shot_cases, draws, only);
   return silent == 0 ? 0 : 1;
 }

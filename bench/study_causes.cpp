@@ -91,25 +91,40 @@ int main(int argc, char** argv) {
   const std::vector<RigCase> cases{
       {"clean", "", {0.0}, [](RigTrialSetup&, double) {}},
       {"clean, scale not told", "", {0.0}, [](RigTrialSetup& s, double) { s.tells_scale = false; }},
-      {"encoder scale, not told", "%", {1.0},
+      {"encoder scale, not told",
+       "%",
+       {1.0},
        [](RigTrialSetup& s, double v) {
          s.scene.encoder_scale = 1.0 + 0.01 * v;
          s.tells_scale = false;
        }},
-      {"encoder scale", "%", {0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0},
+      {"encoder scale",
+       "%",
+       {0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0},
        [](RigTrialSetup& s, double v) { s.scene.encoder_scale = 1.0 + 0.01 * v; }},
-      {"one period a turn", "°", {0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0},
+      {"one period a turn",
+       "°",
+       {0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0},
        [](RigTrialSetup& s, double v) { s.scene.once_rad = v * degree; }},
-      {"two periods a turn", "°", {0.05, 0.1, 0.2, 0.5, 1.0, 2.0},
+      {"two periods a turn",
+       "°",
+       {0.05, 0.1, 0.2, 0.5, 1.0, 2.0},
        [](RigTrialSetup& s, double v) { s.noise.twice_rad = v * degree; }},
-      {"backlash", "°", {0.02, 0.05, 0.1, 0.2, 0.5, 1.0},
+      {"backlash",
+       "°",
+       {0.02, 0.05, 0.1, 0.2, 0.5, 1.0},
        [](RigTrialSetup& s, double v) { s.noise.backlash_rad = v * degree; }},
-      {"focal length", "%", {0.1, 0.2, 0.5, 1.0, 2.0, 5.0}, [](RigTrialSetup& s, double v) { s.mistake.focal = 0.01 * v; }},
+      {"focal length",
+       "%",
+       {0.1, 0.2, 0.5, 1.0, 2.0, 5.0},
+       [](RigTrialSetup& s, double v) { s.mistake.focal = 0.01 * v; }},
       {"centre", "px", {0.5, 1.0, 2.0, 5.0, 10.0, 20.0}, [](RigTrialSetup& s, double v) { s.mistake.centre_px = v; }},
       {"angles swapped", "", {1.0}, [](RigTrialSetup& s, double) { s.mistake.swap_angles = true; }},
       {"pan flipped", "", {1.0}, [](RigTrialSetup& s, double) { s.mistake.flip_pan = true; }},
       {"mirrored", "", {1.0}, [](RigTrialSetup& s, double) { s.mistake.mirror = true; }},
-      {"heads swapped, lenses differ", "", {1.0},
+      {"heads swapped, lenses differ",
+       "",
+       {1.0},
        [](RigTrialSetup& s, double) {
          for (const RigHead& head : xiahou_rig()) s.scene.nominal.push_back(head);
          s.scene.nominal[1].camera = mistaken_camera(s.scene.nominal[1].camera, 0.15, 0.0);
@@ -119,19 +134,27 @@ int main(int argc, char** argv) {
   };
   const std::vector<ShotCase> shot_cases{
       {"shots as told", "", {0.0}, [](RangefinderTrialSetup&, double) {}},
-      {"range scale", "%", {0.05, 0.1, 0.2, 0.5, 1.0, 2.0},
+      {"range scale",
+       "%",
+       {0.05, 0.1, 0.2, 0.5, 1.0, 2.0},
        [](RangefinderTrialSetup& s, double v) { s.scale = 1.0 + 0.01 * v; }},
-      {"square", "%", {0.05, 0.1, 0.2, 0.5, 1.0, 2.0},
-       [](RangefinderTrialSetup& s, double v) { s.square = 0.01 * v; }},
-      {"range offset", "mm", {10.0, 100.0},
-       [](RangefinderTrialSetup& s, double v) { s.mistake.offset_m = 0.001 * v; }},
-      {"spot σ at 1 m", "px", {0.5, 1.0, 2.0, 5.0},
+      {"square", "%", {0.05, 0.1, 0.2, 0.5, 1.0, 2.0}, [](RangefinderTrialSetup& s, double v) { s.square = 0.01 * v; }},
+      {"range offset", "mm", {10.0, 100.0}, [](RangefinderTrialSetup& s, double v) { s.mistake.offset_m = 0.001 * v; }},
+      {"spot σ at 1 m",
+       "px",
+       {0.5, 1.0, 2.0, 5.0},
        [](RangefinderTrialSetup& s, double v) { s.noise.sigma_spot_near_px = v; }},
-      {"focal length of the file", "%", {0.2, 0.5, 1.0, 2.0, 5.0},
+      {"focal length of the file",
+       "%",
+       {0.2, 0.5, 1.0, 2.0, 5.0},
        [](RangefinderTrialSetup& s, double v) { s.mistake.focal = 0.01 * v; }},
-      {"centre of the file", "px", {2.0, 5.0, 10.0, 20.0, 50.0},
+      {"centre of the file",
+       "px",
+       {2.0, 5.0, 10.0, 20.0, 50.0},
        [](RangefinderTrialSetup& s, double v) { s.mistake.centre_px = v; }},
-      {"wrong readings", "%", {6.0, 17.0, 33.0, 45.0, 56.0},
+      {"wrong readings",
+       "%",
+       {6.0, 17.0, 33.0, 45.0, 56.0},
        [](RangefinderTrialSetup& s, double v) { s.noise.outlier_share = 0.01 * v; }},
       {"rows late", "", {1.0}, [](RangefinderTrialSetup& s, double) { s.mistake.shift_rows = 1; }},
       {"rows early", "", {1.0}, [](RangefinderTrialSetup& s, double) { s.mistake.shift_rows = -1; }},
@@ -140,7 +163,8 @@ int main(int argc, char** argv) {
       {"centimetres", "", {1.0}, [](RangefinderTrialSetup& s, double) { s.mistake.unit_m = 0.01; }},
   };
   fmt::print(
-      "# What is wrong with a rig or a rangefinder, and what is seen of it\n\n`study_causes {}` (`make study` draws 100): "
+      "# What is wrong with a rig or a rangefinder, and what is seen of it\n\n`study_causes {}` (`make study` draws "
+      "100): "
       "one thing wrong at a time, {} draws a row. Seen: refused, of care, or estimated. The last columns: the largest "
       "error below a good verdict, in its stated σ, and how many draws were good and off by more than 5σ.\n\n"
       "## `alidade rig`\n\nTwo heads, 320×240, f 338 px, corners 0.2 px, readings 0.02°, five places of a board, four "

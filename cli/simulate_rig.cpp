@@ -147,7 +147,8 @@ void add_rig_scenario(Frame& frame) {
   number("--once-deg", args->once_deg, "Amplitude of an error of one period a turn of each axis [deg]", 0.0, 15.0);
   number("--twice-deg", args->twice_deg, "The same of two periods a turn [deg]", 0.0, 15.0);
   number("--backlash-deg", args->backlash_deg, "Backlash of each axis [deg]", 0.0, 10.0);
-  number("--focal-error", args->mistake.focal, "Share by which the camera files' focal lengths are too long", -0.5, 0.5);
+  number("--focal-error", args->mistake.focal, "Share by which the camera files' focal lengths are too long", -0.5,
+         0.5);
   number("--centre-error", args->mistake.centre_px, "Pixels by which their centres lie aside, in u and v", -1e3, 1e3);
   command.add_flag("--swap-angles", args->mistake.swap_angles, "Pan stands in the column of tilt");
   command.add_flag("--flip-pan", args->mistake.flip_pan, "Pan counts the other way");

@@ -239,9 +239,10 @@ void add_rig(Frame& frame) {
   command.add_flag("--scales", args->scales, "Estimate the scale of each encoder as well (--estimate scale)")
       ->excludes(sigma_scale);
   command
-      .add_option("--estimate", args->estimate,
-                  "auto: what the residuals ask for, and scales that nobody told; none; or any of scale, once (an error "
-                  "of one period a turn), backlash (views in the order they were taken), focal, centre (of each lens)")
+      .add_option(
+          "--estimate", args->estimate,
+          "auto: what the residuals ask for, and scales that nobody told; none; or any of scale, once (an error "
+          "of one period a turn), backlash (views in the order they were taken), focal, centre (of each lens)")
       ->check(CLI::IsMember({"auto", "none", "scale", "once", "backlash", "focal", "centre"}))
       ->delimiter(',')
       ->capture_default_str();

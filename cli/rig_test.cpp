@@ -51,7 +51,8 @@ void expect_near_truth(const Rig& rig, const Rig& truth, double most_deg, double
 
 TEST_F(RigCommand, GivesTheRigWithTheNamesOfTheContract) {
   simulate();
-  const Outcome outcome = calibrate(path("sim/views.csv"), {"--json"});
+  // The simulated encoders' scales are exact; where that is not told they are estimated, and errors are twice as large.
+  const Outcome outcome = calibrate(path("sim/views.csv"), {"--json", "--sigma-scale", "1e-5"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const Json document = Json::parse(outcome.out);
   EXPECT_EQ(document["estimate"]["heads"].size(), 2u);
@@ -69,7 +70,7 @@ TEST_F(RigCommand, SaysWhatItAssumedAndHeedsIt) {
   simulate();
   const std::string lens = "model: pinhole\nwidth: 320\nheight: 240\nfx: 337.84\nfy: 337.84\ncx: 160\ncy: 120\n";
   write_file(path("sim/camera_1.yaml"), lens);
-  const Json document = Json::parse(calibrate(path("sim/views.csv"), {"--json"}).out);
+  const Json document = Json::parse(calibrate(path("sim/views.csv"), {"--json", "--estimate", "none"}).out);
   EXPECT_EQ(document["verdict"]["state"], "care");
   std::vector<std::string> names;
   for (const Json& what : document["assumed"]) {
@@ -90,9 +91,28 @@ TEST_F(RigCommand, SaysWhatItAssumedAndHeedsIt) {
   for (const Json& what : told["assumed"]) EXPECT_FALSE(what["sigma"].is_null()) << what["name"];
 }
 
+/// Where nobody told the encoders' scales they are estimated; what else the residuals ask for is named, and kept in
+/// rig.yaml.
+TEST_F(RigCommand, EstimatesWhatIsAskedFor) {
+  simulate({"--scale", "1.01", "--once-deg", "3"});
+  const Outcome outcome = calibrate(path("sim/views.csv"), {"--json", "--sigma-square", "1e-6"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  EXPECT_EQ(document["verdict"]["state"], "care");
+  EXPECT_FALSE(document["estimate"]["estimated"].empty());
+  const Rig rig = read_rig(path("out/rig.yaml"));
+  expect_near_truth(rig, read_rig(path("sim/truth_rig.yaml")), 1.0, 0.02);
+  EXPECT_EQ(calibrate(path("sim/views.csv"), {"--estimate", "auto,scale"}).code, 2);
+  EXPECT_EQ(calibrate(path("sim/views.csv"), {"--estimate", "scale", "--sigma-scale", "0.001"}).code, 2);
+  simulate({"--swap-angles"});
+  const Outcome exchanged = calibrate(path("sim/views.csv"));
+  EXPECT_EQ(exchanged.code, 4);
+  EXPECT_NE(exchanged.err.find("pan and tilt are exchanged"), std::string::npos) << exchanged.err;
+}
+
 TEST_F(RigCommand, FromRenderedPhotosEndToEnd) {
   simulate({"--photos"});
-  const Outcome outcome = calibrate(path("sim/views.csv"));
+  const Outcome outcome = calibrate(path("sim/views.csv"), {"--sigma-scale", "1e-5"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   expect_near_truth(read_rig(path("out/rig.yaml")), read_rig(path("sim/truth_rig.yaml")), 0.20, 0.0035);
 }

@@ -155,11 +155,10 @@ EncoderError encoder_error_of(const YAML::Node& head, const std::string& file, s
 
 Encoder encoder_of(const YAML::Node& node, const Fields& parent) {
   const Fields fields(node, parent.file(), parent.full("encoder."));
-  refuse_unknown_keys(
-      fields,
-      {"pan_zero_rad", "tilt_zero_rad", "pan_scale", "tilt_scale", "pan_cos_rad", "pan_sin_rad", "tilt_cos_rad",
-       "tilt_sin_rad", "sigma_rad", "sigma_zero_rad", "sigma_scale"},
-      "an encoder");
+  refuse_unknown_keys(fields,
+                      {"pan_zero_rad", "tilt_zero_rad", "pan_scale", "tilt_scale", "pan_cos_rad", "pan_sin_rad",
+                       "tilt_cos_rad", "tilt_sin_rad", "sigma_rad", "sigma_zero_rad", "sigma_scale"},
+                      "an encoder");
   Encoder encoder;
   encoder.pan_zero_rad = angle_of(fields, "pan_zero_rad");
   encoder.tilt_zero_rad = angle_of(fields, "tilt_zero_rad");
@@ -242,7 +241,8 @@ void read_rig_covariance(const YAML::Node& node, const Fields& fields, Rig& rig)
 }  // namespace
 
 std::string rig_text(const Rig& rig, std::span<const std::string> camera_files) {
-  std::string text = "# Pan-tilt heads; angle = scale * (reading + cos, sin errors - zero), pan > 0 left, tilt > 0 up\nheads:\n";
+  std::string text =
+      "# Pan-tilt heads; angle = scale * (reading + cos, sin errors - zero), pan > 0 left, tilt > 0 up\nheads:\n";
   for (std::size_t i = 0; i < rig.heads.size(); ++i)
     text += head_text(rig.heads[i], i < rig.encoder_errors.size() ? rig.encoder_errors[i] : EncoderError{},
                       i < camera_files.size() ? camera_files[i] : "");

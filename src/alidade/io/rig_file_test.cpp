@@ -65,6 +65,7 @@ void expect_same(const Rig& read, const Rig& rig) {
     EXPECT_EQ(read.heads[i].camera.width_px, 320);
   }
   EXPECT_EQ(read.cov, rig.cov);
+  EXPECT_EQ(read.heads[0].head.encoder, rig.heads[0].head.encoder);
 }
 
 TEST_F(RigFile, ReadsBackWhatWasWritten) {
@@ -131,11 +132,14 @@ TEST_F(RigFile, SaysWhatIsExactAndWhatHeadsShareWithLenses) {
 
   const Eigen::Index lens = params(rig.heads[0].camera.lens).size(), size = 2 * num_head_params + 2 * lens;
   rig.cov_with_lenses.setZero(size, size);
-  const std::array<Eigen::Index, 3> at{4, num_head_params + 4, 2 * num_head_params + lens};  // a turn of each base, the second's fx
+  const std::array<Eigen::Index, 3> at{4, num_head_params + 4,
+                                       2 * num_head_params + lens};  // a turn of each base, the second's fx
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t j = 0; j < 3; ++j) rig.cov_with_lenses(at[i], at[j]) = i == j ? 2.0 : 0.5;
   rig.cov = rig.cov_with_lenses.topLeftCorner(2 * num_head_params, 2 * num_head_params);
   rig.encoder_errors = {{0.001, 0.002}, {}};
+  rig.heads[0].head.encoder.pan_cos_rad = 0.01;
+  rig.heads[0].head.encoder.tilt_sin_rad = -0.02;
   read = read_rig(write(rig_text(rig, {})));
   EXPECT_EQ(read.cov_with_lenses, rig.cov_with_lenses);
   EXPECT_EQ(read.cov, rig.cov);

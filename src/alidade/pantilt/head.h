@@ -19,7 +19,7 @@ struct Encoder {
   double tilt_zero_rad = 0.0;
   double pan_scale = 1.0;
   double tilt_scale = 1.0;
-  double sigma_rad = 0.0;  ///< Of a reading.
+  double sigma_rad = 0.0;                                                               ///< Of a reading.
   double pan_cos_rad = 0.0, pan_sin_rad = 0.0, tilt_cos_rad = 0.0, tilt_sin_rad = 0.0;  ///< Amplitudes c and s.
 
   /// Readings without the error of one period a turn.
@@ -57,11 +57,10 @@ struct RigHead {
 /// skew of the axes, the encoders' errors of one period a turn.
 inline constexpr int num_head_params = 24;
 inline constexpr std::array<const char*, num_head_params> head_param_names{
-    "base_x_m",        "base_y_m",        "base_z_m",        "base_rx_rad",     "base_ry_rad",
-    "base_rz_rad",     "pan_to_tilt_x_m", "pan_to_tilt_y_m", "pan_to_tilt_z_m", "tilt_to_cam_x_m",
-    "tilt_to_cam_y_m", "tilt_to_cam_z_m", "cam_rx_rad",      "cam_ry_rad",      "cam_rz_rad",
-    "pan_zero_rad",    "tilt_zero_rad",   "pan_scale",       "tilt_scale",      "axes_skew_rad",
-    "pan_cos_rad",     "pan_sin_rad",     "tilt_cos_rad",    "tilt_sin_rad"};
+    "base_x_m",        "base_y_m",        "base_z_m",        "base_rx_rad",     "base_ry_rad",     "base_rz_rad",
+    "pan_to_tilt_x_m", "pan_to_tilt_y_m", "pan_to_tilt_z_m", "tilt_to_cam_x_m", "tilt_to_cam_y_m", "tilt_to_cam_z_m",
+    "cam_rx_rad",      "cam_ry_rad",      "cam_rz_rad",      "pan_zero_rad",    "tilt_zero_rad",   "pan_scale",
+    "tilt_scale",      "axes_skew_rad",   "pan_cos_rad",     "pan_sin_rad",     "tilt_cos_rad",    "tilt_sin_rad"};
 using HeadVector = Eigen::Matrix<double, num_head_params, 1>;
 
 /// The head moved by a small step of its parameters.

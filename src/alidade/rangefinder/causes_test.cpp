@@ -17,6 +17,7 @@ using testing::RangefinderTrialSetup;
 struct ShotFault {
   const char* name;
   std::function<void(RangefinderTrialSetup&)> set;
+  bool spots_tell = true;  ///< Spots alone do not tell a lens' centre from the beam's direction: it is taken as given.
 };
 
 class ShotFaults : public ::testing::TestWithParam<ShotFault> {};
@@ -24,6 +25,7 @@ class ShotFaults : public ::testing::TestWithParam<ShotFault> {};
 TEST_P(ShotFaults, AreNeverSilent) {
   constexpr int num_logs = 20;
   for (const auto method : {RangefinderMethod::joint, RangefinderMethod::plane, RangefinderMethod::spot}) {
+    if (method == RangefinderMethod::spot && !GetParam().spots_tell) continue;
     for (int draw = 1; draw <= num_logs; ++draw) {
       RangefinderTrialSetup setup;
       setup.method = method;
@@ -44,7 +46,7 @@ INSTANTIATE_TEST_SUITE_P(
                       ShotFault{"near_spots", [](RangefinderTrialSetup& s) { s.noise.sigma_spot_near_px = 2.0; }},
                       ShotFault{"focal_small", [](RangefinderTrialSetup& s) { s.mistake.focal = 0.005; }},
                       ShotFault{"focal", [](RangefinderTrialSetup& s) { s.mistake.focal = 0.03; }},
-                      ShotFault{"centre", [](RangefinderTrialSetup& s) { s.mistake.centre_px = 10.0; }},
+                      ShotFault{"centre", [](RangefinderTrialSetup& s) { s.mistake.centre_px = 10.0; }, false},
                       ShotFault{"wrong_17", [](RangefinderTrialSetup& s) { s.noise.outlier_share = 0.17; }},
                       ShotFault{"wrong_45", [](RangefinderTrialSetup& s) { s.noise.outlier_share = 0.45; }},
                       ShotFault{"wrong_56", [](RangefinderTrialSetup& s) { s.noise.outlier_share = 0.56; }},

@@ -117,8 +117,8 @@ struct RangefinderReport {
 
 struct SolvedRangefinder {
   RangefinderReport report;
-  Verdict verdict;            ///< Without what was assumed: heed_assumptions().
-  RangefinderConfig config;   ///< As it was solved with.
+  Verdict verdict;           ///< Without what was assumed: heed_assumptions().
+  RangefinderConfig config;  ///< As it was solved with.
 };
 /// calibrate_rangefinder() and what a person would do next: the readings' scale is estimated too where the answer rests
 /// on one that nobody told and the shots tell it, and where no beam explains the shots the cause is looked for.

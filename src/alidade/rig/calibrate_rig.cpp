@@ -68,8 +68,7 @@ RigReport calibrate_rig(std::span<const HeadView> views, std::span<const Eigen::
   }
   const bool is_alone = report.status == Status::converged || report.status == Status::no_convergence ||
                         report.status == Status::degenerate;
-  if (is_alone && is_suspicious(report))
-    look_for_misreading(views, points_in_board, cameras, config, progress, report);
+  if (is_alone && is_suspicious(report)) look_for_misreading(views, points_in_board, cameras, config, progress, report);
   if (!config.estimate_by_need || report.status != Status::converged) return report;
   return freed_by_need(std::move(report), views, points_in_board, cameras, config, progress);
 }

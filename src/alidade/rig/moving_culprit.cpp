@@ -79,9 +79,8 @@ std::string culprit_of(const MovingTargetReport& report, std::span<const TargetS
   const Agreement as_given = agreement_of(place(some, given));
   Best best;
   for (std::size_t h = 0; h < given.size() && (given.size() > 2 || h == 0); ++h) {
-    const std::string words = given.size() == 2
-                                  ? "one of the two cameras gives mirrored images"
-                                  : "the images of head " + name_of(given[h]) + " are mirrored";
+    const std::string words = given.size() == 2 ? "one of the two cameras gives mirrored images"
+                                                : "the images of head " + name_of(given[h]) + " are mirrored";
     best.consider(agreement_of(place(mirrored(some, h, given[h].camera.width_px), given)), words);
   }
   for (std::size_t a = 0; a < given.size(); ++a) {

@@ -379,11 +379,10 @@ MovingTargetReport place_cameras(std::span<const TargetSight> sights, std::span<
   MovingTargetReport report = placed(from_origin, heads, truth_from_origin);
   constexpr double most_search_s = 30.0;  // of clocks that are farther apart, each trial takes minutes
   if (report.culprit.empty() && config.clock_search_s <= most_search_s)
-    report.culprit =
-        culprit_of(report, from_origin, heads,
-                   [&](const std::vector<TargetSight>& some, const std::vector<RigHead>& given) {
-                     return placed(some, given, {});
-                   });
+    report.culprit = culprit_of(report, from_origin, heads,
+                                [&](const std::vector<TargetSight>& some, const std::vector<RigHead>& given) {
+                                  return placed(some, given, {});
+                                });
   move_back(origin_s, report);
   return report;
 }

@@ -25,10 +25,10 @@ struct RigConfig {
   bool estimate_centre = false;
   /// What the residuals ask for is estimated too, where the views can tell it; and the scales where nobody told them.
   bool estimate_by_need = false;
-  double square_m = 0.0;                    ///< Side of the board's squares, to be named; 0: not known.
-  std::optional<double> sigma_square_m;     ///< Of it; none: not known.
-  std::optional<double> sigma_scale;        ///< Of the encoders' scales where they are held; none: not known.
-  bool estimate_skew = true;                ///< Of the axes from being square to each other.
+  double square_m = 0.0;                 ///< Side of the board's squares, to be named; 0: not known.
+  std::optional<double> sigma_square_m;  ///< Of it; none: not known.
+  std::optional<double> sigma_scale;     ///< Of the encoders' scales where they are held; none: not known.
+  bool estimate_skew = true;             ///< Of the axes from being square to each other.
   bool reject_outliers = true;
 };
 
@@ -100,10 +100,10 @@ struct RigReport {
             ///< with a σ is counted.
   Eigen::MatrixXd cov_model;   ///< As rig.cov, if every corner and reading erred by itself and all given was exact.
   ClusterCovariance clusters;  ///< Views; of the parameters that are solved for.
-  std::vector<Assumption> assumed;  ///< Lenses, the square, the encoders' scales.
-  std::vector<RigCause> causes;     ///< Tested one by one, the one most asked for first.
-  std::vector<RigFreed> freed;      ///< By need.
-  std::string alike;                ///< Two causes that explain the residuals alike; empty: none.
+  std::vector<Assumption> assumed;                  ///< Lenses, the square, the encoders' scales.
+  std::vector<RigCause> causes;                     ///< Tested one by one, the one most asked for first.
+  std::vector<RigFreed> freed;                      ///< By need.
+  std::string alike;                                ///< Two causes that explain the residuals alike; empty: none.
   std::vector<Eigen::Vector2d> backlash_rad;        ///< Pan, tilt of each head, where it was estimated; 0 else.
   std::vector<Eigen::Vector2d> sigma_backlash_rad;  ///< Of it.
   double deviance = 0.0;  ///< −2 ln of the likelihood, less a constant of the views: what two solves are compared by.

@@ -57,9 +57,11 @@ std::vector<Tested> single_tests(const RigProblem& problem, const RigState& stat
 std::vector<Tested> tested_of(const RigProblem& problem, const RigState& state) {
   std::vector<Tested> all = single_tests(problem, state);
   const std::size_t num_single = all.size();
-  for (const auto& [ending, name] :
-       {std::pair{"_scale", "scales"}, {" once a turn", "once a turn"}, {" backlash", "backlash"},
-        {"camera.fx", "camera.fx"}, {"camera.c", "centre"}}) {
+  for (const auto& [ending, name] : {std::pair{"_scale", "scales"},
+                                     {" once a turn", "once a turn"},
+                                     {" backlash", "backlash"},
+                                     {"camera.fx", "camera.fx"},
+                                     {"camera.c", "centre"}}) {
     Tested joint{std::string("all ") + name, "", {}, 1.0};
     int num = 0;
     for (std::size_t i = 0; i < num_single; ++i) {

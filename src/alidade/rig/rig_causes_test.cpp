@@ -7,7 +7,8 @@
 #include "alidade/testing/rig_trial.h"
 
 // What may be wrong with a rig, each alone: never a good verdict over an error above 5σ, and what can be told apart is
-// estimated. ALIDADE_TEST_TRIALS=20 draws as many rigs of each kind; bench/study_causes.cpp: of which size each is seen.
+// estimated. ALIDADE_TEST_TRIALS=20 draws as many rigs of each kind; bench/study_causes.cpp: of which size each is
+// seen.
 
 namespace alidade {
 namespace {
@@ -33,30 +34,29 @@ TEST_P(RigFaults, AreNeverSilent) {
     RigTrialSetup setup;
     GetParam().set(setup);
     const RigTrial trial = rig_trial(setup, static_cast<std::uint64_t>(300 + draw));
-    EXPECT_FALSE(trial.is_silent()) << GetParam().name << " " << draw << ": " << trial.worst_sigmas << "σ: "
-                                    << trial.verdict.sentence;
+    EXPECT_FALSE(trial.is_silent()) << GetParam().name << " " << draw << ": " << trial.worst_sigmas
+                                    << "σ: " << trial.verdict.sentence;
   }
 }
 
 // Of each a size that is hardly seen, and one that is plain.
 INSTANTIATE_TEST_SUITE_P(
     All, RigFaults,
-    ::testing::Values(
-        RigFault{"scale_small", [](RigTrialSetup& s) { s.scene.encoder_scale = 1.001; }},
-        RigFault{"scale", [](RigTrialSetup& s) { s.scene.encoder_scale = 1.01; }},
-        RigFault{"once_small", [](RigTrialSetup& s) { s.scene.once_rad = 0.3 * degree; }},
-        RigFault{"once", [](RigTrialSetup& s) { s.scene.once_rad = 3.0 * degree; }},
-        RigFault{"twice", [](RigTrialSetup& s) { s.noise.twice_rad = 0.3 * degree; }},
-        RigFault{"backlash_small", [](RigTrialSetup& s) { s.noise.backlash_rad = 0.05 * degree; }},
-        RigFault{"backlash", [](RigTrialSetup& s) { s.noise.backlash_rad = 0.3 * degree; }},
-        RigFault{"focal_small", [](RigTrialSetup& s) { s.mistake.focal = 0.003; }},
-        RigFault{"focal", [](RigTrialSetup& s) { s.mistake.focal = 0.02; }},
-        RigFault{"centre_small", [](RigTrialSetup& s) { s.mistake.centre_px = 2.0; }},
-        RigFault{"centre", [](RigTrialSetup& s) { s.mistake.centre_px = 8.0; }},
-        RigFault{"swapped_angles", [](RigTrialSetup& s) { s.mistake.swap_angles = true; }},
-        RigFault{"flipped_pan", [](RigTrialSetup& s) { s.mistake.flip_pan = true; }},
-        RigFault{"mirrored", [](RigTrialSetup& s) { s.mistake.mirror = true; }},
-        RigFault{"shifted_rows", [](RigTrialSetup& s) { s.mistake.shift_rows = true; }}),
+    ::testing::Values(RigFault{"scale_small", [](RigTrialSetup& s) { s.scene.encoder_scale = 1.001; }},
+                      RigFault{"scale", [](RigTrialSetup& s) { s.scene.encoder_scale = 1.01; }},
+                      RigFault{"once_small", [](RigTrialSetup& s) { s.scene.once_rad = 0.3 * degree; }},
+                      RigFault{"once", [](RigTrialSetup& s) { s.scene.once_rad = 3.0 * degree; }},
+                      RigFault{"twice", [](RigTrialSetup& s) { s.noise.twice_rad = 0.3 * degree; }},
+                      RigFault{"backlash_small", [](RigTrialSetup& s) { s.noise.backlash_rad = 0.05 * degree; }},
+                      RigFault{"backlash", [](RigTrialSetup& s) { s.noise.backlash_rad = 0.3 * degree; }},
+                      RigFault{"focal_small", [](RigTrialSetup& s) { s.mistake.focal = 0.003; }},
+                      RigFault{"focal", [](RigTrialSetup& s) { s.mistake.focal = 0.02; }},
+                      RigFault{"centre_small", [](RigTrialSetup& s) { s.mistake.centre_px = 2.0; }},
+                      RigFault{"centre", [](RigTrialSetup& s) { s.mistake.centre_px = 8.0; }},
+                      RigFault{"swapped_angles", [](RigTrialSetup& s) { s.mistake.swap_angles = true; }},
+                      RigFault{"flipped_pan", [](RigTrialSetup& s) { s.mistake.flip_pan = true; }},
+                      RigFault{"mirrored", [](RigTrialSetup& s) { s.mistake.mirror = true; }},
+                      RigFault{"shifted_rows", [](RigTrialSetup& s) { s.mistake.shift_rows = true; }}),
     [](const auto& info) { return std::string(info.param.name); });
 
 const RigFreed* freed_named(const RigTrial& trial, const std::string& name) {
@@ -103,7 +103,8 @@ TEST(RigByNeed, LeavesACleanRigAsItIs) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     const RigTrial trial = rig_trial({}, seed);
     for (const RigCause& cause : trial.report.causes) freed += cause.sigmas > rig_cause_limit ? 1 : 0;
-    for (const RigFreed& one : trial.report.freed) EXPECT_LT(std::abs(one.value - one.was), 4.5 * one.sigma) << one.name;
+    for (const RigFreed& one : trial.report.freed)
+      EXPECT_LT(std::abs(one.value - one.was), 4.5 * one.sigma) << one.name;
   }
   EXPECT_EQ(freed, 0);
 }

@@ -128,8 +128,8 @@ std::vector<std::string> names_of(const RigProblem& problem, const RigState& sta
 
 /// Derivatives of a pixel, over σ, by the free parameters of its head.
 void fill_row(const std::vector<int>& free, const Eigen::Matrix<double, 2, num_head_params>& by_head,
-              const Eigen::Matrix2d& by_readings, const LensProjection& seen, const Camera& camera, const RigProblem& problem,
-              const RigView& view, Eigen::Ref<Eigen::MatrixXd> row) {
+              const Eigen::Matrix2d& by_readings, const LensProjection& seen, const Camera& camera,
+              const RigProblem& problem, const RigView& view, Eigen::Ref<Eigen::MatrixXd> row) {
   for (std::size_t k = 0; k < free.size(); ++k) {
     auto column = row.col(static_cast<Eigen::Index>(k));
     const int param = free[k];

@@ -23,9 +23,11 @@ struct Example {
                     {0, 1, 2, 3, 4, 5, 8, 9, 10, 11, 12, 13, 14, 19, focal_param, centre_x_param, centre_y_param,
                      pan_backlash_param, tilt_backlash_param}};
     for (const HeadView& view : scene.views)
-      problem.views.push_back({&view, view.head == 1 ? 0u : 1u, static_cast<std::size_t>(view.board),
-                               problem.views.size() % 3 == 0 ? Eigen::Vector2d(0.5, -0.5) : Eigen::Vector2d(-0.5, 0.5)});
-    state = {scene.rig.heads, scene.world_from_board,
+      problem.views.push_back(
+          {&view, view.head == 1 ? 0u : 1u, static_cast<std::size_t>(view.board),
+           problem.views.size() % 3 == 0 ? Eigen::Vector2d(0.5, -0.5) : Eigen::Vector2d(-0.5, 0.5)});
+    state = {scene.rig.heads,
+             scene.world_from_board,
              std::vector<Eigen::Vector2d>(scene.views.size(), Eigen::Vector2d(0.002, -0.001)),
              {Eigen::Vector2d::Zero(), Eigen::Vector2d(0.003, 0.004)}};
     state.heads[0].head.encoder.pan_sin_rad = 0.02;
@@ -69,9 +71,8 @@ TEST(RigSolve, JacobiansAreTheDerivatives) {
     };
     const std::vector<int>& free = example.problem.free[view.head];
     for (std::size_t k = 0; k < free.size(); ++k)
-      expect(
-          [&](RigState& state, double by) { move(state, view.head, free[k], by); },
-          at->J_head.col(static_cast<Eigen::Index>(k)));
+      expect([&](RigState& state, double by) { move(state, view.head, free[k], by); },
+             at->J_head.col(static_cast<Eigen::Index>(k)));
     for (int k = 0; k < 6; ++k)
       expect(
           [&](RigState& state, double by) {

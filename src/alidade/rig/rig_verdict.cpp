@@ -114,24 +114,23 @@ void add_precision(const RigReport& report, Verdict& verdict) {
                                     1e3 * good_relative_m, "mm"));
 }
 
-/// An axis that turned little is enough where the views tell the rig beyond them, too: what counts is what is known over
-/// 20° of each axis, not how far each happened to turn.
+/// An axis that turned little is enough where the views tell the rig beyond them, too: what counts is what is known
+/// over 20° of each axis, not how far each happened to turn.
 void add_spans(const RigReport& report, Verdict& verdict) {
   const bool is_known = report.sigma_span_rad < good_relative_rad && report.sigma_span_m < good_relative_m;
   for (const HeadCover& cover : report.covers) {
     for (int axis = 0; axis < 2; ++axis) {
       const double span = cover.highest_rad[axis] - cover.lowest_rad[axis];
       const std::string name = axis == 0 ? "pan" : "tilt";
-      verdict.checks.push_back(
-          check_of(name + " " + std::to_string(cover.id), span >= good_span_rad || is_known ? State::good : State::care,
-                   "head " + std::to_string(cover.id) + " covers " + text_of(cover.lowest_rad[axis] / degree, 2) +
-                       "° to " + text_of(cover.highest_rad[axis] / degree, 2) + "° of " + name +
-                       (span >= good_span_rad ? ""
-                        : is_known            ? "; over 20° the rig is known, too"
-                                              : "; " + name + " farther: over 20° σ is " +
-                                         text_of(report.sigma_span_rad / degree, 2) + "°, " +
-                                         text_of(1e3 * report.sigma_span_m, 2) + " mm"),
-                   span / degree, good_span_rad / degree, "°"));
+      verdict.checks.push_back(check_of(
+          name + " " + std::to_string(cover.id), span >= good_span_rad || is_known ? State::good : State::care,
+          "head " + std::to_string(cover.id) + " covers " + text_of(cover.lowest_rad[axis] / degree, 2) + "° to " +
+              text_of(cover.highest_rad[axis] / degree, 2) + "° of " + name +
+              (span >= good_span_rad ? ""
+               : is_known            ? "; over 20° the rig is known, too"
+                          : "; " + name + " farther: over 20° σ is " + text_of(report.sigma_span_rad / degree, 2) +
+                                "°, " + text_of(1e3 * report.sigma_span_m, 2) + " mm"),
+          span / degree, good_span_rad / degree, "°"));
     }
   }
 }

@@ -63,8 +63,7 @@ bool is_line(std::span<const SightSeries> series, std::size_t least_sights) {
       const Eigen::Vector3d ray = at.homogeneous();
       sum += ray * ray.transpose() / static_cast<double>(one.at.size());
     }
-    return one.at.size() >= least_sights &&
-           std::sqrt(std::abs(symmetric_eigen3(sum).values[0])) * one.px > most_px;
+    return one.at.size() >= least_sights && std::sqrt(std::abs(symmetric_eigen3(sum).values[0])) * one.px > most_px;
   });
 }
 

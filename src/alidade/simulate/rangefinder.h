@@ -37,7 +37,7 @@ struct ShotNoise {
   double sigma_corner_px = 0.2;
   double sigma_spot_px = 0.3;
   double sigma_spot_near_px = 0.0;  ///< Of a spot at 1 m beyond that; it falls with the range: a wide spot, speckle.
-  double outlier_share = 0.0;  ///< Of the shots, rounded: their readings are 0.3 to 1 m too long.
+  double outlier_share = 0.0;       ///< Of the shots, rounded: their readings are 0.3 to 1 m too long.
   bool with_spot = true, with_board = true;
 };
 
@@ -58,11 +58,11 @@ struct SimulatedShots {
 
 /// What a person got wrong, or did not know, about such a log.
 struct ShotMistake {
-  double focal = 0.0;       ///< Share by which the camera file's focal length is too long.
-  double centre_px = 0.0;   ///< By which its centre lies aside, in u and in v.
-  double offset_m = 0.0;    ///< That each reading is too long.
-  double unit_m = 1.0;      ///< Of the readings: 0.0254 where they are inches.
-  int shift_rows = 0;       ///< The ranges stand so many rows later than their boards and spots.
+  double focal = 0.0;      ///< Share by which the camera file's focal length is too long.
+  double centre_px = 0.0;  ///< By which its centre lies aside, in u and in v.
+  double offset_m = 0.0;   ///< That each reading is too long.
+  double unit_m = 1.0;     ///< Of the readings: 0.0254 where they are inches.
+  int shift_rows = 0;      ///< The ranges stand so many rows later than their boards and spots.
 };
 [[nodiscard]] std::vector<Shot> mistaken_shots(std::vector<Shot> shots, const ShotMistake& mistake);
 [[nodiscard]] Camera mistaken_camera(Camera camera, double focal, double centre_px);

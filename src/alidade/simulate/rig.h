@@ -33,7 +33,7 @@ struct RigSceneConfig {
   double skew_sigma_rad = 0.01;
   double encoder_scale = 1.0;  ///< Radians of each axis of each head for each radian read.
   double once_rad = 0.0;       ///< Amplitude of an error of one period a turn of each axis, its phase drawn.
-  bool shared = true;  ///< Each board is seen by all heads.
+  bool shared = true;          ///< Each board is seen by all heads.
 };
 
 /// Draws heads and boards. Boards that some head does not see at two pairs of angles are drawn again. Same seed, same
@@ -43,8 +43,8 @@ struct RigSceneConfig {
 struct RigNoise {
   double sigma_px = 0.2;
   double sigma_encoder_rad = 0.02 * 0.017453292519943295;
-  double wrong_views = 0.0;  ///< Share of the views whose angles are those of another view.
-  double twice_rad = 0.0;    ///< Amplitude of an error of two periods a turn of each axis, its phase drawn.
+  double wrong_views = 0.0;   ///< Share of the views whose angles are those of another view.
+  double twice_rad = 0.0;     ///< Amplitude of an error of two periods a turn of each axis, its phase drawn.
   double backlash_rad = 0.0;  ///< Of each axis: readings are half of it too large where the axis came from below.
 };
 struct SimulatedViews {
@@ -55,13 +55,13 @@ struct SimulatedViews {
 
 /// What a person got wrong, or did not know, about such a world.
 struct RigMistake {
-  double focal = 0.0;         ///< Share by which the camera files' focal lengths are too long.
-  double centre_px = 0.0;     ///< By which their centres lie aside, in u and in v.
-  bool swap_angles = false;   ///< Pan stands in the column of tilt.
-  bool flip_pan = false;      ///< Pan counts the other way.
-  bool mirror = false;        ///< Images are mirrored.
-  bool swap_heads = false;    ///< The heads' numbers are exchanged.
-  bool shift_rows = false;    ///< Each view has the angles of the one before.
+  double focal = 0.0;        ///< Share by which the camera files' focal lengths are too long.
+  double centre_px = 0.0;    ///< By which their centres lie aside, in u and in v.
+  bool swap_angles = false;  ///< Pan stands in the column of tilt.
+  bool flip_pan = false;     ///< Pan counts the other way.
+  bool mirror = false;       ///< Images are mirrored.
+  bool swap_heads = false;   ///< The heads' numbers are exchanged.
+  bool shift_rows = false;   ///< Each view has the angles of the one before.
 };
 [[nodiscard]] std::vector<HeadView> mistaken_views(std::vector<HeadView> views, const RigScene& scene,
                                                    const RigMistake& mistake);

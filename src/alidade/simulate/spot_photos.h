@@ -54,10 +54,10 @@ struct SpotPhotoConfig {
   double exposure = 1.0;                      ///< Factor on all light, as of another exposure time.
   bool is_on = true;                          ///< False: the same photo with the laser off.
   std::vector<Eigen::Vector3d> stray_in_cam;  ///< Further places lit like the spot, as a reflection would.
-  int num_stickers = 0;     ///< Coloured like the laser, at places of the board that stay; there with the laser off, too.
-  double speckle = 0.0;     ///< Contrast of the laser's speckle: σ over mean of its light in a grain of a pixel.
-  bool is_bayer = false;    ///< A sensor with one colour a pixel (RGGB), the others interpolated.
-  int jpeg_quality = 0;     ///< Compressed and opened again, as a camera's photo; 0: not.
+  int num_stickers = 0;   ///< Coloured like the laser, at places of the board that stay; there with the laser off, too.
+  double speckle = 0.0;   ///< Contrast of the laser's speckle: σ over mean of its light in a grain of a pixel.
+  bool is_bayer = false;  ///< A sensor with one colour a pixel (RGGB), the others interpolated.
+  int jpeg_quality = 0;   ///< Compressed and opened again, as a camera's photo; 0: not.
 };
 
 /// The light of one photo, kept so that many photos with other spots and other noise cost little.

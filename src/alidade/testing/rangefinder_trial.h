@@ -13,7 +13,7 @@ namespace alidade::testing {
 
 struct RangefinderTrialSetup {
   std::string scenario = "reference";
-  double scale = 1.0;  ///< Metres for each metre read.
+  double scale = 1.0;   ///< Metres for each metre read.
   double square = 0.0;  ///< Share by which the board is printed larger than told.
   ShotNoise noise = {};
   ShotMistake mistake = {};
@@ -47,8 +47,7 @@ inline RangefinderTrial rangefinder_trial(const RangefinderTrialSetup& setup, st
   if (!is_solved) return trial;
   // A constant that the readings hold is part of the origin: the beam that reads so starts so much farther back.
   const Beam& truth = sample.scene.beam;
-  const Eigen::Vector3d origin =
-      truth.origin_in_cam - truth.scale * setup.mistake.offset_m * truth.direction_in_cam;
+  const Eigen::Vector3d origin = truth.origin_in_cam - truth.scale * setup.mistake.offset_m * truth.direction_in_cam;
   Eigen::Matrix<double, 5, 1> error;
   error << report.beam.origin_in_cam - origin, direction_error_rad(report, sample);
   for (int i = 0; i < 5; ++i)

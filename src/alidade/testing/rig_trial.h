@@ -52,7 +52,8 @@ inline RigTrial rig_trial(const RigTrialSetup& setup, std::uint64_t seed) {
   const RigScene scene = draw_rig_scene(setup.scene, seed);
   std::map<int, Camera> cameras;
   for (const RigHead& rig_head : scene.rig.heads) {
-    Camera& camera = cameras[rig_head.head.id] = mistaken_camera(rig_head.camera, setup.mistake.focal, setup.mistake.centre_px);
+    Camera& camera = cameras[rig_head.head.id] =
+        mistaken_camera(rig_head.camera, setup.mistake.focal, setup.mistake.centre_px);
     const Eigen::Index num = params(camera.lens).size();
     camera.cov.setZero(num, num);  // its file says that it is exact
   }
@@ -71,10 +72,10 @@ inline RigTrial rig_trial(const RigTrialSetup& setup, std::uint64_t seed) {
   if (setup.mistake.flip_pan)
     for (RigHead& one : truth.heads) one.head.encoder.pan_scale *= -1.0;
   if (is_solved) trial.worst_sigmas = worst_error_in_sigmas(trial.report.rig, truth);
-  trial.is_seen = trial.verdict.state != State::good ||
-                  std::ranges::any_of(trial.report.freed, [](const RigFreed& one) {
-                    return std::abs(one.value - one.was) > 3.0 * one.sigma;
-                  });
+  trial.is_seen =
+      trial.verdict.state != State::good || std::ranges::any_of(trial.report.freed, [](const RigFreed& one) {
+        return std::abs(one.value - one.was) > 3.0 * one.sigma;
+      });
   return trial;
 }
 

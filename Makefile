@@ -90,9 +90,9 @@ docs: demo
 
 study:
 	@tools/setup build
-	@echo "study: building $(out)/study_calibration, study_observe, study_rangefinder, study_localize, study_chain, study_causes and corner_accuracy"
+	@echo "study: building $(out)/study_calibration, study_observe, study_rangefinder, study_localize, study_chain, study_causes, study_faults and corner_accuracy"
 	@cmake --preset release -DALIDADE_BENCH=ON >/dev/null
-	@ninja -C $(out) $(jobs) study_calibration study_observe study_rangefinder study_localize study_chain study_causes corner_accuracy alidade_cli
+	@ninja -C $(out) $(jobs) study_calibration study_observe study_rangefinder study_localize study_chain study_causes study_faults corner_accuracy alidade_cli
 	@echo "study: 2400 calibrations, into docs/studies.md"
 	@mkdir -p build/study
 	@$(out)/study_calibration 2400 >build/study/studies.md; met=$$?; cp build/study/studies.md docs/studies.md; exit $$met
@@ -109,6 +109,8 @@ study:
 	@echo "study: what is wrong with rigs and rangefinders, and what is seen of it, into docs/studies-causes.md"
 	@$(out)/study_causes 100 >build/study/causes.md; met=$$?; cp build/study/causes.md docs/studies-causes.md; exit $$met
 	@$(out)/corner_accuracy
+	@echo "study: how large a fault must be to be seen, into docs/studies-faults.md"
+	@$(out)/study_faults 20 >build/study/faults.md; met=$$?; cp build/study/faults.md docs/studies-faults.md; exit $$met
 
 format:
 	@tools/setup tidy

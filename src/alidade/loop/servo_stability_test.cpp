@@ -68,11 +68,12 @@ TEST(ServoStability, WhatIsCalledStableStaysAndWhatIsRefusedDoesNot) {
                                std::to_string(of.latency_s) + " gain " + std::to_string(of.gain_factor) + " loop " +
                                std::to_string(of.loop) + " radius " + std::to_string(radius);
       (radius < 1.0 ? num_stable : num_unstable) += 1;
-      // Noise of 0.6 px, amplified where a loop is hardly stable; a loop that is not loses the target.
+      // Noise of 0.6 px, amplified where a loop is hardly stable. One that is not loses the target, or swings as far as
+      // its limits of rate and acceleration let it (8 px at the least in this grid).
       if (radius < 1.0)
         EXPECT_LT(rms_px, 0.8 / (1.0 - radius) + 6.0) << what;
       else
-        EXPECT_GT(rms_px, 20.0) << what;
+        EXPECT_GT(rms_px, 5.0) << what;
     }
   }
   EXPECT_GT(num_stable, 150);

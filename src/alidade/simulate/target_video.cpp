@@ -1,7 +1,9 @@
 #include "alidade/simulate/target_video.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "alidade/simulate/draws.h"
@@ -16,6 +18,35 @@ double clouds(const Eigen::Vector3d& direction_in_world) {
                        std::sin(17.0 * d.z() + 11.0 * d.x() + 2.0);
   return 110.0 + 50.0 / 3.0 * waves;
 }
+
+/// Coloured patches: of each colour eight waves of 40 to 160 a radian in directions of their own, σ 1 together.
+class Patches {
+ public:
+  Patches() {
+    Draws draws(41);
+    for (auto& colour : waves_)
+      for (Wave& wave : colour)
+        wave = {draws.uniform(40.0, 160.0) * draws.normal3().normalized(), draws.uniform(0.0, 2.0 * std::numbers::pi)};
+  }
+  [[nodiscard]] cv::Vec3f at(const Eigen::Vector3d& direction_in_world) const {
+    cv::Vec3f value;
+    for (int c = 0; c < 3; ++c) {
+      double sum = 0.0;
+      for (const Wave& wave : waves_[static_cast<std::size_t>(c)])
+        sum += std::sin(wave.per_rad.dot(direction_in_world) + wave.phase_rad);
+      value[c] = static_cast<float>(sum / std::sqrt(0.5 * num_waves));
+    }
+    return value;
+  }
+
+ private:
+  static constexpr std::size_t num_waves = 8;
+  struct Wave {
+    Eigen::Vector3d per_rad;
+    double phase_rad = 0.0;
+  };
+  std::array<std::array<Wave, num_waves>, 3> waves_;
+};
 
 struct TargetView {
   Rigid3 world_from_cam;
@@ -79,13 +110,18 @@ cv::Rect window_of(const TargetView& view, const Camera& camera) {
   return cv::Rect(box & cv::Rect2d(0.0, 0.0, camera.width_px, camera.height_px));
 }
 
-cv::Mat painted_clouds(const Camera& camera, const Rigid3& world_from_cam) {
+cv::Mat painted_clouds(const Camera& camera, const Rigid3& world_from_cam, double clutter) {
+  static const Patches patches;
   cv::Mat picture(camera.height_px, camera.width_px, CV_32FC3);
   for (int v = 0; v < picture.rows; ++v) {
     for (int u = 0; u < picture.cols; ++u) {
       const auto ray = unproject(camera, Eigen::Vector2d(u, v));
-      const double grey = ray ? clouds(world_from_cam.rotation * ray->normalized()) : 0.0;
-      picture.at<cv::Vec3f>(v, u) = cv::Vec3f::all(static_cast<float>(grey));
+      auto& pixel = picture.at<cv::Vec3f>(v, u);
+      pixel = cv::Vec3f::all(0.0F);
+      if (!ray) continue;
+      const Eigen::Vector3d direction = world_from_cam.rotation * ray->normalized();
+      pixel = cv::Vec3f::all(static_cast<float>(clouds(direction)));
+      if (clutter > 0.0) pixel += static_cast<float>(clutter) * patches.at(direction);
     }
   }
   return picture;
@@ -98,7 +134,7 @@ cv::Mat render_target_frame(const RigHead& rig_head, const Eigen::Vector2d& pan_
                             const TargetVideoConfig& config, std::uint64_t seed) {
   const Camera& camera = rig_head.camera;
   const Rigid3 pose = world_from_cam(rig_head.head, pan_tilt_rad);
-  cv::Mat picture = painted_clouds(camera, pose);
+  cv::Mat picture = painted_clouds(camera, pose, config.clutter);
   if (target_in_world) {
     const TargetView view{pose, target, *target_in_world};
     paint_target(view, camera, window_of(view, camera), picture);

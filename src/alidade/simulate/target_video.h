@@ -22,6 +22,7 @@ struct FilmedTarget {
 struct TargetVideoConfig {
   double blur_px = 0.6;  ///< σ of the optical blur.
   double noise = 2.0;    ///< σ of a colour value's noise, of 255.
+  double clutter = 0.0;  ///< σ of the colours of patches of a degree or two behind the target.
 };
 
 /// What the head's camera sees, 8-bit BGR: soft grey clouds that stand still far away, and the target's centre at that

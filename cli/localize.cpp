@@ -155,6 +155,7 @@ LocalizeReport localize_pictures(const LocalizeArgs& args, const Camera& camera,
                                  std::span<const TimedPose> truth, LiveRun& live, Run& run) {
   LocalizeImagesConfig config;
   config.localize = localize;
+  config.localize.sigma_scale = args.sigma_scale;
   if (args.sigma_px > 0.0) config.eyes.sigma_floor_px = args.sigma_px;
   if (!args.target.empty()) config.target = read_image_target(args.target);
   ImageSequence pictures(args.sequence, args.rate_hz, camera.width_px, camera.height_px);
@@ -264,8 +265,7 @@ void add_options(CLI::App& command, LocalizeArgs& args) {
       "--sigma-px", args.sigma_px,
       "σ of a pixel coordinate (default 0.5); in pictures, where each match brings its own, the least (default 0.11) "
       "[px]");
-  number("--sigma-scale", args.sigma_scale,
-         "σ of the target's size over it, as of a print (0.002: 0.2 %), counted; for tracked points");
+  number("--sigma-scale", args.sigma_scale, "σ of the target's size over it, as of a print (0.002: 0.2 %), counted");
   number("--sigma-a", args.filter.sigma_a_m_s2, "Acceleration of the camera [m/s2]; by hand about 4")
       ->capture_default_str();
   number("--sigma-alpha", args.filter.sigma_alpha_rad_s2, "Angular acceleration [rad/s2]; by hand about 6")

@@ -20,6 +20,8 @@ struct SimulateUnderwaterArgs {
   UnderwaterScene scene;
   std::filesystem::path camera;
   double rate_hz = 10.0;
+  double told_f = 1.0, told_centre_px = 0.0;
+  bool told_k1 = true;
   bool video = false;
   UnderwaterVideoConfig look;
 };
@@ -70,6 +72,21 @@ std::size_t add_frames(const SimulateUnderwaterArgs& args, const Camera& camera,
   return sequence.frames.size();
 }
 
+/// The camera as camera.yaml tells it.
+Camera told_camera(const SimulateUnderwaterArgs& args, const Camera& camera) {
+  Camera told = camera;
+  Eigen::VectorXd values = params(camera.lens);
+  const std::vector<std::string> names = param_names(camera.lens);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    double& value = values[static_cast<Eigen::Index>(i)];
+    if (names[i] == "fx" || names[i] == "fy") value *= args.told_f;
+    if (names[i] == "cx") value += args.told_centre_px;
+    if (names[i] == "k1" && !args.told_k1) value = 0.0;
+  }
+  told.lens = with_params(camera.lens, values);
+  return told;
+}
+
 ExitCode simulate(const SimulateUnderwaterArgs& args, Run& run) {
   UnderwaterScene scene = args.scene;
   scene.camera = args.camera.empty() ? underwater_camera() : read_camera(args.camera);
@@ -82,7 +99,7 @@ ExitCode simulate(const SimulateUnderwaterArgs& args, Run& run) {
   for (const UnderwaterPoint& point : sequence.points)
     map.push_back({point.id, point.point_in_world, Eigen::Matrix3d::Zero(), point.is_known, 0});
   const std::size_t num = args.video ? add_frames(args, scene.camera, sequence, run) : add_sights(scene, sequence, run);
-  run.add_file("camera.yaml", camera_text(scene.camera, CameraFormat::alidade));
+  run.add_file("camera.yaml", camera_text(told_camera(args, scene.camera), CameraFormat::alidade));
   run.add_file("truth.tum", tum_text(truth));
   run.add_file("truth_map.csv", map_csv(map));
   run.document.estimate["frames"] = sequence.frames.size();
@@ -132,6 +149,24 @@ void add_underwater_scenario(Frame& frame) {
   number("--mismatches", scene.mismatches, "Share of the sights that show another place", 0.0, 1.0)->excludes(video);
   number("--blackout-from", scene.blackout_from_s, "Nothing is seen from this time on [s]", 0.0, 1e6)->excludes(video);
   number("--blackout", scene.blackout_s, "How long nothing is seen [s]", 0.0, 1e6)->excludes(video);
+  const char* const group = "What is not as told";
+  number("--told-f", args->told_f, "Focal length in camera.yaml over the true one", 0.1, 10.0)->group(group);
+  number("--told-centre", args->told_centre_px, "cx in camera.yaml less the true one [px]", -500.0, 500.0)
+      ->group(group);
+  command.add_flag("!--no-k1", args->told_k1, "camera.yaml has no k1")->group(group);
+  number("--readout", scene.readout_s, "Rolling shutter: time from the first row to the last [s]", 0.0, 1.0)
+      ->excludes(video)
+      ->group(group);
+  number("--late", scene.late_s, "Pictures are taken so long before their times [s]", -10.0, 10.0)
+      ->excludes(video)
+      ->group(group);
+  number("--target-speed", scene.target_speed_m_s, "Of the board along its x, against the other points [m/s]", -1.0,
+         1.0)
+      ->excludes(video)
+      ->group(group);
+  number("--target-stretch", scene.target_stretch, "target.yaml's points are so much further apart along x", -0.5, 0.5)
+      ->excludes(video)
+      ->group(group);
 }
 
 }  // namespace alidade::cli

@@ -126,6 +126,17 @@ void fill_localization(const LocalizeReport& report, std::span<const TimedPose> 
   estimate["restarts"] = report.num_restarts;
   estimate["sights"] = report.num_sights;
   estimate["sights_gated"] = report.num_gated;
+  JsonValue tested = JsonValue::list();
+  for (const GivenNumber& given : report.given) {
+    if (given.z == 0.0) continue;
+    JsonValue each = JsonValue::object();
+    each["name"] = given.name;
+    each["asked"] = given.asked;
+    each["sigma"] = std::abs(given.asked / given.z);
+    each["z"] = given.z;
+    tested.push_back(each);
+  }
+  estimate["tested"] = tested;
   const std::vector<std::string> all = param_names(report.camera.lens);
   const Eigen::VectorXd values = params(report.camera.lens);
   for (std::size_t k = 0; k < lens_params.size(); ++k) {

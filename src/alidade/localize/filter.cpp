@@ -24,6 +24,7 @@ LocalizationFilter::LocalizationFilter(Camera camera, const CameraMotion& start,
     P_.at(motion_dim + k, motion_dim + k) = sigma * sigma;
   }
   const auto sights = static_cast<std::size_t>(config_.sights_capacity);
+  given_ = GivenEffects(camera_, config_.lens_params, config_.sigma_scale, P_.capacity(), config_.sights_capacity);
   delta_.setZero(P_.capacity());
   start_.setZero(P_.capacity());
   next_.setZero(P_.capacity());
@@ -54,6 +55,7 @@ void LocalizationFilter::predict(double dt_s) {
   const MotionJacobians J = motion_jacobians(motion_, dt_s);
   const MotionMatrix Q = motion_noise(J, config_.sigma_a_m_s2, config_.sigma_alpha_rad_s2, dt_s);
   motion_ = moved(motion_, dt_s);
+  given_.predict(J.F);
   for (int j = motion_dim; j < P_.dim(); ++j) {
     Eigen::Map<Eigen::Vector<double, motion_dim>> column(&P_.at(0, j));  // F changes position and rotation
     const Eigen::Vector3d rotation = column.segment<3>(3), rate = column.tail<3>();
@@ -76,6 +78,7 @@ bool LocalizationFilter::add_known(long id, const Eigen::Vector3d& point_in_worl
   feature.offset = P_.dim();
   if (!P_.grow(3)) return false;
   for (int i = 0; i < 3; ++i) P_.at(feature.offset + i, feature.offset + i) = sigma_m * sigma_m;
+  given_.add_known(feature.offset, point_in_world);
   features_.push_back(feature);
   return true;
 }
@@ -101,6 +104,7 @@ void LocalizationFilter::append_feature(const NewFeature& made, long id) {
     J.col(pose_dim + k) = made.J_lens.col(config_.lens_params[static_cast<std::size_t>(k)]);
   const auto place = [](int input) { return input < pose_dim ? input : motion_dim + input - pose_dim; };
   if (!P_.grow(dim)) return;
+  given_.add(feature.offset, made, config_.lens_params);
   for (int j = 0; j < feature.offset; ++j) {
     for (int i = 0; i < dim; ++i) {
       double sum = 0.0;
@@ -119,6 +123,7 @@ void LocalizationFilter::append_feature(const NewFeature& made, long id) {
 }
 
 void LocalizationFilter::remove_numbers(int offset, int count) {
+  given_.remove(offset, count, P_.dim());
   P_.remove(offset, count);
   for (Feature& feature : features_)
     if (feature.offset > offset) feature.offset -= count;
@@ -150,6 +155,7 @@ int LocalizationFilter::convert_linear() {
     }
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) P_.at(at + i, at + j) = own(i, j);
+    given_.make_place(at, place.J);
     feature.kind = FeatureKind::xyz;
     feature.values.setZero();
     feature.values.head<3>() = place.point_in_world;
@@ -161,6 +167,7 @@ int LocalizationFilter::convert_linear() {
 
 void LocalizationFilter::place_camera(const CameraMotion& motion, const MotionMatrix& cov) {
   motion_ = motion;
+  given_.forget_motion();
   for (int i = 0; i < motion_dim; ++i) {
     for (int j = 0; j < P_.dim(); ++j) P_.at(i, j) = P_.at(j, i) = 0.0;
   }
@@ -176,6 +183,10 @@ std::optional<LocalizationFilter::Place> LocalizationFilter::place(long id) cons
   for (int a = 0; a < feature->dim(); ++a)
     for (int b = 0; b < feature->dim(); ++b)
       result.cov += P_.at(feature->offset + a, feature->offset + b) * at.J.col(a) * at.J.col(b).transpose();
+  if (given_.counts()) {
+    const Eigen::MatrixXd J = at.J.leftCols(feature->dim()) * given_.rows(feature->offset, feature->dim());
+    result.cov += J * given_.cov() * J.transpose();
+  }
   return result;
 }
 
@@ -189,7 +200,18 @@ MotionMatrix LocalizationFilter::motion_covariance() const {
 Eigen::Matrix<double, 6, 6> LocalizationFilter::pose_covariance() const {
   Eigen::Matrix<double, 6, 6> J = Eigen::Matrix<double, 6, 6>::Identity();
   J.topLeftCorner<3, 3>() = motion_.world_from_cam.rotation.toRotationMatrix().transpose();
-  return J * motion_covariance().topLeftCorner<6, 6>() * J.transpose();
+  Eigen::Matrix<double, 6, 6> cov = J * motion_covariance().topLeftCorner<6, 6>() * J.transpose();
+  if (given_.counts()) {
+    const Eigen::Matrix<double, 6, Eigen::Dynamic> J_given = J_pose_given();
+    cov += J_given * given_.cov() * J_given.transpose();
+  }
+  return cov;
+}
+
+Eigen::Matrix<double, 6, Eigen::Dynamic> LocalizationFilter::J_pose_given() const {
+  Eigen::Matrix<double, 6, Eigen::Dynamic> J = given_.rows(0, pose_dim);
+  J.topRows<3>() = motion_.world_from_cam.rotation.toRotationMatrix().transpose() * given_.rows(0, 3);
+  return J;
 }
 
 Eigen::VectorXd LocalizationFilter::lens_sigmas() const {

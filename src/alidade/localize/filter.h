@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "alidade/localize/feature.h"
+#include "alidade/localize/given_effects.h"
 #include "alidade/localize/state_covariance.h"
 
 namespace alidade {
@@ -33,6 +34,7 @@ struct LocalizationFilterConfig {
   double linear_below = 0.1;     ///< Linearity index below which an inverse depth becomes a place.
   std::vector<int> lens_params;  ///< Places of the lens's parameters that are in the state, and their σ at the start.
   std::vector<double> sigma_lens_params;
+  double sigma_scale = 0.0;   ///< Of the known points' common scale, relative; counted, as the lens's covariance is.
   int state_capacity = 800;   ///< Numbers of the state at most.
   int sights_capacity = 200;  ///< Measured features of one moment at most.
 };
@@ -99,7 +101,7 @@ class LocalizationFilter {
   [[nodiscard]] std::optional<ExpectedSight> expected(long id) const;
   [[nodiscard]] bool has(long id) const { return find(id) != nullptr; }
   [[nodiscard]] const std::vector<Feature>& features() const { return features_; }
-  /// Place of a feature and its covariance. None: not in the map.
+  /// Place of a feature and its covariance, what is given counted. None: not in the map.
   struct Place {
     Eigen::Vector3d point_in_world;
     Eigen::Matrix3d cov;
@@ -108,11 +110,16 @@ class LocalizationFilter {
 
   [[nodiscard]] const CameraMotion& motion() const { return motion_; }
   [[nodiscard]] MotionMatrix motion_covariance() const;
-  /// Of the right perturbation ξ = [translation, rotation] of world_from_cam, as everywhere in this library.
+  /// Of the right perturbation ξ = [translation, rotation] of world_from_cam, as everywhere in this library; what is
+  /// given counted.
   [[nodiscard]] Eigen::Matrix<double, 6, 6> pose_covariance() const;
   [[nodiscard]] const Camera& camera() const { return camera_; }
   /// σ of the lens's parameters that are in the state, in the order of the configuration.
   [[nodiscard]] Eigen::VectorXd lens_sigmas() const;
+  /// What is taken as given: how the state moves with it, and what the sights say of it.
+  [[nodiscard]] const GivenEffects& given() const { return given_; }
+  /// How the pose's right perturbation moves with each given number.
+  [[nodiscard]] Eigen::Matrix<double, 6, Eigen::Dynamic> J_pose_given() const;
   [[nodiscard]] int dim() const { return P_.dim(); }
   [[nodiscard]] const StateCovariance& covariance() const { return P_; }
   [[nodiscard]] const LocalizationFilterConfig& config() const { return config_; }
@@ -183,6 +190,7 @@ class LocalizationFilter {
   void turn_by_delta();
   void move_by_delta();
   void move_lens_by_delta();
+  void count_given();
   [[nodiscard]] double best_attempt();
   /// What the last attempt came to, put aside while another is made, and taken back.
   void keep_attempt();
@@ -194,6 +202,7 @@ class LocalizationFilter {
   CameraMotion motion_;
   LocalizationFilterConfig config_;
   StateCovariance P_;
+  GivenEffects given_;
   std::vector<Feature> features_;
   Eigen::VectorXd delta_;  ///< Error from the nominal state while an update goes on.
 

@@ -92,6 +92,7 @@ void LocalizationFilter::turn_by_delta() {
     if (feature.dim() > 3) block(feature.offset + 3) = turn.J_turned_angles(feature, error_of(feature));
   }
   P_.turn(shear_.data(), motion_dim, num_lens());
+  given_.turn(shear_.data(), P_.capacity(), motion_dim, num_lens(), P_.dim());
   const auto added = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
     return ((G * cross_matrix(from) - cross_matrix(to) * J_left) * R).eval();
   };
@@ -111,6 +112,7 @@ void LocalizationFilter::turn_by_delta() {
   }
   constexpr int rotation_at = 3;
   P_.shear(rotation_at, shear_.data());
+  given_.shear(rotation_at, shear_.data(), P_.capacity(), P_.dim());
 }
 
 /// The state moves by delta_, and the covariance's errors are counted from there: the rotation's by the right Jacobian,
@@ -139,6 +141,18 @@ void LocalizationFilter::move_by_delta() {
           (J_before_turn(before) * R - J_before_turn(feature) * RJ).topRows(feature.dim());
   }
   P_.shear(rotation_at, shear_.data());
+  given_.shear(rotation_at, shear_.data(), P_.capacity(), P_.dim());
+}
+
+/// What is given moves the state by what those used say of it, at the state that they led to.
+void LocalizationFilter::count_given() {
+  if (given_.num() == 0 || used_.empty()) return;
+  for (const Measured* measured : used_) {
+    const auto view = expected_view(camera_, motion_.world_from_cam, *measured->feature);
+    if (view)
+      given_.add_sight(*view, *measured->feature, config_.lens_params, measured->px - view->px, measured->variance_px2);
+  }
+  given_.finish(P_);
 }
 
 void LocalizationFilter::move_lens_by_delta() {

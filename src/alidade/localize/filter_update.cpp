@@ -285,6 +285,7 @@ bool LocalizationFilter::finish_update() {
   P_.commit();
   turns_world_ ? turn_by_delta() : move_by_delta();
   move_lens_by_delta();
+  count_given();
   delta_.setZero();
   return true;
 }

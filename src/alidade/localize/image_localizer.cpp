@@ -34,6 +34,7 @@ ImageLocalizer::ImageLocalizer(const Camera& camera, const LocalizeImagesConfig&
   const std::size_t need =
       motion_dim + filter_config_.lens_params.size() + 3 * num_known + 6 * config.eyes.most_features;
   filter_config_.state_capacity = static_cast<int>(need) + 8;
+  filter_config_.sigma_scale = config.localize.sigma_scale;
   filter_config_.sights_capacity = static_cast<int>(config.eyes.most_tried + num_known);
   next_id_ = static_cast<long>(num_known);
   if (config.target)
@@ -292,7 +293,8 @@ bool ImageLocalizer::try_from(const cv::Mat& smoothed, const StartHypothesis& fr
 /// Where the sights of several pictures in a row contradict the path though they are found: from the target or a
 /// keyframe, if that explains this picture.
 bool ImageLocalizer::restart_in_doubt(const cv::Mat& smoothed, PathStep& step) {
-  if (!config_.localize.restarts || doubt_.after(step) != Doubt::strong) return false;
+  const Doubt doubt = config_.localize.restarts ? doubt_.after(step) : Doubt::none;
+  if (doubt != Doubt::strong && doubt != Doubt::many) return false;
   doubt_.clear();
   const FilterBank before = *bank_;
   if (find_back(smoothed, step)) return true;
@@ -369,6 +371,7 @@ PathStep ImageLocalizer::take(const cv::Mat& grey, long frame, double t_s) {
   step.world_from_cam = filter.motion().world_from_cam;
   step.cov = filter.pose_covariance();
   step.num_features = filter.features().size();
+  given_.add(filter);
   if (step.event == FrameEvent::tracked)
     keyframes_.offer(grey, step.world_from_cam, config_.eyes.near_share * usual_depth_m(), config_.eyes.near_rad);
   return step;

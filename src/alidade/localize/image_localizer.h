@@ -2,6 +2,7 @@
 
 #include <unordered_map>
 
+#include "alidade/localize/given_numbers.h"
 #include "alidade/localize/keyframes.h"
 #include "alidade/localize/landmark.h"
 #include "alidade/localize/localize_images.h"
@@ -27,6 +28,7 @@ class ImageLocalizer {
   /// The target's points as they were told to the filter.
   [[nodiscard]] std::span<const KnownPoint> told() const { return told_; }
   [[nodiscard]] const RadialResiduals& residuals() const { return residuals_; }
+  [[nodiscard]] const GivenTally& given() const { return given_; }
   [[nodiscard]] std::size_t num_alike() const { return num_alike_; }
   /// Of the last picture.
   [[nodiscard]] std::span<const SightTried> tried() const { return tried_; }
@@ -65,6 +67,7 @@ class ImageLocalizer {
   std::vector<KnownPoint> told_;
   PathDoubt doubt_;
   RadialResiduals residuals_;
+  GivenTally given_;
   std::size_t num_alike_ = 1;
   std::vector<SightTried> tried_;
   std::vector<Eigen::Vector2d> in_view_;  ///< Where landmarks are, or should be, in this picture.

@@ -1,7 +1,9 @@
 #include "alidade/localize/known_pose.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <random>
 
 #include "alidade/board/board_pose.h"
 #include "alidade/geometry/decompositions.h"
@@ -78,29 +80,75 @@ std::vector<BoardPoseFit> fits_of(const Camera& camera, const SeenPoints& seen, 
                          effective_sigma_px(camera, fits.front(), seen.sigma_m, sigma_px));
 }
 
+constexpr double most_pose_chi2_per_dof = 6.9;  // 99.9 % of the two numbers that four points leave
+constexpr double most_chi2 = 13.8;              // 99.9 % of a point's two
+
+bool agree(const std::vector<BoardPoseFit>& fits) {
+  return !fits.empty() && fits.front().chi2 <= most_pose_chi2_per_dof * std::max(fits.front().dof, 2);
+}
+
+/// Those of all that fit a pose.
+BoardView fitting(const Camera& camera, const SeenPoints& seen, const BoardPoseFit& fit, double sigma_px) {
+  const double sigma = effective_sigma_px(camera, fit, seen.sigma_m, sigma_px);
+  BoardView view;
+  for (const Corner& corner : seen.view.corners) {
+    const auto px =
+        project(camera, fit.pose.cam_from_board * seen.points_in_board[static_cast<std::size_t>(corner.index)]);
+    if (px && (*px - corner.px).squaredNorm() < most_chi2 * sigma * sigma) view.corners.push_back(corner);
+  }
+  return view;
+}
+
+/// Four of them, drawn; all sets of four where there are few.
+std::vector<std::array<std::size_t, 4>> fours_of(std::size_t num) {
+  constexpr std::size_t most = 48;
+  std::vector<std::array<std::size_t, 4>> fours;
+  for (std::size_t a = 0; a < num; ++a)
+    for (std::size_t b = a + 1; b < num; ++b)
+      for (std::size_t c = b + 1; c < num; ++c)
+        for (std::size_t d = c + 1; d < num; ++d) fours.push_back({a, b, c, d});
+  std::mt19937_64 bits(1);
+  for (std::size_t i = 0; i < std::min(most, fours.size()); ++i)
+    std::swap(fours[i], fours[i + bits() % (fours.size() - i)]);
+  if (fours.size() > most) fours.resize(most);
+  return fours;
+}
+
+/// The poses that most sights agree on, where not all agree on one: from sets of four (M. A. Fischler & R. C. Bolles,
+/// "Random Sample Consensus", 1981). Of more than five more than four must agree, and half of all: four points fit
+/// chance poses.
+std::vector<BoardPoseFit> agreed_poses(const Camera& camera, const SeenPoints& seen, double sigma_px) {
+  const std::size_t num = seen.view.corners.size();
+  constexpr std::size_t few = 5;
+  const std::size_t least = num <= few ? 4 : std::max<std::size_t>(few, (num + 1) / 2);
+  BoardView best;
+  for (const auto& four : fours_of(num)) {
+    BoardView view;
+    for (const std::size_t i : four) view.corners.push_back(seen.view.corners[i]);
+    for (const BoardPoseFit& fit : fits_of(camera, seen, view, sigma_px)) {
+      BoardView agreeing = fitting(camera, seen, fit, sigma_px);
+      if (agreeing.corners.size() > best.corners.size()) best = std::move(agreeing);
+    }
+  }
+  if (best.corners.size() < least) return {};
+  std::vector<BoardPoseFit> fits = fits_of(camera, seen, best, sigma_px);
+  if (fits.empty()) return fits;
+  const BoardView again = fitting(camera, seen, fits.front(), sigma_px);
+  if (again.corners.size() > best.corners.size()) fits = fits_of(camera, seen, again, sigma_px);
+  return fits;
+}
+
 }  // namespace
 
 std::vector<StartHypothesis> poses_from_known(const Camera& camera, std::span<const FeatureSight> sights,
                                               std::span<const KnownPoint> known, const KnownPoseConfig& config) {
   const SeenPoints seen = seen_points(sights, known);
-  BoardView view = seen.view;
-  std::vector<BoardPoseFit> fits = fits_of(camera, seen, view, config.sigma_px);
-  constexpr double most_chi2_per_dof = 6.9;  // 99.9 % of the two numbers that four points leave
-  while (view.corners.size() > 4 && (fits.empty() || fits.front().chi2 > most_chi2_per_dof * fits.front().dof)) {
-    BoardView best = view;
-    for (std::size_t left_out = 0; left_out < view.corners.size(); ++left_out) {
-      BoardView fewer = view;
-      fewer.corners.erase(fewer.corners.begin() + static_cast<std::ptrdiff_t>(left_out));
-      std::vector<BoardPoseFit> tried = fits_of(camera, seen, fewer, config.sigma_px);
-      if (tried.empty() || (best.corners.size() < view.corners.size() && tried.front().chi2 >= fits.front().chi2))
-        continue;
-      best = std::move(fewer);
-      fits = std::move(tried);
-    }
-    if (best.corners.size() == view.corners.size()) break;
-    view = std::move(best);
-  }
-  std::erase_if(fits, [](const BoardPoseFit& fit) { return !(fit.chi2 <= most_chi2_per_dof * std::max(fit.dof, 2)); });
+  std::vector<BoardPoseFit> fits = fits_of(camera, seen, seen.view, config.sigma_px);
+  constexpr std::size_t most_for_sets = 40;  // a board's corners come from one finder: no mismatches among them
+  const std::size_t num = seen.view.corners.size();
+  if (!agree(fits) && num > 4 && num <= most_for_sets) fits = agreed_poses(camera, seen, config.sigma_px);
+  std::erase_if(fits,
+                [](const BoardPoseFit& fit) { return !(fit.chi2 <= most_pose_chi2_per_dof * std::max(fit.dof, 2)); });
   std::vector<StartHypothesis> starts;
   for (const BoardPoseFit& fit : fits) starts.push_back(start_of(fit, seen, config));
   return starts;

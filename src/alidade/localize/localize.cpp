@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "alidade/localize/given_numbers.h"
 #include "alidade/localize/path_doubt.h"
 #include "alidade/localize/point_store.h"
 #include "alidade/localize/sight_record.h"
@@ -28,6 +29,7 @@ class Localizer {
   [[nodiscard]] const PointStore& points() const { return points_; }
   [[nodiscard]] const RadialResiduals& residuals() const { return residuals_; }
   [[nodiscard]] const SightRecord& record() const { return record_; }
+  [[nodiscard]] const GivenTally& given() const { return given_; }
   [[nodiscard]] double period_s() const { return period_s_; }
 
  private:
@@ -41,6 +43,7 @@ class Localizer {
   void add_new(const SightFrame& frame);
   void drop_strangers(const SightFrame& frame, const SightsReport& report);
   [[nodiscard]] std::vector<StartHypothesis> elsewhere(const SightFrame& frame) const;
+  [[nodiscard]] int num_more_explained(const SightFrame& frame, const Rigid3& world_from_cam) const;
   bool restart(const SightFrame& frame, Doubt doubt);
   void fill(const SightFrame& frame, const SightsReport& report, PathStep& step) const;
 
@@ -53,6 +56,7 @@ class Localizer {
   int num_elsewhere_ = 0;  ///< Frames in a row in which the target says that the camera is somewhere else.
   RadialResiduals residuals_;
   SightRecord record_;
+  GivenTally given_;
   std::size_t num_taken_ = 0;  ///< Frames.
   std::size_t num_restarts_ = 0;
 };
@@ -96,8 +100,7 @@ void Localizer::add_new(const SightFrame& frame) {
     const auto prior = points_.prior_of(sight, bank_->best());
     if (!prior) continue;
     const FeatureKind kind = config_.new_points == NewPoints::xyz ? FeatureKind::xyz : FeatureKind::inverse_depth;
-    if (bank_->add(sight.id, sight.px, *prior, kind))
-      record_.entered(num_taken_, sight, *prior, config_.filter.sigma_px);
+    if (bank_->add(sight.id, sight.px, *prior, kind)) record_.entered(num_taken_, sight.id, *prior);
   }
 }
 
@@ -126,12 +129,32 @@ std::vector<StartHypothesis> Localizer::elsewhere(const SightFrame& frame) const
   return from;
 }
 
-/// From the target, where it says that the camera is somewhere else; where there is only some doubt, three times
-/// running: mismatches may look like another pose, but not again and again. The map of points that led there is
-/// dropped.
+/// Of the target's sights, how many more a pose explains than the path does.
+int Localizer::num_more_explained(const SightFrame& frame, const Rigid3& world_from_cam) const {
+  const double gate_px2 = 4.0 * config_.filter.gate * config_.filter.sigma_px * config_.filter.sigma_px;
+  const Rigid3& now = bank_->best().motion().world_from_cam;
+  int num_more = 0;
+  for (const FeatureSight& sight : frame.sights) {
+    const auto known = std::ranges::find(config_.target, sight.id, &KnownPoint::id);
+    if (known == config_.target.end()) continue;
+    const auto is_near = [&](const Rigid3& pose) {
+      const auto px = project(camera_, pose.inverse() * known->point_in_world);
+      return px && (*px - sight.px).squaredNorm() < gate_px2 ? 1 : 0;
+    };
+    num_more += is_near(world_from_cam) - is_near(now);
+  }
+  return num_more;
+}
+
+/// From the target, where it says that the camera is somewhere else. Mismatches may look like another pose: where the
+/// sights that fit are not contradicted by themselves, it has to explain at least two more of the target's, and where
+/// there is only some doubt three times running. The map of points that led there is dropped.
 bool Localizer::restart(const SightFrame& frame, Doubt doubt) {
-  constexpr int sure = 3;
-  const std::vector<StartHypothesis> from = doubt == Doubt::none ? std::vector<StartHypothesis>{} : elsewhere(frame);
+  constexpr int sure = 3, least_more = 2;
+  std::vector<StartHypothesis> from = doubt == Doubt::none ? std::vector<StartHypothesis>{} : elsewhere(frame);
+  if (!from.empty() && doubt != Doubt::strong &&
+      num_more_explained(frame, from.front().motion.world_from_cam) < least_more)
+    from.clear();
   num_elsewhere_ = from.empty() ? 0 : num_elsewhere_ + 1;
   if (from.empty() || (doubt == Doubt::some && num_elsewhere_ < sure)) return false;
   std::vector<long> unknown;
@@ -187,7 +210,6 @@ PathStep Localizer::taken(const SightFrame& frame) {
   }
   const SightsReport report = bank_->update(frame.sights);
   fill(frame, report, step);
-  record_.take(num_taken_, frame.sights, report.outcomes, config_.filter.sigma_px);
   residuals_.add(bank_->best(), frame.sights, report.outcomes);
   if (step.event == FrameEvent::tracked && step.num_tracked < least_sights) step.event = FrameEvent::predicted;
   const Doubt doubt = doubt_.after(step);
@@ -195,11 +217,11 @@ PathStep Localizer::taken(const SightFrame& frame) {
   if (config_.restarts && restart(frame, doubt)) {
     const SightsReport again = bank_->update(frame.sights);
     fill(frame, again, step);
-    record_.take(num_taken_, frame.sights, again.outcomes, config_.filter.sigma_px);
     step.event = FrameEvent::restarted;
   }
   if (step.num_tracked >= least_sights || step.event == FrameEvent::started) add_new(frame);
   bank_->convert_linear();
+  given_.add(bank_->best());
   return step;
 }
 
@@ -225,6 +247,7 @@ LocalizeConfig sized(const LocalizeConfig& given, std::span<const SightFrame> fr
   const auto need = motion_dim + config.filter.lens_params.size() + 6 * ids.size() + 8;
   config.filter.state_capacity =
       std::min(config.filter.state_capacity, static_cast<int>(std::min<std::size_t>(need, 1 << 20)));
+  config.filter.sigma_scale = config.sigma_scale;
   config.filter.sights_capacity =
       std::min(config.filter.sights_capacity, static_cast<int>(std::min<std::size_t>(most, 1 << 20)));
   return config;
@@ -239,20 +262,39 @@ void enlarge(SmoothedPath& smoothed, const ResidualStructure& residuals) {
   smoothed.sigma_lens *= std::sqrt(factor);
 }
 
+/// What of each frame fits the smoothed path: frames that the filter had lost may be held by their sights there.
+void judge_frames(const SmoothedPath& smoothed, std::size_t first_frame, std::span<const SightFrame> frames,
+                  LocalizeReport& report) {
+  std::vector<std::size_t> num_fit(report.path.size(), 0);
+  for (const PlacedResidual& residual : smoothed.residuals) ++num_fit[first_frame + residual.frame];
+  for (std::size_t k = first_frame; k < report.path.size(); ++k) {
+    PathStep& step = report.path[k];
+    const bool was_lost = step.event == FrameEvent::predicted || step.event == FrameEvent::waiting;
+    if (was_lost && num_fit[k] >= least_sights) step.event = FrameEvent::tracked;
+    std::size_t num_of_map = 0;
+    for (const FeatureSight& sight : frames[k].sights)
+      num_of_map += std::ranges::binary_search(smoothed.ids, sight.id) ? 1 : 0;
+    report.num_unexplained += 2 * num_fit[k] < num_of_map ? 1 : 0;
+  }
+}
+
 /// The path since it began, from all that was seen of it. None where there is no scale, or it does not settle.
-std::optional<SmoothedPath> smooth(const Localizer& localizer, const LocalizeConfig& config, LocalizeReport& report) {
+std::optional<SmoothedPath> smooth(const Localizer& localizer, const LocalizeConfig& config,
+                                   std::span<const SightFrame> frames, LocalizeReport& report) {
   if (!config.smooths || !localizer.bank() || config.target.empty()) return std::nullopt;
+  const SightRecord& record = localizer.record();
   const auto problem =
-      localizer.record().problem(report.camera, config, report.path, localizer.bank()->best(), localizer.period_s());
+      record.problem(report.camera, config, frames, report.path, localizer.bank()->best(), localizer.period_s());
   auto smoothed = problem ? smoothed_path(*problem) : std::nullopt;
   if (!smoothed) return std::nullopt;
   report.residuals = residual_structure(smoothed->residuals, report.camera.width_px, report.camera.height_px);
   enlarge(*smoothed, report.residuals);
   for (std::size_t k = 0; k < smoothed->cov.size(); ++k) {
-    PathStep& step = report.path[localizer.record().first_frame() + k];
+    PathStep& step = report.path[problem->first_frame + k];
     step.world_from_cam = smoothed->world_from_cam[k];
     step.cov = smoothed->cov[k];
   }
+  judge_frames(*smoothed, problem->first_frame, frames, report);
   return smoothed;
 }
 
@@ -292,7 +334,8 @@ LocalizeReport localize_sights(const Camera& camera, std::span<const SightFrame>
     if (config.inspect && localizer.bank()) config.inspect(localizer.bank()->best());
   }
   report.num_restarts = localizer.num_restarts();
-  const auto smoothed = smooth(localizer, config, report);
+  const auto smoothed = smooth(localizer, config, frames, report);
+  report.given = localizer.given().numbers();
   sum_up(
       localizer.bank(), [&](long id) { return localizer.points().num_used(id); }, truth, report);
   if (smoothed) take_over(*smoothed, report);

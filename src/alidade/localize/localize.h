@@ -112,11 +112,14 @@ struct LocalizeReport {
   Eigen::VectorXd sigma_lens;  ///< Of the parameters that were estimated.
   PathError error;             ///< With truth.
   bool is_scale_told = true, is_board = false;  ///< As in LocalizeConfig.
-  bool is_behind = false;          ///< Most poses are on the side of a flat target from which it is not seen.
-  ResidualStructure residuals;     ///< Of a smoothed path.
-  bool is_smoothed = false;        ///< Path and map are from all sights together, not each from those before it.
-  std::vector<GivenNumber> given;  ///< Of a smoothed path: what was given, and what it does.
-  double lens_pull = 0.0;          ///< Of a lens that was estimated: how far from what was told, in the told σ.
+  bool is_behind = false;           ///< Most poses are on the side of a flat target from which it is not seen.
+  ResidualStructure residuals;      ///< Of a smoothed path.
+  bool is_smoothed = false;         ///< Path and map are from all sights together, not each from those before it.
+  std::size_t num_unexplained = 0;  ///< Frames of a smoothed path of which most sights do not fit it.
+  double widened = 1.0;             ///< Of a smoothed path: see SmoothedPath,
+  bool is_from_one_place = false;   ///< and this, too.
+  std::vector<GivenNumber> given;   ///< What was given, and what it does.
+  double lens_pull = 0.0;           ///< Of a lens that was estimated: how far from what was told, in the told σ.
 };
 
 /// The path of a camera through all frames, in order of time, and the map of its points.

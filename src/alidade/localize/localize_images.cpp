@@ -32,6 +32,7 @@ LocalizeReport localize_images(const Camera& camera, const NextPicture& next, st
       localizer.bank(), [&](long id) { return localizer.num_found(id); }, truth, report);
   report.known_shift = known_shift(report.map, localizer.told());
   report.radial = localizer.residuals().structure();
+  report.given = localizer.given().numbers();
   report.num_alike = localizer.num_alike();
   report.sigma_px = config.eyes.sigma_floor_px;
   return report;

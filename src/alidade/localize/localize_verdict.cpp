@@ -60,6 +60,12 @@ void add_truth(const LocalizeReport& report, Verdict& verdict) {
                               before, elsewhere_ratio, "σ", "path"});
 }
 
+/// Whether the smoothed path explains what was seen before the filter began anew, too.
+bool is_solved_anew(const LocalizeReport& report) {
+  constexpr double few = 0.01;
+  return report.is_smoothed && share(report.num_unexplained, report.path.size()) < few;
+}
+
 /// After frames without a pose it is the way back; else what led to it was wrong for some time before.
 std::string restarts_text(const LocalizeReport& report) {
   std::size_t num_back = 0, num_anew = 0;
@@ -72,11 +78,35 @@ std::string restarts_text(const LocalizeReport& report) {
   }
   const auto times = [](std::size_t num) { return num == 1 ? std::string("once") : std::to_string(num) + " times"; };
   std::string text = num_back > 0 ? "found its way back " + times(num_back) : "";
-  if (num_anew > 0)
+  if (num_anew > 0 && is_solved_anew(report))
+    text += (text.empty() ? "begun anew " : "; begun anew ") + times(num_anew) +
+            "; the path before it is solved anew, from the map after it";
+  else if (num_anew > 0)
     text += (text.empty() ? "begun anew " : "; begun anew ") + times(num_anew) +
             (num_anew == 1 ? ", in" : ", last in") + " frame " + std::to_string(last_anew) +
             ": do not trust the path before it";
   return text;
+}
+
+/// "0.5 %", "3 px", "12 ms": what the sights ask for.
+std::string asked_text(const GivenNumber& given) {
+  const double asked = given.asked;
+  if (given.name == "focal length" || given.name == "shape of the target") return text_of(100.0 * asked, 2) + " %";
+  if (given.name.starts_with("centre")) return text_of(asked, 2) + " px";
+  if (given.name == "speed of the target") return text_of(1000.0 * std::abs(asked), 2) + " mm/s";
+  if (given.name == "readout") return text_of(1000.0 * asked, 2) + " ms";
+  return text_of(asked, 2);
+}
+
+std::string cause_text(const GivenNumber& given) {
+  const std::string size = asked_text(given), z = " (" + text_of(std::abs(given.z), 2) + "σ)";
+  if (given.name == "shape of the target")
+    return "the target is longer along x, against y, than it is told to be, by " + size + z;
+  if (given.name == "speed of the target") return "the target moves against the other points, by " + size + z;
+  if (given.name == "readout")
+    return "rows are not of one moment: a rolling shutter of " + size + " from the first to the last" + z;
+  return "the sights ask for another " + std::string(given.name) + ", by " + size + z +
+         ": the camera file is not of this lens as it was used";
 }
 
 /// Of what was given, the one of which the sights ask most: a wrong lens moves the others' scores, too.
@@ -84,17 +114,10 @@ void add_given(const LocalizeReport& report, Verdict& verdict) {
   const GivenNumber* worst = nullptr;
   for (const GivenNumber& given : report.given)
     if (worst == nullptr || std::abs(given.z) > std::abs(worst->z)) worst = &given;
-  constexpr double care_z = 4.5, bad_z = 15.0, least_move = 0.5;
-  if (worst != nullptr && std::abs(worst->asked * worst->moves) > least_move && std::abs(worst->z) > care_z) {
-    const bool is_relative = worst->name == "focal length" || worst->name == "scale of the target";
-    const bool is_px = worst->name.starts_with("centre");
-    const std::string size = is_relative ? text_of(100.0 * worst->asked, 2) + " %" : text_of(worst->asked, 2);
-    verdict.checks.push_back({"camera", state_of(std::abs(worst->z), care_z, bad_z),
-                              "the sights ask for another " + std::string(worst->name) + ", by " + size +
-                                  (is_px ? " px" : "") + " (" + text_of(std::abs(worst->z), 2) +
-                                  "σ): the camera file is not of this lens as it was used",
+  constexpr double care_z = 3.5, bad_z = 15.0, least_move = 0.5;
+  if (worst != nullptr && std::abs(worst->asked * worst->moves) > least_move && std::abs(worst->z) > care_z)
+    verdict.checks.push_back({"camera", state_of(std::abs(worst->z), care_z, bad_z), cause_text(*worst),
                               std::abs(worst->z), care_z, "σ", "path"});
-  }
   constexpr double care_pull = 3.0;
   if (report.lens_pull > care_pull)
     verdict.checks.push_back({"camera", State::care,
@@ -118,6 +141,19 @@ void add_residuals(const LocalizeReport& report, Verdict& verdict) {
                               "errors last from frame to frame (correlation " + text_of(residuals.colour, 2) +
                                   "): tracks drift, or something told is wrong; σ is enlarged for it",
                               residuals.colour, 0.25, "1", "nis"});
+}
+
+void add_tilt(const LocalizeReport& report, Verdict& verdict) {
+  constexpr double care_widened = 1.5;
+  if (!report.is_from_one_place && !(report.widened > care_widened)) return;
+  std::string text = report.is_from_one_place
+                         ? "the camera hardly moves aside: from one place how the target is tilted is hardly told, and "
+                           "errors may be several times their σ"
+                         : "how the target is tilted is hardly told: it is seen from one side alone";
+  if (report.widened > care_widened) text += "; σ is enlarged " + text_of(report.widened, 2) + " times for it";
+  verdict.checks.push_back(
+      {"tilt of the target", State::care, std::move(text), report.widened, care_widened, "1", "path"});
+  verdict.to_add = "move the camera aside while the target is in view, or use a larger target or one with depth";
 }
 
 void add_side(const LocalizeReport& report, Verdict& verdict) {
@@ -171,10 +207,11 @@ void add_checks(const LocalizeReport& report, Verdict& verdict) {
                                 : "scale unknown: the path is up to scale, its unit is the depth at the start",
                             0.0, 0.0, "", "path"});
   if (report.num_restarts > 0)
-    verdict.checks.push_back({"restarts", State::care, restarts_text(report), static_cast<double>(report.num_restarts),
-                              0.0, "times", "path"});
+    verdict.checks.push_back({"restarts", is_solved_anew(report) ? State::good : State::care, restarts_text(report),
+                              static_cast<double>(report.num_restarts), 0.0, "times", "path"});
   add_given(report, verdict);
   add_residuals(report, verdict);
+  add_tilt(report, verdict);
   add_side(report, verdict);
   add_truth(report, verdict);
 }

@@ -32,8 +32,8 @@ Doubt PathDoubt::after(const PathStep& step) {
   push(recent_gated_, share(step.num_gated, num));
   push(recent_known_gated_, share(step.num_known_gated, step.num_known));
   if (recent_nis_.size() < window) return Doubt::none;
-  if (mean(recent_nis_) > most_nis || mean(recent_gated_) > most_gated || mean(recent_known_gated_) > most_known_gated)
-    return Doubt::strong;
+  if (mean(recent_nis_) > most_nis) return Doubt::strong;
+  if (mean(recent_gated_) > most_gated || mean(recent_known_gated_) > most_known_gated) return Doubt::many;
   return mean(recent_known_gated_) > many_known_gated ? Doubt::some : Doubt::none;
 }
 

@@ -10,7 +10,8 @@ namespace alidade {
 enum class Doubt {
   none,
   some,    ///< More than three in ten of the target's sights are gated: the path may be wrong, or they.
-  strong,  ///< The path is wrong.
+  many,    ///< Most sights, or nearly all of the target's, are gated.
+  strong,  ///< Those that fit contradict each other: the path is wrong.
 };
 
 /// `part` of `of`, 0 where there is nothing.
@@ -19,7 +20,7 @@ enum class Doubt {
 /// Whether the last frames say that the path is wrong: a path may fit its own map well and be elsewhere.
 class PathDoubt {
  public:
-  /// Strong: mean NIS above 2, or most sights or most of the target's gated, over five frames with sights.
+  /// Over five frames with sights. Strong: mean NIS above 2.
   [[nodiscard]] Doubt after(const PathStep& step);
   void clear();
 

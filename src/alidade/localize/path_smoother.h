@@ -10,12 +10,13 @@
 
 namespace alidade {
 
-/// A sight that a filter used, or by which a point entered it.
+/// A sight of a point of the map.
 struct UsedSight {
   std::size_t frame = 0;  ///< Index from the smoother's first.
   long id = 0;
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   double sigma_px = 0.5;
+  bool fits_start = true;  ///< With the poses and points that the smoother begins at.
 };
 
 struct SmootherPoint {
@@ -37,7 +38,8 @@ struct PlacedResidual {
 
 /// What a path is smoothed from. Frames follow each other without a break.
 struct SmootherProblem {
-  Camera camera;  ///< As told; its covariance is counted.
+  std::size_t first_frame = 0;  ///< Of the recording.
+  Camera camera;                ///< As told; its covariance is counted.
   std::vector<double> t_s;
   std::vector<Rigid3> world_from_cam;  ///< To begin at.
   std::vector<UsedSight> sights;       ///< In order of frames.
@@ -52,8 +54,10 @@ struct SmootherProblem {
 /// Something that is taken as given: how it would move the path, and what the sights say of it (a score test: what one
 /// more free parameter would come to, by the linearisation that is there anyway).
 struct GivenNumber {
-  std::string_view name;        ///< "focal length", "centre u", "centre v", "k1", "scale of the target"
-  double moves = 0.0;           ///< Largest move of a pose's number for a whole unit (relative, px), in its σ,
+  /// "focal length", "centre u", "centre v", "k1", "scale of the target", "shape of the target", "speed of the target",
+  /// "readout" (of a rolling shutter, first row to last), "clock"
+  std::string_view name;
+  double moves = 0.0;           ///< Largest move of a pose's number for a whole unit (relative, px, m/s, s), in its σ,
   std::string_view moved = {};  ///< which that is,
   double moved_by = 0.0;        ///< and by how much [m or rad].
   double asked = 0.0, z = 0.0;  ///< The change that the sights ask for, in units, and over its own σ.
@@ -65,7 +69,7 @@ struct GivenNumber {
 struct SmoothedPath {
   std::vector<Rigid3> world_from_cam;
   std::vector<Eigen::Matrix<double, 6, 6>> cov;  ///< Of the right perturbation.
-  std::vector<long> ids;
+  std::vector<long> ids;                         ///< Of the points, growing.
   std::vector<Eigen::Vector3d> points;
   std::vector<Eigen::Matrix3d> point_covs;
   Camera camera;
@@ -73,7 +77,14 @@ struct SmoothedPath {
   double lens_pull = 0.0;      ///< How far an estimated number of the lens is from what was told, in the told σ.
   std::vector<GivenNumber> given;
   std::vector<PlacedResidual> residuals;
-  std::size_t num_dropped = 0;  ///< Sights beyond the gate once all was known.
+  double chi2_per_dof = 0.0;  ///< Of the sights that fit.
+  /// Along its least certain direction the cost rises more slowly to one side than to the other, or than σ says; σ is
+  /// enlarged there by so much.
+  double widened = 1.0;
+  /// The camera hardly moves aside, and so a pose's least certain numbers are less sure than a cut is straight: turns
+  /// and small moves look alike where depths are not known, and the posterior is no Gaussian.
+  bool is_from_one_place = false;
+  std::size_t num_dropped = 0;  ///< Sights that do not fit it.
 };
 
 /// All sights of a recording together: a filter's derivatives are those of its moment, when depths were vague, and what

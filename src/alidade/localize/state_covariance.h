@@ -30,6 +30,7 @@ class StateCovariance {
   [[nodiscard]] double at(int i, int j) const {
     return P_[static_cast<std::size_t>(j) * stride() + static_cast<std::size_t>(i)];
   }
+  [[nodiscard]] const double* column(int j) const { return &P_[static_cast<std::size_t>(j) * stride()]; }
   /// Of P − W Wᵀ.
   [[nodiscard]] double current(int i, int j) const;
 

@@ -62,8 +62,15 @@ void take_over(const SmoothedPath& smoothed, LocalizeReport& report) {
   report.is_smoothed = true;
   report.given = smoothed.given;
   report.lens_pull = smoothed.lens_pull;
+  report.widened = smoothed.widened;
+  report.is_from_one_place = smoothed.is_from_one_place;
   report.camera = smoothed.camera;
   report.sigma_lens = smoothed.sigma_lens;
+  if (report.num_restarts > 0) {  // what the filter left out before it began anew is no longer left out
+    report.num_used = smoothed.residuals.size();
+    report.num_gated = smoothed.num_dropped;
+    report.nis_per_dof = smoothed.chi2_per_dof;
+  }
   for (std::size_t i = 0; i < smoothed.ids.size(); ++i) {
     const auto at = std::ranges::find(report.map, smoothed.ids[i], &MapPoint::id);
     if (at == report.map.end()) continue;

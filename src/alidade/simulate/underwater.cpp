@@ -51,9 +51,22 @@ std::vector<UnderwaterPoint> points_of(const UnderwaterScene& scene, Draws& draw
     for (const long id : scene.known) point.is_known = point.is_known || id == point.id;
     const Eigen::Vector3d error = scene.sigma_known_m * draws.normal3();
     if (point.is_known) point.told_in_world = point.point_in_world + error;
+    point.told_in_world.x() *= 1.0 + scene.target_stretch;
     points.push_back(point);
   }
   return points;
+}
+
+/// Of a row that is read `readout_s` (v/H − ½) after the middle one: by iteration, as the row depends on the pose.
+std::optional<Eigen::Vector2d> rolling_px(const UnderwaterScene& scene, const Swing& swing, double t_s,
+                                          const Eigen::Vector3d& point_in_world) {
+  auto px = project(scene.camera, swing.world_from_cam(t_s).inverse() * point_in_world);
+  constexpr int enough = 4;  // of which each leaves a hundredth
+  for (int i = 0; i < enough && scene.readout_s > 0.0 && px; ++i) {
+    const double later_s = scene.readout_s * (px->y() / scene.camera.height_px - 0.5);
+    px = project(scene.camera, swing.world_from_cam(t_s + later_s).inverse() * point_in_world);
+  }
+  return px;
 }
 
 bool is_between_pixels(const Camera& camera, const Eigen::Vector2d& px) {
@@ -92,8 +105,10 @@ UnderwaterSequence simulate_underwater(const UnderwaterScene& scene, std::uint64
       const Eigen::Vector2d noise = scene.sigma_px * draws.normal2();
       const double depth_error = draws.normal(), is_wrong = draws.uniform();
       const double v = draws.uniform(-1.0, 1.0), u = draws.uniform(-1.0, 1.0);
-      const Eigen::Vector3d point_in_cam = frame.world_from_cam.inverse() * point.point_in_world;
-      const auto px = project(scene.camera, point_in_cam);
+      Eigen::Vector3d point_in_world = point.point_in_world;
+      if (point.id <= static_cast<long>(vertices.size())) point_in_world.x() += scene.target_speed_m_s * frame.t_s;
+      const Eigen::Vector3d point_in_cam = frame.world_from_cam.inverse() * point_in_world;
+      const auto px = rolling_px(scene, swing, frame.t_s - scene.late_s, point_in_world);
       if (is_black || !px || !is_between_pixels(scene.camera, *px)) continue;
       // A prior of 30 % may draw a point behind the camera: no one believes that.
       if (point.told_depth_m == 0.0)

@@ -25,6 +25,11 @@ struct UnderwaterScene {
   double mismatches = 0.0;    ///< Share of the sights after the first frame that show another place.
   double mismatch_px = 60.0;  ///< How far at most, in each coordinate.
   double blackout_from_s = 0.0, blackout_s = 0.0;  ///< Nothing is seen from then on for so long.
+  // What is not as a filter is told.
+  double readout_s = 0.0;         ///< From a picture's first row to its last; its time is that of the middle one.
+  double late_s = 0.0;            ///< Pictures are taken so long before the time that they bear.
+  double target_speed_m_s = 0.0;  ///< Of the board along its x, against the other points.
+  double target_stretch = 0.0;    ///< Known points are told so much (relative) further apart along x.
 };
 
 /// 768×576, fx 768, fy 766, cx 389, cy 284, k1 −0.44881, k2 0.0664, p1 0.01316, p2 0.00218: strong distortion, which

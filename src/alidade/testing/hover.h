@@ -23,6 +23,12 @@ struct Hover {
   double sigma_px = 0.5, sigma_known_m = 0.001;
   double distance_m = 0.9;
   bool turns_in_place = false;
+  // What is not as told.
+  double readout_s = 0.0;            ///< From the first row to the last, the time being that of the middle one.
+  double target_speed_m_s = 0.0;     ///< Along x, against the other points.
+  double target_stretch = 0.0;       ///< Of the told points along x, relative.
+  double most_mismatched_px = 20.0;  ///< Of a share of the sights after the first frame, in each coordinate.
+  double mismatches = 0.0;
 };
 
 struct HoverRun {
@@ -110,9 +116,11 @@ inline HoverRun hovering(const Hover& scene, std::uint64_t seed) {
   const Eigen::VectorXd p = params(run.camera.lens);
   std::vector<Eigen::Vector3d> points{{-0.15, -0.1, 0.0}, {0.15, -0.1, 0.0}, {0.15, 0.1, 0.0},
                                       {-0.15, 0.1, 0.0},  {0.05, 0.0, 0.0},  {-0.05, 0.05, 0.0}};
-  for (std::size_t i = 0; i < points.size(); ++i)
-    run.target.push_back(
-        {static_cast<long>(i) + 1, points[i] + scene.sigma_known_m * draws.normal3(), scene.sigma_known_m});
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    Eigen::Vector3d told = points[i] + scene.sigma_known_m * draws.normal3();
+    told.x() *= 1.0 + scene.target_stretch;
+    run.target.push_back({static_cast<long>(i) + 1, told, scene.sigma_known_m});
+  }
   const double wide = scene.lens == HoverLens::fisheye ? 2.0 : 1.0;
   for (int i = 0; i < scene.num_others; ++i) {
     const double x = wide * draws.uniform(-0.8, 0.8), y = wide * draws.uniform(-0.6, 0.6), z = draws.uniform(-0.2, 0.9);
@@ -125,16 +133,25 @@ inline HoverRun hovering(const Hover& scene, std::uint64_t seed) {
     phase[i] = draws.uniform(0.0, 2.0 * std::numbers::pi);
   }
   if (scene.turns_in_place) amplitude.head<3>().setZero();
-  for (int k = 0; k < scene.num_frames; ++k) {
-    const double t_s = k * scene.dt_s;
+  const auto pose_at = [&](double t_s) {
     Eigen::Vector<double, 6> at;
     for (int i = 0; i < 6; ++i)
       at[i] = amplitude[i] * std::sin(2.0 * std::numbers::pi * frequency_hz[i] * t_s + phase[i]);
-    const Rigid3 world_from_cam{exp_so3(at.tail<3>()), at.head<3>() - Eigen::Vector3d(0.0, 0.0, scene.distance_m)};
+    return Rigid3{exp_so3(at.tail<3>()), at.head<3>() - Eigen::Vector3d(0.0, 0.0, scene.distance_m)};
+  };
+  for (int k = 0; k < scene.num_frames; ++k) {
+    const double t_s = k * scene.dt_s;
+    const Rigid3 world_from_cam = pose_at(t_s);
     SightFrame frame{k, t_s, {}};
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const Eigen::Vector2d noise = scene.sigma_px * draws.normal2();
-      const auto px = hover::seen(scene.lens, p, world_from_cam.inverse() * points[i]);
+      Eigen::Vector2d noise = scene.sigma_px * draws.normal2();
+      if (scene.mismatches > 0.0 && draws.uniform() < scene.mismatches && k > 0)
+        noise = scene.most_mismatched_px * Eigen::Vector2d(draws.uniform(-1.0, 1.0), draws.uniform(-1.0, 1.0));
+      Eigen::Vector3d point = points[i];
+      if (i < run.target.size()) point.x() += scene.target_speed_m_s * t_s;
+      auto px = hover::seen(scene.lens, p, world_from_cam.inverse() * point);
+      for (int again = 0; again < 4 && px && scene.readout_s > 0.0; ++again)
+        px = hover::seen(scene.lens, p, pose_at(t_s + scene.readout_s * (px->y() / 576.0 - 0.5)).inverse() * point);
       if (px) frame.sights.push_back({static_cast<long>(i) + 1, *px + noise, 0.0});
     }
     run.frames.push_back(std::move(frame));

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "alidade/localize/feature.h"
+
+namespace alidade {
+
+/// A sight of a point whose place is known, with its covariance.
+struct PlacedSight {
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  double sigma_px = 0.5;
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();
+};
+
+/// Where a camera is by sights of places, some of which may be mismatched.
+struct Resection {
+  Rigid3 world_from_cam;
+  double cost = 0.0;  ///< Squares over σ², of each sight at most the gate.
+  std::size_t num_fit = 0;
+  std::vector<bool> fits;  ///< One a sight.
+};
+
+/// From each of the poses to begin at, weights that fall with a residual (Geman & McClure 1985), wide at first, then
+/// narrower; the one that explains most. None: fewer than three sights, or nothing to begin at.
+[[nodiscard]] std::optional<Resection> resection(const Camera& camera, std::span<const PlacedSight> sights,
+                                                 std::span<const Rigid3> begin_at, double gate);
+
+}  // namespace alidade

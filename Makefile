@@ -90,9 +90,9 @@ docs: demo
 
 study:
 	@tools/setup build
-	@echo "study: building $(out)/study_calibration, study_observe, study_rangefinder, study_localize, study_chain, study_causes, study_faults and corner_accuracy"
+	@echo "study: building $(out)/study_calibration, study_observe, study_rangefinder, study_localize, study_chain, study_turned, study_causes, study_faults and corner_accuracy"
 	@cmake --preset release -DALIDADE_BENCH=ON >/dev/null
-	@ninja -C $(out) $(jobs) study_calibration study_observe study_rangefinder study_localize study_chain study_causes study_faults corner_accuracy alidade_cli
+	@ninja -C $(out) $(jobs) study_calibration study_observe study_rangefinder study_localize study_chain study_turned study_causes study_faults corner_accuracy alidade_cli
 	@echo "study: 2400 calibrations, into docs/studies.md"
 	@mkdir -p build/study
 	@$(out)/study_calibration 2400 >build/study/studies.md; met=$$?; cp build/study/studies.md docs/studies.md; exit $$met
@@ -106,6 +106,8 @@ study:
 	@$(out)/study_localize 200 20 >build/study/localize.md; met=$$?; cp build/study/localize.md docs/studies-localize.md; exit $$met
 	@echo "study: lenses, rig and track in a chain, into docs/studies-chain.md"
 	@$(out)/study_chain 200 >build/study/chain.md; met=$$?; cp build/study/chain.md docs/studies-chain.md; exit $$met
+	@echo "study: photos of a camera turned by hand, into docs/studies-turned.md"
+	@$(out)/study_turned 200 >build/study/turned.md; met=$$?; cp build/study/turned.md docs/studies-turned.md; exit $$met
 	@echo "study: what is wrong with rigs and rangefinders, and what is seen of it, into docs/studies-causes.md"
 	@$(out)/study_causes 100 >build/study/causes.md; met=$$?; cp build/study/causes.md docs/studies-causes.md; exit $$met
 	@$(out)/corner_accuracy

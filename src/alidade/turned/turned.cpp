@@ -210,8 +210,7 @@ class TurnedRun {
     ScatterCovariance scatter = scatter_covariance(fit_, progress_);
     report_.lens_terms = free_.lens_terms;
     while (report_.lens_terms > 0 && !config_.keeps_terms) {
-      // k1 bends f along with it: it is let go only where it is next to nothing
-      const double told_beyond = report_.lens_terms > 1 ? 3.0 : 1.5;  // σ
+      constexpr double told_beyond = 3.0;  // σ
       const int last = num_camera - 3 + report_.lens_terms;
       if (std::abs(fit_.bundle.camera[last]) > told_beyond * std::sqrt(scatter.cov(last, last))) break;
       const Eigen::Vector4d before = fit_.bundle.camera.head<4>();

@@ -98,9 +98,9 @@ study:
 	@$(out)/study_localize 200 20 >build/study/localize.md; met=$$?; cp build/study/localize.md docs/studies-localize.md; exit $$met
 	@echo "study: lenses, rig and track in a chain, into docs/studies-chain.md"
 	@$(out)/study_chain 200 >build/study/chain.md; met=$$?; cp build/study/chain.md docs/studies-chain.md; exit $$met
+	@$(out)/corner_accuracy
 	@echo "study: what is wrong with rigs and rangefinders, and what is seen of it, into docs/studies-causes.md"
 	@$(out)/study_causes 100 >build/study/causes.md; met=$$?; cp build/study/causes.md docs/studies-causes.md; exit $$met
-	@$(out)/corner_accuracy
 
 format:
 	@tools/setup tidy

@@ -108,11 +108,11 @@ study:
 	@$(out)/study_chain 200 >build/study/chain.md; met=$$?; cp build/study/chain.md docs/studies-chain.md; exit $$met
 	@echo "study: photos of a camera turned by hand, into docs/studies-turned.md"
 	@$(out)/study_turned 200 >build/study/turned.md; met=$$?; cp build/study/turned.md docs/studies-turned.md; exit $$met
-	@echo "study: what is wrong with rigs and rangefinders, and what is seen of it, into docs/studies-causes.md"
-	@$(out)/study_causes 100 >build/study/causes.md; met=$$?; cp build/study/causes.md docs/studies-causes.md; exit $$met
 	@$(out)/corner_accuracy
 	@echo "study: how large a fault must be to be seen, into docs/studies-faults.md"
 	@$(out)/study_faults 20 >build/study/faults.md; met=$$?; cp build/study/faults.md docs/studies-faults.md; exit $$met
+	@echo "study: what is wrong with rigs and rangefinders, and what is seen of it, into docs/studies-causes.md"
+	@$(out)/study_causes 100 >build/study/causes.md; met=$$?; cp build/study/causes.md docs/studies-causes.md; exit $$met
 
 format:
 	@tools/setup tidy

@@ -1,5 +1,6 @@
 #include "alidade/board/board_pose.h"
 
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -81,23 +82,54 @@ Rigid3 mirrored(const Rigid3& cam_from_board, const Eigen::Vector3d& middle_in_b
   return {rotation, middle_in_cam - rotation * middle_in_board};
 }
 
+/// The board square to the line of sight, in the same place and as far turned about it: where a small board's tilt is
+/// lost in noise, a homography can have any.
+Rigid3 squared_up(const Rigid3& cam_from_board, const Eigen::Vector3d& middle_in_board) {
+  const Eigen::Vector3d middle_in_cam = cam_from_board * middle_in_board;
+  const Eigen::Quaterniond turn =
+      rotation_between(cam_from_board.rotation * Eigen::Vector3d::UnitZ(), middle_in_cam.normalized());
+  const Eigen::Quaterniond rotation = (turn * cam_from_board.rotation).normalized();
+  return {rotation, middle_in_cam - rotation * middle_in_board};
+}
+
 struct Refined {
   Rigid3 cam_from_board;
   CornerResiduals residuals;
 };
 
+/// Second derivative of ½ |r|², by differences of its gradient g over a thousandth of σ; H its part by the slope of r.
+/// That part where a difference reaches beside what the lens sees.
+Matrix6 curvature(const Camera& camera, const Rigid3& cam_from_board, const Matrix6& H, const Vector6& g,
+                  const BoardView& view, std::span<const Eigen::Vector3d> points, std::optional<double> sigma_px) {
+  Matrix6 second;
+  for (int k = 0; k < 6; ++k) {
+    const double h = 1e-3 / std::sqrt(H(k, k));
+    const auto beside = corner_residuals(camera, cam_from_board.retract(h * Vector6::Unit(k)), view, points, sigma_px);
+    if (!beside) return H;
+    second.col(k) = (beside->J_pose.transpose() * beside->r - g) / h;
+  }
+  return 0.5 * (second + second.transpose());
+}
+
+/// Levenberg–Marquardt. Between two poses that look alike r bends as much as it slopes, and steps by the slope alone
+/// creep or leap about: from the tenth step on by the whole curvature (Newton).
 std::optional<Refined> refined(const Camera& camera, Rigid3 cam_from_board, const BoardView& view,
                                std::span<const Eigen::Vector3d> points, std::optional<double> sigma_px) {
   auto now = corner_residuals(camera, cam_from_board, view, points, sigma_px);
   if (!now) return std::nullopt;
   double damping = 1e-6, last2 = std::numeric_limits<double>::infinity();
-  constexpr int max_iterations = 50;  // quadratic from a homography: 3–5 are typical
+  constexpr int max_iterations = 100, by_slope = 10;  // quadratic from a homography: 3–5 are typical
   for (int i = 0; i < max_iterations; ++i) {
     const Matrix6 H = now->J_pose.transpose() * now->J_pose;
     const Vector6 g = now->J_pose.transpose() * now->r;
-    Matrix6 damped = H;
-    damped.diagonal() *= 1.0 + damping;
-    const Vector6 step = -solve_symmetric(damped, g);
+    Matrix6 damped = i < by_slope ? H : curvature(camera, cam_from_board, H, g, view, points, sigma_px);
+    damped.diagonal() += damping * H.diagonal();
+    const Eigen::LLT<Matrix6> llt(damped);
+    if (llt.info() != Eigen::Success) {  // bent the other way: not a valley yet
+      if (!damped.allFinite() || (damping = std::max(10.0 * damping, 1e-3)) > 1e12) break;
+      continue;
+    }
+    const Vector6 step = -llt.solve(g);
     if (!step.allFinite()) return std::nullopt;
     // A step of 10⁻⁶ σ changes nothing that could be measured.
     const double step2 = step.dot(H * step);
@@ -114,7 +146,7 @@ std::optional<Refined> refined(const Camera& camera, Rigid3 cam_from_board, cons
     }
     if (is_small) return Refined{cam_from_board, std::move(*now)};
   }
-  // Between two poses that look alike, steps become smaller but slowly: a hundredth of σ is as good.
+  // Steps that stay small, but not that small: a hundredth of σ is as good.
   constexpr double as_good2 = 1e-4;
   return last2 < as_good2 ? std::optional(Refined{cam_from_board, std::move(*now)}) : std::nullopt;
 }
@@ -177,6 +209,7 @@ std::vector<BoardPoseFit> fit_board_poses(const Camera& camera, const BoardView&
   middle.head<2>() = middle_and_size(view, points_in_board).first;
   std::vector<BoardPoseFit> fits;
   auto at = refined(camera, *start, view, points_in_board, sigma_px);
+  if (!at) at = refined(camera, squared_up(*start, middle), view, points_in_board, sigma_px);
   if (at) fits.push_back(fit_at(*at));
   at = refined(camera, mirrored(at ? at->cam_from_board : *start, middle), view, points_in_board, sigma_px);
   if (at) fits.push_back(fit_at(*at));

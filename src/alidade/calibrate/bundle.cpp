@@ -177,7 +177,8 @@ void follow_lens(const Eigen::MatrixXd& extra, BundleResult& result) {
   for (std::size_t k = 0; k < result.pose_cov.size(); ++k) {
     const Eigen::Matrix<double, 6, Eigen::Dynamic> gain =
         Eigen::LLT<Pose6>(eq.V[k]).solve(eq.coupling(k).topRows(extra.rows()).transpose());
-    result.pose_cov[k] += gain * extra * gain.transpose();
+    const Eigen::Matrix<double, 6, Eigen::Dynamic> by_extra = gain.lazyProduct(extra);
+    result.pose_cov[k] += by_extra.lazyProduct(gain.transpose());
   }
 }
 
@@ -196,10 +197,18 @@ BundleResult solve_bundle(const BundleProblem& problem, BundleState start, const
   for (; result.iterations < config.max_iterations && lambda < 1e12; ++result.iterations) {
     auto step = damped_step(problem, result.state, eq, lambda);
     // The step moves nothing by more than the tolerance (or 10⁻⁸ px): with it we are there.
-    if (step && lambda <= 1e-3 && step->decrease <= tolerance2 * eq.cost / dof + 1e-16 * dof) {
-      result.status = BundleResult::Status::converged;
-      result.state = std::move(step->state);
-      break;
+    const double small = tolerance2 * eq.cost / dof + 1e-16 * dof;
+    if (step && lambda <= 1e-3 && step->decrease <= small) {
+      // Damping shortens steps along a weak valley: the whole one says whether there is still a way to go.
+      auto whole = lambda > least_lambda ? damped_step(problem, result.state, eq, 0.0) : std::nullopt;
+      const bool goes_on =
+          whole && whole->decrease > small && linearize(problem, whole->state, trial) && trial.cost < eq.cost;
+      result.state = std::move(whole && (goes_on || whole->decrease <= small) ? whole->state : step->state);
+      if (!goes_on) result.status = BundleResult::Status::converged;
+      if (!goes_on) break;
+      std::swap(eq, trial);
+      lambda = 0.0;
+      continue;
     }
     if (!step || !linearize(problem, step->state, trial) || !(trial.cost <= eq.cost)) {
       lambda = std::max(10.0 * lambda, least_lambda);

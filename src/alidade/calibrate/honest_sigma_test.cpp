@@ -23,16 +23,17 @@ struct SigmaCoverage {
   }
 };
 
-SigmaCoverage coverage_of_sigma(double shared_px, int runs) {
+SigmaCoverage coverage_of_sigma(double shared_px, int runs, int photos = photos_of_a_set,
+                                const CalibrateConfig& config = {}) {
   const Camera camera = testing::sample_camera("brown");
   const Eigen::VectorXd truth = params(camera.lens);
   SigmaCoverage found;
   for (int run = 0; run < runs; ++run) {
     const auto seed = static_cast<std::uint64_t>(run + 1);
-    const BoardScene scene = testing::sample_scene(camera, photos_of_a_set, seed);
+    const BoardScene scene = testing::sample_scene(camera, photos, seed);
     std::vector<BoardView> views = simulate_views(scene, 0.1, seed + 10000);
     add_shared_errors(scene, shared_px, seed + 20000, views);
-    const CalibrateReport report = calibrate(testing::sample_board, views, testing::sample_size, {});
+    const CalibrateReport report = calibrate(testing::sample_board, views, testing::sample_size, config);
     if (report.status != CalibrateReport::Status::converged) continue;
     found.runs += 1.0;
     const Eigen::VectorXd error = params(report.camera.lens) - truth;
@@ -67,6 +68,29 @@ TEST(HonestSigma, CoversErrorsThatThePhotosCornersShare) {
   EXPECT_LT(found.inside_2, 0.98);
   EXPECT_LT(found.model_2, 0.75);  // what σ of single corners would cover
   EXPECT_LT(found.variation(), 0.25);
+}
+
+TEST(HonestSigma, CoversSharedErrorsOfFewPhotos) {
+  const SigmaCoverage found = coverage_of_sigma(0.1, 1000, 7);
+  ASSERT_EQ(found.runs, 1000.0);
+  EXPECT_GT(found.inside_2, 0.90);
+  EXPECT_LT(found.inside_2, 0.98);
+}
+
+// A board whose every point is free bends to the errors of few photos: their residuals say less of them.
+TEST(HonestSigma, CoversSharedErrorsOfFewPhotosWithAFreeBoard) {
+  const SigmaCoverage found = coverage_of_sigma(0.1, 300, 7, {.board_shape = BoardShape::free});
+  ASSERT_EQ(found.runs, 300.0);
+  EXPECT_GT(found.inside_2, 0.90);
+  EXPECT_LT(found.inside_2, 0.98);
+  EXPECT_LT(found.model_2, 0.75);
+}
+
+TEST(HonestSigma, CoversWhereTheModelIsTrueWithAFreeBoard) {
+  const SigmaCoverage found = coverage_of_sigma(0.0, 300, 7, {.board_shape = BoardShape::free});
+  ASSERT_EQ(found.runs, 300.0);
+  EXPECT_NEAR(found.inside_1, 0.683, 0.04);
+  EXPECT_NEAR(found.inside_2, 0.954, 0.02);
 }
 
 }  // namespace

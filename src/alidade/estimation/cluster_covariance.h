@@ -15,7 +15,10 @@ namespace ALIDADE_PUBLIC alidade {
 /// clusters' own eliminated), A and g = Σ Jᵀr the cluster's part of it and of the gradient at the optimum, r whitened.
 struct ClusterStep {
   Eigen::VectorXd step;    ///< H⁻¹ g, of the parameters asked for.
-  Eigen::MatrixXd spread;  ///< H⁻¹ A H⁻¹, of the same: what `step` would have for covariance by the model.
+  Eigen::MatrixXd spread;  ///< H⁻¹ A H⁻¹, of the same: what `step` would have for covariance were the truth fitted.
+  /// H⁻¹ A H⁻¹ A H⁻¹, of the same, over all shared parameters: by how much the fit to the cluster itself lessens that.
+  /// May be left out where all shared parameters are asked for.
+  Eigen::MatrixXd taken = {};
 };
 
 /// The step of a cluster where all shared parameters are asked for: `inverse` is H⁻¹.
@@ -28,7 +31,7 @@ struct ClusterCovariance {
   Eigen::VectorXd inflation;           ///< σ over the model's σ, one per parameter; 1 for a parameter that is held.
   Eigen::VectorXd degrees_of_freedom;  ///< Of each variance (Satterthwaite); infinite where it is the model's.
   double design_effect = 1.0;          ///< Variance over the model's, in the mean over all directions.
-  double shrinkage = 1.0;              ///< 0: the clusters' own scatter by direction; 1: the design effect in all.
+  double shrinkage = 1.0;              ///< λ: 0: the clusters' own scatter by direction; 1: the design effect in all.
   std::vector<double> z2;  ///< One per cluster: its squared score over what the model expects; 1 in the mean if true.
 
   static constexpr std::size_t least_clusters = 3;
@@ -41,15 +44,14 @@ struct ClusterCovariance {
 /// whitened residuals by their own degrees of freedom: s² H⁻¹ is the model's covariance. Parameters with a zero
 /// diagonal are held. Fewer than `least_clusters` clusters tell nothing: the model's covariance comes back.
 ///
-/// In parameters in which H⁻¹ = 1 a cluster has the share h = its spread of the information and the score step; by the
-/// model the score's covariance is s² h(1 − h). x = (1 − h)^(−1/2) step makes the scatter W = Σ x xᵀ/s² unbiased for 1
-/// (CR2); along directions in which a cluster contradicts the others by more than 3σ, (1 − h)⁻¹ step: what its deletion
-/// changes (CR3, the jackknife). W is noisy with few clusters: all of it but contradictions is shrunk towards c·1,
-/// c = tr W / tr 1, by as much as its own scatter asks for (Ledoit & Wolf). What exceeds 1 is added to the model's,
-/// widened by ν/(ν − 2), the variance of a t distribution of as many degrees of freedom, with which the 2σ interval
-/// holds for few clusters, too. Liang & Zeger, Biometrika 73, 1986; Bell & McCaffrey, Survey Methodology 28(2), 2002;
-/// Imbens & Kolesár, Rev. Econ. Stat. 98(4), 2016; Ledoit & Wolf, J. Multivariate Anal. 88, 2004.
-/// docs/maths/honest-sigma.md.
+/// In parameters in which H⁻¹ = 1 a cluster has the share h = C Cᵀ of the information and the step d; by the model the
+/// covariance of y = C⁻¹ d is s² (1 − m), m the leverage of the whole fit. x = C (1 − m)^(−1/2) y/s makes the scatter
+/// W = Σ x xᵀ unbiased for 1 (CR2); along directions in which a cluster contradicts the others beyond chance it is
+/// C (1 − m)⁻¹ y/s: what its deletion changes (CR3, the jackknife). What of W exceeds 1 is believed as far as the
+/// design effect c = tr W / tr 1 departs from 1 beyond chance, shrunk towards (c − 1)·1 by its degrees of freedom,
+/// added to the model's, and widened by ν/(ν − 2), the variance of a t distribution of as many degrees of freedom, with
+/// which the 2σ interval holds for few clusters, too. Liang & Zeger, Biometrika 73, 1986; Bell & McCaffrey, Survey
+/// Methodology 28(2), 2002; Imbens & Kolesár, Rev. Econ. Stat. 98(4), 2016. docs/maths/honest-sigma.md.
 [[nodiscard]] ClusterCovariance cluster_covariance(const Eigen::MatrixXd& inverse, double noise_variance,
                                                    std::span<const ClusterStep> clusters);
 

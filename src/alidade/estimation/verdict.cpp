@@ -28,6 +28,10 @@ Check assumed_check(const std::vector<Assumption>& assumed) {
   check.value = worst->moves;
   check.state = worst->moves <= check.limit ? State::good : State::care;
   const std::string has_none = worst->name + " is given without σ";
+  if (!(worst->moves > 0.0)) {
+    check.text = has_none + ", but moves nothing of the answer";
+    return check;
+  }
   const std::string effect = "an error of " + text_of(worst->ordinary, 2) + " would move " + worst->moved + " by " +
                              text_of(worst->moves, 2) + "σ";
   check.text = has_none + ": " + effect;

@@ -7,6 +7,7 @@
 #include "alidade/calibrate/port.h"
 #include "alidade/geometry/so3.h"
 #include "alidade/io/camera_json.h"
+#include "alidade/io/sigma_values.h"
 
 namespace alidade {
 namespace {
@@ -215,21 +216,14 @@ void fill_grids(const CalibrationStudy& study, ResultDocument& document) {
   document.grids.push_back(std::move(halves));
 }
 
-/// How the stated σ came about: by how much the photos' scatter raised the model's, and how sure that is.
-JsonValue sigma_values(const CalibrateReport& report) {
-  JsonValue values = JsonValue::object(), inflation = JsonValue::object(), dof = JsonValue::object();
+JsonValue sigma_of_photos(const CalibrateReport& report) {
+  std::vector<std::pair<std::string, Eigen::Index>> told;
   const auto names = param_names(report.camera.lens);
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    if (!(report.model_cov(k, k) > 0.0)) continue;
-    inflation[names[i]] = report.clusters.inflation[k];
-    dof[names[i]] = report.clusters.degrees_of_freedom[k];
+    if (report.model_cov(k, k) > 0.0) told.emplace_back(names[i], k);
   }
-  values["design_effect"] = report.clusters.design_effect;
-  values["shrinkage"] = report.clusters.shrinkage;
-  values["inflation"] = std::move(inflation);
-  values["degrees_of_freedom"] = std::move(dof);
-  return values;
+  return sigma_values(told, report.clusters);
 }
 
 /// How a brown lens would do in the place of a flat port.
@@ -259,7 +253,7 @@ void fill_estimate(const Board& board, const Calibration& calibration, ResultDoc
   Camera by_single_corners = report.camera;
   by_single_corners.cov = report.model_cov;
   document.stddev_model["camera"] = camera_stddev(by_single_corners);
-  document.estimate["sigma"] = sigma_values(report);
+  document.estimate["sigma"] = sigma_of_photos(report);
   std::vector<Eigen::Index> free;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);

@@ -9,6 +9,7 @@
 #include "alidade/io/beam_file.h"
 #include "alidade/io/camera_file.h"
 #include "alidade/io/number_list.h"
+#include "alidade/io/sigma_values.h"
 
 namespace alidade {
 namespace {
@@ -205,22 +206,15 @@ void put_sigmas(const Beam& beam, JsonValue& stddev) {
   stddev["scale"] = std::sqrt(cov(6, 6));
 }
 
-/// How the stated σ came about: by how much the shots' scatter raised the model's, and how sure that is.
-JsonValue sigma_values(const RangefinderReport& report) {
+JsonValue sigma_of_shots(const RangefinderReport& report) {
   static constexpr std::array<const char*, num_beam_params> names{"origin_x_m",  "origin_y_m",  "origin_z_m",
                                                                   "direction_u", "direction_v", "scale"};
-  JsonValue values = JsonValue::object(), inflation = JsonValue::object(), dof = JsonValue::object();
+  std::vector<std::pair<std::string, Eigen::Index>> told;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    if (!(report.cov_model(k, k) > 0.0) || k >= report.clusters.inflation.size()) continue;
-    inflation[names[i]] = report.clusters.inflation[k];
-    dof[names[i]] = report.clusters.degrees_of_freedom[k];
+    if (report.cov_model(k, k) > 0.0 && k < report.clusters.inflation.size()) told.emplace_back(names[i], k);
   }
-  values["design_effect"] = report.clusters.design_effect;
-  values["shrinkage"] = report.clusters.shrinkage;
-  values["inflation"] = std::move(inflation);
-  values["degrees_of_freedom"] = std::move(dof);
-  return values;
+  return sigma_values(told, report.clusters);
 }
 
 void fill_beam(const RangefinderReport& report, ResultDocument& document) {
@@ -270,7 +264,7 @@ void fill_rangefinder(std::span<const Shot> shots, const RangefinderReport& repo
   estimate["normal_spread"] = report.bound.normal_spread;
   estimate["offset_m"] = report.bound.offset_m;
   if (has_beam) document.assumed = rangefinder_assumptions(report);
-  if (has_beam) estimate["sigma"] = sigma_values(report);
+  if (has_beam) estimate["sigma"] = sigma_of_shots(report);
   estimate["noise"]["sigma_spot_px"] = report.sigma_spot_px;
   estimate["noise"]["sigma_corner_px"] = report.sigma_corner_px;
   estimate["noise"]["sigma_range_m"] = report.beam.noise.sigma_m;

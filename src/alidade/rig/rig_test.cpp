@@ -13,6 +13,7 @@
 #include "alidade/io/views_file.h"
 #include "alidade/simulate/rig.h"
 #include "alidade/testing/reference_case.h"
+#include "alidade/testing/rig_sample.h"
 
 namespace alidade {
 namespace {
@@ -28,26 +29,9 @@ std::vector<Eigen::Vector3d> centred(const Board& board) {
   return points;
 }
 
-std::map<int, Camera> cameras_of(const Rig& rig) {
-  std::map<int, Camera> cameras;
-  for (const RigHead& rig_head : rig.heads) cameras[rig_head.head.id] = rig_head.camera;
-  return cameras;
-}
-
 struct Errors {
   double rotation_rad = 0.0, translation_m = 0.0;  ///< RMS.
 };
-
-Eigen::Matrix<double, 6, 1> relative_error(const Rig& rig, const Rig& truth, const Eigen::Vector2d& first,
-                                           const Eigen::Vector2d& second) {
-  const auto cam_from_cam = [&](const Rig& of) {
-    return cam_from_world(of.heads[0].head, first) * world_from_cam(of.heads[1].head, second);
-  };
-  const Rigid3 a = cam_from_cam(rig), b = cam_from_cam(truth);
-  Eigen::Matrix<double, 6, 1> xi;
-  xi << b.rotation.conjugate() * (a.translation - b.translation), log_so3(b.rotation.conjugate() * a.rotation);
-  return xi;
-}
 
 /// Over a grid of both heads' angles.
 Errors errors_of(const Rig& rig, const Rig& truth) {
@@ -57,7 +41,7 @@ Errors errors_of(const Rig& rig, const Rig& truth) {
     for (const double tilt1 : {-0.2, 0.4}) {
       for (const double pan2 : {-0.6, 0.0, 0.6}) {
         for (const double tilt2 : {-0.2, 0.4}) {
-          const auto xi = relative_error(rig, truth, {pan1, tilt1}, {pan2, tilt2});
+          const auto xi = testing::error_between(rig, truth, {pan1, tilt1}, {pan2, tilt2});
           sum.translation_m += xi.head<3>().squaredNorm();
           sum.rotation_rad += xi.tail<3>().squaredNorm();
           ++num;
@@ -69,7 +53,7 @@ Errors errors_of(const Rig& rig, const Rig& truth) {
 }
 
 RigReport solved(const RigScene& scene, const std::vector<HeadView>& views, const RigConfig& config = {}) {
-  return calibrate_rig(views, points_in_board(scene.board), cameras_of(scene.rig), config);
+  return calibrate_rig(views, points_in_board(scene.board), testing::cameras_of(scene.rig), config);
 }
 
 TEST(Rig, TheReferenceCaseIsFoundAgain) {
@@ -146,7 +130,7 @@ Trials trials(int runs, const RigSceneConfig& scene_config, const RigConfig& con
     sum.dropped += report.views_dropped;
     sum.sigma_encoder_rad += report.sigma_encoder_rad / runs;
     const Eigen::Vector2d first(0.3, 0.2), second(-0.4, 0.1);
-    const auto xi = relative_error(report.rig, scene.rig, first, second);
+    const auto xi = testing::error_between(report.rig, scene.rig, first, second);
     sum.nees += squared_mahalanobis(xi, relative_covariance(report.rig, 0, first, 1, second)) / runs;
   }
   return sum;
@@ -190,7 +174,7 @@ TEST(Rig, AnyMountingIsFoundWithoutAGuess) {
     const RigReport report = solved(scene, simulate_head_views(scene, {}, 3).views);
     ASSERT_EQ(report.status, Status::converged) << turn.transpose();
     const Eigen::Vector2d first(0.3, 0.2), second(-0.4, 0.1);
-    const auto xi = relative_error(report.rig, scene.rig, first, second);
+    const auto xi = testing::error_between(report.rig, scene.rig, first, second);
     EXPECT_LT(squared_mahalanobis(xi, relative_covariance(report.rig, 0, first, 1, second)), 35.0);  // χ²₆, 4·10⁻⁶
     ++num_checked;
   }
@@ -280,7 +264,7 @@ TEST(Rig, WhatCannotBeToldIsRefusedByName) {
       config.tilts_rad = tilts;
       config.shared = shared;
       const RigScene scene = draw_rig_scene(config, seed);
-      expect_refusal(scene, simulate_head_views(scene, {}, seed).views, words, cameras_of(scene.rig));
+      expect_refusal(scene, simulate_head_views(scene, {}, seed).views, words, testing::cameras_of(scene.rig));
     }
   };
   const std::vector<double> pans{-0.5, -0.25, 0.0, 0.25, 0.5}, tilts{-0.2, 0.0, 0.2, 0.4};
@@ -298,7 +282,7 @@ TEST(Rig, DegreesAndSwappedCamerasAreNamed) {
     config.nominal[1].camera.lens = with_params(config.nominal[1].camera.lens, longer);
     const RigScene scene = draw_rig_scene(config, seed);
     std::vector<HeadView> views = simulate_head_views(scene, {}, seed).views;
-    std::map<int, Camera> cameras = cameras_of(scene.rig);
+    std::map<int, Camera> cameras = testing::cameras_of(scene.rig);
     std::swap(cameras[1], cameras[2]);
     expect_refusal(scene, views, "heads swapped", cameras);
     std::swap(cameras[1], cameras[2]);
@@ -311,8 +295,8 @@ TEST(Rig, DegreesAndSwappedCamerasAreNamed) {
 TEST(Rig, TooFewViewsAreRefused) {
   const RigScene scene = draw_rig_scene({}, 1);
   std::vector<HeadView> views = simulate_head_views(scene, {}, 1).views;
-  expect_refusal(scene, {views.begin(), views.begin() + 2}, "three are the least", cameras_of(scene.rig));
-  expect_refusal(scene, {}, "no view", cameras_of(scene.rig));
+  expect_refusal(scene, {views.begin(), views.begin() + 2}, "three are the least", testing::cameras_of(scene.rig));
+  expect_refusal(scene, {}, "no view", testing::cameras_of(scene.rig));
   expect_refusal(scene, views, "no view", {});
 }
 
@@ -375,7 +359,7 @@ TEST(Rig, RandomHandfulsAreRefusedOrCovered) {
       ++num_refused;
     } else if (report.rig.heads.size() == 2) {
       const Eigen::Vector2d first = report.covers[0].lowest_rad, second = report.covers[1].highest_rad;
-      const auto xi = relative_error(report.rig, scene.rig, first, second);
+      const auto xi = testing::error_between(report.rig, scene.rig, first, second);
       const double own = squared_mahalanobis(xi, relative_covariance(report.rig, 0, first, 1, second));
       EXPECT_LT(own, 42.7) << seed;  // χ²₆ at 10⁻⁷
       nees += own;

@@ -237,7 +237,7 @@ class Localize(Audit):
                     self.assertNotEqual(result["verdict"]["state"], "good", result["verdict"]["sentence"])
 
     def test_no_path_is_silently_wrong(self):
-        for name, options in (("base_brown", []), ("base_fisheye", []), ("pure_rotation_target", []),
+        for name, options in (("base_brown", []), ("base_fisheye", []),
                               ("lens_f_5pc_online", []), ("lens_f_5pc_online", ["--calibrate-online"])):
             with self.subTest(name, options=" ".join(options)):
                 result = self.localize(name, *options)

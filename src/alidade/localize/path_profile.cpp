@@ -67,7 +67,7 @@ namespace {
 
 /// Whether the places of a path differ by little more than they are uncertain.
 bool is_from_one_place(const SmoothedPath& path) {
-  constexpr double apart = 5.0;
+  constexpr double apart = 12.0;
   const double num = static_cast<double>(path.cov.size());
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const Rigid3& pose : path.world_from_cam) middle += pose.translation / num;

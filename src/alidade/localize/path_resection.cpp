@@ -23,8 +23,8 @@ std::optional<PlacedView> placed_view(const Camera& camera, const Rigid3& world_
   return PlacedView{sight.px - view->px, view->J_px_pose, sight.sigma_px * sight.sigma_px + of_place};
 }
 
-Resection judged(const Camera& camera, std::span<const PlacedSight> sights, const Rigid3& world_from_cam, double gate) {
-  Resection resection{world_from_cam, 0.0, 0, {}};
+CameraResection judged(const Camera& camera, std::span<const PlacedSight> sights, const Rigid3& world_from_cam, double gate) {
+  CameraResection resection{world_from_cam, 0.0, 0, {}};
   for (const PlacedSight& sight : sights) {
     const auto view = placed_view(camera, world_from_cam, sight);
     const double chi2 = view ? view->residual_px.squaredNorm() / view->variance_px2 : gate;
@@ -59,18 +59,18 @@ bool stepped(const Camera& camera, std::span<const PlacedSight> sights, double w
 
 }  // namespace
 
-std::optional<Resection> resection(const Camera& camera, std::span<const PlacedSight> sights,
+std::optional<CameraResection> resection(const Camera& camera, std::span<const PlacedSight> sights,
                                    std::span<const Rigid3> begin_at, double gate) {
   constexpr std::size_t least_sights = 3;
   if (sights.size() < least_sights) return std::nullopt;
-  std::optional<Resection> best;
+  std::optional<CameraResection> best;
   for (const Rigid3& begin : begin_at) {
     Rigid3 world_from_cam = begin;
     constexpr double widest_px = 64.0, narrowest_px = 1.0;
     for (double wide_px = widest_px; wide_px >= narrowest_px; wide_px *= 0.6)
       if (!stepped(camera, sights, wide_px, world_from_cam)) break;
     for (const Rigid3& there : {begin, world_from_cam}) {
-      Resection now = judged(camera, sights, there, gate);
+      CameraResection now = judged(camera, sights, there, gate);
       if (!best || now.cost < best->cost) best = std::move(now);
     }
   }

@@ -17,7 +17,7 @@ struct PlacedSight {
 };
 
 /// Where a camera is by sights of places, some of which may be mismatched.
-struct Resection {
+struct CameraResection {
   Rigid3 world_from_cam;
   double cost = 0.0;  ///< Squares over σ², of each sight at most the gate.
   std::size_t num_fit = 0;
@@ -26,7 +26,7 @@ struct Resection {
 
 /// From each of the poses to begin at, weights that fall with a residual (Geman & McClure 1985), wide at first, then
 /// narrower; the one that explains most. None: fewer than three sights, or nothing to begin at.
-[[nodiscard]] std::optional<Resection> resection(const Camera& camera, std::span<const PlacedSight> sights,
+[[nodiscard]] std::optional<CameraResection> resection(const Camera& camera, std::span<const PlacedSight> sights,
                                                  std::span<const Rigid3> begin_at, double gate);
 
 }  // namespace alidade

@@ -34,16 +34,22 @@ struct ObserveArgs {
 
 void estimate_word(const std::string& name, ObserveConfig& config) {
   static const std::map<std::string, bool ObserveNuisances::*> words{
-      {"k1", &ObserveNuisances::k1},         {"k2", &ObserveNuisances::k2},         {"k3", &ObserveNuisances::k3},
-      {"p1", &ObserveNuisances::tangential}, {"p2", &ObserveNuisances::tangential}, {"mount", &ObserveNuisances::mount},
-      {"delay", &ObserveNuisances::delay},   {"lever", &ObserveNuisances::lever}};
+      {"k1", &ObserveNuisances::k1},           {"k2", &ObserveNuisances::k2},
+      {"k3", &ObserveNuisances::k3},           {"p1", &ObserveNuisances::tangential},
+      {"p2", &ObserveNuisances::tangential},   {"mount", &ObserveNuisances::mount},
+      {"delay", &ObserveNuisances::delay},     {"lever", &ObserveNuisances::lever},
+      {"shutter", &ObserveNuisances::shutter}, {"focal-drift", &ObserveNuisances::drift}};
   if (name == "none") return;
   if (name == "auto") {
     config.estimate_auto = true;
   } else if (const auto word = words.find(name); word != words.end()) {
     config.estimate.*(word->second) = true;
+  } else if (const auto causes = rotation_causes_of(name); !causes.empty()) {
+    config.estimate_errors.insert(config.estimate_errors.end(), causes.begin(), causes.end());
   } else {
-    throw UsageError("--estimate: '" + name + "' is not auto, none, k1, k2, k3, p1, p2, mount, delay or lever");
+    throw UsageError("--estimate: '" + name +
+                     "' is not auto, none, k1, k2, k3, p1, p2, mount, delay, lever, shutter, focal-drift, scale, "
+                     "backlash, curve, drift or bias");
   }
 }
 
@@ -90,7 +96,7 @@ ObserveConfig config_from(const ObserveArgs& args, const std::optional<Camera>& 
   }
   if (!args.lever.empty()) config.lever_m = Eigen::Vector3d(args.lever.data());
   const bool is_regression = config.method == ObserveMethod::flow || config.method == ObserveMethod::fang2011;
-  const bool asks = CommonLayout(config.estimate).size > 4 || config.estimate_auto;
+  const bool asks = CommonLayout(config.estimate).size > 4 || config.estimate_auto || !config.estimate_errors.empty();
   config.estimate_auto = config.estimate_auto || (args.estimate.empty() && !is_regression);
   if (is_regression && (asks || config.rotation != RotationKnowledge::known)) {
     throw UsageError("--method " + args.method + " knows neither --estimate nor a rotation that is not known");
@@ -164,6 +170,9 @@ class RowView {
 /// Rows from standard input as they come, each answered at once with a row of intrinsics.csv; the log, at its end.
 RotationLog follow_input(const ObserveArgs& args, const ObserveConfig& config, const std::optional<Camera>& camera,
                          LiveRun& live, Run& run) {
+  if (!config.estimate_errors.empty()) {
+    throw UsageError("observe -: errors of the rotation are told from a whole log: keep the rows in a file");
+  }
   if (config.width_px <= 0) throw UsageError("observe -: say --size WxH or --camera FILE, the first rows do not tell");
   RowView view(config, live);
   StandardInput input;  // Ctrl-C ends waiting for a row
@@ -261,6 +270,24 @@ void check_sources(ObserveArgs& args) {
   if (args.video.empty() && args.rate_hz > 0.0) throw UsageError("--rate is for --video");
 }
 
+/// Backlash of rates, a scale that is told to be exact: not to be left out silently.
+void check_errors(const ObserveArgs& args, const ObserveConfig& config, const RotationLog& log) {
+  for (const std::string& word : args.estimate) {
+    ObserveConfig one = config;
+    one.estimate_errors = rotation_causes_of(word);
+    if (one.estimate_errors.empty()) continue;
+    if (config.rotation != RotationKnowledge::known) {
+      throw UsageError("--estimate " + word + ": is for --rotation known");
+    }
+    if (!estimated_errors(log, one).empty()) continue;
+    one.sigma_scale = 1.0;
+    const bool is_told = !estimated_errors(log, one).empty();
+    throw UsageError("--estimate " + word +
+                     (is_told ? ": the scale is told to be exact: give --sigma-encoder-scale"
+                              : ": the rotation of this log has no such error"));
+  }
+}
+
 ExitCode observe_log(ObserveArgs args, Run& run) {
   check_sources(args);
   std::optional<Camera> camera;
@@ -277,6 +304,7 @@ ExitCode observe_log(ObserveArgs args, Run& run) {
     throw InputError(args.log + ": no rotation: omega_x,omega_y or pan,tilt or qw,qx,qy,qz, or say --rotation free");
   }
   if (config.rotation == RotationKnowledge::free) log.source = RotationSource::none;
+  check_errors(args, config, log);
   // A lens that is to be estimated is seen as it is.
   const bool lens_is_estimated =
       config.estimate.k1 || config.estimate.k2 || config.estimate.k3 || config.estimate.tangential;
@@ -325,7 +353,7 @@ void add_options(CLI::App& command, ObserveArgs& args) {
   command
       .add_option("--estimate", args.estimate,
                   "Estimated as well: auto (default: what the residuals ask for), none, or of k1, k2, k3, p1, p2, "
-                  "mount, delay, lever")
+                  "mount, delay, lever, shutter, focal-drift, and of the rotation scale, backlash, curve, drift, bias")
       ->delimiter(',');
   command.add_option("--camera", args.camera, "Where to start, and the lens' distortion")->type_name("FILE");
   command.add_option("--start", args.start, "Where to start: fx,fy,cx,cy [px]; without it several are tried")
@@ -337,6 +365,7 @@ void add_options(CLI::App& command, ObserveArgs& args) {
       ->check(CLI::IsMember({"fast", "quiet", "kalman"}))
       ->capture_default_str();
   command.add_flag("--square-pixels", args.config.square_pixels, "fx = fy");
+  command.add_flag("--no-zoom", args.config.no_zoom, "The camera does not zoom: what seems a zoom is something else");
   command.add_flag("--fix-centre", args.config.fixed_centre, "cx, cy: the start's, or the picture's middle");
   command.add_option("--lever", args.lever, "Camera centre from the centre of rotation, x,y,z in the camera frame [m]")
       ->delimiter(',')

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <opencv2/core.hpp>
@@ -28,9 +29,12 @@ namespace {
 struct SimulateRotationArgs {
   std::string size = "780x582", source = "rate", motion = "sway", zoom = "none";
   std::vector<double> k{710.0, 700.0, 390.0, 290.0}, lever, depth;
-  double k1 = 0.0, tilt_deg = 0.0, delay_s = 0.0;
+  double k1 = 0.0, k2 = 0.0, k3 = 0.0, p1 = 0.0, p2 = 0.0, tilt_deg = 0.0, delay_s = 0.0, shutter_s = 0.0;
+  double drift_per_s = 0.0, backlash_deg = 0.0;
+  std::vector<double> mount_deg, bias, signs, zero_drift, curve_deg;
+  RotationFaults faults;
   int points = 4;
-  bool video = false;
+  bool video = false, with_range = true;
   std::string photo;
   double photo_deg = 90.0;
   int photos = 0;
@@ -59,7 +63,13 @@ std::function<Eigen::Vector3d(double)> motion_of(const SimulateRotationArgs& arg
 }
 
 RotatingIntrinsics intrinsics_at(const SimulateRotationArgs& args, double t_s) {
-  RotatingIntrinsics now{args.k[0], args.k[1], args.k[2], args.k[3], args.k1};
+  RotatingIntrinsics now{args.k[0], args.k[1], args.k[2], args.k[3], args.k1, args.k2, args.k3, args.p1, args.p2};
+  now.fx *= 1.0 + args.drift_per_s * t_s;
+  now.fy *= 1.0 + args.drift_per_s * t_s;
+  if (args.zoom == "sway") {
+    now.fx *= 1.0 + 0.15 * std::sin(1.3 * t_s);
+    now.fy *= 1.0 + 0.15 * std::sin(1.3 * t_s);
+  }
   if (args.zoom == "step" && t_s >= 6.0) {
     now.fx *= 1.1;
     now.fy *= 1.1;
@@ -82,12 +92,15 @@ std::string truth_yaml(const SimulateRotationArgs& args, const Eigen::Vector4d& 
   Camera camera;
   camera.width_px = scene.width_px;
   camera.height_px = scene.height_px;
-  camera.lens = *make_lens(args.k1 != 0.0 ? "brown" : "pinhole");
+  const std::map<std::string, double> bends{
+      {"k1", args.k1}, {"k2", args.k2}, {"k3", args.k3}, {"p1", args.p1}, {"p2", args.p2}};
+  const bool is_bent = std::any_of(bends.begin(), bends.end(), [](const auto& each) { return each.second != 0.0; });
+  camera.lens = *make_lens(is_bent ? "brown" : "pinhole");
   Eigen::VectorXd values = params(camera.lens);
   values.head<4>() = k;
   const auto names = param_names(camera.lens);
   for (std::size_t i = 0; i < names.size(); ++i) {
-    if (names[i] == "k1") values[static_cast<Eigen::Index>(i)] = args.k1;
+    if (bends.contains(names[i])) values[static_cast<Eigen::Index>(i)] = bends.at(names[i]);
   }
   camera.lens = with_params(camera.lens, values);
   camera.source = "alidade simulate rotation: true at the end";
@@ -170,6 +183,19 @@ ExitCode simulate_photos(const SimulateRotationArgs& args, const RotationScene& 
   return run.finish(verdict);
 }
 
+RotationFaults faults_of(const SimulateRotationArgs& args) {
+  constexpr double degree = std::numbers::pi / 180.0;
+  RotationFaults faults = args.faults;
+  faults.backlash_rad = args.backlash_deg * degree;
+  if (!args.curve_deg.empty()) {
+    faults.once_a_turn_rad = args.curve_deg[0] * degree;
+    faults.twice_a_turn_rad = args.curve_deg[1] * degree;
+  }
+  if (!args.zero_drift.empty()) faults.zero_drift_rad_per_s = Eigen::Vector2d(args.zero_drift.data());
+  if (!args.signs.empty()) faults.signs = Eigen::Vector2d(args.signs.data());
+  return faults;
+}
+
 ExitCode simulate_rotation_log(const SimulateRotationArgs& args, Run& run) {
   RotationScene scene;
   std::tie(scene.width_px, scene.height_px) = picture_size(args.size);
@@ -178,6 +204,8 @@ ExitCode simulate_rotation_log(const SimulateRotationArgs& args, Run& run) {
   scene.intrinsics = [&args](double t_s) { return intrinsics_at(args, t_s); };
   scene.motion = motion_of(args);
   scene.delay_s = args.delay_s;
+  scene.shutter_s = args.shutter_s;
+  if (!args.mount_deg.empty()) scene.mount_rad = Eigen::Vector3d(args.mount_deg.data()) * std::numbers::pi / 180.0;
   if (!args.lever.empty()) scene.lever_arm_m = Eigen::Vector3d(args.lever.data());
   if (!args.depth.empty()) {
     Draws draws(run.options.seed + 1);
@@ -185,7 +213,8 @@ ExitCode simulate_rotation_log(const SimulateRotationArgs& args, Run& run) {
   }
   RotationLogConfig config = args.config;
   config.source = source_of(args.source);
-  config.with_range = !args.depth.empty();
+  config.with_range = !args.depth.empty() && args.with_range;
+  if (!args.bias.empty()) config.rate_bias_rad_per_s = Eigen::Vector3d(args.bias.data());
   if (args.photos > 0) {
     if (args.video) throw UsageError("--photos and --video: one of them");
     return simulate_photos(args, scene, run);
@@ -197,7 +226,12 @@ ExitCode simulate_rotation_log(const SimulateRotationArgs& args, Run& run) {
     if (!args.depth.empty() || !args.lever.empty()) throw UsageError("--video: its world is far away, without --depth");
     return simulate_video(args, scene, config, run);
   }
-  const RotationLog log = simulate_rotation(scene, config, run.options.seed);
+  RotationLog log = simulate_rotation(scene, config, run.options.seed);
+  const RotationFaults faults = faults_of(args);
+  if (faults.are_of_rotation() && log.source != RotationSource::head) {
+    throw UsageError("errors of the angles are of a head's: --source head");
+  }
+  add_faults(faults, scene.width_px, scene.height_px, run.options.seed, log);
   run.add_file("log.csv", rotation_log_csv(log));
   run.add_file("truth_camera.yaml", truth_yaml(args, Eigen::Vector4d(log.truth.back().data()), scene));
   run.document.counts.given = run.document.counts.used = log.rows.size();
@@ -205,6 +239,33 @@ ExitCode simulate_rotation_log(const SimulateRotationArgs& args, Run& run) {
   verdict.sentence = fmt::format("{} rows of {} points with known truth", log.rows.size(), args.points);
   run.say(fmt::format("{} in {}", verdict.sentence, (run.options.out / "log.csv").string()));
   return run.finish(verdict);
+}
+
+/// What a log may have that nobody told.
+void add_fault_options(CLI::App& command, SimulateRotationArgs& args) {
+  const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
+    command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
+  };
+  const auto numbers = [&](const char* name, std::vector<double>& values, int count, const char* help) {
+    command.add_option(name, values, help)->delimiter(',')->expected(count)->check(finite_number());
+  };
+  RotationFaults& faults = args.faults;
+  number("--encoder-scale", faults.angle_scale, "Angles as measured over the true ones", 0.1, 10.0);
+  number("--backlash-deg", args.backlash_deg, "Play between the encoders and the camera [°]", 0.0, 10.0);
+  numbers("--curve-deg", args.curve_deg, 2, "Amplitudes of the encoders' error once and twice a turn [°]");
+  numbers("--zero-drift", args.zero_drift, 2, "Of the zeros of pan, tilt [rad/s]");
+  numbers("--signs", args.signs, 2, "1 or -1: how pan and tilt count");
+  command.add_flag("--swap-axes", faults.swaps_axes, "Pan and tilt are exchanged");
+  numbers("--bias", args.bias, 3, "Of the rates x,y,z [rad/s]");
+  numbers("--mount-deg", args.mount_deg, 3, "The camera on its mount: rotation vector x,y,z [°]");
+  number("--line-time", args.shutter_s, "Rolling shutter: last row after the first [s]", -0.2, 0.2);
+  number("--focal-drift", args.drift_per_s, "Growth of fx and fy a second, as a share", -0.1, 0.1);
+  number("--wrong", faults.wrong_share, "Share of pixels that are anywhere", 0.0, 0.95);
+  number("--swapped", faults.swapped_share, "Share of pixels that are another point's", 0.0, 0.95);
+  number("--moving", faults.moving_share, "Share of points that move", 0.0, 1.0);
+  number("--lasting-px", faults.noise_px, "Further noise of each track, which lasts [px]", 0.0, 100.0);
+  number("--lasting-s", faults.noise_lasts_s, "How long it lasts [s]", 0.0, 1000.0);
+  command.add_flag("!--no-range", args.with_range, "With --depth: without range_m");
 }
 
 void add_options(CLI::App& command, SimulateRotationArgs& args) {
@@ -217,7 +278,8 @@ void add_options(CLI::App& command, SimulateRotationArgs& args) {
   word("--source", args.source, "How the rotation is measured: rate, head or attitude", {"rate", "head", "attitude"});
   word("--motion", args.motion, "sway (the paper's, eq. 27), pan, tilt, roll or still",
        {"sway", "pan", "tilt", "roll", "still"});
-  word("--zoom", args.zoom, "none, ramp (eq. 29) or step (+10 % at 6 s)", {"none", "ramp", "step"});
+  word("--zoom", args.zoom, "none, ramp (eq. 29), step (+10 % at 6 s) or sway (±15 %, never at rest)",
+       {"none", "ramp", "step", "sway"});
   command.add_option("--points", args.points, "How many points")->check(CLI::Range(1, 5000))->capture_default_str();
   command.add_option("--size", args.size, "Picture")->type_name("WxH")->capture_default_str();
   command.add_option("--intrinsics", args.k, "True fx,fy,cx,cy [px]")
@@ -248,6 +310,11 @@ void add_options(CLI::App& command, SimulateRotationArgs& args) {
   number("--noise", args.panorama.noise, "Grey noise of the frames, of 255", 0.0, 100.0);
   number("--blur", args.panorama.blur_px, "Optical blur of the frames [px]", 0.0, 20.0);
   number("--k1", args.k1, "True radial distortion", -0.4, 0.4);
+  number("--k2", args.k2, "True lens: k2", -0.4, 0.4);
+  number("--k3", args.k3, "True lens: k3", -0.4, 0.4);
+  number("--p1", args.p1, "True lens: p1", -0.05, 0.05);
+  number("--p2", args.p2, "True lens: p2", -0.05, 0.05);
+  add_fault_options(command, args);
   number("--tilt-deg", args.tilt_deg, "Mean tilt of a head", -80.0, 80.0);
   number("--delay", args.delay_s, "Pixels are so much later than the rotation [s]", -0.5, 0.5);
   number("--duration", args.config.duration_s, "Length of the log [s]", 0.1, 100000.0);

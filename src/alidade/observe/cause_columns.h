@@ -13,6 +13,7 @@ class CauseColumns {
   };
   struct Column {
     std::string member, unit;
+    double ordinary = 1.0;  ///< σ of what there ordinarily is of it.
   };
 
   CauseColumns(const RotationLog& log, const Adjustment& reference, const CauseConfig& config);
@@ -27,7 +28,7 @@ class CauseColumns {
   [[nodiscard]] bool at(const BundleObservation& seen, RotationPrediction& p, Eigen::Ref<Eigen::MatrixXd> by_causes);
 
  private:
-  void add(const std::string& group, const std::string& member, const std::string& unit = "");
+  void add(const std::string& group, const std::string& member, double ordinary, const std::string& unit = "");
   void add_lens();
   void add_lever();
   void fill_lens(const Eigen::Vector3d& in_cam, Eigen::Ref<Eigen::MatrixXd> out) const;
@@ -44,6 +45,7 @@ class CauseColumns {
       first_lever_ = -1;
   std::optional<RotationView> view_;
   int frame_ = 0;
+  double frame_time_s_ = 0.0;
   Eigen::Matrix3d cam_from_start_, mount_from_cam_;
   RotationPrediction wide_prediction_;
 };

@@ -71,7 +71,7 @@ using PixelOf = std::function<Eigen::Vector2d(const BundleObservation&, double a
 
 void expect_derivative(const Turning& turning, const std::string& cause, const std::string& member, const PixelOf& of,
                        double tolerance) {
-  CauseColumns columns(turning.log, turning.reference, {{}, gap_s, 1.5});
+  CauseColumns columns(turning.log, turning.reference, {{}, gap_s, 1.5, {}});
   const int column = column_of(columns, cause, member);
   RotationPrediction p;
   Eigen::MatrixXd by_causes(2, columns.size());

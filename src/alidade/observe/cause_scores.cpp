@@ -71,7 +71,7 @@ class Linearisation {
     blocks_.assign(num_blocks, {VectorXd::Zero(size), MatrixXd::Zero(size, size)});
     const auto& frames = reference_.bundle.frames;
     const double from_s = frames.front().t_s, block_s = (frames.back().t_s - from_s) / num_blocks;
-    seen_ = seen_within(block_s, residual_correlation_s(reference_));
+    seen_ = seen_within(block_s, lasting_errors(reference_).seconds);
     MatrixXd J(2, size);
     visit([&](std::size_t i, const BundleObservation& seen, const MatrixXd& by_causes) {
       const auto point = static_cast<std::size_t>(seen.point);
@@ -92,6 +92,7 @@ class Linearisation {
       all_.information += block.information;
     }
     all_.information.topLeftCorner(n_, n_) += reference_.solution.prior_information / every_;
+    all_.gradient.head(n_) += reference_.solution.prior_gradient / every_;
     inverse_nn_ = inverse_symmetric(all_.information.topLeftCorner(n_, n_));
   }
 
@@ -143,14 +144,23 @@ CauseScore Linearisation::score_of(const CauseColumns::Group& group) const {
   const double effect = std::max(1.0, (S_inverse * scatter).trace() / rank * num_blocks / (num_blocks - 1.0) / seen_);
   CauseScore result{.name = group.name, .shift = step.head(n_)};
   double chi2 = -s.dot(value) / effect;
+  const double explained = chi2;
   if (effect > estimated_effect) {
     // A design effect told by few blocks is unsure itself: of Hotelling's statistic, the χ² that is as rare.
     constexpr double dof = num_blocks - 1.0;
     chi2 = dof * std::log1p(std::max(chi2, 0.0) / dof);
   }
+  // What it would take of the cause may be more than there ever is: a posterior, with a prior of ordinary sizes.
+  VectorXd prior(width);
+  for (Index i = 0; i < width; ++i) {
+    const double ordinary = columns_.column(group.columns[static_cast<std::size_t>(i)]).ordinary;
+    prior[i] = effect * unit[i] * unit[i] / (ordinary * ordinary * every_);
+  }
+  const double posterior = s.dot(inverse_symmetric(S + MatrixXd(prior.asDiagonal())) * s);
+  const double likely = std::clamp(posterior / std::max(-s.dot(value), 1e-300), 0.0, 1.0);
   const double count = 2.0 * static_cast<double>(reference_.bundle.observations.size());
   result.z = rank > 1.0 ? std::sqrt(std::max(0.0, chi2 - 2.0 * (rank - 1.0))) : std::sqrt(std::max(0.0, chi2));
-  result.gain = chi2 - rank * std::log(count);
+  result.gain = likely * explained - rank * std::log(count);
   for (Index i = 0; i < width; ++i) {
     const CauseColumns::Column& column = columns_.column(group.columns[static_cast<std::size_t>(i)]);
     const double variance = S_inverse(i, i) * effect / every_;

@@ -17,7 +17,8 @@ struct CauseMember {
 struct CauseScore {
   std::string name;   ///< "k1", "encoder scale", "backlash"
   double z = 0.0;     ///< Gain as a normal deviate.
-  double gain = 0.0;  ///< Of twice the log-likelihood, less what its freedom costs (BIC): the largest explains best.
+  double gain = 0.0;  ///< Of twice the log-posterior, for sizes that it ordinarily has, less what its freedom costs
+                      ///< (BIC): the largest explains best.
   std::vector<CauseMember> members;
   CommonVector shift;  ///< Of the estimated parameters if it were free, normalised.
 };
@@ -25,7 +26,8 @@ struct CauseScore {
 struct CauseConfig {
   ObserveNuisances nuisances;  ///< What was estimated.
   double max_gap_s = 0.25;
-  double height = 1.0;  ///< Of the picture, normalised: a rolling shutter's way.
+  double height = 1.0;                   ///< Of the picture, normalised: a rolling shutter's way.
+  std::vector<std::string> errors = {};  ///< Causes among the rotation's errors that were estimated.
 };
 
 /// Score (Lagrange multiplier) tests of the reference, all from one linearisation: with point bearings and what was

@@ -21,6 +21,12 @@ CommonMatrix CommonPrior::information(const CommonLayout& layout) const {
   if (layout.mount >= 0) sigma.segment<3>(layout.mount).setConstant(sigma_mount_rad);
   if (layout.delay >= 0) sigma[layout.delay] = sigma_delay_s;
   if (layout.lever >= 0) sigma.segment<3>(layout.lever).setConstant(sigma_lever_m);
+  if (layout.shutter >= 0) sigma[layout.shutter] = sigma_shutter_s;
+  if (layout.drift >= 0) sigma[layout.drift] = sigma_drift_per_s;
+  if (layout.errors >= 0) {
+    // What encoders and gyroscopes can do is known, and said below.
+    sigma.segment(layout.errors, layout.num_errors).setConstant(std::numeric_limits<double>::infinity());
+  }
   CommonMatrix information = CommonMatrix::Zero(layout.size, layout.size);
   information.diagonal() = sigma.array().square().inverse();
   for (int i = 0; i < 4; ++i) {
@@ -33,6 +39,9 @@ CommonMatrix CommonPrior::said_information(const CommonLayout& layout) const {
   CommonMatrix information = CommonMatrix::Zero(layout.size, layout.size);
   for (int i = 0; i < 4; ++i) {
     if (says_k[static_cast<std::size_t>(i)]) information(i, i) = 1.0 / (sigma_k[i] * sigma_k[i]);
+  }
+  if (layout.errors >= 0) {
+    information.diagonal().segment(layout.errors, layout.num_errors).setConstant(1.0 / (sigma_error * sigma_error));
   }
   const double aspect = 1.0 / (sigma_aspect * sigma_aspect);
   information.topLeftCorner<2, 2>() += aspect * (Eigen::Matrix2d() << 1.0, -1.0, -1.0, 1.0).finished();
@@ -66,6 +75,14 @@ CommonVector CommonPrior::offset(const CommonLayout& layout, const RotatingCamer
   }
   if (layout.delay >= 0) offset[layout.delay] = camera.delay_s - mean.delay_s;
   if (layout.lever >= 0) offset.segment<3>(layout.lever) = camera.lever_m - mean.lever_m;
+  if (layout.shutter >= 0) offset[layout.shutter] = camera.shutter_s - mean.shutter_s;
+  if (layout.drift >= 0) offset[layout.drift] = camera.drift_per_s - mean.drift_per_s;
+  // About none, whatever the mean: all there is of them.
+  for (const RotationErrors* part : {&camera.errors, &camera.undone}) {
+    if (layout.errors >= 0 && part->size() == layout.num_errors) {
+      offset.segment(layout.errors, layout.num_errors) += *part;
+    }
+  }
   return offset;
 }
 

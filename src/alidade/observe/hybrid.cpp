@@ -51,7 +51,7 @@ IntrinsicsEstimate HybridObserver::step(const RotationFrame& frame) {
   }
   if (is_running_) filter_frame(frame, estimate);
   if (!is_running_) bootstrap(frame, estimate);
-  if (is_running_) report(estimate);
+  if (is_running_) report(frame.t_s, estimate);
   return estimate;
 }
 
@@ -113,7 +113,7 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
     judgement.accept = true;
     for (std::size_t i = 0; i < filter_.num_seen(); ++i) filter_.leave_out(i, true);  // they are in already
   }
-  if (judgement.event == ObserveEvent::burst && is_zoom(frame)) {
+  if (judgement.event == ObserveEvent::burst && !config_.no_zoom && is_zoom(frame)) {
     judgement.event = ObserveEvent::zoom;
     judgement.accept = true;
   }
@@ -127,7 +127,7 @@ void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate
     return;
   }
   has_candidate_ = false;
-  if (!is_zooming_ && has_drifted(estimate)) {
+  if (!is_zooming_ && has_drifted(estimate) && !config_.no_zoom) {
     estimate.event = ObserveEvent::zoom;
     begin_zoom();
     jump(filter_, frame);
@@ -255,16 +255,16 @@ double HybridObserver::noise_ratio() const {
   return config_.sigma_px > 0.0 || !(sum_dof_ > 0.0) ? 1.0 : std::sqrt(sum_nis_ / sum_dof_);
 }
 
-void HybridObserver::report(IntrinsicsEstimate& estimate) const {
+void HybridObserver::report(double t_s, IntrinsicsEstimate& estimate) const {
   const double scale = config_.scale.scale;
-  const Eigen::Vector4d& k = filter_.camera().k;
+  const Eigen::Vector4d k = filter_.camera().k_at(t_s);
   estimate.has_value = true;
   estimate.fx = scale * k[0];
   estimate.fy = scale * k[1];
   estimate.cx = scale * k[2] + config_.scale.centre.x();
   estimate.cy = scale * k[3] + config_.scale.centre.y();
   estimate.k1 = filter_.camera().k1;
-  estimate.sigma = scale * noise_ratio() * filter_.covariance().diagonal().head<4>().cwiseSqrt();
+  estimate.sigma = scale * noise_ratio() * sigma_k_at(filter_.camera(), filter_.layout(), filter_.covariance(), t_s);
 }
 
 HybridObserver::Judgement HybridObserver::judge() {

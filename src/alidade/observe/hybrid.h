@@ -12,6 +12,7 @@ struct HybridConfig {
   bool with_depth = false;
   RotatingCamera start;  ///< Normalised.
   std::optional<CommonPrior> prior;
+  bool no_zoom = false;         ///< Nothing is taken for a zoom.
   bool start_is_given = false;  ///< Otherwise several focal lengths are tried.
   double sigma_px = 0.0;        ///< [px]; 0: told by the residuals.
   double sigma_range_m = 0.0;   ///< Of the frames' ranges.
@@ -83,7 +84,7 @@ class HybridObserver {
   [[nodiscard]] CommonVector zoom_walk() const;
   void learn_zoom_walk(const Eigen::Vector4d& k_before);
   [[nodiscard]] double noise_ratio() const;
-  void report(IntrinsicsEstimate& estimate) const;
+  void report(double t_s, IntrinsicsEstimate& estimate) const;
 
   static constexpr double gate_z = 3.09;   ///< One frame in a thousand is called bad by chance.
   static constexpr double any_zoom = 1e6;  ///< Frames worth of change: whatever the pixels want.

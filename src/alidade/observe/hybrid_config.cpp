@@ -1,4 +1,4 @@
-#include "alidade/observe/observe.h"
+#include "alidade/observe/observe_once.h"
 
 namespace alidade {
 
@@ -10,6 +10,7 @@ RotatingCamera start_camera(const ObserveConfig& config, const PixelScale& scale
   RotatingCamera start;
   start.k = config.start ? scale.normalised_intrinsics(*config.start) : Eigen::Vector4d(1.3, 1.3, 0.0, 0.0);
   if (config.lever_m) start.lever_m = *config.lever_m;
+  if (config.height_px > 0) start.picture_height = config.height_px / scale.scale;
   return start;
 }
 
@@ -25,7 +26,7 @@ std::optional<CommonPrior> said_prior(const ObserveConfig& config, const Rotatin
   return prior;
 }
 
-std::vector<std::string> quantity_names(const CommonLayout& layout) {
+std::vector<std::string> quantity_names(const CommonLayout& layout, const std::vector<RotationError>& errors) {
   std::vector<std::string> names{"fx", "fy", "cx", "cy"};
   if (layout.k1 >= 0) names.emplace_back("k1");
   if (layout.k2 >= 0) names.emplace_back("k2");
@@ -34,6 +35,11 @@ std::vector<std::string> quantity_names(const CommonLayout& layout) {
   if (layout.mount >= 0) names.insert(names.end(), {"mount_x_rad", "mount_y_rad", "mount_z_rad"});
   if (layout.delay >= 0) names.emplace_back("delay_s");
   if (layout.lever >= 0) names.insert(names.end(), {"lever_x_m", "lever_y_m", "lever_z_m"});
+  if (layout.shutter >= 0) names.emplace_back("shutter_s");
+  if (layout.drift >= 0) names.emplace_back("focal_drift_per_s");
+  if (layout.errors >= 0) {
+    for (const RotationError& error : errors) names.push_back(error.quantity);
+  }
   return names;
 }
 
@@ -45,11 +51,34 @@ HybridConfig hybrid_config(const RotationLog& layout, const ObserveConfig& confi
   hybrid.with_depth = needs_depth(layout, config);
   hybrid.start = start_camera(config, scale);
   hybrid.start_is_given = config.start.has_value();
+  hybrid.no_zoom = config.no_zoom;
   hybrid.prior = said_prior(config, hybrid.start);
   hybrid.sigma_px = config.sigma_px;
   hybrid.sigma_range_m = config.sigma_range_m;
   hybrid.range_point = layout.range_point;
   return hybrid;
+}
+
+AdjustConfig adjust_config_of(const RotationLog& log, const ObserveConfig& config, const RotatingCamera& start,
+                              const PixelScale& scale) {
+  AdjustConfig adjust;
+  adjust.nuisances = config.estimate;
+  adjust.nuisances.turn = config.rotation != RotationKnowledge::known;
+  adjust.with_depth = needs_depth(log, config);
+  adjust.sigma_px = config.sigma_px / scale.scale;
+  adjust.sigma_range_m = config.sigma_range_m;
+  adjust.range_point = log.range_point;
+  adjust.start = start;
+  adjust.prior = said_prior(config, start);
+  if (config.rotation == RotationKnowledge::free) {
+    adjust.sigma_turn_rad = std::numeric_limits<double>::infinity();
+  } else if (log.source == RotationSource::rate) {
+    adjust.sigma_rate_rad_per_s = config.sigma_rate_rad_per_s > 0.0 ? config.sigma_rate_rad_per_s : 1e-3;
+  } else {
+    adjust.sigma_turn_rad = config.sigma_angle_rad > 0.0 ? config.sigma_angle_rad : 1e-4;
+  }
+  if (!config.start) adjust.other_starts = {0.7, 2.5, 5.0, 10.0};
+  return adjust;
 }
 
 }  // namespace alidade

@@ -8,10 +8,16 @@
 #include "alidade/observe/fang_observer.h"
 #include "alidade/observe/flow_filter.h"
 #include "alidade/observe/hybrid.h"
+#include "alidade/observe/observe_once.h"
 #include "alidade/observe/steadiness.h"
 
 namespace alidade {
 namespace {
+
+Eigen::Vector4d intrinsics_px(const Eigen::Vector4d& k, const PixelScale& scale) {
+  const Eigen::Vector4d px = scale.scale * k;
+  return {px[0], px[1], px[2] + scale.centre.x(), px[3] + scale.centre.y()};
+}
 
 constexpr std::size_t most_turns = 240;  // frames whose rotation is estimated: the solve is cubic in them
 constexpr std::size_t most_cells = 4000000;
@@ -19,15 +25,21 @@ constexpr std::size_t most_cells = 4000000;
 /// One run over one log: frames, scale and start made once, then a method, then the reference.
 class Observation {
  public:
-  Observation(const RotationLog& log, const ObserveConfig& config, const Progress& progress)
-      : log_(log), config_(config), progress_(progress) {
+  Observation(const RotationLog& log, const ObserveConfig& config, const std::vector<RotationError>& errors,
+              const RotationErrors& undone, const Progress& progress)
+      : log_(log), config_(config), errors_(errors), progress_(progress) {
     report_.width_px = config.width_px;
     report_.height_px = config.height_px;
     report_.scale = pixel_scale(log, report_.width_px, report_.height_px);
     report_.sigma_is_told = !(config.sigma_px > 0.0);
     report_.steps.resize(log.rows.size());
-    with_depth_ = needs_depth(log, config);
-    start_ = start_camera(config, report_.scale);
+    config_.width_px = report_.width_px;
+    config_.height_px = report_.height_px;
+    config_.estimate.errors = static_cast<int>(errors.size());
+    start_ = start_camera(config_, report_.scale);
+    start_.errors = RotationErrors::Zero(static_cast<Eigen::Index>(errors.size()));
+    start_.undone = undone;
+    if (!log.rows.empty()) start_.drift_from_s = log.rows.back().t_s;
   }
 
   ObserveReport run() {
@@ -67,6 +79,7 @@ class Observation {
       report_.rows_used += is_used ? 1 : 0;
     }
     if (log_.source == RotationSource::none) begin_free();
+    add_turns(log_, errors_, config_.max_gap_s, frames_);
   }
 
   void begin_free() {
@@ -96,7 +109,9 @@ class Observation {
   }
 
   void run_hybrid() {
-    HybridObserver observer(hybrid_config(log_, config_, report_.scale));
+    HybridConfig hybrid = hybrid_config(log_, config_, report_.scale);
+    hybrid.start = start_;
+    HybridObserver observer(hybrid);
     double sum_nis = 0.0, sum_dof = 0.0;
     for (std::size_t k = 0; k < frames_.size(); ++k) {
       report_.steps[k] = observer.step(frames_[k]);
@@ -118,29 +133,8 @@ class Observation {
     const double ratio = config_.sigma_px > 0.0 ? 1.0 : std::pow(noise / observer.filter_sigma_px(), 2);
     final_cov_ = ratio * observer.filter().covariance();
     has_final_ = true;
-    set_values(report_.steps.back(), final_);
+    set_values(report_.steps.back(), final_, frames_.back().t_s);
     report_.steps.back().sigma = report_.scale.scale * final_cov_.diagonal().head<4>().cwiseSqrt();
-  }
-
-  [[nodiscard]] AdjustConfig adjust_config() const {
-    AdjustConfig adjust;
-    adjust.nuisances = config_.estimate;
-    adjust.nuisances.turn = config_.rotation != RotationKnowledge::known;
-    adjust.with_depth = with_depth_;
-    adjust.sigma_px = config_.sigma_px / report_.scale.scale;
-    adjust.sigma_range_m = config_.sigma_range_m;
-    adjust.range_point = log_.range_point;
-    adjust.start = start_;
-    adjust.prior = said_prior(config_, start_);
-    if (config_.rotation == RotationKnowledge::free) {
-      adjust.sigma_turn_rad = std::numeric_limits<double>::infinity();
-    } else if (log_.source == RotationSource::rate) {
-      adjust.sigma_rate_rad_per_s = config_.sigma_rate_rad_per_s > 0.0 ? config_.sigma_rate_rad_per_s : 1e-3;
-    } else {
-      adjust.sigma_turn_rad = config_.sigma_angle_rad > 0.0 ? config_.sigma_angle_rad : 1e-4;
-    }
-    if (!config_.start) adjust.other_starts = {0.7, 2.5, 5.0, 10.0};
-    return adjust;
   }
 
   void add_frame(FrameBuffer& buffer, std::size_t row) const {
@@ -153,7 +147,7 @@ class Observation {
   void run_window() {
     constexpr double keyframe_s = 0.1;
     FrameBuffer buffer(log_.num_points, std::min<std::size_t>(frames_.size(), 20000));
-    AdjustConfig adjust_with = adjust_config();
+    AdjustConfig adjust_with = adjust_config_of(log_, config_, start_, report_.scale);
     double next_s = frames_.front().t_s + 1.0;
     for (std::size_t k = 0; k < frames_.size(); ++k) {
       add_frame(buffer, k);
@@ -165,7 +159,7 @@ class Observation {
       const Adjustment adjustment = adjust(buffer, adjust_with, progress_);
       if (adjustment.has_value) {
         if (!report_.steps[k].has_value) report_.steps[k].event = ObserveEvent::start;
-        fill(report_.steps[k], adjustment);
+        fill(report_.steps[k], adjustment, frames_[k].t_s);
         adjust_with.start = adjustment.solution.camera;
         adjust_with.other_starts.clear();
       }
@@ -173,9 +167,9 @@ class Observation {
     }
   }
 
-  void fill(IntrinsicsEstimate& step, const Adjustment& adjustment) {
+  void fill(IntrinsicsEstimate& step, const Adjustment& adjustment, double t_s) {
     step.has_value = true;
-    set_values(step, adjustment.solution.camera);
+    set_values(step, adjustment.solution.camera, t_s);
     final_ = adjustment.solution.camera;
     final_cov_ = adjustment.solution.covariance();
     has_final_ = true;
@@ -187,21 +181,16 @@ class Observation {
     report_.nis_per_dof = adjustment.solution.sum_squares / dof;
   }
 
-  void set_values(IntrinsicsEstimate& step, const RotatingCamera& camera) const {
-    const PixelScale& scale = report_.scale;
-    step.fx = camera.k[0] * scale.scale;
-    step.fy = camera.k[1] * scale.scale;
-    step.cx = camera.k[2] * scale.scale + scale.centre.x();
-    step.cy = camera.k[3] * scale.scale + scale.centre.y();
+  void set_values(IntrinsicsEstimate& step, const RotatingCamera& camera, double t_s) const {
+    const Eigen::Vector4d k = intrinsics_px(camera.k_at(t_s), report_.scale);
+    step.fx = k[0];
+    step.fy = k[1];
+    step.cx = k[2];
+    step.cy = k[3];
     step.k1 = camera.k1;
   }
 
-  [[nodiscard]] Eigen::Vector4d start_px() const {
-    const PixelScale& scale = report_.scale;
-    const Eigen::Vector4d& k = start_.k;
-    return {k[0] * scale.scale, k[1] * scale.scale, k[2] * scale.scale + scale.centre.x(),
-            k[3] * scale.scale + scale.centre.y()};
-  }
+  [[nodiscard]] Eigen::Vector4d start_px() const { return intrinsics_px(start_.k, report_.scale); }
 
   template <typename Observer>
   void run_regression(Observer& observer) {
@@ -257,7 +246,7 @@ class Observation {
     for (std::size_t k = 0; k < frames_.size(); ++k) {
       if (is_at_rest(frames_[k])) add_frame(buffer, k);
     }
-    AdjustConfig config = adjust_config();
+    AdjustConfig config = adjust_config_of(log_, config_, start_, report_.scale);
     if (has_final_ && config_.method != ObserveMethod::fang2011) {
       config.start = final_;
       config.start.turn_rad.setZero();
@@ -267,14 +256,19 @@ class Observation {
     if (!report_.reference.has_value) return;
     report_.pixels_left_out = report_.reference.num_left_out;
     if (config_.rotation == RotationKnowledge::known) {
+      report_.jitter = turn_jitter(report_.reference);
       report_.stated = stated_covariance(report_.reference, config.nuisances);
-      report_.causes = cause_scores(log_, report_.reference,
-                                    {config.nuisances, config_.max_gap_s, report_.height_px / report_.scale.scale});
+      report_.causes = cause_scores(
+          log_, report_.reference,
+          {config.nuisances, config_.max_gap_s, report_.height_px / report_.scale.scale, config_.estimate_errors});
     }
     if (config_.method != ObserveMethod::batch && config_.rotation == RotationKnowledge::known) return;
     IntrinsicsEstimate all;
-    fill(all, report_.reference);
-    std::fill(report_.steps.begin(), report_.steps.end(), all);
+    fill(all, report_.reference, frames_.back().t_s);
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      report_.steps[k] = all;
+      set_values(report_.steps[k], final_, frames_[k].t_s);
+    }
   }
 
   /// Are the rows that the answer rests on of one focal length?
@@ -296,6 +290,10 @@ class Observation {
     ObserveNuisances nuisances = config_.estimate;
     if (regression && config_.rotation == RotationKnowledge::known) nuisances = {};
     const CommonLayout layout(nuisances);
+    if (layout.errors >= 0) {
+      const RotatingCamera& camera = has_final_ ? final_ : report_.reference.solution.camera;
+      report_.errors = CommonPrior(RotatingCamera{}).offset(layout, camera).segment(layout.errors, layout.num_errors);
+    }
     if (report_.sigma_px == 0.0) report_.sigma_px = report_.reference.sigma_px * report_.scale.scale;
     const CommonMatrix bound = report_.reference.solution.bound();
     if (has_final_) {
@@ -305,15 +303,16 @@ class Observation {
     list_quantities(layout, bound);
     if (has_final_) state_steps();
     if (!has_final_) return;
-    report_.status = is_observable(bound) ? ObserveReport::Status::ok : ObserveReport::Status::unobservable;
+    report_.status = is_observable(report_, bound) ? ObserveReport::Status::ok : ObserveReport::Status::unobservable;
   }
 
   /// The last row, and where all rows are one answer all of them, have the stated σ.
   void state_steps() {
-    const Eigen::Vector4d sigma = report_.covariance.diagonal().head<4>().cwiseSqrt();
+    const CommonLayout layout(model_cov_.rows() == 4 ? ObserveNuisances{} : config_.estimate);
     const bool is_one = config_.method == ObserveMethod::batch || config_.rotation != RotationKnowledge::known;
     for (std::size_t k = is_one ? 0 : report_.steps.size() - 1; k < report_.steps.size(); ++k) {
-      report_.steps[k].sigma = sigma;
+      report_.steps[k].sigma =
+          report_.scale.scale * sigma_k_at(final_, layout, CommonMatrix(final_cov_), frames_[k].t_s);
     }
   }
 
@@ -345,23 +344,14 @@ class Observation {
     report_.from_reference = (difference.array().abs() / (own + of_reference).array().sqrt()).maxCoeff();
   }
 
-  [[nodiscard]] bool is_observable(const CommonMatrix& bound) const {
-    constexpr double most = 0.05;  // of the focal length; of the picture's width
-    const Eigen::Vector4d& k = report_.reference.solution.camera.k;
-    const Eigen::Vector4d variance = bound.diagonal().head<4>();
-    if (!(variance.array() > 0.0).all() || !variance.allFinite()) return false;
-    const Eigen::Vector4d sigma = variance.cwiseSqrt();
-    const double width = report_.width_px / report_.scale.scale;
-    return sigma[0] < most * k[0] && sigma[1] < most * k[1] && sigma[2] < most * width && sigma[3] < most * width;
-  }
-
   void list_quantities(const CommonLayout& layout, const CommonMatrix& bound) {
     const double s = report_.scale.scale;
     const Eigen::Vector2d& c = report_.scale.centre;
     CommonVector unit = CommonVector::Ones(layout.size), offset = CommonVector::Zero(layout.size);
     unit.head<4>().setConstant(s);
+    for (int i = 0; i < layout.num_errors; ++i) unit[layout.errors + i] = errors_[static_cast<std::size_t>(i)].ordinary;
     offset.segment<2>(2) = c;
-    const std::vector<std::string> names = quantity_names(layout);
+    const std::vector<std::string> names = quantity_names(layout, errors_);
     const RotatingCamera& camera = has_final_ ? final_ : report_.reference.solution.camera;
     RotatingCamera zero;
     zero.k.setZero();
@@ -380,19 +370,22 @@ class Observation {
   }
 
   const RotationLog& log_;
-  const ObserveConfig& config_;
+  ObserveConfig config_;
+  const std::vector<RotationError>& errors_;
   const Progress& progress_;
   ObserveReport report_;
   std::vector<RotationFrame> frames_;
-  bool with_depth_ = false, free_started_ = false, has_final_ = false;
+  bool free_started_ = false, has_final_ = false;
   RotatingCamera start_, final_;
   CommonMatrix final_cov_, model_cov_;
 };
 
 }  // namespace
 
-ObserveReport observe_as_told(const RotationLog& log, const ObserveConfig& config, const Progress& progress) {
-  return Observation(log, config, progress).run();
+ObserveReport observe_once(const RotationLog& log, const ObserveConfig& config,
+                           const std::vector<RotationError>& errors, const RotationErrors& undone,
+                           const Progress& progress) {
+  return Observation(log, config, errors, undone, progress).run();
 }
 
 }  // namespace alidade

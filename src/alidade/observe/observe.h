@@ -8,6 +8,7 @@
 #include "alidade/observe/frame_buffer.h"
 #include "alidade/observe/hybrid.h"
 #include "alidade/observe/stated_covariance.h"
+#include "alidade/observe/steadiness.h"
 
 namespace alidade {
 
@@ -17,17 +18,19 @@ enum class RotationKnowledge { known, noisy, free };
 struct ObserveConfig {
   ObserveMethod method = ObserveMethod::hybrid;
   RotationKnowledge rotation = RotationKnowledge::known;
-  std::string profile = "kalman";        ///< Of fang2011: fast, quiet or kalman.
-  ObserveNuisances estimate;             ///< Beside fx, fy, cx, cy: k1, k2, k3, tangential, mount, delay, lever.
-  bool estimate_auto = false;            ///< And what the residuals ask for.
-  bool lens_is_given = false;            ///< The pixels were freed of a lens that is given: it is not estimated.
-  int width_px = 0, height_px = 0;       ///< 0: what holds the pixels.
-  std::optional<Eigen::Vector4d> start;  ///< fx, fy, cx, cy [px]; none: found from the data.
-  bool square_pixels = false;            ///< fx = fy.
-  bool fixed_centre = false;             ///< cx, cy: the start's, else the picture's middle.
-  double sigma_px = 0.0;                 ///< 0: told by the residuals.
-  double sigma_angle_rad = 0.0;          ///< Of heads and attitudes, where the rotation is noisy.
-  double sigma_rate_rad_per_s = 0.0;     ///< Of rates.
+  std::string profile = "kalman";  ///< Of fang2011: fast, quiet or kalman.
+  ObserveNuisances estimate;       ///< Beside fx, fy, cx, cy: k1, k2, k3, tangential, mount, delay, lever, shutter.
+  std::vector<std::string> estimate_errors;  ///< And errors of the measured rotation: causes of rotation_errors().
+  bool estimate_auto = false;                ///< And what the residuals ask for.
+  bool lens_is_given = false;                ///< The pixels were freed of a lens that is given: it is not estimated.
+  int width_px = 0, height_px = 0;           ///< 0: what holds the pixels.
+  std::optional<Eigen::Vector4d> start;      ///< fx, fy, cx, cy [px]; none: found from the data.
+  bool square_pixels = false;                ///< fx = fy.
+  bool no_zoom = false;                      ///< The intrinsics are those of one camera: what seems a zoom is none.
+  bool fixed_centre = false;                 ///< cx, cy: the start's, else the picture's middle.
+  double sigma_px = 0.0;                     ///< 0: told by the residuals.
+  double sigma_angle_rad = 0.0;              ///< Of heads and attitudes, where the rotation is noisy.
+  double sigma_rate_rad_per_s = 0.0;         ///< Of rates.
   double sigma_range_m = 0.002;
   std::optional<Eigen::Vector3d> lever_m;  ///< Known, or (with estimate.lever) where to start.
   double max_gap_s = 0.25;                 ///< A longer one in a rate log starts a segment.
@@ -86,11 +89,15 @@ struct ObserveReport {
   Adjustment reference;
   double reference_from_s = 0.0, reference_until_s = std::numeric_limits<double>::infinity();
   StatedCovariance stated;          ///< Of the reference.
+  TurnJitter jitter;                ///< Of its frames.
   std::vector<CauseScore> causes;   ///< What the reference's residuals say of what was taken as exact.
   std::vector<Assumption> assumed;  ///< What was taken as given, and what it would do to the answer.
   /// The answer minus the reference over their σ, the largest of fx, fy, cx, cy, where both are of the same camera.
   double from_reference = 0.0;
-  ObserveNuisances estimated;      ///< What was, in the end, beside fx, fy, cx, cy.
+  ObserveNuisances estimated;  ///< What was, in the end, beside fx, fy, cx, cy.
+  std::vector<std::string> estimated_errors;
+  RotationErrors errors;           ///< Of the rotation, as estimated, in units of their ordinary sizes.
+  std::vector<Check> told_apart;   ///< What else explains the residuals as well, and what the pixels do not tell.
   std::string misread;             ///< How the rotation seems to be misread, in words; empty: it is not.
   bool sigma_is_distance = false;  ///< The method has no σ: stated is its distance from the reference.
 };
@@ -113,7 +120,11 @@ struct ObserveReport {
 [[nodiscard]] HybridConfig hybrid_config(const RotationLog& layout, const ObserveConfig& config,
                                          const PixelScale& scale);
 /// fx, fy, cx, cy, then what else the layout has, in its order.
-[[nodiscard]] std::vector<std::string> quantity_names(const CommonLayout& layout);
+[[nodiscard]] std::vector<std::string> quantity_names(const CommonLayout& layout,
+                                                      const std::vector<RotationError>& errors = {});
+/// The errors of the log's rotation that are to be estimated, with the σ that is told of their scale. None of those
+/// that are told to be exact.
+[[nodiscard]] std::vector<RotationError> estimated_errors(const RotationLog& log, const ObserveConfig& config);
 [[nodiscard]] bool needs_depth(const RotationLog& log, const ObserveConfig& config);
 [[nodiscard]] RotatingCamera start_camera(const ObserveConfig& config, const PixelScale& scale);
 /// What the person says of the camera; none if nothing.
@@ -144,8 +155,16 @@ struct ObserveReport {
 /// the noise is one that trackers have, whether points stand still.
 [[nodiscard]] std::vector<Check> residual_checks(const ObserveReport& report);
 
+/// z at which the residuals ask for a cause: noise that a frame's pixels share makes chance larger.
+[[nodiscard]] double asked_beyond(const ObserveReport& report);
+
 /// Is the rotation read as it was meant? A mount that turns by half a turn, or a misreading that fits better.
 [[nodiscard]] Check rotation_check(const ObserveReport& report);
+
+/// The word of --estimate for a cause: "k1,k2", "mount", "scale", "backlash".
+[[nodiscard]] std::string estimate_word_of(const std::string& cause);
+/// The causes of a word that are errors of the measured rotation; empty: it is none of them.
+[[nodiscard]] std::vector<std::string> rotation_causes_of(const std::string& word);
 
 /// Where a log without measured rotation may start: a focal length and each row's rotation, from pairs of neighbouring
 /// rows, by the focal length that makes them rotations best. None: too few shared points.

@@ -98,6 +98,7 @@ void add_checks(const ObserveReport& report, Verdict& verdict) {
                               report.nis_per_dof, 2.0, "", "nis"});
   }
   for (const Check& check : residual_checks(report)) verdict.checks.push_back(check);
+  verdict.checks.insert(verdict.checks.end(), report.told_apart.begin(), report.told_apart.end());
   if (report.gramian_lambda_min >= 0.0) {
     const double lambda = report.gramian_lambda_min;
     const State state = lambda < fang_refuse_lambda ? State::refused
@@ -189,6 +190,10 @@ Verdict observe_verdict(const ObserveReport& report, const RotationLog& log, con
   }
   const auto cause = std::find_if(verdict.checks.begin(), verdict.checks.end(),
                                   [](const Check& check) { return check.name.starts_with("needs "); });
+  const auto jitter = std::find_if(verdict.checks.begin(), verdict.checks.end(), [](const Check& check) {
+    return check.name == "rotation's noise" && check.state == State::care;
+  });
+  if (jitter != verdict.checks.end() && verdict.state == State::care) verdict.to_add = jitter->text;
   if (cause != verdict.checks.end() && verdict.state == State::care) verdict.to_add = cause->text;
   const Check read = rotation_check(report);
   verdict.checks.push_back(read);

@@ -7,7 +7,6 @@
 namespace alidade {
 namespace {
 
-constexpr double ask_beyond = 5.0;                                // σ at which the residuals ask for one thing more
 constexpr double most_ordinary_px = 2.0, most_possible_px = 6.0;  // noise of a point finder
 constexpr double many_left_out = 0.2, most_left_out = 0.4;        // share of what was seen
 constexpr double moves_beyond = 4.0;                              // of a track's residuals over the others' median
@@ -16,7 +15,7 @@ constexpr double moves_beyond = 4.0;                              // of a track'
 std::vector<const CauseScore*> asked_for(const ObserveReport& report) {
   std::vector<const CauseScore*> asked;
   for (const CauseScore& cause : report.causes) {
-    if (cause.z >= ask_beyond) asked.push_back(&cause);
+    if (cause.z >= asked_beyond(report)) asked.push_back(&cause);
   }
   std::stable_sort(asked.begin(), asked.end(),
                    [](const CauseScore* a, const CauseScore* b) { return a->gain > b->gain; });
@@ -35,16 +34,9 @@ std::string size_of(const CauseScore& cause) {
 }
 
 std::string advice_for(const CauseScore& cause) {
-  const bool is_of_lens = cause.name.size() >= 2 && (cause.name[0] == 'k' || cause.name.starts_with("p1"));
-  if (is_of_lens || cause.name == "mount" || cause.name == "delay" || cause.name == "lever") {
-    return "--estimate " + cause.name;
-  }
-  if (cause.name == "encoder scale" || cause.name == "scale of the rates") {
-    return "compare the angles with a known turn and correct their scale";
-  }
-  if (cause.name == "focal length that drifts") return "hold zoom and focus, or use --method hybrid";
-  if (cause.name == "rolling shutter") return "turn more slowly, or use a global shutter";
-  return "correct the angles for it";
+  const std::string word = estimate_word_of(cause.name);
+  if (word == "scale") return "measure the scale with a known turn, or --estimate scale --sigma-encoder-scale S";
+  return "--estimate " + word;
 }
 
 Check noise_check(const ObserveReport& report) {
@@ -116,6 +108,40 @@ Check reference_check(const ObserveReport& report) {
   return check;
 }
 
+/// How much of σ is what lasts in the tracks, and how well that can be counted.
+Check lasting_check(const ObserveReport& report) {
+  constexpr double most = 12.0;  // beyond it the errors last about as long as the log
+  const StatedCovariance& stated = report.stated;
+  const auto count = std::min(stated.lasting.rows(), report.reference.solution.information.rows());
+  Check check{"errors last", State::good, "", 1.0, most, "", "residuals"};
+  const CommonMatrix model = report.reference.solution.covariance();
+  for (Eigen::Index i = 0; i < count; ++i) {
+    check.value = std::max(check.value, std::sqrt(stated.lasting(i, i) / model(i, i)));
+  }
+  check.text = stated.correlation_s > 0.0
+                   ? "errors of a track last for " + text_of(stated.correlation_s, 2) + " s: σ is up to " +
+                         text_of(check.value, 2) + " times what pixels that err by themselves would give"
+                   : "every pixel errs by itself";
+  if (check.value > most) check.state = State::care;
+  return check;
+}
+
+/// Do the residuals of a frame turn together? An encoder's or a gyroscope's noise, which every row has anew.
+Check jitter_check(const ObserveReport& report) {
+  constexpr double more_than_pixels = 3.0;
+  const TurnJitter& jitter = report.jitter;
+  const double sigma_rad = std::sqrt(jitter.variance_rad2);
+  Check check{"rotation's noise", State::good,      "frames do not jitter beyond their pixels' noise",
+              jitter.f_ratio,     more_than_pixels, "",
+              "residuals"};
+  if (jitter.f_ratio > more_than_pixels && jitter.is_noise()) {
+    check.state = State::care;
+    check.text = "the pixels of a frame err together, as if its rotation were off by " +
+                 text_of(sigma_rad / degree, 2) + "°: --rotation noisy --sigma-angle " + text_of(sigma_rad, 2);
+  }
+  return check;
+}
+
 }  // namespace
 
 namespace {
@@ -154,6 +180,11 @@ Check rotation_check(const ObserveReport& report) {
   return check;
 }
 
+double asked_beyond(const ObserveReport& report) {
+  constexpr double sigmas = 5.0;
+  return sigmas * std::sqrt(report.jitter.is_noise() ? std::max(report.jitter.f_ratio, 1.0) : 1.0);
+}
+
 std::vector<Check> residual_checks(const ObserveReport& report) {
   std::vector<Check> checks;
   const auto asked = asked_for(report);
@@ -163,7 +194,7 @@ std::vector<Check> residual_checks(const ObserveReport& report) {
     std::string text = i == 0 ? "the residuals ask for " : "so they do for ";
     text += cause.name + " (" + size_of(cause) + "; " + text_of(cause.z, 2) + "σ)";
     if (i == 0) text += ": " + advice_for(cause);
-    checks.push_back({"needs " + cause.name, State::care, text, cause.z, ask_beyond, "σ", "residuals"});
+    checks.push_back({"needs " + cause.name, State::care, text, cause.z, asked_beyond(report), "σ", "residuals"});
   }
   if (asked.empty() && !report.causes.empty()) {
     const auto largest = std::max_element(report.causes.begin(), report.causes.end(),
@@ -171,14 +202,16 @@ std::vector<Check> residual_checks(const ObserveReport& report) {
     checks.push_back({"causes", State::good,
                       "of " + std::to_string(report.causes.size()) +
                           " causes tested the residuals ask for none; most for " + largest->name,
-                      largest->z, ask_beyond, "σ", "residuals"});
+                      largest->z, asked_beyond(report), "σ", "residuals"});
   }
   if (!report.stated.blocks.z2.empty()) {
     checks.push_back(clusters_agree(report.stated.blocks, "block of time",
                                     "blur, noise of the angles, or what was taken as exact", "residuals"));
     checks.back().name = "blocks of time agree";
+    checks.push_back(lasting_check(report));
   }
   checks.push_back(noise_check(report));
+  if (!report.causes.empty()) checks.push_back(jitter_check(report));
   checks.push_back(left_out_check(report));
   if (!report.reference.bundle_point_of.empty() && !report.causes.empty()) checks.push_back(points_check(report));
   if (report.from_reference > 0.0) checks.push_back(reference_check(report));

@@ -330,6 +330,7 @@ class Solver {
     Eigen::MatrixXd reduced = common_;
     Eigen::VectorXd gradient = gradient_;
     solution.prior_information = prior_.information(layout_);
+    solution.prior_gradient = solution.prior_information * prior_.offset(layout_, place_.camera);
     solution.said_information = prior_.said_information(layout_);
     reduced.topLeftCorner(n, n) -= solution.prior_information;
     eliminate_points(0.0, reduced, gradient);

@@ -58,6 +58,9 @@ struct CommonPrior {
   double sigma_mount_rad = 0.2;
   double sigma_delay_s = 0.1;
   double sigma_lever_m = 0.3;
+  double sigma_shutter_s = 0.05;
+  double sigma_drift_per_s = 0.01;
+  double sigma_error = 1.0;  ///< Of errors of the rotation, which are in units of their ordinary sizes: said.
 
   [[nodiscard]] CommonMatrix information(const CommonLayout& layout) const;
   /// Of what a person says alone.
@@ -85,6 +88,7 @@ struct BundleSolution {
   CommonMatrix information;  ///< Of the common parameters but the turn, all else eliminated, without the prior, in
                              ///< units of 1/σ².
   CommonMatrix prior_information;
+  CommonVector prior_gradient;                 ///< Of half the prior's cost.
   CommonMatrix said_information;               ///< Of the prior, what a person said.
   std::vector<PointGivenCommon> given_common;  ///< One a point; not with turns.
   std::vector<Eigen::Vector2d> residuals;      ///< Prediction minus pixel, one an observation, normalised.

@@ -16,12 +16,16 @@ struct ObserveNuisances {
   bool mount = false;       ///< Rotation from the frame whose rotation is measured to the camera's, 3 angles.
   bool delay = false;       ///< Pixels are of t + delay.
   bool lever = false;       ///< Camera centre from the centre of rotation, camera frame. [m]
+  bool shutter = false;     ///< The picture's last row is of so much later than its first: a rolling shutter.
+  bool drift = false;       ///< fx and fy grow by so much of themselves a second: warmth, a focus that creeps.
+  int errors = 0;           ///< Errors of the measured rotation, so many: RotationFrame::turn_by.
   bool learnt =
       false;  ///< fx, fy, cx, cy with which the points were learnt, before a zoom: they know nothing of the new ones.
   bool turn = false;  ///< Error of the measured rotation, 3 angles; one a frame in a bundle, of now in a filter.
 };
 
-inline constexpr int most_common = 23;  ///< Of ObserveNuisances with everything.
+inline constexpr int most_common = 25 + most_rotation_errors;  ///< Of ObserveNuisances with everything.
+using RotationErrors = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_rotation_errors, 1>;
 using CommonVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_common, 1>;
 using CommonMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_common, most_common>;
 using PixelByCommon = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, most_common>;
@@ -31,7 +35,9 @@ struct CommonLayout {
   explicit CommonLayout(const ObserveNuisances& nuisances);
 
   int size = 4;
-  int k1 = -1, k2 = -1, k3 = -1, tangential = -1, mount = -1, delay = -1, lever = -1, learnt = -1, turn = -1;
+  int k1 = -1, k2 = -1, k3 = -1, tangential = -1, mount = -1, delay = -1, lever = -1, shutter = -1, drift = -1,
+      errors = -1, learnt = -1, turn = -1;
+  int num_errors = 0;
 };
 
 /// What all points have in common. Pixels are normalised (PixelScale), so are fx, fy, cx, cy.
@@ -41,8 +47,16 @@ struct RotatingCamera {
   Eigen::Quaterniond cam_from_mount = Eigen::Quaterniond::Identity();
   double delay_s = 0.0;
   Eigen::Vector3d lever_m = Eigen::Vector3d::Zero();
+  double shutter_s = 0.0;  ///< Pixels are of t + delay + shutter · v / picture_height, v from the picture's middle.
+  double picture_height = 1.0;  ///< Normalised. Not estimated.
+  double drift_per_s = 0.0;     ///< Of fx and fy, as a share; they are what k says at drift_from_s.
+  double drift_from_s = 0.0;    ///< Not estimated.
+  RotationErrors errors;        ///< mount_now = Exp(turn_by · errors) · measured; in units of their ordinary sizes.
+  RotationErrors undone;        ///< What the measured rotation has been freed of before, in the same units.
   Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();  ///< mount_now = Exp(turn) · measured.
 
+  /// fx, fy, cx, cy of an instant.
+  [[nodiscard]] Eigen::Vector4d k_at(double t_s) const;
   /// The values moved by `step`, in the layout's order; the mount turns on the right.
   [[nodiscard]] RotatingCamera retract(const CommonLayout& layout, const CommonVector& step) const;
 };
@@ -70,7 +84,8 @@ class RotationView {
   RotationView(const RotatingCamera& camera, const RotationFrame& frame);
 
   /// Normalised pixel of a point; none behind the camera or beyond the fold of the lens.
-  /// p ~ K D(C R Cᵀ (m + χ r) + χ (t − r)): R the measured rotation, C the mount, r the lever arm, t the shift.
+  /// p ~ K D(C R Cᵀ (m + χ r) + χ (t − r)): R the measured rotation, C the mount, r the lever arm, t the shift. With a
+  /// rolling shutter R is that of the pixel's own row.
   [[nodiscard]] std::optional<Eigen::Vector2d> project(const BearingPoint& point) const;
   [[nodiscard]] bool predict(const BearingPoint& point, const CommonLayout& layout, RotationPrediction& out) const;
   /// Ray of the pixel in the start's frame, for a point far away.
@@ -82,10 +97,30 @@ class RotationView {
                        Eigen::Matrix3d& J_point) const;
 
  private:
+  /// To where the camera was so much after (before) the frame's rotation was measured.
+  void turn_to(double late_s);
+  /// To where it was when this point's row was read. False: the point has no pixel.
+  bool turn_to_row_of(const BearingPoint& point);
+  [[nodiscard]] std::optional<Eigen::Vector2d> project_at_once(const BearingPoint& point) const;
+  bool predict_at_once(const BearingPoint& point, const CommonLayout& layout, RotationPrediction& out) const;
+  bool predict_by_rows(const BearingPoint& point, const CommonLayout& layout, RotationPrediction& out) const;
+  [[nodiscard]] Eigen::Vector3d turned(const BearingPoint& point) const;
+  [[nodiscard]] double late_at_row(double v) const;
+
   const RotatingCamera& camera_;
+  Eigen::Quaterniond measured_;
+  Eigen::Vector3d measured_rate_, acceleration_, shift_m_;
+  TurnByErrors turn_by_;
   Eigen::Matrix3d cam_from_mount_, mount_from_start_, cam_from_start_;
-  Eigen::Vector3d rate_, shift_m_;
+  Eigen::Vector3d rate_;
+  Eigen::Vector4d k_;       ///< As they are at the frame's time,
+  double growth_ = 1.0;     ///< f over that of drift_from_s,
+  double elapsed_s_ = 0.0;  ///< since then.
 };
+
+/// σ of fx, fy, cx, cy at an instant, from the covariance of the common parameters.
+[[nodiscard]] Eigen::Vector4d sigma_k_at(const RotatingCamera& camera, const CommonLayout& layout,
+                                         const CommonMatrix& cov, double t_s);
 
 /// A rotation that takes (0, 0, 1) to the direction of `ray`.
 [[nodiscard]] Eigen::Matrix3d rotation_to(const Eigen::Vector3d& ray);

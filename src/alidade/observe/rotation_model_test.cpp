@@ -32,6 +32,17 @@ Sample draw_sample(Draws& draws) {
   // About the same axis: about others the derivative by the delay is right to its square only.
   sample.frame.acceleration_rad_per_s2 = draws.normal() * sample.frame.rate_rad_per_s;
   sample.frame.shift_m = 0.2 * draws.normal3();
+  sample.camera.shutter_s = 0.02 * draws.normal();
+  sample.camera.picture_height = 1.5;
+  sample.camera.drift_per_s = 0.01 * draws.normal();
+  sample.camera.drift_from_s = 2.0;
+  sample.frame.t_s = 5.0;
+  sample.frame.turn_by.resize(3, most_rotation_errors);
+  sample.camera.errors.resize(most_rotation_errors);
+  for (int i = 0; i < most_rotation_errors; ++i) {
+    sample.frame.turn_by.col(i) = 0.02 * draws.normal3();
+    sample.camera.errors[i] = draws.normal();
+  }
   sample.point.start_from_point = rotation_to({0.2 * draws.normal(), 0.2 * draws.normal(), 1.0});
   sample.point.ab = 0.05 * draws.normal2();
   sample.point.inverse_depth = draws.uniform(0.0, 0.5);
@@ -45,6 +56,9 @@ constexpr ObserveNuisances everything{.k1 = true,
                                       .mount = true,
                                       .delay = true,
                                       .lever = true,
+                                      .shutter = true,
+                                      .drift = true,
+                                      .errors = most_rotation_errors,
                                       .learnt = true,
                                       .turn = true};
 

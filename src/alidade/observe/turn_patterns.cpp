@@ -1,16 +1,19 @@
 #include "alidade/observe/turn_patterns.h"
 
+#include <algorithm>
 #include <cmath>
-#include <functional>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/geometry/so3.h"
-#include "alidade/observe/rotation_frame.h"
 
 namespace alidade {
 namespace {
 
-/// A measured rotation that is off by `amount` of a cause.
-using Disturb = std::function<void(RotationRow& row, std::size_t index, double amount)>;
+// σ of what ordinary instruments have. Encoders: cheap servos; rates: gyroscopes of phones.
+constexpr double instrument_scale = 0.02, instrument_backlash_rad = 0.5 * degree, instrument_curve_rad = 0.3 * degree,
+                 instrument_zero_drift = 1e-3, instrument_bias = 0.01;
+
+using Rows = std::span<RotationRow>;
 
 /// The rows without their pixels.
 RotationLog bare(const RotationLog& log) {
@@ -35,117 +38,134 @@ std::vector<Eigen::Quaterniond> turned_since_start(const RotationLog& log, doubl
   return turned;
 }
 
-class Patterns {
- public:
-  Patterns(const RotationLog& log, double max_gap_s)
-      : log_(bare(log)), max_gap_s_(max_gap_s), as_measured_(turned_since_start(log_, max_gap_s)) {}
-
-  std::vector<TurnPattern> take() { return std::move(patterns_); }
-
-  /// By a difference: rotations are smooth in what is measured.
-  void add(const std::string& cause, const std::string& member, const std::string& unit, double step,
-           const Disturb& disturb) {
-    RotationLog off = log_;
-    for (std::size_t k = 0; k < off.rows.size(); ++k) disturb(off.rows[k], k, step);
-    const std::vector<Eigen::Quaterniond> turned = turned_since_start(off, max_gap_s_);
-    TurnPattern pattern{cause, member, unit, {}};
-    pattern.turn_rad.reserve(turned.size());
-    for (std::size_t k = 0; k < turned.size(); ++k) {
-      pattern.turn_rad.emplace_back(log_so3((turned[k] * as_measured_[k].conjugate()).normalized()) / step);
-    }
-    patterns_.push_back(std::move(pattern));
-  }
-
-  void add_head();
-  void add_rate();
-  void add_attitude();
-
- private:
-  /// ±1: the way the axis last turned.
-  [[nodiscard]] std::vector<double> direction(Eigen::Index axis) const;
-
-  RotationLog log_;
-  double max_gap_s_;
-  std::vector<Eigen::Quaterniond> as_measured_;
-  std::vector<TurnPattern> patterns_;
-};
-
-std::vector<double> Patterns::direction(Eigen::Index axis) const {
+/// The play between an encoder and its camera, so wide: the camera stands while the encoder crosses it, and is then
+/// pushed by its edge. Two plays in a row are one of both widths. Below zero: the encoder lags behind the camera.
+void undo_backlash(Rows rows, Eigen::Index axis, double width) {
+  const double half = 0.5 * std::abs(width), sign = width < 0.0 ? -1.0 : 1.0;
   constexpr double still_rad = 1e-6;  // encoders' last digit is no motion
-  std::vector<double> way(log_.rows.size(), 0.0);
-  double now = 0.0, turned_at = not_seen;
-  for (std::size_t k = 0; k < way.size(); ++k) {
-    const double angle = log_.rows[k].pan_tilt_roll_rad[axis];
-    if (std::isfinite(angle)) {
-      if (std::isfinite(turned_at) && std::abs(angle - turned_at) > still_rad) now = angle > turned_at ? 1.0 : -1.0;
-      turned_at = angle;
-    }
-    way[k] = now;
+  double first = not_seen, way = 0.0;
+  for (const RotationRow& row : rows) {
+    const double angle = row.pan_tilt_roll_rad[axis];
+    if (!std::isfinite(angle)) continue;
+    if (!std::isfinite(first)) first = angle;
+    if (std::abs(angle - first) <= std::max(still_rad, 2.0 * half)) continue;
+    way = angle > first ? 1.0 : -1.0;
+    break;
   }
-  return way;
+  double camera = first - half * way;  // it had been turning before the log began
+  for (RotationRow& row : rows) {
+    double& angle = row.pan_tilt_roll_rad[axis];
+    if (!std::isfinite(angle)) continue;
+    camera = std::clamp(camera, angle - half, angle + half);
+    angle += sign * (camera - angle);
+  }
 }
 
-void Patterns::add_head() {
-  static const char* const names[] = {"of pan", "of tilt"};
-  const double start_s = log_.rows.front().t_s;
+std::string with_axis(const char* name, const char* axis, const char* unit) {
+  return std::string(name) + "_" + axis + (*unit == '\0' ? "" : "_") + unit;
+}
+
+void add_head_errors(std::vector<RotationError>& errors) {
+  static constexpr const char* axes[] = {"pan", "tilt"};
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
-    const char* member = names[axis];
-    const auto angle = [axis](RotationRow& row) -> double& { return row.pan_tilt_roll_rad[axis]; };
-    add("encoder scale", member, "", 1e-5,
-        [&](RotationRow& row, std::size_t, double amount) { angle(row) *= 1.0 + amount; });
-    add("zero that drifts", member, "rad/s", 1e-6,
-        [&](RotationRow& row, std::size_t, double amount) { angle(row) += amount * (row.t_s - start_s); });
-    const std::vector<double> way = direction(axis);
-    add("backlash", member, "rad", 1e-6,
-        [&](RotationRow& row, std::size_t k, double amount) { angle(row) += 0.5 * amount * way[k]; });
-    const auto curve = [&](const std::string& word, double (*of)(double), double times) {
-      add("error of the angles within a turn", word + " " + member, "rad", 1e-6,
-          [&](RotationRow& row, std::size_t, double amount) { angle(row) += amount * of(times * angle(row)); });
+    const char* name = axes[axis];
+    const std::string member = std::string("of ") + name;
+    errors.push_back({"encoder scale", member, "", with_axis("scale", name, ""), instrument_scale, 1e-5,
+                      [axis](Rows rows, double amount) {
+                        for (RotationRow& row : rows) row.pan_tilt_roll_rad[axis] *= 1.0 + amount;
+                      }});
+    errors.push_back({"zero that drifts", member, "rad/s", with_axis("zero_drift", name, "rad_per_s"),
+                      instrument_zero_drift, 1e-6, [axis](Rows rows, double amount) {
+                        for (RotationRow& row : rows) {
+                          row.pan_tilt_roll_rad[axis] += amount * (row.t_s - rows.front().t_s);
+                        }
+                      }});
+    // A step wider than encoders' noise: its flicker at a turning point is no turning.
+    errors.push_back({"backlash", member, "rad", with_axis("backlash", name, "rad"), instrument_backlash_rad, 2e-4,
+                      [axis](Rows rows, double amount) { undo_backlash(rows, axis, amount); }});
+    const auto add_curve = [&](const char* word, const char* short_word, double (*of)(double), double times) {
+      errors.push_back({"error of the angles within a turn", std::string(word) + " " + member, "rad",
+                        std::string("curve_") + short_word + "_" + name + "_rad", instrument_curve_rad, 1e-6,
+                        [axis, of, times](Rows rows, double amount) {
+                          for (RotationRow& row : rows) {
+                            row.pan_tilt_roll_rad[axis] += amount * of(times * row.pan_tilt_roll_rad[axis]);
+                          }
+                        }});
     };
-    curve(
-        "sin", [](double a) { return std::sin(a); }, 1.0);
-    curve(
-        "cos", [](double a) { return std::cos(a); }, 1.0);
-    curve(
-        "sin 2×", [](double a) { return std::sin(a); }, 2.0);
-    curve(
-        "cos 2×", [](double a) { return std::cos(a); }, 2.0);
+    const auto sine = [](double a) { return std::sin(a); };
+    const auto cosine = [](double a) { return std::cos(a); };
+    add_curve("sin", "sin", sine, 1.0);
+    add_curve("cos", "cos", cosine, 1.0);
+    add_curve("sin 2×", "sin2", sine, 2.0);
+    add_curve("cos 2×", "cos2", cosine, 2.0);
   }
 }
 
-void Patterns::add_rate() {
-  static const char* const names[] = {"of ω_x", "of ω_y", "of ω_z"};
-  for (Eigen::Index axis = 0; axis < (log_.has_roll_rate ? 3 : 2); ++axis) {
-    const auto rate = [axis](RotationRow& row) -> double& { return row.rate_rad_per_s[axis]; };
-    add("scale of the rates", names[axis], "", 1e-5,
-        [&](RotationRow& row, std::size_t, double amount) { rate(row) *= 1.0 + amount; });
+void add_rate_errors(bool has_roll_rate, std::vector<RotationError>& errors) {
+  static constexpr const char* axes[] = {"x", "y", "z"};
+  for (Eigen::Index axis = 0; axis < (has_roll_rate ? 3 : 2); ++axis) {
+    errors.push_back({"scale of the rates", std::string("of ω_") + axes[axis], "", with_axis("scale", axes[axis], ""),
+                      instrument_scale, 1e-5, [axis](Rows rows, double amount) {
+                        for (RotationRow& row : rows) row.rate_rad_per_s[axis] *= 1.0 + amount;
+                      }});
   }
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    add("bias of the rates", names[axis], "rad/s", 1e-6,
-        [axis](RotationRow& row, std::size_t, double amount) { row.rate_rad_per_s[axis] += amount; });
+    errors.push_back({"bias of the rates", std::string("of ω_") + axes[axis], "rad/s",
+                      with_axis("bias", axes[axis], "rad_per_s"), instrument_bias, 1e-6,
+                      [axis](Rows rows, double amount) {
+                        for (RotationRow& row : rows) row.rate_rad_per_s[axis] += amount;
+                      }});
   }
 }
 
-void Patterns::add_attitude() {
-  static const char* const names[] = {"about x", "about y", "about z"};
-  const double start_s = log_.rows.front().t_s;
+void add_attitude_errors(std::vector<RotationError>& errors) {
+  static constexpr const char* axes[] = {"x", "y", "z"};
   for (int axis = 0; axis < 3; ++axis) {
-    add("attitude that drifts", names[axis], "rad/s", 1e-6, [&](RotationRow& row, std::size_t, double amount) {
-      const Eigen::Vector3d turn = amount * (row.t_s - start_s) * Eigen::Vector3d::Unit(axis);
-      row.base_from_cam = exp_so3(turn) * row.base_from_cam;
-    });
+    errors.push_back({"attitude that drifts", std::string("about ") + axes[axis], "rad/s",
+                      with_axis("attitude_drift", axes[axis], "rad_per_s"), instrument_zero_drift, 1e-6,
+                      [axis](Rows rows, double amount) {
+                        for (RotationRow& row : rows) {
+                          const double turn_rad = amount * (row.t_s - rows.front().t_s);
+                          row.base_from_cam = exp_so3(turn_rad * Eigen::Vector3d::Unit(axis)) * row.base_from_cam;
+                        }
+                      }});
   }
 }
 
 }  // namespace
 
+std::vector<RotationError> rotation_errors(RotationSource source, bool has_roll_rate) {
+  std::vector<RotationError> errors;
+  if (source == RotationSource::head) add_head_errors(errors);
+  if (source == RotationSource::rate) add_rate_errors(has_roll_rate, errors);
+  if (source == RotationSource::attitude) add_attitude_errors(errors);
+  return errors;
+}
+
+/// By differences: rotations are smooth in what is measured.
+std::vector<TurnPattern> turn_patterns(const RotationLog& log, const std::vector<RotationError>& errors,
+                                       double max_gap_s) {
+  if (log.rows.empty() || errors.empty()) return {};
+  const RotationLog as_it_is = bare(log);
+  const std::vector<Eigen::Quaterniond> measured = turned_since_start(as_it_is, max_gap_s);
+  std::vector<TurnPattern> patterns;
+  for (const RotationError& error : errors) {
+    RotationLog off = as_it_is;
+    error.undo(off.rows, error.derivative_step);
+    const std::vector<Eigen::Quaterniond> turned = turned_since_start(off, max_gap_s);
+    TurnPattern pattern{error, {}};
+    pattern.turn_rad.reserve(turned.size());
+    for (std::size_t k = 0; k < turned.size(); ++k) {
+      const Eigen::Quaterniond turn = (turned[k] * measured[k].conjugate()).normalized();
+      pattern.turn_rad.emplace_back(log_so3(turn) / error.derivative_step);
+    }
+    patterns.push_back(std::move(pattern));
+  }
+  return patterns;
+}
+
 std::vector<TurnPattern> turn_patterns(const RotationLog& log, double max_gap_s) {
-  if (log.rows.empty() || log.source == RotationSource::none) return {};
-  Patterns patterns(log, max_gap_s);
-  if (log.source == RotationSource::head) patterns.add_head();
-  if (log.source == RotationSource::rate) patterns.add_rate();
-  if (log.source == RotationSource::attitude) patterns.add_attitude();
-  return patterns.take();
+  return turn_patterns(log, rotation_errors(log.source, log.has_roll_rate), max_gap_s);
 }
 
 }  // namespace alidade

@@ -1,23 +1,41 @@
 #pragma once
 
+#include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "alidade/observe/rotation_frame.h"
 #include "alidade/pantilt/rotation_log.h"
 
 namespace alidade {
 
-/// A way in which the measured rotation may be wrong: by how much each row's turns, per unit of it.
-struct TurnPattern {
-  std::string cause;                      ///< "encoder scale"; patterns of one cause are judged together.
-  std::string member;                     ///< "of pan"
-  std::string unit;                       ///< Of the coefficient: "", "rad", "rad/s".
-  std::vector<Eigen::Vector3d> turn_rad;  ///< One a row: mount_true = Exp(turn · coefficient) · measured.
+/// A way in which a measured rotation may be wrong, with one number.
+struct RotationError {
+  std::string cause;      ///< "encoder scale"; errors of one cause are judged together.
+  std::string member;     ///< "of pan"
+  std::string unit;       ///< Of the number: "", "rad", "rad/s".
+  std::string quantity;   ///< Its name in results: "scale_pan".
+  double ordinary = 1.0;  ///< σ of what instruments have of it.
+  double derivative_step = 1e-6;
+  /// Takes so much of it out of the rows' rotation: true = measured · (1 + scale), measured + bias, and so on.
+  std::function<void(std::span<RotationRow>, double amount)> undo;
 };
 
-/// Patterns of the log's source, to first order. Heads: scale of each axis, an error once and twice a turn, backlash
-/// (half of it either way, by the axis' last motion), a zero that drifts. Rates: scale and bias of each axis.
-/// Attitudes: a drift about each axis. None where no rotation was measured.
+/// Of heads: scale of each axis, backlash (the camera lags behind the encoder by half of it), a zero that drifts, an
+/// error once and twice a turn. Of rates: scale and bias of each axis. Of attitudes: a drift about each axis.
+[[nodiscard]] std::vector<RotationError> rotation_errors(RotationSource source, bool has_roll_rate);
+
+/// By how much each row's rotation turns, per unit of it.
+struct TurnPattern {
+  RotationError error;
+  std::vector<Eigen::Vector3d> turn_rad;  ///< One a row: mount_true = Exp(turn · number) · measured, to first order.
+};
+
+/// Patterns of the log's source. None where no rotation was measured.
 [[nodiscard]] std::vector<TurnPattern> turn_patterns(const RotationLog& log, double max_gap_s);
+/// The same of these errors alone.
+[[nodiscard]] std::vector<TurnPattern> turn_patterns(const RotationLog& log, const std::vector<RotationError>& errors,
+                                                     double max_gap_s);
 
 }  // namespace alidade

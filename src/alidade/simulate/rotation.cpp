@@ -55,6 +55,69 @@ void measure_rotation(const RotationScene& scene, const RotationLogConfig& confi
   }
 }
 
+/// A world, turning.
+class Turning {
+ public:
+  Turning(const RotationScene& scene, const RotationLogConfig& config, std::uint64_t seed)
+      : scene_(scene),
+        config_(config),
+        world_(world_of(scene)),
+        cam_from_mount_(exp_so3(scene.mount_rad)),
+        mount_(scene, config.source, 1.0 / (64.0 * config.rate_hz)),
+        draws_(seed) {}
+
+  RotationRow row_at(double t_s, const RotatingIntrinsics& now) {
+    RotationRow row;
+    row.t_s = t_s;
+    measure_rotation(scene_, config_, draws_, row);
+    const Eigen::Quaterniond cam_from_start = turned(t_s);
+    for (std::size_t i = 0; i < world_.size(); ++i) {
+      Eigen::Vector3d point = in_cam(i, cam_from_start);
+      if (i == 0 && config_.with_range) row.range_m = point.norm() + config_.sigma_range_m * draws_.normal();
+      if (scene_.shutter_s != 0.0) point = at_its_row(i, t_s, now, point);
+      row.px.push_back(pixel_of(point, now));
+    }
+    return row;
+  }
+
+ private:
+  Eigen::Quaterniond turned(double t_s) {
+    return cam_from_mount_ * mount_.at(t_s + scene_.delay_s) * cam_from_mount_.conjugate();
+  }
+
+  [[nodiscard]] Eigen::Vector3d in_cam(std::size_t i, const Eigen::Quaterniond& cam_from_start) const {
+    return cam_from_start * (world_[i] + scene_.lever_arm_m) - scene_.lever_arm_m;
+  }
+
+  /// Where the point is when the row that sees it is read.
+  Eigen::Vector3d at_its_row(std::size_t i, double t_s, const RotatingIntrinsics& now, Eigen::Vector3d point) {
+    constexpr int rounds = 6;  // a row's time moves the point by few rows
+    for (int round = 0; round < rounds; ++round) {
+      const double v = px_of_ray(now, Eigen::Vector2d(point.head<2>() / point.z())).y();
+      const double late_s = scene_.shutter_s * (v - 0.5 * (scene_.height_px - 1.0)) / scene_.height_px;
+      point = in_cam(i, turned(t_s + late_s));
+    }
+    return point;
+  }
+
+  Eigen::Vector2d pixel_of(const Eigen::Vector3d& point, const RotatingIntrinsics& now) {
+    const Eigen::Vector2d px =
+        px_of_ray(now, Eigen::Vector2d(point.head<2>() / point.z())) + config_.sigma_px * draws_.normal2();
+    const bool is_inside =
+        px.x() >= -0.5 && px.y() >= -0.5 && px.x() < scene_.width_px - 0.5 && px.y() < scene_.height_px - 0.5;
+    const bool is_lost = config_.lost_share > 0.0 && draws_.uniform() < config_.lost_share;
+    const bool seen = point.z() > 0.0 && (is_inside || !config_.clip_to_picture) && !is_lost;
+    return seen ? px : Eigen::Vector2d::Constant(not_seen);
+  }
+
+  const RotationScene& scene_;
+  const RotationLogConfig& config_;
+  std::vector<Eigen::Vector3d> world_;
+  Eigen::Quaterniond cam_from_mount_;
+  TrueRotation mount_;
+  Draws draws_;
+};
+
 }  // namespace
 
 Eigen::Vector3d paper_rate(double t_s) { return {0.07 * std::sin(0.8 * t_s), 0.12 * std::sin(1.6 * t_s), 0.0}; }
@@ -91,36 +154,18 @@ std::vector<Eigen::Vector2d> draw_points(int width_px, int height_px, int count,
 }
 
 RotationLog simulate_rotation(const RotationScene& scene, const RotationLogConfig& config, std::uint64_t seed) {
-  Draws draws(seed);
   RotationLog log;
   log.source = config.source;
   log.num_points = scene.start_px.size();
   log.has_roll_rate = config.source == RotationSource::rate;
   log.sigma_scale = 0.0;
   if (scene.lever_arm_m.isZero(0.0)) log.sigma_parallax = 0.0;
-  const std::vector<Eigen::Vector3d> world = world_of(scene);
-  const Eigen::Quaterniond cam_from_mount = exp_so3(scene.mount_rad);
-  TrueRotation mount(scene, config.source, 1.0 / (64.0 * config.rate_hz));
+  Turning turning(scene, config, seed);
   const auto num_rows = static_cast<std::size_t>(std::floor(config.duration_s * config.rate_hz + 0.5)) + 1;
   for (std::size_t k = 0; k < num_rows; ++k) {
-    RotationRow row;
-    row.t_s = static_cast<double>(k) / config.rate_hz;
-    measure_rotation(scene, config, draws, row);
-    const Eigen::Quaterniond cam_from_start =
-        cam_from_mount * mount.at(row.t_s + scene.delay_s) * cam_from_mount.conjugate();
-    const RotatingIntrinsics now = scene.intrinsics(row.t_s);
-    for (std::size_t i = 0; i < world.size(); ++i) {
-      const Eigen::Vector3d point = cam_from_start * (world[i] + scene.lever_arm_m) - scene.lever_arm_m;
-      if (i == 0 && config.with_range) row.range_m = point.norm() + config.sigma_range_m * draws.normal();
-      const Eigen::Vector2d px =
-          px_of_ray(now, Eigen::Vector2d(point.head<2>() / point.z())) + config.sigma_px * draws.normal2();
-      const bool is_inside =
-          px.x() >= -0.5 && px.y() >= -0.5 && px.x() < scene.width_px - 0.5 && px.y() < scene.height_px - 0.5;
-      const bool is_lost = config.lost_share > 0.0 && draws.uniform() < config.lost_share;
-      const bool seen = point.z() > 0.0 && (is_inside || !config.clip_to_picture) && !is_lost;
-      row.px.push_back(seen ? px : Eigen::Vector2d::Constant(not_seen));
-    }
-    log.rows.push_back(std::move(row));
+    const double t_s = static_cast<double>(k) / config.rate_hz;
+    const RotatingIntrinsics now = scene.intrinsics(t_s);
+    log.rows.push_back(turning.row_at(t_s, now));
     log.truth.push_back({now.fx, now.fy, now.cx, now.cy});
   }
   return log;

@@ -10,7 +10,8 @@ namespace alidade {
 /// Intrinsics at an instant. [px]
 struct RotatingIntrinsics {
   double fx = 710.0, fy = 700.0, cx = 390.0, cy = 290.0;
-  double k1 = 0.0;  ///< Radial, on coordinates over the focal length: (1 + k1 r²).
+  double k1 = 0.0;  ///< Radial, on coordinates over the focal length: (1 + k1 r² + k2 r⁴ + k3 r⁶).
+  double k2 = 0.0, k3 = 0.0, p1 = 0.0, p2 = 0.0;  ///< As Brown has them.
 };
 
 /// A world for `observe`: a camera that turns, and points that stand still.
@@ -26,6 +27,7 @@ struct RotationScene {
   Eigen::Vector3d mount_rad =
       Eigen::Vector3d::Zero();  ///< cam_from_mount = Exp(mount): what is measured is the mount's.
   double delay_s = 0.0;         ///< Pixels are of t + delay.
+  double shutter_s = 0.0;       ///< The last row is read so much after the first; the middle one at t + delay.
 };
 
 struct RotationLogConfig {
@@ -41,6 +43,25 @@ struct RotationLogConfig {
   double lost_share = 0.0;       ///< Share of single pixels not seen, by chance.
   bool clip_to_picture = false;  ///< Points outside the picture are not seen; otherwise the picture has no edge.
 };
+
+/// What may be wrong with a log: with how the rotation is measured, and with which pixel is whose.
+struct RotationFaults {
+  double angle_scale = 1.0;                              ///< Measured over true, of both axes.
+  double backlash_rad = 0.0;                             ///< The camera lags behind the encoder by half of it.
+  double once_a_turn_rad = 0.0, twice_a_turn_rad = 0.0;  ///< Amplitudes of the encoders' error; phases drawn.
+  Eigen::Vector2d zero_drift_rad_per_s = Eigen::Vector2d::Zero();  ///< Of pan and tilt.
+  bool swaps_axes = false;
+  Eigen::Vector2d signs = Eigen::Vector2d::Ones();  ///< Of pan and tilt.
+  double wrong_share = 0.0;                         ///< Pixels that are anywhere in the picture.
+  double swapped_share = 0.0;                       ///< Pixels that change places with another point's.
+  double moving_share = 0.0;  ///< Points that move through the picture, by a few pixels a second, up to 20.
+  double noise_px = 0.0, noise_lasts_s = 0.0;  ///< Noise of each track beside the white one, and how long it lasts.
+
+  [[nodiscard]] bool are_of_rotation() const;
+};
+
+/// The log with these faults. Heads alone have those of angles; σ of scale and parallax, if wrong, are no more told.
+void add_faults(const RotationFaults& faults, int width_px, int height_px, std::uint64_t seed, RotationLog& log);
 
 /// The paper's motion: ω = (0.07 sin 0.8t, 0.12 sin 1.6t, 0) rad/s. Fang et al. 2011, eq. (27).
 [[nodiscard]] Eigen::Vector3d paper_rate(double t_s);

@@ -5,7 +5,7 @@
 namespace alidade {
 namespace {
 
-const WordList<BoardKind>& kinds() {
+const WordList<BoardKind>& kind_words() {
   static const WordList<BoardKind> words = [] {
     WordList<BoardKind> list;
     for (const BoardKind kind : {BoardKind::chessboard, BoardKind::charuco, BoardKind::aprilgrid, BoardKind::circles,
@@ -50,7 +50,7 @@ FieldList fields_of(Board& board, bool is_required) {
            .group = group,
            .is_required = is_required},
           {.name = "board_kind",
-           .value = words_code(board.kind, kinds()),
+           .value = words_code(board.kind, kind_words()),
            .help = "What is printed on it",
            .old_options = {"--target"},
            .group = group},

@@ -133,7 +133,7 @@ ExitCode calibrate_photos_of(const CalibrateArgs& args, Run& run) {
   run.lap("solve");
   require_readable(set, result);
   require_size(args, result.size);
-  Outcome outcome = outcome_of(result);
+  JobOutcome outcome = outcome_of(result);
   if (!run.options.no_report) {
     add_pictures(result, photos, outcome);
     run.lap("pictures");

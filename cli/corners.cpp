@@ -39,7 +39,7 @@ ExitCode run_corners(CornersArgs args, Run& run) {
   const FoundCorners found = find_corners(set.photos(), args.board, args.config, run.progress);
   run.lap("solve");
   require_readable(set, found.calibration);
-  Outcome outcome = outcome_of(found);
+  JobOutcome outcome = outcome_of(found);
   tell_photos(set, outcome.document.counts, outcome.document.verdict, run);
   return run.finish(std::move(outcome));
 }

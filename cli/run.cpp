@@ -98,7 +98,7 @@ ExitCode Run::finish(Verdict verdict) {
   return document.verdict.exit_code;
 }
 
-ExitCode Run::finish(Outcome outcome) {
+ExitCode Run::finish(JobOutcome outcome) {
   ResultDocument& from = outcome.document;
   std::vector<SkippedInput> skipped = std::move(document.counts.skipped);
   document.counts = std::move(from.counts);

@@ -75,7 +75,7 @@ class Run {
   /// printed, Interrupted after Ctrl-C. A refusal does not replace an earlier estimate: it goes to DIR/refused.
   [[nodiscard]] ExitCode finish(Verdict verdict);
   /// The same with all that a job of the library leaves; what was said or skipped before comes first.
-  [[nodiscard]] ExitCode finish(Outcome outcome);
+  [[nodiscard]] ExitCode finish(JobOutcome outcome);
   /// Text of result.json; empty before finish().
   [[nodiscard]] const std::string& result() const { return result_; }
 

@@ -38,7 +38,7 @@ struct SimulateRotationArgs {
   std::string photo;
   double photo_deg = 90.0;
   int photos = 0;
-  double wrong = 0.0, moving = 0.0, zoomed = 1.0;
+  double zoomed = 1.0;
   PanoramaConfig panorama;
   RotationLogConfig config;
 };
@@ -147,8 +147,8 @@ TurnedScene turned_scene_of(const SimulateRotationArgs& args, const RotationScen
   turned.num_photos = args.photos;
   turned.pan_step_rad = 0.4 * scene.width_px / args.k[0];  // six tenths of each photo are the next one's
   turned.tilt_rad = 0.2 * scene.height_px / args.k[1];
-  turned.wrong_share = args.wrong;
-  turned.moving_share = args.moving;
+  turned.wrong_share = args.faults.wrong_share;
+  turned.moving_share = args.faults.moving_share;
   if (args.config.sigma_px > 0.0) turned.sigma_px = args.config.sigma_px;
   if (!args.lever.empty()) turned.lever_m = Eigen::Vector3d(args.lever.data());
   if (!args.depth.empty())
@@ -219,9 +219,7 @@ ExitCode simulate_rotation_log(const SimulateRotationArgs& args, Run& run) {
     if (args.video) throw UsageError("--photos and --video: one of them");
     return simulate_photos(args, scene, run);
   }
-  if (args.wrong > 0.0 || args.moving > 0.0 || args.zoomed != 1.0) {
-    throw UsageError("--wrong, --moving and --zoomed are of --photos");
-  }
+  if (args.zoomed != 1.0) throw UsageError("--zoomed is of --photos");
   if (args.video) {
     if (!args.depth.empty() || !args.lever.empty()) throw UsageError("--video: its world is far away, without --depth");
     return simulate_video(args, scene, config, run);
@@ -260,9 +258,9 @@ void add_fault_options(CLI::App& command, SimulateRotationArgs& args) {
   numbers("--mount-deg", args.mount_deg, 3, "The camera on its mount: rotation vector x,y,z [°]");
   number("--line-time", args.shutter_s, "Rolling shutter: last row after the first [s]", -0.2, 0.2);
   number("--focal-drift", args.drift_per_s, "Growth of fx and fy a second, as a share", -0.1, 0.1);
-  number("--wrong", faults.wrong_share, "Share of pixels that are anywhere", 0.0, 0.95);
+  number("--wrong", faults.wrong_share, "Share of pixels that are anywhere; of wrong matches in pairs.csv", 0.0, 0.95);
   number("--swapped", faults.swapped_share, "Share of pixels that are another point's", 0.0, 0.95);
-  number("--moving", faults.moving_share, "Share of points that move", 0.0, 1.0);
+  number("--moving", faults.moving_share, "Share of points that move, also of those in pairs.csv", 0.0, 1.0);
   number("--lasting-px", faults.noise_px, "Further noise of each track, which lasts [px]", 0.0, 100.0);
   number("--lasting-s", faults.noise_lasts_s, "How long it lasts [s]", 0.0, 1000.0);
   command.add_flag("!--no-range", args.with_range, "With --depth: without range_m");
@@ -301,8 +299,6 @@ void add_options(CLI::App& command, SimulateRotationArgs& args) {
           "Render so many photos of a camera that is turned by hand instead, and matches between them: photos/, "
           "pairs.csv")
       ->check(CLI::Range(2, 200));
-  number("--wrong", args.wrong, "Share of wrong matches in pairs.csv", 0.0, 0.9);
-  number("--moving", args.moving, "Share of the points in pairs.csv that move", 0.0, 0.9);
   number("--zoomed", args.zoomed, "Focal length of the photo in the middle over the others'", 0.2, 5.0);
   command.add_option("--photo", args.photo, "What the world of videos and photos looks like (default: noise)")
       ->type_name("FILE");

@@ -128,8 +128,8 @@ void add_result_files(const Calibration& calibration, std::vector<NamedBytes>& f
 
 }  // namespace
 
-Outcome outcome_of(const Calibration& calibration) {
-  Outcome outcome;
+JobOutcome outcome_of(const Calibration& calibration) {
+  JobOutcome outcome;
   outcome.document.command = "calibrate";
   fill_calibration(calibration.board, calibration, outcome.document);
   outcome.document.verdict = calibration.verdict;
@@ -138,8 +138,8 @@ Outcome outcome_of(const Calibration& calibration) {
   return outcome;
 }
 
-Outcome outcome_of(const FoundCorners& found) {
-  Outcome outcome;
+JobOutcome outcome_of(const FoundCorners& found) {
+  JobOutcome outcome;
   ResultDocument whole;
   fill_calibration(found.calibration.board, found.calibration, whole);
   whole.data.resize(std::min<std::size_t>(2, whole.data.size()));  // photos and corners
@@ -173,7 +173,7 @@ Outcome outcome_of(const FoundCorners& found) {
   return outcome;
 }
 
-void add_pictures(const Calibration& calibration, const Photos& photos, Outcome& outcome) {
+void add_pictures(const Calibration& calibration, const Photos& photos, JobOutcome& outcome) {
   const CalibrateReport& report = calibration;
   const std::vector<BoardView>& views = calibration.board_views;
   const std::vector<std::size_t> chosen = shown_photos(report);

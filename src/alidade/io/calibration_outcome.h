@@ -9,12 +9,12 @@ namespace ALIDADE_PUBLIC alidade {
 
 /// The document of a calibration, its lines for a person, and camera.yaml, corners.csv, poses.csv and board_points.csv
 /// where there is a camera.
-[[nodiscard]] Outcome outcome_of(const Calibration& calibration);
+[[nodiscard]] JobOutcome outcome_of(const Calibration& calibration);
 
 /// The document of corners, its lines, and corners.csv where there are any.
-[[nodiscard]] Outcome outcome_of(const FoundCorners& found);
+[[nodiscard]] JobOutcome outcome_of(const FoundCorners& found);
 
 /// Adds small pictures of the photos for the report, and the worst one without its distortion.
-void add_pictures(const Calibration& calibration, const Photos& photos, Outcome& outcome);
+void add_pictures(const Calibration& calibration, const Photos& photos, JobOutcome& outcome);
 
 }  // namespace alidade

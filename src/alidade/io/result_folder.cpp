@@ -100,7 +100,7 @@ void ResultFolder::commit() {
   swap_.commit();
 }
 
-void save(Outcome outcome, const std::filesystem::path& folder) {
+void save(JobOutcome outcome, const std::filesystem::path& folder) {
   ResultDocument& document = outcome.document;
   if (document.created_utc.empty()) document.created_utc = utc_now();
   for (const NamedBytes& file : outcome.files) document.files.push_back(file.name);

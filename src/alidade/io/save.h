@@ -9,6 +9,6 @@ namespace ALIDADE_PUBLIC alidade {
 
 /// Leaves in `folder` what the command leaves there: result.json, the files of the estimate, report.html; all of them
 /// at once, or none. Throws InputError where they cannot be written. `save(outcome_of(calibration), "result")`.
-void save(Outcome outcome, const std::filesystem::path& folder);
+void save(JobOutcome outcome, const std::filesystem::path& folder);
 
 }  // namespace alidade

@@ -23,7 +23,8 @@ std::optional<PlacedView> placed_view(const Camera& camera, const Rigid3& world_
   return PlacedView{sight.px - view->px, view->J_px_pose, sight.sigma_px * sight.sigma_px + of_place};
 }
 
-CameraResection judged(const Camera& camera, std::span<const PlacedSight> sights, const Rigid3& world_from_cam, double gate) {
+CameraResection judged(const Camera& camera, std::span<const PlacedSight> sights, const Rigid3& world_from_cam,
+                       double gate) {
   CameraResection resection{world_from_cam, 0.0, 0, {}};
   for (const PlacedSight& sight : sights) {
     const auto view = placed_view(camera, world_from_cam, sight);
@@ -60,7 +61,7 @@ bool stepped(const Camera& camera, std::span<const PlacedSight> sights, double w
 }  // namespace
 
 std::optional<CameraResection> resection(const Camera& camera, std::span<const PlacedSight> sights,
-                                   std::span<const Rigid3> begin_at, double gate) {
+                                         std::span<const Rigid3> begin_at, double gate) {
   constexpr std::size_t least_sights = 3;
   if (sights.size() < least_sights) return std::nullopt;
   std::optional<CameraResection> best;

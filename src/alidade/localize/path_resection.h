@@ -27,6 +27,6 @@ struct CameraResection {
 /// From each of the poses to begin at, weights that fall with a residual (Geman & McClure 1985), wide at first, then
 /// narrower; the one that explains most. None: fewer than three sights, or nothing to begin at.
 [[nodiscard]] std::optional<CameraResection> resection(const Camera& camera, std::span<const PlacedSight> sights,
-                                                 std::span<const Rigid3> begin_at, double gate);
+                                                       std::span<const Rigid3> begin_at, double gate);
 
 }  // namespace alidade

@@ -38,7 +38,7 @@ TextCode shape_code(CalibrateArgs& args) {
     if (word.read(text).empty()) return "";
     std::error_code ignored;
     if (!text.ends_with(".csv") && !std::filesystem::exists(text, ignored)) {
-      return fmt::format("is flat, bow, free, auto or a file of points; there is no file '{}'", text);
+      return fmt::format("'{}' is not flat, bow, free or auto, nor a file of points that is there", text);
     }
     args.points = text;
     args.config.board_shape = BoardShape::given;

@@ -135,9 +135,10 @@ TEST(Executable, ABoardShapeThatIsNoWordIsWrongUsageAndAFileThatIsMissingBadInpu
         folder.path().string());
   };
   EXPECT_EQ(shaped("foo").code, 2);
-  EXPECT_EQ(shaped("foo").err,
-            "alidade: error: calibrate: --board-shape is flat, bow, free, auto or a file of points; there is no file "
-            "'foo'\n");
+  EXPECT_EQ(
+      shaped("foo").err,
+      "alidade: error: calibrate: --board-shape: 'foo' is not flat, bow, free or auto, nor a file of points that is "
+      "there\n");
   EXPECT_EQ(shaped("points.csv").code, 3);
   EXPECT_THAT(shaped("points.csv").err, MatchesRegex("alidade: error: points.csv: cannot be read: [^\n]*\n"));
   EXPECT_THAT(shaped("auto").err, HasSubstr("none.jpg"));

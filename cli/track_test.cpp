@@ -222,7 +222,7 @@ TEST_F(TrackCommand, AWrongClockIsNamed) {
   for (const auto& [arrival_s, row] : rows) text += row;
   write_file(path("changed.csv"), text);
   const Outcome outcome = track({}, "changed.csv");
-  EXPECT_THAT(outcome.out, ::testing::HasSubstr("the clock of head 2 seems 30 ms ahead of that of head 1"));
+  EXPECT_THAT(outcome.err, ::testing::HasSubstr("the clock of head 2 seems 30 ms ahead of that of head 1"));
 }
 
 TEST_F(TrackCommand, SaysWhatIsWrongWithItsInput) {

@@ -141,7 +141,8 @@ class RealBoards(unittest.TestCase):
         focal = {}
         for medium, boards in (("air", 12), ("underwater", 6)):
             photos = sorted((DATA / "underwater-dome" / f"{medium}1100").glob("*.png"))
-            result = self.calibrate(*photos, "--board", "8x6", "--square", "0.03", "--board-shape", "flat")
+            result = self.calibrate(*photos, "--board", "8x6", "--square", "0.03", "--board-shape", "flat",
+                                    allowed=(0, 6))  # six photos of a board that bends, held flat: said to be so
             self.assertEqual(self.found(result), boards)
             self.assertLessEqual(result["estimate"]["rms_px"], 0.25)
             focal[medium] = result["estimate"]["camera"]["fx"]

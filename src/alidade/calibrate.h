@@ -13,7 +13,8 @@
 
 /// Calibration of a camera by a board: the whole job, as `alidade calibrate` does it. Its result has the camera with
 /// its covariance, the poses of the board, what was rejected and why, and a verdict.
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// From photos: the corners are found, the camera is solved, the corners are found again with it, and all is solved,
 /// studied and judged. Photos that show no board are named in `counts.skipped`. Throws ConfigError for a config or a
@@ -25,4 +26,5 @@ namespace ALIDADE_PUBLIC alidade {
 [[nodiscard]] Calibration calibrate(std::vector<BoardView> views, const ImageSize& size, const Board& board,
                                     const CalibrateConfig& config = {}, const Progress& progress = {});
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -8,7 +8,8 @@
 
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 enum class BoardKind { chessboard, charuco, aprilgrid, circles, asymmetric_circles };
 
@@ -43,4 +44,5 @@ struct Board {
 /// The board's points [m], index = number. A printed board is nearly this; `BoardShape` says how nearly.
 [[nodiscard]] std::vector<Eigen::Vector3d> points_in_board(const Board& board);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

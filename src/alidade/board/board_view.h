@@ -6,7 +6,8 @@
 
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// One board point as seen: which one, where, and how well.
 struct Corner {
@@ -22,4 +23,5 @@ struct BoardView {
   std::vector<Corner> corners;
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -11,7 +11,8 @@
 #include "alidade/geometry/rigid3.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// One corner of one view after the solve.
 struct CornerResidual {
@@ -74,4 +75,5 @@ struct ImageSize {
                                         const CalibrateConfig& config,
                                         std::span<const Eigen::Vector3d> given_points = {});
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

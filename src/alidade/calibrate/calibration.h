@@ -12,7 +12,8 @@
 #include "alidade/estimation/verdict.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Everything a calibration has to say: what the solve found (camera, views, board_points …), and what it is worth.
 /// `study` and `next` are empty where there is no camera.
@@ -31,4 +32,5 @@ struct Calibration : CalibrateReport {
   Verdict verdict;
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

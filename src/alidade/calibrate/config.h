@@ -9,7 +9,8 @@
 #include "alidade/description/field.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Which shape the board may have: flat as printed; a bow (two parameters: out-of-plane parabolas along x and y);
 /// free (every point moves in 3-D, rigid motion and scale held); given (points learned elsewhere, held); or automatic:
@@ -60,4 +61,5 @@ struct CalibrateConfig {
 /// and outliers. Lens in air and board points are values that come from files.
 [[nodiscard]] FieldList fields_of(CalibrateConfig& config);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

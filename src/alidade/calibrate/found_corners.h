@@ -4,7 +4,8 @@
 #include "alidade/imaging/photos.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// The corners of a board in photos, each with the covariance to be stated: its own, and, where a calibration of the
 /// photos settles, what that finds in the residuals beyond the corners' own.
@@ -26,4 +27,5 @@ struct FoundCorners {
 [[nodiscard]] FoundCorners find_corners(const Photos& photos, const Board& board, const CalibrateConfig& config = {},
                                         const Progress& progress = {});
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

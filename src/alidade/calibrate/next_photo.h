@@ -8,7 +8,8 @@
 #include "alidade/geometry/rigid3.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// A board pose to photograph next, and what it would bring.
 struct NextPhoto {
@@ -29,4 +30,5 @@ struct NextPhotoPlan {
                                              const std::vector<Eigen::Vector3d>& board_points, int num_photos,
                                              const Progress& progress = {});
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -8,7 +8,8 @@
 #include "alidade/calibrate/calibrate.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// The word of --board-shape for a shape.
 [[nodiscard]] std::string shape_name(BoardShape shape);
@@ -44,4 +45,5 @@ struct ShapeTransfer {
 /// The test to show: of the shape in use; else of those proved, or of all, the one that predicts best.
 [[nodiscard]] std::optional<ShapeTransfer> most_telling(std::span<const ShapeTransfer> transfers, BoardShape in_use);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

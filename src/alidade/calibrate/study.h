@@ -10,7 +10,8 @@
 #include "alidade/estimation/progress.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Mean residual over a cell of the picture.
 struct ResidualCell {
@@ -66,4 +67,5 @@ struct CalibrationStudy {
 [[nodiscard]] std::vector<BoardView> used_views(std::span<const BoardView> views, const CalibrateReport& report,
                                                 std::size_t most);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

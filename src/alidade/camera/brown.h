@@ -5,7 +5,8 @@
 #include "alidade/camera/camera_model.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Perspective camera with radial and tangential distortion (Brown–Conrady), in OpenCV's names and order of k1…k3:
 ///     x = X/Z, y = Y/Z, r² = x² + y²,  L = 1 + k1 r² + k2 r⁴ + k3 r⁶
@@ -49,4 +50,5 @@ struct Brown {
 
 static_assert(CameraModel<Brown>);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -12,7 +12,8 @@
 #include "alidade/camera/pinhole.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// A model together with its parameter values.
 template <CameraModel Model>
@@ -72,4 +73,5 @@ struct LensProjection {
 [[nodiscard]] std::vector<std::optional<LensProjection>> project_with_jacobians(
     const Camera& camera, std::span<const Eigen::Vector3d> points_in_cam);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -9,7 +9,8 @@
 #include "alidade/geometry/rigid3.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 struct CameraDiffConfig {
   int cols = 60;
@@ -46,4 +47,5 @@ struct CameraDiff {
 [[nodiscard]] std::optional<CameraDiff> diff_cameras(const Camera& a, const Camera& b,
                                                      const CameraDiffConfig& config = {});
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -7,7 +7,8 @@
 
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 template <class Model>
 using Params = Eigen::Matrix<double, Model::num_params, 1>;
@@ -50,4 +51,5 @@ concept CameraModel = requires(const Params<Model>& params, const Eigen::Vector3
   { Model::unproject(params, domain, px) } -> std::same_as<std::optional<Eigen::Vector3d>>;
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -3,7 +3,8 @@
 #include "alidade/camera/brown.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// A Brown lens in air behind a flat port: air gap d, glass of thickness t with index n_g, then water with index n_w,
 /// the port's unit normal n = (normal_x, normal_y, √(1 − normal_x² − normal_y²)) away from the camera. A point P in
@@ -59,4 +60,5 @@ struct FlatPort {
 
 static_assert(CameraModel<FlatPort>);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -5,7 +5,8 @@
 #include "alidade/camera/camera_model.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Kannala–Brandt fisheye: image radius θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸), θ = angle off the optical axis,
 /// (x_d, y_d) = θ_d/ρ (X, Y), ρ = |(X, Y)|. Same parameters and order of k as cv::fisheye; skew in px as everywhere.
@@ -46,4 +47,5 @@ struct KannalaBrandt {
 
 static_assert(CameraModel<KannalaBrandt>);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

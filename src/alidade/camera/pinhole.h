@@ -5,7 +5,8 @@
 #include "alidade/camera/camera_model.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Ideal perspective camera: (u, v) = (fx x + skew y + cx, fy y + cy), x = X/Z, y = Y/Z.
 /// Hartley & Zisserman, "Multiple View Geometry", 2003, eq. (6.10).
@@ -38,4 +39,5 @@ struct Pinhole {
 
 static_assert(CameraModel<Pinhole>);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

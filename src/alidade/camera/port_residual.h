@@ -7,7 +7,8 @@
 #include "alidade/camera/camera.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 struct PortResidualConfig {
   std::vector<double> fit_ranges_m{0.75, 1.0, 1.5};  ///< Where a calibration in water would hold its boards.
@@ -38,4 +39,5 @@ inline constexpr double port_residual_limit_px = 0.3;
 /// docs/maths/camera-models.md; T. Treibitz et al., "Flat refractive geometry", PAMI 34(1), 2012, for why it remains.
 [[nodiscard]] std::optional<PortResidual> port_residual(const Camera& port, const PortResidualConfig& config = {});
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -3,7 +3,8 @@
 #include "alidade/camera/camera.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Values over the picture on a regular grid of pixels: value (col, row) stands at (u0 + col·du, v0 + row·dv).
 struct PixelGrid {
@@ -25,4 +26,5 @@ struct PixelGrid {
 /// derived in docs/maths/camera-models.md.
 [[nodiscard]] PixelGrid projection_sigma(const Camera& camera, int cols, int rows, double distance_m);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -9,7 +9,8 @@
 
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Which numbers a field may have. NaN and infinity it may never have.
 struct Limits {
@@ -95,4 +96,5 @@ template <typename Enum>
 /// 640x480".
 [[nodiscard]] TextCode pair_code(int& first, int& second, int max, const std::string& example);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

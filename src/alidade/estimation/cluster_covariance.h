@@ -8,7 +8,8 @@
 #include "alidade/estimation/verdict.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// What one independent cluster of measurements (a photo, a shot, a block of time) does to the estimate, in the
 /// parameters whose covariance is asked for: H = Σ A + priors is the information of all shared parameters (the
@@ -61,4 +62,5 @@ struct ClusterCovariance {
 [[nodiscard]] Check clusters_agree(const ClusterCovariance& covariance, const std::string& cluster,
                                    const std::string& causes, const std::string& figure);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

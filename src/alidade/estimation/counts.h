@@ -6,7 +6,8 @@
 
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// A row, or a photo, that was left out, and why. Line 0: the whole file.
 struct SkippedInput {
@@ -23,4 +24,5 @@ struct Counts {
   std::vector<SkippedInput> skipped;
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

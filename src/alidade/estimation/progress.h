@@ -7,7 +7,8 @@
 
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// The person pressed Ctrl-C; the door turns it into one line and its exit code, nothing is written.
 struct Interrupted : std::runtime_error {
@@ -22,4 +23,5 @@ inline void report_progress(const Progress& progress, std::string_view what, std
   if (progress && !progress(what, done, total)) throw Interrupted();
 }
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -6,7 +6,8 @@
 
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Exit codes, the same for every command, so that scripts can tell "bad input" from "no answer" from "our bug".
 enum class ExitCode : int {
@@ -71,4 +72,5 @@ void heed_assumptions(const std::vector<Assumption>& assumed, Verdict& verdict);
 /// The value with so many significant digits, as sentences and checks quote it.
 [[nodiscard]] std::string text_of(double value, int digits = 3);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -5,7 +5,8 @@
 #include "alidade/geometry/so3.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Rigid motion that maps coordinates in frame a to coordinates in frame b. Name every instance `b_from_a`:
 ///     point_in_cam   = cam_from_board * point_in_board
@@ -34,4 +35,5 @@ struct Rigid3 {
   return {(c_from_b.rotation * b_from_a.rotation).normalized(), c_from_b * b_from_a.translation};
 }
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

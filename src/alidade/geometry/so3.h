@@ -5,7 +5,8 @@
 
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Unit quaternion of a rotation vector [rad]: (cos ½θ, sin(½θ)/θ · φ). Exact at zero.
 /// Solà, Deray & Atchuthan, "A micro Lie theory", 2018, eq. (133).
@@ -44,4 +45,5 @@ namespace ALIDADE_PUBLIC alidade {
   return Eigen::Quaterniond(w, axis.x(), axis.y(), axis.z()).normalized();
 }
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

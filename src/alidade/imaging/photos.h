@@ -11,7 +11,8 @@ namespace cv {
 class Mat;
 }
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Gives photo `i`; called from several threads, each photo once. What it throws becomes that photo's reason.
 using PhotoLoader = std::function<cv::Mat(std::size_t i)>;
@@ -22,4 +23,5 @@ struct Photos {
   PhotoLoader load;
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -5,7 +5,8 @@
 #include "alidade/io/outcome.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// The document of a calibration, its lines for a person, and camera.yaml, corners.csv, poses.csv and board_points.csv
 /// where there is a camera.
@@ -17,4 +18,5 @@ namespace ALIDADE_PUBLIC alidade {
 /// Adds small pictures of the photos for the report, and the worst one without its distortion.
 void add_pictures(const Calibration& calibration, const Photos& photos, JobOutcome& outcome);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -9,7 +9,8 @@
 #include "alidade/io/files.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// `opencv` is cv::FileStorage (YAML; XML and JSON are read too), `ros` a camera_info YAML, `kalibr` a camchain YAML,
 /// `mrcal` a .cameramodel, `colmap` a cameras.txt. The traps of each: docs/maths/camera-models.md.
@@ -50,4 +51,5 @@ void write_camera(const std::filesystem::path& file, const Camera& camera, Camer
 [[nodiscard]] CameraFormat camera_format(std::string_view name);
 [[nodiscard]] std::string_view camera_format_name(CameraFormat format);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

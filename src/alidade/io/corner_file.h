@@ -12,7 +12,8 @@
 #include "alidade/io/result_document.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Corners as CSV: photo,corner,u_px,v_px,sigma_u_px,sigma_v_px,corr_uv. Places to 10⁻⁹ px, so that
 /// what is read back gives the same camera.
@@ -39,4 +40,5 @@ void require_corners_inside(const ImageSize& size, const std::filesystem::path& 
 [[nodiscard]] std::string board_points_csv(std::span<const Eigen::Vector3d> points_in_board);
 [[nodiscard]] std::vector<Eigen::Vector3d> read_board_points(const std::filesystem::path& file, int num_points);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

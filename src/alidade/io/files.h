@@ -7,7 +7,8 @@
 
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// The outside world is wrong: one line, "file:line: column: what; what to do". Becomes exit code 3.
 struct InputError : std::runtime_error {
@@ -21,4 +22,5 @@ struct InputError : std::runtime_error {
 /// ever stands under `file`. Throws InputError if it cannot be written.
 void write_file(const std::filesystem::path& file, std::string_view content);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

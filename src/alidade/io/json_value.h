@@ -10,7 +10,8 @@
 
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// A JSON value made of plain C++ ones: `value["camera"]["fx"] = 532.8`. Objects keep the order of insertion. Numbers
 /// that are not finite become null in the text.
@@ -59,4 +60,5 @@ class JsonValue {
 /// The numbers to so many decimals: what a reader can use, in a file of a fitting size.
 [[nodiscard]] std::vector<double> rounded(std::vector<double> numbers, int decimals);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -6,7 +6,8 @@
 #include "alidade/io/result_document.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// A file beside result.json, or a picture (JPEG) of the report.
 struct NamedBytes {
@@ -22,4 +23,5 @@ struct JobOutcome {
   std::vector<NamedBytes> pictures;  ///< The most wanted first.
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -12,7 +12,8 @@
 #include "alidade/io/result_document.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// The photos of files and folders. Each is read once; the second look comes from memory while the set is small. They
 /// may be loaded from many threads; copies share what was read.
@@ -44,4 +45,5 @@ class PhotoSet {
 /// The photos of a file or a folder: `calibrate(photos_in("photos"), board)`. Throws as PhotoSet does.
 [[nodiscard]] Photos photos_in(const std::filesystem::path& path);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -11,7 +11,8 @@
 #include "alidade/io/json_value.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// A file that a result was made from.
 struct InputFile {
@@ -77,4 +78,5 @@ struct ResultDocument {
 /// table, values of a grid or the covariance do not have the length they must have.
 [[nodiscard]] std::string result_text(const ResultDocument& document);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -5,10 +5,12 @@
 #include "alidade/io/outcome.h"
 #include "alidade/public.h"
 
-namespace ALIDADE_PUBLIC alidade {
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Leaves in `folder` what the command leaves there: result.json, the files of the estimate, report.html; all of them
 /// at once, or none. Throws InputError where they cannot be written. `save(outcome_of(calibration), "result")`.
 void save(JobOutcome outcome, const std::filesystem::path& folder);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

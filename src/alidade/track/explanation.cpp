@@ -113,7 +113,8 @@ std::optional<Explanation> foreign_head(const Sights& sights, std::span<const Ri
     if (others.size() == sights.size() || !tried(others, heads, config).fits) continue;
     if (found) return std::nullopt;  // of two that could be it neither is named
     found = {"the sights of " + head_name(heads, head) + " agree with none of the other heads, which agree",
-             "its row in the rig file is that of another head, or its events are: leave it out, or place it anew"};
+             "its row in the rig file is that of another head, or its events are: leave it out, or place it anew",
+             true};
   }
   return found;
 }

@@ -13,6 +13,7 @@ struct ClockShift;
 /// A mistake under which sights that do not fit the rig would.
 struct Explanation {
   std::string what, to_do;
+  bool is_foreign_head = false;  ///< One head agrees with none of the others: by its place, or by its clock.
 };
 
 /// Swapped heads, a wrong sign of an angle or a mirrored picture, of all heads or of one, degrees, a head that is not

@@ -35,9 +35,13 @@ bool fits(const TrackReport& report) {
 using Sights = std::vector<TargetSight>;
 using Fault = Explanation;
 
-/// Why no track began although there were two heads at a time.
-Fault why_no_start(std::span<const TargetSight> given, std::span<const RigHead> heads, const TrackConfig& config) {
+/// How many pairs of sights there are at a time, and of them, with parallel rays.
+struct PairCounts {
   std::size_t together = 0, parallel = 0;
+};
+
+PairCounts count_pairs(std::span<const TargetSight> given, std::span<const RigHead> heads, const TrackConfig& config) {
+  PairCounts counts;
   Sights sights(given.begin(), given.end());
   std::ranges::stable_sort(sights, {}, &TargetSight::t_capture_s);
   for (std::size_t i = 1; i < sights.size(); ++i) {
@@ -45,11 +49,22 @@ Fault why_no_start(std::span<const TargetSight> given, std::span<const RigHead> 
     if (a.head == b.head || a.head >= heads.size() || b.head >= heads.size() ||
         std::abs(a.t_capture_s - b.t_capture_s) > config.tracker.together_s)
       continue;
-    ++together;
+    ++counts.together;
     const auto ray_a = ray_in_world(heads[a.head], a);
     const auto ray_b = ray_in_world(heads[b.head], b);
-    if (ray_a && ray_b && !nearest_to_rays(*ray_a, *ray_b)) ++parallel;
+    if (ray_a && ray_b && !nearest_to_rays(*ray_a, *ray_b)) ++counts.parallel;
   }
+  return counts;
+}
+
+bool are_parallel(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackConfig& config) {
+  const PairCounts counts = count_pairs(sights, heads, config);
+  return 2 * counts.parallel > counts.together;
+}
+
+/// Why no track began although there were two heads at a time.
+Fault why_no_start(std::span<const TargetSight> given, std::span<const RigHead> heads, const TrackConfig& config) {
+  const auto [together, parallel] = count_pairs(given, heads, config);
   if (together == 0)
     return {
         "the heads never see the target within " + text_of(1e3 * config.tracker.together_s, 2) + " ms of each other",
@@ -244,15 +259,20 @@ Causes causes_of(const TrackReport& report, std::span<const TargetSight> sights,
   Causes causes;
   if (!fits(report) || report.nis_per_dof > good_nis_high || used_share(report) < 1.0 - care_left_out)
     causes.mistake = explanation_of(sights, heads, config);
-  if (causes.mistake) return causes;
-  causes.second = second_target(report, sights, heads, found);
+  if (causes.mistake && !causes.mistake->is_foreign_head) return causes;
   causes.shift = probable_clock_shift(sights, heads, found);
+  // A head with a wrong clock agrees with none of the others, either.
+  if (causes.mistake && !causes.shift) return causes;
+  causes.mistake.reset();
+  causes.second = second_target(report, sights, heads, found);
   return causes;
 }
 
 /// Why there is no track to be told of.
 std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes, std::span<const TargetSight> sights,
                                 std::span<const RigHead> heads, const TrackConfig& config) {
+  // Where nothing moves against the heads, many a mistake would make the rays meet: that explains nothing.
+  if (report.num_starts == 0 && are_parallel(sights, heads, config)) return why_no_start(sights, heads, config);
   if (causes.mistake && (!fits(report) || used_share(report) < 1.0 - most_left_out)) return causes.mistake;
   if (fits(report)) return std::nullopt;
   if (causes.shift) return Fault{clock_text(*causes.shift, heads), "set the heads' clocks"};

@@ -70,7 +70,9 @@ class Package(unittest.TestCase):
 
     def test_the_library_shows_what_public_headers_declare(self):
         symbols = run("nm", "--dynamic", "--defined-only", "--demangle", self.library)
-        names = re.findall(r" T alidade::(?:detail::)?([\w~:]+)", symbols)
+        # Functions compiled for several processors have a resolver, which compilers never hide.
+        shown = [line for line in symbols.splitlines() if "[clone" not in line]
+        names = re.findall(r" T alidade::(?:detail::)?([\w~:]+)", "\n".join(shown))
         declared = "".join(header.read_text() for header in (self.prefix / "include").rglob("*.h"))
         self.assertIn("calibrate", names)
         hidden = sorted({name for name in names if not re.search(rf"\b{re.escape(name.split('::')[0])}\b", declared)})

@@ -131,6 +131,24 @@ Verdict fang_refusal(const ObserveReport& report, const RotationLog& log, const 
   return verdict;
 }
 
+/// A scale that no instrument has was not measured with an error, but read in another way.
+void add_scale_check(const ObserveReport& report, Verdict& verdict) {
+  constexpr double most = 0.1;
+  for (const ObservedQuantity& quantity : report.quantities) {
+    if (!quantity.name.starts_with("scale_") || std::abs(quantity.value) <= most) continue;
+    const std::string reading = quantity.value > 0.0 ? "the angles are half of what the head turns"
+                                                     : "the angles are twice what the head turns";
+    verdict.checks.push_back({.name = "rotation read as it is",
+                              .state = State::bad,
+                              .text = "no encoder is off by " + text_of(100.0 * std::abs(quantity.value), 2) +
+                                      " %: " + reading + ", or of another unit",
+                              .value = std::abs(quantity.value),
+                              .limit = most,
+                              .unit = "1"});
+    return;
+  }
+}
+
 }  // namespace
 
 Verdict observe_verdict(const ObserveReport& report, const RotationLog& log, const ObserveConfig& config) {
@@ -173,6 +191,7 @@ Verdict observe_verdict(const ObserveReport& report, const RotationLog& log, con
   }
   Verdict verdict;
   add_checks(report, verdict);
+  add_scale_check(report, verdict);
   for (const Check& check : verdict.checks) {
     const bool speaks = check.state == State::care || check.state == State::bad;
     if (!speaks || check.state <= verdict.state) continue;

@@ -10,7 +10,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "alidade/imaging/find_board.h"
+#include "alidade/board_detector/find_board.h"
 #include "alidade/simulate/board_photos.h"
 #include "alidade/simulate/example_camera.h"
 
@@ -93,7 +93,7 @@ struct Score {
 
 void run(const Condition& condition, const std::vector<Method>& methods, int num_photos) {
   const Board board{BoardKind::chessboard, 10, 10, 0.02, 0.0, ""};
-  constexpr double fill_per_px = 11.0 / 600.0;  // eleven squares over the picture's height
+  constexpr double fill_per_px = 11.0 / 600.0;  // eleven squares over the image's height
   const BoardScene scene = draw_board_scene(*example_camera("brown", 800, 600), board,
                                             {.num_photos = num_photos,
                                              .max_tilt_rad = condition.max_tilt_rad,

@@ -13,10 +13,11 @@
 namespace alidade::bench {
 namespace {
 
-/// A filter with so many features around a known target, after a second of frames, and the sights of the next one.
+/// A filter with so many features around a known target, after a second of frames, and the observations of the next
+/// one.
 struct Ready {
   LocalizationFilter filter;
-  std::vector<FeatureSight> sights;
+  std::vector<FeatureObservation> observations;
 };
 
 Ready ready(int num_features, FeatureKind kind) {
@@ -29,36 +30,37 @@ Ready ready(int num_features, FeatureKind kind) {
   LocalizationFilterConfig config;
   // As large as the map, as in a run: a larger one would not be in the cache after it was copied.
   config.state_capacity = motion_dim + 3 * static_cast<int>(sample.config.target.size()) + 6 * num_features;
-  config.sights_capacity = 320;
+  config.observations_capacity = 320;
   config.linear_below = kind == FeatureKind::xyz ? 1e9 : 0.0;
   Ready made{LocalizationFilter(sample.camera, sample.config.start->motion, sample.config.start->cov, config), {}};
   for (const KnownPoint& point : sample.config.target)
     made.filter.add_known(point.id, point.point_in_world, point.sigma_m);
-  for (const SightFrame& frame : sample.frames) {
+  for (const ObservationFrame& frame : sample.frames) {
     made.filter.predict(scene.dt_s);
-    made.sights = frame.sights;
+    made.observations = frame.observations;
     if (&frame == &sample.frames.back()) break;
-    (void)made.filter.update(frame.sights);
-    for (const FeatureSight& sight : frame.sights) made.filter.add(sight.id, sight.px, {0.7, 0.1});
+    (void)made.filter.update(frame.observations);
+    for (const FeatureObservation& observation : frame.observations)
+      made.filter.add(observation.id, observation.px, {0.7, 0.1});
     made.filter.convert_linear();
   }
   return made;
 }
 
-/// The update, mean and covariance, with the first `most_sights` features measured; what it needs of copies is not
+/// The update, mean and covariance, with the first `max_observations` features measured; what it needs of copies is not
 /// timed.
-void time_update(benchmark::State& state, int num_features, FeatureKind kind, std::size_t most_sights) {
+void time_update(benchmark::State& state, int num_features, FeatureKind kind, std::size_t max_observations) {
   Ready at = ready(num_features, kind);
-  if (at.sights.size() > most_sights) at.sights.resize(most_sights);
+  if (at.observations.size() > max_observations) at.observations.resize(max_observations);
   LocalizationFilter filter = at.filter;
   for (auto _ : state) {
     state.PauseTiming();
     filter = at.filter;
     state.ResumeTiming();
-    benchmark::DoNotOptimize(filter.update(at.sights).num_used);
+    benchmark::DoNotOptimize(filter.update(at.observations).num_used);
   }
   state.counters["state"] = at.filter.dim();
-  state.counters["sights"] = static_cast<double>(at.sights.size());
+  state.counters["sights"] = static_cast<double>(at.observations.size());
 }
 
 /// Prediction and the expected place of every feature: what a search in images needs before each frame.
@@ -72,7 +74,7 @@ void time_expected(benchmark::State& state, int num_features) {
   state.counters["state"] = filter.dim();
 }
 
-/// A picture of 640×480, from pixels to pose, with a state of at least 350 and 60 features found in it: the median of
+/// An image of 640×480, from pixels to pose, with a state of at least 350 and 60 features found in it: the median of
 /// two seconds of film of a room, rendered beforehand.
 void time_frames(benchmark::State& state) {
   testing::RoomScene scene;
@@ -93,11 +95,11 @@ void time_frames(benchmark::State& state) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
   };
   config.target = rectangle_target(scene.rectangle_width_m, scene.rectangle_height_m);
-  config.eyes.least_found = 100;
-  config.eyes.most_tried = config.eyes.most_features = 120;
+  config.eyes.min_found = 100;
+  config.eyes.max_tried = config.eyes.max_features = 120;
   for (auto _ : state) {
     std::size_t at = 0;
-    const NextPicture next = [&](cv::Mat& grey, long& frame, double& t_s) {
+    const NextImage next = [&](cv::Mat& grey, long& frame, double& t_s) {
       if (at == film.size()) return false;
       grey = film[at];
       frame = static_cast<long>(at);
@@ -133,7 +135,7 @@ void add_all() {
       time_update(state, num_features, FeatureKind::inverse_depth, 1000);
     })->Unit(benchmark::kMillisecond);
     benchmark::RegisterBenchmark(("update/inverse_depth/of_30" + end).c_str(), [=](benchmark::State& state) {
-      time_update(state, num_features, FeatureKind::inverse_depth, 30);  // as many as are looked for in a picture
+      time_update(state, num_features, FeatureKind::inverse_depth, 30);  // as many as are looked for in an image
     })->Unit(benchmark::kMillisecond);
     benchmark::RegisterBenchmark(("update/xyz" + end).c_str(), [=](benchmark::State& state) {
       time_update(state, num_features, FeatureKind::xyz, 1000);

@@ -9,7 +9,8 @@
 namespace alidade::bench {
 namespace {
 
-/// Steps of one head, filter, search and controller of both axes, on the sights of a recorded run. The goal is 50 µs.
+/// Steps of one head, filter, search and controller of both axes, on the observations of a recorded run. The goal is 50
+/// µs.
 void time_steps(benchmark::State& state, ControllerKind kind, const ServoPlant& plant) {
   ServoScene scene = xiahou_servo_scene();
   scene.path.radius_m = 0.3;
@@ -23,8 +24,8 @@ void time_steps(benchmark::State& state, ControllerKind kind, const ServoPlant& 
   for (const ServoRow& row : run.rows) {
     if (row.head != 0) continue;
     HeadServoInput input{row.t_s, row.measured_rad, std::nullopt};
-    if (row.is_in_picture)
-      input.sight = HeadSight{row.t_s, row.measured_rad, row.error_px + centre_of(scene.heads[0].camera)};
+    if (row.is_in_image)
+      input.observation = HeadObservation{row.t_s, row.measured_rad, row.error_px + centre_of(scene.heads[0].camera)};
     inputs.push_back(input);
   }
   for (auto _ : state) {

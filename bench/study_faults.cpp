@@ -13,7 +13,7 @@
 #include "alidade/track/track.h"
 #include "alidade/track/track_assumed.h"
 
-// How large must a fault be to be seen? Rigs, clocks and pictures of `track`, axes of `identify`, each with one fault
+// How large must a fault be to be seen? Rigs, clocks and images of `track`, axes of `identify`, each with one fault
 // of growing size. Prints Markdown; exits 1 where an answer was called good and was off by more than 5σ.
 
 namespace {
@@ -31,20 +31,20 @@ struct Ladder {
   std::function<Outcome(double size, std::uint64_t seed)> run;
 };
 
-/// Of the rows' own checks, and no assumption: what the sights themselves say.
+/// Of the rows' own checks, and no assumption: what the observations themselves say.
 Outcome tracked(const std::string& scenario, const std::function<void(TrackFaults&)>& fault, std::uint64_t seed) {
   TrackScene scene = *track_scenario(scenario);
   fault(scene.faults);
-  const std::vector<TargetSight> sights = reproduce::sights_of(scene, seed);
+  const std::vector<TargetObservation> observations = reproduce::observations_of(scene, seed);
   const TrackConfig config;
-  const TrackReport report = track_target(sights, scene.heads, config);
-  Verdict verdict = track_verdict(report, sights, scene.heads, config);
+  const TrackReport report = track_target(observations, scene.heads, config);
+  Verdict verdict = track_verdict(report, observations, scene.heads, config);
   Outcome outcome;
   outcome.is_seen = verdict.state != State::good;
   if (verdict.exit_code != ExitCode::ok) return outcome;
   Rig rig;
   rig.heads = scene.heads;
-  heed_assumptions(track_assumed(sights, rig, config, report, {}), verdict);
+  heed_assumptions(track_assumed(observations, rig, config, report, {}), verdict);
   double worst = 0.0;
   for (const TrackStep& step : report.steps) {
     if (!step.has_belief || step.t_s < 1.5) continue;

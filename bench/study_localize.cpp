@@ -169,8 +169,9 @@ UnderwaterSample disturbed(const Disturbance& what, std::uint64_t seed) {
   if (!what.leaves_out) return sample;
   const UnderwaterSequence sequence = simulate_underwater(scene, seed);
   for (std::size_t k = 0; k < sample.frames.size(); ++k) {
-    std::erase_if(sample.frames[k].sights, [&](const FeatureSight& sight) {
-      return std::ranges::find(sequence.frames[k].sights, sight.id, &UnderwaterSight::id)->is_mismatch;
+    std::erase_if(sample.frames[k].observations, [&](const FeatureObservation& observation) {
+      return std::ranges::find(sequence.frames[k].observations, observation.id, &UnderwaterObservation::id)
+          ->is_mismatch;
     });
   }
   return sample;
@@ -178,7 +179,7 @@ UnderwaterSample disturbed(const Disturbance& what, std::uint64_t seed) {
 
 struct DisturbedResult {
   double rms_mm = 0.0;
-  std::size_t most_lost = 0;  ///< Frames with sights but without three that fit.
+  std::size_t max_lost = 0;  ///< Frames with observations but without three that fit.
 };
 
 DisturbedResult run_disturbed(const Disturbance& what, int num) {
@@ -186,22 +187,22 @@ DisturbedResult run_disturbed(const Disturbance& what, int num) {
   DisturbedResult result;
   for (int seed = 0; seed < num; ++seed) {
     const UnderwaterSample sample = disturbed(what, 600000 + static_cast<std::uint64_t>(seed));
-    const LocalizeReport report = localize_sights(sample.camera, sample.frames, sample.config, sample.truth);
+    const LocalizeReport report = localize_observations(sample.camera, sample.frames, sample.config, sample.truth);
     std::size_t lost = 0;
     for (std::size_t k = 0; k < report.path.size(); ++k) {
-      if (sample.frames[k].sights.empty()) continue;
+      if (sample.frames[k].observations.empty()) continue;
       lost += report.path[k].event == FrameEvent::predicted ? 1 : 0;
       squares.push_back(
           (report.path[k].world_from_cam.translation - sample.truth[k].world_from_cam.translation).squaredNorm());
     }
-    result.most_lost = std::max(result.most_lost, lost);
+    result.max_lost = std::max(result.max_lost, lost);
     nis.push_back(report.nis_per_dof);
     const auto num_gated = static_cast<double>(report.num_gated);
     gated.push_back(100.0 * num_gated / (num_gated + static_cast<double>(report.num_used)));
   }
   result.rms_mm = 1e3 * std::sqrt(mean(squares));
   fmt::print("| {} | {:.2f} | {:.2f} | {:.1f} | {} |\n", what.name, result.rms_mm, mean(nis), mean(gated),
-             result.most_lost);
+             result.max_lost);
   return result;
 }
 
@@ -214,7 +215,7 @@ bool study_disturbances(int num) {
   const DisturbedResult black = run_disturbed({"1 s black", 0.0, 1.0}, num);
   check("error with 40 % mismatches over without", wrong.rms_mm / clean.rms_mm, 0.0, 1.1);
   const bool met = check("error with 40 % mismatches over 40 % left out", wrong.rms_mm / fewer.rms_mm, 0.0, 1.1);
-  return print_goals(check("frames lost after the blackout, most", static_cast<double>(black.most_lost), 0.0, 10.0) &&
+  return print_goals(check("frames lost after the blackout, most", static_cast<double>(black.max_lost), 0.0, 10.0) &&
                      met);
 }
 

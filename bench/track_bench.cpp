@@ -25,12 +25,12 @@ RigUncertainty calibrated(const std::vector<RigHead>& heads) {
   return rig_uncertainty(rig, 1e-3);
 }
 
-/// Sights a second, as a camera would give them: gates, history and all. items/s is what the goal speaks of.
-void time_sights(benchmark::State& state, const std::string& scenario, TrackMethod method, bool counts) {
+/// Observations a second, as a camera would give them: gates, history and all. items/s is what the goal speaks of.
+void time_observations(benchmark::State& state, const std::string& scenario, TrackMethod method, bool counts) {
   const TrackScene scene = *track_scenario(scenario);
-  std::vector<TargetSight> sights;
-  for (const SimulatedSight& s : simulate_track(scene, 1))
-    sights.push_back({s.t_capture_s, s.t_arrival_s, s.head, s.pan_tilt_rad, s.px});
+  std::vector<TargetObservation> observations;
+  for (const SimulatedObservation& s : simulate_track(scene, 1))
+    observations.push_back({s.t_capture_s, s.t_arrival_s, s.head, s.pan_tilt_rad, s.px});
   TrackerConfig config;
   config.method = method;
   config.sigma_a_m_s2 = scene.sigma_a_m_s2;
@@ -38,9 +38,10 @@ void time_sights(benchmark::State& state, const std::string& scenario, TrackMeth
   state.counters["errors"] = config.errors.num();
   for (auto _ : state) {
     Tracker tracker(scene.heads, config);
-    for (const TargetSight& sight : sights) benchmark::DoNotOptimize(tracker.take(sight).belief.x[0]);
+    for (const TargetObservation& observation : observations)
+      benchmark::DoNotOptimize(tracker.take(observation).belief.x[0]);
   }
-  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(sights.size()));
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(observations.size()));
 }
 
 void add_all() {
@@ -48,8 +49,9 @@ void add_all() {
     for (const std::string scenario : {"B", "C", "G"}) {
       for (const bool counts : {false, true}) {
         const std::string name = "track/" + std::string(method_name(method)) + "/" + scenario;
-        benchmark::RegisterBenchmark((name + (counts ? "/errors" : "")).c_str(),
-                                     [=](benchmark::State& state) { time_sights(state, scenario, method, counts); });
+        benchmark::RegisterBenchmark((name + (counts ? "/errors" : "")).c_str(), [=](benchmark::State& state) {
+          time_observations(state, scenario, method, counts);
+        });
       }
     }
   }

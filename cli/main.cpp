@@ -1,24 +1,24 @@
-#include "cli/commands.h"
-#include "cli/frame.h"
+#include "cli/app/app.h"
+#include "cli/commands/commands.h"
 
 namespace {
 
-void add_commands(alidade::cli::Frame& frame) {
-  alidade::cli::add_calibrate(frame);
-  alidade::cli::add_camera(frame);
-  alidade::cli::add_corners(frame);
-  alidade::cli::add_identify(frame);
-  alidade::cli::add_localize(frame);
-  alidade::cli::add_observe(frame);
-  alidade::cli::add_plan(frame);
-  alidade::cli::add_project(frame);
-  alidade::cli::add_rangefinder(frame);
-  alidade::cli::add_reproduce(frame);
-  alidade::cli::add_rig(frame);
-  alidade::cli::add_servo(frame);
-  alidade::cli::add_simulate(frame);
-  alidade::cli::add_track(frame);
-  alidade::cli::add_view(frame);
+void add_commands(alidade::cli::App& app) {
+  alidade::cli::add_calibrate(app);
+  alidade::cli::add_camera(app);
+  alidade::cli::add_corners(app);
+  alidade::cli::add_identify(app);
+  alidade::cli::add_localize(app);
+  alidade::cli::add_observe(app);
+  alidade::cli::add_plan(app);
+  alidade::cli::add_project(app);
+  alidade::cli::add_rangefinder(app);
+  alidade::cli::add_reproduce(app);
+  alidade::cli::add_rig(app);
+  alidade::cli::add_servo(app);
+  alidade::cli::add_simulate(app);
+  alidade::cli::add_track(app);
+  alidade::cli::add_view(app);
 }
 
 }  // namespace

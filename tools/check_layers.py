@@ -5,9 +5,12 @@ import re
 import sys
 
 FOUNDATIONS = {"geometry", "estimation", "description"}
-SENSORS = {"camera", "pantilt", "beam", "board", "imaging", "matching"}
-ESTIMATORS = {"calibrate", "localize", "observe", "rangefinder", "rig", "servo", "track", "turned"}
+VISION = {"imaging", "corners", "board_detector", "spot", "patches", "target", "matching"}  # measurements in an image
+SENSORS = {"camera", "pantilt", "beam", "board"} | VISION
+ESTIMATORS = {"calibrate", "localize", "network", "observe", "rangefinder", "rig", "servo", "track", "turned"}
 COMPOSITIONS = {"loop"}  # put estimators and the simulator together
+JOBS = FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate"}
+FILES = {"files", "images", "formats", "tables"}  # what stands on a disk, read and written
 
 MAY_INCLUDE = {
     "geometry": set(),
@@ -18,24 +21,34 @@ MAY_INCLUDE = {
     "board": FOUNDATIONS | {"camera"},
     "beam": FOUNDATIONS | {"camera", "board"},
     "imaging": FOUNDATIONS | {"camera", "board"},
+    "corners": FOUNDATIONS | {"imaging"},
+    "board_detector": FOUNDATIONS | {"camera", "board", "imaging", "corners"},
+    "spot": FOUNDATIONS | {"camera", "board", "imaging"},
+    "patches": FOUNDATIONS | {"camera", "imaging"},
+    "target": FOUNDATIONS | {"camera", "board", "imaging"},
     "matching": FOUNDATIONS | {"imaging"},
     "simulate": FOUNDATIONS | SENSORS,
     **{estimator: FOUNDATIONS | SENSORS for estimator in ESTIMATORS},
     **{composition: FOUNDATIONS | SENSORS | ESTIMATORS | {"simulate"} for composition in COMPOSITIONS},
-    "reproduce": FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate"},
-    "report": FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate"},
-    "io": FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate", "reproduce", "report"},
-    "live": FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate", "report", "io"},
-    "testing": FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate", "reproduce", "report", "io"},
+    "reproduce": JOBS,
+    "report": JOBS,
+    "files": FOUNDATIONS,
+    "images": FOUNDATIONS | {"imaging", "files"},
+    "formats": JOBS | {"files"},
+    "tables": JOBS | {"files", "formats"},
+    "detect": JOBS | FILES,
+    "results": JOBS | FILES | {"reproduce", "report", "detect"},
+    "live": JOBS | FILES | {"report", "results"},
+    "testing": JOBS | FILES | {"reproduce", "report", "detect", "results"},
 }
 # A room's public header and the job behind it, src/alidade/ROOM.h and .cpp, may include what the room may, and other
-# public headers; `files` is io's, `alidade` all of them.
-FACES_OF = {"files": {"io"} | MAY_INCLUDE["io"], "alidade": set(), "public": set()}
-TESTS_MAY_ALSO = {"testing", "simulate", "io"}
+# public headers; `files` is theirs who read and write, `alidade` all of them.
+FACES_OF = {"files": {"results"} | MAY_INCLUDE["results"], "alidade": set(), "public": set()}
+TESTS_MAY_ALSO = {"testing", "simulate", "detect", "results"} | FILES
 INCLUDE = re.compile(r'#include "alidade/(\w+)/')
 # A public header speaks Eigen and std: these cost seconds in every file that sees them.
 HEAVY = re.compile(r'#include [<"](ceres|opencv2|nlohmann|yaml-cpp|tbb|fmt|boost)/')
-# Only io/ opens files, only live/ listens; nothing else in the library prints, starts threads or looks at a clock or the
+# Only FILES and results/ open files, only live/ listens; nothing else in the library prints, starts threads or looks at a clock or the
 # environment.
 OUTSIDE_WORLD = re.compile(
     r"#include <(iostream|fstream|thread|chrono|ctime|unistd\.h)>|\b(f?printf|puts|fopen|getenv|imread|imwrite)\(")
@@ -67,8 +80,8 @@ def faults_of(file, folder):
         if heavy and file.suffix == ".h" and not is_test:
             found.append(f"{file}:{number}: {heavy[1]} belongs in a .cpp")
         outside = OUTSIDE_WORLD.search(line.split("//")[0])
-        if outside and folder not in {"io", "live"} and not is_test:
-            found.append(f"{file}:{number}: only io/, live/ and cli/ may use {outside[1] or outside[2]}")
+        if outside and folder not in FILES | {"detect", "results", "live"} and not is_test:
+            found.append(f"{file}:{number}: only what reads and writes, live/ and cli/ may use {outside[1] or outside[2]}")
     if len(lines) > LINES_A_FILE:
         found.append(f"{file}: {len(lines)} lines; a file has at most {LINES_A_FILE}")
     return found
@@ -82,7 +95,7 @@ def surface_of(files, root):
             continue
         room = pathlib.Path(file.relative_to(root).parts[0]).stem
         for folder, header in re.findall(r'#include "alidade/(\w+)/([^"]+)"', file.read_text()):
-            if folder != {"files": "io"}.get(room, room):
+            if folder != room:
                 surface.setdefault(folder, set()).add(header)
     return surface
 

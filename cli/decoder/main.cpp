@@ -1,4 +1,4 @@
-// alidade_video FILE grey|bgr: writes a video's frames to standard output, for src/alidade/io/video_process.h:
+// alidade_video FILE grey|bgr: writes a video's frames to standard output, for src/alidade/images/video_process.h:
 // 64 characters "alidade_video WIDTH HEIGHT FRAMES", then for each frame 'f' and its bytes, and 'e' at the end.
 // A program of its own, because OpenCV's videoio loads a hundred libraries that no other command needs.
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace {
 
-/// As 8-bit grey or BGR; empty if it is not such a picture.
+/// As 8-bit grey or BGR; empty if it is not such an image.
 cv::Mat in_colours(const cv::Mat& frame, bool is_bgr) {
   cv::Mat result;
   if (frame.depth() != CV_8U) return result;
@@ -20,26 +20,26 @@ cv::Mat in_colours(const cv::Mat& frame, bool is_bgr) {
   return result;
 }
 
-bool write_header(const cv::Mat& picture, double frames) {
+bool write_header(const cv::Mat& image, double frames) {
   std::array<char, 64> header{};
   const unsigned long count = frames > 0.0 && frames < 1e9 ? static_cast<unsigned long>(frames) : 0UL;
-  std::snprintf(header.data(), header.size(), "alidade_video %d %d %lu", picture.cols, picture.rows, count);
+  std::snprintf(header.data(), header.size(), "alidade_video %d %d %lu", image.cols, image.rows, count);
   return std::fwrite(header.data(), 1, header.size(), stdout) == header.size();
 }
 
 int decode(const char* file, bool is_bgr) {
-  cv::VideoCapture video(file, cv::CAP_FFMPEG);  // others would take a picture for the first of many
-  cv::Mat frame, picture;
+  cv::VideoCapture video(file, cv::CAP_FFMPEG);  // others would take an image for the first of many
+  cv::Mat frame, image;
   if (!video.isOpened() || !video.read(frame)) return 3;
-  picture = in_colours(frame, is_bgr);
-  const cv::Size size = picture.size();
-  if (picture.empty() || !write_header(picture, video.get(cv::CAP_PROP_FRAME_COUNT))) return 3;
+  image = in_colours(frame, is_bgr);
+  const cv::Size size = image.size();
+  if (image.empty() || !write_header(image, video.get(cv::CAP_PROP_FRAME_COUNT))) return 3;
   do {
-    picture = in_colours(frame, is_bgr);
-    if (picture.size() != size) return 3;
+    image = in_colours(frame, is_bgr);
+    if (image.size() != size) return 3;
     std::fputc('f', stdout);
-    const std::size_t bytes = picture.total() * picture.elemSize();
-    if (std::fwrite(picture.data, 1, bytes, stdout) != bytes) return 3;
+    const std::size_t bytes = image.total() * image.elemSize();
+    if (std::fwrite(image.data, 1, bytes, stdout) != bytes) return 3;
   } while (video.read(frame));
   std::fputc('e', stdout);
   return std::fflush(stdout) == 0 ? 0 : 3;

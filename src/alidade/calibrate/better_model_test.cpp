@@ -39,7 +39,7 @@ Calibration judged(std::vector<BoardView> views, const CalibrateConfig& config) 
 }
 
 TEST(BetterModel, ABrownLensOnAWideCameraEndsInAnAnswer) {
-  // Its radial map folds inside the picture: a step that puts one corner behind the fold must not stop the solve.
+  // Its radial map folds inside the image: a step that puts one corner behind the fold must not stop the solve.
   for (const double field_of_view_deg : {120.0, 135.0, 150.0}) {
     for (const std::uint64_t seed : {1u, 2u, 3u}) {
       for (const int num_photos : {8, 20}) {

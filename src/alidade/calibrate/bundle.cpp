@@ -192,7 +192,7 @@ BundleResult solve_bundle(const BundleProblem& problem, BundleState start, const
   const double tolerance2 = config.tolerance_sigmas * config.tolerance_sigmas;
   // A long lens and a far board leave a curved valley a millionth as stiff as the rest: more damping than this makes
   // the solve creep along it.
-  constexpr double least_lambda = 1e-9;
+  constexpr double min_lambda = 1e-9;
   double lambda = config.first_lambda;
   for (; result.iterations < config.max_iterations && lambda < 1e12; ++result.iterations) {
     auto step = damped_step(problem, result.state, eq, lambda);
@@ -200,7 +200,7 @@ BundleResult solve_bundle(const BundleProblem& problem, BundleState start, const
     const double small = tolerance2 * eq.cost / dof + 1e-16 * dof;
     if (step && lambda <= 1e-3 && step->decrease <= small) {
       // Damping shortens steps along a weak valley: the whole one says whether there is still a way to go.
-      auto whole = lambda > least_lambda ? damped_step(problem, result.state, eq, 0.0) : std::nullopt;
+      auto whole = lambda > min_lambda ? damped_step(problem, result.state, eq, 0.0) : std::nullopt;
       const bool goes_on =
           whole && whole->decrease > small && linearize(problem, whole->state, trial) && trial.cost < eq.cost;
       result.state = std::move(whole && (goes_on || whole->decrease <= small) ? whole->state : step->state);
@@ -211,12 +211,12 @@ BundleResult solve_bundle(const BundleProblem& problem, BundleState start, const
       continue;
     }
     if (!step || !linearize(problem, step->state, trial) || !(trial.cost <= eq.cost)) {
-      lambda = std::max(10.0 * lambda, least_lambda);
+      lambda = std::max(10.0 * lambda, min_lambda);
       continue;
     }
     result.state = std::move(step->state);
     std::swap(eq, trial);
-    lambda = lambda <= least_lambda ? 0.0 : lambda * 0.1;
+    lambda = lambda <= min_lambda ? 0.0 : lambda * 0.1;
   }
   result.cost = eq.cost;
   result.equations = std::make_shared<const NormalEquations>(std::move(eq));
@@ -250,8 +250,8 @@ BundleResult solve_past_fold(BundleProblem problem, BundleState start, const Bun
   beyond.iterations += result.iterations;
   problem.passes_fold = false;
   // Where it loses more than a few corners, it is no lens, and what stands on this side says more of the fault.
-  constexpr double most_unseen = 0.1;
-  if (share_unseen(problem, beyond.state) > most_unseen) return result;
+  constexpr double max_unseen = 0.1;
+  if (share_unseen(problem, beyond.state) > max_unseen) return result;
   NormalEquations inside;
   if (!linearize(problem, beyond.state, inside)) beyond.status = BundleResult::Status::no_convergence;
   return beyond;

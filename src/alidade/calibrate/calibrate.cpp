@@ -40,7 +40,7 @@ void refuse(CalibrateReport& report, std::string reason, std::string to_add) {
 
 /// Takes in every view with enough corners, once; the others are named.
 void take_usable_views(std::span<const BoardView> views, CalibrateReport& report, Work& work) {
-  constexpr std::size_t least_corners = 6;  // a pose takes 3; the rest must say something of the lens
+  constexpr std::size_t min_corners = 6;  // a pose takes 3; the rest must say something of the lens
   const auto repeats = repeated_views(views);
   for (std::size_t k = 0; k < views.size(); ++k) {
     report.views[k].corners.resize(views[k].corners.size());
@@ -48,7 +48,7 @@ void take_usable_views(std::span<const BoardView> views, CalibrateReport& report
       report.views[k].reason = "is the same picture as " + views[*repeats[k]].photo;
     } else if (views[k].corners.empty()) {
       report.views[k].reason = "no corners";
-    } else if (views[k].corners.size() < least_corners) {
+    } else if (views[k].corners.size() < min_corners) {
       report.views[k].reason = "only " + std::to_string(views[k].corners.size()) + " corners";
     } else {
       work.number.push_back(k);
@@ -343,7 +343,7 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
   report.camera.height_px = size.height_px;
   Work work;
   take_usable_views(views, report, work);
-  const std::size_t least = least_views(config);
+  const std::size_t least = min_views(config);
   const bool repeated = std::any_of(report.views.begin(), report.views.end(),
                                     [](const ViewFit& view) { return view.reason.starts_with("is the same picture"); });
   const auto too_few = [&] {

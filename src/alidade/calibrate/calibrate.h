@@ -61,7 +61,7 @@ struct CalibrateReport {
 /// photo is worth.
 [[nodiscard]] double shared_noise_px(const CalibrateReport& report);
 
-/// Picture size [px]; the start of the principal point where the views alone cannot give one, and the σ map's range.
+/// Image size [px]; the start of the principal point where the views alone cannot give one, and the σ map's range.
 struct ImageSize {
   int width_px = 0;
   int height_px = 0;

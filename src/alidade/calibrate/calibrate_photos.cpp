@@ -6,8 +6,8 @@
 #include <optional>
 #include <utility>
 
+#include "alidade/board_detector/board_guess.h"
 #include "alidade/calibrate/repeated_views.h"
-#include "alidade/imaging/board_guess.h"
 
 namespace alidade {
 namespace {
@@ -89,8 +89,8 @@ std::string wrong_board(const PhotoCalibration& result) {
 /// 9×6", "only 8×6 of 9×6 corners, …". None where the board is of another kind.
 std::optional<std::vector<std::pair<int, int>>> grids_seen(const Board& told, const PhotoCalibration& result) {
   if (told.kind != BoardKind::chessboard) return std::nullopt;
-  constexpr std::ptrdiff_t least_photos = 2;
-  constexpr std::size_t most_sizes = 4;
+  constexpr std::ptrdiff_t min_photos = 2;
+  constexpr std::size_t max_sizes = 4;
   std::vector<std::pair<int, int>> all, seen;
   for (const std::string& reason : result.reasons) {
     std::pair<int, int> size;
@@ -99,9 +99,9 @@ std::optional<std::vector<std::pair<int, int>>> grids_seen(const Board& told, co
       continue;
     all.push_back(size);
   }
-  const std::ptrdiff_t needed = all.size() < 3 ? 1 : least_photos;
+  const std::ptrdiff_t needed = all.size() < 3 ? 1 : min_photos;
   for (const auto& size : all) {
-    if (std::count(all.begin(), all.end(), size) < needed || seen.size() == most_sizes) continue;
+    if (std::count(all.begin(), all.end(), size) < needed || seen.size() == max_sizes) continue;
     if (std::find(seen.begin(), seen.end(), size) == seen.end()) seen.push_back(size);
   }
   return seen;

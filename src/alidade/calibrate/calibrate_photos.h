@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "alidade/board_detector/find_boards.h"
 #include "alidade/calibrate/calibrate.h"
-#include "alidade/imaging/find_boards.h"
 
 namespace alidade {
 

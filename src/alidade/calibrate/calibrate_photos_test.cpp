@@ -22,16 +22,16 @@ constexpr int num_photos = 8;
 struct Photos {
   BoardScene scene = testing::sample_scene(testing::sample_camera("brown"), num_photos, 3);
   std::vector<std::string> names;
-  std::vector<cv::Mat> pictures;
+  std::vector<cv::Mat> images;
 
   Photos() {
     for (std::size_t i = 0; i < num_photos; ++i) {
       names.push_back(photo_name(i));
-      pictures.push_back(render_board_photo(scene, i, {}, 5));
+      images.push_back(render_board_photo(scene, i, {}, 5));
     }
   }
   [[nodiscard]] PhotoLoader loader() const {
-    return [this](std::size_t i) { return pictures[i]; };
+    return [this](std::size_t i) { return images[i]; };
   }
 };
 
@@ -77,7 +77,7 @@ TEST(CalibratePhotos, AWrongBoardGivesNoCamera) {
 TEST(CalibratePhotos, APhotoOfAnotherSizeIsNamed) {
   Photos changed = photos();
   const cv::Rect part(0, 0, 640, 470);
-  changed.pictures[4] = changed.pictures[4](part).clone();
+  changed.images[4] = changed.images[4](part).clone();
   const auto result = calibrate_photos(changed.names, changed.loader(), sample_board, {});
   ASSERT_EQ(result.report.status, CalibrateReport::Status::converged);
   EXPECT_FALSE(result.report.views[4].used);
@@ -88,10 +88,10 @@ TEST(CalibratePhotos, APhotoOfAnotherSizeIsNamed) {
 
 TEST(CalibratePhotos, PhotosWithoutABoardAndUnreadableOnesAreNamed) {
   Photos changed = photos();
-  changed.pictures[2] = cv::Mat(480, 640, CV_8UC1, cv::Scalar(90));
+  changed.images[2] = cv::Mat(480, 640, CV_8UC1, cv::Scalar(90));
   const PhotoLoader loader = [&changed](std::size_t i) {
     if (i == 5) throw std::runtime_error("the picture is cut off");
-    return changed.pictures[i];
+    return changed.images[i];
   };
   const auto result = calibrate_photos(changed.names, loader, sample_board, {});
   ASSERT_EQ(result.report.status, CalibrateReport::Status::converged);
@@ -104,8 +104,8 @@ TEST(CalibratePhotos, PhotosWithoutABoardAndUnreadableOnesAreNamed) {
 
 TEST(CalibratePhotos, TheSizeThatMostPhotosHaveDecidesNotTheFirst) {
   Photos changed = photos();
-  cv::resize(changed.pictures[0], changed.pictures[0], {800, 600});
-  cv::rotate(changed.pictures[3], changed.pictures[3], cv::ROTATE_90_CLOCKWISE);
+  cv::resize(changed.images[0], changed.images[0], {800, 600});
+  cv::rotate(changed.images[3], changed.images[3], cv::ROTATE_90_CLOCKWISE);
   const auto result = calibrate_photos(changed.names, changed.loader(), sample_board, {});
   ASSERT_EQ(result.report.status, CalibrateReport::Status::converged) << result.report.reason;
   EXPECT_EQ(result.size.width_px, 640);

@@ -182,7 +182,7 @@ TEST(Calibrate, ACornerFarOffThatIsToBeKeptIsNamedWhereNothingFits) {
   EXPECT_NE(report.to_add.find(views[1].photo + ", corner 17"), std::string::npos) << report.to_add;
 }
 
-TEST(Calibrate, APictureGivenTwiceCountsOnce) {
+TEST(Calibrate, AImageGivenTwiceCountsOnce) {
   const BoardScene scene = example_scene("brown", 12);
   const auto views = simulate_views(scene, 0.1, 9);
   auto twice = views;
@@ -267,7 +267,7 @@ TEST(Calibrate, RefusesWhatCannotBeTold) {
   expect_refused(status({views[0], views[1]}), "only 2");
   expect_refused(status(std::vector<BoardView>(10, views[0])), "the same picture");
 
-  BoardScene still = scene;  // one place, but ten pictures
+  BoardScene still = scene;  // one place, but ten images
   for (Rigid3& pose : still.cam_from_board) pose = scene.cam_from_board[0];
   expect_refused(status(simulate_views(still, 0.1, 3)), "parallel");
 

@@ -37,10 +37,10 @@ Counts count_photos(const Calibration& result) {
 
 /// The board as solved: decides its shape, and solves again where that is not the one of the first solve.
 std::vector<ShapeTransfer> settle_shape(Calibration& result, const Progress& progress) {
-  constexpr std::size_t most_photos = 60;  // enough to tell a board's shape
+  constexpr std::size_t max_photos = 60;  // enough to tell a board's shape
   report_progress(progress, "testing the board's shape", 0, 1);
   const BoardShape asked = result.config.board_shape;
-  auto transfers = test_shape_transfer(result.board, used_views(result.board_views, result, most_photos), result.size,
+  auto transfers = test_shape_transfer(result.board, used_views(result.board_views, result, max_photos), result.size,
                                        result.config, result.board_points);
   result.asked_shape = asked;
   result.config.board_shape = decide_shape(asked, transfers);
@@ -75,7 +75,7 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   result.counts = count_photos(result);
   result.assumed = count_assumptions(board, result.config, result.board_views, air, result);
   result.study = study_calibration(board, result.board_views, result.config, result,
-                                   most_telling(transfers, result.config.board_shape), progress);
+                                   max_telling(transfers, result.config.board_shape), progress);
   result.next = plan_next_photos(result.camera, shared_noise_px(result), result.board_points, 1, progress);
   result.port = port_residual(result.camera);
   result.verdict = calibration_verdict(result, result.study, result.board_views, result.config, result.next);

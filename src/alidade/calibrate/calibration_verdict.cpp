@@ -28,7 +28,7 @@ State grade(double value, double care, double bad) {
   return value <= care ? State::good : State::care;
 }
 
-/// Where in the picture a pixel lies, for a person.
+/// Where in the image a pixel lies, for a person.
 std::string place(const Eigen::Vector2d& px, const Camera& camera) {
   const double x = px.x() / camera.width_px, y = px.y() / camera.height_px;
   const std::string row = y < 1.0 / 3 ? "top" : y > 2.0 / 3 ? "bottom" : "";
@@ -53,7 +53,7 @@ Worst worst_of(const PixelGrid& grid) {
   return worst;
 }
 
-/// Share [%] of the picture where 3σ is at most `limit_px`.
+/// Share [%] of the image where 3σ is at most `limit_px`.
 double share_below(const PixelGrid& sigma, double limit_px) {
   const auto below =
       std::count_if(sigma.values.begin(), sigma.values.end(), [&](double value) { return 3.0 * value <= limit_px; });
@@ -68,7 +68,7 @@ Check coverage(const CalibrateReport& report, const CalibrationStudy& study) {
               .limit = 95.0,
               .unit = "%",
               .figure = "sigma"};
-  // A large σ is said and counted: not to be trusted is only what is no answer over half of the picture.
+  // A large σ is said and counted: not to be trusted is only what is no answer over half of the image.
   const double useless_px = 0.01 * std::max(report.camera.width_px, report.camera.height_px);
   const bool is_answer = share_below(study.sigma_infinity, useless_px) >= 50.0;
   check.state = check.value >= 95.0 ? State::good : is_answer ? State::care : State::bad;

@@ -43,7 +43,7 @@ TEST(CalibrationVerdict, CleanDataIsGood) {
 }
 
 TEST(CalibrationVerdict, ItsNumbersAreThoseOfTheStudy) {
-  // Eight photos: some of the picture is not good.
+  // Eight photos: some of the image is not good.
   const auto views = sample_views(sample_scene(sample_camera("brown"), 8, 5), 5);
   const Calibration result = sample_calibration(views);
   double worst = 0.0, below_half = 0.0, below_one = 0.0;
@@ -70,7 +70,7 @@ TEST(CalibrationVerdict, ItsNumbersAreThoseOfTheStudy) {
 }
 
 TEST(CalibrationVerdict, AdviceIsThePlannedPhoto) {
-  // All boards in one corner of the picture: the rest is a guess.
+  // All boards in one corner of the image: the rest is a guess.
   BoardScene scene = sample_scene(sample_camera("brown"), 40, 3);
   std::erase_if(scene.cam_from_board, [&](const Rigid3& pose) {
     const auto px = project(scene.camera, pose * Eigen::Vector3d(0.1, 0.06, 0.0));

@@ -34,7 +34,7 @@ std::vector<double> relative_distances(std::size_t count, const Point& point) {
 /// Whether there may be one; costs next to nothing. A grid's farthest corner is twice as far from the mean as the mean
 /// distance; with one of six corners at infinity, three times.
 bool may_have_far_corners(const std::vector<Corner>& corners) {
-  constexpr double least_ratio = 2.4;
+  constexpr double min_ratio = 2.4;
   const auto count = static_cast<double>(corners.size());
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const Corner& corner : corners) mean += corner.px / count;
@@ -44,7 +44,7 @@ bool may_have_far_corners(const std::vector<Corner>& corners) {
     sum += distance;
     farthest = std::max(farthest, distance);
   }
-  return !std::isfinite(sum) || farthest * count > least_ratio * sum;
+  return !std::isfinite(sum) || farthest * count > min_ratio * sum;
 }
 
 }  // namespace
@@ -52,14 +52,14 @@ bool may_have_far_corners(const std::vector<Corner>& corners) {
 std::vector<bool> far_corners(const BoardView& view, const std::vector<Eigen::Vector3d>& board_points) {
   const auto& corners = view.corners;
   if (corners.size() < 6 || !may_have_far_corners(corners)) return {};
-  constexpr double most_stretched = 8.0;  // how much perspective and lens may pull one corner from the rest
-  const auto in_picture = relative_distances(corners.size(), [&](std::size_t i) { return corners[i].px; });
-  if (*std::max_element(in_picture.begin(), in_picture.end()) <= most_stretched) return {};
+  constexpr double max_stretched = 8.0;  // how much perspective and lens may pull one corner from the rest
+  const auto in_image = relative_distances(corners.size(), [&](std::size_t i) { return corners[i].px; });
+  if (*std::max_element(in_image.begin(), in_image.end()) <= max_stretched) return {};
   const auto on_board = relative_distances(corners.size(), [&](std::size_t i) -> Eigen::Vector2d {
     return board_points[static_cast<std::size_t>(corners[i].index)].head<2>();
   });
   std::vector<bool> far(corners.size());
-  for (std::size_t i = 0; i < far.size(); ++i) far[i] = in_picture[i] > most_stretched * std::max(1.0, on_board[i]);
+  for (std::size_t i = 0; i < far.size(); ++i) far[i] = in_image[i] > max_stretched * std::max(1.0, on_board[i]);
   return std::find(far.begin(), far.end(), true) == far.end() ? std::vector<bool>{} : far;
 }
 

@@ -35,7 +35,7 @@ Eigen::MatrixXd submatrix(const Eigen::MatrixXd& full, const std::vector<int>& r
   return part;
 }
 
-/// The view of all corners at a pose, with no residual; none where a corner falls outside the picture.
+/// The view of all corners at a pose, with no residual; none where a corner falls outside the image.
 std::optional<ViewArrays> see(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
                               const Rigid3& cam_from_board) {
   BoardView view;
@@ -66,7 +66,7 @@ std::optional<Candidate> evaluate(const Camera& camera, const std::vector<Eigen:
   return Candidate{cam_from_board, H - eq.coupling(0) * V.solve(eq.coupling(0).transpose())};
 }
 
-/// The board turned by `tilt` about its middle, its middle seen at `px`, `fill` of the picture's width wide.
+/// The board turned by `tilt` about its middle, its middle seen at `px`, `fill` of the image's width wide.
 std::optional<Rigid3> place(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
                             const Eigen::Vector2d& px, double fill, const Eigen::Vector3d& tilt) {
   Eigen::AlignedBox3d box;

@@ -14,7 +14,7 @@ ALIDADE_PUBLIC_BEGIN
 /// A board pose to photograph next, and what it would bring.
 struct NextPhoto {
   Rigid3 cam_from_board;
-  double worst_3sigma_px = 0.0;  ///< Worst 3σ of projection over the picture with this photo added.
+  double worst_3sigma_px = 0.0;  ///< Worst 3σ of projection over the image with this photo added.
 };
 
 struct NextPhotoPlan {
@@ -22,7 +22,7 @@ struct NextPhotoPlan {
   std::vector<NextPhoto> photos;  ///< In the order in which to take them, each counting the ones before.
 };
 
-/// Chooses, out of board poses all over the picture, at two distances and five tilts, the one that lowers the worst 3σ
+/// Chooses, out of board poses all over the image, at two distances and five tilts, the one that lowers the worst 3σ
 /// of projection most; then the next, and so on. Greedy experimental design on the information matrix of the lens:
 /// Λ' = Λ + (A − W V⁻¹ Wᵀ)/σ², the candidate's pose eliminated. `camera.cov` and `noise_px` come from the calibration.
 /// Fedorov, "Theory of optimal experiments", 1972 (sequential G-optimal design).

@@ -12,7 +12,7 @@ using testing::sample_camera;
 using testing::sample_scene;
 using testing::sample_size;
 
-/// Worst 3σ over the picture, on the grid of the plan.
+/// Worst 3σ over the image, on the grid of the plan.
 double worst_3sigma_px(const Camera& camera) {
   double worst = 0.0;
   for (const double sigma : projection_sigma(camera, 9, 7, std::numeric_limits<double>::infinity()).values) {

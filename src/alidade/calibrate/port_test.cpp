@@ -13,7 +13,7 @@
 namespace alidade {
 namespace {
 
-constexpr ImageSize port_picture{768, 576};
+constexpr ImageSize port_image{768, 576};
 constexpr double sigma_px = 0.3;
 const Board port_board{.cols = 14, .rows = 10, .square_m = 0.03};
 
@@ -64,7 +64,7 @@ TEST_P(CalibratePort, FindsGapAndNormalAsWellAsItSays) {
   constexpr int num_seeds = 6;
   for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
     const auto views = simulate_views(scene_of(truth, seed), sigma_px, seed + 100);
-    const auto report = calibrate(port_board, views, port_picture, with_port({}, knowledge()));
+    const auto report = calibrate(port_board, views, port_image, with_port({}, knowledge()));
     ASSERT_EQ(report.status, CalibrateReport::Status::converged) << report.reason;
     const Errors errors = errors_of(report, truth);
     gap_m2 += errors.gap_m * errors.gap_m / num_seeds;
@@ -92,7 +92,7 @@ TEST(CalibratePort, IsExactWithoutNoise) {
       corner.cov.setIdentity();
     }
   }
-  const auto report = calibrate(port_board, views, port_picture, with_port({}, knowledge()));
+  const auto report = calibrate(port_board, views, port_image, with_port({}, knowledge()));
   ASSERT_EQ(report.status, CalibrateReport::Status::converged) << report.reason;
   EXPECT_LT(errors_of(report, truth).gap_m, 1e-8);
   EXPECT_LT(errors_of(report, truth).normal_rad, 1e-8);
@@ -102,8 +102,8 @@ TEST(CalibratePort, IsExactWithoutNoise) {
 TEST(CalibratePort, BrownFitsTheSamePhotosAsWell) {
   const Camera truth = port_camera(0.05, 2.0);
   const auto views = simulate_views(scene_of(truth, 4), sigma_px, 8);
-  const auto port = calibrate(port_board, views, port_picture, with_port({}, knowledge()));
-  const auto brown = calibrate(port_board, views, port_picture, {});
+  const auto port = calibrate(port_board, views, port_image, with_port({}, knowledge()));
+  const auto brown = calibrate(port_board, views, port_image, {});
   ASSERT_EQ(port.status, CalibrateReport::Status::converged);
   ASSERT_EQ(brown.status, CalibrateReport::Status::converged);
   RecordProperty("port_rms_px", std::to_string(port.rms_px));
@@ -115,7 +115,7 @@ TEST(CalibratePort, RefusesWhatParallelBoardsCannotTell) {
   const auto views = simulate_views(scene_of(port_camera(0.02, 0.0), 5, 0.0), sigma_px, 9);
   PortKnowledge nothing = knowledge();
   nothing.air.reset();
-  const auto report = calibrate(port_board, views, port_picture, with_port({}, nothing));
+  const auto report = calibrate(port_board, views, port_image, with_port({}, nothing));
   EXPECT_EQ(report.status, CalibrateReport::Status::degenerate);
   EXPECT_FALSE(report.reason.empty());
 }
@@ -126,7 +126,7 @@ TEST(CalibratePort, RefusesAFreeLensAndFreeIndices) {
   nothing.air.reset();
   CalibrateConfig config = with_port({}, nothing);
   config.fixed = {"skew"};  // glass and indices as well
-  const auto report = calibrate(port_board, views, port_picture, config);
+  const auto report = calibrate(port_board, views, port_image, config);
   EXPECT_NE(report.status, CalibrateReport::Status::converged);
 }
 
@@ -135,7 +135,7 @@ TEST(CalibratePort, RefusesAGapBelowZeroAndHoldsItAtZero) {
   int refused = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const auto views = simulate_views(scene_of(truth, seed), sigma_px, seed + 20);
-    const auto report = calibrate(port_board, views, port_picture, with_port({}, knowledge()));
+    const auto report = calibrate(port_board, views, port_image, with_port({}, knowledge()));
     if (report.status == CalibrateReport::Status::degenerate) {
       EXPECT_TRUE(report.reason.starts_with("gap_m comes out below zero")) << report.reason;
       ++refused;
@@ -144,7 +144,7 @@ TEST(CalibratePort, RefusesAGapBelowZeroAndHoldsItAtZero) {
     }
     PortKnowledge on_glass = knowledge();
     on_glass.gap_m = 0.0;
-    const auto held = calibrate(port_board, views, port_picture, with_port({.fixed = {"skew", "gap_m"}}, on_glass));
+    const auto held = calibrate(port_board, views, port_image, with_port({.fixed = {"skew", "gap_m"}}, on_glass));
     EXPECT_EQ(held.status, CalibrateReport::Status::converged) << held.reason;
     EXPECT_LT(errors_of(held, truth).normal_rad, 0.3 * degree);
   }
@@ -155,11 +155,11 @@ TEST(CalibratePort, RefusesAGapBelowZeroAndHoldsItAtZero) {
 TEST(CalibratePort, JudgesWhetherBrownWouldDo) {
   const auto judged = [](double gap_m) {
     PhotoCalibration photos;
-    photos.size = port_picture;
+    photos.size = port_image;
     photos.views = simulate_views(scene_of(port_camera(gap_m, 0.0), 7), sigma_px, 10);
     photos.reasons.resize(photos.views.size());
     const CalibrateConfig config = with_port({}, knowledge());
-    photos.report = calibrate(port_board, photos.views, port_picture, config);
+    photos.report = calibrate(port_board, photos.views, port_image, config);
     return judge_calibration(port_board, std::move(photos), config);
   };
   const Calibration thin = judged(0.01), thick = judged(0.10);

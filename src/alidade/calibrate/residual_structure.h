@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// Mean residual per cell of a cols × rows division of the picture.
+/// Mean residual per cell of a cols × rows division of the image.
 [[nodiscard]] std::vector<ResidualCell> residual_cells(std::span<const BoardView> views, const CalibrateReport& report,
                                                        int cols, int rows);
 

@@ -56,7 +56,7 @@ TEST(ResidualCells, AreNoiseWhereTheModelFits) {
   EXPECT_LT(beyond, 0.0111 * cells + 4 * std::sqrt(0.0111 * cells));
 }
 
-TEST(ResidualCells, ShowWhatPullsOneCornerOfThePicture) {
+TEST(ResidualCells, ShowWhatPullsOneCornerOfTheImage) {
   auto [views, report] = solve(2);
   for (std::size_t k = 0; k < views.size(); ++k) {
     for (std::size_t i = 0; i < views[k].corners.size(); ++i) {

@@ -52,7 +52,7 @@ std::vector<std::string> faults(const CalibrateConfig& config) {
   return found;
 }
 
-std::size_t least_views(const CalibrateConfig& config) {
+std::size_t min_views(const CalibrateConfig& config) {
   return contains(config.fixed, "cx") && contains(config.fixed, "cy") ? 2 : 3;
 }
 

@@ -12,10 +12,10 @@ namespace alidade {
 [[nodiscard]] std::vector<std::string> faults(const CalibrateConfig& config);
 
 /// How many usable views it takes: three, two where the principal point is held (Zhang 2000, §3.1).
-[[nodiscard]] std::size_t least_views(const CalibrateConfig& config);
+[[nodiscard]] std::size_t min_views(const CalibrateConfig& config);
 
 /// Free parameters, priors and board of `problem`; returns the lens with every held parameter at its value: its
-/// prior's, else the picture's centre (cx, cy), else zero. `config` must have no faults.
+/// prior's, else the image's centre (cx, cy), else zero. `config` must have no faults.
 [[nodiscard]] Lens set_up_problem(const Board& board, const CalibrateConfig& config, ImageSize size,
                                   BundleProblem& problem);
 

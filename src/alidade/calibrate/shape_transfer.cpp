@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t least_photos_to_halve = 6;  // two halves of three
+constexpr std::size_t min_photos_to_halve = 6;  // two halves of three
 
 bool converged(const CalibrateReport& report) { return report.status == CalibrateReport::Status::converged; }
 
@@ -109,7 +109,7 @@ std::vector<ShapeTransfer> test_shape_transfer(const Board& board, std::span<con
                                                const CalibrateConfig& config,
                                                std::span<const Eigen::Vector3d> given_points) {
   std::vector<ShapeTransfer> transfers;
-  if (views.size() < least_photos_to_halve) return transfers;
+  if (views.size() < min_photos_to_halve) return transfers;
   CalibrateConfig plain = config;
   if (config.board_shape != BoardShape::given) plain.board_shape = BoardShape::flat;
   std::array<Half, 2> halves;
@@ -142,7 +142,7 @@ BoardShape decide_shape(BoardShape asked, std::span<const ShapeTransfer> transfe
   return BoardShape::flat;
 }
 
-std::optional<ShapeTransfer> most_telling(std::span<const ShapeTransfer> transfers, BoardShape in_use) {
+std::optional<ShapeTransfer> max_telling(std::span<const ShapeTransfer> transfers, BoardShape in_use) {
   for (const ShapeTransfer& each : transfers) {
     if (each.shape == in_use) return each;
   }

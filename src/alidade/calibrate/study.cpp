@@ -9,7 +9,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t least_photos = 6;  // two halves of three
+constexpr std::size_t min_photos = 6;  // two halves of three
 
 double median_distance_m(const CalibrateReport& report) {
   std::vector<double> distances;
@@ -24,7 +24,7 @@ double median_distance_m(const CalibrateReport& report) {
 /// Both halves calibrated apart, on one board shape.
 std::optional<Halves> compare_halves(const Board& board, std::span<const BoardView> views, ImageSize size,
                                      CalibrateConfig config, const std::vector<Eigen::Vector3d>& board_points) {
-  if (views.size() < least_photos) return std::nullopt;
+  if (views.size() < min_photos) return std::nullopt;
   config.board_shape = BoardShape::given;
   const CalibrateReport a = calibrate(board, every_other(views, 0), size, config, board_points);
   const CalibrateReport b = calibrate(board, every_other(views, 1), size, config, board_points);
@@ -76,11 +76,11 @@ CalibrationStudy study_calibration(const Board& board, std::span<const BoardView
   study.sigma_infinity = projection_sigma(report.camera, 60, 40, std::numeric_limits<double>::infinity());
   study.sigma_working = projection_sigma(report.camera, 60, 40, study.working_distance_m);
 
-  constexpr std::size_t most_photos = 120;
-  const std::vector<BoardView> sampled = used_views(views, report, most_photos);
+  constexpr std::size_t max_photos = 120;
+  const std::vector<BoardView> sampled = used_views(views, report, max_photos);
   report_progress(progress, "comparing the halves", 0, 1);
   study.halves = compare_halves(board, sampled, size, config, report.board_points);
-  if (sampled.size() >= least_photos) {
+  if (sampled.size() >= min_photos) {
     const std::vector<BoardView> fewer = used_views(views, report, 60);
     study.models = heldout_models(board, fewer, size, config, report.board_points, progress);
   }

@@ -13,7 +13,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Mean residual over a cell of the picture.
+/// Mean residual over a cell of the image.
 struct ResidualCell {
   double u_px = 0.0, v_px = 0.0;  ///< Centre.
   int count = 0;
@@ -39,7 +39,7 @@ struct HeldOutModel {
 
 /// The two halves of the photos (even and odd), calibrated apart.
 struct Halves {
-  CameraDiff diff;       ///< Second minus first over the picture.
+  CameraDiff diff;       ///< Second minus first over the image.
   double worst_z = 0.0;  ///< Largest |difference| of a parameter in its σ.
   std::string worst_name;
 };

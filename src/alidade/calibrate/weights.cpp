@@ -15,11 +15,11 @@ const Eigen::Matrix2d& own_cov(const Corner& corner, bool use_covariances) {
   return use_covariances ? corner.cov : no_cov;
 }
 
-constexpr double least_variance = 1e-12;  // px²: noise-free corners still have a finite weight
+constexpr double min_variance = 1e-12;  // px²: noise-free corners still have a finite weight
 
 /// (own + excess² I)⁻¹ r.
 Eigen::Vector2d weighted(const Eigen::Vector2d& r, const Eigen::Matrix2d& own, double excess2) {
-  const double p = own(0, 0) + excess2 + least_variance, q = own(0, 1), s = own(1, 1) + excess2 + least_variance;
+  const double p = own(0, 0) + excess2 + min_variance, q = own(0, 1), s = own(1, 1) + excess2 + min_variance;
   const double inverse = 1.0 / (p * s - q * q);
   return {inverse * (s * r.x() - q * r.y()), inverse * (p * r.y() - q * r.x())};
 }
@@ -138,7 +138,7 @@ void set_whiteners(const BoardView& view, const std::vector<Eigen::Vector2d>& re
       const double distance = residuals[i].allFinite() ? std::sqrt(mahalanobis2(residuals[i], own, excess2)) : 1e9;
       weight = distance > huber_sigmas ? huber_sigmas / distance : 1.0;
     }
-    set_whitener(arrays, i, own + (excess2 + least_variance) * Eigen::Matrix2d::Identity(), weight);
+    set_whitener(arrays, i, own + (excess2 + min_variance) * Eigen::Matrix2d::Identity(), weight);
   }
 }
 

@@ -12,7 +12,7 @@ ALIDADE_PUBLIC_BEGIN
 ///     x = X/Z, y = Y/Z, r² = x² + y²,  L = 1 + k1 r² + k2 r⁴ + k3 r⁶
 ///     x_d = L x + 2 p1 x y + p2 (r² + 2x²),   y_d = L y + p1 (r² + 2y²) + 2 p2 x y
 ///     u = fx x_d + skew y_d + cx,             v = fy y_d + cy
-/// Valid for Z > 0, r < max_radius() — there the radial map r·L(r²) stops growing and points would re-enter the picture
+/// Valid for Z > 0, r < max_radius() — there the radial map r·L(r²) stops growing and points would re-enter the image
 /// — and det ∂(x_d, y_d)/∂(x, y) > 0, because the tangential terms move the fold inwards on one side. D. C. Brown,
 /// "Close-range camera calibration", Photogrammetric Engineering 37(8), 1971.
 struct Brown {

@@ -82,17 +82,18 @@ std::vector<std::optional<Eigen::Vector3d>> unproject(const Camera& camera, std:
       camera.lens);
 }
 
-std::vector<std::optional<SightRay>> sight_rays(const Camera& camera, std::span<const Eigen::Vector2d> pixels) {
+std::vector<std::optional<ObservationRay>> observation_rays(const Camera& camera,
+                                                            std::span<const Eigen::Vector2d> pixels) {
   return std::visit(
       [&]<CameraModel Model>(const Calibrated<Model>& lens) {
         const typename Model::Domain domain = Model::domain(lens.params);
-        std::vector<std::optional<SightRay>> rays(pixels.size());
+        std::vector<std::optional<ObservationRay>> rays(pixels.size());
         for (std::size_t i = 0; i < pixels.size(); ++i) {
           if constexpr (Model::is_central) {
             const auto direction_in_cam = Model::unproject(lens.params, domain, pixels[i]);
-            if (direction_in_cam) rays[i] = SightRay{Eigen::Vector3d::Zero(), *direction_in_cam};
+            if (direction_in_cam) rays[i] = ObservationRay{Eigen::Vector3d::Zero(), *direction_in_cam};
           } else {
-            rays[i] = Model::sight_ray(lens.params, domain, pixels[i]);
+            rays[i] = Model::observation_ray(lens.params, domain, pixels[i]);
           }
         }
         return rays;
@@ -100,11 +101,11 @@ std::vector<std::optional<SightRay>> sight_rays(const Camera& camera, std::span<
       camera.lens);
 }
 
-std::optional<SightRay> sight_ray(const Camera& camera, const Eigen::Vector2d& px) {
-  return sight_rays(camera, {&px, 1}).front();
+std::optional<ObservationRay> observation_ray(const Camera& camera, const Eigen::Vector2d& px) {
+  return observation_rays(camera, {&px, 1}).front();
 }
 
-std::optional<Eigen::Vector3d> point_at_range(const SightRay& ray, double range_m) {
+std::optional<Eigen::Vector3d> point_at_range(const ObservationRay& ray, double range_m) {
   // |o + s w|² = range²: the root in front.
   const double along = ray.origin_in_cam.dot(ray.direction_in_cam);
   const double square = along * along + range_m * range_m - ray.origin_in_cam.squaredNorm();

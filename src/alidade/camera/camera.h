@@ -56,11 +56,11 @@ struct Camera {
 [[nodiscard]] std::vector<std::optional<Eigen::Vector3d>> unproject(const Camera& camera,
                                                                     std::span<const Eigen::Vector2d> pixels);
 /// Origin and direction of what a pixel sees, for any lens.
-[[nodiscard]] std::optional<SightRay> sight_ray(const Camera& camera, const Eigen::Vector2d& px);
-[[nodiscard]] std::vector<std::optional<SightRay>> sight_rays(const Camera& camera,
-                                                              std::span<const Eigen::Vector2d> pixels);
+[[nodiscard]] std::optional<ObservationRay> observation_ray(const Camera& camera, const Eigen::Vector2d& px);
+[[nodiscard]] std::vector<std::optional<ObservationRay>> observation_rays(const Camera& camera,
+                                                                          std::span<const Eigen::Vector2d> pixels);
 /// The point on the ray that is `range_m` from the camera's origin; none where the ray begins further away.
-[[nodiscard]] std::optional<Eigen::Vector3d> point_at_range(const SightRay& ray, double range_m);
+[[nodiscard]] std::optional<Eigen::Vector3d> point_at_range(const ObservationRay& ray, double range_m);
 
 /// A pixel with its derivatives, for any model: J_px_params is 2 × number of parameters.
 struct LensProjection {

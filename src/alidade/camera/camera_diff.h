@@ -25,7 +25,7 @@ struct ParameterDiff {
   double a = 0.0, b = 0.0, sigma_a = 0.0, sigma_b = 0.0;
 };
 
-/// How far apart two cameras are over the picture, after the motion between their frames that fits best.
+/// How far apart two cameras are over the image, after the motion between their frames that fits best.
 struct CameraDiff {
   PixelGrid delta_u, delta_v;  ///< Where b sees what a sees at the pixel, minus the pixel; NaN where not both see.
   PixelGrid sigma_a, sigma_b;  ///< Each camera's own projection_sigma(); all NaN without a covariance.
@@ -40,8 +40,8 @@ struct CameraDiff {
   std::vector<ParameterDiff> parameters;            ///< Empty where the models differ.
 };
 
-/// Compares what two cameras of one picture size see. The models may differ. The motion is fitted by Gauss–Newton with
-/// weights 1/σ² where σ is known, and robust ones, so that corners where a model fails do not turn the picture.
+/// Compares what two cameras of one image size see. The models may differ. The motion is fitted by Gauss–Newton with
+/// weights 1/σ² where σ is known, and robust ones, so that corners where a model fails do not turn the image.
 /// None where the sizes differ or fewer than ten pixels of the grid are seen by both.
 /// D. Kogan, mrcal, "Differencing"; docs/maths/camera-models.md.
 [[nodiscard]] std::optional<CameraDiff> diff_cameras(const Camera& a, const Camera& b,

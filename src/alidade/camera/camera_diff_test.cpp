@@ -50,7 +50,7 @@ TEST(CameraDiff, OfACameraWithItselfIsNothing) {
 }
 
 TEST(CameraDiff, TakesAKnownRotationOut) {
-  // A pinhole whose picture was turned about the optical axis needs skew-free lenses: turn about z by re-labelling.
+  // A pinhole whose image was turned about the optical axis needs skew-free lenses: turn about z by re-labelling.
   // b = a with the principal point moved: for a long lens that is a rotation of Δc/f.
   Camera a{640, 480, Calibrated<Pinhole>{Params<Pinhole>{8000.0, 8000.0, 319.5, 239.5, 0.0}}, {}, 0.0, {}};
   Camera b = a;
@@ -123,7 +123,7 @@ TEST(CameraDiff, ComparesLensesOfDifferentModels) {
   EXPECT_GT(diff->max_px, 0.01);
 }
 
-TEST(CameraDiff, ARegionThatFailsDoesNotTurnThePicture) {
+TEST(CameraDiff, ARegionThatFailsDoesNotTurnTheImage) {
   // b is a with strong k3: only the corners differ, by tens of pixels, and more on one side (its principal point).
   Camera a = brown_camera(), b = brown_camera();
   auto& values = std::get<Calibrated<Brown>>(b.lens).params;

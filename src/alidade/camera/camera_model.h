@@ -22,7 +22,7 @@ struct Projection {
 };
 
 /// Where a pixel looks outside the camera: all points origin_in_cam + distance · direction_in_cam, distance ≥ 0.
-struct SightRay {
+struct ObservationRay {
   Eigen::Vector3d origin_in_cam = Eigen::Vector3d::Zero();     ///< [m]; the centre of a central lens.
   Eigen::Vector3d direction_in_cam = Eigen::Vector3d::Zero();  ///< Unit.
 };
@@ -34,7 +34,7 @@ struct SightRay {
 /// The first five parameters of every model are fx, fy, cx, cy, skew [px]: (u, v) = (fx x + skew y + cx, fy y + cy)
 /// of the distorted normalised point (x, y). No answer (nullopt) behind the camera or outside the valid domain.
 /// `is_central`: all rays meet in the camera's origin, so that unproject() says all about a pixel. Of a model that is
-/// not, it gives the direction alone; sight_ray() gives the whole ray.
+/// not, it gives the direction alone; observation_ray() gives the whole ray.
 template <class Model>
 concept CameraModel = requires(const Params<Model>& params, const Eigen::Vector3d& point_in_cam,
                                const typename Model::Domain& domain, const Eigen::Vector2d& px) {

@@ -11,8 +11,8 @@ enum : Eigen::Index { gap = 10, glass, n_glass, n_water, normal_x, normal_y };
 /// Whether the numbers describe a port at all: also false for what is not finite.
 bool is_port(const Params<FlatPort>& p) {
   const auto is_index = [](double n) { return n >= 1.0 && n <= 4.0; };
-  constexpr double most_m = 1e6;
-  return p[gap] > FlatPort::least_gap_m && p[gap] < most_m && p[glass] >= 0.0 && p[glass] < most_m &&
+  constexpr double max_m = 1e6;
+  return p[gap] > FlatPort::min_gap_m && p[gap] < max_m && p[glass] >= 0.0 && p[glass] < max_m &&
          is_index(p[n_glass]) && is_index(p[n_water]) && p[normal_x] * p[normal_x] + p[normal_y] * p[normal_y] < 1.0;
 }
 
@@ -139,8 +139,8 @@ std::optional<Projection<FlatPort>> FlatPort::project_with_jacobians(const Param
   return out;
 }
 
-std::optional<SightRay> FlatPort::sight_ray(const Params<FlatPort>& params, const Domain& domain,
-                                            const Eigen::Vector2d& px) {
+std::optional<ObservationRay> FlatPort::observation_ray(const Params<FlatPort>& params, const Domain& domain,
+                                                        const Eigen::Vector2d& px) {
   if (!is_port(params)) return std::nullopt;
   const auto in_air = Brown::unproject(air_lens(params), domain, px);
   if (!in_air) return std::nullopt;
@@ -151,13 +151,13 @@ std::optional<SightRay> FlatPort::sight_ray(const Params<FlatPort>& params, cons
   const double tau = aside.norm();
   const Eigen::Vector3d across = tau > 0.0 ? Eigen::Vector3d(aside / tau) : Eigen::Vector3d::Zero();
   const double in_glass = refract(tau, params[n_glass]).tan, in_water = refract(tau, params[n_water]).tan;
-  return SightRay{(params[gap] + params[glass]) * n + (params[gap] * tau + params[glass] * in_glass) * across,
-                  (n + in_water * across).normalized()};
+  return ObservationRay{(params[gap] + params[glass]) * n + (params[gap] * tau + params[glass] * in_glass) * across,
+                        (n + in_water * across).normalized()};
 }
 
 std::optional<Eigen::Vector3d> FlatPort::unproject(const Params<FlatPort>& params, const Domain& domain,
                                                    const Eigen::Vector2d& px) {
-  const std::optional<SightRay> ray = sight_ray(params, domain, px);
+  const std::optional<ObservationRay> ray = observation_ray(params, domain, px);
   if (!ray) return std::nullopt;
   return ray->direction_in_cam;
 }

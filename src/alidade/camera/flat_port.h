@@ -14,7 +14,7 @@ ALIDADE_PUBLIC_BEGIN
 /// (Snell's law in each layer: sin θ = n_g sin θ_g = n_w sin θ_w), whose right side grows with τ and is concave, and at
 /// the pixel of the air direction n + τ (P − z n)/ρ in the Brown lens. Agrawal et al., "A theory of multi-layer flat
 /// refractive geometry", CVPR 2012, for the axis; docs/maths/camera-models.md.
-/// NOT central: the rays in water do not meet in a point, so a direction alone says not all: see sight_ray().
+/// NOT central: the rays in water do not meet in a point, so a direction alone says not all: see observation_ray().
 /// Valid for z > d + t (in water), t ≥ 0, indices in [1, 4], and where the Brown lens sees the air direction.
 /// A gap a little below zero is no port, but lets an estimate of one at zero scatter to both sides.
 struct FlatPort {
@@ -25,7 +25,7 @@ struct FlatPort {
       "fx", "fy", "cx",    "cy",      "skew",    "k1",      "k2",       "p1",
       "p2", "k3", "gap_m", "glass_m", "n_glass", "n_water", "normal_x", "normal_y"};
 
-  static constexpr double least_gap_m = -0.03;
+  static constexpr double min_gap_m = -0.03;
 
   /// That of the lens in air.
   using Domain = Brown::Domain;
@@ -40,8 +40,8 @@ struct FlatPort {
   [[nodiscard]] static std::optional<Eigen::Vector3d> unproject(const Params<FlatPort>& params,
                                                                 const Eigen::Vector2d& px);
   /// The ray in water: it begins where it leaves the port's outer face.
-  [[nodiscard]] static std::optional<SightRay> sight_ray(const Params<FlatPort>& params, const Domain& domain,
-                                                         const Eigen::Vector2d& px);
+  [[nodiscard]] static std::optional<ObservationRay> observation_ray(const Params<FlatPort>& params,
+                                                                     const Domain& domain, const Eigen::Vector2d& px);
 
   /// The port's unit normal, away from the camera; NaN where normal_x, normal_y are of no unit vector.
   [[nodiscard]] static Eigen::Vector3d normal(const Params<FlatPort>& params);

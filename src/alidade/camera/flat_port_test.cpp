@@ -27,7 +27,7 @@ Params<FlatPort> example_params() {
   return p;
 }
 
-/// A point in water that the picture shows, 0.1 to 4 m deep.
+/// A point in water that the image shows, 0.1 to 4 m deep.
 Eigen::Vector3d random_point(std::mt19937_64& rng, double max_angle_rad) {
   std::uniform_real_distribution<> angle(0.0, max_angle_rad), azimuth(-std::numbers::pi, std::numbers::pi),
       depth_m(0.1, 4.0);
@@ -45,14 +45,14 @@ std::optional<Eigen::Vector3d> refracted(const Eigen::Vector3d& direction, const
 }
 
 /// The ray of a direction in air, traced from plane to plane without the axial formula.
-std::optional<SightRay> traced(const Params<FlatPort>& p, const Eigen::Vector3d& in_air) {
+std::optional<ObservationRay> traced(const Params<FlatPort>& p, const Eigen::Vector3d& in_air) {
   const Eigen::Vector3d n = FlatPort::normal(p);
   const Eigen::Vector3d inner = in_air * (p[10] / in_air.dot(n));
   const auto in_glass = refracted(in_air, n, 1.0, p[12]);
   const Eigen::Vector3d outer = inner + *in_glass * (p[11] / in_glass->dot(n));
   const auto in_water = refracted(*in_glass, n, p[12], p[13]);
   if (!in_water) return std::nullopt;
-  return SightRay{outer, *in_water};
+  return ObservationRay{outer, *in_water};
 }
 
 TEST(FlatPort, SeesThePointThatARayTracedThroughThePortHits) {
@@ -72,7 +72,7 @@ TEST(FlatPort, SeesThePointThatARayTracedThroughThePortHits) {
     const auto seen = FlatPort::project(p, point_in_cam);
     ASSERT_TRUE(seen) << point_in_cam.transpose();
     EXPECT_LT((*seen - px).norm(), 1e-9) << px.transpose();
-    const auto ours = FlatPort::sight_ray(p, FlatPort::domain(p), px);
+    const auto ours = FlatPort::observation_ray(p, FlatPort::domain(p), px);
     ASSERT_TRUE(ours);
     EXPECT_LT((ours->origin_in_cam - ray->origin_in_cam).norm(), 1e-14);  // 0.1 m by rounding
     EXPECT_LT((ours->direction_in_cam - ray->direction_in_cam).norm(), 1e-14);
@@ -88,7 +88,7 @@ TEST(FlatPort, GoesForthAndBackToTheSamePixel) {
     const Eigen::Vector3d point_in_cam = random_point(rng, 0.5);
     const auto px = project(camera, point_in_cam);
     ASSERT_TRUE(px);
-    const auto ray = sight_ray(camera, *px);
+    const auto ray = observation_ray(camera, *px);
     ASSERT_TRUE(ray);
     const Eigen::Vector3d from = point_in_cam - ray->origin_in_cam;
     EXPECT_LT(from.cross(ray->direction_in_cam).norm(), 1e-12 * (1.0 + from.norm()));
@@ -206,7 +206,7 @@ TEST(FlatPort, AnswersNothingToNonsense) {
 
 TEST(FlatPort, ARayBeginsBeyondSmallRanges) {
   const Camera camera{768, 576, Calibrated<FlatPort>{example_params()}, {}, 0.0, {}};
-  const auto ray = sight_ray(camera, {384.0, 288.0});
+  const auto ray = observation_ray(camera, {384.0, 288.0});
   ASSERT_TRUE(ray);
   EXPECT_FALSE(point_at_range(*ray, 0.01));
   EXPECT_NEAR(point_at_range(*ray, 1.0)->norm(), 1.0, 1e-14);

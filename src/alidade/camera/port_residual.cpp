@@ -11,25 +11,25 @@
 namespace alidade {
 namespace {
 
-struct Sight {
+struct Observation {
   Eigen::Vector2d px;
   Eigen::Vector3d point_in_cam;
 };
 
-/// What the port sees at depth `range_m`, over the picture.
-std::vector<Sight> sights_at(const Camera& port, const PortResidualConfig& config, double range_m) {
+/// What the port sees at depth `range_m`, over the image.
+std::vector<Observation> observations_at(const Camera& port, const PortResidualConfig& config, double range_m) {
   const PixelGrid grid = make_grid(port.width_px, port.height_px, config.cols, config.rows);
-  std::vector<Sight> sights;
+  std::vector<Observation> observations;
   for (int row = 0; row < grid.rows; ++row) {
     for (int col = 0; col < grid.cols; ++col) {
-      const auto ray = sight_ray(port, grid.px(col, row));
+      const auto ray = observation_ray(port, grid.px(col, row));
       if (!ray || !(ray->direction_in_cam.z() > 0.0)) continue;
       const double distance_m = (range_m - ray->origin_in_cam.z()) / ray->direction_in_cam.z();
       if (!(distance_m > 0.0)) continue;
-      sights.push_back({grid.px(col, row), ray->origin_in_cam + distance_m * ray->direction_in_cam});
+      observations.push_back({grid.px(col, row), ray->origin_in_cam + distance_m * ray->direction_in_cam});
     }
   }
-  return sights;
+  return observations;
 }
 
 /// Brown parameters without skew, then the viewpoint.
@@ -56,18 +56,18 @@ struct Equations {
   double cost = 0.0;
 };
 
-Equations linearize(const Fit& fit, const std::vector<Sight>& sights) {
+Equations linearize(const Fit& fit, const std::vector<Observation>& observations) {
   Equations eq;
   const Brown::Domain domain = Brown::domain(fit.lens);
-  for (const Sight& sight : sights) {
-    const auto seen = Brown::project_with_jacobians(fit.lens, domain, sight.point_in_cam - fit.viewpoint);
+  for (const Observation& observation : observations) {
+    const auto seen = Brown::project_with_jacobians(fit.lens, domain, observation.point_in_cam - fit.viewpoint);
     if (!seen) {
       eq.cost = std::numeric_limits<double>::infinity();
       return eq;
     }
     Eigen::Matrix<double, 2, num_free> J;
     J << seen->J_px_params.leftCols<4>(), seen->J_px_params.rightCols<5>(), -seen->J_px_point;
-    const Eigen::Vector2d residual = seen->px - sight.px;
+    const Eigen::Vector2d residual = seen->px - observation.px;
     eq.H += J.transpose() * J;
     eq.gradient += J.transpose() * residual;
     eq.cost += residual.squaredNorm();
@@ -76,9 +76,9 @@ Equations linearize(const Fit& fit, const std::vector<Sight>& sights) {
 }
 
 /// Levenberg–Marquardt.
-std::optional<Fit> fit_brown(Fit fit, const std::vector<Sight>& sights) {
-  Equations eq = linearize(fit, sights);
-  if (sights.size() < num_free || !std::isfinite(eq.cost)) return std::nullopt;
+std::optional<Fit> fit_brown(Fit fit, const std::vector<Observation>& observations) {
+  Equations eq = linearize(fit, observations);
+  if (observations.size() < num_free || !std::isfinite(eq.cost)) return std::nullopt;
   double lambda = 1e-6;
   constexpr int max_iterations = 100;
   for (int i = 0; i < max_iterations && lambda < 1e9; ++i) {
@@ -86,12 +86,12 @@ std::optional<Fit> fit_brown(Fit fit, const std::vector<Sight>& sights) {
     H.diagonal() *= 1.0 + lambda;
     const Step step = -solve_symmetric(H, eq.gradient);
     const Fit next = fit.moved(step);
-    const Equations trial = linearize(next, sights);
+    const Equations trial = linearize(next, observations);
     if (!step.allFinite() || !(trial.cost <= eq.cost)) {
       lambda = std::max(10.0 * lambda, 1e-6);
       continue;
     }
-    const bool done = eq.cost - trial.cost <= 1e-10 * eq.cost + 1e-12 * static_cast<double>(sights.size());
+    const bool done = eq.cost - trial.cost <= 1e-10 * eq.cost + 1e-12 * static_cast<double>(observations.size());
     fit = next;
     eq = trial;
     lambda *= 0.1;
@@ -108,14 +108,14 @@ Fit start_of(const Params<FlatPort>& port) {
   return fit;
 }
 
-PortRange compare(const Camera& brown, const Eigen::Vector3d& viewpoint, const std::vector<Sight>& sights,
+PortRange compare(const Camera& brown, const Eigen::Vector3d& viewpoint, const std::vector<Observation>& observations,
                   double range_m) {
   PortRange at{range_m, 0.0, 0.0};
   double count = 0.0;
-  for (const Sight& sight : sights) {
-    const auto px = project(brown, sight.point_in_cam - viewpoint);
+  for (const Observation& observation : observations) {
+    const auto px = project(brown, observation.point_in_cam - viewpoint);
     if (!px) continue;
-    const double off = (*px - sight.px).norm();
+    const double off = (*px - observation.px).norm();
     at.rms_px += off * off;
     at.max_px = std::max(at.max_px, off);
     count += 1.0;
@@ -129,19 +129,19 @@ PortRange compare(const Camera& brown, const Eigen::Vector3d& viewpoint, const s
 std::optional<PortResidual> port_residual(const Camera& port, const PortResidualConfig& config) {
   const auto* lens = std::get_if<Calibrated<FlatPort>>(&port.lens);
   if (!lens) return std::nullopt;
-  std::vector<Sight> sights;
+  std::vector<Observation> observations;
   for (const double range_m : config.fit_ranges_m) {
-    const std::vector<Sight> at = sights_at(port, config, range_m);
-    sights.insert(sights.end(), at.begin(), at.end());
+    const std::vector<Observation> at = observations_at(port, config, range_m);
+    observations.insert(observations.end(), at.begin(), at.end());
   }
-  const std::optional<Fit> fit = fit_brown(start_of(lens->params), sights);
+  const std::optional<Fit> fit = fit_brown(start_of(lens->params), observations);
   if (!fit) return std::nullopt;
   PortResidual result;
   result.brown = {port.width_px, port.height_px, Calibrated<Brown>{fit->lens}, {}, 0.0, "fitted to a flat port"};
   result.shift_m = fit->viewpoint;
   constexpr double near_m = 0.5;
   for (const double range_m : config.test_ranges_m) {
-    result.at.push_back(compare(result.brown, fit->viewpoint, sights_at(port, config, range_m), range_m));
+    result.at.push_back(compare(result.brown, fit->viewpoint, observations_at(port, config, range_m), range_m));
     const double rms_px = result.at.back().rms_px;
     if (range_m >= near_m && !(rms_px <= result.worst_rms_px)) result.worst_rms_px = rms_px;
   }

@@ -26,7 +26,7 @@ std::vector<std::optional<GridPoint>> look(const Camera& camera, const PixelGrid
   for (int row = 0; row < grid.rows; ++row) {
     for (int col = 0; col < grid.cols; ++col) pixels.push_back(grid.px(col, row));
   }
-  const std::vector<std::optional<SightRay>> rays = sight_rays(camera, pixels);
+  const std::vector<std::optional<ObservationRay>> rays = observation_rays(camera, pixels);
   // Infinity is a direction to a central lens; to another, a point so far away that its origin no longer counts.
   const double far_m = is_central(camera.lens) ? 1.0 : 1e6;
   const double range_m = std::isfinite(distance_m) ? distance_m : far_m;
@@ -64,7 +64,7 @@ std::vector<Eigen::Matrix2d> implied_covariance(const Eigen::MatrixXd& cov,
     A.noalias() += weights[i] * J_motion[i].transpose() * J_motion[i];
     B.noalias() += weights[i] * J_motion[i].transpose() * seen[i]->projection.J_px_params;
   }
-  // The least-norm answer where the grid does not tell the motion (a very narrow picture).
+  // The least-norm answer where the grid does not tell the motion (a very narrow image).
   const Eigen::MatrixXd K = -minimum_norm_solution(A, B);
   std::vector<Eigen::Matrix2d> covariances(seen.size(), Eigen::Matrix2d::Zero());
   for (std::size_t i = 0; i < seen.size(); ++i) {

@@ -6,7 +6,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Values over the picture on a regular grid of pixels: value (col, row) stands at (u0 + col·du, v0 + row·dv).
+/// Values over the image on a regular grid of pixels: value (col, row) stands at (u0 + col·du, v0 + row·dv).
 struct PixelGrid {
   int cols = 0, rows = 0;
   double u0_px = 0.0, v0_px = 0.0, du_px = 1.0, dv_px = 1.0;
@@ -18,7 +18,7 @@ struct PixelGrid {
 /// A grid without values that reaches from the centre of the first pixel to the centre of the last.
 [[nodiscard]] PixelGrid make_grid(int width_px, int height_px, int cols, int rows);
 
-/// Standard deviation [px] of where a fixed direction is seen, over the picture: the largest axis of
+/// Standard deviation [px] of where a fixed direction is seen, over the image: the largest axis of
 /// J Σ Jᵀ after the best-fitting rigid motion of the camera is removed, as that motion is taken up by the poses.
 /// `distance_m`: infinity removes a rotation only; a finite working distance removes rotation and translation.
 /// The fit weighs each pixel of the grid by 1/σ², with σ of an unweighted fit.

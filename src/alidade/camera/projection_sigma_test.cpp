@@ -128,13 +128,13 @@ TEST(ProjectionSigma, IsTheScatterOfDrawnLensesAtAWorkingDistance) { expect_the_
 TEST(ProjectionSigma, IsTheScatterOfDrawnFisheyes) { expect_the_scatter(fisheye_camera(), infinity); }
 
 TEST(ProjectionSigma, IgnoresWhatTheMotionTakesUp) {
-  // A principal point that is uncertain alone is, for a narrow picture, a rotation: nearly nothing is left of 10 px.
+  // A principal point that is uncertain alone is, for a narrow image, a rotation: nearly nothing is left of 10 px.
   Camera camera{
       640, 480, Calibrated<Pinhole>{Params<Pinhole>{8000.0, 8000.0, 319.5, 239.5, 0.0}}, Eigen::MatrixXd::Zero(5, 5),
       0.0, {}};
   camera.cov(2, 2) = camera.cov(3, 3) = 100.0;
   for (const double sigma_px : projection_sigma(camera, 15, 11, infinity).values) EXPECT_LT(sigma_px, 0.05);
-  // A focal length is not: it scales the picture about its centre.
+  // A focal length is not: it scales the image about its centre.
   camera.cov.setZero();
   camera.cov(0, 0) = camera.cov(1, 1) = 16.0;
   camera.cov(0, 1) = camera.cov(1, 0) = 16.0;
@@ -175,13 +175,13 @@ TEST(ProjectionSigma, IsNothingOutsideTheLensAndWithoutACovariance) {
     num_seen += covered[i];
     num_otherwise += covered[i] == std::isnan(grid.values[i]);
   }
-  EXPECT_NEAR(num_seen, 0.79 * 2400, 50);  // a fifth of this picture sees nothing
+  EXPECT_NEAR(num_seen, 0.79 * 2400, 50);  // a fifth of this image sees nothing
   EXPECT_LE(num_otherwise, 12);            // some of the pixels within 1 px of the edge
   camera.cov.resize(0, 0);
   for (const double sigma_px : projection_sigma(camera, 6, 4, infinity).values) EXPECT_TRUE(std::isnan(sigma_px));
 }
 
-TEST(ProjectionSigma, OfAPictureTakesMilliseconds) {
+TEST(ProjectionSigma, OfAImageTakesMilliseconds) {
   const Camera camera = distorted_camera();
   double best_s = infinity;
   for (int i = 0; i < 5; ++i) {

@@ -6,12 +6,12 @@
 
 namespace alidade {
 
-/// The pinhole that a picture is undistorted to: same size, principal point and skew 0, focal lengths times `zoom`
-/// (below 1 shows more of a wide picture, with black where the lens sees nothing).
+/// The pinhole that an image is undistorted to: same size, principal point and skew 0, focal lengths times `zoom`
+/// (below 1 shows more of a wide image, with black where the lens sees nothing).
 [[nodiscard]] Camera undistorted_camera(const Camera& camera, double zoom = 1.0);
 
 /// For each pixel of `target`, row by row, where `source` sees the same direction; (−1, −1) where it does not, or where
-/// that is outside its picture. float, as image libraries want it: 1e-4 px at 2000 px.
+/// that is outside its image. float, as image libraries want it: 1e-4 px at 2000 px.
 struct PixelMap {
   int width_px = 0;
   int height_px = 0;

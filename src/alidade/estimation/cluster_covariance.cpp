@@ -24,7 +24,7 @@ MatrixXd product(const A& a, const B& b) {
 }
 
 /// Least rest 1 − h along a direction. A cluster that alone tells it has no residual in it: 0/0 is left at 0.
-constexpr double least_rest = 1e-3;
+constexpr double min_rest = 1e-3;
 
 /// A cluster where the model's covariance is 1. Its measurements of what is asked for, made orthonormal, pull by y: by
 /// the model of covariance 1 − m, m their leverage. `along` holds what a unit of each principal y moves, `rest` 1 − m
@@ -56,7 +56,7 @@ Principal principal_of(const MatrixXd& share, const MatrixXd* taken, const Vecto
     principal.y = leverage.eigenvectors().transpose() * principal.y;
     principal.rest = leverage.eigenvalues();
   }
-  principal.rest = (1.0 - principal.rest.array()).max(least_rest);
+  principal.rest = (1.0 - principal.rest.array()).max(min_rest);
   principal.y.array() /= principal.rest.array().sqrt();
   return principal;
 }
@@ -230,8 +230,8 @@ void state_free(const MatrixXd& inverse, double noise_variance, std::span<const 
   VectorXd widen(n);
   for (Eigen::Index j = 0; j < n; ++j) {
     const double dof = stated_dof(scatter, scatter.dof[j], directions.row(j).transpose());
-    constexpr double least_dof = 4.0;  // below, a t distribution's variance says little
-    widen[j] = std::sqrt(1.0 + 2.0 / (std::max(dof, least_dof) - 2.0));
+    constexpr double min_dof = 4.0;  // below, a t distribution's variance says little
+    widen[j] = std::sqrt(1.0 + 2.0 / (std::max(dof, min_dof) - 2.0));
     result.degrees_of_freedom[j] = dof;
   }
   const MatrixXd widened = widen.asDiagonal() * L;
@@ -254,7 +254,7 @@ ClusterCovariance cluster_covariance(const MatrixXd& inverse, double noise_varia
   result.cov = noise_variance * inverse;
   result.inflation = VectorXd::Ones(n);
   result.degrees_of_freedom = VectorXd::Constant(n, std::numeric_limits<double>::infinity());
-  if (clusters.size() < ClusterCovariance::least_clusters) return result;
+  if (clusters.size() < ClusterCovariance::min_clusters) return result;
   std::vector<Eigen::Index> free;
   for (Eigen::Index j = 0; j < n; ++j) {
     if (inverse(j, j) > 0.0) free.push_back(j);

@@ -35,7 +35,7 @@ struct ClusterCovariance {
   double shrinkage = 1.0;              ///< λ: 0: the clusters' own scatter by direction; 1: the design effect in all.
   std::vector<double> z2;  ///< One per cluster: its squared score over what the model expects; 1 in the mean if true.
 
-  static constexpr std::size_t least_clusters = 3;
+  static constexpr std::size_t min_clusters = 3;
 
   /// Largest inflation of σ over the parameters.
   [[nodiscard]] double largest_inflation() const { return inflation.size() > 0 ? inflation.maxCoeff() : 1.0; }
@@ -43,7 +43,7 @@ struct ClusterCovariance {
 
 /// Cluster-robust covariance. `inverse` is H⁻¹ of the parameters asked for, `noise_variance` the variance s² of the
 /// whitened residuals by their own degrees of freedom: s² H⁻¹ is the model's covariance. Parameters with a zero
-/// diagonal are held. Fewer than `least_clusters` clusters tell nothing: the model's covariance comes back.
+/// diagonal are held. Fewer than `min_clusters` clusters tell nothing: the model's covariance comes back.
 ///
 /// In parameters in which H⁻¹ = 1 a cluster has the share h = C Cᵀ of the information and the step d; by the model the
 /// covariance of y = C⁻¹ d is s² (1 − m), m the leverage of the whole fit. x = C (1 − m)^(−1/2) y/s makes the scatter

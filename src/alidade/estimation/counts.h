@@ -9,6 +9,14 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
+/// A file that a result was made from.
+struct InputFile {
+  std::string role;  ///< photo, camera, log, …
+  std::string name;  ///< As given.
+  std::size_t bytes = 0;
+  std::string sha256;
+};
+
 /// A row, or a photo, that was left out, and why. Line 0: the whole file.
 struct SkippedInput {
   std::string file;

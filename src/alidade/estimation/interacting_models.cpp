@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-constexpr double least_probability = 1e-4;  // else a model that was wrong for long never comes back
+constexpr double min_probability = 1e-4;  // else a model that was wrong for long never comes back
 
 Belief<9> with_acceleration(const Belief<6>& belief, double sigma_a_m_s2) {
   Belief<9> result;
@@ -42,7 +42,7 @@ double log_likelihood(const Innovation& innovation) {
 }
 
 void keep_all(Eigen::Vector3d& mu) {
-  mu = mu.cwiseMax(least_probability);
+  mu = mu.cwiseMax(min_probability);
   mu /= mu.sum();
 }
 

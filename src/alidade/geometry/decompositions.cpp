@@ -55,7 +55,7 @@ Eigen::MatrixXd minimum_norm_solution(const Eigen::Ref<const Eigen::MatrixXd>& A
 
 Ldlt::Ldlt(const Eigen::Ref<const Eigen::MatrixXd>& symmetric) : ldlt_(symmetric) {}
 bool Ldlt::is_positive() const { return ldlt_.info() == Eigen::Success && ldlt_.isPositive(); }
-double Ldlt::least_pivot() const {
+double Ldlt::min_pivot() const {
   const Eigen::VectorXd D = ldlt_.vectorD();
   return ldlt_.info() == Eigen::Success && D.allFinite() ? D.minCoeff() : std::numeric_limits<double>::quiet_NaN();
 }

@@ -46,13 +46,13 @@ struct Svd {
                                                     const Eigen::Ref<const Eigen::MatrixXd>& B);
 
 /// L D Lᵀ of a symmetric matrix, n × n; its lower triangle is read. Of a singular one, or one that is not finite,
-/// least_pivot() says so, and solutions are of no use.
+/// min_pivot() says so, and solutions are of no use.
 class Ldlt {
  public:
   Ldlt() = default;  ///< Of nothing yet.
   explicit Ldlt(const Eigen::Ref<const Eigen::MatrixXd>& symmetric);
   [[nodiscard]] bool is_positive() const;
-  [[nodiscard]] double least_pivot() const;  ///< Of D; NaN where the matrix has no such decomposition.
+  [[nodiscard]] double min_pivot() const;  ///< Of D; NaN where the matrix has no such decomposition.
   [[nodiscard]] Eigen::VectorXd solve(const Eigen::Ref<const Eigen::VectorXd>& b) const;
   [[nodiscard]] Eigen::MatrixXd solve_each(const Eigen::Ref<const Eigen::MatrixXd>& B) const;  ///< Column by column.
   [[nodiscard]] Eigen::MatrixXd inverse() const;

@@ -52,13 +52,13 @@ TEST(Decompositions, SolveWhatTheySay) {
   EXPECT_LT((S * ldlt.solve(b) - b).norm(), 1e-12);
   EXPECT_LT((S * ldlt.solve_each(B) - B).norm(), 1e-12);
   EXPECT_LT((S * ldlt.inverse() - Eigen::MatrixXd::Identity(4, 4)).norm(), 1e-12);
-  EXPECT_GT(ldlt.least_pivot(), 0.0);
-  EXPECT_LE(ldlt.least_pivot(), S.diagonal().minCoeff());
-  EXPECT_NEAR(Ldlt(Eigen::Vector3d(3.0, 0.5, 2.0).asDiagonal().toDenseMatrix()).least_pivot(), 0.5, 1e-15);
+  EXPECT_GT(ldlt.min_pivot(), 0.0);
+  EXPECT_LE(ldlt.min_pivot(), S.diagonal().minCoeff());
+  EXPECT_NEAR(Ldlt(Eigen::Vector3d(3.0, 0.5, 2.0).asDiagonal().toDenseMatrix()).min_pivot(), 0.5, 1e-15);
   Eigen::MatrixXd broken = S;
   broken(1, 0) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(Ldlt(broken).least_pivot() > 0.0);
-  EXPECT_FALSE(Ldlt(Eigen::MatrixXd(A * A.transpose())).least_pivot() > 1e-12);  // rank 4 of 9
+  EXPECT_FALSE(Ldlt(broken).min_pivot() > 0.0);
+  EXPECT_FALSE(Ldlt(Eigen::MatrixXd(A * A.transpose())).min_pivot() > 1e-12);  // rank 4 of 9
   EXPECT_LT((S * solve_symmetric(S, b) - b).norm(), 1e-12);
   EXPECT_LT((S * inverse_symmetric(S) - Eigen::MatrixXd::Identity(4, 4)).norm(), 1e-12);
   EXPECT_NEAR(squared_mahalanobis(S * b, S), b.dot(S * b), 1e-10 * b.dot(S * b));

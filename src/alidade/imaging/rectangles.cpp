@@ -14,20 +14,20 @@ namespace {
 
 using Quad = std::array<Eigen::Vector2d, 4>;
 
-constexpr double least_side_px = 12.0;
-constexpr double least_contrast = 20.0;  // grey values; a printed rectangle has five times that
-constexpr double most_edge_px = 0.6;     // RMS of an edge from straight: 0.1 of print, 1 and more of chance
+constexpr double min_side_px = 12.0;
+constexpr double min_contrast = 20.0;  // grey values; a printed rectangle has five times that
+constexpr double max_edge_px = 0.6;    // RMS of an edge from straight: 0.1 of print, 1 and more of chance
 
-double grey_at(const cv::Mat& picture, const Eigen::Vector2d& px) {
+double grey_at(const cv::Mat& image, const Eigen::Vector2d& px) {
   const int u = static_cast<int>(std::floor(px.x())), v = static_cast<int>(std::floor(px.y()));
-  if (u < 0 || v < 0 || u + 1 >= picture.cols || v + 1 >= picture.rows) return std::nan("");
+  if (u < 0 || v < 0 || u + 1 >= image.cols || v + 1 >= image.rows) return std::nan("");
   const double a = px.x() - u, b = px.y() - v;
-  const std::uint8_t* const g = picture.ptr<std::uint8_t>(v) + u;
-  const std::uint8_t* const h = picture.ptr<std::uint8_t>(v + 1) + u;
+  const std::uint8_t* const g = image.ptr<std::uint8_t>(v) + u;
+  const std::uint8_t* const h = image.ptr<std::uint8_t>(v + 1) + u;
   return (1 - b) * ((1 - a) * g[0] + a * g[1]) + b * ((1 - a) * h[0] + a * h[1]);
 }
 
-/// Clockwise in the picture (y down), beginning at the top left.
+/// Clockwise in the image (y down), beginning at the top left.
 Quad ordered(Quad quad) {
   double area = 0.0;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -50,7 +50,7 @@ std::vector<Quad> outlines(const cv::Mat& grey) {
     std::vector<std::vector<cv::Point>> contours;
     cv::findContours(mask, contours, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
     for (const auto& contour : contours) {
-      if (static_cast<double>(contour.size()) < 4.0 * least_side_px) continue;
+      if (static_cast<double>(contour.size()) < 4.0 * min_side_px) continue;
       std::vector<cv::Point> corners;
       cv::approxPolyDP(contour, corners, 0.03 * static_cast<double>(contour.size()), true);
       if (corners.size() != 4 || !cv::isContourConvex(corners)) continue;
@@ -58,7 +58,7 @@ std::vector<Quad> outlines(const cv::Mat& grey) {
       bool is_inside = true, is_large = true;
       for (std::size_t i = 0; i < 4; ++i) quad[i] = {corners[i].x, corners[i].y};
       for (std::size_t i = 0; i < 4; ++i) {
-        is_large = is_large && (quad[i] - quad[(i + 1) % 4]).norm() >= least_side_px;
+        is_large = is_large && (quad[i] - quad[(i + 1) % 4]).norm() >= min_side_px;
         is_inside = is_inside && quad[i].minCoeff() > 2.0 && quad[i].x() < grey.cols - 3 && quad[i].y() < grey.rows - 3;
       }
       if (!is_inside || !is_large) continue;
@@ -85,7 +85,7 @@ std::optional<Eigen::Vector2d> edge_point(const cv::Mat& grey, const Eigen::Vect
         sign * (grey_at(grey, at + (s + 0.75) * inward) - grey_at(grey, at + (s - 0.75) * inward));
   }
   const auto best = static_cast<std::size_t>(std::ranges::max_element(slope) - slope.begin());
-  if (best == 0 || best + 1 >= slope.size() || !(slope[best] > 0.4 * least_contrast)) return std::nullopt;
+  if (best == 0 || best + 1 >= slope.size() || !(slope[best] > 0.4 * min_contrast)) return std::nullopt;
   const double before = slope[best - 1], after = slope[best + 1], bend = before - 2.0 * slope[best] + after;
   if (!(bend < 0.0)) return std::nullopt;
   const double s = 0.5 * (static_cast<double>(best) - reach + 0.5 * (before - after) / bend);
@@ -139,7 +139,7 @@ std::optional<SeenRectangle> fitted(const cv::Mat& grey, const Camera& camera, c
   double rms_px = 0.0;
   for (std::size_t i = 0; i < 4; ++i) {
     const auto plane = edge_plane(grey, camera, quad[i], quad[(i + 1) % 4], sign);
-    if (!plane || plane->rms_px > most_edge_px) return std::nullopt;
+    if (!plane || plane->rms_px > max_edge_px) return std::nullopt;
     planes[i] = *plane;
     rms_px = std::max(rms_px, plane->rms_px);
   }
@@ -201,7 +201,7 @@ std::vector<SeenRectangle> find_rectangles(const cv::Mat& grey, const Camera& ca
       if (seen) seen = fitted(bytes, camera, seen->corners_px, sign);
       if (!seen) continue;
       measure_light(bytes, *seen);
-      if (std::abs(seen->contrast) < least_contrast || seen->contrast * sign < 0.0) continue;
+      if (std::abs(seen->contrast) < min_contrast || seen->contrast * sign < 0.0) continue;
       const bool is_known = std::ranges::any_of(found, [&](const SeenRectangle& other) {
         double most = 0.0;
         for (std::size_t i = 0; i < 4; ++i) most = std::max(most, (other.corners_px[i] - seen->corners_px[i]).norm());

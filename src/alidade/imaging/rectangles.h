@@ -21,7 +21,7 @@ struct SeenRectangle {
   double inside_sigma = 0.0;  ///< Of the grey values inside.
 };
 
-/// All of them that are in the picture as a whole, the most contrast first. Edges are fitted as planes of rays, so that
+/// All of them that are in the image as a whole, the most contrast first. Edges are fitted as planes of rays, so that
 /// corners are right where the lens bends lines.
 [[nodiscard]] std::vector<SeenRectangle> find_rectangles(const cv::Mat& grey, const Camera& camera);
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "alidade/camera/camera.h"
+#include "alidade/files/json_value.h"
 #include "alidade/geometry/rigid3.h"
-#include "alidade/io/json_value.h"
 #include "alidade/live/protocol.h"
 
 // Messages that Foxglove and Lichtblick draw, as JSON; their schemas are github.com/foxglove/foxglove-sdk/schemas.
@@ -67,7 +67,7 @@ class Scene {
   JsonValue entities_ = JsonValue::list();
 };
 
-/// Marks over a picture. [px]
+/// Marks over an image. [px]
 class Marks {
  public:
   explicit Marks(std::int64_t t_ns) : t_ns_(t_ns) {}

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "alidade/io/files.h"
+#include "alidade/files/files.h"
 #include "alidade/live/foxglove.h"
 #include "alidade/live/server.h"
 

@@ -15,7 +15,7 @@ void SendQueue::push(Outgoing message) {
   }
   bytes_ += message.size();
   waiting_.push_back(std::move(message));
-  while (bytes_ > most_bytes_ && (drop_oldest(MessageKind::image) || drop_oldest(MessageKind::step))) {
+  while (bytes_ > max_bytes_ && (drop_oldest(MessageKind::image) || drop_oldest(MessageKind::step))) {
   }
 }
 

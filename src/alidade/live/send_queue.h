@@ -28,7 +28,7 @@ struct Outgoing {
 /// that size, and no time.
 class SendQueue {
  public:
-  explicit SendQueue(std::size_t most_bytes) : most_bytes_(most_bytes) {}
+  explicit SendQueue(std::size_t max_bytes) : max_bytes_(max_bytes) {}
 
   /// Drops the oldest images, then the oldest steps, where it does not fit otherwise.
   void push(Outgoing message);
@@ -46,7 +46,7 @@ class SendQueue {
  private:
   bool drop_oldest(MessageKind kind);
 
-  std::size_t most_bytes_, bytes_ = 0;
+  std::size_t max_bytes_, bytes_ = 0;
   std::deque<Outgoing> waiting_;
   Dropped dropped_;
 };

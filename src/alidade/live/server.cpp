@@ -19,7 +19,7 @@
 #include <set>
 #include <thread>
 
-#include "alidade/io/files.h"
+#include "alidade/files/files.h"
 
 namespace alidade::live {
 namespace {
@@ -35,10 +35,10 @@ using std::chrono::seconds;
 using Request = http::request<http::string_body>;
 using Response = http::response<http::string_body>;
 
-constexpr std::size_t most_clients = 8, most_connections = 40;
-constexpr std::size_t most_request_bytes = 64 * 1024;  // of a client: subscriptions of all topics are 2 kB
-constexpr auto patience = seconds(10);                 // with a request that does not come
-constexpr auto silence = seconds(40);                  // of a client that answers no ping
+constexpr std::size_t max_clients = 8, max_connections = 40;
+constexpr std::size_t max_request_bytes = 64 * 1024;  // of a client: subscriptions of all topics are 2 kB
+constexpr auto patience = seconds(10);                // with a request that does not come
+constexpr auto silence = seconds(40);                 // of a client that answers no ping
 constexpr auto tick = milliseconds(100);
 
 double now_s() { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
@@ -101,7 +101,7 @@ class Client : public std::enable_shared_from_this<Client> {
     socket_.set_option(websocket::stream_base::decorator([subprotocol](websocket::response_type& response) {
       response.set(http::field::sec_websocket_protocol, subprotocol);
     }));
-    socket_.read_message_max(most_request_bytes);
+    socket_.read_message_max(max_request_bytes);
     socket_.async_accept(request_, [self = shared_from_this()](beast::error_code error) {
       if (error) return self->leave();
       self->is_open_ = true;
@@ -201,8 +201,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
     const auto subprotocol = chosen_subprotocol({offered.data(), offered.size()});
     if (!subprotocol)
       return refuse(http::status::bad_request, "offer the subprotocol foxglove.sdk.v1 or foxglove.websocket.v1\n");
-    if (server_.clients.size() >= most_clients)
-      return refuse(http::status::service_unavailable, fmt::format("{} clients are served, no more\n", most_clients));
+    if (server_.clients.size() >= max_clients)
+      return refuse(http::status::service_unavailable, fmt::format("{} clients are served, no more\n", max_clients));
     const auto client = std::make_shared<Client>(std::move(stream_), server_);
     server_.clients.insert(client);
     server_.num_clients = server_.clients.size();
@@ -256,7 +256,7 @@ void Server::State::listen() {
 void Server::State::accept() {
   acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
-    if (!error && num_connections < most_connections) {
+    if (!error && num_connections < max_connections) {
       socket.set_option(tcp::no_delay(true), error);
       std::make_shared<Connection>(std::move(socket), *this)->run();
     }
@@ -377,8 +377,8 @@ std::vector<std::string> Server::kept(std::string_view topic) const {
 
 std::size_t Server::num_clients() const { return state_->num_clients; }
 
-void Server::finish(double most_s) {
-  const auto until = Clock::now() + std::chrono::duration<double>(most_s);
+void Server::finish(double max_s) {
+  const auto until = Clock::now() + std::chrono::duration<double>(max_s);
   const auto count = [this] {
     std::promise<std::size_t> counted;
     asio::post(state_->io, [&] { counted.set_value(state_->num_unfinished()); });

@@ -51,7 +51,7 @@ class Server {
 
   [[nodiscard]] std::size_t num_clients() const;
   /// Waits until all that was sent is out and those who attend the end have left; not longer than so many seconds.
-  void finish(double most_s);
+  void finish(double max_s);
 
   struct State;
 

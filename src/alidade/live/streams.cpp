@@ -4,16 +4,16 @@
 
 #include <cmath>
 
-#include "alidade/io/localize_document.h"
-#include "alidade/io/observe_document.h"
-#include "alidade/io/servo_document.h"
-#include "alidade/io/track_document.h"
 #include "alidade/live/foxglove.h"
+#include "alidade/results/localize_document.h"
+#include "alidade/results/observe_document.h"
+#include "alidade/results/servo_document.h"
+#include "alidade/results/track_document.h"
 
 namespace alidade::live {
 namespace {
 
-constexpr std::size_t most_trail = 300;
+constexpr std::size_t max_trail = 300;
 
 std::int64_t ns_of(double t_s) {
   return std::isfinite(t_s) && std::abs(t_s) < 9e9 ? static_cast<std::int64_t>(std::llround(t_s * 1e9)) : 0;
@@ -21,8 +21,8 @@ std::int64_t ns_of(double t_s) {
 
 std::string head_name(const RigHead& head) { return fmt::format("head{}", head.head.id); }
 
-Topic latest(const std::string& topic, FoxgloveType type, double most_hz, std::size_t lanes = 1) {
-  return {foxglove_channel(topic, type), TopicKind::latest, most_hz, lanes};
+Topic latest(const std::string& topic, FoxgloveType type, double max_hz, std::size_t lanes = 1) {
+  return {foxglove_channel(topic, type), TopicKind::latest, max_hz, lanes};
 }
 
 /// One value of a column, by whatever it holds.
@@ -48,7 +48,7 @@ std::string schema_of(const JsonValue& value) {
 
 void add_place(Trail& trail, const Eigen::Vector3d& place) {
   trail.push_back(place);
-  if (trail.size() > most_trail) trail.pop_front();
+  if (trail.size() > max_trail) trail.pop_front();
 }
 
 void draw_trail(Scene& scene, const Trail& trail) {
@@ -119,7 +119,7 @@ void TrackStream::begin(Server& server) const { send_cameras(server, heads_); }
 
 namespace {
 
-std::string track_scene(std::int64_t t_ns, std::span<const RigHead> heads, const TargetSight& sight,
+std::string track_scene(std::int64_t t_ns, std::span<const RigHead> heads, const TargetObservation& observation,
                         const TrackStep& step, Trail& trail) {
   const Eigen::Vector3d target = step.belief.x.head<3>();
   Scene scene(t_ns, "world");
@@ -129,39 +129,42 @@ std::string track_scene(std::int64_t t_ns, std::span<const RigHead> heads, const
   }
   draw_trail(scene, trail);
   for (std::size_t i = 0; i < heads.size(); ++i) {
-    const Eigen::Vector3d place = cam_centre_in_world(heads[i].head, sight.pan_tilt_rad);
+    const Eigen::Vector3d place = cam_centre_in_world(heads[i].head, observation.pan_tilt_rad);
     scene.label(head_name(heads[i]), place, fmt::format("head {}", heads[i].head.id));
   }
-  const auto ray = ray_in_world(heads[sight.head], sight);
+  const auto ray = ray_in_world(heads[observation.head], observation);
   if (ray) {
     const double length_m = step.has_belief ? 1.15 * (target - ray->origin_in_world).norm() : 2.0;
     const std::array<Eigen::Vector3d, 2> ends{ray->origin_in_world,
                                               ray->origin_in_world + length_m * ray->direction_in_world};
-    scene.line("ray of " + head_name(heads[sight.head]), ends, 1.5, purple);
+    scene.line("ray of " + head_name(heads[observation.head]), ends, 1.5, purple);
   }
   return scene.text();
 }
 
 /// What was seen, and where it was expected within 3σ.
-std::string track_marks(std::int64_t t_ns, const TargetSight& sight, const TrackStep& step) {
+std::string track_marks(std::int64_t t_ns, const TargetObservation& observation, const TrackStep& step) {
   Marks marks(t_ns);
-  if (step.has_innovation) marks.ellipse(sight.px - step.innovation.nu, step.innovation.S, sky);
-  marks.dot(sight.px, 6.0, step.accepted ? orange : vermilion);
+  if (step.has_innovation) marks.ellipse(observation.px - step.innovation.nu, step.innovation.S, sky);
+  marks.dot(observation.px, 6.0, step.accepted ? orange : vermilion);
   return marks.text();
 }
 
 }  // namespace
 
-void TrackStream::show(Server& server, const TargetSight& sight, const TrackStep& step, bool is_last) const {
-  const std::int64_t t_ns = ns_of(sight.t_capture_s);
-  const RigHead& head = heads_[sight.head];
+void TrackStream::show(Server& server, const TargetObservation& observation, const TrackStep& step,
+                       bool is_last) const {
+  const std::int64_t t_ns = ns_of(observation.t_capture_s);
+  const RigHead& head = heads_[observation.head];
   server.send(
       "/track", t_ns,
-      [heads = heads_, truth = truth_, sight, step] { return row_text(track_row(sight, heads, step, *truth)); },
-      sight.head, is_last);
+      [heads = heads_, truth = truth_, observation, step] {
+        return row_text(track_row(observation, heads, step, *truth));
+      },
+      observation.head, is_last);
   server.send(
-      "/tf", t_ns, [t_ns, &head, sight] { return head_transforms(t_ns, head, sight.pan_tilt_rad); }, sight.head,
-      is_last);
+      "/tf", t_ns, [t_ns, &head, observation] { return head_transforms(t_ns, head, observation.pan_tilt_rad); },
+      observation.head, is_last);
   if (step.has_belief)
     server.send(
         "/target", t_ns,
@@ -171,9 +174,12 @@ void TrackStream::show(Server& server, const TargetSight& sight, const TrackStep
         0, is_last);
   server.send(
       "/scene", t_ns,
-      [t_ns, heads = heads_, sight, step, trail = trail_] { return track_scene(t_ns, heads, sight, step, *trail); },
-      sight.head);
-  server.send("/" + head_name(head) + "/marks", t_ns, [t_ns, sight, step] { return track_marks(t_ns, sight, step); });
+      [t_ns, heads = heads_, observation, step, trail = trail_] {
+        return track_scene(t_ns, heads, observation, step, *trail);
+      },
+      observation.head);
+  server.send("/" + head_name(head) + "/marks", t_ns,
+              [t_ns, observation, step] { return track_marks(t_ns, observation, step); });
   if (step.event == TrackEvent::restart || step.event == TrackEvent::start)
     server.send("/log", t_ns, [t_ns, event = step.event] {
       return log_text(t_ns, event == TrackEvent::start ? LogLevel::info : LogLevel::warning, "track",

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "alidade/io/result_document.h"
 #include "alidade/live/server.h"
 #include "alidade/localize/localize.h"
 #include "alidade/loop/servo_study.h"
 #include "alidade/observe/observe.h"
+#include "alidade/results/result_document.h"
 #include "alidade/track/track.h"
 
 // What runs publish: each step of an estimator as a row, and as what Foxglove draws. What a stream is made of must live
@@ -36,7 +36,7 @@ class TrackStream {
   TrackStream(std::span<const RigHead> heads, const TrueTrack& truth) : heads_(heads), truth_(&truth) {}
   [[nodiscard]] std::vector<Topic> topics() const;
   void begin(Server& server) const;
-  void show(Server& server, const TargetSight& sight, const TrackStep& step, bool is_last = false) const;
+  void show(Server& server, const TargetObservation& observation, const TrackStep& step, bool is_last = false) const;
 
  private:
   std::span<const RigHead> heads_;

@@ -49,7 +49,7 @@ class DeafClient {
   int socket_;
 };
 
-/// Two heads at 30 pictures a second and four clients that do not read: the estimator's own thread spends less than a
+/// Two heads at 30 images a second and four clients that do not read: the estimator's own thread spends less than a
 /// hundredth of its time on showing them what it does.
 TEST(TrackStream, CostsTheEstimatorLessThanOnePercent) {
   const std::array<RigHead, 2> heads = xiahou_rig();
@@ -69,9 +69,9 @@ TEST(TrackStream, CostsTheEstimatorLessThanOnePercent) {
   step.belief.x << 0.1, 0.2, 0.8, 0.0, 0.0, 0.0;
   step.belief.P.setIdentity();
   step.innovation.S.setIdentity();
-  constexpr int num_pictures = 45;
+  constexpr int num_images = 45;
   double spent_s = 0.0;
-  for (int i = 0; i < num_pictures; ++i) {
+  for (int i = 0; i < num_images; ++i) {
     for (std::size_t head = 0; head < 2; ++head) {
       const double t_s = i / 30.0, from_s = thread_s();
       stream.show(server, {t_s, t_s, head, Eigen::Vector2d::Zero(), Eigen::Vector2d(300, 200), 0.0}, step);
@@ -79,8 +79,8 @@ TEST(TrackStream, CostsTheEstimatorLessThanOnePercent) {
     }
     std::this_thread::sleep_for(std::chrono::microseconds(33'333));
   }
-  RecordProperty("share", std::to_string(spent_s / (num_pictures / 30.0)));
-  EXPECT_LT(spent_s, 0.01 * num_pictures / 30.0) << "of " << num_pictures / 30.0 << " s";
+  RecordProperty("share", std::to_string(spent_s / (num_images / 30.0)));
+  EXPECT_LT(spent_s, 0.01 * num_images / 30.0) << "of " << num_images / 30.0 << " s";
 }
 
 }  // namespace

@@ -7,8 +7,8 @@
 namespace alidade::live {
 namespace {
 
-constexpr std::size_t most_waiting_bytes = 4'000'000;
-constexpr std::size_t most_subscriptions = 256;
+constexpr std::size_t max_waiting_bytes = 4'000'000;
+constexpr std::size_t max_subscriptions = 256;
 constexpr double kept_s = 60.0;
 constexpr double between_notes_s = 2.0;  // or notes fill the queue themselves
 constexpr std::uint32_t replaces_time = 0xffffffffU, replaces_note = 0xfffffffeU, replaces_warning = 0xfffffffdU;
@@ -24,7 +24,7 @@ TopicStore::TopicStore(const std::vector<Topic>& topics) {
     State& made = *topics_.emplace_back(std::make_unique<State>());
     made.topic = topic;
     const std::size_t lanes = std::max<std::size_t>(1, topic.lanes);
-    made.limits.assign(lanes, RateLimit(topic.most_hz / static_cast<double>(lanes)));
+    made.limits.assign(lanes, RateLimit(topic.max_hz / static_cast<double>(lanes)));
   }
 }
 
@@ -60,7 +60,7 @@ void TopicStore::keep(std::size_t index, KeptMessage message) {
   topic.kept.push_back(std::move(message));
 }
 
-Feed::Feed(const TopicStore& topics, std::string_view session_id) : topics_(topics), queue_(most_waiting_bytes) {
+Feed::Feed(const TopicStore& topics, std::string_view session_id) : topics_(topics), queue_(max_waiting_bytes) {
   queue_.push(text_message(server_info_text("alidade", session_id)));
   queue_.push(text_message(advertise_text(topics.channels())));
 }
@@ -108,7 +108,7 @@ void Feed::subscribe(std::uint32_t subscription, std::uint64_t channel) {
   if (channel < 1 || channel > topics_.size()) return warn(fmt::format("there is no channel {}", channel));
   if (std::ranges::any_of(subscriptions_, [&](const auto& s) { return s.first == subscription; }))
     return warn(fmt::format("subscription {} is there already", subscription));
-  if (subscriptions_.size() >= most_subscriptions) return warn("too many subscriptions");
+  if (subscriptions_.size() >= max_subscriptions) return warn("too many subscriptions");
   const auto index = static_cast<std::size_t>(channel - 1);
   subscriptions_.emplace_back(subscription, index);
   for (const KeptMessage& message : topics_.kept(index)) push(subscription, index, message);

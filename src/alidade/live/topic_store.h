@@ -25,7 +25,7 @@ enum class TopicKind {
 struct Topic {
   Channel channel;
   TopicKind kind = TopicKind::steps;
-  double most_hz = 60.0;  ///< Messages a second, of all lanes.
+  double max_hz = 60.0;   ///< Messages a second, of all lanes.
   std::size_t lanes = 1;  ///< Each has its share: heads, of which none is to hide another.
 };
 

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "alidade/io/files.h"
+#include "alidade/files/files.h"
 #include "alidade/testing/random.h"
 #include "alidade/testing/reference_case.h"
 

@@ -47,8 +47,8 @@ double information_of(const LocalizationFilter& filter) {
   return std::log(information.determinant());
 }
 
-/// Without known points no sight tells where the world is or how it is turned: an update changes what is known of
-/// that by nothing, though the state it is linearised at moves. With places: inverse depths that begin in one picture
+/// Without known points no observation tells where the world is or how it is turned: an update changes what is known of
+/// that by nothing, though the state it is linearised at moves. With places: inverse depths that begin in one image
 /// share their first three numbers, and such a covariance has no inverse.
 TEST(Consistency, NothingSeenTellsHowTheWorldIsTurned) {
   UnderwaterScene scene;
@@ -66,15 +66,15 @@ TEST(Consistency, NothingSeenTellsHowTheWorldIsTurned) {
       filter.predict(0.1);
       const double before = information_of(filter);
       const Eigen::Quaterniond was = filter.motion().world_from_cam.rotation;
-      ASSERT_TRUE(filter.update(sample.frames[k].sights).is_sound);
+      ASSERT_TRUE(filter.update(sample.frames[k].observations).is_sound);
       largest_turn_rad = std::max(largest_turn_rad, was.angularDistance(filter.motion().world_from_cam.rotation));
       EXPECT_NEAR(information_of(filter), before, 1e-3) << k;
     }
-    for (const FeatureSight& sight : sample.frames[k].sights) {
-      const auto told = std::ranges::find(sample.config.depths, sight.id, &ToldDepth::id);
-      if (filter.has(sight.id) || told == sample.config.depths.end()) continue;
-      const double range_m = told->depth_m / unproject(filter.camera(), sight.px)->z();
-      filter.add(sight.id, sight.px, {range_m, told->sigma_rel}, FeatureKind::xyz);
+    for (const FeatureObservation& observation : sample.frames[k].observations) {
+      const auto told = std::ranges::find(sample.config.depths, observation.id, &ToldDepth::id);
+      if (filter.has(observation.id) || told == sample.config.depths.end()) continue;
+      const double range_m = told->depth_m / unproject(filter.camera(), observation.px)->z();
+      filter.add(observation.id, observation.px, {range_m, told->sigma_rel}, FeatureKind::xyz);
     }
   }
   EXPECT_GT(largest_turn_rad, 0.005);  // the updates did something

@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-constexpr double least_rho = 1e-4;  // 10 km: beyond it only the direction can be told
+constexpr double min_rho = 1e-4;  // 10 km: beyond it only the direction can be told
 
 /// The point at a distance that is seen at a pixel. A lens with a port has no single centre: its ray is a start only.
 struct SightedPoint {
@@ -55,7 +55,7 @@ FeaturePlace place_of(const Feature& feature) {
   place.J.leftCols<3>().setIdentity();
   if (feature.kind == FeatureKind::xyz) return place;
   const BearingAngles bearing = bearing_of(feature.values[3], feature.values[4]);
-  const double rho = std::max(feature.values[5], least_rho);
+  const double rho = std::max(feature.values[5], min_rho);
   place.point_in_world += bearing.m / rho;
   place.J.col(3) = bearing.m_theta / rho;
   place.J.col(4) = bearing.m_phi / rho;
@@ -70,12 +70,12 @@ std::optional<ExpectedView> expected_view(const Camera& camera, const Rigid3& wo
   Eigen::Vector3d offset = place.point_in_world - world_from_cam.translation;
   Eigen::Matrix<double, 3, 6> J_offset = place.J;
   double J_position = -1.0;
-  if (is_inverse && feature.values[5] < least_rho) {  // (c − r) ρ/ρ_min + m/ρ_min: the same direction, also for ρ ≤ 0
+  if (is_inverse && feature.values[5] < min_rho) {  // (c − r) ρ/ρ_min + m/ρ_min: the same direction, also for ρ ≤ 0
     const Eigen::Vector3d from_camera = feature.values.head<3>() - world_from_cam.translation;
-    const double share = feature.values[5] / least_rho;
+    const double share = feature.values[5] / min_rho;
     offset += (share - 1.0) * from_camera;
     J_offset.leftCols<3>() *= share;
-    J_offset.col(5) = from_camera / least_rho;
+    J_offset.col(5) = from_camera / min_rho;
     J_position = -share;
   }
   const Eigen::Vector3d point_in_cam = cam_from_world_rotation * offset;
@@ -132,7 +132,7 @@ std::optional<NewFeature> new_feature(const Camera& camera, const Rigid3& world_
 
 double linearity_index(const Feature& feature, double sigma_rho, const Eigen::Vector3d& camera_in_world) {
   const double rho = feature.values[5];
-  if (!(rho > least_rho)) return 1e9;
+  if (!(rho > min_rho)) return 1e9;
   const Eigen::Vector3d ray_in_world = bearing_of(feature.values[3], feature.values[4]).m;
   const Eigen::Vector3d from_here = feature.values.head<3>() + ray_in_world / rho - camera_in_world;
   const double distance = from_here.norm(), sigma_d = sigma_rho / (rho * rho);

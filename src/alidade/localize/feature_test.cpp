@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "alidade/io/files.h"
+#include "alidade/files/files.h"
 #include "alidade/localize/distortion.h"
 #include "alidade/simulate/example_camera.h"
 #include "alidade/simulate/underwater.h"

@@ -14,7 +14,7 @@ constexpr int pose_dim = 6;
 LocalizationFilter::LocalizationFilter(Camera camera, const CameraMotion& start, const MotionMatrix& start_cov,
                                        LocalizationFilterConfig config)
     : camera_(std::move(camera)), motion_(start), config_(std::move(config)), camera_at_delta_(camera_) {
-  P_.reserve(config_.state_capacity, 2 * config_.sights_capacity);
+  P_.reserve(config_.state_capacity, 2 * config_.observations_capacity);
   [[maybe_unused]] const bool fits = P_.grow(motion_dim + num_lens());
   assert(fits && config_.lens_params.size() == config_.sigma_lens_params.size());
   for (int i = 0; i < motion_dim; ++i)
@@ -23,24 +23,25 @@ LocalizationFilter::LocalizationFilter(Camera camera, const CameraMotion& start,
     const double sigma = config_.sigma_lens_params[static_cast<std::size_t>(k)];
     P_.at(motion_dim + k, motion_dim + k) = sigma * sigma;
   }
-  const auto sights = static_cast<std::size_t>(config_.sights_capacity);
-  given_ = GivenEffects(camera_, config_.lens_params, config_.sigma_scale, P_.capacity(), config_.sights_capacity);
+  const auto observations = static_cast<std::size_t>(config_.observations_capacity);
+  given_ =
+      GivenEffects(camera_, config_.lens_params, config_.sigma_scale, P_.capacity(), config_.observations_capacity);
   delta_.setZero(P_.capacity());
   start_.setZero(P_.capacity());
   next_.setZero(P_.capacity());
   before_.setZero(P_.capacity());
   shear_.setZero(P_.capacity(), 3);
-  measured_.reserve(sights);
-  waiting_.reserve(sights);
-  doubtful_.reserve(sights);
-  used_.reserve(sights);
-  outcomes_.reserve(sights);
-  nis_.reserve(sights);
-  agrees_.reserve(sights);
-  agrees_best_.reserve(sights);
-  kept_.outcomes.reserve(sights);
-  kept_.nis.reserve(sights);
-  kept_.used.reserve(sights);
+  measured_.reserve(observations);
+  waiting_.reserve(observations);
+  doubtful_.reserve(observations);
+  used_.reserve(observations);
+  outcomes_.reserve(observations);
+  nis_.reserve(observations);
+  agrees_.reserve(observations);
+  agrees_best_.reserve(observations);
+  kept_.outcomes.reserve(observations);
+  kept_.nis.reserve(observations);
+  kept_.used.reserve(observations);
   kept_.delta.setZero(P_.capacity());
 }
 

@@ -13,7 +13,7 @@
 namespace alidade {
 
 struct LocalizationFilterConfig {
-  double sigma_px = 0.5;  ///< Of a pixel coordinate, where a sight does not say.
+  double sigma_px = 0.5;  ///< Of a pixel coordinate, where an observation does not say.
   /// Of the pixel by which a new feature is defined; 0: sigma_px. A patch that is looked for as it was first seen is
   /// there by definition.
   double sigma_new_px = 0.0;
@@ -23,30 +23,30 @@ struct LocalizationFilterConfig {
   double gate = 13.8;               ///< χ² of two numbers: 99.9 %.
   double bend_tolerance = 0.05;     ///< Iterate while innovations are further from linear than so many σ.
   bool is_sequential = true;        ///< Known points first, then by growing innovation; false: in the order given.
-  bool finds_consensus = true;      ///< One-point consensus where sights disagree: mismatches.
-  double consensus_above = 0.0;     ///< Share of the sights that may disagree before a consensus is looked for.
-  /// No sight tells how the world is turned, and so the covariance says: world_turn.h. False: as in the literature
-  /// before 2001, more certain with every frame.
+  bool finds_consensus = true;      ///< One-point consensus where observations disagree: mismatches.
+  double consensus_above = 0.0;     ///< Share of the observations that may disagree before a consensus is looked for.
+  /// No observation tells how the world is turned, and so the covariance says: world_turn.h. False: as in the
+  /// literature before 2001, more certain with every frame.
   bool holds_frame = true;
   /// Errors that turn with the world are straight for small turns only: an update by a larger one holds the frame by
   /// its derivatives alone. See world_turn.h.
-  double most_turn_rad = 0.02;
+  double max_turn_rad = 0.02;
   double linear_below = 0.1;     ///< Linearity index below which an inverse depth becomes a place.
   std::vector<int> lens_params;  ///< Places of the lens's parameters that are in the state, and their σ at the start.
   std::vector<double> sigma_lens_params;
-  double sigma_scale = 0.0;   ///< Of the known points' common scale, relative; counted, as the lens's covariance is.
-  int state_capacity = 800;   ///< Numbers of the state at most.
-  int sights_capacity = 200;  ///< Measured features of one moment at most.
+  double sigma_scale = 0.0;  ///< Of the known points' common scale, relative; counted, as the lens's covariance is.
+  int state_capacity = 800;  ///< Numbers of the state at most.
+  int observations_capacity = 200;  ///< Measured features of one moment at most.
 };
 
 /// A feature seen: which one, where. σ 0: the filter's.
-struct FeatureSight {
+struct FeatureObservation {
   long id = 0;
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   double sigma_px = 0.0;
 };
 
-enum class SightOutcome {
+enum class ObservationOutcome {
   used,
   gated,        ///< Too far from where it was expected.
   not_in_map,   ///< No such feature.
@@ -54,15 +54,15 @@ enum class SightOutcome {
 };
 
 /// Where a feature is expected, and how surely: search its 3σ ellipse.
-struct ExpectedSight {
+struct ExpectedObservation {
   Eigen::Vector2d px;
   Eigen::Matrix2d S;  ///< Covariance of the innovation, with the pixel's own noise. [px²]
   double depth_m = 0.0;
 };
 
-/// What became of the sights of one moment.
-struct SightsReport {
-  std::span<const SightOutcome> outcomes;  ///< One a sight; valid until the next update.
+/// What became of the observations of one moment.
+struct ObservationsReport {
+  std::span<const ObservationOutcome> outcomes;  ///< One an observation; valid until the next update.
   /// νᵀS⁻¹ν of each when its turn came, behind those before it (of one in a group: its share); NaN if not expected.
   std::span<const double> nis;
   std::size_t num_used = 0, num_gated = 0;
@@ -75,7 +75,7 @@ struct SightsReport {
 
 /// Where a moving camera is, and the points that it sees: an error-state extended Kalman filter over the camera's
 /// motion, the lens where asked, and a map of places and inverse depths. Drive it by
-///     predict(dt);  expected(id) …;  update(sights);  add(id, px, prior) …;  remove(id)
+///     predict(dt);  expected(id) …;  update(observations);  add(id, px, prior) …;  remove(id)
 /// It allocates nothing after its construction, except for more features than it had before.
 /// A. J. Davison et al., PAMI 29(6), 2007; J. Civera et al., TRO 24(5), 2008; docs/maths/localization.md.
 class LocalizationFilter {
@@ -84,8 +84,8 @@ class LocalizationFilter {
                      LocalizationFilterConfig config = {});
 
   void predict(double dt_s);
-  /// Updates with the sights of one moment.
-  SightsReport update(std::span<const FeatureSight> sights);
+  /// Updates with the observations of one moment.
+  ObservationsReport update(std::span<const FeatureObservation> observations);
   /// A known point, told with the σ of each of its coordinates. False where there is no room, or it is there already.
   bool add_known(long id, const Eigen::Vector3d& point_in_world, double sigma_m);
   /// A feature on the ray of its pixel, fully correlated with camera and lens. False where there is no room, it is
@@ -98,7 +98,7 @@ class LocalizationFilter {
   void place_camera(const CameraMotion& motion, const MotionMatrix& cov);
 
   /// Where a feature of the map should be seen now. None: not in the map, or not visible.
-  [[nodiscard]] std::optional<ExpectedSight> expected(long id) const;
+  [[nodiscard]] std::optional<ExpectedObservation> expected(long id) const;
   [[nodiscard]] bool has(long id) const { return find(id) != nullptr; }
   [[nodiscard]] const std::vector<Feature>& features() const { return features_; }
   /// Place of a feature and its covariance, what is given counted. None: not in the map.
@@ -116,7 +116,7 @@ class LocalizationFilter {
   [[nodiscard]] const Camera& camera() const { return camera_; }
   /// σ of the lens's parameters that are in the state, in the order of the configuration.
   [[nodiscard]] Eigen::VectorXd lens_sigmas() const;
-  /// What is taken as given: how the state moves with it, and what the sights say of it.
+  /// What is taken as given: how the state moves with it, and what the observations say of it.
   [[nodiscard]] const GivenEffects& given() const { return given_; }
   /// How the pose's right perturbation moves with each given number.
   [[nodiscard]] Eigen::Matrix<double, 6, Eigen::Dynamic> J_pose_given() const;
@@ -127,9 +127,9 @@ class LocalizationFilter {
  private:
   using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
                                     StateCovariance::max_columns, StateCovariance::max_columns>;
-  /// A sight with its derivatives by the numbers of the state that it depends on.
+  /// An observation with its derivatives by the numbers of the state that it depends on.
   struct Measured {
-    std::size_t sight = 0;
+    std::size_t observation = 0;
     const Feature* feature = nullptr;
     Eigen::Vector2d px = Eigen::Vector2d::Zero();
     double variance_px2 = 0.0;
@@ -153,10 +153,10 @@ class LocalizationFilter {
   /// Derivatives and innovation at nominal ⊞ delta_. False where it is not seen.
   bool linearise(Measured& measured);
   void expect(Measured& measured) const;  ///< S and NIS from the current covariance.
-  void collect(std::span<const FeatureSight> sights);
+  void collect(std::span<const FeatureObservation> observations);
   /// What comes first in an update.
   enum class Attempt {
-    in_order,      ///< One sight after another.
+    in_order,      ///< One observation after another.
     by_consensus,  ///< Those that agree with one of them.
     jointly,       ///< As many as a group holds, together.
   };
@@ -209,11 +209,11 @@ class LocalizationFilter {
   // Work of an update, kept so that nothing is allocated.
   std::vector<Measured> measured_;
   std::vector<Measured*> waiting_, doubtful_, used_;
-  std::vector<SightOutcome> outcomes_;
+  std::vector<ObservationOutcome> outcomes_;
   std::vector<double> nis_;
   Eigen::VectorXd start_, next_, before_;
-  static constexpr std::size_t most_in_group = StateCovariance::max_columns / 2;
-  std::array<Measured, most_in_group> there_;
+  static constexpr std::size_t max_in_group = StateCovariance::max_columns / 2;
+  std::array<Measured, max_in_group> there_;
   Eigen::Matrix<double, Eigen::Dynamic, 3> shear_;
   bool turns_world_ = false;  ///< Whether the errors of this update are those of world_turn.h.
   Camera camera_at_delta_;
@@ -225,7 +225,7 @@ class LocalizationFilter {
   double total_nis_ = 0.0, total_log_det_ = 0.0;  ///< and of all that are used.
   std::vector<unsigned char> agrees_, agrees_best_;
   struct KeptAttempt {
-    std::vector<SightOutcome> outcomes;
+    std::vector<ObservationOutcome> outcomes;
     std::vector<double> nis;
     std::vector<Measured*> used;
     Eigen::VectorXd delta;

@@ -3,21 +3,22 @@
 
 #include "alidade/localize/filter.h"
 
-// Which sights of a moment fit together: several attempts from the same prior, of which the one stands that explains
-// the sights best.
+// Which observations of a moment fit together: several attempts from the same prior, of which the one stands that
+// explains the observations best.
 
 namespace alidade {
 
 double LocalizationFilter::cost_of_used() const {
   std::size_t num_gated = 0;
-  for (const Measured& measured : measured_) num_gated += outcomes_[measured.sight] == SightOutcome::gated ? 1u : 0u;
+  for (const Measured& measured : measured_)
+    num_gated += outcomes_[measured.observation] == ObservationOutcome::gated ? 1u : 0u;
   constexpr double log_two_pi = 1.8378770664093453;
   const double cost_gated = 2.0 * std::log(100.0 * 100.0) - 2.0 * std::log(0.1);
   return total_nis_ + total_log_det_ + 2.0 * static_cast<double>(used_.size()) * log_two_pi +
          static_cast<double>(num_gated) * cost_gated;
 }
 
-/// From the prior: which sights fit together, and what follows from them.
+/// From the prior: which observations fit together, and what follows from them.
 double LocalizationFilter::attempt(Attempt way) {
   P_.drop_pending();
   delta_.setZero();
@@ -58,18 +59,19 @@ void LocalizationFilter::restore_attempt() {
   P_.swap_pending();
 }
 
-/// The first that fit in a group, known ones before others, in one step that no gate judges: three or four sights alone
-/// can settle on the wrong one of the poses that explain them, from where the others look wrong.
+/// The first that fit in a group, known ones before others, in one step that no gate judges: three or four observations
+/// alone can settle on the wrong one of the poses that explain them, from where the others look wrong.
 void LocalizationFilter::use_first_jointly() {
-  const std::size_t num = std::min(waiting_.size(), most_in_group);
+  const std::size_t num = std::min(waiting_.size(), max_in_group);
   if (num == 0) return;
-  std::partition(waiting_.begin(), waiting_.end(), [](const Measured* sight) { return sight->feature->is_known; });
+  std::partition(waiting_.begin(), waiting_.end(),
+                 [](const Measured* observation) { return observation->feature->is_known; });
   const bool is_used = take({waiting_.data(), num});
   for (std::size_t i = 0; i < num; ++i) settle(*waiting_[i], is_used);
   waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(num));
 }
 
-/// Another attempt, which stands if it explains the sights better.
+/// Another attempt, which stands if it explains the observations better.
 double LocalizationFilter::attempt_also(Attempt way, double cost) {
   keep_attempt();
   const double other = attempt(way);
@@ -78,11 +80,11 @@ double LocalizationFilter::attempt_also(Attempt way, double cost) {
   return cost;
 }
 
-/// What fits together, with a consensus where sights disagree.
+/// What fits together, with a consensus where observations disagree.
 double LocalizationFilter::best_attempt() {
   double cost = attempt(Attempt::in_order);
-  constexpr std::size_t least_for_another = 4;
-  if (!config_.finds_consensus || measured_.size() < least_for_another) return cost;
+  constexpr std::size_t min_for_another = 4;
+  if (!config_.finds_consensus || measured_.size() < min_for_another) return cost;
   const auto share_left = [&] {
     return static_cast<double>(measured_.size() - used_.size()) / static_cast<double>(measured_.size());
   };

@@ -46,11 +46,11 @@ void FilterBank::predict(double dt_s) {
   for (Part& part : parts_) part.filter.predict(dt_s);
 }
 
-SightsReport FilterBank::update(std::span<const FeatureSight> sights) {
-  SightsReport of_best;
+ObservationsReport FilterBank::update(std::span<const FeatureObservation> observations) {
+  ObservationsReport of_best;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < parts_.size(); ++i) {
-    const SightsReport report = parts_[i].filter.update(sights);
+    const ObservationsReport report = parts_[i].filter.update(observations);
     parts_[i].cost += report.cost;
     const bool is_better = parts_[i].cost < least || i == 0;
     if (!is_better) continue;
@@ -58,7 +58,7 @@ SightsReport FilterBank::update(std::span<const FeatureSight> sights) {
     best_ = i;
     of_best = report;
   }
-  if (parts_.size() > 1 && !sights.empty()) {
+  if (parts_.size() > 1 && !observations.empty()) {
     ++num_updates_;
     prune();
   }
@@ -69,8 +69,7 @@ void FilterBank::prune() {
   const double least = parts_[best_].cost;
   std::size_t kept = 0;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
-    const bool stays =
-        i == best_ || (num_updates_ < config_.most_frames && parts_[i].cost < least + config_.least_weight);
+    const bool stays = i == best_ || (num_updates_ < config_.max_frames && parts_[i].cost < least + config_.min_weight);
     if (!stays) continue;
     if (i == best_) best_ = kept;
     if (i != kept) std::swap(parts_[kept], parts_[i]);

@@ -15,25 +15,26 @@ struct StartHypothesis {
 };
 
 struct FilterBankConfig {
-  int splits = 5;              ///< Parts of the speed aside, to each of two sides; 1: none.
-  double spread = 1.5;         ///< The outermost part, in σ.
-  double narrowed = 0.5;       ///< σ of a part over the σ of the whole.
-  double least_weight = 40.0;  ///< A part that costs so much more than the best one (−2 ln) is given up.
-  int most_frames = 15;        ///< After so many updates the best one alone goes on.
+  int splits = 5;            ///< Parts of the speed aside, to each of two sides; 1: none.
+  double spread = 1.5;       ///< The outermost part, in σ.
+  double narrowed = 0.5;     ///< σ of a part over the σ of the whole.
+  double min_weight = 40.0;  ///< A part that costs so much more than the best one (−2 ln) is given up.
+  int max_frames = 15;       ///< After so many updates the best one alone goes on.
 };
 
-/// Filters that start differently, until the sights tell which is right. In front of a small or flat target, a move
-/// aside and a turn look alike: the first frames leave a long bent valley of poses, a Gaussian on it is sure of itself
-/// in the wrong place, and one in ten runs is lost. So the belief of the speed aside is split into narrower ones
+/// Filters that start differently, until the observations tell which is right. In front of a small or flat target, a
+/// move aside and a turn look alike: the first frames leave a long bent valley of poses, a Gaussian on it is sure of
+/// itself in the wrong place, and one in ten runs is lost. So the belief of the speed aside is split into narrower ones
 /// (a Gaussian sum; D. L. Alspach & H. W. Sorenson, "Nonlinear Bayesian Estimation Using Gaussian Sum Approximations",
-/// IEEE TAC 17(4), 1972), each weighed by what it said of the sights. The two poses of a flat target are two starts.
+/// IEEE TAC 17(4), 1972), each weighed by what it said of the observations. The two poses of a flat target are two
+/// starts.
 class FilterBank {
  public:
   FilterBank(const Camera& camera, std::span<const StartHypothesis> starts, const LocalizationFilterConfig& filter,
              const FilterBankConfig& config = {});
 
   void predict(double dt_s);
-  SightsReport update(std::span<const FeatureSight> sights);
+  ObservationsReport update(std::span<const FeatureObservation> observations);
   void add_known(long id, const Eigen::Vector3d& point_in_world, double sigma_m);
   /// False where the best filter cannot.
   bool add(long id, const Eigen::Vector2d& px, const RangePrior& prior, FeatureKind kind = FeatureKind::inverse_depth);

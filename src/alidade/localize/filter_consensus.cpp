@@ -11,17 +11,17 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t most_for_snooping = 40;  // S is inverted as a whole
-constexpr int most_dropped = 6;                // the gates of the update find what is left
+constexpr std::size_t max_for_snooping = 40;  // S is inverted as a whole
+constexpr int max_dropped = 6;                // the gates of the update find what is left
 
 }  // namespace
 
 void LocalizationFilter::fill_joint_innovations() {
   const std::size_t num = waiting_.size();
   if (joint_x_.size() == 0) {  // only for those who meet mismatches
-    joint_x_.resize(P_.capacity(), 2 * config_.sights_capacity);
-    joint_s_.resize(2 * config_.sights_capacity, 2 * config_.sights_capacity);
-    joint_nu_.resize(2 * config_.sights_capacity);
+    joint_x_.resize(P_.capacity(), 2 * config_.observations_capacity);
+    joint_s_.resize(2 * config_.observations_capacity, 2 * config_.observations_capacity);
+    joint_nu_.resize(2 * config_.observations_capacity);
   }
   for (std::size_t b = 0; b < num; ++b) {
     const auto at = static_cast<Eigen::Index>(2 * b);
@@ -68,8 +68,8 @@ double LocalizationFilter::agreement_with(std::size_t chosen) {
 /// weighted innovation (S⁻¹ν)ᵢ. The worst leaves while one is beyond the gate. W. Baarda, "A Testing Procedure for Use
 /// in Geodetic Networks", 1968.
 void LocalizationFilter::drop_doubtful() {
-  for (int dropped = 0; dropped < most_dropped && waiting_.size() > 3; ++dropped) {
-    if (waiting_.size() > most_for_snooping) return;
+  for (int dropped = 0; dropped < max_dropped && waiting_.size() > 3; ++dropped) {
+    if (waiting_.size() > max_for_snooping) return;
     fill_joint_innovations();
     const auto num = static_cast<Eigen::Index>(2 * waiting_.size());
     auto S = joint_s_.topLeftCorner(num, num);

@@ -150,7 +150,8 @@ void LocalizationFilter::count_given() {
   for (const Measured* measured : used_) {
     const auto view = expected_view(camera_, motion_.world_from_cam, *measured->feature);
     if (view)
-      given_.add_sight(*view, *measured->feature, config_.lens_params, measured->px - view->px, measured->variance_px2);
+      given_.add_observation(*view, *measured->feature, config_.lens_params, measured->px - view->px,
+                             measured->variance_px2);
   }
   given_.finish(P_);
 }

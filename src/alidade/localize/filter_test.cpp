@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "alidade/io/csv.h"
-#include "alidade/io/files.h"
+#include "alidade/files/csv.h"
+#include "alidade/files/files.h"
 #include "alidade/testing/allocations.h"
 #include "alidade/testing/localize_sample.h"
 #include "alidade/testing/random.h"
@@ -37,14 +37,14 @@ LocalizationFilter filter_of(const testing::UnderwaterSample& sample, const Loca
   return filter;
 }
 
-void add_told(const testing::UnderwaterSample& sample, const SightFrame& frame, FeatureKind kind,
+void add_told(const testing::UnderwaterSample& sample, const ObservationFrame& frame, FeatureKind kind,
               LocalizationFilter& filter) {
-  for (const FeatureSight& sight : frame.sights) {
-    const auto told = std::ranges::find(sample.config.depths, sight.id, &ToldDepth::id);
-    if (filter.has(sight.id) || told == sample.config.depths.end()) continue;
-    const auto ray_in_cam = unproject(filter.camera(), sight.px);
+  for (const FeatureObservation& observation : frame.observations) {
+    const auto told = std::ranges::find(sample.config.depths, observation.id, &ToldDepth::id);
+    if (filter.has(observation.id) || told == sample.config.depths.end()) continue;
+    const auto ray_in_cam = unproject(filter.camera(), observation.px);
     ASSERT_TRUE(ray_in_cam);
-    EXPECT_TRUE(filter.add(sight.id, sight.px, {told->depth_m / ray_in_cam->z(), told->sigma_rel}, kind));
+    EXPECT_TRUE(filter.add(observation.id, observation.px, {told->depth_m / ray_in_cam->z(), told->sigma_rel}, kind));
   }
 }
 
@@ -53,7 +53,7 @@ TEST(LocalizationFilter, CovarianceStaysSymmetricAndPositiveOverAThousandFrames)
   LocalizationFilter filter = filter_of(sample);
   for (std::size_t k = 0; k < sample.frames.size(); ++k) {
     if (k > 0) filter.predict(0.1);
-    EXPECT_TRUE(filter.update(sample.frames[k].sights).is_sound);
+    EXPECT_TRUE(filter.update(sample.frames[k].observations).is_sound);
     add_told(sample, sample.frames[k], FeatureKind::inverse_depth, filter);
     filter.convert_linear();
   }
@@ -71,7 +71,7 @@ TEST(LocalizationFilter, ANewFeatureIsCorrelatedWithCameraAndLens) {
   config.lens_params = {0, 1, 5};
   config.sigma_lens_params = {5.0, 4.0, 0.01};
   LocalizationFilter filter = filter_of(sample, config);
-  (void)filter.update(sample.frames[0].sights);
+  (void)filter.update(sample.frames[0].observations);
   const Eigen::MatrixXd before = covariance_of(filter);
   const Eigen::Vector2d px(300.0, 250.0);
   const auto made =
@@ -104,7 +104,7 @@ TEST(LocalizationFilter, UpdateIsTheDenseKalmanUpdate) {
     const Eigen::MatrixXd P = covariance_of(filter);
     Eigen::MatrixXd H = Eigen::MatrixXd::Zero(8, filter.dim());
     Eigen::VectorXd nu(8);
-    std::vector<FeatureSight> sights;
+    std::vector<FeatureObservation> observations;
     for (std::size_t i = 0; i < 4; ++i) {
       const Feature feature = filter.features()[i];
       const auto view = expected_view(sample.camera, sample.truth[0].world_from_cam, feature);
@@ -113,10 +113,10 @@ TEST(LocalizationFilter, UpdateIsTheDenseKalmanUpdate) {
       H.block<2, 6>(row, 0) = view->J_px_pose;
       H.block<2, 3>(row, feature.offset) = view->J_px_feature.leftCols<3>();
       nu.segment<2>(row) = Eigen::Vector2d(0.01, -0.02) * (1.0 + static_cast<double>(i));
-      sights.push_back({feature.id, view->px + nu.segment<2>(row), 0.0});
+      observations.push_back({feature.id, view->px + nu.segment<2>(row), 0.0});
     }
     const Eigen::MatrixXd S = H * P * H.transpose() + 0.25 * Eigen::MatrixXd::Identity(8, 8);
-    const SightsReport report = filter.update(sights);
+    const ObservationsReport report = filter.update(observations);
     EXPECT_EQ(report.num_used, 4u);
     EXPECT_NEAR(report.nis_per_dof, nu.dot(S.inverse() * nu) / 8.0, 1e-6);
     const Eigen::MatrixXd should = P - P * H.transpose() * S.inverse() * H * P;
@@ -128,8 +128,8 @@ TEST(LocalizationFilter, UpdateIsTheDenseKalmanUpdate) {
   }
 }
 
-/// A sight out of place makes the update look for a consensus. Where that explains the sights no better, what stands
-/// is to the bit what stands without having looked.
+/// An observation out of place makes the update look for a consensus. Where that explains the observations no better,
+/// what stands is to the bit what stands without having looked.
 TEST(LocalizationFilter, AConsensusThatHelpsNotLeavesNoTrace) {
   LocalizationFilterConfig blind;
   blind.finds_consensus = false;
@@ -137,11 +137,12 @@ TEST(LocalizationFilter, AConsensusThatHelpsNotLeavesNoTrace) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     const auto sample = testing::underwater_sample(scene_of(30, 2), seed);
     LocalizationFilter without = filter_of(sample, blind), with = filter_of(sample);
-    std::vector<FeatureSight> sights = sample.frames[0].sights;
-    const auto known = std::ranges::find_if(sights, [&](const FeatureSight& sight) { return with.has(sight.id); });
-    ASSERT_NE(known, sights.end());
+    std::vector<FeatureObservation> observations = sample.frames[0].observations;
+    const auto known = std::ranges::find_if(
+        observations, [&](const FeatureObservation& observation) { return with.has(observation.id); });
+    ASSERT_NE(known, observations.end());
     known->px += Eigen::Vector2d(40.0, -25.0);
-    const SightsReport reports[2] = {without.update(sights), with.update(sights)};
+    const ObservationsReport reports[2] = {without.update(observations), with.update(observations)};
     EXPECT_GT(reports[0].num_gated, 0u) << seed;
     EXPECT_LE(reports[1].cost, reports[0].cost) << seed;
     if (reports[1].cost != reports[0].cost) continue;
@@ -164,7 +165,7 @@ TEST(LocalizationFilter, AllocatesNothingOnceItRuns) {
     const bool counts = k >= 30;
     const std::size_t before = testing::num_allocations();
     if (k > 0) filter.predict(0.1);
-    const SightsReport report = filter.update(sample.frames[k].sights);
+    const ObservationsReport report = filter.update(sample.frames[k].observations);
     if (counts) {
       EXPECT_EQ(testing::num_allocations(), before) << k;
       num_gated += report.num_gated;
@@ -182,14 +183,14 @@ TEST(LocalizationFilter, ExpectsWhatItThenSees) {
   int num = 0;
   for (std::size_t k = 0; k < sample.frames.size(); ++k) {
     if (k > 0) filter.predict(0.1);
-    for (const FeatureSight& sight : sample.frames[k].sights) {
-      const auto expected = filter.expected(sight.id);
+    for (const FeatureObservation& observation : sample.frames[k].observations) {
+      const auto expected = filter.expected(observation.id);
       if (!expected || k < 5) continue;
-      const Eigen::Vector2d nu = sight.px - expected->px;
+      const Eigen::Vector2d nu = observation.px - expected->px;
       sum += 0.5 * nu.dot(expected->S.inverse() * nu);
       ++num;
     }
-    (void)filter.update(sample.frames[k].sights);
+    (void)filter.update(sample.frames[k].observations);
     add_told(sample, sample.frames[k], FeatureKind::inverse_depth, filter);
     filter.convert_linear();
   }
@@ -208,15 +209,16 @@ TEST(LocalizationFilter, RefusesWhatItCannotHold) {
   EXPECT_FALSE(filter.add(50, {1e6, 1e6}, {0.6, 0.1}));  // the lens sees nothing there
   EXPECT_TRUE(filter.add(50, {300.0, 250.0}, {0.6, 0.1}));
   EXPECT_FALSE(filter.add(51, {310.0, 250.0}, {0.6, 0.1}));  // no room
-  const std::vector<FeatureSight> strange{{777, {1.0, 1.0}, 0.0}, {2, {std::nan(""), 1.0}, 0.0}};
+  const std::vector<FeatureObservation> strange{{777, {1.0, 1.0}, 0.0}, {2, {std::nan(""), 1.0}, 0.0}};
   const CameraMotion before = filter.motion();
-  const SightsReport report = filter.update(strange);
-  EXPECT_EQ(report.outcomes[0], SightOutcome::not_in_map);
-  EXPECT_EQ(report.outcomes[1], SightOutcome::gated);
+  const ObservationsReport report = filter.update(strange);
+  EXPECT_EQ(report.outcomes[0], ObservationOutcome::not_in_map);
+  EXPECT_EQ(report.outcomes[1], ObservationOutcome::gated);
   EXPECT_EQ(filter.motion().world_from_cam.translation, before.world_from_cam.translation);
 }
 
-/// Reference sequences of an independent filter of the same kind: places, all sights of a frame at once, iterated.
+/// Reference sequences of an independent filter of the same kind: places, all observations of a frame at once,
+/// iterated.
 TEST(LocalizationFilter, IsThatOfTheReferenceSequences) {
   for (const std::string name : {"d4_seq0", "d4_seq3"}) {
     const std::string file = testing::reference_case(name);
@@ -228,7 +230,7 @@ TEST(LocalizationFilter, IsThatOfTheReferenceSequences) {
       const long frame = csv.integer(row, "frame", 0, 1000);
       if (sample.frames.empty() || sample.frames.back().frame != frame)
         sample.frames.push_back({frame, csv.number(row, "t_s"), {}});
-      sample.frames.back().sights.push_back(
+      sample.frames.back().observations.push_back(
           {csv.integer(row, "point_id", 0, 100), {csv.number(row, "u_px"), csv.number(row, "v_px")}, 0.0});
     }
     const auto vector_of = [](const Json& x) { return Eigen::Vector3d(x[0], x[1], x[2]); };

@@ -9,7 +9,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t most_singly = 12;  // used one by one, before the rest, whose pose is sure by then, in groups
+constexpr std::size_t max_singly = 12;  // used one by one, before the rest, whose pose is sure by then, in groups
 
 }  // namespace
 
@@ -19,7 +19,7 @@ void LocalizationFilter::expect(Measured& measured) const {
   measured.nis = measured.nu.dot(inverse_of_symmetric(measured.S) * measured.nu);
 }
 
-std::optional<ExpectedSight> LocalizationFilter::expected(long id) const {
+std::optional<ExpectedObservation> LocalizationFilter::expected(long id) const {
   const Feature* feature = find(id);
   if (!feature) return std::nullopt;
   const auto view = expected_view(camera_, motion_.world_from_cam, *feature);
@@ -38,25 +38,26 @@ std::optional<ExpectedSight> LocalizationFilter::expected(long id) const {
     put(motion_dim + k, view->J_px_lens(0, index), view->J_px_lens(1, index));
   }
   for (int i = 0; i < feature->dim(); ++i) put(feature->offset + i, view->J_px_feature(0, i), view->J_px_feature(1, i));
-  ExpectedSight sight{view->px, P_.innovation_covariance({{columns.data(), n}, h0.data(), h1.data()}), view->depth_m};
-  sight.S.diagonal().array() += config_.sigma_px * config_.sigma_px;
-  return sight;
+  ExpectedObservation observation{view->px, P_.innovation_covariance({{columns.data(), n}, h0.data(), h1.data()}),
+                                  view->depth_m};
+  observation.S.diagonal().array() += config_.sigma_px * config_.sigma_px;
+  return observation;
 }
 
-void LocalizationFilter::collect(std::span<const FeatureSight> sights) {
+void LocalizationFilter::collect(std::span<const FeatureObservation> observations) {
   measured_.clear();
-  outcomes_.assign(sights.size(), SightOutcome::not_in_map);
-  nis_.assign(sights.size(), std::numeric_limits<double>::quiet_NaN());
-  for (std::size_t i = 0; i < sights.size(); ++i) {
-    const Feature* feature = find(sights[i].id);
-    if (!feature || measured_.size() == static_cast<std::size_t>(config_.sights_capacity)) continue;
-    const double sigma_px = sights[i].sigma_px > 0.0 ? sights[i].sigma_px : config_.sigma_px;
+  outcomes_.assign(observations.size(), ObservationOutcome::not_in_map);
+  nis_.assign(observations.size(), std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const Feature* feature = find(observations[i].id);
+    if (!feature || measured_.size() == static_cast<std::size_t>(config_.observations_capacity)) continue;
+    const double sigma_px = observations[i].sigma_px > 0.0 ? observations[i].sigma_px : config_.sigma_px;
     Measured measured;
-    measured.sight = i;
+    measured.observation = i;
     measured.feature = feature;
-    measured.px = sights[i].px;
+    measured.px = observations[i].px;
     measured.variance_px2 = sigma_px * sigma_px;
-    outcomes_[i] = SightOutcome::not_visible;
+    outcomes_[i] = ObservationOutcome::not_visible;
     if (!linearise(measured)) continue;
     measured_.push_back(measured);
   }
@@ -64,7 +65,7 @@ void LocalizationFilter::collect(std::span<const FeatureSight> sights) {
 
 /// S⁻¹ of the whole group and what follows from it: the step in `next_`, L⁻ᵀ in `triangle_`.
 bool LocalizationFilter::solve(std::span<Measured*> group) {
-  std::array<StateCovariance::Rows, most_in_group> rows{};
+  std::array<StateCovariance::Rows, max_in_group> rows{};
   for (std::size_t m = 0; m < group.size(); ++m) rows[m] = group[m]->rows();
   P_.products({rows.data(), group.size()});
   const int num = 2 * static_cast<int>(group.size());
@@ -110,10 +111,10 @@ double LocalizationFilter::bend_between(const Measured& here, const Measured& th
 /// the group is seen, and the group's residuals; the group as linearised there is in `there_`. False, and no step,
 /// where there is none.
 bool LocalizationFilter::step(std::span<Measured*> group, bool must_fall, StepCost& at) {
-  constexpr double least_share = 0.05, rounding = 1e-6;
+  constexpr double min_share = 0.05, rounding = 1e-6;
   const int dim = P_.dim();
   before_.head(dim) = delta_.head(dim);
-  for (double share = 1.0; share > least_share; share *= 0.5) {
+  for (double share = 1.0; share > min_share; share *= 0.5) {
     delta_.head(dim) = before_.head(dim) + share * (next_.head(dim) - before_.head(dim));
     const double prior = (1.0 - share) * at.prior + share * group_prior_;  // at most: it is convex
     double all = prior;
@@ -136,8 +137,8 @@ std::optional<double> LocalizationFilter::iterate(std::span<Measured*> group, bo
   for (const Measured* measured : group) at.all += measured->nu.squaredNorm() / measured->variance_px2;
   bool has_answer = false;
   constexpr int slower = 8;  // are shortened steps
-  const int most_iterations = (must_fall ? slower : 1) * config_.max_iterations;
-  for (int iteration = 0; iteration < most_iterations; ++iteration) {
+  const int max_iterations = (must_fall ? slower : 1) * config_.max_iterations;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
     if (!solve(group)) break;
     if (!has_answer && group.size() > 1) {  // what they share is counted once
       for (Measured* measured : group) measured->nis = group_nis_ / static_cast<double>(group.size());
@@ -150,7 +151,7 @@ std::optional<double> LocalizationFilter::iterate(std::span<Measured*> group, bo
     has_answer = true;
     double bend = 0.0;
     for (std::size_t m = 0; m < group.size(); ++m) bend = std::max(bend, bend_between(*group[m], there_[m]));
-    if (bend < config_.bend_tolerance || iteration + 1 == most_iterations) break;
+    if (bend < config_.bend_tolerance || iteration + 1 == max_iterations) break;
     for (std::size_t m = 0; m < group.size(); ++m) *group[m] = there_[m];
   }
   return has_answer ? std::optional(at.all) : std::nullopt;
@@ -183,8 +184,8 @@ bool LocalizationFilter::use_again() {
   P_.drop_pending();
   delta_.head(dim).setZero();
   total_nis_ = total_log_det_ = 0.0;
-  for (std::size_t at = 0; at < used_.size(); at += most_in_group) {
-    const std::span<Measured*> group(&used_[at], std::min(most_in_group, used_.size() - at));
+  for (std::size_t at = 0; at < used_.size(); at += max_in_group) {
+    const std::span<Measured*> group(&used_[at], std::min(max_in_group, used_.size() - at));
     start_.head(dim) = delta_.head(dim);
     if (!solve(group) ||
         !P_.append({triangle_.data(), static_cast<std::size_t>(triangle_.size())}, 2 * static_cast<int>(group.size())))
@@ -210,12 +211,12 @@ void LocalizationFilter::refine() {
 }
 
 void LocalizationFilter::settle(Measured& measured, bool is_used) {
-  outcomes_[measured.sight] = is_used ? SightOutcome::used : SightOutcome::gated;
-  nis_[measured.sight] = measured.nis;
+  outcomes_[measured.observation] = is_used ? ObservationOutcome::used : ObservationOutcome::gated;
+  nis_[measured.observation] = measured.nis;
 }
 
 /// One by one, each at its own linearisation behind those before it: known points first, then by the size of what is
-/// expected of the innovation. From the `most_singly`th on in groups.
+/// expected of the innovation. From the `max_singly`th on in groups.
 void LocalizationFilter::use_in_order() {
   std::size_t num_used = 0;
   while (!waiting_.empty()) {
@@ -228,10 +229,10 @@ void LocalizationFilter::use_in_order() {
     std::ranges::sort(waiting_, [](const Measured* a, const Measured* b) {
       if (a->feature->is_known != b->feature->is_known) return b->feature->is_known;
       const double size_a = a->S.trace(), size_b = b->S.trace();
-      return size_a != size_b ? size_a > size_b : a->sight > b->sight;
+      return size_a != size_b ? size_a > size_b : a->observation > b->observation;
     });
-    const std::size_t group_size = num_used < most_singly ? 1 : most_in_group;
-    std::array<Measured*, most_in_group> group{};
+    const std::size_t group_size = num_used < max_singly ? 1 : max_in_group;
+    std::array<Measured*, max_in_group> group{};
     std::size_t num = 0;
     while (num < group_size && !waiting_.empty()) {
       Measured* next = waiting_.back();
@@ -251,7 +252,7 @@ void LocalizationFilter::use_in_order() {
 /// All at once, as far as a group goes.
 void LocalizationFilter::use_together() {
   std::size_t num = 0;
-  std::array<Measured*, most_in_group> group{};
+  std::array<Measured*, max_in_group> group{};
   const auto use = [&] {
     if (num == 0) return;
     const bool is_used = take({group.data(), num});
@@ -266,7 +267,7 @@ void LocalizationFilter::use_together() {
       continue;
     }
     group[num++] = measured;
-    if (num == most_in_group) use();
+    if (num == max_in_group) use();
   }
   use();
   waiting_.clear();
@@ -290,23 +291,23 @@ bool LocalizationFilter::finish_update() {
   return true;
 }
 
-SightsReport LocalizationFilter::update(std::span<const FeatureSight> sights) {
+ObservationsReport LocalizationFilter::update(std::span<const FeatureObservation> observations) {
   turns_world_ = config_.holds_frame;
-  collect(sights);
+  collect(observations);
   double cost = best_attempt();
-  if (turns_world_ && !(delta_.segment<3>(3).norm() < config_.most_turn_rad)) {
+  if (turns_world_ && !(delta_.segment<3>(3).norm() < config_.max_turn_rad)) {
     turns_world_ = false;
     cost = best_attempt();
   }
-  SightsReport report{outcomes_, nis_};
-  // Each sight was within the gate when it was used: together they cannot be farther from what they led to.
+  ObservationsReport report{outcomes_, nis_};
+  // Each observation was within the gate when it was used: together they cannot be farther from what they led to.
   const bool agrees = total_nis_ <= config_.gate * 2.0 * static_cast<double>(std::max<std::size_t>(1, used_.size()));
   if (!agrees) drop_update();
   report.is_sound = agrees && finish_update();
-  for (SightOutcome& outcome : outcomes_) {
-    if (outcome == SightOutcome::used && !report.is_sound) outcome = SightOutcome::gated;
-    if (outcome == SightOutcome::gated) ++report.num_gated;
-    if (outcome == SightOutcome::used) ++report.num_used;
+  for (ObservationOutcome& outcome : outcomes_) {
+    if (outcome == ObservationOutcome::used && !report.is_sound) outcome = ObservationOutcome::gated;
+    if (outcome == ObservationOutcome::gated) ++report.num_gated;
+    if (outcome == ObservationOutcome::used) ++report.num_used;
   }
   if (report.num_used > 0) report.nis_per_dof = total_nis_ / (2.0 * static_cast<double>(report.num_used));
   report.cost = cost;

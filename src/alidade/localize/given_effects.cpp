@@ -5,7 +5,7 @@
 namespace alidade {
 
 GivenEffects::GivenEffects(const Camera& camera, std::span<const int> estimated, double sigma_scale, int capacity,
-                           int sights) {
+                           int observations) {
   const std::vector<std::string> names = param_names(camera.lens);
   const bool has_cov = camera.cov.size() > 0;
   for (int i = 0; i < static_cast<int>(names.size()); ++i) {
@@ -29,8 +29,8 @@ GivenEffects::GivenEffects(const Camera& camera, std::span<const int> estimated,
   G_.setZero(padded, num);
   by_point_.setZero(padded, num);
   of_left_.setZero(num, num);
-  most_seen_ = static_cast<std::size_t>(sights);
-  seen_.reserve(most_seen_);
+  max_seen_ = static_cast<std::size_t>(observations);
+  seen_.reserve(max_seen_);
 }
 
 void GivenEffects::predict(const MotionMatrix& F) {
@@ -114,9 +114,9 @@ GivenEffects::Derivatives GivenEffects::product(const Seen& seen, const Columns&
   return D;
 }
 
-void GivenEffects::add_sight(const ExpectedView& view, const Feature& feature, std::span<const int> estimated,
-                             const Eigen::Vector2d& residual_px, double variance_px2) {
-  if (seen_.size() == most_seen_) return;
+void GivenEffects::add_observation(const ExpectedView& view, const Feature& feature, std::span<const int> estimated,
+                                   const Eigen::Vector2d& residual_px, double variance_px2) {
+  if (seen_.size() == max_seen_) return;
   Seen& seen = seen_.emplace_back();
   const auto put = [&](int column, const Eigen::Vector2d& derivative) {
     seen.columns[static_cast<std::size_t>(seen.num)] = column;

@@ -25,15 +25,16 @@ class GivenEffects {
 
   GivenEffects() = default;
   /// Of the lens: fx, fy, cx, cy, k1, and whatever has a covariance, except `estimated`.
-  GivenEffects(const Camera& camera, std::span<const int> estimated, double sigma_scale, int capacity, int sights);
+  GivenEffects(const Camera& camera, std::span<const int> estimated, double sigma_scale, int capacity,
+               int observations);
 
   [[nodiscard]] int num() const { return static_cast<int>(M_.cols()); }
   [[nodiscard]] const std::vector<int>& lens_params() const { return lens_params_; }  ///< Then the scale.
   [[nodiscard]] const Eigen::MatrixXd& cov() const { return cov_; }                   ///< Σ; zero where none is known.
   [[nodiscard]] const Eigen::VectorXd& score() const { return score_; }
   [[nodiscard]] const Eigen::MatrixXd& information() const { return information_; }
-  /// Of the score, as the sights of one point share their errors and those of different points do not: Σ s sᵀ of what
-  /// each adds to it.
+  /// Of the score, as the observations of one point share their errors and those of different points do not: Σ s sᵀ of
+  /// what each adds to it.
   [[nodiscard]] Eigen::MatrixXd score_cov() const { return of_left_ + by_point_.transpose() * by_point_; }
   [[nodiscard]] bool counts() const { return counts_; }  ///< Whether Σ is anything.
   [[nodiscard]] auto rows(int first, int count) const { return M_.middleRows(first, count); }
@@ -48,9 +49,9 @@ class GivenEffects {
   void turn(const double* blocks, int stride, int single_at, int num_single, int dim);
   void shear(int at, const double* K, int stride, int dim);
 
-  /// The sights of an update, at the state that they led to; then what they change.
-  void add_sight(const ExpectedView& view, const Feature& feature, std::span<const int> estimated,
-                 const Eigen::Vector2d& residual_px, double variance_px2);
+  /// The observations of an update, at the state that they led to; then what they change.
+  void add_observation(const ExpectedView& view, const Feature& feature, std::span<const int> estimated,
+                       const Eigen::Vector2d& residual_px, double variance_px2);
   void finish(const StateCovariance& P);
 
  private:
@@ -71,7 +72,7 @@ class GivenEffects {
   Columns by_point_;         ///< What each feature adds to the score, in the row of its first number.
   Eigen::MatrixXd of_left_;  ///< Σ s sᵀ of those that have left.
   std::vector<Seen> seen_;
-  std::size_t most_seen_ = 0;
+  std::size_t max_seen_ = 0;
   bool counts_ = false;
 };
 

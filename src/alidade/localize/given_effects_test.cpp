@@ -25,10 +25,10 @@ LocalizationFilter followed(const HoverRun& run, const Camera& camera, double sc
   for (const KnownPoint& point : run.target) filter.add_known(point.id, scale * point.point_in_world, point.sigma_m);
   for (std::size_t k = 0; k < 20; ++k) {
     if (k > 0) filter.predict(1.0 / 30.0);
-    filter.update(run.frames[k].sights);
-    for (const FeatureSight& sight : run.frames[k].sights)
-      if (!filter.has(sight.id)) filter.add(sight.id, sight.px, {1.2, 0.3});
-    if (k == 10) filter.remove(run.frames[k].sights.back().id);
+    filter.update(run.frames[k].observations);
+    for (const FeatureObservation& observation : run.frames[k].observations)
+      if (!filter.has(observation.id)) filter.add(observation.id, observation.px, {1.2, 0.3});
+    if (k == 10) filter.remove(run.frames[k].observations.back().id);
     filter.convert_linear();
   }
   return filter;
@@ -78,7 +78,7 @@ TEST(GivenEffects, AFilterCountsTheLens) {
       LocalizeConfig config;
       config.target = run.target;
       config.smooths = false;
-      const LocalizeReport report = localize_sights(camera, run.frames, config);
+      const LocalizeReport report = localize_observations(camera, run.frames, config);
       return testing::pose_nees(report.path.back(), run.truth.back().world_from_cam) / num_seeds;
     };
     ignored += nees(told);
@@ -92,7 +92,7 @@ TEST(GivenEffects, AFilterCountsTheLens) {
 /// Without a target as with one; and what an ordinary error would do is said.
 TEST(GivenEffects, WithoutATargetWhatWasAssumedIsSaid) {
   const HoverRun run = testing::hovering({.num_frames = 60, .num_others = 30}, 4);
-  const LocalizeReport report = localize_sights(run.camera, run.frames, {});
+  const LocalizeReport report = localize_observations(run.camera, run.frames, {});
   const auto assumed = localize_assumed(report);
   const auto focal = std::ranges::find(assumed, std::string("camera.f (relative)"), &Assumption::name);
   ASSERT_NE(focal, assumed.end());
@@ -101,7 +101,7 @@ TEST(GivenEffects, WithoutATargetWhatWasAssumedIsSaid) {
   Camera known = run.camera;
   known.cov = Eigen::MatrixXd::Zero(10, 10);
   known.cov(0, 0) = known.cov(1, 1) = 9.0;
-  const auto counted = localize_assumed(localize_sights(known, run.frames, {}));
+  const auto counted = localize_assumed(localize_observations(known, run.frames, {}));
   EXPECT_NEAR(*std::ranges::find(counted, std::string("camera.f (relative)"), &Assumption::name)->sigma, 3.0 / 610.0,
               1e-4);
 }

@@ -12,7 +12,7 @@ constexpr std::array<std::string_view, 6> pose_numbers{"the position across (x)"
                                                        "the distance (z)",        "the rotation about x",
                                                        "the rotation about y",    "the rotation about z"};
 
-/// Of a change along `direction`: how the path moves, and what the sights say.
+/// Of a change along `direction`: how the path moves, and what the observations say.
 GivenNumber given_number(std::string_view name, const Eigen::VectorXd& direction, const GivenSystem& system) {
   GivenNumber given{.name = name};
   for (std::size_t k = 0; k < system.J_pose.size(); ++k)
@@ -67,7 +67,7 @@ std::vector<GivenNumber> given_numbers(const GivenSystem& system) {
     if (at >= 0) add(name, direction_of(at), has_cov ? std::optional(std::sqrt(system.cov(at, at))) : std::nullopt);
   }
   add("scale of the target", direction_of(num), std::sqrt(system.cov(num, num)));
-  all.back().asked = all.back().z = 0.0;  // all may be larger: no sight tells
+  all.back().asked = all.back().z = 0.0;  // all may be larger: no observation tells
   const auto at_cause = [&](int cause) { return direction_of(num + cause); };
   if (system.score.size() < num + num_causes) return all;
   add("shape of the target", at_cause(shape_cause), std::nullopt);

@@ -6,7 +6,7 @@
 namespace alidade {
 
 /// What is left of a path's normal equations for the numbers that are given: those of the lens by their places in it,
-/// then the target's scale; of a smoothed path also its shape, its speed (3) and the picture's readout.
+/// then the target's scale; of a smoothed path also its shape, its speed (3) and the image's readout.
 struct GivenSystem {
   const Camera& camera;
   const std::vector<int>& lens_params;
@@ -23,7 +23,7 @@ struct GivenSystem {
 /// Then of a smoothed path: shape of the target (x longer and y shorter, relative), its speed (m/s), readout (s).
 [[nodiscard]] std::vector<GivenNumber> given_numbers(const GivenSystem& system);
 
-/// What was given to a filter, over a run: the largest moves of its poses, and what its sights said.
+/// What was given to a filter, over a run: the largest moves of its poses, and what its observations said.
 class GivenTally {
  public:
   void add(const LocalizationFilter& filter);

@@ -4,38 +4,36 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "alidade/imaging/corner_features.h"
+#include "alidade/patches/corner_features.h"
 
 namespace alidade {
 namespace {
 
-constexpr std::size_t least_tracked = 5;  // a pose has six numbers, a point two; two points more to notice a mistake
-constexpr double least_share = 0.25;      // of the features looked for: fewer may be chance
-constexpr double prior_share = 0.5;       // σ of a new inverse depth over it: from half the depth to infinity
+constexpr std::size_t min_tracked = 5;  // a pose has six numbers, a point two; two points more to notice a mistake
+constexpr double min_share = 0.25;      // of the features looked for: fewer may be chance
+constexpr double prior_share = 0.5;     // σ of a new inverse depth over it: from half the depth to infinity
 
 }  // namespace
 
-LocalizationFilterConfig for_pictures(LocalizationFilterConfig config, double sigma_floor_px) {
+LocalizationFilterConfig for_images(LocalizationFilterConfig config, double sigma_floor_px) {
   constexpr double few_doubtful = 0.1;  // the gates alone keep them out; a consensus costs as much as the update
   if (!(config.sigma_new_px > 0.0)) config.sigma_new_px = sigma_floor_px;
   // Many matches settle the first frames' poses: errors may turn with the world there too, and must not bend to one
   // side.
-  config.most_turn_rad = std::max(config.most_turn_rad, 0.05);
+  config.max_turn_rad = std::max(config.max_turn_rad, 0.05);
   config.bend_tolerance = std::min(config.bend_tolerance, 0.001);
   config.consensus_above = std::max(config.consensus_above, few_doubtful);
   return config;
 }
 
 ImageLocalizer::ImageLocalizer(const Camera& camera, const LocalizeImagesConfig& config)
-    : camera_(camera),
-      config_(config),
-      filter_config_(for_pictures(config.localize.filter, config.eyes.sigma_floor_px)) {
+    : camera_(camera), config_(config), filter_config_(for_images(config.localize.filter, config.eyes.sigma_floor_px)) {
   const std::size_t num_known = config.target ? config.target->points.size() : 0;
   const std::size_t need =
-      motion_dim + filter_config_.lens_params.size() + 3 * num_known + 6 * config.eyes.most_features;
+      motion_dim + filter_config_.lens_params.size() + 3 * num_known + 6 * config.eyes.max_features;
   filter_config_.state_capacity = static_cast<int>(need) + 8;
   filter_config_.sigma_scale = config.localize.sigma_scale;
-  filter_config_.sights_capacity = static_cast<int>(config.eyes.most_tried + num_known);
+  filter_config_.observations_capacity = static_cast<int>(config.eyes.max_tried + num_known);
   next_id_ = static_cast<long>(num_known);
   if (config.target)
     for (const KnownPoint& point : config.target->points) next_id_ = std::max(next_id_, point.id + 1);
@@ -74,7 +72,7 @@ bool ImageLocalizer::start(const cv::Mat& smoothed) {
   if (localize.start) {
     begin_at({{*localize.start}});
   } else if (seen) {
-    begin_at(only_where(seen->starts));  // the same sights follow as a measurement, with the points' own σ
+    begin_at(only_where(seen->starts));  // the same observations follow as a measurement, with the points' own σ
   } else {
     StartHypothesis origin;
     constexpr double sure = 1e-6;  // the world is where the camera is; zero would leave no way to correct it
@@ -85,7 +83,7 @@ bool ImageLocalizer::start(const cv::Mat& smoothed) {
   }
   if (seen) add_target(smoothed, *seen);
   add_new(smoothed);
-  return seen || num_found_now_ >= least_tracked;
+  return seen || num_found_now_ >= min_tracked;
 }
 
 /// What is looked for later is what surrounds the corner as found, not the corner itself: where that is in the world is
@@ -93,8 +91,8 @@ bool ImageLocalizer::start(const cv::Mat& smoothed) {
 std::vector<KnownPoint> ImageLocalizer::told_points(const SeenTarget& seen) const {
   std::vector<KnownPoint> told = config_.target->points;
   for (KnownPoint& point : told) {
-    const auto at = std::ranges::find(seen.sights, point.id, &FeatureSight::id);
-    if (at == seen.sights.end()) continue;
+    const auto at = std::ranges::find(seen.observations, point.id, &FeatureObservation::id);
+    if (at == seen.observations.end()) continue;
     const Rigid3& world_from_cam = seen.starts.front().motion.world_from_cam;
     const double distance_m = (world_from_cam.translation - point.point_in_world).norm();
     point.sigma_m = std::hypot(point.sigma_m, at->sigma_px * distance_m / params(camera_.lens)[0]);
@@ -107,9 +105,9 @@ void ImageLocalizer::add_target(const cv::Mat& smoothed, const SeenTarget& seen)
   const std::vector<KnownPoint>& points = config_.target->points;
   told_ = told_points(seen);
   for (const KnownPoint& point : told_) bank_->add_known(point.id, point.point_in_world, point.sigma_m);
-  std::vector<FeatureSight> sights = seen.sights;
-  for (FeatureSight& sight : sights) sight.sigma_px = config_.eyes.sigma_floor_px;
-  const SightsReport report = bank_->update(sights);
+  std::vector<FeatureObservation> observations = seen.observations;
+  for (FeatureObservation& observation : observations) observation.sigma_px = config_.eyes.sigma_floor_px;
+  const ObservationsReport report = bank_->update(observations);
   num_found_now_ = report.num_used;
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // of the plane through the points
   for (std::size_t i = 2; i < points.size(); ++i)
@@ -117,31 +115,31 @@ void ImageLocalizer::add_target(const cv::Mat& smoothed, const SeenTarget& seen)
                   .cross(points[i].point_in_world - points[0].point_in_world);
   const Rigid3& world_from_cam = bank_->best().motion().world_from_cam;
   in_view_.clear();
-  for (const FeatureSight& sight : seen.sights) {
-    const auto point = std::ranges::find(points, sight.id, &KnownPoint::id);
-    in_view_.push_back(sight.px);
-    auto landmark = new_landmark(sight.id, smoothed, camera_, world_from_cam, sight.px, point->point_in_world,
-                                 normal.norm() > 0.0 ? std::optional(normal) : std::nullopt);
+  for (const FeatureObservation& observation : seen.observations) {
+    const auto point = std::ranges::find(points, observation.id, &KnownPoint::id);
+    in_view_.push_back(observation.px);
+    auto landmark = new_landmark(observation.id, smoothed, camera_, world_from_cam, observation.px,
+                                 point->point_in_world, normal.norm() > 0.0 ? std::optional(normal) : std::nullopt);
     if (!landmark) continue;
     landmark->is_known = true;
     landmark->last_found = frame_;
-    landmarks_[sight.id] = *landmark;
+    landmarks_[observation.id] = *landmark;
   }
 }
 
-/// In steps of the pictures' period: accelerations are drawn anew for each, also while pictures are missing.
+/// In steps of the images' period: accelerations are drawn anew for each, also while images are missing.
 void ImageLocalizer::predict_to(double t_s) {
   const double gap_s = t_s - t_s_;
   if (!(period_s_ > 0.0) || gap_s < period_s_) period_s_ = gap_s;
-  constexpr int most_steps = 1000;  // σ is as large as the world long before
-  const int num_steps = std::clamp(static_cast<int>(std::lround(gap_s / period_s_)), 1, most_steps);
+  constexpr int max_steps = 1000;  // σ is as large as the world long before
+  const int num_steps = std::clamp(static_cast<int>(std::lround(gap_s / period_s_)), 1, max_steps);
   for (int i = 0; i < num_steps; ++i) bank_->predict(gap_s / num_steps);
   t_s_ = t_s;
 }
 
-std::vector<FeatureSight> ImageLocalizer::look(const cv::Mat& smoothed, const Search& search) {
+std::vector<FeatureObservation> ImageLocalizer::look(const cv::Mat& smoothed, const Search& search) {
   const LocalizationFilter& filter = bank_->best();
-  std::vector<FeatureSight> sights;
+  std::vector<FeatureObservation> observations;
   tried_.clear();
   in_view_.clear();
   constexpr double margin_px = PatchView::half_px + 2.0;
@@ -153,7 +151,7 @@ std::vector<FeatureSight> ImageLocalizer::look(const cv::Mat& smoothed, const Se
         expected->px.y() > smoothed.rows - 1 - margin_px)
       continue;
     in_view_.push_back(expected->px);
-    if (tried_.size() >= config_.eyes.most_tried) continue;
+    if (tried_.size() >= config_.eyes.max_tried) continue;
     Landmark& landmark = at->second;
     const auto warp =
         here_from_first(landmark, camera_, filter.motion().world_from_cam, place_of(feature).point_in_world);
@@ -167,34 +165,34 @@ std::vector<FeatureSight> ImageLocalizer::look(const cv::Mat& smoothed, const Se
     if (!match) continue;
     tried_.back().found_px = match->px + offset_px;
     in_view_.back() = match->px + offset_px;
-    sights.push_back({feature.id, match->px + offset_px, std::hypot(match->sigma_px, config_.eyes.sigma_floor_px)});
+    observations.push_back(
+        {feature.id, match->px + offset_px, std::hypot(match->sigma_px, config_.eyes.sigma_floor_px)});
   }
-  return sights;
+  return observations;
 }
 
 bool ImageLocalizer::is_found(std::size_t num_found) const {
-  return num_found >= least_tracked &&
-         static_cast<double>(num_found) >= least_share * static_cast<double>(tried_.size());
+  return num_found >= min_tracked && static_cast<double>(num_found) >= min_share * static_cast<double>(tried_.size());
 }
 
-void ImageLocalizer::count(std::span<const FeatureSight> sights, const SightsReport& report) {
-  for (const SightTried& tried : tried_) ++landmarks_.at(tried.id).num_tried;
-  for (std::size_t i = 0; i < sights.size(); ++i) {
-    if (report.outcomes[i] != SightOutcome::used) continue;
-    Landmark& landmark = landmarks_.at(sights[i].id);
+void ImageLocalizer::count(std::span<const FeatureObservation> observations, const ObservationsReport& report) {
+  for (const ObservationTried& tried : tried_) ++landmarks_.at(tried.id).num_tried;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    if (report.outcomes[i] != ObservationOutcome::used) continue;
+    Landmark& landmark = landmarks_.at(observations[i].id);
     ++landmark.num_found;
     landmark.last_found = frame_;
-    const auto tried = std::ranges::find(tried_, sights[i].id, &SightTried::id);
+    const auto tried = std::ranges::find(tried_, observations[i].id, &ObservationTried::id);
     if (tried != tried_.end()) tried->is_used = true;
   }
 }
 
 void ImageLocalizer::drop_bad() {
-  constexpr int least_tries = 8;
+  constexpr int min_tries = 8;
   std::vector<long> bad;
   for (const auto& [id, landmark] : landmarks_) {
-    if (landmark.is_known || landmark.num_tried < least_tries) continue;
-    if (landmark.num_found < config_.eyes.least_found_share * landmark.num_tried) bad.push_back(id);
+    if (landmark.is_known || landmark.num_tried < min_tries) continue;
+    if (landmark.num_found < config_.eyes.min_found_share * landmark.num_tried) bad.push_back(id);
   }
   std::ranges::sort(bad);
   for (const long id : bad) forget(id);
@@ -217,7 +215,7 @@ double ImageLocalizer::usual_depth_m() const {
 
 /// Where the map is full, what has not been seen for longest leaves.
 bool ImageLocalizer::make_room() {
-  if (landmarks_.size() < config_.eyes.most_features) return true;
+  if (landmarks_.size() < config_.eyes.max_features) return true;
   const Landmark* oldest = nullptr;
   for (const auto& [id, landmark] : landmarks_) {
     if (landmark.is_known || landmark.last_found == frame_) continue;
@@ -232,20 +230,20 @@ bool ImageLocalizer::make_room() {
 
 void ImageLocalizer::add_new(const cv::Mat& smoothed) {
   const EyesConfig& eyes = config_.eyes;
-  if (num_found_now_ >= eyes.least_found) return;
+  if (num_found_now_ >= eyes.min_found) return;
   CornerFeatureConfig corners;
   corners.cell_px = eyes.cell_px > 0 ? eyes.cell_px : std::max(24, smoothed.cols / 10);
   corners.min_distance_px = 0.5 * corners.cell_px;
-  const bool is_first = landmarks_.size() < least_tracked;
-  std::size_t most = std::min(eyes.least_found - num_found_now_, is_first ? eyes.least_found : eyes.most_new);
+  const bool is_first = landmarks_.size() < min_tracked;
+  std::size_t most = std::min(eyes.min_found - num_found_now_, is_first ? eyes.min_found : eyes.max_new);
   const double depth_m = usual_depth_m();
   for (const CornerFeature& corner : corners_in_empty_cells(smoothed, in_view_, corners)) {
     if (most == 0 || !make_room()) return;
     const Eigen::Vector2d px = corner.px.cast<double>();
     const auto ray_in_cam = unproject(camera_, px);
     if (!ray_in_cam) continue;
-    constexpr double least_z = 0.2;  // at the edge of a wide lens a depth is no distance
-    const double range_m = depth_m / std::max(ray_in_cam->z(), least_z);
+    constexpr double min_z = 0.2;  // at the edge of a wide lens a depth is no distance
+    const double range_m = depth_m / std::max(ray_in_cam->z(), min_z);
     const Rigid3 world_from_cam = bank_->best().motion().world_from_cam;
     auto landmark =
         new_landmark(next_id_, smoothed, camera_, world_from_cam, px, world_from_cam * (range_m * *ray_in_cam));
@@ -257,16 +255,17 @@ void ImageLocalizer::add_new(const cv::Mat& smoothed) {
   }
 }
 
-void ImageLocalizer::fill(std::span<const FeatureSight> sights, const SightsReport& report, PathStep& step) const {
-  step.num_seen = sights.size();
+void ImageLocalizer::fill(std::span<const FeatureObservation> observations, const ObservationsReport& report,
+                          PathStep& step) const {
+  step.num_seen = observations.size();
   step.num_tracked = report.num_used;
   step.num_gated = report.num_gated;
   if (report.num_used > 0) step.nis_per_dof = report.nis_per_dof;
   step.num_known = step.num_known_gated = 0;
-  for (std::size_t i = 0; i < sights.size(); ++i) {
-    if (!landmarks_.at(sights[i].id).is_known) continue;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    if (!landmarks_.at(observations[i].id).is_known) continue;
     ++step.num_known;
-    step.num_known_gated += report.outcomes[i] == SightOutcome::gated ? 1u : 0u;
+    step.num_known_gated += report.outcomes[i] == ObservationOutcome::gated ? 1u : 0u;
   }
 }
 
@@ -274,14 +273,14 @@ void ImageLocalizer::fill(std::span<const FeatureSight> sights, const SightsRepo
 /// most of what is expected then, where it is expected.
 bool ImageLocalizer::try_from(const cv::Mat& smoothed, const StartHypothesis& from, PathStep& step) {
   bank_->restart({{from}});
-  const std::vector<FeatureSight> sights = look(smoothed, {0.85, 0.0});
-  if (!is_found(sights.size())) return false;
-  const SightsReport report = bank_->update(sights);
-  constexpr double most_nis = 3.0;
-  if (!report.is_sound || !is_found(report.num_used) || report.nis_per_dof > most_nis) return false;
+  const std::vector<FeatureObservation> observations = look(smoothed, {0.85, 0.0});
+  if (!is_found(observations.size())) return false;
+  const ObservationsReport report = bank_->update(observations);
+  constexpr double max_nis = 3.0;
+  if (!report.is_sound || !is_found(report.num_used) || report.nis_per_dof > max_nis) return false;
   PathStep found = step;
-  fill(sights, report, found);
-  const std::vector<FeatureSight> again = look(smoothed, {config_.eyes.min_correlation, 0.0});
+  fill(observations, report, found);
+  const std::vector<FeatureObservation> again = look(smoothed, {config_.eyes.min_correlation, 0.0});
   constexpr double sure_share = 0.5;
   constexpr std::size_t sure_number = 8;
   if (again.size() < sure_number || static_cast<double>(again.size()) < sure_share * static_cast<double>(tried_.size()))
@@ -290,8 +289,8 @@ bool ImageLocalizer::try_from(const cv::Mat& smoothed, const StartHypothesis& fr
   return true;
 }
 
-/// Where the sights of several pictures in a row contradict the path though they are found: from the target or a
-/// keyframe, if that explains this picture.
+/// Where the observations of several images in a row contradict the path though they are found: from the target or a
+/// keyframe, if that explains this image.
 bool ImageLocalizer::restart_in_doubt(const cv::Mat& smoothed, PathStep& step) {
   const Doubt doubt = config_.localize.restarts ? doubt_.after(step) : Doubt::none;
   if (doubt != Doubt::strong && doubt != Doubt::many) return false;
@@ -345,15 +344,15 @@ PathStep ImageLocalizer::take(const cv::Mat& grey, long frame, double t_s) {
     step.num_seen = step.num_tracked = landmarks_.size();
   } else {
     predict_to(t_s);
-    std::vector<FeatureSight> sights = look(smoothed, {config_.eyes.min_correlation, 0.0});
-    if (config_.disturb) config_.disturb(frame, sights);
-    step.num_seen = sights.size();
+    std::vector<FeatureObservation> observations = look(smoothed, {config_.eyes.min_correlation, 0.0});
+    if (config_.disturb) config_.disturb(frame, observations);
+    step.num_seen = observations.size();
     step.event = FrameEvent::predicted;
-    if (is_found(sights.size())) {
-      const SightsReport report = bank_->update(sights);
-      fill(sights, report, step);
-      count(sights, report);
-      residuals_.add(bank_->best(), sights, report.outcomes);
+    if (is_found(observations.size())) {
+      const ObservationsReport report = bank_->update(observations);
+      fill(observations, report, step);
+      count(observations, report);
+      residuals_.add(bank_->best(), observations, report.outcomes);
       if (is_found(report.num_used)) step.event = FrameEvent::tracked;
     }
     if (step.event == FrameEvent::predicted ? find_back(smoothed, step) : restart_in_doubt(smoothed, step)) {

@@ -10,17 +10,17 @@
 
 namespace alidade {
 
-/// A filter's configuration as pictures need it: tens of matches a frame, whose few mismatches the gates keep out, and
+/// A filter's configuration as images need it: tens of matches a frame, whose few mismatches the gates keep out, and
 /// features defined by a pixel that is found again to `sigma_floor_px`.
-[[nodiscard]] LocalizationFilterConfig for_pictures(LocalizationFilterConfig config, double sigma_floor_px);
+[[nodiscard]] LocalizationFilterConfig for_images(LocalizationFilterConfig config, double sigma_floor_px);
 
-/// One run through pictures: finds the features of the filter's map in each, chooses new ones, and finds the way back
+/// One run through images: finds the features of the filter's map in each, chooses new ones, and finds the way back
 /// after it was lost.
 class ImageLocalizer {
  public:
   ImageLocalizer(const Camera& camera, const LocalizeImagesConfig& config);
 
-  /// The next picture, 8-bit grey of the camera's size.
+  /// The next image, 8-bit grey of the camera's size.
   PathStep take(const cv::Mat& grey, long frame, double t_s);
   [[nodiscard]] const FilterBank* bank() const { return bank_ ? &*bank_ : nullptr; }
   [[nodiscard]] std::size_t num_restarts() const { return num_restarts_; }
@@ -30,8 +30,8 @@ class ImageLocalizer {
   [[nodiscard]] const RadialResiduals& residuals() const { return residuals_; }
   [[nodiscard]] const GivenTally& given() const { return given_; }
   [[nodiscard]] std::size_t num_alike() const { return num_alike_; }
-  /// Of the last picture.
-  [[nodiscard]] std::span<const SightTried> tried() const { return tried_; }
+  /// Of the last image.
+  [[nodiscard]] std::span<const ObservationTried> tried() const { return tried_; }
 
  private:
   struct Search {
@@ -45,16 +45,16 @@ class ImageLocalizer {
   [[nodiscard]] std::vector<KnownPoint> told_points(const SeenTarget& seen) const;
   void predict_to(double t_s);
   /// What of the map is found where it is expected; `tried_` says what was looked for.
-  [[nodiscard]] std::vector<FeatureSight> look(const cv::Mat& smoothed, const Search& search);
+  [[nodiscard]] std::vector<FeatureObservation> look(const cv::Mat& smoothed, const Search& search);
   [[nodiscard]] bool is_found(std::size_t num_found) const;
-  void count(std::span<const FeatureSight> sights, const SightsReport& report);
+  void count(std::span<const FeatureObservation> observations, const ObservationsReport& report);
   void drop_bad();
   void add_new(const cv::Mat& smoothed);
   [[nodiscard]] bool make_room();
   [[nodiscard]] double usual_depth_m() const;
   [[nodiscard]] bool find_back(const cv::Mat& smoothed, PathStep& step);
   [[nodiscard]] bool try_from(const cv::Mat& smoothed, const StartHypothesis& start, PathStep& step);
-  void fill(std::span<const FeatureSight> sights, const SightsReport& report, PathStep& step) const;
+  void fill(std::span<const FeatureObservation> observations, const ObservationsReport& report, PathStep& step) const;
   void forget(long id);
   [[nodiscard]] bool restart_in_doubt(const cv::Mat& smoothed, PathStep& step);
 
@@ -69,8 +69,8 @@ class ImageLocalizer {
   RadialResiduals residuals_;
   GivenTally given_;
   std::size_t num_alike_ = 1;
-  std::vector<SightTried> tried_;
-  std::vector<Eigen::Vector2d> in_view_;  ///< Where landmarks are, or should be, in this picture.
+  std::vector<ObservationTried> tried_;
+  std::vector<Eigen::Vector2d> in_view_;  ///< Where landmarks are, or should be, in this image.
   double t_s_ = 0.0, period_s_ = 0.0;
   long frame_ = 0, next_id_ = 0;
   int num_lost_in_a_row_ = 0;

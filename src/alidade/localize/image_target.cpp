@@ -4,22 +4,22 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "alidade/imaging/find_board.h"
+#include "alidade/board_detector/find_board.h"
 #include "alidade/imaging/rectangles.h"
 
 namespace alidade {
 namespace {
 
-constexpr double most_chi2_per_dof = 6.9;  // 99.9 % of the two numbers that four corners leave
+constexpr double max_chi2_per_dof = 6.9;  // 99.9 % of the two numbers that four corners leave
 
 int dof_of(std::size_t num_points) { return 2 * static_cast<int>(num_points) - 6; }
 
-std::optional<SeenTarget> posed(const Camera& camera, std::vector<FeatureSight> sights, const ImageTarget& target,
-                                const KnownPoseConfig& config) {
-  SeenTarget seen{std::move(sights), {}};
-  seen.starts = poses_from_known(camera, seen.sights, target.points, config);
+std::optional<SeenTarget> posed(const Camera& camera, std::vector<FeatureObservation> observations,
+                                const ImageTarget& target, const KnownPoseConfig& config) {
+  SeenTarget seen{std::move(observations), {}};
+  seen.starts = poses_from_known(camera, seen.observations, target.points, config);
   if (seen.starts.empty()) return std::nullopt;
-  if (seen.starts.front().cost > most_chi2_per_dof * std::max(1, dof_of(seen.sights.size()))) return std::nullopt;
+  if (seen.starts.front().cost > max_chi2_per_dof * std::max(1, dof_of(seen.observations.size()))) return std::nullopt;
   return seen;
 }
 
@@ -30,12 +30,12 @@ std::optional<SeenTarget> posed_rectangle(const Camera& camera, const SeenRectan
   for (std::size_t first = 0; first < 4; ++first) {
     const Eigen::Vector2d x_axis = rectangle.corners_px[(first + 1) % 4] - rectangle.corners_px[first];
     if (!(x_axis.x() > 0.0)) continue;
-    std::vector<FeatureSight> sights;
+    std::vector<FeatureObservation> observations;
     for (std::size_t k = 0; k < 4; ++k)
-      sights.push_back({static_cast<long>(k), rectangle.corners_px[(first + k) % 4], rectangle.sigma_px});
+      observations.push_back({static_cast<long>(k), rectangle.corners_px[(first + k) % 4], rectangle.sigma_px});
     KnownPoseConfig own = config;
     own.sigma_px = std::max(rectangle.sigma_px, config.sigma_px);
-    auto seen = posed(camera, std::move(sights), target, own);
+    auto seen = posed(camera, std::move(observations), target, own);
     if (seen && (!best || seen->starts.front().cost < best->starts.front().cost)) best = std::move(seen);
   }
   return best;
@@ -72,10 +72,10 @@ std::optional<SeenTarget> find_board_points(const cv::Mat& grey, const Camera& c
                                             const KnownPoseConfig& config) {
   const BoardDetection found = find_board(grey, *target.board);
   if (!found.found()) return std::nullopt;
-  std::vector<FeatureSight> sights;
+  std::vector<FeatureObservation> observations;
   for (const Corner& corner : found.view.corners)
-    sights.push_back({corner.index, corner.px, std::sqrt(0.5 * corner.cov.trace())});
-  return posed(camera, std::move(sights), target, config);
+    observations.push_back({corner.index, corner.px, std::sqrt(0.5 * corner.cov.trace())});
+  return posed(camera, std::move(observations), target, config);
 }
 
 /// Where the top of a parabola through three neighbours is, from the middle one.
@@ -84,11 +84,11 @@ double top_of(double before, double at, double after) {
   return bend < 0.0 ? std::clamp(0.5 * (before - after) / bend, -0.5, 0.5) : 0.0;
 }
 
-/// Each patch where the picture is most like it.
+/// Each patch where the image is most like it.
 std::optional<SeenTarget> find_patches(const cv::Mat& grey, const Camera& camera, const ImageTarget& target,
                                        const KnownPoseConfig& config) {
-  constexpr double least_correlation = 0.75;
-  std::vector<FeatureSight> sights;
+  constexpr double min_correlation = 0.75;
+  std::vector<FeatureObservation> observations;
   for (std::size_t i = 0; i < target.patches.size(); ++i) {
     const GreyPatch& patch = target.patches[i];
     const cv::Mat look(patch.height_px, patch.width_px, CV_8U, const_cast<std::uint8_t*>(patch.grey.data()));
@@ -98,7 +98,7 @@ std::optional<SeenTarget> find_patches(const cv::Mat& grey, const Camera& camera
     double best = 0.0;
     cv::Point at;
     cv::minMaxLoc(likeness, nullptr, &best, nullptr, &at);
-    if (!(best >= least_correlation)) continue;
+    if (!(best >= min_correlation)) continue;
     const auto like = [&](int dx, int dy) -> double {
       const int u = std::clamp(at.x + dx, 0, likeness.cols - 1), v = std::clamp(at.y + dy, 0, likeness.rows - 1);
       return likeness.at<float>(v, u);
@@ -106,9 +106,9 @@ std::optional<SeenTarget> find_patches(const cv::Mat& grey, const Camera& camera
     const Eigen::Vector2d top(at.x + top_of(like(-1, 0), best, like(1, 0)),
                               at.y + top_of(like(0, -1), best, like(0, 1)));
     const Eigen::Vector2d middle(0.5 * (patch.width_px - 1), 0.5 * (patch.height_px - 1));
-    sights.push_back({target.points[i].id, top + middle, config.sigma_px});
+    observations.push_back({target.points[i].id, top + middle, config.sigma_px});
   }
-  return posed(camera, std::move(sights), target, config);
+  return posed(camera, std::move(observations), target, config);
 }
 
 }  // namespace

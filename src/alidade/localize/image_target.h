@@ -14,13 +14,13 @@ class Mat;
 
 namespace alidade {
 
-/// A small grey picture of a point as first seen; the point is its middle.
+/// A small grey image of a point as first seen; the point is its middle.
 struct GreyPatch {
   int width_px = 0, height_px = 0;
   std::vector<std::uint8_t> grey;  ///< Row by row.
 };
 
-/// What gives scale and the map's frame in pictures: points that are found by themselves.
+/// What gives scale and the map's frame in images: points that are found by themselves.
 struct ImageTarget {
   std::vector<KnownPoint> points;
   std::optional<Eigen::Vector2d> rectangle_m;  ///< Width and height; `points` are its corners. See rectangle_target().
@@ -32,11 +32,11 @@ struct ImageTarget {
 /// from (−, −). The default σ is that of a print on a flat thing.
 [[nodiscard]] ImageTarget rectangle_target(double width_m, double height_m, double sigma_m = 0.0003);
 
-/// The target in a picture: where its points are, and from where it looks so.
+/// The target in an image: where its points are, and from where it looks so.
 struct SeenTarget {
-  std::vector<FeatureSight> sights;
+  std::vector<FeatureObservation> observations;
   std::vector<StartHypothesis> starts;  ///< The better one first.
-  std::size_t num_alike = 1;            ///< Things in the picture that might as well be the target.
+  std::size_t num_alike = 1;            ///< Things in the image that might as well be the target.
 };
 
 /// None where it is not found, or where what is found does not have its shape. Of several rectangles with its shape the

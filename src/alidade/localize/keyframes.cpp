@@ -10,8 +10,8 @@
 namespace alidade {
 namespace {
 
-constexpr double least_sigma = 4.0;  // grey values of a thumbnail: less shows nothing
-constexpr std::size_t most_keyframes = 200;
+constexpr double min_sigma = 4.0;  // grey values of a thumbnail: less shows nothing
+constexpr std::size_t max_keyframes = 200;
 
 /// Correlation of what both show at a shift; of the overlap alone.
 double correlation_at(const Thumbnail& first, const Thumbnail& second, int du, int dv) {
@@ -42,7 +42,7 @@ double correlation_at(const Thumbnail& first, const Thumbnail& second, int du, i
 
 double distance_rad(const Rigid3& a, const Rigid3& b) { return a.rotation.angularDistance(b.rotation); }
 
-/// The pose turned so that the picture's middle looks where `shift_px` less looked before.
+/// The pose turned so that the image's middle looks where `shift_px` less looked before.
 Rigid3 turned(const Camera& camera, const Rigid3& world_from_cam, const Eigen::Vector2d& shift_px) {
   const Eigen::Vector2d middle(0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1));
   const auto from = unproject(camera, middle), to = unproject(camera, middle - shift_px);
@@ -68,9 +68,9 @@ Thumbnail thumbnail_of(const cv::Mat& grey) {
 
 ThumbnailMatch match_thumbnails(const Thumbnail& first, const Thumbnail& second) {
   ThumbnailMatch best;
-  constexpr double least_energy = least_sigma * least_sigma * Thumbnail::width * Thumbnail::height;
-  if (first.energy < least_energy || second.energy < least_energy) return best;
-  constexpr int reach_u = 12, reach_v = 9;  // a third of the picture
+  constexpr double min_energy = min_sigma * min_sigma * Thumbnail::width * Thumbnail::height;
+  if (first.energy < min_energy || second.energy < min_energy) return best;
+  constexpr int reach_u = 12, reach_v = 9;  // a third of the image
   for (int dv = -reach_v; dv <= reach_v; ++dv) {
     for (int du = -reach_u; du <= reach_u; ++du) {
       const double correlation = correlation_at(first, second, du, dv);
@@ -81,7 +81,7 @@ ThumbnailMatch match_thumbnails(const Thumbnail& first, const Thumbnail& second)
 }
 
 void KeyframeStore::offer(const cv::Mat& grey, const Rigid3& world_from_cam, double near_m, double near_rad) {
-  if (keyframes_.size() >= most_keyframes) return;
+  if (keyframes_.size() >= max_keyframes) return;
   const bool is_near = std::ranges::any_of(keyframes_, [&](const Keyframe& keyframe) {
     return (keyframe.world_from_cam.translation - world_from_cam.translation).norm() < near_m &&
            distance_rad(keyframe.world_from_cam, world_from_cam) < near_rad;
@@ -95,8 +95,8 @@ std::vector<Rigid3> KeyframeStore::candidates(const cv::Mat& grey, const Camera&
   std::vector<std::pair<ThumbnailMatch, const Keyframe*>> matches;
   for (const Keyframe& keyframe : keyframes_) {
     const ThumbnailMatch match = match_thumbnails(keyframe.thumbnail, now);
-    constexpr double least_correlation = 0.4;
-    if (match.correlation > least_correlation) matches.emplace_back(match, &keyframe);
+    constexpr double min_correlation = 0.4;
+    if (match.correlation > min_correlation) matches.emplace_back(match, &keyframe);
   }
   std::ranges::sort(matches, std::greater{}, [](const auto& entry) { return entry.first.correlation; });
   std::vector<Rigid3> poses;

@@ -13,7 +13,7 @@ class Mat;
 
 namespace alidade {
 
-/// A picture made very small: what is remembered of a place.
+/// An image made very small: what is remembered of a place.
 struct Thumbnail {
   static constexpr int width = 40, height = 30;
   std::array<float, static_cast<std::size_t>(width) * height> grey{};  ///< Without mean.
@@ -28,15 +28,15 @@ struct ThumbnailMatch {
 };
 [[nodiscard]] ThumbnailMatch match_thumbnails(const Thumbnail& first, const Thumbnail& second);
 
-/// Pictures whose pose was known, far enough from each other. B. Williams, G. Klein & I. Reid, "Automatic
+/// Images whose pose was known, far enough from each other. B. Williams, G. Klein & I. Reid, "Automatic
 /// Relocalization and Loop Closing for Real-Time Monocular SLAM", PAMI 33(9), 2011; thumbnails: G. Klein & D. Murray,
 /// "Improving the Agility of Keyframe-Based SLAM", ECCV 2008.
 class KeyframeStore {
  public:
   /// Keeps it if none is near: `near_m` and `near_rad` away.
   void offer(const cv::Mat& grey, const Rigid3& world_from_cam, double near_m, double near_rad);
-  /// Poses from which a picture may have been taken, the likeliest first: those of the keyframes most like it, turned
-  /// by the shift of the picture.
+  /// Poses from which an image may have been taken, the likeliest first: those of the keyframes most like it, turned
+  /// by the shift of the image.
   [[nodiscard]] std::vector<Rigid3> candidates(const cv::Mat& grey, const Camera& camera, std::size_t most) const;
   [[nodiscard]] std::size_t size() const { return keyframes_.size(); }
 

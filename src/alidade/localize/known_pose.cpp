@@ -19,16 +19,16 @@ struct SeenPoints {
 };
 
 /// The known points that are seen, in the frame of the plane through them.
-SeenPoints seen_points(std::span<const FeatureSight> sights, std::span<const KnownPoint> known) {
+SeenPoints seen_points(std::span<const FeatureObservation> observations, std::span<const KnownPoint> known) {
   SeenPoints seen;
   std::vector<Eigen::Vector3d> points_in_world;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const FeatureSight& sight : sights) {
-    const auto at = std::ranges::find(known, sight.id, &KnownPoint::id);
+  for (const FeatureObservation& observation : observations) {
+    const auto at = std::ranges::find(known, observation.id, &KnownPoint::id);
     if (at == known.end()) continue;
     Corner corner;
     corner.index = static_cast<int>(points_in_world.size());
-    corner.px = sight.px;
+    corner.px = observation.px;
     seen.view.corners.push_back(corner);
     points_in_world.push_back(at->point_in_world);
     middle += at->point_in_world;
@@ -80,11 +80,11 @@ std::vector<BoardPoseFit> fits_of(const Camera& camera, const SeenPoints& seen, 
                          effective_sigma_px(camera, fits.front(), seen.sigma_m, sigma_px));
 }
 
-constexpr double most_pose_chi2_per_dof = 6.9;  // 99.9 % of the two numbers that four points leave
-constexpr double most_chi2 = 13.8;              // 99.9 % of a point's two
+constexpr double max_pose_chi2_per_dof = 6.9;  // 99.9 % of the two numbers that four points leave
+constexpr double max_chi2 = 13.8;              // 99.9 % of a point's two
 
 bool agree(const std::vector<BoardPoseFit>& fits) {
-  return !fits.empty() && fits.front().chi2 <= most_pose_chi2_per_dof * std::max(fits.front().dof, 2);
+  return !fits.empty() && fits.front().chi2 <= max_pose_chi2_per_dof * std::max(fits.front().dof, 2);
 }
 
 /// Those of all that fit a pose.
@@ -94,7 +94,7 @@ BoardView fitting(const Camera& camera, const SeenPoints& seen, const BoardPoseF
   for (const Corner& corner : seen.view.corners) {
     const auto px =
         project(camera, fit.pose.cam_from_board * seen.points_in_board[static_cast<std::size_t>(corner.index)]);
-    if (px && (*px - corner.px).squaredNorm() < most_chi2 * sigma * sigma) view.corners.push_back(corner);
+    if (px && (*px - corner.px).squaredNorm() < max_chi2 * sigma * sigma) view.corners.push_back(corner);
   }
   return view;
 }
@@ -114,9 +114,9 @@ std::vector<std::array<std::size_t, 4>> fours_of(std::size_t num) {
   return fours;
 }
 
-/// The poses that most sights agree on, where not all agree on one: from sets of four (M. A. Fischler & R. C. Bolles,
-/// "Random Sample Consensus", 1981). Of more than five more than four must agree, and half of all: four points fit
-/// chance poses.
+/// The poses that most observations agree on, where not all agree on one: from sets of four (M. A. Fischler & R. C.
+/// Bolles, "Random Sample Consensus", 1981). Of more than five more than four must agree, and half of all: four points
+/// fit chance poses.
 std::vector<BoardPoseFit> agreed_poses(const Camera& camera, const SeenPoints& seen, double sigma_px) {
   const std::size_t num = seen.view.corners.size();
   constexpr std::size_t few = 5;
@@ -140,15 +140,15 @@ std::vector<BoardPoseFit> agreed_poses(const Camera& camera, const SeenPoints& s
 
 }  // namespace
 
-std::vector<StartHypothesis> poses_from_known(const Camera& camera, std::span<const FeatureSight> sights,
+std::vector<StartHypothesis> poses_from_known(const Camera& camera, std::span<const FeatureObservation> observations,
                                               std::span<const KnownPoint> known, const KnownPoseConfig& config) {
-  const SeenPoints seen = seen_points(sights, known);
+  const SeenPoints seen = seen_points(observations, known);
   std::vector<BoardPoseFit> fits = fits_of(camera, seen, seen.view, config.sigma_px);
-  constexpr std::size_t most_for_sets = 40;  // a board's corners come from one finder: no mismatches among them
+  constexpr std::size_t max_for_sets = 40;  // a board's corners come from one finder: no mismatches among them
   const std::size_t num = seen.view.corners.size();
-  if (!agree(fits) && num > 4 && num <= most_for_sets) fits = agreed_poses(camera, seen, config.sigma_px);
+  if (!agree(fits) && num > 4 && num <= max_for_sets) fits = agreed_poses(camera, seen, config.sigma_px);
   std::erase_if(fits,
-                [](const BoardPoseFit& fit) { return !(fit.chi2 <= most_pose_chi2_per_dof * std::max(fit.dof, 2)); });
+                [](const BoardPoseFit& fit) { return !(fit.chi2 <= max_pose_chi2_per_dof * std::max(fit.dof, 2)); });
   std::vector<StartHypothesis> starts;
   for (const BoardPoseFit& fit : fits) starts.push_back(start_of(fit, seen, config));
   return starts;

@@ -35,9 +35,9 @@ std::optional<Landmark> new_landmark(long id, const cv::Mat& smoothed, const Cam
   if (!landmark.patch.seen_through(Eigen::Matrix2d::Identity())) return std::nullopt;
   landmark.offset_px = px - middle.cast<double>();
   landmark.world_from_first_cam = world_from_cam;
-  const Eigen::Vector3d sight = point_in_world - world_from_cam.translation;
-  landmark.first_distance_m = sight.norm();
-  landmark.surface_in_world = two_across(normal_in_world.value_or(sight).normalized());
+  const Eigen::Vector3d observation = point_in_world - world_from_cam.translation;
+  landmark.first_distance_m = observation.norm();
+  landmark.surface_in_world = two_across(normal_in_world.value_or(observation).normalized());
   const auto J = J_px_surface(camera, world_from_cam, point_in_world, landmark.surface_in_world);
   if (!J || !(std::abs(J->determinant()) > 0.0)) return std::nullopt;
   landmark.J_first_px_surface = *J;

@@ -5,7 +5,7 @@
 
 #include "alidade/camera/camera.h"
 #include "alidade/geometry/rigid3.h"
-#include "alidade/imaging/reference_patch.h"
+#include "alidade/patches/reference_patch.h"
 
 namespace alidade {
 
@@ -24,14 +24,14 @@ struct Landmark {
 };
 
 /// A landmark as seen first, at a point of the world. Its surface is taken to face the camera, or to have the normal
-/// given. `smoothed`: the picture of smoothed_for_search(). None too near the picture's edge, or where the lens does
+/// given. `smoothed`: the image of smoothed_for_search(). None too near the image's edge, or where the lens does
 /// not see the point.
 [[nodiscard]] std::optional<Landmark> new_landmark(long id, const cv::Mat& smoothed, const Camera& camera,
                                                    const Rigid3& world_from_cam, const Eigen::Vector2d& px,
                                                    const Eigen::Vector3d& point_in_world,
                                                    const std::optional<Eigen::Vector3d>& normal_in_world = {});
 
-/// How its surroundings have been turned and stretched, as a map of offsets from the first picture to one taken from
+/// How its surroundings have been turned and stretched, as a map of offsets from the first image to one taken from
 /// here. By the derivatives of the plane that it lies in: A = J₁ R₁ᵀ B (J₀ B)⁻¹.
 [[nodiscard]] std::optional<Eigen::Matrix2d> here_from_first(const Landmark& landmark, const Camera& camera,
                                                              const Rigid3& world_from_cam,

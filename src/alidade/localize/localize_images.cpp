@@ -7,12 +7,12 @@
 
 namespace alidade {
 
-LocalizeReport localize_images(const Camera& camera, const NextPicture& next, std::size_t num_pictures,
+LocalizeReport localize_images(const Camera& camera, const NextImage& next, std::size_t num_images,
                                const LocalizeImagesConfig& config, std::span<const TimedPose> truth,
                                const Progress& progress) {
   LocalizeReport report;
   report.camera = camera;
-  report.is_of_pictures = true;
+  report.is_of_images = true;
   report.has_target = config.target.has_value();
   report.scale_known = report.has_target;
   ImageLocalizer localizer(camera, config);
@@ -20,7 +20,7 @@ LocalizeReport localize_images(const Camera& camera, const NextPicture& next, st
   long frame = 0;
   double t_s = 0.0;
   while (next(grey, frame, t_s)) {
-    report_progress(progress, "localize", report.path.size(), std::max(num_pictures, report.path.size() + 1));
+    report_progress(progress, "localize", report.path.size(), std::max(num_images, report.path.size() + 1));
     const double begin_s = config.localize.seconds ? config.localize.seconds() : 0.0;
     report.path.push_back(localizer.take(grey, frame, t_s));
     if (config.localize.seconds) report.path.back().seconds = config.localize.seconds() - begin_s;

@@ -13,22 +13,22 @@ namespace alidade {
 
 /// How features are chosen, found again and given up.
 struct EyesConfig {
-  std::size_t least_found = 30;  ///< New ones are added while fewer are found in a picture.
-  std::size_t most_tried = 40;   ///< Looked for in a picture, the oldest first: they drift least.
-  std::size_t most_new = 8;      ///< In a picture, after the first.
-  std::size_t most_features = 120;
+  std::size_t min_found = 30;  ///< New ones are added while fewer are found in an image.
+  std::size_t max_tried = 40;  ///< Looked for in an image, the oldest first: they drift least.
+  std::size_t max_new = 8;     ///< In an image, after the first.
+  std::size_t max_features = 120;
   /// Least σ of a match's coordinate: what patches of things with depth, seen through a lens that is not quite as
   /// calibrated, are off by, however well they fit.
   double sigma_floor_px = 0.11;
   double min_correlation = 0.8;
-  double least_found_share = 0.5;  ///< Features that are found less often leave.
-  int cell_px = 0;                 ///< Of the grid on which new ones are chosen; 0: a tenth of the picture's width.
-  double near_share = 0.15;        ///< Distance between keyframes over that of the map's points,
-  double near_rad = 0.15;          ///< and angle.
+  double min_found_share = 0.5;  ///< Features that are found less often leave.
+  int cell_px = 0;               ///< Of the grid on which new ones are chosen; 0: a tenth of the image's width.
+  double near_share = 0.15;      ///< Distance between keyframes over that of the map's points,
+  double near_rad = 0.15;        ///< and angle.
 };
 
-/// A feature looked for in a picture: for those who draw it.
-struct SightTried {
+/// A feature looked for in an image: for those who draw it.
+struct ObservationTried {
   long id = 0;
   Eigen::Vector2d expected_px = Eigen::Vector2d::Zero();
   Eigen::Matrix2d S = Eigen::Matrix2d::Identity();
@@ -41,16 +41,16 @@ struct LocalizeImagesConfig {
   EyesConfig eyes;
   std::optional<ImageTarget> target;  ///< None: the world is the first camera, scale unknown.
   /// Is given what was matched before the filter sees it, and may change it.
-  std::function<void(long frame, std::vector<FeatureSight>&)> disturb = {};
-  /// Is shown each picture with what was looked for in it, before `localize.watch` its row.
-  std::function<void(long frame, const cv::Mat&, std::span<const SightTried>)> watch = {};
+  std::function<void(long frame, std::vector<FeatureObservation>&)> disturb = {};
+  /// Is shown each image with what was looked for in it, before `localize.watch` its row.
+  std::function<void(long frame, const cv::Mat&, std::span<const ObservationTried>)> watch = {};
 };
 
-/// The next picture, 8-bit grey, its number and time. False at the end.
-using NextPicture = std::function<bool(cv::Mat& grey, long& frame, double& t_s)>;
+/// The next image, 8-bit grey, its number and time. False at the end.
+using NextImage = std::function<bool(cv::Mat& grey, long& frame, double& t_s)>;
 
-/// The path of a camera through pictures, in order of time. `num_pictures`: for progress; 0: not known.
-[[nodiscard]] LocalizeReport localize_images(const Camera& camera, const NextPicture& next, std::size_t num_pictures,
+/// The path of a camera through images, in order of time. `num_images`: for progress; 0: not known.
+[[nodiscard]] LocalizeReport localize_images(const Camera& camera, const NextImage& next, std::size_t num_images,
                                              const LocalizeImagesConfig& config, std::span<const TimedPose> truth = {},
                                              const Progress& progress = {});
 

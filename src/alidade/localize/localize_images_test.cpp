@@ -8,9 +8,9 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "alidade/io/image_sequence.h"
-#include "alidade/io/localize_file.h"
+#include "alidade/detect/image_sequence.h"
 #include "alidade/simulate/draws.h"
+#include "alidade/tables/localize_file.h"
 #include "alidade/testing/room_video.h"
 
 namespace alidade {
@@ -23,21 +23,21 @@ using testing::RoomScene;
 
 struct RoomVideo {
   RoomScene scene;
-  std::vector<cv::Mat> pictures;
+  std::vector<cv::Mat> images;
   std::vector<TimedPose> truth;
 };
 
 RoomVideo room_video(const RoomScene& scene) {
   RoomVideo video{scene, {}, {}};
   for (const Rigid3& world_from_cam : room_path(scene)) {
-    const std::size_t i = video.pictures.size();
-    video.pictures.push_back(render_room(scene, world_from_cam, i + 1));
+    const std::size_t i = video.images.size();
+    video.images.push_back(render_room(scene, world_from_cam, i + 1));
     video.truth.push_back({static_cast<double>(i) / scene.rate_hz, world_from_cam});
   }
   return video;
 }
 
-/// The same pictures serve several tests.
+/// The same images serve several tests.
 const RoomVideo& usual_room() {
   static const RoomVideo video = [] {
     RoomScene scene;
@@ -57,14 +57,14 @@ LocalizeImagesConfig by_hand() {
 
 LocalizeReport localized(const RoomVideo& video, const LocalizeImagesConfig& config) {
   std::size_t i = 0;
-  const NextPicture next = [&](cv::Mat& grey, long& frame, double& t_s) {
-    if (i == video.pictures.size()) return false;
-    grey = video.pictures[i];
+  const NextImage next = [&](cv::Mat& grey, long& frame, double& t_s) {
+    if (i == video.images.size()) return false;
+    grey = video.images[i];
     frame = static_cast<long>(i);
     t_s = static_cast<double>(i++) / video.scene.rate_hz;
     return true;
   };
-  return localize_images(video.scene.camera, next, video.pictures.size(), config, video.truth);
+  return localize_images(video.scene.camera, next, video.images.size(), config, video.truth);
 }
 
 TEST(LocalizeImages, FollowsARoomWithoutLosingAFrame) {
@@ -80,17 +80,17 @@ TEST(LocalizeImages, FollowsARoomWithoutLosingAFrame) {
 LocalizeReport disturbed(const RoomVideo& video, bool takes_away, std::uint64_t seed) {
   LocalizeImagesConfig config = by_hand();
   Draws draws(seed);
-  config.disturb = [&](long, std::vector<FeatureSight>& sights) {
-    std::vector<FeatureSight> left;
-    for (FeatureSight& sight : sights) {
+  config.disturb = [&](long, std::vector<FeatureObservation>& observations) {
+    std::vector<FeatureObservation> left;
+    for (FeatureObservation& observation : observations) {
       const bool is_wrong = draws.uniform() < 0.4;
       const double v = draws.uniform(-1, 1), u = draws.uniform(-1, 1);
       const Eigen::Vector2d by_px = 20.0 * Eigen::Vector2d(u, v);
       if (is_wrong && takes_away) continue;
-      if (is_wrong) sight.px += by_px;
-      left.push_back(sight);
+      if (is_wrong) observation.px += by_px;
+      left.push_back(observation);
     }
-    sights = std::move(left);
+    observations = std::move(left);
   };
   return localized(video, config);
 }
@@ -114,7 +114,7 @@ TEST(LocalizeImages, MismatchesOfFortyPercentChangeLittle) {
   }
   RecordProperty("over_clean", std::to_string(std::sqrt(wrong2 / clean2)));
   RecordProperty("over_missing", std::to_string(std::sqrt(wrong2 / missing2)));
-  // Six tenths of the sights tell with 1/√0.6 = 1.29 times the σ: being wrong must cost no more than being away.
+  // Six tenths of the observations tell with 1/√0.6 = 1.29 times the σ: being wrong must cost no more than being away.
   EXPECT_LT(std::sqrt(wrong2 / missing2), 1.1);
   EXPECT_LT(std::sqrt(wrong2 / clean2), 1.2);  // one draw scatters by a quarter, six by a tenth
 }
@@ -122,7 +122,7 @@ TEST(LocalizeImages, MismatchesOfFortyPercentChangeLittle) {
 TEST(LocalizeImages, ASecondOfDarknessIsRecoveredWithinTenFrames) {
   RoomVideo video = usual_room();
   for (std::size_t i = 40; i < 70; ++i)
-    video.pictures[i] = cv::Mat(240, 320, CV_8U, cv::Scalar(0));  // zeros() would write into the shared one
+    video.images[i] = cv::Mat(240, 320, CV_8U, cv::Scalar(0));  // zeros() would write into the shared one
   const LocalizeReport report = localized(video, by_hand());
   for (std::size_t i = 40; i < 70; ++i) EXPECT_EQ(report.path[i].event, FrameEvent::predicted);
   for (std::size_t i = 80; i < 90; ++i) {
@@ -144,9 +144,9 @@ TEST(LocalizeImages, WithoutTheTargetThereIsNoPath) {
 
 /// Sheets with a dark rectangle each, on a grey wall 0.7 m ahead.
 cv::Mat sheets_at(const Camera& camera, const std::vector<double>& places_m) {
-  cv::Mat picture(camera.height_px, camera.width_px, CV_8U);
-  for (int v = 0; v < picture.rows; ++v) {
-    for (int u = 0; u < picture.cols; ++u) {
+  cv::Mat image(camera.height_px, camera.width_px, CV_8U);
+  for (int v = 0; v < image.rows; ++v) {
+    for (int u = 0; u < image.cols; ++u) {
       const Eigen::Vector3d ray = *unproject(camera, {u, v});
       const Eigen::Vector2d at = 0.7 * ray.hnormalized();
       double grey = 128.0;
@@ -155,16 +155,16 @@ cv::Mat sheets_at(const Camera& camera, const std::vector<double>& places_m) {
         const double dark = testing::inside(at.x() - x, at.y(), 0.105, 0.07425);
         grey += paper * (215.0 - 185.0 * dark - grey);
       }
-      picture.at<std::uint8_t>(v, u) = cv::saturate_cast<std::uint8_t>(grey);
+      image.at<std::uint8_t>(v, u) = cv::saturate_cast<std::uint8_t>(grey);
     }
   }
-  return picture;
+  return image;
 }
 
 /// Two sheets that look the same: a path from the wrong one would be a wrong path with a small σ.
 TEST(LocalizeImages, OfTwoThatLookAlikeItTakesNone) {
   RoomVideo video = usual_room();
-  video.pictures.assign(5, sheets_at(video.scene.camera, {-0.2, 0.2}));
+  video.images.assign(5, sheets_at(video.scene.camera, {-0.2, 0.2}));
   const LocalizeReport two = localized(video, by_hand());
   EXPECT_EQ(two.num_lost, 5u);
   EXPECT_EQ(two.num_alike, 2u);
@@ -172,7 +172,7 @@ TEST(LocalizeImages, OfTwoThatLookAlikeItTakesNone) {
   EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
   EXPECT_NE(verdict.sentence.find("2 things in one picture look like the target"), std::string::npos)
       << verdict.sentence;
-  video.pictures.assign(5, sheets_at(video.scene.camera, {-0.2}));
+  video.images.assign(5, sheets_at(video.scene.camera, {-0.2}));
   EXPECT_EQ(localized(video, by_hand()).path.front().event, FrameEvent::started);
 }
 
@@ -185,7 +185,7 @@ TEST(LocalizeImages, FindsPointsByTheirPatches) {
   for (const KnownPoint& point : config.target->points) {
     const auto px = project(video.scene.camera, video.truth[0].world_from_cam.inverse() * point.point_in_world);
     cv::Mat patch;
-    cv::getRectSubPix(video.pictures[0], {side, side}, cv::Point2d(px->x(), px->y()), patch);
+    cv::getRectSubPix(video.images[0], {side, side}, cv::Point2d(px->x(), px->y()), patch);
     config.target->patches.push_back({side, side, {patch.datastart, patch.dataend}});
   }
   const LocalizeReport report = localized(video, config);
@@ -193,13 +193,13 @@ TEST(LocalizeImages, FindsPointsByTheirPatches) {
   EXPECT_LT(report.error.unaligned_m, 0.01);  // its points are found to a tenth of a pixel: 1 mm of 0.7 m, and drift
 }
 
-/// Sights that contradict each other for a third of a second: the path begins anew instead of following them.
-TEST(LocalizeImages, BeginsAnewWhereItsSightsContradictIt) {
+/// Observations that contradict each other for a third of a second: the path begins anew instead of following them.
+TEST(LocalizeImages, BeginsAnewWhereItsObservationsContradictIt) {
   LocalizeImagesConfig config = by_hand();
   Draws draws(3);
-  config.disturb = [&](long frame, std::vector<FeatureSight>& sights) {
+  config.disturb = [&](long frame, std::vector<FeatureObservation>& observations) {
     if (frame < 30 || frame >= 40) return;
-    for (FeatureSight& sight : sights) sight.px += 0.7 * draws.normal2();
+    for (FeatureObservation& observation : observations) observation.px += 0.7 * draws.normal2();
   };
   const LocalizeReport report = localized(usual_room(), config);
   EXPECT_GE(report.num_restarts, 1u);
@@ -225,8 +225,8 @@ TEST(LocalizeImages, AWrongLensIsSeenByTheTruth) {
 
 TEST(LocalizeImages, WithoutTextureThereIsNoPath) {
   RoomVideo video = usual_room();
-  video.pictures.resize(10);
-  for (cv::Mat& picture : video.pictures) picture = cv::Mat(240, 320, CV_8U, cv::Scalar(128));
+  video.images.resize(10);
+  for (cv::Mat& image : video.images) image = cv::Mat(240, 320, CV_8U, cv::Scalar(128));
   LocalizeImagesConfig config = by_hand();
   config.target.reset();
   const LocalizeReport report = localized(video, config);
@@ -244,8 +244,8 @@ TEST(LocalizeImages, ARealDeskIsFollowedToACentimetre) {
   values << 195.0, 195.0, 162.0, 125.0, 0.0, -0.00893, -0.03290, -0.00519, 0.00191;
   camera.lens = Calibrated<KannalaBrandt>{values};
   const std::vector<TimedPose> truth = read_tum(folder / "reference_tum.txt");
-  ImageSequence pictures(folder / "frames", 30.0, camera.width_px, camera.height_px);
-  const NextPicture next = [&](cv::Mat& grey, long& frame, double& t_s) { return pictures.next(grey, frame, t_s); };
+  ImageSequence images(folder / "frames", 30.0, camera.width_px, camera.height_px);
+  const NextImage next = [&](cv::Mat& grey, long& frame, double& t_s) { return images.next(grey, frame, t_s); };
   const LocalizeReport report = localize_images(camera, next, 500, by_hand(), truth);
   EXPECT_EQ(report.path.size(), 500u);
   EXPECT_EQ(report.num_lost, 0u);

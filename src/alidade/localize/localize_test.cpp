@@ -98,16 +98,16 @@ TEST(Localize, CalibratesAStaleLens) {
   EXPECT_LT(p1_in_sigma2, 1.8);  // χ²/40 is below 1.84 at 99.9 %
 }
 
-/// Where the sights come out of rendered pictures, and their σ with them.
-TEST(Localize, FromRenderedPicturesTheMapIsAsGoodAsItsCovarianceSays) {
+/// Where the observations come out of rendered images, and their σ with them.
+TEST(Localize, FromRenderedImagesTheMapIsAsGoodAsItsCovarianceSays) {
   UnderwaterScene scene = scene_of(0.03);
   scene.num_frames = 12;
   scene.dt_s = 0.3;
   UnderwaterSample sample = reproduce::filmed_sample(scene, UnderwaterVideoConfig{}, 11);
-  const reproduce::SightErrors errors = reproduce::sight_errors(sample);
+  const reproduce::ObservationErrors errors = reproduce::observation_errors(sample);
   EXPECT_GE(errors.num, 80u);           // of 96
-  EXPECT_LT(errors.rms_px, 0.05);       // what a picture's noise leaves of corners under such a blur is a hundredth
-  EXPECT_GT(errors.chi2_per_dof, 0.7);  // χ² over 160 is within 1 ± 0.37 at 99.9 %; corners of one picture share
+  EXPECT_LT(errors.rms_px, 0.05);       // what an image's noise leaves of corners under such a blur is a hundredth
+  EXPECT_GT(errors.chi2_per_dof, 0.7);  // χ² over 160 is within 1 ± 0.37 at 99.9 %; corners of one image share
   EXPECT_LT(errors.chi2_per_dof, 1.5);  // nothing but its lens
   sample = reproduce::with_even_noise(sample);
   const auto filter = testing::recommended_filter();
@@ -123,7 +123,7 @@ TEST(Localize, FromRenderedPicturesTheMapIsAsGoodAsItsCovarianceSays) {
 double rms_m(const LocalizeReport& report, const UnderwaterSample& sample) {
   double sum2 = 0.0, num = 0.0;
   for (std::size_t k = 0; k < report.path.size(); ++k) {
-    if (sample.frames[k].sights.empty()) continue;
+    if (sample.frames[k].observations.empty()) continue;
     sum2 += (report.path[k].world_from_cam.translation - sample.truth[k].world_from_cam.translation).squaredNorm();
     num += 1.0;
   }
@@ -139,14 +139,15 @@ TEST(Localize, FindsMismatches) {
     UnderwaterSample fewer = sample;
     const UnderwaterSequence sequence = simulate_underwater(scene, seed);
     for (std::size_t k = 0; k < fewer.frames.size(); ++k)
-      std::erase_if(fewer.frames[k].sights, [&](const FeatureSight& sight) {
-        return std::ranges::find(sequence.frames[k].sights, sight.id, &UnderwaterSight::id)->is_mismatch;
+      std::erase_if(fewer.frames[k].observations, [&](const FeatureObservation& observation) {
+        return std::ranges::find(sequence.frames[k].observations, observation.id, &UnderwaterObservation::id)
+            ->is_mismatch;
       });
-    const LocalizeReport report = localize_sights(sample.camera, sample.frames, sample.config, sample.truth);
+    const LocalizeReport report = localize_observations(sample.camera, sample.frames, sample.config, sample.truth);
     EXPECT_EQ(report.num_lost, 0u) << seed;
-    EXPECT_NEAR(static_cast<double>(report.num_gated) / static_cast<double>(report.num_sights), 0.41, 0.05);
+    EXPECT_NEAR(static_cast<double>(report.num_gated) / static_cast<double>(report.num_observations), 0.41, 0.05);
     with2 += std::pow(rms_m(report, sample), 2);
-    without2 += std::pow(rms_m(localize_sights(fewer.camera, fewer.frames, fewer.config, fewer.truth), fewer), 2);
+    without2 += std::pow(rms_m(localize_observations(fewer.camera, fewer.frames, fewer.config, fewer.truth), fewer), 2);
   }
   EXPECT_LT(std::sqrt(with2 / without2), 1.2);  // the goal is 1.1 over many sequences; three scatter by 10 %
 }
@@ -158,14 +159,14 @@ TEST(Localize, RecoversFromABlackout) {
     scene.blackout_from_s = 2.0;
     scene.blackout_s = 1.0;
     const UnderwaterSample sample = testing::underwater_sample(scene, seed);
-    const LocalizeReport report = localize_sights(sample.camera, sample.frames, sample.config, sample.truth);
+    const LocalizeReport report = localize_observations(sample.camera, sample.frames, sample.config, sample.truth);
     EXPECT_EQ(report.num_lost, 30u);
     for (std::size_t k = 60; k < 90; ++k) EXPECT_EQ(report.path[k].event, FrameEvent::predicted);
     // It knows that it does not know: most in the middle, once the end is known, too.
     EXPECT_GT(report.path[75].cov.trace(), 3.0 * report.path[59].cov.trace());
     LocalizeConfig as_it_comes = sample.config;
     as_it_comes.smooths = false;
-    const LocalizeReport filtered = localize_sights(sample.camera, sample.frames, as_it_comes);
+    const LocalizeReport filtered = localize_observations(sample.camera, sample.frames, as_it_comes);
     EXPECT_GT(filtered.path[89].cov.trace(), 100.0 * filtered.path[59].cov.trace());
     const PathStep& after = report.path[100];  // ten frames later
     const double error = (after.world_from_cam.translation - sample.truth[100].world_from_cam.translation).norm();
@@ -181,7 +182,7 @@ TEST(Localize, StartsFromTheTargetAlone) {
     UnderwaterSample sample = testing::underwater_sample(rich_scene(), seed);
     sample.config.start.reset();
     sample.config.depths.clear();
-    const LocalizeReport report = localize_sights(sample.camera, sample.frames, sample.config, sample.truth);
+    const LocalizeReport report = localize_observations(sample.camera, sample.frames, sample.config, sample.truth);
     EXPECT_TRUE(report.scale_known);
     num_good += report.error.ate_m < 0.03 ? 1 : 0;
   }
@@ -191,7 +192,7 @@ TEST(Localize, StartsFromTheTargetAlone) {
 TEST(Localize, WithoutATargetThePathIsUpToScaleAndSaysSo) {
   UnderwaterSample sample = testing::underwater_sample(rich_scene(), 2);
   sample.config = {};
-  const LocalizeReport report = localize_sights(sample.camera, sample.frames, sample.config, sample.truth);
+  const LocalizeReport report = localize_observations(sample.camera, sample.frames, sample.config, sample.truth);
   EXPECT_FALSE(report.scale_known);
   EXPECT_LT(report.error.ate_m, 0.02);  // of a path of 2 m, after a similarity
   const Verdict verdict = localize_verdict(report);
@@ -200,17 +201,17 @@ TEST(Localize, WithoutATargetThePathIsUpToScaleAndSaysSo) {
   EXPECT_NE(verdict.sentence.find("scale unknown"), std::string::npos) << verdict.sentence;
 }
 
-/// One sequence in two hundred: what leaves the picture early leaves two poses alike, and the wrong one fits its own
-/// map. A third of the target's sights do not fit it: the target says so as often as it is seen whole.
+/// One sequence in two hundred: what leaves the image early leaves two poses alike, and the wrong one fits its own
+/// map. A third of the target's observations do not fit it: the target says so as often as it is seen whole.
 TEST(Localize, LeavesAPoseThatFitsItsOwnMapButNotTheTarget) {
   const UnderwaterSample sample = testing::underwater_sample(scene_of(0.03), 500136);
   LocalizeConfig config = sample.config;
   config.restarts = false;
-  const LocalizeReport stays = localize_sights(sample.camera, sample.frames, config, sample.truth);
+  const LocalizeReport stays = localize_observations(sample.camera, sample.frames, config, sample.truth);
   ASSERT_GT(stays.error.ate_m, 0.04);
   ASSERT_LT(stays.nis_per_dof, 1.5);  // it would not be noticed by this
   config.restarts = true;
-  const LocalizeReport leaves = localize_sights(sample.camera, sample.frames, config, sample.truth);
+  const LocalizeReport leaves = localize_observations(sample.camera, sample.frames, config, sample.truth);
   EXPECT_EQ(leaves.num_restarts, 1u);
   const Rigid3 &is = leaves.path.back().world_from_cam, &was = sample.truth.back().world_from_cam;
   EXPECT_LT((is.translation - was.translation).norm(), 0.02);
@@ -221,7 +222,7 @@ TEST(Localize, LeavesAPoseThatFitsItsOwnMapButNotTheTarget) {
 TEST(Localize, RestartsWhereTheStartIsWrong) {
   UnderwaterSample sample = testing::underwater_sample(rich_scene(), 4);
   sample.config.start->motion.world_from_cam.translation += Eigen::Vector3d(0.4, 0.2, -0.3);  // 80 σ
-  const LocalizeReport report = localize_sights(sample.camera, sample.frames, sample.config, sample.truth);
+  const LocalizeReport report = localize_observations(sample.camera, sample.frames, sample.config, sample.truth);
   EXPECT_GE(report.num_restarts, 1u);
   EXPECT_LT((report.path.back().world_from_cam.translation - sample.truth.back().world_from_cam.translation).norm(),
             0.05);
@@ -230,7 +231,7 @@ TEST(Localize, RestartsWhereTheStartIsWrong) {
 TEST(Localize, AWrongPathIsNeverGood) {
   UnderwaterSample sample = testing::underwater_sample(rich_scene(), 5);
   const auto verdict_of = [&](const Camera& camera, const LocalizeConfig& config) {
-    return localize_verdict(localize_sights(camera, sample.frames, config, sample.truth));
+    return localize_verdict(localize_observations(camera, sample.frames, config, sample.truth));
   };
   EXPECT_EQ(verdict_of(sample.camera, sample.config).state, State::good);
   const auto pinhole = with_distortion(sample.camera, DistortionVariant::none);
@@ -244,12 +245,12 @@ TEST(Localize, AWrongPathIsNeverGood) {
   EXPECT_NE(verdict_of(sample.camera, swapped).state, State::good);
 }
 
-/// No truth is given: what the lens leaves in the sights has to tell.
+/// No truth is given: what the lens leaves in the observations has to tell.
 TEST(Localize, APinholeInPlaceOfADistortingLensIsNeverGood) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const UnderwaterSample sample = testing::underwater_sample(seed < 8 ? scene_of(0.03) : rich_scene(), seed);
     const auto pinhole = with_distortion(sample.camera, DistortionVariant::none);
-    const Verdict verdict = localize_verdict(localize_sights(*pinhole, sample.frames, sample.config));
+    const Verdict verdict = localize_verdict(localize_observations(*pinhole, sample.frames, sample.config));
     EXPECT_GE(verdict.state, State::care) << seed << ": " << verdict.sentence;
   }
 }
@@ -284,7 +285,7 @@ TEST(Localize, SeesThroughAFlatPort) {
     UnderwaterScene scene = rich_scene();
     scene.camera = camera_behind_port();
     const UnderwaterSample sample = testing::underwater_sample(scene, seed);
-    const LocalizeReport report = localize_sights(sample.camera, sample.frames, sample.config);
+    const LocalizeReport report = localize_observations(sample.camera, sample.frames, sample.config);
     EXPECT_EQ(report.num_lost, 0u) << seed;
     EXPECT_EQ(localize_verdict(report).exit_code, ExitCode::ok) << seed;
     const auto [nees_here, rms_here_m] = nees_and_rms_m(report, sample);
@@ -293,7 +294,7 @@ TEST(Localize, SeesThroughAFlatPort) {
     // The same lens with its port pressed against it: as the paper's.
     Camera thin = sample.camera;
     std::get<Calibrated<FlatPort>>(thin.lens).params[10] = 0.0;
-    const LocalizeReport wrong = localize_sights(thin, sample.frames, sample.config);
+    const LocalizeReport wrong = localize_observations(thin, sample.frames, sample.config);
     EXPECT_GT(nees_and_rms_m(wrong, sample).second, 2.0 * rms_here_m) << seed;
   }
   EXPECT_GT(nees, 0.5);
@@ -303,19 +304,20 @@ TEST(Localize, SeesThroughAFlatPort) {
 
 TEST(Localize, TooLittleIsRefusedByName) {
   UnderwaterSample sample = testing::underwater_sample(scene_of(0.03), 1);
-  for (SightFrame& frame : sample.frames)
-    std::erase_if(frame.sights, [](const FeatureSight& sight) { return sight.id > 2; });
-  Verdict verdict = localize_verdict(localize_sights(sample.camera, sample.frames, sample.config));
+  for (ObservationFrame& frame : sample.frames)
+    std::erase_if(frame.observations, [](const FeatureObservation& observation) { return observation.id > 2; });
+  Verdict verdict = localize_verdict(localize_observations(sample.camera, sample.frames, sample.config));
   EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
   EXPECT_NE(verdict.sentence.find("too few points"), std::string::npos) << verdict.sentence;
   sample = testing::underwater_sample(scene_of(0.03), 1);
   sample.config.start.reset();
-  for (SightFrame& frame : sample.frames)
-    std::erase_if(frame.sights, [](const FeatureSight& sight) { return sight.id == 2; });  // three known are left
-  verdict = localize_verdict(localize_sights(sample.camera, sample.frames, sample.config));
+  for (ObservationFrame& frame : sample.frames)
+    std::erase_if(frame.observations,
+                  [](const FeatureObservation& observation) { return observation.id == 2; });  // three known are left
+  verdict = localize_verdict(localize_observations(sample.camera, sample.frames, sample.config));
   EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
   EXPECT_NE(verdict.sentence.find("target is not found"), std::string::npos) << verdict.sentence;
-  verdict = localize_verdict(localize_sights(sample.camera, {}, sample.config));
+  verdict = localize_verdict(localize_observations(sample.camera, {}, sample.config));
   EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
 }
 
@@ -323,7 +325,7 @@ TEST(Localize, DelayedPointsAndPlacesWorkAsWell) {
   for (const NewPoints new_points : {NewPoints::delayed, NewPoints::xyz, NewPoints::inverse_depth}) {
     UnderwaterSample sample = testing::underwater_sample(rich_scene(), 6);
     sample.config.new_points = new_points;
-    const LocalizeReport report = localize_sights(sample.camera, sample.frames, sample.config, sample.truth);
+    const LocalizeReport report = localize_observations(sample.camera, sample.frames, sample.config, sample.truth);
     EXPECT_LT(report.error.ate_m, 0.02);
     EXPECT_GT(report.map.size(), 25u);
   }
@@ -331,8 +333,8 @@ TEST(Localize, DelayedPointsAndPlacesWorkAsWell) {
 
 TEST(Localize, OfTwoRunsEachNumberIsTheSame) {
   const UnderwaterSample sample = testing::underwater_sample(rich_scene(), 7);
-  const LocalizeReport one = localize_sights(sample.camera, sample.frames, sample.config);
-  const LocalizeReport two = localize_sights(sample.camera, sample.frames, sample.config);
+  const LocalizeReport one = localize_observations(sample.camera, sample.frames, sample.config);
+  const LocalizeReport two = localize_observations(sample.camera, sample.frames, sample.config);
   EXPECT_EQ(one.path.back().world_from_cam.translation, two.path.back().world_from_cam.translation);
   EXPECT_EQ(one.path.back().cov, two.path.back().cov);
 }

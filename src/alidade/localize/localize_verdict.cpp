@@ -8,8 +8,8 @@
 namespace alidade {
 namespace {
 
-constexpr double good_nis_low = 0.4, good_nis_high = 1.5, care_nis = 2.0, most_nis = 4.0;
-constexpr double bad_gated = 0.5, most_known_gated = 0.8, most_gated = 0.6, care_lost = 1.0 / 3.0, most_lost = 0.5;
+constexpr double good_nis_low = 0.4, good_nis_high = 1.5, care_nis = 2.0, max_nis = 4.0;
+constexpr double bad_gated = 0.5, max_known_gated = 0.8, max_gated = 0.6, care_lost = 1.0 / 3.0, max_lost = 0.5;
 
 Verdict stopped(State state, ExitCode code, std::string sentence, std::string to_add) {
   return {state, code, std::move(sentence), std::move(to_add), {}};
@@ -24,13 +24,12 @@ Verdict never_started(const LocalizeReport& report) {
     return cannot_tell(std::to_string(report.num_alike) +
                            " things in one picture look like the target: which one it is cannot be told",
                        "begin where one of them is seen, or give --start");
-  if (report.is_of_pictures && report.has_target)
+  if (report.is_of_images && report.has_target)
     return cannot_tell("the target is not found in any of " + std::to_string(report.path.size()) + " pictures",
                        "begin in front of the target, whole and sharp, and check its size in --target");
-  if (report.most_seen < 3)
-    return cannot_tell(
-        "too few points: at most " + std::to_string(report.most_seen) + " in a frame, a pose needs three",
-        report.is_of_pictures ? "look at something with corners, in light" : "track more points");
+  if (report.max_seen < 3)
+    return cannot_tell("too few points: at most " + std::to_string(report.max_seen) + " in a frame, a pose needs three",
+                       report.is_of_images ? "look at something with corners, in light" : "track more points");
   return cannot_tell(
       "the target is not found: four of its points, in a plane and not on a line, are never seen where they belong",
       "begin in front of the target, or give --start");
@@ -88,7 +87,7 @@ std::string restarts_text(const LocalizeReport& report) {
   return text;
 }
 
-/// "0.5 %", "3 px", "12 ms": what the sights ask for.
+/// "0.5 %", "3 px", "12 ms": what the observations ask for.
 std::string asked_text(const GivenNumber& given) {
   const double asked = given.asked;
   if (given.name == "focal length" || given.name == "shape of the target") return text_of(100.0 * asked, 2) + " %";
@@ -109,13 +108,13 @@ std::string cause_text(const GivenNumber& given) {
          ": the camera file is not of this lens as it was used";
 }
 
-/// Of what was given, the one of which the sights ask most: a wrong lens moves the others' scores, too.
+/// Of what was given, the one of which the observations ask most: a wrong lens moves the others' scores, too.
 void add_given(const LocalizeReport& report, Verdict& verdict) {
   const GivenNumber* worst = nullptr;
   for (const GivenNumber& given : report.given)
     if (worst == nullptr || std::abs(given.z) > std::abs(worst->z)) worst = &given;
-  constexpr double care_z = 3.5, bad_z = 15.0, least_move = 0.5;
-  if (worst != nullptr && std::abs(worst->asked * worst->moves) > least_move && std::abs(worst->z) > care_z)
+  constexpr double care_z = 3.5, bad_z = 15.0, min_move = 0.5;
+  if (worst != nullptr && std::abs(worst->asked * worst->moves) > min_move && std::abs(worst->z) > care_z)
     verdict.checks.push_back({"camera", state_of(std::abs(worst->z), care_z, bad_z), cause_text(*worst),
                               std::abs(worst->z), care_z, "σ", "path"});
   constexpr double care_pull = 3.0;
@@ -126,7 +125,7 @@ void add_given(const LocalizeReport& report, Verdict& verdict) {
                               report.lens_pull, care_pull, "σ", "path"});
 }
 
-/// Residuals that are said to be independent: by place in the picture, and from frame to frame.
+/// Residuals that are said to be independent: by place in the image, and from frame to frame.
 void add_residuals(const LocalizeReport& report, Verdict& verdict) {
   if (!report.is_smoothed) return;
   const ResidualStructure& residuals = report.residuals;
@@ -170,10 +169,10 @@ void add_checks(const LocalizeReport& report, Verdict& verdict) {
   const double nis = report.nis_per_dof;
   const State nis_state = nis < good_nis_low ? State::care : state_of(nis, good_nis_high, care_nis);
   const std::string px = text_of(report.sigma_px, 2) + " px";
-  const std::string low = report.is_of_pictures ? "matches are better than the " + px +
-                                                      " that they are taken for, and σ is too large "
-                                                      "(--sigma-px)"
-                                                : "noise is smaller than the " + px + " stated";
+  const std::string low = report.is_of_images ? "matches are better than the " + px +
+                                                    " that they are taken for, and σ is too large "
+                                                    "(--sigma-px)"
+                                              : "noise is smaller than the " + px + " stated";
   const std::string said = nis > good_nis_high  ? "the sights do not fit: the lens or the noise is not as stated"
                            : nis < good_nis_low ? low
                                                 : "innovations as large as predicted";
@@ -193,13 +192,13 @@ void add_checks(const LocalizeReport& report, Verdict& verdict) {
     verdict.checks.push_back({"target", state_of(known_gated, 0.1, gated + 0.2),
                               text_of(100.0 * known_gated, 3) + " % of the target's sights are not where they belong",
                               known_gated, 0.1, "1", "tracks"});
-  constexpr double most_shift = 3.0;  // χ² of a rectangle's twelve numbers over their count: 99.9 % is 2.7
-  if (report.known_shift > most_shift)
+  constexpr double max_shift = 3.0;  // χ² of a rectangle's twelve numbers over their count: 99.9 % is 2.7
+  if (report.known_shift > max_shift)
     verdict.checks.push_back({"map's frame", State::care,
                               "the target's points have drifted in the map, " + text_of(std::sqrt(report.known_shift)) +
                                   " times the σ they were told with: the path's place and scale before the target are "
                                   "less sure than its σ says",
-                              report.known_shift, most_shift, "1", "path"});
+                              report.known_shift, max_shift, "1", "path"});
   verdict.checks.push_back({"scale", report.scale_known ? State::good : State::care,
                             report.scale_known ? "scale from the known points"
                             : report.has_target
@@ -222,28 +221,28 @@ Verdict localize_verdict(const LocalizeReport& report) {
   const std::size_t num_frames = report.path.size();
   const bool has_started = std::ranges::any_of(report.path, &PathStep::has_pose);
   if (!has_started) return never_started(report);
-  if (report.num_used == 0 || report.most_seen < 3)
+  if (report.num_used == 0 || report.max_seen < 3)
     return stopped(State::refused, ExitCode::cannot_tell,
-                   "too few points: at most " + std::to_string(report.most_seen) + " in a frame, a pose needs three",
+                   "too few points: at most " + std::to_string(report.max_seen) + " in a frame, a pose needs three",
                    "track more points");
   const double gated = share(report.num_gated, report.num_used + report.num_gated);
   const double lost = share(report.num_lost, num_frames);
   const bool is_finite = std::ranges::all_of(report.path, [](const PathStep& step) {
     return !step.has_pose() || (step.world_from_cam.translation.allFinite() && step.cov.allFinite());
   });
-  if (!is_finite || report.nis_per_dof > most_nis || gated > most_gated)
+  if (!is_finite || report.nis_per_dof > max_nis || gated > max_gated)
     return stopped(State::not_converged, ExitCode::no_convergence,
                    "no path fits the sights: NIS " + text_of(report.nis_per_dof, 3) + " per degree of freedom, " +
                        text_of(100.0 * gated, 2) + " % of them left out",
                    "check camera, target and start, and --sigma-px");
   const double known_gated = share(report.num_known_gated, report.num_known);
   constexpr std::size_t enough_known = 8;
-  if (report.num_known >= enough_known && known_gated > most_known_gated)
+  if (report.num_known >= enough_known && known_gated > max_known_gated)
     return stopped(State::not_converged, ExitCode::no_convergence,
                    "the target is not where it is told to be: " + text_of(100.0 * known_gated, 3) +
                        " % of its sights do not fit the path",
                    "check the points' numbers and places in --target");
-  if (lost > most_lost)
+  if (lost > max_lost)
     return stopped(State::refused, ExitCode::cannot_tell,
                    "lost: " + std::to_string(report.num_lost) + " of " + std::to_string(num_frames) +
                        " frames have fewer than three points that fit",

@@ -25,15 +25,15 @@ double share(std::size_t part, std::size_t of) {
 Doubt PathDoubt::after(const PathStep& step) {
   const std::size_t num = step.num_tracked + step.num_gated;
   if (num == 0) return Doubt::none;
-  constexpr double most_nis = 2.0, most_gated = 0.6;
-  constexpr double most_known_gated = 0.85;  // four known points, two of them mismatched, are no proof
+  constexpr double max_nis = 2.0, max_gated = 0.6;
+  constexpr double max_known_gated = 0.85;  // four known points, two of them mismatched, are no proof
   constexpr double many_known_gated = 0.3;
-  push(recent_nis_, step.num_tracked > 0 ? step.nis_per_dof : most_nis);
+  push(recent_nis_, step.num_tracked > 0 ? step.nis_per_dof : max_nis);
   push(recent_gated_, share(step.num_gated, num));
   push(recent_known_gated_, share(step.num_known_gated, step.num_known));
   if (recent_nis_.size() < window) return Doubt::none;
-  if (mean(recent_nis_) > most_nis) return Doubt::strong;
-  if (mean(recent_gated_) > most_gated || mean(recent_known_gated_) > most_known_gated) return Doubt::many;
+  if (mean(recent_nis_) > max_nis) return Doubt::strong;
+  if (mean(recent_gated_) > max_gated || mean(recent_known_gated_) > max_known_gated) return Doubt::many;
   return mean(recent_known_gated_) > many_known_gated ? Doubt::some : Doubt::none;
 }
 

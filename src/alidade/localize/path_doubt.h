@@ -9,8 +9,8 @@ namespace alidade {
 
 enum class Doubt {
   none,
-  some,    ///< More than three in ten of the target's sights are gated: the path may be wrong, or they.
-  many,    ///< Most sights, or nearly all of the target's, are gated.
+  some,    ///< More than three in ten of the target's observations are gated: the path may be wrong, or they.
+  many,    ///< Most observations, or nearly all of the target's, are gated.
   strong,  ///< Those that fit contradict each other: the path is wrong.
 };
 
@@ -20,7 +20,7 @@ enum class Doubt {
 /// Whether the last frames say that the path is wrong: a path may fit its own map well and be elsewhere.
 class PathDoubt {
  public:
-  /// Over five frames with sights. Strong: mean NIS above 2.
+  /// Over five frames with observations. Strong: mean NIS above 2.
   [[nodiscard]] Doubt after(const PathStep& step);
   void clear();
 

@@ -4,7 +4,7 @@
 
 #include "alidade/localize/path_system.h"
 
-// What a path is solved from: sights, told points, told distances, the motion, the start.
+// What a path is solved from: observations, told points, told distances, the motion, the start.
 
 namespace alidade {
 namespace {
@@ -106,31 +106,33 @@ PathSmoother::Twist PathSmoother::twist_at(const SmootherState& state, std::size
 }
 
 /// How the expected pixel changes by what is given: the lens, then the causes (scale and shape by told places alone).
-PathSmoother::GivenRows PathSmoother::given_rows(const ExpectedView& view, const UsedSight& sight,
+PathSmoother::GivenRows PathSmoother::given_rows(const ExpectedView& view, const UsedObservation& observation,
                                                  const Twist& twist) const {
   const auto num_lens = view.J_px_lens.cols();
   GivenRows J = GivenRows::Zero(2, num_lens + num_causes);
   for (Eigen::Index i = 0; i < num_lens; ++i) J.col(i) = view.J_px_lens.col(lens_order_[static_cast<std::size_t>(i)]);
-  const SmootherPoint& point = problem_.points[index_of_.at(sight.id)];
+  const SmootherPoint& point = problem_.points[index_of_.at(observation.id)];
   if (point.told_in_world)  // a target that moves: not where it is told to be, but further by so much
-    J.middleCols<3>(num_lens + speed_cause) = (problem_.t_s[sight.frame] - middle_s_) * view.J_px_feature.leftCols<3>();
-  const double rows = sight.px.y() / problem_.camera.height_px - 0.5;  // a picture's time is that of its middle row
+    J.middleCols<3>(num_lens + speed_cause) =
+        (problem_.t_s[observation.frame] - middle_s_) * view.J_px_feature.leftCols<3>();
+  const double rows =
+      observation.px.y() / problem_.camera.height_px - 0.5;  // an image's time is that of its middle row
   J.col(num_lens + readout_cause) = rows * view.J_px_pose * twist;
   return J;
 }
 
-bool PathSmoother::add_sight(const SmootherState& state, const UsedSight& sight, const Twist& twist,
-                             SmootherSystem& system) const {
-  const std::size_t point = index_of_.at(sight.id);
+bool PathSmoother::add_observation(const SmootherState& state, const UsedObservation& observation, const Twist& twist,
+                                   SmootherSystem& system) const {
+  const std::size_t point = index_of_.at(observation.id);
   Feature feature;
   feature.values.head<3>() = state.points[point];
-  const auto view = expected_view(state.camera, state.poses[sight.frame], feature);
+  const auto view = expected_view(state.camera, state.poses[observation.frame], feature);
   if (!view) return false;
-  const double weight = 1.0 / sight.sigma_px;
-  const Eigen::Vector2d error = weight * (view->px - sight.px);
+  const double weight = 1.0 / observation.sigma_px;
+  const Eigen::Vector2d error = weight * (view->px - observation.px);
   const Eigen::Matrix<double, 2, 6> J_pose = weight * view->J_px_pose;
   const Eigen::Matrix<double, 2, 3> J_point = weight * view->J_px_feature.leftCols<3>();
-  const GivenRows J_given = weight * given_rows(*view, sight, twist);
+  const GivenRows J_given = weight * given_rows(*view, observation, twist);
   PoseChain& chain = system.chain;
   const auto at = static_cast<Eigen::Index>(3 * point), num_given = J_given.cols();
   chain.A.topLeftCorner<6, 6>() += J_pose.transpose() * J_pose;
@@ -233,8 +235,8 @@ std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state) co
   std::size_t next = 0;
   for (std::size_t k = 0; k < state.poses.size(); ++k) {
     const Twist twist = twist_at(state, k);
-    for (; next < sights_.size() && sights_[next].frame == k; ++next)
-      if (!add_sight(state, sights_[next], twist, system)) return std::nullopt;
+    for (; next < observations_.size() && observations_[next].frame == k; ++next)
+      if (!add_observation(state, observations_[next], twist, system)) return std::nullopt;
     for (const std::size_t point : first_seen[k]) add_range(state, point, system);
     if (k + 1 < state.poses.size()) add_motion(state, k, system);
     if (held_ && held_->frame == k) add_held(state, system);

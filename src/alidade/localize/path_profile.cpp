@@ -41,11 +41,11 @@ void PathSmoother::add_held(const SmootherState& state, SmootherSystem& system) 
 bool PathSmoother::hold_weakest(const SmoothedPath& path) {
   constexpr double straight = 0.012;  // of the distance, and rad
   Held held;
-  double most_m2 = 0.0;
+  double max_m2 = 0.0;
   for (std::size_t k = 0; k < path.cov.size(); ++k) {
     const double variance_m2 = path.cov[k].topLeftCorner<3, 3>().trace();
-    if (!(variance_m2 > most_m2)) continue;
-    most_m2 = variance_m2;
+    if (!(variance_m2 > max_m2)) continue;
+    max_m2 = variance_m2;
     held.frame = k;
   }
   held.from = path.world_from_cam[held.frame];
@@ -81,7 +81,7 @@ bool is_from_one_place(const SmoothedPath& path) {
 
 }  // namespace
 
-void PathSmoother::widen(double least_cost, SmoothedPath& path) {
+void PathSmoother::widen(double min_cost, SmoothedPath& path) {
   if (!hold_weakest(path)) return;
   path.is_from_one_place = is_from_one_place(path);
   constexpr double sides = 3.0, most = 4.0, little = 0.5;
@@ -99,7 +99,7 @@ void PathSmoother::widen(double least_cost, SmoothedPath& path) {
     const auto there = build(state_);
     held_ = held;
     if (!there) continue;
-    const double rise = std::max(there->cost - least_cost, little);
+    const double rise = std::max(there->cost - min_cost, little);
     const double factor = std::min(std::abs(reached) / std::sqrt(rise), most);
     if (!(factor > path.widened)) continue;
     path.widened = factor;

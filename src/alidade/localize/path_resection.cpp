@@ -13,21 +13,22 @@ struct PlacedView {
   double variance_px2 = 0.0;  ///< Of pixel and place, the mean of both coordinates.
 };
 
-std::optional<PlacedView> placed_view(const Camera& camera, const Rigid3& world_from_cam, const PlacedSight& sight) {
+std::optional<PlacedView> placed_view(const Camera& camera, const Rigid3& world_from_cam,
+                                      const PlacedObservation& observation) {
   Feature feature;
-  feature.values.head<3>() = sight.point_in_world;
+  feature.values.head<3>() = observation.point_in_world;
   const auto view = expected_view(camera, world_from_cam, feature);
   if (!view) return std::nullopt;
   const Eigen::Matrix<double, 2, 3> J_point = view->J_px_feature.leftCols<3>();
-  const double of_place = 0.5 * (J_point * sight.cov * J_point.transpose()).trace();
-  return PlacedView{sight.px - view->px, view->J_px_pose, sight.sigma_px * sight.sigma_px + of_place};
+  const double of_place = 0.5 * (J_point * observation.cov * J_point.transpose()).trace();
+  return PlacedView{observation.px - view->px, view->J_px_pose, observation.sigma_px * observation.sigma_px + of_place};
 }
 
-CameraResection judged(const Camera& camera, std::span<const PlacedSight> sights, const Rigid3& world_from_cam,
-                       double gate) {
+CameraResection judged(const Camera& camera, std::span<const PlacedObservation> observations,
+                       const Rigid3& world_from_cam, double gate) {
   CameraResection resection{world_from_cam, 0.0, 0, {}};
-  for (const PlacedSight& sight : sights) {
-    const auto view = placed_view(camera, world_from_cam, sight);
+  for (const PlacedObservation& observation : observations) {
+    const auto view = placed_view(camera, world_from_cam, observation);
     const double chi2 = view ? view->residual_px.squaredNorm() / view->variance_px2 : gate;
     resection.fits.push_back(view && chi2 <= gate);
     resection.num_fit += resection.fits.back() ? 1 : 0;
@@ -37,11 +38,12 @@ CameraResection judged(const Camera& camera, std::span<const PlacedSight> sights
 }
 
 /// One Gauss–Newton step with weights for residuals of `wide_px`. False where nothing tells it.
-bool stepped(const Camera& camera, std::span<const PlacedSight> sights, double wide_px, Rigid3& world_from_cam) {
+bool stepped(const Camera& camera, std::span<const PlacedObservation> observations, double wide_px,
+             Rigid3& world_from_cam) {
   Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Vector<double, 6> g = Eigen::Vector<double, 6>::Zero();
-  for (const PlacedSight& sight : sights) {
-    const auto view = placed_view(camera, world_from_cam, sight);
+  for (const PlacedObservation& observation : observations) {
+    const auto view = placed_view(camera, world_from_cam, observation);
     if (!view) continue;
     const double wide2 = std::max(wide_px * wide_px, 6.0 * view->variance_px2);
     const double robust = wide2 / (wide2 + view->residual_px.squaredNorm());
@@ -60,18 +62,18 @@ bool stepped(const Camera& camera, std::span<const PlacedSight> sights, double w
 
 }  // namespace
 
-std::optional<CameraResection> resection(const Camera& camera, std::span<const PlacedSight> sights,
+std::optional<CameraResection> resection(const Camera& camera, std::span<const PlacedObservation> observations,
                                          std::span<const Rigid3> begin_at, double gate) {
-  constexpr std::size_t least_sights = 3;
-  if (sights.size() < least_sights) return std::nullopt;
+  constexpr std::size_t min_observations = 3;
+  if (observations.size() < min_observations) return std::nullopt;
   std::optional<CameraResection> best;
   for (const Rigid3& begin : begin_at) {
     Rigid3 world_from_cam = begin;
     constexpr double widest_px = 64.0, narrowest_px = 1.0;
     for (double wide_px = widest_px; wide_px >= narrowest_px; wide_px *= 0.6)
-      if (!stepped(camera, sights, wide_px, world_from_cam)) break;
+      if (!stepped(camera, observations, wide_px, world_from_cam)) break;
     for (const Rigid3& there : {begin, world_from_cam}) {
-      CameraResection now = judged(camera, sights, there, gate);
+      CameraResection now = judged(camera, observations, there, gate);
       if (!best || now.cost < best->cost) best = std::move(now);
     }
   }

@@ -50,10 +50,10 @@ SmootherState PathSmoother::moved_by(const Eigen::VectorXd& border, std::span<co
 
 /// Whole Gauss–Newton steps where the cost falls, else shorter ones.
 bool PathSmoother::settle() {
-  constexpr int most_iterations = 25;
-  constexpr double settled = 1e-3, least_share = 0.02;  // of a step, squared, in σ
+  constexpr int max_iterations = 25;
+  constexpr double settled = 1e-3, min_share = 0.02;  // of a step, squared, in σ
   auto system = build(state_);
-  for (int iteration = 0; system && iteration < most_iterations; ++iteration) {
+  for (int iteration = 0; system && iteration < max_iterations; ++iteration) {
     const int num = num_solved();
     const Eigen::LLT<Eigen::MatrixXd> llt(system->chain.B.topLeftCorner(num, num));
     if (llt.info() != Eigen::Success) return false;
@@ -63,7 +63,7 @@ bool PathSmoother::settle() {
     const auto poses = system->chain.steps(border);
     std::optional<SmootherSystem> next;
     double share = 1.0;
-    for (; share > least_share && !next; share *= 0.5) {
+    for (; share > min_share && !next; share *= 0.5) {
       const SmootherState there = moved_by(border, poses, share);
       next = build(there);
       if (next && !(next->cost <= system->cost + 1e-9 * (1.0 + system->cost))) next.reset();
@@ -76,39 +76,41 @@ bool PathSmoother::settle() {
   return false;
 }
 
-bool PathSmoother::choose_sights() {
-  std::vector<UsedSight> chosen;
+bool PathSmoother::choose_observations() {
+  std::vector<UsedObservation> chosen;
   bool is_other = false;
   std::size_t next = 0;
-  for (const UsedSight& sight : problem_.sights) {
-    const auto point = index_of_.find(sight.id);
-    const bool was_there = next < sights_.size() && sights_[next].frame == sight.frame && sights_[next].id == sight.id;
+  for (const UsedObservation& observation : problem_.observations) {
+    const auto point = index_of_.find(observation.id);
+    const bool was_there = next < observations_.size() && observations_[next].frame == observation.frame &&
+                           observations_[next].id == observation.id;
     next += was_there ? 1 : 0;
     if (point == index_of_.end()) continue;
-    const auto px = project(state_.camera, state_.poses[sight.frame].inverse() * state_.points[point->second]);
-    const bool fits = px && (*px - sight.px).squaredNorm() <= problem_.filter.gate * sight.sigma_px * sight.sigma_px;
+    const auto px = project(state_.camera, state_.poses[observation.frame].inverse() * state_.points[point->second]);
+    const bool fits = px && (*px - observation.px).squaredNorm() <=
+                                problem_.filter.gate * observation.sigma_px * observation.sigma_px;
     is_other = is_other || fits != was_there;
-    if (fits) chosen.push_back(sight);
+    if (fits) chosen.push_back(observation);
   }
-  sights_ = std::move(chosen);
+  observations_ = std::move(chosen);
   return is_other;
 }
 
 std::optional<SmoothedPath> PathSmoother::solve() {
-  for (const UsedSight& sight : problem_.sights) {
-    const auto point = index_of_.find(sight.id);
-    if (sight.fits_start && point != index_of_.end() &&
-        project(state_.camera, state_.poses[sight.frame].inverse() * state_.points[point->second]))
-      sights_.push_back(sight);
+  for (const UsedObservation& observation : problem_.observations) {
+    const auto point = index_of_.find(observation.id);
+    if (observation.fits_start && point != index_of_.end() &&
+        project(state_.camera, state_.poses[observation.frame].inverse() * state_.points[point->second]))
+      observations_.push_back(observation);
   }
   if (!settle()) return std::nullopt;
-  constexpr int most_choices = 3;
-  for (int i = 0; i < most_choices && choose_sights(); ++i)
+  constexpr int max_choices = 3;
+  for (int i = 0; i < max_choices && choose_observations(); ++i)
     if (!settle()) return std::nullopt;
   const auto system = build(state_);
   if (!system) return std::nullopt;
   SmoothedPath path = result(*system);
-  path.num_dropped = problem_.sights.size() - sights_.size();
+  path.num_dropped = problem_.observations.size() - observations_.size();
   widen(system->cost, path);
   return path;
 }
@@ -131,18 +133,20 @@ void PathSmoother::fill_map(const Eigen::MatrixXd& cov, SmoothedPath& path) cons
     path.point_covs.emplace_back(cov.block<3, 3>(at, at));
     path.ids.push_back(problem_.points[i].id);
   }
-  for (const UsedSight& sight : sights_) {
-    const auto px = project(state_.camera, state_.poses[sight.frame].inverse() * state_.points[index_of_.at(sight.id)]);
+  for (const UsedObservation& observation : observations_) {
+    const auto px =
+        project(state_.camera, state_.poses[observation.frame].inverse() * state_.points[index_of_.at(observation.id)]);
     if (!px) continue;
-    path.residuals.push_back({sight.frame, sight.id, sight.px, sight.px - *px, sight.sigma_px});
-    path.chi2_per_dof += (sight.px - *px).squaredNorm() / (sight.sigma_px * sight.sigma_px);
+    path.residuals.push_back(
+        {observation.frame, observation.id, observation.px, observation.px - *px, observation.sigma_px});
+    path.chi2_per_dof += (observation.px - *px).squaredNorm() / (observation.sigma_px * observation.sigma_px);
   }
   const double num_numbers = 2.0 * static_cast<double>(path.residuals.size());
   const double num_solved = 6.0 * static_cast<double>(state_.poses.size()) + 3.0 * static_cast<double>(path.ids.size());
   path.chi2_per_dof /= std::max(num_numbers - num_solved, 0.5 * num_numbers + 1.0);
 }
 
-/// Times that are all late by the same move nothing that is seen: no sight tells.
+/// Times that are all late by the same move nothing that is seen: no observation tells.
 void PathSmoother::add_clock(SmoothedPath& path) const {
   GivenNumber clock{.name = "clock"};
   for (std::size_t k = 0; k < state_.poses.size(); ++k) {

@@ -10,8 +10,8 @@
 
 namespace alidade {
 
-/// A sight of a point of the map.
-struct UsedSight {
+/// An observation of a point of the map.
+struct UsedObservation {
   std::size_t frame = 0;  ///< Index from the smoother's first.
   long id = 0;
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
@@ -41,8 +41,8 @@ struct SmootherProblem {
   std::size_t first_frame = 0;  ///< Of the recording.
   Camera camera;                ///< As told; its covariance is counted.
   std::vector<double> t_s;
-  std::vector<Rigid3> world_from_cam;  ///< To begin at.
-  std::vector<UsedSight> sights;       ///< In order of frames.
+  std::vector<Rigid3> world_from_cam;         ///< To begin at.
+  std::vector<UsedObservation> observations;  ///< In order of frames.
   std::vector<SmootherPoint> points;
   std::optional<StartHypothesis> start;  ///< What was told of the first pose; else its speeds alone, zero with these σ:
   double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;
@@ -51,8 +51,8 @@ struct SmootherProblem {
   LocalizationFilterConfig filter;  /// σ of accelerations, the gate, and what of the lens is estimated.
 };
 
-/// Something that is taken as given: how it would move the path, and what the sights say of it (a score test: what one
-/// more free parameter would come to, by the linearisation that is there anyway).
+/// Something that is taken as given: how it would move the path, and what the observations say of it (a score test:
+/// what one more free parameter would come to, by the linearisation that is there anyway).
 struct GivenNumber {
   /// "focal length", "centre u", "centre v", "k1", "scale of the target", "shape of the target", "speed of the target",
   /// "readout" (of a rolling shutter, first row to last), "clock"
@@ -60,7 +60,7 @@ struct GivenNumber {
   double moves = 0.0;           ///< Largest move of a pose's number for a whole unit (relative, px, m/s, s), in its σ,
   std::string_view moved = {};  ///< which that is,
   double moved_by = 0.0;        ///< and by how much [m or rad].
-  double asked = 0.0, z = 0.0;  ///< The change that the sights ask for, in units, and over its own σ.
+  double asked = 0.0, z = 0.0;  ///< The change that the observations ask for, in units, and over its own σ.
   std::optional<double> sigma;  ///< Counted, in units. None: not known.
 };
 
@@ -77,20 +77,20 @@ struct SmoothedPath {
   double lens_pull = 0.0;      ///< How far an estimated number of the lens is from what was told, in the told σ.
   std::vector<GivenNumber> given;
   std::vector<PlacedResidual> residuals;
-  double chi2_per_dof = 0.0;  ///< Of the sights that fit.
+  double chi2_per_dof = 0.0;  ///< Of the observations that fit.
   /// Along its least certain direction the cost rises more slowly to one side than to the other, or than σ says; σ is
   /// enlarged there by so much.
   double widened = 1.0;
   /// The camera hardly moves aside, and so a pose's least certain numbers are less sure than a cut is straight: turns
   /// and small moves look alike where depths are not known, and the posterior is no Gaussian.
   bool is_from_one_place = false;
-  std::size_t num_dropped = 0;  ///< Sights that do not fit it.
+  std::size_t num_dropped = 0;  ///< Observations that do not fit it.
 };
 
-/// All sights of a recording together: a filter's derivatives are those of its moment, when depths were vague, and what
-/// they say of the world's frame and scale differs from one to the next, so that certainty is gained that no sight
-/// gave. Here all are taken at one place, the solution. Gauss–Newton over poses, points and lens with the filter's own
-/// motion model; poses are eliminated one after another (pose_chain.h). None where it does not settle.
+/// All observations of a recording together: a filter's derivatives are those of its moment, when depths were vague,
+/// and what they say of the world's frame and scale differs from one to the next, so that certainty is gained that no
+/// observation gave. Here all are taken at one place, the solution. Gauss–Newton over poses, points and lens with the
+/// filter's own motion model; poses are eliminated one after another (pose_chain.h). None where it does not settle.
 [[nodiscard]] std::optional<SmoothedPath> smoothed_path(const SmootherProblem& problem);
 
 }  // namespace alidade

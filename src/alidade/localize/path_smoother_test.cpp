@@ -68,7 +68,7 @@ TEST(PoseChain, EliminatedPoseByPoseIsTheWholeMatrixInverted) {
 LocalizeReport hover_localized(const HoverRun& run, const Camera& camera) {
   LocalizeConfig config;
   config.target = run.target;
-  return localize_sights(camera, run.frames, config, run.truth);
+  return localize_observations(camera, run.frames, config, run.truth);
 }
 
 double mean_nees(const LocalizeReport& report, const HoverRun& run) {
@@ -162,22 +162,22 @@ TEST(SimpleCase, AWrongLensIsNamed) {
   EXPECT_NE(verdict.sentence.find("focal length"), std::string::npos) << verdict.sentence;
 }
 
-/// As a mirrored target, or a mirrored picture, leaves it.
+/// As a mirrored target, or a mirrored image, leaves it.
 TEST(SimpleCase, ATargetSeenFromBehindIsAskedAbout) {
   HoverRun run = testing::hovering({.num_frames = 60}, 5);
   run.camera.cov = Eigen::MatrixXd::Zero(10, 10);
   for (KnownPoint& point : run.target) point.point_in_world.x() *= -1.0;
   LocalizeConfig config;
   config.target = run.target;
-  const LocalizeReport report = localize_sights(run.camera, run.frames, config);
+  const LocalizeReport report = localize_observations(run.camera, run.frames, config);
   EXPECT_TRUE(report.is_behind);
   const Verdict verdict = localize_verdict(report);
   EXPECT_TRUE(has_state(verdict, State::care, "mirrored?")) << verdict.sentence;
   config.is_board = true;
-  EXPECT_EQ(localize_verdict(localize_sights(run.camera, run.frames, config)).exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(localize_verdict(localize_observations(run.camera, run.frames, config)).exit_code, ExitCode::cannot_tell);
   config.is_board = false;
   config.seen_from_plus_z = true;
-  EXPECT_FALSE(localize_sights(run.camera, run.frames, config).is_behind);
+  EXPECT_FALSE(localize_observations(run.camera, run.frames, config).is_behind);
 }
 
 }  // namespace

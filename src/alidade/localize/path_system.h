@@ -45,9 +45,10 @@ class PathSmoother {
   using Twist = Eigen::Vector<double, 6>;  ///< How fast a pose changes: in the world, and on the right. [m/s, rad/s]
   [[nodiscard]] Twist twist_at(const SmootherState& state, std::size_t k) const;
   using GivenRows = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 16 + num_causes>;
-  [[nodiscard]] GivenRows given_rows(const ExpectedView& view, const UsedSight& sight, const Twist& twist) const;
-  [[nodiscard]] bool add_sight(const SmootherState& state, const UsedSight& sight, const Twist& twist,
-                               SmootherSystem& system) const;
+  [[nodiscard]] GivenRows given_rows(const ExpectedView& view, const UsedObservation& observation,
+                                     const Twist& twist) const;
+  [[nodiscard]] bool add_observation(const SmootherState& state, const UsedObservation& observation, const Twist& twist,
+                                     SmootherSystem& system) const;
   void add_range(const SmootherState& state, std::size_t point, SmootherSystem& system) const;
   struct Speeds {
     Eigen::Vector<double, 6> values;
@@ -57,25 +58,25 @@ class PathSmoother {
   void add_motion(const SmootherState& state, std::size_t k, SmootherSystem& system) const;
   void add_start(const SmootherState& state, SmootherSystem& system) const;
   [[nodiscard]] Eigen::Vector3d shape_change(const Eigen::Vector3d& told_in_world) const;
-  /// The sights within the gate of where they are expected now. Whether these are others than before.
-  [[nodiscard]] bool choose_sights();
+  /// The observations within the gate of where they are expected now. Whether these are others than before.
+  [[nodiscard]] bool choose_observations();
   [[nodiscard]] Eigen::MatrixXd lens_information() const;
   [[nodiscard]] Eigen::MatrixXd considered_cov() const;
   void fill_map(const Eigen::MatrixXd& cov, SmoothedPath& path) const;
   void fill_lens(const Eigen::MatrixXd& cov, SmoothedPath& path) const;
   void add_clock(SmoothedPath& path) const;
   /// path_profile.cpp.
-  void widen(double least_cost, SmoothedPath& path);
+  void widen(double min_cost, SmoothedPath& path);
   [[nodiscard]] bool hold_weakest(const SmoothedPath& path);
   void add_held(const SmootherState& state, SmootherSystem& system) const;
   [[nodiscard]] SmoothedPath result(const SmootherSystem& system) const;
 
   const SmootherProblem& problem_;
-  std::vector<UsedSight> sights_;  ///< Those that fit.
+  std::vector<UsedObservation> observations_;  ///< Those that fit.
   std::map<long, std::size_t> index_of_;
   std::vector<int> lens_order_;  ///< Those estimated, then the others.
   int num_estimated_ = 0, lens_at_ = 0;
-  int causes_at_ = 0;  ///< The target's scale and shape, its speed, and the picture's readout: tested, not solved for.
+  int causes_at_ = 0;  ///< The target's scale and shape, its speed, and the image's readout: tested, not solved for.
   Eigen::Vector3d target_middle_ = Eigen::Vector3d::Zero();
   double middle_s_ = 0.0;
   /// A combination of one pose's numbers that is held at a value while all else is solved for.

@@ -6,15 +6,15 @@
 
 namespace alidade {
 
-bool PointStore::is_stranger(long id, SightOutcome outcome) {
-  if (outcome != SightOutcome::used && outcome != SightOutcome::gated) return false;
+bool PointStore::is_stranger(long id, ObservationOutcome outcome) {
+  if (outcome != ObservationOutcome::used && outcome != ObservationOutcome::gated) return false;
   Point& point = points_[id];
-  const bool is_used = outcome == SightOutcome::used;
+  const bool is_used = outcome == ObservationOutcome::used;
   point.num_used += is_used ? 1 : 0;
   point.num_gated_in_a_row = is_used ? 0 : point.num_gated_in_a_row + 1;
-  constexpr int most_gated = 5;
+  constexpr int max_gated = 5;
   const bool is_known = std::ranges::find(config_->target, id, &KnownPoint::id) != config_->target.end();
-  if (is_known || point.num_gated_in_a_row < most_gated) return false;
+  if (is_known || point.num_gated_in_a_row < max_gated) return false;
   point = {};
   point.was_in_map = true;
   return true;
@@ -38,25 +38,27 @@ double PointStore::usual_depth_m(const LocalizationFilter& filter) const {
   return depths[depths.size() / 2];
 }
 
-std::optional<RangePrior> PointStore::prior_of(const FeatureSight& sight, const LocalizationFilter& filter) {
-  if (config_->new_points == NewPoints::delayed) return triangulated(sight, filter);
-  const auto ray_in_cam = unproject(filter.camera(), sight.px);
+std::optional<RangePrior> PointStore::prior_of(const FeatureObservation& observation,
+                                               const LocalizationFilter& filter) {
+  if (config_->new_points == NewPoints::delayed) return triangulated(observation, filter);
+  const auto ray_in_cam = unproject(filter.camera(), observation.px);
   if (!ray_in_cam) return std::nullopt;
-  const double least_z = 0.05;  // a fisheye sees sideways, too: there a depth is no distance
-  const double z = std::max(ray_in_cam->z(), least_z);
-  const auto told = std::ranges::find(config_->depths, sight.id, &ToldDepth::id);
-  const bool is_new = !std::exchange(points_[sight.id].was_in_map, true);
+  const double min_z = 0.05;  // a fisheye sees sideways, too: there a depth is no distance
+  const double z = std::max(ray_in_cam->z(), min_z);
+  const auto told = std::ranges::find(config_->depths, observation.id, &ToldDepth::id);
+  const bool is_new = !std::exchange(points_[observation.id].was_in_map, true);
   if (told != config_->depths.end() && is_new) return RangePrior{told->depth_m / z, told->sigma_rel};
   return RangePrior{usual_depth_m(filter) / z, config_->sigma_depth};
 }
 
-/// From the ray of its first sight and this one: d = b sin α₁ / sin(parallax), σ_d/d of the parallax' own σ.
-std::optional<RangePrior> PointStore::triangulated(const FeatureSight& sight, const LocalizationFilter& filter) {
-  const auto ray_in_cam = unproject(filter.camera(), sight.px);
+/// From the ray of its first observation and this one: d = b sin α₁ / sin(parallax), σ_d/d of the parallax' own σ.
+std::optional<RangePrior> PointStore::triangulated(const FeatureObservation& observation,
+                                                   const LocalizationFilter& filter) {
+  const auto ray_in_cam = unproject(filter.camera(), observation.px);
   if (!ray_in_cam) return std::nullopt;
   const Rigid3& world_from_cam = filter.motion().world_from_cam;
   const Eigen::Vector3d ray_in_world = world_from_cam.rotation * *ray_in_cam;
-  Point& point = points_[sight.id];
+  Point& point = points_[observation.id];
   if (!point.first_world_from_cam) {
     point.first_world_from_cam = world_from_cam;
     point.first_ray_in_world = ray_in_world;

@@ -13,11 +13,13 @@ class PointStore {
  public:
   explicit PointStore(const LocalizeConfig& config) : config_(&config) {}
 
-  /// Counts what became of a sight. True where the point has not fitted so often in a row that it should leave the map.
-  bool is_stranger(long id, SightOutcome outcome);
+  /// Counts what became of an observation. True where the point has not fitted so often in a row that it should leave
+  /// the map.
+  bool is_stranger(long id, ObservationOutcome outcome);
   [[nodiscard]] std::size_t num_used(long id) const;
   /// Distance along the ray of a new point. None: not now (delayed, or the lens sees nothing there).
-  [[nodiscard]] std::optional<RangePrior> prior_of(const FeatureSight& sight, const LocalizationFilter& filter);
+  [[nodiscard]] std::optional<RangePrior> prior_of(const FeatureObservation& observation,
+                                                   const LocalizationFilter& filter);
 
  private:
   struct Point {
@@ -27,7 +29,8 @@ class PointStore {
     std::optional<Rigid3> first_world_from_cam;  ///< Of a delayed one.
     Eigen::Vector3d first_ray_in_world = Eigen::Vector3d::Zero();
   };
-  [[nodiscard]] std::optional<RangePrior> triangulated(const FeatureSight& sight, const LocalizationFilter& filter);
+  [[nodiscard]] std::optional<RangePrior> triangulated(const FeatureObservation& observation,
+                                                       const LocalizationFilter& filter);
   [[nodiscard]] double usual_depth_m(const LocalizationFilter& filter) const;
 
   const LocalizeConfig* config_;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t num_across = 4, num_down = 3;
 
-struct PicturePart {
+struct ImagePart {
   double num = 0.0;
   Eigen::Vector2d sum = Eigen::Vector2d::Zero(), sum_px = Eigen::Vector2d::Zero();
 };
@@ -45,13 +45,13 @@ void add_colour(std::span<const PlacedResidual> residuals, ResidualStructure& st
 ResidualStructure residual_structure(std::span<const PlacedResidual> residuals, int width_px, int height_px) {
   ResidualStructure structure;
   add_colour(residuals, structure);
-  std::array<PicturePart, num_across * num_down> parts;
+  std::array<ImagePart, num_across * num_down> parts;
   for (const PlacedResidual& residual : residuals) {
     const auto index = [](double share, std::size_t num) {
       return static_cast<std::size_t>(std::clamp(share, 0.0, 0.999) * static_cast<double>(num));
     };
-    PicturePart& part = parts[index(residual.px.y() / height_px, num_down) * num_across +
-                              index(residual.px.x() / width_px, num_across)];
+    ImagePart& part = parts[index(residual.px.y() / height_px, num_down) * num_across +
+                            index(residual.px.x() / width_px, num_across)];
     part.num += 1.0;
     part.sum += residual.residual_px / residual.sigma_px;
     part.sum_px += residual.residual_px;

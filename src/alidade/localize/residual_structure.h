@@ -14,7 +14,7 @@ struct ResidualStructure {
   double sigma_colour = 1.0;  ///< Of that, were they independent.
   /// Whether that is more than chance and worth a word.
   [[nodiscard]] bool has_colour() const { return colour > 0.25 && colour > 4.0 * sigma_colour; }
-  double place_chi2 = 0.0;   ///< Of the mean residuals of 4 × 3 parts of the picture, over their count: 1 where right.
+  double place_chi2 = 0.0;   ///< Of the mean residuals of 4 × 3 parts of the image, over their count: 1 where right.
   double place_limit = 1e9;  ///< 99.9 % of that.
   double worst_px = 0.0;     ///< The largest mean,
   std::string worst_place;   ///< and where: "upper left".

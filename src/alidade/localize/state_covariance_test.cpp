@@ -11,7 +11,7 @@
 namespace alidade {
 namespace {
 
-constexpr int most_dim = 70;
+constexpr int max_dim = 70;
 
 Eigen::MatrixXd random_covariance(std::mt19937_64& rng, int dim) {
   std::normal_distribution<double> normal;
@@ -40,9 +40,9 @@ TEST(StateCovariance, IsThatOfTheDenseUpdateInAnyGrouping) {
   auto rng = testing::make_rng();
   std::normal_distribution<double> normal;
   int num_updates = 0;
-  for (const int dim : {12, 17, 24, 63, most_dim}) {
+  for (const int dim : {12, 17, 24, 63, max_dim}) {
     StateCovariance P;
-    P.reserve(most_dim, 64);
+    P.reserve(max_dim, 64);
     ASSERT_TRUE(P.grow(dim));
     Eigen::MatrixXd should = random_covariance(rng, dim);
     for (int i = 0; i < dim; ++i)
@@ -85,7 +85,7 @@ TEST(StateCovariance, IsThatOfTheDenseUpdateInAnyGrouping) {
 TEST(StateCovariance, KeepsAChangeAsideWhileAnotherIsTried) {
   auto rng = testing::make_rng();
   StateCovariance P;
-  P.reserve(most_dim, 8);
+  P.reserve(max_dim, 8);
   ASSERT_TRUE(P.grow(20));
   const Eigen::MatrixXd start = random_covariance(rng, 20);
   for (int i = 0; i < 20; ++i)
@@ -118,7 +118,7 @@ TEST(StateCovariance, TurnsByBlocks) {
     constexpr int single_at = 12;
     const int dim = 60 + num_single;
     StateCovariance P;
-    P.reserve(most_dim, 8);
+    P.reserve(max_dim, 8);
     ASSERT_TRUE(P.grow(dim));
     const Eigen::MatrixXd start = random_covariance(rng, dim);
     for (int i = 0; i < dim; ++i)

@@ -12,12 +12,12 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
   std::vector<TimedPose> path;
   std::vector<double> sigmas_m;
   for (const PathStep& step : report.path) {
-    report.num_sights += step.num_seen;
+    report.num_observations += step.num_seen;
     report.num_used += step.num_tracked;
     report.num_gated += step.num_gated;
     report.num_known += step.num_known;
     report.num_known_gated += step.num_known_gated;
-    report.most_seen = std::max(report.most_seen, step.num_seen);
+    report.max_seen = std::max(report.max_seen, step.num_seen);
     report.num_lost += step.event == FrameEvent::waiting || step.event == FrameEvent::predicted ? 1 : 0;
     if (step.num_tracked > 0 && std::isfinite(step.nis_per_dof)) {
       nis += step.nis_per_dof * static_cast<double>(step.num_tracked);
@@ -28,13 +28,13 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
     sigmas_m.push_back(std::sqrt(step.cov.topLeftCorner<3, 3>().trace()));
   }
   if (dof > 0.0) report.nis_per_dof = nis / dof;
-  if (!report.is_of_pictures) report.scale_known = report.scale_known && report.num_known > 0;
+  if (!report.is_of_images) report.scale_known = report.scale_known && report.num_known > 0;
   if (!bank) return;
   const LocalizationFilter& filter = bank->best();
   report.camera = filter.camera();
   report.sigma_lens = filter.lens_sigmas();
   for (const Feature& feature : filter.features()) {
-    if (!report.is_of_pictures && feature.is_known && num_used(feature.id) == 0) continue;  // told, never seen
+    if (!report.is_of_images && feature.is_known && num_used(feature.id) == 0) continue;  // told, never seen
     const auto place = filter.place(feature.id);
     report.map.push_back({feature.id, place->point_in_world, place->cov, feature.is_known, num_used(feature.id)});
   }

@@ -12,7 +12,7 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
             std::span<const TimedPose> truth, LocalizeReport& report);
 
 /// Whether most poses are on the side of a flat target, in the world's x and y, from which it is not seen: as where it
-/// or the pictures are mirrored. By the house's convention a target is seen from its −z.
+/// or the images are mirrored. By the house's convention a target is seen from its −z.
 [[nodiscard]] bool is_behind(std::span<const PathStep> path, std::span<const KnownPoint> target, bool seen_from_plus_z);
 
 /// The map, and the lens, of a smoothed path.

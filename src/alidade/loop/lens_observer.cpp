@@ -42,7 +42,7 @@ class TurnSpread {
     sum2_ += before.cwiseProduct(pan_tilt_rad - mean_rad_);
   }
   /// Readings with errors of this σ do so to the focal lengths (fx by pan, fy by tilt), as a share: all points of a
-  /// picture share the error, so that no number of points helps.
+  /// image share the error, so that no number of points helps.
   [[nodiscard]] Eigen::Vector2d variance_of_share(double sigma_rad) const {
     return sigma_rad * sigma_rad * sum2_.cwiseMax(1e-12).cwiseInverse();
   }
@@ -72,7 +72,7 @@ struct LensObserver::State {
         observer(observer_config(of, num_points, now)),
         sigma_encoder_rad(sigma_rad) {}
 
-  /// A picture that did not fit may be of another lens: one that much longer or shorter.
+  /// An image that did not fit may be of another lens: one that much longer or shorter.
   [[nodiscard]] double share_of_misfit(const IntrinsicsEstimate& estimate) const {
     if (estimate.event != ObserveEvent::burst) return 0.0;
     double radius2 = 0.0;
@@ -111,7 +111,7 @@ void LensObserver::take(double t_capture_s, const Eigen::Vector2d& pan_tilt_rad,
   own.row.px.clear();
   const Zoomed zoomed(own.head.camera, own.now.k);
   for (const Eigen::Vector2d& seen : px) {
-    // The observer's camera is without distortion: as the lens of the last picture would have it straightened.
+    // The observer's camera is without distortion: as the lens of the last image would have it straightened.
     const auto ray = is_seen(seen) ? unproject(own.head.camera, zoomed.own_px(seen)) : std::nullopt;
     const bool is_ahead = ray && ray->z() > 0.0;
     own.row.px.push_back(

@@ -9,9 +9,9 @@
 
 namespace alidade {
 
-/// The on-line observer of a head's lens: points of its pictures that stand still, and the encoders' readings, go
-/// through the hybrid observer (observe/hybrid.h) picture by picture; what comes out are the focal lengths of that
-/// picture, beside the camera's own principal point.
+/// The on-line observer of a head's lens: points of its images that stand still, and the encoders' readings, go
+/// through the hybrid observer (observe/hybrid.h) image by image; what comes out are the focal lengths of that
+/// image, beside the camera's own principal point.
 class LensObserver {
  public:
   /// `head` with the camera that is believed at the start: its σ, or an ordinary one where it says none, is the prior.
@@ -21,9 +21,9 @@ class LensObserver {
   LensObserver(LensObserver&&) noexcept;
   LensObserver& operator=(LensObserver&&) noexcept;
 
-  /// Pixels of the points in the picture taken then, NaN: not seen. Pictures in order of capture.
+  /// Pixels of the points in the image taken then, NaN: not seen. Images in order of capture.
   void take(double t_capture_s, const Eigen::Vector2d& pan_tilt_rad, std::span<const Eigen::Vector2d> px);
-  /// As of the last picture; the camera's own before the first estimate.
+  /// As of the last image; the camera's own before the first estimate.
   [[nodiscard]] const LensNow& lens() const;
   [[nodiscard]] bool has_estimate() const;
 

@@ -11,42 +11,42 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t most_on_their_way = 256;  // pictures taken and not yet known
+constexpr std::size_t max_on_their_way = 256;  // images taken and not yet known
 
-/// A picture of one head: the target, and what stands still.
-struct Picture {
-  HeadSight sight;
+/// An image of one head: the target, and what stands still.
+struct Image {
+  HeadObservation observation;
   bool is_seen = false;
   std::vector<Eigen::Vector2d> background;
 };
 
-/// Pictures of one head that are not yet known.
-class PictureQueue {
+/// Images of one head that are not yet known.
+class ImageQueue {
  public:
-  explicit PictureQueue(double latency_s) : latency_s_(latency_s) {}
-  void take(Picture picture) { ring_[num_taken_++ % ring_.size()] = std::move(picture); }
-  /// The next picture that is known by now and was not asked for before; none: nullptr.
-  Picture* next(double t_s) {
+  explicit ImageQueue(double latency_s) : latency_s_(latency_s) {}
+  void take(Image image) { ring_[num_taken_++ % ring_.size()] = std::move(image); }
+  /// The next image that is known by now and was not asked for before; none: nullptr.
+  Image* next(double t_s) {
     if (num_known_ >= num_taken_) return nullptr;
-    Picture& picture = ring_[num_known_ % ring_.size()];
-    if (picture.sight.t_capture_s + latency_s_ > t_s + 1e-9) return nullptr;
+    Image& image = ring_[num_known_ % ring_.size()];
+    if (image.observation.t_capture_s + latency_s_ > t_s + 1e-9) return nullptr;
     ++num_known_;
-    return &picture;
+    return &image;
   }
 
  private:
-  std::array<Picture, most_on_their_way> ring_{};
+  std::array<Image, max_on_their_way> ring_{};
   std::size_t num_taken_ = 0, num_known_ = 0;
   double latency_s_;
 };
 
-/// One head, its controller and the pictures between them.
+/// One head, its controller and the images between them.
 struct LoopedHead {
   SimulatedHead head;
   HeadServo servo;
-  PictureQueue pictures;
+  ImageQueue images;
   std::optional<LensObserver> observer;
-  LensNow lens;  ///< Of the newest picture that is known.
+  LensNow lens;  ///< Of the newest image that is known.
 };
 
 std::array<ServoAxis, 2> true_axes(const ServoScene& scene) {
@@ -55,7 +55,7 @@ std::array<ServoAxis, 2> true_axes(const ServoScene& scene) {
   return axes;
 }
 
-/// Points far away that stand still where a head will look: about the target, somewhere in the narrowest picture.
+/// Points far away that stand still where a head will look: about the target, somewhere in the narrowest image.
 std::vector<Eigen::Vector3d> background_of(const ServoScene& scene, const RigHead& head, std::uint64_t seed) {
   constexpr double far_m = 1e4;
   std::vector<Eigen::Vector3d> points;
@@ -85,7 +85,7 @@ std::vector<LoopedHead> looped_heads(const ServoScene& scene, const ServoConfig&
     const Eigen::Vector2d start = aim(head.head, scene.path.at(0.0)).value_or(Eigen::Vector2d::Zero());
     looped.push_back({SimulatedHead(truth, start, own_seed),
                       HeadServo(head, config),
-                      PictureQueue(scene.latency_s),
+                      ImageQueue(scene.latency_s),
                       {},
                       own_lens(head.camera)});
     if (observes) {
@@ -104,25 +104,25 @@ bool is_hidden(const ServoScene& scene, double t_s) {
 
 /// What is known by now goes to the observer, and the newest of it to the servo.
 void deliver(const ServoScene& scene, LoopedHead& looped, double t_s, HeadServoInput& input) {
-  while (Picture* picture = looped.pictures.next(t_s)) {
-    input.sight.reset();
-    HeadSight& sight = picture->sight;
+  while (Image* image = looped.images.next(t_s)) {
+    input.observation.reset();
+    HeadObservation& observation = image->observation;
     if (looped.observer) {
-      looped.observer->take(sight.t_capture_s, sight.pan_tilt_rad, picture->background);
-      sight.lens = looped.observer->lens();
+      looped.observer->take(observation.t_capture_s, observation.pan_tilt_rad, image->background);
+      observation.lens = looped.observer->lens();
     }
-    if (scene.intrinsics != LensKnowledge::given) looped.lens = *sight.lens;
-    if (picture->is_seen) input.sight = sight;
+    if (scene.intrinsics != LensKnowledge::given) looped.lens = *observation.lens;
+    if (image->is_seen) input.observation = observation;
   }
 }
 
-/// Where the target truly is in the row's picture.
+/// Where the target truly is in the row's image.
 void add_truth(const ServoScene& scene, const LoopedHead& looped, const Eigen::Vector3d& target, ServoRow& row) {
   const auto where = looped.head.true_pixel(target);
   row.true_lens = looped.head.intrinsics();
   row.error_px = where ? Eigen::Vector2d(*where - row.true_lens.tail<2>())
                        : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
-  row.is_in_picture = where && is_in_picture(scene.heads[row.head].camera, *where);
+  row.is_in_image = where && is_in_image(scene.heads[row.head].camera, *where);
 }
 
 ServoRow step(const ServoScene& scene, LoopedHead& looped, double t_s, std::size_t head) {
@@ -134,11 +134,11 @@ ServoRow step(const ServoScene& scene, LoopedHead& looped, double t_s, std::size
   row.measured_rad = looped.head.read_encoders();
   const auto seen = looped.head.seen_pixel(target);
   const bool is_seen = seen && !is_hidden(scene, t_s);
-  Picture picture{
+  Image image{
       {t_s, row.measured_rad, seen.value_or(Eigen::Vector2d::Zero()), {}}, is_seen, looped.head.seen_background()};
   if (scene.intrinsics == LensKnowledge::truth)
-    picture.sight.lens = LensNow{looped.head.intrinsics(), Eigen::Vector4d::Zero()};
-  looped.pictures.take(std::move(picture));
+    image.observation.lens = LensNow{looped.head.intrinsics(), Eigen::Vector4d::Zero()};
+  looped.images.take(std::move(image));
   HeadServoInput input{t_s, row.measured_rad, std::nullopt};
   deliver(scene, looped, t_s, input);
   const HeadServoOutput output = looped.servo.step(input);
@@ -187,7 +187,7 @@ ServoFigures figures_of(const ServoScene& scene, const std::vector<ServoRow>& ro
     const double error = row.error_px.allFinite() ? std::min(most, row.error_px.norm()) : most;
     errors.push_back(error);
     sum2 += error * error;
-    visible += row.is_in_picture ? 1u : 0u;
+    visible += row.is_in_image ? 1u : 0u;
     central +=
         std::abs(row.error_px.x()) <= camera.width_px / 6.0 && std::abs(row.error_px.y()) <= camera.height_px / 6.0
             ? 1u
@@ -197,7 +197,7 @@ ServoFigures figures_of(const ServoScene& scene, const std::vector<ServoRow>& ro
   const auto count = static_cast<double>(errors.size());
   figures.rms_px = std::sqrt(sum2 / count);
   figures.central_third = static_cast<double>(central) / count;
-  figures.in_picture = static_cast<double>(visible) / count;
+  figures.in_image = static_cast<double>(visible) / count;
   std::ranges::sort(errors);
   figures.p95_px = errors[static_cast<std::size_t>(0.95 * (count - 1.0))];
   figures.max_px = errors.back();
@@ -254,7 +254,7 @@ ServoFigures put_together(const std::vector<ServoFigures>& runs) {
   for (const ServoFigures& run : runs) {
     all.rms_px += run.rms_px * run.rms_px;
     all.central_third += run.central_third;
-    all.in_picture += run.in_picture;
+    all.in_image += run.in_image;
     all.num_lost += run.num_lost;
     all.num_found += run.num_found;
     all.search_s += run.search_s;
@@ -268,7 +268,7 @@ ServoFigures put_together(const std::vector<ServoFigures>& runs) {
   all.focal_share = std::sqrt(all.focal_share / count);
   all.focal_z = std::sqrt(all.focal_z / count);
   all.central_third /= count;
-  all.in_picture /= count;
+  all.in_image /= count;
   std::ranges::sort(maxima);
   std::ranges::sort(p95);
   all.max_px = maxima[maxima.size() / 2];

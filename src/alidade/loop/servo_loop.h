@@ -22,13 +22,13 @@ struct PlantMismatch {
 };
 
 /// Which intrinsics the loop takes its pixels by: the rig's, whatever the lens does; those that an on-line observer
-/// tells of the pictures' background; the true ones.
+/// tells of the images' background; the true ones.
 enum class LensKnowledge { given, observed, truth };
 [[nodiscard]] std::string_view lens_knowledge_name(LensKnowledge knowledge);  ///< given, observed, true
 [[nodiscard]] std::optional<LensKnowledge> lens_knowledge_named(std::string_view name);
 
-/// The closed loop of one target, two heads or more, and a controller on each. Pictures are taken, encoders read and
-/// commands sent each period; a picture is known `latency_s` after it was taken.
+/// The closed loop of one target, two heads or more, and a controller on each. Images are taken, encoders read and
+/// commands sent each period; an image is known `latency_s` after it was taken.
 struct ServoScene {
   std::vector<RigHead> heads;       ///< Their encoders' σ is that of the readings.
   RigUncertainty rig_errors;        ///< What the rig's file says of its own; `track` counts it.
@@ -57,11 +57,11 @@ struct ServoRow {
   std::size_t head = 0;
   Eigen::Vector2d command, asked_rad, measured_rad, predicted_rad, rate_rad_s, sigma_predicted_px;
   bool has_prediction = false;
-  Eigen::Vector2d error_px;  ///< True image of the target − middle of the picture; NaN behind the camera.
-  bool is_in_picture = false;
-  std::optional<Eigen::Vector2d> seen_px;  ///< What the head's picture told, with its noise.
+  Eigen::Vector2d error_px;  ///< True image of the target − middle of the image; NaN behind the camera.
+  bool is_in_image = false;
+  std::optional<Eigen::Vector2d> seen_px;  ///< What the head's image told, with its noise.
   ServoEvent event = ServoEvent::none;
-  LensNow lens;                                         ///< That this picture will be taken by, or the rig's.
+  LensNow lens;                                         ///< That this image will be taken by, or the rig's.
   Eigen::Vector4d true_lens = Eigen::Vector4d::Zero();  ///< fx, fy, cx, cy. [px]
 };
 
@@ -71,7 +71,7 @@ struct ServoFigures {
   double p95_px = 0.0;
   double max_px = 0.0;
   double central_third = 0.0;  ///< Share within the middle third in both directions.
-  double in_picture = 0.0;     ///< Share.
+  double in_image = 0.0;       ///< Share.
   std::size_t num_lost = 0;    ///< How often a target that had been followed was lost…
   std::size_t num_found = 0;   ///< …and found again.
   double search_s = 0.0;       ///< Time spent searching, all heads.

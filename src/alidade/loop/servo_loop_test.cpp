@@ -55,7 +55,7 @@ void expect_ratios(double latency_s, const PlantMismatch& mismatch, const std::a
 
 // One setting of the filter for all of them: the figures asked for were reached with one set for each circle.
 TEST(ServoLoop, PredictionBeatsThePapersController) { expect_ratios(0.0, {}, {8.0, 18.0, 15.0}); }
-TEST(ServoLoop, PredictionBeatsItWithLatePictures) { expect_ratios(0.1, {}, {5.0, 8.0, 5.0}); }
+TEST(ServoLoop, PredictionBeatsItWithLateImages) { expect_ratios(0.1, {}, {5.0, 8.0, 5.0}); }
 TEST(ServoLoop, PredictionBeatsItOnAPlantThatIsNotAsKnown) {
   for (const PlantMismatch& mismatch : {PlantMismatch{0.8, 1.3}, PlantMismatch{1.2, 0.7}}) {
     expect_ratios(0.0, mismatch, {3.5, 3.0, 2.5});
@@ -71,7 +71,7 @@ TEST(ServoLoop, ThePapersControllerIsAsSlowAsFoundElsewhere) {
                 0.1 * elsewhere_px[i]);
 }
 
-/// 30°/s at the most, pictures 0.1 s late: the paper's controller is off by about 33 px.
+/// 30°/s at the most, images 0.1 s late: the paper's controller is off by about 33 px.
 TEST(ServoLoop, SwayOfThirtyDegreesASecond) {
   ServoScene scene = xiahou_servo_scene();
   scene.path.kind = PathKind::sway;
@@ -174,14 +174,14 @@ TEST(ServoLoop, LosesATargetAndFindsItAgain) {
   }
 }
 
-/// The heads' own sights tell where the target was: as well as they would of heads that stand still (half a pixel and
-/// 0.05° at 0.8 m are a centimetre along the view).
-TEST(ServoLoop, ItsSightsTellWhereTheTargetWas) {
+/// The heads' own observations tell where the target was: as well as they would of heads that stand still (half a pixel
+/// and 0.05° at 0.8 m are a centimetre along the view).
+TEST(ServoLoop, ItsObservationsTellWhereTheTargetWas) {
   const ServoScene scene = xiahou_servo_scene();
   ServoConfig config;
   config.controller = ControllerKind::feedforward;
   const ServoTrack track = track_of(scene, run_servo(scene, config, first_seed));
-  EXPECT_GT(track.report.num_used, track.sights.size() * 9 / 10);
+  EXPECT_GT(track.report.num_used, track.observations.size() * 9 / 10);
   EXPECT_LT(track.report.rms_m, 0.01);
   EXPECT_GT(track.report.nees_per_dof, 0.3);
   EXPECT_LT(track.report.nees_per_dof, 2.0);

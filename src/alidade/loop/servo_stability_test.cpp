@@ -42,7 +42,7 @@ ServoScenario scenario_of(const GridCase& of, ControllerKind kind) {
   scene.mismatch = {of.gain_factor, of.tau_factor};
   scene.path.kind = PathKind::still;
   scene.path.start_m = {0.25, 0.0,
-                        8.0};  // nearly straight ahead: in the picture also where a gain is six times too large
+                        8.0};  // nearly straight ahead: in the image also where a gain is six times too large
   scene.duration_s = 20.0;
   scene.warm_up_s = 10.0;
   scenario.config.pi.kp *= of.loop;

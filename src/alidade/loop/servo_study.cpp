@@ -61,17 +61,17 @@ void add_checks(const ServoScenario& scenario, const ServoStudy& study, Verdict&
   const double asked = scenario.specification_px;
   add("specification", best.rms_px <= asked, text_of(best.rms_px) + " px RMS of " + text_of(asked) + " px asked for",
       best.rms_px, asked, "px");
-  add("in the picture", best.in_picture >= 1.0, text_of(100.0 * best.in_picture) + " % of the time in the picture",
-      best.in_picture, 1.0, "1");
+  add("in the picture", best.in_image >= 1.0, text_of(100.0 * best.in_image) + " % of the time in the picture",
+      best.in_image, 1.0, "1");
   if (best.num_lost > 0)
     add("lost", false,
         "lost " + std::to_string(best.num_lost) + " times, found again " + std::to_string(best.num_found) + " times",
         static_cast<double>(best.num_lost), 0.0, "times");
   if (scenario.scene.intrinsics == LensKnowledge::observed) {
-    constexpr double most_z = 2.0;
-    add("observed focal length", best.focal_z <= most_z,
+    constexpr double max_z = 2.0;
+    add("observed focal length", best.focal_z <= max_z,
         text_of(100.0 * best.focal_share) + " % off (RMS), " + text_of(best.focal_z) + " of its sigma", best.focal_z,
-        most_z, "sigma");
+        max_z, "sigma");
   }
   for (const LoopCheck& loop : study.loops) {
     const double most = loop.delay_samples < 0 ? 0.995 : 0.98;  // one that was tried has a slow observer in it, too
@@ -221,9 +221,9 @@ Verdict servo_verdict(const ServoScenario& scenario, const ServoStudy& study) {
   const auto pi = std::ranges::find(study.comparison, ControllerKind::pi, &ServoComparison::controller);
   if (pi != study.comparison.end() && study.best != ControllerKind::pi)
     verdict.sentence += ", pi within " + text_of(pi->figures.rms_px) + " px";
-  if (best.in_picture < 0.5) {
+  if (best.in_image < 0.5) {
     verdict.state = State::bad;
-    verdict.sentence += "; in the picture " + text_of(100.0 * best.in_picture) + " % of the time only";
+    verdict.sentence += "; in the picture " + text_of(100.0 * best.in_image) + " % of the time only";
     return verdict;
   }
   for (const Check& check : verdict.checks) {

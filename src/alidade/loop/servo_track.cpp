@@ -7,14 +7,14 @@
 namespace alidade {
 namespace {
 
-/// The intrinsics that the loop had of each picture. A row knows those of the newest picture that had arrived.
+/// The intrinsics that the loop had of each image. A row knows those of the newest image that had arrived.
 std::vector<LensCourse> courses_of(const ServoScene& scene, const ServoRun& run) {
   std::vector<LensCourse> courses(scene.heads.size());
   for (const ServoRow& row : run.rows) {
     LensCourse& course = courses[row.head];
-    const double picture = std::floor((row.t_s - scene.latency_s) / scene.period_s + 1e-6);
-    const double captured_s = picture * scene.period_s;
-    if (picture < 0.0 || (!course.t_s.empty() && !(captured_s > course.t_s.back()))) continue;
+    const double image = std::floor((row.t_s - scene.latency_s) / scene.period_s + 1e-6);
+    const double captured_s = image * scene.period_s;
+    if (image < 0.0 || (!course.t_s.empty() && !(captured_s > course.t_s.back()))) continue;
     course.t_s.push_back(captured_s);
     course.lens.push_back(row.lens);
     course.until_s = row.t_s;
@@ -32,17 +32,18 @@ ServoTrack track_of(const ServoScene& scene, const ServoRun& run) {
       track.truth.position.push_back(scene.path.at(row.t_s));
     }
     if (row.seen_px)
-      track.sights.push_back({row.t_s, row.t_s + scene.latency_s, row.head, row.measured_rad, *row.seen_px, 0.0, {}});
+      track.observations.push_back(
+          {row.t_s, row.t_s + scene.latency_s, row.head, row.measured_rad, *row.seen_px, 0.0, {}});
   }
   Rig rig;
   rig.heads = scene.heads;
-  if (scene.intrinsics != LensKnowledge::given) use_courses(courses_of(scene, run), track.sights, rig);
+  if (scene.intrinsics != LensKnowledge::given) use_courses(courses_of(scene, run), track.observations, rig);
   TrackConfig config;
   config.tracker.sigma_px = scene.sigma_px;
   config.tracker.sigma_encoder_rad = scene.sigma_encoder_rad;
   config.tracker.errors = scene.rig_errors.num() > 0 ? scene.rig_errors : rig_uncertainty(rig);
   config.warm_up_s = scene.warm_up_s;
-  if (!track.sights.empty()) track.report = track_target(track.sights, scene.heads, config, track.truth);
+  if (!track.observations.empty()) track.report = track_target(track.observations, scene.heads, config, track.truth);
   return track;
 }
 

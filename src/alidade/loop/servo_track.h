@@ -9,7 +9,7 @@ namespace alidade {
 
 /// Where the target was in space, as `track` tells from what the heads of a run saw of it.
 struct ServoTrack {
-  std::vector<TargetSight> sights;
+  std::vector<TargetObservation> observations;
   TrueTrack truth;
   TrackReport report;
 };

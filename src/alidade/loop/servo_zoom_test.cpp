@@ -5,7 +5,7 @@
 
 #include "alidade/loop/servo_study.h"
 
-// A lens that zooms while its head follows: what the loop knows of it decides whether the target stays in the picture.
+// A lens that zooms while its head follows: what the loop knows of it decides whether the target stays in the image.
 
 namespace alidade {
 namespace {
@@ -34,7 +34,7 @@ std::vector<ServoFigures> draws_of(ServoScene scene, LensKnowledge knowledge, Co
 /// In each of 20 draws: the observer's loop holds the target as the one that knows the lens does, but for half as much
 /// again; the loop that keeps the old focal length does not hold it at all.
 TEST(ServoZoom, TheObserversLoopHoldsTheTargetAndTheOldFocalLengthsDoesNot) {
-  constexpr double bound_px = 10.0;  // RMS: the specification of a scenario; the picture is 320 px wide
+  constexpr double bound_px = 10.0;  // RMS: the specification of a scenario; the image is 320 px wide
   for (const ControllerKind kind : {ControllerKind::feedforward, ControllerKind::lqr}) {
     const auto given = draws_of(zooming_scene(), LensKnowledge::given, kind);
     const auto observed = draws_of(zooming_scene(), LensKnowledge::observed, kind);
@@ -42,7 +42,7 @@ TEST(ServoZoom, TheObserversLoopHoldsTheTargetAndTheOldFocalLengthsDoesNot) {
     for (std::size_t i = 0; i < num_zoom_draws; ++i) {
       EXPECT_LT(observed[i].rms_px, bound_px) << controller_name(kind) << " " << i;
       EXPECT_LT(observed[i].rms_px, 1.5 * truth[i].rms_px) << controller_name(kind) << " " << i;
-      EXPECT_EQ(observed[i].in_picture, 1.0) << controller_name(kind) << " " << i;
+      EXPECT_EQ(observed[i].in_image, 1.0) << controller_name(kind) << " " << i;
       EXPECT_GT(given[i].rms_px, 2.0 * bound_px) << controller_name(kind) << " " << i;
     }
     RecordProperty("given_px_" + std::string(controller_name(kind)), std::to_string(put_together(given).rms_px));
@@ -68,8 +68,8 @@ TEST(ServoZoom, TheObservedFocalLengthCovers) {
   EXPECT_GT(std::sqrt(z2), 0.3);
 }
 
-/// Out again, with pictures 100 ms late and a plant that is not as known.
-TEST(ServoZoom, HoldsOutAndInWithLatePictures) {
+/// Out again, with images 100 ms late and a plant that is not as known.
+TEST(ServoZoom, HoldsOutAndInWithLateImages) {
   ServoScene scene = zooming_scene();
   scene.zoom = {{3.0, 6.0, 9.0, 11.0}, {1.0, 3.0, 3.0, 0.8}};
   scene.latency_s = 0.1;
@@ -78,11 +78,11 @@ TEST(ServoZoom, HoldsOutAndInWithLatePictures) {
   const auto truth = draws_of(scene, LensKnowledge::truth, ControllerKind::lqr);
   for (std::size_t i = 0; i < num_zoom_draws; ++i) {
     EXPECT_LT(observed[i].rms_px, 1.5 * truth[i].rms_px) << i;
-    EXPECT_EQ(observed[i].in_picture, 1.0) << i;
+    EXPECT_EQ(observed[i].in_image, 1.0) << i;
   }
 }
 
-/// Without a zoom the observer costs nothing that matters, and the same pictures are drawn.
+/// Without a zoom the observer costs nothing that matters, and the same images are drawn.
 TEST(ServoZoom, AStillLensIsFollowedAsWithoutAnObserver) {
   ServoScene scene = xiahou_servo_scene();
   const auto given = draws_of(scene, LensKnowledge::given, ControllerKind::feedforward);
@@ -102,7 +102,7 @@ TEST(ZoomProfile, IsStraightInTheLogarithmAndStillOutside) {
   EXPECT_EQ(ZoomProfile{}.at(5.0), 1.0);
 }
 
-/// What the study says of it: three loops over the same seeds, and a track whose sights know their lens.
+/// What the study says of it: three loops over the same seeds, and a track whose observations know their lens.
 TEST(ServoZoom, TheStudyComparesWhatIsKnown) {
   ServoScenario scenario;
   scenario.scene = zooming_scene();

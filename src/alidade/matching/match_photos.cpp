@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t least_features = 8;
+constexpr std::size_t min_features = 8;
 
 using Size = std::pair<int, int>;
 
@@ -58,7 +58,7 @@ std::vector<PhotoFeatures> all_features(std::size_t num_photos, const std::funct
     if (sizes[i].first == 0) ++matches.num_unreadable;
     if (!matches.reasons[i].empty()) continue;
     if (sizes[i] != usual) matches.reasons[i] = other_size(sizes[i], usual);
-    if (features[i].px.size() < least_features) matches.reasons[i] = "shows nothing that could be known again";
+    if (features[i].px.size() < min_features) matches.reasons[i] = "shows nothing that could be known again";
     if (!matches.reasons[i].empty()) features[i] = {};
   }
   return features;

@@ -29,21 +29,21 @@ cv::Mat texture(int width, int height) {
   return grey;
 }
 
-/// Where a point of the first picture is in the turned one.
-cv::Mat turned(const cv::Mat& picture, cv::Mat& map) {
+/// Where a point of the first image is in the turned one.
+cv::Mat turned(const cv::Mat& image, cv::Mat& map) {
   map = cv::getRotationMatrix2D({320.0F, 240.0F}, 12.0, 1.0);
   map.at<double>(0, 2) += 35.5;
   cv::Mat out;
-  cv::warpAffine(picture, out, map, picture.size(), cv::INTER_CUBIC);
+  cv::warpAffine(image, out, map, image.size(), cv::INTER_CUBIC);
   return out;
 }
 
-TEST(MatchPhotos, FindsThePointsOfATurnedPictureAgain) {
+TEST(MatchPhotos, FindsThePointsOfATurnedImageAgain) {
   const cv::Mat first = texture(640, 480);
   cv::Mat map, second;
   cv::cvtColor(turned(first, map), second, cv::COLOR_GRAY2BGR);  // colour beside grey
-  const std::vector<cv::Mat> pictures{first, second};
-  const PhotoMatches found = match_photos({"a", "b"}, [&](std::size_t i) { return pictures[i]; });
+  const std::vector<cv::Mat> images{first, second};
+  const PhotoMatches found = match_photos({"a", "b"}, [&](std::size_t i) { return images[i]; });
   ASSERT_EQ(found.photos.pairs.size(), 1u);
   const MatchedPair& pair = found.photos.pairs.front();
   EXPECT_GT(pair.matches.size(), 200u);
@@ -63,7 +63,7 @@ TEST(MatchPhotos, ALargePhotoIsLookedAtSmallerAndItsPointsStayWhereTheyAre) {
   const cv::Mat small = texture(640, 480);
   cv::Mat large;
   cv::resize(small, large, {}, 3.0, 3.0, cv::INTER_CUBIC);
-  const PhotoFeatures a = find_features(small), b = find_features(large, {.most_megapixels = 0.3072});
+  const PhotoFeatures a = find_features(small), b = find_features(large, {.max_megapixels = 0.3072});
   const auto matches = match_features(a.descriptors, b.descriptors);
   ASSERT_GT(matches.size(), 300u);
   std::vector<double> off;
@@ -77,13 +77,13 @@ TEST(MatchPhotos, ALargePhotoIsLookedAtSmallerAndItsPointsStayWhereTheyAre) {
 }
 
 TEST(MatchPhotos, NamesWhatTakesNoPart) {
-  const cv::Mat picture = texture(320, 240);
+  const cv::Mat image = texture(320, 240);
   cv::Mat upright;
-  cv::rotate(picture, upright, cv::ROTATE_90_CLOCKWISE);
-  const std::vector<cv::Mat> pictures{picture, picture, upright, cv::Mat(240, 320, CV_8U, cv::Scalar(90)), cv::Mat()};
+  cv::rotate(image, upright, cv::ROTATE_90_CLOCKWISE);
+  const std::vector<cv::Mat> images{image, image, upright, cv::Mat(240, 320, CV_8U, cv::Scalar(90)), cv::Mat()};
   const PhotoMatches found = match_photos({"a", "b", "upright", "plain", "broken"}, [&](std::size_t i) {
-    if (pictures[i].empty()) throw std::runtime_error("is cut off");
-    return pictures[i];
+    if (images[i].empty()) throw std::runtime_error("is cut off");
+    return images[i];
   });
   EXPECT_EQ(found.photos.width_px, 320);
   EXPECT_EQ(found.reasons[0], "");

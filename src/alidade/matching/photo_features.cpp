@@ -15,13 +15,13 @@ namespace alidade {
 namespace {
 
 /// 8-bit grey, at most so large; `shrunk` is its size over the photo's.
-cv::Mat small_grey(const cv::Mat& photo, double most_megapixels, double& shrunk) {
+cv::Mat small_grey(const cv::Mat& photo, double max_megapixels, double& shrunk) {
   std::string reason;
   cv::Mat grey = to_grey_photo(photo, reason);
   if (grey.empty()) throw std::invalid_argument(reason);
   grey.convertTo(grey, CV_8U);
   const double pixels = static_cast<double>(grey.total());
-  shrunk = std::min(1.0, std::sqrt(most_megapixels * 1e6 / pixels));
+  shrunk = std::min(1.0, std::sqrt(max_megapixels * 1e6 / pixels));
   if (shrunk < 1.0) cv::resize(grey, grey, {}, shrunk, shrunk, cv::INTER_AREA);
   return grey;
 }
@@ -50,11 +50,11 @@ std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> found, const cv::Size
 
 PhotoFeatures find_features(const cv::Mat& photo, const FeatureConfig& config) {
   double shrunk = 1.0;
-  const cv::Mat grey = small_grey(photo, config.most_megapixels, shrunk);
+  const cv::Mat grey = small_grey(photo, config.max_megapixels, shrunk);
   const auto sift = cv::SIFT::create(0, 3, 0.025);
   std::vector<cv::KeyPoint> found;
   sift->detect(grey, found);
-  std::vector<cv::KeyPoint> kept = spread(std::move(found), grey.size(), config.most_features);
+  std::vector<cv::KeyPoint> kept = spread(std::move(found), grey.size(), config.max_features);
   cv::Mat descriptors;
   if (!kept.empty()) sift->compute(grey, kept, descriptors);
   PhotoFeatures features;

@@ -21,8 +21,8 @@ struct PhotoFeatures {
 };
 
 struct FeatureConfig {
-  double most_megapixels = 1.6;  ///< A larger photo is looked at smaller.
-  int most_features = 2600;      ///< Spread over the photo: the strongest of each of 8 × 6 cells.
+  double max_megapixels = 1.6;  ///< A larger photo is looked at smaller.
+  int max_features = 2600;      ///< Spread over the photo: the strongest of each of 8 × 6 cells.
 };
 
 /// Features of a photo, grey or colour, 8 or 16 bit: Lowe's SIFT (IJCV 60, 2004) as OpenCV has it, with descriptors

@@ -7,7 +7,7 @@
 namespace alidade {
 namespace {
 
-constexpr int most_lever_points = 16;
+constexpr int max_lever_points = 16;
 constexpr double usual_k = 0.3, usual_p = 0.01, usual_mount_rad = 0.2, usual_delay_s = 0.1, usual_shutter_s = 0.03,
                  usual_zoom_per_s = 0.01, usual_parallax_rad = 0.05;
 
@@ -106,7 +106,7 @@ void CauseColumns::add_lever() {
     return times[static_cast<std::size_t>(a)] > times[static_cast<std::size_t>(b)];
   });
   // The first has the common one: only what the others have beside it can be told apart from that.
-  for (std::size_t i = 1; i < order.size() && i <= most_lever_points; ++i) {
+  for (std::size_t i = 1; i < order.size() && i <= max_lever_points; ++i) {
     lever_column_[static_cast<std::size_t>(order[i])] = size();
     add("lever", "z over distance, a point's own", usual_parallax_rad, "rad");
   }

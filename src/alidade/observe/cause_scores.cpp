@@ -14,10 +14,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::size_t most_observations = 40000;  // thinned by frames: power falls, the test does not
+constexpr std::size_t max_observations = 40000;  // thinned by frames: power falls, the test does not
 constexpr int num_blocks = 12;
 constexpr double estimated_effect = 1.5;
-constexpr double least_told = 1e-10;  // of a cause's information that is its own: the rest is rounding
+constexpr double min_told = 1e-10;  // of a cause's information that is its own: the rest is rounding
 
 /// Score and information of a block of time, points eliminated: estimated parameters, then causes.
 struct Block {
@@ -30,7 +30,7 @@ class Linearisation {
   Linearisation(const RotationLog& log, const Adjustment& reference, const CauseConfig& config)
       : reference_(reference), columns_(log, reference, config), n_(columns_.layout().size), q_(columns_.size()) {
     const std::size_t count = reference.bundle.observations.size();
-    every_ = static_cast<int>((count + most_observations - 1) / most_observations);
+    every_ = static_cast<int>((count + max_observations - 1) / max_observations);
     eliminate_points();
     gather();
   }
@@ -126,7 +126,7 @@ CauseScore Linearisation::score_of(const CauseColumns::Group& group) const {
   const SymmetricEigen eigen = symmetric_eigen(S);
   VectorXd inverse = VectorXd::Zero(width);
   for (Index i = 0; i < width; ++i) {
-    if (eigen.values[i] > least_told) inverse[i] = 1.0 / eigen.values[i];
+    if (eigen.values[i] > min_told) inverse[i] = 1.0 / eigen.values[i];
   }
   const MatrixXd S_inverse = eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose();
   const VectorXd s = score(all_.gradient);

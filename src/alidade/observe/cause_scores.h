@@ -26,7 +26,7 @@ struct CauseScore {
 struct CauseConfig {
   ObserveNuisances nuisances;  ///< What was estimated.
   double max_gap_s = 0.25;
-  double height = 1.0;                   ///< Of the picture, normalised: a rolling shutter's way.
+  double height = 1.0;                   ///< Of the image, normalised: a rolling shutter's way.
   std::vector<std::string> errors = {};  ///< Causes among the rotation's errors that were estimated.
 };
 

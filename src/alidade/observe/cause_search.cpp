@@ -7,7 +7,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t most_search_frames = 120, most_search_points = 40;
+constexpr std::size_t max_search_frames = 120, max_search_points = 40;
 
 /// What a trial frees beside what is estimated already.
 struct Trial {
@@ -86,7 +86,7 @@ Sample sample_of(const RotationLog& log, const ObserveConfig& config, const Pixe
     for (std::size_t i = 0; i < row.px.size(); ++i) seen[i].first -= is_seen(row.px[i]) ? 1 : 0;
   }
   std::sort(seen.begin(), seen.end());
-  seen.resize(std::min(seen.size(), most_search_points));
+  seen.resize(std::min(seen.size(), max_search_points));
   Sample sample;
   MotionReader reader(log.source, config.max_gap_s);
   for (const RotationRow& row : log.rows) {
@@ -109,7 +109,7 @@ double noise_of(const RotationLog& log, const ObserveConfig& config, const Obser
   add_turns(log, errors, config.max_gap_s, frames);
   const std::size_t num_points = sample.px.empty() ? 0 : sample.px.front().size();
   FrameBuffer buffer(num_points, frames.size() + 1);
-  const std::size_t every = std::max<std::size_t>(1, frames.size() / most_search_frames);
+  const std::size_t every = std::max<std::size_t>(1, frames.size() / max_search_frames);
   bool is_new = false;
   for (std::size_t k = 0; k < frames.size(); ++k) {
     is_new = is_new || frames[k].starts_segment;
@@ -133,9 +133,9 @@ double noise_of(const RotationLog& log, const ObserveConfig& config, const Obser
   if (!config.start) adjust_with.other_starts = {2.5};
   const Adjustment adjustment = adjust(buffer, adjust_with, progress);
   const std::size_t seen = adjustment.num_left_out + adjustment.bundle.observations.size();
-  constexpr double most_left_out = 0.3;
+  constexpr double max_left_out = 0.3;
   if (!adjustment.has_value ||
-      static_cast<double>(adjustment.num_left_out) > most_left_out * static_cast<double>(seen)) {
+      static_cast<double>(adjustment.num_left_out) > max_left_out * static_cast<double>(seen)) {
     return std::numeric_limits<double>::infinity();
   }
   return adjustment.sigma_px * report.scale.scale;
@@ -144,7 +144,7 @@ double noise_of(const RotationLog& log, const ObserveConfig& config, const Obser
 }  // namespace
 
 std::optional<ObserveConfig> searched_causes(const RotationLog& log, const ObserveConfig& config,
-                                             const ObserveReport& report, double most_noise_px,
+                                             const ObserveReport& report, double max_noise_px,
                                              const Progress& progress) {
   constexpr double as_well = 1.15;
   if (log.rows.size() < 10 || log.num_points < 2) return std::nullopt;
@@ -161,13 +161,13 @@ std::optional<ObserveConfig> searched_causes(const RotationLog& log, const Obser
   // Where the richest do not explain it, none does.
   const double as_told = noise_of(log, config, report, sample, progress);
   constexpr double clearly = 0.6;
-  most_noise_px = std::min(most_noise_px, clearly * as_told);
+  max_noise_px = std::min(max_noise_px, clearly * as_told);
   for (auto trial = trials().rbegin(); trial != trials().rbegin() + 2; ++trial) attempt(*trial);
   attempt({.drift = true});
-  if (!(least < most_noise_px)) return std::nullopt;
+  if (!(least < max_noise_px)) return std::nullopt;
   for (const Trial& trial : trials()) {
     attempt(trial);
-    if (found.back().first < most_noise_px && found.back().first < as_well * least) return found.back().second;
+    if (found.back().first < max_noise_px && found.back().first < as_well * least) return found.back().second;
   }
   return std::nullopt;
 }
@@ -185,7 +185,7 @@ bool has_no_rest(const RotationLog& log, const ObserveConfig& config, const Obse
   int judged = 0, unsteady = 0;
   std::size_t k = 0;
   while (k < sample.frames.size()) {
-    FrameBuffer buffer(sample.px.front().size(), most_search_frames);
+    FrameBuffer buffer(sample.px.front().size(), max_search_frames);
     const double until_s = sample.frames[k].t_s + window_s;
     still.start.drift_from_s = sample.frames[k].t_s;
     for (; k < sample.frames.size() && sample.frames[k].t_s < until_s; ++k) {

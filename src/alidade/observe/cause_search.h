@@ -5,11 +5,11 @@
 
 namespace alidade {
 
-/// The configuration that frees what explains all rows with less noise than `most_noise_px`: the simplest of those that
+/// The configuration that frees what explains all rows with less noise than `max_noise_px`: the simplest of those that
 /// do about as well as any. None: nothing does. For reports whose residuals are more than points' noise, or that saw
 /// zooms, where tests of one cause at a time do not see it.
 [[nodiscard]] std::optional<ObserveConfig> searched_causes(const RotationLog& log, const ObserveConfig& config,
-                                                           const ObserveReport& report, double most_noise_px,
+                                                           const ObserveReport& report, double max_noise_px,
                                                            const Progress& progress);
 
 /// Does the focal length change within most seconds of the log, so that one that grows or shrinks explains them clearly

@@ -140,7 +140,7 @@ TEST(FangExperiment3, FastFollowsAZoomThatMovesNothing) {
   }
 }
 
-TEST(FangExperiment3, ButNotOneThatMovesThePicture) {
+TEST(FangExperiment3, ButNotOneThatMovesTheImage) {
   const ZoomFigures figures = experiment_3(physical_zoom_log, 30);
   EXPECT_GT(figures.ramp[0].median(), 100.0);  // or no value; 590 px in that study
   for (std::size_t i = 0; i < 4; ++i) EXPECT_LT(figures.after[i].median(), 0.3) << figures.after[i];

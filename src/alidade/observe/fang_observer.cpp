@@ -12,7 +12,7 @@ using Matrix8 = Eigen::Matrix<double, 8, 8>;
 /// Added to a measured Ḡ: directions that nothing excited get a gain that is large, not infinite.
 constexpr double gramian_floor = 1e-6;
 
-/// Diagonal of Ḡ, median of many sets of four points in a picture of 780×582 under the paper's motion. The last two, of
+/// Diagonal of Ḡ, median of many sets of four points in an image of 780×582 under the paper's motion. The last two, of
 /// a head at 20° of tilt.
 Matrix8 typical_gramian(std::size_t num_points) {
   DifferenceParameters diagonal;
@@ -66,7 +66,7 @@ IntrinsicsEstimate FangObserver::step(const RotationFrame& frame) {
   if (frame.starts_segment) has_reference_ = false;
   if (choose_reference(frame)) take_step(frame);
   last_rate_ = frame.rate_rad_per_s;
-  has_started_ = has_started_ || intrinsics_of(theta(), least_inverse_focal).has_value();
+  has_started_ = has_started_ || intrinsics_of(theta(), min_inverse_focal).has_value();
   if (is_later_segment) return estimate(ObserveEvent::new_segment);
   return estimate(has_started_ && !had_started ? ObserveEvent::start : ObserveEvent::none);
 }
@@ -75,15 +75,15 @@ IntrinsicsEstimate FangObserver::step(const RotationFrame& frame) {
 bool FangObserver::choose_reference(const RotationFrame& frame) {
   if (has_reference_ && is_seen(frame.px[reference_])) return true;
   has_reference_ = false;
-  double least_distance2 = 0.0;
+  double min_distance2 = 0.0;
   for (std::size_t i = 0; i < points_.size(); ++i) {
     points_[i].is_live = false;
     if (!is_seen(frame.px[i])) continue;
     const bool is_given = config_.reference_point == i;
     const double distance2 = is_given ? 0.0 : (frame.px[i] - config_.scale.centre).squaredNorm();
-    if (has_reference_ && distance2 >= least_distance2) continue;
+    if (has_reference_ && distance2 >= min_distance2) continue;
     reference_ = i;
-    least_distance2 = distance2;
+    min_distance2 = distance2;
     has_reference_ = true;
   }
   return has_reference_;
@@ -206,7 +206,7 @@ IntrinsicsEstimate FangObserver::estimate(ObserveEvent event) const {
   IntrinsicsEstimate estimate;
   estimate.event = event;
   estimate.sigma.setConstant(std::numeric_limits<double>::quiet_NaN());
-  const std::optional<Eigen::Vector4d> k = intrinsics_of(theta(), least_inverse_focal);
+  const std::optional<Eigen::Vector4d> k = intrinsics_of(theta(), min_inverse_focal);
   if (!has_started_ || !k) return estimate;
   const Eigen::Vector4d px = intrinsics_in_px(config_.scale, *k);
   estimate.has_value = true;

@@ -38,7 +38,7 @@ struct FangConfig {
   /// The regression takes the rates measured at both ends of a step, as the paper would, not their mean over it. At 30
   /// Hz that costs fx 0.2 px, the error of the trapezoid rule.
   bool rates_at_ends = false;
-  /// The point that differences are taken to, while it is seen; otherwise the one nearest the picture's centre.
+  /// The point that differences are taken to, while it is seen; otherwise the one nearest the image's centre.
   std::optional<std::size_t> reference_point;
   std::optional<FangGains> gains;  ///< Instead of the profile's.
   /// Ḡ, the mean of ΩΩᵀ, where it is known beforehand. Otherwise a typical one serves until `excitation_period_s` has

@@ -81,7 +81,7 @@ void FlowFilter::project() {
   const Eigen::Matrix<double, 14, 14> information = theta_.information();
   Projection best = projection_from(k_, information);
   if (!(best.chi2 < implausible_chi2)) {
-    const auto plain = intrinsics_of(theta_.mean()(difference_rows), least_inverse_focal);
+    const auto plain = intrinsics_of(theta_.mean()(difference_rows), min_inverse_focal);
     const Projection other = plain ? projection_from(*plain, information) : best;
     if (other.chi2 < best.chi2) best = other;
   }

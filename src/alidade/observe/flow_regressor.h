@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// The picture's flow under a rotation of the camera is linear in unknown constants Θ. For a static far point seen at
+/// The image's flow under a rotation of the camera is linear in unknown constants Θ. For a static far point seen at
 /// q = (px, py) and a camera that turns with ω (camera frame, ṁ = −ω × m),
 ///
 ///   ṗx = [−px²ωy, 2pxωy, 0, pxpyωx, −pyωx, −pxωx | −ωy, ωx, 0, 0 | pyωz, −ωz, 0, 0] Θ
@@ -38,8 +38,8 @@ inline constexpr std::array<Eigen::Index, 8> difference_rows{0, 1, 2, 3, 4, 5, 1
 [[nodiscard]] DifferenceParameters difference_parameters(const Eigen::Vector4d& k);
 [[nodiscard]] Eigen::Matrix<double, 8, 4> difference_parameters_jacobian(const Eigen::Vector4d& k);
 
-/// A focal length beyond twenty half pictures is no estimate yet.
-inline constexpr double least_inverse_focal = 1.0 / 20.0;
+/// A focal length beyond twenty half images is no estimate yet.
+inline constexpr double min_inverse_focal = 1.0 / 20.0;
 
 [[nodiscard]] constexpr double squared(double x) { return x * x; }
 

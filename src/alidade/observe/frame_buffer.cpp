@@ -157,9 +157,9 @@ Adjustment adjust(const FrameBuffer& buffer, const AdjustConfig& config, const P
   // Again from there: without what does not belong, then with the noise that the rest tells.
   for (int round = 0; round < 2 && adjustment.has_value; ++round) {
     const BundleSolution& so_far = adjustment.solution;
-    constexpr double least_sigma = 2e-5;  // about 0.01 px: no tracker is better, and rates are sampled
+    constexpr double min_sigma = 2e-5;  // about 0.01 px: no tracker is better, and rates are sampled
     const double robust = robust_sigma(so_far.residual_px, so_far.dof);
-    const double told = std::max(round == 0 ? robust : sigma_by_squares(so_far), least_sigma);
+    const double told = std::max(round == 0 ? robust : sigma_by_squares(so_far), min_sigma);
     if (!sigma_is_known) solve.sigma_px = told;
     if (config.reject && round == 0) {
       adjustment.num_left_out = leave_out_far(bundle, so_far, std::max(told, solve.sigma_px));

@@ -1,7 +1,7 @@
 #pragma once
 
+#include "alidade/observe/arrowhead_filter.h"
 #include "alidade/observe/frame_buffer.h"
-#include "alidade/observe/star_filter.h"
 
 namespace alidade {
 
@@ -25,9 +25,9 @@ struct HybridConfig {
 };
 
 /// The default estimator of a rotating camera: a rotation bundle adjustment over the first second, adjusted again
-/// while the answer is still coarse, then an extended Kalman filter (StarFilter) that judges each frame before it takes
-/// it in: a point that slipped is left out (and after 15 frames met anew), a burst of noise is skipped, a change of
-/// the intrinsics is followed, as fast as it is. While the focal length does not stand still it does not begin. If
+/// while the answer is still coarse, then an extended Kalman filter (ArrowheadFilter) that judges each frame before it
+/// takes it in: a point that slipped is left out (and after 15 frames met anew), a burst of noise is skipped, a change
+/// of the intrinsics is followed, as fast as it is. While the focal length does not stand still it does not begin. If
 /// nothing fits for a second it starts again.
 /// `step` allocates nothing once the adjustments are over (about 4 s).
 /// docs/maths/rotating-camera.md.
@@ -37,7 +37,7 @@ class HybridObserver {
 
   IntrinsicsEstimate step(const RotationFrame& frame);
 
-  [[nodiscard]] const StarFilter& filter() const { return filter_; }
+  [[nodiscard]] const ArrowheadFilter& filter() const { return filter_; }
   [[nodiscard]] bool is_running() const { return is_running_; }
   /// σ of a pixel coordinate: given, or as the log tells so far. [px]
   [[nodiscard]] double sigma_px() const { return config_.scale.scale * sigma_px_ * noise_ratio(); }
@@ -69,7 +69,7 @@ class HybridObserver {
   [[nodiscard]] Judgement judge();
   bool leave_out_until(double gate_z, Judgement& judgement);
   [[nodiscard]] bool is_zoom(const RotationFrame& frame);
-  void jump(StarFilter& filter, const RotationFrame& frame) const;
+  void jump(ArrowheadFilter& filter, const RotationFrame& frame) const;
   void begin_zoom();
   [[nodiscard]] bool has_drifted(IntrinsicsEstimate& estimate);
   [[nodiscard]] int drifting_point() const;
@@ -80,7 +80,7 @@ class HybridObserver {
   void note_slips();
   void note_rest();
   void restart(IntrinsicsEstimate& estimate);
-  [[nodiscard]] CommonVector walk(const StarFilter& filter, double frames) const;
+  [[nodiscard]] CommonVector walk(const ArrowheadFilter& filter, double frames) const;
   [[nodiscard]] CommonVector zoom_walk() const;
   void learn_zoom_walk(const Eigen::Vector4d& k_before);
   [[nodiscard]] double noise_ratio() const;
@@ -91,12 +91,12 @@ class HybridObserver {
   static constexpr int rest_frames = 10;   ///< Over which a zoom that is over shows no change.
 
   HybridConfig config_;
-  StarFilter filter_;
+  ArrowheadFilter filter_;
   FrameBuffer buffer_;
   std::vector<Eigen::Vector2d> px_;  ///< Of this frame, normalised.
   std::vector<int> frames_out_;      ///< One a point: in a row left out,
   std::vector<int> patience_;        ///< and how many before it is met anew.
-  StarFilter candidate_;             ///< The filter if the last frame was a zoom.
+  ArrowheadFilter candidate_;        ///< The filter if the last frame was a zoom.
   bool has_candidate_ = false;
   bool is_coarse_ = true;  ///< Still adjusted, not only filtered.
   bool is_running_ = false;

@@ -10,7 +10,7 @@ RotatingCamera start_camera(const ObserveConfig& config, const PixelScale& scale
   RotatingCamera start;
   start.k = config.start ? scale.normalised_intrinsics(*config.start) : Eigen::Vector4d(1.3, 1.3, 0.0, 0.0);
   if (config.lever_m) start.lever_m = *config.lever_m;
-  if (config.height_px > 0) start.picture_height = config.height_px / scale.scale;
+  if (config.height_px > 0) start.image_height = config.height_px / scale.scale;
   return start;
 }
 

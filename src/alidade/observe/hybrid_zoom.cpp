@@ -13,7 +13,7 @@ constexpr double zoom_memory = 0.8;  // of a frame's change for the next frame's
 }  // namespace
 
 /// Variance that so many frames of zoom add.
-CommonVector HybridObserver::walk(const StarFilter& filter, double frames) const {
+CommonVector HybridObserver::walk(const ArrowheadFilter& filter, double frames) const {
   CommonVector variance = CommonVector::Zero(filter.layout().size);
   const double sigma = config_.zoom_px / config_.scale.scale;
   variance.head<4>().setConstant(frames * sigma * sigma);
@@ -64,7 +64,7 @@ bool HybridObserver::is_zoom(const RotationFrame& frame) {
 
 /// Lets the intrinsics walk as far as this frame wants them to, and no farther: what it takes for a step of 70 px would
 /// make a drift of 1 px as noisy as one frame is.
-void HybridObserver::jump(StarFilter& filter, const RotationFrame& frame) const {
+void HybridObserver::jump(ArrowheadFilter& filter, const RotationFrame& frame) const {
   const CommonVector step = filter.if_walked(walk(filter, any_zoom)).step;
   filter.remember_intrinsics();
   CommonVector variance = walk(filter, 4.0);

@@ -58,7 +58,7 @@ std::vector<Misreading> misreadings_of(RotationSource source) {
           {"the rates are degrees per second", scaled(degree, degree, degree)}};
 }
 
-constexpr std::size_t most_frames = 150;
+constexpr std::size_t max_frames = 150;
 
 /// Noise [px] with which the log is explained, by the rows of its first seconds, thinned; infinite: not at all.
 struct Explanation {
@@ -69,7 +69,7 @@ struct Explanation {
 Explanation explanation_of(const RotationLog& log, const ObserveConfig& config, const PixelScale& scale,
                            const Progress& progress) {
   MotionReader reader(log.source, config.max_gap_s);
-  FrameBuffer buffer(log.num_points, most_frames);
+  FrameBuffer buffer(log.num_points, max_frames);
   std::vector<Eigen::Vector2d> px(log.num_points);
   for (const RotationRow& row : log.rows) {
     const RotationFrame frame = reader.next(row);
@@ -94,14 +94,14 @@ Explanation explanation_of(const RotationLog& log, const ObserveConfig& config, 
 
 /// Turns so small, or about one axis only, tell nothing however they are read.
 bool turns_can_tell(const ObserveMotion& motion) {
-  constexpr double least_rad = 3.0 * degree, little = 0.02;  // of the largest: an axis that did not turn
-  return motion.span_rad >= least_rad && motion.path_rad.head<2>().minCoeff() >= little * motion.path_rad.maxCoeff();
+  constexpr double min_rad = 3.0 * degree, little = 0.02;  // of the largest: an axis that did not turn
+  return motion.span_rad >= min_rad && motion.path_rad.head<2>().minCoeff() >= little * motion.path_rad.maxCoeff();
 }
 
 }  // namespace
 
 bool may_be_misread(const ObserveReport& report) {
-  constexpr double most_ordinary_px = 2.0, many = 0.2;
+  constexpr double max_ordinary_px = 2.0, many = 0.2;
   using Status = ObserveReport::Status;
   constexpr double ask_beyond = 5.0;
   const bool has_answer = report.status == Status::ok || report.status == Status::too_few_data;
@@ -109,16 +109,16 @@ bool may_be_misread(const ObserveReport& report) {
   if (std::ranges::any_of(report.causes, [](const CauseScore& cause) { return cause.z >= ask_beyond; })) return true;
   const auto seen = static_cast<double>(report.reference.bundle.observations.size() + report.pixels_left_out);
   return report.status == Status::ok &&
-         (report.sigma_px > most_ordinary_px || static_cast<double>(report.pixels_left_out) > many * seen);
+         (report.sigma_px > max_ordinary_px || static_cast<double>(report.pixels_left_out) > many * seen);
 }
 
 std::string misread_rotation(const RotationLog& log, const ObserveConfig& config, const ObserveReport& report,
                              const Progress& progress) {
   if (log.source == RotationSource::none || config.rotation == RotationKnowledge::free) return "";
-  constexpr double most_px = 3.0, clearly = 0.3;  // of the noise as the log is read
+  constexpr double max_px = 3.0, clearly = 0.3;  // of the noise as the log is read
   const double as_read = explanation_of(log, config, report.scale, progress).noise_px;
   std::string best;
-  double least = std::min(most_px, clearly * as_read);
+  double least = std::min(max_px, clearly * as_read);
   for (const Misreading& misreading : misreadings_of(log.source)) {
     RotationLog undone = log;
     for (RotationRow& row : undone.rows) misreading.undo(row);

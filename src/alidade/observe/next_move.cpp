@@ -12,7 +12,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t most_points = 50;
+constexpr std::size_t max_points = 50;
 
 class Planner {
  public:
@@ -20,7 +20,7 @@ class Planner {
     scale_ = {0.5 * Eigen::Vector2d(now.width_px - 1.0, now.height_px - 1.0), 0.5 * now.width_px};
     bundle_.camera.k = scale_.normalised_intrinsics(now.k_px);
     const RotationView view(bundle_.camera, RotationFrame{});
-    const std::size_t stride = std::max<std::size_t>(1, now.points_px.size() / most_points);
+    const std::size_t stride = std::max<std::size_t>(1, now.points_px.size() / max_points);
     for (std::size_t i = 0; i < now.points_px.size(); i += stride) {
       const auto ray = view.ray_in_start(scale_.normalised(now.points_px[i]));
       if (ray) bundle_.points.push_back({rotation_to(*ray), Eigen::Vector2d::Zero(), 0.0});

@@ -24,7 +24,7 @@ struct MoveLimits {
 };
 
 /// Turn to this pan, tilt, roll (from where the camera looks now), and what will be known then if enough points stay in
-/// the picture.
+/// the image.
 struct NextMove {
   Eigen::Vector3d pan_tilt_roll_rad = Eigen::Vector3d::Zero();
   double duration_s = 0.0;
@@ -33,7 +33,7 @@ struct NextMove {
 
 /// The moves that lower the uncertainty of fx, fy, cx, cy most, one after the other: each is the best of turns in eight
 /// directions and three lengths (and rolls), by the information of the pixels on the way, with the points' bearings
-/// unknown. Empty: no point is seen, or none stays in the picture.
+/// unknown. Empty: no point is seen, or none stays in the image.
 [[nodiscard]] std::vector<NextMove> plan_next_moves(const ObservedNow& now, const MoveLimits& limits, int num_moves,
                                                     const Progress& progress = {});
 

@@ -19,8 +19,8 @@ Eigen::Vector4d intrinsics_px(const Eigen::Vector4d& k, const PixelScale& scale)
   return {px[0], px[1], px[2] + scale.centre.x(), px[3] + scale.centre.y()};
 }
 
-constexpr std::size_t most_turns = 240;  // frames whose rotation is estimated: the solve is cubic in them
-constexpr std::size_t most_cells = 4000000;
+constexpr std::size_t max_turns = 240;  // frames whose rotation is estimated: the solve is cubic in them
+constexpr std::size_t max_cells = 4000000;
 
 /// One run over one log: frames, scale and start made once, then a method, then the reference.
 class Observation {
@@ -241,8 +241,8 @@ class Observation {
     };
     for (const RotationFrame& frame : frames_) rows += is_at_rest(frame) ? 1u : 0u;
     const bool turns = config_.rotation != RotationKnowledge::known;
-    const std::size_t room = std::max<std::size_t>(most_cells / std::max<std::size_t>(log_.num_points, 1), 64);
-    FrameBuffer buffer(log_.num_points, turns ? most_turns : std::min(rows + 1, room));
+    const std::size_t room = std::max<std::size_t>(max_cells / std::max<std::size_t>(log_.num_points, 1), 64);
+    FrameBuffer buffer(log_.num_points, turns ? max_turns : std::min(rows + 1, room));
     for (std::size_t k = 0; k < frames_.size(); ++k) {
       if (is_at_rest(frames_[k])) add_frame(buffer, k);
     }

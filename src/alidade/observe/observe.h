@@ -27,7 +27,7 @@ struct ObserveConfig {
   std::optional<Eigen::Vector4d> start;      ///< fx, fy, cx, cy [px]; none: found from the data.
   bool square_pixels = false;                ///< fx = fy.
   bool no_zoom = false;                      ///< The intrinsics are those of one camera: what seems a zoom is none.
-  bool fixed_centre = false;                 ///< cx, cy: the start's, else the picture's middle.
+  bool fixed_centre = false;                 ///< cx, cy: the start's, else the image's middle.
   double sigma_px = 0.0;                     ///< 0: told by the residuals.
   double sigma_angle_rad = 0.0;              ///< Of heads and attitudes, where the rotation is noisy.
   double sigma_rate_rad_per_s = 0.0;         ///< Of rates.
@@ -143,7 +143,7 @@ struct ObserveReport {
 /// The word for an event in files: start, burst, slip, zoom, zoom_end, restart, gap; empty for none.
 [[nodiscard]] std::string_view event_name(ObserveEvent event);
 
-/// Picture's middle and half width: of the size given, else of what holds the pixels.
+/// Image's middle and half width: of the size given, else of what holds the pixels.
 [[nodiscard]] PixelScale pixel_scale(const RotationLog& log, int& width_px, int& height_px);
 
 /// What the log and the person give, with the answer's move for an error of its σ or, without one, of what errors

@@ -16,7 +16,7 @@ void add_turns(const RotationLog& log, const std::vector<RotationError>& errors,
 }
 
 bool is_observable(const ObserveReport& report, const CommonMatrix& bound) {
-  constexpr double most = 0.05;  // of the focal length; of the picture's width
+  constexpr double most = 0.05;  // of the focal length; of the image's width
   const Eigen::Vector4d& k = report.reference.solution.camera.k;
   const Eigen::Vector4d variance = bound.diagonal().head<4>();
   if (!(variance.array() > 0.0).all() || !variance.allFinite()) return false;
@@ -76,9 +76,9 @@ ObserveReport observe_as_told(const RotationLog& log, const ObserveConfig& confi
   const std::vector<RotationError> errors = is_known ? estimated_errors(log, config) : std::vector<RotationError>{};
   RotationErrors undone = RotationErrors::Zero(static_cast<Eigen::Index>(errors.size()));
   ObserveReport report = observe_once(log, config, errors, undone, progress);
-  constexpr int most_rounds = 4;
+  constexpr int max_rounds = 4;
   constexpr double little = 0.02;  // of the ordinary size: what is left of it is linear
-  for (int round = 1; round < most_rounds && !errors.empty(); ++round) {
+  for (int round = 1; round < max_rounds && !errors.empty(); ++round) {
     if (report.status != ObserveReport::Status::ok || report.errors.size() != undone.size()) break;
     if ((report.errors - undone).cwiseAbs().maxCoeff() < little) break;
     undone = report.errors;

@@ -6,7 +6,7 @@
 namespace alidade {
 namespace {
 
-constexpr int most_rounds = 6;
+constexpr int max_rounds = 6;
 
 /// Frees what the cause names, "k1,k2", "mount", "backlash". False: it cannot be estimated, or is already.
 bool free_cause(const std::string& cause, const RotationLog& log, ObserveConfig& config) {
@@ -55,7 +55,7 @@ const CauseScore* best_cause(const ObserveReport& report) {
 
 bool is_answer(const ObserveReport& report) { return report.status == ObserveReport::Status::ok; }
 
-/// Without an answer there may be one where the camera is mounted askew, late, and bends its picture.
+/// Without an answer there may be one where the camera is mounted askew, late, and bends its image.
 ObserveReport second_chance(const RotationLog& log, ObserveConfig& config, const Progress& progress) {
   ObserveConfig freer = config;
   freer.estimate.mount = freer.estimate.delay = true;
@@ -149,7 +149,7 @@ std::vector<Check> rival_checks(const std::vector<Rival>& rivals, const Rotation
 /// Frees one cause after the other, the one that explains most first.
 void free_one_by_one(const RotationLog& log, const Progress& progress, ObserveConfig& config, ObserveReport& report,
                      std::vector<Rival>& rivals) {
-  for (int round = 0; round < most_rounds && is_answer(report); ++round) {
+  for (int round = 0; round < max_rounds && is_answer(report); ++round) {
     const CauseScore* cause = best_cause(report);
     ObserveConfig next = config;
     if (cause == nullptr || zooms(*cause) || !free_cause(cause->name, log, next)) break;
@@ -164,18 +164,18 @@ void free_one_by_one(const RotationLog& log, const Progress& progress, ObserveCo
 
 /// Residuals that are more than points' noise, or zooms, may be several causes at once.
 bool is_doubtful(const ObserveReport& report) {
-  constexpr double most_ordinary_px = 2.0, many = 9.0, vague = 0.005;
+  constexpr double max_ordinary_px = 2.0, many = 9.0, vague = 0.005;
   if (!is_answer(report)) return true;
-  return has_zoom(report) || report.sigma_px > most_ordinary_px || report.stated.blocks.design_effect > many ||
+  return has_zoom(report) || report.sigma_px > max_ordinary_px || report.stated.blocks.design_effect > many ||
          report.quantities[0].sigma > vague * report.quantities[0].value;
 }
 
 /// Tries sets of causes from what the person told.
 bool search_causes(const RotationLog& log, const Progress& progress, ObserveConfig& config, ObserveReport& report) {
-  constexpr double clearly = 0.6, with_zoom = 3.0, most_px = 2.0;
-  double most_px_here = most_px;
-  if (is_answer(report)) most_px_here = std::min(most_px, (has_zoom(report) ? with_zoom : clearly) * report.sigma_px);
-  const auto found = searched_causes(log, config, report, most_px_here, progress);
+  constexpr double clearly = 0.6, with_zoom = 3.0, max_px = 2.0;
+  double max_px_here = max_px;
+  if (is_answer(report)) max_px_here = std::min(max_px, (has_zoom(report) ? with_zoom : clearly) * report.sigma_px);
+  const auto found = searched_causes(log, config, report, max_px_here, progress);
   if (!found) return false;
   ObserveConfig freer = *found;
   ObserveReport again = observe_as_told(log, freer, progress);
@@ -195,14 +195,14 @@ bool search_causes(const RotationLog& log, const Progress& progress, ObserveConf
 /// still.
 bool never_rests(const RotationLog& log, const ObserveConfig& config, const ObserveReport& report,
                  const Progress& progress) {
-  constexpr double vague = 0.005, most_ordinary_px = 2.0;
+  constexpr double vague = 0.005, max_ordinary_px = 2.0;
   if (report.status == ObserveReport::Status::no_convergence) return has_no_rest(log, config, report, progress);
   if (!is_answer(report)) return false;
   const CauseScore* cause = best_cause(report);
   if (cause != nullptr && zooms(*cause)) return true;
   if (std::abs(report.reference.solution.camera.drift_per_s) > fastest_drift_per_s) return true;
   const bool is_vague =
-      report.sigma_px > most_ordinary_px || report.quantities[0].sigma > vague * report.quantities[0].value;
+      report.sigma_px > max_ordinary_px || report.quantities[0].sigma > vague * report.quantities[0].value;
   return is_vague && has_no_rest(log, config, report, progress);
 }
 
@@ -210,11 +210,11 @@ bool never_rests(const RotationLog& log, const ObserveConfig& config, const Obse
 /// theirs is the answer, and the report says so.
 void prefer_all_rows(const RotationLog& log, const ObserveConfig& config, const Progress& progress,
                      ObserveReport& report) {
-  constexpr double most_off = 3.0;
+  constexpr double max_off = 3.0;
   const bool is_filter = config.method == ObserveMethod::hybrid || config.method == ObserveMethod::window;
   if (!is_filter || config.rotation != RotationKnowledge::known) return;
   if (report.status == ObserveReport::Status::unsteady || report.status == ObserveReport::Status::too_few_data) return;
-  if (is_answer(report) && !(report.from_reference > most_off)) return;
+  if (is_answer(report) && !(report.from_reference > max_off)) return;
   ObserveConfig whole = config;
   whole.method = ObserveMethod::batch;
   ObserveReport all = observe_as_told(log, whole, progress);
@@ -224,7 +224,7 @@ void prefer_all_rows(const RotationLog& log, const ObserveConfig& config, const 
                               : std::string("the filter did not settle");
   all.events = std::move(report.events);
   all.told_apart.push_back({"from all rows", State::good, why + ": theirs is the answer", report.from_reference,
-                            most_off, "σ", "intrinsics"});
+                            max_off, "σ", "intrinsics"});
   report = std::move(all);
 }
 

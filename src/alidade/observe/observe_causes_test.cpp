@@ -14,7 +14,7 @@
 namespace alidade {
 namespace causes_of_observe {
 
-constexpr int picture_width = 1280, picture_height = 720;
+constexpr int image_width = 1280, image_height = 720;
 
 /// Draws of each cause: 3, or as many as ALIDADE_TEST_TRIALS says.
 const int sets = [] {
@@ -40,9 +40,9 @@ struct World {
 RotationLog log_in(const World& world, std::uint64_t seed) {
   Draws draws(5000 + seed);
   RotationScene scene;
-  scene.width_px = picture_width;
-  scene.height_px = picture_height;
-  scene.start_px = draw_points(picture_width, picture_height, 12, 300 + seed);
+  scene.width_px = image_width;
+  scene.height_px = image_height;
+  scene.start_px = draw_points(image_width, image_height, 12, 300 + seed);
   scene.intrinsics = [](double) { return RotatingIntrinsics{true_k[0], true_k[1], true_k[2], true_k[3]}; };
   std::array<double, 4> rate{}, phase{};
   for (std::size_t i = 0; i < 4; ++i) {
@@ -62,11 +62,11 @@ RotationLog log_in(const World& world, std::uint64_t seed) {
   config.source = world.source;
   config.duration_s = 10.0;
   config.sigma_px = 0.3;
-  config.clip_to_picture = true;
+  config.clip_to_image = true;
   world.scene(scene, config, draws);
   RotationLog log = simulate_rotation(scene, config, seed);
   if (!world.tells_scale) log.sigma_scale = log.sigma_parallax = std::nullopt;
-  add_faults(world.faults, picture_width, picture_height, seed, log);
+  add_faults(world.faults, image_width, image_height, seed, log);
   return log;
 }
 
@@ -75,8 +75,8 @@ ObserveConfig auto_config(ObserveMethod method = ObserveMethod::hybrid) {
   config.method = method;
   config.estimate_auto =
       method == ObserveMethod::hybrid || method == ObserveMethod::batch || method == ObserveMethod::window;
-  config.width_px = picture_width;
-  config.height_px = picture_height;
+  config.width_px = image_width;
+  config.height_px = image_height;
   return config;
 }
 

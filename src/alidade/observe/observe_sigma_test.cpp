@@ -227,7 +227,7 @@ const std::vector<Cause>& causes() {
       {.name = "rolling shutter",
        .disturb =
            [](RotationLog& log, Draws&) {
-             const RotationLog still = log;  // a row lower in the picture is seen later, by up to 15 ms
+             const RotationLog still = log;  // a row lower in the image is seen later, by up to 15 ms
              for (std::size_t k = 1; k + 1 < log.rows.size(); ++k) {
                const double span_s = still.rows[k + 1].t_s - still.rows[k - 1].t_s;
                for (std::size_t i = 0; i < log.num_points; ++i) {

@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <numbers>
 
-#include "alidade/io/csv.h"
+#include "alidade/files/csv.h"
 #include "alidade/observe/hybrid.h"
 #include "alidade/observe/observe.h"
 #include "alidade/simulate/draws.h"
@@ -42,7 +42,7 @@ std::optional<BroadcastMotion> broadcast(const std::string& name) {
 /// Before the broadcast the operator sways the camera, zoom at rest, for a period of the paper's motion.
 const double sway_s = 2.0 * std::numbers::pi / 0.8;
 
-/// Points all around the field, of which the picture holds a dozen at a time.
+/// Points all around the field, of which the image holds a dozen at a time.
 RotationLog log_of(const BroadcastMotion& motion, double first_s, std::uint64_t seed) {
   RotationScene scene;
   scene.width_px = 1280;
@@ -64,7 +64,7 @@ RotationLog log_of(const BroadcastMotion& motion, double first_s, std::uint64_t 
   config.rate_hz = motion.rate_hz;
   config.duration_s = first_s + static_cast<double>(motion.f_px.size() - 1) / motion.rate_hz;
   config.sigma_px = 0.3;
-  config.clip_to_picture = true;
+  config.clip_to_image = true;
   return simulate_rotation(scene, config, seed);
 }
 

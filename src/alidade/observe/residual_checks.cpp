@@ -7,9 +7,9 @@
 namespace alidade {
 namespace {
 
-constexpr double most_ordinary_px = 2.0, most_possible_px = 6.0;  // noise of a point finder
-constexpr double many_left_out = 0.2, most_left_out = 0.4;        // share of what was seen
-constexpr double moves_beyond = 4.0;                              // of a track's residuals over the others' median
+constexpr double max_ordinary_px = 2.0, max_possible_px = 6.0;  // noise of a point finder
+constexpr double many_left_out = 0.2, max_left_out = 0.4;       // share of what was seen
+constexpr double moves_beyond = 4.0;                            // of a track's residuals over the others' median
 
 /// Asked for, the one that explains best first.
 std::vector<const CauseScore*> asked_for(const ObserveReport& report) {
@@ -40,11 +40,11 @@ std::string advice_for(const CauseScore& cause) {
 }
 
 Check noise_check(const ObserveReport& report) {
-  Check check{"noise", State::good, "", report.sigma_px, most_ordinary_px, "px", "residuals"};
+  Check check{"noise", State::good, "", report.sigma_px, max_ordinary_px, "px", "residuals"};
   check.text = "σ of a pixel is " + text_of(report.sigma_px, 2) + " px";
   if (!report.sigma_is_told) return check;
-  if (check.value > most_ordinary_px) {
-    check.state = check.value > most_possible_px ? State::bad : State::care;
+  if (check.value > max_ordinary_px) {
+    check.state = check.value > max_possible_px ? State::bad : State::care;
     check.text += ": no finder of points is so unsure, something else moves them";
   }
   return check;
@@ -57,7 +57,7 @@ Check left_out_check(const ObserveReport& report) {
               "%",        "residuals"};
   check.text = text_of(check.value, 2) + " % of the pixels were left out";
   if (check.value > 100.0 * many_left_out) {
-    check.state = check.value > 100.0 * most_left_out ? State::bad : State::care;
+    check.state = check.value > 100.0 * max_left_out ? State::bad : State::care;
     check.text += ": points move, or are taken for each other";
   }
   return check;
@@ -74,9 +74,9 @@ Check points_check(const ObserveReport& report) {
     squares[point] += reference.solution.residual_px[i] * reference.solution.residual_px[i];
     count[point] += 2.0;
   }
-  constexpr double least_pixels = 20.0;
+  constexpr double min_pixels = 20.0;
   for (std::size_t i = 0; i < num; ++i) {
-    if (count[i] >= least_pixels) rms.push_back(std::sqrt(squares[i] / count[i]));
+    if (count[i] >= min_pixels) rms.push_back(std::sqrt(squares[i] / count[i]));
   }
   Check check{"points stand still", State::good, "", 0.0, moves_beyond, "", "points"};
   if (rms.size() < 3) {
@@ -88,7 +88,7 @@ Check points_check(const ObserveReport& report) {
   std::string names;
   for (std::size_t i = 0; i < reference.bundle_point_of.size(); ++i) {
     const int place = reference.bundle_point_of[i];
-    if (place < 0 || count[static_cast<std::size_t>(place)] < least_pixels) continue;
+    if (place < 0 || count[static_cast<std::size_t>(place)] < min_pixels) continue;
     const auto at = static_cast<std::size_t>(place);
     const double ratio = std::sqrt(squares[at] / count[at]) / std::max(median, 1e-12);
     check.value = std::max(check.value, ratio);
@@ -146,7 +146,7 @@ Check jitter_check(const ObserveReport& report) {
 
 namespace {
 
-/// Half a turn about x undoes a pan of the other sign, and a picture that is mirrored left to right, and so on.
+/// Half a turn about x undoes a pan of the other sign, and an image that is mirrored left to right, and so on.
 std::string half_turn_words(const Eigen::Vector3d& mount_rad) {
   const Eigen::Vector3d axis = mount_rad.cwiseAbs() / mount_rad.norm();
   constexpr double along = 0.95;
@@ -161,8 +161,8 @@ std::string half_turn_words(const Eigen::Vector3d& mount_rad) {
 }  // namespace
 
 Check rotation_check(const ObserveReport& report) {
-  constexpr double most_deg = 45.0;
-  Check check{"rotation", State::good, "the rotation fits as it is read", 0.0, most_deg, "°", "residuals"};
+  constexpr double max_deg = 45.0;
+  Check check{"rotation", State::good, "the rotation fits as it is read", 0.0, max_deg, "°", "residuals"};
   Eigen::Vector3d mount_rad = Eigen::Vector3d::Zero();
   for (const ObservedQuantity& quantity : report.quantities) {
     if (quantity.name == "mount_x_rad") mount_rad.x() = quantity.value;
@@ -173,7 +173,7 @@ Check rotation_check(const ObserveReport& report) {
   if (!report.misread.empty()) {
     check.state = State::bad;
     check.text = "the pixels fit better if the rotation is read otherwise: " + report.misread;
-  } else if (check.value > most_deg) {
+  } else if (check.value > max_deg) {
     check.state = State::bad;
     check.text = "the mount turns by " + text_of(check.value, 3) + "°: " + half_turn_words(mount_rad);
   }
@@ -188,8 +188,8 @@ double asked_beyond(const ObserveReport& report) {
 std::vector<Check> residual_checks(const ObserveReport& report) {
   std::vector<Check> checks;
   const auto asked = asked_for(report);
-  constexpr std::size_t most_named = 4;
-  for (std::size_t i = 0; i < std::min(asked.size(), most_named); ++i) {
+  constexpr std::size_t max_named = 4;
+  for (std::size_t i = 0; i < std::min(asked.size(), max_named); ++i) {
     const CauseScore& cause = *asked[i];
     std::string text = i == 0 ? "the residuals ask for " : "so they do for ";
     text += cause.name + " (" + size_of(cause) + "; " + text_of(cause.z, 2) + "σ)";

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double inverse_depth_information = 1.0;  // a point is 1 m away or farther: σ 1/m
 
-using PointByCommon = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most_common>;
+using PointByCommon = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_common>;
 
 /// The place of a bundle in its search: everything that is estimated.
 struct Place {

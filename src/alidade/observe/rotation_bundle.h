@@ -50,7 +50,7 @@ struct RotationBundleConfig {
 struct CommonPrior {
   explicit CommonPrior(const RotatingCamera& mean_in);
   RotatingCamera mean;
-  Eigen::Vector4d sigma_k;       ///< fx, fy: half their value; cx, cy: a quarter of the picture.
+  Eigen::Vector4d sigma_k;       ///< fx, fy: half their value; cx, cy: a quarter of the image.
   std::array<bool, 4> says_k{};  ///< sigma_k is said by a person, not weak.
   double sigma_aspect = std::numeric_limits<double>::infinity();  ///< Of fx − fy, where a person says so.
   double sigma_k1 = 0.5;                                          ///< k2, k3 too.
@@ -73,7 +73,7 @@ struct CommonPrior {
 
 /// A point's share of the joint covariance given the common parameters c: point = point_mean + slope (c − c_mean) + e,
 /// e ~ N(0, cov). Inverse depth is the third coordinate, if there is one.
-using PointByCommonSlope = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most_common>;
+using PointByCommonSlope = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_common>;
 struct PointGivenCommon {
   PointByCommonSlope slope;
   Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();

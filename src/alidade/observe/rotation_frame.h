@@ -7,8 +7,8 @@
 
 namespace alidade {
 
-inline constexpr int most_rotation_errors = 14;  ///< Of a head: scale, backlash, zero and curve of both axes.
-using TurnByErrors = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most_rotation_errors>;
+inline constexpr int max_rotation_errors = 14;  ///< Of a head: scale, backlash, zero and curve of both axes.
+using TurnByErrors = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_rotation_errors>;
 
 /// One instant as the estimators of a rotating camera take it: how the camera has turned since the start, and what it
 /// saw. A static point m has m(t) = R m(0) + shift in the camera frame, Ṙ = −[ω]× R.

@@ -28,7 +28,7 @@ CommonLayout::CommonLayout(const ObserveNuisances& nuisances) {
 
 namespace {
 
-/// A ray's place in the picture of focal length one, bent by the lens; Brown 1971.
+/// A ray's place in the image of focal length one, bent by the lens; Brown 1971.
 struct Bent {
   Eigen::Vector2d xy;
   double dxx, cross, dyy;  ///< ∂x'/∂x, ∂x'/∂y = ∂y'/∂x, ∂y'/∂y
@@ -134,13 +134,13 @@ void RotationView::turn_to(double late_s) {
 }
 
 double RotationView::late_at_row(double v) const {
-  return camera_.delay_s + camera_.shutter_s * v / camera_.picture_height;
+  return camera_.delay_s + camera_.shutter_s * v / camera_.image_height;
 }
 
 bool RotationView::turn_to_row_of(const BearingPoint& point) {
   double late_s = camera_.delay_s;
-  constexpr int most_rounds = 12;  // each leaves a hundredth: a row's time moves the point by few rows
-  for (int i = 0; i < most_rounds; ++i) {
+  constexpr int max_rounds = 12;  // each leaves a hundredth: a row's time moves the point by few rows
+  for (int i = 0; i < max_rounds; ++i) {
     const auto px = project_at_once(point);
     if (!px) return false;
     const double next_s = late_at_row(px->y());
@@ -186,8 +186,8 @@ bool RotationView::predict_by_rows(const BearingPoint& point, const CommonLayout
   Bent bent;
   if (!bend(camera_, d.x() / d.z(), d.y() / d.z(), bent)) return false;
   const Eigen::Vector2d by_time = pixel_by_cam(k_, d, bent) * (-cam_from_mount_ * late.rate_.cross(late.turned(point)));
-  if (layout.shutter >= 0) out.J_px_common.col(layout.shutter) = by_time * (out.px.y() / camera_.picture_height);
-  const double share = camera_.shutter_s / camera_.picture_height;
+  if (layout.shutter >= 0) out.J_px_common.col(layout.shutter) = by_time * (out.px.y() / camera_.image_height);
+  const double share = camera_.shutter_s / camera_.image_height;
   const Eigen::Vector2d follow = by_time * (share / (1.0 - share * by_time.y()));
   out.J_px_common += (follow * out.J_px_common.row(1)).eval();
   out.J_px_point += (follow * out.J_px_point.row(1)).eval();
@@ -212,7 +212,7 @@ bool RotationView::predict_at_once(const BearingPoint& point, const CommonLayout
     out.J_px_point.col(2).setZero();
     return true;
   }
-  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most_common> J_d_common(3, layout.size);
+  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_common> J_d_common(3, layout.size);
   Eigen::Matrix3d J_d_point;
   point_jacobians(point, layout, J_d_common, J_d_point);
   for (int column = 4; column < layout.size; ++column) {
@@ -234,7 +234,7 @@ bool RotationView::predict_at_once(const BearingPoint& point, const CommonLayout
 }
 
 void RotationView::point_jacobians(const BearingPoint& point, const CommonLayout& layout,
-                                   Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most_common>& J_common,
+                                   Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_common>& J_common,
                                    Eigen::Matrix3d& J_point) const {
   const double chi = point.inverse_depth;
   const Eigen::Vector3d in_mount = cam_from_mount_.transpose() * (point.ray() + chi * camera_.lever_m);

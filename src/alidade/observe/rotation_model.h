@@ -16,7 +16,7 @@ struct ObserveNuisances {
   bool mount = false;       ///< Rotation from the frame whose rotation is measured to the camera's, 3 angles.
   bool delay = false;       ///< Pixels are of t + delay.
   bool lever = false;       ///< Camera centre from the centre of rotation, camera frame. [m]
-  bool shutter = false;     ///< The picture's last row is of so much later than its first: a rolling shutter.
+  bool shutter = false;     ///< The image's last row is of so much later than its first: a rolling shutter.
   bool drift = false;       ///< fx and fy grow by so much of themselves a second: warmth, a focus that creeps.
   int errors = 0;           ///< Errors of the measured rotation, so many: RotationFrame::turn_by.
   bool learnt =
@@ -24,11 +24,11 @@ struct ObserveNuisances {
   bool turn = false;  ///< Error of the measured rotation, 3 angles; one a frame in a bundle, of now in a filter.
 };
 
-inline constexpr int most_common = 25 + most_rotation_errors;  ///< Of ObserveNuisances with everything.
-using RotationErrors = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_rotation_errors, 1>;
-using CommonVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_common, 1>;
-using CommonMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_common, most_common>;
-using PixelByCommon = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, most_common>;
+inline constexpr int max_common = 25 + max_rotation_errors;  ///< Of ObserveNuisances with everything.
+using RotationErrors = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_rotation_errors, 1>;
+using CommonVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_common, 1>;
+using CommonMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_common, max_common>;
+using PixelByCommon = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, max_common>;
 
 /// Where each parameter stands in a vector: fx, fy, cx, cy, then what else is estimated. −1: not there.
 struct CommonLayout {
@@ -47,12 +47,12 @@ struct RotatingCamera {
   Eigen::Quaterniond cam_from_mount = Eigen::Quaterniond::Identity();
   double delay_s = 0.0;
   Eigen::Vector3d lever_m = Eigen::Vector3d::Zero();
-  double shutter_s = 0.0;  ///< Pixels are of t + delay + shutter · v / picture_height, v from the picture's middle.
-  double picture_height = 1.0;  ///< Normalised. Not estimated.
-  double drift_per_s = 0.0;     ///< Of fx and fy, as a share; they are what k says at drift_from_s.
-  double drift_from_s = 0.0;    ///< Not estimated.
-  RotationErrors errors;        ///< mount_now = Exp(turn_by · errors) · measured; in units of their ordinary sizes.
-  RotationErrors undone;        ///< What the measured rotation has been freed of before, in the same units.
+  double shutter_s = 0.0;     ///< Pixels are of t + delay + shutter · v / image_height, v from the image's middle.
+  double image_height = 1.0;  ///< Normalised. Not estimated.
+  double drift_per_s = 0.0;   ///< Of fx and fy, as a share; they are what k says at drift_from_s.
+  double drift_from_s = 0.0;  ///< Not estimated.
+  RotationErrors errors;      ///< mount_now = Exp(turn_by · errors) · measured; in units of their ordinary sizes.
+  RotationErrors undone;      ///< What the measured rotation has been freed of before, in the same units.
   Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();  ///< mount_now = Exp(turn) · measured.
 
   /// fx, fy, cx, cy of an instant.
@@ -93,7 +93,7 @@ class RotationView {
   /// Point in the camera, times its inverse depth; the derivative by common parameters, a, b and inverse depth.
   [[nodiscard]] Eigen::Vector3d point_in_cam(const BearingPoint& point) const;
   void point_jacobians(const BearingPoint& point, const CommonLayout& layout,
-                       Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most_common>& J_common,
+                       Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_common>& J_common,
                        Eigen::Matrix3d& J_point) const;
 
  private:

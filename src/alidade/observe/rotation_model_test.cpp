@@ -33,13 +33,13 @@ Sample draw_sample(Draws& draws) {
   sample.frame.acceleration_rad_per_s2 = draws.normal() * sample.frame.rate_rad_per_s;
   sample.frame.shift_m = 0.2 * draws.normal3();
   sample.camera.shutter_s = 0.02 * draws.normal();
-  sample.camera.picture_height = 1.5;
+  sample.camera.image_height = 1.5;
   sample.camera.drift_per_s = 0.01 * draws.normal();
   sample.camera.drift_from_s = 2.0;
   sample.frame.t_s = 5.0;
-  sample.frame.turn_by.resize(3, most_rotation_errors);
-  sample.camera.errors.resize(most_rotation_errors);
-  for (int i = 0; i < most_rotation_errors; ++i) {
+  sample.frame.turn_by.resize(3, max_rotation_errors);
+  sample.camera.errors.resize(max_rotation_errors);
+  for (int i = 0; i < max_rotation_errors; ++i) {
     sample.frame.turn_by.col(i) = 0.02 * draws.normal3();
     sample.camera.errors[i] = draws.normal();
   }
@@ -58,7 +58,7 @@ constexpr ObserveNuisances everything{.k1 = true,
                                       .lever = true,
                                       .shutter = true,
                                       .drift = true,
-                                      .errors = most_rotation_errors,
+                                      .errors = max_rotation_errors,
                                       .learnt = true,
                                       .turn = true};
 
@@ -66,7 +66,7 @@ constexpr ObserveNuisances everything{.k1 = true,
 TEST(RotationModel, JacobiansAreTheDerivatives) {
   Draws draws(testing::make_rng()());
   const CommonLayout layout(everything);
-  ASSERT_EQ(layout.size, most_common);
+  ASSERT_EQ(layout.size, max_common);
   int checked = 0;
   for (int trial = 0; trial < 200; ++trial) {
     const Sample sample = draw_sample(draws);

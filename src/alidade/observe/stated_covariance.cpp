@@ -11,7 +11,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int most_blocks = 24, least_blocks = 6;
+constexpr int max_blocks = 24, min_blocks = 6;
 constexpr double correlations_a_block = 5.0;
 constexpr std::size_t tracks_looked_at = 64;
 
@@ -198,8 +198,8 @@ LastingErrors lasting_errors(const Adjustment& reference) {
       lag_sum += k * correlation;
       of_mean += 2.0 * pairs * correlation;
     }
-    constexpr double most_lost = 0.5;
-    lost = std::min(of_mean / num_frames, most_lost);
+    constexpr double max_lost = 0.5;
+    lost = std::min(of_mean / num_frames, max_lost);
   }
   if (!(sum > 0.0)) return {};
   const double frame_s = duration_of(reference) / std::max(1.0, num_frames - 1.0);
@@ -222,8 +222,7 @@ StatedCovariance stated_covariance(const Adjustment& reference, const ObserveNui
   stated.correlation_s = errors.seconds;
   const double wanted = duration_s / std::max(correlations_a_block * stated.correlation_s, 1e-9);
   const int frames_allow = static_cast<int>(reference.bundle.frames.size() / 3);
-  const int num_blocks =
-      std::min(static_cast<int>(std::clamp<double>(wanted, least_blocks, most_blocks)), frames_allow);
+  const int num_blocks = std::min(static_cast<int>(std::clamp<double>(wanted, min_blocks, max_blocks)), frames_allow);
   const Eigen::LLT<MatrixXd> llt(model);
   if (num_blocks < 3 || llt.info() != Eigen::Success) return stated;
   stated.block_s = duration_s / num_blocks;

@@ -54,8 +54,8 @@ std::vector<FrameSums> sums_by_frame(const Adjustment& reference) {
     sums.squares += residual.squaredNorm();
     ++sums.num;
   }
-  constexpr int least_points = 4;
-  std::erase_if(frames, [](const FrameSums& sums) { return sums.num < least_points; });
+  constexpr int min_points = 4;
+  std::erase_if(frames, [](const FrameSums& sums) { return sums.num < min_points; });
   return frames;
 }
 
@@ -73,8 +73,8 @@ TurnJitter turn_jitter(const Adjustment& reference) {
     squares += mean.squaredNorm();
     if (k > 0) to_next += mean.dot(frames[k - 1].sum / frames[k - 1].num);
   }
-  constexpr std::size_t least_frames = 20;
-  if (frames.size() < least_frames || !(left > 0.0)) return {};
+  constexpr std::size_t min_frames = 20;
+  if (frames.size() < min_frames || !(left > 0.0)) return {};
   const double num_frames = static_cast<double>(frames.size()), noise = left / left_dof;
   const double ratio = explained / (2.0 * num_frames) / noise;
   const double focal = reference.solution.camera.k.head<2>().mean();

@@ -118,7 +118,7 @@ struct HeadPixelOfParams {
                                                                  const Eigen::Vector2d& pan_tilt_rad,
                                                                  const Eigen::Vector3d& point_in_world);
 
-/// A straight line of sight.
+/// A straight line of observation.
 struct WorldRay {
   Eigen::Vector3d origin_in_world;
   Eigen::Vector3d direction_in_world;  ///< Unit vector.

@@ -38,7 +38,7 @@ RigHead random_head(std::mt19937_64& rng) {
 }
 
 /// A point that a head at these readings sees off its axis.
-Eigen::Vector3d point_in_sight(const RigHead& rig_head, const Eigen::Vector2d& readings, std::mt19937_64& rng) {
+Eigen::Vector3d point_in_observation(const RigHead& rig_head, const Eigen::Vector2d& readings, std::mt19937_64& rng) {
   const Eigen::Vector3d point_in_cam = Eigen::Vector3d(0.0, 0.0, 2.0) + random_vector(rng, 0.4);
   return world_from_cam(rig_head.head, readings) * point_in_cam;
 }
@@ -59,7 +59,7 @@ TEST(Head, JacobiansAreTheDerivatives) {
   for (int i = 0; i < 50; ++i) {
     const RigHead at = random_head(rng);
     const Eigen::Vector2d readings = random_vector(rng, 0.6).head<2>();
-    const Eigen::Vector3d point = point_in_sight(at, readings, rng);
+    const Eigen::Vector3d point = point_in_observation(at, readings, rng);
     const auto seen = project_with_head(at, readings, point);
     ASSERT_TRUE(seen);
     const auto expect_column = [&](const Eigen::Vector2d& plus, const Eigen::Vector2d& minus, const auto& column) {
@@ -151,7 +151,7 @@ TEST(Head, RayOfAPixelMeetsThePoint) {
   for (int i = 0; i < 50; ++i) {
     const RigHead at = random_head(rng);
     const Eigen::Vector2d readings = random_vector(rng, 0.6).head<2>();
-    const Eigen::Vector3d point = point_in_sight(at, readings, rng);
+    const Eigen::Vector3d point = point_in_observation(at, readings, rng);
     const auto ray = ray_in_world(at, readings, pixel(at, readings, point));
     ASSERT_TRUE(ray);
     EXPECT_LE((point - ray->origin_in_world).cross(ray->direction_in_world).norm(), 1e-9);

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "alidade/pantilt/head.h"
-#include "alidade/pantilt/target_sight.h"
+#include "alidade/pantilt/target_observation.h"
 
 namespace alidade {
 

@@ -104,12 +104,12 @@ RigUncertainty rig_uncertainty(const Rig& rig, double sigma_clock_s) {
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(factor.front().cols(), factor.front().cols());
   double num = 0.0;
   for (std::size_t h = 0; h < rig.heads.size(); ++h) add_effects(rig.heads[h], factor[h], sum, num);
-  constexpr double least_px2 = 1e-4;
+  constexpr double min_px2 = 1e-4;
   const SymmetricEigen parts = symmetric_eigen(sum / std::max(1.0, num));
   Eigen::Index dropped = 0;
   for (double left = 0.0; dropped < parts.values.size(); ++dropped)
-    if ((left += std::max(0.0, parts.values[dropped])) > least_px2) break;
-  const Eigen::Index kept = std::min<Eigen::Index>(parts.values.size() - dropped, most_rig_errors);
+    if ((left += std::max(0.0, parts.values[dropped])) > min_px2) break;
+  const Eigen::Index kept = std::min<Eigen::Index>(parts.values.size() - dropped, max_rig_errors);
   RigUncertainty uncertainty;
   if (kept == 0) return uncertainty;
   for (const Eigen::MatrixXd& rows : factor) uncertainty.factor.emplace_back(rows * parts.vectors.rightCols(kept));
@@ -119,7 +119,7 @@ RigUncertainty rig_uncertainty(const Rig& rig, double sigma_clock_s) {
 std::optional<RigErrorEffect> rig_error_effect(const Eigen::MatrixXd& factor, const TurnedHead& turned,
                                                const Camera& camera, const Eigen::Vector3d& point_in_world,
                                                const Eigen::Vector3d& velocity_in_world,
-                                               const std::optional<SightLens>& lens) {
+                                               const std::optional<ObservationLens>& lens) {
   const Eigen::Vector3d point_in_cam = turned.point_in_cam(point_in_world);
   const auto seen = project_with_jacobians(camera, point_in_cam);
   if (!seen) return std::nullopt;

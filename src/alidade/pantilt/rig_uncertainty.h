@@ -10,10 +10,10 @@
 namespace alidade {
 
 /// At most so many directions of error are counted; see rig_uncertainty().
-inline constexpr int most_rig_errors = 32;
+inline constexpr int max_rig_errors = 32;
 
-/// ∂ pixel / ∂ u of one sight.
-using RigErrorEffect = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, most_rig_errors>;
+/// ∂ pixel / ∂ u of one observation.
+using RigErrorEffect = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, max_rig_errors>;
 
 /// The errors of a rig's heads, lenses and clocks as p = p̂ + factor[h] u, u ~ N(0, 1) of all heads together. The rows
 /// of a factor: the head's parameters (head_param_names), its lens' (param_names), the delay of its clock [s].
@@ -28,7 +28,7 @@ struct RigUncertainty {
 [[nodiscard]] Eigen::MatrixXd joint_covariance(const Rig& rig);
 
 /// The errors of a rig whose clocks are right to σ_clock each. Directions that move no pixel are left out: of what
-/// remains, all but 0.01 px RMS over a working space of 0.5 to 12 m is kept, in at most most_rig_errors directions.
+/// remains, all but 0.01 px RMS over a working space of 0.5 to 12 m is kept, in at most max_rig_errors directions.
 [[nodiscard]] RigUncertainty rig_uncertainty(const Rig& rig, double sigma_clock_s = 0.0);
 
 /// ∂ pixel / ∂ u where a head (the one of `factor`) at these readings sees a point that moves so: a clock that lags by
@@ -38,6 +38,6 @@ struct RigUncertainty {
                                                              const Camera& camera,
                                                              const Eigen::Vector3d& point_in_world,
                                                              const Eigen::Vector3d& velocity_in_world,
-                                                             const std::optional<SightLens>& lens = {});
+                                                             const std::optional<ObservationLens>& lens = {});
 
 }  // namespace alidade

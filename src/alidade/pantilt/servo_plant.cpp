@@ -84,8 +84,8 @@ ServoAxis linear_part(const ServoAxis& axis) {
 void DelayedAxis::move(double dt_s, double command) {
   const double goal = past_dead_band(command, axis_.dead_band), lag_s = axis_.second_tau_s;
   if (lag_s > 0.0 && dt_s > 0.0) {
-    constexpr double per_tau = 20.0, most_steps = 4096.0;
-    const double steps = std::clamp(std::ceil(per_tau * dt_s / std::min(lag_s, tau_of(axis_.plant))), 1.0, most_steps);
+    constexpr double per_tau = 20.0, max_steps = 4096.0;
+    const double steps = std::clamp(std::ceil(per_tau * dt_s / std::min(lag_s, tau_of(axis_.plant))), 1.0, max_steps);
     const double step_s = dt_s / steps, rise = -std::expm1(-step_s / lag_s);
     for (double k = 0.0; k < steps; ++k) {
       motion_ = advanced(axis_, motion_, goal + (lagged_ - goal) * rise * lag_s / step_s, step_s);

@@ -94,7 +94,7 @@ Agreement agreement_of(const Sample& shots, const Beam& beam, const Camera& came
     const double rows = num_rows / static_cast<double>(shots.size());
     found.scale2 = *middle / (rows * std::pow(1.0 - 2.0 / (9.0 * rows), 3));
     if (!std::isfinite(found.scale2)) return found;
-    found.scale2 = std::max({found.scale2, search.least_scale2, 1e-12});
+    found.scale2 = std::max({found.scale2, search.min_scale2, 1e-12});
   }
   found.score = search.knows_sigma ? 0.0 : found.scale2;
   for (const double chi2 : found.chi2) {
@@ -206,9 +206,9 @@ std::optional<Beam> find_outliers(BeamProblem& problem, const Camera& camera, co
     }
   }
   // Local optimisation of the most promising only: O. Chum et al., "Locally Optimized RANSAC", 2003.
-  constexpr std::size_t most_refined = 12;
+  constexpr std::size_t max_refined = 12;
   std::ranges::stable_sort(candidates, {}, [](const Candidate& candidate) { return candidate.agreement.score; });
-  if (candidates.size() > most_refined) candidates.resize(most_refined);
+  if (candidates.size() > max_refined) candidates.resize(max_refined);
   BeamProblem work = problem;
   std::optional<Beam> best;
   Agreement best_agreement;

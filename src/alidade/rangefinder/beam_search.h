@@ -19,8 +19,8 @@ struct OutlierSearch {
   double sigmas = 6.0;
   int num_draws = 100;
   std::uint64_t seed = 1;
-  bool knows_sigma = true;    ///< Else the scale of the residuals is that of their median.
-  double least_scale2 = 0.0;  ///< Of that scale, squared.
+  bool knows_sigma = true;  ///< Else the scale of the residuals is that of their median.
+  double min_scale2 = 0.0;  ///< Of that scale, squared.
 };
 
 /// Marks in `used` which shots agree with the beam that most agree with: random samples as small as the method allows,

@@ -215,10 +215,10 @@ EdgePart part_of(const std::vector<ScanEdge>& edges, double num_all, const GreyI
 }
 
 /// Sandwich covariance over parts of the scene, each a slice of the view: edges of one thing err alike. The beam may be
-/// `usual_m` and `usual_rad` from where the prior holds it, which moves the optimum by H⁻¹ P of that. And `least_rad`:
+/// `usual_m` and `usual_rad` from where the prior holds it, which moves the optimum by H⁻¹ P of that. And `min_rad`:
 /// strong edges draw all nearer ones than the last blur, those that the scan does not see among them.
 Matrix5 covariance_of(std::vector<ScanEdge> edges, const GreyImage& density, const Camera& camera, const Beam& beam,
-                      double least_rad) {
+                      double min_rad) {
   constexpr std::size_t num_parts = 8;
   std::stable_sort(edges.begin(), edges.end(), [](const ScanEdge& a, const ScanEdge& b) {
     return (a.photo_from_cam * Eigen::Vector3d::UnitZ()).x() < (b.photo_from_cam * Eigen::Vector3d::UnitZ()).x();
@@ -244,7 +244,7 @@ Matrix5 covariance_of(std::vector<ScanEdge> edges, const GreyImage& density, con
   }
   const Matrix5 inverse = inverse_symmetric(H);
   Matrix5 cov = inverse * (scatter + prior_weight * prior) * inverse;
-  cov.diagonal().tail<2>().array() += least_rad * least_rad;
+  cov.diagonal().tail<2>().array() += min_rad * min_rad;
   return cov;
 }
 
@@ -281,19 +281,19 @@ EdgesReport align_edges(std::span<const ScanRow> scan, const GreyImage& photo, c
 
 Verdict edges_verdict(const EdgesReport& report) {
   Verdict verdict;
-  constexpr int least_edges = 100;
-  constexpr double least_gain = 0.3, most_rad = 0.02;
+  constexpr int min_edges = 100;
+  constexpr double min_gain = 0.3, max_rad = 0.02;
   const auto refuse = [&](const char* sentence, const char* add) {
     verdict.state = State::refused;
     verdict.exit_code = ExitCode::cannot_tell;
     verdict.sentence = sentence;
     verdict.to_add = add;
   };
-  if (report.num_edges < least_edges) {
+  if (report.num_edges < min_edges) {
     refuse("too few edges in the scan", "scan finer, and a scene with things at different distances");
-  } else if (!(report.gain > least_gain)) {
+  } else if (!(report.gain > min_gain)) {
     refuse("the edges of the scan are not those of the photo", "check the head's angles and the camera file");
-  } else if (!(report.halves_differ_rad < most_rad)) {
+  } else if (!(report.halves_differ_rad < max_rad)) {
     refuse("one half of the scan's edges tells another direction than the other", "scan finer");
   } else {
     verdict.state = State::care;

@@ -16,7 +16,7 @@ TEST(Edges, FindTheDirectionToSomeMrad) {
   Beam truth;
   truth.origin_in_cam = {0.04, -0.05, 0.0};
   truth.direction_in_cam = Eigen::Vector3d(0.03, -0.025, 1.0).normalized();
-  const EdgesConfig config{.blur_px = {12.0, 6.0, 3.0}};  // a quarter of the picture, a quarter of the blur and more
+  const EdgesConfig config{.blur_px = {12.0, 6.0, 3.0}};  // a quarter of the image, a quarter of the blur and more
   const EdgesReport report = align_edges(scan_of(truth, 0.0044), photo_of(camera), camera, Beam{}, config);
   // 8.4 mrad is the median of a scan half as fine in another program; the start is 39 mrad away.
   EXPECT_LT((report.beam.direction_in_cam - truth.direction_in_cam).norm(), 0.0084);

@@ -19,7 +19,7 @@ struct Explained {
 
 Explained explained(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board, const Camera& camera,
                     const RangefinderConfig& config) {
-  constexpr double most_m = 0.05, most_of_range = 0.02;
+  constexpr double max_m = 0.05, max_of_range = 0.02;
   const RangefinderReport report = calibrate_rangefinder(shots, points_in_board, camera, config);
   double mean_m = 0.0, sum_m2 = 0.0, num = 0.0;
   for (const Shot& shot : shots) mean_m += shot.range_m / static_cast<double>(shots.size());
@@ -32,7 +32,7 @@ Explained explained(std::span<const Shot> shots, std::span<const Eigen::Vector3d
   }
   if (num > 0.0) by.rms_m = std::sqrt(sum_m2 / num);
   by.fits = 10 * report.shots_used >= 8 * static_cast<int>(shots.size()) && report.rms_range_m > 0.0 &&
-            report.rms_range_m < std::min(most_m, most_of_range * mean_m);
+            report.rms_range_m < std::min(max_m, max_of_range * mean_m);
   by.known = report.status == RangefinderReport::Status::converged && report.bound.sigma_origin_m < 0.1;
   return by;
 }
@@ -61,8 +61,8 @@ std::vector<Shot> shifted(std::span<const Shot> shots, int by) {
 
 std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board,
                             const Camera& camera, const RangefinderConfig& config) {
-  constexpr std::size_t least_shots = 7;
-  if (shots.size() < least_shots) return "";
+  constexpr std::size_t min_shots = 7;
+  if (shots.size() < min_shots) return "";
   RangefinderConfig plain = config;
   if (plain.method == RangefinderMethod::spot) plain.method = RangefinderMethod::joint;  // spots know no metres
   plain.estimate_scale = plain.scale_by_need = false;

@@ -74,7 +74,7 @@ Groups groups_of(const BeamProblem& problem, const Camera& camera, const Beam& b
 
 /// What its finder knows of a spot stays; what comes on top is so many times larger.
 void scale_spot_sigma(double factor, PreparedShot& shot) {
-  const double own2 = shot.least_sigma_spot_px * shot.least_sigma_spot_px;
+  const double own2 = shot.min_sigma_spot_px * shot.min_sigma_spot_px;
   constexpr double never_none_px = 0.01;
   double more_px = std::sqrt(std::max(0.0, shot.sigma_spot_px * shot.sigma_spot_px - own2));
   if (own2 > 0.0) more_px = std::max(more_px, never_none_px);

@@ -89,10 +89,10 @@ PreparedShot prepared(const Shot& shot, const Camera& camera, const RangefinderC
     if (!ready.spot_ray) reason = "the lens sees nothing at its spot";
     const Spot& spot = *shot.spot;
     ready.owns_spot_sigma = spot.sigma_px && !spot.sigma_is_least;
-    ready.least_sigma_spot_px = spot.sigma_is_least ? spot.sigma_px.value_or(0.0) : 0.0;
+    ready.min_sigma_spot_px = spot.sigma_is_least ? spot.sigma_px.value_or(0.0) : 0.0;
     ready.sigma_spot_px = ready.owns_spot_sigma
                               ? *spot.sigma_px
-                              : std::hypot(ready.least_sigma_spot_px, config.sigma_spot_px.value_or(guessed_sigma_px));
+                              : std::hypot(ready.min_sigma_spot_px, config.sigma_spot_px.value_or(guessed_sigma_px));
   }
   if (shot.board && (uses_plane || lens_is_free)) {
     use_board(shot, camera, config, uses_plane, points, ready, corners, reason);
@@ -165,7 +165,7 @@ Preparation prepare_shots(std::span<const Shot> shots, std::span<const Eigen::Ve
   ready.reasons.resize(shots.size());
   const bool lens_is_free = config.refine == Refine::all && !lens_prior(camera, config.refine_distortion).free.empty();
   std::vector<CornerFit> corners(shots.size());
-  ready.least_sigma_range_m = step_of_readings(shots) / std::sqrt(12.0);
+  ready.min_sigma_range_m = step_of_readings(shots) / std::sqrt(12.0);
   for (std::size_t i = 0; i < shots.size(); ++i) {
     ready.reasons[i] = fault_of(shots[i]);
     if (!ready.reasons[i].empty()) continue;

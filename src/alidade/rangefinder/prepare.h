@@ -14,7 +14,7 @@ struct Preparation {
   std::vector<std::string> reasons;  ///< One a shot: why it cannot be used; empty otherwise.
   double sigma_corner_px = 0.0;
   bool knows_spot_sigma = true, knows_range_sigma = true;
-  double least_sigma_range_m = 0.0;  ///< Readings in steps of q scatter by q/√12 at least, whatever their residuals.
+  double min_sigma_range_m = 0.0;  ///< Readings in steps of q scatter by q/√12 at least, whatever their residuals.
 };
 
 /// Where σ is not known and the residuals have not been asked yet: a centroid, a cheap rangefinder.

@@ -54,9 +54,9 @@ bool tells_outliers(const BeamFit& all, const BeamProblem& all_shots, const Beam
   };
   const double num_all = num_used(all_shots), num_others = num_used(other_shots);
   constexpr double chance = 1e-3;
-  constexpr int least_spare = 2;
+  constexpr int min_spare = 2;
   const int spare = others.best.normals.num_rows - other_shots.num_free();
-  if (num_others < 0.6 * num_all || spare < least_spare) return false;
+  if (num_others < 0.6 * num_all || spare < min_spare) return false;
   const double ratio = all.best.normals.cost / others.best.normals.cost;
   if (0.5 * spare * std::log(ratio) < log_choices(num_all, num_all - num_others) - std::log(chance)) return false;
   const double limit = 3.0 * (1.0 + 5.0 / spare);
@@ -78,7 +78,7 @@ std::optional<BeamFit> search_beam(Preparation& ready, const Camera& camera, con
     BeamProblem without = problem;
     const auto agreed = find_outliers(without, camera,
                                       {config.outlier_sigmas, config.num_draws, config.seed, knows_sigma,
-                                       std::pow(ready.least_sigma_range_m / guessed_sigma_m, 2)});
+                                       std::pow(ready.min_sigma_range_m / guessed_sigma_m, 2)});
     auto better = agreed ? best_beam(without, camera, agreed) : std::nullopt;
     if (better && (knows_sigma || !fit || tells_outliers(*fit, problem, *better, without))) {
       problem = std::move(without);
@@ -90,7 +90,7 @@ std::optional<BeamFit> search_beam(Preparation& ready, const Camera& camera, con
     const double change =
         estimate_noise(problem, camera, fit->best.beam, !ready.knows_spot_sigma, !ready.knows_range_sigma);
     if (!ready.knows_range_sigma)
-      problem.model.noise.sigma_m = std::max(problem.model.noise.sigma_m, ready.least_sigma_range_m);
+      problem.model.noise.sigma_m = std::max(problem.model.noise.sigma_m, ready.min_sigma_range_m);
     auto solved = solve_beam(problem, camera, fit->best.beam);
     if (solved) fit->best = std::move(*solved);
     if (change < 1e-3 || !solved) break;
@@ -253,7 +253,7 @@ void take_over(const RefinedBeam& refined, BeamProblem& problem, RangefinderRepo
 /// Do the readings ask for a scale? How far it would be from 1, were it estimated too, lens and poses held, over its σ,
 /// with the σ of a reading told anew: where that came of residuals, they held the missing scale, too.
 double scale_in_sigmas(const BeamProblem& problem, const Camera& camera, const Beam& beam, bool sigma_is_told,
-                       double least_sigma_m) {
+                       double min_sigma_m) {
   BeamProblem work = problem;
   work.estimate_scale = true;
   const auto planes = std::count_if(work.shots.begin(), work.shots.end(),
@@ -262,7 +262,7 @@ double scale_in_sigmas(const BeamProblem& problem, const Camera& camera, const B
   auto with = solve_beam(work, camera, beam);
   for (int round = 0; round < 6 && with && sigma_is_told; ++round) {
     const double change = estimate_noise(work, camera, with->beam, false, true);
-    work.model.noise.sigma_m = std::max(work.model.noise.sigma_m, least_sigma_m);
+    work.model.noise.sigma_m = std::max(work.model.noise.sigma_m, min_sigma_m);
     with = solve_beam(work, camera, with->beam);
     if (change < 1e-2) break;
   }
@@ -324,7 +324,7 @@ void solve_report(Preparation& ready, const BeamFit& fit, const Camera& camera, 
     carry_lens(problem, camera, report);
   }
   report.scale_in_sigmas =
-      scale_in_sigmas(problem, report.camera, report.beam, report.range_sigma_is_told, ready.least_sigma_range_m);
+      scale_in_sigmas(problem, report.camera, report.beam, report.range_sigma_is_told, ready.min_sigma_range_m);
   report.bound = judge_beam(problem, report.beam, report.camera);
   report.bound.cov =
       refined ? refined->state.beam.cov : BeamMatrix(BeamMatrix::Constant(std::numeric_limits<double>::infinity()));

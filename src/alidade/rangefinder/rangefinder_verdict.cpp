@@ -11,7 +11,7 @@ using Status = RangefinderReport::Status;
 using Method = RangefinderMethod;
 
 constexpr double refuse_origin_m = 0.1, good_origin_m = 0.01;
-constexpr double least_range_ratio = 2.0, least_normal_spread = 0.1;
+constexpr double min_range_ratio = 2.0, min_normal_spread = 0.1;
 constexpr double degenerate_range_ratio = 1.3;      // 2.0 to 2.4 m: two methods of three cannot tell
 constexpr double degenerate_normal_spread = 0.035;  // tilts of 5°: half of a board's turn is its noise
 
@@ -99,8 +99,8 @@ LineOffset line_offset(const RangefinderReport& report, std::span<const Shot> sh
 
 /// Only where the shots do say so: a line that passes far off, however badly known, is another matter.
 bool passes_the_centre(const LineOffset& offset) {
-  constexpr double least_m = 0.002;  // nearer, no spot moves by what it could be measured with
-  return offset.value_m < near_centre_m && offset.value_m < std::max(least_m, 3.0 * offset.sigma_m);
+  constexpr double min_m = 0.002;  // nearer, no spot moves by what it could be measured with
+  return offset.value_m < near_centre_m && offset.value_m < std::max(min_m, 3.0 * offset.sigma_m);
 }
 
 /// Mean angle of the boards' normals to the camera's view, from the cosines.
@@ -143,8 +143,8 @@ Weakness reason_of(const RangefinderReport& report, std::span<const Shot> shots,
                 " mm: where along it the origin lies cannot be told",
             "mount the rangefinder a few centimetres beside the camera"};
   }
-  if (method == Method::plane && bound.normal_spread < least_normal_spread) return reason_of_boards(report);
-  if (bound.range_ratio < least_range_ratio) return reason_of_equal_ranges(report);
+  if (method == Method::plane && bound.normal_spread < min_normal_spread) return reason_of_boards(report);
+  if (bound.range_ratio < min_range_ratio) return reason_of_equal_ranges(report);
   return {"too little",
           "too little for this noise: the origin is known to " + text_of(1e3 * bound.sigma_origin_m, 2) + " mm only",
           "add shots from near to far, the board tilted to all sides"};
@@ -183,16 +183,16 @@ void add_precision(const RangefinderReport& report, Method method, Verdict& verd
 
 void add_geometry(const RangefinderReport& report, std::span<const Shot> shots, Method method, Verdict& verdict) {
   const BeamBound& bound = report.bound;
-  verdict.checks.push_back(check_of("ranges", bound.range_ratio >= least_range_ratio ? State::good : State::care,
+  verdict.checks.push_back(check_of("ranges", bound.range_ratio >= min_range_ratio ? State::good : State::care,
                                     "the longest range is " + text_of(bound.range_ratio) + " times the shortest",
-                                    bound.range_ratio, least_range_ratio, "", "next"));
+                                    bound.range_ratio, min_range_ratio, "", "next"));
   if (method != Method::spot && bound.normal_spread > 0.0) {
     // With the spot seen, tilts do not matter: the figure is told, it decides nothing.
-    State state = bound.normal_spread >= least_normal_spread || method == Method::joint ? State::good : State::care;
+    State state = bound.normal_spread >= min_normal_spread || method == Method::joint ? State::good : State::care;
     if (method == Method::plane && bound.normal_spread < 0.5 * degenerate_normal_spread) state = State::refused;
     verdict.checks.push_back(check_of("tilts", state,
                                       "the boards' normals spread by " + text_of(bound.normal_spread, 2),
-                                      bound.normal_spread, least_normal_spread, "", "next"));
+                                      bound.normal_spread, min_normal_spread, "", "next"));
   }
   if (method == Method::spot) {
     const LineOffset offset = line_offset(report, shots);
@@ -259,7 +259,7 @@ void add_fit(const RangefinderReport& report, Verdict& verdict) {
 
 /// A singular information has no clusters: of that others speak.
 void add_clusters(const RangefinderReport& report, Verdict& verdict) {
-  const bool is_few = report.shots_used < static_cast<int>(ClusterCovariance::least_clusters);
+  const bool is_few = report.shots_used < static_cast<int>(ClusterCovariance::min_clusters);
   if (report.clusters.z2.empty() && !is_few) return;
   verdict.checks.push_back(
       clusters_agree(report.clusters, "shot",

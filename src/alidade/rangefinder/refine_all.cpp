@@ -65,7 +65,7 @@ bool add_covariances(const BeamProblem& problem, const LensPrior& prior, Refined
   if (!scale.allFinite()) return false;
   const Ldlt ldlt(scale.asDiagonal() * S * scale.asDiagonal());
   // Scaled to a unit diagonal, a pivot of 10⁻¹³ is rounding.
-  if (!(ldlt.least_pivot() > 1e-13)) return false;
+  if (!(ldlt.min_pivot() > 1e-13)) return false;
   const Eigen::MatrixXd cov = scale.asDiagonal() * ldlt.inverse() * scale.asDiagonal();
   const int p = problem.num_free();
   Beam& beam = refined.state.beam;

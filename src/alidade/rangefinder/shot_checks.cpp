@@ -59,12 +59,12 @@ LeftOutShot predicted(std::size_t index, const Shot& shot, const RangefinderRepo
 std::vector<CountedSigma> sigma_by_count(std::span<const Shot> shots, const RangefinderReport& report,
                                          std::span<const Eigen::Vector3d> points_in_board, const Camera& camera,
                                          const RangefinderConfig& config, const Progress& progress) {
-  constexpr std::size_t most_counts = 20;
+  constexpr std::size_t max_counts = 20;
   std::vector<std::size_t> order = used_shots(report);
   std::mt19937_64 draw(config.seed);
   std::shuffle(order.begin(), order.end(), draw);
   const RangefinderConfig part_config = config_of_part(config, report);
-  const std::size_t every = std::max<std::size_t>(1, order.size() / most_counts);
+  const std::size_t every = std::max<std::size_t>(1, order.size() / max_counts);
   std::vector<Shot> part;
   std::vector<CountedSigma> counted;
   for (std::size_t n = 0; n < order.size(); ++n) {

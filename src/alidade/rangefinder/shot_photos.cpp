@@ -8,7 +8,7 @@
 #include <opencv2/core.hpp>
 
 #include "alidade/board/board_pose.h"
-#include "alidade/imaging/find_board.h"
+#include "alidade/board_detector/find_board.h"
 
 namespace alidade {
 namespace {

@@ -10,7 +10,7 @@
 #include "alidade/beam/shot.h"
 #include "alidade/board/board.h"
 #include "alidade/estimation/progress.h"
-#include "alidade/imaging/laser_spot.h"
+#include "alidade/spot/laser_spot.h"
 
 namespace alidade {
 

@@ -17,7 +17,7 @@ struct PreparedShot {
   std::optional<Eigen::Vector3d> spot_ray;  ///< Unit ray of the spot, in the camera frame.
   double sigma_spot_px = 1.0;
   bool owns_spot_sigma = false;      ///< The shot brought its σ.
-  double least_sigma_spot_px = 0.0;  ///< What its finder knows of.
+  double min_sigma_spot_px = 0.0;    ///< What its finder knows of.
   std::optional<Plane> plane;        ///< The board's; is compared with the reading.
   std::optional<BoardPose> pose;     ///< Where the plane comes from a board; else the plane's own covariance counts.
   const BoardView* board = nullptr;  ///< Its corners, where it has them.

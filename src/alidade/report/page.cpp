@@ -42,10 +42,10 @@ void append_until(std::string& page, std::string_view& rest, std::string_view pl
 }
 
 /// Inert blocks, each made an image when it is first looked at.
-std::string picture_blocks(const std::map<std::string, std::string>& pictures) {
+std::string image_blocks(const std::map<std::string, std::string>& images) {
   std::string blocks;
   std::size_t index = 0;
-  for (const auto& [name, jpeg] : pictures)
+  for (const auto& [name, jpeg] : images)
     blocks += "<script type=\"text/plain\" id=\"image-" + std::to_string(index++) + "\" data-name=\"" +
               report::escaped(name) + "\">" + report::base64(jpeg) + "</script>\n";
   return blocks;
@@ -53,10 +53,10 @@ std::string picture_blocks(const std::map<std::string, std::string>& pictures) {
 
 }  // namespace
 
-std::string report_page(std::string_view result_json, const std::map<std::string, std::string>& pictures) {
+std::string report_page(std::string_view result_json, const std::map<std::string, std::string>& images) {
   std::string_view rest = page_template();
   if (rest.empty()) return report::plain_page(result_json);
-  const std::string blocks = picture_blocks(pictures);
+  const std::string blocks = image_blocks(images);
   std::string page;
   page.reserve(rest.size() + result_json.size() + blocks.size() + 1024);
   append_until(page, rest, "@TITLE@", "alidade " + report::escaped(command_of(result_json)));

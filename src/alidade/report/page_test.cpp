@@ -12,7 +12,7 @@
 #include "alidade/report/plain_page.h"
 #include "alidade/report/thin.h"
 
-// What the page draws is tested in a browser: web/test. Here: that document and pictures arrive in it unharmed.
+// What the page draws is tested in a browser: web/test. Here: that document and images arrive in it unharmed.
 namespace alidade {
 namespace {
 
@@ -52,7 +52,7 @@ TEST(ReportPage, EmbedsTheDocumentUnchanged) {
   EXPECT_THAT(page, HasSubstr("three"));  // the licence notices
 }
 
-TEST(ReportPage, PicturesAreInertBlocks) {
+TEST(ReportPage, ImagesAreInertBlocks) {
   const std::string page = report_page(sample().dump(), {{"a.jpg", "jpeg"}, {evil, "other"}});
   if (page.find("id=\"result\"") == std::string::npos) GTEST_SKIP() << "built without the page of web/";
   EXPECT_EQ(occurrences(page, "<script type=\"text/plain\" id=\"image-"), 2u);
@@ -61,13 +61,13 @@ TEST(ReportPage, PicturesAreInertBlocks) {
 }
 
 TEST(ReportPage, ThirteenPhotosTakeNoTime) {
-  std::map<std::string, std::string> pictures;
-  for (int i = 0; i < 13; ++i) pictures[std::to_string(i)] = std::string(40'000, 'x');
+  std::map<std::string, std::string> images;
+  for (int i = 0; i < 13; ++i) images[std::to_string(i)] = std::string(40'000, 'x');
   const std::string document = sample().dump() + std::string(200'000, ' ');
   double best_s = 1.0;
   for (int i = 0; i < 5; ++i) {
     const auto start = std::chrono::steady_clock::now();
-    EXPECT_GT(report_page(document, pictures).size(), 1000u);
+    EXPECT_GT(report_page(document, images).size(), 1000u);
     best_s = std::min(best_s, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   }
   EXPECT_LT(best_s, 0.060);  // of the half second from photos to report

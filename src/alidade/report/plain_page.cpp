@@ -12,8 +12,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t most_rows = 60;  // result.json has all of them
-constexpr std::size_t most_leaves = 400;
+constexpr std::size_t max_rows = 60;  // result.json has all of them
+constexpr std::size_t max_leaves = 400;
 
 const Json& member(const Json& object, const std::string& name) {
   static const Json null;
@@ -56,7 +56,7 @@ void append_leaves(std::string& rows, const std::string& path, const Json& value
     }
     return;
   }
-  if (++leaves > most_leaves) return;
+  if (++leaves > max_leaves) return;
   const ValueText words = value_text(number_of(value), number_of(sigmas));
   rows += "<tr><th>" + escaped(path) + "</th><td>" + (value.is_number() ? words.value : escaped(text_of(value))) +
           "</td><td>" + plus_minus(words) + "</td><td>" + plus_minus(value_text(number_of(value), number_of(ideal))) +
@@ -95,7 +95,7 @@ std::string table_markup(const std::string& name, const Json& columns) {
   }
   std::string out = "<details><summary>" + escaped(name) + ", " + std::to_string(num_rows) +
                     " rows</summary><table><tr>" + head + "</tr>";
-  for (std::size_t row = 0; row < std::min(num_rows, most_rows); ++row) {
+  for (std::size_t row = 0; row < std::min(num_rows, max_rows); ++row) {
     out += "<tr>";
     for (const auto& [column, values] : columns.items())
       if (values.is_array()) out += row < values.size() ? cell(values[row]) : "<td></td>";

@@ -11,7 +11,7 @@ namespace alidade::reproduce {
 namespace {
 
 /// The least height of any triangle among the points. [px]
-double least_height_px(const std::vector<Eigen::Vector2d>& p) {
+double min_height_px(const std::vector<Eigen::Vector2d>& p) {
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < p.size(); ++i) {
     for (std::size_t j = i + 1; j < p.size(); ++j) {
@@ -64,7 +64,7 @@ std::vector<Eigen::Vector2d> draw_set(std::uint64_t seed, int num_points) {
       const double x = draws.uniform(60.0, 720.0), y = draws.uniform(60.0, 522.0);
       points.emplace_back(x, y);
     }
-    if (least_height_px(points) >= 40.0) return points;
+    if (min_height_px(points) >= 40.0) return points;
   }
 }
 

@@ -2,11 +2,11 @@
 
 namespace alidade::reproduce {
 
-std::vector<TargetSight> sights_of(const TrackScene& scene, std::uint64_t seed) {
-  std::vector<TargetSight> sights;
-  for (const SimulatedSight& s : simulate_track(scene, seed))
-    sights.push_back({s.t_capture_s, s.t_arrival_s, s.head, s.pan_tilt_rad, s.px});
-  return sights;
+std::vector<TargetObservation> observations_of(const TrackScene& scene, std::uint64_t seed) {
+  std::vector<TargetObservation> observations;
+  for (const SimulatedObservation& s : simulate_track(scene, seed))
+    observations.push_back({s.t_capture_s, s.t_arrival_s, s.head, s.pan_tilt_rad, s.px});
+  return observations;
 }
 
 TrueTrack truth_of(const TrackScene& scene) {

@@ -7,8 +7,8 @@
 
 namespace alidade::reproduce {
 
-/// The sights of a simulated scene, as the tracker takes them.
-[[nodiscard]] std::vector<TargetSight> sights_of(const TrackScene& scene, std::uint64_t seed);
+/// The observations of a simulated scene, as the tracker takes them.
+[[nodiscard]] std::vector<TargetObservation> observations_of(const TrackScene& scene, std::uint64_t seed);
 /// Its truth, each 5 ms.
 [[nodiscard]] TrueTrack truth_of(const TrackScene& scene);
 

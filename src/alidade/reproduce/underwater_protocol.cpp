@@ -5,7 +5,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "alidade/imaging/find_boards.h"
+#include "alidade/board_detector/find_boards.h"
 
 namespace alidade::reproduce {
 
@@ -14,8 +14,9 @@ UnderwaterSample underwater_sample(const UnderwaterScene& scene, std::uint64_t s
   UnderwaterSample sample;
   sample.camera = scene.camera;
   for (const UnderwaterFrame& frame : sequence.frames) {
-    SightFrame seen{static_cast<long>(sample.frames.size()), frame.t_s, {}};
-    for (const UnderwaterSight& sight : frame.sights) seen.sights.push_back({sight.id, sight.px, 0.0});
+    ObservationFrame seen{static_cast<long>(sample.frames.size()), frame.t_s, {}};
+    for (const UnderwaterObservation& observation : frame.observations)
+      seen.observations.push_back({observation.id, observation.px, 0.0});
     sample.frames.push_back(std::move(seen));
     sample.truth.push_back({frame.t_s, frame.world_from_cam});
   }
@@ -37,19 +38,19 @@ UnderwaterSample underwater_sample(const UnderwaterScene& scene, std::uint64_t s
 
 namespace {
 
-/// What of the board's points was found in a picture.
-std::vector<FeatureSight> sights_of_board(const BoardDetection& detection) {
-  std::vector<FeatureSight> sights;
+/// What of the board's points was found in an image.
+std::vector<FeatureObservation> observations_of_board(const BoardDetection& detection) {
+  std::vector<FeatureObservation> observations;
   for (const Corner& corner : detection.view.corners)
     if (const auto id = underwater_point_at(corner.index))
-      sights.push_back({*id, corner.px, std::sqrt(0.5 * corner.cov.trace())});
-  return sights;
+      observations.push_back({*id, corner.px, std::sqrt(0.5 * corner.cov.trace())});
+  return observations;
 }
 
 /// Where a point is first seen, its true depth there. 0: never.
 double first_depth_m(const UnderwaterSample& sample, long id) {
   for (std::size_t k = 0; k < sample.frames.size(); ++k)
-    if (std::ranges::count(sample.frames[k].sights, id, &FeatureSight::id) > 0)
+    if (std::ranges::count(sample.frames[k].observations, id, &FeatureObservation::id) > 0)
       return (sample.truth[k].world_from_cam.inverse() * sample.points.at(id)).z();
   return 0.0;
 }
@@ -63,27 +64,29 @@ UnderwaterSample filmed_sample(const UnderwaterScene& scene, const UnderwaterVid
     return render_underwater_frame(scene.camera, sample.truth[k].world_from_cam, video, 1000 * seed + k);
   };
   const BoardDetections found = find_boards(sample.frames.size(), film, underwater_board());
-  for (std::size_t k = 0; k < sample.frames.size(); ++k) sample.frames[k].sights = sights_of_board(found.photos[k]);
-  // As wrong as before, of the depth at which the pictures show a point first.
+  for (std::size_t k = 0; k < sample.frames.size(); ++k)
+    sample.frames[k].observations = observations_of_board(found.photos[k]);
+  // As wrong as before, of the depth at which the images show a point first.
   for (ToldDepth& told : sample.config.depths) told.depth_m *= first_depth_m(sample, told.id);
   return sample;
 }
 
 UnderwaterSample with_even_noise(UnderwaterSample sample) {
-  for (SightFrame& frame : sample.frames)
-    for (FeatureSight& sight : frame.sights) sight.sigma_px = 0.0;
+  for (ObservationFrame& frame : sample.frames)
+    for (FeatureObservation& observation : frame.observations) observation.sigma_px = 0.0;
   return sample;
 }
 
-SightErrors sight_errors(const UnderwaterSample& sample) {
-  SightErrors errors;
+ObservationErrors observation_errors(const UnderwaterSample& sample) {
+  ObservationErrors errors;
   double sum2 = 0.0, chi2 = 0.0;
   for (std::size_t k = 0; k < sample.frames.size(); ++k) {
-    for (const FeatureSight& sight : sample.frames[k].sights) {
-      const auto px = project(sample.camera, sample.truth[k].world_from_cam.inverse() * sample.points.at(sight.id));
-      const double error2 = px ? (sight.px - *px).squaredNorm() : INFINITY;
+    for (const FeatureObservation& observation : sample.frames[k].observations) {
+      const auto px =
+          project(sample.camera, sample.truth[k].world_from_cam.inverse() * sample.points.at(observation.id));
+      const double error2 = px ? (observation.px - *px).squaredNorm() : INFINITY;
       sum2 += error2;
-      chi2 += error2 / (sight.sigma_px * sight.sigma_px);
+      chi2 += error2 / (observation.sigma_px * observation.sigma_px);
       ++errors.num;
     }
   }
@@ -135,7 +138,7 @@ ProtocolRun run_protocol(const UnderwaterSample& sample, const Camera& camera, c
     run.p5_percent.push_back(error_of(sample, now, 5).percent);
     add_last_frame(sample, now, run);
   };
-  const LocalizeReport report = localize_sights(camera, sample.frames, config);
+  const LocalizeReport report = localize_observations(camera, sample.frames, config);
   for (auto* percent : {&run.p1_percent, &run.p5_percent})  // frames before the start
     percent->insert(percent->begin(), sample.frames.size() - percent->size(), 100.0);
   for (const PathStep& step : report.path)
@@ -156,14 +159,14 @@ LocalizationFilterConfig paper_filter() {
   config.gate = 1e9;
   config.bend_tolerance = 0.0;  // always four steps
   config.state_capacity = 80;
-  config.sights_capacity = 16;
+  config.observations_capacity = 16;
   return config;
 }
 
 LocalizationFilterConfig recommended_filter() {
   LocalizationFilterConfig config;
   config.state_capacity = 80;
-  config.sights_capacity = 16;
+  config.observations_capacity = 16;
   return config;
 }
 

@@ -15,28 +15,28 @@ namespace alidade::reproduce {
 /// A simulated sequence as a filter is given it, with its truth.
 struct UnderwaterSample {
   Camera camera;
-  std::vector<SightFrame> frames;
+  std::vector<ObservationFrame> frames;
   std::vector<TimedPose> truth;
   LocalizeConfig config;
   std::map<long, Eigen::Vector3d> points;
 };
 [[nodiscard]] UnderwaterSample underwater_sample(const UnderwaterScene& scene, std::uint64_t seed);
 
-/// The same from pictures: each frame is rendered, and the board's eight points are what find_board() finds in it, with
-/// its σ. A frame in which the board is not found has no sights.
+/// The same from images: each frame is rendered, and the board's eight points are what find_board() finds in it, with
+/// its σ. A frame in which the board is not found has no observations.
 [[nodiscard]] UnderwaterSample filmed_sample(const UnderwaterScene& scene, const UnderwaterVideoConfig& video,
                                              std::uint64_t seed);
 
-/// The same sights without a σ of their own: a filter takes its own for all.
+/// The same observations without a σ of their own: a filter takes its own for all.
 [[nodiscard]] UnderwaterSample with_even_noise(UnderwaterSample sample);
 
-/// Sights against where the true lens puts the true points.
-struct SightErrors {
+/// Observations against where the true lens puts the true points.
+struct ObservationErrors {
   double rms_px = 0.0;        ///< Of a coordinate.
-  double chi2_per_dof = 0.0;  ///< By the sights' own σ.
+  double chi2_per_dof = 0.0;  ///< By the observations' own σ.
   std::size_t num = 0;
 };
-[[nodiscard]] SightErrors sight_errors(const UnderwaterSample& sample);
+[[nodiscard]] ObservationErrors observation_errors(const UnderwaterSample& sample);
 
 /// A point of the map against the truth.
 struct PointError {
@@ -61,7 +61,7 @@ struct ProtocolRun {
                                        const LocalizationFilterConfig& filter, const FilterBankConfig& bank_config,
                                        FeatureKind kind);
 
-/// The published filter of the protocol: places, all sights of a frame at once, iterated, one start, no gate.
+/// The published filter of the protocol: places, all observations of a frame at once, iterated, one start, no gate.
 [[nodiscard]] LocalizationFilterConfig paper_filter();
 
 /// The recommended one for so few points.

@@ -104,10 +104,10 @@ FigureTable figure_7(const BeamErrorTable& table) {
 
 /// Share of the spots in each quarter of a pixel; the last one holds all beyond.
 FigureTable figure_8(const BeamErrorTable& table, const std::string& id, const std::string& name, std::size_t alone,
-                     std::size_t global, double most_px) {
+                     std::size_t global, double max_px) {
   constexpr int num_bins = 24;
   FigureTable figure{id, {{"error_px", {}}, {name + "_percent", {}}, {name + "_optimised_percent", {}}}};
-  const double width_px = most_px / num_bins;
+  const double width_px = max_px / num_bins;
   for (int bin = 0; bin < num_bins; ++bin) figure.columns[0].second.push_back((bin + 0.5) * width_px);
   for (std::size_t column = 1; column <= 2; ++column) {
     const std::vector<double>& errors = table[column == 1 ? alone : global][at_18].spots_px;

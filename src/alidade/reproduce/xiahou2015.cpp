@@ -19,7 +19,7 @@ double baseline_cm() {
   return paper_target_cm.z() * (std::tan(printed_angles[1].x()) - std::tan(printed_angles[0].x()));
 }
 
-/// A point in a head's picture at the printed angles.
+/// A point in a head's image at the printed angles.
 Eigen::Vector2d pixel_of(std::size_t head, const Eigen::Vector3d& point_m) {
   std::array<RigHead, 2> rig = xiahou_rig();
   rig[1].head.world_from_base.translation.x() = baseline_cm() / 100.0;

@@ -14,7 +14,7 @@
 #include "alidade/track/xiahou_filter.h"
 
 // Figure 2 of the paper: angles → tangents → filter → projection with the same angles → error → PI → plant → angles,
-// with d1 to d4 added to the four angles. No picture of the target comes in anywhere.
+// with d1 to d4 added to the four angles. No image of the target comes in anywhere.
 
 namespace alidade::reproduce {
 namespace {
@@ -24,7 +24,7 @@ constexpr int loop_steps = 240;
 constexpr double loop_baseline_cm = 50.2;
 const Eigen::Vector2d loop_middle_px(160.0, 120.0);
 
-/// One instant: what is fed back, where the target truly is in both pictures, and the angles of both heads.
+/// One instant: what is fed back, where the target truly is in both images, and the angles of both heads.
 struct LoopStep {
   double t_s = 0.0;
   std::array<Eigen::Vector2d, 2> fed_back_px, true_px, pan_tilt_rad, to_target_rad;
@@ -104,8 +104,8 @@ double travel_deg(const std::vector<LoopStep>& steps, std::array<Eigen::Vector2d
   double most = 0.0;
   for (const LoopStep& step : steps)
     most = std::max(most, std::abs((step.*angles)[0].x() - (steps.front().*angles)[0].x()));
-  constexpr double least_deg = 1e-9;  // rounding is no travel
-  return most / degree > least_deg ? most / degree : 0.0;
+  constexpr double min_deg = 1e-9;  // rounding is no travel
+  return most / degree > min_deg ? most / degree : 0.0;
 }
 
 FigureTable loop_figure(const std::vector<LoopStep>& steps) {

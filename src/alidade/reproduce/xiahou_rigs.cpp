@@ -20,9 +20,9 @@ Scores score(const ReproduceConfig& config, const TrackScene& scene) {
   Scores sums;
   for (int run = 0; run < runs; ++run) {
     report_progress(config.progress, "rigs", static_cast<std::size_t>(run), static_cast<std::size_t>(runs));
-    const auto sights = sights_of(scene, 800000 * config.seed + static_cast<std::uint64_t>(run));
-    const TrackReport paper = track_target_xiahou(sights, scene.heads, {}, truth),
-                      best = track_target(sights, scene.heads, {}, truth);
+    const auto observations = observations_of(scene, 800000 * config.seed + static_cast<std::uint64_t>(run));
+    const TrackReport paper = track_target_xiahou(observations, scene.heads, {}, truth),
+                      best = track_target(observations, scene.heads, {}, truth);
     sums.paper_mm += 1e6 * paper.rms_m * paper.rms_m / runs;
     sums.best_mm += 1e6 * best.rms_m * best.rms_m / runs;
     sums.bound_mm += 1e6 * best.pcrlb_m * best.pcrlb_m / runs;

@@ -20,7 +20,7 @@ constexpr std::array<DistortionVariant, 3> variants{DistortionVariant::none, Dis
 /// The same sequences by the paper's filter and by ours, with each of the three lenses.
 struct Trials {
   std::array<Runs, 3> ours, best;
-  Values sights_rms_px, sights_chi2;  ///< Of each sequence, against the truth.
+  Values observations_rms_px, observations_chi2;  ///< Of each sequence, against the truth.
 };
 
 using SampleMaker = std::function<UnderwaterSample(const UnderwaterScene&, std::uint64_t seed)>;
@@ -35,10 +35,10 @@ Trials run_trials(const ReproduceConfig& config, const char* what, int num, cons
   for (int sequence = 0; sequence < num; ++sequence) {
     report_progress(config.progress, what, static_cast<std::size_t>(sequence), static_cast<std::size_t>(num));
     const UnderwaterSample sample = sample_of(scene, 900000 * config.seed + static_cast<std::uint64_t>(sequence));
-    const UnderwaterSample even = with_even_noise(sample);  // half a pixel each, also where a picture tells better
-    const SightErrors errors = sight_errors(sample);
-    trials.sights_rms_px.push_back(errors.rms_px);
-    trials.sights_chi2.push_back(errors.chi2_per_dof);
+    const UnderwaterSample even = with_even_noise(sample);  // half a pixel each, also where an image tells better
+    const ObservationErrors errors = observation_errors(sample);
+    trials.observations_rms_px.push_back(errors.rms_px);
+    trials.observations_chi2.push_back(errors.chi2_per_dof);
     for (std::size_t lens = 0; lens < variants.size(); ++lens) {
       const Camera camera = *with_distortion(sample.camera, variants[lens]);
       trials.ours[lens].push_back(run_protocol(even, camera, paper_filter(), one_start, FeatureKind::xyz));
@@ -215,7 +215,7 @@ std::vector<Claim> claims_from_points(const Trials& trials) {
 }
 
 /// The few sequences that are filmed bear ratios of errors; shares of frames beyond 2 % would turn with the draw.
-std::vector<Claim> claims_from_pictures(const Trials& trials) {
+std::vector<Claim> claims_from_images(const Trials& trials) {
   const Gains corner = gains_of(trials.ours, &ProtocolRun::p1_mean),
               best_corner = gains_of(trials.best, &ProtocolRun::p1_mean);
   Claim whole{"pictures-distortion",
@@ -231,7 +231,7 @@ std::vector<Claim> claims_from_pictures(const Trials& trials) {
       "lens "
       "is the 1 mm to which the points of the board are known.",
       corner.words(), 100.0 * mean_of(trials.ours[0], &ProtocolRun::p1_above_2), trials.ours[0].size(),
-      quantile_of(trials.sights_rms_px, 0.5), quantile_of(trials.sights_chi2, 0.5));
+      quantile_of(trials.observations_rms_px, 0.5), quantile_of(trials.observations_chi2, 0.5));
   Claim higher = higher_order_improves(corner, best_corner);
   higher.id = "pictures-higher-order";
   higher.quantity = "from pictures, a higher order still improves: the same over first order";
@@ -260,7 +260,7 @@ Experiment from_points(const Trials& trials) {
       {figure_10("10", trials)}};
 }
 
-Experiment from_pictures(const Trials& trials) {
+Experiment from_images(const Trials& trials) {
   return {
       "figure10-pictures",
       "Figure 10 from rendered pictures",
@@ -270,7 +270,7 @@ Experiment from_pictures(const Trials& trials) {
       "Attenuation 1.2, 0.5, 0.45 per metre (red, green, blue), a wall behind the board, one more square all round "
       "it so that its outermost vertices are corners. The filters take the 0.5 px of the points, though the corners "
       "are better.",
-      claims_from_pictures(trials),
+      claims_from_images(trials),
       {figure_10("10_pictures", trials)}};
 }
 
@@ -278,13 +278,13 @@ Experiment from_pictures(const Trials& trials) {
 
 PaperReport reproduce_xu_underwater(const ReproduceConfig& config) {
   const Trials points = run_trials(config, "sequences", config.quick ? 70 : 600, underwater_sample);
-  const Trials pictures = run_trials(config, "filmed sequences", config.quick ? 3 : 30,
-                                     [](const UnderwaterScene& scene, std::uint64_t seed) {
-                                       return filmed_sample(scene, UnderwaterVideoConfig{}, seed);
-                                     });
+  const Trials images = run_trials(config, "filmed sequences", config.quick ? 3 : 30,
+                                   [](const UnderwaterScene& scene, std::uint64_t seed) {
+                                     return filmed_sample(scene, UnderwaterVideoConfig{}, seed);
+                                   });
   return {"xu-underwater",
           "Xu, Xu, \"Underwater monocular localization with lens distortion\"",
-          {from_points(points), from_pictures(pictures)}};
+          {from_points(points), from_images(images)}};
 }
 
 }  // namespace alidade::reproduce

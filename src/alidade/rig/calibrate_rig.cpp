@@ -44,8 +44,8 @@ std::vector<Misreading> misreadings(std::span<const HeadView> views) {
 void look_for_misreading(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
                          const std::map<int, Camera>& cameras, const RigConfig& config, const Progress& progress,
                          RigReport& report) {
-  constexpr std::size_t least_views = 8;
-  if (report.status == Status::degrees || report.status == Status::mirrored || views.size() < least_views) return;
+  constexpr std::size_t min_views = 8;
+  if (report.status == Status::degrees || report.status == Status::mirrored || views.size() < min_views) return;
   for (const Misreading& other : misreadings(views)) {
     const RigReport otherwise = calibrated_with(other.views, points_in_board, cameras, config, {}, progress);
     if (otherwise.status != Status::converged || is_suspicious(otherwise)) continue;

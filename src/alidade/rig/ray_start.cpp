@@ -11,10 +11,10 @@ namespace alidade {
 namespace {
 
 /// Where the points are best put for a rotation: least squared distances from their lines.
-Eigen::Vector3d best_translation(std::span<const SightLine> lines, const Eigen::Matrix3d& R) {
+Eigen::Vector3d best_translation(std::span<const ObservationLine> lines, const Eigen::Matrix3d& R) {
   Eigen::Matrix3d A = 1e-12 * Eigen::Matrix3d::Identity();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
-  for (const SightLine& line : lines) {
+  for (const ObservationLine& line : lines) {
     const Eigen::Matrix3d across =
         Eigen::Matrix3d::Identity() - line.direction_in_base * line.direction_in_base.transpose();
     A += across;
@@ -24,11 +24,12 @@ Eigen::Vector3d best_translation(std::span<const SightLine> lines, const Eigen::
 }
 
 /// The rotation that turns the points best onto where their lines pass nearest to them.
-Eigen::Matrix3d best_rotation(std::span<const SightLine> lines, const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {
+Eigen::Matrix3d best_rotation(std::span<const ObservationLine> lines, const Eigen::Matrix3d& R,
+                              const Eigen::Vector3d& t) {
   const auto num = static_cast<double>(lines.size());
   Eigen::Vector3d from_mean = Eigen::Vector3d::Zero(), to_mean = Eigen::Vector3d::Zero();
   Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
-  for (const SightLine& line : lines) {
+  for (const ObservationLine& line : lines) {
     const double along = std::max(0.0, line.direction_in_base.dot(R * line.point_in_board + t));
     const Eigen::Vector3d to = along * line.direction_in_base;
     from_mean += line.point_in_board / num;
@@ -39,10 +40,10 @@ Eigen::Matrix3d best_rotation(std::span<const SightLine> lines, const Eigen::Mat
   return nearest_rotation(products);
 }
 
-double misfit(std::span<const SightLine> lines, const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {
+double misfit(std::span<const ObservationLine> lines, const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {
   constexpr double cap_rad = 0.5;
   double sum = 0.0;
-  for (const SightLine& line : lines) {
+  for (const ObservationLine& line : lines) {
     const Eigen::Vector3d point = R * line.point_in_board + t;
     const double angle = std::atan2(point.cross(line.direction_in_base).norm(), point.dot(line.direction_in_base));
     sum += std::min(cap_rad, angle);
@@ -68,11 +69,11 @@ std::vector<Eigen::Quaterniond> turns_of_a_cube() {
   return turns;
 }
 
-std::optional<SightPose> pose_of_sight_lines(std::span<const SightLine> lines) {
+std::optional<ObservationPose> pose_of_observation_lines(std::span<const ObservationLine> lines) {
   constexpr std::size_t least = 6;
   constexpr int iterations = 100;  // linear convergence, of which a start needs little
   if (lines.size() < least) return std::nullopt;
-  std::optional<SightPose> best;
+  std::optional<ObservationPose> best;
   for (const Eigen::Quaterniond& turn : turns_of_a_cube()) {
     Eigen::Matrix3d R = turn.toRotationMatrix();
     Eigen::Vector3d t = best_translation(lines, R);
@@ -82,16 +83,16 @@ std::optional<SightPose> pose_of_sight_lines(std::span<const SightLine> lines) {
     }
     const double left = misfit(lines, R, t);
     if (std::isfinite(left) && (!best || left < best->misfit_rad))
-      best = SightPose{{Eigen::Quaterniond(R).normalized(), t}, left};
+      best = ObservationPose{{Eigen::Quaterniond(R).normalized(), t}, left};
   }
   return best;
 }
 
-std::optional<SightPose> sight_pose(const RigProblem& problem, const std::vector<bool>& usable, const RigHead& rig_head,
-                                    std::size_t head, std::size_t board) {
+std::optional<ObservationPose> observation_pose(const RigProblem& problem, const std::vector<bool>& usable,
+                                                const RigHead& rig_head, std::size_t head, std::size_t board) {
   RigHead in_own_base = rig_head;
   in_own_base.head.world_from_base = {};
-  std::vector<SightLine> lines;
+  std::vector<ObservationLine> lines;
   for (std::size_t v = 0; v < problem.views.size(); ++v) {
     const RigView& view = problem.views[v];
     if (!usable[v] || view.head != head || view.board != board) continue;
@@ -101,7 +102,7 @@ std::optional<SightPose> sight_pose(const RigProblem& problem, const std::vector
         lines.push_back({ray->direction_in_world, problem.points_in_board[static_cast<std::size_t>(corner.index)]});
     }
   }
-  return pose_of_sight_lines(lines);
+  return pose_of_observation_lines(lines);
 }
 
 }  // namespace alidade

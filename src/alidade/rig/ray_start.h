@@ -8,8 +8,8 @@
 
 namespace alidade {
 
-/// A line of sight through a head's middle and the point that was seen along it.
-struct SightLine {
+/// A line of observation through a head's middle and the point that was seen along it.
+struct ObservationLine {
   Eigen::Vector3d direction_in_base;  ///< Unit vector.
   Eigen::Vector3d point_in_board;
 };
@@ -17,16 +17,17 @@ struct SightLine {
 /// The pose of points that are seen along such lines, by orthogonal iteration from the 24 turns of a cube, and the mean
 /// capped angle that is left. None for fewer than six lines.
 /// Lu, Hager & Mjolsness, "Fast and globally convergent pose estimation from video images", 2000.
-struct SightPose {
+struct ObservationPose {
   Rigid3 base_from_board;
   double misfit_rad = 0.0;
 };
-[[nodiscard]] std::optional<SightPose> pose_of_sight_lines(std::span<const SightLine> lines);
+[[nodiscard]] std::optional<ObservationPose> pose_of_observation_lines(std::span<const ObservationLine> lines);
 
 /// What a head's views of a board say of its place when no view alone does: single points at many angles. Offsets are
 /// taken as zero. `usable`: one a view of the problem.
-[[nodiscard]] std::optional<SightPose> sight_pose(const RigProblem& problem, const std::vector<bool>& usable,
-                                                  const RigHead& rig_head, std::size_t head, std::size_t board);
+[[nodiscard]] std::optional<ObservationPose> observation_pose(const RigProblem& problem,
+                                                              const std::vector<bool>& usable, const RigHead& rig_head,
+                                                              std::size_t head, std::size_t board);
 
 /// The turns that take a cube into itself.
 [[nodiscard]] std::vector<Eigen::Quaterniond> turns_of_a_cube();

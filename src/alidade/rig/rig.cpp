@@ -107,7 +107,7 @@ double sum_of_corrections2(const Work& work, const SolvedRig& solved, const std:
 
 /// Solves, and with it what the encoders' noise is (Helmert's variance component). None: no convergence.
 std::optional<SolvedRig> solve_with_noise(Work& work, const RigState& start, std::vector<double>& weights) {
-  constexpr double usual_rad = 0.05 * degree, least_rad = 1e-3 * degree;
+  constexpr double usual_rad = 0.05 * degree, min_rad = 1e-3 * degree;
   constexpr double enough =
       8.0;  // of as many corrections a σ is told to a quarter; of fewer it is easily far too small
   work.report.sigma_encoder_is_told = !work.config.sigma_encoder_rad;
@@ -120,7 +120,7 @@ std::optional<SolvedRig> solve_with_noise(Work& work, const RigState& start, std
     const double told = num - num_held_corrections(work.problem, *solved, *cov, weights);
     work.num_told = told >= enough ? told : 0.0;
     const double before = work.problem.sigma_encoder_rad;
-    double sigma_rad = std::max(least_rad, std::sqrt(sum_of_corrections2(work, *solved, weights) / told));
+    double sigma_rad = std::max(min_rad, std::sqrt(sum_of_corrections2(work, *solved, weights) / told));
     if (!(told >= enough)) {
       work.report.sigma_encoder_is_told = false;
       sigma_rad = told > 1.0 ? std::max(sigma_rad, usual_rad) : usual_rad;
@@ -216,7 +216,7 @@ bool has_enough(const Work& work) {
 
 bool turns_about_both_axes(const Work& work) {
   return std::ranges::all_of(work.report.covers, [](const HeadCover& cover) {
-    return (cover.highest_rad - cover.lowest_rad).minCoeff() >= least_span_rad;
+    return (cover.highest_rad - cover.lowest_rad).minCoeff() >= min_span_rad;
   });
 }
 

@@ -56,7 +56,7 @@ inline constexpr double rig_cause_limit = 4.2;
 inline constexpr double rig_free_limit = 3.5, rig_free_joint_limit = 2.8;
 
 /// A head that turned less about an axis is taken not to have turned about it.
-inline constexpr double least_span_rad = 0.07;
+inline constexpr double min_span_rad = 0.07;
 /// Over so much of each axis, 20°, a rig is to be known.
 inline constexpr double good_span_rad = 0.35;
 

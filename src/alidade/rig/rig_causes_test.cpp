@@ -85,7 +85,7 @@ TEST(RigByNeed, EstimatesTheEncodersScaleAndSaysSo) {
 TEST(RigByNeed, EstimatesBacklashAndCountsHalfOfItAsNoiseOfReadings) {
   RigTrialSetup setup;
   setup.noise.backlash_rad = 0.3 * degree;
-  setup.scene.most_views_of_a_board = 6;
+  setup.scene.max_views_of_a_board = 6;
   int found = 0;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const RigTrial trial = rig_trial(setup, seed);

@@ -236,7 +236,7 @@ TEST(RigCauses, AreNamedWithTheirSize) {
     for (std::uint64_t seed = 1; seed <= runs; ++seed) {
       RigSceneConfig scene_config;
       scene_config.nominal = {xiahou_rig()[0]};
-      scene_config.most_views_of_a_board = 8;
+      scene_config.max_views_of_a_board = 8;
       const RigScene scene = draw_rig_scene(scene_config, seed);
       std::vector<HeadView> views = simulate_head_views(scene, {}, seed).views;
       for (HeadView& view : views) {

@@ -16,7 +16,7 @@ Eigen::MatrixXd power_of(const Eigen::MatrixXd& symmetric, double power, double 
   return eigen.vectors * values.asDiagonal() * eigen.vectors.transpose();
 }
 
-constexpr double least_rest = 1e-3;  // of a residual's variance: as cluster_covariance() has it
+constexpr double min_rest = 1e-3;  // of a residual's variance: as cluster_covariance() has it
 
 }  // namespace
 
@@ -54,10 +54,10 @@ std::vector<ClusterStep> view_cluster_steps(const RigProblem& problem, const Sol
         pull * pull.transpose() + at->K_board * Ldlt(board.V).solve_each(Eigen::MatrixXd(at->K_board.transpose()));
     const Eigen::Index k = at->y.size(), n = cov.rows();
     const Eigen::VectorXd own =
-        power_of(Eigen::MatrixXd::Identity(k, k) - taken, -0.5, least_rest) * at->y;  // CR2, heads and boards
+        power_of(Eigen::MatrixXd::Identity(k, k) - taken, -0.5, min_rest) * at->y;  // CR2, heads and boards
     const Eigen::MatrixXd h = pull.transpose() * pull;
     // cluster_covariance() will make it larger again by what the heads take.
-    const Eigen::VectorXd x = power_of(Eigen::MatrixXd::Identity(n, n) - h, 0.5, least_rest) * (pull.transpose() * own);
+    const Eigen::VectorXd x = power_of(Eigen::MatrixXd::Identity(n, n) - h, 0.5, min_rest) * (pull.transpose() * own);
     steps.push_back({L * x, L * h * L.transpose()});
   }
   return steps;

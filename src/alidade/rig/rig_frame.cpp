@@ -83,10 +83,10 @@ Rigid3 cam_from_cam(const Head& first, const Eigen::Vector2d& first_rad, const H
   return cam_from_world(first, first_rad) * world_from_cam(second, second_rad);
 }
 
-/// The middle and the four corners of what a head's views cover, or of `least_rad` about its middle if that is more.
-std::vector<Eigen::Vector2d> angles_of(const HeadCover& cover, double least_rad) {
+/// The middle and the four corners of what a head's views cover, or of `min_rad` about its middle if that is more.
+std::vector<Eigen::Vector2d> angles_of(const HeadCover& cover, double min_rad) {
   const Eigen::Vector2d middle = 0.5 * (cover.lowest_rad + cover.highest_rad);
-  const Eigen::Vector2d half = (0.5 * (cover.highest_rad - cover.lowest_rad)).cwiseMax(0.5 * least_rad);
+  const Eigen::Vector2d half = (0.5 * (cover.highest_rad - cover.lowest_rad)).cwiseMax(0.5 * min_rad);
   const Eigen::Vector2d low = middle - half, high = middle + half;
   return {0.5 * (low + high), low, {low.x(), high.y()}, high, {high.x(), low.y()}};
 }
@@ -131,14 +131,14 @@ Eigen::Matrix<double, 6, 6> relative_covariance(const Rig& rig, std::size_t firs
 namespace {
 
 /// σ of angle and place between cameras, the worst over what their views cover, or so much about its middle.
-std::pair<double, double> worst_sigma(const RigReport& report, double least_rad) {
+std::pair<double, double> worst_sigma(const RigReport& report, double min_rad) {
   const Rig& rig = report.rig;
   double angle2 = 0.0, length2 = 0.0;
   const bool is_one = rig.heads.size() == 1;
-  const std::vector<Eigen::Vector2d> first_angles = angles_of(report.covers[0], least_rad);
+  const std::vector<Eigen::Vector2d> first_angles = angles_of(report.covers[0], min_rad);
   for (std::size_t h = is_one ? 0 : 1; h < rig.heads.size(); ++h) {
     for (const Eigen::Vector2d& first_rad : first_angles) {
-      for (const Eigen::Vector2d& second_rad : angles_of(report.covers[h], least_rad)) {
+      for (const Eigen::Vector2d& second_rad : angles_of(report.covers[h], min_rad)) {
         const Eigen::Matrix<double, 6, 6> cov = relative_covariance(rig, 0, first_rad, h, second_rad);
         length2 = std::max(length2, cov.topLeftCorner<3, 3>().trace());
         angle2 = std::max(angle2, cov.bottomRightCorner<3, 3>().trace());

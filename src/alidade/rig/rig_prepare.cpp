@@ -68,7 +68,7 @@ void choose_counting(const Work& work, std::size_t head, RigHead& rig_head) {
       RigHead trial = nominal;
       trial.head.encoder.pan_scale = scales.x();
       trial.head.encoder.tilt_scale = scales.y();
-      const auto seen = sight_pose(work.problem, work.usable, trial, head, board);
+      const auto seen = observation_pose(work.problem, work.usable, trial, head, board);
       if (seen && seen->misfit_rad < 0.999 * least) least = seen->misfit_rad, rig_head = trial;
     }
   }
@@ -78,12 +78,12 @@ void choose_counting(const Work& work, std::size_t head, RigHead& rig_head) {
 class Travels {
  public:
   Eigen::Vector2d to(const HeadView& view) {
-    constexpr double least_rad = 5e-3;  // less is a reading's noise: the axis stayed where it was
+    constexpr double min_rad = 5e-3;  // less is a reading's noise: the axis stayed where it was
     const auto [last, is_first] = last_.try_emplace(view.head, view.pan_tilt_rad, Eigen::Vector2d::Zero());
     auto& [reading_rad, travel] = last->second;
     for (int axis = 0; axis < 2 && !is_first; ++axis) {
       const double by_rad = view.pan_tilt_rad[axis] - reading_rad[axis];
-      if (std::abs(by_rad) > least_rad) travel[axis] = by_rad > 0.0 ? 0.5 : -0.5;
+      if (std::abs(by_rad) > min_rad) travel[axis] = by_rad > 0.0 ? 0.5 : -0.5;
     }
     reading_rad = view.pan_tilt_rad;
     return travel;
@@ -121,13 +121,13 @@ void fit_poses(Work& work) {
   work.report.sigma_px_is_told = !work.config.sigma_px && told_px > 0.0;
   work.report.sigma_px = work.config.sigma_px ? *work.config.sigma_px : told_px > 0.0 ? std::max(told_px, 1e-3) : 0.5;
   work.problem.sigma_px = work.report.sigma_px;
-  constexpr double most_sigmas = 6.0;  // of one view's own residuals: blurred is not wrong, a wrong corner is
+  constexpr double max_sigmas = 6.0;  // of one view's own residuals: blurred is not wrong, a wrong corner is
   for (std::size_t v = 0; v < work.given.size(); ++v) {
     if (!work.usable[v]) continue;
     const auto& pose = work.poses[v];
     // A view without a pose of its own is placed by the others.
     if (pose && work.config.reject_outliers && pose->dof > 0 &&
-        pose->chi2 / pose->dof > std::pow(most_sigmas * std::max(told_px, work.report.sigma_px), 2)) {
+        pose->chi2 / pose->dof > std::pow(max_sigmas * std::max(told_px, work.report.sigma_px), 2)) {
       work.usable[v] = false;
       work.report.views[v].reason = "its corners do not fit the board";
       work.poses[v].reset();

@@ -93,7 +93,7 @@ double distance(const Rigid3& a, const Rigid3& b) {
 }
 
 /// What most of several opinions agree on.
-std::optional<Rigid3> most_agreed(const std::vector<Rigid3>& opinions) {
+std::optional<Rigid3> max_agreed(const std::vector<Rigid3>& opinions) {
   std::optional<Rigid3> best;
   double least = std::numeric_limits<double>::infinity();
   for (const Rigid3& opinion : opinions) {
@@ -109,12 +109,12 @@ using Poses = std::span<const std::optional<BoardPoseFit>>;
 /// Of a board that no view alone places: where single points at many angles put it.
 std::optional<Rigid3> place_of_points(const RigProblem& problem, const std::vector<bool>& usable,
                                       const PlacedRig& placed, std::size_t board) {
-  std::optional<SightPose> best;
+  std::optional<ObservationPose> best;
   Rigid3 place;
   for (std::size_t h = 0; h < placed.has_head.size(); ++h) {
     if (!placed.has_head[h]) continue;
     const RigHead& rig_head = placed.state.heads[h];
-    const auto seen = sight_pose(problem, usable, rig_head, h, board);
+    const auto seen = observation_pose(problem, usable, rig_head, h, board);
     if (!seen || (best && best->misfit_rad <= seen->misfit_rad)) continue;
     best = seen;
     place = rig_head.head.world_from_base * seen->base_from_board;
@@ -134,7 +134,7 @@ bool place_boards(const RigProblem& problem, const std::vector<bool>& usable, Po
       const Rigid3 world_from_cam_v = world_from_cam(placed.state.heads[view.head].head, view.view->pan_tilt_rad);
       opinions.push_back(world_from_cam_v * poses[v]->pose.cam_from_board);
     }
-    const auto place = opinions.empty() ? place_of_points(problem, usable, placed, b) : most_agreed(opinions);
+    const auto place = opinions.empty() ? place_of_points(problem, usable, placed, b) : max_agreed(opinions);
     if (place) {
       placed.state.world_from_board[b] = *place;
       placed.has_board[b] = any = true;
@@ -158,10 +158,11 @@ bool place_heads(const RigProblem& problem, const std::vector<bool>& usable, Pos
       opinions.push_back(placed.state.world_from_board[view.board] * base_from_board_v.inverse());
     }
     for (std::size_t b = 0; opinions.empty() && b < placed.has_board.size(); ++b) {
-      const auto seen = placed.has_board[b] ? sight_pose(problem, usable, placed.state.heads[h], h, b) : std::nullopt;
+      const auto seen =
+          placed.has_board[b] ? observation_pose(problem, usable, placed.state.heads[h], h, b) : std::nullopt;
       if (seen) opinions.push_back(placed.state.world_from_board[b] * seen->base_from_board.inverse());
     }
-    if (const auto world_from_base = most_agreed(opinions)) {
+    if (const auto world_from_base = max_agreed(opinions)) {
       placed.state.heads[h].head.world_from_base = *world_from_base;
       placed.has_head[h] = any = true;
     }

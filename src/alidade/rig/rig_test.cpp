@@ -7,11 +7,11 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "alidade/files/csv.h"
 #include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/io/csv.h"
-#include "alidade/io/views_file.h"
 #include "alidade/simulate/rig.h"
+#include "alidade/tables/views_file.h"
 #include "alidade/testing/reference_case.h"
 #include "alidade/testing/rig_sample.h"
 
@@ -300,7 +300,7 @@ TEST(Rig, TooFewViewsAreRefused) {
   expect_refusal(scene, views, "no view", {});
 }
 
-/// 71 readings of a real head at eight surveyed points, one point a picture, by Dai, Xiong & Li, 2011: no view alone
+/// 71 readings of a real head at eight surveyed points, one point an image, by Dai, Xiong & Li, 2011: no view alone
 /// gives a pose. The lens is the authors', at half their resolution; their v counts upwards.
 TEST(Rig, ARealHeadsSurveyedPointsAreExplainedToTwoPixels) {
   const char* data = std::getenv("ALIDADE_DATA");

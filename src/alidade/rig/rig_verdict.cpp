@@ -29,7 +29,7 @@ Verdict cannot_tell(std::string sentence, std::string add) {
 std::optional<Verdict> refusal_by_angles(const RigReport& report) {
   for (const HeadCover& cover : report.covers) {
     const Eigen::Vector2d span = cover.highest_rad - cover.lowest_rad;
-    const bool pans = span.x() >= least_span_rad, tilts = span.y() >= least_span_rad;
+    const bool pans = span.x() >= min_span_rad, tilts = span.y() >= min_span_rad;
     const std::string head = "head " + std::to_string(cover.id);
     if (cover.num_views < 3 || (pans && tilts)) continue;
     if (!pans && !tilts)

@@ -12,7 +12,7 @@ namespace alidade {
 /// What one axis has to act on, at one sample.
 struct AxisInput {
   double encoder_rad = 0.0;
-  double error_rad = 0.0;  ///< Of the newest picture: focal-normalised offset of the target, > 0 towards + angle.
+  double error_rad = 0.0;  ///< Of the newest image: focal-normalised offset of the target, > 0 towards + angle.
   /// Where the axis should point from the moment at which a command acts, a sample apart; none: stay.
   std::optional<Eigen::Vector<double, mpc_horizon + 1>> wanted_rad;
   Eigen::Vector<double, mpc_horizon + 1> wanted_rate_rad_s = Eigen::Vector<double, mpc_horizon + 1>::Zero();

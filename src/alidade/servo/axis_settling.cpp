@@ -54,10 +54,10 @@ double settling_per_period(const ServoConfig& config, const ServoAxis& known, co
                            double latency_s) {
   constexpr double offset_rad = 1e-6;  // far from every limit of rate, also when it has grown a thousandfold
   constexpr double settled = 1e-4, grown = 1e3;
-  constexpr int window = 64, most_windows = 160;
+  constexpr int window = 64, max_windows = 160;
   SmallLoop loop(config, known, real, focal_px, latency_s, offset_rad);
   std::vector<double> sizes;
-  for (int k = 0; k < most_windows; ++k) {
+  for (int k = 0; k < max_windows; ++k) {
     double size = 0.0;
     for (int i = 0; i < window; ++i) {
       const double off = loop.step();

@@ -71,7 +71,7 @@ void BearingAxis::start(double t_s, double angle_rad, double variance_rad2, cons
     beliefs_[i].x = {angle_rad, 0.0, 0.0};  // after a jump no rate or acceleration is believed
     beliefs_[i].P = Eigen::Vector3d(variance_rad2 + effect.squaredNorm(), rate * rate, sigma * sigma).asDiagonal();
     with_lens_[i].setZero();
-    with_lens_[i].row(0) = -effect;  // state − belief: what the sight has too much
+    with_lens_[i].row(0) = -effect;  // state − belief: what the observation has too much
   }
   log_weights_.fill(0.0);
   weights_.fill(1.0 / num_agilities);
@@ -119,8 +119,8 @@ Bearing BearingAxis::at(double t_s) const {
   return {mean[0], mean[1], mean[2], std::sqrt(std::max(0.0, second_moment - mean[0] * mean[0]))};
 }
 
-SightUse BearingFilter::begin(double t_s, const Eigen::Vector2d& bearing_rad, double variance,
-                              const std::array<LensEffect, 2>& effects, SightUse as) {
+ObservationUse BearingFilter::begin(double t_s, const Eigen::Vector2d& bearing_rad, double variance,
+                                    const std::array<LensEffect, 2>& effects, ObservationUse as) {
   for (std::size_t axis = 0; axis < 2; ++axis)
     axes_[axis].start(t_s, bearing_rad[static_cast<Eigen::Index>(axis)], variance, effects[axis]);
   newest_s_ = t_s;
@@ -129,11 +129,11 @@ SightUse BearingFilter::begin(double t_s, const Eigen::Vector2d& bearing_rad, do
   return as;
 }
 
-SightUse BearingFilter::take(double t_capture_s, const Eigen::Vector2d& bearing_rad, double sigma_rad,
-                             const std::array<LensEffect, 2>& effects) {
+ObservationUse BearingFilter::take(double t_capture_s, const Eigen::Vector2d& bearing_rad, double sigma_rad,
+                                   const std::array<LensEffect, 2>& effects) {
   const double variance = sigma_rad * sigma_rad;
-  if (!has_started_) return begin(t_capture_s, bearing_rad, variance, effects, SightUse::started);
-  if (!(t_capture_s > newest_s_)) return SightUse::late;
+  if (!has_started_) return begin(t_capture_s, bearing_rad, variance, effects, ObservationUse::started);
+  if (!(t_capture_s > newest_s_)) return ObservationUse::late;
   const double gap_s = num_gated_ == 0 ? t_capture_s - newest_s_ : usual_gap_s_;
   bool is_expected = true;
   for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -144,14 +144,14 @@ SightUse BearingFilter::take(double t_capture_s, const Eigen::Vector2d& bearing_
   if (!is_expected) {
     usual_gap_s_ = gap_s;
     if (++num_gated_ >= config_.restart_after)
-      return begin(t_capture_s, bearing_rad, variance, effects, SightUse::restarted);
-    return SightUse::gated;
+      return begin(t_capture_s, bearing_rad, variance, effects, ObservationUse::restarted);
+    return ObservationUse::gated;
   }
   for (std::size_t axis = 0; axis < 2; ++axis)
     axes_[axis].update(t_capture_s, bearing_rad[static_cast<Eigen::Index>(axis)], variance, effects[axis]);
   newest_s_ = t_capture_s;
   num_gated_ = 0;
-  return SightUse::used;
+  return ObservationUse::used;
 }
 
 }  // namespace alidade

@@ -19,7 +19,7 @@ struct BearingFilterConfig {
   double memory_s = 0.5;          ///< For how long a model's prediction counts.
   double start_rate_rad_s = 2.0;  ///< σ of the rate that a target may have when first seen.
   double gate = 20.0;             ///< On the squared innovation over its variance, of the mixture: 4.5 σ.
-  int restart_after = 2;          ///< Sights beyond the gate, one after the other: the target has jumped.
+  int restart_after = 2;          ///< Observations beyond the gate, one after the other: the target has jumped.
 };
 
 /// What an error of the lens, one σ of it, does to a bearing: of the focal length, of the principal point. These errors
@@ -41,11 +41,11 @@ class BearingAxis {
   explicit BearingAxis(const BearingFilterConfig& config) : config_(config) {}
 
   void start(double t_s, double angle_rad, double variance_rad2, const LensEffect& effect = LensEffect::Zero());
-  /// Squared innovation over its variance, by the mixture. The variance is that of a sight `usual_gap_s` after the
-  /// last: waiting makes no jump believable. `variance_rad2` with all that a sight may be off.
+  /// Squared innovation over its variance, by the mixture. The variance is that of an observation `usual_gap_s` after
+  /// the last: waiting makes no jump believable. `variance_rad2` with all that an observation may be off.
   [[nodiscard]] double surprise(double t_s, double angle_rad, double variance_rad2, double usual_gap_s) const;
   void update(double t_s, double angle_rad, double variance_rad2, const LensEffect& effect = LensEffect::Zero());
-  /// The mixture at a time not before the last sight.
+  /// The mixture at a time not before the last observation.
   [[nodiscard]] Bearing at(double t_s) const;
   /// How much each model is heard.
   [[nodiscard]] const std::array<double, num_agilities>& weights() const { return weights_; }
@@ -58,7 +58,7 @@ class BearingAxis {
   double t_s_ = 0.0;
 };
 
-enum class SightUse { used, started, gated, restarted, late };
+enum class ObservationUse { used, started, gated, restarted, late };
 
 /// Both axes of a head: bearings as (pan, tilt) at which the head would point at the target.
 class BearingFilter {
@@ -66,18 +66,18 @@ class BearingFilter {
   explicit BearingFilter(const BearingFilterConfig& config)
       : config_(config), axes_{BearingAxis(config), BearingAxis(config)} {}
 
-  /// A bearing at its capture time, both axes with this σ, and what the lens' errors do to each. Sights older than the
-  /// last one are left out.
-  SightUse take(double t_capture_s, const Eigen::Vector2d& bearing_rad, double sigma_rad,
-                const std::array<LensEffect, 2>& effects = {LensEffect::Zero(), LensEffect::Zero()});
+  /// A bearing at its capture time, both axes with this σ, and what the lens' errors do to each. Observations older
+  /// than the last one are left out.
+  ObservationUse take(double t_capture_s, const Eigen::Vector2d& bearing_rad, double sigma_rad,
+                      const std::array<LensEffect, 2>& effects = {LensEffect::Zero(), LensEffect::Zero()});
   [[nodiscard]] bool has_started() const { return has_started_; }
   [[nodiscard]] double newest_s() const { return newest_s_; }
   [[nodiscard]] std::array<Bearing, 2> at(double t_s) const { return {axes_[0].at(t_s), axes_[1].at(t_s)}; }
   void forget() { has_started_ = false; }
 
  private:
-  SightUse begin(double t_s, const Eigen::Vector2d& bearing_rad, double variance,
-                 const std::array<LensEffect, 2>& effects, SightUse as);
+  ObservationUse begin(double t_s, const Eigen::Vector2d& bearing_rad, double variance,
+                       const std::array<LensEffect, 2>& effects, ObservationUse as);
 
   BearingFilterConfig config_;
   std::array<BearingAxis, 2> axes_;

@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-constexpr double sigma_rad = 0.0017, sight_period_s = 0.05;
+constexpr double sigma_rad = 0.0017, observation_period_s = 0.05;
 
 /// After a start, σ of the angle dt later is that of F P Fᵀ + Q; from the exponential of Van Loan.
 TEST(BearingAxis, PredictsAsSingersModel) {
@@ -35,7 +35,7 @@ TEST(BearingAxis, ExtrapolatesAsItPredicts) {
   BearingAxis axis(config);
   axis.start(0.0, 0.0, sigma_rad * sigma_rad);
   for (int k = 1; k < 20; ++k)
-    axis.update(k * sight_period_s, 0.3 * std::sin(2.0 * k * sight_period_s), sigma_rad * sigma_rad);
+    axis.update(k * observation_period_s, 0.3 * std::sin(2.0 * k * observation_period_s), sigma_rad * sigma_rad);
   const Bearing there = ahead(axis.at(0.95), config.singer_tau_s, 0.2), predicted = axis.at(1.15);
   EXPECT_NEAR(there.angle_rad, predicted.angle_rad, 1e-12);
   EXPECT_NEAR(there.rate_rad_s, predicted.rate_rad_s, 1e-12);
@@ -47,7 +47,7 @@ double rms_ahead(double amplitude_rad, double omega, const BearingFilterConfig& 
   axis.start(0.0, 0.0, sigma_rad * sigma_rad);
   double sum2 = 0.0;
   for (int k = 1; k <= 600; ++k) {
-    const double t_s = k * sight_period_s;
+    const double t_s = k * observation_period_s;
     axis.update(t_s, amplitude_rad * std::sin(omega * t_s) + sigma_rad * draws.normal(), sigma_rad * sigma_rad);
     const double error = axis.at(t_s + ahead_s).angle_rad - amplitude_rad * std::sin(omega * (t_s + ahead_s));
     if (k > 40) sum2 += error * error;
@@ -55,7 +55,7 @@ double rms_ahead(double amplitude_rad, double omega, const BearingFilterConfig& 
   return std::sqrt(sum2 / 560.0);
 }
 
-/// Nobody says how lively the target is, and it costs at most a quarter against the best of 25 single σ.
+/// Nobody says how manoeuvring the target is, and it costs at most a quarter against the best of 25 single σ.
 TEST(BearingAxis, FindsTheTargetsLiveliness) {
   struct Case {
     double amplitude_rad, omega;
@@ -73,26 +73,26 @@ TEST(BearingAxis, FindsTheTargetsLiveliness) {
   }
 }
 
-TEST(BearingFilter, LeavesOutOneWildSightAndFollowsAJump) {
+TEST(BearingFilter, LeavesOutOneWildObservationAndFollowsAJump) {
   Draws draws(1);
   BearingFilter filter({});
   const auto take = [&](double t_s, const Eigen::Vector2d& where) {
     return filter.take(t_s, where + sigma_rad * draws.normal2(), sigma_rad);
   };
   const Eigen::Vector2d here(0.1, -0.2), there(0.27, -0.12);
-  EXPECT_EQ(take(0.0, here), SightUse::started);
+  EXPECT_EQ(take(0.0, here), ObservationUse::started);
   int k = 1;
-  for (; k < 40; ++k) EXPECT_EQ(take(k * sight_period_s, here), SightUse::used);
-  EXPECT_EQ(take(k++ * sight_period_s, there), SightUse::gated);  // one wild sight…
-  EXPECT_EQ(take(k * sight_period_s, here), SightUse::used);
-  EXPECT_NEAR(filter.at(k++ * sight_period_s)[0].angle_rad, here.x(), 3e-3);
-  EXPECT_EQ(take(k++ * sight_period_s, there), SightUse::gated);  // …and a jump
-  EXPECT_EQ(take(k * sight_period_s, there), SightUse::restarted);
+  for (; k < 40; ++k) EXPECT_EQ(take(k * observation_period_s, here), ObservationUse::used);
+  EXPECT_EQ(take(k++ * observation_period_s, there), ObservationUse::gated);  // one wild observation…
+  EXPECT_EQ(take(k * observation_period_s, here), ObservationUse::used);
+  EXPECT_NEAR(filter.at(k++ * observation_period_s)[0].angle_rad, here.x(), 3e-3);
+  EXPECT_EQ(take(k++ * observation_period_s, there), ObservationUse::gated);  // …and a jump
+  EXPECT_EQ(take(k * observation_period_s, there), ObservationUse::restarted);
   // The jump is no motion: nothing is carried on.
-  EXPECT_NEAR(filter.at(k * sight_period_s + 0.2)[0].angle_rad, there.x(), 4.0 * sigma_rad);
-  EXPECT_EQ(filter.take((k - 3) * sight_period_s, there, sigma_rad), SightUse::late);
+  EXPECT_NEAR(filter.at(k * observation_period_s + 0.2)[0].angle_rad, there.x(), 4.0 * sigma_rad);
+  EXPECT_EQ(filter.take((k - 3) * observation_period_s, there, sigma_rad), ObservationUse::late);
   const double nan = std::nan("");
-  EXPECT_EQ(filter.take((k + 1) * sight_period_s, {nan, nan}, sigma_rad), SightUse::gated);
+  EXPECT_EQ(filter.take((k + 1) * observation_period_s, {nan, nan}, sigma_rad), ObservationUse::gated);
 }
 
 /// A lens' error that lasts: σ of the filter holds with it counted, and falls far short without.
@@ -107,7 +107,7 @@ TEST(BearingAxis, CountsWhatTheLensHasWrong) {
     config.sigma_rad_s2.fill(0.5);
     BearingAxis with(config), without(config);
     double state[3] = {0.0, 0.0, 0.5 * draws.normal()};  // a target that moves as the model has it
-    const double dt = sight_period_s, a = dt / config.singer_tau_s;
+    const double dt = observation_period_s, a = dt / config.singer_tau_s;
     for (int k = 0; k <= 60; ++k) {
       const LensEffect effect(of_focal_rad * std::sin(0.2 * k), of_centre_rad);
       const double z = state[0] + effect[0] * focal + effect[1] * centre + sigma_rad * draws.normal();

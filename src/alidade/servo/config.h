@@ -19,10 +19,10 @@ inline constexpr std::array controller_kinds{ControllerKind::pi, ControllerKind:
 /// What to do where the target is not seen: first go on as it went, then look round where it should be.
 struct SearchConfig {
   bool enabled = true;
-  double coast_s = 0.3;         ///< Without a sight for so long the target counts as lost.
+  double coast_s = 0.3;         ///< Without an observation for so long the target counts as lost.
   double carry_s = 0.2;         ///< The lost target's rate is believed to decay in this time.
   double speed_rad_s = 1.0;     ///< Of the view along the spiral.
-  double turn_of_view = 0.7;    ///< From one turn of the spiral to the next, in heights of the picture.
+  double turn_of_view = 0.7;    ///< From one turn of the spiral to the next, in heights of the image.
   double max_radius_rad = 0.8;  ///< Then from the middle again.
 };
 

@@ -25,56 +25,58 @@ HeadServo::HeadServo(const RigHead& head, const ServoConfig& config)
       search_(config.search, head.camera.height_px / focal_px_),
       axes_{AxisController(config, config.axes[0], focal_px_), AxisController(config, config.axes[1], focal_px_)} {}
 
-std::optional<Eigen::Vector2d> HeadServo::bearing_of(const HeadSight& sight) const {
-  const Eigen::Vector2d own_px = sight.lens ? Zoomed(head_.camera, sight.lens->k).own_px(sight.px) : sight.px;
-  const auto ray = ray_in_world(head_, sight.pan_tilt_rad, own_px);
+std::optional<Eigen::Vector2d> HeadServo::bearing_of(const HeadObservation& observation) const {
+  const Eigen::Vector2d own_px =
+      observation.lens ? Zoomed(head_.camera, observation.lens->k).own_px(observation.px) : observation.px;
+  const auto ray = ray_in_world(head_, observation.pan_tilt_rad, own_px);
   if (!ray) return std::nullopt;
   auto bearing = aim(head_.head, ray->origin_in_world + config_.range_m * ray->direction_in_world);
   if (!bearing) return std::nullopt;
   for (int axis = 0; axis < 2; ++axis) {  // on the turn that the head is on
     double& angle = (*bearing)[axis];
-    angle = sight.pan_tilt_rad[axis] + std::remainder(angle - sight.pan_tilt_rad[axis], 2.0 * std::numbers::pi);
+    angle =
+        observation.pan_tilt_rad[axis] + std::remainder(angle - observation.pan_tilt_rad[axis], 2.0 * std::numbers::pi);
   }
   return bearing;
 }
 
 /// bearing = reading − (px − c) / f: by a σ of f, and by one of c.
-std::array<LensEffect, 2> HeadServo::lens_effects(const HeadSight& sight) const {
+std::array<LensEffect, 2> HeadServo::lens_effects(const HeadObservation& observation) const {
   std::array<LensEffect, 2> effects{LensEffect::Zero(), LensEffect::Zero()};
-  if (!sight.lens) return effects;
-  const LensNow& lens = *sight.lens;
+  if (!observation.lens) return effects;
+  const LensNow& lens = *observation.lens;
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
-    const double f = lens.k[axis], offset = (sight.px[axis] - lens.k[2 + axis]) / f;
+    const double f = lens.k[axis], offset = (observation.px[axis] - lens.k[2 + axis]) / f;
     effects[static_cast<std::size_t>(axis)] = {offset * lens.sigma[axis] / f, lens.sigma[2 + axis] / f};
   }
   return effects;
 }
 
-SightUse HeadServo::take(const HeadSight& sight) {
-  const auto bearing = bearing_of(sight);
-  if (!bearing || !bearing->allFinite()) return SightUse::late;
-  const Eigen::Vector2d centre_px = sight.lens ? Eigen::Vector2d(sight.lens->k.tail<2>()) : centre_px_;
-  const double focal_px = sight.lens ? sight.lens->k.head<2>().mean() : focal_px_;
+ObservationUse HeadServo::take(const HeadObservation& observation) {
+  const auto bearing = bearing_of(observation);
+  if (!bearing || !bearing->allFinite()) return ObservationUse::late;
+  const Eigen::Vector2d centre_px = observation.lens ? Eigen::Vector2d(observation.lens->k.tail<2>()) : centre_px_;
+  const double focal_px = observation.lens ? observation.lens->k.head<2>().mean() : focal_px_;
   const double sigma_rad =
-      sight.lens ? std::hypot(config_.sigma_px / focal_px, config_.sigma_encoder_rad) : sigma_bearing_rad_;
-  const SightUse use = filter_.take(sight.t_capture_s, *bearing, sigma_rad, lens_effects(sight));
-  if (use != SightUse::late) error_rad_ = -(sight.px - centre_px) / focal_px;  // pan > 0 left, tilt > 0 up
+      observation.lens ? std::hypot(config_.sigma_px / focal_px, config_.sigma_encoder_rad) : sigma_bearing_rad_;
+  const ObservationUse use = filter_.take(observation.t_capture_s, *bearing, sigma_rad, lens_effects(observation));
+  if (use != ObservationUse::late) error_rad_ = -(observation.px - centre_px) / focal_px;  // pan > 0 left, tilt > 0 up
   return use;
 }
 
-/// Uses the picture and says what became of the target.
+/// Uses the image and says what became of the target.
 ServoEvent HeadServo::follow(const HeadServoInput& input) {
-  if (input.sight) {
+  if (input.observation) {
     if (is_lost_) filter_.forget();
-    const SightUse use = take(*input.sight);
-    if (use != SightUse::late) {
+    const ObservationUse use = take(*input.observation);
+    if (use != ObservationUse::late) {
       last_seen_s_ = input.t_s;
       const bool was_lost = is_lost_;
       is_lost_ = false;
       if (was_lost) return ServoEvent::found;
-      if (use == SightUse::gated) return ServoEvent::gated;
-      if (use == SightUse::restarted) return ServoEvent::jumped;
-      return use == SightUse::started ? ServoEvent::started : ServoEvent::none;
+      if (use == ObservationUse::gated) return ServoEvent::gated;
+      if (use == ObservationUse::restarted) return ServoEvent::jumped;
+      return use == ObservationUse::started ? ServoEvent::started : ServoEvent::none;
     }
   }
   if (!filter_.has_started()) return ServoEvent::waiting;

@@ -12,19 +12,20 @@
 
 namespace alidade {
 
-/// Where the target stood in a picture, and what the encoders read when it was taken.
-struct HeadSight {
+/// Where the target stood in an image, and what the encoders read when it was taken.
+struct HeadObservation {
   double t_capture_s = 0.0;
   Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
-  /// Intrinsics of that picture, where they are not the head's own; their σ is counted.
+  /// Intrinsics of that image, where they are not the head's own; their σ is counted.
   std::optional<LensNow> lens = {};
 };
 
 struct HeadServoInput {
   double t_s = 0.0;
   Eigen::Vector2d encoder_rad = Eigen::Vector2d::Zero();  ///< (pan, tilt) now.
-  std::optional<HeadSight> sight;  ///< Of the picture that arrived since the last step, if the target is in it.
+  std::optional<HeadObservation>
+      observation;  ///< Of the image that arrived since the last step, if the target is in it.
 };
 
 enum class ServoEvent { none, waiting, started, gated, jumped, lost, searching, found };
@@ -39,20 +40,20 @@ struct HeadServoOutput {
   ServoEvent event = ServoEvent::waiting;
 };
 
-/// Keeps the target in the middle of one head's picture: late pictures and present encoder readings in, commands out,
+/// Keeps the target in the middle of one head's image: late images and present encoder readings in, commands out,
 /// once a period. What it holds is made at the start; a step allocates nothing. docs/maths/servo.md
 class HeadServo {
  public:
   HeadServo(const RigHead& head, const ServoConfig& config);
 
   HeadServoOutput step(const HeadServoInput& input);
-  /// Readings at which the head would have a pixel's ray in the middle of its picture: the measured bearing. None where
+  /// Readings at which the head would have a pixel's ray in the middle of its image: the measured bearing. None where
   /// the lens has no ray there.
-  [[nodiscard]] std::optional<Eigen::Vector2d> bearing_of(const HeadSight& sight) const;
+  [[nodiscard]] std::optional<Eigen::Vector2d> bearing_of(const HeadObservation& observation) const;
 
  private:
-  SightUse take(const HeadSight& sight);
-  [[nodiscard]] std::array<LensEffect, 2> lens_effects(const HeadSight& sight) const;
+  ObservationUse take(const HeadObservation& observation);
+  [[nodiscard]] std::array<LensEffect, 2> lens_effects(const HeadObservation& observation) const;
   ServoEvent follow(const HeadServoInput& input);
   void ask_for_target(double t_effect_s, std::array<AxisInput, 2>& inputs) const;
   void ask_for_search(double t_effect_s, std::array<AxisInput, 2>& inputs) const;
@@ -69,7 +70,7 @@ class HeadServo {
   bool is_lost_ = false;
 };
 
-/// Where the optical axis meets the picture, and the focal length (mean of both). [px]
+/// Where the optical axis meets the image, and the focal length (mean of both). [px]
 [[nodiscard]] Eigen::Vector2d centre_of(const Camera& camera);
 [[nodiscard]] double focal_of(const Camera& camera);
 

@@ -25,8 +25,8 @@ RigHead general_head() {
 TEST(HeadServo, BearingIsThePapersForSmallOffsets) {
   const RigHead head = xiahou_rig()[0];
   const HeadServo servo(head, {});
-  const HeadSight sight{0.0, {0.2, 0.4}, {160.0 + 3.0, 120.0 - 2.0}};
-  const auto bearing = servo.bearing_of(sight);
+  const HeadObservation observation{0.0, {0.2, 0.4}, {160.0 + 3.0, 120.0 - 2.0}};
+  const auto bearing = servo.bearing_of(observation);
   ASSERT_TRUE(bearing);
   EXPECT_NEAR(bearing->x(), 0.2 - std::atan(3.0 / 337.84) / std::cos(0.4), 1e-4);  // 0.03 px of second order
   EXPECT_NEAR(bearing->y(), 0.4 + std::atan(2.0 / 337.84), 1e-4);
@@ -71,7 +71,7 @@ struct Loop {
     HeadServoInput input{t_s, head.read_encoders(), std::nullopt};
     // Away for a while, so that the search is run through as well.
     if (const auto px = head.seen_pixel(path.at(t_s)); px && (t_s < 3.0 || t_s > 4.0))
-      input.sight = HeadSight{t_s, input.encoder_rad, *px};
+      input.observation = HeadObservation{t_s, input.encoder_rad, *px};
     head.send(servo.step(input).command);
     head.advance(0.05);
   }
@@ -94,14 +94,14 @@ TEST(HeadServo, TakesLessThanFiftyMicrosecondsAStep) {
   for (const ServoPlant& plant : {ServoPlant(AnglePlant{}), ServoPlant(RatePlant{})}) {
     for (const ControllerKind kind : controller_kinds) {
       Loop loop(kind, plant);
-      double least_us = 1e9;
+      double min_us = 1e9;
       for (int batch = 0; batch < 20; ++batch) {  // the best of 20: others use this machine as well
         const auto start = std::chrono::steady_clock::now();
         for (int k = 0; k < 10; ++k) loop.step();
         const std::chrono::duration<double, std::micro> spent = std::chrono::steady_clock::now() - start;
-        least_us = std::min(least_us, 2.0 * spent.count() / 10.0);
+        min_us = std::min(min_us, 2.0 * spent.count() / 10.0);
       }
-      EXPECT_LT(least_us, 50.0) << controller_name(kind);
+      EXPECT_LT(min_us, 50.0) << controller_name(kind);
     }
   }
 }

@@ -112,7 +112,7 @@ std::optional<Eigen::MatrixXd> inverse_normal(const Eigen::MatrixXd& J) {
   const Eigen::VectorXd scale = JtJ.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * JtJ * scale.asDiagonal();
   const Ldlt ldlt(scaled);
-  if (!(ldlt.least_pivot() > 1e-10)) return std::nullopt;
+  if (!(ldlt.min_pivot() > 1e-10)) return std::nullopt;
   return scale.asDiagonal() * ldlt.inverse() * scale.asDiagonal();
 }
 
@@ -185,11 +185,11 @@ void set_clusters(const Eigen::MatrixXd& J, ServoIdentification& result) {
 
 /// Whether the residuals of a fit without flaws ask for more.
 bool asks_for_more(std::span<const ServoSample> log, const ServoFit& fit) {
-  constexpr double most_colour = 0.3, least_sigmas = 3.5;
+  constexpr double max_colour = 0.3, min_sigmas = 3.5;
   const FlawGround ground = flaw_ground(log, fit);
   const std::vector<double> residuals(ground.misfit.data(), ground.misfit.data() + ground.misfit.size());
-  if (std::abs(lag_one(residuals)) > most_colour) return true;
-  const double sum2 = ground.misfit.squaredNorm(), least2 = least_sigmas * least_sigmas * fit.rms_rad * fit.rms_rad;
+  if (std::abs(lag_one(residuals)) > max_colour) return true;
+  const double sum2 = ground.misfit.squaredNorm(), least2 = min_sigmas * min_sigmas * fit.rms_rad * fit.rms_rad;
   for (std::size_t flaw = 0; flaw < num_servo_flaws && sum2 > 0.0; ++flaw)
     if (flaw_scores(log, fit, ground, flaw).front().gain2 > least2) return true;
   return false;

@@ -66,11 +66,11 @@ TEST(ServoCauses, FlawedResponseIsTheIntegralOfItsEquations) {
         const double u = log[std::min(row, log.size() - 1)].command;
         const double goal = std::copysign(std::max(0.0, std::abs(u) - 8.0), u);
         lagged = flaws.second_tau_s > 0.0 ? lagged + dt_s * (goal - lagged) / flaws.second_tau_s : goal;
-        const double pull = fit.params[0] * lagged, most_v = flaws.max_rate_rad_s;
-        const double most_dv = flaws.max_acceleration_rad_s2 > 0.0 ? flaws.max_acceleration_rad_s2 * dt_s : 1e9;
-        const double wanted = is_rate_plant ? v + dt_s * (std::clamp(pull, -most_v, most_v) - v) / 0.1
-                                            : std::clamp((pull - x) / 0.1, -most_v, most_v);
-        v += std::clamp(wanted - v, -most_dv, most_dv);
+        const double pull = fit.params[0] * lagged, max_v = flaws.max_rate_rad_s;
+        const double max_dv = flaws.max_acceleration_rad_s2 > 0.0 ? flaws.max_acceleration_rad_s2 * dt_s : 1e9;
+        const double wanted = is_rate_plant ? v + dt_s * (std::clamp(pull, -max_v, max_v) - v) / 0.1
+                                            : std::clamp((pull - x) / 0.1, -max_v, max_v);
+        v += std::clamp(wanted - v, -max_dv, max_dv);
         x += dt_s * v;
         read = std::clamp(read, x - 0.005, x + 0.005);
       }

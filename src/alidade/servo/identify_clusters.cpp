@@ -27,10 +27,10 @@ std::size_t correlated_rows(std::span<const double> residual_rad) {
 
 ClusterCovariance servo_clusters(std::span<const double> residual_rad, const Eigen::MatrixXd& J,
                                  const Eigen::MatrixXd& inverse) {
-  constexpr std::size_t least_rows = 4, least_blocks = 8;
+  constexpr std::size_t min_rows = 4, min_blocks = 8;
   const std::size_t rows = residual_rad.size();
   const std::size_t length =
-      std::clamp(2 * correlated_rows(residual_rad), least_rows, std::max(least_rows, rows / least_blocks));
+      std::clamp(2 * correlated_rows(residual_rad), min_rows, std::max(min_rows, rows / min_blocks));
   const auto size = static_cast<Index>(length);
   Eigen::MatrixXd noise(size, size);
   for (Index k = 0; k < size; ++k) {

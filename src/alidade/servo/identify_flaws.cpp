@@ -23,15 +23,15 @@ class FlawedServo {
  public:
   FlawedServo(const ServoFit& fit, const ServoFlaws& flaws, double first_command)
       : fit_(fit), flaws_(flaws), lagged_(past_dead_band(first_command, flaws.dead_band)) {
-    const double most_rate = flaws.max_rate_rad_s > 0.0 ? flaws.max_rate_rad_s : no_limit;
+    const double max_rate = flaws.max_rate_rad_s > 0.0 ? flaws.max_rate_rad_s : no_limit;
     if (fit.kind == ServoKind::angle) {
       AnglePlant plant{fit.params[gain], AngleUnit::rad, fit.params[tau]};
-      if (flaws.max_rate_rad_s > 0.0) plant.max_rate_rad_s = most_rate;
+      if (flaws.max_rate_rad_s > 0.0) plant.max_rate_rad_s = max_rate;
       axis_.plant = plant;
       now_.angle_rad = fit.params[start];
     } else {
       RatePlant plant{fit.params[gain], AngleUnit::rad, fit.params[tau]};
-      plant.max_rate_rad_s = most_rate;
+      plant.max_rate_rad_s = max_rate;
       plant.max_acceleration_rad_s2 = flaws.max_acceleration_rad_s2 > 0.0 ? flaws.max_acceleration_rad_s2 : no_limit;
       axis_.plant = plant;
       now_.rate_rad_s = fit.params[start];
@@ -47,9 +47,9 @@ class FlawedServo {
     if (!(lag_s > 0.0) && !is_hard) {
       now_ = advanced(axis_, now_, goal, dt_s);
     } else {
-      constexpr double per_tau = 20.0, most_steps = 40.0;
+      constexpr double per_tau = 20.0, max_steps = 40.0;
       const double shortest_s = lag_s > 0.0 ? std::min(lag_s, fit_.params[tau]) : fit_.params[tau];
-      const double steps = std::clamp(std::ceil(per_tau * dt_s / shortest_s), 1.0, most_steps), step_s = dt_s / steps;
+      const double steps = std::clamp(std::ceil(per_tau * dt_s / shortest_s), 1.0, max_steps), step_s = dt_s / steps;
       for (double k = 0.0; k < steps; ++k) step(step_s, goal, is_hard);
     }
     const double half = 0.5 * flaws_.backlash_rad;
@@ -188,13 +188,13 @@ struct Candidate {
   double sum2 = std::numeric_limits<double>::infinity();
 };
 
-double most_command(std::span<const ServoSample> log) {
+double max_command(std::span<const ServoSample> log) {
   double most = 0.0;
   for (const ServoSample& row : log) most = std::max(most, std::abs(row.command));
   return most;
 }
 
-double most_rate(std::span<const ServoSample> log, const Eigen::VectorXd& response) {
+double max_rate(std::span<const ServoSample> log, const Eigen::VectorXd& response) {
   double most = 0.0;
   for (std::size_t i = 1; i < log.size(); ++i) {
     const auto at = static_cast<Index>(i);
@@ -212,11 +212,11 @@ std::vector<double> sizes_of(std::span<const ServoSample> log, const ServoFit& f
   };
   switch (flaw) {
     case rate_limit:
-      return times(most_rate(log, response), {0.95, 0.9, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1});
+      return times(max_rate(log, response), {0.95, 0.9, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1});
     case acceleration_limit:
-      return times(most_rate(log, response) / fit.params[tau], {0.9, 0.7, 0.5, 0.3, 0.15});
+      return times(max_rate(log, response) / fit.params[tau], {0.9, 0.7, 0.5, 0.3, 0.15});
     case dead_band:
-      return times(most_command(log), {0.005, 0.01, 0.02, 0.05, 0.1, 0.2});
+      return times(max_command(log), {0.005, 0.01, 0.02, 0.05, 0.1, 0.2});
     case backlash:
       return times(response.maxCoeff() - response.minCoeff(), {0.002, 0.005, 0.01, 0.02, 0.05, 0.1});
     default:
@@ -280,28 +280,28 @@ namespace {
 
 /// The fit with one more flaw, from the two sizes that explain most.
 Candidate freed(std::span<const ServoSample> log, const ServoFit& fit, const FlawGround& ground, std::size_t flaw) {
-  constexpr std::size_t most_starts = 2;
-  constexpr int first_steps = 8, most_steps = 40;
+  constexpr std::size_t max_starts = 2;
+  constexpr int first_steps = 8, max_steps = 40;
   const std::vector<FlawScore> scores = flaw_scores(log, fit, ground, flaw);
   Candidate best{flaw, fit};
-  for (std::size_t i = 0; i < std::min(most_starts, scores.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(max_starts, scores.size()); ++i) {
     ServoFit trial = fit;
     trial.freed.push_back(flaw);
     trial.flaws.*servo_flaws[flaw] = scores[i].size;
     const double sum2 = refine(log, first_steps, trial);
     if (sum2 < best.sum2) best = {flaw, trial, sum2};
   }
-  if (std::isfinite(best.sum2)) best.sum2 = refine(log, most_steps, best.fit);
+  if (std::isfinite(best.sum2)) best.sum2 = refine(log, max_steps, best.fit);
   return best;
 }
 
 }  // namespace
 
 ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& plain, std::vector<ServoRival>& rivals) {
-  constexpr std::size_t most_freed = 3;
+  constexpr std::size_t max_freed = 3;
   constexpr double margin = 12.0, clear = 10.0;
   ServoFit fit = plain;
-  while (fit.freed.size() < most_freed) {
+  while (fit.freed.size() < max_freed) {
     const FlawGround ground = flaw_ground(log, fit);
     const double sum2 = ground.misfit.squaredNorm();
     std::vector<Candidate> candidates;
@@ -322,7 +322,7 @@ ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& plain, std
 }
 
 std::vector<HiddenFlaw> hidden_flaws(std::span<const ServoSample> log, const ServoFit& fit) {
-  constexpr double share = 0.05, least_evidence = 9.0, least_moved = 0.005;
+  constexpr double share = 0.05, min_evidence = 9.0, min_moved = 0.005;
   const Eigen::VectorXd response = flawed_response(log, fit, fit.flaws);
   const double sum2 = misfit_of(log, fit).squaredNorm(), range = response.maxCoeff() - response.minCoeff();
   std::vector<HiddenFlaw> hidden;
@@ -334,12 +334,12 @@ std::vector<HiddenFlaw> hidden_flaws(std::span<const ServoSample> log, const Ser
     const double with2 = refine(log, 40, trial);
     const double rows = effective_rows(misfit_of(log, trial));
     const double factor = trial.params[gain] / fit.params[gain];
-    if (rows * std::log(with2 / sum2) < least_evidence && std::abs(factor - 1.0) > least_moved)
+    if (rows * std::log(with2 / sum2) < min_evidence && std::abs(factor - 1.0) > min_moved)
       hidden.push_back({flaw, size, factor});
   };
-  ask(dead_band, share * most_command(log));
+  ask(dead_band, share * max_command(log));
   ask(backlash, 0.5 * share * range);
-  if (fit.kind == ServoKind::rate) ask(rate_limit, most_rate(log, response));
+  if (fit.kind == ServoKind::rate) ask(rate_limit, max_rate(log, response));
   return hidden;
 }
 

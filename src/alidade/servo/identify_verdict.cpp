@@ -105,18 +105,18 @@ void add_excitation(std::span<const ServoSample> log, const ServoIdentification&
 
 /// Degrees read as radians, milliseconds as seconds; an encoder that is coarser than its noise.
 void add_readings(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
-  constexpr double most_turn_rad = 6.2831853071795865, most_spacing_s = 1.0;
+  constexpr double max_turn_rad = 6.2831853071795865, max_spacing_s = 1.0;
   const double range = identified.angle_range_rad;
-  if (range > most_turn_rad && identified.fit.kind == ServoKind::angle)
+  if (range > max_turn_rad && identified.fit.kind == ServoKind::angle)
     verdict.checks.push_back(
         {"units", State::care,
          "the angle covers " + text_of(range) + " rad, more than a turn: are these degrees? name the column angle_deg",
-         range, most_turn_rad, "rad", ""});
+         range, max_turn_rad, "rad", ""});
   const double spacing_s = identified.duration_s / (static_cast<double>(log.size()) - 1.0);
-  if (spacing_s > most_spacing_s)
+  if (spacing_s > max_spacing_s)
     verdict.checks.push_back({"times", State::care,
                               "rows are " + text_of(spacing_s) + " s apart: are these milliseconds? t_s is in seconds",
-                              spacing_s, most_spacing_s, "s", ""});
+                              spacing_s, max_spacing_s, "s", ""});
   const double step_rad = encoder_step_rad(log);
   // Rounding errs by step/√12; beyond two of the noise's σ it is no longer spread by the noise.
   if (step_rad > 2.0 * identified.fit.rms_rad)

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "alidade/io/files.h"
+#include "alidade/files/files.h"
 #include "alidade/servo/axis_model.h"
 #include "alidade/testing/reference_case.h"
 

@@ -12,8 +12,8 @@ Eigen::Vector2d TargetSearch::at(double t_s) const {
   const Eigen::Vector2d middle(lost_[0].angle_rad + lost_[0].rate_rad_s * carried_s,
                                lost_[1].angle_rad + lost_[1].rate_rad_s * carried_s);
   // Of r = turn φ / 2π the arc is about turn φ² / 4π.
-  const double most_turns = config_.max_radius_rad / turn_rad_;
-  const double whole_arc = std::numbers::pi * turn_rad_ * most_turns * most_turns;
+  const double max_turns = config_.max_radius_rad / turn_rad_;
+  const double whole_arc = std::numbers::pi * turn_rad_ * max_turns * max_turns;
   const double arc = std::fmod(config_.speed_rad_s * since_s, std::max(whole_arc, turn_rad_));
   const double phi = std::sqrt(4.0 * std::numbers::pi * arc / turn_rad_);
   const double radius = turn_rad_ * phi / (2.0 * std::numbers::pi);

@@ -8,10 +8,10 @@
 namespace alidade {
 
 /// Where to look for a target that was lost: about where its motion, dying away, has carried it, on an Archimedean
-/// spiral at constant speed whose turns overlap by less than a picture. Allocates nothing.
+/// spiral at constant speed whose turns overlap by less than an image. Allocates nothing.
 class TargetSearch {
  public:
-  /// `view_height_rad` is the picture's height as an angle.
+  /// `view_height_rad` is the image's height as an angle.
   TargetSearch(const SearchConfig& config, double view_height_rad)
       : config_(config), turn_rad_(config.turn_of_view * view_height_rad) {}
 

@@ -55,7 +55,7 @@ class BoardLight {
   /// `seed` draws the background.
   BoardLight(const BoardScene& scene, std::size_t i, const RenderConfig& config, std::uint64_t seed);
 
-  /// The whole picture in ambient light.
+  /// The whole image in ambient light.
   [[nodiscard]] PixelLight ambient() const;
 
   /// What a lamp adds in the pixels of `rect`. `on_paper`: grey value that it gives white paper at a point in frame

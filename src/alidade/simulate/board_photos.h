@@ -25,13 +25,13 @@ struct BoardScene {
 struct BoardSceneConfig {
   int num_photos = 20;
   double max_tilt_rad = 0.6;
-  double min_fill = 0.35, max_fill = 0.9;  ///< Printed size over picture size, whichever axis is fuller.
+  double min_fill = 0.35, max_fill = 0.9;  ///< Printed size over image size, whichever axis is fuller.
   double bow_m = 0.0;          ///< Height of the bow in the board's middle over its corners, away from the camera. [m]
   double shape_sigma_m = 0.0;  ///< Scatter of every point, in and out of plane. [m]
 };
 
 /// Draws a scene in which every point of every board is seen. Same seed, same scene.
-/// Tilts, rolls, places in the picture and distances vary; where a pose drawn so would not fit, the board moves away.
+/// Tilts, rolls, places in the image and distances vary; where a pose drawn so would not fit, the board moves away.
 [[nodiscard]] BoardScene draw_board_scene(const Camera& camera, const Board& board, const BoardSceneConfig& config,
                                           std::uint64_t seed);
 
@@ -41,7 +41,7 @@ struct BoardSceneConfig {
 /// True pixels of the board's points in photo `i`, in the board's order.
 [[nodiscard]] std::vector<Eigen::Vector2d> true_corners(const BoardScene& scene, std::size_t i);
 
-/// Corners without pictures: truth plus normal noise of `sigma_px` a coordinate, with that covariance.
+/// Corners without images: truth plus normal noise of `sigma_px` a coordinate, with that covariance.
 [[nodiscard]] std::vector<BoardView> simulate_views(const BoardScene& scene, double sigma_px, std::uint64_t seed);
 
 /// Moves the corners of each view by a smooth field of their place on the board, drawn anew for each: a quadratic

@@ -132,7 +132,7 @@ TEST(BoardSurface, OfABowIsTheParabola) {
   }
 }
 
-/// Where a picture's row crosses a near-vertical edge, from the sum of its grey values between two pixels: blur that is
+/// Where an image's row crosses a near-vertical edge, from the sum of its grey values between two pixels: blur that is
 /// symmetric does not move it.
 double crossing(const cv::Mat& photo, int v, int u_from, int u_to) {
   double sum = 0.0;

@@ -14,7 +14,7 @@ namespace alidade {
 /// Places [m] whose visibility makes the board visible: the outline of what is printed, and the points.
 [[nodiscard]] std::vector<Eigen::Vector3d> visible_outline(const BoardScene& scene);
 
-/// Whether all points lie in the picture, with room for the fit's pixels and the blur.
+/// Whether all points lie in the image, with room for the fit's pixels and the blur.
 [[nodiscard]] bool sees_all(const Camera& camera, const Rigid3& cam_from_board,
                             const std::vector<Eigen::Vector3d>& points_in_board);
 

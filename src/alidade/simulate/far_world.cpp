@@ -69,7 +69,7 @@ Painter noise_painter(double grain_rad, std::uint64_t seed) {
   };
 }
 
-/// Index of a row or column of a picture that goes on mirrored beyond its edges.
+/// Index of a row or column of an image that goes on mirrored beyond its edges.
 int mirrored(int i, int size) {
   const int period = 2 * size;
   const int inside = ((i % period) + period) % period;
@@ -95,7 +95,7 @@ Painter photo_painter(const cv::Mat& photo, double rad_per_px) {
 
 }  // namespace
 
-/// Six square pictures on the planes ±x, ±y, ±z = 1, with bilinear interpolation: what is between the texels is a fixed
+/// Six square images on the planes ±x, ±y, ±z = 1, with bilinear interpolation: what is between the texels is a fixed
 /// function of the direction, so that interpolation moves nothing.
 class FarWorld::Cube {
  public:

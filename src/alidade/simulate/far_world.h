@@ -11,7 +11,7 @@ class Mat;
 
 namespace alidade {
 
-/// A world so far away that only directions count: grey values on a sphere, kept as a cube of pictures whose tiles are
+/// A world so far away that only directions count: grey values on a sphere, kept as a cube of images whose tiles are
 /// painted when they are first looked at. Frame base: x right, y down, z forward.
 class FarWorld {
  public:

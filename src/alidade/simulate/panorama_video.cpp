@@ -41,7 +41,7 @@ class View {
  public:
   View(const RotatingIntrinsics& k, int width, int height, const Eigen::Quaterniond& base_from_cam)
       : k_(k), base_from_cam_(base_from_cam.toRotationMatrix().cast<float>()) {
-    constexpr double beyond = 1.2;  // of the farthest corner: the margin that is blurred into the picture
+    constexpr double beyond = 1.2;  // of the farthest corner: the margin that is blurred into the image
     const double x = beyond * std::max(k.cx, width - k.cx) / k.fx, y = beyond * std::max(k.cy, height - k.cy) / k.fy;
     square_step_ = (x * x + y * y) / num_squares;
     for (int i = 0; k.k1 != 0.0 && i < num_squares + 2; ++i) {

@@ -46,7 +46,7 @@ struct ShotNoise {
 [[nodiscard]] std::optional<RangefinderSceneConfig> rangefinder_scenario(std::string_view name);
 [[nodiscard]] std::vector<std::string> rangefinder_scenarios();
 
-/// Draws boards that are all inside the picture and hit by the beam. Same seed, same scene.
+/// Draws boards that are all inside the image and hit by the beam. Same seed, same scene.
 [[nodiscard]] RangefinderScene draw_rangefinder_scene(const RangefinderSceneConfig& config, std::uint64_t seed);
 
 /// What is measured in such a world. Corners bring their covariance; spots and readings bring no σ.

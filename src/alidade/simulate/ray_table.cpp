@@ -7,9 +7,9 @@
 namespace alidade {
 namespace {
 
-SightRay ray_or_nan(const Camera& camera, double u, double v) {
+ObservationRay ray_or_nan(const Camera& camera, double u, double v) {
   const Eigen::Vector3d nowhere = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
-  return sight_ray(camera, {u, v}).value_or(SightRay{nowhere, nowhere});
+  return observation_ray(camera, {u, v}).value_or(ObservationRay{nowhere, nowhere});
 }
 
 /// Lagrange's cubic weights of four nodes at −1, 0, 1, 2 for a place x in [0, 1).
@@ -30,7 +30,7 @@ RayTable::RayTable(const Camera& camera, int u_min, int u_max, int v_min, int v_
   const bool central = is_central(camera_.lens);
   for (int row = 0; row < rows_; ++row) {
     for (int col = 0; col < cols_; ++col) {
-      const SightRay ray = ray_or_nan(camera_, u_min_ + step_px * col, v_min_ + step_px * row);
+      const ObservationRay ray = ray_or_nan(camera_, u_min_ + step_px * col, v_min_ + step_px * row);
       nodes_.push_back(ray.direction_in_cam);
       if (!central) origins_.push_back(ray.origin_in_cam);
     }

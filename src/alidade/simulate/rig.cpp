@@ -42,7 +42,7 @@ RigHead drawn_head(const RigHead& nominal, const RigSceneConfig& config, bool is
   return drawn;
 }
 
-/// The corners of a board as a head at these angles sees them; fewer where some are not in the picture.
+/// The corners of a board as a head at these angles sees them; fewer where some are not in the image.
 BoardView true_view(const RigHead& rig_head, const Eigen::Vector2d& angles, const Rigid3& world_from_board,
                     const std::vector<Eigen::Vector3d>& points_in_board) {
   BoardView seen;
@@ -67,7 +67,7 @@ std::vector<HeadView> views_of(const RigHead& rig_head, const Rigid3& world_from
       if (view.seen.corners.size() == points_in_board.size()) all.push_back(std::move(view));
     }
   }
-  const auto most = static_cast<std::size_t>(config.most_views_of_a_board);
+  const auto most = static_cast<std::size_t>(config.max_views_of_a_board);
   if (all.size() <= most) return all;
   for (std::size_t i = 0; i < most; ++i) kept.push_back(all[i * all.size() / most]);
   return kept;
@@ -118,9 +118,9 @@ RigScene draw_rig_scene(const RigSceneConfig& given, std::uint64_t seed) {
   use_first_camera(scene.rig);
   const std::vector<Eigen::Vector3d> points = points_in_board(config.board);
   const Eigen::Vector3d middle = 0.5 * (points.front() + points.back());
-  constexpr int most_tries = 100000;
+  constexpr int max_tries = 100000;
   for (int tries = 0; static_cast<int>(scene.world_from_board.size()) < config.num_boards; ++tries) {
-    if (tries > most_tries) throw std::runtime_error("no board can be placed in sight of these heads");
+    if (tries > max_tries) throw std::runtime_error("no board can be placed in sight of these heads");
     const Rigid3 world_from_board = drawn_board(config, scene.rig, middle, draws);
     const auto index = static_cast<int>(scene.world_from_board.size());
     std::vector<HeadView> views;

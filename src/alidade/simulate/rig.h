@@ -28,7 +28,7 @@ struct RigSceneConfig {
   int num_boards = 5;
   std::vector<double> pans_rad, tilts_rad;  ///< Empty: −40 to 40° in 5 and −15 to 30° in 4.
   double min_range_m = 0.7, max_range_m = 1.3;
-  int most_views_of_a_board = 4;  ///< By one head, spread over those that see it whole.
+  int max_views_of_a_board = 4;  ///< By one head, spread over those that see it whole.
   double mounting_sigma_rad = 0.04, offset_sigma_m = 0.02, base_sigma_rad = 0.05, base_sigma_m = 0.03;
   double skew_sigma_rad = 0.01;
   double encoder_scale = 1.0;  ///< Radians of each axis of each head for each radian read.

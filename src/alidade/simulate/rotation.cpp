@@ -106,7 +106,7 @@ class Turning {
     const bool is_inside =
         px.x() >= -0.5 && px.y() >= -0.5 && px.x() < scene_.width_px - 0.5 && px.y() < scene_.height_px - 0.5;
     const bool is_lost = config_.lost_share > 0.0 && draws_.uniform() < config_.lost_share;
-    const bool seen = point.z() > 0.0 && (is_inside || !config_.clip_to_picture) && !is_lost;
+    const bool seen = point.z() > 0.0 && (is_inside || !config_.clip_to_image) && !is_lost;
     return seen ? px : Eigen::Vector2d::Constant(not_seen);
   }
 
@@ -128,16 +128,16 @@ Eigen::Vector3d paper_pan_tilt(double t_s, double mean_tilt_rad) {
 }
 
 std::vector<Eigen::Vector2d> draw_points(int width_px, int height_px, int count, std::uint64_t seed) {
-  constexpr double margin_px = 60.0, least_height_px = 40.0;
+  constexpr double margin_px = 60.0, min_height_px = 40.0;
   Draws draws(seed);
   std::vector<Eigen::Vector2d> points;
   const auto fits = [&](const Eigen::Vector2d& c) {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      if ((points[i] - c).norm() < least_height_px) return false;
+      if ((points[i] - c).norm() < min_height_px) return false;
       for (std::size_t j = 0; j < i; ++j) {
         const Eigen::Vector2d ab = points[j] - points[i], ac = c - points[i], bc = c - points[j];
         const double twice_area = std::abs(ab.x() * ac.y() - ab.y() * ac.x());
-        if (twice_area < least_height_px * std::max({ab.norm(), ac.norm(), bc.norm()})) return false;
+        if (twice_area < min_height_px * std::max({ab.norm(), ac.norm(), bc.norm()})) return false;
       }
     }
     return true;

@@ -39,9 +39,9 @@ struct RotationLogConfig {
   double sigma_angle_rad = 0.0;           ///< White, of each sample; the others.
   Eigen::Vector3d rate_bias_rad_per_s = Eigen::Vector3d::Zero();
   double sigma_range_m = 0.0;
-  bool with_range = false;       ///< Range of the first point in every row.
-  double lost_share = 0.0;       ///< Share of single pixels not seen, by chance.
-  bool clip_to_picture = false;  ///< Points outside the picture are not seen; otherwise the picture has no edge.
+  bool with_range = false;     ///< Range of the first point in every row.
+  double lost_share = 0.0;     ///< Share of single pixels not seen, by chance.
+  bool clip_to_image = false;  ///< Points outside the image are not seen; otherwise the image has no edge.
 };
 
 /// What may be wrong with a log: with how the rotation is measured, and with which pixel is whose.
@@ -52,9 +52,9 @@ struct RotationFaults {
   Eigen::Vector2d zero_drift_rad_per_s = Eigen::Vector2d::Zero();  ///< Of pan and tilt.
   bool swaps_axes = false;
   Eigen::Vector2d signs = Eigen::Vector2d::Ones();  ///< Of pan and tilt.
-  double wrong_share = 0.0;                         ///< Pixels that are anywhere in the picture.
+  double wrong_share = 0.0;                         ///< Pixels that are anywhere in the image.
   double swapped_share = 0.0;                       ///< Pixels that change places with another point's.
-  double moving_share = 0.0;  ///< Points that move through the picture, by a few pixels a second, up to 20.
+  double moving_share = 0.0;  ///< Points that move through the image, by a few pixels a second, up to 20.
   double noise_px = 0.0, noise_lasts_s = 0.0;  ///< Noise of each track beside the white one, and how long it lasts.
 
   [[nodiscard]] bool are_of_rotation() const;
@@ -68,7 +68,7 @@ void add_faults(const RotationFaults& faults, int width_px, int height_px, std::
 /// The same sway as pan and tilt of a head about a mean tilt. [rad]
 [[nodiscard]] Eigen::Vector3d paper_pan_tilt(double t_s, double mean_tilt_rad);
 
-/// `count` points in the picture such that every triangle among them is at least 40 px high (for two points: 40 px
+/// `count` points in the image such that every triangle among them is at least 40 px high (for two points: 40 px
 /// apart), 60 px inside the edges. Same seed, same points.
 [[nodiscard]] std::vector<Eigen::Vector2d> draw_points(int width_px, int height_px, int count, std::uint64_t seed);
 

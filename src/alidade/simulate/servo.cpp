@@ -144,7 +144,7 @@ std::vector<Eigen::Vector2d> SimulatedHead::seen_background() {
   for (const Eigen::Vector3d& point : truth_.background_in_world) {
     const Eigen::Vector2d noise_px = truth_.sigma_px * background_draws_.normal2();
     const auto px = true_pixel(point);
-    const bool is_there = px && is_in_picture(truth_.head.camera, *px + noise_px);
+    const bool is_there = px && is_in_image(truth_.head.camera, *px + noise_px);
     pixels.push_back(is_there ? Eigen::Vector2d(*px + noise_px) : Eigen::Vector2d::Constant(nan));
   }
   return pixels;
@@ -153,7 +153,7 @@ std::vector<Eigen::Vector2d> SimulatedHead::seen_background() {
 std::optional<Eigen::Vector2d> SimulatedHead::seen_pixel(const Eigen::Vector3d& target_in_world) {
   const Eigen::Vector2d noise_px = truth_.sigma_px * draws_.normal2();  // drawn always: what is hidden shifts no seed
   const auto px = true_pixel(target_in_world);
-  if (!px || !is_in_picture(truth_.head.camera, *px + noise_px)) return std::nullopt;
+  if (!px || !is_in_image(truth_.head.camera, *px + noise_px)) return std::nullopt;
   return *px + noise_px;
 }
 

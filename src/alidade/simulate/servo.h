@@ -64,11 +64,11 @@ class SimulatedHead {
   void send(const Eigen::Vector2d& command);
   void advance(double dt_s);
   [[nodiscard]] Eigen::Vector2d read_encoders();
-  /// Where the target is in the picture taken now: without noise, anywhere in front of the camera.
+  /// Where the target is in the image taken now: without noise, anywhere in front of the camera.
   [[nodiscard]] std::optional<Eigen::Vector2d> true_pixel(const Eigen::Vector3d& target_in_world) const;
-  /// The same with noise, where it is within the picture.
+  /// The same with noise, where it is within the image.
   [[nodiscard]] std::optional<Eigen::Vector2d> seen_pixel(const Eigen::Vector3d& target_in_world);
-  /// Where the background is in that picture, with noise; NaN: not in it.
+  /// Where the background is in that image, with noise; NaN: not in it.
   [[nodiscard]] std::vector<Eigen::Vector2d> seen_background();
   /// From now on the focal lengths are so many times the camera's own.
   void zoom_to(double factor);

@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "alidade/imaging/picture_codecs.h"
+#include "alidade/imaging/image_codecs.h"
 #include "alidade/simulate/board_light.h"
 #include "alidade/simulate/board_placing.h"
 #include "alidade/simulate/board_surface.h"
@@ -84,7 +84,7 @@ std::optional<SpotScene> draw_spot_scene(const Camera& camera, const Board& boar
                   beam_direction_in_cam.normalized(),
                   {}};
   const std::vector<Eigen::Vector3d> outline = visible_outline(scene.boards);
-  constexpr int max_tries = 5000;  // a photo; of a board that fills half of the picture one in ten fits
+  constexpr int max_tries = 5000;  // a photo; of a board that fills half of the image one in ten fits
   for (int i = 0; i < config.num_photos; ++i) {
     for (int tries = 0; scene.range_m.size() <= static_cast<std::size_t>(i); ++tries) {
       if (tries == max_tries) return std::nullopt;
@@ -185,7 +185,7 @@ cv::Mat through_bayer(const cv::Mat& photo) {
   return colour;
 }
 
-cv::Mat through_jpeg(const cv::Mat& photo, int quality) { return decode_picture(jpeg_bytes(photo, quality)); }
+cv::Mat through_jpeg(const cv::Mat& photo, int quality) { return decode_image(jpeg_bytes(photo, quality)); }
 
 /// Places of the board that carry stickers, the same in all photos.
 std::vector<Eigen::Vector3d> stickers_in_cam(const SpotScene& scene, std::size_t i, int num) {

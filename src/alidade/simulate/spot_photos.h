@@ -25,7 +25,7 @@ struct SpotSceneConfig {
 };
 
 /// Draws a scene in which every point of every board is seen and the beam hits what is printed, at any place of it.
-/// None where no such pose is found: the beam leaves the picture, or the board does not fit into it at these ranges.
+/// None where no such pose is found: the beam leaves the image, or the board does not fit into it at these ranges.
 [[nodiscard]] std::optional<SpotScene> draw_spot_scene(const Camera& camera, const Board& board,
                                                        const Eigen::Vector3d& beam_origin_in_cam,
                                                        const Eigen::Vector3d& beam_direction_in_cam,

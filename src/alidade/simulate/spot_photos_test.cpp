@@ -39,7 +39,7 @@ SpotPhotoConfig dim_light() {
   return config;
 }
 
-/// A facing board at a distance, hit in the picture's middle (160, 120), by a beam along the axis, at a place.
+/// A facing board at a distance, hit in the image's middle (160, 120), by a beam along the axis, at a place.
 SpotScene middle_scene(double range_m, const Eigen::Vector3d& place) {
   const Camera camera{320, 240, Calibrated<Pinhole>{{400.0, 400.0, 160.0, 120.0, 0.0}}, {}, 0.0, ""};
   SpotScene scene{
@@ -89,7 +89,7 @@ TEST(SpotScene, TheBeamHitsThePrintOfEveryBoardAtItsRange) {
   }
 }
 
-TEST(SpotScene, NoneWhereTheBeamLeavesThePicture) {
+TEST(SpotScene, NoneWhereTheBeamLeavesTheImage) {
   const Camera camera = *example_camera("brown", 320, 240);
   EXPECT_FALSE(draw_spot_scene(camera, board, beam_origin_in_cam, Eigen::Vector3d(1.0, 0.0, 0.2), {}, 1));
   EXPECT_FALSE(draw_spot_scene(camera, board, beam_origin_in_cam, -beam_direction_in_cam, {}, 1));

@@ -74,7 +74,7 @@ std::optional<Eigen::Vector3d> seen_of_target(const TargetView& view, const Eige
 }
 
 /// Rays of the pixel and of the 3 × 3 places in it.
-void paint_target(const TargetView& view, const Camera& camera, const cv::Rect& window, cv::Mat& picture) {
+void paint_target(const TargetView& view, const Camera& camera, const cv::Rect& window, cv::Mat& image) {
   constexpr int side = 3;
   for (int v = window.y; v < window.br().y; ++v) {
     for (int u = window.x; u < window.br().x; ++u) {
@@ -90,7 +90,7 @@ void paint_target(const TargetView& view, const Camera& camera, const cv::Rect& 
           ++hits;
         }
       }
-      auto& pixel = picture.at<cv::Vec3f>(v, u);
+      auto& pixel = image.at<cv::Vec3f>(v, u);
       const float behind = static_cast<float>(side * side - hits) / static_cast<float>(side * side);
       for (int c = 0; c < 3; ++c)
         pixel[c] = behind * pixel[c] + static_cast<float>(sum[c]) / static_cast<float>(side * side);
@@ -112,11 +112,11 @@ cv::Rect window_of(const TargetView& view, const Camera& camera) {
 
 cv::Mat painted_clouds(const Camera& camera, const Rigid3& world_from_cam, double clutter) {
   static const Patches patches;
-  cv::Mat picture(camera.height_px, camera.width_px, CV_32FC3);
-  for (int v = 0; v < picture.rows; ++v) {
-    for (int u = 0; u < picture.cols; ++u) {
+  cv::Mat image(camera.height_px, camera.width_px, CV_32FC3);
+  for (int v = 0; v < image.rows; ++v) {
+    for (int u = 0; u < image.cols; ++u) {
       const auto ray = unproject(camera, Eigen::Vector2d(u, v));
-      auto& pixel = picture.at<cv::Vec3f>(v, u);
+      auto& pixel = image.at<cv::Vec3f>(v, u);
       pixel = cv::Vec3f::all(0.0F);
       if (!ray) continue;
       const Eigen::Vector3d direction = world_from_cam.rotation * ray->normalized();
@@ -124,7 +124,7 @@ cv::Mat painted_clouds(const Camera& camera, const Rigid3& world_from_cam, doubl
       if (clutter > 0.0) pixel += static_cast<float>(clutter) * patches.at(direction);
     }
   }
-  return picture;
+  return image;
 }
 
 }  // namespace
@@ -134,19 +134,19 @@ cv::Mat render_target_frame(const RigHead& rig_head, const Eigen::Vector2d& pan_
                             const TargetVideoConfig& config, std::uint64_t seed) {
   const Camera& camera = rig_head.camera;
   const Rigid3 pose = world_from_cam(rig_head.head, pan_tilt_rad);
-  cv::Mat picture = painted_clouds(camera, pose, config.clutter);
+  cv::Mat image = painted_clouds(camera, pose, config.clutter);
   if (target_in_world) {
     const TargetView view{pose, target, *target_in_world};
-    paint_target(view, camera, window_of(view, camera), picture);
+    paint_target(view, camera, window_of(view, camera), image);
   }
-  if (config.blur_px > 0.0) cv::GaussianBlur(picture, picture, {}, config.blur_px);
+  if (config.blur_px > 0.0) cv::GaussianBlur(image, image, {}, config.blur_px);
   Draws draws(seed);
-  for (int v = 0; v < picture.rows; ++v) {
-    auto* row = picture.ptr<float>(v);
-    for (int i = 0; i < 3 * picture.cols; ++i) row[i] += static_cast<float>(config.noise * draws.normal());
+  for (int v = 0; v < image.rows; ++v) {
+    auto* row = image.ptr<float>(v);
+    for (int i = 0; i < 3 * image.cols; ++i) row[i] += static_cast<float>(config.noise * draws.normal());
   }
   cv::Mat frame;
-  picture.convertTo(frame, CV_8UC3);
+  image.convertTo(frame, CV_8UC3);
   return frame;
 }
 

@@ -98,25 +98,26 @@ std::vector<RigHead> heads_as_they_are(const TrackScene& scene) {
   return heads;
 }
 
-/// What the log makes of a sight: false names, signs and places.
-void spoil(const TrackScene& scene, Draws& draws, SimulatedSight& sight) {
+/// What the log makes of an observation: false names, signs and places.
+void spoil(const TrackScene& scene, Draws& draws, SimulatedObservation& observation) {
   const TrackFaults& faults = scene.faults;
-  const Camera& camera = scene.heads[sight.head].camera;
+  const Camera& camera = scene.heads[observation.head].camera;
   if (faults.clutter > 0.0) {
     const Vector2d elsewhere(draws.uniform(0.0, camera.width_px - 1.0), draws.uniform(0.0, camera.height_px - 1.0));
-    if (draws.uniform(0.0, 1.0) < faults.clutter) sight.px = elsewhere;
+    if (draws.uniform(0.0, 1.0) < faults.clutter) observation.px = elsewhere;
   }
-  if (sight.head == 1) {
-    sight.t_capture_s += faults.clock_s;
-    sight.t_arrival_s += faults.clock_s;
-    if (faults.mirrored) sight.px.x() = camera.width_px - 1.0 - sight.px.x();
-    if (faults.pan_sign) sight.pan_tilt_rad.x() *= -1.0;
-    if (faults.tilt_sign) sight.pan_tilt_rad.y() *= -1.0;
+  if (observation.head == 1) {
+    observation.t_capture_s += faults.clock_s;
+    observation.t_arrival_s += faults.clock_s;
+    if (faults.mirrored) observation.px.x() = camera.width_px - 1.0 - observation.px.x();
+    if (faults.pan_sign) observation.pan_tilt_rad.x() *= -1.0;
+    if (faults.tilt_sign) observation.pan_tilt_rad.y() *= -1.0;
   }
-  if (faults.swapped && sight.head < 2) sight.head = 1 - sight.head;
+  if (faults.swapped && observation.head < 2) observation.head = 1 - observation.head;
 }
 
-void add_sights(const TrackScene& given, std::size_t head, std::uint64_t seed, std::vector<SimulatedSight>& sights) {
+void add_observations(const TrackScene& given, std::size_t head, std::uint64_t seed,
+                      std::vector<SimulatedObservation>& observations) {
   TrackScene scene = given;
   scene.heads = heads_as_they_are(given);
   const Vector3d apart(0.4, -0.1, 0.0);
@@ -132,9 +133,9 @@ void add_sights(const TrackScene& given, std::size_t head, std::uint64_t seed, s
     const auto seen = project(scene.heads[head], angles, is_second ? scene.position(t_s) + apart : scene.position(t_s));
     if (!seen || is_hidden(scene, head, t_s)) continue;
     const Vector2d px = seen->px + noise_px;
-    if (!is_in_picture(scene.heads[head].camera, px)) continue;
-    sights.push_back({t_s, t_s + late_s, head, angles + noise_rad, px});
-    spoil(given, others, sights.back());
+    if (!is_in_image(scene.heads[head].camera, px)) continue;
+    observations.push_back({t_s, t_s + late_s, head, angles + noise_rad, px});
+    spoil(given, others, observations.back());
   }
 }
 
@@ -156,7 +157,7 @@ Eigen::Vector3d circle_offset(double radius_m, double period_s, double t_s) {
   return radius_m * Vector3d(std::cos(angle) - 1.0, std::sin(angle), 0.0);
 }
 
-bool is_in_picture(const Camera& camera, const Eigen::Vector2d& px) {
+bool is_in_image(const Camera& camera, const Eigen::Vector2d& px) {
   return px.x() >= -0.5 && px.y() >= -0.5 && px.x() <= camera.width_px - 0.5 && px.y() <= camera.height_px - 0.5;
 }
 
@@ -217,11 +218,11 @@ std::optional<TrackScene> track_scenario(std::string_view name) {
   return scene;
 }
 
-std::vector<SimulatedSight> simulate_track(const TrackScene& scene, std::uint64_t seed) {
-  std::vector<SimulatedSight> sights;
-  for (std::size_t head = 0; head < scene.heads.size(); ++head) add_sights(scene, head, seed, sights);
-  std::ranges::stable_sort(sights, {}, &SimulatedSight::t_arrival_s);
-  return sights;
+std::vector<SimulatedObservation> simulate_track(const TrackScene& scene, std::uint64_t seed) {
+  std::vector<SimulatedObservation> observations;
+  for (std::size_t head = 0; head < scene.heads.size(); ++head) add_observations(scene, head, seed, observations);
+  std::ranges::stable_sort(observations, {}, &SimulatedObservation::t_arrival_s);
+  return observations;
 }
 
 }  // namespace alidade

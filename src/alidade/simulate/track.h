@@ -20,18 +20,18 @@ struct Occlusion {
   double from_s, to_s;
 };
 
-/// What of a rig, of its clocks and pictures is not as its file says. Of two heads it is the second one, but for the
+/// What of a rig, of its clocks and images is not as its file says. Of two heads it is the second one, but for the
 /// zeros.
 struct TrackFaults {
   Eigen::Vector3d base_turn_rad = Eigen::Vector3d::Zero();  ///< About x (pitch), y (yaw), z (roll) of its base.
   double baseline = 0.0;                                    ///< It stands further away by this share.
   std::array<Eigen::Vector2d, 2> zero_rad{Eigen::Vector2d::Zero(),
                                           Eigen::Vector2d::Zero()};  ///< (pan, tilt), one a head.
-  double clock_s = 0.0;   ///< Its pictures say that they were taken so much later than they were.
-  double clutter = 0.0;   ///< Share of the sights, of both heads, that are anywhere in the picture instead.
-  double second = 0.0;    ///< Share of the sights that are of another target, 0.4 m to the right and 0.1 m above.
+  double clock_s = 0.0;   ///< Its images say that they were taken so much later than they were.
+  double clutter = 0.0;   ///< Share of the observations, of both heads, that are anywhere in the image instead.
+  double second = 0.0;    ///< Share of the observations that are of another target, 0.4 m to the right and 0.1 m above.
   bool swapped = false;   ///< The heads' names.
-  bool mirrored = false;  ///< Its pictures, left to right.
+  bool mirrored = false;  ///< Its images, left to right.
   bool pan_sign = false, tilt_sign = false;  ///< Its angles, reversed.
 };
 
@@ -41,8 +41,8 @@ struct TrackScene {
   std::vector<RigHead> heads;
   std::function<Eigen::Vector3d(double t_s)> position;  ///< In the world. [m]
   double duration_s = 10.0;
-  std::vector<double> rate_hz;         ///< One a head: pictures.
-  std::vector<double> phase_s;         ///< One a head: when its first picture is taken.
+  std::vector<double> rate_hz;         ///< One a head: images.
+  std::vector<double> phase_s;         ///< One a head: when its first image is taken.
   double latency_s = 0.0;              ///< Capture to arrival.
   std::vector<double> more_latency_s;  ///< One a head, added; empty: none.
   double aiming_lag_s = 0.34;          ///< Time constant of the heads. 0: they always point at the target.
@@ -52,8 +52,8 @@ struct TrackScene {
   TrackFaults faults;
 };
 
-/// One picture of one head: what the encoders read at its capture, and where the target was seen.
-struct SimulatedSight {
+/// One image of one head: what the encoders read at its capture, and where the target was seen.
+struct SimulatedObservation {
   double t_capture_s = 0.0, t_arrival_s = 0.0;
   std::size_t head = 0;
   Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();
@@ -61,7 +61,7 @@ struct SimulatedSight {
 };
 
 /// The scenarios by name: A (slow circle), A2 (the same, heads with offsets and turned mountings), B (fast circle),
-/// C (manoeuvre), D (C, occluded), E (B, 100 ms late), F (C, 100 ms late), G (C, 20 and 30 pictures a second), throw
+/// C (manoeuvre), D (C, occluded), E (B, 100 ms late), F (C, 100 ms late), G (C, 20 and 30 images a second), throw
 /// (a ball at rest, thrown up at 4 m/s, caught, at rest). None for an unknown name.
 [[nodiscard]] std::optional<TrackScene> track_scenario(std::string_view name);
 [[nodiscard]] std::vector<std::string> track_scenarios();
@@ -69,7 +69,7 @@ struct SimulatedSight {
 /// From the start of a circle in a plane of constant z, which begins at +x of its middle.
 [[nodiscard]] Eigen::Vector3d circle_offset(double radius_m, double period_s, double t_s);
 
-[[nodiscard]] bool is_in_picture(const Camera& camera, const Eigen::Vector2d& px);
+[[nodiscard]] bool is_in_image(const Camera& camera, const Eigen::Vector2d& px);
 
 /// The manoeuvre of scenario C: 11 s between 0.9 and 3.9 m, up to 1.5 m/s and 6 m/s².
 [[nodiscard]] Eigen::Vector3d manoeuvre_position(double t_s);
@@ -79,7 +79,7 @@ struct SimulatedSight {
 [[nodiscard]] std::function<Eigen::Vector3d(double t_s)> thrown_ball(const Eigen::Vector3d& from_m,
                                                                      const Eigen::Vector3d& velocity_m_s);
 
-/// All sights in order of arrival; pictures without the target in them are not there. Same seed, same sights.
-[[nodiscard]] std::vector<SimulatedSight> simulate_track(const TrackScene& scene, std::uint64_t seed);
+/// All observations in order of arrival; images without the target in them are not there. Same seed, same observations.
+[[nodiscard]] std::vector<SimulatedObservation> simulate_track(const TrackScene& scene, std::uint64_t seed);
 
 }  // namespace alidade

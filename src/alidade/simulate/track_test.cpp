@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "alidade/io/csv.h"
+#include "alidade/files/csv.h"
 #include "alidade/testing/reference_case.h"
 
 namespace alidade {
@@ -27,10 +27,11 @@ TEST(SimulateTrack, NoiseHasItsSigma) {
   scene.duration_s = 60.0;
   double sum2_px = 0.0, num = 0.0;
   scene.sigma_encoder_rad = 0.0;  // what is read is then where the head stands
-  for (const SimulatedSight& sight : simulate_track(scene, 5)) {
-    const auto seen = project(scene.heads[sight.head], sight.pan_tilt_rad, scene.position(sight.t_capture_s));
+  for (const SimulatedObservation& observation : simulate_track(scene, 5)) {
+    const auto seen =
+        project(scene.heads[observation.head], observation.pan_tilt_rad, scene.position(observation.t_capture_s));
     ASSERT_TRUE(seen);
-    sum2_px += (sight.px - seen->px).squaredNorm();
+    sum2_px += (observation.px - seen->px).squaredNorm();
     num += 2.0;
   }
   EXPECT_NEAR(num, 4804.0, 0.5);
@@ -42,9 +43,9 @@ TEST(SimulateTrack, HeadsLagBehindTheirTarget) {
     TrackScene scene = *track_scenario("A");
     scene.aiming_lag_s = lag_s;
     double sum2 = 0.0, num = 0.0;
-    for (const SimulatedSight& sight : simulate_track(scene, 1)) {
-      if (sight.t_capture_s < 2.0) continue;
-      sum2 += (sight.px - Eigen::Vector2d(160.0, 120.0)).squaredNorm();
+    for (const SimulatedObservation& observation : simulate_track(scene, 1)) {
+      if (observation.t_capture_s < 2.0) continue;
+      sum2 += (observation.px - Eigen::Vector2d(160.0, 120.0)).squaredNorm();
       num += 1.0;
     }
     return std::sqrt(sum2 / num);
@@ -57,14 +58,14 @@ TEST(SimulateTrack, HeadsLagBehindTheirTarget) {
 
 TEST(SimulateTrack, OcclusionLatencyAndRates) {
   const TrackScene hidden = *track_scenario("D");
-  for (const SimulatedSight& sight : simulate_track(hidden, 1)) {
-    EXPECT_FALSE(sight.head == 1 && sight.t_capture_s >= 3.0 && sight.t_capture_s < 5.0);
-    EXPECT_FALSE(sight.t_capture_s >= 7.0 && sight.t_capture_s < 7.5);
+  for (const SimulatedObservation& observation : simulate_track(hidden, 1)) {
+    EXPECT_FALSE(observation.head == 1 && observation.t_capture_s >= 3.0 && observation.t_capture_s < 5.0);
+    EXPECT_FALSE(observation.t_capture_s >= 7.0 && observation.t_capture_s < 7.5);
   }
-  for (const SimulatedSight& sight : simulate_track(*track_scenario("E"), 1))
-    EXPECT_NEAR(sight.t_arrival_s - sight.t_capture_s, 0.1, 1e-12);
+  for (const SimulatedObservation& observation : simulate_track(*track_scenario("E"), 1))
+    EXPECT_NEAR(observation.t_arrival_s - observation.t_capture_s, 0.1, 1e-12);
   std::size_t second = 0;
-  for (const SimulatedSight& sight : simulate_track(*track_scenario("G"), 1)) second += sight.head;
+  for (const SimulatedObservation& observation : simulate_track(*track_scenario("G"), 1)) second += observation.head;
   EXPECT_GT(second, 310u);
   EXPECT_FALSE(track_scenario("H"));
 }

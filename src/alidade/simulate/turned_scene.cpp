@@ -50,7 +50,7 @@ std::optional<Eigen::Vector2d> pixel_of(const TurnedScene& scene, const TurnedVi
 }
 
 Eigen::Vector3d far_point(const TurnedScene& scene, Draws& draws) {
-  const double depth = draws.uniform(scene.least_depth_m, scene.most_depth_m);
+  const double depth = draws.uniform(scene.min_depth_m, scene.max_depth_m);
   return depth * draws.normal3().normalized();
 }
 
@@ -84,7 +84,7 @@ MatchedPhotos simulate_turned_photos(const TurnedScene& scene, std::uint64_t see
       photos.features[k].emplace_back(*px + scene.sigma_px * draws.normal2());
     }
   }
-  constexpr std::size_t least_matches = 10;
+  constexpr std::size_t min_matches = 10;
   for (std::size_t a = 0; a < count; ++a) {
     for (std::size_t b = a + 1; b < count; ++b) {
       MatchedPair pair{static_cast<int>(a), static_cast<int>(b), {}};
@@ -96,7 +96,7 @@ MatchedPhotos simulate_turned_photos(const TurnedScene& scene, std::uint64_t see
           other = static_cast<int>(draws.uniform() * static_cast<double>(photos.features[b].size()));
         pair.matches.push_back({feature, other});
       }
-      if (pair.matches.size() >= least_matches) photos.pairs.push_back(std::move(pair));
+      if (pair.matches.size() >= min_matches) photos.pairs.push_back(std::move(pair));
     }
   }
   return photos;

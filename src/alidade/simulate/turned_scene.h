@@ -17,7 +17,7 @@ struct TurnedScene {
   double pan_step_rad = 0.3, tilt_rad = 0.15;  ///< From photo to photo; up and down by turns, for a third row again.
   double shake_rad = 0.03;                     ///< σ of every angle, the roll's as well.
   double points_per_rad2 = 600.0;
-  double least_depth_m = 2.0, most_depth_m = 20.0;
+  double min_depth_m = 2.0, max_depth_m = 20.0;
   Eigen::Vector3d lever_m = Eigen::Vector3d::Zero();  ///< Camera centre from the centre of the turn, camera frame.
   double sigma_step_m = 0.0;                          ///< Of the hand: the centre's own steps, each axis.
   double sigma_px = 0.5;

@@ -116,7 +116,7 @@ UnderwaterSequence simulate_underwater(const UnderwaterScene& scene, std::uint64
       const bool is_mismatch = k > 0 && is_wrong < scene.mismatches;
       const Eigen::Vector2d shown =
           is_mismatch ? Eigen::Vector2d(*px + scene.mismatch_px * Eigen::Vector2d(u, v)) : *px + noise;
-      if (is_between_pixels(scene.camera, shown)) frame.sights.push_back({point.id, shown, is_mismatch});
+      if (is_between_pixels(scene.camera, shown)) frame.observations.push_back({point.id, shown, is_mismatch});
     }
     sequence.frames.push_back(std::move(frame));
   }

@@ -22,12 +22,12 @@ struct UnderwaterScene {
   double sigma_known_m = 0.001;  ///< Of each coordinate of a known point.
   double sigma_depth = 0.03;     ///< Of the depth at which an unknown point is first believed, over the depth.
   double sigma_position_m = 0.005, sigma_rotation_rad = 0.01;  ///< Of the start that a filter is told.
-  double mismatches = 0.0;    ///< Share of the sights after the first frame that show another place.
+  double mismatches = 0.0;    ///< Share of the observations after the first frame that show another place.
   double mismatch_px = 60.0;  ///< How far at most, in each coordinate.
   double blackout_from_s = 0.0, blackout_s = 0.0;  ///< Nothing is seen from then on for so long.
   // What is not as a filter is told.
-  double readout_s = 0.0;         ///< From a picture's first row to its last; its time is that of the middle one.
-  double late_s = 0.0;            ///< Pictures are taken so long before the time that they bear.
+  double readout_s = 0.0;         ///< From an image's first row to its last; its time is that of the middle one.
+  double late_s = 0.0;            ///< Images are taken so long before the time that they bear.
   double target_speed_m_s = 0.0;  ///< Of the board along its x, against the other points.
   double target_stretch = 0.0;    ///< Known points are told so much (relative) further apart along x.
 };
@@ -36,7 +36,7 @@ struct UnderwaterScene {
 /// folds at r = 0.989.
 [[nodiscard]] Camera underwater_camera();
 
-struct UnderwaterSight {
+struct UnderwaterObservation {
   long id = 0;
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   bool is_mismatch = false;
@@ -45,7 +45,7 @@ struct UnderwaterSight {
 struct UnderwaterFrame {
   double t_s = 0.0;
   Rigid3 world_from_cam;  ///< The truth.
-  std::vector<UnderwaterSight> sights;
+  std::vector<UnderwaterObservation> observations;
 };
 
 /// What a filter is told of a point before it sees it, and the truth.

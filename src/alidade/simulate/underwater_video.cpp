@@ -47,7 +47,7 @@ cv::Mat render_underwater_frame(const Camera& camera, const Rigid3& world_from_c
   render.blur_px = config.blur_px;
   render.background_texture = 0.0;
   render.oversampling = 2;  // enough under such a blur: corners come out as with 4
-  // Water is put before the blurred picture: over a blur's width it changes by a thousandth.
+  // Water is put before the blurred image: over a blur's width it changes by a thousandth.
   const PixelLight light = BoardLight(scene, 0, render, seed).ambient();
   const WallDistance distance_m(camera, world_from_cam);
   Draws draws(seed);

@@ -6,7 +6,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
-#include "alidade/imaging/find_board.h"
+#include "alidade/board_detector/find_board.h"
 #include "alidade/simulate/board_photos.h"
 #include "alidade/simulate/underwater.h"
 
@@ -71,7 +71,7 @@ TEST(UnderwaterVideo, FarAwayThereIsWaterAlone) {
 /// Light goes along each pixel's own ray: on a slanted one there is more water.
 TEST(UnderwaterVideo, TowardsTheEdgeThereIsMoreWater) {
   const cv::Mat frame = render_underwater_frame(pinhole_camera(), before(-2.0, -2.0, 0.6), silent(), 1);  // wall alone
-  const double slant = std::hypot(1.0, 159.5 / 300.0, 119.5 / 300.0);  // distance over depth in the picture's corner
+  const double slant = std::hypot(1.0, 159.5 / 300.0, 119.5 / 300.0);  // distance over depth in the image's corner
   const Eigen::Vector3d middle = rgb_at(frame, 160, 120) - Water{}.veil, corner = rgb_at(frame, 0, 0) - Water{}.veil;
   for (int channel = 0; channel < 3; ++channel)
     EXPECT_NEAR(corner[channel], middle[channel] * std::exp(-Water{}.attenuation_per_m[channel] * 0.6 * (slant - 1.0)),
@@ -79,7 +79,7 @@ TEST(UnderwaterVideo, TowardsTheEdgeThereIsMoreWater) {
         << channel;
 }
 
-/// OpenCV says where the points are; what is found in the picture is there within its σ.
+/// OpenCV says where the points are; what is found in the image is there within its σ.
 TEST(UnderwaterVideo, CornersAreWhereOpenCVPutsThem) {
   const Camera camera = underwater_camera();
   const UnderwaterSequence sequence = simulate_underwater({.camera = camera}, 5);

@@ -64,7 +64,7 @@ inline TrackReport track_chain(const Chain& chain, double range_m, std::uint64_t
   config.tracker.sigma_px = scene.sigma_px;
   config.tracker.max_depth_m = 60.0;
   if (counted) config.tracker.errors = rig_uncertainty(chain.rig);
-  return track_target(sights_of(scene, seed), chain.rig.heads, config, truth_of(scene));
+  return track_target(observations_of(scene, seed), chain.rig.heads, config, truth_of(scene));
 }
 
 }  // namespace alidade::testing

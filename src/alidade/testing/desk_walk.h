@@ -9,7 +9,7 @@
 
 namespace alidade::testing {
 
-/// A camera moved by hand in front of a desk, as room_video.h has it, but with points instead of pictures: features
+/// A camera moved by hand in front of a desk, as room_video.h has it, but with points instead of images: features
 /// enter where fewer than thirty are in view, by where they are first seen, and leave where the map is full.
 struct DeskWalk {
   int num_frames = 500;
@@ -23,8 +23,8 @@ inline LocalizationFilterConfig desk_filter() {
   config.sigma_a_m_s2 = 4.0;
   config.sigma_alpha_rad_s2 = 6.0;
   config.state_capacity = 760;
-  config.sights_capacity = 80;
-  return for_pictures(config, EyesConfig{}.sigma_floor_px);
+  config.observations_capacity = 80;
+  return for_images(config, EyesConfig{}.sigma_floor_px);
 }
 
 /// Of each frame: eᵀP⁻¹e of the position over 3 and of the pose over 6, and the filter's NIS.
@@ -58,7 +58,7 @@ class DeskWalker {
     for (frame_ = 0; frame_ < path_.size(); ++frame_) {
       if (frame_ > 0) {
         bank_->predict(1.0 / 30.0);
-        const SightsReport report = bank_->update(sights());
+        const ObservationsReport report = bank_->update(observations());
         run.nis_per_dof += report.nis_per_dof * static_cast<double>(report.num_used);
         num += static_cast<double>(report.num_used);
         bank_->convert_linear();
@@ -83,7 +83,7 @@ class DeskWalker {
   }
 
   void start() {
-    std::vector<FeatureSight> corners;
+    std::vector<FeatureObservation> corners;
     for (const KnownPoint& point : known_)
       corners.push_back({point.id, *seen(static_cast<std::size_t>(point.id)) + walk_.sigma_corner_px * draws_.normal2(),
                          walk_.sigma_corner_px});
@@ -94,15 +94,15 @@ class DeskWalker {
     bank_->update(corners);
   }
 
-  std::vector<FeatureSight> sights() {
-    std::vector<FeatureSight> sights;
+  std::vector<FeatureObservation> observations() {
+    std::vector<FeatureObservation> observations;
     for (const Feature& feature : bank_->best().features()) {
       const auto px = seen(static_cast<std::size_t>(feature.id));
-      if (!px || sights.size() >= 44) continue;
-      sights.push_back({feature.id, *px + walk_.sigma_px * draws_.normal2(), walk_.sigma_px});
+      if (!px || observations.size() >= 44) continue;
+      observations.push_back({feature.id, *px + walk_.sigma_px * draws_.normal2(), walk_.sigma_px});
       last_seen_[feature.id] = frame_;
     }
-    return sights;
+    return observations;
   }
 
   void add_new() {

@@ -24,16 +24,16 @@ struct Hover {
   double distance_m = 0.9;
   bool turns_in_place = false;
   // What is not as told.
-  double readout_s = 0.0;            ///< From the first row to the last, the time being that of the middle one.
-  double target_speed_m_s = 0.0;     ///< Along x, against the other points.
-  double target_stretch = 0.0;       ///< Of the told points along x, relative.
-  double most_mismatched_px = 20.0;  ///< Of a share of the sights after the first frame, in each coordinate.
+  double readout_s = 0.0;           ///< From the first row to the last, the time being that of the middle one.
+  double target_speed_m_s = 0.0;    ///< Along x, against the other points.
+  double target_stretch = 0.0;      ///< Of the told points along x, relative.
+  double max_mismatched_px = 20.0;  ///< Of a share of the observations after the first frame, in each coordinate.
   double mismatches = 0.0;
 };
 
 struct HoverRun {
   Camera camera;
-  std::vector<SightFrame> frames;
+  std::vector<ObservationFrame> frames;
   std::vector<TimedPose> truth;
   std::vector<KnownPoint> target;
   std::vector<Eigen::Vector3d> points;  ///< Of ids from 1 on.
@@ -142,17 +142,17 @@ inline HoverRun hovering(const Hover& scene, std::uint64_t seed) {
   for (int k = 0; k < scene.num_frames; ++k) {
     const double t_s = k * scene.dt_s;
     const Rigid3 world_from_cam = pose_at(t_s);
-    SightFrame frame{k, t_s, {}};
+    ObservationFrame frame{k, t_s, {}};
     for (std::size_t i = 0; i < points.size(); ++i) {
       Eigen::Vector2d noise = scene.sigma_px * draws.normal2();
       if (scene.mismatches > 0.0 && draws.uniform() < scene.mismatches && k > 0)
-        noise = scene.most_mismatched_px * Eigen::Vector2d(draws.uniform(-1.0, 1.0), draws.uniform(-1.0, 1.0));
+        noise = scene.max_mismatched_px * Eigen::Vector2d(draws.uniform(-1.0, 1.0), draws.uniform(-1.0, 1.0));
       Eigen::Vector3d point = points[i];
       if (i < run.target.size()) point.x() += scene.target_speed_m_s * t_s;
       auto px = hover::seen(scene.lens, p, world_from_cam.inverse() * point);
       for (int again = 0; again < 4 && px && scene.readout_s > 0.0; ++again)
         px = hover::seen(scene.lens, p, pose_at(t_s + scene.readout_s * (px->y() / 576.0 - 0.5)).inverse() * point);
-      if (px) frame.sights.push_back({static_cast<long>(i) + 1, *px + noise, 0.0});
+      if (px) frame.observations.push_back({static_cast<long>(i) + 1, *px + noise, 0.0});
     }
     run.frames.push_back(std::move(frame));
     run.truth.push_back({t_s, world_from_cam});

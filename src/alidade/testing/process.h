@@ -15,7 +15,7 @@
 #include <thread>
 #include <vector>
 
-#include "alidade/io/files.h"
+#include "alidade/files/files.h"
 #include "alidade/testing/temporary_folder.h"
 
 namespace alidade::testing {

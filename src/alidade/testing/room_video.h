@@ -15,7 +15,7 @@
 
 namespace alidade::testing {
 
-/// A world for `localize` with pictures: a camera is moved by hand in front of a table and a wall, on which a dark
+/// A world for `localize` with images: a camera is moved by hand in front of a table and a wall, on which a dark
 /// rectangle on white paper hangs. The world's frame is at the rectangle's centre, x right, y down.
 struct RoomScene {
   Camera camera;  ///< See room_camera().
@@ -115,17 +115,17 @@ inline double grey_of(const RoomScene& scene, const Eigen::Vector3d& from, const
 /// A frame, 8-bit grey: rays cast on the planes of the room, with noise drawn by `seed`.
 [[nodiscard]] inline cv::Mat render_room(const RoomScene& scene, const Rigid3& world_from_cam, std::uint64_t seed) {
   const int width = scene.camera.width_px, height = scene.camera.height_px;
-  cv::Mat picture(height, width, CV_8U);
+  cv::Mat image(height, width, CV_8U);
   Draws draws(seed);
   for (int v = 0; v < height; ++v) {
     for (int u = 0; u < width; ++u) {
       const auto ray_in_cam = unproject(scene.camera, {u, v});
       const double grey =
           ray_in_cam ? grey_of(scene, world_from_cam.translation, world_from_cam.rotation * *ray_in_cam) : 0.0;
-      picture.at<std::uint8_t>(v, u) = cv::saturate_cast<std::uint8_t>(grey + scene.noise * draws.normal());
+      image.at<std::uint8_t>(v, u) = cv::saturate_cast<std::uint8_t>(grey + scene.noise * draws.normal());
     }
   }
-  return picture;
+  return image;
 }
 
 }  // namespace alidade::testing

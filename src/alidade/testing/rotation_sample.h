@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/io/csv.h"
+#include "alidade/files/csv.h"
 #include "alidade/observe/intrinsics_estimate.h"
 #include "alidade/observe/rotation_frame.h"
 #include "alidade/reproduce/fang_scenes.h"

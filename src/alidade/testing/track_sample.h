@@ -9,7 +9,7 @@
 
 namespace alidade::testing {
 
-using reproduce::sights_of;
+using reproduce::observations_of;
 using reproduce::truth_of;
 
 /// A path by white acceleration of ConstantVelocity{sigma_a}, drawn every 0.05 s and straight between.

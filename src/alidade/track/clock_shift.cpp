@@ -12,7 +12,8 @@ namespace {
 
 constexpr std::size_t num_blocks = 8;
 
-/// −ln p of the sights in each eighth of the log, the target's acceleration being what makes all of them most probable.
+/// −ln p of the observations in each eighth of the log, the target's acceleration being what makes all of them most
+/// probable.
 struct BlockCosts {
   std::array<double, num_blocks> block{};
   double nis_per_dof = 0.0;
@@ -24,23 +25,25 @@ struct BlockCosts {
 };
 
 /// Rows of a long log are taken evenly from all of it, eight stretches.
-std::vector<std::vector<TargetSight>> stretches_of(std::span<const TargetSight> sights, std::size_t most) {
-  std::vector<std::vector<TargetSight>> stretches;
-  const std::size_t num = sights.size() > most ? num_blocks : 1, length = std::min(sights.size(), most) / num;
+std::vector<std::vector<TargetObservation>> stretches_of(std::span<const TargetObservation> observations,
+                                                         std::size_t most) {
+  std::vector<std::vector<TargetObservation>> stretches;
+  const std::size_t num = observations.size() > most ? num_blocks : 1,
+                    length = std::min(observations.size(), most) / num;
   for (std::size_t k = 0; k < num; ++k) {
-    const std::size_t first = num > 1 ? k * (sights.size() - length) / (num - 1) : 0;
-    const auto part = sights.subspan(first, num > 1 ? length : sights.size());
+    const std::size_t first = num > 1 ? k * (observations.size() - length) / (num - 1) : 0;
+    const auto part = observations.subspan(first, num > 1 ? length : observations.size());
     stretches.emplace_back(part.begin(), part.end());
   }
   return stretches;
 }
 
-void add_costs(const TrackReport& report, std::span<const TargetSight> sights, double gate, std::size_t stretch,
-               bool is_only, BlockCosts& costs, double& nis, double& num) {
-  const double from_s = sights.front().t_capture_s, span_s = sights.back().t_capture_s - from_s;
+void add_costs(const TrackReport& report, std::span<const TargetObservation> observations, double gate,
+               std::size_t stretch, bool is_only, BlockCosts& costs, double& nis, double& num) {
+  const double from_s = observations.front().t_capture_s, span_s = observations.back().t_capture_s - from_s;
   for (std::size_t i = 0; i < report.steps.size(); ++i) {
     const TrackStep& step = report.steps[i];
-    const double share = span_s > 0.0 ? (sights[i].t_capture_s - from_s) / span_s : 0.0;
+    const double share = span_s > 0.0 ? (observations[i].t_capture_s - from_s) / span_s : 0.0;
     const std::size_t block =
         is_only ? std::min(num_blocks - 1, static_cast<std::size_t>(share * num_blocks)) : stretch;
     double cost = 0.5 * gate;
@@ -54,7 +57,7 @@ void add_costs(const TrackReport& report, std::span<const TargetSight> sights, d
   }
 }
 
-BlockCosts costs_of(const std::vector<std::vector<TargetSight>>& stretches, std::span<const RigHead> heads,
+BlockCosts costs_of(const std::vector<std::vector<TargetObservation>>& stretches, std::span<const RigHead> heads,
                     const TrackConfig& config, const ClockShift& shift) {
   TrackConfig plain;
   plain.tracker = config.tracker;
@@ -63,13 +66,13 @@ BlockCosts costs_of(const std::vector<std::vector<TargetSight>>& stretches, std:
   BlockCosts best;
   double least = std::numeric_limits<double>::infinity();
   // A right clock makes a target calmer, never livelier.
-  const int most_halvings = config.find_sigma_a ? 5 : 1;
-  for (int k = 0; k < most_halvings; ++k) {
+  const int max_halvings = config.find_sigma_a ? 5 : 1;
+  for (int k = 0; k < max_halvings; ++k) {
     plain.tracker.sigma_a_m_s2 = config.tracker.sigma_a_m_s2 * std::pow(0.5, k);
     BlockCosts costs;
     double nis = 0.0, num = 0.0;
     for (std::size_t s = 0; s < stretches.size(); ++s) {
-      const std::vector<TargetSight> shifted = with_shift(stretches[s], shift);
+      const std::vector<TargetObservation> shifted = with_shift(stretches[s], shift);
       add_costs(track_target(shifted, heads, plain), shifted, plain.tracker.gate, s, stretches.size() == 1, costs, nis,
                 num);
     }
@@ -83,36 +86,37 @@ BlockCosts costs_of(const std::vector<std::vector<TargetSight>>& stretches, std:
 
 /// Whether the gain comes from more than one place of the log.
 bool is_throughout(const BlockCosts& told, const BlockCosts& shifted) {
-  constexpr double least_elsewhere = 10.0;  // of ln p, without the eighth that gains most
+  constexpr double min_elsewhere = 10.0;  // of ln p, without the eighth that gains most
   double sum = 0.0, most = 0.0;
   for (std::size_t k = 0; k < num_blocks; ++k) {
     const double gain = told.block[k] - shifted.block[k];
     sum += gain;
     most = std::max(most, gain);
   }
-  return sum - most > least_elsewhere;
+  return sum - most > min_elsewhere;
 }
 
 }  // namespace
 
-std::vector<TargetSight> with_shift(std::span<const TargetSight> sights, const ClockShift& shift) {
-  std::vector<TargetSight> shifted(sights.begin(), sights.end());
-  for (TargetSight& sight : shifted) {
-    if (sight.head == shift.head) sight.t_capture_s += shift.later_s;
-    sight.t_arrival_s = sight.t_capture_s;  // what is probable does not depend on what arrived first
+std::vector<TargetObservation> with_shift(std::span<const TargetObservation> observations, const ClockShift& shift) {
+  std::vector<TargetObservation> shifted(observations.begin(), observations.end());
+  for (TargetObservation& observation : shifted) {
+    if (observation.head == shift.head) observation.t_capture_s += shift.later_s;
+    observation.t_arrival_s = observation.t_capture_s;  // what is probable does not depend on what arrived first
   }
-  std::ranges::stable_sort(shifted, {}, &TargetSight::t_capture_s);
+  std::ranges::stable_sort(shifted, {}, &TargetObservation::t_capture_s);
   return shifted;
 }
 
-std::optional<ClockShift> probable_clock_shift(std::span<const TargetSight> sights, std::span<const RigHead> heads,
-                                               const TrackConfig& config) {
-  const std::size_t most_sights = config.tracker.errors.num() > 0 ? 1200 : 4000;  // learning costs several times more
-  constexpr double least_gain = 20.0, nis_that_fits = 1.5;
-  if (sights.size() < 2 * num_blocks) return std::nullopt;
-  const auto stretches = stretches_of(with_shift(sights, {}), most_sights);
+std::optional<ClockShift> probable_clock_shift(std::span<const TargetObservation> observations,
+                                               std::span<const RigHead> heads, const TrackConfig& config) {
+  const std::size_t max_observations =
+      config.tracker.errors.num() > 0 ? 1200 : 4000;  // learning costs several times more
+  constexpr double min_gain = 20.0, nis_that_fits = 1.5;
+  if (observations.size() < 2 * num_blocks) return std::nullopt;
+  const auto stretches = stretches_of(with_shift(observations, {}), max_observations);
   const BlockCosts as_told = costs_of(stretches, heads, config, {});
-  double most = least_gain;
+  double most = min_gain;
   std::optional<ClockShift> best;
   BlockCosts of_best;
   const auto try_shift = [&](ClockShift shift) {

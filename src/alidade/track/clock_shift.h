@@ -8,20 +8,22 @@
 
 namespace alidade {
 
-/// The head whose pictures were taken later or earlier than they say: a wrong clock passes for a lively target, whose
-/// σ_a is then found too large. Of two heads the second one, against the first: which of them is right the sights do
-/// not tell.
+/// The head whose images were taken later or earlier than they say: a wrong clock passes for a manoeuvring target,
+/// whose σ_a is then found too large. Of two heads the second one, against the first: which of them is right the
+/// observations do not tell.
 struct ClockShift {
   std::size_t head = 0;
   double later_s = 0.0;  ///< To be added to its capture times.
   double gain = 0.0;     ///< Of ln p.
 };
 
-/// None where no shift of up to 0.1 s makes the sights more probable by far, throughout the log, and lets them fit.
-[[nodiscard]] std::optional<ClockShift> probable_clock_shift(std::span<const TargetSight> sights,
+/// None where no shift of up to 0.1 s makes the observations more probable by far, throughout the log, and lets them
+/// fit.
+[[nodiscard]] std::optional<ClockShift> probable_clock_shift(std::span<const TargetObservation> observations,
                                                              std::span<const RigHead> heads, const TrackConfig& config);
 
-/// The sights in order of capture, one head's taken so much later than they say.
-[[nodiscard]] std::vector<TargetSight> with_shift(std::span<const TargetSight> sights, const ClockShift& shift);
+/// The observations in order of capture, one head's taken so much later than they say.
+[[nodiscard]] std::vector<TargetObservation> with_shift(std::span<const TargetObservation> observations,
+                                                        const ClockShift& shift);
 
 }  // namespace alidade

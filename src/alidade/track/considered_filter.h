@@ -8,54 +8,54 @@
 #include "alidade/track/target_filter.h"
 
 // The beliefs of target_filter.h where heads, lenses and clocks are uncertain: their errors u ~ N(0, 1) are carried as
-// considered parameters, whose covariance with the state is kept and which no sight changes (Schmidt–Kalman).
+// considered parameters, whose covariance with the state is kept and which no observation changes (Schmidt–Kalman).
 // S. F. Schmidt, "Application of state-space methods to navigation problems", 1966; Bierman, 1977, chapter VIII.
 
 namespace alidade {
 
 /// Covariance of a state with u.
 template <int N>
-using WithErrors = Eigen::Matrix<double, N, Eigen::Dynamic, 0, N, most_rig_errors>;
+using WithErrors = Eigen::Matrix<double, N, Eigen::Dynamic, 0, N, max_rig_errors>;
 
-/// u is counted: no sight changes it.
+/// u is counted: no observation changes it.
 struct CountedErrors {
   void start(int) {}
   [[nodiscard]] static Eigen::Vector2d shift(const RigErrorEffect&) { return Eigen::Vector2d::Zero(); }
-  [[nodiscard]] static Eigen::Matrix<double, Eigen::Dynamic, 2, 0, most_rig_errors, 2> carried(
+  [[nodiscard]] static Eigen::Matrix<double, Eigen::Dynamic, 2, 0, max_rig_errors, 2> carried(
       const RigErrorEffect& effect) {
     return effect.transpose();
   }
-  void update(const Eigen::Matrix<double, Eigen::Dynamic, 2, 0, most_rig_errors, 2>&, const Eigen::Vector2d&,
+  void update(const Eigen::Matrix<double, Eigen::Dynamic, 2, 0, max_rig_errors, 2>&, const Eigen::Vector2d&,
               const Eigen::Matrix2d&) {}
 };
 
 /// u is estimated as well: whose innovations are white where all holds, and which tells what of the rig is off.
 struct LearnedErrors {
-  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_rig_errors, 1> u;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_rig_errors, most_rig_errors> C;
+  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_rig_errors, 1> u;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_rig_errors, max_rig_errors> C;
 
   void start(int num) {
     u.setZero(num);
     C.setIdentity(num, num);
   }
   [[nodiscard]] Eigen::Vector2d shift(const RigErrorEffect& effect) const { return effect * u; }
-  [[nodiscard]] Eigen::Matrix<double, Eigen::Dynamic, 2, 0, most_rig_errors, 2> carried(
+  [[nodiscard]] Eigen::Matrix<double, Eigen::Dynamic, 2, 0, max_rig_errors, 2> carried(
       const RigErrorEffect& effect) const {
     return C.lazyProduct(effect.transpose());
   }
-  void update(const Eigen::Matrix<double, Eigen::Dynamic, 2, 0, most_rig_errors, 2>& CHt,
+  void update(const Eigen::Matrix<double, Eigen::Dynamic, 2, 0, max_rig_errors, 2>& CHt,
               const Eigen::Vector2d& weighted, const Eigen::Matrix2d& S_inverse) {
     u += CHt * weighted;
-    const Eigen::Matrix<double, Eigen::Dynamic, 2, 0, most_rig_errors, 2> K = CHt * S_inverse;
+    const Eigen::Matrix<double, Eigen::Dynamic, 2, 0, max_rig_errors, 2> K = CHt * S_inverse;
     C -= K.lazyProduct(CHt.transpose());
   }
 };
 
-/// What a sight tells of state and errors: the covariances of both with the pixel, and the pixel's own.
+/// What an observation tells of state and errors: the covariances of both with the pixel, and the pixel's own.
 template <int N>
 struct SeenWithErrors {
   Eigen::Matrix<double, N, 2> PHt;
-  Eigen::Matrix<double, Eigen::Dynamic, 2, 0, most_rig_errors, 2> CHt;
+  Eigen::Matrix<double, Eigen::Dynamic, 2, 0, max_rig_errors, 2> CHt;
   Eigen::Matrix2d S;
 
   template <class Errors>
@@ -88,7 +88,7 @@ template <int N, class Errors>
 template <int N, class Errors>
 [[nodiscard]] bool update_with_errors(Belief<N>& belief, WithErrors<N>& cross, Errors& errors,
                                       const PositionSeen& expected, const RigErrorEffect& effect,
-                                      const Eigen::Vector2d& z, const SightModel& see,
+                                      const Eigen::Vector2d& z, const ObservationModel& see,
                                       const IteratedUpdateConfig& config) {
   const Eigen::Vector3d start = belief.x.template head<3>();
   const double tolerance2 = config.tolerance * config.tolerance;
@@ -151,7 +151,7 @@ struct ConsideredFilter {
     return innovation_with_errors(own.belief, cross, errors, seen, effect, z);
   }
   [[nodiscard]] bool update(const PositionSeen& seen, const RigErrorEffect& effect, const Eigen::Vector2d& z,
-                            const SightModel& see, const IteratedUpdateConfig& config) {
+                            const ObservationModel& see, const IteratedUpdateConfig& config) {
     return update_with_errors(own.belief, cross, errors, seen, effect, z, see, config);
   }
   [[nodiscard]] Belief<6> estimate() const { return own.estimate(); }
@@ -221,7 +221,7 @@ struct ConsideredInteracting {
     return innovation_with_errors(own.belief.merged(), cross, CountedErrors{}, seen, effect, z);
   }
   [[nodiscard]] bool update(const PositionSeen&, const RigErrorEffect& effect, const Eigen::Vector2d& z,
-                            const SightModel& see, const IteratedUpdateConfig& config) {
+                            const ObservationModel& see, const IteratedUpdateConfig& config) {
     ConsideredInteracting next = *this;
     const auto of_quiet = updated(next.own.belief.quiet, next.quiet, effect, z, see, config);
     const auto of_agile = updated(next.own.belief.agile, next.agile, effect, z, see, config);
@@ -238,7 +238,8 @@ struct ConsideredInteracting {
   template <int N>
   [[nodiscard]] static std::optional<Innovation> updated(Belief<N>& belief, WithErrors<N>& cross,
                                                          const RigErrorEffect& effect, const Eigen::Vector2d& z,
-                                                         const SightModel& see, const IteratedUpdateConfig& config) {
+                                                         const ObservationModel& see,
+                                                         const IteratedUpdateConfig& config) {
     const auto seen = see(belief.x.template head<3>());
     if (!seen) return std::nullopt;
     CountedErrors errors;

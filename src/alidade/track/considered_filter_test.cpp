@@ -16,7 +16,7 @@
 namespace alidade {
 namespace {
 
-using testing::sights_of;
+using testing::observations_of;
 
 /// Two heads 0.5 m apart whose mountings, encoders and lenses are known as a calibration knows them: the range at 12 m
 /// to 5 %, beyond which no filter's Gaussian is one.
@@ -80,7 +80,7 @@ TEST(ConsideredErrors, AgreeWithTheRecursionWrittenOut) {
   Draws draws(5);
   for (int k = 0; k < 20; ++k) {
     const std::size_t head = static_cast<std::size_t>(k % 2);
-    const SightModel see(rig.heads[head], {0.1 * draws.normal(), 0.05 * draws.normal()}, 0.5, 0.001);
+    const ObservationModel see(rig.heads[head], {0.1 * draws.normal(), 0.05 * draws.normal()}, 0.5, 0.001);
     const auto one = [&](auto& filter, Eigen::VectorXd& x, Eigen::MatrixXd& P, bool learns) {
       const auto seen = see(filter.position());
       const auto effect =
@@ -131,16 +131,16 @@ Covered covered_at(double range_m, TrackMethod method, int runs) {
     scene.sigma_a_m_s2 = 1.0;
     scene.position = testing::drawn_path({0.2, -0.2, range_m}, 1.0, scene.duration_s, seed);
     scene.heads = drawn_heads(rig, draws);
-    const auto sights = sights_of(scene, seed);
+    const auto observations = observations_of(scene, seed);
     TrackConfig config;
     config.find_sigma_a = false;
     config.tracker.method = method;
     config.tracker.max_depth_m = 60.0;
     const TrueTrack truth = testing::truth_of(scene);
-    covered.exact += track_target(sights, rig.heads, config, truth).nees_per_dof / runs;
+    covered.exact += track_target(observations, rig.heads, config, truth).nees_per_dof / runs;
     config.tracker.errors = rig_uncertainty(rig);
     if (method != TrackMethod::imm) config.smooth_s = 0.2;
-    const TrackReport report = track_target(sights, rig.heads, config, truth);
+    const TrackReport report = track_target(observations, rig.heads, config, truth);
     covered.counted += report.nees_per_dof / runs;
     for (const PredictedStep& step : report.smoothed) {
       const auto position = truth.at(step.t_s);
@@ -151,7 +151,7 @@ Covered covered_at(double range_m, TrackMethod method, int runs) {
     }
     config.tracker.learn_errors = true;
     if (method == TrackMethod::imm) config.tracker.method = TrackMethod::cv;
-    covered.nis_learned += track_target(sights, rig.heads, config, truth).nis_per_dof / runs;
+    covered.nis_learned += track_target(observations, rig.heads, config, truth).nis_per_dof / runs;
   }
   if (num_smoothed > 0.0) covered.smoothed /= num_smoothed;
   return covered;
@@ -165,17 +165,18 @@ TEST(ConsideredErrors, ComeInAnyOrderAndAllocateNothing) {
     config.method = method;
     config.sigma_a_m_s2 = scene.sigma_a_m_s2;
     config.errors = rig_uncertainty(rig, 0.002);
-    std::vector<TargetSight> sights = sights_of(scene, 4), late = sights;
-    std::ranges::stable_sort(sights, {}, &TargetSight::t_capture_s);
-    for (TargetSight& sight : late) sight.t_arrival_s = sight.t_capture_s + (sight.head == 1 ? 0.2 : 0.0);
-    std::ranges::stable_sort(late, {}, &TargetSight::t_arrival_s);
+    std::vector<TargetObservation> observations = observations_of(scene, 4), late = observations;
+    std::ranges::stable_sort(observations, {}, &TargetObservation::t_capture_s);
+    for (TargetObservation& observation : late)
+      observation.t_arrival_s = observation.t_capture_s + (observation.head == 1 ? 0.2 : 0.0);
+    std::ranges::stable_sort(late, {}, &TargetObservation::t_arrival_s);
     Tracker in_order(scene.heads, config), shuffled(scene.heads, config);
     TrackStep last, last_shuffled;
     const std::size_t before = testing::num_allocations();
     std::size_t starts = 0;
-    for (const TargetSight& sight : sights) last = in_order.take(sight);
-    for (const TargetSight& sight : late) {
-      last_shuffled = shuffled.take(sight);
+    for (const TargetObservation& observation : observations) last = in_order.take(observation);
+    for (const TargetObservation& observation : late) {
+      last_shuffled = shuffled.take(observation);
       starts += last_shuffled.event == TrackEvent::start ? 1u : 0u;
     }
     EXPECT_EQ(testing::num_allocations(), before);
@@ -192,7 +193,7 @@ TEST(RigFaults, ATurnedHeadIsNamedAndARightOneIsNot) {
     if (is_turned)
       told[1].head.world_from_base.rotation = told[1].head.world_from_base.rotation * exp_so3({0.01, 0.0, 0.0});
     TrackConfig config;
-    const TrackReport report = track_target(sights_of(scene, 3), told, config);
+    const TrackReport report = track_target(observations_of(scene, 3), told, config);
     ASSERT_FALSE(report.faults.empty());
     if (is_turned) {
       EXPECT_EQ(report.faults.front().name, "head2.base_rx_rad");

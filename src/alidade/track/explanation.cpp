@@ -14,11 +14,11 @@
 namespace alidade {
 namespace {
 
-using Sights = std::vector<TargetSight>;
+using Observations = std::vector<TargetObservation>;
 
 struct Hypothesis {
   Explanation told;
-  std::function<void(TargetSight&)> apply;
+  std::function<void(TargetObservation&)> apply;
 };
 
 struct Trial {
@@ -26,16 +26,16 @@ struct Trial {
   bool fits = false;
 };
 
-/// How the sights fare, the target being as lively as suits them best.
-Trial tried(const Sights& sights, std::span<const RigHead> heads, const TrackConfig& config) {
-  constexpr double least_used = 0.9, nis_that_fits = 1.7, most_restarts = 0.01;
+/// How the observations fare, the target being as manoeuvring as suits them best.
+Trial tried(const Observations& observations, std::span<const RigHead> heads, const TrackConfig& config) {
+  constexpr double min_used = 0.9, nis_that_fits = 1.7, max_restarts = 0.01;
   Trial best;
   TrackConfig plain = config;
   plain.judge = plain.find_sigma_a = false;
   for (const double sigma_a : {0.1, 1.0, 8.0}) {
     plain.tracker.sigma_a_m_s2 = config.find_sigma_a ? sigma_a : config.tracker.sigma_a_m_s2;
-    const TrackReport report = track_target(sights, heads, plain);
-    const double num = static_cast<double>(sights.size()), gate = plain.tracker.gate;
+    const TrackReport report = track_target(observations, heads, plain);
+    const double num = static_cast<double>(observations.size()), gate = plain.tracker.gate;
     double ln_p = 0.0;
     for (const TrackStep& step : report.steps) {
       ln_p -= step.has_innovation
@@ -45,8 +45,8 @@ Trial tried(const Sights& sights, std::span<const RigHead> heads, const TrackCon
     }
     if (ln_p > best.ln_p) {
       best.ln_p = ln_p;
-      best.fits = report.num_starts > 0 && static_cast<double>(report.num_used) > least_used * num &&
-                  report.nis_per_dof < nis_that_fits && static_cast<double>(report.num_restarts) <= most_restarts * num;
+      best.fits = report.num_starts > 0 && static_cast<double>(report.num_used) > min_used * num &&
+                  report.nis_per_dof < nis_that_fits && static_cast<double>(report.num_restarts) <= max_restarts * num;
     }
     if (!config.find_sigma_a) break;
   }
@@ -60,57 +60,58 @@ std::string head_name(std::span<const RigHead> heads, std::size_t head) {
 /// The signs and mirrors of one head, or of all.
 void add_turned(std::span<const RigHead> heads, std::optional<std::size_t> head, std::vector<Hypothesis>& all) {
   const std::string of = head ? " of " + head_name(heads, *head) : "";
-  const auto add = [&](const std::string& what, const std::string& to_do, std::function<void(TargetSight&)> change) {
-    all.push_back({{what, to_do}, [head, change](TargetSight& sight) {
-                     if (!head || sight.head == *head) change(sight);
+  const auto add = [&](const std::string& what, const std::string& to_do,
+                       std::function<void(TargetObservation&)> change) {
+    all.push_back({{what, to_do}, [head, change](TargetObservation& observation) {
+                     if (!head || observation.head == *head) change(observation);
                    }});
   };
   add("pan" + of + " with the wrong sign", "pan > 0 turns left: with the sign reversed the events fit the rig",
-      [](TargetSight& sight) { sight.pan_tilt_rad.x() *= -1.0; });
+      [](TargetObservation& observation) { observation.pan_tilt_rad.x() *= -1.0; });
   add("tilt" + of + " with the wrong sign", "tilt > 0 turns up: with the sign reversed the events fit the rig",
-      [](TargetSight& sight) { sight.pan_tilt_rad.y() *= -1.0; });
-  const auto mirrored = [heads](TargetSight& sight, int axis) {
-    const Camera& camera = heads[sight.head].camera;
-    sight.px[axis] = (axis == 0 ? camera.width_px : camera.height_px) - 1.0 - sight.px[axis];
+      [](TargetObservation& observation) { observation.pan_tilt_rad.y() *= -1.0; });
+  const auto mirrored = [heads](TargetObservation& observation, int axis) {
+    const Camera& camera = heads[observation.head].camera;
+    observation.px[axis] = (axis == 0 ? camera.width_px : camera.height_px) - 1.0 - observation.px[axis];
   };
   const std::string whose = head ? head_name(heads, *head) : "all heads";
   add("the pictures of " + whose + " are mirrored", "turn u about: then the events fit the rig",
-      [mirrored](TargetSight& sight) { mirrored(sight, 0); });
+      [mirrored](TargetObservation& observation) { mirrored(observation, 0); });
   add("the pictures of " + whose + " are flipped upside down", "turn v about: then the events fit the rig",
-      [mirrored](TargetSight& sight) { mirrored(sight, 1); });
+      [mirrored](TargetObservation& observation) { mirrored(observation, 1); });
   add("the pictures of " + whose + " are turned by half a turn",
       "that camera hangs upside down: turn u and v about, or say so in the rig's cam_from_tilt",
-      [mirrored](TargetSight& sight) {
-        mirrored(sight, 0);
-        mirrored(sight, 1);
+      [mirrored](TargetObservation& observation) {
+        mirrored(observation, 0);
+        mirrored(observation, 1);
       });
 }
 
 std::vector<Hypothesis> hypotheses(std::span<const RigHead> heads) {
   std::vector<Hypothesis> all;
   all.push_back({{"angles in degrees", "give pan_rad and tilt_rad in radians: as degrees they fit the rig"},
-                 [](TargetSight& sight) { sight.pan_tilt_rad *= std::numbers::pi / 180.0; }});
+                 [](TargetObservation& observation) { observation.pan_tilt_rad *= std::numbers::pi / 180.0; }});
   const std::size_t num = std::min<std::size_t>(heads.size(), 4);
   for (std::size_t a = 0; a < num; ++a)
     for (std::size_t b = a + 1; b < num; ++b)
       all.push_back({{num == 2 ? "heads swapped" : head_name(heads, a) + " and " + head_name(heads, b) + " swapped",
                       "exchange the two heads' names in the events or in the rig: then they fit"},
-                     [a, b](TargetSight& sight) {
-                       sight.head = sight.head == a ? b : sight.head == b ? a : sight.head;
+                     [a, b](TargetObservation& observation) {
+                       observation.head = observation.head == a ? b : observation.head == b ? a : observation.head;
                      }});
   add_turned(heads, std::nullopt, all);
   for (std::size_t head = 0; head < num; ++head) add_turned(heads, head, all);
   return all;
 }
 
-/// Of three heads or more the one without which the others' sights fit.
-std::optional<Explanation> foreign_head(const Sights& sights, std::span<const RigHead> heads,
+/// Of three heads or more the one without which the others' observations fit.
+std::optional<Explanation> foreign_head(const Observations& observations, std::span<const RigHead> heads,
                                         const TrackConfig& config) {
   std::optional<Explanation> found;
   for (std::size_t head = 0; heads.size() > 2 && head < heads.size(); ++head) {
-    Sights others = sights;
-    std::erase_if(others, [&](const TargetSight& sight) { return sight.head == head; });
-    if (others.size() == sights.size() || !tried(others, heads, config).fits) continue;
+    Observations others = observations;
+    std::erase_if(others, [&](const TargetObservation& observation) { return observation.head == head; });
+    if (others.size() == observations.size() || !tried(others, heads, config).fits) continue;
     if (found) return std::nullopt;  // of two that could be it neither is named
     found = {"the sights of " + head_name(heads, head) + " agree with none of the other heads, which agree",
              "its row in the rig file is that of another head, or its events are: leave it out, or place it anew",
@@ -130,24 +131,24 @@ std::string clock_text(const ClockShift& shift, std::span<const RigHead> heads) 
          ": with its times moved by that the sights are far more probable";
 }
 
-std::optional<Explanation> explanation_of(std::span<const TargetSight> sights, std::span<const RigHead> heads,
-                                          const TrackConfig& config) {
-  constexpr std::size_t most_sights = 1200, first_sights = 160;
-  constexpr double least_gain = 30.0, clear = 15.0;
-  Sights given = with_shift(sights.first(std::min(sights.size(), most_sights)), {});
-  std::erase_if(given, [&](const TargetSight& sight) { return sight.head >= heads.size(); });
+std::optional<Explanation> explanation_of(std::span<const TargetObservation> observations,
+                                          std::span<const RigHead> heads, const TrackConfig& config) {
+  constexpr std::size_t max_observations = 1200, first_observations = 160;
+  constexpr double min_gain = 30.0, clear = 15.0;
+  Observations given = with_shift(observations.first(std::min(observations.size(), max_observations)), {});
+  std::erase_if(given, [&](const TargetObservation& observation) { return observation.head >= heads.size(); });
   const double as_told = tried(given, heads, config).ln_p;
   std::vector<std::pair<double, Explanation>> fitting;
   for (const Hypothesis& hypothesis : hypotheses(heads)) {
-    Sights changed = given;
-    for (TargetSight& sight : changed) hypothesis.apply(sight);
+    Observations changed = given;
+    for (TargetObservation& observation : changed) hypothesis.apply(observation);
     changed = with_shift(changed, {});
-    // What does not fit a few hundred sights does not fit all of them.
-    const Sights some(changed.begin(),
-                      changed.begin() + static_cast<std::ptrdiff_t>(std::min(changed.size(), first_sights)));
-    if (changed.size() > 2 * first_sights && !tried(some, heads, config).fits) continue;
+    // What does not fit a few hundred observations does not fit all of them.
+    const Observations some(
+        changed.begin(), changed.begin() + static_cast<std::ptrdiff_t>(std::min(changed.size(), first_observations)));
+    if (changed.size() > 2 * first_observations && !tried(some, heads, config).fits) continue;
     const Trial trial = tried(changed, heads, config);
-    if (trial.fits && trial.ln_p > as_told + least_gain) fitting.emplace_back(trial.ln_p, hypothesis.told);
+    if (trial.fits && trial.ln_p > as_told + min_gain) fitting.emplace_back(trial.ln_p, hypothesis.told);
   }
   if (fitting.empty()) return foreign_head(given, heads, config);
   std::ranges::stable_sort(fitting, std::ranges::greater{}, &std::pair<double, Explanation>::first);

@@ -10,16 +10,16 @@ namespace alidade {
 
 struct ClockShift;
 
-/// A mistake under which sights that do not fit the rig would.
+/// A mistake under which observations that do not fit the rig would.
 struct Explanation {
   std::string what, to_do;
   bool is_foreign_head = false;  ///< One head agrees with none of the others: by its place, or by its clock.
 };
 
-/// Swapped heads, a wrong sign of an angle or a mirrored picture, of all heads or of one, degrees, a head that is not
-/// the rig's: the one under which the sights fit and are the most probable. Two of them where they are nearly
-/// equally probable; none where none lets the sights fit.
-[[nodiscard]] std::optional<Explanation> explanation_of(std::span<const TargetSight> sights,
+/// Swapped heads, a wrong sign of an angle or a mirrored image, of all heads or of one, degrees, a head that is not
+/// the rig's: the one under which the observations fit and are the most probable. Two of them where they are nearly
+/// equally probable; none where none lets the observations fit.
+[[nodiscard]] std::optional<Explanation> explanation_of(std::span<const TargetObservation> observations,
                                                         std::span<const RigHead> heads, const TrackConfig& config);
 
 /// "the clock of head 2 seems 30 ms behind that of head 1 …"

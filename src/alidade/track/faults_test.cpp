@@ -23,16 +23,16 @@ struct Judged {
 
 /// As `alidade track` judges events whose rig file says nothing of its errors.
 Judged judged(const TrackScene& scene, std::uint64_t seed, TrackMethod method = TrackMethod::cv) {
-  const std::vector<TargetSight> sights = testing::sights_of(scene, seed);
+  const std::vector<TargetObservation> observations = testing::observations_of(scene, seed);
   TrackConfig config;
   config.tracker.method = method;
   Judged result;
-  result.report = track_target(sights, scene.heads, config);
-  result.verdict = track_verdict(result.report, sights, scene.heads, config);
+  result.report = track_target(observations, scene.heads, config);
+  result.verdict = track_verdict(result.report, observations, scene.heads, config);
   if (result.verdict.exit_code != ExitCode::ok) return result;
   Rig rig;
   rig.heads = scene.heads;
-  heed_assumptions(track_assumed(sights, rig, config, result.report, {}), result.verdict);
+  heed_assumptions(track_assumed(observations, rig, config, result.report, {}), result.verdict);
   for (const TrackStep& step : result.report.steps) {
     if (!step.has_belief || step.t_s < 1.5) continue;
     const Eigen::Vector3d error = step.belief.x.head<3>() - scene.position(step.t_s);
@@ -109,10 +109,10 @@ TEST(TrackFaults, CleanScenariosAreGood) {
     const TrackScene scene = *track_scenario(name);
     int num_good = 0;
     for (std::uint64_t seed = 101; seed < 101 + draws; ++seed) {
-      const std::vector<TargetSight> sights = testing::sights_of(scene, seed);
+      const std::vector<TargetObservation> observations = testing::observations_of(scene, seed);
       const TrackConfig config;
-      const TrackReport report = track_target(sights, scene.heads, config, testing::truth_of(scene));
-      num_good += track_verdict(report, sights, scene.heads, config).state == State::good ? 1 : 0;
+      const TrackReport report = track_target(observations, scene.heads, config, testing::truth_of(scene));
+      num_good += track_verdict(report, observations, scene.heads, config).state == State::good ? 1 : 0;
     }
     EXPECT_GE(num_good, 38) << name;
     RecordProperty(std::string("good_") + name, num_good);
@@ -130,24 +130,24 @@ TEST(TrackFaults, OfThreeHeadsTheWrongOneIsNamed) {
   scene.rate_hz = {20.0, 20.0, 20.0};
   scene.phase_s = {0.0, 0.01, 0.02};
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
-    const std::vector<TargetSight> sights = testing::sights_of(scene, seed);
+    const std::vector<TargetObservation> observations = testing::observations_of(scene, seed);
     const TrackConfig config;
     for (std::size_t wrong = 0; wrong < 3; ++wrong) {
       const std::string head = "head " + std::to_string(scene.heads[wrong].head.id);
       std::vector<RigHead> heads = scene.heads;
       heads[wrong].head.world_from_base.rotation =
           heads[wrong].head.world_from_base.rotation * exp_so3({0.3, 0.4, 0.1});
-      const Verdict foreign = track_verdict(track_target(sights, heads, config), sights, heads, config);
+      const Verdict foreign = track_verdict(track_target(observations, heads, config), observations, heads, config);
       EXPECT_EQ(foreign.exit_code, ExitCode::cannot_tell);
       EXPECT_NE(foreign.sentence.find("the sights of " + head), std::string::npos) << foreign.sentence;
-      const std::vector<TargetSight> late = with_shift(sights, {wrong, 0.04});
+      const std::vector<TargetObservation> late = with_shift(observations, {wrong, 0.04});
       const Verdict clock = track_verdict(track_target(late, scene.heads, config), late, scene.heads, config);
       EXPECT_NE(clock.sentence.find("the clock of " + head + " seems"), std::string::npos) << clock.sentence;
     }
   }
 }
 
-/// Two things in the pictures, each seen now and then: it is said, and what is followed is one of them.
+/// Two things in the images, each seen now and then: it is said, and what is followed is one of them.
 TEST(TrackFaults, ASecondTargetIsSaid) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     const TrackScene scene = faulty("C", [](TrackFaults& f) { f.second = 0.25; });
@@ -165,10 +165,10 @@ TEST(TrackFaults, SigmaCoversWithClutter) {
       double nees = 0.0;
       constexpr int draws = 20;
       for (std::uint64_t seed = 1; seed <= draws; ++seed) {
-        const std::vector<TargetSight> sights = testing::sights_of(scene, seed);
+        const std::vector<TargetObservation> observations = testing::observations_of(scene, seed);
         TrackConfig config;
         config.warm_up_s = 1.0;
-        nees += track_target(sights, scene.heads, config, testing::truth_of(scene)).nees_per_dof / draws;
+        nees += track_target(observations, scene.heads, config, testing::truth_of(scene)).nees_per_dof / draws;
       }
       EXPECT_LT(nees, 1.5) << name << " " << share;
       RecordProperty("nees_" + std::string(name) + std::to_string(share), std::to_string(nees));
@@ -192,7 +192,7 @@ Throws thrown(TrackMethod method) {
     TrackConfig config;
     config.tracker.method = method;
     config.predict_s = 0.3;
-    for (const PredictedStep& step : track_target(testing::sights_of(scene, seed), scene.heads, config).ahead) {
+    for (const PredictedStep& step : track_target(testing::observations_of(scene, seed), scene.heads, config).ahead) {
       if (!step.has_belief || step.t_s < 1.45 || step.t_s > lands_s) continue;
       const double z = (step.belief.x[1] - scene.position(step.t_s).y()) / std::sqrt(step.belief.P(1, 1));
       all.mean_z2 += z * z;

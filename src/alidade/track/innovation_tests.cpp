@@ -16,16 +16,16 @@ struct Sums {
   std::optional<Eigen::Vector2d> last;
 };
 
-/// Where a target that moves so goes in the picture.
-Eigen::Vector2d direction_in_picture(const RigHead& head, const TargetSight& sight, const Belief<6>& belief) {
-  const TurnedHead turned(head.head, sight.pan_tilt_rad);
+/// Where a target that moves so goes in the image.
+Eigen::Vector2d direction_in_image(const RigHead& head, const TargetObservation& observation, const Belief<6>& belief) {
+  const TurnedHead turned(head.head, observation.pan_tilt_rad);
   const auto seen = project(turned, head.camera, belief.x.head<3>());
   if (!seen) return Eigen::Vector2d::Zero();
   const Eigen::Vector2d goes = seen->J_px_point * belief.x.segment<3>(3);
   return goes.norm() > 1.0 ? Eigen::Vector2d(goes.normalized()) : Eigen::Vector2d::Zero();
 }
 
-void add(const TargetSight& sight, const RigHead& head, const TrackStep& step, double gate, Sums& sums) {
+void add(const TargetObservation& observation, const RigHead& head, const TrackStep& step, double gate, Sums& sums) {
   const Innovation& innovation = step.innovation;
   Eigen::Vector2d w = innovation.S.llt().matrixL().solve(innovation.nu);
   if (innovation.nis > gate) w *= std::sqrt(gate / innovation.nis);
@@ -34,11 +34,11 @@ void add(const TargetSight& sight, const RigHead& head, const TrackStep& step, d
   ++told.num;
   told.mean += w;
   sums.nis += w.squaredNorm();
-  const Eigen::Vector2d goes = direction_in_picture(head, sight, step.belief);
+  const Eigen::Vector2d goes = direction_in_image(head, observation, step.belief);
   told.along += w.dot(goes);
   sums.num_along += goes.squaredNorm();
   const Eigen::Vector2d size(head.camera.width_px, head.camera.height_px);
-  const Eigen::Vector2d place = (4.0 * (sight.px - 0.5 * size)).cwiseQuotient(size);
+  const Eigen::Vector2d place = (4.0 * (observation.px - 0.5 * size)).cwiseQuotient(size);
   sums.slope += w.cwiseProduct(place);
   sums.slope2 += place.cwiseAbs2();
   if (sums.last) sums.lagged += w.dot(*sums.last);
@@ -61,15 +61,16 @@ HeadInnovations finished(const Sums& sums) {
 
 }  // namespace
 
-std::vector<HeadInnovations> test_innovations(std::span<const TargetSight> sights, std::span<const RigHead> heads,
-                                              std::span<const TrackStep> steps, const TrackConfig& config) {
+std::vector<HeadInnovations> test_innovations(std::span<const TargetObservation> observations,
+                                              std::span<const RigHead> heads, std::span<const TrackStep> steps,
+                                              const TrackConfig& config) {
   std::vector<Sums> sums(heads.size());
   double began_s = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < steps.size() && i < sights.size(); ++i) {
+  for (std::size_t i = 0; i < steps.size() && i < observations.size(); ++i) {
     const TrackStep& step = steps[i];
     if (step.event == TrackEvent::start || step.event == TrackEvent::restart) began_s = step.t_s;
     if (!step.has_innovation || !(step.t_s >= began_s + config.warm_up_s)) continue;
-    add(sights[i], heads[sights[i].head], step, config.tracker.gate, sums[sights[i].head]);
+    add(observations[i], heads[observations[i].head], step, config.tracker.gate, sums[observations[i].head]);
   }
   std::vector<HeadInnovations> told;
   for (const Sums& each : sums) told.push_back(finished(each));

@@ -8,16 +8,17 @@
 
 namespace alidade {
 
-/// A sight of which a head's course of intrinsics says nothing: more than `beyond_s` outside what it spans.
+/// An observation of which a head's course of intrinsics says nothing: more than `beyond_s` outside what it spans.
 struct OutsideCourse {
   std::size_t head = 0;
   double t_s = 0.0;
 };
-[[nodiscard]] std::optional<OutsideCourse> outside_course(std::span<const TargetSight> sights,
+[[nodiscard]] std::optional<OutsideCourse> outside_course(std::span<const TargetObservation> observations,
                                                           std::span<const LensCourse> courses, double beyond_s);
 
-/// Gives each sight the intrinsics of its capture, and the rig's lenses the errors that these have: as an observer's
-/// errors last, they are counted as what does not change but in its size. Heads without a course keep their own.
-void use_courses(std::span<const LensCourse> courses, std::vector<TargetSight>& sights, Rig& rig);
+/// Gives each observation the intrinsics of its capture, and the rig's lenses the errors that these have: as an
+/// observer's errors last, they are counted as what does not change but in its size. Heads without a course keep their
+/// own.
+void use_courses(std::span<const LensCourse> courses, std::vector<TargetObservation>& observations, Rig& rig);
 
 }  // namespace alidade

@@ -37,12 +37,12 @@ TEST(ZoomedLens, GoesThereAndBackAndKeepsTheLens) {
   }
 }
 
-/// Jacobians of a sight under another lens, against differences; and what its errors do.
+/// Jacobians of an observation under another lens, against differences; and what its errors do.
 TEST(ZoomedLens, DerivativesAreThoseOfDifferences) {
   const RigHead head = bent_head();
-  const SightLens lens{Eigen::Vector4d(900.0, 890.0, 150.0, 125.0), Eigen::Vector4d(0.5, 2.0, 1.5, 3.0)};
+  const ObservationLens lens{Eigen::Vector4d(900.0, 890.0, 150.0, 125.0), Eigen::Vector4d(0.5, 2.0, 1.5, 3.0)};
   const Eigen::Vector2d readings(0.1, -0.05);
-  const SightModel see(head, readings, 0.5, 0.001, lens);
+  const ObservationModel see(head, readings, 0.5, 0.001, lens);
   const Eigen::Vector3d position = head.head.world_from_base * Eigen::Vector3d(0.05, 0.1, 1.4);
   const auto seen = see(position);
   ASSERT_TRUE(seen);
@@ -81,9 +81,9 @@ TEST(ZoomedLens, DerivativesAreThoseOfDifferences) {
   EXPECT_LT((*effect * effect->transpose() - cov).norm(), 1e-2 * cov.norm());
 }
 
-/// Sights of scenario B through lenses that zoom to twice and to half their focal length.
+/// Observations of scenario B through lenses that zoom to twice and to half their focal length.
 struct ZoomingTrack {
-  std::vector<TargetSight> sights;
+  std::vector<TargetObservation> observations;
   Rig rig;
   TrueTrack truth;
   std::vector<LensCourse> courses;
@@ -110,13 +110,13 @@ ZoomingTrack zooming_track(std::uint64_t seed, double sigma_share, const Eigen::
     }
   }
   for (LensCourse& course : track.courses) course.until_s = 10.0;
-  for (const SimulatedSight& s : simulate_track(scene, seed)) {
+  for (const SimulatedObservation& s : simulate_track(scene, seed)) {
     // What was drawn with the own lens, seen larger; the noise too, which is told.
     const LensNow now = track.courses[s.head].at(s.t_capture_s);
     const Zoomed zoomed(scene.heads[s.head].camera, now.k);
-    TargetSight sight{s.t_capture_s, s.t_arrival_s, s.head, s.pan_tilt_rad, zoomed.px(s.px), 0.0, {}};
-    sight.sigma_px = scene.sigma_px * zoomed.ratio.x();
-    track.sights.push_back(sight);
+    TargetObservation observation{s.t_capture_s, s.t_arrival_s, s.head, s.pan_tilt_rad, zoomed.px(s.px), 0.0, {}};
+    observation.sigma_px = scene.sigma_px * zoomed.ratio.x();
+    track.observations.push_back(observation);
   }
   for (std::size_t h = 0; h < 2; ++h)
     for (LensNow& now : track.courses[h].lens) now.k.head<2>() *= 1.0 + sigma_share * off[static_cast<Eigen::Index>(h)];
@@ -133,14 +133,14 @@ TrackReport tracked(ZoomingTrack& track, double sigma_a) {
   config.judge = false;
   config.tracker.sigma_a_m_s2 = sigma_a;
   config.tracker.errors = rig_uncertainty(track.rig);
-  for (RigHead& head : track.rig.heads) head.camera.width_px = head.camera.height_px = 4000;  // the picture has no edge
-  return track_target(track.sights, track.rig.heads, config, track.truth);
+  for (RigHead& head : track.rig.heads) head.camera.width_px = head.camera.height_px = 4000;  // the image has no edge
+  return track_target(track.observations, track.rig.heads, config, track.truth);
 }
 
 TEST(LensOverTime, IsFollowedAsIfNothingZoomed) {
   const double sigma_a = track_scenario("B")->sigma_a_m_s2;
   ZoomingTrack zooming = zooming_track(3, 0.0, Eigen::Vector2d::Zero()), blind = zooming;
-  use_courses(zooming.courses, zooming.sights, zooming.rig);
+  use_courses(zooming.courses, zooming.observations, zooming.rig);
   const TrackReport known = tracked(zooming, sigma_a), unknown = tracked(blind, sigma_a);
   EXPECT_LT(known.rms_m, 1.1 * known.pcrlb_m);
   EXPECT_LT(known.rms_m, 0.0045);
@@ -156,10 +156,10 @@ TEST(LensOverTime, SigmaOfTheIntrinsicsIsCounted) {
     Draws draws(50 + run);
     const Eigen::Vector2d off = draws.normal2();
     ZoomingTrack zooming = zooming_track(run, 0.02, off), trusting = zooming;
-    use_courses(zooming.courses, zooming.sights, zooming.rig);
+    use_courses(zooming.courses, zooming.observations, zooming.rig);
     for (LensCourse& course : trusting.courses)
       for (LensNow& now : course.lens) now.sigma.setZero();
-    use_courses(trusting.courses, trusting.sights, trusting.rig);
+    use_courses(trusting.courses, trusting.observations, trusting.rig);
     counted += tracked(zooming, sigma_a).nees_per_dof / num_runs;
     exact += tracked(trusting, sigma_a).nees_per_dof / num_runs;
   }
@@ -170,16 +170,16 @@ TEST(LensOverTime, SigmaOfTheIntrinsicsIsCounted) {
   RecordProperty("nees_exact", std::to_string(exact));
 }
 
-TEST(LensOverTime, SaysWhichSightNoCourseTellsOf) {
+TEST(LensOverTime, SaysWhichObservationNoCourseTellsOf) {
   ZoomingTrack zooming = zooming_track(3, 0.01, Eigen::Vector2d::Zero());
-  EXPECT_FALSE(outside_course(zooming.sights, zooming.courses, 1.0));
+  EXPECT_FALSE(outside_course(zooming.observations, zooming.courses, 1.0));
   zooming.courses[1].until_s = 4.0;
-  const auto outside = outside_course(zooming.sights, zooming.courses, 1.0);
+  const auto outside = outside_course(zooming.observations, zooming.courses, 1.0);
   ASSERT_TRUE(outside);
   EXPECT_EQ(outside->head, 1u);
   EXPECT_GT(outside->t_s, 5.0);
   zooming.courses[1].lens.clear();  // a head without a course
-  EXPECT_FALSE(outside_course(zooming.sights, zooming.courses, 1.0));
+  EXPECT_FALSE(outside_course(zooming.observations, zooming.courses, 1.0));
 }
 
 }  // namespace

@@ -14,7 +14,7 @@
 namespace alidade {
 namespace {
 
-using testing::sights_of;
+using testing::observations_of;
 using testing::truth_of;
 
 struct Scores {
@@ -32,12 +32,13 @@ Scores scores_of(const TrackScene& scene, TrackMethod method, int runs, double a
     config.method = method;
     config.sigma_a_m_s2 = scene.sigma_a_m_s2;
     Tracker tracker(scene.heads, config);
-    const std::vector<TargetSight> sights = sights_of(scene, static_cast<std::uint64_t>(run) + 1);
+    const std::vector<TargetObservation> observations = observations_of(scene, static_cast<std::uint64_t>(run) + 1);
     double run2 = 0.0, num_run = 0.0;
-    for (std::size_t i = 0; i < sights.size(); ++i) {
-      const double now_s = sights[i].t_arrival_s;
-      (void)tracker.take(sights[i]);
-      if ((i + 1 < sights.size() && sights[i + 1].t_arrival_s < now_s + 1e-9) || now_s < 0.5 + scene.latency_s)
+    for (std::size_t i = 0; i < observations.size(); ++i) {
+      const double now_s = observations[i].t_arrival_s;
+      (void)tracker.take(observations[i]);
+      if ((i + 1 < observations.size() && observations[i + 1].t_arrival_s < now_s + 1e-9) ||
+          now_s < 0.5 + scene.latency_s)
         continue;
       const auto belief = tracker.at(now_s);
       if (!belief) ++scores.without_belief;
@@ -61,9 +62,9 @@ Scores scores_of(const TrackScene& scene, TrackMethod method, int runs, double a
 }
 
 TEST(TrackMonteCarlo, ReachesItsFiguresInEveryScenario) {
-  const std::map<std::string, double> most_mm{{"A", 2.2},  {"A2", 2.2}, {"B", 3.8}, {"C", 52.0},
-                                              {"E", 12.5}, {"F", 97.0}, {"G", 54.0}};
-  for (const auto& [name, limit_mm] : most_mm) {
+  const std::map<std::string, double> max_mm{{"A", 2.2},  {"A2", 2.2}, {"B", 3.8}, {"C", 52.0},
+                                             {"E", 12.5}, {"F", 97.0}, {"G", 54.0}};
+  for (const auto& [name, limit_mm] : max_mm) {
     const Scores scores = scores_of(*track_scenario(name), TrackMethod::cv, 40);
     EXPECT_LE(scores.rmse_mm, limit_mm) << name;
     EXPECT_GE(scores.nees, 0.6) << name;
@@ -93,13 +94,14 @@ TEST(TrackMonteCarlo, NoRunDivergesThroughOcclusions) {
 /// The least RMSE of the paper's filter over its process noise and the weight of cm beside tangents.
 double best_of_the_paper_mm(const TrackScene& scene, int runs) {
   const TrueTrack truth = truth_of(scene);
-  std::vector<std::vector<TargetSight>> sights;
-  for (int run = 0; run < runs; ++run) sights.push_back(sights_of(scene, static_cast<std::uint64_t>(run) + 1));
+  std::vector<std::vector<TargetObservation>> observations;
+  for (int run = 0; run < runs; ++run)
+    observations.push_back(observations_of(scene, static_cast<std::uint64_t>(run) + 1));
   double best_m = 1e9;
   for (double process = 1e-5; process < 2e5; process *= 10.0) {
     for (double cm = 1e-3; cm < 2e3; cm *= 10.0) {
       double sum2 = 0.0;
-      for (const auto& given : sights) {
+      for (const auto& given : observations) {
         XiahouConfig config{.process_variance = process, .variance_of_cm = cm};
         const TrackReport report = track_target_xiahou(given, scene.heads, config, truth);
         sum2 += report.rms_m * report.rms_m;
@@ -111,8 +113,8 @@ double best_of_the_paper_mm(const TrackScene& scene, int runs) {
 }
 
 TEST(TrackMonteCarlo, BeatsThePapersFilterAtItsBest) {
-  const std::map<std::string, double> least_ratio{{"A", 8.0}, {"A2", 50.0}, {"B", 25.0}, {"C", 7.0}};
-  for (const auto& [name, ratio] : least_ratio) {
+  const std::map<std::string, double> min_ratio{{"A", 8.0}, {"A2", 50.0}, {"B", 25.0}, {"C", 7.0}};
+  for (const auto& [name, ratio] : min_ratio) {
     const TrackScene scene = *track_scenario(name);
     const double paper_mm = best_of_the_paper_mm(scene, 5), ours_mm = scores_of(scene, TrackMethod::cv, 20).rmse_mm;
     EXPECT_GE(paper_mm / ours_mm, ratio) << name << ": " << paper_mm << " and " << ours_mm << " mm";
@@ -123,19 +125,19 @@ TEST(TrackMonteCarlo, BeatsThePapersFilterAtItsBest) {
 TEST(TrackMonteCarlo, WithPixelsAndIdealHeadsThePapersFilterIsNearlyAsGood) {
   const TrackScene scene = *track_scenario("A");
   const TrueTrack truth = truth_of(scene);
-  double least_m = 1e9;
+  double min_m = 1e9;
   for (double process = 1e-8; process < 1.0; process *= 10.0) {
     // Tangents of 0.1° and their reach across 64 cm.
     const XiahouConfig config{
         .process_variance = process, .variance_of_tangent = 3e-6, .variance_of_cm = 0.02, .use_pixels = true};
     double sum2 = 0.0;
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-      const double rms_m = track_target_xiahou(sights_of(scene, seed), scene.heads, config, truth).rms_m;
+      const double rms_m = track_target_xiahou(observations_of(scene, seed), scene.heads, config, truth).rms_m;
       sum2 += rms_m * rms_m / 10.0;
     }
-    least_m = std::min(least_m, std::sqrt(sum2));
+    min_m = std::min(min_m, std::sqrt(sum2));
   }
-  EXPECT_LT(1e3 * least_m, 4.0);  // 1.94 mm where Q and R are tuned more finely; 21 without pixels
+  EXPECT_LT(1e3 * min_m, 4.0);  // 1.94 mm where Q and R are tuned more finely; 21 without pixels
 }
 
 /// A target that moves as the model says, seen by heads that follow it closely.
@@ -164,8 +166,8 @@ TEST(TrackMonteCarlo, IsAtTheBoundWhereTheModelHolds) {
       config.warm_up_s = 1.0;
       config.tracker.sigma_a_m_s2 = given.sigma_a;
       config.tracker.start_sigma_v_m_s = 0.1;
-      const TrackReport report =
-          track_target(sights_of(scene, static_cast<std::uint64_t>(run) + 500), scene.heads, config, truth_of(scene));
+      const TrackReport report = track_target(observations_of(scene, static_cast<std::uint64_t>(run) + 500),
+                                              scene.heads, config, truth_of(scene));
       ASSERT_TRUE(std::isfinite(report.pcrlb_m));
       error2 += report.rms_m * report.rms_m;
       bound2 += report.pcrlb_m * report.pcrlb_m;

@@ -9,9 +9,9 @@
 namespace alidade {
 namespace {
 
-/// What moves a ray within the plane of both rays moves the range, and no other: the sights do not tell it, and what a
-/// filter believes to learn of it comes from its own linearisation. Told are the parameters across that plane: of heads
-/// side by side what turns about x or z, and what is vertical.
+/// What moves a ray within the plane of both rays moves the range, and no other: the observations do not tell it, and
+/// what a filter believes to learn of it comes from its own linearisation. Told are the parameters across that plane:
+/// of heads side by side what turns about x or z, and what is vertical.
 bool is_across(std::span<const RigHead> heads, Eigen::Index param) {
   const Eigen::Vector3d apart =
       heads.back().head.world_from_base.translation - heads.front().head.world_from_base.translation;
@@ -25,9 +25,9 @@ bool is_across(std::span<const RigHead> heads, Eigen::Index param) {
 
 std::vector<RigFault> rig_faults(std::span<const RigHead> heads, const RigUncertainty& errors,
                                  const Tracker::Learned& learned, bool is_supposed) {
-  constexpr double least_told = 0.1;  // of the variance
+  constexpr double min_told = 0.1;  // of the variance
   std::vector<RigFault> faults;
-  // What the sights add to u ~ N(0, 1): the information, and its vector.
+  // What the observations add to u ~ N(0, 1): the information, and its vector.
   const Eigen::MatrixXd inverse = inverse_symmetric(learned.cov);
   const Eigen::MatrixXd told = inverse - Eigen::MatrixXd::Identity(inverse.rows(), inverse.cols());
   const Eigen::VectorXd told_u = inverse * learned.u;
@@ -38,7 +38,7 @@ std::vector<RigFault> rig_faults(std::span<const RigHead> heads, const RigUncert
       if (!is_across(heads, p)) continue;
       const Eigen::RowVectorXd row = factor.row(p);
       const double before = row.squaredNorm(), after = row * learned.cov * row.transpose();
-      if (!(before > 0.0) || !(before - after > least_told * before)) continue;
+      if (!(before > 0.0) || !(before - after > min_told * before)) continue;
       const Eigen::Index k = p - num_head_params;
       const std::string name = k < 0 ? std::string(head_param_names[static_cast<std::size_t>(p)])
                                      : "camera." + lens[static_cast<std::size_t>(k)];

@@ -5,20 +5,20 @@
 
 #include "alidade/estimation/iterated_update.h"
 #include "alidade/pantilt/head.h"
-#include "alidade/pantilt/target_sight.h"
+#include "alidade/pantilt/target_observation.h"
 
 namespace alidade {
 
-/// h and R of one sight: the head as it stood, its camera, and the noise of pixel and encoder. Lives as long as the
-/// camera.
-struct SightModel {
+/// h and R of one observation: the head as it stood, its camera, and the noise of pixel and encoder. Lives as long as
+/// the camera.
+struct ObservationModel {
   TurnedHead turned;
   const Camera* camera;
   double variance_px2, variance_rad2;
   std::optional<Zoomed> zoomed;  ///< Where the lens is not the camera's own.
 
-  SightModel(const RigHead& head, const Eigen::Vector2d& pan_tilt_rad, double sigma_px, double sigma_encoder_rad,
-             const std::optional<SightLens>& lens = {})
+  ObservationModel(const RigHead& head, const Eigen::Vector2d& pan_tilt_rad, double sigma_px, double sigma_encoder_rad,
+                   const std::optional<ObservationLens>& lens = {})
       : turned(head.head, pan_tilt_rad),
         camera(&head.camera),
         variance_px2(sigma_px * sigma_px),

@@ -38,7 +38,7 @@ struct ModelFilter {
     return innovation_of(belief, seen, z);
   }
   /// False, and no change, where the update has no answer.
-  [[nodiscard]] bool update(const PositionSeen& seen, const Eigen::Vector2d& z, const SightModel& see,
+  [[nodiscard]] bool update(const PositionSeen& seen, const Eigen::Vector2d& z, const ObservationModel& see,
                             const IteratedUpdateConfig& config) {
     const auto updated = iterated_update(belief, seen, z, see, config);
     if (updated) belief = *updated;
@@ -82,7 +82,7 @@ struct InteractingFilter {
   [[nodiscard]] Innovation expect(const PositionSeen& seen, const Eigen::Vector2d& z) const {
     return innovation_of(belief.merged(), seen, z);
   }
-  [[nodiscard]] bool update(const PositionSeen&, const Eigen::Vector2d& z, const SightModel& see,
+  [[nodiscard]] bool update(const PositionSeen&, const Eigen::Vector2d& z, const ObservationModel& see,
                             const IteratedUpdateConfig& config) {
     const auto by_quiet = see(belief.quiet.x.head<3>()), by_agile = see(belief.agile.x.head<3>());
     const auto by_falling = see(belief.falling.x.head<3>());

@@ -20,15 +20,15 @@ void add_smoothed(const std::optional<Tracker::Smoothed>& now, std::vector<Predi
   smoothed.push_back({now->t_s, true, now->belief});
 }
 
-TrackReport followed(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackerConfig& config,
-                     double predict_s = 0.0, double smooth_s = 0.0, const TrackWatch& watch = {},
-                     std::optional<Tracker::Learned>* learned = nullptr) {
+TrackReport followed(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                     const TrackerConfig& config, double predict_s = 0.0, double smooth_s = 0.0,
+                     const TrackWatch& watch = {}, std::optional<Tracker::Learned>* learned = nullptr) {
   Tracker tracker({heads.begin(), heads.end()}, config);
   TrackReport report;
   report.sigma_a_m_s2 = config.sigma_a_m_s2;
-  report.steps.reserve(sights.size());
-  for (const TargetSight& sight : sights) {
-    const TrackStep step = tracker.take(sight);
+  report.steps.reserve(observations.size());
+  for (const TargetObservation& observation : observations) {
+    const TrackStep step = tracker.take(observation);
     report.num_used += step.accepted ? 1 : 0;
     report.num_starts += step.event == TrackEvent::start ? 1 : 0;
     report.num_restarts += step.event == TrackEvent::restart ? 1 : 0;
@@ -36,7 +36,7 @@ TrackReport followed(std::span<const TargetSight> sights, std::span<const RigHea
       report.log_likelihood -=
           0.5 * (std::min(step.innovation.nis, config.gate) + std::log(step.innovation.S.determinant()));
     report.steps.push_back(step);
-    if (watch) watch(sight, step);
+    if (watch) watch(observation, step);
     if (smooth_s > 0.0) add_smoothed(tracker.smoothed(smooth_s), report.smoothed);
     if (!(predict_s > 0.0)) continue;
     const auto ahead = tracker.at(step.t_s + predict_s);
@@ -47,11 +47,11 @@ TrackReport followed(std::span<const TargetSight> sights, std::span<const RigHea
 }
 
 /// The σ_a whose innovations are the most probable, from 0.03 to 30 m/s² in steps of a quarter of a decade.
-double most_probable_sigma_a(std::span<const TargetSight> sights, std::span<const RigHead> heads,
-                             TrackerConfig config) {
-  constexpr std::size_t most_sights = 4000;       // a few minutes: enough to tell
+double max_probable_sigma_a(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                            TrackerConfig config) {
+  constexpr std::size_t max_observations = 4000;  // a few minutes: enough to tell
   config.learn_errors = config.errors.num() > 0;  // the others' innovations follow one another
-  const auto first = sights.first(std::min(sights.size(), most_sights));
+  const auto first = observations.first(std::min(observations.size(), max_observations));
   double best = config.sigma_a_m_s2, most = -std::numeric_limits<double>::infinity();
   for (int quarter = -6; quarter <= 6; ++quarter) {
     config.sigma_a_m_s2 = std::pow(10.0, 0.25 * quarter);
@@ -66,7 +66,7 @@ double most_probable_sigma_a(std::span<const TargetSight> sights, std::span<cons
   return best;
 }
 
-/// The sights that count in statistics: there is a belief, and the track is older than the warm-up.
+/// The observations that count in statistics: there is a belief, and the track is older than the warm-up.
 std::vector<bool> counted(const std::vector<TrackStep>& steps, double warm_up_s) {
   std::vector<bool> result;
   double began_s = std::numeric_limits<double>::infinity();
@@ -87,7 +87,7 @@ void add_errors(TrackReport& report, const std::vector<bool>& counts, const True
     if (!step.has_belief || !position) continue;
     const Eigen::Vector3d error = step.belief.x.head<3>() - *position;
     report.nees[i] = position_nees(step, truth);
-    // Of several heads at one instant the last one's sight completes the estimate.
+    // Of several heads at one instant the last one's observation completes the estimate.
     const bool is_complete = i + 1 == report.steps.size() || report.steps[i + 1].t_s != step.t_s;
     if (!counts[i] || !is_complete) continue;
     sum2 += error.squaredNorm();
@@ -118,9 +118,9 @@ void add_smoothed_error(TrackReport& report, const std::vector<bool>& counts, co
   if (num > 0.0) report.smoothed_rms_m = std::sqrt(sum2 / num);
 }
 
-/// The angles (pan, tilt) that an unturned head without offsets would have to look along a sight.
-std::optional<Eigen::Vector2d> angles_of_ray(const RigHead& head, const TargetSight& sight) {
-  const auto ray = ray_in_world(head, sight);
+/// The angles (pan, tilt) that an unturned head without offsets would have to look along an observation.
+std::optional<Eigen::Vector2d> angles_of_ray(const RigHead& head, const TargetObservation& observation) {
+  const auto ray = ray_in_world(head, observation);
   if (!ray) return std::nullopt;
   const Eigen::Vector3d& d = ray->direction_in_world;
   return Eigen::Vector2d(-std::atan2(d.x(), d.z()), -std::atan2(d.y(), std::hypot(d.x(), d.z())));
@@ -156,9 +156,9 @@ double position_nees(const TrackStep& step, const TrueTrack& truth) {
 namespace {
 
 /// In order of capture: what is probable does not depend on what arrived first.
-std::vector<TargetSight> as_captured(std::span<const TargetSight> sights) {
-  std::vector<TargetSight> sorted(sights.begin(), sights.end());
-  std::ranges::stable_sort(sorted, {}, [](const TargetSight& s) { return std::pair(s.t_capture_s, s.head); });
+std::vector<TargetObservation> as_captured(std::span<const TargetObservation> observations) {
+  std::vector<TargetObservation> sorted(observations.begin(), observations.end());
+  std::ranges::stable_sort(sorted, {}, [](const TargetObservation& s) { return std::pair(s.t_capture_s, s.head); });
   return sorted;
 }
 
@@ -175,16 +175,16 @@ double mean_nis(const std::vector<TrackStep>& steps, const std::vector<bool>& co
 
 /// What the innovations ask σ² to be raised by: where they are larger than stated, or follow one another.
 double asked_inflation(const TrackReport& report) {
-  constexpr double least_nis = 0.2, in_sigma = 3.5, most_colour = 0.35;
+  constexpr double min_nis = 0.2, in_sigma = 3.5, max_colour = 0.35;
   double colour = 0.0, num = 0.0;
   for (const HeadInnovations& head : report.innovations) {
     colour += static_cast<double>(head.num) * head.colour;
     num += static_cast<double>(head.num);
   }
-  // Of n sights the mean NIS a degree of freedom scatters by 1/√n.
-  const double most_nis = 1.0 + std::max(least_nis, in_sigma / std::sqrt(std::max(1.0, num)));
-  double inflation = report.nis_per_dof > most_nis ? report.nis_per_dof : 1.0;
-  if (num > 0.0 && colour / num > most_colour) inflation *= (num + colour) / (num - colour);
+  // Of n observations the mean NIS a degree of freedom scatters by 1/√n.
+  const double max_nis = 1.0 + std::max(min_nis, in_sigma / std::sqrt(std::max(1.0, num)));
+  double inflation = report.nis_per_dof > max_nis ? report.nis_per_dof : 1.0;
+  if (num > 0.0 && colour / num > max_colour) inflation *= (num + colour) / (num - colour);
   return inflation;
 }
 
@@ -196,31 +196,31 @@ void inflate(TrackReport& report) {
   for (PredictedStep& step : report.smoothed) step.belief.P *= report.inflation;
 }
 
-/// What of the rig the sights contradict, by a filter that learns its errors: those that its file states, else
+/// What of the rig the observations contradict, by a filter that learns its errors: those that its file states, else
 /// supposed. The target may go anywhere meanwhile, so that what it does is not taken for the rig's fault.
-void ask_for_faults(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackConfig& config,
-                    TrackReport& report) {
-  constexpr double freely = 10.0, least_m_s2 = 10.0;
+void ask_for_faults(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                    const TrackConfig& config, TrackReport& report) {
+  constexpr double freely = 10.0, min_m_s2 = 10.0;
   TrackerConfig learning = config.tracker;
   learning.method = TrackMethod::cv;
   learning.learn_errors = true;
-  learning.sigma_a_m_s2 = std::max(least_m_s2, freely * learning.sigma_a_m_s2);
+  learning.sigma_a_m_s2 = std::max(min_m_s2, freely * learning.sigma_a_m_s2);
   if (!report.errors_are_counted) learning.errors = supposed_errors(heads);
   std::optional<Tracker::Learned> learned;
-  const TrackReport free = followed(sights, heads, learning, 0.0, 0.0, {}, &learned);
+  const TrackReport free = followed(observations, heads, learning, 0.0, 0.0, {}, &learned);
   if (learned && free.num_restarts <= 1)
     report.faults = rig_faults(heads, learning.errors, *learned, !report.errors_are_counted);
 }
 
-/// What sights say of noise, motion and rig. Where the rig's errors are counted, by innovations of a filter that learns
-/// them.
-void judge_sights(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackConfig& config,
-                  TrackReport& report) {
+/// What observations say of noise, motion and rig. Where the rig's errors are counted, by innovations of a filter that
+/// learns them.
+void judge_observations(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                        const TrackConfig& config, TrackReport& report) {
   report.errors_are_counted = config.tracker.errors.num() > 0;
   TrackerConfig learning = config.tracker;
   learning.learn_errors = report.errors_are_counted;
   if (learning.learn_errors && learning.method == TrackMethod::imm) learning.method = TrackMethod::singer;
-  const std::vector<TargetSight> sorted = as_captured(sights);
+  const std::vector<TargetObservation> sorted = as_captured(observations);
   const std::vector<TrackStep> steps = followed(sorted, heads, learning).steps;
   report.nis_per_dof = mean_nis(steps, counted(steps, config.warm_up_s), config.tracker.gate);
   report.innovations = test_innovations(sorted, heads, steps, config);
@@ -229,45 +229,46 @@ void judge_sights(std::span<const TargetSight> sights, std::span<const RigHead> 
 
 }  // namespace
 
-TrackReport track_target(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackConfig& config,
-                         const TrueTrack& truth, const TrackWatch& watch) {
+TrackReport track_target(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                         const TrackConfig& config, const TrueTrack& truth, const TrackWatch& watch) {
   TrackConfig used = config;
   if (config.find_sigma_a)
-    used.tracker.sigma_a_m_s2 = most_probable_sigma_a(as_captured(sights), heads, config.tracker);
+    used.tracker.sigma_a_m_s2 = max_probable_sigma_a(as_captured(observations), heads, config.tracker);
   if (config.smooth_s > 0.0) {
     used.tracker.history_s = std::max(used.tracker.history_s, 1.2 * config.smooth_s + 0.1);
-    used.tracker.most_kept = std::max<std::size_t>(used.tracker.most_kept, 2048);
+    used.tracker.max_kept = std::max<std::size_t>(used.tracker.max_kept, 2048);
   }
-  TrackReport report = followed(sights, heads, used.tracker, config.predict_s, config.smooth_s, watch);
+  TrackReport report = followed(observations, heads, used.tracker, config.predict_s, config.smooth_s, watch);
   report.sigma_a_is_found = config.find_sigma_a;
   const std::vector<bool> counts = counted(report.steps, config.warm_up_s);
   if (config.judge) {
-    judge_sights(sights, heads, used, report);
+    judge_observations(observations, heads, used, report);
     inflate(report);
   } else {
     report.nis_per_dof = mean_nis(report.steps, counts, config.tracker.gate);
   }
   if (!truth.t_s.empty()) {
-    add_errors(report, counts, truth, track_bound(sights, heads, used, truth));
+    add_errors(report, counts, truth, track_bound(observations, heads, used, truth));
     add_smoothed_error(report, counts, truth);
   }
   return report;
 }
 
-TrackReport track_target_xiahou(std::span<const TargetSight> sights, std::span<const RigHead> heads,
+TrackReport track_target_xiahou(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                                 const XiahouConfig& config, const TrueTrack& truth, const TrackWatch& watch) {
   constexpr double together_s = 0.06;
   TrackReport report;
   std::optional<XiahouFilter> filter;
-  std::array<std::optional<TargetSight>, 2> last;
+  std::array<std::optional<TargetObservation>, 2> last;
   double filter_time_s = 0.0;
   const Eigen::Vector3d origin = heads.empty() ? Eigen::Vector3d::Zero() : heads[0].head.world_from_base.translation;
-  for (const TargetSight& sight : sights) {
+  for (const TargetObservation& observation : observations) {
     TrackStep step;
     if (filter) step = step_of(*filter, filter_time_s, origin);
     step.accepted = false;
-    if (sight.head < 2) last[sight.head] = sight;
-    if (sight.head < 2 && last[0] && last[1] && std::abs(last[0]->t_capture_s - last[1]->t_capture_s) <= together_s) {
+    if (observation.head < 2) last[observation.head] = observation;
+    if (observation.head < 2 && last[0] && last[1] &&
+        std::abs(last[0]->t_capture_s - last[1]->t_capture_s) <= together_s) {
       std::array<std::optional<Eigen::Vector2d>, 2> angles{last[0]->pan_tilt_rad, last[1]->pan_tilt_rad};
       for (std::size_t i = 0; i < 2 && config.use_pixels; ++i) angles[i] = angles_of_ray(heads[i], *last[i]);
       const double t_s = std::max(last[0]->t_capture_s, last[1]->t_capture_s);
@@ -286,33 +287,33 @@ TrackReport track_target_xiahou(std::span<const TargetSight> sights, std::span<c
       }
     }
     report.steps.push_back(step);
-    if (watch) watch(sight, step);
+    if (watch) watch(observation, step);
   }
   if (!truth.t_s.empty()) add_errors(report, counted(report.steps, TrackConfig{}.warm_up_s), truth, {});
   return report;
 }
 
-std::vector<double> track_bound(std::span<const TargetSight> sights, std::span<const RigHead> heads,
+std::vector<double> track_bound(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                                 const TrackConfig& config, const TrueTrack& truth) {
-  std::vector<std::size_t> order(sights.size());
+  std::vector<std::size_t> order(observations.size());
   std::iota(order.begin(), order.end(), 0u);
-  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return sights[i].t_capture_s; });
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return observations[i].t_capture_s; });
   const ConstantVelocity motion{config.tracker.sigma_a_m_s2};
   Belief<6> belief;
   belief.P.topLeftCorner<3, 3>() *= config.tracker.start_sigma_m * config.tracker.start_sigma_m;
   belief.P.bottomRightCorner<3, 3>() *= config.tracker.start_sigma_v_m_s * config.tracker.start_sigma_v_m_s;
-  std::vector<double> sigma_m(sights.size(), not_there);
-  double now_s = order.empty() ? 0.0 : sights[order.front()].t_capture_s;
+  std::vector<double> sigma_m(observations.size(), not_there);
+  double now_s = order.empty() ? 0.0 : observations[order.front()].t_capture_s;
   for (const std::size_t i : order) {
-    const TargetSight& sight = sights[i];
-    belief = motion.predicted(belief, sight.t_capture_s - now_s);
-    now_s = sight.t_capture_s;
+    const TargetObservation& observation = observations[i];
+    belief = motion.predicted(belief, observation.t_capture_s - now_s);
+    now_s = observation.t_capture_s;
     const auto position = truth.at(now_s);
-    if (position && sight.head < heads.size()) {
-      const RigHead& head = heads[sight.head];
+    if (position && observation.head < heads.size()) {
+      const RigHead& head = heads[observation.head];
       const double own = head.head.encoder.sigma_rad;
-      const SightModel see(head, sight.pan_tilt_rad, sigma_px_of(sight, config.tracker.sigma_px),
-                           own > 0.0 ? own : config.tracker.sigma_encoder_rad, sight.lens);
+      const ObservationModel see(head, observation.pan_tilt_rad, sigma_px_of(observation, config.tracker.sigma_px),
+                                 own > 0.0 ? own : config.tracker.sigma_encoder_rad, observation.lens);
       belief.x.head<3>() = *position;
       if (const auto seen = see(*position)) {
         const auto updated = iterated_update(belief, *seen, seen->z, see, {.max_iterations = 1});

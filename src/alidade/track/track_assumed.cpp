@@ -19,7 +19,8 @@ struct Median {
   std::vector<HeadReading> readings;
 };
 
-Median median_of_steps(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackReport& report) {
+Median median_of_steps(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                       const TrackReport& report) {
   std::vector<std::pair<double, std::size_t>> by_range;
   const Eigen::Vector3d origin = heads[0].head.world_from_base.translation;
   for (std::size_t i = report.steps.size() / 10; i < report.steps.size(); ++i) {
@@ -32,13 +33,13 @@ Median median_of_steps(std::span<const TargetSight> sights, std::span<const RigH
   std::ranges::nth_element(by_range, middle);
   median.step = &report.steps[middle->second];
   for (std::size_t h = 0; h < heads.size(); ++h) {
-    double least_s = 1.0;
-    const TargetSight* nearest = nullptr;
-    for (const TargetSight& sight : sights) {
-      const double apart_s = std::abs(sight.t_capture_s - median.step->t_s);
-      if (sight.head != h || !(apart_s < least_s)) continue;
-      least_s = apart_s;
-      nearest = &sight;
+    double min_s = 1.0;
+    const TargetObservation* nearest = nullptr;
+    for (const TargetObservation& observation : observations) {
+      const double apart_s = std::abs(observation.t_capture_s - median.step->t_s);
+      if (observation.head != h || !(apart_s < min_s)) continue;
+      min_s = apart_s;
+      nearest = &observation;
     }
     if (nearest != nullptr) median.readings.push_back({h, nearest->pan_tilt_rad});
   }
@@ -144,15 +145,15 @@ class Lister {
 };
 
 /// By how much a third more or less of acceleration moves the track: RMS over its steps, in σ of each.
-double moved_by_motion(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackConfig& config,
-                       const TrackReport& report) {
-  constexpr std::size_t most_sights = 2000;
+double moved_by_motion(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                       const TrackConfig& config, const TrackReport& report) {
+  constexpr std::size_t max_observations = 2000;
   TrackerConfig other = config.tracker;
   other.sigma_a_m_s2 = 1.333 * report.sigma_a_m_s2;
   Tracker tracker({heads.begin(), heads.end()}, other);
   double sum = 0.0, num = 0.0;
-  for (std::size_t i = 0; i < std::min({most_sights, sights.size(), report.steps.size()}); ++i) {
-    const TrackStep step = tracker.take(sights[i]);
+  for (std::size_t i = 0; i < std::min({max_observations, observations.size(), report.steps.size()}); ++i) {
+    const TrackStep step = tracker.take(observations[i]);
     const TrackStep& told = report.steps[i];
     if (!step.has_belief || !told.has_belief || i < 20) continue;
     for (int k = 0; k < 3; ++k) sum += std::pow(step.belief.x[k] - told.belief.x[k], 2) / (3.0 * told.belief.P(k, k));
@@ -192,23 +193,23 @@ std::vector<Eigen::MatrixXd> meeting_sensitivity(std::span<const RigHead> heads,
   return by;
 }
 
-std::vector<Assumption> track_assumed(std::span<const TargetSight> sights, const Rig& rig, const TrackConfig& config,
-                                      const TrackReport& report, const TrackTold& told) {
+std::vector<Assumption> track_assumed(std::span<const TargetObservation> observations, const Rig& rig,
+                                      const TrackConfig& config, const TrackReport& report, const TrackTold& told) {
   if (rig.heads.empty()) return {};
-  const Median median = median_of_steps(sights, rig.heads, report);
+  const Median median = median_of_steps(observations, rig.heads, report);
   Lister lister(rig, median);
   for (std::size_t h = 0; h < rig.heads.size(); ++h) lister.add_lens(h);
   for (std::size_t h = 1; h < rig.heads.size(); ++h) lister.add_mounting(h);
   for (std::size_t h = 0; h < rig.heads.size(); ++h) lister.add_scales(h);
   if (told.sigma_clock_s > 0.0)
     for (std::size_t h = 0; h < rig.heads.size(); ++h) lister.add_clock(h, told.sigma_clock_s);
-  if (told.sigma_px)  // weighs the sights, and moves no one's mean: NIS judges it
+  if (told.sigma_px)  // weighs the observations, and moves no one's mean: NIS judges it
     lister.assumed.push_back({.name = "sigma_px", .value = config.tracker.sigma_px, .sigma = 0.0});
   Assumption motion{.name = "motion_" + std::string(method_name(config.tracker.method)) + ".sigma_a_m_s2",
                     .value = report.sigma_a_m_s2,
                     .moved = "position_m",
                     .remedy = "leave --sigma-a out, or try --method imm"};
-  if (median.step != nullptr) motion.moves = moved_by_motion(sights, rig.heads, config, report);
+  if (median.step != nullptr) motion.moves = moved_by_motion(observations, rig.heads, config, report);
   motion.ordinary = 0.333 * report.sigma_a_m_s2;
   if (!told.sigma_a) motion.sigma = motion.ordinary;  // what the innovations tell it to
   lister.assumed.push_back(std::move(motion));

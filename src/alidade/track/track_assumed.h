@@ -18,7 +18,7 @@ struct TrackTold {
 /// What a track takes as given: lenses, heads, encoders, clocks, noise and the model of motion. `moves`: of the target
 /// where half of it was nearer, by the heads' rays meeting elsewhere, in the σ that the track states there. A rig of
 /// one head, or a report without a track, moves nothing.
-[[nodiscard]] std::vector<Assumption> track_assumed(std::span<const TargetSight> sights, const Rig& rig,
+[[nodiscard]] std::vector<Assumption> track_assumed(std::span<const TargetObservation> observations, const Rig& rig,
                                                     const TrackConfig& config, const TrackReport& report,
                                                     const TrackTold& told);
 

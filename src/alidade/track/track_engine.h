@@ -10,34 +10,35 @@
 
 namespace alidade::detail {
 
-/// The tracker for one kind of filter: the last moments of sights and of beliefs after them, in order of capture, so
-/// that a sight that comes late is put in its place and what follows is done again.
+/// The tracker for one kind of filter: the last moments of observations and of beliefs after them, in order of capture,
+/// so that an observation that comes late is put in its place and what follows is done again.
 template <class Filter>
 class TrackEngine {
  public:
   using Models = typename Filter::Models;
 
   TrackEngine(std::vector<RigHead> heads, const TrackerConfig& config, const Models& models)
-      : heads_(std::move(heads)), config_(config), models_(models), kept_(std::max<std::size_t>(8, config.most_kept)) {}
+      : heads_(std::move(heads)), config_(config), models_(models), kept_(std::max<std::size_t>(8, config.max_kept)) {}
 
-  TrackStep take(const TargetSight& sight) {
-    if (!is_in_picture(sight)) return rejected(TrackEvent::outside);
+  TrackStep take(const TargetObservation& observation) {
+    if (!is_in_image(observation)) return rejected(TrackEvent::outside);
     std::size_t place = count_;
-    while (place > 0 && entry(place - 1).sight.t_capture_s > sight.t_capture_s) --place;
-    const bool is_late = place < count_ && (newest().sight.t_capture_s - sight.t_capture_s > config_.history_s ||
-                                            (place == 0 && has_forgotten_));
+    while (place > 0 && entry(place - 1).observation.t_capture_s > observation.t_capture_s) --place;
+    const bool is_late =
+        place < count_ && (newest().observation.t_capture_s - observation.t_capture_s > config_.history_s ||
+                           (place == 0 && has_forgotten_));
     if (is_late) return rejected(TrackEvent::late);
     place -= make_room(place);
     for (std::size_t i = count_; i > place; --i) entry(i) = entry(i - 1);
     const bool had_started = count_ > 0 && newest().has_started;
     ++count_;
-    entry(place).sight = sight;
+    entry(place).observation = observation;
     TrackStep step;
     apply(place, step);
     for (std::size_t i = place + 1; i < count_; ++i) {
       TrackStep again;
       apply(i, again);
-      // A sight that came earlier and was taken later may have waited for this one.
+      // An observation that came earlier and was taken later may have waited for this one.
       if (!had_started && again.event == TrackEvent::start) {
         step.event = TrackEvent::start;
         step.accepted = true;
@@ -48,9 +49,9 @@ class TrackEngine {
   }
 
   [[nodiscard]] std::optional<Belief<6>> at(double t_s) const {
-    if (count_ == 0 || !newest().has_started || !(t_s >= newest().sight.t_capture_s)) return std::nullopt;
+    if (count_ == 0 || !newest().has_started || !(t_s >= newest().observation.t_capture_s)) return std::nullopt;
     Filter filter = newest().filter;
-    filter.predict(models_, t_s - newest().sight.t_capture_s);
+    filter.predict(models_, t_s - newest().observation.t_capture_s);
     return filter.estimate();
   }
 
@@ -59,13 +60,13 @@ class TrackEngine {
       if (count_ == 0 || !newest().has_started) return std::nullopt;
       Filter filter = newest().filter;
       std::size_t i = count_ - 1;
-      while (newest().sight.t_capture_s - entry(i).sight.t_capture_s < lag_s) {
+      while (newest().observation.t_capture_s - entry(i).observation.t_capture_s < lag_s) {
         if (i == 0 || entry(i).began || !entry(i - 1).has_started) return std::nullopt;
-        filter =
-            entry(i - 1).filter.smoothed(models_, filter, entry(i).sight.t_capture_s - entry(i - 1).sight.t_capture_s);
+        filter = entry(i - 1).filter.smoothed(models_, filter,
+                                              entry(i).observation.t_capture_s - entry(i - 1).observation.t_capture_s);
         --i;
       }
-      return Tracker::Smoothed{entry(i).sight.t_capture_s, filter.estimate()};
+      return Tracker::Smoothed{entry(i).observation.t_capture_s, filter.estimate()};
     } else {
       return std::nullopt;
     }
@@ -80,13 +81,13 @@ class TrackEngine {
   }
 
  private:
-  /// A sight, and how things stood after it.
+  /// An observation, and how things stood after it.
   struct Entry {
-    TargetSight sight;
+    TargetObservation observation;
     Filter filter;
     bool has_started = false;
     bool began = false;     ///< The track starts, or starts anew, here.
-    bool accepted = false;  ///< The track took this sight.
+    bool accepted = false;  ///< The track took this observation.
     /// Of each head, one after the other: counted together, a head that keeps failing would be hidden by one that does
     /// not. Heads beyond the eighth share the last place.
     std::array<int, 8> num_rejected{};
@@ -102,25 +103,26 @@ class TrackEngine {
   std::size_t make_room(std::size_t place) {
     std::size_t dropped = 0;
     const double oldest_s = newest_time() - config_.history_s;
-    const std::size_t least = std::min(most_of_a_streak, kept_.size() - 1);
+    const std::size_t least = std::min(max_of_a_streak, kept_.size() - 1);
     while (count_ > 1 && dropped < place &&
-           ((count_ > least && entry(1).sight.t_capture_s < oldest_s) || count_ == kept_.size())) {
+           ((count_ > least && entry(1).observation.t_capture_s < oldest_s) || count_ == kept_.size())) {
       first_ = (first_ + 1) % kept_.size();
       --count_;
       ++dropped;
       has_forgotten_ = true;
     }
-    if (count_ == kept_.size()) --count_;  // the sight is older than all that is kept: the newest makes room
+    if (count_ == kept_.size()) --count_;  // the observation is older than all that is kept: the newest makes room
     return dropped;
   }
-  [[nodiscard]] double newest_time() const { return count_ > 0 ? newest().sight.t_capture_s : -1e300; }
+  [[nodiscard]] double newest_time() const { return count_ > 0 ? newest().observation.t_capture_s : -1e300; }
 
-  [[nodiscard]] bool is_in_picture(const TargetSight& sight) const {
-    if (!(sight.head < heads_.size()) || !std::isfinite(sight.t_capture_s) || !sight.pan_tilt_rad.allFinite())
+  [[nodiscard]] bool is_in_image(const TargetObservation& observation) const {
+    if (!(observation.head < heads_.size()) || !std::isfinite(observation.t_capture_s) ||
+        !observation.pan_tilt_rad.allFinite())
       return false;
-    const Camera& camera = heads_[sight.head].camera;
-    return sight.px.x() >= -0.5 && sight.px.y() >= -0.5 && sight.px.x() <= camera.width_px - 0.5 &&
-           sight.px.y() <= camera.height_px - 0.5;
+    const Camera& camera = heads_[observation.head].camera;
+    return observation.px.x() >= -0.5 && observation.px.y() >= -0.5 && observation.px.x() <= camera.width_px - 0.5 &&
+           observation.px.y() <= camera.height_px - 0.5;
   }
   [[nodiscard]] double sigma_encoder(std::size_t head) const {
     const double own = heads_[head].head.encoder.sigma_rad;
@@ -138,12 +140,12 @@ class TrackEngine {
   }
   void report_newest(TrackStep& step) const {
     if (count_ == 0) return;
-    step.t_s = newest().sight.t_capture_s;
+    step.t_s = newest().observation.t_capture_s;
     step.has_belief = newest().has_started;
     if (step.has_belief) step.belief = newest().filter.estimate();
   }
 
-  /// What becomes of the sight at this place, given the entry before it.
+  /// What becomes of the observation at this place, given the entry before it.
   void apply(std::size_t place, TrackStep& step) {
     Entry& now = entry(place);
     now.began = now.accepted = false;
@@ -165,10 +167,10 @@ class TrackEngine {
       step.event = step.accepted ? TrackEvent::start : TrackEvent::waiting;
       return;
     }
-    now.filter.predict(models_, now.sight.t_capture_s - before.sight.t_capture_s);
+    now.filter.predict(models_, now.observation.t_capture_s - before.observation.t_capture_s);
     step.event = use(now, step);
     step.accepted = step.event == TrackEvent::none;
-    int& num_rejected = now.num_rejected[std::min(now.sight.head, now.num_rejected.size() - 1)];
+    int& num_rejected = now.num_rejected[std::min(now.observation.head, now.num_rejected.size() - 1)];
     if (step.accepted) {
       num_rejected = 0;
       note_head(now);
@@ -180,30 +182,30 @@ class TrackEngine {
     now.accepted = step.accepted;
   }
 
-  /// Begins the track anew where another one explains what was seen since a head's sights were first left out: it takes
-  /// three sights more than the old one did, so that single false sights do not end a track.
+  /// Begins the track anew where another one explains what was seen since a head's observations were first left out: it
+  /// takes three observations more than the old one did, so that single false observations do not end a track.
   bool begin_anew(std::size_t place) {
     constexpr int more = 3;
-    const std::size_t head = entry(place).sight.head;
+    const std::size_t head = entry(place).observation.head;
     std::size_t first = place;
-    for (std::size_t i = place; i-- > 0 && place - i < most_of_a_streak;) {
-      if (entry(i).sight.head != head) continue;
+    for (std::size_t i = place; i-- > 0 && place - i < max_of_a_streak;) {
+      if (entry(i).observation.head != head) continue;
       if (entry(i).accepted) break;
       first = i;
     }
     for (std::size_t i = first; i < place; ++i) {
-      if (entry(i).sight.head != head) continue;
+      if (entry(i).observation.head != head) continue;
       const auto other = other_before(i);
       if (!other) continue;
-      auto filter = begun(entry(*other).sight, entry(i).sight);
+      auto filter = begun(entry(*other).observation, entry(i).observation);
       if (!filter) continue;
       int old_takes = 0, new_takes = 2;
       for (std::size_t k = *other; k < place; ++k) old_takes += entry(k).accepted ? 1 : 0;
       Entry trial;
       trial.filter = *filter;
       for (std::size_t k = i + 1; k <= place; ++k) {
-        trial.filter.predict(models_, entry(k).sight.t_capture_s - entry(k - 1).sight.t_capture_s);
-        trial.sight = entry(k).sight;
+        trial.filter.predict(models_, entry(k).observation.t_capture_s - entry(k - 1).observation.t_capture_s);
+        trial.observation = entry(k).observation;
         TrackStep ignored;
         new_takes += use(trial, ignored) == TrackEvent::none ? 1 : 0;
       }
@@ -214,11 +216,11 @@ class TrackEngine {
     return false;
   }
 
-  /// The last sight of another head that was taken at about the same time as this one.
+  /// The last observation of another head that was taken at about the same time as this one.
   [[nodiscard]] std::optional<std::size_t> other_before(std::size_t place) const {
-    const TargetSight& now = entry(place).sight;
-    for (std::size_t i = place; i-- > 0 && now.t_capture_s - entry(i).sight.t_capture_s <= config_.together_s;)
-      if (entry(i).sight.head != now.head) return i;
+    const TargetObservation& now = entry(place).observation;
+    for (std::size_t i = place; i-- > 0 && now.t_capture_s - entry(i).observation.t_capture_s <= config_.together_s;)
+      if (entry(i).observation.head != now.head) return i;
     return std::nullopt;
   }
 
@@ -227,41 +229,42 @@ class TrackEngine {
     now.filter = filter;
     now.has_started = now.began = true;
     now.num_rejected = {};
-    now.head = now.sight.head;
-    now.t_head_s = now.sight.t_capture_s;
-    now.t_other_s = entry(other).sight.t_capture_s;
+    now.head = now.observation.head;
+    now.t_head_s = now.observation.t_capture_s;
+    now.t_other_s = entry(other).observation.t_capture_s;
   }
 
   void note_head(Entry& now) const {
-    if (now.sight.head != now.head) {
+    if (now.observation.head != now.head) {
       now.t_other_s = now.t_head_s;
-      now.head = now.sight.head;
+      now.head = now.observation.head;
     }
-    now.t_head_s = now.sight.t_capture_s;
+    now.t_head_s = now.observation.t_capture_s;
   }
 
-  /// Updates with the sight, where the gates let it: then `none`.
+  /// Updates with the observation, where the gates let it: then `none`.
   TrackEvent use(Entry& now, TrackStep& step) const {
-    const SightModel see(heads_[now.sight.head], now.sight.pan_tilt_rad, sigma_px_of(now.sight, config_.sigma_px),
-                         sigma_encoder(now.sight.head), now.sight.lens);
+    const ObservationModel see(heads_[now.observation.head], now.observation.pan_tilt_rad,
+                               sigma_px_of(now.observation, config_.sigma_px), sigma_encoder(now.observation.head),
+                               now.observation.lens);
     const Eigen::Vector3d position = now.filter.position();
     if (!is_in_range(see.depth_m(position))) return TrackEvent::depth;
     const auto expected = see(position);
     if (!expected) return TrackEvent::depth;
     const Filter prior = now.filter;
     if constexpr (Filter::considers) {
-      const auto effect = rig_error_effect(config_.errors.factor[now.sight.head], see.turned, *see.camera, position,
-                                           now.filter.velocity(), now.sight.lens);
+      const auto effect = rig_error_effect(config_.errors.factor[now.observation.head], see.turned, *see.camera,
+                                           position, now.filter.velocity(), now.observation.lens);
       if (!effect) return TrackEvent::depth;
-      step.innovation = now.filter.expect(*expected, *effect, now.sight.px);
+      step.innovation = now.filter.expect(*expected, *effect, now.observation.px);
       step.has_innovation = true;
       if (!(step.innovation.nis < config_.gate)) return TrackEvent::gated;
-      if (!now.filter.update(*expected, *effect, now.sight.px, see, config_.update)) return TrackEvent::gated;
+      if (!now.filter.update(*expected, *effect, now.observation.px, see, config_.update)) return TrackEvent::gated;
     } else {
-      step.innovation = now.filter.expect(*expected, now.sight.px);
+      step.innovation = now.filter.expect(*expected, now.observation.px);
       step.has_innovation = true;
       if (!(step.innovation.nis < config_.gate)) return TrackEvent::gated;
-      if (!now.filter.update(*expected, now.sight.px, see, config_.update)) return TrackEvent::gated;
+      if (!now.filter.update(*expected, now.observation.px, see, config_.update)) return TrackEvent::gated;
     }
     if (!is_in_range(see.depth_m(now.filter.position()))) {
       now.filter = prior;
@@ -270,18 +273,18 @@ class TrackEngine {
     return TrackEvent::none;
   }
 
-  /// Begins the track at this place from its sight and the last one of another head, if they are of about one time
-  /// and their rays meet in the working range.
+  /// Begins the track at this place from its observation and the last one of another head, if they are of about one
+  /// time and their rays meet in the working range.
   bool begin(std::size_t place) {
     const auto other = other_before(place);
     if (!other) return false;
-    const auto filter = begun(entry(*other).sight, entry(place).sight);
+    const auto filter = begun(entry(*other).observation, entry(place).observation);
     if (!filter) return false;
     set_begun(place, *other, *filter);
     return true;
   }
 
-  [[nodiscard]] std::optional<Filter> begun(const TargetSight& earlier, const TargetSight& later) const {
+  [[nodiscard]] std::optional<Filter> begun(const TargetObservation& earlier, const TargetObservation& later) const {
     const auto ray_a = ray_in_world(heads_[earlier.head], earlier);
     const auto ray_b = ray_in_world(heads_[later.head], later);
     if (!ray_a || !ray_b) return std::nullopt;
@@ -296,16 +299,16 @@ class TrackEngine {
     Entry trial;
     trial.filter.start(models_, first);
     TrackStep ignored;
-    trial.sight = earlier;
+    trial.observation = earlier;
     if (use(trial, ignored) != TrackEvent::none) return std::nullopt;
     trial.filter.predict(models_, later.t_capture_s - earlier.t_capture_s);
-    trial.sight = later;
+    trial.observation = later;
     if (use(trial, ignored) != TrackEvent::none) return std::nullopt;
     return trial.filter;
   }
 
   static constexpr double one_head_after_s = 0.5;
-  static constexpr std::size_t most_of_a_streak = 16;  ///< Sights that a new track may be told from.
+  static constexpr std::size_t max_of_a_streak = 16;  ///< Observations that a new track may be told from.
 
   std::vector<RigHead> heads_;
   TrackerConfig config_;

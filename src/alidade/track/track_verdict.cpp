@@ -14,10 +14,10 @@
 namespace alidade {
 namespace {
 
-constexpr double good_nees = 2.0, most_nees = 9.0;  // per degree of freedom, where the truth is given
-constexpr double good_nees_of_one = 3.8;            // where errors do not change along a track: 99 % of three numbers
-constexpr double care_left_out = 0.05, most_left_out = 0.2;
-constexpr double least_used_share = 0.7, most_nis = 3.0, good_nis_low = 0.6, good_nis_high = 1.5;
+constexpr double good_nees = 2.0, max_nees = 9.0;  // per degree of freedom, where the truth is given
+constexpr double good_nees_of_one = 3.8;           // where errors do not change along a track: 99 % of three numbers
+constexpr double care_left_out = 0.05, max_left_out = 0.2;
+constexpr double min_used_share = 0.7, max_nis = 3.0, good_nis_low = 0.6, good_nis_high = 1.5;
 
 double used_share(const TrackReport& report) {
   return report.steps.empty() ? 0.0 : static_cast<double>(report.num_used) / static_cast<double>(report.steps.size());
@@ -28,24 +28,25 @@ std::size_t count(const TrackReport& report, TrackEvent event) {
 }
 
 bool fits(const TrackReport& report) {
-  return report.num_starts > 0 && used_share(report) > least_used_share && !(report.nis_per_dof > most_nis) &&
+  return report.num_starts > 0 && used_share(report) > min_used_share && !(report.nis_per_dof > max_nis) &&
          report.num_restarts * 20 <= report.steps.size();
 }
 
-using Sights = std::vector<TargetSight>;
+using Observations = std::vector<TargetObservation>;
 using Fault = Explanation;
 
-/// How many pairs of sights there are at a time, and of them, with parallel rays.
+/// How many pairs of observations there are at a time, and of them, with parallel rays.
 struct PairCounts {
   std::size_t together = 0, parallel = 0;
 };
 
-PairCounts count_pairs(std::span<const TargetSight> given, std::span<const RigHead> heads, const TrackConfig& config) {
+PairCounts count_pairs(std::span<const TargetObservation> given, std::span<const RigHead> heads,
+                       const TrackConfig& config) {
   PairCounts counts;
-  Sights sights(given.begin(), given.end());
-  std::ranges::stable_sort(sights, {}, &TargetSight::t_capture_s);
-  for (std::size_t i = 1; i < sights.size(); ++i) {
-    const TargetSight &a = sights[i - 1], &b = sights[i];
+  Observations observations(given.begin(), given.end());
+  std::ranges::stable_sort(observations, {}, &TargetObservation::t_capture_s);
+  for (std::size_t i = 1; i < observations.size(); ++i) {
+    const TargetObservation &a = observations[i - 1], &b = observations[i];
     if (a.head == b.head || a.head >= heads.size() || b.head >= heads.size() ||
         std::abs(a.t_capture_s - b.t_capture_s) > config.tracker.together_s)
       continue;
@@ -57,13 +58,15 @@ PairCounts count_pairs(std::span<const TargetSight> given, std::span<const RigHe
   return counts;
 }
 
-bool are_parallel(std::span<const TargetSight> sights, std::span<const RigHead> heads, const TrackConfig& config) {
-  const PairCounts counts = count_pairs(sights, heads, config);
+bool are_parallel(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                  const TrackConfig& config) {
+  const PairCounts counts = count_pairs(observations, heads, config);
   return 2 * counts.parallel > counts.together;
 }
 
 /// Why no track began although there were two heads at a time.
-Fault why_no_start(std::span<const TargetSight> given, std::span<const RigHead> heads, const TrackConfig& config) {
+Fault why_no_start(std::span<const TargetObservation> given, std::span<const RigHead> heads,
+                   const TrackConfig& config) {
   const auto [together, parallel] = count_pairs(given, heads, config);
   if (together == 0)
     return {
@@ -77,18 +80,18 @@ Fault why_no_start(std::span<const TargetSight> given, std::span<const RigHead> 
           "check the rig file, or widen the working range"};
 }
 
-/// Pixels beyond the picture of the rig's camera: the rig file is of another camera.
-std::optional<Fault> other_camera(const TrackReport& report, std::span<const TargetSight> sights,
+/// Pixels beyond the image of the rig's camera: the rig file is of another camera.
+std::optional<Fault> other_camera(const TrackReport& report, std::span<const TargetObservation> observations,
                                   std::span<const RigHead> heads) {
-  constexpr double most_share = 0.05;
+  constexpr double max_share = 0.05;
   for (std::size_t h = 0; h < heads.size(); ++h) {
     double num = 0.0, outside = 0.0;
-    for (std::size_t i = 0; i < sights.size() && i < report.steps.size(); ++i) {
-      if (sights[i].head != h) continue;
+    for (std::size_t i = 0; i < observations.size() && i < report.steps.size(); ++i) {
+      if (observations[i].head != h) continue;
       num += 1.0;
       outside += report.steps[i].event == TrackEvent::outside ? 1.0 : 0.0;
     }
-    if (!(outside > most_share * num)) continue;
+    if (!(outside > max_share * num)) continue;
     return Fault{text_of(100.0 * outside / num) + " % of the sights of head " + std::to_string(heads[h].head.id) +
                      " lie outside its picture of " + std::to_string(heads[h].camera.width_px) + " x " +
                      std::to_string(heads[h].camera.height_px) + " px",
@@ -117,11 +120,11 @@ struct Lean {
 };
 
 /// A target that --method describes badly leans, too, by up to half of these: see scenario C.
-constexpr double least_mean = 0.4, least_along = 0.6, least_place = 1.2;
+constexpr double min_mean = 0.4, min_along = 0.6, min_place = 1.2;
 
 void take_if_worse(std::string text, double size, double least, double z, Lean& worst) {
-  constexpr double least_z = 6.0;
-  if (std::abs(size) > least && std::abs(z) > least_z && std::abs(size) > worst.size)
+  constexpr double min_z = 6.0;
+  if (std::abs(size) > least && std::abs(z) > min_z && std::abs(size) > worst.size)
     worst = {std::move(text), std::abs(size)};
 }
 
@@ -131,15 +134,15 @@ void take_worst_of(const HeadInnovations& of, const std::string& head, Lean& wor
     take_if_worse(head + " sees the target to one side of where it is expected, by " +
                       text_of(std::abs(of.mean[k]), 2) + "σ in " + (k == 0 ? "u" : "v") +
                       ": its mounting or an encoder's zero",
-                  of.mean[k], least_mean, root * of.mean[k], worst);
+                  of.mean[k], min_mean, root * of.mean[k], worst);
     take_if_worse("the innovations of " + head + " grow with the place in the picture, by " +
                       text_of(std::abs(of.place[k]), 2) + "σ a quarter of it: its focal length, or a scale",
-                  of.place[k], least_place, of.place[k] * std::sqrt(of.place_num), worst);
+                  of.place[k], min_place, of.place[k] * std::sqrt(of.place_num), worst);
   }
   take_if_worse(head + " sees the target " + (of.along > 0.0 ? "ahead of" : "behind") + " where it is expected, by " +
                     text_of(std::abs(of.along), 2) +
                     "σ along its motion: clocks, or a target that --method does not describe",
-                of.along, least_along, root * of.along, worst);
+                of.along, min_along, root * of.along, worst);
 }
 
 /// The largest lean of all heads.
@@ -150,23 +153,23 @@ Lean worst_lean(const TrackReport& report, std::span<const RigHead> heads) {
   return worst;
 }
 
-/// Whether innovations are white, and what of the rig the sights contradict.
+/// Whether innovations are white, and what of the rig the observations contradict.
 void add_white(const TrackReport& report, std::span<const RigHead> heads, Verdict& verdict) {
   const Lean lean = worst_lean(report, heads);
   const Check lean_check = check("lean", lean.size > 0.0 ? State::care : State::good,
                                  lean.size > 0.0 ? lean.text : "by head, motion and place the innovations have no lean",
-                                 lean.size, least_mean, "σ");
-  constexpr double most_z = 5.0;
+                                 lean.size, min_mean, "σ");
+  constexpr double max_z = 5.0;
   if (!report.faults.empty()) {
     const RigFault& worst = report.faults.front();
-    const bool is_off = worst.z > most_z;
+    const bool is_off = worst.z > max_z;
     const std::string kind = report.errors_are_counted ? " of what the rig file allows)" : " of chance)";
     verdict.checks.push_back(check("rig", is_off ? State::care : State::good,
                                    is_off
                                        ? "the sights say that " + worst.name + " is off by " +
                                              text_of(std::abs(worst.off), 2) + " (" + text_of(worst.z, 2) + "σ" + kind
                                        : "the heads' rays meet as the rig file lets them",
-                                   worst.z, most_z, "σ"));
+                                   worst.z, max_z, "σ"));
   }
   verdict.checks.push_back(lean_check);
   if (report.inflation > 1.0)
@@ -184,21 +187,21 @@ void add_checks(const TrackReport& report, Verdict& verdict) {
                              : nis < good_nis_low ? "noise is smaller than stated"
                                                   : "innovations as large as predicted";
     verdict.checks.push_back(check("NIS",
-                                   is_good          ? State::good
-                                   : nis > most_nis ? State::bad
-                                                    : State::care,
+                                   is_good         ? State::good
+                                   : nis > max_nis ? State::bad
+                                                   : State::care,
                                    text_of(nis, 3) + " per degree of freedom: " + text, nis, good_nis_high, "1"));
   }
   const double nees = report.nees_per_dof;
   if (std::isfinite(
           nees)) {  // only who has the truth sees a wrong focal length: a head that follows keeps the target central
-    const double ratio = std::sqrt(nees), most_good = report.errors_are_counted ? good_nees_of_one : good_nees;
+    const double ratio = std::sqrt(nees), max_good = report.errors_are_counted ? good_nees_of_one : good_nees;
     verdict.checks.push_back(check("truth",
-                                   nees > most_nees   ? State::bad
-                                   : nees > most_good ? State::care
-                                                      : State::good,
-                                   "the errors are " + text_of(ratio, 2) + " times their σ", ratio,
-                                   std::sqrt(most_good), "σ"));
+                                   nees > max_nees   ? State::bad
+                                   : nees > max_good ? State::care
+                                                     : State::good,
+                                   "the errors are " + text_of(ratio, 2) + " times their σ", ratio, std::sqrt(max_good),
+                                   "σ"));
   }
   const auto num_alone = static_cast<double>(count(report, TrackEvent::one_head));
   const double alone = num_alone / static_cast<double>(report.steps.size());
@@ -211,7 +214,7 @@ void add_checks(const TrackReport& report, Verdict& verdict) {
   const std::size_t num_left = report.steps.size() - report.num_used;
   verdict.checks.push_back(
       check("left out",
-            left_out > most_left_out   ? State::bad
+            left_out > max_left_out    ? State::bad
             : left_out > care_left_out ? State::care
                                        : State::good,
             std::to_string(num_left) + " of " + std::to_string(report.steps.size()) + " sights (" +
@@ -224,61 +227,63 @@ void add_checks(const TrackReport& report, Verdict& verdict) {
         check("late", State::care, text_of(late, 2) + " sights came too late", late, 0.0, "sights"));
 }
 
-/// Sights that were left out and follow a path of their own.
-std::optional<Check> second_target(const TrackReport& report, std::span<const TargetSight> sights,
+/// Observations that were left out and follow a path of their own.
+std::optional<Check> second_target(const TrackReport& report, std::span<const TargetObservation> observations,
                                    std::span<const RigHead> heads, const TrackConfig& config) {
   constexpr std::size_t least = 16;
-  constexpr double least_share = 0.7;
-  Sights others;
-  for (std::size_t i = 0; i < sights.size() && i < report.steps.size(); ++i)
+  constexpr double min_share = 0.7;
+  Observations others;
+  for (std::size_t i = 0; i < observations.size() && i < report.steps.size(); ++i)
     if (report.steps[i].event == TrackEvent::gated || report.steps[i].event == TrackEvent::depth)
-      others.push_back(sights[i]);
+      others.push_back(observations[i]);
   if (others.size() < least) return std::nullopt;
   TrackConfig plain = config;
   plain.judge = false;
   const TrackReport second = track_target(with_shift(others, {}), heads, plain);
-  if (second.num_starts == 0 || used_share(second) < least_share || second.num_restarts * 20 > others.size())
+  if (second.num_starts == 0 || used_share(second) < min_share || second.num_restarts * 20 > others.size())
     return std::nullopt;
   return check("second target", State::care,
                "there are two targets: " + std::to_string(second.num_used) + " of the " +
                    std::to_string(others.size()) + " sights that were left out follow a path of their own",
-               used_share(second), least_share, "1");
+               used_share(second), min_share, "1");
 }
 
-/// What of the sights as a whole is not as told.
+/// What of the observations as a whole is not as told.
 struct Causes {
   std::optional<Fault> mistake;
   std::optional<Check> second;
   std::optional<ClockShift> shift;
 };
 
-Causes causes_of(const TrackReport& report, std::span<const TargetSight> sights, std::span<const RigHead> heads,
-                 const TrackConfig& config) {
+Causes causes_of(const TrackReport& report, std::span<const TargetObservation> observations,
+                 std::span<const RigHead> heads, const TrackConfig& config) {
   TrackConfig found = config;
   if (report.num_starts > 0) found.tracker.sigma_a_m_s2 = report.sigma_a_m_s2;
   Causes causes;
   if (!fits(report) || report.nis_per_dof > good_nis_high || used_share(report) < 1.0 - care_left_out)
-    causes.mistake = explanation_of(sights, heads, config);
+    causes.mistake = explanation_of(observations, heads, config);
   if (causes.mistake && !causes.mistake->is_foreign_head) return causes;
-  causes.shift = probable_clock_shift(sights, heads, found);
+  causes.shift = probable_clock_shift(observations, heads, found);
   // A head with a wrong clock agrees with none of the others, either.
   if (causes.mistake && !causes.shift) return causes;
   causes.mistake.reset();
-  causes.second = second_target(report, sights, heads, found);
+  causes.second = second_target(report, observations, heads, found);
   return causes;
 }
 
 /// Why there is no track to be told of.
-std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes, std::span<const TargetSight> sights,
-                                std::span<const RigHead> heads, const TrackConfig& config) {
+std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes,
+                                std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                                const TrackConfig& config) {
   // Where nothing moves against the heads, many a mistake would make the rays meet: that explains nothing.
-  if (report.num_starts == 0 && are_parallel(sights, heads, config)) return why_no_start(sights, heads, config);
-  if (causes.mistake && (!fits(report) || used_share(report) < 1.0 - most_left_out)) return causes.mistake;
+  if (report.num_starts == 0 && are_parallel(observations, heads, config))
+    return why_no_start(observations, heads, config);
+  if (causes.mistake && (!fits(report) || used_share(report) < 1.0 - max_left_out)) return causes.mistake;
   if (fits(report)) return std::nullopt;
   if (causes.shift) return Fault{clock_text(*causes.shift, heads), "set the heads' clocks"};
-  if (report.num_starts == 0) return why_no_start(sights, heads, config);
+  if (report.num_starts == 0) return why_no_start(observations, heads, config);
   if (causes.second) return Fault{causes.second->text, "give the sights of one target: one row a picture"};
-  if (used_share(report) < least_used_share)
+  if (used_share(report) < min_used_share)
     return Fault{"only " + text_of(100.0 * used_share(report), 2) +
                      " % of the sights fit one track and this rig, and no clock, sign or swap explains it",
                  "check that the rig file is of these heads as they stand now, and the noise"};
@@ -302,15 +307,15 @@ std::string sentence_of(const TrackReport& report, const Verdict& verdict) {
 
 }  // namespace
 
-Verdict track_verdict(const TrackReport& report, std::span<const TargetSight> sights, std::span<const RigHead> heads,
-                      const TrackConfig& config) {
+Verdict track_verdict(const TrackReport& report, std::span<const TargetObservation> observations,
+                      std::span<const RigHead> heads, const TrackConfig& config) {
   std::set<std::size_t> seen_by;
-  for (const TargetSight& sight : sights) seen_by.insert(sight.head);
+  for (const TargetObservation& observation : observations) seen_by.insert(observation.head);
   if (seen_by.size() < 2)
     return refused({"one head only: the range along its ray cannot be told", "add the events of a second head"});
-  if (auto other = other_camera(report, sights, heads)) return refused(std::move(*other));
-  const Causes causes = causes_of(report, sights, heads, config);
-  if (auto why = refusal_of(report, causes, sights, heads, config)) return refused(std::move(*why));
+  if (auto other = other_camera(report, observations, heads)) return refused(std::move(*other));
+  const Causes causes = causes_of(report, observations, heads, config);
+  if (auto why = refusal_of(report, causes, observations, heads, config)) return refused(std::move(*why));
   Verdict verdict;
   if (causes.shift)
     verdict.checks.push_back(

@@ -16,14 +16,14 @@ const Check* check_of(const Verdict& verdict, const std::string& name) {
 
 TEST(TrackVerdict, WhatThrowsAQuarterAwayIsNotConsistent) {
   const TrackScene scene = *track_scenario("B");
-  std::vector<TargetSight> sights = testing::sights_of(scene, 3);
-  for (std::size_t i = 20; i < sights.size(); i += 4)  // another thing in the picture
-    sights[i].px.x() += sights[i].px.x() < 160.0 ? 80.0 : -80.0;
+  std::vector<TargetObservation> observations = testing::observations_of(scene, 3);
+  for (std::size_t i = 20; i < observations.size(); i += 4)  // another thing in the image
+    observations[i].px.x() += observations[i].px.x() < 160.0 ? 80.0 : -80.0;
   TrackConfig config;
   config.find_sigma_a = false;
   config.tracker.sigma_a_m_s2 = scene.sigma_a_m_s2;
-  const TrackReport report = track_target(sights, scene.heads, config);
-  const Verdict verdict = track_verdict(report, sights, scene.heads, config);
+  const TrackReport report = track_target(observations, scene.heads, config);
+  const Verdict verdict = track_verdict(report, observations, scene.heads, config);
   EXPECT_EQ(verdict.state, State::bad) << verdict.sentence;
   const Check* left_out = check_of(verdict, "left out");
   ASSERT_NE(left_out, nullptr);
@@ -31,21 +31,21 @@ TEST(TrackVerdict, WhatThrowsAQuarterAwayIsNotConsistent) {
   EXPECT_NEAR(left_out->value, 0.22, 0.05);
 }
 
-/// One head's pictures come 0.1 s later than the other's.
+/// One head's images come 0.1 s later than the other's.
 TEST(TrackVerdict, DoesNotDependOnTheOrderOfArrival) {
   for (const double late_s : {0.06, 0.1, 0.2}) {
     const TrackScene scene = *track_scenario("G");
-    std::vector<TargetSight> sights = testing::sights_of(scene, 4);
+    std::vector<TargetObservation> observations = testing::observations_of(scene, 4);
     const TrackConfig config;
-    const TrackReport in_order = track_target(sights, scene.heads, config);
-    for (TargetSight& sight : sights) sight.t_arrival_s += sight.head == 1 ? late_s : 0.0;
-    std::ranges::stable_sort(sights, {}, &TargetSight::t_arrival_s);
-    const TrackReport late = track_target(sights, scene.heads, config);
+    const TrackReport in_order = track_target(observations, scene.heads, config);
+    for (TargetObservation& observation : observations) observation.t_arrival_s += observation.head == 1 ? late_s : 0.0;
+    std::ranges::stable_sort(observations, {}, &TargetObservation::t_arrival_s);
+    const TrackReport late = track_target(observations, scene.heads, config);
     EXPECT_EQ(late.num_starts, 1u);
     EXPECT_EQ(late.sigma_a_m_s2, in_order.sigma_a_m_s2);
     EXPECT_NEAR(late.nis_per_dof, in_order.nis_per_dof, 1e-9);
     EXPECT_LT((late.steps.back().belief.x - in_order.steps.back().belief.x).norm(), 1e-9);
-    EXPECT_EQ(track_verdict(late, sights, scene.heads, config).state, State::good);
+    EXPECT_EQ(track_verdict(late, observations, scene.heads, config).state, State::good);
   }
 }
 
@@ -54,15 +54,15 @@ TEST(TrackVerdict, NoiseThatIsLargerThanStatedRaisesSigma) {
   scene.sigma_px = 1.0;
   scene.sigma_encoder_rad = 0.0;
   for (RigHead& head : scene.heads) head.head.encoder.sigma_rad = 1e-6;
-  const std::vector<TargetSight> sights = testing::sights_of(scene, 3);
+  const std::vector<TargetObservation> observations = testing::observations_of(scene, 3);
   TrackConfig config;
   config.tracker.sigma_px = 0.5;
   config.find_sigma_a = false;
   config.tracker.sigma_a_m_s2 = scene.sigma_a_m_s2;
-  const TrackReport report = track_target(sights, scene.heads, config, testing::truth_of(scene));
+  const TrackReport report = track_target(observations, scene.heads, config, testing::truth_of(scene));
   EXPECT_GT(report.inflation, 2.0);  // the noise's variance is 4 times the one stated
   EXPECT_LT(report.nees_per_dof, 2.0);
-  const Verdict verdict = track_verdict(report, sights, scene.heads, config);
+  const Verdict verdict = track_verdict(report, observations, scene.heads, config);
   ASSERT_NE(check_of(verdict, "inflated"), nullptr);
   EXPECT_GE(verdict.state, State::care);
 }
@@ -84,19 +84,19 @@ TEST(TrackAssumed, TheMeetingOfRaysFollowsTheParameters) {
 
 TEST(TrackAssumed, WhatIsExactMovesNothingAndWhatIsUnknownDoes) {
   const TrackScene scene = *track_scenario("C");
-  const auto sights = testing::sights_of(scene, 2);
+  const auto observations = testing::observations_of(scene, 2);
   const TrackConfig config;
-  const TrackReport report = track_target(sights, scene.heads, config);
+  const TrackReport report = track_target(observations, scene.heads, config);
   Rig rig;
   rig.heads = scene.heads;
-  const auto unknown = track_assumed(sights, rig, config, report, {});
+  const auto unknown = track_assumed(observations, rig, config, report, {});
   EXPECT_EQ(assumed_check(unknown).state, State::care);
   rig.cov.setZero(2 * num_head_params, 2 * num_head_params);
   for (RigHead& head : rig.heads) {
     const auto size = params(head.camera.lens).size();
     head.camera.cov.setZero(size, size);
   }
-  const auto exact = track_assumed(sights, rig, config, report, {});
+  const auto exact = track_assumed(observations, rig, config, report, {});
   EXPECT_EQ(assumed_check(exact).state, State::good);
   EXPECT_EQ(exact.size(), unknown.size());
   for (const Assumption& what : exact)

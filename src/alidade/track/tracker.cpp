@@ -74,8 +74,8 @@ Tracker::~Tracker() = default;
 Tracker::Tracker(Tracker&&) noexcept = default;
 Tracker& Tracker::operator=(Tracker&&) noexcept = default;
 
-TrackStep Tracker::take(const TargetSight& sight) {
-  return std::visit([&](auto& engine) { return engine.take(sight); }, state_->engine);
+TrackStep Tracker::take(const TargetObservation& observation) {
+  return std::visit([&](auto& engine) { return engine.take(observation); }, state_->engine);
 }
 
 std::optional<Belief<6>> Tracker::at(double t_s) const {
@@ -94,8 +94,8 @@ std::optional<Eigen::Vector3d> nearest_to_rays(const WorldRay& a, const WorldRay
   const Eigen::Vector3d& along_a = a.direction_in_world;
   const Eigen::Vector3d& along_b = b.direction_in_world;
   const double cosine = along_a.dot(along_b), sine2 = along_a.cross(along_b).squaredNorm();
-  constexpr double least_sine = 1e-3;
-  if (!(sine2 > least_sine * least_sine)) return std::nullopt;
+  constexpr double min_sine = 1e-3;
+  if (!(sine2 > min_sine * min_sine)) return std::nullopt;
   const Eigen::Vector3d apart = b.origin_in_world - a.origin_in_world;
   const double s = (apart.dot(along_a) - cosine * apart.dot(along_b)) / sine2;
   const double t = (cosine * apart.dot(along_a) - apart.dot(along_b)) / sine2;

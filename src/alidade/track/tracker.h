@@ -27,14 +27,14 @@ struct TrackerConfig {
   double resting_sigma_v_m_s = 0.9, resting_tau_s = 0.7;
   Eigen::Vector3d gravity_m_s2 = {0.0, 9.80665, 0.0};  ///< In the world, for ballistic and imm; so where y is down.
   IteratedUpdateConfig update;
-  double gate = 25.0;  ///< On NIS, 2 degrees of freedom: a right sight fails it once in 270 000.
+  double gate = 25.0;  ///< On NIS, 2 degrees of freedom: a right observation fails it once in 270 000.
   double min_depth_m = 0.2, max_depth_m = 20.0;  ///< The rig's working range, along a camera's view.
   int restart_after = 2;  ///< Rejections one after the other, of one head: then it is asked whether another track fits.
   double together_s = 0.06;    ///< Two heads that far apart in time still intersect.
   double start_sigma_m = 1.0;  ///< Or a tenth of the distance, where that is more.
   double start_sigma_v_m_s = 2.0;
-  double history_s = 0.3;       ///< How late a sight may come.
-  std::size_t most_kept = 256;  ///< Sights within history_s; older ones can then no longer be overtaken.
+  double history_s = 0.3;      ///< How late an observation may come.
+  std::size_t max_kept = 256;  ///< Observations within history_s; older ones can then no longer be overtaken.
   /// Of the heads, their lenses and clocks: counted in every σ, and not estimated (Schmidt–Kalman). None: all exact.
   RigUncertainty errors;
   /// Estimate the errors instead: for tests of the rig, whose innovations are then white. Not for imm, which counts.
@@ -46,15 +46,16 @@ enum class TrackEvent {
   waiting,   ///< No track yet: another head is needed to start it.
   start,     ///< Track begun, by intersecting the rays of two heads.
   restart,   ///< Begun anew: the old one did not agree with what was seen.
-  gated,     ///< Sight left out: NIS beyond the gate.
-  depth,     ///< Sight left out: the target would be outside the working range.
-  outside,   ///< Sight left out: its pixel is not in the picture, or not a number.
-  late,      ///< Sight left out: older than the history.
+  gated,     ///< Observation left out: NIS beyond the gate.
+  depth,     ///< Observation left out: the target would be outside the working range.
+  outside,   ///< Observation left out: its pixel is not in the image, or not a number.
+  late,      ///< Observation left out: older than the history.
   one_head,  ///< Used, but only one head has seen the target for a while: its range is drifting.
 };
 [[nodiscard]] std::string_view event_name(TrackEvent event);
 
-/// What became of one sight. The belief is that of the newest capture time so far, position and velocity in the world.
+/// What became of one observation. The belief is that of the newest capture time so far, position and velocity in the
+/// world.
 struct TrackStep {
   double t_s = 0.0;
   bool has_belief = false;
@@ -62,12 +63,12 @@ struct TrackStep {
   TrackEvent event = TrackEvent::waiting;
   bool accepted = false;
   bool has_innovation = false;
-  Innovation innovation;  ///< At the sight's own capture time.
+  Innovation innovation;  ///< At the observation's own capture time.
 };
 
-/// Follows a target in space through the pixels of moving heads, one sight at a time, each at its capture time and
-/// with the angles of that instant, in whatever order they arrive. Allocates nothing once made.
-/// Iterated extended Kalman filter on pixels; docs/maths/tracking.md.
+/// Follows a target in space through the pixels of moving heads, one observation at a time, each at its capture time
+/// and with the angles of that instant, in whatever order they arrive. Allocates nothing once made. Iterated extended
+/// Kalman filter on pixels; docs/maths/tracking.md.
 class Tracker {
  public:
   Tracker(std::vector<RigHead> heads, const TrackerConfig& config);
@@ -75,18 +76,18 @@ class Tracker {
   Tracker(Tracker&&) noexcept;
   Tracker& operator=(Tracker&&) noexcept;
 
-  TrackStep take(const TargetSight& sight);
+  TrackStep take(const TargetObservation& observation);
   /// The newest belief predicted to a time; none before the start, or before the newest capture time.
   [[nodiscard]] std::optional<Belief<6>> at(double t_s) const;
-  /// The belief at the newest capture time that is at least `lag_s` before the last, given all sights since (within the
-  /// history). None before the start, and for imm.
+  /// The belief at the newest capture time that is at least `lag_s` before the last, given all observations since
+  /// (within the history). None before the start, and for imm.
   struct Smoothed {
     double t_s;
     Belief<6> belief;
   };
   [[nodiscard]] std::optional<Smoothed> smoothed(double lag_s) const;
 
-  /// u of the rig's errors as the sights tell it so far, and its covariance. None unless errors are learned.
+  /// u of the rig's errors as the observations tell it so far, and its covariance. None unless errors are learned.
   struct Learned {
     Eigen::VectorXd u;
     Eigen::MatrixXd cov;

@@ -19,7 +19,7 @@ namespace alidade {
 namespace {
 
 using Json = nlohmann::json;
-using testing::sights_of;
+using testing::observations_of;
 
 TrackerConfig config_for(const TrackScene& scene, TrackMethod method = TrackMethod::cv) {
   TrackerConfig config;
@@ -43,8 +43,8 @@ TEST(Tracker, UpdateAgreesWithTheReferenceCase) {
   const double tolerance = given["tol"];
   RigHead head = xiahou_rig()[1];
   head.head.world_from_base.translation = vector_of<3>(given["head_pos"]);
-  const SightModel see(head, Eigen::Vector2d(given["pan"].get<double>(), given["tilt"].get<double>()),
-                       given["sigma_px"], given["sigma_enc_rad"]);
+  const ObservationModel see(head, Eigen::Vector2d(given["pan"].get<double>(), given["tilt"].get<double>()),
+                             given["sigma_px"], given["sigma_enc_rad"]);
   Belief<6> prior;
   prior.x = vector_of<6>(given["X"]);
   prior.P = vector_of<6>(given["P_diag"]).asDiagonal();
@@ -76,8 +76,8 @@ TEST(Tracker, CovarianceStaysPositiveDefinite) {
     TrackScene scene = *track_scenario("C");
     Tracker tracker(scene.heads, config_for(scene, method));
     std::size_t checked = 0;
-    for (const TargetSight& sight : sights_of(scene, 3)) {
-      const TrackStep step = tracker.take(sight);
+    for (const TargetObservation& observation : observations_of(scene, 3)) {
+      const TrackStep step = tracker.take(observation);
       if (!step.has_belief) continue;
       EXPECT_EQ((step.belief.P - step.belief.P.transpose()).norm(), 0.0);
       const SymmetricEigen parts = symmetric_eigen(step.belief.P);
@@ -91,21 +91,22 @@ TEST(Tracker, CovarianceStaysPositiveDefinite) {
 TEST(Tracker, AnyOrderWithinTheHistoryGivesTheSameTrack) {
   for (const TrackMethod method : all_methods) {
     TrackScene scene = *track_scenario("G");
-    std::vector<TargetSight> sights = sights_of(scene, 4);
-    std::ranges::stable_sort(sights, {}, &TargetSight::t_capture_s);
+    std::vector<TargetObservation> observations = observations_of(scene, 4);
+    std::ranges::stable_sort(observations, {}, &TargetObservation::t_capture_s);
     Tracker in_order(scene.heads, config_for(scene, method)), shuffled(scene.heads, config_for(scene, method));
     TrackStep last, last_shuffled;
-    for (const TargetSight& sight : sights) last = in_order.take(sight);
-    std::vector<TargetSight> late = sights;
-    // Each sight of the second head comes 0.2 s late, behind what was seen meanwhile.
-    for (TargetSight& sight : late) sight.t_arrival_s = sight.t_capture_s + (sight.head == 1 ? 0.2 : 0.0);
-    std::ranges::stable_sort(late, {}, &TargetSight::t_arrival_s);
+    for (const TargetObservation& observation : observations) last = in_order.take(observation);
+    std::vector<TargetObservation> late = observations;
+    // Each observation of the second head comes 0.2 s late, behind what was seen meanwhile.
+    for (TargetObservation& observation : late)
+      observation.t_arrival_s = observation.t_capture_s + (observation.head == 1 ? 0.2 : 0.0);
+    std::ranges::stable_sort(late, {}, &TargetObservation::t_arrival_s);
     std::size_t overtaken = 0;
     double newest_s = 0.0;
-    for (const TargetSight& sight : late) {
-      overtaken += sight.t_capture_s < newest_s ? 1u : 0u;
-      newest_s = std::max(newest_s, sight.t_capture_s);
-      last_shuffled = shuffled.take(sight);
+    for (const TargetObservation& observation : late) {
+      overtaken += observation.t_capture_s < newest_s ? 1u : 0u;
+      newest_s = std::max(newest_s, observation.t_capture_s);
+      last_shuffled = shuffled.take(observation);
     }
     EXPECT_GT(overtaken, 300u);
     EXPECT_EQ(last.t_s, last_shuffled.t_s);
@@ -114,16 +115,16 @@ TEST(Tracker, AnyOrderWithinTheHistoryGivesTheSameTrack) {
   }
 }
 
-TEST(Tracker, SightsOlderThanTheHistoryAreLeftOut) {
+TEST(Tracker, ObservationsOlderThanTheHistoryAreLeftOut) {
   const TrackScene scene = *track_scenario("A");
-  const std::vector<TargetSight> sights = sights_of(scene, 1);
+  const std::vector<TargetObservation> observations = observations_of(scene, 1);
   Tracker tracker(scene.heads, config_for(scene));
   TrackStep before;
-  for (std::size_t i = 0; i < 60; ++i) before = tracker.take(sights[i]);
-  const TrackStep after = tracker.take(sights[10]);
+  for (std::size_t i = 0; i < 60; ++i) before = tracker.take(observations[i]);
+  const TrackStep after = tracker.take(observations[10]);
   EXPECT_EQ(after.event, TrackEvent::late);
   EXPECT_EQ(before.belief.x, after.belief.x);
-  TargetSight recent = sights[55];
+  TargetObservation recent = observations[55];
   recent.t_capture_s += 1e-3;
   EXPECT_TRUE(tracker.take(recent).accepted);
 }
@@ -132,13 +133,13 @@ TEST(Tracker, AllocatesNothingOnceMade) {
   for (const TrackMethod method : all_methods) {
     TrackScene scene = *track_scenario("D");
     scene.more_latency_s = {0.0, 0.13};
-    const std::vector<TargetSight> sights = sights_of(scene, 2);
+    const std::vector<TargetObservation> observations = observations_of(scene, 2);
     Tracker tracker(scene.heads, config_for(scene, method));
     const std::size_t before = testing::num_allocations();
     double sum = 0.0;
-    for (const TargetSight& sight : sights) {
-      sum += tracker.take(sight).belief.x[0];
-      if (const auto ahead = tracker.at(sight.t_arrival_s + 0.1)) sum += ahead->x[1];
+    for (const TargetObservation& observation : observations) {
+      sum += tracker.take(observation).belief.x[0];
+      if (const auto ahead = tracker.at(observation.t_arrival_s + 0.1)) sum += ahead->x[1];
       if (const auto smooth = tracker.smoothed(0.1)) sum += smooth->belief.x[2];
     }
     EXPECT_EQ(testing::num_allocations(), before) << method_name(method);
@@ -146,18 +147,18 @@ TEST(Tracker, AllocatesNothingOnceMade) {
   }
 }
 
-TEST(Tracker, LeavesOutWildSightsAndStays) {
+TEST(Tracker, LeavesOutWildObservationsAndStays) {
   const TrackScene scene = *track_scenario("B");
-  std::vector<TargetSight> sights = sights_of(scene, 6);
+  std::vector<TargetObservation> observations = observations_of(scene, 6);
   Tracker tracker(scene.heads, config_for(scene));
   std::size_t wild = 0, gated = 0;
   double worst_m = 0.0;
-  for (std::size_t i = 0; i < sights.size(); ++i) {
-    TargetSight sight = sights[i];
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    TargetObservation observation = observations[i];
     const bool is_wild = i > 40 && i % 7 == 0;
-    if (is_wild) sight.px.x() = 320.0 - sight.px.x();  // another thing in the picture
-    if (is_wild && std::abs(sight.px.x() - sights[i].px.x()) < 15.0) sight.px.x() += 20.0;
-    const TrackStep step = tracker.take(sight);
+    if (is_wild) observation.px.x() = 320.0 - observation.px.x();  // another thing in the image
+    if (is_wild && std::abs(observation.px.x() - observations[i].px.x()) < 15.0) observation.px.x() += 20.0;
+    const TrackStep step = tracker.take(observation);
     wild += is_wild ? 1u : 0u;
     gated += is_wild && step.event == TrackEvent::gated ? 1u : 0u;
     EXPECT_NE(step.event, TrackEvent::restart);
@@ -175,11 +176,11 @@ TEST(Tracker, BeginsAnewWhereTheTargetJumped) {
   Tracker tracker(scene.heads, config_for(scene));
   std::size_t restarts = 0;
   double found_s = 1e9;
-  for (const TargetSight& sight : sights_of(scene, 1)) {
-    const TrackStep step = tracker.take(sight);
+  for (const TargetObservation& observation : observations_of(scene, 1)) {
+    const TrackStep step = tracker.take(observation);
     restarts += step.event == TrackEvent::restart ? 1u : 0u;
-    if (sight.t_capture_s >= 3.0 && (step.belief.x.head<3>() - scene.position(step.t_s)).norm() < 0.05)
-      found_s = std::min(found_s, sight.t_capture_s);
+    if (observation.t_capture_s >= 3.0 && (step.belief.x.head<3>() - scene.position(step.t_s)).norm() < 0.05)
+      found_s = std::min(found_s, observation.t_capture_s);
   }
   EXPECT_EQ(restarts, 1u);
   EXPECT_LE(found_s, 3.0 + 0.051);
@@ -204,7 +205,7 @@ TEST(Tracker, ABallInFlightIsPredictedWithinItsSigma) {
     for (std::uint64_t seed = 1; seed <= 30; ++seed) {
       Tracker tracker(scene.heads, config);
       TrackStep last;
-      for (const TargetSight& sight : sights_of(scene, seed)) last = tracker.take(sight);
+      for (const TargetObservation& observation : observations_of(scene, seed)) last = tracker.take(observation);
       const auto ahead = tracker.at(last.t_s + 0.3);
       ASSERT_TRUE(ahead);
       const Eigen::Vector3d error = ahead->x.head<3>() - scene.position(last.t_s + 0.3);
@@ -221,21 +222,21 @@ TEST(Tracker, ABallInFlightIsPredictedWithinItsSigma) {
 
 TEST(Tracker, OneHeadStartsNoTrackAndIsNamedLater) {
   TrackScene scene = *track_scenario("A");
-  std::vector<TargetSight> sights = sights_of(scene, 1);
+  std::vector<TargetObservation> observations = observations_of(scene, 1);
   Tracker alone(scene.heads, config_for(scene));
-  for (const TargetSight& sight : sights) {
-    if (sight.head != 0) continue;
-    EXPECT_EQ(alone.take(sight).event, TrackEvent::waiting);
+  for (const TargetObservation& observation : observations) {
+    if (observation.head != 0) continue;
+    EXPECT_EQ(alone.take(observation).event, TrackEvent::waiting);
   }
   EXPECT_FALSE(alone.at(20.0));
   Tracker tracker(scene.heads, config_for(scene));
-  for (const TargetSight& sight : sights) {
-    if (sight.head == 1 && sight.t_capture_s > 3.0) continue;
-    const TrackStep step = tracker.take(sight);
-    if (sight.t_capture_s > 6.0) break;  // what is left of the range then is soon outside the working range
-    if (sight.t_capture_s > 3.6) {
-      EXPECT_EQ(step.event, TrackEvent::one_head) << sight.t_capture_s;
-    } else if (sight.t_capture_s > 0.1 && sight.t_capture_s < 3.4) {
+  for (const TargetObservation& observation : observations) {
+    if (observation.head == 1 && observation.t_capture_s > 3.0) continue;
+    const TrackStep step = tracker.take(observation);
+    if (observation.t_capture_s > 6.0) break;  // what is left of the range then is soon outside the working range
+    if (observation.t_capture_s > 3.6) {
+      EXPECT_EQ(step.event, TrackEvent::one_head) << observation.t_capture_s;
+    } else if (observation.t_capture_s > 0.1 && observation.t_capture_s < 3.4) {
       EXPECT_EQ(step.event, TrackEvent::none);
     }
   }
@@ -244,22 +245,22 @@ TEST(Tracker, OneHeadStartsNoTrackAndIsNamedLater) {
 TEST(Tracker, WrongNumbersAreLeftOut) {
   const TrackScene scene = *track_scenario("A");
   Tracker tracker(scene.heads, config_for(scene));
-  const std::vector<TargetSight> sights = sights_of(scene, 1);
-  for (std::size_t i = 0; i < 20; ++i) EXPECT_NE(tracker.take(sights[i]).event, TrackEvent::outside);
+  const std::vector<TargetObservation> observations = observations_of(scene, 1);
+  for (std::size_t i = 0; i < 20; ++i) EXPECT_NE(tracker.take(observations[i]).event, TrackEvent::outside);
   const double nan = std::nan("");
-  TargetSight bad = sights[20];
+  TargetObservation bad = observations[20];
   for (const Eigen::Vector2d& px :
        {Eigen::Vector2d(nan, 1.0), Eigen::Vector2d(-3.0, 1.0), Eigen::Vector2d(1.0, 240.0)}) {
     bad.px = px;
     EXPECT_EQ(tracker.take(bad).event, TrackEvent::outside);
   }
-  bad = sights[20];
+  bad = observations[20];
   bad.pan_tilt_rad.x() = nan;
   EXPECT_EQ(tracker.take(bad).event, TrackEvent::outside);
-  bad = sights[20];
+  bad = observations[20];
   bad.head = 7;
   EXPECT_EQ(tracker.take(bad).event, TrackEvent::outside);
-  EXPECT_TRUE(tracker.take(sights[20]).accepted);
+  EXPECT_TRUE(tracker.take(observations[20]).accepted);
 }
 
 using Row = std::array<double, 9>;  // arrival, capture, head, pan, tilt at capture, pan, tilt at arrival, du, dv
@@ -291,9 +292,9 @@ double rms_of_circle_mm(const std::vector<Row>& rows, TrackMethod method, double
   double sum2 = 0.0, num = 0.0;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Row& r = rows[i];
-    TargetSight sight{r[1], r[0], r[2] > 1.5 ? 1u : 0u, {r[3], r[4]}, {160.0 + r[7], 120.0 + r[8]}};
-    if (ignores_latency) sight.t_capture_s = r[0], sight.pan_tilt_rad = {r[5], r[6]};
-    (void)tracker.take(sight);
+    TargetObservation observation{r[1], r[0], r[2] > 1.5 ? 1u : 0u, {r[3], r[4]}, {160.0 + r[7], 120.0 + r[8]}};
+    if (ignores_latency) observation.t_capture_s = r[0], observation.pan_tilt_rad = {r[5], r[6]};
+    (void)tracker.take(observation);
     if ((i + 1 < rows.size() && rows[i + 1][0] < r[0] + 1e-9) || r[0] < 0.6 - 1e-9) continue;
     const double angle = 2.0 * std::acos(-1.0) * r[0] / 3.0;
     const Eigen::Vector3d there(0.173 + 0.2 * (std::cos(angle) - 1.0), -0.314 + 0.2 * std::sin(angle), 0.636);
@@ -324,9 +325,9 @@ TEST(Tracker, SmoothingWithinTheLagLowersTheError) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     Tracker tracker(scene.heads, config_for(scene));
     std::vector<std::pair<double, double>> errors;
-    for (const TargetSight& sight : sights_of(scene, seed)) {
-      const TrackStep step = tracker.take(sight);
-      if (sight.t_capture_s < 1.0) continue;
+    for (const TargetObservation& observation : observations_of(scene, seed)) {
+      const TrackStep step = tracker.take(observation);
+      if (observation.t_capture_s < 1.0) continue;
       const auto smooth = tracker.smoothed(0.2);
       ASSERT_TRUE(smooth);
       EXPECT_GE(step.t_s - smooth->t_s, 0.2 - 1e-12);

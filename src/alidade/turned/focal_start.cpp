@@ -18,10 +18,10 @@ struct LinkPoints {
 };
 
 LinkPoints points_of(const MatchedPhotos& photos, const PhotoLink& link) {
-  constexpr std::size_t most_points = 100;
+  constexpr std::size_t max_points = 100;
   const PhotoScale scale(photos);
   const MatchedPair& pair = photos.pairs[link.pair];
-  const std::size_t step = std::max<std::size_t>(1, link.inliers.size() / most_points);
+  const std::size_t step = std::max<std::size_t>(1, link.inliers.size() / max_points);
   LinkPoints points;
   for (std::size_t i = 0; i < link.inliers.size(); i += step) {
     const FeatureMatch& match = pair.matches[static_cast<std::size_t>(link.inliers[i])];
@@ -68,10 +68,10 @@ Turn robust_turn(const LinkPoints& points, double focal) {
 
 std::vector<FocalStart> focal_starts(const MatchedPhotos& photos, const std::vector<PhotoLink>& links,
                                      std::size_t most) {
-  constexpr std::size_t most_links = 60;  // tell the focal length; the rotations come from all
+  constexpr std::size_t max_links = 60;  // tell the focal length; the rotations come from all
   std::vector<LinkPoints> points;
   for (const PhotoLink& link : links) points.push_back(points_of(photos, link));
-  const std::size_t step = (links.size() + most_links - 1) / most_links;
+  const std::size_t step = (links.size() + max_links - 1) / max_links;
   std::vector<FocalStart> tried;
   for (double focal = 0.25; focal < 60.0; focal *= 1.05) {
     FocalStart start{focal, 0.0, {}};

@@ -16,14 +16,15 @@ struct Misfit {
 
 using PairMisfits = std::map<std::pair<int, int>, std::vector<Misfit>>;
 
-/// Of the tracks' neighbouring sights.
+/// Of the tracks' neighbouring observations.
 PairMisfits misfits_of(const TurnedFit& fit) {
   PairMisfits misfits;
   const TurnedBundle& bundle = fit.bundle;
-  for (std::size_t i = 0; i < bundle.sights.size(); ++i) {
-    for (std::size_t j = i + 1; j < bundle.sights.size() && bundle.sights[j].track == bundle.sights[i].track; ++j) {
-      const bool in_order = bundle.sights[i].photo < bundle.sights[j].photo;
-      const TurnedSight &from = bundle.sights[in_order ? i : j], &to = bundle.sights[in_order ? j : i];
+  for (std::size_t i = 0; i < bundle.observations.size(); ++i) {
+    for (std::size_t j = i + 1;
+         j < bundle.observations.size() && bundle.observations[j].track == bundle.observations[i].track; ++j) {
+      const bool in_order = bundle.observations[i].photo < bundle.observations[j].photo;
+      const TurnedDetection &from = bundle.observations[in_order ? i : j], &to = bundle.observations[in_order ? j : i];
       const auto a = static_cast<std::size_t>(from.photo), b = static_cast<std::size_t>(to.photo);
       const auto ray = turned_ray(bundle.camera, bundle.log_zoom[a], from.px);
       if (!ray) continue;
@@ -68,12 +69,12 @@ Anisotropy along_lines(const std::vector<Misfit>& misfits, const Eigen::Vector3d
 }  // namespace
 
 ParallaxTest parallax_of(const TurnedFit& fit) {
-  constexpr std::size_t least_matches = 20;
+  constexpr std::size_t min_matches = 20;
   const std::vector<Eigen::Vector3d> steps = directions();
   ParallaxTest test;
   double squares = 0.0, turns = 0.0, count = 0.0;
   for (const auto& [photos, misfits] : misfits_of(fit)) {
-    if (misfits.size() < least_matches) continue;
+    if (misfits.size() < min_matches) continue;
     Anisotropy most;
     for (const Eigen::Vector3d& step : steps) {
       const Anisotropy each = along_lines(misfits, step);

@@ -10,8 +10,8 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t least_inliers = 8;
-constexpr double least_share = 0.1;
+constexpr std::size_t min_inliers = 8;
+constexpr double min_share = 0.1;
 constexpr double agree_within = 0.0022, agree_within_px = 1.5;  // of the width; the lens bends, hands shake
 constexpr double same_within_px = 0.05;
 
@@ -19,7 +19,7 @@ constexpr double same_within_px = 0.05;
 PhotoLink link_of_pair(const MatchedPhotos& photos, std::size_t index) {
   const MatchedPair& pair = photos.pairs[index];
   PhotoLink link{pair.photo_a, pair.photo_b, index, {}, Eigen::Matrix3d::Identity(), false};
-  if (pair.matches.size() < least_inliers) return link;
+  if (pair.matches.size() < min_inliers) return link;
   const PhotoScale scale(photos);
   std::vector<cv::Point2d> a, b;
   std::size_t still = 0;
@@ -49,9 +49,9 @@ PhotoLink link_of_pair(const MatchedPhotos& photos, std::size_t index) {
     if (fits[i]) link.inliers.push_back(static_cast<int>(i));
   }
   const auto share = static_cast<double>(link.inliers.size()) / static_cast<double>(pair.matches.size());
-  if (link.inliers.size() < least_inliers || share < least_share) link.inliers.clear();
+  if (link.inliers.size() < min_inliers || share < min_share) link.inliers.clear();
   constexpr double nearly_all = 0.8;
-  link.is_same_picture = static_cast<double>(still) > nearly_all * static_cast<double>(pair.matches.size());
+  link.is_same_image = static_cast<double>(still) > nearly_all * static_cast<double>(pair.matches.size());
   return link;
 }
 

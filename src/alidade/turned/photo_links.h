@@ -13,10 +13,10 @@ struct PhotoLink {
   std::size_t pair = 0;                                    ///< In MatchedPhotos::pairs.
   std::vector<int> inliers;                                ///< Of the pair's matches.
   Eigen::Matrix3d b_from_a = Eigen::Matrix3d::Identity();  ///< The homography, normalised pixels.
-  bool is_same_picture = false;                            ///< Every point stands where it stood.
+  bool is_same_image = false;                              ///< Every point stands where it stood.
 };
 
-/// Normalised pixels: middle of the picture 0, half its width 1.
+/// Normalised pixels: middle of the image 0, half its width 1.
 struct PhotoScale {
   double half_width_px = 1.0;
   Eigen::Vector2d middle_px = Eigen::Vector2d::Zero();
@@ -29,7 +29,7 @@ struct PhotoScale {
 /// image stitching using invariant features", 2007, section 3. Throws Interrupted.
 [[nodiscard]] std::vector<PhotoLink> find_links(const MatchedPhotos& photos, const Progress& progress = {});
 
-/// The largest set of photos that links join, with no link through the same picture twice; the photo with most links
+/// The largest set of photos that links join, with no link through the same image twice; the photo with most links
 /// first, the others in the order of a tree of the strongest links. `link_of[i]`: the link by which photo i joins one
 /// before it; −1 for the first.
 struct PhotoTree {

@@ -40,12 +40,12 @@ class FeatureSets {
   std::vector<std::vector<Node>> members_;
 };
 
-/// The mean direction in which the sights of [first, last) say that their point is; zero where one has no ray.
+/// The mean direction in which the observations of [first, last) say that their point is; zero where one has no ray.
 Eigen::Vector3d mean_ray(const TurnedBundle& bundle, std::size_t first, std::size_t last) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t i = first; i < last; ++i) {
-    const auto photo = static_cast<std::size_t>(bundle.sights[i].photo);
-    const auto ray = turned_ray(bundle.camera, bundle.log_zoom[photo], bundle.sights[i].px);
+    const auto photo = static_cast<std::size_t>(bundle.observations[i].photo);
+    const auto ray = turned_ray(bundle.camera, bundle.log_zoom[photo], bundle.observations[i].px);
     if (!ray) return Eigen::Vector3d::Zero();
     sum += bundle.cam_from_world[photo].transpose() * *ray;
   }
@@ -103,21 +103,21 @@ std::size_t set_tracks(const MatchedPhotos& photos, const std::vector<KeptMatch>
     const FeatureMatch& match = pair.matches[static_cast<std::size_t>(kept.match)];
     joined += sets.join({pair.photo_a, match.a}, {pair.photo_b, match.b}) ? 1u : 0u;
   }
-  bundle.sights.clear();
+  bundle.observations.clear();
   bundle.rays.clear();
   for (const auto& set : sets.sets()) {
     if (set.size() < 2) continue;
-    const std::size_t first = bundle.sights.size();
+    const std::size_t first = bundle.observations.size();
     for (const auto& [photo, feature] : set) {
       const Eigen::Vector2d& px = photos.features[static_cast<std::size_t>(photo)][static_cast<std::size_t>(feature)];
-      bundle.sights.push_back(
+      bundle.observations.push_back(
           {bundle_place[static_cast<std::size_t>(photo)], static_cast<int>(bundle.rays.size()), scale.normalised(px)});
     }
-    const Eigen::Vector3d ray = mean_ray(bundle, first, bundle.sights.size());
+    const Eigen::Vector3d ray = mean_ray(bundle, first, bundle.observations.size());
     if (ray.norm() > 0.0) {
       bundle.rays.push_back(ray);
     } else {
-      bundle.sights.resize(first);
+      bundle.observations.resize(first);
     }
   }
   return joined;
@@ -126,25 +126,25 @@ std::size_t set_tracks(const MatchedPhotos& photos, const std::vector<KeptMatch>
 std::size_t leave_out(const std::vector<Eigen::Vector2d>& residuals, double gate, TurnedBundle& bundle) {
   const std::vector<double> norms = freed_norms(bundle, residuals);
   TurnedBundle kept = bundle;
-  kept.sights.clear();
+  kept.observations.clear();
   kept.rays.clear();
-  for (std::size_t i = 0; i < bundle.sights.size();) {
+  for (std::size_t i = 0; i < bundle.observations.size();) {
     std::size_t end = i, worst = i;
-    for (; end < bundle.sights.size() && bundle.sights[end].track == bundle.sights[i].track; ++end) {
+    for (; end < bundle.observations.size() && bundle.observations[end].track == bundle.observations[i].track; ++end) {
       if (!(norms[end] <= norms[worst])) worst = end;
     }
     const bool is_out = !(norms[worst] <= gate);
     if (end - i - (is_out ? 1u : 0u) >= 2) {
       for (std::size_t j = i; j < end; ++j) {
         if (is_out && j == worst) continue;
-        kept.sights.push_back(bundle.sights[j]);
-        kept.sights.back().track = static_cast<int>(kept.rays.size());
+        kept.observations.push_back(bundle.observations[j]);
+        kept.observations.back().track = static_cast<int>(kept.rays.size());
       }
-      kept.rays.push_back(bundle.rays[static_cast<std::size_t>(bundle.sights[i].track)]);
+      kept.rays.push_back(bundle.rays[static_cast<std::size_t>(bundle.observations[i].track)]);
     }
     i = end;
   }
-  const std::size_t out = bundle.sights.size() - kept.sights.size();
+  const std::size_t out = bundle.observations.size() - kept.observations.size();
   bundle = std::move(kept);
   return out;
 }

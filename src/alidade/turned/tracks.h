@@ -19,13 +19,13 @@ struct KeptMatch {
 [[nodiscard]] std::vector<KeptMatch> explained_matches(const MatchedPhotos& photos, const TurnedBundle& bundle,
                                                        const std::vector<int>& bundle_place, double gate);
 
-/// Joins matches to tracks and gives the bundle their sights and rays. A match that would put a point at two places of
-/// one photo is left out. Returns the number of matches that take part.
+/// Joins matches to tracks and gives the bundle their observations and rays. A match that would put a point at two
+/// places of one photo is left out. Returns the number of matches that take part.
 std::size_t set_tracks(const MatchedPhotos& photos, const std::vector<KeptMatch>& matches,
                        const std::vector<int>& bundle_place, TurnedBundle& bundle);
 
-/// Leaves out sights whose freed residual is beyond `gate` (normalised), the worst of a track at a time, and tracks
-/// that fewer than two photos show. Returns how many sights went.
+/// Leaves out observations whose freed residual is beyond `gate` (normalised), the worst of a track at a time, and
+/// tracks that fewer than two photos show. Returns how many observations went.
 std::size_t leave_out(const std::vector<Eigen::Vector2d>& residuals, double gate, TurnedBundle& bundle);
 
 }  // namespace alidade

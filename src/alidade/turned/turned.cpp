@@ -12,7 +12,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t least_photos = 3;
+constexpr std::size_t min_photos = 3;
 constexpr double ordinary_parallax = 0.003;  // 5 mm of lever at 1.7 m, 5 cm at 17 m
 constexpr double zoom_is_other = 0.02;       // a photo's focal length differs by so much: not the camera of the others
 
@@ -33,22 +33,22 @@ class TurnedRun {
 
   TurnedReport run() {
     links_ = find_links(photos_, progress_);
-    leave_out_same_pictures();
+    leave_out_same_images();
     tree_ = largest_tree(photos_.names.size(), links_);
     name_unconnected();
-    if (tree_.photos.size() < least_photos) return std::move(report_);
+    if (tree_.photos.size() < min_photos) return std::move(report_);
     fit();
     if (report_.status == TurnedReport::Status::too_few_photos) judge();
     return std::move(report_);
   }
 
  private:
-  /// A picture that is there twice says nothing the second time, and says it without noise.
-  void leave_out_same_pictures() {
+  /// An image that is there twice says nothing the second time, and says it without noise.
+  void leave_out_same_images() {
     std::vector<bool> is_same(photos_.names.size(), false);
     for (const PhotoLink& link : links_) {
       const auto a = static_cast<std::size_t>(link.photo_a), b = static_cast<std::size_t>(link.photo_b);
-      if (!link.is_same_picture || is_same[a]) continue;
+      if (!link.is_same_image || is_same[a]) continue;
       is_same[b] = true;
       report_.photos[b].reason = "is the same picture as " + photos_.names[a];
       ++num_same_;
@@ -145,12 +145,12 @@ class TurnedRun {
     note_fit();
     count_matches();
     if (report_.status == TurnedReport::Status::no_convergence) return;
-    constexpr double least_turn = 0.5 * degree, least_kept = 0.5;
-    if (report_.largest_turn_rad < least_turn) {
+    constexpr double min_turn = 0.5 * degree, min_kept = 0.5;
+    if (report_.largest_turn_rad < min_turn) {
       report_.status = TurnedReport::Status::no_turn;
       return;
     }
-    if (static_cast<double>(report_.num_kept) < least_kept * static_cast<double>(num_agreeing_)) {
+    if (static_cast<double>(report_.num_kept) < min_kept * static_cast<double>(num_agreeing_)) {
       report_.status = TurnedReport::Status::moved;
       return;
     }
@@ -158,10 +158,10 @@ class TurnedRun {
     test_photos_zooms();
     hold();
     const double f = report_.camera[0];
-    constexpr double most_focal = 0.05, most_centre = 0.05;
+    constexpr double max_focal = 0.05, max_centre = 0.05;
     const Eigen::VectorXd sigma = report_.cov.diagonal().cwiseSqrt();
-    const bool is_told = sigma.allFinite() && sigma.head<2>().maxCoeff() < most_focal * f &&
-                         sigma.segment<2>(2).maxCoeff() < most_centre * photos_.width_px;
+    const bool is_told = sigma.allFinite() && sigma.head<2>().maxCoeff() < max_focal * f &&
+                         sigma.segment<2>(2).maxCoeff() < max_centre * photos_.width_px;
     report_.status = is_told ? TurnedReport::Status::ok : TurnedReport::Status::weak;
   }
 
@@ -180,15 +180,15 @@ class TurnedRun {
     for (TurnedPhoto& photo : report_.photos) photo.num_points = 0;
     report_.largest_turn_rad = 0.0;
     std::vector<double> squares(count, 0.0);
-    for (std::size_t i = 0; i < fit_.bundle.sights.size(); ++i) {
-      const auto k = static_cast<std::size_t>(fit_.bundle.sights[i].photo);
+    for (std::size_t i = 0; i < fit_.bundle.observations.size(); ++i) {
+      const auto k = static_cast<std::size_t>(fit_.bundle.observations[i].photo);
       ++photo_at(k).num_points;
       squares[k] += fit_.solution.residuals[i].squaredNorm();
     }
     for (std::size_t k = 0; k < count; ++k) {
       TurnedPhoto& photo = photo_at(k);
-      constexpr int least_points = 6;
-      photo.is_used = photo.num_points >= least_points;
+      constexpr int min_points = 6;
+      photo.is_used = photo.num_points >= min_points;
       if (photo.is_used) photo.reason.clear();
       if (!photo.is_used) photo.reason = "agrees with others, but not with one camera that turned";
       photo.rms_px = scale_.half_width_px * std::sqrt(squares[k] / std::max(photo.num_points, 1));

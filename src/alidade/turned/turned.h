@@ -10,7 +10,7 @@ namespace alidade {
 
 struct TurnedConfig {
   bool square_pixels = false;  ///< fx = fy.
-  bool fixed_centre = false;   ///< cx, cy: the start's, else the picture's middle.
+  bool fixed_centre = false;   ///< cx, cy: the start's, else the image's middle.
   /// fx / fy and the centre are what cameras ordinarily have, within a σ that is counted; false: nothing is known.
   bool ordinary_aspect = true, ordinary_centre = true;
   int lens_terms = 2;                    ///< Radial distortion: none, k1, or k1 and k2.
@@ -55,7 +55,7 @@ struct TurnedReport {
   std::vector<TurnedPhoto> photos;
   TurnedBundle bundle;  ///< Normalised; its photos are `bundle_photo`.
   std::vector<int> bundle_photo;
-  std::vector<Eigen::Vector2d> residuals;  ///< Normalised, one a sight.
+  std::vector<Eigen::Vector2d> residuals;  ///< Normalised, one an observation.
   Eigen::Matrix<double, 6, 1> camera;      ///< fx, fy, cx, cy [px], k1, k2.
   Eigen::Matrix<double, 6, 6> cov, cov_model;
   int lens_terms = 0;  ///< That are estimated; what the others might be is counted in `cov`.

@@ -18,7 +18,7 @@ using ByPhoto = Eigen::Matrix<double, 2, per_photo>;
 
 /// A track's part of the normal equations: its ray (two directions across it), and what that shares with the rest.
 struct TrackBlock {
-  std::size_t first = 0, last = 0;  ///< Its sights.
+  std::size_t first = 0, last = 0;  ///< Its observations.
   Eigen::Matrix<double, 3, 2> across;
   Eigen::Matrix2d information, inverse;
   Eigen::Vector2d gradient;
@@ -47,10 +47,10 @@ class TurnedSystem {
       information_(at + 3, at + 3) += zoom;
       if (!is_held && zoom < held) gradient_[at + 3] += zoom * bundle.log_zoom[k];
     }
-    by_photo_.resize(bundle.sights.size());
-    for (std::size_t i = 0; i < bundle.sights.size();) {
+    by_photo_.resize(bundle.observations.size());
+    for (std::size_t i = 0; i < bundle.observations.size();) {
       std::size_t end = i;
-      while (end < bundle.sights.size() && bundle.sights[end].track == bundle.sights[i].track) ++end;
+      while (end < bundle.observations.size() && bundle.observations[end].track == bundle.observations[i].track) ++end;
       add_track(i, end);
       i = end;
     }
@@ -77,9 +77,9 @@ class TurnedSystem {
     for (const TrackBlock& block : blocks_) {
       Eigen::Vector2d right = block.gradient + block.by_camera * step.head<num_camera>();
       for (std::size_t i = block.first; i < block.last; ++i) {
-        right += by_photo_[i] * step.segment<per_photo>(place_of(bundle_.sights[i].photo));
+        right += by_photo_[i] * step.segment<per_photo>(place_of(bundle_.observations[i].photo));
       }
-      Eigen::Vector3d& ray = next.rays[static_cast<std::size_t>(bundle_.sights[block.first].track)];
+      Eigen::Vector3d& ray = next.rays[static_cast<std::size_t>(bundle_.observations[block.first].track)];
       ray = (ray - block.across * (block.inverse * right)).normalized();
     }
     return next;
@@ -88,27 +88,27 @@ class TurnedSystem {
  private:
   void add_track(std::size_t first, std::size_t last) {
     TrackBlock block{first, last, {}, {}, {}, {}, {}};
-    const Eigen::Vector3d& ray = bundle_.rays[static_cast<std::size_t>(bundle_.sights[first].track)];
+    const Eigen::Vector3d& ray = bundle_.rays[static_cast<std::size_t>(bundle_.observations[first].track)];
     block.across = two_across(ray);
     block.information.setZero();
     block.gradient.setZero();
     block.by_camera.setZero();
-    for (std::size_t i = first; i < last; ++i) add_sight(i, ray, block);
+    for (std::size_t i = first; i < last; ++i) add_observation(i, ray, block);
     block.information.diagonal().array() += 1e-9;  // a point that nobody sees stays where it is
     blocks_.push_back(block);
   }
 
-  void add_sight(std::size_t i, const Eigen::Vector3d& ray, TrackBlock& block) {
-    const TurnedSight& sight = bundle_.sights[i];
+  void add_observation(std::size_t i, const Eigen::Vector3d& ray, TrackBlock& block) {
+    const TurnedDetection& observation = bundle_.observations[i];
     by_photo_[i].setZero();
-    if (sight.photo == without_) return;
-    const auto photo = static_cast<std::size_t>(sight.photo);
+    if (observation.photo == without_) return;
+    const auto photo = static_cast<std::size_t>(observation.photo);
     TurnedPrediction seen;
     if (!predict_turned(bundle_.camera, bundle_.cam_from_world[photo], bundle_.log_zoom[photo], ray, seen)) return;
-    const Eigen::Vector2d residual = seen.px - sight.px;
+    const Eigen::Vector2d residual = seen.px - observation.px;
     const double weight =
         huber_weight(residual.norm() / config_.sigma_px, config_.huber) / (config_.sigma_px * config_.sigma_px);
-    const auto at = place_of(sight.photo);
+    const auto at = place_of(observation.photo);
     const ByCamera c = weight * seen.J_camera;
     const ByPhoto p = weight * seen.J_photo;
     information_.topLeftCorner<num_camera, num_camera>().noalias() += seen.J_camera.transpose() * c;
@@ -132,12 +132,12 @@ class TurnedSystem {
     normal.information.topLeftCorner<num_camera, num_camera>().noalias() -= block.by_camera.transpose() * camera_gain;
     normal.gradient.head<num_camera>().noalias() -= block.by_camera.transpose() * gain;
     for (std::size_t i = block.first; i < block.last; ++i) {
-      const auto at = place_of(bundle_.sights[i].photo);
+      const auto at = place_of(bundle_.observations[i].photo);
       normal.gradient.segment<per_photo>(at).noalias() -= by_photo_[i].transpose() * gain;
       normal.information.block<per_photo, num_camera>(at, 0).noalias() -= by_photo_[i].transpose() * camera_gain;
       const ByPhoto photo_gain = block.inverse * by_photo_[i];
       for (std::size_t j = block.first; j < block.last; ++j) {
-        const auto row = place_of(bundle_.sights[j].photo);
+        const auto row = place_of(bundle_.observations[j].photo);
         if (row < at) continue;
         normal.information.block<per_photo, per_photo>(row, at).noalias() -= by_photo_[j].transpose() * photo_gain;
       }
@@ -151,22 +151,22 @@ class TurnedSystem {
   Eigen::MatrixXd information_;
   Eigen::VectorXd gradient_;
   std::vector<TrackBlock> blocks_;
-  std::vector<ByPhoto> by_photo_;  ///< A sight's ray by its photo's parameters.
+  std::vector<ByPhoto> by_photo_;  ///< An observation's ray by its photo's parameters.
 };
 
 /// Twice the negative log-likelihood, Huber's; a point without a pixel counts as `outside`.
 double cost_of(const TurnedBundle& bundle, const TurnedPrior& prior, const TurnedSolveConfig& config) {
-  constexpr double least_focal = 0.05;
-  if (!(bundle.camera.head<2>().minCoeff() > least_focal)) return std::numeric_limits<double>::infinity();
+  constexpr double min_focal = 0.05;
+  if (!(bundle.camera.head<2>().minCoeff() > min_focal)) return std::numeric_limits<double>::infinity();
   const TurnedCamera offset = bundle.camera - prior.mean;
   double cost = offset.dot(prior.information * offset);
   for (const double zoom : bundle.log_zoom)
     cost += prior.zoom_information < held ? prior.zoom_information * zoom * zoom : 0.0;
-  for (const TurnedSight& sight : bundle.sights) {
-    const auto photo = static_cast<std::size_t>(sight.photo);
+  for (const TurnedDetection& observation : bundle.observations) {
+    const auto photo = static_cast<std::size_t>(observation.photo);
     const auto px = turned_pixel(bundle.camera, bundle.cam_from_world[photo], bundle.log_zoom[photo],
-                                 bundle.rays[static_cast<std::size_t>(sight.track)]);
-    cost += huber_cost(px ? std::min((*px - sight.px).norm() / config.sigma_px, 1e6) : outside, config.huber);
+                                 bundle.rays[static_cast<std::size_t>(observation.track)]);
+    cost += huber_cost(px ? std::min((*px - observation.px).norm() / config.sigma_px, 1e6) : outside, config.huber);
   }
   return cost;
 }
@@ -198,19 +198,19 @@ TurnedSolution solve_turned(TurnedBundle& bundle, const TurnedPrior& prior, cons
       is_lower = cost <= solution.cost;
       if (!is_lower) continue;
       damping = std::max(damping * 1e-2, 1e-12);
-      solution.converged = solution.cost - cost < config.least_gain * (1.0 + cost);
+      solution.converged = solution.cost - cost < config.min_gain * (1.0 + cost);
       solution.cost = cost;
       bundle = std::move(next);
     }
     if (!is_lower) solution.converged = true;  // the bottom, but for rounding
   }
-  solution.residuals.reserve(bundle.sights.size());
-  for (const TurnedSight& sight : bundle.sights) {
-    const auto photo = static_cast<std::size_t>(sight.photo);
+  solution.residuals.reserve(bundle.observations.size());
+  for (const TurnedDetection& observation : bundle.observations) {
+    const auto photo = static_cast<std::size_t>(observation.photo);
     const auto px = turned_pixel(bundle.camera, bundle.cam_from_world[photo], bundle.log_zoom[photo],
-                                 bundle.rays[static_cast<std::size_t>(sight.track)]);
+                                 bundle.rays[static_cast<std::size_t>(observation.track)]);
     solution.residuals.push_back(
-        px ? Eigen::Vector2d(*px - sight.px)
+        px ? Eigen::Vector2d(*px - observation.px)
            : Eigen::Vector2d(Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN())));
   }
   return solution;
@@ -218,9 +218,10 @@ TurnedSolution solve_turned(TurnedBundle& bundle, const TurnedPrior& prior, cons
 
 std::vector<double> freed_norms(const TurnedBundle& bundle, const std::vector<Eigen::Vector2d>& residuals) {
   std::vector<double> seen(bundle.rays.size(), 0.0), norms;
-  for (const TurnedSight& sight : bundle.sights) seen[static_cast<std::size_t>(sight.track)] += 1.0;
+  for (const TurnedDetection& observation : bundle.observations)
+    seen[static_cast<std::size_t>(observation.track)] += 1.0;
   for (std::size_t i = 0; i < residuals.size(); ++i) {
-    const double m = std::max(seen[static_cast<std::size_t>(bundle.sights[i].track)], 2.0);
+    const double m = std::max(seen[static_cast<std::size_t>(bundle.observations[i].track)], 2.0);
     norms.push_back(residuals[i].norm() / std::sqrt(1.0 - 1.0 / m));
   }
   return norms;

@@ -8,18 +8,18 @@
 namespace alidade {
 
 /// One point as one photo shows it.
-struct TurnedSight {
+struct TurnedDetection {
   int photo = 0, track = 0;
   Eigen::Vector2d px;  ///< Normalised.
 };
 
-/// Photos of a turned camera, adjusted together. The sights stand track by track.
+/// Photos of a turned camera, adjusted together. The observations stand track by track.
 struct TurnedBundle {
   TurnedCamera camera;
   std::vector<Eigen::Matrix3d> cam_from_world;  ///< One a photo. The first photo's is held: the world is free to turn.
   std::vector<double> log_zoom;                 ///< One a photo, the first one's is held.
   std::vector<Eigen::Vector3d> rays;            ///< One a track, unit length, in the world.
-  std::vector<TurnedSight> sights;
+  std::vector<TurnedDetection> observations;
 };
 
 /// The rotation from one photo's camera to another's.
@@ -39,7 +39,7 @@ struct TurnedSolveConfig {
   double sigma_px = 1e-3;  ///< Normalised, of a coordinate.
   double huber = 2.0;      ///< In σ of a residual.
   int max_iterations = 50;
-  double least_gain = 1e-8;  ///< Of the cost, as a share: less is the bottom.
+  double min_gain = 1e-8;  ///< Of the cost, as a share: less is the bottom.
 };
 
 /// Normal equations of camera and photos, the tracks' rays eliminated. Order: camera, then `per_photo` a photo.
@@ -48,7 +48,7 @@ struct TurnedNormal {
   Eigen::VectorXd gradient;
 };
 
-/// Of what `bundle` holds at its place, in units of 1/σ²; without the sights of `without_photo`, if there is one.
+/// Of what `bundle` holds at its place, in units of 1/σ²; without the observations of `without_photo`, if there is one.
 [[nodiscard]] TurnedNormal turned_normal(const TurnedBundle& bundle, const TurnedPrior& prior,
                                          const TurnedSolveConfig& config, int without_photo = -1);
 
@@ -57,7 +57,7 @@ struct TurnedSolution {
   int iterations = 0;
   double cost = 0.0;  ///< Huber's, prior included, σ as given.
   std::vector<Eigen::Vector2d>
-      residuals;  ///< Prediction minus pixel, one a sight, normalised; NaN where there is none.
+      residuals;  ///< Prediction minus pixel, one an observation, normalised; NaN where there is none.
 };
 
 /// Levenberg–Marquardt on camera, turns (and zooms) and rays, in place; rays are eliminated track by track. Throws
@@ -65,7 +65,8 @@ struct TurnedSolution {
 TurnedSolution solve_turned(TurnedBundle& bundle, const TurnedPrior& prior, const TurnedSolveConfig& config,
                             const Progress& progress = {});
 
-/// Each sight's residual over what its track leaves of it: √(1 − 1/m), m the track's sights. NaN as in `residuals`.
+/// Each observation's residual over what its track leaves of it: √(1 − 1/m), m the track's observations. NaN as in
+/// `residuals`.
 [[nodiscard]] std::vector<double> freed_norms(const TurnedBundle& bundle,
                                               const std::vector<Eigen::Vector2d>& residuals);
 

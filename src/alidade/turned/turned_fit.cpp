@@ -9,8 +9,8 @@ namespace alidade {
 namespace {
 
 constexpr double first_sigma = 0.003;  // half widths: before the residuals tell
-constexpr double least_sigma = 2e-5;   // about 0.01 px
-constexpr double most_sigma = 0.005;   // what is worse is no noise, but a wrong start that would take in everything
+constexpr double min_sigma = 2e-5;     // about 0.01 px
+constexpr double max_sigma = 0.005;    // what is worse is no noise, but a wrong start that would take in everything
 constexpr double gate_sigmas = 4.5;
 constexpr double zoom_sigma = 0.3;
 
@@ -25,7 +25,7 @@ double sigma_by_median(const TurnedFit& fit) {
   std::vector<double> norms = freed_norms(fit.bundle, fit.solution.residuals);
   std::erase_if(norms, [](double norm) { return !std::isfinite(norm); });
   if (norms.empty()) return first_sigma;
-  return std::clamp(middle_of(std::move(norms)) / 1.17741, least_sigma, most_sigma);
+  return std::clamp(middle_of(std::move(norms)) / 1.17741, min_sigma, max_sigma);
 }
 
 /// The same by squares, each residual beyond Huber's bound weighed down.
@@ -35,7 +35,7 @@ double sigma_by_weights(const TurnedFit& fit) {
     const double norm = residual.norm(), k = fit.solve.huber * fit.solve.sigma_px;
     if (std::isfinite(norm)) sum += norm > k ? k * norm : norm * norm;
   }
-  return std::max(std::sqrt(sum / std::max(freedom_of(fit.bundle), 1.0)), least_sigma);
+  return std::max(std::sqrt(sum / std::max(freedom_of(fit.bundle), 1.0)), min_sigma);
 }
 
 void turn_by_tree(const std::vector<PhotoLink>& links, const PhotoTree& tree, const FocalStart& start, bool frees_zoom,
@@ -67,7 +67,7 @@ std::vector<int> places_of(const MatchedPhotos& photos, const PhotoTree& tree) {
 }  // namespace
 
 double freedom_of(const TurnedBundle& bundle) {
-  return 2.0 * static_cast<double>(bundle.sights.size()) - 2.0 * static_cast<double>(bundle.rays.size()) -
+  return 2.0 * static_cast<double>(bundle.observations.size()) - 2.0 * static_cast<double>(bundle.rays.size()) -
          3.0 * static_cast<double>(bundle.cam_from_world.size() - 1) - 3.0;
 }
 
@@ -113,7 +113,7 @@ class Rounds {
 
   void solve(bool is_last) {
     fit_.solve.max_iterations = is_last ? 60 : 15;
-    fit_.solve.least_gain = is_last ? 1e-9 : 1e-4;
+    fit_.solve.min_gain = is_last ? 1e-9 : 1e-4;
     fit_.solution = solve_turned(fit_.bundle, fit_.prior, fit_.solve, progress_);
   }
 
@@ -130,8 +130,8 @@ class Rounds {
     const auto matches = explained_matches(photos_, fit_.bundle, place, gate * std::sqrt(2.0) * told);
     fit_.num_kept = set_tracks(photos_, matches, place, fit_.bundle);
     fit_.solve.sigma_px = told;
-    constexpr int most_times = 3;
-    for (int i = 0; i < most_times; ++i) {
+    constexpr int max_times = 3;
+    for (int i = 0; i < max_times; ++i) {
       if (freedom_of(fit_.bundle) < 1.0) return false;
       solve(false);
       const double limit = gate * std::max(sigma_by_median(fit_), given_);

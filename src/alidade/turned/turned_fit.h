@@ -15,7 +15,7 @@ struct TurnedFit {
   std::size_t num_kept = 0;  ///< Matches.
 };
 
-/// The camera of a start, the prior about it. A lens' distortion at the picture's corner is 0 within 8 % (k1) and 4 %
+/// The camera of a start, the prior about it. A lens' distortion at the image's corner is 0 within 8 % (k1) and 4 %
 /// (k2); an ordinary camera's pixels are square within 0.1 %, its centre in the middle within 1.5 % of the width.
 [[nodiscard]] TurnedPrior prior_about(double focal, const MatchedPhotos& photos, const TurnedConfig& config);
 

@@ -7,7 +7,7 @@
 namespace alidade {
 namespace {
 
-constexpr double least_depth = 0.05;  // cosine of the angle to the axis: 87°
+constexpr double min_depth = 0.05;  // cosine of the angle to the axis: 87°
 
 /// d and the derivative of r d by r; that one above zero: the lens does not fold.
 struct RadialFactor {
@@ -24,7 +24,7 @@ RadialFactor radial_factor(const TurnedCamera& camera, double r2) {
 std::optional<Eigen::Vector2d> turned_pixel(const TurnedCamera& camera, const Eigen::Matrix3d& R, double log_zoom,
                                             const Eigen::Vector3d& ray) {
   const Eigen::Vector3d Y = R * ray;
-  if (!(Y.z() > least_depth * ray.norm())) return std::nullopt;
+  if (!(Y.z() > min_depth * ray.norm())) return std::nullopt;
   const Eigen::Vector2d x = Y.head<2>() / Y.z();
   const RadialFactor radial = radial_factor(camera, x.squaredNorm());
   if (!(radial.growth > 0.0)) return std::nullopt;
@@ -36,7 +36,7 @@ std::optional<Eigen::Vector2d> turned_pixel(const TurnedCamera& camera, const Ei
 bool predict_turned(const TurnedCamera& camera, const Eigen::Matrix3d& R, double log_zoom, const Eigen::Vector3d& ray,
                     TurnedPrediction& out) {
   const Eigen::Vector3d Y = R * ray;
-  if (!(Y.z() > least_depth * ray.norm())) return false;
+  if (!(Y.z() > min_depth * ray.norm())) return false;
   const double inverse = 1.0 / Y.z();
   const Eigen::Vector2d x = Y.head<2>() * inverse;
   const double r2 = x.squaredNorm();

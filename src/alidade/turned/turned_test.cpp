@@ -161,8 +161,8 @@ TEST(Turned, ACameraThatWalksIsRefused) {
   walk.shake_rad = 0.002;
   walk.sigma_step_m = 0.5;
   for (const double depth : {5.0, 20.0}) {
-    walk.least_depth_m = 0.99 * depth;
-    walk.most_depth_m = depth;
+    walk.min_depth_m = 0.99 * depth;
+    walk.max_depth_m = depth;
     const Verdict verdict = verdict_of(simulate_turned_photos(walk, 7));
     EXPECT_TRUE(verdict.exit_code == ExitCode::cannot_tell || verdict.state == State::bad) << verdict.sentence;
   }
@@ -211,7 +211,7 @@ TEST(Turned, TheInformationWithoutAPhotoIsThatOfTheOthers) {
   information.diagonal().array() += 1e-6;
   const Eigen::VectorXd step = -information.ldlt().solve(normal.gradient);
   TurnedBundle others = fit.bundle;
-  std::erase_if(others.sights, [](const TurnedSight& sight) { return sight.photo == without; });
+  std::erase_if(others.observations, [](const TurnedDetection& observation) { return observation.photo == without; });
   (void)solve_turned(others, fit.prior, fit.solve);
   const double f = fit.bundle.camera[0];
   EXPECT_NEAR(f + step[0], others.camera[0], 0.1 * std::abs(others.camera[0] - f) + 1e-6 * f);

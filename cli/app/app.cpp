@@ -1,0 +1,321 @@
+#include "cli/app/app.h"
+
+#include <tbb/global_control.h>
+#include <tbb/info.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <deque>
+#include <iostream>
+#include <numeric>
+#include <opencv2/core.hpp>
+#include <opencv2/core/utils/logger.hpp>
+#include <utility>
+
+#include "alidade/estimation/config_error.h"
+#include "cli/app/field_options.h"
+#include "cli/app/help_format.h"
+#include "cli/app/terminal.h"
+
+namespace alidade::cli {
+
+struct App::Command {
+  CommandSpec spec;
+  CLI::App* app = nullptr;
+  std::function<ExitCode(Run&)> work;
+  CommonOptions options;
+  FieldList fields;              ///< Empty where the options are not described by fields.
+  std::filesystem::path config;  ///< --config, or empty.
+};
+
+struct App::State {
+  CLI::App app{"alidade: calibrate what moves. Cameras you can trust, from photos, with their uncertainty.", "alidade"};
+  std::deque<Command> commands;  // options point into it: it must not move
+  Terminal terminal;
+};
+
+namespace {
+
+/// Inserted, removed or replaced letters, and swapped neighbours, between two words. Damerau 1964.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> before, above, row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    before = std::exchange(above, row);
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replaced = above[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1);
+      row[j] = std::min({replaced, above[j] + 1, row[j - 1] + 1});
+      const bool is_swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
+      if (is_swapped) row[j] = std::min(row[j], before[j - 2] + 1);
+    }
+  }
+  return row.back();
+}
+
+/// "; did you mean 'WORD'?" for the nearest of the known words, if one is near: one slip in three letters, dashes
+/// aside.
+std::string suggestion(const std::string& word, const std::vector<std::string>& known) {
+  const std::string* nearest = nullptr;
+  const std::size_t num_letters = word.size() - std::min(word.find_first_not_of('-'), word.size());
+  std::size_t distance = (num_letters + 1) / 3;
+  for (const std::string& each : known) {
+    const std::size_t d = edit_distance(word, each);
+    if (d > distance || (nearest != nullptr && d == distance)) continue;
+    nearest = &each;
+    distance = d;
+  }
+  return nearest != nullptr ? "; did you mean '" + *nearest + "'?" : "";
+}
+
+std::vector<std::string> subcommand_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* each : app.get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(each->get_name());
+  return names;
+}
+
+std::vector<std::string> option_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* each : app.get_options()) {
+    for (const std::string& name : each->get_lnames()) names.push_back("--" + name);
+  }
+  return names;
+}
+
+/// The command, or group, that the line got to.
+const CLI::App& deepest(const CLI::App& app) {
+  const auto parsed = app.get_subcommands();
+  return parsed.empty() ? app : deepest(*parsed.front());
+}
+
+/// "camera show: " of the app that the line got to; "" of the program itself.
+std::string where(const CLI::App& app) {
+  if (app.get_parent() == nullptr) return "";
+  const std::string parent = where(*app.get_parent());
+  return (parent.empty() ? "" : parent.substr(0, parent.size() - 2) + " ") + app.get_name() + ": ";
+}
+
+bool is_option(const std::string& word) { return word.size() > 1 && word.front() == '-'; }
+
+std::string name_of(const std::string& option) { return option.substr(0, option.find('=')); }
+
+/// Whether the command, or one of the group, has the option.
+bool knows(const CLI::App& app, const std::string& option) {
+  if (app.get_option_no_throw(option) != nullptr) return true;
+  const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
+  return std::any_of(commands.begin(), commands.end(), [&](const CLI::App* each) { return knows(*each, option); });
+}
+
+/// An option of the command (`at`) that was typed before it: "--json" of "alidade --json calibrate". None: "".
+std::string early_option(const CLI::App& app, const CLI::App& at) {
+  if (!subcommand_names(app).empty()) {
+    for (const std::string& word : app.remaining()) {
+      if (is_option(word) && knows(at, name_of(word))) return name_of(word);
+    }
+  }
+  const auto parsed = app.get_subcommands();
+  return parsed.empty() ? "" : early_option(*parsed.front(), at);
+}
+
+/// What is wrong with the line, in one line that says what to do.
+std::string usage_fault(const CLI::App& app, const CLI::ParseError& error) {
+  const CLI::App& at = deepest(app);
+  if (const std::string early = early_option(app, at); !early.empty()) {
+    const std::string command = where(at).substr(0, where(at).find(':'));
+    return "'" + early + "' stands after the command: alidade " + command + (command.empty() ? "" : " ") +
+           (subcommand_names(at).empty() ? "" : "COMMAND ") + early + " …";
+  }
+  std::string extra;
+  for (const std::string& word : app.remaining(true)) {  // an option that nobody knows explains more than its effects
+    if (extra.empty() || (extra.front() != '-' && word.front() == '-')) extra = word;
+  }
+  if (is_option(extra)) {
+    return where(at) + "unknown option '" + name_of(extra) + "'" + suggestion(name_of(extra), option_names(at));
+  }
+  const std::vector<std::string> names = subcommand_names(at);
+  if (!extra.empty() && !names.empty()) {
+    return where(at) + "unknown command '" + extra + "'" + suggestion(extra, names);
+  }
+  if (at.get_parent() == nullptr) return "a command is required; see alidade --help";
+  if (!names.empty()) {
+    std::string list;
+    for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+    return where(at) + "a command is required: " + list + "; see alidade " + at.get_name() + " --help";
+  }
+  const std::string in_help = "; see alidade " + where(at).substr(0, where(at).size() - 2) + " --help";
+  if (!extra.empty()) return where(at) + "unexpected argument '" + extra + "'";
+  const bool is_missing = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr;
+  return where(at) + error.what() + (is_missing ? in_help : "");
+}
+
+/// What every command has.
+void add_common_options(CLI::App& app, const CommandSpec& spec, CommonOptions& options) {
+  options.out = std::filesystem::path("alidade-out") / spec.name.substr(0, spec.name.find(' '));
+  const std::string group = "Common options";
+  app.add_option("--out", options.out, "Folder for the results")->type_name("DIR")->capture_default_str()->group(group);
+  app.add_flag("--json", options.json, "One JSON document on stdout and nothing else")->group(group);
+  app.add_flag("--quiet", options.quiet, "Nothing on stdout")->group(group);
+  app.add_flag("--no-report", options.no_report, "Write no report.html")->group(group);
+  app.add_option("--threads", options.threads, "Threads to use at most; 0: as many as there are processors")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str()
+      ->group(group);
+  if (!spec.draws_random_numbers) return;
+  app.add_option("--seed", options.seed, "Seed of the random numbers; same seed, same result")
+      ->type_name("N")
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 62U))
+      ->capture_default_str()
+      ->group(group);
+}
+
+/// Finds out before the work, not after it, that there is no place for results; leaves nothing there.
+void require_place(const CommonOptions& options) {
+  if (!options.leaves_results) return;
+  try {
+    const FolderSwap tried(options.out);
+  } catch (const InputError& error) {
+    throw InputError(std::string(error.what()) + "; give another --out");
+  }
+}
+
+/// Threads and foreign libraries as the options say. The limit lasts as long as what is returned.
+tbb::global_control prepare_libraries(int threads) {
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  cv::setNumThreads(threads == 0 ? -1 : threads);
+  const int limit = threads == 0 ? tbb::info::default_concurrency() : threads;
+  return {tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(limit)};
+}
+
+std::string refusal(const std::string& command, const Verdict& verdict) {
+  const bool is_said = verdict.exit_code != ExitCode::not_trusted || verdict.sentence.starts_with("Not to be trusted");
+  return command + ": " + (is_said ? "" : "not to be trusted: ") + verdict.sentence +
+         (verdict.to_add.empty() ? "" : "; " + verdict.to_add);
+}
+
+constexpr const char* bug = " (a bug in alidade; please report it)";
+
+}  // namespace
+
+App::App() : state_(std::make_unique<State>()) {
+  CLI::App& app = state_->app;
+  app.set_version_flag("--version", "alidade " ALIDADE_VERSION);
+  app.set_help_flag("--help,-h", "Print this help");
+  app.require_subcommand(1);
+  app.formatter(std::make_shared<HelpFormat>());
+  app.footer(
+      "Begin with photos that are made for it, or with your own:\n"
+      "    alidade simulate board --board 9x6 --square 0.025 --out photos\n"
+      "    alidade calibrate photos --board 9x6 --square 0.025\n"
+      "Each command has its own help, which ends with examples: alidade COMMAND --help\n"
+      "Exit codes: 0 an estimate that stands, 1 a fault of alidade, 2 wrong usage, 3 bad input, nothing written,\n"
+      "4 the data cannot tell (what is missing is named), 5 no convergence, 6 an estimate that is not to be trusted\n"
+      "(files are written), 130 interrupted.\n"
+      "Results replace the earlier ones in DIR at once, at the end. A run that fails leaves those as they were; a "
+      "refusal\n"
+      "(4, 5) beside an earlier estimate is written to DIR/refused.");
+}
+
+App::~App() = default;
+
+void App::add_group(const std::string& name, const std::string& summary) {
+  CLI::App* group = state_->app.add_subcommand(name, summary)->require_subcommand(1);
+  group->footer("Each command has its own help, which ends with examples: alidade " + name + " COMMAND --help");
+}
+
+CLI::App& App::add_command(const CommandSpec& spec, std::function<ExitCode(Run&)> work) {
+  const std::size_t space = spec.name.find(' ');
+  CLI::App* parent = &state_->app;
+  if (space != std::string::npos) parent = parent->get_subcommand(spec.name.substr(0, space));
+  CLI::App* app =
+      parent->add_subcommand(space == std::string::npos ? spec.name : spec.name.substr(space + 1), spec.summary);
+  Command& command = state_->commands.emplace_back(Command{spec, app, std::move(work), {}, {}, {}});
+  command.options.leaves_results = spec.leaves_results;
+  app->footer("Examples:\n" + indented_examples(spec.examples));
+  return *app;
+}
+
+void App::add_fields(CLI::App& app, FieldList fields) {
+  for (Command& command : state_->commands) {
+    if (command.app != &app) continue;
+    command.fields = std::move(fields);
+    cli::add_fields(app, command.fields);
+    app.add_option("--config", command.config, "Options from a file, `name: value`; what is typed beats it")
+        ->type_name("FILE.yaml");
+  }
+}
+
+App::Command* App::chosen_command() {
+  for (Command& command : state_->commands) {
+    if (command.app->parsed()) return &command;
+  }
+  return nullptr;
+}
+
+int App::dispatch(int argc, const char* const* argv) {
+  CLI::App& app = state_->app;
+  for (Command& command : state_->commands)  // behind the command's own, in its help as well
+    add_common_options(*command.app, command.spec, command.options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help and --version
+    throw UsageError(usage_fault(app, error));
+  }
+  Command& command = *chosen_command();
+  CommonOptions& options = command.options;
+  take_config(*command.app, command.fields, command.config);
+  if (command.app->count("--out") > 0) options.leaves_results = true;
+  catch_interrupts();
+  require_place(options);
+  const tbb::global_control limit = prepare_libraries(options.threads);
+  Run run(command.spec.name, {argv, argv + argc}, options, state_->terminal.progress(!options.quiet && !options.json));
+  if (command.spec.draws_random_numbers) run.document.seed = options.seed;
+  try {
+    const ExitCode code = command.work(run);
+    state_->terminal.wipe_progress();
+    if (code != ExitCode::ok) state_->terminal.error(refusal(command.spec.name, run.document.verdict));
+    return static_cast<int>(code);
+  } catch (const UsageError& error) {
+    throw UsageError(command.spec.name + ": " + error.what());
+  } catch (const ConfigError& error) {
+    throw UsageError(command.spec.name + ": " + error.what());
+  }
+}
+
+int run_cli(int argc, const char* const* argv, void (*add_commands)(App&)) {
+  hold_standard_streams();
+  App frame;
+  const auto failed = [&](const std::string& message, ExitCode code) {
+    frame.state_->terminal.error(message);
+    return static_cast<int>(code);
+  };
+  try {
+    add_commands(frame);
+    const int code = frame.dispatch(argc, argv);
+    std::cout.flush();
+    const bool is_written = std::cout.good() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+    return is_written ? code : failed("stdout: cannot be written", ExitCode::bad_input);
+  } catch (const UsageError& error) {
+    return failed(error.what(), ExitCode::usage);
+  } catch (const Interrupted& error) {
+    frame.state_->terminal.error(error.what());
+    return 128 + interrupting_signal();
+  } catch (const InputError& error) {
+    return failed(error.what(), ExitCode::bad_input);
+  } catch (const std::filesystem::filesystem_error& error) {
+    return failed(error.path1().string() + ": " + error.code().message(), ExitCode::bad_input);
+  } catch (const std::bad_alloc&) {
+    return failed("internal: not enough memory; use fewer or smaller inputs", ExitCode::internal_error);
+  } catch (const cv::Exception& error) {
+    return failed("internal: OpenCV: " + error.err + bug, ExitCode::internal_error);
+  } catch (const std::exception& error) {
+    return failed(std::string("internal: ") + error.what() + bug, ExitCode::internal_error);
+  } catch (...) {
+    return failed(std::string("internal: unknown") + bug, ExitCode::internal_error);
+  }
+}
+
+}  // namespace alidade::cli

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "alidade/description/field.h"
+#include "cli/app/run.h"
+
+namespace CLI {  // NOLINT(readability-identifier-naming): CLI11's
+class App;
+}
+
+namespace alidade::cli {
+
+/// What a command is called and how it presents itself.
+struct CommandSpec {
+  std::string name;                   ///< "calibrate"; with a space, "camera show", a command of a group.
+  std::string summary;                ///< One line.
+  std::string examples;               ///< Command lines, one a line; shown at the end of --help.
+  bool draws_random_numbers = false;  ///< Gives it --seed.
+  bool leaves_results = true;         ///< False: nothing is written into DIR unless --out is given (show, convert).
+};
+
+/// The commands and what they share: options, threads, errors, exit codes. See cli/commands.h.
+class App {
+ public:
+  App();
+  ~App();
+  App(const App&) = delete;
+  App& operator=(const App&) = delete;
+
+  /// A command. `work` runs after the whole line has been parsed; it ends with `return run.finish(verdict);`. Add the
+  /// command's own options to what is returned.
+  CLI::App& add_command(const CommandSpec& spec, std::function<ExitCode(Run&)> work);
+  /// The command's options, as its fields describe them; it gets --config FILE as well. Once for a command.
+  void add_fields(CLI::App& command, FieldList fields);
+  /// The word before the commands of a group: "camera" of "camera show". Comes before them.
+  void add_group(const std::string& name, const std::string& summary);
+
+ private:
+  friend int run_cli(int argc, const char* const* argv, void (*add_commands)(App&));
+  struct Command;
+  struct State;
+
+  int dispatch(int argc, const char* const* argv);
+  Command* chosen_command();
+
+  std::unique_ptr<State> state_;
+};
+
+/// Parses, runs the chosen command, and is the one place that turns what is thrown into a line and an exit code.
+[[nodiscard]] int run_cli(int argc, const char* const* argv, void (*add_commands)(App&));
+
+}  // namespace alidade::cli

@@ -1,0 +1,39 @@
+#include "cli/commands/camera_values.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "alidade/formats/camera_file.h"
+#include "alidade/report/markup.h"
+
+namespace alidade::cli {
+
+Camera read_camera_input(Run& run, const std::string& role, const std::filesystem::path& file) {
+  Camera camera = read_camera(file);
+  std::error_code ignored;
+  std::string name = file.string();
+  if (!std::filesystem::exists(name, ignored)) name = name.substr(0, name.rfind(':'));  // FILE:NAME
+  run.add_input(role, file.string(), read_file(name));
+  return camera;
+}
+
+std::vector<std::string> camera_lines(const Camera& camera) {
+  const std::vector<std::string> names = param_names(camera.lens);
+  const Eigen::VectorXd values = params(camera.lens);
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const Eigen::Index at = static_cast<Eigen::Index>(i);
+    const double sigma = has_covariance(camera) ? std::sqrt(std::max(0.0, camera.cov(at, at))) : 0.0;
+    const report::ValueText text = report::value_text(values[at], sigma);
+    const std::string value =
+        text.plus_minus.empty() ? fmt::format("{:.10g}", values[at]) : text.value + " ± " + text.plus_minus;
+    const std::string name = names[i] + (names[i].size() < 5 ? "" : " ");
+    lines.push_back(fmt::format("  {:<5}{}{}", name, value, i < 5 ? " px" : names[i].ends_with("_m") ? " m" : ""));
+  }
+  return lines;
+}
+
+}  // namespace alidade::cli

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "alidade/camera/camera.h"
+#include "alidade/formats/camera_json.h"
+#include "cli/app/run.h"
+
+namespace alidade::cli {
+
+/// Reads a camera file and records it among the inputs of the run. "FILE:NAME" chooses one of several.
+[[nodiscard]] Camera read_camera_input(Run& run, const std::string& role, const std::filesystem::path& file);
+
+/// "fx 532.8 ± 1.3 px" each, ± 3σ where σ is known.
+[[nodiscard]] std::vector<std::string> camera_lines(const Camera& camera);
+
+}  // namespace alidade::cli

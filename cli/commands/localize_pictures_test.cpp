@@ -1,0 +1,117 @@
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "alidade/files/files.h"
+#include "alidade/testing/command_test.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Outcome;
+using Json = nlohmann::json;
+
+/// A short film of a board under water, and what may be wrong with such a film.
+class LocalizeImageFolders : public testing::CommandTest {
+ protected:
+  static constexpr int num_frames = 12;
+
+  void SetUp() override {
+    CommandTest::SetUp();
+    const Outcome made = alidade({"simulate", "underwater", "--video", "--frames", std::to_string(num_frames), "--rate",
+                                  "30", "--out", path("sim"), "--quiet", "--no-report"});
+    ASSERT_EQ(made.code, 0) << made.err;
+  }
+  [[nodiscard]] std::string frame(int i) const { return path(fmt::format("sim/frames/{:06}.png", i)); }
+  [[nodiscard]] Outcome localize(const std::string& sequence, const std::vector<std::string>& options) {
+    return alidade(
+        {"localize", path(sequence), "--camera", path("sim/camera.yaml"), "--target", path("sim/target.yaml"),
+         "--truth", path("sim/truth.tum"), "--json", "--out", path("out"), "--no-report"},
+        options);
+  }
+  void expect_refused(const std::string& sequence, const std::vector<std::string>& options, int code,
+                      const std::string& what) {
+    const Outcome outcome = localize(sequence, options);
+    EXPECT_EQ(outcome.code, code) << what << outcome.out << outcome.err;
+    EXPECT_NE(outcome.err.find(what), std::string::npos) << outcome.err;
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+    EXPECT_FALSE(fs::exists(path("out/trajectory.tum")));
+  }
+};
+
+TEST_F(LocalizeImageFolders, ReadsTheLayoutOfEuRoC) {
+  const fs::path data = path("flight/mav0/cam0/data");
+  fs::create_directories(data);
+  std::string table = "#timestamp [ns],filename\n";
+  for (int i = 0; i < num_frames; ++i) {
+    const std::string name = fmt::format("{}.png", 1'000'000 * ((1000L * i + 15) / 30));  // whole milliseconds
+    fs::copy_file(frame(i), data / name);
+    table += fmt::format("{},{}\n", name.substr(0, name.size() - 4), name);
+  }
+  write_file(path("flight/mav0/cam0/data.csv"), table);
+  const Outcome numbered = localize("sim/frames", {"--rate", "30"}), euroc = localize("flight", {});
+  ASSERT_EQ(numbered.code, 0) << numbered.err;
+  ASSERT_EQ(euroc.code, 0) << euroc.err;
+  const Json a = Json::parse(numbered.out)["estimate"], b = Json::parse(euroc.out)["estimate"];
+  EXPECT_EQ(b["frames"], num_frames);
+  EXPECT_EQ(b["lost"], 0);
+  EXPECT_NEAR(b["ate_m"].get<double>(), a["ate_m"].get<double>(), 2e-4);  // times are rounded to milliseconds
+  fs::remove(data / "0.png");
+  const Outcome without = localize("flight", {});  // an image that is missing is a gap
+  ASSERT_EQ(without.code, 0) << without.err;
+  EXPECT_EQ(Json::parse(without.out)["estimate"]["frames"], num_frames - 1);
+  fs::remove_all(path("out"));
+  write_file(path("flight/mav0/cam0/data.csv"), table + table.substr(table.find("0,0.png")));
+  fs::copy_file(frame(0), data / "0.png");
+  expect_refused("flight", {}, 3, "data.csv:14: '0' is not after the time before it");
+}
+
+TEST_F(LocalizeImageFolders, NamesAImageThatCannotBe) {
+  const cv::Mat small(100, 100, CV_8U, cv::Scalar(128));
+  cv::imwrite(frame(5), small);
+  expect_refused("sim/frames", {"--rate", "30"}, 3, "000005.png: is 100×100, the first frame is 768×576");
+  write_file(frame(5), read_file(frame(4)).substr(0, 3000));
+  expect_refused("sim/frames", {"--rate", "30"}, 3, "000005.png");
+  write_file(frame(5), "");
+  expect_refused("sim/frames", {"--rate", "30"}, 3, "000005.png");
+  expect_refused("sim/frames", {}, 3, "has no times; give --rate");
+}
+
+TEST_F(LocalizeImageFolders, WhatShowsNothingIsRefused) {
+  const cv::Mat grey(576, 768, CV_8U, cv::Scalar(128));
+  for (int i = 0; i < num_frames; ++i) cv::imwrite(frame(i), grey);
+  expect_refused("sim/frames", {"--rate", "30"}, 4, "the target is not found in any of 12 pictures");
+  for (int i = 0; i < num_frames; ++i) cv::imwrite(frame(i), cv::Mat::zeros(576, 768, CV_8U));
+  expect_refused("sim/frames", {"--rate", "30"}, 4, "the target is not found in any of 12 pictures");
+}
+
+/// Clean rendered images are matched better than real ones: the verdict says so, and what to tell.
+TEST_F(LocalizeImageFolders, TheLeastSigmaOfAMatchCanBeTold) {
+  const Json usual = Json::parse(localize("sim/frames", {"--rate", "30"}).out),
+             told = Json::parse(localize("sim/frames", {"--rate", "30", "--sigma-px", "0.03"}).out);
+  EXPECT_EQ(usual["estimate"]["sigma_px"], 0.11);
+  EXPECT_EQ(told["estimate"]["sigma_px"], 0.03);
+  EXPECT_GT(told["estimate"]["nis_per_dof"].get<double>(), 2.0 * usual["estimate"]["nis_per_dof"].get<double>());
+  EXPECT_NE(usual["verdict"]["sentence"].get<std::string>().find("--sigma-px"), std::string::npos);
+}
+
+/// Some images are missing, some are black: the path goes on, and does not call itself good.
+TEST_F(LocalizeImageFolders, GapsAndBlackImagesAreCounted) {
+  for (const int i : {4, 5}) cv::imwrite(frame(i), cv::Mat::zeros(576, 768, CV_8U));
+  fs::remove(frame(8));
+  const Outcome outcome = localize("sim/frames", {"--rate", "30"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  EXPECT_EQ(document["estimate"]["frames"], num_frames - 1);
+  EXPECT_EQ(document["estimate"]["lost"], 2);
+  EXPECT_EQ(document["verdict"]["state"], "care");
+  EXPECT_LT(document["estimate"]["ate_m"], 0.01);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,441 @@
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "alidade/files/csv.h"
+#include "alidade/files/files.h"
+#include "alidade/testing/command_test.h"
+
+namespace alidade {
+namespace {
+
+using testing::Outcome;
+using Json = nlohmann::json;
+
+class RangefinderCommand : public testing::CommandTest {
+ protected:
+  void simulate(const std::vector<std::string>& options = {}) {
+    std::vector<std::string> arguments{"simulate", "rangefinder", "--out", path("sim"), "--quiet", "--no-report"};
+    const Outcome made = alidade(arguments, options);
+    ASSERT_EQ(made.code, 0) << made.err;
+  }
+  /// The simulated shots, with their corners.
+  [[nodiscard]] Outcome calibrate(const std::vector<std::string>& options) const {
+    std::vector<std::string> arguments{"rangefinder", path("sim/shots.csv"),
+                                       "--camera",    path("sim/camera.yaml"),
+                                       "--corners",   path("sim/corners.csv"),
+                                       "--board",     "9x6",
+                                       "--square",    "0.04",
+                                       "--out",       path("out")};
+    return alidade(arguments, options);
+  }
+  /// Of spots, planes or ranges in a table of one's own.
+  [[nodiscard]] Outcome calibrate_table(const std::string& table, const std::vector<std::string>& options = {}) const {
+    write_file(path("shots.csv"), table);
+    std::vector<std::string> arguments{"rangefinder", path("shots.csv"), "--camera", path("sim/camera.yaml"),
+                                       "--no-report", "--out",           path("out")};
+    return alidade(arguments, options);
+  }
+};
+
+void expect_near_truth(const Json& document, double sigmas = 3.5) {
+  const std::vector<double> origin{0.04, -0.07, 0.04}, direction{0.013795889, -0.015203087, 0.999789248};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double sigma_m = document["stddev"]["origin_m"][i], sigma = document["stddev"]["direction"][i];
+    EXPECT_NEAR(document["estimate"]["origin_m"][i], origin[i], sigmas * sigma_m);
+    EXPECT_NEAR(document["estimate"]["direction"][i], direction[i], sigmas * sigma);
+  }
+}
+
+TEST_F(RangefinderCommand, GivesTheBeamWithTheNamesOfTheContract) {
+  simulate();
+  for (const std::string method : {"joint", "spot", "plane"}) {
+    const Outcome outcome = calibrate({"--method", method, "--json", "--no-report"});
+    ASSERT_EQ(outcome.code, 0) << method << ": " << outcome.err;
+    const Json document = Json::parse(outcome.out);
+    expect_near_truth(document);
+    const Json& estimate = document["estimate"];
+    // Nobody told the readings' scale: it is estimated where it matters.
+    EXPECT_NEAR(estimate["scale"], 1.0, 4.0 * document["stddev"]["scale"].get<double>() + 1e-12);
+    EXPECT_LE(document["stddev_model"]["origin_m"][2], 1.000001 * document["stddev"]["origin_m"][2].get<double>());
+    EXPECT_EQ(document["data"]["shots"]["cluster_z2"].size(), 18u);
+    const bool is_joint = method == "joint";
+    if (is_joint) EXPECT_EQ(document["verdict"]["state"], "good") << document["verdict"]["to_add"];
+    for (const char* name : {"theta_x_rad", "theta_y_rad", "rms_px", "rms_range_m", "bound"})
+      EXPECT_TRUE(estimate.contains(name)) << name;
+    EXPECT_NEAR(estimate["theta_x_rad"], 1.557, 0.02);
+    EXPECT_EQ(document["data"]["shots"]["range_m"].size(), 18u);
+    EXPECT_EQ(document["counts"]["used"], 18);
+    EXPECT_TRUE(std::filesystem::exists(path("out/rangefinder.yaml")));
+    EXPECT_TRUE(std::filesystem::exists(path("out/camera.yaml")));
+  }
+}
+
+const Json* assumption(const Json& document, const std::string& name) {
+  for (const Json& each : document["assumed"])
+    if (each["name"] == name) return &each;
+  return nullptr;
+}
+
+TEST_F(RangefinderCommand, WhatIsToldWithItsSigmaIsCarriedAndWhatIsNotIsNamed) {
+  simulate();
+  const Outcome told = calibrate({"--sigma-scale", "0", "--sigma-square", "0.00002", "--json", "--no-report"});
+  ASSERT_EQ(told.code, 0) << told.err;
+  const Json document = Json::parse(told.out);
+  EXPECT_EQ(document["estimate"]["scale"], 1.0);
+  EXPECT_EQ(document["verdict"]["state"], "good") << document["verdict"]["to_add"];
+  ASSERT_TRUE(assumption(document, "square_m") && assumption(document, "scale") && assumption(document, "camera.f"));
+  EXPECT_EQ((*assumption(document, "square_m"))["sigma"], 0.00002);
+  EXPECT_EQ((*assumption(document, "scale"))["sigma"], 0.0);
+  EXPECT_NEAR((*assumption(document, "camera.f"))["sigma"].get<double>(), 1.5 / std::sqrt(2.0), 1e-6);
+  // A camera whose covariance nobody knows moves the direction by many σ.
+  std::string camera = read_file(path("sim/camera.yaml"));
+  write_file(path("sim/camera.yaml"), camera.substr(0, camera.find("covariance:")));
+  const Outcome unknown = calibrate({"--sigma-scale", "0", "--sigma-square", "0", "--json", "--no-report"});
+  ASSERT_EQ(unknown.code, 0) << unknown.err;
+  const Json care = Json::parse(unknown.out);
+  EXPECT_EQ(care["verdict"]["state"], "care");
+  EXPECT_NE(care["verdict"]["sentence"].get<std::string>().find("camera.c"), std::string::npos) << care["verdict"];
+  EXPECT_EQ(calibrate({"--scale", "--sigma-scale", "0.001"}).code, 2);
+  EXPECT_EQ(calibrate({"--sigma-scale", "-1"}).code, 2);
+}
+
+TEST_F(RangefinderCommand, ProjectSaysWhereAFileHasNoCovariance) {
+  simulate();
+  const auto project = [&](const std::string& beam, const std::string& camera) {
+    const Outcome outcome = alidade({"project", "--beam", beam, "--camera", camera, "--range", "2", "--json",
+                                     "--no-report", "--out", path("projected")});
+    return Json::parse(outcome.out);
+  };
+  ASSERT_EQ(calibrate({"--no-report"}).code, 0);
+  const Json known = project(path("out/rangefinder.yaml"), path("out/camera.yaml"));
+  EXPECT_EQ(known["verdict"]["state"], "good");
+  EXPECT_TRUE((*assumption(known, "camera.cx"))["sigma"].is_number());
+  EXPECT_EQ(project(path("sim/truth_rangefinder.yaml"), path("out/camera.yaml"))["verdict"]["state"], "care");
+  const std::string camera = read_file(path("out/camera.yaml"));
+  write_file(path("bare.yaml"), camera.substr(0, camera.find("covariance:")));
+  const Json bare = project(path("out/rangefinder.yaml"), path("bare.yaml"));
+  EXPECT_TRUE((*assumption(bare, "camera.cx"))["sigma"].is_null());
+  EXPECT_GT((*assumption(bare, "camera.cx"))["moves"], 0.5);
+}
+
+TEST_F(RangefinderCommand, ProjectNamesAnotherCamera) {
+  simulate();
+  ASSERT_EQ(calibrate({"--no-report"}).code, 0);
+  const auto projected = [&](const std::string& camera) {
+    return Json::parse(alidade({"project", "--beam", path("out/rangefinder.yaml"), "--camera", camera, "--range", "2",
+                                "--json", "--no-report", "--out", path("projected")})
+                           .out)["verdict"];
+  };
+  // The file that the beam was refined from is of the same camera.
+  EXPECT_EQ(projected(path("sim/camera.yaml"))["state"], "good");
+  std::string camera = read_file(path("out/camera.yaml"));
+  const std::size_t at = camera.find("cx:");
+  camera.replace(at, camera.find('\n', at) - at, "cx: 700");
+  write_file(path("other.yaml"), camera);
+  const Json other = projected(path("other.yaml"));
+  EXPECT_EQ(other["state"], "care");
+  EXPECT_NE(other.dump().find("not the camera that the beam was calibrated with: its cx is 700 px"), std::string::npos)
+      << other;
+}
+
+TEST_F(RangefinderCommand, PointsToTheCornersWhereNobodyHasThePhotos) {
+  simulate();
+  const std::vector<std::string> arguments{"rangefinder", path("sim/shots.csv"),
+                                           "--camera",    path("sim/camera.yaml"),
+                                           "--board",     "9x6",
+                                           "--square",    "0.04",
+                                           "--out",       path("out")};
+  const Outcome outcome = alidade(arguments);
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, ::testing::HasSubstr("shot_001.png"));
+  EXPECT_THAT(outcome.err, ::testing::HasSubstr("--corners " + path("sim/corners.csv")));
+}
+
+TEST_F(RangefinderCommand, ProjectSaysWhereTheSpotIsAndHowSure) {
+  simulate();
+  ASSERT_EQ(calibrate({"--no-report"}).code, 0);
+  const Outcome outcome =
+      alidade({"project", "--beam", path("out/rangefinder.yaml"), "--camera", path("out/camera.yaml"), "--range",
+               "2.31", "--json", "--no-report", "--out", path("projected")});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  // By hand: X = B + L A of the truth, f 1200 px, centre (640, 480).
+  const double x = 0.04 + 2.31 * 0.013795889, y = -0.07 - 2.31 * 0.015203087, z = 0.04 + 2.31 * 0.999789248;
+  const Json &px = document["estimate"]["px"], &sigma = document["stddev"]["px"];
+  EXPECT_NEAR(px[0], 640.0 + 1200.0 * x / z, 4.0 * sigma[0].get<double>());
+  EXPECT_NEAR(px[1], 480.0 + 1200.0 * y / z, 4.0 * sigma[1].get<double>());
+  EXPECT_LT(sigma[0], 0.5);
+  EXPECT_NEAR(document["estimate"]["point_in_cam_m"][2], z, 0.02);
+  const Csv points = Csv::read(path("projected/points.csv"));
+  EXPECT_EQ(points.num_rows(), 1u);
+  EXPECT_NEAR(points.number(0, "u_px"), px[0], 1e-6);
+}
+
+TEST_F(RangefinderCommand, PlanProposesShotsThatLowerTheUncertainty) {
+  simulate({"--shots", "6"});
+  ASSERT_EQ(calibrate({"--no-report"}).code, 0);
+  const Outcome outcome = alidade({"plan", "rangefinder", path("out"), "--json", "--no-report", "--out", path("plan")});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json estimate = Json::parse(outcome.out)["estimate"];
+  EXPECT_LT(estimate["sigma_planned_origin_m"], estimate["sigma_now_origin_m"]);
+}
+
+TEST_F(RangefinderCommand, WhatCannotTellIsRefusedByName) {
+  for (const auto& [scenario, method, reason] :
+       std::vector<std::array<std::string, 3>>{{"equal_range", "spot", "equal ranges"},
+                                               {"equal_range", "plane", "equal ranges"},
+                                               {"table1", "plane", "equal ranges"},
+                                               {"table1", "spot", "equal ranges"},
+                                               {"frontal", "plane", "frontal boards"},
+                                               {"parallel", "plane", "parallel boards"},
+                                               {"through_centre", "spot", "centre"}}) {
+    simulate({"--scenario", scenario});
+    const Outcome outcome = calibrate({"--method", method, "--no-report"});
+    EXPECT_EQ(outcome.code, 4) << scenario << ' ' << method << outcome.out;
+    EXPECT_NE(outcome.err.find(reason), std::string::npos) << scenario << ' ' << method << ": " << outcome.err;
+    EXPECT_FALSE(std::filesystem::exists(path("out/rangefinder.yaml"))) << scenario;
+    EXPECT_TRUE(std::filesystem::exists(path("out/result.json")));
+  }
+  simulate();
+  const Outcome scale = calibrate({"--method", "spot", "--scale", "--no-report"});
+  EXPECT_EQ(scale.code, 4);
+  EXPECT_NE(scale.err.find("scale"), std::string::npos) << scale.err;
+}
+
+TEST_F(RangefinderCommand, AnotherBoardAndTheSameShotTwiceAreNamed) {
+  simulate();
+  const Outcome turned =
+      alidade({"rangefinder", path("sim/shots.csv"), "--camera", path("sim/camera.yaml"), "--corners",
+               path("sim/corners.csv"), "--board", "6x9", "--square", "0.04", "--no-report", "--out", path("out")});
+  EXPECT_EQ(turned.code, 4) << turned.out;
+  EXPECT_NE(turned.err.find("no pose of the board fits its corners in 18 of 18 shots; check --board"),
+            std::string::npos)
+      << turned.err;
+  std::string table = read_file(path("sim/shots.csv"));
+  table += table.substr(table.rfind('\n', table.size() - 2) + 1);
+  const Outcome twice = calibrate_table(table);
+  EXPECT_EQ(twice.code, 3);
+  EXPECT_NE(twice.err.find("the same shot stands in a row before"), std::string::npos) << twice.err;
+}
+
+TEST_F(RangefinderCommand, WrongShotsAreNamed) {
+  simulate({"--outliers", "0.17"});
+  const Json made = Json::parse(read_file(path("sim/result.json")));
+  ASSERT_EQ(made["estimate"]["outliers"].size(), 3u);
+  const Outcome outcome = calibrate({"--json", "--no-report"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  expect_near_truth(document);
+  const Json& shots = document["data"]["shots"];
+  for (std::size_t i = 0; i < 18; ++i) {
+    const bool is_outlier = std::ranges::count(made["estimate"]["outliers"], shots["name"][i]) > 0;
+    EXPECT_EQ(shots["used"][i].get<bool>(), !is_outlier) << shots["name"][i] << shots["reason"][i];
+  }
+}
+
+TEST_F(RangefinderCommand, SaysWhatIsWrongWithItsInput) {
+  simulate();
+  const auto expect = [&](const std::string& table, const std::string& what) {
+    const Outcome outcome = calibrate_table(table);
+    EXPECT_EQ(outcome.code, 3) << table << outcome.err;
+    EXPECT_NE(outcome.err.find(what), std::string::npos) << outcome.err;
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+    EXPECT_FALSE(std::filesystem::exists(path("out")));
+  };
+  expect("", "shots.csv");
+  expect("range_m,u,v\n", "has no shots");
+  expect("range_mm,u,v\n2310,1,1\n", "has no column 'range_m'; ranges are metres");
+  expect("range_m\n2.31\n", "ranges alone");
+  expect("range_m,u\n2.31,4\n", "'u' and 'v'");
+  expect("range_m,nx,ny,nz\n2.31,0,0,1\n", "'nx', 'ny', 'nz' and 'd'");
+  expect("range_m,u,v\n2.31,4,5\nnan,4,5\n", "shots.csv:3: column 'range_m': 'nan' is not a finite number");
+  expect("range_m,u,v\n-2.31,4,5\n", "shots.csv:2: column 'range_m': '-2.31' is not above zero");
+  expect("range_m,u,v\n2310,4,5\n", "ranges are metres");
+  expect("range_m,u,v\n2.31,,5\n", "shots.csv:2: column 'u': is empty");
+  expect("range_m,u,v\n2.31,1e300,5\n", "shots.csv:2");
+  expect("range_m,nx,ny,nz,d\n2.31,0,0,2,-2\n", "the normal's length is 2, not 1");
+  expect("range_m,nx,ny,nz,d\n2.31,0,0,1,0\n", "passes through the camera's centre");
+  expect("range_m,photo\n2.31,none.jpg\n", "none.jpg");
+  write_file(path("text.jpg"), "not a picture");
+  expect("range_m,photo\n2.31,text.jpg\n", "text.jpg");
+  const Outcome skipped = calibrate_table("range_m,u,v\n2.31,4,5\nnan,4,5\n", {"--skip-bad", "--json"});
+  EXPECT_EQ(skipped.code, 4) << skipped.err;  // one shot tells nothing
+  EXPECT_EQ(Json::parse(skipped.out)["counts"]["skipped"].size(), 1u);
+}
+
+TEST_F(RangefinderCommand, WrongUsageAndBadFilesAreNamed) {
+  simulate();
+  EXPECT_EQ(alidade({"rangefinder", path("sim/shots.csv")}).code, 2);
+  EXPECT_EQ(calibrate({"--method", "magic"}).code, 2);
+  EXPECT_EQ(alidade({"rangefinder", path("sim/shots.csv"), "--camera", path("sim/camera.yaml"), "--board", "9x6"}).code,
+            2);
+  EXPECT_EQ(alidade({"project", "--beam", path("none.yaml"), "--range", "1"}).code, 3);
+  EXPECT_EQ(alidade({"project", "--beam", path("sim/truth_rangefinder.yaml"), "--range", "-1"}).code, 2);
+  write_file(path("bad.yaml"), "origin_m: [0, 0, 0]\ndirection: [0, 0, 2]\n");
+  const Outcome outcome = alidade({"project", "--beam", path("bad.yaml"), "--range", "1"});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_NE(outcome.err.find("direction: has the length 2, not 1"), std::string::npos) << outcome.err;
+}
+
+/// From rendered photos, found and solved without help: board, lens and spot with noise.
+TEST_F(RangefinderCommand, FromPhotosTheOriginIsWithinThreeMillimetres) {
+  simulate({"--photos", "--seed", "4"});
+  const Outcome outcome = alidade({"rangefinder", path("sim/shots.csv"), "--camera", path("sim/camera.yaml"), "--board",
+                                   "9x6", "--square", "0.04", "--json", "--out", path("out")});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  expect_near_truth(document, 3.0);
+  double squares_m2 = 0.0, cosine = 0.0;
+  const std::vector<double> origin{0.04, -0.07, 0.04}, direction{0.013795889, -0.015203087, 0.999789248};
+  for (std::size_t i = 0; i < 3; ++i) {
+    squares_m2 += std::pow(document["estimate"]["origin_m"][i].get<double>() - origin[i], 2);
+    cosine += document["estimate"]["direction"][i].get<double>() * direction[i];
+  }
+  EXPECT_LT(std::sqrt(squares_m2), 0.003);
+  EXPECT_LT(std::acos(std::min(cosine, 1.0)) * 180.0 / M_PI, 0.05);
+  EXPECT_TRUE(std::filesystem::exists(path("out/report.html")));
+}
+
+/// A true single-point rangefinder: 37 photos, readings in steps of 1 cm.
+TEST_F(RangefinderCommand, ARealRangefindersRangesArePredicted) {
+  const char* data = std::getenv("ALIDADE_DATA");
+  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set: the photos of a real rangefinder are not at hand";
+  const std::string folder = std::string(data) + "/data/lidar1d-giubilato/";
+  const Csv ranges = Csv::read(folder + "ranges_m.csv");
+  std::string table = "range_m,photo\n";
+  for (std::size_t row = 0; row < ranges.num_rows(); ++row)
+    table += ranges.text(row, "range_m") + "," + folder + "images/" + ranges.text(row, "image") + "\n";
+  write_file(path("shots.csv"), table);
+  const Outcome camera = alidade({"calibrate", folder + "images", "--board", "8x6", "--square", "0.0387", "--no-report",
+                                  "--quiet", "--out", path("camera")});
+  ASSERT_TRUE(camera.code == 0 || camera.code == 6) << camera.err;  // its σ is not what this test is about
+  const std::vector<std::string> command{"rangefinder", path("shots.csv"),
+                                         "--camera",    path("camera/camera.yaml"),
+                                         "--board",     "8x6",
+                                         "--square",    "0.0387",
+                                         "--method",    "plane",
+                                         "--json",      "--no-report",
+                                         "--out",       path("out")};
+  const Outcome plain = alidade(command);
+  ASSERT_EQ(plain.code, 0) << plain.err;
+  EXPECT_NE(Json::parse(plain.out)["verdict"]["checks"].dump().find("--scale"), std::string::npos);
+  std::vector<std::string> scaled = command;
+  scaled.emplace_back("--scale");
+  const Outcome outcome = alidade(scaled);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  const Json& estimate = document["estimate"];
+  EXPECT_LT(estimate["left_out"]["rms_range_m"], 0.018);
+  // The authors' own unconstrained fit has |direction| 0.975: the same scale.
+  EXPECT_NEAR(estimate["scale"], 0.98, 0.02);
+  EXPECT_GT((1.0 - estimate["scale"].get<double>()) / document["stddev"]["scale"].get<double>(), 3.0);
+  EXPECT_GE(estimate["noise"]["sigma_range_m"], 0.01 / std::sqrt(12.0) * 0.999);  // the steps of the readings
+  // σ covers the scatter: residuals over their σ.
+  double squares = 0.0;
+  int num = 0;
+  const Json& shots = document["data"]["shots"];
+  for (std::size_t i = 0; i < shots["used"].size(); ++i) {
+    if (!shots["used"][i].get<bool>()) continue;
+    squares +=
+        std::pow(shots["residual_range_m"][i].get<double>() / shots["sigma_residual_range_m"][i].get<double>(), 2);
+    ++num;
+  }
+  EXPECT_GE(num, 34);
+  EXPECT_NEAR(std::sqrt(squares / (num - 6)), 1.0, 0.35);
+}
+
+/// One bearing of a 3-D scanner is a single-point rangefinder: in the middle of the ranges that its scan of each board
+/// has there. Scans in the scanner's frame.
+class ScannersBearing {
+ public:
+  explicit ScannersBearing(std::string folder) : folder_(std::move(folder)) {
+    for (int k = 1; k <= 15; ++k) {
+      std::istringstream points(read_file(folder_ + "laser_target" + std::to_string(k) + ".xyz"));
+      Eigen::Vector3d point;
+      while (points >> point.x() >> point.y() >> point.z()) scans_[k].push_back(point);
+    }
+  }
+  static Eigen::Vector3d direction(double azimuth_deg, double elevation_deg) {
+    constexpr double degree = 0.017453292519943295;
+    const double a = azimuth_deg * degree, e = elevation_deg * degree;
+    return {std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e)};
+  }
+  [[nodiscard]] std::string shots(const Eigen::Vector3d& bearing) const {
+    constexpr double near = 0.005, widest_m = 0.05, farthest_m = 3.2;  // behind the boards is a wall
+    constexpr std::size_t num = 5;
+    std::string table = "range_m,photo\n";
+    for (const auto& [k, points] : scans_) {
+      std::map<double, double> nearest;
+      for (const Eigen::Vector3d& point : points) {
+        const double away = (point.normalized() - bearing).norm();
+        if (away < near) nearest[away] = point.norm();
+      }
+      std::vector<double> ranges;
+      for (const auto& [away, range_m] : nearest)
+        if (ranges.size() < num) ranges.push_back(range_m);
+      std::ranges::sort(ranges);
+      if (ranges.size() < 3 || ranges.back() - ranges.front() > widest_m) continue;  // an edge
+      if (ranges.back() > farthest_m) continue;
+      table += fmt::format("{:.5f},{}img_target{}.jpg\n", ranges[ranges.size() / 2], folder_, k);
+    }
+    return table;
+  }
+
+ private:
+  std::string folder_;
+  std::map<int, std::vector<Eigen::Vector3d>> scans_;
+};
+
+/// The boards stood at nearly one distance: the data cannot tell. By the published pose two of the bearings passed 9 of
+/// 14 and 13 of 15 boards, and read what stood behind, up to 46 cm off: that is told first. What the data do tell is
+/// within its σ of the pose.
+TEST_F(RangefinderCommand, BearingsOfARealScannerAreWithinTheirSigmaOfThePublishedPose) {
+  const char* data = std::getenv("ALIDADE_DATA");
+  if (!data) GTEST_SKIP() << "ALIDADE_DATA is not set: the scans are not at hand";
+  const ScannersBearing scanner(std::string(data) + "/data/lcct-laser3d/");
+  write_file(path("camera.yaml"),
+             "model: brown\nwidth: 640\nheight: 480\nfx: 1588.85\nfy: 1589.14\ncx: 336.85\ncy: 166.22\n"
+             "k1: -0.18345\nk2: -0.0344\np1: -0.00547\np2: 0.00439\nk3: 0\n");
+  Eigen::Matrix3d cam_from_scanner;
+  cam_from_scanner << -0.527226, 0.849650, -0.011278, 0.111189, 0.055825, -0.992230, -0.842419, -0.524383, -0.123904;
+  const Eigen::Vector3d origin(-0.198980, 0.016672, -0.091506);
+  struct Asked {
+    double azimuth_deg, elevation_deg;
+    int code;
+    const char* reason;
+  };
+  for (const auto& [azimuth_deg, elevation_deg, code, reason] : {Asked{-156.0, -16.0, 4, "equal ranges"},
+                                                                 {-152.0, -13.0, 5, "that the beam hit the board"},
+                                                                 {-144.0, -13.0, 5, "that the beam hit the board"}}) {
+    const Eigen::Vector3d bearing = ScannersBearing::direction(azimuth_deg, elevation_deg);
+    write_file(path("shots.csv"), scanner.shots(bearing));
+    const Outcome outcome =
+        alidade({"rangefinder", path("shots.csv"), "--camera", path("camera.yaml"), "--board", "7x5", "--square",
+                 "0.03", "--method", "plane", "--no-report", "--out", path("out"), "--json"});
+    EXPECT_EQ(outcome.code, code) << outcome.err;
+    EXPECT_NE(outcome.err.find(reason), std::string::npos) << outcome.err;
+    const Json document = Json::parse(read_file(path("out/result.json")));
+    EXPECT_GE(document["counts"]["used"], 10);
+    const Json &estimate = document["estimate"], &stddev = document["stddev"];
+    const Eigen::Vector3d direction = cam_from_scanner * bearing;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto axis = static_cast<Eigen::Index>(i);
+      EXPECT_LT(std::abs(estimate["origin_m"][i].get<double>() - origin[axis]),
+                3.0 * stddev["origin_m"][i].get<double>());
+      EXPECT_LT(std::abs(estimate["direction"][i].get<double>() - direction[axis]),
+                3.0 * stddev["direction"][i].get<double>());
+    }
+  }
+}
+
+}  // namespace
+}  // namespace alidade

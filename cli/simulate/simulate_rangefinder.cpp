@@ -1,0 +1,175 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <opencv2/core.hpp>
+
+#include "alidade/formats/beam_file.h"
+#include "alidade/formats/camera_file.h"
+#include "alidade/imaging/image_codecs.h"
+#include "alidade/simulate/rangefinder.h"
+#include "alidade/simulate/spot_photos.h"
+#include "alidade/tables/corner_file.h"
+#include "alidade/tables/shots_file.h"
+#include "cli/app/app.h"
+#include "cli/app/option_checks.h"
+#include "cli/commands/commands.h"
+
+namespace alidade::cli {
+namespace {
+
+struct SimulateRangefinderArgs {
+  std::string scenario = "reference", laser = "red";
+  std::filesystem::path camera;
+  int shots = 18;
+  double sigma_range_m = 0.002, scale = 1.0;
+  ShotNoise noise;
+  ShotMistake mistake;
+  std::string unit = "m";
+  int stickers = 0, jpeg = 0;
+  double speckle = 0.0;
+  bool photos = false, photos_off = false, bayer = false;
+};
+
+std::string row_name(std::size_t i) { return fmt::format("shot_{:03}.png", i + 1); }
+
+RangefinderScene scene_of(const SimulateRangefinderArgs& args, Run& run) {
+  auto config = rangefinder_scenario(args.scenario);
+  if (!config)
+    throw UsageError(
+        fmt::format("--scenario: '{}' is not one of {}", args.scenario, fmt::join(rangefinder_scenarios(), ", ")));
+  if (!args.camera.empty()) {
+    run.add_input("camera", args.camera);
+    config->camera = read_central_camera(args.camera);
+  }
+  config->num_shots = args.shots;
+  config->beam.noise = {args.sigma_range_m, 0.0, 0.0};
+  config->beam.scale = args.scale;
+  return draw_rangefinder_scene(*config, run.options.seed);
+}
+
+/// Photos of the boards with the spot, and shots that name them: what a person brings home.
+void add_photos(const SimulateRangefinderArgs& args, const RangefinderScene& scene, std::vector<Shot>& shots,
+                Run& run) {
+  SpotScene spots;
+  spots.boards = {scene.camera, scene.board, points_in_board(scene.board), scene.cam_from_board};
+  spots.beam_origin_in_cam = scene.beam.origin_in_cam;
+  spots.beam_direction_in_cam = scene.beam.direction_in_cam;
+  for (const double range_m : scene.range_m) spots.range_m.push_back(scene.beam.scale * range_m);
+  SpotPhotoConfig config;
+  config.speckle = args.speckle;
+  config.is_bayer = args.bayer;
+  config.jpeg_quality = args.jpeg;
+  config.num_stickers = args.stickers;
+  config.laser.colour = args.laser == "green" ? LaserColour::green : LaserColour::red;
+  const auto add = [&](std::size_t i, bool is_on, const std::string& name) {
+    config.is_on = is_on;
+    run.add_file(name, png_bytes(render_spot_photo(spots, i, config, run.options.seed + (is_on ? 0u : 1u))));
+  };
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    report_progress(run.progress, "photos", i, shots.size());
+    shots[i].spot.reset();
+    add(i, true, row_name(i));
+    if (args.photos_off) add(i, false, "off_" + row_name(i));
+  }
+}
+
+std::string table_of(const SimulateRangefinderArgs& args, const std::vector<Shot>& shots) {
+  if (!args.photos) return shots_csv(shots, true);
+  std::string text = args.photos_off ? "range_m,photo,photo_off\n" : "range_m,photo\n";
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    text += fmt::format("{:.9g},{}", shots[i].range_m, row_name(i));
+    text += args.photos_off ? ",off_" + row_name(i) + "\n" : "\n";
+  }
+  return text;
+}
+
+ShotMistake mistake_of(const SimulateRangefinderArgs& args) {
+  ShotMistake mistake = args.mistake;
+  for (const auto& [name, metres] :
+       {std::pair{"mm", 0.001}, std::pair{"cm", 0.01}, std::pair{"inch", 0.0254}, std::pair{"feet", 0.3048}})
+    if (args.unit == name) mistake.unit_m = metres;
+  return mistake;
+}
+
+ExitCode simulate_rangefinder(const SimulateRangefinderArgs& args, Run& run) {
+  const RangefinderScene scene = scene_of(args, run);
+  SimulatedShots simulated = simulate_shots(scene, args.noise, run.options.seed);
+  simulated.shots = mistaken_shots(std::move(simulated.shots), mistake_of(args));
+  std::vector<BoardView> views;
+  for (std::size_t i = 0; i < simulated.shots.size(); ++i) {
+    Shot& shot = simulated.shots[i];
+    shot.name = row_name(i);
+    if (!shot.board) continue;
+    shot.board->photo = shot.name;
+    views.push_back(*shot.board);
+  }
+  if (args.photos) add_photos(args, scene, simulated.shots, run);
+  run.add_file("shots.csv", table_of(args, simulated.shots));
+  if (!args.photos) run.add_file("corners.csv", corners_csv(views));
+  const Camera told = mistaken_camera(scene.camera, args.mistake.focal, args.mistake.centre_px);
+  run.add_file("camera.yaml", camera_text(told, CameraFormat::alidade));
+  run.add_file("truth_rangefinder.yaml", beam_text(scene.beam, scene.camera, "camera.yaml"));
+  JsonValue outliers = JsonValue::list();
+  for (std::size_t i = 0; i < simulated.is_outlier.size(); ++i)
+    if (simulated.is_outlier[i]) outliers.push_back(row_name(i));
+  run.document.estimate["outliers"] = std::move(outliers);
+  run.document.counts.given = run.document.counts.used = simulated.shots.size();
+  Verdict verdict;
+  verdict.sentence = fmt::format("{} shots of a rangefinder with known truth; board {}x{}, {:g} m", args.shots,
+                                 scene.board.cols, scene.board.rows, scene.board.square_m);
+  run.say(fmt::format("{} in {}", verdict.sentence, run.options.out.string()));
+  return run.finish(verdict);
+}
+
+}  // namespace
+
+void add_rangefinder_scenario(App& app) {
+  auto args = std::make_shared<SimulateRangefinderArgs>();
+  CLI::App& command = app.add_command(
+      {"simulate rangefinder", "Shots of a laser rangefinder beside a camera, with boards and spots, and the truth",
+       "  alidade simulate rangefinder --out shots && alidade rangefinder shots/shots.csv --camera shots/camera.yaml "
+       "\\\n"
+       "    --corners shots/corners.csv --board 9x6 --square 0.04\n"
+       "  alidade simulate rangefinder --photos --shots 12 --out photos",
+       true},
+      [args](Run& run) { return simulate_rangefinder(*args, run); });
+  command.add_option("--scenario", args->scenario, fmt::format("{}", fmt::join(rangefinder_scenarios(), ", ")))
+      ->capture_default_str();
+  command.add_option("--shots", args->shots, "How many shots")->check(CLI::Range(1, 10000))->capture_default_str();
+  command.add_option("--camera", args->camera, "The true camera; without it one is made up")->type_name("FILE");
+  const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
+    command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
+  };
+  number("--sigma-range-m", args->sigma_range_m, "Noise of a reading [m]", 0.0, 1.0);
+  number("--sigma-px", args->noise.sigma_spot_px, "Noise of a spot's coordinate", 0.0, 100.0);
+  number("--sigma-corner-px", args->noise.sigma_corner_px, "Noise of a corner's coordinate", 0.0, 100.0);
+  number("--outliers", args->noise.outlier_share, "Share of shots whose beam passed the board", 0.0, 0.9);
+  number("--scale", args->scale, "Metres for each metre read", 0.5, 2.0);
+  number("--sigma-px-near", args->noise.sigma_spot_near_px, "Noise of a spot at 1 m beyond that; falls with the range",
+         0.0, 100.0);
+  number("--offset-m", args->mistake.offset_m, "What each reading is too long by [m]", -1.0, 1.0);
+  number("--focal-error", args->mistake.focal, "Share by which the camera file's focal length is too long", -0.5, 0.5);
+  number("--centre-error", args->mistake.centre_px, "Pixels by which its centre lies aside, in u and v", -1e3, 1e3);
+  command.add_option("--unit", args->unit, "Of the readings in the table")
+      ->check(CLI::IsMember({"m", "mm", "cm", "inch", "feet"}))
+      ->capture_default_str();
+  command.add_option("--shift-rows", args->mistake.shift_rows, "Ranges stand so many rows late")
+      ->check(CLI::Range(-100, 100))
+      ->capture_default_str();
+  number("--speckle", args->speckle, "With --photos: contrast of the laser's speckle, 1 is full", 0.0, 1.0);
+  command.add_flag("--bayer", args->bayer, "With --photos: one colour a pixel, the others interpolated");
+  command.add_option("--jpeg", args->jpeg, "With --photos: compressed with this quality, 0: not")
+      ->check(CLI::Range(0, 100))
+      ->capture_default_str();
+  command.add_option("--stickers", args->stickers, "With --photos: red spots on the board that are not the laser's")
+      ->check(CLI::Range(0, 10))
+      ->capture_default_str();
+  command.add_flag("--photos", args->photos, "Render the photos instead of spots and corners");
+  command.add_flag("--photos-off", args->photos_off, "With --photos: each also with the laser off");
+  command.add_option("--laser", args->laser, "Colour of the laser in photos: red or green")
+      ->check(CLI::IsMember({"red", "green"}))
+      ->capture_default_str();
+}
+
+}  // namespace alidade::cli

@@ -1,0 +1,159 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <opencv2/core.hpp>
+
+#include "alidade/formats/camera_file.h"
+#include "alidade/formats/rig_file.h"
+#include "alidade/geometry/degree.h"
+#include "alidade/imaging/image_codecs.h"
+#include "alidade/simulate/board_photos.h"
+#include "alidade/simulate/rangefinder.h"
+#include "alidade/simulate/rig.h"
+#include "alidade/tables/views_file.h"
+#include "cli/app/app.h"
+#include "cli/app/option_checks.h"
+#include "cli/commands/commands.h"
+
+namespace alidade::cli {
+namespace {
+
+struct SimulateRigArgs {
+  std::string scenario = "reference";
+  std::filesystem::path rig;
+  int boards = 5, views = 4;
+  double sigma_px = 0.2, sigma_angle_deg = 0.02, wrong = 0.0;
+  double scale = 1.0, once_deg = 0.0, twice_deg = 0.0, backlash_deg = 0.0;
+  RigMistake mistake;
+  bool photos = false;
+};
+
+RigSceneConfig config_from(const SimulateRigArgs& args, Run& run) {
+  RigSceneConfig config;
+  config.num_boards = args.boards;
+  config.max_views_of_a_board = args.views;
+  config.encoder_scale = args.scale;
+  config.once_rad = args.once_deg * degree;
+  for (RigHead& head : xiahou_rig()) config.nominal.push_back(head);
+  if (!args.rig.empty()) {
+    run.add_input("rig", args.rig);
+    config.nominal = read_rig(args.rig).heads;
+  }
+  if (args.scenario == "pan_only") config.tilts_rad = {5.0 * degree};
+  if (args.scenario == "tilt_only") config.pans_rad = {0.0};
+  if (args.scenario == "unlinked") config.shared = false;
+  if (args.scenario == "one_head") config.nominal.resize(1);
+  return config;
+}
+
+std::string photo_of(std::size_t v) { return fmt::format("view_{:03}.png", v); }
+
+/// Photos of the boards instead of corners.
+void add_photos(const RigScene& scene, const std::vector<HeadView>& views, Run& run) {
+  std::string table = "view,board,head,pan_rad,tilt_rad,photo\n";
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    report_progress(run.progress, "photos", v, views.size());
+    const HeadView& truth = scene.views[v];
+    for (const RigHead& rig_head : scene.rig.heads) {
+      if (rig_head.head.id != truth.head) continue;
+      const Rigid3& world_from_board = scene.world_from_board[static_cast<std::size_t>(truth.board)];
+      const BoardScene shown{.camera = rig_head.camera,
+                             .board = scene.board,
+                             .points_in_board = points_in_board(scene.board),
+                             .cam_from_board = {cam_from_world(rig_head.head, truth.pan_tilt_rad) * world_from_board}};
+      run.add_file(photo_of(v), png_bytes(render_board_photo(shown, 0, {}, run.options.seed + v)));
+    }
+    table += fmt::format("{},{},{},{},{},{}\n", v, truth.board, truth.head, views[v].pan_tilt_rad.x(),
+                         views[v].pan_tilt_rad.y(), photo_of(v));
+  }
+  run.add_file("views.csv", table);
+}
+
+/// The lens is the true one; its file says so: focal lengths and centre to a thousandth of a pixel.
+Camera with_sigma(Camera camera) {
+  constexpr double sigma_px = 1e-3;
+  if (camera.cov.size() > 0) return camera;
+  const auto num = static_cast<Eigen::Index>(params(camera.lens).size());
+  camera.cov.setZero(num, num);
+  camera.cov.diagonal().head<4>().setConstant(sigma_px * sigma_px);
+  return camera;
+}
+
+ExitCode simulate_rig(const SimulateRigArgs& args, Run& run) {
+  const RigScene scene = draw_rig_scene(config_from(args, run), run.options.seed);
+  const RigNoise noise{args.sigma_px, args.sigma_angle_deg * degree, args.wrong, args.twice_deg * degree,
+                       args.backlash_deg * degree};
+  SimulatedViews simulated = simulate_head_views(scene, noise, run.options.seed);
+  simulated.views = mistaken_views(std::move(simulated.views), scene, args.mistake);
+  if (args.photos) {
+    add_photos(scene, simulated.views, run);
+  } else {
+    run.add_file("views.csv", views_csv(simulated.views));
+  }
+  std::vector<std::string> camera_files;
+  for (const RigHead& rig_head : scene.rig.heads) {
+    camera_files.push_back(fmt::format("camera_{}.yaml", rig_head.head.id));
+    const Camera told = mistaken_camera(rig_head.camera, args.mistake.focal, args.mistake.centre_px);
+    run.add_file(camera_files.back(), camera_text(with_sigma(told), CameraFormat::alidade));
+  }
+  // Where the files of the lenses are wrong, the truth holds its own.
+  const bool is_mistaken = args.mistake.focal != 0.0 || args.mistake.centre_px != 0.0;
+  run.add_file("truth_rig.yaml", rig_text(scene.rig, is_mistaken ? std::vector<std::string>{} : camera_files));
+  JsonValue wrong = JsonValue::list();
+  for (std::size_t v = 0; v < simulated.is_wrong.size(); ++v)
+    if (simulated.is_wrong[v]) wrong.push_back(simulated.views[v].seen.photo);
+  run.document.estimate["wrong_views"] = std::move(wrong);
+  run.document.counts.given = run.document.counts.used = simulated.views.size();
+  Verdict verdict;
+  verdict.sentence =
+      fmt::format("{} views of {} boards by {} heads with known truth; board {}x{}, {:g} m", simulated.views.size(),
+                  args.boards, scene.rig.heads.size(), scene.board.cols, scene.board.rows, scene.board.square_m);
+  run.say(fmt::format("{} in {}", verdict.sentence, run.options.out.string()));
+  return run.finish(verdict);
+}
+
+}  // namespace
+
+void add_rig_scenario(App& app) {
+  auto args = std::make_shared<SimulateRigArgs>();
+  CLI::App& command = app.add_command(
+      {"simulate rig", "Views of boards by two pan-tilt heads, with the angles their encoders read, and the truth",
+       "  alidade simulate rig --out views && alidade rig views/views.csv --camera views/camera_1.yaml \\\n"
+       "    --camera views/camera_2.yaml --board 9x6 --square 0.025 --sigma-square 1e-6 --sigma-scale 1e-6\n"
+       "  alidade simulate rig --photos --out photos",
+       true},
+      [args](Run& run) { return simulate_rig(*args, run); });
+  command.add_option("--scenario", args->scenario, "reference, pan_only, tilt_only, unlinked, one_head")
+      ->check(CLI::IsMember({"reference", "pan_only", "tilt_only", "unlinked", "one_head"}))
+      ->capture_default_str();
+  command.add_option("--rig", args->rig, "Heads that the drawn ones are near (default: the paper's two)")
+      ->type_name("FILE");
+  command.add_option("--boards", args->boards, "Places of the board")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command.add_option("--views", args->views, "Views of each board by each head, at most")
+      ->check(CLI::Range(2, 1000))
+      ->capture_default_str();
+  const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
+    command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
+  };
+  number("--sigma-px", args->sigma_px, "Noise of a corner's coordinate", 0.0, 100.0);
+  number("--sigma-angle-deg", args->sigma_angle_deg, "Noise of a reading [deg]", 0.0, 10.0);
+  number("--wrong", args->wrong, "Share of the views with the angles of another", 0.0, 0.5);
+  number("--scale", args->scale, "Radians of each axis for each radian read", 0.5, 2.0);
+  number("--once-deg", args->once_deg, "Amplitude of an error of one period a turn of each axis [deg]", 0.0, 15.0);
+  number("--twice-deg", args->twice_deg, "The same of two periods a turn [deg]", 0.0, 15.0);
+  number("--backlash-deg", args->backlash_deg, "Backlash of each axis [deg]", 0.0, 10.0);
+  number("--focal-error", args->mistake.focal, "Share by which the camera files' focal lengths are too long", -0.5,
+         0.5);
+  number("--centre-error", args->mistake.centre_px, "Pixels by which their centres lie aside, in u and v", -1e3, 1e3);
+  command.add_flag("--swap-angles", args->mistake.swap_angles, "Pan stands in the column of tilt");
+  command.add_flag("--flip-pan", args->mistake.flip_pan, "Pan counts the other way");
+  command.add_flag("--mirror", args->mistake.mirror, "Images are mirrored");
+  command.add_flag("--swap-heads", args->mistake.swap_heads, "The heads' numbers are exchanged");
+  command.add_flag("--shift-rows", args->mistake.shift_rows, "Each view has the angles of the one before");
+  command.add_flag("--photos", args->photos, "Render the photos instead of corners");
+}
+
+}  // namespace alidade::cli

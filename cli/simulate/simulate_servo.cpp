@@ -1,0 +1,117 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <numbers>
+
+#include "alidade/simulate/servo.h"
+#include "alidade/tables/servo_log_file.h"
+#include "alidade/tables/servo_scenario_file.h"
+#include "cli/app/app.h"
+#include "cli/app/option_checks.h"
+#include "cli/commands/commands.h"
+
+namespace alidade::cli {
+namespace {
+
+constexpr double max_rate_deg_s = 1e6;
+
+struct SimulateServoArgs {
+  std::string kind = "angle", unit = "deg";
+  bool chirp = false, one_step = false;
+  double gain = 0.0, tau_s = 0.1, latency_s = 0.08, max_rate_deg_s = max_rate_deg_s, max_acceleration_deg_s2 = 1e9;
+  double dead_band = 0.0, backlash_deg = 0.0, second_tau_s = 0.0;
+  double amplitude = 200.0, duration_s = 5.0, rate_hz = 100.0, sigma_deg = 0.05, step_deg = 0.0, zero_deg = 0.0;
+};
+
+ServoLogScene scene_of(const SimulateServoArgs& args) {
+  const double deg = std::numbers::pi / 180.0;
+  ServoLogScene scene;
+  if (args.kind == "rate") {
+    RatePlant plant{args.gain != 0.0 ? args.gain : 0.3, *unit_named(args.unit), args.tau_s};
+    plant.max_rate_rad_s = deg * args.max_rate_deg_s;
+    plant.max_acceleration_rad_s2 = deg * args.max_acceleration_deg_s2;
+    scene.axis.plant = plant;
+  } else {
+    AnglePlant plant{args.gain != 0.0 ? args.gain : 0.0567, *unit_named(args.unit), args.tau_s};
+    if (args.max_rate_deg_s < max_rate_deg_s) plant.max_rate_rad_s = deg * args.max_rate_deg_s;
+    scene.axis.plant = plant;
+  }
+  scene.axis.dead_band = args.dead_band;
+  scene.axis.backlash_rad = deg * args.backlash_deg;
+  scene.axis.second_tau_s = args.second_tau_s;
+  scene.axis.command_delay_s = args.latency_s;
+  scene.is_chirp = args.chirp;
+  if (args.one_step) scene.steps = {1.0};
+  scene.amplitude = args.amplitude;
+  scene.duration_s = args.duration_s;
+  scene.rate_hz = args.rate_hz;
+  scene.zero_rad = deg * args.zero_deg;
+  scene.sigma_rad = deg * args.sigma_deg;
+  scene.encoder_step_rad = deg * args.step_deg;
+  return scene;
+}
+
+ExitCode simulate_servo(const SimulateServoArgs& args, Run& run) {
+  if (args.duration_s * args.rate_hz > 1e6) throw UsageError("--rate-hz: makes more than a million rows");
+  const ServoLogScene scene = scene_of(args);
+  std::vector<ServoSample> samples;
+  for (const ServoLogRow& row : simulate_servo_log(scene, run.options.seed))
+    samples.push_back({row.t_s, row.command, row.angle_rad});
+  run.add_file("log.csv", servo_log_csv(samples));
+  run.add_file("scenario.yaml", servo_scenario_text());
+  run.document.estimate["gain_rad"] = gain_of(scene.axis.plant);
+  run.document.estimate["tau_s"] = args.tau_s;
+  run.document.estimate["latency_s"] = args.latency_s;
+  run.document.counts.given = run.document.counts.used = samples.size();
+  Verdict verdict;
+  verdict.sentence = fmt::format("{} rows of a servo under a {} with known truth", samples.size(),
+                                 args.chirp      ? "chirp"
+                                 : args.one_step ? "step"
+                                                 : "row of steps");
+  run.say(fmt::format("{} in {}, with a scenario of alidade servo", verdict.sentence, run.options.out.string()));
+  return run.finish(verdict);
+}
+
+}  // namespace
+
+void add_servo_scenario(App& app) {
+  auto args = std::make_shared<SimulateServoArgs>();
+  CLI::App& command = app.add_command(
+      {"simulate servo", "A log of one servo axis under steps or a chirp for `identify`, and a scenario for `servo`",
+       "  alidade simulate servo --out sim && alidade identify sim/log.csv && alidade servo sim/scenario.yaml\n"
+       "  alidade simulate servo --chirp --kind rate --latency-s 0.05 --out rate",
+       true},
+      [args](Run& run) { return simulate_servo(*args, run); });
+  command.add_option("--kind", args->kind, "What follows the command with a lag: the angle, or its rate")
+      ->check(CLI::IsMember({"angle", "rate"}))
+      ->capture_default_str();
+  command.add_flag("--chirp", args->chirp, "A sine that rises from 0.1 to 3 Hz, instead of steps");
+  command.add_flag("--one-step", args->one_step, "One step after 0.5 s that stays, instead of several to both sides");
+  command.add_option("--gain", args->gain, "Angle (or rate) for each unit of command (default: 0.0567, rate 0.3)")
+      ->check(finite_number());
+  command.add_option("--unit", args->unit, "Unit of the angle in the gain")
+      ->check(CLI::IsMember({"deg", "rad"}))
+      ->capture_default_str();
+  const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
+    command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
+  };
+  number("--tau-s", args->tau_s, "Time constant", 1e-4, 100.0);
+  number("--latency-s", args->latency_s, "From a command to its first effect", 0.0, 10.0);
+  number("--max-rate-deg-s", args->max_rate_deg_s, "Fastest turn [deg/s]", 1e-3, max_rate_deg_s);
+  number("--max-acceleration-deg-s2", args->max_acceleration_deg_s2, "With --kind rate: largest acceleration [deg/s2]",
+         1e-3, 1e9);
+  number("--dead-band", args->dead_band, "Commands no larger do nothing, larger ones count from it [units of command]",
+         0.0, 1e9);
+  number("--backlash-deg", args->backlash_deg, "Play between what drives the axis and the angle that is read", 0.0,
+         90.0);
+  number("--second-tau-s", args->second_tau_s, "A second lag, of the command", 0.0, 100.0);
+  number("--amplitude", args->amplitude, "Size of the step or sine, in units of command", 0.0, 1e9);
+  number("--duration-s", args->duration_s, "Length of the log [s]", 1e-3, 1e4);
+  number("--rate-hz", args->rate_hz, "Rows a second", 1e-2, 1e5);
+  number("--sigma-deg", args->sigma_deg, "Noise of the encoder", 0.0, 90.0);
+  number("--step-deg", args->step_deg, "One count of the encoder; 0: it does not round", 0.0, 90.0);
+  number("--zero-deg", args->zero_deg, "What the encoder reads at angle zero", -360.0, 360.0);
+}
+
+}  // namespace alidade::cli

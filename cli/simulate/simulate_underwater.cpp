@@ -1,0 +1,174 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <opencv2/core.hpp>
+
+#include "alidade/formats/camera_file.h"
+#include "alidade/imaging/image_codecs.h"
+#include "alidade/simulate/underwater.h"
+#include "alidade/simulate/underwater_video.h"
+#include "alidade/tables/localize_file.h"
+#include "cli/app/app.h"
+#include "cli/app/option_checks.h"
+#include "cli/commands/commands.h"
+
+namespace alidade::cli {
+namespace {
+
+struct SimulateUnderwaterArgs {
+  UnderwaterScene scene;
+  std::filesystem::path camera;
+  double rate_hz = 10.0;
+  double told_f = 1.0, told_centre_px = 0.0;
+  bool told_k1 = true;
+  bool video = false;
+  UnderwaterVideoConfig look;
+};
+
+StartFile start_of(const UnderwaterScene& scene, const UnderwaterSequence& sequence) {
+  StartFile file;
+  file.start.motion.world_from_cam = sequence.told_start;
+  const std::array<double, 4> sigmas{scene.sigma_position_m, scene.sigma_rotation_rad, 0.3, 0.3};
+  for (std::size_t i = 0; i < sigmas.size(); ++i)
+    file.start.cov.diagonal().segment<3>(static_cast<Eigen::Index>(3 * i)).setConstant(sigmas[i] * sigmas[i]);
+  for (const UnderwaterPoint& point : sequence.points)
+    if (!point.is_known && point.told_depth_m > 0.0)
+      file.depths.push_back({point.id, point.told_depth_m, scene.sigma_depth});
+  return file;
+}
+
+/// What `localize` takes of observations; how many there are.
+std::size_t add_observations(const UnderwaterScene& scene, const UnderwaterSequence& sequence, Run& run) {
+  std::vector<ObservationFrame> frames;
+  std::size_t num_observations = 0;
+  for (const UnderwaterFrame& frame : sequence.frames) {
+    ObservationFrame seen{static_cast<long>(frames.size()), frame.t_s, {}};
+    for (const UnderwaterObservation& observation : frame.observations)
+      seen.observations.push_back({observation.id, observation.px, 0.0});
+    num_observations += seen.observations.size();
+    frames.push_back(std::move(seen));
+  }
+  std::vector<KnownPoint> target;
+  for (const UnderwaterPoint& point : sequence.points)
+    if (point.is_known) target.push_back({point.id, point.told_in_world, scene.sigma_known_m});
+  run.add_file("sights.csv", observations_csv(frames));
+  run.add_file("target.yaml", target_text(target));
+  run.add_file("start.yaml", start_text(start_of(scene, sequence)));
+  return num_observations;
+}
+
+/// What `localize` takes of images: the board itself is the target.
+std::size_t add_frames(const SimulateUnderwaterArgs& args, const Camera& camera, const UnderwaterSequence& sequence,
+                       Run& run) {
+  for (std::size_t k = 0; k < sequence.frames.size(); ++k) {
+    report_progress(run.progress, "frames", k, sequence.frames.size());
+    const cv::Mat frame =
+        render_underwater_frame(camera, sequence.frames[k].world_from_cam, args.look, run.options.seed + k);
+    run.add_file(fmt::format("frames/{:06}.png", k), png_bytes(frame));
+  }
+  const Board board = underwater_board();
+  run.add_file("target.yaml",
+               fmt::format("board: {{corners: {}x{}, square_m: {}}}\n", board.cols, board.rows, board.square_m));
+  return sequence.frames.size();
+}
+
+/// The camera as camera.yaml tells it.
+Camera told_camera(const SimulateUnderwaterArgs& args, const Camera& camera) {
+  Camera told = camera;
+  Eigen::VectorXd values = params(camera.lens);
+  const std::vector<std::string> names = param_names(camera.lens);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    double& value = values[static_cast<Eigen::Index>(i)];
+    if (names[i] == "fx" || names[i] == "fy") value *= args.told_f;
+    if (names[i] == "cx") value += args.told_centre_px;
+    if (names[i] == "k1" && !args.told_k1) value = 0.0;
+  }
+  told.lens = with_params(camera.lens, values);
+  return told;
+}
+
+ExitCode simulate(const SimulateUnderwaterArgs& args, Run& run) {
+  UnderwaterScene scene = args.scene;
+  scene.camera = args.camera.empty() ? underwater_camera() : read_camera(args.camera);
+  if (!args.camera.empty()) run.add_input("camera", args.camera);
+  scene.dt_s = 1.0 / args.rate_hz;
+  const UnderwaterSequence sequence = simulate_underwater(scene, run.options.seed);
+  std::vector<TimedPose> truth;
+  for (const UnderwaterFrame& frame : sequence.frames) truth.push_back({frame.t_s, frame.world_from_cam});
+  std::vector<MapPoint> map;
+  for (const UnderwaterPoint& point : sequence.points)
+    map.push_back({point.id, point.point_in_world, Eigen::Matrix3d::Zero(), point.is_known, 0});
+  const std::size_t num =
+      args.video ? add_frames(args, scene.camera, sequence, run) : add_observations(scene, sequence, run);
+  run.add_file("camera.yaml", camera_text(told_camera(args, scene.camera), CameraFormat::alidade));
+  run.add_file("truth.tum", tum_text(truth));
+  run.add_file("truth_map.csv", map_csv(map));
+  run.document.estimate["frames"] = sequence.frames.size();
+  run.document.counts.given = run.document.counts.used = num;
+  Verdict verdict;
+  verdict.sentence = args.video ? fmt::format("{} pictures of a board under water, with known truth", num)
+                                : fmt::format("{} frames with {} sights of {} points, with known truth",
+                                              sequence.frames.size(), num, sequence.points.size());
+  run.say(fmt::format("{} in {}", verdict.sentence, run.options.out.string()));
+  return run.finish(verdict);
+}
+
+}  // namespace
+
+void add_underwater_scenario(App& app) {
+  auto args = std::make_shared<SimulateUnderwaterArgs>();
+  CLI::App& command = app.add_command(
+      {"simulate underwater", "What a camera under water sees of a board and points around it, and its true path",
+       "  alidade simulate underwater --out sim && alidade localize sim/sights.csv --camera sim/camera.yaml \\\n"
+       "    --target sim/target.yaml --start sim/start.yaml --truth sim/truth.tum\n"
+       "  alidade simulate underwater --points 40 --frames 300 --rate 30 --mismatches 0.4 --out hard\n"
+       "  alidade simulate underwater --video --rate 30 --frames 90 --out film && alidade localize film/frames \\\n"
+       "    --rate 30 --camera film/camera.yaml --target film/target.yaml --truth film/truth.tum",
+       true},
+      [args](Run& run) { return simulate(*args, run); });
+  UnderwaterScene& scene = args->scene;
+  command.add_option("--camera", args->camera, "The camera (default: a strongly distorting one)")->type_name("FILE");
+  command.add_option("--frames", scene.num_frames, "How many frames")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  CLI::Option* points = command.add_option("--points", scene.num_points, "The board's 8, then others")
+                            ->check(CLI::Range(1, 1000))
+                            ->capture_default_str();
+  command.add_option("--rate", args->rate_hz, "Frames a second")->check(positive_number())->capture_default_str();
+  const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
+    return command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
+  };
+  CLI::Option* video = command.add_flag(
+      "--video", args->video, "Render pictures of the board instead of sights: frames/, as seen through turbid water");
+  number("--blur-px", args->look.blur_px, "With --video: sigma of the blur [px]", 0.0, 10.0)->needs(video);
+  number("--noise", args->look.noise, "With --video: sigma of a colour value's noise, of 255", 0.0, 100.0)
+      ->needs(video);
+  points->excludes(video);
+  number("--sigma-px", scene.sigma_px, "σ of a pixel coordinate [px]", 0.0, 100.0)->excludes(video);
+  number("--sigma-depth", scene.sigma_depth, "σ of the depths in start.yaml, over the depth", 0.0, 1.0)
+      ->excludes(video);
+  number("--mismatches", scene.mismatches, "Share of the sights that show another place", 0.0, 1.0)->excludes(video);
+  number("--blackout-from", scene.blackout_from_s, "Nothing is seen from this time on [s]", 0.0, 1e6)->excludes(video);
+  number("--blackout", scene.blackout_s, "How long nothing is seen [s]", 0.0, 1e6)->excludes(video);
+  const char* const group = "What is not as told";
+  number("--told-f", args->told_f, "Focal length in camera.yaml over the true one", 0.1, 10.0)->group(group);
+  number("--told-centre", args->told_centre_px, "cx in camera.yaml less the true one [px]", -500.0, 500.0)
+      ->group(group);
+  command.add_flag("!--no-k1", args->told_k1, "camera.yaml has no k1")->group(group);
+  number("--readout", scene.readout_s, "Rolling shutter: time from the first row to the last [s]", 0.0, 1.0)
+      ->excludes(video)
+      ->group(group);
+  number("--late", scene.late_s, "Pictures are taken so long before their times [s]", -10.0, 10.0)
+      ->excludes(video)
+      ->group(group);
+  number("--target-speed", scene.target_speed_m_s, "Of the board along its x, against the other points [m/s]", -1.0,
+         1.0)
+      ->excludes(video)
+      ->group(group);
+  number("--target-stretch", scene.target_stretch, "target.yaml's points are so much further apart along x", -0.5, 0.5)
+      ->excludes(video)
+      ->group(group);
+}
+
+}  // namespace alidade::cli

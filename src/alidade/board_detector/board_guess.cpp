@@ -1,0 +1,182 @@
+#include "alidade/board_detector/board_guess.h"
+
+#include <algorithm>
+#include <array>
+#include <compare>
+#include <opencv2/imgproc.hpp>
+
+#include "alidade/board/dictionary.h"
+#include "alidade/board_detector/marker_board.h"
+#include "alidade/imaging/grey_photo.h"
+
+namespace alidade {
+namespace {
+
+constexpr std::size_t max_photos = 4;
+
+bool has_markers(const Board& board) { return board.kind == BoardKind::charuco || board.kind == BoardKind::aprilgrid; }
+
+using Sizes = std::vector<std::pair<int, int>>;
+
+/// Columns and rows of the usual slips. A chessboard is the same one turned by a quarter: of two that are equally near
+/// to what was told the wide one comes first.
+Sizes slips(const Board& told) {
+  const int c = told.cols, r = told.rows;
+  const Sizes all{{c, r},     {c - 1, r - 1}, {c + 1, r + 1}, {r, c},         {c, r - 1},     {c + 1, r},
+                  {c - 1, r}, {c, r + 1},     {c + 1, r - 1}, {c - 1, r + 1}, {r - 1, c - 1}, {r + 1, c + 1}};
+  Sizes each;
+  for (const auto& size : all) {
+    if (std::find(each.begin(), each.end(), size) == each.end()) each.push_back(size);
+  }
+  return each;
+}
+
+/// A few of the photos, evenly chosen, in a size that is searched quickly.
+std::vector<cv::Mat> chosen_photos(std::size_t num_photos, const PhotoLoader& load_photo) {
+  constexpr double enough_pixels = 2.5e6;
+  const std::size_t count = std::min(num_photos, max_photos);
+  std::vector<cv::Mat> photos;
+  for (std::size_t i = 0; i < count; ++i) {
+    cv::Mat photo = load_photo(i * num_photos / count);
+    while (static_cast<double>(photo.total()) > enough_pixels) cv::resize(photo, photo, {}, 0.5, 0.5, cv::INTER_AREA);
+    photos.push_back(std::move(photo));
+  }
+  return photos;
+}
+
+/// "DICT_5X5" of DICT_5X5_100: dictionaries of one family begin with the same markers. AprilTags have none but
+/// themselves.
+std::string family(const std::string& dictionary) {
+  return dictionary.starts_with("DICT_APRILTAG") ? dictionary : dictionary.substr(0, dictionary.rfind('_'));
+}
+
+/// The largest of each family: whatever the board is printed with is in it.
+constexpr std::array<const char*, 9> families{"DICT_4X4_1000",      "DICT_5X5_1000",       "DICT_6X6_1000",
+                                              "DICT_7X7_1000",      "DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_16h5",
+                                              "DICT_APRILTAG_25h9", "DICT_APRILTAG_36h10", "DICT_APRILTAG_36h11"};
+
+/// The dictionary of which most markers are seen; empty where there are next to none.
+std::string seen_dictionary(const std::vector<cv::Mat>& photos) {
+  constexpr std::size_t min_markers = 4;
+  std::vector<std::size_t> counts(families.size(), 0);
+  for (const cv::Mat& photo : photos) {
+    std::string reason;
+    const cv::Mat grey = to_grey_photo(photo, reason);
+    for (std::size_t k = 0; reason.empty() && k < families.size(); ++k) counts[k] += count_markers(grey, families[k]);
+  }
+  const auto most = std::max_element(counts.begin(), counts.end());
+  return *most < min_markers ? "" : families[static_cast<std::size_t>(most - counts.begin())];
+}
+
+/// The smallest dictionary of a family that holds the board; the told one where it does.
+std::string fitting_dictionary(Board board, const std::string& of_family, const std::string& told) {
+  board.dictionary = told;
+  if (family(told) == family(of_family) && fault(board).empty()) return told;
+  for (const std::string ending : {"_50", "_100", "_250", "_1000"}) {
+    board.dictionary = family(of_family) + ending;
+    if (marker_dictionary(board.dictionary) && fault(board).empty()) return board.dictionary;
+  }
+  return of_family;
+}
+
+/// The kinds of board that may be meant: the told one, then a chessboard with markers for one without.
+std::vector<Board> kinds_to_try(const Board& told, const std::string& dictionary) {
+  std::vector<Board> kinds;
+  const bool is_aprilgrid = told.kind == BoardKind::chessboard && dictionary == "DICT_APRILTAG_36h11";
+  const bool is_marked = !dictionary.empty() && !is_aprilgrid;
+  if (told.kind != BoardKind::charuco || is_marked) kinds.push_back(told);
+  if (told.kind == BoardKind::chessboard && is_marked) {
+    kinds.push_back(told);
+    kinds.back().kind = BoardKind::charuco;
+    kinds.back().marker_m = 0.75 * told.square_m;  // whatever it is: it must be told
+  }
+  if (told.kind == BoardKind::charuco) {
+    Board plain = told;
+    plain.kind = BoardKind::chessboard;
+    plain.marker_m = 0.0;
+    plain.dictionary.clear();
+    kinds.push_back(plain);
+  }
+  return kinds;
+}
+
+/// How well a board explains the photos: in how many it stands, then how many of its points are seen.
+struct Score {
+  std::size_t photos = 0, points = 0;
+  auto operator<=>(const Score&) const = default;
+};
+
+/// Does some photo show half of each outer row and column? A board that is told too large has its markers where the
+/// right one has them, and a row more, of which the paper's border now and then gives a point.
+bool reaches_its_edges(const Board& board, const std::vector<BoardDetection>& photos) {
+  std::array<int, 4> most{};
+  for (const BoardDetection& photo : photos) {
+    std::array<int, 4> seen{};
+    for (const Corner& corner : photo.view.corners) {
+      const int col = corner.index % board.cols, row = corner.index / board.cols;
+      const std::array<bool, 4> is_at{row == 0, row == board.rows - 1, col == 0, col == board.cols - 1};
+      for (std::size_t k = 0; k < 4; ++k) seen[k] += is_at[k] ? 1 : 0;
+    }
+    for (std::size_t k = 0; k < 4; ++k) most[k] = std::max(most[k], seen[k]);
+  }
+  return 2 * std::min(most[0], most[1]) >= board.cols && 2 * std::min(most[2], most[3]) >= board.rows;
+}
+
+Score score_of(const std::vector<cv::Mat>& photos, const Board& board, const Progress& progress) {
+  Score score;
+  const auto all = static_cast<std::size_t>(num_points(board));
+  const PhotoLoader load = [&](std::size_t i) { return photos[i]; };
+  const std::vector<BoardDetection> found = find_boards(photos.size(), load, board, false, progress).photos;
+  if (board.kind == BoardKind::charuco && !reaches_its_edges(board, found)) return score;
+  for (const BoardDetection& photo : found) {
+    const std::size_t seen = photo.view.corners.size();
+    // Part of a board without markers may be part of another one as well.
+    if (has_markers(board) ? 2 * seen < all : seen < all) continue;
+    ++score.photos;
+    score.points += seen;
+  }
+  return score;
+}
+
+}  // namespace
+
+std::optional<Board> guess_board(std::size_t num_photos, const PhotoLoader& load_photo, const Board& told,
+                                 const std::optional<std::vector<std::pair<int, int>>>& grids_seen,
+                                 const Progress& progress) {
+  const std::vector<cv::Mat> photos = chosen_photos(num_photos, load_photo);
+  if (photos.empty()) return std::nullopt;
+  const bool may_have_markers = told.kind == BoardKind::charuco || told.kind == BoardKind::chessboard;
+  const std::string dictionary = may_have_markers ? seen_dictionary(photos) : "";
+  std::optional<Board> best;
+  Score best_score;
+  for (Board board : kinds_to_try(told, dictionary)) {
+    const bool is_plain = board.kind == BoardKind::chessboard;
+    for (const auto& [cols, rows] : is_plain&& grids_seen ? *grids_seen : slips(told)) {
+      board.cols = cols;
+      board.rows = rows;
+      if (board.kind == BoardKind::charuco) board.dictionary = fitting_dictionary(board, dictionary, told.dictionary);
+      if (board == told || !fault(board).empty()) continue;
+      const Score score = score_of(photos, board, progress);
+      if (2 * score.photos <= photos.size()) continue;
+      const bool is_smaller = best && score == best_score && num_points(board) < num_points(*best);
+      if (best && !(score > best_score) && !is_smaller) continue;
+      best = board;
+      best_score = score;
+    }
+  }
+  return best;
+}
+
+std::string changed_options(const Board& told, const Board& meant) {
+  std::string options;
+  const auto add = [&](const std::string& option) { options += (options.empty() ? "" : " ") + option; };
+  if (meant.kind != told.kind) add("--board-kind " + std::string(kind_name(meant.kind)));
+  if (meant.cols != told.cols || meant.rows != told.rows) {
+    add("--board " + std::to_string(meant.cols) + "x" + std::to_string(meant.rows));
+  }
+  if (meant.kind == BoardKind::charuco && meant.dictionary != told.dictionary) add("--dictionary " + meant.dictionary);
+  if (meant.kind == BoardKind::charuco && told.kind != BoardKind::charuco) add("--marker with its markers' side");
+  return options;
+}
+
+}  // namespace alidade

@@ -1,0 +1,18 @@
+#pragma once
+
+#include "alidade/board/board.h"
+#include "alidade/board_detector/chessboard.h"
+#include "alidade/board_detector/find_board.h"
+
+namespace alidade {
+
+/// Fits every corner of a coarsely found chessboard below the pixel, and looks for those that the coarse search missed
+/// at their predicted places. `photo` is one channel of 32-bit float, 0 to 255.
+[[nodiscard]] BoardDetection fit_chessboard(const cv::Mat& photo, const Board& board, const Chessboard& coarse);
+
+/// Fits the corners of `first` again, each started from where the lens and the pose put it, with the edges bent as the
+/// lens bends them. Corners that the first fit had refused are tried too.
+[[nodiscard]] BoardDetection refit_chessboard(const cv::Mat& photo, const Board& board, const BoardView& first,
+                                              const Camera& camera, const Rigid3& cam_from_board);
+
+}  // namespace alidade

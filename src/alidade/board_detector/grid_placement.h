@@ -1,0 +1,25 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include "alidade/board_detector/corner_grid.h"
+
+namespace alidade {
+
+/// Which sides of a grid are known to be the board's own border: i_min, i_max, j_min, j_max.
+using GridBorders = std::array<bool, 4>;
+
+/// A grid numbered as the board: key (column, row) from (0, 0); or the reason why that cannot be told.
+struct PlacedGrid {
+  CornerGrid grid;
+  std::string reason;
+};
+
+/// Numbers a grid as a board of cols × rows inner corners, never mirrored. The square outside corner (0, 0) is the dark
+/// one where the pattern has only one such place; where turned boards look the same, columns run to the right in the
+/// image. Part of a board is placed if its size, colours and `borders` leave one place only.
+[[nodiscard]] PlacedGrid place_grid(const CornerGrid& grid, int cols, int rows, const GridBorders& borders = {});
+
+}  // namespace alidade

@@ -1,0 +1,170 @@
+#include "alidade/detect/image_sequence.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "alidade/files/files.h"
+#include "alidade/files/yaml_fields.h"
+#include "alidade/images/photos.h"
+#include "alidade/tables/localize_file.h"
+
+namespace alidade {
+namespace {
+
+using std::filesystem::path;
+
+/// EuRoC's folder of images and its table, wherever in the layout one points. Empty paths: another layout.
+struct AslFolder {
+  path images, table;
+};
+
+AslFolder asl_folder(const path& given) {
+  std::error_code error;
+  for (const path& cam :
+       {given, given / "cam0", given / "mav0" / "cam0", given.parent_path(), given.parent_path().parent_path()}) {
+    if (!std::filesystem::exists(cam / "data.csv", error) || !std::filesystem::is_directory(cam / "data", error))
+      continue;
+    return {cam / "data", cam / "data.csv"};
+  }
+  return {};
+}
+
+path images_of(const path& given) {
+  const AslFolder asl = asl_folder(given);
+  return asl.images.empty() ? given : asl.images;
+}
+
+/// `timestamp [ns],filename` a row; lines that begin with # are comments. Seconds after the first.
+std::vector<double> asl_times_s(const path& table, const path& images) {
+  const std::string text = read_file(table);
+  std::vector<long long> times_ns;
+  std::vector<std::string> names;
+  std::size_t line = 0;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    std::string row = text.substr(at, end - at);
+    at = end + 1;
+    ++line;
+    while (!row.empty() && (row.back() == '\r' || row.back() == ' ')) row.pop_back();
+    if (row.empty() || row.front() == '#') continue;
+    const auto fail = [&](const std::string& what) {
+      throw InputError(fmt::format("{}:{}: {}", table.string(), line, what));
+    };
+    const std::size_t comma = row.find(',');
+    const std::string time = row.substr(0, comma);
+    if (comma == std::string::npos || time.empty() || time.size() > 18 ||
+        time.find_first_not_of("0123456789") != std::string::npos)
+      fail("is not 'timestamp [ns],filename'");
+    times_ns.push_back(std::stoll(time));
+    names.push_back(row.substr(row.find_first_not_of(' ', comma + 1)));
+    if (times_ns.size() > 1 && times_ns.back() <= times_ns[times_ns.size() - 2])
+      fail(fmt::format("'{}' is not after the time before it", time));
+  }
+  const std::vector<path> files = list_photos({images});
+  std::vector<double> times_s;
+  for (const path& file : files) {
+    const auto at = std::ranges::find(names, file.filename().string());
+    if (at == names.end()) throw InputError(fmt::format("{}: has no time for {}", table.string(), file.string()));
+    times_s.push_back(1e-9 * static_cast<double>(times_ns[static_cast<std::size_t>(at - names.begin())] - times_ns[0]));
+    if (times_s.size() > 1 && !(times_s.back() > times_s[times_s.size() - 2]))
+      throw InputError(fmt::format("{}: the time of {} is not after the picture before it", table.string(),
+                                   file.filename().string()));
+  }
+  return times_s;
+}
+
+GreyPatch read_patch(const path& file) {
+  cv::Mat image = decode_photo(read_file(file)), grey;
+  if (image.channels() > 1)
+    cv::cvtColor(image, grey, image.channels() == 4 ? cv::COLOR_BGRA2GRAY : cv::COLOR_BGR2GRAY);
+  else
+    grey = image;
+  if (grey.depth() != CV_8U || std::min(grey.cols, grey.rows) < 5 || std::max(grey.cols, grey.rows) > 201)
+    throw InputError(file.string() + ": a patch has 8 bits and 5 to 201 pixels a side");
+  return {grey.cols, grey.rows, std::vector<std::uint8_t>(grey.begin<std::uint8_t>(), grey.end<std::uint8_t>())};
+}
+
+/// The board of which these are the corners, row by row.
+Board board_of(const std::vector<KnownPoint>& points) {
+  Board board;
+  const double y = points.front().point_in_world.y();
+  board.cols = static_cast<int>(
+      std::ranges::count_if(points, [&](const KnownPoint& point) { return point.point_in_world.y() == y; }));
+  board.rows = static_cast<int>(points.size()) / board.cols;
+  board.square_m = (points[1].point_in_world - points[0].point_in_world).norm();
+  return board;
+}
+
+}  // namespace
+
+ImageSequence::ImageSequence(const path& given, double rate_hz, int width_px, int height_px)
+    : frames_(images_of(given)), rate_hz_(rate_hz), width_px_(width_px), height_px_(height_px) {
+  const AslFolder asl = asl_folder(given);
+  if (!asl.table.empty())
+    times_s_ = asl_times_s(asl.table, asl.images);
+  else if (!(rate_hz > 0.0))
+    throw InputError(given.string() + ": has no times; give --rate, frames a second");
+}
+
+bool ImageSequence::is_images(const path& given) {
+  std::error_code error;
+  if (std::filesystem::is_directory(given, error)) return true;
+  std::string ending = given.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  constexpr std::array endings{".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg"};
+  return std::ranges::any_of(endings, [&](const char* video) { return ending == video; });
+}
+
+bool ImageSequence::next(cv::Mat& grey, long& frame, double& t_s) {
+  const cv::Mat image = frames_.next();
+  if (image.empty()) return false;
+  if (image.cols != width_px_ || image.rows != height_px_)
+    throw InputError(
+        fmt::format("{}: is {}×{}, the camera {}×{}", frames_.name(), image.cols, image.rows, width_px_, height_px_));
+  image.convertTo(grey, CV_8U);
+  frame = static_cast<long>(frames_.number());
+  t_s = times_s_.empty() ? static_cast<double>(frame) / rate_hz_ : times_s_.at(count_);
+  if (!times_s_.empty()) frame = static_cast<long>(count_);
+  ++count_;
+  return true;
+}
+
+ImageTarget read_image_target(const path& file) {
+  const std::string name = file.string();
+  const YAML::Node root = detail::load_yaml(read_file(file), name);
+  const detail::Fields fields(root, name);
+  if (fields.has("rectangle")) {
+    if (fields.has("points") || fields.has("board")) detail::refuse(name, "rectangle", "stands beside another target");
+    const YAML::Node node = root["rectangle"];
+    const detail::Fields rectangle(node, name, "rectangle.");
+    detail::refuse_unknown_keys(rectangle, {"width_m", "height_m", "sigma_m"}, "a rectangle");
+    const double width_m = rectangle.number("width_m"), height_m = rectangle.number("height_m");
+    const double sigma_m = rectangle.has("sigma_m") ? rectangle.number("sigma_m") : 0.0003;
+    if (!(width_m > 0.0)) detail::refuse(name, "rectangle.width_m", "is not above zero");
+    if (!(height_m > 0.0)) detail::refuse(name, "rectangle.height_m", "is not above zero");
+    if (!(sigma_m > 0.0)) detail::refuse(name, "rectangle.sigma_m", "is not above zero");
+    return rectangle_target(width_m, height_m, sigma_m);
+  }
+  ImageTarget target;
+  target.points = read_target(file);
+  if (fields.has("board")) {
+    target.board = board_of(target.points);
+    return target;
+  }
+  for (std::size_t i = 0; i < target.points.size(); ++i) {
+    const YAML::Node entry = root["points"][i];
+    const detail::Fields point(entry, name, fmt::format("points[{}].", i));
+    if (!point.has("patch"))
+      detail::refuse(name, point.full("patch"), "is needed: what the point looks like in a picture");
+    target.patches.push_back(read_patch(file.parent_path() / point.text("patch")));
+  }
+  return target;
+}
+
+}  // namespace alidade

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/estimation/progress.h"
+#include "alidade/images/video.h"
+#include "alidade/pantilt/head.h"
+#include "alidade/pantilt/rotation_log.h"
+#include "alidade/target/target_detector.h"
+#include "alidade/track/sight.h"
+
+namespace alidade {
+
+/// Encoder readings of heads over time.
+struct HeadAngles {
+  std::string name;               ///< Of the file, to begin a message with.
+  std::vector<RotationLog> logs;  ///< One a head of the rig, source `head`, without points.
+};
+
+/// Reads `t_s,head,pan_rad,tilt_rad` (also `t_capture_s`; `head` may be left out where the rig has one), in order of
+/// time for each head. Throws InputError: no such column, a head that is not in the rig or has no rows, times that run
+/// backwards, angles in `pan_deg`.
+[[nodiscard]] HeadAngles read_head_angles(const std::filesystem::path& csv, std::span<const RigHead> heads);
+
+[[nodiscard]] std::string head_angles_csv(const HeadAngles& angles, std::span<const RigHead> heads);
+
+/// One frame, and what was found in it.
+struct TargetFrame {
+  double t_s = 0.0;
+  std::size_t head = 0;  ///< Place in the rig's list.
+  std::size_t number = 0;
+  Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();
+  TargetDetection seen;
+};
+
+struct VideoObservationsConfig {
+  /// Frames a second: frame k was taken at t = k / rate, and the angles are interpolated there. 0: the angles have one
+  /// row a frame, with its time.
+  double rate_hz = 0.0;
+  double max_speed_px_s = 2000.0;  ///< Of the target over what stands still, where it is looked for at first.
+};
+
+/// Finds the target in the videos of the heads, the first video of the first head and so on: first where it should be
+/// (the direction in which it was last seen, with the head as it now stands), and where that fails in the whole frame.
+/// In order of time. Throws InputError: a frame that cannot be read or is not of the camera's size, a frame whose time
+/// the angles do not cover, more or fewer rows than frames where no rate is given.
+[[nodiscard]] std::vector<TargetFrame> target_frames(std::span<VideoFrames> videos, const HeadAngles& angles,
+                                                     std::span<const RigHead> heads, const TargetLook& look,
+                                                     const cv::Mat* pattern, const VideoObservationsConfig& config = {},
+                                                     const Progress& progress = {});
+
+/// Those in which it was found, as observations that arrive when they are taken.
+[[nodiscard]] std::vector<TargetObservation> observations_of(std::span<const TargetFrame> frames);
+
+}  // namespace alidade

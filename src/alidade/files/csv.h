@@ -1,0 +1,99 @@
+#pragma once
+
+#include <deque>
+#include <filesystem>
+#include <istream>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/files/files.h"
+
+namespace alidade {
+
+/// Where a cell stands; `text` is "file:line: column 'name'", to begin a message with.
+struct CsvPlace {
+  const std::string& file;
+  std::size_t line;
+  const std::string& column;
+
+  [[nodiscard]] std::string text() const;
+};
+
+/// A finite number, |x| ≤ 1e12. Throws `shots.csv:17: column 'range_m': 'nan' is not a finite number`.
+[[nodiscard]] double csv_number(const std::string& cell, const CsvPlace& place);
+
+/// Text as a cell: quoted where it must be.
+[[nodiscard]] std::string csv_cell(const std::string& text);
+
+/// A CSV file as read: header names and text cells. The ONE reader of tables; every fault names file, line and column.
+class Csv {
+ public:
+  /// Throws InputError: unreadable, empty, no header, duplicate column, a row of another length, not text.
+  [[nodiscard]] static Csv read(const std::filesystem::path& file);
+  [[nodiscard]] static Csv parse(std::string_view text, const std::string& name);
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] std::size_t line(std::size_t row) const { return lines_.at(row); }  ///< Where the row begins.
+  [[nodiscard]] std::size_t num_rows() const { return rows_.size(); }
+  [[nodiscard]] bool has(const std::string& column) const { return columns_.contains(column); }
+  /// Throws InputError naming the first of these columns that is missing, and those that there are.
+  void require(std::span<const std::string> columns) const;
+  /// Throws it for this column; `hint` begins with "; ".
+  [[noreturn]] void refuse_missing(const std::string& column, const std::string& hint = "") const;
+  [[nodiscard]] const std::vector<std::string>& header() const { return header_; }
+  [[nodiscard]] bool is_empty(std::size_t row, const std::string& column) const;
+
+  /// Text of a cell. Throws InputError naming the missing column and the known ones.
+  [[nodiscard]] const std::string& text(std::size_t row, const std::string& column) const;
+  [[nodiscard]] double number(std::size_t row, const std::string& column) const;
+  /// A number above zero.
+  [[nodiscard]] double positive(std::size_t row, const std::string& column) const;
+  /// An integer in [low, high].
+  [[nodiscard]] long integer(std::size_t row, const std::string& column, long low, long high) const;
+  /// "file:line: column 'name'" of a cell, to begin a message with.
+  [[nodiscard]] std::string where(std::size_t row, const std::string& column) const;
+
+ private:
+  std::string name_;
+  std::vector<std::string> header_;
+  std::map<std::string, std::size_t> columns_;
+  std::vector<std::vector<std::string>> rows_;
+  std::vector<std::size_t> lines_;
+};
+
+struct CsvRow {
+  std::vector<std::string> cells;
+  std::size_t line = 1;  ///< Where it begins.
+};
+
+/// Such a table row by row, as it arrives: nothing is waited for beyond the end of the line that is asked for.
+class CsvStream {
+ public:
+  /// Reads the header. Throws InputError as Csv does.
+  CsvStream(std::istream& in, std::string name);
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] const std::vector<std::string>& header() const { return header_; }
+  [[nodiscard]] std::size_t header_line() const { return header_line_; }
+  /// The next row, as long as the header; none at the end. Throws InputError; the call after that goes on behind the
+  /// fault.
+  [[nodiscard]] std::optional<CsvRow> next();
+
+ private:
+  [[nodiscard]] std::optional<CsvRow> next_with_content();
+  [[nodiscard]] bool read_rows();
+
+  std::istream& in_;
+  std::string name_;
+  char separator_ = ',';
+  std::vector<std::string> header_;
+  std::size_t header_line_ = 0;
+  std::size_t line_ = 1, blank_line_ = 0;  ///< Of what comes next; of a blank line just passed, 0: none.
+  std::deque<CsvRow> rows_;                ///< Read and not yet given.
+};
+
+}  // namespace alidade

@@ -1,0 +1,124 @@
+#include "alidade/files/csv.h"
+
+#include <gtest/gtest.h>
+
+#include <utility>
+
+#include "alidade/testing/temporary_folder.h"
+
+namespace alidade {
+namespace {
+
+/// The message of what `work` throws; empty if it throws nothing.
+template <typename Work>
+std::string fault_of(Work work) {
+  try {
+    work();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+std::string fault_of_text(std::string_view text) {
+  return fault_of([&] { (void)Csv::parse(text, "shots.csv"); });
+}
+
+/// The fault of the number in row 0 of a table with one other column.
+std::string fault_of_number(const std::string& cell) {
+  return fault_of([&] { (void)Csv::parse("id,range_m\n1," + cell + "\n", "shots.csv").number(0, "range_m"); });
+}
+
+TEST(Csv, ReadsCellsByColumnName) {
+  const Csv csv = Csv::parse("t, u_px ,name\n1,-2.5e1, a b \n+4,0,\n", "x.csv");
+  ASSERT_EQ(csv.num_rows(), 2u);
+  EXPECT_EQ(csv.header(), (std::vector<std::string>{"t", "u_px", "name"}));
+  EXPECT_EQ(csv.number(0, "u_px"), -25.0);
+  EXPECT_EQ(csv.number(1, "t"), 4.0);
+  EXPECT_EQ(csv.text(0, "name"), "a b");
+  EXPECT_TRUE(csv.is_empty(1, "name"));
+  EXPECT_TRUE(csv.has("t"));
+  EXPECT_FALSE(csv.has("v_px"));
+}
+
+TEST(Csv, ReadsWhatSpreadsheetsWrite) {
+  const Csv csv = Csv::parse("\xEF\xBB\xBF\"t\",\"a \"\"b\"\", c\"\r\n1,\"x\r\ny\"\r\n2,z\r\n\r\n\r\n", "x.csv");
+  ASSERT_EQ(csv.num_rows(), 2u);
+  EXPECT_EQ(csv.text(0, "a \"b\", c"), "x\r\ny");
+  EXPECT_EQ(csv.where(1, "t"), "x.csv:4: column 't'") << "a cell of two lines counts as two";
+}
+
+TEST(Csv, LastLineNeedsNoEnd) { EXPECT_EQ(Csv::parse("a,b\n1,2", "x.csv").number(0, "b"), 2.0); }
+
+TEST(Csv, OldMacLineEndsAreRead) { EXPECT_EQ(Csv::parse("a,b\r1,2\r", "x.csv").number(0, "b"), 2.0); }
+
+TEST(Csv, AHeaderWithoutRowsIsATable) { EXPECT_EQ(Csv::parse("a,b\n", "x.csv").num_rows(), 0u); }
+
+TEST(Csv, NumbersThatAreNoneAreRefusedByPlace) {
+  const std::string where = "shots.csv:2: column 'range_m': ";
+  EXPECT_EQ(fault_of_number("nan"), where + "'nan' is not a finite number");
+  EXPECT_EQ(fault_of_number("-NaN"), where + "'-NaN' is not a finite number");
+  EXPECT_EQ(fault_of_number("inf"), where + "'inf' is not a finite number");
+  EXPECT_EQ(fault_of_number("1e300"), where + "'1e300' is out of range; numbers up to 1e12 are read");
+  EXPECT_EQ(fault_of_number("-1e999"), where + "'-1e999' is out of range; numbers up to 1e12 are read");
+  EXPECT_EQ(fault_of_number("two"), where + "'two' is not a number");
+  EXPECT_EQ(fault_of_number("2.5 m"), where + "'2.5 m' is not a number");
+  EXPECT_EQ(fault_of_number("0x10"), where + "'0x10' is not a number");
+  EXPECT_EQ(fault_of_number("1_000"), where + "'1_000' is not a number");
+  EXPECT_EQ(fault_of_number("--1"), where + "'--1' is not a number");
+  EXPECT_EQ(fault_of_number("\"2,5\""), where + "'2,5' is not a number");
+  EXPECT_EQ(fault_of_number(""), where + "is empty; a number is needed");
+  EXPECT_EQ(fault_of_number("1e12"), "");
+}
+
+TEST(Csv, ALongCellIsCutInTheMessage) {
+  EXPECT_EQ(fault_of_number(std::string(100'000, 'x')),
+            "shots.csv:2: column 'range_m': '" + std::string(40, 'x') + "…' is not a number");
+}
+
+TEST(Csv, IntegersHaveARange) {
+  const Csv csv = Csv::parse("i\n7\n-1\n7.5\n99999999999999999999\n", "x.csv");
+  const auto fault = [&](std::size_t row) { return fault_of([&] { (void)csv.integer(row, "i", 0, 10); }); };
+  EXPECT_EQ(csv.integer(0, "i", 0, 10), 7);
+  EXPECT_EQ(fault(1), "x.csv:3: column 'i': '-1' is not a whole number from 0 to 10");
+  EXPECT_EQ(fault(2), "x.csv:4: column 'i': '7.5' is not a whole number from 0 to 10");
+  EXPECT_EQ(fault(3), "x.csv:5: column 'i': '99999999999999999999' is not a whole number from 0 to 10");
+}
+
+TEST(Csv, NanosecondTimeStampsAreExact) {
+  EXPECT_EQ(Csv::parse("t_ns\n1403636579763555584\n", "x.csv").integer(0, "t_ns", 0, 2'000'000'000'000'000'000),
+            1403636579763555584);
+}
+
+TEST(Csv, WrongTablesAreRefusedByLine) {
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"", "shots.csv: is empty; a header line with the columns' names is needed"},
+      {"\n\r\n \n", "shots.csv: is empty; a header line with the columns' names is needed"},
+      {"a,b\n1,2\n3\n", "shots.csv:3: has 1 cells, the header has 2"},
+      {"a,b\n1,2,3\n", "shots.csv:2: has 3 cells, the header has 2"},
+      {"a,b,a\n", "shots.csv:1: column 'a' stands twice in the header"},
+      {"a,,b\n", "shots.csv:1: column 2 has no name"},
+      {"a,b\n1,2\n\n3,4\n", "shots.csv:3: a blank line inside the table; remove it"},
+      {"a,b\n1,\"2\n", "shots.csv:2: a quote is opened and never closed"},
+      {"a,b\n1,\"2\"3\n", "shots.csv:2: text after a closing quote"},
+      {std::string("a,b\n1,\0\n", 8), "shots.csv:2: is not a text file; a table of comma-separated values is needed"},
+      {"\xFF\xD8\xFF\xE0\x01JFIF", "shots.csv:1: is not a text file; a table of comma-separated values is needed"},
+  };
+  for (const auto& [text, message] : cases) EXPECT_EQ(fault_of_text(text), message);
+}
+
+TEST(Csv, AMissingColumnIsNamedWithThoseThatAreThere) {
+  const Csv csv = Csv::parse("a,b\n1,2\n", "x.csv");
+  EXPECT_EQ(fault_of([&] { (void)csv.number(0, "range_m"); }), "x.csv: has no column 'range_m'; it has: a, b");
+}
+
+TEST(Csv, AFileIsNamedAsGiven) {
+  const testing::TemporaryFolder folder;
+  const auto file = folder.path() / "views.csv";
+  write_file(file, "a\nx\n");
+  EXPECT_EQ(fault_of([&] { (void)Csv::read(file).number(0, "a"); }),
+            file.string() + ":2: column 'a': 'x' is not a number");
+}
+
+}  // namespace
+}  // namespace alidade

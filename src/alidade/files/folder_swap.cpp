@@ -1,0 +1,207 @@
+#include "alidade/files/folder_swap.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+
+#include "alidade/files/files.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* hidden_prefix = ".alidade-";
+// Inside the hidden folder. The third name says that all that was older is out of the way.
+constexpr const char *new_files = "new", *older_files = "older", *replaced_files = "replaced";
+
+/// The folder open and locked; not open where another process has it, or the file system knows no locks.
+Descriptor locked(const fs::path& folder) {
+  Descriptor descriptor(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+  if (!descriptor.is_open() || ::flock(descriptor.number(), LOCK_EX | LOCK_NB) == 0) return descriptor;
+  const int error = errno;
+  (void)descriptor.close();
+  errno = error;
+  return descriptor;
+}
+
+bool stands_at(const fs::path& path) {
+  struct stat status {};
+  return ::lstat(path.c_str(), &status) == 0;
+}
+
+/// Every file under `from` to the same place under `to`.
+void move_files(const fs::path& from, const fs::path& to) {
+  std::error_code ignored;
+  std::vector<fs::path> names;
+  for (const auto& entry : fs::recursive_directory_iterator(from, ignored)) {
+    if (!entry.is_directory(ignored) || entry.is_symlink(ignored))
+      names.push_back(entry.path().lexically_relative(from));
+  }
+  for (const fs::path& name : names) {
+    fs::create_directories((to / name).parent_path(), ignored);
+    fs::rename(from / name, to / name, ignored);
+  }
+}
+
+/// A hidden folder as FolderSwap makes it: with nothing else in it.
+bool is_of_swap(const fs::path& hidden) {
+  std::error_code ignored;
+  const auto is_own = [](const fs::directory_entry& entry) {
+    const std::string name = entry.path().filename();
+    return name == new_files || name == older_files || name == replaced_files;
+  };
+  return std::all_of(fs::directory_iterator(hidden, ignored), fs::directory_iterator(), is_own);
+}
+
+/// What processes that were killed left in the folder. One killed within commit(): before the older files were all out
+/// of the way it is undone, after that it is ended.
+void clear_remains(const fs::path& folder) {
+  std::error_code ignored;
+  std::vector<fs::path> remains;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    if (entry.path().filename().string().starts_with(hidden_prefix)) remains.push_back(entry.path());
+  }
+  for (const fs::path& hidden : remains) {
+    const Descriptor lock = locked(hidden);
+    if (!lock.is_open() || !is_of_swap(hidden)) continue;
+    if (stands_at(hidden / older_files)) move_files(hidden / older_files, folder);
+    if (stands_at(hidden / replaced_files)) move_files(hidden / new_files, folder);
+    fs::remove_all(hidden, ignored);
+  }
+}
+
+}  // namespace
+
+MadeFolders::~MadeFolders() {
+  for (auto folder = made_.rbegin(); folder != made_.rend(); ++folder) ::rmdir(folder->c_str());
+}
+
+void MadeFolders::make(const fs::path& folder) {
+  std::vector<fs::path> missing;
+  std::error_code ignored;
+  for (fs::path at = folder; !at.empty() && !fs::exists(at, ignored); at = at.parent_path()) {
+    missing.push_back(at);
+    if (at == at.parent_path()) break;
+  }
+  for (auto at = missing.rbegin(); at != missing.rend(); ++at) {
+    if (::mkdir(at->c_str(), 0777) == 0) {
+      made_.push_back(*at);
+    } else if (errno != EEXIST) {
+      fail_on(folder, "cannot be made", errno);
+    }
+  }
+}
+
+FolderSwap::FolderSwap(fs::path folder) : folder_(std::move(folder)) {
+  if (folder_.empty()) folder_ = ".";
+  std::error_code ignored;
+  if (fs::exists(folder_, ignored) && !fs::is_directory(folder_, ignored)) {
+    throw InputError(folder_.string() + ": is a file, not a folder");
+  }
+  // Another process that tries the folder may take it away again, or a hidden folder that is not locked yet.
+  for (int i = 0; i < 20 && !hide(); ++i) {
+  }
+  if (!lock_) fail_on(folder_, "cannot be written", errno);
+  clear_remains(folder_);
+}
+
+/// Makes the hidden folder. False where it did not work; with `errno` ENOENT or EAGAIN it may the next time.
+bool FolderSwap::hide() {
+  made_.make(folder_);
+  std::string pattern = folder_ / (std::string(hidden_prefix) + "XXXXXX");
+  if (::mkdtemp(pattern.data()) == nullptr) {
+    if (errno != ENOENT) fail_on(folder_, "cannot be written", errno);
+    return false;
+  }
+  Descriptor lock = locked(pattern);
+  if (!lock.is_open() && errno == EWOULDBLOCK) return false;
+  if (::mkdir((pattern + "/" + new_files).c_str(), 0777) != 0) {
+    const int error = errno;
+    ::rmdir(pattern.c_str());
+    if (error != ENOENT) fail_on(folder_, "cannot be written", error);
+    errno = error;
+    return false;
+  }
+  hidden_ = pattern;
+  lock_.emplace(std::move(lock));
+  return true;
+}
+
+FolderSwap::~FolderSwap() {
+  std::error_code ignored;
+  fs::remove_all(hidden_, ignored);
+}
+
+void FolderSwap::add(const fs::path& name, std::string_view content) {
+  const fs::path place = folder_ / name, waiting = hidden_ / new_files / name;
+  std::error_code error;
+  if (fs::is_directory(place, error)) throw InputError(place.string() + ": is a folder, not a file");
+  fs::create_directories(waiting.parent_path(), error);
+  if (error) fail_on(place, "cannot be written", error.value());
+  Descriptor file(::open(waiting.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0666));
+  if (!file.is_open()) fail_on(place, "cannot be written", errno);
+  try {
+    write_all(place, file, content);
+    if (!file.close()) fail_on(place, "cannot be written", errno);
+  } catch (const InputError&) {
+    ::unlink(waiting.c_str());
+    throw;
+  }
+  if (std::find(added_.begin(), added_.end(), name) == added_.end()) added_.push_back(name);
+}
+
+void FolderSwap::remove(const fs::path& name) { removed_.push_back(name); }
+
+void FolderSwap::move(const fs::path& from, const fs::path& to) {
+  if (::rename(from.c_str(), to.c_str()) != 0)
+    throw fs::filesystem_error("rename", from, to, {errno, std::generic_category()});
+  moves_.push_back({from, to});
+}
+
+void FolderSwap::undo() noexcept {
+  for (auto done = moves_.rbegin(); done != moves_.rend(); ++done) ::rename(done->to.c_str(), done->from.c_str());
+  moves_.clear();
+}
+
+void FolderSwap::commit() {
+  std::vector<fs::path> going = added_;
+  going.insert(going.end(), removed_.begin(), removed_.end());
+  const Descriptor turn(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (turn.is_open()) ::flock(turn.number(), LOCK_EX);  // one after the other; where there are no locks, at once
+  fs::path at;
+  try {
+    fs::create_directory(hidden_ / older_files);
+    for (const fs::path& name : going) {
+      at = folder_ / name;
+      std::error_code ignored;
+      if (!stands_at(at) || fs::is_directory(fs::symlink_status(at, ignored))) continue;
+      fs::create_directories((hidden_ / older_files / name).parent_path());
+      move(at, hidden_ / older_files / name);
+    }
+    move(hidden_ / older_files, hidden_ / replaced_files);
+    for (auto name = added_.rbegin(); name != added_.rend(); ++name) {
+      at = folder_ / *name;
+      made_.make(at.parent_path());
+      move(hidden_ / new_files / *name, at);
+    }
+  } catch (const fs::filesystem_error& error) {
+    undo();
+    fail_on(at.empty() ? folder_ : at, "cannot be written", error.code().value());
+  } catch (...) {
+    undo();
+    throw;
+  }
+  for (const fs::path& name : going) {  // folders that earlier files stood in
+    for (fs::path in = name.parent_path(); !in.empty() && ::rmdir((folder_ / in).c_str()) == 0;) in = in.parent_path();
+  }
+  added_.clear();
+  removed_.clear();
+  moves_.clear();
+}
+
+}  // namespace alidade

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "alidade/files/descriptor.h"
+
+namespace alidade {
+
+/// Folders made here, from the outermost; removed again as long as they are empty.
+class MadeFolders {
+ public:
+  MadeFolders() = default;
+  MadeFolders(const MadeFolders&) = delete;
+  MadeFolders& operator=(const MadeFolders&) = delete;
+  ~MadeFolders();
+  /// Makes what is missing of the path. Throws InputError if it cannot be made.
+  void make(const std::filesystem::path& folder);
+
+ private:
+  std::vector<std::filesystem::path> made_;
+};
+
+/// New files of a folder, and old ones that go: all at once, or nothing at all. What is new waits in a hidden folder
+/// inside it (`.alidade-…`: the same disk, so that a rename is enough) until commit(). Without commit(), on a full disk
+/// or after any exception, the folder is as it was, and is not there if it was not. A killed process leaves at worst
+/// the hidden folder; the next FolderSwap there clears it, and undoes, or ends, a commit() that was cut in two.
+class FolderSwap {
+ public:
+  /// Makes the folder where it is missing, and finds out that it can be written: throws InputError if not.
+  explicit FolderSwap(std::filesystem::path folder);
+  FolderSwap(const FolderSwap&) = delete;
+  FolderSwap& operator=(const FolderSwap&) = delete;
+  ~FolderSwap();
+
+  /// A new file, by its name inside the folder, whole on the disk when this returns. Throws InputError, and leaves
+  /// nothing of it, if it cannot be written.
+  void add(const std::filesystem::path& name, std::string_view content);
+  /// A file that goes, if it is there and nothing new takes its place.
+  void remove(const std::filesystem::path& name);
+  /// Puts everything in its place; the file that was added first comes last, and its older self goes first: where a
+  /// file tells what the others are, it never stands beside the wrong ones. Throws InputError after undoing it all.
+  void commit();
+
+ private:
+  struct Move {
+    std::filesystem::path from, to;
+  };
+
+  bool hide();
+  void move(const std::filesystem::path& from, const std::filesystem::path& to);
+  void undo() noexcept;
+
+  std::filesystem::path folder_;
+  MadeFolders made_;
+  std::filesystem::path hidden_;
+  std::optional<Descriptor> lock_;  ///< Of the hidden folder: its owner lives.
+  std::vector<std::filesystem::path> added_, removed_;
+  std::vector<Move> moves_;
+};
+
+}  // namespace alidade

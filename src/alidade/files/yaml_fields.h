@@ -1,0 +1,69 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/files/files.h"
+
+namespace YAML {  // NOLINT(readability-identifier-naming): yaml-cpp's own
+class Node;
+}
+
+/// What the readers and writers of YAML files share. All throw InputError, `file: key: what`.
+namespace alidade::detail {
+
+/// Throws `file: key: what`.
+[[noreturn]] void refuse(const std::string& file, const std::string& key, const std::string& what);
+/// A number of at most 1e12 in size, or refuses.
+[[nodiscard]] double checked_number(std::string_view text, const std::string& file, const std::string& key);
+/// An image's width or height: a whole number from 1 to 1 000 000.
+[[nodiscard]] int checked_size(double value, const std::string& file, const std::string& key);
+/// Shortest text that reads back as the same double, always with a point or an exponent.
+[[nodiscard]] std::string number_text(double value);
+[[nodiscard]] std::string number_list(const std::vector<double>& values);
+
+/// The entries of a YAML map with the file's name in every message.
+class Fields {
+ public:
+  /// Refuses what is not a map, and a key that stands twice. `prefix` begins the keys in messages ("cam0.").
+  Fields(const YAML::Node& map, std::string file, std::string prefix = "");
+  Fields(const YAML::Node&& map, std::string file, std::string prefix = "") = delete;  // it would not outlive this line
+
+  [[nodiscard]] bool has(const std::string& key) const;
+  [[nodiscard]] double number(const std::string& key) const;
+  [[nodiscard]] int size(const std::string& key) const;
+  [[nodiscard]] std::string text(const std::string& key) const;
+  [[nodiscard]] std::vector<double> numbers(const std::string& key) const;
+  [[nodiscard]] std::vector<std::string> texts(const std::string& key) const;
+  /// The numbers of {rows, cols, data}, row-major. Refuses where they are not rows × cols.
+  [[nodiscard]] std::vector<double> matrix(const std::string& key) const;
+  [[nodiscard]] std::vector<std::string> keys() const;
+  [[nodiscard]] const std::string& file() const { return file_; }
+  [[nodiscard]] std::string full(const std::string& key) const { return prefix_ + key; }
+
+ private:
+  [[nodiscard]] YAML::Node at(const std::string& key) const;
+
+  const YAML::Node& map_;
+  std::string file_;
+  std::string prefix_;
+};
+
+/// Parses text; `file` begins the message of what is not YAML, with its line.
+[[nodiscard]] YAML::Node load_yaml(const std::string& text, const std::string& file);
+
+/// Refuses a key that is not among `known`; `what` names what the map is: "a beam".
+void refuse_unknown_keys(const Fields& fields, const std::vector<std::string>& known, std::string_view what);
+
+/// Three numbers.
+[[nodiscard]] Eigen::Vector3d read_vector(const Fields& fields, const std::string& key);
+
+/// The covariance of `key`: {names, upper}: upper triangle row by row, in the order of `names`, which are among
+/// `known`; those that are not named are held and have zero rows. Square, as large as `known`. Refuses what varies
+/// together as no covariance does. `of` names what has the parameters: "the model".
+[[nodiscard]] Eigen::MatrixXd read_covariance(const YAML::Node& node, const Fields& parent,
+                                              const std::vector<std::string>& known, std::string_view of);
+
+}  // namespace alidade::detail

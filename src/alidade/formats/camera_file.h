@@ -1,0 +1,55 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/camera/camera.h"
+#include "alidade/files/files.h"
+#include "alidade/public.h"
+
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+/// `opencv` is cv::FileStorage (YAML; XML and JSON are read too), `ros` a camera_info YAML, `kalibr` a camchain YAML,
+/// `mrcal` a .cameramodel, `colmap` a cameras.txt. The traps of each: docs/maths/camera-models.md.
+enum class CameraFormat { alidade, opencv, ros, kalibr, mrcal, colmap };
+
+/// Reads a camera file of any known format, recognised by its content. Of a file with several cameras one is chosen by
+/// its name in the file: "camchain.yaml:cam1". Throws InputError, also for a lens that no model of ours can be.
+[[nodiscard]] Camera read_camera(const std::filesystem::path& file);
+
+/// The same where all rays must meet in one point: throws InputError for a flat_port camera.
+[[nodiscard]] Camera read_central_camera(const std::filesystem::path& file);
+/// Throws that InputError for a camera at hand; `name` begins the message.
+void require_central(const Camera& camera, const std::string& name);
+
+/// read_camera() of text that is at hand; `name` stands for the file in messages, `choice` is the camera's name in the
+/// file (empty: the only one).
+[[nodiscard]] Camera parse_camera(std::string_view text, const std::string& name, const std::string& choice = "");
+
+/// What a camera file says beside the camera, which read_camera() passes over and no camera_text() will say again:
+/// where it stands among others (T_cn_cnm1 of Kalibr, extrinsics of mrcal), its place in a stereo pair (R and P of
+/// ROS), which of several it is. In words, empty for most files. Reads and throws as read_camera() does.
+[[nodiscard]] std::vector<std::string> unread_parts(const std::filesystem::path& file);
+
+/// A camera as text of a format. Throws InputError saying what would be lost, unless `lossy`; also if the format has no
+/// such lens at all.
+[[nodiscard]] std::string camera_text(const Camera& camera, CameraFormat format, bool lossy = false);
+
+/// Writes it, whole. Throws as camera_text() does, and where the file cannot be written.
+void write_camera(const std::filesystem::path& file, const Camera& camera, CameraFormat format = CameraFormat::alidade,
+                  bool lossy = false);
+
+/// What of the lens the format cannot hold, "skew 0.3 px" each; camera_text() refuses these.
+[[nodiscard]] std::vector<std::string> lens_losses(const Camera& camera, CameraFormat format);
+/// What else a format does not hold (covariance, RMS): worth a note, no reason to refuse.
+[[nodiscard]] std::vector<std::string> other_losses(const Camera& camera, CameraFormat format);
+
+/// The format of a name (`opencv`, `ros`, …). Throws InputError for an unknown one.
+[[nodiscard]] CameraFormat camera_format(std::string_view name);
+[[nodiscard]] std::string_view camera_format_name(CameraFormat format);
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

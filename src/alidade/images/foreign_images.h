@@ -1,0 +1,24 @@
+#pragma once
+
+#include <filesystem>
+#include <set>
+#include <string>
+#include <string_view>
+
+namespace alidade {
+
+/// What to do with an image of a kind that is not read (HEIC, AVIF, raw files, GIF, PDF, a video), told by its bytes:
+/// "is HEIC, which is not read: convert it to JPEG or PNG without turning it". Empty for all others.
+[[nodiscard]] std::string foreign_image(std::string_view bytes);
+
+/// The ending of a file in small letters, ".jpg".
+[[nodiscard]] std::string lower_ending(const std::filesystem::path& file);
+
+/// Why a file in a folder of photos, or a folder in it, is not taken for a photo, by its ending. Empty: there is
+/// nothing to say, as for a folder of results.
+[[nodiscard]] std::string why_no_photo(const std::filesystem::path& file);
+
+/// Names of what an earlier run of ours left in a folder.
+[[nodiscard]] std::set<std::string> our_results(const std::filesystem::path& folder);
+
+}  // namespace alidade

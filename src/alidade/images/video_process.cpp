@@ -1,0 +1,129 @@
+#include "alidade/images/video_process.h"
+
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+#include <string>
+#include <string_view>
+
+#include "alidade/files/files.h"
+
+namespace alidade {
+namespace {
+
+constexpr const char* decoder_name = "alidade_video";
+
+std::filesystem::path decoder_beside_this_program(const std::filesystem::path& video) {
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  const std::filesystem::path decoder = self.parent_path() / decoder_name;
+  if (!error && std::filesystem::exists(decoder, error)) return decoder;
+  throw InputError(video.string() + ": video files are decoded by the program '" + decoder_name +
+                   "', which is not beside this one; give a folder of numbered pictures");
+}
+
+/// Decoders draw text files as moving letters, and play lists lead elsewhere.
+void refuse_text(const std::filesystem::path& video) {
+  std::array<char, 4096> bytes{};
+  std::ifstream in(video, std::ios::binary);
+  if (!in) throw InputError(video.string() + ": cannot be read");
+  in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  const auto* const end = bytes.data() + in.gcount();
+  if (end == bytes.data()) throw InputError(video.string() + ": the file is empty");
+  const bool is_raw_video = std::string_view(bytes.data(), 9) == "YUV4MPEG2";  // its header is text
+  const bool is_text = !is_raw_video && std::none_of(static_cast<const char*>(bytes.data()), end, [](char c) {
+    return static_cast<unsigned char>(c) < 0x20U && c != '\n' && c != '\r' && c != '\t' && c != '\f';
+  });
+  if (is_text) throw InputError(video.string() + ": is a text file, not a video");
+}
+
+/// Its output goes to `pipe_end`; what it has to say otherwise, nowhere.
+int start_decoder(const std::string& decoder, const std::string& video, FrameColour colour, int pipe_end) {
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, pipe_end, STDOUT_FILENO);
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+  std::array<std::string, 3> words{decoder, video, colour == FrameColour::bgr ? "bgr" : "grey"};
+  std::array<char*, 4> arguments{words[0].data(), words[1].data(), words[2].data(), nullptr};
+  pid_t process = -1;
+  const int error = posix_spawn(&process, decoder.c_str(), &actions, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  return error == 0 ? process : -1;
+}
+
+}  // namespace
+
+VideoProcess::VideoProcess(const std::filesystem::path& video, FrameColour colour) : video_(video), colour_(colour) {
+  refuse_text(video);
+  const std::filesystem::path decoder = decoder_beside_this_program(video);
+  std::array<int, 2> ends{};
+  if (::pipe2(ends.data(), O_CLOEXEC) != 0) throw InputError(video.string() + ": no pipe to the decoder");
+  // Absolute: a name like "http:…" shall not be an address.
+  process_ = start_decoder(decoder.string(), std::filesystem::absolute(video).string(), colour, ends[1]);
+  ::close(ends[1]);
+  pipe_ = ends[0];
+  try {
+    read_header();
+  } catch (const InputError&) {
+    stop();
+    throw;
+  }
+}
+
+VideoProcess::~VideoProcess() { stop(); }
+
+void VideoProcess::stop() {
+  if (pipe_ >= 0) ::close(pipe_);
+  if (process_ > 0) {
+    ::kill(process_, SIGKILL);
+    ::waitpid(process_, nullptr, 0);
+  }
+  pipe_ = process_ = -1;
+}
+
+/// "alidade_video WIDTH HEIGHT FRAMES" in 64 characters.
+void VideoProcess::read_header() {
+  constexpr int largest_px = 1 << 15;
+  std::array<char, 65> header{};
+  unsigned long frames = 0;
+  const bool is_good = process_ > 0 && read_bytes(header.data(), 64) &&
+                       std::sscanf(header.data(), "alidade_video %d %d %lu", &width_px_, &height_px_, &frames) == 3 &&
+                       width_px_ > 0 && height_px_ > 0 && width_px_ < largest_px && height_px_ < largest_px;
+  if (!is_good) throw InputError(video_.string() + ": not a video that can be read");
+  num_frames_ = frames;
+}
+
+std::vector<unsigned char> VideoProcess::next() {
+  char mark = 0;
+  if (!read_bytes(&mark, 1)) throw InputError(video_.string() + ": the decoder gave up in the middle");
+  if (mark != 'f') return {};
+  const std::size_t channels = colour_ == FrameColour::bgr ? 3 : 1;
+  std::vector<unsigned char> frame(static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_) *
+                                   channels);
+  if (!read_bytes(frame.data(), frame.size()))
+    throw InputError(video_.string() + ": the decoder gave up in the middle");
+  return frame;
+}
+
+bool VideoProcess::read_bytes(void* to, std::size_t count) const {
+  auto* at = static_cast<char*>(to);
+  while (count > 0) {
+    const ssize_t got = ::read(pipe_, at, count);
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return false;
+    at += got;
+    count -= static_cast<std::size_t>(got);
+  }
+  return true;
+}
+
+}  // namespace alidade

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <vector>
+
+#include "alidade/images/video.h"
+
+namespace alidade {
+
+/// Decodes a video file in a process of its own, the program alidade_video beside this one: its libraries take longer
+/// to load than most commands run, and a broken file cannot take this program with it.
+class VideoProcess {
+ public:
+  /// Starts it. Throws InputError: no such file, not a video, no decoder.
+  VideoProcess(const std::filesystem::path& video, FrameColour colour);
+  VideoProcess(const VideoProcess&) = delete;
+  VideoProcess& operator=(const VideoProcess&) = delete;
+  ~VideoProcess();
+
+  [[nodiscard]] int width_px() const { return width_px_; }
+  [[nodiscard]] int height_px() const { return height_px_; }
+  /// As the file says; 0: it does not.
+  [[nodiscard]] std::size_t num_frames() const { return num_frames_; }
+
+  /// The next frame's values, row by row (grey, or blue, green and red); empty at the end. Throws InputError if the
+  /// decoder died.
+  [[nodiscard]] std::vector<unsigned char> next();
+
+ private:
+  [[nodiscard]] bool read_bytes(void* to, std::size_t count) const;
+  void read_header();
+  void stop();
+
+  std::filesystem::path video_;
+  FrameColour colour_;
+  int pipe_ = -1, process_ = -1;
+  int width_px_ = 0, height_px_ = 0;
+  std::size_t num_frames_ = 0;
+};
+
+}  // namespace alidade

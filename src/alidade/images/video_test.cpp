@@ -1,0 +1,142 @@
+#include "alidade/images/video.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fmt/format.h>
+
+#include <functional>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "alidade/files/files.h"
+#include "alidade/testing/temporary_folder.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::TemporaryFolder;
+
+/// An image that is told from others by its grey value.
+cv::Mat plain(int value, int type = CV_8U, cv::Size size = {96, 80}) { return {size, type, cv::Scalar::all(value)}; }
+
+void write_image(const std::filesystem::path& file, const cv::Mat& image) {
+  std::vector<unsigned char> bytes;
+  cv::imencode(file.extension().string(), image, bytes);
+  write_file(file, std::string(bytes.begin(), bytes.end()));
+}
+
+std::string refusal(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const InputError& error) {
+    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+    return error.what();
+  }
+  return "";
+}
+
+/// What is refused when a whole video is read.
+std::string refusal_of(const std::filesystem::path& path) {
+  return refusal([&] {
+    VideoFrames video(path);
+    while (!video.next().empty()) {
+    }
+  });
+}
+
+/// An uncompressed video, Y4M, of such plain frames of 96 × 80.
+std::string raw_video(const std::vector<int>& values) {
+  std::string bytes = "YUV4MPEG2 W96 H80 F30:1 Ip A1:1 C420jpeg\n";
+  for (const int value : values)
+    bytes += "FRAME\n" + std::string(96 * 80, static_cast<char>(value)) + std::string(2 * 48 * 40, '\x80');
+  return bytes;
+}
+
+TEST(VideoFrames, OfAFolderComeInNumericOrderWithGaps) {
+  const TemporaryFolder folder;
+  for (const int number : {2, 3, 5, 10})
+    write_image(folder.path() / fmt::format("shot{}.png", number), plain(10 * number, CV_8UC3));
+  VideoFrames video(folder.path());
+  EXPECT_EQ(video.num_frames(), 4u);
+  for (const std::size_t number : {2u, 3u, 5u, 10u}) {
+    const cv::Mat frame = video.next();
+    ASSERT_EQ(frame.type(), CV_8U);
+    EXPECT_EQ(frame.at<unsigned char>(40, 40), 10 * number);
+    EXPECT_EQ(video.number(), number - 2);
+  }
+  EXPECT_TRUE(video.next().empty());
+}
+
+TEST(VideoFrames, CountsImagesWhoseNamesAreClocks) {
+  const TemporaryFolder folder;
+  for (const char* name : {"1403636579763555584.png", "1403636579813555456.png"})
+    write_image(folder.path() / name, plain(50));
+  VideoFrames video(folder.path());
+  (void)video.next();
+  (void)video.next();
+  EXPECT_EQ(video.number(), 1u);
+}
+
+TEST(VideoFrames, OfDeepImagesKeepOneScale) {
+  const TemporaryFolder folder;
+  write_image(folder.path() / "1.png", plain(2000, CV_16U));  // of 12 bits: 4095
+  write_image(folder.path() / "2.png", plain(1000, CV_16U));
+  VideoFrames video(folder.path());
+  const cv::Mat first = video.next(), second = video.next();
+  ASSERT_EQ(first.type(), CV_32F);
+  EXPECT_NEAR(first.at<float>(0, 0), 2000.0 * 255.0 / 2047.0, 0.01);
+  EXPECT_NEAR(second.at<float>(0, 0), 1000.0 * 255.0 / 2047.0, 0.01);
+}
+
+TEST(VideoFrames, OfAFileAreDecoded) {
+  const TemporaryFolder folder;
+  const std::vector<int> values = {60, 120, 180};
+  write_file(folder.path() / "turn.y4m", raw_video(values));
+  VideoFrames video(folder.path() / "turn.y4m");
+  for (const int value : values) {
+    const cv::Mat frame = video.next();
+    ASSERT_EQ(frame.size(), cv::Size(96, 80));
+    // The decoder may take the luma as full or as television's 16 … 235.
+    const int grey = frame.at<unsigned char>(40, 40);
+    EXPECT_TRUE(std::abs(grey - value) <= 2 || std::abs(grey - (value - 16) * 255 / 219) <= 2) << grey;
+  }
+  EXPECT_TRUE(video.next().empty());
+}
+
+TEST(VideoFrames, CanBeLeftInTheMiddle) {
+  const TemporaryFolder folder;
+  write_file(folder.path() / "long.y4m", raw_video(std::vector<int>(400, 90)));
+  VideoFrames video(folder.path() / "long.y4m");
+  EXPECT_FALSE(video.next().empty());
+}
+
+TEST(VideoFrames, RefuseWhatIsNoFolderOfImages) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(refusal_of(folder.path() / "none"), HasSubstr("no such file"));
+  EXPECT_THAT(refusal_of(folder.path()), HasSubstr("holds no photos"));
+  write_file(folder.path() / "1.png", "this is a text");
+  EXPECT_THAT(refusal_of(folder.path()), HasSubstr("1.png: not a picture"));
+  write_image(folder.path() / "1.png", plain(10));
+  write_image(folder.path() / "2.png", plain(10, CV_8U, {96, 81}));
+  EXPECT_THAT(refusal_of(folder.path()), HasSubstr("2.png: is 96×81, the first frame is 96×80"));
+  write_image(folder.path() / "1.png", plain(10, CV_8U, {96, 20}));
+  EXPECT_THAT(refusal_of(folder.path()), HasSubstr("64 pixels"));
+}
+
+TEST(VideoFrames, RefuseFilesThatAreNoVideo) {
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder.path() / "video.mp4";
+  write_file(file, "t,pan,tilt\n0,0,0\n");
+  EXPECT_THAT(refusal_of(file), HasSubstr("is a text file, not a video"));
+  write_file(file, "");
+  EXPECT_THAT(refusal_of(file), HasSubstr("empty"));
+  std::string bytes(5000, '\0');
+  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<char>(i * i * 31 + i / 7);
+  write_file(file, bytes);
+  EXPECT_THAT(refusal_of(file), HasSubstr("not a video that can be read"));
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string_view>
+
+namespace cv {
+class Mat;
+}
+
+namespace alidade {
+
+/// A TIFF's first image as decode_image() gives it: 8 or 16 bit, grey, BGR or BGRA; any compression that libtiff
+/// knows. Empty where it cannot be read.
+[[nodiscard]] cv::Mat decode_tiff(std::string_view bytes, bool keep_alpha);
+
+}  // namespace alidade

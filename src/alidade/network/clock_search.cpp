@@ -1,0 +1,144 @@
+#include "alidade/network/clock_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core/eigen.hpp>
+
+namespace alidade {
+namespace {
+
+constexpr double agree_px = 4.0, min_agree = 2e-3;
+constexpr std::size_t least_common = 30;
+
+struct Common {
+  std::vector<double> t_s;
+  std::vector<cv::Point2d> first, second;
+};
+
+/// At most so many moments at which both see the target.
+Common common_observations(const ObservationSeries& first, const ObservationSeries& second, double offset_s,
+                           std::size_t most) {
+  Common common;
+  const std::size_t stride = std::max<std::size_t>(1, first.t_s.size() / most);
+  for (std::size_t i = 0; i < first.t_s.size(); i += stride) {
+    const auto there = second.seen_at(first.t_s[i] + offset_s);
+    if (!there) continue;
+    common.t_s.push_back(first.t_s[i]);
+    common.first.emplace_back(first.at[i].x(), first.at[i].y());
+    common.second.emplace_back(there->x(), there->y());
+  }
+  return common;
+}
+
+double threshold(const ObservationSeries& a, const ObservationSeries& b) {
+  return std::max(min_agree, agree_px / std::min(a.px, b.px));
+}
+
+/// Share of the common observations that agree with their best epipolar geometry.
+ObservationPair agreement(std::span<const ObservationSeries> series, std::size_t first, std::size_t second,
+                          double offset_s, std::size_t most, int samples) {
+  ObservationPair pair{first, second, offset_s, 0.0, 0};
+  const Common common = common_observations(series[first], series[second], offset_s, most);
+  pair.num_common = common.t_s.size();
+  if (pair.num_common < least_common) return pair;
+  cv::Mat agree;
+  const cv::Mat E = cv::findEssentialMat(common.first, common.second, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, 0.99,
+                                         threshold(series[first], series[second]), samples, agree);
+  if (E.rows < 3 || agree.empty()) return pair;
+  pair.share = static_cast<double>(cv::countNonZero(agree)) / static_cast<double>(pair.num_common);
+  return pair;
+}
+
+/// Few common observations agree by chance: what counts is how many beyond.
+double strength(const ObservationPair& pair) {
+  constexpr double by_chance = 40.0;
+  return pair.share * static_cast<double>(pair.num_common) / (static_cast<double>(pair.num_common) + by_chance);
+}
+
+}  // namespace
+
+std::optional<ObservationPair> agreeing_offset(std::span<const ObservationSeries> series, std::size_t first,
+                                               std::size_t second, double search_s, const Progress& progress) {
+  constexpr double coarse_s = 0.25, fine_s = 0.05;
+  const auto steps = static_cast<int>(std::ceil(search_s / coarse_s));
+  std::vector<ObservationPair> coarse;
+  for (int k = -steps; k <= steps; ++k) {
+    coarse.push_back(agreement(series, first, second, coarse_s * k, 140, 40));
+    report_progress(progress, "clocks", static_cast<std::size_t>(k + steps), static_cast<std::size_t>(2 * steps + 1));
+  }
+  // Few samples can miss the best geometry: the best few offsets are looked at again.
+  constexpr std::size_t max_again = 6;
+  const auto again = coarse.begin() + static_cast<std::ptrdiff_t>(std::min(max_again, coarse.size()));
+  std::ranges::partial_sort(coarse, again, std::greater{}, strength);
+  ObservationPair best{first, second, 0.0, -1.0, 0};
+  const auto consider = [&](double offset_s) {
+    const ObservationPair pair = agreement(series, first, second, offset_s, 300, 300);
+    if (strength(pair) > strength(best)) best = pair;
+  };
+  for (auto one = coarse.begin(); one != again; ++one)
+    if (one->num_common >= least_common) consider(one->offset_s);
+  if (best.num_common < least_common) return std::nullopt;
+  const double centre_s = best.offset_s;
+  const int around = steps > 0 ? static_cast<int>(std::round(0.6 * coarse_s / fine_s)) : 0;
+  for (int k = -around; k <= around; ++k)
+    if (k != 0) consider(centre_s + fine_s * k);
+  return best;
+}
+
+std::optional<RelativePose> relative_pose(const ObservationSeries& first, const ObservationSeries& second,
+                                          double offset_s) {
+  const Common common = common_observations(first, second, offset_s, 2000);
+  if (common.t_s.size() < least_common) return std::nullopt;
+  const cv::Mat K = cv::Mat::eye(3, 3, CV_64F);
+  cv::Mat agree, R, t, points;
+  const cv::Mat E =
+      cv::findEssentialMat(common.first, common.second, K, cv::RANSAC, 0.999, threshold(first, second), 1000, agree);
+  if (E.rows != 3) return std::nullopt;
+  constexpr double furthest = 1e3;
+  const int num_agree = cv::countNonZero(agree);
+  cv::recoverPose(E, common.first, common.second, K, R, t, furthest, agree, points);
+  // Rays that agree but meet behind a camera are of one whose images are mirrored.
+  if (2 * cv::countNonZero(agree) < num_agree) return std::nullopt;
+  Eigen::Matrix3d rotation;
+  Eigen::Vector3d translation;
+  cv::cv2eigen(R, rotation);
+  cv::cv2eigen(t, translation);
+  RelativePose pose{{Eigen::Quaterniond(rotation), translation}, {}, {}};
+  for (std::size_t i = 0; i < common.t_s.size(); ++i) {
+    if (agree.at<unsigned char>(static_cast<int>(i)) == 0) continue;
+    const Eigen::Vector4d point(points.at<double>(0, static_cast<int>(i)), points.at<double>(1, static_cast<int>(i)),
+                                points.at<double>(2, static_cast<int>(i)), points.at<double>(3, static_cast<int>(i)));
+    pose.t_s.push_back(common.t_s[i]);
+    pose.point_in_first.emplace_back(point.head<3>() / point.w());
+  }
+  if (pose.t_s.size() < least_common) return std::nullopt;
+  return pose;
+}
+
+std::optional<Resection> resection(const ObservationSeries& camera, std::span<const double> t_s,
+                                   std::span<const Eigen::Vector3d> point_in_world, double offset_s, double rate) {
+  std::vector<cv::Point3d> points;
+  std::vector<cv::Point2d> seen;
+  const double middle_s = 0.5 * (t_s.front() + t_s.back());
+  for (std::size_t i = 0; i < t_s.size(); ++i) {
+    const auto at = camera.seen_at(t_s[i] + offset_s + (rate - 1.0) * (t_s[i] - middle_s));
+    if (!at) continue;
+    points.emplace_back(point_in_world[i].x(), point_in_world[i].y(), point_in_world[i].z());
+    seen.emplace_back(at->x(), at->y());
+  }
+  if (points.size() < least_common) return std::nullopt;
+  cv::Mat turn, translation, agree;
+  const double reach = std::max(2.0 * min_agree, 2.0 * agree_px / camera.px);
+  if (!cv::solvePnPRansac(points, seen, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), turn, translation, false, 100,
+                          static_cast<float>(reach), 0.99, agree, cv::SOLVEPNP_EPNP))
+    return std::nullopt;
+  Eigen::Vector3d phi, t;
+  cv::cv2eigen(turn, phi);
+  cv::cv2eigen(translation, t);
+  return Resection{
+      {exp_so3(phi), t}, static_cast<double>(agree.rows) / static_cast<double>(points.size()), points.size()};
+}
+
+}  // namespace alidade

@@ -1,0 +1,106 @@
+#include "alidade/network/moving_culprit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "alidade/geometry/degree.h"
+
+namespace alidade {
+namespace {
+
+using PlacedStatus = MovingTargetReport::Status;
+
+/// How well cameras agree: how many are placed, and what is left at them.
+struct Agreement {
+  std::size_t num_placed = 0;
+  double sigma_px = std::numeric_limits<double>::infinity();  ///< Root mean square of the cameras'.
+};
+
+Agreement agreement_of(const MovingTargetReport& report) {
+  Agreement agreement;
+  if (report.status != PlacedStatus::placed && report.status != PlacedStatus::no_scale) return agreement;
+  double sum2 = 0.0;
+  for (const PlacedCamera& camera : report.cameras) {
+    if (!camera.placed) continue;
+    ++agreement.num_placed;
+    sum2 += camera.sigma_px * camera.sigma_px;
+  }
+  if (agreement.num_placed > 0) agreement.sigma_px = std::sqrt(sum2 / static_cast<double>(agreement.num_placed));
+  return agreement;
+}
+
+bool is_doubtful(const MovingTargetReport& report) {
+  constexpr double usual_rad = 0.2 * degree;
+  if (report.status == PlacedStatus::too_few || report.status == PlacedStatus::truth_misfits) return false;
+  const bool all_placed = std::ranges::all_of(report.cameras, &PlacedCamera::placed);
+  const bool is_solved = report.status == PlacedStatus::placed || report.status == PlacedStatus::no_scale;
+  return !is_solved || !all_placed || report.sigma_relative_rad > usual_rad;
+}
+
+/// The minute in the middle of the observations: enough to tell whether cameras agree.
+std::vector<TargetObservation> middle_of(std::span<const TargetObservation> observations) {
+  constexpr double enough_s = 60.0;
+  const auto [first, last] = std::ranges::minmax_element(observations, {}, &TargetObservation::t_capture_s);
+  const double middle_s = 0.5 * (first->t_capture_s + last->t_capture_s);
+  std::vector<TargetObservation> kept;
+  for (const TargetObservation& observation : observations)
+    if (std::abs(observation.t_capture_s - middle_s) <= 0.5 * enough_s) kept.push_back(observation);
+  return kept;
+}
+
+std::vector<TargetObservation> mirrored(std::vector<TargetObservation> observations, std::size_t head, int width_px) {
+  for (TargetObservation& observation : observations)
+    if (observation.head == head) observation.px.x() = width_px - 1.0 - observation.px.x();
+  return observations;
+}
+
+struct Best {
+  Agreement agreement;
+  std::string words;
+
+  void consider(const Agreement& other, const std::string& of) {
+    if (other.num_placed < agreement.num_placed || other.num_placed < 2) return;
+    if (other.num_placed == agreement.num_placed && !(other.sigma_px < agreement.sigma_px)) return;
+    agreement = other;
+    words = of;
+  }
+};
+
+std::string name_of(const RigHead& head) { return std::to_string(head.head.id); }
+
+}  // namespace
+
+std::string culprit_of(const MovingTargetReport& report, std::span<const TargetObservation> observations,
+                       std::span<const RigHead> heads, const PlaceCameras& place) {
+  if (!is_doubtful(report) || observations.empty()) return "";
+  const std::vector<TargetObservation> some = middle_of(observations);
+  const std::vector<RigHead> given(heads.begin(), heads.end());
+  const Agreement as_given = agreement_of(place(some, given));
+  Best best;
+  for (std::size_t h = 0; h < given.size() && (given.size() > 2 || h == 0); ++h) {
+    const std::string words = given.size() == 2 ? "one of the two cameras gives mirrored images"
+                                                : "the images of head " + name_of(given[h]) + " are mirrored";
+    best.consider(agreement_of(place(mirrored(some, h, given[h].camera.width_px), given)), words);
+  }
+  for (std::size_t a = 0; a < given.size(); ++a) {
+    for (std::size_t b = a + 1; b < given.size(); ++b) {
+      const Camera &first = given[a].camera, &second = given[b].camera;
+      const bool differ = first.lens.index() != second.lens.index() || params(first.lens) != params(second.lens);
+      if (!differ || first.width_px != second.width_px || first.height_px != second.height_px) continue;
+      std::vector<RigHead> exchanged = given;
+      std::swap(exchanged[a].camera, exchanged[b].camera);
+      best.consider(agreement_of(place(some, exchanged)),
+                    "heads " + name_of(given[a]) + " and " + name_of(given[b]) + " have each other's camera");
+    }
+  }
+  // By as much less is left as no chance would have it: thousands of observations are seen by all.
+  constexpr double much_less = 0.5;
+  const bool explains = best.agreement.num_placed == given.size() &&
+                        (as_given.num_placed < given.size() || best.agreement.sigma_px < much_less * as_given.sigma_px);
+  if (!explains) return "";
+  return best.words + ": undone, all cameras agree to " + text_of(best.agreement.sigma_px, 2) + " px" +
+         (as_given.num_placed == given.size() ? ", for " + text_of(as_given.sigma_px, 2) : std::string());
+}
+
+}  // namespace alidade

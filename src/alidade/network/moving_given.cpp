@@ -1,0 +1,89 @@
+#include "alidade/network/moving_given.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace alidade {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+constexpr double usual_f = 0.003, usual_centre_px = 2.0, usual_distance = 0.005;
+
+struct Given {
+  Assumption what;
+  VectorXd moved;  ///< Of the common parameters, for its σ or an ordinary error.
+};
+
+void add_lens(const RigHead& rig_head, const Eigen::MatrixXd& follows, std::vector<Given>& all, MovingGiven& given) {
+  const VectorXd values = params(rig_head.camera.lens);
+  const Eigen::MatrixXd& cov = rig_head.camera.cov;
+  const bool has_cov = cov.rows() == values.size();
+  const auto add = [&](const char* name, Index param, double ordinary, const VectorXd& step) {
+    Given one{{.name = "head" + std::to_string(rig_head.head.id) + ".camera." + name, .value = values[param]}, {}};
+    if (has_cov) one.what.sigma = std::sqrt(std::max(0.0, cov(param, param)));
+    one.what.ordinary = ordinary;
+    one.what.remedy = "give camera files with their covariance (alidade calibrate writes it)";
+    one.moved = step * one.what.sigma.value_or(ordinary);
+    all.push_back(std::move(one));
+  };
+  VectorXd by_f = follows.col(0);
+  if (!has_cov) by_f += values[1] / values[0] * follows.col(1);  // both focal lengths err together
+  add("fx", 0, usual_f * values[0], by_f);
+  add("cx", 2, usual_centre_px, follows.col(2));
+  add("cy", 3, usual_centre_px, follows.col(3));
+  if (has_cov) given.cov += follows * cov * follows.transpose();
+}
+
+/// All places follow the distance in proportion, seen from the camera that is held.
+void add_distance(const MovingProblem& problem, const SolvedMoving& solved, const KnownDistance& distance,
+                  std::vector<Given>& all) {
+  const auto centre = [&](std::size_t h) {
+    return cam_centre_in_world(solved.state.heads[h].head, problem.readings[h]);
+  };
+  VectorXd step = VectorXd::Zero(problem.num_common());
+  for (std::size_t h = 0; h < solved.state.heads.size(); ++h) {
+    const Index at = problem.first_param(h);
+    if (at < 0) continue;
+    step.segment<3>(at) = solved.state.heads[h].head.world_from_base.rotation.conjugate() *
+                          ((centre(h) - centre(problem.reference)) / distance.distance_m);
+  }
+  Given one{{.name = "distance_m", .value = distance.distance_m, .ordinary = usual_distance * distance.distance_m}, {}};
+  if (distance.sigma_m > 0.0) one.what.sigma = distance.sigma_m;
+  one.what.remedy = "give the distance's σ: --distance HEAD:HEAD:M:SIGMA";
+  one.moved = step * one.what.sigma.value_or(one.what.ordinary);
+  all.push_back(std::move(one));
+}
+
+/// The pose that it moves most, in that one's σ.
+void set_moves(const MovingProblem& problem, const SolvedMoving& solved, const Eigen::MatrixXd& cov, Given& one) {
+  for (std::size_t h = 0; h < solved.state.heads.size(); ++h) {
+    const Index at = problem.first_param(h);
+    for (Index k = 0; at >= 0 && k < 6; ++k) {
+      const double sigma = std::sqrt(cov(at + k, at + k)), moved = one.moved[at + k];
+      if (!(std::abs(moved) > one.what.moves * sigma)) continue;
+      one.what.moves = std::abs(moved) / sigma;
+      one.what.moved =
+          "head" + std::to_string(solved.state.heads[h].head.id) + "." + head_param_names[static_cast<std::size_t>(k)];
+      one.what.moved_by = moved;
+    }
+  }
+}
+
+}  // namespace
+
+MovingGiven moving_given(const MovingProblem& problem, const SolvedMoving& solved, const MovingTargetConfig& config) {
+  MovingGiven given{{}, solved.cov};
+  std::vector<Given> all;
+  for (std::size_t h = 0; h < solved.state.heads.size(); ++h)
+    if (problem.placed[h]) add_lens(solved.state.heads[h], solved.by_lens[h], all, given);
+  if (config.distance) add_distance(problem, solved, *config.distance, all);
+  for (Given& one : all) {
+    set_moves(problem, solved, given.cov, one);
+    given.assumed.push_back(std::move(one.what));
+  }
+  return given;
+}
+
+}  // namespace alidade

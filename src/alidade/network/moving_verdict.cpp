@@ -1,0 +1,150 @@
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/geometry/degree.h"
+#include "alidade/network/moving_target.h"
+
+namespace alidade {
+namespace {
+
+using PlacedStatus = MovingTargetReport::Status;
+constexpr double good_turn_rad = 0.2 * degree, refuse_turn_rad = 2.0 * degree;
+constexpr double good_share = 0.01, refuse_share = 0.1;  // σ of a place over the cameras' distance
+
+Verdict moving_refusal(std::string sentence, std::string add) {
+  return {State::refused, ExitCode::cannot_tell, std::move(sentence), std::move(add), {}};
+}
+
+Verdict refusal_by_status(const MovingTargetReport& report, const MovingTargetConfig& config) {
+  switch (report.status) {
+    case PlacedStatus::too_few:
+      return moving_refusal("no two cameras saw the target together in 30 moments or more",
+                            config.clock_search_s > 0.0
+                                ? "let the target move where the cameras' views overlap, or raise --clocks"
+                                : "let the target move where the views overlap; where each camera has its own clock, "
+                                  "give --clocks SECONDS");
+    case PlacedStatus::no_pair:
+      return moving_refusal(config.clock_search_s > 0.0
+                                ? "no two cameras' sights agree at any difference of their clocks"
+                                : "no two cameras' sights agree: their clocks differ, or a lens is wrong",
+                            config.clock_search_s > 0.0 ? "raise --clocks; check the lenses and their order"
+                                                        : "give --clocks SECONDS; check the lenses and their order");
+    case PlacedStatus::degenerate:
+      return moving_refusal("the cameras' places cannot be told from this path",
+                            "let the target move in all three directions and near the cameras, not along a line");
+    case PlacedStatus::no_scale:
+      return moving_refusal(
+          "the scale cannot be told: all lengths grow with the path",
+          "give the distance of two placed cameras (--distance 1:2:12.5), or the target's path (--truth)");
+    case PlacedStatus::truth_misfits:
+      return moving_refusal("the path that was seen is not the true path given, whatever its scale",
+                            config.clock_search_s > 0.0
+                                ? "check that --truth is of the same flight and metres"
+                                : "give --clocks SECONDS where the true path has a clock of its own");
+    case PlacedStatus::no_convergence:
+      if (!(config.clock_search_s > 0.0))
+        return moving_refusal(
+            "no path fits what the cameras saw by one clock",
+            "give --clocks SECONDS where each camera has its own clock; check the lenses, and that one "
+            "target only is in the table");
+      return {State::not_converged,
+              ExitCode::no_convergence,
+              "the estimate does not settle",
+              "check the lenses and that one target only is in the table",
+              {}};
+    case PlacedStatus::placed:
+      break;
+  }
+  return {};
+}
+
+/// The largest distance of two placed cameras.
+double spread_m(const MovingTargetReport& report) {
+  double most = 0.0;
+  for (std::size_t a = 0; a < report.cameras.size(); ++a)
+    for (std::size_t b = 0; b < a; ++b)
+      if (report.cameras[a].placed && report.cameras[b].placed)
+        most = std::max(most, (report.rig.heads[a].head.world_from_base.translation -
+                               report.rig.heads[b].head.world_from_base.translation)
+                                  .norm());
+  return most;
+}
+
+State state_between(double value, double good, double refuse) {
+  return !(value < refuse) ? State::refused : value < good ? State::good : State::care;
+}
+
+void add_precision(const MovingTargetReport& report, Verdict& verdict) {
+  const double spread = spread_m(report), sigma_m = report.sigma_relative_m, sigma_rad = report.sigma_relative_rad;
+  verdict.checks.push_back({"rotation", state_between(sigma_rad, good_turn_rad, refuse_turn_rad),
+                            "σ of a camera's attitude " + text_of(sigma_rad / degree, 2) + "°", sigma_rad / degree,
+                            good_turn_rad / degree, "°", ""});
+  verdict.checks.push_back(
+      {"position", state_between(sigma_m / spread, good_share, refuse_share),
+       "σ of a camera's place " + text_of(sigma_m, 2) + " m, of " + text_of(spread, 3) + " m between cameras", sigma_m,
+       good_share * spread, "m", ""});
+}
+
+void add_cameras(const MovingTargetReport& report, Verdict& verdict) {
+  std::string left;
+  std::size_t num_left = 0, num_used = 0, num_given = 0;
+  for (const PlacedCamera& camera : report.cameras) {
+    num_used += camera.num_used;
+    num_given += camera.num_observations;
+    if (camera.placed) continue;
+    ++num_left;
+    left += (left.empty() ? "head " : "; head ") + std::to_string(camera.id) + ": " + camera.reason;
+  }
+  verdict.checks.push_back({"cameras", num_left == 0 ? State::good : State::care,
+                            num_left == 0 ? "all placed" : "not placed: " + left, static_cast<double>(num_left), 1.0,
+                            "", ""});
+  // Hands and lenses err for long stretches: that σ is several times larger is usual here, and counted.
+  Check agree = clusters_agree(report.clusters, "block",
+                               text_of(report.block_s, 2) + " s of a hand's or a lens's errors", "path");
+  if (!report.clusters.z2.empty()) agree.state = State::good;
+  verdict.checks.push_back(agree);
+}
+
+void add_truth(const MovingTargetReport& report, Verdict& verdict) {
+  if (!(report.truth_covered > 0.0)) return;
+  verdict.checks.push_back({"true path", report.truth_covered > 0.9 ? State::good : State::care,
+                            "met within " + text_of(report.truth_median_m, 2) +
+                                " m (median) after a similarity, over " + text_of(100.0 * report.truth_covered) +
+                                " % of the path",
+                            report.truth_median_m, 0.0, "m", ""});
+}
+
+}  // namespace
+
+Verdict moving_target_verdict(const MovingTargetReport& report, const MovingTargetConfig& config) {
+  if (!report.culprit.empty())
+    return moving_refusal(report.culprit,
+                          "give images as the camera takes them (no mirror, no flip), and cameras in the order of the "
+                          "heads' numbers");
+  if (report.status != PlacedStatus::placed) return refusal_by_status(report, config);
+  Verdict verdict;
+  add_precision(report, verdict);
+  add_cameras(report, verdict);
+  add_truth(report, verdict);
+  const auto first = [&](State state) {
+    return std::ranges::find_if(verdict.checks, [&](const Check& check) { return check.state == state; });
+  };
+  if (const auto refused = first(State::refused); refused != verdict.checks.end()) {
+    Verdict no = moving_refusal("too little to place the cameras: " + refused->text,
+                                "let the target move in all three directions, nearer to the cameras, and for longer");
+    no.checks = verdict.checks;
+    return no;
+  }
+  if (const auto care = first(State::care); care != verdict.checks.end()) {
+    verdict.state = State::care;
+    verdict.to_add = care->text;
+  }
+  const auto num = std::ranges::count(report.cameras, true, &PlacedCamera::placed);
+  verdict.sentence = std::to_string(num) + " cameras placed by a moving target, ± " +
+                     text_of(3.0 * report.sigma_relative_rad / degree, 2) + "°, ± " +
+                     text_of(3.0 * report.sigma_relative_m, 2) + " m (3σ)";
+  heed_assumptions(report.assumed, verdict);
+  return verdict;
+}
+
+}  // namespace alidade

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "alidade/patches/image_warp.h"
+
+namespace cv {
+class Mat;
+}
+
+namespace alidade {
+
+/// Where a patch stands in an image, and how it has been turned, stretched and bent since it was cut out: what lay at
+/// offset d from its middle is seen at px + linear d + ½ bend (d_x², 2 d_x d_y, d_y²), with grey values gain · grey +
+/// bias.
+struct PatchPose {
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d linear = Eigen::Matrix2d::Identity();
+  WarpBend bend = WarpBend::Zero();  ///< Given: a patch alone tells bend and place badly apart.
+  double gain = 1.0, bias = 0.0;
+};
+
+/// A patch found again.
+struct PatchFit {
+  PatchPose pose;
+  double rms = 0.0;  ///< Of the residuals, in grey values of the patch.
+  bool converged = false;
+  Eigen::Matrix2d cov = Eigen::Matrix2d::Identity();  ///< Of px, by this frame's noise alone. [px²]
+};
+
+/// A square of pixels of one image that is found again in others by an affine warp with gain and bias, to a few
+/// hundredths of a pixel: inverse-compositional Gauss–Newton, so that the derivatives are the patch's own and are taken
+/// once. S. Baker & I. Matthews, "Lucas–Kanade 20 years on", 2004.
+///
+/// Images are 32-bit float, smoothed by smoothed_for_patches(): interpolation then leaves hardly an error that
+/// depends on the place between pixels.
+class AnchorPatch {
+ public:
+  static constexpr int half_px = 7;
+  /// Pixels around `px` that have to be in the image.
+  static constexpr int margin_px = half_px + 3;
+
+  AnchorPatch() = default;
+  /// Cuts out the patch around a whole pixel, `margin_px` inside the image.
+  AnchorPatch(const cv::Mat& smoothed, int u, int v);
+
+  /// Finds it from a pose at most about 2 px off. Not converged: it is not there, or partly outside.
+  [[nodiscard]] PatchFit align(const cv::Mat& smoothed, const PatchPose& start) const;
+
+  /// Covariance of the place [px²] for noise of σ = 1 grey value in the unsmoothed image.
+  [[nodiscard]] const Eigen::Matrix2d& cov_of_unit_noise() const { return cov_unit_; }
+  /// σ of the patch's own grey values.
+  [[nodiscard]] double contrast() const { return contrast_; }
+  /// RMS of residuals between two smoothed images for noise of σ = 1 in each.
+  [[nodiscard]] double rms_of_unit_noise() const { return rms_unit_; }
+
+ private:
+  static constexpr int side_px = 2 * half_px + 1, area_px = side_px * side_px;
+  static constexpr int num_unknowns = 8;  // place, linear part, gain, bias
+  using Jacobian = Eigen::Matrix<float, num_unknowns, Eigen::Dynamic>;
+
+  void set_noise_model();
+
+  std::vector<float> grey_;
+  Jacobian jacobian_;
+  Eigen::Matrix<double, num_unknowns, num_unknowns> inverse_ = {};
+  Eigen::Matrix2d cov_unit_ = Eigen::Matrix2d::Zero();
+  double contrast_ = 0.0, rms_unit_ = 1.0;
+};
+
+/// The image in 32-bit float, smoothed by [1 2 1]/4 along rows and columns.
+[[nodiscard]] cv::Mat smoothed_for_patches(const cv::Mat& grey);
+
+}  // namespace alidade

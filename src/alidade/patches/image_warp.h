@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+
+namespace alidade {
+
+/// Second derivatives of a map of the plane: ∂²/∂x², ∂²/∂x∂y, ∂²/∂y² in the columns. [1/px]
+using WarpBend = Eigen::Matrix<double, 2, 3>;
+
+/// Where a point went from one frame to another.
+struct PointMove {
+  Eigen::Vector2d from_px, to_px;
+};
+
+/// A smooth map of a whole image onto another, a cubic polynomial through many moved points: how the perspective of a
+/// turn, and the lens, bend what is seen. A far world needs no more, with any lens.
+class ImageWarp {
+ public:
+  /// None for fewer points than can tell. Points that moved otherwise than the rest are left out.
+  [[nodiscard]] static std::optional<ImageWarp> fit(std::span<const PointMove> moves);
+
+  [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& px) const;
+  [[nodiscard]] WarpBend bend_at(const Eigen::Vector2d& px) const;
+
+ private:
+  static constexpr int num_terms = 10;
+  using Terms = Eigen::Matrix<double, num_terms, 1>;
+
+  [[nodiscard]] Eigen::Vector2d normalised(const Eigen::Vector2d& px) const { return (px - centre_) / scale_; }
+  [[nodiscard]] static Terms terms(const Eigen::Vector2d& q);
+  [[nodiscard]] bool solve(std::span<const PointMove> moves, double max_residual_px);
+
+  Eigen::Vector2d centre_ = Eigen::Vector2d::Zero();
+  double scale_ = 1.0;
+  Eigen::Matrix<double, num_terms, 2> coefficients_ = Eigen::Matrix<double, num_terms, 2>::Zero();
+};
+
+}  // namespace alidade

@@ -1,0 +1,166 @@
+#include "alidade/results/moving_document.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "alidade/report/thin.h"
+#include "alidade/results/rig_document.h"
+#include "alidade/results/thin_tables.h"
+
+namespace alidade {
+namespace {
+
+using Numbers = std::vector<double>;
+constexpr std::size_t max_rows = 4000;  // the page holds them; path.csv has all
+
+JsonValue camera_value(const PlacedCamera& camera) {
+  JsonValue value;
+  value["id"] = camera.id;
+  value["placed"] = camera.placed;
+  value["reason"] = camera.reason;
+  value["sights"] = camera.num_observations;
+  value["used"] = camera.num_used;
+  value["clock_offset_s"] = camera.clock.offset_s;
+  value["clock_rate"] = camera.clock.rate;
+  value["sigma_clock_s"] = camera.sigma_clock_s;
+  value["sigma_clock_rate"] = camera.sigma_rate;
+  value["sigma_px"] = camera.sigma_px;
+  value["rms_px"] = camera.rms_px;
+  return value;
+}
+
+/// Where each placed camera stands, with the covariance of its place in the world, and half its view (tangents), to
+/// draw it by.
+DataTable cameras_table(const MovingTargetReport& report) {
+  constexpr std::array<const char*, 18> columns{"id",
+                                                "world_from_cam_x_m",
+                                                "world_from_cam_y_m",
+                                                "world_from_cam_z_m",
+                                                "world_from_cam_qx",
+                                                "world_from_cam_qy",
+                                                "world_from_cam_qz",
+                                                "world_from_cam_qw",
+                                                "cov_xx_m2",
+                                                "cov_xy_m2",
+                                                "cov_xz_m2",
+                                                "cov_yy_m2",
+                                                "cov_yz_m2",
+                                                "cov_zz_m2",
+                                                "half_view_x",
+                                                "half_view_y",
+                                                "num_used",
+                                                "rms_px"};
+  std::array<Numbers, columns.size()> cells;
+  for (std::size_t h = 0; h < report.cameras.size(); ++h) {
+    if (!report.cameras[h].placed) continue;
+    const RigHead& head = report.rig.heads[h];
+    // The covariance is of steps on the right: along the base's own axes.
+    const Rigid3& base = head.head.world_from_base;
+    const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h);
+    const Eigen::Matrix3d R = base.rotation.toRotationMatrix();
+    const Eigen::Matrix3d cov = R * report.rig.cov.block<3, 3>(at, at) * R.transpose();
+    // It does not turn: its axes stand where the encoder is at zero.
+    const Rigid3 cam = world_from_cam(head.head, head.head.encoder.readings(Eigen::Vector2d::Zero()));
+    const Eigen::Vector3d& t = cam.translation;
+    const Eigen::Quaterniond& q = cam.rotation;
+    const Eigen::VectorXd lens = params(head.camera.lens);  // the first two of any: fx, fy
+    const std::array<double, columns.size()> row{static_cast<double>(report.cameras[h].id),
+                                                 t.x(),
+                                                 t.y(),
+                                                 t.z(),
+                                                 q.x(),
+                                                 q.y(),
+                                                 q.z(),
+                                                 q.w(),
+                                                 cov(0, 0),
+                                                 cov(0, 1),
+                                                 cov(0, 2),
+                                                 cov(1, 1),
+                                                 cov(1, 2),
+                                                 cov(2, 2),
+                                                 0.5 * head.camera.width_px / lens[0],
+                                                 0.5 * head.camera.height_px / lens[1],
+                                                 static_cast<double>(report.cameras[h].num_used),
+                                                 report.cameras[h].rms_px};
+    for (std::size_t i = 0; i < row.size(); ++i) cells[i].push_back(row[i]);
+  }
+  DataTable table{"cameras", {}};
+  for (std::size_t i = 0; i < columns.size(); ++i) table.columns.emplace_back(columns[i], cells[i]);
+  return table;
+}
+
+DataTable path_table(const MovingTargetReport& report) {
+  std::array<Numbers, 4> columns;
+  const std::vector<bool> none(report.path.size(), false);
+  for (const std::size_t row : report::thinned_rows(report.path.size(), {}, none, max_rows)) {
+    columns[0].push_back(report.path_t_s[row]);
+    for (std::size_t k = 0; k < 3; ++k) columns[k + 1].push_back(report.path[row][static_cast<Eigen::Index>(k)]);
+  }
+  DataTable table{"path",
+                  {{"t_s", rounded(columns[0], 6)},
+                   {"target_in_base_x_m", rounded(columns[1], 6)},
+                   {"target_in_base_y_m", rounded(columns[2], 6)},
+                   {"target_in_base_z_m", rounded(columns[3], 6)}}};
+  record_steps_kept(table, report.path.size(), "path.csv");
+  return table;
+}
+
+}  // namespace
+
+void fill_moving_target(std::span<const TargetObservation> observations, const MovingTargetReport& report,
+                        ResultDocument& document) {
+  document.counts.given += observations.size();
+  document.counts.used = static_cast<std::size_t>(std::ranges::count(report.used, true));
+  document.counts.dropped = observations.size() - document.counts.used;
+  JsonValue& estimate = document.estimate;
+  JsonValue cameras = JsonValue::list();
+  for (const PlacedCamera& camera : report.cameras) cameras.push_back(camera_value(camera));
+  estimate["cameras"] = std::move(cameras);
+  if (report.status != MovingTargetReport::Status::placed) return;
+  fill_heads(report.rig, document);
+  estimate["chi2_per_dof"] = report.chi2_per_dof;
+  fill_heads_model(report.rig, report.cov_model, document);
+  document.assumed = report.assumed;
+  estimate["design_effect"] = report.clusters.design_effect;
+  estimate["block_s"] = report.block_s;
+  estimate["sigma_relative_rad"] = report.sigma_relative_rad;
+  estimate["sigma_relative_m"] = report.sigma_relative_m;
+  estimate["sigma_scale"] = report.sigma_scale;
+  if (report.truth_covered > 0.0) {
+    estimate["true_path"]["median_m"] = report.truth_median_m;
+    estimate["true_path"]["rms_m"] = report.truth_rms_m;
+    estimate["true_path"]["covered"] = report.truth_covered;
+    estimate["true_path"]["clock_offset_s"] = report.truth_clock.offset_s;
+    estimate["true_path"]["clock_rate"] = report.truth_clock.rate;
+  }
+  document.data.push_back(path_table(report));
+  document.data.push_back(cameras_table(report));
+}
+
+std::vector<TargetObservation> observations_on_one_clock(std::span<const TargetObservation> observations,
+                                                         const MovingTargetReport& report) {
+  std::vector<TargetObservation> on_rig;
+  for (const TargetObservation& observation : observations) {
+    const PlacedCamera& camera = report.cameras[observation.head];
+    if (!camera.placed) continue;
+    on_rig.push_back(observation);
+    on_rig.back().t_capture_s = on_rig.back().t_arrival_s = camera.clock.in_rig(observation.t_capture_s);
+    if (!(observation.sigma_px > 0.0)) on_rig.back().sigma_px = camera.sigma_px;
+  }
+  std::ranges::stable_sort(on_rig, {}, &TargetObservation::t_capture_s);
+  return on_rig;
+}
+
+std::string moving_path_csv(const MovingTargetReport& report) {
+  std::string text = "t_s,x_m,y_m,z_m\n";
+  for (std::size_t i = 0; i < report.path.size(); ++i) {
+    const Eigen::Vector3d& point = report.path[i];
+    text += fmt::format("{:.6f},{:.6f},{:.6f},{:.6f}\n", report.path_t_s[i], point.x(), point.y(), point.z());
+  }
+  return text;
+}
+
+}  // namespace alidade

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "alidade/public.h"
+#include "alidade/results/result_document.h"
+
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+/// A file beside result.json, or an image (JPEG) of the report.
+struct NamedBytes {
+  std::string name;
+  std::string bytes;
+};
+
+/// All that a job leaves, whoever ran it: what a command shows and writes, and what a program saves.
+struct JobOutcome {
+  ResultDocument document;         ///< Of it counts, assumed, verdict, estimate … grids; the rest is the run's.
+  std::vector<std::string> lines;  ///< For a person, before the verdict.
+  std::vector<NamedBytes> files;
+  std::vector<NamedBytes> images;  ///< The most wanted first.
+};
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <utility>
+
+#include "alidade/estimation/cluster_covariance.h"
+#include "alidade/results/result_document.h"
+
+namespace alidade {
+
+/// How the stated σ came about: by how much the clusters' scatter raised the model's, and how sure that is. `told`: the
+/// names of the parameters that are estimated, each with its place in the covariance.
+[[nodiscard]] JsonValue sigma_values(std::span<const std::pair<std::string, Eigen::Index>> told,
+                                     const ClusterCovariance& clusters);
+
+}  // namespace alidade

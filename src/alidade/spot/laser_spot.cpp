@@ -1,0 +1,97 @@
+#include "alidade/spot/laser_spot.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "alidade/spot/spot_candidates.h"
+#include "alidade/spot/spot_fit.h"
+#include "alidade/spot/spot_signal.h"
+
+namespace alidade {
+namespace {
+
+std::string at_pixel(const Eigen::Vector2d& px) {
+  return "(" + std::to_string(std::lround(px.x())) + ", " + std::to_string(std::lround(px.y())) + ")";
+}
+
+/// One channel with its candidates, in pixels of the photo.
+struct Channel {
+  SpotSignal signal;
+  std::vector<SpotCandidate> candidates;
+
+  [[nodiscard]] Eigen::Vector2d px(const SpotCandidate& spot) const {
+    return spot.px + Eigen::Vector2d(signal.u_min, signal.v_min);
+  }
+  [[nodiscard]] double strongest() const { return candidates.empty() ? 0.0 : candidates.front().strength; }
+};
+
+std::vector<int> channels_for(const cv::Mat& photo, SpotColour colour) {
+  constexpr int green = 1, red = 2, grey = 3;
+  if (photo.channels() < 3 || colour == SpotColour::bright) return {grey};
+  if (colour == SpotColour::red) return {red};
+  if (colour == SpotColour::green) return {green};
+  return {red, green};
+}
+
+/// A light of comparable strength elsewhere, in any channel: what its own light leaks into other channels lies at the
+/// same place.
+const SpotCandidate* rival_of(const Channel& best, const std::vector<Channel>& channels, const LaserSpotConfig& config,
+                              Eigen::Vector2d& px) {
+  const SpotCandidate& spot = best.candidates.front();
+  for (const Channel& channel : channels) {
+    for (const SpotCandidate& other : channel.candidates) {
+      px = channel.px(other);
+      const bool is_same = (px - best.px(spot)).norm() < 2.0 * std::max(spot.radius_px, other.radius_px) + 2.0;
+      if (&other != &spot && !(is_same && &channel != &best) && other.strength >= config.rival_share * spot.strength)
+        return &other;
+    }
+  }
+  return nullptr;
+}
+
+LaserSpot no_spot(std::string reason) {
+  LaserSpot spot;
+  spot.reason = std::move(reason);
+  return spot;
+}
+
+bool is_blown_out(const SpotSignal& signal) {
+  const auto num_region = (signal.is_in_region > 0).count();
+  const auto num_saturated = (signal.is_in_region > 0 && signal.is_saturated > 0).count();
+  return 2 * num_saturated > num_region;
+}
+
+}  // namespace
+
+LaserSpot find_laser_spot(const cv::Mat& photo, const LaserSpotAids& aids, const LaserSpotConfig& config) {
+  std::vector<Channel> channels;
+  for (const int channel : channels_for(photo, config.colour)) {
+    channels.push_back({spot_signal(photo, channel, aids), {}});
+    SpotSignal& signal = channels.back().signal;
+    if (!signal.reason.empty()) return no_spot(signal.reason);
+    if (is_blown_out(signal)) return no_spot("the photo is blown out");
+    channels.back().candidates = spot_candidates(signal, config);
+  }
+  const Channel& best = *std::max_element(channels.begin(), channels.end(), [](const Channel& a, const Channel& b) {
+    return a.strongest() < b.strongest();
+  });
+  if (best.candidates.empty()) return no_spot("no laser spot");
+  const SpotCandidate& candidate = best.candidates.front();
+  Eigen::Vector2d rival_px;
+  if (rival_of(best, channels, config, rival_px) != nullptr)
+    return no_spot("two candidates at " + at_pixel(best.px(candidate)) + " and " + at_pixel(rival_px));
+  if (!candidate.reason.empty())
+    return no_spot("the laser spot at " + at_pixel(best.px(candidate)) + " " + candidate.reason);
+  const SpotPlace place = measure_spot(best.signal, candidate);
+  if (!place.reason.empty()) return no_spot(place.reason);
+  return {.px = place.px + Eigen::Vector2d(best.signal.u_min, best.signal.v_min),
+          .cov = place.cov,
+          .peak = place.peak,
+          .radius_px = place.radius_px,
+          .is_saturated = candidate.is_saturated,
+          .is_on_edge = place.is_on_edge,
+          .reason = {}};
+}
+
+}  // namespace alidade

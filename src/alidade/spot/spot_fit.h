@@ -1,0 +1,31 @@
+#pragma once
+
+#include "alidade/spot/spot_candidates.h"
+#include "alidade/spot/spot_signal.h"
+
+namespace alidade {
+
+/// A spot's place below the pixel, in pixels of the signal's part.
+struct SpotPlace {
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d cov = Eigen::Matrix2d::Identity();  ///< [px²]
+  double radius_px = 0.0;
+  double peak = 0.0;
+  double offset_light = 0.0;  ///< Light around the spot that is not its own.
+  bool is_saturated = false;
+  bool is_on_edge = false;
+  std::string reason;
+};
+
+/// Centroid of the light in a disc of three sigmas around itself, iterated until it stands. Where ink and paper share
+/// the disc, it starts fit_on_edge().
+[[nodiscard]] SpotPlace measure_spot(const SpotSignal& signal, const SpotCandidate& candidate);
+
+/// Fits the light of a Gaussian spot on a print whose ink returns the share r of what paper returns,
+///     S(p) = s · exp(−½ (p−μ)ᵀ Σ⁻¹ (p−μ)) · (r + (1 − r) w(p)),
+/// w the share of paper. Blur acts on the product: it widens the spot from Σ' to Σ = Σ' + b² and moves what p sees of
+/// the print to μ + Σ' Σ⁻¹ (p − μ), where the print is blurred by less than b (product of two Gaussians).
+/// Saturated pixels only tell that there is at least that much light.
+[[nodiscard]] SpotPlace fit_on_edge(const SpotSignal& signal, const SpotPlace& start);
+
+}  // namespace alidade

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/board/board_view.h"
+#include "alidade/calibrate/calibrate.h"
+#include "alidade/estimation/counts.h"
+#include "alidade/files/files.h"
+#include "alidade/geometry/rigid3.h"
+#include "alidade/public.h"
+
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+/// Corners as CSV: photo,corner,u_px,v_px,sigma_u_px,sigma_v_px,corr_uv. Places to 10⁻⁹ px, so that
+/// what is read back gives the same camera.
+[[nodiscard]] std::string corners_csv(std::span<const BoardView> views);
+
+/// Reads such a file, by anybody: photo, corner, u_px, v_px (or u, v) and, optionally, sigma_u_px, sigma_v_px and
+/// corr_uv; without σ the covariance is the identity, "unknown". Photos in order of first appearance. Throws
+/// InputError: a corner that the board does not have, the same corner twice, a σ that is not positive, a missing
+/// column. With `skipped` a wrong row is left out and named there instead.
+[[nodiscard]] std::vector<BoardView> read_corners(const std::filesystem::path& file, int num_points,
+                                                  std::vector<SkippedInput>* skipped = nullptr);
+
+/// The smallest images that hold all corners [px]: where nobody tells their size.
+[[nodiscard]] ImageSize min_size(std::span<const BoardView> views);
+
+/// A size that does not hold the corners is of other images: throws InputError about `file` where more than one in ten
+/// lies outside. A few outside may be wrong corners.
+void require_corners_inside(const ImageSize& size, const std::filesystem::path& file, std::span<const BoardView> views);
+
+/// Poses as CSV: photo,cam_from_board_x_m,…_y_m,…_z_m,…_qx,…_qy,…_qz,…_qw.
+[[nodiscard]] std::string poses_csv(const std::vector<std::string>& photos, std::span<const Rigid3> cam_from_board);
+
+/// Board points as CSV: corner,x_m,y_m,z_m; and back. Throws InputError where a point is missing.
+[[nodiscard]] std::string board_points_csv(std::span<const Eigen::Vector3d> points_in_board);
+[[nodiscard]] std::vector<Eigen::Vector3d> read_board_points(const std::filesystem::path& file, int num_points);
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

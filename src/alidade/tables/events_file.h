@@ -1,0 +1,51 @@
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/estimation/counts.h"
+#include "alidade/pantilt/head.h"
+#include "alidade/track/track.h"
+
+namespace alidade {
+
+struct EventsFile {
+  std::vector<TargetObservation> observations;  ///< In the order of the file: of arrival.
+  std::vector<SkippedInput> skipped;
+};
+
+struct EventsOptions {
+  bool skip_bad = false;  ///< Leave out rows that are wrong, by name.
+  /// Cameras that do not turn, each with a clock of its own: `pan_rad,tilt_rad` may be left out (zero) but may not
+  /// change, and times run forwards head by head alone.
+  bool stands_still = false;
+};
+
+/// Ids in column `head`, in order of size.
+[[nodiscard]] std::vector<int> heads_in_events(const std::filesystem::path& file);
+
+/// Reads `t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px`: `head` is an id of the rig, angles are those at
+/// capture (also `pan_rad_at_capture`), `t_arrival_s` may be left out. `du_px,dv_px` in place of the pixel are offsets
+/// from the principal point; `sigma_px`, where there is such a column, is a row's own. Throws InputError: no such
+/// column, a head that is not in the rig, arrival before capture, arrival times that run backwards, angles in
+/// `pan_deg`, no rows.
+[[nodiscard]] EventsFile read_events(const std::filesystem::path& file, std::span<const RigHead> heads,
+                                     const EventsOptions& options = {});
+
+/// `sigma_px` stands there if an observation has one.
+[[nodiscard]] std::string events_csv(std::span<const TargetObservation> observations, std::span<const RigHead> heads);
+
+/// Reads `t_s,x_m,y_m,z_m`, in order of time.
+[[nodiscard]] TrueTrack read_true_track(const std::filesystem::path& file);
+[[nodiscard]] std::string true_track_csv(const TrueTrack& truth);
+
+/// Text of track.csv: `t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,sigma_x_m,sigma_y_m,sigma_z_m,nis,event`, a row an
+/// observation; `ahead` (one an observation, or none) adds rows with the event `predicted`.
+[[nodiscard]] std::string track_csv(std::span<const TrackStep> steps, std::span<const PredictedStep> ahead = {});
+
+/// Text of smoothed.csv: `t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,sigma_x_m,sigma_y_m,sigma_z_m`.
+[[nodiscard]] std::string smoothed_csv(std::span<const PredictedStep> smoothed);
+
+}  // namespace alidade

@@ -1,0 +1,196 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <set>
+
+#include "alidade/files/table_rows.h"
+#include "alidade/tables/localize_file.h"
+
+namespace alidade {
+namespace {
+
+constexpr long max_frames = 10'000'000, max_point_id = 1'000'000'000;
+
+/// What a row says of its frame; the frame is made with its first row.
+ObservationFrame& frame_of(const Csv& csv, std::size_t row, const ObservationsOptions& options,
+                           std::vector<ObservationFrame>& frames) {
+  const long number = csv.integer(row, "frame", 0, max_frames);
+  const double t_s = options.rate_hz > 0.0 ? static_cast<double>(number) / options.rate_hz : csv.number(row, "t_s");
+  if (!frames.empty() && frames.back().frame == number) {
+    if (frames.back().t_s != t_s)
+      throw InputError(csv.where(row, "t_s") +
+                       fmt::format(": '{}' differs from the first row of frame {}", csv.text(row, "t_s"), number));
+    return frames.back();
+  }
+  if (!frames.empty() && number < frames.back().frame)
+    throw InputError(csv.where(row, "frame") + fmt::format(": '{}' runs backwards", number));
+  if (!frames.empty() && !(t_s > frames.back().t_s))
+    throw InputError(csv.where(row, "t_s") +
+                     fmt::format(": '{}' is not after frame {}", csv.text(row, "t_s"), frames.back().frame));
+  frames.push_back({number, t_s, {}});
+  return frames.back();
+}
+
+void read_row(const Csv& csv, std::size_t row, const ObservationsOptions& options,
+              std::vector<ObservationFrame>& frames) {
+  const bool is_empty = csv.is_empty(row, "point_id");
+  FeatureObservation observation;
+  if (!is_empty) {
+    observation.id = csv.integer(row, "point_id", 0, max_point_id);
+    observation.px = {csv.number(row, "u_px"), csv.number(row, "v_px")};
+    const double u = observation.px.x() / options.width_px, v = observation.px.y() / options.height_px;
+    // A tracker may be half an image off; a camera file of another size is further.
+    if (options.width_px > 0 && !(u > -0.5 && u < 1.5))
+      throw InputError(csv.where(row, "u_px") + fmt::format(": '{}' is far outside the camera's {} px",
+                                                            csv.text(row, "u_px"), options.width_px));
+    if (options.height_px > 0 && !(v > -0.5 && v < 1.5))
+      throw InputError(csv.where(row, "v_px") + fmt::format(": '{}' is far outside the camera's {} px",
+                                                            csv.text(row, "v_px"), options.height_px));
+  }
+  const std::size_t num_before = frames.size();
+  ObservationFrame& frame = frame_of(csv, row, options, frames);
+  if (is_empty) return;
+  for (const FeatureObservation& other : frame.observations)
+    if (other.id == observation.id) {
+      if (frames.size() > num_before) frames.pop_back();
+      throw InputError(csv.where(row, "point_id") +
+                       fmt::format(": {} stands twice in frame {}", observation.id, frame.frame));
+    }
+  frame.observations.push_back(observation);
+}
+
+/// Frames whose numbers are missing, evenly between their neighbours: nothing was seen there.
+std::vector<ObservationFrame> with_missing(std::vector<ObservationFrame> frames) {
+  constexpr long max_missing = 100'000;  // a longer gap is another recording
+  std::vector<ObservationFrame> all;
+  for (ObservationFrame& frame : frames) {
+    const long missing = all.empty() ? 0 : frame.frame - all.back().frame - 1;
+    if (missing > 0 && missing <= max_missing) {
+      const ObservationFrame before = all.back();
+      const double step_s = (frame.t_s - before.t_s) / static_cast<double>(missing + 1);
+      for (long k = 1; k <= missing; ++k)
+        all.push_back({before.frame + k, before.t_s + step_s * static_cast<double>(k), {}});
+    }
+    all.push_back(std::move(frame));
+  }
+  return all;
+}
+
+std::string pose_cells(const Rigid3& world_from_cam, char between) {
+  const Eigen::Vector3d& t = world_from_cam.translation;
+  const Eigen::Quaterniond& q = world_from_cam.rotation;
+  const std::array<double, 7> cells{t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
+  std::string text;
+  for (const double cell : cells) text += between + fmt::format("{:.9f}", cell);
+  return text;
+}
+
+double sigma_of(const MapPoint& point) { return std::sqrt(point.cov.trace() / 3.0); }
+
+}  // namespace
+
+ObservationsFile read_observations(const std::filesystem::path& file, const ObservationsOptions& options) {
+  const Csv csv = Csv::read(file);
+  for (const char* name : {"frame", "t_s", "point_id", "u_px", "v_px"}) {
+    if (options.rate_hz > 0.0 && std::string(name) == "t_s") continue;
+    if (!csv.has(name)) csv.refuse_missing(name, std::string(name) == "t_s" ? "; give it, or --rate" : "");
+  }
+  ObservationsFile read;
+  for_each_row(csv, options.skip_bad, read.skipped, [&](std::size_t row) { read_row(csv, row, options, read.frames); });
+  if (read.frames.empty()) throw InputError(file.string() + ": has no sights; at least one row is needed");
+  read.frames = with_missing(std::move(read.frames));
+  return read;
+}
+
+std::string observations_csv(std::span<const ObservationFrame> frames) {
+  std::string text = "frame,t_s,point_id,u_px,v_px\n";
+  for (const ObservationFrame& frame : frames) {
+    if (frame.observations.empty()) text += fmt::format("{},{:.9g},,,\n", frame.frame, frame.t_s);
+    for (const FeatureObservation& observation : frame.observations)
+      text += fmt::format("{},{:.9g},{},{:.4f},{:.4f}\n", frame.frame, frame.t_s, observation.id, observation.px.x(),
+                          observation.px.y());
+  }
+  return text;
+}
+
+std::vector<TimedPose> read_tum(const std::filesystem::path& file) {
+  const std::string text = read_file(file);
+  std::vector<TimedPose> poses;
+  std::size_t line = 0, at = 0;
+  while (at < text.size()) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    std::string row = text.substr(at, end - at);
+    at = end + 1;
+    ++line;
+    const std::size_t first = row.find_first_not_of(" \t\r");
+    if (first == std::string::npos || row[first] == '#') continue;
+    const auto fail = [&](const std::string& what) {
+      throw InputError(fmt::format("{}:{}: {}", file.string(), line, what));
+    };
+    std::vector<double> cells;
+    for (std::size_t from = first; from != std::string::npos && from < row.size();) {
+      const std::size_t to = std::min(row.find_first_of(" \t\r", from), row.size());
+      cells.push_back(csv_number(row.substr(from, to - from), {file.string(), line, "pose"}));
+      from = row.find_first_not_of(" \t\r", to);
+    }
+    if (cells.size() != 8) fail("is not 't x y z qx qy qz qw'");
+    const Eigen::Quaterniond rotation(cells[7], cells[4], cells[5], cells[6]);
+    if (!(std::abs(rotation.norm() - 1.0) < 1e-2)) fail("the quaternion has not the length 1");
+    if (!poses.empty() && !(cells[0] > poses.back().t_s)) fail("its time is not after the one before it");
+    poses.push_back({cells[0], {rotation.normalized(), {cells[1], cells[2], cells[3]}}});
+  }
+  if (poses.empty()) throw InputError(file.string() + ": has no poses");
+  return poses;
+}
+
+std::string tum_text(std::span<const TimedPose> poses) {
+  std::string text = "# t x y z qx qy qz qw: world_from_cam\n";
+  for (const TimedPose& pose : poses)
+    text += fmt::format("{:.9f}", pose.t_s) + pose_cells(pose.world_from_cam, ' ') + "\n";
+  return text;
+}
+
+std::string map_csv(std::span<const MapPoint> points) {
+  std::string text =
+      "point_id,x_m,y_m,z_m,sigma_m,cov_xx_m2,cov_xy_m2,cov_xz_m2,cov_yy_m2,cov_yz_m2,cov_zz_m2,known,num_seen\n";
+  for (const MapPoint& point : points) {
+    const Eigen::Vector3d& p = point.point_in_world;
+    text += fmt::format("{},{:.7f},{:.7f},{:.7f},{:.6g}", point.id, p.x(), p.y(), p.z(), sigma_of(point));
+    for (int i = 0; i < 3; ++i)
+      for (int j = i; j < 3; ++j) text += fmt::format(",{:.6g}", point.cov(i, j));
+    text += fmt::format(",{},{}\n", point.is_known ? 1 : 0, point.num_seen);
+  }
+  return text;
+}
+
+std::string map_ply(std::span<const MapPoint> points) {
+  std::string text = fmt::format(
+      "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n"
+      "property double sigma_m\nproperty int point_id\nend_header\n",
+      points.size());
+  for (const MapPoint& point : points) {
+    const Eigen::Vector3d& p = point.point_in_world;
+    text += fmt::format("{:.7f} {:.7f} {:.7f} {:.6g} {}\n", p.x(), p.y(), p.z(), sigma_of(point), point.id);
+  }
+  return text;
+}
+
+std::string poses_csv(std::span<const PathStep> path) {
+  constexpr std::array<const char*, 6> names{"x", "y", "z", "rx", "ry", "rz"};
+  std::string text = "frame,t_s,x_m,y_m,z_m,qx,qy,qz,qw";
+  for (std::size_t i = 0; i < 6; ++i)
+    for (std::size_t j = i; j < 6; ++j) text += fmt::format(",cov_{}_{}", names[i], names[j]);
+  text += ",num_seen,num_tracked,num_gated,nis_per_dof,event\n";
+  for (const PathStep& step : path) {
+    text += fmt::format("{},{:.9g}", step.frame, step.t_s);
+    text += step.has_pose() ? pose_cells(step.world_from_cam, ',') : ",,,,,,,";
+    for (int i = 0; i < 6; ++i)
+      for (int j = i; j < 6; ++j) text += step.has_pose() ? fmt::format(",{:.6g}", step.cov(i, j)) : ",";
+    const std::string nis = std::isfinite(step.nis_per_dof) ? fmt::format("{:.4f}", step.nis_per_dof) : "";
+    text +=
+        fmt::format(",{},{},{},{},{}\n", step.num_seen, step.num_tracked, step.num_gated, nis, event_name(step.event));
+  }
+  return text;
+}
+
+}  // namespace alidade

@@ -1,0 +1,62 @@
+#include "alidade/tables/servo_log_file.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "alidade/files/table_rows.h"
+#include "alidade/geometry/degree.h"
+#include "alidade/servo/identify_causes.h"
+
+namespace alidade {
+ServoLogFile read_servo_log(const std::filesystem::path& file, bool skip_bad) {
+  const Csv csv = Csv::read(file);
+  const bool is_deg = csv.has("angle_deg");
+  if (is_deg && csv.has("angle_rad")) throw InputError(csv.name() + ": has both 'angle_rad' and 'angle_deg'");
+  const std::string angle = is_deg ? "angle_deg" : "angle_rad";
+  for (const std::string& name : {std::string("t_s"), std::string("command"), angle})
+    if (!csv.has(name)) throw InputError(csv.name() + ": has no column '" + name + "'; needs t_s,command,angle_rad");
+  ServoLogFile read;
+  for_each_row(csv, skip_bad, read.skipped, [&](std::size_t row) {
+    const ServoSample sample{csv.number(row, "t_s"), csv.number(row, "command"),
+                             csv.number(row, angle) * (is_deg ? degree : 1.0)};
+    if (!read.samples.empty() && !(sample.t_s > read.samples.back().t_s))
+      throw InputError(csv.where(row, "t_s") + ": '" + csv.text(row, "t_s") + "' is not after the row before it");
+    if (!(std::abs(sample.angle_rad) <= 1e4))
+      throw InputError(csv.where(row, angle) + ": '" + csv.text(row, angle) + "' is no angle of a servo");
+    read.samples.push_back(sample);
+  });
+  if (read.samples.empty()) throw InputError(file.string() + ": has no rows");
+  return read;
+}
+
+std::string servo_log_csv(std::span<const ServoSample> samples) {
+  std::string text = "t_s,command,angle_rad\n";
+  for (const ServoSample& sample : samples)
+    text += fmt::format("{:.6f},{:.9g},{:.9f}\n", sample.t_s, sample.command, sample.angle_rad);
+  return text;
+}
+
+std::string servo_plant_text(const ServoFit& fit) {
+  const ServoParams sigma = fit.cov.diagonal().cwiseSqrt();
+  const bool is_angle = fit.kind == ServoKind::angle;
+  std::string flaws, flaw_sigmas;
+  for (const std::size_t flaw : fit.freed) {
+    const double size = fit.flaws.*servo_flaws[flaw];
+    const std::string name = servo_flaw_names[flaw];
+    const bool is_rad = name.find("rad") != std::string::npos;
+    std::string key = name;
+    if (const auto at = key.find("rad"); is_rad) key.replace(at, 3, "deg");
+    // A scenario has no limit of the acceleration of an angle plant.
+    const bool is_known = !(is_angle && name == "max_acceleration_rad_s2");
+    if (is_known) flaws += fmt::format(", {}: {:.9g}", key, size / (is_rad ? degree : 1.0));
+    flaw_sigmas += fmt::format(", {} {:.3g}", key, fit.flaw_sigma[flaw] / (is_rad ? degree : 1.0));
+  }
+  return fmt::format(
+      "# {} per unit of command; sigma: gain {:.3g}, tau {:.3g} s, delay {:.3g} s{}\n"
+      "plant: {{kind: {}, gain: {:.9g}, unit: rad, tau_s: {:.9g}, command_delay_s: {:.9g}{}}}\n",
+      is_angle ? "rad" : "rad/s", sigma[0], sigma[1], sigma[2], flaw_sigmas, is_angle ? "angle" : "rate", fit.params[0],
+      fit.params[1], fit.params[2], flaws);
+}
+
+}  // namespace alidade

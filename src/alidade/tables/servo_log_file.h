@@ -1,0 +1,26 @@
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/estimation/counts.h"
+#include "alidade/servo/identify.h"
+
+namespace alidade {
+
+struct ServoLogFile {
+  std::vector<ServoSample> samples;
+  std::vector<SkippedInput> skipped;
+};
+
+/// Reads `t_s,command,angle_rad` (or `angle_deg`): what is commanded from that time on, and what the encoder reads.
+/// Throws InputError: no such column, both angles, times that do not run forward, no rows.
+[[nodiscard]] ServoLogFile read_servo_log(const std::filesystem::path& file, bool skip_bad = false);
+[[nodiscard]] std::string servo_log_csv(std::span<const ServoSample> samples);
+
+/// Text of servo.yaml: the plant as a scenario of `alidade servo` takes it, its σ beside it.
+[[nodiscard]] std::string servo_plant_text(const ServoFit& fit);
+
+}  // namespace alidade

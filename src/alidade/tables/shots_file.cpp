@@ -1,0 +1,149 @@
+#include "alidade/tables/shots_file.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <iterator>
+#include <set>
+
+#include "alidade/files/table_rows.h"
+
+namespace alidade {
+namespace {
+
+/// ShotColumns of one table by what they mean; empty: not there.
+struct ShotColumns {
+  std::string u, v, d;
+};
+
+std::string either(const Csv& csv, const char* first, const char* second) {
+  return csv.has(first) ? first : csv.has(second) ? second : "";
+}
+
+ShotColumns shot_columns_of(const Csv& csv) {
+  if (!csv.has("range_m")) {
+    const std::string hint = csv.has("range_mm") ? "; ranges are metres" : "";
+    csv.refuse_missing("range_m", hint);
+  }
+  const ShotColumns columns{either(csv, "u", "u_px"), either(csv, "v", "v_px"), either(csv, "d", "d_m")};
+  if (columns.u.empty() != columns.v.empty())
+    throw InputError(csv.name() + ": has one of 'u' and 'v', a spot needs both");
+  const int num_of_plane = csv.has("nx") + csv.has("ny") + csv.has("nz") + !columns.d.empty();
+  if (num_of_plane != 0 && num_of_plane != 4)
+    throw InputError(csv.name() + ": a plane needs all of 'nx', 'ny', 'nz' and 'd'");
+  if (columns.u.empty() && num_of_plane == 0 && !csv.has("photo"))
+    throw InputError(csv.name() + ": has ranges alone; 'u,v', 'photo' or 'nx,ny,nz,d' must say what was hit");
+  return columns;
+}
+
+bool is_given(const Csv& csv, std::size_t row, const std::string& column) {
+  return !column.empty() && csv.has(column) && !csv.is_empty(row, column);
+}
+
+double above_zero(const Csv& csv, std::size_t row, const std::string& column) {
+  const double value = csv.number(row, column);
+  if (!(value > 0.0)) throw InputError(csv.where(row, column) + ": '" + csv.text(row, column) + "' is not above zero");
+  return value;
+}
+
+/// Metres: what is beyond 1 km is millimetres.
+double range_of(const Csv& csv, std::size_t row) {
+  constexpr double max_m = 1000.0;
+  const double range_m = above_zero(csv, row, "range_m");
+  if (range_m > max_m)
+    throw InputError(csv.where(row, "range_m") + ": '" + csv.text(row, "range_m") +
+                     "' is beyond 1000 m; ranges are metres");
+  return range_m;
+}
+
+Spot spot_of(const Csv& csv, std::size_t row, const ShotColumns& columns) {
+  constexpr double max_px = 1e6;
+  for (const std::string& name : {columns.u, columns.v}) {
+    if (csv.is_empty(row, name)) throw InputError(csv.where(row, name) + ": is empty; a spot needs u and v");
+    if (std::abs(csv.number(row, name)) > max_px)
+      throw InputError(csv.where(row, name) + ": '" + csv.text(row, name) + "' is in no picture");
+  }
+  Spot spot{.px = {csv.number(row, columns.u), csv.number(row, columns.v)}};
+  if (is_given(csv, row, "sigma_px")) spot.sigma_px = above_zero(csv, row, "sigma_px");
+  return spot;
+}
+
+Plane plane_of_row(const Csv& csv, std::size_t row, const ShotColumns& columns) {
+  for (const std::string& name : {std::string("nx"), std::string("ny"), std::string("nz"), columns.d}) {
+    if (csv.is_empty(row, name)) throw InputError(csv.where(row, name) + ": is empty; a plane needs nx, ny, nz and d");
+  }
+  Plane plane;
+  plane.normal_in_cam = {csv.number(row, "nx"), csv.number(row, "ny"), csv.number(row, "nz")};
+  plane.d_m = csv.number(row, columns.d);
+  const double length = plane.normal_in_cam.norm();
+  if (!(std::abs(length - 1.0) < 1e-3))
+    throw InputError(csv.where(row, "nx") + fmt::format(": the normal's length is {:.6g}, not 1", length));
+  plane.normal_in_cam /= length;
+  if (std::abs(plane.d_m) < 1e-3)
+    throw InputError(csv.where(row, columns.d) + ": the plane passes through the camera's centre");
+  if (plane.d_m > 0.0) {
+    plane.normal_in_cam = -plane.normal_in_cam;
+    plane.d_m = -plane.d_m;
+  }
+  return plane;
+}
+
+ShotRow read_row(const Csv& csv, std::size_t row, const ShotColumns& columns) {
+  ShotRow read;
+  read.line = csv.line(row);
+  read.shot.range_m = range_of(csv, row);
+  if (is_given(csv, row, "sigma_range_m")) read.shot.sigma_range_m = above_zero(csv, row, "sigma_range_m");
+  if (is_given(csv, row, columns.u) || is_given(csv, row, columns.v)) read.shot.spot = spot_of(csv, row, columns);
+  if (is_given(csv, row, "nx") || is_given(csv, row, "ny") || is_given(csv, row, "nz") ||
+      is_given(csv, row, columns.d)) {
+    read.shot.plane = plane_of_row(csv, row, columns);
+  }
+  if (is_given(csv, row, "photo")) read.photo = csv.text(row, "photo");
+  if (is_given(csv, row, "photo_off")) read.photo_off = csv.text(row, "photo_off");
+  if (!read.photo_off.empty() && read.photo.empty())
+    throw InputError(csv.where(row, "photo") + ": is empty, but there is a 'photo_off'");
+  if (!read.shot.spot && !read.shot.plane && read.photo.empty())
+    throw InputError(csv.where(row, "range_m") + ": nothing says what this range hit: a spot, a photo or a plane");
+  read.shot.name = read.photo.empty() ? fmt::format("row {}", read.line) : read.photo;
+  return read;
+}
+
+std::string number(double value) { return fmt::format("{:.9g}", value); }
+
+}  // namespace
+
+ShotsFile read_shots(const std::filesystem::path& file, const ShotsOptions& options) {
+  const Csv csv = Csv::read(file);
+  const ShotColumns columns = shot_columns_of(csv);
+  ShotsFile read;
+  std::set<std::string> seen;  // the same measurement twice would be believed twice
+  for_each_row(csv, options.skip_bad, read.skipped, [&](std::size_t row) {
+    ShotRow shot = read_row(csv, row, columns);
+    std::string cells;
+    for (const std::string& name : csv.header()) cells += csv.text(row, name) + ",";
+    if (!seen.insert(std::move(cells)).second)
+      throw InputError(csv.where(row, "range_m") + ": the same shot stands in a row before");
+    read.rows.push_back(std::move(shot));
+  });
+  if (read.rows.empty()) throw InputError(file.string() + ": has no shots; at least one row is needed");
+  return read;
+}
+
+std::string shots_csv(std::span<const Shot> shots, bool with_photos) {
+  std::string text = "range_m,u,v,nx,ny,nz,d";
+  text += with_photos ? ",photo\n" : "\n";
+  for (const Shot& shot : shots) {
+    text += number(shot.range_m);
+    text += shot.spot ? fmt::format(",{:.4f},{:.4f}", shot.spot->px.x(), shot.spot->px.y()) : ",,";
+    if (shot.plane) {
+      const Eigen::Vector3d& n = shot.plane->normal_in_cam;
+      text += "," + number(n.x()) + "," + number(n.y()) + "," + number(n.z()) + "," + number(shot.plane->d_m);
+    } else {
+      text += ",,,,";
+    }
+    text += with_photos ? "," + csv_cell(shot.name) + "\n" : "\n";
+  }
+  return text;
+}
+
+}  // namespace alidade

@@ -15,6 +15,7 @@ void add_commands(alidade::cli::App& app) {
   alidade::cli::add_rangefinder(app);
   alidade::cli::add_reproduce(app);
   alidade::cli::add_rig(app);
+  alidade::cli::add_schema(app);
   alidade::cli::add_servo(app);
   alidade::cli::add_simulate(app);
   alidade::cli::add_track(app);

@@ -38,6 +38,7 @@ MAY_INCLUDE = {
     "tables": JOBS | {"files", "formats"},
     "detect": JOBS | FILES,
     "results": JOBS | FILES | {"reproduce", "report", "detect"},
+    "reference": FOUNDATIONS | FILES,
     "live": JOBS | FILES | {"report", "results"},
     "testing": JOBS | FILES | {"reproduce", "report", "detect", "results"},
 }

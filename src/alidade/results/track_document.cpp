@@ -35,7 +35,7 @@ void add_by_axis(DataTable& table, const std::string& before, const std::string&
 
 DataTable steps_table(const TrackReport& report, const TrueTrack& truth, std::span<const std::size_t> rows) {
   Numbers t, nees;
-  ByAxis position, velocity, sigma, sigma_velocity, true_position;
+  ByAxis target_in_world, velocity, sigma_in_world, sigma_velocity, true_position;
   std::array<Numbers, 6> cov;  // of the position, upper triangle
   std::vector<std::string> events;
   for (const std::size_t row : rows) {
@@ -46,9 +46,9 @@ DataTable steps_table(const TrackReport& report, const TrueTrack& truth, std::sp
     events.emplace_back(event_name(step.event));
     for (int i = 0; i < 3; ++i) {
       const auto k = static_cast<std::size_t>(i);
-      position[k].push_back(step.has_belief ? step.belief.x[i] : missing_value);
+      target_in_world[k].push_back(step.has_belief ? step.belief.x[i] : missing_value);
       velocity[k].push_back(step.has_belief ? step.belief.x[3 + i] : missing_value);
-      sigma[k].push_back(step.has_belief ? std::sqrt(step.belief.P(i, i)) : missing_value);
+      sigma_in_world[k].push_back(step.has_belief ? std::sqrt(step.belief.P(i, i)) : missing_value);
       sigma_velocity[k].push_back(step.has_belief ? std::sqrt(step.belief.P(3 + i, 3 + i)) : missing_value);
       true_position[k].push_back(there ? (*there)[i] : missing_value);
     }
@@ -58,9 +58,9 @@ DataTable steps_table(const TrackReport& report, const TrueTrack& truth, std::sp
     }
   }
   DataTable table{"steps", {{"t_s", t}}};
-  add_by_axis(table, "target_in_base_", "_m", std::move(position));
+  add_by_axis(table, "target_in_world_", "_m", std::move(target_in_world));
   add_by_axis(table, "velocity_", "_m_s", std::move(velocity));
-  add_by_axis(table, "sigma_target_in_base_", "_m", std::move(sigma));
+  add_by_axis(table, "sigma_target_in_world_", "_m", std::move(sigma_in_world));
   add_by_axis(table, "sigma_velocity_", "_m_s", std::move(sigma_velocity));
   for (std::size_t k = 0; k < cov.size(); ++k)
     table.columns.emplace_back(std::string("cov_") + cov_names[k] + "_m2", std::move(cov[k]));
@@ -85,7 +85,7 @@ DataTable measurements_table(std::span<const TargetObservation> observations, st
                                               "nis",
                                               "head"};
   std::array<Numbers, names.size()> column;
-  ByAxis ray_origin, ray_direction;
+  ByAxis origin_in_world, direction_in_world;
   std::vector<bool> accepted;
   for (const std::size_t row : rows) {
     const TargetObservation& observation = observations[row];
@@ -108,16 +108,16 @@ DataTable measurements_table(std::span<const TargetObservation> observations, st
     accepted.push_back(step.accepted);
     const auto ray = ray_in_world(heads[observation.head], observation);
     for (int i = 0; i < 3; ++i) {
-      ray_origin[static_cast<std::size_t>(i)].push_back(ray ? ray->origin_in_world[i] : missing_value);
-      ray_direction[static_cast<std::size_t>(i)].push_back(ray ? ray->direction_in_world[i] : missing_value);
+      origin_in_world[static_cast<std::size_t>(i)].push_back(ray ? ray->origin_in_world[i] : missing_value);
+      direction_in_world[static_cast<std::size_t>(i)].push_back(ray ? ray->direction_in_world[i] : missing_value);
     }
   }
   DataTable table{"measurements", {}};
   for (std::size_t k = 0; k < names.size(); ++k)
     table.columns.emplace_back(names[k], rounded(std::move(column[k]), k < 4 ? 6 : 4));
   table.columns.emplace_back("accepted", accepted);
-  add_by_axis(table, "ray_origin_in_base_", "_m", std::move(ray_origin));
-  add_by_axis(table, "ray_direction_", "", std::move(ray_direction));
+  add_by_axis(table, "ray_origin_in_world_", "_m", std::move(origin_in_world));
+  add_by_axis(table, "ray_direction_", "", std::move(direction_in_world));
   return table;
 }
 

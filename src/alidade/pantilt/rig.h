@@ -5,8 +5,10 @@
 
 #include "alidade/pantilt/head.h"
 #include "alidade/pantilt/target_observation.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// σ of a head's encoders beside its readings' noise, where a file gives it; NaN: not told, 0: exact.
 struct EncoderError {
@@ -27,4 +29,5 @@ struct Rig {
   std::vector<LensCourse> lens_courses;      ///< One a head, or none: of cameras that zoom.
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

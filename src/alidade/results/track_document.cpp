@@ -6,6 +6,7 @@
 
 #include "alidade/report/thin.h"
 #include "alidade/results/thin_tables.h"
+#include "alidade/track/track.h"
 
 namespace alidade {
 namespace {
@@ -121,66 +122,7 @@ DataTable measurements_table(std::span<const TargetObservation> observations, st
   return table;
 }
 
-/// Of each head: how many, their mean, mean along the motion, slope over the image and colour, in σ of each.
-DataTable innovations_table(std::span<const RigHead> heads, const TrackReport& report) {
-  Numbers head, num, mean_u, mean_v, along, place_u, place_v, colour, nis;
-  for (std::size_t h = 0; h < report.innovations.size(); ++h) {
-    const HeadInnovations& of = report.innovations[h];
-    head.push_back(heads[h].head.id);
-    num.push_back(static_cast<double>(of.num));
-    mean_u.push_back(of.mean.x());
-    mean_v.push_back(of.mean.y());
-    along.push_back(of.along);
-    place_u.push_back(of.place.x());
-    place_v.push_back(of.place.y());
-    colour.push_back(of.colour);
-    nis.push_back(of.nis_per_dof);
-  }
-  DataTable table{"innovations", {{"head", head}, {"num", num}}};
-  table.columns.emplace_back("mean_u_sigma", rounded(std::move(mean_u), 4));
-  table.columns.emplace_back("mean_v_sigma", rounded(std::move(mean_v), 4));
-  table.columns.emplace_back("along_motion_sigma", rounded(std::move(along), 4));
-  table.columns.emplace_back("slope_u_sigma", rounded(std::move(place_u), 4));
-  table.columns.emplace_back("slope_v_sigma", rounded(std::move(place_v), 4));
-  table.columns.emplace_back("colour", rounded(std::move(colour), 4));
-  table.columns.emplace_back("nis_per_dof", rounded(std::move(nis), 4));
-  return table;
-}
-
 }  // namespace
-
-void fill_track(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                const TrackReport& report, const TrueTrack& truth, ResultDocument& document) {
-  document.counts.given += observations.size();
-  document.counts.used = report.num_used;
-  document.counts.dropped = observations.size() - report.num_used;
-  JsonValue& estimate = document.estimate;
-  estimate["rms_m"] = report.rms_m;
-  estimate["mean_error_m"] = report.mean_error_m;
-  if (!report.smoothed.empty()) estimate["smoothed_rms_m"] = report.smoothed_rms_m;
-  estimate["nees_per_dof"] = report.nees_per_dof;
-  estimate["nis_per_dof"] = report.nis_per_dof;
-  estimate["pcrlb_m"] = report.pcrlb_m;
-  estimate["sigma_a_m_s2"] = report.sigma_a_m_s2;
-  estimate["sigma_a_is_estimated"] = report.sigma_a_is_found;
-  estimate["restarts"] = report.num_restarts;
-  estimate["rig_errors_counted"] = report.errors_are_counted;
-  estimate["sigma_raised_by"] = std::sqrt(report.inflation);
-  if (!report.steps.empty() && report.steps.back().has_belief) {
-    const Belief<6>& last = report.steps.back().belief;
-    estimate["position_m"] = Numbers(last.x.data(), last.x.data() + 3);
-    estimate["velocity_m_s"] = Numbers(last.x.data() + 3, last.x.data() + 6);
-    const Eigen::Vector<double, 6> sigma = last.P.diagonal().cwiseSqrt();
-    document.stddev["position_m"] = Numbers(sigma.data(), sigma.data() + 3);
-    document.stddev["velocity_m_s"] = Numbers(sigma.data() + 3, sigma.data() + 6);
-    document.covariance_names = {"x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s"};
-    for (int i = 0; i < 6; ++i) {
-      for (int j = i; j < 6; ++j) document.covariance_upper.push_back(last.P(i, j));
-    }
-  }
-  add_track_tables(observations, heads, report, truth, document);
-  if (!report.innovations.empty()) document.data.push_back(innovations_table(heads, report));
-}
 
 void add_track_tables(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                       const TrackReport& report, const TrueTrack& truth, ResultDocument& document) {
@@ -201,47 +143,6 @@ DataTable track_row(const TargetObservation& observation, std::span<const RigHea
   DataTable observations = measurements_table({&observation, 1}, heads, report, row);
   for (auto& column : observations.columns) table.columns.push_back(std::move(column));
   return table;
-}
-
-void fill_target_frames(std::span<const TargetFrame> frames, std::span<const RigHead> heads, ResultDocument& document) {
-  std::vector<std::size_t> num_frames(heads.size()), num_seen(heads.size());
-  Numbers t, head, number, u, v, sigma, score;
-  std::vector<std::string> reason;
-  std::vector<bool> lost;
-  for (const TargetFrame& frame : frames) {
-    ++num_frames[frame.head];
-    num_seen[frame.head] += frame.seen.found() ? 1U : 0U;
-    lost.push_back(!frame.seen.found());
-  }
-  for (const std::size_t row : report::thinned_rows(frames.size(), {}, lost, report::max_step_rows)) {
-    const TargetFrame& frame = frames[row];
-    const auto if_found = [&](double value) { return frame.seen.found() ? value : missing_value; };
-    t.push_back(frame.t_s);
-    head.push_back(heads[frame.head].head.id);
-    number.push_back(static_cast<double>(frame.number));
-    u.push_back(if_found(frame.seen.px.x()));
-    v.push_back(if_found(frame.seen.px.y()));
-    sigma.push_back(if_found(std::sqrt(0.5 * frame.seen.cov.trace())));
-    score.push_back(if_found(frame.seen.score));
-    reason.push_back(frame.seen.reason);
-  }
-  JsonValue videos = JsonValue::list();
-  for (std::size_t i = 0; i < heads.size(); ++i) {
-    JsonValue video = JsonValue::object();
-    video["head"] = heads[i].head.id;
-    video["frames"] = num_frames[i];
-    video["seen"] = num_seen[i];
-    videos.push_back(std::move(video));
-  }
-  document.estimate["video"] = std::move(videos);
-  DataTable table{"frames", {{"t_s", t}, {"head", head}, {"frame", number}}};
-  table.columns.emplace_back("u_px", rounded(std::move(u), 4));
-  table.columns.emplace_back("v_px", rounded(std::move(v), 4));
-  table.columns.emplace_back("sigma_px", rounded(std::move(sigma), 4));
-  table.columns.emplace_back("score", rounded(std::move(score), 4));
-  table.columns.emplace_back("reason", reason);
-  record_steps_kept(table, frames.size(), "");
-  document.data.push_back(std::move(table));
 }
 
 }  // namespace alidade

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "alidade/track/lens_over_time.h"
+#include "alidade/track/track.h"
 
 namespace alidade {
 namespace {

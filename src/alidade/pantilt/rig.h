@@ -1,6 +1,7 @@
 #pragma once
 
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "alidade/pantilt/head.h"
@@ -28,6 +29,10 @@ struct Rig {
   std::vector<EncoderError> encoder_errors;  ///< One a head, or none.
   std::vector<LensCourse> lens_courses;      ///< One a head, or none: of cameras that zoom.
 };
+
+/// What is wrong with a head or a rig that a program made, in one sentence; empty where nothing is.
+[[nodiscard]] std::string fault(const RigHead& rig_head);
+[[nodiscard]] std::string fault(const Rig& rig);
 
 ALIDADE_PUBLIC_END
 }  // namespace alidade

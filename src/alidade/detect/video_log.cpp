@@ -9,7 +9,7 @@
 
 #include "alidade/files/files.h"
 #include "alidade/tables/angle_interpolation.h"
-#include "alidade/tables/rotation_log_file.h"
+#include "alidade/tables/rotation_log_stream.h"
 
 namespace alidade {
 namespace {
@@ -32,7 +32,8 @@ Tracks follow_points(VideoFrames& video, const PointTrackerConfig& config, const
     report_progress(progress, "following points", tracks.frames.size(),
                     std::max(tracks.frames.size(), video.num_frames()));
   }
-  if (tracks.frames.size() < 2) throw InputError(video.name() + ": has only one frame; a video of a turn is needed");
+  if (tracks.frames.size() < 2)
+    throw InputError(video.name() + ": has only one frame; a video of a rotation is needed");
   return tracks;
 }
 
@@ -63,7 +64,7 @@ Rows rows_one_a_frame(const RotationLog& angles, const std::string& angles_name,
   const std::size_t needed = tracks.numbers.back() + 1;
   if (angles.rows.size() != needed)
     throw InputError(
-        fmt::format("{}: has {} rows and the video {} frames; one row a frame is needed, or '--rate' to "
+        fmt::format("{}: has {} rows and the video {} frames; one row per frame is needed, or '--rate' to "
                     "interpolate by time",
                     angles_name, angles.rows.size(), needed));
   Rows rows;

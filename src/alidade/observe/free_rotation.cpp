@@ -3,7 +3,7 @@
 
 #include "alidade/geometry/decompositions.h"
 
-#include "alidade/observe/observe.h"
+#include "alidade/observe/solve.h"
 
 namespace alidade {
 namespace {

@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <sstream>
 
+#include "alidade/estimation/median.h"
 #include "alidade/files/files.h"
 #include "alidade/tables/angle_interpolation.h"
 #include "alidade/tables/rotation_log_stream.h"
@@ -95,12 +96,6 @@ Rows rows_by_time(const RotationLog& angles, const std::string& angles_name, con
     add(interpolation.at(t_s));
   }
   return rows;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace

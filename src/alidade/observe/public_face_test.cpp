@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "alidade/observe.h"
 #include "alidade/observe/solve.h"
@@ -135,6 +136,26 @@ TEST(ObserveFace, AnswersWordsThatDoNotFit) {
   config = with_words({"bias"});
   config.rotation = RotationKnowledge::noisy;
   EXPECT_THAT(fault_of(config), ::testing::HasSubstr("is for --rotation known"));
+}
+
+TEST(ObserveFace, EveryFieldIsWrittenAsItIsRead) {
+  const std::map<std::string, std::string> texts{
+      {"method", "batch"},        {"rotation", "noisy"},    {"estimate", "k1"},    {"start", "500,510,400,300"},
+      {"size", "640x480"},        {"profile", "quiet"},     {"lever_m", "0,0,-1"}, {"square_pixels", "true"},
+      {"no_zoom", "true"},        {"fixed_centre", "true"}, {"sigma_px", "0.5"},   {"sigma_angle_rad", "0.001"},
+      {"sigma_range_m", "0.01"},  {"sigma_scale", "0"},     {"window_s", "3"},     {"sigma_rate_rad_per_s", "0.02"},
+      {"sigma_parallax", "0.002"}};
+  ObserveConfig config;
+  const FieldList fields = fields_of(config);
+  EXPECT_EQ(fields.size(), texts.size());
+  for (const Field& field : fields) {
+    ASSERT_TRUE(texts.contains(field.name)) << field.name;
+    EXPECT_EQ(set_field(field, texts.at(field.name)), "");
+    EXPECT_EQ(value_text(field), texts.at(field.name));
+  }
+  EXPECT_EQ(config.method, ObserveMethod::batch);
+  EXPECT_EQ(config.start, Eigen::Vector4d(500.0, 510.0, 400.0, 300.0));
+  EXPECT_NO_THROW(check_config(config));
 }
 
 TEST(ObserveFace, AnswersLogsThatCannotBe) {

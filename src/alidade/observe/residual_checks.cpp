@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/observe/solve.h"
 
@@ -83,14 +84,13 @@ Check points_check(const ObserveSolution& report) {
     check.text = "too few points to compare";
     return check;
   }
-  std::nth_element(rms.begin(), rms.begin() + static_cast<std::ptrdiff_t>(rms.size() / 2), rms.end());
-  const double median = rms[rms.size() / 2];
+  const double typical = median(rms);
   std::string names;
   for (std::size_t i = 0; i < reference.bundle_point_of.size(); ++i) {
     const int place = reference.bundle_point_of[i];
     if (place < 0 || count[static_cast<std::size_t>(place)] < min_pixels) continue;
     const auto at = static_cast<std::size_t>(place);
-    const double ratio = std::sqrt(squares[at] / count[at]) / std::max(median, 1e-12);
+    const double ratio = std::sqrt(squares[at] / count[at]) / std::max(typical, 1e-12);
     check.value = std::max(check.value, ratio);
     if (ratio > moves_beyond) names += (names.empty() ? "" : ", ") + std::to_string(i + 1);
   }

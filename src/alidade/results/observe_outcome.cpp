@@ -53,7 +53,7 @@ void say_input(const ObserveReport& report, std::vector<std::string>& lines) {
                                 report.width_px, report.height_px));
   }
   for (std::size_t i = 0; i < report.photos.size(); ++i) {
-    if (report.photos[i].is_used) continue;
+    if (report.photos[i].is_used || report.photos[i].reason.empty()) continue;
     lines.push_back(fmt::format("rejected: {} {}", report.photo_names[i], report.photos[i].reason));
   }
 }

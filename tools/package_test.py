@@ -49,6 +49,18 @@ class Package(unittest.TestCase):
               for name, file in (("library", camera), ("command", self.folder / "result" / "camera.yaml"))}
         self.assertAlmostEqual(fx["library"], fx["command"], places=2, msg="the library and the command say the same")
 
+    def test_the_observe_example_leaves_what_the_command_leaves(self):
+        outside, alidade, log = self.folder / "examples", self.prefix / "bin" / "alidade", self.folder / "rotation"
+        run("cmake", "-S", ROOT / "examples", "-B", outside, f"-DCMAKE_PREFIX_PATH={self.prefix}")
+        run("cmake", "--build", outside, "--target", "02_observe")
+        run(alidade, "simulate", "rotation", "--duration", "6", "--out", log, "--quiet")
+        said = run(outside / "02_observe", log / "log.csv", "780", "582", self.folder / "observed")
+        self.assertIn("start", said)
+        run(alidade, "observe", log / "log.csv", "--size", "780x582", "--out", self.folder / "observe", "--quiet")
+        for name in ("camera.yaml", "intrinsics.csv"):
+            texts = {(self.folder / folder / name).read_text() for folder in ("observed", "observe")}
+            self.assertEqual(len(texts), 1, f"{name}: the library and the command leave the same")
+
     def test_pkg_config_links(self):
         environment = {**os.environ, "PKG_CONFIG_PATH": str(self.library.parent / "pkgconfig")}
         flags = run("pkg-config", "--cflags", "--libs", "alidade", env=environment).split()

@@ -18,31 +18,11 @@ const WordList<TrackMethod>& track_method_words() {
   return words;
 }
 
-/// "0 9.80665 0", by blanks or commas.
 TextCode gravity_code(std::optional<Eigen::Vector3d>& vector) {
-  TextCode code;
-  code.read = [&vector](const std::string& text) -> std::string {
-    std::vector<double> numbers;
-    const char* const end = text.data() + text.size();
-    for (const char* at = text.data(); at != end;) {
-      if (*at == ' ' || *at == ',') {
-        ++at;
-        continue;
-      }
-      double number = 0.0;
-      const auto [rest, error] = std::from_chars(at, end, number);
-      if (error != std::errc{} || !std::isfinite(number)) return "'" + text + "' is not three finite numbers";
-      numbers.push_back(number);
-      at = rest;
-    }
-    if (numbers.size() != 3) return "'" + text + "' is not three finite numbers";
-    vector = Eigen::Vector3d(numbers.data());
-    return "";
+  const auto values = [&vector] {
+    return vector ? std::vector<double>(vector->begin(), vector->end()) : std::vector<double>();
   };
-  code.write = [&vector] {
-    return vector ? fmt::format("{} {} {}", vector->x(), vector->y(), vector->z()) : std::string();
-  };
-  return code;
+  return numbers_code(3, values, [&vector](const std::vector<double>& xyz) { vector = Eigen::Vector3d(xyz.data()); });
 }
 
 }  // namespace
@@ -59,8 +39,7 @@ FieldList fields_of(TrackConfig& config) {
        .value = gravity_code(config.gravity_m_s2),
        .help =
            "With ballistic and imm: gravity in the rig's world [m/s2] (default: 0 9.80665 0, the first camera level)",
-       .form = "NUMBER",
-       .num_words = 3},
+       .form = "X,Y,Z"},
       {.name = "corrected",
        .value = &config.corrected,
        .help = "With xiahou2015: pixels and mounting corrected, else as printed"},

@@ -1,10 +1,17 @@
 #pragma once
 
 #include "alidade/files/files.h"
+#include "alidade/formats/beam_file.h"
 #include "alidade/formats/camera_file.h"
+#include "alidade/images/grey_image_file.h"
 #include "alidade/images/photo_set.h"
+#include "alidade/images/table_photos.h"
 #include "alidade/results/calibration_outcome.h"
+#include "alidade/results/rangefinder_outcome.h"
+#include "alidade/results/rangefinder_result.h"
 #include "alidade/results/save.h"
 #include "alidade/tables/corner_file.h"
+#include "alidade/tables/scan_file.h"
+#include "alidade/tables/shots_file.h"
 
-/// Files in and out: photos, cameras of OpenCV, ROS, Kalibr, mrcal, COLMAP and ours, tables of corners.
+/// Files in and out: photos, cameras of OpenCV, ROS, Kalibr, mrcal, COLMAP and ours, beams, tables of corners, shots and scans.

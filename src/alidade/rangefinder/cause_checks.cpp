@@ -126,7 +126,7 @@ void add_by_distance(const RangefinderReport& report, std::span<const Shot> shot
 /// A rangefinder that scatters by decimetres is none, or its readings are of something else.
 void add_range_noise(const RangefinderReport& report, Verdict& verdict) {
   constexpr double max_m = 0.1;
-  if (!report.range_sigma_is_told || report.shots_used == 0) return;
+  if (!report.range_sigma_is_estimated || report.shots_used == 0) return;
   const double sigma_m = report.beam.noise.sigma_m;
   verdict.checks.push_back(check_of("range noise", sigma_m < max_m ? State::good : State::refused,
                                     sigma_m < max_m ? "readings scatter by " + text_of(1e3 * sigma_m, 2) + " mm"

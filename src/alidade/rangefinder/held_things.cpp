@@ -151,14 +151,14 @@ std::vector<HeldThing> held_sigmas(const BeamProblem& problem, const Rangefinder
   noise = {noise.sigma_m * (1.0 + part), noise.per_m * (1.0 + part), noise.incidence_m * (1.0 + part)};
   for (PreparedShot& shot : other.shots)
     if (shot.sigma_range_m) *shot.sigma_range_m *= 1.0 + part;
-  add("sigma_range_m", problem.model.noise.sigma_m, report.range_sigma_is_told, other);
+  add("sigma_range_m", problem.model.noise.sigma_m, report.range_sigma_is_estimated, other);
   other = problem;
   bool has_spots = false;
   for (PreparedShot& shot : other.shots) {
     has_spots = has_spots || (shot.used && shot.spot_px);
     shot.sigma_spot_px *= 1.0 + part;
   }
-  if (has_spots) add("sigma_spot_px", report.sigma_spot_px, report.spot_sigma_is_told, other);
+  if (has_spots) add("sigma_spot_px", report.sigma_spot_px, report.spot_sigma_is_estimated, other);
   return held;
 }
 

@@ -1,12 +1,13 @@
 #pragma once
 
-#include <span>
 #include <vector>
 
 #include "alidade/estimation/progress.h"
-#include "alidade/rangefinder/rangefinder.h"
+#include "alidade/public.h"
+#include "alidade/rangefinder/report.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// What is known of the beam, and what the next shots will be measured with.
 struct BeamNow {
@@ -46,4 +47,5 @@ struct ShotGain {
 };
 [[nodiscard]] std::vector<ShotGain> next_shot_gains(const BeamNow& now, const ShotLimits& limits);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -324,7 +324,7 @@ void solve_report(Preparation& ready, const BeamFit& fit, const Camera& camera, 
     carry_lens(problem, camera, report);
   }
   report.scale_in_sigmas =
-      scale_in_sigmas(problem, report.camera, report.beam, report.range_sigma_is_told, ready.min_sigma_range_m);
+      scale_in_sigmas(problem, report.camera, report.beam, report.range_sigma_is_estimated, ready.min_sigma_range_m);
   report.bound = judge_beam(problem, report.beam, report.camera);
   report.bound.cov =
       refined ? refined->state.beam.cov : BeamMatrix(BeamMatrix::Constant(std::numeric_limits<double>::infinity()));
@@ -342,8 +342,8 @@ RangefinderReport calibrate_rangefinder(std::span<const Shot> shots, std::span<c
   report.scale_by_need = config.scale_by_need;
   report.sigma_corner_px = ready.sigma_corner_px;
   report.sigma_spot_px = config.sigma_spot_px.value_or(guessed_sigma_px);
-  report.spot_sigma_is_told = !ready.knows_spot_sigma;
-  report.range_sigma_is_told = !ready.knows_range_sigma;
+  report.spot_sigma_is_estimated = !ready.knows_spot_sigma;
+  report.range_sigma_is_estimated = !ready.knows_range_sigma;
   report.shots.resize(shots.size());
   for (std::size_t i = 0; i < shots.size(); ++i) report.shots[i].reason = ready.reasons[i];
   report.shots_dropped = static_cast<int>(shots.size());

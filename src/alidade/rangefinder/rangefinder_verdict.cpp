@@ -249,7 +249,7 @@ void add_fit(const RangefinderReport& report, Verdict& verdict) {
   const State state = outliers == 0 ? State::good : 5 * outliers > 2 * told ? State::refused : State::care;
   verdict.checks.push_back(check_of("outliers", state, outliers == 0 ? "all shots agree" : "left out: shot " + named,
                                     outliers, 0.4 * told, "", "residuals"));
-  if (report.dof < 1 || (report.spot_sigma_is_told && report.range_sigma_is_told)) return;
+  if (report.dof < 1 || (report.spot_sigma_is_estimated && report.range_sigma_is_estimated)) return;
   const double ratio = std::sqrt(report.cost / report.dof);
   const double most = 1.0 + 3.0 / std::sqrt(2.0 * report.dof) + 0.2;
   verdict.checks.push_back(check_of("fit", ratio < most ? State::good : State::care,

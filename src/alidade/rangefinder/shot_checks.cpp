@@ -6,6 +6,7 @@
 #include <random>
 
 #include "alidade/board/board_pose.h"
+#include "alidade/rangefinder/rangefinder.h"
 
 namespace alidade {
 namespace {
@@ -24,7 +25,7 @@ RangefinderConfig config_of_part(const RangefinderConfig& config, const Rangefin
   RangefinderConfig part = config;
   part.reject_outliers = false;
   part.sigma_spot_px = report.sigma_spot_px > 0.0 ? std::optional(report.sigma_spot_px) : config.sigma_spot_px;
-  part.range_noise = report.beam.noise;
+  part.set_range_noise(report.beam.noise);
   return part;
 }
 

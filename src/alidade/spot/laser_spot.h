@@ -8,12 +8,14 @@
 #include "alidade/board/board.h"
 #include "alidade/camera/camera.h"
 #include "alidade/geometry/rigid3.h"
+#include "alidade/public.h"
 
 namespace cv {
 class Mat;
 }
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// `automatic`: red or green, whichever is stronger, in a colour photo; bright in a grey one.
 enum class SpotColour { automatic, red, green, bright };
@@ -60,4 +62,5 @@ struct LaserSpot {
 [[nodiscard]] LaserSpot find_laser_spot(const cv::Mat& photo, const LaserSpotAids& aids = {},
                                         const LaserSpotConfig& config = {});
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

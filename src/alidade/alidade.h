@@ -3,4 +3,6 @@
 /// Every public header: one for each room, and files.
 #include "alidade/calibrate.h"
 #include "alidade/files.h"
+#include "alidade/network.h"
 #include "alidade/rangefinder.h"
+#include "alidade/rig.h"

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "alidade/camera/camera_fault.h"
 #include "alidade/rangefinder/align_edges.h"
 #include "alidade/rangefinder/rangefinder.h"
 #include "alidade/rangefinder/shot_checks.h"
@@ -12,26 +13,12 @@
 namespace alidade {
 namespace {
 
-void require(const std::vector<std::string>& found) {
-  std::string sentence;
-  for (const std::string& each : found) sentence += (sentence.empty() ? "" : "; ") + each;
-  if (!sentence.empty()) throw ConfigError(sentence);
-}
-
-std::string camera_fault(const Camera& camera) {
-  if (camera.width_px < 1 || camera.height_px < 1) return "the camera's image size must be given";
-  const Eigen::VectorXd lens = params(camera.lens);
-  const bool is_finite = lens.allFinite() && camera.cov.allFinite();
-  return is_finite && lens.head<2>().minCoeff() > 0.0 ? ""
-                                                      : "the camera's parameters must be finite, fx and fy above 0";
-}
-
 void require_sense(std::span<const Shot> shots, const Camera& camera, const RangefinderConfig& config) {
   std::vector<std::string> found = faults(config);
-  if (const std::string of_camera = camera_fault(camera); !of_camera.empty()) found.push_back(of_camera);
+  if (const std::string of_camera = fault(camera); !of_camera.empty()) found.push_back(of_camera);
   const bool has_corners = std::ranges::any_of(shots, [](const Shot& shot) { return shot.board.has_value(); });
   if (has_corners && !config.board) found.emplace_back("the shots have corners of a board, but no board is given");
-  require(found);
+  require_none(found);
 }
 
 std::vector<Eigen::Vector3d> points_of(const RangefinderConfig& config) {
@@ -128,12 +115,12 @@ RangefinderCalibration rangefinder(std::vector<Shot> shots, const Camera& camera
 EdgesCalibration rangefinder_by_edges(const std::vector<ScanRow>& scan, const GreyImage& photo, const Camera& camera,
                                       const EdgesConfig& config, const Progress& progress) {
   std::vector<std::string> found = faults(config);
-  if (const std::string of_camera = camera_fault(camera); !of_camera.empty()) found.push_back(of_camera);
+  if (const std::string of_camera = fault(camera); !of_camera.empty()) found.push_back(of_camera);
   if (photo.width_px != camera.width_px || photo.height_px != camera.height_px ||
       photo.values.size() != static_cast<std::size_t>(photo.width_px) * static_cast<std::size_t>(photo.height_px)) {
     found.emplace_back("the photo must be of the camera's size");
   }
-  require(found);
+  require_none(found);
   EdgesConfig scaled = config;
   constexpr double usual_width_px = 640.0;  // of the images that the blurs are meant for
   for (double& blur_px : scaled.blur_px) blur_px *= camera.width_px / usual_width_px;

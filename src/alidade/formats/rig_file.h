@@ -1,12 +1,16 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "alidade/pantilt/rig.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Text of rig.yaml: heads with their cameras (`camera_files`, one a head, as written; none: inline), mounting,
 /// encoders, and the covariance where it is known.
@@ -17,4 +21,11 @@ namespace alidade {
 /// looks like degrees, two heads of one id, something that is no covariance. A head's `intrinsics` is read along.
 [[nodiscard]] Rig read_rig(const std::filesystem::path& file);
 
+/// Reads the camera of each head of a table: one file for all, or one for each head in the order of `ids`. Throws
+/// InputError: another number of files (`table` is named), a camera that cannot be read or is not central.
+[[nodiscard]] std::map<int, Camera> read_cameras_by_head(const std::vector<std::filesystem::path>& files,
+                                                         const std::vector<int>& ids,
+                                                         const std::filesystem::path& table);
+
+ALIDADE_PUBLIC_END
 }  // namespace alidade

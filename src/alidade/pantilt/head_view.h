@@ -3,8 +3,10 @@
 #include <string>
 
 #include "alidade/board/board_view.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// A board that stood still, as the camera of one head saw it at one pair of readings.
 struct HeadView {
@@ -14,4 +16,5 @@ struct HeadView {
   Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();  ///< What its encoders read.
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -1,12 +1,15 @@
 #pragma once
 
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "alidade/pantilt/head.h"
 #include "alidade/pantilt/target_observation.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// σ of a head's encoders beside its readings' noise, where a file gives it; NaN: not told, 0: exact.
 struct EncoderError {
@@ -27,4 +30,8 @@ struct Rig {
   std::vector<LensCourse> lens_courses;      ///< One a head, or none: of cameras that zoom.
 };
 
+/// Names of the parameters of all heads, in the order of `cov`: "head1.base_x_m", …
+[[nodiscard]] std::vector<std::string> parameter_names(const Rig& rig);
+
+ALIDADE_PUBLIC_END
 }  // namespace alidade

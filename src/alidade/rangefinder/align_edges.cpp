@@ -312,14 +312,15 @@ Verdict edges_verdict(const EdgesReport& report) {
   } else if (!(report.gain > min_gain)) {
     refuse("the edges of the scan are not those of the photo", "check the head's angles and the camera file");
   } else if (!(report.halves_differ_rad < max_rad)) {
-    refuse("one half of the scan's edges tells another direction than the other", "scan finer");
+    refuse("the two halves of the scan's edges give different directions", "scan finer");
   } else {
     verdict.state = State::care;
     const BeamMatrix& cov = report.beam.cov;
-    verdict.sentence = "a check of the direction, ± " + text_of(3e3 * std::sqrt(cov.block<2, 2>(3, 3).trace()), 2) +
-                       " mrad (3σ), from " + std::to_string(report.num_edges) +
-                       " edges; the origin is hardly told, ± " +
-                       text_of(3e3 * std::sqrt(cov.topLeftCorner<3, 3>().trace()), 2) + " mm";
+    verdict.sentence =
+        "a check of the direction, ± " +
+        text_of(3e3 * std::sqrt(cov.block<2, 2>(beam_direction_param, beam_direction_param).trace()), 2) +
+        " mrad (3σ), from " + std::to_string(report.num_edges) + " edges; the origin is hardly determined, ± " +
+        text_of(3e3 * std::sqrt(cov.topLeftCorner<3, 3>().trace()), 2) + " mm";
     verdict.to_add = "calibrate with a board: --method joint";
   }
   return verdict;

@@ -23,7 +23,7 @@ const char* remedy_of(const std::string& name) {
   if (name == "scale") return "give --sigma-scale, or estimate it: --scale";
   if (name.starts_with("camera")) return "use a camera file with covariance: alidade calibrate";
   if (name == "board.flat_m") return "glue the board to something flat";
-  return "leave it out: the residuals tell it";
+  return "leave the option away: it is estimated from the residuals";
 }
 
 /// The move of one of the answer's vectors in its σ, √trace, as the verdict states it; named by what moves most.
@@ -42,8 +42,10 @@ void put_moves(const RangefinderReport& report, const BeamVector& moves, Assumpt
   const Eigen::Vector3d turned = 1e6 * (moved.direction_in_cam - report.beam.direction_in_cam);
   const BeamMatrix& cov = report.beam.cov;
   put_move_of("origin_m", moves.head<3>(), std::sqrt(cov.topLeftCorner<3, 3>().trace()), assumption);
-  put_move_of("direction", turned, std::sqrt(cov.block<2, 2>(3, 3).trace()), assumption);
-  if (!report.scale_by_need) put_move_of("scale", moves.tail<1>(), std::sqrt(cov(5, 5)), assumption);
+  put_move_of("direction", turned, std::sqrt(cov.block<2, 2>(beam_direction_param, beam_direction_param).trace()),
+              assumption);
+  if (!report.scale_by_need)
+    put_move_of("scale", moves.tail<1>(), std::sqrt(cov(beam_scale_param, beam_scale_param)), assumption);
 }
 
 bool is_of_lengths(const HeldThing& thing) { return thing.name == "scale" || thing.name == "square_m"; }

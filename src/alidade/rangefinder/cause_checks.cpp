@@ -21,7 +21,7 @@ std::string unit_of(double scale) {
 /// A scale that was estimated as nobody told it, and is not 1: the rangefinder's, or that of the board.
 void add_found_scale(const RangefinderReport& report, Verdict& verdict) {
   constexpr double ask_beyond = 4.0, beyond_an_instrument = 0.05;
-  const double away = report.beam.scale - 1.0, sigma = std::sqrt(report.beam.cov(5, 5));
+  const double away = report.beam.scale - 1.0, sigma = std::sqrt(report.beam.cov(beam_scale_param, beam_scale_param));
   const double z = std::abs(away) / sigma;
   Check check = check_of("scale", z < ask_beyond ? State::good : State::care, "the readings' scale is 1 within its σ",
                          z, ask_beyond, "σ", "residuals");
@@ -77,7 +77,7 @@ void add_camera(const RangefinderReport& report, Verdict& verdict) {
                  text_of(thing.value + thing.asked, 5) + " px, not " + text_of(thing.value, 5) + " (" + text_of(z, 2) +
                  "σ): " +
                  (is_focal && std::abs(thing.asked) > foreign * thing.value ? "the file of another camera, or zoomed"
-                                                                            : "calibrate the camera anew");
+                                                                            : "calibrate the camera again");
   }
   verdict.checks.push_back(std::move(check));
 }

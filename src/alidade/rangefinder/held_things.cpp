@@ -14,7 +14,7 @@ using Eigen::VectorXd;
 /// The first of a solve's parameters are those of the beam.
 BeamVector of_beam(const VectorXd& all, const RangefinderReport& report) {
   BeamVector beam = BeamVector::Zero();
-  const Index num = report.cov_model(5, 5) > 0.0 ? 6 : 5;
+  const Index num = report.cov_model(beam_scale_param, beam_scale_param) > 0.0 ? 6 : 5;
   beam.head(num) = all.head(num);
   return beam;
 }

@@ -270,7 +270,7 @@ double scale_in_sigmas(const BeamProblem& problem, const Camera& camera, const B
   const int spare = with ? with->normals.num_rows - num_beam_params : 0;
   if (spare < enough || !with->converged) return 0.0;
   const double left = std::max(1.0, with->normals.cost / spare);
-  const double sigma = std::sqrt(left * inverse_of_scaled(with->normals.H)(5, 5));
+  const double sigma = std::sqrt(left * inverse_of_scaled(with->normals.H)(beam_scale_param, beam_scale_param));
   const double z = (with->beam.scale - 1.0) / sigma;
   return std::isfinite(z) ? z : 0.0;
 }

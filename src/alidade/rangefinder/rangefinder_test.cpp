@@ -91,7 +91,7 @@ TEST(RangefinderVerdict, WarnsOfAShortSpanAndOfOutliers) {
   EXPECT_TRUE(verdict.state == State::care && verdict.exit_code == ExitCode::ok);
   sample = draw_rangefinder_sample(*rangefinder_scenario("reference"), {.outlier_share = 0.1}, 3);
   verdict = rangefinder_verdict(solve_sample(sample, config), sample.simulated.shots, config);
-  EXPECT_NE(verdict.to_add.find("left out: shot"), std::string::npos) << verdict.to_add;
+  EXPECT_NE(verdict.to_add.find("rejected: shot"), std::string::npos) << verdict.to_add;
 }
 
 /// Squared error over its covariance of origin, direction and scale; χ² of six.

@@ -78,7 +78,8 @@ std::vector<CountedSigma> sigma_by_count(std::span<const Shot> shots, const Rang
                        .sigma_origin_m = fit.bound.sigma_origin_m,
                        .sigma_direction_rad = fit.bound.sigma_direction_rad,
                        .bound_origin_m = std::sqrt(fit.bound.cov.topLeftCorner<3, 3>().trace()),
-                       .bound_direction_rad = std::sqrt(fit.bound.cov.block<2, 2>(3, 3).trace())});
+                       .bound_direction_rad =
+                           std::sqrt(fit.bound.cov.block<2, 2>(beam_direction_param, beam_direction_param).trace())});
   }
   return counted;
 }

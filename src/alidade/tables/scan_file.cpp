@@ -12,7 +12,7 @@ double angle(const Csv& csv, std::size_t row, const std::string& column) {
   const double value = csv.number(row, column);
   if (std::abs(value) > 2.0 * std::numbers::pi)
     throw InputError(csv.where(row, column) + ": '" + csv.text(row, column) +
-                     "' is beyond a full turn; angles are radians");
+                     "' is beyond a full revolution; angles are radians");
   return value;
 }
 

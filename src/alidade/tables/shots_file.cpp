@@ -61,7 +61,7 @@ Spot spot_of(const Csv& csv, std::size_t row, const ShotColumns& columns) {
   for (const std::string& name : {columns.u, columns.v}) {
     if (csv.is_empty(row, name)) throw InputError(csv.where(row, name) + ": is empty; a spot needs u and v");
     if (std::abs(csv.number(row, name)) > max_px)
-      throw InputError(csv.where(row, name) + ": '" + csv.text(row, name) + "' is in no picture");
+      throw InputError(csv.where(row, name) + ": '" + csv.text(row, name) + "' is in no image");
   }
   Spot spot{.px = {csv.number(row, columns.u), csv.number(row, columns.v)}};
   if (is_given(csv, row, "sigma_px")) spot.sigma_px = above_zero(csv, row, "sigma_px");

@@ -34,13 +34,13 @@ using BeamMatrix = Eigen::Matrix<double, num_beam_params, num_beam_params>;
 /// The beam of a single-point rangefinder in the frame of a camera: a reading L is the point
 ///     point_in_cam = origin_in_cam + scale · L · direction_in_cam.
 /// The origin takes up whatever constant the instrument adds to its readings: an offset c is an origin that is moved by
-/// c along the beam, and nothing can tell the two apart. Wang & Li, 2020, eq. (1).
+/// c along the beam, and nothing separates the two. Wang & Li, 2020, eq. (1).
 struct Beam {
   Eigen::Vector3d origin_in_cam = Eigen::Vector3d::Zero();      ///< Where the reading is zero. [m]
   Eigen::Vector3d direction_in_cam = Eigen::Vector3d::UnitZ();  ///< Unit vector.
   double scale = 1.0;                                           ///< Metres for each metre read.
   RangeNoise noise;
-  /// Of the six parameters, the direction in tangent_basis(direction_in_cam); zero rows for what was held.
+  /// Of the six parameters, the direction in tangent_basis(direction_in_cam); zero rows for what was fixed.
   BeamMatrix cov = BeamMatrix::Zero();
   /// Covariance of the six parameters with those of the lens it was calibrated with (6 × parameters): both were found
   /// from the same photos. 0×0: independent. Without it a pixel would seem to be worse known than it is.

@@ -15,7 +15,7 @@ namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
 /// How the readings of a head become angles of its axes: angle = scale · (reading + c cos reading + s sin reading −
-/// zero). c and s are what a disc that sits off its axis does: an error of one period a turn.
+/// zero). c and s are what a disc that sits off its axis does: an error of one period per revolution.
 struct Encoder {
   double pan_zero_rad = 0.0;  ///< What is read, corrected, where the pan angle is zero.
   double tilt_zero_rad = 0.0;
@@ -24,7 +24,7 @@ struct Encoder {
   double sigma_rad = 0.0;                                                               ///< Of a reading.
   double pan_cos_rad = 0.0, pan_sin_rad = 0.0, tilt_cos_rad = 0.0, tilt_sin_rad = 0.0;  ///< Amplitudes c and s.
 
-  /// Readings without the error of one period a turn.
+  /// Readings without the error of one period per revolution.
   [[nodiscard]] Eigen::Vector2d corrected(const Eigen::Vector2d& readings_rad) const;
   /// What an angle moves by for a reading.
   [[nodiscard]] Eigen::Vector2d slopes(const Eigen::Vector2d& readings_rad) const;
@@ -56,7 +56,7 @@ struct RigHead {
 
 /// The parameters of a head in their order: world_from_base ξ (translation, rotation; on the right), pan_to_tilt,
 /// tilt_to_cam, cam_from_tilt (rotation, on the right), pan zero, tilt zero, pan scale, tilt scale,
-/// skew of the axes, the encoders' errors of one period a turn.
+/// skew of the axes, the encoders' errors of one period per revolution.
 inline constexpr int num_head_params = 24;
 inline constexpr std::array<const char*, num_head_params> head_param_names{
     "base_x_m",        "base_y_m",        "base_z_m",        "base_rx_rad",     "base_ry_rad",     "base_rz_rad",

@@ -14,7 +14,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// What the first so many shots, in a drawn order, tell of the beam.
+/// What the first so many shots, in a drawn order, determine of the beam.
 struct CountedSigma {
   int num_shots = 0;
   double sigma_origin_m = 0.0, sigma_direction_rad = 0.0;  ///< √trace of the estimate's covariances.

@@ -62,7 +62,7 @@ void add_camera(const RangefinderReport& report, Verdict& verdict) {
   constexpr double ask_beyond = 4.5, foreign = 0.02;
   Check check =
       check_of("camera", State::good, "boards and spots agree with the camera file", 0.0, ask_beyond, "σ", "residuals");
-  for (const HeldThing& thing : report.held) {
+  for (const FixedQuantity& thing : report.fixed) {
     if (!thing.name.starts_with("camera")) continue;
     const double z = std::abs(thing.asked) / thing.asked_sigma;
     if (!(z > check.value)) continue;

@@ -12,7 +12,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// One reading of a rangefinder that turns with the camera on a head; angles as in pantilt/head_rotation.h.
+/// One reading of a rangefinder that rotates with the camera on a head; angles as in pantilt/head_rotation.h.
 struct ScanRow {
   double pan_rad = 0.0, tilt_rad = 0.0;
   double range_m = 0.0;

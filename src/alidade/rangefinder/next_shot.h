@@ -25,7 +25,7 @@ struct ShotLimits {
   double max_tilt_rad = 0.78;
 };
 
-/// A place for the board, and what would be known with it.
+/// A pose for the board, and what would be known with it.
 struct NextShot {
   double distance_m = 0.0;   ///< Along the beam, as read.
   double tilt_rad = 0.0;     ///< Between the board's normal and the camera's view.

@@ -29,7 +29,7 @@ struct ShotFit {
 };
 
 /// Something that the solve fixed: what an error of it does to the beam, and what the shots say of it.
-struct HeldThing {
+struct FixedQuantity {
   std::string name;  ///< scale, square_m, board.flat_m, camera.f, camera.cx, camera.cy, sigma_range_m, sigma_spot_px
   double value = 0.0;
   BeamVector moves = BeamVector::Zero();  ///< ∂ beam / ∂ its value, everything else solved again.
@@ -69,8 +69,8 @@ struct RangefinderReport {
   Camera camera;                              ///< As given, or refined with the beam; the beam belongs to it.
   BeamMatrix cov_model = BeamMatrix::Zero();  ///< Of the beam, if every single measurement erred by itself.
   Eigen::MatrixXd lens_cov_model;             ///< The same of a lens that was refined; 0×0: it was fixed.
-  ClusterCovariance clusters;                 ///< What tells the two apart; shots are its clusters.
-  std::vector<HeldThing> held;
+  ClusterCovariance clusters;                 ///< What separates the two; shots are its clusters.
+  std::vector<FixedQuantity> fixed;
   bool scale_by_need = false;      ///< The scale was estimated for the beam's sake, it is no result itself.
   std::vector<Beam> alternatives;  ///< Other beams that fit as well.
   std::vector<ShotFit> shots;      ///< One per shot.

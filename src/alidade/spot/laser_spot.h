@@ -36,7 +36,7 @@ struct SeenBoard {
 
 /// What is known beside the photo; each part helps and none is needed, but a grey photo needs one of the first two.
 struct LaserSpotAids {
-  const cv::Mat* photo_off = nullptr;   ///< The same with the laser off; exposure and place may differ a little.
+  const cv::Mat* photo_off = nullptr;   ///< The same with the laser off; exposure and position may differ a little.
   std::optional<SeenBoard> seen_board;  ///< The spot is looked for on its print alone.
   std::vector<Eigen::Vector2d> region;  ///< Polygon in which the spot lies [px]; empty: anywhere.
 };
@@ -47,7 +47,7 @@ struct LaserSpot {
   Eigen::Matrix2d cov = Eigen::Matrix2d::Identity();  ///< Noise, pixels, and what an edge below the spot leaves. [px²]
   double peak = 0.0;                                  ///< Light over the background, in grey values of its channel.
   double radius_px = 0.0;                             ///< σ of the spot, mean of its axes.
-  bool is_saturated = false;                          ///< Its middle exceeds the camera's range.
+  bool is_saturated = false;                          ///< Its centre exceeds the camera's range.
   bool is_on_edge = false;  ///< It lies on ink and paper, and is corrected for what each returns.
   std::string reason;       ///< "no laser spot", "two candidates at (u, v) and (u, v)", …; empty where it was found.
   [[nodiscard]] bool found() const { return reason.empty(); }

@@ -61,6 +61,22 @@ class Package(unittest.TestCase):
             texts = {(self.folder / folder / name).read_text() for folder in ("observed", "observe")}
             self.assertEqual(len(texts), 1, f"{name}: the library and the command leave the same")
 
+    def test_examples_of_rangefinder_and_rig_run(self):
+        outside, alidade = self.folder / "examples_67", self.prefix / "bin" / "alidade"
+        run("cmake", "-S", ROOT / "examples", "-B", outside, f"-DCMAKE_PREFIX_PATH={self.prefix}")
+        run("cmake", "--build", outside, "--target", "06_rangefinder", "07_rig")
+        shots, views = self.folder / "shots", self.folder / "views"
+        run(alidade, "simulate", "rangefinder", "--out", shots, "--quiet")
+        said = run(outside / "06_rangefinder", shots / "shots.csv", shots / "camera.yaml", shots / "corners.csv",
+                   self.folder / "beam")
+        self.assertIn("origin_x_m", said)
+        self.assertTrue((self.folder / "beam" / "rangefinder.yaml").exists())
+        run(alidade, "simulate", "rig", "--out", views, "--quiet")
+        said = run(outside / "07_rig", views / "views.csv", views / "camera_1.yaml", views / "camera_2.yaml",
+                   self.folder / "rig.yaml")
+        self.assertIn("head2.base_x_m", said)
+        self.assertIn("heads", (self.folder / "rig.yaml").read_text())
+
     def test_pkg_config_links(self):
         environment = {**os.environ, "PKG_CONFIG_PATH": str(self.library.parent / "pkgconfig")}
         flags = run("pkg-config", "--cflags", "--libs", "alidade", env=environment).split()

@@ -9,7 +9,7 @@
 #include "alidade/formats/camera_json.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/results/calibration_document.h"
-#include "alidade/results/rangefinder_document.h"
+#include "alidade/results/rangefinder_result.h"
 #include "cli/app/app.h"
 #include "cli/app/option_checks.h"
 #include "cli/commands/commands.h"

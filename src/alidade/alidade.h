@@ -3,5 +3,8 @@
 /// Every public header: one for each room, and files.
 #include "alidade/calibrate.h"
 #include "alidade/files.h"
+#include "alidade/network.h"
 #include "alidade/observe.h"
+#include "alidade/rangefinder.h"
+#include "alidade/rig.h"
 #include "alidade/track.h"

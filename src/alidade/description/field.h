@@ -24,7 +24,7 @@ struct TextCode {
   std::function<std::string(const std::string& text)> read;  ///< Takes it over; what is wrong with it, else "".
   std::function<std::string()> write;                        ///< As `read` takes it; "" where there is no value.
   std::vector<std::string> words = {};                       ///< All that it may be; empty: too many to list.
-  int num_parts = 1;  ///< More: so many values, separated by commas or given one after the other.
+  int num_parts = 1;  ///< More: so many values, separated by commas or given one after the other; 0: any number.
 };
 
 /// One field of a config, described once. Options of the command line and their help, keys of a config file, keyword

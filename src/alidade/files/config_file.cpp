@@ -17,7 +17,7 @@ void take_value(const Field& field, const YAML::Node& node, const std::string& f
       detail::refuse(file, field.name, fault);
     }
   };
-  if (const auto* code = std::get_if<TextCode>(&field.value); code && code->num_parts > 1 && node.IsSequence()) {
+  if (const auto* code = std::get_if<TextCode>(&field.value); code && code->num_parts != 1 && node.IsSequence()) {
     std::string text;
     for (const YAML::Node& part : node) text += (text.empty() ? "" : ",") + (part.IsScalar() ? part.Scalar() : "");
     return take(YAML::Node(text), true);

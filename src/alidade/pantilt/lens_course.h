@@ -7,7 +7,7 @@
 #include "alidade/camera/camera.h"
 #include "alidade/public.h"
 
-// A lens that zooms: intrinsics that change while a head works, told by an observer or by the truth.
+// A lens that zooms: intrinsics that change while a head works, given by an observer or by the truth.
 
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
@@ -35,7 +35,7 @@ struct Zoomed {
   }
 };
 
-/// Intrinsics over time, as `alidade observe` tells them of a head's camera.
+/// Intrinsics over time, as `alidade observe` estimates them of a head's camera.
 struct LensCourse {
   std::string name;                    ///< Of the file, for messages.
   std::vector<double> t_s;             ///< Ascending.

@@ -275,11 +275,11 @@ bool is_chessboard(const LaserSpotAids& aids) {
 }
 
 std::string reason_against(const cv::Mat& photo, const LaserSpotAids& aids) {
-  if (photo.empty() || photo.dims != 2) return "there is no picture";
+  if (photo.empty() || photo.dims != 2) return "there is no image";
   if (aids.photo_off && (aids.photo_off->size() != photo.size() || aids.photo_off->type() != photo.type()))
     return "the photo with the laser off has another size or kind";
   if (photo.channels() < 3 && !aids.photo_off && !is_chessboard(aids))
-    return "a grey photo tells no spot without the photo with the laser off or a chessboard's pose";
+    return "a grey photo shows no spot without the photo with the laser off or a chessboard's pose";
   return {};
 }
 

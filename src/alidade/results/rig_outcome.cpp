@@ -1,4 +1,6 @@
-#include "alidade/results/rig_document.h"
+#include "alidade/results/rig_outcome.h"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -7,51 +9,13 @@
 #include <map>
 
 #include "alidade/files/number_list.h"
+#include "alidade/geometry/degree.h"
+#include "alidade/results/heads_document.h"
 
 namespace alidade {
 namespace {
 
 using Numbers = std::vector<double>;
-
-JsonValue head_value(const Head& head) {
-  JsonValue value;
-  value["id"] = head.id;
-  value["world_from_base"]["translation_m"] = list_of(head.world_from_base.translation);
-  value["world_from_base"]["quaternion_wxyz"] = list_of(head.world_from_base.rotation);
-  value["pan_to_tilt_m"] = list_of(head.pan_to_tilt_m);
-  value["tilt_to_cam_m"] = list_of(head.tilt_to_cam_m);
-  value["cam_from_tilt"]["quaternion_wxyz"] = list_of(head.cam_from_tilt);
-  value["axes_skew_rad"] = head.axes_skew_rad;
-  value["encoder"]["pan_zero_rad"] = head.encoder.pan_zero_rad;
-  value["encoder"]["tilt_zero_rad"] = head.encoder.tilt_zero_rad;
-  value["encoder"]["pan_scale"] = head.encoder.pan_scale;
-  value["encoder"]["tilt_scale"] = head.encoder.tilt_scale;
-  value["encoder"]["pan_cos_rad"] = head.encoder.pan_cos_rad;
-  value["encoder"]["pan_sin_rad"] = head.encoder.pan_sin_rad;
-  value["encoder"]["tilt_cos_rad"] = head.encoder.tilt_cos_rad;
-  value["encoder"]["tilt_sin_rad"] = head.encoder.tilt_sin_rad;
-  value["encoder"]["sigma_rad"] = head.encoder.sigma_rad;
-  return value;
-}
-
-/// σ by the names of a head; rotations as three small turns on the right.
-JsonValue head_sigma(int id, const HeadVector& sigma) {
-  JsonValue value;
-  value["id"] = id;
-  value["world_from_base"]["translation_m"] = list_of(Eigen::Vector3d(sigma.head<3>()));
-  value["world_from_base"]["rotation_rad"] = list_of(Eigen::Vector3d(sigma.segment<3>(3)));
-  value["pan_to_tilt_m"] = list_of(Eigen::Vector3d(sigma.segment<3>(6)));
-  value["tilt_to_cam_m"] = list_of(Eigen::Vector3d(sigma.segment<3>(9)));
-  value["cam_from_tilt"]["rotation_rad"] = list_of(Eigen::Vector3d(sigma.segment<3>(12)));
-  value["axes_skew_rad"] = sigma[19];
-  value["encoder"]["pan_scale"] = sigma[17];
-  value["encoder"]["tilt_scale"] = sigma[18];
-  value["encoder"]["pan_cos_rad"] = sigma[20];
-  value["encoder"]["pan_sin_rad"] = sigma[21];
-  value["encoder"]["tilt_cos_rad"] = sigma[22];
-  value["encoder"]["tilt_sin_rad"] = sigma[23];
-  return value;
-}
 
 JsonValue covers_value(const RigReport& report) {
   JsonValue covers = JsonValue::list();
@@ -84,7 +48,7 @@ const Head* head_of(const Rig& rig, int id) {
 }
 
 /// Which way each view's pan came from, of the same head: residuals of two levels by it are backlash. 0 at first.
-std::vector<int> travel_signs(std::span<const HeadView> views) {
+std::vector<int> travel_signs(const std::vector<HeadView>& views) {
   std::map<int, double> last_rad;
   std::vector<int> signs;
   for (const HeadView& view : views) {
@@ -129,7 +93,8 @@ DataTable axes_table(const Rig& rig) {
 }
 
 /// Corners with their residuals, prediction − observation; `view` is a row of `views`.
-DataTable corners_table(std::span<const HeadView> views, const RigReport& report) {
+DataTable corners_table(const RigCalibration& report) {
+  const std::vector<HeadView>& views = report.measured;
   std::vector<int> view, corner;
   std::array<Numbers, 4> columns;
   for (std::size_t v = 0; v < views.size(); ++v) {
@@ -153,7 +118,8 @@ DataTable corners_table(std::span<const HeadView> views, const RigReport& report
            {"residual_v_px", rounded(std::move(columns[3]), 4)}}};
 }
 
-DataTable views_table(std::span<const HeadView> views, const RigReport& report) {
+DataTable views_table(const RigCalibration& report) {
+  const std::vector<HeadView>& views = report.measured;
   std::vector<std::string> name, reason;
   std::vector<int> head, board;
   std::vector<bool> used;
@@ -195,37 +161,6 @@ DataTable views_table(std::span<const HeadView> views, const RigReport& report) 
   return table;
 }
 
-}  // namespace
-
-void fill_heads(const Rig& rig, ResultDocument& document) {
-  JsonValue heads = JsonValue::list(), sigmas = JsonValue::list();
-  for (std::size_t h = 0; h < rig.heads.size(); ++h) {
-    const int id = rig.heads[h].head.id;
-    heads.push_back(head_value(rig.heads[h].head));
-    const HeadVector variance =
-        rig.cov.diagonal().segment<num_head_params>(num_head_params * static_cast<Eigen::Index>(h));
-    sigmas.push_back(head_sigma(id, variance.cwiseMax(0.0).cwiseSqrt()));
-    for (const char* name : head_param_names)
-      document.covariance_names.push_back("head" + std::to_string(id) + "." + name);
-  }
-  document.estimate["heads"] = std::move(heads);
-  document.stddev["heads"] = std::move(sigmas);
-  for (Eigen::Index i = 0; i < rig.cov.rows(); ++i)
-    for (Eigen::Index j = i; j < rig.cov.cols(); ++j) document.covariance_upper.push_back(rig.cov(i, j));
-}
-
-void fill_heads_model(const Rig& rig, const Eigen::MatrixXd& cov_model, ResultDocument& document) {
-  JsonValue sigmas = JsonValue::list();
-  for (std::size_t h = 0; h < rig.heads.size(); ++h) {
-    const HeadVector variance =
-        cov_model.diagonal().segment<num_head_params>(num_head_params * static_cast<Eigen::Index>(h));
-    sigmas.push_back(head_sigma(rig.heads[h].head.id, variance.cwiseMax(0.0).cwiseSqrt()));
-  }
-  document.stddev_model["heads"] = std::move(sigmas);
-}
-
-namespace {
-
 /// What was estimated by need, and backlash, which is no part of a head as a file has it.
 void fill_freed(const RigReport& report, ResultDocument& document) {
   JsonValue freed = JsonValue::list(), backlash = JsonValue::list(), sigma = JsonValue::list();
@@ -246,43 +181,96 @@ void fill_freed(const RigReport& report, ResultDocument& document) {
   document.stddev["backlash_rad"] = std::move(sigma);
 }
 
+void fill_solved(const RigCalibration& result, ResultDocument& document) {
+  JsonValue& estimate = document.estimate;
+  fill_heads(result.rig, document);
+  fill_freed(result, document);
+  fill_heads_model(result.rig, result.cov_model, document);
+  document.assumed = result.assumed;
+  JsonValue causes = JsonValue::list();
+  for (const RigCause& cause : result.causes) {
+    JsonValue value;
+    value["name"] = cause.name;
+    value["size"] = cause.size;
+    value["sigmas"] = cause.sigmas;
+    causes.push_back(std::move(value));
+  }
+  estimate["causes"] = std::move(causes);
+  estimate["design_effect"] = result.clusters.design_effect;
+  estimate["chi2_per_dof"] = result.chi2_per_dof();
+  estimate["rms_px"] = result.rms_px;
+  estimate["sigma_relative_rad"] = result.sigma_relative_rad;
+  estimate["sigma_relative_m"] = result.sigma_relative_m;
+}
+
+void fill_document(const RigCalibration& result, ResultDocument& document) {
+  document.command = "rig";
+  document.counts = result.counts;
+  document.verdict = result.verdict;
+  JsonValue& estimate = document.estimate;
+  const bool is_solved = result.status == RigReport::Status::converged;
+  if (is_solved) fill_solved(result, document);
+  estimate["noise"]["sigma_px"] = result.sigma_px;
+  estimate["noise"]["sigma_encoder_rad"] = result.sigma_encoder_rad;
+  estimate["noise"]["px_from"] = result.sigma_px_is_estimated ? "residuals" : "given";
+  estimate["noise"]["encoder_from"] = result.sigma_encoder_is_estimated ? "residuals" : "given or assumed";
+  estimate["covers"] = covers_value(result);
+  if (result.views.size() != result.measured.size()) return;
+  document.data.push_back(views_table(result));
+  if (!is_solved) return;
+  document.data.push_back(axes_table(result.rig));
+  document.data.push_back(corners_table(result));
+}
+
+void add_lines_of_head(const Rig& rig, std::size_t h, std::vector<std::string>& lines) {
+  const Head& head = rig.heads[h].head;
+  const HeadVector sigma = 3.0 * rig.cov.diagonal()
+                                     .segment<num_head_params>(num_head_params * static_cast<Eigen::Index>(h))
+                                     .cwiseMax(0.0)
+                                     .cwiseSqrt();
+  const Eigen::Vector3d &base = head.world_from_base.translation, &arm = head.tilt_to_cam_m;
+  const Eigen::Vector3d arm_sigma = sigma.segment<3>(tilt_to_cam_param);
+  lines.push_back(fmt::format("head {}: base at ({:.1f}, {:.1f}, {:.1f}) ± ({:.2g}, {:.2g}, {:.2g}) mm   (3σ)", head.id,
+                              1e3 * base.x(), 1e3 * base.y(), 1e3 * base.z(), 1e3 * sigma[0], 1e3 * sigma[1],
+                              1e3 * sigma[2]));
+  lines.push_back(fmt::format("  tilt axis {:.2f} ± {:.2g} mm before the pan axis, {:.3f} ± {:.2g}° from square to it",
+                              1e3 * head.pan_to_tilt_m.z(), 1e3 * sigma[pan_to_tilt_param + 2],
+                              head.axes_skew_rad / degree, sigma[axes_skew_param] / degree));
+  lines.push_back(fmt::format("  camera at ({:.2f}, {:.2f}, {:.2f}) ± ({:.2g}, {:.2g}, {:.2g}) mm from the tilt axis",
+                              1e3 * arm.x(), 1e3 * arm.y(), 1e3 * arm.z(), 1e3 * arm_sigma.x(), 1e3 * arm_sigma.y(),
+                              1e3 * arm_sigma.z()));
+}
+
+std::vector<std::string> lines_of(const RigCalibration& result) {
+  std::vector<std::string> lines;
+  for (const SkippedInput& photo : result.no_board)
+    lines.push_back(fmt::format("no board: {}: {}", photo.file, photo.reason));
+  for (std::size_t v = 0; v < result.views.size() && v < result.measured.size(); ++v) {
+    const HeadViewFit& fit = result.views[v];
+    if (!fit.used && !fit.reason.empty())
+      lines.push_back(fmt::format("not used: {}: {}", result.measured[v].seen.photo, fit.reason));
+  }
+  if (result.status != RigReport::Status::converged) return lines;
+  for (std::size_t h = 0; h < result.rig.heads.size(); ++h) add_lines_of_head(result.rig, h, lines);
+  for (const RigFreed& one : result.freed)
+    lines.push_back(fmt::format("estimated too: {} {:.5g} ± {:.2g}", one.name, one.value, 3.0 * one.sigma));
+  lines.push_back(fmt::format("{} of {} views; χ²/dof {:.3f}, rms {:.3f} px; σ of a reading {:.3g}° ({})",
+                              result.views_used, result.views.size(), result.chi2_per_dof(), result.rms_px,
+                              result.sigma_encoder_rad / degree,
+                              result.sigma_encoder_is_estimated ? "estimated from the residuals"
+                              : result.config.sigma_encoder_rad ? "as given"
+                                                                : "assumed"));
+  return lines;
+}
+
 }  // namespace
 
-void fill_rig(std::span<const HeadView> views, const RigReport& report, ResultDocument& document) {
-  document.counts.given += views.size();
-  document.counts.used = static_cast<std::size_t>(report.views_used);
-  document.counts.dropped = static_cast<std::size_t>(report.views_dropped);
-  JsonValue& estimate = document.estimate;
-  if (report.status == RigReport::Status::converged) {
-    fill_heads(report.rig, document);
-    fill_freed(report, document);
-    fill_heads_model(report.rig, report.cov_model, document);
-    document.assumed = report.assumed;
-    JsonValue causes = JsonValue::list();
-    for (const RigCause& cause : report.causes) {
-      JsonValue value;
-      value["name"] = cause.name;
-      value["size"] = cause.size;
-      value["sigmas"] = cause.sigmas;
-      causes.push_back(std::move(value));
-    }
-    estimate["causes"] = std::move(causes);
-    estimate["design_effect"] = report.clusters.design_effect;
-    estimate["chi2_per_dof"] = report.chi2_per_dof();
-    estimate["rms_px"] = report.rms_px;
-    estimate["sigma_relative_rad"] = report.sigma_relative_rad;
-    estimate["sigma_relative_m"] = report.sigma_relative_m;
-  }
-  estimate["noise"]["sigma_px"] = report.sigma_px;
-  estimate["noise"]["sigma_encoder_rad"] = report.sigma_encoder_rad;
-  estimate["noise"]["px_from"] = report.sigma_px_is_told ? "residuals" : "given";
-  estimate["noise"]["encoder_from"] = report.sigma_encoder_is_told ? "residuals" : "given or assumed";
-  estimate["covers"] = covers_value(report);
-  if (report.views.size() != views.size()) return;
-  document.data.push_back(views_table(views, report));
-  if (report.status != RigReport::Status::converged) return;
-  document.data.push_back(axes_table(report.rig));
-  document.data.push_back(corners_table(views, report));
+JobOutcome outcome_of(const RigCalibration& calibration) {
+  JobOutcome outcome;
+  fill_document(calibration, outcome.document);
+  outcome.lines = lines_of(calibration);
+  if (tells_an_estimate(static_cast<int>(calibration.verdict.exit_code))) add_rig_files(calibration.rig, outcome.files);
+  return outcome;
 }
 
 }  // namespace alidade

@@ -1,4 +1,4 @@
-#include "alidade/rangefinder/edges.h"
+#include "alidade/rangefinder/align_edges.h"
 
 #include <algorithm>
 #include <array>
@@ -250,6 +250,24 @@ Matrix5 covariance_of(std::vector<ScanEdge> edges, const GreyImage& density, con
 
 }  // namespace
 
+std::vector<std::string> faults(const EdgesConfig& config) {
+  std::vector<std::string> found;
+  const auto is_positive = [](double value) { return value > 0.0 && std::isfinite(value); };
+  if (!is_positive(config.jump_m)) found.emplace_back("jump_m is not above 0");
+  if (config.blur_px.empty() || !std::ranges::all_of(config.blur_px, is_positive)) {
+    found.emplace_back("blur_px must have values, each above 0");
+  }
+  if (!std::isfinite(config.photo_pan_rad) || !std::isfinite(config.photo_tilt_rad)) {
+    found.emplace_back("photo_pan_rad and photo_tilt_rad must be finite");
+  }
+  if (config.max_evaluations < 1) found.emplace_back("max_evaluations must be 1 or more");
+  const Beam& guess = config.initial_guess;
+  if (!guess.origin_in_cam.allFinite() || !(std::abs(guess.direction_in_cam.norm() - 1.0) < 1e-3)) {
+    found.emplace_back("initial_guess is no beam");
+  }
+  return found;
+}
+
 EdgesReport align_edges(std::span<const ScanRow> scan, const GreyImage& photo, const Camera& camera, const Beam& start,
                         const EdgesConfig& config, const Progress& progress) {
   EdgesReport report;
@@ -294,14 +312,15 @@ Verdict edges_verdict(const EdgesReport& report) {
   } else if (!(report.gain > min_gain)) {
     refuse("the edges of the scan are not those of the photo", "check the head's angles and the camera file");
   } else if (!(report.halves_differ_rad < max_rad)) {
-    refuse("one half of the scan's edges tells another direction than the other", "scan finer");
+    refuse("the two halves of the scan's edges give different directions", "scan finer");
   } else {
     verdict.state = State::care;
     const BeamMatrix& cov = report.beam.cov;
-    verdict.sentence = "a check of the direction, ± " + text_of(3e3 * std::sqrt(cov.block<2, 2>(3, 3).trace()), 2) +
-                       " mrad (3σ), from " + std::to_string(report.num_edges) +
-                       " edges; the origin is hardly told, ± " +
-                       text_of(3e3 * std::sqrt(cov.topLeftCorner<3, 3>().trace()), 2) + " mm";
+    verdict.sentence =
+        "a check of the direction, ± " +
+        text_of(3e3 * std::sqrt(cov.block<2, 2>(beam_direction_param, beam_direction_param).trace()), 2) +
+        " mrad (3σ), from " + std::to_string(report.num_edges) + " edges; the origin is hardly determined, ± " +
+        text_of(3e3 * std::sqrt(cov.topLeftCorner<3, 3>().trace()), 2) + " mm";
     verdict.to_add = "calibrate with a board: --method joint";
   }
   return verdict;

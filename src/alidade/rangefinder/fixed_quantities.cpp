@@ -1,4 +1,4 @@
-#include "alidade/rangefinder/held_things.h"
+#include "alidade/rangefinder/fixed_quantities.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,7 +14,7 @@ using Eigen::VectorXd;
 /// The first of a solve's parameters are those of the beam.
 BeamVector of_beam(const VectorXd& all, const RangefinderReport& report) {
   BeamVector beam = BeamVector::Zero();
-  const Index num = report.cov_model(5, 5) > 0.0 ? 6 : 5;
+  const Index num = report.cov_model(beam_scale_param, beam_scale_param) > 0.0 ? 6 : 5;
   beam.head(num) = all.head(num);
   return beam;
 }
@@ -25,12 +25,12 @@ VectorXd gradient_of(const ReducedSystem& system) {
   return g;
 }
 
-/// A held thing whose column in the system is `column`: its parameters move along `along` for a unit of it.
-HeldThing held_along(const std::string& name, const VectorXd& along, const ReducedSystem& system,
-                     const SolvedPart& part, const VectorXd& g, const RangefinderReport& report) {
+/// A fixed quantity whose column in the system is `column`: its parameters move along `along` for a unit of it.
+FixedQuantity fixed_along(const std::string& name, const VectorXd& along, const ReducedSystem& system,
+                          const SolvedPart& part, const VectorXd& g, const RangefinderReport& report) {
   const VectorXd column = system.H * along;
   const VectorXd moves = -part.inverse * column(part.places);
-  HeldThing thing{.name = name, .moves = of_beam(moves, report)};
+  FixedQuantity thing{.name = name, .moves = of_beam(moves, report)};
   const double information = along.dot(column) + column(part.places).dot(moves);
   // Less than a ten-thousandth left by the others is rounding.
   if (!(information > 1e-9 * along.dot(column))) return thing;
@@ -40,8 +40,8 @@ HeldThing held_along(const std::string& name, const VectorXd& along, const Reduc
 }
 
 /// The lens was free within its covariance: what an error of its prior does, and how far the shots pulled it away.
-HeldThing prior_along(const std::string& name, const VectorXd& along_lens, const SolvedPart& part,
-                      const LensPrior& prior, const Camera& camera, const RangefinderReport& report) {
+FixedQuantity prior_along(const std::string& name, const VectorXd& along_lens, const SolvedPart& part,
+                          const LensPrior& prior, const Camera& camera, const RangefinderReport& report) {
   const auto num_lens = static_cast<Index>(prior.free.size());
   VectorXd along(num_lens);
   VectorXd away(num_lens);
@@ -52,7 +52,7 @@ HeldThing prior_along(const std::string& name, const VectorXd& along_lens, const
     away[i] = now[parameter] - prior.mean[parameter];
   }
   const VectorXd pulled = prior.information * along;
-  HeldThing thing{.name = name, .moves = of_beam(part.inverse.rightCols(num_lens) * pulled, report)};
+  FixedQuantity thing{.name = name, .moves = of_beam(part.inverse.rightCols(num_lens) * pulled, report)};
   const Eigen::MatrixXd cov_before = camera.cov(prior.free, prior.free);
   const Eigen::MatrixXd cov_after = part.inverse.bottomRightCorner(num_lens, num_lens);
   const VectorXd u = along / along.squaredNorm();  // the value of `along` in the lens' parameters
@@ -83,18 +83,18 @@ std::optional<double> carried_sigma(const Camera& camera, const VectorXd& along_
 }
 
 void add_lens(const ReducedSystem& system, const SolvedPart& part, const LensPrior& prior, const Camera& camera,
-              const VectorXd& g, const RangefinderReport& report, std::vector<HeldThing>& held) {
+              const VectorXd& g, const RangefinderReport& report, std::vector<FixedQuantity>& fixed) {
   const VectorXd values = params(camera.lens);
   for (const auto& [name, along_lens] : lens_things(camera)) {
     if (!prior.free.empty()) {
-      held.push_back(prior_along(name, along_lens, part, prior, camera, report));
+      fixed.push_back(prior_along(name, along_lens, part, prior, camera, report));
     } else {
       VectorXd along = VectorXd::Zero(system.H.rows());
       along.segment(num_beam_params, 4) = along_lens;
-      held.push_back(held_along(name, along, system, part, g, report));
-      held.back().sigma = carried_sigma(camera, along_lens);
+      fixed.push_back(fixed_along(name, along, system, part, g, report));
+      fixed.back().sigma = carried_sigma(camera, along_lens);
     }
-    held.back().value = values[name == "camera.f" ? 0 : name == "camera.cx" ? 2 : 3];
+    fixed.back().value = values[name == "camera.f" ? 0 : name == "camera.cx" ? 2 : 3];
   }
 }
 
@@ -107,10 +107,10 @@ BeamVector between(const Beam& from, const Beam& to) {
 
 }  // namespace
 
-std::vector<HeldThing> held_things(const ReducedSystem& system, const SolvedPart& part, const LensPrior& prior,
-                                   const Camera& camera, std::span<const Eigen::Vector3d> points_in_board,
-                                   const RangefinderReport& report, const RangefinderConfig& config) {
-  std::vector<HeldThing> held;
+std::vector<FixedQuantity> fixed_quantities(const ReducedSystem& system, const SolvedPart& part, const LensPrior& prior,
+                                            const Camera& camera, std::span<const Eigen::Vector3d> points_in_board,
+                                            const RangefinderReport& report, const RangefinderConfig& config) {
+  std::vector<FixedQuantity> fixed;
   const VectorXd g = gradient_of(system);
   const bool has_boards =
       config.method != RangefinderMethod::spot && points_in_board.size() > 1 &&
@@ -118,48 +118,48 @@ std::vector<HeldThing> held_things(const ReducedSystem& system, const SolvedPart
   if (has_boards) {
     const double square_m = (points_in_board[1] - points_in_board[0]).norm();
     const VectorXd column = system.square_column(report.beam) / square_m;
-    held.push_back(
+    fixed.push_back(
         {.name = "square_m", .value = square_m, .moves = of_beam(-part.inverse * column(part.places), report)});
-    held.back().sigma = config.sigma_square_m;
+    fixed.back().sigma = config.sigma_square_m;
     // A board that is hit so far before the plane of its corners: the beam starts so much nearer.
-    held.push_back({.name = "board.flat_m", .value = 0.0});
-    held.back().moves.head<3>() = report.beam.direction_in_cam;
+    fixed.push_back({.name = "board.flat_m", .value = 0.0});
+    fixed.back().moves.head<3>() = report.beam.direction_in_cam;
   }
   if (!config.estimate_scale) {
-    held.push_back(held_along("scale", VectorXd::Unit(system.H.rows(), 5), system, part, g, report));
-    held.back().value = report.beam.scale;
-    held.back().sigma = config.sigma_scale;
+    fixed.push_back(fixed_along("scale", VectorXd::Unit(system.H.rows(), beam_scale_param), system, part, g, report));
+    fixed.back().value = report.beam.scale;
+    fixed.back().sigma = config.sigma_scale;
   }
-  add_lens(system, part, prior, camera, g, report, held);
-  return held;
+  add_lens(system, part, prior, camera, g, report, fixed);
+  return fixed;
 }
 
-std::vector<HeldThing> held_sigmas(const BeamProblem& problem, const RangefinderReport& report) {
+std::vector<FixedQuantity> fixed_sigmas(const BeamProblem& problem, const RangefinderReport& report) {
   constexpr double part = 0.2;
-  std::vector<HeldThing> held;
+  std::vector<FixedQuantity> fixed;
   const auto here = solve_beam(problem, report.camera, report.beam);
-  if (!here) return held;
+  if (!here) return fixed;
   const double dof = std::max(1, here->normals.num_rows - problem.num_free());
   const auto add = [&](const char* name, double value, bool is_told, const BeamProblem& other) {
     const auto there = solve_beam(other, report.camera, report.beam);
     if (!(value > 0.0) || !there || !there->converged) return;
-    held.push_back({.name = name, .value = value, .moves = between(here->beam, there->beam) / (part * value)});
-    if (is_told) held.back().sigma = value / std::sqrt(2.0 * dof);
+    fixed.push_back({.name = name, .value = value, .moves = between(here->beam, there->beam) / (part * value)});
+    if (is_told) fixed.back().sigma = value / std::sqrt(2.0 * dof);
   };
   BeamProblem other = problem;
   RangeNoise& noise = other.model.noise;
   noise = {noise.sigma_m * (1.0 + part), noise.per_m * (1.0 + part), noise.incidence_m * (1.0 + part)};
   for (PreparedShot& shot : other.shots)
     if (shot.sigma_range_m) *shot.sigma_range_m *= 1.0 + part;
-  add("sigma_range_m", problem.model.noise.sigma_m, report.range_sigma_is_told, other);
+  add("sigma_range_m", problem.model.noise.sigma_m, report.range_sigma_is_estimated, other);
   other = problem;
   bool has_spots = false;
   for (PreparedShot& shot : other.shots) {
     has_spots = has_spots || (shot.used && shot.spot_px);
     shot.sigma_spot_px *= 1.0 + part;
   }
-  if (has_spots) add("sigma_spot_px", report.sigma_spot_px, report.spot_sigma_is_told, other);
-  return held;
+  if (has_spots) add("sigma_spot_px", report.sigma_spot_px, report.spot_sigma_is_estimated, other);
+  return fixed;
 }
 
 }  // namespace alidade

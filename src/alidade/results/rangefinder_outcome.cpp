@@ -1,27 +1,27 @@
-#include "alidade/results/rangefinder_document.h"
+#include "alidade/results/rangefinder_outcome.h"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
 
 #include "alidade/files/number_list.h"
 #include "alidade/formats/beam_file.h"
 #include "alidade/formats/camera_file.h"
+#include "alidade/formats/camera_json.h"
+#include "alidade/images/photos.h"
 #include "alidade/results/sigma_values.h"
 
 namespace alidade {
 namespace {
 
-using Json = nlohmann::json;
 using Numbers = std::vector<double>;
 
-std::string_view method_name(RangefinderMethod method) {
-  return method == RangefinderMethod::spot ? "spot" : method == RangefinderMethod::plane ? "plane" : "joint";
-}
-
-DataTable shots_table(std::span<const Shot> shots, const RangefinderReport& report) {
+DataTable shots_table(const RangefinderCalibration& report) {
+  const std::vector<Shot>& shots = report.measured;
   std::vector<std::string> name, reason;
   std::vector<bool> used;
   std::vector<Numbers> column(14);
@@ -68,7 +68,8 @@ DataTable shots_table(std::span<const Shot> shots, const RangefinderReport& repo
 }
 
 /// Planes of the boards, and where a board's pose is known its corner 0 and axes: enough to draw it.
-DataTable planes_table(std::span<const Shot> shots, const RangefinderReport& report) {
+DataTable planes_table(const RangefinderCalibration& report) {
+  const std::vector<Shot>& shots = report.measured;
   std::vector<std::string> name;
   std::vector<Numbers> column(11);
   for (std::size_t i = 0; i < shots.size(); ++i) {
@@ -205,25 +206,26 @@ void put_sigmas(const Beam& beam, JsonValue& stddev) {
 }
 
 JsonValue sigma_of_shots(const RangefinderReport& report) {
-  static constexpr std::array<const char*, num_beam_params> names{"origin_x_m",  "origin_y_m",  "origin_z_m",
-                                                                  "direction_u", "direction_v", "scale"};
   std::vector<std::pair<std::string, Eigen::Index>> told;
-  for (std::size_t i = 0; i < names.size(); ++i) {
+  for (std::size_t i = 0; i < beam_param_names.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    if (report.cov_model(k, k) > 0.0 && k < report.clusters.inflation.size()) told.emplace_back(names[i], k);
+    if (report.cov_model(k, k) > 0.0 && k < report.clusters.inflation.size()) told.emplace_back(beam_param_names[i], k);
   }
   return sigma_values(told, report.clusters);
 }
 
-void fill_beam(const RangefinderReport& report, ResultDocument& document) {
-  const Beam& beam = report.beam;
-  const Eigen::Matrix<double, 7, 7> cov = embedded_covariance(beam);
-  JsonValue& estimate = document.estimate;
+void put_beam(const Beam& beam, JsonValue& estimate) {
   const Eigen::Vector2d theta = direction_angles_rad(beam);
   estimate["origin_m"] = list_of(beam.origin_in_cam);
   estimate["direction"] = list_of(beam.direction_in_cam);
   estimate["theta_x_rad"] = theta.x();
   estimate["theta_y_rad"] = theta.y();
+}
+
+void fill_beam(const RangefinderCalibration& report, ResultDocument& document) {
+  const Beam& beam = report.beam;
+  JsonValue& estimate = document.estimate;
+  put_beam(beam, estimate);
   estimate["scale"] = beam.scale;
   estimate["rms_px"] = report.rms_px;
   estimate["rms_range_m"] = report.rms_range_m;
@@ -237,89 +239,148 @@ void fill_beam(const RangefinderReport& report, ResultDocument& document) {
   estimate["bound"]["origin_m"] = root_of_diagonal(bound, 0, 3);
   estimate["bound"]["direction"] = root_of_diagonal(bound, 3, 3);
   estimate["bound"]["scale"] = std::sqrt(bound(6, 6));
-  document.covariance_names = {"origin_x_m",  "origin_y_m",  "origin_z_m", "direction_x",
-                               "direction_y", "direction_z", "scale"};
+  document.covariance_names = report.parameter_names;
   for (Eigen::Index i = 0; i < 7; ++i)
-    for (Eigen::Index j = i; j < 7; ++j) document.covariance_upper.push_back(cov(i, j));
+    for (Eigen::Index j = i; j < 7; ++j) document.covariance_upper.push_back(report.covariance(i, j));
+}
+
+void fill_geometry_and_noise(const RangefinderCalibration& result, JsonValue& estimate) {
+  const BeamBound& bound = result.bound;
+  estimate["spot_sigma_px"] = Numbers(bound.spot_sigma_px.begin(), bound.spot_sigma_px.end());
+  estimate["spot_sigma_at_m"] = Numbers(bound_ranges_m.begin(), bound_ranges_m.end());
+  estimate["condition"] = bound.condition;
+  estimate["range_ratio"] = bound.range_ratio;
+  estimate["normal_spread"] = bound.normal_spread;
+  estimate["offset_m"] = bound.offset_m;
+  if (result.status == RangefinderReport::Status::converged) estimate["sigma"] = sigma_of_shots(result);
+  estimate["noise"]["sigma_spot_px"] = result.sigma_spot_px;
+  estimate["noise"]["sigma_corner_px"] = result.sigma_corner_px;
+  estimate["noise"]["sigma_range_m"] = result.beam.noise.sigma_m;
+  estimate["noise"]["spot_from"] = result.spot_sigma_is_estimated ? "residuals" : "given";
+  estimate["noise"]["range_from"] = result.range_sigma_is_estimated ? "residuals" : "given";
+}
+
+void fill_document(const RangefinderCalibration& result, ResultDocument& document) {
+  document.command = "rangefinder";
+  document.counts = result.counts;
+  document.assumed = result.assumed;
+  document.verdict = result.verdict;
+  JsonValue& estimate = document.estimate;
+  estimate["camera"] = camera_values(result.camera);  // that the beam belongs to
+  RangefinderConfig config = result.config;
+  for (const Field& field : fields_of(config))
+    if (field.name == "method" || field.name == "refine") estimate[field.name] = value_text(field);
+  if (result.status == RangefinderReport::Status::converged) fill_beam(result, document);
+  fill_geometry_and_noise(result, estimate);
+  if (const std::optional<Board>& board = result.config.board) {
+    estimate["board"]["kind"] = kind_name(board->kind);
+    estimate["board"]["cols"] = board->cols;
+    estimate["board"]["rows"] = board->rows;
+    estimate["board"]["square_m"] = board->square_m;
+    estimate["board"]["marker_m"] = board->marker_m;
+  }
+  if (result.shots.size() == result.measured.size()) {
+    document.data.push_back(shots_table(result));
+    document.data.push_back(planes_table(result));
+  }
+  add_counts(result.by_count, document);
+  add_left_out(result.left_out, document);
+  add_gains(result.gains, document);
+}
+
+/// What the photos did not give, and which shots were not used.
+std::vector<std::string> lines_of_shots(const RangefinderCalibration& result) {
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < result.measured.size(); ++i) {
+    const Shot& shot = result.measured[i];
+    if (!shot.no_board.empty()) lines.push_back(fmt::format("no board: {}: {}", shot.photo, shot.no_board));
+    if (i >= result.photos.size()) continue;
+    const ShotPhoto& photo = result.photos[i];
+    const std::string& no_spot = photo.false_spot.empty() ? photo.no_spot : photo.false_spot;
+    if (!no_spot.empty()) lines.push_back(fmt::format("no spot: {}: {}", shot.photo, no_spot));
+  }
+  for (std::size_t i = 0; i < result.shots.size() && i < result.measured.size(); ++i) {
+    const ShotFit& fit = result.shots[i];
+    if (!fit.used && !fit.reason.empty())
+      lines.push_back(fmt::format("not used: {}: {}", result.measured[i].name, fit.reason));
+  }
+  return lines;
+}
+
+void add_lines_of_beam(const RangefinderCalibration& result, std::vector<std::string>& lines) {
+  const Beam& beam = result.beam;
+  const auto sigma3 = [&](Eigen::Index i) { return 3.0 * std::sqrt(result.covariance(i, i)); };
+  for (int i = 0; i < 3; ++i)
+    lines.push_back(
+        fmt::format("origin {}    {:9.2f} ± {:.2g} mm   (3σ)", "xyz"[i], 1e3 * beam.origin_in_cam[i], 1e3 * sigma3(i)));
+  for (int i = 0; i < 3; ++i)
+    lines.push_back(fmt::format("direction {} {:9.6f} ± {:.2g}", "xyz"[i], beam.direction_in_cam[i], sigma3(3 + i)));
+  const bool has_scale = beam.cov(beam_scale_param, beam_scale_param) > 0.0;
+  if (has_scale && result.config.scale_by_need)
+    lines.emplace_back("the readings' scale is estimated, as nobody gave it (--sigma-scale)");
+  if (has_scale) lines.push_back(fmt::format("scale       {:9.6f} ± {:.2g}", beam.scale, sigma3(6)));
+  lines.push_back(fmt::format("{} of {} shots; σ of a range {:.2g} mm ({})", result.shots_used, result.measured.size(),
+                              1e3 * beam.noise.sigma_m,
+                              result.range_sigma_is_estimated ? "estimated from the residuals" : "as given"));
+  const auto& spot_px = result.bound.spot_sigma_px;
+  lines.push_back(fmt::format("where the spot is, 3σ: {:.2g} px at 0.5 m, {:.2g} at 1 m, {:.2g} at 2 m, {:.2g} at 4 m",
+                              3.0 * spot_px[0], 3.0 * spot_px[1], 3.0 * spot_px[2], 3.0 * spot_px[3]));
+}
+
+void add_beam_files(const Beam& beam, const Camera& camera, JobOutcome& outcome) {
+  if (!tells_an_estimate(static_cast<int>(outcome.document.verdict.exit_code))) return;
+  outcome.files.push_back({"rangefinder.yaml", beam_text(beam, camera, "camera.yaml")});
+  outcome.files.push_back({"camera.yaml", camera_text(camera, CameraFormat::alidade)});
 }
 
 }  // namespace
 
-void fill_rangefinder(std::span<const Shot> shots, const RangefinderReport& report, const RangefinderConfig& config,
-                      const RangefinderExtras& extras, ResultDocument& document) {
-  document.counts.given += shots.size();
-  document.counts.used = static_cast<std::size_t>(report.shots_used);
-  document.counts.dropped = static_cast<std::size_t>(report.shots_dropped);
-  JsonValue& estimate = document.estimate;
-  estimate["method"] = method_name(config.method);
-  estimate["refine"] = config.refine == Refine::all ? "all" : "beam";
-  const bool has_beam = report.status == RangefinderReport::Status::converged;
-  if (has_beam) fill_beam(report, document);
-  estimate["spot_sigma_px"] = Numbers(report.bound.spot_sigma_px.begin(), report.bound.spot_sigma_px.end());
-  estimate["spot_sigma_at_m"] = Numbers(bound_ranges_m.begin(), bound_ranges_m.end());
-  estimate["condition"] = report.bound.condition;
-  estimate["range_ratio"] = report.bound.range_ratio;
-  estimate["normal_spread"] = report.bound.normal_spread;
-  estimate["offset_m"] = report.bound.offset_m;
-  if (has_beam) document.assumed = rangefinder_assumptions(report);
-  if (has_beam) estimate["sigma"] = sigma_of_shots(report);
-  estimate["noise"]["sigma_spot_px"] = report.sigma_spot_px;
-  estimate["noise"]["sigma_corner_px"] = report.sigma_corner_px;
-  estimate["noise"]["sigma_range_m"] = report.beam.noise.sigma_m;
-  estimate["noise"]["spot_from"] = report.spot_sigma_is_told ? "residuals" : "given";
-  estimate["noise"]["range_from"] = report.range_sigma_is_told ? "residuals" : "given";
-  if (extras.board) {
-    estimate["board"]["kind"] = kind_name(extras.board->kind);
-    estimate["board"]["cols"] = extras.board->cols;
-    estimate["board"]["rows"] = extras.board->rows;
-    estimate["board"]["square_m"] = extras.board->square_m;
-    estimate["board"]["marker_m"] = extras.board->marker_m;
-  }
-  if (report.shots.size() == shots.size()) {
-    document.data.push_back(shots_table(shots, report));
-    document.data.push_back(planes_table(shots, report));
-  }
-  add_counts(extras.by_count, document);
-  add_left_out(extras.left_out, document);
-  add_gains(extras.gains, document);
+JobOutcome outcome_of(const RangefinderCalibration& calibration, const std::string& camera_file) {
+  JobOutcome outcome;
+  fill_document(calibration, outcome.document);
+  outcome.lines = lines_of_shots(calibration);
+  if (calibration.status == RangefinderReport::Status::converged) add_lines_of_beam(calibration, outcome.lines);
+  Camera camera = calibration.camera;
+  if (calibration.config.refine == Refine::all)
+    camera.source = "alidade rangefinder" + (camera_file.empty() ? "" : ", refined from " + camera_file);
+  add_beam_files(calibration.beam, camera, outcome);
+  return outcome;
 }
 
-BeamNow read_rangefinder(const std::filesystem::path& result) {
-  const std::filesystem::path file = std::filesystem::is_directory(result) ? result / "result.json" : result;
-  BeamNow now;
-  try {
-    const Json json = Json::parse(read_file(file));
-    if (json.at("command") != "rangefinder")
-      throw InputError("is the result of '" + json.at("command").get<std::string>() + "', not of rangefinder");
-    if (!tells_an_estimate(json.at("verdict").at("exit_code").get<int>()))
-      throw InputError("this calibration was refused: " + json.at("verdict").value("to_add", ""));
-    const Json& estimate = json.at("estimate");
-    const std::string method = estimate.at("method");
-    now.method = method == "spot"    ? RangefinderMethod::spot
-                 : method == "plane" ? RangefinderMethod::plane
-                                     : RangefinderMethod::joint;
-    now.sigma_spot_px = std::max(0.02, estimate.at("noise").at("sigma_spot_px").get<double>());
-    now.sigma_corner_px = std::max(0.01, estimate.at("noise").at("sigma_corner_px").get<double>());
-    now.estimate_scale = json.at("stddev").at("scale").get<double>() > 0.0;
-    Board board{.cols = 9, .rows = 6, .square_m = 0.04};
-    if (estimate.contains("board")) {
-      const Json& b = estimate.at("board");
-      board.kind = board_kind(b.at("kind").get<std::string>()).value_or(BoardKind::chessboard);
-      board.cols = b.at("cols").get<int>();
-      board.rows = b.at("rows").get<int>();
-      board.square_m = b.at("square_m").get<double>();
-      board.marker_m = b.at("marker_m").get<double>();
-    }
-    now.points_in_board = points_in_board(board);
-  } catch (const Json::exception&) {
-    throw InputError(file.string() + ": not a result.json of alidade rangefinder");
-  } catch (const InputError& error) {
-    const std::string what = error.what();
-    throw InputError(what.starts_with(file.string()) ? what : file.string() + ": " + what);
+JobOutcome outcome_of(const EdgesCalibration& calibration) {
+  JobOutcome outcome;
+  ResultDocument& document = outcome.document;
+  const Beam& beam = calibration.beam;
+  document.command = "rangefinder";
+  document.counts = calibration.counts;
+  document.verdict = calibration.verdict;
+  JsonValue& estimate = document.estimate;
+  estimate["method"] = "edges";
+  put_beam(beam, estimate);
+  const Eigen::Matrix<double, 7, 7> cov = calibration.covariance;
+  document.stddev["origin_m"] = root_of_diagonal(cov, 0, 3);
+  document.stddev["direction"] = root_of_diagonal(cov, 3, 3);
+  estimate["gain"] = calibration.gain;
+  estimate["halves_differ_rad"] = calibration.halves_differ_rad;
+  if (tells_an_estimate(static_cast<int>(calibration.verdict.exit_code))) {
+    const auto part = [&](int i) {
+      return fmt::format("{:.5f} ± {:.2g}", beam.direction_in_cam[i], 3.0 * std::sqrt(cov(3 + i, 3 + i)));
+    };
+    outcome.lines.push_back(fmt::format("direction {}  {}  {} (3σ); the halves of the scan differ by {:.2g} mrad",
+                                        part(0), part(1), part(2), 1e3 * calibration.halves_differ_rad));
   }
-  now.beam = read_beam(file.parent_path() / "rangefinder.yaml").beam;
-  now.camera = read_camera(file.parent_path() / "camera.yaml");
-  return now;
+  add_beam_files(beam, calibration.camera, outcome);
+  return outcome;
+}
+
+void add_images(const RangefinderCalibration& calibration, const PhotoByName& load_photo, JobOutcome& outcome) {
+  constexpr std::size_t max_images = 40;  // of the page
+  const std::size_t num = std::min(max_images, calibration.photos.size());
+  for (std::size_t i = 0; i < num; ++i) {
+    if (!calibration.photos[i].has_photo) continue;
+    const Shot& shot = calibration.measured[i];
+    outcome.images.push_back({shot.name, jpeg_preview(load_photo(shot.photo), 640, 75)});
+  }
 }
 
 }  // namespace alidade

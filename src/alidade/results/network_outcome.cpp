@@ -1,4 +1,4 @@
-#include "alidade/results/moving_document.h"
+#include "alidade/results/network_outcome.h"
 
 #include <fmt/format.h>
 
@@ -6,9 +6,11 @@
 #include <array>
 #include <cmath>
 
+#include "alidade/geometry/degree.h"
 #include "alidade/report/thin.h"
-#include "alidade/results/rig_document.h"
+#include "alidade/results/heads_document.h"
 #include "alidade/results/thin_tables.h"
+#include "alidade/tables/events_file.h"
 
 namespace alidade {
 namespace {
@@ -32,7 +34,7 @@ JsonValue camera_value(const PlacedCamera& camera) {
   return value;
 }
 
-/// Where each placed camera stands, with the covariance of its place in the world, and half its view (tangents), to
+/// Where each placed camera stands, with the covariance of its position in the world, and half its view (tangents), to
 /// draw it by.
 DataTable cameras_table(const MovingTargetReport& report) {
   constexpr std::array<const char*, 18> columns{"id",
@@ -62,7 +64,7 @@ DataTable cameras_table(const MovingTargetReport& report) {
     const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h);
     const Eigen::Matrix3d R = base.rotation.toRotationMatrix();
     const Eigen::Matrix3d cov = R * report.rig.cov.block<3, 3>(at, at) * R.transpose();
-    // It does not turn: its axes stand where the encoder is at zero.
+    // It does not rotate: its axes stand where the encoder is at zero.
     const Rigid3 cam = world_from_cam(head.head, head.head.encoder.readings(Eigen::Vector2d::Zero()));
     const Eigen::Vector3d& t = cam.translation;
     const Eigen::Quaterniond& q = cam.rotation;
@@ -108,59 +110,85 @@ DataTable path_table(const MovingTargetReport& report) {
   return table;
 }
 
-}  // namespace
-
-void fill_moving_target(std::span<const TargetObservation> observations, const MovingTargetReport& report,
-                        ResultDocument& document) {
-  document.counts.given += observations.size();
-  document.counts.used = static_cast<std::size_t>(std::ranges::count(report.used, true));
-  document.counts.dropped = observations.size() - document.counts.used;
+void fill_placed(const NetworkCalibration& result, ResultDocument& document) {
   JsonValue& estimate = document.estimate;
-  JsonValue cameras = JsonValue::list();
-  for (const PlacedCamera& camera : report.cameras) cameras.push_back(camera_value(camera));
-  estimate["cameras"] = std::move(cameras);
-  if (report.status != MovingTargetReport::Status::placed) return;
-  fill_heads(report.rig, document);
-  estimate["chi2_per_dof"] = report.chi2_per_dof;
-  fill_heads_model(report.rig, report.cov_model, document);
-  document.assumed = report.assumed;
-  estimate["design_effect"] = report.clusters.design_effect;
-  estimate["block_s"] = report.block_s;
-  estimate["sigma_relative_rad"] = report.sigma_relative_rad;
-  estimate["sigma_relative_m"] = report.sigma_relative_m;
-  estimate["sigma_scale"] = report.sigma_scale;
-  if (report.truth_covered > 0.0) {
-    estimate["true_path"]["median_m"] = report.truth_median_m;
-    estimate["true_path"]["rms_m"] = report.truth_rms_m;
-    estimate["true_path"]["covered"] = report.truth_covered;
-    estimate["true_path"]["clock_offset_s"] = report.truth_clock.offset_s;
-    estimate["true_path"]["clock_rate"] = report.truth_clock.rate;
+  fill_heads(result.rig, document);
+  estimate["chi2_per_dof"] = result.chi2_per_dof;
+  fill_heads_model(result.rig, result.cov_model, document);
+  document.assumed = result.assumed;
+  estimate["design_effect"] = result.clusters.design_effect;
+  estimate["block_s"] = result.block_s;
+  estimate["sigma_relative_rad"] = result.sigma_relative_rad;
+  estimate["sigma_relative_m"] = result.sigma_relative_m;
+  estimate["sigma_scale"] = result.sigma_scale;
+  if (result.truth_covered > 0.0) {
+    estimate["true_path"]["median_m"] = result.truth_median_m;
+    estimate["true_path"]["rms_m"] = result.truth_rms_m;
+    estimate["true_path"]["covered"] = result.truth_covered;
+    estimate["true_path"]["clock_offset_s"] = result.truth_clock.offset_s;
+    estimate["true_path"]["clock_rate"] = result.truth_clock.rate;
   }
-  document.data.push_back(path_table(report));
-  document.data.push_back(cameras_table(report));
+  document.data.push_back(path_table(result));
+  document.data.push_back(cameras_table(result));
 }
 
-std::vector<TargetObservation> observations_on_one_clock(std::span<const TargetObservation> observations,
-                                                         const MovingTargetReport& report) {
-  std::vector<TargetObservation> on_rig;
-  for (const TargetObservation& observation : observations) {
-    const PlacedCamera& camera = report.cameras[observation.head];
-    if (!camera.placed) continue;
-    on_rig.push_back(observation);
-    on_rig.back().t_capture_s = on_rig.back().t_arrival_s = camera.clock.in_rig(observation.t_capture_s);
-    if (!(observation.sigma_px > 0.0)) on_rig.back().sigma_px = camera.sigma_px;
-  }
-  std::ranges::stable_sort(on_rig, {}, &TargetObservation::t_capture_s);
-  return on_rig;
-}
-
-std::string moving_path_csv(const MovingTargetReport& report) {
+/// Text of path.csv: `t_s,x_m,y_m,z_m`.
+std::string path_csv(const MovingTargetReport& report) {
   std::string text = "t_s,x_m,y_m,z_m\n";
   for (std::size_t i = 0; i < report.path.size(); ++i) {
     const Eigen::Vector3d& point = report.path[i];
     text += fmt::format("{:.6f},{:.6f},{:.6f},{:.6f}\n", report.path_t_s[i], point.x(), point.y(), point.z());
   }
   return text;
+}
+
+void add_lines_of_camera(const NetworkCalibration& result, std::size_t h, std::vector<std::string>& lines) {
+  const PlacedCamera& camera = result.cameras[h];
+  const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h);
+  const Eigen::Vector3d& position = result.rig.heads[h].head.world_from_base.translation;
+  const HeadVector sigma = 3.0 * result.rig.cov.diagonal().segment<num_head_params>(at).cwiseMax(0.0).cwiseSqrt();
+  lines.push_back(fmt::format(
+      "head {}: at ({:.2f}, {:.2f}, {:.2f}) m ± {:.2g} m, ± {:.2g}°   (3σ), {} of {} observations, σ {:.2g} px",
+      camera.id, position.x(), position.y(), position.z(), sigma.head<3>().norm(),
+      sigma.segment<3>(base_rotation_param).norm() / degree, camera.num_used, camera.num_observations,
+      camera.sigma_px));
+  lines.push_back(fmt::format("  its clock: time of the rig = {:.4f} s + {:.6f} · its own, ± {:.2g} s (3σ)",
+                              camera.clock.offset_s, camera.clock.rate, 3.0 * camera.sigma_clock_s));
+}
+
+std::vector<std::string> lines_of(const NetworkCalibration& result) {
+  std::vector<std::string> lines;
+  for (std::size_t h = 0; h < result.cameras.size(); ++h) {
+    const PlacedCamera& camera = result.cameras[h];
+    if (!camera.placed && !camera.reason.empty())
+      lines.push_back(fmt::format("head {}: not placed: {}", camera.id, camera.reason));
+    if (camera.placed && result.status == MovingTargetReport::Status::placed) add_lines_of_camera(result, h, lines);
+  }
+  if (result.truth_covered > 0.0)
+    lines.push_back(fmt::format(
+        "against the true path, after a similarity: median {:.3f} m, RMS {:.3f} m, over {:.0f} % of the path",
+        result.truth_median_m, result.truth_rms_m, 100.0 * result.truth_covered));
+  return lines;
+}
+
+}  // namespace
+
+JobOutcome outcome_of(const NetworkCalibration& calibration) {
+  JobOutcome outcome;
+  ResultDocument& document = outcome.document;
+  document.command = "rig";
+  document.counts = calibration.counts;
+  document.verdict = calibration.verdict;
+  JsonValue cameras = JsonValue::list();
+  for (const PlacedCamera& camera : calibration.cameras) cameras.push_back(camera_value(camera));
+  document.estimate["cameras"] = std::move(cameras);
+  if (calibration.status == MovingTargetReport::Status::placed) fill_placed(calibration, document);
+  outcome.lines = lines_of(calibration);
+  if (!tells_an_estimate(static_cast<int>(calibration.verdict.exit_code))) return outcome;
+  add_rig_files(placed_rig(calibration), outcome.files);
+  outcome.files.push_back({"events.csv", events_csv(observations_on_one_clock(calibration), calibration.rig.heads)});
+  outcome.files.push_back({"path.csv", path_csv(calibration)});
+  return outcome;
 }
 
 }  // namespace alidade

@@ -49,6 +49,13 @@ class Package(unittest.TestCase):
               for name, file in (("library", camera), ("command", self.folder / "result" / "camera.yaml"))}
         self.assertAlmostEqual(fx["library"], fx["command"], places=2, msg="the library and the command say the same")
 
+    def test_python_module_stands_alone(self):
+        module = self.prefix / "lib" / "python3" / "dist-packages"
+        if not (module / "alidade").is_dir():
+            self.skipTest("the module was not built")
+        run("/usr/bin/python3", "-W", "error", "-c", "import alidade as al; al.simulate.track(scenario='C')", cwd=self.folder,
+            env={**os.environ, "PYTHONPATH": str(module)})
+
     def test_pkg_config_links(self):
         environment = {**os.environ, "PKG_CONFIG_PATH": str(self.library.parent / "pkgconfig")}
         flags = run("pkg-config", "--cflags", "--libs", "alidade", env=environment).split()

@@ -36,7 +36,7 @@ Outcome tracked(const std::string& scenario, const std::function<void(TrackFault
   TrackScene scene = *track_scenario(scenario);
   fault(scene.faults);
   const std::vector<TargetObservation> observations = reproduce::observations_of(scene, seed);
-  const TrackConfig config;
+  const FollowConfig config;
   const TrackReport report = track_target(observations, scene.heads, config);
   Verdict verdict = track_verdict(report, observations, scene.heads, config);
   Outcome outcome;

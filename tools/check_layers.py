@@ -43,7 +43,10 @@ MAY_INCLUDE = {
 }
 # A room's public header and the job behind it, src/alidade/ROOM.h and .cpp, may include what the room may, and other
 # public headers; `files` is theirs who read and write, `alidade` all of them.
-FACES_OF = {"files": {"results"} | MAY_INCLUDE["results"], "alidade": set(), "public": set()}
+# A job whose room is called otherwise: the room that it is of.
+FACES_OF = {"identify": MAY_INCLUDE["servo"] | {"servo"}, "servo": MAY_INCLUDE["loop"] | {"loop"},
+            "project": FOUNDATIONS | SENSORS | {"track"},  # how well rays meet stands there
+            "files": {"results"} | MAY_INCLUDE["results"], "alidade": set(), "public": set()}
 TESTS_MAY_ALSO = {"testing", "simulate", "detect", "results"} | FILES
 INCLUDE = re.compile(r'#include "alidade/(\w+)/')
 # A public header speaks Eigen and std: these cost seconds in every file that sees them.

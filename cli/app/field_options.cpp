@@ -24,6 +24,14 @@ CLI::Option* add_option(CLI::App& command, const Field& field, const std::string
     };
     return command.add_option_function<std::vector<std::string>>(name, take, field.help)->delimiter(',');
   }
+  if (field.num_words > 1) {
+    const auto take = [field, name](const std::vector<std::string>& words) {
+      std::string text;
+      for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
+      set_or_throw(field, name, text);
+    };
+    return command.add_option_function<std::vector<std::string>>(name, take, field.help)->expected(field.num_words);
+  }
   return command.add_option_function<std::string>(
       name, [field, name](const std::string& text) { set_or_throw(field, name, text); }, field.help);
 }

@@ -63,7 +63,7 @@ TEST_F(TrackCommand, GivesThePathWithTheNamesOfTheContract) {
     EXPECT_LT(estimate["nees_per_dof"], 1.8) << method;
     EXPECT_GT(estimate["pcrlb_m"], 0.001) << method;
     const Json& steps = document["data"]["steps"];
-    EXPECT_EQ(steps["t_s"].size(), steps["target_in_base_x_m"].size());
+    EXPECT_EQ(steps["t_s"].size(), steps["target_in_world_x_m"].size());
     EXPECT_EQ(document["data"]["measurements"]["accepted"].size(), document["counts"]["given"]);
   }
   const Csv rows = Csv::read(path("out/track.csv"));

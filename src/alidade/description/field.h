@@ -39,6 +39,7 @@ struct Field {
   std::vector<std::string> old_options{};  ///< Earlier names of the option, which stay accepted.
   std::string group = {};                  ///< Heading in help.
   bool is_required = false;
+  int num_words = 1;  ///< Of a TextCode on the command line, told by blanks: 3 of "--gravity 0 9.81 0".
 };
 using FieldList = std::vector<Field>;
 

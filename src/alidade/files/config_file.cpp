@@ -18,6 +18,12 @@ void take_value(const Field& field, const YAML::Node& node, const std::string& f
     }
   };
   const bool is_list = std::holds_alternative<std::vector<std::string>*>(field.value);
+  if (field.num_words > 1 && node.IsSequence()) {
+    std::string text;
+    for (const YAML::Node& word : node) text += (text.empty() ? "" : " ") + word.as<std::string>("");
+    if (const std::string fault = set_field(field, text); !fault.empty()) detail::refuse(file, field.name, fault);
+    return;
+  }
   if (!is_list || !node.IsSequence()) return take(node, true);
   for (std::size_t i = 0; i < node.size(); ++i) take(node[i], i == 0);
 }

@@ -5,8 +5,10 @@
 #include <string>
 
 #include "alidade/pantilt/rig.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Text of rig.yaml: heads with their cameras (`camera_files`, one a head, as written; none: inline), mounting,
 /// encoders, and the covariance where it is known.
@@ -17,4 +19,5 @@ namespace alidade {
 /// looks like degrees, two heads of one id, something that is no covariance. A head's `intrinsics` is read along.
 [[nodiscard]] Rig read_rig(const std::filesystem::path& file);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

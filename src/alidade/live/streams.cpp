@@ -7,7 +7,7 @@
 #include "alidade/live/foxglove.h"
 #include "alidade/results/localize_document.h"
 #include "alidade/results/observe_document.h"
-#include "alidade/results/servo_document.h"
+#include "alidade/results/servo_outcome.h"
 #include "alidade/results/track_document.h"
 
 namespace alidade::live {

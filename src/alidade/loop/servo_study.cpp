@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "alidade/servo/axis_settling.h"
+#include "alidade/servo/head_servo.h"
 
 namespace alidade {
 namespace {
@@ -178,6 +179,7 @@ ServoStudy study_servo(const ServoScenario& scenario, std::uint64_t first_seed, 
   ServoStudy study;
   study.loops = check_loops(scenario);
   if (!std::ranges::all_of(study.loops, [](const LoopCheck& loop) { return loop.analysis.is_stable(); })) return study;
+  study.status = ServoStudy::Status::compared;
   const auto num_seeds = static_cast<std::size_t>(scenario.num_seeds);
   ServoConfig config = scenario.config;
   for (const ControllerKind kind : scenario.controllers) {

@@ -6,11 +6,13 @@
 
 #include "alidade/camera/camera.h"
 #include "alidade/geometry/rigid3.h"
+#include "alidade/public.h"
 
 // The general pan-tilt head; docs/maths/pan-tilt-heads.md. Angles at every interface are what the encoders READ, as
 // (pan, tilt) [rad]; the head itself stands at scale · (reading − zero). Pan > 0 turns left, tilt > 0 turns up.
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// How the readings of a head become angles of its axes: angle = scale · (reading + c cos reading + s sin reading −
 /// zero). c and s are what a disc that sits off its axis does: an error of one period a turn.
@@ -139,4 +141,5 @@ struct WorldRay {
 /// The two heads of Xiahou, Chen & Wu, 2015: no offsets, 0.50 m apart along x, f = 337.84 px, 320 × 240.
 [[nodiscard]] std::array<RigHead, 2> xiahou_rig();
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -5,10 +5,12 @@
 #include <vector>
 
 #include "alidade/camera/camera.h"
+#include "alidade/public.h"
 
 // A lens that zooms: intrinsics that change while a head works, told by an observer or by the truth.
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Intrinsics of a camera at one instant: fx, fy, cx, cy, and σ of each. [px]
 struct LensNow {
@@ -44,4 +46,5 @@ struct LensCourse {
   [[nodiscard]] LensNow at(double at_s) const;
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -1,12 +1,15 @@
 #pragma once
 
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "alidade/pantilt/head.h"
 #include "alidade/pantilt/target_observation.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// σ of a head's encoders beside its readings' noise, where a file gives it; NaN: not told, 0: exact.
 struct EncoderError {
@@ -27,4 +30,9 @@ struct Rig {
   std::vector<LensCourse> lens_courses;      ///< One a head, or none: of cameras that zoom.
 };
 
+/// What is wrong with a head or a rig that a program made, in one sentence; empty where nothing is.
+[[nodiscard]] std::string fault(const RigHead& rig_head);
+[[nodiscard]] std::string fault(const Rig& rig);
+
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -4,10 +4,12 @@
 #include <vector>
 
 #include "alidade/pantilt/rig.h"
+#include "alidade/public.h"
 
 // What is taken from a rig file is not exact: its errors, in a form that estimators can count.
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// At most so many directions of error are counted; see rig_uncertainty().
 inline constexpr int max_rig_errors = 32;
@@ -40,4 +42,5 @@ struct RigUncertainty {
                                                              const Eigen::Vector3d& velocity_in_world,
                                                              const std::optional<ObservationLens>& lens = {});
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

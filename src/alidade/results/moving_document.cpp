@@ -101,9 +101,9 @@ DataTable path_table(const MovingTargetReport& report) {
   }
   DataTable table{"path",
                   {{"t_s", rounded(columns[0], 6)},
-                   {"target_in_base_x_m", rounded(columns[1], 6)},
-                   {"target_in_base_y_m", rounded(columns[2], 6)},
-                   {"target_in_base_z_m", rounded(columns[3], 6)}}};
+                   {"target_in_world_x_m", rounded(columns[1], 6)},
+                   {"target_in_world_y_m", rounded(columns[2], 6)},
+                   {"target_in_world_z_m", rounded(columns[3], 6)}}};
   record_steps_kept(table, report.path.size(), "path.csv");
   return table;
 }

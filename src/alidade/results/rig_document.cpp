@@ -111,17 +111,17 @@ DataTable axes_table(const Rig& rig) {
         point_in_base = base_from_pan * head.pan_to_tilt_m;
         direction_in_base = base_from_pan * tilt_in_pan;
       }
-      const Eigen::Vector3d place = head.world_from_base * point_in_base;
-      const Eigen::Vector3d direction = head.world_from_base.rotation * direction_in_base;
+      const Eigen::Vector3d point_in_world = head.world_from_base * point_in_base;
+      const Eigen::Vector3d direction_in_world = head.world_from_base.rotation * direction_in_base;
       names.push_back((is_pan ? "pan " : "tilt ") + std::to_string(head.id));
       for (int k = 0; k < 3; ++k) {
-        columns[static_cast<std::size_t>(k)].push_back(place[k]);
-        columns[static_cast<std::size_t>(3 + k)].push_back(direction[k]);
+        columns[static_cast<std::size_t>(k)].push_back(point_in_world[k]);
+        columns[static_cast<std::size_t>(3 + k)].push_back(direction_in_world[k]);
       }
     }
   }
   static constexpr std::array<const char*, 6> column_names{
-      "point_in_base_x_m", "point_in_base_y_m", "point_in_base_z_m", "direction_x", "direction_y", "direction_z"};
+      "point_in_world_x_m", "point_in_world_y_m", "point_in_world_z_m", "direction_x", "direction_y", "direction_z"};
   DataTable table{"axes", {{"name", names}}};
   for (std::size_t k = 0; k < columns.size(); ++k)
     table.columns.emplace_back(column_names[k], rounded(std::move(columns[k]), 6));

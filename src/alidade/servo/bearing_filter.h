@@ -5,8 +5,10 @@
 #include <optional>
 
 #include "alidade/estimation/belief.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 inline constexpr std::size_t num_agilities = 5;
 
@@ -86,4 +88,5 @@ class BearingFilter {
   double newest_s_ = 0.0, usual_gap_s_ = 0.0;
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <array>
 #include <optional>
-#include <string_view>
 
 #include "alidade/pantilt/head.h"
 #include "alidade/pantilt/lens_course.h"
@@ -27,9 +26,6 @@ struct HeadServoInput {
   std::optional<HeadObservation>
       observation;  ///< Of the image that arrived since the last step, if the target is in it.
 };
-
-enum class ServoEvent { none, waiting, started, gated, jumped, lost, searching, found };
-[[nodiscard]] std::string_view servo_event_name(ServoEvent event);
 
 struct HeadServoOutput {
   Eigen::Vector2d command = Eigen::Vector2d::Zero();        ///< (pan, tilt), in the plants' units of command.

@@ -27,10 +27,10 @@ struct Trial {
 };
 
 /// How the observations fare, the target being as manoeuvring as suits them best.
-Trial tried(const Observations& observations, std::span<const RigHead> heads, const TrackConfig& config) {
+Trial tried(const Observations& observations, std::span<const RigHead> heads, const FollowConfig& config) {
   constexpr double min_used = 0.9, nis_that_fits = 1.7, max_restarts = 0.01;
   Trial best;
-  TrackConfig plain = config;
+  FollowConfig plain = config;
   plain.judge = plain.find_sigma_a = false;
   for (const double sigma_a : {0.1, 1.0, 8.0}) {
     plain.tracker.sigma_a_m_s2 = config.find_sigma_a ? sigma_a : config.tracker.sigma_a_m_s2;
@@ -106,7 +106,7 @@ std::vector<Hypothesis> hypotheses(std::span<const RigHead> heads) {
 
 /// Of three heads or more the one without which the others' observations fit.
 std::optional<Explanation> foreign_head(const Observations& observations, std::span<const RigHead> heads,
-                                        const TrackConfig& config) {
+                                        const FollowConfig& config) {
   std::optional<Explanation> found;
   for (std::size_t head = 0; heads.size() > 2 && head < heads.size(); ++head) {
     Observations others = observations;
@@ -132,7 +132,7 @@ std::string clock_text(const ClockShift& shift, std::span<const RigHead> heads) 
 }
 
 std::optional<Explanation> explanation_of(std::span<const TargetObservation> observations,
-                                          std::span<const RigHead> heads, const TrackConfig& config) {
+                                          std::span<const RigHead> heads, const FollowConfig& config) {
   constexpr std::size_t max_observations = 1200, first_observations = 160;
   constexpr double min_gain = 30.0, clear = 15.0;
   Observations given = with_shift(observations.first(std::min(observations.size(), max_observations)), {});

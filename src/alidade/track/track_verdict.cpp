@@ -41,7 +41,7 @@ struct PairCounts {
 };
 
 PairCounts count_pairs(std::span<const TargetObservation> given, std::span<const RigHead> heads,
-                       const TrackConfig& config) {
+                       const FollowConfig& config) {
   PairCounts counts;
   Observations observations(given.begin(), given.end());
   std::ranges::stable_sort(observations, {}, &TargetObservation::t_capture_s);
@@ -59,14 +59,14 @@ PairCounts count_pairs(std::span<const TargetObservation> given, std::span<const
 }
 
 bool are_parallel(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                  const TrackConfig& config) {
+                  const FollowConfig& config) {
   const PairCounts counts = count_pairs(observations, heads, config);
   return 2 * counts.parallel > counts.together;
 }
 
 /// Why no track began although there were two heads at a time.
 Fault why_no_start(std::span<const TargetObservation> given, std::span<const RigHead> heads,
-                   const TrackConfig& config) {
+                   const FollowConfig& config) {
   const auto [together, parallel] = count_pairs(given, heads, config);
   if (together == 0)
     return {
@@ -229,7 +229,7 @@ void add_checks(const TrackReport& report, Verdict& verdict) {
 
 /// Observations that were left out and follow a path of their own.
 std::optional<Check> second_target(const TrackReport& report, std::span<const TargetObservation> observations,
-                                   std::span<const RigHead> heads, const TrackConfig& config) {
+                                   std::span<const RigHead> heads, const FollowConfig& config) {
   constexpr std::size_t least = 16;
   constexpr double min_share = 0.7;
   Observations others;
@@ -237,7 +237,7 @@ std::optional<Check> second_target(const TrackReport& report, std::span<const Ta
     if (report.steps[i].event == TrackEvent::gated || report.steps[i].event == TrackEvent::depth)
       others.push_back(observations[i]);
   if (others.size() < least) return std::nullopt;
-  TrackConfig plain = config;
+  FollowConfig plain = config;
   plain.judge = false;
   const TrackReport second = track_target(with_shift(others, {}), heads, plain);
   if (second.num_starts == 0 || used_share(second) < min_share || second.num_restarts * 20 > others.size())
@@ -256,8 +256,8 @@ struct Causes {
 };
 
 Causes causes_of(const TrackReport& report, std::span<const TargetObservation> observations,
-                 std::span<const RigHead> heads, const TrackConfig& config) {
-  TrackConfig found = config;
+                 std::span<const RigHead> heads, const FollowConfig& config) {
+  FollowConfig found = config;
   if (report.num_starts > 0) found.tracker.sigma_a_m_s2 = report.sigma_a_m_s2;
   Causes causes;
   if (!fits(report) || report.nis_per_dof > good_nis_high || used_share(report) < 1.0 - care_left_out)
@@ -274,7 +274,7 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
 /// Why there is no track to be told of.
 std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes,
                                 std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                                const TrackConfig& config) {
+                                const FollowConfig& config) {
   // Where nothing moves against the heads, many a mistake would make the rays meet: that explains nothing.
   if (report.num_starts == 0 && are_parallel(observations, heads, config))
     return why_no_start(observations, heads, config);
@@ -308,7 +308,7 @@ std::string sentence_of(const TrackReport& report, const Verdict& verdict) {
 }  // namespace
 
 Verdict track_verdict(const TrackReport& report, std::span<const TargetObservation> observations,
-                      std::span<const RigHead> heads, const TrackConfig& config) {
+                      std::span<const RigHead> heads, const FollowConfig& config) {
   std::set<std::size_t> seen_by;
   for (const TargetObservation& observation : observations) seen_by.insert(observation.head);
   if (seen_by.size() < 2)

@@ -1,4 +1,4 @@
-#include "alidade/results/servo_document.h"
+#include "alidade/results/servo_outcome.h"
 
 #include <fmt/format.h>
 
@@ -168,11 +168,7 @@ DataGrid robustness_grid(const ServoRobustness& robustness) {
   return grid;
 }
 
-}  // namespace
-
 void fill_servo(const ServoScenario& scenario, const ServoStudy& study, ResultDocument& document) {
-  document.counts.given = study.trials.size();
-  document.counts.used = study.trials.size();
   JsonValue& estimate = document.estimate;
   estimate["controllers"] = JsonValue::object();
   for (const ServoComparison& compared : study.comparison)
@@ -209,8 +205,7 @@ void fill_servo(const ServoScenario& scenario, const ServoStudy& study, ResultDo
   if (study.robustness) document.grids.push_back(robustness_grid(*study.robustness));
 }
 
-DataTable servo_row(std::span<const RigHead> heads, const ServoRow& row) { return control_table(heads, {&row, 1}); }
-
+/// Text of servo.csv: the first trial of every controller, a row per head and period.
 std::string servo_csv(const ServoScenario& scenario, const ServoStudy& study) {
   std::string text = "controller,t_s,head";
   for (std::size_t k = 0; k < num_columns; ++k) text += fmt::format(",{}", columns[k]);
@@ -224,6 +219,51 @@ std::string servo_csv(const ServoScenario& scenario, const ServoStudy& study) {
     }
   }
   return text;
+}
+
+void tell_controllers(const ServoStudy& study, std::vector<std::string>& lines) {
+  lines.push_back("controller    RMS px   95 % px   max px   central third   in picture");
+  for (const ServoComparison& compared : study.comparison) {
+    const ServoFigures& figures = compared.figures;
+    lines.push_back(fmt::format(
+        "{:<12} {:7.2f} {:9.2f} {:8.2f} {:13.1f} % {:10.1f} %{}", controller_name(compared.controller), figures.rms_px,
+        figures.p95_px, figures.max_px, 100.0 * figures.central_third, 100.0 * figures.in_image,
+        figures.num_lost > 0 ? fmt::format("   lost {}, found {}, {:.1f} s of search", figures.num_lost,
+                                           figures.num_found, figures.search_s)
+                             : ""));
+  }
+}
+
+/// The best controller by the intrinsics that its loop goes by.
+void tell_lenses(const ServoStudy& study, std::vector<std::string>& lines) {
+  if (study.lenses.empty()) return;
+  lines.push_back(fmt::format("intrinsics    RMS px   95 % px   max px   in picture   fx off by   ({})",
+                              controller_name(study.best)));
+  for (const LensComparison& compared : study.lenses) {
+    const ServoFigures& figures = compared.figures;
+    lines.push_back(fmt::format("{:<12} {:7.2f} {:9.2f} {:8.2f} {:10.1f} % {:9.2g} %",
+                                lens_knowledge_name(compared.knowledge), figures.rms_px, figures.p95_px, figures.max_px,
+                                100.0 * figures.in_image, 100.0 * figures.focal_share));
+  }
+}
+
+}  // namespace
+
+DataTable servo_row(std::span<const RigHead> heads, const ServoRow& row) { return control_table(heads, {&row, 1}); }
+
+JobOutcome outcome_of(const ServoResult& result) {
+  JobOutcome outcome;
+  outcome.document.command = "servo";
+  outcome.document.seed = result.seed;
+  outcome.document.counts = result.counts;
+  outcome.document.assumed = result.assumed;
+  outcome.document.verdict = result.verdict;
+  fill_servo(result.scenario, result, outcome.document);
+  tell_controllers(result, outcome.lines);
+  tell_lenses(result, outcome.lines);
+  if (tells_an_estimate(static_cast<int>(result.verdict.exit_code)))
+    outcome.files.push_back({"servo.csv", servo_csv(result.scenario, result)});
+  return outcome;
 }
 
 }  // namespace alidade

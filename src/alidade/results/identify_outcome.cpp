@@ -1,18 +1,22 @@
-#include "alidade/results/identify_document.h"
+#include "alidade/results/identify_outcome.h"
+
+#include <fmt/format.h>
 
 #include <cmath>
+#include <span>
 
 #include "alidade/geometry/degree.h"
 #include "alidade/report/thin.h"
 #include "alidade/results/thin_tables.h"
-#include "alidade/servo/identify_causes.h"
+#include "alidade/tables/servo_log_file.h"
 
 namespace alidade {
 namespace {
 
 using Numbers = std::vector<double>;
 
-void fill_table(std::span<const ServoSample> log, const ServoIdentification& identified, ResultDocument& document) {
+void fill_response(const Identification& identified, ResultDocument& document) {
+  const std::vector<ServoSample>& log = identified.log;
   Numbers t, command, measured, model, residual;
   for (const std::size_t at : report::thinned_rows(log.size(), {identified.residual_rad}, {}, report::max_step_rows)) {
     t.push_back(log[at].t_s);
@@ -31,35 +35,16 @@ void fill_table(std::span<const ServoSample> log, const ServoIdentification& ide
 }
 
 /// What was freed beside a lag, and the encoder's own step.
-void fill_flaws(std::span<const ServoSample> log, const ServoFit& fit, ResultDocument& document) {
+void fill_flaws(const Identification& identified, ResultDocument& document) {
+  const ServoFit& fit = identified.fit;
   for (const std::size_t flaw : fit.freed) {
     document.estimate[servo_flaw_names[flaw]] = fit.flaws.*servo_flaws[flaw];
     document.stddev[servo_flaw_names[flaw]] = fit.is_observable ? fit.flaw_sigma[flaw] : std::nan("");
   }
-  document.estimate["encoder_step_rad"] = encoder_step_rad(log);
+  document.estimate["encoder_step_rad"] = identified.encoder_step_rad;
 }
 
-void fill_assumed(const ServoIdentification& identified, ResultDocument& document) {
-  const double gain = identified.fit.params[0], sigma = std::sqrt(identified.fit.cov(0, 0));
-  // By definition: angles are the encoder's own radians, times the log's own seconds.
-  document.assumed = {{.name = "encoder_scale", .value = 1.0, .sigma = 0.0, .moved = "gain_rad"},
-                      {.name = "clock_rate", .value = 1.0, .sigma = 0.0, .moved = "tau_s"}};
-  for (const HiddenFlaw& hidden : identified.hidden)
-    document.assumed.push_back({.name = servo_flaw_names[hidden.flaw],
-                                .value = servo_flaws[hidden.flaw] == &ServoFlaws::max_rate_rad_s ? std::nan("") : 0.0,
-                                .ordinary = hidden.size,
-                                .moves = std::abs(hidden.gain_factor - 1.0) * std::abs(gain) / sigma,
-                                .moved = "gain_rad",
-                                .moved_by = (hidden.gain_factor - 1.0) * gain,
-                                .remedy = "log steps of several sizes to both sides, or a chirp"});
-}
-
-}  // namespace
-
-void fill_identification(std::span<const ServoSample> log, const ServoIdentification& identified,
-                         ResultDocument& document) {
-  document.counts.given += log.size();
-  document.counts.used = log.size();
+void fill_identification(const Identification& identified, ResultDocument& document) {
   if (identified.residual_rad.empty()) return;
   const ServoFit& fit = identified.fit;
   JsonValue &estimate = document.estimate, &stddev = document.stddev;
@@ -78,8 +63,7 @@ void fill_identification(std::span<const ServoSample> log, const ServoIdentifica
   put("latency_s", 2, 1.0);
   put("zero_rad", 3, 1.0);
   put("start_rad", 4, 1.0);
-  fill_flaws(log, fit, document);
-  fill_assumed(identified, document);
+  fill_flaws(identified, document);
   estimate["design_effect"] = identified.clusters.design_effect;
   estimate["correlated_rows"] = identified.correlated_rows;
   estimate["rms_rad"] = fit.rms_rad;
@@ -90,7 +74,41 @@ void fill_identification(std::span<const ServoSample> log, const ServoIdentifica
     for (int i = 0; i < num_servo_params; ++i)
       for (int j = i; j < num_servo_params; ++j) document.covariance_upper.push_back(fit.cov(i, j));
   }
-  fill_table(log, identified, document);
+  fill_response(identified, document);
+}
+
+void tell_plant(const ServoIdentification& identified, std::vector<std::string>& lines) {
+  const ServoFit& fit = identified.fit;
+  const ServoParams sigma = fit.cov.diagonal().cwiseSqrt();
+  const bool is_angle = fit.kind == ServoKind::angle;
+  constexpr double deg = 1.0 / degree;
+  const std::string per = is_angle ? "" : "/s";
+  lines.push_back(fmt::format("{} plant   (3σ)", is_angle ? "angle" : "rate"));
+  lines.push_back(fmt::format("gain      {:.6g} ± {:.2g} rad{} per unit = {:.6g} ± {:.2g} deg{}", fit.params[0],
+                              3.0 * sigma[0], per, fit.params[0] * deg, 3.0 * sigma[0] * deg, per));
+  lines.push_back(fmt::format("tau       {:.6g} ± {:.2g} s", fit.params[1], 3.0 * sigma[1]));
+  lines.push_back(fmt::format("latency   {:.6g} ± {:.2g} s", fit.params[2], 3.0 * sigma[2]));
+  for (const std::size_t flaw : fit.freed)
+    lines.push_back(fmt::format("{} {:.6g} ± {:.2g} {}", servo_flaw_words[flaw], fit.flaws.*servo_flaws[flaw],
+                                3.0 * fit.flaw_sigma[flaw], servo_flaw_units[flaw]));
+  lines.push_back(fmt::format("residuals {:.3g}° RMS, correlation {:.2f}; as {} plant {:.3g}°", fit.rms_rad * deg,
+                              identified.lag_one_correlation, is_angle ? "a rate" : "an angle",
+                              identified.other.rms_rad * deg));
+}
+
+}  // namespace
+
+JobOutcome outcome_of(const Identification& identification) {
+  JobOutcome outcome;
+  outcome.document.command = "identify";
+  outcome.document.counts = identification.counts;
+  outcome.document.assumed = identification.assumed;
+  outcome.document.verdict = identification.verdict;
+  fill_identification(identification, outcome.document);
+  if (!tells_an_estimate(static_cast<int>(identification.verdict.exit_code))) return outcome;
+  tell_plant(identification, outcome.lines);
+  outcome.files.push_back({"servo.yaml", servo_plant_text(identification.fit)});
+  return outcome;
 }
 
 }  // namespace alidade

@@ -29,6 +29,7 @@ MAY_INCLUDE = {
     "matching": FOUNDATIONS | {"imaging"},
     "simulate": FOUNDATIONS | SENSORS,
     **{estimator: FOUNDATIONS | SENSORS for estimator in ESTIMATORS},
+    "turned": FOUNDATIONS | SENSORS | {"observe"},  # what photos of a rotating camera tell is an observation
     **{composition: FOUNDATIONS | SENSORS | ESTIMATORS | {"simulate"} for composition in COMPOSITIONS},
     "reproduce": JOBS,
     "report": JOBS,

@@ -56,6 +56,18 @@ class Package(unittest.TestCase):
         run("/usr/bin/python3", "-W", "error", "-c", "import alidade as al; al.simulate.track(scenario='C')", cwd=self.folder,
             env={**os.environ, "PYTHONPATH": str(module)})
 
+    def test_the_observe_example_leaves_what_the_command_leaves(self):
+        outside, alidade, log = self.folder / "examples", self.prefix / "bin" / "alidade", self.folder / "rotation"
+        run("cmake", "-S", ROOT / "examples", "-B", outside, f"-DCMAKE_PREFIX_PATH={self.prefix}")
+        run("cmake", "--build", outside, "--target", "02_observe")
+        run(alidade, "simulate", "rotation", "--duration", "6", "--out", log, "--quiet")
+        said = run(outside / "02_observe", log / "log.csv", "780", "582", self.folder / "observed")
+        self.assertIn("start", said)
+        run(alidade, "observe", log / "log.csv", "--size", "780x582", "--out", self.folder / "observe", "--quiet")
+        for name in ("camera.yaml", "intrinsics.csv"):
+            texts = {(self.folder / folder / name).read_text() for folder in ("observed", "observe")}
+            self.assertEqual(len(texts), 1, f"{name}: the library and the command leave the same")
+
     def test_pkg_config_links(self):
         environment = {**os.environ, "PKG_CONFIG_PATH": str(self.library.parent / "pkgconfig")}
         flags = run("pkg-config", "--cflags", "--libs", "alidade", env=environment).split()

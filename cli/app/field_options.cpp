@@ -32,6 +32,16 @@ CLI::Option* add_option(CLI::App& command, const Field& field, const std::string
     };
     return command.add_option_function<std::vector<std::string>>(name, take, field.help)->expected(field.num_words);
   }
+  if (const auto* code = std::get_if<TextCode>(&field.value); code && code->num_parts > 1) {
+    const auto take = [field, name](const std::vector<std::string>& parts) {
+      std::string text;
+      for (const std::string& part : parts) text += (text.empty() ? "" : ",") + part;
+      set_or_throw(field, name, text);
+    };
+    return command.add_option_function<std::vector<std::string>>(name, take, field.help)
+        ->delimiter(',')
+        ->expected(code->num_parts);
+  }
   return command.add_option_function<std::string>(
       name, [field, name](const std::string& text) { set_or_throw(field, name, text); }, field.help);
 }

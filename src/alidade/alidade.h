@@ -3,4 +3,5 @@
 /// Every public header: one for each room, and files.
 #include "alidade/calibrate.h"
 #include "alidade/files.h"
+#include "alidade/observe.h"
 #include "alidade/track.h"

@@ -316,28 +316,23 @@ void LocalizeStream::show(Server& server, const PathStep& step, bool is_last) co
 
 std::vector<Topic> ObserveStream::topics() const {
   std::vector<Topic> topics = common_topics();
-  const TrueIntrinsics truth{};  // rows have it where the log has
-  topics.push_back(row_topic("/observe", "alidade.ObserveStep", observe_row(0.0, {}, {}, &truth)));
+  ObserveStep row;
+  row.truth = TrueIntrinsics{};  // rows have it where the log has
+  topics.push_back(row_topic("/observe", "alidade.ObserveStep", observe_row(row)));
   topics.push_back({foxglove_channel("/tf", FoxgloveType::frame_transforms), TopicKind::images, 60.0, 1});
   topics.push_back(latest("/head1/camera", FoxgloveType::camera_calibration, 10.0));
   return topics;
 }
 
-void ObserveStream::show(Server& server, double t_s, const IntrinsicsEstimate& estimate, const RotationFrame& frame,
-                         const TrueIntrinsics* truth, bool is_last) const {
-  const std::int64_t t_ns = ns_of(t_s);
-  RotationFrame copy = frame;
-  copy.px = {};  // points into the row
+void ObserveStream::show(Server& server, const ObserveStep& step, bool is_last) const {
+  const std::int64_t t_ns = ns_of(step.t_s);
+  const IntrinsicsEstimate& estimate = step.estimate;
   server.send(
-      "/observe", t_ns,
-      [t_s, estimate, copy, truth = truth != nullptr ? std::optional(*truth) : std::nullopt] {
-        return row_text(observe_row(t_s, estimate, copy, truth ? &*truth : nullptr));
-      },
-      0, is_last);
+      "/observe", t_ns, [step] { return row_text(observe_row(step)); }, 0, is_last);
   server.send(
       "/tf", t_ns,
-      [t_ns, copy] {
-        const FrameTransform transform{"world", "head1", {copy.cam_from_start.conjugate(), Eigen::Vector3d::Zero()}};
+      [t_ns, start_from_cam = step.start_from_cam] {
+        const FrameTransform transform{"world", "head1", {start_from_cam, Eigen::Vector3d::Zero()}};
         return frame_transforms_text(t_ns, {&transform, 1});
       },
       0, is_last);

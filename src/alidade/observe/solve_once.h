@@ -1,11 +1,11 @@
 #pragma once
 
-#include "alidade/observe/observe.h"
+#include "alidade/observe/solve.h"
 
 namespace alidade {
 
 /// One run over one log with the errors of its rotation that are estimated; `undone`: what the log is free of already.
-[[nodiscard]] ObserveReport observe_once(const RotationLog& log, const ObserveConfig& config,
+[[nodiscard]] ObserveSolution solve_once(const RotationLog& log, const ObserveSetup& config,
                                          const std::vector<RotationError>& errors, const RotationErrors& undone,
                                          const Progress& progress);
 
@@ -14,10 +14,10 @@ void add_turns(const RotationLog& log, const std::vector<RotationError>& errors,
                std::vector<RotationFrame>& frames);
 
 /// How the bundle of a log is adjusted.
-[[nodiscard]] AdjustConfig adjust_config_of(const RotationLog& log, const ObserveConfig& config,
+[[nodiscard]] AdjustConfig adjust_config_of(const RotationLog& log, const ObserveSetup& config,
                                             const RotatingCamera& start, const PixelScale& scale);
 
 /// Does the bound of the reference allow an answer at all?
-[[nodiscard]] bool is_observable(const ObserveReport& report, const CommonMatrix& bound);
+[[nodiscard]] bool is_observable(const ObserveSolution& report, const CommonMatrix& bound);
 
 }  // namespace alidade

@@ -1,4 +1,4 @@
-#include "alidade/observe/observe.h"
+#include "alidade/observe/solve.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -8,7 +8,7 @@
 #include "alidade/observe/fang_observer.h"
 #include "alidade/observe/flow_filter.h"
 #include "alidade/observe/hybrid.h"
-#include "alidade/observe/observe_once.h"
+#include "alidade/observe/solve_once.h"
 #include "alidade/observe/steadiness.h"
 
 namespace alidade {
@@ -25,24 +25,24 @@ constexpr std::size_t max_cells = 4000000;
 /// One run over one log: frames, scale and start made once, then a method, then the reference.
 class Observation {
  public:
-  Observation(const RotationLog& log, const ObserveConfig& config, const std::vector<RotationError>& errors,
+  Observation(const RotationLog& log, const ObserveSetup& config, const std::vector<RotationError>& errors,
               const RotationErrors& undone, const Progress& progress)
       : log_(log), config_(config), errors_(errors), progress_(progress) {
     report_.width_px = config.width_px;
     report_.height_px = config.height_px;
     report_.scale = pixel_scale(log, report_.width_px, report_.height_px);
-    report_.sigma_is_told = !(config.sigma_px > 0.0);
+    report_.sigma_is_estimated = !config.sigma_px;
     report_.steps.resize(log.rows.size());
     config_.width_px = report_.width_px;
     config_.height_px = report_.height_px;
-    config_.estimate.errors = static_cast<int>(errors.size());
+    config_.nuisances.errors = static_cast<int>(errors.size());
     start_ = start_camera(config_, report_.scale);
     start_.errors = RotationErrors::Zero(static_cast<Eigen::Index>(errors.size()));
     start_.undone = undone;
     if (!log.rows.empty()) start_.drift_from_s = log.rows.back().t_s;
   }
 
-  ObserveReport run() {
+  ObserveSolution run() {
     make_frames();
     if (!enough_to_begin()) return std::move(report_);
     switch (config_.rotation == RotationKnowledge::known ? config_.method : ObserveMethod::batch) {
@@ -130,7 +130,7 @@ class Observation {
     report_.reference_until_s = rest.until_s;
     final_ = observer.filter().camera();
     const double noise = observer.sigma_px() / report_.scale.scale;
-    const double ratio = config_.sigma_px > 0.0 ? 1.0 : std::pow(noise / observer.filter_sigma_px(), 2);
+    const double ratio = config_.sigma_px ? 1.0 : std::pow(noise / observer.filter_sigma_px(), 2);
     final_cov_ = ratio * observer.filter().covariance();
     has_final_ = true;
     set_values(report_.steps.back(), final_, frames_.back().t_s);
@@ -213,7 +213,7 @@ class Observation {
     flow.num_points = log_.num_points;
     flow.scale = report_.scale;
     flow.start = start_px();
-    if (config_.sigma_px > 0.0) flow.sigma_px = config_.sigma_px;
+    if (config_.sigma_px) flow.sigma_px = *config_.sigma_px;
     FlowFilter observer(flow);
     run_regression(observer);
   }
@@ -223,10 +223,8 @@ class Observation {
     fang.num_points = log_.num_points;
     fang.scale = report_.scale;
     fang.start = start_px();
-    fang.profile = config_.profile == "fast"    ? FangProfile::fast
-                   : config_.profile == "quiet" ? FangProfile::quiet
-                                                : FangProfile::kalman;
-    if (config_.sigma_px > 0.0) fang.sigma_px = config_.sigma_px;
+    fang.profile = config_.profile;
+    if (config_.sigma_px) fang.sigma_px = *config_.sigma_px;
     fang.roll_columns = log_.source != RotationSource::rate || log_.has_roll_rate;
     FangObserver observer(fang);
     run_regression(observer);
@@ -254,7 +252,7 @@ class Observation {
     }
     report_.reference = adjust(buffer, config, progress_);
     if (!report_.reference.has_value) return;
-    report_.pixels_left_out = report_.reference.num_left_out;
+    report_.pixels_rejected = report_.reference.num_left_out;
     if (config_.rotation == RotationKnowledge::known) {
       report_.jitter = turn_jitter(report_.reference);
       report_.stated = stated_covariance(report_.reference, config.nuisances);
@@ -279,15 +277,15 @@ class Observation {
 
   void conclude() {
     if (is_unsteady()) {
-      report_.status = ObserveReport::Status::unsteady;
+      report_.status = ObserveSolution::Status::unsteady;
       return;
     }
     if (!has_final_ || !report_.reference.has_value) {
-      report_.status = ObserveReport::Status::no_convergence;
+      report_.status = ObserveSolution::Status::no_convergence;
       if (!report_.reference.has_value) return;
     }
     const bool regression = config_.method == ObserveMethod::flow || config_.method == ObserveMethod::fang2011;
-    ObserveNuisances nuisances = config_.estimate;
+    ObserveNuisances nuisances = config_.nuisances;
     if (regression && config_.rotation == RotationKnowledge::known) nuisances = {};
     const CommonLayout layout(nuisances);
     if (layout.errors >= 0) {
@@ -303,12 +301,13 @@ class Observation {
     list_quantities(layout, bound);
     if (has_final_) state_steps();
     if (!has_final_) return;
-    report_.status = is_observable(report_, bound) ? ObserveReport::Status::ok : ObserveReport::Status::unobservable;
+    report_.status =
+        is_observable(report_, bound) ? ObserveSolution::Status::ok : ObserveSolution::Status::unobservable;
   }
 
   /// The last row, and where all rows are one answer all of them, have the stated σ.
   void state_steps() {
-    const CommonLayout layout(model_cov_.rows() == 4 ? ObserveNuisances{} : config_.estimate);
+    const CommonLayout layout(model_cov_.rows() == 4 ? ObserveNuisances{} : config_.nuisances);
     const bool is_one = config_.method == ObserveMethod::batch || config_.rotation != RotationKnowledge::known;
     for (std::size_t k = is_one ? 0 : report_.steps.size() - 1; k < report_.steps.size(); ++k) {
       report_.steps[k].sigma =
@@ -370,10 +369,10 @@ class Observation {
   }
 
   const RotationLog& log_;
-  ObserveConfig config_;
+  ObserveSetup config_;
   const std::vector<RotationError>& errors_;
   const Progress& progress_;
-  ObserveReport report_;
+  ObserveSolution report_;
   std::vector<RotationFrame> frames_;
   bool free_started_ = false, has_final_ = false;
   RotatingCamera start_, final_;
@@ -382,9 +381,8 @@ class Observation {
 
 }  // namespace
 
-ObserveReport observe_once(const RotationLog& log, const ObserveConfig& config,
-                           const std::vector<RotationError>& errors, const RotationErrors& undone,
-                           const Progress& progress) {
+ObserveSolution solve_once(const RotationLog& log, const ObserveSetup& config, const std::vector<RotationError>& errors,
+                           const RotationErrors& undone, const Progress& progress) {
   return Observation(log, config, errors, undone, progress).run();
 }
 

@@ -9,9 +9,9 @@ namespace {
 constexpr int max_rounds = 6;
 
 /// Frees what the cause names, "k1,k2", "mount", "backlash". False: it cannot be estimated, or is already.
-bool free_cause(const std::string& cause, const RotationLog& log, ObserveConfig& config) {
+bool free_cause(const std::string& cause, const RotationLog& log, ObserveSetup& config) {
   const bool lens_is_given = config.lens_is_given;
-  ObserveNuisances& estimate = config.estimate;
+  ObserveNuisances& estimate = config.nuisances;
   const ObserveNuisances before = estimate;
   const std::size_t errors_before = estimated_errors(log, config).size();
   config.estimate_errors.push_back(cause);
@@ -21,15 +21,7 @@ bool free_cause(const std::string& cause, const RotationLog& log, ObserveConfig&
   for (std::string name; std::getline(names, name, ',');) {
     const bool is_of_lens = name.size() == 2 && (name[0] == 'k' || name[0] == 'p');
     if (is_of_lens && lens_is_given) return false;
-    if (name == "k1") estimate.k1 = true;
-    if (name == "k2") estimate.k2 = true;
-    if (name == "k3") estimate.k3 = true;
-    if (name == "p1" || name == "p2") estimate.tangential = true;
-    if (name == "mount") estimate.mount = true;
-    if (name == "delay") estimate.delay = true;
-    if (name == "lever") estimate.lever = true;
-    if (name == "rolling shutter") estimate.shutter = true;
-    if (name == "focal length that drifts") estimate.drift = true;
+    if (const auto nuisance = nuisance_of(estimate_word_of(name))) estimate.*nuisance = true;
   }
   // Higher terms without the lower ones are no lens that is made.
   estimate.k2 = estimate.k2 || (estimate.k3 && !lens_is_given);
@@ -39,7 +31,7 @@ bool free_cause(const std::string& cause, const RotationLog& log, ObserveConfig&
 
 /// The cause that explains the residuals best, of those that are asked for; of several that do nearly as well the one
 /// with the fewest numbers: what it leaves is asked for next. Null: none is.
-const CauseScore* best_cause(const ObserveReport& report) {
+const CauseScore* best_cause(const ObserveSolution& report) {
   constexpr double nearly = 0.9;
   const CauseScore* best = nullptr;
   for (const CauseScore& cause : report.causes) {
@@ -53,19 +45,19 @@ const CauseScore* best_cause(const ObserveReport& report) {
   return simplest;
 }
 
-bool is_answer(const ObserveReport& report) { return report.status == ObserveReport::Status::ok; }
+bool is_answer(const ObserveSolution& report) { return report.status == ObserveSolution::Status::ok; }
 
 /// Without an answer there may be one where the camera is mounted askew, late, and bends its image.
-ObserveReport second_chance(const RotationLog& log, ObserveConfig& config, const Progress& progress) {
-  ObserveConfig freer = config;
-  freer.estimate.mount = freer.estimate.delay = true;
-  if (!config.lens_is_given) freer.estimate.k1 = true;
-  ObserveReport report = observe_as_told(log, freer, progress);
+ObserveSolution second_chance(const RotationLog& log, ObserveSetup& config, const Progress& progress) {
+  ObserveSetup freer = config;
+  freer.nuisances.mount = freer.nuisances.delay = true;
+  if (!config.lens_is_given) freer.nuisances.k1 = true;
+  ObserveSolution report = solve_as_given(log, freer, progress);
   if (is_answer(report)) config = freer;
   return report;
 }
 
-bool has_zoom(const ObserveReport& report) {
+bool has_zoom(const ObserveSolution& report) {
   return std::any_of(report.events.begin(), report.events.end(), [](const ObserveNote& note) {
     return note.event == ObserveEvent::zoom || note.event == ObserveEvent::restart;
   });
@@ -74,14 +66,14 @@ bool has_zoom(const ObserveReport& report) {
 /// What is not modelled, and errors that last, may look like zooms, and each rest between them be explained by itself.
 /// Where all rows fit one camera nearly as well there was no zoom: theirs is the answer. Where they do not but are
 /// steady, what they ask for counts.
-void settle_zooms(const RotationLog& log, const ObserveConfig& config, const Progress& progress,
-                  ObserveReport& report) {
+void settle_zooms(const RotationLog& log, const ObserveSetup& config, const Progress& progress,
+                  ObserveSolution& report) {
   constexpr double nearly = 1.2;  // of the noise: a zoom that moves points by their σ raises it more
   const bool is_known = config.rotation == RotationKnowledge::known;
   if (!has_zoom(report) || !is_known || !is_answer(report) || config.method != ObserveMethod::hybrid) return;
-  ObserveConfig whole = config;
+  ObserveSetup whole = config;
   whole.method = ObserveMethod::batch;
-  ObserveReport all = observe_as_told(log, whole, progress);
+  ObserveSolution all = solve_as_given(log, whole, progress);
   if (!is_answer(all)) return;
   if (all.sigma_px < nearly * report.sigma_px || config.no_zoom) {
     const IntrinsicsEstimate last = all.steps.back();
@@ -118,7 +110,7 @@ struct Rival {
   double by_px = 0.0;  ///< How far the answers are from each other.
 };
 
-void note_rivals(const ObserveReport& report, const CauseScore& best, std::vector<Rival>& rivals) {
+void note_rivals(const ObserveSolution& report, const CauseScore& best, std::vector<Rival>& rivals) {
   constexpr double about_as_well = 10.0;  // of twice the log-likelihood: odds of 1 : 150
   constexpr double elsewhere = 3.0;       // σ
   const auto& quantities = report.quantities;
@@ -132,14 +124,14 @@ void note_rivals(const ObserveReport& report, const CauseScore& best, std::vecto
 }
 
 /// Of those that are not estimated in the end.
-std::vector<Check> rival_checks(const std::vector<Rival>& rivals, const RotationLog& log, const ObserveConfig& config) {
+std::vector<Check> rival_checks(const std::vector<Rival>& rivals, const RotationLog& log, const ObserveSetup& config) {
   std::vector<Check> checks;
   for (const Rival& rival : rivals) {
-    ObserveConfig freer = config;
+    ObserveSetup freer = config;
     if (!free_cause(rival.name, log, freer)) continue;
     checks.push_back({"told apart", State::care,
                       rival.freed + " explains the residuals, and " + rival.name +
-                          " would about as well: these pixels cannot tell them apart (fx, fy would differ by " +
+                          " would about as well: these pixels cannot distinguish them (fx, fy would differ by " +
                           text_of(rival.by_px, 2) + " px)",
                       rival.by_px, 0.0, "px", "residuals"});
   }
@@ -147,13 +139,13 @@ std::vector<Check> rival_checks(const std::vector<Rival>& rivals, const Rotation
 }
 
 /// Frees one cause after the other, the one that explains most first.
-void free_one_by_one(const RotationLog& log, const Progress& progress, ObserveConfig& config, ObserveReport& report,
+void free_one_by_one(const RotationLog& log, const Progress& progress, ObserveSetup& config, ObserveSolution& report,
                      std::vector<Rival>& rivals) {
   for (int round = 0; round < max_rounds && is_answer(report); ++round) {
     const CauseScore* cause = best_cause(report);
-    ObserveConfig next = config;
+    ObserveSetup next = config;
     if (cause == nullptr || zooms(*cause) || !free_cause(cause->name, log, next)) break;
-    ObserveReport freer = observe_as_told(log, next, progress);
+    ObserveSolution freer = solve_as_given(log, next, progress);
     if (!is_answer(freer)) break;
     note_rivals(report, *cause, rivals);
     report = std::move(freer);
@@ -163,7 +155,7 @@ void free_one_by_one(const RotationLog& log, const Progress& progress, ObserveCo
 }
 
 /// Residuals that are more than points' noise, or zooms, may be several causes at once.
-bool is_doubtful(const ObserveReport& report) {
+bool is_doubtful(const ObserveSolution& report) {
   constexpr double max_ordinary_px = 2.0, many = 9.0, vague = 0.005;
   if (!is_answer(report)) return true;
   return has_zoom(report) || report.sigma_px > max_ordinary_px || report.stated.blocks.design_effect > many ||
@@ -171,18 +163,18 @@ bool is_doubtful(const ObserveReport& report) {
 }
 
 /// Tries sets of causes from what the person told.
-bool search_causes(const RotationLog& log, const Progress& progress, ObserveConfig& config, ObserveReport& report) {
+bool search_causes(const RotationLog& log, const Progress& progress, ObserveSetup& config, ObserveSolution& report) {
   constexpr double clearly = 0.6, with_zoom = 3.0, max_px = 2.0;
   double max_px_here = max_px;
   if (is_answer(report)) max_px_here = std::min(max_px, (has_zoom(report) ? with_zoom : clearly) * report.sigma_px);
   const auto found = searched_causes(log, config, report, max_px_here, progress);
   if (!found) return false;
-  ObserveConfig freer = *found;
-  ObserveReport again = observe_as_told(log, freer, progress);
+  ObserveSetup freer = *found;
+  ObserveSolution again = solve_as_given(log, freer, progress);
   settle_zooms(log, freer, progress, again);
   if (!is_answer(again)) {
     freer.method = ObserveMethod::batch;
-    again = observe_as_told(log, freer, progress);
+    again = solve_as_given(log, freer, progress);
     freer.method = config.method;
   }
   if (!is_answer(again)) return false;
@@ -193,10 +185,10 @@ bool search_causes(const RotationLog& log, const Progress& progress, ObserveConf
 
 /// A zoom that never rests: it is asked for as a drift that is none, or the answer is vague, and no second stands
 /// still.
-bool never_rests(const RotationLog& log, const ObserveConfig& config, const ObserveReport& report,
+bool never_rests(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,
                  const Progress& progress) {
   constexpr double vague = 0.005, max_ordinary_px = 2.0;
-  if (report.status == ObserveReport::Status::no_convergence) return has_no_rest(log, config, report, progress);
+  if (report.status == ObserveSolution::Status::no_convergence) return has_no_rest(log, config, report, progress);
   if (!is_answer(report)) return false;
   const CauseScore* cause = best_cause(report);
   if (cause != nullptr && zooms(*cause)) return true;
@@ -208,16 +200,17 @@ bool never_rests(const RotationLog& log, const ObserveConfig& config, const Obse
 
 /// A filter is never worse than the adjustment of all rows: where it did not settle, or is off by more than its σ,
 /// theirs is the answer, and the report says so.
-void prefer_all_rows(const RotationLog& log, const ObserveConfig& config, const Progress& progress,
-                     ObserveReport& report) {
+void prefer_all_rows(const RotationLog& log, const ObserveSetup& config, const Progress& progress,
+                     ObserveSolution& report) {
   constexpr double max_off = 3.0;
   const bool is_filter = config.method == ObserveMethod::hybrid || config.method == ObserveMethod::window;
   if (!is_filter || config.rotation != RotationKnowledge::known) return;
-  if (report.status == ObserveReport::Status::unsteady || report.status == ObserveReport::Status::too_few_data) return;
+  if (report.status == ObserveSolution::Status::unsteady || report.status == ObserveSolution::Status::too_few_data)
+    return;
   if (is_answer(report) && !(report.from_reference > max_off)) return;
-  ObserveConfig whole = config;
+  ObserveSetup whole = config;
   whole.method = ObserveMethod::batch;
-  ObserveReport all = observe_as_told(log, whole, progress);
+  ObserveSolution all = solve_as_given(log, whole, progress);
   if (!is_answer(all)) return;
   const std::string why = is_answer(report)
                               ? "the filter ends " + text_of(report.from_reference, 2) + "σ from all rows together"
@@ -229,7 +222,7 @@ void prefer_all_rows(const RotationLog& log, const ObserveConfig& config, const 
 }
 
 /// What is estimated and yet rests on what instruments ordinarily have.
-void note_untold(const ObserveReport& report, const std::vector<RotationError>& errors,
+void note_untold(const ObserveSolution& report, const std::vector<RotationError>& errors,
                  std::vector<Check>& told_apart) {
   constexpr double hardly = 0.7;
   std::string names;
@@ -241,24 +234,24 @@ void note_untold(const ObserveReport& report, const std::vector<RotationError>& 
   }
   if (names.empty()) return;
   told_apart.push_back({"told", State::good,
-                        "the pixels hardly tell " + names + ": σ counts what such instruments ordinarily have", 0.0,
-                        0.0, "", "residuals"});
+                        "the pixels hardly determine " + names + ": σ counts what such instruments ordinarily have",
+                        0.0, 0.0, "", "residuals"});
 }
 
 /// Frees what the residuals ask for: sets of causes where the answer is doubtful, one after the other where not.
-void find_causes(const RotationLog& log, const ObserveConfig& told, const Progress& progress, ObserveConfig& config,
-                 ObserveReport& report, std::vector<Rival>& rivals) {
-  using Status = ObserveReport::Status;
+void find_causes(const RotationLog& log, const ObserveSetup& told, const Progress& progress, ObserveSetup& config,
+                 ObserveSolution& report, std::vector<Rival>& rivals) {
+  using Status = ObserveSolution::Status;
   if (is_doubtful(report) && report.status != Status::unobservable) search_causes(log, progress, config, report);
   if (report.status == Status::no_convergence || report.status == Status::unsteady) {
-    ObserveReport second = second_chance(log, config, progress);
+    ObserveSolution second = second_chance(log, config, progress);
     if (is_answer(second)) {
       report = std::move(second);
       settle_zooms(log, config, progress, report);
     }
   }
   free_one_by_one(log, progress, config, report, rivals);
-  ObserveConfig again = told;
+  ObserveSetup again = told;
   if (has_zoom(report) || !is_answer(report) || !is_doubtful(report)) return;
   if (!search_causes(log, progress, again, report)) return;
   config = std::move(again);
@@ -268,10 +261,10 @@ void find_causes(const RotationLog& log, const ObserveConfig& told, const Progre
 
 }  // namespace
 
-ObserveReport observe(const RotationLog& log, const ObserveConfig& told, const Progress& progress) {
-  using Status = ObserveReport::Status;
-  ObserveConfig config = told;
-  ObserveReport report = observe_as_told(log, config, progress);
+ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& told, const Progress& progress) {
+  using Status = ObserveSolution::Status;
+  ObserveSetup config = told;
+  ObserveSolution report = solve_as_given(log, config, progress);
   settle_zooms(log, config, progress, report);
   std::vector<Rival> rivals;
   const bool is_regression = config.method == ObserveMethod::flow || config.method == ObserveMethod::fang2011;
@@ -284,7 +277,7 @@ ObserveReport observe(const RotationLog& log, const ObserveConfig& told, const P
     note_untold(report, estimated_errors(log, config), report.told_apart);
     for (Check& check : rival_checks(rivals, log, config)) report.told_apart.push_back(std::move(check));
   }
-  report.estimated = config.estimate;
+  report.estimated = config.nuisances;
   report.estimated_errors = config.estimate_errors;
   if (may_be_misread(report)) report.misread = misread_rotation(log, config, report, progress);
   return report;

@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "alidade/observe/observe_once.h"
+#include "alidade/observe/solve_once.h"
 
 namespace alidade {
 
@@ -15,7 +15,7 @@ void add_turns(const RotationLog& log, const std::vector<RotationError>& errors,
   }
 }
 
-bool is_observable(const ObserveReport& report, const CommonMatrix& bound) {
+bool is_observable(const ObserveSolution& report, const CommonMatrix& bound) {
   constexpr double most = 0.05;  // of the focal length; of the image's width
   const Eigen::Vector4d& k = report.reference.solution.camera.k;
   const Eigen::Vector4d variance = bound.diagonal().head<4>();
@@ -25,36 +25,7 @@ bool is_observable(const ObserveReport& report, const CommonMatrix& bound) {
   return sigma[0] < most * k[0] && sigma[1] < most * k[1] && sigma[2] < most * width && sigma[3] < most * width;
 }
 
-namespace {
-
-constexpr std::pair<const char*, const char*> words[] = {{"scale", "encoder scale"},
-                                                         {"scale", "scale of the rates"},
-                                                         {"backlash", "backlash"},
-                                                         {"curve", "error of the angles within a turn"},
-                                                         {"drift", "zero that drifts"},
-                                                         {"drift", "attitude that drifts"},
-                                                         {"bias", "bias of the rates"},
-                                                         {"shutter", "rolling shutter"},
-                                                         {"focal-drift", "focal length that drifts"}};
-
-}  // namespace
-
-std::string estimate_word_of(const std::string& cause) {
-  for (const auto& [word, of] : words) {
-    if (cause == of) return word;
-  }
-  return cause;
-}
-
-std::vector<std::string> rotation_causes_of(const std::string& word) {
-  std::vector<std::string> causes;
-  for (const auto& [each, cause] : words) {
-    if (word == each && word != "shutter" && word != "focal-drift") causes.emplace_back(cause);
-  }
-  return causes;
-}
-
-std::vector<RotationError> estimated_errors(const RotationLog& log, const ObserveConfig& config) {
+std::vector<RotationError> estimated_errors(const RotationLog& log, const ObserveSetup& config) {
   std::vector<RotationError> errors = rotation_errors(log.source, log.has_roll_rate);
   std::erase_if(errors, [&](const RotationError& error) {
     return std::find(config.estimate_errors.begin(), config.estimate_errors.end(), error.cause) ==
@@ -71,23 +42,23 @@ std::vector<RotationError> estimated_errors(const RotationLog& log, const Observ
 
 /// Errors of the rotation are small, and yet not linear (a play opens at each turning point): the log is freed of what
 /// was found, and asked again.
-ObserveReport observe_as_told(const RotationLog& log, const ObserveConfig& config, const Progress& progress) {
+ObserveSolution solve_as_given(const RotationLog& log, const ObserveSetup& config, const Progress& progress) {
   const bool is_known = config.rotation == RotationKnowledge::known;
   const std::vector<RotationError> errors = is_known ? estimated_errors(log, config) : std::vector<RotationError>{};
   RotationErrors undone = RotationErrors::Zero(static_cast<Eigen::Index>(errors.size()));
-  ObserveReport report = observe_once(log, config, errors, undone, progress);
+  ObserveSolution report = solve_once(log, config, errors, undone, progress);
   constexpr int max_rounds = 4;
   constexpr double little = 0.02;  // of the ordinary size: what is left of it is linear
   for (int round = 1; round < max_rounds && !errors.empty(); ++round) {
-    if (report.status != ObserveReport::Status::ok || report.errors.size() != undone.size()) break;
+    if (report.status != ObserveSolution::Status::ok || report.errors.size() != undone.size()) break;
     if ((report.errors - undone).cwiseAbs().maxCoeff() < little) break;
     undone = report.errors;
     RotationLog freed = log;
     for (std::size_t i = 0; i < errors.size(); ++i) {
       errors[i].undo(freed.rows, undone[static_cast<Eigen::Index>(i)] * errors[i].ordinary);
     }
-    ObserveReport again = observe_once(freed, config, errors, undone, progress);
-    if (again.status != ObserveReport::Status::ok) break;
+    ObserveSolution again = solve_once(freed, config, errors, undone, progress);
+    if (again.status != ObserveSolution::Status::ok) break;
     report = std::move(again);
   }
   return report;

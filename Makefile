@@ -10,8 +10,8 @@ jobs := $(if $(JOBS),-j $(JOBS),)
 help:
 	@echo "make demo    calibrate a camera from 13 real photos, and write its report"
 	@echo "make test    build and run the tests"
-	@echo "make build   build build/release/alidade"
-	@echo "make install PREFIX=/usr/local: the executable, the library with its headers, man pages, bash completion"
+	@echo "make build   build build/release/alidade and the Python module, build/release/python"
+	@echo "make install PREFIX=/usr/local: the executable, the library with its headers, the Python module, man pages, bash completion"
 	@echo "make bench   measure speed, side by side with OpenCV and mrcal"
 	@echo "make docs    renew the pictures in README and docs"
 	@echo "make study   is σ what it says? 2400 calibrations, 2000 observations, rangefinders; corners against OpenCV's, with known truth"
@@ -21,16 +21,16 @@ help:
 
 build:
 	@tools/setup build
-	@echo "build: $(out)/alidade"
+	@echo "build: $(out)/alidade, and the Python module in $(out)/python"
 	@cmake --preset release >/dev/null
-	@ninja -C $(out) $(jobs) alidade_cli
+	@ninja -C $(out) $(jobs) programs
 	@[ build/editor/compile_commands.json -nt CMakeLists.txt ] || cmake --preset editor >/dev/null
 
 # PREFIX=/usr/local, or another place; DESTDIR for packages.
 install:
 	@tools/setup build
 	@cmake --preset release >/dev/null
-	@ninja -C $(out) $(jobs) alidade_cli alidade_shared
+	@ninja -C $(out) $(jobs) programs alidade_shared
 	@cmake --install $(out) $(if $(PREFIX),--prefix $(PREFIX),)
 
 demo: build

@@ -49,6 +49,13 @@ class Package(unittest.TestCase):
               for name, file in (("library", camera), ("command", self.folder / "result" / "camera.yaml"))}
         self.assertAlmostEqual(fx["library"], fx["command"], places=2, msg="the library and the command say the same")
 
+    def test_python_module_stands_alone(self):
+        module = self.prefix / "lib" / "python3" / "dist-packages"
+        if not (module / "alidade").is_dir():
+            self.skipTest("the module was not built")
+        run("/usr/bin/python3", "-W", "error", "-c", "import alidade as al; al.simulate.track(scenario='C')", cwd=self.folder,
+            env={**os.environ, "PYTHONPATH": str(module)})
+
     def test_the_observe_example_leaves_what_the_command_leaves(self):
         outside, alidade, log = self.folder / "examples", self.prefix / "bin" / "alidade", self.folder / "rotation"
         run("cmake", "-S", ROOT / "examples", "-B", outside, f"-DCMAKE_PREFIX_PATH={self.prefix}")

@@ -31,8 +31,8 @@ struct App::Command {
 
 struct App::State {
   CLI::App app{"alidade: calibrate what moves. Cameras you can trust, from photos, with their uncertainty.", "alidade"};
-  std::deque<Command> commands;  // options point into it: it must not move
-  Terminal terminal;
+  std::deque<Command> commands;        // options point into it: it must not move
+  std::unique_ptr<Terminal> terminal;  ///< Of a command that was typed.
 };
 
 namespace {
@@ -189,6 +189,32 @@ tbb::global_control prepare_libraries(int threads) {
   return {tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(limit)};
 }
 
+/// "sigma_px" of "--sigma-px", and of an argument its own name.
+std::string identifier_of(const CLI::Option& option) {
+  std::string name = option.get_lnames().empty() ? option.get_name(true) : option.get_lnames().front();
+  std::ranges::replace(name, '-', '_');
+  return name;
+}
+
+OptionInfo option_info(const CLI::Option& option, const FieldList& fields) {
+  OptionInfo info{.name = identifier_of(option),
+                  .help = option.get_description(),
+                  .standard = option.get_default_str(),
+                  .group = option.get_group(),
+                  .is_required = option.get_required(),
+                  .is_list = option.get_items_expected_max() > 1};
+  if (!option.get_lnames().empty()) info.option = "--" + option.get_lnames().front();
+  const bool is_flag = option.get_type_size() == 0 || option.get_expected_max() == 0;
+  if (!is_flag) info.form = words_of_type(option.get_type_name().empty() ? "TEXT" : option.get_type_name());
+  for (const Field& field : fields) {
+    if (option_of(field) != info.option) continue;
+    info.name = field.name;
+    if (!is_flag) info.form = form_text(field);
+    info.is_required = field.is_required;
+  }
+  return info;
+}
+
 std::string refusal(const std::string& command, const Verdict& verdict) {
   const bool is_said = verdict.exit_code != ExitCode::not_trusted || verdict.sentence.starts_with("Not to be trusted");
   return command + ": " + (is_said ? "" : "not to be trusted: ") + verdict.sentence +
@@ -254,6 +280,43 @@ App::Command* App::chosen_command() {
   return nullptr;
 }
 
+std::vector<CommandInfo> App::commands() {
+  std::vector<CommandInfo> all;
+  for (Command& command : state_->commands) {
+    add_common_options(*command.app, command.spec, command.options);
+    CommandInfo& info = all.emplace_back(CommandInfo{command.spec.name, command.spec.summary, {}});
+    for (const CLI::Option* option : command.app->get_options()) {
+      if (option->get_group().empty() || option == command.app->get_help_ptr()) continue;
+      info.options.push_back(option_info(*option, command.fields));
+    }
+  }
+  return all;
+}
+
+JobOutcome App::run_job(const std::vector<std::string>& words, const Progress& progress) {
+  CLI::App& app = state_->app;
+  for (Command& command : state_->commands) add_common_options(*command.app, command.spec, command.options);
+  try {
+    std::vector<std::string> last_first(words.rbegin(), words.rend());
+    app.parse(last_first);
+  } catch (const CLI::ParseError& error) {
+    throw UsageError(usage_fault(app, error));
+  }
+  Command& command = *chosen_command();
+  CommonOptions& options = command.options;
+  take_config(*command.app, command.fields, command.config);
+  options.leaves_results = false;
+  options.keeps_outcome = options.quiet = true;
+  std::optional<tbb::global_control> limit;  // the program's own use of libraries stays as it is
+  if (options.threads > 0) {
+    limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(options.threads));
+  }
+  Run run(command.spec.name, words, options, progress);
+  if (command.spec.draws_random_numbers) run.document.seed = options.seed;
+  static_cast<void>(command.work(run));
+  return run.outcome();
+}
+
 int App::dispatch(int argc, const char* const* argv) {
   CLI::App& app = state_->app;
   for (Command& command : state_->commands)  // behind the command's own, in its help as well
@@ -271,12 +334,12 @@ int App::dispatch(int argc, const char* const* argv) {
   catch_interrupts();
   require_place(options);
   const tbb::global_control limit = prepare_libraries(options.threads);
-  Run run(command.spec.name, {argv, argv + argc}, options, state_->terminal.progress(!options.quiet && !options.json));
+  Run run(command.spec.name, {argv, argv + argc}, options, state_->terminal->progress(!options.quiet && !options.json));
   if (command.spec.draws_random_numbers) run.document.seed = options.seed;
   try {
     const ExitCode code = command.work(run);
-    state_->terminal.wipe_progress();
-    if (code != ExitCode::ok) state_->terminal.error(refusal(command.spec.name, run.document.verdict));
+    state_->terminal->wipe_progress();
+    if (code != ExitCode::ok) state_->terminal->error(refusal(command.spec.name, run.document.verdict));
     return static_cast<int>(code);
   } catch (const UsageError& error) {
     throw UsageError(command.spec.name + ": " + error.what());
@@ -288,8 +351,9 @@ int App::dispatch(int argc, const char* const* argv) {
 int run_cli(int argc, const char* const* argv, void (*add_commands)(App&)) {
   hold_standard_streams();
   App frame;
+  frame.state_->terminal = std::make_unique<Terminal>();
   const auto failed = [&](const std::string& message, ExitCode code) {
-    frame.state_->terminal.error(message);
+    frame.state_->terminal->error(message);
     return static_cast<int>(code);
   };
   try {
@@ -301,7 +365,7 @@ int run_cli(int argc, const char* const* argv, void (*add_commands)(App&)) {
   } catch (const UsageError& error) {
     return failed(error.what(), ExitCode::usage);
   } catch (const Interrupted& error) {
-    frame.state_->terminal.error(error.what());
+    frame.state_->terminal->error(error.what());
     return 128 + interrupting_signal();
   } catch (const InputError& error) {
     return failed(error.what(), ExitCode::bad_input);

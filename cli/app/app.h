@@ -23,6 +23,22 @@ struct CommandSpec {
   bool leaves_results = true;         ///< False: nothing is written into DIR unless --out is given (show, convert).
 };
 
+/// An option of a command, or one of its arguments.
+struct OptionInfo {
+  std::string name;      ///< Of its field, else the option's as an identifier: "sigma_px".
+  std::string option;    ///< "--sigma-px"; empty: an argument.
+  std::string help;      ///< One line.
+  std::string form;      ///< What stands for its value: "NUMBER > 0"; empty: a flag.
+  std::string standard;  ///< Its default; empty: none.
+  std::string group;     ///< Heading in help.
+  bool is_required = false;
+  bool is_list = false;  ///< Takes several values.
+};
+struct CommandInfo {
+  std::string name, summary;
+  std::vector<OptionInfo> options;
+};
+
 /// The commands and what they share: options, threads, errors, exit codes. See cli/commands.h.
 class App {
  public:
@@ -38,6 +54,13 @@ class App {
   void add_fields(CLI::App& command, FieldList fields);
   /// The word before the commands of a group: "camera" of "camera show". Comes before them.
   void add_group(const std::string& name, const std::string& summary);
+
+  /// The commands with their options, for another door than the command line. Once for an App.
+  [[nodiscard]] std::vector<CommandInfo> commands();
+  /// Runs a command in a program, which gets what the command would have written: `words` as they are typed, without
+  /// the executable. Throws UsageError, ConfigError and InputError with the line that the command would print,
+  /// Interrupted where `progress` says stop. Once for an App.
+  [[nodiscard]] JobOutcome run_job(const std::vector<std::string>& words, const Progress& progress);
 
  private:
   friend int run_cli(int argc, const char* const* argv, void (*add_commands)(App&));

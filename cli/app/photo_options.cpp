@@ -2,6 +2,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "alidade/results/calibration_outcome.h"
+
 namespace alidade::cli {
 
 void add_photos(CLI::App& command, std::vector<std::filesystem::path>& photos, bool is_required) {
@@ -14,13 +16,13 @@ void require_readable(const PhotoSet& set, const Calibration& calibration) {
 }
 
 void tell_photos(const PhotoSet& set, Counts& counts, Verdict& verdict, Run& run) {
-  for (InputFile& input : set.inputs()) run.document.inputs.push_back(std::move(input));
-  counts.skipped.insert(counts.skipped.end(), set.skipped().begin(), set.skipped().end());
-  if (const std::string line = set.skipped_line(); !line.empty()) run.say(line);
-  if (const auto turned = set.turned()) {
-    run.say(turned->text);
-    verdict.checks.push_back(*turned);
-  }
+  JobOutcome told;
+  add_photos(set, told);
+  ResultDocument& from = told.document;
+  run.document.inputs.insert(run.document.inputs.end(), from.inputs.begin(), from.inputs.end());
+  counts.skipped.insert(counts.skipped.end(), from.counts.skipped.begin(), from.counts.skipped.end());
+  verdict.checks.insert(verdict.checks.end(), from.verdict.checks.begin(), from.verdict.checks.end());
+  for (std::string& line : told.lines) run.say(std::move(line));
 }
 
 }  // namespace alidade::cli

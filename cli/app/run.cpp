@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <tuple>
 
 #include "alidade/files/sha256.h"
 #include "alidade/results/thin_tables.h"
@@ -78,14 +77,12 @@ void Run::say(std::string line) { lines_.push_back(std::move(line)); }
 
 ExitCode Run::finish(Verdict verdict) {
   document.verdict = std::move(verdict);
-  if (document.verdict.state == State::bad && document.verdict.exit_code == ExitCode::ok) {
-    document.verdict.exit_code = ExitCode::not_trusted;
-  }
-  // Photos are read by many threads, in any order; the document has one order.
-  std::stable_sort(document.inputs.begin(), document.inputs.end(), [](const InputFile& a, const InputFile& b) {
-    return std::tie(a.role, a.name) < std::tie(b.role, b.name);
-  });
+  settle(document);
   document.seconds.insert(document.seconds.begin(), {"total", seconds_since(start_)});
+  if (options.keeps_outcome) {
+    for (FolderSwap& swap : elsewhere_) swap.commit();
+    return document.verdict.exit_code;
+  }
   result_ = result_text_of_size(document,
                                 [&](std::string name, std::string csv) { add_file(std::move(name), std::move(csv)); });
   report_progress(progress, "writing", 0, 0);
@@ -103,6 +100,7 @@ ExitCode Run::finish(JobOutcome outcome) {
   std::vector<SkippedInput> skipped = std::move(document.counts.skipped);
   document.counts = std::move(from.counts);
   document.counts.skipped.insert(document.counts.skipped.begin(), skipped.begin(), skipped.end());
+  document.inputs.insert(document.inputs.end(), from.inputs.begin(), from.inputs.end());
   document.assumed = std::move(from.assumed);
   document.estimate = std::move(from.estimate);
   document.stddev = std::move(from.stddev);
@@ -115,6 +113,13 @@ ExitCode Run::finish(JobOutcome outcome) {
   for (NamedBytes& file : outcome.files) add_file(std::move(file.name), std::move(file.bytes));
   for (NamedBytes& image : outcome.images) add_image(std::move(image.name), std::move(image.bytes));
   return finish(std::move(from.verdict));
+}
+
+JobOutcome Run::outcome() {
+  JobOutcome kept{.document = std::move(document), .lines = std::move(lines_), .images = std::move(images_)};
+  kept.document.files.clear();
+  for (const PendingFile& file : files_) kept.files.push_back({file.name, content_of(file)});
+  return kept;
 }
 
 void Run::write_files() {

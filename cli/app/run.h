@@ -34,6 +34,7 @@ struct CommonOptions {
   bool quiet = false;
   bool no_report = false;
   bool leaves_results = true;  ///< False: nothing goes into DIR.
+  bool keeps_outcome = false;  ///< finish() neither writes nor prints: outcome() has it all.
   int threads = 0;             ///< 0: all processors. Already in force when the command begins.
   std::uint64_t seed = 1;      ///< Of all chance in the command.
 };
@@ -76,6 +77,8 @@ class Run {
   [[nodiscard]] ExitCode finish(Verdict verdict);
   /// The same with all that a job of the library leaves; what was said or skipped before comes first.
   [[nodiscard]] ExitCode finish(JobOutcome outcome);
+  /// What finish() was to write, and the lines; after finish() with options.keeps_outcome.
+  [[nodiscard]] JobOutcome outcome();
   /// Text of result.json; empty before finish().
   [[nodiscard]] const std::string& result() const { return result_; }
 

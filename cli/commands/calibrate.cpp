@@ -138,7 +138,7 @@ ExitCode calibrate_photos_of(const CalibrateArgs& args, Run& run) {
     add_images(result, photos, outcome);
     run.lap("pictures");
   }
-  tell_photos(set, outcome.document.counts, outcome.document.verdict, run);
+  add_photos(set, outcome);
   return run.finish(std::move(outcome));
 }
 

@@ -4,6 +4,9 @@ namespace alidade::cli {
 
 class App;
 
+/// All of those below.
+void add_commands(App& app);
+
 void add_calibrate(App& app);
 void add_camera(App& app);
 void add_corners(App& app);
@@ -30,7 +33,7 @@ void add_underwater_scenario(App& app);  ///< Of `simulate`.
 void add_view(App& app);
 
 // How to write a command: cli/commands/NAME.cpp with one function `add_NAME(App&)`, declared here and called in
-// main.cpp.
+// commands.cpp.
 //
 //   ExitCode calibrate(const CalibrateArgs& args, Run& run) {
 //     const std::string text = read_file(args.file);            // reading throws InputError → exit 3

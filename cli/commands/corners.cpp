@@ -40,7 +40,7 @@ ExitCode run_corners(CornersArgs args, Run& run) {
   run.lap("solve");
   require_readable(set, found.calibration);
   JobOutcome outcome = outcome_of(found);
-  tell_photos(set, outcome.document.counts, outcome.document.verdict, run);
+  add_photos(set, outcome);
   return run.finish(std::move(outcome));
 }
 

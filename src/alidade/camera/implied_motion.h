@@ -31,6 +31,10 @@ using MotionJacobian = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 6>;
                                                               std::span<const std::optional<GridPoint>> seen,
                                                               std::span<const double> weights, double range_m);
 
+/// projection_sigma() at pixels of one's own; the motion is that of a grid over the image. NaN where there is none.
+[[nodiscard]] std::vector<double> sigma_at(const Camera& camera, std::span<const Eigen::Vector2d> pixels,
+                                           double distance_m);
+
 /// Square root of the larger eigenvalue of a symmetric 2×2 matrix.
 [[nodiscard]] double largest_sigma(const Eigen::Matrix2d& cov);
 

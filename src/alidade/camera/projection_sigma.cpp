@@ -21,11 +21,18 @@ PixelGrid make_grid(int width_px, int height_px, int cols, int rows) {
 
 namespace detail {
 
-std::vector<std::optional<GridPoint>> look(const Camera& camera, const PixelGrid& grid, double distance_m) {
+namespace {
+
+std::vector<Eigen::Vector2d> pixels_of(const PixelGrid& grid) {
   std::vector<Eigen::Vector2d> pixels;
   for (int row = 0; row < grid.rows; ++row) {
     for (int col = 0; col < grid.cols; ++col) pixels.push_back(grid.px(col, row));
   }
+  return pixels;
+}
+
+std::vector<std::optional<GridPoint>> look_at(const Camera& camera, std::span<const Eigen::Vector2d> pixels,
+                                              double distance_m) {
   const std::vector<std::optional<ObservationRay>> rays = observation_rays(camera, pixels);
   // Infinity is a direction to a central lens; to another, a point so far away that its origin no longer counts.
   const double far_m = is_central(camera.lens) ? 1.0 : 1e6;
@@ -41,6 +48,43 @@ std::vector<std::optional<GridPoint>> look(const Camera& camera, const PixelGrid
     if (rays[i] && projections[i]) seen[i] = GridPoint{points_in_cam[i], *projections[i]};
   }
   return seen;
+}
+
+/// 1/σ² of each pixel that is seen, by the σ of an unweighted fit.
+std::vector<double> weights_of(const Eigen::MatrixXd& cov, std::span<const std::optional<GridPoint>> seen,
+                               double range_m) {
+  std::vector<double> sigmas_px;
+  for (const Eigen::Matrix2d& each : implied_covariance(cov, seen, std::vector<double>(seen.size(), 1.0), range_m)) {
+    sigmas_px.push_back(largest_sigma(each));
+  }
+  return inverse_variance_weights(sigmas_px);
+}
+
+bool has_full_covariance(const Camera& camera) {
+  return camera.cov.rows() == params(camera.lens).size() && camera.cov.cols() == camera.cov.rows();
+}
+
+}  // namespace
+
+std::vector<std::optional<GridPoint>> look(const Camera& camera, const PixelGrid& grid, double distance_m) {
+  return look_at(camera, pixels_of(grid), distance_m);
+}
+
+std::vector<double> sigma_at(const Camera& camera, std::span<const Eigen::Vector2d> pixels, double distance_m) {
+  std::vector<double> sigmas_px(pixels.size(), std::numeric_limits<double>::quiet_NaN());
+  if (!has_full_covariance(camera)) return sigmas_px;
+  const double range_m = std::isfinite(distance_m) ? distance_m : 0.0;
+  std::vector<std::optional<GridPoint>> seen =
+      look(camera, make_grid(camera.width_px, camera.height_px, 60, 40), distance_m);
+  std::vector<double> weights = weights_of(camera.cov, seen, range_m);
+  const std::size_t num_grid = seen.size();
+  for (auto& each : look_at(camera, pixels, distance_m)) seen.push_back(std::move(each));
+  weights.resize(seen.size(), 0.0);  // they do not take part in the fit of the motion
+  const auto covariances = implied_covariance(camera.cov, seen, weights, range_m);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    if (seen[num_grid + i]) sigmas_px[i] = largest_sigma(covariances[num_grid + i]);
+  }
+  return sigmas_px;
 }
 
 MotionJacobian motion_jacobian(const GridPoint& at, double range_m) {
@@ -98,18 +142,14 @@ PixelGrid projection_sigma(const Camera& camera, int cols, int rows, double dist
   PixelGrid grid = make_grid(camera.width_px, camera.height_px, cols, rows);
   const std::size_t num_pixels = static_cast<std::size_t>(cols) * static_cast<std::size_t>(rows);
   grid.values.assign(num_pixels, std::numeric_limits<double>::quiet_NaN());
-  if (camera.cov.rows() != params(camera.lens).size() || camera.cov.cols() != camera.cov.rows()) return grid;
+  if (!detail::has_full_covariance(camera)) return grid;
 
   const double range_m = std::isfinite(distance_m) ? distance_m : 0.0;
   const std::vector<std::optional<detail::GridPoint>> seen = detail::look(camera, grid, distance_m);
-  std::vector<double> weights(num_pixels, 1.0), sigmas_px(num_pixels, 0.0);
-  for (int pass = 0; pass < 2; ++pass) {
-    const auto covariances = detail::implied_covariance(camera.cov, seen, weights, range_m);
-    for (std::size_t i = 0; i < num_pixels; ++i) sigmas_px[i] = detail::largest_sigma(covariances[i]);
-    if (pass == 0) weights = detail::inverse_variance_weights(sigmas_px);
-  }
+  const auto covariances =
+      detail::implied_covariance(camera.cov, seen, detail::weights_of(camera.cov, seen, range_m), range_m);
   for (std::size_t i = 0; i < num_pixels; ++i) {
-    if (seen[i]) grid.values[i] = sigmas_px[i];
+    if (seen[i]) grid.values[i] = detail::largest_sigma(covariances[i]);
   }
   return grid;
 }

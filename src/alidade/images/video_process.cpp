@@ -1,5 +1,6 @@
 #include "alidade/images/video_process.h"
 
+#include <dlfcn.h>
 #include <fcntl.h>
 #include <spawn.h>
 #include <sys/wait.h>
@@ -13,6 +14,7 @@
 #include <fstream>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "alidade/files/files.h"
 
@@ -21,11 +23,28 @@ namespace {
 
 constexpr const char* decoder_name = "alidade_video";
 
+/// Of the executable; and of the library or the Python module that this code is in: up to five folders above its file,
+/// and `bin` in each.
+std::vector<std::filesystem::path> decoder_folders() {
+  std::error_code error;
+  std::vector<std::filesystem::path> folders = {std::filesystem::read_symlink("/proc/self/exe", error).parent_path()};
+  Dl_info info{};
+  if (::dladdr(reinterpret_cast<const void*>(&decoder_folders), &info) == 0 || info.dli_fname == nullptr)
+    return folders;
+  std::filesystem::path folder = std::filesystem::absolute(info.dli_fname, error);
+  for (int i = 0; i < 5 && folder.has_relative_path(); ++i) {
+    folder = folder.parent_path();
+    folders.push_back(folder);
+    folders.push_back(folder / "bin");
+  }
+  return folders;
+}
+
 std::filesystem::path decoder_beside_this_program(const std::filesystem::path& video) {
   std::error_code error;
-  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
-  const std::filesystem::path decoder = self.parent_path() / decoder_name;
-  if (!error && std::filesystem::exists(decoder, error)) return decoder;
+  for (const std::filesystem::path& folder : decoder_folders()) {
+    if (std::filesystem::is_regular_file(folder / decoder_name, error)) return folder / decoder_name;
+  }
   throw InputError(video.string() + ": video files are decoded by the program '" + decoder_name +
                    "', which is not beside this one; give a folder of numbered pictures");
 }

@@ -173,6 +173,20 @@ JobOutcome outcome_of(const FoundCorners& found) {
   return outcome;
 }
 
+void add_photos(const PhotoSet& set, JobOutcome& outcome) {
+  ResultDocument& document = outcome.document;
+  const std::vector<InputFile> inputs = set.inputs();
+  document.inputs.insert(document.inputs.end(), inputs.begin(), inputs.end());
+  document.counts.skipped.insert(document.counts.skipped.end(), set.skipped().begin(), set.skipped().end());
+  std::vector<std::string> lines;
+  if (const std::string line = set.skipped_line(); !line.empty()) lines.push_back(line);
+  if (const auto turned = set.turned()) {
+    lines.push_back(turned->text);
+    document.verdict.checks.push_back(*turned);
+  }
+  outcome.lines.insert(outcome.lines.begin(), lines.begin(), lines.end());
+}
+
 void add_images(const Calibration& calibration, const Photos& photos, JobOutcome& outcome) {
   const CalibrateReport& report = calibration;
   const std::vector<BoardView>& views = calibration.board_views;

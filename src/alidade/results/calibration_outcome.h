@@ -1,6 +1,7 @@
 #pragma once
 
 #include "alidade/calibrate/found_corners.h"
+#include "alidade/images/photo_set.h"
 #include "alidade/imaging/photos.h"
 #include "alidade/public.h"
 #include "alidade/results/outcome.h"
@@ -14,6 +15,9 @@ ALIDADE_PUBLIC_BEGIN
 
 /// The document of corners, its lines, and corners.csv where there are any.
 [[nodiscard]] JobOutcome outcome_of(const FoundCorners& found);
+
+/// Adds what became of the photos' files: the inputs, what lay beside the photos, and how they are turned.
+void add_photos(const PhotoSet& set, JobOutcome& outcome);
 
 /// Adds small images of the photos for the report, and the worst one without its distortion.
 void add_images(const Calibration& calibration, const Photos& photos, JobOutcome& outcome);

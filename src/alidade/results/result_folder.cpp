@@ -4,6 +4,7 @@
 #include <ctime>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <tuple>
 
 #include "alidade/files/files.h"
 #include "alidade/report/page.h"
@@ -100,8 +101,17 @@ void ResultFolder::commit() {
   swap_.commit();
 }
 
+void settle(ResultDocument& document) {
+  Verdict& verdict = document.verdict;
+  if (verdict.state == State::bad && verdict.exit_code == ExitCode::ok) verdict.exit_code = ExitCode::not_trusted;
+  std::stable_sort(document.inputs.begin(), document.inputs.end(), [](const InputFile& a, const InputFile& b) {
+    return std::tie(a.role, a.name) < std::tie(b.role, b.name);
+  });
+}
+
 void save(JobOutcome outcome, const std::filesystem::path& folder) {
   ResultDocument& document = outcome.document;
+  settle(document);
   if (document.created_utc.empty()) document.created_utc = utc_now();
   for (const NamedBytes& file : outcome.files) document.files.push_back(file.name);
   std::vector<NamedBytes> tables;  // of which the document has a part

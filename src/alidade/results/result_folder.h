@@ -37,6 +37,10 @@ class ResultFolder {
   FolderSwap swap_;
 };
 
+/// What every finished document keeps to: an estimate that its checks speak against ends in that exit code, and inputs
+/// have one order, whichever thread read them first.
+void settle(ResultDocument& document);
+
 /// Seconds since 1970 as 2026-01-31T12:00:00Z, now.
 [[nodiscard]] std::string utc_now();
 

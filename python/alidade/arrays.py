@@ -1,0 +1,54 @@
+"""What comes in as arrays is checked here, and refused in one line."""
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Numbers = npt.NDArray[np.float64]
+
+
+def numbers(values: Any, name: str) -> Numbers:
+    """`values` as a C-contiguous float64 array; a copy only where it is none."""
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{name}: rows of different lengths are no array") from None
+    if array.dtype.kind not in "iuf":
+        raise ValueError(f"{name}: numbers are needed, not {array.dtype}")
+    return np.asarray(array, dtype=np.float64, order="C")
+
+
+def vectors(values: Any, size: int, name: str) -> tuple[Numbers, tuple[int, ...]]:
+    """As rows, (N, size), with the shape of what stood before the last axis."""
+    array = numbers(values, name)
+    if array.ndim == 0 or array.shape[-1] != size:
+        raise ValueError(f"{name}: the last axis must have {size} numbers, but the shape is {array.shape}")
+    return array.reshape(-1, size), array.shape[:-1]
+
+
+def image(values: Any, name: str = "image") -> npt.NDArray[Any]:
+    """An image (H, W), or (H, W, 3) in OpenCV's order (blue first), uint8 or uint16."""
+    array = np.asarray(values)
+    if array.dtype not in (np.uint8, np.uint16):
+        raise ValueError(f"{name}: an image is uint8 or uint16, not {array.dtype}")
+    if array.ndim == 3 and array.shape[2] == 1:
+        array = array[:, :, 0]
+    if array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (3, 4)):
+        raise ValueError(f"{name}: an image is (H, W) or (H, W, 3), but the shape is {array.shape}")
+    if array.size == 0:
+        raise ValueError(f"{name}: the image is empty, its shape is {array.shape}")
+    return np.ascontiguousarray(array)
+
+
+def image_size(size: Any, name: str = "size") -> tuple[int, int]:
+    """(width, height) [px], or "640x480"."""
+    try:
+        width, height = size.lower().split("x") if isinstance(size, str) else size
+        pair = int(width), int(height)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}: {size!r} is not (width, height), for example (640, 480)") from None
+    if min(pair) < 1 or max(pair) > 200000:
+        raise ValueError(f"{name}: {size!r} is not (width, height), for example (640, 480)")
+    return pair

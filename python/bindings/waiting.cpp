@@ -1,0 +1,137 @@
+#include "python/bindings/waiting.h"
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <list>
+#include <mutex>
+#include <thread>
+
+namespace alidade::python {
+namespace {
+
+/// What the thread that works and the one that waits share.
+struct Shared {
+  std::mutex mutex;
+  std::condition_variable ended;
+  bool is_done = false;
+  std::exception_ptr thrown;
+  std::atomic<bool> stops = false;
+  bool has_news = false;
+  std::string what;
+  std::size_t done = 0, total = 0;
+
+  /// Called by the work, from any of its threads.
+  bool report(std::string_view now, std::size_t so_far, std::size_t of) {
+    const std::scoped_lock lock(mutex);
+    what = now;
+    done = so_far;
+    total = of;
+    has_news = true;
+    return !stops;
+  }
+  void end(std::exception_ptr error) {
+    const std::scoped_lock lock(mutex);
+    is_done = true;
+    thrown = std::move(error);
+    ended.notify_all();
+  }
+};
+
+/// Work that nobody waits for any more: it ends soon, and before Python does.
+std::mutex left_mutex;
+std::list<std::pair<std::shared_ptr<Shared>, std::thread>> left_behind;
+
+bool has_ended(const std::shared_ptr<Shared>& shared) {
+  const std::scoped_lock lock(shared->mutex);
+  return shared->is_done;
+}
+
+void leave_behind(const std::shared_ptr<Shared>& shared, std::thread thread) {
+  shared->stops = true;
+  const std::scoped_lock lock(left_mutex);
+  for (auto each = left_behind.begin(); each != left_behind.end();) {
+    if (!has_ended(each->first)) {
+      ++each;
+      continue;
+    }
+    each->second.join();
+    each = left_behind.erase(each);
+  }
+  left_behind.emplace_back(shared, std::move(thread));
+}
+
+void join_all() {
+  const py::gil_scoped_release released;
+  const std::scoped_lock lock(left_mutex);
+  for (auto& [shared, thread] : left_behind) thread.join();
+  left_behind.clear();
+}
+
+/// Whether it is over; waits a moment. The GIL is free meanwhile.
+bool wait_a_moment(Shared& shared) {
+  const py::gil_scoped_release released;
+  std::unique_lock lock(shared.mutex);
+  return shared.ended.wait_for(lock, std::chrono::milliseconds(50), [&] { return shared.is_done; });
+}
+
+/// Tells `progress` what is new. Throws what it raises, Interrupted where it returns False.
+void tell(Shared& shared, const py::object& progress) {
+  std::string what;
+  std::size_t done = 0, total = 0;
+  {
+    const std::scoped_lock lock(shared.mutex);
+    if (!shared.has_news || progress.is_none()) return;
+    shared.has_news = false;
+    what = shared.what;
+    done = shared.done;
+    total = shared.total;
+  }
+  const py::object answer = progress(what, done, total);
+  if (answer.is(py::bool_(false))) throw Interrupted();
+}
+
+}  // namespace
+
+void wait_for(std::function<void(const Progress&)> work, const py::object& progress) {
+  const auto shared = std::make_shared<Shared>();
+  std::thread thread([shared, work = std::move(work)]() mutable {
+    std::exception_ptr thrown;
+    try {
+      work([&shared](std::string_view what, std::size_t done, std::size_t total) {
+        return shared->report(what, done, total);
+      });
+    } catch (...) {
+      thrown = std::current_exception();
+    }
+    work = {};  // what it holds goes before anybody hears of the end
+    shared->end(thrown);
+  });
+  try {
+    while (!wait_a_moment(*shared)) {
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+      tell(*shared, progress);
+    }
+    tell(*shared, progress);
+  } catch (...) {
+    leave_behind(shared, std::move(thread));
+    throw;
+  }
+  thread.join();
+  if (shared->thrown) std::rethrow_exception(shared->thrown);
+}
+
+std::shared_ptr<void> kept(py::object object) {
+  return {object.release().ptr(), [](PyObject* held) {
+            if (!Py_IsInitialized()) return;
+            const py::gil_scoped_acquire acquired;
+            Py_DECREF(held);
+          }};
+}
+
+void bind_waiting(py::module_& module) {
+  py::module_::import("atexit").attr("register")(py::cpp_function(&join_all));
+  static_cast<void>(module);
+}
+
+}  // namespace alidade::python

@@ -1,0 +1,91 @@
+"""Jobs from files and from columns against the command, value by value."""
+import json
+import unittest
+
+import alidade as al
+from common import InFolder, assert_same_table, command
+
+
+def values(path):
+    document = json.loads((path / "result.json").read_text())
+    return {key: document[key] for key in ("verdict", "counts", "estimate", "stddev", "covariance", "data", "grids", "files")}
+
+
+class Jobs(InFolder):
+    def same_as_command(self, result, *words):
+        out, saved = self.folder / "command", self.folder / "python"
+        done = command(*words, "--out", out, "--quiet")
+        self.assertIn(done.returncode, (0, 4, 5, 6), done.stderr)
+        result.save(saved)
+        self.assertEqual(values(saved), values(out))
+        for name in json.loads((out / "result.json").read_text())["files"]:
+            self.assertEqual((saved / name).read_bytes(), (out / name).read_bytes(), name)
+        self.assertEqual(result.estimate, values(out)["estimate"])
+        self.assertEqual(result.verdict.exit_code, done.returncode)
+
+    def test_observe(self):
+        made = al.simulate.rotation(points=8, seed=3)
+        self.assertEqual(made, al.simulate.rotation(points=8, seed=3))
+        made.save(self.folder / "turn")
+        log = self.folder / "turn" / "log.csv"
+        result = al.observe(log, size=(780, 582))
+        self.same_as_command(result, "observe", log, "--size", "780x582")
+        columns = al.observe(made.tables["log"], size=(780, 582))
+        self.assertEqual(columns.estimate, result.estimate)
+        self.assertEqual(len(columns.tables["intrinsics"]), len(made.tables["log"]))
+        self.assertAlmostEqual(result.camera.fx, result.estimate["camera"]["fx"], delta=1e-6)
+
+    def test_track(self):
+        import pandas
+        made = al.simulate.track(scenario="C", seed=2)
+        made.save(self.folder / "events")
+        events, rig = self.folder / "events" / "events.csv", self.folder / "events" / "rig.yaml"
+        result = al.track(events, rig=rig)
+        self.same_as_command(result, "track", events, "--rig", rig)
+        for table in (made.tables["events"], dict((n, made.tables["events"][n]) for n in made.tables["events"].dtype.names),
+                      pandas.DataFrame(made.tables["events"])):
+            assert_same_table(al.track(table, rig=rig).tables["track"], result.tables["track"])
+        self.assertGreater(len(result.tables["track"]), 10)
+        self.assertEqual(al.track(events, rig=rig, method="cv"), result)
+
+    def test_rangefinder_and_rig(self):
+        board = al.Board("9x6", square_m=0.04)
+        made = self.folder / "shots"
+        al.simulate.rangefinder(shots=12).save(made)
+        given = dict(corners=made / "corners.csv", board=board)
+        result = al.rangefinder(made / "shots.csv", camera=made / "camera.yaml", **given)
+        self.same_as_command(result, "rangefinder", made / "shots.csv", "--camera", made / "camera.yaml", "--board", "9x6",
+                             "--square", "0.04", "--corners", made / "corners.csv")
+        by_value = al.rangefinder(made / "shots.csv", camera=al.Camera.read(made / "camera.yaml"), **given)
+        self.assertEqual(by_value.estimate, result.estimate)
+        self.assertEqual(result.direction.shape, (3,))
+        views = self.folder / "views"
+        al.simulate.rig().save(views)
+        rig = al.rig(views / "views.csv", camera=[views / "camera_1.yaml", views / "camera_2.yaml"],
+                     board=al.Board("9x6", square_m=0.025))
+        self.assertIn("rig.yaml", rig.files)
+
+    def test_wrong_use_is_a_value_error_in_the_commands_words(self):
+        for work, words in ((lambda: al.track(rig="absent.yaml"), "events"), (lambda: al.observe("absent.csv"), "absent.csv"),
+                            (lambda: al.track("absent.csv", rig="absent.yaml"), "absent.yaml"),
+                            (lambda: al.observe({"t": [0.0]}, size=(100, 100)), "log"),
+                            (lambda: al.observe({"t": [0.0], "pan": [1.0, 2.0]}), "differ in length"),
+                            (lambda: al.observe({"t": [0.0], "pan": ["x"], "tilt": [0.0], "p1x": [1.0], "p1y": [1.0]}), "log:2"),
+                            (lambda: al.observe("-", size=(1, 1)), "is no file"),
+                            (lambda: al.track("e.csv", rig="r.yaml", method="cw"), "cw"),
+                            (lambda: al.track("e.csv", rig="r.yaml", sigma_px=-1.0), "sigma-px"),
+                            (lambda: al.servo(object()), "scenario")):
+            with self.subTest(words=words), self.assertRaises(ValueError) as caught:
+                work()
+            self.assertIn(words, str(caught.exception))
+            self.assertNotIn("\n", str(caught.exception))
+        with self.assertRaises(TypeError):
+            al.track("e.csv", rig="r.yaml", sigmas=1.0)
+
+    def test_the_docs_say_what_a_keyword_is(self):
+        self.assertIn("sigma_px: ", al.track.__doc__)
+        self.assertIn("fixed: ", al.calibrate.__doc__)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,78 @@
+"""The package as such: import, stub, docs and examples."""
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import numpy as np
+
+import alidade as al
+from common import BOARD, board_corners, command
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+def python(*words, **options):
+    return subprocess.run([sys.executable, *words], capture_output=True, text=True, **options)
+
+
+class Package(unittest.TestCase):
+    def test_import_is_quiet_and_fast(self):
+        done = python("-W", "error", "-c", "import alidade; print(alidade.__version__)")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        code = "import time, numpy; t = time.perf_counter(); import alidade; print(time.perf_counter() - t)"
+        seconds = min(float(python("-c", code).stdout) for _ in range(5))
+        self.assertLess(seconds, 0.1)
+
+    def test_stub(self):
+        package = pathlib.Path(al.__file__).parent
+        environment = {**os.environ, "MYPYPATH": str(package.parent)}
+        done = python("-m", "mypy.stubtest", "alidade", "--ignore-missing-stub", env=environment)
+        self.assertEqual(done.returncode, 0, done.stdout[-3000:] + done.stderr[-3000:])
+
+    def test_boards_are_values(self):
+        import copy
+        import pickle
+        board = al.Board((5, 4), "25mm", "charuco", marker_m=0.018)
+        for same in (pickle.loads(pickle.dumps(board)), copy.copy(board), eval(repr(board), {"Board": al.Board})):
+            self.assertEqual(same, board)
+        self.assertEqual((board.cols, board.rows, board.square_m, board.kind, board.dictionary),
+                         (5, 4, 0.025, "charuco", "DICT_5X5_100"))
+        self.assertEqual(BOARD.points.shape, (54, 3))
+        for wrong in (("9", 0.025), ("9x6", 25), ("9x6", -1), ((9, 6), None), ("9x6", 0.025, "table"),
+                      ("9x6", 0.025, "charuco"), (object(), 0.025)):
+            with self.subTest(wrong=wrong), self.assertRaises((ValueError, TypeError)):
+                al.Board(*wrong)
+
+    def test_first_screen_of_the_docs_runs(self):
+        blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "python.md").read_text(), re.S)
+        with tempfile.TemporaryDirectory() as folder:
+            done = command("simulate", "board", "--board", "9x6", "--square", "0.025", "--photos", "7", "--size", "640x480",
+                           "--out", pathlib.Path(folder) / "photos", "--quiet")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            code = "import matplotlib; matplotlib.use('Agg')\n" + blocks[0]
+            done = python("-c", code, cwd=folder)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("±", done.stdout)
+
+    def test_examples_run(self):
+        examples = ROOT / "examples" / "python"
+        with tempfile.TemporaryDirectory() as folder:
+            folder = pathlib.Path(folder)
+            al.simulate.rotation(points=8).save(folder / "turn")
+            done = python(examples / "observe_log.py", folder / "turn" / "log.csv", "780", "582")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("fx", done.stdout)
+            command("simulate", "board", "--board", "9x6", "--square", "0.025", "--photos", "7", "--size", "640x480",
+                    "--out", folder / "photos", "--quiet")
+            done = python(examples / "webcam.py", str(folder / "photos" / "*.png"), cwd=folder)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("fx", done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -31,13 +31,18 @@ struct Observer::State {
       : config(given),
         setup(stream_setup(layout, given)),
         log(std::move(layout)),
-        hybrid(hybrid_config(log, setup, pixel_scale(log, setup.width_px, setup.height_px))),
         reader(log.source, setup.max_gap_s) {}
+
+  void begin(std::size_t num_points) {
+    if (log.num_points == 0) log.num_points = num_points;
+    if (log.num_points == 0) throw ConfigError("the first row says how many points there are, and has none");
+    hybrid.emplace(hybrid_config(log, setup, pixel_scale(log, setup.width_px, setup.height_px)));
+  }
 
   ObserveConfig config;
   ObserveSetup setup;
   RotationLog log;
-  HybridObserver hybrid;
+  std::optional<HybridObserver> hybrid;
   MotionReader reader;
 };
 
@@ -50,6 +55,7 @@ Observer& Observer::operator=(Observer&&) noexcept = default;
 ObserveStep Observer::push(RotationRow row, const std::optional<TrueIntrinsics>& truth) {
   State& state = *state_;
   RotationLog& log = state.log;
+  if (!state.hybrid) state.begin(row.px.size());
   check_row(row, log.rows.size(), log, log.rows.empty() ? row.t_s : log.rows.back().t_s);
   if (truth.has_value() != !log.truth.empty() && !log.rows.empty()) {
     throw ConfigError("either every row has a truth, or none");
@@ -59,7 +65,7 @@ ObserveStep Observer::push(RotationRow row, const std::optional<TrueIntrinsics>&
   if (state.setup.lens_is_given) undistort(*state.config.camera, Eigen::Vector2d::Constant(not_seen), row.px);
   const RotationFrame frame = state.reader.next(row);
   ObserveStep step =
-      step_of(frame, log.source == RotationSource::none ? IntrinsicsEstimate{} : state.hybrid.step(frame));
+      step_of(frame, log.source == RotationSource::none ? IntrinsicsEstimate{} : state.hybrid->step(frame));
   step.truth = truth;
   return step;
 }

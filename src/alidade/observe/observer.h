@@ -26,9 +26,9 @@ struct ObserveStep {
 /// that observe() gives of all of them.
 class Observer {
  public:
-  /// `layout`: a log without rows, which says what rows have: the source of the rotation, how many points. Throws
-  /// ConfigError as observe() does, without the size of the images, and where errors of the rotation are to be
-  /// estimated: they take a whole log.
+  /// `layout`: a log without rows, which says what rows have: the source of the rotation, how many points (0: as many
+  /// as the first row). Throws ConfigError as observe() does, without the size of the images, and where errors of the
+  /// rotation are to be estimated: they take a whole log.
   Observer(RotationLog layout, const ObserveConfig& config);
   ~Observer();
   Observer(Observer&&) noexcept;

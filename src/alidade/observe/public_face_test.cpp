@@ -67,7 +67,7 @@ TEST(ObserveFace, RowsOneByOneGiveWhatAllGive) {
     RotationLog layout = log;
     layout.rows.clear();
     layout.truth.clear();
-    Observer observer(layout, config), by_hand(layout, config);
+    Observer observer(layout, config), by_hand({.source = source}, config);
     const ObserveReport all = observe(log, config);
     for (std::size_t k = 0; k < log.rows.size(); ++k) {
       const RotationRow& row = log.rows[k];
@@ -196,6 +196,7 @@ TEST(ObserveFace, AnswersEmptyInput) {
   ObserveConfig errors = sized();
   errors.estimate = {"bias"};
   EXPECT_THROW(Observer(RotationLog{}, errors), ConfigError);
+  EXPECT_THROW((void)Observer(RotationLog{}, sized()).push(RotationRow{}), ConfigError) << "no points";
   EXPECT_EQ(Observer(RotationLog{}, sized()).finish().verdict.exit_code, ExitCode::cannot_tell);
 }
 

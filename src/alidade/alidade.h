@@ -3,4 +3,7 @@
 /// Every public header: one for each room, and files.
 #include "alidade/calibrate.h"
 #include "alidade/files.h"
+#include "alidade/identify.h"
+#include "alidade/project.h"
+#include "alidade/servo.h"
 #include "alidade/track.h"

@@ -4,8 +4,10 @@
 #include <optional>
 
 #include "alidade/camera/camera.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// How well a rangefinder reads: σ² = (sigma_m + per_m · range)² + (incidence_m · tan i)², with i the angle between the
 /// beam and the normal of what it hits (the wider the spot's footprint in depth, the less sure the reading).
@@ -77,4 +79,5 @@ struct BeamPixel {
 /// Distance of the beam's line from the camera's centre, |origin × direction|. [m]
 [[nodiscard]] double offset_of_line_m(const Beam& beam);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

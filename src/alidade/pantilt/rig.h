@@ -11,7 +11,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// σ of a head's encoders beside its readings' noise, where a file gives it; NaN: not told, 0: exact.
+/// σ of a head's encoders beside its readings' noise, where a file gives it; NaN: not given, 0: exact.
 struct EncoderError {
   double sigma_zero_rad = std::numeric_limits<double>::quiet_NaN();
   double sigma_scale = std::numeric_limits<double>::quiet_NaN();
@@ -20,14 +20,14 @@ struct EncoderError {
 /// One head or more in one world: what `alidade rig` estimates and rig.yaml holds.
 struct Rig {
   std::vector<RigHead> heads;
-  /// Covariance of the parameters of all heads, one head after the other, each as head_param_names (what is held has
+  /// Covariance of the parameters of all heads, one head after the other, each as head_param_names (what is fixed has
   /// zero rows); 0×0 where unknown, all zero where the heads are exact.
   Eigen::MatrixXd cov;
   /// The same followed by the parameters of all lenses, head by head: what the heads share with the lenses that they
-  /// were calibrated through. 0×0 where that is not told; each lens then has its own camera's covariance.
+  /// were calibrated through. 0×0 where that is not known; each lens then has its own camera's covariance.
   Eigen::MatrixXd cov_with_lenses;
-  std::vector<EncoderError> encoder_errors;  ///< One a head, or none.
-  std::vector<LensCourse> lens_courses;      ///< One a head, or none: of cameras that zoom.
+  std::vector<EncoderError> encoder_errors;  ///< One per head, or none.
+  std::vector<LensCourse> lens_courses;      ///< One per head, or none: of cameras that zoom.
 };
 
 /// What is wrong with a head or a rig that a program made, in one sentence; empty where nothing is.

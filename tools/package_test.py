@@ -2,6 +2,7 @@
 """What others build on: package_test.py BUILD. Installs the build into a folder, and uses it from outside the tree: by
 find_package, by pkg-config, by add_subdirectory (configured only). Headers that are installed include installed ones,
 Eigen and std; the library shows nothing that they do not declare; the man pages and the completion are there."""
+import json
 import os
 import pathlib
 import re
@@ -48,6 +49,26 @@ class Package(unittest.TestCase):
         fx = {name: float(re.search(r"fx\D+([\d.]+)", run(alidade, "camera", "show", file)).group(1))
               for name, file in (("library", camera), ("command", self.folder / "result" / "camera.yaml"))}
         self.assertAlmostEqual(fx["library"], fx["command"], places=2, msg="the library and the command say the same")
+        self.follow_a_target(outside, alidade)
+
+    def follow_a_target(self, outside, alidade):
+        """The examples of heads: what they leave is what the commands leave."""
+        for name, words, command in (
+                ("track", ("track", "--scenario", "B"), lambda sim: ("track", sim / "events.csv", "--rig", sim / "rig.yaml",
+                                                                     "--sigma-a", "1", "--sigma-px", "0.5")),
+                ("identify", ("servo",), lambda sim: ("identify", sim / "log.csv"))):
+            sim, left = self.folder / f"sim_{name}", self.folder / f"left_{name}"
+            run(alidade, "simulate", *words, "--out", sim, "--quiet")
+            run(alidade, *command(sim), "--out", left, "--quiet", "--no-report")
+            inputs = [word for word in command(sim)[1:] if isinstance(word, pathlib.Path)]
+            number = {"track": "03", "identify": "04"}[name]
+            run(outside / f"{number}_{name}", *inputs, self.folder / f"saved_{name}")
+            for document in (saved := json.loads((self.folder / f"saved_{name}" / "result.json").read_text()),
+                             wanted := json.loads((left / "result.json").read_text())):
+                for key in ("argv", "created_utc", "seconds", "inputs"):
+                    document.pop(key, None)
+            self.assertEqual(saved, wanted, "the library and the command leave the same")
+        self.assertIn("px RMS", run(outside / "05_servo"))
 
     def test_python_module_stands_alone(self):
         module = self.prefix / "lib" / "python3" / "dist-packages"

@@ -318,7 +318,7 @@ class TrackFilm : public TrackCommand {
 TEST_F(TrackFilm, TargetIsFoundInTheFramesAndFollowed) {
   film("1.5");
   const Outcome outcome =
-      watch({"--angles", path("sim/angles.csv"), "--target", "colour:230,70,20", "--truth", path("sim/truth.csv")});
+      watch({"--angles", path("sim/angles.csv"), "--look", "colour:230,70,20", "--truth", path("sim/truth.csv")});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const Json document = Json::parse(read_file(path("out/result.json")));
   for (const Json& video : document["estimate"]["video"]) {

@@ -94,7 +94,7 @@ void add_camera_assumptions(const Camera& camera, const std::vector<ProjectedRea
 /// In which of focal lengths and centre the two are farther apart than calibrations of one camera are; empty: in none.
 std::string difference_of(const Camera& a, const Camera& b) {
   if (a.width_px != b.width_px || a.height_px != b.height_px)
-    return fmt::format("its pictures are {}x{}, not {}x{}", b.width_px, b.height_px, a.width_px, a.height_px);
+    return fmt::format("its images are {}x{}, not {}x{}", b.width_px, b.height_px, a.width_px, a.height_px);
   constexpr double sigmas = 5.0, usual_focal = 0.005, usual_centre_px = 5.0;  // of calibrations on two days
   const std::array<const char*, 4> names{"fx", "fy", "cx", "cy"};
   const Eigen::VectorXd first = params(a.lens), second = params(b.lens);
@@ -225,7 +225,7 @@ BeamProjection project_readings(const Beam& beam, const Camera& camera, const st
       std::ranges::count_if(result.readings, [](const ProjectedReading& one) { return one.pixel.has_value(); });
   result.counts.given = result.readings.size();
   result.counts.used = static_cast<std::size_t>(num_seen);
-  result.verdict.sentence = fmt::format("{} of {} point{} in the picture's model", num_seen, result.readings.size(),
+  result.verdict.sentence = fmt::format("{} of {} point{} in the image's model", num_seen, result.readings.size(),
                                         result.readings.size() == 1 ? "" : "s");
   add_beam_assumptions(result.beam, camera, result.readings, result.assumed);
   add_camera_assumptions(camera, result.readings, result.assumed);
@@ -237,6 +237,7 @@ BeamProjection project_readings(const Beam& beam, const Camera& camera, const st
 RigProjection project_rig(const Rig& rig, const std::vector<double>& pans_rad, const std::vector<double>& tilts_rad,
                           const std::optional<Eigen::Vector3d>& point_in_world) {
   if (const std::string of_rig = fault(rig); !of_rig.empty()) throw ConfigError(of_rig);
+  if (rig.heads.empty()) throw ConfigError("the rig has no heads");
   if (!rig.lens_courses.empty())
     throw ConfigError("intrinsics: change with time, which `project` is not given; give a camera");
   check_angles(pans_rad, "--pan", rig.heads.size());

@@ -183,7 +183,7 @@ void TrackStream::show(Server& server, const TargetObservation& observation, con
   if (step.event == TrackEvent::restart || step.event == TrackEvent::start)
     server.send("/log", t_ns, [t_ns, event = step.event] {
       return log_text(t_ns, event == TrackEvent::start ? LogLevel::info : LogLevel::warning, "track",
-                      event == TrackEvent::start ? "the track starts" : "the track starts anew: it did not fit");
+                      event == TrackEvent::start ? "the track starts" : "the track starts again: it did not fit");
     });
 }
 

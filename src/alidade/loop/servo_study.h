@@ -21,7 +21,7 @@ struct LoopCheck {
   ControllerKind controller;
   LoopAnalysis analysis;
   double loop_gain = 0.0;  ///< Error units of the gains per unit of the plant's output.
-  int delay_samples = 0;   ///< −1: the controller was tried, and `sampled_radius` alone is told.
+  int delay_samples = 0;   ///< −1: the controller was tried, and `sampled_radius` alone is known.
 };
 /// Of `pi`, round plant and image; of `feedforward`, the correction round plant and encoder; of all others, of
 /// `feedforward` on a rate plant, and where a command is a part of a period late or the plant has a second lag, what

@@ -7,7 +7,7 @@
 #include "alidade/camera/camera.h"
 #include "alidade/public.h"
 
-// A lens that zooms: intrinsics that change while a head works, given by an observer or by the truth.
+// A lens that zooms: intrinsics that change while a head works, estimated by an observer, or true.
 
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
@@ -39,7 +39,7 @@ struct Zoomed {
 struct LensCourse {
   std::string name;                    ///< Of the file, for messages.
   std::vector<double> t_s;             ///< Ascending.
-  std::vector<LensNow> lens;           ///< One a time; none where the camera's own intrinsics hold.
+  std::vector<LensNow> lens;           ///< One per time; none where the camera's own intrinsics hold.
   double from_s = 0.0, until_s = 0.0;  ///< What the observer's log spans.
 
   /// Straight between the times; the first and the last hold before and after.

@@ -36,14 +36,14 @@ struct HeadServoOutput {
   ServoEvent event = ServoEvent::waiting;
 };
 
-/// Keeps the target in the middle of one head's image: late images and present encoder readings in, commands out,
+/// Keeps the target in the centre of one head's image: late images and present encoder readings in, commands out,
 /// once a period. What it holds is made at the start; a step allocates nothing. docs/maths/servo.md
 class HeadServo {
  public:
   HeadServo(const RigHead& head, const ServoConfig& config);
 
   HeadServoOutput step(const HeadServoInput& input);
-  /// Readings at which the head would have a pixel's ray in the middle of its image: the measured bearing. None where
+  /// Readings at which the head would have a pixel's ray in the centre of its image: the measured bearing. None where
   /// the lens has no ray there.
   [[nodiscard]] std::optional<Eigen::Vector2d> bearing_of(const HeadObservation& observation) const;
 

@@ -75,12 +75,12 @@ void add_turned(std::span<const RigHead> heads, std::optional<std::size_t> head,
     observation.px[axis] = (axis == 0 ? camera.width_px : camera.height_px) - 1.0 - observation.px[axis];
   };
   const std::string whose = head ? head_name(heads, *head) : "all heads";
-  add("the pictures of " + whose + " are mirrored", "turn u about: then the events fit the rig",
+  add("the images of " + whose + " are mirrored", "mirror u: then the events fit the rig",
       [mirrored](TargetObservation& observation) { mirrored(observation, 0); });
-  add("the pictures of " + whose + " are flipped upside down", "turn v about: then the events fit the rig",
+  add("the images of " + whose + " are flipped upside down", "mirror v: then the events fit the rig",
       [mirrored](TargetObservation& observation) { mirrored(observation, 1); });
-  add("the pictures of " + whose + " are turned by half a turn",
-      "that camera hangs upside down: turn u and v about, or say so in the rig's cam_from_tilt",
+  add("the images of " + whose + " are rotated by half a turn",
+      "that camera hangs upside down: mirror u and v, or say so in the rig's cam_from_tilt",
       [mirrored](TargetObservation& observation) {
         mirrored(observation, 0);
         mirrored(observation, 1);
@@ -113,8 +113,9 @@ std::optional<Explanation> foreign_head(const Observations& observations, std::s
     std::erase_if(others, [&](const TargetObservation& observation) { return observation.head == head; });
     if (others.size() == observations.size() || !tried(others, heads, config).fits) continue;
     if (found) return std::nullopt;  // of two that could be it neither is named
-    found = {"the sights of " + head_name(heads, head) + " agree with none of the other heads, which agree",
-             "its row in the rig file is that of another head, or its events are: leave it out, or place it anew",
+    found = {"the observations of " + head_name(heads, head) + " agree with none of the other heads, which agree",
+             "its row in the rig file is that of another head, or its events are: remove it, or calibrate where it "
+             "stands again",
              true};
   }
   return found;
@@ -128,7 +129,7 @@ std::string clock_text(const ClockShift& shift, std::span<const RigHead> heads) 
                                                : "that of head " + std::to_string(heads[1].head.id);
   return "the clock of " + head_name(heads, shift.head) + " seems " + text_of(1e3 * std::abs(shift.later_s), 2) +
          " ms " + (shift.later_s > 0.0 ? "behind" : "ahead of") + " " + others +
-         ": with its times moved by that the sights are far more probable";
+         ": with its times moved by that the observations are far more probable";
 }
 
 std::optional<Explanation> explanation_of(std::span<const TargetObservation> observations,

@@ -66,7 +66,7 @@ const std::vector<FaultCase>& fault_cases() {
       {"tilt zero of head 2", [](TrackFaults& f) { f.zero_rad[1].y() = -0.01; }, "base_rx_rad|tilt"},
       {"clock ahead", [](TrackFaults& f) { f.clock_s = 0.04; }, "the clock of head 2"},
       {"clock behind", [](TrackFaults& f) { f.clock_s = -0.04; }, "the clock of head 2"},
-      {"clutter", [](TrackFaults& f) { f.clutter = 0.1; }, "left out|larger than stated"},
+      {"clutter", [](TrackFaults& f) { f.clutter = 0.1; }, "rejected|larger than stated"},
       {"swapped", [](TrackFaults& f) { f.swapped = true; }, "heads swapped"},
       {"mirrored", [](TrackFaults& f) { f.mirrored = true; }, "head 2 are mirrored"},
       {"pan sign", [](TrackFaults& f) { f.pan_sign = true; }, "pan of head 2 with the wrong sign"},
@@ -139,7 +139,7 @@ TEST(TrackFaults, OfThreeHeadsTheWrongOneIsNamed) {
           heads[wrong].head.world_from_base.rotation * exp_so3({0.3, 0.4, 0.1});
       const Verdict foreign = track_verdict(track_target(observations, heads, config), observations, heads, config);
       EXPECT_EQ(foreign.exit_code, ExitCode::cannot_tell);
-      EXPECT_NE(foreign.sentence.find("the sights of " + head), std::string::npos) << foreign.sentence;
+      EXPECT_NE(foreign.sentence.find("the observations of " + head), std::string::npos) << foreign.sentence;
       const std::vector<TargetObservation> late = with_shift(observations, {wrong, 0.04});
       const Verdict clock = track_verdict(track_target(late, scene.heads, config), late, scene.heads, config);
       EXPECT_NE(clock.sentence.find("the clock of " + head + " seems"), std::string::npos) << clock.sentence;

@@ -11,7 +11,7 @@
 namespace alidade {
 
 /// Of a filter that learned the errors: each number against what its covariance allows, the most surprising first.
-/// Numbers that the observations hardly tell, and those within the plane of both rays, are left out. `is_supposed`: the
+/// Numbers that the observations hardly tell, and those within the plane of both rays, are omitted. `is_supposed`: the
 /// errors are no one's σ but a question, and the file's numbers may be exact; each is then asked about by itself.
 [[nodiscard]] std::vector<RigFault> rig_faults(std::span<const RigHead> heads, const RigUncertainty& errors,
                                                const Tracker::Learned& learned, bool is_supposed);

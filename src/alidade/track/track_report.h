@@ -51,7 +51,7 @@ struct TrackReport {
   bool sigma_a_is_found = false;
   std::vector<TrackStep> steps;         ///< One per observation, in their order.
   std::vector<PredictedStep> ahead;     ///< One per step, or none.
-  std::vector<PredictedStep> smoothed;  ///< In order of time, one per capture time that was told of; else none.
+  std::vector<PredictedStep> smoothed;  ///< In order of time, one per capture time that can be smoothed; else none.
   std::size_t num_used = 0, num_starts = 0, num_restarts = 0;
   double log_likelihood = 0.0;  ///< Of all innovations, but for a constant.
   /// With truth, after the warm-up; NaN without.

@@ -116,8 +116,14 @@ void LiveRun::keep_pace(double t_s) {
   if (server_) pace_.keep(t_s);
 }
 
-ExitCode LiveRun::finish(Verdict verdict) {
-  const ExitCode code = run_.finish(verdict);
+ExitCode LiveRun::finish(Verdict verdict) { return tell_end(run_.finish(verdict), verdict); }
+
+ExitCode LiveRun::finish(JobOutcome outcome) {
+  const Verdict verdict = outcome.document.verdict;
+  return tell_end(run_.finish(std::move(outcome)), verdict);
+}
+
+ExitCode LiveRun::tell_end(ExitCode code, const Verdict& verdict) {
   if (!server_) return code;
   {
     const std::scoped_lock lock(mutex_);

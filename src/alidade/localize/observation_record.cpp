@@ -73,7 +73,7 @@ bool BackwardPath::take(const ObservationFrame& frame, const PathStep& path) {
   constexpr double doubtful = 0.5;
   if (found && static_cast<double>(found->num_fit) < doubtful * static_cast<double>(placed.size())) {
     for (const StartHypothesis& start :
-         poses_from_known(camera_, frame.observations, config_.target,
+         poses_from_known(camera_, frame.observations, config_.target.points,
                           {config_.filter.sigma_px, config_.sigma_speed_m_s, config_.sigma_rate_rad_s}))
       begin.push_back(start.motion.world_from_cam);
     found = resection(camera_, placed, begin, gate);
@@ -103,9 +103,9 @@ void ObservationRecord::add_points(const LocalizeConfig& config, const Localizat
     SmootherPoint point;
     point.id = feature.id;
     point.point_in_world = feature.values.head<3>();
-    const auto told = std::ranges::find(config.target, feature.id, &KnownPoint::id);
+    const auto told = std::ranges::find(config.target.points, feature.id, &KnownPoint::id);
     const auto birth = births_.find(feature.id);
-    if (told != config.target.end()) {
+    if (told != config.target.points.end()) {
       point.told_in_world = told->point_in_world;
       point.sigma_m = told->sigma_m;
     } else if (birth != births_.end()) {
@@ -157,11 +157,12 @@ std::optional<SmootherProblem> ObservationRecord::problem(const Camera& camera, 
   if (std::ranges::none_of(problem.points, [](const SmootherPoint& point) { return point.told_in_world.has_value(); }))
     return std::nullopt;
   problem.camera = camera;
-  if (num_begun_ == 1) problem.start = config.start;  // else the observations contradicted it
+  if (num_begun_ == 1 && config.start)
+    problem.start = StartHypothesis{config.start->motion, config.start->cov};  // else the observations contradicted it
   problem.sigma_speed_m_s = config.sigma_speed_m_s;
   problem.sigma_rate_rad_s = config.sigma_rate_rad_s;
   problem.period_s = period_s;
-  problem.sigma_scale = config.sigma_scale;
+  problem.sigma_scale = config.filter.sigma_scale;
   problem.filter = config.filter;
   return problem;
 }

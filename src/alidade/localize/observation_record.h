@@ -2,7 +2,8 @@
 
 #include <map>
 
-#include "alidade/localize/localize.h"
+#include "alidade/localize/config.h"
+#include "alidade/localize/filter.h"
 #include "alidade/localize/path_smoother.h"
 
 namespace alidade {

@@ -3,7 +3,7 @@
 #include <map>
 #include <optional>
 
-#include "alidade/localize/localize.h"
+#include "alidade/localize/filter.h"
 
 namespace alidade {
 
@@ -25,12 +25,13 @@ class PointStore {
   struct Point {
     std::size_t num_used = 0;
     int num_gated_in_a_row = 0;
-    bool was_in_map = false;                     ///< What is told of its depth holds where it was first seen.
+    bool was_in_map = false;                     ///< What is given of its depth holds where it was first seen.
     std::optional<Rigid3> first_world_from_cam;  ///< Of a delayed one.
     Eigen::Vector3d first_ray_in_world = Eigen::Vector3d::Zero();
   };
   [[nodiscard]] std::optional<RangePrior> triangulated(const FeatureObservation& observation,
                                                        const LocalizationFilter& filter);
+  [[nodiscard]] const GivenDepth* given_depth(long id) const;
   [[nodiscard]] double usual_depth_m(const LocalizationFilter& filter) const;
 
   const LocalizeConfig* config_;

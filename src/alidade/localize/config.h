@@ -109,6 +109,7 @@ struct LocalizeConfig {
   double period_s = 0.0;  ///< Usual time between frames. 0: the median; of images the least so far.
   bool smooths = true;    ///< With a target: the path is solved again from all observations after the last frame.
   bool restarts = true;   ///< From the target where the innovations say that the path is wrong.
+  int max_points = 0;     ///< In the filter at once, beside the target's; 0: as many as its state holds.
   double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;  ///< At a start from the target or from nothing.
   LocalizationFilterConfig filter = {};
   FilterBankConfig bank = {};
@@ -125,7 +126,7 @@ struct LocalizeConfig {
 };
 
 /// The fields of `config` that a person sets: distortion, calibrate_online, new_points, depth_m, sigma_depth, sigma_px,
-/// sigma_scale, sigma_a_m_s2 and sigma_alpha_rad_s2. Start and target are values that come from files.
+/// sigma_scale, sigma_a_m_s2, sigma_alpha_rad_s2 and max_points. Start and target are values that come from files.
 [[nodiscard]] FieldList fields_of(LocalizeConfig& config);
 
 ALIDADE_PUBLIC_END

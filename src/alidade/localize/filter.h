@@ -59,6 +59,8 @@ class LocalizationFilter {
   /// there already, or the lens sees nothing there.
   bool add(long id, const Eigen::Vector2d& px, const RangePrior& prior, FeatureKind kind = FeatureKind::inverse_depth);
   void remove(long id);
+  /// Whether so many more numbers fit into the state.
+  [[nodiscard]] bool has_room(int count) const { return P_.dim() + count <= config_.state_capacity; }
   /// Inverse depths that are nearly linear become places: half the numbers. Their count.
   int convert_linear();
   /// The camera is elsewhere: correlations with the map end, the map stays.
@@ -114,7 +116,6 @@ class LocalizationFilter {
   };
 
   [[nodiscard]] const Feature* find(long id) const;
-  [[nodiscard]] bool has_room(int count) const;
   void remove_numbers(int offset, int count);
   [[nodiscard]] int num_lens() const { return static_cast<int>(config_.lens_params.size()); }
   /// Derivatives and innovation at nominal ⊞ delta_. False where it is not seen.

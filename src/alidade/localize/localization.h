@@ -107,6 +107,7 @@ struct Localization {
       std::numeric_limits<double>::quiet_NaN();  ///< Of an observation that brings none; of images the least.
   std::size_t num_lost = 0;  ///< Frames without a pose that observations hold: waiting or predicted.
   std::size_t num_restarts = 0;
+  std::size_t num_left = 0;  ///< Times that a point left a full filter.
   std::size_t num_observations = 0, num_used = 0, num_gated = 0, max_seen = 0;
   std::size_t num_known = 0, num_known_gated = 0;
   double nis_per_dof = std::numeric_limits<double>::quiet_NaN();

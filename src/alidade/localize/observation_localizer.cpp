@@ -40,21 +40,76 @@ bool ObservationLocalizer::start(const ObservationFrame& frame) {
   return true;
 }
 
+/// For one point more.
+bool ObservationLocalizer::has_room() const {
+  const LocalizationFilter& filter = engine_.best();
+  if (!filter.has_room(config_.new_points == NewPoints::xyz ? 3 : 6)) return false;
+  const auto num_known = std::ranges::count_if(filter.features(), &Feature::is_known);
+  return config_.max_points == 0 ||
+         static_cast<std::ptrdiff_t>(filter.features().size()) - num_known < config_.max_points;
+}
+
+/// What a point that is not seen now is worth: how much of a look at it would be news of the camera and not of the
+/// point (the pixel's variance over that with which it is expected), times how likely it is seen again soon (it is in
+/// the image or near it, and was seen lately).
+double ObservationLocalizer::value_of(const Feature& feature) const {
+  const auto expected = engine_.best().expected(feature.id);
+  if (!expected) return 0.0;
+  const double information = config_.filter.sigma_px * config_.filter.sigma_px / std::sqrt(expected->S.determinant());
+  const Eigen::Array2d size(engine_.camera().width_px, engine_.camera().height_px), px = expected->px;
+  const double outside = std::max({0.0, (-px / size).maxCoeff(), (px / size - 1.0).maxCoeff()});
+  constexpr double near_share = 0.25, half_life = 30.0;  // of the image's size; frames
+  const double age = static_cast<double>(num_taken_ - points_.last_frame(feature.id));
+  return information * std::exp(-outside / near_share) * std::exp2(-age / half_life);
+}
+
+/// The points that may leave, the first first.
+std::vector<long> ObservationLocalizer::least_useful(const ObservationFrame& frame) const {
+  constexpr double useful = 0.5;
+  std::vector<std::pair<double, long>> worth;
+  for (const Feature& feature : engine_.best().features()) {
+    const bool is_seen = std::ranges::count(frame.observations, feature.id, &FeatureObservation::id) > 0;
+    if (feature.is_known || is_seen) continue;
+    if (const double value = value_of(feature); value < useful) worth.emplace_back(value, feature.id);
+  }
+  std::ranges::sort(worth);
+  std::vector<long> ids;
+  for (const auto& [value, id] : worth) ids.push_back(id);
+  return ids;
+}
+
+void ObservationLocalizer::let_go(long id) {
+  const LocalizationFilter& filter = engine_.best();
+  const auto place = filter.place(id);
+  const auto feature = std::ranges::find(filter.features(), id, &Feature::id);
+  points_.keep({{id, place->point_in_world, place->cov, false, 0}, feature->kind == FeatureKind::xyz});
+  engine_.filters().remove(id);
+  ++num_left_;
+}
+
+/// Where the filter is full, points that are of little use leave for those that are seen; they come back by their
+/// number.
 void ObservationLocalizer::add_new(const ObservationFrame& frame) {
+  std::optional<std::vector<long>> leaving;
+  std::size_t num_gone = 0;
   for (const FeatureObservation& observation : frame.observations) {
     if (engine_.best().has(observation.id)) continue;
     const auto prior = points_.prior_of(observation, engine_.best());
     if (!prior) continue;
+    if (!leaving && !has_room()) leaving = least_useful(frame);
+    while (!has_room() && num_gone < leaving->size()) let_go((*leaving)[num_gone++]);
+    if (!has_room()) continue;
     const FeatureKind kind = config_.new_points == NewPoints::xyz ? FeatureKind::xyz : FeatureKind::inverse_depth;
-    if (engine_.filters().add(observation.id, observation.px, *prior, kind))
-      record_.entered(num_taken_, observation.id, *prior);
+    if (!engine_.filters().add(observation.id, observation.px, *prior, kind)) continue;
+    record_.entered(num_taken_, observation.id, *prior, points_.is_gone(observation.id));
+    points_.entered(observation.id, num_taken_);
   }
 }
 
 /// Points that do not fit several times in a row leave; they may come again.
 void ObservationLocalizer::drop_strangers(const ObservationFrame& frame, const ObservationsReport& report) {
   for (std::size_t i = 0; i < frame.observations.size(); ++i) {
-    if (!points_.is_stranger(frame.observations[i].id, report.outcomes[i])) continue;
+    if (!points_.is_stranger(frame.observations[i].id, report.outcomes[i], num_taken_)) continue;
     engine_.filters().remove(frame.observations[i].id);
     record_.left(frame.observations[i].id);
   }
@@ -111,6 +166,7 @@ bool ObservationLocalizer::restart(const ObservationFrame& frame, Doubt doubt) {
     if (!feature.is_known) unknown.push_back(feature.id);
   for (const long id : unknown) engine_.filters().remove(id);
   engine_.filters().restart(only_where(from));
+  points_.forget_gone();
   record_.begin(num_taken_);
   engine_.forget_doubt();
   num_elsewhere_ = 0;
@@ -165,10 +221,17 @@ void ObservationLocalizer::sum_up(Localization& result) const {
   result.is_board = target.board.has_value();
   std::optional<SmoothedPath> smoothed;
   if (smooths() && engine_.has_begun()) {
-    const auto problem = record_.problem(engine_.camera(), config_, frames_, result.path, engine_.best(), period_s());
+    const auto problem = record_.problem(engine_.camera(), config_, frames_, result.path, engine_.best(),
+                                         points_.gone(engine_.best()), period_s());
     if (problem) smoothed = smooth(*problem, frames_, result);
   }
   engine_.sum_up([this](long id) { return points_.num_used(id); }, result);
+  result.num_left = num_left_;
+  if (engine_.has_begun())
+    for (const GonePoint& each : points_.gone(engine_.best())) {
+      result.map.push_back(each.point);
+      result.map.back().num_seen = points_.num_used(each.point.id);
+    }
   if (smoothed) take_over(*smoothed, result);
   result.known_shift = known_shift(result.map, target.points);
   result.is_behind = is_behind(result.path, target.points, target.seen_from_plus_z);

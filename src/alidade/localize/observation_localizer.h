@@ -27,6 +27,10 @@ class ObservationLocalizer {
   [[nodiscard]] PathStep taken(const ObservationFrame& frame);
   [[nodiscard]] bool start(const ObservationFrame& frame);
   void add_new(const ObservationFrame& frame);
+  [[nodiscard]] bool has_room() const;
+  [[nodiscard]] double value_of(const Feature& feature) const;
+  [[nodiscard]] std::vector<long> least_useful(const ObservationFrame& frame) const;
+  void let_go(long id);
   void drop_strangers(const ObservationFrame& frame, const ObservationsReport& report);
   [[nodiscard]] std::vector<StartHypothesis> elsewhere(const ObservationFrame& frame) const;
   [[nodiscard]] int num_more_explained(const ObservationFrame& frame, const Rigid3& world_from_cam) const;
@@ -40,6 +44,7 @@ class ObservationLocalizer {
   std::vector<double> gaps_s_;            ///< Between frames, growing; where their period is not given.
   double t_s_ = 0.0;                      ///< Of the last frame.
   std::size_t num_taken_ = 0;             ///< Frames.
+  std::size_t num_left_ = 0;              ///< Times that a point left a full filter.
   int num_elsewhere_ = 0;  ///< Frames in a row in which the target says that the camera is somewhere else.
 };
 

@@ -18,9 +18,11 @@ struct PlaceOfPoint {
 class BackwardPath {
  public:
   BackwardPath(const Camera& camera, const LocalizeConfig& config, const LocalizationFilter& filter,
-               const SmootherProblem& problem)
+               std::span<const GonePoint> gone, const SmootherProblem& problem)
       : camera_(camera), config_(config) {
     for (const SmootherPoint& point : problem.points) places_[point.id] = {point.point_in_world, cov_of(filter, point)};
+    for (const GonePoint& each : gone)
+      if (each.is_linear) places_[each.point.id] = {each.point.point_in_world, each.point.cov};
   }
 
   /// The pose of a frame, and its observations in their order; `path` is the filter's. Whether its observations hold
@@ -118,17 +120,32 @@ void ObservationRecord::add_points(const LocalizeConfig& config, const Localizat
   }
 }
 
+void ObservationRecord::add_gone(std::span<const GonePoint> gone, SmootherProblem& problem) const {
+  for (const GonePoint& each : gone) {
+    const auto birth = births_.find(each.point.id);
+    if (!each.is_linear || birth == births_.end()) continue;
+    SmootherPoint point;
+    point.id = each.point.id;
+    point.point_in_world = each.point.point_in_world;
+    point.first_frame = birth->second.frame;
+    point.range = birth->second.range;
+    problem.points.push_back(point);
+  }
+}
+
 std::optional<SmootherProblem> ObservationRecord::problem(const Camera& camera, const LocalizeConfig& config,
                                                           std::span<const ObservationFrame> frames,
                                                           std::span<const PathStep> path,
-                                                          const LocalizationFilter& filter, double period_s) const {
+                                                          const LocalizationFilter& filter,
+                                                          std::span<const GonePoint> gone, double period_s) const {
   SmootherProblem problem;
   add_points(config, filter, problem);
+  add_gone(gone, problem);
   constexpr double max_work = 2e8;  // frames times numbers of the map, squared: seconds
   const double num_frames = static_cast<double>(path.size() - first_frame_);
   const double num_map = 3.0 * static_cast<double>(problem.points.size()) + 20.0;
   if (num_frames * num_map * num_map > max_work) return std::nullopt;
-  BackwardPath back(camera, config, filter, problem);
+  BackwardPath back(camera, config, filter, gone, problem);
   std::size_t first = path.size();
   while (first > first_frame_) {
     --first;

@@ -231,6 +231,11 @@ LocalizeConfig resolved(LocalizeConfig config, const Camera& camera, bool is_of_
     config.filter.sigma_scale = config.sigma_scale.value_or(config.target.sigma_scale);
     config.target.is_scale_given = config.target.is_scale_given || config.sigma_scale;
   }
+  if (config.max_points > 0) {
+    config.features.max_features = config.max_points;
+    config.filter.state_capacity = motion_dim + static_cast<int>(config.filter.lens_params.size()) +
+                                   3 * static_cast<int>(config.target.points.size()) + 6 * config.max_points;
+  }
   if (!is_of_images) {
     if (config.sigma_px) config.filter.sigma_px = *config.sigma_px;
     return config;

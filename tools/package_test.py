@@ -105,6 +105,15 @@ class Package(unittest.TestCase):
         self.assertIn("head2.base_x_m", said)
         self.assertIn("heads", (self.folder / "rig.yaml").read_text())
 
+        sea, result = self.folder / "sea", self.folder / "localized"
+        run(alidade, "simulate", "underwater", "--points", "20", "--frames", "40", "--rate", "30", "--out", sea, "--quiet")
+        words = [sea / "sights.csv", sea / "camera.yaml", sea / "target.yaml"]
+        self.assertIn("localised in 40 of 40 frames", run(outside / "08_localize", *words, cwd=self.folder))
+        run(alidade, "localize", words[0], "--camera", words[1], "--target", words[2], "--out", self.folder / "command",
+            "--quiet", "--no-report")
+        for name in ("trajectory.tum", "poses.csv", "map.csv", "map.ply"):
+            self.assertEqual((result / name).read_text(), (self.folder / "command" / name).read_text(), name)
+
     def test_pkg_config_links(self):
         environment = {**os.environ, "PKG_CONFIG_PATH": str(self.library.parent / "pkgconfig")}
         flags = run("pkg-config", "--cflags", "--libs", "alidade", env=environment).split()

@@ -4,6 +4,7 @@
 #include "alidade/calibrate.h"
 #include "alidade/files.h"
 #include "alidade/identify.h"
+#include "alidade/localize.h"
 #include "alidade/network.h"
 #include "alidade/observe.h"
 #include "alidade/project.h"

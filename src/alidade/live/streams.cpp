@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "alidade/live/foxglove.h"
-#include "alidade/results/localize_document.h"
+#include "alidade/results/localize_outcome.h"
 #include "alidade/results/observe_document.h"
 #include "alidade/results/servo_outcome.h"
 #include "alidade/results/track_document.h"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "alidade/live/server.h"
-#include "alidade/localize/localize.h"
+#include "alidade/localize/localization.h"
 #include "alidade/loop/servo_study.h"
 #include "alidade/observe/observer.h"
 #include "alidade/results/result_document.h"

@@ -24,6 +24,7 @@ build:
 	@echo "build: $(out)/alidade, and the Python module in $(out)/python"
 	@cmake --preset release >/dev/null
 	@ninja -C $(out) $(jobs) programs
+	@[ build/editor/compile_commands.json -nt CMakeLists.txt ] || cmake --preset editor >/dev/null
 
 # PREFIX=/usr/local, or another place; DESTDIR for packages.
 install:
@@ -117,7 +118,7 @@ study:
 format:
 	@tools/setup tidy
 	@echo "format: every source file"
-	@git ls-files '*.h' '*.cpp' | xargs clang-format -i
+	@git ls-files '*.h' '*.cpp' | xargs clang-format-14 -i
 
 tidy:
 	@tools/setup build test tidy

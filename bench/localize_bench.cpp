@@ -5,7 +5,7 @@
 #include <chrono>
 #include <string>
 
-#include "alidade/localize/localize_images.h"
+#include "alidade/localize.h"
 #include "alidade/testing/localize_sample.h"
 #include "alidade/testing/room_video.h"
 #include "run_benchmarks.h"
@@ -29,11 +29,11 @@ Ready ready(int num_features, FeatureKind kind) {
   const testing::UnderwaterSample sample = testing::underwater_sample(scene, 1);
   LocalizationFilterConfig config;
   // As large as the map, as in a run: a larger one would not be in the cache after it was copied.
-  config.state_capacity = motion_dim + 3 * static_cast<int>(sample.config.target.size()) + 6 * num_features;
+  config.state_capacity = motion_dim + 3 * static_cast<int>(sample.config.target.points.size()) + 6 * num_features;
   config.observations_capacity = 320;
   config.linear_below = kind == FeatureKind::xyz ? 1e9 : 0.0;
   Ready made{LocalizationFilter(sample.camera, sample.config.start->motion, sample.config.start->cov, config), {}};
-  for (const KnownPoint& point : sample.config.target)
+  for (const KnownPoint& point : sample.config.target.points)
     made.filter.add_known(point.id, point.point_in_world, point.sigma_m);
   for (const ObservationFrame& frame : sample.frames) {
     made.filter.predict(scene.dt_s);
@@ -88,15 +88,15 @@ void time_frames(benchmark::State& state) {
   std::vector<cv::Mat> film;
   for (const Rigid3& world_from_cam : testing::room_path(scene))
     film.push_back(testing::render_room(scene, world_from_cam, film.size()));
-  LocalizeImagesConfig config;
-  config.localize.filter.sigma_a_m_s2 = 4.0;
-  config.localize.filter.sigma_alpha_rad_s2 = 6.0;
-  config.localize.seconds = [] {
+  LocalizeConfig config;
+  config.filter.sigma_a_m_s2 = 4.0;
+  config.filter.sigma_alpha_rad_s2 = 6.0;
+  config.seconds = [] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
   };
   config.target = rectangle_target(scene.rectangle_width_m, scene.rectangle_height_m);
-  config.eyes.min_found = 100;
-  config.eyes.max_tried = config.eyes.max_features = 120;
+  config.features.min_found = 100;
+  config.features.max_tried = config.features.max_features = 120;
   for (auto _ : state) {
     std::size_t at = 0;
     const NextImage next = [&](cv::Mat& grey, long& frame, double& t_s) {
@@ -106,7 +106,7 @@ void time_frames(benchmark::State& state) {
       t_s = static_cast<double>(at++) / scene.rate_hz;
       return true;
     };
-    const LocalizeReport report = localize_images(scene.camera, next, film.size(), config);
+    const Localization report = localize(ImageStream{next, film.size()}, scene.camera, config);
     std::vector<double> seconds, found, features;
     for (const PathStep& step : report.path) {
       seconds.push_back(step.seconds);

@@ -22,7 +22,7 @@ void time_solve(benchmark::State& state, RangefinderMethod method, Refine refine
   config.refine = refine;
   if (tells_sigma) {
     config.sigma_spot_px = 0.3;
-    config.range_noise = RangeNoise{0.002};
+    config.sigma_range_m = 0.002;
   }
   for (auto _ : state) {
     const RangefinderReport report = calibrate_rangefinder(shots, points, scene.camera, config);

@@ -9,7 +9,7 @@
 
 #include "alidade/reproduce/track_trials.h"
 #include "alidade/servo/identify.h"
-#include "alidade/simulate/servo.h"
+#include "alidade/testing/servo_sample.h"
 #include "alidade/track/track.h"
 #include "alidade/track/track_assumed.h"
 
@@ -36,7 +36,7 @@ Outcome tracked(const std::string& scenario, const std::function<void(TrackFault
   TrackScene scene = *track_scenario(scenario);
   fault(scene.faults);
   const std::vector<TargetObservation> observations = reproduce::observations_of(scene, seed);
-  const TrackConfig config;
+  const FollowConfig config;
   const TrackReport report = track_target(observations, scene.heads, config);
   Verdict verdict = track_verdict(report, observations, scene.heads, config);
   Outcome outcome;
@@ -63,20 +63,8 @@ Ladder of_track(const std::string& scenario, const std::string& name, const std:
           }};
 }
 
-ServoLogScene log_scene(bool is_rate_plant) {
-  ServoLogScene scene;
-  if (is_rate_plant) {
-    RatePlant plant{0.3, AngleUnit::deg, 0.1};
-    plant.max_rate_rad_s = plant.max_acceleration_rad_s2 = 1e9;
-    scene.axis.plant = plant;
-  }
-  scene.axis.command_delay_s = 0.083;
-  return scene;
-}
-
 Outcome identified(const ServoLogScene& scene, std::size_t flaw, std::uint64_t seed) {
-  std::vector<ServoSample> log;
-  for (const ServoLogRow& row : simulate_servo_log(scene, seed)) log.push_back({row.t_s, row.command, row.angle_rad});
+  const std::vector<ServoSample> log = testing::log_of(scene, seed);
   const ServoIdentification servo = identify_servo(log);
   const Verdict verdict = identify_verdict(log, servo);
   const ServoFit& fit = servo.fit;
@@ -91,7 +79,7 @@ Ladder of_axis(const std::string& kind, std::size_t flaw, std::vector<double> si
                const std::function<void(ServoLogScene&, double)>& set) {
   return {"identify " + kind + ": " + servo_flaw_words[flaw], servo_flaw_units[flaw], std::move(sizes),
           [kind, flaw, set](double size, std::uint64_t seed) {
-            ServoLogScene scene = log_scene(kind == "rate");
+            ServoLogScene scene = testing::late_scene(kind == "rate", {0.3, AngleUnit::deg, 0.1});
             set(scene, size);
             return identified(scene, flaw, seed);
           }};

@@ -90,6 +90,8 @@ bool print_goals(bool met) {
   return met;
 }
 
+std::string word_of(DistortionVariant variant) { return words_code(variant, distortion_words()).write(); }
+
 bool study_protocol(int num) {
   fmt::print("\n## The protocol, three lenses\n\nDepths 3 %, points as places; {} sequences.\n", num);
   print_head("lens, filter");
@@ -97,10 +99,10 @@ bool study_protocol(int num) {
   for (const DistortionVariant variant :
        {DistortionVariant::none, DistortionVariant::radial1, DistortionVariant::full}) {
     auto& those = runs[static_cast<std::size_t>(variant)];
-    print_row(std::string(variant_name(variant)) + ", all at once, one start",
+    print_row(word_of(variant) + ", all at once, one start",
               run_all(num, 0.03, variant, paper_filter(), 1, FeatureKind::xyz));
     those = run_all(num, 0.03, variant, recommended_filter(), 5, FeatureKind::xyz);
-    print_row(std::string(variant_name(variant)) + ", recommended", those);
+    print_row(word_of(variant) + ", recommended", those);
   }
   const auto& [none, radial1, full] = runs;
   const double p1 = mean(of(full, &ProtocolRun::p1_mean));
@@ -187,7 +189,7 @@ DisturbedResult run_disturbed(const Disturbance& what, int num) {
   DisturbedResult result;
   for (int seed = 0; seed < num; ++seed) {
     const UnderwaterSample sample = disturbed(what, 600000 + static_cast<std::uint64_t>(seed));
-    const LocalizeReport report = localize_observations(sample.camera, sample.frames, sample.config, sample.truth);
+    const Localization report = localize(sample.frames, sample.camera, sample.config, sample.truth);
     std::size_t lost = 0;
     for (std::size_t k = 0; k < report.path.size(); ++k) {
       if (sample.frames[k].observations.empty()) continue;

@@ -26,7 +26,7 @@ RigUncertainty calibrated(const std::vector<RigHead>& heads) {
 }
 
 /// Observations a second, as a camera would give them: gates, history and all. items/s is what the goal speaks of.
-void time_observations(benchmark::State& state, const std::string& scenario, TrackMethod method, bool counts) {
+void time_observations(benchmark::State& state, const std::string& scenario, TargetMotion method, bool counts) {
   const TrackScene scene = *track_scenario(scenario);
   std::vector<TargetObservation> observations;
   for (const SimulatedObservation& s : simulate_track(scene, 1))
@@ -45,10 +45,10 @@ void time_observations(benchmark::State& state, const std::string& scenario, Tra
 }
 
 void add_all() {
-  for (const TrackMethod method : {TrackMethod::cv, TrackMethod::singer, TrackMethod::turn, TrackMethod::imm}) {
+  for (const TargetMotion method : {TargetMotion::cv, TargetMotion::singer, TargetMotion::turn, TargetMotion::imm}) {
     for (const std::string scenario : {"B", "C", "G"}) {
       for (const bool counts : {false, true}) {
-        const std::string name = "track/" + std::string(method_name(method)) + "/" + scenario;
+        const std::string name = "track/" + std::string(motion_name(method)) + "/" + scenario;
         benchmark::RegisterBenchmark((name + (counts ? "/errors" : "")).c_str(), [=](benchmark::State& state) {
           time_observations(state, scenario, method, counts);
         });

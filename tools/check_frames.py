@@ -3,7 +3,8 @@
 
     cam_from_world * world_from_board      cam_from_board * point_in_board      world_from_cam.inverse() * point_in_world
 
-and what a product is assigned to must have its outer names: cam_from_board = cam_from_world * world_from_board.
+and what a product is assigned to must have its outer names: cam_from_board = cam_from_world * world_from_board. A column
+or key of a document has the frame of the value that it is written from: add("target_in_world_", target_in_world).
 """
 import pathlib
 import re
@@ -16,6 +17,8 @@ TRANSFORM = re.compile(rf"\b{OWNER}(?:\w+_)?(?P<to>{WORD})_from_(?P<frm>{WORD})\
 POINT = re.compile(rf"\b{OWNER}[a-z]\w*_in_(?P<at>{WORD})\b(?:{TAIL})")
 ASSIGNED = re.compile(rf"(?:(?:\b|_)(?P<to>{WORD})_from_(?P<frm>{WORD})|\b[a-z]\w*_in_(?P<at>{WORD}))\s*(?:=|\{{|\()\s*$")
 TIMES = re.compile(r"\s*\*\s*")
+COLUMN = re.compile(rf'"[^"]*?_in_(?P<at>{WORD})(?:_[^"]*)?"')
+FRAMES = {"world", "map", "board", "base", "pan", "tilt", "head", "cam", "body"}  # of what documents tell
 END = re.compile(r"\s*(?:;|\}\s*;|$)")
 
 
@@ -61,6 +64,14 @@ def faults_of(code):
             yield f"{'_from_'.join(target)} is assigned {'_from_'.join(result)}"
 
 
+def column_faults_of(code):
+    """Names of columns in one line that say another frame than the values beside them."""
+    values = {point["at"] for point in POINT.finditer(re.sub(r'"[^"]*"', '""', code))} & FRAMES
+    for column in COLUMN.finditer(code):
+        if column["at"] in FRAMES and values and column["at"] not in values:
+            yield f"column {column[0]} holds a point in {' or '.join(sorted(values))}"
+
+
 def main(folders):
     files = sorted(p for folder in folders for p in pathlib.Path(folder).rglob("*") if p.suffix in {".h", ".cpp"})
     faults, products = [], 0
@@ -68,7 +79,7 @@ def main(folders):
         for number, line in enumerate(file.read_text().splitlines(), 1):
             code = line.split("//")[0]
             products += sum(1 for _ in chains_of(code))
-            faults += [f"{file}:{number}: {fault}" for fault in faults_of(code)]
+            faults += [f"{file}:{number}: {fault}" for fault in [*faults_of(code), *column_faults_of(code)]]
     print("\n".join(faults) or f"frames ok ({products} products in {len(files)} files)")
     return bool(faults)
 

@@ -90,6 +90,14 @@ class Frames(unittest.TestCase):
         self.assert_refused("const Rigid3 board_from_cam = cam_from_world * world_from_board;", "board_from_cam is assigned cam_from_board")
         self.assert_refused("const Vec point_in_world = cam_from_world * point_in_world;", "world is assigned cam")
 
+    def test_a_column_has_the_frame_of_its_value(self):
+        self.assert_refused('add(table, "target_in_base_", "_m", std::move(target_in_world));',
+                            'column "target_in_base_" holds a point in world')
+        self.assert_refused('estimate["point_in_cam_m"] = numbers(ray.origin_in_world);',
+                            'column "point_in_cam_m" holds a point in world')
+        self.assert_allowed('add(table, "target_in_world_", "_m", std::move(target_in_world));')
+        self.assert_allowed('estimate["rms_in_sigmas"] = rms(point_in_world);')
+
     def test_products_that_cancel_are_allowed(self):
         self.assert_allowed("const Rigid3 cam_from_board = cam_from_world * world_from_board;")
         self.assert_allowed("const Vec point_in_cam = view.cam_from_board * point_in_board;")

@@ -2,6 +2,7 @@
 """What others build on: package_test.py BUILD. Installs the build into a folder, and uses it from outside the tree: by
 find_package, by pkg-config, by add_subdirectory (configured only). Headers that are installed include installed ones,
 Eigen and std; the library shows nothing that they do not declare; the man pages and the completion are there."""
+import json
 import os
 import pathlib
 import re
@@ -48,6 +49,26 @@ class Package(unittest.TestCase):
         fx = {name: float(re.search(r"fx\D+([\d.]+)", run(alidade, "camera", "show", file)).group(1))
               for name, file in (("library", camera), ("command", self.folder / "result" / "camera.yaml"))}
         self.assertAlmostEqual(fx["library"], fx["command"], places=2, msg="the library and the command say the same")
+        self.follow_a_target(outside, alidade)
+
+    def follow_a_target(self, outside, alidade):
+        """The examples of heads: what they leave is what the commands leave."""
+        for name, words, command in (
+                ("track", ("track", "--scenario", "B"), lambda sim: ("track", sim / "events.csv", "--rig", sim / "rig.yaml",
+                                                                     "--sigma-a", "1", "--sigma-px", "0.5")),
+                ("identify", ("servo",), lambda sim: ("identify", sim / "log.csv"))):
+            sim, left = self.folder / f"sim_{name}", self.folder / f"left_{name}"
+            run(alidade, "simulate", *words, "--out", sim, "--quiet")
+            run(alidade, *command(sim), "--out", left, "--quiet", "--no-report")
+            inputs = [word for word in command(sim)[1:] if isinstance(word, pathlib.Path)]
+            number = {"track": "03", "identify": "04"}[name]
+            run(outside / f"{number}_{name}", *inputs, self.folder / f"saved_{name}")
+            for document in (saved := json.loads((self.folder / f"saved_{name}" / "result.json").read_text()),
+                             wanted := json.loads((left / "result.json").read_text())):
+                for key in ("argv", "created_utc", "seconds", "inputs"):
+                    document.pop(key, None)
+            self.assertEqual(saved, wanted, "the library and the command leave the same")
+        self.assertIn("px RMS", run(outside / "05_servo"))
 
     def test_python_module_stands_alone(self):
         module = self.prefix / "lib" / "python3" / "dist-packages"
@@ -55,6 +76,43 @@ class Package(unittest.TestCase):
             self.skipTest("the module was not built")
         run("/usr/bin/python3", "-W", "error", "-c", "import alidade as al; al.simulate.track(scenario='C')", cwd=self.folder,
             env={**os.environ, "PYTHONPATH": str(module)})
+
+    def test_the_observe_example_leaves_what_the_command_leaves(self):
+        outside, alidade, log = self.folder / "examples", self.prefix / "bin" / "alidade", self.folder / "rotation"
+        run("cmake", "-S", ROOT / "examples", "-B", outside, f"-DCMAKE_PREFIX_PATH={self.prefix}")
+        run("cmake", "--build", outside, "--target", "02_observe")
+        run(alidade, "simulate", "rotation", "--duration", "6", "--out", log, "--quiet")
+        said = run(outside / "02_observe", log / "log.csv", "780", "582", self.folder / "observed")
+        self.assertIn("start", said)
+        run(alidade, "observe", log / "log.csv", "--size", "780x582", "--out", self.folder / "observe", "--quiet")
+        for name in ("camera.yaml", "intrinsics.csv"):
+            texts = {(self.folder / folder / name).read_text() for folder in ("observed", "observe")}
+            self.assertEqual(len(texts), 1, f"{name}: the library and the command leave the same")
+
+    def test_examples_of_rangefinder_and_rig_run(self):
+        outside, alidade = self.folder / "examples_67", self.prefix / "bin" / "alidade"
+        run("cmake", "-S", ROOT / "examples", "-B", outside, f"-DCMAKE_PREFIX_PATH={self.prefix}")
+        run("cmake", "--build", outside, "--target", "06_rangefinder", "07_rig")
+        shots, views = self.folder / "shots", self.folder / "views"
+        run(alidade, "simulate", "rangefinder", "--out", shots, "--quiet")
+        said = run(outside / "06_rangefinder", shots / "shots.csv", shots / "camera.yaml", shots / "corners.csv",
+                   self.folder / "beam")
+        self.assertIn("origin_x_m", said)
+        self.assertTrue((self.folder / "beam" / "rangefinder.yaml").exists())
+        run(alidade, "simulate", "rig", "--out", views, "--quiet")
+        said = run(outside / "07_rig", views / "views.csv", views / "camera_1.yaml", views / "camera_2.yaml",
+                   self.folder / "rig.yaml")
+        self.assertIn("head2.base_x_m", said)
+        self.assertIn("heads", (self.folder / "rig.yaml").read_text())
+
+        sea, result = self.folder / "sea", self.folder / "localized"
+        run(alidade, "simulate", "underwater", "--points", "20", "--frames", "40", "--rate", "30", "--out", sea, "--quiet")
+        words = [sea / "sights.csv", sea / "camera.yaml", sea / "target.yaml"]
+        self.assertIn("localised in 40 of 40 frames", run(outside / "08_localize", *words, cwd=self.folder))
+        run(alidade, "localize", words[0], "--camera", words[1], "--target", words[2], "--out", self.folder / "command",
+            "--quiet", "--no-report")
+        for name in ("trajectory.tum", "poses.csv", "map.csv", "map.ply"):
+            self.assertEqual((result / name).read_text(), (self.folder / "command" / name).read_text(), name)
 
     def test_pkg_config_links(self):
         environment = {**os.environ, "PKG_CONFIG_PATH": str(self.library.parent / "pkgconfig")}

@@ -1,5 +1,7 @@
 #include "cli/app/field_options.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
@@ -23,6 +25,13 @@ CLI::Option* add_option(CLI::App& command, const Field& field, const std::string
       for (std::size_t i = 0; i < parts.size(); ++i) set_or_throw(field, name, parts[i], i == 0);
     };
     return command.add_option_function<std::vector<std::string>>(name, take, field.help)->delimiter(',');
+  }
+  if (const auto* code = std::get_if<TextCode>(&field.value); code && code->num_parts != 1) {
+    const auto take = [field, name](const std::vector<std::string>& parts) {
+      set_or_throw(field, name, fmt::format("{}", fmt::join(parts, ",")));
+    };
+    CLI::Option* option = command.add_option_function<std::vector<std::string>>(name, take, field.help);
+    return code->num_parts == 0 ? option : option->delimiter(',')->expected(code->num_parts);
   }
   return command.add_option_function<std::string>(
       name, [field, name](const std::string& text) { set_or_throw(field, name, text); }, field.help);

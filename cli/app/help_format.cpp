@@ -19,7 +19,9 @@ std::string range_of(const std::string& checks) {
 }  // namespace
 
 std::string words_of_type(const std::string& type_and_checks) {
-  const std::size_t colon = type_and_checks.find(':');
+  std::size_t colon = type_and_checks.find(':');
+  // NAME=VALUE:SIGMA is a form, and no type with a check.
+  if (const std::size_t equals = type_and_checks.find('='); equals < colon) colon = std::string::npos;
   std::string type = type_and_checks.substr(0, colon);
   const std::string checks = colon == std::string::npos ? "" : type_and_checks.substr(colon + 1);
   if (checks.starts_with('{')) {
@@ -36,7 +38,8 @@ std::string HelpFormat::make_option_opts(const CLI::Option* option) const {
   std::string text;
   if (option->get_type_size() != 0) {
     if (!option->get_type_name().empty()) text += " " + words_of_type(option->get_type_name());
-    if (option->get_expected_max() == CLI::detail::expected_max_vector_size)
+    const bool says_list = text.find("...") != std::string::npos;
+    if (!says_list && option->get_expected_max() == CLI::detail::expected_max_vector_size)
       text += " ...";
     else if (option->get_expected_min() > 1)
       text += " x " + std::to_string(option->get_expected());

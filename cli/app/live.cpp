@@ -116,9 +116,13 @@ void LiveRun::keep_pace(double t_s) {
   if (server_) pace_.keep(t_s);
 }
 
-ExitCode LiveRun::finish(Verdict verdict) {
-  const ExitCode code = run_.finish(verdict);
+ExitCode LiveRun::finish(Verdict verdict) { return tell_end(run_.finish(std::move(verdict))); }
+
+ExitCode LiveRun::finish(JobOutcome outcome) { return tell_end(run_.finish(std::move(outcome))); }
+
+ExitCode LiveRun::tell_end(ExitCode code) {
   if (!server_) return code;
+  const Verdict& verdict = run_.document.verdict;
   {
     const std::scoped_lock lock(mutex_);
     result_ = run_.result();
@@ -131,9 +135,8 @@ ExitCode LiveRun::finish(Verdict verdict) {
       "/log", 0, [=, this] { return live::log_text(0, level, run_.document.command, sentence); }, 0, true);
   server_->send(
       live::end_topic, 0,
-      [=] {
-        return Json{{"state", state_name(verdict.state)}, {"exit_code", static_cast<int>(code)}, {"sentence", sentence}}
-            .dump();
+      [code, sentence, state = verdict.state] {
+        return Json{{"state", state_name(state)}, {"exit_code", static_cast<int>(code)}, {"sentence", sentence}}.dump();
       },
       0, true);
   constexpr double max_s = 3.0;  // for a browser on a busy machine to fetch the result

@@ -48,8 +48,10 @@ class LiveRun {
   void keep_pace(double t_s);
   /// run.finish(), and gives clients the time to fetch the result.
   [[nodiscard]] ExitCode finish(Verdict verdict);
+  [[nodiscard]] ExitCode finish(JobOutcome outcome);
 
  private:
+  ExitCode tell_end(ExitCode code);
   [[nodiscard]] live::HttpAnswer answer(std::string_view path);
   [[nodiscard]] std::string document_so_far(bool has_data);
 

@@ -14,6 +14,7 @@ void add_commands(App& app) {
   add_rangefinder(app);
   add_reproduce(app);
   add_rig(app);
+  add_schema(app);
   add_servo(app);
   add_simulate(app);
   add_track(app);

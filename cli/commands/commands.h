@@ -23,6 +23,7 @@ void add_rig(App& app);
 void add_rig_scenario(App& app);          ///< Of `simulate`.
 void add_rangefinder_scenario(App& app);  ///< Of `simulate`.
 void add_rotation_scenario(App& app);     ///< Of `simulate`.
+void add_schema(App& app);
 void add_servo(App& app);
 void add_servo_scenario(App& app);  ///< Of `simulate`.
 void add_simulate(App& app);
@@ -31,7 +32,8 @@ void add_track_scenario(App& app);       ///< Of `simulate`.
 void add_underwater_scenario(App& app);  ///< Of `simulate`.
 void add_view(App& app);
 
-// How to write a command: cli/NAME.cpp with one function `add_NAME(App&)`, declared here and called in commands.cpp.
+// How to write a command: cli/commands/NAME.cpp with one function `add_NAME(App&)`, declared here and called in
+// commands.cpp.
 //
 //   ExitCode calibrate(const CalibrateArgs& args, Run& run) {
 //     const std::string text = read_file(args.file);            // reading throws InputError → exit 3
@@ -55,7 +57,7 @@ void add_view(App& app);
 //
 // --out, --json, --quiet, --no-report, --threads (and --seed where chance is) are there already. A verdict with exit
 // code cannot_tell or no_convergence becomes the line `alidade: error: calibrate: SENTENCE; TO_ADD`. Do not print, do
-// not catch, do not use CLI::ExistingFile (a missing file is exit 3, not 2); numbers: see option_checks.h; wrong
+// not catch, do not use CLI::ExistingFile (a missing file is exit 3, not 2); numbers: see app/option_checks.h; wrong
 // combinations of options: throw UsageError("--fix: 'k9' is not a parameter of brown"). nlohmann-json is at hand in the
 // .cpp.
 

@@ -85,9 +85,9 @@ TEST_F(LocalizeImageFolders, NamesAImageThatCannotBe) {
 TEST_F(LocalizeImageFolders, WhatShowsNothingIsRefused) {
   const cv::Mat grey(576, 768, CV_8U, cv::Scalar(128));
   for (int i = 0; i < num_frames; ++i) cv::imwrite(frame(i), grey);
-  expect_refused("sim/frames", {"--rate", "30"}, 4, "the target is not found in any of 12 pictures");
+  expect_refused("sim/frames", {"--rate", "30"}, 4, "the target is not found in any of 12 images");
   for (int i = 0; i < num_frames; ++i) cv::imwrite(frame(i), cv::Mat::zeros(576, 768, CV_8U));
-  expect_refused("sim/frames", {"--rate", "30"}, 4, "the target is not found in any of 12 pictures");
+  expect_refused("sim/frames", {"--rate", "30"}, 4, "the target is not found in any of 12 images");
 }
 
 /// Clean rendered images are matched better than real ones: the verdict says so, and what to tell.

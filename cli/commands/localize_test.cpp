@@ -117,7 +117,7 @@ TEST_F(LocalizeCommand, ATargetThatIsNotThereIsSaid) {
   with_ids({{'2', "4"}, {'4', "6"}, {'6', "8"}, {'8', "2"}});
   const Outcome elsewhere = localize(told());
   EXPECT_EQ(elsewhere.code, 5) << elsewhere.out;
-  EXPECT_THAT(elsewhere.err, ::testing::HasSubstr("the target is not where it is told to be"));
+  EXPECT_THAT(elsewhere.err, ::testing::HasSubstr("the target is not where it is given"));
 }
 
 TEST_F(LocalizeCommand, WhatIsGivenWithoutSigmaIsSaid) {
@@ -145,12 +145,12 @@ TEST_F(LocalizeCommand, WhatIsGivenWithoutSigmaIsSaid) {
 /// Nothing but the side from which a flat target is seen tells that it, or the images, are mirrored.
 TEST_F(LocalizeCommand, AMirroredTargetIsAskedAbout) {
   simulate({"--points", "30", "--frames", "60", "--rate", "30"});
-  std::vector<KnownPoint> points = read_target(path("sim/target.yaml"));
+  std::vector<KnownPoint> points = read_target(path("sim/target.yaml")).points;
   for (KnownPoint& point : points) point.point_in_world.x() *= -1.0;
   write_file(path("mirrored.yaml"), target_text(points));
   const Outcome asked = localize({"--target", path("mirrored.yaml"), "--json"});
   EXPECT_NE(Json::parse(asked.out)["verdict"]["state"], "good");
-  EXPECT_THAT(asked.out, ::testing::HasSubstr("are they, or the pictures, mirrored?"));
+  EXPECT_THAT(asked.out, ::testing::HasSubstr("are they, or the images, mirrored?"));
   write_file(path("mirrored.yaml"), target_text(points) + "seen_from: +z\n");
   const Outcome meant = localize({"--target", path("mirrored.yaml"), "--json"});
   EXPECT_EQ(meant.out.find("mirrored?"), std::string::npos) << meant.out;

@@ -184,10 +184,10 @@ TEST_F(RigCommand, ProjectPrintsMatricesAndPixels) {
 }
 
 TEST_F(RigCommand, WhatCannotBeToldIsRefusedByName) {
-  for (const auto& [scenario, words] :
-       std::vector<std::array<std::string, 2>>{{"pan_only", "pan only: its tilt axis cannot be told; tilt the head"},
-                                               {"tilt_only", "tilt only: its pan axis cannot be told; pan the head"},
-                                               {"unlinked", "shares no board with another head"}}) {
+  for (const auto& [scenario, words] : std::vector<std::array<std::string, 2>>{
+           {"pan_only", "pan only: its tilt axis cannot be determined; tilt the head"},
+           {"tilt_only", "tilt only: its pan axis cannot be determined; pan the head"},
+           {"unlinked", "shares no board with another head"}}) {
     simulate({"--scenario", scenario});
     const Outcome outcome = calibrate(path("sim/views.csv"));
     EXPECT_EQ(outcome.code, 4) << scenario << outcome.err;

@@ -1,3 +1,5 @@
+#include "alidade/servo.h"
+
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -5,7 +7,7 @@
 #include <memory>
 
 #include "alidade/live/streams.h"
-#include "alidade/results/servo_document.h"
+#include "alidade/results/servo_outcome.h"
 #include "alidade/tables/servo_scenario_file.h"
 #include "cli/app/app.h"
 #include "cli/app/live.h"
@@ -34,8 +36,6 @@ ServoScenario with_options(ServoScenario scenario, const ServoArgs& args) {
   }
   if (args.seeds > 0) scenario.num_seeds = args.seeds;
   if (args.latency_ms >= 0.0) scenario.scene.latency_s = 1e-3 * args.latency_ms;
-  if (scenario.scene.latency_s > 200.0 * scenario.scene.period_s)
-    throw UsageError("--latency-ms: is more than 200 pictures late");
   if (args.gain_factor > 0.0) scenario.scene.mismatch.gain = args.gain_factor;
   if (args.tau_factor > 0.0) scenario.scene.mismatch.tau = args.tau_factor;
   if (!args.intrinsics.empty()) scenario.scene.intrinsics = *lens_knowledge_named(args.intrinsics);
@@ -43,78 +43,31 @@ ServoScenario with_options(ServoScenario scenario, const ServoArgs& args) {
   return scenario;
 }
 
-void summarize(const ServoStudy& study, Run& run) {
-  run.say("controller    RMS px   95 % px   max px   central third   in picture");
-  for (const ServoComparison& compared : study.comparison) {
-    const ServoFigures& figures = compared.figures;
-    run.say(fmt::format("{:<12} {:7.2f} {:9.2f} {:8.2f} {:13.1f} % {:10.1f} %{}", controller_name(compared.controller),
-                        figures.rms_px, figures.p95_px, figures.max_px, 100.0 * figures.central_third,
-                        100.0 * figures.in_image,
-                        figures.num_lost > 0 ? fmt::format("   lost {}, found {}, {:.1f} s of search", figures.num_lost,
-                                                           figures.num_found, figures.search_s)
-                                             : ""));
-  }
-}
-
-/// The best controller by the intrinsics that its loop goes by.
-void summarize_lenses(const ServoStudy& study, Run& run) {
-  if (study.lenses.empty()) return;
-  run.say(fmt::format("intrinsics    RMS px   95 % px   max px   in picture   fx off by   ({})",
-                      controller_name(study.best)));
-  for (const LensComparison& compared : study.lenses) {
-    const ServoFigures& figures = compared.figures;
-    run.say(fmt::format("{:<12} {:7.2f} {:9.2f} {:8.2f} {:10.1f} % {:9.2g} %", lens_knowledge_name(compared.knowledge),
-                        figures.rms_px, figures.p95_px, figures.max_px, 100.0 * figures.in_image,
-                        100.0 * figures.focal_share));
-  }
-}
-
 /// What a run held to the wall clock says of its steps.
-void tell_pace(const Pace& pace, Run& run) {
-  JsonValue& told = run.document.estimate["realtime"];
+void tell_pace(const Pace& pace, JobOutcome& outcome) {
+  JsonValue& told = outcome.document.estimate["realtime"];
   told["steps"] = pace.num_steps();
   told["steps_late"] = pace.num_late();
   told["worst_late_s"] = pace.worst_late_s();
-  run.say(fmt::format("in real time: {} steps, {} more than 1 ms late, the worst by {:.2g} ms", pace.num_steps(),
-                      pace.num_late(), 1e3 * std::max(0.0, pace.worst_late_s())));
+  outcome.lines.push_back(fmt::format("in real time: {} steps, {} more than 1 ms late, the worst by {:.2g} ms",
+                                      pace.num_steps(), pace.num_late(), 1e3 * std::max(0.0, pace.worst_late_s())));
 }
 
-ServoStudy studied(const ServoScenario& scenario, live::ServoStream& stream, LiveRun& live, Pace& pace, Run& run) {
-  if (!live.is_on())
-    return study_servo(scenario, run.options.seed, run.progress,
-                       [&](ControllerKind, const ServoRow& row) { pace.keep(row.t_s); });
-  live.open(stream.topics(), "/servo");
-  stream.begin(*live.server());
-  ServoStudy study =
-      study_servo(scenario, run.options.seed, live.progress(), [&](ControllerKind controller, const ServoRow& row) {
-        live.keep_pace(row.t_s);
-        pace.keep(row.t_s);
-        stream.show(*live.server(), controller, row);
-      });
-  if (!study.comparison.empty())
-    stream.show(*live.server(), study.comparison.back().controller, study.comparison.back().shown.rows.back(), true);
-  return study;
-}
-
-/// A simulated loop is what its scenario says, exactly; what would be off in a real one is tried by --true-gain,
-/// --true-tau and the grid of robustness.
-std::vector<Assumption> assumed_of(const ServoScenario& scenario) {
-  const ServoScene& scene = scenario.scene;
-  std::vector<Assumption> assumed;
-  const auto exact = [&](std::string name, double value) {
-    assumed.push_back({.name = std::move(name), .value = value, .sigma = 0.0});
+ServoResult studied(const ServoScenario& scenario, live::ServoStream& stream, LiveRun& live, Pace& pace, Run& run) {
+  if (live.is_on()) live.open(stream.topics(), "/servo");
+  if (live.server() != nullptr) stream.begin(*live.server());
+  const ServoWatch watch = [&](ControllerKind controller, const ServoRow& row) {
+    live.keep_pace(row.t_s);
+    pace.keep(row.t_s);
+    if (live.server() != nullptr) stream.show(*live.server(), controller, row);
   };
-  exact("plant.gain_factor", scene.mismatch.gain);
-  exact("plant.tau_factor", scene.mismatch.tau);
-  exact("latency_s", scene.latency_s);
-  exact("sigma_px", scene.sigma_px);
-  exact("sigma_encoder_rad", scene.sigma_encoder_rad);
-  if (scene.intrinsics != LensKnowledge::observed)
-    for (const RigHead& head : scene.heads) exact(fmt::format("head{}.camera.fx", head.head.id), focal_of(head.camera));
-  return assumed;
+  ServoResult result = alidade::servo(scenario, run.options.seed, live.progress(), watch);
+  if (live.server() != nullptr && !result.comparison.empty())
+    stream.show(*live.server(), result.comparison.back().controller, result.comparison.back().shown.rows.back(), true);
+  return result;
 }
 
-ExitCode servo(const ServoArgs& args, Run& run) {
+ExitCode run_servo_command(const ServoArgs& args, Run& run) {
   run.add_input("scenario", args.scenario);
   const ServoScenarioFile read = read_servo_scenario(args.scenario);
   if (!read.rig.empty()) run.add_input("rig", read.rig);
@@ -124,17 +77,10 @@ ExitCode servo(const ServoArgs& args, Run& run) {
   live::ServoStream stream(scenario.scene);
   LiveRun live(args.live, run);
   Pace pace(args.real_time ? 1.0 : 0.0);
-  const ServoStudy study = studied(scenario, stream, live, pace, run);
+  JobOutcome outcome = outcome_of(studied(scenario, stream, live, pace, run));
   run.lap("run");
-  Verdict verdict = servo_verdict(scenario, study);
-  run.document.assumed = assumed_of(scenario);
-  if (verdict.exit_code == ExitCode::ok) heed_assumptions(run.document.assumed, verdict);
-  fill_servo(scenario, study, run.document);
-  summarize(study, run);
-  summarize_lenses(study, run);
-  if (args.real_time) tell_pace(pace, run);
-  if (has_estimate(verdict)) run.add_file("servo.csv", servo_csv(scenario, study));
-  return live.finish(verdict);
+  if (args.real_time) tell_pace(pace, outcome);
+  return live.finish(std::move(outcome));
 }
 
 }  // namespace
@@ -150,14 +96,14 @@ void add_servo(App& app) {
                    "scenario.yaml; every key may be left out, these are the values it then has:\n\n" +
                    servo_scenario_text(),
        .draws_random_numbers = true},
-      [args](Run& run) { return servo(*args, run); });
+      [args](Run& run) { return run_servo_command(*args, run); });
   command.add_option("scenario", args->scenario, "YAML: target, heads, plant, delays, noise, controllers; see below")
       ->required();
   command.add_option("--controller", args->controllers, "Only these of pi, feedforward, lqr, mpc")
       ->check(CLI::IsMember({"pi", "feedforward", "lqr", "mpc"}))
       ->delimiter(',');
   command.add_option("--seeds", args->seeds, "Runs of each controller, from --seed on")->check(CLI::Range(1, 1000));
-  command.add_option("--latency-ms", args->latency_ms, "From a picture to its pixel")
+  command.add_option("--latency-ms", args->latency_ms, "From an image to its pixel")
       ->check(finite_number() & CLI::Range(0.0, 10000.0));
   command.add_option("--true-gain", args->gain_factor, "The plant's gain as it is, over what is known of it")
       ->check(finite_number() & CLI::Range(0.01, 100.0));
@@ -166,8 +112,8 @@ void add_servo(App& app) {
   command
       .add_option(
           "--intrinsics", args->intrinsics,
-          "What the loop goes by where lenses zoom: given (the rig's, whatever they do), observed (told on-line "
-          "by what stands still in the pictures), true")
+          "What the loop goes by where lenses zoom: given (the rig's, whatever they do), observed (estimated on-line "
+          "from what stands still in the images), true")
       ->check(CLI::IsMember({"given", "observed", "true"}));
   command.add_flag("--no-robustness", args->no_robustness, "Leave out the grid over gain and time constant");
   command.add_flag(

@@ -49,7 +49,7 @@ TEST_F(ServoCommand, GivesTheNamesOfTheContract) {
   const Csv rows = Csv::read(path("out/servo.csv"));
   EXPECT_EQ(rows.num_rows(), 4u * 2u * 121u);
   EXPECT_TRUE(rows.has("error_v_px"));
-  EXPECT_GT(document["data"]["steps"]["target_in_base_x_m"].size(), 200u);  // what track makes of the shown run
+  EXPECT_GT(document["data"]["steps"]["target_in_world_x_m"].size(), 200u);  // what track makes of the shown run
   EXPECT_GT(document["data"]["measurements"]["accepted"].size(), 200u);
   EXPECT_EQ(document["verdict"]["state"], "good");
 }

@@ -63,7 +63,7 @@ TEST_F(TrackCommand, GivesThePathWithTheNamesOfTheContract) {
     EXPECT_LT(estimate["nees_per_dof"], 1.8) << method;
     EXPECT_GT(estimate["pcrlb_m"], 0.001) << method;
     const Json& steps = document["data"]["steps"];
-    EXPECT_EQ(steps["t_s"].size(), steps["target_in_base_x_m"].size());
+    EXPECT_EQ(steps["t_s"].size(), steps["target_in_world_x_m"].size());
     EXPECT_EQ(document["data"]["measurements"]["accepted"].size(), document["counts"]["given"]);
   }
   const Csv rows = Csv::read(path("out/track.csv"));
@@ -318,7 +318,7 @@ class TrackFilm : public TrackCommand {
 TEST_F(TrackFilm, TargetIsFoundInTheFramesAndFollowed) {
   film("1.5");
   const Outcome outcome =
-      watch({"--angles", path("sim/angles.csv"), "--target", "colour:230,70,20", "--truth", path("sim/truth.csv")});
+      watch({"--angles", path("sim/angles.csv"), "--look", "colour:230,70,20", "--truth", path("sim/truth.csv")});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const Json document = Json::parse(read_file(path("out/result.json")));
   for (const Json& video : document["estimate"]["video"]) {

@@ -218,7 +218,7 @@ void add_track_scenario(App& app) {
        "  alidade simulate track --scenario B --fault clock:0.03 --fault clutter:0.05 --out faulty\n"
        "  alidade simulate track --scenario G --path recorded.csv --out real\n"
        "  alidade simulate track --scenario B --video --duration 3 --out film && alidade track --video film/head_1 \\\n"
-       "    film/head_2 --angles film/angles.csv --rig film/rig.yaml --target colour:230,70,20 --truth film/truth.csv",
+       "    film/head_2 --angles film/angles.csv --rig film/rig.yaml --look colour:230,70,20 --truth film/truth.csv",
        true},
       [args](Run& run) { return simulate_track_events(*args, run); });
   command

@@ -26,16 +26,16 @@ struct SimulateUnderwaterArgs {
   UnderwaterVideoConfig look;
 };
 
-StartFile start_of(const UnderwaterScene& scene, const UnderwaterSequence& sequence) {
-  StartFile file;
-  file.start.motion.world_from_cam = sequence.told_start;
+LocalizeStart start_of(const UnderwaterScene& scene, const UnderwaterSequence& sequence) {
+  LocalizeStart start;
+  start.motion.world_from_cam = sequence.told_start;
   const std::array<double, 4> sigmas{scene.sigma_position_m, scene.sigma_rotation_rad, 0.3, 0.3};
   for (std::size_t i = 0; i < sigmas.size(); ++i)
-    file.start.cov.diagonal().segment<3>(static_cast<Eigen::Index>(3 * i)).setConstant(sigmas[i] * sigmas[i]);
+    start.cov.diagonal().segment<3>(static_cast<Eigen::Index>(3 * i)).setConstant(sigmas[i] * sigmas[i]);
   for (const UnderwaterPoint& point : sequence.points)
     if (!point.is_known && point.told_depth_m > 0.0)
-      file.depths.push_back({point.id, point.told_depth_m, scene.sigma_depth});
-  return file;
+      start.depths.push_back({point.id, point.told_depth_m, scene.sigma_depth});
+  return start;
 }
 
 /// What `localize` takes of observations; how many there are.

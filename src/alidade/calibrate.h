@@ -6,6 +6,7 @@
 #include "alidade/board/board_view.h"
 #include "alidade/calibrate/calibration.h"
 #include "alidade/calibrate/found_corners.h"
+#include "alidade/calibrate/photo_plan.h"
 #include "alidade/estimation/config_error.h"
 #include "alidade/estimation/progress.h"
 #include "alidade/imaging/photos.h"

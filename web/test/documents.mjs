@@ -123,7 +123,7 @@ export function movingDocument() {
   ['qx', 'qy', 'qz', 'qw'].forEach((part, k) => (cameras[`world_from_cam_${part}`] = headings.map((a) => round([0, Math.sin(a / 2), 0, Math.cos(a / 2)][k]))));
   for (const part of ['xx', 'xy', 'xz', 'yy', 'yz', 'zz']) cameras[`cov_${part}_m2`] = [0, 1, 2, 3].map((i) => (i > 0 && part[0] === part[1] ? 4e-4 * i : 0));
   Object.assign(cameras, {half_view_x: [0.6, 0.5, 0.6, 0.4], half_view_y: [0.4, 0.3, 0.4, 0.3], num_used: [300, 310, 280, 290], rms_px: [0.7, 0.6, 0.8, 0.7]});
-  ['x', 'y', 'z'].forEach((axis, k) => (path[`target_in_base_${axis}_m`] = path.t_s.map((t) => round([10 + 6 * Math.cos(t), -3 + Math.sin(2 * t), 12 + 6 * Math.sin(t)][k]))));
+  ['x', 'y', 'z'].forEach((axis, k) => (path[`target_in_world_${axis}_m`] = path.t_s.map((t) => round([10 + 6 * Math.cos(t), -3 + Math.sin(2 * t), 12 + 6 * Math.sin(t)][k]))));
   const names = ['x_m', 'y_m', 'z_m', 'rx_rad', 'ry_rad', 'rz_rad'].flatMap((part) => [2, 3, 4].map((id) => `head${id}.base_${part}`)), n = names.length;
   const upper = range(n, (i) => range(n - i, (j) => (j === 0 ? (names[i].endsWith('rad') ? 1e-6 : 4e-4) : 0))).flat();
   return base('rig', {covariance: {names, upper}, data: {cameras, path},

@@ -64,7 +64,7 @@ Eigen::Vector2d direction_angles_rad(const Beam& beam) {
 Eigen::Matrix<double, 7, 7> embedded_covariance(const Beam& beam) {
   Eigen::Matrix<double, 7, num_beam_params> J = Eigen::Matrix<double, 7, num_beam_params>::Zero();
   J.topLeftCorner<3, 3>().setIdentity();
-  J.block<3, 2>(3, 3) = tangent_basis(beam.direction_in_cam);
+  J.block<3, 2>(3, beam_direction_param) = tangent_basis(beam.direction_in_cam);
   J(6, 5) = 1.0;
   return J * beam.cov * J.transpose();
 }

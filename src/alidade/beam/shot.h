@@ -7,8 +7,10 @@
 #include "alidade/board/board_pose.h"
 #include "alidade/board/board_view.h"
 #include "alidade/geometry/rigid3.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Plane n · point_in_cam + d = 0.
 struct Plane {
@@ -46,8 +48,14 @@ struct Shot {
   std::optional<BoardPose> pose = {};
   std::optional<Plane> plane = {};
   std::string name = {};  ///< For a person: a row or a photo.
+  /// Photos of the board with the laser on and, where there is one, off; as the table names them. Empty: none.
+  std::string photo = {}, photo_off = {};
+  std::string no_board = {};  ///< Why the photo gives none, where that is known.
+  std::string table = {};     ///< Where the shot comes from, and its line there; empty: from no file.
+  std::size_t line = 0;
 
   [[nodiscard]] bool has_plane() const { return board || pose || plane; }
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

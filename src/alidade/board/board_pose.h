@@ -8,8 +8,10 @@
 #include "alidade/board/board_view.h"
 #include "alidade/camera/camera.h"
 #include "alidade/geometry/rigid3.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Where a board stood, with the covariance of its right perturbation ξ; zero: exact.
 struct BoardPose {
@@ -52,4 +54,5 @@ struct BoardPoseFit {
                                                         std::span<const Eigen::Vector3d> points_in_board,
                                                         std::optional<double> sigma_px = {});
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

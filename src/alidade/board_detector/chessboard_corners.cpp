@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "alidade/corners/corner_fit.h"
+#include "alidade/estimation/median.h"
 
 namespace alidade {
 namespace {
@@ -41,12 +42,6 @@ GridCorner with_local_steps(const CornerGrid& grid, const GridCell& cell, GridCo
   return corner;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Sign of the contrast if the board were dark in the square from (0, 0) to (1, 1).
 double parity_sign(const GridCell& cell) { return (cell.first + cell.second) % 2 == 0 ? 1.0 : -1.0; }
 
@@ -55,7 +50,7 @@ void drop_wrong_colours(std::vector<FittedCorner>& corners) {
   if (corners.empty()) return;
   std::vector<double> contrasts;
   for (const FittedCorner& corner : corners) contrasts.push_back(parity_sign(corner.cell) * corner.fit.contrast);
-  const double typical = median(contrasts);
+  const double typical = median_of(contrasts);
   std::erase_if(corners, [&](const FittedCorner& corner) {
     return !(parity_sign(corner.cell) * corner.fit.contrast * typical > min_relative_contrast * typical * typical);
   });

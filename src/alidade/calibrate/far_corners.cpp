@@ -1,16 +1,11 @@
 #include "alidade/calibrate/far_corners.h"
+#include "alidade/estimation/median.h"
 
 #include <algorithm>
 #include <cmath>
 
 namespace alidade {
 namespace {
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Distance of each point from the median of each coordinate, in the median of these distances.
 template <class Point>
@@ -22,11 +17,11 @@ std::vector<double> relative_distances(std::size_t count, const Point& point) {
     x.push_back(point(i).x());
     y.push_back(point(i).y());
   }
-  const Eigen::Vector2d centre(median(x), median(y));
+  const Eigen::Vector2d centre(median_of(x), median_of(y));
   distances.reserve(count);
   for (std::size_t i = 0; i < count; ++i) distances.push_back((point(i) - centre).norm());
   std::vector<double> sorted = distances;
-  const double unit = std::max(median(sorted), 1e-300);
+  const double unit = std::max(median_of(sorted), 1e-300);
   for (double& distance : distances) distance /= unit;
   return distances;
 }

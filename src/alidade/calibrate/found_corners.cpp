@@ -4,16 +4,10 @@
 #include <cmath>
 
 #include "alidade/calibrate.h"
+#include "alidade/estimation/median.h"
 
 namespace alidade {
 namespace {
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Whether a view's corners are the calibration's outliers, all of them: most of them fit no board.
 bool is_misfit(const ViewFit& fit) { return !fit.used && fit.reason.ends_with("do not fit the other photos"); }

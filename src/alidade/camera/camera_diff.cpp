@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "alidade/camera/implied_motion.h"
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/decompositions.h"
 
 namespace alidade {
@@ -32,13 +33,6 @@ Seen look_with(const Camera& b, const Rigid3& b_from_a, const Seen& seen_by_a) {
     if (projections[i]) seen[i] = GridPoint{points_in_b[i], *projections[i]};
   }
   return seen;
-}
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// Weights of one iteration: 1/s², with s the pixel's σ (1 where none is known), times (t/e)² where e = |δ|/s is beyond

@@ -174,18 +174,41 @@ TextCode length_code(double& value_m, double min_m, double max_m) {
   return code;
 }
 
-TextCode pair_code(int& first, int& second, int max, const std::string& example) {
+TextCode pair_code(int& first, int& second, int max, const std::string& example, int min) {
   TextCode code;
-  code.read = [&first, &second, max, example](const std::string& text) -> std::string {
+  code.read = [&first, &second, max, min, example](const std::string& text) -> std::string {
     const std::size_t cross = text.find_first_of("xX");
     const auto a = number_of<int>(text.substr(0, cross));
     const auto b = cross == std::string::npos ? std::nullopt : number_of<int>(text.substr(cross + 1));
-    if (!a || !b || *a < 1 || *b < 1 || *a > max || *b > max) return quoted(text) + " is not " + example;
+    if (!a || !b || *a < min || *b < min || *a > max || *b > max) return quoted(text) + " is not " + example;
     first = *a;
     second = *b;
     return "";
   };
   code.write = [&first, &second] { return first > 0 ? fmt::format("{}x{}", first, second) : std::string(); };
+  return code;
+}
+
+TextCode numbers_code(int count, const std::function<std::vector<double>()>& values,
+                      const std::function<void(const std::vector<double>&)>& take) {
+  TextCode code;
+  code.num_parts = count;
+  code.read = [count, take](const std::string& text) -> std::string {
+    std::vector<double> numbers;
+    for (std::size_t begin = 0; begin <= text.size();) {
+      const std::size_t end = std::min(text.find(',', begin), text.size());
+      const auto number = number_of<double>(text.substr(begin, end - begin));
+      if (!number) return quoted(text.substr(begin, end - begin)) + " is not a finite number";
+      numbers.push_back(*number);
+      begin = end + 1;
+    }
+    if (numbers.size() != static_cast<std::size_t>(count)) {
+      return fmt::format("'{}' is {} number{}, not {}", text, numbers.size(), numbers.size() == 1 ? "" : "s", count);
+    }
+    take(numbers);
+    return "";
+  };
+  code.write = [values] { return fmt::format("{}", fmt::join(values(), ",")); };
   return code;
 }
 

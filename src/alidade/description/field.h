@@ -24,6 +24,7 @@ struct TextCode {
   std::function<std::string(const std::string& text)> read;  ///< Takes it over; what is wrong with it, else "".
   std::function<std::string()> write;                        ///< As `read` takes it; "" where there is no value.
   std::vector<std::string> words = {};                       ///< All that it may be; empty: too many to list.
+  int num_parts = 1;  ///< More: so many values, separated by commas or given one after the other; 0: any number.
 };
 
 /// One field of a config, described once. Options of the command line and their help, keys of a config file, keyword
@@ -92,9 +93,13 @@ template <typename Enum>
 /// meant in another unit, and is refused with what it would be.
 [[nodiscard]] TextCode length_code(double& value_m, double min_m, double max_m);
 
-/// Two whole numbers above zero, "640x480". `example` is shown where the text is none: "WIDTHxHEIGHT, for example
+/// Two whole numbers of `min` or more, "640x480". `example` is shown where the text is none: "WIDTHxHEIGHT, for example
 /// 640x480".
-[[nodiscard]] TextCode pair_code(int& first, int& second, int max, const std::string& example);
+[[nodiscard]] TextCode pair_code(int& first, int& second, int max, const std::string& example, int min = 1);
+
+/// So many finite numbers, "500,510,400,300". `values`: those that there are now; none: no value.
+[[nodiscard]] TextCode numbers_code(int count, const std::function<std::vector<double>()>& values,
+                                    const std::function<void(const std::vector<double>&)>& take);
 
 ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -20,6 +20,7 @@ struct Config {
   Shape shape = Shape::flat;
   int width_px = 0, height_px = 0;
   double square_m = 0.0;
+  std::vector<double> start;
 };
 
 FieldList fields_of(Config& config) {
@@ -33,7 +34,12 @@ FieldList fields_of(Config& config) {
            .value = words_code<Shape>(config.shape, {{Shape::flat, "flat"}, {Shape::bow, "bow"}}),
            .help = "Shape"},
           {.name = "size", .value = pair_code(config.width_px, config.height_px, 1000, "WxH"), .help = "Size"},
-          {.name = "square_m", .value = length_code(config.square_m, 5e-4, 2.0), .help = "Square"}};
+          {.name = "square_m", .value = length_code(config.square_m, 5e-4, 2.0), .help = "Square"},
+          {.name = "start",
+           .value = numbers_code(
+               2, [&config] { return config.start; },
+               [&config](const std::vector<double>& numbers) { config.start = numbers; }),
+           .help = "Start"}};
 }
 
 const Field& field(const FieldList& fields, const std::string& name) {
@@ -54,7 +60,8 @@ TEST(Field, TakesAndWritesEveryKindOfValue) {
                                                                                    {"fixed", "k3"},
                                                                                    {"board_shape", "bow"},
                                                                                    {"size", "640x480"},
-                                                                                   {"square_m", "0.025"}}) {
+                                                                                   {"square_m", "0.025"},
+                                                                                   {"start", "500,-1.5"}}) {
     EXPECT_EQ(set_field(field(fields, name), text), "");
     EXPECT_EQ(value_text(field(fields, name)), text);
   }
@@ -83,6 +90,10 @@ TEST(Field, SaysWhatIsWrongAndKeepsWhatStood) {
   EXPECT_EQ(fault("board_shape", "round"), "'round' is not one of flat, bow");
   EXPECT_EQ(fault("size", "640x"), "'640x' is not WxH");
   EXPECT_EQ(fault("size", "640x2000"), "'640x2000' is not WxH");
+  EXPECT_EQ(fault("start", "1,2,3"), "'1,2,3' is 3 numbers, not 2");
+  EXPECT_EQ(fault("start", "1,nan"), "'nan' is not a finite number");
+  EXPECT_EQ(fault("start", "1,"), "'' is not a finite number");
+  EXPECT_THAT(config.start, ::testing::IsEmpty());
   EXPECT_EQ(config.count, 3);
   EXPECT_EQ(config.gap_m, 0.02);
   EXPECT_FALSE(config.glass_m);

@@ -6,12 +6,14 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "alidade/files/files.h"
 #include "alidade/files/yaml_fields.h"
 #include "alidade/images/photos.h"
+#include "alidade/images/video.h"
 #include "alidade/tables/localize_file.h"
 
 namespace alidade {
@@ -101,7 +103,20 @@ Board board_of(const std::vector<KnownPoint>& points) {
   return board;
 }
 
-}  // namespace
+/// Images one after the other, with their times.
+class ImageSequence {
+ public:
+  ImageSequence(const path& given, double rate_hz, int width_px, int height_px);
+  [[nodiscard]] bool next(cv::Mat& grey, long& frame, double& t_s);
+  [[nodiscard]] std::size_t num_images() const { return frames_.num_frames(); }
+
+ private:
+  VideoFrames frames_;
+  std::vector<double> times_s_;  ///< One per image; empty: number over rate.
+  double rate_hz_;
+  int width_px_, height_px_;
+  std::size_t count_ = 0;
+};
 
 ImageSequence::ImageSequence(const path& given, double rate_hz, int width_px, int height_px)
     : frames_(images_of(given)), rate_hz_(rate_hz), width_px_(width_px), height_px_(height_px) {
@@ -110,15 +125,6 @@ ImageSequence::ImageSequence(const path& given, double rate_hz, int width_px, in
     times_s_ = asl_times_s(asl.table, asl.images);
   else if (!(rate_hz > 0.0))
     throw InputError(given.string() + ": has no times; give --rate, frames a second");
-}
-
-bool ImageSequence::is_images(const path& given) {
-  std::error_code error;
-  if (std::filesystem::is_directory(given, error)) return true;
-  std::string ending = given.extension().string();
-  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  constexpr std::array endings{".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg"};
-  return std::ranges::any_of(endings, [&](const char* video) { return ending == video; });
 }
 
 bool ImageSequence::next(cv::Mat& grey, long& frame, double& t_s) {
@@ -135,7 +141,24 @@ bool ImageSequence::next(cv::Mat& grey, long& frame, double& t_s) {
   return true;
 }
 
-ImageTarget read_image_target(const path& file) {
+}  // namespace
+
+bool is_image_sequence(const path& given) {
+  std::error_code error;
+  if (std::filesystem::is_directory(given, error)) return true;
+  std::string ending = given.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  constexpr std::array endings{".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg"};
+  return std::ranges::any_of(endings, [&](const char* video) { return ending == video; });
+}
+
+ImageStream images_in(const path& given, const Camera& camera, double rate_hz) {
+  const auto images = std::make_shared<ImageSequence>(given, rate_hz, camera.width_px, camera.height_px);
+  const auto next = [images](cv::Mat& grey, long& frame, double& t_s) { return images->next(grey, frame, t_s); };
+  return {next, images->num_images()};
+}
+
+LocalizeTarget read_image_target(const path& file) {
   const std::string name = file.string();
   const YAML::Node root = detail::load_yaml(read_file(file), name);
   const detail::Fields fields(root, name);
@@ -151,8 +174,8 @@ ImageTarget read_image_target(const path& file) {
     if (!(sigma_m > 0.0)) detail::refuse(name, "rectangle.sigma_m", "is not above zero");
     return rectangle_target(width_m, height_m, sigma_m);
   }
-  ImageTarget target;
-  target.points = read_target(file);
+  LocalizeTarget target;
+  target.points = read_target(file).points;
   if (fields.has("board")) {
     target.board = board_of(target.points);
     return target;

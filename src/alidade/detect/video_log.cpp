@@ -7,9 +7,10 @@
 #include <opencv2/core.hpp>
 #include <sstream>
 
+#include "alidade/estimation/median.h"
 #include "alidade/files/files.h"
 #include "alidade/tables/angle_interpolation.h"
-#include "alidade/tables/rotation_log_file.h"
+#include "alidade/tables/rotation_log_stream.h"
 
 namespace alidade {
 namespace {
@@ -32,7 +33,8 @@ Tracks follow_points(VideoFrames& video, const PointTrackerConfig& config, const
     report_progress(progress, "following points", tracks.frames.size(),
                     std::max(tracks.frames.size(), video.num_frames()));
   }
-  if (tracks.frames.size() < 2) throw InputError(video.name() + ": has only one frame; a video of a turn is needed");
+  if (tracks.frames.size() < 2)
+    throw InputError(video.name() + ": has only one frame; a video of a rotation is needed");
   return tracks;
 }
 
@@ -63,7 +65,7 @@ Rows rows_one_a_frame(const RotationLog& angles, const std::string& angles_name,
   const std::size_t needed = tracks.numbers.back() + 1;
   if (angles.rows.size() != needed)
     throw InputError(
-        fmt::format("{}: has {} rows and the video {} frames; one row a frame is needed, or '--rate' to "
+        fmt::format("{}: has {} rows and the video {} frames; one row per frame is needed, or '--rate' to "
                     "interpolate by time",
                     angles_name, angles.rows.size(), needed));
   Rows rows;
@@ -94,12 +96,6 @@ Rows rows_by_time(const RotationLog& angles, const std::string& angles_name, con
     add(interpolation.at(t_s));
   }
   return rows;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace
@@ -149,7 +145,7 @@ VideoLog log_from_video(VideoFrames& video, const RotationLog& angles, const std
       sigmas.push_back(point.sigma_px);
     }
   }
-  made.median_sigma_px = median(std::move(sigmas));
+  made.median_sigma_px = median_of(std::move(sigmas));
   return made;
 }
 

@@ -18,7 +18,7 @@ struct VideoLogConfig {
   /// row a frame, with its time.
   double rate_hz = 0.0;
   PointTrackerConfig tracker = {};
-  std::size_t min_rows = 10;      ///< Points that were seen in fewer frames are left out.
+  std::size_t min_rows = 10;      ///< Points that were seen in fewer frames are rejected.
   std::size_t max_points = 1000;  ///< The longest seen are kept.
 };
 
@@ -27,7 +27,7 @@ struct VideoLog {
   RotationLog log;
   int width_px = 0, height_px = 0;
   std::size_t num_frames = 0;
-  std::size_t num_tracks = 0;    ///< Points that were followed, before the short ones were left out.
+  std::size_t num_tracks = 0;    ///< Points that were followed, before the short ones were rejected.
   double median_sigma_px = 0.0;  ///< Of one coordinate, as the tracker states it.
 };
 

@@ -17,7 +17,7 @@ namespace alidade {
 /// Encoder readings of heads over time.
 struct HeadAngles {
   std::string name;               ///< Of the file, to begin a message with.
-  std::vector<RotationLog> logs;  ///< One a head of the rig, source `head`, without points.
+  std::vector<RotationLog> logs;  ///< One per head of the rig, source `head`, without points.
 };
 
 /// Reads `t_s,head,pan_rad,tilt_rad` (also `t_capture_s`; `head` may be left out where the rig has one), in order of

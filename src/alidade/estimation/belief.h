@@ -2,7 +2,10 @@
 
 #include <Eigen/Core>
 
+#include "alidade/public.h"
+
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// A Gaussian over N numbers: mean x and covariance P.
 template <int N>
@@ -20,4 +23,5 @@ void mirror_upper(Eigen::Matrix<double, N, N>& P) {
   }
 }
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "alidade/public.h"
 
@@ -12,6 +14,13 @@ ALIDADE_PUBLIC_BEGIN
 struct ConfigError : std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
+
+/// Throws it with all these faults, if there are any.
+inline void require_none(const std::vector<std::string>& faults) {
+  std::string sentence;
+  for (const std::string& each : faults) sentence += (sentence.empty() ? "" : "; ") + each;
+  if (!sentence.empty()) throw ConfigError(sentence);
+}
 
 ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -32,5 +32,11 @@ struct Counts {
   std::vector<SkippedInput> skipped;
 };
 
+/// Rows that were rejected in reading count as given; they stand before what the job itself rejected.
+inline void add_skipped(const std::vector<SkippedInput>& rows, Counts& counts) {
+  counts.given += rows.size();
+  counts.skipped.insert(counts.skipped.begin(), rows.begin(), rows.end());
+}
+
 ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "alidade/estimation/belief.h"
+#include "alidade/estimation/innovation.h"
 
 namespace alidade {
 
@@ -25,13 +26,6 @@ concept SeesPosition = requires(const See& see, const Eigen::Vector3d& position)
 struct IteratedUpdateConfig {
   int max_iterations = 4;   ///< Gauss–Newton steps.
   double tolerance = 1e-3;  ///< Stop where the next step would move the measurement by less than this many σ.
-};
-
-/// What was expected of a measurement before it was used: innovation ν = z − h(x) and its covariance S.
-struct Innovation {
-  Eigen::Vector2d nu = Eigen::Vector2d::Zero();
-  Eigen::Matrix2d S = Eigen::Matrix2d::Identity();
-  double nis = 0.0;  ///< νᵀ S⁻¹ ν: χ² with 2 degrees of freedom where the models hold.
 };
 
 /// S⁻¹ of a symmetric 2×2, or NaN where it has none.

@@ -17,6 +17,11 @@ void take_value(const Field& field, const YAML::Node& node, const std::string& f
       detail::refuse(file, field.name, fault);
     }
   };
+  if (const auto* code = std::get_if<TextCode>(&field.value); code && code->num_parts != 1 && node.IsSequence()) {
+    std::string text;
+    for (const YAML::Node& part : node) text += (text.empty() ? "" : ",") + (part.IsScalar() ? part.Scalar() : "");
+    return take(YAML::Node(text), true);
+  }
   const bool is_list = std::holds_alternative<std::vector<std::string>*>(field.value);
   if (!is_list || !node.IsSequence()) return take(node, true);
   for (std::size_t i = 0; i < node.size(); ++i) take(node[i], i == 0);

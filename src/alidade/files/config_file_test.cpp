@@ -12,13 +12,19 @@ namespace {
 struct Settings {
   double gap_m = 0.02;
   int count = 3;
-  std::vector<std::string> fixed;
+  std::vector<std::string> fixed = {};
+  std::vector<double> start = {};
 };
 
 FieldList fields_of(Settings& settings) {
   return {{.name = "gap_m", .value = &settings.gap_m, .help = "Gap [m]", .limits = {0.0, 10.0}},
           {.name = "count", .value = &settings.count, .help = "How many", .limits = {1, 10}},
-          {.name = "fixed", .value = &settings.fixed, .help = "Parameters fixed"}};
+          {.name = "fixed", .value = &settings.fixed, .help = "Parameters fixed"},
+          {.name = "start",
+           .value = numbers_code(
+               2, [&settings] { return settings.start; },
+               [&settings](const std::vector<double>& numbers) { settings.start = numbers; }),
+           .help = "Start"}};
 }
 
 class ConfigFile : public ::testing::Test, protected testing::TemporaryFolder {
@@ -36,20 +42,23 @@ class ConfigFile : public ::testing::Test, protected testing::TemporaryFolder {
 };
 
 TEST_F(ConfigFile, IsTakenOverButForWhatWasTyped) {
-  write_file(path() / "run.yaml", "gap_m: 0.5\ncount: 7\nfixed: [k3, p1]\n");
+  write_file(path() / "run.yaml", "gap_m: 0.5\ncount: 7\nfixed: [k3, p1]\nstart: [500, 510]\n");
   Settings settings;
   const auto names =
       read_config(path() / "run.yaml", fields_of(settings), [](const Field& field) { return field.name == "count"; });
   EXPECT_EQ(settings.gap_m, 0.5);
   EXPECT_EQ(settings.count, 3);
   EXPECT_THAT(settings.fixed, ::testing::ElementsAre("k3", "p1"));
-  EXPECT_EQ(names.size(), 3u);
+  EXPECT_THAT(settings.start, ::testing::ElementsAre(500.0, 510.0));
+  EXPECT_EQ(names.size(), 4u);
 }
 
 TEST_F(ConfigFile, NamesWhatIsWrong) {
   EXPECT_THAT(fault("gapp_m: 1\n"), ::testing::HasSubstr("gapp_m: is not a key of this command; known: gap_m count"));
   EXPECT_THAT(fault("gap_m: nan\n"), ::testing::HasSubstr("gap_m: 'nan' is not a finite number"));
   EXPECT_THAT(fault("gap_m: [1, 2]\n"), ::testing::HasSubstr("gap_m: is not one value"));
+  EXPECT_THAT(fault("start: [1, 2, 3]\n"), ::testing::HasSubstr("start: '1,2,3' is 3 numbers, not 2"));
+  EXPECT_NE(fault("start: [1, [2]]\n"), "");
   EXPECT_THAT(fault("count: 11\n"), ::testing::HasSubstr("count: '11' is not within 1 to 10"));
   EXPECT_NE(fault("gap_m: {\n"), "");
   EXPECT_NE(fault("- gap_m\n"), "");

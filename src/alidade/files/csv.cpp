@@ -157,8 +157,8 @@ bool is_out_of_range(std::string_view text) {
 
 void check_length(const CsvRow& row, std::size_t wanted, const std::string& name) {
   if (row.cells.size() == wanted) return;
-  throw InputError(at_line(name, row.line) + "has " + std::to_string(row.cells.size()) + " cells, the header has " +
-                   std::to_string(wanted));
+  throw InputError(at_line(name, row.line) + "has " + std::to_string(row.cells.size()) +
+                   (row.cells.size() == 1 ? " cell" : " cells") + ", the header has " + std::to_string(wanted));
 }
 
 /// One line with its end, or several where a quoted cell has line ends in it. Empty at the end of the stream.

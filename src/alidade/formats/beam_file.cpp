@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
-#include <array>
 #include <cmath>
 
 #include "alidade/beam/unit_direction.h"
@@ -17,16 +16,13 @@ using detail::number_list;
 using detail::number_text;
 using detail::refuse;
 
-/// Origin, direction (as a vector, singular along itself), scale: no basis has to be told with them.
-constexpr std::array<const char*, 7> names{"origin_x_m",  "origin_y_m",  "origin_z_m", "direction_x",
-                                           "direction_y", "direction_z", "scale"};
 using Embedding = Eigen::Matrix<double, 7, num_beam_params>;
 
 Embedding embedding_of(const Eigen::Vector3d& direction) {
   Embedding J = Embedding::Zero();
   J.topLeftCorner<3, 3>().setIdentity();
-  J.block<3, 2>(3, 3) = tangent_basis(direction);
-  J(6, 5) = 1.0;
+  J.block<3, 2>(3, beam_direction_param) = tangent_basis(direction);
+  J(6, beam_scale_param) = 1.0;
   return J;
 }
 
@@ -45,10 +41,12 @@ std::vector<double> upper_of(const Eigen::Matrix<double, 7, 7>& cov) {
   return numbers;
 }
 
-/// Of origin, direction and scale, taken to the tangent of the direction: the embedding's columns are orthonormal.
+/// Of origin, direction (as a vector, singular along itself: no basis has to be told with it) and scale, taken to the
+/// tangent of the direction: the embedding's columns are orthonormal.
 BeamMatrix read_beam_covariance(const YAML::Node& node, const Fields& fields, const Eigen::Vector3d& direction) {
   const Embedding J = embedding_of(direction);
-  return J.transpose() * detail::read_covariance(node, fields, {names.begin(), names.end()}, "a beam") * J;
+  return J.transpose() *
+         detail::read_covariance(node, fields, {embedded_beam_names.begin(), embedded_beam_names.end()}, "a beam") * J;
 }
 
 Eigen::MatrixXd read_cov_with_lens(const Fields& fields, const Eigen::Vector3d& direction) {
@@ -95,8 +93,8 @@ std::string beam_text(const Beam& beam, const Camera& camera, const std::string&
     text += fmt::format("sigma_range_incidence_m: {}\n", number_text(beam.noise.incidence_m));
   if (!camera_file.empty()) text += fmt::format("camera: {}\n", camera_file);
   if (beam.cov.isZero(0.0)) return text;
-  text += fmt::format("covariance:  # upper triangle, row by row\n  names: [{}]\n  upper: {}\n", fmt::join(names, ", "),
-                      number_list(upper_of(embedded_covariance(beam))));
+  text += fmt::format("covariance:  # upper triangle, row by row\n  names: [{}]\n  upper: {}\n",
+                      fmt::join(embedded_beam_names, ", "), number_list(upper_of(embedded_covariance(beam))));
   if (beam.cov_with_lens.size() > 0) {
     const Eigen::MatrixXd embedded = embedding_of(a) * beam.cov_with_lens;
     text += fmt::format("covariance_with_camera: {}  # 7 rows, a column for each of {}\n",

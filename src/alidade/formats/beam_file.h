@@ -4,8 +4,10 @@
 #include <string>
 
 #include "alidade/beam/beam.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// What rangefinder.yaml holds.
 struct BeamFile {
@@ -22,4 +24,5 @@ struct BeamFile {
 /// unknown or no number, a direction that is no unit vector, something that is no covariance.
 [[nodiscard]] BeamFile read_beam(const std::filesystem::path& file);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "alidade/files/csv.h"
-#include "alidade/observe/observe.h"
+#include "alidade/observe/report.h"
 
 namespace alidade {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "alidade/files/files.h"
-#include "alidade/observe/observe.h"
+#include "alidade/observe/report.h"
 
 namespace alidade {
 namespace {

@@ -11,6 +11,7 @@
 #include "alidade/files/yaml_fields.h"
 #include "alidade/formats/camera_file.h"
 #include "alidade/formats/intrinsics_file.h"
+#include "alidade/pantilt/head_cameras.h"
 
 namespace alidade {
 namespace {
@@ -269,6 +270,15 @@ Rig read_rig(const std::filesystem::path& file) {
   }
   if (fields.has("covariance")) read_rig_covariance(root["covariance"], fields, rig);
   return rig;
+}
+
+std::map<int, Camera> read_cameras_by_head(const std::vector<std::filesystem::path>& files, const std::vector<int>& ids,
+                                           const std::filesystem::path& table) {
+  const std::string fault = camera_count_fault(ids, files.size());
+  if (!fault.empty()) throw InputError(table.string() + ": " + fault);
+  std::vector<Camera> cameras;
+  for (const std::filesystem::path& file : files) cameras.push_back(read_central_camera(file));
+  return cameras_by_head(ids, cameras);
 }
 
 }  // namespace alidade

@@ -77,6 +77,8 @@ std::string lower_ending(const std::filesystem::path& file) {
   return ending;
 }
 
+bool is_foreign_ending(const std::filesystem::path& file) { return !kind_of_ending(lower_ending(file)).empty(); }
+
 std::string why_no_photo(const std::filesystem::path& file) {
   std::error_code ignored;
   if (std::filesystem::is_directory(file, ignored)) {

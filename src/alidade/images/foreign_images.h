@@ -11,6 +11,9 @@ namespace alidade {
 /// "is HEIC, which is not read: convert it to JPEG or PNG without turning it". Empty for all others.
 [[nodiscard]] std::string foreign_image(std::string_view bytes);
 
+/// Whether a file's ending is of such a kind.
+[[nodiscard]] bool is_foreign_ending(const std::filesystem::path& file);
+
 /// The ending of a file in small letters, ".jpg".
 [[nodiscard]] std::string lower_ending(const std::filesystem::path& file);
 

@@ -123,8 +123,10 @@ std::optional<Check> PhotoSet::turned() const {
 
 void PhotoSet::require_readable(std::size_t num_unreadable, const std::string& reason) const {
   if (num_unreadable < size()) return;
-  const std::string others = fmt::format("; nor can any of the other {} be read", size() - 1);
-  throw InputError(state_->found.photos.front().string() + ": " + reason + (size() > 1 ? others : ""));
+  const std::string others = size() < 2    ? ""
+                             : size() == 2 ? "; nor can the other be read"
+                                           : fmt::format("; nor can any of the other {} be read", size() - 1);
+  throw InputError(state_->found.photos.front().string() + ": " + reason + others);
 }
 
 Photos photos_in(const std::filesystem::path& path) { return PhotoSet({path}).photos(); }

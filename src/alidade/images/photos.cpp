@@ -103,6 +103,12 @@ std::vector<std::filesystem::path> photos_in(const std::filesystem::path& folder
 
 }  // namespace
 
+bool looks_like_photos(const std::filesystem::path& argument) {
+  std::error_code ignored;
+  return std::filesystem::is_directory(argument, ignored) || looks_like_a_photo(argument) ||
+         is_foreign_ending(argument);
+}
+
 PhotoFiles find_photos(const std::vector<std::filesystem::path>& arguments) {
   PhotoFiles found;
   for (const auto& argument : arguments) {

@@ -23,6 +23,8 @@ struct PhotoFiles {
 /// Photo files for arguments that are files or folders: of a folder, its images (by ending) in natural order, 2
 /// before 10. Throws InputError for a path that does not exist and for a folder without images.
 [[nodiscard]] PhotoFiles find_photos(const std::vector<std::filesystem::path>& arguments);
+/// Whether an argument is a photo (by its ending, be it of a kind that is not read) or a folder, rather than a table.
+[[nodiscard]] bool looks_like_photos(const std::filesystem::path& argument);
 /// The photos alone.
 [[nodiscard]] std::vector<std::filesystem::path> list_photos(const std::vector<std::filesystem::path>& arguments);
 

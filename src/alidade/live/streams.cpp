@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "alidade/live/foxglove.h"
-#include "alidade/results/localize_document.h"
+#include "alidade/results/localize_outcome.h"
 #include "alidade/results/observe_document.h"
-#include "alidade/results/servo_document.h"
+#include "alidade/results/servo_outcome.h"
 #include "alidade/results/track_document.h"
 
 namespace alidade::live {
@@ -183,7 +183,7 @@ void TrackStream::show(Server& server, const TargetObservation& observation, con
   if (step.event == TrackEvent::restart || step.event == TrackEvent::start)
     server.send("/log", t_ns, [t_ns, event = step.event] {
       return log_text(t_ns, event == TrackEvent::start ? LogLevel::info : LogLevel::warning, "track",
-                      event == TrackEvent::start ? "the track starts" : "the track starts anew: it did not fit");
+                      event == TrackEvent::start ? "the track starts" : "the track starts again: it did not fit");
     });
 }
 
@@ -316,28 +316,23 @@ void LocalizeStream::show(Server& server, const PathStep& step, bool is_last) co
 
 std::vector<Topic> ObserveStream::topics() const {
   std::vector<Topic> topics = common_topics();
-  const TrueIntrinsics truth{};  // rows have it where the log has
-  topics.push_back(row_topic("/observe", "alidade.ObserveStep", observe_row(0.0, {}, {}, &truth)));
+  ObserveStep row;
+  row.truth = TrueIntrinsics{};  // rows have it where the log has
+  topics.push_back(row_topic("/observe", "alidade.ObserveStep", observe_row(row)));
   topics.push_back({foxglove_channel("/tf", FoxgloveType::frame_transforms), TopicKind::images, 60.0, 1});
   topics.push_back(latest("/head1/camera", FoxgloveType::camera_calibration, 10.0));
   return topics;
 }
 
-void ObserveStream::show(Server& server, double t_s, const IntrinsicsEstimate& estimate, const RotationFrame& frame,
-                         const TrueIntrinsics* truth, bool is_last) const {
-  const std::int64_t t_ns = ns_of(t_s);
-  RotationFrame copy = frame;
-  copy.px = {};  // points into the row
+void ObserveStream::show(Server& server, const ObserveStep& step, bool is_last) const {
+  const std::int64_t t_ns = ns_of(step.t_s);
+  const IntrinsicsEstimate& estimate = step.estimate;
   server.send(
-      "/observe", t_ns,
-      [t_s, estimate, copy, truth = truth != nullptr ? std::optional(*truth) : std::nullopt] {
-        return row_text(observe_row(t_s, estimate, copy, truth ? &*truth : nullptr));
-      },
-      0, is_last);
+      "/observe", t_ns, [step] { return row_text(observe_row(step)); }, 0, is_last);
   server.send(
       "/tf", t_ns,
-      [t_ns, copy] {
-        const FrameTransform transform{"world", "head1", {copy.cam_from_start.conjugate(), Eigen::Vector3d::Zero()}};
+      [t_ns, start_from_cam = step.start_from_cam] {
+        const FrameTransform transform{"world", "head1", {start_from_cam, Eigen::Vector3d::Zero()}};
         return frame_transforms_text(t_ns, {&transform, 1});
       },
       0, is_last);

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "alidade/live/server.h"
-#include "alidade/localize/localize.h"
+#include "alidade/localize/localization.h"
 #include "alidade/loop/servo_study.h"
-#include "alidade/observe/observe.h"
+#include "alidade/observe/observer.h"
 #include "alidade/results/result_document.h"
 #include "alidade/track/track.h"
 
@@ -76,8 +76,7 @@ class ObserveStream {
  public:
   ObserveStream(int width_px, int height_px) : width_px_(width_px), height_px_(height_px) {}
   [[nodiscard]] std::vector<Topic> topics() const;
-  void show(Server& server, double t_s, const IntrinsicsEstimate& estimate, const RotationFrame& frame,
-            const TrueIntrinsics* truth, bool is_last = false) const;
+  void show(Server& server, const ObserveStep& step, bool is_last = false) const;
 
  private:
   int width_px_, height_px_;

@@ -3,8 +3,10 @@
 #include <Eigen/Core>
 
 #include "alidade/geometry/rigid3.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// A camera that moves: where it is, and how fast. Its error has 12 numbers, in this order: position in the world,
 /// rotation on the right (q = q̂ exp(δθ)), velocity in the world, angular rate in the camera's frame.
@@ -39,4 +41,5 @@ struct MotionJacobians {
 /// Solà, Deray & Atchuthan, "A micro Lie theory", 2018, eq. (143).
 [[nodiscard]] Eigen::Matrix3d right_jacobian(const Eigen::Vector3d& phi);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

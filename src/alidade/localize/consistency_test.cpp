@@ -71,8 +71,8 @@ TEST(Consistency, NothingSeenTellsHowTheWorldIsTurned) {
       EXPECT_NEAR(information_of(filter), before, 1e-3) << k;
     }
     for (const FeatureObservation& observation : sample.frames[k].observations) {
-      const auto told = std::ranges::find(sample.config.depths, observation.id, &ToldDepth::id);
-      if (filter.has(observation.id) || told == sample.config.depths.end()) continue;
+      const auto told = std::ranges::find(sample.config.start->depths, observation.id, &GivenDepth::id);
+      if (filter.has(observation.id) || told == sample.config.start->depths.end()) continue;
       const double range_m = told->depth_m / unproject(filter.camera(), observation.px)->z();
       filter.add(observation.id, observation.px, {range_m, told->sigma_rel}, FeatureKind::xyz);
     }

@@ -1,16 +1,6 @@
 #include "alidade/localize/distortion.h"
 
-#include <array>
-#include <utility>
-
 namespace alidade {
-namespace {
-
-constexpr std::array<std::pair<DistortionVariant, std::string_view>, 3> names{
-    {{DistortionVariant::none, "none"}, {DistortionVariant::radial1, "radial1"}, {DistortionVariant::full, "full"}}};
-
-}  // namespace
-
 std::optional<Camera> with_distortion(const Camera& camera, DistortionVariant variant) {
   if (variant == DistortionVariant::full || std::holds_alternative<Calibrated<Pinhole>>(camera.lens)) return camera;
   Camera result = camera;
@@ -20,16 +10,10 @@ std::optional<Camera> with_distortion(const Camera& camera, DistortionVariant va
   return result;
 }
 
-std::string_view variant_name(DistortionVariant variant) {
-  for (const auto& [value, name] : names)
-    if (value == variant) return name;
-  return "";
-}
-
-std::optional<DistortionVariant> distortion_variant(std::string_view name) {
-  for (const auto& [value, known] : names)
-    if (known == name) return value;
-  return std::nullopt;
+const WordList<DistortionVariant>& distortion_words() {
+  static const WordList<DistortionVariant> words = {
+      {DistortionVariant::none, "none"}, {DistortionVariant::radial1, "radial1"}, {DistortionVariant::full, "full"}};
+  return words;
 }
 
 }  // namespace alidade

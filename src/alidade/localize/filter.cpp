@@ -50,8 +50,6 @@ const Feature* LocalizationFilter::find(long id) const {
   return at == features_.end() ? nullptr : &*at;
 }
 
-bool LocalizationFilter::has_room(int count) const { return P_.dim() + count <= config_.state_capacity; }
-
 void LocalizationFilter::predict(double dt_s) {
   const MotionJacobians J = motion_jacobians(motion_, dt_s);
   const MotionMatrix Q = motion_noise(J, config_.sigma_a_m_s2, config_.sigma_alpha_rad_s2, dt_s);

@@ -6,45 +6,12 @@
 #include <span>
 #include <vector>
 
+#include "alidade/localize/config.h"
 #include "alidade/localize/feature.h"
 #include "alidade/localize/given_effects.h"
 #include "alidade/localize/state_covariance.h"
 
 namespace alidade {
-
-struct LocalizationFilterConfig {
-  double sigma_px = 0.5;  ///< Of a pixel coordinate, where an observation does not say.
-  /// Of the pixel by which a new feature is defined; 0: sigma_px. A patch that is looked for as it was first seen is
-  /// there by definition.
-  double sigma_new_px = 0.0;
-  double sigma_a_m_s2 = 1.0;        ///< Acceleration between predictions; a hand's is about 4.
-  double sigma_alpha_rad_s2 = 1.5;  ///< Angular acceleration; a hand's is about 6.
-  int max_iterations = 4;           ///< Gauss–Newton steps of an update.
-  double gate = 13.8;               ///< χ² of two numbers: 99.9 %.
-  double bend_tolerance = 0.05;     ///< Iterate while innovations are further from linear than so many σ.
-  bool is_sequential = true;        ///< Known points first, then by growing innovation; false: in the order given.
-  bool finds_consensus = true;      ///< One-point consensus where observations disagree: mismatches.
-  double consensus_above = 0.0;     ///< Share of the observations that may disagree before a consensus is looked for.
-  /// No observation tells how the world is turned, and so the covariance says: world_turn.h. False: as in the
-  /// literature before 2001, more certain with every frame.
-  bool holds_frame = true;
-  /// Errors that turn with the world are straight for small turns only: an update by a larger one holds the frame by
-  /// its derivatives alone. See world_turn.h.
-  double max_turn_rad = 0.02;
-  double linear_below = 0.1;     ///< Linearity index below which an inverse depth becomes a place.
-  std::vector<int> lens_params;  ///< Places of the lens's parameters that are in the state, and their σ at the start.
-  std::vector<double> sigma_lens_params;
-  double sigma_scale = 0.0;  ///< Of the known points' common scale, relative; counted, as the lens's covariance is.
-  int state_capacity = 800;  ///< Numbers of the state at most.
-  int observations_capacity = 200;  ///< Measured features of one moment at most.
-};
-
-/// A feature seen: which one, where. σ 0: the filter's.
-struct FeatureObservation {
-  long id = 0;
-  Eigen::Vector2d px = Eigen::Vector2d::Zero();
-  double sigma_px = 0.0;
-};
 
 enum class ObservationOutcome {
   used,
@@ -74,7 +41,7 @@ struct ObservationsReport {
 };
 
 /// Where a moving camera is, and the points that it sees: an error-state extended Kalman filter over the camera's
-/// motion, the lens where asked, and a map of places and inverse depths. Drive it by
+/// motion, the lens where asked, and a map of positions and inverse depths. Drive it by
 ///     predict(dt);  expected(id) …;  update(observations);  add(id, px, prior) …;  remove(id)
 /// It allocates nothing after its construction, except for more features than it had before.
 /// A. J. Davison et al., PAMI 29(6), 2007; J. Civera et al., TRO 24(5), 2008; docs/maths/localization.md.
@@ -92,6 +59,8 @@ class LocalizationFilter {
   /// there already, or the lens sees nothing there.
   bool add(long id, const Eigen::Vector2d& px, const RangePrior& prior, FeatureKind kind = FeatureKind::inverse_depth);
   void remove(long id);
+  /// Whether so many more numbers fit into the state.
+  [[nodiscard]] bool has_room(int count) const { return P_.dim() + count <= config_.state_capacity; }
   /// Inverse depths that are nearly linear become places: half the numbers. Their count.
   int convert_linear();
   /// The camera is elsewhere: correlations with the map end, the map stays.
@@ -147,7 +116,6 @@ class LocalizationFilter {
   };
 
   [[nodiscard]] const Feature* find(long id) const;
-  [[nodiscard]] bool has_room(int count) const;
   void remove_numbers(int offset, int count);
   [[nodiscard]] int num_lens() const { return static_cast<int>(config_.lens_params.size()); }
   /// Derivatives and innovation at nominal ⊞ delta_. False where it is not seen.

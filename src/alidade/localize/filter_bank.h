@@ -14,14 +14,6 @@ struct StartHypothesis {
   double cost = 0.0;
 };
 
-struct FilterBankConfig {
-  int splits = 5;            ///< Parts of the speed aside, to each of two sides; 1: none.
-  double spread = 1.5;       ///< The outermost part, in σ.
-  double narrowed = 0.5;     ///< σ of a part over the σ of the whole.
-  double min_weight = 40.0;  ///< A part that costs so much more than the best one (−2 ln) is given up.
-  int max_frames = 15;       ///< After so many updates the best one alone goes on.
-};
-
 /// Filters that start differently, until the observations tell which is right. In front of a small or flat target, a
 /// move aside and a turn look alike: the first frames leave a long bent valley of poses, a Gaussian on it is sure of
 /// itself in the wrong place, and one in ten runs is lost. So the belief of the speed aside is split into narrower ones

@@ -32,7 +32,7 @@ UnderwaterScene scene_of(int num_points, int num_frames, double sigma_depth = 0.
 /// A filter with the sample's known points, at its start.
 LocalizationFilter filter_of(const testing::UnderwaterSample& sample, const LocalizationFilterConfig& config = {}) {
   LocalizationFilter filter(sample.camera, sample.config.start->motion, sample.config.start->cov, config);
-  for (const KnownPoint& point : sample.config.target)
+  for (const KnownPoint& point : sample.config.target.points)
     EXPECT_TRUE(filter.add_known(point.id, point.point_in_world, point.sigma_m));
   return filter;
 }
@@ -40,8 +40,8 @@ LocalizationFilter filter_of(const testing::UnderwaterSample& sample, const Loca
 void add_told(const testing::UnderwaterSample& sample, const ObservationFrame& frame, FeatureKind kind,
               LocalizationFilter& filter) {
   for (const FeatureObservation& observation : frame.observations) {
-    const auto told = std::ranges::find(sample.config.depths, observation.id, &ToldDepth::id);
-    if (filter.has(observation.id) || told == sample.config.depths.end()) continue;
+    const auto told = std::ranges::find(sample.config.start->depths, observation.id, &GivenDepth::id);
+    if (filter.has(observation.id) || told == sample.config.start->depths.end()) continue;
     const auto ray_in_cam = unproject(filter.camera(), observation.px);
     ASSERT_TRUE(ray_in_cam);
     EXPECT_TRUE(filter.add(observation.id, observation.px, {told->depth_m / ray_in_cam->z(), told->sigma_rel}, kind));
@@ -100,7 +100,8 @@ TEST(LocalizationFilter, UpdateIsTheDenseKalmanUpdate) {
     CameraMotion still;
     still.world_from_cam = sample.truth[0].world_from_cam;
     LocalizationFilter filter(sample.camera, still, 1e-8 * MotionMatrix::Identity(), config);
-    for (const KnownPoint& point : sample.config.target) filter.add_known(point.id, sample.points.at(point.id), 1e-4);
+    for (const KnownPoint& point : sample.config.target.points)
+      filter.add_known(point.id, sample.points.at(point.id), 1e-4);
     const Eigen::MatrixXd P = covariance_of(filter);
     Eigen::MatrixXd H = Eigen::MatrixXd::Zero(8, filter.dim());
     Eigen::VectorXd nu(8);
@@ -235,7 +236,7 @@ TEST(LocalizationFilter, IsThatOfTheReferenceSequences) {
     }
     const auto vector_of = [](const Json& x) { return Eigen::Vector3d(x[0], x[1], x[2]); };
     const auto quaternion_of = [](const Json& x) { return Eigen::Quaterniond(x[0], x[1], x[2], x[3]); };
-    StartHypothesis start;
+    LocalizeStart start;
     start.motion.world_from_cam = {quaternion_of(about["init"]["q"]), vector_of(about["init"]["r"])};
     const std::array<const char*, 4> names{"r", "theta", "v", "omega"};
     for (int i = 0; i < 4; ++i) {
@@ -250,9 +251,9 @@ TEST(LocalizationFilter, IsThatOfTheReferenceSequences) {
       const long id = point["id"];
       sample.points[id] = vector_of(about["truth"]["points"][static_cast<std::size_t>(id - 1)]);
       if (point["known"])
-        sample.config.target.push_back({id, vector_of(point["init"]), point["sigma_m"]});
+        sample.config.target.points.push_back({id, vector_of(point["init"]), point["sigma_m"]});
       else
-        sample.config.depths.push_back({id, point["init_depth_m"], point["sigma_rel"]});
+        sample.config.start->depths.push_back({id, point["init_depth_m"], point["sigma_rel"]});
     }
     const std::array<const char*, 3> variants{"pinhole", "first", "full"};
     for (const DistortionVariant variant :

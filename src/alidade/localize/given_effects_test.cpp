@@ -76,9 +76,9 @@ TEST(GivenEffects, AFilterCountsTheLens) {
     told.lens = with_params(told.lens, values);
     const auto nees = [&](const Camera& camera) {
       LocalizeConfig config;
-      config.target = run.target;
+      config.target.points = run.target;
       config.smooths = false;
-      const LocalizeReport report = localize_observations(camera, run.frames, config);
+      const Localization report = localize(run.frames, camera, config);
       return testing::pose_nees(report.path.back(), run.truth.back().world_from_cam) / num_seeds;
     };
     ignored += nees(told);
@@ -92,8 +92,8 @@ TEST(GivenEffects, AFilterCountsTheLens) {
 /// Without a target as with one; and what an ordinary error would do is said.
 TEST(GivenEffects, WithoutATargetWhatWasAssumedIsSaid) {
   const HoverRun run = testing::hovering({.num_frames = 60, .num_others = 30}, 4);
-  const LocalizeReport report = localize_observations(run.camera, run.frames, {});
-  const auto assumed = localize_assumed(report);
+  const Localization report = localize(run.frames, run.camera);
+  const auto assumed = report.assumed;
   const auto focal = std::ranges::find(assumed, std::string("camera.f (relative)"), &Assumption::name);
   ASSERT_NE(focal, assumed.end());
   EXPECT_FALSE(focal->sigma.has_value());
@@ -101,7 +101,7 @@ TEST(GivenEffects, WithoutATargetWhatWasAssumedIsSaid) {
   Camera known = run.camera;
   known.cov = Eigen::MatrixXd::Zero(10, 10);
   known.cov(0, 0) = known.cov(1, 1) = 9.0;
-  const auto counted = localize_assumed(localize_observations(known, run.frames, {}));
+  const auto counted = localize(run.frames, known).assumed;
   EXPECT_NEAR(*std::ranges::find(counted, std::string("camera.f (relative)"), &Assumption::name)->sigma, 3.0 / 610.0,
               1e-4);
 }

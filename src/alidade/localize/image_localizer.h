@@ -2,11 +2,10 @@
 
 #include <unordered_map>
 
-#include "alidade/localize/given_numbers.h"
+#include "alidade/localize/engine.h"
+#include "alidade/localize/image_target.h"
 #include "alidade/localize/keyframes.h"
 #include "alidade/localize/landmark.h"
-#include "alidade/localize/localize_images.h"
-#include "alidade/localize/path_doubt.h"
 
 namespace alidade {
 
@@ -14,22 +13,17 @@ namespace alidade {
 /// features defined by a pixel that is found again to `sigma_floor_px`.
 [[nodiscard]] LocalizationFilterConfig for_images(LocalizationFilterConfig config, double sigma_floor_px);
 
-/// One run through images: finds the features of the filter's map in each, chooses new ones, and finds the way back
+/// The front end for images: finds the features of the filter's map in each, chooses new ones, and finds the way back
 /// after it was lost.
 class ImageLocalizer {
  public:
-  ImageLocalizer(const Camera& camera, const LocalizeImagesConfig& config);
+  /// `config` as resolved() gives it; it must live longer.
+  ImageLocalizer(const Camera& camera, const LocalizeConfig& config);
 
   /// The next image, 8-bit grey of the camera's size.
   PathStep take(const cv::Mat& grey, long frame, double t_s);
-  [[nodiscard]] const FilterBank* bank() const { return bank_ ? &*bank_ : nullptr; }
-  [[nodiscard]] std::size_t num_restarts() const { return num_restarts_; }
-  [[nodiscard]] std::size_t num_found(long id) const;
-  /// The target's points as they were told to the filter.
-  [[nodiscard]] std::span<const KnownPoint> told() const { return told_; }
-  [[nodiscard]] const RadialResiduals& residuals() const { return residuals_; }
-  [[nodiscard]] const GivenTally& given() const { return given_; }
-  [[nodiscard]] std::size_t num_alike() const { return num_alike_; }
+  /// `result` has the path; the rest is filled in.
+  void sum_up(Localization& result) const;
   /// Of the last image.
   [[nodiscard]] std::span<const ObservationTried> tried() const { return tried_; }
 
@@ -41,8 +35,9 @@ class ImageLocalizer {
 
   bool start(const cv::Mat& smoothed);
   void begin_at(std::span<const StartHypothesis> starts);
+  [[nodiscard]] std::optional<SeenTarget> seen_target(const cv::Mat& smoothed) const;
   void add_target(const cv::Mat& smoothed, const SeenTarget& seen);
-  [[nodiscard]] std::vector<KnownPoint> told_points(const SeenTarget& seen) const;
+  [[nodiscard]] std::vector<KnownPoint> given_points(const SeenTarget& seen) const;
   void predict_to(double t_s);
   /// What of the map is found where it is expected; `tried_` says what was looked for.
   [[nodiscard]] std::vector<FeatureObservation> look(const cv::Mat& smoothed, const Search& search);
@@ -54,27 +49,21 @@ class ImageLocalizer {
   [[nodiscard]] double usual_depth_m() const;
   [[nodiscard]] bool find_back(const cv::Mat& smoothed, PathStep& step);
   [[nodiscard]] bool try_from(const cv::Mat& smoothed, const StartHypothesis& start, PathStep& step);
-  void fill(std::span<const FeatureObservation> observations, const ObservationsReport& report, PathStep& step) const;
   void forget(long id);
+  void take_next(const cv::Mat& smoothed, PathStep& step);
   [[nodiscard]] bool restart_in_doubt(const cv::Mat& smoothed, PathStep& step);
 
-  Camera camera_;
-  const LocalizeImagesConfig& config_;
-  LocalizationFilterConfig filter_config_;
-  std::optional<FilterBank> bank_;
+  LocalizeEngine engine_;
+  const LocalizeConfig& config_;
   std::unordered_map<long, Landmark> landmarks_;
   KeyframeStore keyframes_;
-  std::vector<KnownPoint> told_;
-  PathDoubt doubt_;
-  RadialResiduals residuals_;
-  GivenTally given_;
+  std::vector<KnownPoint> given_;  ///< The target's points, as the filter was given them.
   std::size_t num_alike_ = 1;
   std::vector<ObservationTried> tried_;
   std::vector<Eigen::Vector2d> in_view_;  ///< Where landmarks are, or should be, in this image.
   double t_s_ = 0.0, period_s_ = 0.0;
   long frame_ = 0, next_id_ = 0;
-  int num_lost_in_a_row_ = 0;
-  std::size_t num_restarts_ = 0, num_found_now_ = 0;
+  std::size_t num_found_now_ = 0;
 };
 
 }  // namespace alidade

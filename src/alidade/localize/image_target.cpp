@@ -15,7 +15,7 @@ constexpr double max_chi2_per_dof = 6.9;  // 99.9 % of the two numbers that four
 int dof_of(std::size_t num_points) { return 2 * static_cast<int>(num_points) - 6; }
 
 std::optional<SeenTarget> posed(const Camera& camera, std::vector<FeatureObservation> observations,
-                                const ImageTarget& target, const KnownPoseConfig& config) {
+                                const LocalizeTarget& target, const KnownPoseConfig& config) {
   SeenTarget seen{std::move(observations), {}};
   seen.starts = poses_from_known(camera, seen.observations, target.points, config);
   if (seen.starts.empty()) return std::nullopt;
@@ -25,7 +25,7 @@ std::optional<SeenTarget> posed(const Camera& camera, std::vector<FeatureObserva
 
 /// Of the ways to number the corners those in which x points to the right; the one that fits best.
 std::optional<SeenTarget> posed_rectangle(const Camera& camera, const SeenRectangle& rectangle,
-                                          const ImageTarget& target, const KnownPoseConfig& config) {
+                                          const LocalizeTarget& target, const KnownPoseConfig& config) {
   std::optional<SeenTarget> best;
   for (std::size_t first = 0; first < 4; ++first) {
     const Eigen::Vector2d x_axis = rectangle.corners_px[(first + 1) % 4] - rectangle.corners_px[first];
@@ -41,7 +41,7 @@ std::optional<SeenTarget> posed_rectangle(const Camera& camera, const SeenRectan
   return best;
 }
 
-std::optional<SeenTarget> find_rectangle(const cv::Mat& grey, const Camera& camera, const ImageTarget& target,
+std::optional<SeenTarget> find_rectangle(const cv::Mat& grey, const Camera& camera, const LocalizeTarget& target,
                                          const KnownPoseConfig& config) {
   struct Candidate {
     SeenTarget seen;
@@ -68,7 +68,7 @@ std::optional<SeenTarget> find_rectangle(const cv::Mat& grey, const Camera& came
   return std::move(best->seen);
 }
 
-std::optional<SeenTarget> find_board_points(const cv::Mat& grey, const Camera& camera, const ImageTarget& target,
+std::optional<SeenTarget> find_board_points(const cv::Mat& grey, const Camera& camera, const LocalizeTarget& target,
                                             const KnownPoseConfig& config) {
   const BoardDetection found = find_board(grey, *target.board);
   if (!found.found()) return std::nullopt;
@@ -85,7 +85,7 @@ double top_of(double before, double at, double after) {
 }
 
 /// Each patch where the image is most like it.
-std::optional<SeenTarget> find_patches(const cv::Mat& grey, const Camera& camera, const ImageTarget& target,
+std::optional<SeenTarget> find_patches(const cv::Mat& grey, const Camera& camera, const LocalizeTarget& target,
                                        const KnownPoseConfig& config) {
   constexpr double min_correlation = 0.75;
   std::vector<FeatureObservation> observations;
@@ -113,8 +113,8 @@ std::optional<SeenTarget> find_patches(const cv::Mat& grey, const Camera& camera
 
 }  // namespace
 
-ImageTarget rectangle_target(double width_m, double height_m, double sigma_m) {
-  ImageTarget target;
+LocalizeTarget rectangle_target(double width_m, double height_m, double sigma_m) {
+  LocalizeTarget target;
   target.rectangle_m = {width_m, height_m};
   const double x = 0.5 * width_m, y = 0.5 * height_m;
   target.points = {
@@ -122,7 +122,7 @@ ImageTarget rectangle_target(double width_m, double height_m, double sigma_m) {
   return target;
 }
 
-std::optional<SeenTarget> find_target(const cv::Mat& grey, const Camera& camera, const ImageTarget& target,
+std::optional<SeenTarget> find_target(const cv::Mat& grey, const Camera& camera, const LocalizeTarget& target,
                                       const KnownPoseConfig& config) {
   if (target.rectangle_m) return find_rectangle(grey, camera, target, config);
   if (target.board) return find_board_points(grey, camera, target, config);

@@ -4,15 +4,9 @@
 #include <vector>
 
 #include "alidade/localize/filter_bank.h"
+#include "alidade/localize/target.h"
 
 namespace alidade {
-
-/// A point whose place is known before: it gives scale and frame.
-struct KnownPoint {
-  long id = 0;
-  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();
-  double sigma_m = 0.001;  ///< Of each coordinate.
-};
 
 /// Where a camera is that sees these known points, which lie in a plane (or nearly): both poses that a flat target
 /// nearly has, by maximum likelihood, the better one first, with their covariance; speeds zero with these σ. Of more

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <string>
 
-#include "alidade/localize/localize.h"
+#include "alidade/localize/judge.h"
 
 namespace alidade {
 namespace {
@@ -30,7 +30,7 @@ double value_of(std::string_view given, const Camera& camera) {
 
 }  // namespace
 
-std::vector<Assumption> localize_assumed(const LocalizeReport& report) {
+std::vector<Assumption> localize_assumed(const Localization& report) {
   std::vector<Assumption> assumed;
   if (!std::ranges::any_of(report.path, &PathStep::has_pose)) return assumed;
   for (const GivenNumber& given : report.given) {
@@ -41,14 +41,14 @@ std::vector<Assumption> localize_assumed(const LocalizeReport& report) {
     Assumption each;
     each.name = named->name;
     each.value = value_of(named->given, report.camera);
-    each.sigma = is_scale && !report.is_scale_told ? std::nullopt : given.sigma;
+    each.sigma = is_scale && !report.is_scale_given ? std::nullopt : given.sigma;
     each.ordinary = named->ordinary;
     const double error = each.sigma.value_or(named->ordinary);
     each.moves = given.moves * error;
     each.moved = std::string(given.moved);
     each.moved_by = given.moved_by * error;
     each.remedy = is_scale   ? "give --sigma-scale, or σ in --target: sigma_m of each point, sigma_square_m of a board"
-                  : is_clock ? "take times at the middle of each exposure: no sight tells when it was"
+                  : is_clock ? "take times at the centre of each exposure: no observation says when it was"
                              : remedy_camera;
     assumed.push_back(each);
   }

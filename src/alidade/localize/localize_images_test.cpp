@@ -1,4 +1,4 @@
-#include "alidade/localize/localize_images.h"
+#include "alidade/localize.h"
 
 #include <gtest/gtest.h>
 
@@ -47,15 +47,15 @@ const RoomVideo& usual_room() {
   return video;
 }
 
-LocalizeImagesConfig by_hand() {
-  LocalizeImagesConfig config;
-  config.localize.filter.sigma_a_m_s2 = 4.0;
-  config.localize.filter.sigma_alpha_rad_s2 = 6.0;
+LocalizeConfig by_hand() {
+  LocalizeConfig config;
+  config.filter.sigma_a_m_s2 = 4.0;
+  config.filter.sigma_alpha_rad_s2 = 6.0;
   config.target = rectangle_target(0.210, 0.1485);
   return config;
 }
 
-LocalizeReport localized(const RoomVideo& video, const LocalizeImagesConfig& config) {
+Localization localized(const RoomVideo& video, const LocalizeConfig& config) {
   std::size_t i = 0;
   const NextImage next = [&](cv::Mat& grey, long& frame, double& t_s) {
     if (i == video.images.size()) return false;
@@ -64,21 +64,21 @@ LocalizeReport localized(const RoomVideo& video, const LocalizeImagesConfig& con
     t_s = static_cast<double>(i++) / video.scene.rate_hz;
     return true;
   };
-  return localize_images(video.scene.camera, next, video.images.size(), config, video.truth);
+  return localize(ImageStream{next, video.images.size()}, video.scene.camera, config, video.truth);
 }
 
 TEST(LocalizeImages, FollowsARoomWithoutLosingAFrame) {
-  const LocalizeReport report = localized(usual_room(), by_hand());
+  const Localization report = localized(usual_room(), by_hand());
   EXPECT_EQ(report.num_lost, 0u);
   EXPECT_LT(report.error.ate_m, 0.005);  // 0.1 px of the rectangle's 60 are 1 mm of 0.7 m; a drift of a few of them
-  EXPECT_EQ(localize_verdict(report).exit_code, ExitCode::ok);
+  EXPECT_EQ(report.verdict.exit_code, ExitCode::ok);
   EXPECT_TRUE(report.scale_known);
   for (const PathStep& step : report.path) EXPECT_GE(step.num_tracked, 20u) << step.frame;
 }
 
 /// Four in ten matches moved by up to 20 px, or taken away.
-LocalizeReport disturbed(const RoomVideo& video, bool takes_away, std::uint64_t seed) {
-  LocalizeImagesConfig config = by_hand();
+Localization disturbed(const RoomVideo& video, bool takes_away, std::uint64_t seed) {
+  LocalizeConfig config = by_hand();
   Draws draws(seed);
   config.disturb = [&](long, std::vector<FeatureObservation>& observations) {
     std::vector<FeatureObservation> left;
@@ -105,7 +105,7 @@ TEST(LocalizeImages, MismatchesOfFortyPercentChangeLittle) {
     const RoomVideo video = amplitude == 1.0 ? usual_room() : room_video(scene);
     clean2 += std::pow(localized(video, by_hand()).error.ate_m, 2);
     for (std::uint64_t seed = 1; seed <= num_draws; ++seed) {
-      const LocalizeReport wrong = disturbed(video, false, seed);
+      const Localization wrong = disturbed(video, false, seed);
       EXPECT_EQ(wrong.num_lost, 0u) << amplitude << ' ' << seed;
       EXPECT_GT(wrong.num_gated, wrong.num_used / 4) << amplitude << ' ' << seed;
       wrong2 += std::pow(wrong.error.ate_m, 2) / num_draws;
@@ -123,7 +123,7 @@ TEST(LocalizeImages, ASecondOfDarknessIsRecoveredWithinTenFrames) {
   RoomVideo video = usual_room();
   for (std::size_t i = 40; i < 70; ++i)
     video.images[i] = cv::Mat(240, 320, CV_8U, cv::Scalar(0));  // zeros() would write into the shared one
-  const LocalizeReport report = localized(video, by_hand());
+  const Localization report = localized(video, by_hand());
   for (std::size_t i = 40; i < 70; ++i) EXPECT_EQ(report.path[i].event, FrameEvent::predicted);
   for (std::size_t i = 80; i < 90; ++i) {
     EXPECT_NE(report.path[i].event, FrameEvent::predicted) << i;
@@ -137,9 +137,9 @@ TEST(LocalizeImages, WithoutTheTargetThereIsNoPath) {
   scene.camera = room_camera();
   scene.has_rectangle = false;
   scene.num_frames = 5;
-  const LocalizeReport report = localized(room_video(scene), by_hand());
+  const Localization report = localized(room_video(scene), by_hand());
   EXPECT_EQ(report.num_lost, 5u);
-  EXPECT_EQ(localize_verdict(report).exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(report.verdict.exit_code, ExitCode::cannot_tell);
 }
 
 /// Sheets with a dark rectangle each, on a grey wall 0.7 m ahead.
@@ -165,43 +165,42 @@ cv::Mat sheets_at(const Camera& camera, const std::vector<double>& places_m) {
 TEST(LocalizeImages, OfTwoThatLookAlikeItTakesNone) {
   RoomVideo video = usual_room();
   video.images.assign(5, sheets_at(video.scene.camera, {-0.2, 0.2}));
-  const LocalizeReport two = localized(video, by_hand());
+  const Localization two = localized(video, by_hand());
   EXPECT_EQ(two.num_lost, 5u);
   EXPECT_EQ(two.num_alike, 2u);
-  const Verdict verdict = localize_verdict(two);
+  const Verdict verdict = two.verdict;
   EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
-  EXPECT_NE(verdict.sentence.find("2 things in one picture look like the target"), std::string::npos)
-      << verdict.sentence;
+  EXPECT_NE(verdict.sentence.find("2 things in one image look like the target"), std::string::npos) << verdict.sentence;
   video.images.assign(5, sheets_at(video.scene.camera, {-0.2}));
   EXPECT_EQ(localized(video, by_hand()).path.front().event, FrameEvent::started);
 }
 
 /// Points of the target that are told by how they look, instead of a rectangle: the path is the same.
 TEST(LocalizeImages, FindsPointsByTheirPatches) {
-  LocalizeImagesConfig config = by_hand();
-  config.target->rectangle_m.reset();
+  LocalizeConfig config = by_hand();
+  config.target.rectangle_m.reset();
   const RoomVideo& video = usual_room();
   constexpr int side = 31;
-  for (const KnownPoint& point : config.target->points) {
+  for (const KnownPoint& point : config.target.points) {
     const auto px = project(video.scene.camera, video.truth[0].world_from_cam.inverse() * point.point_in_world);
     cv::Mat patch;
     cv::getRectSubPix(video.images[0], {side, side}, cv::Point2d(px->x(), px->y()), patch);
-    config.target->patches.push_back({side, side, {patch.datastart, patch.dataend}});
+    config.target.patches.push_back({side, side, {patch.datastart, patch.dataend}});
   }
-  const LocalizeReport report = localized(video, config);
+  const Localization report = localized(video, config);
   EXPECT_EQ(report.num_lost, 0u);
   EXPECT_LT(report.error.unaligned_m, 0.01);  // its points are found to a tenth of a pixel: 1 mm of 0.7 m, and drift
 }
 
 /// Observations that contradict each other for a third of a second: the path begins anew instead of following them.
 TEST(LocalizeImages, BeginsAnewWhereItsObservationsContradictIt) {
-  LocalizeImagesConfig config = by_hand();
+  LocalizeConfig config = by_hand();
   Draws draws(3);
   config.disturb = [&](long frame, std::vector<FeatureObservation>& observations) {
     if (frame < 30 || frame >= 40) return;
     for (FeatureObservation& observation : observations) observation.px += 0.7 * draws.normal2();
   };
-  const LocalizeReport report = localized(usual_room(), config);
+  const Localization report = localized(usual_room(), config);
   EXPECT_GE(report.num_restarts, 1u);
   for (std::size_t i = 45; i < 90; ++i) {
     const Eigen::Vector3d& is = report.path[i].world_from_cam.translation;
@@ -212,13 +211,13 @@ TEST(LocalizeImages, BeginsAnewWhereItsObservationsContradictIt) {
 /// What a wrong camera does to the path is seen where the truth is given.
 TEST(LocalizeImages, AWrongLensIsSeenByTheTruth) {
   RoomVideo video = usual_room();
-  const LocalizeReport right = localized(video, by_hand());
+  const Localization right = localized(video, by_hand());
   EXPECT_LT(right.error.ate_m, 1.5 * right.error.stated_m);
   Params<KannalaBrandt> values = std::get<Calibrated<KannalaBrandt>>(video.scene.camera.lens).params;
   values.head<2>() *= 1.3;
   video.scene.camera.lens = Calibrated<KannalaBrandt>{values};
-  const LocalizeReport wrong = localized(video, by_hand());
-  const Verdict verdict = localize_verdict(wrong);
+  const Localization wrong = localized(video, by_hand());
+  const Verdict verdict = wrong.verdict;
   EXPECT_NE(verdict.state, State::good) << verdict.sentence;
   EXPECT_GT(std::max(wrong.error.ate_m, wrong.error.unaligned_m), 3.0 * wrong.error.stated_m);
 }
@@ -227,11 +226,11 @@ TEST(LocalizeImages, WithoutTextureThereIsNoPath) {
   RoomVideo video = usual_room();
   video.images.resize(10);
   for (cv::Mat& image : video.images) image = cv::Mat(240, 320, CV_8U, cv::Scalar(128));
-  LocalizeImagesConfig config = by_hand();
-  config.target.reset();
-  const LocalizeReport report = localized(video, config);
+  LocalizeConfig config = by_hand();
+  config.target = {};
+  const Localization report = localized(video, config);
   EXPECT_EQ(report.num_lost, 10u);
-  EXPECT_NE(localize_verdict(report).exit_code, ExitCode::ok);
+  EXPECT_NE(report.verdict.exit_code, ExitCode::ok);
 }
 
 TEST(LocalizeImages, ARealDeskIsFollowedToACentimetre) {
@@ -244,9 +243,7 @@ TEST(LocalizeImages, ARealDeskIsFollowedToACentimetre) {
   values << 195.0, 195.0, 162.0, 125.0, 0.0, -0.00893, -0.03290, -0.00519, 0.00191;
   camera.lens = Calibrated<KannalaBrandt>{values};
   const std::vector<TimedPose> truth = read_tum(folder / "reference_tum.txt");
-  ImageSequence images(folder / "frames", 30.0, camera.width_px, camera.height_px);
-  const NextImage next = [&](cv::Mat& grey, long& frame, double& t_s) { return images.next(grey, frame, t_s); };
-  const LocalizeReport report = localize_images(camera, next, 500, by_hand(), truth);
+  const Localization report = localize(images_in(folder / "frames", camera, 30.0), camera, by_hand(), truth);
   EXPECT_EQ(report.path.size(), 500u);
   EXPECT_EQ(report.num_lost, 0u);
   EXPECT_LT(report.error.ate_m, 0.010);  // the reference itself is good to 5 mm

@@ -1,4 +1,4 @@
-#include "alidade/localize/localize.h"
+#include "alidade/localize.h"
 
 #include <gtest/gtest.h>
 
@@ -120,7 +120,7 @@ TEST(Localize, FromRenderedImagesTheMapIsAsGoodAsItsCovarianceSays) {
   EXPECT_GT(pinhole.p1_mean, 2.0 * full.p1_mean);
 }
 
-double rms_m(const LocalizeReport& report, const UnderwaterSample& sample) {
+double rms_m(const Localization& report, const UnderwaterSample& sample) {
   double sum2 = 0.0, num = 0.0;
   for (std::size_t k = 0; k < report.path.size(); ++k) {
     if (sample.frames[k].observations.empty()) continue;
@@ -143,11 +143,11 @@ TEST(Localize, FindsMismatches) {
         return std::ranges::find(sequence.frames[k].observations, observation.id, &UnderwaterObservation::id)
             ->is_mismatch;
       });
-    const LocalizeReport report = localize_observations(sample.camera, sample.frames, sample.config, sample.truth);
+    const Localization report = localize(sample.frames, sample.camera, sample.config, sample.truth);
     EXPECT_EQ(report.num_lost, 0u) << seed;
     EXPECT_NEAR(static_cast<double>(report.num_gated) / static_cast<double>(report.num_observations), 0.41, 0.05);
     with2 += std::pow(rms_m(report, sample), 2);
-    without2 += std::pow(rms_m(localize_observations(fewer.camera, fewer.frames, fewer.config, fewer.truth), fewer), 2);
+    without2 += std::pow(rms_m(localize(fewer.frames, fewer.camera, fewer.config, fewer.truth), fewer), 2);
   }
   EXPECT_LT(std::sqrt(with2 / without2), 1.2);  // the goal is 1.1 over many sequences; three scatter by 10 %
 }
@@ -159,14 +159,14 @@ TEST(Localize, RecoversFromABlackout) {
     scene.blackout_from_s = 2.0;
     scene.blackout_s = 1.0;
     const UnderwaterSample sample = testing::underwater_sample(scene, seed);
-    const LocalizeReport report = localize_observations(sample.camera, sample.frames, sample.config, sample.truth);
+    const Localization report = localize(sample.frames, sample.camera, sample.config, sample.truth);
     EXPECT_EQ(report.num_lost, 30u);
     for (std::size_t k = 60; k < 90; ++k) EXPECT_EQ(report.path[k].event, FrameEvent::predicted);
     // It knows that it does not know: most in the middle, once the end is known, too.
     EXPECT_GT(report.path[75].cov.trace(), 3.0 * report.path[59].cov.trace());
     LocalizeConfig as_it_comes = sample.config;
     as_it_comes.smooths = false;
-    const LocalizeReport filtered = localize_observations(sample.camera, sample.frames, as_it_comes);
+    const Localization filtered = localize(sample.frames, sample.camera, as_it_comes);
     EXPECT_GT(filtered.path[89].cov.trace(), 100.0 * filtered.path[59].cov.trace());
     const PathStep& after = report.path[100];  // ten frames later
     const double error = (after.world_from_cam.translation - sample.truth[100].world_from_cam.translation).norm();
@@ -181,8 +181,7 @@ TEST(Localize, StartsFromTheTargetAlone) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     UnderwaterSample sample = testing::underwater_sample(rich_scene(), seed);
     sample.config.start.reset();
-    sample.config.depths.clear();
-    const LocalizeReport report = localize_observations(sample.camera, sample.frames, sample.config, sample.truth);
+    const Localization report = localize(sample.frames, sample.camera, sample.config, sample.truth);
     EXPECT_TRUE(report.scale_known);
     num_good += report.error.ate_m < 0.03 ? 1 : 0;
   }
@@ -192,10 +191,10 @@ TEST(Localize, StartsFromTheTargetAlone) {
 TEST(Localize, WithoutATargetThePathIsUpToScaleAndSaysSo) {
   UnderwaterSample sample = testing::underwater_sample(rich_scene(), 2);
   sample.config = {};
-  const LocalizeReport report = localize_observations(sample.camera, sample.frames, sample.config, sample.truth);
+  const Localization report = localize(sample.frames, sample.camera, sample.config, sample.truth);
   EXPECT_FALSE(report.scale_known);
   EXPECT_LT(report.error.ate_m, 0.02);  // of a path of 2 m, after a similarity
-  const Verdict verdict = localize_verdict(report);
+  const Verdict verdict = report.verdict;
   EXPECT_EQ(verdict.exit_code, ExitCode::ok);
   EXPECT_EQ(verdict.state, State::care);
   EXPECT_NE(verdict.sentence.find("scale unknown"), std::string::npos) << verdict.sentence;
@@ -207,11 +206,11 @@ TEST(Localize, LeavesAPoseThatFitsItsOwnMapButNotTheTarget) {
   const UnderwaterSample sample = testing::underwater_sample(scene_of(0.03), 500136);
   LocalizeConfig config = sample.config;
   config.restarts = false;
-  const LocalizeReport stays = localize_observations(sample.camera, sample.frames, config, sample.truth);
+  const Localization stays = localize(sample.frames, sample.camera, config, sample.truth);
   ASSERT_GT(stays.error.ate_m, 0.04);
   ASSERT_LT(stays.nis_per_dof, 1.5);  // it would not be noticed by this
   config.restarts = true;
-  const LocalizeReport leaves = localize_observations(sample.camera, sample.frames, config, sample.truth);
+  const Localization leaves = localize(sample.frames, sample.camera, config, sample.truth);
   EXPECT_EQ(leaves.num_restarts, 1u);
   const Rigid3 &is = leaves.path.back().world_from_cam, &was = sample.truth.back().world_from_cam;
   EXPECT_LT((is.translation - was.translation).norm(), 0.02);
@@ -222,7 +221,7 @@ TEST(Localize, LeavesAPoseThatFitsItsOwnMapButNotTheTarget) {
 TEST(Localize, RestartsWhereTheStartIsWrong) {
   UnderwaterSample sample = testing::underwater_sample(rich_scene(), 4);
   sample.config.start->motion.world_from_cam.translation += Eigen::Vector3d(0.4, 0.2, -0.3);  // 80 σ
-  const LocalizeReport report = localize_observations(sample.camera, sample.frames, sample.config, sample.truth);
+  const Localization report = localize(sample.frames, sample.camera, sample.config, sample.truth);
   EXPECT_GE(report.num_restarts, 1u);
   EXPECT_LT((report.path.back().world_from_cam.translation - sample.truth.back().world_from_cam.translation).norm(),
             0.05);
@@ -231,7 +230,7 @@ TEST(Localize, RestartsWhereTheStartIsWrong) {
 TEST(Localize, AWrongPathIsNeverGood) {
   UnderwaterSample sample = testing::underwater_sample(rich_scene(), 5);
   const auto verdict_of = [&](const Camera& camera, const LocalizeConfig& config) {
-    return localize_verdict(localize_observations(camera, sample.frames, config, sample.truth));
+    return localize(sample.frames, camera, config, sample.truth).verdict;
   };
   EXPECT_EQ(verdict_of(sample.camera, sample.config).state, State::good);
   const auto pinhole = with_distortion(sample.camera, DistortionVariant::none);
@@ -240,8 +239,8 @@ TEST(Localize, AWrongPathIsNeverGood) {
   sure.filter.sigma_px = 0.1;  // five times better than it is
   EXPECT_GE(verdict_of(sample.camera, sure).state, State::bad);
   LocalizeConfig swapped = sample.config;  // points told at each other's places
-  for (std::size_t i = 0; i + 1 < swapped.target.size(); i += 2)
-    std::swap(swapped.target[i].point_in_world, swapped.target[i + 1].point_in_world);
+  for (std::size_t i = 0; i + 1 < swapped.target.points.size(); i += 2)
+    std::swap(swapped.target.points[i].point_in_world, swapped.target.points[i + 1].point_in_world);
   EXPECT_NE(verdict_of(sample.camera, swapped).state, State::good);
 }
 
@@ -250,7 +249,7 @@ TEST(Localize, APinholeInPlaceOfADistortingLensIsNeverGood) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const UnderwaterSample sample = testing::underwater_sample(seed < 8 ? scene_of(0.03) : rich_scene(), seed);
     const auto pinhole = with_distortion(sample.camera, DistortionVariant::none);
-    const Verdict verdict = localize_verdict(localize_observations(*pinhole, sample.frames, sample.config));
+    const Verdict verdict = localize(sample.frames, *pinhole, sample.config).verdict;
     EXPECT_GE(verdict.state, State::care) << seed << ": " << verdict.sentence;
   }
 }
@@ -263,7 +262,7 @@ Camera camera_behind_port() {
 }
 
 /// Mean of eᵀ P⁻¹ e / 3 of the positions, and their RMS.
-std::pair<double, double> nees_and_rms_m(const LocalizeReport& report, const UnderwaterSample& sample) {
+std::pair<double, double> nees_and_rms_m(const Localization& report, const UnderwaterSample& sample) {
   double nees = 0.0, sum2 = 0.0, num = 0.0;
   for (std::size_t k = 0; k < report.path.size(); ++k) {
     const PathStep& step = report.path[k];
@@ -285,16 +284,16 @@ TEST(Localize, SeesThroughAFlatPort) {
     UnderwaterScene scene = rich_scene();
     scene.camera = camera_behind_port();
     const UnderwaterSample sample = testing::underwater_sample(scene, seed);
-    const LocalizeReport report = localize_observations(sample.camera, sample.frames, sample.config);
+    const Localization report = localize(sample.frames, sample.camera, sample.config);
     EXPECT_EQ(report.num_lost, 0u) << seed;
-    EXPECT_EQ(localize_verdict(report).exit_code, ExitCode::ok) << seed;
+    EXPECT_EQ(report.verdict.exit_code, ExitCode::ok) << seed;
     const auto [nees_here, rms_here_m] = nees_and_rms_m(report, sample);
     nees += nees_here / num_seeds;
     rms_m += rms_here_m / num_seeds;
     // The same lens with its port pressed against it: as the paper's.
     Camera thin = sample.camera;
     std::get<Calibrated<FlatPort>>(thin.lens).params[10] = 0.0;
-    const LocalizeReport wrong = localize_observations(thin, sample.frames, sample.config);
+    const Localization wrong = localize(sample.frames, thin, sample.config);
     EXPECT_GT(nees_and_rms_m(wrong, sample).second, 2.0 * rms_here_m) << seed;
   }
   EXPECT_GT(nees, 0.5);
@@ -306,7 +305,7 @@ TEST(Localize, TooLittleIsRefusedByName) {
   UnderwaterSample sample = testing::underwater_sample(scene_of(0.03), 1);
   for (ObservationFrame& frame : sample.frames)
     std::erase_if(frame.observations, [](const FeatureObservation& observation) { return observation.id > 2; });
-  Verdict verdict = localize_verdict(localize_observations(sample.camera, sample.frames, sample.config));
+  Verdict verdict = localize(sample.frames, sample.camera, sample.config).verdict;
   EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
   EXPECT_NE(verdict.sentence.find("too few points"), std::string::npos) << verdict.sentence;
   sample = testing::underwater_sample(scene_of(0.03), 1);
@@ -314,10 +313,10 @@ TEST(Localize, TooLittleIsRefusedByName) {
   for (ObservationFrame& frame : sample.frames)
     std::erase_if(frame.observations,
                   [](const FeatureObservation& observation) { return observation.id == 2; });  // three known are left
-  verdict = localize_verdict(localize_observations(sample.camera, sample.frames, sample.config));
+  verdict = localize(sample.frames, sample.camera, sample.config).verdict;
   EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
   EXPECT_NE(verdict.sentence.find("target is not found"), std::string::npos) << verdict.sentence;
-  verdict = localize_verdict(localize_observations(sample.camera, {}, sample.config));
+  verdict = localize(std::vector<ObservationFrame>{}, sample.camera, sample.config).verdict;
   EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
 }
 
@@ -325,7 +324,7 @@ TEST(Localize, DelayedPointsAndPlacesWorkAsWell) {
   for (const NewPoints new_points : {NewPoints::delayed, NewPoints::xyz, NewPoints::inverse_depth}) {
     UnderwaterSample sample = testing::underwater_sample(rich_scene(), 6);
     sample.config.new_points = new_points;
-    const LocalizeReport report = localize_observations(sample.camera, sample.frames, sample.config, sample.truth);
+    const Localization report = localize(sample.frames, sample.camera, sample.config, sample.truth);
     EXPECT_LT(report.error.ate_m, 0.02);
     EXPECT_GT(report.map.size(), 25u);
   }
@@ -333,8 +332,8 @@ TEST(Localize, DelayedPointsAndPlacesWorkAsWell) {
 
 TEST(Localize, OfTwoRunsEachNumberIsTheSame) {
   const UnderwaterSample sample = testing::underwater_sample(rich_scene(), 7);
-  const LocalizeReport one = localize_observations(sample.camera, sample.frames, sample.config);
-  const LocalizeReport two = localize_observations(sample.camera, sample.frames, sample.config);
+  const Localization one = localize(sample.frames, sample.camera, sample.config);
+  const Localization two = localize(sample.frames, sample.camera, sample.config);
   EXPECT_EQ(one.path.back().world_from_cam.translation, two.path.back().world_from_cam.translation);
   EXPECT_EQ(one.path.back().cov, two.path.back().cov);
 }

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <string>
 
-#include "alidade/localize/localize.h"
+#include "alidade/localize/judge.h"
 #include "alidade/localize/path_doubt.h"
 
 namespace alidade {
@@ -16,16 +16,16 @@ Verdict stopped(State state, ExitCode code, std::string sentence, std::string to
 }
 
 /// Why there is no path at all.
-Verdict never_started(const LocalizeReport& report) {
+Verdict never_started(const Localization& report) {
   const auto cannot_tell = [](std::string sentence, std::string to_add) {
     return stopped(State::refused, ExitCode::cannot_tell, std::move(sentence), std::move(to_add));
   };
   if (report.num_alike > 1)
     return cannot_tell(std::to_string(report.num_alike) +
-                           " things in one picture look like the target: which one it is cannot be told",
+                           " things in one image look like the target: which one it is cannot be determined",
                        "begin where one of them is seen, or give --start");
   if (report.is_of_images && report.has_target)
-    return cannot_tell("the target is not found in any of " + std::to_string(report.path.size()) + " pictures",
+    return cannot_tell("the target is not found in any of " + std::to_string(report.path.size()) + " images",
                        "begin in front of the target, whole and sharp, and check its size in --target");
   if (report.max_seen < 3)
     return cannot_tell("too few points: at most " + std::to_string(report.max_seen) + " in a frame, a pose needs three",
@@ -41,7 +41,7 @@ State state_of(double value, double care, double bad) {
 
 /// What only the truth shows: a path may fit its own map well and be elsewhere. An alignment only takes errors away, so
 /// what is left after it should be within σ; before it the truth may stand in a frame of its own.
-void add_truth(const LocalizeReport& report, Verdict& verdict) {
+void add_truth(const Localization& report, Verdict& verdict) {
   const PathError& error = report.error;
   if (!std::isfinite(error.ate_m) || !(error.stated_m > 0.0)) return;
   constexpr double care_ratio = 1.5, bad_ratio = 3.0, elsewhere_ratio = 3.0;
@@ -59,30 +59,30 @@ void add_truth(const LocalizeReport& report, Verdict& verdict) {
                               before, elsewhere_ratio, "σ", "path"});
 }
 
-/// Whether the smoothed path explains what was seen before the filter began anew, too.
-bool is_solved_anew(const LocalizeReport& report) {
+/// Whether the smoothed path explains what was seen before the filter was reinitialised, too.
+bool is_solved_again(const Localization& report) {
   constexpr double few = 0.01;
   return report.is_smoothed && share(report.num_unexplained, report.path.size()) < few;
 }
 
 /// After frames without a pose it is the way back; else what led to it was wrong for some time before.
-std::string restarts_text(const LocalizeReport& report) {
-  std::size_t num_back = 0, num_anew = 0;
-  long last_anew = 0;
+std::string restarts_text(const Localization& report) {
+  std::size_t num_back = 0, num_again = 0;
+  long last_again = 0;
   for (std::size_t i = 1; i < report.path.size(); ++i) {
     if (report.path[i].event != FrameEvent::restarted) continue;
     const bool was_lost = report.path[i - 1].event == FrameEvent::predicted;
-    ++(was_lost ? num_back : num_anew);
-    if (!was_lost) last_anew = report.path[i].frame;
+    ++(was_lost ? num_back : num_again);
+    if (!was_lost) last_again = report.path[i].frame;
   }
   const auto times = [](std::size_t num) { return num == 1 ? std::string("once") : std::to_string(num) + " times"; };
   std::string text = num_back > 0 ? "found its way back " + times(num_back) : "";
-  if (num_anew > 0 && is_solved_anew(report))
-    text += (text.empty() ? "begun anew " : "; begun anew ") + times(num_anew) +
-            "; the path before it is solved anew, from the map after it";
-  else if (num_anew > 0)
-    text += (text.empty() ? "begun anew " : "; begun anew ") + times(num_anew) +
-            (num_anew == 1 ? ", in" : ", last in") + " frame " + std::to_string(last_anew) +
+  if (num_again > 0 && is_solved_again(report))
+    text += (text.empty() ? "reinitialised " : "; reinitialised ") + times(num_again) +
+            "; the path before it is solved again, from the map after it";
+  else if (num_again > 0)
+    text += (text.empty() ? "reinitialised " : "; reinitialised ") + times(num_again) +
+            (num_again == 1 ? ", in" : ", last in") + " frame " + std::to_string(last_again) +
             ": do not trust the path before it";
   return text;
 }
@@ -99,17 +99,16 @@ std::string asked_text(const GivenNumber& given) {
 
 std::string cause_text(const GivenNumber& given) {
   const std::string size = asked_text(given), z = " (" + text_of(std::abs(given.z), 2) + "σ)";
-  if (given.name == "shape of the target")
-    return "the target is longer along x, against y, than it is told to be, by " + size + z;
+  if (given.name == "shape of the target") return "the target is longer along x, against y, than given, by " + size + z;
   if (given.name == "speed of the target") return "the target moves against the other points, by " + size + z;
   if (given.name == "readout")
     return "rows are not of one moment: a rolling shutter of " + size + " from the first to the last" + z;
-  return "the sights ask for another " + std::string(given.name) + ", by " + size + z +
+  return "the observations ask for another " + std::string(given.name) + ", by " + size + z +
          ": the camera file is not of this lens as it was used";
 }
 
 /// Of what was given, the one of which the observations ask most: a wrong lens moves the others' scores, too.
-void add_given(const LocalizeReport& report, Verdict& verdict) {
+void add_given(const Localization& report, Verdict& verdict) {
   const GivenNumber* worst = nullptr;
   for (const GivenNumber& given : report.given)
     if (worst == nullptr || std::abs(given.z) > std::abs(worst->z)) worst = &given;
@@ -121,51 +120,52 @@ void add_given(const LocalizeReport& report, Verdict& verdict) {
   if (report.lens_pull > care_pull)
     verdict.checks.push_back({"camera", State::care,
                               "the lens came out " + text_of(report.lens_pull, 2) +
-                                  "σ from what was told: the camera file is not of this lens as it was used",
+                                  "σ from what was given: the camera file is not of this lens as it was used",
                               report.lens_pull, care_pull, "σ", "path"});
 }
 
-/// Residuals that are said to be independent: by place in the image, and from frame to frame.
-void add_residuals(const LocalizeReport& report, Verdict& verdict) {
+/// Residuals that are said to be independent: by position in the image, and from frame to frame.
+void add_residuals(const Localization& report, Verdict& verdict) {
   if (!report.is_smoothed) return;
   const ResidualStructure& residuals = report.residuals;
   constexpr double care_px_share = 0.2;  // of σ: less is seen in long recordings and moves nothing
   if (residuals.place_chi2 > 2.0 * residuals.place_limit && residuals.worst_px > care_px_share * report.sigma_px)
     verdict.checks.push_back({"place in the picture", State::care,
-                              "residuals depend on the place in the picture, " + text_of(residuals.worst_px, 2) +
-                                  " px in the " + residuals.worst_place + ": the lens is not as told",
+                              "residuals depend on the position in the image, " + text_of(residuals.worst_px, 2) +
+                                  " px in the " + residuals.worst_place + ": the lens is not as given",
                               residuals.place_chi2, 2.0 * residuals.place_limit, "1", "nis"});
   if (residuals.has_colour())
     verdict.checks.push_back({"colour", State::care,
                               "errors last from frame to frame (correlation " + text_of(residuals.colour, 2) +
-                                  "): tracks drift, or something told is wrong; σ is enlarged for it",
+                                  "): tracks drift, or something given is wrong; σ is enlarged for it",
                               residuals.colour, 0.25, "1", "nis"});
 }
 
-void add_tilt(const LocalizeReport& report, Verdict& verdict) {
+void add_tilt(const Localization& report, Verdict& verdict) {
   constexpr double care_widened = 1.5;
   if (!report.is_from_one_place && !(report.widened > care_widened)) return;
-  std::string text = report.is_from_one_place
-                         ? "the camera hardly moves aside: from one place how the target is tilted is hardly told, and "
-                           "errors may be several times their σ"
-                         : "how the target is tilted is hardly told: it is seen from one side alone";
+  std::string text =
+      report.is_from_one_place
+          ? "the camera hardly moves aside: from one position the tilt of the target is hardly observable, and "
+            "errors may be several times their σ"
+          : "the tilt of the target is hardly observable: it is seen from one side alone";
   if (report.widened > care_widened) text += "; σ is enlarged " + text_of(report.widened, 2) + " times for it";
   verdict.checks.push_back(
       {"tilt of the target", State::care, std::move(text), report.widened, care_widened, "1", "path"});
   verdict.to_add = "move the camera aside while the target is in view, or use a larger target or one with depth";
 }
 
-void add_side(const LocalizeReport& report, Verdict& verdict) {
+void add_side(const Localization& report, Verdict& verdict) {
   if (!report.is_behind) return;
   verdict.checks.push_back({"side of the target", State::care,
                             "the target's points are seen from behind (the camera is at their +z): are they, or the "
-                            "pictures, mirrored?",
+                            "images, mirrored?",
                             1.0, 0.0, "", "path"});
   verdict.to_add =
       "check that x goes right and y down as the target is seen; if +z is its front, say 'seen_from: +z' in --target";
 }
 
-void add_checks(const LocalizeReport& report, Verdict& verdict) {
+void add_checks(const Localization& report, Verdict& verdict) {
   const double nis = report.nis_per_dof;
   const State nis_state = nis < good_nis_low ? State::care : state_of(nis, good_nis_high, care_nis);
   const std::string px = text_of(report.sigma_px, 2) + " px";
@@ -173,7 +173,7 @@ void add_checks(const LocalizeReport& report, Verdict& verdict) {
                                                     " that they are taken for, and σ is too large "
                                                     "(--sigma-px)"
                                               : "noise is smaller than the " + px + " stated";
-  const std::string said = nis > good_nis_high  ? "the sights do not fit: the lens or the noise is not as stated"
+  const std::string said = nis > good_nis_high  ? "the observations do not fit: the lens or the noise is not as stated"
                            : nis < good_nis_low ? low
                                                 : "innovations as large as predicted";
   verdict.checks.push_back({"innovations", nis_state, "NIS " + text_of(nis, 3) + " per degree of freedom: " + said, nis,
@@ -184,19 +184,19 @@ void add_checks(const LocalizeReport& report, Verdict& verdict) {
                             lost, care_lost, "1", "tracks"});
   const double gated = share(report.num_gated, report.num_used + report.num_gated);
   verdict.checks.push_back({"gated", state_of(gated, 0.05, bad_gated),
-                            text_of(100.0 * gated, 3) + " % of the sights fit nowhere", gated, bad_gated, "1",
+                            text_of(100.0 * gated, 3) + " % of the observations are rejected", gated, bad_gated, "1",
                             "tracks"});
   const double known_gated = share(report.num_known_gated, report.num_known);
   // Known points may be mismatched as often as others; if more often, they are not where they are said to be.
   if (report.num_known > 0)
     verdict.checks.push_back({"target", state_of(known_gated, 0.1, gated + 0.2),
-                              text_of(100.0 * known_gated, 3) + " % of the target's sights are not where they belong",
+                              text_of(100.0 * known_gated, 3) + " % of the target's observations are rejected",
                               known_gated, 0.1, "1", "tracks"});
   constexpr double max_shift = 3.0;  // χ² of a rectangle's twelve numbers over their count: 99.9 % is 2.7
   if (report.known_shift > max_shift)
     verdict.checks.push_back({"map's frame", State::care,
                               "the target's points have drifted in the map, " + text_of(std::sqrt(report.known_shift)) +
-                                  " times the σ they were told with: the path's place and scale before the target are "
+                                  " times their given σ: the path's position and scale before the target are "
                                   "less sure than its σ says",
                               report.known_shift, max_shift, "1", "path"});
   verdict.checks.push_back({"scale", report.scale_known ? State::good : State::care,
@@ -206,7 +206,7 @@ void add_checks(const LocalizeReport& report, Verdict& verdict) {
                                 : "scale unknown: the path is up to scale, its unit is the depth at the start",
                             0.0, 0.0, "", "path"});
   if (report.num_restarts > 0)
-    verdict.checks.push_back({"restarts", is_solved_anew(report) ? State::good : State::care, restarts_text(report),
+    verdict.checks.push_back({"restarts", is_solved_again(report) ? State::good : State::care, restarts_text(report),
                               static_cast<double>(report.num_restarts), 0.0, "times", "path"});
   add_given(report, verdict);
   add_residuals(report, verdict);
@@ -217,7 +217,7 @@ void add_checks(const LocalizeReport& report, Verdict& verdict) {
 
 }  // namespace
 
-Verdict localize_verdict(const LocalizeReport& report) {
+Verdict localize_verdict(const Localization& report) {
   const std::size_t num_frames = report.path.size();
   const bool has_started = std::ranges::any_of(report.path, &PathStep::has_pose);
   if (!has_started) return never_started(report);
@@ -232,16 +232,16 @@ Verdict localize_verdict(const LocalizeReport& report) {
   });
   if (!is_finite || report.nis_per_dof > max_nis || gated > max_gated)
     return stopped(State::not_converged, ExitCode::no_convergence,
-                   "no path fits the sights: NIS " + text_of(report.nis_per_dof, 3) + " per degree of freedom, " +
-                       text_of(100.0 * gated, 2) + " % of them left out",
+                   "no path fits the observations: NIS " + text_of(report.nis_per_dof, 3) + " per degree of freedom, " +
+                       text_of(100.0 * gated, 2) + " % of them rejected",
                    "check camera, target and start, and --sigma-px");
   const double known_gated = share(report.num_known_gated, report.num_known);
   constexpr std::size_t enough_known = 8;
   if (report.num_known >= enough_known && known_gated > max_known_gated)
     return stopped(State::not_converged, ExitCode::no_convergence,
-                   "the target is not where it is told to be: " + text_of(100.0 * known_gated, 3) +
-                       " % of its sights do not fit the path",
-                   "check the points' numbers and places in --target");
+                   "the target is not where it is given: " + text_of(100.0 * known_gated, 3) +
+                       " % of its observations do not fit the path",
+                   "check the points' numbers and positions in --target");
   if (lost > max_lost)
     return stopped(State::refused, ExitCode::cannot_tell,
                    "lost: " + std::to_string(report.num_lost) + " of " + std::to_string(num_frames) +
@@ -249,8 +249,8 @@ Verdict localize_verdict(const LocalizeReport& report) {
                    "track more points, and keep the target in sight for longer");
   if (report.is_behind && report.is_board)
     return stopped(State::refused, ExitCode::cannot_tell,
-                   "mirrored: the sights put the camera behind the printed side of the board",
-                   "check that the pictures are not mirrored, and the order of the board's corners");
+                   "mirrored: the observations put the camera behind the printed side of the board",
+                   "check that the images are not mirrored, and the order of the board's corners");
   Verdict verdict;
   add_checks(report, verdict);
   for (const Check& check : verdict.checks) verdict.state = std::max(verdict.state, check.state);

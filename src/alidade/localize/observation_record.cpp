@@ -18,9 +18,11 @@ struct PlaceOfPoint {
 class BackwardPath {
  public:
   BackwardPath(const Camera& camera, const LocalizeConfig& config, const LocalizationFilter& filter,
-               const SmootherProblem& problem)
+               std::span<const GonePoint> gone, const SmootherProblem& problem)
       : camera_(camera), config_(config) {
     for (const SmootherPoint& point : problem.points) places_[point.id] = {point.point_in_world, cov_of(filter, point)};
+    for (const GonePoint& each : gone)
+      if (each.is_linear) places_[each.point.id] = {each.point.point_in_world, each.point.cov};
   }
 
   /// The pose of a frame, and its observations in their order; `path` is the filter's. Whether its observations hold
@@ -73,7 +75,7 @@ bool BackwardPath::take(const ObservationFrame& frame, const PathStep& path) {
   constexpr double doubtful = 0.5;
   if (found && static_cast<double>(found->num_fit) < doubtful * static_cast<double>(placed.size())) {
     for (const StartHypothesis& start :
-         poses_from_known(camera_, frame.observations, config_.target,
+         poses_from_known(camera_, frame.observations, config_.target.points,
                           {config_.filter.sigma_px, config_.sigma_speed_m_s, config_.sigma_rate_rad_s}))
       begin.push_back(start.motion.world_from_cam);
     found = resection(camera_, placed, begin, gate);
@@ -103,9 +105,9 @@ void ObservationRecord::add_points(const LocalizeConfig& config, const Localizat
     SmootherPoint point;
     point.id = feature.id;
     point.point_in_world = feature.values.head<3>();
-    const auto told = std::ranges::find(config.target, feature.id, &KnownPoint::id);
+    const auto told = std::ranges::find(config.target.points, feature.id, &KnownPoint::id);
     const auto birth = births_.find(feature.id);
-    if (told != config.target.end()) {
+    if (told != config.target.points.end()) {
       point.told_in_world = told->point_in_world;
       point.sigma_m = told->sigma_m;
     } else if (birth != births_.end()) {
@@ -118,17 +120,32 @@ void ObservationRecord::add_points(const LocalizeConfig& config, const Localizat
   }
 }
 
+void ObservationRecord::add_gone(std::span<const GonePoint> gone, SmootherProblem& problem) const {
+  for (const GonePoint& each : gone) {
+    const auto birth = births_.find(each.point.id);
+    if (!each.is_linear || birth == births_.end()) continue;
+    SmootherPoint point;
+    point.id = each.point.id;
+    point.point_in_world = each.point.point_in_world;
+    point.first_frame = birth->second.frame;
+    point.range = birth->second.range;
+    problem.points.push_back(point);
+  }
+}
+
 std::optional<SmootherProblem> ObservationRecord::problem(const Camera& camera, const LocalizeConfig& config,
                                                           std::span<const ObservationFrame> frames,
                                                           std::span<const PathStep> path,
-                                                          const LocalizationFilter& filter, double period_s) const {
+                                                          const LocalizationFilter& filter,
+                                                          std::span<const GonePoint> gone, double period_s) const {
   SmootherProblem problem;
   add_points(config, filter, problem);
+  add_gone(gone, problem);
   constexpr double max_work = 2e8;  // frames times numbers of the map, squared: seconds
   const double num_frames = static_cast<double>(path.size() - first_frame_);
   const double num_map = 3.0 * static_cast<double>(problem.points.size()) + 20.0;
   if (num_frames * num_map * num_map > max_work) return std::nullopt;
-  BackwardPath back(camera, config, filter, problem);
+  BackwardPath back(camera, config, filter, gone, problem);
   std::size_t first = path.size();
   while (first > first_frame_) {
     --first;
@@ -157,11 +174,12 @@ std::optional<SmootherProblem> ObservationRecord::problem(const Camera& camera, 
   if (std::ranges::none_of(problem.points, [](const SmootherPoint& point) { return point.told_in_world.has_value(); }))
     return std::nullopt;
   problem.camera = camera;
-  if (num_begun_ == 1) problem.start = config.start;  // else the observations contradicted it
+  if (num_begun_ == 1 && config.start)
+    problem.start = StartHypothesis{config.start->motion, config.start->cov};  // else the observations contradicted it
   problem.sigma_speed_m_s = config.sigma_speed_m_s;
   problem.sigma_rate_rad_s = config.sigma_rate_rad_s;
   problem.period_s = period_s;
-  problem.sigma_scale = config.sigma_scale;
+  problem.sigma_scale = config.filter.sigma_scale;
   problem.filter = config.filter;
   return problem;
 }

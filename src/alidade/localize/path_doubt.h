@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <deque>
 
-#include "alidade/localize/localize.h"
+#include "alidade/localize/localization.h"
 
 namespace alidade {
 

@@ -1,34 +1,11 @@
 #pragma once
 
-#include <limits>
 #include <span>
-#include <vector>
 
-#include "alidade/geometry/rigid3.h"
 #include "alidade/geometry/similarity.h"
+#include "alidade/localize/localization.h"
 
 namespace alidade {
-
-/// A pose at a time.
-struct TimedPose {
-  double t_s = 0.0;
-  Rigid3 world_from_cam;
-};
-
-/// How far an estimated path is from the true one. Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM
-/// Systems", IROS 2012: ATE is the RMS distance of positions after alignment; RPE the RMS translation of
-/// (Q_i⁻¹ Q_i+1)⁻¹ (P_i⁻¹ P_i+1) between neighbours, with the aligned scale.
-struct PathError {
-  double ate_m = std::numeric_limits<double>::quiet_NaN();
-  double rpe_m = std::numeric_limits<double>::quiet_NaN();
-  double rpe_rad = std::numeric_limits<double>::quiet_NaN();  ///< RMS rotation of the same.
-  double unaligned_m = std::numeric_limits<double>::quiet_NaN();
-  double scale = 1.0;  ///< Of truth over estimate.
-  /// RMS of the positions' stated σ (root of the trace), with the aligned scale: what `ate_m` should not be above, as
-  /// an alignment takes errors away and adds none.
-  double stated_m = std::numeric_limits<double>::quiet_NaN();
-  std::size_t num_pairs = 0;
-};
 
 constexpr double same_time_s = 0.01;
 

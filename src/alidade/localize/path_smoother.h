@@ -3,10 +3,10 @@
 #include <array>
 #include <optional>
 #include <span>
-#include <string_view>
 #include <vector>
 
 #include "alidade/localize/filter_bank.h"
+#include "alidade/localize/localization.h"
 
 namespace alidade {
 
@@ -49,19 +49,6 @@ struct SmootherProblem {
   double period_s = 1.0 / 30.0;     ///< Accelerations are drawn anew for each.
   double sigma_scale = 0.0;         ///< Of the told points' common scale, counted and not estimated.
   LocalizationFilterConfig filter;  /// σ of accelerations, the gate, and what of the lens is estimated.
-};
-
-/// Something that is taken as given: how it would move the path, and what the observations say of it (a score test:
-/// what one more free parameter would come to, by the linearisation that is there anyway).
-struct GivenNumber {
-  /// "focal length", "centre u", "centre v", "k1", "scale of the target", "shape of the target", "speed of the target",
-  /// "readout" (of a rolling shutter, first row to last), "clock"
-  std::string_view name;
-  double moves = 0.0;           ///< Largest move of a pose's number for a whole unit (relative, px, m/s, s), in its σ,
-  std::string_view moved = {};  ///< which that is,
-  double moved_by = 0.0;        ///< and by how much [m or rad].
-  double asked = 0.0, z = 0.0;  ///< The change that the observations ask for, in units, and over its own σ.
-  std::optional<double> sigma;  ///< Counted, in units. None: not known.
 };
 
 /// Path, map and lens at the maximum of their common posterior, with its covariance; the lens's own covariance and the

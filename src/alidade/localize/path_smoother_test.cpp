@@ -65,13 +65,13 @@ TEST(PoseChain, EliminatedPoseByPoseIsTheWholeMatrixInverted) {
   }
 }
 
-LocalizeReport hover_localized(const HoverRun& run, const Camera& camera) {
+Localization hover_localized(const HoverRun& run, const Camera& camera) {
   LocalizeConfig config;
-  config.target = run.target;
-  return localize_observations(camera, run.frames, config, run.truth);
+  config.target.points = run.target;
+  return localize(run.frames, camera, config, run.truth);
 }
 
-double mean_nees(const LocalizeReport& report, const HoverRun& run) {
+double mean_nees(const Localization& report, const HoverRun& run) {
   double sum = 0.0;
   for (std::size_t k = 0; k < report.path.size(); ++k)
     sum += testing::pose_nees(report.path[k], run.truth[k].world_from_cam);
@@ -86,7 +86,7 @@ TEST(SimpleCase, ThePoseIsAsGoodAsItsCovarianceSays) {
     double nees = 0.0;
     for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
       const HoverRun run = testing::hovering({.lens = lens}, 1000 + seed);
-      const LocalizeReport report = hover_localized(run, run.camera);
+      const Localization report = hover_localized(run, run.camera);
       EXPECT_TRUE(report.is_smoothed);
       nees += mean_nees(report, run) / num_seeds;
     }
@@ -123,18 +123,17 @@ bool has_state(const Verdict& verdict, State state, const std::string& text) {
 
 TEST(SimpleCase, ACameraWithoutCovarianceIsSaidAndNotGood) {
   const HoverRun run = testing::hovering({.num_frames = 90}, 3);
-  const LocalizeReport report = hover_localized(run, run.camera);
-  EXPECT_TRUE(has_state(localize_verdict(report), State::care, "is given without σ"))
-      << localize_verdict(report).sentence;
+  const Localization report = hover_localized(run, run.camera);
+  EXPECT_TRUE(has_state(report.verdict, State::care, "is given without σ")) << report.verdict.sentence;
   // The check tells the truth: a focal length off by 0.3 % moves the path as much as it says.
-  const auto assumed = localize_assumed(report);
+  const auto assumed = report.assumed;
   const auto focal = std::ranges::find(assumed, std::string("camera.f (relative)"), &Assumption::name);
   ASSERT_NE(focal, assumed.end());
   Camera longer = run.camera;
   Eigen::VectorXd values = params(longer.lens);
   values.head<2>() *= 1.003;
   longer.lens = with_params(longer.lens, values);
-  const LocalizeReport moved = hover_localized(run, longer);
+  const Localization moved = hover_localized(run, longer);
   double most = 0.0;
   for (std::size_t k = 0; k < report.path.size(); ++k) {
     const PathStep &is = report.path[k], &was = moved.path[k];
@@ -146,8 +145,7 @@ TEST(SimpleCase, ACameraWithoutCovarianceIsSaidAndNotGood) {
   EXPECT_NEAR(focal->moves / most, 1.0, 0.15);  // the target's points give way a little, in second order
   Camera exact = run.camera;
   exact.cov = Eigen::MatrixXd::Zero(10, 10);
-  EXPECT_EQ(localize_verdict(hover_localized(run, exact)).state, State::good)
-      << localize_verdict(hover_localized(run, exact)).sentence;
+  EXPECT_EQ(hover_localized(run, exact).verdict.state, State::good) << hover_localized(run, exact).verdict.sentence;
 }
 
 TEST(SimpleCase, AWrongLensIsNamed) {
@@ -157,7 +155,7 @@ TEST(SimpleCase, AWrongLensIsNamed) {
   Eigen::VectorXd values = params(wrong.lens);
   values.head<2>() *= 1.03;
   wrong.lens = with_params(wrong.lens, values);
-  const Verdict verdict = localize_verdict(hover_localized(run, wrong));
+  const Verdict verdict = hover_localized(run, wrong).verdict;
   EXPECT_NE(verdict.state, State::good);
   EXPECT_NE(verdict.sentence.find("focal length"), std::string::npos) << verdict.sentence;
 }
@@ -168,16 +166,16 @@ TEST(SimpleCase, ATargetSeenFromBehindIsAskedAbout) {
   run.camera.cov = Eigen::MatrixXd::Zero(10, 10);
   for (KnownPoint& point : run.target) point.point_in_world.x() *= -1.0;
   LocalizeConfig config;
-  config.target = run.target;
-  const LocalizeReport report = localize_observations(run.camera, run.frames, config);
+  config.target.points = run.target;
+  const Localization report = localize(run.frames, run.camera, config);
   EXPECT_TRUE(report.is_behind);
-  const Verdict verdict = localize_verdict(report);
+  const Verdict verdict = report.verdict;
   EXPECT_TRUE(has_state(verdict, State::care, "mirrored?")) << verdict.sentence;
-  config.is_board = true;
-  EXPECT_EQ(localize_verdict(localize_observations(run.camera, run.frames, config)).exit_code, ExitCode::cannot_tell);
-  config.is_board = false;
-  config.seen_from_plus_z = true;
-  EXPECT_FALSE(localize_observations(run.camera, run.frames, config).is_behind);
+  config.target.board = Board{.cols = 3, .rows = 2};
+  EXPECT_EQ(localize(run.frames, run.camera, config).verdict.exit_code, ExitCode::cannot_tell);
+  config.target.board.reset();
+  config.target.seen_from_plus_z = true;
+  EXPECT_FALSE(localize(run.frames, run.camera, config).is_behind);
 }
 
 }  // namespace

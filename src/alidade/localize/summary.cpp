@@ -4,21 +4,22 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/localize/path_error.h"
+
 namespace alidade {
 
-void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& num_used,
-            std::span<const TimedPose> truth, LocalizeReport& report) {
+void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& num_used, Localization& result) {
   double nis = 0.0, dof = 0.0;
   std::vector<TimedPose> path;
   std::vector<double> sigmas_m;
-  for (const PathStep& step : report.path) {
-    report.num_observations += step.num_seen;
-    report.num_used += step.num_tracked;
-    report.num_gated += step.num_gated;
-    report.num_known += step.num_known;
-    report.num_known_gated += step.num_known_gated;
-    report.max_seen = std::max(report.max_seen, step.num_seen);
-    report.num_lost += step.event == FrameEvent::waiting || step.event == FrameEvent::predicted ? 1 : 0;
+  for (const PathStep& step : result.path) {
+    result.num_observations += step.num_seen;
+    result.num_used += step.num_tracked;
+    result.num_gated += step.num_gated;
+    result.num_known += step.num_known;
+    result.num_known_gated += step.num_known_gated;
+    result.max_seen = std::max(result.max_seen, step.num_seen);
+    result.num_lost += step.event == FrameEvent::waiting || step.event == FrameEvent::predicted ? 1 : 0;
     if (step.num_tracked > 0 && std::isfinite(step.nis_per_dof)) {
       nis += step.nis_per_dof * static_cast<double>(step.num_tracked);
       dof += static_cast<double>(step.num_tracked);
@@ -27,18 +28,18 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
     path.push_back({step.t_s, step.world_from_cam});
     sigmas_m.push_back(std::sqrt(step.cov.topLeftCorner<3, 3>().trace()));
   }
-  if (dof > 0.0) report.nis_per_dof = nis / dof;
-  if (!report.is_of_images) report.scale_known = report.scale_known && report.num_known > 0;
+  if (dof > 0.0) result.nis_per_dof = nis / dof;
+  if (!result.is_of_images) result.scale_known = result.scale_known && result.num_known > 0;
   if (!bank) return;
   const LocalizationFilter& filter = bank->best();
-  report.camera = filter.camera();
-  report.sigma_lens = filter.lens_sigmas();
+  result.camera = filter.camera();
+  result.sigma_lens = filter.lens_sigmas();
   for (const Feature& feature : filter.features()) {
-    if (!report.is_of_images && feature.is_known && num_used(feature.id) == 0) continue;  // told, never seen
+    if (!result.is_of_images && feature.is_known && num_used(feature.id) == 0) continue;  // given, never seen
     const auto place = filter.place(feature.id);
-    report.map.push_back({feature.id, place->point_in_world, place->cov, feature.is_known, num_used(feature.id)});
+    result.map.push_back({feature.id, place->point_in_world, place->cov, feature.is_known, num_used(feature.id)});
   }
-  if (!truth.empty()) report.error = path_error(path, truth, report.scale_known, sigmas_m);
+  if (!result.truth.empty()) result.error = path_error(path, result.truth, result.scale_known, sigmas_m);
 }
 
 /// A flat target whose plane is that of x and y, and most poses on the side where it is not seen.
@@ -58,22 +59,22 @@ bool is_behind(std::span<const PathStep> path, std::span<const KnownPoint> targe
   return balance > 0.0;
 }
 
-void take_over(const SmoothedPath& smoothed, LocalizeReport& report) {
-  report.is_smoothed = true;
-  report.given = smoothed.given;
-  report.lens_pull = smoothed.lens_pull;
-  report.widened = smoothed.widened;
-  report.is_from_one_place = smoothed.is_from_one_place;
-  report.camera = smoothed.camera;
-  report.sigma_lens = smoothed.sigma_lens;
-  if (report.num_restarts > 0) {  // what the filter left out before it began anew is no longer left out
-    report.num_used = smoothed.residuals.size();
-    report.num_gated = smoothed.num_dropped;
-    report.nis_per_dof = smoothed.chi2_per_dof;
+void take_over(const SmoothedPath& smoothed, Localization& result) {
+  result.is_smoothed = true;
+  result.given = smoothed.given;
+  result.lens_pull = smoothed.lens_pull;
+  result.widened = smoothed.widened;
+  result.is_from_one_place = smoothed.is_from_one_place;
+  result.camera = smoothed.camera;
+  result.sigma_lens = smoothed.sigma_lens;
+  if (result.num_restarts > 0) {  // what the filter left out before it began anew is no longer left out
+    result.num_used = smoothed.residuals.size();
+    result.num_gated = smoothed.num_dropped;
+    result.nis_per_dof = smoothed.chi2_per_dof;
   }
   for (std::size_t i = 0; i < smoothed.ids.size(); ++i) {
-    const auto at = std::ranges::find(report.map, smoothed.ids[i], &MapPoint::id);
-    if (at == report.map.end()) continue;
+    const auto at = std::ranges::find(result.map, smoothed.ids[i], &MapPoint::id);
+    if (at == result.map.end()) continue;
     at->point_in_world = smoothed.points[i];
     at->cov = smoothed.point_covs[i];
   }

@@ -5,7 +5,9 @@
 #include <numeric>
 
 #include "alidade/loop/lens_observer.h"
+#include "alidade/servo/head_servo.h"
 #include "alidade/simulate/draws.h"
+#include "alidade/simulate/servo.h"
 #include "alidade/simulate/track.h"
 
 namespace alidade {

@@ -10,11 +10,14 @@
 #include <vector>
 
 #include "alidade/estimation/progress.h"
+#include "alidade/pantilt/lens_course.h"
 #include "alidade/pantilt/rig_uncertainty.h"
-#include "alidade/servo/head_servo.h"
-#include "alidade/simulate/servo.h"
+#include "alidade/public.h"
+#include "alidade/servo/config.h"
+#include "alidade/simulate/target_path.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// How the heads really are, as factors on what is known of them.
 struct PlantMismatch {
@@ -22,7 +25,7 @@ struct PlantMismatch {
 };
 
 /// Which intrinsics the loop takes its pixels by: the rig's, whatever the lens does; those that an on-line observer
-/// tells of the images' background; the true ones.
+/// estimates from the images' background; the true ones.
 enum class LensKnowledge { given, observed, truth };
 [[nodiscard]] std::string_view lens_knowledge_name(LensKnowledge knowledge);  ///< given, observed, true
 [[nodiscard]] std::optional<LensKnowledge> lens_knowledge_named(std::string_view name);
@@ -57,20 +60,20 @@ struct ServoRow {
   std::size_t head = 0;
   Eigen::Vector2d command, asked_rad, measured_rad, predicted_rad, rate_rad_s, sigma_predicted_px;
   bool has_prediction = false;
-  Eigen::Vector2d error_px;  ///< True image of the target − middle of the image; NaN behind the camera.
+  Eigen::Vector2d error_px;  ///< True image of the target − centre of the image; NaN behind the camera.
   bool is_in_image = false;
-  std::optional<Eigen::Vector2d> seen_px;  ///< What the head's image told, with its noise.
+  std::optional<Eigen::Vector2d> seen_px;  ///< Where the head saw the target, with its noise.
   ServoEvent event = ServoEvent::none;
   LensNow lens;                                         ///< That this image will be taken by, or the rig's.
   Eigen::Vector4d true_lens = Eigen::Vector4d::Zero();  ///< fx, fy, cx, cy. [px]
 };
 
-/// Figures of one run, or of several put together. Errors are distances |(u, v) − middle| at the periods, all heads.
+/// Figures of one run, or of several put together. Errors are distances |(u, v) − centre| at the periods, all heads.
 struct ServoFigures {
   double rms_px = 0.0;
   double p95_px = 0.0;
   double max_px = 0.0;
-  double central_third = 0.0;  ///< Share within the middle third in both directions.
+  double central_third = 0.0;  ///< Share within the central third in both directions.
   double in_image = 0.0;       ///< Share.
   std::size_t num_lost = 0;    ///< How often a target that had been followed was lost…
   std::size_t num_found = 0;   ///< …and found again.
@@ -101,4 +104,5 @@ struct ServoRobustness {
                                                std::vector<double> gain_factors, std::vector<double> tau_factors,
                                                std::uint64_t seed, const Progress& progress = {});
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

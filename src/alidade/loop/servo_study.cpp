@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "alidade/servo/axis_settling.h"
+#include "alidade/servo/head_servo.h"
 
 namespace alidade {
 namespace {
@@ -39,7 +40,7 @@ Verdict unstable(const ServoScenario& scenario, const LoopCheck& loop) {
   if (loop.delay_samples >= 0)
     verdict.sentence +=
         ", loop gain " + text_of(loop.loop_gain, 4) + " error units per " + std::string(unit_name(unit_of(plant)));
-  verdict.to_add = loop.delay_samples < 0 ? "lower rate_gain_per_s, raise command_weight, or identify the plant anew"
+  verdict.to_add = loop.delay_samples < 0 ? "lower rate_gain_per_s, raise command_weight, or identify the plant again"
                    : as_other.is_stable() ? "is the gain in " + std::string(unit_name(unit_of(other))) +
                                                 "? then the radius is " + text_of(as_other.sampled_radius, 4)
                                           : "lower kp and ki, shorten the latency, or sample faster";
@@ -61,7 +62,7 @@ void add_checks(const ServoScenario& scenario, const ServoStudy& study, Verdict&
   const double asked = scenario.specification_px;
   add("specification", best.rms_px <= asked, text_of(best.rms_px) + " px RMS of " + text_of(asked) + " px asked for",
       best.rms_px, asked, "px");
-  add("in the picture", best.in_image >= 1.0, text_of(100.0 * best.in_image) + " % of the time in the picture",
+  add("in the picture", best.in_image >= 1.0, text_of(100.0 * best.in_image) + " % of the time in the image",
       best.in_image, 1.0, "1");
   if (best.num_lost > 0)
     add("lost", false,
@@ -178,6 +179,7 @@ ServoStudy study_servo(const ServoScenario& scenario, std::uint64_t first_seed, 
   ServoStudy study;
   study.loops = check_loops(scenario);
   if (!std::ranges::all_of(study.loops, [](const LoopCheck& loop) { return loop.analysis.is_stable(); })) return study;
+  study.status = ServoStudy::Status::compared;
   const auto num_seeds = static_cast<std::size_t>(scenario.num_seeds);
   ServoConfig config = scenario.config;
   for (const ControllerKind kind : scenario.controllers) {
@@ -217,13 +219,13 @@ Verdict servo_verdict(const ServoScenario& scenario, const ServoStudy& study) {
   add_checks(scenario, study, verdict);
   const ServoFigures& best = best_of(study).figures;
   verdict.sentence = std::string(controller_name(study.best)) + " keeps the target within " + text_of(best.rms_px) +
-                     " px RMS of the middle";
+                     " px RMS of the centre";
   const auto pi = std::ranges::find(study.comparison, ControllerKind::pi, &ServoComparison::controller);
   if (pi != study.comparison.end() && study.best != ControllerKind::pi)
     verdict.sentence += ", pi within " + text_of(pi->figures.rms_px) + " px";
   if (best.in_image < 0.5) {
     verdict.state = State::bad;
-    verdict.sentence += "; in the picture " + text_of(100.0 * best.in_image) + " % of the time only";
+    verdict.sentence += "; in the image " + text_of(100.0 * best.in_image) + " % of the time only";
     return verdict;
   }
   for (const Check& check : verdict.checks) {

@@ -6,36 +6,22 @@
 #include <string>
 #include <vector>
 
+#include "alidade/estimation/counts.h"
 #include "alidade/estimation/progress.h"
 #include "alidade/estimation/verdict.h"
+#include "alidade/loop/servo_scenario.h"
 #include "alidade/loop/servo_track.h"
+#include "alidade/public.h"
 
 namespace alidade {
-
-/// Factors on gain and time constant, evenly from low to high.
-struct RobustnessConfig {
-  double gain_low = 0.8, gain_high = 1.2;
-  double tau_low = 0.7, tau_high = 1.3;
-  int points = 5;  ///< Of each.
-};
-
-/// What `alidade servo` reads: a world, and which controllers are to be compared in it. The defaults are the preset of
-/// docs/maths/servo.md: plant, gains, rig and target of Xiahou, Chen & Wu, 2015.
-struct ServoScenario {
-  ServoScene scene = xiahou_servo_scene();
-  ServoConfig config;
-  std::vector<ControllerKind> controllers{controller_kinds.begin(), controller_kinds.end()};
-  int num_seeds = 8;
-  double specification_px = 10.0;  ///< RMS that is asked for: lines in figures, and the verdict's.
-  std::optional<RobustnessConfig> robustness = RobustnessConfig{};
-};
+ALIDADE_PUBLIC_BEGIN
 
 /// The linear loop that a controller closes, before anything moves.
 struct LoopCheck {
   ControllerKind controller;
   LoopAnalysis analysis;
   double loop_gain = 0.0;  ///< Error units of the gains per unit of the plant's output.
-  int delay_samples = 0;   ///< −1: the controller was tried, and `sampled_radius` alone is told.
+  int delay_samples = 0;   ///< −1: the controller was tried, and `sampled_radius` alone is known.
 };
 /// Of `pi`, round plant and image; of `feedforward`, the correction round plant and encoder; of all others, of
 /// `feedforward` on a rate plant, and where a command is a part of a period late or the plant has a second lag, what
@@ -57,18 +43,20 @@ struct ServoComparison {
 /// The best controller with each kind of knowledge of a lens that zooms, over the same seeds.
 struct LensComparison {
   LensKnowledge knowledge;
-  std::vector<ServoFigures> trials;  ///< One a seed.
+  std::vector<ServoFigures> trials;  ///< One per seed.
   ServoFigures figures;              ///< Of all of them.
 };
 
 struct ServoStudy {
+  enum class Status { compared, unstable };
+  Status status = Status::unstable;
   std::vector<LoopCheck> loops;
   std::vector<ServoTrial> trials;
   std::vector<ServoComparison> comparison;  ///< In the order of the scenario; empty where a loop is unstable.
   ControllerKind best = ControllerKind::pi;
   ServoTrack track;                           ///< Of the best one's shown run; two heads or more.
   std::optional<ServoRobustness> robustness;  ///< Of the best.
-  std::vector<LensComparison> lenses;         ///< Where the lens zooms, or an observer tells of it; else none.
+  std::vector<LensComparison> lenses;         ///< Where the lens zooms, or an observer estimates it; else none.
 };
 
 /// Is shown the rows of each controller's first trial as they come.
@@ -80,4 +68,14 @@ using ServoWatch = std::function<void(ControllerKind, const ServoRow&)>;
 
 [[nodiscard]] Verdict servo_verdict(const ServoScenario& scenario, const ServoStudy& study);
 
+/// Everything that servo() has to say: figures of the controllers, and what they are worth.
+struct ServoResult : ServoStudy {
+  ServoScenario scenario;
+  std::uint64_t seed = 1;  ///< Of the first run.
+  std::vector<Assumption> assumed;
+  Counts counts;  ///< Of trials.
+  Verdict verdict;
+};
+
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "alidade/track/lens_over_time.h"
+#include "alidade/track/track.h"
 
 namespace alidade {
 namespace {
@@ -38,7 +39,7 @@ ServoTrack track_of(const ServoScene& scene, const ServoRun& run) {
   Rig rig;
   rig.heads = scene.heads;
   if (scene.intrinsics != LensKnowledge::given) use_courses(courses_of(scene, run), track.observations, rig);
-  TrackConfig config;
+  FollowConfig config;
   config.tracker.sigma_px = scene.sigma_px;
   config.tracker.sigma_encoder_rad = scene.sigma_encoder_rad;
   config.tracker.errors = scene.rig_errors.num() > 0 ? scene.rig_errors : rig_uncertainty(rig);

@@ -3,9 +3,11 @@
 #include <vector>
 
 #include "alidade/loop/servo_loop.h"
-#include "alidade/track/track.h"
+#include "alidade/public.h"
+#include "alidade/track/track_report.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Where the target was in space, as `track` tells from what the heads of a run saw of it.
 struct ServoTrack {
@@ -15,4 +17,5 @@ struct ServoTrack {
 };
 [[nodiscard]] ServoTrack track_of(const ServoScene& scene, const ServoRun& run);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -4,7 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "alidade/public.h"
+
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Two features taken for the same point: their places in the lists of their photos.
 struct FeatureMatch {
@@ -24,4 +27,5 @@ struct MatchedPhotos {
   std::vector<MatchedPair> pairs;                      ///< Each pair of photos once, a before b.
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

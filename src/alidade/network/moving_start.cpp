@@ -86,7 +86,7 @@ bool place_next(std::span<const ObservationSeries> series, const std::vector<Obs
   const auto best = best_resection(series[added], start, around_s, searches, camera);
   camera.placed = best && best->share >= min_share;
   if (!camera.placed) {
-    camera.reason = "at no difference of clocks do half of its sights agree with the other cameras'";
+    camera.reason = "at no difference of clocks do half of its observations agree with the other cameras'";
     return true;
   }
   camera.cam_from_world = best->cam_from_world;

@@ -1,81 +1,11 @@
 #pragma once
 
-#include <optional>
 #include <span>
-#include <string>
-#include <vector>
 
-#include "alidade/estimation/cluster_covariance.h"
 #include "alidade/estimation/progress.h"
-#include "alidade/estimation/verdict.h"
-#include "alidade/pantilt/rig.h"
-#include "alidade/pantilt/target_observation.h"
+#include "alidade/network/report.h"
 
 namespace alidade {
-
-/// How far two cameras are apart, by a tape or a survey; ids of their heads.
-struct KnownDistance {
-  int first = 0, second = 0;
-  double distance_m = 0.0;
-  double sigma_m = 0.0;
-};
-
-struct MovingTargetConfig {
-  /// Above 0: each camera has a clock of its own, up to so many seconds from another's. 0: one clock.
-  double clock_search_s = 0.0;
-  std::optional<KnownDistance> distance = {};  ///< The scale, unless a true path tells it.
-  std::optional<double> sigma_px =
-      {};  ///< Of a coordinate of an observation; none: told by the residuals, head by head.
-};
-
-/// Time of the rig = offset + rate · time of the camera.
-struct CameraClock {
-  double offset_s = 0.0, rate = 1.0;
-  [[nodiscard]] double in_rig(double t_s) const { return offset_s + rate * t_s; }
-};
-
-/// One camera after the solve.
-struct PlacedCamera {
-  int id = 0;
-  bool placed = false;
-  std::string reason;  ///< Why it was not placed; empty otherwise.
-  std::size_t num_observations = 0, num_used = 0;
-  CameraClock clock;
-  double sigma_clock_s = 0.0, sigma_rate = 0.0;  ///< Of the clock in the middle of its observations, and of its rate.
-  double sigma_px = 0.0;                         ///< Of a coordinate.
-  double rms_px = 0.0;                           ///< Per point, of the used observations.
-};
-
-struct MovingTargetReport {
-  enum class Status {
-    placed,
-    too_few,        ///< No two cameras saw the target together often enough.
-    no_pair,        ///< No two cameras' observations agree at any time between their clocks.
-    degenerate,     ///< The path is too simple (a straight line), or too far away.
-    no_scale,       ///< Neither a distance nor a true path is given.
-    truth_misfits,  ///< The true path given is not the one that was seen.
-    no_convergence
-  };
-  Status status = Status::too_few;
-  Rig rig;                            ///< All heads; those that were not placed are as given.
-  std::vector<PlacedCamera> cameras;  ///< One a head.
-  std::vector<bool> used;             ///< One an observation.
-  std::vector<double> path_t_s;       ///< Times of the rig, where two cameras or more saw the target.
-  std::vector<Eigen::Vector3d> path;  ///< The target then.
-  double chi2_per_dof = 0.0;
-  double sigma_scale = 0.0;         ///< Relative; of the distance or of the fit to the true path.
-  Eigen::MatrixXd cov_model;        ///< As rig.cov, if every observation erred by itself and lenses were exact.
-  ClusterCovariance clusters;       ///< Blocks of time, by the solver's own parameters.
-  double block_s = 0.0;             ///< Length of a block.
-  std::string culprit;              ///< What is wrong with a camera, where that is found out; empty: nothing.
-  std::vector<Assumption> assumed;  ///< Lenses and the distance.
-  double sigma_relative_m = 0.0, sigma_relative_rad = 0.0;  ///< Worst camera, in the first one's frame.
-  /// With a true path: its clock (time of the rig by its own), and what is left after the similarity, over the path.
-  CameraClock truth_clock;
-  double truth_median_m = 0.0, truth_rms_m = 0.0;
-  double truth_covered = 0.0;  ///< Share of the path that it covers.
-  int iterations = 0;
-};
 
 /// Where cameras stand that do not turn, and how their clocks go, from their observations of one target that moves:
 /// relative poses of pairs over the clocks' differences, then all cameras and the path (a cubic spline) together by

@@ -349,7 +349,7 @@ TEST(MovingTarget, WhatCannotBeToldIsRefusedByName) {
     EXPECT_NE(verdict.sentence.find(words), std::string::npos) << verdict.sentence;
     EXPECT_FALSE(verdict.to_add.empty());
   };
-  refused(place_cameras(scene.observations, unplaced(scene), {}), {}, "the scale cannot be told");
+  refused(place_cameras(scene.observations, unplaced(scene), {}), {}, "the scale cannot be determined");
   std::vector<TargetObservation> of_one;
   for (const TargetObservation& observation : scene.observations)
     if (observation.head == 1) of_one.push_back(observation);
@@ -357,7 +357,7 @@ TEST(MovingTarget, WhatCannotBeToldIsRefusedByName) {
           "no two cameras saw the target together");
   const Scene line = scene_of(straight, 3, false);
   refused(place_cameras(line.observations, unplaced(line), with_distance), with_distance,
-          "cannot be told from this path");
+          "cannot be determined from this path");
   // A target that is not one: each camera sees another.
   Scene other = scene_of(loops, 3, false);
   std::mt19937 random(1);

@@ -25,16 +25,16 @@ Verdict refusal_by_status(const MovingTargetReport& report, const MovingTargetCo
                                   "give --clocks SECONDS");
     case PlacedStatus::no_pair:
       return moving_refusal(config.clock_search_s > 0.0
-                                ? "no two cameras' sights agree at any difference of their clocks"
-                                : "no two cameras' sights agree: their clocks differ, or a lens is wrong",
+                                ? "no two cameras' observations agree at any difference of their clocks"
+                                : "no two cameras' observations agree: their clocks differ, or a lens is wrong",
                             config.clock_search_s > 0.0 ? "raise --clocks; check the lenses and their order"
                                                         : "give --clocks SECONDS; check the lenses and their order");
     case PlacedStatus::degenerate:
-      return moving_refusal("the cameras' places cannot be told from this path",
+      return moving_refusal("the cameras' positions cannot be determined from this path",
                             "let the target move in all three directions and near the cameras, not along a line");
     case PlacedStatus::no_scale:
       return moving_refusal(
-          "the scale cannot be told: all lengths grow with the path",
+          "the scale cannot be determined: all lengths grow with the path",
           "give the distance of two placed cameras (--distance 1:2:12.5), or the target's path (--truth)");
     case PlacedStatus::truth_misfits:
       return moving_refusal("the path that was seen is not the true path given, whatever its scale",
@@ -81,8 +81,8 @@ void add_precision(const MovingTargetReport& report, Verdict& verdict) {
                             good_turn_rad / degree, "°", ""});
   verdict.checks.push_back(
       {"position", state_between(sigma_m / spread, good_share, refuse_share),
-       "σ of a camera's place " + text_of(sigma_m, 2) + " m, of " + text_of(spread, 3) + " m between cameras", sigma_m,
-       good_share * spread, "m", ""});
+       "σ of a camera's position " + text_of(sigma_m, 2) + " m, of " + text_of(spread, 3) + " m between cameras",
+       sigma_m, good_share * spread, "m", ""});
 }
 
 void add_cameras(const MovingTargetReport& report, Verdict& verdict) {

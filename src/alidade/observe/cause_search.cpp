@@ -54,9 +54,9 @@ const std::vector<Trial>& trials() {
   return all;
 }
 
-ObserveConfig freed_by(const Trial& trial, const ObserveConfig& config) {
-  ObserveConfig freer = config;
-  ObserveNuisances& estimate = freer.estimate;
+ObserveSetup freed_by(const Trial& trial, const ObserveSetup& config) {
+  ObserveSetup freer = config;
+  ObserveNuisances& estimate = freer.nuisances;
   if (trial.lens && !config.lens_is_given) estimate.k1 = estimate.k2 = estimate.k3 = estimate.tangential = true;
   estimate.mount = estimate.mount || trial.mount;
   estimate.delay = estimate.delay || trial.delay;
@@ -67,8 +67,8 @@ ObserveConfig freed_by(const Trial& trial, const ObserveConfig& config) {
   return freer;
 }
 
-int size_of_layout(const RotationLog& log, const ObserveConfig& config) {
-  ObserveNuisances nuisances = config.estimate;
+int size_of_layout(const RotationLog& log, const ObserveSetup& config) {
+  ObserveNuisances nuisances = config.nuisances;
   nuisances.errors = static_cast<int>(estimated_errors(log, config).size());
   return CommonLayout(nuisances).size;
 }
@@ -79,7 +79,7 @@ struct Sample {
   std::vector<std::vector<Eigen::Vector2d>> px;
 };
 
-Sample sample_of(const RotationLog& log, const ObserveConfig& config, const PixelScale& scale) {
+Sample sample_of(const RotationLog& log, const ObserveSetup& config, const PixelScale& scale) {
   std::vector<std::pair<int, std::size_t>> seen(log.num_points);
   for (std::size_t i = 0; i < seen.size(); ++i) seen[i] = {0, i};
   for (const RotationRow& row : log.rows) {
@@ -102,7 +102,7 @@ Sample sample_of(const RotationLog& log, const ObserveConfig& config, const Pixe
 }
 
 /// σ of a pixel [px] with which all rows are explained; infinite: not at all.
-double noise_of(const RotationLog& log, const ObserveConfig& config, const ObserveReport& report, const Sample& sample,
+double noise_of(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report, const Sample& sample,
                 const Progress& progress) {
   std::vector<RotationFrame> frames = sample.frames;
   const std::vector<RotationError> errors = estimated_errors(log, config);
@@ -119,11 +119,11 @@ double noise_of(const RotationLog& log, const ObserveConfig& config, const Obser
     buffer.add(frames[k], sample.px[k]);
   }
   AdjustConfig adjust_with;
-  adjust_with.nuisances = config.estimate;
+  adjust_with.nuisances = config.nuisances;
   adjust_with.nuisances.errors = static_cast<int>(errors.size());
   adjust_with.with_depth = needs_depth(log, config);
   adjust_with.sigma_range_m = config.sigma_range_m;
-  ObserveConfig sized = config;
+  ObserveSetup sized = config;
   sized.width_px = report.width_px;
   sized.height_px = report.height_px;
   adjust_with.start = start_camera(sized, report.scale);
@@ -143,16 +143,16 @@ double noise_of(const RotationLog& log, const ObserveConfig& config, const Obser
 
 }  // namespace
 
-std::optional<ObserveConfig> searched_causes(const RotationLog& log, const ObserveConfig& config,
-                                             const ObserveReport& report, double max_noise_px,
-                                             const Progress& progress) {
+std::optional<ObserveSetup> searched_causes(const RotationLog& log, const ObserveSetup& config,
+                                            const ObserveSolution& report, double max_noise_px,
+                                            const Progress& progress) {
   constexpr double as_well = 1.15;
   if (log.rows.size() < 10 || log.num_points < 2) return std::nullopt;
   const Sample sample = sample_of(log, config, report.scale);
-  std::vector<std::pair<double, ObserveConfig>> found;
+  std::vector<std::pair<double, ObserveSetup>> found;
   double least = std::numeric_limits<double>::infinity();
   const auto attempt = [&](const Trial& trial) {
-    ObserveConfig freer = freed_by(trial, config);
+    ObserveSetup freer = freed_by(trial, config);
     if (size_of_layout(log, freer) <= size_of_layout(log, config)) return;
     const double noise_px = noise_of(log, freer, report, sample, progress);
     least = std::min(least, noise_px);
@@ -172,11 +172,11 @@ std::optional<ObserveConfig> searched_causes(const RotationLog& log, const Obser
   return std::nullopt;
 }
 
-bool has_no_rest(const RotationLog& log, const ObserveConfig& config, const ObserveReport& report,
+bool has_no_rest(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,
                  const Progress& progress) {
   constexpr double window_s = 1.0, many = 0.5, clearly = 0.5, slowest_per_s = 0.003;
   const Sample sample = sample_of(log, config, report.scale);
-  ObserveConfig sized = config;
+  ObserveSetup sized = config;
   sized.width_px = report.width_px;
   sized.height_px = report.height_px;
   AdjustConfig still;

@@ -1,7 +1,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/so3.h"
 #include "alidade/observe/rotation_bundle.h"
@@ -98,10 +100,8 @@ CommonMatrix BundleSolution::bound() const {
 
 double robust_sigma(std::vector<double> residual_norms, int dof) {
   if (residual_norms.empty() || dof < 1) return 0.0;
-  const auto middle = residual_norms.begin() + static_cast<std::ptrdiff_t>(residual_norms.size() / 2);
-  std::nth_element(residual_norms.begin(), middle, residual_norms.end());
   const double share = static_cast<double>(dof) / (2.0 * static_cast<double>(residual_norms.size()));
-  return *middle / std::sqrt(2.0 * std::log(2.0)) / std::sqrt(share);
+  return median_of(std::move(residual_norms)) / std::sqrt(2.0 * std::log(2.0)) / std::sqrt(share);
 }
 
 }  // namespace alidade

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <functional>
 
-#include "alidade/observe/observe.h"
+#include "alidade/observe/solve.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/rotation.h"
 
@@ -63,8 +63,8 @@ RotationLog log_of(const Degenerate& one, std::uint64_t seed, int num_points = 4
   return simulate_rotation(scene, config, seed);
 }
 
-ObserveConfig config_of(ObserveMethod method) {
-  ObserveConfig config;
+ObserveSetup config_of(ObserveMethod method) {
+  ObserveSetup config;
   config.method = method;
   config.width_px = 780;
   config.height_px = 582;
@@ -78,8 +78,8 @@ TEST(ObserveDegenerate, EveryOneIsRefusedByNameWithEveryMethod) {
                                        ObserveMethod::flow, ObserveMethod::fang2011}) {
       for (std::uint64_t seed = 1; seed <= (method == ObserveMethod::window ? 1u : 4u); ++seed) {
         const RotationLog log = log_of(one, seed);
-        const ObserveConfig config = config_of(method);
-        const Verdict verdict = observe_verdict(observe(log, config), log, config);
+        const ObserveSetup config = config_of(method);
+        const Verdict verdict = observe_verdict(solve_intrinsics(log, config), log, config);
         EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell)
             << one.name << ", method " << static_cast<int>(method) << ", seed " << seed << ": " << verdict.sentence;
         EXPECT_NE(verdict.sentence.find(one.words), std::string::npos)
@@ -98,8 +98,8 @@ TEST(ObserveDegenerate, GoodLogsAreAcceptedEveryOne) {
   for (std::uint64_t seed = 1; seed <= sets; ++seed) {
     const Degenerate none{"good", "", [](RotationScene&, RotationLogConfig&, std::uint64_t) {}};
     const RotationLog log = log_of(none, seed);
-    const ObserveConfig config = config_of(ObserveMethod::hybrid);
-    const Verdict verdict = observe_verdict(observe(log, config), log, config);
+    const ObserveSetup config = config_of(ObserveMethod::hybrid);
+    const Verdict verdict = observe_verdict(solve_intrinsics(log, config), log, config);
     accepted += verdict.exit_code == ExitCode::ok;
     EXPECT_EQ(verdict.exit_code, ExitCode::ok) << "seed " << seed << ": " << verdict.sentence;
   }
@@ -119,8 +119,8 @@ TEST(ObserveDegenerate, ALineOfPointsIsNamedForThePapersObserverAndOthersTell) {
     RotationLogConfig log_config;
     log_config.duration_s = 6.0;
     const RotationLog log = simulate_rotation(scene, log_config, seed);
-    const ObserveConfig hybrid = config_of(ObserveMethod::hybrid);
-    EXPECT_EQ(observe_verdict(observe(log, hybrid), log, hybrid).exit_code, ExitCode::ok) << "seed " << seed;
+    const ObserveSetup hybrid = config_of(ObserveMethod::hybrid);
+    EXPECT_EQ(observe_verdict(solve_intrinsics(log, hybrid), log, hybrid).exit_code, ExitCode::ok) << "seed " << seed;
   }
 }
 
@@ -138,9 +138,9 @@ TEST(ObserveDegenerate, DistortionOrAWrongMountIsNotTakenForAZoom) {
       scene.mount_rad = {0.03, -0.02, 0.04};
     }
     const RotationLog log = simulate_rotation(scene, log_config, seed);
-    const ObserveConfig config = config_of(ObserveMethod::hybrid);
-    const ObserveReport report = observe(log, config);
-    EXPECT_NE(report.status, ObserveReport::Status::unsteady) << "seed " << seed;
+    const ObserveSetup config = config_of(ObserveMethod::hybrid);
+    const ObserveSolution report = solve_intrinsics(log, config);
+    EXPECT_NE(report.status, ObserveSolution::Status::unsteady) << "seed " << seed;
   }
 }
 

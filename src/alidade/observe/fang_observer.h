@@ -3,17 +3,12 @@
 #include <optional>
 #include <vector>
 
+#include "alidade/observe/config.h"
 #include "alidade/observe/difference_filter.h"
 #include "alidade/observe/rotation_frame.h"
 #include "alidade/observe/running_gramian.h"
 
 namespace alidade {
-
-enum class FangProfile {
-  fast,    ///< Settles within seconds; for pixels without noise only.
-  quiet,   ///< Bears noise of a third of a pixel; takes twenty seconds.
-  kalman,  ///< The same regression with optimal gains.
-};
 
 /// Gains of the observer with constant gain.
 struct FangGains {

@@ -45,7 +45,7 @@ class FrameBuffer {
 struct AdjustConfig {
   ObserveNuisances nuisances;
   bool with_depth = false;
-  double sigma_px = 0.0;  ///< Normalised; 0: told by the residuals.
+  double sigma_px = 0.0;  ///< Normalised; 0: estimated from the residuals.
   double sigma_range_m = 0.0;
   std::size_t range_point = 0;
   double sigma_turn_rad = 0.0;
@@ -62,7 +62,7 @@ struct Adjustment {
   BundleSolution solution;
   RotationBundle bundle;
   std::vector<int> bundle_point_of;  ///< Of each of the buffer's points as it is now; −1: none.
-  double sigma_px = 0.0;             ///< Normalised; given, or told.
+  double sigma_px = 0.0;             ///< Normalised; given, or estimated.
   std::size_t num_left_out = 0;
 };
 

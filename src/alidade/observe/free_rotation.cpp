@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/decompositions.h"
-
-#include "alidade/observe/observe.h"
+#include "alidade/observe/solve.h"
 
 namespace alidade {
 namespace {
@@ -33,12 +33,6 @@ Eigen::Matrix3d align(const std::vector<RayPair>& pairs, const std::vector<doubl
   return nearest_rotation(sum);
 }
 
-double middle(std::vector<double> values) {
-  const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), half, values.end());
-  return *half;
-}
-
 struct Alignment {
   Eigen::Matrix3d cam_from_before = Eigen::Matrix3d::Identity();
   double median_angle = 0.0;
@@ -51,7 +45,7 @@ Alignment robust_alignment(const std::vector<RayPair>& pairs) {
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       angles[i] = (cam_from_before * pairs[i].before - pairs[i].now).norm();
     }
-    return middle(angles);
+    return median_of(angles);
   };
   Alignment best{align(pairs, weights), 0.0};
   best.median_angle = measure(best.cam_from_before);

@@ -14,7 +14,7 @@ struct HybridConfig {
   std::optional<CommonPrior> prior;
   bool no_zoom = false;         ///< Nothing is taken for a zoom.
   bool start_is_given = false;  ///< Otherwise several focal lengths are tried.
-  double sigma_px = 0.0;        ///< [px]; 0: told by the residuals.
+  double sigma_px = 0.0;        ///< [px]; 0: estimated from the residuals.
   double sigma_range_m = 0.0;   ///< Of the frames' ranges.
   std::size_t range_point = 0;
   double bootstrap_s = 1.0;
@@ -26,11 +26,10 @@ struct HybridConfig {
 
 /// The default estimator of a rotating camera: a rotation bundle adjustment over the first second, adjusted again
 /// while the answer is still coarse, then an extended Kalman filter (ArrowheadFilter) that judges each frame before it
-/// takes it in: a point that slipped is left out (and after 15 frames met anew), a burst of noise is skipped, a change
-/// of the intrinsics is followed, as fast as it is. While the focal length does not stand still it does not begin. If
-/// nothing fits for a second it starts again.
-/// `step` allocates nothing once the adjustments are over (about 4 s).
-/// docs/maths/rotating-camera.md.
+/// takes it in: an outlier point is rejected (and after 15 frames initialised again), an outlier frame is skipped, a
+/// change of the intrinsics is followed, as fast as it is. While the focal length does not stand still it does not
+/// begin. If nothing fits for a second it starts again. `step` allocates nothing once the adjustments are over (about 4
+/// s). docs/maths/rotating-camera.md.
 class HybridObserver {
  public:
   explicit HybridObserver(const HybridConfig& config);
@@ -94,8 +93,8 @@ class HybridObserver {
   ArrowheadFilter filter_;
   FrameBuffer buffer_;
   std::vector<Eigen::Vector2d> px_;  ///< Of this frame, normalised.
-  std::vector<int> frames_out_;      ///< One a point: in a row left out,
-  std::vector<int> patience_;        ///< and how many before it is met anew.
+  std::vector<int> frames_out_;      ///< One a point: in a row rejected,
+  std::vector<int> patience_;        ///< and how many before it is initialised again.
   ArrowheadFilter candidate_;        ///< The filter if the last frame was a zoom.
   bool has_candidate_ = false;
   bool is_coarse_ = true;  ///< Still adjusted, not only filtered.

@@ -1,12 +1,12 @@
-#include "alidade/observe/observe_once.h"
+#include "alidade/observe/solve_once.h"
 
 namespace alidade {
 
-bool needs_depth(const RotationLog& log, const ObserveConfig& config) {
-  return config.lever_m.has_value() || config.estimate.lever || log.has_velocity;
+bool needs_depth(const RotationLog& log, const ObserveSetup& config) {
+  return config.lever_m.has_value() || config.nuisances.lever || log.has_velocity;
 }
 
-RotatingCamera start_camera(const ObserveConfig& config, const PixelScale& scale) {
+RotatingCamera start_camera(const ObserveSetup& config, const PixelScale& scale) {
   RotatingCamera start;
   start.k = config.start ? scale.normalised_intrinsics(*config.start) : Eigen::Vector4d(1.3, 1.3, 0.0, 0.0);
   if (config.lever_m) start.lever_m = *config.lever_m;
@@ -14,7 +14,7 @@ RotatingCamera start_camera(const ObserveConfig& config, const PixelScale& scale
   return start;
 }
 
-std::optional<CommonPrior> said_prior(const ObserveConfig& config, const RotatingCamera& start) {
+std::optional<CommonPrior> said_prior(const ObserveSetup& config, const RotatingCamera& start) {
   if (!config.square_pixels && !config.fixed_centre) return std::nullopt;
   constexpr double held = 1e-7;
   CommonPrior prior(start);
@@ -43,29 +43,29 @@ std::vector<std::string> quantity_names(const CommonLayout& layout, const std::v
   return names;
 }
 
-HybridConfig hybrid_config(const RotationLog& layout, const ObserveConfig& config, const PixelScale& scale) {
+HybridConfig hybrid_config(const RotationLog& layout, const ObserveSetup& config, const PixelScale& scale) {
   HybridConfig hybrid;
   hybrid.num_points = layout.num_points;
   hybrid.scale = scale;
-  hybrid.nuisances = config.estimate;
+  hybrid.nuisances = config.nuisances;
   hybrid.with_depth = needs_depth(layout, config);
   hybrid.start = start_camera(config, scale);
   hybrid.start_is_given = config.start.has_value();
   hybrid.no_zoom = config.no_zoom;
   hybrid.prior = said_prior(config, hybrid.start);
-  hybrid.sigma_px = config.sigma_px;
+  hybrid.sigma_px = config.sigma_px.value_or(0.0);
   hybrid.sigma_range_m = config.sigma_range_m;
   hybrid.range_point = layout.range_point;
   return hybrid;
 }
 
-AdjustConfig adjust_config_of(const RotationLog& log, const ObserveConfig& config, const RotatingCamera& start,
+AdjustConfig adjust_config_of(const RotationLog& log, const ObserveSetup& config, const RotatingCamera& start,
                               const PixelScale& scale) {
   AdjustConfig adjust;
-  adjust.nuisances = config.estimate;
+  adjust.nuisances = config.nuisances;
   adjust.nuisances.turn = config.rotation != RotationKnowledge::known;
   adjust.with_depth = needs_depth(log, config);
-  adjust.sigma_px = config.sigma_px / scale.scale;
+  adjust.sigma_px = config.sigma_px.value_or(0.0) / scale.scale;
   adjust.sigma_range_m = config.sigma_range_m;
   adjust.range_point = log.range_point;
   adjust.start = start;
@@ -73,9 +73,9 @@ AdjustConfig adjust_config_of(const RotationLog& log, const ObserveConfig& confi
   if (config.rotation == RotationKnowledge::free) {
     adjust.sigma_turn_rad = std::numeric_limits<double>::infinity();
   } else if (log.source == RotationSource::rate) {
-    adjust.sigma_rate_rad_per_s = config.sigma_rate_rad_per_s > 0.0 ? config.sigma_rate_rad_per_s : 1e-3;
+    adjust.sigma_rate_rad_per_s = config.sigma_rate_rad_per_s.value_or(1e-3);
   } else {
-    adjust.sigma_turn_rad = config.sigma_angle_rad > 0.0 ? config.sigma_angle_rad : 1e-4;
+    adjust.sigma_turn_rad = config.sigma_angle_rad.value_or(1e-4);
   }
   if (!config.start) adjust.other_starts = {0.7, 2.5, 5.0, 10.0};
   return adjust;

@@ -3,17 +3,20 @@
 #include <Eigen/Core>
 #include <limits>
 
+#include "alidade/public.h"
+
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// What an estimator noticed in a frame.
 enum class ObserveEvent {
   none,
   start,        ///< The first estimate.
-  burst,        ///< One frame did not fit and was left out.
-  slip,         ///< One point did not fit and was left out; see `point`.
+  burst,        ///< An outlier frame was rejected.
+  slip,         ///< An outlier point was rejected; see `point`.
   zoom,         ///< The intrinsics are changing.
   zoom_end,     ///< They have come to rest.
-  restart,      ///< Estimated anew from the last seconds.
+  restart,      ///< Estimated again from the last seconds.
   new_segment,  ///< A gap: the rotation across it is not known.
 };
 
@@ -45,4 +48,5 @@ struct PixelScale {
   }
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

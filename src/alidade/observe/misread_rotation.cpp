@@ -4,7 +4,7 @@
 
 #include "alidade/geometry/degree.h"
 #include "alidade/geometry/so3.h"
-#include "alidade/observe/observe.h"
+#include "alidade/observe/solve.h"
 
 namespace alidade {
 namespace {
@@ -35,8 +35,8 @@ std::vector<Misreading> misreadings_of(RotationSource source) {
              [](RotationRow& row) { row.base_from_cam = row.base_from_cam.conjugate(); }}};
   }
   if (source == RotationSource::head) {
-    return {{"pan counts the other way (to the right), or the picture is mirrored left to right", scaled(-1, 1, 1)},
-            {"tilt counts the other way (down), or the picture is mirrored top to bottom", scaled(1, -1, 1)},
+    return {{"pan counts the other way (to the right), or the image is mirrored left to right", scaled(-1, 1, 1)},
+            {"tilt counts the other way (down), or the image is mirrored top to bottom", scaled(1, -1, 1)},
             {"pan and tilt count the other way, or the camera hangs upside down", scaled(-1, -1, 1)},
             {"pan and tilt are exchanged", exchange},
             {"pan and tilt are exchanged, and pan counts the other way",
@@ -48,10 +48,10 @@ std::vector<Misreading> misreadings_of(RotationSource source) {
             {"the angles are twice what the head turns", scaled(0.5, 0.5, 0.5)},
             {"the angles are degrees: name the columns pan_deg, tilt_deg", scaled(degree, degree, degree)}};
   }
-  return {{"ω_y counts the other way, or the picture is mirrored left to right", scaled(1, -1, -1)},
-          {"ω_x counts the other way, or the picture is mirrored top to bottom", scaled(-1, 1, -1)},
+  return {{"ω_y counts the other way, or the image is mirrored left to right", scaled(1, -1, -1)},
+          {"ω_x counts the other way, or the image is mirrored top to bottom", scaled(-1, 1, -1)},
           {"ω_x and ω_y count the other way, or the camera hangs upside down", scaled(-1, -1, 1)},
-          {"the rates are of the world against the camera: all signs are turned", scaled(-1, -1, -1)},
+          {"the rates are of the world against the camera: all signs are reversed", scaled(-1, -1, -1)},
           {"ω_x and ω_y are exchanged", exchange},
           {"the rates are half of what the camera turns", scaled(2, 2, 2)},
           {"the rates are twice what the camera turns", scaled(0.5, 0.5, 0.5)},
@@ -66,7 +66,7 @@ struct Explanation {
   bool tells = false;  ///< The focal lengths, too: what tells nothing is explained by any reading.
 };
 
-Explanation explanation_of(const RotationLog& log, const ObserveConfig& config, const PixelScale& scale,
+Explanation explanation_of(const RotationLog& log, const ObserveSetup& config, const PixelScale& scale,
                            const Progress& progress) {
   MotionReader reader(log.source, config.max_gap_s);
   FrameBuffer buffer(log.num_points, max_frames);
@@ -100,19 +100,19 @@ bool turns_can_tell(const ObserveMotion& motion) {
 
 }  // namespace
 
-bool may_be_misread(const ObserveReport& report) {
+bool may_be_misread(const ObserveSolution& report) {
   constexpr double max_ordinary_px = 2.0, many = 0.2;
-  using Status = ObserveReport::Status;
+  using Status = ObserveSolution::Status;
   constexpr double ask_beyond = 5.0;
   const bool has_answer = report.status == Status::ok || report.status == Status::too_few_data;
   if (!has_answer) return turns_can_tell(report.motion);
   if (std::ranges::any_of(report.causes, [](const CauseScore& cause) { return cause.z >= ask_beyond; })) return true;
-  const auto seen = static_cast<double>(report.reference.bundle.observations.size() + report.pixels_left_out);
+  const auto seen = static_cast<double>(report.reference.bundle.observations.size() + report.pixels_rejected);
   return report.status == Status::ok &&
-         (report.sigma_px > max_ordinary_px || static_cast<double>(report.pixels_left_out) > many * seen);
+         (report.sigma_px > max_ordinary_px || static_cast<double>(report.pixels_rejected) > many * seen);
 }
 
-std::string misread_rotation(const RotationLog& log, const ObserveConfig& config, const ObserveReport& report,
+std::string misread_rotation(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,
                              const Progress& progress) {
   if (log.source == RotationSource::none || config.rotation == RotationKnowledge::free) return "";
   constexpr double max_px = 3.0, clearly = 0.3;  // of the noise as the log is read

@@ -4,7 +4,7 @@
 #include <functional>
 
 #include "alidade/geometry/degree.h"
-#include "alidade/observe/observe.h"
+#include "alidade/observe/solve.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/rotation.h"
 
@@ -70,8 +70,8 @@ RotationLog log_in(const World& world, std::uint64_t seed) {
   return log;
 }
 
-ObserveConfig auto_config(ObserveMethod method = ObserveMethod::hybrid) {
-  ObserveConfig config;
+ObserveSetup auto_config(ObserveMethod method = ObserveMethod::hybrid) {
+  ObserveSetup config;
   config.method = method;
   config.estimate_auto =
       method == ObserveMethod::hybrid || method == ObserveMethod::batch || method == ObserveMethod::window;
@@ -87,16 +87,16 @@ struct Outcome {
 };
 
 /// `quantity`: one that is estimated once the cause is found.
-Outcome outcome_of(const World& world, const ObserveConfig& config, const std::string& quantity = "",
+Outcome outcome_of(const World& world, const ObserveSetup& config, const std::string& quantity = "",
                    int num_draws = sets) {
   Outcome outcome;
   double count = 0.0;
   for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(num_draws); ++seed) {
     const RotationLog log = log_in(world, seed);
-    const ObserveReport report = observe(log, config);
+    const ObserveSolution report = solve_intrinsics(log, config);
     const Verdict verdict = observe_verdict(report, log, config);
     outcome.words.push_back(verdict.sentence + " | " + verdict.to_add);
-    if (report.status != ObserveReport::Status::ok) {
+    if (report.status != ObserveSolution::Status::ok) {
       ++outcome.refused;
       continue;
     }
@@ -208,7 +208,7 @@ TEST(ObserveCauses, ASlowDriftIsToldRowByRow) {
   });
   expect_estimated(world, "focal_drift_per_s");
   const RotationLog log = log_in(world, 1);
-  const ObserveReport report = observe(log, auto_config(ObserveMethod::batch));
+  const ObserveSolution report = solve_intrinsics(log, auto_config(ObserveMethod::batch));
   for (const std::size_t row : {std::size_t{0}, log.rows.size() / 2, log.rows.size() - 1}) {
     const IntrinsicsEstimate& step = report.steps[row];
     EXPECT_NEAR(step.fx, log.truth[row][0], 4.0 * step.sigma[0]) << row;
@@ -303,16 +303,16 @@ TEST(ObserveCauses, AMisreadHeadIsNamed) {
 
 /// A lens that is not modelled seems to zoom. Told that there is no zoom, all rows are one camera's.
 TEST(ObserveCauses, ToldThatNothingZoomsThereIsNoZoom) {
-  ObserveConfig config = auto_config();
+  ObserveSetup config = auto_config();
   config.no_zoom = true;
   config.estimate_auto = false;
   const World bent = with_scene([](RotationScene& scene, RotationLogConfig&, Draws&) {
     scene.intrinsics = [](double) { return RotatingIntrinsics{true_k[0], true_k[1], true_k[2], true_k[3], -0.1}; };
   });
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    const ObserveReport report = observe(log_in(bent, seed), config);
+    const ObserveSolution report = solve_intrinsics(log_in(bent, seed), config);
     for (const ObserveNote& note : report.events) EXPECT_NE(note.event, ObserveEvent::zoom);
-    EXPECT_EQ(report.status, ObserveReport::Status::ok);
+    EXPECT_EQ(report.status, ObserveSolution::Status::ok);
   }
 }
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "alidade/observe/observe.h"
+#include "alidade/observe/solve.h"
 #include "alidade/simulate/rotation.h"
 
 // What a log may bring beside rotation and pixels: noise of the rotation, a measured velocity, a gap.
@@ -17,14 +17,14 @@ RotationScene scene_of(std::uint64_t seed) {
   return scene;
 }
 
-ObserveConfig config_of() {
-  ObserveConfig config;
+ObserveSetup config_of() {
+  ObserveSetup config;
   config.width_px = 780;
   config.height_px = 582;
   return config;
 }
 
-Eigen::Vector4d errors_of(const ObserveReport& report) {
+Eigen::Vector4d errors_of(const ObserveSolution& report) {
   const double truth[] = {710.0, 700.0, 390.0, 290.0};
   Eigen::Vector4d errors;
   for (int i = 0; i < 4; ++i) errors[i] = report.quantities[static_cast<std::size_t>(i)].value - truth[i];
@@ -46,11 +46,11 @@ TEST(ObserveLog, AMeasuredVelocityTakesTheBiasOfTranslationAway) {
     log_config.with_range = true;
     log_config.sigma_range_m = 0.002;
     RotationLog log = simulate_rotation(scene, log_config, seed);
-    const ObserveReport blind = observe(log, config_of());
+    const ObserveSolution blind = solve_intrinsics(log, config_of());
     log.has_velocity = true;
     for (RotationRow& row : log.rows) row.velocity_m_per_s = row.rate_rad_per_s.cross(lever_m);
-    const ObserveReport told = observe(log, config_of());
-    ASSERT_EQ(told.status, ObserveReport::Status::ok);
+    const ObserveSolution told = solve_intrinsics(log, config_of());
+    ASSERT_EQ(told.status, ObserveSolution::Status::ok);
     with += errors_of(told) / sets;
     without += errors_of(blind) / sets;
   }
@@ -70,11 +70,11 @@ TEST(ObserveLog, NoisyRotationIsEstimatedWithTheRest) {
     log_config.duration_s = 6.0;
     log_config.sigma_angle_rad = 5e-4;
     const RotationLog log = simulate_rotation(scene, log_config, seed);
-    ObserveConfig config = config_of();
+    ObserveSetup config = config_of();
     config.rotation = RotationKnowledge::noisy;
     config.sigma_angle_rad = 5e-4;
-    const ObserveReport report = observe(log, config);
-    ASSERT_EQ(report.status, ObserveReport::Status::ok);
+    const ObserveSolution report = solve_intrinsics(log, config);
+    ASSERT_EQ(report.status, ObserveSolution::Status::ok);
     const Eigen::Vector4d errors = errors_of(report);
     for (int i = 0; i < 4; ++i) {
       inside += std::abs(errors[i]) < 2.0 * report.quantities[static_cast<std::size_t>(i)].sigma;
@@ -93,8 +93,8 @@ TEST(ObserveLog, AGapOfTheRatesBeginsASegmentAndNothingBreaks) {
     RotationLog log = simulate_rotation(scene_of(seed), log_config, seed);
     std::erase_if(log.rows, [](const RotationRow& row) { return row.t_s > 4.0 && row.t_s < 5.0; });
     log.truth.resize(log.rows.size());
-    const ObserveReport report = observe(log, config_of());
-    ASSERT_EQ(report.status, ObserveReport::Status::ok);
+    const ObserveSolution report = solve_intrinsics(log, config_of());
+    ASSERT_EQ(report.status, ObserveSolution::Status::ok);
     const bool has_gap = std::any_of(report.events.begin(), report.events.end(),
                                      [](const ObserveNote& note) { return note.event == ObserveEvent::new_segment; });
     EXPECT_TRUE(has_gap);

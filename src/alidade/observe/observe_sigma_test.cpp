@@ -4,7 +4,7 @@
 #include <functional>
 
 #include "alidade/geometry/degree.h"
-#include "alidade/observe/observe.h"
+#include "alidade/observe/solve.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/rotation.h"
 
@@ -43,15 +43,15 @@ RotationLog log_of(const Scenario& scenario, std::uint64_t seed) {
   return log;
 }
 
-ObserveConfig config_of(ObserveMethod method = ObserveMethod::hybrid) {
-  ObserveConfig config;
+ObserveSetup config_of(ObserveMethod method = ObserveMethod::hybrid) {
+  ObserveSetup config;
   config.method = method;
   config.width_px = width_px;
   config.height_px = height_px;
   return config;
 }
 
-Eigen::Vector4d z_of(const ObserveReport& report) {
+Eigen::Vector4d z_of(const ObserveSolution& report) {
   Eigen::Vector4d z;
   for (int i = 0; i < 4; ++i) {
     const ObservedQuantity& quantity = report.quantities[static_cast<std::size_t>(i)];
@@ -64,14 +64,14 @@ struct Coverage {
   double one = 0.0, two = 0.0, good = 0.0, rms_over_bound = 0.0;
 };
 
-Coverage coverage_of(const Scenario& scenario, const ObserveConfig& config, int sets) {
+Coverage coverage_of(const Scenario& scenario, const ObserveSetup& config, int sets) {
   Coverage coverage;
   double count = 0.0, squares = 0.0;
   for (int set = 1; set <= sets; ++set) {
     const RotationLog log = log_of(scenario, static_cast<std::uint64_t>(set));
-    const ObserveReport report = observe(log, config);
-    EXPECT_EQ(report.status, ObserveReport::Status::ok) << set;
-    if (report.status != ObserveReport::Status::ok) continue;
+    const ObserveSolution report = solve_intrinsics(log, config);
+    EXPECT_EQ(report.status, ObserveSolution::Status::ok) << set;
+    if (report.status != ObserveSolution::Status::ok) continue;
     const Verdict verdict = observe_verdict(report, log, config);
     if (verdict.state != State::good && std::getenv("ALIDADE_SHOW")) {
       std::printf("%d %s | %s\n", set, verdict.sentence.c_str(), verdict.to_add.c_str());
@@ -153,7 +153,7 @@ TEST(ObserveSigma, FindsHowLongErrorsLast) {
   double sum_s = 0.0;
   constexpr int sets = 40;
   for (std::uint64_t seed = 1; seed <= sets; ++seed) {
-    sum_s += observe(log_of(in_time, seed), config_of(ObserveMethod::batch)).stated.correlation_s;
+    sum_s += solve_intrinsics(log_of(in_time, seed), config_of(ObserveMethod::batch)).stated.correlation_s;
   }
   EXPECT_NEAR(sum_s / sets, 0.5, 0.1);
 }
@@ -259,10 +259,10 @@ TEST(ObserveSigma, NoCauseIsSilent) {
       scenario.disturb = cause.disturb;
       RotationLog log = log_of(scenario, seed);
       log.sigma_scale = log.sigma_parallax = std::nullopt;  // nobody knows that anything is wrong, or exact
-      const ObserveConfig config = config_of();
-      const ObserveReport report = observe(log, config);
+      const ObserveSetup config = config_of();
+      const ObserveSolution report = solve_intrinsics(log, config);
       const Verdict verdict = observe_verdict(report, log, config);
-      if (report.status != ObserveReport::Status::ok) {
+      if (report.status != ObserveSolution::Status::ok) {
         ++named;
         continue;
       }

@@ -5,7 +5,7 @@
 #include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/observe/fang_observer.h"
-#include "alidade/observe/observe.h"
+#include "alidade/observe/solve.h"
 
 namespace alidade {
 namespace {
@@ -17,13 +17,13 @@ struct Reason {
   std::string name, what, add;
 };
 
-Reason reason_of(const ObserveReport& report, const RotationLog& log, const ObserveConfig& config) {
+Reason reason_of(const ObserveSolution& report, const RotationLog& log, const ObserveSetup& config) {
   const Eigen::Vector3d& path = report.motion.path_rad;  // about x: tilt; y: pan; z: roll
   const double most = path.maxCoeff();
   constexpr double little = 0.02;  // of the largest: an axis that did not turn
   if (log.num_points == 0 || report.rows_used < 3) {
     return {"too few points", "too few points: " + std::to_string(report.rows_used) + " rows see any",
-            "track at least one point through the turn, better four"};
+            "track at least one point through the rotation, better four"};
   }
   if (most < 0.2 * degree) return {"no motion", "the camera does not turn", "pan and tilt it by 5° or more"};
   if (path.y() < little * most && path.x() < little * most) {
@@ -40,20 +40,21 @@ Reason reason_of(const ObserveReport& report, const RotationLog& log, const Obse
     if (!config.square_pixels) hold = " --square-pixels";
     if (!config.fixed_centre) hold += " --fix-centre";
     return {"free rotation", "with the rotation unknown these views cannot tell fx / fy, cx and cy apart",
-            "measure the rotation, turn the camera farther, about its axis of view too" +
-                (hold.empty() ? "" : ", or hold them:" + hold)};
+            "measure the rotation, rotate the camera farther, about its axis of view too" +
+                (hold.empty() ? "" : ", or fix them:" + hold)};
   }
   if (report.motion.span_rad < 3.0 * degree) {
     return {"too small a span",
-            "too small a span: the camera turns by " + text_of(report.motion.span_rad / degree, 2) + "° only",
+            "too small a span: the camera rotates by " + text_of(report.motion.span_rad / degree, 2) + "° only",
             "pan and tilt by 5° or more"};
   }
-  if (log.num_points < 2) return {"too few points", "too few points: one does not tell", "track four or more"};
-  return {"weak motion", "the motion is too weak for the noise", "turn farther, longer, or track more points"};
+  if (log.num_points < 2)
+    return {"too few points", "too few points: one does not determine them", "track four or more"};
+  return {"weak motion", "the motion is too weak for the noise", "rotate farther, longer, or track more points"};
 }
 
 /// The worst-known combination of fx, fy, cx, cy: its σ [px] and its name.
-Check weakest(const ObserveReport& report) {
+Check weakest(const ObserveSolution& report) {
   Check check{"weakest combination", State::good, "", 0.0, 0.0, "px", "excitation"};
   const double s = report.scale.scale;
   const CommonMatrix bound = report.reference.solution.bound();
@@ -80,7 +81,7 @@ Check weakest(const ObserveReport& report) {
   return check;
 }
 
-void add_checks(const ObserveReport& report, Verdict& verdict) {
+void add_checks(const ObserveSolution& report, Verdict& verdict) {
   verdict.checks.push_back(weakest(report));
   const double f_sigma = std::max(report.quantities[0].sigma / report.quantities[0].value,
                                   report.quantities[1].sigma / report.quantities[1].value);
@@ -119,7 +120,7 @@ Verdict refusal(const std::string& sentence, const std::string& add, ExitCode co
   return verdict;
 }
 
-Verdict fang_refusal(const ObserveReport& report, const RotationLog& log, const Reason& reason) {
+Verdict fang_refusal(const ObserveSolution& report, const RotationLog& log, const Reason& reason) {
   std::string why = "the paper's observer is not excited: least eigenvalue of its Gramian " +
                     text_of(report.gramian_lambda_min, 2) + " < 1e-4";
   if (log.num_points < 3)
@@ -132,7 +133,7 @@ Verdict fang_refusal(const ObserveReport& report, const RotationLog& log, const 
 }
 
 /// A scale that no instrument has was not measured with an error, but read in another way.
-void add_scale_check(const ObserveReport& report, Verdict& verdict) {
+void add_scale_check(const ObserveSolution& report, Verdict& verdict) {
   constexpr double most = 0.1;
   for (const ObservedQuantity& quantity : report.quantities) {
     if (!quantity.name.starts_with("scale_") || std::abs(quantity.value) <= most) continue;
@@ -151,8 +152,8 @@ void add_scale_check(const ObserveReport& report, Verdict& verdict) {
 
 }  // namespace
 
-Verdict observe_verdict(const ObserveReport& report, const RotationLog& log, const ObserveConfig& config) {
-  using Status = ObserveReport::Status;
+Verdict observe_verdict(const ObserveSolution& report, const RotationLog& log, const ObserveSetup& config) {
+  using Status = ObserveSolution::Status;
   if (report.status == Status::unobservable || report.status == Status::too_few_data) {
     Reason reason = reason_of(report, log, config);
     if (!report.misread.empty()) {

@@ -1,28 +1,19 @@
 #include <algorithm>
 #include <array>
 
-#include "alidade/observe/observe.h"
+#include "alidade/observe/solve.h"
 
 namespace alidade {
 
-RotationLog undistorted(const RotationLog& log, const Camera& camera) {
-  RotationLog straight = log;
+void undistort(const Camera& camera, const Eigen::Vector2d& unseen, std::vector<Eigen::Vector2d>& pixels) {
   const Eigen::VectorXd known = params(camera.lens);
-  const auto names = param_names(camera.lens);
-  const auto value = [&](std::string_view name) {
-    const auto at = std::find(names.begin(), names.end(), name);
-    return at == names.end() ? 0.0 : known[at - names.begin()];
-  };
-  for (RotationRow& row : straight.rows) {
-    for (Eigen::Vector2d& px : row.px) {
-      if (!is_seen(px)) continue;
-      const auto ray = unproject(camera, px);
-      px = ray && ray->z() > 1e-6 ? Eigen::Vector2d(value("fx") * ray->x() / ray->z() + value("cx"),
-                                                    value("fy") * ray->y() / ray->z() + value("cy"))
-                                  : Eigen::Vector2d::Constant(not_seen);
-    }
+  for (Eigen::Vector2d& px : pixels) {
+    if (!is_seen(px)) continue;
+    const auto ray = unproject(camera, px);
+    px = ray && ray->z() > 1e-6
+             ? Eigen::Vector2d(known[0] * ray->x() / ray->z() + known[2], known[1] * ray->y() / ray->z() + known[3])
+             : unseen;
   }
-  return straight;
 }
 
 Camera observed_camera(const ObserveReport& report, const std::optional<Camera>& known) {

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/observe/observe.h"
+#include "alidade/observe/solve.h"
 
 namespace alidade {
 

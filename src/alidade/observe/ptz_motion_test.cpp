@@ -6,7 +6,7 @@
 
 #include "alidade/files/csv.h"
 #include "alidade/observe/hybrid.h"
-#include "alidade/observe/observe.h"
+#include "alidade/observe/solve.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/rotation.h"
 
@@ -68,8 +68,8 @@ RotationLog log_of(const BroadcastMotion& motion, double first_s, std::uint64_t 
   return simulate_rotation(scene, config, seed);
 }
 
-ObserveConfig config_for_broadcast() {
-  ObserveConfig config;
+ObserveSetup config_for_broadcast() {
+  ObserveSetup config;
   config.width_px = 1280;
   config.height_px = 720;
   return config;
@@ -80,8 +80,8 @@ void follow(const std::string& name, double median_most, double p95_most) {
   const auto motion = broadcast(name);
   if (!motion) GTEST_SKIP() << "ALIDADE_DATA is not set: the motion of real broadcast cameras is not at hand";
   const RotationLog log = log_of(*motion, sway_s, 1);
-  const ObserveReport report = observe(log, config_for_broadcast());
-  ASSERT_EQ(report.status, ObserveReport::Status::ok);
+  const ObserveSolution report = solve_intrinsics(log, config_for_broadcast());
+  ASSERT_EQ(report.status, ObserveSolution::Status::ok);
   std::vector<double> errors;
   std::size_t inside = 0;
   for (std::size_t k = 60; k < log.rows.size(); ++k) {
@@ -105,9 +105,9 @@ TEST(PtzMotion, AZoomThatNeverRestsIsRefusedNotGuessed) {
   if (!motion) GTEST_SKIP() << "ALIDADE_DATA is not set: the motion of real broadcast cameras is not at hand";
   const RotationLog log = log_of(*motion, 0.0, 1);
   for (const ObserveMethod method : {ObserveMethod::hybrid, ObserveMethod::batch}) {
-    ObserveConfig config = config_for_broadcast();
+    ObserveSetup config = config_for_broadcast();
     config.method = method;
-    const ObserveReport report = observe(log, config);
+    const ObserveSolution report = solve_intrinsics(log, config);
     const Verdict verdict = observe_verdict(report, log, config);
     EXPECT_NE(verdict.exit_code, ExitCode::ok) << verdict.sentence;
     EXPECT_NE((verdict.sentence + verdict.to_add).find("zoom"), std::string::npos) << verdict.sentence;

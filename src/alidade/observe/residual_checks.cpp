@@ -1,8 +1,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/observe/observe.h"
+#include "alidade/observe/solve.h"
 
 namespace alidade {
 namespace {
@@ -12,7 +13,7 @@ constexpr double many_left_out = 0.2, max_left_out = 0.4;       // share of what
 constexpr double moves_beyond = 4.0;                            // of a track's residuals over the others' median
 
 /// Asked for, the one that explains best first.
-std::vector<const CauseScore*> asked_for(const ObserveReport& report) {
+std::vector<const CauseScore*> asked_for(const ObserveSolution& report) {
   std::vector<const CauseScore*> asked;
   for (const CauseScore& cause : report.causes) {
     if (cause.z >= asked_beyond(report)) asked.push_back(&cause);
@@ -35,14 +36,14 @@ std::string size_of(const CauseScore& cause) {
 
 std::string advice_for(const CauseScore& cause) {
   const std::string word = estimate_word_of(cause.name);
-  if (word == "scale") return "measure the scale with a known turn, or --estimate scale --sigma-encoder-scale S";
+  if (word == "scale") return "measure the scale with a known rotation, or --estimate scale --sigma-encoder-scale S";
   return "--estimate " + word;
 }
 
-Check noise_check(const ObserveReport& report) {
+Check noise_check(const ObserveSolution& report) {
   Check check{"noise", State::good, "", report.sigma_px, max_ordinary_px, "px", "residuals"};
   check.text = "σ of a pixel is " + text_of(report.sigma_px, 2) + " px";
-  if (!report.sigma_is_told) return check;
+  if (!report.sigma_is_estimated) return check;
   if (check.value > max_ordinary_px) {
     check.state = check.value > max_possible_px ? State::bad : State::care;
     check.text += ": no finder of points is so unsure, something else moves them";
@@ -50,12 +51,12 @@ Check noise_check(const ObserveReport& report) {
   return check;
 }
 
-Check left_out_check(const ObserveReport& report) {
-  const auto out = static_cast<double>(report.pixels_left_out);
+Check left_out_check(const ObserveSolution& report) {
+  const auto out = static_cast<double>(report.pixels_rejected);
   const double all = out + static_cast<double>(report.reference.bundle.observations.size());
   Check check{"left out", State::good, "", all > 0.0 ? 100.0 * out / all : 0.0, 100.0 * many_left_out,
               "%",        "residuals"};
-  check.text = text_of(check.value, 2) + " % of the pixels were left out";
+  check.text = text_of(check.value, 2) + " % of the pixels were rejected";
   if (check.value > 100.0 * many_left_out) {
     check.state = check.value > 100.0 * max_left_out ? State::bad : State::care;
     check.text += ": points move, or are taken for each other";
@@ -64,7 +65,7 @@ Check left_out_check(const ObserveReport& report) {
 }
 
 /// Tracks whose residuals are far larger than the others'.
-Check points_check(const ObserveReport& report) {
+Check points_check(const ObserveSolution& report) {
   const Adjustment& reference = report.reference;
   const std::size_t num = reference.bundle.points.size();
   std::vector<double> squares(num, 0.0), count(num, 0.0), rms;
@@ -83,14 +84,13 @@ Check points_check(const ObserveReport& report) {
     check.text = "too few points to compare";
     return check;
   }
-  std::nth_element(rms.begin(), rms.begin() + static_cast<std::ptrdiff_t>(rms.size() / 2), rms.end());
-  const double median = rms[rms.size() / 2];
+  const double typical = median_of(rms);
   std::string names;
   for (std::size_t i = 0; i < reference.bundle_point_of.size(); ++i) {
     const int place = reference.bundle_point_of[i];
     if (place < 0 || count[static_cast<std::size_t>(place)] < min_pixels) continue;
     const auto at = static_cast<std::size_t>(place);
-    const double ratio = std::sqrt(squares[at] / count[at]) / std::max(median, 1e-12);
+    const double ratio = std::sqrt(squares[at] / count[at]) / std::max(typical, 1e-12);
     check.value = std::max(check.value, ratio);
     if (ratio > moves_beyond) names += (names.empty() ? "" : ", ") + std::to_string(i + 1);
   }
@@ -100,7 +100,7 @@ Check points_check(const ObserveReport& report) {
   return check;
 }
 
-Check reference_check(const ObserveReport& report) {
+Check reference_check(const ObserveSolution& report) {
   constexpr double care = 3.0, bad = 5.0;
   Check check{"agrees with all rows together", State::good, "", report.from_reference, care, "σ", "intrinsics"};
   check.text = "the answer is " + text_of(check.value, 2) + "σ from the adjustment of all rows together";
@@ -109,7 +109,7 @@ Check reference_check(const ObserveReport& report) {
 }
 
 /// How much of σ is what lasts in the tracks, and how well that can be counted.
-Check lasting_check(const ObserveReport& report) {
+Check lasting_check(const ObserveSolution& report) {
   constexpr double most = 12.0;  // beyond it the errors last about as long as the log
   const StatedCovariance& stated = report.stated;
   const auto count = std::min(stated.lasting.rows(), report.reference.solution.information.rows());
@@ -127,7 +127,7 @@ Check lasting_check(const ObserveReport& report) {
 }
 
 /// Do the residuals of a frame turn together? An encoder's or a gyroscope's noise, which every row has anew.
-Check jitter_check(const ObserveReport& report) {
+Check jitter_check(const ObserveSolution& report) {
   constexpr double more_than_pixels = 3.0;
   const TurnJitter& jitter = report.jitter;
   const double sigma_rad = std::sqrt(jitter.variance_rad2);
@@ -151,16 +151,16 @@ std::string half_turn_words(const Eigen::Vector3d& mount_rad) {
   const Eigen::Vector3d axis = mount_rad.cwiseAbs() / mount_rad.norm();
   constexpr double along = 0.95;
   if (mount_rad.norm() > 170.0 * degree) {
-    if (axis.x() > along) return "pan (ω_y) counts the other way, or the picture is mirrored left to right";
-    if (axis.y() > along) return "tilt (ω_x) counts the other way, or the picture is mirrored top to bottom";
+    if (axis.x() > along) return "pan (ω_y) counts the other way, or the image is mirrored left to right";
+    if (axis.y() > along) return "tilt (ω_x) counts the other way, or the image is mirrored top to bottom";
     if (axis.z() > along) return "pan and tilt count the other way, or the camera hangs upside down";
   }
-  return "axes are exchanged, a sign is turned, or the picture is mirrored, which no rotation undoes";
+  return "axes are exchanged, a sign is reversed, or the image is mirrored, which no rotation undoes";
 }
 
 }  // namespace
 
-Check rotation_check(const ObserveReport& report) {
+Check rotation_check(const ObserveSolution& report) {
   constexpr double max_deg = 45.0;
   Check check{"rotation", State::good, "the rotation fits as it is read", 0.0, max_deg, "°", "residuals"};
   Eigen::Vector3d mount_rad = Eigen::Vector3d::Zero();
@@ -175,17 +175,17 @@ Check rotation_check(const ObserveReport& report) {
     check.text = "the pixels fit better if the rotation is read otherwise: " + report.misread;
   } else if (check.value > max_deg) {
     check.state = State::bad;
-    check.text = "the mount turns by " + text_of(check.value, 3) + "°: " + half_turn_words(mount_rad);
+    check.text = "the mount rotates by " + text_of(check.value, 3) + "°: " + half_turn_words(mount_rad);
   }
   return check;
 }
 
-double asked_beyond(const ObserveReport& report) {
+double asked_beyond(const ObserveSolution& report) {
   constexpr double sigmas = 5.0;
   return sigmas * std::sqrt(report.jitter.is_noise() ? std::max(report.jitter.f_ratio, 1.0) : 1.0);
 }
 
-std::vector<Check> residual_checks(const ObserveReport& report) {
+std::vector<Check> residual_checks(const ObserveSolution& report) {
   std::vector<Check> checks;
   const auto asked = asked_for(report);
   constexpr std::size_t max_named = 4;

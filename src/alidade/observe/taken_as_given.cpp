@@ -3,7 +3,7 @@
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/observe/observe.h"
+#include "alidade/observe/solve.h"
 
 namespace alidade {
 namespace {
@@ -14,7 +14,7 @@ constexpr const char* const quantity_names[] = {"fx", "fy", "cx", "cy"};
 struct Given {
   const char* cause;
   double ordinary;
-  std::optional<double> ObserveConfig::*told;
+  std::optional<double> ObserveSetup::*told;
   const char* remedy;
 };
 
@@ -24,20 +24,20 @@ constexpr double ordinary_scale = 0.005, ordinary_mount_rad = 0.5 * degree, ordi
 
 const std::vector<Given>& givens() {
   static const std::vector<Given> all{
-      {"encoder scale", ordinary_scale, &ObserveConfig::sigma_scale, "give --sigma-encoder-scale"},
-      {"scale of the rates", ordinary_scale, &ObserveConfig::sigma_scale, "give --sigma-encoder-scale"},
-      {"lever", ordinary_parallax, &ObserveConfig::sigma_parallax,
+      {"encoder scale", ordinary_scale, &ObserveSetup::sigma_scale, "give --sigma-encoder-scale"},
+      {"scale of the rates", ordinary_scale, &ObserveSetup::sigma_scale, "give --sigma-encoder-scale"},
+      {"lever", ordinary_parallax, &ObserveSetup::sigma_parallax,
        "give --sigma-parallax, or --lever with measured ranges"},
       {"mount", ordinary_mount_rad, nullptr, "--estimate mount"},
       {"delay", ordinary_delay_s, nullptr, "--estimate delay"},
-      {"k1", ordinary_k1, &ObserveConfig::sigma_k1, "--estimate k1, or give a camera file with its covariance"}};
+      {"k1", ordinary_k1, &ObserveSetup::sigma_k1, "--estimate k1, or give a camera file with its covariance"}};
   return all;
 }
 
-std::optional<double> told_sigma(const Given& given, const RotationLog& log, const ObserveConfig& config) {
+std::optional<double> told_sigma(const Given& given, const RotationLog& log, const ObserveSetup& config) {
   if (given.told != nullptr && config.*given.told) return config.*given.told;
-  if (given.told == &ObserveConfig::sigma_scale) return log.sigma_scale;
-  if (given.told == &ObserveConfig::sigma_parallax) return log.sigma_parallax;
+  if (given.told == &ObserveSetup::sigma_scale) return log.sigma_scale;
+  if (given.told == &ObserveSetup::sigma_parallax) return log.sigma_parallax;
   // A log whose scale and centre are exact comes from a simulator: so is all that it does not say.
   if (log.sigma_scale == 0.0 && log.sigma_parallax == 0.0) return 0.0;
   return std::nullopt;
@@ -63,7 +63,7 @@ std::size_t end_member(const CauseScore& cause) {
 }
 
 /// fx and fy follow a centre that is held where it is not.
-void add_held_centre(const ObserveConfig& config, const ObserveReport& report, const Eigen::Vector4d& sigma,
+void add_held_centre(const ObserveSetup& config, const ObserveSolution& report, const Eigen::Vector4d& sigma,
                      std::vector<Assumption>& assumed) {
   if (!config.fixed_centre) return;
   const CommonMatrix& information = report.reference.solution.information;
@@ -77,7 +77,7 @@ void add_held_centre(const ObserveConfig& config, const ObserveReport& report, c
         .name = axis == 0 ? "cx held" : "cy held",
         .value = report.quantities.empty() ? not_seen : report.quantities[2 + static_cast<std::size_t>(axis)].value,
         .ordinary = ordinary_centre_px,
-        .remedy = "calibrate with a board, or measure the rotation: then the centre need not be held"};
+        .remedy = "calibrate with a board, or measure the rotation: then the centre need not be fixed"};
     fill_effect(move, Eigen::Vector4d(sigma[0], sigma[1], 1.0, 1.0), report.scale.scale, assumption);
     assumed.push_back(assumption);
   }
@@ -85,8 +85,8 @@ void add_held_centre(const ObserveConfig& config, const ObserveReport& report, c
 
 }  // namespace
 
-std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveConfig& config, const ObserveReport& report,
-                                       CommonMatrix& cov) {
+std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveSetup& config,
+                                       const ObserveSolution& report, CommonMatrix& cov) {
   std::vector<Assumption> assumed;
   struct Effect {
     std::size_t assumption;

@@ -6,14 +6,16 @@
 
 #include "alidade/camera/camera.h"
 #include "alidade/geometry/rigid3.h"
+#include "alidade/public.h"
 
 // The general pan-tilt head; docs/maths/pan-tilt-heads.md. Angles at every interface are what the encoders READ, as
 // (pan, tilt) [rad]; the head itself stands at scale · (reading − zero). Pan > 0 turns left, tilt > 0 turns up.
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// How the readings of a head become angles of its axes: angle = scale · (reading + c cos reading + s sin reading −
-/// zero). c and s are what a disc that sits off its axis does: an error of one period a turn.
+/// zero). c and s are what a disc that sits off its axis does: an error of one period per revolution.
 struct Encoder {
   double pan_zero_rad = 0.0;  ///< What is read, corrected, where the pan angle is zero.
   double tilt_zero_rad = 0.0;
@@ -22,7 +24,7 @@ struct Encoder {
   double sigma_rad = 0.0;                                                               ///< Of a reading.
   double pan_cos_rad = 0.0, pan_sin_rad = 0.0, tilt_cos_rad = 0.0, tilt_sin_rad = 0.0;  ///< Amplitudes c and s.
 
-  /// Readings without the error of one period a turn.
+  /// Readings without the error of one period per revolution.
   [[nodiscard]] Eigen::Vector2d corrected(const Eigen::Vector2d& readings_rad) const;
   /// What an angle moves by for a reading.
   [[nodiscard]] Eigen::Vector2d slopes(const Eigen::Vector2d& readings_rad) const;
@@ -54,13 +56,18 @@ struct RigHead {
 
 /// The parameters of a head in their order: world_from_base ξ (translation, rotation; on the right), pan_to_tilt,
 /// tilt_to_cam, cam_from_tilt (rotation, on the right), pan zero, tilt zero, pan scale, tilt scale,
-/// skew of the axes, the encoders' errors of one period a turn.
+/// skew of the axes, the encoders' errors of one period per revolution.
 inline constexpr int num_head_params = 24;
 inline constexpr std::array<const char*, num_head_params> head_param_names{
     "base_x_m",        "base_y_m",        "base_z_m",        "base_rx_rad",     "base_ry_rad",     "base_rz_rad",
     "pan_to_tilt_x_m", "pan_to_tilt_y_m", "pan_to_tilt_z_m", "tilt_to_cam_x_m", "tilt_to_cam_y_m", "tilt_to_cam_z_m",
     "cam_rx_rad",      "cam_ry_rad",      "cam_rz_rad",      "pan_zero_rad",    "tilt_zero_rad",   "pan_scale",
     "tilt_scale",      "axes_skew_rad",   "pan_cos_rad",     "pan_sin_rad",     "tilt_cos_rad",    "tilt_sin_rad"};
+/// Where they begin, by name; tilt and its like stand behind pan's.
+inline constexpr int base_param = 0, base_rotation_param = 3, pan_to_tilt_param = 6, tilt_to_cam_param = 9,
+                     cam_rotation_param = 12, pan_zero_param = 15, pan_scale_param = 17, tilt_scale_param = 18,
+                     axes_skew_param = 19, pan_cos_param = 20, pan_sin_param = 21, tilt_cos_param = 22,
+                     tilt_sin_param = 23;
 using HeadVector = Eigen::Matrix<double, num_head_params, 1>;
 
 /// The head moved by a small step of its parameters.
@@ -139,4 +146,5 @@ struct WorldRay {
 /// The two heads of Xiahou, Chen & Wu, 2015: no offsets, 0.50 m apart along x, f = 337.84 px, 320 × 240.
 [[nodiscard]] std::array<RigHead, 2> xiahou_rig();
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -5,10 +5,12 @@
 #include <vector>
 
 #include "alidade/camera/camera.h"
+#include "alidade/public.h"
 
-// A lens that zooms: intrinsics that change while a head works, told by an observer or by the truth.
+// A lens that zooms: intrinsics that change while a head works, estimated by an observer, or true.
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Intrinsics of a camera at one instant: fx, fy, cx, cy, and σ of each. [px]
 struct LensNow {
@@ -33,15 +35,16 @@ struct Zoomed {
   }
 };
 
-/// Intrinsics over time, as `alidade observe` tells them of a head's camera.
+/// Intrinsics over time, as `alidade observe` estimates them of a head's camera.
 struct LensCourse {
   std::string name;                    ///< Of the file, for messages.
   std::vector<double> t_s;             ///< Ascending.
-  std::vector<LensNow> lens;           ///< One a time; none where the camera's own intrinsics hold.
+  std::vector<LensNow> lens;           ///< One per time; none where the camera's own intrinsics hold.
   double from_s = 0.0, until_s = 0.0;  ///< What the observer's log spans.
 
   /// Straight between the times; the first and the last hold before and after.
   [[nodiscard]] LensNow at(double at_s) const;
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -4,10 +4,12 @@
 #include <vector>
 
 #include "alidade/pantilt/rig.h"
+#include "alidade/public.h"
 
 // What is taken from a rig file is not exact: its errors, in a form that estimators can count.
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// At most so many directions of error are counted; see rig_uncertainty().
 inline constexpr int max_rig_errors = 32;
@@ -18,7 +20,7 @@ using RigErrorEffect = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, max_rig_er
 /// The errors of a rig's heads, lenses and clocks as p = p̂ + factor[h] u, u ~ N(0, 1) of all heads together. The rows
 /// of a factor: the head's parameters (head_param_names), its lens' (param_names), the delay of its clock [s].
 struct RigUncertainty {
-  std::vector<Eigen::MatrixXd> factor;  ///< One a head; empty: nothing is uncertain.
+  std::vector<Eigen::MatrixXd> factor;  ///< One per head; empty: nothing is uncertain.
 
   [[nodiscard]] int num() const { return factor.empty() ? 0 : static_cast<int>(factor.front().cols()); }
 };
@@ -27,7 +29,7 @@ struct RigUncertainty {
 /// and lenses by themselves; σ of zeros and scales of encoders where the rig's covariance holds these.
 [[nodiscard]] Eigen::MatrixXd joint_covariance(const Rig& rig);
 
-/// The errors of a rig whose clocks are right to σ_clock each. Directions that move no pixel are left out: of what
+/// The errors of a rig whose clocks are right to σ_clock each. Directions that move no pixel are omitted: of what
 /// remains, all but 0.01 px RMS over a working space of 0.5 to 12 m is kept, in at most max_rig_errors directions.
 [[nodiscard]] RigUncertainty rig_uncertainty(const Rig& rig, double sigma_clock_s = 0.0);
 
@@ -40,4 +42,5 @@ struct RigUncertainty {
                                                              const Eigen::Vector3d& velocity_in_world,
                                                              const std::optional<ObservationLens>& lens = {});
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -7,10 +7,13 @@
 #include <string_view>
 #include <variant>
 
+#include "alidade/public.h"
+
 // How one axis of a head follows its command; docs/maths/servo.md. Angles inside are radians; the gain of a plant
 // speaks of the unit that stands beside it, because a gain without its unit has been misread before.
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 enum class AngleUnit { deg, rad };
 [[nodiscard]] double radians_in(AngleUnit unit);  ///< π/180, or 1.
@@ -109,4 +112,5 @@ class DelayedAxis {
   std::size_t num_waiting_ = 0;
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -7,8 +7,10 @@
 
 #include "alidade/pantilt/head.h"
 #include "alidade/pantilt/lens_course.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Intrinsics that an observation was taken under, where they are not its head's own, and their σ in units of the σ
 /// that the rig's errors have of them (of fx, fy, cx, cy; both over the focal length).
@@ -44,4 +46,5 @@ struct TrueTrack {
   [[nodiscard]] std::optional<Eigen::Vector3d> at(double t_s) const;
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

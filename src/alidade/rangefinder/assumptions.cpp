@@ -8,7 +8,7 @@ namespace alidade {
 namespace {
 
 /// What is ordinarily wrong with a thing that nobody gave a σ for, in its unit.
-double ordinary_error(const HeldThing& thing) {
+double ordinary_error(const FixedQuantity& thing) {
   if (thing.name == "square_m") return 0.002 * thing.value;  // a printer
   if (thing.name == "scale") return 0.005;
   if (thing.name == "camera.f") return 0.003 * thing.value;
@@ -23,7 +23,7 @@ const char* remedy_of(const std::string& name) {
   if (name == "scale") return "give --sigma-scale, or estimate it: --scale";
   if (name.starts_with("camera")) return "use a camera file with covariance: alidade calibrate";
   if (name == "board.flat_m") return "glue the board to something flat";
-  return "leave it out: the residuals tell it";
+  return "leave the option away: it is estimated from the residuals";
 }
 
 /// The move of one of the answer's vectors in its σ, √trace, as the verdict states it; named by what moves most.
@@ -42,13 +42,15 @@ void put_moves(const RangefinderReport& report, const BeamVector& moves, Assumpt
   const Eigen::Vector3d turned = 1e6 * (moved.direction_in_cam - report.beam.direction_in_cam);
   const BeamMatrix& cov = report.beam.cov;
   put_move_of("origin_m", moves.head<3>(), std::sqrt(cov.topLeftCorner<3, 3>().trace()), assumption);
-  put_move_of("direction", turned, std::sqrt(cov.block<2, 2>(3, 3).trace()), assumption);
-  if (!report.scale_by_need) put_move_of("scale", moves.tail<1>(), std::sqrt(cov(5, 5)), assumption);
+  put_move_of("direction", turned, std::sqrt(cov.block<2, 2>(beam_direction_param, beam_direction_param).trace()),
+              assumption);
+  if (!report.scale_by_need)
+    put_move_of("scale", moves.tail<1>(), std::sqrt(cov(beam_scale_param, beam_scale_param)), assumption);
 }
 
-bool is_of_lengths(const HeldThing& thing) { return thing.name == "scale" || thing.name == "square_m"; }
+bool is_of_lengths(const FixedQuantity& thing) { return thing.name == "scale" || thing.name == "square_m"; }
 
-Assumption assumption_of(const RangefinderReport& report, const HeldThing& thing) {
+Assumption assumption_of(const RangefinderReport& report, const FixedQuantity& thing) {
   Assumption assumption{.name = thing.name, .value = thing.value, .sigma = thing.sigma};
   if (!thing.sigma) assumption.ordinary = ordinary_error(thing);
   assumption.remedy = thing.sigma ? "" : remedy_of(thing.name);
@@ -60,7 +62,7 @@ Assumption assumption_of(const RangefinderReport& report, const HeldThing& thing
 
 std::vector<Assumption> rangefinder_assumptions(const RangefinderReport& report) {
   std::vector<Assumption> assumed;
-  for (const HeldThing& thing : report.held) assumed.push_back(assumption_of(report, thing));
+  for (const FixedQuantity& thing : report.fixed) assumed.push_back(assumption_of(report, thing));
   return assumed;
 }
 
@@ -68,7 +70,7 @@ bool wants_scale(const RangefinderReport& report, const RangefinderConfig& confi
   constexpr double asks_beyond = 3.0;
   if (config.estimate_scale || config.sigma_scale || config.method == RangefinderMethod::spot) return false;
   if (std::abs(report.scale_in_sigmas) > asks_beyond) return true;
-  return std::any_of(report.held.begin(), report.held.end(), [&](const HeldThing& thing) {
+  return std::any_of(report.fixed.begin(), report.fixed.end(), [&](const FixedQuantity& thing) {
     return is_of_lengths(thing) && !thing.sigma && assumption_of(report, thing).moves > 1.0;
   });
 }

@@ -49,7 +49,7 @@ BeamBound judge_beam(const BeamProblem& problem, const Beam& beam, const Camera&
   if (const auto normals = beam_normals(problem, camera, beam))
     bound.condition = scaled_condition(normals->H.topLeftCorner(problem.num_free(), problem.num_free()));
   bound.sigma_origin_m = std::sqrt(beam.cov.topLeftCorner<3, 3>().trace());
-  bound.sigma_direction_rad = std::sqrt(beam.cov.block<2, 2>(3, 3).trace());
+  bound.sigma_direction_rad = std::sqrt(beam.cov.block<2, 2>(beam_direction_param, beam_direction_param).trace());
   const auto spot_sigma_px = [&](double range_m) {
     const auto pixel = measured_pixel(beam, camera, range_m, 0.0);
     return pixel ? std::sqrt(std::max(0.0, symmetric_eigenvalues(pixel->cov)[1])) : infinity;  // not seen there

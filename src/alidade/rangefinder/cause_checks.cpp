@@ -21,7 +21,7 @@ std::string unit_of(double scale) {
 /// A scale that was estimated as nobody told it, and is not 1: the rangefinder's, or that of the board.
 void add_found_scale(const RangefinderReport& report, Verdict& verdict) {
   constexpr double ask_beyond = 4.0, beyond_an_instrument = 0.05;
-  const double away = report.beam.scale - 1.0, sigma = std::sqrt(report.beam.cov(5, 5));
+  const double away = report.beam.scale - 1.0, sigma = std::sqrt(report.beam.cov(beam_scale_param, beam_scale_param));
   const double z = std::abs(away) / sigma;
   Check check = check_of("scale", z < ask_beyond ? State::good : State::care, "the readings' scale is 1 within its σ",
                          z, ask_beyond, "σ", "residuals");
@@ -62,7 +62,7 @@ void add_camera(const RangefinderReport& report, Verdict& verdict) {
   constexpr double ask_beyond = 4.5, foreign = 0.02;
   Check check =
       check_of("camera", State::good, "boards and spots agree with the camera file", 0.0, ask_beyond, "σ", "residuals");
-  for (const HeldThing& thing : report.held) {
+  for (const FixedQuantity& thing : report.fixed) {
     if (!thing.name.starts_with("camera")) continue;
     const double z = std::abs(thing.asked) / thing.asked_sigma;
     if (!(z > check.value)) continue;
@@ -77,7 +77,7 @@ void add_camera(const RangefinderReport& report, Verdict& verdict) {
                  text_of(thing.value + thing.asked, 5) + " px, not " + text_of(thing.value, 5) + " (" + text_of(z, 2) +
                  "σ): " +
                  (is_focal && std::abs(thing.asked) > foreign * thing.value ? "the file of another camera, or zoomed"
-                                                                            : "calibrate the camera anew");
+                                                                            : "calibrate the camera again");
   }
   verdict.checks.push_back(std::move(check));
 }
@@ -126,7 +126,7 @@ void add_by_distance(const RangefinderReport& report, std::span<const Shot> shot
 /// A rangefinder that scatters by decimetres is none, or its readings are of something else.
 void add_range_noise(const RangefinderReport& report, Verdict& verdict) {
   constexpr double max_m = 0.1;
-  if (!report.range_sigma_is_told || report.shots_used == 0) return;
+  if (!report.range_sigma_is_estimated || report.shots_used == 0) return;
   const double sigma_m = report.beam.noise.sigma_m;
   verdict.checks.push_back(check_of("range noise", sigma_m < max_m ? State::good : State::refused,
                                     sigma_m < max_m ? "readings scatter by " + text_of(1e3 * sigma_m, 2) + " mm"

@@ -145,17 +145,17 @@ TEST(HonestSigma, OneShotsSharedErrorStandsOut) {
   }
 }
 
-/// What `held` says that an error of `error` moves the beam by, against a solve with that error.
+/// What `fixed` says that an error of `error` moves the beam by, against a solve with that error.
 void expect_moves(const RangefinderReport& report, const std::string& name, double error,
                   const RangefinderReport& other, double tolerance_m) {
-  for (const HeldThing& thing : report.held) {
+  for (const FixedQuantity& thing : report.fixed) {
     if (thing.name != name) continue;
     const Eigen::Vector3d moved = other.beam.origin_in_cam - report.beam.origin_in_cam;
     EXPECT_LT((moved - error * thing.moves.head<3>()).norm(), tolerance_m) << name << ": " << moved.transpose();
     EXPECT_GT(moved.norm(), 2.0 * tolerance_m) << name;
     return;
   }
-  ADD_FAILURE() << name << " is not among what was held";
+  ADD_FAILURE() << name << " is not among what was fixed";
 }
 
 TEST(Assumptions, MoveTheBeamAsSolvesWithTheErrorSay) {
@@ -176,7 +176,7 @@ TEST(Assumptions, MoveTheBeamAsSolvesWithTheErrorSay) {
   auto aside = unknown;
   aside.camera.lens = with_params(sample.camera.lens, values);
   const RangefinderReport moved = solve_sample(aside, config);
-  for (const HeldThing& thing : held.held) {
+  for (const FixedQuantity& thing : held.fixed) {
     if (thing.name != "camera.cx") continue;
     EXPECT_FALSE(thing.sigma);
     const Eigen::Vector3d turned = moved.beam.direction_in_cam - held.beam.direction_in_cam;
@@ -191,7 +191,7 @@ TEST(Assumptions, AToldSigmaIsCarriedIntoTheBeamsOwn) {
   const RangefinderReport without = solve_sample(sample, config);
   config.sigma_square_m = 0.002 * 0.04;
   const RangefinderReport with = solve_sample(sample, config);
-  for (const HeldThing& thing : with.held) {
+  for (const FixedQuantity& thing : with.fixed) {
     if (thing.name != "square_m") continue;
     const double carried = *config.sigma_square_m * thing.moves[2];
     EXPECT_NEAR(with.beam.cov(2, 2), without.beam.cov(2, 2) + carried * carried, 1e-12);

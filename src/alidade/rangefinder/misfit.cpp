@@ -66,7 +66,7 @@ std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::
   RangefinderConfig plain = config;
   if (plain.method == RangefinderMethod::spot) plain.method = RangefinderMethod::joint;  // spots know no metres
   plain.estimate_scale = plain.scale_by_need = false;
-  plain.range_noise.reset();
+  plain.sigma_range_m.reset();
   const Explained as_given = explained(shots, points_in_board, camera, plain);
   if (as_given.fits) return "";  // nothing is amiss with them: what they cannot tell they do not know
   const auto explains = [&](std::span<const Shot> others) {

@@ -1,12 +1,13 @@
 #pragma once
 
-#include <span>
 #include <vector>
 
 #include "alidade/estimation/progress.h"
-#include "alidade/rangefinder/rangefinder.h"
+#include "alidade/public.h"
+#include "alidade/rangefinder/report.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// What is known of the beam, and what the next shots will be measured with.
 struct BeamNow {
@@ -24,7 +25,7 @@ struct ShotLimits {
   double max_tilt_rad = 0.78;
 };
 
-/// A place for the board, and what would be known with it.
+/// A pose for the board, and what would be known with it.
 struct NextShot {
   double distance_m = 0.0;   ///< Along the beam, as read.
   double tilt_rad = 0.0;     ///< Between the board's normal and the camera's view.
@@ -46,4 +47,5 @@ struct ShotGain {
 };
 [[nodiscard]] std::vector<ShotGain> next_shot_gains(const BeamNow& now, const ShotLimits& limits);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -158,7 +158,7 @@ Preparation prepare_shots(std::span<const Shot> shots, std::span<const Eigen::Ve
   Preparation ready;
   BeamProblem& problem = ready.problem;
   problem.points_in_board = points_in_board;
-  problem.model = {config.range_noise.value_or(RangeNoise{guessed_sigma_m}), config.reading_counts_twice};
+  problem.model = {config.range_noise().value_or(RangeNoise{guessed_sigma_m}), config.reading_counts_twice};
   problem.sigma_corner_px = config.sigma_corner_px;
   problem.estimate_scale = config.estimate_scale;
   problem.max_iterations = config.max_iterations;
@@ -177,7 +177,7 @@ Preparation prepare_shots(std::span<const Shot> shots, std::span<const Eigen::Ve
   }
   scale_corners(corners, config, ready);
   for (const PreparedShot& shot : problem.shots) {
-    ready.knows_range_sigma = ready.knows_range_sigma && (shot.sigma_range_m || config.range_noise);
+    ready.knows_range_sigma = ready.knows_range_sigma && (shot.sigma_range_m || config.sigma_range_m);
     if (shot.spot_px) ready.knows_spot_sigma = ready.knows_spot_sigma && (shot.owns_spot_sigma || config.sigma_spot_px);
   }
   return ready;

@@ -7,7 +7,7 @@
 #include "alidade/geometry/decompositions.h"
 #include "alidade/rangefinder/beam_bound.h"
 #include "alidade/rangefinder/beam_search.h"
-#include "alidade/rangefinder/held_things.h"
+#include "alidade/rangefinder/fixed_quantities.h"
 #include "alidade/rangefinder/prepare.h"
 #include "alidade/rangefinder/refine_all.h"
 
@@ -63,7 +63,7 @@ bool tells_outliers(const BeamFit& all, const BeamProblem& all_shots, const Beam
   return !(ratio * spare / dof_of(all, all_shots) < limit * limit);
 }
 
-/// Beam, outliers and noise, lens and poses held: what is marked in the problem stays for what follows.
+/// Beam, outliers and noise, lens and poses fixed: what is marked in the problem stays for what follows.
 std::optional<BeamFit> search_beam(Preparation& ready, const Camera& camera, const RangefinderConfig& config,
                                    const Progress& progress) {
   BeamProblem& problem = ready.problem;
@@ -98,7 +98,7 @@ std::optional<BeamFit> search_beam(Preparation& ready, const Camera& camera, con
   return fit && !knows_sigma ? best_beam(problem, camera, fit->best.beam) : fit;
 }
 
-/// ∂beam/∂lens of a beam whose lens and poses were held; empty where the lens' covariance is not known.
+/// ∂beam/∂lens of a beam whose lens and poses were fixed; empty where the lens' covariance is not known.
 Eigen::MatrixXd J_beam_lens(const BeamProblem& problem, const Camera& camera, const Beam& beam) {
   const Eigen::Index num_lens = camera.cov.rows();
   const auto normals = beam_normals(problem, camera, beam);
@@ -107,7 +107,7 @@ Eigen::MatrixXd J_beam_lens(const BeamProblem& problem, const Camera& camera, co
   return -Ldlt(normals->H.topLeftCorner(p, p)).solve_each(normals->H_lens.topRows(p));
 }
 
-/// The covariance of a lens that was held is carried through.
+/// The covariance of a lens that was fixed is carried through.
 void carry_lens(const BeamProblem& problem, const Camera& camera, RangefinderReport& report) {
   const Eigen::MatrixXd G = J_beam_lens(problem, camera, report.beam);
   if (G.size() == 0) return;
@@ -152,7 +152,7 @@ void put_clusters(const BeamProblem& problem, const ReducedSystem& system, const
 
 /// What was told with a σ is carried into the beam's covariance.
 void carry_told(RangefinderReport& report) {
-  for (const HeldThing& thing : report.held) {
+  for (const FixedQuantity& thing : report.fixed) {
     if (!thing.sigma || (thing.name != "square_m" && thing.name != "scale")) continue;  // the lens' is in it already
     const BeamVector moved = *thing.sigma * thing.moves;
     report.beam.cov += moved * moved.transpose();
@@ -165,7 +165,7 @@ void carry_told(RangefinderReport& report) {
 /// its σ away to all of it at 4, if the shots by themselves know the lens at least half as well as its file.
 void carry_surprise(RangefinderReport& report) {
   constexpr double doubtful = 2.5, sure = 4.0, worst = 2.2;
-  for (const HeldThing& thing : report.held) {
+  for (const FixedQuantity& thing : report.fixed) {
     if (!thing.name.starts_with("camera") || !thing.sigma || !(thing.asked_sigma < worst * *thing.sigma)) continue;
     const double z = std::abs(thing.asked) / thing.asked_sigma;
     if (z < doubtful) continue;
@@ -250,8 +250,8 @@ void take_over(const RefinedBeam& refined, BeamProblem& problem, RangefinderRepo
   }
 }
 
-/// Do the readings ask for a scale? How far it would be from 1, were it estimated too, lens and poses held, over its σ,
-/// with the σ of a reading told anew: where that came of residuals, they held the missing scale, too.
+/// Do the readings ask for a scale? How far it would be from 1, were it estimated too, lens and poses fixed, over its
+/// σ, with the σ of a reading estimated again: where that came of residuals, they held the missing scale, too.
 double scale_in_sigmas(const BeamProblem& problem, const Camera& camera, const Beam& beam, bool sigma_is_told,
                        double min_sigma_m) {
   BeamProblem work = problem;
@@ -270,7 +270,7 @@ double scale_in_sigmas(const BeamProblem& problem, const Camera& camera, const B
   const int spare = with ? with->normals.num_rows - num_beam_params : 0;
   if (spare < enough || !with->converged) return 0.0;
   const double left = std::max(1.0, with->normals.cost / spare);
-  const double sigma = std::sqrt(left * inverse_of_scaled(with->normals.H)(5, 5));
+  const double sigma = std::sqrt(left * inverse_of_scaled(with->normals.H)(beam_scale_param, beam_scale_param));
   const double z = (with->beam.scale - 1.0) / sigma;
   return std::isfinite(z) ? z : 0.0;
 }
@@ -286,8 +286,8 @@ void put_uncertainty(const BeamProblem& problem, const LensPrior& prior, const C
   part.inverse = inverse_of_scaled(information);
   if (!part.inverse.allFinite()) return;
   put_clusters(problem, system, part, prior, report);
-  report.held = held_things(system, part, prior, camera, problem.points_in_board, report, config);
-  for (HeldThing& sigma : held_sigmas(problem, report)) report.held.push_back(std::move(sigma));
+  report.fixed = fixed_quantities(system, part, prior, camera, problem.points_in_board, report, config);
+  for (FixedQuantity& sigma : fixed_sigmas(problem, report)) report.fixed.push_back(std::move(sigma));
   if (config.refine == Refine::beam) carry_lens(problem, camera, report);
   carry_told(report);
   if (config.refine == Refine::all) carry_surprise(report);
@@ -324,7 +324,7 @@ void solve_report(Preparation& ready, const BeamFit& fit, const Camera& camera, 
     carry_lens(problem, camera, report);
   }
   report.scale_in_sigmas =
-      scale_in_sigmas(problem, report.camera, report.beam, report.range_sigma_is_told, ready.min_sigma_range_m);
+      scale_in_sigmas(problem, report.camera, report.beam, report.range_sigma_is_estimated, ready.min_sigma_range_m);
   report.bound = judge_beam(problem, report.beam, report.camera);
   report.bound.cov =
       refined ? refined->state.beam.cov : BeamMatrix(BeamMatrix::Constant(std::numeric_limits<double>::infinity()));
@@ -342,8 +342,8 @@ RangefinderReport calibrate_rangefinder(std::span<const Shot> shots, std::span<c
   report.scale_by_need = config.scale_by_need;
   report.sigma_corner_px = ready.sigma_corner_px;
   report.sigma_spot_px = config.sigma_spot_px.value_or(guessed_sigma_px);
-  report.spot_sigma_is_told = !ready.knows_spot_sigma;
-  report.range_sigma_is_told = !ready.knows_range_sigma;
+  report.spot_sigma_is_estimated = !ready.knows_spot_sigma;
+  report.range_sigma_is_estimated = !ready.knows_range_sigma;
   report.shots.resize(shots.size());
   for (std::size_t i = 0; i < shots.size(); ++i) report.shots[i].reason = ready.reasons[i];
   report.shots_dropped = static_cast<int>(shots.size());

@@ -1,92 +1,14 @@
 #pragma once
 
-#include <array>
-#include <limits>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "alidade/beam/shot.h"
-#include "alidade/estimation/cluster_covariance.h"
 #include "alidade/estimation/progress.h"
 #include "alidade/estimation/verdict.h"
-#include "alidade/rangefinder/config.h"
+#include "alidade/rangefinder/report.h"
 
 namespace alidade {
-
-/// One shot after the solve. NaN where there is nothing to compare.
-struct ShotFit {
-  bool used = false;
-  std::string reason;                                                  ///< Why it was not used; empty otherwise.
-  double residual_range_m = std::numeric_limits<double>::quiet_NaN();  ///< Predicted from the board − read.
-  double sigma_range_m = std::numeric_limits<double>::quiet_NaN();     ///< Of that residual: the reading, the board.
-  Eigen::Vector2d residual_px = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
-  Eigen::Matrix2d cov_px = Eigen::Matrix2d::Zero();        ///< Of that residual.
-  Eigen::Vector3d point_in_cam = Eigen::Vector3d::Zero();  ///< Where the beam says the reading was taken.
-  std::optional<Plane> plane = {};                         ///< Of the board, in the camera frame.
-  std::optional<BoardPose> pose = {};                      ///< Of the board, as solved; where it has one.
-  /// What the shot pulls the answer by, squared, over what its noise lets expect; 1 in the mean if all is as assumed.
-  double cluster_z2 = std::numeric_limits<double>::quiet_NaN();
-};
-
-/// Something that the solve held: what an error of it does to the beam, and what the shots say of it.
-struct HeldThing {
-  std::string name;  ///< scale, square_m, board.flat_m, camera.f, camera.cx, camera.cy, sigma_range_m, sigma_spot_px
-  double value = 0.0;
-  BeamVector moves = BeamVector::Zero();  ///< ∂ beam / ∂ its value, everything else solved anew.
-  /// What its error would be, were it free too, and the σ of that: a score (Lagrange multiplier) test. Infinite where
-  /// the shots say nothing of it.
-  double asked = 0.0, asked_sigma = std::numeric_limits<double>::infinity();
-  std::optional<double> sigma = {};  ///< With which it was given; in `beam.cov`.
-};
-
-/// What can be known of the beam from these shots, and how its geometry stands.
-struct BeamBound {
-  BeamMatrix cov = BeamMatrix::Zero();  ///< Cramér–Rao, lens and poses estimated too; infinite where singular.
-  double sigma_origin_m = 0.0;          ///< √trace of the origin's covariance, of the estimate.
-  double sigma_direction_rad = 0.0;     ///< √trace of the direction's, of the estimate.
-  std::array<double, 4>
-      spot_sigma_px{};               ///< Larger axis of the predicted spot at bound_ranges_m, for an exact reading.
-  double worst_spot_sigma_px = 0.0;  ///< Of these, at ranges between the nearest shot and the farthest.
-  double nearest_m = 0.0, farthest_m = 0.0;  ///< Readings used.
-  double condition = 0.0;                    ///< Of the information about the beam, scaled to a unit diagonal.
-  double range_ratio = 0.0;                  ///< Longest over shortest reading.
-  double normal_spread = 0.0;                ///< Least singular value of the boards' normals over √(their number).
-  double offset_m = 0.0;                     ///< Of the beam's line from the camera's centre.
-};
-inline constexpr std::array<double, 4> bound_ranges_m{0.5, 1.0, 2.0, 4.0};
-
-struct RangefinderReport {
-  enum class Status {
-    converged,
-    too_few,        ///< Shots for the method.
-    degenerate,     ///< The information about the beam is singular.
-    scale_unknown,  ///< A scale was asked of spots alone.
-    ambiguous,      ///< Two beams explain the shots alike.
-    no_convergence
-  };
-  Status status = Status::too_few;
-  Beam beam;                                  ///< Its covariance counts that the measurements of a shot share errors.
-  Camera camera;                              ///< As given, or refined with the beam; the beam belongs to it.
-  BeamMatrix cov_model = BeamMatrix::Zero();  ///< Of the beam, if every single measurement erred by itself.
-  Eigen::MatrixXd lens_cov_model;             ///< The same of a lens that was refined; 0×0: it was held.
-  ClusterCovariance clusters;                 ///< What tells the two apart; shots are its clusters.
-  std::vector<HeldThing> held;
-  bool scale_by_need = false;      ///< The scale was estimated for the beam's sake, it is no result itself.
-  std::vector<Beam> alternatives;  ///< Other beams that fit as well.
-  std::vector<ShotFit> shots;      ///< One a shot.
-  BeamBound bound;
-  double sigma_spot_px = 0.0;  ///< Of spots that do not bring their own.
-  double sigma_corner_px = 0.0;
-  bool spot_sigma_is_told = false, range_sigma_is_told = false;  ///< By the residuals.
-  double cost = 0.0;  ///< Sum of the whitened squared residuals: corners, spots, ranges, prior of the lens.
-  int dof = 0;        ///< Of that sum.
-  /// What a scale of the readings would be, were it estimated too, less 1, over its σ; 0 where that was not asked.
-  double scale_in_sigmas = 0.0;
-  double rms_px = 0.0, rms_range_m = 0.0;  ///< Of the spots (per point) and of the ranges used.
-  int shots_used = 0, shots_dropped = 0;
-  int iterations = 0;
-};
 
 /// Origin and direction (and scale) of a rangefinder's beam in the camera frame, by maximum likelihood, with what is
 /// wrong among the shots named. Needs no first guess and does not throw on bad data: the report says how it went.

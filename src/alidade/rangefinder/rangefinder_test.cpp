@@ -31,7 +31,7 @@ TEST_P(DegenerateBattery, IsAlwaysRefusedByNameWithWhatElseCouldTell) {
     scene.num_shots = 15;
     const auto sample = draw_rangefinder_sample(scene, {}, static_cast<std::uint64_t>(300 + trial));
     RangefinderConfig config = told_config(method);
-    if (trial % 2 == 1) config.sigma_spot_px.reset(), config.range_noise.reset();  // a refusal needs no σ
+    if (trial % 2 == 1) config.sigma_spot_px.reset(), config.sigma_range_m.reset();  // a refusal needs no σ
     const RangefinderReport report = solve_sample(sample, config);
     const Verdict verdict = rangefinder_verdict(report, sample.simulated.shots, config);
     refused += verdict.exit_code == ExitCode::cannot_tell ? 1 : 0;
@@ -91,7 +91,7 @@ TEST(RangefinderVerdict, WarnsOfAShortSpanAndOfOutliers) {
   EXPECT_TRUE(verdict.state == State::care && verdict.exit_code == ExitCode::ok);
   sample = draw_rangefinder_sample(*rangefinder_scenario("reference"), {.outlier_share = 0.1}, 3);
   verdict = rangefinder_verdict(solve_sample(sample, config), sample.simulated.shots, config);
-  EXPECT_NE(verdict.to_add.find("left out: shot"), std::string::npos) << verdict.to_add;
+  EXPECT_NE(verdict.to_add.find("rejected: shot"), std::string::npos) << verdict.to_add;
 }
 
 /// Squared error over its covariance of origin, direction and scale; χ² of six.
@@ -161,7 +161,7 @@ TEST(Rangefinder, FindsItsOwnNoise) {
                                           static_cast<std::uint64_t>(trial));
     sample.camera = sample.scene.camera;  // an error of the lens would show in the corners
     const RangefinderReport report = solve_sample(sample, {});
-    EXPECT_TRUE(report.spot_sigma_is_told && report.range_sigma_is_told);
+    EXPECT_TRUE(report.spot_sigma_is_estimated && report.range_sigma_is_estimated);
     sum_m += std::pow(report.beam.noise.sigma_m, 2) / trials;
     sum_px += std::pow(report.sigma_spot_px, 2) / trials;
     sum_corner += std::pow(report.sigma_corner_px, 2) / trials;

@@ -117,17 +117,17 @@ double mean_tilt_rad(const RangefinderReport& report) {
 Weakness reason_of_equal_ranges(const RangefinderReport& report) {
   return {"equal ranges",
           "equal ranges: the longest is only " + text_of(report.bound.range_ratio) +
-              " times the shortest, so origin and direction cannot be told apart",
+              " times the shortest, so origin and direction cannot be separated",
           "take shots from near to far, at least 1 to 4"};
 }
 
 Weakness reason_of_boards(const RangefinderReport& report) {
   constexpr double frontal_rad = 0.14;  // 8°
   if (mean_tilt_rad(report) < frontal_rad) {
-    return {"frontal boards", "frontal boards: all face the camera, so where the beam hits them across cannot be told",
+    return {"frontal boards", "frontal boards: all face the camera, so where the beam hits them across is unobservable",
             "tilt the board by 20 to 45°, to all sides"};
   }
-  return {"parallel boards", "parallel boards: all are tilted alike, so the beam cannot be told along them",
+  return {"parallel boards", "parallel boards: all are tilted alike, so the beam is unobservable along them",
           "tilt the board to all sides"};
 }
 
@@ -140,7 +140,7 @@ Weakness reason_of(const RangefinderReport& report, std::span<const Shot> shots,
   if (method == Method::spot && passes_the_centre(offset)) {
     return {"beam through the optical centre",
             "the beam passes the optical centre by " + text_of(1e3 * offset.value_m, 2) +
-                " mm: where along it the origin lies cannot be told",
+                " mm: where along it the origin lies is unobservable",
             "mount the rangefinder a few centimetres beside the camera"};
   }
   if (method == Method::plane && bound.normal_spread < min_normal_spread) return reason_of_boards(report);
@@ -206,7 +206,7 @@ void add_geometry(const RangefinderReport& report, std::span<const Shot> shots, 
 /// Measurements beyond what the beam takes: with none to spare a wrong shot bends the beam and leaves no residual.
 void add_spare(const RangefinderReport& report, Verdict& verdict) {
   constexpr int enough = 3;
-  int spare = report.beam.cov(5, 5) > 0.0 ? -6 : -5;
+  int spare = report.beam.cov(beam_scale_param, beam_scale_param) > 0.0 ? -6 : -5;
   for (const ShotFit& fit : report.shots) {
     if (!fit.used) continue;
     spare += (std::isfinite(fit.residual_range_m) ? 1 : 0) + (fit.residual_px.allFinite() ? 2 : 0);
@@ -247,9 +247,9 @@ void add_fit(const RangefinderReport& report, Verdict& verdict) {
   const int told = report.shots_used + outliers;
   // Where two in five do not agree with the rest, the rest may be as wrong.
   const State state = outliers == 0 ? State::good : 5 * outliers > 2 * told ? State::refused : State::care;
-  verdict.checks.push_back(check_of("outliers", state, outliers == 0 ? "all shots agree" : "left out: shot " + named,
+  verdict.checks.push_back(check_of("outliers", state, outliers == 0 ? "all shots agree" : "rejected: shot " + named,
                                     outliers, 0.4 * told, "", "residuals"));
-  if (report.dof < 1 || (report.spot_sigma_is_told && report.range_sigma_is_told)) return;
+  if (report.dof < 1 || (report.spot_sigma_is_estimated && report.range_sigma_is_estimated)) return;
   const double ratio = std::sqrt(report.cost / report.dof);
   const double most = 1.0 + 3.0 / std::sqrt(2.0 * report.dof) + 0.2;
   verdict.checks.push_back(check_of("fit", ratio < most ? State::good : State::care,
@@ -268,8 +268,9 @@ void add_clusters(const RangefinderReport& report, Verdict& verdict) {
 
 Verdict refusal_by_status(const RangefinderReport& report, Method method, const Supply& supply) {
   if (report.status == Status::scale_unknown) {
-    return refusal(State::refused, ExitCode::cannot_tell, "spots alone cannot tell the scale of the ranges",
-                   "take shots on a board and use --method joint, or leave out --scale");
+    return refusal(State::refused, ExitCode::cannot_tell,
+                   "the scale of the ranges cannot be determined from spots alone",
+                   "take shots on a board and use --method joint, or estimate no --scale");
   }
   if (report.status == Status::too_few) {
     const char* needed = method == Method::spot    ? "three with a spot"

@@ -55,7 +55,7 @@ RangefinderConfig config_for(RangefinderMethod method) {
   RangefinderConfig config;
   config.method = method;
   config.sigma_spot_px = 0.3;
-  config.range_noise = RangeNoise{0.002};
+  config.sigma_range_m = 0.002;
   return config;
 }
 

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "alidade/board/board_pose.h"
+#include "alidade/rangefinder/rangefinder.h"
 
 namespace alidade {
 namespace {
@@ -24,7 +25,7 @@ RangefinderConfig config_of_part(const RangefinderConfig& config, const Rangefin
   RangefinderConfig part = config;
   part.reject_outliers = false;
   part.sigma_spot_px = report.sigma_spot_px > 0.0 ? std::optional(report.sigma_spot_px) : config.sigma_spot_px;
-  part.range_noise = report.beam.noise;
+  part.set_range_noise(report.beam.noise);
   return part;
 }
 
@@ -77,7 +78,8 @@ std::vector<CountedSigma> sigma_by_count(std::span<const Shot> shots, const Rang
                        .sigma_origin_m = fit.bound.sigma_origin_m,
                        .sigma_direction_rad = fit.bound.sigma_direction_rad,
                        .bound_origin_m = std::sqrt(fit.bound.cov.topLeftCorner<3, 3>().trace()),
-                       .bound_direction_rad = std::sqrt(fit.bound.cov.block<2, 2>(3, 3).trace())});
+                       .bound_direction_rad =
+                           std::sqrt(fit.bound.cov.block<2, 2>(beam_direction_param, beam_direction_param).trace())});
   }
   return counted;
 }

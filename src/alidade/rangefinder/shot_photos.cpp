@@ -15,10 +15,10 @@ namespace {
 
 /// Corners of the board, found again where the lens and the pose are known by the first ones.
 void find_corners(const cv::Mat& photo, const Camera& camera, const ShotPhotosConfig& config, Shot& shot,
-                  ShotPhoto& seen, std::optional<SeenBoard>& board_in_photo) {
+                  std::optional<SeenBoard>& board_in_photo) {
   BoardDetection found = find_board(photo, *config.board);
   if (!found.found()) {
-    seen.no_board = found.reason;
+    shot.no_board = found.reason;
     return;
   }
   const std::vector<Eigen::Vector3d> points = points_in_board(*config.board);
@@ -34,7 +34,7 @@ void find_corners(const cv::Mat& photo, const Camera& camera, const ShotPhotosCo
     }
   }
   if (!fit) {
-    seen.no_board = "no pose fits the board's corners with this camera";
+    shot.no_board = "no pose fits the board's corners with this camera";
     return;
   }
   board_in_photo = SeenBoard{*config.board, camera, fit->pose.cam_from_board};
@@ -65,19 +65,22 @@ std::string size_fault(const cv::Mat& photo, const Camera& camera) {
          std::to_string(camera.width_px) + "x" + std::to_string(camera.height_px);
 }
 
-ShotPhoto look_at(std::size_t i, Shot& shot, const ShotPhotoLoader& load_photo, const Camera& camera,
-                  const ShotPhotosConfig& config) {
+cv::Mat loaded(const PhotoByName& load_photo, const std::string& name) {
+  return name.empty() ? cv::Mat() : load_photo(name);
+}
+
+ShotPhoto look_at(Shot& shot, const PhotoByName& load_photo, const Camera& camera, const ShotPhotosConfig& config) {
   ShotPhoto seen;
-  const cv::Mat photo = load_photo(i, false);
+  const cv::Mat photo = loaded(load_photo, shot.photo);
   if (photo.empty()) return seen;
   seen.has_photo = true;
-  const cv::Mat photo_off = load_photo(i, true);
+  const cv::Mat photo_off = loaded(load_photo, shot.photo_off);
   seen.fault = size_fault(photo, camera);
   if (seen.fault.empty() && !photo_off.empty() && photo_off.size() != photo.size())
     seen.fault = "has another size than its photo without the laser";
   if (!seen.fault.empty()) return seen;
   std::optional<SeenBoard> board;
-  if (config.board) find_corners(photo_off.empty() ? photo : photo_off, camera, config, shot, seen, board);
+  if (config.board) find_corners(photo_off.empty() ? photo : photo_off, camera, config, shot, board);
   if (config.find_spots && !shot.spot) find_spot(photo, photo_off, board, {}, config, shot, seen);
   return seen;
 }
@@ -102,8 +105,8 @@ std::string at_pixel_of(const Eigen::Vector2d& px) {
   return "(" + std::to_string(std::lround(px.x())) + ", " + std::to_string(std::lround(px.y())) + ")";
 }
 
-void look_again(std::size_t i, Shot& shot, ShotPhoto& seen, const ShotPhotoLoader& load_photo, const Camera& camera,
-                const Foretold& where, const ShotPhotosConfig& config) {
+void look_again(Shot& shot, ShotPhoto& seen, const PhotoByName& load_photo, const Camera& camera, const Foretold& where,
+                const ShotPhotosConfig& config) {
   if (shot.spot) {
     if ((shot.spot->px - where.px).norm() <= where.reach_px) return;
     seen.false_spot = "the light at " + at_pixel_of(shot.spot->px) + " is not the spot: by the boards that is within " +
@@ -111,7 +114,7 @@ void look_again(std::size_t i, Shot& shot, ShotPhoto& seen, const ShotPhotoLoade
     shot.spot.reset();
     seen.spot.reset();
   }
-  const cv::Mat photo = load_photo(i, false), photo_off = load_photo(i, true);
+  const cv::Mat photo = loaded(load_photo, shot.photo), photo_off = loaded(load_photo, shot.photo_off);
   std::optional<SeenBoard> board;
   const std::vector<Eigen::Vector3d> points = points_in_board(*config.board);
   if (const auto fit = fit_board_pose(camera, *shot.board, points))
@@ -141,7 +144,7 @@ void drop_rare_spots(std::span<Shot> shots, std::span<ShotPhoto> seen, std::size
 
 }  // namespace
 
-void look_again_for_spots(std::span<Shot> shots, std::span<ShotPhoto> seen, const ShotPhotoLoader& load_photo,
+void look_again_for_spots(std::span<Shot> shots, std::span<ShotPhoto> seen, const PhotoByName& load_photo,
                           const Camera& camera, const Beam& by_boards, const ShotPhotosConfig& config,
                           const Progress& progress) {
   std::vector<std::optional<Foretold>> where(shots.size());
@@ -155,13 +158,13 @@ void look_again_for_spots(std::span<Shot> shots, std::span<ShotPhoto> seen, cons
   }
   std::atomic<std::size_t> done{0};
   tbb::parallel_for(std::size_t{0}, shots.size(), [&](std::size_t i) {
-    if (where[i]) look_again(i, shots[i], seen[i], load_photo, camera, *where[i], config);
+    if (where[i]) look_again(shots[i], seen[i], load_photo, camera, *where[i], config);
     report_progress(progress, "looking again at spots", ++done, shots.size());
   });
   drop_rare_spots(shots, seen, num_looked);
 }
 
-std::vector<ShotPhoto> look_at_photos(std::span<Shot> shots, const ShotPhotoLoader& load_photo, const Camera& camera,
+std::vector<ShotPhoto> look_at_photos(std::span<Shot> shots, const PhotoByName& load_photo, const Camera& camera,
                                       const ShotPhotosConfig& config, const Progress& progress) {
   std::vector<ShotPhoto> seen(shots.size());
   std::atomic<std::size_t> done{0};
@@ -171,11 +174,11 @@ std::vector<ShotPhoto> look_at_photos(std::span<Shot> shots, const ShotPhotoLoad
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
           try {
-            seen[i] = look_at(i, shots[i], load_photo, camera, config);
+            seen[i] = look_at(shots[i], load_photo, camera, config);
           } catch (const Interrupted&) {
             throw;
           } catch (const std::exception& error) {
-            seen[i] = {.has_photo = true, .fault = error.what(), .no_board = {}, .no_spot = {}};
+            seen[i] = {.has_photo = true, .fault = error.what(), .no_spot = {}};
           }
           report_progress(progress, "looking at photos", ++done, shots.size());
         }

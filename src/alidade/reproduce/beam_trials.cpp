@@ -24,7 +24,7 @@ RangefinderConfig told_config(RangefinderMethod method) {
   config.method = method;
   config.sigma_spot_px = 0.3;
   config.sigma_corner_px = 0.2;
-  config.range_noise = RangeNoise{0.002};
+  config.sigma_range_m = 0.002;
   return config;
 }
 

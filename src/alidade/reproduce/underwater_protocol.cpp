@@ -20,7 +20,7 @@ UnderwaterSample underwater_sample(const UnderwaterScene& scene, std::uint64_t s
     sample.frames.push_back(std::move(seen));
     sample.truth.push_back({frame.t_s, frame.world_from_cam});
   }
-  StartHypothesis start;
+  LocalizeStart start;
   start.motion.world_from_cam = sequence.told_start;
   start.cov.diagonal().head<3>().setConstant(scene.sigma_position_m * scene.sigma_position_m);
   start.cov.diagonal().segment<3>(3).setConstant(scene.sigma_rotation_rad * scene.sigma_rotation_rad);
@@ -29,9 +29,9 @@ UnderwaterSample underwater_sample(const UnderwaterScene& scene, std::uint64_t s
   for (const UnderwaterPoint& point : sequence.points) {
     sample.points[point.id] = point.point_in_world;
     if (point.is_known)
-      sample.config.target.push_back({point.id, point.told_in_world, scene.sigma_known_m});
+      sample.config.target.points.push_back({point.id, point.told_in_world, scene.sigma_known_m});
     else if (point.told_depth_m > 0.0)
-      sample.config.depths.push_back({point.id, point.told_depth_m, scene.sigma_depth});
+      sample.config.start->depths.push_back({point.id, point.told_depth_m, scene.sigma_depth});
   }
   return sample;
 }
@@ -59,7 +59,7 @@ double first_depth_m(const UnderwaterSample& sample, long id) {
 
 UnderwaterSample filmed_sample(const UnderwaterScene& scene, const UnderwaterVideoConfig& video, std::uint64_t seed) {
   UnderwaterSample sample = underwater_sample(scene, seed);
-  for (ToldDepth& told : sample.config.depths) told.depth_m /= first_depth_m(sample, told.id);
+  for (GivenDepth& told : sample.config.start->depths) told.depth_m /= first_depth_m(sample, told.id);
   const auto film = [&](std::size_t k) {
     return render_underwater_frame(scene.camera, sample.truth[k].world_from_cam, video, 1000 * seed + k);
   };
@@ -67,7 +67,7 @@ UnderwaterSample filmed_sample(const UnderwaterScene& scene, const UnderwaterVid
   for (std::size_t k = 0; k < sample.frames.size(); ++k)
     sample.frames[k].observations = observations_of_board(found.photos[k]);
   // As wrong as before, of the depth at which the images show a point first.
-  for (ToldDepth& told : sample.config.depths) told.depth_m *= first_depth_m(sample, told.id);
+  for (GivenDepth& told : sample.config.start->depths) told.depth_m *= first_depth_m(sample, told.id);
   return sample;
 }
 
@@ -138,7 +138,7 @@ ProtocolRun run_protocol(const UnderwaterSample& sample, const Camera& camera, c
     run.p5_percent.push_back(error_of(sample, now, 5).percent);
     add_last_frame(sample, now, run);
   };
-  const LocalizeReport report = localize_observations(camera, sample.frames, config);
+  const Localization report = localize(sample.frames, camera, config);
   for (auto* percent : {&run.p1_percent, &run.p5_percent})  // frames before the start
     percent->insert(percent->begin(), sample.frames.size() - percent->size(), 100.0);
   for (const PathStep& step : report.path)

@@ -3,8 +3,9 @@
 #include <map>
 #include <vector>
 
+#include "alidade/localize.h"
 #include "alidade/localize/distortion.h"
-#include "alidade/localize/localize.h"
+#include "alidade/localize/filter.h"
 #include "alidade/simulate/underwater.h"
 #include "alidade/simulate/underwater_video.h"
 

@@ -40,7 +40,7 @@ double sigma_mm(const std::vector<Shot>& shots, const RangefinderSceneConfig& sc
   RangefinderConfig config;
   config.method = method;
   config.sigma_spot_px = 0.3;
-  config.range_noise = RangeNoise{0.001};
+  config.sigma_range_m = 0.001;
   const RangefinderReport report = calibrate_rangefinder(shots, {}, scene.camera, config);
   return 1e3 * std::sqrt(report.bound.cov.topLeftCorner<3, 3>().trace());
 }

@@ -144,7 +144,7 @@ FigureTable figure_9(const BeamErrorTable& table) {
 RangefinderConfig config_of_way(std::size_t way) {
   RangefinderConfig config = told_config(ways[way].method);
   config.refine = ways[way].refine;
-  config.range_noise = RangeNoise{sigma_range_m};
+  config.sigma_range_m = sigma_range_m;
   config.sigma_corner_px = corner_px;
   return config;
 }

@@ -176,7 +176,7 @@ TEST_F(ReadCalibration, GivesBackWhatWasFound) {
   const Calibration calibration = solved();
   write(calibration);
   for (const auto& place : {path(), path() / "result.json"}) {
-    const CalibrationResult read = read_calibration(place);
+    const CalibratedNow read = read_calibration(place);
     EXPECT_EQ(params(read.camera.lens), params(calibration.camera.lens));
     EXPECT_LT((read.camera.cov - calibration.camera.cov).norm(), 1e-12 * read.camera.cov.norm());
     EXPECT_EQ(read.board, sample_board);

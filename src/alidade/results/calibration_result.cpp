@@ -27,11 +27,11 @@ Board board_of(const nlohmann::json& json) {
 
 }  // namespace
 
-CalibrationResult read_calibration(const std::filesystem::path& result) {
+CalibratedNow read_calibration(const std::filesystem::path& result) {
   const bool is_folder = std::filesystem::is_directory(result);
   const std::filesystem::path file = is_folder ? result / "result.json" : result;
   const std::filesystem::path folder = file.parent_path();
-  CalibrationResult found;
+  CalibratedNow found;
   try {
     const auto json = nlohmann::json::parse(read_file(file));
     if (json.at("command") != "calibrate") {

@@ -2,22 +2,15 @@
 
 #include <filesystem>
 
-#include "alidade/board/board.h"
-#include "alidade/camera/camera.h"
+#include "alidade/calibrate/photo_plan.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
-/// What later commands need of an earlier `alidade calibrate`.
-struct CalibrationResult {
-  Camera camera;
-  Board board;
-  std::vector<Eigen::Vector3d> board_points;  ///< [m] as solved.
-  double noise_px = 0.0;                      ///< Of a corner.
-  double design_effect = 1.0;                 ///< Variance over that of corners that err independently.
-};
+/// Reads what later commands need of the folder of a calibration (or the result.json in it). Throws InputError: not a
+/// calibration, a refused one, files missing.
+[[nodiscard]] CalibratedNow read_calibration(const std::filesystem::path& result);
 
-/// Reads the folder of a calibration (or the result.json in it). Throws InputError: not a calibration, a refused one,
-/// files missing.
-[[nodiscard]] CalibrationResult read_calibration(const std::filesystem::path& result);
-
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "alidade/formats/camera_json.h"
+#include "alidade/observe/solve.h"
 #include "alidade/report/thin.h"
 #include "alidade/results/thin_tables.h"
 
@@ -27,7 +28,7 @@ std::vector<bool> kept_rows(const ObserveReport& report) {
 /// Values over time, the event, and where the camera looked.
 class StepColumns {
  public:
-  void add(double t_s, const IntrinsicsEstimate& step, const RotationFrame& frame, const TrueIntrinsics* truth);
+  void add(const ObserveStep& row);
   [[nodiscard]] DataTable table() const;
 
  private:
@@ -37,17 +38,17 @@ class StepColumns {
   std::vector<std::string> events_;
 };
 
-void StepColumns::add(double t_s, const IntrinsicsEstimate& step, const RotationFrame& frame,
-                      const TrueIntrinsics* truth) {
-  t_.push_back(t_s);
+void StepColumns::add(const ObserveStep& row) {
+  const IntrinsicsEstimate& step = row.estimate;
+  t_.push_back(row.t_s);
   for (std::size_t i = 0; i < 4; ++i) {
     const auto at = static_cast<Eigen::Index>(i);
     value_[i].push_back(step.has_value ? step.values()[at] : not_seen);
     sigma_[i].push_back(step.has_value ? step.sigma[at] : not_seen);
-    if (truth != nullptr) truth_[i].push_back((*truth)[i]);
-    attitude_[i].push_back(frame.cam_from_start.conjugate().coeffs()[at]);
+    if (row.truth) truth_[i].push_back((*row.truth)[i]);
+    attitude_[i].push_back(row.start_from_cam.coeffs()[at]);
   }
-  for (std::size_t i = 0; i < 3; ++i) rate_[i].push_back(frame.rate_rad_per_s[static_cast<Eigen::Index>(i)]);
+  for (std::size_t i = 0; i < 3; ++i) rate_[i].push_back(row.rate_rad_per_s[static_cast<Eigen::Index>(i)]);
   nis_.push_back(step.nis_dof > 0 ? step.nis : not_seen);
   nis_dof_.push_back(step.nis_dof);
   weak_.push_back(step.has_value ? 1.0 / step.sigma.cwiseAbs2().maxCoeff() : not_seen);
@@ -76,13 +77,17 @@ DataTable StepColumns::table() const {
   return table;
 }
 
-DataTable steps_table(const RotationLog& log, const ObserveReport& report) {
+DataTable steps_table(const ObserveReport& report) {
+  const RotationLog& log = report.log;
   MotionReader reader(log.source, 0.25);
   const std::vector<bool> is_kept = kept_rows(report);
   StepColumns columns;
   for (std::size_t k = 0; k < log.rows.size(); ++k) {
     const RotationFrame frame = reader.next(log.rows[k]);
-    if (is_kept[k]) columns.add(log.rows[k].t_s, report.steps[k], frame, log.truth.empty() ? nullptr : &log.truth[k]);
+    if (!is_kept[k]) continue;
+    ObserveStep step = step_of(frame, report.steps[k]);
+    if (!log.truth.empty()) step.truth = log.truth[k];
+    columns.add(step);
   }
   DataTable table = columns.table();
   record_steps_kept(table, log.rows.size(), "intrinsics.csv");
@@ -96,30 +101,19 @@ std::size_t stride(std::size_t count, std::size_t num_points) {
   return std::max<std::size_t>(1, every);
 }
 
-/// Residuals of the reference adjustment, prediction minus pixel. `step` is a row of the log.
-DataTable points_table(const RotationLog& log, const ObserveReport& report) {
+/// Residuals, prediction minus pixel. `step` is a row of the log.
+DataTable points_table(const ObserveReport& report) {
   std::vector<int> step, point;
   Numbers u, v, du, dv;
-  const Adjustment& reference = report.reference;
-  const double s = report.scale.scale;
-  std::vector<int> log_point(reference.bundle.points.size(), -1);
-  for (std::size_t i = 0; i < reference.bundle_point_of.size(); ++i) {
-    if (reference.bundle_point_of[i] >= 0) {
-      log_point[static_cast<std::size_t>(reference.bundle_point_of[i])] = static_cast<int>(i);
-    }
-  }
-  const std::size_t every = stride(reference.solution.residuals.size(), std::max<std::size_t>(1, log.num_points));
-  for (std::size_t i = 0; i < reference.solution.residuals.size(); i += every) {
-    const BundleObservation& seen = reference.bundle.observations[i];
-    const double t_s = reference.bundle.frames[static_cast<std::size_t>(seen.frame)].t_s;
-    const auto row = std::lower_bound(log.rows.begin(), log.rows.end(), t_s - 1e-9,
-                                      [](const RotationRow& r, double t) { return r.t_s < t; });
-    step.push_back(static_cast<int>(row - log.rows.begin()));
-    point.push_back(log_point[static_cast<std::size_t>(seen.point)]);
-    u.push_back(seen.px.x() * s + report.scale.centre.x());
-    v.push_back(seen.px.y() * s + report.scale.centre.y());
-    du.push_back(s * reference.solution.residuals[i].x());
-    dv.push_back(s * reference.solution.residuals[i].y());
+  const std::size_t every = stride(report.residuals.size(), std::max<std::size_t>(1, report.log.num_points));
+  for (std::size_t i = 0; i < report.residuals.size(); i += every) {
+    const ObserveResidual& seen = report.residuals[i];
+    step.push_back(seen.row);
+    point.push_back(seen.point);
+    u.push_back(seen.px.x());
+    v.push_back(seen.px.y());
+    du.push_back(seen.residual_px.x());
+    dv.push_back(seen.residual_px.y());
   }
   return {"points",
           {{"step", step},
@@ -136,7 +130,8 @@ bool is_of_camera(const std::string& name) {
 }
 
 /// The bound is of the longest time without a zoom alone: σ, which holds the other rows as well, may be smaller.
-void fill_reference(const RotationLog& log, const ObserveReport& report, JsonValue& bound) {
+void fill_reference(const ObserveReport& report, JsonValue& bound) {
+  const RotationLog& log = report.log;
   const double from_s = log.rows.front().t_s, until_s = log.rows.back().t_s;
   const double first_s = std::max(from_s, report.reference_from_s),
                last_s = std::min(until_s, report.reference_until_s);
@@ -146,9 +141,9 @@ void fill_reference(const RotationLog& log, const ObserveReport& report, JsonVal
   bound["until_s"] = last_s;
 }
 
-void fill_values(const ObserveReport& report, const Camera& camera, ResultDocument& document) {
+void fill_values(const ObserveReport& report, ResultDocument& document) {
   JsonValue& estimate = document.estimate;
-  estimate["camera"] = camera_values(camera);
+  estimate["camera"] = camera_values(report.camera);
   for (const ObservedQuantity& quantity : report.quantities) {
     if (is_of_camera(quantity.name)) {
       document.stddev["camera"][quantity.name] = quantity.sigma;
@@ -171,19 +166,18 @@ void fill_values(const ObserveReport& report, const Camera& camera, ResultDocume
 /// What tells the stated σ from the model's, and what was tested.
 void fill_errors(const ObserveReport& report, ResultDocument& document) {
   document.assumed = report.assumed;
-  const StatedCovariance& stated = report.stated;
   JsonValue& shared = document.estimate["shared_errors"];
-  shared["design_effect"] = stated.blocks.design_effect;
-  shared["correlation_s"] = stated.correlation_s;
-  shared["block_s"] = stated.block_s;
-  shared["track_effect"] = stated.track_effect;
+  shared["design_effect"] = report.shared_errors.design_effect;
+  shared["correlation_s"] = report.shared_errors.correlation_s;
+  shared["block_s"] = report.shared_errors.block_s;
+  shared["track_effect"] = report.shared_errors.track_effect;
   JsonValue causes = JsonValue::list();
-  for (const CauseScore& cause : report.causes) {
+  for (const TestedCause& cause : report.tested_causes) {
     JsonValue each = JsonValue::object();
     each["name"] = cause.name;
     each["z"] = cause.z;
     JsonValue members = JsonValue::list();
-    for (const CauseMember& member : cause.members) {
+    for (const TestedCause::Value& member : cause.values) {
       JsonValue value = JsonValue::object();
       value["name"] = member.name;
       value["value"] = member.value;
@@ -197,25 +191,7 @@ void fill_errors(const ObserveReport& report, ResultDocument& document) {
   document.estimate["causes"] = std::move(causes);
 }
 
-}  // namespace
-
-DataTable observe_row(double t_s, const IntrinsicsEstimate& estimate, const RotationFrame& frame,
-                      const TrueIntrinsics* truth) {
-  StepColumns columns;
-  columns.add(t_s, estimate, frame, truth);
-  return columns.table();
-}
-
-void fill_observation(const RotationLog& log, const ObserveReport& report, const Camera& camera,
-                      ResultDocument& document) {
-  document.counts.given += log.rows.size();
-  document.counts.used = report.rows_used;
-  document.counts.dropped = log.rows.size() - report.rows_used;
-  if (report.status == ObserveReport::Status::ok) {
-    fill_values(report, camera, document);
-    fill_errors(report, document);
-    if (!log.rows.empty()) fill_reference(log, report, document.estimate["bound"]);
-  }
+JsonValue events_list(const ObserveReport& report) {
   JsonValue events = JsonValue::list();
   for (const ObserveNote& note : report.events) {
     JsonValue event = JsonValue::object();
@@ -224,19 +200,102 @@ void fill_observation(const RotationLog& log, const ObserveReport& report, const
     if (note.point >= 0) event["point"] = note.point + 1;
     events.push_back(std::move(event));
   }
-  document.estimate["events"] = std::move(events);
+  return events;
+}
+
+JsonValue photos_list(const ObserveReport& report) {
+  JsonValue list = JsonValue::list();
+  for (std::size_t i = 0; i < report.photos.size(); ++i) {
+    const RotatedPhoto& photo = report.photos[i];
+    JsonValue row = JsonValue::object();
+    row["file"] = report.photo_names[i];
+    row["used"] = photo.is_used;
+    row["reason"] = photo.reason;
+    row["points"] = photo.num_points;
+    if (photo.is_used) {
+      row["rms_px"] = photo.rms_px;
+      row["turn_rad"] = photo.turn_rad;
+      row["zoom"] = photo.zoom;
+      row["sigma_zoom"] = photo.sigma_zoom;
+    }
+    list.push_back(std::move(row));
+  }
+  return list;
+}
+
+DataTable photos_table(const ObserveReport& report) {
+  std::vector<std::string> reasons;
+  std::vector<bool> used;
+  std::vector<int> points;
+  std::vector<double> rms, z2;
+  for (const RotatedPhoto& photo : report.photos) {
+    used.push_back(photo.is_used);
+    reasons.push_back(photo.reason);
+    points.push_back(photo.num_points);
+    rms.push_back(photo.is_used ? photo.rms_px : not_seen);
+    z2.push_back(photo.is_used && photo.z2 > 0.0 ? photo.z2 : not_seen);
+  }
+  return {"photos",
+          {{"name", report.photo_names},
+           {"used", used},
+           {"reason", reasons},
+           {"points", points},
+           {"rms_px", rms},
+           {"cluster_z2", z2}}};
+}
+
+/// What only photos have; and they have no clock: what a log has by the second says nothing.
+void fill_photos(const ObserveReport& report, ResultDocument& document) {
+  for (DataTable& table : document.data) {
+    if (table.name != "steps") continue;
+    std::erase_if(table.columns, [](const auto& column) {
+      return column.first.starts_with("omega_") || column.first == "weak_eigenvalue";
+    });
+  }
+  document.data.insert(document.data.begin(), photos_table(report));
+  document.estimate["photos"] = photos_list(report);
+  JsonValue& matches = document.estimate["matches"];
+  matches["given"] = report.matches.given;
+  matches["agree_within_pairs"] = report.matches.agreeing;
+  matches["kept"] = report.matches.kept;
+  if (report.status != ObserveReport::Status::ok) return;
+  JsonValue& parallax = document.estimate["parallax"];
+  parallax["z"] = report.parallax.z;
+  parallax["rms_px"] = report.parallax.rms_px;
+  parallax["share_of_distance"] = report.parallax.relative;  // a radian of rotation
+}
+
+}  // namespace
+
+DataTable observe_row(const ObserveStep& step) {
+  StepColumns columns;
+  columns.add(step);
+  return columns.table();
+}
+
+void fill_observation(const ObserveReport& report, ResultDocument& document) {
+  const RotationLog& log = report.log;
+  document.counts = report.counts;
+  if (report.status == ObserveReport::Status::ok) {
+    fill_values(report, document);
+    fill_errors(report, document);
+    if (!log.rows.empty()) fill_reference(report, document.estimate["bound"]);
+  }
+  document.estimate["events"] = events_list(report);
   document.estimate["sigma_px"] = report.sigma_px;
-  document.estimate["sigma_px_from"] = report.sigma_is_told ? "residuals" : "given";
+  document.estimate["sigma_px_from"] = report.sigma_is_estimated ? "residuals" : "given";
   if (!log.truth.empty() && report.status == ObserveReport::Status::ok) {
     const std::vector<std::string> names{"fx", "fy", "cx", "cy"};
     for (std::size_t i = 0; i < 4; ++i) {
       document.estimate["error"][names[i]] = report.quantities[i].value - log.truth.back()[i];
     }
   }
-  if (report.steps.size() == log.rows.size() && !log.rows.empty()) document.data.push_back(steps_table(log, report));
-  if (!report.reference.has_value) return;
-  document.data.push_back(points_table(log, report));
-  record_steps_kept(document.data.back(), report.reference.solution.residuals.size(), "");
+  if (report.steps.size() == log.rows.size() && !log.rows.empty()) document.data.push_back(steps_table(report));
+  if (!report.residuals.empty()) {
+    document.data.push_back(points_table(report));
+    record_steps_kept(document.data.back(), report.residuals.size(), "");
+  }
+  if (!report.photos.empty()) fill_photos(report, document);
 }
 
 }  // namespace alidade

@@ -23,5 +23,12 @@ struct JobOutcome {
   std::vector<NamedBytes> images;  ///< The most wanted first.
 };
 
+/// Rows of the job's file that were wrong and not read: counted as given, and named.
+inline void add_skipped(const std::vector<SkippedInput>& skipped, JobOutcome& outcome) {
+  Counts& counts = outcome.document.counts;
+  counts.given += skipped.size();
+  counts.skipped.insert(counts.skipped.end(), skipped.begin(), skipped.end());
+}
+
 ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -113,6 +113,8 @@ void save(JobOutcome outcome, const std::filesystem::path& folder) {
   ResultDocument& document = outcome.document;
   settle(document);
   if (document.created_utc.empty()) document.created_utc = utc_now();
+  Verdict& verdict = document.verdict;
+  if (verdict.state == State::bad && verdict.exit_code == ExitCode::ok) verdict.exit_code = ExitCode::not_trusted;
   for (const NamedBytes& file : outcome.files) document.files.push_back(file.name);
   std::vector<NamedBytes> tables;  // of which the document has a part
   const std::string text = result_text_of_size(document, [&](std::string name, std::string csv) {

@@ -38,7 +38,7 @@ void SeenFrames::offer(double t_s, const cv::Mat& image, std::span<const Observa
   frames_.push_back({t_s, std::move(name), image.cols, image.rows, {tried.begin(), tried.end()}});
 }
 
-void SeenFrames::fill(ResultDocument& document) const {
+void SeenFrames::add_to(JobOutcome& outcome) const {
   if (frames_.empty()) return;
   std::vector<double> t_s;
   std::vector<std::string> names;
@@ -67,19 +67,22 @@ void SeenFrames::fill(ResultDocument& document) const {
       used.push_back(observation.is_used);
     }
   }
-  document.data.push_back(
-      {"frames", {{"t_s", t_s}, {"name", names}, {"width_px", width_px}, {"height_px", height_px}}});
-  document.data.push_back({"sights",
-                           {{"frame", frame},
-                            {"id", id},
-                            {"expected_u_px", rounded(c[0], 2)},
-                            {"expected_v_px", rounded(c[1], 2)},
-                            {"cov_uu_px2", c[2]},
-                            {"cov_uv_px2", c[3]},
-                            {"cov_vv_px2", c[4]},
-                            {"u_px", rounded(c[5], 2)},
-                            {"v_px", rounded(c[6], 2)},
-                            {"used", used}}});
+  DataTable seen{"sights",
+                 {{"frame", frame},
+                  {"id", id},
+                  {"expected_u_px", rounded(c[0], 2)},
+                  {"expected_v_px", rounded(c[1], 2)},
+                  {"cov_uu_px2", c[2]},
+                  {"cov_uv_px2", c[3]},
+                  {"cov_vv_px2", c[4]},
+                  {"u_px", rounded(c[5], 2)},
+                  {"v_px", rounded(c[6], 2)},
+                  {"used", used}}};
+  std::vector<DataTable>& data = outcome.document.data;
+  data.insert(data.begin(), std::move(seen));
+  data.insert(data.begin(),
+              {"frames", {{"t_s", t_s}, {"name", names}, {"width_px", width_px}, {"height_px", height_px}}});
+  for (const auto& [image, jpeg] : images_) outcome.images.push_back({image, jpeg});
 }
 
 }  // namespace alidade

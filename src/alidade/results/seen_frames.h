@@ -1,12 +1,16 @@
 #pragma once
 
 #include <map>
+#include <span>
 #include <string>
+#include <vector>
 
-#include "alidade/localize/localize_images.h"
-#include "alidade/results/result_document.h"
+#include "alidade/localize/sequence.h"
+#include "alidade/public.h"
+#include "alidade/results/outcome.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Some images of a run, evenly spread over it, with what was looked for in them: for its page.
 class SeenFrames {
@@ -14,12 +18,13 @@ class SeenFrames {
   /// `num_images` of the run; 0: not known. Without a page no image is kept, only what was looked for.
   SeenFrames(std::size_t num_images, bool keeps_images);
 
+  /// For LocalizeConfig::watch_image.
   void offer(double t_s, const cv::Mat& image, std::span<const ObservationTried> tried);
-  /// Adds the tables `frames` (t_s, name of the image, its size) and `observations` (where a point was expected, the
-  /// covariance of the innovation, where it was found); neither where no image came.
-  void fill(ResultDocument& document) const;
-  /// JPEG by name.
-  [[nodiscard]] const std::map<std::string, std::string>& images() const { return images_; }
+  /// Puts the tables `frames` (t_s, name of the image, its size) and `sights` (where a point was expected, the
+  /// covariance of the innovation, where it was found) before the others, and adds the images; nothing where no image
+  /// came.
+  void add_to(JobOutcome& outcome) const;
+  [[nodiscard]] std::size_t num_images() const { return images_.size(); }
 
  private:
   struct Frame {
@@ -34,4 +39,5 @@ class SeenFrames {
   std::map<std::string, std::string> images_;
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

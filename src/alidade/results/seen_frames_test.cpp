@@ -9,10 +9,10 @@ namespace alidade {
 namespace {
 
 nlohmann::json document_of(const SeenFrames& frames) {
-  ResultDocument document;
-  document.command = "localize";
-  frames.fill(document);
-  return nlohmann::json::parse(result_text(document))["data"];
+  JobOutcome outcome;
+  outcome.document.command = "localize";
+  frames.add_to(outcome);
+  return nlohmann::json::parse(result_text(outcome.document))["data"];
 }
 
 SeenFrames shown(std::size_t said, std::size_t num) {
@@ -35,9 +35,13 @@ TEST(SeenFrames, KeepsSomeEvenlyHoweverManyThereAre) {
     for (std::size_t i = 2; i < t_s.size(); ++i) EXPECT_NEAR(t_s[i] - t_s[i - 1], t_s[1] - t_s[0], 1e-9) << said;
     EXPECT_EQ(t_s.front(), 0.0);
     EXPECT_GT(t_s.back(), 85.0);
-    EXPECT_EQ(frames.images().size(), t_s.size());
-    for (const auto& name : data["frames"]["name"])
-      EXPECT_EQ(frames.images().at(name.get<std::string>()).substr(0, 2), "\xff\xd8");
+    JobOutcome outcome;
+    frames.add_to(outcome);
+    ASSERT_EQ(outcome.images.size(), t_s.size());
+    for (std::size_t i = 0; i < t_s.size(); ++i) {
+      EXPECT_EQ(outcome.images[i].name, data["frames"]["name"][i].get<std::string>());
+      EXPECT_EQ(outcome.images[i].bytes.substr(0, 2), "\xff\xd8");
+    }
   }
 }
 
@@ -55,7 +59,7 @@ TEST(SeenFrames, SaysWhatWasExpectedAndFound) {
 TEST(SeenFrames, WithoutAPageTheTablesAreTheSame) {
   SeenFrames frames(1, false);
   frames.offer(0.0, cv::Mat(48, 64, CV_8U, cv::Scalar(128)), {});
-  EXPECT_TRUE(frames.images().empty());
+  EXPECT_EQ(frames.num_images(), 0u);
   EXPECT_EQ(document_of(frames)["frames"]["width_px"], nlohmann::json({64}));
 }
 

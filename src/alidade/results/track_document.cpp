@@ -6,6 +6,7 @@
 
 #include "alidade/report/thin.h"
 #include "alidade/results/thin_tables.h"
+#include "alidade/track/track.h"
 
 namespace alidade {
 namespace {
@@ -35,7 +36,7 @@ void add_by_axis(DataTable& table, const std::string& before, const std::string&
 
 DataTable steps_table(const TrackReport& report, const TrueTrack& truth, std::span<const std::size_t> rows) {
   Numbers t, nees;
-  ByAxis position, velocity, sigma, sigma_velocity, true_position;
+  ByAxis target_in_world, velocity, sigma_in_world, sigma_velocity, true_position;
   std::array<Numbers, 6> cov;  // of the position, upper triangle
   std::vector<std::string> events;
   for (const std::size_t row : rows) {
@@ -46,9 +47,9 @@ DataTable steps_table(const TrackReport& report, const TrueTrack& truth, std::sp
     events.emplace_back(event_name(step.event));
     for (int i = 0; i < 3; ++i) {
       const auto k = static_cast<std::size_t>(i);
-      position[k].push_back(step.has_belief ? step.belief.x[i] : missing_value);
+      target_in_world[k].push_back(step.has_belief ? step.belief.x[i] : missing_value);
       velocity[k].push_back(step.has_belief ? step.belief.x[3 + i] : missing_value);
-      sigma[k].push_back(step.has_belief ? std::sqrt(step.belief.P(i, i)) : missing_value);
+      sigma_in_world[k].push_back(step.has_belief ? std::sqrt(step.belief.P(i, i)) : missing_value);
       sigma_velocity[k].push_back(step.has_belief ? std::sqrt(step.belief.P(3 + i, 3 + i)) : missing_value);
       true_position[k].push_back(there ? (*there)[i] : missing_value);
     }
@@ -58,9 +59,9 @@ DataTable steps_table(const TrackReport& report, const TrueTrack& truth, std::sp
     }
   }
   DataTable table{"steps", {{"t_s", t}}};
-  add_by_axis(table, "target_in_base_", "_m", std::move(position));
+  add_by_axis(table, "target_in_world_", "_m", std::move(target_in_world));
   add_by_axis(table, "velocity_", "_m_s", std::move(velocity));
-  add_by_axis(table, "sigma_target_in_base_", "_m", std::move(sigma));
+  add_by_axis(table, "sigma_target_in_world_", "_m", std::move(sigma_in_world));
   add_by_axis(table, "sigma_velocity_", "_m_s", std::move(sigma_velocity));
   for (std::size_t k = 0; k < cov.size(); ++k)
     table.columns.emplace_back(std::string("cov_") + cov_names[k] + "_m2", std::move(cov[k]));
@@ -85,7 +86,7 @@ DataTable measurements_table(std::span<const TargetObservation> observations, st
                                               "nis",
                                               "head"};
   std::array<Numbers, names.size()> column;
-  ByAxis ray_origin, ray_direction;
+  ByAxis origin_in_world, direction_in_world;
   std::vector<bool> accepted;
   for (const std::size_t row : rows) {
     const TargetObservation& observation = observations[row];
@@ -108,79 +109,20 @@ DataTable measurements_table(std::span<const TargetObservation> observations, st
     accepted.push_back(step.accepted);
     const auto ray = ray_in_world(heads[observation.head], observation);
     for (int i = 0; i < 3; ++i) {
-      ray_origin[static_cast<std::size_t>(i)].push_back(ray ? ray->origin_in_world[i] : missing_value);
-      ray_direction[static_cast<std::size_t>(i)].push_back(ray ? ray->direction_in_world[i] : missing_value);
+      origin_in_world[static_cast<std::size_t>(i)].push_back(ray ? ray->origin_in_world[i] : missing_value);
+      direction_in_world[static_cast<std::size_t>(i)].push_back(ray ? ray->direction_in_world[i] : missing_value);
     }
   }
   DataTable table{"measurements", {}};
   for (std::size_t k = 0; k < names.size(); ++k)
     table.columns.emplace_back(names[k], rounded(std::move(column[k]), k < 4 ? 6 : 4));
   table.columns.emplace_back("accepted", accepted);
-  add_by_axis(table, "ray_origin_in_base_", "_m", std::move(ray_origin));
-  add_by_axis(table, "ray_direction_", "", std::move(ray_direction));
-  return table;
-}
-
-/// Of each head: how many, their mean, mean along the motion, slope over the image and colour, in σ of each.
-DataTable innovations_table(std::span<const RigHead> heads, const TrackReport& report) {
-  Numbers head, num, mean_u, mean_v, along, place_u, place_v, colour, nis;
-  for (std::size_t h = 0; h < report.innovations.size(); ++h) {
-    const HeadInnovations& of = report.innovations[h];
-    head.push_back(heads[h].head.id);
-    num.push_back(static_cast<double>(of.num));
-    mean_u.push_back(of.mean.x());
-    mean_v.push_back(of.mean.y());
-    along.push_back(of.along);
-    place_u.push_back(of.place.x());
-    place_v.push_back(of.place.y());
-    colour.push_back(of.colour);
-    nis.push_back(of.nis_per_dof);
-  }
-  DataTable table{"innovations", {{"head", head}, {"num", num}}};
-  table.columns.emplace_back("mean_u_sigma", rounded(std::move(mean_u), 4));
-  table.columns.emplace_back("mean_v_sigma", rounded(std::move(mean_v), 4));
-  table.columns.emplace_back("along_motion_sigma", rounded(std::move(along), 4));
-  table.columns.emplace_back("slope_u_sigma", rounded(std::move(place_u), 4));
-  table.columns.emplace_back("slope_v_sigma", rounded(std::move(place_v), 4));
-  table.columns.emplace_back("colour", rounded(std::move(colour), 4));
-  table.columns.emplace_back("nis_per_dof", rounded(std::move(nis), 4));
+  add_by_axis(table, "ray_origin_in_world_", "_m", std::move(origin_in_world));
+  add_by_axis(table, "ray_direction_", "", std::move(direction_in_world));
   return table;
 }
 
 }  // namespace
-
-void fill_track(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                const TrackReport& report, const TrueTrack& truth, ResultDocument& document) {
-  document.counts.given += observations.size();
-  document.counts.used = report.num_used;
-  document.counts.dropped = observations.size() - report.num_used;
-  JsonValue& estimate = document.estimate;
-  estimate["rms_m"] = report.rms_m;
-  estimate["mean_error_m"] = report.mean_error_m;
-  if (!report.smoothed.empty()) estimate["smoothed_rms_m"] = report.smoothed_rms_m;
-  estimate["nees_per_dof"] = report.nees_per_dof;
-  estimate["nis_per_dof"] = report.nis_per_dof;
-  estimate["pcrlb_m"] = report.pcrlb_m;
-  estimate["sigma_a_m_s2"] = report.sigma_a_m_s2;
-  estimate["sigma_a_is_estimated"] = report.sigma_a_is_found;
-  estimate["restarts"] = report.num_restarts;
-  estimate["rig_errors_counted"] = report.errors_are_counted;
-  estimate["sigma_raised_by"] = std::sqrt(report.inflation);
-  if (!report.steps.empty() && report.steps.back().has_belief) {
-    const Belief<6>& last = report.steps.back().belief;
-    estimate["position_m"] = Numbers(last.x.data(), last.x.data() + 3);
-    estimate["velocity_m_s"] = Numbers(last.x.data() + 3, last.x.data() + 6);
-    const Eigen::Vector<double, 6> sigma = last.P.diagonal().cwiseSqrt();
-    document.stddev["position_m"] = Numbers(sigma.data(), sigma.data() + 3);
-    document.stddev["velocity_m_s"] = Numbers(sigma.data() + 3, sigma.data() + 6);
-    document.covariance_names = {"x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s"};
-    for (int i = 0; i < 6; ++i) {
-      for (int j = i; j < 6; ++j) document.covariance_upper.push_back(last.P(i, j));
-    }
-  }
-  add_track_tables(observations, heads, report, truth, document);
-  if (!report.innovations.empty()) document.data.push_back(innovations_table(heads, report));
-}
 
 void add_track_tables(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                       const TrackReport& report, const TrueTrack& truth, ResultDocument& document) {
@@ -201,47 +143,6 @@ DataTable track_row(const TargetObservation& observation, std::span<const RigHea
   DataTable observations = measurements_table({&observation, 1}, heads, report, row);
   for (auto& column : observations.columns) table.columns.push_back(std::move(column));
   return table;
-}
-
-void fill_target_frames(std::span<const TargetFrame> frames, std::span<const RigHead> heads, ResultDocument& document) {
-  std::vector<std::size_t> num_frames(heads.size()), num_seen(heads.size());
-  Numbers t, head, number, u, v, sigma, score;
-  std::vector<std::string> reason;
-  std::vector<bool> lost;
-  for (const TargetFrame& frame : frames) {
-    ++num_frames[frame.head];
-    num_seen[frame.head] += frame.seen.found() ? 1U : 0U;
-    lost.push_back(!frame.seen.found());
-  }
-  for (const std::size_t row : report::thinned_rows(frames.size(), {}, lost, report::max_step_rows)) {
-    const TargetFrame& frame = frames[row];
-    const auto if_found = [&](double value) { return frame.seen.found() ? value : missing_value; };
-    t.push_back(frame.t_s);
-    head.push_back(heads[frame.head].head.id);
-    number.push_back(static_cast<double>(frame.number));
-    u.push_back(if_found(frame.seen.px.x()));
-    v.push_back(if_found(frame.seen.px.y()));
-    sigma.push_back(if_found(std::sqrt(0.5 * frame.seen.cov.trace())));
-    score.push_back(if_found(frame.seen.score));
-    reason.push_back(frame.seen.reason);
-  }
-  JsonValue videos = JsonValue::list();
-  for (std::size_t i = 0; i < heads.size(); ++i) {
-    JsonValue video = JsonValue::object();
-    video["head"] = heads[i].head.id;
-    video["frames"] = num_frames[i];
-    video["seen"] = num_seen[i];
-    videos.push_back(std::move(video));
-  }
-  document.estimate["video"] = std::move(videos);
-  DataTable table{"frames", {{"t_s", t}, {"head", head}, {"frame", number}}};
-  table.columns.emplace_back("u_px", rounded(std::move(u), 4));
-  table.columns.emplace_back("v_px", rounded(std::move(v), 4));
-  table.columns.emplace_back("sigma_px", rounded(std::move(sigma), 4));
-  table.columns.emplace_back("score", rounded(std::move(score), 4));
-  table.columns.emplace_back("reason", reason);
-  record_steps_kept(table, frames.size(), "");
-  document.data.push_back(std::move(table));
 }
 
 }  // namespace alidade

@@ -69,7 +69,14 @@ RigReport calibrate_rig(std::span<const HeadView> views, std::span<const Eigen::
   const bool is_alone = report.status == Status::converged || report.status == Status::no_convergence ||
                         report.status == Status::degenerate;
   if (is_alone && is_suspicious(report)) look_for_misreading(views, points_in_board, cameras, config, progress, report);
-  if (!config.estimate_by_need || report.status != Status::converged) return report;
+  return report;
+}
+
+RigReport calibrate_rig_by_need(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
+                                const std::map<int, Camera>& cameras, const RigConfig& config,
+                                const Progress& progress) {
+  RigReport report = calibrate_rig(views, points_in_board, cameras, config, progress);
+  if (report.status != Status::converged) return report;
   return freed_by_need(std::move(report), views, points_in_board, cameras, config, progress);
 }
 

@@ -110,10 +110,10 @@ std::optional<SolvedRig> solve_with_noise(Work& work, const RigState& start, std
   constexpr double usual_rad = 0.05 * degree, min_rad = 1e-3 * degree;
   constexpr double enough =
       8.0;  // of as many corrections a σ is told to a quarter; of fewer it is easily far too small
-  work.report.sigma_encoder_is_told = !work.config.sigma_encoder_rad;
+  work.report.sigma_encoder_is_estimated = !work.config.sigma_encoder_rad;
   work.problem.sigma_encoder_rad = work.config.sigma_encoder_rad.value_or(usual_rad);
   auto solved = solve_robustly(work, start, weights);
-  for (int round = 0; round < 8 && solved && solved->converged && work.report.sigma_encoder_is_told; ++round) {
+  for (int round = 0; round < 8 && solved && solved->converged && work.report.sigma_encoder_is_estimated; ++round) {
     const auto cov = rig_covariance(work.problem, *solved).cov;
     if (!cov) break;
     const double num = 2.0 * static_cast<double>(std::ranges::count(weights, 1.0));
@@ -122,7 +122,7 @@ std::optional<SolvedRig> solve_with_noise(Work& work, const RigState& start, std
     const double before = work.problem.sigma_encoder_rad;
     double sigma_rad = std::max(min_rad, std::sqrt(sum_of_corrections2(work, *solved, weights) / told));
     if (!(told >= enough)) {
-      work.report.sigma_encoder_is_told = false;
+      work.report.sigma_encoder_is_estimated = false;
       sigma_rad = told > 1.0 ? std::max(sigma_rad, usual_rad) : usual_rad;
     }
     work.problem.sigma_encoder_rad = sigma_rad;

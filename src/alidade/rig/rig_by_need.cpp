@@ -24,15 +24,15 @@ std::vector<int> params_of(const std::string& name) {
   if (name == "camera.fx") return {focal_param};
   if (name == "camera.cx") return {centre_x_param};
   if (name == "camera.cy") return {centre_y_param};
-  if (name.ends_with("_scale")) return {17 + axis};
-  if (name.ends_with("once a turn")) return {20 + 2 * axis, 21 + 2 * axis};
+  if (name.ends_with("_scale")) return {pan_scale_param + axis};
+  if (name.ends_with("once a turn")) return {pan_cos_param + 2 * axis, pan_sin_param + 2 * axis};
   if (name.ends_with("backlash")) return {pan_backlash_param + axis};
-  return {17 + axis, 20 + 2 * axis, 21 + 2 * axis};
+  return {pan_scale_param + axis, pan_cos_param + 2 * axis, pan_sin_param + 2 * axis};
 }
 
 std::vector<int> params_of_all(const std::string& name) {
-  if (name == "scales") return {17, 18};
-  if (name == "once a turn") return {20, 21, 22, 23};
+  if (name == "scales") return {pan_scale_param, tilt_scale_param};
+  if (name == "once a turn") return {pan_cos_param, pan_sin_param, tilt_cos_param, tilt_sin_param};
   if (name == "backlash") return {pan_backlash_param, tilt_backlash_param};
   if (name == "camera.fx") return {focal_param};
   return {centre_x_param, centre_y_param};
@@ -81,7 +81,7 @@ class ByNeed {
     // Two solves are compared by the same σ of a corner.
     if (!config_.sigma_px) config_.sigma_px = report.sigma_px;
     best_ = std::move(report);
-    sigma_px_is_told_ = best_.sigma_px_is_told;
+    sigma_px_is_estimated_ = best_.sigma_px_is_estimated;
   }
 
   /// Scales that nobody told are estimated where holding them matters.
@@ -92,7 +92,7 @@ class ByNeed {
     });
     if (!matters) return;
     FreedParams scales;
-    for (const RigHead& rig_head : best_.rig.heads) scales[rig_head.head.id] = {17, 18};
+    for (const RigHead& rig_head : best_.rig.heads) scales[rig_head.head.id] = {pan_scale_param, tilt_scale_param};
     if (auto trial = solve(scales)) {
       freed_ = std::move(scales);
       best_ = std::move(*trial);
@@ -106,7 +106,7 @@ class ByNeed {
   }
 
   RigReport result() && {
-    best_.sigma_px_is_told = sigma_px_is_told_;
+    best_.sigma_px_is_estimated = sigma_px_is_estimated_;
     describe();
     best_.alike = alike_;
     return std::move(best_);
@@ -187,10 +187,10 @@ class ByNeed {
     if (param < num_head_params) {
       const Eigen::Index at = num_head_params * static_cast<Eigen::Index>(h) + param;
       freed.sigma = std::sqrt(best_.rig.cov(at, at));
-      const bool is_scale = param == 17 || param == 18;
-      freed.value = is_scale ? (param == 17 ? encoder.pan_scale : encoder.tilt_scale)
+      const bool is_scale = param == pan_scale_param || param == tilt_scale_param;
+      freed.value = is_scale ? (param == pan_scale_param ? encoder.pan_scale : encoder.tilt_scale)
                              : std::array{encoder.pan_cos_rad, encoder.pan_sin_rad, encoder.tilt_cos_rad,
-                                          encoder.tilt_sin_rad}[static_cast<std::size_t>(param - 20)];
+                                          encoder.tilt_sin_rad}[static_cast<std::size_t>(param - pan_cos_param)];
       freed.was = is_scale ? std::copysign(1.0, freed.value) : 0.0;  // which way it counts is found, not asked for
     } else if (param >= pan_backlash_param) {
       const int axis = param - pan_backlash_param;
@@ -212,7 +212,7 @@ class ByNeed {
   const Progress& progress_;
   FreedParams freed_;
   RigReport best_;
-  bool sigma_px_is_told_ = false;
+  bool sigma_px_is_estimated_ = false;
   std::string alike_;
 };
 

@@ -44,8 +44,8 @@ std::vector<Tested> single_tests(const RigProblem& problem, const RigState& stat
     for (const int axis : {0, 1}) {
       const std::string name = axis == 0 ? "pan" : "tilt";
       const Index at = column_of_axis(axis);
-      add(name + "_scale", "", 17 + axis, {at});
-      add(name + " once a turn", "rad", 20 + 2 * axis, {at + 1, at + 2});
+      add(name + "_scale", "", pan_scale_param + axis, {at});
+      add(name + " once a turn", "rad", pan_cos_param + 2 * axis, {at + 1, at + 2});
       add(name + " twice a turn", "rad", -1, {at + 3, at + 4});
       add(name + " backlash", "rad", pan_backlash_param + axis, {at + 5});
     }

@@ -149,7 +149,7 @@ double length_named(const Rig& rig, const Rig& from, const std::string& name) {
 TEST(RigGiven, MovesAreThoseOfASecondSolve) {
   const RigScene scene = draw_rig_scene({}, 2);
   const std::vector<HeadView> views = simulate_head_views(scene, {}, 2).views;
-  const RigConfig config{.sigma_px = 0.2, .sigma_encoder_rad = 0.02 * degree, .square_m = 0.025};
+  const RigConfig config{.sigma_px = 0.2, .sigma_encoder_rad = 0.02 * degree, .board = scene.board};
   const std::vector<Eigen::Vector3d> points = points_in_board(scene.board);
   const std::map<int, Camera> cameras = testing::cameras_of(scene.rig);
   const RigReport report = calibrate_rig(views, points, cameras, config);

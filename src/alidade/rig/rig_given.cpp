@@ -9,7 +9,6 @@ namespace alidade {
 namespace {
 
 using Eigen::Index;
-constexpr int pan_scale = 17, tilt_scale = 18;
 constexpr double ordinary_scale = 0.005, ordinary_square = 0.002, ordinary_f = 0.003, ordinary_centre_px = 2.0;
 
 /// What is given, and how the free parameters follow it.
@@ -163,10 +162,10 @@ struct Filler {
   }
 
   void add_square(const RigConfig& config, const Follows& follows) {
-    const double square_m = config.square_m > 0.0 ? config.square_m : 1.0;
+    const double square_m = config.board ? config.board->square_m : 1.0;
     const Eigen::VectorXd step = in_wide(problem, given.wide, follows.square) / square_m;
     add({.name = "square_m",
-         .value = config.square_m > 0.0 ? config.square_m : std::nan(""),
+         .value = config.board ? square_m : std::nan(""),
          .sigma = config.sigma_square_m,
          .ordinary = ordinary_square * square_m,
          .remedy = "give --sigma-square"},
@@ -177,7 +176,7 @@ struct Filler {
   void add_scales(const std::vector<RigHead>& heads, const RigConfig& config, const Follows& follows) {
     for (std::size_t h = 0; h < heads.size(); ++h) {
       for (const int axis : {0, 1}) {
-        const int param = axis == 0 ? pan_scale : tilt_scale;
+        const int param = axis == 0 ? pan_scale_param : tilt_scale_param;
         if (std::ranges::find(problem.free[h], param) != problem.free[h].end()) continue;
         Eigen::VectorXd step = in_wide(problem, given.wide, follows.scales[h].col(axis));
         const auto own = std::ranges::find(given.wide.free[h], param) - given.wide.free[h].begin();
@@ -224,8 +223,8 @@ GivenColumns given_columns(const RigProblem& problem, const RigState& state, std
     columns.square.segment<2>(row) = J * (cam_from_board_rotation * point_in_board);
     columns.readings.middleRows<2>(row) = J * turned.J_point_readings(points_in_cam[i]);
     const auto by_head = turned.J_point_head(points_in_cam[i]);
-    columns.pan.segment<2>(row) = J * by_head.col(pan_scale);
-    columns.tilt.segment<2>(row) = J * by_head.col(tilt_scale);
+    columns.pan.segment<2>(row) = J * by_head.col(pan_scale_param);
+    columns.tilt.segment<2>(row) = J * by_head.col(tilt_scale_param);
   }
   return columns;
 }
@@ -241,7 +240,7 @@ RigGiven rig_given(const RigProblem& problem, const SolvedRig& solved, const Eig
                    const std::vector<double>& weights, const RigConfig& config) {
   RigGiven given{problem, {}, {}, {}, {}, {}};
   for (std::vector<int>& free : given.wide.free)
-    for (const int param : {pan_scale, tilt_scale})
+    for (const int param : {pan_scale_param, tilt_scale_param})
       if (std::ranges::find(free, param) == free.end()) free.insert(std::ranges::lower_bound(free, param), param);
   given.cov.setZero(given.wide.num_free(), given.wide.num_free());
   Index num_lenses = 0;

@@ -118,7 +118,7 @@ void index_views(Work& work, const std::map<int, Camera>& cameras) {
 void fit_poses(Work& work) {
   work.poses = fitted_poses(work, work.heads);
   const double told_px = sigma_of_poses(work.poses);
-  work.report.sigma_px_is_told = !work.config.sigma_px && told_px > 0.0;
+  work.report.sigma_px_is_estimated = !work.config.sigma_px && told_px > 0.0;
   work.report.sigma_px = work.config.sigma_px ? *work.config.sigma_px : told_px > 0.0 ? std::max(told_px, 1e-3) : 0.5;
   work.problem.sigma_px = work.report.sigma_px;
   constexpr double max_sigmas = 6.0;  // of one view's own residuals: blurred is not wrong, a wrong corner is
@@ -170,12 +170,17 @@ bool start_mountings(Work& work) {
 void choose_free(Work& work) {
   for (std::size_t h = 0; h < work.heads.size(); ++h) {
     std::vector<int> free;
-    if (h > 0) free = {0, 1, 2, 3, 4, 5};
-    free.insert(free.end(), {8, 9, 10, 11, 12, 13, 14});
+    const auto add = [&free](int first, int count) {
+      for (int i = 0; i < count; ++i) free.push_back(first + i);
+    };
+    if (h > 0) add(base_param, 6);
+    add(pan_to_tilt_param + 2, 1);  // its z: what x and y do the base and tilt_to_cam do, too
+    add(tilt_to_cam_param, 3);
+    add(cam_rotation_param, 3);
     const RigConfig& config = work.config;
-    if (config.estimate_scales) free.insert(free.end(), {17, 18});
-    if (config.estimate_skew) free.push_back(19);
-    if (config.estimate_once) free.insert(free.end(), {20, 21, 22, 23});
+    if (config.estimate_scales) add(pan_scale_param, 2);
+    if (config.estimate_skew) add(axes_skew_param, 1);
+    if (config.estimate_once) add(pan_cos_param, 4);
     if (config.estimate_focal) free.push_back(focal_param);
     if (config.estimate_centre) free.insert(free.end(), {centre_x_param, centre_y_param});
     if (config.estimate_backlash) free.insert(free.end(), {pan_backlash_param, tilt_backlash_param});

@@ -268,9 +268,9 @@ TEST(Rig, WhatCannotBeToldIsRefusedByName) {
     }
   };
   const std::vector<double> pans{-0.5, -0.25, 0.0, 0.25, 0.5}, tilts{-0.2, 0.0, 0.2, 0.4};
-  simulated(pans, {0.1}, true, "pan only: its tilt axis cannot be told");
-  simulated({0.0}, tilts, true, "tilt only: its pan axis cannot be told");
-  simulated({0.0, 0.001}, {0.1, 0.101}, true, "does not turn");
+  simulated(pans, {0.1}, true, "pan only: its tilt axis cannot be determined");
+  simulated({0.0}, tilts, true, "tilt only: its pan axis cannot be determined");
+  simulated({0.0, 0.001}, {0.1, 0.101}, true, "does not rotate");
   simulated(pans, tilts, false, "shares no board with another head");
 }
 

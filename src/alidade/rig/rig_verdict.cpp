@@ -33,11 +33,13 @@ std::optional<Verdict> refusal_by_angles(const RigReport& report) {
     const std::string head = "head " + std::to_string(cover.id);
     if (cover.num_views < 3 || (pans && tilts)) continue;
     if (!pans && !tilts)
-      return cannot_tell(head + " does not turn: its axes cannot be told",
+      return cannot_tell(head + " does not rotate: its axes cannot be determined",
                          "look at each board at several pans and tilts, ±20° or more of each");
     if (pans)
-      return cannot_tell(head + ": pan only: its tilt axis cannot be told", "tilt the head as well, by ±15° or more");
-    return cannot_tell(head + ": tilt only: its pan axis cannot be told", "pan the head as well, by ±20° or more");
+      return cannot_tell(head + ": pan only: its tilt axis cannot be determined",
+                         "tilt the head as well, by ±15° or more");
+    return cannot_tell(head + ": tilt only: its pan axis cannot be determined",
+                       "pan the head as well, by ±20° or more");
   }
   return std::nullopt;
 }
@@ -57,10 +59,10 @@ Verdict refusal_by_link(const RigReport& report) {
   for (const HeadCover& cover : report.covers) {
     if (cover.num_shared_boards > 0) continue;
     return cannot_tell("head " + std::to_string(cover.id) +
-                           " shares no board with another head: where they stand to each other cannot be told",
-                       "let both heads see a board in the same place");
+                           " shares no board with another head: where they stand to each other cannot be determined",
+                       "let both heads see a board in the same position");
   }
-  return cannot_tell("not all heads share boards with each other", "let all heads see a board in the same place");
+  return cannot_tell("not all heads share boards with each other", "let all heads see a board in the same position");
 }
 
 Verdict refusal_by_status(const RigReport& report) {
@@ -68,7 +70,7 @@ Verdict refusal_by_status(const RigReport& report) {
   switch (report.status) {
     case RigStatus::degrees:
       return rig_refusal(State::refused, ExitCode::cannot_tell,
-                         "the angles are degrees: the boards turn as if each radian were a degree",
+                         "the angles are degrees: the boards rotate as if each radian were a degree",
                          "give pan_rad and tilt_rad in radians");
     case RigStatus::swapped:
       return rig_refusal(State::refused, ExitCode::cannot_tell,
@@ -90,7 +92,7 @@ Verdict refusal_by_status(const RigReport& report) {
   }
   if (const auto angles = refusal_by_angles(report)) return *angles;
   if (report.status == RigStatus::degenerate)
-    return cannot_tell("these cannot be told apart: " + joined(report.unknown),
+    return cannot_tell("these cannot be separated: " + joined(report.unknown),
                        "look at each board from more pans and tilts");
   return rig_refusal(State::not_converged, ExitCode::no_convergence, "no rig explains these views",
                      "check that each view has its own angles (radians), head and board, and the camera files");
@@ -101,7 +103,7 @@ Check check_of(std::string name, State state, std::string text, double value, do
 }
 
 void add_precision(const RigReport& report, Verdict& verdict) {
-  const std::string what = report.rig.heads.size() > 1 ? "between the cameras" : "of the camera as it turns";
+  const std::string what = report.rig.heads.size() > 1 ? "between the cameras" : "of the camera as it rotates";
   const double angle = report.sigma_relative_rad, length = report.sigma_relative_m;
   const auto state = [](double value, double good, double refuse) {
     return !(value < refuse) ? State::refused : value > good ? State::care : State::good;
@@ -140,9 +142,9 @@ void add_boards(const RigReport& report, Verdict& verdict) {
   int least = report.covers.front().num_shared_boards;
   for (const HeadCover& cover : report.covers) least = std::min(least, cover.num_shared_boards);
   verdict.checks.push_back(check_of("shared boards", least >= 3 ? State::good : State::care,
-                                    std::to_string(least) + (least == 1 ? " place" : " places") +
+                                    std::to_string(least) + (least == 1 ? " position" : " positions") +
                                         " of the board seen by more than one head" +
-                                        (least >= 3 ? "" : "; put it in three places or more"),
+                                        (least >= 3 ? "" : "; put it in three positions or more"),
                                     least, 3.0, ""));
 }
 
@@ -156,7 +158,7 @@ void add_fit(const RigReport& report, Verdict& verdict) {
   }
   const auto given = static_cast<double>(report.views.size());
   const State state = outliers == 0 ? State::good : outliers > 0.4 * given ? State::refused : State::care;
-  verdict.checks.push_back(check_of("outliers", state, outliers == 0 ? "all views agree" : "left out: view " + named,
+  verdict.checks.push_back(check_of("outliers", state, outliers == 0 ? "all views agree" : "rejected: view " + named,
                                     outliers, 0.4 * given, ""));
   if (report.dof < 1) return;
   const double ratio = report.chi2_per_dof(), most = 1.3 + 3.0 * std::sqrt(2.0 / report.dof);
@@ -170,9 +172,9 @@ void add_encoder(const RigReport& report, const RigConfig& config, Verdict& verd
   const double sigma = report.sigma_encoder_rad;
   verdict.checks.push_back(check_of("encoder", sigma < good_rad ? State::good : State::care,
                                     "σ of a reading is " + text_of(sigma / degree, 2) + "°" +
-                                        (report.sigma_encoder_is_told ? " (told by the residuals)"
-                                         : config.sigma_encoder_rad   ? " (as given)"
-                                                                      : " (assumed: too few views to tell)"),
+                                        (report.sigma_encoder_is_estimated ? " (estimated from the residuals)"
+                                         : config.sigma_encoder_rad        ? " (as given)"
+                                                                    : " (assumed: too few views to estimate it)"),
                                     sigma / degree, good_rad / degree, "°"));
 }
 
@@ -212,7 +214,7 @@ void add_freed(const RigReport& report, Verdict& verdict) {
   if (worst != nullptr)
     text = worst->name + " is " + text_of(worst->value, 5) + ", not " + text_of(worst->was, 5) + " (" +
            text_of(most, 2) + "σ): " +
-           (worst->name.find("camera") != std::string::npos ? "calibrate that lens anew"
+           (worst->name.find("camera") != std::string::npos ? "calibrate that lens again"
                                                             : "check the encoder, and the rig at other angles") +
            "; " + text;
   verdict.checks.push_back(

@@ -5,8 +5,10 @@
 #include <optional>
 
 #include "alidade/estimation/belief.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 inline constexpr std::size_t num_agilities = 5;
 
@@ -67,7 +69,7 @@ class BearingFilter {
       : config_(config), axes_{BearingAxis(config), BearingAxis(config)} {}
 
   /// A bearing at its capture time, both axes with this σ, and what the lens' errors do to each. Observations older
-  /// than the last one are left out.
+  /// than the last one are rejected.
   ObservationUse take(double t_capture_s, const Eigen::Vector2d& bearing_rad, double sigma_rad,
                       const std::array<LensEffect, 2>& effects = {LensEffect::Zero(), LensEffect::Zero()});
   [[nodiscard]] bool has_started() const { return has_started_; }
@@ -86,4 +88,5 @@ class BearingFilter {
   double newest_s_ = 0.0, usual_gap_s_ = 0.0;
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

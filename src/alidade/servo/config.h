@@ -5,16 +5,22 @@
 #include <string_view>
 
 #include "alidade/pantilt/servo_plant.h"
+#include "alidade/public.h"
 #include "alidade/servo/bearing_filter.h"
 #include "alidade/servo/loop_analysis.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 enum class ControllerKind { pi, feedforward, lqr, mpc };
 inline constexpr std::array controller_kinds{ControllerKind::pi, ControllerKind::feedforward, ControllerKind::lqr,
                                              ControllerKind::mpc};
 [[nodiscard]] std::string_view controller_name(ControllerKind kind);  ///< pi, feedforward, lqr, mpc
 [[nodiscard]] std::optional<ControllerKind> controller_named(std::string_view name);
+
+/// What a controller is about at one step.
+enum class ServoEvent { none, waiting, started, gated, jumped, lost, searching, found };
+[[nodiscard]] std::string_view servo_event_name(ServoEvent event);
 
 /// What to do where the target is not seen: first go on as it went, then look round where it should be.
 struct SearchConfig {
@@ -23,7 +29,7 @@ struct SearchConfig {
   double carry_s = 0.2;         ///< The lost target's rate is believed to decay in this time.
   double speed_rad_s = 1.0;     ///< Of the view along the spiral.
   double turn_of_view = 0.7;    ///< From one turn of the spiral to the next, in heights of the image.
-  double max_radius_rad = 0.8;  ///< Then from the middle again.
+  double max_radius_rad = 0.8;  ///< Then from the centre again.
 };
 
 /// A controller of one head, both axes alike.
@@ -41,4 +47,5 @@ struct ServoConfig {
   SearchConfig search;
 };
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <array>
 #include <optional>
-#include <string_view>
 
 #include "alidade/pantilt/head.h"
 #include "alidade/pantilt/lens_course.h"
@@ -28,9 +27,6 @@ struct HeadServoInput {
       observation;  ///< Of the image that arrived since the last step, if the target is in it.
 };
 
-enum class ServoEvent { none, waiting, started, gated, jumped, lost, searching, found };
-[[nodiscard]] std::string_view servo_event_name(ServoEvent event);
-
 struct HeadServoOutput {
   Eigen::Vector2d command = Eigen::Vector2d::Zero();        ///< (pan, tilt), in the plants' units of command.
   Eigen::Vector2d asked_rad = Eigen::Vector2d::Zero();      ///< Where the head should point when the command acts.
@@ -40,14 +36,14 @@ struct HeadServoOutput {
   ServoEvent event = ServoEvent::waiting;
 };
 
-/// Keeps the target in the middle of one head's image: late images and present encoder readings in, commands out,
+/// Keeps the target in the centre of one head's image: late images and present encoder readings in, commands out,
 /// once a period. What it holds is made at the start; a step allocates nothing. docs/maths/servo.md
 class HeadServo {
  public:
   HeadServo(const RigHead& head, const ServoConfig& config);
 
   HeadServoOutput step(const HeadServoInput& input);
-  /// Readings at which the head would have a pixel's ray in the middle of its image: the measured bearing. None where
+  /// Readings at which the head would have a pixel's ray in the centre of its image: the measured bearing. None where
   /// the lens has no ray there.
   [[nodiscard]] std::optional<Eigen::Vector2d> bearing_of(const HeadObservation& observation) const;
 

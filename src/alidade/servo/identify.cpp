@@ -10,11 +10,10 @@
 #include "alidade/servo/identify_causes.h"
 #include "alidade/servo/identify_clusters.h"
 #include "alidade/servo/identify_flaws.h"
+#include "alidade/servo/levenberg.h"
 
 namespace alidade {
 namespace {
-
-enum Param { gain, tau, latency, zero, start };
 
 /// Angle and rate of a plant of gain one half-way through a log, with their derivatives by the parameters.
 struct Walk {
@@ -29,28 +28,26 @@ struct Walk {
     const double decay_by_tau = decay * dt_s / (tau_s * tau_s);
     if (kind == ServoKind::angle) {
       dx *= decay;
-      dx[Param::gain] += rise * command;
-      dx[Param::tau] += decay_by_tau * (x - goal);
+      dx[ServoParam::gain] += rise * command;
+      dx[ServoParam::tau] += decay_by_tau * (x - goal);
       x = goal + decay * (x - goal);
       return;
     }
     const double gap = v - goal, reach_s = tau_s * rise;
     dx += reach_s * dv;
-    dx[Param::gain] += (dt_s - reach_s) * command;
-    dx[Param::tau] += (rise - tau_s * decay_by_tau) * gap;
+    dx[ServoParam::gain] += (dt_s - reach_s) * command;
+    dx[ServoParam::tau] += (rise - tau_s * decay_by_tau) * gap;
     dv *= decay;
-    dv[Param::gain] += rise * command;
-    dv[Param::tau] += decay_by_tau * gap;
+    dv[ServoParam::gain] += rise * command;
+    dv[ServoParam::tau] += decay_by_tau * gap;
     x += goal * dt_s + gap * reach_s;
     v = goal + decay * gap;
   }
   /// A switch a little later: what pulled before goes on a little longer.
   void switch_command(double from, double to) {
-    (kind == ServoKind::angle ? dx : dv)[Param::latency] += gain * (from - to) / tau_s;
+    (kind == ServoKind::angle ? dx : dv)[ServoParam::latency] += gain * (from - to) / tau_s;
   }
 };
-
-constexpr double fastest_tau_s = 1e-5;
 
 /// Gain, zero and start that fit best at a time constant and latency, and what is left.
 struct LinearFit {
@@ -63,7 +60,7 @@ LinearFit linear_fit(std::span<const ServoSample> log, ServoKind kind, double ta
   params << 1.0, tau_s, latency_s, 0.0, 0.0;
   const ServoResponse response = servo_response(log, kind, params);
   Eigen::Matrix<double, Eigen::Dynamic, 3> A(readings.size(), 3);  // the response is linear in these three
-  A << response.J.col(Param::gain), response.J.col(Param::zero), response.J.col(Param::start);
+  A << response.J.col(ServoParam::gain), response.J.col(ServoParam::zero), response.J.col(ServoParam::start);
   const Eigen::Vector3d best = least_squares(A, readings);
   LinearFit fit;
   fit.params << best[0], tau_s, latency_s, best[1], best[2];
@@ -120,36 +117,18 @@ std::optional<Eigen::MatrixXd> inverse_normal(const Eigen::MatrixXd& J) {
 ServoFit refined(std::span<const ServoSample> log, ServoKind kind, ServoParams params) {
   const Eigen::VectorXd readings = readings_of(log);
   const double dof = static_cast<double>(log.size()) - num_servo_params;
-  double damping = 1e-6;
-  ServoResponse response = servo_response(log, kind, params);
-  double sum2 = (response.angle_rad - readings).squaredNorm();
+  // 5 to 15 steps are typical; a kink at a sampled latency takes more
+  const LevenbergOutcome descent = levenberg(
+      {.max_steps = 60, .first_damping = 1e-6, .tolerance = 1e-12}, params,
+      [&](const ServoParams& at) -> Eigen::VectorXd { return servo_response(log, kind, at).angle_rad - readings; },
+      [&](const ServoParams& at) { return servo_response(log, kind, at).J; },
+      [](const ServoParams& from, const auto& step) { return within_meaning(from, ServoParams(from + step)); });
   ServoFit fit;
   fit.kind = kind;
-  constexpr int max_steps = 60;  // 5 to 15 are typical; a kink at a sampled latency takes more
-  for (int i = 0; i < max_steps && !fit.has_converged; ++i) {
-    const auto JtJ = (response.J.transpose() * response.J).eval();
-    auto damped = JtJ;
-    damped.diagonal() *= 1.0 + damping;
-    const ServoParams step = solve_symmetric(damped, response.J.transpose() * (readings - response.angle_rad));
-    ServoParams next = params + step;
-    next[Param::tau] = std::max({next[Param::tau], 0.2 * params[Param::tau], fastest_tau_s});
-    next[Param::latency] = std::max(next[Param::latency], 0.0);
-    const ServoResponse tried = servo_response(log, kind, next);
-    const double tried_sum2 = (tried.angle_rad - readings).squaredNorm();
-    if (!(tried_sum2 <= sum2)) {
-      damping *= 10.0;
-      fit.has_converged = damping > 1e8;
-      continue;
-    }
-    fit.has_converged = sum2 - tried_sum2 <= 1e-12 * sum2;
-    params = next;
-    response = tried;
-    sum2 = tried_sum2;
-    damping = std::max(1e-9, 0.1 * damping);
-  }
+  fit.has_converged = descent.has_converged;
   fit.params = params;
-  fit.rms_rad = std::sqrt(sum2 / dof);
-  const auto inverse = inverse_normal(response.J);
+  fit.rms_rad = std::sqrt(descent.sum2 / dof);
+  const auto inverse = inverse_normal(servo_response(log, kind, params).J);
   fit.is_observable = inverse.has_value();
   if (inverse) fit.cov = fit.cov_model = fit.rms_rad * fit.rms_rad * *inverse;
   return fit;
@@ -200,21 +179,21 @@ bool asks_for_more(std::span<const ServoSample> log, const ServoFit& fit) {
 ServoResponse servo_response(std::span<const ServoSample> log, ServoKind kind, const ServoParams& params) {
   const auto num_rows = static_cast<Eigen::Index>(log.size());
   ServoResponse response{Eigen::VectorXd(num_rows), decltype(response.J)(num_rows, num_servo_params)};
-  Walk walk{kind, params[Param::gain], params[Param::tau]};
+  Walk walk{kind, params[ServoParam::gain], params[ServoParam::tau]};
   if (kind == ServoKind::angle) {
-    walk.x = params[Param::start];
-    walk.dx[Param::start] = 1.0;
+    walk.x = params[ServoParam::start];
+    walk.dx[ServoParam::start] = 1.0;
   } else {
-    walk.v = params[Param::start];
-    walk.dv[Param::start] = 1.0;
+    walk.v = params[ServoParam::start];
+    walk.dv[ServoParam::start] = 1.0;
   }
   double now_s = log.front().t_s, command = log.front().command;
   std::size_t next = 1;  // the first command has been there before
   for (Eigen::Index i = 0; i < num_rows; ++i) {
     const double t_s = log[static_cast<std::size_t>(i)].t_s;
-    for (; next < log.size() && log[next].t_s + params[Param::latency] <= t_s; ++next) {
+    for (; next < log.size() && log[next].t_s + params[ServoParam::latency] <= t_s; ++next) {
       if (log[next].command == command) continue;
-      const double switch_s = log[next].t_s + params[Param::latency];
+      const double switch_s = log[next].t_s + params[ServoParam::latency];
       walk.advance(switch_s - now_s, command);
       walk.switch_command(command, log[next].command);
       now_s = switch_s;
@@ -222,14 +201,30 @@ ServoResponse servo_response(std::span<const ServoSample> log, ServoKind kind, c
     }
     walk.advance(t_s - now_s, command);
     now_s = t_s;
-    response.angle_rad[i] = params[Param::zero] + walk.x;
+    response.angle_rad[i] = params[ServoParam::zero] + walk.x;
     response.J.row(i) = walk.dx;
-    response.J(i, Param::zero) = 1.0;
+    response.J(i, ServoParam::zero) = 1.0;
   }
   return response;
 }
 
-ServoIdentification identify_servo(std::span<const ServoSample> log) {
+namespace {
+
+/// The place of the believed one of two fits, angle and rate.
+std::size_t believed_of(const std::array<ServoFit, 2>& fits, ServoKindRule rule) {
+  // An angle plant with a very long lag looks like a rate plant: a tenth less is more than chance leaves.
+  if (rule == ServoKindRule::automatic) return fits[1].rms_rad < 0.9 * fits[0].rms_rad ? 1 : 0;
+  return rule == ServoKindRule::rate ? 1 : 0;
+}
+
+ServoIdentification::Status status_of(const ServoFit& fit) {
+  if (!fit.is_observable) return ServoIdentification::Status::degenerate;
+  return fit.has_converged ? ServoIdentification::Status::converged : ServoIdentification::Status::not_converged;
+}
+
+}  // namespace
+
+ServoIdentification identify_servo(std::span<const ServoSample> log, ServoKindRule rule) {
   ServoIdentification result;
   const auto [low, high] = std::ranges::minmax_element(log, {}, &ServoSample::command);
   const auto [lowest, highest] = std::ranges::minmax_element(log, {}, &ServoSample::angle_rad);
@@ -241,10 +236,9 @@ ServoIdentification identify_servo(std::span<const ServoSample> log) {
                                refined(log, ServoKind::rate, searched(log, ServoKind::rate))};
   std::array<std::vector<ServoRival>, 2> rivals;
   // Where one kind explains the log as it is, the other is not made to.
-  const bool is_enough = !asks_for_more(log, fits[fits[1].rms_rad < 0.9 * fits[0].rms_rad ? 1 : 0]);
+  const bool is_enough = !asks_for_more(log, fits[believed_of(fits, rule)]);
   for (std::size_t kind = 0; kind < 2 && !is_enough; ++kind) fits[kind] = with_flaws(log, fits[kind], rivals[kind]);
-  // An angle plant with a very long lag looks like a rate plant: a tenth less is more than chance leaves.
-  const std::size_t believed = fits[1].rms_rad < 0.9 * fits[0].rms_rad ? 1 : 0;
+  const std::size_t believed = believed_of(fits, rule);
   result.fit = fits[believed];
   result.other = fits[1 - believed];
   result.rivals = rivals[believed];
@@ -254,6 +248,7 @@ ServoIdentification identify_servo(std::span<const ServoSample> log) {
       (is_plain ? response.angle_rad : flawed_response(log, result.fit, result.fit.flaws)) - readings_of(log);
   result.residual_rad.assign(residuals.data(), residuals.data() + residuals.size());
   set_clusters(is_plain ? Eigen::MatrixXd(response.J) : flawed_jacobian(log, result.fit), result);
+  result.status = status_of(result.fit);
   result.lag_one_correlation = lag_one(result.residual_rad);
   constexpr std::size_t several = 2;
   if (num_sizes(log, several) < several && result.fit.is_observable) result.hidden = hidden_flaws(log, result.fit);

@@ -1,30 +1,16 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <array>
 #include <span>
 #include <vector>
 
-#include "alidade/estimation/cluster_covariance.h"
-#include "alidade/estimation/verdict.h"
+#include "alidade/servo/identification.h"
 
 namespace alidade {
 
-/// One row of a servo's log: a command that is held until the next row, and the angle read at that time.
-struct ServoSample {
-  double t_s = 0.0, command = 0.0, angle_rad = 0.0;
+/// Places of the parameters in ServoParams.
+struct ServoParam {
+  enum Place { gain, tau, latency, zero, start };
 };
-
-/// Parameters of a servo in their order: gain [rad per unit, or rad/s per unit], time constant [s], latency [s], what
-/// the encoder reads at angle zero [rad], start [rad, or rad/s: the angle of an angle plant, the rate of a rate plant,
-/// at the first row].
-inline constexpr int num_servo_params = 5;
-using ServoParams = Eigen::Vector<double, num_servo_params>;
-inline constexpr std::array<const char*, num_servo_params> servo_param_names{"gain", "tau_s", "latency_s", "zero",
-                                                                             "start"};
-
-/// How the angle answers: with a first-order lag itself (angle plant), or in its rate (rate plant).
-enum class ServoKind { angle, rate };
 
 /// Angles that a servo of these parameters reads at the times of a log, and their derivatives. Exact for held commands:
 /// from one instant to the next in closed form, a switch of the command moving with the latency. Before the log the
@@ -35,68 +21,13 @@ struct ServoResponse {
 };
 [[nodiscard]] ServoResponse servo_response(std::span<const ServoSample> log, ServoKind kind, const ServoParams& params);
 
-/// What a servo can do beside a first-order lag, each of some size; 0: nothing of it.
-struct ServoFlaws {
-  double max_rate_rad_s = 0.0, max_acceleration_rad_s2 = 0.0;
-  double dead_band = 0.0;     ///< Commands smaller than it do nothing, larger ones count from it.
-  double backlash_rad = 0.0;  ///< Play between what drives the axis and the angle that is read.
-  double second_tau_s = 0.0;  ///< A first-order lag of the command, before the plant.
-};
-inline constexpr std::size_t num_servo_flaws = 5;
-inline constexpr std::array<double ServoFlaws::*, num_servo_flaws> servo_flaws{
-    &ServoFlaws::max_rate_rad_s, &ServoFlaws::max_acceleration_rad_s2, &ServoFlaws::dead_band,
-    &ServoFlaws::backlash_rad, &ServoFlaws::second_tau_s};
-inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_names{"max_rate_rad_s", "max_acceleration_rad_s2",
-                                                                           "dead_band", "backlash_rad", "second_tau_s"};
-inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_words{
-    "a limit of its rate", "a limit of its acceleration", "a dead band", "backlash", "a second lag"};
-inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_units{"rad/s", "rad/s^2", "units of command",
-                                                                           "rad", "s"};
-
-struct ServoFit {
-  ServoKind kind = ServoKind::angle;
-  ServoParams params = ServoParams::Zero();
-  ServoFlaws flaws;                                     ///< Those that the log asks for, as estimated.
-  std::vector<std::size_t> freed;                       ///< Which: places in servo_flaws, the first asked for first.
-  std::array<double, num_servo_flaws> flaw_sigma = {};  ///< Of those.
-  /// Of the model that is believed: blocks of rows are clusters; of the other as `cov_model`.
-  Eigen::Matrix<double, num_servo_params, num_servo_params> cov = decltype(cov)::Zero();
-  Eigen::Matrix<double, num_servo_params, num_servo_params> cov_model = decltype(cov)::Zero();  ///< Of white noise.
-  double rms_rad = 0.0;  ///< Of the residuals, over the degrees of freedom.
-  bool has_converged = false;
-  bool is_observable = false;  ///< The normal equations can be solved.
-};
-
-/// A flaw that another one of the model explains as well.
-struct ServoRival {
-  std::size_t flaw = 0, other = 0;
-  double evidence = 0.0;  ///< 2 ln of the likelihood ratio, for `flaw`.
-};
-
-/// A flaw of an ordinary size that this log does not show: what the gain would be with it, over what is stated.
-struct HiddenFlaw {
-  std::size_t flaw = 0;
-  double size = 0.0, gain_factor = 1.0;
-};
-
-struct ServoIdentification {
-  ServoFit fit;                      ///< The model that is believed.
-  ServoFit other;                    ///< The one that is not.
-  std::vector<double> residual_rad;  ///< Response − reading.
-  ClusterCovariance clusters;        ///< Blocks of rows; of the fit's parameters, whose covariance it is.
-  std::size_t correlated_rows = 1;   ///< How many rows in a row share an error.
-  std::vector<ServoRival> rivals;    ///< Of the flaws that were freed.
-  std::vector<HiddenFlaw> hidden;
-  double lag_one_correlation = 0.0;  ///< Of the residuals, one row to the next: near 0 where the model is enough.
-  double command_range = 0.0, angle_range_rad = 0.0, duration_s = 0.0;
-};
-
 /// Least squares over both kinds of plant, from a search over time constant and latency (the rest is linear) refined by
 /// Gauss–Newton with analytic derivatives. The rate plant is believed where its residuals are clearly the smaller.
 /// G. H. Golub & V. Pereyra, "The differentiation of pseudo-inverses and nonlinear least squares problems whose
-/// variables separate", 1973. Where the residuals ask for it, flaws are estimated as well: freed one after the other,
-/// each where its evidence is worth its parameter. At least 8 rows, in order of time.
-[[nodiscard]] ServoIdentification identify_servo(std::span<const ServoSample> log);
+/// variables separate", 1973. A kind that is known is believed. Where the residuals ask for it, flaws are estimated as
+/// well: freed one after the other, each where its evidence is worth its parameter. At least 8 rows, in order of time.
+[[nodiscard]] ServoIdentification identify_servo(std::span<const ServoSample> log,
+                                                 ServoKindRule rule = ServoKindRule::automatic);
 
 /// Whether the model stands; what the log lacks where it does not.
 [[nodiscard]] Verdict identify_verdict(std::span<const ServoSample> log, const ServoIdentification& identified);

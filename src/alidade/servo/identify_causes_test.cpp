@@ -8,31 +8,17 @@
 
 #include "alidade/geometry/degree.h"
 #include "alidade/servo/identify_flaws.h"
-#include "alidade/simulate/servo.h"
+#include "alidade/testing/servo_sample.h"
 
 namespace alidade {
 namespace {
 
-std::vector<ServoSample> rows_of(const ServoLogScene& scene, std::uint64_t seed) {
-  std::vector<ServoSample> log;
-  for (const ServoLogRow& row : simulate_servo_log(scene, seed)) log.push_back({row.t_s, row.command, row.angle_rad});
-  return log;
-}
-
-ServoLogScene late_scene(bool is_rate_plant) {
-  ServoLogScene scene;
-  if (is_rate_plant) {
-    RatePlant plant{0.005, AngleUnit::rad, 0.08};
-    plant.max_rate_rad_s = plant.max_acceleration_rad_s2 = 1e9;
-    scene.axis.plant = plant;
-  }
-  scene.axis.command_delay_s = 0.083;
-  return scene;
-}
+using testing::late_scene;
+using testing::log_of;
 
 TEST(ServoCauses, WithoutFlawsIsTheClosedForm) {
   for (const bool is_rate_plant : {false, true}) {
-    const std::vector<ServoSample> log = rows_of(late_scene(is_rate_plant), 1);
+    const std::vector<ServoSample> log = log_of(late_scene(is_rate_plant), 1);
     const ServoFit fit = identify_servo(log).fit;
     const Eigen::VectorXd exact = servo_response(log, fit.kind, fit.params).angle_rad;
     EXPECT_LT((flawed_response(log, fit, {}) - exact).cwiseAbs().maxCoeff(), 1e-9);
@@ -44,7 +30,7 @@ TEST(ServoCauses, FlawedResponseIsTheIntegralOfItsEquations) {
   for (const bool is_rate_plant : {false, true}) {
     ServoLogScene scene = late_scene(is_rate_plant);
     scene.duration_s = 2.5;
-    const std::vector<ServoSample> log = rows_of(scene, 1);
+    const std::vector<ServoSample> log = log_of(scene, 1);
     ServoFit fit;
     fit.kind = is_rate_plant ? ServoKind::rate : ServoKind::angle;
     fit.params << gain_of(scene.axis.plant), 0.1, 0.083, 0.2, 0.0;
@@ -87,7 +73,7 @@ TEST(ServoCauses, CleanLogsAreGood) {
       for (std::uint64_t seed = 1; seed <= 20; ++seed, ++runs) {
         ServoLogScene scene = late_scene(is_rate_plant);
         scene.is_chirp = is_chirp;
-        const std::vector<ServoSample> log = rows_of(scene, seed);
+        const std::vector<ServoSample> log = log_of(scene, seed);
         const Verdict verdict = identify_verdict(log, identify_servo(log));
         good += verdict.state == State::good ? 1 : 0;
       }
@@ -146,7 +132,7 @@ TEST(ServoCauses, FlawsAreEstimated) {
     int num_good = 0;
     double sum2 = 0.0;
     for (std::uint64_t seed = 1; seed <= draws; ++seed) {
-      const std::vector<ServoSample> log = rows_of(flawed_scene(of), seed);
+      const std::vector<ServoSample> log = log_of(flawed_scene(of), seed);
       const ServoIdentification identified = identify_servo(log);
       const ServoFit& fit = identified.fit;
       ASSERT_EQ(fit.kind, of.is_rate_plant ? ServoKind::rate : ServoKind::angle);
@@ -170,7 +156,7 @@ TEST(ServoCauses, WhatOneStepHidesIsNamed) {
     for (const FlawCase& of : {flaw_cases[1], flaw_cases[3], flaw_cases[5]}) {
       ServoLogScene scene = flawed_scene(of);
       scene.steps = {1.0};
-      const std::vector<ServoSample> log = rows_of(scene, seed);
+      const std::vector<ServoSample> log = log_of(scene, seed);
       const ServoIdentification identified = identify_servo(log);
       const Verdict verdict = identify_verdict(log, identified);
       EXPECT_EQ(verdict.state, State::care);
@@ -188,16 +174,16 @@ TEST(ServoCauses, UnitsAndRoundingAreNamed) {
   const auto sentence_of = [](const std::vector<ServoSample>& log) {
     return identify_verdict(log, identify_servo(log)).sentence;
   };
-  std::vector<ServoSample> log = rows_of(late_scene(false), 1);
+  std::vector<ServoSample> log = log_of(late_scene(false), 1);
   for (ServoSample& row : log) row.angle_rad /= degree;
   EXPECT_NE(sentence_of(log).find("are these degrees"), std::string::npos);
-  log = rows_of(late_scene(false), 1);
+  log = log_of(late_scene(false), 1);
   for (ServoSample& row : log) row.t_s *= 1000.0;
   EXPECT_NE(sentence_of(log).find("are these milliseconds"), std::string::npos);
   ServoLogScene rounded = late_scene(false);
   rounded.sigma_rad = 1e-5;
   rounded.encoder_step_rad = 0.1 * degree;
-  const std::vector<ServoSample> coarse = rows_of(rounded, 1);
+  const std::vector<ServoSample> coarse = log_of(rounded, 1);
   EXPECT_NEAR(encoder_step_rad(coarse), 0.1 * degree, 1e-9);
   EXPECT_EQ(identify_verdict(coarse, identify_servo(coarse)).state, State::care);
 }

@@ -6,17 +6,16 @@
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/pantilt/servo_plant.h"
+#include "alidade/servo/levenberg.h"
 
 namespace alidade {
 namespace {
 
 using Eigen::Index;
 
-enum Param { gain, tau, latency, zero, start };
 enum Flaw : std::size_t { rate_limit, acceleration_limit, dead_band, backlash, second_lag };
 
 constexpr double no_limit = 1e9;
-constexpr double fastest_tau_s = 1e-5;
 
 /// A servo half-way through its log: an axis of gain and flaws as fitted, which counts its commands from zero.
 class FlawedServo {
@@ -25,16 +24,16 @@ class FlawedServo {
       : fit_(fit), flaws_(flaws), lagged_(past_dead_band(first_command, flaws.dead_band)) {
     const double max_rate = flaws.max_rate_rad_s > 0.0 ? flaws.max_rate_rad_s : no_limit;
     if (fit.kind == ServoKind::angle) {
-      AnglePlant plant{fit.params[gain], AngleUnit::rad, fit.params[tau]};
+      AnglePlant plant{fit.params[ServoParam::gain], AngleUnit::rad, fit.params[ServoParam::tau]};
       if (flaws.max_rate_rad_s > 0.0) plant.max_rate_rad_s = max_rate;
       axis_.plant = plant;
-      now_.angle_rad = fit.params[start];
+      now_.angle_rad = fit.params[ServoParam::start];
     } else {
-      RatePlant plant{fit.params[gain], AngleUnit::rad, fit.params[tau]};
+      RatePlant plant{fit.params[ServoParam::gain], AngleUnit::rad, fit.params[ServoParam::tau]};
       plant.max_rate_rad_s = max_rate;
       plant.max_acceleration_rad_s2 = flaws.max_acceleration_rad_s2 > 0.0 ? flaws.max_acceleration_rad_s2 : no_limit;
       axis_.plant = plant;
-      now_.rate_rad_s = fit.params[start];
+      now_.rate_rad_s = fit.params[ServoParam::start];
     }
     read_ = now_.angle_rad;
   }
@@ -48,7 +47,8 @@ class FlawedServo {
       now_ = advanced(axis_, now_, goal, dt_s);
     } else {
       constexpr double per_tau = 20.0, max_steps = 40.0;
-      const double shortest_s = lag_s > 0.0 ? std::min(lag_s, fit_.params[tau]) : fit_.params[tau];
+      const double shortest_s =
+          lag_s > 0.0 ? std::min(lag_s, fit_.params[ServoParam::tau]) : fit_.params[ServoParam::tau];
       const double steps = std::clamp(std::ceil(per_tau * dt_s / shortest_s), 1.0, max_steps), step_s = dt_s / steps;
       for (double k = 0.0; k < steps; ++k) step(step_s, goal, is_hard);
     }
@@ -72,7 +72,7 @@ class FlawedServo {
     // The rate that the lag asks for, neared no harder than it can; by the middle of the step.
     const double before = now_.rate_rad_s, most = flaws_.max_acceleration_rad_s2 * dt_s;
     const auto asked = [&](double angle_rad) {
-      const double rate = (fit_.params[gain] * mean - angle_rad) / fit_.params[tau];
+      const double rate = (fit_.params[ServoParam::gain] * mean - angle_rad) / fit_.params[ServoParam::tau];
       return flaws_.max_rate_rad_s > 0.0 ? std::clamp(rate, -flaws_.max_rate_rad_s, flaws_.max_rate_rad_s) : rate;
     };
     const double half_way = now_.angle_rad + 0.5 * dt_s * before;
@@ -98,14 +98,13 @@ ServoFit moved(const ServoFit& fit, Index param, double by) {
   ServoFit next = fit;
   if (param < num_servo_params) {
     next.params[param] += by;
-    next.params[tau] = std::max({next.params[tau], 0.2 * fit.params[tau], fastest_tau_s});
-    next.params[latency] = std::max(next.params[latency], 0.0);
+    next.params = within_meaning(fit.params, next.params);
   } else {
     const std::size_t flaw = fit.freed[static_cast<std::size_t>(param - num_servo_params)];
     double& size = next.flaws.*servo_flaws[flaw];
     size *= std::exp(std::clamp(by, -1.0, 1.0));
     // Of two lags one is the shorter: the second.
-    if (flaw == second_lag) size = std::clamp(size, 0.02 * next.params[tau], next.params[tau]);
+    if (flaw == second_lag) size = std::clamp(size, 0.02 * next.params[ServoParam::tau], next.params[ServoParam::tau]);
   }
   return next;
 }
@@ -114,14 +113,14 @@ ServoFit moved(const ServoFit& fit, Index param, double by) {
 double step_of(std::span<const ServoSample> log, const ServoFit& fit, Index param) {
   const double spacing_s = (log.back().t_s - log.front().t_s) / static_cast<double>(log.size());
   switch (param) {
-    case gain:
-      return 1e-5 * std::abs(fit.params[gain]);
-    case tau:
-      return 1e-4 * fit.params[tau];
-    case latency:
-      return std::min(1e-3 * std::max(fit.params[tau], spacing_s), 0.01 * spacing_s);
-    case zero:
-    case start:
+    case ServoParam::gain:
+      return 1e-5 * std::abs(fit.params[ServoParam::gain]);
+    case ServoParam::tau:
+      return 1e-4 * fit.params[ServoParam::tau];
+    case ServoParam::latency:
+      return std::min(1e-3 * std::max(fit.params[ServoParam::tau], spacing_s), 0.01 * spacing_s);
+    case ServoParam::zero:
+    case ServoParam::start:
       return 1e-6;
     default:
       return 1e-4;
@@ -134,7 +133,7 @@ Eigen::MatrixXd jacobian_by_factors(std::span<const ServoSample> log, const Serv
   Eigen::MatrixXd J(static_cast<Index>(log.size()), num);
   for (Index k = 0; k < num; ++k) {
     const double step = step_of(log, fit, k);
-    const bool is_at_edge = k == latency && fit.params[latency] < step;
+    const bool is_at_edge = k == ServoParam::latency && fit.params[ServoParam::latency] < step;
     const ServoFit more = moved(fit, k, step), less = moved(fit, k, is_at_edge ? 0.0 : -step);
     J.col(k) = (flawed_response(log, more, more.flaws) - flawed_response(log, less, less.flaws)) /
                (is_at_edge ? step : 2.0 * step);
@@ -144,34 +143,19 @@ Eigen::MatrixXd jacobian_by_factors(std::span<const ServoSample> log, const Serv
 
 /// Levenberg–Marquardt over parameters and freed flaws. Returns what is left of the squares.
 double refine(std::span<const ServoSample> log, int max_steps, ServoFit& fit) {
-  Eigen::VectorXd misfit = misfit_of(log, fit);
-  double sum2 = misfit.squaredNorm(), damping = 1e-4;
-  Eigen::MatrixXd J = jacobian_by_factors(log, fit);
-  fit.has_converged = false;
-  for (int i = 0; i < max_steps && !fit.has_converged; ++i) {
-    Eigen::MatrixXd JtJ = J.transpose() * J;
-    JtJ.diagonal() *= 1.0 + damping;
-    JtJ.diagonal().array() += 1e-12 * JtJ.diagonal().maxCoeff() * 1e-6 + 1e-300;
-    const Eigen::VectorXd step = -solve_symmetric(JtJ, J.transpose() * misfit);
-    ServoFit next = fit;
+  const auto after = [](const ServoFit& from, const Eigen::VectorXd& step) {
+    ServoFit next = from;
     for (Index k = 0; k < step.size(); ++k) next = moved(next, k, step[k]);
-    const Eigen::VectorXd tried = misfit_of(log, next);
-    const double tried2 = tried.squaredNorm();
-    if (!(tried2 <= sum2)) {
-      damping *= 10.0;
-      fit.has_converged = damping > 1e8;
-      continue;
-    }
-    next.has_converged = sum2 - tried2 <= 1e-9 * sum2;
-    fit = next;
-    misfit = tried;
-    sum2 = tried2;
-    damping = std::max(1e-9, 0.1 * damping);
-    if (!fit.has_converged) J = jacobian_by_factors(log, fit);
-  }
+    return next;
+  };
+  const LevenbergOutcome descent = levenberg(
+      {.max_steps = max_steps, .first_damping = 1e-4, .tolerance = 1e-9, .ridge = 1e-18}, fit,
+      [&](const ServoFit& at) { return misfit_of(log, at); },
+      [&](const ServoFit& at) { return jacobian_by_factors(log, at); }, after);
+  fit.has_converged = descent.has_converged;
   const double dof = static_cast<double>(log.size()) - num_servo_params - static_cast<double>(fit.freed.size());
-  fit.rms_rad = std::sqrt(sum2 / std::max(1.0, dof));
-  return sum2;
+  fit.rms_rad = std::sqrt(descent.sum2 / std::max(1.0, dof));
+  return descent.sum2;
 }
 
 /// Rows that do not share errors: of an AR(1) noise with the residuals' correlation from row to row.
@@ -214,13 +198,13 @@ std::vector<double> sizes_of(std::span<const ServoSample> log, const ServoFit& f
     case rate_limit:
       return times(max_rate(log, response), {0.95, 0.9, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1});
     case acceleration_limit:
-      return times(max_rate(log, response) / fit.params[tau], {0.9, 0.7, 0.5, 0.3, 0.15});
+      return times(max_rate(log, response) / fit.params[ServoParam::tau], {0.9, 0.7, 0.5, 0.3, 0.15});
     case dead_band:
       return times(max_command(log), {0.005, 0.01, 0.02, 0.05, 0.1, 0.2});
     case backlash:
       return times(response.maxCoeff() - response.minCoeff(), {0.002, 0.005, 0.01, 0.02, 0.05, 0.1});
     default:
-      return times(fit.params[tau], {0.1, 0.3, 0.6, 1.0});
+      return times(fit.params[ServoParam::tau], {0.1, 0.3, 0.6, 1.0});
   }
 }
 
@@ -232,15 +216,15 @@ Eigen::VectorXd flawed_response(std::span<const ServoSample> log, const ServoFit
   double now_s = log.front().t_s, command = log.front().command;
   std::size_t next = 1;
   for (std::size_t i = 0; i < log.size(); ++i) {
-    for (; next < log.size() && log[next].t_s + fit.params[latency] <= log[i].t_s; ++next) {
+    for (; next < log.size() && log[next].t_s + fit.params[ServoParam::latency] <= log[i].t_s; ++next) {
       if (log[next].command == command) continue;
-      servo.advance(log[next].t_s + fit.params[latency] - now_s, command);
-      now_s = log[next].t_s + fit.params[latency];
+      servo.advance(log[next].t_s + fit.params[ServoParam::latency] - now_s, command);
+      now_s = log[next].t_s + fit.params[ServoParam::latency];
       command = log[next].command;
     }
     servo.advance(log[i].t_s - now_s, command);
     now_s = log[i].t_s;
-    angles[static_cast<Index>(i)] = fit.params[zero] + servo.read_rad();
+    angles[static_cast<Index>(i)] = fit.params[ServoParam::zero] + servo.read_rad();
   }
   return angles;
 }
@@ -330,10 +314,10 @@ std::vector<HiddenFlaw> hidden_flaws(std::span<const ServoSample> log, const Ser
     if (std::ranges::count(fit.freed, flaw) > 0 || !(size > 0.0)) return;
     ServoFit trial = fit;
     trial.flaws.*servo_flaws[flaw] = size;
-    if (flaw == rate_limit && fit.kind == ServoKind::rate) trial.params[gain] *= 1.0 + share;
+    if (flaw == rate_limit && fit.kind == ServoKind::rate) trial.params[ServoParam::gain] *= 1.0 + share;
     const double with2 = refine(log, 40, trial);
     const double rows = effective_rows(misfit_of(log, trial));
-    const double factor = trial.params[gain] / fit.params[gain];
+    const double factor = trial.params[ServoParam::gain] / fit.params[ServoParam::gain];
     if (rows * std::log(with2 / sum2) < min_evidence && std::abs(factor - 1.0) > min_moved)
       hidden.push_back({flaw, size, factor});
   };

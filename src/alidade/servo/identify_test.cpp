@@ -5,28 +5,17 @@
 #include <cmath>
 
 #include "alidade/geometry/decompositions.h"
-#include "alidade/simulate/servo.h"
+#include "alidade/testing/servo_sample.h"
 
 namespace alidade {
 namespace {
 
+using testing::log_of;
 using Log = std::vector<ServoSample>;
-
-Log log_of(const ServoLogScene& scene, std::uint64_t seed = 1) {
-  Log log;
-  for (const ServoLogRow& row : simulate_servo_log(scene, seed)) log.push_back({row.t_s, row.command, row.angle_rad});
-  return log;
-}
 
 /// The paper's axis, 83 ms late, with an encoder whose zero is off.
 ServoLogScene scene(bool is_chirp, bool is_rate_plant) {
-  ServoLogScene scene;
-  if (is_rate_plant) {
-    RatePlant plant{0.005, AngleUnit::rad, 0.08};
-    plant.max_rate_rad_s = plant.max_acceleration_rad_s2 = 1e9;
-    scene.axis.plant = plant;
-  }
-  scene.axis.command_delay_s = 0.083;
+  ServoLogScene scene = testing::late_scene(is_rate_plant);
   scene.is_chirp = is_chirp;
   scene.zero_rad = 0.3;
   return scene;

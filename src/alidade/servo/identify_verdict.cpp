@@ -143,9 +143,9 @@ Verdict identify_verdict(std::span<const ServoSample> log, const ServoIdentifica
                    "and more than one change of command");
   const ServoParams sigma = fit.cov.diagonal().cwiseSqrt();
   if (!(std::abs(fit.params[0]) > 5.0 * sigma[0]))
-    return refused(
-        "no answer: the gain " + text_of(fit.params[0]) + " is not told from zero (σ " + text_of(sigma[0]) + ")",
-        excite);
+    return refused("no answer: the gain " + text_of(fit.params[0]) + " is not distinguishable from zero (σ " +
+                       text_of(sigma[0]) + ")",
+                   excite);
   if (!(sigma[1] < 0.5 * fit.params[1]) && !(fit.params[1] + 2.0 * sigma[1] < 0.02 * identified.duration_s))
     return refused("too short or too coarse: the time constant is " + text_of(fit.params[1]) + " s with σ " +
                        text_of(sigma[1]) + " s",

@@ -4,8 +4,10 @@
 #include <vector>
 
 #include "alidade/pantilt/servo_plant.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// What the error of a loop is counted in; gains speak of it.
 enum class ErrorUnit { px, deg, rad };
@@ -38,4 +40,5 @@ struct LoopAnalysis {
 [[nodiscard]] LoopAnalysis analysed(const ServoPlant& plant, const PiGains& per_rad, double period_s,
                                     int delay_samples = 0);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

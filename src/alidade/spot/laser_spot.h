@@ -8,12 +8,14 @@
 #include "alidade/board/board.h"
 #include "alidade/camera/camera.h"
 #include "alidade/geometry/rigid3.h"
+#include "alidade/public.h"
 
 namespace cv {
 class Mat;
 }
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// `automatic`: red or green, whichever is stronger, in a colour photo; bright in a grey one.
 enum class SpotColour { automatic, red, green, bright };
@@ -34,7 +36,7 @@ struct SeenBoard {
 
 /// What is known beside the photo; each part helps and none is needed, but a grey photo needs one of the first two.
 struct LaserSpotAids {
-  const cv::Mat* photo_off = nullptr;   ///< The same with the laser off; exposure and place may differ a little.
+  const cv::Mat* photo_off = nullptr;   ///< The same with the laser off; exposure and position may differ a little.
   std::optional<SeenBoard> seen_board;  ///< The spot is looked for on its print alone.
   std::vector<Eigen::Vector2d> region;  ///< Polygon in which the spot lies [px]; empty: anywhere.
 };
@@ -45,7 +47,7 @@ struct LaserSpot {
   Eigen::Matrix2d cov = Eigen::Matrix2d::Identity();  ///< Noise, pixels, and what an edge below the spot leaves. [px²]
   double peak = 0.0;                                  ///< Light over the background, in grey values of its channel.
   double radius_px = 0.0;                             ///< σ of the spot, mean of its axes.
-  bool is_saturated = false;                          ///< Its middle exceeds the camera's range.
+  bool is_saturated = false;                          ///< Its centre exceeds the camera's range.
   bool is_on_edge = false;  ///< It lies on ink and paper, and is corrected for what each returns.
   std::string reason;       ///< "no laser spot", "two candidates at (u, v) and (u, v)", …; empty where it was found.
   [[nodiscard]] bool found() const { return reason.empty(); }
@@ -60,4 +62,5 @@ struct LaserSpot {
 [[nodiscard]] LaserSpot find_laser_spot(const cv::Mat& photo, const LaserSpotAids& aids = {},
                                         const LaserSpotConfig& config = {});
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -147,10 +147,10 @@ TEST(LaserSpot, WhatCannotBeToldIsNamed) {
   Painting painting;
   painting.light.setTo(cv::Scalar(300, 300, 300));
   EXPECT_EQ(find_laser_spot(painting.photo()).reason, "the photo is blown out");
-  EXPECT_EQ(find_laser_spot(cv::Mat()).reason, "there is no picture");
+  EXPECT_EQ(find_laser_spot(cv::Mat()).reason, "there is no image");
   const cv::Mat grey(120, 160, CV_8UC1, cv::Scalar(90)), small(60, 80, CV_8UC1, cv::Scalar(90));
   EXPECT_EQ(find_laser_spot(grey).reason,
-            "a grey photo tells no spot without the photo with the laser off or a chessboard's pose");
+            "a grey photo shows no spot without the photo with the laser off or a chessboard's pose");
   LaserSpotAids aids;
   aids.photo_off = &small;
   EXPECT_EQ(find_laser_spot(grey, aids).reason, "the photo with the laser off has another size or kind");

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "alidade/estimation/median.h"
 #include "alidade/spot/printed_squares.h"
 
 namespace alidade {
@@ -38,13 +39,6 @@ double scale_of(const cv::Mat& photo) {
   double brightest = 0.0;
   cv::minMaxLoc(photo.reshape(1), nullptr, &brightest);
   return brightest > 0.0 ? 255.0 / brightest : 1.0;
-}
-
-double median(std::vector<float>& values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return static_cast<double>(*middle);
 }
 
 Image gradient_length(const Image& image, Image* du = nullptr, Image* dv = nullptr) {
@@ -113,7 +107,7 @@ class RobustSum {
       std::vector<float> sizes(static_cast<std::size_t>(samples_.cols()));
       for (Eigen::Index i = 0; i < samples_.cols(); ++i)
         sizes[static_cast<std::size_t>(i)] = static_cast<float>(std::abs(residual(i)));
-      limit = 3.0 * std::max(0.5, normal_from_mad * median(sizes));
+      limit = 3.0 * std::max(0.5, normal_from_mad * median_of(sizes));
     }
   }
   /// Lower triangle of the sums of all products over the samples within the limit.
@@ -150,7 +144,7 @@ double noise_of(const Image& image) {
   for (Eigen::Index v = 0; v < image.rows(); v += step)
     for (Eigen::Index u = 1; u < image.cols(); u += step)
       differences.push_back(std::abs(image(v, u) - image(v, u - 1)));
-  return std::max(0.4, normal_from_mad / std::sqrt(2.0) * median(differences));
+  return std::max(0.4, normal_from_mad / std::sqrt(2.0) * median_of(differences));
 }
 
 ImageMask unsaturated(const Image& channel) {
@@ -266,10 +260,11 @@ void measure_noise(SpotSignal& signal) {
       edge_sum += static_cast<double>(edge);
     }
   }
-  signal.sigma = std::max(0.4, normal_from_mad * median(even));  // rounding alone makes 0.29, of two photos 0.41
+  signal.sigma = std::max(0.4, normal_from_mad * median_of(even));  // rounding alone makes 0.29, of two photos 0.41
   // A print has many edges; those of a few pixels may be the spot's own light in the other channels.
   if (at_edges.size() < 20 || 50 * at_edges.size() < even.size()) return;
-  const double rest = normal_from_mad * median(at_edges), mean_edge = edge_sum / static_cast<double>(at_edges.size());
+  const double rest = normal_from_mad * median_of(at_edges),
+               mean_edge = edge_sum / static_cast<double>(at_edges.size());
   constexpr double max_edge_sigma_px = 0.3;  // what is worse was not compared with its like
   signal.edge_sigma_px =
       std::min(max_edge_sigma_px, std::sqrt(std::max(0.0, rest * rest - signal.sigma * signal.sigma)) / mean_edge);
@@ -280,11 +275,11 @@ bool is_chessboard(const LaserSpotAids& aids) {
 }
 
 std::string reason_against(const cv::Mat& photo, const LaserSpotAids& aids) {
-  if (photo.empty() || photo.dims != 2) return "there is no picture";
+  if (photo.empty() || photo.dims != 2) return "there is no image";
   if (aids.photo_off && (aids.photo_off->size() != photo.size() || aids.photo_off->type() != photo.type()))
     return "the photo with the laser off has another size or kind";
   if (photo.channels() < 3 && !aids.photo_off && !is_chessboard(aids))
-    return "a grey photo tells no spot without the photo with the laser off or a chessboard's pose";
+    return "a grey photo shows no spot without the photo with the laser off or a chessboard's pose";
   return {};
 }
 

@@ -96,19 +96,19 @@ void require_corners_inside(const ImageSize& size, const std::filesystem::path& 
     }
   }
   if (10 * outside <= all) return;
-  throw InputError(fmt::format("{}: {} of {} corners lie outside a picture of {}x{} px: check --size", file.string(),
+  throw InputError(fmt::format("{}: {} of {} corners lie outside an image of {}x{} px: check --size", file.string(),
                                outside, all, size.width_px, size.height_px));
 }
 
 std::string poses_csv(const std::vector<std::string>& photos, std::span<const Rigid3> cam_from_board) {
   std::string text =
-      "photo,cam_from_board_x_m,cam_from_board_y_m,cam_from_board_z_m,cam_from_board_qx,cam_from_board_qy,"
-      "cam_from_board_qz,cam_from_board_qw\n";
+      "photo,cam_from_board_x_m,cam_from_board_y_m,cam_from_board_z_m,cam_from_board_qw,cam_from_board_qx,"
+      "cam_from_board_qy,cam_from_board_qz\n";
   for (std::size_t i = 0; i < photos.size(); ++i) {
     const Eigen::Vector3d& t = cam_from_board[i].translation;
     const Eigen::Quaterniond& q = cam_from_board[i].rotation;
     fmt::format_to(std::back_inserter(text), "{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}\n",
-                   csv_cell(photos[i]), t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+                   csv_cell(photos[i]), t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z());
   }
   return text;
 }

@@ -33,7 +33,7 @@ ALIDADE_PUBLIC_BEGIN
 /// lies outside. A few outside may be wrong corners.
 void require_corners_inside(const ImageSize& size, const std::filesystem::path& file, std::span<const BoardView> views);
 
-/// Poses as CSV: photo,cam_from_board_x_m,…_y_m,…_z_m,…_qx,…_qy,…_qz,…_qw.
+/// Poses as CSV: photo,cam_from_board_x_m,…_y_m,…_z_m,…_qw,…_qx,…_qy,…_qz.
 [[nodiscard]] std::string poses_csv(const std::vector<std::string>& photos, std::span<const Rigid3> cam_from_board);
 
 /// Board points as CSV: corner,x_m,y_m,z_m; and back. Throws InputError where a point is missing.

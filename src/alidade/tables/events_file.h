@@ -7,9 +7,11 @@
 
 #include "alidade/estimation/counts.h"
 #include "alidade/pantilt/head.h"
-#include "alidade/track/track.h"
+#include "alidade/public.h"
+#include "alidade/track/track_report.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 struct EventsFile {
   std::vector<TargetObservation> observations;  ///< In the order of the file: of arrival.
@@ -17,7 +19,7 @@ struct EventsFile {
 };
 
 struct EventsOptions {
-  bool skip_bad = false;  ///< Leave out rows that are wrong, by name.
+  bool skip_bad = false;  ///< Skip rows that are wrong, by name.
   /// Cameras that do not turn, each with a clock of its own: `pan_rad,tilt_rad` may be left out (zero) but may not
   /// change, and times run forwards head by head alone.
   bool stands_still = false;
@@ -41,11 +43,12 @@ struct EventsOptions {
 [[nodiscard]] TrueTrack read_true_track(const std::filesystem::path& file);
 [[nodiscard]] std::string true_track_csv(const TrueTrack& truth);
 
-/// Text of track.csv: `t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,sigma_x_m,sigma_y_m,sigma_z_m,nis,event`, a row an
+/// Text of track.csv: `t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,sigma_x_m,sigma_y_m,sigma_z_m,nis,event`, a row per
 /// observation; `ahead` (one an observation, or none) adds rows with the event `predicted`.
 [[nodiscard]] std::string track_csv(std::span<const TrackStep> steps, std::span<const PredictedStep> ahead = {});
 
 /// Text of smoothed.csv: `t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,sigma_x_m,sigma_y_m,sigma_z_m`.
 [[nodiscard]] std::string smoothed_csv(std::span<const PredictedStep> smoothed);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -45,9 +45,9 @@ void for_each_of(const YAML::Node& list, const std::string& file, const std::str
   }
 }
 
-TargetFile points_of(const YAML::Node& list, const std::string& file) {
-  TargetFile target;
-  target.is_scale_told = true;
+LocalizeTarget points_of(const YAML::Node& list, const std::string& file) {
+  LocalizeTarget target;
+  target.is_scale_given = true;
   std::vector<KnownPoint>& points = target.points;
   std::set<long> ids;
   for_each_of(list, file, "points", [&](const Fields& fields) {
@@ -57,13 +57,13 @@ TargetFile points_of(const YAML::Node& list, const std::string& file) {
     if (!ids.insert(point.id).second) refuse(file, fields.full("id"), fmt::format("{} stands twice", point.id));
     point.point_in_world = {fields.number("x_m"), fields.number("y_m"), fields.number("z_m")};
     point.sigma_m = positive(fields, "sigma_m", 0.001);
-    target.is_scale_told = target.is_scale_told && fields.has("sigma_m");
+    target.is_scale_given = target.is_scale_given && fields.has("sigma_m");
     points.push_back(point);
   });
   return target;
 }
 
-TargetFile board_points_of(const YAML::Node& node, const std::string& file) {
+LocalizeTarget board_points_of(const YAML::Node& node, const std::string& file) {
   const Fields fields(node, file, "board.");
   detail::refuse_unknown_keys(fields, {"corners", "square_m", "sigma_m", "sigma_square_m"}, "a board");
   Board board;
@@ -74,9 +74,9 @@ TargetFile board_points_of(const YAML::Node& node, const std::string& file) {
     refuse(file, "board.corners", fmt::format("'{}' is not like 9x6", corners));
   board.square_m = fields.number("square_m");
   if (!(board.square_m > 0.0)) refuse(file, "board.square_m", "is not above zero");
-  TargetFile target;
-  target.is_board = true;
-  target.is_scale_told = fields.has("sigma_square_m");
+  LocalizeTarget target;
+  target.board = board;
+  target.is_scale_given = fields.has("sigma_square_m");
   target.sigma_scale = positive(fields, "sigma_square_m", 0.0) / board.square_m;
   for (const Eigen::Vector3d& point : points_in_board(board))
     target.points.push_back({static_cast<long>(target.points.size()), point, positive(fields, "sigma_m", 0.001)});
@@ -112,25 +112,23 @@ std::vector<double> numbers_of(const Eigen::Vector3d& v) { return {v.x(), v.y(),
 
 }  // namespace
 
-TargetFile read_target_file(const std::filesystem::path& file) {
+LocalizeTarget read_target(const std::filesystem::path& file) {
   const std::string name = file.string();
   const YAML::Node root = detail::load_yaml(read_file(file), name);
   const Fields fields(root, name);
   detail::refuse_unknown_keys(fields, {"points", "rectangle", "board", "seen_from"}, "a target");
   if (fields.has("rectangle")) refuse(name, "rectangle", "is found in images; sights need 'points' or a 'board'");
   if (fields.has("points") == fields.has("board")) refuse(name, "points", "or 'board': one of them is needed");
-  TargetFile target = fields.has("board") ? board_points_of(root["board"], name) : points_of(root["points"], name);
+  LocalizeTarget target = fields.has("board") ? board_points_of(root["board"], name) : points_of(root["points"], name);
   if (target.points.empty()) refuse(name, "points", "has no points");
   if (fields.has("seen_from")) {
     const std::string side = fields.text("seen_from");
     if (side != "+z" && side != "-z") refuse(name, "seen_from", "is not +z or -z");
-    if (target.is_board) refuse(name, "seen_from", "is of points; a board is seen from its printed side");
+    if (target.board) refuse(name, "seen_from", "is of points; a board is seen from its printed side");
     target.seen_from_plus_z = side == "+z";
   }
   return target;
 }
-
-std::vector<KnownPoint> read_target(const std::filesystem::path& file) { return read_target_file(file).points; }
 
 std::string target_text(std::span<const KnownPoint> points) {
   std::string text = "# known points, in the frame of the map\npoints:\n";
@@ -141,13 +139,13 @@ std::string target_text(std::span<const KnownPoint> points) {
   return text;
 }
 
-StartFile read_start(const std::filesystem::path& file) {
+LocalizeStart read_start(const std::filesystem::path& file) {
   const std::string name = file.string();
   const YAML::Node root = detail::load_yaml(read_file(file), name);
   const Fields fields(root, name);
   detail::refuse_unknown_keys(fields, start_keys, "a start");
-  StartFile read;
-  CameraMotion& motion = read.start.motion;
+  LocalizeStart read;
+  CameraMotion& motion = read.motion;
   motion.world_from_cam = {read_quaternion(fields), detail::read_vector(fields, "position_m")};
   motion.velocity_in_world = vector_or_zero(fields, "velocity_m_s");
   motion.rate_in_cam = vector_or_zero(fields, "rate_rad_s");
@@ -155,23 +153,23 @@ StartFile read_start(const std::filesystem::path& file) {
       positive(fields, "sigma_position_m", 0.01), positive(fields, "sigma_rotation_rad", 0.02),
       positive(fields, "sigma_velocity_m_s", 0.3), positive(fields, "sigma_rate_rad_s", 0.3)};
   for (std::size_t i = 0; i < sigmas.size(); ++i)
-    read.start.cov.diagonal().segment<3>(static_cast<Eigen::Index>(3 * i)).setConstant(sigmas[i] * sigmas[i]);
+    read.cov.diagonal().segment<3>(static_cast<Eigen::Index>(3 * i)).setConstant(sigmas[i] * sigmas[i]);
   read.depth_m = positive(fields, "depth_m", 0.0);
   read.sigma_depth = positive(fields, "sigma_depth", 0.5);
   if (!fields.has("depths")) return read;
   for_each_of(root["depths"], name, "depths", [&](const Fields& depth) {
     detail::refuse_unknown_keys(depth, {"id", "depth_m", "sigma_rel"}, "a depth");
-    const ToldDepth told{id_of(depth), depth.number("depth_m"), positive(depth, "sigma_rel", 0.5)};
-    if (!(told.depth_m > 0.0)) refuse(name, depth.full("depth_m"), "is not above zero");
-    read.depths.push_back(told);
+    const GivenDepth given{id_of(depth), depth.number("depth_m"), positive(depth, "sigma_rel", 0.5)};
+    if (!(given.depth_m > 0.0)) refuse(name, depth.full("depth_m"), "is not above zero");
+    read.depths.push_back(given);
   });
   return read;
 }
 
-std::string start_text(const StartFile& file) {
-  const CameraMotion& motion = file.start.motion;
+std::string start_text(const LocalizeStart& start) {
+  const CameraMotion& motion = start.motion;
   const Eigen::Quaterniond& q = motion.world_from_cam.rotation;
-  const auto sigma = [&](int i) { return number_text(std::sqrt(file.start.cov(i, i))); };
+  const auto sigma = [&](int i) { return number_text(std::sqrt(start.cov(i, i))); };
   std::string text = "# world_from_cam before the first frame\n";
   text += fmt::format("position_m: {}\n", number_list(numbers_of(motion.world_from_cam.translation)));
   text += fmt::format("quaternion_wxyz: {}\n", number_list({q.w(), q.x(), q.y(), q.z()}));
@@ -179,10 +177,10 @@ std::string start_text(const StartFile& file) {
                       number_list(numbers_of(motion.rate_in_cam)));
   text += fmt::format("sigma_position_m: {}\nsigma_rotation_rad: {}\n", sigma(0), sigma(3));
   text += fmt::format("sigma_velocity_m_s: {}\nsigma_rate_rad_s: {}\n", sigma(6), sigma(9));
-  if (file.depth_m > 0.0)
-    text += fmt::format("depth_m: {}\nsigma_depth: {}\n", number_text(file.depth_m), number_text(file.sigma_depth));
-  if (!file.depths.empty()) text += "depths:  # along the optical axis, where first seen\n";
-  for (const ToldDepth& depth : file.depths)
+  if (start.depth_m > 0.0)
+    text += fmt::format("depth_m: {}\nsigma_depth: {}\n", number_text(start.depth_m), number_text(start.sigma_depth));
+  if (!start.depths.empty()) text += "depths:  # along the optical axis, where first seen\n";
+  for (const GivenDepth& depth : start.depths)
     text += fmt::format("  - {{id: {}, depth_m: {}, sigma_rel: {}}}\n", depth.id, number_text(depth.depth_m),
                         number_text(depth.sigma_rel));
   return text;

@@ -89,13 +89,13 @@ double sigma_of(const MapPoint& point) { return std::sqrt(point.cov.trace() / 3.
 
 }  // namespace
 
-ObservationsFile read_observations(const std::filesystem::path& file, const ObservationsOptions& options) {
+ObservationTable read_observations(const std::filesystem::path& file, const ObservationsOptions& options) {
   const Csv csv = Csv::read(file);
   for (const char* name : {"frame", "t_s", "point_id", "u_px", "v_px"}) {
     if (options.rate_hz > 0.0 && std::string(name) == "t_s") continue;
     if (!csv.has(name)) csv.refuse_missing(name, std::string(name) == "t_s" ? "; give it, or --rate" : "");
   }
-  ObservationsFile read;
+  ObservationTable read;
   for_each_row(csv, options.skip_bad, read.skipped, [&](std::size_t row) { read_row(csv, row, options, read.frames); });
   if (read.frames.empty()) throw InputError(file.string() + ": has no sights; at least one row is needed");
   read.frames = with_missing(std::move(read.frames));

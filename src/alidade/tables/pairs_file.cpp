@@ -108,6 +108,21 @@ PairsFile read_pairs(const std::filesystem::path& file, bool skip_bad) {
   return read;
 }
 
+void require_features_inside(const MatchedPhotos& photos, const std::filesystem::path& file) {
+  if (photos.width_px <= 0) return;
+  std::size_t outside = 0, all = 0;
+  for (const auto& features : photos.features) {
+    for (const Eigen::Vector2d& px : features) {
+      const bool inside = px.minCoeff() > -1.0 && px.x() < photos.width_px && px.y() < photos.height_px;
+      outside += inside ? 0 : 1;
+      ++all;
+    }
+  }
+  if (20 * outside <= all) return;
+  throw InputError(fmt::format("{}: {} of {} points lie outside an image of {}x{} px: check --size", file.string(),
+                               outside, all, photos.width_px, photos.height_px));
+}
+
 std::string pairs_csv(const MatchedPhotos& photos) {
   std::string text = "frame_a,frame_b,ua_px,va_px,ub_px,vb_px\n";
   for (const MatchedPair& pair : photos.pairs) {

@@ -6,6 +6,8 @@
 #include <iterator>
 #include <sstream>
 
+#include "alidade/tables/rotation_log_stream.h"
+
 namespace alidade {
 namespace {
 
@@ -133,8 +135,12 @@ std::optional<RotationLogEntry> RotationLogStream::next_checked() {
 }
 
 RotationLogFile read_rotation_log(const std::filesystem::path& file, const RotationLogOptions& options) {
-  std::istringstream text(read_file(file));
-  RotationLogStream stream(text, file.string(), options);
+  return parse_rotation_log(read_file(file), file.string(), options);
+}
+
+RotationLogFile parse_rotation_log(const std::string& csv, const std::string& name, const RotationLogOptions& options) {
+  std::istringstream text(csv);
+  RotationLogStream stream(text, name, options);
   RotationLogFile read{stream.layout(), {}};
   while (std::optional<RotationLogEntry> entry = stream.next()) {
     read.log.sigma_scale = stream.layout().sigma_scale;
@@ -143,7 +149,7 @@ RotationLogFile read_rotation_log(const std::filesystem::path& file, const Rotat
     if (entry->truth) read.log.truth.push_back(*entry->truth);
   }
   read.skipped = stream.skipped();
-  check_log(read.log, file.string());
+  check_log(read.log, name);
   return read;
 }
 

@@ -1,4 +1,4 @@
-#include "alidade/tables/rotation_log_file.h"
+#include "alidade/tables/rotation_log_stream.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -6,9 +6,11 @@
 #include <vector>
 
 #include "alidade/estimation/counts.h"
-#include "alidade/servo/identify.h"
+#include "alidade/public.h"
+#include "alidade/servo/identification.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 struct ServoLogFile {
   std::vector<ServoSample> samples;
@@ -23,4 +25,5 @@ struct ServoLogFile {
 /// Text of servo.yaml: the plant as a scenario of `alidade servo` takes it, its σ beside it.
 [[nodiscard]] std::string servo_plant_text(const ServoFit& fit);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -18,6 +18,26 @@ using detail::Fields;
 using detail::refuse;
 using detail::refuse_unknown_keys;
 
+double within(const Fields& fields, const std::string& key, double low, double high) {
+  const double value = fields.number(key);
+  if (!(value >= low && value <= high))
+    refuse(fields.file(), fields.full(key), fmt::format("{} is not between {:g} and {:g}", value, low, high));
+  return value;
+}
+
+/// Within its limits, or what it was; in the file in another unit. `described`: fields of the scenario, `value` among
+/// them.
+void read_number(const Fields& fields, const std::string& key, double& value, const FieldList& described,
+                 double unit = 1.0) {
+  if (!fields.has(key)) return;
+  const auto field = std::ranges::find_if(described, [&](const Field& each) {
+    double* const* const pointer = std::get_if<double*>(&each.value);
+    return pointer != nullptr && *pointer == &value;
+  });
+  const double slack = unit == 1.0 ? 1.0 : 1.0 + 1e-12;  // 90 / unit * unit is not quite 90
+  value = unit * within(fields, key, field->limits.min / unit / slack, field->limits.max / unit * slack);
+}
+
 /// A section of the file, or an empty one.
 class Section {
  public:
@@ -30,9 +50,8 @@ class Section {
   [[nodiscard]] bool has(const std::string& key) const { return fields_.has(key); }
   [[nodiscard]] bool is_empty() const { return fields_.keys().empty(); }
 
-  /// Within [low, high], or what it was.
-  void number(const std::string& key, double& value, double low, double high, double unit = 1.0) const {
-    if (fields_.has(key)) value = unit * within(fields_, key, low, high);
+  void number(const std::string& key, double& value, const FieldList& described, double unit = 1.0) const {
+    read_number(fields_, key, value, described, unit);
   }
   void vector(const std::string& key, Eigen::Vector3d& value) const {
     if (fields_.has(key)) value = detail::read_vector(fields_, key);
@@ -56,12 +75,6 @@ class Section {
     axis.min_rad = degree * numbers[0];
     axis.max_rad = degree * numbers[1];
   }
-  static double within(const Fields& fields, const std::string& key, double low, double high) {
-    const double value = fields.number(key);
-    if (!(value >= low && value <= high))
-      refuse(fields.file(), fields.full(key), fmt::format("{} is not between {} and {}", value, low, high));
-    return value;
-  }
 
  private:
   YAML::Node node_;
@@ -83,6 +96,7 @@ std::optional<ErrorUnit> error_unit(const std::string& name) {
 
 void read_target(const YAML::Node& root, const Fields& top, ServoScenarioFile& read,
                  const std::filesystem::path& folder) {
+  const FieldList described = fields_of(read.scenario);
   TargetPath& path = read.scenario.scene.path;
   const Section target(root, top, "target",
                        {"path", "start_m", "radius_m", "period_s", "jump_m", "jump_at_s", "track"});
@@ -93,22 +107,19 @@ void read_target(const YAML::Node& root, const Fields& top, ServoScenarioFile& r
   }
   target.word("path", path.kind, path_named, "still, circle, sway, step, manoeuvre");
   target.vector("start_m", path.start_m);
-  target.number("radius_m", path.radius_m, 0.0, 1e4);
-  target.number("period_s", path.period_s, 1e-3, 1e6);
+  target.number("radius_m", path.radius_m, described);
+  target.number("period_s", path.period_s, described);
   target.vector("jump_m", path.jump_m);
-  target.number("jump_at_s", path.jump_at_s, 0.0, 1e6);
+  target.number("jump_at_s", path.jump_at_s, described);
 }
 
-template <class Plant>
-Plant plant_of(const Section& section) {
-  Plant plant;
-  section.number("gain", plant.gain, -1e6, 1e6);
+void read_gain(const Section& section, const FieldList& described, auto& plant) {
+  section.number("gain", plant.gain, described);
   if (plant.gain == 0.0) refuse(section.fields().file(), section.fields().full("gain"), "is zero");
   if (section.has("gain") && !section.has("unit"))
     refuse(section.fields().file(), section.fields().full("unit"), "is missing: deg or rad, what the gain gives");
   section.word("unit", plant.unit, unit_named, "deg, rad");
-  section.number("tau_s", plant.tau_s, 1e-4, 100.0);
-  return plant;
+  section.number("tau_s", plant.tau_s, described);
 }
 
 void read_plant(const YAML::Node& root, const Fields& top, ServoScenario& scenario) {
@@ -122,39 +133,43 @@ void read_plant(const YAML::Node& root, const Fields& top, ServoScenario& scenar
         return name == "rate" ? std::optional(true) : name == "angle" ? std::optional(false) : std::nullopt;
       },
       "angle, rate");
-  ServoAxis axis;
+  ServoAxis& axis = scenario.scene.axes[0];
+  axis = {};
+  if (is_rate_plant) axis.plant = RatePlant{};
+  const FieldList described = fields_of(scenario);
   if (is_rate_plant) {
-    RatePlant plant = plant_of<RatePlant>(section);
-    section.number("max_rate_deg_s", plant.max_rate_rad_s, 1e-3, 1e5, degree);
-    section.number("max_acceleration_deg_s2", plant.max_acceleration_rad_s2, 1e-3, 1e7, degree);
-    axis.plant = plant;
+    RatePlant& plant = std::get<RatePlant>(axis.plant);
+    read_gain(section, described, plant);
+    section.number("max_rate_deg_s", plant.max_rate_rad_s, described, degree);
+    section.number("max_acceleration_deg_s2", plant.max_acceleration_rad_s2, described, degree);
     // A loop of 4/s, whatever a unit of command is.
     const double loop_per_s = 4.0 / plant.gain;
     scenario.config.pi = {loop_per_s, loop_per_s, plant.unit == AngleUnit::deg ? ErrorUnit::deg : ErrorUnit::rad};
   } else {
-    AnglePlant plant = plant_of<AnglePlant>(section);
-    section.number("max_rate_deg_s", plant.max_rate_rad_s, 1e-3, 1e5, degree);
-    axis.plant = plant;
+    AnglePlant& plant = std::get<AnglePlant>(axis.plant);
+    read_gain(section, described, plant);
+    section.number("max_rate_deg_s", plant.max_rate_rad_s, described, degree);
     const std::string key = "max_acceleration_deg_s2";
     if (section.has(key)) refuse(top.file(), section.fields().full(key), "is for a plant of kind rate");
   }
-  section.number("command_delay_s", axis.command_delay_s, 0.0, 10.0);
-  section.number("dead_band", axis.dead_band, 0.0, 1e9);
-  section.number("backlash_deg", axis.backlash_rad, 0.0, 90.0, degree);
-  section.number("second_tau_s", axis.second_tau_s, 0.0, 100.0);
-  scenario.scene.axes = {axis, axis};
+  section.number("command_delay_s", axis.command_delay_s, described);
+  section.number("dead_band", axis.dead_band, described);
+  section.number("backlash_deg", axis.backlash_rad, described, degree);
+  section.number("second_tau_s", axis.second_tau_s, described);
+  scenario.scene.axes[1] = axis;
   section.limits("pan_deg", scenario.scene.axes[0]);
   section.limits("tilt_deg", scenario.scene.axes[1]);
 }
 
 void read_noise(const YAML::Node& root, const Fields& top, ServoScenario& scenario) {
   ServoScene& scene = scenario.scene;
+  const FieldList described = fields_of(scenario);
   const Section noise(root, top, "noise", {"sigma_px", "sigma_encoder_deg", "encoder_step_deg"});
   if (const double sigma_rad = scene.heads[0].head.encoder.sigma_rad; sigma_rad > 0.0)
     scene.sigma_encoder_rad = sigma_rad;
-  noise.number("sigma_px", scene.sigma_px, 0.0, 1e3);
-  noise.number("sigma_encoder_deg", scene.sigma_encoder_rad, 0.0, 90.0, degree);
-  noise.number("encoder_step_deg", scene.encoder_step_rad, 0.0, 90.0, degree);
+  noise.number("sigma_px", scene.sigma_px, described);
+  noise.number("sigma_encoder_deg", scene.sigma_encoder_rad, described, degree);
+  noise.number("encoder_step_deg", scene.encoder_step_rad, described, degree);
   scenario.config.sigma_px = std::max(scene.sigma_px, 1e-3);
   // A rounded reading errs by a twelfth of a step's square.
   scenario.config.sigma_encoder_rad =
@@ -175,24 +190,25 @@ void read_controllers(const YAML::Node& root, const Fields& top, ServoScenario& 
     if (scenario.controllers.empty()) refuse(top.file(), "controllers", "names none");
   }
   ServoConfig& config = scenario.config;
+  const FieldList described = fields_of(scenario);
   const Section pi(root, top, "pi", {"kp", "ki", "unit"});
   if ((pi.has("kp") || pi.has("ki")) && !pi.has("unit"))
     refuse(top.file(), "pi.unit", "is missing: px, deg or rad, what the error is counted in");
-  pi.number("kp", config.pi.kp, -1e9, 1e9);
-  pi.number("ki", config.pi.ki, -1e9, 1e9);
+  pi.number("kp", config.pi.kp, described);
+  pi.number("ki", config.pi.ki, described);
   pi.word("unit", config.pi.unit, error_unit, "px, deg, rad");
   const Section predicted(root, top, "predictive", {"rate_gain_per_s", "command_weight", "range_m"});
-  predicted.number("rate_gain_per_s", config.rate_gain_per_s, 0.0, 1e4);
-  predicted.number("command_weight", config.command_weight, 1e-6, 1e6);
-  predicted.number("range_m", config.range_m, 1e-3, 1e6);
+  predicted.number("rate_gain_per_s", config.rate_gain_per_s, described);
+  predicted.number("command_weight", config.command_weight, described);
+  predicted.number("range_m", config.range_m, described);
 }
 
-void read_filter(const YAML::Node& root, const Fields& top, BearingFilterConfig& config) {
+void read_filter(const YAML::Node& root, const Fields& top, const FieldList& described, BearingFilterConfig& config) {
   const Section filter(root, top, "filter", {"singer_tau_s", "sigma_deg_s2", "memory_s", "start_rate_deg_s", "gate"});
-  filter.number("singer_tau_s", config.singer_tau_s, 1e-2, 1e3);
-  filter.number("memory_s", config.memory_s, 1e-3, 1e3);
-  filter.number("start_rate_deg_s", config.start_rate_rad_s, 1e-3, 1e5, degree);
-  filter.number("gate", config.gate, 1.0, 1e9);
+  filter.number("singer_tau_s", config.singer_tau_s, described);
+  filter.number("memory_s", config.memory_s, described);
+  filter.number("start_rate_deg_s", config.start_rate_rad_s, described, degree);
+  filter.number("gate", config.gate, described);
   if (!filter.has("sigma_deg_s2")) return;
   const std::vector<double> sigmas = filter.fields().numbers("sigma_deg_s2");
   const std::string key = filter.fields().full("sigma_deg_s2");
@@ -205,15 +221,15 @@ void read_filter(const YAML::Node& root, const Fields& top, BearingFilterConfig&
   }
 }
 
-void read_search(const YAML::Node& root, const Fields& top, SearchConfig& config) {
+void read_search(const YAML::Node& root, const Fields& top, const FieldList& described, SearchConfig& config) {
   const Section search(root, top, "search",
                        {"enabled", "coast_s", "carry_s", "speed_deg_s", "turn_of_view", "max_radius_deg"});
   search.word("enabled", config.enabled, yes_or_no, "true, false");
-  search.number("coast_s", config.coast_s, 0.0, 1e3);
-  search.number("carry_s", config.carry_s, 0.0, 1e3);
-  search.number("speed_deg_s", config.speed_rad_s, 1e-3, 1e4, degree);
-  search.number("turn_of_view", config.turn_of_view, 0.05, 10.0);
-  search.number("max_radius_deg", config.max_radius_rad, 0.1, 360.0, degree);
+  search.number("coast_s", config.coast_s, described);
+  search.number("carry_s", config.carry_s, described);
+  search.number("speed_deg_s", config.speed_rad_s, described, degree);
+  search.number("turn_of_view", config.turn_of_view, described);
+  search.number("max_radius_deg", config.max_radius_rad, described, degree);
 }
 
 /// How the lenses zoom, and by which intrinsics the loop goes: an observer's where they do, if nothing is said.
@@ -241,7 +257,7 @@ void read_lens(const YAML::Node& root, const Fields& top, ServoScene& scene) {
     scene.intrinsics = *knowledge;
   }
   if (top.has("background_points"))
-    scene.background_points = static_cast<std::size_t>(Section::within(top, "background_points", 4, 200));
+    scene.background_points = static_cast<std::size_t>(within(top, "background_points", 4, 200));
 }
 
 void read_robustness(const YAML::Node& root, const Fields& top, std::optional<RobustnessConfig>& robustness) {
@@ -258,7 +274,7 @@ void read_robustness(const YAML::Node& root, const Fields& top, std::optional<Ro
   range("gain", config.gain_low, config.gain_high);
   range("tau", config.tau_low, config.tau_high);
   double points = config.points;
-  section.number("points", points, 0.0, 50.0);
+  if (section.has("points")) points = within(section.fields(), "points", 0.0, 50.0);
   config.points = static_cast<int>(points);
   if (points != config.points) refuse(top.file(), "robustness.points", "is not a whole number");
   robustness = config.points > 0 ? std::optional(config) : std::nullopt;
@@ -266,16 +282,14 @@ void read_robustness(const YAML::Node& root, const Fields& top, std::optional<Ro
 
 void read_timing(const YAML::Node& root, const Fields& top, ServoScenario& scenario) {
   ServoScene& scene = scenario.scene;
-  const auto number = [&](const std::string& key, double& value, double low, double high) {
-    if (top.has(key)) value = Section::within(top, key, low, high);
-  };
-  number("duration_s", scene.duration_s, 0.0, 3600.0);
-  number("warm_up_s", scene.warm_up_s, 0.0, 3600.0);
-  number("sample_period_s", scene.period_s, 1e-3, 1.0);
-  number("latency_s", scene.latency_s, 0.0, 10.0);
-  number("specification_px", scenario.specification_px, 1e-3, 1e6);
+  const FieldList described = fields_of(scenario);
+  read_number(top, "duration_s", scene.duration_s, described);
+  read_number(top, "warm_up_s", scene.warm_up_s, described);
+  read_number(top, "sample_period_s", scene.period_s, described);
+  read_number(top, "latency_s", scene.latency_s, described);
+  read_number(top, "specification_px", scenario.specification_px, described);
   double seeds = scenario.num_seeds;
-  number("seeds", seeds, 1.0, 1000.0);
+  if (top.has("seeds")) seeds = within(top, "seeds", 1.0, 1000.0);
   if (seeds != std::floor(seeds)) refuse(top.file(), "seeds", "is not a whole number");
   scenario.num_seeds = static_cast<int>(seeds);
   if (!(scene.duration_s > scene.warm_up_s))
@@ -284,8 +298,8 @@ void read_timing(const YAML::Node& root, const Fields& top, ServoScenario& scena
   if (scene.latency_s > 200.0 * scene.period_s)
     refuse(top.file(), "latency_s", fmt::format("{} is more than 200 pictures late", scene.latency_s));
   const Section mismatch(root, top, "mismatch", {"gain", "tau"});
-  mismatch.number("gain", scene.mismatch.gain, 0.01, 100.0);
-  mismatch.number("tau", scene.mismatch.tau, 0.01, 100.0);
+  mismatch.number("gain", scene.mismatch.gain, described);
+  mismatch.number("tau", scene.mismatch.tau, described);
   if (!top.has("hidden_s")) return;
   const std::vector<double> times = top.numbers("hidden_s");
   if (times.size() % 2 != 0) refuse(top.file(), "hidden_s", "must be pairs of times: from, to, from, to");
@@ -330,8 +344,8 @@ ServoScenarioFile read_servo_scenario(const std::filesystem::path& file) {
   read_plant(root, top, read.scenario);
   read_noise(root, top, read.scenario);
   read_controllers(root, top, read.scenario);
-  read_filter(root, top, read.scenario.config.filter);
-  read_search(root, top, read.scenario.config.search);
+  read_filter(root, top, fields_of(read.scenario), read.scenario.config.filter);
+  read_search(root, top, fields_of(read.scenario), read.scenario.config.search);
   read_timing(root, top, read.scenario);
   read_robustness(root, top, read.scenario.robustness);
   read_lens(root, top, read.scenario.scene);

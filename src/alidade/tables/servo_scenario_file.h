@@ -4,8 +4,10 @@
 #include <string>
 
 #include "alidade/loop/servo_study.h"
+#include "alidade/public.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 struct ServoScenarioFile {
   ServoScenario scenario;
@@ -23,4 +25,5 @@ struct ServoScenarioFile {
 /// Every key with the preset's value: a scenario to begin from.
 [[nodiscard]] std::string servo_scenario_text();
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -61,7 +61,7 @@ Spot spot_of(const Csv& csv, std::size_t row, const ShotColumns& columns) {
   for (const std::string& name : {columns.u, columns.v}) {
     if (csv.is_empty(row, name)) throw InputError(csv.where(row, name) + ": is empty; a spot needs u and v");
     if (std::abs(csv.number(row, name)) > max_px)
-      throw InputError(csv.where(row, name) + ": '" + csv.text(row, name) + "' is in no picture");
+      throw InputError(csv.where(row, name) + ": '" + csv.text(row, name) + "' is in no image");
   }
   Spot spot{.px = {csv.number(row, columns.u), csv.number(row, columns.v)}};
   if (is_given(csv, row, "sigma_px")) spot.sigma_px = above_zero(csv, row, "sigma_px");
@@ -88,23 +88,24 @@ Plane plane_of_row(const Csv& csv, std::size_t row, const ShotColumns& columns) 
   return plane;
 }
 
-ShotRow read_row(const Csv& csv, std::size_t row, const ShotColumns& columns) {
-  ShotRow read;
+Shot shot_of_row(const Csv& csv, std::size_t row, const ShotColumns& columns) {
+  Shot read;
+  read.table = csv.name();
   read.line = csv.line(row);
-  read.shot.range_m = range_of(csv, row);
-  if (is_given(csv, row, "sigma_range_m")) read.shot.sigma_range_m = above_zero(csv, row, "sigma_range_m");
-  if (is_given(csv, row, columns.u) || is_given(csv, row, columns.v)) read.shot.spot = spot_of(csv, row, columns);
+  read.range_m = range_of(csv, row);
+  if (is_given(csv, row, "sigma_range_m")) read.sigma_range_m = above_zero(csv, row, "sigma_range_m");
+  if (is_given(csv, row, columns.u) || is_given(csv, row, columns.v)) read.spot = spot_of(csv, row, columns);
   if (is_given(csv, row, "nx") || is_given(csv, row, "ny") || is_given(csv, row, "nz") ||
       is_given(csv, row, columns.d)) {
-    read.shot.plane = plane_of_row(csv, row, columns);
+    read.plane = plane_of_row(csv, row, columns);
   }
   if (is_given(csv, row, "photo")) read.photo = csv.text(row, "photo");
   if (is_given(csv, row, "photo_off")) read.photo_off = csv.text(row, "photo_off");
   if (!read.photo_off.empty() && read.photo.empty())
     throw InputError(csv.where(row, "photo") + ": is empty, but there is a 'photo_off'");
-  if (!read.shot.spot && !read.shot.plane && read.photo.empty())
+  if (!read.spot && !read.plane && read.photo.empty())
     throw InputError(csv.where(row, "range_m") + ": nothing says what this range hit: a spot, a photo or a plane");
-  read.shot.name = read.photo.empty() ? fmt::format("row {}", read.line) : read.photo;
+  read.name = read.photo.empty() ? fmt::format("row {}", read.line) : read.photo;
   return read;
 }
 
@@ -113,20 +114,47 @@ std::string number(double value) { return fmt::format("{:.9g}", value); }
 }  // namespace
 
 ShotsFile read_shots(const std::filesystem::path& file, const ShotsOptions& options) {
-  const Csv csv = Csv::read(file);
+  return read_shots(Csv::read(file), options);
+}
+
+ShotsFile read_shots(const Csv& csv, const ShotsOptions& options) {
   const ShotColumns columns = shot_columns_of(csv);
   ShotsFile read;
   std::set<std::string> seen;  // the same measurement twice would be believed twice
   for_each_row(csv, options.skip_bad, read.skipped, [&](std::size_t row) {
-    ShotRow shot = read_row(csv, row, columns);
+    Shot shot = shot_of_row(csv, row, columns);
     std::string cells;
     for (const std::string& name : csv.header()) cells += csv.text(row, name) + ",";
     if (!seen.insert(std::move(cells)).second)
       throw InputError(csv.where(row, "range_m") + ": the same shot stands in a row before");
-    read.rows.push_back(std::move(shot));
+    read.shots.push_back(std::move(shot));
   });
-  if (read.rows.empty()) throw InputError(file.string() + ": has no shots; at least one row is needed");
+  if (read.shots.empty()) throw InputError(csv.name() + ": has no shots; at least one row is needed");
   return read;
+}
+
+std::map<std::string, std::string> photo_roles(std::span<const Shot> shots) {
+  std::map<std::string, std::string> roles;
+  for (const Shot& shot : shots)
+    if (!shot.photo_off.empty()) roles[shot.photo_off] = "photo_off";
+  return roles;
+}
+
+void add_corners(const std::filesystem::path& corners, std::span<const BoardView> views, std::vector<Shot>& shots) {
+  for (Shot& shot : shots) {
+    if (shot.photo.empty()) continue;
+    for (const BoardView& view : views)
+      if (view.photo == shot.photo) shot.board = view;
+    if (!shot.board) shot.no_board = "has no corners in " + corners.string();
+  }
+}
+
+void refuse_photo_of(const Shot& shot, const std::string& reason) {
+  // Simulated and measured elsewhere: shots name photos that nobody has, and their corners lie beside them.
+  const std::filesystem::path corners = std::filesystem::path(shot.table).parent_path() / "corners.csv";
+  std::string what = fmt::format("{}:{}: photo '{}': {}", shot.table, shot.line, shot.photo, reason);
+  if (std::filesystem::exists(corners)) what += "; for the corners in its stead: --corners " + corners.string();
+  throw InputError(what);
 }
 
 std::string shots_csv(std::span<const Shot> shots, bool with_photos) {

@@ -69,7 +69,7 @@ Corner corner_of(const Csv& csv, std::size_t row, const ViewColumns& columns, in
   corner.px = {csv.number(row, columns.u), csv.number(row, columns.v)};
   for (int axis = 0; axis < 2; ++axis) {
     const std::string& name = axis == 0 ? columns.u : columns.v;
-    if (!(std::abs(corner.px[axis]) <= max_px)) throw InputError(csv.where(row, name) + ": is in no picture");
+    if (!(std::abs(corner.px[axis]) <= max_px)) throw InputError(csv.where(row, name) + ": is in no image");
   }
   return corner;
 }
@@ -107,14 +107,27 @@ void add_row(const Csv& csv, std::size_t row, const ViewColumns& columns, int nu
 }  // namespace
 
 ViewsFile read_views(const std::filesystem::path& file, const ViewsOptions& options) {
-  const Csv csv = Csv::read(file);
+  return read_views(Csv::read(file), options);
+}
+
+ViewsFile read_views(const Csv& csv, const ViewsOptions& options) {
   const ViewColumns columns = view_columns_of(csv);
   ViewsFile read{{}, {}, columns.has_photo};
   std::map<long, std::size_t> index;
   for_each_row(csv, options.skip_bad, read.skipped,
                [&](std::size_t row) { add_row(csv, row, columns, options.num_points, index, read); });
-  if (read.views.empty()) throw InputError(file.string() + ": has no views; at least one row is needed");
+  if (read.views.empty()) throw InputError(csv.name() + ": has no views; at least one row is needed");
   return read;
+}
+
+void require_corners_inside(const std::filesystem::path& file, std::span<const HeadView> views,
+                            const std::map<int, Camera>& cameras) {
+  const std::string fault = image_fault(views, cameras);
+  if (!fault.empty()) throw InputError(file.string() + ": " + fault);
+}
+
+void refuse_photo(const std::filesystem::path& file, const SkippedInput& photo) {
+  throw InputError(fmt::format("{}: photo '{}': {}", file.string(), photo.file, photo.reason));
 }
 
 std::string views_csv(std::span<const HeadView> views) {

@@ -1,14 +1,20 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "alidade/estimation/counts.h"
+#include "alidade/pantilt/head_cameras.h"
 #include "alidade/pantilt/head_view.h"
+#include "alidade/public.h"
 
 namespace alidade {
+class Csv;
+
+ALIDADE_PUBLIC_BEGIN
 
 struct ViewsFile {
   std::vector<HeadView> views;  ///< In order of first appearance; seen.photo: "view 17", or the photo's name.
@@ -17,15 +23,25 @@ struct ViewsFile {
 };
 
 struct ViewsOptions {
-  bool skip_bad = false;  ///< Leave out rows that are wrong, by name.
+  bool skip_bad = false;  ///< Reject rows that are wrong, by name.
   int num_points = 0;     ///< Of the board.
 };
 
-/// Reads `view,board,head,pan_rad,tilt_rad` with `corner,u,v` (also `u_px,v_px`), one row a corner, or with `photo`,
-/// one row a view. Throws InputError: a missing column, degrees (more than a turn, or `pan_deg`), a view whose rows
-/// differ in board, head or angles, a corner that the board does not have or that stands twice, no rows.
+/// Reads `view,board,head,pan_rad,tilt_rad` with `corner,u,v` (also `u_px,v_px`), one row per corner, or with `photo`,
+/// one row per view. Throws InputError: a missing column, degrees (more than a revolution, or `pan_deg`), a view whose
+/// rows differ in board, head or angles, a corner that the board does not have or that stands twice, no rows.
 [[nodiscard]] ViewsFile read_views(const std::filesystem::path& file, const ViewsOptions& options);
+/// The same of a table that was read elsewhere.
+[[nodiscard]] ViewsFile read_views(const Csv& csv, const ViewsOptions& options);
+
+/// Throws InputError about the table of that name where a corner lies outside its camera's image.
+void require_corners_inside(const std::filesystem::path& file, std::span<const HeadView> views,
+                            const std::map<int, Camera>& cameras);
+
+/// Throws InputError about a photo that the table of that name names, and that cannot be used.
+[[noreturn]] void refuse_photo(const std::filesystem::path& file, const SkippedInput& photo);
 
 [[nodiscard]] std::string views_csv(std::span<const HeadView> views);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

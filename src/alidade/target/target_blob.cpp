@@ -3,17 +3,11 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "alidade/estimation/median.h"
 #include "alidade/target/target_search.h"
 
 namespace alidade {
 namespace {
-
-float median_of(std::vector<float> values) {
-  if (values.empty()) return 0.0F;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Some ten thousand values of an image, evenly spread.
 std::vector<float> sample_of(const cv::Mat& image) {

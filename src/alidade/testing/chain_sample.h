@@ -60,7 +60,7 @@ inline TrackReport track_chain(const Chain& chain, double range_m, std::uint64_t
   scene.sigma_px = 0.3;
   scene.sigma_encoder_rad = RigNoise{}.sigma_encoder_rad;
   scene.position = drawn_path({0.25, -0.1 * range_m, range_m}, 0.5, scene.duration_s, seed);
-  TrackConfig config;
+  FollowConfig config;
   config.tracker.sigma_px = scene.sigma_px;
   config.tracker.max_depth_m = 60.0;
   if (counted) config.tracker.errors = rig_uncertainty(chain.rig);

@@ -24,7 +24,7 @@ inline LocalizationFilterConfig desk_filter() {
   config.sigma_alpha_rad_s2 = 6.0;
   config.state_capacity = 760;
   config.observations_capacity = 80;
-  return for_images(config, EyesConfig{}.sigma_floor_px);
+  return for_images(config, ImageFeatureConfig{}.sigma_floor_px);
 }
 
 /// Of each frame: eᵀP⁻¹e of the position over 3 and of the pose over 6, and the filter's NIS.

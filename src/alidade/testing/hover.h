@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-#include "alidade/localize/localize.h"
+#include "alidade/localize.h"
 #include "alidade/simulate/draws.h"
 
 namespace alidade::testing {

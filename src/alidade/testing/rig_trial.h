@@ -60,12 +60,12 @@ inline RigTrial rig_trial(const RigTrialSetup& setup, std::uint64_t seed) {
   const std::vector<HeadView> views =
       mistaken_views(simulate_head_views(scene, setup.noise, seed).views, scene, setup.mistake);
   RigConfig config;
-  config.square_m = scene.board.square_m;
+  config.board = scene.board;
   config.sigma_square_m = 1e-9;
   if (setup.tells_scale) config.sigma_scale = 1e-9;
-  config.estimate_by_need = setup.by_need;
   RigTrial trial;
-  trial.report = calibrate_rig(views, points_in_board(scene.board), cameras, config);
+  const auto calibrated = setup.by_need ? calibrate_rig_by_need : calibrate_rig;
+  trial.report = calibrated(views, points_in_board(scene.board), cameras, config, {});
   trial.verdict = rig_verdict(trial.report, config);
   const bool is_solved = trial.verdict.state == State::good || trial.verdict.state == State::care;
   Rig truth = scene.rig;

@@ -58,11 +58,11 @@ void add_costs(const TrackReport& report, std::span<const TargetObservation> obs
 }
 
 BlockCosts costs_of(const std::vector<std::vector<TargetObservation>>& stretches, std::span<const RigHead> heads,
-                    const TrackConfig& config, const ClockShift& shift) {
-  TrackConfig plain;
+                    const FollowConfig& config, const ClockShift& shift) {
+  FollowConfig plain;
   plain.tracker = config.tracker;
   plain.find_sigma_a = plain.judge = false;
-  plain.tracker.learn_errors = plain.tracker.errors.num() > 0 && plain.tracker.method != TrackMethod::imm;
+  plain.tracker.learn_errors = plain.tracker.errors.num() > 0 && plain.tracker.method != TargetMotion::imm;
   BlockCosts best;
   double least = std::numeric_limits<double>::infinity();
   // A right clock makes a target calmer, never livelier.
@@ -109,7 +109,7 @@ std::vector<TargetObservation> with_shift(std::span<const TargetObservation> obs
 }
 
 std::optional<ClockShift> probable_clock_shift(std::span<const TargetObservation> observations,
-                                               std::span<const RigHead> heads, const TrackConfig& config) {
+                                               std::span<const RigHead> heads, const FollowConfig& config) {
   const std::size_t max_observations =
       config.tracker.errors.num() > 0 ? 1200 : 4000;  // learning costs several times more
   constexpr double min_gain = 20.0, nis_that_fits = 1.5;

@@ -20,7 +20,8 @@ struct ClockShift {
 /// None where no shift of up to 0.1 s makes the observations more probable by far, throughout the log, and lets them
 /// fit.
 [[nodiscard]] std::optional<ClockShift> probable_clock_shift(std::span<const TargetObservation> observations,
-                                                             std::span<const RigHead> heads, const TrackConfig& config);
+                                                             std::span<const RigHead> heads,
+                                                             const FollowConfig& config);
 
 /// The observations in order of capture, one head's taken so much later than they say.
 [[nodiscard]] std::vector<TargetObservation> with_shift(std::span<const TargetObservation> observations,

@@ -118,7 +118,7 @@ struct Covered {
   double counted = 0.0, exact = 0.0, smoothed = 0.0, nis_learned = 0.0;  ///< NEES/3 and NIS/2.
 };
 
-Covered covered_at(double range_m, TrackMethod method, int runs) {
+Covered covered_at(double range_m, TargetMotion method, int runs) {
   const Rig rig = rig_with_errors();
   Covered covered;
   double num_smoothed = 0.0;
@@ -132,14 +132,14 @@ Covered covered_at(double range_m, TrackMethod method, int runs) {
     scene.position = testing::drawn_path({0.2, -0.2, range_m}, 1.0, scene.duration_s, seed);
     scene.heads = drawn_heads(rig, draws);
     const auto observations = observations_of(scene, seed);
-    TrackConfig config;
+    FollowConfig config;
     config.find_sigma_a = false;
     config.tracker.method = method;
     config.tracker.max_depth_m = 60.0;
     const TrueTrack truth = testing::truth_of(scene);
     covered.exact += track_target(observations, rig.heads, config, truth).nees_per_dof / runs;
     config.tracker.errors = rig_uncertainty(rig);
-    if (method != TrackMethod::imm) config.smooth_s = 0.2;
+    if (method != TargetMotion::imm) config.smooth_s = 0.2;
     const TrackReport report = track_target(observations, rig.heads, config, truth);
     covered.counted += report.nees_per_dof / runs;
     for (const PredictedStep& step : report.smoothed) {
@@ -150,7 +150,7 @@ Covered covered_at(double range_m, TrackMethod method, int runs) {
       num_smoothed += 1.0;
     }
     config.tracker.learn_errors = true;
-    if (method == TrackMethod::imm) config.tracker.method = TrackMethod::cv;
+    if (method == TargetMotion::imm) config.tracker.method = TargetMotion::cv;
     covered.nis_learned += track_target(observations, rig.heads, config, truth).nis_per_dof / runs;
   }
   if (num_smoothed > 0.0) covered.smoothed /= num_smoothed;
@@ -158,7 +158,7 @@ Covered covered_at(double range_m, TrackMethod method, int runs) {
 }
 
 TEST(ConsideredErrors, ComeInAnyOrderAndAllocateNothing) {
-  for (const TrackMethod method : {TrackMethod::cv, TrackMethod::imm}) {
+  for (const TargetMotion method : {TargetMotion::cv, TargetMotion::imm}) {
     const Rig rig = rig_with_errors();
     const TrackScene scene = *track_scenario("G");
     TrackerConfig config;
@@ -181,8 +181,8 @@ TEST(ConsideredErrors, ComeInAnyOrderAndAllocateNothing) {
     }
     EXPECT_EQ(testing::num_allocations(), before);
     EXPECT_EQ(starts, 1u);
-    EXPECT_LT((last.belief.x - last_shuffled.belief.x).norm(), 1e-9) << method_name(method);
-    EXPECT_LT((last.belief.P - last_shuffled.belief.P).norm(), 1e-9) << method_name(method);
+    EXPECT_LT((last.belief.x - last_shuffled.belief.x).norm(), 1e-9) << motion_name(method);
+    EXPECT_LT((last.belief.P - last_shuffled.belief.P).norm(), 1e-9) << motion_name(method);
   }
 }
 
@@ -192,7 +192,7 @@ TEST(RigFaults, ATurnedHeadIsNamedAndARightOneIsNot) {
     std::vector<RigHead> told = scene.heads;
     if (is_turned)
       told[1].head.world_from_base.rotation = told[1].head.world_from_base.rotation * exp_so3({0.01, 0.0, 0.0});
-    TrackConfig config;
+    FollowConfig config;
     const TrackReport report = track_target(observations_of(scene, 3), told, config);
     ASSERT_FALSE(report.faults.empty());
     if (is_turned) {
@@ -206,17 +206,17 @@ TEST(RigFaults, ATurnedHeadIsNamedAndARightOneIsNot) {
 }
 
 TEST(ConsideredErrors, AreCoveredAtAllRanges) {
-  for (const TrackMethod method : {TrackMethod::cv, TrackMethod::singer, TrackMethod::imm}) {
+  for (const TargetMotion method : {TargetMotion::cv, TargetMotion::singer, TargetMotion::imm}) {
     for (const double range_m : {1.0, 3.0, 6.0, 12.0}) {
       const Covered covered = covered_at(range_m, method, 60);
       // 60 rigs, three numbers each that hardly change during a run: ± 0.11.
-      EXPECT_NEAR(covered.counted, 1.0, 0.3) << method_name(method) << " at " << range_m << " m";
-      EXPECT_GT(covered.exact, 1.8 * covered.counted) << method_name(method) << " at " << range_m << " m";
-      if (method == TrackMethod::cv)  // the model by which the target was drawn
+      EXPECT_NEAR(covered.counted, 1.0, 0.3) << motion_name(method) << " at " << range_m << " m";
+      EXPECT_GT(covered.exact, 1.8 * covered.counted) << motion_name(method) << " at " << range_m << " m";
+      if (method == TargetMotion::cv)  // the model by which the target was drawn
         EXPECT_NEAR(covered.nis_learned, 1.0, 0.1) << range_m << " m";
-      if (method != TrackMethod::imm && range_m < 10.0)  // at 12 m the range's own curvature shows: 1.5
+      if (method != TargetMotion::imm && range_m < 10.0)  // at 12 m the range's own curvature shows: 1.5
         EXPECT_NEAR(covered.smoothed, 1.0, 0.35) << range_m << " m";
-      RecordProperty("nees_" + std::string(method_name(method)) + std::to_string(static_cast<int>(range_m)),
+      RecordProperty("nees_" + std::string(motion_name(method)) + std::to_string(static_cast<int>(range_m)),
                      std::to_string(covered.counted) + " " + std::to_string(covered.exact) + " " +
                          std::to_string(covered.smoothed) + " " + std::to_string(covered.nis_learned));
     }

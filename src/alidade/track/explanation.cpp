@@ -27,10 +27,10 @@ struct Trial {
 };
 
 /// How the observations fare, the target being as manoeuvring as suits them best.
-Trial tried(const Observations& observations, std::span<const RigHead> heads, const TrackConfig& config) {
+Trial tried(const Observations& observations, std::span<const RigHead> heads, const FollowConfig& config) {
   constexpr double min_used = 0.9, nis_that_fits = 1.7, max_restarts = 0.01;
   Trial best;
-  TrackConfig plain = config;
+  FollowConfig plain = config;
   plain.judge = plain.find_sigma_a = false;
   for (const double sigma_a : {0.1, 1.0, 8.0}) {
     plain.tracker.sigma_a_m_s2 = config.find_sigma_a ? sigma_a : config.tracker.sigma_a_m_s2;
@@ -75,12 +75,12 @@ void add_turned(std::span<const RigHead> heads, std::optional<std::size_t> head,
     observation.px[axis] = (axis == 0 ? camera.width_px : camera.height_px) - 1.0 - observation.px[axis];
   };
   const std::string whose = head ? head_name(heads, *head) : "all heads";
-  add("the pictures of " + whose + " are mirrored", "turn u about: then the events fit the rig",
+  add("the images of " + whose + " are mirrored", "mirror u: then the events fit the rig",
       [mirrored](TargetObservation& observation) { mirrored(observation, 0); });
-  add("the pictures of " + whose + " are flipped upside down", "turn v about: then the events fit the rig",
+  add("the images of " + whose + " are flipped upside down", "mirror v: then the events fit the rig",
       [mirrored](TargetObservation& observation) { mirrored(observation, 1); });
-  add("the pictures of " + whose + " are turned by half a turn",
-      "that camera hangs upside down: turn u and v about, or say so in the rig's cam_from_tilt",
+  add("the images of " + whose + " are rotated by half a turn",
+      "that camera hangs upside down: mirror u and v, or say so in the rig's cam_from_tilt",
       [mirrored](TargetObservation& observation) {
         mirrored(observation, 0);
         mirrored(observation, 1);
@@ -106,15 +106,16 @@ std::vector<Hypothesis> hypotheses(std::span<const RigHead> heads) {
 
 /// Of three heads or more the one without which the others' observations fit.
 std::optional<Explanation> foreign_head(const Observations& observations, std::span<const RigHead> heads,
-                                        const TrackConfig& config) {
+                                        const FollowConfig& config) {
   std::optional<Explanation> found;
   for (std::size_t head = 0; heads.size() > 2 && head < heads.size(); ++head) {
     Observations others = observations;
     std::erase_if(others, [&](const TargetObservation& observation) { return observation.head == head; });
     if (others.size() == observations.size() || !tried(others, heads, config).fits) continue;
     if (found) return std::nullopt;  // of two that could be it neither is named
-    found = {"the sights of " + head_name(heads, head) + " agree with none of the other heads, which agree",
-             "its row in the rig file is that of another head, or its events are: leave it out, or place it anew",
+    found = {"the observations of " + head_name(heads, head) + " agree with none of the other heads, which agree",
+             "its row in the rig file is that of another head, or its events are: remove it, or calibrate where it "
+             "stands again",
              true};
   }
   return found;
@@ -128,11 +129,11 @@ std::string clock_text(const ClockShift& shift, std::span<const RigHead> heads) 
                                                : "that of head " + std::to_string(heads[1].head.id);
   return "the clock of " + head_name(heads, shift.head) + " seems " + text_of(1e3 * std::abs(shift.later_s), 2) +
          " ms " + (shift.later_s > 0.0 ? "behind" : "ahead of") + " " + others +
-         ": with its times moved by that the sights are far more probable";
+         ": with its times moved by that the observations are far more probable";
 }
 
 std::optional<Explanation> explanation_of(std::span<const TargetObservation> observations,
-                                          std::span<const RigHead> heads, const TrackConfig& config) {
+                                          std::span<const RigHead> heads, const FollowConfig& config) {
   constexpr std::size_t max_observations = 1200, first_observations = 160;
   constexpr double min_gain = 30.0, clear = 15.0;
   Observations given = with_shift(observations.first(std::min(observations.size(), max_observations)), {});

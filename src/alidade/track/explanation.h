@@ -20,7 +20,7 @@ struct Explanation {
 /// the rig's: the one under which the observations fit and are the most probable. Two of them where they are nearly
 /// equally probable; none where none lets the observations fit.
 [[nodiscard]] std::optional<Explanation> explanation_of(std::span<const TargetObservation> observations,
-                                                        std::span<const RigHead> heads, const TrackConfig& config);
+                                                        std::span<const RigHead> heads, const FollowConfig& config);
 
 /// "the clock of head 2 seems 30 ms behind that of head 1 …"
 [[nodiscard]] std::string clock_text(const ClockShift& shift, std::span<const RigHead> heads);

@@ -22,9 +22,9 @@ struct Judged {
 };
 
 /// As `alidade track` judges events whose rig file says nothing of its errors.
-Judged judged(const TrackScene& scene, std::uint64_t seed, TrackMethod method = TrackMethod::cv) {
+Judged judged(const TrackScene& scene, std::uint64_t seed, TargetMotion method = TargetMotion::cv) {
   const std::vector<TargetObservation> observations = testing::observations_of(scene, seed);
-  TrackConfig config;
+  FollowConfig config;
   config.tracker.method = method;
   Judged result;
   result.report = track_target(observations, scene.heads, config);
@@ -66,7 +66,7 @@ const std::vector<FaultCase>& fault_cases() {
       {"tilt zero of head 2", [](TrackFaults& f) { f.zero_rad[1].y() = -0.01; }, "base_rx_rad|tilt"},
       {"clock ahead", [](TrackFaults& f) { f.clock_s = 0.04; }, "the clock of head 2"},
       {"clock behind", [](TrackFaults& f) { f.clock_s = -0.04; }, "the clock of head 2"},
-      {"clutter", [](TrackFaults& f) { f.clutter = 0.1; }, "left out|larger than stated"},
+      {"clutter", [](TrackFaults& f) { f.clutter = 0.1; }, "rejected|larger than stated"},
       {"swapped", [](TrackFaults& f) { f.swapped = true; }, "heads swapped"},
       {"mirrored", [](TrackFaults& f) { f.mirrored = true; }, "head 2 are mirrored"},
       {"pan sign", [](TrackFaults& f) { f.pan_sign = true; }, "pan of head 2 with the wrong sign"},
@@ -110,7 +110,7 @@ TEST(TrackFaults, CleanScenariosAreGood) {
     int num_good = 0;
     for (std::uint64_t seed = 101; seed < 101 + draws; ++seed) {
       const std::vector<TargetObservation> observations = testing::observations_of(scene, seed);
-      const TrackConfig config;
+      const FollowConfig config;
       const TrackReport report = track_target(observations, scene.heads, config, testing::truth_of(scene));
       num_good += track_verdict(report, observations, scene.heads, config).state == State::good ? 1 : 0;
     }
@@ -131,7 +131,7 @@ TEST(TrackFaults, OfThreeHeadsTheWrongOneIsNamed) {
   scene.phase_s = {0.0, 0.01, 0.02};
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     const std::vector<TargetObservation> observations = testing::observations_of(scene, seed);
-    const TrackConfig config;
+    const FollowConfig config;
     for (std::size_t wrong = 0; wrong < 3; ++wrong) {
       const std::string head = "head " + std::to_string(scene.heads[wrong].head.id);
       std::vector<RigHead> heads = scene.heads;
@@ -139,7 +139,7 @@ TEST(TrackFaults, OfThreeHeadsTheWrongOneIsNamed) {
           heads[wrong].head.world_from_base.rotation * exp_so3({0.3, 0.4, 0.1});
       const Verdict foreign = track_verdict(track_target(observations, heads, config), observations, heads, config);
       EXPECT_EQ(foreign.exit_code, ExitCode::cannot_tell);
-      EXPECT_NE(foreign.sentence.find("the sights of " + head), std::string::npos) << foreign.sentence;
+      EXPECT_NE(foreign.sentence.find("the observations of " + head), std::string::npos) << foreign.sentence;
       const std::vector<TargetObservation> late = with_shift(observations, {wrong, 0.04});
       const Verdict clock = track_verdict(track_target(late, scene.heads, config), late, scene.heads, config);
       EXPECT_NE(clock.sentence.find("the clock of " + head + " seems"), std::string::npos) << clock.sentence;
@@ -166,7 +166,7 @@ TEST(TrackFaults, SigmaCoversWithClutter) {
       constexpr int draws = 20;
       for (std::uint64_t seed = 1; seed <= draws; ++seed) {
         const std::vector<TargetObservation> observations = testing::observations_of(scene, seed);
-        TrackConfig config;
+        FollowConfig config;
         config.warm_up_s = 1.0;
         nees += track_target(observations, scene.heads, config, testing::truth_of(scene)).nees_per_dof / draws;
       }
@@ -181,7 +181,7 @@ struct Throws {
 };
 
 /// Predictions 0.3 s ahead of twenty throws, from 0.15 s after each throw on, both times in flight: the vertical error.
-Throws thrown(TrackMethod method) {
+Throws thrown(TargetMotion method) {
   Throws all;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Draws draws(seed);
@@ -189,7 +189,7 @@ Throws thrown(TrackMethod method) {
     TrackScene scene = *track_scenario("throw");
     scene.position = thrown_ball({draws.uniform(-0.2, 0.4), draws.uniform(-0.1, 0.3), 3.0}, velocity);
     const double lands_s = 1.0 - 2.0 * velocity.y() / 9.80665;
-    TrackConfig config;
+    FollowConfig config;
     config.tracker.method = method;
     config.predict_s = 0.3;
     for (const PredictedStep& step : track_target(testing::observations_of(scene, seed), scene.heads, config).ahead) {
@@ -205,12 +205,12 @@ Throws thrown(TrackMethod method) {
 }
 
 TEST(TrackFaults, PredictionsInFlightAreWithinTheirSigma) {
-  for (const TrackMethod method : {TrackMethod::ballistic, TrackMethod::imm}) {
+  for (const TargetMotion method : {TargetMotion::ballistic, TargetMotion::imm}) {
     const Throws throws = thrown(method);
     EXPECT_GT(throws.num, 400.0);
-    EXPECT_LT(throws.mean_z2, 1.2) << method_name(method);
-    EXPECT_LE(throws.beyond_three, 0.01 * throws.num) << method_name(method);
-    RecordProperty("z2_" + std::string(method_name(method)), std::to_string(throws.mean_z2));
+    EXPECT_LT(throws.mean_z2, 1.2) << motion_name(method);
+    EXPECT_LE(throws.beyond_three, 0.01 * throws.num) << motion_name(method);
+    RecordProperty("z2_" + std::string(motion_name(method)), std::to_string(throws.mean_z2));
   }
 }
 

@@ -63,7 +63,7 @@ HeadInnovations finished(const Sums& sums) {
 
 std::vector<HeadInnovations> test_innovations(std::span<const TargetObservation> observations,
                                               std::span<const RigHead> heads, std::span<const TrackStep> steps,
-                                              const TrackConfig& config) {
+                                              const FollowConfig& config) {
   std::vector<Sums> sums(heads.size());
   double began_s = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < steps.size() && i < observations.size(); ++i) {

@@ -128,7 +128,7 @@ ZoomingTrack zooming_track(std::uint64_t seed, double sigma_share, const Eigen::
 }
 
 TrackReport tracked(ZoomingTrack& track, double sigma_a) {
-  TrackConfig config;
+  FollowConfig config;
   config.find_sigma_a = false;
   config.judge = false;
   config.tracker.sigma_a_m_s2 = sigma_a;

@@ -24,7 +24,7 @@ struct Scores {
   std::size_t without_belief = 0, num = 0;
 };
 
-Scores scores_of(const TrackScene& scene, TrackMethod method, int runs, double after_s = 0.0) {
+Scores scores_of(const TrackScene& scene, TargetMotion method, int runs, double after_s = 0.0) {
   Scores scores;
   double sum2 = 0.0, nees = 0.0, after2 = 0.0, num_after = 0.0;
   for (int run = 0; run < runs; ++run) {
@@ -65,7 +65,7 @@ TEST(TrackMonteCarlo, ReachesItsFiguresInEveryScenario) {
   const std::map<std::string, double> max_mm{{"A", 2.2},  {"A2", 2.2}, {"B", 3.8}, {"C", 52.0},
                                              {"E", 12.5}, {"F", 97.0}, {"G", 54.0}};
   for (const auto& [name, limit_mm] : max_mm) {
-    const Scores scores = scores_of(*track_scenario(name), TrackMethod::cv, 40);
+    const Scores scores = scores_of(*track_scenario(name), TargetMotion::cv, 40);
     EXPECT_LE(scores.rmse_mm, limit_mm) << name;
     EXPECT_GE(scores.nees, 0.6) << name;
     EXPECT_LE(scores.nees, 1.3) << name;
@@ -76,15 +76,15 @@ TEST(TrackMonteCarlo, ReachesItsFiguresInEveryScenario) {
 
 TEST(TrackMonteCarlo, OtherModelsDoAsWellAsTheirReference) {
   // An independent implementation's figures, 150 runs: turn 40.0 and imm 42.7 mm in C, Singer 7.4 to 7.7 mm in E.
-  EXPECT_LE(scores_of(*track_scenario("C"), TrackMethod::turn, 150).rmse_mm, 44.0);
-  EXPECT_LE(scores_of(*track_scenario("C"), TrackMethod::imm, 150).rmse_mm, 47.0);
+  EXPECT_LE(scores_of(*track_scenario("C"), TargetMotion::turn, 150).rmse_mm, 44.0);
+  EXPECT_LE(scores_of(*track_scenario("C"), TargetMotion::imm, 150).rmse_mm, 47.0);
   TrackScene late = *track_scenario("E");
   late.sigma_a_m_s2 = 0.5;
-  EXPECT_LE(scores_of(late, TrackMethod::singer, 30).rmse_mm, 8.2);
+  EXPECT_LE(scores_of(late, TargetMotion::singer, 30).rmse_mm, 8.2);
 }
 
 TEST(TrackMonteCarlo, NoRunDivergesThroughOcclusions) {
-  const Scores scores = scores_of(*track_scenario("D"), TrackMethod::cv, 100, 7.75);
+  const Scores scores = scores_of(*track_scenario("D"), TargetMotion::cv, 100, 7.75);
   EXPECT_LE(scores.after_mm, 55.0);
   EXPECT_LE(scores.worst_after_mm, 100.0);  // twice what a run without occlusions has at the most
   EXPECT_EQ(scores.without_belief, 0u);
@@ -116,7 +116,7 @@ TEST(TrackMonteCarlo, BeatsThePapersFilterAtItsBest) {
   const std::map<std::string, double> min_ratio{{"A", 8.0}, {"A2", 50.0}, {"B", 25.0}, {"C", 7.0}};
   for (const auto& [name, ratio] : min_ratio) {
     const TrackScene scene = *track_scenario(name);
-    const double paper_mm = best_of_the_paper_mm(scene, 5), ours_mm = scores_of(scene, TrackMethod::cv, 20).rmse_mm;
+    const double paper_mm = best_of_the_paper_mm(scene, 5), ours_mm = scores_of(scene, TargetMotion::cv, 20).rmse_mm;
     EXPECT_GE(paper_mm / ours_mm, ratio) << name << ": " << paper_mm << " and " << ours_mm << " mm";
     RecordProperty("ratio_" + name, std::to_string(paper_mm / ours_mm));
   }
@@ -161,7 +161,7 @@ TEST(TrackMonteCarlo, IsAtTheBoundWhereTheModelHolds) {
     constexpr int runs = 150;
     for (int run = 0; run < runs; ++run) {
       const TrackScene scene = scene_of_the_model(given.start, given.sigma_a, static_cast<std::uint64_t>(run));
-      TrackConfig config;
+      FollowConfig config;
       config.find_sigma_a = false;
       config.warm_up_s = 1.0;
       config.tracker.sigma_a_m_s2 = given.sigma_a;

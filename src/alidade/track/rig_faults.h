@@ -5,19 +5,13 @@
 #include <vector>
 
 #include "alidade/pantilt/rig_uncertainty.h"
+#include "alidade/track/track_report.h"
 #include "alidade/track/tracker.h"
 
 namespace alidade {
 
-/// What the observations of a track say of one number that the rig file states.
-struct RigFault {
-  std::string name;  ///< "head2.base_rx_rad", "head1.tilt_scale", "head2.camera.fy".
-  double off = 0.0;  ///< By how much it seems off, in its unit.
-  double z = 0.0;    ///< The same over what would be by chance.
-};
-
 /// Of a filter that learned the errors: each number against what its covariance allows, the most surprising first.
-/// Numbers that the observations hardly tell, and those within the plane of both rays, are left out. `is_supposed`: the
+/// Numbers that the observations hardly tell, and those within the plane of both rays, are omitted. `is_supposed`: the
 /// errors are no one's σ but a question, and the file's numbers may be exact; each is then asked about by itself.
 [[nodiscard]] std::vector<RigFault> rig_faults(std::span<const RigHead> heads, const RigUncertainty& errors,
                                                const Tracker::Learned& learned, bool is_supposed);

@@ -2,11 +2,12 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numeric>
 
 #include "alidade/geometry/decompositions.h"
+#include "alidade/track/rig_faults.h"
+#include "alidade/track/xiahou_tracker.h"
 
 namespace alidade {
 namespace {
@@ -21,13 +22,17 @@ void add_smoothed(const std::optional<Tracker::Smoothed>& now, std::vector<Predi
 }
 
 TrackReport followed(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                     const TrackerConfig& config, double predict_s = 0.0, double smooth_s = 0.0,
-                     const TrackWatch& watch = {}, std::optional<Tracker::Learned>* learned = nullptr) {
+                     const TrackerConfig& config, const Progress& progress, double predict_s = 0.0,
+                     double smooth_s = 0.0, const TrackWatch& watch = {},
+                     std::optional<Tracker::Learned>* learned = nullptr) {
   Tracker tracker({heads.begin(), heads.end()}, config);
   TrackReport report;
   report.sigma_a_m_s2 = config.sigma_a_m_s2;
   report.steps.reserve(observations.size());
+  constexpr std::size_t between_reports = 64;
   for (const TargetObservation& observation : observations) {
+    if (report.steps.size() % between_reports == 0)
+      report_progress(progress, "tracking", report.steps.size(), observations.size());
     const TrackStep step = tracker.take(observation);
     report.num_used += step.accepted ? 1 : 0;
     report.num_starts += step.event == TrackEvent::start ? 1 : 0;
@@ -42,20 +47,21 @@ TrackReport followed(std::span<const TargetObservation> observations, std::span<
     const auto ahead = tracker.at(step.t_s + predict_s);
     report.ahead.push_back({step.t_s + predict_s, ahead.has_value(), ahead.value_or(Belief<6>{})});
   }
+  if (report.num_starts > 0) report.status = TrackReport::Status::tracked;
   if (learned != nullptr) *learned = tracker.learned();
   return report;
 }
 
 /// The σ_a whose innovations are the most probable, from 0.03 to 30 m/s² in steps of a quarter of a decade.
 double max_probable_sigma_a(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                            TrackerConfig config) {
+                            TrackerConfig config, const Progress& progress) {
   constexpr std::size_t max_observations = 4000;  // a few minutes: enough to tell
   config.learn_errors = config.errors.num() > 0;  // the others' innovations follow one another
   const auto first = observations.first(std::min(observations.size(), max_observations));
   double best = config.sigma_a_m_s2, most = -std::numeric_limits<double>::infinity();
   for (int quarter = -6; quarter <= 6; ++quarter) {
     config.sigma_a_m_s2 = std::pow(10.0, 0.25 * quarter);
-    const TrackReport report = followed(first, heads, config);
+    const TrackReport report = followed(first, heads, config, progress);
     const double log_likelihood =
         report.log_likelihood - config.gate * static_cast<double>(report.num_restarts);  // a restart hides its misfit
     if (report.num_starts > 0 && log_likelihood > most) {
@@ -118,31 +124,6 @@ void add_smoothed_error(TrackReport& report, const std::vector<bool>& counts, co
   if (num > 0.0) report.smoothed_rms_m = std::sqrt(sum2 / num);
 }
 
-/// The angles (pan, tilt) that an unturned head without offsets would have to look along an observation.
-std::optional<Eigen::Vector2d> angles_of_ray(const RigHead& head, const TargetObservation& observation) {
-  const auto ray = ray_in_world(head, observation);
-  if (!ray) return std::nullopt;
-  const Eigen::Vector3d& d = ray->direction_in_world;
-  return Eigen::Vector2d(-std::atan2(d.x(), d.z()), -std::atan2(d.y(), std::hypot(d.x(), d.z())));
-}
-
-TrackStep step_of(const XiahouFilter& filter, double t_s, const Eigen::Vector3d& origin) {
-  constexpr double m_per_cm = 0.01;
-  constexpr std::array<int, 6> place{0, 2, 4, 1, 3, 5};  // of x, y, z, vx, vy, vz in the paper's state
-  TrackStep step;
-  step.t_s = t_s;
-  step.has_belief = step.accepted = true;
-  step.event = TrackEvent::none;
-  for (int i = 0; i < 6; ++i) {
-    const int from = place[static_cast<std::size_t>(i)];
-    step.belief.x[i] = m_per_cm * filter.state().x[from];
-    for (int j = 0; j < 6; ++j)
-      step.belief.P(i, j) = m_per_cm * m_per_cm * filter.state().P(from, place[static_cast<std::size_t>(j)]);
-  }
-  step.belief.x.head<3>() += origin;
-  return step;
-}
-
 }  // namespace
 
 double position_nees(const TrackStep& step, const TrueTrack& truth) {
@@ -199,15 +180,15 @@ void inflate(TrackReport& report) {
 /// What of the rig the observations contradict, by a filter that learns its errors: those that its file states, else
 /// supposed. The target may go anywhere meanwhile, so that what it does is not taken for the rig's fault.
 void ask_for_faults(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                    const TrackConfig& config, TrackReport& report) {
+                    const FollowConfig& config, TrackReport& report) {
   constexpr double freely = 10.0, min_m_s2 = 10.0;
   TrackerConfig learning = config.tracker;
-  learning.method = TrackMethod::cv;
+  learning.method = TargetMotion::cv;
   learning.learn_errors = true;
   learning.sigma_a_m_s2 = std::max(min_m_s2, freely * learning.sigma_a_m_s2);
   if (!report.errors_are_counted) learning.errors = supposed_errors(heads);
   std::optional<Tracker::Learned> learned;
-  const TrackReport free = followed(observations, heads, learning, 0.0, 0.0, {}, &learned);
+  const TrackReport free = followed(observations, heads, learning, config.progress, 0.0, 0.0, {}, &learned);
   if (learned && free.num_restarts <= 1)
     report.faults = rig_faults(heads, learning.errors, *learned, !report.errors_are_counted);
 }
@@ -215,13 +196,13 @@ void ask_for_faults(std::span<const TargetObservation> observations, std::span<c
 /// What observations say of noise, motion and rig. Where the rig's errors are counted, by innovations of a filter that
 /// learns them.
 void judge_observations(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                        const TrackConfig& config, TrackReport& report) {
+                        const FollowConfig& config, TrackReport& report) {
   report.errors_are_counted = config.tracker.errors.num() > 0;
   TrackerConfig learning = config.tracker;
   learning.learn_errors = report.errors_are_counted;
-  if (learning.learn_errors && learning.method == TrackMethod::imm) learning.method = TrackMethod::singer;
+  if (learning.learn_errors && learning.method == TargetMotion::imm) learning.method = TargetMotion::singer;
   const std::vector<TargetObservation> sorted = as_captured(observations);
-  const std::vector<TrackStep> steps = followed(sorted, heads, learning).steps;
+  const std::vector<TrackStep> steps = followed(sorted, heads, learning, config.progress).steps;
   report.nis_per_dof = mean_nis(steps, counted(steps, config.warm_up_s), config.tracker.gate);
   report.innovations = test_innovations(sorted, heads, steps, config);
   ask_for_faults(sorted, heads, config, report);
@@ -229,16 +210,23 @@ void judge_observations(std::span<const TargetObservation> observations, std::sp
 
 }  // namespace
 
-TrackReport track_target(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                         const TrackConfig& config, const TrueTrack& truth, const TrackWatch& watch) {
-  TrackConfig used = config;
-  if (config.find_sigma_a)
-    used.tracker.sigma_a_m_s2 = max_probable_sigma_a(as_captured(observations), heads, config.tracker);
+TrackerConfig with_history(const FollowConfig& config) {
+  TrackerConfig tracker = config.tracker;
   if (config.smooth_s > 0.0) {
-    used.tracker.history_s = std::max(used.tracker.history_s, 1.2 * config.smooth_s + 0.1);
-    used.tracker.max_kept = std::max<std::size_t>(used.tracker.max_kept, 2048);
+    tracker.history_s = std::max(tracker.history_s, 1.2 * config.smooth_s + 0.1);
+    tracker.max_kept = std::max<std::size_t>(tracker.max_kept, 2048);
   }
-  TrackReport report = followed(observations, heads, used.tracker, config.predict_s, config.smooth_s, watch);
+  return tracker;
+}
+
+TrackReport track_target(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                         const FollowConfig& config, const TrueTrack& truth, const TrackWatch& watch) {
+  FollowConfig used = config;
+  if (config.find_sigma_a)
+    used.tracker.sigma_a_m_s2 = max_probable_sigma_a(as_captured(observations), heads, config.tracker, config.progress);
+  used.tracker = with_history(used);
+  TrackReport report =
+      followed(observations, heads, used.tracker, config.progress, config.predict_s, config.smooth_s, watch);
   report.sigma_a_is_found = config.find_sigma_a;
   const std::vector<bool> counts = counted(report.steps, config.warm_up_s);
   if (config.judge) {
@@ -256,45 +244,22 @@ TrackReport track_target(std::span<const TargetObservation> observations, std::s
 
 TrackReport track_target_xiahou(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                                 const XiahouConfig& config, const TrueTrack& truth, const TrackWatch& watch) {
-  constexpr double together_s = 0.06;
   TrackReport report;
-  std::optional<XiahouFilter> filter;
-  std::array<std::optional<TargetObservation>, 2> last;
-  double filter_time_s = 0.0;
-  const Eigen::Vector3d origin = heads.empty() ? Eigen::Vector3d::Zero() : heads[0].head.world_from_base.translation;
+  XiahouTracker tracker(heads, config);
   for (const TargetObservation& observation : observations) {
-    TrackStep step;
-    if (filter) step = step_of(*filter, filter_time_s, origin);
-    step.accepted = false;
-    if (observation.head < 2) last[observation.head] = observation;
-    if (observation.head < 2 && last[0] && last[1] &&
-        std::abs(last[0]->t_capture_s - last[1]->t_capture_s) <= together_s) {
-      std::array<std::optional<Eigen::Vector2d>, 2> angles{last[0]->pan_tilt_rad, last[1]->pan_tilt_rad};
-      for (std::size_t i = 0; i < 2 && config.use_pixels; ++i) angles[i] = angles_of_ray(heads[i], *last[i]);
-      const double t_s = std::max(last[0]->t_capture_s, last[1]->t_capture_s);
-      const auto k =
-          angles[0] && angles[1] ? pseudo_measurement(*angles[0], *angles[1], config.baseline_cm) : std::nullopt;
-      if (k && (!filter || t_s > filter_time_s)) {
-        const bool starts = !filter;
-        if (starts) filter.emplace(config, position_of_pseudo_measurement(*k, config.baseline_cm));
-        if (!starts) filter->step(*k, t_s - filter_time_s);
-        filter_time_s = t_s;
-        step = step_of(*filter, t_s, origin);
-        if (starts) step.event = TrackEvent::start;
-        report.num_starts += starts ? 1 : 0;
-        report.num_used += 2;
-        last = {};
-      }
-    }
+    const TrackStep step = tracker.take(observation);
+    report.num_starts += step.event == TrackEvent::start ? 1 : 0;
+    report.num_used += step.accepted ? 2 : 0;
     report.steps.push_back(step);
     if (watch) watch(observation, step);
   }
-  if (!truth.t_s.empty()) add_errors(report, counted(report.steps, TrackConfig{}.warm_up_s), truth, {});
+  if (report.num_starts > 0) report.status = TrackReport::Status::tracked;
+  if (!truth.t_s.empty()) add_errors(report, counted(report.steps, FollowConfig{}.warm_up_s), truth, {});
   return report;
 }
 
 std::vector<double> track_bound(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                                const TrackConfig& config, const TrueTrack& truth) {
+                                const FollowConfig& config, const TrueTrack& truth) {
   std::vector<std::size_t> order(observations.size());
   std::iota(order.begin(), order.end(), 0u);
   std::ranges::stable_sort(order, {}, [&](std::size_t i) { return observations[i].t_capture_s; });

@@ -77,11 +77,11 @@ class Lister {
   void add_lens(std::size_t h) {
     const Camera& camera = rig_.heads[h].camera;
     const Eigen::VectorXd values = params(camera.lens);
-    const bool is_told = camera.cov.rows() == values.size();
+    const bool is_given = camera.cov.rows() == values.size();
     const std::string name = name_of(h) + ".camera";
     const std::string remedy = "use camera files with their covariance (alidade calibrate writes it)";
     const auto sigma = [&](Eigen::Index k) -> std::optional<double> {
-      if (!is_told) return std::nullopt;
+      if (!is_given) return std::nullopt;
       return std::sqrt(std::max(0.0, camera.cov(k, k)));
     };
     add({.name = name + ".fx",
@@ -102,12 +102,12 @@ class Lister {
   /// Heads beyond the first stand to it as the file says.
   void add_mounting(std::size_t h) {
     const Eigen::Index yaw = num_head_params * static_cast<Eigen::Index>(h) + 4;
-    const bool is_told = rig_.cov.rows() > yaw;
+    const bool is_given = rig_.cov.rows() > yaw;
     Assumption what{.name = name_of(h) + ".base_ry_rad",
                     .value = std::nan(""),
                     .ordinary = ordinary_turn_rad,
                     .remedy = "use a rig file with its covariance (alidade rig writes it)"};
-    if (is_told) what.sigma = std::sqrt(std::max(0.0, rig_.cov(yaw, yaw)));
+    if (is_given) what.sigma = std::sqrt(std::max(0.0, rig_.cov(yaw, yaw)));
     add(std::move(what), h, {{4, 1.0}});
   }
 
@@ -146,7 +146,7 @@ class Lister {
 
 /// By how much a third more or less of acceleration moves the track: RMS over its steps, in σ of each.
 double moved_by_motion(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                       const TrackConfig& config, const TrackReport& report) {
+                       const FollowConfig& config, const TrackReport& report) {
   constexpr std::size_t max_observations = 2000;
   TrackerConfig other = config.tracker;
   other.sigma_a_m_s2 = 1.333 * report.sigma_a_m_s2;
@@ -194,24 +194,24 @@ std::vector<Eigen::MatrixXd> meeting_sensitivity(std::span<const RigHead> heads,
 }
 
 std::vector<Assumption> track_assumed(std::span<const TargetObservation> observations, const Rig& rig,
-                                      const TrackConfig& config, const TrackReport& report, const TrackTold& told) {
+                                      const FollowConfig& config, const TrackReport& report, const TrackGiven& given) {
   if (rig.heads.empty()) return {};
   const Median median = median_of_steps(observations, rig.heads, report);
   Lister lister(rig, median);
   for (std::size_t h = 0; h < rig.heads.size(); ++h) lister.add_lens(h);
   for (std::size_t h = 1; h < rig.heads.size(); ++h) lister.add_mounting(h);
   for (std::size_t h = 0; h < rig.heads.size(); ++h) lister.add_scales(h);
-  if (told.sigma_clock_s > 0.0)
-    for (std::size_t h = 0; h < rig.heads.size(); ++h) lister.add_clock(h, told.sigma_clock_s);
-  if (told.sigma_px)  // weighs the observations, and moves no one's mean: NIS judges it
+  if (given.sigma_clock_s > 0.0)
+    for (std::size_t h = 0; h < rig.heads.size(); ++h) lister.add_clock(h, given.sigma_clock_s);
+  if (given.sigma_px)  // weighs the observations, and moves no one's mean: NIS judges it
     lister.assumed.push_back({.name = "sigma_px", .value = config.tracker.sigma_px, .sigma = 0.0});
-  Assumption motion{.name = "motion_" + std::string(method_name(config.tracker.method)) + ".sigma_a_m_s2",
+  Assumption motion{.name = "motion_" + std::string(motion_name(config.tracker.method)) + ".sigma_a_m_s2",
                     .value = report.sigma_a_m_s2,
                     .moved = "position_m",
                     .remedy = "leave --sigma-a out, or try --method imm"};
   if (median.step != nullptr) motion.moves = moved_by_motion(observations, rig.heads, config, report);
   motion.ordinary = 0.333 * report.sigma_a_m_s2;
-  if (!told.sigma_a) motion.sigma = motion.ordinary;  // what the innovations tell it to
+  if (!given.sigma_a) motion.sigma = motion.ordinary;  // as far as the innovations say
   lister.assumed.push_back(std::move(motion));
   return std::move(lister.assumed);
 }

@@ -9,18 +9,18 @@
 
 namespace alidade {
 
-/// What of a track's input a person told, rather than a file or the data.
-struct TrackTold {
+/// What of a track's input a person gave, rather than a file or the data.
+struct TrackGiven {
   bool sigma_px = false, sigma_a = false;
-  double sigma_clock_s = 0.0;  ///< 0: not told.
+  double sigma_clock_s = 0.0;  ///< 0: not given.
 };
 
 /// What a track takes as given: lenses, heads, encoders, clocks, noise and the model of motion. `moves`: of the target
 /// where half of it was nearer, by the heads' rays meeting elsewhere, in the σ that the track states there. A rig of
 /// one head, or a report without a track, moves nothing.
 [[nodiscard]] std::vector<Assumption> track_assumed(std::span<const TargetObservation> observations, const Rig& rig,
-                                                    const TrackConfig& config, const TrackReport& report,
-                                                    const TrackTold& told);
+                                                    const FollowConfig& config, const TrackReport& report,
+                                                    const TrackGiven& given);
 
 /// How a point that heads at these readings see follows their parameters: ∂ point / ∂ (head_param_names, lens
 /// parameters, delay of its clock) of each head, by least squares over their pixels. Empty where they cannot tell it.

@@ -86,7 +86,7 @@ class TrackEngine {
     TargetObservation observation;
     Filter filter;
     bool has_started = false;
-    bool began = false;     ///< The track starts, or starts anew, here.
+    bool began = false;     ///< The track starts, or starts again, here.
     bool accepted = false;  ///< The track took this observation.
     /// Of each head, one after the other: counted together, a head that keeps failing would be hidden by one that does
     /// not. Heads beyond the eighth share the last place.
@@ -175,16 +175,16 @@ class TrackEngine {
       num_rejected = 0;
       note_head(now);
       if (now.t_head_s - now.t_other_s > one_head_after_s) step.event = TrackEvent::one_head;
-    } else if (++num_rejected >= config_.restart_after && begin_anew(place)) {
+    } else if (++num_rejected >= config_.restart_after && begin_again(place)) {
       step.event = TrackEvent::restart;
       step.accepted = true;
     }
     now.accepted = step.accepted;
   }
 
-  /// Begins the track anew where another one explains what was seen since a head's observations were first left out: it
-  /// takes three observations more than the old one did, so that single false observations do not end a track.
-  bool begin_anew(std::size_t place) {
+  /// Begins the track again where another one explains what was seen since a head's observations were first rejected:
+  /// it takes three observations more than the old one did, so that single false observations do not end a track.
+  bool begin_again(std::size_t place) {
     constexpr int more = 3;
     const std::size_t head = entry(place).observation.head;
     std::size_t first = place;
@@ -308,7 +308,7 @@ class TrackEngine {
   }
 
   static constexpr double one_head_after_s = 0.5;
-  static constexpr std::size_t max_of_a_streak = 16;  ///< Observations that a new track may be told from.
+  static constexpr std::size_t max_of_a_streak = 16;  ///< Observations that a new track may be begun from.
 
   std::vector<RigHead> heads_;
   TrackerConfig config_;

@@ -41,7 +41,7 @@ struct PairCounts {
 };
 
 PairCounts count_pairs(std::span<const TargetObservation> given, std::span<const RigHead> heads,
-                       const TrackConfig& config) {
+                       const FollowConfig& config) {
   PairCounts counts;
   Observations observations(given.begin(), given.end());
   std::ranges::stable_sort(observations, {}, &TargetObservation::t_capture_s);
@@ -59,21 +59,21 @@ PairCounts count_pairs(std::span<const TargetObservation> given, std::span<const
 }
 
 bool are_parallel(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                  const TrackConfig& config) {
+                  const FollowConfig& config) {
   const PairCounts counts = count_pairs(observations, heads, config);
   return 2 * counts.parallel > counts.together;
 }
 
 /// Why no track began although there were two heads at a time.
 Fault why_no_start(std::span<const TargetObservation> given, std::span<const RigHead> heads,
-                   const TrackConfig& config) {
+                   const FollowConfig& config) {
   const auto [together, parallel] = count_pairs(given, heads, config);
   if (together == 0)
     return {
         "the heads never see the target within " + text_of(1e3 * config.tracker.together_s, 2) + " ms of each other",
-        "take pictures more often, or set their clocks"};
+        "take images more often, or set their clocks"};
   if (2 * parallel > together)
-    return {"parallel rays: the heads look in the same direction, so that the range cannot be told",
+    return {"parallel rays: the heads look in the same direction, so that the range cannot be determined",
             "set the heads further apart, or let the target come nearer"};
   return {"the two heads' rays do not meet within " + text_of(config.tracker.min_depth_m, 2) + " to " +
               text_of(config.tracker.max_depth_m, 2) + " m",
@@ -92,8 +92,8 @@ std::optional<Fault> other_camera(const TrackReport& report, std::span<const Tar
       outside += report.steps[i].event == TrackEvent::outside ? 1.0 : 0.0;
     }
     if (!(outside > max_share * num)) continue;
-    return Fault{text_of(100.0 * outside / num) + " % of the sights of head " + std::to_string(heads[h].head.id) +
-                     " lie outside its picture of " + std::to_string(heads[h].camera.width_px) + " x " +
+    return Fault{text_of(100.0 * outside / num) + " % of the observations of head " + std::to_string(heads[h].head.id) +
+                     " lie outside its image of " + std::to_string(heads[h].camera.width_px) + " x " +
                      std::to_string(heads[h].camera.height_px) + " px",
                  "give the rig file of the camera that took them"};
   }
@@ -135,7 +135,7 @@ void take_worst_of(const HeadInnovations& of, const std::string& head, Lean& wor
                       text_of(std::abs(of.mean[k]), 2) + "σ in " + (k == 0 ? "u" : "v") +
                       ": its mounting or an encoder's zero",
                   of.mean[k], min_mean, root * of.mean[k], worst);
-    take_if_worse("the innovations of " + head + " grow with the place in the picture, by " +
+    take_if_worse("the innovations of " + head + " grow with the position in the image, by " +
                       text_of(std::abs(of.place[k]), 2) + "σ a quarter of it: its focal length, or a scale",
                   of.place[k], min_place, of.place[k] * std::sqrt(of.place_num), worst);
   }
@@ -156,9 +156,10 @@ Lean worst_lean(const TrackReport& report, std::span<const RigHead> heads) {
 /// Whether innovations are white, and what of the rig the observations contradict.
 void add_white(const TrackReport& report, std::span<const RigHead> heads, Verdict& verdict) {
   const Lean lean = worst_lean(report, heads);
-  const Check lean_check = check("lean", lean.size > 0.0 ? State::care : State::good,
-                                 lean.size > 0.0 ? lean.text : "by head, motion and place the innovations have no lean",
-                                 lean.size, min_mean, "σ");
+  const Check lean_check =
+      check("lean", lean.size > 0.0 ? State::care : State::good,
+            lean.size > 0.0 ? lean.text : "by head, motion and position the innovations have no lean", lean.size,
+            min_mean, "σ");
   constexpr double max_z = 5.0;
   if (!report.faults.empty()) {
     const RigFault& worst = report.faults.front();
@@ -166,7 +167,7 @@ void add_white(const TrackReport& report, std::span<const RigHead> heads, Verdic
     const std::string kind = report.errors_are_counted ? " of what the rig file allows)" : " of chance)";
     verdict.checks.push_back(check("rig", is_off ? State::care : State::good,
                                    is_off
-                                       ? "the sights say that " + worst.name + " is off by " +
+                                       ? "the observations say that " + worst.name + " is off by " +
                                              text_of(std::abs(worst.off), 2) + " (" + text_of(worst.z, 2) + "σ" + kind
                                        : "the heads' rays meet as the rig file lets them",
                                    worst.z, max_z, "σ"));
@@ -217,19 +218,19 @@ void add_checks(const TrackReport& report, Verdict& verdict) {
             left_out > max_left_out    ? State::bad
             : left_out > care_left_out ? State::care
                                        : State::good,
-            std::to_string(num_left) + " of " + std::to_string(report.steps.size()) + " sights (" +
-                text_of(100.0 * left_out, 2) + " %) were left out: " +
+            std::to_string(num_left) + " of " + std::to_string(report.steps.size()) + " observations (" +
+                text_of(100.0 * left_out, 2) + " %) were rejected: " +
                 (left_out > care_left_out ? "what agrees is no more than what was let in" : "the others agree"),
             left_out, care_left_out, "1"));
   const auto late = static_cast<double>(count(report, TrackEvent::late));
   if (late > 0.0)
     verdict.checks.push_back(
-        check("late", State::care, text_of(late, 2) + " sights came too late", late, 0.0, "sights"));
+        check("late", State::care, text_of(late, 2) + " observations came too late", late, 0.0, "observations"));
 }
 
-/// Observations that were left out and follow a path of their own.
+/// Observations that were rejected and follow a path of their own.
 std::optional<Check> second_target(const TrackReport& report, std::span<const TargetObservation> observations,
-                                   std::span<const RigHead> heads, const TrackConfig& config) {
+                                   std::span<const RigHead> heads, const FollowConfig& config) {
   constexpr std::size_t least = 16;
   constexpr double min_share = 0.7;
   Observations others;
@@ -237,18 +238,18 @@ std::optional<Check> second_target(const TrackReport& report, std::span<const Ta
     if (report.steps[i].event == TrackEvent::gated || report.steps[i].event == TrackEvent::depth)
       others.push_back(observations[i]);
   if (others.size() < least) return std::nullopt;
-  TrackConfig plain = config;
+  FollowConfig plain = config;
   plain.judge = false;
   const TrackReport second = track_target(with_shift(others, {}), heads, plain);
   if (second.num_starts == 0 || used_share(second) < min_share || second.num_restarts * 20 > others.size())
     return std::nullopt;
   return check("second target", State::care,
                "there are two targets: " + std::to_string(second.num_used) + " of the " +
-                   std::to_string(others.size()) + " sights that were left out follow a path of their own",
+                   std::to_string(others.size()) + " observations that were rejected follow a path of their own",
                used_share(second), min_share, "1");
 }
 
-/// What of the observations as a whole is not as told.
+/// What of the observations as a whole is not as stated.
 struct Causes {
   std::optional<Fault> mistake;
   std::optional<Check> second;
@@ -256,8 +257,8 @@ struct Causes {
 };
 
 Causes causes_of(const TrackReport& report, std::span<const TargetObservation> observations,
-                 std::span<const RigHead> heads, const TrackConfig& config) {
-  TrackConfig found = config;
+                 std::span<const RigHead> heads, const FollowConfig& config) {
+  FollowConfig found = config;
   if (report.num_starts > 0) found.tracker.sigma_a_m_s2 = report.sigma_a_m_s2;
   Causes causes;
   if (!fits(report) || report.nis_per_dof > good_nis_high || used_share(report) < 1.0 - care_left_out)
@@ -271,10 +272,10 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
   return causes;
 }
 
-/// Why there is no track to be told of.
+/// Why there is no track.
 std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes,
                                 std::span<const TargetObservation> observations, std::span<const RigHead> heads,
-                                const TrackConfig& config) {
+                                const FollowConfig& config) {
   // Where nothing moves against the heads, many a mistake would make the rays meet: that explains nothing.
   if (report.num_starts == 0 && are_parallel(observations, heads, config))
     return why_no_start(observations, heads, config);
@@ -282,18 +283,18 @@ std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes,
   if (fits(report)) return std::nullopt;
   if (causes.shift) return Fault{clock_text(*causes.shift, heads), "set the heads' clocks"};
   if (report.num_starts == 0) return why_no_start(observations, heads, config);
-  if (causes.second) return Fault{causes.second->text, "give the sights of one target: one row a picture"};
+  if (causes.second) return Fault{causes.second->text, "give the observations of one target: one row per image"};
   if (used_share(report) < min_used_share)
     return Fault{"only " + text_of(100.0 * used_share(report), 2) +
-                     " % of the sights fit one track and this rig, and no clock, sign or swap explains it",
+                     " % of the observations fit one track and this rig, and no clock, sign or swap explains it",
                  "check that the rig file is of these heads as they stand now, and the noise"};
   return std::nullopt;
 }
 
 std::string sentence_of(const TrackReport& report, const Verdict& verdict) {
-  std::string sentence =
-      "tracked through " + std::to_string(report.num_used) + " of " + std::to_string(report.steps.size()) + " sights";
-  if (report.num_restarts > 0) sentence += ", begun anew " + std::to_string(report.num_restarts) + " times";
+  std::string sentence = "tracked through " + std::to_string(report.num_used) + " of " +
+                         std::to_string(report.steps.size()) + " observations";
+  if (report.num_restarts > 0) sentence += ", started again " + std::to_string(report.num_restarts) + " times";
   if (verdict.state == State::good) return sentence;
   const auto first = std::ranges::find(verdict.checks, verdict.state, &Check::state);
   sentence += "; " + first->text;
@@ -308,11 +309,11 @@ std::string sentence_of(const TrackReport& report, const Verdict& verdict) {
 }  // namespace
 
 Verdict track_verdict(const TrackReport& report, std::span<const TargetObservation> observations,
-                      std::span<const RigHead> heads, const TrackConfig& config) {
+                      std::span<const RigHead> heads, const FollowConfig& config) {
   std::set<std::size_t> seen_by;
   for (const TargetObservation& observation : observations) seen_by.insert(observation.head);
   if (seen_by.size() < 2)
-    return refused({"one head only: the range along its ray cannot be told", "add the events of a second head"});
+    return refused({"one head only: the range along its ray cannot be determined", "add the events of a second head"});
   if (auto other = other_camera(report, observations, heads)) return refused(std::move(*other));
   const Causes causes = causes_of(report, observations, heads, config);
   if (auto why = refusal_of(report, causes, observations, heads, config)) return refused(std::move(*why));

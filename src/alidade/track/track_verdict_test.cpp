@@ -19,7 +19,7 @@ TEST(TrackVerdict, WhatThrowsAQuarterAwayIsNotConsistent) {
   std::vector<TargetObservation> observations = testing::observations_of(scene, 3);
   for (std::size_t i = 20; i < observations.size(); i += 4)  // another thing in the image
     observations[i].px.x() += observations[i].px.x() < 160.0 ? 80.0 : -80.0;
-  TrackConfig config;
+  FollowConfig config;
   config.find_sigma_a = false;
   config.tracker.sigma_a_m_s2 = scene.sigma_a_m_s2;
   const TrackReport report = track_target(observations, scene.heads, config);
@@ -36,7 +36,7 @@ TEST(TrackVerdict, DoesNotDependOnTheOrderOfArrival) {
   for (const double late_s : {0.06, 0.1, 0.2}) {
     const TrackScene scene = *track_scenario("G");
     std::vector<TargetObservation> observations = testing::observations_of(scene, 4);
-    const TrackConfig config;
+    const FollowConfig config;
     const TrackReport in_order = track_target(observations, scene.heads, config);
     for (TargetObservation& observation : observations) observation.t_arrival_s += observation.head == 1 ? late_s : 0.0;
     std::ranges::stable_sort(observations, {}, &TargetObservation::t_arrival_s);
@@ -55,7 +55,7 @@ TEST(TrackVerdict, NoiseThatIsLargerThanStatedRaisesSigma) {
   scene.sigma_encoder_rad = 0.0;
   for (RigHead& head : scene.heads) head.head.encoder.sigma_rad = 1e-6;
   const std::vector<TargetObservation> observations = testing::observations_of(scene, 3);
-  TrackConfig config;
+  FollowConfig config;
   config.tracker.sigma_px = 0.5;
   config.find_sigma_a = false;
   config.tracker.sigma_a_m_s2 = scene.sigma_a_m_s2;
@@ -85,7 +85,7 @@ TEST(TrackAssumed, TheMeetingOfRaysFollowsTheParameters) {
 TEST(TrackAssumed, WhatIsExactMovesNothingAndWhatIsUnknownDoes) {
   const TrackScene scene = *track_scenario("C");
   const auto observations = testing::observations_of(scene, 2);
-  const TrackConfig config;
+  const FollowConfig config;
   const TrackReport report = track_target(observations, scene.heads, config);
   Rig rig;
   rig.heads = scene.heads;

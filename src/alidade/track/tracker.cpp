@@ -40,23 +40,23 @@ Engine engine_for(std::vector<RigHead> heads, const TrackerConfig& config) {
   const double sigma_a = config.sigma_a_m_s2;
   const Singer singer{sigma_a, config.singer_tau_s};
   switch (config.method) {
-    case TrackMethod::singer:
+    case TargetMotion::singer:
       return engine_of(std::move(heads), config, singer, sigma_a);
-    case TrackMethod::turn:
+    case TargetMotion::turn:
       return engine_of(std::move(heads), config, CoordinatedTurn{share_of_acceleration_beside_turning * sigma_a},
                        start_sigma_turn_rad_s);
-    case TrackMethod::resting:
+    case TargetMotion::resting:
       return engine_of(std::move(heads), config, MeanReverting{config.resting_sigma_v_m_s, config.resting_tau_s}, 1.0);
-    case TrackMethod::imm: {
+    case TargetMotion::imm: {
       const double sigma_quiet = share_while_quiet * sigma_a;
       const InteractingModels models{ConstantVelocity{sigma_quiet}, singer,
                                      Ballistic{sigma_quiet, config.gravity_m_s2}};
       if (config.errors.num() == 0) return detail::TrackEngine<InteractingFilter>(std::move(heads), config, models);
       return detail::TrackEngine<ConsideredInteracting>(std::move(heads), config, {models, config.errors.num()});
     }
-    case TrackMethod::ballistic:
+    case TargetMotion::ballistic:
       return engine_of(std::move(heads), config, Ballistic{sigma_a, config.gravity_m_s2}, 1.0);
-    case TrackMethod::cv:
+    case TargetMotion::cv:
       break;
   }
   return engine_of(std::move(heads), config, ConstantVelocity{sigma_a}, 1.0);
@@ -102,7 +102,7 @@ std::optional<Eigen::Vector3d> nearest_to_rays(const WorldRay& a, const WorldRay
   return 0.5 * (a.origin_in_world + s * along_a + b.origin_in_world + t * along_b);
 }
 
-std::string_view method_name(TrackMethod method) {
+std::string_view motion_name(TargetMotion method) {
   constexpr std::array<std::string_view, 6> names{"cv", "singer", "turn", "resting", "imm", "ballistic"};
   return names[static_cast<std::size_t>(method)];
 }

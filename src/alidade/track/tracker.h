@@ -10,16 +10,18 @@
 #include "alidade/estimation/motion_models.h"
 #include "alidade/pantilt/rig_uncertainty.h"
 #include "alidade/track/sight.h"
+#include "alidade/track/track_step.h"
 
 namespace alidade {
 
-enum class TrackMethod { cv, singer, turn, resting, imm, ballistic };
+/// The models of motion that the filter has; what can be asked for by name: TrackMethod.
+enum class TargetMotion { cv, singer, turn, resting, imm, ballistic };
 
-/// The words of --method: cv, singer, turn, resting, imm, ballistic.
-[[nodiscard]] std::string_view method_name(TrackMethod method);
+/// cv, singer, turn, resting, imm, ballistic.
+[[nodiscard]] std::string_view motion_name(TargetMotion method);
 
 struct TrackerConfig {
-  TrackMethod method = TrackMethod::cv;
+  TargetMotion method = TargetMotion::cv;
   double sigma_px = 0.5;
   double sigma_encoder_rad = 0.0008726646259971648;  ///< 0.05°; for heads whose encoder does not say its own.
   double sigma_a_m_s2 = 1.0;                         ///< About the target's peak acceleration; see the models.
@@ -39,31 +41,6 @@ struct TrackerConfig {
   RigUncertainty errors;
   /// Estimate the errors instead: for tests of the rig, whose innovations are then white. Not for imm, which counts.
   bool learn_errors = false;
-};
-
-enum class TrackEvent {
-  none,
-  waiting,   ///< No track yet: another head is needed to start it.
-  start,     ///< Track begun, by intersecting the rays of two heads.
-  restart,   ///< Begun anew: the old one did not agree with what was seen.
-  gated,     ///< Observation left out: NIS beyond the gate.
-  depth,     ///< Observation left out: the target would be outside the working range.
-  outside,   ///< Observation left out: its pixel is not in the image, or not a number.
-  late,      ///< Observation left out: older than the history.
-  one_head,  ///< Used, but only one head has seen the target for a while: its range is drifting.
-};
-[[nodiscard]] std::string_view event_name(TrackEvent event);
-
-/// What became of one observation. The belief is that of the newest capture time so far, position and velocity in the
-/// world.
-struct TrackStep {
-  double t_s = 0.0;
-  bool has_belief = false;
-  Belief<6> belief;
-  TrackEvent event = TrackEvent::waiting;
-  bool accepted = false;
-  bool has_innovation = false;
-  Innovation innovation;  ///< At the observation's own capture time.
 };
 
 /// Follows a target in space through the pixels of moving heads, one observation at a time, each at its capture time

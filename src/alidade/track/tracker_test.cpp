@@ -21,15 +21,15 @@ namespace {
 using Json = nlohmann::json;
 using testing::observations_of;
 
-TrackerConfig config_for(const TrackScene& scene, TrackMethod method = TrackMethod::cv) {
+TrackerConfig config_for(const TrackScene& scene, TargetMotion method = TargetMotion::cv) {
   TrackerConfig config;
   config.method = method;
   config.sigma_a_m_s2 = scene.sigma_a_m_s2;
   return config;
 }
 
-constexpr TrackMethod all_methods[] = {TrackMethod::cv,      TrackMethod::singer, TrackMethod::turn,
-                                       TrackMethod::resting, TrackMethod::imm,    TrackMethod::ballistic};
+constexpr TargetMotion all_methods[] = {TargetMotion::cv,      TargetMotion::singer, TargetMotion::turn,
+                                        TargetMotion::resting, TargetMotion::imm,    TargetMotion::ballistic};
 
 template <int N>
 Eigen::Vector<double, N> vector_of(const Json& list) {
@@ -72,7 +72,7 @@ TEST(Tracker, UpdateAgreesWithTheReferenceCase) {
 }
 
 TEST(Tracker, CovarianceStaysPositiveDefinite) {
-  for (const TrackMethod method : all_methods) {
+  for (const TargetMotion method : all_methods) {
     TrackScene scene = *track_scenario("C");
     Tracker tracker(scene.heads, config_for(scene, method));
     std::size_t checked = 0;
@@ -84,12 +84,12 @@ TEST(Tracker, CovarianceStaysPositiveDefinite) {
       EXPECT_GT(parts.values[0], 0.0);
       ++checked;
     }
-    EXPECT_GT(checked, 400u) << method_name(method);
+    EXPECT_GT(checked, 400u) << motion_name(method);
   }
 }
 
 TEST(Tracker, AnyOrderWithinTheHistoryGivesTheSameTrack) {
-  for (const TrackMethod method : all_methods) {
+  for (const TargetMotion method : all_methods) {
     TrackScene scene = *track_scenario("G");
     std::vector<TargetObservation> observations = observations_of(scene, 4);
     std::ranges::stable_sort(observations, {}, &TargetObservation::t_capture_s);
@@ -110,8 +110,8 @@ TEST(Tracker, AnyOrderWithinTheHistoryGivesTheSameTrack) {
     }
     EXPECT_GT(overtaken, 300u);
     EXPECT_EQ(last.t_s, last_shuffled.t_s);
-    EXPECT_LT((last.belief.x - last_shuffled.belief.x).norm(), 1e-9) << method_name(method);
-    EXPECT_LT((last.belief.P - last_shuffled.belief.P).norm(), 1e-9) << method_name(method);
+    EXPECT_LT((last.belief.x - last_shuffled.belief.x).norm(), 1e-9) << motion_name(method);
+    EXPECT_LT((last.belief.P - last_shuffled.belief.P).norm(), 1e-9) << motion_name(method);
   }
 }
 
@@ -130,7 +130,7 @@ TEST(Tracker, ObservationsOlderThanTheHistoryAreLeftOut) {
 }
 
 TEST(Tracker, AllocatesNothingOnceMade) {
-  for (const TrackMethod method : all_methods) {
+  for (const TargetMotion method : all_methods) {
     TrackScene scene = *track_scenario("D");
     scene.more_latency_s = {0.0, 0.13};
     const std::vector<TargetObservation> observations = observations_of(scene, 2);
@@ -142,7 +142,7 @@ TEST(Tracker, AllocatesNothingOnceMade) {
       if (const auto ahead = tracker.at(observation.t_arrival_s + 0.1)) sum += ahead->x[1];
       if (const auto smooth = tracker.smoothed(0.1)) sum += smooth->belief.x[2];
     }
-    EXPECT_EQ(testing::num_allocations(), before) << method_name(method);
+    EXPECT_EQ(testing::num_allocations(), before) << motion_name(method);
     EXPECT_TRUE(std::isfinite(sum));
   }
 }
@@ -195,7 +195,7 @@ TEST(Tracker, ABallInFlightIsPredictedWithinItsSigma) {
   scene.position = [](double t_s) {
     return Eigen::Vector3d(-1.0 + 2.0 * t_s, -0.5 - 5.0 * t_s + 0.5 * 9.80665 * t_s * t_s, 3.0 + 0.5 * t_s);
   };
-  for (const TrackMethod method : {TrackMethod::ballistic, TrackMethod::cv}) {
+  for (const TargetMotion method : {TargetMotion::ballistic, TargetMotion::cv}) {
     TrackerConfig config;
     config.method = method;
     config.sigma_a_m_s2 = 0.2;
@@ -212,7 +212,7 @@ TEST(Tracker, ABallInFlightIsPredictedWithinItsSigma) {
       nees += squared_mahalanobis(error, Eigen::Matrix3d(ahead->P.topLeftCorner<3, 3>())) / 3.0;
       num += 1.0;
     }
-    if (method == TrackMethod::ballistic) {
+    if (method == TargetMotion::ballistic) {
       EXPECT_LT(nees / num, 1.5);  // 30 draws of 3: 1 ± 0.15, and the noise allows for drag that is not there
     } else {
       EXPECT_GT(nees / num, 4.0);
@@ -282,7 +282,7 @@ std::vector<Row> rows_of(const std::string& name) {
 }
 
 /// RMSE at arrival, from 0.6 s on, of the reference case's circle. [mm]
-double rms_of_circle_mm(const std::vector<Row>& rows, TrackMethod method, double sigma_a, bool ignores_latency) {
+double rms_of_circle_mm(const std::vector<Row>& rows, TargetMotion method, double sigma_a, bool ignores_latency) {
   const auto rig = xiahou_rig();
   TrackerConfig config;
   config.method = method;
@@ -309,13 +309,13 @@ TEST(Tracker, LatencyIsPaidByPredictionNotByError) {
   const Json expected = Json::parse(std::ifstream(cases + "c6_events_latency.json"))["expected"];
   const std::vector<Row> rows = rows_of(cases + "c6_events_latency.csv");
   ASSERT_EQ(rows.size(), 238u);
-  const double compensated = rms_of_circle_mm(rows, TrackMethod::cv, 1.0, false);
-  const double ignored = rms_of_circle_mm(rows, TrackMethod::cv, 1.0, true);
+  const double compensated = rms_of_circle_mm(rows, TargetMotion::cv, 1.0, false);
+  const double ignored = rms_of_circle_mm(rows, TargetMotion::cv, 1.0, true);
   EXPECT_LT(compensated, 14.0);
   EXPECT_LT(compensated, 0.6 * ignored);
   // The same algorithm but for how a track starts: 2 %.
   EXPECT_NEAR(compensated, expected["comp_cv"], 0.02 * 10.5);
-  EXPECT_NEAR(rms_of_circle_mm(rows, TrackMethod::singer, 0.5, false), expected["comp_singer"], 0.02 * 7.6);
+  EXPECT_NEAR(rms_of_circle_mm(rows, TargetMotion::singer, 0.5, false), expected["comp_singer"], 0.02 * 7.6);
   EXPECT_NEAR(ignored, expected["ignored_cv"], 0.02 * 24.8);
 }
 

@@ -50,7 +50,7 @@ class TurnedRun {
       const auto a = static_cast<std::size_t>(link.photo_a), b = static_cast<std::size_t>(link.photo_b);
       if (!link.is_same_image || is_same[a]) continue;
       is_same[b] = true;
-      report_.photos[b].reason = "is the same picture as " + photos_.names[a];
+      report_.photos[b].reason = "is the same image as " + photos_.names[a];
       ++num_same_;
     }
     std::erase_if(links_, [&](const PhotoLink& link) {
@@ -60,7 +60,7 @@ class TurnedRun {
 
   void name_unconnected() {
     for (std::size_t i = 0; i < report_.photos.size(); ++i) {
-      TurnedPhoto& photo = report_.photos[i];
+      RotatedPhoto& photo = report_.photos[i];
       const bool is_in =
           tree_.photos.size() > 1 && std::ranges::find(tree_.photos, static_cast<int>(i)) != tree_.photos.end();
       if (is_in || !photo.reason.empty()) continue;
@@ -123,7 +123,7 @@ class TurnedRun {
     const ZoomTest test = free_zooms(zoomed, progress_);
     bool differs = false;
     for (std::size_t k = 0; k < test.log_zoom.size(); ++k) {
-      TurnedPhoto& photo = photo_at(k);
+      RotatedPhoto& photo = photo_at(k);
       photo.zoom = std::exp(test.log_zoom[k]);
       photo.sigma_zoom = photo.zoom * test.sigma[k];
       differs |= std::abs(test.log_zoom[k]) > std::max(zoom_is_other, 6.0 * test.sigma[k]);
@@ -137,7 +137,7 @@ class TurnedRun {
     return true;
   }
 
-  TurnedPhoto& photo_at(std::size_t bundle_photo) {
+  RotatedPhoto& photo_at(std::size_t bundle_photo) {
     return report_.photos[static_cast<std::size_t>(tree_.photos[bundle_photo])];
   }
 
@@ -150,7 +150,7 @@ class TurnedRun {
       report_.status = TurnedReport::Status::no_turn;
       return;
     }
-    if (static_cast<double>(report_.num_kept) < min_kept * static_cast<double>(num_agreeing_)) {
+    if (static_cast<double>(report_.matches.kept) < min_kept * static_cast<double>(num_agreeing_)) {
       report_.status = TurnedReport::Status::moved;
       return;
     }
@@ -170,14 +170,14 @@ class TurnedRun {
     report_.bundle_photo = tree_.photos;
     report_.residuals = fit_.solution.residuals;
     report_.sigma_px = fit_.solve.sigma_px * scale_.half_width_px;
-    report_.num_agreeing = num_agreeing_;
-    report_.num_kept = fit_.num_kept;
+    report_.matches.agreeing = num_agreeing_;
+    report_.matches.kept = fit_.num_kept;
     count_photos();
   }
 
   void count_photos() {
     const std::size_t count = tree_.photos.size();
-    for (TurnedPhoto& photo : report_.photos) photo.num_points = 0;
+    for (RotatedPhoto& photo : report_.photos) photo.num_points = 0;
     report_.largest_turn_rad = 0.0;
     std::vector<double> squares(count, 0.0);
     for (std::size_t i = 0; i < fit_.bundle.observations.size(); ++i) {
@@ -186,11 +186,11 @@ class TurnedRun {
       squares[k] += fit_.solution.residuals[i].squaredNorm();
     }
     for (std::size_t k = 0; k < count; ++k) {
-      TurnedPhoto& photo = photo_at(k);
+      RotatedPhoto& photo = photo_at(k);
       constexpr int min_points = 6;
       photo.is_used = photo.num_points >= min_points;
       if (photo.is_used) photo.reason.clear();
-      if (!photo.is_used) photo.reason = "agrees with others, but not with one camera that turned";
+      if (!photo.is_used) photo.reason = "agrees with others, but not with one camera that rotated";
       photo.rms_px = scale_.half_width_px * std::sqrt(squares[k] / std::max(photo.num_points, 1));
       photo.cam_from_world = fit_.bundle.cam_from_world[k];
       photo.turn_rad = angle_of(photo.cam_from_world);
@@ -202,7 +202,7 @@ class TurnedRun {
   }
 
   void count_matches() {
-    for (const PhotoLink& link : links_) report_.num_matches += photos_.pairs[link.pair].matches.size();
+    for (const PhotoLink& link : links_) report_.matches.given += photos_.pairs[link.pair].matches.size();
   }
 
   /// With fewer terms of the lens, where all that are free are not told from zero; what they might be is counted still.
@@ -272,7 +272,7 @@ class TurnedRun {
     steps.moved = "fx";
     steps.moved_by = (config_.sigma_parallax ? parallax : careless) * f.x();
     steps.moves = steps.moved_by / std::sqrt(report_.cov(0, 0));
-    steps.remedy = "turn the camera about its lens, look at things far away, and say --sigma-parallax";
+    steps.remedy = "rotate the camera about its lens, look at things far away, and say --sigma-parallax";
     report_.assumed.push_back(steps);
   }
 

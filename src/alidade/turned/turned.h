@@ -4,41 +4,22 @@
 
 #include "alidade/estimation/verdict.h"
 #include "alidade/matching/matched_photos.h"
+#include "alidade/observe/report.h"
 #include "alidade/turned/turned_bundle.h"
 
 namespace alidade {
 
 struct TurnedConfig {
   bool square_pixels = false;  ///< fx = fy.
-  bool fixed_centre = false;   ///< cx, cy: the start's, else the image's middle.
+  bool fixed_centre = false;   ///< cx, cy: the initial guess's, else the image's centre.
   /// fx / fy and the centre are what cameras ordinarily have, within a σ that is counted; false: nothing is known.
   bool ordinary_aspect = true, ordinary_centre = true;
   int lens_terms = 2;                    ///< Radial distortion: none, k1, or k1 and k2.
   bool keeps_terms = false;              ///< All of them; false: those that the photos tell from zero.
   std::optional<Eigen::Vector4d> start;  ///< fx, fy, cx, cy [px].
-  double sigma_px = 0.0;                 ///< Of a coordinate; 0: told by the residuals.
+  double sigma_px = 0.0;                 ///< Of a coordinate; 0: estimated from the residuals.
   /// σ of how far the camera's centre moved as it turned, over the points' distance, a radian of turn; none: ordinary.
   std::optional<double> sigma_parallax;
-};
-
-/// What became of a photo.
-struct TurnedPhoto {
-  bool is_used = false;
-  std::string reason;  ///< Why it took no part.
-  int num_points = 0;
-  double rms_px = 0.0;                  ///< Per point.
-  double turn_rad = 0.0;                ///< From the first photo that is used.
-  double z2 = 0.0;                      ///< What leaving it out changes, over what the model expects of that; squared.
-  double zoom = 1.0, sigma_zoom = 0.0;  ///< Its focal length over the others', if it may have one of its own.
-  Eigen::Matrix3d cam_from_world = Eigen::Matrix3d::Identity();
-};
-
-/// How much the camera's centre moved, by the residuals: what is along the lines to one point less what is across them.
-struct ParallaxTest {
-  double z = 0.0;  ///< Of the pair that shows it most.
-  int photo_a = -1, photo_b = -1;
-  double rms_px = 0.0;    ///< Of all pairs.
-  double relative = 0.0;  ///< Over the points' distance, a radian of turn.
 };
 
 struct TurnedReport {
@@ -52,7 +33,7 @@ struct TurnedReport {
     no_convergence
   };
   Status status = Status::too_few_photos;
-  std::vector<TurnedPhoto> photos;
+  std::vector<RotatedPhoto> photos;
   TurnedBundle bundle;  ///< Normalised; its photos are `bundle_photo`.
   std::vector<int> bundle_photo;
   std::vector<Eigen::Vector2d> residuals;  ///< Normalised, one an observation.
@@ -60,10 +41,8 @@ struct TurnedReport {
   Eigen::Matrix<double, 6, 6> cov, cov_model;
   int lens_terms = 0;  ///< That are estimated; what the others might be is counted in `cov`.
   double sigma_px = 0.0;
-  std::size_t num_matches = 0;   ///< Given between photos that take part.
-  std::size_t num_agreeing = 0;  ///< With one homography a pair.
-  std::size_t num_kept = 0;      ///< With one camera.
-  double design_effect = 1.0;    ///< What photos change, over what the model expects of it; variances.
+  MatchCounts matches;
+  double design_effect = 1.0;  ///< What photos change, over what the model expects of it; variances.
   double degrees_of_freedom = 0.0;
   double largest_turn_rad = 0.0;
   ParallaxTest parallax;

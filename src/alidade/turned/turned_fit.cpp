@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/estimation/median.h"
 #include "alidade/geometry/decompositions.h"
 
 namespace alidade {
@@ -14,18 +15,12 @@ constexpr double max_sigma = 0.005;    // what is worse is no noise, but a wrong
 constexpr double gate_sigmas = 4.5;
 constexpr double zoom_sigma = 0.3;
 
-double middle_of(std::vector<double> values) {
-  const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), half, values.end());
-  return *half;
-}
-
 /// σ of a coordinate by the median of the residuals' norms, which is √(2 ln 2) σ.
 double sigma_by_median(const TurnedFit& fit) {
   std::vector<double> norms = freed_norms(fit.bundle, fit.solution.residuals);
   std::erase_if(norms, [](double norm) { return !std::isfinite(norm); });
   if (norms.empty()) return first_sigma;
-  return std::clamp(middle_of(std::move(norms)) / 1.17741, min_sigma, max_sigma);
+  return std::clamp(median_of(std::move(norms)) / 1.17741, min_sigma, max_sigma);
 }
 
 /// The same by squares, each residual beyond Huber's bound weighed down.
@@ -201,7 +196,7 @@ ZoomTest free_zooms(TurnedFit fit, const Progress& progress) {
   }
   // the first photo's is held: all are told against the middle one
   std::vector<double> sorted = test.log_zoom;
-  const double middle = middle_of(std::move(sorted));
+  const double middle = median_of(std::move(sorted));
   for (double& zoom : test.log_zoom) zoom -= middle;
   return test;
 }

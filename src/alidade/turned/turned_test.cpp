@@ -144,7 +144,7 @@ TEST(Turned, WhatCannotTellIsRefusedWithItsReason) {
   for (FeatureMatch& match : same.pairs[0].matches) match.b = match.a;
   const Verdict one = verdict_of(same);
   EXPECT_EQ(one.exit_code, ExitCode::cannot_tell);
-  EXPECT_THAT(one.sentence, HasSubstr("one picture"));
+  EXPECT_THAT(one.sentence, HasSubstr("one image"));
 
   TurnedScene still = small_scene();
   still.pan_step_rad = still.tilt_rad = 0.0;

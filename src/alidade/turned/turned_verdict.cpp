@@ -35,16 +35,16 @@ struct Refusal {
 Refusal too_few(const TurnedReport& report, const MatchedPhotos& photos) {
   const std::size_t count = photos.names.size();
   const std::string more = "take three or more from one spot, each overlapping the last by a third or more";
-  if (count < 2) return {"one photo tells nothing of a turn", more};
+  if (count < 2) return {"one photo tells nothing of a rotation", more};
   const auto same = std::ranges::count_if(
-      report.photos, [](const TurnedPhoto& photo) { return photo.reason.starts_with("is the same picture"); });
+      report.photos, [](const RotatedPhoto& photo) { return photo.reason.starts_with("is the same image"); });
   if (same + 1 == static_cast<std::ptrdiff_t>(count))
-    return {"all photos are one picture: the camera did not turn", "turn it by 10° or more from photo to photo"};
+    return {"all photos are one image: the camera did not rotate", "rotate it by 10° or more from photo to photo"};
   const auto alone = std::ranges::count_if(
-      report.photos, [](const TurnedPhoto& photo) { return photo.reason == "overlaps no other photo"; });
+      report.photos, [](const RotatedPhoto& photo) { return photo.reason == "overlaps no other photo"; });
   if (alone + same == static_cast<std::ptrdiff_t>(count))
     return {"no two of the " + std::to_string(count) + " photos show the same things", more};
-  return {"only two photos hang together: one turn, which nothing confirms", more};
+  return {"only two photos hang together: one rotation, which nothing confirms", more};
 }
 
 Refusal zoomed(const TurnedReport& report, const MatchedPhotos& photos) {
@@ -63,10 +63,10 @@ Refusal weak(const TurnedReport& report, const MatchedPhotos& photos, const Turn
   const double f = std::min(report.camera[0], report.camera[1]);
   constexpr double most = 0.05;
   const auto less = std::min(sigma[0], sigma[1]);
-  const std::string turn = "turn the camera farther, by half a picture's width and more, up and down as well";
+  const std::string turn = "rotate the camera farther, by half an image's width and more, up and down as well";
   if (!(less < most * f)) {
-    return {"the focal length is told to " + text_of(100.0 * less / f, 2) + " % only (1σ), by turns of up to " +
-                text_of(report.largest_turn_rad / degree, 2) + "°",
+    return {"the focal length is determined to " + text_of(100.0 * less / f, 2) +
+                " % only (1σ), by rotations of up to " + text_of(report.largest_turn_rad / degree, 2) + "°",
             turn};
   }
   const bool is_aspect = !(std::max(sigma[0], sigma[1]) < most * f);
@@ -76,7 +76,7 @@ Refusal weak(const TurnedReport& report, const MatchedPhotos& photos, const Turn
   if (is_aspect && !config.square_pixels) hold = " --square-pixels";
   if (is_centre && !config.fixed_centre) hold += " --fix-centre";
   return {"with the rotation unknown these views cannot tell " + what,
-          (hold.empty() ? "" : "hold what you know:" + hold + ", or ") + turn};
+          (hold.empty() ? "" : "fix what you know:" + hold + ", or ") + turn};
 }
 
 Verdict refused(const Refusal& refusal, ExitCode code) {
@@ -95,7 +95,7 @@ Check focal_check(const TurnedReport& report) {
               "intrinsics"};
   if (sigma > fine) {
     check.state = sigma > none ? State::bad : State::care;
-    check.text += ": take more photos, turned farther, up and down as well";
+    check.text += ": take more photos, rotated farther, up and down as well";
   }
   return check;
 }
@@ -124,7 +124,7 @@ Check parallax_check(const TurnedReport& report, const MatchedPhotos& photos) {
                photos.names[static_cast<std::size_t>(test.photo_b)] + ": the camera's centre moved by about " +
                text_of(100.0 * test.relative, 2) + " % of the points' distance a radian of turn";
   const bool matters = test.relative * report.camera[0] > 0.5 * std::sqrt(report.cov(0, 0));
-  check.text += matters ? "; counted in σ: turn it about its lens, or look at things farther away" : "; counted in σ";
+  check.text += matters ? "; counted in σ: rotate it about its lens, or look at things farther away" : "; counted in σ";
   if (matters) check.state = test.relative > most ? State::bad : State::care;
   return check;
 }
@@ -138,7 +138,7 @@ Check zoom_check(const TurnedReport& report, const MatchedPhotos& photos) {
               "%",
               "photos"};
   for (std::size_t i = 0; i < report.photos.size(); ++i) {
-    const TurnedPhoto& photo = report.photos[i];
+    const RotatedPhoto& photo = report.photos[i];
     const double off = std::abs(photo.zoom - 1.0);
     if (!photo.is_used || !(off > zoom_is_seen * photo.sigma_zoom) || 100.0 * off <= check.value) continue;
     check.value = 100.0 * off;
@@ -152,11 +152,11 @@ Check zoom_check(const TurnedReport& report, const MatchedPhotos& photos) {
 
 Check kept_check(const TurnedReport& report) {
   constexpr double care = 80.0;
-  const double share = 100.0 * std::min(1.0, static_cast<double>(report.num_kept) /
-                                                 std::max(1.0, static_cast<double>(report.num_agreeing)));
+  const double share = 100.0 * std::min(1.0, static_cast<double>(report.matches.kept) /
+                                                 std::max(1.0, static_cast<double>(report.matches.agreeing)));
   Check check{"matches", State::good, "", share, care, "%", "residuals"};
-  check.text = "of " + std::to_string(report.num_matches) + " matches " + std::to_string(report.num_agreeing) +
-               " agree within their pair, " + std::to_string(report.num_kept) + " with one camera that turns";
+  check.text = "of " + std::to_string(report.matches.given) + " matches " + std::to_string(report.matches.agreeing) +
+               " agree within their pair, " + std::to_string(report.matches.kept) + " with one camera that rotates";
   if (share < care) check.state = State::care;
   return check;
 }
@@ -177,7 +177,7 @@ Check photos_check(const TurnedReport& report, const MatchedPhotos& photos) {
   const auto used = photos.names.size() - out.size();
   Check check{"photos", State::good, std::to_string(used) + " photos hang together", static_cast<double>(used), 4.0,
               "photos", "photos"};
-  if (!out.empty()) check.text += "; left out: " + list_of(out);
+  if (!out.empty()) check.text += "; rejected: " + list_of(out);
   if (used < 4) {
     check.state = State::care;
     check.text += "; with three little confirms the answer: add photos between and beyond them";
@@ -207,7 +207,7 @@ Check centre_check(const TurnedReport& report) {
                text_of(report.free_centre_px.y(), 4) + ") px";
   if (check.value > most) {
     check.state = State::care;
-    check.text += ", not where it is held: leave out --fix-centre";
+    check.text += ", not where it is fixed: leave out --fix-centre";
   }
   return check;
 }
@@ -219,20 +219,21 @@ Verdict turned_verdict(const TurnedReport& report, const MatchedPhotos& photos, 
     case Status::too_few_photos:
       return refused(too_few(report, photos), ExitCode::cannot_tell);
     case Status::no_turn:
-      return refused({"the camera does not turn between these photos", "turn it by 10° or more from photo to photo"},
+      return refused({"the camera does not turn between these photos", "rotate it by 10° or more from photo to photo"},
                      ExitCode::cannot_tell);
     case Status::zoomed:
       return refused(zoomed(report, photos), ExitCode::cannot_tell);
     case Status::moved:
-      return refused({"the photos agree two by two, but not with one camera that turns on the spot: " +
-                          std::to_string(report.num_kept) + " of " + std::to_string(report.num_agreeing) + " matches",
-                      "turn the camera about its lens instead of walking, or look at things farther away"},
-                     ExitCode::cannot_tell);
+      return refused(
+          {"the photos agree two by two, but not with one camera that rotates on the spot: " +
+               std::to_string(report.matches.kept) + " of " + std::to_string(report.matches.agreeing) + " matches",
+           "rotate the camera about its lens instead of walking, or look at things farther away"},
+          ExitCode::cannot_tell);
     case Status::weak:
       return refused(weak(report, photos, config), ExitCode::cannot_tell);
     case Status::no_convergence:
       return refused(
-          {"no camera that turns explains these matches", "check that the photos are of one camera and spot"},
+          {"no camera that rotates explains these matches", "check that the photos are of one camera and spot"},
           ExitCode::no_convergence);
     case Status::ok:
       break;
@@ -254,7 +255,7 @@ Verdict turned_verdict(const TurnedReport& report, const MatchedPhotos& photos, 
     verdict.to_add = check.text;
   }
   const Eigen::VectorXd sigma = report.cov.diagonal().cwiseSqrt();
-  const auto used = std::ranges::count_if(report.photos, [](const TurnedPhoto& photo) { return photo.is_used; });
+  const auto used = std::ranges::count_if(report.photos, [](const RotatedPhoto& photo) { return photo.is_used; });
   verdict.sentence = "fx " + text_of(report.camera[0], 5) + " ± " + text_of(3.0 * sigma[0], 2) + " px, fy " +
                      text_of(report.camera[1], 5) + " ± " + text_of(3.0 * sigma[1], 2) + " px (3σ) from " +
                      std::to_string(used) + " photos";

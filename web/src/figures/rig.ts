@@ -38,7 +38,7 @@ function headPose(doc: Doc, k: number): Pose | null {
 
 function addAxes(world: World, axes: Table, length: number): void {
   for (let i = 0; i < axes.rows; ++i) {
-    const n = (name: string) => axes.number(name, i), p: V3 = [n('point_in_base_x_m'), n('point_in_base_y_m'), n('point_in_base_z_m')];
+    const n = (name: string) => axes.number(name, i), p: V3 = [n('point_in_world_x_m'), n('point_in_world_y_m'), n('point_in_world_z_m')];
     const d = unit([n('direction_x'), n('direction_y'), n('direction_z')]), name = axes.text('name', i), isPan = name.includes('pan');
     const ends: V3[] = [sub(p, mul(d, length)), add(p, mul(d, length))];
     world.line(ends, {colour: isPan ? 'green' : 'orange', width: 3});

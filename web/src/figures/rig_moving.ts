@@ -13,7 +13,7 @@ import {hasTriple, triple} from './columns';
 import {scatter} from './scatter';
 
 const colours = ['blue', 'orange', 'green', 'purple', 'sky', 'red'] as const;
-const target = 'target_in_base_';
+const target = 'target_in_world_';
 
 function camerasOf(doc: Doc): Table | null {
   const cameras = doc.table('cameras');

@@ -13,7 +13,7 @@ import {drawNis} from './nis_plot';
 import {observeScene} from './observe_scene';
 import {scatter} from './scatter';
 
-const target = 'target_in_base_';
+const target = 'target_in_world_';
 
 function covOf(steps: Table, i: number): M3 {
   const c = (name: string) => steps.number(`cov_${name}_m2`, i), s = (axis: string) => steps.number(`sigma_${target}${axis}_m`, i);
@@ -24,10 +24,10 @@ function covOf(steps: Table, i: number): M3 {
 /** Rays of the sights about an instant: one a head, the newest. */
 function addRays(world: World, doc: Doc, time: number, to: V3): void {
   const sights = doc.table('measurements');
-  if (!sights || !hasTriple(sights, 'ray_origin_in_base_')) return;
+  if (!sights || !hasTriple(sights, 'ray_origin_in_world_')) return;
   const t = sights.numbers('t_capture_s'), head = sights.numbers('head'), latest = new Map<number, number>();
   for (let i = 0; i < sights.rows; ++i) if (t[i]! <= time + 1e-6) latest.set(head[i]!, i);
-  const origin = triple(sights, 'ray_origin_in_base_'), direction = triple(sights, 'ray_direction_', '');
+  const origin = triple(sights, 'ray_origin_in_world_'), direction = triple(sights, 'ray_direction_', '');
   for (const [id, i] of latest) {
     const from = origin.at(i), d = direction.at(i);
     if (!isFinite3(from) || !isFinite3(d)) continue;

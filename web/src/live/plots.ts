@@ -47,8 +47,8 @@ const nis = (dof: string | number): Plot => ({label: 'NIS over its degrees of fr
 
 export const plotsOf: Record<string, PlotCard[]> = {
   track: [
-    {id: 'position', title: 'Where is it?', note: 'm, ± 3σ', span: 12, plots: axes.map(([axis, colour]) => ({label: axis, unit: 'm', sigma: `sigma_target_in_base_${axis}_m`, lines: [
-      {column: `target_in_base_${axis}_m`, name: axis, colour}, {column: `truth_${axis}_m`, name: 'truth', colour: 'ink', dash: [5, 4], width: 1.2}]}))},
+    {id: 'position', title: 'Where is it?', note: 'm, ± 3σ', span: 12, plots: axes.map(([axis, colour]) => ({label: axis, unit: 'm', sigma: `sigma_target_in_world_${axis}_m`, lines: [
+      {column: `target_in_world_${axis}_m`, name: axis, colour}, {column: `truth_${axis}_m`, name: 'truth', colour: 'ink', dash: [5, 4], width: 1.2}]}))},
     {id: 'innovations', title: 'Does each sight fit?', note: 'innovation, px, ± 3σ; left out: red', span: 12, isPerHead: true, plots: [sightPlot('u'), sightPlot('v'), nis(2)]},
   ],
   servo: [

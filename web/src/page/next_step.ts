@@ -28,7 +28,7 @@ const uses: Record<string, (doc: Doc) => string> = {
 
 /** Empty of none. */
 export function nextStep(doc: Doc): string {
-  if (doc.toAdd) return doc.toAdd.replace(/\.?$/, '.').replace(/^./, (first) => first.toUpperCase());
+  if (doc.toAdd) return doc.toAdd.replace(/\.?$/, '.').replace(/^[a-z]/, (first) => first.toUpperCase());
   if (!doc.isAnswer) return '';
   const next = doc.command === 'calibrate' ? doc.table('next') : null;
   const gain = next && next.number('worst_3sigma_px', 0) > 0 ? ` One more photo, as sketched below, would bring the worst 3σ to ${num(next.number('worst_3sigma_px', 0), 2)} px.` : '';

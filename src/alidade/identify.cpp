@@ -1,0 +1,77 @@
+#include "alidade/identify.h"
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "alidade/servo/identify.h"
+#include "alidade/servo/identify_causes.h"
+
+namespace alidade {
+namespace {
+
+void require_sense(const std::vector<ServoSample>& log) {
+  constexpr double max_angle_rad = 1e4, max_number = 1e12;
+  for (std::size_t i = 0; i < log.size(); ++i) {
+    const ServoSample& row = log[i];
+    const std::string where = "row " + std::to_string(i) + ": ";
+    if (!(std::abs(row.t_s) <= max_number && std::abs(row.command) <= max_number))
+      throw ConfigError(where + "its time and command must be finite, and no larger than 1e12");
+    if (!(std::abs(row.angle_rad) <= max_angle_rad)) throw ConfigError(where + "is no angle of a servo");
+    if (i > 0 && !(row.t_s > log[i - 1].t_s)) throw ConfigError(where + "its time is not after the row before it");
+  }
+}
+
+/// What is taken as given. By definition: angles are the encoder's own radians, times the log's own seconds.
+std::vector<Assumption> assumed_of(const ServoIdentification& identified) {
+  const double gain = identified.fit.params[ServoParam::gain], sigma = std::sqrt(identified.fit.cov(0, 0));
+  std::vector<Assumption> assumed = {{.name = "encoder_scale", .value = 1.0, .sigma = 0.0, .moved = "gain_rad"},
+                                     {.name = "clock_rate", .value = 1.0, .sigma = 0.0, .moved = "tau_s"}};
+  for (const HiddenFlaw& hidden : identified.hidden)
+    assumed.push_back({.name = servo_flaw_names[hidden.flaw],
+                       .value = servo_flaws[hidden.flaw] == &ServoFlaws::max_rate_rad_s
+                                    ? std::numeric_limits<double>::quiet_NaN()
+                                    : 0.0,
+                       .ordinary = hidden.size,
+                       .moves = std::abs(hidden.gain_factor - 1.0) * std::abs(gain) / sigma,
+                       .moved = "gain_rad",
+                       .moved_by = (hidden.gain_factor - 1.0) * gain,
+                       .remedy = "log steps of several sizes to both sides, or a chirp"});
+  return assumed;
+}
+
+const WordList<ServoKindRule>& servo_kind_words() {
+  static const WordList<ServoKindRule> words = {
+      {ServoKindRule::automatic, "auto"}, {ServoKindRule::angle, "angle"}, {ServoKindRule::rate, "rate"}};
+  return words;
+}
+
+}  // namespace
+
+FieldList fields_of(IdentifyConfig& config) {
+  return {{.name = "kind",
+           .value = words_code(config.kind, servo_kind_words()),
+           .help = "What follows the command with a lag: the angle, or its rate; auto: the one whose residuals are "
+                   "clearly the smaller"}};
+}
+
+Identification identify(std::vector<ServoSample> log, const IdentifyConfig& config) {
+  if (config.kind < ServoKindRule::automatic || config.kind > ServoKindRule::rate)
+    throw ConfigError("kind is none of auto, angle, rate");
+  require_sense(log);
+  constexpr std::size_t min_rows = 20;
+  Identification result;
+  result.log = std::move(log);
+  result.config = config;
+  if (result.log.size() >= min_rows)
+    static_cast<ServoIdentification&>(result) = identify_servo(result.log, config.kind);
+  result.verdict = identify_verdict(result.log, result);
+  result.counts.given = result.counts.used = result.log.size();
+  if (result.residual_rad.empty()) return result;
+  result.encoder_step_rad = encoder_step_rad(result.log);
+  result.assumed = assumed_of(result);
+  return result;
+}
+
+}  // namespace alidade

@@ -1,0 +1,131 @@
+#include "alidade/localize.h"
+
+#include <algorithm>
+#include <limits>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <utility>
+
+#include "alidade/localize/image_localizer.h"
+#include "alidade/localize/judge.h"
+#include "alidade/localize/observation_localizer.h"
+#include "alidade/localize/setup.h"
+
+namespace alidade {
+
+/// The front ends point to config: it stays where it is.
+struct Localizer::Run {
+  Camera camera;
+  LocalizeConfig config;
+  std::optional<ObservationLocalizer> of_observations;
+  std::optional<ImageLocalizer> of_images;
+  std::vector<PathStep> path;
+
+  [[nodiscard]] double last_t_s() const {
+    return path.empty() ? std::numeric_limits<double>::quiet_NaN() : path.back().t_s;
+  }
+  template <typename Take>
+  const PathStep& timed(const Take& take) {
+    const double begin_s = config.seconds ? config.seconds() : 0.0;
+    path.push_back(take());
+    if (config.seconds) path.back().seconds = config.seconds() - begin_s;
+    return path.back();
+  }
+};
+
+Localizer::Localizer(const Camera& camera, const LocalizeConfig& config) {
+  require_sense(config, camera);
+  run_ = std::make_unique<Run>(Run{known_camera(camera, config), config, {}, {}, {}});
+}
+
+Localizer::~Localizer() = default;
+Localizer::Localizer(Localizer&&) noexcept = default;
+Localizer& Localizer::operator=(Localizer&&) noexcept = default;
+
+const PathStep& Localizer::push(const ObservationFrame& frame) {
+  Run& run = *run_;
+  if (run.of_images) throw ConfigError("observations follow images");
+  require_sense(frame, run.last_t_s());
+  if (!run.of_observations) {
+    run.config = resolved(std::move(run.config), run.camera, false);
+    run.of_observations.emplace(run.camera, run.config);
+  }
+  const PathStep& step = run.timed([&] { return run.of_observations->take(frame); });
+  if (run.config.watch) run.config.watch(step);
+  return step;
+}
+
+const PathStep& Localizer::push(const cv::Mat& grey, long frame, double t_s) {
+  Run& run = *run_;
+  if (run.of_observations) throw ConfigError("images follow observations");
+  require_sense(ObservationFrame{frame, t_s, {}}, run.last_t_s());
+  if (grey.type() != CV_8UC1 || grey.cols != run.camera.width_px || grey.rows != run.camera.height_px)
+    throw ConfigError("an image is not 8-bit grey of the camera's size");
+  if (!run.of_images) {
+    run.config = resolved(std::move(run.config), run.camera, true);
+    run.of_images.emplace(run.camera, run.config);
+  }
+  const PathStep& step = run.timed([&] { return run.of_images->take(grey, frame, t_s); });
+  if (run.config.watch_image) run.config.watch_image(t_s, grey, run.of_images->tried());
+  if (run.config.watch) run.config.watch(step);
+  return step;
+}
+
+Localization Localizer::finish(std::span<const TimedPose> truth) const {
+  require_sense(truth);
+  const Run& run = *run_;
+  Localization result;
+  result.path = run.path;
+  result.camera = run.camera;
+  result.truth.assign(truth.begin(), truth.end());
+  result.has_target = result.scale_known = !run.config.target.points.empty();
+  result.is_scale_given = run.config.target.is_scale_given;
+  result.sigma_px = run.config.filter.sigma_px;
+  for (const int index : run.config.filter.lens_params)
+    result.lens_params.push_back(param_names(run.camera.lens)[static_cast<std::size_t>(index)]);
+  if (run.of_images)
+    run.of_images->sum_up(result);
+  else if (run.of_observations)
+    run.of_observations->sum_up(result);
+  result.counts = {result.path.size(), result.path.size() - result.num_lost, result.num_lost, {}};
+  result.assumed = localize_assumed(result);
+  result.verdict = localize_verdict(result);
+  return result;
+}
+
+Localization localize(std::span<const ObservationFrame> frames, const Camera& camera, const LocalizeConfig& config,
+                      std::span<const TimedPose> truth, const Progress& progress) {
+  require_sense(truth);
+  Localizer localizer(camera, sized(config, frames));
+  std::size_t done = 0;
+  for (const ObservationFrame& frame : frames) {
+    report_progress(progress, "localize", done++, frames.size());
+    localizer.push(frame);
+  }
+  return localizer.finish(truth);
+}
+
+Localization localize(const ObservationTable& observations, const Camera& camera, const LocalizeConfig& config,
+                      std::span<const TimedPose> truth, const Progress& progress) {
+  Localization result = localize(observations.frames, camera, config, truth, progress);
+  result.counts.given += observations.skipped.size();
+  result.counts.skipped = observations.skipped;
+  return result;
+}
+
+Localization localize(const ImageStream& images, const Camera& camera, const LocalizeConfig& config,
+                      std::span<const TimedPose> truth, const Progress& progress) {
+  if (!images.next) throw ConfigError("there is nothing that loads the images");
+  require_sense(truth);
+  Localizer localizer(camera, config);
+  cv::Mat grey;
+  long frame = 0;
+  double t_s = 0.0;
+  for (std::size_t done = 0; images.next(grey, frame, t_s); ++done) {
+    report_progress(progress, "localize", done, std::max(images.num_images, done + 1));
+    localizer.push(grey, frame, t_s);
+  }
+  return localizer.finish(truth);
+}
+
+}  // namespace alidade

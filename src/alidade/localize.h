@@ -1,0 +1,54 @@
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "alidade/camera/camera.h"
+#include "alidade/estimation/config_error.h"
+#include "alidade/estimation/progress.h"
+#include "alidade/localize/config.h"
+#include "alidade/localize/localization.h"
+#include "alidade/localize/sequence.h"
+#include "alidade/public.h"
+
+/// The path of a moving camera and the map of the points that it sees: the whole job, as `alidade localize` does it.
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+/// From observations of numbered points, frames in order of time. Throws ConfigError for a config, a camera or frames
+/// that cannot be, Interrupted where `progress` says stop; never for what the observations show. With `truth` the
+/// result has the path's error.
+[[nodiscard]] Localization localize(const ObservationTable& observations, const Camera& camera,
+                                    const LocalizeConfig& config = {}, std::span<const TimedPose> truth = {},
+                                    const Progress& progress = {});
+[[nodiscard]] Localization localize(std::span<const ObservationFrame> frames, const Camera& camera,
+                                    const LocalizeConfig& config = {}, std::span<const TimedPose> truth = {},
+                                    const Progress& progress = {});
+
+/// From images, 8-bit grey and of the camera's size, in order of time: features are chosen and found again in them.
+[[nodiscard]] Localization localize(const ImageStream& images, const Camera& camera, const LocalizeConfig& config = {},
+                                    std::span<const TimedPose> truth = {}, const Progress& progress = {});
+
+/// The same frame by frame, as they come. What push() gives is the filter's; finish() gives what localize() gives from
+/// the same frames, if they are equally far apart or the config has their period.
+class Localizer {
+ public:
+  /// Throws ConfigError.
+  explicit Localizer(const Camera& camera, const LocalizeConfig& config = {});
+  ~Localizer();
+  Localizer(Localizer&&) noexcept;
+  Localizer& operator=(Localizer&&) noexcept;
+
+  /// The next frame: observations or images, but not both. Throws ConfigError, and is then as it was before.
+  const PathStep& push(const ObservationFrame& frame);
+  const PathStep& push(const cv::Mat& grey, long frame, double t_s);
+  /// The result so far; more may follow.
+  [[nodiscard]] Localization finish(std::span<const TimedPose> truth = {}) const;
+
+ private:
+  struct Run;
+  std::unique_ptr<Run> run_;
+};
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

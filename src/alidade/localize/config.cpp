@@ -1,0 +1,52 @@
+#include "alidade/localize/config.h"
+
+namespace alidade {
+
+FieldList fields_of(LocalizeConfig& config) {
+  static const WordList<NewPoints> new_points = {
+      {NewPoints::inverse_depth, "inverse-depth"}, {NewPoints::xyz, "xyz"}, {NewPoints::delayed, "delayed"}};
+  constexpr Limits positive{.min = 0.0, .is_above_min = true};
+  return {
+      {.name = "distortion",
+       .value = words_code(config.distortion, distortion_words()),
+       .help = "How much of a brown lens's distortion the filter knows"},
+      {.name = "calibrate_online",
+       .value = &config.calibrate_online,
+       .help = "Estimate fx fy cx cy k1 k2 p1 p2 as well, from the camera file's values and σ on"},
+      {.name = "new_points",
+       .value = words_code(config.new_points, new_points),
+       .help = "How a new point enters: inverse-depth, xyz, or delayed until its depth is known to 5 %"},
+      {.name = "depth_m",
+       .value = &config.depth_m,
+       .help = "Depth at which a new point is first believed [m] (default: the target's)",
+       .limits = positive},
+      {.name = "sigma_depth", .value = &config.sigma_depth, .help = "σ of that over the depth", .limits = positive},
+      {.name = "sigma_px",
+       .value = &config.sigma_px,
+       .help = "σ of a pixel coordinate (default 0.5); in images, where each match brings its own, the least (default "
+               "0.11) [px]",
+       .limits = positive,
+       .option = "--sigma-px"},
+      {.name = "sigma_scale",
+       .value = &config.sigma_scale,
+       .help = "σ of the target's size over it, as of a print (0.002: 0.2 %), counted",
+       .limits = positive},
+      {.name = "sigma_a_m_s2",
+       .value = &config.filter.sigma_a_m_s2,
+       .help = "Acceleration of the camera [m/s2]; by hand about 4",
+       .limits = positive},
+      {.name = "sigma_alpha_rad_s2",
+       .value = &config.filter.sigma_alpha_rad_s2,
+       .help = "Angular acceleration [rad/s2]; by hand about 6",
+       .limits = positive,
+       .option = "--sigma-alpha"},
+      {.name = "max_points",
+       .value = &config.max_points,
+       .help =
+           "Points in the filter at once, beside the target's: where it is full, what tells least leaves, and comes "
+           "back when it is seen again (0: as many as its state of 800 holds; in images 120)",
+       .limits = {0.0, 3000.0}},
+  };
+}
+
+}  // namespace alidade

@@ -1,0 +1,133 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/description/field.h"
+#include "alidade/localize/camera_motion.h"
+#include "alidade/localize/distortion.h"
+#include "alidade/localize/sequence.h"
+#include "alidade/localize/target.h"
+#include "alidade/public.h"
+
+namespace alidade {
+class LocalizationFilter;
+ALIDADE_PUBLIC_BEGIN
+struct PathStep;
+
+/// The filter: an error-state EKF over motion, lens and map.
+struct LocalizationFilterConfig {
+  double sigma_px = 0.5;  ///< Of a pixel coordinate, where an observation does not say.
+  /// Of the pixel by which a new feature is defined; 0: sigma_px. A patch that is looked for as it was first seen is
+  /// there by definition.
+  double sigma_new_px = 0.0;
+  double sigma_a_m_s2 = 1.0;        ///< Acceleration between predictions; a hand's is about 4.
+  double sigma_alpha_rad_s2 = 1.5;  ///< Angular acceleration; a hand's is about 6.
+  int max_iterations = 4;           ///< Gauss–Newton steps of an update.
+  double gate = 13.8;               ///< χ² of two numbers: 99.9 %.
+  double bend_tolerance = 0.05;     ///< Iterate while innovations are further from linear than so many σ.
+  bool is_sequential = true;        ///< Known points first, then by growing innovation; false: in the order given.
+  bool finds_consensus = true;      ///< One-point consensus where observations disagree: mismatches.
+  double consensus_above = 0.0;     ///< Share of the observations that may disagree before a consensus is looked for.
+  /// No observation says how the world is rotated, and so the covariance says: world_turn.h. False: as in the
+  /// literature before 2001, more certain with every frame.
+  bool holds_frame = true;
+  /// Errors that rotate with the world are straight for small rotations only: an update by a larger one holds the frame
+  /// by its derivatives alone. See world_turn.h.
+  double max_turn_rad = 0.02;
+  double linear_below = 0.1;          ///< Linearity index below which an inverse depth becomes a position.
+  std::vector<int> lens_params = {};  ///< Indices of the lens's parameters that are in the state, and their initial σ.
+  std::vector<double> sigma_lens_params = {};
+  double sigma_scale = 0.0;  ///< Of the known points' shared scale, relative; counted, as the lens's covariance is.
+  int state_capacity = 800;  ///< Components of the state at most.
+  int observations_capacity = 200;  ///< Measured features of one moment at most.
+};
+
+/// Filters that start differently, until the observations say which is right.
+struct FilterBankConfig {
+  int splits = 5;            ///< Parts of the speed aside, to each of two sides; 1: none.
+  double spread = 1.5;       ///< The outermost part, in σ.
+  double narrowed = 0.5;     ///< σ of a part over the σ of the whole.
+  double min_weight = 40.0;  ///< A part that costs so much more than the best one (−2 ln) is given up.
+  int max_frames = 15;       ///< After so many updates the best one alone goes on.
+};
+
+/// How features of images are chosen, found again and given up.
+struct ImageFeatureConfig {
+  int min_found = 30;  ///< New ones are added while fewer are found in an image.
+  int max_tried = 40;  ///< Looked for in an image, the oldest first: they drift least.
+  int max_new = 8;     ///< In an image, after the first.
+  int max_features = 120;
+  /// Least σ of a match's coordinate: what patches of things with depth, seen through a lens that is not quite as
+  /// calibrated, are off by, however well they fit.
+  double sigma_floor_px = 0.11;
+  double min_correlation = 0.8;
+  double min_found_share = 0.5;  ///< Features that are found less often leave.
+  int cell_px = 0;               ///< Of the grid on which new ones are chosen; 0: a tenth of the image's width.
+  double near_share = 0.15;      ///< Distance between keyframes over that of the map's points,
+  double near_rad = 0.15;        ///< and angle.
+};
+
+/// What is known of a point's depth before it is seen: along the optical axis where it is first seen.
+struct GivenDepth {
+  long id = 0;
+  double depth_m = 1.0;
+  double sigma_rel = 0.03;
+};
+
+/// What is known before the first frame.
+struct LocalizeStart {
+  CameraMotion motion = {};
+  MotionMatrix cov = MotionMatrix::Zero();
+  double depth_m = 0.0;      ///< Of new points, where the config does not say; 0: not known.
+  double sigma_depth = 0.5;  ///< Of that, relative.
+  std::vector<GivenDepth> depths = {};
+};
+
+/// When a new point enters the state.
+enum class NewPoints {
+  inverse_depth,  ///< With its first observation, as an inverse depth.
+  xyz,            ///< With its first observation, as a position.
+  delayed,        ///< When two of its observations give its depth to 5 %, as an inverse depth.
+};
+
+/// Options of localize(). Plain data with usable defaults.
+struct LocalizeConfig {
+  DistortionVariant distortion = DistortionVariant::full;
+  bool calibrate_online = false;  ///< fx fy cx cy k1 k2 p1 p2 are estimated, as far as the lens has them.
+  NewPoints new_points = NewPoints::inverse_depth;
+  std::optional<double> depth_m = {};       ///< Of new points of which no depth is given. None: the target's distance.
+  double sigma_depth = 0.5;                 ///< Of those, relative.
+  std::optional<double> sigma_px = {};      ///< Of a pixel coordinate; in images the least of a match. None: 0.5, 0.11.
+  std::optional<double> sigma_scale = {};   ///< Of the target's size, relative: counted. None: the target's own.
+  std::optional<LocalizeStart> start = {};  ///< Else from the target, else the first camera is the world, up to scale.
+  LocalizeTarget target = {};
+  double period_s = 0.0;  ///< Usual time between frames. 0: the median; of images the least so far.
+  bool smooths = true;    ///< With a target: the path is solved again from all observations after the last frame.
+  bool restarts = true;   ///< From the target where the innovations say that the path is wrong.
+  int max_points = 0;     ///< In the filter at once, beside the target's; 0: as many as its state holds.
+  double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;  ///< At a start from the target or from nothing.
+  LocalizationFilterConfig filter = {};
+  FilterBankConfig bank = {};
+  ImageFeatureConfig features = {};
+
+  std::function<double()> seconds = {};             ///< A clock, if frames are to be timed.
+  std::function<void(const PathStep&)> watch = {};  ///< Is shown each step; what it throws ends the work.
+  /// Is shown each image with what was looked for in it, before `watch` its step.
+  std::function<void(double t_s, const cv::Mat&, std::span<const ObservationTried>)> watch_image = {};
+  /// For studies. Is given what was matched in an image before the filter sees it, and may change it;
+  std::function<void(long frame, std::vector<FeatureObservation>&)> disturb = {};
+  /// is shown the filter after each frame of observations that has one.
+  std::function<void(const LocalizationFilter&)> inspect = {};
+};
+
+/// The fields of `config` that a person sets: distortion, calibrate_online, new_points, depth_m, sigma_depth, sigma_px,
+/// sigma_scale, sigma_a_m_s2, sigma_alpha_rad_s2 and max_points. Start and target are values that come from files.
+[[nodiscard]] FieldList fields_of(LocalizeConfig& config);
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

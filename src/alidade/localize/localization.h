@@ -1,0 +1,143 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/camera/camera.h"
+#include "alidade/estimation/counts.h"
+#include "alidade/estimation/verdict.h"
+#include "alidade/localize/sequence.h"
+#include "alidade/public.h"
+
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+enum class FrameEvent {
+  waiting,  ///< Not started yet: no pose.
+  started,
+  tracked,
+  predicted,  ///< Fewer than three points used: the pose is mostly the motion's.
+  restarted,
+};
+[[nodiscard]] std::string_view event_name(FrameEvent event);
+
+/// A frame of the path.
+struct PathStep {
+  long frame = 0;
+  double t_s = 0.0;
+  FrameEvent event = FrameEvent::waiting;
+  Rigid3 world_from_cam;
+  Eigen::Matrix<double, 6, 6> cov =
+      Eigen::Matrix<double, 6, 6>::Zero();  ///< Of the right perturbation: translation [m], rotation [rad].
+  std::size_t num_seen = 0, num_tracked = 0, num_gated = 0, num_features = 0;
+  std::size_t num_known = 0, num_known_gated = 0;  ///< Of those used or gated: the target's.
+  double nis_per_dof = std::numeric_limits<double>::quiet_NaN();
+  double seconds = 0.0;
+
+  [[nodiscard]] bool has_pose() const { return event != FrameEvent::waiting; }
+};
+
+struct MapPoint {
+  long id = 0;
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();
+  bool is_known = false;
+  std::size_t num_seen = 0;
+};
+
+/// Something that is taken as given: how it would move the path, and what the observations say of it (a score test:
+/// what one more free parameter would come to, by the linearisation that is there anyway).
+struct GivenNumber {
+  /// "focal length", "centre u", "centre v", "k1", "scale of the target", "shape of the target", "speed of the target",
+  /// "readout" (of a rolling shutter, first row to last), "clock"
+  std::string_view name;
+  double moves = 0.0;           ///< Largest move of a pose's number for a whole unit (relative, px, m/s, s), in its σ,
+  std::string_view moved = {};  ///< which that is,
+  double moved_by = 0.0;        ///< and by how much [m or rad].
+  double asked = 0.0, z = 0.0;  ///< The change that the observations ask for, in units, and over its own σ.
+  std::optional<double> sigma;  ///< Counted, in units. None: not known.
+};
+
+/// What the mean residual along the radius is, in rings about the principal point.
+struct RadialStructure {
+  double share = 0.0;          ///< RMS over the rings of the mean residual over σ: 0 for a right lens.
+  double chi2_per_ring = 0.0;  ///< Squares of these means over their own σ, were observations independent.
+  double worst_px = 0.0;       ///< The largest mean residual.
+};
+
+/// What residuals share that should be independent.
+struct ResidualStructure {
+  double colour = 0.0;        ///< Correlation of a point's residual with that of the frame before.
+  double sigma_colour = 1.0;  ///< Of that, were they independent.
+  /// Whether that is more than chance and worth a word.
+  [[nodiscard]] bool has_colour() const { return colour > 0.25 && colour > 4.0 * sigma_colour; }
+  double place_chi2 = 0.0;   ///< Of the mean residuals of 4 × 3 parts of the image, over their count: 1 where right.
+  double place_limit = 1e9;  ///< 99.9 % of that.
+  double worst_px = 0.0;     ///< The largest mean,
+  std::string worst_place;   ///< and where: "upper left".
+};
+
+/// How far an estimated path is from the true one. Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM
+/// Systems", IROS 2012: ATE is the RMS distance of positions after alignment; RPE the RMS translation of
+/// (Q_i⁻¹ Q_i+1)⁻¹ (P_i⁻¹ P_i+1) between neighbours, with the aligned scale.
+struct PathError {
+  double ate_m = std::numeric_limits<double>::quiet_NaN();
+  double rpe_m = std::numeric_limits<double>::quiet_NaN();
+  double rpe_rad = std::numeric_limits<double>::quiet_NaN();  ///< RMS rotation of the same.
+  double unaligned_m = std::numeric_limits<double>::quiet_NaN();
+  double scale = 1.0;  ///< Of truth over estimate.
+  /// RMS of the positions' stated σ (root of the trace), with the aligned scale: what `ate_m` should not be above, as
+  /// an alignment takes errors away and adds none.
+  double stated_m = std::numeric_limits<double>::quiet_NaN();
+  std::size_t num_pairs = 0;
+};
+
+/// Everything that localize() has to say: the path, the map, and what they are worth.
+struct Localization {
+  std::vector<PathStep> path;  ///< One per frame.
+  std::vector<MapPoint> map;   ///< At the end.
+  bool scale_known = false;
+  bool has_target = false;  ///< Known points were given.
+  bool is_of_images = false;
+  double sigma_px =
+      std::numeric_limits<double>::quiet_NaN();  ///< Of an observation that brings none; of images the least.
+  std::size_t num_lost = 0;  ///< Frames without a pose that observations hold: waiting or predicted.
+  std::size_t num_restarts = 0;
+  std::size_t num_left = 0;  ///< Times that a point left a full filter.
+  std::size_t num_observations = 0, num_used = 0, num_gated = 0, max_seen = 0;
+  std::size_t num_known = 0, num_known_gated = 0;
+  double nis_per_dof = std::numeric_limits<double>::quiet_NaN();
+  /// How far the target's points have gone in the map from their given positions: squares over σ², per number.
+  double known_shift = std::numeric_limits<double>::quiet_NaN();
+  RadialStructure radial;                ///< Of what observations are off after the update: what a wrong lens leaves.
+  std::size_t num_alike = 1;             ///< Things seen at once that might be the target, where a start failed for it.
+  Camera camera;                         ///< As it is at the end.
+  std::vector<std::string> lens_params;  ///< Of the camera's parameters those that were estimated,
+  Eigen::VectorXd sigma_lens;            ///< and their σ.
+  std::vector<TimedPose> truth;          ///< As given.
+  PathError error;                       ///< With truth.
+  bool is_scale_given = true;            ///< As in LocalizeTarget; also where the config has its σ.
+  bool is_board = false;                 ///< The target is a printed board, which has one side.
+  bool is_behind = false;                ///< Most poses are on the side of a flat target from which it is not seen.
+  ResidualStructure residuals;           ///< Of a smoothed path.
+  bool is_smoothed = false;         ///< Path and map are from all observations together, not each from those before it.
+  std::size_t num_unexplained = 0;  ///< Frames of a smoothed path of which most observations do not fit it.
+  /// Of a smoothed path: along its least certain direction the cost rises more slowly to one side than to the other, or
+  /// than σ says; σ is enlarged there by so much.
+  double widened = 1.0;
+  /// Of a smoothed path: the camera hardly moves aside, and its least certain numbers are less sure than their σ.
+  bool is_from_one_place = false;
+  std::vector<GivenNumber> given;  ///< What was given, and what it does.
+  double lens_pull = 0.0;          ///< Of a lens that was estimated: how far from what was given, in the given σ.
+
+  Counts counts;  ///< Of frames, and rows that were left out.
+  std::vector<Assumption> assumed;
+  Verdict verdict;
+};
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

@@ -1,0 +1,240 @@
+#include "alidade/localize/observation_localizer.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/localize/known_pose.h"
+#include "alidade/localize/smooth.h"
+#include "alidade/localize/summary.h"
+
+namespace alidade {
+
+double ObservationLocalizer::period_s() const {
+  if (config_.period_s > 0.0) return config_.period_s;
+  return gaps_s_.empty() ? 1.0 : std::max(gaps_s_[gaps_s_.size() / 2], 1e-9);
+}
+
+void ObservationLocalizer::keep_gap(double t_s) {
+  if (num_taken_ > 0 && !(config_.period_s > 0.0))
+    gaps_s_.insert(std::ranges::upper_bound(gaps_s_, t_s - t_s_), t_s - t_s_);
+  t_s_ = t_s;
+}
+
+/// From the start that was given, or the poses from which the target looks so; without both the first camera is the
+/// world.
+bool ObservationLocalizer::start(const ObservationFrame& frame) {
+  std::vector<StartHypothesis> from;
+  if (const auto start = engine_.start_without_target()) {
+    if (!config_.start && frame.observations.size() < min_observations) return false;
+    from = {*start};
+  } else {
+    from = poses_from_known(engine_.camera(), frame.observations, config_.target.points, engine_.pose_config());
+    if (from.empty()) return false;
+    from = only_where(std::move(from));
+  }
+  engine_.begin(from, frame.t_s, config_.bank);
+  for (const KnownPoint& point : config_.target.points)
+    engine_.filters().add_known(point.id, point.point_in_world, point.sigma_m);
+  record_.begin(num_taken_);
+  return true;
+}
+
+/// For one point more.
+bool ObservationLocalizer::has_room() const {
+  const LocalizationFilter& filter = engine_.best();
+  if (!filter.has_room(config_.new_points == NewPoints::xyz ? 3 : 6)) return false;
+  const auto num_known = std::ranges::count_if(filter.features(), &Feature::is_known);
+  return config_.max_points == 0 ||
+         static_cast<std::ptrdiff_t>(filter.features().size()) - num_known < config_.max_points;
+}
+
+/// What a point that is not seen now is worth: how much of a look at it would be news of the camera and not of the
+/// point (the pixel's variance over that with which it is expected), times how likely it is seen again soon (it is in
+/// the image or near it, and was seen lately).
+double ObservationLocalizer::value_of(const Feature& feature) const {
+  const auto expected = engine_.best().expected(feature.id);
+  if (!expected) return 0.0;
+  const double information = config_.filter.sigma_px * config_.filter.sigma_px / std::sqrt(expected->S.determinant());
+  const Eigen::Array2d size(engine_.camera().width_px, engine_.camera().height_px), px = expected->px;
+  const double outside = std::max({0.0, (-px / size).maxCoeff(), (px / size - 1.0).maxCoeff()});
+  constexpr double near_share = 0.25, half_life = 30.0;  // of the image's size; frames
+  const double age = static_cast<double>(num_taken_ - points_.last_frame(feature.id));
+  return information * std::exp(-outside / near_share) * std::exp2(-age / half_life);
+}
+
+/// The points that may leave, the first first.
+std::vector<long> ObservationLocalizer::least_useful(const ObservationFrame& frame) const {
+  constexpr double useful = 0.5;
+  std::vector<std::pair<double, long>> worth;
+  for (const Feature& feature : engine_.best().features()) {
+    const bool is_seen = std::ranges::count(frame.observations, feature.id, &FeatureObservation::id) > 0;
+    if (feature.is_known || is_seen) continue;
+    if (const double value = value_of(feature); value < useful) worth.emplace_back(value, feature.id);
+  }
+  std::ranges::sort(worth);
+  std::vector<long> ids;
+  for (const auto& [value, id] : worth) ids.push_back(id);
+  return ids;
+}
+
+void ObservationLocalizer::let_go(long id) {
+  const LocalizationFilter& filter = engine_.best();
+  const auto place = filter.place(id);
+  const auto feature = std::ranges::find(filter.features(), id, &Feature::id);
+  points_.keep({{id, place->point_in_world, place->cov, false, 0}, feature->kind == FeatureKind::xyz});
+  engine_.filters().remove(id);
+  ++num_left_;
+}
+
+/// Where the filter is full, points that are of little use leave for those that are seen; they come back by their
+/// number.
+void ObservationLocalizer::add_new(const ObservationFrame& frame) {
+  std::optional<std::vector<long>> leaving;
+  std::size_t num_gone = 0;
+  for (const FeatureObservation& observation : frame.observations) {
+    if (engine_.best().has(observation.id)) continue;
+    const auto prior = points_.prior_of(observation, engine_.best());
+    if (!prior) continue;
+    if (!leaving && !has_room()) leaving = least_useful(frame);
+    while (!has_room() && num_gone < leaving->size()) let_go((*leaving)[num_gone++]);
+    if (!has_room()) continue;
+    const FeatureKind kind = config_.new_points == NewPoints::xyz ? FeatureKind::xyz : FeatureKind::inverse_depth;
+    if (!engine_.filters().add(observation.id, observation.px, *prior, kind)) continue;
+    record_.entered(num_taken_, observation.id, *prior, points_.is_gone(observation.id));
+    points_.entered(observation.id, num_taken_);
+  }
+}
+
+/// Points that do not fit several times in a row leave; they may come again.
+void ObservationLocalizer::drop_strangers(const ObservationFrame& frame, const ObservationsReport& report) {
+  for (std::size_t i = 0; i < frame.observations.size(); ++i) {
+    if (!points_.is_stranger(frame.observations[i].id, report.outcomes[i], num_taken_)) continue;
+    engine_.filters().remove(frame.observations[i].id);
+    record_.left(frame.observations[i].id);
+  }
+}
+
+/// Where the camera is by the target, if that contradicts the path. Empty: it does not, or its observations fit no
+/// pose.
+std::vector<StartHypothesis> ObservationLocalizer::elsewhere(const ObservationFrame& frame) const {
+  std::vector<StartHypothesis> from =
+      poses_from_known(engine_.camera(), frame.observations, config_.target.points, engine_.pose_config());
+  if (from.empty()) return from;
+  const LocalizationFilter& now = engine_.best();
+  const CameraMotion& is = now.motion();
+  Eigen::Vector<double, 6> difference;
+  difference.head<3>() = from.front().motion.world_from_cam.translation - is.world_from_cam.translation;
+  difference.tail<3>() = log_so3(is.world_from_cam.rotation.conjugate() * from.front().motion.world_from_cam.rotation);
+  const Eigen::Matrix<double, 6, 6> cov =
+      now.motion_covariance().topLeftCorner<6, 6>() + from.front().cov.topLeftCorner<6, 6>();
+  constexpr double gate = 22.5;  // χ² of six numbers: 99.9 %
+  if (difference.dot(cov.inverse() * difference) < gate) from.clear();
+  return from;
+}
+
+/// Of the target's observations, how many more a pose explains than the path does.
+int ObservationLocalizer::num_more_explained(const ObservationFrame& frame, const Rigid3& world_from_cam) const {
+  const double gate_px2 = 4.0 * config_.filter.gate * config_.filter.sigma_px * config_.filter.sigma_px;
+  const Rigid3& now = engine_.best().motion().world_from_cam;
+  int num_more = 0;
+  for (const FeatureObservation& observation : frame.observations) {
+    const auto known = std::ranges::find(config_.target.points, observation.id, &KnownPoint::id);
+    if (known == config_.target.points.end()) continue;
+    const auto is_near = [&](const Rigid3& pose) {
+      const auto px = project(engine_.camera(), pose.inverse() * known->point_in_world);
+      return px && (*px - observation.px).squaredNorm() < gate_px2 ? 1 : 0;
+    };
+    num_more += is_near(world_from_cam) - is_near(now);
+  }
+  return num_more;
+}
+
+/// From the target, where it says that the camera is somewhere else. Mismatches may look like another pose: where the
+/// observations that fit are not contradicted by themselves, it has to explain at least two more of the target's, and
+/// where there is only some doubt three times running. The map of points that led there is dropped.
+bool ObservationLocalizer::restart(const ObservationFrame& frame, Doubt doubt) {
+  constexpr int sure = 3, min_more = 2;
+  std::vector<StartHypothesis> from = doubt == Doubt::none ? std::vector<StartHypothesis>{} : elsewhere(frame);
+  if (!from.empty() && doubt != Doubt::strong &&
+      num_more_explained(frame, from.front().motion.world_from_cam) < min_more)
+    from.clear();
+  num_elsewhere_ = from.empty() ? 0 : num_elsewhere_ + 1;
+  if (from.empty() || (doubt == Doubt::some && num_elsewhere_ < sure)) return false;
+  std::vector<long> unknown;
+  for (const Feature& feature : engine_.best().features())
+    if (!feature.is_known) unknown.push_back(feature.id);
+  for (const long id : unknown) engine_.filters().remove(id);
+  engine_.filters().restart(only_where(from));
+  points_.forget_gone();
+  record_.begin(num_taken_);
+  engine_.forget_doubt();
+  num_elsewhere_ = 0;
+  engine_.count_restart();
+  return true;
+}
+
+PathStep ObservationLocalizer::take(const ObservationFrame& frame) {
+  keep_gap(frame.t_s);
+  PathStep step = taken(frame);
+  ++num_taken_;
+  if (smooths()) frames_.push_back(frame);
+  return step;
+}
+
+PathStep ObservationLocalizer::taken(const ObservationFrame& frame) {
+  PathStep step;
+  step.frame = frame.frame;
+  step.t_s = frame.t_s;
+  step.num_seen = frame.observations.size();
+  step.event = FrameEvent::tracked;
+  if (!engine_.has_begun()) {
+    if (!start(frame)) {
+      step.event = FrameEvent::waiting;
+      return step;
+    }
+    step.event = FrameEvent::started;
+  } else {
+    engine_.predict_to(frame.t_s, period_s());
+  }
+  const ObservationsReport report = engine_.filters().update(frame.observations);
+  engine_.fill(frame.observations, report, step);
+  engine_.keep_residuals(frame.observations, report);
+  if (step.event == FrameEvent::tracked && step.num_tracked < min_observations) step.event = FrameEvent::predicted;
+  const Doubt doubt = engine_.doubt_after(step);
+  drop_strangers(frame, report);
+  if (config_.restarts && restart(frame, doubt)) {
+    const ObservationsReport again = engine_.filters().update(frame.observations);
+    engine_.fill(frame.observations, again, step);
+    step.event = FrameEvent::restarted;
+  }
+  if (step.num_tracked >= min_observations || step.event == FrameEvent::started) add_new(frame);
+  engine_.filters().convert_linear();
+  engine_.keep_given();
+  if (config_.inspect) config_.inspect(engine_.best());
+  return step;
+}
+
+void ObservationLocalizer::sum_up(Localization& result) const {
+  const LocalizeTarget& target = config_.target;
+  result.sigma_px = config_.filter.sigma_px;
+  result.is_board = target.board.has_value();
+  std::optional<SmoothedPath> smoothed;
+  if (smooths() && engine_.has_begun()) {
+    const auto problem = record_.problem(engine_.camera(), config_, frames_, result.path, engine_.best(),
+                                         points_.gone(engine_.best()), period_s());
+    if (problem) smoothed = smooth(*problem, frames_, result);
+  }
+  engine_.sum_up([this](long id) { return points_.num_used(id); }, result);
+  result.num_left = num_left_;
+  if (engine_.has_begun())
+    for (const GonePoint& each : points_.gone(engine_.best())) {
+      result.map.push_back(each.point);
+      result.map.back().num_seen = points_.num_used(each.point.id);
+    }
+  if (smoothed) take_over(*smoothed, result);
+  result.known_shift = known_shift(result.map, target.points);
+  result.is_behind = is_behind(result.path, target.points, target.seen_from_plus_z);
+}
+
+}  // namespace alidade

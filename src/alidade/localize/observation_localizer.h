@@ -1,0 +1,51 @@
+#pragma once
+
+#include <vector>
+
+#include "alidade/localize/engine.h"
+#include "alidade/localize/observation_record.h"
+#include "alidade/localize/point_store.h"
+
+namespace alidade {
+
+/// The front end for observations of numbered points: which points enter the map and leave it, when the target says
+/// that the path is wrong, and at the end the smoothed path.
+class ObservationLocalizer {
+ public:
+  /// `config` as resolved() gives it; it must live longer.
+  ObservationLocalizer(const Camera& camera, const LocalizeConfig& config)
+      : engine_(camera, config), config_(config), points_(config) {}
+
+  PathStep take(const ObservationFrame& frame);
+  /// `result` has the path; the rest is filled in, and the path smoothed.
+  void sum_up(Localization& result) const;
+
+ private:
+  [[nodiscard]] bool smooths() const { return config_.smooths && !config_.target.points.empty(); }
+  [[nodiscard]] double period_s() const;
+  void keep_gap(double t_s);
+  [[nodiscard]] PathStep taken(const ObservationFrame& frame);
+  [[nodiscard]] bool start(const ObservationFrame& frame);
+  void add_new(const ObservationFrame& frame);
+  [[nodiscard]] bool has_room() const;
+  [[nodiscard]] double value_of(const Feature& feature) const;
+  [[nodiscard]] std::vector<long> least_useful(const ObservationFrame& frame) const;
+  void let_go(long id);
+  void drop_strangers(const ObservationFrame& frame, const ObservationsReport& report);
+  [[nodiscard]] std::vector<StartHypothesis> elsewhere(const ObservationFrame& frame) const;
+  [[nodiscard]] int num_more_explained(const ObservationFrame& frame, const Rigid3& world_from_cam) const;
+  [[nodiscard]] bool restart(const ObservationFrame& frame, Doubt doubt);
+
+  LocalizeEngine engine_;
+  const LocalizeConfig& config_;
+  PointStore points_;
+  ObservationRecord record_;
+  std::vector<ObservationFrame> frames_;  ///< All, where the path is smoothed.
+  std::vector<double> gaps_s_;            ///< Between frames, growing; where their period is not given.
+  double t_s_ = 0.0;                      ///< Of the last frame.
+  std::size_t num_taken_ = 0;             ///< Frames.
+  std::size_t num_left_ = 0;              ///< Times that a point left a full filter.
+  int num_elsewhere_ = 0;  ///< Frames in a row in which the target says that the camera is somewhere else.
+};
+
+}  // namespace alidade

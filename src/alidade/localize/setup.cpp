@@ -1,0 +1,265 @@
+#include "alidade/localize/setup.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "alidade/estimation/config_error.h"
+#include "alidade/localize/filter.h"
+#include "alidade/localize/image_localizer.h"
+
+namespace alidade {
+namespace {
+
+using Sentences = std::vector<std::string>;
+
+/// What is believed at first of those of the lens's parameters that may be in the state: a stale calibration.
+struct OnlineParameter {
+  const char* name;
+  double sigma;
+};
+constexpr std::array<OnlineParameter, 8> online{
+    {{"fx", 8.0}, {"fy", 8.0}, {"cx", 6.0}, {"cy", 6.0}, {"k1", 0.05}, {"k2", 0.1}, {"p1", 0.02}, {"p2", 0.02}}};
+
+/// The numbers that a person does not set: their names and limits.
+FieldList inner_fields(LocalizeConfig& config) {
+  constexpr Limits positive{.min = 0.0, .is_above_min = true}, share{0.0, 1.0}, from_zero{.min = 0.0};
+  constexpr Limits count{1.0, 1e6}, size{0.0, 1e6};
+  LocalizationFilterConfig& filter = config.filter;
+  ImageFeatureConfig& features = config.features;
+  return {
+      {.name = "period_s", .value = &config.period_s, .limits = from_zero},
+      {.name = "sigma_speed_m_s", .value = &config.sigma_speed_m_s, .limits = positive},
+      {.name = "sigma_rate_rad_s", .value = &config.sigma_rate_rad_s, .limits = positive},
+      {.name = "target.sigma_scale", .value = &config.target.sigma_scale, .limits = from_zero},
+      {.name = "filter.sigma_px", .value = &filter.sigma_px, .limits = positive},
+      {.name = "filter.sigma_new_px", .value = &filter.sigma_new_px, .limits = from_zero},
+      {.name = "filter.max_iterations", .value = &filter.max_iterations, .limits = count},
+      {.name = "filter.gate", .value = &filter.gate, .limits = positive},
+      {.name = "filter.bend_tolerance", .value = &filter.bend_tolerance, .limits = from_zero},
+      {.name = "filter.consensus_above", .value = &filter.consensus_above, .limits = share},
+      {.name = "filter.max_turn_rad", .value = &filter.max_turn_rad, .limits = from_zero},
+      {.name = "filter.linear_below", .value = &filter.linear_below, .limits = from_zero},
+      {.name = "filter.sigma_scale", .value = &filter.sigma_scale, .limits = from_zero},
+      {.name = "filter.state_capacity", .value = &filter.state_capacity, .limits = {motion_dim, 20000}},
+      {.name = "filter.observations_capacity", .value = &filter.observations_capacity, .limits = {1, 20000}},
+      {.name = "bank.splits", .value = &config.bank.splits, .limits = {1, 1000}},
+      {.name = "bank.spread", .value = &config.bank.spread, .limits = from_zero},
+      {.name = "bank.narrowed", .value = &config.bank.narrowed, .limits = positive},
+      {.name = "bank.min_weight", .value = &config.bank.min_weight, .limits = from_zero},
+      {.name = "bank.max_frames", .value = &config.bank.max_frames, .limits = size},
+      {.name = "features.min_found", .value = &features.min_found, .limits = count},
+      {.name = "features.max_tried", .value = &features.max_tried, .limits = {1, 5000}},
+      {.name = "features.max_new", .value = &features.max_new, .limits = size},
+      {.name = "features.max_features", .value = &features.max_features, .limits = {1, 3000}},
+      {.name = "features.sigma_floor_px", .value = &features.sigma_floor_px, .limits = positive},
+      {.name = "features.min_correlation", .value = &features.min_correlation, .limits = {-1.0, 1.0}},
+      {.name = "features.min_found_share", .value = &features.min_found_share, .limits = share},
+      {.name = "features.cell_px", .value = &features.cell_px, .limits = size},
+      {.name = "features.near_share", .value = &features.near_share, .limits = from_zero},
+      {.name = "features.near_rad", .value = &features.near_rad, .limits = from_zero},
+  };
+}
+
+void add_faults(const Camera& camera, Sentences& found) {
+  if (camera.width_px < 1 || camera.height_px < 1) found.emplace_back("the camera has no image size");
+  const Eigen::VectorXd values = params(camera.lens);
+  if (!values.allFinite()) found.emplace_back("the camera has parameters that are not finite");
+  if (camera.cov.size() > 0 &&
+      (camera.cov.rows() != values.size() || camera.cov.cols() != values.size() || !camera.cov.allFinite()))
+    found.emplace_back("the camera's covariance is not of its parameters");
+}
+
+void add_faults(const LocalizeTarget& target, Sentences& found) {
+  std::set<long> ids;
+  for (const KnownPoint& point : target.points) {
+    const std::string name = fmt::format("the target's point {}", point.id);
+    if (!ids.insert(point.id).second) found.push_back(name + " stands twice");
+    if (!point.point_in_world.allFinite()) found.push_back(name + " has a position that is not finite");
+    if (!(point.sigma_m > 0.0) || !std::isfinite(point.sigma_m)) found.push_back(name + ": its sigma_m is not above 0");
+  }
+  if (target.rectangle_m && target.points.size() != 4) found.emplace_back("a rectangle has four points");
+  if (target.board && num_points(*target.board) != static_cast<int>(target.points.size()))
+    found.push_back(fmt::format("the target's board has {} points, but {} are given", num_points(*target.board),
+                                target.points.size()));
+  if (!target.patches.empty() && target.patches.size() != target.points.size())
+    found.emplace_back("the target has patches, but not one per point");
+  for (const GreyPatch& patch : target.patches) {
+    const auto num =
+        static_cast<std::size_t>(std::max(patch.width_px, 0)) * static_cast<std::size_t>(std::max(patch.height_px, 0));
+    if (num == 0 || patch.grey.size() != num) found.emplace_back("a patch of the target is not of its size");
+  }
+}
+
+void add_faults(const LocalizeStart& start, Sentences& found) {
+  const CameraMotion& motion = start.motion;
+  const Rigid3& pose = motion.world_from_cam;
+  if (!pose.translation.allFinite() || !(std::abs(pose.rotation.norm() - 1.0) < 1e-3))
+    found.emplace_back("the start's pose is none");
+  if (!motion.velocity_in_world.allFinite() || !motion.rate_in_cam.allFinite())
+    found.emplace_back("the start's speeds are not finite");
+  if (!start.cov.allFinite() || !(start.cov.diagonal().minCoeff() >= 0.0))
+    found.emplace_back("the start's covariance is none");
+  if (!(start.depth_m >= 0.0) || !std::isfinite(start.depth_m)) found.emplace_back("the start's depth_m is below 0");
+  if (!(start.sigma_depth > 0.0) || !std::isfinite(start.sigma_depth))
+    found.emplace_back("the start's sigma_depth is not above 0");
+  for (const GivenDepth& depth : start.depths) {
+    const bool is_good = depth.depth_m > 0.0 && depth.sigma_rel > 0.0 && std::isfinite(depth.depth_m / depth.sigma_rel);
+    if (!is_good) found.push_back(fmt::format("the depth of point {}, or its sigma, is not above 0", depth.id));
+  }
+}
+
+/// Of the lens's parameters that are estimated: which there are.
+void add_lens_faults(const LocalizationFilterConfig& filter, const Camera& camera, Sentences& found) {
+  const std::vector<int>& indices = filter.lens_params;
+  if (indices.size() != filter.sigma_lens_params.size())
+    found.emplace_back("filter.lens_params and filter.sigma_lens_params are not of one length");
+  const auto num = static_cast<int>(params(camera.lens).size());
+  for (const int index : indices)
+    if (index < 0 || index >= num || std::ranges::count(indices, index) > 1)
+      found.push_back(
+          fmt::format("filter.lens_params has {}; the lens has {} parameters, numbered from 0", index, num));
+  for (const double sigma : filter.sigma_lens_params)
+    if (!(sigma > 0.0) || !std::isfinite(sigma))
+      found.emplace_back("a sigma of filter.sigma_lens_params is not above 0");
+  if (filter.state_capacity < motion_dim + static_cast<int>(std::max(indices.size(), online.size())))
+    found.emplace_back("filter.state_capacity has no room for the lens");
+}
+
+void throw_if_any(const Sentences& found) {
+  if (!found.empty()) throw ConfigError(fmt::format("{}", fmt::join(found, "; ")));
+}
+
+void put_lens_in_state(const Camera& camera, LocalizationFilterConfig& filter) {
+  const std::vector<std::string> names = param_names(camera.lens);
+  filter.lens_params.clear();
+  filter.sigma_lens_params.clear();
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    for (const OnlineParameter& parameter : online) {
+      if (names[i] != parameter.name) continue;
+      const auto at = static_cast<Eigen::Index>(i);
+      const bool has_sigma = camera.cov.rows() > at && camera.cov(at, at) > 0.0;
+      filter.lens_params.push_back(static_cast<int>(i));
+      filter.sigma_lens_params.push_back(has_sigma ? std::sqrt(camera.cov(at, at)) : parameter.sigma);
+    }
+  }
+}
+
+/// The usual time between frames: the median.
+double period_of(std::span<const ObservationFrame> frames) {
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < frames.size(); ++i)
+    if (const double gap_s = frames[i].t_s - frames[i - 1].t_s; std::isfinite(gap_s)) gaps.push_back(gap_s);
+  if (gaps.empty()) return 1.0;
+  std::ranges::nth_element(gaps, gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2));
+  return std::max(gaps[gaps.size() / 2], 1e-9);
+}
+
+/// Tens of matches a frame, and room for as many features as there may be.
+LocalizationFilterConfig image_filter(const LocalizeConfig& config) {
+  LocalizationFilterConfig filter = for_images(config.filter, config.features.sigma_floor_px);
+  const auto num_known = static_cast<int>(config.target.points.size());
+  filter.state_capacity =
+      motion_dim + static_cast<int>(filter.lens_params.size()) + 3 * num_known + 6 * config.features.max_features + 8;
+  filter.observations_capacity = config.features.max_tried + num_known;
+  return filter;
+}
+
+}  // namespace
+
+void require_sense(const LocalizeConfig& config, const Camera& camera) {
+  LocalizeConfig copy = config;
+  Sentences found = faults_of(fields_of(copy));
+  for (const Field& field : fields_of(copy))
+    if (const auto* code = std::get_if<TextCode>(&field.value); code != nullptr && code->write().empty())
+      found.push_back(fmt::format("{} is none of {}", field.name, form_text(field)));
+  for (std::string& fault : faults_of(inner_fields(copy))) found.push_back(std::move(fault));
+  add_faults(camera, found);
+  throw_if_any(found);
+  add_faults(config.target, found);
+  if (config.start) add_faults(*config.start, found);
+  add_lens_faults(config.filter, camera, found);
+  throw_if_any(found);
+}
+
+void require_sense(const ObservationFrame& frame, double last_t_s) {
+  const std::string name = fmt::format("frame {}", frame.frame);
+  Sentences found;
+  if (!std::isfinite(frame.t_s)) found.push_back(name + " has no time");
+  if (frame.t_s <= last_t_s) found.push_back(name + " is not after the frame before it");
+  std::vector<long> ids;
+  for (const FeatureObservation& observation : frame.observations) {
+    ids.push_back(observation.id);
+    if (!observation.px.allFinite() || !(observation.sigma_px >= 0.0) || !std::isfinite(observation.sigma_px))
+      found.push_back(fmt::format("{}: point {} is not finite", name, observation.id));
+  }
+  std::ranges::sort(ids);
+  if (const auto twice = std::ranges::adjacent_find(ids); twice != ids.end())
+    found.push_back(fmt::format("{}: point {} stands twice", name, *twice));
+  throw_if_any(found);
+}
+
+void require_sense(std::span<const TimedPose> truth) {
+  const TimedPose* last = nullptr;
+  for (const TimedPose& pose : truth) {
+    const Rigid3& at = pose.world_from_cam;
+    if (!std::isfinite(pose.t_s) || !at.translation.allFinite() || !at.rotation.coeffs().allFinite())
+      throw ConfigError("the truth has a pose that is not finite");
+    if (last != nullptr && !(pose.t_s > last->t_s)) throw ConfigError("the truth is not in order of time");
+    last = &pose;
+  }
+}
+
+Camera known_camera(const Camera& camera, const LocalizeConfig& config) {
+  auto known = with_distortion(camera, config.distortion);
+  if (!known) throw ConfigError("--distortion: only a brown lens can be given less than full distortion");
+  return *known;
+}
+
+LocalizeConfig resolved(LocalizeConfig config, const Camera& camera, bool is_of_images) {
+  if (config.calibrate_online) put_lens_in_state(camera, config.filter);
+  if (config.start && config.start->depth_m > 0.0 && !config.depth_m) {
+    config.depth_m = config.start->depth_m;
+    config.sigma_depth = config.start->sigma_depth;
+  }
+  if (config.target.points.empty()) {
+    config.filter.sigma_scale = 0.0;
+  } else {
+    config.filter.sigma_scale = config.sigma_scale.value_or(config.target.sigma_scale);
+    config.target.is_scale_given = config.target.is_scale_given || config.sigma_scale;
+  }
+  if (config.max_points > 0) {
+    config.features.max_features = config.max_points;
+    config.filter.state_capacity = motion_dim + static_cast<int>(config.filter.lens_params.size()) +
+                                   3 * static_cast<int>(config.target.points.size()) + 6 * config.max_points;
+  }
+  if (!is_of_images) {
+    if (config.sigma_px) config.filter.sigma_px = *config.sigma_px;
+    return config;
+  }
+  if (config.sigma_px) config.features.sigma_floor_px = *config.sigma_px;
+  config.filter = image_filter(config);
+  return config;
+}
+
+LocalizeConfig sized(LocalizeConfig config, std::span<const ObservationFrame> frames) {
+  std::set<long> ids;
+  std::size_t most = 1;
+  for (const ObservationFrame& frame : frames) {
+    for (const FeatureObservation& observation : frame.observations) ids.insert(observation.id);
+    most = std::max(most, frame.observations.size());
+  }
+  for (const KnownPoint& point : config.target.points) ids.insert(point.id);
+  constexpr std::size_t num_lens = 16, limit = 1 << 20;
+  const std::size_t need = motion_dim + num_lens + 6 * ids.size() + 8;
+  LocalizationFilterConfig& filter = config.filter;
+  filter.state_capacity = std::min(filter.state_capacity, static_cast<int>(std::min(need, limit)));
+  filter.observations_capacity = std::min(filter.observations_capacity, static_cast<int>(std::min(most, limit)));
+  if (!(config.period_s > 0.0)) config.period_s = period_of(frames);
+  return config;
+}
+
+}  // namespace alidade

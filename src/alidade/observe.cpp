@@ -1,0 +1,83 @@
+#include "alidade/observe.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "alidade/observe/solve.h"
+
+namespace alidade {
+namespace {
+
+/// The pixels of the reference, and what is left of them.
+std::vector<ObserveResidual> reference_residuals(const RotationLog& log, const ObserveSolution& solution) {
+  const Adjustment& reference = solution.reference;
+  std::vector<ObserveResidual> residuals;
+  if (!reference.has_value) return residuals;
+  std::vector<int> log_point(reference.bundle.points.size(), -1);
+  for (std::size_t i = 0; i < reference.bundle_point_of.size(); ++i) {
+    if (reference.bundle_point_of[i] >= 0) {
+      log_point[static_cast<std::size_t>(reference.bundle_point_of[i])] = static_cast<int>(i);
+    }
+  }
+  const PixelScale& scale = solution.scale;
+  for (std::size_t i = 0; i < reference.solution.residuals.size(); ++i) {
+    const BundleObservation& seen = reference.bundle.observations[i];
+    const double t_s = reference.bundle.frames[static_cast<std::size_t>(seen.frame)].t_s;
+    const auto row = std::lower_bound(log.rows.begin(), log.rows.end(), t_s - 1e-9,
+                                      [](const RotationRow& each, double time) { return each.t_s < time; });
+    residuals.push_back({static_cast<int>(row - log.rows.begin()), log_point[static_cast<std::size_t>(seen.point)],
+                         scale.scale * seen.px + scale.centre, scale.scale * reference.solution.residuals[i]});
+  }
+  return residuals;
+}
+
+std::vector<TestedCause> tested_causes_of(const std::vector<CauseScore>& scores) {
+  std::vector<TestedCause> causes;
+  for (const CauseScore& score : scores) {
+    causes.push_back({.name = score.name, .z = score.z});
+    for (const CauseMember& member : score.members) {
+      causes.back().values.push_back({member.name, member.unit, member.value, member.sigma});
+    }
+  }
+  return causes;
+}
+
+/// What was solved, judged.
+ObserveReport judged_observation(ObserveSolution solution, RotationLog log, const ObserveSetup& setup) {
+  solution.verdict = observe_verdict(solution, log, setup);
+  solution.counts.given = log.rows.size();
+  solution.counts.used = solution.rows_used;
+  solution.counts.dropped = log.rows.size() - solution.rows_used;
+  solution.size_is_guessed = setup.width_px <= 0;
+  if (solution.status == ObserveReport::Status::ok) {
+    solution.camera = observed_camera(solution, setup.lens_is_given ? setup.camera : std::nullopt);
+  } else {
+    solution.quantities.clear();
+    solution.covariance.resize(0, 0);
+  }
+  solution.residuals = reference_residuals(log, solution);
+  solution.tested_causes = tested_causes_of(solution.causes);
+  const StatedCovariance& stated = solution.stated;
+  solution.shared_errors = {stated.blocks.design_effect, stated.correlation_s, stated.block_s, stated.track_effect};
+  solution.log = std::move(log);
+  return std::move(static_cast<ObserveReport&>(solution));
+}
+
+}  // namespace
+
+ObserveReport observe(RotationLog log, const ObserveConfig& config, const Progress& progress) {
+  const ObserveSetup setup = setup_of(config);
+  check_log(log);
+  if (log.source == RotationSource::none && setup.rotation != RotationKnowledge::free) {
+    throw ConfigError("the log has no rotation: give one, or --rotation free");
+  }
+  if (setup.rotation == RotationKnowledge::free) log.source = RotationSource::none;
+  check_rotation_words(setup, log);
+  if (setup.lens_is_given) {
+    for (RotationRow& row : log.rows) undistort(*setup.camera, Eigen::Vector2d::Constant(not_seen), row.px);
+  }
+  ObserveSolution solution = solve_intrinsics(log, setup, progress);
+  return judged_observation(std::move(solution), std::move(log), setup);
+}
+
+}  // namespace alidade

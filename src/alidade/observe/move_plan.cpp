@@ -1,0 +1,90 @@
+#include "alidade/observe/move_plan.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <map>
+
+#include "alidade/estimation/config_error.h"
+#include "alidade/geometry/degree.h"
+#include "alidade/observe/next_move.h"
+
+namespace alidade {
+namespace {
+
+std::string now_fault(const ObservedNow& now) {
+  if (now.width_px < 1 || now.height_px < 1) return "the size of the images must be given";
+  if (!now.k_px.allFinite() || !(now.k_px.head<2>().minCoeff() > 0.0)) return "the focal lengths must be above zero";
+  if (!(now.sigma_px > 0.0) || !std::isfinite(now.sigma_px)) return "σ of a pixel must be above zero";
+  const bool is_covariance = now.cov_px2.allFinite() && now.cov_px2.diagonal().minCoeff() > 0.0;
+  if (!is_covariance) return "the covariance of fx, fy, cx, cy must be positive definite";
+  for (const Eigen::Vector2d& px : now.points_px) {
+    if (!px.allFinite()) return "a point is not at finite pixels";
+  }
+  return "";
+}
+
+Verdict moves_verdict(const MovePlan& plan) {
+  Verdict verdict;
+  if (plan.moves.empty()) {
+    verdict.state = State::refused;
+    verdict.exit_code = ExitCode::cannot_tell;
+    verdict.sentence = "no move can be proposed: no point was seen";
+    verdict.to_add = "track points first";
+    return verdict;
+  }
+  const Eigen::Vector4d before = 3.0 * plan.now.cov_px2.diagonal().cwiseSqrt(),
+                        after = 3.0 * plan.moves.back().sigma_px;
+  verdict.sentence = fmt::format("{} moves lower 3σ of fx from {:.2g} to {:.2g} px, of fy from {:.2g} to {:.2g} px",
+                                 plan.moves.size(), before[0], after[0], before[1], after[1]);
+  return verdict;
+}
+
+}  // namespace
+
+FieldList fields_of(MoveConfig& config) {
+  return {{.name = "moves", .value = &config.moves, .help = "How many rotations to propose", .limits = {1, 20}},
+          {.name = "rate_deg_s",
+           .value = &config.rate_deg_s,
+           .help = "How fast each axis rotates",
+           .limits = {.min = 0.0, .is_above_min = true},
+           .option = "--rate-deg-s"},
+          {.name = "max_turn_deg",
+           .value = &config.max_turn_deg,
+           .help = "How far from here",
+           .limits = {0.1, 85.0},
+           .option = "--max-turn-deg"},
+          {.name = "roll", .value = &config.roll, .help = "The head can roll as well"}};
+}
+
+MovePlan plan_moves(const ObservedNow& now, const MoveConfig& config, const Progress& progress) {
+  MovePlan plan{.now = now, .config = config};
+  std::vector<std::string> faults = faults_of(fields_of(plan.config));
+  if (const std::string fault = now_fault(now); !fault.empty()) faults.push_back(fault);
+  if (!faults.empty()) throw ConfigError(fmt::format("{}", fmt::join(faults, "; ")));
+  const MoveLimits limits{config.rate_deg_s * degree, config.max_turn_deg * degree, config.roll};
+  plan.moves = plan_next_moves(now, limits, config.moves, progress);
+  if (!plan.moves.empty()) plan.counts.given = plan.counts.used = 1;
+  plan.verdict = moves_verdict(plan);
+  return plan;
+}
+
+ObservedNow observed_now(const ObserveReport& report) {
+  const ExitCode code = report.verdict.exit_code;
+  const bool has_answer = code == ExitCode::ok || code == ExitCode::not_trusted;
+  if (report.quantities.size() < 4 || !has_answer) {
+    throw ConfigError("this observation was refused: " + report.verdict.to_add);
+  }
+  ObservedNow now;
+  now.width_px = report.width_px;
+  now.height_px = report.height_px;
+  now.sigma_px = report.sigma_px;
+  now.cov_px2 = report.covariance.topLeftCorner<4, 4>();
+  for (int i = 0; i < 4; ++i) now.k_px[i] = report.quantities[static_cast<std::size_t>(i)].value;
+  std::map<int, Eigen::Vector2d> last;
+  for (const ObserveResidual& seen : report.residuals) last[seen.point] = seen.px;
+  for (const auto& [point, px] : last) now.points_px.push_back(px);
+  return now;
+}
+
+}  // namespace alidade

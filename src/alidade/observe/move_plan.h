@@ -1,0 +1,59 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "alidade/description/field.h"
+#include "alidade/estimation/counts.h"
+#include "alidade/estimation/progress.h"
+#include "alidade/estimation/verdict.h"
+#include "alidade/observe/report.h"
+#include "alidade/public.h"
+
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+/// What is known of a rotating camera now.
+struct ObservedNow {
+  int width_px = 0, height_px = 0;
+  Eigen::Vector4d k_px{0.0, 0.0, 0.0, 0.0};  ///< fx, fy, cx, cy.
+  Eigen::Matrix4d cov_px2 = Eigen::Matrix4d::Zero();
+  std::vector<Eigen::Vector2d> points_px;  ///< Seen now.
+  double sigma_px = 0.3;
+};
+
+/// Rotate to this pan, tilt, roll (from where the camera looks now), and what will be known then if enough points stay
+/// in the image.
+struct NextMove {
+  Eigen::Vector3d pan_tilt_roll_rad = Eigen::Vector3d::Zero();
+  double duration_s = 0.0;
+  Eigen::Vector4d sigma_px = Eigen::Vector4d::Zero();  ///< Of fx, fy, cx, cy after it.
+};
+
+/// What the head can do, and how many moves are wanted.
+struct MoveConfig {
+  int moves = 3;
+  double rate_deg_s = 15.0;    ///< Of each axis.
+  double max_turn_deg = 30.0;  ///< Away from here, each axis.
+  bool roll = false;           ///< The head can roll as well.
+};
+
+[[nodiscard]] FieldList fields_of(MoveConfig& config);
+
+struct MovePlan {
+  ObservedNow now;
+  MoveConfig config;
+  std::vector<NextMove> moves;
+  Counts counts;
+  Verdict verdict;
+};
+
+/// The moves that lower the uncertainty of fx, fy, cx, cy most, one after the other. Throws ConfigError for a config or
+/// a camera that cannot be.
+[[nodiscard]] MovePlan plan_moves(const ObservedNow& now, const MoveConfig& config = {}, const Progress& progress = {});
+
+/// What a report knows of its camera, and where the points were seen last. Throws ConfigError where it has no camera.
+[[nodiscard]] ObservedNow observed_now(const ObserveReport& report);
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

@@ -1,0 +1,140 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/camera/camera.h"
+#include "alidade/estimation/counts.h"
+#include "alidade/estimation/verdict.h"
+#include "alidade/matching/matched_photos.h"
+#include "alidade/observe/intrinsics_estimate.h"
+#include "alidade/pantilt/rotation_log.h"
+#include "alidade/public.h"
+
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+/// Something that happened to the intrinsics or the points.
+struct ObserveNote {
+  double t_s = 0.0;
+  ObserveEvent event = ObserveEvent::none;
+  int point = -1;  ///< From 0; −1: of all.
+};
+
+/// How the camera rotated, about its own axes. [rad]
+struct ObserveMotion {
+  Eigen::Vector3d path_rad = Eigen::Vector3d::Zero();  ///< ∫|ω_x|, ∫|ω_y|, ∫|ω_z|.
+  double span_rad = 0.0;                               ///< Largest rotation away from the first row.
+};
+
+/// One value with σ and the Cramér–Rao bound of this very log. σ counts errors that residuals share and what is given
+/// with a σ; sigma_model: as if every pixel erred by itself.
+struct ObservedQuantity {
+  std::string name;
+  double value = 0.0, sigma = 0.0, bound = 0.0, sigma_model = 0.0;
+};
+
+/// A pixel of the adjustment that the bound is of, and its residual: prediction minus pixel.
+struct ObserveResidual {
+  int row = 0;     ///< Of the log.
+  int point = -1;  ///< Of the log, from 0.
+  Eigen::Vector2d px = Eigen::Vector2d::Zero(), residual_px = Eigen::Vector2d::Zero();
+};
+
+/// Something that was taken as exact, and whether the residuals ask for it: z is the gain as a normal deviate.
+struct TestedCause {
+  struct Value {
+    std::string name, unit;
+    double value = 0.0, sigma = 0.0;  ///< What the residuals ask for.
+  };
+  std::string name;
+  double z = 0.0;
+  std::vector<Value> values;
+};
+
+/// What makes σ larger than if every pixel erred by itself.
+struct SharedErrors {
+  double design_effect = 1.0;                 ///< Variance between blocks of time (photos) over the model's.
+  double correlation_s = 0.0, block_s = 0.0;  ///< How long errors of a track last; length of a block.
+  double track_effect = 1.0;                  ///< Variance of the tracks' scores over what lasts in them.
+};
+
+/// What became of a photo of a camera that rotated on the spot.
+struct RotatedPhoto {
+  bool is_used = false;
+  std::string reason;  ///< Why it was rejected.
+  int num_points = 0;
+  double rms_px = 0.0;                  ///< Per point.
+  double turn_rad = 0.0;                ///< Rotation from the first photo that is used.
+  double z2 = 0.0;                      ///< What leaving it out changes, over what the model expects of that; squared.
+  double zoom = 1.0, sigma_zoom = 0.0;  ///< Its focal length over the others', if it may have one of its own.
+  Eigen::Matrix3d cam_from_world = Eigen::Matrix3d::Identity();
+};
+
+/// How much the camera's centre moved, by the residuals: what is along the lines to one point less what is across them.
+struct ParallaxTest {
+  double z = 0.0;  ///< Of the pair that shows it most.
+  int photo_a = -1, photo_b = -1;
+  double rms_px = 0.0;    ///< Of all pairs.
+  double relative = 0.0;  ///< Over the points' distance, a radian of rotation.
+};
+
+/// Matches between photos.
+struct MatchCounts {
+  std::size_t given = 0;     ///< Between photos that take part.
+  std::size_t agreeing = 0;  ///< With one homography a pair.
+  std::size_t kept = 0;      ///< With one camera.
+};
+
+/// Everything that observe() has to say of a log, or of photos: what they tell, and what it is worth. Where there is no
+/// answer camera, quantities and covariance are empty, and the verdict says why.
+struct ObserveReport {
+  enum class Status {
+    ok,
+    too_few_data,
+    unobservable,
+    unsteady,  ///< The focal length changes all the time, and the method is for one that does not.
+    no_convergence
+  };
+  Status status = Status::too_few_data;
+  Verdict verdict;
+  Counts counts;  ///< Of rows, or photos.
+  std::vector<Assumption> assumed;
+
+  int width_px = 0, height_px = 0;  ///< Of the images.
+  bool size_is_guessed = false;     ///< What holds the pixels: nobody gave it.
+  Camera camera;                    ///< At the end of the log, with its covariance.
+  /// fx, fy, cx, cy [px], then what else was estimated: k1, …, mount_x_rad…, delay_s, lever_x_m….
+  std::vector<ObservedQuantity> quantities;
+  Eigen::MatrixXd covariance;  ///< Of the quantities, in their order and units.
+
+  RotationLog log;  ///< As used: without the distortion of a lens that is given. Photos: a row each.
+  std::vector<IntrinsicsEstimate> steps;  ///< One per row.
+  std::vector<ObserveNote> events;
+  double sigma_px = 0.0;           ///< Of a pixel coordinate.
+  bool sigma_is_estimated = true;  ///< From the residuals.
+  double nis_per_dof = 0.0;
+  ObserveMotion motion;
+  /// The longest time in which the intrinsics did not change: the bound and the residuals are of its rows.
+  double reference_from_s = 0.0, reference_until_s = std::numeric_limits<double>::infinity();
+  std::vector<ObserveResidual> residuals;
+  std::vector<TestedCause> tested_causes;
+  SharedErrors shared_errors;
+
+  std::vector<RotatedPhoto> photos;  ///< One per photo; empty of a log. This and what follows is of photos.
+  std::vector<std::string> photo_names;
+  MatchCounts matches;
+  ParallaxTest parallax;
+  std::optional<MatchedPhotos> found_matches;  ///< Where they were not given.
+  std::size_t num_unreadable = 0;
+};
+
+/// The word for an event in files: start, burst, slip, zoom, zoom_end, restart, gap; empty for none.
+[[nodiscard]] std::string_view event_name(ObserveEvent event);
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

@@ -1,0 +1,274 @@
+#include "alidade/project.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "alidade/pantilt/rig_uncertainty.h"
+#include "alidade/track/track_assumed.h"
+
+namespace alidade {
+namespace {
+
+constexpr double max_length_m = 1e6;
+
+/// By how much of its own σ a pixel or a point moves at most, and which.
+void put_move(const ProjectedReading& one, const Eigen::Vector3d& moved_m, const Eigen::Vector2d& moved_px,
+              Assumption& assumption) {
+  const auto heed_one = [&](const std::string& name, double moved, double variance) {
+    constexpr double most = 1e6;  // where no σ is stated at all
+    const double in_sigmas = moved == 0.0 ? 0.0 : std::min(most, std::abs(moved) / std::sqrt(std::max(variance, 0.0)));
+    if (!(in_sigmas > assumption.moves)) return;
+    assumption.moves = in_sigmas;
+    assumption.moved = name;
+    assumption.moved_by = moved;
+  };
+  const std::array<const char*, 3> axes{"x", "y", "z"};
+  for (int i = 0; i < 3; ++i)
+    heed_one(fmt::format("point_in_cam_m {} at {:g} m", axes[static_cast<std::size_t>(i)], one.range_m), moved_m[i],
+             one.point.cov(i, i));
+  if (!one.pixel) return;
+  heed_one(fmt::format("u_px at {:g} m", one.range_m), moved_px.x(), one.pixel->cov(0, 0));
+  heed_one(fmt::format("v_px at {:g} m", one.range_m), moved_px.y(), one.pixel->cov(1, 1));
+}
+
+/// One thing taken as given, and what its σ, or an ordinary error, moves of every point and pixel.
+template <class Moves>
+Assumption assumption_of(const std::string& name, double value, std::optional<double> sigma, double ordinary,
+                         const std::vector<ProjectedReading>& projected, const Moves& moves) {
+  Assumption assumption{.name = name, .value = value, .sigma = sigma};
+  if (!sigma) assumption.ordinary = ordinary;
+  for (const ProjectedReading& one : projected) {
+    const auto [moved_m, moved_px] = moves(one, sigma.value_or(ordinary));
+    put_move(one, moved_m, moved_px, assumption);
+  }
+  if (!sigma)
+    assumption.remedy = name.starts_with("beam") ? "use a rangefinder.yaml with covariance: alidade rangefinder"
+                                                 : "use a camera file with covariance: alidade calibrate";
+  return assumption;
+}
+
+void add_beam_assumptions(const Beam& beam, const Camera& camera, const std::vector<ProjectedReading>& projected,
+                          std::vector<Assumption>& assumed) {
+  constexpr double ordinary_origin_m = 0.005, ordinary_direction_rad = 0.003;
+  const std::array<const char*, 5> names{"beam.origin_m x", "beam.origin_m y", "beam.origin_m z", "beam.direction u",
+                                         "beam.direction v"};
+  for (int i = 0; i < 5; ++i) {
+    const auto moves = [&](const ProjectedReading& one, double error) {
+      const Eigen::Vector3d moved_m = error * J_point_beam(beam, one.range_m).col(i);
+      const auto seen = project_with_jacobians(camera, one.point.point_in_cam);
+      return std::pair{moved_m, seen ? Eigen::Vector2d(seen->J_px_point * moved_m) : Eigen::Vector2d(0.0, 0.0)};
+    };
+    const std::optional<double> sigma =
+        beam.cov.isZero(0.0) ? std::nullopt : std::optional(std::sqrt(std::max(0.0, beam.cov(i, i))));
+    assumed.push_back(assumption_of(names[static_cast<std::size_t>(i)], i < 3 ? beam.origin_in_cam[i] : 0.0, sigma,
+                                    i < 3 ? ordinary_origin_m : ordinary_direction_rad, projected, moves));
+  }
+}
+
+bool knows_covariance(const Camera& camera) {
+  return camera.cov.rows() == params(camera.lens).size() && camera.cov.allFinite() && !camera.cov.isZero(0.0);
+}
+
+void add_camera_assumptions(const Camera& camera, const std::vector<ProjectedReading>& projected,
+                            std::vector<Assumption>& assumed) {
+  constexpr double ordinary_focal = 0.003, ordinary_centre_px = 2.0;
+  const std::array<const char*, 4> names{"camera.fx", "camera.fy", "camera.cx", "camera.cy"};
+  const Eigen::VectorXd lens = params(camera.lens);
+  for (int i = 0; i < 4; ++i) {
+    const auto moves = [&](const ProjectedReading& one, double error) {
+      const auto seen = project_with_jacobians(camera, one.point.point_in_cam);
+      return std::pair{Eigen::Vector3d(0.0, 0.0, 0.0),
+                       seen ? Eigen::Vector2d(error * seen->J_px_params.col(i)) : Eigen::Vector2d(0.0, 0.0)};
+    };
+    const std::optional<double> sigma =
+        knows_covariance(camera) ? std::optional(std::sqrt(camera.cov(i, i))) : std::nullopt;
+    assumed.push_back(assumption_of(names[static_cast<std::size_t>(i)], lens[i], sigma,
+                                    i < 2 ? ordinary_focal * lens[i] : ordinary_centre_px, projected, moves));
+  }
+}
+
+/// In which of focal lengths and centre the two are farther apart than calibrations of one camera are; empty: in none.
+std::string difference_of(const Camera& a, const Camera& b) {
+  if (a.width_px != b.width_px || a.height_px != b.height_px)
+    return fmt::format("its images are {}x{}, not {}x{}", b.width_px, b.height_px, a.width_px, a.height_px);
+  constexpr double sigmas = 5.0, usual_focal = 0.005, usual_centre_px = 5.0;  // of calibrations on two days
+  const std::array<const char*, 4> names{"fx", "fy", "cx", "cy"};
+  const Eigen::VectorXd first = params(a.lens), second = params(b.lens);
+  for (int i = 0; i < 4; ++i) {
+    const double variance = (knows_covariance(a) ? a.cov(i, i) : 0.0) + (knows_covariance(b) ? b.cov(i, i) : 0.0);
+    const double usual = i < 2 ? usual_focal * first[i] : usual_centre_px;
+    if (std::abs(second[i] - first[i]) > usual + sigmas * std::sqrt(variance))
+      return fmt::format("its {} is {:.5g} px, not {:.5g}", names[static_cast<std::size_t>(i)], second[i], first[i]);
+  }
+  return "";
+}
+
+/// A beam stands in the camera that it was calibrated with: through another one its pixels are elsewhere.
+void heed_other_camera(const ProjectConfig& config, const Camera& camera, Verdict& verdict) {
+  if (!config.own_camera) return;
+  const std::string difference = difference_of(*config.own_camera, camera);
+  Check check{.name = "camera", .text = "the camera is the one that the beam was calibrated with"};
+  if (!difference.empty()) {
+    check.state = State::care;
+    check.text = "this is not the camera that the beam was calibrated with: " + difference;
+  }
+  heed(check, "use " + (config.own_camera_name.empty() ? "that camera" : config.own_camera_name), verdict);
+}
+
+void require_camera(const Camera& camera) {
+  const std::string of_camera = fault(RigHead{{}, camera});
+  if (!of_camera.empty()) throw ConfigError("the camera: " + of_camera);
+}
+
+void require_sense(const Beam& beam, const std::vector<double>& ranges_m) {
+  constexpr double off = 1e-6;  // of a unit vector
+  const bool is_ray = beam.origin_in_cam.allFinite() && std::abs(beam.direction_in_cam.norm() - 1.0) < off;
+  if (!is_ray || !std::isfinite(beam.scale) || beam.scale == 0.0)
+    throw ConfigError("a beam has a finite origin, a direction of length one and a scale other than zero");
+  if (!beam.cov.allFinite() || !beam.cov_with_lens.allFinite() ||
+      (beam.cov_with_lens.size() > 0 && beam.cov_with_lens.rows() != num_beam_params))
+    throw ConfigError("the beam's covariance is not finite, or not of its six parameters");
+  if (ranges_m.empty()) throw ConfigError("there are no readings");
+  for (const double range_m : ranges_m)
+    if (!(range_m > 0.0 && range_m <= max_length_m))
+      throw ConfigError(fmt::format("a reading of {:g} m is not within 0 to {:g}", range_m, max_length_m));
+}
+
+/// The value of head `h`: all heads' one, or its own.
+double of_head(const std::vector<double>& values, std::size_t h) { return values[values.size() == 1 ? 0 : h]; }
+
+void check_angles(const std::vector<double>& angles_rad, const char* option, std::size_t num_heads) {
+  if (angles_rad.size() != 1 && angles_rad.size() != num_heads)
+    throw ConfigError(fmt::format("{}: {} angles for {} heads; give one, or one for each (0.1,0.2)", option,
+                                  angles_rad.size(), num_heads));
+  for (const double angle : angles_rad) {
+    if (!(std::abs(angle) <= 2.0 * std::numbers::pi))
+      throw ConfigError(fmt::format("{}: {:g} is more than a turn; angles are radians", option, angle));
+  }
+}
+
+/// Where a head sees a point, with its covariance; none: not in its view. `factor`: of the rig's errors.
+std::optional<BeamPixel> pixel_of(const RigHead& rig_head, const Eigen::MatrixXd* factor,
+                                  const Eigen::Vector2d& readings, const Eigen::Vector3d& point_in_world) {
+  const auto seen = project(rig_head, readings, point_in_world);
+  if (!seen) return std::nullopt;
+  const double sigma = rig_head.head.encoder.sigma_rad;
+  Eigen::Matrix2d cov = sigma * sigma * seen->J_px_readings * seen->J_px_readings.transpose();
+  if (factor != nullptr) {
+    const auto effect = rig_error_effect(*factor, TurnedHead(rig_head.head, readings), rig_head.camera, point_in_world,
+                                         Eigen::Vector3d::Zero());
+    if (effect) cov += *effect * effect->transpose();
+  }
+  return BeamPixel{seen->px, cov};
+}
+
+std::optional<Eigen::Matrix3d> covariance_of_point(const Rig& rig, const RigUncertainty& errors,
+                                                   std::span<const HeadReading> readings,
+                                                   const Eigen::Vector3d& point_in_world) {
+  const auto by = meeting_sensitivity(rig.heads, readings, point_in_world, Eigen::Vector3d::Zero());
+  if (by.empty()) return std::nullopt;
+  Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();
+  Eigen::Matrix<double, 3, Eigen::Dynamic> by_errors = Eigen::MatrixXd::Zero(3, errors.num());
+  for (std::size_t h = 0; h < by.size(); ++h) {
+    if (by[h].size() == 0) continue;
+    const Encoder& encoder = rig.heads[h].head.encoder;  // a reading errs as the other way the zero does
+    cov += encoder.sigma_rad * encoder.sigma_rad * by[h].middleCols<2>(15) * by[h].middleCols<2>(15).transpose();
+    if (errors.num() > 0) by_errors += by[h] * errors.factor[h];
+  }
+  cov += by_errors * by_errors.transpose();
+  return cov;
+}
+
+/// What the files do not say of their own errors.
+Check files_check(const Rig& rig) {
+  Check check{.name = "covariance", .text = "heads and lenses come with their covariance"};
+  std::string without = rig.cov.size() > 0 ? "" : "the rig";
+  for (const RigHead& head : rig.heads) {
+    if (head.camera.cov.rows() == params(head.camera.lens).size()) continue;
+    without += (without.empty() ? "" : ", ") + fmt::format("the camera of head {}", head.head.id);
+  }
+  if (without.empty()) return check;
+  check.state = State::care;
+  check.text = without + ": given without covariance, whose errors are not in this σ";
+  return check;
+}
+
+}  // namespace
+
+FieldList fields_of(ProjectConfig& config) {
+  return {{.name = "sigma_range_m",
+           .value = &config.sigma_range_m,
+           .help = "σ of the reading [m] (default: the beam's)",
+           .limits = {0.0, max_length_m, /*is_above_min=*/true},
+           .option = "--sigma-range-m"}};
+}
+
+BeamProjection project_readings(const Beam& beam, const Camera& camera, const std::vector<double>& ranges_m,
+                                const ProjectConfig& config) {
+  ProjectConfig used = config;
+  const std::vector<std::string> found = faults_of(fields_of(used));
+  if (!found.empty()) throw ConfigError(fmt::format("{}", fmt::join(found, "; ")));
+  require_sense(beam, ranges_m);
+  require_camera(camera);
+  if (config.own_camera) require_camera(*config.own_camera);
+  BeamProjection result{.readings = {}, .beam = beam, .camera = camera, .assumed = {}, .counts = {}, .verdict = {}};
+  // A covariance with another lens' parameters is of another calibration.
+  if (beam.cov_with_lens.cols() != camera.cov.cols()) result.beam.cov_with_lens.resize(0, 0);
+  for (const double range_m : ranges_m)
+    result.readings.push_back({range_m, measured_point(result.beam, range_m, config.sigma_range_m),
+                               measured_pixel(result.beam, camera, range_m, config.sigma_range_m)});
+  const auto num_seen =
+      std::ranges::count_if(result.readings, [](const ProjectedReading& one) { return one.pixel.has_value(); });
+  result.counts.given = result.readings.size();
+  result.counts.used = static_cast<std::size_t>(num_seen);
+  result.verdict.sentence = fmt::format("{} of {} point{} in the image's model", num_seen, result.readings.size(),
+                                        result.readings.size() == 1 ? "" : "s");
+  add_beam_assumptions(result.beam, camera, result.readings, result.assumed);
+  add_camera_assumptions(camera, result.readings, result.assumed);
+  heed_assumptions(result.assumed, result.verdict);
+  heed_other_camera(config, camera, result.verdict);
+  return result;
+}
+
+RigProjection project_rig(const Rig& rig, const std::vector<double>& pans_rad, const std::vector<double>& tilts_rad,
+                          const std::optional<Eigen::Vector3d>& point_in_world) {
+  if (const std::string of_rig = fault(rig); !of_rig.empty()) throw ConfigError(of_rig);
+  if (rig.heads.empty()) throw ConfigError("the rig has no heads");
+  if (!rig.lens_courses.empty())
+    throw ConfigError("intrinsics: change with time, which `project` is not given; give a camera");
+  check_angles(pans_rad, "--pan", rig.heads.size());
+  check_angles(tilts_rad, "--tilt", rig.heads.size());
+  if (point_in_world && !(point_in_world->cwiseAbs().maxCoeff() <= max_length_m))
+    throw ConfigError("the point must be finite, and within 1000 km");
+  const RigUncertainty errors = rig_uncertainty(rig);
+  RigProjection result;
+  result.point_in_world = point_in_world;
+  std::vector<HeadReading> seen_by;
+  for (std::size_t h = 0; h < rig.heads.size(); ++h) {
+    const RigHead& rig_head = rig.heads[h];
+    HeadProjection head{.id = rig_head.head.id, .pan_tilt_rad = {of_head(pans_rad, h), of_head(tilts_rad, h)}};
+    head.M = projection_matrix(rig_head, head.pan_tilt_rad);
+    head.cam_centre_in_world = cam_centre_in_world(rig_head.head, head.pan_tilt_rad);
+    if (point_in_world)
+      head.pixel =
+          pixel_of(rig_head, errors.num() > 0 ? &errors.factor[h] : nullptr, head.pan_tilt_rad, *point_in_world);
+    if (head.pixel) seen_by.push_back({h, head.pan_tilt_rad});
+    result.heads.push_back(std::move(head));
+  }
+  result.counts.given = result.counts.used = rig.heads.size();
+  if (!point_in_world) {
+    result.verdict.sentence = fmt::format("{} projection matrices", rig.heads.size());
+    return result;
+  }
+  result.verdict.sentence =
+      fmt::format("{} of {} heads have the point in their sight", seen_by.size(), rig.heads.size());
+  result.point_cov = covariance_of_point(rig, errors, seen_by, *point_in_world);
+  heed(files_check(rig), "use files with their covariance: alidade calibrate and alidade rig write it", result.verdict);
+  return result;
+}
+
+}  // namespace alidade

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <vector>
+
+#include "alidade/beam/shot.h"
+#include "alidade/estimation/config_error.h"
+#include "alidade/estimation/progress.h"
+#include "alidade/imaging/photos.h"
+#include "alidade/public.h"
+#include "alidade/rangefinder/calibration.h"
+#include "alidade/rangefinder/edges.h"
+
+/// Calibration of a single-point rangefinder beside a camera: the whole job, as `alidade rangefinder` does it. Its
+/// result has the beam with its covariance, the camera that it belongs to, what was rejected and why, and a verdict.
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+/// Of readings and what was seen of each: the laser's spot, corners of a board, its pose or its plane. With
+/// `load_photo` boards and spots are found in the photos that the shots name; a shot whose photo cannot be used is
+/// named in `unreadable` and `counts.skipped`. The scale of the readings is estimated too where the beam needs it and
+/// the shots tell it. Throws ConfigError for a config or a camera that cannot be, Interrupted where `progress` says
+/// stop; never for what the shots show.
+[[nodiscard]] RangefinderCalibration rangefinder(std::vector<Shot> shots, const Camera& camera,
+                                                 const RangefinderConfig& config = {},
+                                                 const PhotoByName& load_photo = {}, const Progress& progress = {});
+
+/// The beam's direction without a target: from a scan of the head that carries both, and one photo. A check, to some
+/// mrad, not a calibration. Throws ConfigError where the photo is not of the camera's size.
+[[nodiscard]] EdgesCalibration rangefinder_by_edges(const std::vector<ScanRow>& scan, const GreyImage& photo,
+                                                    const Camera& camera, const EdgesConfig& config = {},
+                                                    const Progress& progress = {});
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

@@ -1,0 +1,81 @@
+#include "alidade/rangefinder/shot_plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/geometry/degree.h"
+
+namespace alidade {
+namespace {
+
+/// 3σ of the origin and the direction now.
+double sigma_origin_m(const BeamNow& now) { return std::sqrt(now.beam.cov.topLeftCorner<3, 3>().trace()); }
+
+std::vector<std::string> shot_faults(const BeamNow& now, const ShotConfig& config) {
+  ShotConfig copy = config;
+  std::vector<std::string> found = faults_of(fields_of(copy));
+  if (!(config.min_range_m < config.max_range_m)) found.emplace_back("--min-range-m must be below --max-range-m");
+  if (now.camera.width_px < 1 || now.camera.height_px < 1 || !params(now.camera.lens).allFinite())
+    found.emplace_back("the camera is none");
+  const bool is_beam = now.beam.origin_in_cam.allFinite() && now.beam.direction_in_cam.allFinite() &&
+                       now.beam.direction_in_cam.norm() > 0.5 && now.beam.cov.allFinite();
+  if (!is_beam) found.emplace_back("the beam is none");
+  for (const double sigma_px : {now.sigma_spot_px, now.sigma_corner_px})
+    if (!(sigma_px > 0.0) || !std::isfinite(sigma_px)) found.emplace_back("a sigma is not above 0");
+  const auto is_finite = [](const Eigen::Vector3d& point) { return point.allFinite(); };
+  if (!std::ranges::all_of(now.points_in_board, is_finite)) found.emplace_back("a point of the board is not finite");
+  return found;
+}
+
+Verdict shots_verdict(const ShotPlan& plan) {
+  Verdict verdict;
+  if (plan.shots.empty()) {
+    verdict.state = State::refused;
+    verdict.exit_code = ExitCode::cannot_tell;
+    verdict.sentence = "no shot can be proposed: the beam hits no board inside the picture at these distances";
+    verdict.to_add = "widen --min-range-m and --max-range-m";
+    return verdict;
+  }
+  verdict.sentence = fmt::format("{} more shot{} lower 3σ of the origin from {:.2g} to {:.2g} mm", plan.shots.size(),
+                                 plan.shots.size() == 1 ? "" : "s", 3e3 * sigma_origin_m(plan.now),
+                                 3e3 * plan.shots.back().sigma_origin_m);
+  return verdict;
+}
+
+}  // namespace
+
+FieldList fields_of(ShotConfig& config) {
+  constexpr Limits positive{.min = 0.0, .is_above_min = true};
+  return {{.name = "shots", .value = &config.shots, .help = "How many shots to propose", .limits = {1, 20}},
+          {.name = "min_range_m",
+           .value = &config.min_range_m,
+           .help = "Nearest board",
+           .limits = positive,
+           .option = "--min-range-m"},
+          {.name = "max_range_m",
+           .value = &config.max_range_m,
+           .help = "Farthest board",
+           .limits = positive,
+           .option = "--max-range-m"},
+          {.name = "max_tilt_deg",
+           .value = &config.max_tilt_deg,
+           .help = "Largest tilt of the board [deg]",
+           .limits = {0.0, 80.0},
+           .option = "--max-tilt-deg"}};
+}
+
+ShotPlan plan_shots(const BeamNow& now, const ShotConfig& config, const Progress& progress) {
+  if (const auto faults = shot_faults(now, config); !faults.empty())
+    throw ConfigError(fmt::format("{}", fmt::join(faults, "; ")));
+  const ShotLimits limits{config.min_range_m, config.max_range_m, config.max_tilt_deg * degree};
+  ShotPlan plan;
+  plan.now = now;
+  plan.shots = plan_next_shots(now, limits, config.shots, progress);
+  plan.counts.given = plan.counts.used = 1;
+  plan.verdict = shots_verdict(plan);
+  return plan;
+}
+
+}  // namespace alidade

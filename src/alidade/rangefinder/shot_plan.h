@@ -1,0 +1,35 @@
+#pragma once
+
+#include "alidade/description/field.h"
+#include "alidade/estimation/config_error.h"
+#include "alidade/estimation/counts.h"
+#include "alidade/estimation/verdict.h"
+#include "alidade/public.h"
+#include "alidade/rangefinder/next_shot.h"
+
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+/// Where a board can be held, and how many shots are wanted.
+struct ShotConfig {
+  int shots = 3;
+  double min_range_m = 0.5, max_range_m = 4.0;
+  double max_tilt_deg = 45.0;
+};
+
+[[nodiscard]] FieldList fields_of(ShotConfig& config);
+
+/// The shots to take next, in their order.
+struct ShotPlan {
+  BeamNow now;
+  std::vector<NextShot> shots;
+  Counts counts;
+  Verdict verdict;
+};
+
+/// The shots that lower the uncertainty of the beam most, one after the other. Throws ConfigError for a config or a
+/// beam that cannot be.
+[[nodiscard]] ShotPlan plan_shots(const BeamNow& now, const ShotConfig& config = {}, const Progress& progress = {});
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "alidade/pantilt/rig.h"
+#include "alidade/results/outcome.h"
+
+namespace alidade {
+
+/// Puts the heads of a rig into a result, with their σ and covariance.
+void fill_heads(const Rig& rig, ResultDocument& document);
+
+/// Their σ if every single measurement erred by itself: `stddev_model`.
+void fill_heads_model(const Rig& rig, const Eigen::MatrixXd& cov_model, ResultDocument& document);
+
+/// rig.yaml, and camera_ID.yaml for each head.
+void add_rig_files(const Rig& rig, std::vector<NamedBytes>& files);
+
+}  // namespace alidade

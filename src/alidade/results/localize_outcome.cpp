@@ -1,0 +1,196 @@
+#include "alidade/results/localize_outcome.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "alidade/formats/camera_file.h"
+#include "alidade/geometry/degree.h"
+#include "alidade/localize/path_error.h"
+#include "alidade/report/thin.h"
+#include "alidade/results/thin_tables.h"
+#include "alidade/tables/localize_file.h"
+
+namespace alidade {
+namespace {
+
+using Numbers = std::vector<double>;
+constexpr std::array<const char*, 7> pose_names{"x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"};
+
+std::array<double, 7> numbers_of(const Rigid3& world_from_cam) {
+  const Eigen::Vector3d& t = world_from_cam.translation;
+  const Eigen::Quaterniond& q = world_from_cam.rotation;
+  return {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
+}
+
+DataTable path_table(std::span<const PathStep> path, std::span<const TimedPose> truth) {
+  std::vector<bool> must_keep;
+  for (const PathStep& step : path)
+    must_keep.push_back(step.event == FrameEvent::started || step.event == FrameEvent::restarted);
+  const auto rows = report::thinned_rows(path.size(), {}, must_keep, report::max_step_rows);
+  std::array<Numbers, 7> pose, truths;
+  std::array<Numbers, 6> sigmas;
+  Numbers t, tracked, gated, seen, nis, seconds;
+  std::vector<std::string> events;
+  for (const std::size_t row : rows) {
+    const PathStep& step = path[row];
+    const TimedPose* const there = nearest_pose(truth, step.t_s);
+    const std::array<double, 7> is = numbers_of(step.world_from_cam);
+    const std::array<double, 7> should = there ? numbers_of(there->world_from_cam) : std::array<double, 7>{};
+    for (std::size_t k = 0; k < 7; ++k) {
+      pose[k].push_back(step.has_pose() ? is[k] : missing_value);
+      truths[k].push_back(there ? should[k] : missing_value);
+    }
+    for (std::size_t k = 0; k < 6; ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      sigmas[k].push_back(step.has_pose() ? std::sqrt(step.cov(i, i)) : missing_value);
+    }
+    t.push_back(step.t_s);
+    seen.push_back(static_cast<double>(step.num_seen));
+    tracked.push_back(static_cast<double>(step.num_tracked));
+    gated.push_back(static_cast<double>(step.num_gated));
+    nis.push_back(step.nis_per_dof);
+    seconds.push_back(step.seconds);
+    events.emplace_back(event_name(step.event));
+  }
+  DataTable table{"path", {{"t_s", rounded(t, 6)}}};
+  const auto add = [&](const std::string& name, Numbers values, int digits) {
+    table.columns.emplace_back(name, rounded(std::move(values), digits));
+  };
+  for (std::size_t k = 0; k < 7; ++k) add(std::string("world_from_cam_") + pose_names[k], std::move(pose[k]), 7);
+  constexpr std::array<const char*, 6> sigma_names{"x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"};
+  for (std::size_t k = 0; k < 6; ++k)
+    add(std::string("sigma_world_from_cam_") + sigma_names[k], std::move(sigmas[k]), 8);
+  if (!truth.empty())
+    for (std::size_t k = 0; k < 7; ++k) add(std::string("truth_") + pose_names[k], std::move(truths[k]), 7);
+  add("num_seen", std::move(seen), 0);
+  add("num_tracked", std::move(tracked), 0);
+  add("num_gated", std::move(gated), 0);
+  add("nis", std::move(nis), 4);
+  add("seconds", std::move(seconds), 7);
+  table.columns.emplace_back("event", events);
+  record_steps_kept(table, path.size(), "poses.csv");
+  return table;
+}
+
+DataTable features_table(const Localization& result) {
+  constexpr std::array<const char*, 6> names{"xx", "xy", "xz", "yy", "yz", "zz"};
+  std::array<Numbers, 3> place;
+  std::array<Numbers, 6> cov;
+  std::vector<std::int64_t> ids, seen;
+  std::vector<bool> known;
+  for (const MapPoint& point : result.map) {
+    ids.push_back(point.id);
+    seen.push_back(static_cast<std::int64_t>(point.num_seen));
+    known.push_back(point.is_known);
+    std::size_t at = 0;
+    for (int i = 0; i < 3; ++i) {
+      place[static_cast<std::size_t>(i)].push_back(point.point_in_world[i]);
+      for (int j = i; j < 3; ++j) cov[at++].push_back(point.cov(i, j));
+    }
+  }
+  DataTable table{"features", {{"id", ids}}};
+  constexpr std::array<const char*, 3> axes{"x_m", "y_m", "z_m"};
+  for (std::size_t k = 0; k < 3; ++k)
+    table.columns.emplace_back(std::string("point_in_world_") + axes[k], rounded(std::move(place[k]), 7));
+  for (std::size_t k = 0; k < 6; ++k)
+    table.columns.emplace_back(std::string("cov_") + names[k] + "_m2", std::move(cov[k]));
+  table.columns.emplace_back("num_seen", seen);
+  table.columns.emplace_back("known", known);
+  return table;
+}
+
+void fill_path_estimate(const Localization& result, ResultDocument& document) {
+  JsonValue& estimate = document.estimate;
+  estimate["frames"] = result.path.size();
+  estimate["lost"] = result.num_lost;
+  estimate["ate_m"] = result.error.ate_m;
+  estimate["rpe_m"] = result.error.rpe_m;
+  estimate["rpe_rad"] = result.error.rpe_rad;
+  estimate["unaligned_m"] = result.scale_known ? result.error.unaligned_m : missing_value;
+  estimate["stated_m"] = result.error.stated_m;
+  estimate["alignment"] = result.truth.empty() ? JsonValue() : JsonValue(result.scale_known ? "SE(3)" : "Sim(3)");
+  estimate["nis_per_dof"] = result.nis_per_dof;
+  estimate["sigma_px"] = result.sigma_px;
+  estimate["scale_known"] = result.scale_known;
+  estimate["restarts"] = result.num_restarts;
+  estimate["sights"] = result.num_observations;
+  estimate["sights_gated"] = result.num_gated;
+  JsonValue tested = JsonValue::list();
+  for (const GivenNumber& given : result.given) {
+    if (given.z == 0.0) continue;
+    JsonValue each = JsonValue::object();
+    each["name"] = given.name;
+    each["asked"] = given.asked;
+    each["sigma"] = std::abs(given.asked / given.z);
+    each["z"] = given.z;
+    tested.push_back(each);
+  }
+  estimate["tested"] = tested;
+  const std::vector<std::string> all = param_names(result.camera.lens);
+  const Eigen::VectorXd values = params(result.camera.lens);
+  for (std::size_t k = 0; k < result.lens_params.size(); ++k) {
+    for (std::size_t i = 0; i < all.size(); ++i)
+      if (all[i] == result.lens_params[k]) estimate["camera"][all[i]] = values[static_cast<Eigen::Index>(i)];
+    if (static_cast<Eigen::Index>(k) < result.sigma_lens.size())
+      document.stddev["camera"][result.lens_params[k]] = result.sigma_lens[static_cast<Eigen::Index>(k)];
+  }
+  document.data.push_back(path_table(result.path, result.truth));
+  document.data.push_back(features_table(result));
+}
+
+void path_lines(const Localization& result, std::vector<std::string>& lines) {
+  if (result.path.empty() || !result.path.back().has_pose()) return;
+  const PathStep& last = result.path.back();
+  const Eigen::Vector<double, 6> sigma = last.cov.diagonal().cwiseSqrt();
+  lines.push_back(fmt::format("{} frames, {} lost; {} points in the map; at the end within ± {:.2g} m, ± {:.2g}° (3σ)",
+                              result.path.size(), result.num_lost, result.map.size(), 3.0 * sigma.head<3>().maxCoeff(),
+                              3.0 * sigma.tail<3>().maxCoeff() / degree));
+  if (std::isfinite(result.nis_per_dof))
+    lines.push_back(fmt::format("NIS per degree of freedom {:.2f}", result.nis_per_dof));
+  if (std::isfinite(result.error.ate_m))
+    lines.push_back(fmt::format("against the truth: ATE {:.4g} m ({} alignment), RPE {:.4g} m a frame",
+                                result.error.ate_m, result.scale_known ? "SE(3)" : "Sim(3)", result.error.rpe_m));
+  const std::vector<std::string> names = param_names(result.camera.lens);
+  const Eigen::VectorXd values = params(result.camera.lens);
+  for (std::size_t k = 0; k < result.lens_params.size(); ++k) {
+    const auto at = std::ranges::find(names, result.lens_params[k]) - names.begin();
+    if (static_cast<Eigen::Index>(k) >= result.sigma_lens.size()) continue;  // never started
+    lines.push_back(fmt::format("{} {:.6g} ± {:.2g}", result.lens_params[k], values[at],
+                                3.0 * result.sigma_lens[static_cast<Eigen::Index>(k)]));
+  }
+}
+
+void add_path_files(const Localization& result, std::vector<NamedBytes>& files) {
+  if (!tells_an_estimate(static_cast<int>(result.verdict.exit_code))) return;
+  std::vector<TimedPose> path;
+  for (const PathStep& step : result.path)
+    if (step.has_pose()) path.push_back({step.t_s, step.world_from_cam});
+  files.push_back({"trajectory.tum", tum_text(path)});
+  files.push_back({"poses.csv", poses_csv(result.path)});
+  files.push_back({"map.csv", map_csv(result.map)});
+  files.push_back({"map.ply", map_ply(result.map)});
+  if (!result.lens_params.empty()) files.push_back({"camera.yaml", camera_text(result.camera, CameraFormat::alidade)});
+}
+
+}  // namespace
+
+DataTable localize_row(const PathStep& step, std::span<const TimedPose> truth) { return path_table({&step, 1}, truth); }
+
+JobOutcome outcome_of(const Localization& localization) {
+  JobOutcome outcome;
+  ResultDocument& document = outcome.document;
+  document.command = "localize";
+  document.counts = localization.counts;
+  document.assumed = localization.assumed;
+  document.verdict = localization.verdict;
+  fill_path_estimate(localization, document);
+  path_lines(localization, outcome.lines);
+  add_path_files(localization, outcome.files);
+  return outcome;
+}
+
+}  // namespace alidade

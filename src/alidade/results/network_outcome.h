@@ -1,0 +1,15 @@
+#pragma once
+
+#include "alidade/network.h"
+#include "alidade/public.h"
+#include "alidade/results/outcome.h"
+
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+/// The document of cameras placed by a moving target, its lines for a person, and, where they are placed, rig.yaml with
+/// a camera_ID.yaml for each head, events.csv (on one clock, for `track`) and path.csv.
+[[nodiscard]] JobOutcome outcome_of(const NetworkCalibration& calibration);
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

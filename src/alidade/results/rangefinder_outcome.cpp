@@ -1,0 +1,386 @@
+#include "alidade/results/rangefinder_outcome.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <opencv2/core.hpp>
+
+#include "alidade/files/number_list.h"
+#include "alidade/formats/beam_file.h"
+#include "alidade/formats/camera_file.h"
+#include "alidade/formats/camera_json.h"
+#include "alidade/images/photos.h"
+#include "alidade/results/sigma_values.h"
+
+namespace alidade {
+namespace {
+
+using Numbers = std::vector<double>;
+
+DataTable shots_table(const RangefinderCalibration& report) {
+  const std::vector<Shot>& shots = report.measured;
+  std::vector<std::string> name, reason;
+  std::vector<bool> used;
+  std::vector<Numbers> column(14);
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    const ShotFit& fit = report.shots[i];
+    name.push_back(shots[i].name);
+    used.push_back(fit.used);
+    reason.push_back(fit.reason);
+    const bool has_spot = shots[i].spot.has_value() && fit.cov_px(0, 0) > 0.0;
+    const std::array<double, 14> values{shots[i].range_m,
+                                        fit.residual_range_m,
+                                        fit.sigma_range_m,
+                                        shots[i].spot ? shots[i].spot->px.x() : missing_value,
+                                        shots[i].spot ? shots[i].spot->px.y() : missing_value,
+                                        fit.residual_px.x(),
+                                        fit.residual_px.y(),
+                                        has_spot ? std::sqrt(fit.cov_px(0, 0)) : missing_value,
+                                        has_spot ? std::sqrt(fit.cov_px(1, 1)) : missing_value,
+                                        has_spot ? fit.cov_px(0, 1) : missing_value,
+                                        fit.point_in_cam.x(),
+                                        fit.point_in_cam.y(),
+                                        fit.point_in_cam.z(),
+                                        fit.cluster_z2};
+    for (std::size_t k = 0; k < values.size(); ++k) column[k].push_back(values[k]);
+  }
+  static const std::array<const char*, 14> names{"range_m",
+                                                 "residual_range_m",
+                                                 "sigma_residual_range_m",
+                                                 "u_px",
+                                                 "v_px",
+                                                 "residual_u_px",
+                                                 "residual_v_px",
+                                                 "sigma_residual_u_px",
+                                                 "sigma_residual_v_px",
+                                                 "cov_residual_uv_px2",
+                                                 "point_in_cam_x_m",
+                                                 "point_in_cam_y_m",
+                                                 "point_in_cam_z_m",
+                                                 "cluster_z2"};
+  DataTable table{"shots", {{"name", name}, {"used", used}, {"reason", reason}}};
+  for (std::size_t k = 0; k < names.size(); ++k)
+    table.columns.emplace_back(names[k], rounded(column[k], k < 3 ? 6 : 5));
+  return table;
+}
+
+/// Planes of the boards, and where a board's pose is known its corner 0 and axes: enough to draw it.
+DataTable planes_table(const RangefinderCalibration& report) {
+  const std::vector<Shot>& shots = report.measured;
+  std::vector<std::string> name;
+  std::vector<Numbers> column(11);
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    const ShotFit& fit = report.shots[i];
+    if (!fit.plane) continue;
+    name.push_back(shots[i].name);
+    const Eigen::Vector3d& n = fit.plane->normal_in_cam;
+    std::array<double, 11> values{n.x(), n.y(), n.z(), fit.plane->d_m};
+    std::fill(values.begin() + 4, values.end(), missing_value);
+    if (fit.pose) {
+      const Rigid3& pose = fit.pose->cam_from_board;
+      const Eigen::Quaterniond& q = pose.rotation;
+      const Eigen::Vector3d& t = pose.translation;
+      const std::array<double, 7> posed{t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
+      std::copy(posed.begin(), posed.end(), values.begin() + 4);
+    }
+    for (std::size_t k = 0; k < values.size(); ++k) column[k].push_back(values[k]);
+  }
+  static const std::array<const char*, 11> names{"nx",
+                                                 "ny",
+                                                 "nz",
+                                                 "d_m",
+                                                 "cam_from_board_x_m",
+                                                 "cam_from_board_y_m",
+                                                 "cam_from_board_z_m",
+                                                 "cam_from_board_qx",
+                                                 "cam_from_board_qy",
+                                                 "cam_from_board_qz",
+                                                 "cam_from_board_qw"};
+  DataTable table{"planes", {{"name", name}}};
+  for (std::size_t k = 0; k < names.size(); ++k) table.columns.emplace_back(names[k], rounded(column[k], 8));
+  return table;
+}
+
+void add_counts(const std::vector<CountedSigma>& counted, ResultDocument& document) {
+  if (counted.empty()) return;
+  std::vector<int> num;
+  std::vector<Numbers> column(4);
+  for (const CountedSigma& c : counted) {
+    num.push_back(c.num_shots);
+    column[0].push_back(c.sigma_origin_m);
+    column[1].push_back(c.sigma_direction_rad);
+    column[2].push_back(c.bound_origin_m);
+    column[3].push_back(c.bound_direction_rad);
+  }
+  document.data.push_back({"by_count",
+                           {{"num_shots", num},
+                            {"sigma_origin_m", column[0]},
+                            {"sigma_direction_rad", column[1]},
+                            {"bound_origin_m", column[2]},
+                            {"bound_direction_rad", column[3]}}});
+}
+
+void add_left_out(const std::vector<LeftOutShot>& left_out, ResultDocument& document) {
+  if (left_out.empty()) return;
+  std::vector<std::size_t> shot;
+  Numbers range, u, v;
+  double squares_m2 = 0.0, squares_px2 = 0.0;
+  int num_ranges = 0, num_spots = 0;
+  for (const LeftOutShot& left : left_out) {
+    shot.push_back(left.index);
+    range.push_back(left.residual_range_m);
+    u.push_back(left.residual_px.x());
+    v.push_back(left.residual_px.y());
+    if (std::isfinite(left.residual_range_m)) squares_m2 += left.residual_range_m * left.residual_range_m, ++num_ranges;
+    if (left.residual_px.allFinite()) squares_px2 += left.residual_px.squaredNorm(), ++num_spots;
+  }
+  document.data.push_back({"left_out",
+                           {{"shot", shot},
+                            {"residual_range_m", rounded(range, 6)},
+                            {"residual_u_px", rounded(u, 4)},
+                            {"residual_v_px", rounded(v, 4)}}});
+  JsonValue& rms = document.estimate["left_out"];
+  rms["rms_range_m"] = num_ranges > 0 ? std::sqrt(squares_m2 / num_ranges) : missing_value;
+  rms["rms_px"] = num_spots > 0 ? std::sqrt(squares_px2 / num_spots) : missing_value;
+}
+
+Numbers sorted_unique(Numbers values) {
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+  return values;
+}
+
+/// Distances by rows, tilts by columns; a pose that does not fit into the image is null.
+void add_gains(const std::vector<ShotGain>& gains, ResultDocument& document) {
+  if (gains.empty()) return;
+  Numbers distances, tilts;
+  for (const ShotGain& gain : gains) {
+    distances.push_back(gain.distance_m);
+    tilts.push_back(gain.tilt_rad);
+  }
+  distances = sorted_unique(std::move(distances));
+  tilts = sorted_unique(std::move(tilts));
+  DataGrid grid;
+  grid.name = "next_shot";
+  grid.cols = static_cast<int>(tilts.size());
+  grid.rows = static_cast<int>(distances.size());
+  Numbers distance, tilt, sigma(distances.size() * tilts.size(), missing_value);
+  for (const double d : distances) {
+    for (const double angle : tilts) {
+      distance.push_back(d);
+      tilt.push_back(angle);
+    }
+  }
+  for (const ShotGain& gain : gains) {
+    const auto row = std::lower_bound(distances.begin(), distances.end(), gain.distance_m) - distances.begin();
+    const auto col = std::lower_bound(tilts.begin(), tilts.end(), gain.tilt_rad) - tilts.begin();
+    sigma[static_cast<std::size_t>(row) * tilts.size() + static_cast<std::size_t>(col)] = gain.sigma_point_m;
+  }
+  grid.values = {{"distance_m", distance}, {"tilt_rad", tilt}, {"sigma_point_m", sigma}};
+  document.grids.push_back(std::move(grid));
+}
+
+Numbers root_of_diagonal(const Eigen::MatrixXd& cov, Eigen::Index first, Eigen::Index count) {
+  Numbers sigma;
+  for (Eigen::Index i = first; i < first + count; ++i) sigma.push_back(std::sqrt(cov(i, i)));
+  return sigma;
+}
+
+/// σ of the angles to the camera's axes, cos θ = A: dθ = −dA / sin θ.
+std::array<double, 2> angle_sigmas(const Beam& beam, const Eigen::Matrix<double, 7, 7>& cov) {
+  const Eigen::Vector2d theta = direction_angles_rad(beam);
+  return {std::sqrt(cov(3, 3)) / std::sin(theta.x()), std::sqrt(cov(4, 4)) / std::sin(theta.y())};
+}
+
+void put_sigmas(const Beam& beam, JsonValue& stddev) {
+  const Eigen::Matrix<double, 7, 7> cov = embedded_covariance(beam);
+  const auto sigma_theta = angle_sigmas(beam, cov);
+  stddev["origin_m"] = root_of_diagonal(cov, 0, 3);
+  stddev["direction"] = root_of_diagonal(cov, 3, 3);
+  stddev["theta_x_rad"] = sigma_theta[0];
+  stddev["theta_y_rad"] = sigma_theta[1];
+  stddev["scale"] = std::sqrt(cov(6, 6));
+}
+
+JsonValue sigma_of_shots(const RangefinderReport& report) {
+  std::vector<std::pair<std::string, Eigen::Index>> told;
+  for (std::size_t i = 0; i < beam_param_names.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    if (report.cov_model(k, k) > 0.0 && k < report.clusters.inflation.size()) told.emplace_back(beam_param_names[i], k);
+  }
+  return sigma_values(told, report.clusters);
+}
+
+void put_beam(const Beam& beam, JsonValue& estimate) {
+  const Eigen::Vector2d theta = direction_angles_rad(beam);
+  estimate["origin_m"] = list_of(beam.origin_in_cam);
+  estimate["direction"] = list_of(beam.direction_in_cam);
+  estimate["theta_x_rad"] = theta.x();
+  estimate["theta_y_rad"] = theta.y();
+}
+
+void fill_beam(const RangefinderCalibration& report, ResultDocument& document) {
+  const Beam& beam = report.beam;
+  JsonValue& estimate = document.estimate;
+  put_beam(beam, estimate);
+  estimate["scale"] = beam.scale;
+  estimate["rms_px"] = report.rms_px;
+  estimate["rms_range_m"] = report.rms_range_m;
+  put_sigmas(beam, document.stddev);
+  Beam by_model = beam;
+  by_model.cov = report.cov_model;
+  put_sigmas(by_model, document.stddev_model);
+  Beam at_bound = beam;
+  at_bound.cov = report.bound.cov;
+  const Eigen::Matrix<double, 7, 7> bound = embedded_covariance(at_bound);
+  estimate["bound"]["origin_m"] = root_of_diagonal(bound, 0, 3);
+  estimate["bound"]["direction"] = root_of_diagonal(bound, 3, 3);
+  estimate["bound"]["scale"] = std::sqrt(bound(6, 6));
+  document.covariance_names = report.parameter_names;
+  for (Eigen::Index i = 0; i < 7; ++i)
+    for (Eigen::Index j = i; j < 7; ++j) document.covariance_upper.push_back(report.covariance(i, j));
+}
+
+void fill_geometry_and_noise(const RangefinderCalibration& result, JsonValue& estimate) {
+  const BeamBound& bound = result.bound;
+  estimate["spot_sigma_px"] = Numbers(bound.spot_sigma_px.begin(), bound.spot_sigma_px.end());
+  estimate["spot_sigma_at_m"] = Numbers(bound_ranges_m.begin(), bound_ranges_m.end());
+  estimate["condition"] = bound.condition;
+  estimate["range_ratio"] = bound.range_ratio;
+  estimate["normal_spread"] = bound.normal_spread;
+  estimate["offset_m"] = bound.offset_m;
+  if (result.status == RangefinderReport::Status::converged) estimate["sigma"] = sigma_of_shots(result);
+  estimate["noise"]["sigma_spot_px"] = result.sigma_spot_px;
+  estimate["noise"]["sigma_corner_px"] = result.sigma_corner_px;
+  estimate["noise"]["sigma_range_m"] = result.beam.noise.sigma_m;
+  estimate["noise"]["spot_from"] = result.spot_sigma_is_estimated ? "residuals" : "given";
+  estimate["noise"]["range_from"] = result.range_sigma_is_estimated ? "residuals" : "given";
+}
+
+void fill_document(const RangefinderCalibration& result, ResultDocument& document) {
+  document.command = "rangefinder";
+  document.counts = result.counts;
+  document.assumed = result.assumed;
+  document.verdict = result.verdict;
+  JsonValue& estimate = document.estimate;
+  estimate["camera"] = camera_values(result.camera);  // that the beam belongs to
+  RangefinderConfig config = result.config;
+  for (const Field& field : fields_of(config))
+    if (field.name == "method" || field.name == "refine") estimate[field.name] = value_text(field);
+  if (result.status == RangefinderReport::Status::converged) fill_beam(result, document);
+  fill_geometry_and_noise(result, estimate);
+  if (const std::optional<Board>& board = result.config.board) {
+    estimate["board"]["kind"] = kind_name(board->kind);
+    estimate["board"]["cols"] = board->cols;
+    estimate["board"]["rows"] = board->rows;
+    estimate["board"]["square_m"] = board->square_m;
+    estimate["board"]["marker_m"] = board->marker_m;
+  }
+  if (result.shots.size() == result.measured.size()) {
+    document.data.push_back(shots_table(result));
+    document.data.push_back(planes_table(result));
+  }
+  add_counts(result.by_count, document);
+  add_left_out(result.left_out, document);
+  add_gains(result.gains, document);
+}
+
+/// What the photos did not give, and which shots were not used.
+std::vector<std::string> lines_of_shots(const RangefinderCalibration& result) {
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < result.measured.size(); ++i) {
+    const Shot& shot = result.measured[i];
+    if (!shot.no_board.empty()) lines.push_back(fmt::format("no board: {}: {}", shot.photo, shot.no_board));
+    if (i >= result.photos.size()) continue;
+    const ShotPhoto& photo = result.photos[i];
+    const std::string& no_spot = photo.false_spot.empty() ? photo.no_spot : photo.false_spot;
+    if (!no_spot.empty()) lines.push_back(fmt::format("no spot: {}: {}", shot.photo, no_spot));
+  }
+  for (std::size_t i = 0; i < result.shots.size() && i < result.measured.size(); ++i) {
+    const ShotFit& fit = result.shots[i];
+    if (!fit.used && !fit.reason.empty())
+      lines.push_back(fmt::format("not used: {}: {}", result.measured[i].name, fit.reason));
+  }
+  return lines;
+}
+
+void add_lines_of_beam(const RangefinderCalibration& result, std::vector<std::string>& lines) {
+  const Beam& beam = result.beam;
+  const auto sigma3 = [&](Eigen::Index i) { return 3.0 * std::sqrt(result.covariance(i, i)); };
+  for (int i = 0; i < 3; ++i)
+    lines.push_back(
+        fmt::format("origin {}    {:9.2f} ± {:.2g} mm   (3σ)", "xyz"[i], 1e3 * beam.origin_in_cam[i], 1e3 * sigma3(i)));
+  for (int i = 0; i < 3; ++i)
+    lines.push_back(fmt::format("direction {} {:9.6f} ± {:.2g}", "xyz"[i], beam.direction_in_cam[i], sigma3(3 + i)));
+  const bool has_scale = beam.cov(beam_scale_param, beam_scale_param) > 0.0;
+  if (has_scale && result.config.scale_by_need)
+    lines.emplace_back("the readings' scale is estimated, as nobody gave it (--sigma-scale)");
+  if (has_scale) lines.push_back(fmt::format("scale       {:9.6f} ± {:.2g}", beam.scale, sigma3(6)));
+  lines.push_back(fmt::format("{} of {} shots; σ of a range {:.2g} mm ({})", result.shots_used, result.measured.size(),
+                              1e3 * beam.noise.sigma_m,
+                              result.range_sigma_is_estimated ? "estimated from the residuals" : "as given"));
+  const auto& spot_px = result.bound.spot_sigma_px;
+  lines.push_back(fmt::format("where the spot is, 3σ: {:.2g} px at 0.5 m, {:.2g} at 1 m, {:.2g} at 2 m, {:.2g} at 4 m",
+                              3.0 * spot_px[0], 3.0 * spot_px[1], 3.0 * spot_px[2], 3.0 * spot_px[3]));
+}
+
+void add_beam_files(const Beam& beam, const Camera& camera, JobOutcome& outcome) {
+  if (!tells_an_estimate(static_cast<int>(outcome.document.verdict.exit_code))) return;
+  outcome.files.push_back({"rangefinder.yaml", beam_text(beam, camera, "camera.yaml")});
+  outcome.files.push_back({"camera.yaml", camera_text(camera, CameraFormat::alidade)});
+}
+
+}  // namespace
+
+JobOutcome outcome_of(const RangefinderCalibration& calibration, const std::string& camera_file) {
+  JobOutcome outcome;
+  fill_document(calibration, outcome.document);
+  outcome.lines = lines_of_shots(calibration);
+  if (calibration.status == RangefinderReport::Status::converged) add_lines_of_beam(calibration, outcome.lines);
+  Camera camera = calibration.camera;
+  if (calibration.config.refine == Refine::all)
+    camera.source = "alidade rangefinder" + (camera_file.empty() ? "" : ", refined from " + camera_file);
+  add_beam_files(calibration.beam, camera, outcome);
+  return outcome;
+}
+
+JobOutcome outcome_of(const EdgesCalibration& calibration) {
+  JobOutcome outcome;
+  ResultDocument& document = outcome.document;
+  const Beam& beam = calibration.beam;
+  document.command = "rangefinder";
+  document.counts = calibration.counts;
+  document.verdict = calibration.verdict;
+  JsonValue& estimate = document.estimate;
+  estimate["method"] = "edges";
+  put_beam(beam, estimate);
+  const Eigen::Matrix<double, 7, 7> cov = calibration.covariance;
+  document.stddev["origin_m"] = root_of_diagonal(cov, 0, 3);
+  document.stddev["direction"] = root_of_diagonal(cov, 3, 3);
+  estimate["gain"] = calibration.gain;
+  estimate["halves_differ_rad"] = calibration.halves_differ_rad;
+  if (tells_an_estimate(static_cast<int>(calibration.verdict.exit_code))) {
+    const auto part = [&](int i) {
+      return fmt::format("{:.5f} ± {:.2g}", beam.direction_in_cam[i], 3.0 * std::sqrt(cov(3 + i, 3 + i)));
+    };
+    outcome.lines.push_back(fmt::format("direction {}  {}  {} (3σ); the halves of the scan differ by {:.2g} mrad",
+                                        part(0), part(1), part(2), 1e3 * calibration.halves_differ_rad));
+  }
+  add_beam_files(beam, calibration.camera, outcome);
+  return outcome;
+}
+
+void add_images(const RangefinderCalibration& calibration, const PhotoByName& load_photo, JobOutcome& outcome) {
+  constexpr std::size_t max_images = 40;  // of the page
+  const std::size_t num = std::min(max_images, calibration.photos.size());
+  for (std::size_t i = 0; i < num; ++i) {
+    if (!calibration.photos[i].has_photo) continue;
+    const Shot& shot = calibration.measured[i];
+    outcome.images.push_back({shot.name, jpeg_preview(load_photo(shot.photo), 640, 75)});
+  }
+}
+
+}  // namespace alidade

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "alidade/public.h"
+#include "alidade/results/outcome.h"
+#include "alidade/rig.h"
+
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+/// The document of a rig, its lines for a person, and rig.yaml with a camera_ID.yaml for each head where there is a
+/// rig.
+[[nodiscard]] JobOutcome outcome_of(const RigCalibration& calibration);
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <span>
+
+#include "alidade/loop/servo_study.h"
+#include "alidade/public.h"
+#include "alidade/results/outcome.h"
+
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+/// The document of a servo study (the tables `control`, `steps`, `measurements`, `trials`, `loops` and `lenses`, the
+/// grid `robustness`), its lines for a person, and servo.csv where anything ran.
+[[nodiscard]] JobOutcome outcome_of(const ServoResult& result);
+
+/// One row of `control`.
+[[nodiscard]] DataTable servo_row(std::span<const RigHead> heads, const ServoRow& row);
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

@@ -1,0 +1,88 @@
+#include "alidade/results/shots_outcome.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "alidade/files/number_list.h"
+#include "alidade/formats/camera_json.h"
+#include "alidade/geometry/degree.h"
+#include "alidade/results/calibration_document.h"
+
+namespace alidade {
+namespace {
+
+DataTable planned_shots_table(const std::vector<NextShot>& shots) {
+  std::vector<std::vector<double>> columns(13);
+  for (const NextShot& shot : shots) {
+    const Eigen::Vector3d& t = shot.cam_from_board.translation;
+    const Eigen::Quaterniond& q = shot.cam_from_board.rotation;
+    const std::array<double, 13> values{shot.distance_m,
+                                        shot.tilt_rad,
+                                        shot.azimuth_rad,
+                                        shot.sigma_origin_m,
+                                        shot.sigma_direction_rad,
+                                        shot.spot_sigma_px,
+                                        t.x(),
+                                        t.y(),
+                                        t.z(),
+                                        q.x(),
+                                        q.y(),
+                                        q.z(),
+                                        q.w()};
+    for (std::size_t i = 0; i < values.size(); ++i) columns[i].push_back(values[i]);
+  }
+  static const std::array<const char*, 13> names{
+      "distance_m",        "tilt_rad",           "azimuth_rad",        "sigma_origin_m",     "sigma_direction_rad",
+      "spot_sigma_px",     "cam_from_board_x_m", "cam_from_board_y_m", "cam_from_board_z_m", "cam_from_board_qx",
+      "cam_from_board_qy", "cam_from_board_qz",  "cam_from_board_qw"};
+  DataTable table{"next", {}};
+  for (std::size_t i = 0; i < names.size(); ++i) table.columns.emplace_back(names[i], columns[i]);
+  return table;
+}
+
+/// Which side of the board is farther away.
+std::string_view far_side(double azimuth_rad) {
+  static const std::array<std::string_view, 8> sides{"right", "lower right", "lower", "lower left",
+                                                     "left",  "upper left",  "upper", "upper right"};
+  const auto eighth = static_cast<long>(std::lround(azimuth_rad / (0.25 * std::numbers::pi)));
+  return sides[static_cast<std::size_t>(((eighth % 8) + 8) % 8)];
+}
+
+std::string shot_line(const NextShot& shot, std::size_t number) {
+  const std::string tilted = shot.tilt_rad < 0.01 ? "facing the camera"
+                                                  : fmt::format("tilted by {:.0f}°, {} side away",
+                                                                shot.tilt_rad / degree, far_side(shot.azimuth_rad));
+  return fmt::format(
+      "shot {}: board at {:.2f} m, {}: 3σ of the origin {:.2g} mm, of the direction {:.2g} mrad, of the spot {:.2g} px "
+      "at worst",
+      number, shot.distance_m, tilted, 3e3 * shot.sigma_origin_m, 3e3 * shot.sigma_direction_rad,
+      3.0 * shot.spot_sigma_px);
+}
+
+}  // namespace
+
+JobOutcome outcome_of(const ShotPlan& plan) {
+  JobOutcome outcome;
+  ResultDocument& document = outcome.document;
+  document.command = "plan rangefinder";
+  document.counts = plan.counts;
+  document.verdict = plan.verdict;
+  if (plan.shots.empty()) return outcome;
+  for (std::size_t i = 0; i < plan.shots.size(); ++i) outcome.lines.push_back(shot_line(plan.shots[i], i + 1));
+  const Beam& beam = plan.now.beam;
+  document.data.push_back(planned_shots_table(plan.shots));
+  document.data.push_back(points_in_board_table(plan.now.points_in_board));
+  document.estimate["camera"] = camera_values(plan.now.camera);
+  document.estimate["origin_m"] = list_of(beam.origin_in_cam);
+  document.estimate["direction"] = list_of(beam.direction_in_cam);
+  document.estimate["sigma_now_origin_m"] = std::sqrt(beam.cov.topLeftCorner<3, 3>().trace());
+  document.estimate["sigma_now_direction_rad"] = std::sqrt(beam.cov.block<2, 2>(3, 3).trace());
+  document.estimate["sigma_planned_origin_m"] = plan.shots.back().sigma_origin_m;
+  document.estimate["sigma_planned_direction_rad"] = plan.shots.back().sigma_direction_rad;
+  return outcome;
+}
+
+}  // namespace alidade

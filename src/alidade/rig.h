@@ -1,0 +1,27 @@
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "alidade/estimation/config_error.h"
+#include "alidade/estimation/progress.h"
+#include "alidade/imaging/photos.h"
+#include "alidade/pantilt/head_cameras.h"
+#include "alidade/public.h"
+#include "alidade/rig/calibration.h"
+
+/// Calibration of pan-tilt heads: the whole job, as `alidade rig` does it. Its result has the axes, offsets and
+/// mountings with their covariance, where the heads stand to each other, what was rejected and why, and a verdict.
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+/// From views of boards that stood still, each with what the head's encoders read. `cameras`: by id of the head
+/// (cameras_by_head()). With `load_photo` the boards are found in the photos that the views name; a photo without one
+/// is named in `counts.skipped`. Throws ConfigError for a config or cameras that cannot be, and for corners outside
+/// their camera's image; Interrupted where `progress` says stop; never for what the views show.
+[[nodiscard]] RigCalibration rig(std::vector<HeadView> views, const std::map<int, Camera>& cameras,
+                                 const RigConfig& config, const PhotoByName& load_photo = {},
+                                 const Progress& progress = {});
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

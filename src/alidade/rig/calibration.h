@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "alidade/estimation/counts.h"
+#include "alidade/public.h"
+#include "alidade/rig/report.h"
+
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+/// Everything that a calibration of a rig has to say: what the solve found (rig, boards, views …), and what it is
+/// worth.
+struct RigCalibration : RigReport {
+  std::vector<HeadView> measured;        ///< With the corners found in their photos; `views` tells what became of each.
+  std::vector<SkippedInput> no_board;    ///< Photos that show no board, or cannot be used; in `counts.skipped`, too.
+  std::vector<SkippedInput> unreadable;  ///< Of these, photos that cannot be used.
+  RigConfig config;
+  Eigen::MatrixXd covariance;                ///< Of all heads: rig.cov.
+  std::vector<std::string> parameter_names;  ///< Of `covariance`: "head1.base_x_m", …
+  Counts counts;                             ///< Of views.
+  Verdict verdict;
+};
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

@@ -1,0 +1,113 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "alidade/estimation/cluster_covariance.h"
+#include "alidade/estimation/verdict.h"
+#include "alidade/geometry/rigid3.h"
+#include "alidade/pantilt/head_view.h"
+#include "alidade/pantilt/rig.h"
+#include "alidade/public.h"
+#include "alidade/rig/config.h"
+
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+/// One view after the solve.
+struct HeadViewFit {
+  bool used = false;
+  std::string reason;   ///< Why it was not used; empty otherwise.
+  double chi2 = 0.0;    ///< Corners and reading, against the rig as solved; also of a view that was rejected.
+  double rms_px = 0.0;  ///< Per point.
+  Eigen::Vector2d reading_correction_rad =
+      Eigen::Vector2d::Zero();               ///< What the rig would rather have read, less read.
+  std::vector<Eigen::Vector2d> residual_px;  ///< Prediction − observation, one per corner.
+  double cluster_z2 = 0.0;  ///< Its squared pull on the rig over what its noise alone gives; 0: unused.
+};
+
+/// A pose of the board, in the world.
+struct RigBoard {
+  int board = 0;
+  Rigid3 world_from_board;
+};
+
+/// Beyond so many σ a cause is asked for: of thirty that are tested, one clean rig in a thousand is above.
+inline constexpr double rig_cause_limit = 4.2;
+/// What is estimated by need costs σ where it was not needed, and no more: one clean rig in seventy.
+inline constexpr double rig_free_limit = 3.5, rig_free_joint_limit = 2.8;
+
+/// A head that rotated less about an axis is taken not to have rotated about it.
+inline constexpr double min_span_rad = 0.07;
+/// Over so much of each axis, 20°, a rig is to be known.
+inline constexpr double good_span_rad = 0.35;
+
+/// What the views of one head cover.
+struct HeadCover {
+  int id = 0;
+  int num_views = 0, num_boards = 0;
+  Eigen::Vector2d lowest_rad = Eigen::Vector2d::Zero(), highest_rad = Eigen::Vector2d::Zero();  ///< Pan, tilt.
+  int num_shared_boards = 0;  ///< Seen by another head, too.
+};
+
+/// Something that the residuals ask to be free, by how many σ, and how large it would be.
+struct RigCause {
+  std::string name;  ///< "head1.pan_scale", "head2.tilt once a turn", "all scales"
+  double size = 0.0;
+  std::string unit;
+  double sigmas = 0.0;
+};
+
+/// Something that was estimated because the residuals asked for it.
+struct RigFreed {
+  std::string name;  ///< "head1.pan_scale", "head1.camera.f", "head2.pan_cos_rad"
+  double value = 0.0, sigma = 0.0;
+  double was = 0.0;  ///< As given.
+};
+
+struct RigReport {
+  enum class Status {
+    converged,
+    too_few,     ///< Usable views.
+    degenerate,  ///< A combination of parameters is unobservable; `unknown` names it.
+    not_linked,  ///< A head shares no board with the others.
+    degrees,     ///< The readings are degrees.
+    swapped,     ///< The cameras belong to the other heads.
+    mirrored,    ///< A head sees its boards from behind: its images are mirrored.
+    misread,     ///< The readings are not where they belong; `misreading` says how.
+    no_convergence
+  };
+  Status status = Status::too_few;
+  Rig rig;  ///< World: the first head's camera at readings of zero. Covariance: views are clusters, and what is given
+            ///< with a σ is counted.
+  Eigen::MatrixXd cov_model;   ///< As rig.cov, if every corner and reading erred by itself and all given was exact.
+  ClusterCovariance clusters;  ///< Views; of the parameters that are solved for.
+  std::vector<Assumption> assumed;                  ///< Lenses, the square, the encoders' scales.
+  std::vector<RigCause> causes;                     ///< Tested one by one, the one most asked for first.
+  std::vector<RigFreed> freed;                      ///< By need.
+  std::string alike;                                ///< Two causes that explain the residuals alike; empty: none.
+  std::vector<Eigen::Vector2d> backlash_rad;        ///< Pan, tilt of each head, where it was estimated; 0 else.
+  std::vector<Eigen::Vector2d> sigma_backlash_rad;  ///< Of it.
+  double deviance = 0.0;  ///< −2 ln of the likelihood, less a constant of the views: what two solves are compared by.
+  std::vector<RigBoard> boards;
+  std::vector<HeadViewFit> views;    ///< One per view.
+  std::vector<HeadCover> covers;     ///< One per head.
+  int mirrored_head = 0;             ///< Its id, where one is.
+  std::string misreading;            ///< With which change of the readings the views agree; empty: none is needed.
+  std::vector<std::string> unknown;  ///< Parameters of the combination that is unobservable.
+  double sigma_px = 0.0, sigma_encoder_rad = 0.0;
+  bool sigma_px_is_estimated = false, sigma_encoder_is_estimated = false;  ///< From the residuals.
+  double chi2 = 0.0;  ///< Whitened corners and reading corrections.
+  int dof = 0;
+  double rms_px = 0.0;  ///< Per point, of the used views.
+  /// σ of where another head's camera (else the camera after a rotation, against where it started) stands, over the
+  /// angles covered: what the calibration is for.
+  double sigma_relative_rad = 0.0, sigma_relative_m = 0.0;
+  double sigma_span_rad = 0.0, sigma_span_m = 0.0;  ///< The same over good_span_rad where less is covered.
+  int views_used = 0, views_dropped = 0, iterations = 0;
+
+  [[nodiscard]] double chi2_per_dof() const { return dof > 0 ? chi2 / dof : 0.0; }
+};
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

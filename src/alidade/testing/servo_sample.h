@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "alidade/servo/identify.h"
+#include "alidade/simulate/servo.h"
+
+namespace alidade::testing {
+
+/// What `alidade identify` reads of a simulated axis.
+inline std::vector<ServoSample> log_of(const ServoLogScene& scene, std::uint64_t seed = 1) {
+  std::vector<ServoSample> log;
+  for (const ServoLogRow& row : simulate_servo_log(scene, seed)) log.push_back({row.t_s, row.command, row.angle_rad});
+  return log;
+}
+
+/// The paper's axis, or a rate plant without limits, 83 ms late.
+inline ServoLogScene late_scene(bool is_rate_plant, RatePlant plant = {0.005, AngleUnit::rad, 0.08}) {
+  ServoLogScene scene;
+  plant.max_rate_rad_s = plant.max_acceleration_rad_s2 = 1e9;
+  if (is_rate_plant) scene.axis.plant = plant;
+  scene.axis.command_delay_s = 0.083;
+  return scene;
+}
+
+}  // namespace alidade::testing

@@ -1,0 +1,226 @@
+#include "alidade/track.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+#include <variant>
+
+#include "alidade/pantilt/rig_uncertainty.h"
+#include "alidade/track/lens_over_time.h"
+#include "alidade/track/track.h"
+#include "alidade/track/track_assumed.h"
+#include "alidade/track/xiahou_tracker.h"
+
+namespace alidade {
+namespace {
+
+void require_sense(const Rig& rig) {
+  if (const std::string of_rig = fault(rig); !of_rig.empty()) throw ConfigError(of_rig);
+}
+
+/// What is wrong with an observation; empty where nothing is.
+std::string observation_fault(const TargetObservation& observation, std::size_t num_heads) {
+  if (observation.head >= num_heads)
+    return fmt::format("is of head {}, but the rig has {}, counted from 0", observation.head, num_heads);
+  const bool is_finite = std::isfinite(observation.t_capture_s) && std::isfinite(observation.t_arrival_s) &&
+                         observation.pan_tilt_rad.allFinite() && observation.px.allFinite();
+  if (!is_finite) return "its times, angles and pixel must be finite";
+  if (!(observation.t_arrival_s >= observation.t_capture_s)) return "arrives before its capture";
+  if (!(observation.sigma_px >= 0.0 && std::isfinite(observation.sigma_px))) return "its σ must not be below zero";
+  if (!observation.lens) return "";
+  const bool is_lens = observation.lens->k.allFinite() && observation.lens->k.head<2>().minCoeff() > 0.0 &&
+                       observation.lens->error_scale.allFinite();
+  return is_lens ? "" : "its lens must be finite, with focal lengths above zero";
+}
+
+void require_sense(const TrueTrack& truth) {
+  if (truth.t_s.size() != truth.position.size()) throw ConfigError("the truth has not one position per time");
+  for (std::size_t i = 0; i < truth.t_s.size(); ++i) {
+    if (!std::isfinite(truth.t_s[i]) || !truth.position[i].allFinite()) throw ConfigError("the truth must be finite");
+    if (i > 0 && !(truth.t_s[i] > truth.t_s[i - 1])) throw ConfigError("the times of the truth must ascend");
+  }
+}
+
+void require_paper(const TrackConfig& config, const Rig& rig) {
+  if (config.method == TrackMethod::xiahou2015 && rig.heads.size() != 2)
+    throw ConfigError("--method xiahou2015: needs a rig of two heads");
+}
+
+XiahouConfig xiahou_config(const TrackConfig& config, std::span<const RigHead> heads) {
+  XiahouConfig paper;
+  paper.baseline_cm =
+      100.0 * (heads[1].head.world_from_base.translation - heads[0].head.world_from_base.translation).norm();
+  paper.use_pixels = config.corrected;
+  return paper;
+}
+
+TargetMotion motion_of(TrackMethod method) {
+  switch (method) {
+    case TrackMethod::singer:
+      return TargetMotion::singer;
+    case TrackMethod::turn:
+      return TargetMotion::turn;
+    case TrackMethod::imm:
+      return TargetMotion::imm;
+    case TrackMethod::ballistic:
+      return TargetMotion::ballistic;
+    default:
+      return TargetMotion::cv;
+  }
+}
+
+FollowConfig follow_config(const TrackConfig& config, const Rig& rig) {
+  FollowConfig follow;
+  TrackerConfig& tracker = follow.tracker;
+  tracker.method = motion_of(config.method);
+  follow.find_sigma_a = !config.sigma_a_m_s2;
+  tracker.sigma_a_m_s2 = config.sigma_a_m_s2.value_or(tracker.sigma_a_m_s2);
+  tracker.sigma_px = config.sigma_px.value_or(tracker.sigma_px);
+  tracker.gravity_m_s2 = config.gravity_m_s2.value_or(tracker.gravity_m_s2);
+  tracker.sigma_encoder_rad = config.sigma_angle_rad;
+  tracker.min_depth_m = config.min_depth_m;
+  tracker.max_depth_m = config.max_depth_m;
+  tracker.errors = rig_uncertainty(rig, config.sigma_clock_s.value_or(0.0));
+  follow.predict_s = config.predict_s.value_or(0.0);
+  follow.smooth_s = config.smooth_s.value_or(0.0);
+  return follow;
+}
+
+/// What is assumed of a lens that zooms is not the rig's one number.
+void name_courses(const Rig& rig, std::vector<Assumption>& assumed) {
+  for (std::size_t h = 0; h < rig.lens_courses.size(); ++h) {
+    if (rig.lens_courses[h].lens.empty()) continue;
+    const std::string of_camera = fmt::format("head{}.camera.", rig.heads[h].head.id);
+    for (Assumption& one : assumed) {
+      if (!one.name.starts_with(of_camera)) continue;
+      const std::string what = one.name.substr(of_camera.size());
+      if (what != "fx" && what != "fy" && what != "cx" && what != "cy") continue;
+      one.name = fmt::format("head{}.intrinsics.{}", rig.heads[h].head.id, what);
+      one.value = std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+}
+
+/// The paper's filter tests nothing.
+Verdict paper_verdict(const TrackReport& report) {
+  Verdict verdict;
+  if (report.status == TrackReport::Status::no_start) {
+    return {State::refused,
+            ExitCode::cannot_tell,
+            "the two heads' axes never meet in front of them",
+            "check that events of both heads are there, or use --method cv",
+            {}};
+  }
+  verdict.state = State::care;
+  verdict.sentence = "the paper's filter: no gates, and its covariance does not say how good it is";
+  return verdict;
+}
+
+void judge_track(const FollowConfig& follow, TargetTrack& result) {
+  const TrackConfig& config = result.config;
+  result.verdict = track_verdict(result, result.observations, result.rig.heads, follow);
+  if (result.verdict.exit_code != ExitCode::ok) return;
+  result.assumed = track_assumed(result.observations, result.rig, follow, result,
+                                 {.sigma_px = config.sigma_px.has_value(),
+                                  .sigma_a = config.sigma_a_m_s2.has_value(),
+                                  .sigma_clock_s = config.sigma_clock_s.value_or(0.0)});
+  name_courses(result.rig, result.assumed);
+  heed_assumptions(result.assumed, result.verdict);
+}
+
+}  // namespace
+
+std::string lens_course_fault(const std::vector<TargetObservation>& observations, const Rig& rig) {
+  constexpr double beyond_s = 1.0;  // how far what an observer last said is believed to go on
+  const auto outside = outside_course(observations, rig.lens_courses, beyond_s);
+  if (!outside) return "";
+  const LensCourse& course = rig.lens_courses[outside->head];
+  return fmt::format(
+      "{}: gives head {}'s intrinsics from {:.6g} to {:.6g} s, but there is an observation at {:.6g} s; "
+      "are the clocks the same?",
+      course.name, rig.heads[outside->head].head.id, course.from_s, course.until_s, outside->t_s);
+}
+
+TargetTrack track(std::vector<TargetObservation> observations, Rig rig, const TrackConfig& config, TrueTrack truth,
+                  const Progress& progress, const TrackWatch& watch) {
+  require_sense(config);
+  require_sense(rig);
+  require_paper(config, rig);
+  require_sense(truth);
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const std::string fault = observation_fault(observations[i], rig.heads.size());
+    if (!fault.empty()) throw ConfigError(fmt::format("observation {}: {}", i, fault));
+  }
+  if (const std::string fault = lens_course_fault(observations, rig); !fault.empty()) throw ConfigError(fault);
+  TargetTrack result;
+  result.counts.given = observations.size();
+  if (!rig.lens_courses.empty()) use_courses(rig.lens_courses, observations, rig);
+  result.observations = std::move(observations);
+  result.rig = std::move(rig);
+  result.truth = std::move(truth);
+  result.config = config;
+  const std::vector<RigHead>& heads = result.rig.heads;
+  if (result.observations.empty()) {
+    result.verdict = {
+        State::refused, ExitCode::cannot_tell, "there are no observations", "give those of two heads", {}};
+  } else if (config.method == TrackMethod::xiahou2015) {
+    static_cast<TrackReport&>(result) =
+        track_target_xiahou(result.observations, heads, xiahou_config(config, heads), result.truth, watch);
+    result.verdict = paper_verdict(result);
+  } else {
+    FollowConfig follow = follow_config(config, result.rig);
+    follow.progress = progress;
+    static_cast<TrackReport&>(result) = track_target(result.observations, heads, follow, result.truth, watch);
+    judge_track(follow, result);
+  }
+  result.counts.used = result.num_used;
+  result.counts.dropped = result.counts.given - result.num_used;
+  return result;
+}
+
+struct TargetTracker::State {
+  Rig rig;
+  TrackConfig config;
+  std::variant<Tracker, XiahouTracker> tracker;
+  std::vector<TargetObservation> observations;
+};
+
+namespace {
+
+std::variant<Tracker, XiahouTracker> tracker_for(const Rig& rig, const TrackConfig& config) {
+  require_sense(config);
+  require_sense(rig);
+  require_paper(config, rig);
+  if (!rig.lens_courses.empty())
+    throw ConfigError("courses of intrinsics are of recordings: give each observation its lens");
+  if (config.method == TrackMethod::xiahou2015) return XiahouTracker(rig.heads, xiahou_config(config, rig.heads));
+  return Tracker(rig.heads, with_history(follow_config(config, rig)));
+}
+
+}  // namespace
+
+TargetTracker::TargetTracker(Rig rig, const TrackConfig& config)
+    : state_(std::make_unique<State>(State{rig, config, tracker_for(rig, config), {}})) {}
+TargetTracker::~TargetTracker() = default;
+TargetTracker::TargetTracker(TargetTracker&&) noexcept = default;
+TargetTracker& TargetTracker::operator=(TargetTracker&&) noexcept = default;
+
+TrackStep TargetTracker::push(const TargetObservation& observation) {
+  const std::string fault = observation_fault(observation, state_->rig.heads.size());
+  if (!fault.empty()) throw ConfigError("the observation " + fault);
+  state_->observations.push_back(observation);
+  return std::visit([&](auto& tracker) { return tracker.take(observation); }, state_->tracker);
+}
+
+std::optional<PredictedStep> TargetTracker::at(double t_s) const {
+  const Tracker* tracker = std::get_if<Tracker>(&state_->tracker);
+  const auto belief = tracker != nullptr ? tracker->at(t_s) : std::nullopt;
+  return belief ? std::optional(PredictedStep{t_s, true, *belief}) : std::nullopt;
+}
+
+TargetTrack TargetTracker::finish(const TrueTrack& truth, const Progress& progress) const {
+  return track(state_->observations, state_->rig, state_->config, truth, progress);
+}
+
+}  // namespace alidade

@@ -1,0 +1,91 @@
+#include "alidade/track/config.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "alidade/estimation/config_error.h"
+
+namespace alidade {
+namespace {
+
+const WordList<TrackMethod>& track_method_words() {
+  static const WordList<TrackMethod> words = {
+      {TrackMethod::cv, "cv"},   {TrackMethod::singer, "singer"},       {TrackMethod::turn, "turn"},
+      {TrackMethod::imm, "imm"}, {TrackMethod::ballistic, "ballistic"}, {TrackMethod::xiahou2015, "xiahou2015"}};
+  return words;
+}
+
+TextCode gravity_code(std::optional<Eigen::Vector3d>& vector) {
+  const auto values = [&vector] {
+    return vector ? std::vector<double>(vector->begin(), vector->end()) : std::vector<double>();
+  };
+  return numbers_code(3, values, [&vector](const std::vector<double>& xyz) { vector = Eigen::Vector3d(xyz.data()); });
+}
+
+}  // namespace
+
+FieldList fields_of(TrackConfig& config) {
+  constexpr Limits positive{.min = 0.0, .max = 1e6, .is_above_min = true};
+  return {
+      {.name = "method",
+       .value = words_code(config.method, track_method_words()),
+       .help = "Motion of the target: cv (constant velocity), singer, turn, imm (quiet, agile or falling), ballistic "
+               "(free fall); or the filter of xiahou2015",
+       .old_options = {"--motion"}},
+      {.name = "gravity_m_s2",
+       .value = gravity_code(config.gravity_m_s2),
+       .help =
+           "With ballistic and imm: gravity in the rig's world [m/s2] (default: 0 9.80665 0, the first camera level)",
+       .form = "X,Y,Z"},
+      {.name = "corrected",
+       .value = &config.corrected,
+       .help = "With xiahou2015: pixels and mounting corrected, else as printed"},
+      {.name = "predict_s",
+       .value = &config.predict_s,
+       .help = "Rows so far ahead of each event [s]",
+       .limits = positive},
+      {.name = "smooth_s",
+       .value = &config.smooth_s,
+       .help = "Also smoothed.csv: the path given the observations until so long after [s]; not for imm",
+       .limits = {0.01, 2.0}},
+      {.name = "sigma_a_m_s2",
+       .value = &config.sigma_a_m_s2,
+       .help = "The target's acceleration [m/s2] (default: estimated from the innovations)",
+       .limits = positive},
+      {.name = "sigma_px",
+       .value = &config.sigma_px,
+       .help = "σ of the target's pixel coordinate [px] (default 0.5)",
+       .limits = positive,
+       .option = "--sigma-px"},
+      {.name = "sigma_clock_s",
+       .value = &config.sigma_clock_s,
+       .help = "σ of the delay between a head's clock and its images [s], counted in every σ (default: exact)",
+       .limits = positive},
+      {.name = "sigma_angle_rad",
+       .value = &config.sigma_angle_rad,
+       .help = "σ of an encoder of which the rig states none [rad]",
+       .limits = positive},
+      {.name = "min_depth_m", .value = &config.min_depth_m, .help = "Working range, nearest [m]", .limits = positive},
+      {.name = "max_depth_m", .value = &config.max_depth_m, .help = "Working range, furthest [m]", .limits = positive}};
+}
+
+void require_sense(TrackConfig config) {
+  std::vector<std::string> found = faults_of(fields_of(config));
+  const TrackMethod method = config.method;
+  const bool falls = method == TrackMethod::ballistic || method == TrackMethod::imm;
+  if (method < TrackMethod::cv || method > TrackMethod::xiahou2015) found.emplace_back("method is none of the enum");
+  if (config.gravity_m_s2 && !falls) found.emplace_back("--gravity: only with --method ballistic or imm");
+  if (config.gravity_m_s2 && !config.gravity_m_s2->allFinite())
+    found.emplace_back("gravity_m_s2 is not three finite numbers");
+  if (config.corrected && method != TrackMethod::xiahou2015)
+    found.emplace_back("--corrected: only with --method xiahou2015");
+  if (!(config.min_depth_m < config.max_depth_m)) found.emplace_back("--min-depth: is not below --max-depth");
+  if (config.smooth_s && (method == TrackMethod::imm || method == TrackMethod::xiahou2015))
+    found.push_back("--smooth: not for --method " + words_code(config.method, track_method_words()).write());
+  if (!found.empty()) throw ConfigError(fmt::format("{}", fmt::join(found, "; ")));
+}
+
+}  // namespace alidade

@@ -1,0 +1,94 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "alidade/project.h"
+#include "alidade/results/project_outcome.h"
+
+// `project` through its public header: where points and pixels are, and an answer to every misuse.
+
+namespace alidade {
+namespace {
+
+Rig two_heads() {
+  Rig rig;
+  const auto heads = xiahou_rig();
+  rig.heads.assign(heads.begin(), heads.end());
+  for (RigHead& head : rig.heads) head.head.encoder.sigma_rad = 0.001;
+  return rig;
+}
+
+Beam beside_the_lens() {
+  Beam beam;
+  beam.origin_in_cam = {0.05, 0.0, 0.0};
+  beam.cov.diagonal() << 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 0.0;
+  return beam;
+}
+
+TEST(ProjectFace, AReadingIsWhereTheBeamSays) {
+  const Camera camera = two_heads().heads[0].camera;
+  const BeamProjection result = project_readings(beside_the_lens(), camera, {1.0, 2.0});
+  ASSERT_EQ(result.readings.size(), 2u);
+  EXPECT_EQ(result.readings[1].point.point_in_cam, Eigen::Vector3d(0.05, 0.0, 2.0));
+  ASSERT_TRUE(result.readings[1].pixel);
+  EXPECT_LT((result.readings[1].pixel->px - *project(camera, {0.05, 0.0, 2.0})).norm(), 1e-12);
+  EXPECT_EQ(result.counts.used, 2u);
+  EXPECT_FALSE(result.assumed.empty());
+  EXPECT_TRUE(result.verdict.ok());
+  EXPECT_EQ(outcome_of(result).files.at(0).name, "points.csv");
+  const double by_beam = result.readings[1].point.cov(2, 2);
+  const BeamProjection noisy = project_readings(beside_the_lens(), camera, {2.0}, {.sigma_range_m = 0.1});
+  EXPECT_GT(noisy.readings[0].point.cov(2, 2), by_beam);
+}
+
+TEST(ProjectFace, AnotherCameraThanTheBeamsIsSaid) {
+  const Camera camera = two_heads().heads[0].camera;
+  Camera other = camera;
+  other.width_px = 640;
+  const BeamProjection result =
+      project_readings(beside_the_lens(), camera, {1.0}, {.own_camera = other, .own_camera_name = "own.yaml"});
+  EXPECT_EQ(result.verdict.state, State::care);
+}
+
+TEST(ProjectFace, HeadsSeeAPoint) {
+  const RigProjection result = project_rig(two_heads(), {0.1, -0.1}, {0.05}, Eigen::Vector3d(0.2, -0.1, 2.0));
+  ASSERT_EQ(result.heads.size(), 2u);
+  ASSERT_TRUE(result.heads[0].pixel && result.heads[1].pixel && result.point_cov);
+  EXPECT_EQ(result.heads[1].pan_tilt_rad, Eigen::Vector2d(-0.1, 0.05));
+  const Eigen::Vector3d uvw = result.heads[0].M * Eigen::Vector4d(0.2, -0.1, 2.0, 1.0);
+  EXPECT_LT((uvw.head<2>() / uvw.z() - result.heads[0].pixel->px).norm(), 1e-6);  // a lens without distortion
+  EXPECT_GT((*result.point_cov)(2, 2), (*result.point_cov)(0, 0));                // along the view
+  EXPECT_EQ(outcome_of(result).document.counts.given, 2u);
+  EXPECT_FALSE(project_rig(two_heads(), {0.0}, {0.0}).point_cov);
+}
+
+TEST(ProjectFace, AnswersEveryMisuse) {
+  const Camera camera = two_heads().heads[0].camera;
+  const double inf = std::numeric_limits<double>::infinity();
+  EXPECT_THROW((void)project_readings(beside_the_lens(), camera, {}), ConfigError);
+  EXPECT_THROW((void)project_readings(beside_the_lens(), Camera{.width_px = 0}, {1.0}), ConfigError);
+  for (const double bad : {std::nan(""), inf, -inf, -1.0, 1e300}) {
+    EXPECT_THROW((void)project_readings(beside_the_lens(), camera, {bad}), ConfigError) << bad;
+    EXPECT_THROW((void)project_readings(beside_the_lens(), camera, {1.0}, {.sigma_range_m = bad}), ConfigError) << bad;
+    Beam beam = beside_the_lens();
+    beam.direction_in_cam.z() = bad;
+    if (bad != -1.0) {
+      EXPECT_THROW((void)project_readings(beam, camera, {1.0}), ConfigError) << bad;
+      EXPECT_THROW((void)project_rig(two_heads(), {bad}, {0.0}), ConfigError) << bad;
+      EXPECT_THROW((void)project_rig(two_heads(), {0.0}, {0.0}, Eigen::Vector3d(bad, 0.0, 1.0)), ConfigError) << bad;
+    }
+  }
+  Beam beam = beside_the_lens();
+  beam.cov(0, 0) = std::nan("");
+  EXPECT_THROW((void)project_readings(beam, camera, {1.0}), ConfigError);
+  EXPECT_THROW((void)project_rig(two_heads(), {}, {0.0}), ConfigError);
+  EXPECT_THROW((void)project_rig(two_heads(), {0.0, 0.0, 0.0}, {0.0}), ConfigError);
+  Rig zooming = two_heads();
+  zooming.lens_courses.resize(2);
+  EXPECT_THROW((void)project_rig(zooming, {0.0}, {0.0}), ConfigError);
+  EXPECT_THROW((void)project_rig(Rig{}, {0.0}, {0.0}), ConfigError);
+}
+
+}  // namespace
+}  // namespace alidade

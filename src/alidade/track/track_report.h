@@ -1,0 +1,90 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "alidade/estimation/counts.h"
+#include "alidade/estimation/verdict.h"
+#include "alidade/pantilt/rig.h"
+#include "alidade/pantilt/target_observation.h"
+#include "alidade/public.h"
+#include "alidade/track/config.h"
+#include "alidade/track/track_step.h"
+
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+/// Where the target will be, or was.
+struct PredictedStep {
+  double t_s = 0.0;
+  bool has_belief = false;
+  Belief<6> belief;
+};
+
+/// What the innovations of one head tell, each scaled to σ = 1: where all holds they are white, with mean zero wherever
+/// the target is and however it moves. Those rejected by the gate count, at the gate.
+struct HeadInnovations {
+  std::size_t num = 0;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();   ///< In u, v.
+  double along = 0.0;                               ///< Mean along the target's motion in the image.
+  Eigen::Vector2d place = Eigen::Vector2d::Zero();  ///< Slope over (u, v) − centre, a quarter of the image the unit.
+  double place_num = 0.0;                           ///< Σ x² behind the slope: its σ is 1/√ of it.
+  double colour = 0.0;                              ///< Correlation with the one before.
+  double nis_per_dof = 0.0;
+};
+
+/// What the observations of a track say of one number that the rig file states.
+struct RigFault {
+  std::string name;  ///< "head2.base_rx_rad", "head1.tilt_scale", "head2.camera.fy".
+  double off = 0.0;  ///< By how much it seems off, in its unit.
+  double z = 0.0;    ///< The same over what would be by chance.
+};
+
+/// What became of all observations, and how good it is. Positions and velocities are in the rig's world.
+struct TrackReport {
+  enum class Status { tracked, no_start };
+  Status status = Status::no_start;
+  double sigma_a_m_s2 = 0.0;
+  bool sigma_a_is_found = false;
+  std::vector<TrackStep> steps;         ///< One per observation, in their order.
+  std::vector<PredictedStep> ahead;     ///< One per step, or none.
+  std::vector<PredictedStep> smoothed;  ///< In order of time, one per capture time that can be smoothed; else none.
+  std::size_t num_used = 0, num_starts = 0, num_restarts = 0;
+  double log_likelihood = 0.0;  ///< Of all innovations, but for a constant.
+  /// With truth, after the warm-up; NaN without.
+  double rms_m = std::numeric_limits<double>::quiet_NaN();
+  double mean_error_m = std::numeric_limits<double>::quiet_NaN();
+  double nees_per_dof = std::numeric_limits<double>::quiet_NaN();
+  double smoothed_rms_m = std::numeric_limits<double>::quiet_NaN();
+  double pcrlb_m = std::numeric_limits<double>::quiet_NaN();
+  double nis_per_dof =
+      std::numeric_limits<double>::quiet_NaN();  ///< Of the used observations; gated ones count at the gate.
+  std::vector<double> nees;                      ///< One per step; NaN where there is no truth.
+  /// Of a filter that learns the rig's errors where they are counted: with them counted alone, innovations are coloured
+  /// by what does not change. One per head.
+  std::vector<HeadInnovations> innovations;
+  double inflation = 1.0;           ///< Every covariance was raised by this factor: what the innovations ask for.
+  std::vector<RigFault> faults;     ///< The most surprising first.
+  bool errors_are_counted = false;  ///< Those of the rig.
+};
+
+/// Is shown each observation with what became of it, as it is followed. What it throws ends the work.
+using TrackWatch = std::function<void(const TargetObservation&, const TrackStep&)>;
+
+/// Everything that track() has to say: the path with its covariances (`steps`, and `ahead` and `smoothed` where they
+/// were asked for), and what it is worth.
+struct TargetTrack : TrackReport {
+  Rig rig;                                      ///< As used: the lenses' σ are those of their courses.
+  std::vector<TargetObservation> observations;  ///< As used, one per step; of a course each has its lens.
+  TrueTrack truth;
+  TrackConfig config;
+  std::vector<Assumption> assumed;
+  Counts counts;  ///< Of observations.
+  Verdict verdict;
+};
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

@@ -157,7 +157,7 @@ def _globbed(value: Any) -> Any:
 def _photo_paths(photos: Any) -> list[str] | None:
     """Paths, folders and patterns as paths; None where they are arrays."""
     items = [photos] if isinstance(photos, (str, os.PathLike)) else photos
-    if isinstance(items, np.ndarray) or not all(isinstance(each, (str, os.PathLike)) for each in items):
+    if not all(isinstance(each, (str, os.PathLike)) for each in items):
         return None
     paths: list[str] = []
     for each in items:
@@ -198,17 +198,19 @@ def _board_points(points: Any) -> Any:
 
 
 def _from_photos(photos: Any, size: Any, rest: tuple[Any, ...]) -> Result:
+    if isinstance(photos, np.ndarray) and photos.ndim == 2:
+        photos = [photos]
+    if not isinstance(photos, (str, os.PathLike)):
+        try:
+            photos = list(photos)
+        except TypeError:
+            raise ValueError(f"photos: {type(photos).__name__} is neither paths nor images") from None
     paths = _photo_paths(photos)
     if paths is not None:
         if not paths:
             raise ValueError("photos: there are none")
         return Result(_alidade.calibrate_files(paths, *rest))
-    stack = list(photos)
-    if isinstance(photos, np.ndarray) and photos.ndim == 2:
-        stack = [photos]
-    if not stack:
-        raise ValueError("photos: there are none")
-    images = [image(each, f"photos[{i}]") for i, each in enumerate(stack)]
+    images = [image(each, f"photos[{i}]") for i, each in enumerate(photos)]
     if size is not None and images[0].shape[1::-1] != image_size(size):
         raise ValueError(f"the photos are {images[0].shape[1]}x{images[0].shape[0]}, not as size says")
     names = [f"photo {i}" for i in range(len(images))]

@@ -79,7 +79,7 @@ def _cells(values: Any, name: str) -> list[str]:
         raise ValueError(f"column '{name}': one number per row is needed, but the shape is {array.shape}")
     if array.dtype.kind == "f":
         return ["" if each != each else repr(each) for each in array.tolist()]
-    return ["" if each is None or each != each else str(each) for each in array.tolist()]
+    return ["" if each is None or str(each) in ("nan", "<NA>", "NaT") else str(each) for each in array.tolist()]
 
 
 def csv_of(table: Any, what: str) -> str:

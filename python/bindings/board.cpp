@@ -16,6 +16,13 @@ bool is_called(const Field& field, const std::string& name) {
   return field.name == name || option == name;
 }
 
+/// The numbers of a vector in one text, as its field reads them.
+std::string one_text(const Field& field, const std::vector<std::string>& parts) {
+  std::string text;
+  for (const std::string& part : parts) text += (text.empty() ? "" : field.num_words > 1 ? " " : ",") + part;
+  return text;
+}
+
 Board board_of(const Texts& values) {
   Board board{.cols = 0, .rows = 0, .square_m = 0.0, .dictionary = ""};
   set_fields(fields_of(board), values);
@@ -47,12 +54,13 @@ void set_fields(const FieldList& fields, const Texts& values) {
     const std::string& name = named;
     const auto field = std::ranges::find_if(fields, [&](const Field& each) { return is_called(each, name); });
     if (field == fields.end()) throw ConfigError(name + ": there is no such field");
-    for (std::size_t i = 0; i < texts.size(); ++i) {
-      const std::string fault = set_field(*field, texts[i], i == 0);
-      if (!fault.empty()) throw ConfigError(name + ": " + fault);
-    }
     const bool is_list = std::holds_alternative<std::vector<std::string>*>(field->value);
     if (texts.empty() && is_list) std::get<std::vector<std::string>*>(field->value)->clear();
+    const std::vector<std::string> parts = is_list || texts.empty() ? texts : std::vector{one_text(*field, texts)};
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      const std::string fault = set_field(*field, parts[i], i == 0);
+      if (!fault.empty()) throw ConfigError(name + ": " + fault);
+    }
   }
 }
 

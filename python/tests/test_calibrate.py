@@ -254,7 +254,7 @@ class Photos(InFolder):
 
     def test_wrong_images_are_refused(self):
         for wrong in ([np.zeros((4, 4))], [np.zeros((0, 4), np.uint8)], [np.zeros((2, 2, 2), np.uint8)], [], "absent/*.png",
-                      "absent.png", ["absent.png"], [3], [None]):
+                      "absent.png", ["absent.png"], [3], [None], 3, object()):
             with self.subTest(wrong=str(wrong)[:40]), self.assertRaises(ValueError):
                 al.calibrate(wrong, board=BOARD)
         for wrong in (None, 3, np.zeros((3, 3)), "absent.png"):

@@ -48,13 +48,14 @@ class Package(unittest.TestCase):
             with self.subTest(wrong=wrong), self.assertRaises((ValueError, TypeError)):
                 al.Board(*wrong)
 
-    def test_first_screen_of_the_docs_runs(self):
+    def test_code_of_the_docs_runs(self):
         blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "python.md").read_text(), re.S)
         with tempfile.TemporaryDirectory() as folder:
             done = command("simulate", "board", "--board", "9x6", "--square", "0.025", "--photos", "7", "--size", "640x480",
                            "--out", pathlib.Path(folder) / "photos", "--quiet")
             self.assertEqual(done.returncode, 0, done.stderr)
-            code = "import matplotlib; matplotlib.use('Agg')\n" + blocks[0]
+            al.simulate.track(scenario="C").save(pathlib.Path(folder) / "heads")
+            code = "\n".join(["import matplotlib; matplotlib.use('Agg')", *blocks])
             done = python("-c", code, cwd=folder)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertIn("±", done.stdout)

@@ -1,0 +1,107 @@
+"""Estimators whose data come one by one; finish() gives what the batch call gives on the same data."""
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from . import _alidade
+from .arrays import Numbers, image_size, numbers, vectors
+from .camera import Camera
+from .job import Progress, files_for_call
+from .result import Result
+from .words import texts_of
+
+
+def _row(values: Any, sizes: tuple[int, ...], name: str) -> Numbers:
+    row = numbers(values, name)
+    if row.ndim != 1 or len(row) not in sizes:
+        raise ValueError(f"{name}: {' or '.join(map(str, sizes))} numbers are needed, but the shape is {row.shape}")
+    if not np.isfinite(row).all():
+        raise ValueError(f"{name}: a number is not finite")
+    return row
+
+
+class Tracker:
+    """A target followed in space, observation by observation, as al.track() does it.
+
+    rig     rig.yaml, or the result of al.rig()
+    fields  as of al.track(): method, sigma_px, …
+    """
+
+    def __init__(self, rig: Any, **fields: Any) -> None:
+        with files_for_call() as files:
+            texts = [(name, texts_of(value, name)) for name, value in fields.items() if value is not None]
+            self._core = _alidade.Tracker(files.path_of(rig, "rig"), texts)
+
+    def push(self, head: int, pan_tilt_rad: Any, px: Any, t_capture_s: float, t_arrival_s: float | None = None, *,
+             sigma_px: float = 0.0) -> dict[str, Any]:
+        """One observation: which head (its id), its angles (2,) [rad], the target's pixel (2,). What became of it: t_s,
+        position_m (3,), velocity_m_s (3,) and covariance (6, 6) in the world (None before the start), event, accepted."""
+        pan, tilt = _row(pan_tilt_rad, (2,), "pan_tilt_rad")
+        u, v = _row(px, (2,), "px")
+        arrival = t_capture_s if t_arrival_s is None else t_arrival_s
+        return _belief(self._core.push(head, (pan, tilt), (u, v), t_capture_s, arrival, sigma_px))
+
+    def at(self, t_s: float) -> dict[str, Any] | None:
+        """Where the target will be at a time; None where that is not known."""
+        step = self._core.at(t_s)
+        return None if step is None else _belief(step)
+
+    def finish(self, progress: Progress | None = None) -> Result:
+        """All that was pushed, as al.track() gives it; more may follow."""
+        return Result(self._core.finish(progress))
+
+
+def _belief(step: dict[str, Any]) -> dict[str, Any]:
+    for name, shape in (("position_m", (3,)), ("velocity_m_s", (3,)), ("covariance", (6, 6))):
+        if step[name] is not None:
+            step[name] = np.array(step[name]).reshape(shape)
+    return step
+
+
+class Observer:
+    """Intrinsics of a camera that rotates, row by row, as al.observe() does it by the method hybrid.
+
+    size    (width, height) [px]
+    source  "head" (pan, tilt[, roll] [rad]), "rate" (ω x, y[, z] [rad/s], camera frame), "attitude" (w, x, y, z); None: by
+            the first row, where 2 numbers are a head's, 3 are rates, 4 an attitude
+    camera  an initial guess, and the lens' distortion: a Camera or its file
+    fields  as of al.observe(): start, sigma_px, estimate, …
+    """
+
+    def __init__(self, size: tuple[int, int] | None = None, *, source: str | None = None, camera: Any = None,
+                 **fields: Any) -> None:
+        if source not in (None, "head", "rate", "attitude"):
+            raise ValueError(f"source: {source!r} is not one of head, rate, attitude")
+        self._source = source
+        self._core: _alidade.Observer | None = None
+        if camera is not None and not isinstance(camera, Camera):
+            camera = Camera.read(camera)
+        self._camera = None if camera is None else camera._core
+        self._texts = [(name, texts_of(value, name)) for name, value in fields.items() if value is not None]
+        if size is not None:
+            self._texts.append(("size", ["{}x{}".format(*image_size(size))]))
+
+    def push(self, t_s: float, rotation: Any, pixels: Any) -> dict[str, Any]:
+        """A row: its time, the rotation, and a pixel of each point (N, 2), NaN: not seen. What is known after it: t_s, fx,
+        fy, cx, cy, their sigma_… (NaN: not yet), event."""
+        rows, shape = vectors(pixels, 2, "pixels")
+        if len(shape) != 1:
+            raise ValueError(f"pixels: (N, 2) is needed, one pixel per point, but the shape is {(*shape, 2)}")
+        turned = _row(rotation, (2, 3, 4), "rotation")
+        if self._core is None:
+            self._source = self._source or {2: "head", 3: "rate", 4: "attitude"}[len(turned)]
+            self._count = len(rows)
+            self._core = _alidade.Observer(self._source, len(turned) == 3, len(rows), self._texts, self._camera)
+        if len(rows) != self._count:
+            raise ValueError(f"pixels: the first row had {self._count} points, this has {len(rows)}")
+        if (len(turned) == 4) != (self._source == "attitude"):
+            raise ValueError(f"rotation: {len(turned)} numbers are no {self._source}")
+        return self._core.push(t_s, turned.tolist() + [0.0] * (3 - len(turned)), rows)
+
+    def finish(self, progress: Progress | None = None) -> Result:
+        """Of all rows so far, as al.observe() gives it; more may follow."""
+        if self._core is None:
+            raise ValueError("no row was pushed yet")
+        return Result(self._core.finish(progress))

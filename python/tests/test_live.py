@@ -1,0 +1,49 @@
+"""Estimators whose data come one by one against the batch call."""
+import unittest
+
+import numpy as np
+
+import alidade as al
+from common import InFolder
+
+
+class Live(InFolder):
+    def test_tracker_has_the_path_of_track(self):
+        made = al.simulate.track(scenario="C", seed=2)
+        made.save(self.folder / "events")
+        rig, events = self.folder / "events" / "rig.yaml", made.tables["events"]
+        tracker = al.Tracker(rig, sigma_a_m_s2=1.0)
+        for row in events:
+            step = tracker.push(row["head"], (row["pan_rad"], row["tilt_rad"]), (row["u_px"], row["v_px"]),
+                                row["t_capture_s"], row["t_arrival_s"])
+        batch = al.track(events, rig=rig, sigma_a_m_s2=1.0)
+        self.assertEqual(tracker.finish().estimate, batch.estimate)
+        self.assertEqual(step["covariance"].shape, (6, 6))
+        self.assertGreater(tracker.at(step["t_s"] + 0.1)["covariance"][0, 0], step["covariance"][0, 0])
+        for wrong in (lambda: tracker.push(99, (0.0, 0.0), (0.0, 0.0), 0.0), lambda: al.Tracker("absent.yaml"),
+                      lambda: tracker.push(1, (0.0,), (0.0, 0.0), 0.0), lambda: al.Tracker(rig, sigma_px=-1.0),
+                      lambda: al.Tracker(rig, sigmas=1.0)):
+            with self.assertRaises(ValueError):
+                wrong()
+
+    def test_observer_has_the_answer_of_observe(self):
+        made = al.simulate.rotation(points=8, seed=3, duration=10)
+        log = made.tables["log"]
+        points = sum(name.startswith("p") and name.endswith("x") for name in log.dtype.names)
+        observer = al.Observer(size=(780, 582))
+        for row in log:
+            turned = [row[name] for name in ("omega_x", "omega_y", "omega_z") if name in log.dtype.names]
+            pixels = [[row[f"p{i + 1}x"], row[f"p{i + 1}y"]] for i in range(points)]
+            step = observer.push(row["t"], turned, pixels)
+        live, batch = observer.finish(), al.observe(log, size=(780, 582))
+        self.assertEqual(live.estimate["camera"], batch.estimate["camera"])
+        self.assertTrue(np.isfinite([step["fx"], step["sigma_fx"]]).all())
+        for wrong in (lambda: observer.push(99.0, [0.0] * 5, pixels), lambda: observer.push(99.0, turned, pixels[:2]),
+                      lambda: observer.push(99.0, turned, [0.0, 1.0]), lambda: al.Observer(source="moon"),
+                      lambda: al.Observer().finish()):
+            with self.assertRaises(ValueError):
+                wrong()
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -19,7 +19,13 @@ std::string range_of(const std::string& checks) {
 }  // namespace
 
 std::string words_of_type(const std::string& type_and_checks) {
-  const std::size_t colon = type_and_checks.find(':');
+  // A value's own form may have colons: HEAD:HEAD:M.
+  std::size_t colon = type_and_checks.find(':');
+  const auto is_check = [&](const std::string& rest) {
+    return rest.starts_with('{') || rest.starts_with("NUMBER") || rest.find("in [") != std::string::npos;
+  };
+  while (colon != std::string::npos && !is_check(type_and_checks.substr(colon + 1)))
+    colon = type_and_checks.find(':', colon + 1);
   std::string type = type_and_checks.substr(0, colon);
   const std::string checks = colon == std::string::npos ? "" : type_and_checks.substr(colon + 1);
   if (checks.starts_with('{')) {

@@ -92,6 +92,8 @@ ExitCode by_views(RigArgs args, Run& run) {
 }
 
 ExitCode run_rig(const RigArgs& args, Run& run) {
+  if (!args.by_moving_target && (args.moving.clock_search_s > 0.0 || args.moving.distance || !args.truth.empty()))
+    throw UsageError("--clocks, --distance and --truth are for --moving-target");
   run.add_input(args.by_moving_target ? "events" : "views", args.views);
   for (const std::filesystem::path& camera : args.cameras) run.add_input("camera", camera);
   return args.by_moving_target ? by_moving_target(args, run) : by_views(args, run);
@@ -123,9 +125,6 @@ void add_rig(App& app) {
       ->expected(1)
       ->take_all();
   app.add_fields(command, fields_of(*args));
-  command.get_option("--scales")->excludes(command.get_option("--sigma-scale"));
-  for (const char* name : {"--clocks", "--distance", "--truth"})
-    command.get_option(name)->needs(command.get_option("--moving-target"));
 }
 
 }  // namespace alidade::cli

@@ -110,6 +110,27 @@ TEST_F(RigCommand, EstimatesWhatIsAskedFor) {
   EXPECT_NE(exchanged.err.find("pan and tilt are exchanged"), std::string::npos) << exchanged.err;
 }
 
+/// What is typed beats the file, and what is in neither is the default.
+TEST_F(RigCommand, OptionsMayStandInAFile) {
+  simulate();
+  const Json typed =
+      Json::parse(calibrate(path("sim/views.csv"), {"--json", "--sigma-px", "0.2", "--estimate", "scale,focal"}).out);
+  write_file(path("rig.yaml"),
+             "board: 9x6\nsquare_m: 0.025\nsigma_px: 0.7\nestimate: [scale, focal]\noutliers: drop\n");
+  const auto with_file = [&](const std::vector<std::string>& options) {
+    return alidade({"rig", path("sim/views.csv"), "--camera", path("sim/camera_1.yaml"), "--config", path("rig.yaml"),
+                    "--json", "--no-report", "--out", path("out")},
+                   options);
+  };
+  const Json from_file = Json::parse(with_file({"--sigma-px", "0.2"}).out);
+  EXPECT_EQ(from_file["estimate"], typed["estimate"]);
+  EXPECT_NE(Json::parse(with_file({}).out)["estimate"], typed["estimate"]);
+  write_file(path("rig.yaml"), "board: 9x6\nsquare_m: 0.025\nestimate: [auto, scale]\n");
+  EXPECT_THAT(with_file({}).err, ::testing::HasSubstr("'auto' stands alone"));
+  EXPECT_EQ(calibrate(path("sim/views.csv"), {"--clocks", "3"}).code, 2);
+  EXPECT_EQ(calibrate(path("sim/views.csv"), {"--scales", "--sigma-scale", "0.1"}).code, 2);
+}
+
 TEST_F(RigCommand, FromRenderedPhotosEndToEnd) {
   simulate({"--photos"});
   const Outcome outcome = calibrate(path("sim/views.csv"), {"--sigma-scale", "1e-5"});

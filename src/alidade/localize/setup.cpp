@@ -258,7 +258,7 @@ LocalizeConfig sized(LocalizeConfig config, std::span<const ObservationFrame> fr
   LocalizationFilterConfig& filter = config.filter;
   filter.state_capacity = std::min(filter.state_capacity, static_cast<int>(std::min(need, limit)));
   filter.observations_capacity = std::min(filter.observations_capacity, static_cast<int>(std::min(most, limit)));
-  if (!(config.period_s > 0.0)) config.period_s = period_of(frames);
+  if (config.period_s == 0.0) config.period_s = period_of(frames);
   return config;
 }
 

@@ -77,12 +77,6 @@ JobOutcome outcome_of(const ObserveReport& report) {
   return outcome;
 }
 
-void add_skipped(const std::vector<SkippedInput>& skipped, JobOutcome& outcome) {
-  Counts& counts = outcome.document.counts;
-  counts.given += skipped.size();
-  counts.skipped.insert(counts.skipped.begin(), skipped.begin(), skipped.end());
-}
-
 void add_video(const VideoLog& video, JobOutcome& outcome) {
   outcome.lines.insert(
       outcome.lines.begin(),

@@ -13,9 +13,6 @@ ALIDADE_PUBLIC_BEGIN
 /// pairs.csv where photos were matched.
 [[nodiscard]] JobOutcome outcome_of(const ObserveReport& report);
 
-/// Rows that were rejected in reading count among those given.
-void add_skipped(const std::vector<SkippedInput>& skipped, JobOutcome& outcome);
-
 ALIDADE_PUBLIC_END
 
 /// The log that a video gave: points.csv, to be looked at and used again, and a line about it.

@@ -25,9 +25,7 @@ struct JobOutcome {
 
 /// Rows of the job's file that were wrong and not read: counted as given, and named.
 inline void add_skipped(const std::vector<SkippedInput>& skipped, JobOutcome& outcome) {
-  Counts& counts = outcome.document.counts;
-  counts.given += skipped.size();
-  counts.skipped.insert(counts.skipped.end(), skipped.begin(), skipped.end());
+  add_skipped(skipped, outcome.document.counts);
 }
 
 ALIDADE_PUBLIC_END

@@ -23,12 +23,6 @@ void take_value(const Field& field, const YAML::Node& node, const std::string& f
     return take(YAML::Node(text), true);
   }
   const bool is_list = std::holds_alternative<std::vector<std::string>*>(field.value);
-  const auto* code = std::get_if<TextCode>(&field.value);
-  if (code != nullptr && code->is_list && node.IsSequence()) {
-    std::string joined;
-    for (const YAML::Node& part : node) joined += (joined.empty() ? "" : ",") + part.as<std::string>("");
-    return take(YAML::Node(joined), true);
-  }
   if (!is_list || !node.IsSequence()) return take(node, true);
   for (std::size_t i = 0; i < node.size(); ++i) take(node[i], i == 0);
 }

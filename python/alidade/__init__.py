@@ -15,10 +15,10 @@ from .board import Board, BoardDetection, BoardFinder, find_board
 from .camera import Camera
 from .errors import CannotDetermine, EstimateError, NoConvergence, NotTrusted
 from .jobs import calibrate, corners, identify, localize, observe, rangefinder, rig, servo, track
-from .live import Observer, Tracker
+from .live import Localizer, Observer, Tracker
 from .result import Check, Result, Verdict, read_result
 
 __all__ = [
-    "Board", "BoardDetection", "BoardFinder", "Camera", "CannotDetermine", "Check", "EstimateError", "Interrupted",
+    "Board", "BoardDetection", "BoardFinder", "Camera", "CannotDetermine", "Check", "EstimateError", "Interrupted", "Localizer",
     "NoConvergence", "NotTrusted", "Observer", "Result", "Tracker", "Verdict", "__version__", "calibrate", "corners",
     "find_board", "identify", "localize", "observe", "plan", "rangefinder", "read_result", "rig", "servo", "simulate", "track"]

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from . import _alidade
-from .arrays import Numbers, image_size, numbers, vectors
+from .arrays import Numbers, image, image_size, numbers, vectors
 from .camera import Camera
 from .job import Progress, files_for_call
 from .result import Result
@@ -105,3 +105,62 @@ class Observer:
         if self._core is None:
             raise ValueError("no row was pushed yet")
         return Result(self._core.finish(progress))
+
+
+class Localizer:
+    """The path of a moving camera, frame by frame, as al.localize() does it.
+
+    camera  the camera, a Camera or its file
+    target  what gives scale and the map's frame: target.yaml, or its content as a dict
+    start   where the camera starts, how fast, how sure: start.yaml, or its content
+    fields  as of al.localize(): sigma_px, sigma_a_m_s2, …
+    """
+
+    def __init__(self, camera: Any, *, target: Any = None, start: Any = None, **fields: Any) -> None:
+        self._camera = camera if isinstance(camera, Camera) else Camera.read(camera)
+        self._texts = [(name, texts_of(value, name)) for name, value in fields.items() if value is not None]
+        self._target, self._start = target, start
+        self._frame = 0
+        self._core: _alidade.Localizer | None = None
+
+    def _begin(self, is_of_images: bool) -> _alidade.Localizer:
+        if self._core is None:
+            with files_for_call() as files:
+                target = "" if self._target is None else files.path_of(self._target, "target")
+                start = "" if self._start is None else files.path_of(self._start, "start")
+                self._core = _alidade.Localizer(self._camera._core, target, is_of_images, start, self._texts)
+        return self._core
+
+    def push(self, t_s: float, ids: Any, pixels: Any) -> dict[str, Any]:
+        """A frame of observations: numbers of the points (N,) and their pixels (N, 2). Where the camera is after it: frame,
+        t_s, event, position_m (3,), quaternion_wxyz (4,), covariance (6, 6) of translation [m] and rotation [rad] (None
+        before the start)."""
+        rows, shape = vectors(pixels, 2, "pixels")
+        numbered = np.asarray(ids)
+        if numbered.shape != shape or numbered.ndim != 1 or numbered.dtype.kind not in "iu":
+            raise ValueError(f"ids: a whole number per pixel is needed, but the shape is {numbered.shape}")
+        step = self._begin(False).push_points(self._frame, t_s, numbered.tolist(), rows)
+        self._frame += 1
+        return _pose(step)
+
+    def push_image(self, t_s: float, picture: Any) -> dict[str, Any]:
+        """A frame (H, W), uint8, grey. Where the camera is after it, as push() says it."""
+        pixels = image(picture)
+        if pixels.ndim != 2 or pixels.dtype != np.uint8:
+            raise ValueError("image: grey, (H, W) of uint8, is needed")
+        step = self._begin(True).push_image(self._frame, t_s, pixels)
+        self._frame += 1
+        return _pose(step)
+
+    def finish(self, progress: Progress | None = None) -> Result:
+        """All that was pushed, as al.localize() gives it; more may follow."""
+        if self._core is None:
+            raise ValueError("no frame was pushed yet")
+        return Result(self._core.finish(progress))
+
+
+def _pose(step: dict[str, Any]) -> dict[str, Any]:
+    for name in ("position_m", "quaternion_wxyz"):
+        if step[name] is not None:
+            step[name] = np.array(step[name])
+    return step

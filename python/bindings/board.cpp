@@ -17,9 +17,9 @@ bool is_called(const Field& field, const std::string& name) {
 }
 
 /// The numbers of a vector in one text, as its field reads them.
-std::string one_text(const Field& field, const std::vector<std::string>& parts) {
+std::string one_text(const std::vector<std::string>& parts) {
   std::string text;
-  for (const std::string& part : parts) text += (text.empty() ? "" : field.num_words > 1 ? " " : ",") + part;
+  for (const std::string& part : parts) text += (text.empty() ? "" : ",") + part;
   return text;
 }
 
@@ -56,7 +56,7 @@ void set_fields(const FieldList& fields, const Texts& values) {
     if (field == fields.end()) throw ConfigError(name + ": there is no such field");
     const bool is_list = std::holds_alternative<std::vector<std::string>*>(field->value);
     if (texts.empty() && is_list) std::get<std::vector<std::string>*>(field->value)->clear();
-    const std::vector<std::string> parts = is_list || texts.empty() ? texts : std::vector{one_text(*field, texts)};
+    const std::vector<std::string> parts = is_list || texts.empty() ? texts : std::vector{one_text(texts)};
     for (std::size_t i = 0; i < parts.size(); ++i) {
       const std::string fault = set_field(*field, parts[i], i == 0);
       if (!fault.empty()) throw ConfigError(name + ": " + fault);

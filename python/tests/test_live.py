@@ -44,6 +44,25 @@ class Live(InFolder):
             with self.assertRaises(ValueError):
                 wrong()
 
+    def test_localizer_has_the_path_of_localize(self):
+        made = al.simulate.underwater(frames=40)
+        made.save(self.folder / "dive")
+        files = {name: self.folder / "dive" / f"{name}.yaml" for name in ("camera", "target", "start")}
+        batch = al.localize(made.tables["sights"], **files)
+        localizer = al.Localizer(files["camera"], target=files["target"], start=files["start"])
+        sights = made.tables["sights"]
+        for frame in np.unique(sights["frame"]):
+            seen = sights[sights["frame"] == frame]
+            step = localizer.push(seen["t_s"][0], seen["point_id"], np.stack([seen["u_px"], seen["v_px"]], axis=1))
+        live = localizer.finish()
+        self.assertEqual(live.estimate["frames"], batch.estimate["frames"])
+        np.testing.assert_allclose(live.tables["trajectory"]["x_m"], batch.tables["trajectory"]["x_m"], atol=1e-9)
+        self.assertEqual((step["position_m"].shape, step["covariance"].shape), ((3,), (6, 6)))
+        with self.assertRaises(ValueError):
+            localizer.push(99.0, [1, 2], [[1.0, 2.0]])
+        with self.assertRaises(ValueError):
+            localizer.push_image(99.0, np.zeros((4, 4)))
+
 
 if __name__ == "__main__":
     unittest.main()

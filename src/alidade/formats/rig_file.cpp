@@ -97,7 +97,7 @@ std::string covariance_text(const Rig& rig) {
       fmt::join(free_names, ", "), number_list(upper));
 }
 
-/// Three numbers, zero where they are rejected.
+/// Three numbers, zero where they are omitted.
 Eigen::Vector3d vector_of(const Fields& fields, const std::string& key) {
   return fields.has(key) ? detail::read_vector(fields, key) : Eigen::Vector3d::Zero();
 }

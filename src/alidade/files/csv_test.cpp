@@ -94,7 +94,7 @@ TEST(Csv, WrongTablesAreRefusedByLine) {
   const std::vector<std::pair<std::string, std::string>> cases{
       {"", "shots.csv: is empty; a header line with the columns' names is needed"},
       {"\n\r\n \n", "shots.csv: is empty; a header line with the columns' names is needed"},
-      {"a,b\n1,2\n3\n", "shots.csv:3: has 1 cells, the header has 2"},
+      {"a,b\n1,2\n3\n", "shots.csv:3: has 1 cell, the header has 2"},
       {"a,b\n1,2,3\n", "shots.csv:2: has 3 cells, the header has 2"},
       {"a,b,a\n", "shots.csv:1: column 'a' stands twice in the header"},
       {"a,,b\n", "shots.csv:1: column 2 has no name"},

@@ -38,22 +38,22 @@ struct ObserveConfig {
   /// An initial guess, and the lens: pixels are freed of its distortion where no part of it is estimated.
   std::optional<Camera> camera = {};
   int width_px = 0, height_px = 0;  ///< Of the images; 0: the camera's, else what holds the pixels.
-  std::optional<Eigen::Vector4d>
-      start;  ///< Initial guess: fx, fy, cx, cy [px]; none: the camera's, else from the data.
+  std::optional<Eigen::Vector4d> start =
+      {};  ///< Initial guess: fx, fy, cx, cy [px]; none: the camera's, or the data's.
   FangProfile profile = FangProfile::kalman;
-  bool square_pixels = false;                  ///< fx = fy.
-  bool no_zoom = false;                        ///< The intrinsics are those of one camera: what seems a zoom is none.
-  bool fixed_centre = false;                   ///< cx, cy: the initial guess's, else the image's centre.
-  std::optional<Eigen::Vector3d> lever_m;      ///< Camera centre from the centre of rotation, camera frame; known, or
-                                               ///< (where it is estimated) the initial guess.
-  std::optional<double> sigma_px;              ///< Of a pixel coordinate; none: estimated from the residuals.
-  std::optional<double> sigma_angle_rad;       ///< Of heads and attitudes, where the rotation is noisy.
-  std::optional<double> sigma_rate_rad_per_s;  ///< Of rates.
+  bool square_pixels = false;                   ///< fx = fy.
+  bool no_zoom = false;                         ///< The intrinsics are those of one camera: what seems a zoom is none.
+  bool fixed_centre = false;                    ///< cx, cy: the initial guess's, else the image's centre.
+  std::optional<Eigen::Vector3d> lever_m = {};  ///< Camera centre from the centre of rotation, camera frame; known, or
+                                                ///< (where it is estimated) the initial guess.
+  std::optional<double> sigma_px = {};          ///< Of a pixel coordinate; none: estimated from the residuals.
+  std::optional<double> sigma_angle_rad = {};   ///< Of heads and attitudes, where the rotation is noisy.
+  std::optional<double> sigma_rate_rad_per_s = {};  ///< Of rates.
   double sigma_range_m = 0.002;
-  std::optional<double> sigma_scale;     ///< Of the measured angles or rates, relative; 0: exact; none: the log's.
-  std::optional<double> sigma_parallax;  ///< Camera centre off the axes along the view, over the points' distance.
-  double window_s = 6.0;                 ///< Of ObserveMethod::window.
-  double max_gap_s = 0.25;               ///< A longer one in a log of rates starts a segment.
+  std::optional<double> sigma_scale = {};     ///< Of the measured angles or rates, relative; 0: exact; none: the log's.
+  std::optional<double> sigma_parallax = {};  ///< Camera centre off the axes along the view, over the points' distance.
+  double window_s = 6.0;                      ///< Of ObserveMethod::window.
+  double max_gap_s = 0.25;                    ///< A longer one in a log of rates starts a segment.
 };
 
 /// The fields of `config` that a person sets: method, rotation, estimate, start, size, profile, … window_s. The camera

@@ -43,9 +43,9 @@ struct MoveConfig {
 struct MovePlan {
   ObservedNow now;
   MoveConfig config;
-  std::vector<NextMove> moves;
-  Counts counts;
-  Verdict verdict;
+  std::vector<NextMove> moves = {};
+  Counts counts = {};
+  Verdict verdict = {};
 };
 
 /// The moves that lower the uncertainty of fx, fy, cx, cy most, one after the other. Throws ConfigError for a config or

@@ -53,7 +53,7 @@ struct TestedCause {
   };
   std::string name;
   double z = 0.0;
-  std::vector<Value> values;
+  std::vector<Value> values = {};
 };
 
 /// What makes σ larger than if every pixel erred by itself.

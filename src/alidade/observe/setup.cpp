@@ -94,7 +94,8 @@ bool is_within_reach(const Eigen::Vector2d& px) {
 }  // namespace
 
 ObserveSetup setup_of(const ObserveConfig& config) {
-  ObserveSetup setup{config};
+  ObserveSetup setup;
+  static_cast<ObserveConfig&>(setup) = config;
   Faults faults;
   check_numbers(setup, faults);
   for (const std::string& word : config.estimate) take_word(word, setup, faults);

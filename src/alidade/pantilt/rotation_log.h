@@ -47,10 +47,10 @@ struct RotationLog {
   std::size_t range_point = 0;  ///< Which point `range_m` belongs to.
   bool has_roll_rate = false;   ///< Source `rate`: ω_z was given; without it ω_z is zero.
   bool has_velocity = false;
-  std::optional<double> sigma_scale;     ///< Of the measured angles or rates, as a share; 0: exact; none: not given.
-  std::optional<double> sigma_parallax;  ///< Camera centre off the axes along the view over the points' distance.
-  std::vector<RotationRow> rows;
-  std::vector<TrueIntrinsics> truth;  ///< One a row, or none.
+  std::optional<double> sigma_scale = {};  ///< Of the measured angles or rates, as a share; 0: exact; none: not given.
+  std::optional<double> sigma_parallax = {};  ///< Camera centre off the axes along the view over the points' distance.
+  std::vector<RotationRow> rows = {};
+  std::vector<TrueIntrinsics> truth = {};  ///< One a row, or none.
 };
 
 ALIDADE_PUBLIC_END

@@ -14,12 +14,12 @@
 namespace alidade::cli {
 namespace {
 
-constexpr double max_rate_deg_s = 1e6;
+constexpr double fastest_deg_s = 1e6;
 
 struct SimulateServoArgs {
   std::string kind = "angle", unit = "deg";
   bool chirp = false, one_step = false;
-  double gain = 0.0, tau_s = 0.1, latency_s = 0.08, max_rate_deg_s = max_rate_deg_s, max_acceleration_deg_s2 = 1e9;
+  double gain = 0.0, tau_s = 0.1, latency_s = 0.08, max_rate_deg_s = fastest_deg_s, max_acceleration_deg_s2 = 1e9;
   double dead_band = 0.0, backlash_deg = 0.0, second_tau_s = 0.0;
   double amplitude = 200.0, duration_s = 5.0, rate_hz = 100.0, sigma_deg = 0.05, step_deg = 0.0, zero_deg = 0.0;
 };
@@ -34,7 +34,7 @@ ServoLogScene scene_of(const SimulateServoArgs& args) {
     scene.axis.plant = plant;
   } else {
     AnglePlant plant{args.gain != 0.0 ? args.gain : 0.0567, *unit_named(args.unit), args.tau_s};
-    if (args.max_rate_deg_s < max_rate_deg_s) plant.max_rate_rad_s = deg * args.max_rate_deg_s;
+    if (args.max_rate_deg_s < fastest_deg_s) plant.max_rate_rad_s = deg * args.max_rate_deg_s;
     scene.axis.plant = plant;
   }
   scene.axis.dead_band = args.dead_band;
@@ -98,7 +98,7 @@ void add_servo_scenario(App& app) {
   };
   number("--tau-s", args->tau_s, "Time constant", 1e-4, 100.0);
   number("--latency-s", args->latency_s, "From a command to its first effect", 0.0, 10.0);
-  number("--max-rate-deg-s", args->max_rate_deg_s, "Fastest turn [deg/s]", 1e-3, max_rate_deg_s);
+  number("--max-rate-deg-s", args->max_rate_deg_s, "Fastest turn [deg/s]", 1e-3, fastest_deg_s);
   number("--max-acceleration-deg-s2", args->max_acceleration_deg_s2, "With --kind rate: largest acceleration [deg/s2]",
          1e-3, 1e9);
   number("--dead-band", args->dead_band, "Commands no larger do nothing, larger ones count from it [units of command]",

@@ -19,9 +19,13 @@ std::string range_of(const std::string& checks) {
 }  // namespace
 
 std::string words_of_type(const std::string& type_and_checks) {
+  // A value's own form may have colons: HEAD:HEAD:M.
   std::size_t colon = type_and_checks.find(':');
-  // NAME=VALUE:SIGMA is a form, and no type with a check.
-  if (const std::size_t equals = type_and_checks.find('='); equals < colon) colon = std::string::npos;
+  const auto is_check = [&](const std::string& rest) {
+    return rest.starts_with('{') || rest.starts_with("NUMBER") || rest.find("in [") != std::string::npos;
+  };
+  while (colon != std::string::npos && !is_check(type_and_checks.substr(colon + 1)))
+    colon = type_and_checks.find(':', colon + 1);
   std::string type = type_and_checks.substr(0, colon);
   const std::string checks = colon == std::string::npos ? "" : type_and_checks.substr(colon + 1);
   if (checks.starts_with('{')) {

@@ -11,7 +11,7 @@ class Pace {
   explicit Pace(double times) : times_(times) {}
 
   /// Waits until the step of this time is due, and counts it as late where that is past. A time half a second before
-  /// the last one begins anew. Throws Interrupted after Ctrl-C.
+  /// the last one begins again. Throws Interrupted after Ctrl-C.
   void keep(double t_s);
 
   [[nodiscard]] std::size_t num_steps() const { return num_steps_; }

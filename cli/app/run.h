@@ -66,7 +66,7 @@ class Run {
   /// The file of that name is all that finish() prints, if there is one: a table for the next program.
   void print_file(std::string name) { printed_file_ = std::move(name); }
   /// An image of the report: JPEG bytes under the name that the document uses. Where the page would become too large,
-  /// those added last are left out.
+  /// those added last are dropped.
   void add_image(std::string name, std::string jpeg);
   /// A line for a person, shown by finish() unless --json or --quiet.
   void say(std::string line);

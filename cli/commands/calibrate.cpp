@@ -112,15 +112,15 @@ ExitCode calibrate_corners(const CalibrateArgs& args, Run& run) {
     size = {args.config.port.air->width_px, args.config.port.air->height_px};
   } else if (size.width_px == 0) {
     size = min_size(views);
-    run.say(fmt::format("picture size {}x{} is the least that holds the corners: give --size WIDTHxHEIGHT",
-                        size.width_px, size.height_px));
+    run.say(fmt::format("image size {}x{} is the least that holds the corners: give --size WIDTHxHEIGHT", size.width_px,
+                        size.height_px));
   }
   require_corners_inside(size, args.corners, views);
   const Calibration result = alidade::calibrate(std::move(views), size, args.board, args.config, run.progress);
   run.lap("solve");
   require_size(args, size);
   if (!skipped.empty()) {
-    run.say(fmt::format("{} wrong row{} left out, the first: {}:{}: {}", skipped.size(), skipped.size() > 1 ? "s" : "",
+    run.say(fmt::format("{} wrong row{} rejected, the first: {}:{}: {}", skipped.size(), skipped.size() > 1 ? "s" : "",
                         skipped.front().file, skipped.front().line, skipped.front().reason));
   }
   return run.finish(outcome_of(result));

@@ -156,7 +156,7 @@ TEST_F(CalibrateSurvives, PhotosGivenTwiceCountOnce) {
   }
   ASSERT_EQ(calibrate({photos().string()}).code, 0);
   EXPECT_EQ(result()["counts"]["used"], num_photos);
-  EXPECT_THAT(result()["counts"]["skipped"].dump(), HasSubstr("is the same picture as"));
+  EXPECT_THAT(result()["counts"]["skipped"].dump(), HasSubstr("is the same image as"));
   // What was written can be read again: each corner stands there once.
   EXPECT_EQ(calibrate({"--corners", (out() / "corners.csv").string()}).code, 0);
 }
@@ -172,7 +172,7 @@ TEST_F(CalibrateSurvives, WrongRowsOfCornersStopOrAreNamed) {
   EXPECT_THAT(stopped.err, HasSubstr("bad.csv:"));
   const Outcome named = calibrate({"--corners", bad.string(), "--skip-bad"});
   EXPECT_EQ(named.code, 0) << named.err;
-  EXPECT_THAT(named.out, HasSubstr("2 wrong rows left out, the first: "));
+  EXPECT_THAT(named.out, HasSubstr("2 wrong rows rejected, the first: "));
   const json skipped = result()["counts"]["skipped"];
   ASSERT_EQ(skipped.size(), 2u);
   EXPECT_EQ(skipped[0]["line"], std::ranges::count(table, '\n') + 1);

@@ -94,7 +94,7 @@ ExitCode show(const ShowArgs& args, Run& run) {
   verdict.sentence = "Every pixel sees something";
   if (share < 1.0) {
     verdict.state = State::care;
-    verdict.sentence = fmt::format("{:.0f} % of the picture sees nothing by this lens: its radial map folds inside",
+    verdict.sentence = fmt::format("{:.0f} % of the image sees nothing by this lens: its radial map folds inside",
                                    100.0 * (1.0 - share));
     verdict.to_add = "calibrate with boards that reach the corners, or use kannala_brandt for a wide lens";
   }

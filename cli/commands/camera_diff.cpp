@@ -32,7 +32,7 @@ State agreement(const CameraDiff& diff) {
 
 Verdict verdict_of(const CameraDiff& diff) {
   Verdict verdict;
-  verdict.sentence = fmt::format("{:.2g} px RMS apart over the picture (centre {:.2g}, worst {:.2g} px)", diff.rms_px,
+  verdict.sentence = fmt::format("{:.2g} px RMS apart over the image (centre {:.2g}, worst {:.2g} px)", diff.rms_px,
                                  diff.central_rms_px, diff.max_px);
   if (std::isnan(diff.rms_in_sigmas)) {
     verdict.state = State::care;
@@ -108,7 +108,7 @@ void say_parameters(const CameraDiff& diff, Run& run) {
 ExitCode compare(const DiffArgs& args, Run& run) {
   const Camera a = read_camera_input(run, "camera", args.a), b = read_camera_input(run, "camera", args.b);
   if (a.width_px != b.width_px || a.height_px != b.height_px) {
-    throw InputError(fmt::format("{} is {} × {} px, but {} is {} × {} px; compare cameras of one picture size", args.a,
+    throw InputError(fmt::format("{} is {} × {} px, but {} is {} × {} px; compare cameras of one image size", args.a,
                                  a.width_px, a.height_px, args.b, b.width_px, b.height_px));
   }
   run.document.counts.given = run.document.counts.used = 2;
@@ -133,7 +133,7 @@ void add_camera_diff(App& app) {
   auto args = std::make_shared<DiffArgs>();
   CLI::App& command = app.add_command(
       {.name = "camera diff",
-       .summary = "How far apart two cameras are over the picture, after the motion that fits best",
+       .summary = "How far apart two cameras are over the image, after the motion that fits best",
        .examples =
            "  alidade camera diff monday.yaml friday.yaml\n  alidade camera diff a.yaml b.cameramodel --distance 2"},
       [args](Run& run) { return compare(*args, run); });

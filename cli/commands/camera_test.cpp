@@ -66,7 +66,7 @@ TEST_F(CameraCommand, ShowWarnsOfAImageThatSeesNothingInItsCorners) {
   Camera camera = brown_camera();
   camera.lens = Calibrated<Brown>{Params<Brown>{90, 90, 80, 60, 0, -0.45, 0.07, 0, 0, 0}};
   write("a.yaml", camera);
-  EXPECT_THAT(alidade({"show", "a.yaml"}).out, HasSubstr("of the picture sees nothing"));
+  EXPECT_THAT(alidade({"show", "a.yaml"}).out, HasSubstr("of the image sees nothing"));
 }
 
 TEST_F(CameraCommand, ConvertWritesExactlyTheDestinationInEveryFormat) {
@@ -129,7 +129,7 @@ TEST_F(CameraCommand, DiffSaysHowFarApartAndLeavesResults) {
   write("b.yaml", b);
   const Outcome outcome = alidade({"diff", "a.yaml", "b.yaml", "--out", "out"});
   EXPECT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_THAT(outcome.out, HasSubstr("px RMS apart over the picture"));
+  EXPECT_THAT(outcome.out, HasSubstr("px RMS apart over the image"));
   EXPECT_THAT(outcome.out, HasSubstr("(35.4σ)"));  // 0.05 / (√2 · 0.001)
   const auto document = result("out");
   EXPECT_EQ(document["command"], "camera diff");

@@ -36,7 +36,7 @@ cv::Mat read_photo(const std::string& file, const Camera& camera) {
   return photo;
 }
 
-/// PNG file names, one a photo. Refuses two photos of one name, and a result that would replace a photo.
+/// PNG file names, one per photo. Refuses two photos of one name, and a result that would replace a photo.
 std::vector<std::string> result_names(const UndistortArgs& args, const std::filesystem::path& out) {
   std::vector<std::string> names;
   std::set<std::string> seen;
@@ -109,7 +109,7 @@ ExitCode undistort(const UndistortArgs& args, Run& run) {
   run.say(
       fmt::format("{} photo{} → {}, as the pinhole of camera.yaml there", count, count == 1 ? "" : "s", out.string()));
   Verdict verdict;
-  verdict.sentence = fmt::format("Straight lines are straight; {:.1f} % of each picture is black",
+  verdict.sentence = fmt::format("Straight lines are straight; {:.1f} % of each image is black",
                                  100.0 * static_cast<double>(num_black) / static_cast<double>(map.u_px.size()));
   return run.finish(verdict);
 }

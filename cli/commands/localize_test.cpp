@@ -186,7 +186,7 @@ TEST_F(LocalizeCommand, SaysWhatIsWrongWithItsInput) {
     EXPECT_FALSE(std::filesystem::exists(path("out")));
   };
   expect("", "bad.csv");
-  expect(header, "has no sights");
+  expect(header, "has no observations");
   expect("frame,point_id,u_px,v_px\n0,1,1,1\n", "has no column 't_s'; give it, or --rate");
   expect(header + "0,0,1,nan,1\n", "bad.csv:2: column 'u_px': 'nan' is not a finite number");
   expect(header + "0,0,1,1e300,1\n", "column 'u_px'");

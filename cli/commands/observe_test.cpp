@@ -191,7 +191,7 @@ TEST_F(Film, SaysWhatDoesNotFit) {
   expect({"--video", path("none.mp4"), "--angles", angles}, 3, "none.mp4");
   expect({"--video", frames, "--angles", angles, "--rate", "10"}, 3, "angles.csv: covers");
   expect({"--video", frames, "--angles", angles, "--size", "320x240"}, 3, "frames are 640x480");
-  write_file(frames + "/000012.png", "not a picture");
+  write_file(frames + "/000012.png", "not an image");
   expect({"--video", frames, "--angles", angles}, 3, "000012.png");
 }
 

@@ -260,7 +260,7 @@ TEST_F(RangefinderCommand, SaysWhatIsWrongWithItsInput) {
   expect("range_m,nx,ny,nz,d\n2.31,0,0,2,-2\n", "the normal's length is 2, not 1");
   expect("range_m,nx,ny,nz,d\n2.31,0,0,1,0\n", "passes through the camera's centre");
   expect("range_m,photo\n2.31,none.jpg\n", "none.jpg");
-  write_file(path("text.jpg"), "not a picture");
+  write_file(path("text.jpg"), "not an image");
   expect("range_m,photo\n2.31,text.jpg\n", "text.jpg");
   const Outcome skipped = calibrate_table("range_m,u,v\n2.31,4,5\nnan,4,5\n", {"--skip-bad", "--json"});
   EXPECT_EQ(skipped.code, 4) << skipped.err;  // one shot tells nothing

@@ -73,7 +73,7 @@ void add_reproduce(App& app) {
   CLI::App& command = app.add_command(
       {.name = "reproduce",
        .summary =
-           "The experiments of a paper, run anew: what it prints, what comes out, and what our methods make of it",
+           "The experiments of a paper, run again: what it prints, what comes out, and what our methods make of it",
        .examples = "  alidade reproduce fang2011 --quick\n  alidade reproduce wang2020 --out wang --seed 7",
        .draws_random_numbers = true},
       [args](Run& run) { return reproduce_paper(*args, run); });

@@ -93,7 +93,7 @@ void add_servo(App& app) {
            "The closed loop of a moving target, two pan-tilt heads and their controllers, compared by pixel error",
        .examples = "  alidade servo scenario.yaml\n"
                    "  alidade servo scenario.yaml --controller mpc --latency-ms 100 --seeds 20\n\n"
-                   "scenario.yaml; every key may be left out, these are the values it then has:\n\n" +
+                   "scenario.yaml; every key may be omitted, these are the values it then has:\n\n" +
                    servo_scenario_text(),
        .draws_random_numbers = true},
       [args](Run& run) { return run_servo_command(*args, run); });

@@ -246,7 +246,7 @@ TEST_F(TrackCommand, SaysWhatIsWrongWithItsInput) {
   expect(header + "0,0,1,0,0,1,1\n0,0,2,0,0,1,1\n0,0,1,0,0,1,1\n",
          "bad.csv:4: column 't_capture_s': '0' stands in a row");
   expect(header + "0,0,1,nan,0,1,1\n", "column 'pan_rad': 'nan' is not a finite number");
-  expect(header + "0,0,1,0,0,1e9,1\n", "is in no picture");
+  expect(header + "0,0,1,0,0,1e9,1\n", "is in no image");
   EXPECT_EQ(track({"--method", "magic"}).code, 2);
   EXPECT_EQ(track({"--corrected"}).code, 2);
   EXPECT_EQ(track({"--min-depth", "30"}).code, 2);

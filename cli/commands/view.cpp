@@ -95,7 +95,7 @@ std::string list_page(const std::vector<Shown>& results, const std::string& quer
          rows + "</table></body></html>\n";
 }
 
-/// Read when it is asked for: a run may have written it anew.
+/// Read when it is asked for: a run may have written it again.
 live::HttpAnswer answer_of(const Shown& result, std::string_view file) {
   try {
     if (file == "result.json") return {200, "application/json", read_file(result.folder / "result.json")};

@@ -134,7 +134,7 @@ void add_board_scenario(App& app) {
   command.add_option("--photos", args->photos, "How many photos")->check(CLI::Range(1, 100000))->capture_default_str();
   command.add_option("--camera", args->camera_file, "The true camera; without it one is made up")->type_name("FILE");
   command.add_option("--model", args->model, "Lens of the made-up camera")->type_name("NAME")->capture_default_str();
-  command.add_option("--size", args->size, "Picture of the made-up camera")->type_name("WxH")->capture_default_str();
+  command.add_option("--size", args->size, "Image of the made-up camera")->type_name("WxH")->capture_default_str();
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
     command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
   };

@@ -112,7 +112,7 @@ FarWorld world_of(const SimulateRotationArgs& args, Run& run) {
   run.add_input("photo", args.photo);
   std::string reason;
   const cv::Mat photo = to_grey_photo(decode_photo(read_file(args.photo), args.photo), reason);
-  if (photo.empty()) throw InputError(args.photo + ": is not a picture");
+  if (photo.empty()) throw InputError(args.photo + ": is not an image");
   return FarWorld::of_photo(photo, args.photo_deg * std::numbers::pi / 180.0 / photo.cols);
 }
 

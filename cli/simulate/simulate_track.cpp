@@ -62,7 +62,8 @@ void follow_record(const std::string& file, TrackScene& scene) {
 const char* const fault_help =
     "What is not as rig.yaml says, NAME or NAME:SIZE; of head 2 unless named: yaw, pitch, roll (of its base, rad), "
     "baseline (share of it), pan_zero1, pan_zero2, tilt_zero1, tilt_zero2 (rad), clock (s), clutter (share of the "
-    "sights), second_target (share of the sights), swapped, mirrored, pan_sign, tilt_sign; rig.yaml then does not call "
+    "observations), second_target (share of the observations), swapped, mirrored, pan_sign, tilt_sign; rig.yaml then "
+    "does not call "
     "itself exact";
 
 std::optional<double> number_of(const std::string& text) {
@@ -185,7 +186,7 @@ ExitCode simulate_track_events(const SimulateTrackArgs& args, Run& run) {
   if (!args.path.empty()) run.add_input("path", args.path);
   if (args.video && !args.faults.empty()) throw UsageError("--fault: not with --video");
   if (!args.video && args.clutter > 0.0)
-    throw UsageError("--clutter: is for --video; --fault clutter:SHARE for sights");
+    throw UsageError("--clutter: is for --video; --fault clutter:SHARE for observations");
   if (args.video) scene.sigma_encoder_rad = 0.0;
   const std::size_t num_observations =
       args.video ? add_frames(scene, args.sigma_angle, args.clutter, run) : add_events(scene, run);
@@ -225,7 +226,7 @@ void add_track_scenario(App& app) {
       .add_option(
           "--scenario", args->scenario,
           "A slow circle; A2 the same, heads with offsets and turned mountings; B fast circle; C manoeuvre; D C, "
-          "hidden for a while; E B, pictures 100 ms late; F C, 100 ms late; G C, 20 and 30 pictures a second; "
+          "hidden for a while; E B, images 100 ms late; F C, 100 ms late; G C, 20 and 30 images a second; "
           "throw a ball thrown up and caught")
       ->capture_default_str();
   command.add_option(
@@ -234,7 +235,7 @@ void add_track_scenario(App& app) {
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
     return command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high));
   };
-  command.add_flag("--video", args->video, "Render frames instead of sights: head_1/, head_2/, angles.csv");
+  command.add_flag("--video", args->video, "Render frames instead of observations: head_1/, head_2/, angles.csv");
   number("--clutter", args->clutter, "With --video: coloured patches behind the target, σ of a colour, of 255", 0.0,
          100.0);
   number("--duration", args->duration_s, "Seconds (default: the scenario's, or the path's)", 0.1, longest_s);

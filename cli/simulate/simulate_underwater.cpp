@@ -107,8 +107,8 @@ ExitCode simulate(const SimulateUnderwaterArgs& args, Run& run) {
   run.document.estimate["frames"] = sequence.frames.size();
   run.document.counts.given = run.document.counts.used = num;
   Verdict verdict;
-  verdict.sentence = args.video ? fmt::format("{} pictures of a board under water, with known truth", num)
-                                : fmt::format("{} frames with {} sights of {} points, with known truth",
+  verdict.sentence = args.video ? fmt::format("{} images of a board under water, with known truth", num)
+                                : fmt::format("{} frames with {} observations of {} points, with known truth",
                                               sequence.frames.size(), num, sequence.points.size());
   run.say(fmt::format("{} in {}", verdict.sentence, run.options.out.string()));
   return run.finish(verdict);
@@ -139,8 +139,9 @@ void add_underwater_scenario(App& app) {
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
     return command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
   };
-  CLI::Option* video = command.add_flag(
-      "--video", args->video, "Render pictures of the board instead of sights: frames/, as seen through turbid water");
+  CLI::Option* video =
+      command.add_flag("--video", args->video,
+                       "Render images of the board instead of observations: frames/, as seen through turbid water");
   number("--blur-px", args->look.blur_px, "With --video: sigma of the blur [px]", 0.0, 10.0)->needs(video);
   number("--noise", args->look.noise, "With --video: sigma of a colour value's noise, of 255", 0.0, 100.0)
       ->needs(video);
@@ -148,7 +149,8 @@ void add_underwater_scenario(App& app) {
   number("--sigma-px", scene.sigma_px, "σ of a pixel coordinate [px]", 0.0, 100.0)->excludes(video);
   number("--sigma-depth", scene.sigma_depth, "σ of the depths in start.yaml, over the depth", 0.0, 1.0)
       ->excludes(video);
-  number("--mismatches", scene.mismatches, "Share of the sights that show another place", 0.0, 1.0)->excludes(video);
+  number("--mismatches", scene.mismatches, "Share of the observations that show another place", 0.0, 1.0)
+      ->excludes(video);
   number("--blackout-from", scene.blackout_from_s, "Nothing is seen from this time on [s]", 0.0, 1e6)->excludes(video);
   number("--blackout", scene.blackout_s, "How long nothing is seen [s]", 0.0, 1e6)->excludes(video);
   const char* const group = "What is not as told";
@@ -159,7 +161,7 @@ void add_underwater_scenario(App& app) {
   number("--readout", scene.readout_s, "Rolling shutter: time from the first row to the last [s]", 0.0, 1.0)
       ->excludes(video)
       ->group(group);
-  number("--late", scene.late_s, "Pictures are taken so long before their times [s]", -10.0, 10.0)
+  number("--late", scene.late_s, "Images are taken so long before their times [s]", -10.0, 10.0)
       ->excludes(video)
       ->group(group);
   number("--target-speed", scene.target_speed_m_s, "Of the board along its x, against the other points [m/s]", -1.0,

@@ -265,7 +265,7 @@ RigProjection project_rig(const Rig& rig, const std::vector<double>& pans_rad, c
     return result;
   }
   result.verdict.sentence =
-      fmt::format("{} of {} heads have the point in their sight", seen_by.size(), rig.heads.size());
+      fmt::format("{} of {} heads have the point in their observation", seen_by.size(), rig.heads.size());
   result.point_cov = covariance_of_point(rig, errors, seen_by, *point_in_world);
   heed(files_check(rig), "use files with their covariance: alidade calibrate and alidade rig write it", result.verdict);
   return result;

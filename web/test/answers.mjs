@@ -64,7 +64,7 @@ async function causesAreNamedWorstFirst({open, url}) {
   await close();
 }
 
-/** Beside a header that says that the halves differ no figure says that all of the picture agrees. */
+/** Beside a header that says that the halves differ no figure says that all of the image agrees. */
 async function halvesDoNotContradictTheHeader({open, url, calibration}) {
   const document = calibration(4), caption = async () => {
     const {page, close} = await open(url(document)), words = await page.locator('#fig-halves').innerText();
@@ -72,10 +72,10 @@ async function halvesDoNotContradictTheHeader({open, url, calibration}) {
     return words;
   };
   document.verdict.checks = [{name: 'consistent', state: 'good', text: 'halves differ by 1.1σ in cx', value: 1.1, limit: 3, unit: 'σ', figure: 'halves'}];
-  assert.match(await caption(), /Here it does in \d+ % of the picture/);
+  assert.match(await caption(), /Here it does in \d+ % of the image/);
   Object.assign(document.verdict, {state: 'care', sentence: 'Usable with care: halves differ by 4.8σ in fy', checks: [{name: 'consistent', state: 'care', text: 'halves differ by 4.8σ in fy', value: 4.8, limit: 3, unit: 'σ', figure: 'halves'}]});
   const words = await caption();
-  assert.ok(!/\d+ % of the picture/.test(words), words);
+  assert.ok(!/\d+ % of the image/.test(words), words);
   assert.match(words, /They do not: halves differ by 4\.8σ in fy/);
 }
 
@@ -87,7 +87,7 @@ async function aRefusalShowsCornersAsFound({open, url, calibration}) {
   const {page, faults, close} = await open(url(document));
   const tips = await page.evaluate(() => [...window.alidade.charts].find((chart) => chart.canvas.closest('#fig-photo')).hits.map((hit) => hit.tip().join(' ')));
   assert.equal(tips.length, 54);
-  assert.ok(tips.every((tip) => tip.includes('as found') && !tip.includes('left out')), tips[0]);
+  assert.ok(tips.every((tip) => tip.includes('as found') && !tip.includes('rejected')), tips[0]);
   assert.match(await page.locator('#fig-photo').innerText(), /which corners were found\?[\s\S]*54 corners found/);
   assert.ok(!(await page.locator('#fig-photo').innerText()).includes('Crosses'));
   assert.deepEqual(faults, []);
@@ -146,7 +146,7 @@ async function aReRunIsCalledSo({open, url, documents}) {
 
 async function figuresSayWhatTheyDraw({open, url, documents}) {
   const {document} = documents.reproduce, {page, faults, close} = await open(url(document));
-  for (const [id, title, caption] of [['4', 'Figure 4: angles', 'Drawn: an angle'], ['6', 'Figure 6: spots', 'Left the picture'], ['8', 'Figure 8: errors', 'Shares of spots.'], ['table_2', 'Table 2: three ways', 'Three rows.']]) {
+  for (const [id, title, caption] of [['4', 'Figure 4: angles', 'Drawn: an angle'], ['6', 'Figure 6: spots', 'Left the image'], ['8', 'Figure 8: errors', 'Shares of spots.'], ['table_2', 'Table 2: three ways', 'Three rows.']]) {
     const words = await page.locator(`#fig-paper-${id}`).innerText();
     assert.ok(words.includes(title) && words.includes(caption), words);
   }

@@ -72,7 +72,7 @@ async function hoverSaysTheValue({open, url, calibration}) {
     const {words} = await tipAt(page, 'photos', place);
     assert.ok(words.includes(photos.name[worst[place][1]]) && near(words, worst[place][0]), words);
   }
-  // The map of 3σ: at the picture's middle, a quarter and a corner.
+  // The map of 3σ: at the image's middle, a quarter and a corner.
   await page.locator('#fig-trust canvas').first().evaluate((canvas) => canvas.scrollIntoView({block: 'center'}));
   const box = await page.locator('#fig-trust canvas').first().boundingBox();
   for (const share of [0.5, 0.25, 0.02]) {

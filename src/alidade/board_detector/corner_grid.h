@@ -48,7 +48,7 @@ struct GridExtent {
 
 /// Grows grids from every four saddle points that form a square of a chessboard, its eight neighbours of the right
 /// colours, each by local prediction, so that strong tilt and distortion do no harm. Largest first; grids of fewer than
-/// six corners are left out. `image` is the one in which the points were found.
+/// six corners are rejected. `image` is the one in which the points were found.
 [[nodiscard]] std::vector<CornerGrid> grow_grids(const cv::Mat& image, std::span<const SaddlePoint> points);
 
 }  // namespace alidade

@@ -28,7 +28,7 @@ struct BoardDetection {
 [[nodiscard]] BoardDetection find_board(const cv::Mat& photo, const Board& board, bool reject_partial = false);
 
 /// Fits the same corners again where the lens and the pose are known: edges are curved by the lens, starting points
-/// are the predicted ones, points outside the image are left out. Bouguet's second extraction.
+/// are the predicted ones, points outside the image are rejected. Bouguet's second extraction.
 [[nodiscard]] BoardDetection refind_board(const cv::Mat& photo, const Board& board, const BoardView& first,
                                           const Camera& camera, const Rigid3& cam_from_board);
 

@@ -195,9 +195,9 @@ TEST(FindBoard, PlacesABoardCutByTheImageByTheBordersThatAreSeen) {
 
 TEST(FindBoard, SaysWhyThereIsNoBoard) {
   const Board board;
-  EXPECT_EQ(find_board(cv::Mat(), board).reason, "there is no picture");
-  EXPECT_EQ(find_board(cv::Mat::zeros(1, 1, CV_8U), board).reason, "the picture is too small: 1×1");
-  EXPECT_EQ(find_board(cv::Mat::zeros(480, 640, CV_16U), board).reason, "the picture is black");
+  EXPECT_EQ(find_board(cv::Mat(), board).reason, "there is no image");
+  EXPECT_EQ(find_board(cv::Mat::zeros(1, 1, CV_8U), board).reason, "the image is too small: 1×1");
+  EXPECT_EQ(find_board(cv::Mat::zeros(480, 640, CV_16U), board).reason, "the image is black");
   EXPECT_EQ(find_board(cv::Mat::zeros(480, 640, CV_8UC3), board).reason, "no chessboard corners");
   cv::Mat stripes(480, 640, CV_8U);
   for (int x = 0; x < stripes.cols; ++x) stripes.col(x).setTo(x / 16 % 2 == 0 ? 30 : 220);

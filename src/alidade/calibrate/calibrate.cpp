@@ -45,7 +45,7 @@ void take_usable_views(std::span<const BoardView> views, CalibrateReport& report
   for (std::size_t k = 0; k < views.size(); ++k) {
     report.views[k].corners.resize(views[k].corners.size());
     if (repeats[k]) {
-      report.views[k].reason = "is the same picture as " + views[*repeats[k]].photo;
+      report.views[k].reason = "is the same image as " + views[*repeats[k]].photo;
     } else if (views[k].corners.empty()) {
       report.views[k].reason = "no corners";
     } else if (views[k].corners.size() < min_corners) {
@@ -123,7 +123,7 @@ void whiten(Work& work, const Residuals& residuals, const NoiseEstimate& noise, 
   }
 }
 
-/// Every corner with the same weight, but none for the far ones where outliers are to be left out.
+/// Every corner with the same weight, but none for the far ones where outliers are to be rejected.
 void make_all_arrays(const CalibrateConfig& config, Work& work) {
   work.arrays.clear();
   for (std::size_t k = 0; k < work.views.size(); ++k) {
@@ -259,10 +259,10 @@ bool refuse_untold(const Work& work, CalibrateReport& report) {
     if (at < 4) {
       refuse(report,
              name + " cannot be told: its σ is " + std::to_string(static_cast<long>(std::min(sigma, 1e9))) + " px",
-             "tilt the board 20–45° in several directions and fill the picture");
+             "tilt the board 20–45° in several directions and fill the image");
     } else {
       refuse(report, name + " cannot be told: its σ is " + std::to_string(sigma),
-             "hold the board at several distances, near ones too, and at the picture's edges, or hold " + name +
+             "hold the board at several distances, near ones too, and at the image's edges, or hold " + name +
                  " with --fix");
     }
     return true;
@@ -345,11 +345,11 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
   take_usable_views(views, report, work);
   const std::size_t least = min_views(config);
   const bool repeated = std::any_of(report.views.begin(), report.views.end(),
-                                    [](const ViewFit& view) { return view.reason.starts_with("is the same picture"); });
+                                    [](const ViewFit& view) { return view.reason.starts_with("is the same image"); });
   const auto too_few = [&] {
     refuse(report,
            "only " + std::to_string(work.views.size()) + " usable photo" + (work.views.size() == 1 ? "" : "s") +
-               " of the board" + (repeated ? " (others are the same picture)" : "") + "; it takes " +
+               " of the board" + (repeated ? " (others are the same image)" : "") + "; it takes " +
                std::to_string(least),
            "add photos of the board, tilted 20–45° in several directions");
   };

@@ -43,7 +43,7 @@ std::string other_size(const PhotoSize& size, const PhotoSize& usual) {
          (is_turned ? ": its pixels were turned; take it from the camera as it was stored" : "");
 }
 
-/// Takes over what was found; photos of another size than most are left out. Returns the photos of that size that show
+/// Takes over what was found; photos of another size than most are rejected. Returns the photos of that size that show
 /// no board.
 std::vector<std::size_t> take_detections(BoardDetections&& found, PhotoCalibration& result) {
   std::vector<std::size_t> in_vain;
@@ -64,7 +64,7 @@ std::vector<std::size_t> take_detections(BoardDetections&& found, PhotoCalibrati
   const auto repeats = repeated_views(result.views);
   for (std::size_t i = 0; i < repeats.size(); ++i) {
     if (!repeats[i]) continue;
-    result.reasons[i] = "is the same picture as " + result.views[*repeats[i]].photo;
+    result.reasons[i] = "is the same image as " + result.views[*repeats[i]].photo;
     result.views[i].corners.clear();
   }
   return in_vain;

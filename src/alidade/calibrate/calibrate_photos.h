@@ -18,7 +18,7 @@ struct PhotoCalibration {
 };
 
 /// Bouguet's procedure: find the corners, calibrate a flat board, extract the corners again with lens and pose known,
-/// calibrate as `config` asks. Photos of another size than most are left out and named. Where
+/// calibrate as `config` asks. Photos of another size than most are rejected and named. Where
 /// (nearly) none shows the board as told, the board that they do show is looked for, and the report says how to tell
 /// it. J.-Y. Bouguet, "Camera calibration toolbox for Matlab", first example: analyse error, reproject, recompute
 /// corners.

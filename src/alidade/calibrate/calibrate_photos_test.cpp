@@ -90,7 +90,7 @@ TEST(CalibratePhotos, PhotosWithoutABoardAndUnreadableOnesAreNamed) {
   Photos changed = photos();
   changed.images[2] = cv::Mat(480, 640, CV_8UC1, cv::Scalar(90));
   const PhotoLoader loader = [&changed](std::size_t i) {
-    if (i == 5) throw std::runtime_error("the picture is cut off");
+    if (i == 5) throw std::runtime_error("the image is cut off");
     return changed.images[i];
   };
   const auto result = calibrate_photos(changed.names, loader, sample_board, {});
@@ -98,7 +98,7 @@ TEST(CalibratePhotos, PhotosWithoutABoardAndUnreadableOnesAreNamed) {
   EXPECT_FALSE(result.report.views[2].used);
   EXPECT_FALSE(result.report.views[2].reason.empty());
   EXPECT_NE(result.report.views[2].reason, "no corners") << "say what the search found";
-  EXPECT_EQ(result.report.views[5].reason, "the picture is cut off");
+  EXPECT_EQ(result.report.views[5].reason, "the image is cut off");
   EXPECT_EQ(result.num_unreadable, 1u);
 }
 
@@ -129,7 +129,7 @@ TEST(CalibratePhotos, ABoardToldInSquaresIsNamedInInnerCorners) {
 TEST(CalibratePhotos, NoPhotoAtAllIsARefusal) {
   const auto none = calibrate_photos({}, photos().loader(), sample_board, {});
   EXPECT_EQ(none.report.status, CalibrateReport::Status::degenerate);
-  const PhotoLoader broken = [](std::size_t) -> cv::Mat { throw std::runtime_error("not a picture"); };
+  const PhotoLoader broken = [](std::size_t) -> cv::Mat { throw std::runtime_error("not an image"); };
   const auto unread = calibrate_photos(photos().names, broken, sample_board, {});
   EXPECT_EQ(unread.report.status, CalibrateReport::Status::degenerate);
   EXPECT_EQ(unread.num_unreadable, static_cast<std::size_t>(num_photos));

@@ -194,7 +194,7 @@ TEST(Calibrate, AImageGivenTwiceCountsOnce) {
   ASSERT_EQ(report.status, CalibrateReport::Status::converged);
   EXPECT_EQ(report.corners_used, 12 * 54);
   EXPECT_EQ(report.camera.cov, once.camera.cov);
-  EXPECT_EQ(report.views[12].reason, "is the same picture as " + views[0].photo);
+  EXPECT_EQ(report.views[12].reason, "is the same image as " + views[0].photo);
 }
 
 TEST(Calibrate, DropsAPhotoOfAnotherBoardByName) {
@@ -265,7 +265,7 @@ TEST(Calibrate, RefusesWhatCannotBeTold) {
   };
   expect_refused(status({}), "only 0");
   expect_refused(status({views[0], views[1]}), "only 2");
-  expect_refused(status(std::vector<BoardView>(10, views[0])), "the same picture");
+  expect_refused(status(std::vector<BoardView>(10, views[0])), "the same image");
 
   BoardScene still = scene;  // one place, but ten images
   for (Rigid3& pose : still.cam_from_board) pose = scene.cam_from_board[0];

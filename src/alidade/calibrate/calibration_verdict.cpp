@@ -72,7 +72,7 @@ Check coverage(const CalibrateReport& report, const CalibrationStudy& study) {
   const double useless_px = 0.01 * std::max(report.camera.width_px, report.camera.height_px);
   const bool is_answer = share_below(study.sigma_infinity, useless_px) >= 50.0;
   check.state = check.value >= 95.0 ? State::good : is_answer ? State::care : State::bad;
-  check.text = "3σ is below 1 px in " + two(check.value) + " % of the picture; worst " + two(3.0 * worst.value) +
+  check.text = "3σ is below 1 px in " + two(check.value) + " % of the image; worst " + two(3.0 * worst.value) +
                " px, " + place(worst.px, report.camera);
   return check;
 }
@@ -218,7 +218,7 @@ Check principal_point(const CalibrateReport& report) {
               .unit = "%",
               .figure = "estimate"};
   check.state = grade(check.value, 15.0, 35.0);
-  check.text = two(check.value) + " % of the picture from its centre";
+  check.text = two(check.value) + " % of the image from its centre";
   return check;
 }
 
@@ -273,8 +273,7 @@ Verdict calibration_verdict(const CalibrateReport& report, const CalibrationStud
   for (const Check& check : verdict.checks) {  // halves that differ are a symptom of it
     if (check.name == "board flat" && check.state == State::care && study.transfer) worst = &check;
   }
-  const std::string trust =
-      "3σ is below 0.5 px in " + two(share_below(study.sigma_infinity, 0.5)) + " % of the picture";
+  const std::string trust = "3σ is below 0.5 px in " + two(share_below(study.sigma_infinity, 0.5)) + " % of the image";
   const std::string word = verdict.state == State::good   ? "Good: "
                            : verdict.state == State::care ? "Usable with care: "
                                                           : "Not to be trusted: ";

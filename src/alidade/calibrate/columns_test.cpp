@@ -24,7 +24,7 @@ struct Setting {
   Rigid3 cam_from_board;
 };
 
-/// 11 corners (no multiple of a vector), one of them left out, with full covariances.
+/// 11 corners (no multiple of a vector), one of them rejected, with full covariances.
 Setting draw_setting(std::mt19937_64& rng) {
   std::uniform_real_distribution<> uniform(-1.0, 1.0);
   Setting s;

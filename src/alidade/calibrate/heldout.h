@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// Error on photos left out (five folds; the camera is held, their poses are found anew), for the model in use and for
+/// Error on photos held out (five folds; the camera is held, their poses are found again), for the model in use and for
 /// its simpler and richer neighbours. `views` are those that take part.
 [[nodiscard]] std::vector<HeldOutModel> heldout_models(const Board& board, std::span<const BoardView> views,
                                                        ImageSize size, const CalibrateConfig& config,

@@ -77,7 +77,7 @@ TEST_P(NextPhotoModel, EveryPhotoLowersTheWorst) {
     for (const Eigen::Vector3d& point : planned.report.board_points) {
       const auto px = project(planned.report.camera, photo.cam_from_board * point);
       ASSERT_TRUE(px);
-      EXPECT_TRUE(px->x() > 0 && px->y() > 0 && px->x() < 639 && px->y() < 479) << "a corner outside the picture";
+      EXPECT_TRUE(px->x() > 0 && px->y() > 0 && px->x() < 639 && px->y() < 479) << "a corner outside the image";
     }
   }
 }

@@ -15,7 +15,7 @@ struct FarPixels {
 };
 
 /// The pixels of the parallelogram around a corner. Those near an edge are kept one by one, relative to `origin`; their
-/// number is a multiple of four (up to three are left out). Of the others only sums are kept.
+/// number is a multiple of four (up to three are omitted). Of the others only sums are kept.
 struct CornerWindow {
   Eigen::Vector2d origin = Eigen::Vector2d::Zero();
   std::vector<float> x, y, grey;

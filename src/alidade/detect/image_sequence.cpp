@@ -75,8 +75,8 @@ std::vector<double> asl_times_s(const path& table, const path& images) {
     if (at == names.end()) throw InputError(fmt::format("{}: has no time for {}", table.string(), file.string()));
     times_s.push_back(1e-9 * static_cast<double>(times_ns[static_cast<std::size_t>(at - names.begin())] - times_ns[0]));
     if (times_s.size() > 1 && !(times_s.back() > times_s[times_s.size() - 2]))
-      throw InputError(fmt::format("{}: the time of {} is not after the picture before it", table.string(),
-                                   file.filename().string()));
+      throw InputError(
+          fmt::format("{}: the time of {} is not after the image before it", table.string(), file.filename().string()));
   }
   return times_s;
 }
@@ -184,7 +184,7 @@ LocalizeTarget read_image_target(const path& file) {
     const YAML::Node entry = root["points"][i];
     const detail::Fields point(entry, name, fmt::format("points[{}].", i));
     if (!point.has("patch"))
-      detail::refuse(name, point.full("patch"), "is needed: what the point looks like in a picture");
+      detail::refuse(name, point.full("patch"), "is needed: what the point looks like in an image");
     target.patches.push_back(read_patch(file.parent_path() / point.text("patch")));
   }
   return target;

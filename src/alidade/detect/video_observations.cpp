@@ -55,7 +55,7 @@ class Clock {
                       name_, between_.first_s(), between_.last_s(), id_, number, t_s, rate_hz_));
     return between_.at(t_s);
   }
-  /// Where no rate is given, a row a frame: all of them.
+  /// Where no rate is given, one row per frame: all of them.
   void check_end(std::size_t num_frames) const {
     if (rate_hz_ > 0.0 || num_frames == log_.rows.size()) return;
     throw InputError(

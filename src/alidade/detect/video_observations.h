@@ -20,7 +20,7 @@ struct HeadAngles {
   std::vector<RotationLog> logs;  ///< One per head of the rig, source `head`, without points.
 };
 
-/// Reads `t_s,head,pan_rad,tilt_rad` (also `t_capture_s`; `head` may be left out where the rig has one), in order of
+/// Reads `t_s,head,pan_rad,tilt_rad` (also `t_capture_s`; `head` may be omitted where the rig has one), in order of
 /// time for each head. Throws InputError: no such column, a head that is not in the rig or has no rows, times that run
 /// backwards, angles in `pan_deg`.
 [[nodiscard]] HeadAngles read_head_angles(const std::filesystem::path& csv, std::span<const RigHead> heads);

@@ -18,7 +18,7 @@ struct ClusterStep {
   Eigen::VectorXd step;    ///< H⁻¹ g, of the parameters asked for.
   Eigen::MatrixXd spread;  ///< H⁻¹ A H⁻¹, of the same: what `step` would have for covariance were the truth fitted.
   /// H⁻¹ A H⁻¹ A H⁻¹, of the same, over all shared parameters: by how much the fit to the cluster itself lessens that.
-  /// May be left out where all shared parameters are asked for.
+  /// May be omitted where all shared parameters are asked for.
   Eigen::MatrixXd taken = {};
 };
 

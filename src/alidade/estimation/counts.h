@@ -17,7 +17,7 @@ struct InputFile {
   std::string sha256;
 };
 
-/// A row, or a photo, that was left out, and why. Line 0: the whole file.
+/// A row, or a photo, that was rejected, and why. Line 0: the whole file.
 struct SkippedInput {
   std::string file;
   std::size_t line = 0;

@@ -18,7 +18,7 @@ concept MotionModel = requires(const Model& model, const Belief<Model::dim>& bel
   { model.predicted(belief, dt_s) } -> std::same_as<Belief<Model::dim>>;
 };
 
-/// σ_a is the acceleration that, held for this long and then drawn anew, moves the target as white noise of density
+/// σ_a is the acceleration that, held for this long and then drawn again, moves the target as white noise of density
 /// q = σ_a² · 0.05 s does.
 inline constexpr double acceleration_hold_s = 0.05;
 

@@ -13,7 +13,7 @@ namespace alidade {
 [[nodiscard]] SkippedInput skipped_row(const Csv& csv, std::size_t row, std::string reason);
 
 /// Calls `read(row)` for every row of a table. What it throws as InputError stops the reading, or with `skip_bad` the
-/// row is left out and named in `skipped`.
+/// row is rejected and named in `skipped`.
 void for_each_row(const Csv& csv, bool skip_bad, std::vector<SkippedInput>& skipped,
                   const std::function<void(std::size_t row)>& read);
 

@@ -29,7 +29,7 @@ double checked_number(std::string_view text, const std::string& file, const std:
 
 int checked_size(double value, const std::string& file, const std::string& key) {
   if (!(value >= 1.0 && value <= 1e6) || value != std::floor(value)) {
-    refuse(file, key, fmt::format("{} is not a picture's size in pixels (1 to 1000000)", value));
+    refuse(file, key, fmt::format("{} is not an image's size in pixels (1 to 1000000)", value));
   }
   return static_cast<int>(value);
 }

@@ -97,7 +97,7 @@ std::string covariance_text(const Rig& rig) {
       fmt::join(free_names, ", "), number_list(upper));
 }
 
-/// Three numbers, zero where they are left out.
+/// Three numbers, zero where they are omitted.
 Eigen::Vector3d vector_of(const Fields& fields, const std::string& key) {
   return fields.has(key) ? detail::read_vector(fields, key) : Eigen::Vector3d::Zero();
 }
@@ -139,7 +139,7 @@ double amplitude_of(const Fields& fields, const std::string& key) {
   return amplitude;
 }
 
-/// A σ that may be left out: NaN.
+/// A σ that may be omitted: NaN.
 double sigma_of(const Fields& fields, const std::string& key) {
   if (!fields.has(key)) return std::numeric_limits<double>::quiet_NaN();
   const double sigma = fields.number(key);

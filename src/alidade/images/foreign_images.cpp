@@ -88,7 +88,7 @@ std::string why_no_photo(const std::filesystem::path& file) {
   const std::string name = file.filename().string();
   if (name == "Thumbs.db" || name == "desktop.ini") return "";  // hidden where they come from
   const std::string kind = kind_of_ending(lower_ending(file));
-  return kind.empty() ? "has no ending of a picture that is read" : advice_for(kind);
+  return kind.empty() ? "has no ending of an image that is read" : advice_for(kind);
 }
 
 std::set<std::string> our_results(const std::filesystem::path& folder) {

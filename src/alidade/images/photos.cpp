@@ -133,11 +133,11 @@ std::vector<std::filesystem::path> list_photos(const std::vector<std::filesystem
 cv::Mat decode_photo(std::string_view bytes) {
   if (bytes.empty()) throw InputError("the file is empty");
   if (const std::string foreign = foreign_image(bytes); !foreign.empty()) throw InputError(foreign);
-  if (is_cut_off(bytes)) throw InputError("the picture is cut off");
+  if (is_cut_off(bytes)) throw InputError("the image is cut off");
   const std::string as_stored = untagged_tiff(bytes);
   if (!as_stored.empty()) bytes = as_stored;
   cv::Mat photo = decode_image(bytes);
-  if (photo.empty()) throw InputError("not a picture that can be read");
+  if (photo.empty()) throw InputError("not an image that can be read");
   return photo;
 }
 

@@ -58,7 +58,7 @@ TEST(DecodePhoto, KeepsDepthAndValues) {
 
 TEST(DecodePhoto, RefusesWhatIsNoImage) {
   EXPECT_THAT(refusal(""), HasSubstr("empty"));
-  EXPECT_THAT(refusal("Dear diary, this is a text file named photo.jpg.\n"), HasSubstr("not a picture"));
+  EXPECT_THAT(refusal("Dear diary, this is a text file named photo.jpg.\n"), HasSubstr("not an image"));
   EXPECT_NE(refusal("\x89PNG\r\n\x1a\n"), "");
   EXPECT_NE(refusal("\xFF\xD8\xFF"), "");
   EXPECT_NE(refusal(std::string(1000, '\0')), "");

@@ -46,7 +46,7 @@ std::filesystem::path decoder_beside_this_program(const std::filesystem::path& v
     if (std::filesystem::is_regular_file(folder / decoder_name, error)) return folder / decoder_name;
   }
   throw InputError(video.string() + ": video files are decoded by the program '" + decoder_name +
-                   "', which is not beside this one; give a folder of numbered pictures");
+                   "', which is not beside this one; give a folder of numbered images");
 }
 
 /// Decoders draw text files as moving letters, and play lists lead elsewhere.

@@ -117,7 +117,7 @@ TEST(VideoFrames, RefuseWhatIsNoFolderOfImages) {
   EXPECT_THAT(refusal_of(folder.path() / "none"), HasSubstr("no such file"));
   EXPECT_THAT(refusal_of(folder.path()), HasSubstr("holds no photos"));
   write_file(folder.path() / "1.png", "this is a text");
-  EXPECT_THAT(refusal_of(folder.path()), HasSubstr("1.png: not a picture"));
+  EXPECT_THAT(refusal_of(folder.path()), HasSubstr("1.png: not an image"));
   write_image(folder.path() / "1.png", plain(10));
   write_image(folder.path() / "2.png", plain(10, CV_8U, {96, 81}));
   EXPECT_THAT(refusal_of(folder.path()), HasSubstr("2.png: is 96×81, the first frame is 96×80"));

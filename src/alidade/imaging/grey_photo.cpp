@@ -25,11 +25,11 @@ cv::Mat one_channel(const cv::Mat& photo) {
 cv::Mat to_grey_photo(const cv::Mat& photo, std::string& reason) {
   cv::Mat grey;
   if (photo.empty() || photo.dims != 2) {
-    reason = "there is no picture";
+    reason = "there is no image";
     return grey;
   }
   if (photo.rows < min_photo_side_px || photo.cols < min_photo_side_px) {
-    reason = "the picture is too small: " + std::to_string(photo.cols) + "×" + std::to_string(photo.rows);
+    reason = "the image is too small: " + std::to_string(photo.cols) + "×" + std::to_string(photo.rows);
     return grey;
   }
   if (photo.depth() == CV_8U) {
@@ -43,7 +43,7 @@ cv::Mat to_grey_photo(const cv::Mat& photo, std::string& reason) {
   double darkest = 0.0, brightest = 0.0;
   cv::minMaxLoc(grey, &darkest, &brightest);
   if (!(brightest > 0.0) || !(brightest < 1e30)) {
-    reason = brightest > 0.0 ? "the picture has values without limit" : "the picture is black";
+    reason = brightest > 0.0 ? "the image has values without limit" : "the image is black";
     return {};
   }
   grey.convertTo(grey, CV_32F, 255.0 / brightest);

@@ -108,7 +108,7 @@ TEST(ImageCodecs, SurviveBrokenFiles) {
     }
   }
   EXPECT_TRUE(decode_image("").empty());
-  EXPECT_TRUE(decode_image("not a picture").empty());
+  EXPECT_TRUE(decode_image("not an image").empty());
 }
 
 }  // namespace

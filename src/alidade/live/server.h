@@ -41,7 +41,7 @@ class Server {
   [[nodiscard]] std::uint16_t port() const;
 
   /// A message with its time, which `make` writes on the server's thread. Left out, and `make` not called, where its
-  /// topic has had its share of this second; `is_last` goes always. False: left out. From any thread.
+  /// topic has had its share of this second; `is_last` goes always. False: dropped. From any thread.
   bool send(std::string_view topic, std::int64_t t_ns, std::function<std::string()> make, std::size_t lane = 0,
             bool is_last = false);
   /// A line for every client.

@@ -30,7 +30,7 @@ struct MotionJacobians {
 };
 [[nodiscard]] MotionJacobians motion_jacobians(const CameraMotion& motion, double dt_s);
 
-/// Q = G diag((σ_a Δ)² I, (σ_α Δ)² I) Gᵀ: accelerations that are drawn anew for each Δ.
+/// Q = G diag((σ_a Δ)² I, (σ_α Δ)² I) Gᵀ: accelerations that are drawn again for each Δ.
 [[nodiscard]] MotionMatrix motion_noise(const MotionJacobians& jacobians, double sigma_a_m_s2,
                                         double sigma_alpha_rad_s2, double dt_s);
 

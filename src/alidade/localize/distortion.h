@@ -13,7 +13,7 @@ ALIDADE_PUBLIC_BEGIN
 /// three variants of Xu & Xu, "Underwater monocular localization with lens distortion".
 enum class DistortionVariant { none, radial1, full };
 
-/// The camera with that much distortion. None where the lens is no Brown lens and something would have to be left out.
+/// The camera with that much distortion. None where the lens is no Brown lens and something would have to be dropped.
 [[nodiscard]] std::optional<Camera> with_distortion(const Camera& camera, DistortionVariant variant);
 
 /// Their words: none, radial1, full.

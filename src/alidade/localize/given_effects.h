@@ -14,7 +14,7 @@ namespace alidade {
 /// How the state of a filter moves with what it takes as given: the lens, as far as it is not in the state, and the
 /// target's scale. The filter's gains are those of one that takes these as exact; what their covariance Σ adds to the
 /// state's is M Σ Mᵀ, with M = ∂state/∂given carried beside it: M ← F M in a prediction, M ← M − P⁺ Hᵀ R⁻¹ (H M + H_g)
-/// in an update, and as P where errors are counted anew (S. F. Schmidt, "Application of State-Space Methods to
+/// in an update, and as P where errors are counted again (S. F. Schmidt, "Application of State-Space Methods to
 /// Navigation Problems", 1966; here the gains do not know of it). What the innovations say of a given number falls out:
 /// with D = H M + H_g, score Dᵀ S⁻¹ ν = Dᵀ R⁻¹ r of what is left over, r, and information Dᵀ R⁻¹ (D + H (M⁺ − M)).
 /// Allocates nothing after its construction.
@@ -44,7 +44,7 @@ class GivenEffects {
   void add(int offset, const NewFeature& made, std::span<const int> estimated);
   void remove(int offset, int count, int dim);  ///< `dim` before.
   void make_place(int offset, const Eigen::Matrix<double, 3, 6>& J);
-  void forget_motion();  ///< Of a camera that is placed anew; and what was scored.
+  void forget_motion();  ///< Of a camera that is placed again; and what was scored.
   /// As StateCovariance::turn() and shear().
   void turn(const double* blocks, int stride, int single_at, int num_single, int dim);
   void shear(int at, const double* K, int stride, int dim);

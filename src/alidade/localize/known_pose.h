@@ -10,7 +10,7 @@ namespace alidade {
 
 /// Where a camera is that sees these known points, which lie in a plane (or nearly): both poses that a flat target
 /// nearly has, by maximum likelihood, the better one first, with their covariance; speeds zero with these σ. Of more
-/// than four points those that do not fit are left out. Empty where fewer than four are seen, they are on a line, or
+/// than four points those that do not fit are rejected. Empty where fewer than four are seen, they are on a line, or
 /// no pose fits (χ² beyond 99.9 %): observations that show another place.
 struct KnownPoseConfig {
   double sigma_px = 0.5;

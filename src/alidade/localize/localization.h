@@ -134,7 +134,7 @@ struct Localization {
   std::vector<GivenNumber> given;  ///< What was given, and what it does.
   double lens_pull = 0.0;          ///< Of a lens that was estimated: how far from what was given, in the given σ.
 
-  Counts counts;  ///< Of frames, and rows that were left out.
+  Counts counts;  ///< Of frames, and rows that were rejected.
   std::vector<Assumption> assumed;
   Verdict verdict;
 };

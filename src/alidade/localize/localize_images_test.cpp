@@ -192,7 +192,7 @@ TEST(LocalizeImages, FindsPointsByTheirPatches) {
   EXPECT_LT(report.error.unaligned_m, 0.01);  // its points are found to a tenth of a pixel: 1 mm of 0.7 m, and drift
 }
 
-/// Observations that contradict each other for a third of a second: the path begins anew instead of following them.
+/// Observations that contradict each other for a third of a second: the path begins again instead of following them.
 TEST(LocalizeImages, BeginsAnewWhereItsObservationsContradictIt) {
   LocalizeConfig config = by_hand();
   Draws draws(3);

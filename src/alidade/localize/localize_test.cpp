@@ -214,7 +214,7 @@ TEST(Localize, LeavesAPoseThatFitsItsOwnMapButNotTheTarget) {
   EXPECT_EQ(leaves.num_restarts, 1u);
   const Rigid3 &is = leaves.path.back().world_from_cam, &was = sample.truth.back().world_from_cam;
   EXPECT_LT((is.translation - was.translation).norm(), 0.02);
-  EXPECT_LT(leaves.error.unaligned_m, 0.02);  // the frames before are solved anew, from the map after them
+  EXPECT_LT(leaves.error.unaligned_m, 0.02);  // the frames before are solved again, from the map after them
   EXPECT_EQ(leaves.num_unexplained, 0u);
 }
 

@@ -130,7 +130,7 @@ void add_residuals(const Localization& report, Verdict& verdict) {
   const ResidualStructure& residuals = report.residuals;
   constexpr double care_px_share = 0.2;  // of σ: less is seen in long recordings and moves nothing
   if (residuals.place_chi2 > 2.0 * residuals.place_limit && residuals.worst_px > care_px_share * report.sigma_px)
-    verdict.checks.push_back({"place in the picture", State::care,
+    verdict.checks.push_back({"place in the image", State::care,
                               "residuals depend on the position in the image, " + text_of(residuals.worst_px, 2) +
                                   " px in the " + residuals.worst_place + ": the lens is not as given",
                               residuals.place_chi2, 2.0 * residuals.place_limit, "1", "nis"});
@@ -246,7 +246,7 @@ Verdict localize_verdict(const Localization& report) {
     return stopped(State::refused, ExitCode::cannot_tell,
                    "lost: " + std::to_string(report.num_lost) + " of " + std::to_string(num_frames) +
                        " frames have fewer than three points that fit",
-                   "track more points, and keep the target in sight for longer");
+                   "track more points, and keep the target in observation for longer");
   if (report.is_behind && report.is_board)
     return stopped(State::refused, ExitCode::cannot_tell,
                    "mirrored: the observations put the camera behind the printed side of the board",

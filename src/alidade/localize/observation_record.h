@@ -12,7 +12,7 @@ namespace alidade {
 /// Where a run began, and when points entered its map: for smoothing the path at the end.
 class ObservationRecord {
  public:
-  /// The path begins at this frame, for the first time or anew.
+  /// The path begins at this frame, for the first time or again.
   void begin(std::size_t frame);
   /// A point that comes back was born when it entered first: its range now is what it said before.
   void entered(std::size_t frame, long id, const RangePrior& prior, bool comes_back) {
@@ -22,8 +22,8 @@ class ObservationRecord {
 
   /// All that was seen since the path began, with the filter's map to begin at. Backwards from the last frame, each
   /// pose is the one that explains most of the map's observations: the filter's, that of the frame after it, or one of
-  /// the target's alone; so that what a filter took for its pose before it began anew is forgotten, and frames before
-  /// it began at all are placed as far as the map is seen in them. Points that are not nearly linear yet are left out:
+  /// the target's alone; so that what a filter took for its pose before it began again is forgotten, and frames before
+  /// it began at all are placed as far as the map is seen in them. Points that are not nearly linear yet are rejected:
   /// they tell little, and what they tell is not Gaussian. `gone`: points that left a full filter; their observations
   /// are used, too. None where no known point was seen, or the work would be out
   /// of proportion.

@@ -31,7 +31,7 @@ struct ObservationFrame {
   std::vector<FeatureObservation> observations;
 };
 
-/// Frames in order of time, also those in which nothing was seen, and rows of their table that were left out.
+/// Frames in order of time, also those in which nothing was seen, and rows of their table that were rejected.
 struct ObservationTable {
   std::vector<ObservationFrame> frames = {};
   std::vector<SkippedInput> skipped = {};

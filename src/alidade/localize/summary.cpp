@@ -67,7 +67,7 @@ void take_over(const SmoothedPath& smoothed, Localization& result) {
   result.is_from_one_place = smoothed.is_from_one_place;
   result.camera = smoothed.camera;
   result.sigma_lens = smoothed.sigma_lens;
-  if (result.num_restarts > 0) {  // what the filter left out before it began anew is no longer left out
+  if (result.num_restarts > 0) {  // what the filter rejected before it began again is no longer rejected
     result.num_used = smoothed.residuals.size();
     result.num_gated = smoothed.num_dropped;
     result.nis_per_dof = smoothed.chi2_per_dof;

@@ -116,7 +116,7 @@ void check_scene(const ServoScene& scene, Faults& found) {
     found.push_back(
         fmt::format("duration_s: {} is not longer than the warm-up of {} s", scene.duration_s, scene.warm_up_s));
   if (scene.latency_s > 200.0 * scene.period_s)
-    found.push_back(fmt::format("latency_s: {} is more than 200 pictures late", scene.latency_s));
+    found.push_back(fmt::format("latency_s: {} is more than 200 images late", scene.latency_s));
   for (const auto& [from, to] : scene.hidden_s)
     if (!(from < to)) found.push_back(fmt::format("hidden_s: {} is not before {}", from, to));
   const ZoomProfile& zoom = scene.zoom;

@@ -62,7 +62,7 @@ void add_checks(const ServoScenario& scenario, const ServoStudy& study, Verdict&
   const double asked = scenario.specification_px;
   add("specification", best.rms_px <= asked, text_of(best.rms_px) + " px RMS of " + text_of(asked) + " px asked for",
       best.rms_px, asked, "px");
-  add("in the picture", best.in_image >= 1.0, text_of(100.0 * best.in_image) + " % of the time in the image",
+  add("in the image", best.in_image >= 1.0, text_of(100.0 * best.in_image) + " % of the time in the image",
       best.in_image, 1.0, "1");
   if (best.num_lost > 0)
     add("lost", false,

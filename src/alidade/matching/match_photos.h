@@ -18,7 +18,7 @@ struct PhotoMatches {
 };
 
 /// Features of all photos, on all cores that TBB is allowed, and their matches, each pair of photos. Photos of another
-/// size than most are left out and named. `load_photo` is called from several threads; what it throws becomes the
+/// size than most are rejected and named. `load_photo` is called from several threads; what it throws becomes the
 /// photo's reason. Throws Interrupted.
 [[nodiscard]] PhotoMatches match_photos(const std::vector<std::string>& names,
                                         const std::function<cv::Mat(std::size_t)>& load_photo,

@@ -30,7 +30,7 @@ using Pulls = std::map<std::pair<std::size_t, std::size_t>, Pull>;  ///< By bloc
 
 struct Gathered {
   Pulls pulls;
-  std::vector<MatrixXd> lens_pull;  ///< Kᵀ by the lens, one a head.
+  std::vector<MatrixXd> lens_pull;  ///< Kᵀ by the lens, one per head.
 };
 
 /// Derivatives of an observation by the lens [px].

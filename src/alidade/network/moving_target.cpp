@@ -291,7 +291,7 @@ void set_scale(Placing& work, const TrueTrack& truth) {
   report.status = PlacedStatus::placed;
 }
 
-/// The start of a second solve: what the first one found, the path and its observations anew. The knots, the
+/// The start of a second solve: what the first one found, the path and its observations again. The knots, the
 /// observations that are taken and the loose path no longer depend on how the search for a start went.
 void restart(Placing& work) {
   const MovingState& state = work.solved.state;

@@ -164,7 +164,7 @@ TEST(MovingTarget, CamerasAreWhereTheyAreWithinTheirCovariance) {
     EXPECT_EQ(moving_target_verdict(report, config).state, State::good);
     for (std::size_t c = 1; c < 3; ++c) {
       const auto at = static_cast<Eigen::Index>(num_head_params * c);
-      // The distance is held: its direction has no variance, and is left out by the pseudo-inverse.
+      // The distance is held: its direction has no variance, and is dropped by the pseudo-inverse.
       const Eigen::Matrix<double, 6, 6> cov = report.rig.cov.block<6, 6>(at, at);
       const SymmetricEigen eigen = symmetric_eigen(cov);
       const Eigen::Matrix<double, 6, 1> along = eigen.vectors.transpose() * error_of(report, scene, c);
@@ -246,7 +246,7 @@ TEST(MovingTarget, WhatIsAddedToTimesMovesNothing) {
   }
 }
 
-/// One label in twenty is of something else: they are left out, and σ holds.
+/// One label in twenty is of something else: they are rejected, and σ holds.
 TEST(MovingTarget, FalseLabelsAreFound) {
   double sum = 0.0, num = 0.0, false_used = 0.0, num_false = 0.0;
   for (unsigned seed = 21; seed <= 26; ++seed) {

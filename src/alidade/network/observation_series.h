@@ -22,7 +22,7 @@ struct ObservationSeries {
   [[nodiscard]] std::optional<Eigen::Vector2d> seen_at(double time_s) const;
 };
 
-/// Series of one head; rays that look back (z below 0.1) are left out.
+/// Series of one head; rays that look back (z below 0.1) are rejected.
 [[nodiscard]] ObservationSeries observation_series(std::span<const TargetObservation> observations, std::size_t head,
                                                    const RigHead& rig_head);
 

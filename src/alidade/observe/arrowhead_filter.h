@@ -18,7 +18,7 @@ class ArrowheadFilter {
 
   /// Begins with a bundle's solution. Points that it does not know join when they are seen.
   void start(const BundleSolution& solution, const std::vector<int>& bundle_point_of, double sigma_px);
-  void forget_points();  ///< A new segment: points are met anew, what they have in common stays.
+  void forget_points();  ///< A new segment: points are met again, what they have in common stays.
   void forget_point(std::size_t i) { points_[i].known = false; }
   /// From now on this point's pixels have so many times their variance.
   void distrust(std::size_t i, double factor) { points_[i].variance_factor = factor; }
@@ -26,11 +26,11 @@ class ArrowheadFilter {
   /// The intrinsics are about to change, the points are not: keeps fx, fy, cx, cy as the points were learnt with as
   /// further common parameters, so that what the points have in common stays in common. Once; later calls do nothing.
   void remember_intrinsics();
-  /// The common parameters walk: variances added, in the layout's order; `turn` is drawn anew where `turn_sigma` > 0.
+  /// The common parameters walk: variances added, in the layout's order; `turn` is drawn again where `turn_sigma` > 0.
   void predict(const CommonVector& variance, double turn_sigma_rad);
   /// Takes up a frame: innovations of all known points that were seen. `px` normalised, NaN: not seen.
   void observe(const RotationFrame& frame, std::span<const Eigen::Vector2d> px);
-  /// Innovations are of so many points; point `i` (a place in this list) can be left out.
+  /// Innovations are of so many points; point `i` (a place in this list) can be rejected.
   [[nodiscard]] std::size_t num_seen() const { return num_seen_; }
   [[nodiscard]] int seen_point(std::size_t i) const { return seen_[i].point; }
   void leave_out(std::size_t i, bool out) {
@@ -39,7 +39,7 @@ class ArrowheadFilter {
   }
   [[nodiscard]] bool is_left_out(std::size_t i) const { return seen_[i].left_out; }
   [[nodiscard]] int dof() const;
-  /// Normalised innovation squared of the points not left out.
+  /// Normalised innovation squared of the points not rejected.
   [[nodiscard]] double nis();
   /// The same with `variance` added to the common parameters before, and how they would move.
   struct Walk {
@@ -53,7 +53,7 @@ class ArrowheadFilter {
   void add_score(Eigen::Vector4d& score, Eigen::Matrix4d& information);
   /// One point's share of it, as if the common parameters were known: Gᵀ R⁻¹ ν and Gᵀ R⁻¹ G.
   void add_own_score(std::size_t i, Eigen::Vector4d& score, Eigen::Matrix4d& information) const;
-  /// Takes the innovations in, but those left out; new points join. After `observe`, once.
+  /// Takes the innovations in, but those rejected; new points join. After `observe`, once.
   void update();
   /// Takes a range of a known point in. False: it does not fit (beyond 4 σ), or the point has no depth.
   bool update_range(const RotationFrame& frame, std::size_t point, double range_m, double sigma_range_m);
@@ -98,10 +98,10 @@ class ArrowheadFilter {
   std::size_t num_seen_ = 0;
   RotationFrame frame_;
   std::span<const Eigen::Vector2d> px_;
-  CommonMatrix information_;  ///< Σ Gᵀ R⁻¹ G of those not left out.
+  CommonMatrix information_;  ///< Σ Gᵀ R⁻¹ G of those not rejected.
   CommonVector gradient_;     ///< Σ Gᵀ R⁻¹ ν.
   double squares_ = 0.0;      ///< Σ νᵀ R⁻¹ ν.
-  bool is_summed_ = false;    ///< The three sums are of what is not left out now.
+  bool is_summed_ = false;    ///< The three sums are of what is not rejected now.
 };
 
 }  // namespace alidade

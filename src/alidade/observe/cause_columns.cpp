@@ -78,7 +78,7 @@ void CauseColumns::add_lens() {
   static constexpr const char* names[] = {"k1", "k2", "k3", "p1", "p2"};
   for (const char* name : names) columns_.push_back({name, "", name[0] == 'k' ? usual_k : usual_p});
   const bool is_free[] = {base_.k1 >= 0, base_.k2 >= 0, base_.k3 >= 0, base_.tangential >= 0, base_.tangential >= 0};
-  // Each alone, the radial ones together, all: what is free already is left out.
+  // Each alone, the radial ones together, all: what is free already is omitted.
   constexpr std::pair<int, int> ranges[] = {{0, 1}, {1, 2}, {2, 3}, {3, 5}, {0, 2}, {0, 3}, {0, 5}};
   for (const auto& [from, until] : ranges) {
     Group group;

@@ -71,7 +71,7 @@ IntrinsicsEstimate FangObserver::step(const RotationFrame& frame) {
   return estimate(has_started_ && !had_started ? ObserveEvent::start : ObserveEvent::none);
 }
 
-/// False: nothing is seen. A new reference means new differences: every point begins anew.
+/// False: nothing is seen. A new reference means new differences: every point begins again.
 bool FangObserver::choose_reference(const RotationFrame& frame) {
   if (has_reference_ && is_seen(frame.px[reference_])) return true;
   has_reference_ = false;

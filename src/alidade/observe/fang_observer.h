@@ -62,7 +62,7 @@ class FangObserver {
   explicit FangObserver(const FangConfig& config);
 
   /// No value until both 1/fx and 1/fy have come above 1/20 in scaled pixels. σ is NaN but for `kalman`. A point that
-  /// was not seen begins anew where it is seen next; so do all at the start of a segment and when the reference is
+  /// was not seen begins again where it is seen next; so do all at the start of a segment and when the reference is
   /// lost. θ stays. A frame without a step in time changes nothing.
   IntrinsicsEstimate step(const RotationFrame& frame);
 

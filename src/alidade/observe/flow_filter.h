@@ -34,8 +34,8 @@ class FlowFilter {
  public:
   explicit FlowFilter(const FlowFilterConfig& config);
 
-  /// A point that was not seen begins anew where it is seen next; so do all at the start of a segment. Θ stays. A frame
-  /// without a step in time changes nothing.
+  /// A point that was not seen begins again where it is seen next; so do all at the start of a segment. Θ stays. A
+  /// frame without a step in time changes nothing.
   IntrinsicsEstimate step(const RotationFrame& frame);
 
   /// Θ̂, before the projection.

@@ -28,7 +28,7 @@ FlowFilterConfig flow_config(std::size_t num_points = 4, bool roll_columns = tru
 // --- the joint filter -----------------------------------------------------------------------------------------------
 
 /// The same filter as textbooks have it: one state [ξ; Θ], one covariance, Joseph's form. A point that was not seen is
-/// taken out and put in anew.
+/// taken out and put in again.
 class DenseFlowFilter {
  public:
   explicit DenseFlowFilter(const FlowFilterConfig& config)

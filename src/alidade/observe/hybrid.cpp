@@ -10,7 +10,7 @@ namespace alidade {
 namespace {
 
 constexpr double zoom_gain = 33.4;  // χ²₄ at 10⁻⁶: what a change of K explains that chance does not
-constexpr int slip_patience = 15;   // frames until a point that slipped is met anew
+constexpr int slip_patience = 15;   // frames until a point that slipped is met again
 constexpr double slipped_variance = 25.0;
 constexpr double restart_after_s = 1.0;  // without a frame that fits
 constexpr double better_by = 9.2;        // χ²₂ at 0.01
@@ -230,7 +230,7 @@ void HybridObserver::note_slips() {
   }
 }
 
-/// The point is met anew; if it slips again, later and later.
+/// The point is met again; if it slips again, later and later.
 void HybridObserver::renew(std::size_t point) {
   filter_.forget_point(point);
   filter_.distrust(point, slipped_variance);  // what slipped once may not stand still now either
@@ -286,7 +286,7 @@ HybridObserver::Judgement HybridObserver::judge() {
 }
 
 /// Leaves out the worst points one by one until the rest fits: a slip. At most a third of them (one of three or four).
-/// False, with none left out: that is not it.
+/// False, with none rejected: that is not it.
 bool HybridObserver::leave_out_until(double z, Judgement& judgement) {
   const std::size_t seen = filter_.num_seen();
   const std::size_t most = seen < 3 ? 0 : std::max<std::size_t>(seen / 3, 1);

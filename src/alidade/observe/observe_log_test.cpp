@@ -85,7 +85,7 @@ TEST(ObserveLog, NoisyRotationIsEstimatedWithTheRest) {
   EXPECT_GE(static_cast<double>(inside) / counted, 0.954 - 3.0 * std::sqrt(0.954 * 0.046 / counted));
 }
 
-/// Rates were lost for a second: the rotation across it is not known, the points are met anew, the estimate goes on.
+/// Rates were lost for a second: the rotation across it is not known, the points are met again, the estimate goes on.
 TEST(ObserveLog, AGapOfTheRatesBeginsASegmentAndNothingBreaks) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     RotationLogConfig log_config;

@@ -13,7 +13,7 @@
 namespace alidade {
 namespace {
 
-/// Pan, tilt [rad] and focal length [px] of a real broadcast camera, a row a frame.
+/// Pan, tilt [rad] and focal length [px] of a real broadcast camera, one row per frame.
 struct BroadcastMotion {
   std::vector<double> pan_rad, tilt_rad, f_px;
   double rate_hz = 30.0;

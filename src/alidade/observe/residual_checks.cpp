@@ -54,7 +54,7 @@ Check noise_check(const ObserveSolution& report) {
 Check left_out_check(const ObserveSolution& report) {
   const auto out = static_cast<double>(report.pixels_rejected);
   const double all = out + static_cast<double>(report.reference.bundle.observations.size());
-  Check check{"left out", State::good, "", all > 0.0 ? 100.0 * out / all : 0.0, 100.0 * many_left_out,
+  Check check{"rejected", State::good, "", all > 0.0 ? 100.0 * out / all : 0.0, 100.0 * many_left_out,
               "%",        "residuals"};
   check.text = text_of(check.value, 2) + " % of the pixels were rejected";
   if (check.value > 100.0 * many_left_out) {
@@ -126,7 +126,7 @@ Check lasting_check(const ObserveSolution& report) {
   return check;
 }
 
-/// Do the residuals of a frame turn together? An encoder's or a gyroscope's noise, which every row has anew.
+/// Do the residuals of a frame turn together? An encoder's or a gyroscope's noise, which every row has again.
 Check jitter_check(const ObserveSolution& report) {
   constexpr double more_than_pixels = 3.0;
   const TurnJitter& jitter = report.jitter;

@@ -21,7 +21,7 @@ struct ObserveNuisances {
   int errors = 0;           ///< Errors of the measured rotation, so many: RotationFrame::turn_by.
   bool learnt =
       false;  ///< fx, fy, cx, cy with which the points were learnt, before a zoom: they know nothing of the new ones.
-  bool turn = false;  ///< Error of the measured rotation, 3 angles; one a frame in a bundle, of now in a filter.
+  bool turn = false;  ///< Error of the measured rotation, 3 angles; one per frame in a bundle, of now in a filter.
 };
 
 inline constexpr int max_common = 25 + max_rotation_errors;  ///< Of ObserveNuisances with everything.

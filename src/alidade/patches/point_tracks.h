@@ -15,7 +15,7 @@ struct PointTrackerConfig {
   double max_return_px = 0.3;  ///< A point followed back must end this close to where it came from.
   double max_sigma_px = 0.15;  ///< Points that would be seen less sharply are not begun, and dropped.
   double min_likeness = 0.8;   ///< Correlation with the patch as it was first seen.
-  double max_stretch = 1.3;    ///< Longer or shorter by more than this, the patch is cut out anew.
+  double max_stretch = 1.3;    ///< Longer or shorter by more than this, the patch is cut out again.
 };
 
 /// Where a point is seen in a frame.
@@ -37,7 +37,7 @@ class PointTracker {
   PointTracker& operator=(PointTracker&&) noexcept;
   ~PointTracker();
 
-  /// The next frame: one channel, 8 bits or 32-bit float of 0 to 255. An image of another size begins anew.
+  /// The next frame: one channel, 8 bits or 32-bit float of 0 to 255. An image of another size begins again.
   /// Returns what is seen in it, by id; the first frame's points are where they were chosen.
   const std::vector<TrackedPoint>& update(const cv::Mat& grey);
 

@@ -44,7 +44,7 @@ bool is_cause(const Explained& by, const Explained& as_given) {
   return by.fits && by.known && by.spare * std::log(as_given.rms_m / by.rms_m) > std::log(num_causes / chance);
 }
 
-/// The ranges of one row after (1) or before (−1); the row without one is left out.
+/// The ranges of one row after (1) or before (−1); the row without one is rejected.
 std::vector<Shot> shifted(std::span<const Shot> shots, int by) {
   std::vector<Shot> moved;
   for (std::size_t i = 0; i < shots.size(); ++i) {

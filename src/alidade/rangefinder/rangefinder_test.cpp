@@ -131,7 +131,7 @@ TEST(Rangefinder, UsesEachShotForWhatItHas) {
   double sum_mixed = 0.0, sum_full = 0.0;
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     RangefinderSceneConfig scene = *rangefinder_scenario("reference");
-    scene.max_range_m = 2.5;  // farther, a board may be taken for its mirror image, and without its spot is left out
+    scene.max_range_m = 2.5;  // farther, a board may be taken for its mirror image, and without its spot is rejected
     auto sample = draw_rangefinder_sample(scene, {}, seed);
     for (std::size_t i = 6; i < 18; ++i) {
       if (i < 12) sample.simulated.shots[i].spot.reset();

@@ -33,7 +33,7 @@ struct ReducedSystem {
 };
 
 /// At `state`; `held_prior`: the lens' prior where the lens was free, one without parameters where it was held. Shots
-/// that have nothing to compare there are left out.
+/// that have nothing to compare there are omitted.
 [[nodiscard]] ReducedSystem reduced_system(const BeamProblem& problem, const LensPrior& held_prior,
                                            const CommonState& state);
 

@@ -96,7 +96,7 @@ JsonValue object_schema(const std::vector<ResultName>& names, bool all_numbers =
   return value;
 }
 
-/// Tables: columns are lists of one length, beside `thinned` where rows were left out.
+/// Tables: columns are lists of one length, beside `thinned` where rows were omitted.
 JsonValue tables_schema(std::vector<ResultName> columns) {
   std::vector<ResultName> names;
   std::string table;

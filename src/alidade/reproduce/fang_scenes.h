@@ -23,8 +23,8 @@ inline constexpr double paper_sigma_px = 0.31622776601683794;  ///< √0.1: "var
 /// Points that stand still, seen by the paper's camera and motion.
 [[nodiscard]] RotationScene paper_scene(std::vector<Eigen::Vector2d> start_px);
 
-/// Points, each anywhere 60 px inside the edges; a set with a triangle less than 40 px high is drawn anew as a whole.
-/// (draw_points() draws the last point anew, and gets more sets that are crowded.)
+/// Points, each anywhere 60 px inside the edges; a set with a triangle less than 40 px high is drawn again as a whole.
+/// (draw_points() draws the last point again, and gets more sets that are crowded.)
 [[nodiscard]] std::vector<Eigen::Vector2d> draw_set(std::uint64_t seed, int num_points = 4);
 
 /// The paper's noise: of x of the first and third point, of y of the second and fourth.

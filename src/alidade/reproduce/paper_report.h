@@ -74,7 +74,7 @@ struct PaperReport {
 struct ReproduceConfig {
   std::uint64_t seed = 1;  ///< Another one draws other points, noise and boards.
   bool quick = false;      ///< Fewer draws.
-  /// A clock in seconds, for tables of times. None: times are left out.
+  /// A clock in seconds, for tables of times. None: times are omitted.
   std::function<double()> clock_s = {};
   Progress progress = {};
 };

@@ -57,7 +57,7 @@ struct ProtocolRun {
   Eigen::VectorXd sigma_lens;
 };
 
-/// As `alidade localize` does it. The paper's filter (no gate) never begins anew.
+/// As `alidade localize` does it. The paper's filter (no gate) never begins again.
 [[nodiscard]] ProtocolRun run_protocol(const UnderwaterSample& sample, const Camera& camera,
                                        const LocalizationFilterConfig& filter, const FilterBankConfig& bank_config,
                                        FeatureKind kind);

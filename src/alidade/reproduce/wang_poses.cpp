@@ -74,7 +74,7 @@ Claim spot_is_better(const BeamErrorTable& table) {
       reprojection,     pooled_ratio(table, joint_global, plane_global, &BeamErrors::reprojection_px)};
   claim.holds = reprojection >= 1.0 ? Holds::not_reproducible : position < 0.9 ? Holds::reproduced : Holds::in_shape;
   claim.words = fmt::format(
-      "Much better where the spot is seen in the picture; the origin is not ({:.2f} of the other's "
+      "Much better where the spot is seen in the image; the origin is not ({:.2f} of the other's "
       "error): method 2 tells its place along the beam better, method 1 across it.",
       position);
   claim.figure = "7";
@@ -114,7 +114,7 @@ Experiment wang_poses(const ReproduceConfig& config) {
       "without (lens and boards held) and with global optimisation, and ours (both kinds of measurement together).",
       "The paper does not say its noise: readings 1 mm, corners 0.1 px, spots 0.3 px, lens known to 1.5, 1.5, 2, 2 px. "
       "With readings of 2 mm method 2 needs 24 poses and more for 3 px. What the captions leave open: the error of "
-      "figures 7 and 8 is taken in the picture, that of figure 9 in space; figure 8 at 18 poses. Of what these figures "
+      "figures 7 and 8 is taken in the image, that of figure 9 in space; figure 8 at 18 poses. Of what these figures "
       "show no value is printed."};
   experiment.claims = {within_3px(table, spot_global, at_14, "method1-from-14", "7"),
                        within_3px(table, plane_global, at_18, "method2-from-18", "7"), improves_beyond_15(table),

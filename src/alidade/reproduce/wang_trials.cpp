@@ -81,7 +81,7 @@ FigureTable figure_6(const ReproduceConfig& config) {
   }
   figure.title = "Actual and computed position of the laser spot";
   figure.caption =
-      "12 shots that were not calibrated with. Left: where the spot is found in the picture (0.3 px), and where the "
+      "12 shots that were not calibrated with. Left: where the spot is found in the image (0.3 px), and where the "
       "beam of 18 other shots puts it at the reading (1 mm). Right: computed minus actual.";
   return figure;
 }

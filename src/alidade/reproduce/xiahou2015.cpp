@@ -43,13 +43,13 @@ std::vector<Claim> pixel_claims() {
   const Eigen::Vector3d target_m = paper_target_cm / 100.0, step_m(baseline_cm() / 100.0, 0.0, 0.0);
   const double off_px = std::max((pixel_of(0, target_m) - middle).norm(), (pixel_of(1, target_m) - middle).norm());
   Claim centred{"geometry-middle",
-                "both cameras look at the target at the start: distance from the middle of the picture", "px",
+                "both cameras look at the target at the start: distance from the middle of the image", "px",
                 not_a_number, off_px};
   centred.holds = off_px <= 1.0 ? Holds::reproduced : Holds::not_reproducible;
   centred.words =
       "Pan > 0 turns left and tilt > 0 up on both heads, Y points down; angles are printed to 0.1°, 0.6 px.";
   Claim second{"geometry-second-image",
-               "u of the target in the second picture by (11) and (12), which should be the middle, 160",
+               "u of the target in the second image by (11) and (12), which should be the middle, 160",
                "px",
                not_a_number,
                pixel_of(1, target_m + 2.0 * step_m).x(),
@@ -57,7 +57,7 @@ std::vector<Claim> pixel_claims() {
   second.holds = near_to(second.rerun, 160.0, 0.02);
   second.words =
       "(12) adds the baseline, X + T; the camera stands at T, so that it must be X - T. As printed the target is far "
-      "outside a picture of 320 px.";
+      "outside an image of 320 px.";
   return {centred, second};
 }
 

@@ -149,13 +149,13 @@ Experiment xiahou_loop(const ReproduceConfig& config) {
   for (const ServoRow& row : ours.rows)
     if (row.head == 0)
       ours_most = std::max(ours_most, std::abs(row.measured_rad.x() - ours.rows.front().measured_rad.x()) / degree);
-  Claim fed_back{"loop-fed-back", "what is fed back stays in the central third of both pictures", "%", not_a_number,
+  Claim fed_back{"loop-fed-back", "what is fed back stays in the central third of both images", "%", not_a_number,
                  shares.fed_back_percent};
   fed_back.holds = near_to(fed_back.rerun, 100.0, 0.01);
   fed_back.words =
       "It would wherever the target is: the estimate is projected with the angles that it was computed from.";
   Claim follows{"loop-follows",
-                "the loop as printed keeps the target in the central third of both pictures",
+                "the loop as printed keeps the target in the central third of both images",
                 "%",
                 not_a_number,
                 shares.true_percent,
@@ -175,7 +175,7 @@ Experiment xiahou_loop(const ReproduceConfig& config) {
       "loop",
       "Figure 2: the loop as printed",
       "Angles with d1 to d4 added give the tangents of the measurement; the filter (Q = I6) takes them; its estimate, "
-      "projected with the same angles, is what the PI controllers compare with the middle of the picture.",
+      "projected with the same angles, is what the PI controllers compare with the middle of the image.",
       "d1 to d4: white, 0.5°; the paper does not say what they are. Plant in degrees, error in pixels, circle of 10 "
       "cm in 10 s, which enters nowhere but in the true image.",
       {fed_back, follows, moves},

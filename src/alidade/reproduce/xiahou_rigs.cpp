@@ -46,7 +46,7 @@ Experiment xiahou_realistic(const ReproduceConfig& config) {
       "rigs", "The same on rigs as they are built",
       "Pixels with noise of 0.5 px, encoders with 0.05°, heads that follow the target with the 0.34 s that the paper's "
       "loop "
-      "has, 20 pictures a second. The paper's filter takes the target to be where both axes point; ours takes the "
+      "has, 20 images a second. The paper's filter takes the target to be where both axes point; ours takes the "
       "measured "
       "pixels, the heads as they are mounted, and the capture times. RMS of the position after half a second, and the "
       "posterior Cramér–Rao bound of the same trajectory and model of motion.",

@@ -71,7 +71,7 @@ Experiment xiahou_servo(const ReproduceConfig& config) {
                      fast_pi = figures_of(config, fast, ControllerKind::pi),
                      fast_best = figures_of(config, fast, ControllerKind::feedforward);
   Claim middle{"servo-middle",
-               "the target stays in the central third of both pictures",
+               "the target stays in the central third of both images",
                "%",
                not_a_number,
                100.0 * pi.central_third,

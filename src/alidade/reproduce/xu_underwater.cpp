@@ -219,7 +219,7 @@ std::vector<Claim> claims_from_images(const Trials& trials) {
   const Gains corner = gains_of(trials.ours, &ProtocolRun::p1_mean),
               best_corner = gains_of(trials.best, &ProtocolRun::p1_mean);
   Claim whole{"pictures-distortion",
-              "from pictures, distortion in the model pays: error of point 1 with the whole lens over the pinhole's",
+              "from images, distortion in the model pays: error of point 1 with the whole lens over the pinhole's",
               "",
               not_a_number,
               corner.full / corner.pinhole,
@@ -234,12 +234,12 @@ std::vector<Claim> claims_from_images(const Trials& trials) {
       quantile_of(trials.observations_rms_px, 0.5), quantile_of(trials.observations_chi2, 0.5));
   Claim higher = higher_order_improves(corner, best_corner);
   higher.id = "pictures-higher-order";
-  higher.quantity = "from pictures, a higher order still improves: the same over first order";
+  higher.quantity = "from images, a higher order still improves: the same over first order";
   higher.words = fmt::format(
       "Camera in the last frame {:.0f}, {:.0f}, {:.0f} mm off.", median_of(trials.ours[0], &ProtocolRun::camera_mm),
       median_of(trials.ours[1], &ProtocolRun::camera_mm), median_of(trials.ours[2], &ProtocolRun::camera_mm));
   std::vector<Claim> claims{
-      whole, falls_with_frames(trials, "pictures-fall-with-frames", "from pictures, the error falls with the frames"),
+      whole, falls_with_frames(trials, "pictures-fall-with-frames", "from images, the error falls with the frames"),
       higher};
   for (Claim& claim : claims) claim.figure = "10_pictures";
   return claims;
@@ -252,8 +252,9 @@ Experiment from_points(const Trials& trials) {
       "A camera under water before a board of 9×7 squares of 28 mm; eight of its vertices are tracked in 35 frames, "
       "2, 4, 6 and 8 known beforehand, 1, 3, 5 and 7 begun on their first ray with a depth that is 3 % off. The "
       "paper's filter (an iterated extended Kalman filter on position, attitude, velocity, rate and places, all "
-      "sights of a frame at once) runs with a pinhole, with k1 alone, and with the whole lens; ours (inverse depths, "
-      "sights in order, several starts) beside it. Error: 100 |y' - y| over the distance from the first camera.",
+      "observations of a frame at once) runs with a pinhole, with k1 alone, and with the whole lens; ours (inverse "
+      "depths, "
+      "observations in order, several starts) beside it. Error: 100 |y' - y| over the distance from the first camera.",
       "The path, fx 768, fy 766, cx 389, cy 284 and the 3 % are ours: the paper's are not in its text. Pixel noise "
       "0.5 px.",
       claims_from_points(trials),
@@ -263,10 +264,10 @@ Experiment from_points(const Trials& trials) {
 Experiment from_images(const Trials& trials) {
   return {
       "figure10-pictures",
-      "Figure 10 from rendered pictures",
-      "The same paths, but each frame is a rendered picture of the board through turbid water: attenuated by "
+      "Figure 10 from rendered images",
+      "The same paths, but each frame is a rendered image of the board through turbid water: attenuated by "
       "Beer–Lambert along each pixel's ray, veiled, blurred (1 px), with noise (4 of 255). The eight points are what "
-      "`find_board` finds in it, each picture by itself; the filters are the same.",
+      "`find_board` finds in it, each image by itself; the filters are the same.",
       "Attenuation 1.2, 0.5, 0.45 per metre (red, green, blue), a wall behind the board, one more square all round "
       "it so that its outermost vertices are corners. The filters take the 0.5 px of the points, though the corners "
       "are better.",

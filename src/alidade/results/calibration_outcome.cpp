@@ -84,7 +84,7 @@ void summarize(const Calibration& calibration, std::vector<std::string>& lines) 
       if (fit.used) continue;
       const std::string what = fit.residual_px.allFinite() ? fmt::format("is {:.2f} px off", fit.residual_px.norm())
                                                            : "lies where this lens sees nothing";
-      lines.push_back(fmt::format("left out: {}: corner {} {}", views[k].photo, views[k].corners[i].index, what));
+      lines.push_back(fmt::format("rejected: {}: corner {} {}", views[k].photo, views[k].corners[i].index, what));
     }
   }
   const auto names = param_names(report.camera.lens);
@@ -98,7 +98,7 @@ void summarize(const Calibration& calibration, std::vector<std::string>& lines) 
   }
   const auto used =
       std::count_if(report.views.begin(), report.views.end(), [](const ViewFit& fit) { return fit.used; });
-  lines.push_back(fmt::format("{} of {} photos, {} corners ({} left out), RMS {:.4f} px, board {}", used, views.size(),
+  lines.push_back(fmt::format("{} of {} photos, {} corners ({} rejected), RMS {:.4f} px, board {}", used, views.size(),
                               report.corners_used, report.corners_dropped, report.rms_px,
                               shape_name(calibration.config.board_shape)));
   const BoardShape asked = calibration.asked_shape;
@@ -148,7 +148,7 @@ JobOutcome outcome_of(const FoundCorners& found) {
   document.data = std::move(whole.data);
   document.verdict = found.verdict;
   JsonValue photos = JsonValue::list();
-  for (const std::string& corner : found.rejected) outcome.lines.push_back("left out: " + corner + " fits no noise");
+  for (const std::string& corner : found.rejected) outcome.lines.push_back("rejected: " + corner + " fits no noise");
   for (std::size_t k = 0; k < found.board_views.size(); ++k) {
     const BoardView& view = found.board_views[k];
     const std::string& reason = found.calibration.views[k].reason;
@@ -168,7 +168,7 @@ JobOutcome outcome_of(const FoundCorners& found) {
   document.estimate["photos"] = std::move(photos);
   if (found.num_corners == 0) return outcome;
   outcome.files.push_back({"corners.csv", corners_csv(found.board_views)});
-  outcome.lines.push_back(fmt::format("the table has no picture size: calibrate --corners takes --size {}x{} with it",
+  outcome.lines.push_back(fmt::format("the table has no image size: calibrate --corners takes --size {}x{} with it",
                                       found.size.width_px, found.size.height_px));
   return outcome;
 }

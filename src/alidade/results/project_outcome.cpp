@@ -107,7 +107,7 @@ void tell_readings(const std::vector<ProjectedReading>& projected, std::vector<s
     const std::string pixel = one.pixel ? fmt::format("u {:.2f} ± {:.2g}  v {:.2f} ± {:.2g} px", one.pixel->px.x(),
                                                       3.0 * std::sqrt(one.pixel->cov(0, 0)), one.pixel->px.y(),
                                                       3.0 * std::sqrt(one.pixel->cov(1, 1)))
-                                        : "not in the camera's sight";
+                                        : "not in the camera's field of view";
     lines.push_back(fmt::format("{:.4g} m: {}   x {:.4f} ± {:.2g}  y {:.4f} ± {:.2g}  z {:.4f} ± {:.2g} m   (3σ)",
                                 one.range_m, pixel, p.x(), sigma.x(), p.y(), sigma.y(), p.z(), sigma.z()));
   }
@@ -154,7 +154,7 @@ JsonValue head_value(const HeadProjection& head, bool has_point, std::vector<std
   value["cam_centre_in_world_m"] = numbers_of(head.cam_centre_in_world);
   if (!has_point) return value;
   if (!head.pixel) {
-    lines.push_back("  the point is not in the camera's sight");
+    lines.push_back("  the point is not in the camera's field of view");
     return value;
   }
   const Eigen::Vector2d& px = head.pixel->px;

@@ -20,7 +20,7 @@ class SeenFrames {
 
   /// For LocalizeConfig::watch_image.
   void offer(double t_s, const cv::Mat& image, std::span<const ObservationTried> tried);
-  /// Puts the tables `frames` (t_s, name of the image, its size) and `sights` (where a point was expected, the
+  /// Puts the tables `frames` (t_s, name of the image, its size) and `observations` (where a point was expected, the
   /// covariance of the innovation, where it was found) before the others, and adds the images; nothing where no image
   /// came.
   void add_to(JobOutcome& outcome) const;

@@ -222,7 +222,7 @@ std::string servo_csv(const ServoScenario& scenario, const ServoStudy& study) {
 }
 
 void tell_controllers(const ServoStudy& study, std::vector<std::string>& lines) {
-  lines.push_back("controller    RMS px   95 % px   max px   central third   in picture");
+  lines.push_back("controller    RMS px   95 % px   max px   central third   in image");
   for (const ServoComparison& compared : study.comparison) {
     const ServoFigures& figures = compared.figures;
     lines.push_back(fmt::format(
@@ -237,7 +237,7 @@ void tell_controllers(const ServoStudy& study, std::vector<std::string>& lines) 
 /// The best controller by the intrinsics that its loop goes by.
 void tell_lenses(const ServoStudy& study, std::vector<std::string>& lines) {
   if (study.lenses.empty()) return;
-  lines.push_back(fmt::format("intrinsics    RMS px   95 % px   max px   in picture   fx off by   ({})",
+  lines.push_back(fmt::format("intrinsics    RMS px   95 % px   max px   in image   fx off by   ({})",
                               controller_name(study.best)));
   for (const LensComparison& compared : study.lenses) {
     const ServoFigures& figures = compared.figures;

@@ -140,7 +140,7 @@ void thin_table(DataTable& table, std::size_t most) {
   }
   std::string how = "of equal buckets of rows the first";
   if (!names.empty()) how += " and those with the smallest and the largest " + names;
-  how += "; besides the rows left out or with an event; all rows are in " + table.name + "_all.csv";
+  how += "; besides the rows that were rejected or have an event; all rows are in " + table.name + "_all.csv";
   table.thinned = Thinned{count, rows.size(), std::move(how)};
 }
 

@@ -23,7 +23,7 @@ std::pair<json, Files> written(ResultDocument document, std::size_t* size = null
   return {json::parse(text), files};
 }
 
-/// Corners of so many photos, 54 each; every 1000th is left out, one has by far the largest residual.
+/// Corners of so many photos, 54 each; every 1000th is rejected, one has by far the largest residual.
 DataTable corners_of(int num_photos, std::size_t extreme) {
   std::vector<int> photo, col;
   std::vector<double> u, residual_u, residual_v, weight;

@@ -24,7 +24,7 @@ struct ObservationPose {
 [[nodiscard]] std::optional<ObservationPose> pose_of_observation_lines(std::span<const ObservationLine> lines);
 
 /// What a head's views of a board say of its place when no view alone does: single points at many angles. Offsets are
-/// taken as zero. `usable`: one a view of the problem.
+/// taken as zero. `usable`: one per view of the problem.
 [[nodiscard]] std::optional<ObservationPose> observation_pose(const RigProblem& problem,
                                                               const std::vector<bool>& usable, const RigHead& rig_head,
                                                               std::size_t head, std::size_t board);

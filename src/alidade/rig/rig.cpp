@@ -46,7 +46,7 @@ std::vector<double> soft_weights(const Work& work, const RigState& state) {
   return weights;
 }
 
-/// Readings of a view moved to where its board looks best: what a view that was left out must be judged by.
+/// Readings of a view moved to where its board looks best: what a view that was rejected must be judged by.
 void correct_reading(const Work& work, RigState& state, std::size_t v) {
   for (int i = 0; i < 3; ++i) {
     const auto at = view_residuals(work.problem, state, v);
@@ -71,7 +71,7 @@ std::vector<double> hard_weights(const Work& work, RigState& state, const std::v
   return weights;
 }
 
-/// Soft weights until the views have settled, then those that disagree left out.
+/// Soft weights until the views have settled, then those that disagree rejected.
 std::optional<SolvedRig> solve_robustly(Work& work, const RigState& start, std::vector<double>& weights) {
   constexpr int rounds = 6, max_iterations = 40;
   std::optional<SolvedRig> solved;

@@ -86,7 +86,7 @@ struct RigSystem {
   /// Schur complement over the boards: the information about the heads.
   [[nodiscard]] Eigen::MatrixXd information() const;
 };
-/// `weights`: one a view; zero leaves it out. None where a view with a weight is not seen whole.
+/// `weights`: one per view; zero leaves it out. None where a view with a weight is not seen whole.
 [[nodiscard]] std::optional<RigSystem> rig_system(const RigProblem& problem, const RigState& state,
                                                   std::span<const double> weights);
 

@@ -35,7 +35,7 @@ struct PlacedRig {
   RigState state;
   std::vector<bool> has_head, has_board;
 };
-/// `state.heads`: with their mountings. `usable`, `poses`: one a view of the problem; no
+/// `state.heads`: with their mountings. `usable`, `poses`: one per view of the problem; no
 /// pose: not known.
 [[nodiscard]] PlacedRig place_rig(const RigProblem& problem, const std::vector<RigHead>& heads, std::size_t num_boards,
                                   const std::vector<bool>& usable, std::span<const std::optional<BoardPoseFit>> poses);

@@ -14,7 +14,7 @@ struct SpotScene {
   BoardScene boards;
   Eigen::Vector3d beam_origin_in_cam = Eigen::Vector3d::Zero();      ///< Where the range is zero. [m]
   Eigen::Vector3d beam_direction_in_cam = Eigen::Vector3d::UnitZ();  ///< Unit length.
-  std::vector<double> range_m;                                       ///< True range, one a photo.
+  std::vector<double> range_m;                                       ///< True range, one per photo.
 };
 
 struct SpotSceneConfig {

@@ -26,7 +26,7 @@ struct TrackFaults {
   Eigen::Vector3d base_turn_rad = Eigen::Vector3d::Zero();  ///< About x (pitch), y (yaw), z (roll) of its base.
   double baseline = 0.0;                                    ///< It stands further away by this share.
   std::array<Eigen::Vector2d, 2> zero_rad{Eigen::Vector2d::Zero(),
-                                          Eigen::Vector2d::Zero()};  ///< (pan, tilt), one a head.
+                                          Eigen::Vector2d::Zero()};  ///< (pan, tilt), one per head.
   double clock_s = 0.0;   ///< Its images say that they were taken so much later than they were.
   double clutter = 0.0;   ///< Share of the observations, of both heads, that are anywhere in the image instead.
   double second = 0.0;    ///< Share of the observations that are of another target, 0.4 m to the right and 0.1 m above.

@@ -19,7 +19,7 @@ struct SpotCandidate {
 };
 
 /// All patches of light that stand out of the noise, strongest first. Single pixels, streaks and what is wider than a
-/// spot are left out. In `signal` single hot pixels are taken away, and what saturates gets the light around it.
+/// spot are rejected. In `signal` single hot pixels are taken away, and what saturates gets the light around it.
 [[nodiscard]] std::vector<SpotCandidate> spot_candidates(SpotSignal& signal, const LaserSpotConfig& config);
 
 }  // namespace alidade

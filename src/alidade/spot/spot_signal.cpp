@@ -58,7 +58,7 @@ Eigen::Index stride_of(Eigen::Index num_pixels) {
 }
 
 /// Weights of the best sum of some images for another one, by least squares without outliers: of some thousands of
-/// pixels, residuals beyond three sigmas left out. A spot is small beside a photo.
+/// pixels, residuals beyond three sigmas rejected. A spot is small beside a photo.
 class RobustSum {
  public:
   /// `equal_shares`: weight, per sample, of the prior that the first two terms have 0.5 each.

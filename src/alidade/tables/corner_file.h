@@ -22,7 +22,7 @@ ALIDADE_PUBLIC_BEGIN
 /// Reads such a file, by anybody: photo, corner, u_px, v_px (or u, v) and, optionally, sigma_u_px, sigma_v_px and
 /// corr_uv; without σ the covariance is the identity, "unknown". Photos in order of first appearance. Throws
 /// InputError: a corner that the board does not have, the same corner twice, a σ that is not positive, a missing
-/// column. With `skipped` a wrong row is left out and named there instead.
+/// column. With `skipped` a wrong row is rejected and named there instead.
 [[nodiscard]] std::vector<BoardView> read_corners(const std::filesystem::path& file, int num_points,
                                                   std::vector<SkippedInput>* skipped = nullptr);
 

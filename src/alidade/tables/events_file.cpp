@@ -63,7 +63,7 @@ TargetObservation read_row(const Csv& csv, std::size_t row, const EventColumns& 
     observation.pan_tilt_rad = {angle_in_row(csv, row, columns.pan), angle_in_row(csv, row, columns.tilt)};
   observation.px = {csv.number(row, columns.u), csv.number(row, columns.v)};
   if (!(observation.px.cwiseAbs().maxCoeff() < max_px))
-    throw InputError(csv.where(row, columns.u) + ": is in no picture");
+    throw InputError(csv.where(row, columns.u) + ": is in no image");
   if (csv.has("sigma_px") && !csv.is_empty(row, "sigma_px")) observation.sigma_px = csv.positive(row, "sigma_px");
   if (columns.from_centre) observation.px += principal_point(heads[observation.head].camera);
   return observation;
@@ -99,7 +99,7 @@ EventsFile read_events(const std::filesystem::path& file, std::span<const RigHea
     const TargetObservation observation = read_row(csv, row, columns, heads, newest_s);
     if (!seen.emplace(observation.head, observation.t_capture_s).second)
       throw InputError(csv.where(row, "t_capture_s") + ": '" + csv.text(row, "t_capture_s") +
-                       "' stands in a row of this head before; a picture has one target");
+                       "' stands in a row of this head before; an image has one target");
     const Eigen::Vector2d& stood_rad =
         *(first_rad[observation.head] ? first_rad[observation.head]
                                       : first_rad[observation.head] = observation.pan_tilt_rad);

@@ -20,7 +20,7 @@ struct EventsFile {
 
 struct EventsOptions {
   bool skip_bad = false;  ///< Skip rows that are wrong, by name.
-  /// Cameras that do not turn, each with a clock of its own: `pan_rad,tilt_rad` may be left out (zero) but may not
+  /// Cameras that do not turn, each with a clock of its own: `pan_rad,tilt_rad` may be omitted (zero) but may not
   /// change, and times run forwards head by head alone.
   bool stands_still = false;
 };
@@ -29,7 +29,7 @@ struct EventsOptions {
 [[nodiscard]] std::vector<int> heads_in_events(const std::filesystem::path& file);
 
 /// Reads `t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px`: `head` is an id of the rig, angles are those at
-/// capture (also `pan_rad_at_capture`), `t_arrival_s` may be left out. `du_px,dv_px` in place of the pixel are offsets
+/// capture (also `pan_rad_at_capture`), `t_arrival_s` may be omitted. `du_px,dv_px` in place of the pixel are offsets
 /// from the principal point; `sigma_px`, where there is such a column, is a row's own. Throws InputError: no such
 /// column, a head that is not in the rig, arrival before capture, arrival times that run backwards, angles in
 /// `pan_deg`, no rows.

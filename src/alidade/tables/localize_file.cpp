@@ -117,7 +117,7 @@ LocalizeTarget read_target(const std::filesystem::path& file) {
   const YAML::Node root = detail::load_yaml(read_file(file), name);
   const Fields fields(root, name);
   detail::refuse_unknown_keys(fields, {"points", "rectangle", "board", "seen_from"}, "a target");
-  if (fields.has("rectangle")) refuse(name, "rectangle", "is found in images; sights need 'points' or a 'board'");
+  if (fields.has("rectangle")) refuse(name, "rectangle", "is found in images; observations need 'points' or a 'board'");
   if (fields.has("points") == fields.has("board")) refuse(name, "points", "or 'board': one of them is needed");
   LocalizeTarget target = fields.has("board") ? board_points_of(root["board"], name) : points_of(root["points"], name);
   if (target.points.empty()) refuse(name, "points", "has no points");

@@ -97,7 +97,7 @@ ObservationTable read_observations(const std::filesystem::path& file, const Obse
   }
   ObservationTable read;
   for_each_row(csv, options.skip_bad, read.skipped, [&](std::size_t row) { read_row(csv, row, options, read.frames); });
-  if (read.frames.empty()) throw InputError(file.string() + ": has no sights; at least one row is needed");
+  if (read.frames.empty()) throw InputError(file.string() + ": has no observations; at least one row is needed");
   read.frames = with_missing(std::move(read.frames));
   return read;
 }

@@ -273,7 +273,7 @@ TEST_F(RotationLogText, RoundTrip) {
     for (std::size_t i = 0; i < log.rows.size(); ++i) {
       const RotationRow &a = log.rows[i], &b = back.rows[i];
       EXPECT_NEAR(a.t_s, b.t_s, 0.51e-9);
-      // 12 digits of numbers below one, and a quaternion that is normalised anew.
+      // 12 digits of numbers below one, and a quaternion that is normalised again.
       EXPECT_LT(difference(a.rate_rad_per_s, b.rate_rad_per_s), 1e-11);
       EXPECT_LT(difference(a.pan_tilt_roll_rad, b.pan_tilt_roll_rad), 1e-11);
       EXPECT_LT(difference(a.base_from_cam.coeffs(), b.base_from_cam.coeffs()), 1e-11);

@@ -296,7 +296,7 @@ void read_timing(const YAML::Node& root, const Fields& top, ServoScenario& scena
     refuse(top.file(), "duration_s",
            fmt::format("{} is not longer than the warm-up of {} s", scene.duration_s, scene.warm_up_s));
   if (scene.latency_s > 200.0 * scene.period_s)
-    refuse(top.file(), "latency_s", fmt::format("{} is more than 200 pictures late", scene.latency_s));
+    refuse(top.file(), "latency_s", fmt::format("{} is more than 200 images late", scene.latency_s));
   const Section mismatch(root, top, "mismatch", {"gain", "tau"});
   mismatch.number("gain", scene.mismatch.gain, described);
   mismatch.number("tau", scene.mismatch.tau, described);
@@ -353,7 +353,7 @@ ServoScenarioFile read_servo_scenario(const std::filesystem::path& file) {
 }
 
 std::string servo_scenario_text() {
-  return R"(# What alidade servo runs. Every key may be left out; these are the values it then has.
+  return R"(# What alidade servo runs. Every key may be omitted; these are the values it then has.
 # rig: rig.yaml                  # heads and cameras; without it: the rig of Xiahou, Chen & Wu, 2015
 target: {path: circle, start_m: [0.173, -0.314, 0.636], radius_m: 0.1, period_s: 10}  # still, sway, step, manoeuvre
 # target: {track: path.csv}      # a path that was recorded: t_s,x_m,y_m,z_m

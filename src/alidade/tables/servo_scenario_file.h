@@ -15,7 +15,7 @@ struct ServoScenarioFile {
   std::filesystem::path track;  ///< The target's path, if it was recorded; likewise.
 };
 
-/// Reads scenario.yaml; what is left out is the preset. Throws InputError: a key that is unknown or no number, a value
+/// Reads scenario.yaml; what is omitted is the preset. Throws InputError: a key that is unknown or no number, a value
 /// that no servo can have.
 [[nodiscard]] ServoScenarioFile read_servo_scenario(const std::filesystem::path& file);
 

@@ -153,7 +153,7 @@ TargetDetection find_target_blob(const cv::Mat& frame, const TargetLook& look,
                                  const std::optional<TargetExpectation>& expected) {
   const double max_radius_px = look.max_radius_share * std::min(frame.rows, frame.cols);
   const SearchWindow window = search_window(frame, expected, 0.5 * max_radius_px);
-  if (window.width < 8 || window.height < 8) return lost_target("out of the picture");
+  if (window.width < 8 || window.height < 8) return lost_target("out of the image");
   const cv::Mat signal = signal_of(frame({window.u, window.v, window.width, window.height}), look);
   cv::Mat smoothed;
   cv::GaussianBlur(signal, smoothed, {3, 3}, 0.8, 0.8, cv::BORDER_REPLICATE);
@@ -161,7 +161,7 @@ TargetDetection find_target_blob(const cv::Mat& frame, const TargetLook& look,
   double peak = 0.0;
   cv::minMaxLoc(smoothed, nullptr, &peak);
   constexpr double min_contrast = 12.0;  // of 255: less is not a target that a person sees
-  if (peak < std::max(look.min_snr * noise, min_contrast)) return lost_target("not in the picture");
+  if (peak < std::max(look.min_snr * noise, min_contrast)) return lost_target("not in the image");
   const std::vector<Blob> blobs = blobs_of(smoothed, 0.5 * peak, max_radius_px);
   if (blobs.empty()) return lost_target("what has its look is too large");
   const Eigen::Vector2d corner = window.corner();
@@ -172,7 +172,7 @@ TargetDetection find_target_blob(const cv::Mat& frame, const TargetLook& look,
   if (!blob) return lost_target(reason);
   const cv::Rect in_frame = blob->box + cv::Point(window.u, window.v);
   if (in_frame.x <= 0 || in_frame.y <= 0 || in_frame.br().x >= frame.cols || in_frame.br().y >= frame.rows)
-    return lost_target("cut off by the edge of the picture");
+    return lost_target("cut off by the edge of the image");
   TargetDetection found = measure(signal, *blob, noise);
   found.px += corner;
   return found;

@@ -54,7 +54,7 @@ class TargetDetector::Impl {
   TargetDetection find(const cv::Mat& frame, const std::optional<TargetExpectation>& expected) {
     switch (look_.kind) {
       case TargetKind::colour:
-        if (frame.type() != CV_8UC3) return lost_target("a grey picture has no colours");
+        if (frame.type() != CV_8UC3) return lost_target("a grey image has no colours");
         return find_target_blob(frame, look_, expected);
       case TargetKind::bright:
       case TargetKind::dark:

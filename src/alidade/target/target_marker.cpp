@@ -33,7 +33,7 @@ TargetDetection find_target_marker(const cv::Mat& grey, const TargetLook& look,
                                    const std::optional<TargetExpectation>& expected) {
   const SearchWindow window = search_window(grey, expected, 100.0);
   constexpr int min_side_px = 16;
-  if (window.width < min_side_px || window.height < min_side_px) return lost_target("out of the picture");
+  if (window.width < min_side_px || window.height < min_side_px) return lost_target("out of the image");
   cv::Mat image;
   grey({window.u, window.v, window.width, window.height}).convertTo(image, CV_8U);
   const auto parameters = cv::aruco::DetectorParameters::create();
@@ -56,7 +56,7 @@ TargetDetection find_target_marker(const cv::Mat& grey, const TargetLook& look,
     one.score = 1.0;
     seen.push_back(one);
   }
-  if (seen.empty()) return lost_target("not in the picture");
+  if (seen.empty()) return lost_target("not in the image");
   if (seen.size() > 1) return lost_target(two_candidates(seen[0].px, seen[1].px));
   return seen.front();
 }

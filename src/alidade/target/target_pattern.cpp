@@ -76,7 +76,7 @@ TargetDetection find_target_pattern(const cv::Mat& grey, const cv::Mat& pattern,
                                     const std::optional<TargetExpectation>& expected, double& scale) {
   const double half_px = 0.5 * scale * std::max(pattern.cols, pattern.rows);
   const SearchWindow window = search_window(grey, expected, 1.5 * half_px + 2.0);
-  if (window.width <= 0 || window.height <= 0) return lost_target("out of the picture");
+  if (window.width <= 0 || window.height <= 0) return lost_target("out of the image");
   cv::Mat image;
   grey({window.u, window.v, window.width, window.height}).convertTo(image, CV_32F);
   constexpr std::array<double, 5> changes{0.82, 0.905, 1.0, 1.105, 1.22};
@@ -94,7 +94,7 @@ TargetDetection find_target_pattern(const cv::Mat& grey, const cv::Mat& pattern,
     matches[best] = match_at(image, scaled(pattern, scale * change));
   }
   const Match& match = matches[best];
-  if (match.correlation < look.min_correlation) return lost_target("not in the picture");
+  if (match.correlation < look.min_correlation) return lost_target("not in the image");
   const Eigen::Vector2d corner = window.corner();
   if (match.rival > match.correlation - look.min_margin)
     return lost_target(two_candidates(match.px + corner, match.rival_px + corner));

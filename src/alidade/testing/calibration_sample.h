@@ -9,7 +9,7 @@ namespace alidade::testing {
 inline const Board sample_board{.cols = 9, .rows = 6, .square_m = 0.025};
 inline constexpr ImageSize sample_size{640, 480};
 
-/// The example camera, 640×480, with some parameters set anew.
+/// The example camera, 640×480, with some parameters set again.
 inline Camera sample_camera(const std::string& model, const std::vector<std::pair<std::string, double>>& changed = {}) {
   Camera camera = *example_camera(model, sample_size.width_px, sample_size.height_px);
   const auto names = param_names(camera.lens);

@@ -9,7 +9,7 @@
 
 namespace alidade::testing {
 
-// The paper's camera, image and start (28); points drawn anew for each set; noise σ² = 0.1 px² on every coordinate.
+// The paper's camera, image and start (28); points drawn again for each set; noise σ² = 0.1 px² on every coordinate.
 
 struct Experiment {
   RotationScene scene;

@@ -214,7 +214,7 @@ void add_checks(const TrackReport& report, Verdict& verdict) {
   const double left_out = 1.0 - used_share(report);
   const std::size_t num_left = report.steps.size() - report.num_used;
   verdict.checks.push_back(
-      check("left out",
+      check("rejected",
             left_out > max_left_out    ? State::bad
             : left_out > care_left_out ? State::care
                                        : State::good,

@@ -301,7 +301,7 @@ class TurnedRun {
     report_.cov.middleRows<2>(2).setZero();
     report_.cov.middleCols<2>(2).setZero();
     Assumption centre;
-    centre.name = "centre of the picture";
+    centre.name = "centre of the image";
     centre.sigma = report_.sigma_free_centre_px.x();
     centre.moved = "fx";
     centre.moved_by = std::abs(moved.x());

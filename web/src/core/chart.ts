@@ -1,4 +1,4 @@
-// A canvas that is drawn anew for each size, theme and for paper, and that knows what lies under the pointer.
+// A canvas that is drawn again for each size, theme and for paper, and that knows what lies under the pointer.
 import {palette, type Palette} from './colours';
 import {el} from './dom';
 import {hideTip, showTip} from './tip';
@@ -136,7 +136,7 @@ export interface ChartLook {
   label?: string;
 }
 
-/** All charts of the page, to be drawn anew when the theme changes or for paper. */
+/** All charts of the page, to be drawn again when the theme changes or for paper. */
 export const charts = new Set<Chart>();
 
 export class Chart {

@@ -47,7 +47,7 @@ export function blueToOrange(share: number): Rgb {
   return along([[38, 132, 200], [122, 124, 138], [206, 108, 10]], share);
 }
 
-/** Direction in the picture: right vermilion, down purple, left blue, up green. */
+/** Direction in the image: right vermilion, down purple, left blue, up green. */
 export function directionColour(u: number, v: number): Rgb {
   const turn = Math.atan2(v, u) / (2 * Math.PI);
   return along([[213, 94, 0], [154, 91, 196], [0, 114, 178], [0, 158, 115], [213, 94, 0]], turn < 0 ? turn + 1 : turn);

@@ -257,7 +257,7 @@ export class Doc {
   get isAnswer(): boolean {
     return this.state === 'good' || this.state === 'care' || this.state === 'bad';
   }
-  /** Size of the picture in pixels; null if the document does not tell. */
+  /** Size of the image in pixels; null if the document does not tell. */
   get pictureSize(): {width: number; height: number} | null {
     const width = this.estimate('camera.width'), height = this.estimate('camera.height');
     return width >= 1 && height >= 1 && width < 1e5 && height < 1e5 ? {width, height} : null;

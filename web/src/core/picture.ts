@@ -1,4 +1,4 @@
-// Drawing in the coordinates of a picture: pixels, size in colour, contours, fields of arrows.
+// Drawing in the coordinates of an image: pixels, size in colour, contours, fields of arrows.
 import type {Pen} from './chart';
 import {cividis, css, directionColour, pixelHigh, pixelLevels, pixelLow, pixelShare} from './colours';
 import {contourSegments, type Segment} from './contour';

@@ -67,7 +67,7 @@ export function yAxis(pen: Pen, y: Scale, left: number, right: number, words: Ax
   if (words.label) pen.text(words.label, left, Math.min(y.from, y.to) - 11, {colour: pen.c.ink, size: 11.5, weight: 600});
 }
 
-/** Ticks below, and what they are; those that would touch are left out. */
+/** Ticks below, and what they are; those that would touch are omitted. */
 export function xAxis(pen: Pen, x: Scale, top: number, bottom: number, words: AxisWords = {}): void {
   const format = words.format ?? ((v: number) => num(v, 4));
   let last = -Infinity, lastHalf = 0;

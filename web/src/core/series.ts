@@ -253,7 +253,7 @@ export class SeriesPlot {
   }
 }
 
-/** Labels that would touch are left out; uPlot's own choice leaves short logarithmic axes without any. */
+/** Labels that would touch are omitted; uPlot's own choice leaves short logarithmic axes without any. */
 function apart(u: uPlot, splits: number[]): (number | null)[] {
   let last = NaN;
   return splits.map((value) => {

@@ -35,7 +35,7 @@ export interface Label {
   colour: Colour;
 }
 export interface Picture {
-  corners: [V3, V3, V3, V3]; // as the picture's: top left, top right, bottom right, bottom left
+  corners: [V3, V3, V3, V3]; // as the image's: top left, top right, bottom right, bottom left
   name: string;
 }
 
@@ -98,7 +98,7 @@ export class World {
       if (isNamed) this.label(move(pose, ([0, 1, 2].map((i) => (i === k ? length * 1.22 : 0)) as V3)), name, colour);
     });
   }
-  /** A camera: its pyramid of sight down to `depth`. Corners of the picture plane come back. */
+  /** A camera: its pyramid of sight down to `depth`. Corners of the image plane come back. */
   frustum(pose: Pose, half: [number, number], depth: number, look: LineLook): [V3, V3, V3, V3] {
     const corners = ([[-1, -1], [1, -1], [1, 1], [-1, 1]] as const).map(([x, y]) =>
       move(pose, [x * half[0] * depth, y * half[1] * depth, depth])) as [V3, V3, V3, V3];

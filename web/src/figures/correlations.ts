@@ -9,7 +9,7 @@ export interface Correlations {
 
 const shortNames: Record<string, string> = {origin_x_m: 'x', origin_y_m: 'y', origin_z_m: 'z', direction_x: 'dx', direction_y: 'dy', direction_z: 'dz'};
 
-/** Null where there is no covariance; parameters that were held are left out. */
+/** Null where there is no covariance; fixed parameters are omitted. */
 export function correlationsOf(doc: Doc): Correlations | null {
   const all = doc.covarianceNames, n = all.length, upper = doc.covarianceUpper;
   if (n < 2 || n > 400 || upper.length !== (n * (n + 1)) / 2) return null;

@@ -1,4 +1,4 @@
-// camera diff: how far apart two cameras are over the picture, along its diagonal, and parameter by parameter.
+// camera diff: how far apart two cameras are over the image, along its diagonal, and parameter by parameter.
 import {Chart} from '../core/chart';
 import type {Grid} from '../core/document';
 import {el} from '../core/dom';
@@ -28,7 +28,7 @@ export const difference: Figure = {
     colourKey(host, 'px');
     const [a, b] = [sigmas[0]![0], sigmas[1]![0]];
     const share = a && b ? shareNotAbove(values, Float64Array.from(a, (s, i) => 3 * Math.hypot(s, b[i]!))) : NaN;
-    const good = `Half of the picture differs by less than ${num(quantile(values, 0.5), 2)} px, 95 % of it by less than ${num(quantile(values, 0.95), 2)} px.` +
+    const good = `Half of the image differs by less than ${num(quantile(values, 0.5), 2)} px, 95 % of it by less than ${num(quantile(values, 0.95), 2)} px.` +
       (Number.isFinite(share) ? ` In ${(100 * share).toFixed(0)} % of it the difference is below 3σ of both together.` : '');
     return {marks, rows: marks, tables: [], words: good, good};
   },

@@ -1,4 +1,4 @@
-// Two cameras' difference over the picture: size in colour, contours, arrows; beside it what σ predicts.
+// Two cameras' difference over the image: size in colour, contours, arrows; beside it what σ predicts.
 import {Chart} from '../core/chart';
 import type {Grid} from '../core/document';
 import {el} from '../core/dom';
@@ -32,7 +32,7 @@ export function drawField(host: HTMLElement, field: Field, lowest: number, most 
     if (!field.du || !field.dv) return;
     const {factor, bar_px, barLength} = magnificationFor(panel, quantile(values, 0.7), 0.06 * panel.w);
     drawArrows(pen, panel, grid, field.du, field.dv, factor, 11);
-    pen.scaleBar(4, panel.y + panel.h + 15, barLength, `${num(bar_px, 2)} px, arrows ×${num(factor, 3)}; far longer ones left out`);
+    pen.scaleBar(4, panel.y + panel.h + 15, barLength, `${num(bar_px, 2)} px, arrows ×${num(factor, 3)}; far longer ones omitted`);
   });
   chart.hover = (x, y) => {
     if (!panel?.holds(x, y)) return null;

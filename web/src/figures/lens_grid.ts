@@ -7,7 +7,7 @@ import {lensOf, type Lens} from '../core/rigid';
 
 const lines = 13, steps = 80;
 
-/** Lines of constant x and of constant y on a plane before the camera, out to the picture's edge and beyond. */
+/** Lines of constant x and of constant y on a plane before the camera, out to the image's edge and beyond. */
 function drawLines(pen: Pen, lens: Lens): void {
   const panel = panelIn(lens, 0, 0, pen.w, pen.h), half = [1.35 * lens.width / 2 / lens.fx, 1.35 * lens.height / 2 / lens.fy] as const;
   const straight = (x: number, y: number): [number, number] => [lens.fx * x + lens.cx, lens.fy * y + lens.cy];
@@ -28,12 +28,12 @@ function drawLines(pen: Pen, lens: Lens): void {
 }
 
 export const lensGrid: Figure = {
-  id: 'grid', isOptional: true, title: 'What does this lens do?', note: 'straight lines of the world, in the picture', span: 16,
+  id: 'grid', isOptional: true, title: 'What does this lens do?', note: 'straight lines of the world, in the image', span: 16,
   draw(host, doc) {
     const lens = lensOf(doc), model = doc.estimateText('camera.model');
     if (!lens || !doc.pictureSize || !/^(pinhole|brown|kannala_brandt)$/.test(model)) return null; // a port has no rays through one point
     legend(host, [{words: 'as the lens shows them', colour: 'var(--blue)'}, {words: 'without distortion', colour: 'var(--soft)', look: 'dash'}, {words: 'principal point', colour: 'var(--orange)'}]);
     new Chart(host, {height: 160, aspect: lens.height / lens.width, most: 440, label: `Straight lines through a ${model} lens`}, (pen) => drawLines(pen, lens));
-    return {marks: 2 * lines, rows: 2 * lines, tables: [], words: `a ${model} lens`, good: 'Where a blue line ends inside the picture, the lens model folds back: nothing of the world is shown beyond.'};
+    return {marks: 2 * lines, rows: 2 * lines, tables: [], words: `a ${model} lens`, good: 'Where a blue line ends inside the image, the lens model folds back: nothing of the world is shown beyond.'};
   },
 };

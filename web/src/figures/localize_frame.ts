@@ -1,4 +1,4 @@
-// localize: a picture with where points were expected, and where they were found.
+// localize: an image with where points were expected, and where they were found.
 import {Chart} from '../core/chart';
 import {el} from '../core/dom';
 import {legend, type Figure} from '../core/figure';

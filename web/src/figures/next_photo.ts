@@ -26,7 +26,7 @@ function worstNow(doc: Doc): number {
 function drawBoard(pen: Pen, lens: Lens, board: Board, pose: Pose): void {
   const panel = panelIn(lens, 0, 0, pen.w, pen.h);
   pen.rect(panel.x, panel.y, panel.w, panel.h, pen.c.panel, pen.c.soft);
-  // A sketch: distortion is left out, as the board may reach beyond what the lens model knows.
+  // A sketch: distortion is omitted, as the board may reach beyond what the lens model knows.
   const at = (c: number, r: number): [number, number] => {
     const p: V3 = move(pose, [c * board.square_m, r * board.square_m, 0]);
     return p[2] > 1e-6 ? panel.at((lens.fx * p[0]) / p[2] + lens.cx, (lens.fy * p[1]) / p[2] + lens.cy) : [NaN, NaN];
@@ -65,7 +65,7 @@ export const nextPhoto: Figure = {
     if (pose && board) {
       const middle = move(pose, [0.5 * board.square_m * (board.cols - 1), 0.5 * board.square_m * (board.rows - 1), 0]);
       const tilt = Math.acos(Math.min(1, Math.abs(column(pose.r, 2)[2]))) * degrees;
-      words = `Board ${num(norm(middle), 2)} m away, tilted ${tilt.toFixed(0)}° from the picture plane, where the sketch shows it: the worst 3σ falls from ${num(now, 2)} to ${num(next.number('worst_3sigma_px', 0), 2)} px.`;
+      words = `Board ${num(norm(middle), 2)} m away, tilted ${tilt.toFixed(0)}° from the image plane, where the sketch shows it: the worst 3σ falls from ${num(now, 2)} to ${num(next.number('worst_3sigma_px', 0), 2)} px.`;
       if (lens) new Chart(host, {height: 140, aspect: lens.height / lens.width, most: 330, label: `Sketch of the best next photo. ${words}`}, (pen) => drawBoard(pen, lens, board, pose));
     }
     new Chart(host, {height: 40 + 24 * (Math.min(5, next.rows) + 1), label: words}, (pen) => drawGains(pen, now, next));

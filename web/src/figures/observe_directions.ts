@@ -1,4 +1,4 @@
-// Where did it look? The optical axis on the sphere, with the picture's outline at the first, last and outermost steps.
+// Where did it look? The optical axis on the sphere, with the image's outline at the first, last and outermost steps.
 import {Chart} from '../core/chart';
 import {el} from '../core/dom';
 import type {Figure} from '../core/figure';
@@ -45,7 +45,7 @@ function directionsOf(doc: Doc): Directions | null {
 const rightOf = (d: V3) => Math.atan2(d[0], d[2]) * degrees, upOf = (d: V3) => -Math.asin(d[1]) * degrees;
 
 export const observeDirections: Figure = {
-  id: 'directions', title: 'Where did it look?', note: 'line: the optical axis; frames: the picture first, last and at its outermost', span: 12,
+  id: 'directions', title: 'Where did it look?', note: 'line: the optical axis; frames: the image first, last and at its outermost', span: 12,
   draw(host, doc, selection) {
     const found = directionsOf(doc), scene = observeScene(doc);
     if (!found || !scene) return null;

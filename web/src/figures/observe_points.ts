@@ -1,4 +1,4 @@
-// Does each point fit? The cloud of residuals, and each point's RMS; where the points were seen in the picture.
+// Does each point fit? The cloud of residuals, and each point's RMS; where the points were seen in the image.
 import {Chart, type Pen} from '../core/chart';
 import {el} from '../core/dom';
 import type {Figure} from '../core/figure';
@@ -85,7 +85,7 @@ function frameOf(doc: Doc, u: Float64Array, v: Float64Array): {width: number; he
 }
 
 export const observeTracks: Figure = {
-  id: 'tracks', title: 'Where were the points seen?', note: 'in the picture', span: 8,
+  id: 'tracks', title: 'Where were the points seen?', note: 'in the image', span: 8,
   draw(host, doc) {
     const table = doc.table('points');
     if (!table || !table.tells('u_px')) return null;
@@ -98,7 +98,7 @@ export const observeTracks: Figure = {
       else tracks.set(p, [i]);
     });
     const shown = [...tracks].sort((a, b) => b[1].length - a[1].length).slice(0, 60), isNamed = shown.length <= 24;
-    new Chart(host, {height: 160, aspect: size.height / size.width, most: 420, label: `${shown.length} points in the picture`}, (pen) => {
+    new Chart(host, {height: 160, aspect: size.height / size.width, most: 420, label: `${shown.length} points in the image`}, (pen) => {
       const panel = panelIn(size, 0, 0, pen.w, pen.h);
       pen.rect(panel.x, panel.y, panel.w, panel.h, pen.c.panel, pen.c.soft);
       pen.clipped(panel.x, panel.y, panel.w, panel.h, () => {
@@ -118,6 +118,6 @@ export const observeTracks: Figure = {
       });
     });
     return {marks: shown.length, rows: Math.min(60, tracks.size), tables: [table], words: `${tracks.size} points`,
-      good: 'Good: points all over the picture, not in one line, moving both across and up and down. Dots: where each was first seen; cross: principal point.'};
+      good: 'Good: points all over the image, not in one line, moving both across and up and down. Dots: where each was first seen; cross: principal point.'};
   },
 };

@@ -13,8 +13,8 @@ export interface ObserveScene {
   attitude(i: number): M3 | null; // start_from_cam
 }
 
-const eventWords: Record<string, string> = {start: 'first estimate', burst: 'a frame left out: noise burst', slip: 'a point slipped', zoom: 'zoom begins',
-  zoom_end: 'zoom ends', restart: 'started again', gap: 'gap in the log', one_head: '', waiting: '', gated: 'left out', lost: 'lost'};
+const eventWords: Record<string, string> = {start: 'first estimate', burst: 'a frame rejected: noise burst', slip: 'a point slipped', zoom: 'zoom begins',
+  zoom_end: 'zoom ends', restart: 'started again', gap: 'gap in the log', one_head: '', waiting: '', gated: 'rejected', lost: 'lost'};
 
 export function wordsOfEvent(kind: string): string {
   return Object.prototype.hasOwnProperty.call(eventWords, kind) ? eventWords[kind]! : kind;

@@ -22,7 +22,7 @@ function drawCorner(pen: Pen, panel: Panel, c: Corners, i: number, factor: numbe
   if (!c.isUsed[i]) {
     pen.cross(x, y, 6, '#000', 4);
     pen.cross(x, y, 6, '#ff7b5a', 2);
-    pen.hit({x, y, r: 7, tip: () => [name, 'left out', `residual ${num(c.du[i]!, 3)}, ${num(c.dv[i]!, 3)} px`]});
+    pen.hit({x, y, r: 7, tip: () => [name, 'rejected', `residual ${num(c.du[i]!, 3)}, ${num(c.dv[i]!, 3)} px`]});
     return;
   }
   const su = c.su[i]!, sv = c.sv[i]!;
@@ -77,6 +77,6 @@ export const photo: Figure = {
     const marks = scene.photos[selection.item]?.corners.length ?? 0;
     return {marks, rows: marks, tables: corners ? [corners.table] : [], words: caption.textContent ?? '',
       title: doc.isAnswer ? undefined : 'This photo: which corners were found?', note: doc.isAnswer ? undefined : 'rings: corners as found · ← →',
-      good: corners && !doc.isAnswer ? 'There is no answer to judge corners by: rings show where each was found.' : corners ? 'Good: arrows of no common direction, most within their 3σ. Crosses: corners left out; rings: corners of a photo that was not used.' : 'No corners are drawn: this run has no camera to draw them by.'};
+      good: corners && !doc.isAnswer ? 'There is no answer to judge corners by: rings show where each was found.' : corners ? 'Good: arrows of no common direction, most within their 3σ. Crosses: corners rejected; rings: corners of a photo that was not used.' : 'No corners are drawn: this run has no camera to draw them by.'};
   },
 };

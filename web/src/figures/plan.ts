@@ -57,7 +57,7 @@ function boardsWorld(doc: Doc, sheet: Sheet, all: Pose[], more: (world: World, f
   const world = new World(), lens = lensOf(doc), nearest = Math.min(...all.map((pose) => norm(middleOf(sheet, pose)))), far = Math.max(...all.map((pose) => norm(middleOf(sheet, pose))));
   all.forEach((pose, i) => {
     const corners = sheet.corners.map((corner) => move(pose, corner)), colour = i === 0 ? 'orange' : 'blue';
-    world.face(corners, colour, 0.22, {tip: () => [`${i + 1}.: ${num(norm(middleOf(sheet, pose)), 3)} m away`, `tilted ${tiltOf(pose).toFixed(0)}° from the picture plane`]});
+    world.face(corners, colour, 0.22, {tip: () => [`${i + 1}.: ${num(norm(middleOf(sheet, pose)), 3)} m away`, `tilted ${tiltOf(pose).toFixed(0)}° from the image plane`]});
     world.line(corners, {colour, width: 2}, true);
     for (const point of sheet.points.slice(0, 600)) world.dot(move(pose, point), colour, 3);
     world.label(corners[0]!, String(i + 1), colour);
@@ -70,7 +70,7 @@ function boardsWorld(doc: Doc, sheet: Sheet, all: Pose[], more: (world: World, f
   return world;
 }
 
-/** Each board as the camera would see it; distortion is left out, as the board may reach beyond what the model knows. */
+/** Each board as the camera would see it; distortion is omitted, as the board may reach beyond what the model knows. */
 function drawSeen(pen: Pen, lens: Lens, sheet: Sheet, pose: Pose): void {
   const panel = panelIn(lens, 0, 0, pen.w, pen.h);
   const at = (p: V3): [number, number] => {
@@ -99,12 +99,12 @@ function boardSketches(host: HTMLElement, doc: Doc, sheet: Sheet, all: Pose[]): 
 }
 
 export const planSketches: Figure = {
-  id: 'sketches', isOptional: true, title: 'What will the camera see?', note: 'each board in the picture, distortion left out', span: 24,
+  id: 'sketches', isOptional: true, title: 'What will the camera see?', note: 'each board in the image, distortion omitted', span: 24,
   draw(host, doc) {
     const next = doc.table('next'), sheet = sheetOf(doc), all = next ? poses(next) : [];
     if (!next || !sheet || all.length === 0 || !lensOf(doc)) return null;
     boardSketches(host, doc, sheet, all);
-    return {marks: all.length, rows: all.length, tables: [next], words: `${all.length} boards`, good: `Distances are from the camera to the board’s middle, tilts from the picture plane.${all.length > 6 ? ' The first six are drawn.' : ''}`};
+    return {marks: all.length, rows: all.length, tables: [next], words: `${all.length} boards`, good: `Distances are from the camera to the board’s middle, tilts from the image plane.${all.length > 6 ? ' The first six are drawn.' : ''}`};
   },
 };
 
@@ -201,7 +201,7 @@ function turnTable(next: Table): HTMLElement {
 }
 
 export const planObserve: Figure = {
-  id: 'plan', title: 'How should the head turn?', note: 'from where the camera looks now · frames: the picture', span: 16,
+  id: 'plan', title: 'How should the head turn?', note: 'from where the camera looks now · frames: the image', span: 16,
   draw(host, doc) {
     const next = doc.table('next');
     if (!next || !next.tells('pan_rad')) return null;

@@ -1,4 +1,4 @@
-// Where was the board? The camera with the chosen photo on its picture plane, and all boards.
+// Where was the board? The camera with the chosen photo on its image plane, and all boards.
 import {cividis, pixelShare} from '../core/colours';
 import type {Table} from '../core/document';
 import type {Figure} from '../core/figure';
@@ -74,6 +74,6 @@ export const poses: Figure = {
     selection.on(() => view.refresh());
     whenPicturesAreHere(() => view.refresh());
     return {marks: posed.length, rows: scene.photos.filter((photo) => photo.pose).length, tables: [table],
-      words: `${posed.length} boards, from ${num(nearest, 2)} m`, good: 'Good: boards tilted all ways, near and far, out to the picture’s corners.'};
+      words: `${posed.length} boards, from ${num(nearest, 2)} m`, good: 'Good: boards tilted all ways, near and far, out to the image’s corners.'};
   },
 };

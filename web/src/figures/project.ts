@@ -1,4 +1,4 @@
-// project: where readings of the rangefinder lie in the picture, with 3σ.
+// project: where readings of the rangefinder lie in the image, with 3σ.
 import {Chart, type Pen} from '../core/chart';
 import type {Table} from '../core/document';
 import {el} from '../core/dom';
@@ -33,12 +33,12 @@ function drawPoints(pen: Pen, points: Table): void {
 }
 
 export const projectPicture: Figure = {
-  id: 'picture', isOptional: true, title: 'Where in the picture does it lie?', note: 'px · ellipse: 3σ', span: 16,
+  id: 'picture', isOptional: true, title: 'Where in the image does it lie?', note: 'px · ellipse: 3σ', span: 16,
   draw(host, doc) {
     const points = doc.table('points');
     if (!points || !points.tells('u_px')) return null;
     const count = Math.min(most, points.rows);
-    new Chart(host, {height: 360, isFilling: true, label: `${points.rows} readings in the picture`}, (pen) => drawPoints(pen, points));
+    new Chart(host, {height: 360, isFilling: true, label: `${points.rows} readings in the image`}, (pen) => drawPoints(pen, points));
     return {marks: count, rows: count, tables: [points], words: `${points.rows} readings`, good: `Dots: where the point of a reading is seen${points.rows > 1 ? '; line: along the beam, from near to far' : ''}.`};
   },
 };
@@ -52,6 +52,6 @@ export const projectHeads: Figure = {
     const n = (k: number, name: string) => doc.estimate(`heads[${k}].${name}`), cell = (value: number, digits = 5) => el('td', {class: 'value'}, num(value, digits));
     host.append(el('table', {class: 'estimate'}, el('thead', {}, el('tr', {}, ...['', 'u, px', 'v, px', 'camera x, m', 'y, m', 'z, m'].map((word) => el('th', {}, word)))),
       el('tbody', {}, ...indices.map((k) => el('tr', {}, el('th', {}, `head ${n(k, 'id')}`), cell(n(k, 'px[0]')), cell(n(k, 'px[1]')), ...[0, 1, 2].map((i) => cell(n(k, `cam_centre_in_world_m[${i}]`), 4)))))));
-    return {marks: indices.length, rows: indices.length, tables: [], words: `${indices.length} heads`, good: 'A dash: the point is not in the sight of that head.'};
+    return {marks: indices.length, rows: indices.length, tables: [], words: `${indices.length} heads`, good: 'A dash: the point is not in view of that head.'};
   },
 };

@@ -1,4 +1,4 @@
-// reproduce: each claim of the paper beside its method as we re-run it and our own, and the figures drawn anew.
+// reproduce: each claim of the paper beside its method as we re-run it and our own, and the figures drawn again.
 import {Chart, type Pen} from '../core/chart';
 import type {Doc, Table} from '../core/document';
 import {el} from '../core/dom';

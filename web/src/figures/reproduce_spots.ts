@@ -12,7 +12,7 @@ export function hasSpots(table: Table): boolean {
 
 const looks = [{colour: 'red', shape: 'square'}, {colour: 'blue', shape: 'square'}, {colour: 'green', shape: 'disc'}] as const;
 
-/** In the picture, and what is computed minus what is seen. */
+/** In the image, and what is computed minus what is seen. */
 export function drawSpots(host: HTMLElement, table: Table, wordsOf: (name: string) => string): void {
   const names = table.names.filter((name) => name.endsWith('_u_px') && name !== 'actual_u_px').map((name) => name.slice(0, -5)).slice(0, looks.length);
   const actual = (i: number) => [table.number('actual_u_px', i), table.number('actual_v_px', i)] as const, rows = Array.from({length: table.rows}, (_, i) => i);
@@ -32,7 +32,7 @@ export function drawSpots(host: HTMLElement, table: Table, wordsOf: (name: strin
   const pair = el('div', {style: 'display:grid;grid-template-columns:repeat(auto-fit,minmax(300px,1fr));gap:8px'}), left = el('div'), right = el('div');
   pair.append(left, right);
   host.append(pair);
-  scatter(left, picture, {xLabel: 'u, px', yLabel: '−v, px', height: 320, label: 'actual and computed spots in the picture'});
+  scatter(left, picture, {xLabel: 'u, px', yLabel: '−v, px', height: 320, label: 'actual and computed spots in the image'});
   scatter(right, offsets, {xLabel: 'computed − actual u, px', yLabel: 'actual − computed v, px', height: 320, isSquare: true, label: 'computed minus actual spots', include: [[0, 0]],
     below: (pen, x, y) => { pen.line(x(0) - 8, y(0), x(0) + 8, y(0), pen.c.ink, 1.5), pen.line(x(0), y(0) - 8, x(0), y(0) + 8, pen.c.ink, 1.5); }});
 }

@@ -112,7 +112,7 @@ export const rigCoverage: Figure = {
     });
     if (has) new Chart(host, {height: 46, label: 'colours of RMS'}, (pen) => void colourBar(pen, Math.max(20, pen.w / 2 - 220), Math.min(pen.w - 20, pen.w / 2 + 220), 2, 'RMS of a view, px'));
     selection.on(() => charts.forEach((chart) => chart.redraw()));
-    return {marks: views.rows, rows: views.rows, tables: [views], words: `${views.rows} views`, good: `Good: both angles turned, by ±15° and more, in all combinations; the same colour everywhere.${has && views.numbers('used').some((used) => used === 0) ? ' Crosses: views left out.' : ''}`};
+    return {marks: views.rows, rows: views.rows, tables: [views], words: `${views.rows} views`, good: `Good: both angles turned, by ±15° and more, in all combinations; the same colour everywhere.${has && views.numbers('used').some((used) => used === 0) ? ' Crosses: views rejected.' : ''}`};
   },
 };
 

@@ -149,6 +149,6 @@ export const movingClocks: Figure = {
         pen.text(num(value, 2), x(value) + 6, y + pitch / 2, {size: 11.5, weight: 650});
       });
     });
-    return {marks: bars.length, rows: bars.length, tables: [], words: `at most ${num(ends[1], 2)} ms`, good: 'Good: short against the time in which the target moves by as much as its place is sure. The camera left out here has the rig’s clock.'};
+    return {marks: bars.length, rows: bars.length, tables: [], words: `at most ${num(ends[1], 2)} ms`, good: 'Good: short against the time in which the target moves by as much as its place is sure. The camera rejected here has the rig’s clock.'};
   },
 };

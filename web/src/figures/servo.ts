@@ -1,4 +1,4 @@
-// servo: pixel error; path over the picture; angles asked, measured, predicted; controllers compared; robustness.
+// servo: pixel error; path over the image; angles asked, measured, predicted; controllers compared; robustness.
 import {Chart} from '../core/chart';
 import {cividis, css, onto} from '../core/colours';
 import type {Doc, Table} from '../core/document';
@@ -65,7 +65,7 @@ export const servoError: Figure = {
 };
 
 export const servoPicture: Figure = {
-  id: 'picture', title: 'Where in the picture was it?', note: 'target from the picture’s middle, px', span: 10,
+  id: 'picture', title: 'Where in the image was it?', note: 'target from the image’s middle, px', span: 10,
   draw(host, doc, selection) {
     const control = doc.table('control');
     if (!control || !control.tells('error_u_px')) return null;
@@ -74,7 +74,7 @@ export const servoPicture: Figure = {
     perHead(host, heads, (part, head) => {
       const u = head.column('error_u_px'), v = head.column('error_v_px'), every = Math.max(1, Math.floor(u.length / 3000)), limit = quantile([...u, ...v].map(Math.abs), 0.999) || 1;
       const dots = head.rows.map((_, i) => i).filter((i) => i % every === 0 && Number.isFinite(u[i]! + v[i]!)).map((i) => ({x: u[i]!, y: -v[i]!, size: 1.8, colour: (pen: {c: {blue: string}}) => pen.c.blue, pick: () => selection.at(head.t[i]!), tip: () => [`${num(head.t[i]!, 5)} s`, `u ${num(u[i]!, 3)}, v ${num(v[i]!, 3)} px`]}));
-      charts.push(scatter(part, dots, {xLabel: 'error u, px', yLabel: 'error v, px, upwards', height: 330, isFilling: true, isSquare: true, label: 'errors in the picture', include: [[-limit, -limit], [limit, limit]],
+      charts.push(scatter(part, dots, {xLabel: 'error u, px', yLabel: 'error v, px, upwards', height: 330, isFilling: true, isSquare: true, label: 'errors in the image', include: [[-limit, -limit], [limit, limit]],
         below: (pen, x, y) => { if (spec > 0) pen.g.setLineDash([6, 4]), pen.circle(x(0), y(0), x(spec) - x(0), null, pen.c.red, 1.6), pen.g.setLineDash([]); pen.line(x(0) - 8, y(0), x(0) + 8, y(0), pen.c.ink, 1.5), pen.line(x(0), y(0) - 8, x(0), y(0) + 8, pen.c.ink, 1.5); }}));
     });
     return {marks: control.rows, rows: control.rows, tables: [control], words: '', good: `Good: a round cloud about the middle. ${spec > 0 ? (spec < reach ? `Dashed: the specification, ${num(spec, 3)} px.` : `The specification, ${num(spec, 3)} px, lies outside of what is shown.`) : ''}`};

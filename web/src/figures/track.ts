@@ -21,7 +21,7 @@ function covOf(steps: Table, i: number): M3 {
   return [[s('x') ** 2, 0, 0], [0, s('y') ** 2, 0], [0, 0, s('z') ** 2]];
 }
 
-/** Rays of the sights about an instant: one a head, the newest. */
+/** Rays of the observations about an instant: one a head, the newest. */
 function addRays(world: World, doc: Doc, time: number, to: V3): void {
   const sights = doc.table('measurements');
   if (!sights || !hasTriple(sights, 'ray_origin_in_world_')) return;
@@ -161,34 +161,34 @@ function sorted(t: Float64Array): number[] {
 }
 
 export const trackInnovations: Figure = {
-  id: 'innovations', title: 'Does each sight fit?', note: 'innovation, px, ± 3σ predicted', span: 12,
+  id: 'innovations', title: 'Does each observation fit?', note: 'innovation, px, ± 3σ predicted', span: 12,
   draw(host, doc, selection) {
     const sights = sightsOf(doc);
     if (!sights || !sights.tells('innovation_u_px')) return null;
     const order = sorted(sights.numbers('t_capture_s')), pick = (name: string) => Float64Array.from(order, (i) => sights.number(name, i)), t = pick('t_capture_s'), accepted = pick('accepted');
     const hasInnovation = pick('innovation_u_px').map((v, i) => Number(Number.isFinite(v) && accepted[i] === 0)), dropped = hasInnovation.reduce((a, b) => a + b, 0);
-    legend(host, [{words: 'used', colour: 'var(--blue)', look: 'dot'}, {words: `left out (${dropped})`, colour: 'var(--red)', look: 'dot'}, {words: '± 3σ', colour: 'var(--blue)', look: 'band'}]);
+    legend(host, [{words: 'used', colour: 'var(--blue)', look: 'dot'}, {words: `rejected (${dropped})`, colour: 'var(--red)', look: 'dot'}, {words: '± 3σ', colour: 'var(--blue)', look: 'band'}]);
     for (const axis of ['u', 'v'] as const) {
       const value = pick(`innovation_${axis}_px`), sigma = pick(`sigma_innovation_${axis}_px`), limit = 1.2 * Math.max(3 * quantile(sigma, 0.95), quantile(value.filter((_, i) => accepted[i] === 1).map(Math.abs), 0.999)) || 1;
       const clamp = (v: number) => Math.max(-limit * 0.97, Math.min(limit * 0.97, v));
       new SeriesPlot(host, {t, selection, label: `innovation ${axis}, px`, xLabel: '', height: 112, isFilling: true, aria: `innovation ${axis} over time`, range: [-limit, limit], levels: [{value: 0, dash: []}], bands: [bandAboutZero(sigma, 'blue')],
-        lines: [{name: 'used', values: value.map((v, i) => (accepted[i] === 1 ? v : NaN)), colour: 'blue', isDots: true}, {name: 'left out', values: value.map((v, i) => (accepted[i] === 0 ? clamp(v) : NaN)), colour: 'red', isDots: true, size: 7}],
-        tip: (i) => [`head ${sights.text('head', order[i]!)}: ${num(value[i]!, 3)} px, 3σ ${num(3 * sigma[i]!, 3)}`, accepted[i] === 1 ? 'used' : 'left out']});
+        lines: [{name: 'used', values: value.map((v, i) => (accepted[i] === 1 ? v : NaN)), colour: 'blue', isDots: true}, {name: 'rejected', values: value.map((v, i) => (accepted[i] === 0 ? clamp(v) : NaN)), colour: 'red', isDots: true, size: 7}],
+        tip: (i) => [`head ${sights.text('head', order[i]!)}: ${num(value[i]!, 3)} px, 3σ ${num(3 * sigma[i]!, 3)}`, accepted[i] === 1 ? 'used' : 'rejected']});
     }
     const share = drawNis(host, {t, nis: pick('nis'), dof: () => 2, counts: (i) => accepted[i] === 1, label: 'NIS over its 2 degrees of freedom: 1 is expected', xLabel: 'time of capture, s', height: 160, selection, isFilling: true});
-    const words = `${percent(share.inside, share.known, 1)} of the used sights are inside the 95 % bounds; ${dropped} were left out by the gate`;
+    const words = `${percent(share.inside, share.known, 1)} of the used observations are inside the 95 % bounds; ${dropped} were rejected by the gate`;
     return {marks: t.length, rows: sights.rows, tables: [sights], words, good: `Good: dots in the band, on both sides of zero. Here ${words}.`};
   },
 };
 
 export const trackAge: Figure = {
-  id: 'age', title: 'How old is a sight when it arrives?', note: 'arrival − capture, ms', span: 6,
+  id: 'age', title: 'How old is an observation when it arrives?', note: 'arrival − capture, ms', span: 6,
   draw(host, doc, selection) {
     const sights = sightsOf(doc);
     if (!sights || !sights.tells('t_arrival_s')) return null;
     const capture = sights.numbers('t_capture_s'), arrival = sights.numbers('t_arrival_s'), order = sorted(capture), age = Float64Array.from(order, (i) => 1e3 * (arrival[i]! - capture[i]!));
     const middle = quantile(age, 0.5), worst = quantile(age, 1);
-    new SeriesPlot(host, {t: Float64Array.from(order, (i) => capture[i]!), selection, label: 'age, ms', xLabel: 'time of capture, s', height: 220, isFilling: true, aria: 'age of each sight', lines: [{name: 'age', values: age, colour: 'blue', isDots: true}], range: [0, Math.max(1, 1.25 * worst)],
+    new SeriesPlot(host, {t: Float64Array.from(order, (i) => capture[i]!), selection, label: 'age, ms', xLabel: 'time of capture, s', height: 220, isFilling: true, aria: 'age of each observation', lines: [{name: 'age', values: age, colour: 'blue', isDots: true}], range: [0, Math.max(1, 1.25 * worst)],
       levels: [{value: middle, words: `half below ${num(middle, 3)} ms`}], tip: (i) => [`${num(age[i]!, 3)} ms, head ${sights.text('head', order[i]!)}`]});
     return {marks: age.length, rows: sights.rows, tables: [sights], words: '', good: `Half arrive within ${num(middle, 3)} ms, the latest after ${num(worst, 3)} ms. Late ones are put where they belong in time.`};
   },

@@ -1,4 +1,4 @@
-// Where can I trust a pixel? 3σ of projection over the picture, and the share of the picture under each size.
+// Where can I trust a pixel? 3σ of projection over the image, and the share of the image under each size.
 import {Chart, type Pen} from '../core/chart';
 import type {Grid} from '../core/document';
 import {el} from '../core/dom';
@@ -43,7 +43,7 @@ export const trust: Figure = {
     if (maps.length === 0 || !size) return null;
     let shown = maps[0]!, panel: Panel | null = null;
     if (maps.length > 1) choice(host, 'where', maps.map((map) => map.words), (i) => ((shown = maps[i]!), map.redraw()));
-    const words = () => `3σ of projection ${shown.words}: half of the picture below ${num(quantile(shown.three, 0.5), 2)} px, worst ${num(quantile(shown.three, 1), 2)} px`;
+    const words = () => `3σ of projection ${shown.words}: half of the image below ${num(quantile(shown.three, 0.5), 2)} px, worst ${num(quantile(shown.three, 1), 2)} px`;
     const split = el('div', {class: 'split'}), left = el('div', {class: 'wide'}), right = el('div');
     host.append(split);
     split.append(left, right);
@@ -64,10 +64,10 @@ export const trust: Figure = {
       return [`u ${num(u, 4)}, v ${num(v, 4)} px`, `3σ ${num(value, 3)} px ${shown.words}`];
     };
     if (maps.length > 1) legend(right, maps.map((one, i) => ({words: one.words, colour: 'var(--ink)', look: i === 0 ? 'line' : 'dash'})));
-    const share = new Chart(right, {height: 170, isFilling: true, label: 'Share of the picture whose 3σ is below each size'}, (pen) => {
+    const share = new Chart(right, {height: 170, isFilling: true, label: 'Share of the image whose 3σ is below each size'}, (pen) => {
       const left = 46, right = pen.w - 10, bottom = pen.h - 44;
       const x = scale(pixelLow, pixelHigh, left, right, true), y = scale(0, 100, bottom, 22);
-      yAxis(pen, y, left, right, {format: (v) => `${v} %`, wanted: 2, label: 'share of the picture below …'});
+      yAxis(pen, y, left, right, {format: (v) => `${v} %`, wanted: 2, label: 'share of the image below …'});
       maps.forEach((one, i) => {
         drawShare(pen, one, x, y, i === 0 ? [] : [5, 4]);
       });
@@ -76,9 +76,9 @@ export const trust: Figure = {
     share.hover = (x, y) => {
       const size_px = scale(pixelLow, pixelHigh, 46, share.box.clientWidth - 10, true).invert(x);
       if (y > share.box.clientHeight - 40 || size_px < pixelLow || size_px > pixelHigh) return null;
-      return [`below ${num(size_px, 2)} px`, ...maps.map((one) => `${shareBelow(one, size_px).toFixed(0)} % of the picture ${one.words}`)];
+      return [`below ${num(size_px, 2)} px`, ...maps.map((one) => `${shareBelow(one, size_px).toFixed(0)} % of the image ${one.words}`)];
     };
     return {marks: maps.length, rows: maps.length, tables: [], words: words(),
-      good: `Good: below a third of the accuracy that the task needs, everywhere it looks. Here 3σ is below 0.5 px in ${shareBelow(maps[0]!, 0.5).toFixed(0)} % of the picture, and half of it is below ${num(quantile(maps[0]!.three, 0.5), 2)} px.`};
+      good: `Good: below a third of the accuracy that the task needs, everywhere it looks. Here 3σ is below 0.5 px in ${shareBelow(maps[0]!, 0.5).toFixed(0)} % of the image, and half of it is below ${num(quantile(maps[0]!.three, 0.5), 2)} px.`};
   },
 };

@@ -64,7 +64,7 @@ export class LiveBar {
     if (typeof row['seconds'] === 'number') this.delay_s = row['seconds'];
     if (typeof row['innovation_u_px'] === 'number') ++this.gated.seen, (this.gated.left += row['accepted'] === false ? 1 : 0);
   }
-  /** What the server left out for this page. */
+  /** What the server rejected for this page. */
   noteStatus(words: string): void {
     const dropped = /dropped (\d+) images and (\d+) steps/.exec(words);
     if (dropped) this.lost += Number(dropped[1]) + Number(dropped[2]);

@@ -34,7 +34,7 @@ export class LivePicture {
       this.image?.close();
       this.image = image;
     } catch {
-      // not a picture: the one before stays
+      // not an image: the one before stays
     }
     this.isDecoding = false;
   }

@@ -42,14 +42,14 @@ const degreePlot = (axis: string): Plot => ({label: axis, unit: '°', scale: deg
   {column: `asked_${axis}_rad`, name: 'asked', colour: 'ink', dash: [5, 4], width: 1.2}, {column: `measured_${axis}_rad`, name: 'measured', colour: 'blue'},
   {column: `predicted_${axis}_rad`, name: 'predicted', colour: 'orange', width: 1.1}]});
 const sightPlot = (axis: string): Plot => ({label: `innovation ${axis}`, unit: 'px', sigma: `sigma_innovation_${axis}_px`, isAboutZero: true, levels: [{value: 0, dash: []}], lines: [
-  {column: `innovation_${axis}_px`, name: 'used', colour: 'blue', isDots: true, only: 'accepted'}, {column: `innovation_${axis}_px`, name: 'left out', colour: 'red', isDots: true, only: '!accepted'}]});
+  {column: `innovation_${axis}_px`, name: 'used', colour: 'blue', isDots: true, only: 'accepted'}, {column: `innovation_${axis}_px`, name: 'rejected', colour: 'red', isDots: true, only: '!accepted'}]});
 const nis = (dof: string | number): Plot => ({label: 'NIS over its degrees of freedom: 1 is expected', unit: '', dof, levels: [{value: 1}], height: 150, lines: [{column: 'nis', name: 'NIS / dof', colour: 'blue', isDots: true}]});
 
 export const plotsOf: Record<string, PlotCard[]> = {
   track: [
     {id: 'position', title: 'Where is it?', note: 'm, ± 3σ', span: 12, plots: axes.map(([axis, colour]) => ({label: axis, unit: 'm', sigma: `sigma_target_in_world_${axis}_m`, lines: [
       {column: `target_in_world_${axis}_m`, name: axis, colour}, {column: `truth_${axis}_m`, name: 'truth', colour: 'ink', dash: [5, 4], width: 1.2}]}))},
-    {id: 'innovations', title: 'Does each sight fit?', note: 'innovation, px, ± 3σ; left out: red', span: 12, isPerHead: true, plots: [sightPlot('u'), sightPlot('v'), nis(2)]},
+    {id: 'innovations', title: 'Does each observation fit?', note: 'innovation, px, ± 3σ; rejected: red', span: 12, isPerHead: true, plots: [sightPlot('u'), sightPlot('v'), nis(2)]},
   ],
   servo: [
     {id: 'error', title: 'How far from the middle is the target?', note: 'px, ± 3σ predicted', span: 12, isPerHead: true, plots: (['u', 'v'] as const).map((axis) => ({label: `error ${axis}`, unit: 'px', sigma: `sigma_error_${axis}_px`, isAboutZero: true, levels: [{value: 0, dash: []}], height: 170,
@@ -65,8 +65,8 @@ export const plotsOf: Record<string, PlotCard[]> = {
   localize: [
     {id: 'position', title: 'Where is the camera?', note: 'm, ± 3σ', span: 12, plots: axes.map(([axis, colour]) => ({label: axis, unit: 'm', sigma: `sigma_world_from_cam_${axis}_m`, lines: [
       {column: `world_from_cam_${axis}_m`, name: axis, colour}, {column: `truth_${axis}_m`, name: 'truth', colour: 'ink' as const, dash: [5, 4], width: 1.2}]}))},
-    {id: 'tracks', title: 'Are points kept, and is it fast enough?', note: 'used (blue) · seen - - · left out (red)', span: 12, plots: [
-      {label: 'points', unit: '', lines: [{column: 'num_tracked', name: 'used', colour: 'blue'}, {column: 'num_seen', name: 'seen', colour: 'soft', dash: [4, 3]}, {column: 'num_gated', name: 'left out', colour: 'red'}]},
+    {id: 'tracks', title: 'Are points kept, and is it fast enough?', note: 'used (blue) · seen - - · rejected (red)', span: 12, plots: [
+      {label: 'points', unit: '', lines: [{column: 'num_tracked', name: 'used', colour: 'blue'}, {column: 'num_seen', name: 'seen', colour: 'soft', dash: [4, 3]}, {column: 'num_gated', name: 'rejected', colour: 'red'}]},
       {label: 'NIS over its degrees of freedom: 1 is expected', unit: '', levels: [{value: 1}], lines: [{column: 'nis', name: 'NIS / dof', colour: 'blue', isDots: true}]},
       {label: 'time a frame', unit: 'ms', scale: 1e3, lines: [{column: 'seconds', name: 'ms', colour: 'blue', isDots: true}]}]},
   ],

@@ -16,9 +16,9 @@ function countsOf(doc: Doc): string[] {
   if (used !== undefined && !/^(plan|simulate|camera) /.test(doc.command)) parts.push(`${used}${given !== undefined && given > used ? ` of ${given}` : ''} ${(given ?? used) === 1 ? word.replace(/s$/, '') : word} used`);
   const corners = doc.command === 'calibrate' ? doc.table('corners') : null;
   const rejected = corners ? corners.numbers('weight').filter((w) => w === 0).length : 0;
-  if (corners && doc.isAnswer) parts.push(`${corners.thinned?.from ?? corners.rows} corners (${rejected} left out)`);
+  if (corners && doc.isAnswer) parts.push(`${corners.thinned?.from ?? corners.rows} corners (${rejected} rejected)`);
   else if (corners) parts.push(`${corners.thinned?.from ?? corners.rows} corners`);
-  else if (dropped !== undefined && dropped > 0) parts.push(`${dropped} left out`);
+  else if (dropped !== undefined && dropped > 0) parts.push(`${dropped} rejected`);
   if (doc.skipped.length > 0 && doc.command !== 'calibrate') parts.push(`${doc.skipped.length} skipped`);
   if (Number.isFinite(doc.estimate('rms_px')))
     parts.push(`RMS ${num(doc.estimate('rms_px'), 3)} px${doc.command === 'calibrate' ? ' per corner' : ''}`);

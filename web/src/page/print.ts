@@ -1,4 +1,4 @@
-// Paper: every canvas drawn anew at the paper's width, 3-D as it stands, light.
+// Paper: every canvas drawn again at the paper's width, 3-D as it stands, light.
 import {charts} from '../core/chart';
 import {forgetPalette} from '../core/colours';
 import {seriesPlots} from '../core/series';

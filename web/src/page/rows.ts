@@ -1,4 +1,4 @@
-// Rows of cards as wide as the page: where a figure was left out, the others of its row take its place.
+// Rows of cards as wide as the page: where a figure was omitted, the others of its row take its place.
 import type {Card} from './card';
 
 const columns = 24;

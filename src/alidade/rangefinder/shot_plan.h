@@ -4,9 +4,11 @@
 #include "alidade/estimation/config_error.h"
 #include "alidade/estimation/counts.h"
 #include "alidade/estimation/verdict.h"
+#include "alidade/public.h"
 #include "alidade/rangefinder/next_shot.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// Where a board can be held, and how many shots are wanted.
 struct ShotConfig {
@@ -29,4 +31,5 @@ struct ShotPlan {
 /// beam that cannot be.
 [[nodiscard]] ShotPlan plan_shots(const BeamNow& now, const ShotConfig& config = {}, const Progress& progress = {});
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

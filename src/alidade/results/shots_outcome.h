@@ -1,11 +1,14 @@
 #pragma once
 
+#include "alidade/public.h"
 #include "alidade/rangefinder/shot_plan.h"
 #include "alidade/results/outcome.h"
 
 namespace alidade {
+ALIDADE_PUBLIC_BEGIN
 
 /// The document of the shots to take next, and a line for each.
 [[nodiscard]] JobOutcome outcome_of(const ShotPlan& plan);
 
+ALIDADE_PUBLIC_END
 }  // namespace alidade

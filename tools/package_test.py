@@ -30,16 +30,17 @@ class Package(unittest.TestCase):
         cls.prefix = cls.folder / "installed"
         run("cmake", "--install", build, "--prefix", cls.prefix)
         cls.library = next(cls.prefix.glob("lib*/**/libalidade.so"))
+        cls.alidade, cls.examples = cls.prefix / "bin" / "alidade", cls.folder / "examples"
+        run("cmake", "-S", ROOT / "examples", "-B", cls.examples, f"-DCMAKE_PREFIX_PATH={cls.prefix}")
+        run("cmake", "--build", cls.examples, "--parallel", "2")
 
     @classmethod
     def tearDownClass(cls):
         cls.temporary.cleanup()
 
     def test_examples_build_and_run_against_the_package(self):
-        outside = self.folder / "examples"
-        run("cmake", "-S", ROOT / "examples", "-B", outside, f"-DCMAKE_PREFIX_PATH={self.prefix}")
-        run("cmake", "--build", outside)
-        alidade, photos, camera = self.prefix / "bin" / "alidade", self.folder / "photos", self.folder / "camera.yml"
+        outside, alidade = self.examples, self.alidade
+        photos, camera = self.folder / "photos", self.folder / "camera.yml"
         run(alidade, "simulate", "board", "--board", "9x6", "--square", "0.025", "--photos", "8", "--size", "640x480",
             "--out", photos, "--quiet")
         said = run(outside / "01_calibrate", photos, camera)
@@ -78,9 +79,7 @@ class Package(unittest.TestCase):
             env={**os.environ, "PYTHONPATH": str(module)})
 
     def test_the_observe_example_leaves_what_the_command_leaves(self):
-        outside, alidade, log = self.folder / "examples", self.prefix / "bin" / "alidade", self.folder / "rotation"
-        run("cmake", "-S", ROOT / "examples", "-B", outside, f"-DCMAKE_PREFIX_PATH={self.prefix}")
-        run("cmake", "--build", outside, "--target", "02_observe")
+        outside, alidade, log = self.examples, self.alidade, self.folder / "rotation"
         run(alidade, "simulate", "rotation", "--duration", "6", "--out", log, "--quiet")
         said = run(outside / "02_observe", log / "log.csv", "780", "582", self.folder / "observed")
         self.assertIn("start", said)
@@ -90,9 +89,7 @@ class Package(unittest.TestCase):
             self.assertEqual(len(texts), 1, f"{name}: the library and the command leave the same")
 
     def test_examples_of_rangefinder_and_rig_run(self):
-        outside, alidade = self.folder / "examples_67", self.prefix / "bin" / "alidade"
-        run("cmake", "-S", ROOT / "examples", "-B", outside, f"-DCMAKE_PREFIX_PATH={self.prefix}")
-        run("cmake", "--build", outside, "--target", "06_rangefinder", "07_rig")
+        outside, alidade = self.examples, self.alidade
         shots, views = self.folder / "shots", self.folder / "views"
         run(alidade, "simulate", "rangefinder", "--out", shots, "--quiet")
         said = run(outside / "06_rangefinder", shots / "shots.csv", shots / "camera.yaml", shots / "corners.csv",
@@ -105,6 +102,8 @@ class Package(unittest.TestCase):
         self.assertIn("head2.base_x_m", said)
         self.assertIn("heads", (self.folder / "rig.yaml").read_text())
 
+    def test_the_localize_example_leaves_what_the_command_leaves(self):
+        outside, alidade = self.examples, self.alidade
         sea, result = self.folder / "sea", self.folder / "localized"
         run(alidade, "simulate", "underwater", "--points", "20", "--frames", "40", "--rate", "30", "--out", sea, "--quiet")
         words = [sea / "sights.csv", sea / "camera.yaml", sea / "target.yaml"]

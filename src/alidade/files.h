@@ -24,6 +24,7 @@
 #include "alidade/results/save.h"
 #include "alidade/results/seen_frames.h"
 #include "alidade/results/servo_outcome.h"
+#include "alidade/results/shots_outcome.h"
 #include "alidade/results/track_outcome.h"
 #include "alidade/tables/corner_file.h"
 #include "alidade/tables/events_file.h"

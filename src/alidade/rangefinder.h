@@ -9,6 +9,7 @@
 #include "alidade/public.h"
 #include "alidade/rangefinder/calibration.h"
 #include "alidade/rangefinder/edges.h"
+#include "alidade/rangefinder/shot_plan.h"
 
 /// Calibration of a single-point rangefinder beside a camera: the whole job, as `alidade rangefinder` does it. Its
 /// result has the beam with its covariance, the camera that it belongs to, what was rejected and why, and a verdict.

@@ -36,6 +36,8 @@ left_out.
   rms_range_m  m   of shots predicted from the others
   rms_px       px  of shots predicted from the others
 causes[]       any  errors that were looked for
+gain           1    method edges: of the range over the scan
+halves_differ_rad  rad  method edges: between halves of the edges
 data:
 shots.
   name                    text  photo, or number
@@ -71,6 +73,8 @@ left_out.
   residual_range_m  m      prediction − reading
   residual_u_px     px     prediction − observation
   residual_v_px     px     prediction − observation
+grids:
+next_shot.*  any  σ with one shot more, by distance and tilt of the board
 files:
 rangefinder.yaml  text  the beam with its covariance
 )"},
@@ -98,6 +102,9 @@ points_in_board.
 px[2]               px  of the point
 px_cov_px2[]        any  its covariance, row by row
 point_in_cam_m[3]   m   where the range ends
+point_in_world_m[3] m   of a rig: the point
+M1[]                any projection matrix of the first head
+M2[]                any projection matrix of the second head
 point_cov_m2[]      any  its covariance, row by row
 heads[]             any of a rig: the point in each camera
 data:
@@ -122,7 +129,7 @@ points.csv.
   @cov cov_
 )"},
                                 {"simulate rangefinder", R"(estimate:
-outliers[]  count  shots that are wrong
+outliers[]  text  shots that are wrong
 files:
 shots.csv.
   range_m  m     read

@@ -49,6 +49,7 @@ transfer_rms_px       px     of unseen photos, the board's shape learned
 transfer_flat_rms_px  px     of unseen photos, the board flat
 working_distance_m    m      median distance of the board
 worst_3sigma_px       px     of a pixel in the worst place
+port                  any    flat_port: what a lens without a port would err, by range
 @board board.
 corners_used          count  in the solution
 corners_rejected[].photo      text   whose

@@ -140,7 +140,16 @@ position_m[3]       m     at the end, in the world
 velocity_m_s[3]     m/s   at the end, in the world
 *                   any   of a method
 data:)" + target_tables +
-                                              R"(innovations.
+                                              R"(frames.
+  t_s       s      of the video's image
+  head      count  whose
+  frame     count  number
+  u_px      px     target; null: not found
+  v_px      px     target
+  sigma_px  px     σ
+  score     1      how well it looks like the target
+  reason    text   why it was not found
+innovations.
   head                count  whose
   num                 count  innovations
   mean_u_sigma        1      mean, in its σ
@@ -227,7 +236,7 @@ poses.csv.
   event        text   what happened
 )"},
                                 {"simulate rig", R"(estimate:
-wrong_views[]  count  with a wrong reading
+wrong_views[]  text  with a wrong reading
 files:
 views.csv.
   view      count  number

@@ -19,6 +19,23 @@ focal_drift_x_px_s  px/s  of fx
 focal_drift_y_px_s  px/s  of fy
 sigma_px      px   of a coordinate
 sigma_px_from text residuals, or given
+matches.
+  given               count  between the photos
+  agree_within_pairs  count  with one rotation of their pair
+  kept                count  in the solution
+parallax.
+  z                  1   size of what rotation alone does not explain, in its σ
+  rms_px             px  of it
+  share_of_distance  1   how far the camera's centre moved, over the distance of the points
+photos[].
+  file        text   photo
+  used        flag   in the solution
+  reason      text   why not
+  points      count  of it that are used
+  rms_px      px     of a residual
+  turn_rad    rad    rotation from the first photo
+  zoom        1      focal length over that of the first
+  sigma_zoom  1      σ
 shared_errors.
   design_effect  1  how much less the rows tell than if each erred by itself
   correlation_s  s  how long errors last
@@ -53,6 +70,13 @@ steps.
   start_from_cam_qx  1  rotation since the first row
   start_from_cam_qy  1  rotation since the first row
   start_from_cam_qz  1  rotation since the first row
+photos.
+  name        text   photo
+  used        flag   in the solution
+  reason      text   why not
+  points      count  of it that are used
+  rms_px      px     of a residual
+  cluster_z2  1      squared error that the photo's matches share, in its σ
 points.
   step           count  row of `steps`
   point          count  number

@@ -23,6 +23,8 @@ glass_m  m    thickness of the glass
 n_glass  1    its refractive index
 n_water  1    refractive index of the water
 normal[3] 1   of the glass, in the camera
+normal_x  1   of it, as estimated
+normal_y  1   of it, as estimated
 )"},
                                 {"@pose", R"(
 x_m  m  position

@@ -95,6 +95,14 @@ data:)" + target_table_names() +
   phase_margin_deg  deg    of the loop
   delay_samples     count  of the loop
   sampled_radius    1      largest eigenvalue
+lenses.
+  intrinsics   text   given, observed or true
+  seed         count  of the trial
+  rms_px       px     of the target from the image's centre
+  p95_px       px     95 % are nearer
+  max_px       px     the farthest
+  focal_share  1      error of the focal length
+  focal_z      1      the same in its σ
 trials.
   controller     text   name
   seed           count  of the trial

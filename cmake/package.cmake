@@ -25,6 +25,7 @@ if(TARGET alidade_video)
   install(TARGETS alidade_video RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})  # `alidade` looks for it beside itself
 endif()
 
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/public_headers.txt)
 file(STRINGS ${PROJECT_SOURCE_DIR}/cmake/public_headers.txt public_headers)
 foreach(header ${public_headers})
   get_filename_component(folder ${header} DIRECTORY)

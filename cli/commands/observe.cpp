@@ -135,11 +135,11 @@ ExitCode observe_log(const ObserveArgs& args, Run& run) {
 ExitCode observe_input(const ObserveArgs& args, LiveRun& live, Run& run) {
   const auto [width_px, height_px] = given_size(args.config);
   const live::ObserveStream view(width_px, height_px);
-  StandardInput input;  // Ctrl-C ends waiting for a row
+  live.open(view.topics(), "/observe");  // who watches may come before the first row
+  StandardInput input;                   // Ctrl-C ends waiting for a row
   std::optional<ObserveStep> last;
   RotationLogStream stream(input, "-", {.skip_bad = args.skip_bad});
   Observer observer(stream.layout(), args.config);
-  live.open(view.topics(), "/observe");
   const bool shows = !run.options.json && !run.options.quiet;
   if (shows) std::cout << intrinsics_csv({}, {}) << std::flush;
   while (auto entry = stream.next()) {

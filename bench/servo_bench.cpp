@@ -4,6 +4,7 @@
 #include <string>
 
 #include "alidade/loop/servo_loop.h"
+#include "alidade/servo/head_servo.h"
 #include "run_benchmarks.h"
 
 namespace alidade::bench {

@@ -82,7 +82,8 @@ bool is_grey(const TiffShape& shape) {
 cv::Mat read_rows(TIFF* tiff, const TiffShape& shape, bool keep_alpha) {
   const int depth = shape.bits == 16 ? CV_16U : CV_8U;
   cv::Mat image(static_cast<int>(shape.height), static_cast<int>(shape.width), CV_MAKETYPE(depth, shape.samples));
-  if (static_cast<std::size_t>(TIFFScanlineSize(tiff)) > image.cols * image.elemSize()) return {};
+  if (static_cast<std::size_t>(TIFFScanlineSize(tiff)) > static_cast<std::size_t>(image.cols) * image.elemSize())
+    return {};
   for (int row = 0; row < image.rows; ++row) {
     if (TIFFReadScanline(tiff, image.ptr(row), static_cast<std::uint32_t>(row)) < 0) return {};
   }

@@ -87,10 +87,8 @@ void add_precision(const MovingTargetReport& report, Verdict& verdict) {
 
 void add_cameras(const MovingTargetReport& report, Verdict& verdict) {
   std::string left;
-  std::size_t num_left = 0, num_used = 0, num_given = 0;
+  std::size_t num_left = 0;
   for (const PlacedCamera& camera : report.cameras) {
-    num_used += camera.num_used;
-    num_given += camera.num_observations;
     if (camera.placed) continue;
     ++num_left;
     left += (left.empty() ? "head " : "; head ") + std::to_string(camera.id) + ": " + camera.reason;

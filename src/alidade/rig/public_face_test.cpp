@@ -101,7 +101,7 @@ TEST(RigFace, NamesViewsThatCannotBe) {
   face.views[3].head = 77;
   const RigCalibration result = rig(face.views, face.cameras, face_config(face));
   EXPECT_TRUE(result.verdict.ok()) << result.verdict.sentence;
-  for (const std::size_t v : {2, 3}) {
+  for (const std::size_t v : {2U, 3U}) {
     EXPECT_FALSE(result.views[v].used);
     EXPECT_NE(result.views[v].reason, "");
   }

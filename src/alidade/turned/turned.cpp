@@ -90,7 +90,7 @@ class TurnedRun {
                      [](const TurnedFit& a, const TurnedFit& b) { return a.num_kept > b.num_kept; });
     std::size_t best = 0;
     for (std::size_t i = 1; i < fits.size(); ++i) {
-      const bool as_many = fits[i].num_kept > 0.9 * static_cast<double>(fits[best].num_kept);
+      const bool as_many = static_cast<double>(fits[i].num_kept) > 0.9 * static_cast<double>(fits[best].num_kept);
       if (as_many && fits[i].solve.sigma_px < 0.9 * fits[best].solve.sigma_px) best = i;
     }
     name_other_minimum(fits, best);

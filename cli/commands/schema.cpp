@@ -16,7 +16,7 @@ ExitCode print_schema(const std::vector<std::string>& words, Run& run) {
   const std::string command = fmt::format("{}", fmt::join(words, " "));
   const std::vector<std::string> known = commands_with_results();
   if (std::ranges::find(known, command) == known.end()) {
-    throw UsageError(fmt::format("schema: '{}' leaves no result; there is {}", command, fmt::join(known, ", ")));
+    throw UsageError(fmt::format("'{}' leaves no result; there is {}", command, fmt::join(known, ", ")));
   }
   run.add_file("schema.json", result_schema(command).text(2) + "\n");
   run.print_file("schema.json");

@@ -108,25 +108,9 @@ M2[]                any projection matrix of the second head
 point_cov_m2[]      any  its covariance, row by row
 heads[]             any of a rig: the point in each camera
 data:
-points.
-  range_m     m    read
-  u_px        px   its image
-  v_px        px   its image
-  cov_uu_px2  px²  covariance
-  cov_uv_px2  px²  covariance
-  cov_vv_px2  px²  covariance
-  @xyz point_in_cam_
-  @cov cov_
+@reading points.
 files:
-points.csv.
-  range_m     m    read
-  u_px        px   its image
-  v_px        px   its image
-  cov_uu_px2  px²  covariance
-  cov_uv_px2  px²  covariance
-  cov_vv_px2  px²  covariance
-  @xyz point_in_cam_
-  @cov cov_
+@reading points.csv.
 )"},
                                 {"simulate rangefinder", R"(estimate:
 outliers[]  text  shots that are wrong

@@ -73,6 +73,16 @@ fy_px  px  focal length along v
 cx_px  px  principal point, u
 cy_px  px  principal point, v
 )"},
+                                {"@reading", R"(
+range_m     m    read
+u_px        px   its image
+v_px        px   its image
+cov_uu_px2  px²  covariance
+cov_uv_px2  px²  covariance
+cov_vv_px2  px²  covariance
+@xyz point_in_cam_
+@cov cov_
+)"},
                                 {"@corner-file", R"(
 photo       text   whose
 corner      count  number on the board, row by row

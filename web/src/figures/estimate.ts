@@ -62,7 +62,7 @@ function rowOf(quantity: Quantity, doc: Doc, has: Columns): HTMLElement {
     return el('tr', {}, el('th', {}, name), el('td', {class: 'word', colspan: 3 + Number(has.bound) + Number(has.error) + Number(has.model)}, quantity.text || '–'));
   const text = valueText(factor * quantity.value, factor * quantity.sigma);
   const isLens = quantity.path.startsWith('camera.');
-  const behind = text.plusMinus ? `± ${text.plusMinus}` : isLens && has.sigma ? 'held' : '';
+  const behind = text.plusMinus ? `± ${text.plusMinus}` : isLens && has.sigma ? 'fixed' : '';
   const beside = (kind: string, by: number) => {
     const value = doc.estimate(`${kind}.${quantity.path.replace(/^camera\./, '')}`);
     return el('td', {class: 'right'}, value !== 0 && Number.isFinite(value) ? (kind === 'bound' ? '± ' : '') + num(by * factor * value, 2) : '');

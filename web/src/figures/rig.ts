@@ -186,7 +186,7 @@ export const rigEstimate: Figure = {
     for (const [name, path, sigmaPath, unit_, factor] of parameterRows)
       body.append(el('tr', {}, el('th', {}, name), ...heads.flatMap((k) => {
         const sigma = sigmaPath ? doc.sigma(`heads[${k}].${sigmaPath}`) : NaN, text = valueText(factor * doc.estimate(`heads[${k}].${path}`), factor * sigma);
-        return [el('td', {class: 'value'}, text.value), el('td', {}, text.plusMinus ? `± ${text.plusMinus}` : sigma === 0 ? 'held' : ''), hasModel ? el('td', {class: 'right'}, times(doc.inflation(`heads[${k}].${sigmaPath}`))) : null];
+        return [el('td', {class: 'value'}, text.value), el('td', {}, text.plusMinus ? `± ${text.plusMinus}` : sigma === 0 ? 'fixed' : ''), hasModel ? el('td', {class: 'right'}, times(doc.inflation(`heads[${k}].${sigmaPath}`))) : null];
       }), el('td', {class: 'unit'}, unit_)));
     host.append(el('div', {class: 'scroll'}, el('table', {class: 'estimate'}, el('thead', {}, el('tr', {}, el('th'), ...heads.flatMap((k) => [el('th', {}, `head ${doc.estimate(`heads[${k}].id`)}`), el('th', {}, hasModel ? '3σ' : ''), hasModel ? el('th', {}, 'over model') : null]), el('th'))), body)));
     const rest: [string, string, string, number][] = [['camera to camera, 3σ', 'sigma_relative_rad', '°', 3 * degrees], ['camera to camera, 3σ', 'sigma_relative_m', 'mm', 3e3], ['RMS', 'rms_px', 'px', 1], ['χ² per degree of freedom', 'chi2_per_dof', '', 1], ['σ of a corner', 'noise.sigma_px', 'px', 1], ['σ of a reading', 'noise.sigma_encoder_rad', '°', degrees]];

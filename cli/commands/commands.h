@@ -10,6 +10,7 @@ void add_commands(App& app);
 void add_calibrate(App& app);
 void add_camera(App& app);
 void add_corners(App& app);
+void add_head(App& app);
 void add_identify(App& app);
 void add_localize(App& app);
 void add_observe(App& app);

@@ -1,0 +1,13 @@
+#pragma once
+
+#include "alidade/heads/head_identify.h"
+#include "alidade/results/outcome.h"
+
+namespace alidade {
+
+/// The document of what a head is.
+[[nodiscard]] JobOutcome outcome_of(const HeadSurvey& survey);
+/// Of how it follows: its axes with σ, and log.csv of each.
+[[nodiscard]] JobOutcome outcome_of(const HeadIdentification& identified);
+
+}  // namespace alidade

@@ -1,4 +1,7 @@
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <cstdlib>
 #include <memory>
 
 #include "alidade/geometry/degree.h"
@@ -12,9 +15,29 @@ namespace {
 
 struct HeadArgs {
   std::string url;
-  bool identify = false, move = false;
+  bool identify = false, calibrate = false, move = false;
+  std::string stream;
   HeadRange range;
+  std::optional<double> until;
+  double most_s = 85.0;
 };
+
+/// "0.5%", or a share.
+TextCode share_code(std::optional<double>& share) {
+  TextCode code;
+  code.read = [&share](const std::string& text) -> std::string {
+    char* end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    const std::string unit = end;
+    const double number = unit == "%" ? 0.01 * value : value;
+    if (end == text.c_str() || (!unit.empty() && unit != "%") || !(number > 0.0 && number < 1.0))
+      return "'" + text + "' is no share: give 0.5%";
+    share = number;
+    return "";
+  };
+  code.write = [&share] { return share ? fmt::format("{:g}%", 100.0 * *share) : std::string(); };
+  return code;
+}
 
 /// "LOW,HIGH" in degrees.
 TextCode range_code(HeadRange& range, int axis) {
@@ -31,21 +54,42 @@ TextCode range_code(HeadRange& range, int axis) {
 }
 
 FieldList fields_of(HeadArgs& args) {
-  return {{.name = "move", .value = &args.move, .help = "The head may move; without it nothing does"},
-          {.name = "identify",
-           .value = &args.identify,
-           .help = "Its model: rate, acceleration, time constant, latency, backlash, dead band, repeatability"},
-          {.name = "pan_range",
-           .value = range_code(args.range, 0),
-           .help = "Where it may go, in degrees, left above zero (default: the head's own limits)",
-           .form = "LOW,HIGH"},
-          {.name = "tilt_range",
-           .value = range_code(args.range, 1),
-           .help = "Where it may go, in degrees, up above zero (default: the head's own limits)",
-           .form = "LOW,HIGH"}};
+  return {
+      {.name = "move", .value = &args.move, .help = "The head may move; without it nothing does"},
+      {.name = "identify",
+       .value = &args.identify,
+       .help = "Its model: rate, acceleration, time constant, latency, backlash, dead band, repeatability"},
+      {.name = "calibrate",
+       .value = &args.calibrate,
+       .help = "Its camera, by moves that are planned from what is known: lens, mounting, delay"},
+      {.name = "stream",
+       .value = &args.stream,
+       .help = "What its camera sees: http://HOST:PORT/PATH (motion JPEG), or sim:// of a simulated head",
+       .form = "URL"},
+      {.name = "until",
+       .value = share_code(args.until),
+       .help = "Until 3 sigma of fx and fy are this share of them; 4 where that cannot be (default: its usual time)",
+       .form = "SHARE%"},
+      {.name = "most_s",
+       .value = &args.most_s,
+       .help = "For how long --calibrate may hold the head [s]",
+       .limits = {20.0, 3600.0}},
+      {.name = "pan_range",
+       .value = range_code(args.range, 0),
+       .help = "Where it may go, in degrees, left above zero (default: the head's own limits)",
+       .form = "LOW,HIGH"},
+      {.name = "tilt_range",
+       .value = range_code(args.range, 1),
+       .help = "Where it may go, in degrees, up above zero (default: the head's own limits)",
+       .form = "LOW,HIGH"}};
 }
 
 void check_head(const HeadArgs& args) {
+  if (args.identify && args.calibrate) throw UsageError("give one of --identify and --calibrate");
+  if (args.calibrate && args.stream.empty()) throw UsageError("--calibrate needs the camera: --stream URL");
+  if (args.calibrate && !args.move) throw UsageError("--calibrate moves the head: give --move as well");
+  if (!args.calibrate && (args.until || !args.stream.empty()))
+    throw UsageError("--stream and --until are for --calibrate");
   if (args.identify && !args.move) throw UsageError("--identify moves the head: give --move as well");
   if (!(args.range.low_rad.array() <= args.range.high_rad.array()).all())
     throw UsageError("--pan-range and --tilt-range are LOW,HIGH with LOW not above HIGH");
@@ -55,6 +99,13 @@ ExitCode run_head(const HeadArgs& args, Run& run) {
   check_head(args);
   const std::unique_ptr<HeadDevice> device = open_head(args.url);
   run.lap("connect");
+  if (args.calibrate) {
+    const std::unique_ptr<FrameStream> stream = open_stream(args.stream, *device);
+    const HeadCalibrationConfig config{.range = args.range, .until = args.until, .most_s = args.most_s};
+    JobOutcome outcome = outcome_of(calibrate_head(*device, *stream, config, run.progress));
+    run.lap("calibrate");
+    return run.finish(std::move(outcome));
+  }
   JobOutcome outcome = args.identify ? outcome_of(identify_head(*device, args.range, run.progress))
                                      : outcome_of(survey_head(*device, args.move, args.range, run.progress));
   run.lap(args.identify ? "identify" : "ask");
@@ -68,9 +119,11 @@ void add_head(App& app) {
   CLI::App& command = app.add_command(
       {.name = "head",
        .summary = "A pan-tilt head that is connected: what it is, and how it follows its commands",
-       .examples = "alidade head rotctl://127.0.0.1:4533\n"
-                   "alidade head rotctl://127.0.0.1:4533 --identify --move --pan-range -60,60 --tilt-range 0,60\n"
-                   "alidade head 'sim://?seed=3' --identify --move\n"},
+       .examples =
+           "alidade head rotctl://127.0.0.1:4533\n"
+           "alidade head rotctl://127.0.0.1:4533 --identify --move --pan-range -60,60 --tilt-range 0,60\n"
+           "alidade head 'sim://?seed=3' --identify --move\n"
+           "alidade head rotctl://127.0.0.1:4533 --stream http://127.0.0.1:8090/stream.mjpg --calibrate --move\n"},
       [args](Run& run) { return run_head(*args, run); });
   command.add_option("url", args->url, "rotctl://HOST:PORT (Hamlib's rotctld), or sim://?seed=N, a simulated one")
       ->required();

@@ -119,7 +119,7 @@ class Experiment {
     move_to(in + step);
     for (int i = 0; i < 2; ++i) {
       const PositionerLog& axis = log(i);
-      if (axis.readings.back().angle_rad == axis.readings.front().angle_rad)
+      if (std::abs(axis.readings.back().angle_rad - axis.readings.front().angle_rad) < 0.25 * std::abs(step[i]))
         throw InputError(fmt::format(
             "{}: took a command of {:.2f}° of {} and did not move; positions are refused "
             "silently, or its reading stands",

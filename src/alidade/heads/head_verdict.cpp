@@ -23,8 +23,7 @@ void check_readings(const PositionerFit& fit, const std::string& axis, std::vect
     checks.push_back({axis + " gain", State::bad,
                       fmt::format("{} reads {:.4g} of a radian that it is told", axis, fit.gain), off, limit, "", ""});
   }
-  const bool jumps = fit.rate.value > 1000.0 * degree;
-  if (jumps)
+  if (fit.reads_target)
     checks.push_back({axis + " reading", State::bad,
                       axis + " reads its target at once: it tells where it shall be, not where it is",
                       fit.rate.value / degree, 1000.0, "°/s", ""});

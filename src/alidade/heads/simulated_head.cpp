@@ -58,6 +58,7 @@ class SimulatedHead final : public HeadDevice {
     plant_.stop(t_s);
     return {t_s, 0.0};
   }
+  [[nodiscard]] HeadPlant& plant() { return plant_; }
 
  private:
   double heard() {
@@ -221,6 +222,11 @@ bool HeadPlant::is_at_rest(double t_s) {
   const std::scoped_lock lock(mutex_);
   advance(t_s);
   return axes_[0].is_at_rest() && axes_[1].is_at_rest();
+}
+
+HeadPlant* plant_of(HeadDevice& head) {
+  auto* simulated = dynamic_cast<SimulatedHead*>(&head);
+  return simulated != nullptr ? &simulated->plant() : nullptr;
 }
 
 std::unique_ptr<HeadDevice> open_simulated_head(const std::string& url) {

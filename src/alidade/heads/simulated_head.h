@@ -75,6 +75,9 @@ class HeadPlant {
   std::uint64_t draws_ = 0;
 };
 
+/// Of a head that is simulated in this program; null: it is another.
+[[nodiscard]] HeadPlant* plant_of(HeadDevice& head);
+
 /// sim://?seed=3: such a head in this program. `clock=free`: in a time of its own, as fast as it is asked.
 [[nodiscard]] std::unique_ptr<HeadDevice> open_simulated_head(const std::string& url);
 

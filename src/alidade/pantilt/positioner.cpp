@@ -6,13 +6,12 @@
 namespace alidade {
 namespace {
 
-constexpr double longest_step_s = 0.25e-3;
 constexpr double resting_rate_rad_s = 9e-4, near_rad = 2e-6, still_rad_s = 5e-5;
 
 }  // namespace
 
-Positioner::Positioner(const PositionerParams& params, double start_rad, double t_s)
-    : params_(params), t_(t_s), target_(start_rad), motor_(start_rad), output_(start_rad) {}
+Positioner::Positioner(const PositionerParams& params, double start_rad, double t_s, double step_s)
+    : params_(params), step_s_(step_s), t_(t_s), target_(start_rad), motor_(start_rad), output_(start_rad) {}
 
 void Positioner::go_to(double t_s, double target_rad) {
   waiting_.push_back({t_s + params_.latency_s, target_rad, false});
@@ -69,9 +68,9 @@ void Positioner::advance(double t_s) {
     double until = t_s;
     if (!waiting_.empty()) until = std::min(until, waiting_.front().acts_s);
     if (!is_at_rest_) {
-      const double dt = std::min(longest_step_s, until - t_);
+      const double dt = std::min(step_s_, until - t_);
       step(dt);
-      t_ = dt < longest_step_s ? until : t_ + dt;
+      t_ = dt < step_s_ ? until : t_ + dt;
     } else {
       t_ = until;
     }
@@ -79,11 +78,12 @@ void Positioner::advance(double t_s) {
 }
 
 std::vector<double> positioner_response(const PositionerParams& params, double start_rad,
-                                        std::span<const PositionCommand> commands, std::span<const double> times_s) {
+                                        std::span<const PositionCommand> commands, std::span<const double> times_s,
+                                        double step_s) {
   std::vector<double> answers(times_s.size(), start_rad);
   if (times_s.empty()) return answers;
   const double first_s = commands.empty() ? times_s.front() : std::min(times_s.front(), commands.front().t_s);
-  Positioner axis(params, start_rad, first_s - longest_step_s);
+  Positioner axis(params, start_rad, first_s - step_s, step_s);
   for (const PositionCommand& command : commands) axis.go_to(command.t_s, command.target_rad);
   double before_s = axis.time_s(), before_rad = start_rad;
   for (std::size_t i = 0; i < times_s.size();) {
@@ -96,7 +96,7 @@ std::vector<double> positioner_response(const PositionerParams& params, double s
     }
     before_s = axis.time_s();
     before_rad = axis.output_rad();
-    axis.advance(axis.is_at_rest() ? times_s[i] : before_s + longest_step_s);
+    axis.advance(axis.is_at_rest() ? times_s[i] : before_s + step_s);
   }
   return answers;
 }

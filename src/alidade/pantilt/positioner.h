@@ -17,12 +17,14 @@ struct PositionerParams {
   double dead_band_rad = 0.0;        ///< At rest, a target that is no farther does nothing.
 };
 
+inline constexpr double usual_positioner_step_s = 0.25e-3;
+
 /// The axis in time. A command acts `latency_s` after it was given; the wanted rate is the largest from which the drive
 /// can brake at its acceleration, or what is left over the time constant where that is less; the rate follows it within
-/// the acceleration. Integrated in steps of 0.25 ms that begin where a command begins to act.
+/// the acceleration. Integrated in steps of `step_s` that begin where a command begins to act.
 class Positioner {
  public:
-  Positioner(const PositionerParams& params, double start_rad, double t_s);
+  Positioner(const PositionerParams& params, double start_rad, double t_s, double step_s = usual_positioner_step_s);
 
   /// Commands in order of time.
   void go_to(double t_s, double target_rad);
@@ -47,7 +49,7 @@ class Positioner {
 
   PositionerParams params_;
   std::deque<Waiting> waiting_;
-  double t_, target_, motor_, output_, rate_ = 0.0;
+  double step_s_, t_, target_, motor_, output_, rate_ = 0.0;
   bool is_at_rest_ = true, is_stopping_ = false;
 };
 
@@ -59,6 +61,7 @@ struct PositionCommand {
 /// Output of an axis that rests at `start_rad`, at ascending times; between the steps in a straight line.
 [[nodiscard]] std::vector<double> positioner_response(const PositionerParams& params, double start_rad,
                                                       std::span<const PositionCommand> commands,
-                                                      std::span<const double> times_s);
+                                                      std::span<const double> times_s,
+                                                      double step_s = usual_positioner_step_s);
 
 }  // namespace alidade

@@ -30,7 +30,18 @@ axes.*.
   rms_rad              rad     of a residual
   noise                1       the same, over what resolution and clocks explain
   evidence.*           1       2 ln of the likelihood ratio for it
+stream           text   of the camera
+frame_times      text   stamped by who took them, or of their arrival
+frames           count  that came
+moves            count  of the head
+offline[]        text   words behind `alidade` that give the same numbers, where log.csv is
+mount_x_rad      rad    rotation vector of cam_from_tilt
+mount_y_rad      rad    rotation vector of cam_from_tilt
+mount_z_rad      rad    rotation vector of cam_from_tilt
+delay_s          s      a frame shows the angles of so much later than its time; below zero: earlier
+*                any    of --calibrate: as `observe` says it
 data:
+*.*  any  of --calibrate: as `observe` says it
 readings.
   t_s       s    middle of question and answer
   wait_s    s    for the answer
@@ -46,7 +57,12 @@ tilt.
   measured_rad  rad  encoder
   model_rad     rad  of the estimate
   residual_rad  rad  model − measured
+grids:
+*.*  any  of --calibrate
 files:
+camera.yaml  text  the lens with its covariance
+rig.yaml     text  the head with its mounting
+log.csv      text  rotation log, as `observe` reads it
 pan.csv.
   t_s        s    time
   command    rad  given last

@@ -4,7 +4,10 @@
 
 #include <cmath>
 
+#include "alidade/formats/rig_file.h"
 #include "alidade/geometry/degree.h"
+#include "alidade/geometry/so3.h"
+#include "alidade/results/observe_outcome.h"
 
 namespace alidade {
 namespace {
@@ -138,6 +141,56 @@ JobOutcome outcome_of(const HeadSurvey& survey) {
   }
   table.columns = {{"t_s", t}, {"wait_s", wait}, {"pan_rad", pan}, {"tilt_rad", tilt}};
   document.data.push_back(std::move(table));
+  return outcome;
+}
+
+namespace {
+
+/// rig.yaml: the camera's mounting on the head; the delay stands beside it.
+std::string rig_file_text(const HeadCalibration& calibration) {
+  Eigen::Vector3d mount = Eigen::Vector3d::Zero();
+  double delay_s = 0.0;
+  for (const ObservedQuantity& each : calibration.report.quantities) {
+    if (each.name == "mount_x_rad") mount[0] = each.value;
+    if (each.name == "mount_y_rad") mount[1] = each.value;
+    if (each.name == "mount_z_rad") mount[2] = each.value;
+    if (each.name == "delay_s") delay_s = each.value;
+  }
+  Rig rig;
+  rig.heads.resize(1);
+  rig.heads[0].camera = calibration.report.camera;
+  rig.heads[0].head.cam_from_tilt = exp_so3(mount);
+  const std::vector<std::string> files{"camera.yaml"};
+  return rig_text(rig, files) +
+         fmt::format(
+             "# delay_s: {:.6f}   (a frame shows the angles of so much later than its time; below zero: earlier)\n",
+             delay_s);
+}
+
+}  // namespace
+
+JobOutcome outcome_of(const HeadCalibration& calibration) {
+  JobOutcome outcome = outcome_of(calibration.report);
+  ResultDocument& document = outcome.document;
+  document.command = "head";
+  document.verdict = calibration.verdict;
+  std::erase_if(outcome.files, [](const NamedBytes& file) { return file.name != "camera.yaml"; });
+  const bool has_camera = !outcome.files.empty();
+  outcome.files.push_back({"log.csv", calibration.log_csv});
+  if (has_camera) outcome.files.push_back({"rig.yaml", rig_file_text(calibration)});
+  JsonValue& estimate = document.estimate;
+  estimate["url"] = calibration.url;
+  estimate["stream"] = calibration.stream;
+  estimate["head_time_s"] = calibration.head_time_s;
+  estimate["offline"] = calibration.offline;
+  estimate["frame_times"] = calibration.is_stamped ? "stamped" : "arrival";
+  estimate["frames"] = calibration.num_frames;
+  estimate["moves"] = calibration.num_moves;
+  std::string words = "alidade";
+  for (const std::string& word : calibration.offline) words += " " + word;
+  outcome.lines.push_back(fmt::format("{} moves, {} frames, {:.0f} s; off line: {}", calibration.num_moves,
+                                      calibration.num_frames, calibration.head_time_s, words));
+  outcome.lines.push_back("delay_s: a frame shows the angles of so much later than its time; below zero: earlier");
   return outcome;
 }
 

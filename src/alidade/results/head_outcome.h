@@ -1,5 +1,6 @@
 #pragma once
 
+#include "alidade/heads/head_calibrate.h"
 #include "alidade/heads/head_identify.h"
 #include "alidade/results/outcome.h"
 
@@ -9,5 +10,7 @@ namespace alidade {
 [[nodiscard]] JobOutcome outcome_of(const HeadSurvey& survey);
 /// Of how it follows: its axes with σ, and log.csv of each.
 [[nodiscard]] JobOutcome outcome_of(const HeadIdentification& identified);
+/// Of what it and its camera tell: camera.yaml, rig.yaml, log.csv.
+[[nodiscard]] JobOutcome outcome_of(const HeadCalibration& calibration);
 
 }  // namespace alidade

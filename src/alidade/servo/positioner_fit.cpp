@@ -14,7 +14,7 @@ namespace {
 
 using P = PositionerPlace;
 const std::vector<int> all_places{P::rate, P::acceleration, P::time_constant, P::latency, P::backlash, P::offset};
-constexpr double boundless_acceleration_rad_s2 = 1e3, instant_s = 2e-3;
+constexpr double boundless_acceleration_rad_s2 = 1e3, instant_s = 2e-3, coarse_s = 1e-3;
 
 /// The largest rate that was held over 0.15 s or more.
 double fastest(const std::vector<PositionerReading>& readings) {
@@ -47,8 +47,10 @@ double first_latency(const PositionerLog& log) {
 }
 
 /// From the best places of a coarse grid: the cost has more than one valley.
-PositionerVector best_start(const PositionerProblem& problem, double rate, double latency, double& cost) {
+PositionerVector best_start(PositionerProblem problem, double rate, double latency, double& cost) {
   constexpr std::size_t num_starts = 4;
+  constexpr int few_steps = 12;
+  problem.set_integration(coarse_s);
   std::vector<std::pair<double, PositionerVector>> grid;
   for (const double acceleration : {60.0, 120.0, 220.0, 400.0, 1e4})
     for (const double tau : {0.005, 0.05, 0.1, 0.15})
@@ -62,7 +64,7 @@ PositionerVector best_start(const PositionerProblem& problem, double rate, doubl
   PositionerVector best = grid.front().second;
   cost = 1e300;
   const auto try_from = [&](PositionerVector theta) {
-    const double reached = problem.solve(theta, all_places);
+    const double reached = problem.solve(theta, all_places, few_steps);
     if (reached >= cost) return;
     cost = reached;
     best = theta;
@@ -103,13 +105,15 @@ PositionerVector sigmas_of(const PositionerProblem& problem, const PositionerVec
 }
 
 /// What is lost where a place is held at nothing, the others following: 2 ln of the likelihood ratio.
-double evidence_of(const PositionerProblem& problem, PositionerVector theta, int place, double nothing, double cost,
-                   double noise2) {
+double evidence_of(PositionerProblem problem, PositionerVector theta, int place, double nothing, double noise2) {
+  constexpr int few_steps = 10;
+  problem.set_integration(coarse_s);
+  const double with = problem.solve(theta, all_places, few_steps);
   std::vector<int> others;
   for (const int each : all_places)
     if (each != place) others.push_back(each);
   theta[place] = nothing;
-  return (problem.solve(theta, others) - cost) / noise2;
+  return (problem.solve(theta, others, few_steps) - with) / noise2;
 }
 
 void fill_dead_band(const PositionerLog& log, double step, PositionerFit& fit) {
@@ -196,6 +200,22 @@ void find_sampling(PositionerProblem& problem, PositionerVector& theta, double& 
   cost = cost_as_asked;
 }
 
+/// Long moves that are over at the first reading after the command.
+bool reads_its_target(const PositionerLog& log) {
+  constexpr double long_rad = 2.0 * degree, soon_s = 0.08;  // no drive starts and stops so soon
+  int moves = 0, jumps = 0;
+  for (std::size_t i = 1; i < log.commands.size(); ++i) {
+    if (std::abs(log.commands[i].target_rad - log.commands[i - 1].target_rad) < long_rad) continue;
+    const auto next = std::ranges::upper_bound(log.readings, log.commands[i].t_s, {}, &PositionerReading::t_s);
+    if (next == log.readings.begin() || next == log.readings.end()) continue;
+    const double way = std::abs(next->angle_rad - (next - 1)->angle_rad);
+    ++moves;
+    jumps += way > 0.9 * std::abs(log.commands[i].target_rad - log.commands[i - 1].target_rad) &&
+             next->t_s - log.commands[i].t_s < soon_s;
+  }
+  return moves > 2 && 2 * jumps > moves;
+}
+
 double median_wait(const std::vector<double>& waits) { return waits.empty() ? 0.0 : median_of(waits); }
 
 }  // namespace
@@ -228,6 +248,7 @@ PositionerFit fit_positioner(const PositionerLog& log) {
   fill_dead_band(log, step, fit);
   fill_repeatability(log, step, fit);
   fill_gain(log, fit);
+  fit.reads_target = reads_its_target(log);
   PositionerProblem problem(log, step, fit.dead_band.value);
   if (problem.size() < 30) {
     fit.status = PositionerFit::Status::too_few;
@@ -236,15 +257,14 @@ PositionerFit fit_positioner(const PositionerLog& log) {
   fit.fastest_rad_s = fastest(problem.readings());
   double cost = 0.0;
   PositionerVector theta = best_start(problem, fit.fastest_rad_s, first_latency(log), cost);
+  cost = problem.solve(theta, all_places);
   find_sampling(problem, theta, cost, fit);
   const double noise2 = std::max(1.0, cost / static_cast<double>(problem.size() - all_places.size()));
   fit.noise = std::sqrt(cost / static_cast<double>(problem.size() - all_places.size()));
   PositionerVector sigma = sigmas_of(problem, theta, all_places, noise2);
   const double least = std::log(static_cast<double>(problem.size())) + 6.0;  // BIC, and some for what is not modelled
   const PositionerParams params = positioner_params(theta, fit.dead_band.value);
-  const auto test = [&](int place, double nothing) {
-    return evidence_of(problem, theta, place, nothing, cost, noise2);
-  };
+  const auto test = [&](int place, double nothing) { return evidence_of(problem, theta, place, nothing, noise2); };
   fit.reached_rate = params.rate_rad_s < 1.1 * fit.fastest_rad_s;
   fit.rate = {params.rate_rad_s, sigma[P::rate] * params.rate_rad_s, fit.reached_rate, 0.0};
   if (!fit.reached_rate) {

@@ -49,6 +49,7 @@ struct PositionerFit {
   double gain = 1.0, sigma_gain = 0.0;  ///< What is read at rest for a radian commanded; −1: a mirrored axis.
   double encoder_hz = 0.0;              ///< It is read so often; 0: whenever it is asked.
   double encoder_evidence = 0.0;
+  bool reads_target = false;  ///< Its reading is where it was told to go at once.
   bool reached_rate = false;  ///< The largest rate was held for a while.
   double fastest_rad_s = 0.0;
   double noise = 1.0;                                ///< Of the residuals, over what resolution and timing explain.

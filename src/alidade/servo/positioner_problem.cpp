@@ -111,8 +111,8 @@ PositionerProblem::PositionerProblem(const PositionerLog& log, double step_rad, 
 
 std::vector<double> PositionerProblem::response(const PositionerVector& theta, const std::vector<double>& times) const {
   const double offset = theta[PositionerPlace::offset];
-  std::vector<double> angles =
-      positioner_response(positioner_params(theta, dead_band_rad_), start_rad_ - offset, commands_, times);
+  std::vector<double> angles = positioner_response(positioner_params(theta, dead_band_rad_), start_rad_ - offset,
+                                                   commands_, times, integration_s_);
   for (double& angle : angles) angle += offset;
   return angles;
 }
@@ -144,9 +144,8 @@ Eigen::MatrixXd PositionerProblem::jacobian(const PositionerVector& theta, const
   return J;
 }
 
-double PositionerProblem::solve(PositionerVector& theta, const std::vector<int>& free) const {
+double PositionerProblem::solve(PositionerVector& theta, const std::vector<int>& free, int max_steps) const {
   using P = PositionerPlace;
-  constexpr int max_steps = 40;
   Eigen::VectorXd now = misfit(theta);
   double cost = now.squaredNorm(), damping = 1e-3;
   for (int i = 0; i < max_steps; ++i) {
@@ -173,7 +172,7 @@ double PositionerProblem::solve(PositionerVector& theta, const std::vector<int>&
       now = tried;
       cost -= gained;
     }
-    if (!is_better || gained < 1e-6 * cost) break;
+    if (!is_better || gained < 1e-5 * cost) break;
   }
   return cost;
 }

@@ -4,7 +4,11 @@
 #include <cstdlib>
 #include <memory>
 
+#include "alidade/detect/target_look.h"
+#include "alidade/files/files.h"
+#include "alidade/formats/rig_file.h"
 #include "alidade/geometry/degree.h"
+#include "alidade/heads/head_follow.h"
 #include "alidade/heads/head_identify.h"
 #include "alidade/results/head_outcome.h"
 #include "cli/app/app.h"
@@ -20,6 +24,9 @@ struct HeadArgs {
   HeadRange range;
   std::optional<double> until;
   double most_s = 85.0;
+  std::string rig;
+  NamedLook look;
+  HeadFollowConfig follow;
 };
 
 /// "0.5%", or a share.
@@ -53,6 +60,17 @@ TextCode range_code(HeadRange& range, int axis) {
       });
 }
 
+/// What the target looks like, by the name of what is done with it.
+Field follow_field(NamedLook& look) {
+  Field field = look_field(look);
+  field.name = "follow";
+  field.option = "--follow";
+  field.help = "Follows what looks so: " + field.help;
+  field.group.clear();
+  field.old_options.clear();
+  return field;
+}
+
 FieldList fields_of(HeadArgs& args) {
   return {
       {.name = "move", .value = &args.move, .help = "The head may move; without it nothing does"},
@@ -72,8 +90,8 @@ FieldList fields_of(HeadArgs& args) {
        .form = "SHARE%"},
       {.name = "most_s",
        .value = &args.most_s,
-       .help = "For how long --calibrate may hold the head [s]",
-       .limits = {20.0, 3600.0}},
+       .help = "For how long --calibrate or --follow may hold the head [s]",
+       .limits = {5.0, 86400.0}},
       {.name = "pan_range",
        .value = range_code(args.range, 0),
        .help = "Where it may go, in degrees, left above zero (default: the head's own limits)",
@@ -85,20 +103,42 @@ FieldList fields_of(HeadArgs& args) {
 }
 
 void check_head(const HeadArgs& args) {
-  if (args.identify && args.calibrate) throw UsageError("give one of --identify and --calibrate");
+  const bool follows = !args.look.text.empty();
+  if (args.identify + args.calibrate + follows > 1)
+    throw UsageError("give one of --identify, --calibrate and --follow");
+  if (follows && (args.stream.empty() || args.rig.empty()))
+    throw UsageError("--follow needs --stream URL and --rig FILE");
+  if (follows && !args.move) throw UsageError("--follow moves the head: give --move as well");
+  if (!follows && !args.rig.empty()) throw UsageError("--rig is for --follow");
   if (args.calibrate && args.stream.empty()) throw UsageError("--calibrate needs the camera: --stream URL");
   if (args.calibrate && !args.move) throw UsageError("--calibrate moves the head: give --move as well");
-  if (!args.calibrate && (args.until || !args.stream.empty()))
-    throw UsageError("--stream and --until are for --calibrate");
+  if (!args.calibrate && args.until) throw UsageError("--until is for --calibrate");
+  if (!args.calibrate && !follows && !args.stream.empty()) throw UsageError("--stream is for --calibrate and --follow");
   if (args.identify && !args.move) throw UsageError("--identify moves the head: give --move as well");
   if (!(args.range.low_rad.array() <= args.range.high_rad.array()).all())
     throw UsageError("--pan-range and --tilt-range are LOW,HIGH with LOW not above HIGH");
 }
 
-ExitCode run_head(const HeadArgs& args, Run& run) {
+ExitCode follow_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
+  run.add_input("rig", args.rig);
+  const Rig rig = read_rig(args.rig);
+  if (rig.heads.size() != 1) throw InputError(args.rig + ": one head is followed with; this rig has another number");
+  load_look(args.look);
+  const std::unique_ptr<FrameStream> stream = open_stream(args.stream, device);
+  HeadFollowConfig config = args.follow;
+  config.range = args.range;
+  config.most_s = args.most_s;
+  JobOutcome outcome = outcome_of(
+      follow_target(device, *stream, rig.heads.front(), args.look.look, args.look.pattern.get(), config, run.progress));
+  run.lap("follow");
+  return run.finish(std::move(outcome));
+}
+
+ExitCode run_head(HeadArgs& args, Run& run) {
   check_head(args);
   const std::unique_ptr<HeadDevice> device = open_head(args.url);
   run.lap("connect");
+  if (!args.look.text.empty()) return follow_by_head(args, *device, run);
   if (args.calibrate) {
     const std::unique_ptr<FrameStream> stream = open_stream(args.stream, *device);
     const HeadCalibrationConfig config{.range = args.range, .until = args.until, .most_s = args.most_s};

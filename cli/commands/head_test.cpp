@@ -3,8 +3,12 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <array>
 #include <chrono>
+#include <cmath>
+#include <cstdio>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <thread>
 
 #include "alidade/testing/command_test.h"
@@ -65,6 +69,91 @@ TEST_F(HeadCommand, RefusesWhatCannotBe) {
   const testing::Outcome secret = alidade({"head", "rotctl://me:hunter2@127.0.0.1:4533", "--out", path("out")});
   EXPECT_EQ(secret.code, 3);
   EXPECT_EQ((secret.out + secret.err).find("hunter2"), std::string::npos);
+}
+
+/// Pan and tilt at the end of a truth file, and whether they stood for the last half second.
+struct TruthEnd {
+  double pan = 0.0, tilt = 0.0, moved = 0.0;
+};
+TruthEnd end_of(const std::string& csv) {
+  std::istringstream lines(read_file(csv));
+  std::vector<std::array<double, 2>> rows;
+  for (std::string line; std::getline(lines, line);) {
+    double number = 0, t = 0, shown = 0, pan = 0, tilt = 0;
+    if (std::sscanf(line.c_str(), "%lf,%lf,%lf,%lf,%lf", &number, &t, &shown, &pan, &tilt) == 5)
+      rows.push_back({pan, tilt});
+  }
+  TruthEnd end;
+  if (rows.size() < 10) return end;
+  end.pan = rows.back()[0];
+  end.tilt = rows.back()[1];
+  const auto& before = rows[rows.size() - 6];
+  end.moved = std::hypot(end.pan - before[0], end.tilt - before[1]);
+  return end;
+}
+
+/// Our head as a server while `during` runs, with the ports.
+void with_server(const std::string& truth, const std::function<void(int rotctl, int stream, pid_t server)>& during) {
+  const int rotctl = free_port(), stream = free_port();
+  const auto meanwhile = [&](pid_t server) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1200));
+    during(rotctl, stream, server);
+    ::kill(server, SIGTERM);
+  };
+  (void)testing::run_program({ALIDADE_EXECUTABLE, "simulate", "head", "--rotctl", std::to_string(rotctl), "--stream",
+                              std::to_string(stream), "--head", "rate=3", "--truth", truth, "--seconds", "60"},
+                             "", meanwhile);
+}
+
+std::vector<std::string> calibrating(int rotctl, int stream, const std::string& out) {
+  return {ALIDADE_EXECUTABLE,
+          "head",
+          fmt::format("rotctl://127.0.0.1:{}", rotctl),
+          "--stream",
+          fmt::format("http://127.0.0.1:{}/stream.mjpg", stream),
+          "--calibrate",
+          "--move",
+          "--out",
+          out};
+}
+
+TEST_F(HeadCommand, StandsAfterCtrlC) {
+  with_server(path("truth.csv"), [&](int rotctl, int stream, pid_t) {
+    const testing::Outcome outcome = testing::run_program(calibrating(rotctl, stream, path("out")), "",
+                                                          testing::interrupt_after(std::chrono::milliseconds(4000)));
+    EXPECT_EQ(outcome.code, 130) << outcome.err;
+    EXPECT_FALSE(std::filesystem::exists(path("out")));
+    std::this_thread::sleep_for(std::chrono::milliseconds(1200));
+    const TruthEnd end = end_of(path("truth.csv"));
+    EXPECT_GT(std::hypot(end.pan, end.tilt), 0.01);
+    EXPECT_LT(end.moved, 1e-6);
+  });
+}
+
+TEST_F(HeadCommand, StandsAfterAKillByTheServersWatchdog) {
+  with_server(path("truth.csv"), [&](int rotctl, int stream, pid_t) {
+    const auto kill_soon = [](pid_t child) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(4000));
+      ::kill(child, SIGKILL);
+    };
+    (void)testing::run_program(calibrating(rotctl, stream, path("out")), "", kill_soon);
+    std::this_thread::sleep_for(std::chrono::milliseconds(2000));
+    const TruthEnd end = end_of(path("truth.csv"));
+    EXPECT_GT(std::hypot(end.pan, end.tilt), 0.01);
+    EXPECT_LT(end.moved, 1e-6);
+  });
+}
+
+TEST_F(HeadCommand, ALostServerIsSaid) {
+  with_server(path("truth.csv"), [&](int rotctl, int stream, pid_t server) {
+    const auto kill_server = [server](pid_t) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(4000));
+      ::kill(server, SIGKILL);
+    };
+    const testing::Outcome outcome = testing::run_program(calibrating(rotctl, stream, path("out")), "", kill_server);
+    EXPECT_TRUE(outcome.code == 3 || outcome.code == 4) << outcome.code << outcome.err;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  });
 }
 
 TEST_F(HeadCommand, IdentifiesHamlibsDummy) {

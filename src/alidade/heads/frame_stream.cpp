@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <map>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
@@ -30,8 +31,8 @@ class SimulatedStream final : public FrameStream {
     const double now_s = clock_.now_s();
     if (now_s < next_s_) return frames;
     next_s_ = std::max(next_s_ + 1.0 / camera_.fps, now_s - 1.0 / camera_.fps);
-    auto grey = std::make_shared<cv::Mat>(renderer_.frame(plant_.truth(now_s), ++number_));
-    frames.push_back({now_s + camera_.delay_s, true, std::move(grey)});
+    auto image = std::make_shared<cv::Mat>(renderer_.frame(plant_.truth(now_s), ++number_, now_s));
+    frames.push_back({now_s + camera_.delay_s, true, std::move(image)});
     return frames;
   }
 
@@ -44,6 +45,28 @@ class SimulatedStream final : public FrameStream {
   double next_s_ = 0.0;
   std::uint64_t number_ = 0;
 };
+
+/// A disc, to a sixteenth of a pixel; the world around it dimmed, so that it is the brightest by far.
+void draw_target(const SimulatedCamera& camera, const RotatingIntrinsics& k, const Eigen::Quaterniond& base_from_cam,
+                 double t_s, cv::Mat& image) {
+  constexpr int bits = 4;
+  constexpr double dim = 0.5, one = 1 << bits;
+  image *= dim;
+  Eigen::Vector2d at = camera.target_rad;
+  if (camera.target_span_rad > 0.0) {
+    const double cycles = std::fmod(t_s * camera.target_rate_rad_s / camera.target_span_rad, 2.0);
+    at[0] += camera.target_span_rad * ((cycles < 1.0 ? cycles : 2.0 - cycles) - 0.5);
+  }
+  const Eigen::Vector3d ray = base_from_cam.conjugate() *
+                              (base_from_cam_rotation(Eigen::Vector3d(at[0], at[1], 0.0)) * Eigen::Vector3d::UnitZ());
+  if (ray.z() < 0.2) return;
+  const Eigen::Vector2d plane = ray.head<2>() / ray.z(), bent = plane * (1.0 + k.k1 * plane.squaredNorm());
+  const Eigen::Vector2d px(k.fx * bent.x() + k.cx, k.fy * bent.y() + k.cy);
+  if ((px.array().abs() > 4096.0).any()) return;
+  cv::circle(image, cv::Point(static_cast<int>(std::lround(px.x() * one)), static_cast<int>(std::lround(px.y() * one))),
+             static_cast<int>(std::lround(camera.target_radius_rad * k.fx * one)), cv::Scalar(255), cv::FILLED,
+             cv::LINE_AA, bits);
+}
 
 std::vector<double> numbers_in(const std::string& text, const char* separators) {
   std::vector<double> numbers;
@@ -80,6 +103,11 @@ SimulatedCamera simulated_camera(const std::string& text, const std::string& whe
       camera.width_px = static_cast<int>(numbers[0]);
       camera.height_px = static_cast<int>(numbers[1]);
       for (double* each : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *each *= scale;
+    } else if (key == "target" && numbers.size() == 5) {
+      camera.target_rate_rad_s = numbers[0] * degree;
+      camera.target_rad = Eigen::Vector2d(numbers[1], numbers[2]) * degree;
+      camera.target_span_rad = numbers[3] * degree;
+      camera.target_radius_rad = numbers[4] * degree;
     } else if (key == "mount" && numbers.size() == 3) {
       camera.mount_rad = Eigen::Vector3d(numbers[0], numbers[1], numbers[2]) * degree;
     } else if (const auto place = places.find(key); place != places.end() && numbers.size() == 1) {
@@ -104,14 +132,16 @@ CameraRenderer::CameraRenderer(const SimulatedCamera& camera)
       world_(std::make_unique<World>(World{FarWorld::of_noise(3.0 / std::min(camera.fx, camera.fy), camera.seed)})) {}
 CameraRenderer::~CameraRenderer() = default;
 
-cv::Mat CameraRenderer::frame(const Eigen::Vector2d& pan_tilt_rad, std::uint64_t number) {
+cv::Mat CameraRenderer::frame(const Eigen::Vector2d& pan_tilt_rad, std::uint64_t number, double t_s) {
   const RotatingIntrinsics k{camera_.fx, camera_.fy, camera_.cx, camera_.cy, camera_.k1};
-  const Eigen::Quaterniond base_from_mount =
-      base_from_cam_rotation(Eigen::Vector3d(pan_tilt_rad[0], pan_tilt_rad[1], 0.0));
+  const Eigen::Quaterniond base_from_cam =
+      base_from_cam_rotation(Eigen::Vector3d(pan_tilt_rad[0], pan_tilt_rad[1], 0.0)) *
+      exp_so3(camera_.mount_rad).conjugate();
   const PanoramaConfig config{.blur_px = 0.6, .noise = camera_.noise, .oversampling = 1};
-  return render_panorama(world_->far, k, camera_.width_px, camera_.height_px,
-                         base_from_mount * exp_so3(camera_.mount_rad).conjugate(), config,
-                         camera_.seed + 0x9e3779b97f4a7c15u * number);
+  cv::Mat image = render_panorama(world_->far, k, camera_.width_px, camera_.height_px, base_from_cam, config,
+                                  camera_.seed + 0x9e3779b97f4a7c15u * number);
+  if (camera_.target_radius_rad > 0.0) draw_target(camera_, k, base_from_cam, t_s, image);
+  return image;
 }
 
 std::unique_ptr<FrameStream> open_stream(const std::string& url, HeadDevice& head) {

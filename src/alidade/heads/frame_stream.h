@@ -15,8 +15,8 @@ namespace alidade {
 /// A frame and when it was taken, by the run's clock.
 struct StreamFrame {
   double t_s = 0.0;
-  bool is_stamped = false;  ///< By who took it; else it is when it came.
-  std::shared_ptr<const cv::Mat> grey;
+  bool is_stamped = false;               ///< By who took it; else it is when it came.
+  std::shared_ptr<const cv::Mat> image;  ///< 8 bits, grey or BGR.
 };
 
 /// Frames of a camera as they come. Throws InputError: nobody answers, no pictures, the stream is lost.
@@ -35,11 +35,15 @@ struct SimulatedCamera {
   Eigen::Vector3d mount_rad = Eigen::Vector3d::Zero();  ///< Rotation vector of cam_from_tilt.
   double fps = 12.0, delay_s = 0.0;                     ///< A frame stamped t shows the angle of t − delay_s.
   double noise = 1.5;
+  /// A bright disc that goes to and fro about `target_rad` (pan, tilt) by `target_span_rad` of pan, at that rate; its
+  /// radius zero: none.
+  Eigen::Vector2d target_rad = Eigen::Vector2d::Zero();
+  double target_rate_rad_s = 0.0, target_span_rad = 0.0, target_radius_rad = 0.0;
   std::uint64_t seed = 1;
 };
 
-/// "KEY=VALUE&…": size (WIDTHxHEIGHT), fx, fy, cx, cy, k1, mount (x:y:z in degrees), fps, delay, noise, seed. Throws
-/// InputError.
+/// "KEY=VALUE&…": size (WIDTHxHEIGHT), fx, fy, cx, cy, k1, mount (x:y:z in degrees), fps, delay, noise, seed, target
+/// (rate:pan:tilt:span:radius in degrees). Throws InputError.
 [[nodiscard]] SimulatedCamera simulated_camera(const std::string& text, const std::string& where);
 
 /// Renders what such a camera sees at an angle of its head.
@@ -47,7 +51,7 @@ class CameraRenderer {
  public:
   explicit CameraRenderer(const SimulatedCamera& camera);
   ~CameraRenderer();
-  [[nodiscard]] cv::Mat frame(const Eigen::Vector2d& pan_tilt_rad, std::uint64_t number);
+  [[nodiscard]] cv::Mat frame(const Eigen::Vector2d& pan_tilt_rad, std::uint64_t number, double t_s);
 
  private:
   struct World;

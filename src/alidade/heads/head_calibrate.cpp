@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <mutex>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <thread>
 
 #include "alidade/estimation/config_error.h"
@@ -18,6 +19,12 @@
 
 namespace alidade {
 namespace {
+
+cv::Mat grey_of(const cv::Mat& image) {
+  cv::Mat grey = image;
+  if (image.channels() == 3) cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
+  return grey;
+}
 
 /// Follows points on a thread of its own, so that the head is asked in time.
 class FrameFollower {
@@ -58,7 +65,7 @@ class FrameFollower {
       waiting_.pop_front();
       is_busy_ = true;
       lock.unlock();
-      SeenFrame seen{frame.t_s, tracker_.update(*frame.grey)};
+      SeenFrame seen{frame.t_s, tracker_.update(grey_of(*frame.image))};
       lock.lock();
       is_busy_ = false;
       seen_.push_back(std::move(seen));
@@ -108,7 +115,21 @@ class Session {
 
   void run() {
     begin_s_ = last_frame_s_ = head_.now_s();
-    watch(0.6);
+    try {
+      watch(0.6);
+      moves();
+      head_.stop();
+    } catch (const InputError& fault) {  // a link is lost: the head first, then what was measured before is kept
+      stop_anyhow();
+      if (result_.num_frames == 0 || result_.num_moves < 3) throw;
+      result_.fault = fault.what();
+    }
+    result_.head_time_s = head_time();
+    estimate();
+  }
+
+ private:
+  void moves() {
     first_moves();
     bool goes_on = true;
     while (goes_on && left_s() > 0.0) {
@@ -116,12 +137,13 @@ class Session {
       if (is_reached() && head_time() > least_s()) break;
       goes_on = next_moves();
     }
-    head_.stop();
-    result_.head_time_s = head_time();
-    estimate();
   }
-
- private:
+  void stop_anyhow() {
+    try {
+      head_.stop();
+    } catch (const InputError&) {  // it is the head that is lost
+    }
+  }
   [[nodiscard]] double head_time() { return head_.now_s() - begin_s_; }
   /// Without a goal the usual time is used; with one it may be earlier.
   [[nodiscard]] double least_s() const { return config_.until ? 38.0 : std::min(62.0, 0.75 * config_.most_s); }
@@ -133,8 +155,8 @@ class Session {
       last_frame_s_ = head_.now_s();
       ++result_.num_frames;
       result_.is_stamped = frame.is_stamped;
-      result_.width_px = frame.grey->cols;
-      result_.height_px = frame.grey->rows;
+      result_.width_px = frame.image->cols;
+      result_.height_px = frame.image->rows;
       follower_.push(std::move(frame));
     }
     if (head_.now_s() - last_frame_s_ < lost_s) return;
@@ -290,6 +312,14 @@ Verdict calibration_verdict(const HeadCalibration& result, const HeadCalibration
                             const Eigen::Vector2d& span_rad) {
   constexpr double held_rad = 0.5 * degree;
   Verdict verdict = result.report.verdict;
+  if (!result.fault.empty()) {
+    verdict.state = State::refused;
+    verdict.exit_code = ExitCode::cannot_tell;
+    verdict.sentence = fmt::format("{}; the head was stopped after {:.0f} s; until then: {}", result.fault,
+                                   result.head_time_s, verdict.sentence);
+    verdict.to_add = "mend the link and run it again";
+    return verdict;
+  }
   const bool has_answer = verdict.exit_code == ExitCode::ok || verdict.exit_code == ExitCode::not_trusted;
   std::string missing;
   for (std::size_t i = 0; i < 2 && has_answer && config.until; ++i) {

@@ -17,6 +17,7 @@ namespace {
 
 class MachineClock final : public HeadClock {
  public:
+  MachineClock() { look_at_both(); }
   [[nodiscard]] double now_s() const override {
     return begin_s_ + std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
   }
@@ -26,8 +27,24 @@ class MachineClock final : public HeadClock {
   }
 
  private:
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-  double begin_s_ = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  using Steady = std::chrono::steady_clock;
+  /// Both clocks at once: of a few tries the one in which the least time went by between them.
+  void look_at_both() {
+    constexpr int tries = 50;
+    auto least = Steady::duration::max();
+    for (int i = 0; i < tries; ++i) {
+      const Steady::time_point before = Steady::now();
+      const double unix_s = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+      const Steady::duration between = Steady::now() - before;
+      if (between >= least) continue;
+      least = between;
+      begin_ = before + between / 2;
+      begin_s_ = unix_s;
+    }
+  }
+
+  Steady::time_point begin_;
+  double begin_s_ = 0.0;
 };
 
 /// Questions and commands a second, all together: what asks more often changes what it asks about.

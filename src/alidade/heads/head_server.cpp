@@ -175,7 +175,7 @@ struct HeadServer::State {
       const double t_s = clock->now_s(), stamp_s = t_s + config.camera.delay_s;
       const Eigen::Vector2d angles = plant.truth(t_s);
       const std::size_t number = ++num_frames;
-      const std::string jpeg = jpeg_bytes(renderer.frame(angles, number), 95);
+      const std::string jpeg = jpeg_bytes(renderer.frame(angles, number, t_s), 95);
       auto made = std::make_shared<const std::string>(
           fmt::format("--frame\r\nContent-Type: image/jpeg\r\nContent-Length: {}\r\nX-Frame: {}\r\nX-Timestamp: "
                       "{:.6f}\r\n\r\n",

@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <mutex>
 #include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <thread>
 
@@ -83,9 +82,8 @@ class MjpegStream final : public FrameStream {
       throw InputError(name_ + ": a part of the stream does not say how long it is");
     const std::string jpeg = socket_.bytes(*length);
     const double now_s = clock_->now_s();
-    cv::Mat image = decode_image(jpeg);
+    const cv::Mat image = decode_image(jpeg);
     if (image.empty() || image.depth() != CV_8U) throw InputError(name_ + ": a part of the stream is no JPEG");
-    if (image.channels() == 3) cv::cvtColor(image, image, cv::COLOR_BGR2GRAY);
     const bool is_stamped = stamp && std::isfinite(*stamp) && std::abs(*stamp - now_s) < 3600.0;
     return {is_stamped ? *stamp : now_s, is_stamped, std::make_shared<const cv::Mat>(image)};
   }

@@ -39,6 +39,10 @@ mount_x_rad      rad    rotation vector of cam_from_tilt
 mount_y_rad      rad    rotation vector of cam_from_tilt
 mount_z_rad      rad    rotation vector of cam_from_tilt
 delay_s          s      a frame shows the angles of so much later than its time; below zero: earlier
+commands         count  that were sent to follow the target
+rms_px           px     of the target from the principal point, from a third of the time on
+max_px           px     the farthest
+central_third    1      share of the frames with the target in the central third
 *                any    of --calibrate: as `observe` says it
 data:
 *.*  any  of --calibrate: as `observe` says it
@@ -63,6 +67,15 @@ files:
 camera.yaml  text  the lens with its covariance
 rig.yaml     text  the head with its mounting
 log.csv      text  rotation log, as `observe` reads it
+follow.csv.
+  t_s              s    of the frame
+  pan_rad          rad  of the head, when it was taken
+  tilt_rad         rad  of the head, when it was taken
+  u_px             px   target; empty: not found
+  v_px             px   target; empty: not found
+  target_pan_rad   rad  that would look at it
+  target_tilt_rad  rad  that would look at it
+  error_px         px   of the target from the principal point
 pan.csv.
   t_s        s    time
   command    rad  given last

@@ -194,4 +194,33 @@ JobOutcome outcome_of(const HeadCalibration& calibration) {
   return outcome;
 }
 
+JobOutcome outcome_of(const HeadFollowing& following) {
+  JobOutcome outcome;
+  ResultDocument& document = outcome.document;
+  document.command = "head";
+  document.verdict = following.verdict;
+  document.counts.given = following.frames.size();
+  JsonValue& estimate = document.estimate;
+  estimate["url"] = following.url;
+  estimate["stream"] = following.stream;
+  estimate["head_time_s"] = following.head_time_s;
+  estimate["commands"] = following.num_commands;
+  estimate["rms_px"] = following.rms_px;
+  estimate["max_px"] = following.max_px;
+  estimate["central_third"] = following.central_third;
+  std::string csv = "t_s,pan_rad,tilt_rad,u_px,v_px,target_pan_rad,target_tilt_rad,error_px\n";
+  for (const FollowedFrame& frame : following.frames) {
+    csv += fmt::format("{:.6f},{:.9f},{:.9f}", frame.t_s, frame.pan_tilt_rad[0], frame.pan_tilt_rad[1]);
+    csv += frame.is_found ? fmt::format(",{:.4f},{:.4f},{:.9f},{:.9f},{:.4f}\n", frame.px[0], frame.px[1],
+                                        frame.target_rad[0], frame.target_rad[1], frame.error_px)
+                          : std::string(",,,,,\n");
+    document.counts.used += frame.is_found;
+  }
+  document.counts.dropped = document.counts.given - document.counts.used;
+  outcome.files.push_back({"follow.csv", std::move(csv)});
+  outcome.lines.push_back(fmt::format("{} frames, {} commands; from a third of the time on {:.3g} px RMS",
+                                      following.frames.size(), following.num_commands, following.rms_px));
+  return outcome;
+}
+
 }  // namespace alidade

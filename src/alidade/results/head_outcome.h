@@ -1,6 +1,7 @@
 #pragma once
 
 #include "alidade/heads/head_calibrate.h"
+#include "alidade/heads/head_follow.h"
 #include "alidade/heads/head_identify.h"
 #include "alidade/results/outcome.h"
 
@@ -12,5 +13,7 @@ namespace alidade {
 [[nodiscard]] JobOutcome outcome_of(const HeadIdentification& identified);
 /// Of what it and its camera tell: camera.yaml, rig.yaml, log.csv.
 [[nodiscard]] JobOutcome outcome_of(const HeadCalibration& calibration);
+/// Of how it followed a target: follow.csv.
+[[nodiscard]] JobOutcome outcome_of(const HeadFollowing& following);
 
 }  // namespace alidade

@@ -277,13 +277,17 @@ PositionerFit fit_positioner(const PositionerLog& log) {
   const double e_tau = test(P::time_constant, std::log(instant_s));
   fit.time_constant = {params.time_constant_s, sigma[P::time_constant] * params.time_constant_s, e_tau > least, e_tau};
   const double e_backlash = test(P::backlash, 0.0);
-  fit.backlash = {params.backlash_rad, sigma[P::backlash], e_backlash > least, e_backlash};
+  // Neighbouring readings round alike: what they say together is not below a quarter of a step.
+  fit.backlash = {params.backlash_rad, std::hypot(sigma[P::backlash], 0.25 * step), e_backlash > least, e_backlash};
+  constexpr double phase_share = 0.02;  // when in its period the encoder is sampled is known no better
   const double period = fit.encoder_hz > 0.0 ? 1.0 / fit.encoder_hz : 0.0;
   // Who sent and who received do not agree better on when than the answer took.
   std::vector<double> waits;
   for (const PositionerReading& reading : problem.readings()) waits.push_back(reading.wait_s);
   const double shared_s = std::hypot(median_wait(log.command_waits_s), median_wait(waits)) / std::sqrt(12.0);
-  fit.latency = {params.latency_s + 0.5 * period, std::hypot(std::hypot(sigma[P::latency], shared_s), 2e-4), true, 0.0};
+  fit.latency = {params.latency_s + 0.5 * period,
+                 std::hypot(std::hypot(sigma[P::latency], shared_s), std::hypot(2e-4, phase_share * period)), true,
+                 0.0};
   fit.offset_rad = theta[P::offset];
   fit.sigma_offset_rad = sigma[P::offset];
   fit.model_rad = problem.model(theta);

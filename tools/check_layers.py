@@ -51,7 +51,11 @@ OUTSIDE = {
     "cli/app": ({"board", "calibrate", "description", "estimation", "files", "images", "live", "report", "results"}, {"cli/app"}),
     "cli/commands": (None, {"cli/app", "cli/commands"}),
     "cli/simulate": (None, {"cli/app", "cli/commands", "cli/simulate"}),
-    "cli/decoder": (set(), set()),  # a program of its own
+    "cli/decoder": (set(), set()),  # programs of their own: videos; campaigns on MPI; fleets on NATS; streams of cameras
+    "cli/ranks": (None, {"cli/app", "cli/commands", "cli/ranks"}),
+    "cli/fleet": (None, {"cli/app", "cli/commands", "cli/fleet"}),
+    "cli/heads": (None, {"cli/app", "cli/commands", "cli/heads"}),
+    "cli/capture": (None, {"cli/app", "cli/commands", "cli/capture"}),
     "bench": (None, {"bench"}),
     "fuzz": (None, {"fuzz"}),
     "python/bindings": (None, {"cli/app", "cli/commands", "python/bindings"}),

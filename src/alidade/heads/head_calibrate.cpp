@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "alidade/estimation/config_error.h"
+#include "alidade/estimation/median.h"
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/heads/turn_log.h"
@@ -125,6 +126,7 @@ class Session {
       result_.fault = fault.what();
     }
     result_.head_time_s = head_time();
+    result_.sigma_clock_s = clock_sigma();
     estimate();
   }
 
@@ -138,6 +140,13 @@ class Session {
       goes_on = next_moves();
     }
   }
+  /// Who asked and who answered do not agree better on when than the answer took.
+  [[nodiscard]] double clock_sigma() const {
+    constexpr double machine_s = 1e-4;
+    std::vector<double> waits;
+    for (const HeadPosition& each : readings_) waits.push_back(each.wait_s);
+    return std::hypot(machine_s, waits.empty() ? 0.0 : median_of(std::move(waits)) / std::sqrt(12.0));
+  }
   void stop_anyhow() {
     try {
       head_.stop();
@@ -150,7 +159,7 @@ class Session {
   [[nodiscard]] double left_s() { return config_.most_s - head_time() - 4.0; }
 
   void take_frames() {
-    constexpr double lost_s = 2.0;
+    constexpr double lost_s = 10.0;  // it may come back; until then the head stands
     for (StreamFrame& frame : stream_.take()) {
       last_frame_s_ = head_.now_s();
       ++result_.num_frames;
@@ -159,8 +168,9 @@ class Session {
       result_.height_px = frame.image->rows;
       follower_.push(std::move(frame));
     }
-    if (head_.now_s() - last_frame_s_ < lost_s) return;
+    if (head_.now_s() - last_frame_s_ < silent_s) return;
     head_.stop();
+    if (head_.now_s() - last_frame_s_ < lost_s) return;
     throw InputError(fmt::format("{}: no frame for {:g} s; the stream is lost", stream_.name(), lost_s));
   }
   /// Asks the head and takes frames for so long.
@@ -180,6 +190,7 @@ class Session {
   void move_to(const Eigen::Vector2d& target) {
     constexpr double rest_s = 0.45, most_s = 20.0;
     if (left_s() < 0.0) return;
+    while (head_.now_s() - last_frame_s_ > silent_s) watch(0.1);
     ++result_.num_moves;
     const Eigen::Vector2d from = at(), way = target - from;
     const double pieces = std::max(1.0, std::ceil(way.norm() / longest_piece()));
@@ -295,7 +306,7 @@ class Session {
     return high;
   }
 
-  static constexpr double piece_s = 0.1;
+  static constexpr double piece_s = 0.1, silent_s = 1.2;
   MovingHead& head_;
   FrameStream& stream_;
   const HeadCalibrationConfig& config_;

@@ -24,8 +24,10 @@ struct HeadCalibration {
   std::size_t num_frames = 0, num_moves = 0;
   bool is_stamped = false;  ///< Frames say when they were taken.
   double head_time_s = 0.0;
-  std::string fault;                 ///< What broke in the middle; the head was stopped, and the rest is of before.
-  std::string log_csv;               ///< What `offline` reads, as log.csv.
+  double sigma_clock_s =
+      0.0;              ///< Of the head's times against the frames'; in σ of the delay beside what the log tells.
+  std::string fault;    ///< What broke in the middle; the head was stopped, and the rest is of before.
+  std::string log_csv;  ///< What `offline` reads, as log.csv.
   std::vector<std::string> offline;  ///< `alidade` with these words, in the folder of log.csv, gives the same numbers.
   ObserveReport report;
   Verdict verdict;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <mutex>
@@ -98,12 +99,28 @@ class MjpegStream final : public FrameStream {
         const std::scoped_lock lock(mutex_);
         frames_.push_back(std::move(frame));
         if (frames_.size() > most_waiting) frames_.pop_front();
-      } catch (const std::exception& error) {
+      } catch (const InputError& error) {
+        if (connects_again()) continue;
         const std::scoped_lock lock(mutex_);
         fault_ = std::string(error.what()) + "; the stream is lost";
         return;
       }
     }
+  }
+
+  /// With growing pauses.
+  bool connects_again() {
+    constexpr int tries = 5, first_pause_ms = 200;
+    for (int i = 0; i < tries && !ends_; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(first_pause_ms << i));
+      try {
+        socket_.close();
+        begin();
+        return true;
+      } catch (const InputError&) {  // not yet
+      }
+    }
+    return false;
   }
 
   std::string name_;

@@ -183,6 +183,8 @@ JobOutcome outcome_of(const HeadCalibration& calibration) {
   estimate["stream"] = calibration.stream;
   estimate["head_time_s"] = calibration.head_time_s;
   estimate["offline"] = calibration.offline;
+  for (const ObservedQuantity& each : calibration.report.quantities)
+    if (each.name == "delay_s") document.stddev["delay_s"] = std::hypot(each.sigma, calibration.sigma_clock_s);
   estimate["frame_times"] = calibration.is_stamped ? "stamped" : "arrival";
   estimate["frames"] = calibration.num_frames;
   estimate["moves"] = calibration.num_moves;

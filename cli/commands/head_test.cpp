@@ -59,9 +59,28 @@ TEST_F(HeadCommand, IdentifiesASimulatedHead) {
   }
 }
 
+TEST_F(HeadCommand, CalibratesAndFollows) {
+  const std::string head = "sim://?rate=8&clock=free";
+  const testing::Outcome calibrated = alidade({"head", head, "--stream", "sim://?delay=0.04", "--calibrate", "--move",
+                                               "--pan-range", "-60,60", "--until", "0.5%", "--out", path("out")});
+  ASSERT_EQ(calibrated.code, 0) << calibrated.err;
+  for (const char* file : {"camera.yaml", "rig.yaml", "log.csv", "result.json", "report.html"})
+    EXPECT_TRUE(std::filesystem::exists(path("out") + "/" + file)) << file;
+  const testing::Outcome followed =
+      alidade({"head", head, "--stream", "sim://?delay=0.04&target=4:0:3:20:1.2", "--rig", path("out") + "/rig.yaml",
+               "--follow", "bright", "--move", "--most", "15", "--latency", "0.04", "--delay", "-0.04", "--json",
+               "--out", path("followed")});
+  ASSERT_EQ(followed.code, 0) << followed.err;
+  const auto document = nlohmann::json::parse(followed.out);
+  EXPECT_LT(document["estimate"]["rms_px"].get<double>(), 12.0);
+  EXPECT_GT(document["estimate"]["central_third"].get<double>(), 0.9);
+}
+
 TEST_F(HeadCommand, RefusesWhatCannotBe) {
   EXPECT_EQ(alidade({"head", "sim://", "--identify"}).code, 2);
   EXPECT_EQ(alidade({"head", "sim://", "--pan-range", "5,-5"}).code, 2);
+  EXPECT_EQ(alidade({"head", "sim://", "--follow", "bright", "--move"}).code, 2);
+  EXPECT_EQ(alidade({"head", "sim://", "--calibrate", "--move"}).code, 2);
   EXPECT_EQ(alidade({"head", "sim://", "--pan-range", "nan,5"}).code, 2);
   EXPECT_EQ(alidade({"head", "sim://?lie=often"}).code, 3);
   EXPECT_EQ(alidade({"head", "ftp://here"}).code, 3);

@@ -88,6 +88,7 @@ ObserveReport observed(const std::string& log_csv, int width_px, int height_px) 
   ObserveConfig config;
   config.estimate = {"k1", "mount", "delay"};
   config.no_zoom = true;
+  config.method = ObserveMethod::batch;  // nothing changes: a filter that follows would only lose rows
   config.width_px = width_px;
   config.height_px = height_px;
   try {
@@ -371,8 +372,10 @@ HeadCalibration calibrate_head(HeadDevice& device, FrameStream& stream, const He
     span = head.high_rad() - head.low_rad();
     Session(head, stream, config, progress, result).run();
   }
-  result.offline = {"observe",    "log.csv",        "--size",   fmt::format("{}x{}", result.width_px, result.height_px),
-                    "--estimate", "k1,mount,delay", "--no-zoom"};
+  result.offline = {
+      "observe",    "log.csv",        "--size",    fmt::format("{}x{}", result.width_px, result.height_px),
+      "--estimate", "k1,mount,delay", "--no-zoom", "--method",
+      "batch"};
   result.verdict = calibration_verdict(result, config, span);
   return result;
 }

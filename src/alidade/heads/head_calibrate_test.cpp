@@ -63,6 +63,7 @@ TEST(HeadCalibrate, LensMountingAndDelayWithinThreeSigma) {
   ObserveConfig config;
   config.estimate = {"k1", "mount", "delay"};
   config.no_zoom = true;
+  config.method = ObserveMethod::batch;
   config.width_px = 320;
   config.height_px = 240;
   const ObserveReport again = observe(parse_rotation_log(result.log_csv, "log.csv").log, config);

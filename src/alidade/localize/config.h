@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/beam/beam.h"
 #include "alidade/description/field.h"
 #include "alidade/localize/camera_motion.h"
 #include "alidade/localize/distortion.h"
@@ -88,6 +89,16 @@ struct LocalizeStart {
   std::vector<GivenDepth> depths = {};
 };
 
+/// How deep a camera is, up to an offset: from a pressure sensor.
+struct DepthReading {
+  double t_s = 0.0, depth_m = 0.0, sigma_m = 0.01;
+};
+
+/// What a rangefinder beside the camera reads.
+struct RangeReading {
+  double t_s = 0.0, range_m = 0.0;
+};
+
 /// When a new point enters the state.
 enum class NewPoints {
   inverse_depth,  ///< With its first observation, as an inverse depth.
@@ -106,6 +117,9 @@ struct LocalizeConfig {
   std::optional<double> sigma_scale = {};   ///< Of the target's size, relative: counted. None: the target's own.
   std::optional<LocalizeStart> start = {};  ///< Else from the target, else the first camera is the world, up to scale.
   LocalizeTarget target = {};
+  std::vector<DepthReading> depth_readings = {};  ///< In order of time: scale without a target, else a check of it.
+  std::vector<RangeReading> range_readings = {};  ///< The same, of `beam`.
+  std::optional<Beam> beam = {};
   double period_s = 0.0;  ///< Usual time between frames. 0: the median; of images the least so far.
   bool smooths = true;    ///< With a target: the path is solved again from all observations after the last frame.
   bool restarts = true;   ///< From the target where the innovations say that the path is wrong.

@@ -24,7 +24,7 @@ namespace {
 
 struct LocalizeArgs {
   std::filesystem::path sequence;
-  std::string camera, target, start, truth, depth_sensor, range, beam;  // files
+  std::string camera, target, start, truth, depth_sensor, range, beam, mask;  // files
   std::optional<double> rate_hz;
   bool skip_bad = false;
   LocalizeConfig config;
@@ -49,6 +49,12 @@ FieldList fields_of(LocalizeArgs& args) {
        .value = &args.start,
        .help = "Where the camera starts, how fast, how sure; depths of points (start.yaml)",
        .form = "FILE"},
+      {.name = "mask",
+       .value = &args.mask,
+       .help =
+           "Where images show the scene: an image of the camera's size, black where they do not; or 'circle', as an "
+           "endoscope's, found in the first image",
+       .form = "FILE|circle"},
       {.name = "depth_sensor",
        .value = &args.depth_sensor,
        .help = "How deep the camera is, up to an offset, CSV: t_s,depth_m[,sigma_m]; metres without a target, else a "
@@ -81,6 +87,16 @@ FieldList fields_of(LocalizeArgs& args) {
 
 double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
+ImageMask read_mask(const std::filesystem::path& file) {
+  const cv::Mat photo = decode_photo(read_file(file), file.string());
+  std::vector<cv::Mat> channels;
+  cv::split(photo, channels);
+  const cv::Mat is_shown = channels.front() > 0;
+  ImageMask mask{is_shown.cols, is_shown.rows, {}};
+  mask.shows.assign(is_shown.begin<std::uint8_t>(), is_shown.end<std::uint8_t>());
+  return mask;
+}
+
 /// Reads the files that the config takes values from.
 void read_values(LocalizeArgs& args) {
   if (!args.target.empty())
@@ -89,6 +105,10 @@ void read_values(LocalizeArgs& args) {
   if (args.range.empty() != args.beam.empty()) throw UsageError("--range and --beam belong together: give both");
   if (!args.depth_sensor.empty()) args.config.depth_readings = read_depth_sensor(args.depth_sensor);
   if (!args.range.empty()) args.config.range_readings = read_ranges(args.range);
+  if (!args.mask.empty() && !args.is_images())
+    throw UsageError("--mask is of images; a table of observations has none");
+  args.config.masks_circle = args.mask == "circle";
+  if (!args.mask.empty() && !args.config.masks_circle) args.config.mask = read_mask(args.mask);
   if (!args.beam.empty()) args.config.beam = read_beam(args.beam).beam;
   args.config.seconds = now_s;
 }
@@ -98,6 +118,7 @@ void add_inputs(const LocalizeArgs& args, Run& run) {
   run.add_input("camera", args.camera);
   if (!args.target.empty()) run.add_input("target", args.target);
   if (!args.start.empty()) run.add_input("start", args.start);
+  if (!args.mask.empty() && args.mask != "circle") run.add_input("mask", args.mask);
   if (!args.depth_sensor.empty()) run.add_input("depth sensor", args.depth_sensor);
   if (!args.range.empty()) run.add_input("range", args.range);
   if (!args.beam.empty()) run.add_input("beam", args.beam);

@@ -118,9 +118,13 @@ struct NearPoint {
   Eigen::Vector3d point_in_world;
 };
 
+struct BeamScale {
+  double log_scale = 0.0, roughness = 0.0;  ///< The points off their plane, over the distance.
+};
+
 /// Metres a unit where the beam hits the plane through the points that are nearest to it. None: too few around it.
-std::optional<double> scale_at(const Rigid3& world_from_cam, const Beam& beam, double range_m,
-                               std::span<const MapPoint> map) {
+std::optional<BeamScale> scale_at(const Rigid3& world_from_cam, const Beam& beam, double range_m,
+                                  std::span<const MapPoint> map) {
   constexpr std::size_t num_near = 6;
   constexpr double far_off = 0.25, max_roughness = 0.1;
   const Eigen::Vector3d hit_in_cam = point_at(beam, range_m);
@@ -150,7 +154,8 @@ std::optional<double> scale_at(const Rigid3& world_from_cam, const Beam& beam, d
   if (std::abs(of_hit) < grazing * hit_in_cam.norm() || roughness > max_roughness * middle.norm()) return std::nullopt;
   // n·X = c in units; where the beam hits it is s c in metres.
   const double scale = of_hit / to_plane;
-  return scale > 0.0 && std::isfinite(scale) ? std::optional(scale) : std::nullopt;
+  if (!(scale > 0.0) || !std::isfinite(scale)) return std::nullopt;
+  return BeamScale{std::log(scale), roughness / middle.norm()};
 }
 
 }  // namespace
@@ -158,10 +163,13 @@ std::optional<double> scale_at(const Rigid3& world_from_cam, const Beam& beam, d
 std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, const Beam& beam,
                                         std::span<const PathStep> path, std::span<const MapPoint> map) {
   std::vector<double> logs;  // in order of time
+  double roughness = 0.0;
   for (const RangeReading& reading : readings) {
     const auto pose = pose_at(path, reading.t_s);
     const auto scale = pose ? scale_at(*pose, beam, reading.range_m, map) : std::nullopt;
-    if (scale) logs.push_back(std::log(*scale));
+    if (!scale) continue;
+    logs.push_back(scale->log_scale);
+    roughness += scale->roughness;
   }
   constexpr std::size_t num_blocks = 10;
   if (logs.size() < 3 * num_blocks) return std::nullopt;
@@ -182,7 +190,10 @@ std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, 
   const double num = static_cast<double>(num_blocks), mean = sum / num;
   ReadScale read{std::exp(mean), 0.0, logs.size(), num_given - logs.size()};
   const double of_beam = std::sqrt(std::max(beam.cov(beam_scale_param, beam_scale_param), 0.0)) / beam.scale;
-  read.sigma_rel = std::hypot(std::sqrt(std::max(squares / num - mean * mean, 0.0) / (num - 1.0)), of_beam);
+  // A surface that is bent is on one side of every plane through its points, by about as much as they are off it.
+  const double of_surface = roughness / static_cast<double>(num_given);
+  const double of_blocks = std::sqrt(std::max(squares / num - mean * mean, 0.0) / (num - 1.0));
+  read.sigma_rel = std::hypot(of_blocks, of_beam, of_surface);
   constexpr double useless = 0.2;
   return read.sigma_rel < useless ? std::optional(read) : std::nullopt;
 }

@@ -191,6 +191,10 @@ void require_sense(const LocalizeConfig& config, const Camera& camera) {
       found.emplace_back("a range reading is not finite and above 0");
       break;
     }
+  if (config.mask && (config.mask->width_px != camera.width_px || config.mask->height_px != camera.height_px ||
+                      config.mask->shows.size() !=
+                          static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px)))
+    found.emplace_back("the mask is not of the camera's size");
   if (!config.range_readings.empty() && !config.beam) found.emplace_back("range readings need a beam");
   add_lens_faults(config.filter, camera, found);
   throw_if_any(found);

@@ -24,6 +24,9 @@ install(TARGETS alidade_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 if(TARGET alidade_video)
   install(TARGETS alidade_video RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})  # `alidade` looks for it beside itself
 endif()
+if(TARGET alidade_study)
+  install(TARGETS alidade_study RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endif()
 
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/public_headers.txt)
 file(STRINGS ${PROJECT_SOURCE_DIR}/cmake/public_headers.txt public_headers)

@@ -8,7 +8,7 @@ FOUNDATIONS = {"geometry", "estimation", "description"}
 VISION = {"imaging", "corners", "board_detector", "spot", "patches", "target", "matching"}  # measurements in an image
 SENSORS = {"camera", "pantilt", "beam", "board"} | VISION
 ESTIMATORS = {"calibrate", "localize", "network", "observe", "rangefinder", "rig", "servo", "track", "turned"}
-COMPOSITIONS = {"capture", "loop"}  # put estimators and the simulator together
+COMPOSITIONS = {"capture", "loop", "study"}  # put estimators and the simulator together
 JOBS = FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate"}
 FILES = {"files", "images", "formats", "tables"}  # what stands on a disk, read and written
 
@@ -32,6 +32,7 @@ MAY_INCLUDE = {
     "turned": FOUNDATIONS | SENSORS | {"observe"},  # what photos of a rotating camera tell is an observation
     **{composition: FOUNDATIONS | SENSORS | ESTIMATORS | {"simulate"} for composition in COMPOSITIONS},
     "reproduce": JOBS,
+    "study": JOBS | {"reproduce"},  # the settings of the papers are settings to study
     "report": JOBS,
     "files": FOUNDATIONS,
     "images": FOUNDATIONS | {"imaging", "files"},

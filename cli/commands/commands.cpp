@@ -3,6 +3,7 @@
 namespace alidade::cli {
 
 void add_commands(App& app) {
+  add_batch(app);
   add_calibrate(app);
   add_camera(app);
   add_corners(app);
@@ -17,6 +18,7 @@ void add_commands(App& app) {
   add_schema(app);
   add_servo(app);
   add_simulate(app);
+  add_study(app);
   add_track(app);
   add_view(app);
 }

@@ -7,6 +7,7 @@ class App;
 /// All of those below.
 void add_commands(App& app);
 
+void add_batch(App& app);
 void add_calibrate(App& app);
 void add_camera(App& app);
 void add_corners(App& app);
@@ -27,6 +28,7 @@ void add_schema(App& app);
 void add_servo(App& app);
 void add_servo_scenario(App& app);  ///< Of `simulate`.
 void add_simulate(App& app);
+void add_study(App& app);
 void add_track(App& app);
 void add_track_scenario(App& app);       ///< Of `simulate`.
 void add_underwater_scenario(App& app);  ///< Of `simulate`.

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <functional>
 #include <stdexcept>
+#include <string>
 #include <string_view>
 
 #include "alidade/public.h"
@@ -13,6 +14,8 @@ ALIDADE_PUBLIC_BEGIN
 /// The person pressed Ctrl-C; the door turns it into one line and its exit code, nothing is written.
 struct Interrupted : std::runtime_error {
   Interrupted() : std::runtime_error("interrupted; nothing written") {}
+  /// Of work that leaves what it has done.
+  explicit Interrupted(const std::string& what) : std::runtime_error(what) {}
 };
 
 /// How long work reports itself and is stopped: called now and then, from any thread, as (what, done, total).

@@ -1,0 +1,84 @@
+#include <cmath>
+
+#include "alidade/simulate/track.h"
+#include "alidade/study/studies.h"
+#include "alidade/study/trial_random.h"
+#include "alidade/study/word_field.h"
+
+namespace alidade {
+namespace {
+
+TrackScene track_scene(const TrackStudy& study) {
+  TrackScene scene = *track_scenario(study.scenario);
+  scene.duration_s = study.duration_s;
+  scene.sigma_px = study.noise_px;
+  scene.sigma_encoder_rad = study.noise_rad;
+  for (RigHead& head : scene.heads) head.head.encoder.sigma_rad = study.noise_rad;
+  return scene;
+}
+
+/// The simulated heads are exactly what the rig says, and it says so.
+Rig exact_rig(const std::vector<RigHead>& heads) {
+  Rig rig;
+  rig.heads = heads;
+  const auto num = num_head_params * static_cast<Eigen::Index>(heads.size());
+  rig.cov.setZero(num, num);
+  for (RigHead& head : rig.heads) {
+    const Eigen::Index size = params(head.camera.lens).size();
+    head.camera.cov.setZero(size, size);
+  }
+  return rig;
+}
+
+}  // namespace
+
+FieldList fields_of(TrackStudy& study) {
+  static const std::vector<std::string> methods{"cv", "singer", "turn", "imm"};
+  return {{.name = "scenario", .value = one_of(study.scenario, track_scenarios()), .help = "Of simulate track"},
+          {.name = "method", .value = one_of(study.method, methods), .help = "How the target is taken to move"},
+          {.name = "noise_px", .value = &study.noise_px, .help = "σ of a pixel coordinate", .limits = {1e-6, 100.0}},
+          {.name = "noise_rad",
+           .value = &study.noise_rad,
+           .help = "σ of an encoder [rad]",
+           .limits = {1e-9, 1.0},
+           .option = "--encoder-noise"},
+          {.name = "duration_s", .value = &study.duration_s, .help = "Of a track [s]", .limits = {0.5, 3600.0}}};
+}
+
+TrackTrial trial_of(const TrackStudy& study, std::uint64_t seed, std::uint64_t number) {
+  const TrackScene scene = track_scene(study);
+  TrackTrial trial;
+  for (const SimulatedObservation& s : simulate_track(scene, TrialRandom(seed, TrackStudy::name, number).seed()))
+    trial.observations.push_back({s.t_capture_s, s.t_arrival_s, s.head, s.pan_tilt_rad, s.px});
+  trial.rig = exact_rig(scene.heads);
+  for (const Field& field : fields_of(trial.config)) {
+    if (field.name == "method") (void)set_field(field, study.method);
+  }
+  trial.config.sigma_px = study.noise_px;
+  trial.config.sigma_a_m_s2 = scene.sigma_a_m_s2;
+  constexpr double rate_hz = 200.0;
+  for (int k = 0; k <= static_cast<int>((scene.duration_s + 1.0) * rate_hz); ++k) {
+    trial.truth.t_s.push_back(k / rate_hz);
+    trial.truth.position.push_back(scene.position(k / rate_hz));
+  }
+  return trial;
+}
+
+StudySetting setting_of(const TrackStudy& study, std::uint64_t seed) {
+  const RunTrial run = [=](std::uint64_t number, TrialResult& result) {
+    const TrackTrial trial = trial_of(study, seed, number);
+    const TargetTrack report = track(trial.observations, trial.rig, trial.config);
+    result.state = report.verdict.state;
+    if (report.steps.empty() || !report.steps.back().has_belief) return;
+    const TrackStep& last = report.steps.back();
+    const Eigen::Vector3d error = last.belief.x.head<3>() - track_scene(study).position(last.t_s);
+    result.has_estimate = true;
+    for (int i = 0; i < 3; ++i) {
+      const double sigma = std::sqrt(last.belief.P(i, i));
+      result.values.push_back({error[i], sigma, sigma});
+    }
+  };
+  return {{{"x_m", "m"}, {"y_m", "m"}, {"z_m", "m"}}, false, [run] { return run; }};
+}
+
+}  // namespace alidade

@@ -14,6 +14,7 @@
 #include "alidade/estimation/config_error.h"
 #include "alidade/geometry/rigid3.h"
 #include "alidade/public.h"
+#include "alidade/rangefinder/shot_plan.h"
 
 namespace cv {
 class Mat;
@@ -114,6 +115,40 @@ class CaptureGuide {
  private:
   struct State;
   std::unique_ptr<State> state_;
+};
+
+/// What to shoot next with a rangefinder beside the camera, and how well its beam is known.
+struct ShotGuideState {
+  int shots = 0;
+  bool has_beam = false;
+  Beam beam;                                                        ///< With its covariance, where there is one.
+  double sigma_origin_m = std::numeric_limits<double>::infinity();  ///< √trace of the origin's covariance.
+  Verdict verdict;                                                  ///< On the shots so far.
+  std::optional<NextShot> next;  ///< Where to hold the board; before there is a beam, its words alone tell.
+  std::string words;             ///< "1.5 m away, tilted by 30°, the right side farther"
+};
+
+/// The same guidance for a rangefinder: shots come one by one, each solve is that of rangefinder() on all of them, and
+/// the next shot is the first of plan_shots(). Before three shots, or where they cannot tell, poses that differ as much
+/// as a beam needs.
+class ShotGuide {
+ public:
+  /// Throws ConfigError for a config or a camera that cannot be.
+  explicit ShotGuide(Camera camera, RangefinderConfig config = {}, ShotConfig where = {});
+
+  /// Takes a shot and solves. Throws ConfigError for numbers that no shot can have; it is then not taken.
+  const ShotGuideState& push(const Shot& shot);
+  void undo();
+  [[nodiscard]] const ShotGuideState& state() const { return state_; }
+
+ private:
+  void solve();
+
+  Camera camera_;
+  RangefinderConfig config_;
+  ShotConfig where_;
+  std::vector<Shot> shots_;
+  ShotGuideState state_;
 };
 
 ALIDADE_PUBLIC_END

@@ -12,9 +12,11 @@
 
 #include "alidade/calibrate.h"
 #include "alidade/images/photos.h"
+#include "alidade/images/video_process.h"
 #include "alidade/imaging/grey_photo.h"
 #include "alidade/live/capture_session.h"
 #include "alidade/live/growing_folder.h"
+#include "alidade/live/newest_frame.h"
 #include "alidade/results/calibration_outcome.h"
 #include "cli/app/terminal.h"
 #include "cli/commands/capture_page.h"
@@ -135,6 +137,24 @@ class FolderCapture {
   std::string last_words_;
 };
 
+/// A capture from a camera of the machine or the network, without a page.
+void capture_stream(live::CaptureSession& session, const CaptureArgs& args, Run& run) {
+  live::NewestFrame stream(args.from);
+  const Clock::time_point begin = Clock::now();
+  while (!stream.is_over() && interrupting_signal() == 0) {
+    const std::optional<live::StreamFrame> frame = stream.fetch();
+    if (!frame) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      continue;
+    }
+    const cv::Mat grey = grey_of(*frame);
+    if (session.see(grey, session.begin_s() + passed_s(begin), false).file.empty()) continue;
+    if (!run.options.quiet && !run.options.json) tell_person(progress_line(session, args.config.until_px));
+    if (session.reached_goal({})) return;
+  }
+  if (stream.is_over()) tell_person("alidade: the stream has ended");
+}
+
 /// Where the photos stand, those of an earlier capture included.
 live::KeptPhotos opened_photos(const CaptureArgs& args, Run& run) {
   const bool goes_on = !args.resume.empty();
@@ -160,6 +180,10 @@ ExitCode finish_empty(const Board& board, const CaptureArgs& args, const std::st
 
 }  // namespace
 
+cv::Mat grey_of(const live::StreamFrame& frame) {
+  return cv::Mat(frame.height_px, frame.width_px, CV_8U, const_cast<unsigned char*>(frame.grey.data())).clone();
+}
+
 void add_capture_options(CLI::App& command, CaptureArgs& args) {
   const std::string group = "Guided capture";
   command
@@ -182,8 +206,9 @@ FieldList fields_of(CaptureArgs& args) {
   FieldList fields{
       {.name = "from",
        .value = &args.from,
-       .help = "Pictures of --live from a folder that another program fills, not from the browser's camera",
-       .form = "DIR"},
+       .help = "Pictures of --live from a folder that another program fills, or from v4l2:/dev/video0, rtsp://… or "
+               "http://…, not from the browser's camera",
+       .form = "DIR|ADDRESS"},
       {.name = "no_page", .value = &args.no_page, .help = "With --live --from: without a page, for scripts"},
       {.name = "wait_s",
        .value = &args.wait_s,
@@ -217,15 +242,21 @@ ExitCode calibrate_live(const Board& board, CaptureArgs args, Run& run,
     throw UsageError("--no-page: only with --from, as there is no camera without a page");
   (void)server_config(args.live);  // its faults before any work
   if (!args.resume.empty() && !run.options.out_is_given) run.options.out = args.resume;
-  args.config.is_video = args.from.empty();
-  live::CaptureSession session(board, args.config, opened_photos(args, run),
-                               [](const std::string& line) { tell_person("alidade: " + line); });
-  std::string seen;
+  args.config.is_video = args.from.empty() || is_stream_address(args.from);
   std::optional<CapturePage> page;
+  live::CaptureSession session(board, args.config, opened_photos(args, run), [&page](const std::string& line) {
+    tell_person("alidade: " + line);
+    if (page) page->note(line);
+  });
+  std::string seen;
   if (args.no_page) {
-    FolderCapture capture(session, args, run);
-    capture.run();
-    seen = capture.last_words();
+    if (is_stream_address(args.from)) {
+      capture_stream(session, args, run);
+    } else {
+      FolderCapture capture(session, args, run);
+      capture.run();
+      seen = capture.last_words();
+    }
   } else {
     page.emplace(args, board, session, run);
     seen = page->capture();

@@ -8,18 +8,28 @@
 #include "cli/app/live.h"
 #include "cli/app/run.h"
 
+namespace alidade::live {
+struct StreamFrame;
+}
+namespace cv {
+class Mat;
+}
+
 namespace alidade::cli {
 
 /// What `calibrate --live` is asked for besides what calibrate is asked for.
 struct CaptureArgs {
   LiveOptions live;
-  std::string from;  ///< A folder that fills; empty: the browser's camera.
+  std::string from;  ///< A folder that fills, or a stream's address; empty: the browser's camera.
   bool no_page = false;
   std::string resume;
   double wait_s = 60.0;  ///< Without a page: so long nothing new may come before it ends.
   CaptureConfig config;
   bool until_is_given = false;
 };
+
+/// A frame's values, in memory of its own.
+[[nodiscard]] cv::Mat grey_of(const live::StreamFrame& frame);
 
 void add_capture_options(CLI::App& command, CaptureArgs& args);
 [[nodiscard]] FieldList fields_of(CaptureArgs& args);

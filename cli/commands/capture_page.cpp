@@ -6,9 +6,11 @@
 #include <opencv2/core.hpp>
 
 #include "alidade/images/photos.h"
+#include "alidade/images/video_process.h"
 #include "alidade/imaging/grey_photo.h"
 #include "alidade/live/capture_server.h"
 #include "alidade/live/growing_folder.h"
+#include "alidade/live/newest_frame.h"
 #include "alidade/report/page.h"
 #include "cli/app/live.h"
 #include "cli/app/terminal.h"
@@ -96,6 +98,7 @@ struct CapturePage::State {
   void after_taking();
   void show(const cv::Mat& grey, bool also_control);
   void capture_folder();
+  void capture_stream();
   void capture_browser();
 };
 
@@ -210,6 +213,21 @@ void CapturePage::State::capture_folder() {
   }
 }
 
+void CapturePage::State::capture_stream() {
+  live::NewestFrame stream(args.from);
+  while (!is_over && !stream.is_over() && interrupting_signal() == 0) {
+    const std::optional<live::StreamFrame> frame = stream.fetch();
+    for (const std::string& command : server->commands()) obey(command);
+    if (!frame) {
+      (void)server->wait_for_picture(std::chrono::milliseconds(5));
+      continue;
+    }
+    const cv::Mat grey = grey_of(*frame);
+    see(grey, false);
+    show(grey, true);
+  }
+}
+
 CapturePage::CapturePage(const CaptureArgs& args, const Board& board, live::CaptureSession& session, Run& run)
     : state_(std::make_unique<State>(args, board, session, run)) {
   const live::ServerConfig wanted = server_config(args.live);
@@ -226,6 +244,8 @@ std::string CapturePage::capture() {
   State& state = *state_;
   if (state.args.from.empty()) {
     state.capture_browser();
+  } else if (is_stream_address(state.args.from)) {
+    state.capture_stream();
   } else {
     state.capture_folder();
   }
@@ -233,6 +253,8 @@ std::string CapturePage::capture() {
                      "goal");
   return state.last_words;
 }
+
+void CapturePage::note(const std::string& line) { state_->tell_note(line); }
 
 void CapturePage::show_result(ExitCode code) {
   State& state = *state_;

@@ -21,6 +21,8 @@ class CapturePage {
 
   /// Until the goal holds or the person ends it. Returns what was seen last where no board was.
   [[nodiscard]] std::string capture();
+  /// A line for whoever looks at the page.
+  void note(const std::string& line);
   /// The page becomes the report.
   void show_result(ExitCode code);
 

@@ -213,7 +213,7 @@ class CapturePage {
     this.view.takeLook(look);
     if (this.hasControl === false || this.about.source !== 'browser') this.root.dataset['exact'] = look.exact ? '1' : '0';
     const words = this.view.isMirrored ? look.words_mirrored : look.words;
-    this.advise(look.sight === 'useful' ? 'taken' : look.sight === 'moving' ? words || 'hold it still' : words === 'as outlined' ? 'hold it still' : words);
+    this.advise(look.sight === 'useful' ? (this.state?.paused ? 'worth taking: space takes it' : 'taken') : look.sight === 'moving' ? words || 'hold it still' : words === 'as outlined' ? 'hold it still' : words);
   }
   private advise(words: string): void {
     if (this.advice.textContent !== words) this.advice.textContent = words;

@@ -44,6 +44,7 @@ ShotGuide::ShotGuide(Camera camera, RangefinderConfig config, ShotConfig where)
 }
 
 const ShotGuideState& ShotGuide::push(const Shot& shot) {
+  if (!std::isfinite(shot.range_m)) throw ConfigError("range_m is not finite");
   std::vector<Shot> with = shots_;
   with.push_back(shot);
   std::swap(with, shots_);

@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Each target installs what it misses, says what it does, and is quick the
 # second time.
-.PHONY: help build install demo test bench study docs format tidy clean
+.PHONY: help build install deb demo test bench study fuzz faults sanitize docs format tidy clean
 .DEFAULT_GOAL := help
 
 out := build/release
@@ -12,9 +12,13 @@ help:
 	@echo "make test    build and run the tests"
 	@echo "make build   build build/release/alidade and the Python module, build/release/python"
 	@echo "make install PREFIX=/usr/local: the executable, the library with its headers, the Python module, man pages, bash completion"
+	@echo "make deb     Debian packages of executable, library, Python module and documentation, in build/deb"
 	@echo "make bench   measure speed, side by side with OpenCV and mrcal"
 	@echo "make docs    renew the pictures in README and docs"
 	@echo "make study   is σ what it says? 2400 calibrations, 2000 observations, rangefinders; corners against OpenCV's, with known truth"
+	@echo "make fuzz MINUTES=10   every reader of what others wrote, on bytes that nobody meant; docs/robustness.md"
+	@echo "make faults  failing calls, full disks, kill -9, 64 runs at once, under every command that writes (hours: FAULTS=--short, a minute)"
+	@echo "make sanitize  the tests under the address, undefined-behaviour and thread sanitizers"
 	@echo "make format  format the sources;  make tidy: let clang-tidy read them"
 	@echo "make clean   remove build/"
 	@echo "Each installs the Debian packages it misses (packages.debian), as root or with sudo."
@@ -32,6 +36,10 @@ install:
 	@cmake --preset release >/dev/null
 	@ninja -C $(out) $(jobs) programs alidade_shared
 	@cmake --install $(out) $(if $(PREFIX),--prefix $(PREFIX),)
+
+deb:
+	@tools/setup build deb
+	@JOBS=$(JOBS) tools/make_deb
 
 demo: build
 	@tools/demo_photos build/demo/photos
@@ -55,6 +63,24 @@ bench:
 	@ninja -C $(out) $(jobs) benchmarks
 	@echo "bench: running them"
 	@bench/run $(out)
+
+fuzz: build
+	@tools/setup fuzz
+	@cmake -S fuzz -B build/fuzz -G Ninja -DCMAKE_CXX_COMPILER=clang++ >/dev/null
+	@ninja -C build/fuzz $(jobs)
+	@tools/fuzz.py $(out)/alidade build/fuzz --minutes $(or $(MINUTES),10)
+
+faults: build
+	@tools/setup fuzz
+	@tools/faults.py $(out)/alidade $(FAULTS)
+
+# Tests of one program under the other sanitizers know nothing of each other: one after the other.
+sanitize:
+	@tools/setup build test
+	@for preset in asan tsan; do \
+	  echo "sanitize: $$preset" && cmake --preset $$preset -DALIDADE_TESTS=ON -DALIDADE_WEB=OFF >/dev/null && \
+	  ninja -C build/$$preset $(jobs) && ctest --test-dir build/$$preset --output-on-failure --parallel $$(nproc) \
+	    --label-exclude 'lint|docs|package|audit|web|robustness' || exit 1; done
 
 docs: demo
 	@tools/setup docs

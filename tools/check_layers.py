@@ -44,6 +44,23 @@ MAY_INCLUDE = {
     "live": JOBS | FILES | {"report", "results"},
     "testing": JOBS | FILES | {"reproduce", "report", "detect", "results"},
 }
+# What stands outside the library, by folder of the tree: folders of the library that it may include (None: all), and
+# other folders of the tree. The library includes none of them.
+OUTSIDE = {
+    "cli": (set(), {"cli/app", "cli/commands"}),  # main.cpp
+    "cli/app": ({"board", "calibrate", "description", "estimation", "files", "images", "live", "report", "results"}, {"cli/app"}),
+    "cli/commands": (None, {"cli/app", "cli/commands"}),
+    "cli/simulate": (None, {"cli/app", "cli/commands", "cli/simulate"}),
+    "cli/decoder": (set(), set()),  # programs of their own: videos; campaigns on MPI; fleets on NATS; streams of cameras
+    "cli/ranks": (None, {"cli/app", "cli/commands", "cli/ranks"}),
+    "cli/fleet": (None, {"cli/app", "cli/commands", "cli/fleet"}),
+    "cli/heads": (None, {"cli/app", "cli/commands", "cli/heads"}),
+    "cli/capture": (None, {"cli/app", "cli/commands", "cli/capture"}),
+    "bench": (None, {"bench"}),
+    "fuzz": (None, {"fuzz"}),
+    "python/bindings": (None, {"cli/app", "cli/commands", "python/bindings"}),
+    "examples": (set(), set()),  # what others see: public headers alone
+}
 # A room's public header and the job behind it, src/alidade/ROOM.h and .cpp, may include what the room may, and other
 # public headers; `files` is theirs who read and write, `alidade` all of them.
 # A job whose room is called otherwise: the room that it is of.
@@ -93,6 +110,33 @@ def faults_of(file, folder):
     return found
 
 
+def outside_faults(tree):
+    """What the folders around the library may not include, and files of theirs that are too long."""
+    found = []
+    folders = {path.parent for path in tree.rglob("*") if path.suffix in {".h", ".cpp"}} if tree.is_dir() else set()
+    for folder in sorted(folders):
+        name = folder.relative_to(tree).as_posix()
+        top = name.split("/")[0]
+        if top in {"build", "src"} or "node_modules" in folder.parts:
+            continue
+        if name not in OUTSIDE:
+            found.append(f"{name}/: is not in the table OUTSIDE")
+            continue
+        rooms, others = OUTSIDE[name]
+        for file in sorted(path for path in folder.iterdir() if path.suffix in {".h", ".cpp"}):
+            is_test = file.stem.endswith("_test")
+            lines = file.read_text().splitlines()
+            for number, line in enumerate(lines, 1):
+                room, other = INCLUDE.match(line), re.match(r'#include "((?:cli|bench|fuzz|python|examples)[\w/]*)/[^/"]+"', line)
+                if room and rooms is not None and room[1] not in rooms and not is_test:
+                    found.append(f"{name}/{file.name}:{number}: {name}/ may not include alidade/{room[1]}/")
+                if other and other[1] not in others and not is_test:
+                    found.append(f"{name}/{file.name}:{number}: {name}/ may not include {other[1]}/")
+            if len(lines) > LINES_A_FILE:
+                found.append(f"{name}/{file.name}: {len(lines)} lines; a file has at most {LINES_A_FILE}")
+    return found
+
+
 def surface_of(files, root):
     """{folder: its headers that files of other folders include}. Tests may look closer."""
     surface = {}
@@ -114,6 +158,8 @@ def main(root):
     for folder, headers in sorted(surface.items()):
         if folder not in {"testing", "results", "tables"} and len(headers) > PUBLIC_HEADERS_A_FOLDER:  # tests may share as they like; results/ has one outcome per job, tables/ one reader per kind
             faults.append(f"{folder}/: other folders include {len(headers)} of its headers, at most {PUBLIC_HEADERS_A_FOLDER} may be")
+    if root.resolve().parts[-2:] == ("src", "alidade"):
+        faults += outside_faults(root.resolve().parents[1])
     print("\n".join(faults) or f"layers ok ({len(files)} files)")
     return bool(faults)
 

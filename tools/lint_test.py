@@ -24,6 +24,19 @@ class Layers(unittest.TestCase):
     def assert_refused(self, path, text, message):
         self.assertEqual(outcome("check_layers.py", {path: text}), (1, message + "\n"))
 
+    def test_folders_around_the_library_have_their_table(self):
+        with tempfile.TemporaryDirectory() as folder:
+            tree = pathlib.Path(folder)
+            for path, text in {"src/alidade/geometry/a.h": "", "examples/01.cpp": '#include "alidade/files/csv.h"\n',
+                               "cli/app/a.cpp": '#include "cli/commands/commands.h"\n', "elsewhere/b.cpp": ""}.items():
+                (tree / path).parent.mkdir(parents=True, exist_ok=True)
+                (tree / path).write_text(text)
+            done = subprocess.run([sys.executable, TOOLS / "check_layers.py", tree / "src/alidade"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertEqual(done.stdout.splitlines(), ["cli/app/a.cpp:1: cli/app/ may not include cli/commands/",
+                                                    "elsewhere/: is not in the table OUTSIDE",
+                                                    "examples/01.cpp:1: examples/ may not include alidade/files/"])
+
     def test_arrows_point_one_way(self):
         self.assert_refused("geometry/a.h", '#include "alidade/camera/camera.h"\n', "geometry/a.h:1: geometry/ may not include camera/")
         self.assert_refused("camera/a.cpp", '\n#include "alidade/files/csv.h"\n', "camera/a.cpp:2: camera/ may not include files/")

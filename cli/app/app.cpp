@@ -16,6 +16,7 @@
 #include "alidade/estimation/config_error.h"
 #include "cli/app/field_options.h"
 #include "cli/app/help_format.h"
+#include "cli/app/out_of_memory.h"
 #include "cli/app/terminal.h"
 
 namespace alidade::cli {
@@ -350,6 +351,7 @@ int App::dispatch(int argc, const char* const* argv) {
 
 int run_cli(int argc, const char* const* argv, void (*add_commands)(App&)) {
   hold_standard_streams();
+  prepare_for_out_of_memory();
   App frame;
   frame.state_->terminal = std::make_unique<Terminal>();
   const auto failed = [&](const std::string& message, ExitCode code) {

@@ -38,6 +38,12 @@ std::string words_of_type(const std::string& type_and_checks) {
   return type + range_of(checks) + (checks.find("> 0") != std::string::npos ? " > 0" : "");
 }
 
+std::string HelpFormat::make_option_name(const CLI::Option* option, bool is_positional) const {
+  std::string name = CLI::Formatter::make_option_name(option, is_positional);
+  const std::size_t value = name.find("{false}");  // of a flag that turns something off
+  return value == std::string::npos ? name : name.erase(value, std::string_view("{false}").size());
+}
+
 std::string HelpFormat::make_option_opts(const CLI::Option* option) const {
   std::string text;
   if (option->get_type_size() != 0) {
@@ -48,7 +54,7 @@ std::string HelpFormat::make_option_opts(const CLI::Option* option) const {
     else if (option->get_expected_min() > 1)
       text += " x " + std::to_string(option->get_expected());
     if (!option->get_default_str().empty()) text += " (default " + option->get_default_str() + ")";
-    if (option->get_required()) text += " REQUIRED";
+    if (option->get_required() && !text.ends_with(" REQUIRED")) text += " REQUIRED";  // a field says it in its form
   }
   for (const CLI::Option* other : option->get_needs()) text += " with " + other->get_name();
   return text;

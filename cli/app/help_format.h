@@ -11,6 +11,7 @@ namespace alidade::cli {
 /// Help texts: what an option takes in words, its default, what it goes with.
 class HelpFormat : public CLI::Formatter {
  public:
+  std::string make_option_name(const CLI::Option* option, bool is_positional) const override;
   std::string make_option_opts(const CLI::Option* option) const override;
 };
 

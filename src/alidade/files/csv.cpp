@@ -304,6 +304,7 @@ std::optional<CsvRow> CsvStream::next() {
 /// The next row that is not blank.
 std::optional<CsvRow> CsvStream::next_with_content() {
   while (!rows_.empty() || read_rows()) {
+    if (rows_.empty()) continue;  // a byte order mark and nothing else
     CsvRow row = std::move(rows_.front());
     rows_.pop_front();
     if (!is_blank(row)) return row;

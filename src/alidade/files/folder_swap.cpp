@@ -118,23 +118,33 @@ bool FolderSwap::hide() {
     if (errno != ENOENT) fail_on(folder_, "cannot be written", errno);
     return false;
   }
-  Descriptor lock = locked(pattern);
-  if (!lock.is_open() && errno == EWOULDBLOCK) return false;
-  if (::mkdir((pattern + "/" + new_files).c_str(), 0777) != 0) {
+  // From here on it is removed with this object; not by another attempt, where it belongs to another process by then.
+  hidden_folder_.path = std::move(pattern);
+  Descriptor lock = locked(hidden_folder_.path);
+  if (!lock.is_open() && errno == EWOULDBLOCK) {
+    hidden_folder_.path.clear();
+    return false;
+  }
+  if (::mkdir((hidden_folder_.path + "/" + new_files).c_str(), 0777) != 0) {
     const int error = errno;
-    ::rmdir(pattern.c_str());
+    ::rmdir(hidden_folder_.path.c_str());
+    hidden_folder_.path.clear();
     if (error != ENOENT) fail_on(folder_, "cannot be written", error);
     errno = error;
     return false;
   }
-  hidden_ = pattern;
+  hidden_ = hidden_folder_.path;
   lock_.emplace(std::move(lock));
   return true;
 }
 
-FolderSwap::~FolderSwap() {
+FolderSwap::HiddenFolder::~HiddenFolder() {
+  if (path.empty()) return;
   std::error_code ignored;
-  fs::remove_all(hidden_, ignored);
+  try {
+    fs::remove_all(path, ignored);
+  } catch (const std::bad_alloc&) {  // the next FolderSwap there clears it
+  }
 }
 
 void FolderSwap::add(const fs::path& name, std::string_view content) {
@@ -158,9 +168,11 @@ void FolderSwap::add(const fs::path& name, std::string_view content) {
 void FolderSwap::remove(const fs::path& name) { removed_.push_back(name); }
 
 void FolderSwap::move(const fs::path& from, const fs::path& to) {
-  if (::rename(from.c_str(), to.c_str()) != 0)
-    throw fs::filesystem_error("rename", from, to, {errno, std::generic_category()});
-  moves_.push_back({from, to});
+  moves_.push_back({from, to});  // first: what is moved must be known, or it cannot be undone
+  if (::rename(from.c_str(), to.c_str()) == 0) return;
+  const int error = errno;
+  moves_.pop_back();
+  throw fs::filesystem_error("rename", from, to, {error, std::generic_category()});
 }
 
 void FolderSwap::undo() noexcept {
@@ -196,8 +208,12 @@ void FolderSwap::commit() {
     undo();
     throw;
   }
-  for (const fs::path& name : going) {  // folders that earlier files stood in
-    for (fs::path in = name.parent_path(); !in.empty() && ::rmdir((folder_ / in).c_str()) == 0;) in = in.parent_path();
+  try {
+    for (const fs::path& name : going) {  // folders that earlier files stood in
+      for (fs::path in = name.parent_path(); !in.empty() && ::rmdir((folder_ / in).c_str()) == 0;)
+        in = in.parent_path();
+    }
+  } catch (const std::bad_alloc&) {  // all is in its place; an empty folder stays
   }
   added_.clear();
   removed_.clear();

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -33,7 +34,6 @@ class FolderSwap {
   explicit FolderSwap(std::filesystem::path folder);
   FolderSwap(const FolderSwap&) = delete;
   FolderSwap& operator=(const FolderSwap&) = delete;
-  ~FolderSwap();
 
   /// A new file, by its name inside the folder, whole on the disk when this returns. Throws InputError, and leaves
   /// nothing of it, if it cannot be written.
@@ -48,6 +48,11 @@ class FolderSwap {
   struct Move {
     std::filesystem::path from, to;
   };
+  /// Goes with its owner, also where the owner's constructor throws.
+  struct HiddenFolder {
+    std::string path;
+    ~HiddenFolder();
+  };
 
   bool hide();
   void move(const std::filesystem::path& from, const std::filesystem::path& to);
@@ -57,6 +62,7 @@ class FolderSwap {
   MadeFolders made_;
   std::filesystem::path hidden_;
   std::optional<Descriptor> lock_;  ///< Of the hidden folder: its owner lives.
+  HiddenFolder hidden_folder_;
   std::vector<std::filesystem::path> added_, removed_;
   std::vector<Move> moves_;
 };

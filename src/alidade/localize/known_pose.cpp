@@ -14,6 +14,7 @@ namespace {
 struct SeenPoints {
   BoardView view;
   std::vector<Eigen::Vector3d> points_in_board;
+  double length_m = 0.0, width_m = 0.0;  ///< RMS along the longest direction, and across it.
   Rigid3 world_from_board;
   double sigma_m = 0.0;
 };
@@ -39,6 +40,9 @@ SeenPoints seen_points(std::span<const FeatureObservation> observations, std::sp
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& point : points_in_world) scatter += (point - middle) * (point - middle).transpose();
   const SymmetricEigen3 eigen = symmetric_eigen3(scatter);
+  const double num = static_cast<double>(points_in_world.size());
+  seen.length_m = std::sqrt(std::max(eigen.values[2], 0.0) / num);
+  seen.width_m = std::sqrt(std::max(eigen.values[1], 0.0) / num);
   Eigen::Matrix3d axes;
   axes << eigen.vectors.col(2), eigen.vectors.col(1), eigen.vectors.col(2).cross(eigen.vectors.col(1));
   seen.world_from_board = {Eigen::Quaterniond(axes), middle};
@@ -138,11 +142,18 @@ std::vector<BoardPoseFit> agreed_poses(const Camera& camera, const SeenPoints& s
   return fits;
 }
 
+/// Points on a line up to what they are known by: how the camera is turned about it, and where it is, no pixel tells.
+bool is_line(const SeenPoints& seen) {
+  constexpr double certain = 3.0, wide = 0.02;
+  return seen.width_m < std::max(certain * seen.sigma_m, wide * seen.length_m);
+}
+
 }  // namespace
 
 std::vector<StartHypothesis> poses_from_known(const Camera& camera, std::span<const FeatureObservation> observations,
                                               std::span<const KnownPoint> known, const KnownPoseConfig& config) {
   const SeenPoints seen = seen_points(observations, known);
+  if (is_line(seen)) return {};
   std::vector<BoardPoseFit> fits = fits_of(camera, seen, seen.view, config.sigma_px);
   constexpr std::size_t max_for_sets = 40;  // a board's corners come from one finder: no mismatches among them
   const std::size_t num = seen.view.corners.size();

@@ -65,6 +65,17 @@ bool is_solved_again(const Localization& report) {
   return report.is_smoothed && share(report.num_unexplained, report.path.size()) < few;
 }
 
+/// Again and again without being lost: no path explains what this camera saw of this target.
+State restarts_state(const Localization& report) {
+  if (is_solved_again(report)) return State::good;
+  std::size_t num_again = 0;
+  for (std::size_t i = 1; i < report.path.size(); ++i)
+    num_again += report.path[i].event == FrameEvent::restarted && report.path[i - 1].event != FrameEvent::predicted;
+  constexpr std::size_t few = 3;
+  constexpr double often = 0.01;
+  return num_again >= few && share(num_again, report.path.size()) >= often ? State::bad : State::care;
+}
+
 /// After frames without a pose it is the way back; else what led to it was wrong for some time before.
 std::string restarts_text(const Localization& report) {
   std::size_t num_back = 0, num_again = 0;
@@ -83,7 +94,8 @@ std::string restarts_text(const Localization& report) {
   else if (num_again > 0)
     text += (text.empty() ? "reinitialised " : "; reinitialised ") + times(num_again) +
             (num_again == 1 ? ", in" : ", last in") + " frame " + std::to_string(last_again) +
-            ": do not trust the path before it";
+            ": do not trust the path before it" +
+            (restarts_state(report) == State::bad ? "; camera or target are not as given" : "");
   return text;
 }
 
@@ -124,6 +136,24 @@ void add_given(const Localization& report, Verdict& verdict) {
                               report.lens_pull, care_pull, "σ", "path"});
 }
 
+/// What a wrong lens leaves of observations after the update: the same along the radius in every frame.
+void add_radial(const Localization& report, Verdict& verdict) {
+  constexpr double chance = 12.0;  // squares of the rings' means over their σ², their mean
+  constexpr double care_share = 0.12, bad_share = 0.4;
+  constexpr double least_px = 0.05;  // patches that change as they are seen from elsewhere leave less
+  const RadialStructure& radial = report.radial;
+  const bool is_more = radial.chi2_per_ring > chance && radial.share * report.sigma_px > least_px;
+  const double value = is_more ? radial.share : 0.0;
+  const State state = state_of(value, care_share, bad_share);
+  verdict.checks.push_back({"radial structure", state,
+                            state == State::good ? "residuals along the radius are as noise leaves them"
+                                                 : "residuals depend on the distance from the middle of the image, " +
+                                                       text_of(radial.worst_px, 2) +
+                                                       " px at worst: the lens is not as "
+                                                       "given",
+                            radial.share, care_share, "σ", "nis"});
+}
+
 /// Residuals that are said to be independent: by position in the image, and from frame to frame.
 void add_residuals(const Localization& report, Verdict& verdict) {
   if (!report.is_smoothed) return;
@@ -139,6 +169,16 @@ void add_residuals(const Localization& report, Verdict& verdict) {
                               "errors last from frame to frame (correlation " + text_of(residuals.colour, 2) +
                                   "): tracks drift, or something given is wrong; σ is enlarged for it",
                               residuals.colour, 0.25, "1", "nis"});
+}
+
+/// A filter over hundreds of frames is surer than it may be.
+void add_filter_alone(const Localization& report, Verdict& verdict) {
+  constexpr std::size_t few = 100;
+  if (report.is_of_images || report.is_smoothed || report.path.size() < few) return;
+  verdict.checks.push_back({"σ", report.scale_known ? State::bad : State::care,
+                            "the path could not be solved as a whole, and is the filter's: errors may be several times "
+                            "their σ",
+                            static_cast<double>(report.path.size()), static_cast<double>(few), "frames", "path"});
 }
 
 void add_tilt(const Localization& report, Verdict& verdict) {
@@ -206,10 +246,12 @@ void add_checks(const Localization& report, Verdict& verdict) {
                                 : "scale unknown: the path is up to scale, its unit is the depth at the start",
                             0.0, 0.0, "", "path"});
   if (report.num_restarts > 0)
-    verdict.checks.push_back({"restarts", is_solved_again(report) ? State::good : State::care, restarts_text(report),
+    verdict.checks.push_back({"restarts", restarts_state(report), restarts_text(report),
                               static_cast<double>(report.num_restarts), 0.0, "times", "path"});
   add_given(report, verdict);
+  add_radial(report, verdict);
   add_residuals(report, verdict);
+  add_filter_alone(report, verdict);
   add_tilt(report, verdict);
   add_side(report, verdict);
   add_truth(report, verdict);

@@ -2,9 +2,11 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "alidade/localize/known_pose.h"
+#include "alidade/localize/path_resection.h"
 #include "alidade/localize/smooth.h"
 #include "alidade/localize/summary.h"
 
@@ -82,7 +84,7 @@ void ObservationLocalizer::let_go(long id) {
   const LocalizationFilter& filter = engine_.best();
   const auto place = filter.place(id);
   const auto feature = std::ranges::find(filter.features(), id, &Feature::id);
-  points_.keep({{id, place->point_in_world, place->cov, false, 0}, feature->kind == FeatureKind::xyz});
+  points_.keep({{id, place->point_in_world, place->cov, false, 0}, is_settled(*feature, filter, config_)});
   engine_.filters().remove(id);
   ++num_left_;
 }
@@ -115,21 +117,52 @@ void ObservationLocalizer::drop_strangers(const ObservationFrame& frame, const O
   }
 }
 
+/// Whether the motion leaves it open where most of the target's points are in the image: from there an update finds a
+/// pose that explains them, and not always the right one.
+bool ObservationLocalizer::is_vague(const ObservationFrame& frame) const {
+  constexpr double vague_share = 0.13;  // of the image's width
+  const double vague_px = vague_share * engine_.camera().width_px;
+  std::size_t num_seen = 0, num_vague = 0;
+  for (const KnownPoint& point : config_.target.points) {
+    if (std::ranges::count(frame.observations, point.id, &FeatureObservation::id) == 0) continue;
+    ++num_seen;
+    const auto expected = engine_.best().expected(point.id);
+    num_vague += !expected || expected->S.trace() > vague_px * vague_px ? 1 : 0;
+  }
+  return num_seen >= 4 && 2 * num_vague > num_seen;
+}
+
+/// Where the target says that the camera is, as far as the motion leaves that open.
+void ObservationLocalizer::place_by_target(const ObservationFrame& frame) {
+  std::vector<StartHypothesis> from =
+      poses_from_known(engine_.camera(), frame.observations, config_.target.points, engine_.pose_config());
+  std::vector<double> costs;
+  for (const StartHypothesis& each : from) costs.push_back(each.cost + contradiction_of(each));
+  from = only_where(std::move(from));
+  for (std::size_t i = 0; i < from.size(); ++i) from[i].cost = costs[i];
+  if (!from.empty()) engine_.filters().restart(from);
+}
+
+/// χ² of six numbers.
+double ObservationLocalizer::contradiction_of(const StartHypothesis& from) const {
+  const LocalizationFilter& now = engine_.best();
+  const CameraMotion& is = now.motion();
+  Eigen::Vector<double, 6> difference;
+  difference.head<3>() = from.motion.world_from_cam.translation - is.world_from_cam.translation;
+  difference.tail<3>() = log_so3(is.world_from_cam.rotation.conjugate() * from.motion.world_from_cam.rotation);
+  const Eigen::Matrix<double, 6, 6> cov =
+      now.motion_covariance().topLeftCorner<6, 6>() + from.cov.topLeftCorner<6, 6>();
+  return difference.dot(cov.inverse() * difference);
+}
+
+constexpr double max_contradiction = 22.5;  // χ² of six numbers: 99.9 %
+
 /// Where the camera is by the target, if that contradicts the path. Empty: it does not, or its observations fit no
 /// pose.
 std::vector<StartHypothesis> ObservationLocalizer::elsewhere(const ObservationFrame& frame) const {
   std::vector<StartHypothesis> from =
       poses_from_known(engine_.camera(), frame.observations, config_.target.points, engine_.pose_config());
-  if (from.empty()) return from;
-  const LocalizationFilter& now = engine_.best();
-  const CameraMotion& is = now.motion();
-  Eigen::Vector<double, 6> difference;
-  difference.head<3>() = from.front().motion.world_from_cam.translation - is.world_from_cam.translation;
-  difference.tail<3>() = log_so3(is.world_from_cam.rotation.conjugate() * from.front().motion.world_from_cam.rotation);
-  const Eigen::Matrix<double, 6, 6> cov =
-      now.motion_covariance().topLeftCorner<6, 6>() + from.front().cov.topLeftCorner<6, 6>();
-  constexpr double gate = 22.5;  // χ² of six numbers: 99.9 %
-  if (difference.dot(cov.inverse() * difference) < gate) from.clear();
+  if (!from.empty() && contradiction_of(from.front()) < max_contradiction) from.clear();
   return from;
 }
 
@@ -150,6 +183,15 @@ int ObservationLocalizer::num_more_explained(const ObservationFrame& frame, cons
   return num_more;
 }
 
+/// All but the target.
+void ObservationLocalizer::drop_map() {
+  std::vector<long> unknown;
+  for (const Feature& feature : engine_.best().features())
+    if (!feature.is_known) unknown.push_back(feature.id);
+  for (const long id : unknown) engine_.filters().remove(id);
+  points_.forget_gone();
+}
+
 /// From the target, where it says that the camera is somewhere else. Mismatches may look like another pose: where the
 /// observations that fit are not contradicted by themselves, it has to explain at least two more of the target's, and
 /// where there is only some doubt three times running. The map of points that led there is dropped.
@@ -161,12 +203,67 @@ bool ObservationLocalizer::restart(const ObservationFrame& frame, Doubt doubt) {
     from.clear();
   num_elsewhere_ = from.empty() ? 0 : num_elsewhere_ + 1;
   if (from.empty() || (doubt == Doubt::some && num_elsewhere_ < sure)) return false;
-  std::vector<long> unknown;
-  for (const Feature& feature : engine_.best().features())
-    if (!feature.is_known) unknown.push_back(feature.id);
-  for (const long id : unknown) engine_.filters().remove(id);
+  drop_map();
   engine_.filters().restart(only_where(from));
-  points_.forget_gone();
+  record_.begin(num_taken_);
+  engine_.forget_doubt();
+  num_elsewhere_ = 0;
+  engine_.count_restart();
+  return true;
+}
+
+/// A point whose place no single look can change much: one of the target's, or a settled one. New ones explain whatever
+/// the known ones do not contradict.
+bool ObservationLocalizer::is_firm(long id) const {
+  const auto& features = engine_.best().features();
+  const auto feature = std::ranges::find(features, id, &Feature::id);
+  return feature != features.end() && (feature->is_known || feature->kind == FeatureKind::xyz);
+}
+
+/// Where half of the target is not where the path, as it is now, expects it: where the target says that the camera is,
+/// with how much would be explained from there.
+std::optional<ObservationLocalizer::OtherPlace> ObservationLocalizer::other_place(const ObservationFrame& frame) const {
+  const LocalizationFilter& filter = engine_.best();
+  std::size_t num_seen = 0, num_off = 0;
+  for (const FeatureObservation& observation : frame.observations) {
+    if (std::ranges::count(config_.target.points, observation.id, &KnownPoint::id) == 0) continue;
+    ++num_seen;
+    const auto expected = filter.expected(observation.id);
+    const Eigen::Vector2d nu = expected ? (observation.px - expected->px).eval() : Eigen::Vector2d::Zero();
+    num_off += !expected || nu.dot(expected->S.inverse() * nu) > config_.filter.gate ? 1 : 0;
+  }
+  if (num_seen < 4 || 2 * num_off < num_seen) return std::nullopt;
+  OtherPlace other{poses_from_known(engine_.camera(), frame.observations, config_.target.points, engine_.pose_config()),
+                   0, *engine_.bank()};
+  if (other.from.empty()) return std::nullopt;
+  std::vector<PlacedObservation> placed;
+  for (const FeatureObservation& observation : frame.observations) {
+    const auto place = filter.place(observation.id);
+    if (!place || !is_firm(observation.id)) continue;
+    const double sigma_px = observation.sigma_px > 0.0 ? observation.sigma_px : config_.filter.sigma_px;
+    placed.push_back({observation.px, sigma_px, place->point_in_world, place->cov});
+  }
+  const std::array<Rigid3, 1> there{other.from.front().motion.world_from_cam};
+  if (const auto found = resection(engine_.camera(), placed, there, config_.filter.gate))
+    other.num_explained = found->num_fit;
+  return other;
+}
+
+/// There, if that explains more of the frame than the path did. Where the motion contradicts it, the motion ends there,
+/// and the map that it made is dropped.
+bool ObservationLocalizer::find_again(OtherPlace other, const ObservationFrame& frame,
+                                      const ObservationsReport& report) {
+  std::size_t num_explained = 0;
+  for (std::size_t i = 0; i < frame.observations.size(); ++i)
+    num_explained += report.outcomes[i] == ObservationOutcome::used && is_firm(frame.observations[i].id) ? 1 : 0;
+  const std::size_t min_more = num_explained < min_observations ? 1 : 3;
+  if (other.num_explained < num_explained + min_more) return false;
+  engine_.filters() = std::move(other.before);
+  if (contradiction_of(other.from.front()) > max_contradiction) {
+    record_.jumped(num_taken_);
+    drop_map();
+  }
+  engine_.filters().restart(only_where(std::move(other.from)));
   record_.begin(num_taken_);
   engine_.forget_doubt();
   num_elsewhere_ = 0;
@@ -196,14 +293,18 @@ PathStep ObservationLocalizer::taken(const ObservationFrame& frame) {
     step.event = FrameEvent::started;
   } else {
     engine_.predict_to(frame.t_s, period_s());
+    if (config_.restarts && is_vague(frame)) place_by_target(frame);
   }
+  std::optional<OtherPlace> other;
+  if (config_.restarts && step.event == FrameEvent::tracked) other = other_place(frame);
   const ObservationsReport report = engine_.filters().update(frame.observations);
   engine_.fill(frame.observations, report, step);
   engine_.keep_residuals(frame.observations, report);
+  if (config_.restarts && step.event == FrameEvent::tracked && !other) other = other_place(frame);
   if (step.event == FrameEvent::tracked && step.num_tracked < min_observations) step.event = FrameEvent::predicted;
   const Doubt doubt = engine_.doubt_after(step);
   drop_strangers(frame, report);
-  if (config_.restarts && restart(frame, doubt)) {
+  if (config_.restarts && ((other && find_again(std::move(*other), frame, report)) || restart(frame, doubt))) {
     const ObservationsReport again = engine_.filters().update(frame.observations);
     engine_.fill(frame.observations, again, step);
     step.event = FrameEvent::restarted;
@@ -222,7 +323,7 @@ void ObservationLocalizer::sum_up(Localization& result) const {
   std::optional<SmoothedPath> smoothed;
   if (smooths() && engine_.has_begun()) {
     const auto problem = record_.problem(engine_.camera(), config_, frames_, result.path, engine_.best(),
-                                         points_.gone(engine_.best()), period_s());
+                                         points_.gone(engine_.best()), engine_.start_without_target(), period_s());
     if (problem) smoothed = smooth(*problem, frames_, result);
   }
   engine_.sum_up([this](long id) { return points_.num_used(id); }, result);

@@ -21,7 +21,7 @@ class ObservationLocalizer {
   void sum_up(Localization& result) const;
 
  private:
-  [[nodiscard]] bool smooths() const { return config_.smooths && !config_.target.points.empty(); }
+  [[nodiscard]] bool smooths() const { return config_.smooths; }
   [[nodiscard]] double period_s() const;
   void keep_gap(double t_s);
   [[nodiscard]] PathStep taken(const ObservationFrame& frame);
@@ -32,9 +32,22 @@ class ObservationLocalizer {
   [[nodiscard]] std::vector<long> least_useful(const ObservationFrame& frame) const;
   void let_go(long id);
   void drop_strangers(const ObservationFrame& frame, const ObservationsReport& report);
+  [[nodiscard]] bool is_vague(const ObservationFrame& frame) const;
+  void drop_map();
+  void place_by_target(const ObservationFrame& frame);
+  [[nodiscard]] double contradiction_of(const StartHypothesis& from) const;
   [[nodiscard]] std::vector<StartHypothesis> elsewhere(const ObservationFrame& frame) const;
   [[nodiscard]] int num_more_explained(const ObservationFrame& frame, const Rigid3& world_from_cam) const;
   [[nodiscard]] bool restart(const ObservationFrame& frame, Doubt doubt);
+  /// Where the target says that the camera is, against the path.
+  struct OtherPlace {
+    std::vector<StartHypothesis> from;
+    std::size_t num_explained = 0;  ///< Of firm points' observations, from there.
+    FilterBank before;              ///< As it was before the frame.
+  };
+  [[nodiscard]] std::optional<OtherPlace> other_place(const ObservationFrame& frame) const;
+  [[nodiscard]] bool is_firm(long id) const;
+  [[nodiscard]] bool find_again(OtherPlace other, const ObservationFrame& frame, const ObservationsReport& report);
 
   LocalizeEngine engine_;
   const LocalizeConfig& config_;

@@ -9,6 +9,58 @@
 namespace alidade {
 namespace {
 
+/// Distances that were only supposed share their error: as vague as they are told to be, hundreds of them together
+/// would say how large the world is.
+RangePrior vague(RangePrior range, long id, bool sets_unit, const LocalizeConfig& config) {
+  constexpr double hardly_told = 5.0;
+  const bool is_told =
+      config.start && std::ranges::find(config.start->depths, id, &GivenDepth::id) != config.start->depths.end();
+  if (!is_told && !sets_unit && config.new_points != NewPoints::delayed)
+    range.sigma_rel = std::max(range.sigma_rel, hardly_told);
+  return range;
+}
+
+/// Of the points that are there at once, from their first observation to their last, so many that the work stays in
+/// proportion; known ones first, then those with the most observations. False where that leaves too few.
+[[nodiscard]] bool thin(std::span<const ObservationFrame> frames, double max_work, std::vector<SmootherPoint>& points) {
+  struct Life {
+    std::size_t point = 0, first = 0, last = 0, num = 0;
+  };
+  std::map<long, Life> lives;
+  for (std::size_t i = 0; i < points.size(); ++i) lives[points[i].id].point = i;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    for (const FeatureObservation& observation : frames[k].observations) {
+      const auto at = lives.find(observation.id);
+      if (at == lives.end()) continue;
+      if (at->second.num++ == 0) at->second.first = k;
+      at->second.last = k;
+    }
+  }
+  constexpr double num_shared = 24.0;
+  constexpr double enough = 25.0;
+  const double most = (std::sqrt(max_work / static_cast<double>(frames.size())) - num_shared) / 3.0;
+  std::vector<Life> by_use;
+  for (const auto& [id, life] : lives)
+    if (life.num > 0) by_use.push_back(life);
+  std::ranges::stable_sort(by_use, [&](const Life& a, const Life& b) {
+    const bool known_a = points[a.point].told_in_world.has_value(), known_b = points[b.point].told_in_world.has_value();
+    return known_a != known_b ? known_a : a.num > b.num;
+  });
+  std::vector<int> num_at(frames.size(), 0);
+  std::vector<SmootherPoint> kept;
+  bool has_all = true;
+  for (const Life& life : by_use) {
+    const auto begin = num_at.begin() + static_cast<std::ptrdiff_t>(life.first),
+               end = num_at.begin() + static_cast<std::ptrdiff_t>(life.last) + 1;
+    has_all = has_all && *std::max_element(begin, end) + 1 <= most;
+    if (!(*std::max_element(begin, end) + 1 <= most)) continue;
+    std::for_each(begin, end, [](int& num) { ++num; });
+    kept.push_back(points[life.point]);
+  }
+  points = std::move(kept);
+  return has_all || most >= enough;
+}
+
 struct PlaceOfPoint {
   Eigen::Vector3d point_in_world;
   Eigen::Matrix3d cov;
@@ -94,6 +146,16 @@ void BackwardPath::give_back() {
 
 }  // namespace
 
+bool is_settled(const Feature& feature, const LocalizationFilter& filter, const LocalizeConfig& config) {
+  if (feature.kind == FeatureKind::xyz) return true;
+  constexpr double min_parallax_rad = 0.03, min_rho = 1e-2;
+  if (!config.target.points.empty() || !(feature.values[5] > min_rho)) return false;
+  const Eigen::Vector3d place = place_of(feature).point_in_world;
+  const Eigen::Vector3d first = place - feature.values.head<3>();
+  const Eigen::Vector3d now = place - filter.motion().world_from_cam.translation;
+  return std::atan2(first.cross(now).norm(), first.dot(now)) > min_parallax_rad;
+}
+
 void ObservationRecord::begin(std::size_t frame) {
   if (num_begun_++ == 0) first_frame_ = frame;
 }
@@ -101,10 +163,10 @@ void ObservationRecord::begin(std::size_t frame) {
 void ObservationRecord::add_points(const LocalizeConfig& config, const LocalizationFilter& filter,
                                    SmootherProblem& problem) const {
   for (const Feature& feature : filter.features()) {
-    if (feature.kind != FeatureKind::xyz) continue;
+    if (!is_settled(feature, filter, config)) continue;
     SmootherPoint point;
     point.id = feature.id;
-    point.point_in_world = feature.values.head<3>();
+    point.point_in_world = place_of(feature).point_in_world;
     const auto told = std::ranges::find(config.target.points, feature.id, &KnownPoint::id);
     const auto birth = births_.find(feature.id);
     if (told != config.target.points.end()) {
@@ -112,7 +174,7 @@ void ObservationRecord::add_points(const LocalizeConfig& config, const Localizat
       point.sigma_m = told->sigma_m;
     } else if (birth != births_.end()) {
       point.first_frame = birth->second.frame;
-      point.range = birth->second.range;
+      point.range = vague(birth->second.range, feature.id, sets_unit(config, birth->second.frame), config);
     } else {
       continue;
     }
@@ -120,7 +182,8 @@ void ObservationRecord::add_points(const LocalizeConfig& config, const Localizat
   }
 }
 
-void ObservationRecord::add_gone(std::span<const GonePoint> gone, SmootherProblem& problem) const {
+void ObservationRecord::add_gone(const LocalizeConfig& config, std::span<const GonePoint> gone,
+                                 SmootherProblem& problem) const {
   for (const GonePoint& each : gone) {
     const auto birth = births_.find(each.point.id);
     if (!each.is_linear || birth == births_.end()) continue;
@@ -128,30 +191,28 @@ void ObservationRecord::add_gone(std::span<const GonePoint> gone, SmootherProble
     point.id = each.point.id;
     point.point_in_world = each.point.point_in_world;
     point.first_frame = birth->second.frame;
-    point.range = birth->second.range;
+    point.range = vague(birth->second.range, each.point.id, sets_unit(config, birth->second.frame), config);
     problem.points.push_back(point);
   }
 }
 
-std::optional<SmootherProblem> ObservationRecord::problem(const Camera& camera, const LocalizeConfig& config,
-                                                          std::span<const ObservationFrame> frames,
-                                                          std::span<const PathStep> path,
-                                                          const LocalizationFilter& filter,
-                                                          std::span<const GonePoint> gone, double period_s) const {
+std::optional<SmootherProblem> ObservationRecord::problem(
+    const Camera& camera, const LocalizeConfig& config, std::span<const ObservationFrame> frames,
+    std::span<const PathStep> path, const LocalizationFilter& filter, std::span<const GonePoint> gone,
+    const std::optional<StartHypothesis>& start, double period_s) const {
   SmootherProblem problem;
   add_points(config, filter, problem);
-  add_gone(gone, problem);
-  constexpr double max_work = 2e8;  // frames times numbers of the map, squared: seconds
-  const double num_frames = static_cast<double>(path.size() - first_frame_);
-  const double num_map = 3.0 * static_cast<double>(problem.points.size()) + 20.0;
-  if (num_frames * num_map * num_map > max_work) return std::nullopt;
+  add_gone(config, gone, problem);
+  constexpr double max_work = 2e8;  // frames times the square of the numbers that are there at once: seconds
+  if (!thin(frames, max_work, problem.points)) return std::nullopt;
   BackwardPath back(camera, config, filter, gone, problem);
   std::size_t first = path.size();
   while (first > first_frame_) {
     --first;
     (void)back.take(frames[first], path[first]);
   }
-  for (; first > 0 && !config.start; --first) {
+  const bool has_target = !config.target.points.empty();
+  for (; first > 0 && !config.start && has_target; --first) {
     if (back.take(frames[first - 1], path[first - 1])) continue;
     back.give_back();
     break;
@@ -162,6 +223,7 @@ std::optional<SmootherProblem> ObservationRecord::problem(const Camera& camera, 
   for (std::size_t k = 0; k < back.world_from_cam.size(); ++k) {
     const std::size_t at = back.world_from_cam.size() - 1 - k;
     problem.t_s.push_back(path[first + k].t_s);
+    problem.is_jump.push_back(jumps_.contains(first + k));
     problem.world_from_cam.push_back(back.world_from_cam[at]);
     for (UsedObservation observation : back.observations[at]) {
       observation.frame = k;
@@ -171,11 +233,11 @@ std::optional<SmootherProblem> ObservationRecord::problem(const Camera& camera, 
   }
   std::erase_if(problem.points, [&](const SmootherPoint& point) { return !seen.contains(point.id); });
   std::ranges::sort(problem.points, {}, &SmootherPoint::id);
-  if (std::ranges::none_of(problem.points, [](const SmootherPoint& point) { return point.told_in_world.has_value(); }))
+  if (has_target &&
+      std::ranges::none_of(problem.points, [](const SmootherPoint& point) { return point.told_in_world.has_value(); }))
     return std::nullopt;
   problem.camera = camera;
-  if (num_begun_ == 1 && config.start)
-    problem.start = StartHypothesis{config.start->motion, config.start->cov};  // else the observations contradicted it
+  if (num_begun_ == 1 && (config.start || !has_target)) problem.start = start;  // else the observations contradicted it
   problem.sigma_speed_m_s = config.sigma_speed_m_s;
   problem.sigma_rate_rad_s = config.sigma_rate_rad_s;
   problem.period_s = period_s;

@@ -12,6 +12,8 @@ namespace {
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using WindowRows = Eigen::Matrix<double, 6, PoseChain::window>;
 
+constexpr double hardly_told = 1e-6;  // m⁻², rad⁻²: a pose alone that nothing tells must not stop all others
+
 void add_window(const WindowRows& J, const Eigen::Vector<double, 6>& error, const Eigen::Vector<double, 6>& variance,
                 SmootherSystem& system) {
   const WindowRows weighted = variance.cwiseInverse().asDiagonal() * J;
@@ -68,20 +70,18 @@ void PathSmoother::add_told_point(const SmootherState& state, std::size_t point,
   Eigen::Matrix<double, 3, 2> J;  // of where it is told to be: by scale, and by shape
   J << told, shape_change(told);
   PoseChain& chain = system.chain;
-  const auto at = static_cast<Eigen::Index>(3 * point), by = static_cast<Eigen::Index>(causes_at_ + scale_cause);
+  const int at = chain.place_of(point), by = causes_at_ + scale_cause;
   chain.B.diagonal().segment<3>(at).array() += weight;
-  chain.B.block<2, 3>(by, at) -= weight * J.transpose();
+  chain.B.block<3, 2>(at, by) -= weight * J;
   chain.B.block<2, 2>(by, by) += weight * J.transpose() * J;
   chain.b.segment<3>(at) -= weight * error;
   chain.b.segment<2>(by) += weight * J.transpose() * error;
   system.cost += weight * error.squaredNorm();
 }
 
-/// Known points, and what was told of the lens.
-void PathSmoother::add_told(const SmootherState& state, SmootherSystem& system) const {
+/// What was told of the lens.
+void PathSmoother::add_told_lens(const SmootherState& state, SmootherSystem& system) const {
   PoseChain& chain = system.chain;
-  for (std::size_t i = 0; i < problem_.points.size(); ++i)
-    if (problem_.points[i].told_in_world) add_told_point(state, i, system);
   if (num_estimated_ == 0) return;
   const Eigen::MatrixXd information = lens_information();
   const Eigen::VectorXd now = params(state.camera.lens);
@@ -134,12 +134,12 @@ bool PathSmoother::add_observation(const SmootherState& state, const UsedObserva
   const Eigen::Matrix<double, 2, 3> J_point = weight * view->J_px_feature.leftCols<3>();
   const GivenRows J_given = weight * given_rows(*view, observation, twist);
   PoseChain& chain = system.chain;
-  const auto at = static_cast<Eigen::Index>(3 * point), num_given = J_given.cols();
+  const auto at = static_cast<Eigen::Index>(chain.place_of(point)), num_given = J_given.cols();
   chain.A.topLeftCorner<6, 6>() += J_pose.transpose() * J_pose;
   chain.U.block<6, 3>(0, at) += J_pose.transpose() * J_point;
   chain.U.block(0, lens_at_, 6, num_given) += J_pose.transpose() * J_given;
   chain.B.block<3, 3>(at, at) += J_point.transpose() * J_point;
-  chain.B.block(lens_at_, at, num_given, 3) += J_given.transpose() * J_point;
+  chain.B.block(at, lens_at_, 3, num_given) += J_point.transpose() * J_given;
   chain.B.block(lens_at_, lens_at_, num_given, num_given) += J_given.transpose() * J_given;
   chain.a.head<6>() -= J_pose.transpose() * error;
   chain.b.segment<3>(at) -= J_point.transpose() * error;
@@ -157,7 +157,7 @@ void PathSmoother::add_range(const SmootherState& state, std::size_t point, Smoo
   const Eigen::Vector3d J =
       -weight / std::pow(distance_m, 3) * from_camera;  // by the point; by the position, minus that
   PoseChain& chain = system.chain;
-  const auto at = static_cast<Eigen::Index>(3 * point);
+  const int at = chain.place_of(point);
   chain.A.topLeftCorner<3, 3>() += J * J.transpose();
   chain.U.block<3, 3>(0, at) -= J * J.transpose();
   chain.B.block<3, 3>(at, at) += J * J.transpose();
@@ -180,7 +180,7 @@ PathSmoother::Speeds PathSmoother::speeds(const SmootherState& state, std::size_
 }
 
 /// Speed and rate from frame k to the next, and from there to the one after it, differ by drawn accelerations; the
-/// first differ from what was told.
+/// first differ from what was told. By a jump nothing is told, and behind it they begin again.
 void PathSmoother::add_motion(const SmootherState& state, std::size_t k, SmootherSystem& system) const {
   const auto steps = [&](std::size_t i) {
     return std::max(1.0, std::round((problem_.t_s[i + 1] - problem_.t_s[i]) / problem_.period_s));
@@ -188,21 +188,24 @@ void PathSmoother::add_motion(const SmootherState& state, std::size_t k, Smoothe
   Eigen::Vector<double, 6> step_variance;
   step_variance << Eigen::Vector3d::Constant(std::pow(problem_.filter.sigma_a_m_s2 * problem_.period_s, 2)),
       Eigen::Vector3d::Constant(std::pow(problem_.filter.sigma_alpha_rad_s2 * problem_.period_s, 2));
+  const auto is_jump = [&](std::size_t i) { return i < problem_.is_jump.size() && problem_.is_jump[i]; };
+  if (is_jump(k) || is_jump(k + 1)) system.chain.A.diagonal().head<6>().array() += hardly_told;
+  if (is_jump(k + 1)) return;
   WindowRows J = WindowRows::Zero();
   const Speeds first = speeds(state, k);
-  if (k == 0) {
+  if (k == 0 || is_jump(k)) {
     Eigen::Vector<double, 6> told = Eigen::Vector<double, 6>::Zero(), variance;
     variance << Eigen::Vector3d::Constant(std::pow(problem_.sigma_speed_m_s, 2)),
         Eigen::Vector3d::Constant(std::pow(problem_.sigma_rate_rad_s, 2));
-    if (problem_.start) {
+    if (problem_.start && k == 0) {
       told << problem_.start->motion.velocity_in_world, problem_.start->motion.rate_in_cam;
       variance = problem_.start->cov.diagonal().tail<6>();
     }
     J.leftCols<6>() = first.J_from;
     J.middleCols<6>(6) = first.J_to;
-    add_window(J, first.values - told, variance + walked_before(steps(0)) * step_variance, system);
+    add_window(J, first.values - told, variance + walked_before(steps(k)) * step_variance, system);
   }
-  if (k + 2 >= state.poses.size()) return;
+  if (k + 2 >= state.poses.size() || is_jump(k + 2)) return;
   const Speeds second = speeds(state, k + 1);
   J.leftCols<6>() = -first.J_from;
   J.middleCols<6>(6) = second.J_from - first.J_to;
@@ -226,21 +229,28 @@ void PathSmoother::add_start(const SmootherState& state, SmootherSystem& system)
 }
 
 std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state) const {
-  SmootherSystem system{PoseChain(causes_at_ + num_causes)};
-  add_told(state, system);
+  SmootherSystem system{PoseChain(causes_at_ + num_causes, most_at_once_)};
+  add_told_lens(state, system);
   add_start(state, system);
   std::vector<std::vector<std::size_t>> first_seen(state.poses.size());
   for (std::size_t i = 0; i < problem_.points.size(); ++i)
-    if (problem_.points[i].range) first_seen[problem_.points[i].first_frame].push_back(i);
+    if (problem_.points[i].range && lives_[i]) first_seen[problem_.points[i].first_frame].push_back(i);
   std::size_t next = 0;
   for (std::size_t k = 0; k < state.poses.size(); ++k) {
     const Twist twist = twist_at(state, k);
+    for (const std::size_t point : entering_[k]) {
+      (void)system.chain.enter(point);
+      if (problem_.points[point].told_in_world) add_told_point(state, point, system);
+    }
     for (; next < observations_.size() && observations_[next].frame == k; ++next)
       if (!add_observation(state, observations_[next], twist, system)) return std::nullopt;
     for (const std::size_t point : first_seen[k]) add_range(state, point, system);
     if (k + 1 < state.poses.size()) add_motion(state, k, system);
+    if (k + 1 == state.poses.size()) system.chain.A.diagonal().head<6>().array() += hardly_told;
     if (held_ && held_->frame == k) add_held(state, system);
     if (!system.chain.eliminate()) return std::nullopt;
+    for (const std::size_t point : leaving_[k])
+      if (!system.chain.leave(point)) return std::nullopt;
   }
   return system;
 }

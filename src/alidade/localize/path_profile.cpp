@@ -115,7 +115,8 @@ void PathSmoother::widen(double min_cost, SmoothedPath& path) {
     path.cov[k] += more * move * move.transpose();
   }
   for (std::size_t i = 0; i < path.point_covs.size(); ++i) {
-    const Eigen::Vector3d move = widest->points[i] - best.points[i];
+    const std::size_t at = index_of_.at(path.ids[i]);
+    const Eigen::Vector3d move = widest->points[at] - best.points[at];
     path.point_covs[i] += more * move * move.transpose();
   }
 }

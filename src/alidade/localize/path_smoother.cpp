@@ -11,7 +11,6 @@ namespace alidade {
 
 PathSmoother::PathSmoother(const SmootherProblem& problem) : problem_(problem) {
   const int num_lens = static_cast<int>(params(problem.camera.lens).size());
-  lens_at_ = 3 * static_cast<int>(problem.points.size());
   lens_order_ = problem.filter.lens_params;
   num_estimated_ = static_cast<int>(lens_order_.size());
   for (int i = 0; i < num_lens; ++i)
@@ -32,18 +31,45 @@ PathSmoother::PathSmoother(const SmootherProblem& problem) : problem_(problem) {
   told_lens_ = params(problem.camera.lens);
 }
 
-SmootherState PathSmoother::moved_by(const Eigen::VectorXd& border, std::span<const Eigen::Vector<double, 6>> poses,
-                                     double share) const {
+/// A point is there from its first observation, or where its distance was believed, to its last.
+void PathSmoother::find_lives() {
+  lives_.assign(problem_.points.size(), std::nullopt);
+  for (const UsedObservation& observation : observations_) {
+    std::optional<Life>& life = lives_[index_of_.at(observation.id)];
+    if (!life) life = Life{observation.frame, observation.frame};
+    life->last = observation.frame;
+  }
+  entering_.assign(state_.poses.size(), {});
+  leaving_.assign(state_.poses.size(), {});
+  for (std::size_t i = 0; i < lives_.size(); ++i) {
+    if (!lives_[i]) continue;
+    if (problem_.points[i].range) {
+      lives_[i]->first = std::min(lives_[i]->first, problem_.points[i].first_frame);
+      lives_[i]->last = std::max(lives_[i]->last, problem_.points[i].first_frame);
+    }
+    entering_[lives_[i]->first].push_back(i);
+    leaving_[lives_[i]->last].push_back(i);
+  }
+  most_at_once_ = 0;
+  int num = 0;
+  for (std::size_t k = 0; k < entering_.size(); ++k) {
+    num += static_cast<int>(entering_[k].size());
+    most_at_once_ = std::max(most_at_once_, num);
+    num -= static_cast<int>(leaving_[k].size());
+  }
+}
+
+SmootherState PathSmoother::moved_by(const Eigen::VectorXd& shared, const PoseChain::Steps& steps, double share) const {
   SmootherState moved = state_;
-  for (std::size_t k = 0; k < poses.size(); ++k) {
-    moved.poses[k].translation += share * poses[k].head<3>();
-    moved.poses[k].rotation = (moved.poses[k].rotation * exp_so3(share * poses[k].tail<3>())).normalized();
+  for (std::size_t k = 0; k < steps.poses.size(); ++k) {
+    moved.poses[k].translation += share * steps.poses[k].head<3>();
+    moved.poses[k].rotation = (moved.poses[k].rotation * exp_so3(share * steps.poses[k].tail<3>())).normalized();
   }
   for (std::size_t i = 0; i < moved.points.size(); ++i)
-    moved.points[i] += share * border.segment<3>(static_cast<Eigen::Index>(3 * i));
+    if (lives_[i]) moved.points[i] += share * steps.points[i];
   Eigen::VectorXd lens = params(moved.camera.lens);
   for (int i = 0; i < num_estimated_; ++i)
-    lens[lens_order_[static_cast<std::size_t>(i)]] += share * border[lens_at_ + i];
+    lens[lens_order_[static_cast<std::size_t>(i)]] += share * shared[lens_at_ + i];
   moved.camera.lens = with_params(moved.camera.lens, lens);
   return moved;
 }
@@ -52,19 +78,20 @@ SmootherState PathSmoother::moved_by(const Eigen::VectorXd& border, std::span<co
 bool PathSmoother::settle() {
   constexpr int max_iterations = 25;
   constexpr double settled = 1e-3, min_share = 0.02;  // of a step, squared, in σ
+  find_lives();
   auto system = build(state_);
   for (int iteration = 0; system && iteration < max_iterations; ++iteration) {
     const int num = num_solved();
     const Eigen::LLT<Eigen::MatrixXd> llt(system->chain.B.topLeftCorner(num, num));
     if (llt.info() != Eigen::Success) return false;
-    Eigen::VectorXd border = Eigen::VectorXd::Zero(causes_at_ + num_causes);
-    border.head(num) = llt.solve(system->chain.b.head(num));
-    const double gain = system->chain.gain() + border.head(num).dot(system->chain.b.head(num));
-    const auto poses = system->chain.steps(border);
+    Eigen::VectorXd shared = Eigen::VectorXd::Zero(causes_at_ + num_causes);
+    shared.head(num) = llt.solve(system->chain.b.head(num));
+    const double gain = system->chain.gain() + shared.head(num).dot(system->chain.b.head(num));
+    const auto steps = system->chain.steps(shared);
     std::optional<SmootherSystem> next;
     double share = 1.0;
     for (; share > min_share && !next; share *= 0.5) {
-      const SmootherState there = moved_by(border, poses, share);
+      const SmootherState there = moved_by(shared, steps, share);
       next = build(there);
       if (next && !(next->cost <= system->cost + 1e-9 * (1.0 + system->cost))) next.reset();
       if (next) state_ = there;
@@ -111,7 +138,8 @@ std::optional<SmoothedPath> PathSmoother::solve() {
   if (!system) return std::nullopt;
   SmoothedPath path = result(*system);
   path.num_dropped = problem_.observations.size() - observations_.size();
-  widen(system->cost, path);
+  if (std::ranges::any_of(problem_.points, [](const SmootherPoint& point) { return point.told_in_world.has_value(); }))
+    widen(system->cost, path);
   return path;
 }
 
@@ -126,11 +154,11 @@ void PathSmoother::fill_lens(const Eigen::MatrixXd& cov, SmoothedPath& path) con
   }
 }
 
-void PathSmoother::fill_map(const Eigen::MatrixXd& cov, SmoothedPath& path) const {
-  path.points = state_.points;
+void PathSmoother::fill_map(std::span<const Eigen::Matrix3d> covs, SmoothedPath& path) const {
   for (std::size_t i = 0; i < state_.points.size(); ++i) {
-    const auto at = static_cast<Eigen::Index>(3 * i);
-    path.point_covs.emplace_back(cov.block<3, 3>(at, at));
+    if (!lives_[i]) continue;
+    path.points.push_back(state_.points[i]);
+    path.point_covs.push_back(covs[i]);
     path.ids.push_back(problem_.points[i].id);
   }
   for (const UsedObservation& observation : observations_) {
@@ -159,10 +187,10 @@ void PathSmoother::add_clock(SmoothedPath& path) const {
 
 SmoothedPath PathSmoother::result(const SmootherSystem& system) const {
   const int num = num_solved(), all = causes_at_ + num_causes, rest = all - num;
-  const Eigen::MatrixXd B = system.chain.B.selfadjointView<Eigen::Lower>();
+  const Eigen::MatrixXd B = system.chain.B.topLeftCorner(all, all).selfadjointView<Eigen::Lower>();
   const Eigen::LLT<Eigen::MatrixXd> llt(B.topLeftCorner(num, num));
   const Eigen::MatrixXd considered = considered_cov();
-  Eigen::MatrixXd J = Eigen::MatrixXd::Identity(all, rest);  // of the border, by what is given
+  Eigen::MatrixXd J = Eigen::MatrixXd::Identity(all, rest);  // of what is shared, by what is given
   J.topRows(num) = -llt.solve(B.topRightCorner(num, rest));
   J.bottomRows(rest).setIdentity();
   Eigen::MatrixXd cov = J * considered * J.transpose();
@@ -176,11 +204,12 @@ SmoothedPath PathSmoother::result(const SmootherSystem& system) const {
     path.cov.push_back(to_camera * spread.cov[k] * to_camera.transpose());
     spread.J[k] = to_camera * spread.J[k];
   }
-  fill_map(cov, path);
+  fill_map(spread.point_cov, path);
   fill_lens(cov, path);
   const Eigen::MatrixXd S = B.bottomRightCorner(rest, rest) + B.bottomLeftCorner(rest, num) * J.topRows(num);
   const std::vector<int> given(lens_order_.begin() + num_estimated_, lens_order_.end());
-  path.given = given_numbers({problem_.camera, given, considered, system.chain.b.tail(rest), S, S, spread.J, path.cov});
+  path.given =
+      given_numbers({problem_.camera, given, considered, system.chain.b.segment(num, rest), S, S, spread.J, path.cov});
   add_clock(path);
   return path;
 }

@@ -41,6 +41,7 @@ struct SmootherProblem {
   std::size_t first_frame = 0;  ///< Of the recording.
   Camera camera;                ///< As told; its covariance is counted.
   std::vector<double> t_s;
+  std::vector<bool> is_jump;                  ///< To these frames the camera came by no motion. May be empty: to none.
   std::vector<Rigid3> world_from_cam;         ///< To begin at.
   std::vector<UsedObservation> observations;  ///< In order of frames.
   std::vector<SmootherPoint> points;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <array>
 
 #include "alidade/localize/pose_chain.h"
 #include "alidade/testing/hover.h"
@@ -50,7 +51,7 @@ TEST(PoseChain, EliminatedPoseByPoseIsTheWholeMatrixInverted) {
   const Eigen::VectorXd x_border = B.llt().solve(chain.b);
   EXPECT_LT((x_border - x.tail(border)).norm(), 1e-9);
   EXPECT_NEAR(chain.gain() + x_border.dot(chain.b), x.dot(g), 1e-9);
-  const auto steps = chain.steps(x_border);
+  const auto steps = chain.steps(x_border).poses;
   // The last of the border's numbers as one that is given: the others, and the poses, move with it.
   const int solved = border - 1, rest = 6 * num + solved;
   Eigen::MatrixXd J_border(border, 1);
@@ -62,6 +63,81 @@ TEST(PoseChain, EliminatedPoseByPoseIsTheWholeMatrixInverted) {
     EXPECT_LT((steps[at] - x.segment<6>(6 * k)).norm(), 1e-9);
     EXPECT_LT((spread.cov[at] - cov.block<6, 6>(6 * k, 6 * k)).norm(), 1e-9);
     EXPECT_LT((spread.J[at] - J.segment<6>(6 * k)).norm(), 1e-9);
+  }
+}
+
+/// Points that enter late and leave early, and take each other's places, are as in the whole matrix, too.
+TEST(PoseChain, PointsThatEnterAndLeaveAreTheWholeMatrixInverted) {
+  struct Seen {
+    int first, last;
+  };
+  constexpr std::array<Seen, 5> points{{{0, 2}, {0, 6}, {3, 4}, {3, 5}, {6, 6}}};
+  constexpr int num = 7, shared = 4, num_points = 5, points_at = 6 * num, shared_at = points_at + 3 * num_points;
+  constexpr int all = shared_at + shared;
+  Draws draws(4);
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(all, all);
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(all);
+  PoseChain chain(shared, 3);
+  for (int k = 0; k < num; ++k) {
+    std::vector<int> columns, places;  // in the whole, and in the border
+    const int window = std::min(18, 6 * (num - k));
+    for (int i = 0; i < shared; ++i) {
+      columns.push_back(shared_at + i);
+      places.push_back(i);
+    }
+    for (std::size_t p = 0; p < points.size(); ++p) {
+      if (k == points[p].first) (void)chain.enter(p);
+      if (k < points[p].first || k > points[p].last) continue;
+      for (int i = 0; i < 3; ++i) {
+        columns.push_back(points_at + 3 * static_cast<int>(p) + i);
+        places.push_back(chain.place_of(p) + i);
+      }
+    }
+    constexpr int rows = 40;
+    const int border = static_cast<int>(columns.size());
+    Eigen::MatrixXd J(rows, window + border);
+    Eigen::VectorXd r(rows);
+    for (int i = 0; i < rows; ++i) {
+      r[i] = draws.normal();
+      for (int j = 0; j < window + border; ++j) J(i, j) = draws.normal();
+    }
+    const Eigen::MatrixXd JJ = J.transpose() * J;
+    const Eigen::VectorXd Jr = J.transpose() * r;
+    std::vector<int> whole;
+    for (int i = 0; i < window; ++i) whole.push_back(6 * k + i);
+    whole.insert(whole.end(), columns.begin(), columns.end());
+    for (int i = 0; i < window + border; ++i) {
+      g[whole[static_cast<std::size_t>(i)]] += Jr[i];
+      for (int j = 0; j < window + border; ++j)
+        H(whole[static_cast<std::size_t>(i)], whole[static_cast<std::size_t>(j)]) += JJ(i, j);
+    }
+    chain.A.topLeftCorner(window, window) += JJ.topLeftCorner(window, window);
+    chain.a.head(window) += Jr.head(window);
+    for (int i = 0; i < border; ++i) {
+      const int at = places[static_cast<std::size_t>(i)];
+      chain.U.col(at).head(window) += JJ.col(window + i).head(window);
+      chain.b[at] += Jr[window + i];
+      for (int j = 0; j < border; ++j) chain.B(at, places[static_cast<std::size_t>(j)]) += JJ(window + i, window + j);
+    }
+    ASSERT_TRUE(chain.eliminate());
+    for (std::size_t p = 0; p < points.size(); ++p)
+      if (k == points[p].last) ASSERT_TRUE(chain.leave(p));
+  }
+  const Eigen::MatrixXd cov = H.inverse(), B = chain.B.topLeftCorner(shared, shared).selfadjointView<Eigen::Lower>();
+  const Eigen::VectorXd x = cov * g, x_shared = B.llt().solve(chain.b.head(shared));
+  EXPECT_LT((x_shared - x.tail(shared)).norm(), 1e-9);
+  EXPECT_NEAR(chain.gain() + x_shared.dot(chain.b.head(shared)), x.dot(g), 1e-9);
+  const PoseChain::Steps steps = chain.steps(x_shared);
+  const PoseChain::Spread spread = chain.spread(B.inverse(), Eigen::MatrixXd::Identity(shared, shared));
+  for (int k = 0; k < num; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    EXPECT_LT((steps.poses[at] - x.segment<6>(6 * k)).norm(), 1e-9) << k;
+    EXPECT_LT((spread.cov[at] - cov.block<6, 6>(6 * k, 6 * k)).norm(), 1e-9) << k;
+  }
+  for (std::size_t p = 0; p < points.size(); ++p) {
+    const int at = points_at + 3 * static_cast<int>(p);
+    EXPECT_LT((steps.points[p] - x.segment<3>(at)).norm(), 1e-9) << p;
+    EXPECT_LT((spread.point_cov[p] - cov.block<3, 3>(at, at)).norm(), 1e-9) << p;
   }
 }
 

@@ -35,12 +35,14 @@ class PathSmoother {
   std::optional<SmoothedPath> solve();
 
  private:
-  [[nodiscard]] int num_solved() const { return lens_at_ + num_estimated_; }
+  /// Of the shared numbers those that are solved for: the estimated part of the lens, which stands first.
+  [[nodiscard]] int num_solved() const { return num_estimated_; }
   [[nodiscard]] bool settle();
   [[nodiscard]] std::optional<SmootherSystem> build(const SmootherState& state) const;
-  [[nodiscard]] SmootherState moved_by(const Eigen::VectorXd& border, std::span<const Eigen::Vector<double, 6>> poses,
+  [[nodiscard]] SmootherState moved_by(const Eigen::VectorXd& shared, const PoseChain::Steps& steps,
                                        double share) const;
-  void add_told(const SmootherState& state, SmootherSystem& system) const;
+  void find_lives();
+  void add_told_lens(const SmootherState& state, SmootherSystem& system) const;
   void add_told_point(const SmootherState& state, std::size_t point, SmootherSystem& system) const;
   using Twist = Eigen::Vector<double, 6>;  ///< How fast a pose changes: in the world, and on the right. [m/s, rad/s]
   [[nodiscard]] Twist twist_at(const SmootherState& state, std::size_t k) const;
@@ -62,7 +64,7 @@ class PathSmoother {
   [[nodiscard]] bool choose_observations();
   [[nodiscard]] Eigen::MatrixXd lens_information() const;
   [[nodiscard]] Eigen::MatrixXd considered_cov() const;
-  void fill_map(const Eigen::MatrixXd& cov, SmoothedPath& path) const;
+  void fill_map(std::span<const Eigen::Matrix3d> covs, SmoothedPath& path) const;
   void fill_lens(const Eigen::MatrixXd& cov, SmoothedPath& path) const;
   void add_clock(SmoothedPath& path) const;
   /// path_profile.cpp.
@@ -75,7 +77,8 @@ class PathSmoother {
   std::vector<UsedObservation> observations_;  ///< Those that fit.
   std::map<long, std::size_t> index_of_;
   std::vector<int> lens_order_;  ///< Those estimated, then the others.
-  int num_estimated_ = 0, lens_at_ = 0;
+  int num_estimated_ = 0;
+  static constexpr int lens_at_ = 0;
   int causes_at_ = 0;  ///< The target's scale and shape, its speed, and the image's readout: tested, not solved for.
   Eigen::Vector3d target_middle_ = Eigen::Vector3d::Zero();
   double middle_s_ = 0.0;
@@ -89,6 +92,13 @@ class PathSmoother {
   std::optional<Held> held_;
   Eigen::VectorXd told_lens_;
   SmootherState state_;
+  /// The frames in which a point is in the equations, by its observations; none: it has no part in them.
+  struct Life {
+    std::size_t first = 0, last = 0;
+  };
+  std::vector<std::optional<Life>> lives_;
+  std::vector<std::vector<std::size_t>> entering_, leaving_;  ///< Points, by frame.
+  int most_at_once_ = 0;
 };
 
 }  // namespace alidade

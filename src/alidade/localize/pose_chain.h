@@ -5,49 +5,77 @@
 
 namespace alidade {
 
-/// Normal equations of poses in a row, of which each shares factors with the two after it, and of numbers that all
-/// share (points, a lens): the border. Poses are added in order and leave at once, by Cholesky's elimination, so that
-/// memory and time grow with their number, and with the border's square. T. Barfoot, "State Estimation for Robotics",
-/// 2017, §9.2: the arrowhead of bundle adjustment, with a motion's chain.
+/// Normal equations of poses in a row, of which each shares factors with the two after it; of points, each of which is
+/// seen from some of them; and of numbers that all share (a lens): the border. Poses are added in order and leave at
+/// once, by Cholesky's elimination; a point enters before its first factor and leaves after its last pose has left. So
+/// memory and time grow with the number of poses, and with the square of the points that are there at once. T. Barfoot,
+/// "State Estimation for Robotics", 2017, §9.2: the arrowhead of bundle adjustment, with a motion's chain; what leaves
+/// when: I. S. Duff & J. K. Reid, "The Multifrontal Solution of Indefinite
+/// Sparse Symmetric Linear Equations", 1983.
 class PoseChain {
  public:
   static constexpr int pose_dim = 6, window = 18;  ///< Numbers of a pose; of it and the two after it.
 
-  explicit PoseChain(int border_dim);
+  /// Room for so many points at once.
+  explicit PoseChain(int num_shared, int num_points = 0);
 
-  /// Information of the pose that is next to leave, the two after it, and the border: J^T J and J^T r are added to
-  /// these by whoever has factors. Of symmetric ones the lower half counts.
+  /// Information of the pose that is next to leave, the two after it, and the border (what all share, then a place of
+  /// three numbers for each point): J^T J and J^T r are added to these by whoever has factors. Of symmetric ones the
+  /// lower half counts.
   Eigen::Matrix<double, window, window> A;
   Eigen::Matrix<double, window, Eigen::Dynamic> U;  ///< Window by border.
   Eigen::MatrixXd B;
   Eigen::Vector<double, window> a;
   Eigen::VectorXd b;
 
+  /// Where in the border a point stands that enters. Points are counted from none, in any order.
+  int enter(std::size_t point);
+  /// False where nothing tells its place.
+  [[nodiscard]] bool leave(std::size_t point);
+  [[nodiscard]] int place_of(std::size_t point) const { return place_of_[point]; }
   /// The first pose of the window leaves. False where nothing tells it.
   [[nodiscard]] bool eliminate();
 
   /// Σ |L⁻¹ a|² of those that have left: what their steps gain in cost.
   [[nodiscard]] double gain() const;
 
-  /// With the border at `border`: every pose's step, in order.
-  [[nodiscard]] std::vector<Eigen::Vector<double, pose_dim>> steps(const Eigen::VectorXd& border) const;
+  /// With the shared numbers at `shared`: every pose's step, and every point's, in order.
+  struct Steps {
+    std::vector<Eigen::Vector<double, pose_dim>> poses;
+    std::vector<Eigen::Vector3d> points;
+  };
+  [[nodiscard]] Steps steps(const Eigen::VectorXd& shared) const;
 
-  /// Covariance of each pose where the border's is `border_cov`, and how each moves with these of the border's columns
-  /// (`J_border`: how the border itself moves with them).
+  /// Covariance of each pose and point where that of the shared numbers is `shared_cov`, and how each pose moves with
+  /// these of the shared numbers (`J_shared`: how they themselves move with them).
   struct Spread {
     std::vector<Eigen::Matrix<double, pose_dim, pose_dim>> cov;
     std::vector<Eigen::Matrix<double, pose_dim, Eigen::Dynamic>> J;
+    std::vector<Eigen::Matrix3d> point_cov;
   };
-  [[nodiscard]] Spread spread(const Eigen::MatrixXd& border_cov, const Eigen::MatrixXd& J_border) const;
+  [[nodiscard]] Spread spread(const Eigen::MatrixXd& shared_cov, const Eigen::MatrixXd& J_shared) const;
 
  private:
-  struct Left {
-    Eigen::Matrix<double, pose_dim, pose_dim> L;
-    Eigen::Matrix<double, pose_dim, window - pose_dim> W_poses;
-    Eigen::Matrix<double, pose_dim, Eigen::Dynamic> W_border;
-    Eigen::Vector<double, pose_dim> y;
+  static constexpr int rest_dim = window - pose_dim;
+  enum class Event { entered, left, pose };
+  /// What became of a point or a pose, with what remained of its equations: x = L⁻ᵀ (y − W_poses … − W_border …).
+  struct Step {
+    Event event = Event::pose;
+    std::size_t index = 0;
+    int place = 0;
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, pose_dim, pose_dim> L;
+    Eigen::Matrix<double, Eigen::Dynamic, rest_dim, 0, pose_dim, rest_dim> W_poses;
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic> W_border;  ///< Of as much of it as was in use.
+    Eigen::Vector<double, Eigen::Dynamic> y;
   };
-  std::vector<Left> left_;
+  struct Backward;
+  void take_out(const Step& step);
+
+  int num_shared_ = 0, num_used_ = 0;  ///< Of the border.
+  std::size_t num_poses_ = 0;
+  std::vector<int> place_of_;  ///< Of each point.
+  std::vector<bool> is_taken_;
+  std::vector<Step> steps_;
 };
 
 }  // namespace alidade

@@ -15,7 +15,8 @@ namespace alidade::testing {
 struct LongWalk {
   int num_points = 500, num_frames = 900;
   double length_m = 6.0, dt_s = 1.0 / 30.0, sigma_px = 0.5;
-  bool comes_back = false;  ///< Half of the frames there, half of them back.
+  double sigma_known_m = 0.0;  ///< By how much the target's points are told wrongly.
+  bool comes_back = false;     ///< Half of the frames there, half of them back.
 };
 
 struct WalkRun {
@@ -36,6 +37,8 @@ inline WalkRun long_walk(const LongWalk& scene, std::uint64_t seed) {
   std::vector<Eigen::Vector3d> points{{-0.15, -0.1, 1.2}, {0.15, -0.1, 1.2}, {0.15, 0.1, 1.2},
                                       {-0.15, 0.1, 1.2},  {0.05, 0.0, 1.2},  {-0.05, 0.05, 1.2}};
   for (std::size_t i = 0; i < points.size(); ++i) run.target.push_back({static_cast<long>(i), points[i], 0.001});
+  if (scene.sigma_known_m > 0.0)
+    for (KnownPoint& told : run.target) told.point_in_world += scene.sigma_known_m * draws.normal3();
   for (int i = 0; i < scene.num_points; ++i) {
     const double x = draws.uniform(-1.0, scene.length_m + 1.0), y = draws.uniform(-0.8, 0.8);
     points.emplace_back(x, y, draws.uniform(1.0, 2.2));

@@ -1,0 +1,54 @@
+#include "cli/app/out_of_memory.h"
+
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cstdlib>
+#include <exception>
+#include <new>
+#include <string_view>
+
+#include "alidade/estimation/verdict.h"
+
+namespace alidade::cli {
+namespace {
+
+constexpr std::size_t reserve_bytes = 1 << 20;  // never touched, so that it costs an address and no memory
+std::array<std::atomic<void*>, 4> reserve{};
+
+/// Gives a part of the reserve back, after which the allocation is tried again; throws where none is left.
+void release_reserve() {
+  for (std::atomic<void*>& part : reserve) {
+    if (void* const bytes = part.exchange(nullptr)) {
+      std::free(bytes);
+      return;
+    }
+  }
+  throw std::bad_alloc();
+}
+
+/// Without an allocation, unlike the standard one's names of exceptions.
+[[noreturn]] void end_in_one_line() {
+  std::string_view line = "alidade: error: internal: an error within the handling of another; please report this\n";
+  try {
+    if (std::current_exception()) std::rethrow_exception(std::current_exception());
+  } catch (const std::bad_alloc&) {
+    line = "alidade: error: internal: not enough memory; use fewer or smaller inputs\n";
+  } catch (...) {
+  }
+  [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, line.data(), line.size());
+  ::_exit(static_cast<int>(ExitCode::internal_error));
+}
+
+}  // namespace
+
+void prepare_for_out_of_memory() {
+  for (std::atomic<void*>& part : reserve) {
+    if (part.load() == nullptr) part = std::malloc(reserve_bytes);
+  }
+  std::set_new_handler(release_reserve);
+  std::set_terminate(end_in_one_line);
+}
+
+}  // namespace alidade::cli

@@ -1,0 +1,238 @@
+#!/usr/bin/env python3
+"""Faults of the machine under every command that writes: tools/faults.py ALIDADE [--short] [--seed N] [--commands a,b]
+[--campaigns calls,kill,together,pipe]. What must hold after each fault: it is answered by exit code 1 or 3 and one line (or nothing was
+lost by it: 0), within seconds, and the folder of results has the whole old result or the whole new one, with nothing beside it."""
+import argparse
+import collections
+import errno
+import os
+import pathlib
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+SIMULATED = {
+    "board": "simulate board --board 7x5 --square 0.03 --corners-only --photos 8 --size 320x240",
+    "rotation": "simulate rotation --duration 3",
+    "rangefinder": "simulate rangefinder --shots 12",
+    "rig": "simulate rig --boards 2",
+    "track": "simulate track --duration 2",
+    "servo": "simulate servo",
+    "underwater": "simulate underwater --frames 20",
+}
+# {s} is a folder of what is simulated; each writes --out. Old and new results are of two seeds.
+COMMANDS = {
+    "simulate": "simulate track --duration 1 --seed {n}",
+    "photos": "simulate board --board 5x4 --square 0.03 --photos 2 --size 160x120 --seed {n}",
+    "calibrate": "calibrate --corners {s}/board/corners.csv --size 320x240 --board 7x5 --square 0.03",
+    "observe": "observe {s}/rotation/log.csv --size 780x582",
+    "rangefinder": "rangefinder {s}/rangefinder/shots.csv --corners {s}/rangefinder/corners.csv --board 9x6 --square 0.04 --camera {s}/rangefinder/camera.yaml",
+    "track": "track {s}/track/events.csv --rig {s}/track/rig.yaml",
+    "identify": "identify {s}/servo/log.csv",
+    "localize": "localize {s}/underwater/sights.csv --camera {s}/underwater/camera.yaml --target {s}/underwater/target.yaml",
+}
+KINDS = {  # call: errno of its failure, and whether all calls after it fail as well
+    "open": (errno.EMFILE, False), "write": (errno.ENOSPC, True), "rename": (errno.EACCES, False),
+    "mkdir": (errno.EROFS, False), "sync": (errno.EIO, False), "mmap": (errno.ENOMEM, False), "malloc": (errno.ENOMEM, False),
+}
+HIDDEN = ".alidade-"  # what a killed process leaves, until the next run clears it away
+VOLATILE = ("result.json", "report.html")  # have the time in them
+
+
+def contents(folder, with_hidden=True):
+    """Name to bytes of a folder, None if there is none; what changes with time is only named."""
+    files = sorted(file for file in folder.rglob("*") if file.is_file())
+    found = {str(file.relative_to(folder)): b"" if file.name in VOLATILE else file.read_bytes() for file in files}
+    if not with_hidden:
+        found = {name: content for name, content in found.items() if not name.startswith(HIDDEN)}
+    return found if found or (with_hidden and folder.exists()) else None
+
+
+class Trial:
+    """One command with its old result and its new one, tried again and again."""
+
+    def __init__(self, alidade, name, simulated, folder):
+        self.alidade, self.name, self.folder = alidade, name, folder
+        self.words = {n: COMMANDS[name].format(s=simulated / str(n), n=n).split() for n in (1, 2)}
+        self.base = folder / name
+        self.base.mkdir()
+        self.out = self.base / "out"
+        self.old = self.base / "old"  # of another seed, so that old and new differ
+        self.problems = []
+        self.finished = self.run(seed=2).returncode in (0, 4, 6) and self.out.exists()
+        if self.finished:
+            self.old_content = contents(self.out)
+            self.out.rename(self.old)
+            begun = time.monotonic()
+            self.run()
+            self.seconds = time.monotonic() - begun
+            self.new_content = contents(self.out)
+            for path in self.base.iterdir():
+                if path not in (self.old,):
+                    shutil.rmtree(path)
+
+    def line(self, seed=1):
+        return [str(self.alidade), *self.words[seed], "--out", str(self.out)]
+
+    def run(self, seed=1, **environment):
+        return subprocess.run(self.line(seed), cwd=self.base, capture_output=True, text=True, errors="replace", timeout=60,
+                              env={**os.environ, **environment})
+
+    def begin(self, with_old):
+        shutil.rmtree(self.out, ignore_errors=True)
+        if with_old:
+            shutil.copytree(self.old, self.out)
+
+    def check(self, what, code=None, error="", output="", codes=(0, 1, 3, 4, 6)):
+        """What the folder holds after a fault, and what was said."""
+        found = contents(self.out, with_hidden=code != 0)  # where only clearing up failed, the next run does it
+        is_whole = found is None or found in (self.old_content, self.new_content) or (
+            "report: not written" in error + output and {**found, "report.html": b""} in (self.old_content, self.new_content))
+        beside = [path.name for path in self.base.iterdir() if path not in (self.out, self.old)]
+        lines = [line for line in error.splitlines() if line.strip()]
+        if code is not None and (code not in codes or (code in (1, 3) and len(lines) != 1)):
+            self.problems.append(f"{what}: exit {code}: {' | '.join(lines)[:200]}")
+        if not is_whole:
+            near = min((self.old_content, self.new_content), key=lambda c: len(set(c) ^ set(found)))
+            differ = sorted(k for k in set(near) | set(found) if near.get(k) != found.get(k))
+            self.problems.append(f"{what}: exit {code}: the folder is neither old nor new: {differ[:5]}")
+        if beside:
+            self.problems.append(f"{what}: exit {code}: left beside the folder: {beside}")
+            for name in beside:
+                path = self.base / name
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+def chosen_calls(count, most, generator):
+    if count <= most:
+        return list(range(1, count + 1))
+    return sorted(generator.sample(range(1, count + 1), most))
+
+
+def fail_calls(trial, shim, generator, most):
+    """Every n-th call of each kind fails, or a sample of them."""
+    log = trial.folder / "log"
+    done = collections.Counter()
+    for kind, (number, goes_on) in KINDS.items():
+        faults = {"LD_PRELOAD": str(shim), "FAIL_CALL": kind, "FAIL_ERRNO": str(number), "FAIL_LOG": str(log)}
+        if goes_on:
+            faults["FAIL_LAST"] = "1"
+        trial.begin(False)
+        trial.run(**faults)
+        count = int(log.read_text().split()[0])
+        for nth in chosen_calls(count, most, generator):
+            with_old = nth % 2 == 0
+            trial.begin(with_old)
+            try:
+                ended = trial.run(**faults, FAIL_NTH=str(nth))
+                trial.check(f"{trial.name}: {kind} {nth} of {count} fails", ended.returncode, ended.stderr, ended.stdout)
+            except subprocess.TimeoutExpired:
+                trial.problems.append(f"{trial.name}: {kind} {nth} of {count} fails: hangs")
+            done[kind] += 1
+    return done
+
+
+def kill(trial, generator, times):
+    """kill -9 at random instants; then a run that is left alone must work."""
+    for _ in range(times):
+        trial.begin(generator.random() < 0.5)
+        started = subprocess.Popen(trial.line(), cwd=trial.base, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(generator.random() * 1.1 * trial.seconds)
+        started.send_signal(signal.SIGKILL)
+        started.wait()
+        found = contents(trial.out, with_hidden=False)
+        # In the middle of an exchange there is no result.json: nobody takes the rest for a result.
+        if found is not None and found not in (trial.old_content, trial.new_content) and "result.json" in found:
+            trial.problems.append(f"{trial.name}: killed: the folder is neither old nor new")
+    ended = trial.run()
+    trial.check(f"{trial.name}: after kills", ended.returncode, ended.stderr)
+    if contents(trial.out) != trial.new_content:
+        trial.problems.append(f"{trial.name}: after kills: not the new result")
+    return {"kill": times}
+
+
+def together(trial, count):
+    """Many runs into one folder: in the end it has one whole result."""
+    trial.begin(True)
+    runs = [subprocess.Popen(trial.line(), cwd=trial.base, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+            for _ in range(count)]
+    for each in runs:
+        error = each.communicate(timeout=300)[1]
+        if each.returncode not in (0, 2, 3, 4) or (each.returncode == 3 and len(error.strip().splitlines()) != 1):
+            trial.problems.append(f"{trial.name}: {count} at once: exit {each.returncode}: {error[:200]}")
+    trial.check(f"{trial.name}: {count} at once")
+    if contents(trial.out) != trial.new_content:
+        trial.problems.append(f"{trial.name}: {count} at once: no whole new result")
+    return {"together": count}
+
+
+def closed_pipe(trial):
+    """Standard output that nobody reads, or that is full: the result is written all the same, or it is said."""
+    for name, target in (("closed", None), ("full", "/dev/full")):
+        trial.begin(False)
+        if target:
+            with open(target, "w") as full:
+                ended = subprocess.run(trial.line(), cwd=trial.base, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+        else:
+            reading, writing = os.pipe()
+            os.close(reading)
+            ended = subprocess.run(trial.line(), cwd=trial.base, stdout=writing, stderr=subprocess.PIPE, text=True, timeout=60)
+            os.close(writing)
+        trial.check(f"{trial.name}: standard output {name}", ended.returncode, ended.stderr)
+    return {"pipe": 2}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("alidade", type=pathlib.Path)
+    parser.add_argument("--short", action="store_true", help="a sample of each, for the tests")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--commands", default=",".join(COMMANDS))
+    parser.add_argument("--campaigns", default="calls,kill,together,pipe")
+    args = parser.parse_args()
+    generator = random.Random(args.seed)
+    alidade = args.alidade.resolve()
+    total, problems = collections.Counter(), []
+    with tempfile.TemporaryDirectory() as made:
+        folder = pathlib.Path(made)
+        shim = folder / "fail_nth.so"
+        source = pathlib.Path(__file__).parent / "fail_nth.c"
+        subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", str(shim), str(source), "-ldl"], check=True)
+        simulated = folder / "simulated"
+        for name, command, seed in [(n, c, s) for n, c in SIMULATED.items() for s in "12"]:
+            done = subprocess.run([str(alidade), *command.split(), "--seed", seed, "--out", str(simulated / seed / name)],
+                                  capture_output=True, text=True)
+            if done.returncode:
+                problems.append(f"alidade {command}: exit {done.returncode}: {done.stderr.strip()}")
+        for name in args.commands.split(","):
+            trial = Trial(alidade, name, simulated, folder)
+            if not trial.finished:
+                ended = trial.run()
+                problems.append(f"{name}: exit {ended.returncode} without any fault: {ended.stderr.strip()[:200]}")
+                continue
+            if "calls" in args.campaigns:
+                total.update(fail_calls(trial, shim, generator, 4 if args.short else 200))
+            if "kill" in args.campaigns:
+                total.update(kill(trial, generator, 4 if args.short else 1000))
+            if "together" in args.campaigns:
+                total.update(together(trial, 4 if args.short else 64))
+            if "pipe" in args.campaigns:
+                total.update(closed_pipe(trial))
+            print(f"{name:12} {len(trial.problems)} problems", flush=True)
+            for problem in trial.problems[:20]:
+                print(f"  {problem}", flush=True)
+            problems += trial.problems
+    print("faults:", ", ".join(f"{count} {kind}" for kind, count in total.items()))
+    print(f"faults: {sum(total.values())} in all, {len(problems)} problems")
+    for problem in problems:
+        if "without any fault" in problem or problem.startswith("alidade"):
+            print(f"  {problem}")
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

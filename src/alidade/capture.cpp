@@ -160,6 +160,7 @@ struct CaptureGuide::State {
   std::optional<double> first_s;                ///< Time of the first that could have been taken.
 
   void begin(const ImageSize& of_pictures);
+  void look_closely(const cv::Mat& picture);
   void keep(BoardView view);
   void solve();
   void fill_state();
@@ -174,6 +175,12 @@ void CaptureGuide::State::begin(const ImageSize& of_pictures) {
   if (size.width_px > 0 || of_pictures.width_px < 1 || of_pictures.height_px < 1) return;
   size = of_pictures;
   solve();
+}
+
+/// Of a photo that does not come again, as find_board() does.
+void CaptureGuide::State::look_closely(const cv::Mat& picture) {
+  BoardDetection found = find_board(picture, board);
+  if (found.found()) seen = {.view = std::move(found.view), .blur_px = 0.0, .reason = ""};
 }
 
 void CaptureGuide::State::keep(BoardView view) {
@@ -329,7 +336,10 @@ CaptureLook CaptureGuide::look(const cv::Mat& picture, double t_s) {
   const std::uint64_t hash = hash_of(picture);
   const bool is_repeated = state.hash == hash;
   state.hash = hash;
-  if (!is_repeated) state.seen = state.looker.look(picture);
+  if (!is_repeated) {
+    state.seen = state.looker.look(picture);
+    if (!state.seen.found() && !state.config.is_video) state.look_closely(picture);
+  }
   look = state.judge(t_s);
   if (is_repeated && !state.config.is_video) look.sight = Sight::repeated;
   return look;

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "alidade/board_detector/chessboard.h"
 #include "alidade/board_detector/find_board.h"
@@ -15,7 +16,8 @@
 namespace alidade {
 namespace {
 
-constexpr double quick_pixels = 0.6e6;   // of a picture that is searched: VGA and SVGA as they are
+constexpr double quick_pixels = 0.6e6;  // of a picture that is searched: VGA and SVGA as they are
+constexpr int least_halved_px = 120;
 constexpr double least_roomy_px = 24.0;  // around the place where the board was
 
 double quick_scale(double pixels) {
@@ -65,11 +67,15 @@ QuickLook QuickLooker::look_in(const cv::Mat& photo, int left_px, int top_px, in
   if (scale > 1.0) cv::resize(one_channel(part), small, {}, 1.0 / scale, 1.0 / scale, cv::INTER_AREA);
   const cv::Mat grey = to_grey_photo(scale > 1.0 ? small : part, look.reason);
   if (!look.reason.empty()) return look;
-  const Chessboard found = find_chessboard_at(grey, board_.cols, board_.rows, 1.0);
+  Chessboard found = find_chessboard_at(grey, board_.cols, board_.rows, 1.0);
+  if (!found.reason.empty() && std::min(grey.rows, grey.cols) >= least_halved_px) {  // large squares, or blurred ones
+    Chessboard halved = find_chessboard_at(grey, board_.cols, board_.rows, 2.0);
+    if (halved.reason.empty()) found = std::move(halved);
+  }
   look.reason = found.reason;
   look.other_grid = grid_in(found.reason, board_);
   const std::size_t whole = static_cast<std::size_t>(num_points(board_));
-  if (look.found() && found.grid.corners.size() < whole)
+  if (look.found() && 2 * found.grid.corners.size() < whole)  // numbered, so the others are only missed
     look.reason = std::to_string(found.grid.corners.size()) + " of " + std::to_string(whole) + " corners";
   if (!look.found()) return look;
   look.blur_px = scale * blur_of(grey, found.grid, 1.0);

@@ -16,7 +16,7 @@ namespace alidade {
 
 /// A board as a first look finds it, in a fraction of the time that find_board() takes.
 struct QuickLook {
-  BoardView view;        ///< Corners to about a tenth of a pixel; empty where the board was not found whole.
+  BoardView view;        ///< Corners to about a tenth of a pixel; empty where the board was not found.
   double blur_px = 0.0;  ///< Median σ of the blur of a few corners; 0: not known (boards without crossing edges).
   std::string reason;    ///< Why there is none; empty where there is.
   std::pair<int, int> other_grid = {0, 0};  ///< Columns and rows of a chessboard of another size; zeros: none.

@@ -39,7 +39,8 @@ MAY_INCLUDE = {
     "formats": JOBS | {"files"},
     "tables": JOBS | {"files", "formats"},
     "detect": JOBS | FILES,
-    "results": JOBS | FILES | {"reproduce", "report", "detect"},
+    "heads": JOBS | FILES | {"detect"},  # devices that turn, and what is done with them
+    "results": JOBS | FILES | {"reproduce", "report", "detect", "heads"},
     "reference": FOUNDATIONS | FILES,
     "live": JOBS | FILES | {"report", "results"},
     "testing": JOBS | FILES | {"reproduce", "report", "detect", "results"},
@@ -71,7 +72,7 @@ TESTS_MAY_ALSO = {"testing", "simulate", "detect", "results"} | FILES
 INCLUDE = re.compile(r'#include "alidade/(\w+)/')
 # A public header speaks Eigen and std: these cost seconds in every file that sees them.
 HEAVY = re.compile(r'#include [<"](ceres|opencv2|nlohmann|yaml-cpp|tbb|fmt|boost)/')
-# Only FILES and results/ open files, only live/ listens; nothing else in the library prints, starts threads or looks at a clock or the
+# Only FILES and results/ open files, only live/ listens, only heads/ speaks to devices; nothing else in the library prints, starts threads or looks at a clock or the
 # environment.
 OUTSIDE_WORLD = re.compile(
     r"#include <(iostream|fstream|thread|chrono|ctime|unistd\.h)>|\b(f?printf|puts|fopen|getenv|imread|imwrite)\(")
@@ -103,7 +104,7 @@ def faults_of(file, folder):
         if heavy and file.suffix == ".h" and not is_test:
             found.append(f"{file}:{number}: {heavy[1]} belongs in a .cpp")
         outside = OUTSIDE_WORLD.search(line.split("//")[0])
-        if outside and folder not in FILES | {"detect", "results", "live"} and not is_test:
+        if outside and folder not in FILES | {"detect", "results", "live", "heads"} and not is_test:
             found.append(f"{file}:{number}: only what reads and writes, live/ and cli/ may use {outside[1] or outside[2]}")
     if len(lines) > LINES_A_FILE:
         found.append(f"{file}: {len(lines)} lines; a file has at most {LINES_A_FILE}")

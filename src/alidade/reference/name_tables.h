@@ -13,6 +13,7 @@ using NameTables = std::map<std::string, std::string>;
 [[nodiscard]] const NameTables& observe_names();   ///< observe, plan observe, simulate rotation
 [[nodiscard]] const NameTables& beam_names();      ///< rangefinder, plan rangefinder, project, simulate rangefinder
 [[nodiscard]] const NameTables& motion_names();    ///< rig, track, localize, simulate …
+[[nodiscard]] const NameTables& head_names();      ///< head
 [[nodiscard]] const NameTables& study_names();     ///< identify, servo, reproduce …
 [[nodiscard]] const NameTables& campaign_names();  ///< study …, batch
 

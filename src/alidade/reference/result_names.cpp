@@ -11,8 +11,8 @@ namespace {
 const std::map<std::string, std::string>& tables() {
   static const std::map<std::string, std::string> all = [] {
     std::map<std::string, std::string> joined;
-    for (const auto* part :
-         {&camera_names(), &observe_names(), &beam_names(), &motion_names(), &study_names(), &campaign_names()}) {
+    for (const auto* part : {&camera_names(), &observe_names(), &beam_names(), &motion_names(), &head_names(),
+                             &study_names(), &campaign_names()}) {
       joined.insert(part->begin(), part->end());
     }
     return joined;

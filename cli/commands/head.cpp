@@ -1,0 +1,173 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <memory>
+
+#include "alidade/detect/target_look.h"
+#include "alidade/files/files.h"
+#include "alidade/formats/rig_file.h"
+#include "alidade/geometry/degree.h"
+#include "alidade/heads/head_follow.h"
+#include "alidade/heads/head_identify.h"
+#include "alidade/results/head_outcome.h"
+#include "cli/app/app.h"
+#include "cli/commands/commands.h"
+
+namespace alidade::cli {
+namespace {
+
+struct HeadArgs {
+  std::string url;
+  bool identify = false, calibrate = false, move = false;
+  std::string stream;
+  HeadRange range;
+  std::optional<double> until;
+  double most_s = 85.0;
+  std::string rig;
+  NamedLook look;
+  HeadFollowConfig follow;
+};
+
+/// "0.5%", or a share.
+TextCode share_code(std::optional<double>& share) {
+  TextCode code;
+  code.read = [&share](const std::string& text) -> std::string {
+    char* end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    const std::string unit = end;
+    const double number = unit == "%" ? 0.01 * value : value;
+    if (end == text.c_str() || (!unit.empty() && unit != "%") || !(number > 0.0 && number < 1.0))
+      return "'" + text + "' is no share: give 0.5%";
+    share = number;
+    return "";
+  };
+  code.write = [&share] { return share ? fmt::format("{:g}%", 100.0 * *share) : std::string(); };
+  return code;
+}
+
+/// "LOW,HIGH" in degrees.
+TextCode range_code(HeadRange& range, int axis) {
+  return numbers_code(
+      2,
+      [&range, axis]() -> std::vector<double> {
+        if (range.low_rad[axis] < -1e8) return {};
+        return {range.low_rad[axis] / degree, range.high_rad[axis] / degree};
+      },
+      [&range, axis](const std::vector<double>& numbers) {
+        range.low_rad[axis] = numbers[0] * degree;
+        range.high_rad[axis] = numbers[1] * degree;
+      });
+}
+
+/// What the target looks like, by the name of what is done with it.
+Field follow_field(NamedLook& look) {
+  Field field = look_field(look);
+  field.name = "follow";
+  field.option = "--follow";
+  field.help = "Follows what looks so: " + field.help;
+  field.group.clear();
+  field.old_options.clear();
+  return field;
+}
+
+FieldList fields_of(HeadArgs& args) {
+  return {
+      {.name = "move", .value = &args.move, .help = "The head may move; without it nothing does"},
+      {.name = "identify",
+       .value = &args.identify,
+       .help = "Its model: rate, acceleration, time constant, latency, backlash, dead band, repeatability"},
+      {.name = "calibrate",
+       .value = &args.calibrate,
+       .help = "Its camera, by moves that are planned from what is known: lens, mounting, delay"},
+      {.name = "stream",
+       .value = &args.stream,
+       .help = "What its camera sees: http://HOST:PORT/PATH (motion JPEG), or sim:// of a simulated head",
+       .form = "URL"},
+      {.name = "until",
+       .value = share_code(args.until),
+       .help = "Until 3 sigma of fx and fy are this share of them; 4 where that cannot be (default: its usual time)",
+       .form = "SHARE%"},
+      {.name = "most_s",
+       .value = &args.most_s,
+       .help = "For how long --calibrate or --follow may hold the head [s]",
+       .limits = {5.0, 86400.0}},
+      {.name = "pan_range",
+       .value = range_code(args.range, 0),
+       .help = "Where it may go, in degrees, left above zero (default: the head's own limits)",
+       .form = "LOW,HIGH"},
+      {.name = "tilt_range",
+       .value = range_code(args.range, 1),
+       .help = "Where it may go, in degrees, up above zero (default: the head's own limits)",
+       .form = "LOW,HIGH"}};
+}
+
+void check_head(const HeadArgs& args) {
+  const bool follows = !args.look.text.empty();
+  if (args.identify + args.calibrate + follows > 1)
+    throw UsageError("give one of --identify, --calibrate and --follow");
+  if (follows && (args.stream.empty() || args.rig.empty()))
+    throw UsageError("--follow needs --stream URL and --rig FILE");
+  if (follows && !args.move) throw UsageError("--follow moves the head: give --move as well");
+  if (!follows && !args.rig.empty()) throw UsageError("--rig is for --follow");
+  if (args.calibrate && args.stream.empty()) throw UsageError("--calibrate needs the camera: --stream URL");
+  if (args.calibrate && !args.move) throw UsageError("--calibrate moves the head: give --move as well");
+  if (!args.calibrate && args.until) throw UsageError("--until is for --calibrate");
+  if (!args.calibrate && !follows && !args.stream.empty()) throw UsageError("--stream is for --calibrate and --follow");
+  if (args.identify && !args.move) throw UsageError("--identify moves the head: give --move as well");
+  if (!(args.range.low_rad.array() <= args.range.high_rad.array()).all())
+    throw UsageError("--pan-range and --tilt-range are LOW,HIGH with LOW not above HIGH");
+}
+
+ExitCode follow_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
+  run.add_input("rig", args.rig);
+  const Rig rig = read_rig(args.rig);
+  if (rig.heads.size() != 1) throw InputError(args.rig + ": one head is followed with; this rig has another number");
+  load_look(args.look);
+  const std::unique_ptr<FrameStream> stream = open_stream(args.stream, device);
+  HeadFollowConfig config = args.follow;
+  config.range = args.range;
+  config.most_s = args.most_s;
+  JobOutcome outcome = outcome_of(
+      follow_target(device, *stream, rig.heads.front(), args.look.look, args.look.pattern.get(), config, run.progress));
+  run.lap("follow");
+  return run.finish(std::move(outcome));
+}
+
+ExitCode run_head(HeadArgs& args, Run& run) {
+  check_head(args);
+  const std::unique_ptr<HeadDevice> device = open_head(args.url);
+  run.lap("connect");
+  if (!args.look.text.empty()) return follow_by_head(args, *device, run);
+  if (args.calibrate) {
+    const std::unique_ptr<FrameStream> stream = open_stream(args.stream, *device);
+    const HeadCalibrationConfig config{.range = args.range, .until = args.until, .most_s = args.most_s};
+    JobOutcome outcome = outcome_of(calibrate_head(*device, *stream, config, run.progress));
+    run.lap("calibrate");
+    return run.finish(std::move(outcome));
+  }
+  JobOutcome outcome = args.identify ? outcome_of(identify_head(*device, args.range, run.progress))
+                                     : outcome_of(survey_head(*device, args.move, args.range, run.progress));
+  run.lap(args.identify ? "identify" : "ask");
+  return run.finish(std::move(outcome));
+}
+
+}  // namespace
+
+void add_head(App& app) {
+  auto args = std::make_shared<HeadArgs>();
+  CLI::App& command = app.add_command(
+      {.name = "head",
+       .summary = "A pan-tilt head that is connected: what it is, and how it follows its commands",
+       .examples =
+           "alidade head rotctl://127.0.0.1:4533\n"
+           "alidade head rotctl://127.0.0.1:4533 --identify --move --pan-range -60,60 --tilt-range 0,60\n"
+           "alidade head 'sim://?seed=3' --identify --move\n"
+           "alidade head rotctl://127.0.0.1:4533 --stream http://127.0.0.1:8090/stream.mjpg --calibrate --move\n"},
+      [args](Run& run) { return run_head(*args, run); });
+  command.add_option("url", args->url, "rotctl://HOST:PORT (Hamlib's rotctld), or sim://?seed=N, a simulated one")
+      ->required();
+  app.add_fields(command, fields_of(*args));
+}
+
+}  // namespace alidade::cli

@@ -1,0 +1,77 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "alidade/heads/head_server.h"
+#include "cli/app/app.h"
+#include "cli/app/option_checks.h"
+#include "cli/app/terminal.h"
+#include "cli/commands/commands.h"
+
+namespace alidade::cli {
+namespace {
+
+struct SimulateHeadArgs {
+  int rotctl_port = -1, stream_port = -1;
+  std::string head, camera, truth, address = "127.0.0.1";
+  double watchdog_s = 0.5, seconds = 1e9;
+};
+
+ExitCode simulate_head(const SimulateHeadArgs& args, Run& run) {
+  if (args.rotctl_port < 0 && args.stream_port < 0) throw UsageError("give --rotctl PORT, --stream PORT or both");
+  HeadServerConfig config;
+  config.head = simulated_head_config(args.head, "--head");
+  if (args.head.find("watchdog") == std::string::npos) config.head.watchdog_s = args.watchdog_s;
+  config.camera = simulated_camera(args.camera, "--camera");
+  config.address = args.address;
+  config.rotctl_port = args.rotctl_port;
+  config.stream_port = args.stream_port;
+  config.truth_csv = args.truth;
+  const HeadServer server(config);
+  if (args.rotctl_port >= 0) tell_person(fmt::format("head   rotctl://{}:{}", args.address, server.rotctl_port()));
+  if (args.stream_port >= 0)
+    tell_person(fmt::format("stream http://{}:{}/stream.mjpg", args.address, server.stream_port()));
+  const std::shared_ptr<HeadClock> clock = machine_clock();
+  for (const double until = clock->now_s() + args.seconds; clock->now_s() < until;) {
+    report_progress(run.progress, "serving: frames", server.num_frames(), 0);
+    clock->wait_until(clock->now_s() + 0.05);
+  }
+  run.document.counts.given = run.document.counts.used = server.num_frames();
+  Verdict verdict;
+  verdict.sentence = fmt::format("served {} frames", server.num_frames());
+  return run.finish(verdict);
+}
+
+}  // namespace
+
+void add_head_scenario(App& app) {
+  auto args = std::make_shared<SimulateHeadArgs>();
+  CLI::App& command =
+      app.add_command({"simulate head", "A pan-tilt head and its camera as servers: rotctl, and motion JPEG over HTTP",
+                       "  alidade simulate head --rotctl 4533 --stream 8090 --truth truth.csv\n"
+                       "  alidade simulate head --rotctl 4533 --stream 8090 --head 'rate=40&backlash=0.1' --camera "
+                       "'size=640x480&mount=1:-2:3&delay=0.04'\n",
+                       false, false},
+                      [args](Run& run) { return simulate_head(*args, run); });
+  command.add_option("--rotctl", args->rotctl_port, "Port of the head, as Hamlib's rotctld; 0: any that is free")
+      ->check(CLI::Range(0, 65535));
+  command.add_option("--stream", args->stream_port, "Port of its camera, motion JPEG; 0: any that is free")
+      ->check(CLI::Range(0, 65535));
+  command.add_option("--address", args->address, "Where to listen")->capture_default_str();
+  command.add_option(
+      "--head", args->head,
+      "The head, KEY=VALUE&…: seed, rate, accel, tau, latency, backlash, dead_band, step, update_hz, lie, …");
+  command.add_option(
+      "--camera", args->camera,
+      "The camera, KEY=VALUE&…: size, fx, fy, cx, cy, k1, mount (x:y:z, degrees), fps, delay, noise, seed");
+  command.add_option("--truth", args->truth, "Where each frame's time and true angles are written, CSV")
+      ->type_name("FILE");
+  command.add_option("--watchdog", args->watchdog_s, "Stops by itself after so many seconds of silence; 0: never")
+      ->check(finite_number() & CLI::Range(0.0, 3600.0))
+      ->capture_default_str();
+  command.add_option("--seconds", args->seconds, "Ends by itself after so long (default: at Ctrl-C)")
+      ->check(finite_number() & CLI::Range(0.0, 1e9));
+}
+
+}  // namespace alidade::cli

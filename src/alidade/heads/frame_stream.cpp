@@ -1,0 +1,161 @@
+#include "alidade/heads/frame_stream.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "alidade/files/files.h"
+#include "alidade/geometry/degree.h"
+#include "alidade/geometry/so3.h"
+#include "alidade/heads/simulated_head.h"
+#include "alidade/pantilt/head_rotation.h"
+#include "alidade/simulate/panorama_video.h"
+
+namespace alidade {
+namespace {
+
+/// What the camera on a simulated head sees, taken when it is asked for.
+class SimulatedStream final : public FrameStream {
+ public:
+  SimulatedStream(std::string url, const SimulatedCamera& camera, HeadPlant& plant, HeadClock& clock)
+      : name_(std::move(url)), camera_(camera), renderer_(camera), plant_(plant), clock_(clock) {
+    next_s_ = clock.now_s();
+  }
+  [[nodiscard]] const std::string& name() const override { return name_; }
+  [[nodiscard]] std::deque<StreamFrame> take() override {
+    std::deque<StreamFrame> frames;
+    const double now_s = clock_.now_s();
+    if (now_s < next_s_) return frames;
+    next_s_ = std::max(next_s_ + 1.0 / camera_.fps, now_s - 1.0 / camera_.fps);
+    auto image = std::make_shared<cv::Mat>(renderer_.frame(plant_.truth(now_s), ++number_, now_s));
+    frames.push_back({now_s + camera_.delay_s, true, std::move(image)});
+    return frames;
+  }
+
+ private:
+  std::string name_;
+  SimulatedCamera camera_;
+  CameraRenderer renderer_;
+  HeadPlant& plant_;
+  HeadClock& clock_;
+  double next_s_ = 0.0;
+  std::uint64_t number_ = 0;
+};
+
+/// A disc, to a sixteenth of a pixel; the world around it dimmed, so that it is the brightest by far.
+void draw_target(const SimulatedCamera& camera, const RotatingIntrinsics& k, const Eigen::Quaterniond& base_from_cam,
+                 double t_s, cv::Mat& image) {
+  constexpr int bits = 4;
+  constexpr double dim = 0.5, one = 1 << bits;
+  image *= dim;
+  Eigen::Vector2d at = camera.target_rad;
+  if (camera.target_span_rad > 0.0) {
+    const double cycles = std::fmod(t_s * camera.target_rate_rad_s / camera.target_span_rad, 2.0);
+    at[0] += camera.target_span_rad * ((cycles < 1.0 ? cycles : 2.0 - cycles) - 0.5);
+  }
+  const Eigen::Vector3d ray = base_from_cam.conjugate() *
+                              (base_from_cam_rotation(Eigen::Vector3d(at[0], at[1], 0.0)) * Eigen::Vector3d::UnitZ());
+  if (ray.z() < 0.2) return;
+  const Eigen::Vector2d plane = ray.head<2>() / ray.z(), bent = plane * (1.0 + k.k1 * plane.squaredNorm());
+  const Eigen::Vector2d px(k.fx * bent.x() + k.cx, k.fy * bent.y() + k.cy);
+  if ((px.array().abs() > 4096.0).any()) return;
+  cv::circle(image, cv::Point(static_cast<int>(std::lround(px.x() * one)), static_cast<int>(std::lround(px.y() * one))),
+             static_cast<int>(std::lround(camera.target_radius_rad * k.fx * one)), cv::Scalar(255), cv::FILLED,
+             cv::LINE_AA, bits);
+}
+
+std::vector<double> numbers_in(const std::string& text, const char* separators) {
+  std::vector<double> numbers;
+  for (std::size_t at = 0; at <= text.size();) {
+    const std::size_t end = std::min(text.find_first_of(separators, at), text.size());
+    const std::string part = text.substr(at, end - at);
+    char* last = nullptr;
+    const double number = std::strtod(part.c_str(), &last);
+    if (part.empty() || *last != '\0' || !std::isfinite(number) || std::abs(number) > 1e6) return {};
+    numbers.push_back(number);
+    at = end + 1;
+  }
+  return numbers;
+}
+
+}  // namespace
+
+SimulatedCamera simulated_camera(const std::string& text, const std::string& where) {
+  SimulatedCamera camera;
+  double seed = 1.0;
+  const std::map<std::string, double*> places{
+      {"fx", &camera.fx},       {"fy", &camera.fy},         {"cx", &camera.cx},
+      {"cy", &camera.cy},       {"k1", &camera.k1},         {"fps", &camera.fps},
+      {"noise", &camera.noise}, {"delay", &camera.delay_s}, {"seed", &seed}};
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find_first_of("&,", at), text.size());
+    const std::string part = text.substr(at, end - at), key = part.substr(0, part.find('='));
+    const std::vector<double> numbers =
+        numbers_in(part.size() > key.size() ? part.substr(key.size() + 1) : "", key == "size" ? "x" : ":");
+    at = end + 1;
+    if (key == "size" && numbers.size() == 2 && numbers[0] >= 64 && numbers[1] >= 64 && numbers[0] <= 4096 &&
+        numbers[1] <= 4096) {
+      const double scale = numbers[0] / camera.width_px;
+      camera.width_px = static_cast<int>(numbers[0]);
+      camera.height_px = static_cast<int>(numbers[1]);
+      for (double* each : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *each *= scale;
+    } else if (key == "target" && numbers.size() == 5) {
+      camera.target_rate_rad_s = numbers[0] * degree;
+      camera.target_rad = Eigen::Vector2d(numbers[1], numbers[2]) * degree;
+      camera.target_span_rad = numbers[3] * degree;
+      camera.target_radius_rad = numbers[4] * degree;
+    } else if (key == "mount" && numbers.size() == 3) {
+      camera.mount_rad = Eigen::Vector3d(numbers[0], numbers[1], numbers[2]) * degree;
+    } else if (const auto place = places.find(key); place != places.end() && numbers.size() == 1) {
+      *place->second = numbers[0];
+    } else {
+      throw InputError(fmt::format("{}: '{}' is nothing that a simulated camera has", where, part));
+    }
+  }
+  camera.seed = static_cast<std::uint64_t>(std::abs(seed));
+  if (!(camera.fx > 10.0 && camera.fy > 10.0 && camera.fps > 0.1 && camera.noise >= 0.0 && camera.noise < 100.0 &&
+        std::abs(camera.k1) < 0.5))
+    throw InputError(where + ": no such camera can be made");
+  return camera;
+}
+
+struct CameraRenderer::World {
+  FarWorld far;
+};
+
+CameraRenderer::CameraRenderer(const SimulatedCamera& camera)
+    : camera_(camera),
+      world_(std::make_unique<World>(World{FarWorld::of_noise(3.0 / std::min(camera.fx, camera.fy), camera.seed)})) {}
+CameraRenderer::~CameraRenderer() = default;
+
+cv::Mat CameraRenderer::frame(const Eigen::Vector2d& pan_tilt_rad, std::uint64_t number, double t_s) {
+  const RotatingIntrinsics k{camera_.fx, camera_.fy, camera_.cx, camera_.cy, camera_.k1};
+  const Eigen::Quaterniond base_from_cam =
+      base_from_cam_rotation(Eigen::Vector3d(pan_tilt_rad[0], pan_tilt_rad[1], 0.0)) *
+      exp_so3(camera_.mount_rad).conjugate();
+  const PanoramaConfig config{.blur_px = 0.6, .noise = camera_.noise, .oversampling = 1};
+  cv::Mat image = render_panorama(world_->far, k, camera_.width_px, camera_.height_px, base_from_cam, config,
+                                  camera_.seed + 0x9e3779b97f4a7c15u * number);
+  if (camera_.target_radius_rad > 0.0) draw_target(camera_, k, base_from_cam, t_s, image);
+  return image;
+}
+
+std::unique_ptr<FrameStream> open_stream(const std::string& url, HeadDevice& head) {
+  if (url.starts_with("http://"))
+    return open_mjpeg(url, std::shared_ptr<HeadClock>(std::shared_ptr<void>(), &head.clock()));
+  if (url.starts_with("sim://")) {
+    HeadPlant* plant = plant_of(head);
+    if (plant == nullptr) throw InputError(url + ": only a simulated head, sim://, carries such a camera");
+    const std::size_t query = url.find('?');
+    const std::string text = query == std::string::npos ? "" : url.substr(query + 1);
+    return std::make_unique<SimulatedStream>(url, simulated_camera(text, url), *plant, head.clock());
+  }
+  throw InputError("'" + url.substr(0, url.find('@')) +
+                   "' is no stream of a head: give http://HOST:PORT/PATH (motion JPEG) or sim://");
+}
+
+}  // namespace alidade

@@ -1,0 +1,380 @@
+#include "alidade/heads/head_calibrate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <condition_variable>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <thread>
+
+#include "alidade/estimation/config_error.h"
+#include "alidade/estimation/median.h"
+#include "alidade/files/files.h"
+#include "alidade/geometry/degree.h"
+#include "alidade/heads/turn_log.h"
+#include "alidade/observe.h"
+#include "alidade/tables/rotation_log_file.h"
+
+namespace alidade {
+namespace {
+
+cv::Mat grey_of(const cv::Mat& image) {
+  cv::Mat grey = image;
+  if (image.channels() == 3) cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
+  return grey;
+}
+
+/// Follows points on a thread of its own, so that the head is asked in time.
+class FrameFollower {
+ public:
+  FrameFollower() : tracker_(PointTrackerConfig{.max_tracks = 120}), worker_([this] { work(); }) {}
+  ~FrameFollower() {
+    {
+      const std::scoped_lock lock(mutex_);
+      ends_ = true;
+    }
+    changed_.notify_all();
+    worker_.join();
+  }
+  FrameFollower(const FrameFollower&) = delete;
+  FrameFollower& operator=(const FrameFollower&) = delete;
+
+  void push(StreamFrame frame) {
+    {
+      const std::scoped_lock lock(mutex_);
+      waiting_.push_back(std::move(frame));
+    }
+    changed_.notify_all();
+  }
+  /// Waits until all frames have been looked at.
+  const std::vector<SeenFrame>& seen() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return waiting_.empty() && !is_busy_; });
+    return seen_;
+  }
+
+ private:
+  void work() {
+    std::unique_lock lock(mutex_);
+    for (;;) {
+      changed_.wait(lock, [this] { return ends_ || !waiting_.empty(); });
+      if (ends_) return;
+      const StreamFrame frame = std::move(waiting_.front());
+      waiting_.pop_front();
+      is_busy_ = true;
+      lock.unlock();
+      SeenFrame seen{frame.t_s, tracker_.update(grey_of(*frame.image))};
+      lock.lock();
+      is_busy_ = false;
+      seen_.push_back(std::move(seen));
+      changed_.notify_all();
+    }
+  }
+
+  PointTracker tracker_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<StreamFrame> waiting_;
+  std::vector<SeenFrame> seen_;
+  bool is_busy_ = false, ends_ = false;
+  std::thread worker_;  // last: it uses the others
+};
+
+/// What `alidade` with the words of `offline` says of log.csv, down to the last digit: it is read back from its text.
+ObserveReport observed(const std::string& log_csv, int width_px, int height_px) {
+  ObserveConfig config;
+  config.estimate = {"k1", "mount", "delay"};
+  config.no_zoom = true;
+  config.width_px = width_px;
+  config.height_px = height_px;
+  try {
+    return observe(parse_rotation_log(log_csv, "log.csv").log, config);
+  } catch (const InputError& error) {  // no rows, or no points
+    ObserveReport report;
+    report.verdict.state = State::refused;
+    report.verdict.exit_code = ExitCode::cannot_tell;
+    report.verdict.sentence = std::string("no point was followed while the head moved evenly: ") + error.what();
+    report.verdict.to_add = "let the camera see corners or texture, sharply";
+    return report;
+  }
+}
+
+/// The head and the stream together, for one calibration.
+class Session {
+ public:
+  Session(MovingHead& head, FrameStream& stream, const HeadCalibrationConfig& config, const Progress& progress,
+          HeadCalibration& result)
+      : head_(head), stream_(stream), config_(config), progress_(progress), result_(result) {
+    head_.on_reading = [this](const HeadPosition& reading) { readings_.push_back(reading); };
+  }
+  ~Session() { head_.on_reading = nullptr; }
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  void run() {
+    begin_s_ = last_frame_s_ = head_.now_s();
+    try {
+      watch(0.6);
+      moves();
+      head_.stop();
+    } catch (const InputError& fault) {  // a link is lost: the head first, then what was measured before is kept
+      stop_anyhow();
+      if (result_.num_frames == 0 || result_.num_moves < 3) throw;
+      result_.fault = fault.what();
+    }
+    result_.head_time_s = head_time();
+    result_.sigma_clock_s = clock_sigma();
+    estimate();
+  }
+
+ private:
+  void moves() {
+    first_moves();
+    bool goes_on = true;
+    while (goes_on && left_s() > 0.0) {
+      if (tells_both_axes()) estimate();
+      if (is_reached() && head_time() > least_s()) break;
+      goes_on = next_moves();
+    }
+  }
+  /// Who asked and who answered do not agree better on when than the answer took.
+  [[nodiscard]] double clock_sigma() const {
+    constexpr double machine_s = 1e-4;
+    std::vector<double> waits;
+    for (const HeadPosition& each : readings_) waits.push_back(each.wait_s);
+    return std::hypot(machine_s, waits.empty() ? 0.0 : median_of(std::move(waits)) / std::sqrt(12.0));
+  }
+  void stop_anyhow() {
+    try {
+      head_.stop();
+    } catch (const InputError&) {  // it is the head that is lost
+    }
+  }
+  [[nodiscard]] double head_time() { return head_.now_s() - begin_s_; }
+  /// Without a goal the usual time is used; with one it may be earlier.
+  [[nodiscard]] double least_s() const { return config_.until ? 38.0 : std::min(62.0, 0.75 * config_.most_s); }
+  [[nodiscard]] double left_s() { return config_.most_s - head_time() - 4.0; }
+
+  void take_frames() {
+    constexpr double lost_s = 10.0;  // it may come back; until then the head stands
+    for (StreamFrame& frame : stream_.take()) {
+      last_frame_s_ = head_.now_s();
+      ++result_.num_frames;
+      result_.is_stamped = frame.is_stamped;
+      result_.width_px = frame.image->cols;
+      result_.height_px = frame.image->rows;
+      follower_.push(std::move(frame));
+    }
+    if (head_.now_s() - last_frame_s_ < silent_s) return;
+    head_.stop();
+    if (head_.now_s() - last_frame_s_ < lost_s) return;
+    throw InputError(fmt::format("{}: no frame for {:g} s; the stream is lost", stream_.name(), lost_s));
+  }
+  /// Asks the head and takes frames for so long.
+  void watch(double seconds) {
+    constexpr double question_s = 0.04;
+    for (const double until = head_.now_s() + seconds; head_.now_s() < until;) {
+      report_progress(progress_, "calibrating: s of head time", static_cast<std::size_t>(head_time()), 0);
+      head_.wait_until(next_s_);
+      (void)head_.position();
+      next_s_ = head_.now_s() + question_s;
+      take_frames();
+    }
+  }
+  [[nodiscard]] Eigen::Vector2d at() const { return readings_.back().pan_tilt_rad; }
+
+  /// There, no faster than points can be followed, and a short rest.
+  void move_to(const Eigen::Vector2d& target) {
+    constexpr double rest_s = 0.45, most_s = 20.0;
+    if (left_s() < 0.0) return;
+    while (head_.now_s() - last_frame_s_ > silent_s) watch(0.1);
+    ++result_.num_moves;
+    const Eigen::Vector2d from = at(), way = target - from;
+    const double pieces = std::max(1.0, std::ceil(way.norm() / longest_piece()));
+    for (double piece = 1.0; piece <= pieces; piece += 1.0) {
+      head_.command((from + way * piece / pieces).cwiseMax(head_.low_rad()).cwiseMin(head_.high_rad()));
+      if (piece < pieces) watch(piece_s);
+    }
+    const double begin = head_.now_s();
+    double still_since = begin;
+    Eigen::Vector2d before = at();
+    while (head_.now_s() - begin < most_s && head_.now_s() - std::max(still_since, begin + 0.3) < rest_s) {
+      watch(0.08);
+      note_rate();
+      if (at() != before) still_since = head_.now_s();
+      before = at();
+    }
+  }
+  void note_rate() {
+    constexpr std::size_t back = 5;
+    if (readings_.size() <= back) return;
+    const HeadPosition &a = readings_[readings_.size() - 1 - back], &b = readings_.back();
+    if (b.t_s - a.t_s > 0.05) rate_ = std::max(rate_, (b.pan_tilt_rad - a.pan_tilt_rad).norm() / (b.t_s - a.t_s));
+  }
+  /// A head that is quicker than points can be followed is sent ahead of itself piece by piece.
+  [[nodiscard]] double longest_piece() const {
+    const double most_px_a_frame = 0.035 * result_.width_px;
+    const double span_s = last_frame_s_ - begin_s_;
+    const double fps = span_s > 0.3 ? std::clamp(static_cast<double>(result_.num_frames) / span_s, 1.0, 60.0) : 10.0;
+    const double f_px = focal_px_ > 0.0 ? focal_px_ : 1.1 * result_.width_px;
+    const double most_rate = most_px_a_frame * fps / f_px;
+    return rate_ > most_rate ? most_rate * piece_s : 1e9;
+  }
+
+  /// A box around the middle of what is near and allowed: first a small step, to learn how fast it is.
+  void first_moves() {
+    constexpr double reach = 12.0 * degree;
+    const Eigen::Vector2d start = at().cwiseMax(head_.low_rad()).cwiseMin(head_.high_rad());
+    Eigen::Vector2d low, high;
+    for (int i = 0; i < 2; ++i) {
+      const double wide = std::min(2.0 * reach, head_.high_rad()[i] - head_.low_rad()[i]);
+      low[i] = std::clamp(start[i] - 0.5 * wide, head_.low_rad()[i], head_.high_rad()[i] - wide);
+      high[i] = low[i] + wide;
+    }
+    const Eigen::Vector2d middle = 0.5 * (low + high), toward = (middle - start).norm() > degree
+                                                                    ? (middle - start).normalized().eval()
+                                                                    : Eigen::Vector2d(0.7, 0.7);
+    move_to((start + toward * 2.0 * degree).cwiseMax(low).cwiseMin(high));
+    for (const Eigen::Vector2d& corner :
+         {Eigen::Vector2d(high[0], middle[1]), Eigen::Vector2d(middle[0], high[1]), Eigen::Vector2d(low[0], middle[1]),
+          Eigen::Vector2d(middle[0], low[1]), middle})
+      move_to(corner);
+  }
+
+  void estimate() {
+    const std::vector<SeenFrame>& seen = follower_.seen();
+    const double origin_s = readings_.front().t_s;
+    result_.log_csv = rotation_log_csv(turn_log(readings_, seen, late_s_, origin_s));
+    result_.report = observed(result_.log_csv, result_.width_px, result_.height_px);
+    for (const ObservedQuantity& each : result_.report.quantities) {
+      if (each.name == "delay_s") late_s_ = std::clamp(-each.value, -1.0, 1.0);
+      if (each.name == "fx") focal_px_ = each.value;
+    }
+  }
+
+  /// Of an axis that is held nothing is told until the end: whether something is, costs the most time to say.
+  [[nodiscard]] bool tells_both_axes() const { return (reach_high() - reach_low()).minCoeff() > 0.5 * degree; }
+
+  [[nodiscard]] bool is_reached() const {
+    if (result_.report.quantities.size() < 2) return false;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const ObservedQuantity& f = result_.report.quantities[i];
+      if (config_.until && !(3.0 * f.sigma < *config_.until * f.value)) return false;
+    }
+    return true;
+  }
+
+  /// Two moves that tell most by what is known; false: none is left within the limits.
+  bool next_moves() {
+    constexpr double least_way = 1.5 * degree;
+    std::vector<NextMove> planned;
+    try {
+      const double rate_deg_s = std::clamp(rate_ / degree, 1.0, 60.0);
+      planned = plan_moves(observed_now(result_.report), {.moves = 2, .rate_deg_s = rate_deg_s, .max_turn_deg = 20.0},
+                           progress_)
+                    .moves;
+    } catch (const ConfigError&) {  // no estimate yet: where it has not been
+    }
+    std::vector<Eigen::Vector2d> targets;
+    const Eigen::Vector2d here = at();
+    for (const NextMove& move : planned) targets.push_back(here + move.pan_tilt_roll_rad.head<2>());
+    // Where the plan would not leave the place, and to see old points again: around the middle.
+    const Eigen::Vector2d middle = 0.5 * (reach_low() + reach_high()), half = 0.5 * (reach_high() - reach_low());
+    static constexpr std::array<std::array<double, 2>, 4> corners{{{1, 1}, {-1, -0.6}, {-1, 1}, {1, -0.6}}};
+    const auto& corner = corners[num_corners_++ % corners.size()];
+    targets.push_back(middle + half.cwiseProduct(Eigen::Vector2d(corner[0], corner[1])));
+    bool has_moved = false;
+    for (Eigen::Vector2d target : targets) {
+      target = target.cwiseMax(head_.low_rad()).cwiseMin(head_.high_rad());
+      if ((target - at()).norm() < least_way || left_s() < 0.0) continue;
+      move_to(target);
+      has_moved = true;
+    }
+    return has_moved;
+  }
+  [[nodiscard]] Eigen::Vector2d reach_low() const {
+    Eigen::Vector2d low = readings_.front().pan_tilt_rad;
+    for (const HeadPosition& each : readings_) low = low.cwiseMin(each.pan_tilt_rad);
+    return low;
+  }
+  [[nodiscard]] Eigen::Vector2d reach_high() const {
+    Eigen::Vector2d high = readings_.front().pan_tilt_rad;
+    for (const HeadPosition& each : readings_) high = high.cwiseMax(each.pan_tilt_rad);
+    return high;
+  }
+
+  static constexpr double piece_s = 0.1, silent_s = 1.2;
+  MovingHead& head_;
+  FrameStream& stream_;
+  const HeadCalibrationConfig& config_;
+  const Progress& progress_;
+  HeadCalibration& result_;
+  FrameFollower follower_;
+  std::vector<HeadPosition> readings_;
+  double begin_s_ = 0.0, next_s_ = 0.0, last_frame_s_ = 0.0, rate_ = 0.0, late_s_ = 0.0, focal_px_ = 0.0;
+  std::size_t num_corners_ = 0;
+};
+
+/// Which focal length is not known as well as was asked, and why not.
+Verdict calibration_verdict(const HeadCalibration& result, const HeadCalibrationConfig& config,
+                            const Eigen::Vector2d& span_rad) {
+  constexpr double held_rad = 0.5 * degree;
+  Verdict verdict = result.report.verdict;
+  if (!result.fault.empty()) {
+    verdict.state = State::refused;
+    verdict.exit_code = ExitCode::cannot_tell;
+    verdict.sentence = fmt::format("{}; the head was stopped after {:.0f} s; until then: {}", result.fault,
+                                   result.head_time_s, verdict.sentence);
+    verdict.to_add = "mend the link and run it again";
+    return verdict;
+  }
+  const bool has_answer = verdict.exit_code == ExitCode::ok || verdict.exit_code == ExitCode::not_trusted;
+  std::string missing;
+  for (std::size_t i = 0; i < 2 && has_answer && config.until; ++i) {
+    const ObservedQuantity& f = result.report.quantities[i];
+    if (3.0 * f.sigma < *config.until * f.value) continue;
+    missing +=
+        (missing.empty() ? "" : " and ") + f.name +
+        fmt::format(" is told to {:.2g} % (3σ), not to {:.2g} %", 300.0 * f.sigma / f.value, 100.0 * *config.until);
+  }
+  const bool holds_pan = span_rad[0] < held_rad, holds_tilt = span_rad[1] < held_rad;
+  if (!has_answer && (holds_pan || holds_tilt)) {
+    verdict.sentence = fmt::format("{} cannot be told: {} is held; {}", holds_tilt ? "fy" : "fx",
+                                   holds_tilt ? "tilt" : "pan", verdict.sentence);
+    verdict.to_add = fmt::format("give --{}-range more room", holds_tilt ? "tilt" : "pan");
+  }
+  if (missing.empty()) return verdict;
+  verdict.state = State::refused;
+  verdict.exit_code = ExitCode::cannot_tell;
+  verdict.sentence = missing + fmt::format(" within the limits, in {:.0f} s", result.head_time_s);
+  verdict.to_add = holds_tilt  ? "give --tilt-range more room"
+                   : holds_pan ? "give --pan-range more room"
+                               : "give more room, or more time: --most SECONDS";
+  return verdict;
+}
+
+}  // namespace
+
+HeadCalibration calibrate_head(HeadDevice& device, FrameStream& stream, const HeadCalibrationConfig& config,
+                               const Progress& progress) {
+  HeadCalibration result;
+  result.url = device.name();
+  result.stream = stream.name();
+  Eigen::Vector2d span;
+  {
+    MovingHead head(device, config.range.low_rad, config.range.high_rad, progress);
+    if ((head.high_rad() - head.low_rad()).maxCoeff() > 1e4)
+      throw InputError(device.name() + ": names no limits; give --pan-range and --tilt-range");
+    span = head.high_rad() - head.low_rad();
+    Session(head, stream, config, progress, result).run();
+  }
+  result.offline = {"observe",    "log.csv",        "--size",   fmt::format("{}x{}", result.width_px, result.height_px),
+                    "--estimate", "k1,mount,delay", "--no-zoom"};
+  result.verdict = calibration_verdict(result, config, span);
+  return result;
+}
+
+}  // namespace alidade

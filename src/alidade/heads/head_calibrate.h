@@ -1,0 +1,41 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "alidade/heads/frame_stream.h"
+#include "alidade/heads/head_survey.h"
+#include "alidade/observe/report.h"
+
+namespace alidade {
+
+struct HeadCalibrationConfig {
+  HeadRange range;
+  /// Until 3σ of fx and fy are this share of them; none: for as long as its usual moves take.
+  std::optional<double> until;
+  double most_s = 85.0;  ///< For which the head is held.
+};
+
+/// What a head and its camera tell while the head moves.
+struct HeadCalibration {
+  std::string url, stream;
+  int width_px = 0, height_px = 0;
+  std::size_t num_frames = 0, num_moves = 0;
+  bool is_stamped = false;  ///< Frames say when they were taken.
+  double head_time_s = 0.0;
+  double sigma_clock_s =
+      0.0;              ///< Of the head's times against the frames'; in σ of the delay beside what the log tells.
+  std::string fault;    ///< What broke in the middle; the head was stopped, and the rest is of before.
+  std::string log_csv;  ///< What `offline` reads, as log.csv.
+  std::vector<std::string> offline;  ///< `alidade` with these words, in the folder of log.csv, gives the same numbers.
+  ObserveReport report;
+  Verdict verdict;
+};
+
+/// Moves the head, follows points in what its camera sees, and estimates until the goal or the time is reached; moves
+/// are planned by what is known so far. Throws InputError, Interrupted: the head stands then.
+[[nodiscard]] HeadCalibration calibrate_head(HeadDevice& device, FrameStream& stream,
+                                             const HeadCalibrationConfig& config, const Progress& progress = {});
+
+}  // namespace alidade

@@ -1,0 +1,98 @@
+#include "alidade/heads/head_calibrate.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "alidade/geometry/degree.h"
+#include "alidade/heads/simulated_head.h"
+#include "alidade/heads/turn_log.h"
+#include "alidade/observe.h"
+#include "alidade/tables/rotation_log_file.h"
+
+// A head and a camera that are simulated, in a time of their own: rendered frames, points followed in them.
+
+namespace alidade {
+namespace {
+
+constexpr const char* camera_words = "size=320x240&mount=1:-2:3&delay=0.04";
+
+HeadCalibration calibrated(const std::string& head_words, const HeadCalibrationConfig& config) {
+  const std::unique_ptr<HeadDevice> head = open_head("sim://?clock=free&" + head_words);
+  const std::unique_ptr<FrameStream> stream = open_stream(std::string("sim://?") + camera_words, *head);
+  return calibrate_head(*head, *stream, config);
+}
+
+double value_of(const ObserveReport& report, const std::string& name, double& sigma) {
+  for (const ObservedQuantity& each : report.quantities) {
+    if (each.name != name) continue;
+    sigma = each.sigma;
+    return each.value;
+  }
+  ADD_FAILURE() << name;
+  return std::nan("");
+}
+
+HeadRange range_of(double pan_deg, double low_tilt_deg, double high_tilt_deg) {
+  return {Eigen::Vector2d(-pan_deg, low_tilt_deg) * degree, Eigen::Vector2d(pan_deg, high_tilt_deg) * degree};
+}
+
+TEST(HeadCalibrate, LensMountingAndDelayWithinThreeSigma) {
+  const HeadCalibration result = calibrated("rate=8", {.range = range_of(60, -20, 40), .until = 0.003});
+  ASSERT_EQ(result.verdict.exit_code, ExitCode::ok) << result.verdict.sentence;
+  EXPECT_LT(result.head_time_s, 90.0);
+  EXPECT_TRUE(result.is_stamped);
+  const SimulatedCamera truth = simulated_camera(camera_words, "test");
+  const std::vector<std::pair<std::string, double>> truths{{"fx", truth.fx},
+                                                           {"fy", truth.fy},
+                                                           {"cx", truth.cx},
+                                                           {"cy", truth.cy},
+                                                           {"k1", truth.k1},
+                                                           {"mount_x_rad", truth.mount_rad[0]},
+                                                           {"mount_y_rad", truth.mount_rad[1]},
+                                                           {"mount_z_rad", truth.mount_rad[2]}};
+  for (const auto& [name, value] : truths) {
+    double sigma = 0.0;
+    const double found = value_of(result.report, name, sigma);
+    EXPECT_LE(std::abs(found - value), 3.5 * sigma) << name << " " << found << " for " << value << " ± " << sigma;
+  }
+  double sigma = 0.0;
+  EXPECT_NEAR(value_of(result.report, "fx", sigma), truth.fx, 2e-4 * truth.fx);
+  EXPECT_NEAR(value_of(result.report, "delay_s", sigma), -0.04, 2e-3);
+  // Off line, from the text of the log: the same to the last digit.
+  ObserveConfig config;
+  config.estimate = {"k1", "mount", "delay"};
+  config.no_zoom = true;
+  config.width_px = 320;
+  config.height_px = 240;
+  const ObserveReport again = observe(parse_rotation_log(result.log_csv, "log.csv").log, config);
+  ASSERT_EQ(again.quantities.size(), result.report.quantities.size());
+  for (std::size_t i = 0; i < again.quantities.size(); ++i)
+    EXPECT_EQ(again.quantities[i].value, result.report.quantities[i].value) << again.quantities[i].name;
+}
+
+TEST(HeadCalibrate, NamesFyWhereTiltIsHeld) {
+  const HeadCalibration result = calibrated("rate=8", {.range = range_of(60, 0, 0), .until = 0.001, .most_s = 14.0});
+  EXPECT_EQ(result.verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_NE(result.verdict.sentence.find("fy"), std::string::npos) << result.verdict.sentence;
+}
+
+TEST(HeadCalibrate, EvenMotionOnly) {
+  std::vector<HeadPosition> readings;
+  for (int i = 0; i < 100; ++i) {  // stands, moves evenly from 1 s to 3 s, stands
+    const double t = 0.04 * i;
+    readings.push_back({t, 1e-4, Eigen::Vector2d(0.1 * std::clamp(t - 1.0, 0.0, 2.0), 0.0)});
+  }
+  const HeadManner manner = manner_of(readings);
+  EXPECT_NEAR(manner.fastest_rad_s[0], 0.1, 1e-6);
+  EXPECT_TRUE(even_motion(readings, manner, 0.5, 0.5, 0.5));
+  const auto moving = even_motion(readings, manner, 2.0, 1.96, 2.0);
+  ASSERT_TRUE(moving);
+  EXPECT_NEAR(moving->pan_tilt_rad[0], 0.1, 1e-9);
+  EXPECT_NEAR(moving->rate_rad_s[0], 0.1, 1e-9);
+  EXPECT_FALSE(even_motion(readings, manner, 1.0, 1.0, 1.0));
+  EXPECT_FALSE(even_motion(readings, manner, 2.95, 2.95, 3.0));
+}
+
+}  // namespace
+}  // namespace alidade

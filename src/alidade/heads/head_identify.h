@@ -1,0 +1,30 @@
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "alidade/heads/head_survey.h"
+#include "alidade/servo/positioner_fit.h"
+
+namespace alidade {
+
+/// How a head follows its commands: pan and tilt, and what was done to learn it.
+struct HeadIdentification {
+  std::string url;
+  std::array<PositionerLog, 2> logs;
+  std::array<PositionerFit, 2> axes;
+  double head_time_s = 0.0;
+  Eigen::Vector2d low_rad, high_rad;  ///< Where it was allowed to go.
+  Verdict verdict;
+};
+inline constexpr std::array<const char*, 2> head_axis_names{"pan", "tilt"};
+
+/// Steps small and large, to both sides, then smaller and smaller ones, the same one again and again, and a chirp; it
+/// is asked at most 40 times a second. Ends where it began. Throws InputError, Interrupted: the head stands then.
+[[nodiscard]] HeadIdentification identify_head(HeadDevice& device, const HeadRange& range = {},
+                                               const Progress& progress = {});
+
+/// What the fits are worth, and what the log did not excite.
+[[nodiscard]] Verdict head_verdict(const HeadIdentification& identified);
+
+}  // namespace alidade

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "alidade/heads/frame_stream.h"
+#include "alidade/heads/simulated_head.h"
+
+namespace alidade {
+
+struct HeadServerConfig {
+  SimulatedHeadConfig head;
+  SimulatedCamera camera;
+  std::string address = "127.0.0.1";
+  int rotctl_port = -1, stream_port = -1;  ///< 0: any that is free; −1: not served.
+  std::string truth_csv;                   ///< Where truth is written, line by line; empty: nowhere.
+};
+
+/// A simulated head behind the protocol of Hamlib's rotctld, and what its camera sees as motion JPEG over HTTP
+/// (/stream.mjpg; X-Timestamp says when a frame was taken). At most 16 clients each. Throws InputError: a port is in
+/// use, the file cannot be written.
+class HeadServer {
+ public:
+  explicit HeadServer(const HeadServerConfig& config);
+  ~HeadServer();
+  HeadServer(const HeadServer&) = delete;
+  HeadServer& operator=(const HeadServer&) = delete;
+
+  [[nodiscard]] std::uint16_t rotctl_port() const;
+  [[nodiscard]] std::uint16_t stream_port() const;
+  [[nodiscard]] std::size_t num_frames() const;
+  [[nodiscard]] HeadPlant& plant();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// What rotctld answers to a line; none: the client wants to go.
+[[nodiscard]] std::optional<std::string> rotctl_answer(HeadPlant& plant, const std::string& line, double t_s);
+
+}  // namespace alidade

@@ -1,0 +1,163 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "alidade/files/files.h"
+#include "alidade/geometry/degree.h"
+#include "alidade/heads/head_identify.h"
+#include "alidade/heads/line_socket.h"
+#include "alidade/heads/simulated_head.h"
+
+// Heads that are simulated in a time of their own: truth is the plant's.
+
+namespace alidade {
+namespace {
+
+/// Writes down what it is told, and passes it on.
+class WatchedHead final : public HeadDevice {
+ public:
+  explicit WatchedHead(const std::string& url) : head_(open_head(url)) {}
+  [[nodiscard]] HeadLimits limits() override { return head_->limits(); }
+  [[nodiscard]] HeadPosition position() override {
+    asked_s.push_back(clock().now_s());
+    return head_->position();
+  }
+  HeadSent command(const Eigen::Vector2d& target) override {
+    ++commands;
+    asked_s.push_back(clock().now_s());
+    moves_since_stop = true;
+    farthest = farthest.cwiseMax(target.cwiseAbs());
+    return head_->command(target);
+  }
+  HeadSent stop() override {
+    moves_since_stop = false;
+    return head_->stop();
+  }
+  [[nodiscard]] const std::string& name() const override { return head_->name(); }
+  [[nodiscard]] HeadClock& clock() override { return head_->clock(); }
+
+  int commands = 0;
+  bool moves_since_stop = false;
+  Eigen::Vector2d farthest = Eigen::Vector2d::Zero();
+  std::vector<double> asked_s;
+
+ private:
+  std::unique_ptr<HeadDevice> head_;
+};
+
+void expect_within(const PositionerValue& value, double truth, const std::string& what) {
+  EXPECT_LE(std::abs(value.value - truth), 3.0 * value.sigma) << what << ": " << value.value << " for " << truth;
+  EXPECT_GT(value.sigma, 0.0) << what;
+}
+
+TEST(Heads, IdentifiedWithinThreeSigma) {
+  for (const std::string plant :
+       {"rate=33&accel=210&tau=0.07&latency=0.05&backlash=0.2&dead_band=0.08&step=0.01",
+        "rate=55&accel=150&tau=0.1&latency=0.02&step=0.02&update_hz=20", "rate=12&accel=300&tau=0.05&latency=0.1"}) {
+    const std::string url = "sim://?" + plant + "&clock=free";
+    const SimulatedHeadConfig truth = simulated_head_config(plant, "test");
+    const std::unique_ptr<HeadDevice> head = open_head(url);
+    const HeadIdentification result = identify_head(*head);
+    EXPECT_TRUE(result.verdict.ok()) << result.verdict.sentence;
+    EXPECT_LT(result.head_time_s, 90.0);
+    for (const PositionerFit& axis : result.axes) {
+      expect_within(axis.rate, truth.axis.rate_rad_s, plant + " rate");
+      expect_within(axis.acceleration, truth.axis.acceleration_rad_s2, plant + " acceleration");
+      expect_within(axis.time_constant, truth.axis.time_constant_s, plant + " time constant");
+      const double sampling_s = truth.update_hz > 0.0 ? 0.5 / truth.update_hz : 0.0;
+      expect_within(axis.latency, truth.axis.latency_s + sampling_s, plant + " latency");
+      expect_within(axis.backlash, truth.axis.backlash_rad, plant + " backlash");
+      expect_within(axis.dead_band, truth.axis.dead_band_rad, plant + " dead band");
+      EXPECT_NEAR(axis.resolution.value, truth.step_rad, 0.05 * truth.step_rad) << plant;
+      EXPECT_EQ(axis.backlash.is_asked_for, truth.axis.backlash_rad > 0.0) << plant;
+    }
+  }
+}
+
+TEST(Heads, AskedAtMostFortyTimesASecondWithinLimits) {
+  WatchedHead head("sim://?rate=30&clock=free");
+  const HeadRange range{Eigen::Vector2d(-20.0, -10.0) * degree, Eigen::Vector2d(20.0, 15.0) * degree};
+  (void)identify_head(head, range);
+  EXPECT_LE(head.farthest[0], 20.0001 * degree);
+  EXPECT_LE(head.farthest[1], 15.0001 * degree);
+  for (std::size_t i = 40; i < head.asked_s.size(); ++i) ASSERT_GE(head.asked_s[i] - head.asked_s[i - 40], 0.97);
+  EXPECT_FALSE(head.moves_since_stop);
+}
+
+TEST(Heads, NothingMovesWhereItIsOnlyAsked) {
+  WatchedHead head("sim://?clock=free");
+  const HeadSurvey survey = survey_head(head, false);
+  EXPECT_EQ(head.commands, 0);
+  EXPECT_EQ(survey.readings.size(), 100u);
+  const HeadSurvey moved = survey_head(head, true);
+  EXPECT_EQ(head.commands, 2);
+  EXPECT_FALSE(head.moves_since_stop);
+  EXPECT_TRUE(moved.verdict.ok());
+}
+
+TEST(Heads, NeverSentWhatIsNotFiniteOrOutside) {
+  WatchedHead head("sim://?clock=free");
+  MovingHead moving(head, Eigen::Vector2d(-0.5, -0.5), Eigen::Vector2d(0.5, 0.5), {});
+  const double nan = std::nan(""), inf = std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector2d bad : {Eigen::Vector2d(nan, 0.0), Eigen::Vector2d(0.0, nan), Eigen::Vector2d(inf, 0.0),
+                                    Eigen::Vector2d(0.0, -inf), Eigen::Vector2d(0.6, 0.0), Eigen::Vector2d(0.0, -0.6)})
+    EXPECT_THROW(moving.command(bad), InputError) << bad.transpose();
+  EXPECT_EQ(head.commands, 0);
+  const std::unique_ptr<HeadDevice> device = open_head("sim://?clock=free");
+  EXPECT_THROW(device->command({nan, 0.0}), InputError);
+  EXPECT_THROW(device->command({100.0, 0.0}), InputError);
+}
+
+TEST(Heads, StoppedFirstWhateverEndsIt) {
+  for (const std::string lie : {"silent", "nan"}) {
+    WatchedHead head("sim://?clock=free&lie_after=5&lie=" + lie);
+    EXPECT_THROW((void)identify_head(head), InputError) << lie;
+    EXPECT_GT(head.commands, 0) << lie;
+    EXPECT_FALSE(head.moves_since_stop) << lie;
+  }
+  for (const int after : {50, 300, 900}) {  // Ctrl-C
+    WatchedHead head("sim://?clock=free");
+    int calls = 0;
+    const Progress stops = [&](std::string_view, std::size_t, std::size_t) { return ++calls < after; };
+    EXPECT_THROW((void)identify_head(head, {}, stops), Interrupted);
+    EXPECT_FALSE(head.moves_since_stop) << after;
+  }
+}
+
+TEST(Heads, LiesAreNamed) {
+  for (const std::string lie : {"refuses", "frozen"}) {
+    const std::unique_ptr<HeadDevice> head = open_head("sim://?clock=free&lie=" + lie);
+    try {
+      (void)identify_head(*head);
+      ADD_FAILURE() << lie;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("did not move"), std::string::npos) << error.what();
+    }
+  }
+  const std::unique_ptr<HeadDevice> ahead = open_head("sim://?clock=free&lie=reports-target");
+  const HeadIdentification told = identify_head(*ahead);
+  EXPECT_EQ(told.verdict.state, State::bad) << told.verdict.sentence;
+  EXPECT_NE(told.verdict.sentence.find("its target at once"), std::string::npos) << told.verdict.sentence;
+  const std::unique_ptr<HeadDevice> coarse = open_head("sim://?clock=free&step=1.8");
+  const HeadIdentification steps = identify_head(*coarse);
+  EXPECT_NE(steps.verdict.state, State::good);
+}
+
+TEST(Heads, Addresses) {
+  const SocketAddress plain = address_of("rotctl://radio:4534", "rotctl://", 4533);
+  EXPECT_EQ(plain.host, "radio");
+  EXPECT_EQ(plain.port, 4534);
+  EXPECT_EQ(address_of("rotctl://[::1]", "rotctl://", 4533).host, "::1");
+  EXPECT_EQ(address_of("rotctl://[::1]:99", "rotctl://", 4533).port, 99);
+  for (const std::string bad :
+       {"rotctl://", "rotctl://:4533", "rotctl://a:0", "rotctl://a:70000", "rotctl://a:x", "rotctl://a:-1"})
+    EXPECT_THROW((void)address_of(bad, "rotctl://", 4533), InputError) << bad;
+  EXPECT_THROW((void)open_head("telnet://here"), InputError);
+  EXPECT_THROW((void)open_head("sim://?rate=0"), InputError);
+  EXPECT_THROW((void)open_head("sim://?rate=nan"), InputError);
+  EXPECT_THROW((void)open_head("sim://?colour=1"), InputError);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace alidade {
+
+struct SocketAddress {
+  std::string name;  ///< To begin a message with.
+  std::string host;
+  std::uint16_t port = 0;
+};
+
+/// Host and port of "scheme://HOST:PORT[/…]"; [::1] for addresses with colons. Throws InputError.
+[[nodiscard]] SocketAddress address_of(const std::string& url, std::string_view scheme, std::uint16_t usual_port);
+
+/// A TCP connection whose every call ends within its timeout. After a failure it is closed: an answer that comes late
+/// is not taken for the next one's. Throws InputError.
+class LineSocket {
+ public:
+  LineSocket(SocketAddress address, double timeout_s) : address_(std::move(address)), timeout_s_(timeout_s) {}
+  ~LineSocket() { close(); }
+  LineSocket(const LineSocket&) = delete;
+  LineSocket& operator=(const LineSocket&) = delete;
+
+  /// Where it is not connected.
+  void connect();
+  void close();
+  [[nodiscard]] bool is_connected() const { return socket_ >= 0; }
+  void write(std::string_view text);
+  /// The next line, without its end.
+  [[nodiscard]] std::string line();
+  /// So many bytes.
+  [[nodiscard]] std::string bytes(std::size_t count);
+  void set_timeout(double timeout_s) { timeout_s_ = timeout_s; }
+  [[nodiscard]] const SocketAddress& address() const { return address_; }
+
+ private:
+  void fill(double until_s);
+  [[noreturn]] void fail(const std::string& what);
+
+  SocketAddress address_;
+  double timeout_s_;
+  int socket_ = -1;
+  std::string buffer_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,142 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <thread>
+
+#include "alidade/files/files.h"
+#include "alidade/heads/frame_stream.h"
+#include "alidade/heads/line_socket.h"
+#include "alidade/imaging/image_codecs.h"
+
+namespace alidade {
+namespace {
+
+constexpr double first_timeout_s = 5.0;  // until the first frame
+constexpr std::size_t most_bytes = 1 << 24;
+
+std::string lower(std::string text) {
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+class MjpegStream final : public FrameStream {
+ public:
+  MjpegStream(const std::string& url, std::shared_ptr<HeadClock> clock)
+      : name_(url), clock_(std::move(clock)), socket_(address_of(url, "http://", 80), first_timeout_s) {
+    begin();
+    const StreamFrame first = next();
+    frames_.push_back(first);
+    reader_ = std::thread([this] { read(); });
+  }
+  ~MjpegStream() override {
+    ends_ = true;
+    reader_.join();
+  }
+  MjpegStream(const MjpegStream&) = delete;
+  MjpegStream& operator=(const MjpegStream&) = delete;
+
+  [[nodiscard]] const std::string& name() const override { return name_; }
+  [[nodiscard]] std::deque<StreamFrame> take() override {
+    const std::scoped_lock lock(mutex_);
+    if (!fault_.empty() && frames_.empty()) throw InputError(fault_);
+    return std::exchange(frames_, {});
+  }
+
+ private:
+  void begin() {
+    socket_.connect();
+    const std::size_t slash = name_.find('/', std::string_view("http://").size());
+    const std::string path = slash == std::string::npos ? "/" : name_.substr(slash);
+    // 1.0: the answer comes in one piece, not in chunks.
+    socket_.write(fmt::format("GET {} HTTP/1.0\r\nHost: {}:{}\r\nAccept: multipart/x-mixed-replace, image/jpeg\r\n\r\n",
+                              path, socket_.address().host, socket_.address().port));
+    const std::string status = socket_.line();
+    if (status.find(" 200") == std::string::npos)
+      throw InputError(fmt::format("{}: answers '{}'", name_, status.substr(0, 60)));
+    bool is_multipart = false;
+    for (std::string line = socket_.line(); !line.empty(); line = socket_.line())
+      is_multipart = is_multipart || lower(line).starts_with("content-type: multipart/x-mixed-replace");
+    if (!is_multipart) throw InputError(name_ + ": is no stream of JPEG pictures (multipart/x-mixed-replace)");
+  }
+
+  /// Waits for the next one, at most the socket's timeout.
+  StreamFrame next() {
+    std::optional<std::size_t> length;
+    std::optional<double> stamp;
+    bool has_header = false;
+    for (;;) {
+      const std::string line = lower(socket_.line());
+      if (line.empty() && has_header) break;
+      if (line.empty() || line.starts_with("--")) continue;
+      has_header = true;
+      if (line.starts_with("content-length:")) length = std::strtoul(line.c_str() + 15, nullptr, 10);
+      if (line.starts_with("x-timestamp:")) stamp = std::strtod(line.c_str() + 12, nullptr);
+    }
+    if (!length || *length == 0 || *length > most_bytes)
+      throw InputError(name_ + ": a part of the stream does not say how long it is");
+    const std::string jpeg = socket_.bytes(*length);
+    const double now_s = clock_->now_s();
+    const cv::Mat image = decode_image(jpeg);
+    if (image.empty() || image.depth() != CV_8U) throw InputError(name_ + ": a part of the stream is no JPEG");
+    const bool is_stamped = stamp && std::isfinite(*stamp) && std::abs(*stamp - now_s) < 3600.0;
+    return {is_stamped ? *stamp : now_s, is_stamped, std::make_shared<const cv::Mat>(image)};
+  }
+
+  void read() {
+    constexpr double silence_s = 1.0;
+    constexpr std::size_t most_waiting = 200;
+    socket_.set_timeout(silence_s);
+    while (!ends_) {
+      try {
+        StreamFrame frame = next();
+        const std::scoped_lock lock(mutex_);
+        frames_.push_back(std::move(frame));
+        if (frames_.size() > most_waiting) frames_.pop_front();
+      } catch (const InputError& error) {
+        if (connects_again()) continue;
+        const std::scoped_lock lock(mutex_);
+        fault_ = std::string(error.what()) + "; the stream is lost";
+        return;
+      }
+    }
+  }
+
+  /// With growing pauses.
+  bool connects_again() {
+    constexpr int tries = 5, first_pause_ms = 200;
+    for (int i = 0; i < tries && !ends_; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(first_pause_ms << i));
+      try {
+        socket_.close();
+        begin();
+        return true;
+      } catch (const InputError&) {  // not yet
+      }
+    }
+    return false;
+  }
+
+  std::string name_;
+  std::shared_ptr<HeadClock> clock_;
+  LineSocket socket_;
+  std::mutex mutex_;
+  std::deque<StreamFrame> frames_;
+  std::string fault_;
+  std::atomic<bool> ends_ = false;
+  std::thread reader_;
+};
+
+}  // namespace
+
+std::unique_ptr<FrameStream> open_mjpeg(const std::string& url, std::shared_ptr<HeadClock> clock) {
+  return std::make_unique<MjpegStream>(url, std::move(clock));
+}
+
+}  // namespace alidade

@@ -1,0 +1,228 @@
+#include "alidade/results/head_outcome.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "alidade/formats/rig_file.h"
+#include "alidade/geometry/degree.h"
+#include "alidade/geometry/so3.h"
+#include "alidade/results/observe_outcome.h"
+
+namespace alidade {
+namespace {
+
+std::vector<double> numbers_of(const Eigen::Vector2d& both) { return {both[0], both[1]}; }
+
+/// t_s,command,angle_rad, as `alidade identify` reads it: the command that was given last.
+std::string servo_log_csv(const PositionerLog& log) {
+  std::string csv = "t_s,command,angle_rad\n";
+  if (log.readings.empty()) return csv;
+  const double begin_s = log.readings.front().t_s;
+  double command = log.readings.front().angle_rad, last_s = -1.0;
+  std::size_t next = 0;
+  for (const PositionerReading& reading : log.readings) {
+    while (next < log.commands.size() && log.commands[next].t_s <= reading.t_s)
+      command = log.commands[next++].target_rad;
+    if (reading.t_s - begin_s <= last_s) continue;
+    last_s = reading.t_s - begin_s;
+    csv += fmt::format("{:.6f},{:.9f},{:.9f}\n", last_s, command, reading.angle_rad);
+  }
+  return csv;
+}
+
+void fill_axis(const PositionerFit& fit, const std::string& name, ResultDocument& document) {
+  JsonValue &estimate = document.estimate["axes"][name], &stddev = document.stddev["axes"][name];
+  for (std::size_t i = 0; i < num_positioner_values; ++i) {
+    const PositionerValue& value = *fit.values()[i];
+    const bool is_bound = &value == &fit.acceleration && !value.is_asked_for;
+    estimate[positioner_value_names[i]] = is_bound ? std::nan("") : value.value;
+    stddev[positioner_value_names[i]] = is_bound ? std::nan("") : value.sigma;
+    estimate["evidence"][positioner_value_names[i]] = value.evidence;
+  }
+  estimate["offset_rad"] = fit.offset_rad;
+  stddev["offset_rad"] = fit.sigma_offset_rad;
+  estimate["gain"] = fit.gain;
+  stddev["gain"] = fit.sigma_gain;
+  estimate["encoder_hz"] = fit.encoder_hz;
+  estimate["rms_rad"] = fit.rms_rad;
+  estimate["noise"] = fit.noise;
+}
+
+void tell_axis(const PositionerFit& fit, const std::string& name, std::vector<std::string>& lines) {
+  const auto shown = [](const PositionerValue& value, double unit, const char* word) {
+    if (!value.is_asked_for && value.value <= 3.0 * value.sigma)
+      return fmt::format("below {:.2g} {}", (value.value + 3.0 * value.sigma) / unit, word);
+    return fmt::format("{:.5g} ± {:.2g} {}", value.value / unit, 3.0 * value.sigma / unit, word);
+  };
+  lines.push_back(name + "   (3σ)");
+  lines.push_back("rate          " + shown(fit.rate, degree, "°/s"));
+  lines.push_back("acceleration  " + (fit.acceleration.is_asked_for ? shown(fit.acceleration, degree, "°/s²")
+                                                                    : std::string("larger than can be seen")));
+  lines.push_back("time constant " + shown(fit.time_constant, 1e-3, "ms"));
+  lines.push_back(
+      "latency       " + shown(fit.latency, 1e-3, "ms") +
+      (fit.encoder_hz > 0.0 ? fmt::format(", of an encoder that is read {:.3g} times a second", fit.encoder_hz) : ""));
+  lines.push_back("backlash      " + shown(fit.backlash, degree, "°"));
+  lines.push_back("dead band     " + shown(fit.dead_band, degree, "°"));
+  lines.push_back(fmt::format("resolution    {:.3g}°", fit.resolution.value / degree));
+  lines.push_back("repeatability " + shown(fit.repeatability, degree, "°"));
+}
+
+DataTable response_table(const PositionerFit& fit, const std::string& name) {
+  std::vector<double> t, measured;
+  for (std::size_t i = 0; i < fit.t_s.size(); ++i) {
+    t.push_back(fit.t_s[i]);
+    measured.push_back(fit.model_rad[i] - fit.residual_rad[i]);
+  }
+  return {name,
+          {{"t_s", rounded(std::move(t), 5)},
+           {"measured_rad", rounded(std::move(measured), 7)},
+           {"model_rad", rounded(fit.model_rad, 7)},
+           {"residual_rad", rounded(fit.residual_rad, 7)}}};
+}
+
+}  // namespace
+
+JobOutcome outcome_of(const HeadIdentification& identified) {
+  JobOutcome outcome;
+  ResultDocument& document = outcome.document;
+  document.command = "head";
+  document.verdict = identified.verdict;
+  document.counts.given = identified.logs[0].readings.size();
+  document.estimate["url"] = identified.url;
+  document.estimate["low_rad"] = numbers_of(identified.low_rad);
+  document.estimate["high_rad"] = numbers_of(identified.high_rad);
+  document.estimate["head_time_s"] = identified.head_time_s;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const std::string name = head_axis_names[i];
+    outcome.files.push_back({name + ".csv", servo_log_csv(identified.logs[i])});
+    if (identified.axes[i].status != PositionerFit::Status::ok) continue;
+    fill_axis(identified.axes[i], name, document);
+    tell_axis(identified.axes[i], name, outcome.lines);
+    document.data.push_back(response_table(identified.axes[i], name));
+  }
+  document.counts.used = document.counts.given;
+  return outcome;
+}
+
+JobOutcome outcome_of(const HeadSurvey& survey) {
+  JobOutcome outcome;
+  ResultDocument& document = outcome.document;
+  document.command = "head";
+  document.verdict = survey.verdict;
+  document.counts.given = document.counts.used = survey.readings.size();
+  JsonValue& estimate = document.estimate;
+  estimate["url"] = survey.url;
+  estimate["info"] = survey.limits.info;
+  estimate["position_rad"] = numbers_of(survey.readings.back().pan_tilt_rad);
+  if (survey.limits.are_told) {
+    estimate["low_rad"] = numbers_of(survey.limits.low_rad);
+    estimate["high_rad"] = numbers_of(survey.limits.high_rad);
+  }
+  estimate["latency_s"] = survey.latency_s;
+  estimate["latency_p99_s"] = survey.latency_p99_s;
+  document.stddev["latency_s"] = survey.jitter_s;
+  estimate["jitter_s"] = survey.jitter_s;
+  if (survey.has_moved) {
+    estimate["rate_rad_s"] = numbers_of(survey.rate_rad_s);
+    estimate["resolution_rad"] = numbers_of(survey.resolution_rad);
+    outcome.lines.push_back(fmt::format("a small move: pan {:.3g}°/s, tilt {:.3g}°/s; read in steps of {:.2g}°",
+                                        survey.rate_rad_s[0] / degree, survey.rate_rad_s[1] / degree,
+                                        survey.resolution_rad.maxCoeff() / degree));
+  }
+  DataTable table{"readings"};
+  std::vector<double> t, wait, pan, tilt;
+  for (const HeadPosition& reading : survey.readings) {
+    t.push_back(reading.t_s - survey.readings.front().t_s);
+    wait.push_back(reading.wait_s);
+    pan.push_back(reading.pan_tilt_rad[0]);
+    tilt.push_back(reading.pan_tilt_rad[1]);
+  }
+  table.columns = {{"t_s", t}, {"wait_s", wait}, {"pan_rad", pan}, {"tilt_rad", tilt}};
+  document.data.push_back(std::move(table));
+  return outcome;
+}
+
+namespace {
+
+/// rig.yaml: the camera's mounting on the head; the delay stands beside it.
+std::string rig_file_text(const HeadCalibration& calibration) {
+  Eigen::Vector3d mount = Eigen::Vector3d::Zero();
+  double delay_s = 0.0;
+  for (const ObservedQuantity& each : calibration.report.quantities) {
+    if (each.name == "mount_x_rad") mount[0] = each.value;
+    if (each.name == "mount_y_rad") mount[1] = each.value;
+    if (each.name == "mount_z_rad") mount[2] = each.value;
+    if (each.name == "delay_s") delay_s = each.value;
+  }
+  Rig rig;
+  rig.heads.resize(1);
+  rig.heads[0].camera = calibration.report.camera;
+  rig.heads[0].head.cam_from_tilt = exp_so3(mount);
+  const std::vector<std::string> files{"camera.yaml"};
+  return rig_text(rig, files) +
+         fmt::format(
+             "# delay_s: {:.6f}   (a frame shows the angles of so much later than its time; below zero: earlier)\n",
+             delay_s);
+}
+
+}  // namespace
+
+JobOutcome outcome_of(const HeadCalibration& calibration) {
+  JobOutcome outcome = outcome_of(calibration.report);
+  ResultDocument& document = outcome.document;
+  document.command = "head";
+  document.verdict = calibration.verdict;
+  std::erase_if(outcome.files, [](const NamedBytes& file) { return file.name != "camera.yaml"; });
+  const bool has_camera = !outcome.files.empty();
+  outcome.files.push_back({"log.csv", calibration.log_csv});
+  if (has_camera) outcome.files.push_back({"rig.yaml", rig_file_text(calibration)});
+  JsonValue& estimate = document.estimate;
+  estimate["url"] = calibration.url;
+  estimate["stream"] = calibration.stream;
+  estimate["head_time_s"] = calibration.head_time_s;
+  estimate["offline"] = calibration.offline;
+  for (const ObservedQuantity& each : calibration.report.quantities)
+    if (each.name == "delay_s") document.stddev["delay_s"] = std::hypot(each.sigma, calibration.sigma_clock_s);
+  estimate["frame_times"] = calibration.is_stamped ? "stamped" : "arrival";
+  estimate["frames"] = calibration.num_frames;
+  estimate["moves"] = calibration.num_moves;
+  std::string words = "alidade";
+  for (const std::string& word : calibration.offline) words += " " + word;
+  outcome.lines.push_back(fmt::format("{} moves, {} frames, {:.0f} s; off line: {}", calibration.num_moves,
+                                      calibration.num_frames, calibration.head_time_s, words));
+  outcome.lines.push_back("delay_s: a frame shows the angles of so much later than its time; below zero: earlier");
+  return outcome;
+}
+
+JobOutcome outcome_of(const HeadFollowing& following) {
+  JobOutcome outcome;
+  ResultDocument& document = outcome.document;
+  document.command = "head";
+  document.verdict = following.verdict;
+  document.counts.given = following.frames.size();
+  JsonValue& estimate = document.estimate;
+  estimate["url"] = following.url;
+  estimate["stream"] = following.stream;
+  estimate["head_time_s"] = following.head_time_s;
+  estimate["commands"] = following.num_commands;
+  estimate["rms_px"] = following.rms_px;
+  estimate["max_px"] = following.max_px;
+  estimate["central_third"] = following.central_third;
+  std::string csv = "t_s,pan_rad,tilt_rad,u_px,v_px,target_pan_rad,target_tilt_rad,error_px\n";
+  for (const FollowedFrame& frame : following.frames) {
+    csv += fmt::format("{:.6f},{:.9f},{:.9f}", frame.t_s, frame.pan_tilt_rad[0], frame.pan_tilt_rad[1]);
+    csv += frame.is_found ? fmt::format(",{:.4f},{:.4f},{:.9f},{:.9f},{:.4f}\n", frame.px[0], frame.px[1],
+                                        frame.target_rad[0], frame.target_rad[1], frame.error_px)
+                          : std::string(",,,,,\n");
+    document.counts.used += frame.is_found;
+  }
+  document.counts.dropped = document.counts.given - document.counts.used;
+  outcome.files.push_back({"follow.csv", std::move(csv)});
+  outcome.lines.push_back(fmt::format("{} frames, {} commands; from a third of the time on {:.3g} px RMS",
+                                      following.frames.size(), following.num_commands, following.rms_px));
+  return outcome;
+}
+
+}  // namespace alidade

@@ -142,7 +142,7 @@ void capture_stream(live::CaptureSession& session, const CaptureArgs& args, Run&
   live::NewestFrame stream(args.from);
   const Clock::time_point begin = Clock::now();
   while (!stream.is_over() && interrupting_signal() == 0) {
-    const std::optional<live::StreamFrame> frame = stream.fetch();
+    const std::optional<live::LiveFrame> frame = stream.fetch();
     if (!frame) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
       continue;
@@ -180,7 +180,7 @@ ExitCode finish_empty(const Board& board, const CaptureArgs& args, const std::st
 
 }  // namespace
 
-cv::Mat grey_of(const live::StreamFrame& frame) {
+cv::Mat grey_of(const live::LiveFrame& frame) {
   return cv::Mat(frame.height_px, frame.width_px, CV_8U, const_cast<unsigned char*>(frame.grey.data())).clone();
 }
 

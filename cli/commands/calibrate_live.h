@@ -9,7 +9,7 @@
 #include "cli/app/run.h"
 
 namespace alidade::live {
-struct StreamFrame;
+struct LiveFrame;
 }
 namespace cv {
 class Mat;
@@ -29,7 +29,7 @@ struct CaptureArgs {
 };
 
 /// A frame's values, in memory of its own.
-[[nodiscard]] cv::Mat grey_of(const live::StreamFrame& frame);
+[[nodiscard]] cv::Mat grey_of(const live::LiveFrame& frame);
 
 void add_capture_options(CLI::App& command, CaptureArgs& args);
 [[nodiscard]] FieldList fields_of(CaptureArgs& args);

@@ -216,7 +216,7 @@ void CapturePage::State::capture_folder() {
 void CapturePage::State::capture_stream() {
   live::NewestFrame stream(args.from);
   while (!is_over && !stream.is_over() && interrupting_signal() == 0) {
-    const std::optional<live::StreamFrame> frame = stream.fetch();
+    const std::optional<live::LiveFrame> frame = stream.fetch();
     for (const std::string& command : server->commands()) obey(command);
     if (!frame) {
       (void)server->wait_for_picture(std::chrono::milliseconds(5));

@@ -15,7 +15,7 @@ struct NewestFrame::State {
 
   VideoProcess video;
   mutable std::mutex mutex;
-  std::optional<StreamFrame> newest;
+  std::optional<LiveFrame> newest;
   std::atomic<bool> is_over{false}, is_wanted{true};
   std::thread thread;
 
@@ -25,7 +25,7 @@ struct NewestFrame::State {
         std::vector<unsigned char> grey = video.next();
         if (grey.empty()) break;
         const std::scoped_lock lock(mutex);
-        newest = StreamFrame{video.width_px(), video.height_px(), std::move(grey)};
+        newest = LiveFrame{video.width_px(), video.height_px(), std::move(grey)};
       }
     } catch (const InputError&) {  // it broke off: over
     }
@@ -43,7 +43,7 @@ NewestFrame::~NewestFrame() {
   state_->thread.join();
 }
 
-std::optional<StreamFrame> NewestFrame::fetch() {
+std::optional<LiveFrame> NewestFrame::fetch() {
   const std::scoped_lock lock(state_->mutex);
   return std::exchange(state_->newest, std::nullopt);
 }

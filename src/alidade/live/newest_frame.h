@@ -7,7 +7,7 @@
 
 namespace alidade::live {
 
-struct StreamFrame {
+struct LiveFrame {
   int width_px = 0, height_px = 0;
   std::vector<unsigned char> grey;
 };
@@ -23,7 +23,7 @@ class NewestFrame {
   NewestFrame& operator=(const NewestFrame&) = delete;
 
   /// One that was not fetched yet; none while there is no newer one.
-  [[nodiscard]] std::optional<StreamFrame> fetch();
+  [[nodiscard]] std::optional<LiveFrame> fetch();
   /// The stream has ended, or broke off, and its last frame was fetched.
   [[nodiscard]] bool is_over() const;
 

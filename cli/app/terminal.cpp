@@ -108,6 +108,13 @@ void wipe_progress_line() {
   if (state) state->wipe();
 }
 
+void give_back_stderr() {
+  const std::shared_ptr<Terminal::State> state = Terminal::current().lock();
+  if (!state) return;
+  state->wipe();
+  ::dup2(state->people, STDERR_FILENO);
+}
+
 void tell_person(std::string_view line) {
   const std::shared_ptr<Terminal::State> state = Terminal::current().lock();
   if (state) state->wipe();

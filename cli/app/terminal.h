@@ -33,6 +33,9 @@ class Terminal {
 /// Wipes the progress line of the newest one, before something is printed on stdout.
 void wipe_progress_line();
 
+/// stderr as it was before the newest one, for a program that takes over this process.
+void give_back_stderr();
+
 /// A line for the person, on stderr, after wiping the progress line: what they need while the command runs.
 void tell_person(std::string_view line);
 

@@ -7,6 +7,7 @@ void add_commands(App& app) {
   add_calibrate(app);
   add_camera(app);
   add_corners(app);
+  add_fleet(app);
   add_head(app);
   add_identify(app);
   add_localize(app);

@@ -11,6 +11,8 @@ void add_batch(App& app);
 void add_calibrate(App& app);
 void add_camera(App& app);
 void add_corners(App& app);
+void add_fleet(App& app);
+void add_fleet_scenario(App& app);  ///< Of `simulate`.
 void add_head(App& app);
 void add_head_scenario(App& app);  ///< Of `simulate`.
 void add_identify(App& app);

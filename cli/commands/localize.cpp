@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "alidade/detect/image_sequence.h"
+#include "alidade/formats/beam_file.h"
 #include "alidade/formats/camera_file.h"
 #include "alidade/images/photos.h"
 #include "alidade/live/foxglove.h"
@@ -23,7 +24,7 @@ namespace {
 
 struct LocalizeArgs {
   std::filesystem::path sequence;
-  std::string camera, target, start, truth;  // files
+  std::string camera, target, start, truth, depth_sensor, range, beam, mask;  // files
   std::optional<double> rate_hz;
   bool skip_bad = false;
   LocalizeConfig config;
@@ -48,6 +49,26 @@ FieldList fields_of(LocalizeArgs& args) {
        .value = &args.start,
        .help = "Where the camera starts, how fast, how sure; depths of points (start.yaml)",
        .form = "FILE"},
+      {.name = "mask",
+       .value = &args.mask,
+       .help =
+           "Where images show the scene: an image of the camera's size, black where they do not; or 'circle', as an "
+           "endoscope's, found in the first image",
+       .form = "FILE|circle"},
+      {.name = "depth_sensor",
+       .value = &args.depth_sensor,
+       .help = "How deep the camera is, up to an offset, CSV: t_s,depth_m[,sigma_m]; metres without a target, else a "
+               "check of its scale",
+       .form = "FILE"},
+      {.name = "range",
+       .value = &args.range,
+       .help = "What a rangefinder beside the camera reads, CSV: t_s,range_m; metres without a target, else a check of "
+               "its scale; needs --beam",
+       .form = "FILE"},
+      {.name = "beam",
+       .value = &args.beam,
+       .help = "Its beam in the camera's frame (rangefinder.yaml, as alidade rangefinder writes it)",
+       .form = "FILE"},
       {.name = "truth",
        .value = &args.truth,
        .help = "True path as TUM (t x y z qx qy qz qw); adds ATE and RPE",
@@ -66,11 +87,29 @@ FieldList fields_of(LocalizeArgs& args) {
 
 double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
+ImageMask read_mask(const std::filesystem::path& file) {
+  const cv::Mat photo = decode_photo(read_file(file), file.string());
+  std::vector<cv::Mat> channels;
+  cv::split(photo, channels);
+  const cv::Mat is_shown = channels.front() > 0;
+  ImageMask mask{is_shown.cols, is_shown.rows, {}};
+  mask.shows.assign(is_shown.begin<std::uint8_t>(), is_shown.end<std::uint8_t>());
+  return mask;
+}
+
 /// Reads the files that the config takes values from.
 void read_values(LocalizeArgs& args) {
   if (!args.target.empty())
     args.config.target = args.is_images() ? read_image_target(args.target) : read_target(args.target);
   if (!args.start.empty()) args.config.start = read_start(args.start);
+  if (args.range.empty() != args.beam.empty()) throw UsageError("--range and --beam belong together: give both");
+  if (!args.depth_sensor.empty()) args.config.depth_readings = read_depth_sensor(args.depth_sensor);
+  if (!args.range.empty()) args.config.range_readings = read_ranges(args.range);
+  if (!args.mask.empty() && !args.is_images())
+    throw UsageError("--mask is of images; a table of observations has none");
+  args.config.masks_circle = args.mask == "circle";
+  if (!args.mask.empty() && !args.config.masks_circle) args.config.mask = read_mask(args.mask);
+  if (!args.beam.empty()) args.config.beam = read_beam(args.beam).beam;
   args.config.seconds = now_s;
 }
 
@@ -79,6 +118,10 @@ void add_inputs(const LocalizeArgs& args, Run& run) {
   run.add_input("camera", args.camera);
   if (!args.target.empty()) run.add_input("target", args.target);
   if (!args.start.empty()) run.add_input("start", args.start);
+  if (!args.mask.empty() && args.mask != "circle") run.add_input("mask", args.mask);
+  if (!args.depth_sensor.empty()) run.add_input("depth sensor", args.depth_sensor);
+  if (!args.range.empty()) run.add_input("range", args.range);
+  if (!args.beam.empty()) run.add_input("beam", args.beam);
   if (!args.truth.empty()) run.add_input("truth", args.truth);
 }
 
@@ -156,7 +199,9 @@ void add_localize(App& app) {
                    "--sigma-alpha 6\n"
                    "alidade localize sights.csv --camera camera.yaml --target target.yaml\n"
                    "alidade localize sights.csv --camera camera.yaml --target target.yaml --calibrate-online\n"
-                   "alidade localize sights.csv --camera camera.yaml --start start.yaml --truth truth.tum\n"},
+                   "alidade localize sights.csv --camera camera.yaml --start start.yaml --truth truth.tum\n"
+                   "alidade localize sights.csv --camera camera.yaml --depth-sensor depth.csv\n"
+                   "alidade localize sights.csv --camera camera.yaml --range ranges.csv --beam rangefinder.yaml\n"},
       [args](Run& run) { return run_localize(*args, run); });
   command
       .add_option("sequence", args->sequence,

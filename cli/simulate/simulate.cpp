@@ -155,9 +155,11 @@ void add_board_scenario(App& app) {
 
 void add_simulate(App& app) {
   app.add_group("simulate", "Measurements with known truth, in the files that the other commands read");
-  constexpr std::array scenarios{add_board_scenario, add_head_scenario,      add_rangefinder_scenario,
-                                 add_rig_scenario,   add_rotation_scenario,  add_servo_scenario,
-                                 add_track_scenario, add_underwater_scenario};  // one function a scenario
+  constexpr std::array scenarios{add_board_scenario,     add_fleet_scenario,
+                                 add_head_scenario,      add_rangefinder_scenario,
+                                 add_rig_scenario,       add_rotation_scenario,
+                                 add_servo_scenario,     add_track_scenario,
+                                 add_underwater_scenario};  // one function a scenario
   for (const auto add_scenario : scenarios) add_scenario(app);
 }
 

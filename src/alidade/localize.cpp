@@ -9,7 +9,9 @@
 #include "alidade/localize/image_localizer.h"
 #include "alidade/localize/judge.h"
 #include "alidade/localize/observation_localizer.h"
+#include "alidade/localize/scale_readings.h"
 #include "alidade/localize/setup.h"
+#include "alidade/localize/summary.h"
 
 namespace alidade {
 
@@ -87,6 +89,14 @@ Localization Localizer::finish(std::span<const TimedPose> truth) const {
     run.of_images->sum_up(result);
   else if (run.of_observations)
     run.of_observations->sum_up(result);
+  if (!result.is_scale_read) {
+    read_scales(run.config, result.map, result);
+    if (const auto read = scale_of(result); read && !result.has_target) {
+      apply_scale(*read, result);
+      result.is_scale_read = result.scale_known = true;
+    }
+  }
+  add_path_error(result);
   result.counts = {result.path.size(), result.path.size() - result.num_lost, result.num_lost, {}};
   result.assumed = localize_assumed(result);
   result.verdict = localize_verdict(result);

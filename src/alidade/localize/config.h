@@ -1,12 +1,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "alidade/beam/beam.h"
 #include "alidade/description/field.h"
 #include "alidade/localize/camera_motion.h"
 #include "alidade/localize/distortion.h"
@@ -88,6 +90,22 @@ struct LocalizeStart {
   std::vector<GivenDepth> depths = {};
 };
 
+/// Where images show the scene: elsewhere nothing is chosen or looked for.
+struct ImageMask {
+  int width_px = 0, height_px = 0;
+  std::vector<std::uint8_t> shows = {};  ///< Row by row; 0: not.
+};
+
+/// How deep a camera is, up to an offset: from a pressure sensor.
+struct DepthReading {
+  double t_s = 0.0, depth_m = 0.0, sigma_m = 0.01;
+};
+
+/// What a rangefinder beside the camera reads.
+struct RangeReading {
+  double t_s = 0.0, range_m = 0.0;
+};
+
 /// When a new point enters the state.
 enum class NewPoints {
   inverse_depth,  ///< With its first observation, as an inverse depth.
@@ -106,10 +124,15 @@ struct LocalizeConfig {
   std::optional<double> sigma_scale = {};   ///< Of the target's size, relative: counted. None: the target's own.
   std::optional<LocalizeStart> start = {};  ///< Else from the target, else the first camera is the world, up to scale.
   LocalizeTarget target = {};
-  double period_s = 0.0;  ///< Usual time between frames. 0: the median; of images the least so far.
-  bool smooths = true;    ///< With a target: the path is solved again from all observations after the last frame.
-  bool restarts = true;   ///< From the target where the innovations say that the path is wrong.
-  int max_points = 0;     ///< In the filter at once, beside the target's; 0: as many as its state holds.
+  std::vector<DepthReading> depth_readings = {};  ///< In order of time: scale without a target, else a check of it.
+  std::vector<RangeReading> range_readings = {};  ///< The same, of `beam`.
+  std::optional<Beam> beam = {};
+  std::optional<ImageMask> mask = {};
+  bool masks_circle = false;  ///< Images show the scene in a circle, as an endoscope's: found in the first of them.
+  double period_s = 0.0;      ///< Usual time between frames. 0: the median; of images the least so far.
+  bool smooths = true;        ///< With a target: the path is solved again from all observations after the last frame.
+  bool restarts = true;       ///< From the target where the innovations say that the path is wrong.
+  int max_points = 0;         ///< In the filter at once, beside the target's; 0: as many as its state holds.
   double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;  ///< At a start from the target or from nothing.
   LocalizationFilterConfig filter = {};
   FilterBankConfig bank = {};

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "alidade/localize/image_mask.h"
 #include "alidade/localize/summary.h"
 #include "alidade/patches/corner_features.h"
 
@@ -130,6 +131,7 @@ std::vector<FeatureObservation> ImageLocalizer::look(const cv::Mat& smoothed, co
     if (!expected || expected->px.minCoeff() < margin_px || expected->px.x() > smoothed.cols - 1 - margin_px ||
         expected->px.y() > smoothed.rows - 1 - margin_px)
       continue;
+    if (!is_shown(expected->px)) continue;
     in_view_.push_back(expected->px);
     if (tried_.size() >= static_cast<std::size_t>(config_.features.max_tried)) continue;
     Landmark& landmark = at->second;
@@ -149,6 +151,14 @@ std::vector<FeatureObservation> ImageLocalizer::look(const cv::Mat& smoothed, co
         {feature.id, match->px + offset_px, std::hypot(match->sigma_px, config_.features.sigma_floor_px)});
   }
   return observations;
+}
+
+bool ImageLocalizer::is_shown(const Eigen::Vector2d& px) const {
+  if (shown_.shows.empty()) return true;
+  const int u = static_cast<int>(std::lround(px.x())), v = static_cast<int>(std::lround(px.y()));
+  return u >= 0 && v >= 0 && u < shown_.width_px && v < shown_.height_px &&
+         shown_.shows[static_cast<std::size_t>(v) * static_cast<std::size_t>(shown_.width_px) +
+                      static_cast<std::size_t>(u)] != 0;
 }
 
 bool ImageLocalizer::is_found(std::size_t num_found) const {
@@ -223,7 +233,7 @@ void ImageLocalizer::add_new(const cv::Mat& smoothed) {
     if (most == 0 || !make_room()) return;
     const Eigen::Vector2d px = corner.px.cast<double>();
     const auto ray_in_cam = unproject(engine_.camera(), px);
-    if (!ray_in_cam) continue;
+    if (!ray_in_cam || !is_shown(px)) continue;
     constexpr double min_z = 0.2;  // at the edge of a wide lens a depth is no distance
     const double range_m = depth_m / std::max(ray_in_cam->z(), min_z);
     const Rigid3 world_from_cam = engine_.best().motion().world_from_cam;
@@ -318,6 +328,7 @@ void ImageLocalizer::take_next(const cv::Mat& smoothed, PathStep& step) {
 
 PathStep ImageLocalizer::take(const cv::Mat& grey, long frame, double t_s) {
   const cv::Mat smoothed = smoothed_for_search(grey);
+  if (shown_.shows.empty()) shown_ = shown_part(config_, grey, PatchView::half_px + 2);
   PathStep step;
   step.frame = frame_ = frame;
   step.t_s = t_s;

@@ -59,6 +59,9 @@ class ImageLocalizer {
   KeyframeStore keyframes_;
   std::vector<KnownPoint> given_;  ///< The target's points, as the filter was given them.
   std::size_t num_alike_ = 1;
+  [[nodiscard]] bool is_shown(const Eigen::Vector2d& px) const;
+
+  ImageMask shown_;  ///< image_mask.h.
   std::vector<ObservationTried> tried_;
   std::vector<Eigen::Vector2d> in_view_;  ///< Where landmarks are, or should be, in this image.
   double t_s_ = 0.0, period_s_ = 0.0;

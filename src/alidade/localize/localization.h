@@ -62,6 +62,14 @@ struct GivenNumber {
   std::optional<double> sigma;  ///< Counted, in units. None: not known.
 };
 
+/// What a sensor beside the camera says of the path's unit of length.
+struct SensorScale {
+  std::string sensor;      ///< "depth sensor", "rangefinder"
+  double scale = 1.0;      ///< Metres for each unit that the path had without it: 1 where a target is right.
+  double sigma_rel = 0.0;  ///< Of the scale, over it. 0: the readings do not tell it.
+  std::size_t num_used = 0, num_rejected = 0;
+};
+
 /// What the mean residual along the radius is, in rings about the principal point.
 struct RadialStructure {
   double share = 0.0;          ///< RMS over the rings of the mean residual over σ: 0 for a right lens.
@@ -101,7 +109,9 @@ struct Localization {
   std::vector<PathStep> path;  ///< One per frame.
   std::vector<MapPoint> map;   ///< At the end.
   bool scale_known = false;
-  bool has_target = false;  ///< Known points were given.
+  bool is_scale_read = false;              ///< Known by `sensor_scales`, and not by a target.
+  std::vector<SensorScale> sensor_scales;  ///< Of what readings there were.
+  bool has_target = false;                 ///< Known points were given.
   bool is_of_images = false;
   double sigma_px =
       std::numeric_limits<double>::quiet_NaN();  ///< Of an observation that brings none; of images the least.

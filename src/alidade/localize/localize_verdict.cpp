@@ -205,6 +205,52 @@ void add_side(const Localization& report, Verdict& verdict) {
       "check that x goes right and y down as the target is seen; if +z is its front, say 'seen_from: +z' in --target";
 }
 
+/// "depth sensor, ± 0.2 %"
+std::string sensors_text(const Localization& report) {
+  std::string text;
+  double weights = 0.0;
+  for (const SensorScale& each : report.sensor_scales) {
+    if (!(each.sigma_rel > 0.0)) continue;
+    text += (text.empty() ? "" : " and the ") + each.sensor;
+    weights += 1.0 / (each.sigma_rel * each.sigma_rel);
+  }
+  return text + ", ± " + text_of(100.0 / std::sqrt(weights), 2) + " %";
+}
+
+/// What sensors beside the camera say of a scale that is known without them, and two of them of each other.
+void add_sensors(const Localization& report, Verdict& verdict) {
+  constexpr double care_z = 3.0, bad_z = 6.0, many_rejected = 0.2;
+  const SensorScale* first = nullptr;
+  for (const SensorScale& each : report.sensor_scales) {
+    if (!(each.sigma_rel > 0.0)) {
+      verdict.checks.push_back({each.sensor, State::care,
+                                "the readings of the " + each.sensor + " do not tell the scale: " +
+                                    (each.sensor == "depth sensor"
+                                         ? "too few of them, or the camera moves too little up and down"
+                                         : "too few of them, or too few points around the beam that lie on a surface"),
+                                0.0, 0.0, "", "path"});
+      continue;
+    }
+    const double told = report.is_scale_read ? (first ? first->scale : each.scale) : 1.0;
+    const double sigma = std::hypot(each.sigma_rel, report.is_scale_read && first ? first->sigma_rel : 0.0);
+    const double change = std::log(each.scale / told), z = std::abs(change) / sigma;
+    const std::string by = report.is_scale_read && first ? "the " + first->sensor : "the target";
+    const double rejected = share(each.num_rejected, each.num_used + each.num_rejected);
+    if (!report.is_scale_read || first)
+      verdict.checks.push_back({each.sensor, state_of(z, care_z, bad_z),
+                                z > care_z ? "the path is " + text_of(100.0 * change, 2) + " % longer by the " +
+                                                 each.sensor + " than by " + by + " (" + text_of(z, 2) + "σ)"
+                                           : "the " + each.sensor + " agrees with " + by + " on the scale",
+                                z, care_z, "σ", "path"});
+    if (rejected > many_rejected)
+      verdict.checks.push_back(
+          {each.sensor + " readings", State::care,
+           text_of(100.0 * rejected, 2) + " % of the readings of the " + each.sensor + " are rejected", rejected,
+           many_rejected, "1", "path"});
+    if (first == nullptr) first = &each;
+  }
+}
+
 void add_checks(const Localization& report, Verdict& verdict) {
   const double nis = report.nis_per_dof;
   const State nis_state = nis < good_nis_low ? State::care : state_of(nis, good_nis_high, care_nis);
@@ -240,7 +286,8 @@ void add_checks(const Localization& report, Verdict& verdict) {
                                   "less sure than its σ says",
                               report.known_shift, max_shift, "1", "path"});
   verdict.checks.push_back({"scale", report.scale_known ? State::good : State::care,
-                            report.scale_known ? "scale from the known points"
+                            report.is_scale_read ? "scale from the " + sensors_text(report)
+                            : report.scale_known ? "scale from the known points"
                             : report.has_target
                                 ? "none of the target's points is seen: scale and frame are those of the start"
                                 : "scale unknown: the path is up to scale, its unit is the depth at the start",
@@ -248,6 +295,7 @@ void add_checks(const Localization& report, Verdict& verdict) {
   if (report.num_restarts > 0)
     verdict.checks.push_back({"restarts", restarts_state(report), restarts_text(report),
                               static_cast<double>(report.num_restarts), 0.0, "times", "path"});
+  add_sensors(report, verdict);
   add_given(report, verdict);
   add_radial(report, verdict);
   add_residuals(report, verdict);

@@ -49,6 +49,9 @@ class ObservationLocalizer {
   [[nodiscard]] bool is_firm(long id) const;
   [[nodiscard]] bool find_again(OtherPlace other, const ObservationFrame& frame, const ObservationsReport& report);
 
+  [[nodiscard]] double solve_in_metres(SmootherProblem problem, std::optional<SmoothedPath>& smoothed,
+                                       Localization& result) const;
+
   LocalizeEngine engine_;
   const LocalizeConfig& config_;
   PointStore points_;

@@ -181,6 +181,21 @@ void require_sense(const LocalizeConfig& config, const Camera& camera) {
   throw_if_any(found);
   add_faults(config.target, found);
   if (config.start) add_faults(*config.start, found);
+  for (const DepthReading& reading : config.depth_readings)
+    if (!std::isfinite(reading.t_s + reading.depth_m) || !(reading.sigma_m > 0.0) || !std::isfinite(reading.sigma_m)) {
+      found.emplace_back("a depth reading is not finite, or its sigma_m is not above 0");
+      break;
+    }
+  for (const RangeReading& reading : config.range_readings)
+    if (!std::isfinite(reading.t_s) || !(reading.range_m > 0.0) || !std::isfinite(reading.range_m)) {
+      found.emplace_back("a range reading is not finite and above 0");
+      break;
+    }
+  if (config.mask && (config.mask->width_px != camera.width_px || config.mask->height_px != camera.height_px ||
+                      config.mask->shows.size() !=
+                          static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px)))
+    found.emplace_back("the mask is not of the camera's size");
+  if (!config.range_readings.empty() && !config.beam) found.emplace_back("range readings need a beam");
   add_lens_faults(config.filter, camera, found);
   throw_if_any(found);
 }

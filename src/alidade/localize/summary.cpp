@@ -10,8 +10,6 @@ namespace alidade {
 
 void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& num_used, Localization& result) {
   double nis = 0.0, dof = 0.0;
-  std::vector<TimedPose> path;
-  std::vector<double> sigmas_m;
   for (const PathStep& step : result.path) {
     result.num_observations += step.num_seen;
     result.num_used += step.num_tracked;
@@ -24,12 +22,9 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
       nis += step.nis_per_dof * static_cast<double>(step.num_tracked);
       dof += static_cast<double>(step.num_tracked);
     }
-    if (!step.has_pose()) continue;
-    path.push_back({step.t_s, step.world_from_cam});
-    sigmas_m.push_back(std::sqrt(step.cov.topLeftCorner<3, 3>().trace()));
   }
   if (dof > 0.0) result.nis_per_dof = nis / dof;
-  if (!result.is_of_images) result.scale_known = result.scale_known && result.num_known > 0;
+  if (!result.is_of_images && !result.is_scale_read) result.scale_known = result.scale_known && result.num_known > 0;
   if (!bank) return;
   const LocalizationFilter& filter = bank->best();
   result.camera = filter.camera();
@@ -39,7 +34,18 @@ void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& n
     const auto place = filter.place(feature.id);
     result.map.push_back({feature.id, place->point_in_world, place->cov, feature.is_known, num_used(feature.id)});
   }
-  if (!result.truth.empty()) result.error = path_error(path, result.truth, result.scale_known, sigmas_m);
+}
+
+void add_path_error(Localization& result) {
+  if (result.truth.empty()) return;
+  std::vector<TimedPose> path;
+  std::vector<double> sigmas_m;
+  for (const PathStep& step : result.path) {
+    if (!step.has_pose()) continue;
+    path.push_back({step.t_s, step.world_from_cam});
+    sigmas_m.push_back(std::sqrt(step.cov.topLeftCorner<3, 3>().trace()));
+  }
+  if (!path.empty()) result.error = path_error(path, result.truth, result.scale_known, sigmas_m);
 }
 
 /// A flat target whose plane is that of x and y, and most poses on the side where it is not seen.

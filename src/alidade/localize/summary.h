@@ -11,6 +11,9 @@ namespace alidade {
 /// with truth the error. `num_used`: how often a point of that id was used.
 void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& num_used, Localization& result);
 
+/// With truth: how far the path is from it.
+void add_path_error(Localization& result);
+
 /// Whether most poses are on the side of a flat target, in the world's x and y, from which it is not seen: as where it
 /// or the images are mirrored. A target is seen from its −z.
 [[nodiscard]] bool is_behind(std::span<const PathStep> path, std::span<const KnownPoint> target, bool seen_from_plus_z);

@@ -92,6 +92,25 @@ const NameTables& campaign_names() {
     for (const char* study : {"observe", "calibrate", "rangefinder", "track", "localize", "merge"})
       all["study " + std::string(study)] = study_table();
     all["batch"] = batch_table;
+    all["simulate fleet"] =
+        "estimate:\n"
+        "rows count that were made\n"
+        "rows_per_s 1/s of what was published\n"
+        "latest_s s largest delay against the rate asked for\n"
+        "files:\n"
+        "rows.txt text lines 'CAMERA ROW', in order of time\n"
+        "truth.csv text the truth of each camera, and what happens to it: event, its time, its size [rad, or "
+        "relative]\n";
+    all["fleet worker"] =
+        "estimate:\n"
+        "rows count taken in\n"
+        "cameras count seen\n"
+        "alarms count said\n"
+        "rows_per_s 1/s taken in, by one thread\n"
+        "bytes_a_camera count of what is kept of each\n"
+        "files:\n"
+        "states.jsonl text the last state of each camera, as on cam.ID.state\n"
+        "alarms.jsonl text as on cam.ID.alarm\n";
     return all;
   }();
   return names;

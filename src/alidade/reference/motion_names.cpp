@@ -181,7 +181,7 @@ stated_m      m      RMS of the stated σ
 alignment     text   with truth: none, rigid or similarity
 nis_per_dof   1      1 where the innovations are as predicted
 sigma_px      px     of a coordinate
-scale_known   flag   by the target
+scale_known   flag   by the target, or a sensor beside the camera
 restarts      count  poses that were found again
 sights        count  observations used
 sights_gated  count  observations rejected

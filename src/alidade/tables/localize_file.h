@@ -36,6 +36,12 @@ struct ObservationsOptions {
 [[nodiscard]] LocalizeStart read_start(const std::filesystem::path& file);
 [[nodiscard]] std::string start_text(const LocalizeStart& start);
 
+/// Reads `t_s,depth_m[,sigma_m]` of a pressure sensor, in order of time: how deep it is, up to an offset. σ is 0.01 m
+/// where none is given. Throws InputError.
+[[nodiscard]] std::vector<DepthReading> read_depth_sensor(const std::filesystem::path& file);
+/// Reads `t_s,range_m` of a rangefinder, in order of time. Throws InputError.
+[[nodiscard]] std::vector<RangeReading> read_ranges(const std::filesystem::path& file);
+
 /// Poses as TUM writes them, `t x y z qx qy qz qw`, in order of time; lines that begin with # are comments.
 [[nodiscard]] std::vector<TimedPose> read_tum(const std::filesystem::path& file);
 [[nodiscard]] std::string tum_text(std::span<const TimedPose> poses);

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <set>
 
@@ -100,6 +101,45 @@ ObservationTable read_observations(const std::filesystem::path& file, const Obse
   if (read.frames.empty()) throw InputError(file.string() + ": has no observations; at least one row is needed");
   read.frames = with_missing(std::move(read.frames));
   return read;
+}
+
+namespace {
+
+/// The time of a row, after that of the row before it.
+double later_time(const Csv& csv, std::size_t row, double last_t_s) {
+  const double t_s = csv.number(row, "t_s");
+  if (row > 0 && !(t_s > last_t_s))
+    throw InputError(csv.where(row, "t_s") +
+                     fmt::format(": '{}' is not after the row before it", csv.text(row, "t_s")));
+  return t_s;
+}
+
+}  // namespace
+
+std::vector<DepthReading> read_depth_sensor(const std::filesystem::path& file) {
+  const Csv csv = Csv::read(file);
+  csv.require(std::array<std::string, 2>{"t_s", "depth_m"});
+  std::vector<DepthReading> readings;
+  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
+    DepthReading reading;
+    reading.t_s = later_time(csv, row, readings.empty() ? 0.0 : readings.back().t_s);
+    reading.depth_m = csv.number(row, "depth_m");
+    if (csv.has("sigma_m")) reading.sigma_m = csv.positive(row, "sigma_m");
+    readings.push_back(reading);
+  }
+  if (readings.empty()) throw InputError(file.string() + ": has no readings; at least one row is needed");
+  return readings;
+}
+
+std::vector<RangeReading> read_ranges(const std::filesystem::path& file) {
+  const Csv csv = Csv::read(file);
+  csv.require(std::array<std::string, 2>{"t_s", "range_m"});
+  std::vector<RangeReading> readings;
+  for (std::size_t row = 0; row < csv.num_rows(); ++row)
+    readings.push_back(
+        {later_time(csv, row, readings.empty() ? 0.0 : readings.back().t_s), csv.positive(row, "range_m")});
+  if (readings.empty()) throw InputError(file.string() + ": has no readings; at least one row is needed");
+  return readings;
 }
 
 std::string observations_csv(std::span<const ObservationFrame> frames) {

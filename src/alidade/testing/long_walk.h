@@ -16,6 +16,8 @@ struct LongWalk {
   int num_points = 500, num_frames = 900;
   double length_m = 6.0, dt_s = 1.0 / 30.0, sigma_px = 0.5;
   double sigma_known_m = 0.0;  ///< By how much the target's points are told wrongly.
+  double rise_m = 0.05;        ///< Up and down.
+  bool is_wall = false;        ///< The points are on a wall that is not quite flat.
   bool comes_back = false;     ///< Half of the frames there, half of them back.
 };
 
@@ -25,6 +27,8 @@ struct WalkRun {
   std::vector<TimedPose> truth;
   std::vector<KnownPoint> target;
 };
+
+inline double wall_z(double x, double y) { return 1.5 + 0.1 * std::sin(2.0 * x) + 0.05 * std::cos(3.0 * y); }
 
 inline WalkRun long_walk(const LongWalk& scene, std::uint64_t seed) {
   Draws draws(seed);
@@ -41,7 +45,7 @@ inline WalkRun long_walk(const LongWalk& scene, std::uint64_t seed) {
     for (KnownPoint& told : run.target) told.point_in_world += scene.sigma_known_m * draws.normal3();
   for (int i = 0; i < scene.num_points; ++i) {
     const double x = draws.uniform(-1.0, scene.length_m + 1.0), y = draws.uniform(-0.8, 0.8);
-    points.emplace_back(x, y, draws.uniform(1.0, 2.2));
+    points.emplace_back(x, y, scene.is_wall ? wall_z(x, y) : draws.uniform(1.0, 2.2));
   }
   for (int k = 0; k < scene.num_frames; ++k) {
     const double t_s = k * scene.dt_s, share = static_cast<double>(k) / (scene.num_frames - 1);
@@ -49,7 +53,7 @@ inline WalkRun long_walk(const LongWalk& scene, std::uint64_t seed) {
     const double x = scene.length_m * 0.5 * (1.0 - std::cos(std::acos(-1.0) * along));  // begins and ends at rest
     const Rigid3 world_from_cam{
         exp_so3(Eigen::Vector3d(0.05 * std::sin(1.1 * t_s), 0.08 * std::sin(0.7 * t_s), 0.04 * std::sin(0.9 * t_s))),
-        {x, 0.05 * std::sin(0.8 * t_s), 0.06 * std::sin(0.5 * t_s)}};
+        {x, scene.rise_m * std::sin(0.8 * t_s), 0.06 * std::sin(0.5 * t_s)}};
     ObservationFrame frame{k, t_s, {}};
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Eigen::Vector3d point_in_cam = world_from_cam.inverse() * points[i];

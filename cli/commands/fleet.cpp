@@ -1,0 +1,247 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <fstream>
+#include <map>
+#include <memory>
+
+#include "alidade/results/fleet_text.h"
+#include "cli/app/app.h"
+#include "cli/app/child_process.h"
+#include "cli/app/image_size.h"
+#include "cli/app/terminal.h"
+#include "cli/commands/commands.h"
+#include "cli/commands/fleet_engine.h"
+
+namespace alidade::cli {
+namespace {
+
+/// This process becomes `alidade-fleet`, with the same words.
+[[noreturn]] void hand_over(const Run& run) {
+  if (run.options.keeps_outcome) throw UsageError("a worker runs until it is told to stop: run it as a command");
+  std::error_code error;
+  const std::filesystem::path program = own_executable().parent_path() / "alidade-fleet";
+  if (!std::filesystem::is_regular_file(program, error)) {
+    throw InputError(
+        "fleets are run by the program 'alidade-fleet', which is not beside this one: alidade was built "
+        "without libnats (Debian: libnats-dev)");
+  }
+  std::vector<std::string> words = run.document.argv;
+  words.front() = program.string();
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  give_back_stderr();
+  ::execv(program.c_str(), argv.data());
+  throw InputError(program.string() + ": cannot be started");
+}
+
+void add_broker_options(CLI::App& command, FleetBroker& broker) {
+  const std::string group = "Broker";
+  command.add_option("--nats", broker.url, "Address of a NATS server with JetStream")
+      ->type_name("URL")
+      ->capture_default_str()
+      ->group(group);
+  command.add_option("--creds", broker.credentials, "Credentials of a user (JWT and seed)")
+      ->type_name("FILE")
+      ->group(group);
+  command.add_option("--tls-ca", broker.ca, "Certificates of who signed the server's: TLS")
+      ->type_name("FILE")
+      ->group(group);
+  CLI::Option* cert = command.add_option("--tls-cert", broker.certificate, "Own certificate")->type_name("FILE");
+  CLI::Option* key = command.add_option("--tls-key", broker.key, "Its key")->type_name("FILE");
+  cert->needs(key)->group(group);
+  key->needs(cert)->group(group);
+}
+
+struct WorkerArgs {
+  FleetWorkerOptions options;
+  std::string size, from;
+};
+
+/// The rows of a file through one worker, without a broker: lines "ID ROW", as simulate fleet leaves them.
+ExitCode work_offline(const WorkerArgs& args, Run& run) {
+  std::ifstream in(args.from);
+  if (!in) throw InputError(args.from + ": cannot be read");
+  std::vector<std::pair<std::string, std::string>> rows;
+  std::string line;
+  for (std::size_t number = 1; std::getline(in, line); ++number) {
+    const std::size_t space = line.find(' ');
+    if (space == std::string::npos) throw InputError(fmt::format("{}:{}: is not 'CAMERA ROW'", args.from, number));
+    rows.emplace_back(line.substr(0, space), line.substr(space + 1));
+  }
+  run.lap("read");
+  std::map<std::string, FleetCamera> cameras;
+  std::string alarms, fault;
+  std::size_t num_taken = 0, num_alarms = 0;
+  for (const auto& [id, text] : rows) {
+    if (num_taken % 1024 == 0) report_progress(run.progress, "rows", num_taken, rows.size());
+    const auto row = parse_fleet_row(text, fault);
+    FleetCamera& camera = cameras[id];
+    if (!row || row->n != camera.n + 1)
+      throw InputError(fmt::format("{}: a row of {}: {}", args.from, id, row ? "n is not the next" : fault));
+    ++num_taken;
+    if (const auto alarm = advance(camera, *row, args.options.config)) {
+      alarms += fleet_alarm_text(id, *alarm) + "\n";
+      ++num_alarms;
+    }
+  }
+  run.lap("rows");
+  const double rate = static_cast<double>(num_taken) / run.document.seconds.back().second;
+  std::string states;
+  for (const auto& [id, camera] : cameras) states += fleet_state_text(id, camera) + "\n";
+  run.add_file("states.jsonl", std::move(states));
+  run.add_file("alarms.jsonl", std::move(alarms));
+  run.document.estimate["rows"] = num_taken;
+  run.document.estimate["cameras"] = cameras.size();
+  run.document.estimate["alarms"] = num_alarms;
+  run.document.estimate["rows_per_s"] = rate;
+  run.document.estimate["bytes_a_camera"] = sizeof(FleetCamera);
+  run.document.counts.given = run.document.counts.used = num_taken;
+  Verdict verdict;
+  verdict.sentence = fmt::format("{} rows of {} cameras, {} alarms; {:.0f} rows a second, {} bytes a camera", num_taken,
+                                 cameras.size(), num_alarms, rate, sizeof(FleetCamera));
+  return run.finish(verdict);
+}
+
+ExitCode fleet_worker(WorkerArgs& args, Run& run) {
+  std::tie(args.options.config.width_px, args.options.config.height_px) = image_size(args.size);
+  if (!args.from.empty()) return work_offline(args, run);
+  if (!fleet_engine().work) hand_over(run);
+  return fleet_engine().work(args.options, run);
+}
+
+struct FleetSimulationArgs {
+  FleetSimulation simulation;
+  std::string size = "640x480";
+  bool publishes = false, as_fast = false;
+};
+
+/// The truth of every camera.
+std::string truth_csv(const FleetSimulation& simulation) {
+  std::string text = "camera,fx,fy,cx,cy,event,event_t_s,event_size\n";
+  for (int i = 0; i < simulation.cameras; ++i) {
+    const FleetScene scene = draw_fleet_scene(simulation.scene, simulation.seed, i);
+    text += fmt::format("{},{},{},{},{},{},{},{}\n", scene.id, scene.fx, scene.fy, scene.cx, scene.cy,
+                        event_word(scene.event), scene.event_t_s, scene.event_size);
+  }
+  return text;
+}
+
+std::string rows_text(const FleetSimulation& simulation, const Progress& progress) {
+  std::vector<FleetScene> scenes;
+  for (int i = 0; i < simulation.cameras; ++i) scenes.push_back(draw_fleet_scene(simulation.scene, simulation.seed, i));
+  std::string text;
+  for (int n = 1; n <= simulation.rows; ++n) {
+    report_progress(progress, "rows", static_cast<std::size_t>(n), static_cast<std::size_t>(simulation.rows));
+    for (const FleetScene& scene : scenes) {
+      const FleetSight sight = simulate_sight(scene, simulation.scene, simulation.seed, n);
+      FleetRow row;
+      row.n = n;
+      row.t_s = sight.t_s;
+      row.rotation = {sight.pan_rad, sight.tilt_rad, 0.0, 0.0};
+      row.num_points = 4;
+      std::copy(sight.px.begin(), sight.px.end(), row.px.begin());
+      text += scene.id + " " + fleet_row_text(row) + "\n";
+    }
+  }
+  return text;
+}
+
+ExitCode simulate_fleet(FleetSimulationArgs& args, Run& run) {
+  FleetSimulation& simulation = args.simulation;
+  std::tie(simulation.scene.width_px, simulation.scene.height_px) = image_size(args.size);
+  simulation.seed = run.options.seed;
+  simulation.is_real_time = !args.as_fast;
+  if (args.publishes && !fleet_engine().publish) hand_over(run);
+  run.add_file("truth.csv", truth_csv(simulation));
+  if (args.publishes) return fleet_engine().publish(simulation, run);
+  run.add_file("rows.txt", rows_text(simulation, run.progress));
+  const auto rows = static_cast<std::size_t>(simulation.cameras) * static_cast<std::size_t>(simulation.rows);
+  run.document.estimate["rows"] = rows;
+  run.document.counts.given = run.document.counts.used = rows;
+  Verdict verdict;
+  verdict.sentence = fmt::format("{} rows of {} cameras with known truth", rows, simulation.cameras);
+  run.say(fmt::format("{} in {}", verdict.sentence, run.options.out.string()));
+  return run.finish(verdict);
+}
+
+void add_worker(App& app) {
+  auto args = std::make_shared<WorkerArgs>();
+  CLI::App& command = app.add_command(
+      {.name = "fleet worker",
+       .summary = "Takes observations of installed cameras as they come, keeps what each is, and says what moves",
+       .examples = "  nats-server -a 127.0.0.1 -js -sd store &\n"
+                   "  alidade fleet worker --nats nats://127.0.0.1:4222 --size 640x480\n"
+                   "  alidade fleet worker --from fleet/rows.txt --size 640x480 --out states",
+       .leaves_results = false},
+      [args](Run& run) { return fleet_worker(*args, run); });
+  command.add_option("--size", args->size, "Size of the images")->required()->type_name("WxH");
+  command.add_option("--threshold", args->options.config.threshold, "Of the cumulative sums, in σ; see docs/scale.md")
+      ->check(CLI::Range(3.0, 100.0))
+      ->capture_default_str();
+  command.add_option("--from", args->from, "Rows of a file instead, lines 'CAMERA ROW'; states.jsonl, alarms.jsonl")
+      ->type_name("FILE");
+  add_broker_options(command, args->options.broker);
+}
+
+void add_watch(App& app) {
+  auto args = std::make_shared<FleetWatchOptions>();
+  CLI::App& command = app.add_command({.name = "fleet watch",
+                                       .summary = "The fleet in a browser: verdicts, the worst first, history of one",
+                                       .examples = "  alidade fleet watch --nats nats://127.0.0.1:4222",
+                                       .leaves_results = false},
+                                      [args](Run& run) -> ExitCode {
+                                        if (!fleet_engine().watch) hand_over(run);
+                                        return fleet_engine().watch(*args, run);
+                                      });
+  command.add_option("--port", args->port, "Of the page, on this machine alone; 0: any")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
+  add_broker_options(command, args->broker);
+}
+
+}  // namespace
+
+FleetEngine& fleet_engine() {
+  static FleetEngine engine;
+  return engine;
+}
+
+void add_fleet(App& app) {
+  app.add_group("fleet", "Installed cameras, each observed all the time, over a NATS broker");
+  add_worker(app);
+  add_watch(app);
+}
+
+void add_fleet_scenario(App& app) {
+  auto args = std::make_shared<FleetSimulationArgs>();
+  CLI::App& command = app.add_command(
+      {.name = "simulate fleet",
+       .summary = "Cameras that patrol, belts that slip, brackets that sag, focal lengths that drift, frozen images",
+       .examples =
+           "  alidade simulate fleet --cameras 100 --rows 600 --out fleet\n"
+           "  alidade simulate fleet --cameras 10000 --rate 1 --publish --nats nats://127.0.0.1:4222 --out fleet",
+       .draws_random_numbers = true},
+      [args](Run& run) { return simulate_fleet(*args, run); });
+  FleetSimulation& simulation = args->simulation;
+  const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
+    command.add_option(name, value, help)->check(CLI::Range(low, high))->capture_default_str();
+  };
+  command.add_option("--cameras", simulation.cameras, "How many")->check(CLI::Range(1, 99999))->capture_default_str();
+  command.add_option("--rows", simulation.rows, "Of each")->check(CLI::Range(1, 10000000))->capture_default_str();
+  command.add_option("--size", args->size, "Size of the images")->type_name("WxH")->capture_default_str();
+  number("--rate", simulation.scene.rate_hz, "Rows a second of each", 0.001, 1000.0);
+  number("--noise-px", simulation.scene.noise_px, "Noise of a pixel coordinate", 0.0, 100.0);
+  number("--events", simulation.scene.event_share, "Share of the cameras to which something happens", 0.0, 1.0);
+  number("--event-after", simulation.scene.event_after_s, "Not before, and within as long again [s]", 0.0, 1e9);
+  number("--slip-sigmas", simulation.scene.slip_sigmas,
+         "Belts slip by so many σ of a row, nothing else happens; 0: drawn", 0.0, 1000.0);
+  command.add_flag("--publish", args->publishes, "Publish them instead of leaving rows.txt");
+  command.add_flag("--fast", args->as_fast, "Publish as fast as the broker takes them, not at their rate");
+  add_broker_options(command, simulation.broker);
+}
+
+}  // namespace alidade::cli

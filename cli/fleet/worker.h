@@ -1,0 +1,16 @@
+#pragma once
+
+#include "cli/commands/fleet_engine.h"
+#include "cli/fleet/broker.h"
+
+namespace alidade::fleet {
+
+[[nodiscard]] BrokerOptions broker_options(const cli::FleetBroker& broker);
+
+/// Takes cameras' observations until it is told to stop; then what is done is stored, and its share is free.
+[[nodiscard]] ExitCode run_worker(const cli::FleetWorkerOptions& options, cli::Run& run);
+/// Serves the page of the fleet until it is told to stop.
+[[nodiscard]] ExitCode run_watch(const cli::FleetWatchOptions& options, cli::Run& run);
+[[nodiscard]] ExitCode run_publisher(const cli::FleetSimulation& simulation, cli::Run& run);
+
+}  // namespace alidade::fleet

@@ -1,0 +1,200 @@
+#include "alidade/fleet/fleet_camera.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "alidade/fleet/fleet_learning.h"
+#include "alidade/fleet/fleet_model.h"
+#include "alidade/fleet/fleet_tracking.h"
+
+namespace alidade {
+namespace {
+
+constexpr int frozen_rows = 5;      // the same pixels so often, while the camera turned
+constexpr double turned_px = 3.0;   // by so much that they would have moved
+constexpr double fresh_s = 3600.0;  // an alarm is in the verdict for so long
+constexpr double most_rad = 1e3;    // of an angle or a rate
+constexpr double degree = std::numbers::pi / 180.0;
+
+/// Pixels far outside the image are none.
+FleetRow believable(const FleetRow& row, const FleetConfig& config) {
+  FleetRow kept = row;
+  for (std::size_t i = 0; i < kept.px.size(); i += 2) {
+    const bool is_near =
+        std::abs(kept.px[i]) < 4.0 * config.width_px && std::abs(kept.px[i + 1]) < 4.0 * config.height_px;
+    if (!is_near) kept.px[i] = kept.px[i + 1] = std::numeric_limits<double>::quiet_NaN();
+  }
+  return kept;
+}
+
+void note_row(const FleetRow& row, const FleetRotation& rotation, FleetCamera& camera) {
+  const Eigen::Quaterniond q(rotation.before);
+  camera.attitude = {q.w(), q.x(), q.y(), q.z()};
+  camera.rate = {row.rotation[0], row.rotation[1], row.rotation[2]};
+  camera.has_row = 1;
+  camera.t_s = row.t_s;
+  for (std::size_t i = 0; i < camera.px.size(); ++i) camera.px[i] = static_cast<float>(row.px[i]);
+}
+
+/// All pixels are those of the row before, bit by bit, and at least one is there.
+bool is_same_image(const FleetCamera& camera, const FleetRow& row) {
+  bool is_any = false;
+  for (std::size_t i = 0; i < 2 * static_cast<std::size_t>(camera.num_points); ++i) {
+    const auto now = static_cast<float>(row.px[i]);
+    if (std::isnan(now) && std::isnan(camera.px[i])) continue;
+    if (now != camera.px[i]) return false;
+    is_any = true;
+  }
+  return is_any;
+}
+
+double turn_between(const FleetCamera& camera, const FleetRotation& rotation) {
+  const auto& q = camera.attitude;
+  return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).angularDistance(Eigen::Quaterniond(rotation.before));
+}
+
+/// An image that stands still while the camera turns tells nothing, and is said once.
+std::optional<FleetAlarm> watch_image(FleetCamera& camera, const FleetRow& row, const FleetRotation& rotation,
+                                      const FleetConfig& config, bool& is_frozen) {
+  is_frozen = false;
+  if (camera.has_row == 0 || !is_same_image(camera, row)) {
+    camera.num_frozen = 0;
+    return std::nullopt;
+  }
+  is_frozen = camera.num_frozen > 0 || turn_between(camera, rotation) * config.width_px > turned_px;
+  if (!is_frozen) return std::nullopt;
+  if (camera.num_frozen == 0) camera.frozen_since_s = camera.t_s;
+  if (camera.num_frozen < 60000) ++camera.num_frozen;
+  if (camera.num_frozen != frozen_rows) return std::nullopt;
+  const double duration_s = row.t_s - camera.frozen_since_s;
+  return FleetAlarm{FleetAlarmKind::frozen, row.n, row.t_s, duration_s, duration_s / frozen_rows,
+                    camera.frozen_since_s};
+}
+
+/// What fits nothing for a minute of rows is learned again.
+std::optional<FleetAlarm> watch_fit(FleetCamera& camera, const FleetRow& row) {
+  if (camera.num_gated < lost_rows) return std::nullopt;
+  camera.phase = FleetPhase::learning;
+  camera.body.learning = {};
+  camera.num_buffered = camera.num_gated = 0;
+  camera.stride = 1;
+  camera.since_kept = 0;
+  return FleetAlarm{FleetAlarmKind::lost, row.n, row.t_s, static_cast<double>(lost_rows), 1.0, row.t_s};
+}
+
+}  // namespace
+
+std::optional<FleetAlarm> advance(FleetCamera& camera, const FleetRow& given, const FleetConfig& config) {
+  const FleetRow row = believable(given, config);
+  camera.n = row.n;
+  if (camera.has_row == 0) camera.source = row.source;
+  if (camera.phase == FleetPhase::learning) {
+    const int num_points = std::clamp(row.num_points, static_cast<int>(camera.num_points), max_fleet_points);
+    camera.num_points = static_cast<std::uint8_t>(num_points);
+  }
+  const bool is_turned = std::ranges::all_of(row.rotation, [](double r) { return std::abs(r) < most_rad; });
+  if (row.source != camera.source || !std::isfinite(row.t_s) || !is_turned) return std::nullopt;
+  const FleetRotation rotation = rotation_of(camera, row);
+  if (!rotation.before.allFinite() || !rotation.after.allFinite()) return std::nullopt;
+  bool is_frozen = false;
+  std::optional<FleetAlarm> alarm = watch_image(camera, row, rotation, config, is_frozen);
+  if (!is_frozen) {
+    if (camera.phase == FleetPhase::learning) {
+      note_row(row, rotation, camera);
+      learn(camera, row, rotation, config);
+    } else {
+      alarm = track_row(camera, row, rotation, config);
+      if (!alarm) alarm = watch_fit(camera, row);
+      note_row(row, rotation, camera);
+    }
+  } else {
+    note_row(row, rotation, camera);
+  }
+  if (alarm) {
+    camera.last_alarm = alarm->kind;
+    camera.alarm_t_s = alarm->t_s;
+  }
+  return alarm;
+}
+
+FleetEstimate estimate_of(const FleetCamera& camera) {
+  FleetEstimate estimate;
+  estimate.value.setConstant(std::numeric_limits<double>::quiet_NaN());
+  estimate.sigma = estimate.value;
+  if (camera.phase != FleetPhase::tracking) return estimate;
+  estimate.has_value = true;
+  std::size_t at = 0;
+  for (Eigen::Index i = 0; i < num_fleet_common; ++i) {
+    estimate.value[i] = camera.body.tracking.x[static_cast<std::size_t>(i)];
+    estimate.sigma[i] = std::sqrt(camera.body.tracking.P[at]);
+    at += static_cast<std::size_t>(num_fleet_common - i);
+  }
+  return estimate;
+}
+
+std::string kind_name(FleetAlarmKind kind) {
+  switch (kind) {
+    case FleetAlarmKind::pan_zero:
+      return "pan_zero";
+    case FleetAlarmKind::tilt_zero:
+      return "tilt_zero";
+    case FleetAlarmKind::focal_length:
+      return "focal_length";
+    case FleetAlarmKind::frozen:
+      return "frozen";
+    case FleetAlarmKind::lost:
+      return "lost";
+    case FleetAlarmKind::none:
+      break;
+  }
+  return "none";
+}
+
+std::string sentence_of(const FleetAlarm& alarm) {
+  switch (alarm.kind) {
+    case FleetAlarmKind::pan_zero:
+    case FleetAlarmKind::tilt_zero:
+      return fmt::format("the zero of {} moved by {:.3f}° ± {:.3f}° at {:.1f} s",
+                         alarm.kind == FleetAlarmKind::pan_zero ? "pan" : "tilt", alarm.value / degree,
+                         alarm.sigma / degree, alarm.since_s);
+    case FleetAlarmKind::focal_length:
+      return fmt::format("the focal length changed by {:.2f} % ± {:.2f} % at {:.1f} s", 100.0 * alarm.value,
+                         100.0 * alarm.sigma, alarm.since_s);
+    case FleetAlarmKind::frozen:
+      return fmt::format("the image is frozen since {:.1f} s, while the camera turns", alarm.since_s);
+    case FleetAlarmKind::lost:
+      return "the points fit the camera no longer: it is learned again";
+    case FleetAlarmKind::none:
+      break;
+  }
+  return "";
+}
+
+Verdict verdict_of(const FleetCamera& camera) {
+  Verdict verdict;
+  if (camera.num_frozen >= frozen_rows) {
+    verdict.state = State::bad;
+    verdict.sentence = "the image is frozen";
+  } else if (camera.phase == FleetPhase::learning) {
+    verdict.state = State::refused;
+    verdict.sentence = camera.stride > 1
+                           ? "the rows so far do not determine the camera: turn it about both axes"
+                           : fmt::format("learning: {} of {} rows", camera.num_buffered, fleet_learning_rows);
+  } else if (camera.num_gated > frozen_rows) {
+    verdict.state = State::bad;
+    verdict.sentence = fmt::format("the last {} rows do not fit the camera", camera.num_gated);
+  } else if (camera.last_alarm != FleetAlarmKind::none && camera.t_s - camera.alarm_t_s < fresh_s) {
+    verdict.state = State::care;
+    verdict.sentence =
+        fmt::format("{} at {:.1f} s, and followed since", kind_name(camera.last_alarm), camera.alarm_t_s);
+  } else {
+    verdict.sentence = "as it was learned";
+  }
+  return verdict;
+}
+
+}  // namespace alidade

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/localize/config.h"
+#include "alidade/localize/localization.h"
+
+// Metres from what a vehicle has beside its camera: a pressure sensor, a rangefinder. A path up to scale, by so many
+// times as long, is where they say that it is; a path in metres is checked by them.
+
+namespace alidade {
+
+struct ReadScale {
+  double scale = 1.0;      ///< Metres for each unit of the path.
+  double sigma_rel = 1.0;  ///< Its σ over it.
+  std::size_t num_used = 0, num_rejected = 0;
+};
+
+/// depth = offset + g·r of the camera's place r: of unknown offset and direction, |g| is the scale. Its σ is that of
+/// what is left over, whose neighbours in time are alike. Readings far from all others are rejected. None: the path
+/// moves too little up and down, or the readings do not fit it.
+[[nodiscard]] std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings,
+                                                      std::span<const PathStep> path);
+
+/// Where the beam meets the plane through the map's points around it is `range_m` from its origin; the mean of all
+/// readings near their median, with the scatter of blocks of them as its σ. None: too few readings with points around
+/// them.
+[[nodiscard]] std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, const Beam& beam,
+                                                      std::span<const PathStep> path, std::span<const MapPoint> map);
+
+/// What each of the config's sensors says of `result.path`, into `result.sensor_scales`.
+void read_scales(const LocalizeConfig& config, std::span<const MapPoint> map, Localization& result);
+/// All of them together, the surer one counting for more. None: nothing tells it.
+[[nodiscard]] std::optional<ReadScale> scale_of(const Localization& result);
+
+/// Path and map, longer by the scale about the world's origin; its σ is added to theirs.
+void apply_scale(const ReadScale& scale, Localization& result);
+
+}  // namespace alidade

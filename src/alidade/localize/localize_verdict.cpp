@@ -68,6 +68,7 @@ bool is_solved_again(const Localization& report) {
 /// Again and again without being lost: no path explains what this camera saw of this target.
 State restarts_state(const Localization& report) {
   if (is_solved_again(report)) return State::good;
+  if (!report.is_of_images) return State::care;  // mismatches in a table may look like another pose for a frame
   std::size_t num_again = 0;
   for (std::size_t i = 1; i < report.path.size(); ++i)
     num_again += report.path[i].event == FrameEvent::restarted && report.path[i - 1].event != FrameEvent::predicted;

@@ -16,7 +16,8 @@ JOBS = ["observe", "track", "rangefinder", "rig", "localize", "servo", "identify
 NOT_HERE = {"help", "out", "json", "quiet", "no_report", "config", "csv", "live", "live_address", "live_pace", "version"}
 BOARD = "The board"
 # What a program gives in another way than the command line: by `board`, as values, as photos.
-OF_CALIBRATE = {"photos", "corners", "size", "air", "skip_bad", "threads"}
+OF_CALIBRATE = {"photos", "corners", "size", "air", "skip_bad", "threads",
+                "from", "no_page", "wait_s", "resume", "until_px"}  # of a capture, which is no job of a program
 CALIBRATE = [
     ("photos", "Photos", "None", "Photos of the board: paths, patterns, folders, or arrays (H, W) or (H, W, 3), uint8 or uint16"),
     ("*", "", "", ""),

@@ -8,7 +8,7 @@ FOUNDATIONS = {"geometry", "estimation", "description"}
 VISION = {"imaging", "corners", "board_detector", "spot", "patches", "target", "matching"}  # measurements in an image
 SENSORS = {"camera", "pantilt", "beam", "board"} | VISION
 ESTIMATORS = {"calibrate", "localize", "network", "observe", "rangefinder", "rig", "servo", "track", "turned"}
-COMPOSITIONS = {"fleet", "loop", "study"}  # put estimators and the simulator together
+COMPOSITIONS = {"capture", "fleet", "loop", "study"}  # put estimators and the simulator together
 JOBS = FOUNDATIONS | SENSORS | ESTIMATORS | COMPOSITIONS | {"simulate"}
 FILES = {"files", "images", "formats", "tables"}  # what stands on a disk, read and written
 

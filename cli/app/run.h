@@ -49,7 +49,7 @@ class Run {
  public:
   Run(std::string command, std::vector<std::string> argv, CommonOptions options, Progress progress);
 
-  const CommonOptions options;
+  CommonOptions options;    ///< A command changes none of them but `out`, where another option means it.
   const Progress progress;  ///< Give it to the library's long work.
   ResultDocument document;  ///< Fill in counts, estimate, stddev, covariance, data and grids.
 
@@ -81,6 +81,8 @@ class Run {
   [[nodiscard]] JobOutcome outcome();
   /// Text of result.json; empty before finish().
   [[nodiscard]] const std::string& result() const { return result_; }
+  /// The page that finish() wrote; empty where it wrote none.
+  [[nodiscard]] std::filesystem::path report() const { return has_report_ ? folder_ / "report.html" : ""; }
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -143,6 +143,8 @@ void hold_standard_streams() {
 
 int interrupting_signal() { return stop_signal.load(); }
 
+void forget_interrupt() { stop_signal = 0; }
+
 std::string one_line(std::string_view text) {
   std::string line;
   for (const char c : text) {

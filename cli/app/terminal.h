@@ -48,6 +48,8 @@ void hold_standard_streams();
 void catch_interrupts();
 /// The signal that asked to stop; 0 if none did.
 [[nodiscard]] int interrupting_signal();
+/// The signal has done what it was to do, where it does not end the work: the next one asks anew.
+void forget_interrupt();
 
 /// Text in one line: control characters and line ends become spaces, runs of spaces become one.
 [[nodiscard]] std::string one_line(std::string_view text);

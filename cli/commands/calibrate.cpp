@@ -14,6 +14,7 @@
 #include "cli/app/app.h"
 #include "cli/app/board_options.h"
 #include "cli/app/photo_options.h"
+#include "cli/commands/calibrate_live.h"
 #include "cli/commands/commands.h"
 
 namespace alidade::cli {
@@ -27,6 +28,7 @@ struct CalibrateArgs {
   std::string points;        // of the board: a file
   ImageSize size;            // 0x0: not given
   bool skip_bad = false;
+  CaptureArgs capture;
 };
 
 /// A shape's word, or a file of points: "points.csv" was an attempt at a file, and is not found in reading.
@@ -72,6 +74,7 @@ FieldList fields_of(CalibrateArgs& args) {
     }
     fields.push_back(std::move(field));
   }
+  for (Field& field : fields_of(args.capture)) fields.push_back(std::move(field));
   return fields;
 }
 
@@ -142,8 +145,23 @@ ExitCode calibrate_photos_of(const CalibrateArgs& args, Run& run) {
   return run.finish(std::move(outcome));
 }
 
+/// Photos that are taken while they are looked at; what they give is what they give afterwards.
+ExitCode capture_and_calibrate(CalibrateArgs args, Run& run) {
+  if (!args.corners.empty() || !args.photos.empty())
+    throw UsageError(args.corners.empty() ? "--live takes the photos itself: give none"
+                                          : "--live takes photos: not with --corners");
+  read_values(args, run);
+  args.capture.config.calibrate = args.config;
+  return calibrate_live(args.board, args.capture, run, [&](const std::filesystem::path& photos) {
+    args.photos = {photos};
+    return calibrate_photos_of(args, run);
+  });
+}
+
 ExitCode run_calibrate(CalibrateArgs args, Run& run) {
   require_board(args.board);
+  if (args.capture.live.is_on) return capture_and_calibrate(std::move(args), run);
+  require_no_capture(args.capture);
   if (args.corners.empty() == args.photos.empty()) {
     throw UsageError(args.photos.empty() ? "give photos, or --corners FILE" : "--corners takes the place of photos");
   }
@@ -163,9 +181,11 @@ void add_calibrate(App& app) {
                    "alidade calibrate photos/ --config calibrate.yaml\n"
                    "alidade calibrate --corners corners.csv --size 640x480 --board 9x6 --square 0.025\n"
                    "alidade calibrate water/*.png --board 9x6 --square 0.025 --model flat_port --air camera_air.yaml "
-                   "--glass 0.01\n"},
+                   "--glass 0.01\n"
+                   "alidade calibrate --live --board 9x6 --square 0.025 --until 0.2px --out mycamera\n"},
       [args](Run& run) { return run_calibrate(*args, run); });
   add_photos(command, args->photos);
+  add_capture_options(command, args->capture);
   app.add_fields(command, fields_of(*args));
 }
 

@@ -1,6 +1,7 @@
-// alidade_video FILE grey|bgr: writes a video's frames to standard output, for src/alidade/images/video_process.h:
-// 64 characters "alidade_video WIDTH HEIGHT FRAMES", then for each frame 'f' and its bytes, and 'e' at the end.
-// A program of its own, because OpenCV's videoio loads a hundred libraries that no other command needs.
+// alidade_video FILE|rtsp:…|http:…|v4l2:DEVICE grey|bgr: writes a video's frames to standard output, for
+// src/alidade/images/video_process.h: 64 characters "alidade_video WIDTH HEIGHT FRAMES", then for each frame 'f' and
+// its bytes, and 'e' at the end. A program of its own, because OpenCV's videoio loads a hundred libraries that no other
+// command needs.
 #include <array>
 #include <cstdio>
 #include <opencv2/core.hpp>
@@ -28,7 +29,13 @@ bool write_header(const cv::Mat& image, double frames) {
 }
 
 int decode(const char* file, bool is_bgr) {
-  cv::VideoCapture video(file, cv::CAP_FFMPEG);  // others would take an image for the first of many
+  constexpr std::string_view device = "v4l2:";
+  cv::VideoCapture video;
+  if (std::string_view(file).substr(0, device.size()) == device) {
+    video.open(file + device.size(), cv::CAP_V4L2);
+  } else {
+    video.open(file, cv::CAP_FFMPEG);  // others would take an image for the first of many
+  }
   cv::Mat frame, image;
   if (!video.isOpened() || !video.read(frame)) return 3;
   image = in_colours(frame, is_bgr);

@@ -2,6 +2,7 @@
 
 /// Every public header: one for each room, and files.
 #include "alidade/calibrate.h"
+#include "alidade/capture.h"
 #include "alidade/files.h"
 #include "alidade/identify.h"
 #include "alidade/localize.h"

@@ -12,16 +12,6 @@
 namespace alidade {
 namespace {
 
-/// Skew is fixed unless it is freed, and what is known of a port stands beside what is fixed.
-CalibrateConfig resolved(CalibrateConfig config) {
-  if (std::find(config.fixed.begin(), config.fixed.end(), "skew") == config.fixed.end()) {
-    config.fixed.insert(config.fixed.begin(), "skew");
-  }
-  if (config.model == FlatPort::name) config = with_port(std::move(config), config.port);
-  for (const std::string& name : config.free) std::erase(config.fixed, name);
-  return config;
-}
-
 bool may_stand_behind_a_port(const Lens& lens) {
   return std::holds_alternative<Calibrated<Pinhole>>(lens) || std::holds_alternative<Calibrated<Brown>>(lens);
 }

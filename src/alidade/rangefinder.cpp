@@ -70,22 +70,12 @@ void measure_photos(RangefinderCalibration& result, const PhotoByName& load_phot
   reject_unreadable(result);
 }
 
-BeamNow beam_now(const RangefinderCalibration& result, std::vector<Eigen::Vector3d> points) {
-  BeamNow now{.beam = result.beam, .camera = result.camera, .points_in_board = std::move(points)};
-  now.method = result.config.method;
-  now.estimate_scale = result.config.estimate_scale;
-  if (result.sigma_spot_px > 0.0) now.sigma_spot_px = result.sigma_spot_px;
-  if (result.sigma_corner_px > 0.0) now.sigma_corner_px = result.sigma_corner_px;
-  if (now.points_in_board.empty()) now.points_in_board = points_in_board({.cols = 9, .rows = 6, .square_m = 0.04});
-  return now;
-}
-
 /// What stands beside the answer: what more shots bring, and how well each shot is predicted by the others.
 void study(RangefinderCalibration& result, const Camera& camera, const Progress& progress) {
   const std::vector<Eigen::Vector3d> points = points_of(result.config);
   result.by_count = sigma_by_count(result.measured, result, points, camera, result.config, progress);
   result.left_out = leave_one_out(result.measured, result, points, camera, result.config, progress);
-  if (result.config.rates_next_shots) result.gains = next_shot_gains(beam_now(result, points), {});
+  if (result.config.rates_next_shots) result.gains = next_shot_gains(beam_now(result, result.config), {});
   result.assumed = rangefinder_assumptions(result);
   result.covariance = embedded_covariance(result.beam);
   result.parameter_names.assign(embedded_beam_names.begin(), embedded_beam_names.end());

@@ -1,4 +1,5 @@
 // The page of one run: reads the document, draws the figures of its command.
+import {isCapture, showCapture} from './capture/page';
 import {charts} from './core/chart';
 import {readDocument, type Doc} from './core/document';
 import {el} from './core/dom';
@@ -82,7 +83,8 @@ async function start(): Promise<void> {
   const host = document.getElementById('page')!;
   void documentIsRead.then(findPictures);
   listenToPrinting();
-  if (isLive(doc)) showLive(doc, host, (result) => void showReport(result, host));
+  if (isCapture(doc)) showCapture(doc, host, (result) => void showReport(result, host));
+  else if (isLive(doc)) showLive(doc, host, (result) => void showReport(result, host));
   else await showReport(doc, host);
   await documentIsRead;
   document.documentElement.dataset['ready'] = '1';

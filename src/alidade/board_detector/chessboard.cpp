@@ -84,4 +84,9 @@ Chessboard find_chessboard(const cv::Mat& photo, int cols, int rows) {
   return {.grid = std::move(best.placed.grid), .pixel_scale = best.scale, .reason = std::move(best.placed.reason)};
 }
 
+Chessboard find_chessboard_at(const cv::Mat& photo, int cols, int rows, double scale) {
+  Candidate best = search(scale == 1.0 ? photo : resized(photo, 1.0 / scale), scale, cols, rows);
+  return {.grid = std::move(best.placed.grid), .pixel_scale = best.scale, .reason = std::move(best.placed.reason)};
+}
+
 }  // namespace alidade

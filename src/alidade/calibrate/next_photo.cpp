@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/calibrate/bundle.h"
-#include "alidade/calibrate/normal_equations.h"
+#include "alidade/calibrate/pose_information.h"
 #include "alidade/camera/projection_sigma.h"
 
 namespace alidade {
@@ -16,54 +15,12 @@ struct Candidate {
   Eigen::MatrixXd information;  ///< Of the free lens parameters, per unit noise.
 };
 
-std::vector<int> free_parameters(const Camera& camera) {
-  std::vector<int> free;
-  for (int i = 0; i < camera.cov.rows(); ++i) {
-    if (camera.cov(i, i) > 0.0) free.push_back(i);
-  }
-  return free;
-}
-
-Eigen::MatrixXd submatrix(const Eigen::MatrixXd& full, const std::vector<int>& rows) {
-  const auto n = static_cast<Eigen::Index>(rows.size());
-  Eigen::MatrixXd part(n, n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    for (Eigen::Index j = 0; j < n; ++j) {
-      part(i, j) = full(rows[static_cast<std::size_t>(i)], rows[static_cast<std::size_t>(j)]);
-    }
-  }
-  return part;
-}
-
-/// The view of all corners at a pose, with no residual; none where a corner falls outside the image.
-std::optional<ViewArrays> see(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
-                              const Rigid3& cam_from_board) {
-  BoardView view;
-  for (std::size_t i = 0; i < board_points.size(); ++i) {
-    const auto px = project(camera, cam_from_board * board_points[i]);
-    const bool inside =
-        px && px->x() > 0.0 && px->y() > 0.0 && px->x() < camera.width_px - 1.0 && px->y() < camera.height_px - 1.0;
-    if (inside) view.corners.push_back({static_cast<int>(i), *px});
-  }
-  if (view.corners.size() < board_points.size()) return std::nullopt;
-  return make_arrays(view);
-}
-
 std::optional<Candidate> evaluate(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
                                   const Rigid3& cam_from_board, const std::vector<int>& free) {
-  const auto view = see(camera, board_points, cam_from_board);
-  if (!view) return std::nullopt;
-  BundleProblem problem;
-  problem.views = {&*view, 1};
-  problem.free_lens = free;
-  problem.prior_value = params(camera.lens);
-  problem.prior_information = Eigen::VectorXd::Zero(problem.prior_value.size());
-  NormalEquations eq;
-  if (!linearize(problem, {camera.lens, {cam_from_board}, board_points}, eq)) return std::nullopt;
-  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> V(eq.V.front());
-  if (V.info() != Eigen::Success) return std::nullopt;
-  const Eigen::MatrixXd H = eq.H.selfadjointView<Eigen::Lower>();
-  return Candidate{cam_from_board, H - eq.coupling(0) * V.solve(eq.coupling(0).transpose())};
+  const auto view = predicted_view(camera, board_points, cam_from_board);
+  auto information = view ? lens_information(camera, board_points, *view, cam_from_board, free) : std::nullopt;
+  if (!information) return std::nullopt;
+  return Candidate{cam_from_board, std::move(*information)};
 }
 
 /// The board turned by `tilt` about its middle, its middle seen at `px`, `fill` of the image's width wide.
@@ -100,12 +57,7 @@ std::vector<Candidate> all_candidates(const Camera& camera, const std::vector<Ei
 }
 
 double worst_3sigma(Camera camera, const Eigen::MatrixXd& cov, const std::vector<int>& free) {
-  camera.cov.setZero();
-  for (std::size_t i = 0; i < free.size(); ++i) {
-    for (std::size_t j = 0; j < free.size(); ++j) {
-      camera.cov(free[i], free[j]) = cov(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-    }
-  }
+  camera.cov = full_matrix(cov, free, camera.cov.rows());
   double worst = 0.0;
   const PixelGrid sigma = projection_sigma(camera, 9, 7, std::numeric_limits<double>::infinity());
   for (const double value : sigma.values) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "alidade/calibrate/normal_equations.h"
+#include "alidade/calibrate/port.h"
 
 namespace alidade {
 namespace {
@@ -26,6 +27,13 @@ const Prior* prior_of(const CalibrateConfig& config, const std::string& name) {
 }
 
 }  // namespace
+
+CalibrateConfig resolved(CalibrateConfig config) {
+  if (!contains(config.fixed, "skew")) config.fixed.insert(config.fixed.begin(), "skew");
+  if (config.model == FlatPort::name) config = with_port(std::move(config), config.port);
+  for (const std::string& name : config.free) std::erase(config.fixed, name);
+  return config;
+}
 
 std::vector<std::string> faults(const CalibrateConfig& config) {
   std::vector<std::string> found;

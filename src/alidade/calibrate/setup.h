@@ -8,6 +8,10 @@
 
 namespace alidade {
 
+/// What a person asked for, as calibrate() takes it: skew is fixed unless it is freed, and what is known of a port
+/// stands beside what is fixed.
+[[nodiscard]] CalibrateConfig resolved(CalibrateConfig config);
+
 /// Every fault of `config`, one sentence each; empty if it is usable.
 [[nodiscard]] std::vector<std::string> faults(const CalibrateConfig& config);
 

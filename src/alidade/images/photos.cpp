@@ -85,9 +85,8 @@ std::vector<std::filesystem::path> photos_in(const std::filesystem::path& folder
     (looks_like_a_photo(entry.path()) ? inside : others).push_back(entry.path());
   }
   if (error) throw InputError(folder.string() + ": cannot be read: " + error.message());
-  const auto in_order = [](const auto& a, const auto& b) { return natural_less(a.string(), b.string()); };
-  std::sort(inside.begin(), inside.end(), in_order);
-  std::sort(others.begin(), others.end(), in_order);
+  sort_naturally(inside);
+  sort_naturally(others);
   const std::set<std::string> own = our_results(folder);
   const std::size_t before = skipped.size();
   for (const auto& other : others) {
@@ -107,6 +106,10 @@ bool looks_like_photos(const std::filesystem::path& argument) {
   std::error_code ignored;
   return std::filesystem::is_directory(argument, ignored) || looks_like_a_photo(argument) ||
          is_foreign_ending(argument);
+}
+
+void sort_naturally(std::vector<std::filesystem::path>& files) {
+  std::ranges::sort(files, [](const auto& a, const auto& b) { return natural_less(a.string(), b.string()); });
 }
 
 PhotoFiles find_photos(const std::vector<std::filesystem::path>& arguments) {

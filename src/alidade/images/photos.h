@@ -25,6 +25,9 @@ struct PhotoFiles {
 [[nodiscard]] PhotoFiles find_photos(const std::vector<std::filesystem::path>& arguments);
 /// Whether an argument is a photo (by its ending, be it of a kind that is not read) or a folder, rather than a table.
 [[nodiscard]] bool looks_like_photos(const std::filesystem::path& argument);
+/// By name, as people count: a2 before a10.
+void sort_naturally(std::vector<std::filesystem::path>& files);
+
 /// The photos alone.
 [[nodiscard]] std::vector<std::filesystem::path> list_photos(const std::vector<std::filesystem::path>& arguments);
 

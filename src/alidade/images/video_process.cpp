@@ -81,13 +81,26 @@ int start_decoder(const std::string& decoder, const std::string& video, FrameCol
 
 }  // namespace
 
+bool is_stream_address(const std::string& text) {
+  return text.starts_with("v4l2:") || text.starts_with("rtsp://") || text.starts_with("http://") ||
+         text.starts_with("https://");
+}
+
+// Absolute: a name like "http:…" shall not be an address.
 VideoProcess::VideoProcess(const std::filesystem::path& video, FrameColour colour) : video_(video), colour_(colour) {
   refuse_text(video);
-  const std::filesystem::path decoder = decoder_beside_this_program(video);
+  start(std::filesystem::absolute(video).string());
+}
+
+VideoProcess::VideoProcess(const StreamAddress& stream, FrameColour colour) : video_(stream.text), colour_(colour) {
+  start(stream.text);
+}
+
+void VideoProcess::start(const std::string& source) {
+  const std::filesystem::path decoder = decoder_beside_this_program(video_);
   std::array<int, 2> ends{};
-  if (::pipe2(ends.data(), O_CLOEXEC) != 0) throw InputError(video.string() + ": no pipe to the decoder");
-  // Absolute: a name like "http:…" shall not be an address.
-  process_ = start_decoder(decoder.string(), std::filesystem::absolute(video).string(), colour, ends[1]);
+  if (::pipe2(ends.data(), O_CLOEXEC) != 0) throw InputError(video_.string() + ": no pipe to the decoder");
+  process_ = start_decoder(decoder.string(), source, colour_, ends[1]);
   ::close(ends[1]);
   pipe_ = ends[0];
   try {
@@ -99,6 +112,10 @@ VideoProcess::VideoProcess(const std::filesystem::path& video, FrameColour colou
 }
 
 VideoProcess::~VideoProcess() { stop(); }
+
+void VideoProcess::interrupt() const {
+  if (process_ > 0) ::kill(process_, SIGKILL);
+}
 
 void VideoProcess::stop() {
   if (pipe_ >= 0) ::close(pipe_);

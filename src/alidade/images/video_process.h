@@ -2,11 +2,19 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "alidade/images/video.h"
 
 namespace alidade {
+
+/// A camera or a server of pictures: "v4l2:/dev/video0", "rtsp://…", "http://…".
+struct StreamAddress {
+  std::string text;
+};
+/// Whether a text is such an address, rather than a file or a folder.
+[[nodiscard]] bool is_stream_address(const std::string& text);
 
 /// Decodes a video file in a process of its own, the program alidade_video beside this one: its libraries take longer
 /// to load than most commands run, and a broken file cannot take this program with it.
@@ -14,6 +22,8 @@ class VideoProcess {
  public:
   /// Starts it. Throws InputError: no such file, not a video, no decoder.
   VideoProcess(const std::filesystem::path& video, FrameColour colour);
+  /// Frames as they come from a camera or a server. Throws InputError where it gives none.
+  VideoProcess(const StreamAddress& stream, FrameColour colour);
   VideoProcess(const VideoProcess&) = delete;
   VideoProcess& operator=(const VideoProcess&) = delete;
   ~VideoProcess();
@@ -26,8 +36,11 @@ class VideoProcess {
   /// The next frame's values, row by row (grey, or blue, green and red); empty at the end. Throws InputError if the
   /// decoder died.
   [[nodiscard]] std::vector<unsigned char> next();
+  /// Ends the decoder: a next() that waits in another thread throws, as if it had died.
+  void interrupt() const;
 
  private:
+  void start(const std::string& source);
   [[nodiscard]] bool read_bytes(void* to, std::size_t count) const;
   void read_header();
   void stop();

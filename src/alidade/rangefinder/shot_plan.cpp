@@ -78,4 +78,14 @@ ShotPlan plan_shots(const BeamNow& now, const ShotConfig& config, const Progress
   return plan;
 }
 
+BeamNow beam_now(const RangefinderReport& report, const RangefinderConfig& config) {
+  BeamNow now{.beam = report.beam, .camera = report.camera, .points_in_board = {}};
+  now.method = config.method;
+  now.estimate_scale = config.estimate_scale;
+  if (report.sigma_spot_px > 0.0) now.sigma_spot_px = report.sigma_spot_px;
+  if (report.sigma_corner_px > 0.0) now.sigma_corner_px = report.sigma_corner_px;
+  now.points_in_board = points_in_board(config.board.value_or(Board{.cols = 9, .rows = 6, .square_m = 0.04}));
+  return now;
+}
+
 }  // namespace alidade

@@ -31,5 +31,8 @@ struct ShotPlan {
 /// beam that cannot be.
 [[nodiscard]] ShotPlan plan_shots(const BeamNow& now, const ShotConfig& config = {}, const Progress& progress = {});
 
+/// What a calibration knows of its beam; a board of 9×6 with squares of 40 mm where it had none.
+[[nodiscard]] BeamNow beam_now(const RangefinderReport& report, const RangefinderConfig& config);
+
 ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -1,0 +1,273 @@
+#include "cli/commands/calibrate_live.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <opencv2/core.hpp>
+#include <thread>
+#include <utility>
+
+#include "alidade/calibrate.h"
+#include "alidade/images/photos.h"
+#include "alidade/images/video_process.h"
+#include "alidade/imaging/grey_photo.h"
+#include "alidade/live/capture_session.h"
+#include "alidade/live/growing_folder.h"
+#include "alidade/live/newest_frame.h"
+#include "alidade/results/calibration_outcome.h"
+#include "cli/app/terminal.h"
+#include "cli/commands/capture_page.h"
+
+namespace alidade::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double looks_a_second = 5.0;  // of a folder that is full already: time as a camera's would pass
+
+double passed_s(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+/// A photo as a capture keeps it, 8-bit grey; `is_exact`: nothing of what calibrate reads of it is lost.
+cv::Mat kept_grey(const cv::Mat& photo, bool& is_exact) {
+  const cv::Mat grey = one_channel(photo);
+  is_exact = grey.depth() == CV_8U;
+  if (is_exact) return grey;
+  std::string reason;
+  cv::Mat values = to_grey_photo(grey, reason), bytes;
+  if (!reason.empty()) throw InputError(reason);
+  values.convertTo(bytes, CV_8U);
+  return bytes;
+}
+
+std::string progress_line(const live::CaptureSession& session, double goal_px) {
+  const CaptureState& state = session.state();
+  const std::string& file = session.kept().photos().back().file;
+  std::string line = fmt::format("photo {}: {}", state.photos, file);
+  if (state.has_camera)
+    line += fmt::format(", 3σ {:.2g} px in the worst place, goal {:.2g}", state.worst_3sigma_px, goal_px);
+  if (state.is_at(goal_px)) return line;
+  if (state.photos_to_goal) {
+    constexpr int countable = 200;
+    line +=
+        *state.photos_to_goal > countable ? ", hundreds more" : fmt::format(", about {} more", *state.photos_to_goal);
+  }
+  if (state.next) line += "; next: " + state.next->words;
+  return line;
+}
+
+/// A capture from a folder that another program fills, without a page.
+class FolderCapture {
+ public:
+  FolderCapture(live::CaptureSession& session, const CaptureArgs& args, Run& run)
+      : session_(session), folder_(args.from), goal_px_(args.config.until_px), wait_s_(args.wait_s), run_(run) {}
+
+  /// Until the goal holds, the person ends it, or nothing new has come for too long: then of what came the photos are
+  /// taken that still bring something.
+  void run() {
+    came_at_ = Clock::now();
+    while (!is_over()) {
+      const std::vector<std::filesystem::path> files = folder_.newcomers();
+      for (const std::filesystem::path& file : files) {
+        see(file);
+        if (is_over()) return;
+      }
+      if (passed_s(came_at_) > wait_s_) return take_the_rest();
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+  }
+  [[nodiscard]] const std::string& last_words() const { return last_words_; }
+
+ private:
+  [[nodiscard]] bool is_over() const { return has_goal_ || interrupting_signal() != 0; }
+
+  void see(const std::filesystem::path& file, bool is_again = false) {
+    cv::Mat grey;
+    bool is_exact = false;
+    try {
+      grey = kept_grey(decode_photo(read_file(file)), is_exact);
+    } catch (const InputError& error) {
+      if (!folder_.put_back(file)) tell_person("alidade: " + file.filename().string() + ": " + error.what());
+      return;
+    }
+    came_at_ = Clock::now();
+    const double t_s = std::max(session_.begin_s() + static_cast<double>(++num_seen_) / looks_a_second,
+                                session_.begin_s() + passed_s(begin_));
+    const live::CaptureSession::Seen seen = session_.see(grey, t_s, is_exact, is_again);
+    if (!seen.look.corners_px.empty() && seen.file.empty()) left_.push_back({file, seen.look.gain});
+    if (seen.look.corners_px.empty()) last_words_ = seen.look.words;
+    after(seen.file, file);
+  }
+
+  void after(const std::string& kept, const std::filesystem::path& file) {
+    if (kept.empty()) return;
+    if (!run_.options.quiet && !run_.options.json)
+      tell_person(progress_line(session_, goal_px_) + " (" + file.filename().string() + ")");
+    has_goal_ = session_.reached_goal({});
+  }
+
+  /// What is left, the most telling first; again as long as a round brings something.
+  void take_the_rest() {
+    session_.guide().take_what_comes(true);
+    for (bool has_kept = true; has_kept && !is_over();) {
+      std::vector<Left> round = std::exchange(left_, {});
+      std::ranges::stable_sort(round, std::ranges::greater{}, &Left::gain);
+      const std::size_t num_kept = session_.kept().photos().size();
+      for (const Left& each : round) {
+        if (!is_over()) see(each.file, true);
+      }
+      has_kept = session_.kept().photos().size() > num_kept;
+    }
+  }
+
+  struct Left {
+    std::filesystem::path file;
+    double gain = 0.0;
+  };
+  live::CaptureSession& session_;
+  live::GrowingFolder folder_;
+  double goal_px_, wait_s_;
+  Run& run_;
+  Clock::time_point begin_ = Clock::now(), came_at_ = begin_;
+  std::vector<Left> left_;  ///< With a board, and not kept.
+  int num_seen_ = 0;
+  bool has_goal_ = false;
+  std::string last_words_;
+};
+
+/// A capture from a camera of the machine or the network, without a page.
+void capture_stream(live::CaptureSession& session, const CaptureArgs& args, Run& run) {
+  live::NewestFrame stream(args.from);
+  const Clock::time_point begin = Clock::now();
+  while (!stream.is_over() && interrupting_signal() == 0) {
+    const std::optional<live::LiveFrame> frame = stream.fetch();
+    if (!frame) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      continue;
+    }
+    const cv::Mat grey = grey_of(*frame);
+    if (session.see(grey, session.begin_s() + passed_s(begin), false).file.empty()) continue;
+    if (!run.options.quiet && !run.options.json) tell_person(progress_line(session, args.config.until_px));
+    if (session.reached_goal({})) return;
+  }
+  if (stream.is_over()) tell_person("alidade: the stream has ended");
+}
+
+/// Where the photos stand, those of an earlier capture included.
+live::KeptPhotos opened_photos(const CaptureArgs& args, Run& run) {
+  const bool goes_on = !args.resume.empty();
+  std::error_code ignored;
+  const std::filesystem::path& out = run.options.out;
+  if (goes_on && !std::filesystem::equivalent(args.resume, out, ignored)) {
+    const live::KeptPhotos earlier(args.resume, true);
+    if (std::filesystem::exists(out / "photos", ignored))
+      throw InputError(out.string() + ": has photos already; --resume takes those of " + args.resume);
+    for (const live::KeptPhoto& photo : earlier.photos())
+      write_file(out / "photos" / photo.file, read_file(earlier.path_of(photo)));
+    write_file(out / "photos.csv", read_file(std::filesystem::path(args.resume) / "photos.csv"));
+  }
+  return live::KeptPhotos(out, goes_on);
+}
+
+/// The result of a capture that kept nothing: as calibrate has it of no photos, with what was seen instead.
+ExitCode finish_empty(const Board& board, const CaptureArgs& args, const std::string& seen, Run& run) {
+  Calibration none = alidade::calibrate(Photos{}, board, args.config.calibrate);
+  if (!seen.empty()) none.verdict.sentence = "no photo was kept: " + seen;
+  return run.finish(outcome_of(none));
+}
+
+}  // namespace
+
+cv::Mat grey_of(const live::LiveFrame& frame) {
+  return cv::Mat(frame.height_px, frame.width_px, CV_8U, const_cast<unsigned char*>(frame.grey.data())).clone();
+}
+
+void add_capture_options(CLI::App& command, CaptureArgs& args) {
+  const std::string group = "Guided capture";
+  command
+      .add_option_function<std::string>(
+          "--live",
+          [&args](const std::string& port) {
+            args.live.is_on = true;
+            args.live.port = port;
+          },
+          "Take the photos now, guided: a page with the camera's picture on this port; 0: any (default: 8765)")
+      ->type_name("[PORT]")
+      ->expected(0, 1)
+      ->group(group);
+  command.add_option("--live-address", args.live.address, "Listen there instead of 127.0.0.1")
+      ->type_name("IP")
+      ->group(group);
+}
+
+FieldList fields_of(CaptureArgs& args) {
+  FieldList fields{
+      {.name = "from",
+       .value = &args.from,
+       .help = "Pictures of --live from a folder that another program fills, or from v4l2:/dev/video0, rtsp://… or "
+               "http://…, not from the browser's camera",
+       .form = "DIR|ADDRESS"},
+      {.name = "no_page", .value = &args.no_page, .help = "With --live --from: without a page, for scripts"},
+      {.name = "wait_s",
+       .value = &args.wait_s,
+       .help = "With --no-page: ends when nothing new has come for so long [s]",
+       .limits = {0.1, 1e6}},
+      {.name = "resume", .value = &args.resume, .help = "Go on with the photos of an earlier --live", .form = "DIR"}};
+  for (Field& field : alidade::fields_of(args.config)) {
+    auto& code = std::get<TextCode>(field.value);
+    code.read = [&args, read = code.read](const std::string& text) {
+      args.until_is_given = true;
+      return read(text);
+    };
+    fields.push_back(std::move(field));
+  }
+  for (Field& field : fields) field.group = "Guided capture";
+  return fields;
+}
+
+void require_no_capture(const CaptureArgs& args) {
+  const auto refuse = [](const char* option) { throw UsageError(std::string(option) + ": only with --live"); };
+  if (!args.from.empty()) refuse("--from");
+  if (args.no_page) refuse("--no-page");
+  if (!args.resume.empty()) refuse("--resume");
+  if (args.until_is_given) refuse("--until");
+  if (!args.live.address.empty()) refuse("--live-address");
+}
+
+ExitCode calibrate_live(const Board& board, CaptureArgs args, Run& run,
+                        const std::function<ExitCode(const std::filesystem::path& photos)>& finish) {
+  if (args.no_page && args.from.empty())
+    throw UsageError("--no-page: only with --from, as there is no camera without a page");
+  (void)server_config(args.live);  // its faults before any work
+  if (!args.resume.empty() && !run.options.out_is_given) run.options.out = args.resume;
+  args.config.is_video = args.from.empty() || is_stream_address(args.from);
+  std::optional<CapturePage> page;
+  live::CaptureSession session(board, args.config, opened_photos(args, run), [&page](const std::string& line) {
+    tell_person("alidade: " + line);
+    if (page) page->note(line);
+  });
+  std::string seen;
+  if (args.no_page) {
+    if (is_stream_address(args.from)) {
+      capture_stream(session, args, run);
+    } else {
+      FolderCapture capture(session, args, run);
+      capture.run();
+      seen = capture.last_words();
+    }
+  } else {
+    page.emplace(args, board, session, run);
+    seen = page->capture();
+  }
+  const std::filesystem::path photos = session.kept().folder();
+  if (interrupting_signal() == SIGTERM || interrupting_signal() == SIGHUP) throw Interrupted();
+  forget_interrupt();
+  run.lap("capture");
+  const ExitCode code = session.kept().photos().empty() ? finish_empty(board, args, seen, run) : finish(photos);
+  if (page) page->show_result(code);
+  return code;
+}
+
+}  // namespace alidade::cli

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "alidade/board/board_view.h"
+#include "alidade/camera/camera.h"
+#include "alidade/geometry/rigid3.h"
+
+namespace alidade {
+
+/// Positions of the parameters of a lens that are estimated: those with a variance.
+[[nodiscard]] std::vector<int> free_parameters(const Camera& camera);
+
+/// Rows and columns of a matrix.
+[[nodiscard]] Eigen::MatrixXd submatrix(const Eigen::MatrixXd& full, const std::vector<int>& rows);
+
+/// The inverse of `submatrix`: a covariance over all parameters, zero where they are held.
+[[nodiscard]] Eigen::MatrixXd full_matrix(const Eigen::MatrixXd& part, const std::vector<int>& rows, Eigen::Index size);
+
+/// The view of all points of a board at a pose, without noise; none where one falls within `margin_px` of the image's
+/// edge or outside.
+[[nodiscard]] std::optional<BoardView> predicted_view(const Camera& camera,
+                                                      const std::vector<Eigen::Vector3d>& board_points,
+                                                      const Rigid3& cam_from_board, double margin_px = 0.0);
+
+/// What a view at a pose tells of the free lens parameters, per unit noise of a corner's coordinate, the pose
+/// eliminated: A − W V⁻¹ Wᵀ. None where a corner cannot be projected.
+[[nodiscard]] std::optional<Eigen::MatrixXd> lens_information(const Camera& camera,
+                                                              const std::vector<Eigen::Vector3d>& board_points,
+                                                              const BoardView& view, const Rigid3& cam_from_board,
+                                                              const std::vector<int>& free);
+
+}  // namespace alidade

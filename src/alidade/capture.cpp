@@ -1,0 +1,397 @@
+#include "alidade/capture.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <deque>
+#include <opencv2/core.hpp>
+
+#include "alidade/board/board_pose.h"
+#include "alidade/board/dictionary.h"
+#include "alidade/board_detector/find_board.h"
+#include "alidade/board_detector/quick_look.h"
+#include "alidade/calibrate/setup.h"
+#include "alidade/capture/lens_so_far.h"
+#include "alidade/capture/pose_plan.h"
+#include "alidade/capture/pose_words.h"
+
+namespace alidade {
+namespace {
+
+constexpr double still_s = 0.12;       // so long it has to stand still,
+constexpr double still_share = 0.003;  // within so much of the image's width
+constexpr double same_share = 0.04;    // of the board's size: a pose that is held already
+constexpr double most_blur = 1.8;      // of the sharpest
+constexpr double sharp_px = 1.3;       // is never called blurred
+constexpr double least_gain = 0.004;   // of σ
+// Of the gain of the outline a picture must bring the share `choosy`, or `nearly` as much as the best that was shown
+// within `remembered_s`: who does not follow the outline shows what there is. Without a photo for long, less will do.
+constexpr double choosy = 0.6, nearly = 0.85, easy = 0.35;
+constexpr double looked_s = 3.0, remembered_s = 20.0, patient_s = 6.0, impatient_s = 20.0;
+
+std::uint64_t hash_of(const cv::Mat& picture) {
+  std::uint64_t hash = 1469598103934665603u;  // FNV-1a, eight bytes at a time
+  const std::size_t row_bytes = static_cast<std::size_t>(picture.cols) * picture.elemSize();
+  for (int row = 0; row < picture.rows; ++row) {
+    const uchar* bytes = picture.ptr(row);
+    for (std::size_t i = 0; i + 8 <= row_bytes; i += 8) {
+      std::uint64_t word = 0;
+      std::memcpy(&word, bytes + i, 8);
+      hash = (hash ^ word) * 1099511628211u;
+    }
+  }
+  return hash;
+}
+
+/// Mean distance of the corners that two views share; none where they share too few.
+std::optional<double> distance_px(const BoardView& a, const BoardView& b) {
+  double sum = 0.0;
+  int count = 0;
+  for (auto p = a.corners.begin(), q = b.corners.begin(); p != a.corners.end() && q != b.corners.end();) {
+    if (p->index < q->index) {
+      ++p;
+    } else if (q->index < p->index) {
+      ++q;
+    } else {
+      sum += (p++->px - q++->px).norm();
+      ++count;
+    }
+  }
+  if (count < 4) return std::nullopt;
+  return sum / count;
+}
+
+std::vector<Eigen::Vector2d> places_of(const BoardView& view) {
+  std::vector<Eigen::Vector2d> places;
+  for (const Corner& corner : view.corners) places.push_back(corner.px);
+  return places;
+}
+
+/// The border of the board's points as a lens shows it.
+std::vector<Eigen::Vector2d> outline_of(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
+                                        const Rigid3& cam_from_board) {
+  Eigen::AlignedBox3d box;
+  for (const auto& point : board_points) box.extend(point);
+  const Eigen::Vector3d low = box.min(), high = box.max();
+  const std::vector<Eigen::Vector3d> rim{low, {high.x(), low.y(), 0}, {high.x(), high.y(), 0}, {low.x(), high.y(), 0}};
+  std::vector<Eigen::Vector2d> outline;
+  constexpr int steps = 6;
+  for (std::size_t side = 0; side < 4; ++side) {
+    for (int step = 0; step < steps; ++step) {
+      const double way = static_cast<double>(step) / steps;
+      const auto px =
+          project(camera, cam_from_board * Eigen::Vector3d((1.0 - way) * rim[side] + way * rim[(side + 1) % 4]));
+      if (px) outline.push_back(*px);
+    }
+  }
+  return outline;
+}
+
+}  // namespace
+
+FieldList fields_of(CaptureConfig& config) {
+  TextCode code;
+  code.read = [&config](std::string text) -> std::string {
+    if (text.ends_with("px")) text.resize(text.size() - 2);
+    double value = 0.0;
+    Field number{.name = "until_px", .value = &value, .help = ""};
+    if (const std::string fault = set_field(number, text); !fault.empty()) return fault;
+    if (!(value >= 0.001 && value <= 100.0)) return "'" + text + "' is not within 0.001 to 100 px";
+    config.until_px = value;
+    return "";
+  };
+  code.write = [&config] { return fmt::format("{}px", config.until_px); };
+  return {{.name = "until_px",
+           .value = code,
+           .help = "Goal of --live: 3σ of a pixel in the worst place; there it ends",
+           .form = "PIXELS",
+           .option = "--until"}};
+}
+
+std::string_view sight_name(Sight sight) {
+  switch (sight) {
+    case Sight::nothing:
+      return "nothing";
+    case Sight::other_board:
+      return "other_board";
+    case Sight::moving:
+      return "moving";
+    case Sight::blurred:
+      return "blurred";
+    case Sight::same_pose:
+      return "same_pose";
+    case Sight::little:
+      return "little";
+    case Sight::repeated:
+      return "repeated";
+    case Sight::useful:
+      return "useful";
+  }
+  return "nothing";
+}
+
+struct CaptureGuide::State {
+  State(const Board& given, const CaptureConfig& asked) : board(given), config(asked), looker(given) {
+    solve_config = resolved(asked.calibrate);
+    if (solve_config.outliers == OutlierRule::automatic) solve_config.outliers = OutlierRule::drop;
+  }
+
+  Board board;
+  CaptureConfig config;
+  CalibrateConfig solve_config;
+  QuickLooker looker;
+  ImageSize size;
+  std::vector<BoardView> views;  ///< Of the photos that are kept.
+  std::optional<LensSoFar> lens;
+  std::optional<PosePlan> plan;
+  CaptureState out;
+  double correction = 1.0;  ///< Worst σ of the whole job over ours.
+  bool takes_what_comes = false;
+
+  // Of the pictures that came.
+  std::optional<std::uint64_t> hash;
+  QuickLook seen;        ///< In the newest.
+  BoardView still_view;  ///< Where the board has been since …
+  std::optional<double> still_since_s, took_s;
+  double sharpest_px = 1e9;
+  std::deque<std::pair<double, double>> shown;  ///< Time and share of the outline's gain, newest last, largest first.
+  std::optional<double> first_s;                ///< Time of the first that could have been taken.
+
+  void begin(const ImageSize& of_pictures);
+  void look_closely(const cv::Mat& picture);
+  void keep(BoardView view);
+  void solve();
+  void fill_state();
+  CaptureLook judge(double t_s);
+  [[nodiscard]] double asked_share(double gain, double t_s);
+  [[nodiscard]] bool stands_still(double t_s);
+  [[nodiscard]] std::optional<Rigid3> pose_of(const BoardView& view) const;
+  void say_way(const BoardView& view, CaptureLook& look) const;
+};
+
+void CaptureGuide::State::begin(const ImageSize& of_pictures) {
+  if (size.width_px > 0 || of_pictures.width_px < 1 || of_pictures.height_px < 1) return;
+  size = of_pictures;
+  solve();
+}
+
+/// Of a photo that does not come again, as find_board() does.
+void CaptureGuide::State::look_closely(const cv::Mat& picture) {
+  BoardDetection found = find_board(picture, board);
+  if (found.found()) seen = {.view = std::move(found.view), .blur_px = 0.0, .reason = ""};
+}
+
+void CaptureGuide::State::keep(BoardView view) {
+  view.photo = std::to_string(views.size() + 1);
+  views.push_back(std::move(view));
+  took_s.reset();
+  solve();
+}
+
+std::optional<Rigid3> CaptureGuide::State::pose_of(const BoardView& view) const {
+  const auto fit = fit_board_pose(lens->camera, view, lens->board_points, 1.0);
+  if (!fit) return std::nullopt;
+  return fit->pose.cam_from_board;
+}
+
+/// The lens of the photos so far, what the next may bring, and where to hold the board for it.
+void CaptureGuide::State::solve() {
+  lens = lens_so_far(board, views, size, solve_config);
+  plan.emplace(lens->camera, lens->board_points, lens->noise_px);
+  plan->look_for_best(views);
+  fill_state();
+}
+
+void CaptureGuide::State::fill_state() {
+  out = {};
+  out.photos = static_cast<int>(views.size());
+  out.has_camera = lens->is_solved;
+  out.camera = lens->camera;
+  if (lens->is_solved) {
+    out.worst_3sigma_px = correction * plan->worst_3sigma_px();
+    out.worst_px = plan->worst_px();
+    out.sigma = projection_sigma(lens->camera, 32, 24, std::numeric_limits<double>::infinity());
+    for (double& sigma_px : out.sigma.values) sigma_px *= correction;
+  }
+  if (lens->is_solved) out.photos_to_goal = plan->photos_until(config.until_px / correction);
+  if (plan->best()) {
+    const HeldBoard held = held_board(lens->camera, lens->board_points, *plan->best());
+    out.next = NextPose{*plan->best(), outline_of(lens->camera, lens->board_points, *plan->best()),
+                        words_of(held, false), words_of(held, true)};
+  }
+  if (std::string walk = focal_walk(*lens, views); !walk.empty()) out.warnings.push_back(std::move(walk));
+}
+
+bool CaptureGuide::State::stands_still(double t_s) {
+  if (!config.is_video) return true;
+  const auto moved = distance_px(still_view, seen.view);
+  if (!still_since_s || !moved || *moved > still_share * size.width_px) {
+    still_view = seen.view;
+    still_since_s = t_s;
+    return false;
+  }
+  return t_s - *still_since_s >= still_s;
+}
+
+/// How to come to the next pose from where the board is.
+void CaptureGuide::State::say_way(const BoardView& view, CaptureLook& look) const {
+  const auto pose = plan->best() ? pose_of(view) : std::nullopt;
+  if (!pose) return;
+  const HeldBoard now = held_board(lens->camera, lens->board_points, *pose);
+  const HeldBoard wanted = held_board(lens->camera, lens->board_points, *plan->best());
+  look.words += (look.words.empty() ? "" : ": ") + words_to(wanted, now, false);
+  look.words_mirrored += (look.words_mirrored.empty() ? "" : ": ") + words_to(wanted, now, true);
+}
+
+/// Share of the outline's gain that a picture must bring now; remembers that of this one.
+double CaptureGuide::State::asked_share(double gain, double t_s) {
+  if (takes_what_comes) return 0.0;
+  if (!first_s) first_s = t_s;
+  const double share = plan->best_gain() > 0.0 ? gain / plan->best_gain() : 1.0;
+  double asked = choosy;
+  while (!shown.empty() && t_s - shown.front().first > remembered_s) shown.pop_front();
+  if (t_s - *first_s >= looked_s && !shown.empty()) asked = std::min(asked, nearly * shown.front().second);
+  while (!shown.empty() && shown.back().second <= share) shown.pop_back();
+  shown.emplace_back(t_s, share);
+  const double late = std::clamp((t_s - *took_s - patient_s) / (impatient_s - patient_s), 0.0, 1.0);
+  return asked * (1.0 + late * (easy - 1.0));
+}
+
+CaptureLook CaptureGuide::State::judge(double t_s) {
+  CaptureLook look;
+  const auto say = [&](Sight sight, const std::string& words) {
+    look.sight = sight;
+    look.words = look.words_mirrored = words;
+  };
+  if (!seen.found()) {
+    still_since_s.reset();
+    const bool is_other = seen.other_grid.first > 0;
+    say(is_other ? Sight::other_board : Sight::nothing,
+        is_other ? fmt::format("a board of {}×{} corners is in view, not of {}×{}", seen.other_grid.first,
+                               seen.other_grid.second, board.cols, board.rows)
+                 : "no board in view");
+    return look;
+  }
+  look.corners_px = places_of(seen.view);
+  if (!took_s) took_s = t_s;
+  const bool is_still = stands_still(t_s);
+  if (seen.blur_px > 0.0 && is_still) sharpest_px = std::min(sharpest_px, seen.blur_px);
+  const bool is_held =
+      std::ranges::any_of(views, [&](const BoardView& view) { return is_same_pose(seen.view, view, same_share); });
+  if (is_held) {
+    say(Sight::same_pose, "same pose again");
+    say_way(seen.view, look);
+    return look;
+  }
+  const auto pose = pose_of(seen.view);
+  look.gain = pose ? plan->gain_of(seen.view, *pose) : 0.0;
+  if (!is_still) {
+    say(Sight::moving, "");
+    say_way(seen.view, look);
+    return look;
+  }
+  if (seen.blur_px > std::max(sharp_px, most_blur * sharpest_px)) {
+    say(Sight::blurred, fmt::format("blurred: σ {:.1f} px, the sharpest {:.1f} px", seen.blur_px, sharpest_px));
+    return look;
+  }
+  const double asked = std::max(least_gain, asked_share(look.gain, t_s) * plan->best_gain());
+  if (look.gain < asked) {
+    say(Sight::little, "");
+    say_way(seen.view, look);
+    return look;
+  }
+  say(Sight::useful, "taken");
+  return look;
+}
+
+CaptureGuide::CaptureGuide(const Board& board, const CaptureConfig& config) {
+  CaptureConfig copy = config;
+  std::vector<std::string> found = faults_of(alidade::fields_of(copy.calibrate));
+  if (const std::string of_board = fault(board); !of_board.empty()) found.push_back(of_board);
+  if (!(config.until_px > 0.0)) found.push_back("until_px must be positive");
+  if (found.empty()) found = faults(resolved(config.calibrate));
+  if (!found.empty()) throw ConfigError(fmt::format("{}", fmt::join(found, "; ")));
+  state_ = std::make_unique<State>(board, config);
+}
+
+CaptureGuide::~CaptureGuide() = default;
+CaptureGuide::CaptureGuide(CaptureGuide&&) noexcept = default;
+CaptureGuide& CaptureGuide::operator=(CaptureGuide&&) noexcept = default;
+
+CaptureLook CaptureGuide::look(const cv::Mat& picture, double t_s) {
+  State& state = *state_;
+  CaptureLook look;
+  if (picture.empty() || picture.dims != 2) {
+    look.words = look.words_mirrored = "there is no picture";
+    return look;
+  }
+  state.begin({picture.cols, picture.rows});
+  if (picture.cols != state.size.width_px || picture.rows != state.size.height_px) {
+    look.words = look.words_mirrored = fmt::format("the picture is {}x{}, but the first was {}x{}", picture.cols,
+                                                   picture.rows, state.size.width_px, state.size.height_px);
+    return look;
+  }
+  const std::uint64_t hash = hash_of(picture);
+  const bool is_repeated = state.hash == hash;
+  state.hash = hash;
+  if (!is_repeated) {
+    state.seen = state.looker.look(picture);
+    if (!state.seen.found() && !state.config.is_video) state.look_closely(picture);
+  }
+  look = state.judge(t_s);
+  if (is_repeated && !state.config.is_video) look.sight = Sight::repeated;
+  return look;
+}
+
+std::string CaptureGuide::take(const cv::Mat& picture) {
+  State& state = *state_;
+  state.begin({picture.cols, picture.rows});
+  if (picture.cols != state.size.width_px || picture.rows != state.size.height_px)
+    return fmt::format("the picture is {}x{}, but the first was {}x{}", picture.cols, picture.rows, state.size.width_px,
+                       state.size.height_px);
+  BoardDetection found = find_board(picture, state.board);
+  if (!found.found()) return found.reason;
+  state.keep(std::move(found.view));
+  return "";
+}
+
+CaptureLook CaptureGuide::push(const cv::Mat& picture, double t_s) {
+  CaptureLook seen = look(picture, t_s);
+  if (!seen.take()) return seen;
+  if (const std::string reason = take(picture); !reason.empty()) {
+    seen.sight = Sight::little;
+    seen.words = seen.words_mirrored = reason;
+  }
+  return seen;
+}
+
+CaptureLook CaptureGuide::push(const BoardView& view, const ImageSize& size, double t_s) {
+  State& state = *state_;
+  state.begin(size);
+  state.seen = {.view = view, .blur_px = 0.0, .reason = view.corners.empty() ? "no corners" : ""};
+  CaptureLook seen = state.judge(t_s);
+  if (seen.take()) state.keep(view);
+  return seen;
+}
+
+void CaptureGuide::forget(std::size_t photo) {
+  State& state = *state_;
+  if (photo >= state.views.size()) return;
+  state.views.erase(state.views.begin() + static_cast<std::ptrdiff_t>(photo));
+  state.solve();
+}
+
+const CaptureState& CaptureGuide::state() const { return state_->out; }
+
+void CaptureGuide::correct(double worst_3sigma_px) {
+  State& state = *state_;
+  if (!state.lens || !state.lens->is_solved || !(worst_3sigma_px > 0.0) || !std::isfinite(worst_3sigma_px)) return;
+  state.correction = worst_3sigma_px / state.plan->worst_3sigma_px();
+  state.fill_state();
+}
+
+void CaptureGuide::take_what_comes(bool is_so) { state_->takes_what_comes = is_so; }
+
+}  // namespace alidade

@@ -1,0 +1,155 @@
+#pragma once
+
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "alidade/board/board.h"
+#include "alidade/board/board_view.h"
+#include "alidade/calibrate/calibrate.h"
+#include "alidade/camera/projection_sigma.h"
+#include "alidade/description/field.h"
+#include "alidade/estimation/config_error.h"
+#include "alidade/geometry/rigid3.h"
+#include "alidade/public.h"
+#include "alidade/rangefinder/shot_plan.h"
+
+namespace cv {
+class Mat;
+}
+
+/// Photos of a board, chosen while they are taken: where to hold it, which picture to keep, and when to stop.
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+struct CaptureConfig {
+  double until_px = 0.2;  ///< The goal: 3σ of a pixel in the worst place.
+  /// Pictures follow each other as in a video: a board is taken when it stands still. Else each is a photo by itself.
+  bool is_video = true;
+  CalibrateConfig calibrate = {};
+};
+
+/// "0.2px" or "0.2".
+[[nodiscard]] FieldList fields_of(CaptureConfig& config);
+
+/// What a picture shows, and what it would bring.
+enum class Sight {
+  nothing,      ///< No board.
+  other_board,  ///< A chessboard of another size than was told.
+  moving,       ///< The board has not stood still yet.
+  blurred,      ///< Of the sharpest so far.
+  same_pose,    ///< Held as in a photo that is kept already: its errors would be the same.
+  little,       ///< It would tell next to nothing, or much less than the pose that is asked for.
+  repeated,     ///< The same picture as before, to the bit.
+  useful,       ///< To be taken.
+};
+
+/// The word for it: "nothing", "other_board" …
+[[nodiscard]] std::string_view sight_name(Sight sight);
+
+/// What to do with a picture.
+struct CaptureLook {
+  Sight sight = Sight::nothing;
+  std::string words;                        ///< To the person, one line: what is wrong, or how to move the board.
+  std::string words_mirrored;               ///< The same to who sees the picture mirrored.
+  std::vector<Eigen::Vector2d> corners_px;  ///< As seen; empty where there is no board.
+  double gain = 0.0;                        ///< ln of σ now over σ with it, over the image; 0: not known or none.
+  [[nodiscard]] bool take() const { return sight == Sight::useful; }
+};
+
+/// Where to hold the board next.
+struct NextPose {
+  Rigid3 cam_from_board;
+  std::vector<Eigen::Vector2d> outline_px;  ///< Of the outer corners, as the lens bends it.
+  std::string words;                        ///< "near, in the upper left corner, the top tilted away"
+  std::string words_mirrored;
+};
+
+/// How far the capture is.
+struct CaptureState {
+  int photos = 0;           ///< Kept.
+  bool has_camera = false;  ///< They determine one.
+  Camera camera;            ///< With its covariance; before there is one, a guess without.
+  double worst_3sigma_px = std::numeric_limits<double>::infinity();
+  Eigen::Vector2d worst_px = Eigen::Vector2d::Zero();  ///< Where that is.
+  std::optional<int> photos_to_goal;                   ///< Likely still needed, if the outlines are followed.
+  std::optional<NextPose> next;
+  PixelGrid sigma;                    ///< σ over the image [px]; no values before there is a camera.
+  std::vector<std::string> warnings;  ///< "the focal length walks: …"
+  [[nodiscard]] bool is_at(double goal_px) const { return has_camera && worst_3sigma_px <= goal_px; }
+};
+
+/// Decides about pictures while they come, solves after each that is kept, and says where to hold the board next: the
+/// pose that lowers σ over the image most, by the information matrix of the lens. Knows no files and no clock: times
+/// come with the pictures. One thread at a time.
+/// Richardson, Strom & Olson, "AprilCal", IROS 2013 (the idea); Fedorov 1972 (sequential design), see next_photo.h.
+class CaptureGuide {
+ public:
+  /// Throws ConfigError for a config or a board that cannot be.
+  explicit CaptureGuide(const Board& board, const CaptureConfig& config = {});
+  ~CaptureGuide();
+  CaptureGuide(CaptureGuide&&) noexcept;
+  CaptureGuide& operator=(CaptureGuide&&) noexcept;
+
+  /// Looks at a picture (8- or 16-bit, grey or colour) of time `t_s`, which does not go back. All have the size of the
+  /// first; of another size: Sight::nothing.
+  [[nodiscard]] CaptureLook look(const cv::Mat& picture, double t_s);
+  /// Keeps a picture, whatever it brings, and solves. Why it cannot be kept (no board in it), else "".
+  [[nodiscard]] std::string take(const cv::Mat& picture);
+  /// look(), and take() where that is to be done; `sight` is then `useful`.
+  CaptureLook push(const cv::Mat& picture, double t_s);
+  /// The same with corners that were found elsewhere, in pictures of that size.
+  CaptureLook push(const BoardView& view, const ImageSize& size, double t_s);
+  /// Forgets a photo that was kept, by its number among them.
+  void forget(std::size_t photo);
+
+  [[nodiscard]] const CaptureState& state() const;
+  /// What the whole job, with the board's shape and its second look at the corners, found for these photos: from here
+  /// on σ is told in proportion.
+  void correct(double worst_3sigma_px);
+  /// From now on whatever still brings something is useful: where no better picture will come.
+  void take_what_comes(bool is_so);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// What to shoot next with a rangefinder beside the camera, and how well its beam is known.
+struct ShotGuideState {
+  int shots = 0;
+  bool has_beam = false;
+  Beam beam;                                                        ///< With its covariance, where there is one.
+  double sigma_origin_m = std::numeric_limits<double>::infinity();  ///< √trace of the origin's covariance.
+  Verdict verdict;                                                  ///< On the shots so far.
+  std::optional<NextShot> next;  ///< Where to hold the board; before there is a beam, its words alone tell.
+  std::string words;             ///< "1.5 m away, tilted by 30°, the right side farther"
+};
+
+/// The same guidance for a rangefinder: shots come one by one, each solve is that of rangefinder() on all of them, and
+/// the next shot is the first of plan_shots(). Before three shots, or where they cannot tell, poses that differ as much
+/// as a beam needs.
+class ShotGuide {
+ public:
+  /// Throws ConfigError for a config or a camera that cannot be.
+  explicit ShotGuide(Camera camera, RangefinderConfig config = {}, ShotConfig where = {});
+
+  /// Takes a shot and solves. Throws ConfigError for numbers that no shot can have; it is then not taken.
+  const ShotGuideState& push(const Shot& shot);
+  void undo();
+  [[nodiscard]] const ShotGuideState& state() const { return state_; }
+
+ private:
+  void solve();
+
+  Camera camera_;
+  RangefinderConfig config_;
+  ShotConfig where_;
+  std::vector<Shot> shots_;
+  ShotGuideState state_;
+};
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "alidade/board/board_view.h"
+#include "alidade/calibrate/calibrate.h"
+
+namespace alidade {
+
+/// What a few photos tell of a camera: a solve where they determine one; else a guess, with what is known of any camera
+/// and what these photos add to it, so that the next pose can be chosen from the first photo on.
+struct LensSoFar {
+  Camera camera;  ///< With its covariance.
+  bool is_solved = false;
+  double noise_px = 0.3;                      ///< What one more photo is worth.
+  std::vector<Eigen::Vector3d> board_points;  ///< [m]
+  CalibrateReport report;                     ///< Of the solve.
+};
+
+/// `config` as calibrate() takes it, resolved; the board's shape is not solved for.
+[[nodiscard]] LensSoFar lens_so_far(const Board& board, const std::vector<BoardView>& views, const ImageSize& size,
+                                    const CalibrateConfig& config);
+
+/// "the focal length walks between photos: …" where each photo by itself asks for another one than its neighbours, far
+/// beyond its σ: a camera that focuses by itself. Empty where none does.
+[[nodiscard]] std::string focal_walk(const LensSoFar& lens, const std::vector<BoardView>& views);
+
+}  // namespace alidade

@@ -1,0 +1,68 @@
+// What the run says of the capture, and what it is sent.
+import type {Picture} from './camera';
+
+export interface Look {
+  op: 'look';
+  sight: string;
+  words: string;
+  words_mirrored: string;
+  corners: number[]; // u, v in turn
+  width: number;
+  height: number;
+  exact: boolean;
+  ms: number;
+}
+export interface State {
+  op: 'state';
+  photos: number;
+  last: string;
+  paused: boolean;
+  has_camera: boolean;
+  until: number;
+  worst: number | null; // 3σ in the worst place, px
+  worst_px: number[];
+  needed: number | null;
+  warnings: string[];
+  width: number;
+  height: number;
+  next: {outline: number[]; words: string; words_mirrored: string} | null;
+  sigma: {cols: number; rows: number; three_sigma: (number | null)[]} | null;
+}
+export type Told = Look | State | {op: 'control'; yes: boolean} | {op: 'took'; file: string} | {op: 'note'; words: string} | {op: 'goal'; holds: boolean} | {op: 'ended'; exit_code: number; report: boolean};
+
+const magic = 0x31594441; // 'ADY1'
+
+export function packed(picture: Picture): ArrayBuffer {
+  const message = new Uint8Array(16 + picture.grey.length), head = new DataView(message.buffer);
+  [magic, picture.width, picture.height, picture.isExact ? 1 : 0].forEach((value, i) => head.setUint32(4 * i, value, true));
+  message.set(picture.grey, 16);
+  return message.buffer;
+}
+
+export interface Line {
+  ask(op: string): void;
+  send(picture: Picture): void;
+  close(): void;
+}
+export function connect(told: (message: Told) => void, shown: (jpeg: Blob) => void, lost: () => void): Line {
+  const socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/capture${location.search}`);
+  let isOver = false;
+  socket.binaryType = 'blob';
+  socket.onmessage = (event: MessageEvent<string | Blob>) => {
+    if (isOver) return;
+    if (typeof event.data === 'string') told(JSON.parse(event.data) as Told);
+    else shown(event.data);
+  };
+  socket.onclose = () => {
+    if (!isOver) lost();
+    isOver = true;
+  };
+  return {
+    ask: (op) => socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify({op})),
+    send: (picture) => socket.readyState === WebSocket.OPEN && socket.send(packed(picture)),
+    close: () => {
+      isOver = true;
+      socket.close();
+    },
+  };
+}

@@ -115,6 +115,7 @@ class Lot {
     const auto begin = std::chrono::steady_clock::now();
     if (const std::string fault = fault_of(job.words); !fault.empty()) {
       row.exit_code = static_cast<int>(ExitCode::usage);
+      row.state = "failed";
       row.sentence = fault;
     } else {
       run_command(job, folder, row);

@@ -178,6 +178,15 @@ ExitCode finish_empty(const Board& board, const CaptureArgs& args, const std::st
   return run.finish(outcome_of(none));
 }
 
+/// A camera may be good and yet short of what was asked for.
+void tell_missed_goal(const live::CaptureSession& session, double goal_px, const Run& run) {
+  if (session.kept().photos().empty() || session.state().is_at(goal_px)) return;
+  tell_person(
+      fmt::format("alidade: the goal of {:.2g} px is not reached, 3σ is {:.2g} px in the worst place; go on with "
+                  "--resume {}",
+                  goal_px, session.state().worst_3sigma_px, run.options.out.string()));
+}
+
 }  // namespace
 
 cv::Mat grey_of(const live::LiveFrame& frame) {
@@ -267,6 +276,7 @@ ExitCode calibrate_live(const Board& board, CaptureArgs args, Run& run,
   run.lap("capture");
   const ExitCode code = session.kept().photos().empty() ? finish_empty(board, args, seen, run) : finish(photos);
   if (page) page->show_result(code);
+  tell_missed_goal(session, args.config.until_px, run);
   return code;
 }
 

@@ -86,10 +86,11 @@ TEST(SimulateBoard, NamesWhatIsWrong) {
 TEST(Simulate, WithoutANameListsTheScenarios) {
   const Outcome outcome = testing::run_program({ALIDADE_EXECUTABLE, "simulate"});
   EXPECT_EQ(outcome.code, 2);
-  EXPECT_EQ(outcome.err,
-            "alidade: error: simulate: a command is required: board, rangefinder, rig, rotation, servo, track, "
-            "underwater; see alidade "
-            "simulate --help\n");
+  EXPECT_EQ(
+      outcome.err,
+      "alidade: error: simulate: a command is required: board, fleet, head, rangefinder, rig, rotation, servo, track, "
+      "underwater; see alidade "
+      "simulate --help\n");
 }
 
 }  // namespace

@@ -137,13 +137,15 @@ void add_given(const Localization& report, Verdict& verdict) {
                               report.lens_pull, care_pull, "σ", "path"});
 }
 
-/// What a wrong lens leaves of observations after the update: the same along the radius in every frame.
+/// What a wrong lens leaves of observations after the update: the same along the radius in every frame. Depths that are
+/// not known leave it as well while the camera moves along its axis: it is judged where known points are seen.
 void add_radial(const Localization& report, Verdict& verdict) {
   constexpr double chance = 12.0;  // squares of the rings' means over their σ², their mean
   constexpr double care_share = 0.12, bad_share = 0.4;
   constexpr double least_px = 0.05;  // patches that change as they are seen from elsewhere leave less
   const RadialStructure& radial = report.radial;
-  const bool is_more = radial.chi2_per_ring > chance && radial.share * report.sigma_px > least_px;
+  const bool is_more = report.has_target && report.scale_known && radial.chi2_per_ring > chance &&
+                       radial.share * report.sigma_px > least_px;
   const double value = is_more ? radial.share : 0.0;
   const State state = state_of(value, care_share, bad_share);
   verdict.checks.push_back({"radial structure", state,
@@ -337,7 +339,7 @@ Verdict localize_verdict(const Localization& report) {
     return stopped(State::refused, ExitCode::cannot_tell,
                    "lost: " + std::to_string(report.num_lost) + " of " + std::to_string(num_frames) +
                        " frames have fewer than three points that fit",
-                   "track more points, and keep the target in observation for longer");
+                   "track more points, and keep the target in view for longer");
   if (report.is_behind && report.is_board)
     return stopped(State::refused, ExitCode::cannot_tell,
                    "mirrored: the observations put the camera behind the printed side of the board",

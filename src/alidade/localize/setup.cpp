@@ -194,7 +194,12 @@ void require_sense(const LocalizeConfig& config, const Camera& camera) {
   if (config.mask && (config.mask->width_px != camera.width_px || config.mask->height_px != camera.height_px ||
                       config.mask->shows.size() !=
                           static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px)))
-    found.emplace_back("the mask is not of the camera's size");
+    found.push_back(
+        fmt::format("the mask is {} × {} px and the camera's images are {} × {} px: give a mask of their size",
+                    config.mask->width_px, config.mask->height_px, camera.width_px, camera.height_px));
+  else if (config.mask &&
+           std::none_of(config.mask->shows.begin(), config.mask->shows.end(), [](auto shown) { return shown != 0; }))
+    found.emplace_back("the mask is black everywhere: it is white where the scene is shown");
   if (!config.range_readings.empty() && !config.beam) found.emplace_back("range readings need a beam");
   add_lens_faults(config.filter, camera, found);
   throw_if_any(found);

@@ -45,6 +45,7 @@ class HybridObserver {
   /// A time in which the intrinsics did not change.
   struct Rest {
     double from_s = 0.0, until_s = 0.0;
+    bool is_current = false;  ///< Lasts to the end, whether or not the last frames fit.
     [[nodiscard]] double duration_s() const { return until_s - from_s; }
   };
   /// The longest so far; of no length while there is none.

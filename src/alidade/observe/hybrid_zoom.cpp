@@ -103,7 +103,7 @@ void HybridObserver::note_rest() {
 }
 
 HybridObserver::Rest HybridObserver::longest_rest() const {
-  const Rest rest{constant_since_s_, last_fit_s_};
+  const Rest rest{constant_since_s_, last_fit_s_, true};
   return is_running_ && !is_zooming_ && rest.duration_s() >= rest_.duration_s() ? rest : rest_;
 }
 

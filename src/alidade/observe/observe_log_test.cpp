@@ -31,6 +31,32 @@ Eigen::Vector4d errors_of(const ObserveSolution& report) {
   return errors;
 }
 
+/// What the filter ends at is held against all rows together, also where nothing of the last row is seen or fits: there
+/// it once was not, and stood 9σ off.
+TEST(ObserveLog, TheEndOfALogIsComparedWithAllRowsWhateverItsLastRowIs) {
+  const auto distance_after = [](const auto& change) {
+    RotationLogConfig log_config;
+    log_config.duration_s = 12.0;
+    RotationLog log = simulate_rotation(scene_of(3), log_config, 3);
+    change(log.rows.back());
+    ObserveSetup config = config_of();
+    config.no_zoom = true;
+    const ObserveSolution report = solve_intrinsics(log, config);
+    EXPECT_EQ(report.status, ObserveSolution::Status::ok);
+    return report.from_reference;
+  };
+  const double as_it_is = distance_after([](RotationRow&) {});
+  EXPECT_GT(as_it_is, 0.0);
+  EXPECT_GT(distance_after([](RotationRow& last) {
+              for (Eigen::Vector2d& px : last.px) px += Eigen::Vector2d(40.0, -30.0);
+            }),
+            0.1 * as_it_is);
+  EXPECT_GT(distance_after([](RotationRow& last) {
+              for (Eigen::Vector2d& px : last.px) px.setConstant(not_seen);
+            }),
+            0.1 * as_it_is);
+}
+
 /// A camera centre 20 mm from the centre of rotation moves; measured, its velocity takes the bias away as a given lever
 /// arm does. It is ω × r in the camera's frame.
 TEST(ObserveLog, AMeasuredVelocityTakesTheBiasOfTranslationAway) {

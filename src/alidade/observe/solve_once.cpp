@@ -128,6 +128,7 @@ class Observation {
     const HybridObserver::Rest rest = observer.longest_rest();
     report_.reference_from_s = rest.from_s;
     report_.reference_until_s = rest.until_s;
+    rests_at_end_ = rest.is_current;
     final_ = observer.filter().camera();
     const double noise = observer.sigma_px() / report_.scale.scale;
     const double ratio = config_.sigma_px ? 1.0 : std::pow(noise / observer.filter_sigma_px(), 2);
@@ -330,7 +331,7 @@ class Observation {
 
   /// Where both are of one camera: the reference says whether the answer is as good as its σ.
   void compare_with_reference() {
-    const bool is_of_end = report_.reference_until_s >= frames_.back().t_s - 1e-6;
+    const bool is_of_end = rests_at_end_ || report_.reference_until_s >= frames_.back().t_s - 1e-6;
     if (!is_of_end || config_.method == ObserveMethod::batch) return;
     const Eigen::Vector4d difference = final_.k - report_.reference.solution.camera.k;
     const Eigen::Vector4d of_reference = CommonMatrix(report_.stated.cov).diagonal().head<4>();
@@ -375,6 +376,7 @@ class Observation {
   ObserveSolution report_;
   std::vector<RotationFrame> frames_;
   bool free_started_ = false, has_final_ = false;
+  bool rests_at_end_ = false;  ///< The intrinsics that the reference is of last to the end of the log.
   RotatingCamera start_, final_;
   CommonMatrix final_cov_, model_cov_;
 };

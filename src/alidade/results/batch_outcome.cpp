@@ -226,8 +226,17 @@ JobOutcome outcome_of(const std::vector<BatchRow>& rows) {
   document.estimate["outliers"] = outliers.size();
   document.data = {outlier_table(rows, outliers), lot_table(rows), rows_table(rows)};
   outcome.files.push_back({"batch.csv", batch_csv(rows)});
-  for (const auto& [state, count] : states) outcome.lines.push_back(fmt::format("{:<14} {} rows", state, count));
+  for (const auto& [state, count] : states)
+    outcome.lines.push_back(fmt::format("{:<14} {} {}", state, count, count == 1 ? "row" : "rows"));
   constexpr std::size_t max_lines = 10;
+  std::size_t failures = 0;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (tells_an_estimate(rows[i].exit_code) || ++failures > max_lines) continue;
+    outcome.lines.push_back(
+        fmt::format("row {} ({}): exit code {}: {}", i + 1, rows[i].camera, rows[i].exit_code, rows[i].sentence));
+  }
+  if (failures > max_lines)
+    outcome.lines.push_back(fmt::format("… and {} more without an estimate", failures - max_lines));
   for (std::size_t i = 0; i < std::min(outliers.size(), max_lines); ++i)
     outcome.lines.push_back(fmt::format("stands out: {}  {} = {:.6g} ± {:.2g}, the lot's median {:.6g} (z {:.1f})",
                                         rows[outliers[i].row].camera, outliers[i].name, outliers[i].value,
@@ -237,7 +246,7 @@ JobOutcome outcome_of(const std::vector<BatchRow>& rows) {
                                  rows.size(), outliers.size());
   if (answered < rows.size() || !outliers.empty()) {
     verdict.state = State::care;
-    verdict.to_add = "look at them in batch.csv; each row's own page stands in its folder";
+    verdict.to_add = "look at them in batch.csv";
   }
   if (answered == 0) {
     verdict.state = State::refused;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "alidade/formats/rig_file.h"
@@ -31,11 +33,18 @@ std::string servo_log_csv(const PositionerLog& log) {
   return csv;
 }
 
+/// Of what a short log does not show the fit's σ is without end: such a value is left out.
+bool is_determined(const PositionerValue& value, std::size_t which) {
+  constexpr std::array<double, num_positioner_values> max_sigma{100.0, 1e5, 100.0, 100.0,
+                                                                6.3,   6.3, 6.3,   6.3};  // rad, s
+  return std::isfinite(value.value) && std::isfinite(value.sigma) && value.sigma < max_sigma[which];
+}
+
 void fill_axis(const PositionerFit& fit, const std::string& name, ResultDocument& document) {
   JsonValue &estimate = document.estimate["axes"][name], &stddev = document.stddev["axes"][name];
   for (std::size_t i = 0; i < num_positioner_values; ++i) {
     const PositionerValue& value = *fit.values()[i];
-    const bool is_bound = &value == &fit.acceleration && !value.is_asked_for;
+    const bool is_bound = (&value == &fit.acceleration && !value.is_asked_for) || !is_determined(value, i);
     estimate[positioner_value_names[i]] = is_bound ? std::nan("") : value.value;
     stddev[positioner_value_names[i]] = is_bound ? std::nan("") : value.sigma;
     estimate["evidence"][positioner_value_names[i]] = value.evidence;
@@ -50,7 +59,13 @@ void fill_axis(const PositionerFit& fit, const std::string& name, ResultDocument
 }
 
 void tell_axis(const PositionerFit& fit, const std::string& name, std::vector<std::string>& lines) {
-  const auto shown = [](const PositionerValue& value, double unit, const char* word) {
+  const auto shown = [&fit](const PositionerValue& value, double unit, const char* word) {
+    const auto values = fit.values();
+    const std::size_t which =
+        static_cast<std::size_t>(std::find(values.begin(), values.end(), &value) - values.begin());
+    if (!is_determined(value, which)) return std::string("not shown by this log");
+    if (&value == &fit.dead_band && !value.is_asked_for)  // the verdict's bound
+      return fmt::format("below {:.2g} {}", std::sqrt(3.0) * value.sigma / unit, word);
     if (!value.is_asked_for && value.value <= 3.0 * value.sigma)
       return fmt::format("below {:.2g} {}", (value.value + 3.0 * value.sigma) / unit, word);
     return fmt::format("{:.5g} ± {:.2g} {}", value.value / unit, 3.0 * value.sigma / unit, word);

@@ -120,7 +120,7 @@ RigScene draw_rig_scene(const RigSceneConfig& given, std::uint64_t seed) {
   const Eigen::Vector3d middle = 0.5 * (points.front() + points.back());
   constexpr int max_tries = 100000;
   for (int tries = 0; static_cast<int>(scene.world_from_board.size()) < config.num_boards; ++tries) {
-    if (tries > max_tries) throw std::runtime_error("no board can be placed in observation of these heads");
+    if (tries > max_tries) throw std::runtime_error("no board can be placed in view of these heads");
     const Rigid3 world_from_board = drawn_board(config, scene.rig, middle, draws);
     const auto index = static_cast<int>(scene.world_from_board.size());
     std::vector<HeadView> views;

@@ -69,15 +69,52 @@ class FlawedServo {
       now_ = advanced(axis_, now_, mean, dt_s);
       return;
     }
-    // The rate that the lag asks for, neared no harder than it can; by the middle of the step.
-    const double before = now_.rate_rad_s, most = flaws_.max_acceleration_rad_s2 * dt_s;
-    const auto asked = [&](double angle_rad) {
-      const double rate = (fit_.params[ServoParam::gain] * mean - angle_rad) / fit_.params[ServoParam::tau];
-      return flaws_.max_rate_rad_s > 0.0 ? std::clamp(rate, -flaws_.max_rate_rad_s, flaws_.max_rate_rad_s) : rate;
+    advance_hard(dt_s, fit_.params[ServoParam::gain] * mean);
+  }
+
+  /// The rate that the lag asks for, neared no harder than it can: pieces of constant acceleration, of the largest rate
+  /// and of the lag itself, each to its end. (Steps instead would read as a longer time constant.)
+  void advance_hard(double dt_s, double goal_rad) {
+    const double tau = fit_.params[ServoParam::tau], hardest = flaws_.max_acceleration_rad_s2;
+    const double fastest = flaws_.max_rate_rad_s > 0.0 ? flaws_.max_rate_rad_s : no_limit;
+    constexpr int max_pieces = 16;
+    for (int piece = 0; piece < max_pieces && dt_s > 0.0; ++piece) {
+      const double away = goal_rad - now_.angle_rad, asked = away / tau, rate = now_.rate_rad_s;
+      const double wanted = std::clamp(asked, -fastest, fastest);
+      const bool follows = std::abs(wanted - rate) <= 1e-9 * (std::abs(wanted) + hardest * tau);
+      if (follows && wanted != asked) {
+        const double t = std::min(dt_s, std::max((std::abs(asked) - fastest) * tau / fastest, 1e-9 * tau));
+        now_.angle_rad += wanted * t;
+        dt_s -= t;
+      } else if (follows && std::abs(rate) <= hardest * tau * (1.0 + 1e-9)) {
+        now_.angle_rad = goal_rad - away * std::exp(-dt_s / tau);
+        now_.rate_rad_s = (goal_rad - now_.angle_rad) / tau;
+        return;
+      } else {
+        const double pull = follows ? std::copysign(hardest, -rate) : std::copysign(hardest, wanted - rate);
+        const double t = std::min(dt_s, piece_s(pull, rate, away, tau, fastest));
+        now_.angle_rad += (rate + 0.5 * pull * t) * t;
+        now_.rate_rad_s = rate + pull * t;
+        dt_s -= t;
+      }
+    }
+  }
+
+  /// How long a constant acceleration lasts: until the rate is what the lag asks for, or the largest.
+  static double piece_s(double pull, double rate, double away, double tau, double fastest) {
+    const double shortest_s = 1e-9 * tau;
+    double t = std::numeric_limits<double>::infinity();
+    const auto ends = [&](double at_s) {
+      if (at_s > shortest_s) t = std::min(t, at_s);
     };
-    const double half_way = now_.angle_rad + 0.5 * dt_s * before;
-    now_.rate_rad_s = before + std::clamp(asked(half_way) - before, -most, most);
-    now_.angle_rad += 0.5 * (before + now_.rate_rad_s) * dt_s;
+    // rate + pull t = (away − rate t − pull t²/2) / tau
+    const double b = rate + pull * tau, discriminant = b * b - 2.0 * pull * (rate * tau - away);
+    if (discriminant >= 0.0) {
+      ends((-b + std::sqrt(discriminant)) / pull);
+      ends((-b - std::sqrt(discriminant)) / pull);
+    }
+    ends((std::copysign(fastest, pull) - rate) / pull);
+    return t;
   }
 
   const ServoFit& fit_;

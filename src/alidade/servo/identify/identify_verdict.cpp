@@ -106,12 +106,22 @@ void add_excitation(std::span<const ServoSample> log, const ServoIdentification&
 /// Degrees read as radians, milliseconds as seconds; an encoder that is coarser than its noise.
 void add_readings(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
   constexpr double max_turn_rad = 6.2831853071795865, max_spacing_s = 1.0;
+  constexpr double max_rate_rad_s = 20.0;  // more than a thousand degrees a second: no head turns so
   const double range = identified.angle_range_rad;
   if (range > max_turn_rad && identified.fit.kind == ServoKind::angle)
     verdict.checks.push_back(
         {"units", State::care,
          "the angle covers " + text_of(range) + " rad, more than a turn: are these degrees? name the column angle_deg",
          range, max_turn_rad, "rad", ""});
+  double fastest_rad_s = 0.0;
+  if (identified.fit.kind == ServoKind::rate)
+    for (const ServoSample& row : log)
+      fastest_rad_s = std::max(fastest_rad_s, std::abs(identified.fit.params[ServoParam::gain] * row.command));
+  if (fastest_rad_s > max_rate_rad_s)
+    verdict.checks.push_back(
+        {"units", State::care,
+         "the axis turns by " + text_of(fastest_rad_s, 2) + " rad/s: are these degrees? name the column angle_deg",
+         fastest_rad_s, max_rate_rad_s, "rad/s", ""});
   const double spacing_s = identified.duration_s / (static_cast<double>(log.size()) - 1.0);
   if (spacing_s > max_spacing_s)
     verdict.checks.push_back({"times", State::care,

@@ -30,8 +30,8 @@ TEST(Observe, RefusesByNameWhatTheMotionCannotTell) {
     EXPECT_EQ(outcome.code, 4) << motion;
     EXPECT_NE(outcome.err.find(reason), std::string::npos) << outcome.err;
   };
-  expect("pan", "pan only: fy cannot be told; tilt the camera as well");
-  expect("tilt", "tilt only: fx cannot be told; pan the camera as well");
+  expect("pan", "pan only: fy cannot be determined; tilt the camera as well");
+  expect("tilt", "tilt only: fx cannot be determined; pan the camera as well");
   expect("roll", "roll only");
   expect("still", "does not turn");
 }

@@ -266,7 +266,7 @@ TEST(Observe, ARealCameraTurnedByHandTellsItsFocalLengthAndSaysWhatItCannot) {
   const std::string pairs = set + "/correspondences.csv";
   const Outcome free = observe({"--pairs", pairs, "--size", "1280x960"});
   EXPECT_EQ(free.code, 4);
-  EXPECT_NE(free.err.find("cannot tell fx / fy"), std::string::npos) << free.err;
+  EXPECT_NE(free.err.find("cannot determine fx / fy"), std::string::npos) << free.err;
   EXPECT_NE(free.err.find("--square-pixels"), std::string::npos) << free.err;
   for (const std::vector<std::string>& options :
        {std::vector<std::string>{"--pairs", pairs, "--size", "1280x960", "--square-pixels"},

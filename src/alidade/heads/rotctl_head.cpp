@@ -31,7 +31,7 @@ class RotctlHead final : public HeadDevice {
     socket_.write("p\n");
     const double azimuth = angle(socket_.line()), elevation = angle(socket_.line());
     const double answered_s = clock_->now_s();
-    return {0.5 * (asked_s + answered_s), answered_s - asked_s, Eigen::Vector2d(-azimuth, elevation) * degree};
+    return {0.5 * (asked_s + answered_s), answered_s - asked_s, Eigen::Vector2d(0.0 - azimuth, elevation) * degree};
   }
 
   HeadSent command(const Eigen::Vector2d& pan_tilt_rad) override {

@@ -10,7 +10,7 @@
 #include "alidade/estimation/median.h"
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/heads/frame_follower.h"
+#include "alidade/heads/streams/frame_follower.h"
 #include "alidade/heads/turn_log.h"
 #include "alidade/observe.h"
 #include "alidade/tables/rotation_log_file.h"

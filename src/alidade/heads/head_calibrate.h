@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "alidade/heads/frame_stream.h"
 #include "alidade/heads/head_survey.h"
+#include "alidade/heads/streams/frame_stream.h"
 #include "alidade/observe/report.h"
 
 namespace alidade {

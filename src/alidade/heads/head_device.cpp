@@ -9,10 +9,10 @@
 
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/heads/indi_head.h"
-#include "alidade/heads/line_socket.h"
-#include "alidade/heads/onvif_head.h"
-#include "alidade/heads/rotctl_head.h"
+#include "alidade/heads/protocols/indi_head.h"
+#include "alidade/heads/protocols/line_socket.h"
+#include "alidade/heads/protocols/onvif_head.h"
+#include "alidade/heads/protocols/rotctl_head.h"
 #include "alidade/heads/simulated_head.h"
 
 namespace alidade {

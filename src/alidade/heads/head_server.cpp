@@ -20,7 +20,7 @@
 #include <thread>
 
 #include "alidade/files/files.h"
-#include "alidade/heads/onvif_protocol.h"
+#include "alidade/heads/protocols/onvif_protocol.h"
 #include "alidade/imaging/image_codecs.h"
 
 namespace alidade {

@@ -4,8 +4,8 @@
 #include <memory>
 #include <string>
 
-#include "alidade/heads/frame_stream.h"
 #include "alidade/heads/simulated_head.h"
+#include "alidade/heads/streams/frame_stream.h"
 
 namespace alidade {
 

@@ -6,7 +6,7 @@
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/heads/head_identify.h"
-#include "alidade/heads/line_socket.h"
+#include "alidade/heads/protocols/line_socket.h"
 #include "alidade/heads/simulated_head.h"
 
 // Heads that are simulated in a time of their own: truth is the plant's.

@@ -1,4 +1,4 @@
-#include "alidade/heads/soap.h"
+#include "alidade/heads/protocols/soap.h"
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/heads/line_socket.h"
+#include "alidade/heads/protocols/line_socket.h"
 
 namespace alidade {
 

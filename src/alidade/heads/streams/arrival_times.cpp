@@ -1,4 +1,4 @@
-#include "alidade/heads/arrival_times.h"
+#include "alidade/heads/streams/arrival_times.h"
 
 #include <algorithm>
 #include <cmath>

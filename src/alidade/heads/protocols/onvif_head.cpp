@@ -1,4 +1,4 @@
-#include "alidade/heads/onvif_head.h"
+#include "alidade/heads/protocols/onvif_head.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/heads/onvif_service.h"
+#include "alidade/heads/protocols/onvif_service.h"
 
 namespace alidade {
 namespace {

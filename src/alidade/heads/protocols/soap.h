@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "alidade/heads/line_socket.h"
+#include "alidade/heads/protocols/line_socket.h"
 
 // What ONVIF's client and server both need: SOAP 1.2 over HTTP, and the digest by which a user is known.
 

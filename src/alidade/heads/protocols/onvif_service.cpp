@@ -1,4 +1,4 @@
-#include "alidade/heads/onvif_service.h"
+#include "alidade/heads/protocols/onvif_service.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <cstdlib>
 
 #include "alidade/files/files.h"
-#include "alidade/heads/soap.h"
+#include "alidade/heads/protocols/soap.h"
 
 #if __has_include(<pugixml.hpp>)
 #include <pugixml.hpp>

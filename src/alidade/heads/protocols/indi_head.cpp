@@ -1,4 +1,4 @@
-#include "alidade/heads/indi_head.h"
+#include "alidade/heads/protocols/indi_head.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/heads/indi_link.h"
+#include "alidade/heads/protocols/indi_link.h"
 
 namespace alidade {
 namespace {

@@ -1,4 +1,4 @@
-#include "alidade/heads/onvif_protocol.h"
+#include "alidade/heads/protocols/onvif_protocol.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <optional>
 
-#include "alidade/heads/soap.h"
+#include "alidade/heads/protocols/soap.h"
 
 #if __has_include(<pugixml.hpp>)
 #include <pugixml.hpp>

@@ -1,4 +1,4 @@
-#include "alidade/heads/frame_follower.h"
+#include "alidade/heads/streams/frame_follower.h"
 
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>

@@ -6,8 +6,8 @@
 #include <thread>
 #include <vector>
 
-#include "alidade/heads/arrival_times.h"
-#include "alidade/heads/frame_stream.h"
+#include "alidade/heads/streams/arrival_times.h"
+#include "alidade/heads/streams/frame_stream.h"
 #include "alidade/heads/turn_log.h"
 #include "alidade/patches/point_tracks.h"
 

@@ -1,4 +1,4 @@
-#include "alidade/heads/indi_link.h"
+#include "alidade/heads/protocols/indi_link.h"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 
 #include "alidade/files/files.h"
 #include "alidade/heads/head_device.h"
-#include "alidade/heads/soap.h"
+#include "alidade/heads/protocols/soap.h"
 
 #if __has_include(<pugixml.hpp>)
 #include <pugixml.hpp>

@@ -11,10 +11,10 @@
 #include <thread>
 
 #include "alidade/files/files.h"
-#include "alidade/heads/arrival_times.h"
-#include "alidade/heads/frame_stream.h"
-#include "alidade/heads/line_socket.h"
-#include "alidade/heads/soap.h"
+#include "alidade/heads/protocols/line_socket.h"
+#include "alidade/heads/protocols/soap.h"
+#include "alidade/heads/streams/arrival_times.h"
+#include "alidade/heads/streams/frame_stream.h"
 #include "alidade/imaging/image_codecs.h"
 
 namespace alidade {

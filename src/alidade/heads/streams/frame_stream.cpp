@@ -1,4 +1,4 @@
-#include "alidade/heads/frame_stream.h"
+#include "alidade/heads/streams/frame_stream.h"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/geometry/so3.h"
-#include "alidade/heads/onvif_head.h"
+#include "alidade/heads/protocols/onvif_head.h"
 #include "alidade/heads/simulated_head.h"
 #include "alidade/pantilt/head_rotation.h"
 #include "alidade/simulate/films/panorama_video.h"

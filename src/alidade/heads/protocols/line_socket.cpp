@@ -1,4 +1,4 @@
-#include "alidade/heads/line_socket.h"
+#include "alidade/heads/protocols/line_socket.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -27,11 +27,10 @@ double steady_s() { return std::chrono::duration<double>(std::chrono::steady_clo
 bool is_ready(int socket, short what, double until_s) {
   for (;;) {
     const double left = until_s - steady_s();
-    if (left <= 0.0) return false;
     pollfd waiting{socket, what, 0};
-    const int got = ::poll(&waiting, 1, std::max(1, static_cast<int>(left * 1e3)));
+    const int got = ::poll(&waiting, 1, left > 0.0 ? std::max(1, static_cast<int>(left * 1e3)) : 0);
     if (got > 0) return true;
-    if (got < 0 && errno != EINTR) return false;
+    if ((got < 0 && errno != EINTR) || left <= 0.0) return false;
   }
 }
 
@@ -160,7 +159,7 @@ std::string LineSocket::bytes(std::size_t count) {
 
 std::string LineSocket::some(double wait_s) {
   if (socket_ < 0) fail("not connected");
-  if (buffer_.empty() && is_ready(socket_, POLLIN, steady_s() + wait_s)) fill(steady_s() + wait_s);
+  if (buffer_.empty() && is_ready(socket_, POLLIN, steady_s() + wait_s)) fill(steady_s() + timeout_s_);
   return std::exchange(buffer_, {});
 }
 

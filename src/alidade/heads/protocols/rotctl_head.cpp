@@ -1,4 +1,4 @@
-#include "alidade/heads/rotctl_head.h"
+#include "alidade/heads/protocols/rotctl_head.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/heads/line_socket.h"
+#include "alidade/heads/protocols/line_socket.h"
 
 namespace alidade {
 namespace {

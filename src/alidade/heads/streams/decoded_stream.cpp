@@ -8,8 +8,8 @@
 #include <thread>
 
 #include "alidade/files/files.h"
-#include "alidade/heads/arrival_times.h"
-#include "alidade/heads/frame_stream.h"
+#include "alidade/heads/streams/arrival_times.h"
+#include "alidade/heads/streams/frame_stream.h"
 #include "alidade/images/video_process.h"
 
 namespace alidade {

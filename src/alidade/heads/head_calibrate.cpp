@@ -310,7 +310,7 @@ Verdict calibration_verdict(const HeadCalibration& result, const HeadCalibration
   }
   const bool holds_pan = span_rad[0] < held_rad, holds_tilt = span_rad[1] < held_rad;
   if (!has_answer && (holds_pan || holds_tilt)) {
-    verdict.sentence = fmt::format("{} cannot be told: {} is held; {}", holds_tilt ? "fy" : "fx",
+    verdict.sentence = fmt::format("{} cannot be determined: {} is held; {}", holds_tilt ? "fy" : "fx",
                                    holds_tilt ? "tilt" : "pan", verdict.sentence);
     verdict.to_add = fmt::format("give --{}-range more room", holds_tilt ? "tilt" : "pan");
   }

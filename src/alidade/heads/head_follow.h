@@ -13,8 +13,8 @@ namespace alidade {
 struct HeadFollowConfig {
   HeadRange range;
   double most_s = 60.0;     ///< For which the head is held.
-  double latency_s = 0.05;  ///< From a command to its first effect: as --identify tells it.
-  double delay_s = 0.0;     ///< A frame shows the angles of so much later than its time: as --calibrate tells it.
+  double latency_s = 0.05;  ///< From a command to its first effect: as --identify estimates it.
+  double delay_s = 0.0;     ///< A frame shows the angles of so much later than its time: as --calibrate estimates it.
 };
 
 /// A frame and what was seen in it.

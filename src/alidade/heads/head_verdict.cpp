@@ -19,15 +19,15 @@ void check_readings(const PositionerFit& fit, const std::string& axis, std::vect
          fit.resolution.value / degree, coarse_rad / degree, "°", ""});
   const double off = std::abs(fit.gain - 1.0), limit = std::max(5.0 * fit.sigma_gain, 0.005);
   if (fit.gain < 0.0) {
-    checks.push_back({axis + " sense", State::bad, axis + " is mirrored: what it reads falls where it is told to rise",
-                      fit.gain, 0.0, "", ""});
+    checks.push_back({axis + " sense", State::bad,
+                      axis + " is mirrored: what it reads falls where it is commanded to rise", fit.gain, 0.0, "", ""});
   } else if (off > limit) {
     checks.push_back({axis + " gain", State::bad,
-                      fmt::format("{} reads {:.4g} of a radian that it is told", axis, fit.gain), off, limit, "", ""});
+                      fmt::format("{} reads {:.4g} rad where 1 rad is commanded", axis, fit.gain), off, limit, "", ""});
   }
   if (fit.reads_target)
     checks.push_back({axis + " reading", State::bad,
-                      axis + " reads its target at once: it tells where it shall be, not where it is",
+                      axis + " reads its target at once: it reports the command, not the position",
                       fit.rate.value / degree, 1000.0, "°/s", ""});
   constexpr double most_noise = 4.0;
   checks.push_back({axis + " residuals", fit.noise > most_noise ? State::care : State::good,

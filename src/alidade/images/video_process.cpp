@@ -101,6 +101,7 @@ VideoProcess::VideoProcess(const std::filesystem::path& video, FrameColour colou
 }
 
 VideoProcess::VideoProcess(const StreamAddress& stream, FrameColour colour) : video_(stream.text), colour_(colour) {
+  is_stream_ = true;
   start(stream.text, stream.password);
 }
 
@@ -142,7 +143,9 @@ void VideoProcess::read_header() {
   const bool is_good = process_ > 0 && read_bytes(header.data(), 64) &&
                        std::sscanf(header.data(), "alidade_video %d %d %lu", &width_px_, &height_px_, &frames) == 3 &&
                        width_px_ > 0 && height_px_ > 0 && width_px_ < largest_px && height_px_ < largest_px;
-  if (!is_good) throw InputError(video_.string() + ": not a video that can be read");
+  const std::string why = is_stream_ ? ": gives no pictures: nobody answers, or what answers is no video"
+                                     : ": not a video that can be read";
+  if (!is_good) throw InputError(video_.string() + why);
   num_frames_ = frames;
 }
 

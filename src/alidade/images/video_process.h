@@ -60,6 +60,7 @@ class VideoProcess {
   int width_px_ = 0, height_px_ = 0;
   std::size_t num_frames_ = 0;
   FrameTime time_;
+  bool is_stream_ = false;
 };
 
 }  // namespace alidade

@@ -47,6 +47,7 @@ PYBIND11_MODULE(_alidade, module) {
   bind_calibrate(module);
   bind_capture(module);
   bind_commands(module);
+  bind_head(module);
   bind_images(module);
   bind_live(module);
   bind_localizer(module);

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "alidade/heads/frame_stream.h"
 #include "alidade/heads/head_survey.h"
+#include "alidade/heads/streams/frame_stream.h"
 #include "alidade/pantilt/head.h"
 #include "alidade/target/target_detector.h"
 

@@ -118,6 +118,7 @@ struct Localization {
   std::size_t num_lost = 0;  ///< Frames without a pose that observations hold: waiting or predicted.
   std::size_t num_restarts = 0;
   std::size_t num_left = 0;  ///< Times that a point left a full filter.
+  std::size_t num_loops = 0, num_loops_rejected = 0;  ///< Returns to what was seen long before; of those not believed.
   std::size_t num_observations = 0, num_used = 0, num_gated = 0, max_seen = 0;
   std::size_t num_known = 0, num_known_gated = 0;
   double nis_per_dof = std::numeric_limits<double>::quiet_NaN();

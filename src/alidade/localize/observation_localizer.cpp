@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "alidade/localize/known_pose.h"
+#include "alidade/localize/loop_closure.h"
 #include "alidade/localize/path_resection.h"
 #include "alidade/localize/scale_readings.h"
 #include "alidade/localize/smooth.h"
@@ -97,7 +98,7 @@ void ObservationLocalizer::add_new(const ObservationFrame& frame) {
   std::size_t num_gone = 0;
   for (const FeatureObservation& observation : frame.observations) {
     if (engine_.best().has(observation.id)) continue;
-    const auto prior = points_.prior_of(observation, engine_.best());
+    const auto prior = points_.prior_of(observation, engine_.best(), episodes_.before(observation.id));
     if (!prior) continue;
     if (!leaving && !has_room()) leaving = least_useful(frame);
     while (!has_room() && num_gone < leaving->size()) let_go((*leaving)[num_gone++]);
@@ -272,11 +273,20 @@ bool ObservationLocalizer::find_again(OtherPlace other, const ObservationFrame& 
   return true;
 }
 
-PathStep ObservationLocalizer::take(const ObservationFrame& frame) {
-  keep_gap(frame.t_s);
+/// By the map's numbers.
+ObservationFrame ObservationLocalizer::numbered(ObservationFrame frame) {
+  const auto has_left = [&](long id) { return points_.is_gone(id) && !engine_.best().has(id); };
+  for (FeatureObservation& observation : frame.observations)
+    observation.id = episodes_.id_of(observation.id, num_taken_, has_left);
+  return frame;
+}
+
+PathStep ObservationLocalizer::take(const ObservationFrame& given) {
+  keep_gap(given.t_s);
+  ObservationFrame frame = numbered(given);
   PathStep step = taken(frame);
   ++num_taken_;
-  if (smooths()) frames_.push_back(frame);
+  if (smooths()) frames_.push_back(std::move(frame));
   return step;
 }
 
@@ -317,6 +327,22 @@ PathStep ObservationLocalizer::taken(const ObservationFrame& frame) {
   return step;
 }
 
+/// With its loops closed; where that does not settle, without.
+std::optional<SmoothedPath> ObservationLocalizer::smooth_with_loops(SmootherProblem& problem,
+                                                                    Localization& result) const {
+  SmootherProblem closed = problem;
+  const LoopClosure closure = close_loops(episodes_.number_of(), max_points_at_once(frames_.size()), closed);
+  result.num_loops = closure.num_loops;
+  result.num_loops_rejected = closure.num_rejected;
+  if (closure.num_joined > 0)
+    if (auto smoothed = smooth(closed, frames_, result)) {
+      problem = std::move(closed);
+      return smoothed;
+    }
+  result.num_loops = 0;
+  return smooth(problem, frames_, result);
+}
+
 /// A path up to scale, once more where sensors beside the camera say how long it is: each point's distance from where
 /// it was first seen is believed to be what it is now, in metres, so vaguely that all of them together say the scale
 /// and its σ, and nothing else. What a unit was before in metres.
@@ -344,6 +370,7 @@ double ObservationLocalizer::solve_in_metres(SmootherProblem problem, std::optio
     points.push_back(point);
   }
   problem.points = std::move(points);
+  if (problem.gauge == PathGauge::similarity) problem.gauge = PathGauge::motion;
   Localization again = result;
   auto in_metres = smooth(problem, frames_, again);
   if (!in_metres) return 1.0;
@@ -360,9 +387,10 @@ void ObservationLocalizer::sum_up(Localization& result) const {
   std::optional<SmoothedPath> smoothed;
   double scale = 1.0;
   if (smooths() && engine_.has_begun()) {
-    const auto problem = record_.problem(engine_.camera(), config_, frames_, result.path, engine_.best(),
-                                         points_.gone(engine_.best()), engine_.start_without_target(), period_s());
-    if (problem) smoothed = smooth(*problem, frames_, result);
+    auto problem = record_.problem(engine_.camera(), config_, frames_, result.path, engine_.best(),
+                                   points_.gone(engine_.best()), engine_.start_without_target(), period_s(),
+                                   !episodes_.number_of().empty());
+    if (problem) smoothed = smooth_with_loops(*problem, result);
     if (smoothed) scale = solve_in_metres(*problem, smoothed, result);
   }
   engine_.sum_up([this](long id) { return points_.num_used(id); }, result);
@@ -378,6 +406,7 @@ void ObservationLocalizer::sum_up(Localization& result) const {
       point.cov *= scale * scale;
     }
   if (smoothed) take_over(*smoothed, result);
+  join_episodes(episodes_, smoothed ? std::span<const long>(smoothed->ids) : std::span<const long>(), result.map);
   result.known_shift = known_shift(result.map, target.points);
   result.is_behind = is_behind(result.path, target.points, target.seen_from_plus_z);
 }

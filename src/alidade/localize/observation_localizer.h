@@ -4,6 +4,7 @@
 
 #include "alidade/localize/engine.h"
 #include "alidade/localize/observation_record.h"
+#include "alidade/localize/point_episodes.h"
 #include "alidade/localize/point_store.h"
 
 namespace alidade {
@@ -24,6 +25,7 @@ class ObservationLocalizer {
   [[nodiscard]] bool smooths() const { return config_.smooths; }
   [[nodiscard]] double period_s() const;
   void keep_gap(double t_s);
+  [[nodiscard]] ObservationFrame numbered(ObservationFrame frame);
   [[nodiscard]] PathStep taken(const ObservationFrame& frame);
   [[nodiscard]] bool start(const ObservationFrame& frame);
   void add_new(const ObservationFrame& frame);
@@ -49,12 +51,14 @@ class ObservationLocalizer {
   [[nodiscard]] bool is_firm(long id) const;
   [[nodiscard]] bool find_again(OtherPlace other, const ObservationFrame& frame, const ObservationsReport& report);
 
+  [[nodiscard]] std::optional<SmoothedPath> smooth_with_loops(SmootherProblem& problem, Localization& result) const;
   [[nodiscard]] double solve_in_metres(SmootherProblem problem, std::optional<SmoothedPath>& smoothed,
                                        Localization& result) const;
 
   LocalizeEngine engine_;
   const LocalizeConfig& config_;
   PointStore points_;
+  PointEpisodes episodes_;
   ObservationRecord record_;
   std::vector<ObservationFrame> frames_;  ///< All, where the path is smoothed.
   std::vector<double> gaps_s_;            ///< Between frames, growing; where their period is not given.

@@ -7,7 +7,7 @@
 
 #include "alidade/board/board_view.h"
 #include "alidade/calibrate/calibrate.h"
-#include "alidade/simulate/board_photos.h"
+#include "alidade/simulate/boards/board_photos.h"
 
 namespace alidade::bench {
 

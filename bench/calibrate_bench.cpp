@@ -7,8 +7,8 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "alidade/board_detector/find_board.h"
-#include "alidade/calibrate/normal_equations.h"
 #include "alidade/calibrate/setup.h"
+#include "alidade/calibrate/solve/normal_equations.h"
 #include "alidade/camera/projection_sigma.h"
 #include "alidade/simulate/example_camera.h"
 #include "bench_scenes.h"

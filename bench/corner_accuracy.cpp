@@ -11,7 +11,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "alidade/board_detector/find_board.h"
-#include "alidade/simulate/board_photos.h"
+#include "alidade/simulate/boards/board_photos.h"
 #include "alidade/simulate/example_camera.h"
 
 namespace alidade {

@@ -7,10 +7,10 @@
 #include <cstdlib>
 #include <numbers>
 
-#include "alidade/calibrate/bundle.h"
 #include "alidade/calibrate/calibrate.h"
+#include "alidade/calibrate/solve/bundle.h"
 #include "alidade/camera/implied_motion.h"
-#include "alidade/simulate/board_photos.h"
+#include "alidade/simulate/boards/board_photos.h"
 #include "alidade/simulate/example_camera.h"
 
 // Does σ mean what it says? Simulated calibrations with known truth: reported σ against scatter, coverage, χ², error

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "alidade/reproduce/track_trials.h"
-#include "alidade/servo/identify.h"
+#include "alidade/servo/identify/identify.h"
 #include "alidade/testing/servo_sample.h"
+#include "alidade/track/checks/track_assumed.h"
 #include "alidade/track/track.h"
-#include "alidade/track/track_assumed.h"
 
 // How large must a fault be to be seen? Rigs, clocks and images of `track`, axes of `identify`, each with one fault
 // of growing size. Prints Markdown; exits 1 where an answer was called good and was off by more than 5σ.

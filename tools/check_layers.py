@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Fails if a folder includes a folder it may not. The table below IS the architecture: docs quote it, a test runs it."""
+import collections
 import pathlib
 import re
 import sys
@@ -77,6 +78,9 @@ HEAVY = re.compile(r'#include [<"](ceres|opencv2|nlohmann|yaml-cpp|tbb|fmt|boost
 OUTSIDE_WORLD = re.compile(
     r"#include <(iostream|fstream|thread|chrono|ctime|unistd\.h)>|\b(f?printf|puts|fopen|getenv|imread|imwrite)\(")
 PUBLIC_HEADERS_A_FOLDER = 12  # those that other folders include: what one has to know of it
+HEADERS_A_FOLDER = 12  # a folder fits on one screen of `ls`
+MORE_HEADERS_BECAUSE = {".": "one per room, its public face", "camera": "one per lens model, and what all of them share",
+                        "results": "one outcome per job", "testing": "what tests share is not part of the library"}
 LINES_A_FILE = 400
 
 
@@ -151,10 +155,18 @@ def surface_of(files, root):
     return surface
 
 
+def crowded(files, root):
+    """Folders with more headers than one screen of `ls` shows, but for those whose reason stands above."""
+    folders = collections.Counter(str(file.relative_to(root).parent) for file in files if file.suffix == ".h")
+    return [f"{folder}/: {count} headers, at most {HEADERS_A_FOLDER}" for folder, count in sorted(folders.items())
+            if count > HEADERS_A_FOLDER and folder not in MORE_HEADERS_BECAUSE]
+
+
 def main(root):
     faults, files = [], sorted(p for p in root.rglob("*") if p.suffix in {".h", ".cpp"})
     for file in files:
         faults += faults_of(file, file.relative_to(root).parts[0])
+    faults += crowded(files, root)
     surface = surface_of(files, root)
     for folder, headers in sorted(surface.items()):
         if folder not in {"testing", "results", "tables"} and len(headers) > PUBLIC_HEADERS_A_FOLDER:  # tests may share as they like; results/ has one outcome per job, tables/ one reader per kind

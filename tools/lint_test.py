@@ -56,6 +56,11 @@ class Layers(unittest.TestCase):
         self.assert_refused("calibrate/a.cpp", "#include <iostream>\n", "calibrate/a.cpp:1: only what reads and writes, live/ and cli/ may use iostream")
         self.assert_refused("imaging/a.cpp", "cv::imread(name);\n", "imaging/a.cpp:1: only what reads and writes, live/ and cli/ may use imread")
 
+    def test_a_folder_fits_on_a_screen(self):
+        files = {f"geometry/{name}.h": "" for name in "abcdefghijklm"}
+        self.assertEqual(outcome("check_layers.py", files), (1, "geometry/: 13 headers, at most 12\n"))
+        self.assertEqual(outcome("check_layers.py", {f"testing/{name}.h": "" for name in "abcdefghijklm"})[0], 0)
+
     def test_sizes_hold(self):
         self.assert_refused("geometry/a.cpp", "\n" * 401, "geometry/a.cpp: 401 lines; a file has at most 400")
         includes = "".join(f'#include "alidade/geometry/h{i}.h"\n' for i in range(13))

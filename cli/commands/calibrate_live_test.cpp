@@ -15,7 +15,7 @@
 #include "alidade/imaging/image_codecs.h"
 #include "alidade/live/capture_server.h"
 #include "alidade/live/kept_photos.h"
-#include "alidade/simulate/board_photos.h"
+#include "alidade/simulate/boards/board_photos.h"
 #include "alidade/simulate/example_camera.h"
 
 namespace alidade {

@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "alidade/reproduce/papers.h"
-#include "alidade/results/reproduce_document.h"
+#include "alidade/results/documents/reproduce_document.h"
 #include "cli/app/app.h"
 #include "cli/commands/commands.h"
 

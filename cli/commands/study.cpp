@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "alidade/estimation/config_error.h"
-#include "alidade/results/study_blocks.h"
+#include "alidade/results/documents/study_blocks.h"
 #include "alidade/results/study_outcome.h"
 #include "alidade/study/studies.h"
 #include "cli/app/app.h"

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "alidade/estimation/progress.h"
-#include "alidade/results/study_blocks.h"
+#include "alidade/results/documents/study_blocks.h"
 #include "cli/app/app.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/study_engine.h"

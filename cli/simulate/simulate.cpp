@@ -8,7 +8,7 @@
 #include "alidade/formats/camera_file.h"
 #include "alidade/formats/camera_json.h"
 #include "alidade/imaging/image_codecs.h"
-#include "alidade/simulate/board_photos.h"
+#include "alidade/simulate/boards/board_photos.h"
 #include "alidade/simulate/example_camera.h"
 #include "cli/app/app.h"
 #include "cli/app/board_options.h"

@@ -8,7 +8,7 @@
 #include "alidade/formats/rig_file.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/imaging/image_codecs.h"
-#include "alidade/simulate/board_photos.h"
+#include "alidade/simulate/boards/board_photos.h"
 #include "alidade/simulate/rangefinder.h"
 #include "alidade/simulate/rig.h"
 #include "alidade/tables/views_file.h"

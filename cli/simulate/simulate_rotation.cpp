@@ -13,7 +13,7 @@
 #include "alidade/imaging/grey_photo.h"
 #include "alidade/imaging/image_codecs.h"
 #include "alidade/simulate/draws.h"
-#include "alidade/simulate/panorama_video.h"
+#include "alidade/simulate/films/panorama_video.h"
 #include "alidade/simulate/rotation.h"
 #include "alidade/simulate/turned_scene.h"
 #include "alidade/tables/pairs_file.h"

@@ -12,7 +12,7 @@
 #include "alidade/formats/rig_file.h"
 #include "alidade/imaging/image_codecs.h"
 #include "alidade/simulate/draws.h"
-#include "alidade/simulate/target_video.h"
+#include "alidade/simulate/films/target_video.h"
 #include "alidade/simulate/track.h"
 #include "alidade/tables/events_file.h"
 #include "alidade/tables/servo_scenario_file.h"

@@ -6,8 +6,8 @@
 
 #include "alidade/formats/camera_file.h"
 #include "alidade/imaging/image_codecs.h"
+#include "alidade/simulate/films/underwater_video.h"
 #include "alidade/simulate/underwater.h"
-#include "alidade/simulate/underwater_video.h"
 #include "alidade/tables/localize_file.h"
 #include "cli/app/app.h"
 #include "cli/app/option_checks.h"

@@ -4,10 +4,10 @@
 #include <utility>
 
 #include "alidade/board/dictionary.h"
-#include "alidade/calibrate/judge.h"
-#include "alidade/calibrate/port.h"
+#include "alidade/calibrate/checks/judge.h"
 #include "alidade/calibrate/setup.h"
-#include "alidade/calibrate/weights.h"
+#include "alidade/calibrate/solve/port.h"
+#include "alidade/calibrate/solve/weights.h"
 
 namespace alidade {
 namespace {

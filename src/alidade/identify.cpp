@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
-#include "alidade/servo/identify.h"
-#include "alidade/servo/identify_causes.h"
+#include "alidade/servo/identify/identify.h"
+#include "alidade/servo/identify/identify_causes.h"
 
 namespace alidade {
 namespace {

@@ -6,12 +6,12 @@
 #include <optional>
 #include <utility>
 
-#include "alidade/localize/image_localizer.h"
-#include "alidade/localize/judge.h"
+#include "alidade/localize/checks/judge.h"
+#include "alidade/localize/checks/scale_readings.h"
+#include "alidade/localize/checks/summary.h"
+#include "alidade/localize/frames/image_localizer.h"
 #include "alidade/localize/observation_localizer.h"
-#include "alidade/localize/scale_readings.h"
 #include "alidade/localize/setup.h"
-#include "alidade/localize/summary.h"
 
 namespace alidade {
 

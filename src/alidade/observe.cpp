@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "alidade/observe/solve.h"
+#include "alidade/observe/solve/solve.h"
 
 namespace alidade {
 namespace {

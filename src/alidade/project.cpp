@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "alidade/pantilt/rig_uncertainty.h"
-#include "alidade/track/track_assumed.h"
+#include "alidade/track/checks/track_assumed.h"
 
 namespace alidade {
 namespace {

@@ -5,10 +5,10 @@
 #include <utility>
 
 #include "alidade/camera/camera_fault.h"
-#include "alidade/rangefinder/align_edges.h"
+#include "alidade/rangefinder/checks/shot_checks.h"
 #include "alidade/rangefinder/rangefinder.h"
-#include "alidade/rangefinder/shot_checks.h"
 #include "alidade/rangefinder/shot_photos.h"
+#include "alidade/rangefinder/solve/align_edges.h"
 
 namespace alidade {
 namespace {

@@ -7,9 +7,9 @@
 #include <variant>
 
 #include "alidade/pantilt/rig_uncertainty.h"
-#include "alidade/track/lens_over_time.h"
+#include "alidade/track/checks/lens_over_time.h"
+#include "alidade/track/checks/track_assumed.h"
 #include "alidade/track/track.h"
-#include "alidade/track/track_assumed.h"
 #include "alidade/track/xiahou_tracker.h"
 
 namespace alidade {

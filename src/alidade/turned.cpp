@@ -5,7 +5,7 @@
 #include "alidade/estimation/config_error.h"
 #include "alidade/matching/match_photos.h"
 #include "alidade/observe.h"
-#include "alidade/observe/solve.h"
+#include "alidade/observe/solve/solve.h"
 #include "alidade/turned/turned.h"
 
 // observe() of photos, and of matches between them.

@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "alidade/board/dictionary.h"
-#include "alidade/board_detector/marker_board.h"
+#include "alidade/board_detector/kinds/marker_board.h"
 #include "alidade/imaging/grey_photo.h"
 
 namespace alidade {

@@ -1,8 +1,8 @@
 #pragma once
 
 #include "alidade/board/board.h"
-#include "alidade/board_detector/chessboard.h"
 #include "alidade/board_detector/find_board.h"
+#include "alidade/board_detector/kinds/chessboard.h"
 
 namespace alidade {
 

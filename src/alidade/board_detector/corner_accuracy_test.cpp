@@ -6,7 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "alidade/board_detector/find_board.h"
-#include "alidade/simulate/board_photos.h"
+#include "alidade/simulate/boards/board_photos.h"
 #include "alidade/simulate/example_camera.h"
 
 namespace alidade {

@@ -3,10 +3,10 @@
 #include <opencv2/core.hpp>
 
 #include "alidade/board/dictionary.h"
-#include "alidade/board_detector/chessboard.h"
 #include "alidade/board_detector/chessboard_corners.h"
-#include "alidade/board_detector/circle_grid.h"
-#include "alidade/board_detector/marker_board.h"
+#include "alidade/board_detector/kinds/chessboard.h"
+#include "alidade/board_detector/kinds/circle_grid.h"
+#include "alidade/board_detector/kinds/marker_board.h"
 #include "alidade/imaging/grey_photo.h"
 
 namespace alidade {

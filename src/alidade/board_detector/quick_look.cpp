@@ -7,8 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "alidade/board_detector/chessboard.h"
 #include "alidade/board_detector/find_board.h"
+#include "alidade/board_detector/kinds/chessboard.h"
 #include "alidade/corners/corner_fit.h"
 #include "alidade/estimation/median.h"
 #include "alidade/imaging/grey_photo.h"

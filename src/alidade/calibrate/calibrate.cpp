@@ -3,15 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/calibrate/bundle.h"
+#include "alidade/calibrate/checks/lens_covariance.h"
+#include "alidade/calibrate/checks/repeated_views.h"
 #include "alidade/calibrate/far_corners.h"
-#include "alidade/calibrate/initial_lens.h"
-#include "alidade/calibrate/lens_covariance.h"
-#include "alidade/calibrate/port.h"
-#include "alidade/calibrate/repeated_views.h"
 #include "alidade/calibrate/setup.h"
-#include "alidade/calibrate/start.h"
-#include "alidade/calibrate/weights.h"
+#include "alidade/calibrate/solve/bundle.h"
+#include "alidade/calibrate/solve/initial_lens.h"
+#include "alidade/calibrate/solve/port.h"
+#include "alidade/calibrate/solve/start.h"
+#include "alidade/calibrate/solve/weights.h"
 
 namespace alidade {
 namespace {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "alidade/board_detector/board_guess.h"
-#include "alidade/calibrate/repeated_views.h"
+#include "alidade/calibrate/checks/repeated_views.h"
 
 namespace alidade {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "alidade/calibrate/setup.h"
 #include "alidade/geometry/decompositions.h"
-#include "alidade/simulate/board_photos.h"
+#include "alidade/simulate/boards/board_photos.h"
 
 namespace alidade {
 namespace {

@@ -2,10 +2,10 @@
 
 #include <utility>
 
-#include "alidade/calibrate/assumed.h"
-#include "alidade/calibrate/better_model.h"
-#include "alidade/calibrate/calibration_verdict.h"
-#include "alidade/calibrate/judge.h"
+#include "alidade/calibrate/checks/assumed.h"
+#include "alidade/calibrate/checks/better_model.h"
+#include "alidade/calibrate/checks/calibration_verdict.h"
+#include "alidade/calibrate/checks/judge.h"
 
 namespace alidade {
 namespace {

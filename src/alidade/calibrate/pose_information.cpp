@@ -2,8 +2,8 @@
 
 #include <Eigen/Cholesky>
 
-#include "alidade/calibrate/bundle.h"
-#include "alidade/calibrate/normal_equations.h"
+#include "alidade/calibrate/solve/bundle.h"
+#include "alidade/calibrate/solve/normal_equations.h"
 
 namespace alidade {
 

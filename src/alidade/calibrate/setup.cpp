@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/calibrate/normal_equations.h"
-#include "alidade/calibrate/port.h"
+#include "alidade/calibrate/solve/normal_equations.h"
+#include "alidade/calibrate/solve/port.h"
 
 namespace alidade {
 namespace {

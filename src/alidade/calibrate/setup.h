@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "alidade/calibrate/bundle.h"
 #include "alidade/calibrate/calibrate.h"
+#include "alidade/calibrate/solve/bundle.h"
 
 namespace alidade {
 

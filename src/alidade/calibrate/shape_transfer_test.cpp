@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/calibrate/judge.h"
+#include "alidade/calibrate/checks/judge.h"
 #include "alidade/testing/calibration_sample.h"
 
 namespace alidade {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/calibrate/heldout.h"
-#include "alidade/calibrate/residual_structure.h"
+#include "alidade/calibrate/checks/heldout.h"
+#include "alidade/calibrate/checks/residual_structure.h"
 
 namespace alidade {
 namespace {

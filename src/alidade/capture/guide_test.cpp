@@ -14,8 +14,8 @@
 #include "alidade/camera/camera_diff.h"
 #include "alidade/capture.h"
 #include "alidade/capture/lens_so_far.h"
-#include "alidade/simulate/board_photos.h"
-#include "alidade/simulate/board_placing.h"
+#include "alidade/simulate/boards/board_photos.h"
+#include "alidade/simulate/boards/board_placing.h"
 
 namespace alidade {
 namespace {

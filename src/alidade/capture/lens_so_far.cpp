@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "alidade/board/board_pose.h"
-#include "alidade/calibrate/normal_equations.h"
 #include "alidade/calibrate/pose_information.h"
+#include "alidade/calibrate/solve/normal_equations.h"
 
 namespace alidade {
 namespace {

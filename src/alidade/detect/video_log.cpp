@@ -9,8 +9,8 @@
 
 #include "alidade/estimation/median.h"
 #include "alidade/files/files.h"
-#include "alidade/tables/angle_interpolation.h"
-#include "alidade/tables/rotation_log_stream.h"
+#include "alidade/tables/logs/angle_interpolation.h"
+#include "alidade/tables/logs/rotation_log_stream.h"
 
 namespace alidade {
 namespace {

@@ -10,9 +10,9 @@
 
 #include "alidade/files/files.h"
 #include "alidade/pantilt/head_rotation.h"
-#include "alidade/simulate/panorama_video.h"
+#include "alidade/simulate/films/panorama_video.h"
 #include "alidade/simulate/rotating_lens.h"
-#include "alidade/tables/angle_interpolation.h"
+#include "alidade/tables/logs/angle_interpolation.h"
 #include "alidade/tables/rotation_log_file.h"
 #include "alidade/testing/temporary_folder.h"
 

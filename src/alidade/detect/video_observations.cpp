@@ -6,8 +6,8 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "alidade/tables/angle_interpolation.h"
-#include "alidade/tables/head_column.h"
+#include "alidade/tables/logs/angle_interpolation.h"
+#include "alidade/tables/logs/head_column.h"
 
 namespace alidade {
 namespace {

@@ -13,7 +13,7 @@
 #include "alidade/geometry/so3.h"
 #include "alidade/heads/simulated_head.h"
 #include "alidade/pantilt/head_rotation.h"
-#include "alidade/simulate/panorama_video.h"
+#include "alidade/simulate/films/panorama_video.h"
 
 namespace alidade {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "alidade/heads/head_survey.h"
-#include "alidade/servo/positioner_fit.h"
+#include "alidade/servo/identify/positioner_fit.h"
 
 namespace alidade {
 

@@ -5,10 +5,10 @@
 #include <cmath>
 
 #include "alidade/live/foxglove.h"
+#include "alidade/results/documents/observe_document.h"
+#include "alidade/results/documents/track_document.h"
 #include "alidade/results/localize_outcome.h"
-#include "alidade/results/observe_document.h"
 #include "alidade/results/servo_outcome.h"
-#include "alidade/results/track_document.h"
 
 namespace alidade::live {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "alidade/geometry/decompositions.h"
-#include "alidade/localize/world_turn.h"
+#include "alidade/localize/filter/world_turn.h"
 #include "alidade/testing/desk_walk.h"
 #include "alidade/testing/localize_sample.h"
 

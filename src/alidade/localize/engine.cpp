@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/localize/summary.h"
+#include "alidade/localize/checks/summary.h"
 
 namespace alidade {
 

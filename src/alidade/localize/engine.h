@@ -4,11 +4,11 @@
 #include <optional>
 #include <span>
 
-#include "alidade/localize/filter_bank.h"
-#include "alidade/localize/given_numbers.h"
+#include "alidade/localize/checks/radial_residuals.h"
+#include "alidade/localize/filter/filter_bank.h"
+#include "alidade/localize/filter/given_numbers.h"
 #include "alidade/localize/known_pose.h"
-#include "alidade/localize/path_doubt.h"
-#include "alidade/localize/radial_residuals.h"
+#include "alidade/localize/path/path_doubt.h"
 
 namespace alidade {
 

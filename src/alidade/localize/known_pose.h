@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "alidade/localize/filter_bank.h"
+#include "alidade/localize/filter/filter_bank.h"
 #include "alidade/localize/target.h"
 
 namespace alidade {

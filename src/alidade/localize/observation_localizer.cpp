@@ -5,12 +5,12 @@
 #include <array>
 #include <cmath>
 
+#include "alidade/localize/checks/scale_readings.h"
+#include "alidade/localize/checks/summary.h"
 #include "alidade/localize/known_pose.h"
-#include "alidade/localize/loop_closure.h"
-#include "alidade/localize/path_resection.h"
-#include "alidade/localize/scale_readings.h"
-#include "alidade/localize/smooth.h"
-#include "alidade/localize/summary.h"
+#include "alidade/localize/path/loop_closure.h"
+#include "alidade/localize/path/path_resection.h"
+#include "alidade/localize/path/smooth.h"
 
 namespace alidade {
 

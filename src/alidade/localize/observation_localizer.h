@@ -3,9 +3,9 @@
 #include <vector>
 
 #include "alidade/localize/engine.h"
-#include "alidade/localize/observation_record.h"
-#include "alidade/localize/point_episodes.h"
-#include "alidade/localize/point_store.h"
+#include "alidade/localize/filter/observation_record.h"
+#include "alidade/localize/filter/point_episodes.h"
+#include "alidade/localize/filter/point_store.h"
 
 namespace alidade {
 

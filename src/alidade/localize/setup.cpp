@@ -8,8 +8,8 @@
 #include <set>
 
 #include "alidade/estimation/config_error.h"
-#include "alidade/localize/filter.h"
-#include "alidade/localize/image_localizer.h"
+#include "alidade/localize/filter/filter.h"
+#include "alidade/localize/frames/image_localizer.h"
 
 namespace alidade {
 namespace {

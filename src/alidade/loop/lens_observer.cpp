@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "alidade/observe/hybrid.h"
+#include "alidade/observe/filters/hybrid.h"
 
 namespace alidade {
 namespace {

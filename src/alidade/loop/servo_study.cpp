@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "alidade/servo/axis_settling.h"
+#include "alidade/servo/axis/axis_settling.h"
 #include "alidade/servo/head_servo.h"
 
 namespace alidade {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "alidade/track/lens_over_time.h"
+#include "alidade/track/checks/lens_over_time.h"
 #include "alidade/track/track.h"
 
 namespace alidade {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <functional>
 
-#include "alidade/observe/solve.h"
+#include "alidade/observe/solve/solve.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/rotation.h"
 

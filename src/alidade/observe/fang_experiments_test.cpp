@@ -4,7 +4,7 @@
 #include <array>
 #include <ostream>
 
-#include "alidade/observe/fang_observer.h"
+#include "alidade/observe/filters/fang_observer.h"
 #include "alidade/testing/rotation_sample.h"
 
 // The paper's experiments on many sets of points: what of them holds, and what does not.

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "alidade/observe/intrinsics_estimate.h"
-#include "alidade/observe/rotation_bundle.h"
+#include "alidade/observe/solve/rotation_bundle.h"
 
 namespace alidade {
 

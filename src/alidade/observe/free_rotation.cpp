@@ -3,7 +3,7 @@
 
 #include "alidade/estimation/median.h"
 #include "alidade/geometry/decompositions.h"
-#include "alidade/observe/solve.h"
+#include "alidade/observe/solve/solve.h"
 
 namespace alidade {
 namespace {

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "alidade/geometry/decompositions.h"
-#include "alidade/observe/rotation_bundle.h"
+#include "alidade/observe/solve/rotation_bundle.h"
 #include "alidade/pantilt/head_rotation.h"
 
 namespace alidade {

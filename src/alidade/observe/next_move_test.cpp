@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "alidade/observe/rotation_bundle.h"
+#include "alidade/observe/solve/rotation_bundle.h"
 #include "alidade/simulate/rotation.h"
 
 namespace alidade {

@@ -4,7 +4,7 @@
 #include <functional>
 
 #include "alidade/geometry/degree.h"
-#include "alidade/observe/solve.h"
+#include "alidade/observe/solve/solve.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/rotation.h"
 

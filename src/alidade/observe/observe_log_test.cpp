@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "alidade/observe/solve.h"
+#include "alidade/observe/solve/solve.h"
 #include "alidade/simulate/rotation.h"
 
 // What a log may bring beside rotation and pixels: noise of the rotation, a measured velocity, a gap.

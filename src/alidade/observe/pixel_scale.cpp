@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/observe/solve.h"
+#include "alidade/observe/solve/solve.h"
 
 namespace alidade {
 

@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "alidade/files/csv.h"
-#include "alidade/observe/hybrid.h"
-#include "alidade/observe/solve.h"
+#include "alidade/observe/filters/hybrid.h"
+#include "alidade/observe/solve/solve.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/rotation.h"
 

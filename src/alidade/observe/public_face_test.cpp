@@ -6,7 +6,7 @@
 #include <map>
 
 #include "alidade/observe.h"
-#include "alidade/observe/solve.h"
+#include "alidade/observe/solve/solve.h"
 #include "alidade/simulate/rotation.h"
 #include "alidade/simulate/turned_scene.h"
 

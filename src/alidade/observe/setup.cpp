@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "alidade/estimation/config_error.h"
-#include "alidade/observe/solve.h"
+#include "alidade/observe/solve/solve.h"
 
 namespace alidade {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "alidade/observe/config.h"
-#include "alidade/observe/rotation_model.h"
+#include "alidade/observe/solve/rotation_model.h"
 #include "alidade/pantilt/rotation_log.h"
 
 namespace alidade {

@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
-#include "alidade/simulate/panorama_video.h"
+#include "alidade/simulate/films/panorama_video.h"
 #include "alidade/simulate/rotating_lens.h"
 
 namespace alidade {

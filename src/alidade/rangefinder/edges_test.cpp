@@ -1,4 +1,4 @@
-#include "alidade/rangefinder/align_edges.h"
+#include "alidade/rangefinder/solve/align_edges.h"
 
 #include <gtest/gtest.h>
 

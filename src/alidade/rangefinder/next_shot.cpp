@@ -7,8 +7,8 @@
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/so3.h"
-#include "alidade/rangefinder/beam_bound.h"
-#include "alidade/rangefinder/refine_all.h"
+#include "alidade/rangefinder/solve/beam_bound.h"
+#include "alidade/rangefinder/solve/refine_all.h"
 
 namespace alidade {
 namespace {

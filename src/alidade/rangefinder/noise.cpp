@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "alidade/geometry/decompositions.h"
-#include "alidade/rangefinder/beam_search.h"
 #include "alidade/rangefinder/prepare.h"
+#include "alidade/rangefinder/solve/beam_search.h"
 
 namespace alidade {
 namespace {

@@ -2,9 +2,9 @@
 
 #include <string>
 
-#include "alidade/rangefinder/beam_solve.h"
 #include "alidade/rangefinder/rangefinder.h"
-#include "alidade/rangefinder/refine_all.h"
+#include "alidade/rangefinder/solve/beam_solve.h"
+#include "alidade/rangefinder/solve/refine_all.h"
 
 namespace alidade {
 

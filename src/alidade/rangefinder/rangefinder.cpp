@@ -5,11 +5,11 @@
 #include <cmath>
 
 #include "alidade/geometry/decompositions.h"
-#include "alidade/rangefinder/beam_bound.h"
-#include "alidade/rangefinder/beam_search.h"
-#include "alidade/rangefinder/fixed_quantities.h"
 #include "alidade/rangefinder/prepare.h"
-#include "alidade/rangefinder/refine_all.h"
+#include "alidade/rangefinder/solve/beam_bound.h"
+#include "alidade/rangefinder/solve/beam_search.h"
+#include "alidade/rangefinder/solve/fixed_quantities.h"
+#include "alidade/rangefinder/solve/refine_all.h"
 
 namespace alidade {
 namespace {

@@ -4,9 +4,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "alidade/rangefinder/beam_solve.h"
-#include "alidade/rangefinder/beam_start.h"
 #include "alidade/rangefinder/rangefinder.h"
+#include "alidade/rangefinder/solve/beam_solve.h"
+#include "alidade/rangefinder/solve/beam_start.h"
 #include "alidade/testing/reference_case.h"
 
 // Cases computed elsewhere, with another program.

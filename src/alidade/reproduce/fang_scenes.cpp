@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "alidade/observe/flow_regressor.h"
+#include "alidade/observe/filters/flow_regressor.h"
 #include "alidade/simulate/draws.h"
 
 namespace alidade::reproduce {

@@ -3,8 +3,8 @@
 #include <optional>
 #include <vector>
 
-#include "alidade/observe/fang_observer.h"
-#include "alidade/observe/hybrid.h"
+#include "alidade/observe/filters/fang_observer.h"
+#include "alidade/observe/filters/hybrid.h"
 #include "alidade/simulate/rotation.h"
 
 // The camera, motion and noise of Fang, Liu, Li & Zhang 2011, section V, and how an estimate of them is scored.

@@ -5,9 +5,9 @@
 
 #include "alidade/localize.h"
 #include "alidade/localize/distortion.h"
-#include "alidade/localize/filter.h"
+#include "alidade/localize/filter/filter.h"
+#include "alidade/simulate/films/underwater_video.h"
 #include "alidade/simulate/underwater.h"
-#include "alidade/simulate/underwater_video.h"
 
 // The protocol in which lenses and filters are compared under water; docs/maths/localization.md.
 

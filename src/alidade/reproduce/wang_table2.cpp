@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-#include "alidade/rangefinder/align_edges.h"
+#include "alidade/rangefinder/solve/align_edges.h"
 #include "alidade/reproduce/beam_trials.h"
 #include "alidade/reproduce/edge_scene.h"
 #include "alidade/reproduce/wang_experiments.h"

@@ -8,11 +8,11 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "alidade/calibrate/port.h"
+#include "alidade/calibrate/solve/port.h"
 #include "alidade/camera/undistort.h"
 #include "alidade/formats/camera_file.h"
 #include "alidade/images/photos.h"
-#include "alidade/results/calibration_document.h"
+#include "alidade/results/documents/calibration_document.h"
 #include "alidade/tables/corner_file.h"
 
 namespace alidade {

@@ -9,7 +9,7 @@
 
 #include "alidade/formats/camera_file.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/localize/path_error.h"
+#include "alidade/localize/path/path_error.h"
 #include "alidade/report/thin.h"
 #include "alidade/results/thin_tables.h"
 #include "alidade/tables/localize_file.h"

@@ -8,7 +8,7 @@
 
 #include "alidade/geometry/degree.h"
 #include "alidade/report/thin.h"
-#include "alidade/results/heads_document.h"
+#include "alidade/results/documents/heads_document.h"
 #include "alidade/results/thin_tables.h"
 #include "alidade/tables/events_file.h"
 

@@ -8,7 +8,7 @@
 #include "alidade/formats/camera_file.h"
 #include "alidade/formats/intrinsics_file.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/results/observe_document.h"
+#include "alidade/results/documents/observe_document.h"
 #include "alidade/tables/pairs_file.h"
 #include "alidade/tables/rotation_log_file.h"
 

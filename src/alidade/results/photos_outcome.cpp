@@ -6,7 +6,7 @@
 
 #include "alidade/formats/camera_json.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/results/calibration_document.h"
+#include "alidade/results/documents/calibration_document.h"
 
 namespace alidade {
 namespace {

@@ -13,7 +13,7 @@
 #include "alidade/formats/camera_file.h"
 #include "alidade/formats/camera_json.h"
 #include "alidade/images/photos.h"
-#include "alidade/results/sigma_values.h"
+#include "alidade/results/documents/sigma_values.h"
 
 namespace alidade {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "alidade/files/number_list.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/results/heads_document.h"
+#include "alidade/results/documents/heads_document.h"
 
 namespace alidade {
 namespace {

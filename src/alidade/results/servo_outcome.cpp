@@ -8,8 +8,8 @@
 #include <span>
 
 #include "alidade/report/thin.h"
+#include "alidade/results/documents/track_document.h"
 #include "alidade/results/thin_tables.h"
-#include "alidade/results/track_document.h"
 
 namespace alidade {
 namespace {

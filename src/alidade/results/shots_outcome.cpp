@@ -9,7 +9,7 @@
 #include "alidade/files/number_list.h"
 #include "alidade/formats/camera_json.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/results/calibration_document.h"
+#include "alidade/results/documents/calibration_document.h"
 
 namespace alidade {
 namespace {

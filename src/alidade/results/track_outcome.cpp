@@ -7,8 +7,8 @@
 
 #include "alidade/detect/video_observations.h"
 #include "alidade/report/thin.h"
+#include "alidade/results/documents/track_document.h"
 #include "alidade/results/thin_tables.h"
-#include "alidade/results/track_document.h"
 #include "alidade/tables/events_file.h"
 
 namespace alidade {

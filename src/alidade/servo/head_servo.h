@@ -6,8 +6,8 @@
 
 #include "alidade/pantilt/head.h"
 #include "alidade/pantilt/lens_course.h"
-#include "alidade/servo/axis_controller.h"
-#include "alidade/servo/search.h"
+#include "alidade/servo/axis/axis_controller.h"
+#include "alidade/servo/identify/search.h"
 
 namespace alidade {
 

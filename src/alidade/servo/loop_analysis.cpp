@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "alidade/geometry/decompositions.h"
-#include "alidade/servo/axis_model.h"
+#include "alidade/servo/axis/axis_model.h"
 
 namespace alidade {
 namespace {

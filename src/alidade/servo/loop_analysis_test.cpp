@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "alidade/files/files.h"
-#include "alidade/servo/axis_model.h"
+#include "alidade/servo/axis/axis_model.h"
 #include "alidade/testing/reference_case.h"
 
 namespace alidade {

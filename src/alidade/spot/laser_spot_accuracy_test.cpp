@@ -8,7 +8,7 @@
 
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/example_camera.h"
-#include "alidade/simulate/spot_photos.h"
+#include "alidade/simulate/films/spot_photos.h"
 #include "alidade/spot/laser_spot.h"
 
 namespace alidade {

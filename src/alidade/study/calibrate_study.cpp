@@ -2,7 +2,7 @@
 #include <memory>
 
 #include "alidade/calibrate.h"
-#include "alidade/calibrate/bundle.h"
+#include "alidade/calibrate/solve/bundle.h"
 #include "alidade/estimation/config_error.h"
 #include "alidade/simulate/example_camera.h"
 #include "alidade/study/studies.h"

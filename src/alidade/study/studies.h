@@ -9,7 +9,7 @@
 #include "alidade/localize.h"
 #include "alidade/observe.h"
 #include "alidade/rangefinder.h"
-#include "alidade/simulate/board_photos.h"
+#include "alidade/simulate/boards/board_photos.h"
 #include "alidade/study/trial.h"
 #include "alidade/track.h"
 

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "alidade/files/table_rows.h"
-#include "alidade/tables/head_column.h"
+#include "alidade/tables/logs/head_column.h"
 
 namespace alidade {
 namespace {

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "alidade/files/table_rows.h"
-#include "alidade/tables/rotation_log_columns.h"
+#include "alidade/tables/logs/rotation_log_columns.h"
 
 namespace alidade {
 namespace {

@@ -6,7 +6,7 @@
 #include <iterator>
 #include <sstream>
 
-#include "alidade/tables/rotation_log_stream.h"
+#include "alidade/tables/logs/rotation_log_stream.h"
 
 namespace alidade {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "alidade/files/table_rows.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/servo/identify_causes.h"
+#include "alidade/servo/identify/identify_causes.h"
 
 namespace alidade {
 ServoLogFile read_servo_log(const std::filesystem::path& file, bool skip_bad) {

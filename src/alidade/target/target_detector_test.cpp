@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "alidade/simulate/draws.h"
-#include "alidade/simulate/target_video.h"
+#include "alidade/simulate/films/target_video.h"
 
 namespace alidade {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "alidade/calibrate/judge.h"
-#include "alidade/simulate/board_photos.h"
+#include "alidade/calibrate/checks/judge.h"
+#include "alidade/simulate/boards/board_photos.h"
 #include "alidade/simulate/example_camera.h"
 
 namespace alidade::testing {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <map>
 
-#include "alidade/localize/image_localizer.h"
+#include "alidade/localize/frames/image_localizer.h"
 #include "alidade/testing/room_video.h"
 
 namespace alidade::testing {

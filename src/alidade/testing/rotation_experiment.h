@@ -3,7 +3,7 @@
 #include <functional>
 #include <vector>
 
-#include "alidade/observe/hybrid.h"
+#include "alidade/observe/filters/hybrid.h"
 #include "alidade/simulate/rotation.h"
 #include "alidade/testing/rotation_sample.h"
 

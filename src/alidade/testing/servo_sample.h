@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "alidade/servo/identify.h"
+#include "alidade/servo/identify/identify.h"
 #include "alidade/simulate/servo.h"
 
 namespace alidade::testing {

@@ -5,10 +5,10 @@
 
 #include "alidade/simulate/draws.h"
 #include "alidade/testing/track_sample.h"
-#include "alidade/track/clock_shift.h"
-#include "alidade/track/explanation.h"
+#include "alidade/track/checks/clock_shift.h"
+#include "alidade/track/checks/explanation.h"
+#include "alidade/track/checks/track_assumed.h"
 #include "alidade/track/track.h"
-#include "alidade/track/track_assumed.h"
 
 // What is not as the rig file says: named, or at least not called good. Twenty draws of each.
 

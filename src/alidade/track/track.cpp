@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "alidade/geometry/decompositions.h"
-#include "alidade/track/rig_faults.h"
+#include "alidade/track/checks/rig_faults.h"
 #include "alidade/track/xiahou_tracker.h"
 
 namespace alidade {

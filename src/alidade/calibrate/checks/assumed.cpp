@@ -1,0 +1,150 @@
+#include "alidade/calibrate/checks/assumed.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "alidade/calibrate/setup.h"
+#include "alidade/calibrate/solve/bundle.h"
+#include "alidade/calibrate/solve/normal_equations.h"
+#include "alidade/calibrate/study.h"
+
+namespace alidade {
+namespace {
+
+using Eigen::Index;
+
+/// What is ordinarily wrong with a value that somebody wrote down.
+double ordinary_error(const std::string& name, double value) {
+  if (name == "fx" || name == "fy") return 0.003 * value;
+  if (name == "cx" || name == "cy") return 2.0;  // px
+  if (name == "gap_m") return 2e-3;              // by a ruler
+  if (name == "glass_m") return 0.02 * value;    // a plate's tolerance
+  if (name == "n_glass") return 0.01;            // one glass for another
+  if (name == "n_water") return 0.003;           // 15 °C, or half the way from fresh to sea water
+  return 0.0;                                    // a term that the model does not have
+}
+
+/// Lens parameters by position: those estimated, and those held.
+struct Split {
+  std::vector<Index> free, held;
+};
+
+Split split_of(const CalibrateReport& report) {
+  Split split;
+  for (Index i = 0; i < report.model_cov.rows(); ++i)
+    (report.model_cov(i, i) > 0.0 ? split.free : split.held).push_back(i);
+  return split;
+}
+
+/// dθ/da of the free by the held parameters; empty where the linearisation fails.
+Eigen::MatrixXd sensitivity(const Board& board, CalibrateConfig config, std::span<const BoardView> views,
+                            const CalibrateReport& report, const Split& split) {
+  config.fixed.clear();
+  config.board_shape = BoardShape::given;
+  BundleProblem problem;
+  (void)set_up_problem(board, config, {report.camera.width_px, report.camera.height_px}, problem);
+  problem.prior_information.setZero();
+  std::vector<ViewArrays> arrays;
+  BundleState state{report.camera.lens, {}, report.board_points};
+  const std::vector<BoardView> used = used_views(views, report, views.size());
+  for (const BoardView& view : used) arrays.push_back(make_arrays(view));
+  for (const ViewFit& view : report.views) {
+    if (view.used) state.cam_from_board.push_back(view.cam_from_board);
+  }
+  problem.views = arrays;
+  NormalEquations eq;
+  if (!linearize(problem, state, eq)) return {};
+  Eigen::MatrixXd S = eq.H.selfadjointView<Eigen::Lower>();
+  for (std::size_t k = 0; k < arrays.size(); ++k) {
+    const Eigen::LLT<Eigen::Matrix<double, 6, 6>> V(eq.V[k]);
+    if (V.info() != Eigen::Success) return {};
+    S -= eq.coupling(k) * V.solve(eq.coupling(k).transpose());
+  }
+  const Eigen::MatrixXd of_free = S(split.free, split.free);
+  const Eigen::VectorXd scale = of_free.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::LLT<Eigen::MatrixXd> llt(scale.asDiagonal() * of_free * scale.asDiagonal());
+  if (llt.info() != Eigen::Success) return {};
+  return -(scale.asDiagonal() * llt.solve(scale.asDiagonal() * S(split.free, split.held)));
+}
+
+/// The square of a board. The lens of a central camera is the same for all; the poses' distances follow it.
+Assumption square_of(const Board& board, const CalibrateConfig& config, std::span<const BoardView> views,
+                     const CalibrateReport& report, const Split& split) {
+  constexpr double ordinary = 2e-3;  // a printer's, of the length
+  Assumption square{.name = "square_m", .value = board.square_m, .ordinary = ordinary * board.square_m};
+  square.remedy = "measure the board: a port's gap follows the length of a square";
+  if (is_central(report.camera.lens)) return square;
+  CalibrateConfig scaled = config;
+  scaled.board_shape = BoardShape::given;
+  std::vector<Eigen::Vector3d> points = report.board_points;
+  for (Eigen::Vector3d& point : points) point *= 1.0 + ordinary;
+  const std::vector<BoardView> used = used_views(views, report, 40);
+  const ImageSize size{report.camera.width_px, report.camera.height_px};
+  const CalibrateReport before = calibrate(board, used, size, scaled, report.board_points);
+  const CalibrateReport after = calibrate(board, used, size, scaled, points);
+  if (after.status != CalibrateReport::Status::converged || before.status != after.status) return square;
+  const Eigen::VectorXd moved = params(after.camera.lens) - params(before.camera.lens);
+  const auto names = param_names(report.camera.lens);
+  for (const Index i : split.free) {
+    const double sigmas = std::abs(moved[i]) / std::sqrt(report.camera.cov(i, i));
+    if (sigmas <= square.moves) continue;
+    square.moves = sigmas;
+    square.moved = names[static_cast<std::size_t>(i)];
+    square.moved_by = moved[i];
+  }
+  return square;
+}
+
+/// The covariance of a lens that was given goes into what was estimated with it.
+void count_air(const Camera& air, const Eigen::MatrixXd& K, const Split& split, CalibrateReport& report) {
+  const Index num = report.camera.cov.rows();
+  Eigen::MatrixXd given = Eigen::MatrixXd::Zero(num, num);
+  const Index of_air = std::min(air.cov.rows(), num);
+  given.topLeftCorner(of_air, of_air) = air.cov.topLeftCorner(of_air, of_air);
+  const Eigen::MatrixXd C = given(split.held, split.held), between = K * C;
+  Eigen::MatrixXd& cov = report.camera.cov;
+  cov(split.free, split.free) = (cov(split.free, split.free) + between * K.transpose()).eval();
+  cov(split.free, split.held) = between;
+  cov(split.held, split.free) = between.transpose();
+  cov(split.held, split.held) = C;
+}
+
+}  // namespace
+
+std::vector<Assumption> count_assumptions(const Board& board, const CalibrateConfig& config,
+                                          std::span<const BoardView> views, const std::optional<Camera>& air,
+                                          CalibrateReport& report) {
+  const Split split = split_of(report);
+  const Eigen::MatrixXd K = split.held.empty() ? Eigen::MatrixXd() : sensitivity(board, config, views, report, split);
+  const bool air_has_cov = air && air->cov.size() > 0 && K.size() > 0;
+  if (air_has_cov) count_air(*air, K, split, report);
+  std::vector<Assumption> assumed = {square_of(board, config, views, report, split)};
+  const auto names = param_names(report.camera.lens);
+  const Eigen::VectorXd values = params(report.camera.lens);
+  for (std::size_t h = 0; h < split.held.size(); ++h) {
+    const Index at = split.held[h];
+    const std::string& name = names[static_cast<std::size_t>(at)];
+    Assumption row{.name = name, .value = values[at], .ordinary = ordinary_error(name, values[at])};
+    const bool of_air = air && at < 10;
+    if (of_air && air_has_cov) row.sigma = std::sqrt(std::max(0.0, report.camera.cov(at, at)));
+    if (!row.sigma && row.ordinary == 0.0) row.sigma = 0.0;  // exact: the model is one without it
+    row.remedy =
+        of_air ? "give an --air camera with its covariance" : "estimate " + name + ", or give it with a --prior";
+    const double error = row.sigma.value_or(row.ordinary);
+    for (Index i = 0; i < K.rows() && error > 0.0; ++i) {
+      const Index free = split.free[static_cast<std::size_t>(i)];
+      const double by = K(i, static_cast<Index>(h)) * error,
+                   sigmas = std::abs(by) / std::sqrt(report.camera.cov(free, free));
+      if (sigmas <= row.moves) continue;
+      row.moves = sigmas;
+      row.moved = names[static_cast<std::size_t>(free)];
+      row.moved_by = by;
+    }
+    assumed.push_back(std::move(row));
+  }
+  return assumed;
+}
+
+}  // namespace alidade

@@ -1,0 +1,103 @@
+#include "alidade/calibrate/checks/better_model.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <sstream>
+#include <vector>
+
+namespace alidade {
+namespace {
+
+bool is_central_parameter(const std::string& name) {
+  return name == "fx" || name == "fy" || name == "cx" || name == "cy";
+}
+
+/// The config with another model: what is held or known of focal lengths and centre stays, of the distortion nothing.
+CalibrateConfig with_model(CalibrateConfig config, const std::string& model) {
+  config.model = model;
+  std::erase_if(config.fixed, [](const std::string& name) { return name != "skew" && !is_central_parameter(name); });
+  std::erase_if(config.priors, [](const Prior& prior) { return !is_central_parameter(prior.name); });
+  return config;
+}
+
+std::size_t num_corners(std::span<const BoardView> views) {
+  std::size_t count = 0;
+  for (const BoardView& view : views) count += view.corners.size();
+  return count;
+}
+
+/// "use --model brown --free skew" for a step of the held-out ladder, whose name lists its brown terms.
+std::string options_for(const std::string& name, const CalibrateConfig& config) {
+  if (name == "kannala_brandt") return "use --model kannala_brandt";
+  std::vector<std::string> terms;
+  std::istringstream words(name);
+  for (std::string word; words >> word;) terms.push_back(word);
+  const auto is_in = [](const std::vector<std::string>& names, const std::string& term) {
+    return std::find(names.begin(), names.end(), term) != names.end();
+  };
+  const auto has = [&](const std::string& term) { return is_in(terms, term); };
+  std::string held;
+  bool had_fix = false;
+  for (const std::string term : {"k1", "k2", "p1", "p2", "k3"}) {
+    if (!has(term)) held += (held.empty() ? "" : ",") + term;
+    had_fix = had_fix || is_in(config.fixed, term);
+  }
+  std::string options = config.model == "brown" ? "" : " --model brown";
+  if (!held.empty()) options += " --fix " + held;
+  if (has("skew")) options += " --free skew";
+  if (options.empty()) return "leave out --fix";
+  return "use" + options + (held.empty() && had_fix && config.model == "brown" ? ", and no --fix" : "");
+}
+
+}  // namespace
+
+std::optional<FittingModel> fitting_model(const Board& board, std::span<const BoardView> views, ImageSize size,
+                                          const CalibrateConfig& config, const CalibrateReport& failed) {
+  if (config.model == "flat_port") return std::nullopt;
+  std::vector<BoardView> seen;  // for a lens too plain, corners of wide views are outliers: all are tried again
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    if (!views[k].corners.empty() && !failed.views[k].reason.starts_with("is the same")) seen.push_back(views[k]);
+  }
+  std::optional<FittingModel> best;
+  for (const std::string model : {"brown", "kannala_brandt"}) {
+    if (model == config.model && config.fixed.size() <= 1) continue;
+    CalibrateConfig other = with_model(config, model);
+    if (other.board_shape != BoardShape::given) other.board_shape = BoardShape::flat;
+    const CalibrateReport tried = calibrate(board, seen, size, other, failed.board_points);
+    if (tried.status != CalibrateReport::Status::converged) continue;
+    const bool takes_all = 20 * static_cast<std::size_t>(tried.corners_used) >= 19 * num_corners(seen);
+    const bool is_clear = !(tried.rms_px > 0.5 * failed.rms_px);  // a solve that failed may have no RMS
+    constexpr double fits_px = 2.0;                               // more is no noise of corners, whatever the camera
+    if (takes_all && is_clear && tried.rms_px <= fits_px && (!best || tried.rms_px < best->rms_px))
+      best = FittingModel{model, tried.rms_px};
+  }
+  return best;
+}
+
+void advise_fitting_model(const Board& board, std::span<const BoardView> views, ImageSize size,
+                          const CalibrateConfig& config, CalibrateReport& report) {
+  constexpr double misfit_px = 1.0;  // no detector errs so much: where a parameter is untold at this, the lens is wrong
+  const bool is_settled = report.status != CalibrateReport::Status::no_convergence;
+  if (is_settled && !(report.num_parameters > 0 && report.rms_px > misfit_px)) return;
+  const auto found = fitting_model(board, views, size, config, report);
+  if (!found) return;
+  std::array<char, 32> rms{};
+  std::snprintf(rms.data(), rms.size(), "%.3g", found->rms_px);
+  const bool is_same = found->model == config.model;
+  if (!is_settled) report.reason = config.model + (is_same ? " as held" : "") + " does not fit these corners";
+  report.to_add = (is_same ? "leave out --fix: " + found->model : "use --model " + found->model + ": it") +
+                  " fits these corners with RMS " + rms.data() + " px";
+}
+
+std::string better_model_advice(const CalibrationStudy& study, const CalibrateConfig& config) {
+  const HeldOutModel* best = nullptr;
+  for (const HeldOutModel& model : study.models) {
+    const bool gains = model.is_richer && model.gain_px > 2.0 * model.sigma_px && model.gain_px > 0.0;
+    if (gains && (best == nullptr || model.gain_px > best->gain_px)) best = &model;
+  }
+  return best == nullptr ? "" : options_for(best->name, config);
+}
+
+}  // namespace alidade

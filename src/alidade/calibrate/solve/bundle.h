@@ -1,0 +1,86 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "alidade/calibrate/config.h"
+#include "alidade/calibrate/solve/view_arrays.h"
+#include "alidade/camera/camera.h"
+#include "alidade/geometry/rigid3.h"
+
+namespace alidade {
+
+struct NormalEquations;
+
+/// What is estimated together: lens, poses, board points.
+struct BundleState {
+  Lens lens;
+  std::vector<Rigid3> cam_from_board;
+  std::vector<Eigen::Vector3d> board_points;  ///< [m]
+};
+
+/// What stays the same during a solve.
+struct BundleProblem {
+  std::span<const ViewArrays> views;
+  std::vector<int> free_lens;         ///< Positions of the estimated lens parameters.
+  Eigen::VectorXd prior_value;        ///< One a lens parameter.
+  Eigen::VectorXd prior_information;  ///< 1/σ²; 0 where there is no prior.
+  BoardShape shape = BoardShape::flat;
+  std::vector<Eigen::Vector3d> printed_points;  ///< The board as printed: gauge and start of its shape. [m]
+  double shape_sigma_m =
+      0.0;  ///< Prior σ of a free point against the printed one; keeps unseen points where they were.
+  /// Brown: the formulas hold beyond the fold of the radial map as well, where a lens shows nothing.
+  bool passes_fold = false;
+};
+
+/// How a solve starts and ends.
+struct BundleConfig {
+  int max_iterations = 60;
+  double tolerance_sigmas = 1e-3;  ///< The last step moves nothing by more of its own σ.
+  double first_lambda = 1e-5;      ///< Marquardt's damping at first; 0 where the start is known to be near.
+};
+
+/// Where the solve ended. `cov` is over the free lens parameters, then the shape (bow: 2 heights; free: x y z a point).
+struct BundleResult {
+  enum class Status { converged, no_convergence, singular };
+  Status status = Status::singular;
+  BundleState state;
+  double cost = 0.0;  ///< Σ of squared whitened residuals, priors included.
+  int iterations = 0;
+  std::shared_ptr<const NormalEquations> equations;  ///< Where the last step began.
+  // From here on: by with_covariance().
+  Eigen::MatrixXd cov;                                ///< Inverse of the reduced normal matrix.
+  std::vector<Eigen::Matrix<double, 6, 6>> pose_cov;  ///< One a view, if asked for.
+  /// Where the reduced matrix, scaled to unit diagonal, is (nearly) singular: the eigenvector of its smallest
+  /// eigenvalue, which is what the views leave free.
+  Eigen::VectorXd weakest;
+};
+
+/// Maximum-likelihood bundle adjustment by Levenberg–Marquardt. The poses are eliminated view by view (6 × 6
+/// Cholesky), so time and memory are linear in the views. Triggs et al., "Bundle adjustment — a modern synthesis",
+/// 2000, §6; gauge of the free board: minimal constraints, the rigid motion and scale that fit the printed board best.
+[[nodiscard]] BundleResult solve_bundle(const BundleProblem& problem, BundleState start, const BundleConfig& config);
+
+/// The same; where a Brown lens' fold bars the way (a step that puts one corner behind it is refused, and the solve
+/// creeps along the fold), it goes on by the formulas alone, as others always do. Status no_convergence where it ends
+/// with a corner that counts behind the fold; with more than a tenth of them there, the first result stands.
+[[nodiscard]] BundleResult solve_past_fold(BundleProblem problem, BundleState start, const BundleConfig& config);
+
+/// The same with its covariances, from the undamped equations; status singular where they do not determine all.
+/// Anything but a converged result is returned as it is.
+[[nodiscard]] BundleResult with_covariance(BundleResult result, bool want_pose_cov);
+
+/// Raises the poses' covariances by what the lens' was raised: `extra` is added to that of the free lens parameters.
+void follow_lens(const Eigen::MatrixXd& extra, BundleResult& result);
+
+/// Residual (prediction − seen) [px] of every corner of a view, not whitened; NaN where it cannot be projected.
+[[nodiscard]] std::vector<Eigen::Vector2d> residuals_px(const BundleState& state, std::size_t view_index,
+                                                        const ViewArrays& view);
+
+/// Pose of one view with lens and board held, from a start. None where it does not converge.
+[[nodiscard]] std::optional<Rigid3> refine_pose(const Lens& lens, const std::vector<Eigen::Vector3d>& board_points,
+                                                const ViewArrays& view, const Rigid3& cam_from_board);
+
+}  // namespace alidade

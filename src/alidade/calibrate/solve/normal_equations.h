@@ -1,0 +1,49 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "alidade/calibrate/solve/bundle.h"
+#include "alidade/calibrate/solve/columns.h"
+
+namespace alidade {
+
+/// Normal equations of a bundle at one state. Globals are the free lens parameters, then the shape; each view has a
+/// 6 × 6 pose block V, its coupling W (globals × 6) and its gradient. Right-hand sides are gradients Jᵀr.
+struct NormalEquations {
+  int num_globals = 0;
+  double cost = 0.0;
+  Eigen::MatrixXd H;  ///< globals × globals, lower triangle.
+  Eigen::VectorXd gradient;
+  std::vector<double> W;                       ///< View by view, globals × 6 column-major.
+  std::vector<Eigen::Matrix<double, 6, 6>> V;  ///< Lower triangle.
+  std::vector<Eigen::Matrix<double, 6, 1>> pose_gradient;
+  /// What each view alone brought to the dense globals (lens and bow): its H and gradient, dense × (dense + 1).
+  int num_dense = 0;
+  std::vector<double> view_dense;
+
+  [[nodiscard]] Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 6>> coupling(std::size_t view) const {
+    return {W.data() + view * 6 * static_cast<std::size_t>(num_globals), num_globals, 6};
+  }
+  [[nodiscard]] Eigen::Map<const Eigen::MatrixXd> dense_of(std::size_t view) const {
+    const auto size = static_cast<std::size_t>(num_dense * (num_dense + 1));
+    return {view_dense.data() + view * size, num_dense, num_dense + 1};
+  }
+};
+
+/// Heights of the bow's two parabolas at every point, 1 in the middle and 0 at the border, from the printed board.
+struct BowBasis {
+  std::vector<double> along_x, along_y;
+};
+[[nodiscard]] BowBasis bow_basis(const std::vector<Eigen::Vector3d>& printed_points);
+
+/// The seven directions (orthonormal rows, 7 × 3n) in which a point set moves rigidly or grows: the free gauge.
+[[nodiscard]] Eigen::MatrixXd gauge_directions(const std::vector<Eigen::Vector3d>& points);
+
+/// Number of global unknowns of a problem.
+[[nodiscard]] int num_globals(const BundleProblem& problem);
+
+/// Fills `equations` at `state`. False where a corner cannot be projected: this state is not to be entered.
+[[nodiscard]] bool linearize(const BundleProblem& problem, const BundleState& state, NormalEquations& equations);
+
+}  // namespace alidade

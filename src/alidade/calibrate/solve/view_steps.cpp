@@ -1,0 +1,128 @@
+#include "alidade/calibrate/solve/view_steps.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "alidade/calibrate/solve/columns.h"
+#include "alidade/calibrate/solve/normal_equations.h"
+
+namespace alidade {
+namespace {
+
+using Eigen::Index;
+using ColumnsMap = Eigen::Map<const Eigen::MatrixXd>;
+
+/// J X: the view's whitened Jacobian by all globals, times the columns X of their covariance.
+void fill_product(const BundleProblem& problem, const ViewArrays& view, const Columns& columns,
+                  const Eigen::MatrixXd& X, Eigen::MatrixXd& JX) {
+  const auto rows = static_cast<Index>(columns.num_rows());
+  JX.setZero(rows, X.cols());
+  const auto column = [&](int c) { return Eigen::Map<const Eigen::VectorXd>(columns[c], rows); };
+  Index at = 0;
+  for (const int parameter : problem.free_lens) JX.noalias() += column(parameter) * X.row(at++);
+  const auto half = static_cast<Index>(columns.stride());
+  for (Index i = 0; i < static_cast<Index>(view.size()); ++i) {
+    const Index point = at + 3 * view.index[static_cast<std::size_t>(i)];
+    for (int c = 0; c < 3; ++c) {
+      const double* by_point = columns[Columns::pose + c];
+      JX.row(i) += by_point[i] * X.row(point + c);
+      JX.row(half + i) += by_point[half + i] * X.row(point + c);
+    }
+  }
+}
+
+/// Does a view's fit to the board's shape count? Each view has about the n-th part of what tells the shape: of fifty,
+/// it changes σ by a hundredth.
+bool shape_counts(const BundleProblem& problem) {
+  constexpr std::size_t many_views = 50;
+  return problem.views.size() < many_views;
+}
+
+/// From what the last linearisation kept of each view: lens and bow.
+std::vector<ClusterStep> dense_steps(const BundleProblem& problem, const BundleResult& result,
+                                     const Eigen::MatrixXd& X) {
+  constexpr int most = 18;  // dense globals and the gradient
+  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, most, most>;
+  const NormalEquations& eq = *result.equations;
+  const Index dense = eq.num_dense;
+  const bool takes = X.cols() < dense && shape_counts(problem);
+  std::vector<ClusterStep> steps;
+  steps.reserve(eq.V.size());
+  const Small Xt = X.transpose();
+  Small reduced(dense, dense + 1), pull(X.cols(), dense + 1);
+  for (std::size_t k = 0; k < eq.V.size(); ++k) {
+    const Eigen::LLT<Eigen::Matrix<double, 6, 6>> V(eq.V[k]);
+    Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, most> rows(6, dense + 1);
+    rows.leftCols(dense) = eq.coupling(k).transpose();
+    rows.col(dense) = eq.pose_gradient[k];
+    V.matrixL().solveInPlace(rows);
+    reduced = eq.dense_of(k) - rows.leftCols(dense).transpose().lazyProduct(rows);  // the pose follows
+    pull = Xt.lazyProduct(reduced);
+    steps.push_back({pull.col(dense), pull.leftCols(dense).lazyProduct(X), {}});
+    if (takes) steps.back().taken = pull.leftCols(dense) * result.cov * pull.leftCols(dense).transpose();
+  }
+  return steps;
+}
+
+/// (J X)ᵀ J: the product with the view's columns themselves. J X has its pose taken out.
+void fill_pull(const BundleProblem& problem, const ViewArrays& view, const Columns& columns, const Eigen::MatrixXd& JX,
+               Eigen::MatrixXd& pull) {
+  const auto rows = static_cast<Index>(columns.num_rows());
+  pull.setZero();
+  Index at = 0;
+  for (const int parameter : problem.free_lens) {
+    pull.col(at++).noalias() = JX.transpose() * Eigen::Map<const Eigen::VectorXd>(columns[parameter], rows);
+  }
+  const auto half = static_cast<Index>(columns.stride());
+  for (Index i = 0; i < static_cast<Index>(view.size()); ++i) {
+    const Index point = at + 3 * view.index[static_cast<std::size_t>(i)];
+    for (int c = 0; c < 3; ++c) {
+      const double* by_point = columns[Columns::pose + c];
+      pull.col(point + c) += by_point[i] * JX.row(i).transpose() + by_point[half + i] * JX.row(half + i).transpose();
+    }
+  }
+}
+
+/// With every point of the board free: each view moves its own points only, so its rows are multiplied out.
+std::vector<ClusterStep> sparse_steps(const BundleProblem& problem, const BundleResult& result,
+                                      const Eigen::MatrixXd& X) {
+  const Index num_lens = X.cols();
+  const PreparedLens lens = prepare(result.state.lens);
+  const PointArrays points = make_arrays(result.state.board_points);
+  const bool takes = shape_counts(problem);
+  std::vector<ClusterStep> steps;
+  steps.reserve(problem.views.size());
+  Columns columns;
+  Eigen::MatrixXd JX, pull(num_lens, X.rows()), pulled(num_lens, X.rows());
+  for (std::size_t k = 0; k < problem.views.size(); ++k) {
+    const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(num_lens, num_lens);
+    steps.push_back({Eigen::VectorXd::Zero(num_lens), none, {}});
+    if (takes) steps.back().taken = none;
+    const ViewArrays& view = problem.views[k];
+    if (!fill_columns(lens, result.state.cam_from_board[k], points, view, columns)) continue;
+    fill_product(problem, view, columns, X, JX);
+    const auto rows = static_cast<Index>(columns.num_rows());
+    const ColumnsMap pose(columns[Columns::pose], rows, 6);
+    const Eigen::Map<const Eigen::VectorXd> residual(columns[Columns::residual], rows);
+    const Eigen::LLT<Eigen::Matrix<double, 6, 6>> V(Eigen::Matrix<double, 6, 6>(pose.transpose() * pose));
+    if (V.info() != Eigen::Success) continue;
+    const Eigen::Matrix<double, 6, Eigen::Dynamic> by_pose = V.solve(pose.transpose() * JX);
+    JX.noalias() -= pose * by_pose;  // the pose follows
+    steps.back().step = JX.transpose() * residual;
+    steps.back().spread.noalias() = JX.transpose() * JX;
+    if (!takes) continue;
+    fill_pull(problem, view, columns, JX, pull);
+    pulled.noalias() = pull * result.cov;
+    steps.back().taken.noalias() = pulled * pull.transpose();
+  }
+  return steps;
+}
+
+}  // namespace
+
+std::vector<ClusterStep> view_steps(const BundleProblem& problem, const BundleResult& result) {
+  const Eigen::MatrixXd X = result.cov.leftCols(static_cast<Index>(problem.free_lens.size()));
+  return problem.shape == BoardShape::free ? sparse_steps(problem, result, X) : dense_steps(problem, result, X);
+}
+
+}  // namespace alidade

@@ -1,0 +1,360 @@
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "alidade/localize/checks/judge.h"
+#include "alidade/localize/path/path_doubt.h"
+
+namespace alidade {
+namespace {
+
+constexpr double good_nis_low = 0.4, good_nis_high = 1.5, care_nis = 2.0, max_nis = 4.0;
+constexpr double bad_gated = 0.5, max_known_gated = 0.8, max_gated = 0.6, care_lost = 1.0 / 3.0, max_lost = 0.5;
+
+Verdict stopped(State state, ExitCode code, std::string sentence, std::string to_add) {
+  return {state, code, std::move(sentence), std::move(to_add), {}};
+}
+
+/// Why there is no path at all.
+Verdict never_started(const Localization& report) {
+  const auto cannot_tell = [](std::string sentence, std::string to_add) {
+    return stopped(State::refused, ExitCode::cannot_tell, std::move(sentence), std::move(to_add));
+  };
+  if (report.num_alike > 1)
+    return cannot_tell(std::to_string(report.num_alike) +
+                           " things in one image look like the target: which one it is cannot be determined",
+                       "begin where one of them is seen, or give --start");
+  if (report.is_of_images && report.has_target)
+    return cannot_tell("the target is not found in any of " + std::to_string(report.path.size()) + " images",
+                       "begin in front of the target, whole and sharp, and check its size in --target");
+  if (report.max_seen < 3)
+    return cannot_tell("too few points: at most " + std::to_string(report.max_seen) + " in a frame, a pose needs three",
+                       report.is_of_images ? "look at something with corners, in light" : "track more points");
+  return cannot_tell(
+      "the target is not found: four of its points, in a plane and not on a line, are never seen where they belong",
+      "begin in front of the target, or give --start");
+}
+
+State state_of(double value, double care, double bad) {
+  return value > bad ? State::bad : value > care ? State::care : State::good;
+}
+
+/// What only the truth shows: a path may fit its own map well and be elsewhere. An alignment only takes errors away, so
+/// what is left after it should be within σ; before it the truth may stand in a frame of its own.
+void add_truth(const Localization& report, Verdict& verdict) {
+  const PathError& error = report.error;
+  if (!std::isfinite(error.ate_m) || !(error.stated_m > 0.0)) return;
+  constexpr double care_ratio = 1.5, bad_ratio = 3.0, elsewhere_ratio = 3.0;
+  const double ratio = error.ate_m / error.stated_m;
+  verdict.checks.push_back(
+      {"truth", state_of(ratio, care_ratio, bad_ratio),
+       "the path is " + text_of(ratio, 2) + " times its σ from the truth, after the best alignment", ratio, care_ratio,
+       "σ", "path"});
+  const double before = error.unaligned_m / error.stated_m;
+  if (report.scale_known && before > elsewhere_ratio)
+    verdict.checks.push_back({"truth's frame", State::care,
+                              "before alignment it is " + text_of(before, 2) +
+                                  " times its σ away: the truth stands in another frame, or the map is not where its "
+                                  "σ says",
+                              before, elsewhere_ratio, "σ", "path"});
+}
+
+/// Whether the smoothed path explains what was seen before the filter was reinitialised, too.
+bool is_solved_again(const Localization& report) {
+  constexpr double few = 0.01;
+  return report.is_smoothed && share(report.num_unexplained, report.path.size()) < few;
+}
+
+/// Again and again without being lost: no path explains what this camera saw of this target.
+State restarts_state(const Localization& report) {
+  if (is_solved_again(report)) return State::good;
+  if (!report.is_of_images) return State::care;  // mismatches in a table may look like another pose for a frame
+  std::size_t num_again = 0;
+  for (std::size_t i = 1; i < report.path.size(); ++i)
+    num_again += report.path[i].event == FrameEvent::restarted && report.path[i - 1].event != FrameEvent::predicted;
+  constexpr std::size_t few = 3;
+  constexpr double often = 0.01;
+  return num_again >= few && share(num_again, report.path.size()) >= often ? State::bad : State::care;
+}
+
+/// After frames without a pose it is the way back; else what led to it was wrong for some time before.
+std::string restarts_text(const Localization& report) {
+  std::size_t num_back = 0, num_again = 0;
+  long last_again = 0;
+  for (std::size_t i = 1; i < report.path.size(); ++i) {
+    if (report.path[i].event != FrameEvent::restarted) continue;
+    const bool was_lost = report.path[i - 1].event == FrameEvent::predicted;
+    ++(was_lost ? num_back : num_again);
+    if (!was_lost) last_again = report.path[i].frame;
+  }
+  const auto times = [](std::size_t num) { return num == 1 ? std::string("once") : std::to_string(num) + " times"; };
+  std::string text = num_back > 0 ? "found its way back " + times(num_back) : "";
+  if (num_again > 0 && is_solved_again(report))
+    text += (text.empty() ? "reinitialised " : "; reinitialised ") + times(num_again) +
+            "; the path before it is solved again, from the map after it";
+  else if (num_again > 0)
+    text += (text.empty() ? "reinitialised " : "; reinitialised ") + times(num_again) +
+            (num_again == 1 ? ", in" : ", last in") + " frame " + std::to_string(last_again) +
+            ": do not trust the path before it" +
+            (restarts_state(report) == State::bad ? "; camera or target are not as given" : "");
+  return text;
+}
+
+/// "0.5 %", "3 px", "12 ms": what the observations ask for.
+std::string asked_text(const GivenNumber& given) {
+  const double asked = given.asked;
+  if (given.name == "focal length" || given.name == "shape of the target") return text_of(100.0 * asked, 2) + " %";
+  if (given.name.starts_with("centre")) return text_of(asked, 2) + " px";
+  if (given.name == "speed of the target") return text_of(1000.0 * std::abs(asked), 2) + " mm/s";
+  if (given.name == "readout") return text_of(1000.0 * asked, 2) + " ms";
+  return text_of(asked, 2);
+}
+
+std::string cause_text(const GivenNumber& given) {
+  const std::string size = asked_text(given), z = " (" + text_of(std::abs(given.z), 2) + "σ)";
+  if (given.name == "shape of the target") return "the target is longer along x, against y, than given, by " + size + z;
+  if (given.name == "speed of the target") return "the target moves against the other points, by " + size + z;
+  if (given.name == "readout")
+    return "rows are not of one moment: a rolling shutter of " + size + " from the first to the last" + z;
+  return "the observations ask for another " + std::string(given.name) + ", by " + size + z +
+         ": the camera file is not of this lens as it was used";
+}
+
+/// Of what was given, the one of which the observations ask most: a wrong lens moves the others' scores, too.
+void add_given(const Localization& report, Verdict& verdict) {
+  const GivenNumber* worst = nullptr;
+  for (const GivenNumber& given : report.given)
+    if (worst == nullptr || std::abs(given.z) > std::abs(worst->z)) worst = &given;
+  constexpr double care_z = 3.5, bad_z = 15.0, min_move = 0.5;
+  if (worst != nullptr && std::abs(worst->asked * worst->moves) > min_move && std::abs(worst->z) > care_z)
+    verdict.checks.push_back({"camera", state_of(std::abs(worst->z), care_z, bad_z), cause_text(*worst),
+                              std::abs(worst->z), care_z, "σ", "path"});
+  constexpr double care_pull = 3.0;
+  if (report.lens_pull > care_pull)
+    verdict.checks.push_back({"camera", State::care,
+                              "the lens came out " + text_of(report.lens_pull, 2) +
+                                  "σ from what was given: the camera file is not of this lens as it was used",
+                              report.lens_pull, care_pull, "σ", "path"});
+}
+
+/// What a wrong lens leaves of observations after the update: the same along the radius in every frame. Depths that are
+/// not known leave it as well while the camera moves along its axis: it is judged where known points are seen.
+void add_radial(const Localization& report, Verdict& verdict) {
+  constexpr double chance = 12.0;  // squares of the rings' means over their σ², their mean
+  constexpr double care_share = 0.12, bad_share = 0.4;
+  constexpr double least_px = 0.05;  // patches that change as they are seen from elsewhere leave less
+  const RadialStructure& radial = report.radial;
+  const bool is_more = report.has_target && report.scale_known && radial.chi2_per_ring > chance &&
+                       radial.share * report.sigma_px > least_px;
+  const double value = is_more ? radial.share : 0.0;
+  const State state = state_of(value, care_share, bad_share);
+  verdict.checks.push_back({"radial structure", state,
+                            state == State::good ? "residuals along the radius are as noise leaves them"
+                                                 : "residuals depend on the distance from the middle of the image, " +
+                                                       text_of(radial.worst_px, 2) +
+                                                       " px at worst: the lens is not as "
+                                                       "given",
+                            radial.share, care_share, "σ", "nis"});
+}
+
+/// Residuals that are said to be independent: by position in the image, and from frame to frame.
+void add_residuals(const Localization& report, Verdict& verdict) {
+  if (!report.is_smoothed) return;
+  const ResidualStructure& residuals = report.residuals;
+  constexpr double care_px_share = 0.2;  // of σ: less is seen in long recordings and moves nothing
+  if (residuals.place_chi2 > 2.0 * residuals.place_limit && residuals.worst_px > care_px_share * report.sigma_px)
+    verdict.checks.push_back({"place in the image", State::care,
+                              "residuals depend on the position in the image, " + text_of(residuals.worst_px, 2) +
+                                  " px in the " + residuals.worst_place + ": the lens is not as given",
+                              residuals.place_chi2, 2.0 * residuals.place_limit, "1", "nis"});
+  if (residuals.has_colour())
+    verdict.checks.push_back({"colour", State::care,
+                              "errors last from frame to frame (correlation " + text_of(residuals.colour, 2) +
+                                  "): tracks drift, or something given is wrong; σ is enlarged for it",
+                              residuals.colour, 0.25, "1", "nis"});
+}
+
+/// A filter over hundreds of frames is surer than it may be.
+void add_filter_alone(const Localization& report, Verdict& verdict) {
+  constexpr std::size_t few = 100;
+  if (report.is_of_images || report.is_smoothed || report.path.size() < few) return;
+  verdict.checks.push_back({"σ", report.scale_known ? State::bad : State::care,
+                            "the path could not be solved as a whole, and is the filter's: errors may be several times "
+                            "their σ",
+                            static_cast<double>(report.path.size()), static_cast<double>(few), "frames", "path"});
+}
+
+void add_tilt(const Localization& report, Verdict& verdict) {
+  constexpr double care_widened = 1.5;
+  if (!report.is_from_one_place && !(report.widened > care_widened)) return;
+  std::string text =
+      report.is_from_one_place
+          ? "the camera hardly moves aside: from one position the tilt of the target is hardly observable, and "
+            "errors may be several times their σ"
+          : "the tilt of the target is hardly observable: it is seen from one side alone";
+  if (report.widened > care_widened) text += "; σ is enlarged " + text_of(report.widened, 2) + " times for it";
+  verdict.checks.push_back(
+      {"tilt of the target", State::care, std::move(text), report.widened, care_widened, "1", "path"});
+  verdict.to_add = "move the camera aside while the target is in view, or use a larger target or one with depth";
+}
+
+void add_side(const Localization& report, Verdict& verdict) {
+  if (!report.is_behind) return;
+  verdict.checks.push_back({"side of the target", State::care,
+                            "the target's points are seen from behind (the camera is at their +z): are they, or the "
+                            "images, mirrored?",
+                            1.0, 0.0, "", "path"});
+  verdict.to_add =
+      "check that x goes right and y down as the target is seen; if +z is its front, say 'seen_from: +z' in --target";
+}
+
+/// "depth sensor, ± 0.2 %"
+std::string sensors_text(const Localization& report) {
+  std::string text;
+  double weights = 0.0;
+  for (const SensorScale& each : report.sensor_scales) {
+    if (!(each.sigma_rel > 0.0)) continue;
+    text += (text.empty() ? "" : " and the ") + each.sensor;
+    weights += 1.0 / (each.sigma_rel * each.sigma_rel);
+  }
+  return text + ", ± " + text_of(100.0 / std::sqrt(weights), 2) + " %";
+}
+
+/// What sensors beside the camera say of a scale that is known without them, and two of them of each other.
+void add_sensors(const Localization& report, Verdict& verdict) {
+  constexpr double care_z = 3.0, bad_z = 6.0, many_rejected = 0.2;
+  const SensorScale* first = nullptr;
+  for (const SensorScale& each : report.sensor_scales) {
+    if (!(each.sigma_rel > 0.0)) {
+      verdict.checks.push_back({each.sensor, State::care,
+                                "the readings of the " + each.sensor + " do not tell the scale: " +
+                                    (each.sensor == "depth sensor"
+                                         ? "too few of them, or the camera moves too little up and down"
+                                         : "too few of them, or too few points around the beam that lie on a surface"),
+                                0.0, 0.0, "", "path"});
+      continue;
+    }
+    const double told = report.is_scale_read ? (first ? first->scale : each.scale) : 1.0;
+    const double sigma = std::hypot(each.sigma_rel, report.is_scale_read && first ? first->sigma_rel : 0.0);
+    const double change = std::log(each.scale / told), z = std::abs(change) / sigma;
+    const std::string by = report.is_scale_read && first ? "the " + first->sensor : "the target";
+    const double rejected = share(each.num_rejected, each.num_used + each.num_rejected);
+    if (!report.is_scale_read || first)
+      verdict.checks.push_back({each.sensor, state_of(z, care_z, bad_z),
+                                z > care_z ? "the path is " + text_of(100.0 * change, 2) + " % longer by the " +
+                                                 each.sensor + " than by " + by + " (" + text_of(z, 2) + "σ)"
+                                           : "the " + each.sensor + " agrees with " + by + " on the scale",
+                                z, care_z, "σ", "path"});
+    if (rejected > many_rejected)
+      verdict.checks.push_back(
+          {each.sensor + " readings", State::care,
+           text_of(100.0 * rejected, 2) + " % of the readings of the " + each.sensor + " are rejected", rejected,
+           many_rejected, "1", "path"});
+    if (first == nullptr) first = &each;
+  }
+}
+
+void add_checks(const Localization& report, Verdict& verdict) {
+  const double nis = report.nis_per_dof;
+  const State nis_state = nis < good_nis_low ? State::care : state_of(nis, good_nis_high, care_nis);
+  const std::string px = text_of(report.sigma_px, 2) + " px";
+  const std::string low = report.is_of_images ? "matches are better than the " + px +
+                                                    " that they are taken for, and σ is too large "
+                                                    "(--sigma-px)"
+                                              : "noise is smaller than the " + px + " stated";
+  const std::string said = nis > good_nis_high  ? "the observations do not fit: the lens or the noise is not as stated"
+                           : nis < good_nis_low ? low
+                                                : "innovations as large as predicted";
+  verdict.checks.push_back({"innovations", nis_state, "NIS " + text_of(nis, 3) + " per degree of freedom: " + said, nis,
+                            good_nis_high, "1", "nis"});
+  const double lost = share(report.num_lost, report.path.size());
+  verdict.checks.push_back({"frames lost", state_of(lost, 0.0, care_lost),
+                            report.num_lost == 0 ? "no frame lost" : std::to_string(report.num_lost) + " frames lost",
+                            lost, care_lost, "1", "tracks"});
+  const double gated = share(report.num_gated, report.num_used + report.num_gated);
+  verdict.checks.push_back({"gated", state_of(gated, 0.05, bad_gated),
+                            text_of(100.0 * gated, 3) + " % of the observations are rejected", gated, bad_gated, "1",
+                            "tracks"});
+  const double known_gated = share(report.num_known_gated, report.num_known);
+  // Known points may be mismatched as often as others; if more often, they are not where they are said to be.
+  if (report.num_known > 0)
+    verdict.checks.push_back({"target", state_of(known_gated, 0.1, gated + 0.2),
+                              text_of(100.0 * known_gated, 3) + " % of the target's observations are rejected",
+                              known_gated, 0.1, "1", "tracks"});
+  constexpr double max_shift = 3.0;  // χ² of a rectangle's twelve numbers over their count: 99.9 % is 2.7
+  if (report.known_shift > max_shift)
+    verdict.checks.push_back({"map's frame", State::care,
+                              "the target's points have drifted in the map, " + text_of(std::sqrt(report.known_shift)) +
+                                  " times their given σ: the path's position and scale before the target are "
+                                  "less sure than its σ says",
+                              report.known_shift, max_shift, "1", "path"});
+  verdict.checks.push_back({"scale", report.scale_known ? State::good : State::care,
+                            report.is_scale_read ? "scale from the " + sensors_text(report)
+                            : report.scale_known ? "scale from the known points"
+                            : report.has_target
+                                ? "none of the target's points is seen: scale and frame are those of the start"
+                                : "scale unknown: the path is up to scale, its unit is the depth at the start",
+                            0.0, 0.0, "", "path"});
+  if (report.num_restarts > 0)
+    verdict.checks.push_back({"restarts", restarts_state(report), restarts_text(report),
+                              static_cast<double>(report.num_restarts), 0.0, "times", "path"});
+  add_sensors(report, verdict);
+  add_given(report, verdict);
+  add_radial(report, verdict);
+  add_residuals(report, verdict);
+  add_filter_alone(report, verdict);
+  add_tilt(report, verdict);
+  add_side(report, verdict);
+  add_truth(report, verdict);
+}
+
+}  // namespace
+
+Verdict localize_verdict(const Localization& report) {
+  const std::size_t num_frames = report.path.size();
+  const bool has_started = std::ranges::any_of(report.path, &PathStep::has_pose);
+  if (!has_started) return never_started(report);
+  if (report.num_used == 0 || report.max_seen < 3)
+    return stopped(State::refused, ExitCode::cannot_tell,
+                   "too few points: at most " + std::to_string(report.max_seen) + " in a frame, a pose needs three",
+                   "track more points");
+  const double gated = share(report.num_gated, report.num_used + report.num_gated);
+  const double lost = share(report.num_lost, num_frames);
+  const bool is_finite = std::ranges::all_of(report.path, [](const PathStep& step) {
+    return !step.has_pose() || (step.world_from_cam.translation.allFinite() && step.cov.allFinite());
+  });
+  if (!is_finite || report.nis_per_dof > max_nis || gated > max_gated)
+    return stopped(State::not_converged, ExitCode::no_convergence,
+                   "no path fits the observations: NIS " + text_of(report.nis_per_dof, 3) + " per degree of freedom, " +
+                       text_of(100.0 * gated, 2) + " % of them rejected",
+                   "check camera, target and start, and --sigma-px");
+  const double known_gated = share(report.num_known_gated, report.num_known);
+  constexpr std::size_t enough_known = 8;
+  if (report.num_known >= enough_known && known_gated > max_known_gated)
+    return stopped(State::not_converged, ExitCode::no_convergence,
+                   "the target is not where it is given: " + text_of(100.0 * known_gated, 3) +
+                       " % of its observations do not fit the path",
+                   "check the points' numbers and positions in --target");
+  if (lost > max_lost)
+    return stopped(State::refused, ExitCode::cannot_tell,
+                   "lost: " + std::to_string(report.num_lost) + " of " + std::to_string(num_frames) +
+                       " frames have fewer than three points that fit",
+                   "track more points, and keep the target in view for longer");
+  if (report.is_behind && report.is_board)
+    return stopped(State::refused, ExitCode::cannot_tell,
+                   "mirrored: the observations put the camera behind the printed side of the board",
+                   "check that the images are not mirrored, and the order of the board's corners");
+  Verdict verdict;
+  add_checks(report, verdict);
+  for (const Check& check : verdict.checks) verdict.state = std::max(verdict.state, check.state);
+  verdict.sentence =
+      "localised in " + std::to_string(num_frames - report.num_lost) + " of " + std::to_string(num_frames) + " frames";
+  for (const Check& check : verdict.checks) {
+    if (check.state == State::good || (check.state != verdict.state && check.name != "scale")) continue;
+    verdict.sentence += "; " + check.text;
+  }
+  heed_assumptions(localize_assumed(report), verdict);
+  return verdict;
+}
+
+}  // namespace alidade

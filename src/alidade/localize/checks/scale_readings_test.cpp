@@ -1,0 +1,117 @@
+#include "alidade/localize/checks/scale_readings.h"
+
+#include <gtest/gtest.h>
+
+#include "alidade/localize.h"
+#include "alidade/testing/long_walk.h"
+
+// Metres without a target: a pressure sensor's depths, a rangefinder's readings.
+
+namespace alidade {
+namespace {
+
+using testing::long_walk;
+using testing::LongWalk;
+using testing::WalkRun;
+
+LongWalk swimming() { return {.num_points = 150, .num_frames = 300, .length_m = 2.0, .rise_m = 0.3, .is_wall = true}; }
+
+std::vector<DepthReading> depths_of(const WalkRun& run, double sigma_m, std::uint64_t seed) {
+  Draws draws(seed);
+  std::vector<DepthReading> readings;
+  // Down is a direction of its own in the first camera's frame.
+  const Eigen::Vector3d down = Eigen::Vector3d(0.1, 0.97, -0.2).normalized();
+  for (const TimedPose& pose : run.truth)
+    readings.push_back({pose.t_s, 7.0 + down.dot(pose.world_from_cam.translation) + sigma_m * draws.normal(), sigma_m});
+  return readings;
+}
+
+Beam beam_beside() {
+  Beam beam;
+  beam.origin_in_cam = {0.05, 0.02, 0.0};
+  beam.direction_in_cam = Eigen::Vector3d(0.02, 0.01, 1.0).normalized();
+  return beam;
+}
+
+std::vector<RangeReading> ranges_of(const WalkRun& run, const Beam& beam, std::uint64_t seed) {
+  Draws draws(seed);
+  std::vector<RangeReading> readings;
+  for (const TimedPose& pose : run.truth) {
+    double low = 0.0, high = 5.0;  // where the beam passes the wall
+    for (int i = 0; i < 60; ++i) {
+      const double middle = 0.5 * (low + high);
+      const Eigen::Vector3d there = pose.world_from_cam * point_at(beam, middle);
+      (there.z() < testing::wall_z(there.x(), there.y()) ? low : high) = middle;
+    }
+    readings.push_back({pose.t_s, low + 0.003 * draws.normal()});
+  }
+  return readings;
+}
+
+TEST(SensorScale, ADepthSensorGivesMetres) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const WalkRun run = long_walk(swimming(), seed);
+    LocalizeConfig config;
+    config.depth_readings = depths_of(run, 0.005, seed);
+    for (std::size_t i = 0; i < config.depth_readings.size(); i += 37)
+      config.depth_readings[i].depth_m += 2.0;  // bubbles
+    const Localization result = localize(run.frames, run.camera, config, run.truth);
+    EXPECT_TRUE(result.is_scale_read) << result.verdict.sentence;
+    ASSERT_EQ(result.sensor_scales.size(), 1u);
+    const SensorScale& read = result.sensor_scales.front();
+    const LocalizeConfig without;
+    const double true_scale = localize(run.frames, run.camera, without, run.truth).error.scale;
+    EXPECT_NEAR(read.scale / true_scale, 1.0, 3.0 * read.sigma_rel) << seed;
+    EXPECT_NEAR(read.scale / true_scale, 1.0, 0.01) << seed;
+    EXPECT_LT(read.sigma_rel, 0.005) << seed;
+    EXPECT_GE(read.num_rejected, 8u);
+    EXPECT_LT(result.error.ate_m, 0.02) << seed;  // in metres, without any scale freedom
+    EXPECT_TRUE(result.verdict.ok()) << result.verdict.sentence;
+  }
+}
+
+TEST(SensorScale, ARangefinderGivesMetres) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const WalkRun run = long_walk(swimming(), seed);
+    LocalizeConfig config;
+    config.beam = beam_beside();
+    config.range_readings = ranges_of(run, *config.beam, seed);
+    const Localization result = localize(run.frames, run.camera, config, run.truth);
+    ASSERT_TRUE(result.is_scale_read) << result.verdict.sentence;
+    const SensorScale& read = result.sensor_scales.front();
+    const double true_scale = localize(run.frames, run.camera, LocalizeConfig{}, run.truth).error.scale;
+    EXPECT_NEAR(read.scale / true_scale, 1.0, 3.0 * read.sigma_rel) << seed;
+    EXPECT_NEAR(read.scale / true_scale, 1.0, 0.015) << seed;
+    EXPECT_LT(result.error.ate_m, 0.03) << seed;
+  }
+}
+
+TEST(SensorScale, ASensorThatContradictsTheTargetIsNamed) {
+  const WalkRun run = long_walk(swimming(), 5);
+  LocalizeConfig config;
+  config.target.points = run.target;
+  config.depth_readings = depths_of(run, 0.005, 5);
+  const Localization agreeing = localize(run.frames, run.camera, config, run.truth);
+  EXPECT_FALSE(agreeing.is_scale_read);
+  EXPECT_EQ(agreeing.verdict.sentence.find("longer by the depth sensor"), std::string::npos)
+      << agreeing.verdict.sentence;
+  for (DepthReading& reading : config.depth_readings) reading.depth_m *= 1.1;
+  const Verdict verdict = localize(run.frames, run.camera, config, run.truth).verdict;
+  EXPECT_EQ(verdict.state, State::bad);
+  EXPECT_NE(verdict.sentence.find("longer by the depth sensor"), std::string::npos) << verdict.sentence;
+}
+
+TEST(SensorScale, WithoutMovementUpAndDownNoneIsGiven) {
+  LongWalk scene = swimming();
+  scene.rise_m = 0.0;
+  const WalkRun run = long_walk(scene, 2);
+  LocalizeConfig config;
+  config.depth_readings = depths_of(run, 0.05, 2);
+  for (DepthReading& reading : config.depth_readings) reading.depth_m = 7.0;
+  const Localization result = localize(run.frames, run.camera, config, run.truth);
+  EXPECT_FALSE(result.scale_known);
+  EXPECT_NE(result.verdict.state, State::good);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,100 @@
+#include "alidade/localize/checks/summary.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/localize/path/path_error.h"
+
+namespace alidade {
+
+void sum_up(const FilterBank* bank, const std::function<std::size_t(long id)>& num_used, Localization& result) {
+  double nis = 0.0, dof = 0.0;
+  for (const PathStep& step : result.path) {
+    result.num_observations += step.num_seen;
+    result.num_used += step.num_tracked;
+    result.num_gated += step.num_gated;
+    result.num_known += step.num_known;
+    result.num_known_gated += step.num_known_gated;
+    result.max_seen = std::max(result.max_seen, step.num_seen);
+    result.num_lost += step.event == FrameEvent::waiting || step.event == FrameEvent::predicted ? 1 : 0;
+    if (step.num_tracked > 0 && std::isfinite(step.nis_per_dof)) {
+      nis += step.nis_per_dof * static_cast<double>(step.num_tracked);
+      dof += static_cast<double>(step.num_tracked);
+    }
+  }
+  if (dof > 0.0) result.nis_per_dof = nis / dof;
+  if (!result.is_of_images && !result.is_scale_read) result.scale_known = result.scale_known && result.num_known > 0;
+  if (!bank) return;
+  const LocalizationFilter& filter = bank->best();
+  result.camera = filter.camera();
+  result.sigma_lens = filter.lens_sigmas();
+  for (const Feature& feature : filter.features()) {
+    if (!result.is_of_images && feature.is_known && num_used(feature.id) == 0) continue;  // given, never seen
+    const auto place = filter.place(feature.id);
+    result.map.push_back({feature.id, place->point_in_world, place->cov, feature.is_known, num_used(feature.id)});
+  }
+}
+
+void add_path_error(Localization& result) {
+  if (result.truth.empty()) return;
+  std::vector<TimedPose> path;
+  std::vector<double> sigmas_m;
+  for (const PathStep& step : result.path) {
+    if (!step.has_pose()) continue;
+    path.push_back({step.t_s, step.world_from_cam});
+    sigmas_m.push_back(std::sqrt(step.cov.topLeftCorner<3, 3>().trace()));
+  }
+  if (!path.empty()) result.error = path_error(path, result.truth, result.scale_known, sigmas_m);
+}
+
+/// A flat target whose plane is that of x and y, and most poses on the side where it is not seen.
+bool is_behind(std::span<const PathStep> path, std::span<const KnownPoint> target, bool seen_from_plus_z) {
+  if (target.size() < 3) return false;
+  Eigen::AlignedBox3d box;
+  for (const KnownPoint& point : target) box.extend(point.point_in_world);
+  const Eigen::Vector3d size = box.sizes();
+  constexpr double flat = 0.05;
+  if (!(size.z() < flat * size.head<2>().maxCoeff())) return false;
+  double balance = 0.0;
+  for (const PathStep& step : path) {
+    if (!step.has_pose()) continue;
+    const bool is_plus = step.world_from_cam.translation.z() > box.center().z();
+    balance += is_plus == seen_from_plus_z ? -1.0 : 1.0;
+  }
+  return balance > 0.0;
+}
+
+void take_over(const SmoothedPath& smoothed, Localization& result) {
+  result.is_smoothed = true;
+  result.given = smoothed.given;
+  result.lens_pull = smoothed.lens_pull;
+  result.widened = smoothed.widened;
+  result.is_from_one_place = smoothed.is_from_one_place;
+  result.camera = smoothed.camera;
+  result.sigma_lens = smoothed.sigma_lens;
+  if (result.num_restarts > 0) {  // what the filter rejected before it began again is no longer rejected
+    result.num_used = smoothed.residuals.size();
+    result.num_gated = smoothed.num_dropped;
+    result.nis_per_dof = smoothed.chi2_per_dof;
+  }
+  for (std::size_t i = 0; i < smoothed.ids.size(); ++i) {
+    const auto at = std::ranges::find(result.map, smoothed.ids[i], &MapPoint::id);
+    if (at == result.map.end()) continue;
+    at->point_in_world = smoothed.points[i];
+    at->cov = smoothed.point_covs[i];
+  }
+}
+
+double known_shift(std::span<const MapPoint> map, std::span<const KnownPoint> told) {
+  double sum = 0.0, num = 0.0;
+  for (const KnownPoint& point : told) {
+    const auto at = std::ranges::find(map, point.id, &MapPoint::id);
+    if (at == map.end() || at->num_seen == 0) continue;
+    sum += (at->point_in_world - point.point_in_world).squaredNorm() / (point.sigma_m * point.sigma_m);
+    num += 3.0;
+  }
+  return num > 0.0 ? sum / num : std::numeric_limits<double>::quiet_NaN();
+}
+
+}  // namespace alidade

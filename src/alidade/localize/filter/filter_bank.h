@@ -1,0 +1,55 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "alidade/localize/filter/filter.h"
+
+namespace alidade {
+
+/// One belief of where the camera starts and how it moves; `cost` is −2 ln of its weight.
+struct StartHypothesis {
+  CameraMotion motion;
+  MotionMatrix cov = MotionMatrix::Zero();
+  double cost = 0.0;
+};
+
+/// Filters that start differently, until the observations tell which is right. In front of a small or flat target, a
+/// move aside and a turn look alike: the first frames leave a long bent valley of poses, a Gaussian on it is sure of
+/// itself in the wrong place, and one in ten runs is lost. So the belief of the speed aside is split into narrower ones
+/// (a Gaussian sum; D. L. Alspach & H. W. Sorenson, "Nonlinear Bayesian Estimation Using Gaussian Sum Approximations",
+/// IEEE TAC 17(4), 1972), each weighed by what it said of the observations. The two poses of a flat target are two
+/// starts.
+class FilterBank {
+ public:
+  FilterBank(const Camera& camera, std::span<const StartHypothesis> starts, const LocalizationFilterConfig& filter,
+             const FilterBankConfig& config = {});
+
+  void predict(double dt_s);
+  ObservationsReport update(std::span<const FeatureObservation> observations);
+  void add_known(long id, const Eigen::Vector3d& point_in_world, double sigma_m);
+  /// False where the best filter cannot.
+  bool add(long id, const Eigen::Vector2d& px, const RangePrior& prior, FeatureKind kind = FeatureKind::inverse_depth);
+  void remove(long id);
+  int convert_linear();
+  /// Starts again from these, with the map as it is.
+  void restart(std::span<const StartHypothesis> starts);
+
+  [[nodiscard]] const LocalizationFilter& best() const { return parts_[best_].filter; }
+  [[nodiscard]] std::size_t size() const { return parts_.size(); }
+
+ private:
+  struct Part {
+    LocalizationFilter filter;
+    double cost;
+  };
+  [[nodiscard]] std::vector<StartHypothesis> split(std::span<const StartHypothesis> starts) const;
+  void prune();
+
+  FilterBankConfig config_;
+  std::vector<Part> parts_;
+  std::size_t best_ = 0;
+  int num_updates_ = 0;
+};
+
+}  // namespace alidade

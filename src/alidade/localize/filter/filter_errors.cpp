@@ -1,0 +1,166 @@
+#include <cmath>
+
+#include "alidade/localize/filter/filter.h"
+#include "alidade/localize/filter/world_turn.h"
+
+// What an error of the state is: what is seen of it, and how the state moves by one. See world_turn.h.
+
+namespace alidade {
+namespace {
+
+double& lens_param(Camera& camera, int index) {
+  return std::visit([index](auto& lens) -> double& { return lens.params[index]; }, camera.lens);
+}
+
+}  // namespace
+
+bool LocalizationFilter::linearise(Measured& measured) {
+  const Eigen::Vector3d phi = delta_.segment<3>(3);
+  Rigid3 world_from_cam = motion_.world_from_cam;
+  const Feature& nominal = *measured.feature;
+  Feature feature = nominal;
+  const WorldTurn turn(world_from_cam, phi);
+  if (turns_world_) {  // the camera keeps its attitude: nothing measured depends on how the world is turned
+    world_from_cam.translation = turn.place_before(world_from_cam.translation, delta_.head<3>());
+    feature = turn.feature_before(nominal, error_of(nominal));
+  } else {
+    world_from_cam.translation += delta_.head<3>();
+    world_from_cam.rotation = (world_from_cam.rotation * exp_so3(phi)).normalized();
+    for (int i = 0; i < feature.dim(); ++i) feature.values[i] += delta_[feature.offset + i];
+  }
+  for (int k = 0; k < num_lens(); ++k) {
+    const int index = config_.lens_params[static_cast<std::size_t>(k)];
+    lens_param(camera_at_delta_, index) = lens_param(camera_, index) + delta_[motion_dim + k];
+  }
+  const auto view = expected_view(num_lens() ? camera_at_delta_ : camera_, world_from_cam, feature);
+  if (!view) return false;
+  measured.nu = measured.px - view->px;
+  Eigen::Matrix<double, 2, 3> J_rotation;
+  if (turns_world_) {
+    J_rotation = (view->J_px_pose.leftCols<3>() * cross_matrix(motion_.world_from_cam.translation) +
+                  view->J_px_feature * J_before_turn(nominal)) *
+                 turn.world_from_cam();
+  } else {
+    const Eigen::Matrix3d J = right_jacobian(phi);
+    J_rotation = view->J_px_pose.rightCols<3>() * J;
+    if (config_.holds_frame) {  // by errors counted from where the update began
+      const Eigen::Matrix3d R = turn.world_from_cam(), RJ = R * J.transpose();
+      J_rotation += view->J_px_pose.leftCols<3>() * (cross_matrix(motion_.world_from_cam.translation) * R -
+                                                     cross_matrix(world_from_cam.translation) * RJ);
+      J_rotation += view->J_px_feature * (J_before_turn(nominal) * R - J_before_turn(feature) * RJ);
+    }
+  }
+  int n = 0;
+  const auto put = [&](int column, double d0, double d1) {
+    const auto at = static_cast<std::size_t>(n++);
+    measured.columns[at] = column;
+    measured.h0[at] = d0;
+    measured.h1[at] = d1;
+  };
+  for (int i = 0; i < 3; ++i) put(i, view->J_px_pose(0, i), view->J_px_pose(1, i));
+  for (int i = 0; i < 3; ++i) put(3 + i, J_rotation(0, i), J_rotation(1, i));
+  for (int k = 0; k < num_lens(); ++k) {
+    const int index = config_.lens_params[static_cast<std::size_t>(k)];
+    put(motion_dim + k, view->J_px_lens(0, index), view->J_px_lens(1, index));
+  }
+  for (int i = 0; i < feature.dim(); ++i) put(feature.offset + i, view->J_px_feature(0, i), view->J_px_feature(1, i));
+  measured.num_support = n;
+  measured.c = measured.nu;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(n); ++k)
+    measured.c += delta_[measured.columns[k]] * Eigen::Vector2d(measured.h0[k], measured.h1[k]);
+  return true;
+}
+
+std::span<const double> LocalizationFilter::error_of(const Feature& feature) const {
+  return {delta_.data() + feature.offset, static_cast<std::size_t>(feature.dim())};
+}
+
+/// The state moves, and errors are counted from where it is then: world_turn.h.
+void LocalizationFilter::turn_by_delta() {
+  const WorldTurn turn(motion_.world_from_cam, delta_.segment<3>(3));
+  const Eigen::Matrix3d G = turn.G(), J_left = right_jacobian(-turn.xi()), R = turn.world_from_cam();
+  const CameraMotion was = motion_;
+  motion_ = retract(was, delta_.head<motion_dim>());
+  motion_.world_from_cam.translation = G * turn.place_before(was.world_from_cam.translation, delta_.head<3>());
+  motion_.velocity_in_world = G * turn.place_before(was.velocity_in_world, delta_.segment<3>(6));
+  // First each error is turned with its place, then what the rotation's error adds.
+  const auto block = [&](int row) { return shear_.block<3, 3>(row, 0); };
+  block(0) = block(6) = G;
+  block(3) = block(9) = Eigen::Matrix3d::Identity();
+  for (const Feature& feature : features_) {
+    block(feature.offset) = G;
+    if (feature.dim() > 3) block(feature.offset + 3) = turn.J_turned_angles(feature, error_of(feature));
+  }
+  P_.turn(shear_.data(), motion_dim, num_lens());
+  given_.turn(shear_.data(), P_.capacity(), motion_dim, num_lens(), P_.dim());
+  const auto added = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+    return ((G * cross_matrix(from) - cross_matrix(to) * J_left) * R).eval();
+  };
+  shear_.topRows(motion_dim + num_lens()).setZero();
+  block(0) = added(was.world_from_cam.translation, motion_.world_from_cam.translation);
+  block(3) = motion_.world_from_cam.rotation.toRotationMatrix().transpose() * J_left * R - Eigen::Matrix3d::Identity();
+  block(6) = added(was.velocity_in_world, motion_.velocity_in_world);
+  for (Feature& feature : features_) {
+    const Feature before = feature;
+    feature = WorldTurn::turned(G, turn.feature_before(before, error_of(before)));
+    block(feature.offset) = added(before.values.head<3>(), feature.values.head<3>());
+    if (feature.dim() < 6) continue;
+    block(feature.offset + 3) =
+        (turn.J_turned_angles(before, error_of(before)) * J_before_turn(before).bottomRows<3>() -
+         J_before_turn(feature).bottomRows<3>() * J_left) *
+        R;
+  }
+  constexpr int rotation_at = 3;
+  P_.shear(rotation_at, shear_.data());
+  given_.shear(rotation_at, shear_.data(), P_.capacity(), P_.dim());
+}
+
+/// The state moves by delta_, and the covariance's errors are counted from there: the rotation's by the right Jacobian,
+/// the others so that a turn of the world stays one.
+void LocalizationFilter::move_by_delta() {
+  constexpr int rotation_at = 3;
+  const Eigen::Matrix3d J = right_jacobian(delta_.segment<3>(rotation_at));
+  const CameraMotion was = motion_;
+  motion_ = retract(was, delta_.head<motion_dim>());
+  const Eigen::Matrix3d R = was.world_from_cam.rotation.toRotationMatrix(), RJ = R * J.transpose();
+  const bool holds = config_.holds_frame;
+  const auto shift = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+    return (cross_matrix(from) * R - cross_matrix(to) * RJ).eval();
+  };
+  shear_.topRows(P_.dim()).setZero();
+  shear_.middleRows<3>(rotation_at) = J - Eigen::Matrix3d::Identity();
+  if (holds) {
+    shear_.topRows<3>() = shift(was.world_from_cam.translation, motion_.world_from_cam.translation);
+    shear_.middleRows<3>(6) = shift(was.velocity_in_world, motion_.velocity_in_world);
+  }
+  for (Feature& feature : features_) {
+    const Feature before = feature;
+    for (int i = 0; i < feature.dim(); ++i) feature.values[i] += delta_[feature.offset + i];
+    if (holds)
+      shear_.middleRows(feature.offset, feature.dim()) =
+          (J_before_turn(before) * R - J_before_turn(feature) * RJ).topRows(feature.dim());
+  }
+  P_.shear(rotation_at, shear_.data());
+  given_.shear(rotation_at, shear_.data(), P_.capacity(), P_.dim());
+}
+
+/// What is given moves the state by what those used say of it, at the state that they led to.
+void LocalizationFilter::count_given() {
+  if (given_.num() == 0 || used_.empty()) return;
+  for (const Measured* measured : used_) {
+    const auto view = expected_view(camera_, motion_.world_from_cam, *measured->feature);
+    if (view)
+      given_.add_observation(*view, *measured->feature, config_.lens_params, measured->px - view->px,
+                             measured->variance_px2);
+  }
+  given_.finish(P_);
+}
+
+void LocalizationFilter::move_lens_by_delta() {
+  for (int k = 0; k < num_lens(); ++k) {
+    const int index = config_.lens_params[static_cast<std::size_t>(k)];
+    lens_param(camera_, index) += delta_[motion_dim + k];
+  }
+}
+
+}  // namespace alidade

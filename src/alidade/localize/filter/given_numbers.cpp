@@ -1,0 +1,100 @@
+#include "alidade/localize/filter/given_numbers.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/localize/path/path_system.h"
+
+namespace alidade {
+namespace {
+
+constexpr std::array<std::string_view, 6> pose_numbers{"the position across (x)", "the position across (y)",
+                                                       "the distance (z)",        "the rotation about x",
+                                                       "the rotation about y",    "the rotation about z"};
+
+/// Of a change along `direction`: how the path moves, and what the observations say.
+GivenNumber given_number(std::string_view name, const Eigen::VectorXd& direction, const GivenSystem& system) {
+  GivenNumber given{.name = name};
+  for (std::size_t k = 0; k < system.J_pose.size(); ++k)
+    take_move(system.J_pose[k] * direction, system.pose_cov[k], given);
+  const Eigen::VectorXd informed = system.information * direction;
+  const double information = direction.dot(informed), score = direction.dot(system.score);
+  if (information > 0.0) {
+    given.asked = score / information;
+    given.z = score / std::sqrt(std::max(information, direction.dot(system.score_cov * direction)) +
+                                informed.dot(system.cov * informed));
+  }
+  return given;
+}
+
+}  // namespace
+
+void take_move(const Eigen::Vector<double, 6>& move, const Eigen::Matrix<double, 6, 6>& cov, GivenNumber& given) {
+  for (int i = 0; i < 6; ++i) {
+    const double share = std::abs(move[i]) / std::sqrt(cov(i, i));
+    if (!(share > given.moves)) continue;
+    given.moves = share;
+    given.moved = pose_numbers[static_cast<std::size_t>(i)];
+    given.moved_by = std::abs(move[i]);
+  }
+}
+
+std::vector<GivenNumber> given_numbers(const GivenSystem& system) {
+  const std::vector<std::string> names = param_names(system.camera.lens);
+  const Eigen::VectorXd values = params(system.camera.lens);
+  const auto num = static_cast<Eigen::Index>(system.lens_params.size());
+  const auto place = [&](std::string_view name) -> Eigen::Index {
+    for (Eigen::Index i = 0; i < num; ++i)
+      if (names[static_cast<std::size_t>(system.lens_params[static_cast<std::size_t>(i)])] == name) return i;
+    return -1;
+  };
+  const auto value_of = [&](Eigen::Index i) { return values[system.lens_params[static_cast<std::size_t>(i)]]; };
+  const bool has_cov = system.camera.cov.size() > 0;
+  std::vector<GivenNumber> all;
+  const auto add = [&](std::string_view name, const Eigen::VectorXd& direction, std::optional<double> sigma) {
+    all.push_back(given_number(name, direction, system));
+    all.back().sigma = sigma;
+  };
+  const auto direction_of = [&](Eigen::Index at) -> Eigen::VectorXd {
+    return Eigen::VectorXd::Unit(system.score.size(), at);
+  };
+  const Eigen::Index fx = place("fx"), fy = place("fy");
+  if (fx >= 0 && fy >= 0)
+    add("focal length", value_of(fx) * direction_of(fx) + value_of(fy) * direction_of(fy),
+        has_cov ? std::optional(std::sqrt(system.cov(fx, fx)) / value_of(fx)) : std::nullopt);
+  for (const auto& [param, name] : {std::pair{"cx", "centre u"}, std::pair{"cy", "centre v"}, std::pair{"k1", "k1"}}) {
+    const Eigen::Index at = place(param);
+    if (at >= 0) add(name, direction_of(at), has_cov ? std::optional(std::sqrt(system.cov(at, at))) : std::nullopt);
+  }
+  add("scale of the target", direction_of(num), std::sqrt(system.cov(num, num)));
+  all.back().asked = all.back().z = 0.0;  // all may be larger: no observation tells
+  const auto at_cause = [&](int cause) { return direction_of(num + cause); };
+  if (system.score.size() < num + num_causes) return all;
+  add("shape of the target", at_cause(shape_cause), std::nullopt);
+  for (int axis = 0; axis < 3; ++axis) add("speed of the target", at_cause(speed_cause + axis), std::nullopt);
+  add("readout", at_cause(readout_cause), std::nullopt);
+  return all;
+}
+
+void GivenTally::add(const LocalizationFilter& filter) {
+  const GivenEffects& given = filter.given();
+  const std::vector<Eigen::Matrix<double, 6, Eigen::Dynamic>> J_pose{filter.J_pose_given()};
+  const std::vector<Eigen::Matrix<double, 6, 6>> cov{filter.pose_covariance()};
+  std::vector<GivenNumber> now = given_numbers({filter.camera(), given.lens_params(), given.cov(), given.score(),
+                                                given.information(), given.score_cov(), J_pose, cov});
+  GivenNumber clock{.name = "clock"};
+  Eigen::Vector<double, 6> twist;
+  twist << filter.motion().world_from_cam.rotation.conjugate() * filter.motion().velocity_in_world,
+      filter.motion().rate_in_cam;
+  take_move(twist, cov.front(), clock);
+  now.push_back(clock);
+  for (std::size_t i = 0; i < now.size() && i < numbers_.size(); ++i) {
+    if (now[i].moves > numbers_[i].moves) continue;
+    now[i].moves = numbers_[i].moves;
+    now[i].moved = numbers_[i].moved;
+    now[i].moved_by = numbers_[i].moved_by;
+  }
+  numbers_ = std::move(now);
+}
+
+}  // namespace alidade

@@ -1,0 +1,56 @@
+#include "alidade/localize/filter/landmark.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <opencv2/core.hpp>
+
+#include "alidade/geometry/decompositions.h"
+
+namespace alidade {
+namespace {
+
+/// J Rᵀ B: how the pixel moves with the point along its surface.
+std::optional<Eigen::Matrix2d> J_px_surface(const Camera& camera, const Rigid3& world_from_cam,
+                                            const Eigen::Vector3d& point_in_world,
+                                            const Eigen::Matrix<double, 3, 2>& surface_in_world) {
+  const Rigid3 cam_from_world = world_from_cam.inverse();
+  const auto seen = project_with_jacobians(camera, cam_from_world * point_in_world);
+  if (!seen) return std::nullopt;
+  return seen->J_px_point * (cam_from_world.rotation.toRotationMatrix() * surface_in_world);
+}
+
+}  // namespace
+
+std::optional<Landmark> new_landmark(long id, const cv::Mat& smoothed, const Camera& camera,
+                                     const Rigid3& world_from_cam, const Eigen::Vector2d& px,
+                                     const Eigen::Vector3d& point_in_world,
+                                     const std::optional<Eigen::Vector3d>& normal_in_world) {
+  const Eigen::Vector2i middle = px.array().round().cast<int>();
+  if (middle.minCoeff() < ReferencePatch::margin_px || middle.x() >= smoothed.cols - ReferencePatch::margin_px ||
+      middle.y() >= smoothed.rows - ReferencePatch::margin_px)
+    return std::nullopt;
+  Landmark landmark;
+  landmark.id = id;
+  landmark.patch = ReferencePatch(smoothed, middle.x(), middle.y());
+  if (!landmark.patch.seen_through(Eigen::Matrix2d::Identity())) return std::nullopt;
+  landmark.offset_px = px - middle.cast<double>();
+  landmark.world_from_first_cam = world_from_cam;
+  const Eigen::Vector3d observation = point_in_world - world_from_cam.translation;
+  landmark.first_distance_m = observation.norm();
+  landmark.surface_in_world = two_across(normal_in_world.value_or(observation).normalized());
+  const auto J = J_px_surface(camera, world_from_cam, point_in_world, landmark.surface_in_world);
+  if (!J || !(std::abs(J->determinant()) > 0.0)) return std::nullopt;
+  landmark.J_first_px_surface = *J;
+  return landmark;
+}
+
+std::optional<Eigen::Matrix2d> here_from_first(const Landmark& landmark, const Camera& camera,
+                                               const Rigid3& world_from_cam, const Eigen::Vector3d& point_in_world) {
+  const auto J = J_px_surface(camera, world_from_cam, point_in_world, landmark.surface_in_world);
+  if (!J) return std::nullopt;
+  // On its first ray the derivatives there go with one over the distance, which is known better by now.
+  const double distance_m = (point_in_world - landmark.world_from_first_cam.translation).norm();
+  return *J * landmark.J_first_px_surface.inverse() * (distance_m / landmark.first_distance_m);
+}
+
+}  // namespace alidade

@@ -1,0 +1,50 @@
+#include "alidade/localize/frames/image_mask.h"
+
+#include <algorithm>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+namespace alidade {
+namespace {
+
+/// Brighter than an eighth of the bright parts; single pixels of noise are none.
+cv::Mat bright_part(const cv::Mat& grey) {
+  std::vector<std::uint8_t> values(grey.begin<std::uint8_t>(), grey.end<std::uint8_t>());
+  const auto bright = values.begin() + static_cast<std::ptrdiff_t>(values.size() * 9 / 10);
+  std::ranges::nth_element(values, bright);
+  const cv::Mat is_bright = grey > std::max(8, *bright / 8);
+  cv::Mat opened;
+  cv::morphologyEx(is_bright, opened, cv::MORPH_OPEN, cv::getStructuringElement(cv::MORPH_ELLIPSE, {5, 5}));
+  return opened;
+}
+
+cv::Mat circle_part(const cv::Mat& grey) {
+  std::vector<cv::Point> points;
+  cv::findNonZero(bright_part(grey), points);
+  cv::Mat shown(grey.size(), CV_8U, cv::Scalar(0));
+  if (points.empty()) return shown;
+  cv::Point2f middle;
+  float radius_px = 0.0f;
+  cv::minEnclosingCircle(points, middle, radius_px);
+  cv::circle(shown, middle, static_cast<int>(radius_px), cv::Scalar(255), cv::FILLED);
+  return shown;
+}
+
+}  // namespace
+
+ImageMask shown_part(const LocalizeConfig& config, const cv::Mat& grey, int margin_px) {
+  cv::Mat shown;
+  if (config.masks_circle) shown = circle_part(grey);
+  if (config.mask) {
+    const cv::Mat mask(config.mask->height_px, config.mask->width_px, CV_8U,
+                       const_cast<std::uint8_t*>(config.mask->shows.data()));
+    const cv::Mat is_shown = mask > 0;
+    shown = shown.empty() ? is_shown : cv::Mat(shown & is_shown);
+  }
+  if (shown.empty()) return {};
+  cv::erode(shown, shown, cv::getStructuringElement(cv::MORPH_RECT, {2 * margin_px + 1, 2 * margin_px + 1}));
+  return {shown.cols, shown.rows, {shown.begin<std::uint8_t>(), shown.end<std::uint8_t>()}};
+}
+
+}  // namespace alidade

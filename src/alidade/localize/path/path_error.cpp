@@ -1,0 +1,67 @@
+#include "alidade/localize/path/path_error.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace alidade {
+namespace {
+
+struct Pair {
+  Rigid3 estimated, truth;
+};
+
+}  // namespace
+
+const TimedPose* nearest_pose(std::span<const TimedPose> poses, double t_s, double tolerance_s) {
+  auto at = std::ranges::lower_bound(poses, t_s, {}, &TimedPose::t_s);
+  if (at != poses.begin() && (at == poses.end() || t_s - std::prev(at)->t_s < at->t_s - t_s)) --at;
+  return at != poses.end() && std::abs(at->t_s - t_s) <= tolerance_s ? &*at : nullptr;
+}
+
+PathError path_error(std::span<const TimedPose> estimated, std::span<const TimedPose> truth, bool is_rigid,
+                     std::span<const double> sigmas_m) {
+  std::vector<Pair> pairs;
+  double variance_m2 = 0.0;
+  for (std::size_t i = 0; i < estimated.size(); ++i) {
+    const TimedPose* const there = nearest_pose(truth, estimated[i].t_s);
+    if (there == nullptr) continue;
+    pairs.push_back({estimated[i].world_from_cam, there->world_from_cam});
+    if (!sigmas_m.empty()) variance_m2 += sigmas_m[i] * sigmas_m[i];
+  }
+  PathError error;
+  error.num_pairs = pairs.size();
+  if (pairs.empty()) return error;
+  const auto num = static_cast<double>(pairs.size());
+  std::vector<Eigen::Vector3d> a, b;
+  double sum2 = 0.0;
+  for (const Pair& pair : pairs) {
+    a.push_back(pair.estimated.translation);
+    b.push_back(pair.truth.translation);
+    sum2 += (a.back() - b.back()).squaredNorm();
+  }
+  error.unaligned_m = std::sqrt(sum2 / num);
+  const auto fit = aligned(a, b, is_rigid);
+  if (!fit) return error;
+  error.scale = fit->scale;
+  if (!sigmas_m.empty()) error.stated_m = fit->scale * std::sqrt(variance_m2 / num);
+  sum2 = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const Eigen::Vector3d moved = fit->b_from_a.rotation * (fit->scale * a[i]) + fit->b_from_a.translation;
+    sum2 += (moved - b[i]).squaredNorm();
+  }
+  error.ate_m = std::sqrt(sum2 / num);
+  double steps2 = 0.0, turns2 = 0.0;
+  for (std::size_t i = 1; i < pairs.size(); ++i) {
+    Rigid3 step = pairs[i - 1].estimated.inverse() * pairs[i].estimated;
+    step.translation *= fit->scale;
+    const Rigid3 true_step = pairs[i - 1].truth.inverse() * pairs[i].truth;
+    const Rigid3 difference = true_step.inverse() * step;
+    steps2 += difference.translation.squaredNorm();
+    turns2 += log_so3(difference.rotation).squaredNorm();
+  }
+  error.rpe_m = std::sqrt(steps2 / (num - 1.0));
+  error.rpe_rad = std::sqrt(turns2 / (num - 1.0));
+  return error;
+}
+
+}  // namespace alidade

@@ -1,0 +1,258 @@
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/localize/path/path_system.h"
+
+// What a path is solved from: observations, told points, told distances, the motion, the start.
+
+namespace alidade {
+namespace {
+
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using WindowRows = Eigen::Matrix<double, 6, PoseChain::window>;
+
+constexpr double hardly_told = 1e-6;  // m⁻², rad⁻²: a pose alone that nothing tells must not stop all others
+
+void add_window(const WindowRows& J, const Eigen::Vector<double, 6>& error, const Eigen::Vector<double, 6>& variance,
+                SmootherSystem& system) {
+  const WindowRows weighted = variance.cwiseInverse().asDiagonal() * J;
+  system.chain.A += J.transpose() * weighted;
+  system.chain.a -= weighted.transpose() * error;
+  system.cost += error.cwiseAbs2().cwiseQuotient(variance).sum();
+}
+
+Eigen::Matrix3d inverse_right_jacobian(const Eigen::Vector3d& phi) { return right_jacobian(phi).inverse(); }
+
+/// Noise of the mean speed over `n` steps of a walk with unit steps, and what of it is left to the end.
+double walked_before(double n) { return (n + 1.0) * (2.0 * n + 1.0) / (6.0 * n); }
+double walked_after(double n) { return (n - 1.0) * (2.0 * n - 1.0) / (6.0 * n); }
+
+}  // namespace
+
+/// Of what was told of the estimated part of the lens: its covariance where the file has one, else the filter's σ.
+Eigen::MatrixXd PathSmoother::lens_information() const {
+  Eigen::MatrixXd cov = Eigen::MatrixXd::Zero(num_estimated_, num_estimated_);
+  const bool has_cov = problem_.camera.cov.size() > 0;
+  for (int i = 0; i < num_estimated_; ++i) {
+    const double sigma = problem_.filter.sigma_lens_params[static_cast<std::size_t>(i)];
+    for (int j = 0; has_cov && j < num_estimated_; ++j)
+      cov(i, j) =
+          problem_.camera.cov(lens_order_[static_cast<std::size_t>(i)], lens_order_[static_cast<std::size_t>(j)]);
+    if (!(cov(i, i) > 0.0)) cov(i, i) = sigma * sigma;
+  }
+  return cov.inverse();
+}
+
+/// Of what is given and not estimated: the rest of the lens, the target's scale; the other causes are taken for absent.
+Eigen::MatrixXd PathSmoother::considered_cov() const {
+  const int num_rest = static_cast<int>(lens_order_.size()) - num_estimated_;
+  Eigen::MatrixXd cov = Eigen::MatrixXd::Zero(num_rest + num_causes, num_rest + num_causes);
+  cov(num_rest + scale_cause, num_rest + scale_cause) = problem_.sigma_scale * problem_.sigma_scale;
+  if (problem_.camera.cov.size() == 0) return cov;
+  const auto at = [&](int i) { return lens_order_[static_cast<std::size_t>(num_estimated_ + i)]; };
+  for (int i = 0; i < num_rest; ++i)
+    for (int j = 0; j < num_rest; ++j) cov(i, j) = problem_.camera.cov(at(i), at(j));
+  return cov;
+}
+
+/// Of a target that is longer along x than it is told to be and as much shorter along y, by a share: what a told place
+/// changes by.
+Eigen::Vector3d PathSmoother::shape_change(const Eigen::Vector3d& told_in_world) const {
+  const Eigen::Vector3d out = told_in_world - target_middle_;
+  return {0.5 * out.x(), -0.5 * out.y(), 0.0};
+}
+
+void PathSmoother::add_told_point(const SmootherState& state, std::size_t point, SmootherSystem& system) const {
+  const Eigen::Vector3d& told = *problem_.points[point].told_in_world;
+  const double weight = std::pow(problem_.points[point].sigma_m, -2);
+  const Eigen::Vector3d error = state.points[point] - told;
+  Eigen::Matrix<double, 3, 2> J;  // of where it is told to be: by scale, and by shape
+  J << told, shape_change(told);
+  PoseChain& chain = system.chain;
+  const int at = chain.place_of(point), by = causes_at_ + scale_cause;
+  chain.B.diagonal().segment<3>(at).array() += weight;
+  chain.B.block<3, 2>(at, by) -= weight * J;
+  chain.B.block<2, 2>(by, by) += weight * J.transpose() * J;
+  chain.b.segment<3>(at) -= weight * error;
+  chain.b.segment<2>(by) += weight * J.transpose() * error;
+  system.cost += weight * error.squaredNorm();
+}
+
+/// What was told of the lens.
+void PathSmoother::add_told_lens(const SmootherState& state, SmootherSystem& system) const {
+  PoseChain& chain = system.chain;
+  if (num_estimated_ == 0) return;
+  const Eigen::MatrixXd information = lens_information();
+  const Eigen::VectorXd now = params(state.camera.lens);
+  Eigen::VectorXd error(num_estimated_);
+  for (int i = 0; i < num_estimated_; ++i) {
+    const int at = lens_order_[static_cast<std::size_t>(i)];
+    error[i] = now[at] - told_lens_[at];
+  }
+  chain.B.block(lens_at_, lens_at_, num_estimated_, num_estimated_) += information;
+  chain.b.segment(lens_at_, num_estimated_) -= information * error;
+  system.cost += error.dot(information * error);
+}
+
+PathSmoother::Twist PathSmoother::twist_at(const SmootherState& state, std::size_t k) const {
+  const std::size_t from = k > 0 ? k - 1 : 0, to = std::min(k + 1, state.poses.size() - 1);
+  const double dt_s = problem_.t_s[to] - problem_.t_s[from];
+  if (!(dt_s > 0.0)) return Twist::Zero();
+  Twist twist;
+  twist << (state.poses[to].translation - state.poses[from].translation) / dt_s,
+      log_so3(state.poses[from].rotation.conjugate() * state.poses[to].rotation) / dt_s;
+  return twist;
+}
+
+/// How the expected pixel changes by what is given: the lens, then the causes (scale and shape by told places alone).
+PathSmoother::GivenRows PathSmoother::given_rows(const ExpectedView& view, const UsedObservation& observation,
+                                                 const Twist& twist) const {
+  const auto num_lens = view.J_px_lens.cols();
+  GivenRows J = GivenRows::Zero(2, num_lens + num_causes);
+  for (Eigen::Index i = 0; i < num_lens; ++i) J.col(i) = view.J_px_lens.col(lens_order_[static_cast<std::size_t>(i)]);
+  const SmootherPoint& point = problem_.points[index_of_.at(observation.id)];
+  if (point.told_in_world)  // a target that moves: not where it is told to be, but further by so much
+    J.middleCols<3>(num_lens + speed_cause) =
+        (problem_.t_s[observation.frame] - middle_s_) * view.J_px_feature.leftCols<3>();
+  const double rows =
+      observation.px.y() / problem_.camera.height_px - 0.5;  // an image's time is that of its middle row
+  J.col(num_lens + readout_cause) = rows * view.J_px_pose * twist;
+  return J;
+}
+
+bool PathSmoother::add_observation(const SmootherState& state, const UsedObservation& observation, const Twist& twist,
+                                   SmootherSystem& system) const {
+  const std::size_t point = index_of_.at(observation.id);
+  Feature feature;
+  feature.values.head<3>() = state.points[point];
+  const auto view = expected_view(state.camera, state.poses[observation.frame], feature);
+  if (!view) return false;
+  const double weight = 1.0 / observation.sigma_px;
+  const Eigen::Vector2d error = weight * (view->px - observation.px);
+  const Eigen::Matrix<double, 2, 6> J_pose = weight * view->J_px_pose;
+  const Eigen::Matrix<double, 2, 3> J_point = weight * view->J_px_feature.leftCols<3>();
+  const GivenRows J_given = weight * given_rows(*view, observation, twist);
+  PoseChain& chain = system.chain;
+  const auto at = static_cast<Eigen::Index>(chain.place_of(point)), num_given = J_given.cols();
+  chain.A.topLeftCorner<6, 6>() += J_pose.transpose() * J_pose;
+  chain.U.block<6, 3>(0, at) += J_pose.transpose() * J_point;
+  chain.U.block(0, lens_at_, 6, num_given) += J_pose.transpose() * J_given;
+  chain.B.block<3, 3>(at, at) += J_point.transpose() * J_point;
+  chain.B.block(at, lens_at_, 3, num_given) += J_point.transpose() * J_given;
+  chain.B.block(lens_at_, lens_at_, num_given, num_given) += J_given.transpose() * J_given;
+  chain.a.head<6>() -= J_pose.transpose() * error;
+  chain.b.segment<3>(at) -= J_point.transpose() * error;
+  chain.b.segment(lens_at_, num_given) -= J_given.transpose() * error;
+  system.cost += error.squaredNorm();
+  return true;
+}
+
+/// What was believed of a point's distance where it was first seen, as an inverse one.
+void PathSmoother::add_range(const SmootherState& state, std::size_t point, SmootherSystem& system) const {
+  const SmootherPoint& told = problem_.points[point];
+  const Eigen::Vector3d from_camera = state.points[point] - state.poses[told.first_frame].translation;
+  const double distance_m = from_camera.norm(), weight = told.range->range_m / told.range->sigma_rel;
+  const double error = weight * (1.0 / distance_m - 1.0 / told.range->range_m);
+  const Eigen::Vector3d J =
+      -weight / std::pow(distance_m, 3) * from_camera;  // by the point; by the position, minus that
+  PoseChain& chain = system.chain;
+  const int at = chain.place_of(point);
+  chain.A.topLeftCorner<3, 3>() += J * J.transpose();
+  chain.U.block<3, 3>(0, at) -= J * J.transpose();
+  chain.B.block<3, 3>(at, at) += J * J.transpose();
+  chain.a.head<3>() += J * error;
+  chain.b.segment<3>(at) -= J * error;
+  system.cost += error * error;
+}
+
+/// Speed and rate between frame i and the next.
+PathSmoother::Speeds PathSmoother::speeds(const SmootherState& state, std::size_t i) const {
+  const double dt_s = problem_.t_s[i + 1] - problem_.t_s[i];
+  const Eigen::Vector3d phi = log_so3(state.poses[i].rotation.conjugate() * state.poses[i + 1].rotation);
+  Speeds out{{}, Matrix6::Zero(), Matrix6::Zero()};
+  out.values << (state.poses[i + 1].translation - state.poses[i].translation) / dt_s, phi / dt_s;
+  out.J_from.topLeftCorner<3, 3>() = -Eigen::Matrix3d::Identity() / dt_s;
+  out.J_to.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() / dt_s;
+  out.J_from.bottomRightCorner<3, 3>() = -inverse_right_jacobian(-phi) / dt_s;
+  out.J_to.bottomRightCorner<3, 3>() = inverse_right_jacobian(phi) / dt_s;
+  return out;
+}
+
+/// Speed and rate from frame k to the next, and from there to the one after it, differ by drawn accelerations; the
+/// first differ from what was told. By a jump nothing is told, and behind it they begin again.
+void PathSmoother::add_motion(const SmootherState& state, std::size_t k, SmootherSystem& system) const {
+  const auto steps = [&](std::size_t i) {
+    return std::max(1.0, std::round((problem_.t_s[i + 1] - problem_.t_s[i]) / problem_.period_s));
+  };
+  Eigen::Vector<double, 6> step_variance;
+  step_variance << Eigen::Vector3d::Constant(std::pow(problem_.filter.sigma_a_m_s2 * problem_.period_s, 2)),
+      Eigen::Vector3d::Constant(std::pow(problem_.filter.sigma_alpha_rad_s2 * problem_.period_s, 2));
+  const auto is_jump = [&](std::size_t i) { return i < problem_.is_jump.size() && problem_.is_jump[i]; };
+  if (is_jump(k) || is_jump(k + 1)) system.chain.A.diagonal().head<6>().array() += hardly_told;
+  if (is_jump(k + 1)) return;
+  WindowRows J = WindowRows::Zero();
+  const Speeds first = speeds(state, k);
+  if (k == 0 || is_jump(k)) {
+    Eigen::Vector<double, 6> told = Eigen::Vector<double, 6>::Zero(), variance;
+    variance << Eigen::Vector3d::Constant(std::pow(problem_.sigma_speed_m_s, 2)),
+        Eigen::Vector3d::Constant(std::pow(problem_.sigma_rate_rad_s, 2));
+    if (problem_.start && k == 0) {
+      told << problem_.start->motion.velocity_in_world, problem_.start->motion.rate_in_cam;
+      variance = problem_.start->cov.diagonal().tail<6>();
+    }
+    J.leftCols<6>() = first.J_from;
+    J.middleCols<6>(6) = first.J_to;
+    add_window(J, first.values - told, variance + walked_before(steps(k)) * step_variance, system);
+  }
+  if (k + 2 >= state.poses.size() || is_jump(k + 2)) return;
+  const Speeds second = speeds(state, k + 1);
+  J.leftCols<6>() = -first.J_from;
+  J.middleCols<6>(6) = second.J_from - first.J_to;
+  J.rightCols<6>() = second.J_to;
+  const double num_steps = walked_before(steps(k + 1)) + walked_after(steps(k));
+  add_window(J, second.values - first.values, num_steps * step_variance, system);
+}
+
+void PathSmoother::add_start(const SmootherState& state, SmootherSystem& system) const {
+  if (!problem_.start) return;
+  const Rigid3 &told = problem_.start->motion.world_from_cam, &is = state.poses.front();
+  const Eigen::Matrix<double, 6, 6> information = problem_.start->cov.topLeftCorner<6, 6>().inverse();
+  const Eigen::Vector3d phi = log_so3(told.rotation.conjugate() * is.rotation);
+  Eigen::Vector<double, 6> error;
+  error << is.translation - told.translation, phi;
+  Eigen::Matrix<double, 6, 6> J = Eigen::Matrix<double, 6, 6>::Identity();
+  J.bottomRightCorner<3, 3>() = inverse_right_jacobian(phi);
+  system.chain.A.topLeftCorner<6, 6>() += J.transpose() * information * J;
+  system.chain.a.head<6>() -= J.transpose() * information * error;
+  system.cost += error.dot(information * error);
+}
+
+std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state) const {
+  SmootherSystem system{PoseChain(causes_at_ + num_causes, most_at_once_)};
+  add_told_lens(state, system);
+  add_start(state, system);
+  std::vector<std::vector<std::size_t>> first_seen(state.poses.size());
+  for (std::size_t i = 0; i < problem_.points.size(); ++i)
+    if (problem_.points[i].range && lives_[i]) first_seen[problem_.points[i].first_frame].push_back(i);
+  std::size_t next = 0;
+  for (std::size_t k = 0; k < state.poses.size(); ++k) {
+    const Twist twist = twist_at(state, k);
+    for (const std::size_t point : entering_[k]) {
+      (void)system.chain.enter(point);
+      if (problem_.points[point].told_in_world) add_told_point(state, point, system);
+    }
+    for (; next < observations_.size() && observations_[next].frame == k; ++next)
+      if (!add_observation(state, observations_[next], twist, system)) return std::nullopt;
+    for (const std::size_t point : first_seen[k]) add_range(state, point, system);
+    if (k + 1 < state.poses.size()) add_motion(state, k, system);
+    if (k + 1 == state.poses.size()) system.chain.A.diagonal().head<6>().array() += hardly_told;
+    if (held_ && held_->frame == k) add_held(state, system);
+    if (!system.chain.eliminate()) return std::nullopt;
+    for (const std::size_t point : leaving_[k])
+      if (!system.chain.leave(point)) return std::nullopt;
+  }
+  return system;
+}
+
+}  // namespace alidade

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "alidade/localize/filter/feature.h"
+
+namespace alidade {
+
+/// An observation of a point whose place is known, with its covariance.
+struct PlacedObservation {
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  double sigma_px = 0.5;
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();
+};
+
+/// Where a camera is by observations of places, some of which may be mismatched.
+struct CameraResection {
+  Rigid3 world_from_cam;
+  double cost = 0.0;  ///< Squares over σ², of each observation at most the gate.
+  std::size_t num_fit = 0;
+  std::vector<bool> fits;  ///< One an observation.
+};
+
+/// From each of the poses to begin at, weights that fall with a residual (Geman & McClure 1985), wide at first, then
+/// narrower; the one that explains most. None: fewer than three observations, or nothing to begin at.
+[[nodiscard]] std::optional<CameraResection> resection(const Camera& camera,
+                                                       std::span<const PlacedObservation> observations,
+                                                       std::span<const Rigid3> begin_at, double gate);
+
+}  // namespace alidade

@@ -1,0 +1,223 @@
+#include "alidade/localize/path/path_smoother.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/localize/filter/given_numbers.h"
+#include "alidade/localize/path/path_system.h"
+
+namespace alidade {
+
+PathSmoother::PathSmoother(const SmootherProblem& problem) : problem_(problem) {
+  const int num_lens = static_cast<int>(params(problem.camera.lens).size());
+  lens_order_ = problem.filter.lens_params;
+  num_estimated_ = static_cast<int>(lens_order_.size());
+  for (int i = 0; i < num_lens; ++i)
+    if (std::ranges::find(problem.filter.lens_params, i) == problem.filter.lens_params.end()) lens_order_.push_back(i);
+  causes_at_ = lens_at_ + num_lens;
+  double num_told = 0.0;
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    index_of_[problem.points[i].id] = i;
+    state_.points.push_back(problem.points[i].point_in_world);
+    if (!problem.points[i].told_in_world) continue;
+    target_middle_ += *problem.points[i].told_in_world;
+    num_told += 1.0;
+  }
+  if (num_told > 0.0) target_middle_ /= num_told;
+  middle_s_ = 0.5 * (problem.t_s.front() + problem.t_s.back());
+  state_.camera = problem.camera;
+  state_.poses = problem.world_from_cam;
+  told_lens_ = params(problem.camera.lens);
+}
+
+/// A point is there from its first observation, or where its distance was believed, to its last.
+void PathSmoother::find_lives() {
+  lives_.assign(problem_.points.size(), std::nullopt);
+  for (const UsedObservation& observation : observations_) {
+    std::optional<Life>& life = lives_[index_of_.at(observation.id)];
+    if (!life) life = Life{observation.frame, observation.frame};
+    life->last = observation.frame;
+  }
+  entering_.assign(state_.poses.size(), {});
+  leaving_.assign(state_.poses.size(), {});
+  for (std::size_t i = 0; i < lives_.size(); ++i) {
+    if (!lives_[i]) continue;
+    if (problem_.points[i].range) {
+      lives_[i]->first = std::min(lives_[i]->first, problem_.points[i].first_frame);
+      lives_[i]->last = std::max(lives_[i]->last, problem_.points[i].first_frame);
+    }
+    entering_[lives_[i]->first].push_back(i);
+    leaving_[lives_[i]->last].push_back(i);
+  }
+  most_at_once_ = 0;
+  int num = 0;
+  for (std::size_t k = 0; k < entering_.size(); ++k) {
+    num += static_cast<int>(entering_[k].size());
+    most_at_once_ = std::max(most_at_once_, num);
+    num -= static_cast<int>(leaving_[k].size());
+  }
+}
+
+SmootherState PathSmoother::moved_by(const Eigen::VectorXd& shared, const PoseChain::Steps& steps, double share) const {
+  SmootherState moved = state_;
+  for (std::size_t k = 0; k < steps.poses.size(); ++k) {
+    moved.poses[k].translation += share * steps.poses[k].head<3>();
+    moved.poses[k].rotation = (moved.poses[k].rotation * exp_so3(share * steps.poses[k].tail<3>())).normalized();
+  }
+  for (std::size_t i = 0; i < moved.points.size(); ++i)
+    if (lives_[i]) moved.points[i] += share * steps.points[i];
+  Eigen::VectorXd lens = params(moved.camera.lens);
+  for (int i = 0; i < num_estimated_; ++i)
+    lens[lens_order_[static_cast<std::size_t>(i)]] += share * shared[lens_at_ + i];
+  moved.camera.lens = with_params(moved.camera.lens, lens);
+  return moved;
+}
+
+/// Whole Gauss–Newton steps where the cost falls, else shorter ones.
+bool PathSmoother::settle() {
+  constexpr int max_iterations = 25;
+  constexpr double settled = 1e-3, min_share = 0.02;  // of a step, squared, in σ
+  find_lives();
+  auto system = build(state_);
+  for (int iteration = 0; system && iteration < max_iterations; ++iteration) {
+    const int num = num_solved();
+    const Eigen::LLT<Eigen::MatrixXd> llt(system->chain.B.topLeftCorner(num, num));
+    if (llt.info() != Eigen::Success) return false;
+    Eigen::VectorXd shared = Eigen::VectorXd::Zero(causes_at_ + num_causes);
+    shared.head(num) = llt.solve(system->chain.b.head(num));
+    const double gain = system->chain.gain() + shared.head(num).dot(system->chain.b.head(num));
+    const auto steps = system->chain.steps(shared);
+    std::optional<SmootherSystem> next;
+    double share = 1.0;
+    for (; share > min_share && !next; share *= 0.5) {
+      const SmootherState there = moved_by(shared, steps, share);
+      next = build(there);
+      if (next && !(next->cost <= system->cost + 1e-9 * (1.0 + system->cost))) next.reset();
+      if (next) state_ = there;
+    }
+    if (!next) return gain < settled * 100.0;
+    system = std::move(next);
+    if (gain < settled) return true;
+  }
+  return false;
+}
+
+bool PathSmoother::choose_observations() {
+  std::vector<UsedObservation> chosen;
+  bool is_other = false;
+  std::size_t next = 0;
+  for (const UsedObservation& observation : problem_.observations) {
+    const auto point = index_of_.find(observation.id);
+    const bool was_there = next < observations_.size() && observations_[next].frame == observation.frame &&
+                           observations_[next].id == observation.id;
+    next += was_there ? 1 : 0;
+    if (point == index_of_.end()) continue;
+    const auto px = project(state_.camera, state_.poses[observation.frame].inverse() * state_.points[point->second]);
+    const bool fits = px && (*px - observation.px).squaredNorm() <=
+                                problem_.filter.gate * observation.sigma_px * observation.sigma_px;
+    is_other = is_other || fits != was_there;
+    if (fits) chosen.push_back(observation);
+  }
+  observations_ = std::move(chosen);
+  return is_other;
+}
+
+std::optional<SmoothedPath> PathSmoother::solve() {
+  for (const UsedObservation& observation : problem_.observations) {
+    const auto point = index_of_.find(observation.id);
+    if (observation.fits_start && point != index_of_.end() &&
+        project(state_.camera, state_.poses[observation.frame].inverse() * state_.points[point->second]))
+      observations_.push_back(observation);
+  }
+  if (!settle()) return std::nullopt;
+  constexpr int max_choices = 3;
+  for (int i = 0; i < max_choices && choose_observations(); ++i)
+    if (!settle()) return std::nullopt;
+  const auto system = build(state_);
+  if (!system) return std::nullopt;
+  SmoothedPath path = result(*system);
+  path.num_dropped = problem_.observations.size() - observations_.size();
+  if (std::ranges::any_of(problem_.points, [](const SmootherPoint& point) { return point.told_in_world.has_value(); }))
+    widen(system->cost, path);
+  return path;
+}
+
+void PathSmoother::fill_lens(const Eigen::MatrixXd& cov, SmoothedPath& path) const {
+  path.camera = state_.camera;
+  path.sigma_lens = cov.diagonal().segment(lens_at_, num_estimated_).cwiseSqrt();
+  const Eigen::VectorXd now = params(state_.camera.lens);
+  for (int i = 0; i < num_estimated_; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double told = problem_.filter.sigma_lens_params[at];
+    path.lens_pull = std::max(path.lens_pull, std::abs(now[lens_order_[at]] - told_lens_[lens_order_[at]]) / told);
+  }
+}
+
+void PathSmoother::fill_map(std::span<const Eigen::Matrix3d> covs, SmoothedPath& path) const {
+  for (std::size_t i = 0; i < state_.points.size(); ++i) {
+    if (!lives_[i]) continue;
+    path.points.push_back(state_.points[i]);
+    path.point_covs.push_back(covs[i]);
+    path.ids.push_back(problem_.points[i].id);
+  }
+  for (const UsedObservation& observation : observations_) {
+    const auto px =
+        project(state_.camera, state_.poses[observation.frame].inverse() * state_.points[index_of_.at(observation.id)]);
+    if (!px) continue;
+    path.residuals.push_back(
+        {observation.frame, observation.id, observation.px, observation.px - *px, observation.sigma_px});
+    path.chi2_per_dof += (observation.px - *px).squaredNorm() / (observation.sigma_px * observation.sigma_px);
+  }
+  const double num_numbers = 2.0 * static_cast<double>(path.residuals.size());
+  const double num_solved = 6.0 * static_cast<double>(state_.poses.size()) + 3.0 * static_cast<double>(path.ids.size());
+  path.chi2_per_dof /= std::max(num_numbers - num_solved, 0.5 * num_numbers + 1.0);
+}
+
+/// Times that are all late by the same move nothing that is seen: no observation tells.
+void PathSmoother::add_clock(SmoothedPath& path) const {
+  GivenNumber clock{.name = "clock"};
+  for (std::size_t k = 0; k < state_.poses.size(); ++k) {
+    Twist twist = twist_at(state_, k);
+    twist.head<3>() = state_.poses[k].rotation.conjugate() * twist.head<3>();
+    take_move(twist, path.cov[k], clock);
+  }
+  path.given.push_back(clock);
+}
+
+SmoothedPath PathSmoother::result(const SmootherSystem& system) const {
+  const int num = num_solved(), all = causes_at_ + num_causes, rest = all - num;
+  const Eigen::MatrixXd B = system.chain.B.topLeftCorner(all, all).selfadjointView<Eigen::Lower>();
+  const Eigen::LLT<Eigen::MatrixXd> llt(B.topLeftCorner(num, num));
+  const Eigen::MatrixXd considered = considered_cov();
+  Eigen::MatrixXd J = Eigen::MatrixXd::Identity(all, rest);  // of what is shared, by what is given
+  J.topRows(num) = -llt.solve(B.topRightCorner(num, rest));
+  J.bottomRows(rest).setIdentity();
+  Eigen::MatrixXd cov = J * considered * J.transpose();
+  cov.topLeftCorner(num, num) += llt.solve(Eigen::MatrixXd::Identity(num, num));
+  PoseChain::Spread spread = system.chain.spread(cov, J);
+  align(system, considered, spread);
+  SmoothedPath path;
+  path.world_from_cam = state_.poses;
+  for (std::size_t k = 0; k < state_.poses.size(); ++k) {
+    Eigen::Matrix<double, 6, 6> to_camera = Eigen::Matrix<double, 6, 6>::Identity();
+    to_camera.topLeftCorner<3, 3>() = state_.poses[k].rotation.toRotationMatrix().transpose();
+    path.cov.push_back(to_camera * spread.cov[k] * to_camera.transpose());
+    spread.J[k] = to_camera * spread.J[k];
+  }
+  fill_map(spread.point_cov, path);
+  fill_lens(cov, path);
+  const Eigen::MatrixXd S = B.bottomRightCorner(rest, rest) + B.bottomLeftCorner(rest, num) * J.topRows(num);
+  const std::vector<int> given(lens_order_.begin() + num_estimated_, lens_order_.end());
+  path.given =
+      given_numbers({problem_.camera, given, considered, system.chain.b.segment(num, rest), S, S, spread.J, path.cov});
+  add_clock(path);
+  return path;
+}
+
+std::optional<SmoothedPath> smoothed_path(const SmootherProblem& problem) {
+  if (problem.world_from_cam.size() < 3 || problem.points.empty()) return std::nullopt;
+  return PathSmoother(problem).solve();
+}
+
+}  // namespace alidade

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "alidade/localize/filter/filter_bank.h"
+#include "alidade/localize/localization.h"
+
+namespace alidade {
+
+/// An observation of a point of the map.
+struct UsedObservation {
+  std::size_t frame = 0;  ///< Index from the smoother's first.
+  long id = 0;
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  double sigma_px = 0.5;
+  bool fits_start = true;  ///< With the poses and points that the smoother begins at.
+};
+
+struct SmootherPoint {
+  long id = 0;
+  Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();  ///< To begin at.
+  std::optional<Eigen::Vector3d> told_in_world;              ///< Of a known point, with its σ of each coordinate.
+  double sigma_m = 0.001;
+  std::size_t first_frame = 0;      ///< Where its distance was believed to be
+  std::optional<RangePrior> range;  ///< this.
+};
+
+/// Where a point was seen, and that less where it is expected.
+struct PlacedResidual {
+  std::size_t frame = 0;
+  long id = 0;
+  Eigen::Vector2d px, residual_px;
+  double sigma_px = 0.5;
+};
+
+/// What of a path's place in the world no measurement says: its covariance is that after the best alignment.
+enum class PathGauge {
+  fixed,       ///< A start or known points say it.
+  motion,      ///< Position and rotation: the first camera is the world.
+  similarity,  ///< Its unit of length as well.
+};
+
+/// What a path is smoothed from. Frames follow each other without a break.
+struct SmootherProblem {
+  std::size_t first_frame = 0;  ///< Of the recording.
+  Camera camera;                ///< As told; its covariance is counted.
+  std::vector<double> t_s;
+  std::vector<bool> is_jump;                  ///< To these frames the camera came by no motion. May be empty: to none.
+  std::vector<Rigid3> world_from_cam;         ///< To begin at.
+  std::vector<UsedObservation> observations;  ///< In order of frames.
+  std::vector<SmootherPoint> points;
+  std::optional<StartHypothesis> start;  ///< What was told of the first pose; else its speeds alone, zero with these σ:
+  double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;
+  double period_s = 1.0 / 30.0;     ///< Accelerations are drawn again for each.
+  PathGauge gauge = PathGauge::fixed;
+  double sigma_scale = 0.0;         ///< Of the told points' common scale, counted and not estimated.
+  LocalizationFilterConfig filter;  /// σ of accelerations, the gate, and what of the lens is estimated.
+};
+
+/// Path, map and lens at the maximum of their common posterior, with its covariance; the lens's own covariance and the
+/// target's scale counted, where they are not estimated (S. F. Schmidt 1966: consider parameters).
+struct SmoothedPath {
+  std::vector<Rigid3> world_from_cam;
+  std::vector<Eigen::Matrix<double, 6, 6>> cov;  ///< Of the right perturbation.
+  std::vector<long> ids;                         ///< Of the points, growing.
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Matrix3d> point_covs;
+  Camera camera;
+  Eigen::VectorXd sigma_lens;  ///< Of those estimated.
+  double lens_pull = 0.0;      ///< How far an estimated number of the lens is from what was told, in the told σ.
+  std::vector<GivenNumber> given;
+  std::vector<PlacedResidual> residuals;
+  double chi2_per_dof = 0.0;  ///< Of the observations that fit.
+  /// Along its least certain direction the cost rises more slowly to one side than to the other, or than σ says; σ is
+  /// enlarged there by so much.
+  double widened = 1.0;
+  /// The camera hardly moves aside, and so a pose's least certain numbers are less sure than a cut is straight: turns
+  /// and small moves look alike where depths are not known, and the posterior is no Gaussian.
+  bool is_from_one_place = false;
+  std::size_t num_dropped = 0;  ///< Observations that do not fit it.
+};
+
+/// All observations of a recording together: a filter's derivatives are those of its moment, when depths were vague,
+/// and what they say of the world's frame and scale differs from one to the next, so that certainty is gained that no
+/// observation gave. Here all are taken at one place, the solution. Gauss–Newton over poses, points and lens with the
+/// filter's own motion model; poses are eliminated one after another (pose_chain.h). None where it does not settle.
+[[nodiscard]] std::optional<SmoothedPath> smoothed_path(const SmootherProblem& problem);
+
+}  // namespace alidade

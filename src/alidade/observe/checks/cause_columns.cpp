@@ -1,0 +1,172 @@
+#include "alidade/observe/checks/cause_columns.h"
+
+#include <algorithm>
+
+#include "alidade/geometry/so3.h"
+
+namespace alidade {
+namespace {
+
+constexpr int max_lever_points = 16;
+constexpr double usual_k = 0.3, usual_p = 0.01, usual_mount_rad = 0.2, usual_delay_s = 0.1, usual_shutter_s = 0.03,
+                 usual_zoom_per_s = 0.01, usual_parallax_rad = 0.05;
+
+ObserveNuisances without_turn(ObserveNuisances nuisances) {
+  nuisances.turn = false;
+  return nuisances;
+}
+
+ObserveNuisances with_rotation(ObserveNuisances nuisances) {
+  nuisances.mount = nuisances.delay = nuisances.turn = true;
+  return nuisances;
+}
+
+std::vector<RotationError> errors_but(const RotationLog& log, const std::vector<std::string>& estimated) {
+  std::vector<RotationError> errors = rotation_errors(log.source, log.has_roll_rate);
+  std::erase_if(errors, [&](const RotationError& error) {
+    return std::find(estimated.begin(), estimated.end(), error.cause) != estimated.end();
+  });
+  return errors;
+}
+
+}  // namespace
+
+CauseColumns::CauseColumns(const RotationLog& log, const Adjustment& reference, const CauseConfig& config)
+    : reference_(reference),
+      base_(without_turn(config.nuisances)),
+      wide_(with_rotation(config.nuisances)),
+      height_(config.height),
+      patterns_(turn_patterns(log, errors_but(log, config.errors), config.max_gap_s)),
+      lever_column_(reference.bundle.points.size(), -1) {
+  for (const RotationFrame& frame : reference.bundle.frames) {
+    const auto row = std::lower_bound(log.rows.begin(), log.rows.end(), frame.t_s - 1e-9,
+                                      [](const RotationRow& r, double t_s) { return r.t_s < t_s; });
+    row_of_frame_.push_back(
+        std::min(static_cast<std::size_t>(row - log.rows.begin()), std::max<std::size_t>(log.rows.size(), 1) - 1));
+  }
+  add_lens();
+  if (!config.nuisances.mount) {
+    first_mount_ = size();
+    for (const char* member : {"about x", "about y", "about z"}) add("mount", member, usual_mount_rad, "rad");
+  }
+  if (!config.nuisances.delay) {
+    first_delay_ = size();
+    add("delay", "delay", usual_delay_s, "s");
+  }
+  if (!config.nuisances.shutter) {
+    shutter_ = size();
+    add("rolling shutter", "from top to bottom", usual_shutter_s, "s");
+  }
+  if (!config.nuisances.drift) drift_ = size();
+  if (drift_ >= 0) add("focal length that drifts", "f'/f", usual_zoom_per_s, "1/s");
+  if (!config.nuisances.lever && log.source != RotationSource::none) add_lever();
+  first_pattern_ = size();
+  for (const TurnPattern& pattern : patterns_) {
+    add(pattern.error.cause, pattern.error.member, pattern.error.ordinary, pattern.error.unit);
+  }
+}
+
+void CauseColumns::add(const std::string& group, const std::string& member, double ordinary, const std::string& unit) {
+  auto at = std::find_if(groups_.begin(), groups_.end(), [&](const Group& each) { return each.name == group; });
+  if (at == groups_.end()) at = groups_.insert(groups_.end(), {group, {}});
+  at->columns.push_back(size());
+  columns_.push_back({member, unit, ordinary});
+}
+
+void CauseColumns::add_lens() {
+  first_k1_ = size();
+  static constexpr const char* names[] = {"k1", "k2", "k3", "p1", "p2"};
+  for (const char* name : names) columns_.push_back({name, "", name[0] == 'k' ? usual_k : usual_p});
+  const bool is_free[] = {base_.k1 >= 0, base_.k2 >= 0, base_.k3 >= 0, base_.tangential >= 0, base_.tangential >= 0};
+  // Each alone, the radial ones together, all: what is free already is omitted.
+  constexpr std::pair<int, int> ranges[] = {{0, 1}, {1, 2}, {2, 3}, {3, 5}, {0, 2}, {0, 3}, {0, 5}};
+  for (const auto& [from, until] : ranges) {
+    Group group;
+    for (int i = from; i < until; ++i) {
+      if (is_free[i]) continue;
+      group.name += (group.name.empty() ? "" : ",") + std::string(names[i]);
+      group.columns.push_back(first_k1_ + i);
+    }
+    const bool is_new =
+        std::none_of(groups_.begin(), groups_.end(), [&](const Group& each) { return each.name == group.name; });
+    if (!group.columns.empty() && is_new) groups_.push_back(group);
+  }
+}
+
+void CauseColumns::add_lever() {
+  first_lever_ = size();
+  for (const char* member : {"x over distance", "y over distance", "z over distance"}) {
+    add("lever", member, usual_parallax_rad, "rad");
+  }
+  std::vector<int> times(lever_column_.size(), 0);
+  for (const BundleObservation& seen : reference_.bundle.observations) ++times[static_cast<std::size_t>(seen.point)];
+  std::vector<int> order(times.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>(i);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return times[static_cast<std::size_t>(a)] > times[static_cast<std::size_t>(b)];
+  });
+  // The first has the common one: only what the others have beside it can be told apart from that.
+  for (std::size_t i = 1; i < order.size() && i <= max_lever_points; ++i) {
+    lever_column_[static_cast<std::size_t>(order[i])] = size();
+    add("lever", "z over distance, a point's own", usual_parallax_rad, "rad");
+  }
+}
+
+void CauseColumns::begin_frame(int frame) {
+  frame_ = frame;
+  const RotationFrame& now = reference_.bundle.frames[static_cast<std::size_t>(frame)];
+  frame_time_s_ = now.t_s;
+  const RotatingCamera& camera = reference_.solution.camera;
+  view_.emplace(camera, now);
+  const Eigen::Matrix3d cam_from_mount = camera.cam_from_mount.toRotationMatrix();
+  mount_from_cam_ = cam_from_mount.transpose();
+  // The log's rotation is the mount's, from where it began; the camera turned on it then as it does now.
+  const Eigen::Matrix3d mount_from_begin = now.cam_from_start.toRotationMatrix(), begin_from_start = mount_from_cam_;
+  cam_from_start_ = cam_from_mount * mount_from_begin * begin_from_start;
+}
+
+void CauseColumns::fill_lens(const Eigen::Vector3d& in_cam, Eigen::Ref<Eigen::MatrixXd> out) const {
+  const Eigen::Vector4d k = reference_.solution.camera.k_at(frame_time_s_);
+  // Given the bent point, all five are linear.
+  const double x = in_cam.x() / in_cam.z(), y = in_cam.y() / in_cam.z(), r2 = x * x + y * y;
+  const Eigen::Vector2d radial(k[0] * x * r2, k[1] * y * r2);
+  out.col(first_k1_) = radial;
+  out.col(first_k1_ + 1) = radial * r2;
+  out.col(first_k1_ + 2) = radial * r2 * r2;
+  out.col(first_k1_ + 3) = Eigen::Vector2d(k[0] * 2.0 * x * y, k[1] * (r2 + 2.0 * y * y));
+  out.col(first_k1_ + 4) = Eigen::Vector2d(k[0] * (r2 + 2.0 * x * x), k[1] * 2.0 * x * y);
+}
+
+bool CauseColumns::at(const BundleObservation& seen, RotationPrediction& p, Eigen::Ref<Eigen::MatrixXd> by_causes) {
+  const auto point = static_cast<std::size_t>(seen.point);
+  const BearingPoint& bearing = reference_.solution.points[point];
+  RotationPrediction& wide = wide_prediction_;
+  if (!view_->predict(bearing, base_, p) || !view_->predict(bearing, wide_, wide)) return false;
+  by_causes.setZero();
+  const Eigen::Vector3d in_cam = view_->point_in_cam(bearing);
+  fill_lens(in_cam, by_causes);
+  const Eigen::Matrix<double, 2, 3> by_turn = wide.J_px_common.middleCols<3>(wide_.turn);
+  if (first_mount_ >= 0) by_causes.middleCols<3>(first_mount_) = wide.J_px_common.middleCols<3>(wide_.mount);
+  if (first_delay_ >= 0) by_causes.col(first_delay_) = wide.J_px_common.col(wide_.delay);
+  if (shutter_ >= 0) by_causes.col(shutter_) = wide.J_px_common.col(wide_.delay) * (seen.px.y() / height_);
+  const auto& frames = reference_.bundle.frames;
+  const double middle_s = 0.5 * (frames.front().t_s + frames.back().t_s);
+  if (drift_ >= 0)
+    by_causes.col(drift_) =
+        (frames[static_cast<std::size_t>(frame_)].t_s - middle_s) * (p.px - reference_.solution.camera.k.tail<2>());
+  if (first_lever_ >= 0) {
+    // A pixel feels a shift v of its ray as the turn ray × v / |ray|².
+    const Eigen::Vector3d turned = mount_from_cam_ * in_cam;
+    const Eigen::Matrix3d shift = mount_from_cam_ * (cam_from_start_ - Eigen::Matrix3d::Identity());
+    const Eigen::Matrix<double, 2, 3> by_lever = by_turn * (cross_matrix(turned) * shift) / in_cam.squaredNorm();
+    by_causes.middleCols<3>(first_lever_) = by_lever;
+    if (lever_column_[point] >= 0) by_causes.col(lever_column_[point]) = by_lever.col(2);
+  }
+  const std::size_t row = row_of_frame_[static_cast<std::size_t>(frame_)];
+  for (std::size_t i = 0; i < patterns_.size(); ++i) {
+    by_causes.col(first_pattern_ + static_cast<int>(i)) = by_turn * patterns_[i].turn_rad[row];
+  }
+  return true;
+}
+
+}  // namespace alidade

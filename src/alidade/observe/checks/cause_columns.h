@@ -1,0 +1,53 @@
+#pragma once
+
+#include "alidade/observe/checks/cause_scores.h"
+
+namespace alidade {
+
+/// Derivatives of a pixel by everything that is taken as exact, one column a number.
+class CauseColumns {
+ public:
+  struct Group {
+    std::string name;
+    std::vector<int> columns;
+  };
+  struct Column {
+    std::string member, unit;
+    double ordinary = 1.0;  ///< σ of what there ordinarily is of it.
+  };
+
+  CauseColumns(const RotationLog& log, const Adjustment& reference, const CauseConfig& config);
+
+  [[nodiscard]] int size() const { return static_cast<int>(columns_.size()); }
+  [[nodiscard]] const std::vector<Group>& groups() const { return groups_; }
+  [[nodiscard]] const Column& column(int i) const { return columns_[static_cast<std::size_t>(i)]; }
+  [[nodiscard]] const CommonLayout& layout() const { return base_; }
+
+  void begin_frame(int frame);
+  /// Of the observation: the pixel as predicted, J by the estimated parameters, by the point, by the causes.
+  [[nodiscard]] bool at(const BundleObservation& seen, RotationPrediction& p, Eigen::Ref<Eigen::MatrixXd> by_causes);
+
+ private:
+  void add(const std::string& group, const std::string& member, double ordinary, const std::string& unit = "");
+  void add_lens();
+  void add_lever();
+  void fill_lens(const Eigen::Vector3d& in_cam, Eigen::Ref<Eigen::MatrixXd> out) const;
+
+  const Adjustment& reference_;
+  CommonLayout base_, wide_;
+  double height_;
+  std::vector<TurnPattern> patterns_;
+  std::vector<std::size_t> row_of_frame_;
+  std::vector<int> lever_column_;  ///< Of a point's own parallax; −1: it has none.
+  std::vector<Group> groups_;
+  std::vector<Column> columns_;
+  int first_k1_ = -1, first_mount_ = -1, first_delay_ = -1, shutter_ = -1, drift_ = -1, first_pattern_ = -1,
+      first_lever_ = -1;
+  std::optional<RotationView> view_;
+  int frame_ = 0;
+  double frame_time_s_ = 0.0;
+  Eigen::Matrix3d cam_from_start_, mount_from_cam_;
+  RotationPrediction wide_prediction_;
+};
+
+}  // namespace alidade

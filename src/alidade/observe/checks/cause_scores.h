@@ -1,0 +1,43 @@
+#pragma once
+
+#include "alidade/observe/checks/turn_patterns.h"
+#include "alidade/observe/frame_buffer.h"
+
+namespace alidade {
+
+/// One number of a cause, as one linearisation has it.
+struct CauseMember {
+  std::string name;  ///< "k1", "of pan"
+  std::string unit;
+  double value = 0.0, sigma = 0.0;  ///< What the residuals ask for, and how well they tell it; σ counts shared errors.
+  CommonVector moves;               ///< Of the estimated parameters, normalised, if it were one unit.
+};
+
+/// Something that is taken as exact and may not be: would the residuals gain by more than chance if it were free?
+struct CauseScore {
+  std::string name;   ///< "k1", "encoder scale", "backlash"
+  double z = 0.0;     ///< Gain as a normal deviate.
+  double gain = 0.0;  ///< Of twice the log-posterior, for sizes that it ordinarily has, less what its freedom costs
+                      ///< (BIC): the largest explains best.
+  std::vector<CauseMember> members;
+  CommonVector shift;  ///< Of the estimated parameters if it were free, normalised.
+};
+
+struct CauseConfig {
+  ObserveNuisances nuisances;  ///< What was estimated.
+  double max_gap_s = 0.25;
+  double height = 1.0;                   ///< Of the image, normalised: a rolling shutter's way.
+  std::vector<std::string> errors = {};  ///< Causes among the rotation's errors that were estimated.
+};
+
+/// Score (Lagrange multiplier) tests of the reference, all from one linearisation: with point bearings and what was
+/// estimated eliminated, information S and score s of a cause give χ² = sᵀ S⁻¹ s and the value −S⁻¹ s. Where residuals
+/// share errors in time χ² is divided by their design effect in the cause's own directions, taken after its step:
+/// a cause does not hide behind the scatter that it makes. Tested: k1, k2, k3, p1 and p2, the lens whole; mount, delay,
+/// line time of a rolling shutter, lever arm (one parallax for all points, and each point's own along the view), a
+/// focal length that drifts, and the patterns of the log's rotation. Not for bundles with turns.
+/// Rao 1948; docs/maths/rotating-camera.md.
+[[nodiscard]] std::vector<CauseScore> cause_scores(const RotationLog& log, const Adjustment& reference,
+                                                   const CauseConfig& config);
+
+}  // namespace alidade

@@ -1,0 +1,206 @@
+// Where several things are not as assumed at once, none of them explains much alone: sets of them are tried.
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/observe/checks/cause_search.h"
+
+namespace alidade {
+namespace {
+
+constexpr std::size_t max_search_frames = 120, max_search_points = 40;
+
+/// What a trial frees beside what is estimated already.
+struct Trial {
+  bool lens = false, mount = false, delay = false, shutter = false, lever = false, drift = false;
+  std::vector<std::string> errors = {};
+};
+
+const std::string scale_cause = "encoder scale", backlash_cause = "backlash", zero_cause = "zero that drifts",
+                  rate_scale_cause = "scale of the rates", bias_cause = "bias of the rates",
+                  attitude_cause = "attitude that drifts";
+
+/// Simple ones first: of those that explain about as well the first is taken.
+const std::vector<Trial>& trials() {
+  static const std::vector<Trial> all{
+      {.lens = true},
+      {.mount = true},
+      {.delay = true},
+      {.shutter = true},
+      {.drift = true},
+      {.errors = {backlash_cause}},
+      {.errors = {scale_cause, rate_scale_cause}},
+      {.errors = {bias_cause, attitude_cause, zero_cause}},
+      {.mount = true, .delay = true},
+      {.lever = true},
+      {.delay = true, .shutter = true},
+      {.delay = true, .errors = {backlash_cause}},
+      {.lens = true, .delay = true},
+      {.lens = true, .shutter = true},
+      {.lens = true, .errors = {backlash_cause}},
+      {.lens = true, .errors = {scale_cause, rate_scale_cause}},
+      {.lens = true, .errors = {bias_cause}},
+      {.lens = true, .lever = true},
+      {.lens = true, .mount = true, .delay = true},
+      {.lens = true, .mount = true, .delay = true, .shutter = true},
+      {.mount = true, .delay = true, .errors = {scale_cause, backlash_cause, rate_scale_cause, bias_cause}},
+      {.lens = true, .mount = true, .delay = true, .errors = {backlash_cause, bias_cause}},
+      {.lens = true,
+       .mount = true,
+       .delay = true,
+       .shutter = true,
+       .errors = {scale_cause, backlash_cause, zero_cause, rate_scale_cause, bias_cause, attitude_cause}},
+      {.lens = true, .mount = true, .delay = true, .lever = true},
+  };
+  return all;
+}
+
+ObserveSetup freed_by(const Trial& trial, const ObserveSetup& config) {
+  ObserveSetup freer = config;
+  ObserveNuisances& estimate = freer.nuisances;
+  if (trial.lens && !config.lens_is_given) estimate.k1 = estimate.k2 = estimate.k3 = estimate.tangential = true;
+  estimate.mount = estimate.mount || trial.mount;
+  estimate.delay = estimate.delay || trial.delay;
+  estimate.shutter = estimate.shutter || trial.shutter;
+  estimate.lever = estimate.lever || trial.lever;
+  estimate.drift = estimate.drift || trial.drift;
+  freer.estimate_errors.insert(freer.estimate_errors.end(), trial.errors.begin(), trial.errors.end());
+  return freer;
+}
+
+int size_of_layout(const RotationLog& log, const ObserveSetup& config) {
+  ObserveNuisances nuisances = config.nuisances;
+  nuisances.errors = static_cast<int>(estimated_errors(log, config).size());
+  return CommonLayout(nuisances).size;
+}
+
+/// The log's frames, thinned, with the points that are seen most.
+struct Sample {
+  std::vector<RotationFrame> frames;
+  std::vector<std::vector<Eigen::Vector2d>> px;
+};
+
+Sample sample_of(const RotationLog& log, const ObserveSetup& config, const PixelScale& scale) {
+  std::vector<std::pair<int, std::size_t>> seen(log.num_points);
+  for (std::size_t i = 0; i < seen.size(); ++i) seen[i] = {0, i};
+  for (const RotationRow& row : log.rows) {
+    for (std::size_t i = 0; i < row.px.size(); ++i) seen[i].first -= is_seen(row.px[i]) ? 1 : 0;
+  }
+  std::sort(seen.begin(), seen.end());
+  seen.resize(std::min(seen.size(), max_search_points));
+  Sample sample;
+  MotionReader reader(log.source, config.max_gap_s);
+  for (const RotationRow& row : log.rows) {
+    sample.frames.push_back(reader.next(row));
+    std::vector<Eigen::Vector2d> px;
+    for (const auto& [count, i] : seen) {
+      px.push_back(i < sample.frames.back().px.size() ? scale.normalised(sample.frames.back().px[i])
+                                                      : Eigen::Vector2d::Constant(not_seen));
+    }
+    sample.px.push_back(std::move(px));
+  }
+  return sample;
+}
+
+/// σ of a pixel [px] with which all rows are explained; infinite: not at all.
+double noise_of(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report, const Sample& sample,
+                const Progress& progress) {
+  std::vector<RotationFrame> frames = sample.frames;
+  const std::vector<RotationError> errors = estimated_errors(log, config);
+  add_turns(log, errors, config.max_gap_s, frames);
+  const std::size_t num_points = sample.px.empty() ? 0 : sample.px.front().size();
+  FrameBuffer buffer(num_points, frames.size() + 1);
+  const std::size_t every = std::max<std::size_t>(1, frames.size() / max_search_frames);
+  bool is_new = false;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    is_new = is_new || frames[k].starts_segment;
+    if (k % every != 0) continue;
+    if (is_new) buffer.renew_all();
+    is_new = false;
+    buffer.add(frames[k], sample.px[k]);
+  }
+  AdjustConfig adjust_with;
+  adjust_with.nuisances = config.nuisances;
+  adjust_with.nuisances.errors = static_cast<int>(errors.size());
+  adjust_with.with_depth = needs_depth(log, config);
+  adjust_with.sigma_range_m = config.sigma_range_m;
+  ObserveSetup sized = config;
+  sized.width_px = report.width_px;
+  sized.height_px = report.height_px;
+  adjust_with.start = start_camera(sized, report.scale);
+  adjust_with.start.errors = RotationErrors::Zero(static_cast<Eigen::Index>(errors.size()));
+  if (!log.rows.empty()) adjust_with.start.drift_from_s = log.rows.back().t_s;
+  adjust_with.prior = said_prior(config, adjust_with.start);
+  if (!config.start) adjust_with.other_starts = {2.5};
+  const Adjustment adjustment = adjust(buffer, adjust_with, progress);
+  const std::size_t seen = adjustment.num_left_out + adjustment.bundle.observations.size();
+  constexpr double max_left_out = 0.3;
+  if (!adjustment.has_value ||
+      static_cast<double>(adjustment.num_left_out) > max_left_out * static_cast<double>(seen)) {
+    return std::numeric_limits<double>::infinity();
+  }
+  return adjustment.sigma_px * report.scale.scale;
+}
+
+}  // namespace
+
+std::optional<ObserveSetup> searched_causes(const RotationLog& log, const ObserveSetup& config,
+                                            const ObserveSolution& report, double max_noise_px,
+                                            const Progress& progress) {
+  constexpr double as_well = 1.15;
+  if (log.rows.size() < 10 || log.num_points < 2) return std::nullopt;
+  const Sample sample = sample_of(log, config, report.scale);
+  std::vector<std::pair<double, ObserveSetup>> found;
+  double least = std::numeric_limits<double>::infinity();
+  const auto attempt = [&](const Trial& trial) {
+    ObserveSetup freer = freed_by(trial, config);
+    if (size_of_layout(log, freer) <= size_of_layout(log, config)) return;
+    const double noise_px = noise_of(log, freer, report, sample, progress);
+    least = std::min(least, noise_px);
+    found.emplace_back(noise_px, std::move(freer));
+  };
+  // Where the richest do not explain it, none does.
+  const double as_told = noise_of(log, config, report, sample, progress);
+  constexpr double clearly = 0.6;
+  max_noise_px = std::min(max_noise_px, clearly * as_told);
+  for (auto trial = trials().rbegin(); trial != trials().rbegin() + 2; ++trial) attempt(*trial);
+  attempt({.drift = true});
+  if (!(least < max_noise_px)) return std::nullopt;
+  for (const Trial& trial : trials()) {
+    attempt(trial);
+    if (found.back().first < max_noise_px && found.back().first < as_well * least) return found.back().second;
+  }
+  return std::nullopt;
+}
+
+bool has_no_rest(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,
+                 const Progress& progress) {
+  constexpr double window_s = 1.0, many = 0.5, clearly = 0.5, slowest_per_s = 0.003;
+  const Sample sample = sample_of(log, config, report.scale);
+  ObserveSetup sized = config;
+  sized.width_px = report.width_px;
+  sized.height_px = report.height_px;
+  AdjustConfig still;
+  still.start = start_camera(sized, report.scale);
+  still.other_starts = {2.5, 5.0};
+  int judged = 0, unsteady = 0;
+  std::size_t k = 0;
+  while (k < sample.frames.size()) {
+    FrameBuffer buffer(sample.px.front().size(), max_search_frames);
+    const double until_s = sample.frames[k].t_s + window_s;
+    still.start.drift_from_s = sample.frames[k].t_s;
+    for (; k < sample.frames.size() && sample.frames[k].t_s < until_s; ++k) {
+      if (sample.frames[k].starts_segment) buffer.renew_all();
+      buffer.add(sample.frames[k], sample.px[k]);
+    }
+    AdjustConfig zooming = still;
+    zooming.nuisances.drift = true;
+    const Adjustment one = adjust(buffer, still, progress), changing = adjust(buffer, zooming, progress);
+    if (!one.has_value || !changing.has_value) continue;  // a second that tells nothing
+    ++judged;
+    const bool is_better = changing.sigma_px < clearly * one.sigma_px;
+    unsteady += is_better && std::abs(changing.solution.camera.drift_per_s) > slowest_per_s ? 1 : 0;
+  }
+  return judged >= 3 && unsteady > many * judged;
+}
+
+}  // namespace alidade

@@ -1,0 +1,133 @@
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "alidade/geometry/degree.h"
+#include "alidade/geometry/so3.h"
+#include "alidade/observe/solve/solve.h"
+
+namespace alidade {
+namespace {
+
+/// A way to misread angles, rates or attitudes, and what to say where the pixels fit once it is undone.
+struct Misreading {
+  const char* words;
+  std::function<void(RotationRow&)> undo;
+};
+
+void scale_all(RotationRow& row, const Eigen::Vector3d& by) {
+  row.pan_tilt_roll_rad = row.pan_tilt_roll_rad.cwiseProduct(by);
+  row.rate_rad_per_s = row.rate_rad_per_s.cwiseProduct(by);
+}
+
+std::function<void(RotationRow&)> scaled(double x, double y, double z) {
+  return [by = Eigen::Vector3d(x, y, z)](RotationRow& row) { scale_all(row, by); };
+}
+
+void exchange(RotationRow& row) {
+  std::swap(row.pan_tilt_roll_rad.x(), row.pan_tilt_roll_rad.y());
+  std::swap(row.rate_rad_per_s.x(), row.rate_rad_per_s.y());
+}
+
+std::vector<Misreading> misreadings_of(RotationSource source) {
+  if (source == RotationSource::attitude) {
+    return {{"the quaternions are of the base in the camera, not of the camera in the base",
+             [](RotationRow& row) { row.base_from_cam = row.base_from_cam.conjugate(); }}};
+  }
+  if (source == RotationSource::head) {
+    return {{"pan counts the other way (to the right), or the image is mirrored left to right", scaled(-1, 1, 1)},
+            {"tilt counts the other way (down), or the image is mirrored top to bottom", scaled(1, -1, 1)},
+            {"pan and tilt count the other way, or the camera hangs upside down", scaled(-1, -1, 1)},
+            {"pan and tilt are exchanged", exchange},
+            {"pan and tilt are exchanged, and pan counts the other way",
+             [](RotationRow& row) {
+               exchange(row);
+               scale_all(row, {-1.0, 1.0, 1.0});
+             }},
+            {"the angles are half of what the head turns", scaled(2, 2, 2)},
+            {"the angles are twice what the head turns", scaled(0.5, 0.5, 0.5)},
+            {"the angles are degrees: name the columns pan_deg, tilt_deg", scaled(degree, degree, degree)}};
+  }
+  return {{"ω_y counts the other way, or the image is mirrored left to right", scaled(1, -1, -1)},
+          {"ω_x counts the other way, or the image is mirrored top to bottom", scaled(-1, 1, -1)},
+          {"ω_x and ω_y count the other way, or the camera hangs upside down", scaled(-1, -1, 1)},
+          {"the rates are of the world against the camera: all signs are reversed", scaled(-1, -1, -1)},
+          {"ω_x and ω_y are exchanged", exchange},
+          {"the rates are half of what the camera turns", scaled(2, 2, 2)},
+          {"the rates are twice what the camera turns", scaled(0.5, 0.5, 0.5)},
+          {"the rates are degrees per second", scaled(degree, degree, degree)}};
+}
+
+constexpr std::size_t max_frames = 150;
+
+/// Noise [px] with which the log is explained, by the rows of its first seconds, thinned; infinite: not at all.
+struct Explanation {
+  double noise_px = std::numeric_limits<double>::infinity();
+  bool tells = false;  ///< The focal lengths, too: what tells nothing is explained by any reading.
+};
+
+Explanation explanation_of(const RotationLog& log, const ObserveSetup& config, const PixelScale& scale,
+                           const Progress& progress) {
+  MotionReader reader(log.source, config.max_gap_s);
+  FrameBuffer buffer(log.num_points, max_frames);
+  std::vector<Eigen::Vector2d> px(log.num_points);
+  for (const RotationRow& row : log.rows) {
+    const RotationFrame frame = reader.next(row);
+    for (std::size_t i = 0; i < px.size(); ++i) {
+      px[i] = i < frame.px.size() ? scale.normalised(frame.px[i]) : Eigen::Vector2d::Constant(not_seen);
+    }
+    if (frame.starts_segment && buffer.size() > 0) break;
+    buffer.add(frame, px);
+  }
+  AdjustConfig adjust_with;
+  adjust_with.start = start_camera(config, scale);
+  adjust_with.other_starts = {0.7, 2.5, 5.0, 10.0};
+  adjust_with.reject = false;
+  const Adjustment adjustment = adjust(buffer, adjust_with, progress);
+  if (!adjustment.has_value) return {};
+  constexpr double most = 0.05;  // σ over the focal length, as an answer may have it
+  const Eigen::Vector2d variance = CommonMatrix(adjustment.solution.bound()).diagonal().head<2>();
+  const Eigen::Vector2d focal = adjustment.solution.camera.k.head<2>();
+  const bool tells = (variance.array() > 0.0).all() && (variance.array().sqrt() < most * focal.array()).all();
+  return {adjustment.solution.rms_px * scale.scale, tells};
+}
+
+/// Turns so small, or about one axis only, tell nothing however they are read.
+bool turns_can_tell(const ObserveMotion& motion) {
+  constexpr double min_rad = 3.0 * degree, little = 0.02;  // of the largest: an axis that did not turn
+  return motion.span_rad >= min_rad && motion.path_rad.head<2>().minCoeff() >= little * motion.path_rad.maxCoeff();
+}
+
+}  // namespace
+
+bool may_be_misread(const ObserveSolution& report) {
+  constexpr double max_ordinary_px = 2.0, many = 0.2;
+  using Status = ObserveSolution::Status;
+  constexpr double ask_beyond = 5.0;
+  const bool has_answer = report.status == Status::ok || report.status == Status::too_few_data;
+  if (!has_answer) return turns_can_tell(report.motion);
+  if (std::ranges::any_of(report.causes, [](const CauseScore& cause) { return cause.z >= ask_beyond; })) return true;
+  const auto seen = static_cast<double>(report.reference.bundle.observations.size() + report.pixels_rejected);
+  return report.status == Status::ok &&
+         (report.sigma_px > max_ordinary_px || static_cast<double>(report.pixels_rejected) > many * seen);
+}
+
+std::string misread_rotation(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,
+                             const Progress& progress) {
+  if (log.source == RotationSource::none || config.rotation == RotationKnowledge::free) return "";
+  constexpr double max_px = 3.0, clearly = 0.3;  // of the noise as the log is read
+  const double as_read = explanation_of(log, config, report.scale, progress).noise_px;
+  std::string best;
+  double least = std::min(max_px, clearly * as_read);
+  for (const Misreading& misreading : misreadings_of(log.source)) {
+    RotationLog undone = log;
+    for (RotationRow& row : undone.rows) misreading.undo(row);
+    const Explanation explained = explanation_of(undone, config, report.scale, progress);
+    if (!explained.tells || !(explained.noise_px < least)) continue;
+    least = explained.noise_px;
+    best = misreading.words;
+  }
+  return best;
+}
+
+}  // namespace alidade

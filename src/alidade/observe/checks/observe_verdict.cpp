@@ -1,0 +1,228 @@
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "alidade/geometry/decompositions.h"
+#include "alidade/geometry/degree.h"
+#include "alidade/observe/filters/fang_observer.h"
+#include "alidade/observe/solve/solve.h"
+
+namespace alidade {
+namespace {
+
+constexpr double fine = 0.003;  // σ over the focal length of a converged estimate
+
+/// Why the log cannot tell, in the words of who turned the camera; and what to add.
+struct Reason {
+  std::string name, what, add;
+};
+
+Reason reason_of(const ObserveSolution& report, const RotationLog& log, const ObserveSetup& config) {
+  const Eigen::Vector3d& path = report.motion.path_rad;  // about x: tilt; y: pan; z: roll
+  const double most = path.maxCoeff();
+  constexpr double little = 0.02;  // of the largest: an axis that did not turn
+  if (log.num_points == 0 || report.rows_used < 3) {
+    return {"too few points", "too few points: " + std::to_string(report.rows_used) + " rows see any",
+            "track at least one point through the rotation, better four"};
+  }
+  if (most < 0.2 * degree) return {"no motion", "the camera does not turn", "pan and tilt it by 5° or more"};
+  if (path.y() < little * most && path.x() < little * most) {
+    return {"roll only", "roll only: neither fx nor fy can be told", "pan and tilt the camera"};
+  }
+  if (path.x() < little * path.y()) {
+    return {"pan only", "pan only: fy cannot be told", "tilt the camera as well"};
+  }
+  if (path.y() < little * path.x()) {
+    return {"tilt only", "tilt only: fx cannot be told", "pan the camera as well"};
+  }
+  if (config.rotation == RotationKnowledge::free) {
+    std::string hold;
+    if (!config.square_pixels) hold = " --square-pixels";
+    if (!config.fixed_centre) hold += " --fix-centre";
+    return {"free rotation", "with the rotation unknown these views cannot tell fx / fy, cx and cy apart",
+            "measure the rotation, rotate the camera farther, about its axis of view too" +
+                (hold.empty() ? "" : ", or fix them:" + hold)};
+  }
+  if (report.motion.span_rad < 3.0 * degree) {
+    return {"too small a span",
+            "too small a span: the camera rotates by " + text_of(report.motion.span_rad / degree, 2) + "° only",
+            "pan and tilt by 5° or more"};
+  }
+  if (log.num_points < 2)
+    return {"too few points", "too few points: one does not determine them", "track four or more"};
+  return {"weak motion", "the motion is too weak for the noise", "rotate farther, longer, or track more points"};
+}
+
+/// The worst-known combination of fx, fy, cx, cy: its σ [px] and its name.
+Check weakest(const ObserveSolution& report) {
+  Check check{"weakest combination", State::good, "", 0.0, 0.0, "px", "excitation"};
+  const double s = report.scale.scale;
+  const CommonMatrix bound = report.reference.solution.bound();
+  const Eigen::Matrix4d K = bound.topLeftCorner<4, 4>() * s * s;
+  if (!K.allFinite() || (K.diagonal().array() <= 0.0).any()) {
+    check.state = State::refused;
+    check.text = "no bound";
+    return check;
+  }
+  const SymmetricEigen eigen = symmetric_eigen(K);
+  const Eigen::Vector4d direction = eigen.vectors.col(3);
+  static const char* const names[] = {"fx", "fy", "cx", "cy"};
+  for (int i = 0; i < 4; ++i) {
+    if (std::abs(direction[i]) < 0.3) continue;
+    check.text += (check.text.empty()   ? ""
+                   : direction[i] > 0.0 ? " + "
+                                        : " − ") +
+                  text_of(std::abs(direction[i]), 2) + " " + names[i];
+  }
+  check.value = std::sqrt(eigen.values[3]);
+  check.limit = 0.05 * report.width_px;
+  check.text += " is known to " + text_of(check.value, 2) + " px (1σ)";
+  if (check.value > check.limit) check.state = State::refused;
+  return check;
+}
+
+void add_checks(const ObserveSolution& report, Verdict& verdict) {
+  verdict.checks.push_back(weakest(report));
+  const double f_sigma = std::max(report.quantities[0].sigma / report.quantities[0].value,
+                                  report.quantities[1].sigma / report.quantities[1].value);
+  constexpr double none = 0.05;  // no answer to rest on
+  verdict.checks.push_back({"focal length",
+                            f_sigma < fine   ? State::good
+                            : f_sigma < none ? State::care
+                                             : State::bad,
+                            "σ of the focal length is " + text_of(100.0 * f_sigma, 2) + " %", 100.0 * f_sigma,
+                            100.0 * fine, "%", "intrinsics"});
+  if (report.nis_per_dof > 0.0) {
+    const bool fits = report.nis_per_dof > 0.5 && report.nis_per_dof < 2.0;
+    verdict.checks.push_back({"consistent", fits ? State::good : State::care,
+                              "innovations are " + text_of(std::sqrt(report.nis_per_dof), 2) + " times their σ",
+                              report.nis_per_dof, 2.0, "", "nis"});
+  }
+  for (const Check& check : residual_checks(report)) verdict.checks.push_back(check);
+  verdict.checks.insert(verdict.checks.end(), report.told_apart.begin(), report.told_apart.end());
+  if (report.gramian_lambda_min >= 0.0) {
+    const double lambda = report.gramian_lambda_min;
+    const State state = lambda < fang_refuse_lambda ? State::refused
+                        : lambda < fang_warn_lambda ? State::care
+                                                    : State::good;
+    verdict.checks.push_back({"persistent excitation", state,
+                              "least eigenvalue of the observer's Gramian " + text_of(lambda, 2), lambda,
+                              fang_refuse_lambda, "", "excitation"});
+  }
+}
+
+Verdict refusal(const std::string& sentence, const std::string& add, ExitCode code) {
+  Verdict verdict;
+  verdict.state = code == ExitCode::cannot_tell ? State::refused : State::not_converged;
+  verdict.exit_code = code;
+  verdict.sentence = sentence;
+  verdict.to_add = add;
+  return verdict;
+}
+
+Verdict fang_refusal(const ObserveSolution& report, const RotationLog& log, const Reason& reason) {
+  std::string why = "the paper's observer is not excited: least eigenvalue of its Gramian " +
+                    text_of(report.gramian_lambda_min, 2) + " < 1e-4";
+  if (log.num_points < 3)
+    why = "too few points for the paper's observer: " + std::to_string(log.num_points) + ", it needs three";
+  std::string add = "use --method hybrid, which can tell from this log";
+  if (reason.name == "too small a span") std::tie(why, add) = std::pair(reason.what, reason.add);
+  Verdict verdict = refusal(why, add, ExitCode::cannot_tell);
+  add_checks(report, verdict);
+  return verdict;
+}
+
+/// A scale that no instrument has was not measured with an error, but read in another way.
+void add_scale_check(const ObserveSolution& report, Verdict& verdict) {
+  constexpr double most = 0.1;
+  for (const ObservedQuantity& quantity : report.quantities) {
+    if (!quantity.name.starts_with("scale_") || std::abs(quantity.value) <= most) continue;
+    const std::string reading = quantity.value > 0.0 ? "the angles are half of what the head turns"
+                                                     : "the angles are twice what the head turns";
+    verdict.checks.push_back({.name = "rotation read as it is",
+                              .state = State::bad,
+                              .text = "no encoder is off by " + text_of(100.0 * std::abs(quantity.value), 2) +
+                                      " %: " + reading + ", or of another unit",
+                              .value = std::abs(quantity.value),
+                              .limit = most,
+                              .unit = "1"});
+    return;
+  }
+}
+
+}  // namespace
+
+Verdict observe_verdict(const ObserveSolution& report, const RotationLog& log, const ObserveSetup& config) {
+  using Status = ObserveSolution::Status;
+  if (report.status == Status::unobservable || report.status == Status::too_few_data) {
+    Reason reason = reason_of(report, log, config);
+    if (!report.misread.empty()) {
+      reason.what = "the rotation does not fit these pixels, and would if it were read otherwise";
+      reason.add = report.misread;
+    }
+    Verdict verdict = refusal(reason.what, reason.add, ExitCode::cannot_tell);
+    if (report.status == Status::unobservable) verdict.checks.push_back(weakest(report));
+    return verdict;
+  }
+  if (report.status == Status::unsteady) {
+    const bool is_hybrid = config.method == ObserveMethod::hybrid;
+    return refusal(is_hybrid ? "the focal length never stands still: there is no second to learn the points in"
+                             : "the focal length changes within this log: one camera is no answer",
+                   is_hybrid ? "let the zoom rest for a second or two while the camera pans and tilts, then zoom"
+                             : "use --method hybrid, which follows a zoom",
+                   ExitCode::cannot_tell);
+  }
+  if (report.status == Status::no_convergence) {
+    // An adjustment that finds no bottom, on a log that could not tell anyway.
+    const Reason reason = reason_of(report, log, config);
+    if (reason.name != "weak motion") {
+      return refusal(reason.what, reason.add, ExitCode::cannot_tell);
+    }
+    if (!report.misread.empty()) {
+      return refusal("no intrinsics explain these pixels with this rotation, but they fit once it is read otherwise",
+                     report.misread, ExitCode::no_convergence);
+    }
+    return refusal("no intrinsics explain these pixels with this rotation",
+                   "check the axes and units of the rotation, that the points stand still, and the zoom for a second",
+                   ExitCode::no_convergence);
+  }
+  if (config.method == ObserveMethod::fang2011 && report.gramian_lambda_min >= 0.0 &&
+      report.gramian_lambda_min < fang_refuse_lambda) {
+    return fang_refusal(report, log, reason_of(report, log, config));
+  }
+  Verdict verdict;
+  add_checks(report, verdict);
+  add_scale_check(report, verdict);
+  for (const Check& check : verdict.checks) {
+    const bool speaks = check.state == State::care || check.state == State::bad;
+    if (!speaks || check.state <= verdict.state) continue;
+    verdict.state = check.state;
+    verdict.to_add = check.text;
+  }
+  const ObservedQuantity &fx = report.quantities[0], &fy = report.quantities[1];
+  verdict.sentence = "fx " + text_of(fx.value, 5) + " ± " + text_of(3.0 * fx.sigma, 2) + " px, fy " +
+                     text_of(fy.value, 5) + " ± " + text_of(3.0 * fy.sigma, 2) + " px (3σ) from " +
+                     std::to_string(report.rows_used) + " rows";
+  if (report.sigma_is_distance) {
+    heed({"σ", State::care, "the method states no σ: it is the distance from the adjustment of all rows", 0.0, 0.0, "",
+          "intrinsics"},
+         "use --method hybrid for a σ of its own", verdict);
+  }
+  const auto cause = std::find_if(verdict.checks.begin(), verdict.checks.end(),
+                                  [](const Check& check) { return check.name.starts_with("needs "); });
+  const auto jitter = std::find_if(verdict.checks.begin(), verdict.checks.end(), [](const Check& check) {
+    return check.name == "rotation's noise" && check.state == State::care;
+  });
+  if (jitter != verdict.checks.end() && verdict.state == State::care) verdict.to_add = jitter->text;
+  if (cause != verdict.checks.end() && verdict.state == State::care) verdict.to_add = cause->text;
+  const Check read = rotation_check(report);
+  verdict.checks.push_back(read);
+  if (read.state == State::bad) {
+    verdict.state = State::bad;
+    verdict.to_add = read.text;
+  }
+  heed_assumptions(report.assumed, verdict);
+  return verdict;
+}
+
+}  // namespace alidade

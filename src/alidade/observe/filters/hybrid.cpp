@@ -1,0 +1,325 @@
+#include "alidade/observe/filters/hybrid.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/observe/filters/steadiness.h"
+
+namespace alidade {
+namespace {
+
+constexpr double zoom_gain = 33.4;  // χ²₄ at 10⁻⁶: what a change of K explains that chance does not
+constexpr int slip_patience = 15;   // frames until a point that slipped is met again
+constexpr double slipped_variance = 25.0;
+constexpr double restart_after_s = 1.0;  // without a frame that fits
+constexpr double better_by = 9.2;        // χ²₂ at 0.01
+constexpr int drift_window = 15;         // frames
+constexpr double finer_by = 0.75;        // of σ: what the filter gained since the last adjustment, before the next
+constexpr int between_adjustments = 5;   // frames
+
+}  // namespace
+
+double chi2_quantile(int dof, double z) {
+  const double n = std::max(dof, 1), a = 2.0 / (9.0 * n);
+  return n * std::pow(1.0 - a + z * std::sqrt(a), 3.0);
+}
+
+HybridObserver::HybridObserver(const HybridConfig& config)
+    : config_(config),
+      filter_(config.nuisances, config.with_depth, config.num_points),
+      buffer_(config.num_points, config.buffer_frames),
+      px_(config.num_points, Eigen::Vector2d::Constant(not_seen)),
+      frames_out_(config.num_points, 0),
+      patience_(config.num_points, slip_patience),
+      candidate_(filter_),
+      own_drift_(config.num_points) {}
+
+void HybridObserver::normalise(const RotationFrame& frame) {
+  for (std::size_t i = 0; i < px_.size(); ++i) {
+    px_[i] = i < frame.px.size() ? config_.scale.normalised(frame.px[i]) : Eigen::Vector2d::Constant(not_seen);
+  }
+}
+
+IntrinsicsEstimate HybridObserver::step(const RotationFrame& frame) {
+  IntrinsicsEstimate estimate;
+  normalise(frame);
+  if (frame.starts_segment && buffer_.size() > 0) {
+    buffer_.renew_all();
+    filter_.forget_points();
+    estimate.event = ObserveEvent::new_segment;
+  }
+  if (is_running_) filter_frame(frame, estimate);
+  if (!is_running_) bootstrap(frame, estimate);
+  if (is_running_) report(frame.t_s, estimate);
+  return estimate;
+}
+
+void HybridObserver::bootstrap(const RotationFrame& frame, IntrinsicsEstimate& estimate) {
+  if (buffer_.size() == 0) next_adjustment_s_ = frame.t_s + config_.bootstrap_s;
+  buffer_.add(frame, px_);
+  // A frame at 1 s is due, whatever the rounding of its time.
+  if (frame.t_s < next_adjustment_s_ - 1e-6) return;
+  next_adjustment_s_ = frame.t_s + 0.5 * config_.bootstrap_s;
+  if (!adjust_buffer()) return;
+  is_running_ = true;
+  last_fit_s_ = frame.t_s;
+  constant_since_s_ = buffer_.frames().front().t_s;
+  estimate.event = ObserveEvent::start;
+}
+
+bool HybridObserver::adjust_buffer() {
+  AdjustConfig config;
+  config.nuisances = config_.nuisances;
+  config.with_depth = config_.with_depth;
+  config.sigma_px = config_.sigma_px / config_.scale.scale;
+  config.sigma_range_m = config_.sigma_range_m;
+  config.range_point = config_.range_point;
+  config.start = is_running_ ? filter_.camera() : config_.start;
+  config.prior = config_.prior;
+  if (!config_.start_is_given && !is_running_) config.other_starts = {0.7, 1.3, 2.5, 5.0, 10.0};
+  Adjustment adjustment = adjust(buffer_, config);
+  if (!adjustment.has_value && !is_running_ && config_.start_is_given) {
+    config.other_starts = {0.7, 1.3, 2.5, 5.0, 10.0};  // the given start may be far off
+    adjustment = adjust(buffer_, config);
+  }
+  if (!adjustment.has_value) return false;
+  if (!is_running_ && steadiness_of(adjustment.bundle, adjustment.solution).is_unsteady()) {
+    buffer_.erase_before(buffer_.frames().back().t_s - config_.bootstrap_s);  // wait for a second at rest
+    return false;
+  }
+  sigma_px_ = adjustment.sigma_px;
+  filter_.start(adjustment.solution, adjustment.bundle_point_of, sigma_px_);
+  sum_nis_ = sum_dof_ = std::max(adjustment.solution.dof, 1);
+  drift_frames_ = 0;
+  const CommonMatrix& P = filter_.covariance();
+  const Eigen::Vector4d& k = filter_.camera().k;
+  is_coarse_ = std::max(std::sqrt(P(0, 0)) / k[0], std::sqrt(P(1, 1)) / k[1]) > config_.fine_enough;
+  adjusted_variance_ = P.diagonal().head<2>();
+  frames_since_adjustment_ = 0;
+  return true;
+}
+
+void HybridObserver::filter_frame(const RotationFrame& frame, IntrinsicsEstimate& estimate) {
+  const Eigen::Vector4d k_before = filter_.camera().k;
+  if (is_zooming_) filter_.predict(zoom_walk(), 0.0);
+  filter_.observe(frame, px_);
+  Judgement judgement = judge();
+  if (judgement.event == ObserveEvent::burst && is_coarse_) {
+    // What the filter knows is not exact yet: let all frames together say what this one means.
+    buffer_.add(frame, px_);
+    if (adjust_buffer()) filter_.observe(frame, px_);
+    judgement = judge();
+    judgement.accept = true;
+    for (std::size_t i = 0; i < filter_.num_seen(); ++i) filter_.leave_out(i, true);  // they are in already
+  }
+  if (judgement.event == ObserveEvent::burst && !config_.no_zoom && is_zoom(frame)) {
+    judgement.event = ObserveEvent::zoom;
+    judgement.accept = true;
+  }
+  if (!std::isfinite(judgement.nis)) return restart(estimate);  // a σ too small for floating point
+  estimate.nis = judgement.nis;
+  estimate.nis_dof = judgement.dof;
+  estimate.point = judgement.point;
+  if (estimate.event == ObserveEvent::none) estimate.event = judgement.event;
+  if (!judgement.accept) {
+    if (frame.t_s - last_fit_s_ > restart_after_s) restart(estimate);
+    return;
+  }
+  has_candidate_ = false;
+  if (!is_zooming_ && has_drifted(estimate) && !config_.no_zoom) {
+    estimate.event = ObserveEvent::zoom;
+    begin_zoom();
+    jump(filter_, frame);
+  }
+  take_in(frame, judgement);
+  if (is_zooming_) learn_zoom_walk(k_before);
+  if (is_zooming_ && has_come_to_rest()) {
+    is_zooming_ = false;
+    constant_since_s_ = frame.t_s;
+    estimate.event = ObserveEvent::zoom_end;
+  }
+}
+
+/// The intrinsics' scores of some frames together: a slow change that no single frame shows. Where leaving one point
+/// out explains it, that point is not what it was.
+bool HybridObserver::has_drifted(IntrinsicsEstimate& estimate) {
+  if (drift_frames_ == 0) {
+    drift_ = {};
+    std::fill(own_drift_.begin(), own_drift_.end(), Score{});
+  }
+  filter_.add_score(drift_.score, drift_.information);
+  for (std::size_t i = 0; i < filter_.num_seen(); ++i) {
+    Score& own = own_drift_[static_cast<std::size_t>(filter_.seen_point(i))];
+    if (!filter_.is_left_out(i)) filter_.add_own_score(i, own.score, own.information);
+  }
+  if (++drift_frames_ < drift_window) return false;
+  drift_frames_ = 0;
+  const double statistic = drift_.score.dot(drift_.information.ldlt().solve(drift_.score));
+  if (!(statistic > chi2_quantile(4, gate_z))) return false;
+  const int point = drifting_point();
+  const bool is_on_probation = point >= 0 && patience_[static_cast<std::size_t>(point)] > slip_patience;
+  if (!is_on_probation && !(statistic > zoom_gain)) return false;
+  if (point < 0) return !is_coarse_;
+  estimate.event = ObserveEvent::slip;
+  estimate.point = point;
+  renew(static_cast<std::size_t>(point));
+  for (std::size_t i = 0; i < filter_.num_seen(); ++i) {
+    if (filter_.seen_point(i) == point) filter_.leave_out(i, true);
+  }
+  return false;
+}
+
+/// The point without which the window's scores are no more than chance; −1: none.
+int HybridObserver::drifting_point() const {
+  Score all;
+  for (const Score& own : own_drift_) {
+    all.score += own.score;
+    all.information += own.information;
+  }
+  int best = -1;
+  double least = chi2_quantile(4, gate_z);
+  for (std::size_t i = 0; i < own_drift_.size(); ++i) {
+    if (own_drift_[i].information.isZero(0.0)) continue;
+    const Eigen::Vector4d score = all.score - own_drift_[i].score;
+    const Eigen::Matrix4d information = all.information - own_drift_[i].information;
+    const Eigen::Matrix4d P = filter_.covariance().topLeftCorner<4, 4>();
+    const double statistic = score.dot((information + information * P * information).ldlt().solve(score));
+    if (!(statistic < least)) continue;
+    least = statistic;
+    best = static_cast<int>(i);
+  }
+  return best;
+}
+
+void HybridObserver::take_in(const RotationFrame& frame, const Judgement& judgement) {
+  last_fit_s_ = frame.t_s;
+  if (!is_zooming_) {
+    sum_nis_ += judgement.nis;
+    sum_dof_ += judgement.dof;
+  }
+  note_slips();
+  filter_.update();
+  if (frame.range_m > 0.0 && config_.with_depth) {
+    filter_.update_range(frame, config_.range_point, frame.range_m, config_.sigma_range_m);
+  }
+  if (!is_coarse_) return;
+  buffer_.add(frame, px_);
+  if (frame.t_s < next_adjustment_s_ - 1e-6 && !has_gained_much()) return;
+  next_adjustment_s_ = frame.t_s + std::max(0.5 * config_.bootstrap_s, 0.25 * buffer_.duration_s());
+  adjust_buffer();
+}
+
+/// While it is coarse the filter takes some of its own errors of linearisation for knowledge: what it has gained is
+/// checked by adjusting, before it is much.
+bool HybridObserver::has_gained_much() {
+  if (++frames_since_adjustment_ < between_adjustments) return false;
+  const Eigen::Vector2d variance = filter_.covariance().diagonal().head<2>();
+  return (variance.array() < finer_by * finer_by * adjusted_variance_.array()).any();
+}
+
+void HybridObserver::note_slips() {
+  for (std::size_t i = 0; i < filter_.num_seen(); ++i) {
+    const auto point = static_cast<std::size_t>(filter_.seen_point(i));
+    if (!filter_.is_left_out(i)) {
+      frames_out_[point] = 0;
+      continue;
+    }
+    px_[point].setConstant(not_seen);
+    if (++frames_out_[point] >= patience_[point]) renew(point);
+  }
+}
+
+/// The point is met again; if it slips again, later and later.
+void HybridObserver::renew(std::size_t point) {
+  filter_.forget_point(point);
+  filter_.distrust(point, slipped_variance);  // what slipped once may not stand still now either
+  buffer_.renew_point(point);
+  frames_out_[point] = 0;
+  patience_[point] = std::min(4 * patience_[point], 10000);
+}
+
+void HybridObserver::settle() {
+  if (is_running_ && is_coarse_) adjust_buffer();
+}
+
+void HybridObserver::restart(IntrinsicsEstimate& estimate) {
+  if (!is_zooming_) note_rest();
+  is_running_ = is_zooming_ = false;
+  has_candidate_ = false;
+  buffer_.clear();
+  estimate.event = ObserveEvent::restart;
+}
+
+double HybridObserver::noise_ratio() const {
+  return config_.sigma_px > 0.0 || !(sum_dof_ > 0.0) ? 1.0 : std::sqrt(sum_nis_ / sum_dof_);
+}
+
+void HybridObserver::report(double t_s, IntrinsicsEstimate& estimate) const {
+  const double scale = config_.scale.scale;
+  const Eigen::Vector4d k = filter_.camera().k_at(t_s);
+  estimate.has_value = true;
+  estimate.fx = scale * k[0];
+  estimate.fy = scale * k[1];
+  estimate.cx = scale * k[2] + config_.scale.centre.x();
+  estimate.cy = scale * k[3] + config_.scale.centre.y();
+  estimate.k1 = filter_.camera().k1;
+  estimate.sigma = scale * noise_ratio() * sigma_k_at(filter_.camera(), filter_.layout(), filter_.covariance(), t_s);
+}
+
+HybridObserver::Judgement HybridObserver::judge() {
+  Judgement judgement;
+  judgement.dof = filter_.dof();
+  judgement.nis = filter_.nis();
+  if (judgement.dof == 0) return judgement;
+  if (judgement.nis <= chi2_quantile(judgement.dof, gate_z)) return judgement;
+  const double if_zoomed = filter_.if_walked(walk(filter_, any_zoom)).nis;
+  if (leave_out_until(gate_z, judgement)) {
+    // A change of the intrinsics moves all points, some little: it is no slip where it explains clearly more.
+    if (!(judgement.nis - if_zoomed > better_by)) return judgement;
+    for (std::size_t i = 0; i < filter_.num_seen(); ++i) filter_.leave_out(i, false);
+    judgement.point = -1;
+  }
+  judgement.event = ObserveEvent::burst;
+  judgement.accept = false;
+  return judgement;
+}
+
+/// Leaves out the worst points one by one until the rest fits: a slip. At most a third of them (one of three or four).
+/// False, with none rejected: that is not it.
+bool HybridObserver::leave_out_until(double z, Judgement& judgement) {
+  const std::size_t seen = filter_.num_seen();
+  const std::size_t most = seen < 3 ? 0 : std::max<std::size_t>(seen / 3, 1);
+  for (std::size_t out = 0; out < most; ++out) {
+    std::size_t worst = seen;
+    double best = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < seen; ++i) {
+      if (filter_.is_left_out(i)) continue;
+      double without = -filter_.own_nis(i);  // many points: the one that fits worst by itself
+      if (seen <= 12) {
+        filter_.leave_out(i, true);
+        without = filter_.nis();
+        filter_.leave_out(i, false);
+      }
+      if (without < best) {
+        best = without;
+        worst = i;
+      }
+    }
+    filter_.leave_out(worst, true);
+    judgement.point = filter_.seen_point(worst);
+    judgement.nis = filter_.nis();
+    judgement.dof = filter_.dof();
+    if (judgement.nis <= chi2_quantile(judgement.dof, z)) {
+      judgement.event = ObserveEvent::slip;
+      return true;
+    }
+  }
+  for (std::size_t i = 0; i < seen; ++i) filter_.leave_out(i, false);
+  judgement.nis = filter_.nis();
+  judgement.dof = filter_.dof();
+  judgement.point = -1;
+  return false;
+}
+
+}  // namespace alidade

@@ -1,0 +1,126 @@
+#pragma once
+
+#include "alidade/observe/filters/arrowhead_filter.h"
+#include "alidade/observe/frame_buffer.h"
+
+namespace alidade {
+
+struct HybridConfig {
+  std::size_t num_points = 0;
+  PixelScale scale;
+  ObserveNuisances nuisances;
+  bool with_depth = false;
+  RotatingCamera start;  ///< Normalised.
+  std::optional<CommonPrior> prior;
+  bool no_zoom = false;         ///< Nothing is taken for a zoom.
+  bool start_is_given = false;  ///< Otherwise several focal lengths are tried.
+  double sigma_px = 0.0;        ///< [px]; 0: estimated from the residuals.
+  double sigma_range_m = 0.0;   ///< Of the frames' ranges.
+  std::size_t range_point = 0;
+  double bootstrap_s = 1.0;
+  std::size_t buffer_frames = 300;  ///< Kept for adjustments.
+  /// σ_f / f below which frames are filtered, and a zoom followed, instead of all being adjusted together again.
+  double fine_enough = 1e-3;
+  double zoom_px = 0.5;  ///< σ that a frame of zoom adds to each of fx, fy, cx, cy. [px]
+};
+
+/// The default estimator of a rotating camera: a rotation bundle adjustment over the first second, adjusted again
+/// while the answer is still coarse, then an extended Kalman filter (ArrowheadFilter) that judges each frame before it
+/// takes it in: an outlier point is rejected (and after 15 frames initialised again), an outlier frame is skipped, a
+/// change of the intrinsics is followed, as fast as it is. While the focal length does not stand still it does not
+/// begin. If nothing fits for a second it starts again. `step` allocates nothing once the adjustments are over (about 4
+/// s). docs/maths/rotating-camera.md.
+class HybridObserver {
+ public:
+  explicit HybridObserver(const HybridConfig& config);
+
+  IntrinsicsEstimate step(const RotationFrame& frame);
+
+  [[nodiscard]] const ArrowheadFilter& filter() const { return filter_; }
+  [[nodiscard]] bool is_running() const { return is_running_; }
+  /// σ of a pixel coordinate: given, or as the log tells so far. [px]
+  [[nodiscard]] double sigma_px() const { return config_.scale.scale * sigma_px_ * noise_ratio(); }
+  /// The σ that the filter reckons with, normalised: its covariance is in units of it.
+  [[nodiscard]] double filter_sigma_px() const { return sigma_px_; }
+  /// A time in which the intrinsics did not change.
+  struct Rest {
+    double from_s = 0.0, until_s = 0.0;
+    bool is_current = false;  ///< Lasts to the end, whether or not the last frames fit.
+    [[nodiscard]] double duration_s() const { return until_s - from_s; }
+  };
+  /// The longest so far; of no length while there is none.
+  [[nodiscard]] Rest longest_rest() const;
+  /// The log has ended: while the answer is coarse, all frames together say it best.
+  void settle();
+
+ private:
+  struct Judgement {
+    ObserveEvent event = ObserveEvent::none;
+    int point = -1;
+    double nis = 0.0;
+    int dof = 0;
+    bool accept = true;
+  };
+
+  void normalise(const RotationFrame& frame);
+  void bootstrap(const RotationFrame& frame, IntrinsicsEstimate& estimate);
+  bool adjust_buffer();
+  void filter_frame(const RotationFrame& frame, IntrinsicsEstimate& estimate);
+  [[nodiscard]] Judgement judge();
+  bool leave_out_until(double gate_z, Judgement& judgement);
+  [[nodiscard]] bool is_zoom(const RotationFrame& frame);
+  void jump(ArrowheadFilter& filter, const RotationFrame& frame) const;
+  void begin_zoom();
+  [[nodiscard]] bool has_drifted(IntrinsicsEstimate& estimate);
+  [[nodiscard]] int drifting_point() const;
+  void renew(std::size_t point);
+  [[nodiscard]] bool has_come_to_rest();
+  void take_in(const RotationFrame& frame, const Judgement& judgement);
+  [[nodiscard]] bool has_gained_much();
+  void note_slips();
+  void note_rest();
+  void restart(IntrinsicsEstimate& estimate);
+  [[nodiscard]] CommonVector walk(const ArrowheadFilter& filter, double frames) const;
+  [[nodiscard]] CommonVector zoom_walk() const;
+  void learn_zoom_walk(const Eigen::Vector4d& k_before);
+  [[nodiscard]] double noise_ratio() const;
+  void report(double t_s, IntrinsicsEstimate& estimate) const;
+
+  static constexpr double gate_z = 3.09;   ///< One frame in a thousand is called bad by chance.
+  static constexpr double any_zoom = 1e6;  ///< Frames worth of change: whatever the pixels want.
+  static constexpr int rest_frames = 10;   ///< Over which a zoom that is over shows no change.
+
+  HybridConfig config_;
+  ArrowheadFilter filter_;
+  FrameBuffer buffer_;
+  std::vector<Eigen::Vector2d> px_;  ///< Of this frame, normalised.
+  std::vector<int> frames_out_;      ///< One a point: in a row rejected,
+  std::vector<int> patience_;        ///< and how many before it is initialised again.
+  ArrowheadFilter candidate_;        ///< The filter if the last frame was a zoom.
+  bool has_candidate_ = false;
+  bool is_coarse_ = true;  ///< Still adjusted, not only filtered.
+  bool is_running_ = false;
+  double sigma_px_ = 0.0;  ///< Normalised.
+  double next_adjustment_s_ = 0.0;
+  double constant_since_s_ = 0.0, last_fit_s_ = 0.0;
+  Rest rest_;                                                    ///< The longest before the intrinsics last changed.
+  Eigen::Vector2d adjusted_variance_ = Eigen::Vector2d::Zero();  ///< Of fx, fy, by the last adjustment.
+  int frames_since_adjustment_ = 0;
+  double sum_nis_ = 0.0, sum_dof_ = 0.0;  ///< Over frames that fit: the noise.
+  bool is_zooming_ = false;
+  Eigen::Vector4d zoom_variance_ = Eigen::Vector4d::Zero();  ///< Of a frame's change while zooming, as it was of late.
+  std::array<Eigen::Vector4d, rest_frames> past_k_;
+  int past_count_ = 0;
+  struct Score {
+    Eigen::Vector4d score = Eigen::Vector4d::Zero();
+    Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
+  };
+  Score drift_;
+  std::vector<Score> own_drift_;  ///< One a point.
+  int drift_frames_ = 0;
+};
+
+/// Quantile of χ² with `dof` degrees of freedom at the normal deviate `z` (3.09: 0.999). Wilson & Hilferty 1931.
+[[nodiscard]] double chi2_quantile(int dof, double z);
+
+}  // namespace alidade

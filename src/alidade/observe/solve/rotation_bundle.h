@@ -1,0 +1,115 @@
+#pragma once
+
+#include <array>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "alidade/estimation/progress.h"
+#include "alidade/observe/solve/rotation_model.h"
+
+namespace alidade {
+
+/// Where a point was seen.
+struct BundleObservation {
+  int frame = 0;
+  int point = 0;
+  Eigen::Vector2d px;  ///< Normalised.
+};
+
+/// How far a point was from the camera centre.
+struct BundleRange {
+  int frame = 0;
+  int point = 0;
+  double range_m = 0.0;
+};
+
+/// All that was measured, for one adjustment. `frames[i].px` are not looked at. Points of different segments are
+/// different points.
+struct RotationBundle {
+  std::vector<RotationFrame> frames;
+  std::vector<BundleObservation> observations;
+  std::vector<BundleRange> ranges;
+  RotatingCamera camera;             ///< Where to start.
+  std::vector<BearingPoint> points;  ///< Where to start.
+};
+
+struct RotationBundleConfig {
+  ObserveNuisances nuisances;
+  bool with_depth = false;  ///< Points have a depth: a lever arm or a measured velocity is in play.
+  double sigma_px = 1e-3;   ///< Of each observation, normalised.
+  double sigma_range_m = 1e-3;
+  double sigma_turn_rad = 0.0;  ///< Of each frame's rotation, where nuisances.turn; infinite: not measured.
+  double sigma_rate_rad_per_s =
+      0.0;  ///< Above zero: the rotation was integrated from rates with this white noise a sample, its error walks.
+  double huber = 2.5;  ///< Residuals beyond so many σ count less. 0: all count alike.
+  int max_iterations = 60;
+};
+
+/// What is known of the common parameters before: normal distributions, weak where nothing is said.
+struct CommonPrior {
+  explicit CommonPrior(const RotatingCamera& mean_in);
+  RotatingCamera mean;
+  Eigen::Vector4d sigma_k;       ///< fx, fy: half their value; cx, cy: a quarter of the image.
+  std::array<bool, 4> says_k{};  ///< sigma_k is said by a person, not weak.
+  double sigma_aspect = std::numeric_limits<double>::infinity();  ///< Of fx − fy, where a person says so.
+  double sigma_k1 = 0.5;                                          ///< k2, k3 too.
+  double sigma_tangential = 0.05;
+  double sigma_mount_rad = 0.2;
+  double sigma_delay_s = 0.1;
+  double sigma_lever_m = 0.3;
+  double sigma_shutter_s = 0.05;
+  double sigma_drift_per_s = 0.01;
+  double sigma_error = 1.0;  ///< Of errors of the rotation, which are in units of their ordinary sizes: said.
+
+  [[nodiscard]] CommonMatrix information(const CommonLayout& layout) const;
+  /// Of what a person says alone.
+  [[nodiscard]] CommonMatrix said_information(const CommonLayout& layout) const;
+  /// Values minus the mean, in the layout's order.
+  [[nodiscard]] CommonVector offset(const CommonLayout& layout, const RotatingCamera& camera) const;
+  /// The same knowledge; what is weak is weak about `camera`.
+  [[nodiscard]] CommonPrior about(const RotatingCamera& camera) const;
+};
+
+/// A point's share of the joint covariance given the common parameters c: point = point_mean + slope (c − c_mean) + e,
+/// e ~ N(0, cov). Inverse depth is the third coordinate, if there is one.
+using PointByCommonSlope = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_common>;
+struct PointGivenCommon {
+  PointByCommonSlope slope;
+  Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();
+};
+
+struct BundleSolution {
+  bool converged = false;
+  int iterations = 0;
+  RotatingCamera camera;
+  std::vector<BearingPoint> points;
+  std::vector<Eigen::Quaterniond> mount_from_start;  ///< One a frame, with its turn.
+  CommonMatrix information;  ///< Of the common parameters but the turn, all else eliminated, without the prior, in
+                             ///< units of 1/σ².
+  CommonMatrix prior_information;
+  CommonVector prior_gradient;                 ///< Of half the prior's cost.
+  CommonMatrix said_information;               ///< Of the prior, what a person said.
+  std::vector<PointGivenCommon> given_common;  ///< One a point; not with turns.
+  std::vector<Eigen::Vector2d> residuals;      ///< Prediction minus pixel, one an observation, normalised.
+  std::vector<double> residual_px;             ///< Their norms.
+  double sum_squares = 0.0;                    ///< Of weighted residuals over σ.
+  double rms_px = 0.0;                         ///< A coordinate, normalised, unweighted.
+  int dof = 0;                                 ///< Measurements minus unknowns.
+
+  [[nodiscard]] CommonMatrix covariance() const;
+  /// Cramér–Rao bound at the solution: without the weak prior. Not finite where the data cannot tell.
+  [[nodiscard]] CommonMatrix bound() const;
+};
+
+/// Rotation-only bundle adjustment: Levenberg–Marquardt on the common parameters, all points, and (with nuisances.turn)
+/// each frame's rotation; points are eliminated block by block (Schur complement), so that the time grows linearly in
+/// them. Throws Interrupted.
+/// Triggs, McLauchlan, Hartley & Fitzgibbon, "Bundle adjustment — a modern synthesis", 2000, section 6.
+[[nodiscard]] BundleSolution solve_rotation_bundle(const RotationBundle& bundle, const CommonPrior& prior,
+                                                   const RotationBundleConfig& config, const Progress& progress = {});
+
+/// Robust σ of a coordinate from the residuals: their median norm over √(2 ln 2), freed of the unknowns' share.
+[[nodiscard]] double robust_sigma(std::vector<double> residual_norms, int dof);
+
+}  // namespace alidade

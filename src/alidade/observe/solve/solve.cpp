@@ -1,0 +1,286 @@
+#include <algorithm>
+#include <sstream>
+
+#include "alidade/observe/checks/cause_search.h"
+
+namespace alidade {
+namespace {
+
+constexpr int max_rounds = 6;
+
+/// Frees what the cause names, "k1,k2", "mount", "backlash". False: it cannot be estimated, or is already.
+bool free_cause(const std::string& cause, const RotationLog& log, ObserveSetup& config) {
+  const bool lens_is_given = config.lens_is_given;
+  ObserveNuisances& estimate = config.nuisances;
+  const ObserveNuisances before = estimate;
+  const std::size_t errors_before = estimated_errors(log, config).size();
+  config.estimate_errors.push_back(cause);
+  if (estimated_errors(log, config).size() > errors_before) return true;
+  config.estimate_errors.pop_back();
+  std::istringstream names(cause);
+  for (std::string name; std::getline(names, name, ',');) {
+    const bool is_of_lens = name.size() == 2 && (name[0] == 'k' || name[0] == 'p');
+    if (is_of_lens && lens_is_given) return false;
+    if (const auto nuisance = nuisance_of(estimate_word_of(name))) estimate.*nuisance = true;
+  }
+  // Higher terms without the lower ones are no lens that is made.
+  estimate.k2 = estimate.k2 || (estimate.k3 && !lens_is_given);
+  estimate.k1 = estimate.k1 || (estimate.k2 && !lens_is_given);
+  return CommonLayout(estimate).size > CommonLayout(before).size;
+}
+
+/// The cause that explains the residuals best, of those that are asked for; of several that do nearly as well the one
+/// with the fewest numbers: what it leaves is asked for next. Null: none is.
+const CauseScore* best_cause(const ObserveSolution& report) {
+  constexpr double nearly = 0.9;
+  const CauseScore* best = nullptr;
+  for (const CauseScore& cause : report.causes) {
+    if (cause.z >= asked_beyond(report) && (best == nullptr || cause.gain > best->gain)) best = &cause;
+  }
+  const CauseScore* simplest = best;
+  for (const CauseScore& cause : report.causes) {
+    if (best == nullptr || cause.z < asked_beyond(report) || cause.gain < nearly * best->gain) continue;
+    if (cause.members.size() < simplest->members.size()) simplest = &cause;
+  }
+  return simplest;
+}
+
+bool is_answer(const ObserveSolution& report) { return report.status == ObserveSolution::Status::ok; }
+
+/// Without an answer there may be one where the camera is mounted askew, late, and bends its image.
+ObserveSolution second_chance(const RotationLog& log, ObserveSetup& config, const Progress& progress) {
+  ObserveSetup freer = config;
+  freer.nuisances.mount = freer.nuisances.delay = true;
+  if (!config.lens_is_given) freer.nuisances.k1 = true;
+  ObserveSolution report = solve_as_given(log, freer, progress);
+  if (is_answer(report)) config = freer;
+  return report;
+}
+
+bool has_zoom(const ObserveSolution& report) {
+  return std::any_of(report.events.begin(), report.events.end(), [](const ObserveNote& note) {
+    return note.event == ObserveEvent::zoom || note.event == ObserveEvent::restart;
+  });
+}
+
+/// What is not modelled, and errors that last, may look like zooms, and each rest between them be explained by itself.
+/// Where all rows fit one camera nearly as well there was no zoom: theirs is the answer. Where they do not but are
+/// steady, what they ask for counts.
+void settle_zooms(const RotationLog& log, const ObserveSetup& config, const Progress& progress,
+                  ObserveSolution& report) {
+  constexpr double nearly = 1.2;  // of the noise: a zoom that moves points by their σ raises it more
+  const bool is_known = config.rotation == RotationKnowledge::known;
+  if (!has_zoom(report) || !is_known || !is_answer(report) || config.method != ObserveMethod::hybrid) return;
+  ObserveSetup whole = config;
+  whole.method = ObserveMethod::batch;
+  ObserveSolution all = solve_as_given(log, whole, progress);
+  if (!is_answer(all)) return;
+  if (all.sigma_px < nearly * report.sigma_px || config.no_zoom) {
+    const IntrinsicsEstimate last = all.steps.back();
+    all.steps = std::move(report.steps);
+    all.steps.back() = last;
+    all.events = std::move(report.events);
+    all.nis_per_dof = report.nis_per_dof;
+    report = std::move(all);
+    return;
+  }
+  constexpr double far_off =
+      3.0;  // the noise of one camera's rows beside a real zoom's: nothing is to be learnt from them
+  if (all.sigma_px > far_off * report.sigma_px) return;
+  const CauseScore* best = best_cause(all);
+  if (best == nullptr || best->name == "focal length that drifts") return;
+  const CauseScore* known = best_cause(report);
+  if (known == nullptr || best->gain > known->gain) report.causes = std::move(all.causes);
+}
+
+/// A focal length that changes faster than warmth or a creeping focus do is a zoom.
+constexpr double fastest_drift_per_s = 0.003;
+
+bool zooms(const CauseScore& cause) {
+  return cause.name == "focal length that drifts" && std::abs(cause.members.front().value) > fastest_drift_per_s;
+}
+
+bool is_of_lens(const std::string& cause) {
+  return cause.size() >= 2 && (cause[0] == 'k' || cause[0] == 'p') && cause[1] >= '1' && cause[1] <= '3';
+}
+
+/// Another cause that explains the residuals about as well as the one that was freed.
+struct Rival {
+  std::string freed, name;
+  double by_px = 0.0;  ///< How far the answers are from each other.
+};
+
+void note_rivals(const ObserveSolution& report, const CauseScore& best, std::vector<Rival>& rivals) {
+  constexpr double about_as_well = 10.0;  // of twice the log-likelihood: odds of 1 : 150
+  constexpr double elsewhere = 3.0;       // σ
+  const auto& quantities = report.quantities;
+  for (const CauseScore& cause : report.causes) {
+    const bool is_kin = cause.name == best.name || (is_of_lens(cause.name) && is_of_lens(best.name));
+    if (is_kin || cause.z < asked_beyond(report) || cause.gain < best.gain - about_as_well) continue;
+    const double by_px = report.scale.scale * (cause.shift.head<2>() - best.shift.head<2>()).cwiseAbs().maxCoeff();
+    if (!(by_px > elsewhere * std::max(quantities[0].sigma_model, quantities[1].sigma_model))) continue;
+    rivals.push_back({best.name, cause.name, by_px});
+  }
+}
+
+/// Of those that are not estimated in the end.
+std::vector<Check> rival_checks(const std::vector<Rival>& rivals, const RotationLog& log, const ObserveSetup& config) {
+  std::vector<Check> checks;
+  for (const Rival& rival : rivals) {
+    ObserveSetup freer = config;
+    if (!free_cause(rival.name, log, freer)) continue;
+    checks.push_back({"told apart", State::care,
+                      rival.freed + " explains the residuals, and " + rival.name +
+                          " would about as well: these pixels cannot distinguish them (fx, fy would differ by " +
+                          text_of(rival.by_px, 2) + " px)",
+                      rival.by_px, 0.0, "px", "residuals"});
+  }
+  return checks;
+}
+
+/// Frees one cause after the other, the one that explains most first.
+void free_one_by_one(const RotationLog& log, const Progress& progress, ObserveSetup& config, ObserveSolution& report,
+                     std::vector<Rival>& rivals) {
+  for (int round = 0; round < max_rounds && is_answer(report); ++round) {
+    const CauseScore* cause = best_cause(report);
+    ObserveSetup next = config;
+    if (cause == nullptr || zooms(*cause) || !free_cause(cause->name, log, next)) break;
+    ObserveSolution freer = solve_as_given(log, next, progress);
+    if (!is_answer(freer)) break;
+    note_rivals(report, *cause, rivals);
+    report = std::move(freer);
+    config = next;
+    settle_zooms(log, config, progress, report);
+  }
+}
+
+/// Residuals that are more than points' noise, or zooms, may be several causes at once.
+bool is_doubtful(const ObserveSolution& report) {
+  constexpr double max_ordinary_px = 2.0, many = 9.0, vague = 0.005;
+  if (!is_answer(report)) return true;
+  return has_zoom(report) || report.sigma_px > max_ordinary_px || report.stated.blocks.design_effect > many ||
+         report.quantities[0].sigma > vague * report.quantities[0].value;
+}
+
+/// Tries sets of causes from what the person told.
+bool search_causes(const RotationLog& log, const Progress& progress, ObserveSetup& config, ObserveSolution& report) {
+  constexpr double clearly = 0.6, with_zoom = 3.0, max_px = 2.0;
+  double max_px_here = max_px;
+  if (is_answer(report)) max_px_here = std::min(max_px, (has_zoom(report) ? with_zoom : clearly) * report.sigma_px);
+  const auto found = searched_causes(log, config, report, max_px_here, progress);
+  if (!found) return false;
+  ObserveSetup freer = *found;
+  ObserveSolution again = solve_as_given(log, freer, progress);
+  settle_zooms(log, freer, progress, again);
+  if (!is_answer(again)) {
+    freer.method = ObserveMethod::batch;
+    again = solve_as_given(log, freer, progress);
+    freer.method = config.method;
+  }
+  if (!is_answer(again)) return false;
+  report = std::move(again);
+  config = std::move(freer);
+  return true;
+}
+
+/// A zoom that never rests: it is asked for as a drift that is none, or the answer is vague, and no second stands
+/// still.
+bool never_rests(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,
+                 const Progress& progress) {
+  constexpr double vague = 0.005, max_ordinary_px = 2.0;
+  if (report.status == ObserveSolution::Status::no_convergence) return has_no_rest(log, config, report, progress);
+  if (!is_answer(report)) return false;
+  const CauseScore* cause = best_cause(report);
+  if (cause != nullptr && zooms(*cause)) return true;
+  if (std::abs(report.reference.solution.camera.drift_per_s) > fastest_drift_per_s) return true;
+  const bool is_vague =
+      report.sigma_px > max_ordinary_px || report.quantities[0].sigma > vague * report.quantities[0].value;
+  return is_vague && has_no_rest(log, config, report, progress);
+}
+
+/// A filter is never worse than the adjustment of all rows: where it did not settle, or is off by more than its σ,
+/// theirs is the answer, and the report says so.
+void prefer_all_rows(const RotationLog& log, const ObserveSetup& config, const Progress& progress,
+                     ObserveSolution& report) {
+  constexpr double max_off = 3.0;
+  const bool is_filter = config.method == ObserveMethod::hybrid || config.method == ObserveMethod::window;
+  if (!is_filter || config.rotation != RotationKnowledge::known) return;
+  if (report.status == ObserveSolution::Status::unsteady || report.status == ObserveSolution::Status::too_few_data)
+    return;
+  if (is_answer(report) && !(report.from_reference > max_off)) return;
+  ObserveSetup whole = config;
+  whole.method = ObserveMethod::batch;
+  ObserveSolution all = solve_as_given(log, whole, progress);
+  if (!is_answer(all)) return;
+  const std::string why = is_answer(report)
+                              ? "the filter ends " + text_of(report.from_reference, 2) + "σ from all rows together"
+                              : std::string("the filter did not settle");
+  all.events = std::move(report.events);
+  all.told_apart.push_back({"from all rows", State::good, why + ": theirs is the answer", report.from_reference,
+                            max_off, "σ", "intrinsics"});
+  report = std::move(all);
+}
+
+/// What is estimated and yet rests on what instruments ordinarily have.
+void note_untold(const ObserveSolution& report, const std::vector<RotationError>& errors,
+                 std::vector<Check>& told_apart) {
+  constexpr double hardly = 0.7;
+  std::string names;
+  for (const RotationError& error : errors) {
+    for (const ObservedQuantity& quantity : report.quantities) {
+      if (quantity.name != error.quantity || quantity.sigma_model < hardly * error.ordinary) continue;
+      names += (names.empty() ? "" : ", ") + quantity.name;
+    }
+  }
+  if (names.empty()) return;
+  told_apart.push_back({"told", State::good,
+                        "the pixels hardly determine " + names + ": σ counts what such instruments ordinarily have",
+                        0.0, 0.0, "", "residuals"});
+}
+
+/// Frees what the residuals ask for: sets of causes where the answer is doubtful, one after the other where not.
+void find_causes(const RotationLog& log, const ObserveSetup& told, const Progress& progress, ObserveSetup& config,
+                 ObserveSolution& report, std::vector<Rival>& rivals) {
+  using Status = ObserveSolution::Status;
+  if (is_doubtful(report) && report.status != Status::unobservable) search_causes(log, progress, config, report);
+  if (report.status == Status::no_convergence || report.status == Status::unsteady) {
+    ObserveSolution second = second_chance(log, config, progress);
+    if (is_answer(second)) {
+      report = std::move(second);
+      settle_zooms(log, config, progress, report);
+    }
+  }
+  free_one_by_one(log, progress, config, report, rivals);
+  ObserveSetup again = told;
+  if (has_zoom(report) || !is_answer(report) || !is_doubtful(report)) return;
+  if (!search_causes(log, progress, again, report)) return;
+  config = std::move(again);
+  rivals.clear();
+  free_one_by_one(log, progress, config, report, rivals);
+}
+
+}  // namespace
+
+ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& told, const Progress& progress) {
+  using Status = ObserveSolution::Status;
+  ObserveSetup config = told;
+  ObserveSolution report = solve_as_given(log, config, progress);
+  settle_zooms(log, config, progress, report);
+  std::vector<Rival> rivals;
+  const bool is_regression = config.method == ObserveMethod::flow || config.method == ObserveMethod::fang2011;
+  const bool is_known = config.rotation == RotationKnowledge::known;
+  const bool is_judged = is_known && !is_regression && report.status != Status::too_few_data;
+  if (config.estimate_auto && is_judged) find_causes(log, told, progress, config, report, rivals);
+  prefer_all_rows(log, config, progress, report);
+  if (is_judged && !config.no_zoom && never_rests(log, config, report, progress)) report.status = Status::unsteady;
+  if (is_answer(report)) {
+    note_untold(report, estimated_errors(log, config), report.told_apart);
+    for (Check& check : rival_checks(rivals, log, config)) report.told_apart.push_back(std::move(check));
+  }
+  report.estimated = config.nuisances;
+  report.estimated_errors = config.estimate_errors;
+  if (may_be_misread(report)) report.misread = misread_rotation(log, config, report, progress);
+  return report;
+}
+
+}  // namespace alidade

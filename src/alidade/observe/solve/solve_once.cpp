@@ -1,0 +1,391 @@
+#include "alidade/observe/solve/solve.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/geometry/so3.h"
+#include "alidade/observe/filters/fang_observer.h"
+#include "alidade/observe/filters/flow_filter.h"
+#include "alidade/observe/filters/hybrid.h"
+#include "alidade/observe/filters/steadiness.h"
+#include "alidade/observe/solve/solve_once.h"
+
+namespace alidade {
+namespace {
+
+Eigen::Vector4d intrinsics_px(const Eigen::Vector4d& k, const PixelScale& scale) {
+  const Eigen::Vector4d px = scale.scale * k;
+  return {px[0], px[1], px[2] + scale.centre.x(), px[3] + scale.centre.y()};
+}
+
+constexpr std::size_t max_turns = 240;  // frames whose rotation is estimated: the solve is cubic in them
+constexpr std::size_t max_cells = 4000000;
+
+/// One run over one log: frames, scale and start made once, then a method, then the reference.
+class Observation {
+ public:
+  Observation(const RotationLog& log, const ObserveSetup& config, const std::vector<RotationError>& errors,
+              const RotationErrors& undone, const Progress& progress)
+      : log_(log), config_(config), errors_(errors), progress_(progress) {
+    report_.width_px = config.width_px;
+    report_.height_px = config.height_px;
+    report_.scale = pixel_scale(log, report_.width_px, report_.height_px);
+    report_.sigma_is_estimated = !config.sigma_px;
+    report_.steps.resize(log.rows.size());
+    config_.width_px = report_.width_px;
+    config_.height_px = report_.height_px;
+    config_.nuisances.errors = static_cast<int>(errors.size());
+    start_ = start_camera(config_, report_.scale);
+    start_.errors = RotationErrors::Zero(static_cast<Eigen::Index>(errors.size()));
+    start_.undone = undone;
+    if (!log.rows.empty()) start_.drift_from_s = log.rows.back().t_s;
+  }
+
+  ObserveSolution run() {
+    make_frames();
+    if (!enough_to_begin()) return std::move(report_);
+    switch (config_.rotation == RotationKnowledge::known ? config_.method : ObserveMethod::batch) {
+      case ObserveMethod::hybrid:
+        run_hybrid();
+        break;
+      case ObserveMethod::window:
+        run_window();
+        break;
+      case ObserveMethod::flow:
+        run_flow();
+        break;
+      case ObserveMethod::fang2011:
+        run_fang();
+        break;
+      case ObserveMethod::batch:
+        break;
+    }
+    solve_reference();
+    conclude();
+    return std::move(report_);
+  }
+
+ private:
+  void make_frames() {
+    MotionReader reader(log_.source, config_.max_gap_s);
+    for (const RotationRow& row : log_.rows) frames_.push_back(reader.next(row));
+    Eigen::Quaterniond attitude = Eigen::Quaterniond::Identity();
+    for (const RotationFrame& frame : frames_) {
+      attitude = exp_so3(-frame.mean_rate_rad_per_s * frame.dt_s) * attitude;
+      report_.motion.path_rad += frame.mean_rate_rad_per_s.cwiseAbs() * frame.dt_s;
+      report_.motion.span_rad = std::max(report_.motion.span_rad, log_so3(attitude.normalized()).norm());
+      const bool is_used = std::any_of(frame.px.begin(), frame.px.end(), is_seen);
+      report_.rows_used += is_used ? 1 : 0;
+    }
+    if (log_.source == RotationSource::none) begin_free();
+    add_turns(log_, errors_, config_.max_gap_s, frames_);
+  }
+
+  void begin_free() {
+    const auto start = free_rotation_start(log_, report_.scale);
+    if (!start) return;
+    if (!config_.start) start_.k.head<2>().setConstant(start->focal);
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      frames_[k].cam_from_start = start->cam_from_start[k];
+      frames_[k].starts_segment = k == 0;
+      if (k == 0) continue;
+      const Eigen::Vector3d turn =
+          log_so3((start->cam_from_start[k] * start->cam_from_start[k - 1].conjugate()).normalized());
+      report_.motion.path_rad += turn.cwiseAbs();
+      report_.motion.span_rad = std::max(report_.motion.span_rad, log_so3(start->cam_from_start[k]).norm());
+    }
+    free_started_ = true;
+  }
+
+  [[nodiscard]] bool enough_to_begin() const {
+    return report_.rows_used >= 3 && (log_.source != RotationSource::none || free_started_);
+  }
+
+  void note(std::size_t row) {
+    const IntrinsicsEstimate& step = report_.steps[row];
+    if (step.event != ObserveEvent::none) report_.events.push_back({log_.rows[row].t_s, step.event, step.point});
+    if ((row & 255u) == 0) report_progress(progress_, "frames", row, frames_.size());
+  }
+
+  void run_hybrid() {
+    HybridConfig hybrid = hybrid_config(log_, config_, report_.scale);
+    hybrid.start = start_;
+    HybridObserver observer(hybrid);
+    double sum_nis = 0.0, sum_dof = 0.0;
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      report_.steps[k] = observer.step(frames_[k]);
+      note(k);
+      const IntrinsicsEstimate& step = report_.steps[k];
+      if (!(step.nis_dof > 0) || step.event == ObserveEvent::burst || step.event == ObserveEvent::zoom) continue;
+      sum_nis += step.nis;
+      sum_dof += step.nis_dof;
+    }
+    report_.nis_per_dof = sum_dof > 0.0 ? sum_nis / sum_dof : 0.0;
+    if (!observer.is_running()) return;
+    observer.settle();
+    report_.sigma_px = observer.sigma_px();
+    const HybridObserver::Rest rest = observer.longest_rest();
+    report_.reference_from_s = rest.from_s;
+    report_.reference_until_s = rest.until_s;
+    rests_at_end_ = rest.is_current;
+    final_ = observer.filter().camera();
+    const double noise = observer.sigma_px() / report_.scale.scale;
+    const double ratio = config_.sigma_px ? 1.0 : std::pow(noise / observer.filter_sigma_px(), 2);
+    final_cov_ = ratio * observer.filter().covariance();
+    has_final_ = true;
+    set_values(report_.steps.back(), final_, frames_.back().t_s);
+    report_.steps.back().sigma = report_.scale.scale * final_cov_.diagonal().head<4>().cwiseSqrt();
+  }
+
+  void add_frame(FrameBuffer& buffer, std::size_t row) const {
+    std::vector<Eigen::Vector2d> px(log_.num_points, Eigen::Vector2d::Constant(not_seen));
+    for (std::size_t i = 0; i < frames_[row].px.size(); ++i) px[i] = report_.scale.normalised(frames_[row].px[i]);
+    if (frames_[row].starts_segment) buffer.renew_all();
+    buffer.add(frames_[row], px);
+  }
+
+  void run_window() {
+    constexpr double keyframe_s = 0.1;
+    FrameBuffer buffer(log_.num_points, std::min<std::size_t>(frames_.size(), 20000));
+    AdjustConfig adjust_with = adjust_config_of(log_, config_, start_, report_.scale);
+    double next_s = frames_.front().t_s + 1.0;
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      add_frame(buffer, k);
+      buffer.erase_before(frames_[k].t_s - config_.window_s);
+      if (k > 0) report_.steps[k] = report_.steps[k - 1];
+      report_.steps[k].event = ObserveEvent::none;
+      if (frames_[k].t_s < next_s - 1e-6) continue;
+      next_s = frames_[k].t_s + keyframe_s;
+      const Adjustment adjustment = adjust(buffer, adjust_with, progress_);
+      if (adjustment.has_value) {
+        if (!report_.steps[k].has_value) report_.steps[k].event = ObserveEvent::start;
+        fill(report_.steps[k], adjustment, frames_[k].t_s);
+        adjust_with.start = adjustment.solution.camera;
+        adjust_with.other_starts.clear();
+      }
+      note(k);
+    }
+  }
+
+  void fill(IntrinsicsEstimate& step, const Adjustment& adjustment, double t_s) {
+    step.has_value = true;
+    set_values(step, adjustment.solution.camera, t_s);
+    final_ = adjustment.solution.camera;
+    final_cov_ = adjustment.solution.covariance();
+    has_final_ = true;
+    step.sigma = report_.scale.scale * final_cov_.diagonal().head<4>().cwiseSqrt();
+    const int dof = std::max(adjustment.solution.dof, 1);
+    step.nis = adjustment.solution.sum_squares;
+    step.nis_dof = dof;
+    report_.sigma_px = adjustment.sigma_px * report_.scale.scale;
+    report_.nis_per_dof = adjustment.solution.sum_squares / dof;
+  }
+
+  void set_values(IntrinsicsEstimate& step, const RotatingCamera& camera, double t_s) const {
+    const Eigen::Vector4d k = intrinsics_px(camera.k_at(t_s), report_.scale);
+    step.fx = k[0];
+    step.fy = k[1];
+    step.cx = k[2];
+    step.cy = k[3];
+    step.k1 = camera.k1;
+  }
+
+  [[nodiscard]] Eigen::Vector4d start_px() const { return intrinsics_px(start_.k, report_.scale); }
+
+  template <typename Observer>
+  void run_regression(Observer& observer) {
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      report_.steps[k] = observer.step(frames_[k]);
+      note(k);
+    }
+    const auto last =
+        std::find_if(report_.steps.rbegin(), report_.steps.rend(), [](const auto& s) { return s.has_value; });
+    if (last == report_.steps.rend()) return;
+    const double scale = report_.scale.scale;
+    final_ = start_;
+    final_.k = report_.scale.normalised_intrinsics(last->values());
+    final_cov_ = (last->sigma / scale).cwiseAbs2().asDiagonal();
+    has_final_ = true;
+  }
+
+  void run_flow() {
+    FlowFilterConfig flow;
+    flow.num_points = log_.num_points;
+    flow.scale = report_.scale;
+    flow.start = start_px();
+    if (config_.sigma_px) flow.sigma_px = *config_.sigma_px;
+    FlowFilter observer(flow);
+    run_regression(observer);
+  }
+
+  void run_fang() {
+    FangConfig fang;
+    fang.num_points = log_.num_points;
+    fang.scale = report_.scale;
+    fang.start = start_px();
+    fang.profile = config_.profile;
+    if (config_.sigma_px) fang.sigma_px = *config_.sigma_px;
+    fang.roll_columns = log_.source != RotationSource::rate || log_.has_roll_rate;
+    FangObserver observer(fang);
+    run_regression(observer);
+    report_.gramian_lambda_min = observer.gramian_lambda_min();
+  }
+
+  /// All rows since the intrinsics last changed, together: the bound, and the answer of `batch`.
+  void solve_reference() {
+    std::size_t rows = 0;
+    const auto is_at_rest = [&](const RotationFrame& frame) {
+      return frame.t_s >= report_.reference_from_s - 1e-9 && frame.t_s <= report_.reference_until_s + 1e-9;
+    };
+    for (const RotationFrame& frame : frames_) rows += is_at_rest(frame) ? 1u : 0u;
+    const bool turns = config_.rotation != RotationKnowledge::known;
+    const std::size_t room = std::max<std::size_t>(max_cells / std::max<std::size_t>(log_.num_points, 1), 64);
+    FrameBuffer buffer(log_.num_points, turns ? max_turns : std::min(rows + 1, room));
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      if (is_at_rest(frames_[k])) add_frame(buffer, k);
+    }
+    AdjustConfig config = adjust_config_of(log_, config_, start_, report_.scale);
+    if (has_final_ && config_.method != ObserveMethod::fang2011) {
+      config.start = final_;
+      config.start.turn_rad.setZero();
+      config.other_starts.clear();
+    }
+    report_.reference = adjust(buffer, config, progress_);
+    if (!report_.reference.has_value) return;
+    report_.pixels_rejected = report_.reference.num_left_out;
+    if (config_.rotation == RotationKnowledge::known) {
+      report_.jitter = turn_jitter(report_.reference);
+      report_.stated = stated_covariance(report_.reference, config.nuisances);
+      report_.causes = cause_scores(
+          log_, report_.reference,
+          {config.nuisances, config_.max_gap_s, report_.height_px / report_.scale.scale, config_.estimate_errors});
+    }
+    if (config_.method != ObserveMethod::batch && config_.rotation == RotationKnowledge::known) return;
+    IntrinsicsEstimate all;
+    fill(all, report_.reference, frames_.back().t_s);
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      report_.steps[k] = all;
+      set_values(report_.steps[k], final_, frames_[k].t_s);
+    }
+  }
+
+  /// Are the rows that the answer rests on of one focal length?
+  [[nodiscard]] bool is_unsteady() const {
+    return config_.rotation == RotationKnowledge::known && report_.reference.has_value &&
+           steadiness_of(report_.reference.bundle, report_.reference.solution).is_unsteady();
+  }
+
+  void conclude() {
+    if (is_unsteady()) {
+      report_.status = ObserveSolution::Status::unsteady;
+      return;
+    }
+    if (!has_final_ || !report_.reference.has_value) {
+      report_.status = ObserveSolution::Status::no_convergence;
+      if (!report_.reference.has_value) return;
+    }
+    const bool regression = config_.method == ObserveMethod::flow || config_.method == ObserveMethod::fang2011;
+    ObserveNuisances nuisances = config_.nuisances;
+    if (regression && config_.rotation == RotationKnowledge::known) nuisances = {};
+    const CommonLayout layout(nuisances);
+    if (layout.errors >= 0) {
+      const RotatingCamera& camera = has_final_ ? final_ : report_.reference.solution.camera;
+      report_.errors = CommonPrior(RotatingCamera{}).offset(layout, camera).segment(layout.errors, layout.num_errors);
+    }
+    if (report_.sigma_px == 0.0) report_.sigma_px = report_.reference.sigma_px * report_.scale.scale;
+    const CommonMatrix bound = report_.reference.solution.bound();
+    if (has_final_) {
+      model_cov_ = final_cov_;
+      state_covariance(layout);
+    }
+    list_quantities(layout, bound);
+    if (has_final_) state_steps();
+    if (!has_final_) return;
+    report_.status =
+        is_observable(report_, bound) ? ObserveSolution::Status::ok : ObserveSolution::Status::unobservable;
+  }
+
+  /// The last row, and where all rows are one answer all of them, have the stated σ.
+  void state_steps() {
+    const CommonLayout layout(model_cov_.rows() == 4 ? ObserveNuisances{} : config_.nuisances);
+    const bool is_one = config_.method == ObserveMethod::batch || config_.rotation != RotationKnowledge::known;
+    for (std::size_t k = is_one ? 0 : report_.steps.size() - 1; k < report_.steps.size(); ++k) {
+      report_.steps[k].sigma =
+          report_.scale.scale * sigma_k_at(final_, layout, CommonMatrix(final_cov_), frames_[k].t_s);
+    }
+  }
+
+  /// What the reference says of the errors that pixels share, and what is given with a σ, on top of the model's.
+  void state_covariance(const CommonLayout& layout) {
+    const bool is_known = config_.rotation == RotationKnowledge::known;
+    const Eigen::VectorXd& inflation = report_.stated.inflation;
+    if (is_known && inflation.size() >= layout.size) {
+      const CommonVector raise = inflation.head(layout.size);
+      final_cov_ =
+          CommonMatrix(raise.asDiagonal() * final_cov_.topLeftCorner(layout.size, layout.size) * raise.asDiagonal());
+    }
+    if (is_known) compare_with_reference();
+    report_.assumed = taken_as_given(log_, config_, report_, final_cov_);
+  }
+
+  /// Where both are of one camera: the reference says whether the answer is as good as its σ.
+  void compare_with_reference() {
+    const bool is_of_end = rests_at_end_ || report_.reference_until_s >= frames_.back().t_s - 1e-6;
+    if (!is_of_end || config_.method == ObserveMethod::batch) return;
+    const Eigen::Vector4d difference = final_.k - report_.reference.solution.camera.k;
+    const Eigen::Vector4d of_reference = CommonMatrix(report_.stated.cov).diagonal().head<4>();
+    Eigen::Vector4d own = final_cov_.diagonal().head<4>();
+    if (!own.allFinite()) {
+      own = difference.cwiseAbs2();  // the method states none
+      final_cov_ = CommonMatrix((own + of_reference).asDiagonal());
+      report_.sigma_is_distance = true;
+    }
+    report_.from_reference = (difference.array().abs() / (own + of_reference).array().sqrt()).maxCoeff();
+  }
+
+  void list_quantities(const CommonLayout& layout, const CommonMatrix& bound) {
+    const double s = report_.scale.scale;
+    const Eigen::Vector2d& c = report_.scale.centre;
+    CommonVector unit = CommonVector::Ones(layout.size), offset = CommonVector::Zero(layout.size);
+    unit.head<4>().setConstant(s);
+    for (int i = 0; i < layout.num_errors; ++i) unit[layout.errors + i] = errors_[static_cast<std::size_t>(i)].ordinary;
+    offset.segment<2>(2) = c;
+    const std::vector<std::string> names = quantity_names(layout, errors_);
+    const RotatingCamera& camera = has_final_ ? final_ : report_.reference.solution.camera;
+    RotatingCamera zero;
+    zero.k.setZero();
+    const CommonVector value = CommonPrior(zero).offset(layout, camera);
+    const CommonMatrix cov =
+        has_final_ ? final_cov_ : CommonMatrix(CommonMatrix::Constant(layout.size, layout.size, not_seen));
+    report_.covariance =
+        Eigen::MatrixXd(unit.asDiagonal()) * cov.topLeftCorner(layout.size, layout.size) * unit.asDiagonal();
+    for (int i = 0; i < layout.size; ++i) {
+      const double variance = i < bound.rows() ? bound(i, i) : -1.0;
+      report_.quantities.push_back({names[static_cast<std::size_t>(i)], unit[i] * value[i] + offset[i],
+                                    std::sqrt(report_.covariance(i, i)),
+                                    variance > 0.0 ? unit[i] * std::sqrt(variance) : not_seen,
+                                    has_final_ ? unit[i] * std::sqrt(model_cov_(i, i)) : not_seen});
+    }
+  }
+
+  const RotationLog& log_;
+  ObserveSetup config_;
+  const std::vector<RotationError>& errors_;
+  const Progress& progress_;
+  ObserveSolution report_;
+  std::vector<RotationFrame> frames_;
+  bool free_started_ = false, has_final_ = false;
+  bool rests_at_end_ = false;  ///< The intrinsics that the reference is of last to the end of the log.
+  RotatingCamera start_, final_;
+  CommonMatrix final_cov_, model_cov_;
+};
+
+}  // namespace
+
+ObserveSolution solve_once(const RotationLog& log, const ObserveSetup& config, const std::vector<RotationError>& errors,
+                           const RotationErrors& undone, const Progress& progress) {
+  return Observation(log, config, errors, undone, progress).run();
+}
+
+}  // namespace alidade

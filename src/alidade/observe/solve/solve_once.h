@@ -1,0 +1,23 @@
+#pragma once
+
+#include "alidade/observe/solve/solve.h"
+
+namespace alidade {
+
+/// One run over one log with the errors of its rotation that are estimated; `undone`: what the log is free of already.
+[[nodiscard]] ObserveSolution solve_once(const RotationLog& log, const ObserveSetup& config,
+                                         const std::vector<RotationError>& errors, const RotationErrors& undone,
+                                         const Progress& progress);
+
+/// Gives each frame how the errors turn it, per ordinary size.
+void add_turns(const RotationLog& log, const std::vector<RotationError>& errors, double max_gap_s,
+               std::vector<RotationFrame>& frames);
+
+/// How the bundle of a log is adjusted.
+[[nodiscard]] AdjustConfig adjust_config_of(const RotationLog& log, const ObserveSetup& config,
+                                            const RotatingCamera& start, const PixelScale& scale);
+
+/// Does the bound of the reference allow an answer at all?
+[[nodiscard]] bool is_observable(const ObserveSolution& report, const CommonMatrix& bound);
+
+}  // namespace alidade

@@ -1,0 +1,357 @@
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include "alidade/rangefinder/checks/cause_checks.h"
+
+namespace alidade {
+namespace {
+
+using Status = RangefinderReport::Status;
+using Method = RangefinderMethod;
+
+constexpr double refuse_origin_m = 0.1, good_origin_m = 0.01;
+constexpr double min_range_ratio = 2.0, min_normal_spread = 0.1;
+constexpr double degenerate_range_ratio = 1.3;      // 2.0 to 2.4 m: two methods of three cannot tell
+constexpr double degenerate_normal_spread = 0.035;  // tilts of 5°: half of a board's turn is its noise
+
+/// Origin and direction are tied by where the beam hits, so that joint's information is never round: one reading of
+/// 2 m known to 0.1 mm makes 10⁵ of an origin known to 30 mm, which is not degenerate.
+double condition_limit(Method method) { return method == Method::joint ? 1e8 : 1e4; }
+double good_spot_px(Method method) { return method == Method::plane ? 3.0 : 1.0; }
+
+/// What the shots have, whatever the method makes of it.
+struct Supply {
+  int num_spots = 0, num_planes = 0, num_both = 0;
+};
+
+Supply supply_of(std::span<const Shot> shots) {
+  Supply supply;
+  for (const Shot& shot : shots) {
+    supply.num_spots += shot.spot ? 1 : 0;
+    supply.num_planes += shot.has_plane() ? 1 : 0;
+    supply.num_both += shot.spot && shot.has_plane() ? 1 : 0;
+  }
+  return supply;
+}
+
+/// Which other method could tell from the same shots, or what another kind of shot would take; ends a sentence.
+std::string other_method(Method method, const Supply& supply) {
+  if (method == Method::joint) return "";
+  if (supply.num_both >= 2) return "; --method joint can use spots and boards of these shots together";
+  if (method == Method::plane && supply.num_spots >= 3) return "; --method spot does not need boards";
+  return method == Method::plane ? "; or let the spot be seen on the board and use --method joint"
+                                 : "; or take the shots on a board and use --method joint";
+}
+
+struct Weakness {
+  std::string name, what, add;
+};
+
+/// σ of the beam's distance from the camera's centre: along u, the way to the line, the origin moves it by itself, the
+/// direction by how far away it passes.
+double sigma_of_offset_m(const Beam& beam) {
+  const double along_m = beam.origin_in_cam.dot(beam.direction_in_cam);
+  const Eigen::Vector3d to_line = beam.origin_in_cam - along_m * beam.direction_in_cam;
+  if (!(to_line.norm() > 0.0)) return 0.0;
+  const Eigen::Vector3d u = to_line.normalized();
+  Eigen::Matrix<double, 1, 7> J;
+  J << u.transpose(), -along_m * u.transpose(), 0.0;
+  return std::sqrt((J * embedded_covariance(beam) * J.transpose())[0]);
+}
+
+constexpr double near_centre_m = 0.015;
+
+/// How far the beam's line passes from the camera's centre.
+struct LineOffset {
+  double value_m = 0.0, sigma_m = 0.0;
+};
+
+/// By the spots alone: a ray's x/z and y/z move with 1/range by how far the line passes. Told where no beam is: with
+/// all spots at one place any origin along their ray will do. None where they do not tell it, either.
+std::optional<LineOffset> offset_by_spots(const RangefinderReport& report, std::span<const Shot> shots) {
+  std::vector<Eigen::Vector3d> seen;  // x/z, y/z, 1/range
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < shots.size() && i < report.shots.size(); ++i) {
+    const auto ray = report.shots[i].used && shots[i].spot ? unproject(report.camera, shots[i].spot->px) : std::nullopt;
+    if (!ray || !(ray->z() > 0.0)) continue;
+    seen.emplace_back(ray->x() / ray->z(), ray->y() / ray->z(), 1.0 / shots[i].range_m);
+    mean += seen.back();
+  }
+  if (seen.size() < 4) return std::nullopt;
+  mean /= static_cast<double>(seen.size());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& s : seen) scatter += (s - mean) * (s - mean).transpose();
+  if (!(scatter(2, 2) > 0.0)) return std::nullopt;
+  const Eigen::Vector2d slope = scatter.block<2, 1>(0, 2) / scatter(2, 2);
+  const double left = scatter.topLeftCorner<2, 2>().trace() - slope.squaredNorm() * scatter(2, 2);
+  const double variance = std::max(0.0, left) / (2.0 * static_cast<double>(seen.size()) - 4.0);
+  const LineOffset offset{slope.norm(), std::sqrt(variance / scatter(2, 2))};
+  return 3.0 * offset.sigma_m < near_centre_m ? std::optional(offset) : std::nullopt;
+}
+
+/// Of the solved beam; where that does not know it, of the spots.
+LineOffset line_offset(const RangefinderReport& report, std::span<const Shot> shots) {
+  const LineOffset solved{report.bound.offset_m, sigma_of_offset_m(report.beam)};
+  if (3.0 * solved.sigma_m < near_centre_m) return solved;
+  return offset_by_spots(report, shots).value_or(solved);
+}
+
+/// Only where the shots do say so: a line that passes far off, however badly known, is another matter.
+bool passes_the_centre(const LineOffset& offset) {
+  constexpr double min_m = 0.002;  // nearer, no spot moves by what it could be measured with
+  return offset.value_m < near_centre_m && offset.value_m < std::max(min_m, 3.0 * offset.sigma_m);
+}
+
+/// Mean angle of the boards' normals to the camera's view, from the cosines.
+double mean_tilt_rad(const RangefinderReport& report) {
+  double sum = 0.0, num = 0.0;
+  for (const ShotFit& shot : report.shots) {
+    if (!shot.plane) continue;
+    sum += std::acos(std::min(1.0, std::abs(shot.plane->normal_in_cam.z())));
+    num += 1.0;
+  }
+  return num > 0.0 ? sum / num : 0.0;
+}
+
+Weakness reason_of_equal_ranges(const RangefinderReport& report) {
+  return {"equal ranges",
+          "equal ranges: the longest is only " + text_of(report.bound.range_ratio) +
+              " times the shortest, so origin and direction cannot be separated",
+          "take shots from near to far, at least 1 to 4"};
+}
+
+Weakness reason_of_boards(const RangefinderReport& report) {
+  constexpr double frontal_rad = 0.14;  // 8°
+  if (mean_tilt_rad(report) < frontal_rad) {
+    return {"frontal boards", "frontal boards: all face the camera, so where the beam hits them across is unobservable",
+            "tilt the board by 20 to 45°, to all sides"};
+  }
+  return {"parallel boards", "parallel boards: all are tilted alike, so the beam is unobservable along them",
+          "tilt the board to all sides"};
+}
+
+Weakness reason_of(const RangefinderReport& report, std::span<const Shot> shots, Method method) {
+  const BeamBound& bound = report.bound;
+  const LineOffset offset = line_offset(report, shots);
+  const bool equal = bound.range_ratio < degenerate_range_ratio;
+  if (method == Method::plane && bound.normal_spread < degenerate_normal_spread) return reason_of_boards(report);
+  if (equal) return reason_of_equal_ranges(report);
+  if (method == Method::spot && passes_the_centre(offset)) {
+    return {"beam through the optical centre",
+            "the beam passes the optical centre by " + text_of(1e3 * offset.value_m, 2) +
+                " mm: where along it the origin lies is unobservable",
+            "mount the rangefinder a few centimetres beside the camera"};
+  }
+  if (method == Method::plane && bound.normal_spread < min_normal_spread) return reason_of_boards(report);
+  if (bound.range_ratio < min_range_ratio) return reason_of_equal_ranges(report);
+  return {"too little",
+          "too little for this noise: the origin is known to " + text_of(1e3 * bound.sigma_origin_m, 2) + " mm only",
+          "add shots from near to far, the board tilted to all sides"};
+}
+
+Verdict refusal(State state, ExitCode code, const std::string& sentence, const std::string& add) {
+  Verdict verdict;
+  verdict.state = state;
+  verdict.exit_code = code;
+  verdict.sentence = sentence;
+  verdict.to_add = add;
+  return verdict;
+}
+
+State graded(double value, double good, double refuse) {
+  return !(value < refuse) ? State::refused : value > good ? State::care : State::good;
+}
+
+void add_precision(const RangefinderReport& report, Method method, Verdict& verdict) {
+  const BeamBound& bound = report.bound;
+  verdict.checks.push_back(check_of("origin", graded(bound.sigma_origin_m, good_origin_m, refuse_origin_m),
+                                    "σ of the origin is " + text_of(1e3 * bound.sigma_origin_m, 2) + " mm",
+                                    1e3 * bound.sigma_origin_m, 1e3 * good_origin_m, "mm", "precision"));
+  const double spot_px = bound.worst_spot_sigma_px;
+  verdict.checks.push_back(
+      check_of("spot", spot_px <= good_spot_px(method) ? State::good : State::care,
+               "σ of the predicted spot is up to " + text_of(spot_px, 2) + " px from " +
+                   text_of(std::clamp(bound_ranges_m.front(), bound.nearest_m, bound.farthest_m), 2) + " to " +
+                   text_of(std::clamp(bound_ranges_m.back(), bound.nearest_m, bound.farthest_m), 2) + " m",
+               spot_px, good_spot_px(method), "px", "precision"));
+  const double limit = condition_limit(method);
+  verdict.checks.push_back(check_of("condition", bound.condition <= limit ? State::good : State::refused,
+                                    "condition number of the information " + text_of(bound.condition, 2),
+                                    bound.condition, limit, "", "precision"));
+}
+
+void add_geometry(const RangefinderReport& report, std::span<const Shot> shots, Method method, Verdict& verdict) {
+  const BeamBound& bound = report.bound;
+  verdict.checks.push_back(check_of("ranges", bound.range_ratio >= min_range_ratio ? State::good : State::care,
+                                    "the longest range is " + text_of(bound.range_ratio) + " times the shortest",
+                                    bound.range_ratio, min_range_ratio, "", "next"));
+  if (method != Method::spot && bound.normal_spread > 0.0) {
+    // With the spot seen, tilts do not matter: the figure is told, it decides nothing.
+    State state = bound.normal_spread >= min_normal_spread || method == Method::joint ? State::good : State::care;
+    if (method == Method::plane && bound.normal_spread < 0.5 * degenerate_normal_spread) state = State::refused;
+    verdict.checks.push_back(check_of("tilts", state,
+                                      "the boards' normals spread by " + text_of(bound.normal_spread, 2),
+                                      bound.normal_spread, min_normal_spread, "", "next"));
+  }
+  if (method == Method::spot) {
+    const LineOffset offset = line_offset(report, shots);
+    verdict.checks.push_back(
+        check_of("offset", passes_the_centre(offset) ? State::refused : State::good,
+                 "the beam passes the optical centre by " + text_of(1e3 * offset.value_m, 2) + " mm",
+                 1e3 * offset.value_m, 3e3 * offset.sigma_m, "mm", "precision"));
+  }
+}
+
+/// Measurements beyond what the beam takes: with none to spare a wrong shot bends the beam and leaves no residual.
+void add_spare(const RangefinderReport& report, Verdict& verdict) {
+  constexpr int enough = 3;
+  int spare = report.beam.cov(beam_scale_param, beam_scale_param) > 0.0 ? -6 : -5;
+  for (const ShotFit& fit : report.shots) {
+    if (!fit.used) continue;
+    spare += (std::isfinite(fit.residual_range_m) ? 1 : 0) + (fit.residual_px.allFinite() ? 2 : 0);
+  }
+  const std::string text = "only " + std::to_string(spare) + " measurement" + (spare == 1 ? "" : "s") +
+                           " to spare: a wrong shot would go unnoticed; take more";
+  verdict.checks.push_back(check_of("to spare", spare < enough ? State::care : State::good,
+                                    spare < enough ? text : std::to_string(spare) + " measurements to spare", spare,
+                                    enough, "", "residuals"));
+}
+
+/// Boards that are there but fit no pose: another board, or another camera. Without them a shot has its spot alone.
+void add_boards(const RangefinderReport& report, std::span<const Shot> shots, Verdict& verdict) {
+  int given = 0, unfit = 0;
+  for (std::size_t i = 0; i < shots.size() && i < report.shots.size(); ++i) {
+    given += shots[i].board ? 1 : 0;
+    unfit += shots[i].board && !report.shots[i].plane ? 1 : 0;
+  }
+  if (given == 0) return;
+  verdict.checks.push_back(check_of("boards",
+                                    unfit == 0       ? State::good
+                                    : unfit == given ? State::refused
+                                                     : State::care,
+                                    unfit == 0 ? "each board fits its corners"
+                                               : "no pose of the board fits its corners in " + std::to_string(unfit) +
+                                                     " of " + std::to_string(given) + " shots",
+                                    unfit, 0.0, "", "residuals"));
+}
+
+void add_fit(const RangefinderReport& report, Verdict& verdict) {
+  int outliers = 0;
+  std::string named;
+  for (std::size_t i = 0; i < report.shots.size(); ++i) {
+    if (report.shots[i].used || report.shots[i].reason.rfind("outlier", 0) != 0) continue;
+    named += (named.empty() ? "" : ", ") + std::to_string(i + 1);
+    ++outliers;
+  }
+  const int told = report.shots_used + outliers;
+  // Where two in five do not agree with the rest, the rest may be as wrong.
+  const State state = outliers == 0 ? State::good : 5 * outliers > 2 * told ? State::refused : State::care;
+  verdict.checks.push_back(check_of("outliers", state, outliers == 0 ? "all shots agree" : "rejected: shot " + named,
+                                    outliers, 0.4 * told, "", "residuals"));
+  if (report.dof < 1 || (report.spot_sigma_is_estimated && report.range_sigma_is_estimated)) return;
+  const double ratio = std::sqrt(report.cost / report.dof);
+  const double most = 1.0 + 3.0 / std::sqrt(2.0 * report.dof) + 0.2;
+  verdict.checks.push_back(check_of("fit", ratio < most ? State::good : State::care,
+                                    "residuals are " + text_of(ratio, 2) + " times their σ", ratio, most, "",
+                                    "residuals"));
+}
+
+/// A singular information has no clusters: of that others speak.
+void add_clusters(const RangefinderReport& report, Verdict& verdict) {
+  const bool is_few = report.shots_used < static_cast<int>(ClusterCovariance::min_clusters);
+  if (report.clusters.z2.empty() && !is_few) return;
+  verdict.checks.push_back(
+      clusters_agree(report.clusters, "shot",
+                     "a lens or a square that is off, spots or corners that err alike, a bowed board", "residuals"));
+}
+
+Verdict refusal_by_status(const RangefinderReport& report, Method method, const Supply& supply) {
+  if (report.status == Status::scale_unknown) {
+    return refusal(State::refused, ExitCode::cannot_tell,
+                   "the scale of the ranges cannot be determined from spots alone",
+                   "take shots on a board and use --method joint, or estimate no --scale");
+  }
+  if (report.status == Status::too_few) {
+    const char* needed = method == Method::spot    ? "three with a spot"
+                         : method == Method::plane ? "six with a board"
+                                                   : "two with spot and board";
+    return refusal(
+        State::refused, ExitCode::cannot_tell,
+        "too few shots: of " + std::to_string(report.shots.size()) + " given, " + needed + " or more must be usable",
+        "add shots from near to far" + other_method(method, supply));
+  }
+  if (report.status == Status::ambiguous) {
+    return refusal(State::refused, ExitCode::cannot_tell, "two beams explain these shots alike",
+                   "add a shot or two with the board tilted to another side" + other_method(method, supply));
+  }
+  return refusal(State::not_converged, ExitCode::no_convergence, "no beam explains these shots",
+                 "check the ranges' unit, that each spot and board belongs to its range, and the camera file");
+}
+
+}  // namespace
+
+Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Shot> shots,
+                            const RangefinderConfig& config) {
+  const Supply supply = supply_of(shots);
+  const Method method = config.method;
+  const bool is_solved = report.status == Status::converged || report.status == Status::degenerate ||
+                         report.status == Status::no_convergence || report.status == Status::ambiguous;
+  Verdict verdict;
+  if (is_solved) {
+    add_precision(report, method, verdict);
+    add_geometry(report, shots, method, verdict);
+    add_fit(report, verdict);
+    add_clusters(report, verdict);
+    if (method != Method::spot) add_boards(report, shots, verdict);
+    add_spare(report, verdict);
+    add_cause_checks(report, shots, config, verdict);
+  }
+  const auto worst = [&](State state) {
+    return std::find_if(verdict.checks.begin(), verdict.checks.end(), [&](const Check& c) { return c.state == state; });
+  };
+  const auto refused = worst(State::refused);
+  std::vector<Check> checks = verdict.checks;
+  const auto named = [&](std::string_view name) {
+    return std::find_if(verdict.checks.begin(), verdict.checks.end(),
+                        [&](const Check& c) { return c.name == name && c.state == State::refused; });
+  };
+  if (is_solved && named("scale") != verdict.checks.end()) {
+    verdict = refusal(State::refused, ExitCode::cannot_tell, named("scale")->text,
+                      "give the ranges in metres; a scale that is known to be so: --scale");
+  } else if (is_solved && report.status == Status::converged && named("range noise") != verdict.checks.end()) {
+    verdict = refusal(State::not_converged, ExitCode::no_convergence, named("range noise")->text,
+                      "check that each range belongs to its spot and board, that the beam hit the board, and the unit");
+  } else if (is_solved && refused != verdict.checks.end() && refused->name == "outliers") {
+    verdict = refusal(State::not_converged, ExitCode::no_convergence, "the shots do not agree: " + refused->text,
+                      "check that the beam hit the board in each");
+  } else if (is_solved && refused != verdict.checks.end() && refused->name == "boards") {
+    verdict = refusal(State::refused, ExitCode::cannot_tell, refused->text,
+                      "check --board, --square and the camera; --method spot does without boards");
+  } else if (report.status == Status::degenerate || (is_solved && refused != verdict.checks.end())) {
+    const Weakness reason = reason_of(report, shots, method);
+    verdict = refusal(State::refused, ExitCode::cannot_tell, reason.what, reason.add + other_method(method, supply));
+    checks.push_back(check_of(reason.name, State::refused, reason.what, 0.0, 0.0, "", "next"));
+  } else if (report.status != Status::converged) {
+    verdict = refusal_by_status(report, method, supply);
+  } else {
+    if (const auto care = worst(State::care); care != verdict.checks.end()) {
+      verdict.state = State::care;
+      verdict.to_add = care->text;
+      // What is wrong comes before what follows from it.
+      for (const std::string_view cause :
+           {"shots agree", "spots by distance", "scale", "fit", "outliers", "boards", "camera"})
+        for (const Check& check : verdict.checks)
+          if (check.name == cause && check.state == State::care) verdict.to_add = check.text;
+    }
+    const Eigen::Vector3d mm = 1e3 * report.beam.origin_in_cam;
+    verdict.sentence = "origin (" + text_of(mm.x()) + ", " + text_of(mm.y()) + ", " + text_of(mm.z()) + ") mm ± " +
+                       text_of(3e3 * report.bound.sigma_origin_m, 2) + " mm, direction ± " +
+                       text_of(3e3 * report.bound.sigma_direction_rad, 2) + " mrad (3σ) from " +
+                       std::to_string(report.shots_used) + " shots";
+  }
+  verdict.checks = std::move(checks);
+  return verdict;
+}
+
+}  // namespace alidade

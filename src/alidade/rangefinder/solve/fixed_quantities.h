@@ -1,0 +1,25 @@
+#pragma once
+
+#include "alidade/rangefinder/rangefinder.h"
+#include "alidade/rangefinder/solve/reduced_system.h"
+
+namespace alidade {
+
+/// What a solve held and took as given. `places`: of its parameters in the system; `inverse`: of their information.
+struct SolvedPart {
+  std::vector<Eigen::Index> places;
+  Eigen::MatrixXd inverse;
+};
+
+/// Square and scale, focal length and centre, flatness of the board: by how much each moves the beam, and what the
+/// shots ask for. `camera`: as given. C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948 (the score test).
+[[nodiscard]] std::vector<FixedQuantity> fixed_quantities(const ReducedSystem& system, const SolvedPart& part,
+                                                          const LensPrior& prior, const Camera& camera,
+                                                          std::span<const Eigen::Vector3d> points_in_board,
+                                                          const RangefinderReport& report,
+                                                          const RangefinderConfig& config);
+
+/// The σ of readings and spots: what the beam does where they are another, lens and poses held.
+[[nodiscard]] std::vector<FixedQuantity> fixed_sigmas(const BeamProblem& problem, const RangefinderReport& report);
+
+}  // namespace alidade

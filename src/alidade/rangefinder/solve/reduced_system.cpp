@@ -1,0 +1,86 @@
+#include "alidade/rangefinder/solve/reduced_system.h"
+
+#include <algorithm>
+
+#include "alidade/geometry/decompositions.h"
+
+namespace alidade {
+namespace {
+
+using Eigen::Index;
+
+/// fx, fy, cx, cy come first in every lens; skew is none that a lens has by chance.
+std::vector<int> lens_columns(const LensPrior& prior) {
+  std::vector<int> columns{0, 1, 2, 3};
+  for (const int parameter : prior.free)
+    if (parameter > 3) columns.push_back(parameter);
+  return columns;
+}
+
+std::optional<ReducedShot> reduced_shot(const BeamProblem& one, const LensPrior& all_of_lens,
+                                        const CommonState& state) {
+  const auto system = common_system(one, all_of_lens, state);
+  if (!system) return std::nullopt;
+  ReducedShot shot{0, false, system->U, system->g};
+  const auto& block = system->blocks[0];
+  if (!block.has_pose) return shot;
+  shot.has_corners = true;
+  const Ldlt V(block.V);
+  shot.A.noalias() -= block.W.transpose() * V.solve_each(block.W);
+  shot.g.noalias() -= block.W.transpose() * V.solve(block.g);
+  return shot;
+}
+
+}  // namespace
+
+Index ReducedSystem::of_lens(int parameter) const {
+  return num_beam_params + (std::find(lens.begin(), lens.end(), parameter) - lens.begin());
+}
+
+std::vector<Index> ReducedSystem::places(int num_beam, const std::vector<int>& free_lens) const {
+  std::vector<Index> at;
+  for (int i = 0; i < num_beam; ++i) at.push_back(of_beam(i));
+  for (const int parameter : free_lens) at.push_back(of_lens(parameter));
+  return at;
+}
+
+Eigen::VectorXd ReducedSystem::square_column(const Beam& beam) const {
+  Eigen::VectorXd larger = Eigen::VectorXd::Zero(H.rows());
+  larger.head<3>() = beam.origin_in_cam;
+  larger[5] = beam.scale;
+  Eigen::VectorXd column = Eigen::VectorXd::Zero(H.rows());
+  for (const ReducedShot& shot : shots)
+    if (shot.has_corners) column -= shot.A * larger;
+  return column;
+}
+
+ReducedSystem reduced_system(const BeamProblem& problem, const LensPrior& held_prior, const CommonState& state) {
+  ReducedSystem reduced;
+  reduced.lens = lens_columns(held_prior);
+  const auto num_lens = static_cast<Index>(reduced.lens.size());
+  const LensPrior all_of_lens{reduced.lens, params(state.camera.lens), Eigen::MatrixXd::Zero(num_lens, num_lens)};
+  reduced.H.setZero(num_beam_params + num_lens, num_beam_params + num_lens);
+  BeamProblem one{{}, problem.points_in_board, problem.model, problem.sigma_corner_px, true, problem.max_iterations};
+  for (std::size_t i = 0; i < problem.shots.size(); ++i) {
+    one.shots.assign(1, problem.shots[i]);
+    auto shot = reduced_shot(one, all_of_lens, {state.beam, state.camera, {state.cam_from_board[i]}});
+    if (!shot) continue;
+    shot->index = i;
+    reduced.H += shot->A;
+    reduced.shots.push_back(std::move(*shot));
+  }
+  const std::vector<Index> of_prior = reduced.places(0, held_prior.free);
+  if (!of_prior.empty()) reduced.H(of_prior, of_prior) += held_prior.information;
+  return reduced;
+}
+
+std::vector<ClusterStep> shot_clusters(const ReducedSystem& system, const std::vector<Index>& places,
+                                       const Eigen::MatrixXd& inverse) {
+  std::vector<ClusterStep> clusters;
+  clusters.reserve(system.shots.size());
+  for (const ReducedShot& shot : system.shots)
+    clusters.push_back(cluster_step(inverse, shot.A(places, places), shot.g(places)));
+  return clusters;
+}
+
+}  // namespace alidade

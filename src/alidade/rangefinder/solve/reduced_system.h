@@ -1,0 +1,45 @@
+#pragma once
+
+#include <vector>
+
+#include "alidade/estimation/cluster_covariance.h"
+#include "alidade/rangefinder/solve/refine_all.h"
+
+namespace alidade {
+
+/// What one shot tells: its part A of the information and g = Jᵀr of the gradient, the board's pose eliminated.
+struct ReducedShot {
+  std::size_t index = 0;  ///< In the problem's list.
+  bool has_corners = false;
+  Eigen::MatrixXd A;
+  Eigen::VectorXd g;
+};
+
+/// Normal equations at a solution, shot by shot, also of what was held there: the beam's six parameters [origin m,
+/// direction rad, scale], then those of the lens that `lens` names: fx, fy, cx, cy, and what was free.
+struct ReducedSystem {
+  std::vector<int> lens;
+  std::vector<ReducedShot> shots;
+  Eigen::MatrixXd H;  ///< Σ A and what the lens' prior says.
+
+  [[nodiscard]] static Eigen::Index of_beam(int parameter) { return parameter; }
+  [[nodiscard]] Eigen::Index of_lens(int parameter) const;
+  /// Where the parameters that were estimated stand: the first `num_beam`, and of the lens those of the list.
+  [[nodiscard]] std::vector<Eigen::Index> places(int num_beam, const std::vector<int>& free_lens) const;
+  /// ∂²cost/2 by all and the logarithm of the length of the boards' squares, poses eliminated. A world that is larger
+  /// as a whole, readings and all, looks the same: the square's column is minus that of origin and scale. Shots whose
+  /// plane was told do not follow the square.
+  [[nodiscard]] Eigen::VectorXd square_column(const Beam& beam) const;
+};
+
+/// At `state`; `held_prior`: the lens' prior where the lens was free, one without parameters where it was held. Shots
+/// that have nothing to compare there are omitted.
+[[nodiscard]] ReducedSystem reduced_system(const BeamProblem& problem, const LensPrior& held_prior,
+                                           const CommonState& state);
+
+/// The shots as clusters of the parameters at `places`, whose covariance by the model is `inverse`.
+[[nodiscard]] std::vector<ClusterStep> shot_clusters(const ReducedSystem& system,
+                                                     const std::vector<Eigen::Index>& places,
+                                                     const Eigen::MatrixXd& inverse);
+
+}  // namespace alidade

@@ -1,0 +1,258 @@
+#include "alidade/servo/identify/identify.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "alidade/geometry/decompositions.h"
+#include "alidade/servo/identify/identify_causes.h"
+#include "alidade/servo/identify/identify_clusters.h"
+#include "alidade/servo/identify/identify_flaws.h"
+#include "alidade/servo/identify/levenberg.h"
+
+namespace alidade {
+namespace {
+
+/// Angle and rate of a plant of gain one half-way through a log, with their derivatives by the parameters.
+struct Walk {
+  ServoKind kind;
+  double gain, tau_s;
+  double x = 0.0, v = 0.0;  ///< Angle without its zero; rate (rate plants).
+  Eigen::RowVector<double, num_servo_params> dx = Eigen::RowVector<double, num_servo_params>::Zero(), dv = dx;
+
+  /// dt under one command: of an angle plant x, of a rate plant v goes towards gain · command.
+  void advance(double dt_s, double command) {
+    const double decay = std::exp(-dt_s / tau_s), rise = -std::expm1(-dt_s / tau_s), goal = gain * command;
+    const double decay_by_tau = decay * dt_s / (tau_s * tau_s);
+    if (kind == ServoKind::angle) {
+      dx *= decay;
+      dx[ServoParam::gain] += rise * command;
+      dx[ServoParam::tau] += decay_by_tau * (x - goal);
+      x = goal + decay * (x - goal);
+      return;
+    }
+    const double gap = v - goal, reach_s = tau_s * rise;
+    dx += reach_s * dv;
+    dx[ServoParam::gain] += (dt_s - reach_s) * command;
+    dx[ServoParam::tau] += (rise - tau_s * decay_by_tau) * gap;
+    dv *= decay;
+    dv[ServoParam::gain] += rise * command;
+    dv[ServoParam::tau] += decay_by_tau * gap;
+    x += goal * dt_s + gap * reach_s;
+    v = goal + decay * gap;
+  }
+  /// A switch a little later: what pulled before goes on a little longer.
+  void switch_command(double from, double to) {
+    (kind == ServoKind::angle ? dx : dv)[ServoParam::latency] += gain * (from - to) / tau_s;
+  }
+};
+
+/// Gain, zero and start that fit best at a time constant and latency, and what is left.
+struct LinearFit {
+  ServoParams params = ServoParams::Zero();
+  double sum2 = 0.0;
+};
+LinearFit linear_fit(std::span<const ServoSample> log, ServoKind kind, double tau_s, double latency_s,
+                     const Eigen::VectorXd& readings) {
+  ServoParams params;
+  params << 1.0, tau_s, latency_s, 0.0, 0.0;
+  const ServoResponse response = servo_response(log, kind, params);
+  Eigen::Matrix<double, Eigen::Dynamic, 3> A(readings.size(), 3);  // the response is linear in these three
+  A << response.J.col(ServoParam::gain), response.J.col(ServoParam::zero), response.J.col(ServoParam::start);
+  const Eigen::Vector3d best = least_squares(A, readings);
+  LinearFit fit;
+  fit.params << best[0], tau_s, latency_s, best[1], best[2];
+  fit.sum2 = (A * best - readings).squaredNorm();
+  return fit;
+}
+
+Eigen::VectorXd readings_of(std::span<const ServoSample> log) {
+  Eigen::VectorXd readings(static_cast<Eigen::Index>(log.size()));
+  for (std::size_t i = 0; i < log.size(); ++i) readings[static_cast<Eigen::Index>(i)] = log[i].angle_rad;
+  return readings;
+}
+
+/// Every n-th row, so that a search over a long log stays short; commands between are held.
+std::vector<ServoSample> thinned(std::span<const ServoSample> log) {
+  constexpr std::size_t most = 1500;
+  const std::size_t stride = (log.size() + most - 1) / most;
+  std::vector<ServoSample> rows;
+  for (std::size_t i = 0; i < log.size(); ++i)
+    if (i % stride == 0 || log[i].command != log[i - 1].command) rows.push_back(log[i]);
+  return rows;
+}
+
+/// The best of a grid in time constant (by factors) and latency (up to a third of the log).
+ServoParams searched(std::span<const ServoSample> log, ServoKind kind) {
+  const std::vector<ServoSample> rows = thinned(log);
+  const Eigen::VectorXd readings = readings_of(rows);
+  const double duration_s = log.back().t_s - log.front().t_s;
+  const double step_s = duration_s / static_cast<double>(log.size() - 1);
+  std::vector<double> latencies{0.0};
+  for (double late_s = 0.5 * step_s; late_s < duration_s / 3.0; late_s *= 1.4) latencies.push_back(late_s);
+  LinearFit best;
+  best.sum2 = std::numeric_limits<double>::infinity();
+  for (double tau_s = 0.3 * step_s; tau_s < 3.0 * duration_s; tau_s *= 1.6) {
+    for (const double latency_s : latencies) {
+      const LinearFit fit = linear_fit(rows, kind, tau_s, latency_s, readings);
+      if (fit.sum2 < best.sum2) best = fit;
+    }
+  }
+  return best.params;
+}
+
+/// (JᵀJ)⁻¹, by parameters scaled so that their units do not matter; none where it cannot be solved.
+std::optional<Eigen::MatrixXd> inverse_normal(const Eigen::MatrixXd& J) {
+  const Eigen::MatrixXd JtJ = J.transpose() * J;
+  const Eigen::VectorXd scale = JtJ.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * JtJ * scale.asDiagonal();
+  const Ldlt ldlt(scaled);
+  if (!(ldlt.min_pivot() > 1e-10)) return std::nullopt;
+  return scale.asDiagonal() * ldlt.inverse() * scale.asDiagonal();
+}
+
+/// Levenberg–Marquardt from there; time constant and latency stay within what has a meaning.
+ServoFit refined(std::span<const ServoSample> log, ServoKind kind, ServoParams params) {
+  const Eigen::VectorXd readings = readings_of(log);
+  const double dof = static_cast<double>(log.size()) - num_servo_params;
+  // 5 to 15 steps are typical; a kink at a sampled latency takes more
+  const LevenbergOutcome descent = levenberg(
+      {.max_steps = 60, .first_damping = 1e-6, .tolerance = 1e-12}, params,
+      [&](const ServoParams& at) -> Eigen::VectorXd { return servo_response(log, kind, at).angle_rad - readings; },
+      [&](const ServoParams& at) { return servo_response(log, kind, at).J; },
+      [](const ServoParams& from, const auto& step) { return within_meaning(from, ServoParams(from + step)); });
+  ServoFit fit;
+  fit.kind = kind;
+  fit.has_converged = descent.has_converged;
+  fit.params = params;
+  fit.rms_rad = std::sqrt(descent.sum2 / dof);
+  const auto inverse = inverse_normal(servo_response(log, kind, params).J);
+  fit.is_observable = inverse.has_value();
+  if (inverse) fit.cov = fit.cov_model = fit.rms_rad * fit.rms_rad * *inverse;
+  return fit;
+}
+
+double lag_one(const std::vector<double>& residuals) {
+  double product = 0.0, square = 0.0;
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    square += residuals[i] * residuals[i];
+    if (i > 0) product += residuals[i] * residuals[i - 1];
+  }
+  return square > 0.0 ? product / square : 0.0;
+}
+
+/// What blocks of rows say of the covariance, in scaled parameters so that their units do not matter.
+void set_clusters(const Eigen::MatrixXd& J, ServoIdentification& result) {
+  ServoFit& fit = result.fit;
+  result.correlated_rows = correlated_rows(result.residual_rad);
+  const auto inverse = inverse_normal(J);
+  fit.is_observable = inverse.has_value();
+  if (!fit.is_observable || !(fit.rms_rad > 0.0)) return;
+  const Eigen::VectorXd scale = inverse->diagonal().cwiseSqrt().cwiseMax(1e-300), down = scale.cwiseInverse();
+  result.clusters =
+      servo_clusters(result.residual_rad, J * scale.asDiagonal(), down.asDiagonal() * *inverse * down.asDiagonal());
+  const Eigen::MatrixXd cov = scale.asDiagonal() * result.clusters.cov * scale.asDiagonal();
+  fit.cov_model = fit.rms_rad * fit.rms_rad * inverse->topLeftCorner<num_servo_params, num_servo_params>();
+  fit.cov = cov.topLeftCorner<num_servo_params, num_servo_params>();
+  for (std::size_t i = 0; i < fit.freed.size(); ++i) {
+    const Eigen::Index at = num_servo_params + static_cast<Eigen::Index>(i);
+    fit.flaw_sigma[fit.freed[i]] = std::sqrt(cov(at, at));
+  }
+}
+
+/// Whether the residuals of a fit without flaws ask for more.
+bool asks_for_more(std::span<const ServoSample> log, const ServoFit& fit) {
+  constexpr double max_colour = 0.3, min_sigmas = 3.5;
+  const FlawGround ground = flaw_ground(log, fit);
+  const std::vector<double> residuals(ground.misfit.data(), ground.misfit.data() + ground.misfit.size());
+  if (std::abs(lag_one(residuals)) > max_colour) return true;
+  const double sum2 = ground.misfit.squaredNorm(), least2 = min_sigmas * min_sigmas * fit.rms_rad * fit.rms_rad;
+  for (std::size_t flaw = 0; flaw < num_servo_flaws && sum2 > 0.0; ++flaw)
+    if (flaw_scores(log, fit, ground, flaw).front().gain2 > least2) return true;
+  return false;
+}
+
+}  // namespace
+
+ServoResponse servo_response(std::span<const ServoSample> log, ServoKind kind, const ServoParams& params) {
+  const auto num_rows = static_cast<Eigen::Index>(log.size());
+  ServoResponse response{Eigen::VectorXd(num_rows), decltype(response.J)(num_rows, num_servo_params)};
+  Walk walk{kind, params[ServoParam::gain], params[ServoParam::tau]};
+  if (kind == ServoKind::angle) {
+    walk.x = params[ServoParam::start];
+    walk.dx[ServoParam::start] = 1.0;
+  } else {
+    walk.v = params[ServoParam::start];
+    walk.dv[ServoParam::start] = 1.0;
+  }
+  double now_s = log.front().t_s, command = log.front().command;
+  std::size_t next = 1;  // the first command has been there before
+  for (Eigen::Index i = 0; i < num_rows; ++i) {
+    const double t_s = log[static_cast<std::size_t>(i)].t_s;
+    for (; next < log.size() && log[next].t_s + params[ServoParam::latency] <= t_s; ++next) {
+      if (log[next].command == command) continue;
+      const double switch_s = log[next].t_s + params[ServoParam::latency];
+      walk.advance(switch_s - now_s, command);
+      walk.switch_command(command, log[next].command);
+      now_s = switch_s;
+      command = log[next].command;
+    }
+    walk.advance(t_s - now_s, command);
+    now_s = t_s;
+    response.angle_rad[i] = params[ServoParam::zero] + walk.x;
+    response.J.row(i) = walk.dx;
+    response.J(i, ServoParam::zero) = 1.0;
+  }
+  return response;
+}
+
+namespace {
+
+/// The place of the believed one of two fits, angle and rate.
+std::size_t believed_of(const std::array<ServoFit, 2>& fits, ServoKindRule rule) {
+  // An angle plant with a very long lag looks like a rate plant: a tenth less is more than chance leaves.
+  if (rule == ServoKindRule::automatic) return fits[1].rms_rad < 0.9 * fits[0].rms_rad ? 1 : 0;
+  return rule == ServoKindRule::rate ? 1 : 0;
+}
+
+ServoIdentification::Status status_of(const ServoFit& fit) {
+  if (!fit.is_observable) return ServoIdentification::Status::degenerate;
+  return fit.has_converged ? ServoIdentification::Status::converged : ServoIdentification::Status::not_converged;
+}
+
+}  // namespace
+
+ServoIdentification identify_servo(std::span<const ServoSample> log, ServoKindRule rule) {
+  ServoIdentification result;
+  const auto [low, high] = std::ranges::minmax_element(log, {}, &ServoSample::command);
+  const auto [lowest, highest] = std::ranges::minmax_element(log, {}, &ServoSample::angle_rad);
+  result.command_range = high->command - low->command;
+  result.angle_range_rad = highest->angle_rad - lowest->angle_rad;
+  result.duration_s = log.back().t_s - log.front().t_s;
+  if (!(result.command_range > 0.0)) return result;
+  std::array<ServoFit, 2> fits{refined(log, ServoKind::angle, searched(log, ServoKind::angle)),
+                               refined(log, ServoKind::rate, searched(log, ServoKind::rate))};
+  std::array<std::vector<ServoRival>, 2> rivals;
+  // Where one kind explains the log as it is, the other is not made to.
+  const bool is_enough = !asks_for_more(log, fits[believed_of(fits, rule)]);
+  for (std::size_t kind = 0; kind < 2 && !is_enough; ++kind) fits[kind] = with_flaws(log, fits[kind], rivals[kind]);
+  const std::size_t believed = believed_of(fits, rule);
+  result.fit = fits[believed];
+  result.other = fits[1 - believed];
+  result.rivals = rivals[believed];
+  const bool is_plain = result.fit.freed.empty();
+  const ServoResponse response = servo_response(log, result.fit.kind, result.fit.params);
+  const Eigen::VectorXd residuals =
+      (is_plain ? response.angle_rad : flawed_response(log, result.fit, result.fit.flaws)) - readings_of(log);
+  result.residual_rad.assign(residuals.data(), residuals.data() + residuals.size());
+  set_clusters(is_plain ? Eigen::MatrixXd(response.J) : flawed_jacobian(log, result.fit), result);
+  result.status = status_of(result.fit);
+  result.lag_one_correlation = lag_one(result.residual_rad);
+  constexpr std::size_t several = 2;
+  if (num_sizes(log, several) < several && result.fit.is_observable) result.hidden = hidden_flaws(log, result.fit);
+  return result;
+}
+
+}  // namespace alidade

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/servo/identify/identify.h"
+
+namespace alidade {
+
+/// One flaw, how large it seems, and by how many σ the residuals ask for it.
+struct ServoCause {
+  std::string name;  ///< "a limit of its rate"
+  double size = 0.0;
+  std::string unit;
+  double sigmas = 0.0;
+};
+
+/// Score tests of the flaws that were not freed: of a few sizes each, what they add to the response regressed on the
+/// residuals with the parameters following. The one that explains most, first.
+[[nodiscard]] std::vector<ServoCause> servo_causes(std::span<const ServoSample> log,
+                                                   const ServoIdentification& identified);
+
+/// Sizes of command that the log has, whatever their sign: of those that differ by a tenth, up to `most`. Of one size
+/// alone, a limit that it runs into is another gain.
+[[nodiscard]] std::size_t num_sizes(std::span<const ServoSample> log, std::size_t most);
+
+/// The step of the encoder where the angles are its whole multiples; 0: not seen.
+[[nodiscard]] double encoder_step_rad(std::span<const ServoSample> log);
+
+}  // namespace alidade

@@ -1,0 +1,192 @@
+#include "alidade/servo/identify/identify_causes.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "alidade/geometry/degree.h"
+#include "alidade/servo/identify/identify_flaws.h"
+#include "alidade/testing/servo_sample.h"
+
+namespace alidade {
+namespace {
+
+using testing::late_scene;
+using testing::log_of;
+
+TEST(ServoCauses, WithoutFlawsIsTheClosedForm) {
+  for (const bool is_rate_plant : {false, true}) {
+    const std::vector<ServoSample> log = log_of(late_scene(is_rate_plant), 1);
+    const ServoFit fit = identify_servo(log).fit;
+    const Eigen::VectorXd exact = servo_response(log, fit.kind, fit.params).angle_rad;
+    EXPECT_LT((flawed_response(log, fit, {}) - exact).cwiseAbs().maxCoeff(), 1e-9);
+  }
+}
+
+/// A plant with every flaw, stepped through in 10 µs by its differential equations.
+TEST(ServoCauses, FlawedResponseIsTheIntegralOfItsEquations) {
+  for (const bool is_rate_plant : {false, true}) {
+    ServoLogScene scene = late_scene(is_rate_plant);
+    scene.duration_s = 2.5;
+    const std::vector<ServoSample> log = log_of(scene, 1);
+    ServoFit fit;
+    fit.kind = is_rate_plant ? ServoKind::rate : ServoKind::angle;
+    fit.params << gain_of(scene.axis.plant), 0.1, 0.083, 0.2, 0.0;
+    ServoFlaws flaws{.max_rate_rad_s = is_rate_plant ? 0.6 : 1.2, .dead_band = 8.0, .backlash_rad = 0.01};
+    for (const int more : {0, 1, 2}) {
+      if (more == 1) flaws.second_tau_s = 0.03;
+      if (more == 2) flaws.max_acceleration_rad_s2 = is_rate_plant ? 4.0 : 12.0;
+      const Eigen::VectorXd angles = flawed_response(log, fit, flaws);
+      constexpr double dt_s = 1e-5;
+      double x = 0.0, v = 0.0, lagged = 0.0, read = 0.0, worst = 0.0;
+      std::size_t at = 0;
+      for (int k = 0; at < log.size(); ++k) {
+        const double t_s = k * dt_s;
+        if (t_s >= log[at].t_s - 0.5 * dt_s) {
+          worst = std::max(worst, std::abs(0.2 + read - angles[static_cast<Eigen::Index>(at)]));
+          ++at;
+        }
+        const auto row = static_cast<std::size_t>(std::max(0.0, std::floor((t_s - 0.083) / 0.01 + 1e-9)));
+        const double u = log[std::min(row, log.size() - 1)].command;
+        const double goal = std::copysign(std::max(0.0, std::abs(u) - 8.0), u);
+        lagged = flaws.second_tau_s > 0.0 ? lagged + dt_s * (goal - lagged) / flaws.second_tau_s : goal;
+        const double pull = fit.params[0] * lagged, max_v = flaws.max_rate_rad_s;
+        const double max_dv = flaws.max_acceleration_rad_s2 > 0.0 ? flaws.max_acceleration_rad_s2 * dt_s : 1e9;
+        const double wanted = is_rate_plant ? v + dt_s * (std::clamp(pull, -max_v, max_v) - v) / 0.1
+                                            : std::clamp((pull - x) / 0.1, -max_v, max_v);
+        v += std::clamp(wanted - v, -max_dv, max_dv);
+        x += dt_s * v;
+        read = std::clamp(read, x - 0.005, x + 0.005);
+      }
+      // Euler's own error is of the order of a step's motion, 10⁻⁵ rad; stepped through: 10⁻³ of the range.
+      EXPECT_LT(worst, more == 0 ? 5e-5 : 5e-4) << is_rate_plant << more;
+    }
+  }
+}
+
+TEST(ServoCauses, CleanLogsAreGood) {
+  int good = 0, runs = 0;
+  for (const bool is_rate_plant : {false, true}) {
+    for (const bool is_chirp : {false, true}) {
+      for (std::uint64_t seed = 1; seed <= 20; ++seed, ++runs) {
+        ServoLogScene scene = late_scene(is_rate_plant);
+        scene.is_chirp = is_chirp;
+        const std::vector<ServoSample> log = log_of(scene, seed);
+        const Verdict verdict = identify_verdict(log, identify_servo(log));
+        good += verdict.state == State::good ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GE(good, 76) << "of " << runs;
+}
+
+/// Each flaw of an axis, of a size that its log shows.
+struct FlawCase {
+  std::size_t flaw;
+  bool is_rate_plant;
+  double size;
+};
+constexpr std::array<FlawCase, 7> flaw_cases{{{0, false, 0.9},
+                                              {0, true, 0.6},
+                                              {1, true, 3.0},
+                                              {2, false, 10.0},
+                                              {2, true, 10.0},
+                                              {3, false, 0.5 * degree},
+                                              {4, false, 0.04}}};
+
+ServoLogScene flawed_scene(const FlawCase& of) {
+  ServoLogScene scene = late_scene(of.is_rate_plant);
+  if (of.is_rate_plant) {
+    RatePlant plant = std::get<RatePlant>(scene.axis.plant);
+    if (of.flaw == 0) plant.max_rate_rad_s = of.size;
+    if (of.flaw == 1) plant.max_acceleration_rad_s2 = of.size;
+    scene.axis.plant = plant;
+  } else if (of.flaw == 0) {
+    AnglePlant plant = std::get<AnglePlant>(scene.axis.plant);
+    plant.max_rate_rad_s = of.size;
+    scene.axis.plant = plant;
+  }
+  if (of.flaw == 2) scene.axis.dead_band = of.size;
+  if (of.flaw == 3) scene.axis.backlash_rad = of.size;
+  if (of.flaw == 4) scene.axis.second_tau_s = of.size;
+  return scene;
+}
+
+/// Errors of gain, time constant, latency and the flaw, in σ of each.
+std::vector<double> errors_in_sigma(const FlawCase& of, const ServoFit& fit) {
+  const ServoAxis axis = flawed_scene(of).axis;
+  const std::array<double, 3> truth{gain_of(axis.plant), tau_of(axis.plant), 0.083};
+  std::vector<double> errors;
+  for (int k = 0; k < 3; ++k)
+    errors.push_back((fit.params[k] - truth[static_cast<std::size_t>(k)]) / std::sqrt(fit.cov(k, k)));
+  errors.push_back((fit.flaws.*servo_flaws[of.flaw] - of.size) / fit.flaw_sigma[of.flaw]);
+  return errors;
+}
+
+/// Twenty draws of each: found by its name, at its size, and the rest as if it were not there.
+TEST(ServoCauses, FlawsAreEstimated) {
+  constexpr int draws = 20;
+  for (const FlawCase& of : flaw_cases) {
+    int num_good = 0;
+    double sum2 = 0.0;
+    for (std::uint64_t seed = 1; seed <= draws; ++seed) {
+      const std::vector<ServoSample> log = log_of(flawed_scene(of), seed);
+      const ServoIdentification identified = identify_servo(log);
+      const ServoFit& fit = identified.fit;
+      ASSERT_EQ(fit.kind, of.is_rate_plant ? ServoKind::rate : ServoKind::angle);
+      ASSERT_EQ(std::ranges::count(fit.freed, of.flaw), 1) << servo_flaw_words[of.flaw] << of.is_rate_plant << seed;
+      const Verdict verdict = identify_verdict(log, identified);
+      const bool is_good = verdict.state == State::good;
+      num_good += is_good ? 1 : 0;
+      for (const double error : errors_in_sigma(of, fit)) {
+        sum2 += error * error / (4.0 * draws);
+        if (is_good) EXPECT_LT(std::abs(error), 5.0) << servo_flaw_words[of.flaw] << seed;
+      }
+    }
+    EXPECT_LT(sum2, 1.8) << servo_flaw_words[of.flaw];  // of 80 squares whose mean is 1: 5 σ of the mean
+    EXPECT_GE(num_good, 15) << servo_flaw_words[of.flaw] << of.is_rate_plant;
+  }
+}
+
+/// One step of one size cannot show them: what it hides is named, and what it would do to the gain.
+TEST(ServoCauses, WhatOneStepHidesIsNamed) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    for (const FlawCase& of : {flaw_cases[1], flaw_cases[3], flaw_cases[5]}) {
+      ServoLogScene scene = flawed_scene(of);
+      scene.steps = {1.0};
+      const std::vector<ServoSample> log = log_of(scene, seed);
+      const ServoIdentification identified = identify_servo(log);
+      const Verdict verdict = identify_verdict(log, identified);
+      EXPECT_EQ(verdict.state, State::care);
+      EXPECT_NE(verdict.to_add.find("several sizes"), std::string::npos);
+      EXPECT_EQ(std::ranges::count(identified.hidden, of.flaw, &HiddenFlaw::flaw) +
+                    std::ranges::count(identified.fit.freed, of.flaw),
+                1)
+          << servo_flaw_words[of.flaw];
+      EXPECT_NE(verdict.sentence.find(servo_flaw_words[of.flaw]), std::string::npos) << verdict.sentence;
+    }
+  }
+}
+
+TEST(ServoCauses, UnitsAndRoundingAreNamed) {
+  const auto sentence_of = [](const std::vector<ServoSample>& log) {
+    return identify_verdict(log, identify_servo(log)).sentence;
+  };
+  std::vector<ServoSample> log = log_of(late_scene(false), 1);
+  for (ServoSample& row : log) row.angle_rad /= degree;
+  EXPECT_NE(sentence_of(log).find("are these degrees"), std::string::npos);
+  log = log_of(late_scene(false), 1);
+  for (ServoSample& row : log) row.t_s *= 1000.0;
+  EXPECT_NE(sentence_of(log).find("are these milliseconds"), std::string::npos);
+  ServoLogScene rounded = late_scene(false);
+  rounded.sigma_rad = 1e-5;
+  rounded.encoder_step_rad = 0.1 * degree;
+  const std::vector<ServoSample> coarse = log_of(rounded, 1);
+  EXPECT_NEAR(encoder_step_rad(coarse), 0.1 * degree, 1e-9);
+  EXPECT_EQ(identify_verdict(coarse, identify_servo(coarse)).state, State::care);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "alidade/servo/identify/identify.h"
+
+namespace alidade {
+
+/// Angles that a servo of this fit, with its flaws, reads at the times of the log. In closed form, but for a second lag
+/// and for a limit of the acceleration of an angle plant, which are stepped through.
+[[nodiscard]] Eigen::VectorXd flawed_response(std::span<const ServoSample> log, const ServoFit& fit,
+                                              const ServoFlaws& flaws);
+
+/// ∂ response / ∂ (parameters in their order, flaws that were freed), by differences.
+[[nodiscard]] Eigen::MatrixXd flawed_jacobian(std::span<const ServoSample> log, const ServoFit& fit);
+
+/// What a fit leaves, and the directions in which its parameters can follow.
+struct FlawGround {
+  Eigen::VectorXd response, misfit;  ///< misfit = response − readings.
+  Eigen::MatrixXd across;            ///< Orthonormal, of the Jacobian's columns.
+};
+[[nodiscard]] FlawGround flaw_ground(std::span<const ServoSample> log, const ServoFit& fit);
+
+/// How much of Σ misfit² a flaw of a size explains, by one linearisation with the parameters following.
+struct FlawScore {
+  double size = 0.0, gain2 = 0.0;
+};
+/// Of a few sizes, the one that explains most first.
+[[nodiscard]] std::vector<FlawScore> flaw_scores(std::span<const ServoSample> log, const ServoFit& fit,
+                                                 const FlawGround& ground, std::size_t flaw);
+
+/// The fit with every flaw that the log is evidence of, one after the other: 2 ln of the likelihood ratio, counted in
+/// rows that do not share errors, above ln n + 12 (Schwarz's criterion, and a margin for the choice among flaws and
+/// sizes). `rivals`: flaws that explain the same nearly as well. G. Schwarz, "Estimating the dimension of a model",
+/// 1978.
+[[nodiscard]] ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& plain,
+                                  std::vector<ServoRival>& rivals);
+
+/// Dead band, backlash and a limit of the rate, each of an ordinary size, that the log would not show: with it all else
+/// fits as well.
+[[nodiscard]] std::vector<HiddenFlaw> hidden_flaws(std::span<const ServoSample> log, const ServoFit& fit);
+
+}  // namespace alidade

@@ -1,0 +1,175 @@
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "alidade/geometry/degree.h"
+#include "alidade/servo/identify/identify.h"
+#include "alidade/servo/identify/identify_causes.h"
+
+namespace alidade {
+namespace {
+
+Verdict refused(std::string what, std::string add) {
+  Verdict verdict;
+  verdict.state = State::refused;
+  verdict.exit_code = ExitCode::cannot_tell;
+  verdict.sentence = std::move(what);
+  verdict.to_add = std::move(add);
+  return verdict;
+}
+
+void add_checks(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
+  const ServoFit& fit = identified.fit;
+  const double correlation = identified.lag_one_correlation, rows = static_cast<double>(log.size());
+  // Of white residuals the correlation has σ = 1/√n; 0.3 is where structure costs more than noise.
+  const double limit = std::max(0.3, 4.0 / std::sqrt(rows));
+  const bool is_white = std::abs(correlation) < limit;
+  verdict.checks.push_back(
+      {"residuals", is_white ? State::good : State::care,
+       is_white ? "residuals are white: the model is enough"
+                : "residuals have structure (correlation " + text_of(correlation) +
+                      " from row to row): the servo does more than the model; σ counts that rows share errors",
+       correlation, limit, "1", ""});
+  verdict.checks.push_back(clusters_agree(identified.clusters, "block",
+                                          std::to_string(identified.correlated_rows) + " rows in a row share an error",
+                                          "response"));
+  const double step_s = identified.duration_s / (rows - 1.0);
+  const bool is_resolved = fit.params[1] > 0.5 * step_s;
+  verdict.checks.push_back({"sampling", is_resolved ? State::good : State::care,
+                            is_resolved ? "rows are close enough for the time constant"
+                                        : "rows are further apart than twice the time constant: log faster",
+                            fit.params[1] / step_s, 0.5, "rows", ""});
+  if (!fit.has_converged)
+    verdict.checks.push_back({"convergence", State::care, "the fit was still moving", 0.0, 0.0, "1", ""});
+}
+
+std::string flaw_text(const ServoFit& fit, std::size_t flaw) {
+  return std::string(servo_flaw_words[flaw]) + " (" + text_of(fit.flaws.*servo_flaws[flaw]) + " ± " +
+         text_of(3.0 * fit.flaw_sigma[flaw], 2) + " " + servo_flaw_units[flaw] + ")";
+}
+
+/// What the servo does beside a lag: what was estimated, and what the residuals still ask for.
+void add_causes(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
+  const ServoFit& fit = identified.fit;
+  const std::vector<ServoCause> causes = servo_causes(log, identified);
+  Check check{.name = "causes", .text = "neither limits, dead band, backlash nor a second lag show", .unit = "σ"};
+  check.limit = 4.0;
+  if (!fit.freed.empty()) {
+    check.text = "estimated as well: ";
+    for (std::size_t i = 0; i < fit.freed.size(); ++i) check.text += (i > 0 ? ", " : "") + flaw_text(fit, fit.freed[i]);
+  }
+  if (!identified.rivals.empty()) {
+    const ServoRival& rival = identified.rivals.front();
+    check.state = State::care;
+    check.text += "; " + std::string(servo_flaw_words[rival.other]) + " would explain it nearly as well as " +
+                  servo_flaw_words[rival.flaw] + " (2 ln of their ratio " + text_of(rival.evidence, 2) +
+                  "): this log does not tell them apart";
+  }
+  if (!causes.empty()) {
+    const ServoCause& first = causes.front();
+    check.state = State::care;
+    check.value = first.sigmas;
+    check.text = (fit.freed.empty() ? std::string() : check.text + "; ") + "the residuals ask for " + first.name +
+                 ", about " + text_of(first.size, 2) + " " + first.unit + " (" + text_of(first.sigmas, 2) +
+                 "σ): gain, time constant and latency absorb part of it";
+  }
+  verdict.checks.push_back(check);
+}
+
+/// What a log of one size of command could not show, by name and by what it would do.
+std::string hidden_text(const std::vector<HiddenFlaw>& hidden) {
+  std::string text = "steps of one size: they do not tell another gain from ";
+  for (std::size_t i = 0; i < hidden.size(); ++i) {
+    const HiddenFlaw& flaw = hidden[i];
+    text += (i == 0 ? "" : i + 1 == hidden.size() ? " or " : ", ") + std::string(servo_flaw_words[flaw.flaw]);
+    const std::string size = text_of(flaw.size, 2) + " " + servo_flaw_units[flaw.flaw];
+    const bool is_limit = servo_flaws[flaw.flaw] == &ServoFlaws::max_rate_rad_s;
+    text += is_limit
+                ? " (at " + size + ": then the gain is any larger one)"
+                : " (of " + size + ": then the gain is " + text_of(100.0 * (flaw.gain_factor - 1.0), 2) + " % larger)";
+  }
+  return text;
+}
+
+void add_excitation(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
+  constexpr std::size_t least = 2;
+  const std::size_t sizes = num_sizes(log, least);
+  const bool is_one = sizes < least;
+  const std::string text = !is_one ? "commands of several sizes: what is not proportional would show"
+                           : identified.hidden.empty()
+                               ? "steps of one size: a dead band, backlash or a limit would pass for another gain"
+                               : hidden_text(identified.hidden);
+  verdict.checks.push_back({"excitation", is_one ? State::care : State::good, text, static_cast<double>(sizes),
+                            static_cast<double>(least), "sizes", ""});
+}
+
+/// Degrees read as radians, milliseconds as seconds; an encoder that is coarser than its noise.
+void add_readings(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
+  constexpr double max_turn_rad = 6.2831853071795865, max_spacing_s = 1.0;
+  const double range = identified.angle_range_rad;
+  if (range > max_turn_rad && identified.fit.kind == ServoKind::angle)
+    verdict.checks.push_back(
+        {"units", State::care,
+         "the angle covers " + text_of(range) + " rad, more than a turn: are these degrees? name the column angle_deg",
+         range, max_turn_rad, "rad", ""});
+  const double spacing_s = identified.duration_s / (static_cast<double>(log.size()) - 1.0);
+  if (spacing_s > max_spacing_s)
+    verdict.checks.push_back({"times", State::care,
+                              "rows are " + text_of(spacing_s) + " s apart: are these milliseconds? t_s is in seconds",
+                              spacing_s, max_spacing_s, "s", ""});
+  const double step_rad = encoder_step_rad(log);
+  // Rounding errs by step/√12; beyond two of the noise's σ it is no longer spread by the noise.
+  if (step_rad > 2.0 * identified.fit.rms_rad)
+    verdict.checks.push_back({"rounding", State::care,
+                              "the encoder reads in steps of " + text_of(step_rad / degree, 2) +
+                                  "°, coarser than its noise: errors of neighbouring rows are one error",
+                              step_rad, 2.0 * identified.fit.rms_rad, "rad", ""});
+}
+
+}  // namespace
+
+Verdict identify_verdict(std::span<const ServoSample> log, const ServoIdentification& identified) {
+  const std::string excite = "log a step or a chirp of the command that moves the axis by degrees";
+  if (log.size() < 20)
+    return refused("only " + std::to_string(log.size()) + " rows: too few for five parameters", "log at least 20 rows");
+  if (!(identified.command_range > 0.0))
+    return refused("no excitation: the command is " + text_of(log.front().command) + " throughout", excite);
+  const ServoFit& fit = identified.fit;
+  if (!(identified.angle_range_rad > 0.0)) return refused("no answer: the angle never changes", excite);
+  const bool is_angle = fit.kind == ServoKind::angle;
+  if (!fit.is_observable)
+    return refused("the log cannot tell gain, time constant and latency apart",
+                   "log until the axis has come to rest, "
+                   "and more than one change of command");
+  const ServoParams sigma = fit.cov.diagonal().cwiseSqrt();
+  if (!(std::abs(fit.params[0]) > 5.0 * sigma[0]))
+    return refused("no answer: the gain " + text_of(fit.params[0]) + " is not distinguishable from zero (σ " +
+                       text_of(sigma[0]) + ")",
+                   excite);
+  if (!(sigma[1] < 0.5 * fit.params[1]) && !(fit.params[1] + 2.0 * sigma[1] < 0.02 * identified.duration_s))
+    return refused("too short or too coarse: the time constant is " + text_of(fit.params[1]) + " s with σ " +
+                       text_of(sigma[1]) + " s",
+                   "log for several time constants after a change of command, and faster");
+  if (is_angle && fit.params[1] > identified.duration_s)
+    return refused("too short: the time constant " + text_of(fit.params[1]) + " s is longer than the log",
+                   "log for several time constants after a change of command");
+  Verdict verdict;
+  add_readings(log, identified, verdict);
+  add_checks(log, identified, verdict);
+  add_causes(log, identified, verdict);
+  add_excitation(log, identified, verdict);
+  verdict.sentence = std::string(is_angle ? "the angle" : "the rate") + " follows the command by " +
+                     text_of(fit.params[0]) + " rad" + (is_angle ? "" : "/s") + " per unit with a time constant of " +
+                     text_of(1e3 * fit.params[1]) + " ms, " + text_of(1e3 * fit.params[2]) + " ms late";
+  for (std::size_t i = 0; i < fit.freed.size(); ++i) verdict.sentence += ", with " + flaw_text(fit, fit.freed[i]);
+  for (const Check& check : verdict.checks) {
+    if (check.state == State::good) continue;
+    if (verdict.state == State::good) verdict.sentence += "; " + check.text;
+    if (verdict.to_add.empty() && check.name == "excitation")
+      verdict.to_add = "log steps of several sizes to both sides, or a chirp";
+    verdict.state = State::care;
+  }
+  return verdict;
+}
+
+}  // namespace alidade

@@ -1,0 +1,304 @@
+#include "alidade/servo/identify/positioner_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "alidade/estimation/median.h"
+#include "alidade/geometry/decompositions.h"
+#include "alidade/geometry/degree.h"
+#include "alidade/servo/identify/positioner_problem.h"
+
+namespace alidade {
+namespace {
+
+using P = PositionerPlace;
+const std::vector<int> all_places{P::rate, P::acceleration, P::time_constant, P::latency, P::backlash, P::offset};
+constexpr double boundless_acceleration_rad_s2 = 1e3, instant_s = 2e-3, coarse_s = 1e-3;
+
+/// The largest rate that was held over 0.15 s or more.
+double fastest(const std::vector<PositionerReading>& readings) {
+  constexpr double least_s = 0.15;
+  double largest = 0.0;
+  for (std::size_t i = 0, j = 0; j < readings.size(); ++j) {
+    while (i + 1 < j && readings[j].t_s - readings[i + 1].t_s >= least_s) ++i;
+    const double dt = readings[j].t_s - readings[i].t_s;
+    if (dt >= least_s && dt < 1.0)
+      largest = std::max(largest, std::abs(readings[j].angle_rad - readings[i].angle_rad) / dt);
+  }
+  return largest;
+}
+
+/// From each command to the first change that is read: their median.
+double first_latency(const PositionerLog& log) {
+  std::vector<double> waits;
+  for (std::size_t i = 0; i < log.commands.size(); ++i) {
+    const double from = log.commands[i].t_s;
+    const double until = i + 1 < log.commands.size() ? log.commands[i + 1].t_s : 1e300;
+    std::optional<double> before;
+    for (const PositionerReading& reading : log.readings) {
+      if (reading.t_s <= from) before = reading.angle_rad;
+      if (reading.t_s <= from || reading.t_s > until || !before || reading.angle_rad == *before) continue;
+      waits.push_back(reading.t_s - from);
+      break;
+    }
+  }
+  return waits.empty() ? 0.05 : median_of(std::move(waits));
+}
+
+/// From the best places of a coarse grid: the cost has more than one valley.
+PositionerVector best_start(PositionerProblem problem, double rate, double latency, double& cost) {
+  constexpr std::size_t num_starts = 4;
+  constexpr int few_steps = 12;
+  problem.set_integration(coarse_s);
+  std::vector<std::pair<double, PositionerVector>> grid;
+  for (const double acceleration : {60.0, 120.0, 220.0, 400.0, 1e4})
+    for (const double tau : {0.005, 0.05, 0.1, 0.15})
+      for (const double share : {0.1, 0.4, 0.65, 0.85}) {
+        PositionerVector theta;
+        theta << std::log(std::max(rate, 1e-4)), std::log(acceleration * degree), std::log(tau), latency * share,
+            0.05 * degree, 0.0;
+        grid.emplace_back(problem.misfit(theta).squaredNorm(), theta);
+      }
+  std::ranges::sort(grid, {}, &std::pair<double, PositionerVector>::first);
+  PositionerVector best = grid.front().second;
+  cost = 1e300;
+  const auto try_from = [&](PositionerVector theta) {
+    const double reached = problem.solve(theta, all_places, few_steps);
+    if (reached >= cost) return;
+    cost = reached;
+    best = theta;
+  };
+  for (std::size_t i = 0; i < num_starts; ++i) try_from(grid[i].second);
+  for (const double side : {-1.0, 1.0}) {  // out of a valley along which they trade
+    PositionerVector moved = best;
+    moved[P::acceleration] += 0.2 * side;
+    moved[P::latency] = std::max(0.0, moved[P::latency] + 0.006 * side);
+    try_from(moved);
+  }
+  return best;
+}
+
+/// Covariance: by the model, or by what moves scatter where that is more.
+PositionerVector sigmas_of(const PositionerProblem& problem, const PositionerVector& theta,
+                           const std::vector<int>& free, double noise2) {
+  const Eigen::MatrixXd J = problem.jacobian(theta, free);
+  const Eigen::VectorXd misfit = problem.misfit(theta);
+  Eigen::MatrixXd normal = J.transpose() * J;
+  for (int place = 0; place < P::count; ++place)
+    if (!(normal(place, place) > 0.0)) normal(place, place) = 1e-300;
+  const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-200).cwiseSqrt();
+  Eigen::MatrixXd scaled = scale.asDiagonal().inverse() * normal * scale.asDiagonal().inverse();
+  scaled.diagonal().array() += 1e-10;
+  const Eigen::MatrixXd inverse = scale.asDiagonal().inverse() * scaled.inverse().eval() * scale.asDiagonal().inverse();
+  std::map<int, PositionerVector> scores;
+  for (std::size_t i = 0; i < problem.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    auto [at, is_new] = scores.try_emplace(problem.move()[i], PositionerVector::Zero());
+    at->second += J.row(row).transpose() * misfit[row];
+  }
+  Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(P::count, P::count);
+  for (const auto& [move, score] : scores) meat += score * score.transpose();
+  const double clusters = static_cast<double>(scores.size());
+  const Eigen::MatrixXd robust = inverse * meat * inverse * (clusters / std::max(1.0, clusters - 1.0));
+  return (noise2 * inverse.diagonal()).cwiseMax(robust.diagonal()).cwiseMax(0.0).cwiseSqrt();
+}
+
+/// What is lost where a place is held at nothing, the others following: 2 ln of the likelihood ratio.
+double evidence_of(PositionerProblem problem, PositionerVector theta, int place, double nothing, double noise2) {
+  constexpr int few_steps = 10;
+  problem.set_integration(coarse_s);
+  const double with = problem.solve(theta, all_places, few_steps);
+  std::vector<int> others;
+  for (const int each : all_places)
+    if (each != place) others.push_back(each);
+  theta[place] = nothing;
+  return (problem.solve(theta, others, few_steps) - with) / noise2;
+}
+
+void fill_dead_band(const PositionerLog& log, double step, PositionerFit& fit) {
+  if (!log.smallest_obeyed_rad) {
+    fit.dead_band = {0.0, std::nan(""), false, 0.0};
+    return;
+  }
+  const double low = log.largest_ignored_rad, high = *log.smallest_obeyed_rad;
+  const bool is_seen = low > 0.0;
+  fit.dead_band.value = is_seen ? 0.5 * (low + high) : 0.0;
+  fit.dead_band.sigma = is_seen ? std::hypot((high - low) / std::sqrt(12.0), 0.25 * step) : high / std::sqrt(3.0);
+  fit.dead_band.is_asked_for = is_seen;
+  fit.dead_band.evidence = is_seen ? 2.0 * low / std::max(step, 1e-9) : 0.0;
+}
+
+void fill_repeatability(const PositionerLog& log, double step, PositionerFit& fit) {
+  const std::size_t n = log.repeated_rad.size();
+  if (n < 3) {
+    fit.repeatability = {0.0, std::nan(""), false, 0.0};
+    return;
+  }
+  double mean = 0.0, sum2 = 0.0;
+  for (const double each : log.repeated_rad) mean += each / static_cast<double>(n);
+  for (const double each : log.repeated_rad) sum2 += (each - mean) * (each - mean);
+  const double s = std::sqrt(sum2 / static_cast<double>(n - 1));
+  fit.repeatability = {s, std::hypot(s / std::sqrt(2.0 * static_cast<double>(n - 1)), step / std::sqrt(12.0)), s > step,
+                       s / std::max(step, 1e-9)};
+}
+
+/// Where it rests by what it was told: a line.
+void fill_gain(const PositionerLog& log, PositionerFit& fit) {
+  std::vector<Eigen::Vector2d> pairs;
+  for (std::size_t i = 0; i + 1 < log.commands.size(); ++i) {
+    const double until = log.commands[i + 1].t_s;
+    const PositionerReading *last = nullptr, *before = nullptr;
+    for (const PositionerReading& reading : log.readings) {
+      if (reading.t_s <= log.commands[i].t_s || reading.t_s >= until) continue;
+      before = last;
+      last = &reading;
+    }
+    if (last != nullptr && before != nullptr && last->angle_rad == before->angle_rad)
+      pairs.emplace_back(log.commands[i].target_rad, last->angle_rad);
+  }
+  if (pairs.size() < 3) return;
+  Eigen::MatrixXd A(static_cast<Eigen::Index>(pairs.size()), 2);
+  Eigen::VectorXd y(A.rows());
+  for (Eigen::Index i = 0; i < A.rows(); ++i) {
+    A.row(i) << 1.0, pairs[static_cast<std::size_t>(i)][0];
+    y[i] = pairs[static_cast<std::size_t>(i)][1];
+  }
+  const Eigen::Matrix2d normal = A.transpose() * A;
+  if (!(normal.determinant() > 1e-12)) return;
+  const Eigen::Vector2d line = normal.inverse() * A.transpose() * y;
+  const double s2 = (A * line - y).squaredNorm() / std::max(1.0, static_cast<double>(A.rows() - 2));
+  fit.gain = line[1];
+  fit.sigma_gain = std::sqrt(s2 * normal.inverse()(1, 1));
+}
+
+void find_sampling(PositionerProblem& problem, PositionerVector& theta, double& cost, PositionerFit& fit) {
+  double period = 0.0, phase = 0.0;
+  if (!problem.find_sampling(theta, period, phase)) return;
+  const PositionerProblem as_asked = problem;
+  const PositionerVector theta_as_asked = theta;
+  const double cost_as_asked = cost;
+  theta[P::latency] = std::max(0.0, theta[P::latency] - 0.5 * period);
+  for (int round = 0; round < 3; ++round) {
+    problem = as_asked;
+    problem.set_sampling(period, phase, theta);
+    cost = problem.solve(theta, all_places);
+    double again = 0.0, again_phase = 0.0;
+    // What is left of the times as they were asked tells the period better each time.
+    if (round < 2 && as_asked.find_sampling(theta, again, again_phase)) {
+      period = again;
+      phase = again_phase;
+    }
+  }
+  fit.encoder_evidence = cost_as_asked - as_asked.misfit(theta).squaredNorm();
+  if (cost < 2.0 * cost_as_asked) {
+    fit.encoder_hz = 1.0 / period;
+    return;
+  }
+  problem = as_asked;
+  theta = theta_as_asked;
+  cost = cost_as_asked;
+}
+
+/// Long moves that are over at the first reading after the command.
+bool reads_its_target(const PositionerLog& log) {
+  constexpr double long_rad = 2.0 * degree, soon_s = 0.08;  // no drive starts and stops so soon
+  int moves = 0, jumps = 0;
+  for (std::size_t i = 1; i < log.commands.size(); ++i) {
+    if (std::abs(log.commands[i].target_rad - log.commands[i - 1].target_rad) < long_rad) continue;
+    const auto next = std::ranges::upper_bound(log.readings, log.commands[i].t_s, {}, &PositionerReading::t_s);
+    if (next == log.readings.begin() || next == log.readings.end()) continue;
+    const double way = std::abs(next->angle_rad - (next - 1)->angle_rad);
+    ++moves;
+    jumps += way > 0.9 * std::abs(log.commands[i].target_rad - log.commands[i - 1].target_rad) &&
+             next->t_s - log.commands[i].t_s < soon_s;
+  }
+  return moves > 2 && 2 * jumps > moves;
+}
+
+double median_wait(const std::vector<double>& waits) { return waits.empty() ? 0.0 : median_of(waits); }
+
+}  // namespace
+
+double reading_step(const std::vector<PositionerReading>& readings) {
+  std::vector<double> angles;
+  for (const PositionerReading& reading : readings) angles.push_back(reading.angle_rad);
+  std::ranges::sort(angles);
+  constexpr double same_rad = 1e-8;
+  double step = 0.0;
+  for (std::size_t i = 1; i < angles.size(); ++i) {
+    const double apart = angles[i] - angles[i - 1];
+    if (apart > same_rad && (step == 0.0 || apart < step)) step = apart;
+  }
+  if (!(step > 0.0)) return 0.0;
+  const double whole = std::round((angles.back() - angles.front()) / step);  // a longer lever tells it better
+  return whole > 0.0 && whole < 1e5 ? (angles.back() - angles.front()) / whole : step;
+}
+
+PositionerFit fit_positioner(const PositionerLog& log) {
+  PositionerFit fit;
+  if (log.readings.size() < 30 || log.commands.size() < 3) return fit;
+  const double step = reading_step(log.readings);
+  if (!(step > 0.0)) {
+    fit.status = PositionerFit::Status::no_motion;
+    return fit;
+  }
+  fit.status = PositionerFit::Status::ok;
+  fit.resolution = {step, 0.02 * step, true, 0.0};
+  fill_dead_band(log, step, fit);
+  fill_repeatability(log, step, fit);
+  fill_gain(log, fit);
+  fit.reads_target = reads_its_target(log);
+  PositionerProblem problem(log, step, fit.dead_band.value);
+  if (problem.size() < 30) {
+    fit.status = PositionerFit::Status::too_few;
+    return fit;
+  }
+  fit.fastest_rad_s = fastest(problem.readings());
+  double cost = 0.0;
+  PositionerVector theta = best_start(problem, fit.fastest_rad_s, first_latency(log), cost);
+  cost = problem.solve(theta, all_places);
+  find_sampling(problem, theta, cost, fit);
+  const double noise2 = std::max(1.0, cost / static_cast<double>(problem.size() - all_places.size()));
+  fit.noise = std::sqrt(cost / static_cast<double>(problem.size() - all_places.size()));
+  PositionerVector sigma = sigmas_of(problem, theta, all_places, noise2);
+  const double least = std::log(static_cast<double>(problem.size())) + 6.0;  // BIC, and some for what is not modelled
+  const PositionerParams params = positioner_params(theta, fit.dead_band.value);
+  const auto test = [&](int place, double nothing) { return evidence_of(problem, theta, place, nothing, noise2); };
+  fit.reached_rate = params.rate_rad_s < 1.1 * fit.fastest_rad_s;
+  fit.rate = {params.rate_rad_s, sigma[P::rate] * params.rate_rad_s, fit.reached_rate, 0.0};
+  if (!fit.reached_rate) {
+    fit.rate.value = std::max(fit.fastest_rad_s, std::min(params.rate_rad_s, 2.0 * fit.fastest_rad_s));
+    fit.rate.sigma = std::max(fit.rate.sigma, 0.3 * fit.rate.value);
+  }
+  const double e_acceleration = test(P::acceleration, std::log(boundless_acceleration_rad_s2));
+  fit.acceleration = {params.acceleration_rad_s2, sigma[P::acceleration] * params.acceleration_rad_s2,
+                      e_acceleration > least, e_acceleration};
+  const double e_tau = test(P::time_constant, std::log(instant_s));
+  fit.time_constant = {params.time_constant_s, sigma[P::time_constant] * params.time_constant_s, e_tau > least, e_tau};
+  const double e_backlash = test(P::backlash, 0.0);
+  // Neighbouring readings round alike: what they say together is not below a quarter of a step.
+  fit.backlash = {params.backlash_rad, std::hypot(sigma[P::backlash], 0.25 * step), e_backlash > least, e_backlash};
+  constexpr double phase_share = 0.02;  // when in its period the encoder is sampled is known no better
+  const double period = fit.encoder_hz > 0.0 ? 1.0 / fit.encoder_hz : 0.0;
+  // Who sent and who received do not agree better on when than the answer took.
+  std::vector<double> waits;
+  for (const PositionerReading& reading : problem.readings()) waits.push_back(reading.wait_s);
+  const double shared_s = std::hypot(median_wait(log.command_waits_s), median_wait(waits)) / std::sqrt(12.0);
+  fit.latency = {params.latency_s + 0.5 * period,
+                 std::hypot(std::hypot(sigma[P::latency], shared_s), std::hypot(2e-4, phase_share * period)), true,
+                 0.0};
+  fit.offset_rad = theta[P::offset];
+  fit.sigma_offset_rad = sigma[P::offset];
+  fit.model_rad = problem.model(theta);
+  double sum2 = 0.0;
+  for (std::size_t i = 0; i < problem.size(); ++i) {
+    fit.t_s.push_back(problem.readings()[i].t_s);
+    fit.residual_rad.push_back(fit.model_rad[i] - problem.readings()[i].angle_rad);
+    sum2 += fit.residual_rad.back() * fit.residual_rad.back();
+  }
+  fit.rms_rad = std::sqrt(sum2 / static_cast<double>(problem.size()));
+  return fit;
+}
+
+}  // namespace alidade

@@ -1,0 +1,140 @@
+#include "alidade/simulate/boards/board_photos.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "alidade/simulate/boards/board_placing.h"
+#include "alidade/simulate/boards/printed_pattern.h"
+#include "alidade/simulate/draws.h"
+
+namespace alidade {
+
+std::vector<Eigen::Vector3d> draw_bent_points(const Board& board, const BoardSceneConfig& config, Draws& draws) {
+  std::vector<Eigen::Vector3d> points = points_in_board(board);
+  const Eigen::Vector3d middle = 0.5 * (points.front() + points.back());
+  const Eigen::Vector3d half = (points.back() - middle).cwiseMax(1e-12);
+  for (Eigen::Vector3d& point : points) {
+    const Eigen::Vector3d relative = (point - middle).cwiseQuotient(half);
+    const double bow = config.bow_m * (1.0 - 0.5 * relative.head<2>().squaredNorm());
+    point += Eigen::Vector3d(0.0, 0.0, bow) + config.shape_sigma_m * draws.normal3();
+  }
+  return points;
+}
+
+std::vector<Eigen::Vector3d> visible_outline(const BoardScene& scene) {
+  const PrintedPattern pattern(scene.board);
+  const Eigen::Vector2d low = pattern.print_min(), high = pattern.print_max();
+  std::vector<Eigen::Vector3d> outline = scene.points_in_board;
+  constexpr int steps = 8;
+  for (int i = 0; i < steps; ++i) {
+    const double x = low.x() + (high.x() - low.x()) * i / steps, y = low.y() + (high.y() - low.y()) * i / steps;
+    outline.emplace_back(x, low.y(), 0.0);
+    outline.emplace_back(high.x(), y, 0.0);
+    outline.emplace_back(high.x() + low.x() - x, high.y(), 0.0);
+    outline.emplace_back(low.x(), high.y() + low.y() - y, 0.0);
+  }
+  return outline;
+}
+
+bool sees_all(const Camera& camera, const Rigid3& cam_from_board, const std::vector<Eigen::Vector3d>& points_in_board) {
+  constexpr double margin_px = 6.0;  // room for the fit's pixels and the blur
+  return std::all_of(points_in_board.begin(), points_in_board.end(), [&](const Eigen::Vector3d& point) {
+    const auto px = project(camera, cam_from_board * point);
+    return px && px->x() >= margin_px && px->y() >= margin_px && px->x() <= camera.width_px - 1 - margin_px &&
+           px->y() <= camera.height_px - 1 - margin_px;
+  });
+}
+
+namespace {
+
+/// Draws poses until one shows everything; the board moves away a little after every failure.
+Rigid3 draw_pose(const BoardScene& scene, const std::vector<Eigen::Vector3d>& outline, const BoardSceneConfig& config,
+                 Draws& draws) {
+  const Camera& camera = scene.camera;
+  const PrintedPattern pattern(scene.board);
+  const Eigen::Vector2d size = pattern.print_max() - pattern.print_min();
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  middle.head<2>() = 0.5 * (pattern.print_max() + pattern.print_min());
+  const Eigen::VectorXd lens = params(camera.lens);
+  const double distance_at_fill_1 =
+      std::max(lens[0] * size.x() / camera.width_px, lens[1] * size.y() / camera.height_px);
+  double fill = draws.uniform(config.min_fill, config.max_fill);
+  Rigid3 cam_from_board;
+  constexpr int max_tries = 2000;
+  for (int i = 0; i < max_tries; ++i, fill *= 0.995) {
+    const double tilt = config.max_tilt_rad * std::sqrt(draws.uniform());
+    const double azimuth = draws.uniform(0.0, 2.0 * std::numbers::pi), roll = draws.uniform(-0.35, 0.35);
+    const Eigen::Vector3d axis(std::cos(azimuth), std::sin(azimuth), 0.0);
+    cam_from_board.rotation = exp_so3(tilt * axis) * exp_so3({0.0, 0.0, roll});
+    const double v = draws.uniform(0.1, 0.9) * camera.height_px, u = draws.uniform(0.1, 0.9) * camera.width_px;
+    const auto ray = unproject(camera, {u, v});
+    if (!ray) continue;
+    cam_from_board.translation = distance_at_fill_1 / fill / ray->z() * *ray - cam_from_board.rotation * middle;
+    if (sees_all(camera, cam_from_board, outline)) break;
+  }
+  return cam_from_board;
+}
+
+}  // namespace
+
+BoardScene draw_board_scene(const Camera& camera, const Board& board, const BoardSceneConfig& config,
+                            std::uint64_t seed) {
+  Draws draws(seed);
+  BoardScene scene{camera, board, draw_bent_points(board, config, draws), {}};
+  const std::vector<Eigen::Vector3d> outline = visible_outline(scene);
+  for (int i = 0; i < config.num_photos; ++i) scene.cam_from_board.push_back(draw_pose(scene, outline, config, draws));
+  return scene;
+}
+
+std::vector<Eigen::Vector2d> true_corners(const BoardScene& scene, std::size_t i) {
+  std::vector<Eigen::Vector2d> corners;
+  corners.reserve(scene.points_in_board.size());
+  for (const Eigen::Vector3d& point : scene.points_in_board) {
+    const auto px = project(scene.camera, scene.cam_from_board[i] * point);
+    corners.push_back(px ? *px : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()));
+  }
+  return corners;
+}
+
+std::vector<BoardView> simulate_views(const BoardScene& scene, double sigma_px, std::uint64_t seed) {
+  Draws draws(seed);
+  std::vector<BoardView> views;
+  for (std::size_t i = 0; i < scene.cam_from_board.size(); ++i) {
+    const std::vector<Eigen::Vector2d> truth = true_corners(scene, i);
+    BoardView view{photo_name(i), {}};
+    for (std::size_t k = 0; k < truth.size(); ++k) {
+      const Eigen::Vector2d noise = sigma_px * draws.normal2();
+      if (!truth[k].allFinite()) continue;
+      view.corners.push_back(
+          {static_cast<int>(k), truth[k] + noise, sigma_px * sigma_px * Eigen::Matrix2d::Identity()});
+    }
+    views.push_back(std::move(view));
+  }
+  return views;
+}
+
+void add_shared_errors(const BoardScene& scene, double sigma_px, std::uint64_t seed, std::vector<BoardView>& views) {
+  Draws draws(seed);
+  const std::vector<Eigen::Vector3d> printed = points_in_board(scene.board);
+  const Eigen::Vector3d centre = 0.5 * (printed.front() + printed.back());
+  const Eigen::Vector3d half = (0.5 * (printed.back() - printed.front())).cwiseAbs().cwiseMax(1e-12);
+  for (BoardView& view : views) {
+    Eigen::Matrix<double, 2, 6> field;
+    for (int term = 0; term < 6; ++term) field.col(term) = sigma_px * draws.normal2();
+    for (Corner& corner : view.corners) {
+      const Eigen::Vector3d q = (printed[static_cast<std::size_t>(corner.index)] - centre).cwiseQuotient(half);
+      Eigen::Vector<double, 6> terms;
+      terms << 1.0, q.x(), q.y(), q.x() * q.x(), q.x() * q.y(), q.y() * q.y();
+      corner.px += field * terms;
+    }
+  }
+}
+
+std::string photo_name(std::size_t i) {
+  const std::string number = std::to_string(i + 1);
+  return "board_" + std::string(number.size() < 3 ? 3 - number.size() : 0, '0') + number + ".png";
+}
+
+}  // namespace alidade

@@ -1,0 +1,147 @@
+#include "alidade/simulate/films/panorama_video.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "alidade/pantilt/head_rotation.h"
+#include "alidade/simulate/draws.h"
+#include "alidade/simulate/rotating_lens.h"
+
+namespace alidade {
+namespace {
+
+using RowMajorF = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// Weights of the sub-samples of a pixel and its neighbours along one axis: the optics' Gaussian over the pixel's box.
+struct Kernel {
+  int reach = 0;            ///< Pixels before and after that count.
+  Eigen::VectorXf weights;  ///< (2 reach + 1) · oversampling
+};
+
+Kernel kernel_of(const PanoramaConfig& config) {
+  const int n = config.oversampling;
+  Kernel kernel;
+  kernel.reach = config.blur_px > 0.0 ? static_cast<int>(std::ceil(4.0 * config.blur_px + 0.5)) : 0;
+  kernel.weights.resize((2 * kernel.reach + 1) * n);
+  const double scale = config.blur_px > 0.0 ? 1.0 / (std::sqrt(2.0) * config.blur_px) : 1e9;
+  for (int i = 0; i < static_cast<int>(kernel.weights.size()); ++i) {
+    const double at_px = (i + 0.5) / n - kernel.reach - 0.5;
+    kernel.weights[i] = static_cast<float>(std::erf((at_px + 0.5) * scale) - std::erf((at_px - 0.5) * scale));
+  }
+  kernel.weights /= kernel.weights.sum();
+  return kernel;
+}
+
+/// Directions of pixels. The lens is inverted once for 4096 radii (tested with the rest to 0.01 px; the table's own
+/// error is 1e-6 px), because Newton's steps would cost more than all else.
+class View {
+ public:
+  View(const RotatingIntrinsics& k, int width, int height, const Eigen::Quaterniond& base_from_cam)
+      : k_(k), base_from_cam_(base_from_cam.toRotationMatrix().cast<float>()) {
+    constexpr double beyond = 1.2;  // of the farthest corner: the margin that is blurred into the image
+    const double x = beyond * std::max(k.cx, width - k.cx) / k.fx, y = beyond * std::max(k.cy, height - k.cy) / k.fy;
+    square_step_ = (x * x + y * y) / num_squares;
+    for (int i = 0; k.k1 != 0.0 && i < num_squares + 2; ++i) {
+      const double bent = std::sqrt((i + 1e-9) * square_step_);  // at the centre the scale is the limit's
+      scale_.push_back(static_cast<float>(ray_of_px(k, {k.cx + k.fx * bent, k.cy}).x() / bent));
+    }
+  }
+
+  [[nodiscard]] Eigen::Vector3f direction(double u, double v) const {
+    const auto x = static_cast<float>((u - k_.cx) / k_.fx), y = static_cast<float>((v - k_.cy) / k_.fy);
+    const float scale = scale_.empty() ? 1.0f : scale_at(x * x + y * y);
+    return base_from_cam_ * Eigen::Vector3f(scale * x, scale * y, 1.0f);
+  }
+
+ private:
+  static constexpr int num_squares = 4096;
+
+  [[nodiscard]] float scale_at(float bent_squared) const {
+    const float at = bent_squared / static_cast<float>(square_step_);
+    const std::size_t i = std::min(static_cast<std::size_t>(at), static_cast<std::size_t>(num_squares));
+    return scale_[i] + (at - static_cast<float>(i)) * (scale_[i + 1] - scale_[i]);
+  }
+
+  RotatingIntrinsics k_;
+  Eigen::Matrix3f base_from_cam_;
+  double square_step_ = 1.0;
+  std::vector<float> scale_;  ///< Undistorted over distorted radius, by even steps of the square of the latter.
+};
+
+/// Paints what will be seen: a look at every eighth pixel, and as far around it.
+void prepare(FarWorld& world, const View& view, double focal_px, int width, int height, int margin) {
+  constexpr int step_px = 8;
+  std::vector<Eigen::Vector3f> directions;
+  for (int v = -margin; v < height + margin + step_px; v += step_px)
+    for (int u = -margin; u < width + margin + step_px; u += step_px) directions.push_back(view.direction(u, v));
+  world.prepare(directions, step_px / focal_px);
+}
+
+/// Light per pixel, before the noise.
+RowMajorF light_of(const FarWorld& world, const View& view, int width, int height, const PanoramaConfig& config) {
+  const int n = config.oversampling;
+  const Kernel kernel = kernel_of(config);
+  const int cols = (width + 2 * kernel.reach) * n, rows = (height + 2 * kernel.reach) * n;
+  RowMajorF across(rows, width), light(height, width);
+  tbb::parallel_for(0, rows, [&](int row) {
+    Eigen::VectorXf samples(cols);
+    const double v = (row + 0.5) / n - kernel.reach - 0.5;
+    for (int i = 0; i < cols; ++i) samples[i] = world.grey(view.direction((i + 0.5) / n - kernel.reach - 0.5, v));
+    for (int u = 0; u < width; ++u) across(row, u) = samples.segment(u * n, kernel.weights.size()).dot(kernel.weights);
+  });
+  tbb::parallel_for(0, height, [&](int v) {
+    light.row(v).noalias() = kernel.weights.transpose() * across.middleRows(v * n, kernel.weights.size());
+  });
+  return light;
+}
+
+}  // namespace
+
+cv::Mat render_panorama(FarWorld& world, const RotatingIntrinsics& intrinsics, int width_px, int height_px,
+                        const Eigen::Quaterniond& base_from_cam, const PanoramaConfig& config, std::uint64_t seed) {
+  const View view(intrinsics, width_px, height_px, base_from_cam);
+  prepare(world, view, std::min(intrinsics.fx, intrinsics.fy), width_px, height_px, kernel_of(config).reach + 1);
+  const RowMajorF light = light_of(world, view, width_px, height_px, config);
+  Draws draws(seed);
+  cv::Mat frame(height_px, width_px, CV_8U);
+  for (int v = 0; v < height_px; ++v) {
+    auto* row = frame.ptr<unsigned char>(v);
+    for (int u = 0; u < width_px; ++u) {
+      const double noise = config.noise > 0.0 ? config.noise * draws.normal() : 0.0;
+      row[u] =
+          static_cast<unsigned char>(std::lround(std::clamp(static_cast<double>(light(v, u)) + noise, 0.0, 255.0)));
+    }
+  }
+  return frame;
+}
+
+Eigen::Quaterniond true_base_from_cam(const RotationScene& scene, double t_s) {
+  const Eigen::Quaterniond cam_from_mount = exp_so3(scene.mount_rad);
+  const Eigen::Quaterniond base_from_mount = base_from_cam_rotation(scene.motion(t_s));
+  return base_from_mount * cam_from_mount.conjugate();
+}
+
+cv::Mat render_panorama_frame(FarWorld& world, const RotationScene& scene, std::size_t k, double rate_hz,
+                              const PanoramaConfig& config, std::uint64_t seed) {
+  const double t_s = static_cast<double>(k) / rate_hz;
+  return render_panorama(world, scene.intrinsics(t_s), scene.width_px, scene.height_px,
+                         true_base_from_cam(scene, t_s + scene.delay_s), config, seed + 0x9e3779b97f4a7c15u * (k + 1));
+}
+
+RotationLog panorama_log(const RotationScene& scene, const RotationLogConfig& config, std::uint64_t seed) {
+  RotationScene without_points = scene;
+  without_points.start_px.clear();
+  without_points.depth_m.clear();
+  if (config.source == RotationSource::rate) {
+    without_points.motion = [motion = scene.motion](double t_s) {
+      constexpr double h = 1e-4;  // of a smooth motion: errors of both kinds are below 1e-8 rad/s
+      return head_rate_in_cam(motion(t_s), (motion(t_s + h) - motion(t_s - h)) / (2.0 * h));
+    };
+  }
+  return simulate_rotation(without_points, config, seed);
+}
+
+}  // namespace alidade

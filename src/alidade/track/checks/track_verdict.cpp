@@ -1,0 +1,334 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "alidade/track/checks/clock_shift.h"
+#include "alidade/track/checks/explanation.h"
+#include "alidade/track/track.h"
+
+namespace alidade {
+namespace {
+
+constexpr double good_nees = 2.0, max_nees = 9.0;  // per degree of freedom, where the truth is given
+constexpr double good_nees_of_one = 3.8;           // where errors do not change along a track: 99 % of three numbers
+constexpr double care_left_out = 0.05, max_left_out = 0.2;
+constexpr double min_used_share = 0.7, max_nis = 3.0, good_nis_low = 0.6, good_nis_high = 1.5;
+
+double used_share(const TrackReport& report) {
+  return report.steps.empty() ? 0.0 : static_cast<double>(report.num_used) / static_cast<double>(report.steps.size());
+}
+
+std::size_t count(const TrackReport& report, TrackEvent event) {
+  return static_cast<std::size_t>(std::ranges::count(report.steps, event, &TrackStep::event));
+}
+
+bool fits(const TrackReport& report) {
+  return report.num_starts > 0 && used_share(report) > min_used_share && !(report.nis_per_dof > max_nis) &&
+         report.num_restarts * 20 <= report.steps.size();
+}
+
+using Observations = std::vector<TargetObservation>;
+using Fault = Explanation;
+
+/// How many pairs of observations there are at a time, and of them, with parallel rays.
+struct PairCounts {
+  std::size_t together = 0, parallel = 0;
+};
+
+PairCounts count_pairs(std::span<const TargetObservation> given, std::span<const RigHead> heads,
+                       const FollowConfig& config) {
+  PairCounts counts;
+  Observations observations(given.begin(), given.end());
+  std::ranges::stable_sort(observations, {}, &TargetObservation::t_capture_s);
+  for (std::size_t i = 1; i < observations.size(); ++i) {
+    const TargetObservation &a = observations[i - 1], &b = observations[i];
+    if (a.head == b.head || a.head >= heads.size() || b.head >= heads.size() ||
+        std::abs(a.t_capture_s - b.t_capture_s) > config.tracker.together_s)
+      continue;
+    ++counts.together;
+    const auto ray_a = ray_in_world(heads[a.head], a);
+    const auto ray_b = ray_in_world(heads[b.head], b);
+    if (ray_a && ray_b && !nearest_to_rays(*ray_a, *ray_b)) ++counts.parallel;
+  }
+  return counts;
+}
+
+bool are_parallel(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                  const FollowConfig& config) {
+  const PairCounts counts = count_pairs(observations, heads, config);
+  return 2 * counts.parallel > counts.together;
+}
+
+/// Why no track began although there were two heads at a time.
+Fault why_no_start(std::span<const TargetObservation> given, std::span<const RigHead> heads,
+                   const FollowConfig& config) {
+  const auto [together, parallel] = count_pairs(given, heads, config);
+  if (together == 0)
+    return {
+        "the heads never see the target within " + text_of(1e3 * config.tracker.together_s, 2) + " ms of each other",
+        "take images more often, or set their clocks"};
+  if (2 * parallel > together)
+    return {"parallel rays: the heads look in the same direction, so that the range cannot be determined",
+            "set the heads further apart, or let the target come nearer"};
+  return {"the two heads' rays do not meet within " + text_of(config.tracker.min_depth_m, 2) + " to " +
+              text_of(config.tracker.max_depth_m, 2) + " m",
+          "check the rig file, or widen the working range"};
+}
+
+/// Pixels beyond the image of the rig's camera: the rig file is of another camera.
+std::optional<Fault> other_camera(const TrackReport& report, std::span<const TargetObservation> observations,
+                                  std::span<const RigHead> heads) {
+  constexpr double max_share = 0.05;
+  for (std::size_t h = 0; h < heads.size(); ++h) {
+    double num = 0.0, outside = 0.0;
+    for (std::size_t i = 0; i < observations.size() && i < report.steps.size(); ++i) {
+      if (observations[i].head != h) continue;
+      num += 1.0;
+      outside += report.steps[i].event == TrackEvent::outside ? 1.0 : 0.0;
+    }
+    if (!(outside > max_share * num)) continue;
+    return Fault{text_of(100.0 * outside / num) + " % of the observations of head " + std::to_string(heads[h].head.id) +
+                     " lie outside its image of " + std::to_string(heads[h].camera.width_px) + " x " +
+                     std::to_string(heads[h].camera.height_px) + " px",
+                 "give the rig file of the camera that took them"};
+  }
+  return std::nullopt;
+}
+
+Verdict refused(Fault fault) {
+  Verdict verdict;
+  verdict.state = State::refused;
+  verdict.exit_code = ExitCode::cannot_tell;
+  verdict.sentence = std::move(fault.what);
+  verdict.to_add = std::move(fault.to_do);
+  return verdict;
+}
+
+Check check(std::string name, State state, std::string text, double value, double limit, std::string unit) {
+  return {std::move(name), state, std::move(text), value, limit, std::move(unit), "track"};
+}
+
+/// The lean of one head's innovations that no noise explains, and what usually does it.
+struct Lean {
+  std::string text;
+  double size = 0.0;
+};
+
+/// A target that --method describes badly leans, too, by up to half of these: see scenario C.
+constexpr double min_mean = 0.4, min_along = 0.6, min_place = 1.2;
+
+void take_if_worse(std::string text, double size, double least, double z, Lean& worst) {
+  constexpr double min_z = 6.0;
+  if (std::abs(size) > least && std::abs(z) > min_z && std::abs(size) > worst.size)
+    worst = {std::move(text), std::abs(size)};
+}
+
+void take_worst_of(const HeadInnovations& of, const std::string& head, Lean& worst) {
+  const double root = std::sqrt(static_cast<double>(of.num));
+  for (int k = 0; k < 2; ++k) {
+    take_if_worse(head + " sees the target to one side of where it is expected, by " +
+                      text_of(std::abs(of.mean[k]), 2) + "σ in " + (k == 0 ? "u" : "v") +
+                      ": its mounting or an encoder's zero",
+                  of.mean[k], min_mean, root * of.mean[k], worst);
+    take_if_worse("the innovations of " + head + " grow with the position in the image, by " +
+                      text_of(std::abs(of.place[k]), 2) + "σ a quarter of it: its focal length, or a scale",
+                  of.place[k], min_place, of.place[k] * std::sqrt(of.place_num), worst);
+  }
+  take_if_worse(head + " sees the target " + (of.along > 0.0 ? "ahead of" : "behind") + " where it is expected, by " +
+                    text_of(std::abs(of.along), 2) +
+                    "σ along its motion: clocks, or a target that --method does not describe",
+                of.along, min_along, root * of.along, worst);
+}
+
+/// The largest lean of all heads.
+Lean worst_lean(const TrackReport& report, std::span<const RigHead> heads) {
+  Lean worst;
+  for (std::size_t h = 0; h < report.innovations.size() && h < heads.size(); ++h)
+    take_worst_of(report.innovations[h], "head " + std::to_string(heads[h].head.id), worst);
+  return worst;
+}
+
+/// Whether innovations are white, and what of the rig the observations contradict.
+void add_white(const TrackReport& report, std::span<const RigHead> heads, Verdict& verdict) {
+  const Lean lean = worst_lean(report, heads);
+  const Check lean_check =
+      check("lean", lean.size > 0.0 ? State::care : State::good,
+            lean.size > 0.0 ? lean.text : "by head, motion and position the innovations have no lean", lean.size,
+            min_mean, "σ");
+  constexpr double max_z = 5.0;
+  if (!report.faults.empty()) {
+    const RigFault& worst = report.faults.front();
+    const bool is_off = worst.z > max_z;
+    const std::string kind = report.errors_are_counted ? " of what the rig file allows)" : " of chance)";
+    verdict.checks.push_back(check("rig", is_off ? State::care : State::good,
+                                   is_off
+                                       ? "the observations say that " + worst.name + " is off by " +
+                                             text_of(std::abs(worst.off), 2) + " (" + text_of(worst.z, 2) + "σ" + kind
+                                       : "the heads' rays meet as the rig file lets them",
+                                   worst.z, max_z, "σ"));
+  }
+  verdict.checks.push_back(lean_check);
+  if (report.inflation > 1.0)
+    verdict.checks.push_back(check("inflated", State::care,
+                                   "every σ was raised by " + text_of(std::sqrt(report.inflation), 3) +
+                                       ": the innovations are larger than stated, or follow one another",
+                                   std::sqrt(report.inflation), 1.0, "1"));
+}
+
+void add_checks(const TrackReport& report, Verdict& verdict) {
+  const double nis = report.nis_per_dof;
+  if (std::isfinite(nis)) {
+    const bool is_good = nis >= good_nis_low && nis <= good_nis_high;
+    const std::string text = nis > good_nis_high  ? "noise is larger than stated, or the rig is wrong"
+                             : nis < good_nis_low ? "noise is smaller than stated"
+                                                  : "innovations as large as predicted";
+    verdict.checks.push_back(check("NIS",
+                                   is_good         ? State::good
+                                   : nis > max_nis ? State::bad
+                                                   : State::care,
+                                   text_of(nis, 3) + " per degree of freedom: " + text, nis, good_nis_high, "1"));
+  }
+  const double nees = report.nees_per_dof;
+  if (std::isfinite(
+          nees)) {  // only who has the truth sees a wrong focal length: a head that follows keeps the target central
+    const double ratio = std::sqrt(nees), max_good = report.errors_are_counted ? good_nees_of_one : good_nees;
+    verdict.checks.push_back(check("truth",
+                                   nees > max_nees   ? State::bad
+                                   : nees > max_good ? State::care
+                                                     : State::good,
+                                   "the errors are " + text_of(ratio, 2) + " times their σ", ratio, std::sqrt(max_good),
+                                   "σ"));
+  }
+  const auto num_alone = static_cast<double>(count(report, TrackEvent::one_head));
+  const double alone = num_alone / static_cast<double>(report.steps.size());
+  verdict.checks.push_back(check("both heads", alone > 0.02 ? State::care : State::good,
+                                 alone > 0.0
+                                     ? text_of(100.0 * alone, 2) + " % seen by one head only: range drifts there"
+                                     : "both heads see the target",
+                                 alone, 0.02, "1"));
+  const double left_out = 1.0 - used_share(report);
+  const std::size_t num_left = report.steps.size() - report.num_used;
+  verdict.checks.push_back(
+      check("rejected",
+            left_out > max_left_out    ? State::bad
+            : left_out > care_left_out ? State::care
+                                       : State::good,
+            std::to_string(num_left) + " of " + std::to_string(report.steps.size()) + " observations (" +
+                text_of(100.0 * left_out, 2) + " %) were rejected: " +
+                (left_out > care_left_out ? "what agrees is no more than what was let in" : "the others agree"),
+            left_out, care_left_out, "1"));
+  const auto late = static_cast<double>(count(report, TrackEvent::late));
+  if (late > 0.0)
+    verdict.checks.push_back(
+        check("late", State::care, text_of(late, 2) + " observations came too late", late, 0.0, "observations"));
+}
+
+/// Observations that were rejected and follow a path of their own.
+std::optional<Check> second_target(const TrackReport& report, std::span<const TargetObservation> observations,
+                                   std::span<const RigHead> heads, const FollowConfig& config) {
+  constexpr std::size_t least = 16;
+  constexpr double min_share = 0.7;
+  Observations others;
+  for (std::size_t i = 0; i < observations.size() && i < report.steps.size(); ++i)
+    if (report.steps[i].event == TrackEvent::gated || report.steps[i].event == TrackEvent::depth)
+      others.push_back(observations[i]);
+  if (others.size() < least) return std::nullopt;
+  FollowConfig plain = config;
+  plain.judge = false;
+  const TrackReport second = track_target(with_shift(others, {}), heads, plain);
+  if (second.num_starts == 0 || used_share(second) < min_share || second.num_restarts * 20 > others.size())
+    return std::nullopt;
+  return check("second target", State::care,
+               "there are two targets: " + std::to_string(second.num_used) + " of the " +
+                   std::to_string(others.size()) + " observations that were rejected follow a path of their own",
+               used_share(second), min_share, "1");
+}
+
+/// What of the observations as a whole is not as stated.
+struct Causes {
+  std::optional<Fault> mistake;
+  std::optional<Check> second;
+  std::optional<ClockShift> shift;
+};
+
+Causes causes_of(const TrackReport& report, std::span<const TargetObservation> observations,
+                 std::span<const RigHead> heads, const FollowConfig& config) {
+  FollowConfig found = config;
+  if (report.num_starts > 0) found.tracker.sigma_a_m_s2 = report.sigma_a_m_s2;
+  Causes causes;
+  if (!fits(report) || report.nis_per_dof > good_nis_high || used_share(report) < 1.0 - care_left_out)
+    causes.mistake = explanation_of(observations, heads, config);
+  if (causes.mistake && !causes.mistake->is_foreign_head) return causes;
+  causes.shift = probable_clock_shift(observations, heads, found);
+  // A head with a wrong clock agrees with none of the others, either.
+  if (causes.mistake && !causes.shift) return causes;
+  causes.mistake.reset();
+  causes.second = second_target(report, observations, heads, found);
+  return causes;
+}
+
+/// Why there is no track.
+std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes,
+                                std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                                const FollowConfig& config) {
+  // Where nothing moves against the heads, many a mistake would make the rays meet: that explains nothing.
+  if (report.num_starts == 0 && are_parallel(observations, heads, config))
+    return why_no_start(observations, heads, config);
+  if (causes.mistake && (!fits(report) || used_share(report) < 1.0 - max_left_out)) return causes.mistake;
+  if (fits(report)) return std::nullopt;
+  if (causes.shift) return Fault{clock_text(*causes.shift, heads), "set the heads' clocks"};
+  if (report.num_starts == 0) return why_no_start(observations, heads, config);
+  if (causes.second) return Fault{causes.second->text, "give the observations of one target: one row per image"};
+  if (used_share(report) < min_used_share)
+    return Fault{"only " + text_of(100.0 * used_share(report), 2) +
+                     " % of the observations fit one track and this rig, and no clock, sign or swap explains it",
+                 "check that the rig file is of these heads as they stand now, and the noise"};
+  return std::nullopt;
+}
+
+std::string sentence_of(const TrackReport& report, const Verdict& verdict) {
+  std::string sentence = "tracked through " + std::to_string(report.num_used) + " of " +
+                         std::to_string(report.steps.size()) + " observations";
+  if (report.num_restarts > 0) sentence += ", started again " + std::to_string(report.num_restarts) + " times";
+  if (verdict.state == State::good) return sentence;
+  const auto first = std::ranges::find(verdict.checks, verdict.state, &Check::state);
+  sentence += "; " + first->text;
+  // Beside what only says how bad it is, what it may come from.
+  constexpr std::array<std::string_view, 5> names{"clocks", "mistake", "second target", "rig", "lean"};
+  const auto cause = std::ranges::find_if(
+      verdict.checks, [&](const Check& c) { return c.state != State::good && std::ranges::count(names, c.name) > 0; });
+  if (cause != verdict.checks.end() && cause != first) sentence += "; " + cause->text;
+  return sentence;
+}
+
+}  // namespace
+
+Verdict track_verdict(const TrackReport& report, std::span<const TargetObservation> observations,
+                      std::span<const RigHead> heads, const FollowConfig& config) {
+  std::set<std::size_t> seen_by;
+  for (const TargetObservation& observation : observations) seen_by.insert(observation.head);
+  if (seen_by.size() < 2)
+    return refused({"one head only: the range along its ray cannot be determined", "add the events of a second head"});
+  if (auto other = other_camera(report, observations, heads)) return refused(std::move(*other));
+  const Causes causes = causes_of(report, observations, heads, config);
+  if (auto why = refusal_of(report, causes, observations, heads, config)) return refused(std::move(*why));
+  Verdict verdict;
+  if (causes.shift)
+    verdict.checks.push_back(
+        check("clocks", State::care, clock_text(*causes.shift, heads), 1e3 * causes.shift->later_s, 0.0, "ms"));
+  if (causes.mistake) verdict.checks.push_back(check("mistake", State::bad, causes.mistake->what, 1.0, 0.0, "1"));
+  if (causes.second) verdict.checks.push_back(*causes.second);
+  add_checks(report, verdict);
+  add_white(report, heads, verdict);
+  for (const Check& c : verdict.checks) verdict.state = std::max(verdict.state, c.state);
+  if (verdict.state == State::bad) verdict.to_add = "do not use it before the reason is found";
+  verdict.sentence = sentence_of(report, verdict);
+  return verdict;
+}
+
+}  // namespace alidade

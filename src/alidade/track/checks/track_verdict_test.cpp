@@ -1,0 +1,107 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "alidade/testing/track_sample.h"
+#include "alidade/track/checks/track_assumed.h"
+#include "alidade/track/track.h"
+
+namespace alidade {
+namespace {
+
+const Check* check_of(const Verdict& verdict, const std::string& name) {
+  const auto found = std::ranges::find(verdict.checks, name, &Check::name);
+  return found == verdict.checks.end() ? nullptr : &*found;
+}
+
+TEST(TrackVerdict, WhatThrowsAQuarterAwayIsNotConsistent) {
+  const TrackScene scene = *track_scenario("B");
+  std::vector<TargetObservation> observations = testing::observations_of(scene, 3);
+  for (std::size_t i = 20; i < observations.size(); i += 4)  // another thing in the image
+    observations[i].px.x() += observations[i].px.x() < 160.0 ? 80.0 : -80.0;
+  FollowConfig config;
+  config.find_sigma_a = false;
+  config.tracker.sigma_a_m_s2 = scene.sigma_a_m_s2;
+  const TrackReport report = track_target(observations, scene.heads, config);
+  const Verdict verdict = track_verdict(report, observations, scene.heads, config);
+  EXPECT_EQ(verdict.state, State::bad) << verdict.sentence;
+  const Check* left_out = check_of(verdict, "rejected");
+  ASSERT_NE(left_out, nullptr);
+  EXPECT_EQ(left_out->state, State::bad);
+  EXPECT_NEAR(left_out->value, 0.22, 0.05);
+}
+
+/// One head's images come 0.1 s later than the other's.
+TEST(TrackVerdict, DoesNotDependOnTheOrderOfArrival) {
+  for (const double late_s : {0.06, 0.1, 0.2}) {
+    const TrackScene scene = *track_scenario("G");
+    std::vector<TargetObservation> observations = testing::observations_of(scene, 4);
+    const FollowConfig config;
+    const TrackReport in_order = track_target(observations, scene.heads, config);
+    for (TargetObservation& observation : observations) observation.t_arrival_s += observation.head == 1 ? late_s : 0.0;
+    std::ranges::stable_sort(observations, {}, &TargetObservation::t_arrival_s);
+    const TrackReport late = track_target(observations, scene.heads, config);
+    EXPECT_EQ(late.num_starts, 1u);
+    EXPECT_EQ(late.sigma_a_m_s2, in_order.sigma_a_m_s2);
+    EXPECT_NEAR(late.nis_per_dof, in_order.nis_per_dof, 1e-9);
+    EXPECT_LT((late.steps.back().belief.x - in_order.steps.back().belief.x).norm(), 1e-9);
+    EXPECT_EQ(track_verdict(late, observations, scene.heads, config).state, State::good);
+  }
+}
+
+TEST(TrackVerdict, NoiseThatIsLargerThanStatedRaisesSigma) {
+  TrackScene scene = *track_scenario("A");
+  scene.sigma_px = 1.0;
+  scene.sigma_encoder_rad = 0.0;
+  for (RigHead& head : scene.heads) head.head.encoder.sigma_rad = 1e-6;
+  const std::vector<TargetObservation> observations = testing::observations_of(scene, 3);
+  FollowConfig config;
+  config.tracker.sigma_px = 0.5;
+  config.find_sigma_a = false;
+  config.tracker.sigma_a_m_s2 = scene.sigma_a_m_s2;
+  const TrackReport report = track_target(observations, scene.heads, config, testing::truth_of(scene));
+  EXPECT_GT(report.inflation, 2.0);  // the noise's variance is 4 times the one stated
+  EXPECT_LT(report.nees_per_dof, 2.0);
+  const Verdict verdict = track_verdict(report, observations, scene.heads, config);
+  ASSERT_NE(check_of(verdict, "inflated"), nullptr);
+  EXPECT_GE(verdict.state, State::care);
+}
+
+/// Heads 0.5 m apart look straight ahead at a point half way between, 2 m off: by hand, as z = B f / (u1 − u2).
+TEST(TrackAssumed, TheMeetingOfRaysFollowsTheParameters) {
+  std::vector<RigHead> heads;
+  for (const RigHead& head : xiahou_rig()) heads.push_back(head);
+  const std::vector<HeadReading> readings{{0, {0.0, 0.0}}, {1, {0.0, 0.0}}};
+  const auto by = meeting_sensitivity(heads, readings, {0.25, 0.0, 2.0}, Eigen::Vector3d::Zero());
+  ASSERT_EQ(by.size(), 2u);
+  const double f = 337.84, dz_du = 2.0 * 2.0 / (0.5 * f);
+  // A centre told too small by 1 px (p = p̂ + 1) puts the pixel 1 px nearer to the axis: u1 falls, z rises.
+  EXPECT_NEAR(by[0](2, num_head_params + 2), dz_du, 1e-6);
+  EXPECT_NEAR(by[1](2, num_head_params + 2), -dz_du, 1e-6);
+  EXPECT_NEAR(by[0](2, num_head_params), 0.125 * dz_du, 1e-6);  // f: du = x/z
+  EXPECT_NEAR(by[1](2, 4), by[0](2, 4) * -1.0, 1e-6);           // both bases turned alike move nothing
+}
+
+TEST(TrackAssumed, WhatIsExactMovesNothingAndWhatIsUnknownDoes) {
+  const TrackScene scene = *track_scenario("C");
+  const auto observations = testing::observations_of(scene, 2);
+  const FollowConfig config;
+  const TrackReport report = track_target(observations, scene.heads, config);
+  Rig rig;
+  rig.heads = scene.heads;
+  const auto unknown = track_assumed(observations, rig, config, report, {});
+  EXPECT_EQ(assumed_check(unknown).state, State::care);
+  rig.cov.setZero(2 * num_head_params, 2 * num_head_params);
+  for (RigHead& head : rig.heads) {
+    const auto size = params(head.camera.lens).size();
+    head.camera.cov.setZero(size, size);
+  }
+  const auto exact = track_assumed(observations, rig, config, report, {});
+  EXPECT_EQ(assumed_check(exact).state, State::good);
+  EXPECT_EQ(exact.size(), unknown.size());
+  for (const Assumption& what : exact)
+    if (!what.name.starts_with("motion")) EXPECT_EQ(what.moves, 0.0) << what.name;
+}
+
+}  // namespace
+}  // namespace alidade

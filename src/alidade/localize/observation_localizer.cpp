@@ -37,7 +37,11 @@ bool ObservationLocalizer::start(const ObservationFrame& frame) {
     if (from.empty()) return false;
     from = only_where(std::move(from));
   }
-  engine_.begin(from, frame.t_s, config_.bank);
+  FilterBankConfig bank = config_.bank;
+  // With many points, and none that says how large the world is, speeds are nothing to choose among.
+  constexpr std::size_t many = 30;
+  if (is_free() && frame.observations.size() >= many) bank.splits = 1;
+  engine_.begin(from, frame.t_s, bank);
   for (const KnownPoint& point : config_.target.points)
     engine_.filters().add_known(point.id, point.point_in_world, point.sigma_m);
   record_.begin(num_taken_);
@@ -98,7 +102,7 @@ void ObservationLocalizer::add_new(const ObservationFrame& frame) {
   std::size_t num_gone = 0;
   for (const FeatureObservation& observation : frame.observations) {
     if (engine_.best().has(observation.id)) continue;
-    const auto prior = points_.prior_of(observation, engine_.best(), episodes_.before(observation.id));
+    const auto prior = points_.prior_of(observation, engine_.best());
     if (!prior) continue;
     if (!leaving && !has_room()) leaving = least_useful(frame);
     while (!has_room() && num_gone < leaving->size()) let_go((*leaving)[num_gone++]);
@@ -214,6 +218,22 @@ bool ObservationLocalizer::restart(const ObservationFrame& frame, Doubt doubt) {
   return true;
 }
 
+/// Where observations contradict a path that nothing but itself holds: it and its map are given up, and another begins
+/// where it ends. What was seen before is placed by the map that follows (observation_record.h).
+bool ObservationLocalizer::begin_again(Doubt doubt) {
+  constexpr std::size_t enough_tried = 10, young = 200;  // frames; a path that was right for long is not given up
+  const std::size_t age = num_taken_ - record_.begun();
+  if (!is_free() || (doubt != Doubt::strong && doubt != Doubt::many) || age < enough_tried || age > young) return false;
+  StartHypothesis from = *engine_.start_without_target();
+  from.motion.world_from_cam = engine_.best().motion().world_from_cam;
+  drop_map();
+  engine_.filters().restart({{from}});
+  record_.begin(num_taken_);
+  engine_.forget_doubt();
+  engine_.count_restart();
+  return true;
+}
+
 /// A point whose place no single look can change much: one of the target's, or a settled one. New ones explain whatever
 /// the known ones do not contradict.
 bool ObservationLocalizer::is_firm(long id) const {
@@ -320,6 +340,11 @@ PathStep ObservationLocalizer::taken(const ObservationFrame& frame) {
     engine_.fill(frame.observations, again, step);
     step.event = FrameEvent::restarted;
   }
+  if (config_.restarts && begin_again(doubt)) {
+    step.event = FrameEvent::restarted;
+    engine_.fill_pose(step);
+    add_new(frame);
+  }
   if (step.num_tracked >= min_observations || step.event == FrameEvent::started) add_new(frame);
   engine_.filters().convert_linear();
   engine_.keep_given();
@@ -387,9 +412,9 @@ void ObservationLocalizer::sum_up(Localization& result) const {
   std::optional<SmoothedPath> smoothed;
   double scale = 1.0;
   if (smooths() && engine_.has_begun()) {
-    auto problem = record_.problem(engine_.camera(), config_, frames_, result.path, engine_.best(),
-                                   points_.gone(engine_.best()), engine_.start_without_target(), period_s(),
-                                   !episodes_.number_of().empty());
+    auto problem =
+        record_.problem(engine_.camera(), config_, frames_, result.path, engine_.best(), points_.gone(engine_.best()),
+                        engine_.start_without_target(), period_s(), !episodes_.number_of().empty());
     if (problem) smoothed = smooth_with_loops(*problem, result);
     if (smoothed) scale = solve_in_metres(*problem, smoothed, result);
   }

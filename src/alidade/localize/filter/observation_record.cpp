@@ -1,6 +1,7 @@
 #include "alidade/localize/filter/observation_record.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "alidade/localize/known_pose.h"
@@ -142,6 +143,24 @@ void BackwardPath::give_back() {
   observations.pop_back();
 }
 
+/// A filter's unit grows while depths are vague. Where the supposed distances of the first points are the unit, the
+/// path begins at theirs: the scale that their inverses ask for, by least squares.
+void rescale(SmootherProblem& problem) {
+  constexpr double is_unit = 1.0;  // the others' σ is five times the distance
+  double products = 0.0, squares = 0.0;
+  for (const SmootherPoint& point : problem.points) {
+    if (!point.range || !(point.range->sigma_rel < is_unit)) continue;
+    const double weight = point.range->range_m / point.range->sigma_rel;
+    const double distance = (point.point_in_world - problem.world_from_cam[point.first_frame].translation).norm();
+    products += weight * weight / (distance * point.range->range_m);
+    squares += weight * weight / (distance * distance);
+  }
+  const double scale = squares / products;
+  if (!(scale > 0.0) || !std::isfinite(scale)) return;
+  for (Rigid3& pose : problem.world_from_cam) pose.translation *= scale;
+  for (SmootherPoint& point : problem.points) point.point_in_world *= scale;
+}
+
 }  // namespace
 
 bool is_settled(const Feature& feature, const LocalizationFilter& filter, const LocalizeConfig& config) {
@@ -162,6 +181,7 @@ double max_points_at_once(std::size_t num_frames) {
 
 void ObservationRecord::begin(std::size_t frame) {
   if (num_begun_++ == 0) first_frame_ = frame;
+  last_begun_ = frame;
 }
 
 void ObservationRecord::add_points(const LocalizeConfig& config, const LocalizationFilter& filter,
@@ -243,7 +263,10 @@ std::optional<SmootherProblem> ObservationRecord::problem(
     return std::nullopt;
   problem.camera = camera;
   if (num_begun_ == 1 && (config.start || !has_target)) problem.start = start;  // else the observations contradicted it
-  if (!config.start && !has_target) problem.gauge = PathGauge::similarity;
+  if (!config.start && !has_target) {
+    problem.gauge = PathGauge::similarity;
+    rescale(problem);
+  }
   problem.sigma_speed_m_s = config.sigma_speed_m_s;
   problem.sigma_rate_rad_s = config.sigma_rate_rad_s;
   problem.period_s = period_s;

@@ -22,6 +22,7 @@ class ObservationRecord {
  public:
   /// The path begins at this frame, for the first time or again.
   void begin(std::size_t frame);
+  [[nodiscard]] std::size_t begun() const { return last_begun_; }  ///< The last time.
   /// A point that comes back was born when it entered first: its range now is what it said before.
   void entered(std::size_t frame, long id, const RangePrior& prior, bool comes_back) {
     if (!comes_back || !births_.contains(id)) births_[id] = {frame, prior};
@@ -54,10 +55,10 @@ class ObservationRecord {
   void add_gone(const LocalizeConfig& config, std::span<const GonePoint> gone, SmootherProblem& problem) const;
   /// Without a target and a start the supposed distances of the first points are the unit of length.
   [[nodiscard]] bool sets_unit(const LocalizeConfig& config, std::size_t frame) const {
-    return config.target.points.empty() && !config.start && frame == first_frame_;
+    return config.target.points.empty() && !config.start && frame == last_begun_;
   }
 
-  std::size_t first_frame_ = 0, num_begun_ = 0;
+  std::size_t first_frame_ = 0, last_begun_ = 0, num_begun_ = 0;
   std::map<long, Birth> births_;
   std::set<std::size_t> jumps_;
 };

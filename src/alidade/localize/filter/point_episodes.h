@@ -21,10 +21,8 @@ class PointEpisodes {
     const auto [at, is_new] = now_.try_emplace(number, Episode{number, frame});
     Episode& episode = at->second;
     if (!is_new && frame > episode.last_frame + long_after && has_left(episode.id)) {
-      const long before = episode.id;
       episode.id = next_++;
       number_of_[episode.id] = number;
-      before_[episode.id] = before;
     }
     episode.last_frame = frame;
     return episode.id;
@@ -36,11 +34,6 @@ class PointEpisodes {
     const auto at = number_of_.find(id);
     return at == number_of_.end() ? id : at->second;
   }
-  /// What the map had a point as before; itself where it had none.
-  [[nodiscard]] long before(long id) const {
-    const auto at = before_.find(id);
-    return at == before_.end() ? id : at->second;
-  }
 
  private:
   struct Episode {
@@ -49,7 +42,6 @@ class PointEpisodes {
   };
   std::unordered_map<long, Episode> now_;
   std::map<long, long> number_of_;
-  std::unordered_map<long, long> before_;
   long next_ = std::numeric_limits<long>::min();
 };
 

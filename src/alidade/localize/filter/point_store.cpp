@@ -75,9 +75,8 @@ std::optional<RangePrior> PointStore::known_range(long id, const LocalizationFil
 }
 
 std::optional<RangePrior> PointStore::prior_of(const FeatureObservation& observation,
-                                               const LocalizationFilter& filter, long before) {
-  for (const long id : {observation.id, before})
-    if (const auto known = known_range(id, filter)) return known;
+                                               const LocalizationFilter& filter) {
+  if (const auto known = known_range(observation.id, filter)) return known;
   if (config_->new_points == NewPoints::delayed) return triangulated(observation, filter);
   const auto ray_in_cam = unproject(filter.camera(), observation.px);
   if (!ray_in_cam) return std::nullopt;

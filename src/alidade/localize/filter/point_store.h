@@ -34,10 +34,9 @@ class PointStore {
   [[nodiscard]] bool is_gone(long id) const { return gone_.contains(id); }
   /// Those that are not in the filter now.
   [[nodiscard]] std::vector<GonePoint> gone(const LocalizationFilter& filter) const;
-  /// Distance along the ray of a new point. None: not now (delayed, or the lens sees nothing there). `before`: what it
-  /// was in the map as before it was lost from sight for long.
+  /// Distance along the ray of a new point. None: not now (delayed, or the lens sees nothing there).
   [[nodiscard]] std::optional<RangePrior> prior_of(const FeatureObservation& observation,
-                                                   const LocalizationFilter& filter, long before);
+                                                   const LocalizationFilter& filter);
 
  private:
   struct Point {

@@ -83,13 +83,14 @@ class LoopCloser {
     for (std::size_t k = 0; k < seen_.size(); ++k) {
       const auto num_shared = std::ranges::count_if(seen_[k], [&](long id) { return last.contains(id); });
       const bool is_end = k == 0 || k + 1 == seen_.size();
-      if (!is_end && (seen_[k].size() < min_paired ||
-                      static_cast<double>(num_shared) > shared * static_cast<double>(last.size())))
+      if (!is_end &&
+          (seen_[k].size() < min_paired || static_cast<double>(num_shared) > shared * static_cast<double>(last.size())))
         continue;
       last = {seen_[k].begin(), seen_[k].end()};
       LoopKeyframe keyframe{k, seen_[k], 1.0};
       std::vector<double> distances;
-      for (const long id : keyframe.ids) distances.push_back((place(id) - problem_.world_from_cam[k].translation).norm());
+      for (const long id : keyframe.ids)
+        distances.push_back((place(id) - problem_.world_from_cam[k].translation).norm());
       if (!distances.empty()) {
         std::ranges::nth_element(distances, distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2));
         keyframe.depth_m = distances[distances.size() / 2];
@@ -191,7 +192,8 @@ class LoopCloser {
     for (const auto& [id, times] : times_) {
       if (times.num == 0) continue;
       SmootherPoint& point = problem_.points[times.index];
-      point.point_in_world = corrected(times.middle(), {Eigen::Quaterniond::Identity(), point.point_in_world}).translation;
+      point.point_in_world =
+          corrected(times.middle(), {Eigen::Quaterniond::Identity(), point.point_in_world}).translation;
     }
     for (std::size_t k = 0; k < problem_.world_from_cam.size(); ++k)
       problem_.world_from_cam[k] = corrected(k, problem_.world_from_cam[k]);
@@ -213,7 +215,8 @@ class LoopCloser {
       const PointTimes& first = times_.at(ids.front());
       const double distance = (place(ids.front()) - problem_.world_from_cam[first.middle()].translation).norm();
       constexpr double near_share = 0.1;
-      std::erase_if(ids, [&](long id) { return (place(id) - place(ids.front())).norm() > near_share * distance; });
+      const Eigen::Vector3d& there = place(ids.front());
+      std::erase_if(ids, [&](long id) { return (place(id) - there).norm() > near_share * distance; });
       Candidate candidate{ids, 0};
       for (const long id : ids) candidate.num += times_.at(id).num;
       const auto keyframe = std::ranges::lower_bound(keyframes_, first.middle(), {}, &LoopKeyframe::frame);

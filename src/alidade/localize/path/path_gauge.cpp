@@ -28,7 +28,8 @@ void PathSmoother::align(const SmootherSystem& system, const Eigen::MatrixXd& co
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const Rigid3& pose : state_.poses) middle += pose.translation / static_cast<double>(num);
   double extent2 = 0.0;
-  for (const Rigid3& pose : state_.poses) extent2 += (pose.translation - middle).squaredNorm() / static_cast<double>(num);
+  for (const Rigid3& pose : state_.poses)
+    extent2 += (pose.translation - middle).squaredNorm() / static_cast<double>(num);
   constexpr double rotation_share = 1e-4;
   std::vector<Eigen::MatrixXd> G, W;
   Eigen::MatrixXd N = Eigen::MatrixXd::Zero(num_free, num_free);

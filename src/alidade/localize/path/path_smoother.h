@@ -54,7 +54,7 @@ struct SmootherProblem {
   std::vector<SmootherPoint> points;
   std::optional<StartHypothesis> start;  ///< What was told of the first pose; else its speeds alone, zero with these σ:
   double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;
-  double period_s = 1.0 / 30.0;     ///< Accelerations are drawn again for each.
+  double period_s = 1.0 / 30.0;  ///< Accelerations are drawn again for each.
   PathGauge gauge = PathGauge::fixed;
   double sigma_scale = 0.0;         ///< Of the told points' common scale, counted and not estimated.
   LocalizationFilterConfig filter;  /// σ of accelerations, the gate, and what of the lens is estimated.

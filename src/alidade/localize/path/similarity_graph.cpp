@@ -21,8 +21,7 @@ struct EdgeError {
 
 EdgeError error_of(const SimilarityEdge& edge, const Similarity& from, const Similarity& to) {
   const Eigen::Matrix3d R_from = from.b_from_a.rotation.toRotationMatrix();
-  const Eigen::Vector3d away =
-      R_from.transpose() * (to.b_from_a.translation - from.b_from_a.translation) / from.scale;
+  const Eigen::Vector3d away = R_from.transpose() * (to.b_from_a.translation - from.b_from_a.translation) / from.scale;
   const Eigen::Quaterniond turned = from.b_from_a.rotation.conjugate() * to.b_from_a.rotation;
   const Eigen::Vector3d phi = log_so3(edge.from_from_to.b_from_a.rotation.conjugate() * turned);
   const Eigen::Matrix3d to_log = right_jacobian(phi).inverse();

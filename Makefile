@@ -139,6 +139,8 @@ study:
 	@$(out)/study_chain 200 >build/study/chain.md; met=$$?; cp build/study/chain.md docs/studies-chain.md; exit $$met
 	@echo "study: photos of a camera turned by hand, into docs/studies-turned.md"
 	@$(out)/study_turned 200 >build/study/turned.md; met=$$?; cp build/study/turned.md docs/studies-turned.md; exit $$met
+	@echo "study: 200 runs with a head, broken at random instants, into docs/studies-heads.md"
+	@tools/head_kills.py $(out)/alidade --runs 200 >build/study/heads.md; met=$$?; cp build/study/heads.md docs/studies-heads.md; exit $$met
 	@$(out)/corner_accuracy
 	@echo "study: how large a fault must be to be seen, into docs/studies-faults.md"
 	@$(out)/study_faults 20 >build/study/faults.md; met=$$?; cp build/study/faults.md docs/studies-faults.md; exit $$met

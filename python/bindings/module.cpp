@@ -46,6 +46,7 @@ PYBIND11_MODULE(_alidade, module) {
   bind_outcome(module);
   bind_calibrate(module);
   bind_commands(module);
+  bind_head(module);
   bind_live(module);
   bind_localizer(module);
 }

@@ -65,7 +65,15 @@ void refuse_text(const std::filesystem::path& video) {
 }
 
 /// Its output goes to `pipe_end`; what it has to say otherwise, nowhere.
-int start_decoder(const std::string& decoder, const std::string& video, FrameColour colour, int pipe_end) {
+int start_decoder(const std::string& decoder, const std::string& video, FrameColour colour, int pipe_end,
+                  const std::string& password) {
+  constexpr std::string_view variable = "ALIDADE_PASSWORD=";
+  std::string secret = std::string(variable) + password;
+  std::vector<char*> environment;
+  for (char** each = environ; *each != nullptr; ++each)
+    if (!std::string_view(*each).starts_with(variable)) environment.push_back(*each);
+  if (!password.empty()) environment.push_back(secret.data());
+  environment.push_back(nullptr);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
@@ -74,7 +82,7 @@ int start_decoder(const std::string& decoder, const std::string& video, FrameCol
   std::array<std::string, 3> words{decoder, video, colour == FrameColour::bgr ? "bgr" : "grey"};
   std::array<char*, 4> arguments{words[0].data(), words[1].data(), words[2].data(), nullptr};
   pid_t process = -1;
-  const int error = posix_spawn(&process, decoder.c_str(), &actions, nullptr, arguments.data(), environ);
+  const int error = posix_spawn(&process, decoder.c_str(), &actions, nullptr, arguments.data(), environment.data());
   posix_spawn_file_actions_destroy(&actions);
   return error == 0 ? process : -1;
 }
@@ -89,18 +97,18 @@ bool is_stream_address(const std::string& text) {
 // Absolute: a name like "http:…" shall not be an address.
 VideoProcess::VideoProcess(const std::filesystem::path& video, FrameColour colour) : video_(video), colour_(colour) {
   refuse_text(video);
-  start(std::filesystem::absolute(video).string());
+  start(std::filesystem::absolute(video).string(), "");
 }
 
 VideoProcess::VideoProcess(const StreamAddress& stream, FrameColour colour) : video_(stream.text), colour_(colour) {
-  start(stream.text);
+  start(stream.text, stream.password);
 }
 
-void VideoProcess::start(const std::string& source) {
+void VideoProcess::start(const std::string& source, const std::string& password) {
   const std::filesystem::path decoder = decoder_beside_this_program(video_);
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) throw InputError(video_.string() + ": no pipe to the decoder");
-  process_ = start_decoder(decoder.string(), source, colour_, ends[1]);
+  process_ = start_decoder(decoder.string(), source, colour_, ends[1], password);
   ::close(ends[1]);
   pipe_ = ends[0];
   try {
@@ -142,6 +150,10 @@ std::vector<unsigned char> VideoProcess::next() {
   char mark = 0;
   if (!read_bytes(&mark, 1)) throw InputError(video_.string() + ": the decoder gave up in the middle");
   if (mark != 'f') return {};
+  std::array<double, 2> times{};
+  if (!read_bytes(times.data(), sizeof times))
+    throw InputError(video_.string() + ": the decoder gave up in the middle");
+  time_ = {times[0], times[1]};
   const std::size_t channels = colour_ == FrameColour::bgr ? 3 : 1;
   std::vector<unsigned char> frame(static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_) *
                                    channels);

@@ -66,7 +66,7 @@ struct GivenNumber {
 struct SensorScale {
   std::string sensor;      ///< "depth sensor", "rangefinder"
   double scale = 1.0;      ///< Metres for each unit that the path had without it: 1 where a target is right.
-  double sigma_rel = 0.0;  ///< Of the scale, over it. 0: the readings do not tell it.
+  double sigma_rel = 0.0;  ///< Of the scale, over it. 0: the readings do not determine it.
   std::size_t num_used = 0, num_rejected = 0;
   bool is_in_time = true;  ///< There are readings of when the path was made.
 };

@@ -98,14 +98,14 @@ Similarity inverse(const Similarity& b_from_a) {
   return a_from_b;
 }
 
-Eigen::Vector3d operator*(const Similarity& b_from_a, const Eigen::Vector3d& point_in_a) {
-  return b_from_a.b_from_a * Eigen::Vector3d(b_from_a.scale * point_in_a);
+Eigen::Vector3d operator*(const Similarity& similarity, const Eigen::Vector3d& point_in_a) {
+  return similarity.b_from_a * Eigen::Vector3d(similarity.scale * point_in_a);
 }
 
-Similarity operator*(const Similarity& c_from_b, const Similarity& b_from_a) {
-  return {{(c_from_b.b_from_a.rotation * b_from_a.b_from_a.rotation).normalized(),
-           c_from_b * b_from_a.b_from_a.translation},
-          c_from_b.scale * b_from_a.scale};
+Similarity operator*(const Similarity& second, const Similarity& first) {
+  const Rigid3 &c_from_b = second.b_from_a, &b_from_a = first.b_from_a;
+  return {{(c_from_b.rotation * b_from_a.rotation).normalized(), second * b_from_a.translation},
+          second.scale * first.scale};
 }
 
 std::optional<SimilarityGraph> settled_graph(std::vector<Similarity> world_from_keyframe,

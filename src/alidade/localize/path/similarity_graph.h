@@ -30,7 +30,7 @@ struct SimilarityGraph {
                                                            std::span<const SimilarityEdge> edges);
 
 [[nodiscard]] Similarity inverse(const Similarity& b_from_a);
-[[nodiscard]] Similarity operator*(const Similarity& c_from_b, const Similarity& b_from_a);
-[[nodiscard]] Eigen::Vector3d operator*(const Similarity& b_from_a, const Eigen::Vector3d& point_in_a);
+[[nodiscard]] Similarity operator*(const Similarity& second, const Similarity& first);  ///< After the first the second.
+[[nodiscard]] Eigen::Vector3d operator*(const Similarity& similarity, const Eigen::Vector3d& point_in_a);
 
 }  // namespace alidade

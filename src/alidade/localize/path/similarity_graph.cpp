@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "alidade/geometry/so3.h"
+#include "alidade/localize/camera_motion.h"
 
 namespace alidade {
 namespace {

@@ -87,6 +87,14 @@ int start_decoder(const std::string& decoder, const std::string& video, FrameCol
   return error == 0 ? process : -1;
 }
 
+/// A camera of the machine that is not plugged in.
+void require_device(const std::string& address) {
+  constexpr std::string_view scheme = "v4l2:";
+  std::error_code ignored;
+  if (!address.starts_with(scheme) || std::filesystem::exists(address.substr(scheme.size()), ignored)) return;
+  throw InputError(address + ": there is no such device; is the camera plugged in?");
+}
+
 }  // namespace
 
 bool is_stream_address(const std::string& text) {
@@ -100,7 +108,9 @@ VideoProcess::VideoProcess(const std::filesystem::path& video, FrameColour colou
   start(std::filesystem::absolute(video).string(), "");
 }
 
-VideoProcess::VideoProcess(const StreamAddress& stream, FrameColour colour) : video_(stream.text), colour_(colour) {
+VideoProcess::VideoProcess(const StreamAddress& stream, FrameColour colour)
+    : video_(stream.text), colour_(colour), is_stream_(true) {
+  require_device(stream.text);
   start(stream.text, stream.password);
 }
 
@@ -142,8 +152,15 @@ void VideoProcess::read_header() {
   const bool is_good = process_ > 0 && read_bytes(header.data(), 64) &&
                        std::sscanf(header.data(), "alidade_video %d %d %lu", &width_px_, &height_px_, &frames) == 3 &&
                        width_px_ > 0 && height_px_ > 0 && width_px_ < largest_px && height_px_ < largest_px;
-  if (!is_good) throw InputError(video_.string() + ": not a video that can be read");
-  num_frames_ = frames;
+  if (is_good) {
+    num_frames_ = frames;
+    return;
+  }
+  if (is_stream_)
+    throw InputError(video_.string() +
+                     ": no pictures come from there: nothing answers, or what answers is no video, or "
+                     "another program has the camera");
+  throw InputError(video_.string() + ": not a video that can be read");
 }
 
 std::vector<unsigned char> VideoProcess::next() {

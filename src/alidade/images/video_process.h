@@ -56,6 +56,7 @@ class VideoProcess {
 
   std::filesystem::path video_;
   FrameColour colour_;
+  bool is_stream_ = false;
   int pipe_ = -1, process_ = -1;
   int width_px_ = 0, height_px_ = 0;
   std::size_t num_frames_ = 0;

@@ -228,7 +228,8 @@ void add_sensors(const Localization& report, Verdict& verdict) {
     if (!(each.sigma_rel > 0.0)) {
       verdict.checks.push_back({each.sensor, State::care,
                                 "the readings of the " + each.sensor + " do not determine the scale: " +
-                                    (each.sensor == "depth sensor"
+                                    (!each.is_in_time ? "none of them is of the time of the path (t_s)"
+                                     : each.sensor == "depth sensor"
                                          ? "too few of them, or the camera moves too little up and down"
                                          : "too few of them, or too few points around the beam that lie on a surface"),
                                 0.0, 0.0, "", "path"});

@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Each target installs what it misses, says what it does, and is quick the
 # second time.
-.PHONY: help build install deb demo test bench study fuzz faults sanitize docs format tidy clean
+.PHONY: help build install deb deb-test demo test bench study fuzz faults sanitize docs format tidy clean
 .DEFAULT_GOAL := help
 
 out := build/release
@@ -13,6 +13,7 @@ help:
 	@echo "make build   build build/release/alidade and the Python module, build/release/python"
 	@echo "make install PREFIX=/usr/local: the executable, the library with its headers, the Python module, man pages, bash completion"
 	@echo "make deb     Debian packages of executable, library, Python module and documentation, in build/deb"
+	@echo "make deb-test: install and use them in a fresh Debian 12 root, and remove them"
 	@echo "make bench   measure speed, side by side with OpenCV and mrcal"
 	@echo "make docs    renew the pictures in README and docs"
 	@echo "make study   is σ what it says? 2400 calibrations, 2000 observations, rangefinders; corners against OpenCV's, with known truth"
@@ -40,6 +41,11 @@ install:
 deb:
 	@tools/setup build deb
 	@JOBS=$(JOBS) tools/make_deb
+
+deb-test:
+	@tools/setup deb-test
+	@[ -n "$(wildcard build/deb/*.deb)" ] || $(MAKE) deb
+	@tools/deb_test build/deb
 
 demo: build
 	@tools/demo_photos build/demo/photos
@@ -139,6 +145,8 @@ study:
 	@$(out)/study_chain 200 >build/study/chain.md; met=$$?; cp build/study/chain.md docs/studies-chain.md; exit $$met
 	@echo "study: photos of a camera turned by hand, into docs/studies-turned.md"
 	@$(out)/study_turned 200 >build/study/turned.md; met=$$?; cp build/study/turned.md docs/studies-turned.md; exit $$met
+	@echo "study: 200 runs with a head, broken at random instants, into docs/studies-heads.md"
+	@tools/head_kills.py $(out)/alidade --runs 200 >build/study/heads.md; met=$$?; cp build/study/heads.md docs/studies-heads.md; exit $$met
 	@$(out)/corner_accuracy
 	@echo "study: how large a fault must be to be seen, into docs/studies-faults.md"
 	@$(out)/study_faults 20 >build/study/faults.md; met=$$?; cp build/study/faults.md docs/studies-faults.md; exit $$met

@@ -18,7 +18,8 @@ namespace {
 
 double cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-/// Peak memory of this program alone; getrusage would count the parent's before exec. 0 where it cannot be told. [kB]
+/// Peak memory of this program alone; getrusage would count the parent's before exec. 0 where it cannot be determined.
+/// [kB]
 long peak_kb() {
   std::ifstream status("/proc/self/status");
   for (std::string word; status >> word;) {

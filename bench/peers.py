@@ -165,7 +165,7 @@ def opencv_detect_sectors(photo, pattern=(9, 6)):
 
 
 def peak_kb():
-    """Peak memory of this process, 0 where it cannot be told."""
+    """Peak memory of this process, 0 where it cannot be determined."""
     for line in pathlib.Path("/proc/self/status").read_text().splitlines():
         if line.startswith("VmHWM:"):
             return int(line.split()[1])

@@ -145,7 +145,8 @@ class Study(Folder):
         self.run_line(ALIDADE, "study", *WHAT[:5], "--trial", 3000, "--out", "none", code=2)
 
     def test_wrong_usage_is_said(self):
-        for words in (["--shard", "8/8"], ["--shard", "x"], ["--trials", "0"], ["--vary", "rows"], ["--vary", "row=1:2:1"], ["--points", "1"]):
+        for words in (["--shard", "8/8"], ["--shard", "x"], ["--trials", "0"], ["--vary", "rows"], ["--vary", "row=1:2:1"], ["--points", "1"],
+                      ["--trial", "3", "--shard", "0/2"]):
             self.run_line(ALIDADE, "study", "observe", *words, "--out", "none", code=2)
 
 

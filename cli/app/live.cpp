@@ -56,7 +56,7 @@ void add_live_options(CLI::App& command, LiveOptions& options, bool has_pace) {
       ->group(group);
   command
       .add_option("--live-address", options.address,
-                  "Listen there instead of 127.0.0.1; who connects then needs the token that is told")
+                  "Listen there instead of 127.0.0.1; clients then need the token that is printed")
       ->type_name("IP")
       ->group(group);
   if (!has_pace) return;

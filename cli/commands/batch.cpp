@@ -73,19 +73,20 @@ class Lot {
 
   /// The rows of a shard: those that an earlier run did not do.
   void work(const Shard& shard) {
-    std::vector<std::size_t> todo;
+    std::vector<std::size_t> remaining;
     for (std::size_t i = 0; i < jobs_.size(); ++i) {
       if (i % static_cast<std::size_t>(shard.count) != static_cast<std::size_t>(shard.index)) continue;
       rows_[i] = args_.resume ? earlier(i) : std::nullopt;
-      if (!rows_[i]) todo.push_back(i);
+      if (!rows_[i]) remaining.push_back(i);
     }
-    num_todo_ = todo.size();
+    num_remaining_ = remaining.size();
     const int threads = run_.options.threads > 0 ? run_.options.threads : tbb::this_task_arena::max_concurrency();
     std::atomic<std::size_t> next{0};
     tbb::parallel_for(
         0, threads,
         [&](int) {
-          for (std::size_t at = next++; at < todo.size(); at = next++) rows_[todo[at]] = run_row(todo[at]);
+          for (std::size_t at = next++; at < remaining.size(); at = next++)
+            rows_[remaining[at]] = run_row(remaining[at]);
         },
         tbb::simple_partitioner());
   }
@@ -122,7 +123,7 @@ class Lot {
     }
     row.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     write_file(folder / "row.json", row_text(row, job.words));
-    report_progress(run_.progress, "rows", ++num_done_, num_todo_);
+    report_progress(run_.progress, "rows", ++num_done_, num_remaining_);
     return row;
   }
 
@@ -134,7 +135,7 @@ class Lot {
     if (!has_option(words, "--threads")) words.insert(words.end(), {"--threads", "1"});
     if (!args_.row_reports && !has_option(words, "--no-report")) words.emplace_back("--no-report");
     const ChildResult child = run_child(
-        own_executable(), words, [this] { return !run_.progress || run_.progress("rows", num_done_, num_todo_); });
+        own_executable(), words, [this] { return !run_.progress || run_.progress("rows", num_done_, num_remaining_); });
     if (child.is_stopped) throw Interrupted();
     row.exit_code = child.exit_code;
     const bool has_result = child.exit_code == 0 || (child.exit_code >= 4 && child.exit_code <= 6);
@@ -153,7 +154,7 @@ class Lot {
   std::vector<BatchJob> jobs_;
   Run& run_;
   std::vector<std::optional<BatchRow>> rows_;
-  std::size_t num_todo_ = 0;
+  std::size_t num_remaining_ = 0;
   std::atomic<std::size_t> num_done_{0};
 };
 

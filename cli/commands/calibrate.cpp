@@ -64,7 +64,7 @@ FieldList fields_of(CalibrateArgs& args) {
       {.name = "air",
        .value = &args.air,
        .help = "flat_port: the lens' camera file from a calibration in air, fixed; without it the lens is estimated as "
-               "well, if the photos tell",
+               "well, if the photos determine it",
        .form = "FILE"}};
   fields.insert(fields.end(), inputs.begin(), inputs.end());
   for (Field& field : alidade::fields_of(args.config)) {

@@ -61,8 +61,8 @@ std::string progress_line(const live::CaptureSession& session, double goal_px) {
 /// A capture from a folder that another program fills, without a page.
 class FolderCapture {
  public:
-  FolderCapture(live::CaptureSession& session, const CaptureArgs& args, Run& run)
-      : session_(session), folder_(args.from), goal_px_(args.config.until_px), wait_s_(args.wait_s), run_(run) {}
+  FolderCapture(live::CaptureSession& session, live::GrowingFolder& folder, const CaptureArgs& args, Run& run)
+      : session_(session), folder_(folder), goal_px_(args.config.until_px), wait_s_(args.wait_s), run_(run) {}
 
   /// Until the goal holds, the person ends it, or nothing new has come for too long: then of what came the photos are
   /// taken that still bring something.
@@ -96,15 +96,15 @@ class FolderCapture {
     const double t_s = std::max(session_.begin_s() + static_cast<double>(++num_seen_) / looks_a_second,
                                 session_.begin_s() + passed_s(begin_));
     const live::CaptureSession::Seen seen = session_.see(grey, t_s, is_exact, is_again);
-    if (!seen.look.corners_px.empty() && seen.file.empty()) left_.push_back({file, seen.look.gain});
+    const bool is_taken = !seen.file.empty() && !seen.look.earlier;
+    if (!seen.look.corners_px.empty() && !is_taken) left_.push_back({file, seen.look.gain});
     if (seen.look.corners_px.empty()) last_words_ = seen.look.words;
-    after(seen.file, file);
+    after(seen.file, is_taken ? " (" + file.filename().string() + ")" : "");
   }
 
-  void after(const std::string& kept, const std::filesystem::path& file) {
+  void after(const std::string& kept, const std::string& from) {
     if (kept.empty()) return;
-    if (!run_.options.quiet && !run_.options.json)
-      tell_person(progress_line(session_, goal_px_) + " (" + file.filename().string() + ")");
+    if (!run_.options.quiet && !run_.options.json) tell_person(progress_line(session_, goal_px_) + from);
     has_goal_ = session_.reached_goal({});
   }
 
@@ -127,7 +127,7 @@ class FolderCapture {
     double gain = 0.0;
   };
   live::CaptureSession& session_;
-  live::GrowingFolder folder_;
+  live::GrowingFolder& folder_;
   double goal_px_, wait_s_;
   Run& run_;
   Clock::time_point begin_ = Clock::now(), came_at_ = begin_;
@@ -138,8 +138,7 @@ class FolderCapture {
 };
 
 /// A capture from a camera of the machine or the network, without a page.
-void capture_stream(live::CaptureSession& session, const CaptureArgs& args, Run& run) {
-  live::NewestFrame stream(args.from);
+void capture_stream(live::CaptureSession& session, live::NewestFrame& stream, const CaptureArgs& args, Run& run) {
   const Clock::time_point begin = Clock::now();
   while (!stream.is_over() && interrupting_signal() == 0) {
     const std::optional<live::LiveFrame> frame = stream.fetch();
@@ -169,6 +168,13 @@ live::KeptPhotos opened_photos(const CaptureArgs& args, Run& run) {
     write_file(out / "photos.csv", read_file(std::filesystem::path(args.resume) / "photos.csv"));
   }
   return live::KeptPhotos(out, goes_on);
+}
+
+/// Opened before anything is written: an address may be wrong.
+CaptureSource opened_source(const CaptureArgs& args) {
+  if (args.from.empty()) return {};
+  if (is_stream_address(args.from)) return {nullptr, std::make_shared<live::NewestFrame>(args.from)};
+  return {std::make_shared<live::GrowingFolder>(args.from), nullptr};
 }
 
 /// The result of a capture that kept nothing: as calibrate has it of no photos, with what was seen instead.
@@ -252,6 +258,7 @@ ExitCode calibrate_live(const Board& board, CaptureArgs args, Run& run,
   (void)server_config(args.live);  // its faults before any work
   if (!args.resume.empty() && !run.options.out_is_given) run.options.out = args.resume;
   args.config.is_video = args.from.empty() || is_stream_address(args.from);
+  const CaptureSource source = opened_source(args);
   std::optional<CapturePage> page;
   live::CaptureSession session(board, args.config, opened_photos(args, run), [&page](const std::string& line) {
     tell_person("alidade: " + line);
@@ -259,15 +266,15 @@ ExitCode calibrate_live(const Board& board, CaptureArgs args, Run& run,
   });
   std::string seen;
   if (args.no_page) {
-    if (is_stream_address(args.from)) {
-      capture_stream(session, args, run);
+    if (source.stream) {
+      capture_stream(session, *source.stream, args, run);
     } else {
-      FolderCapture capture(session, args, run);
+      FolderCapture capture(session, *source.folder, args, run);
       capture.run();
       seen = capture.last_words();
     }
   } else {
-    page.emplace(args, board, session, run);
+    page.emplace(args, source, board, session, run);
     seen = page->capture();
   }
   const std::filesystem::path photos = session.kept().folder();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "alidade/calibrate/config.h"
@@ -10,7 +11,9 @@
 
 namespace alidade::live {
 struct LiveFrame;
-}
+class GrowingFolder;
+class NewestFrame;
+}  // namespace alidade::live
 namespace cv {
 class Mat;
 }
@@ -26,6 +29,12 @@ struct CaptureArgs {
   double wait_s = 60.0;  ///< Without a page: so long nothing new may come before it ends.
   CaptureConfig config;
   bool until_is_given = false;
+};
+
+/// Where pictures come from, if not from the browser: one of the two, or none.
+struct CaptureSource {
+  std::shared_ptr<live::GrowingFolder> folder;
+  std::shared_ptr<live::NewestFrame> stream;
 };
 
 /// A frame's values, in memory of its own.

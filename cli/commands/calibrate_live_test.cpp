@@ -101,6 +101,7 @@ TEST_F(CaptureFromAFolder, NamesABoardOfAnotherSizeAndAFrozenStream) {
   const Ran other = run(live("other", "none"));
   EXPECT_EQ(other.code, 4);
   EXPECT_THAT(other.said, HasSubstr("7×6"));
+  EXPECT_THAT(other.said, HasSubstr("--board 7x6"));
   for (int i = 1; i <= 6; ++i)
     write_file(folder_ / "frozen" / (std::to_string(i) + ".png"), read_file(folder_ / "in" / "board_001.png"));
   const Ran frozen = run(live("frozen", "once"));
@@ -126,6 +127,22 @@ TEST_F(CaptureFromAFolder, RefusesOptionsThatDoNotGoTogether) {
   EXPECT_EQ(
       run("--live --no-page --from /nowhere --board 9x6 --square 0.025 --out " + (folder_ / "nowhere").string()).code,
       3);
+}
+
+TEST_F(CaptureFromAFolder, SaysWhyNoPicturesComeAndLeavesNothing) {
+  write_file(folder_ / "a_file", "text");
+  const std::vector<std::pair<std::string, std::string>> wrong = {{"/nowhere", "no such folder"},
+                                                                  {(folder_ / "a_file").string(), "is a file"},
+                                                                  {"v4l2:/dev/video77", "is the camera plugged in"},
+                                                                  {"http://127.0.0.1:9/stream", "nothing answers"}};
+  for (const auto& [from, words] : wrong) {
+    const Ran ran = run("--live --no-page --board 9x6 --square 0.025 --from " + from + " --out " +
+                        (folder_ / "none_came").string());
+    EXPECT_EQ(ran.code, 3) << from;
+    EXPECT_THAT(ran.said, HasSubstr(from + ": "));
+    EXPECT_THAT(ran.said, HasSubstr(words));
+    EXPECT_FALSE(fs::exists(folder_ / "none_came")) << from;
+  }
 }
 
 TEST(KeptPhotos, AreNeverRenumbered) {

@@ -75,7 +75,7 @@ TEST_F(CalibratePortCommand, RefusesAFreeLensFromParallelBoards) {
   simulate("0");
   const Outcome run = calibrate({"--model", "flat_port", "--glass", "0.01"});
   EXPECT_EQ(run.code, 4) << run.err;
-  EXPECT_THAT(std::string(json::parse(run.out)["verdict"]["sentence"]), HasSubstr("cannot be told"));
+  EXPECT_THAT(std::string(json::parse(run.out)["verdict"]["sentence"]), HasSubstr("cannot be determined"));
 }
 
 TEST_F(CalibratePortCommand, SaysWhatIsMissing) {

@@ -6,7 +6,6 @@
 #include <opencv2/core.hpp>
 
 #include "alidade/images/photos.h"
-#include "alidade/images/video_process.h"
 #include "alidade/imaging/grey_photo.h"
 #include "alidade/live/capture_server.h"
 #include "alidade/live/growing_folder.h"
@@ -70,10 +69,11 @@ Json state_json(const live::CaptureSession& session, double goal_px) {
 }  // namespace
 
 struct CapturePage::State {
-  State(const CaptureArgs& given, const Board& of, live::CaptureSession& of_session, Run& of_run)
-      : args(given), board(of), session(of_session), run(of_run) {}
+  State(const CaptureArgs& given, CaptureSource from, const Board& of, live::CaptureSession& of_session, Run& of_run)
+      : args(given), source(std::move(from)), board(of), session(of_session), run(of_run) {}
 
   const CaptureArgs& args;
+  CaptureSource source;
   const Board& board;
   live::CaptureSession& session;
   Run& run;
@@ -192,7 +192,7 @@ void CapturePage::State::capture_browser() {
 }
 
 void CapturePage::State::capture_folder() {
-  live::GrowingFolder folder(args.from);
+  live::GrowingFolder& folder = *source.folder;
   while (!is_over && interrupting_signal() == 0) {
     const std::vector<std::filesystem::path> files = folder.newcomers();
     for (const std::filesystem::path& file : files) {
@@ -214,7 +214,7 @@ void CapturePage::State::capture_folder() {
 }
 
 void CapturePage::State::capture_stream() {
-  live::NewestFrame stream(args.from);
+  live::NewestFrame& stream = *source.stream;
   while (!is_over && !stream.is_over() && interrupting_signal() == 0) {
     const std::optional<live::LiveFrame> frame = stream.fetch();
     for (const std::string& command : server->commands()) obey(command);
@@ -228,8 +228,9 @@ void CapturePage::State::capture_stream() {
   }
 }
 
-CapturePage::CapturePage(const CaptureArgs& args, const Board& board, live::CaptureSession& session, Run& run)
-    : state_(std::make_unique<State>(args, board, session, run)) {
+CapturePage::CapturePage(const CaptureArgs& args, const CaptureSource& source, const Board& board,
+                         live::CaptureSession& session, Run& run)
+    : state_(std::make_unique<State>(args, source, board, session, run)) {
   const live::ServerConfig wanted = server_config(args.live);
   State& state = *state_;
   state.server = std::make_unique<live::CaptureServer>(live::CaptureServerConfig{
@@ -244,7 +245,7 @@ std::string CapturePage::capture() {
   State& state = *state_;
   if (state.args.from.empty()) {
     state.capture_browser();
-  } else if (is_stream_address(state.args.from)) {
+  } else if (state.source.stream) {
     state.capture_stream();
   } else {
     state.capture_folder();

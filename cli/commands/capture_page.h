@@ -9,12 +9,14 @@
 namespace alidade::cli {
 
 struct CaptureArgs;
+struct CaptureSource;
 
 /// A capture with its page: the browser's camera or a folder, watched and steered in a browser.
 class CapturePage {
  public:
   /// Listens, and tells the person where. Throws InputError where it cannot.
-  CapturePage(const CaptureArgs& args, const Board& board, live::CaptureSession& session, Run& run);
+  CapturePage(const CaptureArgs& args, const CaptureSource& source, const Board& board, live::CaptureSession& session,
+              Run& run);
   ~CapturePage();
   CapturePage(const CapturePage&) = delete;
   CapturePage& operator=(const CapturePage&) = delete;

@@ -2,15 +2,18 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdlib>
+#include <filesystem>
 #include <memory>
 
 #include "alidade/detect/target_look.h"
 #include "alidade/files/files.h"
+#include "alidade/files/folder_swap.h"
 #include "alidade/formats/rig_file.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/heads/head_follow.h"
 #include "alidade/heads/head_identify.h"
 #include "alidade/results/head_outcome.h"
+#include "alidade/tables/rotation_log_file.h"
 #include "cli/app/app.h"
 #include "cli/commands/commands.h"
 
@@ -24,7 +27,7 @@ struct HeadArgs {
   HeadRange range;
   std::optional<double> until;
   double most_s = 85.0;
-  std::string rig;
+  std::string rig, resume, password_file;
   NamedLook look;
   HeadFollowConfig follow;
 };
@@ -82,7 +85,9 @@ FieldList fields_of(HeadArgs& args) {
        .help = "Its camera, by moves that are planned from what is known: lens, mounting, delay"},
       {.name = "stream",
        .value = &args.stream,
-       .help = "What its camera sees: http://HOST:PORT/PATH (motion JPEG), or sim:// of a simulated head",
+       .help =
+           "What its camera sees: http://HOST:PORT/PATH (motion JPEG), rtsp://…, v4l2:/dev/video0, onvif://… (it says "
+           "where), or sim:// of a simulated head",
        .form = "URL"},
       {.name = "until",
        .value = share_code(args.until),
@@ -92,15 +97,23 @@ FieldList fields_of(HeadArgs& args) {
        .value = &args.most_s,
        .help = "For how long --calibrate or --follow may hold the head [s]",
        .limits = {5.0, 86400.0}},
+      {.name = "resume",
+       .value = &args.resume,
+       .help = "For --calibrate: what an earlier run, perhaps a broken one, left in DIR counts as well",
+       .form = "DIR"},
+      {.name = "password_file",
+       .value = &args.password_file,
+       .help = "Its first line is the password of who is named in the addresses (default: ALIDADE_PASSWORD)",
+       .form = "FILE"},
       follow_field(args.look),
       {.name = "rig", .value = &args.rig, .help = "For --follow: rig.yaml of --calibrate", .form = "FILE"},
       {.name = "latency_s",
        .value = &args.follow.latency_s,
-       .help = "For --follow: from a command to its first effect, as --identify tells it [s]",
+       .help = "For --follow: from a command to its first effect, as --identify estimates it [s]",
        .limits = {0.0, 2.0}},
       {.name = "delay_s",
        .value = &args.follow.delay_s,
-       .help = "For --follow: a frame shows the angles of so much later than its time, as --calibrate tells it [s]",
+       .help = "For --follow: a frame shows the angles of so much later than its time, as --calibrate estimates it [s]",
        .limits = {-2.0, 2.0}},
       {.name = "pan_range",
        .value = range_code(args.range, 0),
@@ -122,6 +135,7 @@ void check_head(const HeadArgs& args) {
   if (!follows && !args.rig.empty()) throw UsageError("--rig is for --follow");
   if (args.calibrate && args.stream.empty()) throw UsageError("--calibrate needs the camera: --stream URL");
   if (args.calibrate && !args.move) throw UsageError("--calibrate moves the head: give --move as well");
+  if (!args.calibrate && !args.resume.empty()) throw UsageError("--resume is for --calibrate");
   if (!args.calibrate && args.until) throw UsageError("--until is for --calibrate");
   if (!args.calibrate && !follows && !args.stream.empty()) throw UsageError("--stream is for --calibrate and --follow");
   if (args.identify && !args.move) throw UsageError("--identify moves the head: give --move as well");
@@ -129,12 +143,78 @@ void check_head(const HeadArgs& args) {
     throw UsageError("--pan-range and --tilt-range are LOW,HIGH with LOW not above HIGH");
 }
 
+/// From a file or the environment, where nobody else reads it.
+HeadOptions options_of(const HeadArgs& args) {
+  HeadOptions options;
+  if (!args.password_file.empty()) {
+    options.password = read_file(args.password_file);
+    options.password = options.password.substr(0, options.password.find_first_of("\r\n"));
+    if (options.password.empty()) throw InputError(args.password_file + ": its first line is empty");
+  } else if (const char* given = std::getenv("ALIDADE_PASSWORD"); given != nullptr) {
+    options.password = given;
+  }
+  return options;
+}
+
+/// What is known so far, in DIR/so-far, whole at any time.
+class SoFar {
+ public:
+  explicit SoFar(std::filesystem::path out) : folder_(std::move(out) / "so-far") {}
+  void write(const HeadCalibration& calibration) {
+    FolderSwap swap(folder_);
+    for (const NamedBytes& file : files_so_far(calibration)) swap.add(file.name, file.bytes);
+    swap.commit();
+    is_written_ = true;
+  }
+  [[nodiscard]] bool is_written() const { return is_written_; }
+  [[nodiscard]] std::string place() const { return folder_.string(); }
+  void remove() const {
+    std::error_code error;
+    std::filesystem::remove_all(folder_, error);
+  }
+
+ private:
+  std::filesystem::path folder_;
+  bool is_written_ = false;
+};
+
+/// log.csv that an earlier run left, or was on its way to.
+std::optional<RotationLog> log_to_resume(const std::string& folder, Run& run) {
+  if (folder.empty()) return std::nullopt;
+  const std::filesystem::path dir = folder;
+  std::error_code error;
+  std::filesystem::path file = dir / "so-far" / "log.csv";  // is there only where the run did not end
+  if (!std::filesystem::exists(file, error)) file = dir / "log.csv";
+  run.add_input("log", file);
+  return read_rotation_log(file).log;
+}
+
+ExitCode calibrate_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
+  SoFar so_far(run.options.out);
+  HeadCalibrationConfig config{.range = args.range, .until = args.until, .most_s = args.most_s};
+  config.before = log_to_resume(args.resume, run);
+  config.on_so_far = [&so_far](const HeadCalibration& calibration) { so_far.write(calibration); };
+  const std::unique_ptr<FrameStream> stream = open_stream(args.stream, device, options_of(args));
+  try {
+    JobOutcome outcome = outcome_of(calibrate_head(device, *stream, config, run.progress));
+    run.lap("calibrate");
+    const bool tells = has_estimate(outcome.document.verdict);
+    const ExitCode code = run.finish(std::move(outcome));
+    if (tells) so_far.remove();
+    return code;
+  } catch (const Interrupted&) {
+    if (!so_far.is_written()) throw;
+    throw Interrupted(fmt::format("interrupted; the head stands; what was measured is in {}: --resume {}",
+                                  so_far.place(), run.options.out.string()));
+  }
+}
+
 ExitCode follow_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
   run.add_input("rig", args.rig);
   const Rig rig = read_rig(args.rig);
   if (rig.heads.size() != 1) throw InputError(args.rig + ": one head is followed with; this rig has another number");
   load_look(args.look);
-  const std::unique_ptr<FrameStream> stream = open_stream(args.stream, device);
+  const std::unique_ptr<FrameStream> stream = open_stream(args.stream, device, options_of(args));
   HeadFollowConfig config = args.follow;
   config.range = args.range;
   config.most_s = args.most_s;
@@ -146,16 +226,10 @@ ExitCode follow_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
 
 ExitCode run_head(HeadArgs& args, Run& run) {
   check_head(args);
-  const std::unique_ptr<HeadDevice> device = open_head(args.url);
+  const std::unique_ptr<HeadDevice> device = open_head(args.url, options_of(args));
   run.lap("connect");
   if (!args.look.text.empty()) return follow_by_head(args, *device, run);
-  if (args.calibrate) {
-    const std::unique_ptr<FrameStream> stream = open_stream(args.stream, *device);
-    const HeadCalibrationConfig config{.range = args.range, .until = args.until, .most_s = args.most_s};
-    JobOutcome outcome = outcome_of(calibrate_head(*device, *stream, config, run.progress));
-    run.lap("calibrate");
-    return run.finish(std::move(outcome));
-  }
+  if (args.calibrate) return calibrate_by_head(args, *device, run);
   JobOutcome outcome = args.identify ? outcome_of(identify_head(*device, args.range, run.progress))
                                      : outcome_of(survey_head(*device, args.move, args.range, run.progress));
   run.lap(args.identify ? "identify" : "ask");
@@ -172,13 +246,17 @@ void add_head(App& app) {
        .examples =
            "alidade head rotctl://127.0.0.1:4533\n"
            "alidade head rotctl://127.0.0.1:4533 --identify --move --pan-range -60,60 --tilt-range 0,60\n"
+           "alidade head 'onvif://admin@192.168.1.64/?az=-180:180&el=-20:90' --password-file secret.txt\n"
            "alidade head 'sim://?seed=3' --identify --move\n"
            "alidade head rotctl://127.0.0.1:4533 --stream http://127.0.0.1:8090/stream.mjpg --calibrate --move\n"
            "alidade head rotctl://127.0.0.1:4533 --stream http://127.0.0.1:8090/stream.mjpg --rig "
            "alidade-out/head/rig.yaml "
            "--follow bright --move\n"},
       [args](Run& run) { return run_head(*args, run); });
-  command.add_option("url", args->url, "rotctl://HOST:PORT (Hamlib's rotctld), or sim://?seed=N, a simulated one")
+  command
+      .add_option("url", args->url,
+                  "rotctl://HOST:PORT (Hamlib's rotctld), onvif://USER@HOST:PORT (a network camera), "
+                  "indi://HOST:PORT/DEVICE (a telescope mount), or sim://?seed=N, a simulated one")
       ->required();
   app.add_fields(command, fields_of(*args));
 }

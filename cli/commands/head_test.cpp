@@ -85,9 +85,110 @@ TEST_F(HeadCommand, RefusesWhatCannotBe) {
   EXPECT_EQ(alidade({"head", "sim://?lie=often"}).code, 3);
   EXPECT_EQ(alidade({"head", "ftp://here"}).code, 3);
   EXPECT_EQ(alidade({"head", fmt::format("rotctl://127.0.0.1:{}", free_port())}).code, 3);
-  const testing::Outcome secret = alidade({"head", "rotctl://me:hunter2@127.0.0.1:4533", "--out", path("out")});
-  EXPECT_EQ(secret.code, 3);
-  EXPECT_EQ((secret.out + secret.err).find("hunter2"), std::string::npos);
+  EXPECT_EQ(alidade({"head", "sim://", "--resume", "somewhere"}).code, 2);
+  EXPECT_EQ(
+      alidade({"head", "sim://?clock=free", "--stream", "sim://", "--calibrate", "--move", "--resume", path("none")})
+          .code,
+      3);
+  EXPECT_EQ(alidade({"head", "sim://?clock=free", "--password-file", path("none")}).code, 3);
+  EXPECT_EQ(alidade({"simulate", "head", "--onvif", "0", "--user", "me"}).code, 2);
+}
+
+TEST_F(HeadCommand, PasswordsAreRefusedInAddressesAndAppearNowhere) {
+  const std::string sim = "sim://?clock=free";
+  const std::vector<std::vector<std::string>> lines{
+      {"head", "rotctl://me:hunter2@127.0.0.1:4533"},
+      {"head", "onvif://me:hunter2@127.0.0.1"},
+      {"head", "indi://me:hunter2@127.0.0.1/Mount"},
+      {"head", "telnet://me:hunter2@127.0.0.1"},
+      {"head", sim, "--stream", "http://me:hunter2@127.0.0.1/", "--calibrate", "--move"},
+      {"head", sim, "--stream", "rtsp://me:hunter2@127.0.0.1/", "--calibrate", "--move"},
+      {"head", sim, "--stream", "http://127.0.0.1/a?user=me&pwd=hunter2", "--calibrate", "--move"},
+      {"head", sim, "--stream", "ftp://me:hunter2@127.0.0.1/", "--calibrate", "--move"}};
+  for (std::vector<std::string> line : lines) {
+    line.insert(line.end(), {"--out", path("out")});
+    const testing::Outcome outcome = alidade(line);
+    EXPECT_EQ(outcome.code, 3) << line[1];
+    EXPECT_EQ((outcome.out + outcome.err).find("hunter2"), std::string::npos) << outcome.err;
+    EXPECT_FALSE(std::filesystem::exists(path("out"))) << line[1];
+  }
+}
+
+/// Every file below and both outputs, in one text.
+std::string all_text(const testing::Outcome& outcome, const std::string& folder) {
+  std::string text = outcome.out + outcome.err;
+  for (const auto& each : std::filesystem::recursive_directory_iterator(folder))
+    if (each.is_regular_file()) text += read_file(each.path());
+  return text;
+}
+
+TEST_F(HeadCommand, AsksANetworkCameraWithItsPasswordFromAFile) {
+  const int port = free_port();
+  write_file(path("secret.txt"), "hunter2-of-the-camera\n");
+  const std::string url = fmt::format("onvif://admin@127.0.0.1:{}/?az=-170:170&el=-30:60", port);
+  const auto meanwhile = [&](pid_t server) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(700));
+    const testing::Outcome asked =
+        alidade({"head", url, "--password-file", path("secret.txt"), "--move", "--json", "--out", path("out")});
+    EXPECT_EQ(asked.code, 0) << asked.err;
+    EXPECT_EQ(all_text(asked, path("out")).find("hunter2"), std::string::npos);
+    const auto document = nlohmann::json::parse(asked.out);
+    EXPECT_NEAR(document["estimate"]["high_rad"][0].get<double>(), 170.0 * degree_rad, 1e-6);
+    EXPECT_GT(document["estimate"]["rate_rad_s"][0].get<double>(), 3.0 * degree_rad);
+    write_file(path("wrong.txt"), "hunter3\n");
+    const testing::Outcome refused =
+        alidade({"head", url, "--password-file", path("wrong.txt"), "--out", path("none")});
+    EXPECT_EQ(refused.code, 3);
+    EXPECT_NE(refused.err.find("refuses the user or the password"), std::string::npos) << refused.err;
+    EXPECT_EQ(refused.err.find("hunter3"), std::string::npos) << refused.err;
+    ::kill(server, SIGTERM);
+  };
+  ::setenv("ALIDADE_PASSWORD", "hunter2-of-the-camera", 1);
+  (void)testing::run_program(
+      {ALIDADE_EXECUTABLE, "simulate", "head", "--onvif", std::to_string(port), "--user", "admin", "--seconds", "30"},
+      "", meanwhile);
+  ::unsetenv("ALIDADE_PASSWORD");
+}
+
+std::vector<std::string> calibrating_simulated(const std::string& camera, const std::string& out) {
+  return {"head",
+          "sim://?rate=8&clock=free",
+          "--stream",
+          "sim://?delay=0.04" + camera,
+          "--calibrate",
+          "--move",
+          "--pan-range",
+          "-60,60",
+          "--most",
+          "45",
+          "--json",
+          "--out",
+          out};
+}
+
+TEST_F(HeadCommand, WhatWasMeasuredBeforeCountsAfterResume) {
+  std::vector<std::string> second = calibrating_simulated("", path("second"));
+  second.insert(second.end(), {"--resume", path("first")});
+  const testing::Outcome before = alidade(calibrating_simulated("", path("first"))), after = alidade(second);
+  ASSERT_EQ(before.code, 0) << before.err;
+  ASSERT_EQ(after.code, 0) << after.err;
+  const auto one = nlohmann::json::parse(before.out), two = nlohmann::json::parse(after.out);
+  EXPECT_GT(two["counts"]["given"].get<int>(), 3 * one["counts"]["given"].get<int>() / 2);
+  for (const char* name : {"fx", "fy", "cx", "cy"})
+    EXPECT_LT(two["stddev"]["camera"][name].get<double>(), one["stddev"]["camera"][name].get<double>()) << name;
+  EXPECT_NEAR(two["estimate"]["camera"]["fx"].get<double>(), 350.0, 4.0 * two["stddev"]["camera"]["fx"].get<double>());
+  EXPECT_FALSE(std::filesystem::exists(path("second") + "/so-far"));  // it ended
+}
+
+TEST_F(HeadCommand, TimeStampsThatJumpAreNamedAndNotUsed) {
+  const testing::Outcome outcome = alidade(calibrating_simulated("&jump=0.3", path("out")));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto document = nlohmann::json::parse(outcome.out);
+  EXPECT_GT(document["estimate"]["time_stamp_jumps"].get<int>(), 3);
+  EXPECT_EQ(document["estimate"]["frame_times"], "arrival");
+  EXPECT_NE(document["verdict"]["sentence"].get<std::string>().find("time stamps jump"), std::string::npos);
+  EXPECT_NEAR(document["estimate"]["camera"]["fx"].get<double>(), 350.0,
+              4.0 * document["stddev"]["camera"]["fx"].get<double>());
 }
 
 /// Pan and tilt at the end of a truth file, and whether they stood for the last half second.
@@ -141,7 +242,7 @@ TEST_F(HeadCommand, StandsAfterCtrlC) {
     const testing::Outcome outcome = testing::run_program(calibrating(rotctl, stream, path("out")), "",
                                                           testing::interrupt_after(std::chrono::milliseconds(4000)));
     EXPECT_EQ(outcome.code, 130) << outcome.err;
-    EXPECT_FALSE(std::filesystem::exists(path("out")));
+    EXPECT_FALSE(std::filesystem::exists(path("out") + "/result.json"));  // at most DIR/so-far, whole
     std::this_thread::sleep_for(std::chrono::milliseconds(1200));
     const TruthEnd end = end_of(path("truth.csv"));
     EXPECT_GT(std::hypot(end.pan, end.tilt), 0.01);

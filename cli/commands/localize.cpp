@@ -27,6 +27,7 @@ struct LocalizeArgs {
   std::string camera, target, start, truth, depth_sensor, range, beam, mask;  // files
   std::optional<double> rate_hz;
   bool skip_bad = false;
+  std::vector<SkippedInput> skipped;  ///< Of the sensors' files.
   LocalizeConfig config;
   LiveOptions live;
 
@@ -103,8 +104,9 @@ void read_values(LocalizeArgs& args) {
     args.config.target = args.is_images() ? read_image_target(args.target) : read_target(args.target);
   if (!args.start.empty()) args.config.start = read_start(args.start);
   if (args.range.empty() != args.beam.empty()) throw UsageError("--range and --beam belong together: give both");
-  if (!args.depth_sensor.empty()) args.config.depth_readings = read_depth_sensor(args.depth_sensor);
-  if (!args.range.empty()) args.config.range_readings = read_ranges(args.range);
+  if (!args.depth_sensor.empty())
+    args.config.depth_readings = read_depth_sensor(args.depth_sensor, args.skip_bad, &args.skipped);
+  if (!args.range.empty()) args.config.range_readings = read_ranges(args.range, args.skip_bad, &args.skipped);
   if (!args.mask.empty() && !args.is_images())
     throw UsageError("--mask is of images; a table of observations has none");
   args.config.masks_circle = args.mask == "circle";
@@ -184,6 +186,7 @@ ExitCode run_localize(LocalizeArgs args, Run& run) {
   if (live.server() != nullptr && !result.path.empty()) stream.show(*live.server(), result.path.back(), true);
   run.lap("localize");
   JobOutcome outcome = outcome_of(result);
+  add_skipped(args.skipped, outcome);
   if (seen) seen->add_to(outcome);
   return live.finish(std::move(outcome));
 }

@@ -218,6 +218,35 @@ TEST_F(LocalizeCommand, SaysWhatIsWrongWithItsInput) {
   bad_file("--truth", "0 1 2 3\n", "is not 't x y z qx qy qz qw'");
 }
 
+TEST_F(LocalizeCommand, ASensorsFileIsReadByTheSameRulesAndOutOfTimeIsNamed) {
+  simulate();
+  const std::string header = "t_s,depth_m\n";
+  write_file(path("depth.csv"), header + "0,1\nnan,1\n0.2,1\n0.1,1\n0.3,1\n");
+  const Outcome stopped = localize(told({"--depth-sensor", path("depth.csv")}));
+  EXPECT_EQ(stopped.code, 3);
+  EXPECT_NE(stopped.err.find("depth.csv:3"), std::string::npos) << stopped.err;
+  const Outcome skipped = localize(told({"--depth-sensor", path("depth.csv"), "--skip-bad"}));
+  EXPECT_EQ(skipped.code, 0) << skipped.err;
+  EXPECT_EQ(Json::parse(skipped.out)["counts"]["skipped"].size(), 2u);
+  write_file(path("depth.csv"), header + "1000,1\n1001,2\n");
+  const Outcome late = localize(told({"--depth-sensor", path("depth.csv")}));
+  EXPECT_NE(late.out.find("none of them is of the time of the path"), std::string::npos) << late.out;
+}
+
+TEST_F(LocalizeCommand, QuaternionsBeginWithTheirRealPartButInTum) {
+  simulate();
+  ASSERT_EQ(localize(told()).code, 0);
+  EXPECT_TRUE(read_file(path("out/poses.csv")).starts_with("frame,t_s,x_m,y_m,z_m,qw,qx,qy,qz,"));
+  const Csv poses = Csv::read(path("out/poses.csv"));
+  const std::vector<TimedPose> path_of = read_tum(path("out/trajectory.tum"));
+  ASSERT_EQ(path_of.size(), poses.num_rows());
+  for (std::size_t k = 0; k < path_of.size(); ++k) {
+    const Eigen::Quaterniond& q = path_of[k].world_from_cam.rotation;
+    EXPECT_NEAR(poses.number(k, "qw"), q.w(), 1e-8);
+    EXPECT_NEAR(poses.number(k, "qx"), q.x(), 1e-8);
+  }
+}
+
 TEST_F(LocalizeCommand, FollowsABoardInImagesTakenUnderWater) {
   simulate({"--video", "--frames", "12", "--rate", "30"});
   const Outcome outcome = alidade({"localize", path("sim/frames"), "--rate", "30", "--camera", path("sim/camera.yaml"),

@@ -30,8 +30,8 @@ TEST(Observe, RefusesByNameWhatTheMotionCannotTell) {
     EXPECT_EQ(outcome.code, 4) << motion;
     EXPECT_NE(outcome.err.find(reason), std::string::npos) << outcome.err;
   };
-  expect("pan", "pan only: fy cannot be told; tilt the camera as well");
-  expect("tilt", "tilt only: fx cannot be told; pan the camera as well");
+  expect("pan", "pan only: fy cannot be determined; tilt the camera as well");
+  expect("tilt", "tilt only: fx cannot be determined; pan the camera as well");
   expect("roll", "roll only");
   expect("still", "does not turn");
 }
@@ -266,7 +266,7 @@ TEST(Observe, ARealCameraTurnedByHandTellsItsFocalLengthAndSaysWhatItCannot) {
   const std::string pairs = set + "/correspondences.csv";
   const Outcome free = observe({"--pairs", pairs, "--size", "1280x960"});
   EXPECT_EQ(free.code, 4);
-  EXPECT_NE(free.err.find("cannot tell fx / fy"), std::string::npos) << free.err;
+  EXPECT_NE(free.err.find("cannot determine fx / fy"), std::string::npos) << free.err;
   EXPECT_NE(free.err.find("--square-pixels"), std::string::npos) << free.err;
   for (const std::vector<std::string>& options :
        {std::vector<std::string>{"--pairs", pairs, "--size", "1280x960", "--square-pixels"},

@@ -118,7 +118,7 @@ void add_servo(App& app) {
   command.add_flag("--no-robustness", args->no_robustness, "Leave out the grid over gain and time constant");
   command.add_flag(
       "--realtime", args->real_time,
-      "Hold the first run of each controller to the wall clock, and tell how late its steps were (default: "
+      "Hold the first run of each controller to the wall clock, and report how late its steps were (default: "
       "as fast as it can)");
   add_live_options(command, args->live);
 }

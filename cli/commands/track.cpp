@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <iostream>
 #include <memory>
 
 #include "alidade/detect/target_look.h"
@@ -12,8 +13,10 @@
 #include "alidade/live/streams.h"
 #include "alidade/results/track_outcome.h"
 #include "alidade/tables/events_file.h"
+#include "alidade/tables/logs/events_stream.h"
 #include "cli/app/app.h"
 #include "cli/app/live.h"
+#include "cli/app/standard_input.h"
 #include "cli/commands/commands.h"
 
 namespace alidade::cli {
@@ -105,6 +108,30 @@ TargetTrack follow(const TrackArgs& args, std::vector<TargetObservation> observa
   return result;
 }
 
+/// Rows from standard input as they come, each answered at once with a row of track.csv.
+ExitCode follow_input(const TrackArgs& args, const Rig& rig, const TrueTrack& truth, const live::TrackStream& view,
+                      LiveRun& live, Run& run) {
+  StandardInput input;  // Ctrl-C ends waiting for a row
+  EventsStream events(input, "-", rig.heads, {.skip_bad = args.skip_bad});
+  TargetTracker tracker(rig, args.config);
+  const bool shows = !run.options.json && !run.options.quiet;
+  if (shows) std::cout << track_csv({}) << std::flush;
+  const std::size_t header = track_csv({}).size();
+  std::size_t count = 0;
+  while (const std::optional<TargetObservation> observation = events.next()) {
+    report_progress(run.progress, "rows", ++count, 0);
+    const TrackStep step = tracker.push(*observation);
+    if (live.server() != nullptr) view.show(*live.server(), *observation, step);
+    if (shows) std::cout << track_csv({&step, 1}).substr(header) << std::flush;
+  }
+  report_progress(run.progress, "rows", count, 0);  // the input may have ended by Ctrl-C
+  run.lap("read");
+  JobOutcome outcome = outcome_of(tracker.finish(truth, run.progress));
+  run.lap("track");
+  add_skipped(events.skipped(), outcome);
+  return live.finish(std::move(outcome));
+}
+
 ExitCode run_track(TrackArgs args, Run& run) {
   check_inputs(args);
   require_sense(args.config);
@@ -120,6 +147,7 @@ ExitCode run_track(TrackArgs args, Run& run) {
   const live::TrackStream stream(rig.heads, truth);
   if (live.is_on()) live.open(stream.topics(), "/track");
   if (live.server() != nullptr) stream.begin(*live.server());
+  if (args.events == "-") return follow_input(args, rig, truth, stream, live, run);
   std::vector<TargetFrame> frames;
   EventsFile events;
   if (args.videos.empty()) {
@@ -147,13 +175,16 @@ void add_track(App& app) {
        .summary = "Path of a target in space from the pixels and angles of two or more pan-tilt heads",
        .examples = "alidade track events.csv --rig rig.yaml\n"
                    "alidade track events.csv --rig rig.yaml --method imm --predict 0.1\n"
+                   "tail -f events.csv | alidade track - --rig rig.yaml\n"
                    "alidade track events.csv --rig rig.yaml --truth truth.csv --method xiahou2015\n"
                    "alidade track events.csv --rig rig.yaml --intrinsics left/intrinsics.csv right/intrinsics.csv\n"
                    "alidade track --video left.mp4 right.mp4 --angles angles.csv --rate 30 --rig rig.yaml \\\n"
                    "  --look colour:230,70,20\n"},
       [args](Run& run) { return run_track(*args, run); });
-  command.add_option("events", args->events,
-                     "Events, CSV: t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px, in order of arrival");
+  command.add_option(
+      "events", args->events,
+      "Events, CSV: t_capture_s,t_arrival_s,head,pan_rad,tilt_rad,u_px,v_px, in order of arrival; - reads "
+      "rows from standard input and answers each");
   command
       .add_option("--video", args->videos,
                   "Videos or folders of numbered frames instead, one per head of the rig, in its order")

@@ -157,6 +157,28 @@ TEST_F(TrackCommand, ReadsTheReferenceEventsInTheirSpelling) {
   EXPECT_LT(Json::parse(outcome.out)["estimate"]["rms_m"], 0.0038);
 }
 
+TEST_F(TrackCommand, AnswersRowsFromStandardInputAsTheFileIsAnswered) {
+  simulate("B");
+  ASSERT_EQ(track({}).code, 0);
+  const std::string whole = read_file(path("out/track.csv"));
+  const std::string line = std::string("'") + ALIDADE_EXECUTABLE + "' track - --no-report --rig '" +
+                           path("sim/rig.yaml") + "' --out '" + path("live") + "'";
+  const Outcome live = testing::run_program({"sh", "-c", line + " < '" + path("sim/events.csv") + "'"});
+  EXPECT_EQ(live.code, 0) << live.err;
+  EXPECT_EQ(read_file(path("live/track.csv")), whole);
+  EXPECT_EQ(live.out.substr(0, whole.find('\n')), whole.substr(0, whole.find('\n')));
+  EXPECT_GT(std::count(live.out.begin(), live.out.end(), '\n'), std::count(whole.begin(), whole.end(), '\n'));
+
+  const Outcome empty = testing::run_program({"sh", "-c", "head -1 '" + path("sim/events.csv") + "' | " + line});
+  EXPECT_EQ(empty.code, 3);
+  EXPECT_THAT(empty.err, ::testing::HasSubstr("-: has no events"));
+  const Outcome cut =
+      testing::run_program({"sh", "-c", "(head -5 '" + path("sim/events.csv") + "'; echo 1,2,x) | " + line});
+  EXPECT_EQ(cut.code, 3);
+  EXPECT_THAT(cut.err, ::testing::HasSubstr("-:6: has 3 cells"));
+  EXPECT_EQ(read_file(path("live/track.csv")), whole);  // of the run before: a failed one leaves it
+}
+
 TEST_F(TrackCommand, ThePapersFilterStandsBesideOurs) {
   simulate("A");
   const auto rms_of = [&](const std::vector<std::string>& options) {

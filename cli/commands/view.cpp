@@ -163,7 +163,7 @@ void add_view(App& app) {
   command.add_option("--port", args->where.port, "Port; 0: any that is free (default: 8765)")->type_name("PORT");
   command
       .add_option("--address", args->where.address,
-                  "Listen there instead of 127.0.0.1; who connects then needs the token that is told")
+                  "Listen there instead of 127.0.0.1; clients then need the token that is printed")
       ->type_name("IP");
 }
 

@@ -139,7 +139,7 @@ void add_board_scenario(App& app) {
     command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
   };
   number("--max-tilt-deg", args->max_tilt_deg, "Largest tilt of the board", 0.0, 80.0);
-  number("--bow-mm", args->bow_mm, "Height of the board's middle over its corners", -1000.0, 1000.0);
+  number("--bow-mm", args->bow_mm, "Height of the board's centre over its corners", -1000.0, 1000.0);
   number("--shape-sigma-mm", args->shape_sigma_mm, "Scatter of the board's points about their plan", 0.0, 1000.0);
   number("--blur", args->blur_px, "Sigma of the optical blur [px]", 0.0, 20.0);
   number("--noise", args->noise, "Sigma of the grey noise, of 255", 0.0, 100.0);

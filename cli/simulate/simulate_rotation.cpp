@@ -298,7 +298,7 @@ void add_options(CLI::App& command, SimulateRotationArgs& args) {
           "Render so many photos of a camera that is turned by hand instead, and matches between them: photos/, "
           "pairs.csv")
       ->check(CLI::Range(2, 200));
-  number("--zoomed", args.zoomed, "Focal length of the photo in the middle over the others'", 0.2, 5.0);
+  number("--zoomed", args.zoomed, "Focal length of the middle photo over the others'", 0.2, 5.0);
   command.add_option("--photo", args.photo, "What the world of videos and photos looks like (default: noise)")
       ->type_name("FILE");
   number("--photo-deg", args.photo_deg, "How wide that photo stands in the world", 1.0, 360.0);

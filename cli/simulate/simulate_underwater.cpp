@@ -153,7 +153,7 @@ void add_underwater_scenario(App& app) {
       ->excludes(video);
   number("--blackout-from", scene.blackout_from_s, "Nothing is seen from this time on [s]", 0.0, 1e6)->excludes(video);
   number("--blackout", scene.blackout_s, "How long nothing is seen [s]", 0.0, 1e6)->excludes(video);
-  const char* const group = "What is not as told";
+  const char* const group = "What is not as given";
   number("--told-f", args->told_f, "Focal length in camera.yaml over the true one", 0.1, 10.0)->group(group);
   number("--told-centre", args->told_centre_px, "cx in camera.yaml less the true one [px]", -500.0, 500.0)
       ->group(group);

@@ -9,6 +9,26 @@ import numpy.typing as npt
 Numbers = npt.NDArray[np.float64]
 
 
+def shown(value: Any) -> str:
+    """A value in a message: in one line, and short."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def number(value: Any, name: str) -> float:
+    """One number; whether it is finite is for who asked."""
+    if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
+        return float(value)
+    raise ValueError(f"{name}: a number is needed, not {shown(value)}")
+
+
+def whole(value: Any, name: str) -> int:
+    """One whole number that fits into 32 bits."""
+    if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and abs(int(value)) < 1 << 31:
+        return int(value)
+    raise ValueError(f"{name}: a whole number is needed, not {shown(value)}")
+
+
 def numbers(values: Any, name: str) -> Numbers:
     """`values` as a C-contiguous float64 array; a copy only where it is none."""
     try:
@@ -47,8 +67,8 @@ def image_size(size: Any, name: str = "size") -> tuple[int, int]:
     try:
         width, height = size.lower().split("x") if isinstance(size, str) else size
         pair = int(width), int(height)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name}: {size!r} is not (width, height), for example (640, 480)") from None
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name}: {shown(size)} is not (width, height), for example (640, 480)") from None
     if min(pair) < 1 or max(pair) > 200000:
-        raise ValueError(f"{name}: {size!r} is not (width, height), for example (640, 480)")
+        raise ValueError(f"{name}: {shown(size)} is not (width, height), for example (640, 480)")
     return pair

@@ -26,6 +26,7 @@ class Camera:
 
     def __init__(self, model: str = "brown", size: tuple[int, int] = (0, 0), *, covariance: Any = None,
                  rms_px: float = 0.0, source: str = "", **parameters: float) -> None:
+        _refuse_file(model)
         width, height = image_size(size)
         names = _alidade.parameter_names(model)
         for name in parameters:
@@ -239,6 +240,13 @@ class Camera:
         rows = "".join(f"<tr><th>{name}</th><td>{value:.6g}</td><td>{'' if math.isnan(s) else f'± {3 * s:.2g}'}</td></tr>"
                        for name, value, s in self._rows())
         return f"<table><caption>{self.model}, {self.width}×{self.height} px, ± 3σ</caption>{rows}</table>"
+
+
+def _refuse_file(model: Any) -> None:
+    """A file in the place of a lens model: says how it is read."""
+    file = str(model)
+    if not isinstance(model, str) or os.sep in file or os.path.splitext(file)[1]:
+        raise ValueError(f"model: {file!r} is no lens model; al.Camera.read({file!r}) reads a camera file")
 
 
 def _restored(model: str, width: int, height: int, values: list[float], covariance: Numbers, rms_px: float,

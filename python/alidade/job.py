@@ -27,6 +27,8 @@ Progress = Callable[[str, int, int], Any]
 Input = Any
 #: (option, takes no value, takes several values, form), by the keyword.
 Options = dict[str, tuple[str, bool, bool, str]]
+#: Columns of a table that may name files, beside it or where the program runs.
+PHOTO_COLUMNS = ("photo", "photo_off")
 Photos = Union[str, "os.PathLike[str]", "abc.Sequence[Any]", "np.ndarray[Any, Any]"]
 
 
@@ -48,6 +50,17 @@ def _is_standard(value: Any, standard: Any) -> bool:
     return value is standard or (isinstance(value, (str, int, float)) and type(value) is type(standard) and value == standard)
 
 
+def _is_image(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype.kind == "u" and (value.ndim == 2 or value.ndim == 3 and not _are_images(value))
+
+
+def _are_images(value: Any) -> bool:
+    """Several images (N, H, W[, 3]), or a list of them."""
+    if isinstance(value, np.ndarray):
+        return value.dtype.kind == "u" and value.ndim == 4 or value.ndim == 3 and value.shape[2] not in (1, 3, 4)
+    return isinstance(value, (list, tuple)) and len(value) > 0 and all(isinstance(each, np.ndarray) for each in value)
+
+
 def _is_column(value: Any) -> bool:
     return hasattr(value, "__len__") and not isinstance(value, (str, abc.Mapping))
 
@@ -65,16 +78,51 @@ class _Files:
         self.names.append((str(file), name))
         return str(file)
 
+    def _put_image(self, value: Any, name: str) -> str:
+        file = self.folder / f"{name}{len(self.names):06d}.png"
+        file.write_bytes(_alidade.png(image(value, name)))
+        self.names.append((str(file), name))
+        return str(file)
+
+    def _put_images(self, values: Any, name: str) -> str:
+        """A folder of numbered images, in their order."""
+        folder = self.folder / f"{name}{len(self.names)}"
+        folder.mkdir()
+        self.names.append((str(folder), name))
+        for i, each in enumerate(values):
+            (folder / f"{i:06d}.png").write_bytes(_alidade.png(image(each, f"{name}[{i}]")))
+        return str(folder)
+
+    def _with_photos(self, table: Any) -> Any:
+        """Photos that a table names are found from where the program runs, and may be images themselves."""
+        names = table.dtype.names if isinstance(table, np.ndarray) else list(table.keys())
+        if not any(name in names for name in PHOTO_COLUMNS):
+            return table
+        columns = {name: table[name] for name in names}
+        for name in PHOTO_COLUMNS:
+            if name in columns:
+                columns[name] = [self._photo_cell(each, name) for each in columns[name]]
+        return columns
+
+    def _photo_cell(self, cell: Any, name: str) -> Any:
+        if isinstance(cell, np.ndarray):
+            return self._put_image(cell, name)
+        if isinstance(cell, (str, os.PathLike)) and os.path.exists(cell):
+            return os.path.abspath(cell)
+        return cell
+
     def path_of(self, value: Any, name: str) -> str:
-        """The file of a value: columns as CSV, nested values and a camera as YAML, a result as its folder or the file of that
-        name in it."""
+        """The file of a value: columns as CSV, nested values and a camera as YAML, images as a folder of PNGs, a result as its
+        folder or the file of that name in it."""
         if isinstance(value, abc.Mapping) and not all(_is_column(each) for each in value.values()):
             try:
                 return self._put(name, ".yaml", json.dumps(value))  # which is YAML as well
             except TypeError as error:
                 raise ValueError(f"{name}: {error}") from None
         if is_table(value):
-            return self._put(name, ".csv", csv_of(value, name))
+            return self._put(name, ".csv", csv_of(self._with_photos(value), name))
+        if _is_image(value):
+            return self._put_image(value, name)
         if isinstance(value, Camera):
             return self._put(name, ".yaml", value.text())
         if not isinstance(value, Result):
@@ -86,8 +134,10 @@ class _Files:
         return str(own)
 
     def texts_of(self, value: Any, name: str, form: str) -> list[str]:
-        if isinstance(value, (Camera, Result)) or is_table(value):
+        if isinstance(value, (Camera, Result)) or is_table(value) or _is_image(value):
             return [self.path_of(value, name)]
+        if _are_images(value):
+            return [self._put_images(value, name)]
         if re.fullmatch(r"[A-Z][A-Za-z]*x[A-Z][A-Za-z]*", form):
             return ["{}x{}".format(*image_size(value, name))] if name == "size" else texts_of(value, name, pair=True)
         if isinstance(value, (list, tuple)):

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from . import _alidade
-from .arrays import Numbers, image, image_size, numbers, vectors
+from .arrays import Numbers, image, image_size, number, numbers, vectors, whole
 from .camera import Camera
 from .job import Progress, files_for_call
 from .result import Result
@@ -40,12 +40,13 @@ class Tracker:
         position_m (3,), velocity_m_s (3,) and covariance (6, 6) in the world (None before the start), event, accepted."""
         pan, tilt = _row(pan_tilt_rad, (2,), "pan_tilt_rad")
         u, v = _row(px, (2,), "px")
-        arrival = t_capture_s if t_arrival_s is None else t_arrival_s
-        return _belief(self._core.push(head, (pan, tilt), (u, v), t_capture_s, arrival, sigma_px))
+        capture = number(t_capture_s, "t_capture_s")
+        arrival = capture if t_arrival_s is None else number(t_arrival_s, "t_arrival_s")
+        return _belief(self._core.push(whole(head, "head"), (pan, tilt), (u, v), capture, arrival, number(sigma_px, "sigma_px")))
 
     def at(self, t_s: float) -> dict[str, Any] | None:
         """Where the target will be at a time; None where that is not known."""
-        step = self._core.at(t_s)
+        step = self._core.at(number(t_s, "t_s"))
         return None if step is None else _belief(step)
 
     def finish(self, progress: Progress | None = None) -> Result:
@@ -98,7 +99,7 @@ class Observer:
             raise ValueError(f"pixels: the first row had {self._count} points, this has {len(rows)}")
         if (len(turned) == 4) != (self._source == "attitude"):
             raise ValueError(f"rotation: {len(turned)} numbers are no {self._source}")
-        return self._core.push(t_s, turned.tolist() + [0.0] * (3 - len(turned)), rows)
+        return self._core.push(number(t_s, "t_s"), turned.tolist() + [0.0] * (3 - len(turned)), rows)
 
     def finish(self, progress: Progress | None = None) -> Result:
         """Of all rows so far, as al.observe() gives it; more may follow."""
@@ -139,7 +140,7 @@ class Localizer:
         numbered = np.asarray(ids)
         if numbered.shape != shape or numbered.ndim != 1 or numbered.dtype.kind not in "iu":
             raise ValueError(f"ids: a whole number per pixel is needed, but the shape is {numbered.shape}")
-        step = self._begin(False).push_points(self._frame, t_s, numbered.tolist(), rows)
+        step = self._begin(False).push_points(self._frame, number(t_s, "t_s"), numbered.tolist(), rows)
         self._frame += 1
         return _pose(step)
 
@@ -148,7 +149,7 @@ class Localizer:
         pixels = image(picture)
         if pixels.ndim != 2 or pixels.dtype != np.uint8:
             raise ValueError("image: grey, (H, W) of uint8, is needed")
-        step = self._begin(True).push_image(self._frame, t_s, pixels)
+        step = self._begin(True).push_image(self._frame, number(t_s, "t_s"), pixels)
         self._frame += 1
         return _pose(step)
 

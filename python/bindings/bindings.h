@@ -47,7 +47,10 @@ template <int Size>
 void bind_board(py::module_& module);
 void bind_calibrate(py::module_& module);
 void bind_camera(py::module_& module);
+void bind_capture(py::module_& module);
 void bind_commands(py::module_& module);
+void bind_head(py::module_& module);
+void bind_images(py::module_& module);
 void bind_live(py::module_& module);
 void bind_localizer(py::module_& module);
 void bind_outcome(py::module_& module);

@@ -1,6 +1,6 @@
 #include "python/bindings/images.h"
 
-#include "alidade/estimation/config_error.h"
+#include "alidade/imaging/image_codecs.h"
 #include "python/bindings/waiting.h"
 
 namespace alidade::python {
@@ -24,6 +24,19 @@ Photos photos_of(const std::vector<std::string>& names, const std::vector<py::ar
   const auto held = std::make_shared<std::vector<HeldImage>>();
   for (const py::array& image : images) held->push_back(held_image(image));
   return {names, [held](std::size_t i) { return held->at(i).pixels; }};
+}
+
+void bind_images(py::module_& module) {
+  module.def("png", [](const py::array& image) {
+    const Photos photos = photos_of({"image"}, {image});
+    const cv::Mat pixels = photos.load(0);
+    std::string bytes;
+    {
+      const py::gil_scoped_release released;
+      bytes = png_bytes(pixels);
+    }
+    return py::bytes(bytes);
+  });
 }
 
 }  // namespace alidade::python

@@ -10,9 +10,10 @@
 #include "alidade/track.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/fields.h"
+#include "python/bindings/guarded.h"
 #include "python/bindings/waiting.h"
 
-/// Estimators that take their data one by one. They are answered at once, with the GIL; finish() may take its time.
+/// Estimators that take their data one by one, from any thread; finish() may take its time.
 namespace alidade::python {
 namespace {
 
@@ -30,7 +31,7 @@ class LiveTracker {
     set_fields(fields_of(config_), values);
     Rig rig = read_rig(rig_file);
     for (const RigHead& head : rig.heads) ids_.push_back(head.head.id);
-    tracker_ = std::make_shared<TargetTracker>(std::move(rig), config_);
+    tracker_ = std::make_shared<Guarded<TargetTracker>>(std::move(rig), config_);
   }
 
   py::dict push(int head, std::pair<double, double> pan_tilt_rad, std::pair<double, double> px, double t_capture_s,
@@ -42,7 +43,7 @@ class LiveTracker {
     observation.pan_tilt_rad = {pan_tilt_rad.first, pan_tilt_rad.second};
     observation.px = {px.first, px.second};
     observation.sigma_px = sigma_px;
-    const TrackStep step = tracker_->push(observation);
+    const TrackStep step = tracker_->from_python([&](TargetTracker& tracker) { return tracker.push(observation); });
     py::dict made = belief_dict(step.t_s, step.has_belief, step.belief);
     made["event"] = std::string(event_name(step.event));
     made["accepted"] = step.accepted;
@@ -50,14 +51,18 @@ class LiveTracker {
   }
 
   py::object at(double t_s) const {
-    const std::optional<PredictedStep> step = tracker_->at(t_s);
+    const std::optional<PredictedStep> step =
+        tracker_->from_python([&](const TargetTracker& tracker) { return tracker.at(t_s); });
     if (!step) return py::none();
     return belief_dict(step->t_s, step->has_belief, step->belief);
   }
 
   OutcomePtr finish(const py::object& progress) const {
     return value_of<OutcomePtr>(
-        [tracker = tracker_](const Progress& report) { return outcome_ptr(outcome_of(tracker->finish({}, report))); },
+        [held = tracker_](const Progress& report) {
+          return held->from_work(
+              [&](const TargetTracker& tracker) { return outcome_ptr(outcome_of(tracker.finish({}, report))); });
+        },
         progress);
   }
 
@@ -73,7 +78,7 @@ class LiveTracker {
 
   TrackConfig config_;
   std::vector<int> ids_;
-  std::shared_ptr<TargetTracker> tracker_;
+  GuardedPtr<TargetTracker> tracker_;
 };
 
 /// Observer of rows with so many points and that source of the rotation.
@@ -91,15 +96,16 @@ class LiveObserver {
     layout.source = source_;
     layout.has_roll_rate = has_roll_rate;
     layout.num_points = num_points;
-    observer_ = std::make_shared<Observer>(layout, config);
+    observer_ = std::make_shared<Guarded<Observer>>(layout, config);
   }
 
   py::dict push(double t_s, const std::vector<double>& rotation, const Array& pixels) {
     const auto px = vectors_of<2>(pixels);
     const std::vector<double>& r = rotation;
-    const ObserveStep step = source_ == RotationSource::attitude
-                                 ? observer_->push(t_s, Eigen::Quaterniond(r[0], r[1], r[2], r[3]), px)
-                                 : observer_->push(t_s, Eigen::Vector3d(r[0], r[1], r[2]), px);
+    const ObserveStep step = observer_->from_python([&](Observer& observer) {
+      return source_ == RotationSource::attitude ? observer.push(t_s, Eigen::Quaterniond(r[0], r[1], r[2], r[3]), px)
+                                                 : observer.push(t_s, Eigen::Vector3d(r[0], r[1], r[2]), px);
+    });
     const IntrinsicsEstimate& now = step.estimate;
     py::dict made;
     made["t_s"] = step.t_s;
@@ -115,13 +121,16 @@ class LiveObserver {
 
   OutcomePtr finish(const py::object& progress) const {
     return value_of<OutcomePtr>(
-        [observer = observer_](const Progress& report) { return outcome_ptr(outcome_of(observer->finish(report))); },
+        [held = observer_](const Progress& report) {
+          return held->from_work(
+              [&](const Observer& observer) { return outcome_ptr(outcome_of(observer.finish(report))); });
+        },
         progress);
   }
 
  private:
   RotationSource source_;
-  std::shared_ptr<Observer> observer_;
+  GuardedPtr<Observer> observer_;
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include "alidade/tables/localize_file.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/fields.h"
+#include "python/bindings/guarded.h"
 #include "python/bindings/images.h"
 #include "python/bindings/waiting.h"
 
@@ -19,31 +20,29 @@ class LiveLocalizer {
     set_fields(fields_of(config), values);
     if (!target.empty()) config.target = is_of_images ? read_image_target(target) : read_target(target);
     if (!start.empty()) config.start = read_start(start);
-    localizer_ = std::make_shared<Localizer>(camera, config);
+    localizer_ = std::make_shared<Guarded<Localizer>>(camera, config);
   }
 
   py::dict push_points(long frame, double t_s, const std::vector<long>& ids, const Array& pixels) {
     const auto px = vectors_of<2>(pixels);
     ObservationFrame seen{.frame = frame, .t_s = t_s, .observations = {}};
     for (std::size_t i = 0; i < ids.size(); ++i) seen.observations.push_back({.id = ids[i], .px = px[i]});
-    return step_dict(localizer_->push(seen));
+    return step_dict(localizer_->from_python([&](Localizer& localizer) { return PathStep(localizer.push(seen)); }));
   }
 
   py::dict push_image(long frame, double t_s, const py::array& image) {
     const Photos photos = photos_of({"image"}, {image});
     const cv::Mat grey = photos.load(0);
-    const PathStep* step = nullptr;
-    {
-      const py::gil_scoped_release released;
-      step = &localizer_->push(grey, frame, t_s);
-    }
-    return step_dict(*step);
+    return step_dict(
+        localizer_->from_python([&](Localizer& localizer) { return PathStep(localizer.push(grey, frame, t_s)); }));
   }
 
   OutcomePtr finish(const py::object& progress) const {
     return value_of<OutcomePtr>(
-        [localizer = localizer_](const Progress&) {
-          return std::make_shared<Outcome>(Outcome{outcome_of(localizer->finish()), {}, {}});
+        [held = localizer_](const Progress&) {
+          return held->from_work([](const Localizer& localizer) {
+            return std::make_shared<Outcome>(Outcome{outcome_of(localizer.finish()), {}, {}});
+          });
         },
         progress);
   }
@@ -67,7 +66,7 @@ class LiveLocalizer {
     return made;
   }
 
-  std::shared_ptr<Localizer> localizer_;
+  GuardedPtr<Localizer> localizer_;
 };
 
 }  // namespace

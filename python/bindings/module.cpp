@@ -45,7 +45,10 @@ PYBIND11_MODULE(_alidade, module) {
   bind_board(module);
   bind_outcome(module);
   bind_calibrate(module);
+  bind_capture(module);
   bind_commands(module);
+  bind_head(module);
+  bind_images(module);
   bind_live(module);
   bind_localizer(module);
 }

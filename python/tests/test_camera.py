@@ -167,6 +167,12 @@ class Values(unittest.TestCase):
             with self.assertRaisesRegex(ValueError, "absent.yaml"):
                 al.Camera.read(f"{folder}/absent.yaml")
 
+    def test_a_file_is_read_not_constructed(self):
+        import pathlib
+        for file in ("out/camera.yaml", pathlib.Path("camera.yml")):
+            with self.assertRaisesRegex(ValueError, "al.Camera.read"):
+                al.Camera(file)
+
     def test_wrong_values_are_refused(self):
         for work in (lambda: al.Camera("lens", SIZE), lambda: al.Camera("brown", SIZE, k9=1.0),
                      lambda: al.Camera("brown", SIZE, fx=np.nan), lambda: al.Camera("brown", "640"),

@@ -65,6 +65,28 @@ class Jobs(InFolder):
                      board=al.Board("9x6", square_m=0.025))
         self.assertIn("rig.yaml", rig.files)
 
+    def test_images_take_the_place_of_files(self):
+        import cv2
+        import pandas
+        made = self.folder / "film"
+        al.simulate.underwater(video=True, frames=8, rate=30.0).save(made)
+        files = sorted(each for each in (made / "frames").iterdir() if each.suffix == ".png")
+        given = dict(rate_hz=30.0, camera=made / "camera.yaml", target=made / "target.yaml")
+        images = [cv2.imread(str(each), cv2.IMREAD_UNCHANGED) for each in files]
+        by_files, by_arrays = al.localize(made / "frames", **given), al.localize(images, **given)
+        for column in ("x_m", "y_m", "z_m"):
+            self.assertEqual(by_files.tables["trajectory"][column].tolist(), by_arrays.tables["trajectory"][column].tolist())
+        shots = self.folder / "photographed"
+        al.simulate.rangefinder(photos=True, shots=6).save(shots)
+        table = pandas.read_csv(shots / "shots.csv")
+        board = al.Board("9x6", square_m=0.04)
+        by_file = al.rangefinder(shots / "shots.csv", camera=shots / "camera.yaml", board=board)
+        named = [column for column in ("photo", "photo_off") if column in table]
+        for change in (lambda name: str(shots / name), lambda name: cv2.imread(str(shots / name), cv2.IMREAD_UNCHANGED)):
+            columns = {column: [change(cell) if column in named else cell for cell in table[column]] for column in table}
+            self.assertEqual(al.rangefinder(columns, camera=shots / "camera.yaml", board=board).origin_m.tolist(),
+                             by_file.origin_m.tolist())
+
     def test_wrong_use_is_a_value_error_in_the_commands_words(self):
         for work, words in ((lambda: al.track(rig="absent.yaml"), "events"), (lambda: al.observe("absent.csv"), "absent.csv"),
                             (lambda: al.track("absent.csv", rig="absent.yaml"), "absent.yaml"),

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <deque>
 #include <opencv2/core.hpp>
+#include <tuple>
 
 #include "alidade/board/board_pose.h"
 #include "alidade/board/dictionary.h"
@@ -16,6 +16,7 @@
 #include "alidade/capture/lens_so_far.h"
 #include "alidade/capture/pose_plan.h"
 #include "alidade/capture/pose_words.h"
+#include "alidade/capture/shown_pictures.h"
 
 namespace alidade {
 namespace {
@@ -26,10 +27,11 @@ constexpr double same_share = 0.04;    // of the board's size: a pose that is he
 constexpr double most_blur = 1.8;      // of the sharpest
 constexpr double sharp_px = 1.3;       // is never called blurred
 constexpr double least_gain = 0.004;   // of σ
-// Of the gain of the outline a picture must bring the share `choosy`, or `nearly` as much as the best that was shown
-// within `remembered_s`: who does not follow the outline shows what there is. Without a photo for long, less will do.
-constexpr double choosy = 0.6, nearly = 0.85, easy = 0.35;
-constexpr double looked_s = 3.0, remembered_s = 20.0, patient_s = 6.0, impatient_s = 20.0;
+// Of the gain of the outline a picture must bring the share `choosy`. Who does not follow the outline shows what there
+// is: the longer no photo was taken, the less will do, of all pictures that were shown; the newest is preferred where
+// it brings `nearly` as much.
+constexpr double choosy = 0.6, nearly = 0.85;
+constexpr double patient_s = 3.0, impatient_s = 8.0;
 
 std::uint64_t hash_of(const cv::Mat& picture) {
   std::uint64_t hash = 1469598103934665603u;  // FNV-1a, eight bytes at a time
@@ -91,47 +93,6 @@ std::vector<Eigen::Vector2d> outline_of(const Camera& camera, const std::vector<
 
 }  // namespace
 
-FieldList fields_of(CaptureConfig& config) {
-  TextCode code;
-  code.read = [&config](std::string text) -> std::string {
-    if (text.ends_with("px")) text.resize(text.size() - 2);
-    double value = 0.0;
-    Field number{.name = "until_px", .value = &value, .help = ""};
-    if (const std::string fault = set_field(number, text); !fault.empty()) return fault;
-    if (!(value >= 0.001 && value <= 100.0)) return "'" + text + "' is not within 0.001 to 100 px";
-    config.until_px = value;
-    return "";
-  };
-  code.write = [&config] { return fmt::format("{}px", config.until_px); };
-  return {{.name = "until_px",
-           .value = code,
-           .help = "Goal of --live: 3σ of a pixel in the worst place; there it ends",
-           .form = "PIXELS",
-           .option = "--until"}};
-}
-
-std::string_view sight_name(Sight sight) {
-  switch (sight) {
-    case Sight::nothing:
-      return "nothing";
-    case Sight::other_board:
-      return "other_board";
-    case Sight::moving:
-      return "moving";
-    case Sight::blurred:
-      return "blurred";
-    case Sight::same_pose:
-      return "same_pose";
-    case Sight::little:
-      return "little";
-    case Sight::repeated:
-      return "repeated";
-    case Sight::useful:
-      return "useful";
-  }
-  return "nothing";
-}
-
 struct CaptureGuide::State {
   State(const Board& given, const CaptureConfig& asked) : board(given), config(asked), looker(given) {
     solve_config = resolved(asked.calibrate);
@@ -156,16 +117,18 @@ struct CaptureGuide::State {
   BoardView still_view;  ///< Where the board has been since …
   std::optional<double> still_since_s, took_s;
   double sharpest_px = 1e9;
-  std::deque<std::pair<double, double>> shown;  ///< Time and share of the outline's gain, newest last, largest first.
-  std::optional<double> first_s;                ///< Time of the first that could have been taken.
+  ShownPictures shown;  ///< That could have been taken.
 
   void begin(const ImageSize& of_pictures);
   void look_closely(const cv::Mat& picture);
   void keep(BoardView view);
   void solve();
   void fill_state();
-  CaptureLook judge(double t_s);
-  [[nodiscard]] double asked_share(double gain, double t_s);
+  CaptureLook judge(const cv::Mat* picture, double t_s);
+  [[nodiscard]] double asked_share(double t_s) const;
+  [[nodiscard]] double gain_of(const BoardView& view) const;
+  [[nodiscard]] bool is_held(const BoardView& view) const;
+  [[nodiscard]] bool recalls(double t_s, CaptureLook& look) const;
   [[nodiscard]] bool stands_still(double t_s);
   [[nodiscard]] std::optional<Rigid3> pose_of(const BoardView& view) const;
   void say_way(const BoardView& view, CaptureLook& look) const;
@@ -201,6 +164,8 @@ void CaptureGuide::State::solve() {
   lens = lens_so_far(board, views, size, solve_config);
   plan.emplace(lens->camera, lens->board_points, lens->noise_px);
   plan->look_for_best(views);
+  shown.value([this](const BoardView& view) { return gain_of(view); },
+              [this](const BoardView& view) { return is_held(view); });
   fill_state();
 }
 
@@ -245,21 +210,33 @@ void CaptureGuide::State::say_way(const BoardView& view, CaptureLook& look) cons
   look.words_mirrored += (look.words_mirrored.empty() ? "" : ": ") + words_to(wanted, now, true);
 }
 
-/// Share of the outline's gain that a picture must bring now; remembers that of this one.
-double CaptureGuide::State::asked_share(double gain, double t_s) {
+/// Share of the outline's gain that a picture must bring now.
+double CaptureGuide::State::asked_share(double t_s) const {
   if (takes_what_comes) return 0.0;
-  if (!first_s) first_s = t_s;
-  const double share = plan->best_gain() > 0.0 ? gain / plan->best_gain() : 1.0;
-  double asked = choosy;
-  while (!shown.empty() && t_s - shown.front().first > remembered_s) shown.pop_front();
-  if (t_s - *first_s >= looked_s && !shown.empty()) asked = std::min(asked, nearly * shown.front().second);
-  while (!shown.empty() && shown.back().second <= share) shown.pop_back();
-  shown.emplace_back(t_s, share);
   const double late = std::clamp((t_s - *took_s - patient_s) / (impatient_s - patient_s), 0.0, 1.0);
-  return asked * (1.0 + late * (easy - 1.0));
+  return choosy * (1.0 - late);
 }
 
-CaptureLook CaptureGuide::State::judge(double t_s) {
+double CaptureGuide::State::gain_of(const BoardView& view) const {
+  const auto pose = pose_of(view);
+  return pose ? plan->gain_of(view, *pose) : 0.0;
+}
+
+bool CaptureGuide::State::is_held(const BoardView& view) const {
+  return std::ranges::any_of(views, [&](const BoardView& kept) { return is_same_pose(view, kept, same_share); });
+}
+
+/// Whether one of the pictures that were shown is to be taken now.
+bool CaptureGuide::State::recalls(double t_s, CaptureLook& look) const {
+  const ShownPicture* best = shown.best();
+  if (best == nullptr || best->gain < std::max(least_gain, asked_share(t_s) * plan->best_gain())) return false;
+  look.sight = Sight::useful;
+  look.words = look.words_mirrored = fmt::format("taken, as it was held {:.0f} s ago", t_s - best->t_s);
+  look.earlier = EarlierPicture{best->picture, best->view, best->t_s};
+  return true;
+}
+
+CaptureLook CaptureGuide::State::judge(const cv::Mat* picture, double t_s) {
   CaptureLook look;
   const auto say = [&](Sight sight, const std::string& words) {
     look.sight = sight;
@@ -268,6 +245,7 @@ CaptureLook CaptureGuide::State::judge(double t_s) {
   if (!seen.found()) {
     still_since_s.reset();
     const bool is_other = seen.other_grid.first > 0;
+    std::tie(look.other_cols, look.other_rows) = seen.other_grid;
     say(is_other ? Sight::other_board : Sight::nothing,
         is_other ? fmt::format("a board of {}×{} corners is in view, not of {}×{}", seen.other_grid.first,
                                seen.other_grid.second, board.cols, board.rows)
@@ -278,15 +256,12 @@ CaptureLook CaptureGuide::State::judge(double t_s) {
   if (!took_s) took_s = t_s;
   const bool is_still = stands_still(t_s);
   if (seen.blur_px > 0.0 && is_still) sharpest_px = std::min(sharpest_px, seen.blur_px);
-  const bool is_held =
-      std::ranges::any_of(views, [&](const BoardView& view) { return is_same_pose(seen.view, view, same_share); });
-  if (is_held) {
+  if (is_held(seen.view)) {
     say(Sight::same_pose, "same pose again");
     say_way(seen.view, look);
     return look;
   }
-  const auto pose = pose_of(seen.view);
-  look.gain = pose ? plan->gain_of(seen.view, *pose) : 0.0;
+  look.gain = gain_of(seen.view);
   if (!is_still) {
     say(Sight::moving, "");
     say_way(seen.view, look);
@@ -296,13 +271,16 @@ CaptureLook CaptureGuide::State::judge(double t_s) {
     say(Sight::blurred, fmt::format("blurred: σ {:.1f} px, the sharpest {:.1f} px", seen.blur_px, sharpest_px));
     return look;
   }
-  const double asked = std::max(least_gain, asked_share(look.gain, t_s) * plan->best_gain());
-  if (look.gain < asked) {
-    say(Sight::little, "");
-    say_way(seen.view, look);
+  const double asked = std::max(least_gain, asked_share(t_s) * plan->best_gain());
+  const ShownPicture* best = shown.best();
+  if (look.gain >= asked && (takes_what_comes || best == nullptr || look.gain >= nearly * best->gain)) {
+    say(Sight::useful, "taken");
     return look;
   }
-  say(Sight::useful, "taken");
+  if (look.gain >= least_gain) shown.offer(seen.view, picture, t_s, look.gain);
+  if (recalls(t_s, look)) return look;
+  say(Sight::little, "");
+  say_way(seen.view, look);
   return look;
 }
 
@@ -340,7 +318,7 @@ CaptureLook CaptureGuide::look(const cv::Mat& picture, double t_s) {
     state.seen = state.looker.look(picture);
     if (!state.seen.found() && !state.config.is_video) state.look_closely(picture);
   }
-  look = state.judge(t_s);
+  look = state.judge(&picture, t_s);
   if (is_repeated && !state.config.is_video) look.sight = Sight::repeated;
   return look;
 }
@@ -352,7 +330,10 @@ std::string CaptureGuide::take(const cv::Mat& picture) {
     return fmt::format("the picture is {}x{}, but the first was {}x{}", picture.cols, picture.rows, state.size.width_px,
                        state.size.height_px);
   BoardDetection found = find_board(picture, state.board);
-  if (!found.found()) return found.reason;
+  if (!found.found()) {
+    state.shown.drop(picture);
+    return found.reason;
+  }
   state.keep(std::move(found.view));
   return "";
 }
@@ -360,7 +341,7 @@ std::string CaptureGuide::take(const cv::Mat& picture) {
 CaptureLook CaptureGuide::push(const cv::Mat& picture, double t_s) {
   CaptureLook seen = look(picture, t_s);
   if (!seen.take()) return seen;
-  if (const std::string reason = take(picture); !reason.empty()) {
+  if (const std::string reason = take(seen.earlier ? *seen.earlier->picture : picture); !reason.empty()) {
     seen.sight = Sight::little;
     seen.words = seen.words_mirrored = reason;
   }
@@ -371,8 +352,8 @@ CaptureLook CaptureGuide::push(const BoardView& view, const ImageSize& size, dou
   State& state = *state_;
   state.begin(size);
   state.seen = {.view = view, .blur_px = 0.0, .reason = view.corners.empty() ? "no corners" : ""};
-  CaptureLook seen = state.judge(t_s);
-  if (seen.take()) state.keep(view);
+  CaptureLook seen = state.judge(nullptr, t_s);
+  if (seen.take()) state.keep(seen.earlier ? seen.earlier->view : view);
   return seen;
 }
 

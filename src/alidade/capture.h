@@ -49,13 +49,22 @@ enum class Sight {
 /// The word for it: "nothing", "other_board" …
 [[nodiscard]] std::string_view sight_name(Sight sight);
 
+/// A picture that was shown before.
+struct EarlierPicture {
+  std::shared_ptr<const cv::Mat> picture;  ///< Null where corners alone came.
+  BoardView view;
+  double t_s = 0.0;
+};
+
 /// What to do with a picture.
 struct CaptureLook {
   Sight sight = Sight::nothing;
   std::string words;                        ///< To the person, one line: what is wrong, or how to move the board.
   std::string words_mirrored;               ///< The same to who sees the picture mirrored.
   std::vector<Eigen::Vector2d> corners_px;  ///< As seen; empty where there is no board.
+  int other_cols = 0, other_rows = 0;       ///< Of other_board.
   double gain = 0.0;                        ///< ln of σ now over σ with it, over the image; 0: not known or none.
+  std::optional<EarlierPicture> earlier;    ///< To be taken in the place of this one: it told more.
   [[nodiscard]] bool take() const { return sight == Sight::useful; }
 };
 

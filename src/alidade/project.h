@@ -66,8 +66,8 @@ struct RigProjection {
   Status status = Status::projected;
   std::vector<HeadProjection> heads;
   std::optional<Eigen::Vector3d> point_in_world;  ///< As given. [m]
-  /// How well the heads that see the point tell where it is: by their encoders' noise and the errors of rig and lenses,
-  /// a pixel being exact. None where fewer than two see it. [m²]
+  /// How well the heads that see the point determine where it is: by their encoders' noise and the errors of rig and
+  /// lenses, a pixel being exact. None where fewer than two see it. [m²]
   std::optional<Eigen::Matrix3d> point_cov;
   Counts counts;  ///< Of heads.
   Verdict verdict;

@@ -71,7 +71,7 @@ std::optional<Rigid3> start_pose(const Camera& camera, const BoardView& view, st
   return Rigid3{Eigen::Quaterniond(R), H->col(2) * scale};
 }
 
-/// The other pose that looks nearly alike from far away: the normal mirrored at the view of the board's middle.
+/// The other pose that looks nearly alike from far away: the normal mirrored at the view of the board's centre.
 Rigid3 mirrored(const Rigid3& cam_from_board, const Eigen::Vector3d& middle_in_board) {
   const Eigen::Vector3d middle_in_cam = cam_from_board * middle_in_board;
   const Eigen::Vector3d view = middle_in_cam.normalized();

@@ -190,7 +190,7 @@ TEST(FindBoard, PlacesABoardCutByTheImageByTheBordersThatAreSeen) {
   }
   // Without any border in the image nobody can tell which part it is.
   const cv::Rect middle(static_cast<int>(truth[0].x()) - 14, static_cast<int>(truth[0].y()) - 14, 200, 120);
-  EXPECT_NE(find_board(photo(middle), board).reason.find("cannot be told which"), std::string::npos);
+  EXPECT_NE(find_board(photo(middle), board).reason.find("cannot be determined which"), std::string::npos);
 }
 
 TEST(FindBoard, SaysWhyThereIsNoBoard) {

@@ -1,9 +1,11 @@
 #include "alidade/board_detector/grid_border.h"
+#include "alidade/estimation/median.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <utility>
 #include <vector>
 
 #include "alidade/corners/corner_fit.h"
@@ -53,10 +55,7 @@ double typical_contrast(const cv::Mat& photo, const CornerGrid& grid) {
     const CornerFit fit = fit_at(photo, corner);
     if (fit.accepted()) contrasts.push_back(parity_sign(cell.first, cell.second) * fit.contrast);
   }
-  if (contrasts.empty()) return 0.0;
-  const auto middle = contrasts.begin() + static_cast<std::ptrdiff_t>(contrasts.size() / 2);
-  std::nth_element(contrasts.begin(), middle, contrasts.end());
-  return *middle;
+  return median_of(std::move(contrasts));
 }
 
 /// The corners of the line outside a side that can be fitted; empty if they are fewer than half.

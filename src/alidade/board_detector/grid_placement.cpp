@@ -168,7 +168,7 @@ PlacedGrid place_grid(const CornerGrid& grid, int cols, int rows, const GridBord
   } else if (placements.empty()) {
     placed.reason = "a grid of " + seen + " corners, not " + asked;
   } else {
-    placed.reason = "only " + seen + " of " + asked + " corners, and it cannot be told which";
+    placed.reason = "only " + seen + " of " + asked + " corners, and it cannot be determined which";
   }
   return placed;
 }

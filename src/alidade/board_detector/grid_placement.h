@@ -11,7 +11,7 @@ namespace alidade {
 /// Which sides of a grid are known to be the board's own border: i_min, i_max, j_min, j_max.
 using GridBorders = std::array<bool, 4>;
 
-/// A grid numbered as the board: key (column, row) from (0, 0); or the reason why that cannot be told.
+/// A grid numbered as the board: key (column, row) from (0, 0); or the reason why that cannot be determined.
 struct PlacedGrid {
   CornerGrid grid;
   std::string reason;

@@ -76,7 +76,7 @@ TEST(PlaceGrid, ForgetsAStrayLineOfFewCorners) {
 
 TEST(PlaceGrid, PlacesAPartOnlyWhereOnePlaceIsLeft) {
   const CornerGrid part = seen_board(9, 5, 0.0);  // the last row is missing
-  EXPECT_EQ(place_grid(part, 9, 6).reason, "only 9×5 of 9×6 corners, and it cannot be told which");
+  EXPECT_EQ(place_grid(part, 9, 6).reason, "only 9×5 of 9×6 corners, and it cannot be determined which");
   const PlacedGrid placed = place_grid(part, 9, 6, {false, false, true, false});  // the board's upper border is seen
   ASSERT_EQ(placed.reason, "");
   EXPECT_NEAR((place(placed, 0, 0) - Eigen::Vector2d(300, 200)).norm(), 0.0, 1e-9);

@@ -257,11 +257,12 @@ bool refuse_untold(const Work& work, CalibrateReport& report) {
     const double sigma = std::sqrt(report.model_cov(at, at));  // of what these views could tell at best
     if (sigma <= largest_told_sigma(name, values[at], report.camera)) continue;
     if (at < 4) {
-      refuse(report,
-             name + " cannot be told: its σ is " + std::to_string(static_cast<long>(std::min(sigma, 1e9))) + " px",
-             "tilt the board 20–45° in several directions and fill the image");
+      refuse(
+          report,
+          name + " cannot be determined: its σ is " + std::to_string(static_cast<long>(std::min(sigma, 1e9))) + " px",
+          "tilt the board 20–45° in several directions and fill the image");
     } else {
-      refuse(report, name + " cannot be told: its σ is " + std::to_string(sigma),
+      refuse(report, name + " cannot be determined: its σ is " + std::to_string(sigma),
              "hold the board at several distances, near ones too, and at the image's edges, or hold " + name +
                  " with --fix");
     }
@@ -373,7 +374,7 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
   // A port behind a known lens may be told from parallel boards: its σ will say.
   const bool lens_is_known = !is_central(held) && work.problem.free_lens.front() >= 4;
   if (!lens_is_known && spread_of_normals_rad(state.cam_from_board) < parallel_rad) {
-    refuse(report, "all boards are parallel: the focal length cannot be told from the distance",
+    refuse(report, "all boards are parallel: the focal length cannot be determined from the distance",
            "tilt the board 20–45° in several directions");
     return report;
   }

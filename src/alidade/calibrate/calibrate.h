@@ -34,13 +34,13 @@ struct ViewFit {
 struct CalibrateReport {
   enum class Status { converged, no_convergence, degenerate };
   Status status = Status::degenerate;
-  std::string reason;  ///< degenerate: what cannot be told, in one sentence; empty otherwise.
+  std::string reason;  ///< degenerate: what cannot be determined, in one sentence; empty otherwise.
   std::string to_add;  ///< degenerate: what to add.
   /// Lens, size, rms_px, and the covariance over all lens parameters: cluster-robust, as a photo's corners share
   /// errors.
   Camera camera;
   Eigen::MatrixXd model_cov;   ///< The same as if every corner erred by itself.
-  ClusterCovariance clusters;  ///< What tells the two apart; its clusters are the views in use, in order.
+  ClusterCovariance clusters;  ///< Why the two differ; its clusters are the views in use, in order.
   std::vector<ViewFit> views;
   std::vector<Eigen::Vector3d> board_points;  ///< [m] as solved (flat: as printed).
   std::vector<double> board_sigma_z_m;        ///< σ of their z [m]; empty for a flat or given board.
@@ -57,7 +57,7 @@ struct CalibrateReport {
 /// Whether outliers are looked for among corners that have covariances, or have none.
 [[nodiscard]] bool rejects_outliers(const CalibrateConfig& config, bool have_covariances);
 
-/// Noise [px] of a corner that, all independent, would tell as little as corners that share errors do: what one more
+/// Noise [px] of a corner that, all independent, would inform as little as corners that share errors do: what one more
 /// photo is worth.
 [[nodiscard]] double shared_noise_px(const CalibrateReport& report);
 

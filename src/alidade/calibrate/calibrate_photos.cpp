@@ -123,7 +123,7 @@ std::optional<WrongBoard> told_wrongly(const std::vector<std::size_t>& in_vain, 
   const auto meant = guess_board(in_vain.size(), load, told, grids_seen(told, result), progress);
   if (meant) {
     const std::string options = changed_options(told, *meant);
-    return WrongBoard{"the photos do not show the board as told, " + std::to_string(told.cols) + "×" +
+    return WrongBoard{"the photos do not show the board as given, " + std::to_string(told.cols) + "×" +
                           std::to_string(told.rows) + (told.dictionary.empty() ? "" : " with " + told.dictionary),
                       "use " + options + ": that board stands in them"};
   }

@@ -122,7 +122,7 @@ TEST(CalibratePhotos, ABoardToldInSquaresIsNamedInInnerCorners) {
   squares.rows += 1;
   const auto result = calibrate_photos(photos().names, photos().loader(), squares, {});
   EXPECT_EQ(result.report.status, CalibrateReport::Status::degenerate);
-  EXPECT_EQ(result.report.reason, "the photos do not show the board as told, 10×7");
+  EXPECT_EQ(result.report.reason, "the photos do not show the board as given, 10×7");
   EXPECT_EQ(result.report.to_add, "use --board 9x6: that board stands in them");
 }
 

@@ -19,7 +19,7 @@ ALIDADE_PUBLIC_BEGIN
 /// `study` and `next` are empty where there is no camera.
 struct Calibration : CalibrateReport {
   Board board;
-  std::vector<BoardView> board_views;  ///< The corners, one entry per photo; `views` tells what became of each.
+  std::vector<BoardView> board_views;  ///< The corners, one entry per photo; `views` says what became of each.
   ImageSize size;                      ///< That most photos have; 0x0 where none could be read.
   std::size_t num_unreadable = 0;      ///< Photos that could not be read.
   CalibrateConfig config;              ///< As used: a shape that does not transfer is not used.

@@ -37,7 +37,7 @@ struct PortKnowledge {
       air;              ///< The lens as calibrated in air (pinhole or brown), held. None: it is estimated as well.
   double gap_m = 0.02;  ///< A start.
   std::optional<double> glass_m;         ///< Held; must be given.
-  double n_glass = 1.5, n_water = 1.34;  ///< Held: the photos hardly tell them from the gap.
+  double n_glass = 1.5, n_water = 1.34;  ///< Fixed: the photos hardly separate them from the gap.
 };
 
 /// Options of calibrate(). Plain data with usable defaults: `calibrate(board, views, size, {})` is a sensible call.

@@ -33,7 +33,8 @@ struct ShapeTransfer {
 [[nodiscard]] std::vector<BoardView> every_other(std::span<const BoardView> views, std::size_t parity);
 
 /// Tests a bow and, unless a bow is what was asked for, every point free, against a flat board or, with
-/// BoardShape::given, `given_points` [m]. Empty for fewer than six photos; a shape that a half cannot tell is omitted.
+/// BoardShape::given, `given_points` [m]. Empty for fewer than six photos; a shape that a half does not determine is
+/// omitted.
 [[nodiscard]] std::vector<ShapeTransfer> test_shape_transfer(const Board& board, std::span<const BoardView> views,
                                                              ImageSize size, const CalibrateConfig& config,
                                                              std::span<const Eigen::Vector3d> given_points = {});

@@ -1,7 +1,9 @@
 #include "alidade/calibrate/study.h"
+#include "alidade/estimation/median.h"
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "alidade/calibrate/checks/heldout.h"
 #include "alidade/calibrate/checks/residual_structure.h"
@@ -16,9 +18,7 @@ double median_distance_m(const CalibrateReport& report) {
   for (const ViewFit& view : report.views) {
     if (view.used) distances.push_back(view.cam_from_board.translation.norm());
   }
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return median_of(std::move(distances));
 }
 
 /// Both halves calibrated apart, on one board shape.

@@ -53,7 +53,7 @@ struct CalibrationStudy {
   std::optional<Halves> halves;      ///< None for fewer than six photos.
   std::vector<HeldOutModel> models;  ///< Empty for fewer than six photos.
   std::optional<ShapeTransfer>
-      transfer;  ///< Of the shape in use, else of the one that tells most; none for few photos.
+      transfer;  ///< Of the shape in use, else of the most informative one; none for few photos.
 };
 
 /// Residual structure, σ maps, halves and held-out error of other models; `transfer` is passed on. `report` must have

@@ -22,7 +22,7 @@ class PosePlan {
 
   [[nodiscard]] double worst_3sigma_px() const { return 3.0 * now_.worst_px; }
   [[nodiscard]] Eigen::Vector2d worst_px() const { return map_.px(now_.at); }
-  /// ln of σ now over σ with that view; 0 where it cannot be told. 0.01: one percent.
+  /// ln of σ now over σ with that view; 0 where it cannot be determined. 0.01: one percent.
   [[nodiscard]] double gain_of(const BoardView& view, const Rigid3& cam_from_board) const;
 
   /// Tries poses all over the image: which is the best, and what would it bring. None as in `kept`: their errors would
@@ -31,7 +31,7 @@ class PosePlan {
   [[nodiscard]] const std::optional<Rigid3>& best() const { return best_; }
   [[nodiscard]] double best_gain() const { return best_gain_; }
   /// How many photos are likely needed until 3σ is below the goal in the worst place, each the best of its time but
-  /// for what a person does to it. None where that cannot be told.
+  /// for what a person does to it. None where that cannot be determined.
   [[nodiscard]] std::optional<int> photos_until(double goal_3sigma_px) const;
 
  private:

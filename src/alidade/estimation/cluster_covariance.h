@@ -26,7 +26,7 @@ struct ClusterStep {
 [[nodiscard]] ClusterStep cluster_step(const Eigen::MatrixXd& inverse, const Eigen::MatrixXd& information,
                                        const Eigen::VectorXd& gradient);
 
-/// Covariance of an estimate whose errors are shared within clusters, and what tells it from the model's.
+/// Covariance of an estimate whose errors are shared within clusters, and why it differs from the model's.
 struct ClusterCovariance {
   Eigen::MatrixXd cov;                 ///< To be stated; nowhere below the model's.
   Eigen::VectorXd inflation;           ///< σ over the model's σ, one per parameter; 1 for a parameter that is held.
@@ -43,7 +43,7 @@ struct ClusterCovariance {
 
 /// Cluster-robust covariance. `inverse` is H⁻¹ of the parameters asked for, `noise_variance` the variance s² of the
 /// whitened residuals by their own degrees of freedom: s² H⁻¹ is the model's covariance. Parameters with a zero
-/// diagonal are held. Fewer than `min_clusters` clusters tell nothing: the model's covariance comes back.
+/// diagonal are held. Fewer than `min_clusters` clusters determine nothing: the model's covariance comes back.
 ///
 /// In parameters in which H⁻¹ = 1 a cluster has the share h = C Cᵀ of the information and the step d; by the model the
 /// covariance of y = C⁻¹ d is s² (1 − m), m the leverage of the whole fit. x = C (1 − m)^(−1/2) y/s makes the scatter

@@ -9,7 +9,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Exit codes, the same for every command, so that scripts can tell "bad input" from "no answer" from "our bug".
+/// Exit codes, the same for every command, so that scripts can distinguish "bad input" from "no answer" from "our bug".
 enum class ExitCode : int {
   ok = 0,
   internal_error = 1,

@@ -281,6 +281,12 @@ std::string Csv::where(std::size_t row, const std::string& column) const {
   return CsvPlace{name_, lines_.at(row), column}.text();
 }
 
+void Csv::set_only_row(CsvRow row) {
+  lines_.assign(1, row.line);
+  rows_.resize(1);
+  rows_.front() = std::move(row.cells);
+}
+
 CsvStream::CsvStream(std::istream& in, std::string name) : in_(in), name_(std::move(name)) {
   std::optional<CsvRow> header = next_with_content();
   if (!header) throw_empty(name_);
@@ -288,6 +294,14 @@ CsvStream::CsvStream(std::istream& in, std::string name) : in_(in), name_(std::m
   header_ = std::move(header->cells);
   header_line_ = header->line;
   blank_line_ = 0;
+}
+
+Csv CsvStream::empty_table() const {
+  Csv csv;
+  csv.name_ = name_;
+  csv.header_ = header_;
+  csv.columns_ = columns_of({header_, header_line_}, name_);
+  return csv;
 }
 
 std::optional<CsvRow> CsvStream::next() {

@@ -29,6 +29,11 @@ struct CsvPlace {
 /// Text as a cell: quoted where it must be.
 [[nodiscard]] std::string csv_cell(const std::string& text);
 
+struct CsvRow {
+  std::vector<std::string> cells;
+  std::size_t line = 1;  ///< Where it begins.
+};
+
 /// A CSV file as read: header names and text cells. The ONE reader of tables; every fault names file, line and column.
 class Csv {
  public:
@@ -57,17 +62,16 @@ class Csv {
   /// "file:line: column 'name'" of a cell, to begin a message with.
   [[nodiscard]] std::string where(std::size_t row, const std::string& column) const;
 
+  /// That row alone is the table from now on, its number 0: of a stream, whose faults name its lines.
+  void set_only_row(CsvRow row);
+
  private:
+  friend class CsvStream;
   std::string name_;
   std::vector<std::string> header_;
   std::map<std::string, std::size_t> columns_;
   std::vector<std::vector<std::string>> rows_;
   std::vector<std::size_t> lines_;
-};
-
-struct CsvRow {
-  std::vector<std::string> cells;
-  std::size_t line = 1;  ///< Where it begins.
 };
 
 /// Such a table row by row, as it arrives: nothing is waited for beyond the end of the line that is asked for.
@@ -79,6 +83,8 @@ class CsvStream {
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const std::vector<std::string>& header() const { return header_; }
   [[nodiscard]] std::size_t header_line() const { return header_line_; }
+  /// A table with this header and no rows.
+  [[nodiscard]] Csv empty_table() const;
   /// The next row, as long as the header; none at the end. Throws InputError; the call after that goes on behind the
   /// fault.
   [[nodiscard]] std::optional<CsvRow> next();

@@ -4,84 +4,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <condition_variable>
-#include <mutex>
 #include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
-#include <thread>
 
 #include "alidade/estimation/config_error.h"
 #include "alidade/estimation/median.h"
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
+#include "alidade/heads/streams/frame_follower.h"
 #include "alidade/heads/turn_log.h"
 #include "alidade/observe.h"
 #include "alidade/tables/rotation_log_file.h"
 
 namespace alidade {
 namespace {
-
-cv::Mat grey_of(const cv::Mat& image) {
-  cv::Mat grey = image;
-  if (image.channels() == 3) cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
-  return grey;
-}
-
-/// Follows points on a thread of its own, so that the head is asked in time.
-class FrameFollower {
- public:
-  FrameFollower() : tracker_(PointTrackerConfig{.max_tracks = 120}), worker_([this] { work(); }) {}
-  ~FrameFollower() {
-    {
-      const std::scoped_lock lock(mutex_);
-      ends_ = true;
-    }
-    changed_.notify_all();
-    worker_.join();
-  }
-  FrameFollower(const FrameFollower&) = delete;
-  FrameFollower& operator=(const FrameFollower&) = delete;
-
-  void push(StreamFrame frame) {
-    {
-      const std::scoped_lock lock(mutex_);
-      waiting_.push_back(std::move(frame));
-    }
-    changed_.notify_all();
-  }
-  /// Waits until all frames have been looked at.
-  const std::vector<SeenFrame>& seen() {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return waiting_.empty() && !is_busy_; });
-    return seen_;
-  }
-
- private:
-  void work() {
-    std::unique_lock lock(mutex_);
-    for (;;) {
-      changed_.wait(lock, [this] { return ends_ || !waiting_.empty(); });
-      if (ends_) return;
-      const StreamFrame frame = std::move(waiting_.front());
-      waiting_.pop_front();
-      is_busy_ = true;
-      lock.unlock();
-      SeenFrame seen{frame.t_s, tracker_.update(grey_of(*frame.image))};
-      lock.lock();
-      is_busy_ = false;
-      seen_.push_back(std::move(seen));
-      changed_.notify_all();
-    }
-  }
-
-  PointTracker tracker_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<StreamFrame> waiting_;
-  std::vector<SeenFrame> seen_;
-  bool is_busy_ = false, ends_ = false;
-  std::thread worker_;  // last: it uses the others
-};
 
 /// What `alidade` with the words of `offline` says of log.csv, down to the last digit: it is read back from its text.
 ObserveReport observed(const std::string& log_csv, int width_px, int height_px) {
@@ -129,6 +64,10 @@ class Session {
     result_.head_time_s = head_time();
     result_.sigma_clock_s = clock_sigma();
     estimate();
+    result_.times = follower_.times();
+    result_.sigma_frame_s = follower_.sigma_s();
+    result_.num_jumps = follower_.stamps().is_jumping() ? follower_.stamps().num_jumps() : 0;
+    result_.largest_jump_s = follower_.stamps().largest_s();
   }
 
  private:
@@ -164,7 +103,6 @@ class Session {
     for (StreamFrame& frame : stream_.take()) {
       last_frame_s_ = head_.now_s();
       ++result_.num_frames;
-      result_.is_stamped = frame.is_stamped;
       result_.width_px = frame.image->cols;
       result_.height_px = frame.image->rows;
       follower_.push(std::move(frame));
@@ -208,6 +146,7 @@ class Session {
       if (at() != before) still_since = head_.now_s();
       before = at();
     }
+    tell_so_far();
   }
   void note_rate() {
     constexpr std::size_t back = 5;
@@ -246,14 +185,27 @@ class Session {
   }
 
   void estimate() {
-    const std::vector<SeenFrame>& seen = follower_.seen();
-    const double origin_s = readings_.front().t_s;
-    result_.log_csv = rotation_log_csv(turn_log(readings_, seen, late_s_, origin_s));
+    result_.log_csv = log_of(follower_.seen());
     result_.report = observed(result_.log_csv, result_.width_px, result_.height_px);
     for (const ObservedQuantity& each : result_.report.quantities) {
       if (each.name == "delay_s") late_s_ = std::clamp(-each.value, -1.0, 1.0);
       if (each.name == "fx") focal_px_ = each.value;
     }
+    tell_so_far();
+  }
+  [[nodiscard]] std::string log_of(const std::vector<SeenFrame>& seen) const {
+    const RotationLog now = turn_log(readings_, seen, late_s_, readings_.front().t_s);
+    return rotation_log_csv(config_.before ? joined_logs(*config_.before, now) : now);
+  }
+  /// Whoever kills this process finds what was measured until a few seconds ago.
+  void tell_so_far() {
+    constexpr double pause_s = 3.0;
+    if (!config_.on_so_far || readings_.empty()) return;
+    if (head_.now_s() - told_s_ < pause_s) return;
+    told_s_ = head_.now_s();
+    result_.log_csv = log_of(follower_.seen_so_far());
+    result_.head_time_s = head_time();
+    config_.on_so_far(result_);
   }
 
   /// Of an axis that is held nothing is told until the end: whether something is, costs the most time to say.
@@ -315,9 +267,24 @@ class Session {
   HeadCalibration& result_;
   FrameFollower follower_;
   std::vector<HeadPosition> readings_;
-  double begin_s_ = 0.0, next_s_ = 0.0, last_frame_s_ = 0.0, rate_ = 0.0, late_s_ = 0.0, focal_px_ = 0.0;
+  double begin_s_ = 0.0, next_s_ = 0.0, last_frame_s_ = 0.0, told_s_ = 0.0, rate_ = 0.0, late_s_ = 0.0, focal_px_ = 0.0;
   std::size_t num_corners_ = 0;
 };
+
+/// Frames whose time stamps were of no use: said, and what was taken instead.
+void heed_stamps(const HeadCalibration& result, Verdict& verdict) {
+  if (result.num_jumps == 0) return;
+  Check check{.name = "time stamps",
+              .state = State::care,
+              .text = fmt::format(
+                  "the stream's time stamps jump ({} times, by up to {:.2g} s); when frames came was taken instead",
+                  result.num_jumps, result.largest_jump_s),
+              .value = result.largest_jump_s,
+              .unit = "s"};
+  verdict.sentence += "; " + check.text;
+  verdict.checks.push_back(std::move(check));
+  if (verdict.state == State::good) verdict.state = State::care;
+}
 
 /// Which focal length is not known as well as was asked, and why not.
 Verdict calibration_verdict(const HeadCalibration& result, const HeadCalibrationConfig& config,
@@ -343,10 +310,11 @@ Verdict calibration_verdict(const HeadCalibration& result, const HeadCalibration
   }
   const bool holds_pan = span_rad[0] < held_rad, holds_tilt = span_rad[1] < held_rad;
   if (!has_answer && (holds_pan || holds_tilt)) {
-    verdict.sentence = fmt::format("{} cannot be told: {} is held; {}", holds_tilt ? "fy" : "fx",
+    verdict.sentence = fmt::format("{} cannot be determined: {} is held; {}", holds_tilt ? "fy" : "fx",
                                    holds_tilt ? "tilt" : "pan", verdict.sentence);
     verdict.to_add = fmt::format("give --{}-range more room", holds_tilt ? "tilt" : "pan");
   }
+  heed_stamps(result, verdict);
   if (missing.empty()) return verdict;
   verdict.state = State::refused;
   verdict.exit_code = ExitCode::cannot_tell;
@@ -358,6 +326,26 @@ Verdict calibration_verdict(const HeadCalibration& result, const HeadCalibration
 }
 
 }  // namespace
+
+std::vector<std::string> offline_words(const HeadCalibration& result) {
+  return {"observe",    "log.csv",        "--size",    fmt::format("{}x{}", result.width_px, result.height_px),
+          "--estimate", "k1,mount,delay", "--no-zoom", "--method",
+          "batch"};
+}
+
+RotationLog joined_logs(const RotationLog& before, const RotationLog& now) {
+  constexpr double pause_s = 60.0;
+  RotationLog both = before;
+  both.num_points = before.num_points + now.num_points;
+  const double begin_s = before.rows.empty() ? 0.0 : std::ceil(before.rows.back().t_s + pause_s);
+  for (RotationRow& row : both.rows) row.px.resize(both.num_points, Eigen::Vector2d::Constant(not_seen));
+  for (RotationRow row : now.rows) {
+    row.t_s += begin_s - now.rows.front().t_s;
+    row.px.insert(row.px.begin(), before.num_points, Eigen::Vector2d::Constant(not_seen));
+    both.rows.push_back(std::move(row));
+  }
+  return both;
+}
 
 HeadCalibration calibrate_head(HeadDevice& device, FrameStream& stream, const HeadCalibrationConfig& config,
                                const Progress& progress) {
@@ -372,10 +360,7 @@ HeadCalibration calibrate_head(HeadDevice& device, FrameStream& stream, const He
     span = head.high_rad() - head.low_rad();
     Session(head, stream, config, progress, result).run();
   }
-  result.offline = {
-      "observe",    "log.csv",        "--size",    fmt::format("{}x{}", result.width_px, result.height_px),
-      "--estimate", "k1,mount,delay", "--no-zoom", "--method",
-      "batch"};
+  result.offline = offline_words(result);
   result.verdict = calibration_verdict(result, config, span);
   return result;
 }

@@ -1,20 +1,27 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "alidade/heads/frame_stream.h"
 #include "alidade/heads/head_survey.h"
+#include "alidade/heads/streams/frame_stream.h"
 #include "alidade/observe/report.h"
 
 namespace alidade {
+
+struct HeadCalibration;
 
 struct HeadCalibrationConfig {
   HeadRange range;
   /// Until 3σ of fx and fy are this share of them; none: for as long as its usual moves take.
   std::optional<double> until;
   double most_s = 85.0;  ///< For which the head is held.
+  /// What an earlier run of the same head and camera measured: counts as well.
+  std::optional<RotationLog> before = {};
+  /// What is known so far, every few seconds: its log, and the estimate where there is one.
+  std::function<void(const HeadCalibration&)> on_so_far = {};
 };
 
 /// What a head and its camera tell while the head moves.
@@ -22,7 +29,10 @@ struct HeadCalibration {
   std::string url, stream;
   int width_px = 0, height_px = 0;
   std::size_t num_frames = 0, num_moves = 0;
-  bool is_stamped = false;  ///< Frames say when they were taken.
+  FrameTimes times = FrameTimes::arrival;
+  double sigma_frame_s = 0.0;  ///< Of a frame's time, but for what all are late alike.
+  std::size_t num_jumps = 0;   ///< Of time stamps, which therefore were not used; 0: they were, or there are none.
+  double largest_jump_s = 0.0;
   double head_time_s = 0.0;
   double sigma_clock_s =
       0.0;              ///< Of the head's times against the frames'; in σ of the delay beside what the log tells.
@@ -32,6 +42,11 @@ struct HeadCalibration {
   ObserveReport report;
   Verdict verdict;
 };
+
+/// The words of `HeadCalibration::offline`.
+[[nodiscard]] std::vector<std::string> offline_words(const HeadCalibration& result);
+/// Two logs of one head and camera, one after the other; points of one are not those of the other.
+[[nodiscard]] RotationLog joined_logs(const RotationLog& before, const RotationLog& now);
 
 /// Moves the head, follows points in what its camera sees, and estimates until the goal or the time is reached; moves
 /// are planned by what is known so far. Throws InputError, Interrupted: the head stands then.

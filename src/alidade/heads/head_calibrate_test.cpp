@@ -41,7 +41,7 @@ TEST(HeadCalibrate, LensMountingAndDelayWithinThreeSigma) {
   const HeadCalibration result = calibrated("rate=8", {.range = range_of(60, -20, 40), .until = 0.003});
   ASSERT_EQ(result.verdict.exit_code, ExitCode::ok) << result.verdict.sentence;
   EXPECT_LT(result.head_time_s, 90.0);
-  EXPECT_TRUE(result.is_stamped);
+  EXPECT_EQ(result.times, FrameTimes::stamped);
   const SimulatedCamera truth = simulated_camera(camera_words, "test");
   const std::vector<std::pair<std::string, double>> truths{{"fx", truth.fx},
                                                            {"fy", truth.fy},

@@ -9,7 +9,10 @@
 
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/heads/rotctl_head.h"
+#include "alidade/heads/protocols/indi_head.h"
+#include "alidade/heads/protocols/line_socket.h"
+#include "alidade/heads/protocols/onvif_head.h"
+#include "alidade/heads/protocols/rotctl_head.h"
 #include "alidade/heads/simulated_head.h"
 
 namespace alidade {
@@ -65,9 +68,14 @@ bool HeadLimits::hold(const Eigen::Vector2d& at) const {
 
 std::unique_ptr<HeadDevice> open_head(const std::string& url, const HeadOptions& options) {
   if (url.starts_with("rotctl://")) return open_rotctl(url, options);
+  if (url.starts_with("onvif://")) return open_onvif(url, options);
+  if (url.starts_with("indi://")) return open_indi(url, options);
   if (url.starts_with("sim://")) return open_simulated_head(url);
-  throw InputError("'" + url + "' is no head: give rotctl://HOST:PORT or sim://");
+  throw InputError("'" + without_password(url) +
+                   "' is no head: give rotctl://HOST:PORT, onvif://USER@HOST, indi://HOST:PORT/DEVICE or sim://");
 }
+
+void HeadDevice::zoom_to(double) { throw InputError(name() + ": has no zoom that can be told"); }
 
 MovingHead::MovingHead(HeadDevice& device, const Eigen::Vector2d& low_rad, const Eigen::Vector2d& high_rad,
                        Progress progress)
@@ -136,6 +144,13 @@ HeadSent MovingHead::command(const Eigen::Vector2d& pan_tilt_rad) {
   next_question_s_ += 1.0 / max_calls_hz;  // a command asks before
   if (on_command) on_command(sent, pan_tilt_rad);
   return sent;
+}
+
+void MovingHead::zoom_to(double share) {
+  heed_interrupt();
+  keep_pace();
+  has_moved_ = true;
+  device_.zoom_to(std::clamp(share, 0.0, 1.0));
 }
 
 void MovingHead::stop() {

@@ -52,16 +52,21 @@ class HeadDevice {
   virtual HeadSent command(const Eigen::Vector2d& pan_tilt_rad) = 0;
   /// Tries a new connection where the old one is gone.
   virtual HeadSent stop() = 0;
+  /// 0 the widest … 1 the narrowest; none: no zoom that can be asked.
+  [[nodiscard]] virtual std::optional<double> zoom() { return std::nullopt; }
+  virtual void zoom_to(double share);
 
   [[nodiscard]] virtual const std::string& name() const = 0;  ///< To begin a message with; without a password.
   [[nodiscard]] virtual HeadClock& clock() = 0;
 };
 
 struct HeadOptions {
+  std::string password;    ///< For who is named in the URL; appears in no message.
   double timeout_s = 0.5;  ///< Of every call: a head that moves and says nothing is stopped after it.
 };
 
-/// The head of a URL: rotctl://HOST:PORT, sim://?seed=3. Throws InputError: no such protocol, nobody answers.
+/// The head of a URL: rotctl://HOST:PORT, onvif://USER@HOST, indi://HOST:PORT/DEVICE, sim://?seed=3. Throws InputError:
+/// no such protocol, nobody answers.
 [[nodiscard]] std::unique_ptr<HeadDevice> open_head(const std::string& url, const HeadOptions& options = {});
 
 /// Holds a head that may move: within angles, asked not too often, and stopped when this ends, whatever ended it.
@@ -76,6 +81,7 @@ class MovingHead {
 
   [[nodiscard]] HeadPosition position();
   HeadSent command(const Eigen::Vector2d& pan_tilt_rad);
+  void zoom_to(double share);
   /// Stops the head; throws InputError where that fails.
   void stop();
   /// Until then. Throws Interrupted after Ctrl-C.

@@ -16,7 +16,7 @@
 namespace alidade {
 namespace {
 
-constexpr double command_s = 0.125, question_s = 0.05;
+constexpr double command_every_s = 0.125, ask_every_s = 0.05;
 constexpr double far_m = 1e6;  // bearings alone count
 
 /// Pan and tilt at a time, between two readings.
@@ -52,10 +52,10 @@ class Follower {
       report_progress(progress_, "following: s of head time", static_cast<std::size_t>(head_.now_s() - begin_s_), 0);
       head_.wait_until(next_question_s);
       (void)head_.position();
-      next_question_s = head_.now_s() + question_s;
+      next_question_s = head_.now_s() + ask_every_s;
       look();
       if (head_.now_s() < next_command_s) continue;
-      next_command_s = head_.now_s() + command_s;
+      next_command_s = head_.now_s() + command_every_s;
       aim_head();
     }
     head_.stop();
@@ -125,7 +125,7 @@ class Follower {
       is_following_ = false;
       return;
     }
-    const double acts_s = now_s + config_.latency_s + command_s;
+    const double acts_s = now_s + config_.latency_s + command_every_s;
     Eigen::Vector2d target(axes_[0].at(acts_s).angle_rad, axes_[1].at(acts_s).angle_rad);
     target = target.cwiseMax(head_.low_rad()).cwiseMin(head_.high_rad());
     head_.command(target);

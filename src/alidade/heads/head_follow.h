@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "alidade/heads/frame_stream.h"
 #include "alidade/heads/head_survey.h"
+#include "alidade/heads/streams/frame_stream.h"
 #include "alidade/pantilt/head.h"
 #include "alidade/target/target_detector.h"
 
@@ -13,8 +13,8 @@ namespace alidade {
 struct HeadFollowConfig {
   HeadRange range;
   double most_s = 60.0;     ///< For which the head is held.
-  double latency_s = 0.05;  ///< From a command to its first effect: as --identify tells it.
-  double delay_s = 0.0;     ///< A frame shows the angles of so much later than its time: as --calibrate tells it.
+  double latency_s = 0.05;  ///< From a command to its first effect: as --identify estimates it.
+  double delay_s = 0.0;     ///< A frame shows the angles of so much later than its time: as --calibrate estimates it.
 };
 
 /// A frame and what was seen in it.

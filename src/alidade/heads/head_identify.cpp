@@ -16,6 +16,11 @@ constexpr double question_s = 0.045;    // a head that moves only while it is no
 constexpr double longest_move_s = 5.0;  // of a slow head
 constexpr double widest_rad = 125.0 * degree;
 
+/// Thrown where the head does what makes all further moves useless.
+struct HeadLies {
+  std::string what;
+};
+
 /// One head, moved step by step, and what it reads meanwhile.
 class Experiment {
  public:
@@ -40,14 +45,19 @@ class Experiment {
     ask_for(0.4);
     start_ = last().pan_tilt_rad;
     place_window();
-    wake();
-    steps();
-    chirp();
-    const double until_s = head_.now_s();
-    for (PositionerLog& each : result_.logs) each.used_until_s = until_s;
-    small_steps();
-    repeat();
-    move_to(start_.cwiseMax(head_.low_rad()).cwiseMin(head_.high_rad()));
+    try {
+      wake();
+      steps();
+      chirp();
+      const double until_s = head_.now_s();
+      for (PositionerLog& each : result_.logs) each.used_until_s = until_s;
+      small_steps();
+      repeat();
+      move_to(start_.cwiseMax(head_.low_rad()).cwiseMin(head_.high_rad()));
+      result_.zoom = try_zoom(head_);
+    } catch (const HeadLies& lie) {
+      result_.lie = lie.what;
+    }
     head_.stop();
     result_.head_time_s = head_.now_s() - begin_s_;
   }
@@ -92,8 +102,27 @@ class Experiment {
     next_s_ = head_.now_s() + question_s;
   }
   void move_to(const Eigen::Vector2d& target) {
+    const Eigen::Vector2d before = last().pan_tilt_rad;
+    const std::size_t first = log(0).readings.size();
     send(target);
     ask_until_rest(patience_s_, 0.35);
+    for (int i = 0; i < 2; ++i) heed_standing(i, before[i], first);
+  }
+  /// A reading that stands through several commands, each far beyond any dead band, is none.
+  void heed_standing(int axis, double before, std::size_t first) {
+    constexpr double long_way_rad = 1.9 * degree;
+    constexpr int most = 3;
+    const PositionerLog& it = log(axis);
+    const double way = it.commands.back().target_rad - before;
+    const bool stands = std::all_of(it.readings.begin() + static_cast<std::ptrdiff_t>(first), it.readings.end(),
+                                    [&](const PositionerReading& each) { return each.angle_rad == before; });
+    int& count = num_standing_[static_cast<std::size_t>(axis)];
+    if (!stands) count = 0;
+    if (!stands || std::abs(way) < long_way_rad || ++count < most) return;
+    throw HeadLies{
+        fmt::format("{} reads {:.3f}° through {} commands of {:.1f}° and more, after it had moved: its reading "
+                    "is frozen, or positions are refused silently",
+                    head_axis_names[static_cast<std::size_t>(axis)], before / degree, most, long_way_rad / degree)};
   }
 
   /// The middle of what is free, no wider than is needed, and with the start in it.
@@ -120,10 +149,9 @@ class Experiment {
     for (int i = 0; i < 2; ++i) {
       const PositionerLog& axis = log(i);
       if (std::abs(axis.readings.back().angle_rad - axis.readings.front().angle_rad) < 0.25 * std::abs(step[i]))
-        throw InputError(fmt::format(
-            "{}: took a command of {:.2f}° of {} and did not move; positions are refused "
-            "silently, or its reading stands",
-            head_.device().name(), std::abs(step[i]) / degree, head_axis_names[static_cast<std::size_t>(i)]));
+        throw HeadLies{fmt::format(
+            "{} took a command of {:.2f}° and did not move: positions are refused silently, or its reading stands",
+            head_axis_names[static_cast<std::size_t>(i)], std::abs(step[i]) / degree)};
       slow_rate_[i] = slowest_rate(axis, begin);
     }
     for (PositionerLog& axis : result_.logs) axis.used_from_s = head_.now_s();
@@ -249,6 +277,7 @@ class Experiment {
   HeadIdentification& result_;
   const Progress& progress_;
   double begin_s_ = 0.0, next_s_ = 0.0, chance_ = 0.3, patience_s_ = 0.7;
+  std::array<int, 2> num_standing_{};
   Eigen::Vector2d start_, low_, high_, window_low_, window_high_, toward_, slow_rate_;
 };
 
@@ -265,7 +294,7 @@ HeadIdentification identify_head(HeadDevice& device, const HeadRange& range, con
     result.high_rad = head.high_rad();
     Experiment(head, result, progress).run();
   }
-  for (std::size_t i = 0; i < 2; ++i) {
+  for (std::size_t i = 0; i < 2 && result.lie.empty(); ++i) {
     report_progress(progress, "fitting: axis", i + 1, 2);
     result.axes[i] = fit_positioner(result.logs[i]);
   }

@@ -15,6 +15,8 @@ struct HeadIdentification {
   std::array<PositionerFit, 2> axes;
   double head_time_s = 0.0;
   Eigen::Vector2d low_rad, high_rad;  ///< Where it was allowed to go.
+  std::string lie;                    ///< Why nothing can be told; empty: it can.
+  ZoomTrial zoom;
   Verdict verdict;
 };
 inline constexpr std::array<const char*, 2> head_axis_names{"pan", "tilt"};
@@ -23,6 +25,9 @@ inline constexpr std::array<const char*, 2> head_axis_names{"pan", "tilt"};
 /// is asked at most 40 times a second. Ends where it began. Throws InputError, Interrupted: the head stands then.
 [[nodiscard]] HeadIdentification identify_head(HeadDevice& device, const HeadRange& range = {},
                                                const Progress& progress = {});
+
+/// The step to whose multiples commands are rounded: where they end, against where they were to end. 0: none is seen.
+[[nodiscard]] double command_step(const PositionerLog& log);
 
 /// What the fits are worth, and what the log did not excite.
 [[nodiscard]] Verdict head_verdict(const HeadIdentification& identified);

@@ -20,6 +20,7 @@
 #include <thread>
 
 #include "alidade/files/files.h"
+#include "alidade/heads/protocols/onvif_protocol.h"
 #include "alidade/imaging/image_codecs.h"
 
 namespace alidade {
@@ -67,6 +68,14 @@ bool send_all(int socket, std::string_view bytes, const std::atomic<bool>& ends)
   return bytes.empty();
 }
 
+/// As a request's header says; 0: it does not.
+std::size_t body_length(std::string header) {
+  for (char& letter : header) letter = static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
+  const std::string_view word = "\r\ncontent-length:";
+  const std::size_t at = header.find(word);
+  return at == std::string::npos ? 0 : std::strtoul(header.c_str() + at + word.size(), nullptr, 10);
+}
+
 /// A port, and a thread for each client.
 class Listener {
  public:
@@ -76,7 +85,7 @@ class Listener {
   /// After `ends` is set.
   ~Listener() {
     thread_.join();
-    for (std::thread& client : clients_) client.join();
+    for (Client& client : clients_) client.thread.join();
     ::close(socket_);
   }
   Listener(const Listener&) = delete;
@@ -84,6 +93,10 @@ class Listener {
   [[nodiscard]] std::uint16_t port() const { return port_of(socket_); }
 
  private:
+  struct Client {
+    std::thread thread;
+    std::atomic<bool> is_over = false;
+  };
   void accept() {
     while (!ends_) {
       if (!waits_for(socket_, POLLIN)) continue;
@@ -96,10 +109,16 @@ class Listener {
       const int on = 1;
       ::setsockopt(client, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
       ++num_clients_;
-      clients_.emplace_back([this, client] {
+      clients_.remove_if([](Client& each) {
+        if (each.is_over) each.thread.join();
+        return each.is_over.load();
+      });
+      Client& last = clients_.emplace_back();
+      last.thread = std::thread([this, client, &last] {
         serve_(client);
         ::close(client);
         --num_clients_;
+        last.is_over = true;
       });
     }
   }
@@ -108,7 +127,7 @@ class Listener {
   const std::atomic<bool>& ends_;
   Serve serve_;
   std::atomic<std::size_t> num_clients_ = 0;
-  std::list<std::thread> clients_;
+  std::list<Client> clients_;
   std::thread thread_;
 };
 
@@ -129,7 +148,8 @@ struct HeadServer::State {
   std::atomic<std::size_t> num_frames = 0;
   int truth = -1;
   std::thread camera;
-  std::optional<Listener> rotctl, stream;
+  std::optional<OnvifCamera> onvif_camera;
+  std::optional<Listener> rotctl, stream, onvif;
 
   void serve_rotctl(int socket) {
     constexpr std::size_t longest_line = 1000;
@@ -168,11 +188,43 @@ struct HeadServer::State {
     }
   }
 
+  /// One question a connection.
+  void serve_onvif(int socket) {
+    constexpr std::size_t most_bytes = 1 << 20;
+    constexpr int most_waits = 100;
+    std::string request;
+    std::size_t body = std::string::npos, length = 0;
+    char chunk[4096];
+    for (int waits = 0; !ends && (body == std::string::npos || request.size() < body + length);) {
+      if (!waits_for(socket, POLLIN)) {
+        if (++waits > most_waits) return;
+        continue;
+      }
+      const ssize_t got = ::recv(socket, chunk, sizeof chunk, 0);
+      if (got <= 0 || request.size() > most_bytes) return;
+      request.append(chunk, static_cast<std::size_t>(got));
+      const std::size_t end = request.find("\r\n\r\n");
+      if (body != std::string::npos || end == std::string::npos) continue;
+      body = end + 4;
+      length = body_length(request.substr(0, end));
+      if (length > most_bytes) return;
+    }
+    const OnvifCamera::Answer answer =
+        onvif_camera->answer(request.substr(std::min(body, request.size())), clock->now_s());
+    (void)send_all(
+        socket,
+        fmt::format("HTTP/1.1 {}\r\nContent-Type: application/soap+xml; charset=utf-8\r\nContent-Length: {}\r\n"
+                    "Connection: close\r\n\r\n{}",
+                    answer.status == 200 ? "200 OK" : fmt::format("{} Refused", answer.status), answer.body.size(),
+                    answer.body),
+        ends);
+  }
+
   void film() {
     const double period_s = 1.0 / config.camera.fps;
     for (double next_s = clock->now_s(); !ends; next_s = std::max(next_s + period_s, clock->now_s())) {
       clock->wait_until(next_s);
-      const double t_s = clock->now_s(), stamp_s = t_s + config.camera.delay_s;
+      const double t_s = clock->now_s(), stamp_s = stamp_of(config.camera, t_s);
       const Eigen::Vector2d angles = plant.truth(t_s);
       const std::size_t number = ++num_frames;
       const std::string jpeg = jpeg_bytes(renderer.frame(angles, number, t_s), 95);
@@ -204,9 +256,18 @@ HeadServer::HeadServer(const HeadServerConfig& config) : state_(std::make_unique
       state.rotctl.emplace(config.address, config.rotctl_port, state.ends, [&state](int s) { state.serve_rotctl(s); });
     if (config.stream_port >= 0)
       state.stream.emplace(config.address, config.stream_port, state.ends, [&state](int s) { state.serve_stream(s); });
+    if (config.onvif_port >= 0) {
+      const std::string pictures = fmt::format("http://{}:{}/stream.mjpg", config.address, stream_port());
+      state.onvif_camera.emplace(state.plant,
+                                 OnvifServerConfig{config.user, config.password, config.address, 80, pictures,
+                                                   config.camera.width_px, config.camera.height_px});
+      state.onvif.emplace(config.address, config.onvif_port, state.ends, [&state](int s) { state.serve_onvif(s); });
+      state.onvif_camera->set_port(state.onvif->port());
+    }
   } catch (...) {
     state.ends = true;
     state.rotctl.reset();
+    state.stream.reset();
     throw;
   }
   if (config.stream_port >= 0) state.camera = std::thread([&state] { state.film(); });
@@ -217,11 +278,13 @@ HeadServer::~HeadServer() {
   if (state_->camera.joinable()) state_->camera.join();
   state_->rotctl.reset();
   state_->stream.reset();
+  state_->onvif.reset();
   if (state_->truth >= 0) ::close(state_->truth);
 }
 
 std::uint16_t HeadServer::rotctl_port() const { return state_->rotctl ? state_->rotctl->port() : 0; }
 std::uint16_t HeadServer::stream_port() const { return state_->stream ? state_->stream->port() : 0; }
+std::uint16_t HeadServer::onvif_port() const { return state_->onvif ? state_->onvif->port() : 0; }
 std::size_t HeadServer::num_frames() const { return state_->num_frames; }
 HeadPlant& HeadServer::plant() { return state_->plant; }
 

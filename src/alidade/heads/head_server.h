@@ -4,8 +4,8 @@
 #include <memory>
 #include <string>
 
-#include "alidade/heads/frame_stream.h"
 #include "alidade/heads/simulated_head.h"
+#include "alidade/heads/streams/frame_stream.h"
 
 namespace alidade {
 
@@ -13,13 +13,14 @@ struct HeadServerConfig {
   SimulatedHeadConfig head;
   SimulatedCamera camera;
   std::string address = "127.0.0.1";
-  int rotctl_port = -1, stream_port = -1;  ///< 0: any that is free; −1: not served.
-  std::string truth_csv;                   ///< Where truth is written, line by line; empty: nowhere.
+  int rotctl_port = -1, stream_port = -1, onvif_port = -1;  ///< 0: any that is free; −1: not served.
+  std::string user, password;                               ///< Of ONVIF; no user: everybody may ask.
+  std::string truth_csv;                                    ///< Where truth is written, line by line; empty: nowhere.
 };
 
 /// A simulated head behind the protocol of Hamlib's rotctld, and what its camera sees as motion JPEG over HTTP
-/// (/stream.mjpg; X-Timestamp says when a frame was taken). At most 16 clients each. Throws InputError: a port is in
-/// use, the file cannot be written.
+/// (/stream.mjpg; X-Timestamp says when a frame was taken), and as an ONVIF camera. At most 16 clients each. Throws
+/// InputError: a port is in use, the file cannot be written.
 class HeadServer {
  public:
   explicit HeadServer(const HeadServerConfig& config);
@@ -29,6 +30,7 @@ class HeadServer {
 
   [[nodiscard]] std::uint16_t rotctl_port() const;
   [[nodiscard]] std::uint16_t stream_port() const;
+  [[nodiscard]] std::uint16_t onvif_port() const;
   [[nodiscard]] std::size_t num_frames() const;
   [[nodiscard]] HeadPlant& plant();
 

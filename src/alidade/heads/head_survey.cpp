@@ -56,6 +56,7 @@ void move_a_little(MovingHead& head, HeadSurvey& survey) {
   wait_for_rest(head, most_s);
   head.command(start.cwiseMax(head.low_rad()).cwiseMin(head.high_rad()));
   wait_for_rest(head, most_s);
+  survey.zoom = try_zoom(head);
   head.stop();
   survey.has_moved = true;
   for (int axis = 0; axis < 2; ++axis) {
@@ -85,14 +86,59 @@ Verdict verdict_of(const HeadSurvey& survey) {
       {.name = "moves",
        .state = still ? State::bad : State::good,
        .text = still ? "a command was taken, and the reading did not change" : "the readings follow the commands"});
+  judge_zoom(survey.zoom, verdict);
   if (!still) return verdict;
   verdict.state = State::bad;
   verdict.exit_code = ExitCode::not_trusted;
-  verdict.sentence += "; a command was taken, and the reading did not change: positions are refused silently";
+  verdict.sentence +=
+      "; a command was taken, and the reading did not change: positions are refused silently, or its reading stands";
   return verdict;
 }
 
 }  // namespace
+
+ZoomTrial try_zoom(MovingHead& head) {
+  constexpr double step = 0.1, most_s = 8.0;
+  ZoomTrial trial;
+  const std::optional<double> begin = head.device().zoom();
+  if (!begin) return trial;
+  trial.has_zoom = true;
+  trial.from = *begin;
+  trial.to = *begin > 0.5 ? *begin - step : *begin + step;
+  const Eigen::Vector2d before = wait_for_rest(head, most_s).pan_tilt_rad;
+  head.zoom_to(trial.to);
+  trial.moved_rad = wait_for_rest(head, most_s).pan_tilt_rad - before;
+  trial.read = head.device().zoom().value_or(std::nan(""));
+  head.zoom_to(trial.from);
+  (void)wait_for_rest(head, most_s);
+  return trial;
+}
+
+void judge_zoom(const ZoomTrial& trial, Verdict& verdict) {
+  constexpr double still_rad = 0.1 * degree, same = 0.02;
+  if (!trial.has_zoom) return;
+  const double moved = trial.moved_rad.cwiseAbs().maxCoeff();
+  const bool moves = moved > still_rad, follows = std::abs(trial.read - trial.to) < same;
+  Check check{.name = "zoom",
+              .text = "zoom moves neither pan nor tilt",
+              .value = moved / degree,
+              .limit = still_rad / degree,
+              .unit = "°"};
+  if (moves) {
+    check.state = State::bad;
+    check.text =
+        fmt::format("zoom moves {}: by {:.2f}° where zoom alone was commanded",
+                    std::abs(trial.moved_rad[0]) >= std::abs(trial.moved_rad[1]) ? "pan" : "tilt", moved / degree);
+  } else if (!follows) {
+    check.state = State::care;
+    check.text = fmt::format("zoom reads {:.3g} where {:.3g} was commanded", trial.read, trial.to);
+  }
+  verdict.checks.push_back(check);
+  if (check.state == State::good) return;
+  verdict.sentence += "; " + check.text;
+  if (check.state == State::bad) verdict.exit_code = ExitCode::not_trusted;
+  if (verdict.state == State::good || check.state == State::bad) verdict.state = check.state;
+}
 
 HeadPosition wait_for_rest(MovingHead& head, double most_s) {
   constexpr double rest_s = 0.5, least_s = 0.6;

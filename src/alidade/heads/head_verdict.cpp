@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "alidade/geometry/degree.h"
@@ -12,20 +13,21 @@ namespace {
 void check_readings(const PositionerFit& fit, const std::string& axis, std::vector<Check>& checks) {
   constexpr double coarse_rad = 0.2 * degree;
   if (fit.resolution.value > coarse_rad)
-    checks.push_back({axis + " resolution", State::care,
-                      fmt::format("{} is read in steps of {:.3g}°", axis, fit.resolution.value / degree),
-                      fit.resolution.value / degree, coarse_rad / degree, "°", ""});
+    checks.push_back(
+        {axis + " resolution", State::care,
+         fmt::format("{} is read in steps of {:.3g}°: what is finer is lost", axis, fit.resolution.value / degree),
+         fit.resolution.value / degree, coarse_rad / degree, "°", ""});
   const double off = std::abs(fit.gain - 1.0), limit = std::max(5.0 * fit.sigma_gain, 0.005);
   if (fit.gain < 0.0) {
-    checks.push_back({axis + " sense", State::bad, axis + " is mirrored: what it reads falls where it is told to rise",
-                      fit.gain, 0.0, "", ""});
+    checks.push_back({axis + " sense", State::bad,
+                      axis + " is mirrored: what it reads falls where it is commanded to rise", fit.gain, 0.0, "", ""});
   } else if (off > limit) {
     checks.push_back({axis + " gain", State::bad,
-                      fmt::format("{} reads {:.4g} of a radian that it is told", axis, fit.gain), off, limit, "", ""});
+                      fmt::format("{} reads {:.4g} rad where 1 rad is commanded", axis, fit.gain), off, limit, "", ""});
   }
   if (fit.reads_target)
     checks.push_back({axis + " reading", State::bad,
-                      axis + " reads its target at once: it tells where it shall be, not where it is",
+                      axis + " reads its target at once: it reports the command, not the position",
                       fit.rate.value / degree, 1000.0, "°/s", ""});
   constexpr double most_noise = 4.0;
   checks.push_back({axis + " residuals", fit.noise > most_noise ? State::care : State::good,
@@ -50,6 +52,17 @@ std::string not_told(const PositionerFit& fit) {
   return text;
 }
 
+/// Where commands end, on a grid that is coarser than what is read.
+void check_grid(const PositionerLog& log, const PositionerFit& fit, const std::string& axis,
+                std::vector<Check>& checks) {
+  constexpr double coarse_rad = 0.2 * degree;
+  const double grid = command_step(log);
+  if (!(grid > std::max(coarse_rad, 4.0 * fit.resolution.value))) return;
+  checks.push_back({axis + " steps", State::bad,
+                    fmt::format("{} goes in steps of {:.3g}°: commands between are rounded", axis, grid / degree),
+                    grid / degree, coarse_rad / degree, "°", ""});
+}
+
 Verdict refusal_of(const std::string& axis, const PositionerFit& fit) {
   Verdict verdict;
   verdict.state = State::refused;
@@ -63,34 +76,78 @@ Verdict refusal_of(const std::string& axis, const PositionerFit& fit) {
 
 }  // namespace
 
+double command_step(const PositionerLog& log) {
+  constexpr double rest_s = 0.2, least_share = 0.12;
+  constexpr std::size_t fewest = 8;
+  std::vector<PositionerReading> rests;
+  std::vector<double> off;
+  for (std::size_t k = 0; k < log.commands.size(); ++k) {
+    const double end_s = k + 1 < log.commands.size() ? log.commands[k + 1].t_s : 1e300;
+    const auto next = std::ranges::lower_bound(log.readings, end_s, {}, &PositionerReading::t_s);
+    if (next == log.readings.begin()) continue;
+    const PositionerReading& last = *(next - 1);
+    const bool rests_there = last.t_s - log.commands[k].t_s > 2.0 * rest_s &&
+                             std::all_of(log.readings.begin(), next, [&](const PositionerReading& each) {
+                               return each.t_s < last.t_s - rest_s || each.angle_rad == last.angle_rad;
+                             });
+    if (!rests_there) continue;
+    rests.push_back(last);
+    off.push_back(last.angle_rad - log.commands[k].target_rad);
+  }
+  if (rests.size() < fewest) return 0.0;
+  const double step = reading_step(rests), grain = reading_step(log.readings);
+  double sum2 = 0.0;
+  for (std::size_t i = 0; i < rests.size(); ++i) {
+    const double steps = (rests[i].angle_rad - rests.front().angle_rad) / step;
+    if (!(std::abs(steps - std::round(steps)) * step < 0.6 * grain + 0.01 * step)) return 0.0;
+    sum2 += off[i] * off[i];
+  }
+  // Rounded, they end beside their targets by up to half a step.
+  return std::sqrt(sum2 / static_cast<double>(rests.size())) > least_share * step ? step : 0.0;
+}
+
 Verdict head_verdict(const HeadIdentification& identified) {
+  Verdict verdict;
+  if (!identified.lie.empty()) {
+    verdict.state = State::refused;
+    verdict.exit_code = ExitCode::cannot_tell;
+    verdict.sentence = identified.lie;
+    verdict.to_add = "look whether it moves; mend that first";
+    return verdict;
+  }
   for (std::size_t i = 0; i < 2; ++i)
     if (identified.axes[i].status != PositionerFit::Status::ok)
       return refusal_of(head_axis_names[i], identified.axes[i]);
-  Verdict verdict;
   for (std::size_t i = 0; i < 2; ++i) {
     const PositionerFit& fit = identified.axes[i];
     const std::string axis = head_axis_names[i], missing = not_told(fit);
     check_readings(fit, axis, verdict.checks);
+    check_grid(identified.logs[i], fit, axis, verdict.checks);
     verdict.sentence += fmt::format("{}{} follows at up to {:.4g}°/s, {:.3g} ms late", i == 0 ? "" : "; ", axis,
                                     fit.rate.value / degree, 1e3 * fit.latency.value);
-    if (!missing.empty()) verdict.sentence += ", the log does not show " + missing;
+    if (!fit.reached_rate) verdict.sentence += ", and had no way to reach its largest rate";
     const bool lacks = !fit.reached_rate || !std::isfinite(fit.dead_band.sigma);
     verdict.checks.push_back(
         {axis + " excitation", lacks ? State::care : State::good,
          missing.empty() ? axis + ": all of the model was excited" : axis + ": the log does not show " + missing});
     if (lacks) verdict.to_add = "give it more room: --" + axis + "-range LOW,HIGH";
   }
+  std::string named;
   for (const Check& check : verdict.checks) {
     if (check.state == State::good) continue;
+    const bool is_named = check.state == State::bad || check.name.ends_with("resolution");
+    if (is_named) named += (named.empty() ? "" : "; ") + check.text;
     if (check.state == State::bad) {
       verdict.state = State::bad;
       verdict.exit_code = ExitCode::not_trusted;
-      verdict.sentence += "; " + check.text;
     } else if (verdict.state == State::good) {
       verdict.state = State::care;
     }
   }
+  // What is wrong comes first; of values that are not to be trusted nothing is said.
+  if (verdict.state == State::bad) verdict.sentence = named;
+  if (verdict.state != State::bad && !named.empty()) verdict.sentence += "; " + named;
+  judge_zoom(identified.zoom, verdict);
   return verdict;
 }
 

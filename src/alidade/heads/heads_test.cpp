@@ -6,7 +6,7 @@
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/heads/head_identify.h"
-#include "alidade/heads/line_socket.h"
+#include "alidade/heads/protocols/line_socket.h"
 #include "alidade/heads/simulated_head.h"
 
 // Heads that are simulated in a time of their own: truth is the plant's.
@@ -125,23 +125,57 @@ TEST(Heads, StoppedFirstWhateverEndsIt) {
   }
 }
 
+HeadIdentification identified(const std::string& words) {
+  const std::unique_ptr<HeadDevice> head = open_head("sim://?clock=free&" + words);
+  return identify_head(*head);
+}
+
 TEST(Heads, LiesAreNamed) {
-  for (const std::string lie : {"refuses", "frozen"}) {
-    const std::unique_ptr<HeadDevice> head = open_head("sim://?clock=free&lie=" + lie);
+  struct Case {
+    std::string head, words;
+    ExitCode code;
+  };
+  const std::vector<Case> cases{
+      {"lie=refuses", "refused silently", ExitCode::cannot_tell},
+      {"lie=frozen", "refused silently, or its reading stands", ExitCode::cannot_tell},
+      {"lie=frozen&lie_after=20", "frozen", ExitCode::cannot_tell},  // in the middle: by its readings, not their number
+      {"lie=refuses&lie_after=30", "refused silently", ExitCode::cannot_tell},
+      {"lie=reports-target", "its target at once", ExitCode::not_trusted},
+      {"grid=1.8", "goes in steps of 1.8°", ExitCode::not_trusted},
+      {"zoom=1&lie=zoom-moves-pan", "zoom moves pan: by 1.50°", ExitCode::not_trusted},
+      {"step=1.8", "read in steps of 1.8°", ExitCode::ok}};
+  for (const Case& each : cases) {
+    const HeadIdentification told = identified(each.head);
+    EXPECT_EQ(told.verdict.exit_code, each.code) << each.head << ": " << told.verdict.sentence;
+    EXPECT_NE(told.verdict.state, State::good) << each.head;
+    EXPECT_NE(told.verdict.sentence.find(each.words), std::string::npos) << each.head << ": " << told.verdict.sentence;
+  }
+}
+
+TEST(Heads, HonestOnesAreNotAccused) {
+  for (const std::string head : {"dead_band=0.2&backlash=0.3", "step=0.05&update_hz=20", "zoom=1", "repeat=0.05"}) {
+    const HeadIdentification told = identified(head);
+    EXPECT_TRUE(told.verdict.ok()) << head << ": " << told.verdict.sentence;
+    EXPECT_LT(told.verdict.sentence.size(), 160u) << told.verdict.sentence;
+  }
+  const std::unique_ptr<HeadDevice> zooms = open_head("sim://?clock=free&zoom=1");
+  const HeadSurvey survey = survey_head(*zooms, true);
+  EXPECT_TRUE(survey.zoom.has_zoom);
+  EXPECT_TRUE(survey.verdict.ok()) << survey.verdict.sentence;
+  EXPECT_NEAR(*zooms->zoom(), 0.0, 1e-12);  // it is back
+}
+
+TEST(Heads, UnknownKeysAreNamedWithThoseThereAre) {
+  for (const std::string bad : {"speed=3", "rate=fast", "lie=often", "rate", "clock=slow", "min_pan=10&max_pan=5"}) {
     try {
-      (void)identify_head(*head);
-      ADD_FAILURE() << lie;
+      (void)open_head("sim://?" + bad);
+      ADD_FAILURE() << bad;
     } catch (const InputError& error) {
-      EXPECT_NE(std::string(error.what()).find("did not move"), std::string::npos) << error.what();
+      if (bad.starts_with("speed")) {
+        EXPECT_NE(std::string(error.what()).find("backlash, "), std::string::npos) << error.what();
+      }
     }
   }
-  const std::unique_ptr<HeadDevice> ahead = open_head("sim://?clock=free&lie=reports-target");
-  const HeadIdentification told = identify_head(*ahead);
-  EXPECT_EQ(told.verdict.state, State::bad) << told.verdict.sentence;
-  EXPECT_NE(told.verdict.sentence.find("its target at once"), std::string::npos) << told.verdict.sentence;
-  const std::unique_ptr<HeadDevice> coarse = open_head("sim://?clock=free&step=1.8");
-  const HeadIdentification steps = identify_head(*coarse);
-  EXPECT_NE(steps.verdict.state, State::good);
 }
 
 TEST(Heads, Addresses) {
@@ -150,8 +184,11 @@ TEST(Heads, Addresses) {
   EXPECT_EQ(plain.port, 4534);
   EXPECT_EQ(address_of("rotctl://[::1]", "rotctl://", 4533).host, "::1");
   EXPECT_EQ(address_of("rotctl://[::1]:99", "rotctl://", 4533).port, 99);
-  for (const std::string bad :
-       {"rotctl://", "rotctl://:4533", "rotctl://a:0", "rotctl://a:70000", "rotctl://a:x", "rotctl://a:-1"})
+  EXPECT_EQ(address_of("onvif://admin@cam:8080/?profile=0", "onvif://", 80).user, "admin");
+  EXPECT_EQ(address_of("onvif://admin@cam:8080/?profile=0", "onvif://", 80).host, "cam");
+  EXPECT_EQ(address_of("onvif://cam?profile=0", "onvif://", 80).port, 80);
+  for (const std::string bad : {"rotctl://me:secret@a", "rotctl://@a", "rotctl://a@b@c", "rotctl://", "rotctl://:4533",
+                                "rotctl://a:0", "rotctl://a:70000", "rotctl://a:x", "rotctl://a:-1"})
     EXPECT_THROW((void)address_of(bad, "rotctl://", 4533), InputError) << bad;
   EXPECT_THROW((void)open_head("telnet://here"), InputError);
   EXPECT_THROW((void)open_head("sim://?rate=0"), InputError);

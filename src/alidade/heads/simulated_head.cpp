@@ -24,9 +24,13 @@ class FreeClock final : public HeadClock {
 };
 
 const std::map<std::string, HeadLie>& lies() {
-  static const std::map<std::string, HeadLie> words{
-      {"none", HeadLie::none},     {"refuses", HeadLie::refuses},  {"reports-target", HeadLie::reports_target},
-      {"silent", HeadLie::silent}, {"nan", HeadLie::not_a_number}, {"frozen", HeadLie::frozen}};
+  static const std::map<std::string, HeadLie> words{{"none", HeadLie::none},
+                                                    {"refuses", HeadLie::refuses},
+                                                    {"reports-target", HeadLie::reports_target},
+                                                    {"silent", HeadLie::silent},
+                                                    {"nan", HeadLie::not_a_number},
+                                                    {"frozen", HeadLie::frozen},
+                                                    {"zoom-moves-pan", HeadLie::zoom_moves_pan}};
   return words;
 }
 
@@ -58,6 +62,12 @@ class SimulatedHead final : public HeadDevice {
     plant_.stop(t_s);
     return {t_s, 0.0};
   }
+  [[nodiscard]] std::optional<double> zoom() override {
+    if (!plant_.config().has_zoom) return std::nullopt;
+    (void)heard();
+    return plant_.zoom();
+  }
+  void zoom_to(double share) override { plant_.zoom_to(heard(), share); }
   [[nodiscard]] HeadPlant& plant() { return plant_; }
 
  private:
@@ -98,50 +108,68 @@ SimulatedHeadConfig drawn_head(std::uint64_t seed) {
   return head;
 }
 
+namespace {
+
+struct HeadNumber {
+  double* place;
+  double unit;
+};
+std::map<std::string, HeadNumber> numbers_of(SimulatedHeadConfig& head) {
+  PositionerParams& axis = head.axis;
+  return {{"rate", {&axis.rate_rad_s, degree}},       {"accel", {&axis.acceleration_rad_s2, degree}},
+          {"tau", {&axis.time_constant_s, 1.0}},      {"latency", {&axis.latency_s, 1.0}},
+          {"backlash", {&axis.backlash_rad, degree}}, {"dead_band", {&axis.dead_band_rad, degree}},
+          {"step", {&head.step_rad, degree}},         {"grid", {&head.command_step_rad, degree}},
+          {"update_hz", {&head.update_hz, 1.0}},      {"repeat", {&head.repeatability_rad, degree}},
+          {"watchdog", {&head.watchdog_s, 1.0}},      {"lie_after", {&head.lie_after_s, 1.0}},
+          {"min_pan", {&head.low_rad[0], degree}},    {"max_pan", {&head.high_rad[0], degree}},
+          {"min_tilt", {&head.low_rad[1], degree}},   {"max_tilt", {&head.high_rad[1], degree}}};
+}
+
+/// Throws where the key is none.
+void take_key(const std::string& key, const std::string& value, const std::string& where, SimulatedHeadConfig& head) {
+  if (key == "clock" && value == "free") return;
+  char* last = nullptr;
+  const double number = std::strtod(value.c_str(), &last);
+  const bool is_number = !value.empty() && *last == '\0' && std::isfinite(number) && std::abs(number) < 1e9;
+  const bool may_be_below_zero = key.starts_with("min_") || key.starts_with("max_");
+  const std::map<std::string, HeadNumber> numbers = numbers_of(head);
+  std::string known = "clock=free, lie, seed, zoom";
+  for (const auto& [name, number_of_it] : numbers) known += ", " + name;
+  if (key == "lie") {
+    std::string words;
+    for (const auto& [word, lie] : lies()) words += (words.empty() ? "" : ", ") + word;
+    if (!lies().contains(value)) throw InputError(fmt::format("{}: no lie '{}'; there are {}", where, value, words));
+    head.lie = lies().at(value);
+  } else if (key != "seed" && key != "zoom" && !numbers.contains(key)) {
+    throw InputError(fmt::format("{}: a simulated head has no '{}'; it has {}", where, key, known));
+  } else if (!is_number || (number < 0.0 && !may_be_below_zero)) {
+    throw InputError(fmt::format("{}: '{}={}' is no number that a head can have", where, key, value));
+  } else if (key == "zoom") {
+    head.has_zoom = number > 0.0;
+  } else if (key == "seed") {
+    head = drawn_head(static_cast<std::uint64_t>(number));
+  } else {
+    *numbers.at(key).place = number * numbers.at(key).unit;
+  }
+}
+
+}  // namespace
+
 SimulatedHeadConfig simulated_head_config(const std::string& text, const std::string& where) {
   SimulatedHeadConfig head;
-  PositionerParams& axis = head.axis;
-  axis = {.rate_rad_s = 40.0 * degree, .acceleration_rad_s2 = 120.0 * degree};
-  const std::map<std::string, std::pair<double*, double>> numbers{{"rate", {&axis.rate_rad_s, degree}},
-                                                                  {"accel", {&axis.acceleration_rad_s2, degree}},
-                                                                  {"tau", {&axis.time_constant_s, 1.0}},
-                                                                  {"latency", {&axis.latency_s, 1.0}},
-                                                                  {"backlash", {&axis.backlash_rad, degree}},
-                                                                  {"dead_band", {&axis.dead_band_rad, degree}},
-                                                                  {"step", {&head.step_rad, degree}},
-                                                                  {"update_hz", {&head.update_hz, 1.0}},
-                                                                  {"repeat", {&head.repeatability_rad, degree}},
-                                                                  {"watchdog", {&head.watchdog_s, 1.0}},
-                                                                  {"lie_after", {&head.lie_after_s, 1.0}},
-                                                                  {"min_pan", {&head.low_rad[0], degree}},
-                                                                  {"max_pan", {&head.high_rad[0], degree}},
-                                                                  {"min_tilt", {&head.low_rad[1], degree}},
-                                                                  {"max_tilt", {&head.high_rad[1], degree}}};
+  head.axis = {.rate_rad_s = 40.0 * degree, .acceleration_rad_s2 = 120.0 * degree};
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find_first_of("&,", at), text.size());
     const std::string part = text.substr(at, end - at), key = part.substr(0, part.find('='));
-    const std::string value = part.size() > key.size() ? part.substr(key.size() + 1) : "";
     at = end + 1;
-    if (key == "clock") continue;
-    if (const auto lie = lies().find(value); key == "lie" && lie != lies().end()) {
-      head.lie = lie->second;
-      continue;
-    }
-    char* last = nullptr;
-    const double number = std::strtod(value.c_str(), &last);
-    const bool is_number = !value.empty() && *last == '\0' && std::isfinite(number) && std::abs(number) < 1e9;
-    const bool may_be_below_zero = key.starts_with("min_") || key.starts_with("max_");
-    if (key == "seed" && is_number && number >= 0.0) {
-      head = drawn_head(static_cast<std::uint64_t>(number));
-    } else if (const auto known = numbers.find(key);
-               known != numbers.end() && is_number && (number >= 0.0 || may_be_below_zero)) {
-      *known->second.first = number * known->second.second;
-    } else {
-      throw InputError(fmt::format("{}: '{}' is nothing that a simulated head has", where, part));
-    }
+    if (!part.empty()) take_key(key, part.size() > key.size() ? part.substr(key.size() + 1) : "", where, head);
   }
+  const PositionerParams& axis = head.axis;
   const bool can_move = axis.rate_rad_s > 0.0 && axis.acceleration_rad_s2 > 0.0 && axis.time_constant_s > 0.0;
   if (!can_move) throw InputError(where + ": rate, accel and tau must be above zero");
+  if (!(head.low_rad.array() <= head.high_rad.array()).all())
+    throw InputError(where + ": min_pan and min_tilt are not above max_pan and max_tilt");
   return head;
 }
 
@@ -160,6 +188,10 @@ void HeadPlant::advance(double t_s) {
       if (!axis.is_at_rest()) axis.cut(axis.time_s());
     }
     heard_s_ = until;
+  }
+  if (until >= turns_until_s_) {
+    for (Positioner& axis : axes_) axis.advance(turns_until_s_), axis.stop(turns_until_s_);
+    turns_until_s_ = 1e300;
   }
   if (config_.update_hz > 0.0) {
     const auto sample = static_cast<std::int64_t>(std::floor(until * config_.update_hz));
@@ -180,21 +212,56 @@ void HeadPlant::hear(double t_s) {
   heard_s_ = std::max(heard_s_, t_s - begin_s_);
 }
 
+/// Lies count from the first command on.
+void HeadPlant::begin_motion(double t_s) {
+  advance(t_s);
+  turns_until_s_ = 1e300;
+  if (moved_s_ < 0.0) moved_s_ = t_s - begin_s_;
+}
+
+void HeadPlant::send(double t_s, const Eigen::Vector2d& target) {
+  target_ = target;
+  if (does(HeadLie::refuses, t_s)) return;
+  for (std::size_t i = 0; i < 2; ++i) axes_[i].go_to(t_s - begin_s_, target[static_cast<Eigen::Index>(i)]);
+}
+
 void HeadPlant::go_to(double t_s, const Eigen::Vector2d& pan_tilt_rad) {
   const std::scoped_lock lock(mutex_);
-  advance(t_s);
-  if (moved_s_ < 0.0) moved_s_ = t_s - begin_s_;
-  target_ = pan_tilt_rad;
-  if (does(HeadLie::refuses, t_s)) return;
+  begin_motion(t_s);
   Draws draws(config_.seed * 1000003u + ++draws_);
-  for (std::size_t i = 0; i < 2; ++i)
-    axes_[i].go_to(t_s - begin_s_,
-                   pan_tilt_rad[static_cast<Eigen::Index>(i)] + config_.repeatability_rad * draws.normal());
+  const double step = config_.command_step_rad;
+  Eigen::Vector2d target = pan_tilt_rad;
+  if (step > 0.0) target = (target / step).array().round() * step;
+  target = target.cwiseMax(config_.low_rad).cwiseMin(config_.high_rad);
+  for (double& angle : target) angle += config_.repeatability_rad * draws.normal();
+  send(t_s, target);
+}
+
+void HeadPlant::turn(double t_s, const Eigen::Vector2d& direction, double until_s) {
+  const std::scoped_lock lock(mutex_);
+  begin_motion(t_s);
+  Eigen::Vector2d target = target_;
+  for (int i = 0; i < 2; ++i) {
+    if (direction[i] > 0.0) target[i] = config_.high_rad[i];
+    if (direction[i] < 0.0) target[i] = config_.low_rad[i];
+  }
+  send(t_s, target);
+  turns_until_s_ = until_s - begin_s_;
+}
+
+void HeadPlant::zoom_to(double t_s, double share) {
+  constexpr double moves_rad = 1.5 * degree;
+  const std::scoped_lock lock(mutex_);
+  begin_motion(t_s);
+  const double way = share - zoom_;
+  zoom_ = share;
+  if (does(HeadLie::zoom_moves_pan, t_s)) send(t_s, target_ + Eigen::Vector2d(way > 0.0 ? moves_rad : -moves_rad, 0.0));
 }
 
 void HeadPlant::stop(double t_s) {
   const std::scoped_lock lock(mutex_);
   advance(t_s);
+  turns_until_s_ = 1e300;
   for (Positioner& axis : axes_) axis.stop(t_s - begin_s_);
 }
 

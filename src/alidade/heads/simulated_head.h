@@ -21,7 +21,8 @@ enum class HeadLie {
   reports_target,  ///< Reads where it shall be, not where it is.
   silent,          ///< Answers nothing any more.
   not_a_number,    ///< Reads NaN.
-  frozen           ///< Moves, and reads where it was.
+  frozen,          ///< Moves, and reads where it was.
+  zoom_moves_pan   ///< A command of zoom alone moves pan as well.
 };
 
 /// A head that somebody might own. Both axes are alike.
@@ -29,7 +30,9 @@ struct SimulatedHeadConfig {
   PositionerParams axis;
   double step_rad = 0.01 * 0.017453292519943295;  ///< Of the encoder.
   double update_hz = 0.0;                         ///< Of the encoder; 0: read when it is asked.
-  double repeatability_rad = 0.0;                 ///< σ of where a command ends.
+  double command_step_rad = 0.0;                  ///< Commands are rounded to multiples of it; 0: they are not.
+  bool has_zoom = false;
+  double repeatability_rad = 0.0;  ///< σ of where a command ends.
   Eigen::Vector2d low_rad{-2.96705972839036, -0.523598775598299};
   Eigen::Vector2d high_rad{2.96705972839036, 1.047197551196598};
   double watchdog_s = 0.0;      ///< Silence after which it stops by itself; 0: never.
@@ -42,8 +45,9 @@ struct SimulatedHeadConfig {
 /// backlash and dead band often, an encoder of 0.01–0.05° that is read when asked or 20 or 50 times a second.
 [[nodiscard]] SimulatedHeadConfig drawn_head(std::uint64_t seed);
 
-/// The config of "KEY=VALUE&KEY=VALUE" (or separated by commas): seed, rate, accel, backlash, dead_band, step, repeat
-/// in degrees and their rates; tau, latency, watchdog in seconds; update_hz; lie. Throws InputError.
+/// The config of "KEY=VALUE&KEY=VALUE" (or separated by commas): seed, rate, accel, backlash, dead_band, step, grid,
+/// repeat in degrees and their rates; tau, latency, watchdog in seconds; update_hz; zoom; lie. Throws InputError, which
+/// names all keys where one is not known.
 [[nodiscard]] SimulatedHeadConfig simulated_head_config(const std::string& text, const std::string& where);
 
 /// The plant in time. From any thread; times never go back.
@@ -54,6 +58,10 @@ class HeadPlant {
   void stop(double t_s);
   [[nodiscard]] Eigen::Vector2d reading(double t_s);
   [[nodiscard]] Eigen::Vector2d truth(double t_s);  ///< Of what a camera on it looks along.
+  /// Turns towards the signs of `direction`, at its largest rate, until `until_s` or the next command.
+  void turn(double t_s, const Eigen::Vector2d& direction, double until_s);
+  void zoom_to(double t_s, double share);
+  [[nodiscard]] double zoom() const { return zoom_; }
   [[nodiscard]] bool is_at_rest(double t_s);
   /// Somebody spoke: the watchdog counts from here.
   void hear(double t_s);
@@ -62,6 +70,8 @@ class HeadPlant {
 
  private:
   void advance(double t_s);
+  void send(double t_s, const Eigen::Vector2d& target);
+  void begin_motion(double t_s);
   [[nodiscard]] Eigen::Vector2d output() const { return {axes_[0].output_rad(), axes_[1].output_rad()}; }
 
   SimulatedHeadConfig config_;
@@ -72,6 +82,8 @@ class HeadPlant {
   Eigen::Vector2d target_ = Eigen::Vector2d::Zero(), sampled_ = Eigen::Vector2d::Zero(),
                   kept_ = Eigen::Vector2d::Constant(1e9);
   std::int64_t sample_ = -1;
+  double turns_until_s_ = 1e300;
+  std::atomic<double> zoom_ = 0.0;
   std::uint64_t draws_ = 0;
 };
 

@@ -65,7 +65,15 @@ void refuse_text(const std::filesystem::path& video) {
 }
 
 /// Its output goes to `pipe_end`; what it has to say otherwise, nowhere.
-int start_decoder(const std::string& decoder, const std::string& video, FrameColour colour, int pipe_end) {
+int start_decoder(const std::string& decoder, const std::string& video, FrameColour colour, int pipe_end,
+                  const std::string& password) {
+  constexpr std::string_view variable = "ALIDADE_PASSWORD=";
+  std::string secret = std::string(variable) + password;
+  std::vector<char*> environment;
+  for (char** each = environ; *each != nullptr; ++each)
+    if (!std::string_view(*each).starts_with(variable)) environment.push_back(*each);
+  if (!password.empty()) environment.push_back(secret.data());
+  environment.push_back(nullptr);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
@@ -74,9 +82,17 @@ int start_decoder(const std::string& decoder, const std::string& video, FrameCol
   std::array<std::string, 3> words{decoder, video, colour == FrameColour::bgr ? "bgr" : "grey"};
   std::array<char*, 4> arguments{words[0].data(), words[1].data(), words[2].data(), nullptr};
   pid_t process = -1;
-  const int error = posix_spawn(&process, decoder.c_str(), &actions, nullptr, arguments.data(), environ);
+  const int error = posix_spawn(&process, decoder.c_str(), &actions, nullptr, arguments.data(), environment.data());
   posix_spawn_file_actions_destroy(&actions);
   return error == 0 ? process : -1;
+}
+
+/// A camera of the machine that is not plugged in.
+void require_device(const std::string& address) {
+  constexpr std::string_view scheme = "v4l2:";
+  std::error_code ignored;
+  if (!address.starts_with(scheme) || std::filesystem::exists(address.substr(scheme.size()), ignored)) return;
+  throw InputError(address + ": there is no such device; is the camera plugged in?");
 }
 
 }  // namespace
@@ -89,18 +105,20 @@ bool is_stream_address(const std::string& text) {
 // Absolute: a name like "http:…" shall not be an address.
 VideoProcess::VideoProcess(const std::filesystem::path& video, FrameColour colour) : video_(video), colour_(colour) {
   refuse_text(video);
-  start(std::filesystem::absolute(video).string());
+  start(std::filesystem::absolute(video).string(), "");
 }
 
-VideoProcess::VideoProcess(const StreamAddress& stream, FrameColour colour) : video_(stream.text), colour_(colour) {
-  start(stream.text);
+VideoProcess::VideoProcess(const StreamAddress& stream, FrameColour colour)
+    : video_(stream.text), colour_(colour), is_stream_(true) {
+  require_device(stream.text);
+  start(stream.text, stream.password);
 }
 
-void VideoProcess::start(const std::string& source) {
+void VideoProcess::start(const std::string& source, const std::string& password) {
   const std::filesystem::path decoder = decoder_beside_this_program(video_);
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) throw InputError(video_.string() + ": no pipe to the decoder");
-  process_ = start_decoder(decoder.string(), source, colour_, ends[1]);
+  process_ = start_decoder(decoder.string(), source, colour_, ends[1], password);
   ::close(ends[1]);
   pipe_ = ends[0];
   try {
@@ -134,14 +152,25 @@ void VideoProcess::read_header() {
   const bool is_good = process_ > 0 && read_bytes(header.data(), 64) &&
                        std::sscanf(header.data(), "alidade_video %d %d %lu", &width_px_, &height_px_, &frames) == 3 &&
                        width_px_ > 0 && height_px_ > 0 && width_px_ < largest_px && height_px_ < largest_px;
-  if (!is_good) throw InputError(video_.string() + ": not a video that can be read");
-  num_frames_ = frames;
+  if (is_good) {
+    num_frames_ = frames;
+    return;
+  }
+  if (is_stream_)
+    throw InputError(video_.string() +
+                     ": no pictures come from there: nothing answers, or what answers is no video, or "
+                     "another program has the camera");
+  throw InputError(video_.string() + ": not a video that can be read");
 }
 
 std::vector<unsigned char> VideoProcess::next() {
   char mark = 0;
   if (!read_bytes(&mark, 1)) throw InputError(video_.string() + ": the decoder gave up in the middle");
   if (mark != 'f') return {};
+  std::array<double, 2> times{};
+  if (!read_bytes(times.data(), sizeof times))
+    throw InputError(video_.string() + ": the decoder gave up in the middle");
+  time_ = {times[0], times[1]};
   const std::size_t channels = colour_ == FrameColour::bgr ? 3 : 1;
   std::vector<unsigned char> frame(static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_) *
                                    channels);

@@ -12,6 +12,13 @@ namespace alidade {
 /// A camera or a server of pictures: "v4l2:/dev/video0", "rtsp://…", "http://…".
 struct StreamAddress {
   std::string text;
+  std::string password = {};  ///< Of the user in it; reaches the decoder by its environment, and no message.
+};
+
+/// When a frame was taken; NaN: not known.
+struct FrameTime {
+  double media_s = 0.0;  ///< By the video's own clock.
+  double taken_s = 0.0;  ///< Since 1970: by the kernel of a camera, or by RTCP's sender reports.
 };
 /// Whether a text is such an address, rather than a file or a folder.
 [[nodiscard]] bool is_stream_address(const std::string& text);
@@ -36,20 +43,24 @@ class VideoProcess {
   /// The next frame's values, row by row (grey, or blue, green and red); empty at the end. Throws InputError if the
   /// decoder died.
   [[nodiscard]] std::vector<unsigned char> next();
+  /// Of the frame that next() gave.
+  [[nodiscard]] const FrameTime& time() const { return time_; }
   /// Ends the decoder: a next() that waits in another thread throws, as if it had died.
   void interrupt() const;
 
  private:
-  void start(const std::string& source);
+  void start(const std::string& source, const std::string& password);
   [[nodiscard]] bool read_bytes(void* to, std::size_t count) const;
   void read_header();
   void stop();
 
   std::filesystem::path video_;
   FrameColour colour_;
+  bool is_stream_ = false;
   int pipe_ = -1, process_ = -1;
   int width_px_ = 0, height_px_ = 0;
   std::size_t num_frames_ = 0;
+  FrameTime time_;
 };
 
 }  // namespace alidade

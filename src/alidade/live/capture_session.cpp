@@ -63,7 +63,10 @@ void CaptureSession::note(const CaptureLook& look, const cv::Mat& grey, double t
   const bool has_board = look.sight != Sight::nothing && look.sight != Sight::other_board;
   if (!board_seen_s_ || has_board) board_seen_s_ = t_s;
   num_other_ = look.sight == Sight::other_board ? num_other_ + 1 : 0;
-  if (num_other_ >= enough_of_another) tell_once(look.words + "; --board counts inner corners");
+  if (num_other_ >= enough_of_another) {
+    tell_once(fmt::format("{}; if it is the one to calibrate with: --board {}x{} (inner corners)", look.words,
+                          look.other_cols, look.other_rows));
+  }
   if (t_s - *board_seen_s_ >= without_board_s)
     tell_once("no board for a minute; what is looked for: a " + board_words(board_));
 }
@@ -82,8 +85,11 @@ std::string CaptureSession::keep(const cv::Mat& grey, double t_s, bool is_exact)
 CaptureSession::Seen CaptureSession::see(const cv::Mat& grey, double t_s, bool is_exact, bool is_again) {
   Seen seen{guide_.look(grey, t_s), ""};
   if (!is_again) note(seen.look, grey, t_s);
+  all_exact_ = all_exact_ && is_exact;
   if (!seen.look.take() || is_paused_) return seen;
-  if (const std::string reason = keep(grey, t_s, is_exact); !reason.empty()) {
+  const std::optional<EarlierPicture>& earlier = seen.look.earlier;
+  const std::string reason = earlier ? keep(*earlier->picture, earlier->t_s, all_exact_) : keep(grey, t_s, is_exact);
+  if (!reason.empty()) {
     seen.look.sight = Sight::little;
     seen.look.words = seen.look.words_mirrored = reason;
   } else {

@@ -53,6 +53,7 @@ class CaptureSession {
   std::function<void(const std::string&)> tell_;
   std::vector<std::string> told_;
   bool is_paused_ = false, has_warned_ = false;
+  bool all_exact_ = true;  ///< All pictures so far: which of them an earlier one was is not asked.
   double begin_s_ = 0.0;
   std::size_t checked_at_ = 0;  ///< Photos when the whole job was last run.
   std::optional<double> board_seen_s_, same_since_s_;

@@ -42,9 +42,9 @@ FieldList fields_of(LocalizeConfig& config) {
        .option = "--sigma-alpha"},
       {.name = "max_points",
        .value = &config.max_points,
-       .help =
-           "Points in the filter at once, beside the target's: where it is full, what tells least leaves, and comes "
-           "back when it is seen again (0: as many as its state of 800 holds; in images 120)",
+       .help = "Points in the filter at once, beside the target's: where it is full, the least informative leaves, and "
+               "comes "
+               "back when it is seen again (0: as many as its state of 800 holds; in images 120)",
        .limits = {0.0, 3000.0}},
   };
 }

@@ -66,8 +66,9 @@ struct GivenNumber {
 struct SensorScale {
   std::string sensor;      ///< "depth sensor", "rangefinder"
   double scale = 1.0;      ///< Metres for each unit that the path had without it: 1 where a target is right.
-  double sigma_rel = 0.0;  ///< Of the scale, over it. 0: the readings do not tell it.
+  double sigma_rel = 0.0;  ///< Of the scale, over it. 0: the readings do not determine it.
   std::size_t num_used = 0, num_rejected = 0;
+  bool is_in_time = true;  ///< There are readings of when the path was made.
 };
 
 /// What the mean residual along the radius is, in rings about the principal point.
@@ -117,7 +118,8 @@ struct Localization {
       std::numeric_limits<double>::quiet_NaN();  ///< Of an observation that brings none; of images the least.
   std::size_t num_lost = 0;  ///< Frames without a pose that observations hold: waiting or predicted.
   std::size_t num_restarts = 0;
-  std::size_t num_left = 0;  ///< Times that a point left a full filter.
+  std::size_t num_left = 0;                           ///< Times that a point left a full filter.
+  std::size_t num_loops = 0, num_loops_rejected = 0;  ///< Returns to what was seen long before; of those not believed.
   std::size_t num_observations = 0, num_used = 0, num_gated = 0, max_seen = 0;
   std::size_t num_known = 0, num_known_gated = 0;
   double nis_per_dof = std::numeric_limits<double>::quiet_NaN();

@@ -5,11 +5,8 @@
 #include <array>
 #include <cmath>
 
-#include "alidade/localize/checks/scale_readings.h"
-#include "alidade/localize/checks/summary.h"
 #include "alidade/localize/known_pose.h"
 #include "alidade/localize/path/path_resection.h"
-#include "alidade/localize/path/smooth.h"
 
 namespace alidade {
 
@@ -36,7 +33,11 @@ bool ObservationLocalizer::start(const ObservationFrame& frame) {
     if (from.empty()) return false;
     from = only_where(std::move(from));
   }
-  engine_.begin(from, frame.t_s, config_.bank);
+  FilterBankConfig bank = config_.bank;
+  // With many points, and none that says how large the world is, speeds are nothing to choose among.
+  constexpr std::size_t many = 30;
+  if (is_free() && frame.observations.size() >= many) bank.splits = 1;
+  engine_.begin(from, frame.t_s, bank);
   for (const KnownPoint& point : config_.target.points)
     engine_.filters().add_known(point.id, point.point_in_world, point.sigma_m);
   record_.begin(num_taken_);
@@ -213,6 +214,22 @@ bool ObservationLocalizer::restart(const ObservationFrame& frame, Doubt doubt) {
   return true;
 }
 
+/// Where observations contradict a path that nothing but itself holds: it and its map are given up, and another begins
+/// where it ends. What was seen before is placed by the map that follows (observation_record.h).
+bool ObservationLocalizer::begin_again(Doubt doubt) {
+  constexpr std::size_t enough_tried = 10, young = 200;  // frames; a path that was right for long is not given up
+  const std::size_t age = num_taken_ - record_.begun();
+  if (!is_free() || (doubt != Doubt::strong && doubt != Doubt::many) || age < enough_tried || age > young) return false;
+  StartHypothesis from = *engine_.start_without_target();
+  from.motion.world_from_cam = engine_.best().motion().world_from_cam;
+  drop_map();
+  engine_.filters().restart({{from}});
+  record_.begin(num_taken_);
+  engine_.forget_doubt();
+  engine_.count_restart();
+  return true;
+}
+
 /// A point whose place no single look can change much: one of the target's, or a settled one. New ones explain whatever
 /// the known ones do not contradict.
 bool ObservationLocalizer::is_firm(long id) const {
@@ -272,11 +289,20 @@ bool ObservationLocalizer::find_again(OtherPlace other, const ObservationFrame& 
   return true;
 }
 
-PathStep ObservationLocalizer::take(const ObservationFrame& frame) {
-  keep_gap(frame.t_s);
+/// By the map's numbers.
+ObservationFrame ObservationLocalizer::numbered(ObservationFrame frame) {
+  const auto has_left = [&](long id) { return points_.is_gone(id) && !engine_.best().has(id); };
+  for (FeatureObservation& observation : frame.observations)
+    observation.id = episodes_.id_of(observation.id, num_taken_, has_left);
+  return frame;
+}
+
+PathStep ObservationLocalizer::take(const ObservationFrame& given) {
+  keep_gap(given.t_s);
+  ObservationFrame frame = numbered(given);
   PathStep step = taken(frame);
   ++num_taken_;
-  if (smooths()) frames_.push_back(frame);
+  if (smooths()) frames_.push_back(std::move(frame));
   return step;
 }
 
@@ -310,76 +336,16 @@ PathStep ObservationLocalizer::taken(const ObservationFrame& frame) {
     engine_.fill(frame.observations, again, step);
     step.event = FrameEvent::restarted;
   }
+  if (config_.restarts && begin_again(doubt)) {
+    step.event = FrameEvent::restarted;
+    engine_.fill_pose(step);
+    add_new(frame);
+  }
   if (step.num_tracked >= min_observations || step.event == FrameEvent::started) add_new(frame);
   engine_.filters().convert_linear();
   engine_.keep_given();
   if (config_.inspect) config_.inspect(engine_.best());
   return step;
-}
-
-/// A path up to scale, once more where sensors beside the camera say how long it is: each point's distance from where
-/// it was first seen is believed to be what it is now, in metres, so vaguely that all of them together say the scale
-/// and its σ, and nothing else. What a unit was before in metres.
-double ObservationLocalizer::solve_in_metres(SmootherProblem problem, std::optional<SmoothedPath>& smoothed,
-                                             Localization& result) const {
-  if (!config_.target.points.empty()) return 1.0;
-  std::vector<MapPoint> map;
-  for (std::size_t i = 0; i < smoothed->ids.size(); ++i)
-    map.push_back({smoothed->ids[i], smoothed->points[i], smoothed->point_covs[i], false, 0});
-  read_scales(config_, map, result);
-  const auto read = scale_of(result);
-  if (!read) return 1.0;
-  for (std::size_t k = 0; k < problem.world_from_cam.size(); ++k) {
-    problem.world_from_cam[k] = smoothed->world_from_cam[k];
-    problem.world_from_cam[k].translation *= read->scale;
-  }
-  const double sigma_rel = read->sigma_rel * std::sqrt(static_cast<double>(smoothed->ids.size()));
-  std::vector<SmootherPoint> points;
-  for (SmootherPoint& point : problem.points) {
-    const auto at = std::ranges::lower_bound(smoothed->ids, point.id);
-    if (at == smoothed->ids.end() || *at != point.id) continue;
-    point.point_in_world = read->scale * smoothed->points[static_cast<std::size_t>(at - smoothed->ids.begin())];
-    const Eigen::Vector3d away = point.point_in_world - problem.world_from_cam[point.first_frame].translation;
-    point.range = RangePrior{away.norm(), sigma_rel};
-    points.push_back(point);
-  }
-  problem.points = std::move(points);
-  Localization again = result;
-  auto in_metres = smooth(problem, frames_, again);
-  if (!in_metres) return 1.0;
-  result = std::move(again);
-  smoothed = std::move(in_metres);
-  result.is_scale_read = result.scale_known = true;
-  return read->scale;
-}
-
-void ObservationLocalizer::sum_up(Localization& result) const {
-  const LocalizeTarget& target = config_.target;
-  result.sigma_px = config_.filter.sigma_px;
-  result.is_board = target.board.has_value();
-  std::optional<SmoothedPath> smoothed;
-  double scale = 1.0;
-  if (smooths() && engine_.has_begun()) {
-    const auto problem = record_.problem(engine_.camera(), config_, frames_, result.path, engine_.best(),
-                                         points_.gone(engine_.best()), engine_.start_without_target(), period_s());
-    if (problem) smoothed = smooth(*problem, frames_, result);
-    if (smoothed) scale = solve_in_metres(*problem, smoothed, result);
-  }
-  engine_.sum_up([this](long id) { return points_.num_used(id); }, result);
-  result.num_left = num_left_;
-  if (engine_.has_begun())
-    for (const GonePoint& each : points_.gone(engine_.best())) {
-      result.map.push_back(each.point);
-      result.map.back().num_seen = points_.num_used(each.point.id);
-    }
-  if (scale != 1.0)
-    for (MapPoint& point : result.map) {
-      point.point_in_world *= scale;
-      point.cov *= scale * scale;
-    }
-  if (smoothed) take_over(*smoothed, result);
-  result.known_shift = known_shift(result.map, target.points);
-  result.is_behind = is_behind(result.path, target.points, target.seen_from_plus_z);
 }
 
 }  // namespace alidade

@@ -4,6 +4,7 @@
 
 #include "alidade/localize/engine.h"
 #include "alidade/localize/filter/observation_record.h"
+#include "alidade/localize/filter/point_episodes.h"
 #include "alidade/localize/filter/point_store.h"
 
 namespace alidade {
@@ -24,6 +25,7 @@ class ObservationLocalizer {
   [[nodiscard]] bool smooths() const { return config_.smooths; }
   [[nodiscard]] double period_s() const;
   void keep_gap(double t_s);
+  [[nodiscard]] ObservationFrame numbered(ObservationFrame frame);
   [[nodiscard]] PathStep taken(const ObservationFrame& frame);
   [[nodiscard]] bool start(const ObservationFrame& frame);
   void add_new(const ObservationFrame& frame);
@@ -38,6 +40,9 @@ class ObservationLocalizer {
   [[nodiscard]] double contradiction_of(const StartHypothesis& from) const;
   [[nodiscard]] std::vector<StartHypothesis> elsewhere(const ObservationFrame& frame) const;
   [[nodiscard]] int num_more_explained(const ObservationFrame& frame, const Rigid3& world_from_cam) const;
+  /// Nothing says where the world is, nor how large.
+  [[nodiscard]] bool is_free() const { return !config_.start && config_.target.points.empty(); }
+  [[nodiscard]] bool begin_again(Doubt doubt);
   [[nodiscard]] bool restart(const ObservationFrame& frame, Doubt doubt);
   /// Where the target says that the camera is, against the path.
   struct OtherPlace {
@@ -49,12 +54,14 @@ class ObservationLocalizer {
   [[nodiscard]] bool is_firm(long id) const;
   [[nodiscard]] bool find_again(OtherPlace other, const ObservationFrame& frame, const ObservationsReport& report);
 
+  [[nodiscard]] std::optional<SmoothedPath> smooth_with_loops(SmootherProblem& problem, Localization& result) const;
   [[nodiscard]] double solve_in_metres(SmootherProblem problem, std::optional<SmoothedPath>& smoothed,
                                        Localization& result) const;
 
   LocalizeEngine engine_;
   const LocalizeConfig& config_;
   PointStore points_;
+  PointEpisodes episodes_;
   ObservationRecord record_;
   std::vector<ObservationFrame> frames_;  ///< All, where the path is smoothed.
   std::vector<double> gaps_s_;            ///< Between frames, growing; where their period is not given.

@@ -9,7 +9,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Where the target was in space, as `track` tells from what the heads of a run saw of it.
+/// Where the target was in space, as `track` estimates from what the heads of a run saw of it.
 struct ServoTrack {
   std::vector<TargetObservation> observations;
   TrueTrack truth;

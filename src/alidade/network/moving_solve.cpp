@@ -1,9 +1,11 @@
 #include "alidade/network/moving_solve.h"
+#include "alidade/estimation/median.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/network/moving_clusters.h"
@@ -177,22 +179,19 @@ struct Solver {
   void tell_noise() {
     if (problem.sigma_px) return;
     const double larger = followed() / 1.1774;
-    std::vector<double> told;
+    std::vector<double> of_heads;
     for (std::size_t h = 0; h < sigma_px.size(); ++h) {
       std::vector<double> lengths;
       for (std::size_t i = 0; i < residual.size(); ++i)
         if (problem.observations[i].head == h && residual[i].allFinite()) lengths.push_back(residual[i].norm());
       if (lengths.empty()) continue;
-      const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
-      std::ranges::nth_element(lengths, middle);
-      sigma_px[h] = std::max(0.05, larger * *middle);
-      told.push_back(sigma_px[h]);
+      sigma_px[h] = std::max(0.05, larger * median_of(std::move(lengths)));
+      of_heads.push_back(sigma_px[h]);
     }
-    if (told.empty()) return;
+    if (of_heads.empty()) return;
     // A camera that the path follows alone would seem to have no noise, and be followed all the more.
-    const auto middle = told.begin() + static_cast<std::ptrdiff_t>(told.size() / 2);
-    std::ranges::nth_element(told, middle);
-    for (double& sigma : sigma_px) sigma = std::max(sigma, 0.5 * *middle);
+    const double typical = median_of(std::move(of_heads));
+    for (double& sigma : sigma_px) sigma = std::max(sigma, 0.5 * typical);
   }
 
   /// What the path accelerates, where observations hold it: taken from the middle of the loosely held path.

@@ -51,7 +51,8 @@ struct SolvedMoving {
   std::vector<double> sigma_px;              ///< One a head.
   std::vector<Eigen::Vector2d> residual_px;  ///< One an observation of the problem; not a number where not seen.
   std::vector<bool> used;
-  Eigen::MatrixXd cov;  ///< Of the common parameters, blocks of time and cameras being clusters; 0×0: cannot be told.
+  Eigen::MatrixXd
+      cov;  ///< Of the common parameters, blocks of time and cameras being clusters; 0×0: cannot be determined.
   Eigen::MatrixXd cov_model;             ///< If every observation erred by itself.
   ClusterCovariance clusters;            ///< Blocks of time.
   double block_s = 0.0;                  ///< Length of one.

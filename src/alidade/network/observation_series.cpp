@@ -1,7 +1,9 @@
 #include "alidade/network/observation_series.h"
+#include "alidade/estimation/median.h"
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "alidade/geometry/decompositions.h"
 
@@ -38,10 +40,7 @@ ObservationSeries observation_series(std::span<const TargetObservation> observat
     series.at.push_back(rays[k]->head<2>() / rays[k]->z());
     series.observation.push_back(own[k]);
   }
-  if (!steps.empty()) {
-    std::ranges::nth_element(steps, steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2));
-    series.spacing_s = steps[steps.size() / 2];
-  }
+  if (!steps.empty()) series.spacing_s = median_of(std::move(steps));
   series.px = params(rig_head.camera.lens)[0];
   return series;
 }

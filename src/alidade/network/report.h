@@ -88,7 +88,7 @@ struct MovingTargetReport {
 /// Everything that a placement of cameras has to say: what the solve found (rig, cameras, path …), and what it is
 /// worth.
 struct NetworkCalibration : MovingTargetReport {
-  std::vector<TargetObservation> observations;  ///< As given; `used` tells what became of each.
+  std::vector<TargetObservation> observations;  ///< As given; `used` says what became of each.
   MovingTargetConfig config;
   Eigen::MatrixXd covariance;                ///< Of all heads: rig.cov.
   std::vector<std::string> parameter_names;  ///< Of `covariance`: "head1.base_x_m", …

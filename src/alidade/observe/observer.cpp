@@ -15,7 +15,7 @@ ObserveSetup stream_setup(const RotationLog& layout, const ObserveConfig& config
   if (!setup.estimate_errors.empty()) {
     throw ConfigError("errors of the rotation are estimated from a whole log: keep the rows in a file");
   }
-  if (setup.width_px <= 0) throw ConfigError("say --size WxH or --camera FILE, the first rows do not tell");
+  if (setup.width_px <= 0) throw ConfigError("say --size WxH or --camera FILE, the first rows do not determine it");
   check_log(layout);
   return setup;
 }

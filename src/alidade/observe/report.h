@@ -90,7 +90,7 @@ struct MatchCounts {
   std::size_t kept = 0;      ///< With one camera.
 };
 
-/// Everything that observe() has to say of a log, or of photos: what they tell, and what it is worth. Where there is no
+/// Everything that observe() has to say of a log, or of photos: what they determine, and how well. Where there is no
 /// answer camera, quantities and covariance are empty, and the verdict says why.
 struct ObserveReport {
   enum class Status {

@@ -90,7 +90,7 @@ class DelayedAxis {
   /// `added` is added to every command meanwhile.
   void advance(double dt_s, double added = 0.0);
   [[nodiscard]] const AxisMotion& motion() const { return driven_; }
-  /// In the middle of its play, its second lag at rest.
+  /// In the centre of its play, its second lag at rest.
   void set_motion(const AxisMotion& motion) {
     motion_ = driven_ = motion;
     lagged_ = past_dead_band(command_, axis_.dead_band);

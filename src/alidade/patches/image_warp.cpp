@@ -1,8 +1,10 @@
 #include "alidade/patches/image_warp.h"
+#include "alidade/estimation/median.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace alidade {
@@ -31,10 +33,8 @@ std::optional<ImageWarp> ImageWarp::fit(std::span<const PointMove> moves) {
   // Half of the points are taken for good; of the others, those that fit as these do.
   std::vector<double> residuals;
   for (const PointMove& move : moves) residuals.push_back((warp.at(move.from_px) - move.to_px).norm());
-  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
-  std::nth_element(residuals.begin(), middle, residuals.end());
   constexpr double of_median = 4.0;
-  if (!warp.solve(moves, of_median * *middle + 1e-6)) return std::nullopt;
+  if (!warp.solve(moves, of_median * median_of(std::move(residuals)) + 1e-6)) return std::nullopt;
   return warp;
 }
 

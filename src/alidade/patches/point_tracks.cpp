@@ -1,4 +1,5 @@
 #include "alidade/patches/point_tracks.h"
+#include "alidade/estimation/median.h"
 
 #include <tbb/parallel_for.h>
 
@@ -178,9 +179,7 @@ class PointTracker::Impl {
     if (tracks_.empty()) return;
     std::vector<double> all;
     for (const Track& track : tracks_) all.push_back(track.noise);
-    const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-    std::nth_element(all.begin(), middle, all.end());
-    noise_ = *middle;
+    noise_ = median_of(std::move(all));
   }
 
   /// New points in the cells that have none: the sharpest corner of each. J. Shi & C. Tomasi, "Good features to track",

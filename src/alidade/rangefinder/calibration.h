@@ -40,7 +40,7 @@ struct ShotPhoto {
 /// Everything that a calibration of a rangefinder has to say: what the solve found (beam, camera, shots …), and what it
 /// is worth. `by_count`, `left_out` and `gains` are empty where there is no beam.
 struct RangefinderCalibration : RangefinderReport {
-  std::vector<Shot> measured;     ///< With what their photos gave; `shots` tells what became of each.
+  std::vector<Shot> measured;     ///< With what their photos gave; `shots` says what became of each.
   std::vector<ShotPhoto> photos;  ///< One per shot, where photos were looked at.
   std::vector<Shot> unreadable;   ///< Shots whose photos could not be used; `counts.skipped` says why, in order.
   RangefinderConfig config;       ///< As used: a scale that nobody gave may be estimated.

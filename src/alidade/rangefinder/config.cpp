@@ -32,7 +32,7 @@ FieldList sigma_fields(RangefinderConfig& config) {
           {.name = "sigma_scale",
            .value = &config.sigma_scale,
            .help = "σ of the scale of the readings, which is then fixed at 1; 0: exact (default: estimated where it "
-                   "matters and the shots tell it)",
+                   "matters and the shots determine it)",
            .limits = share},
           {.name = "sigma_range_per_m",
            .value = &config.sigma_range_per_m,

@@ -120,7 +120,7 @@ class Planner {
     return inverse(cov);
   }
 
-  /// The board's middle where the beam hits, its normal tilted so that the azimuth's side is farther.
+  /// The board's centre where the beam hits, its normal tilted so that the azimuth's side is farther.
   [[nodiscard]] Rigid3 board_at(double distance_m, double tilt_rad, double azimuth_rad) const {
     const Eigen::Vector3d axis(std::sin(azimuth_rad), -std::cos(azimuth_rad), 0.0);
     const Eigen::Quaterniond rotation = exp_so3(tilt_rad * axis);

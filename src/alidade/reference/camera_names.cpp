@@ -44,7 +44,7 @@ rms_px                px     of a point's residual
 noise_px              px     σ of a coordinate, from the residuals
 excess_px             px     σ that every corner has beyond its own
 board_shape           text   flat, bow, free or given
-bow_m[2]              m      height of the board's middle over its edges, along both sides
+bow_m[2]              m      height of the board's centre over its edges, along both sides
 transfer_rms_px       px     of unseen photos, the board's shape learned
 transfer_flat_rms_px  px     of unseen photos, the board flat
 working_distance_m    m      median distance of the board

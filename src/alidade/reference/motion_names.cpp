@@ -185,7 +185,7 @@ scale_known   flag   by the target, or a sensor beside the camera
 restarts      count  poses that were found again
 sights        count  observations used
 sights_gated  count  observations rejected
-radial[]      any    mean residual outwards by radius
+loops         count  returns to what was seen long before
 tested[].
   name   text  error that was looked for
   asked  1     its size

@@ -99,7 +99,7 @@ TEST(PlainPage, SaysWhatWasTakenAsGivenAndTheIdealSigma) {
                           {"moved_by", 1e-4}},
                          {{"name", evil}, {"value", nullptr}, {"sigma", 0}, {"moves", 0}, {"moved", nullptr}}};
   const std::string page = report::plain_page(document.dump());
-  for (const char* part : {"± 1.3", "± 0.63", "± 0.0012", "± 0.0018", "Taken as given", "square_m", "not told",
+  for (const char* part : {"± 1.3", "± 0.63", "± 0.0012", "± 0.0018", "Taken as given", "square_m", "not given",
                            "0.00005 more or less moves origin_m z by 12.5 of its σ", "camera.fx", "0.7",
                            "its σ moves theta_x_rad by 0.25 of its σ", "exact"})
     EXPECT_THAT(page, HasSubstr(part));

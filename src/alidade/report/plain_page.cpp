@@ -69,7 +69,7 @@ std::string assumed_markup(const Json& assumed) {
   std::string rows;
   for (const Json& each : assumed) {
     const Json &value = member(each, "value"), &sigma = member(each, "sigma");
-    const std::string known = sigma.is_null()           ? "not told"
+    const std::string known = sigma.is_null()           ? "not given"
                               : number_of(sigma) == 0.0 ? "exact"
                                                         : number_text(number_of(sigma));
     const std::string moved = text_of(member(each, "moved"));

@@ -93,7 +93,7 @@ Experiment experiment_1(const ReproduceConfig& config) {
       "Gains: Γ = g Ḡ⁻¹ with Ḡ the mean of ΩΩᵀ over a period of the planned motion; quiet k1 = 2, g = 2 behind a low "
       "pass of "
       "0.3 Hz on both sides, fast k1 = 15, g = 1500. Implicit midpoint rule. Points: uniform, every triangle at least "
-      "40 px high. Ours is told the noise."};
+      "40 px high. Ours is given the noise."};
   experiment.claims = noise_claims(score_noise(config));
   const RotationLog clean = clean_log(figure_points());
   RotationLog log = clean;

@@ -84,7 +84,8 @@ Claim enough_motion(const ReproduceConfig& config, Experiment& experiment) {
   claim.words = fmt::format(
       "False. Three rows of the regressor hold the one rate and three the other: both must keep coming. On a pan alone "
       "the "
-      "least eigenvalue of the Gramian is {:.1g} and fy stays at its first guess. Ours says what it cannot tell: its "
+      "least eigenvalue of the Gramian is {:.1g} and fy stays at its first guess. Ours says what it cannot determine: "
+      "its "
       "sigma "
       "of fy is {:.0f} px, and `alidade observe` refuses such a log.",
       lambda_of(scene), best_sigma);

@@ -199,7 +199,7 @@ Experiment wang_table_2(const ReproduceConfig& config) {
                  edges.direction_mrad,
                  joint.direction_mrad};
   existing.holds = edges.direction_mrad < 0.5 * 39.0 ? Holds::reproduced : Holds::not_reproducible;
-  existing.words = "A legitimate direction to some mrad without a target; its origin is told to centimetres only.";
+  existing.words = "A legitimate direction to some mrad without a target; its origin is known to centimetres only.";
   existing.figure = "table_2";
   Experiment experiment{"table2", "Table 2: three algorithms",
                         "18 boards of 9×6 corners between 0.5 and 4 m, tilted up to 45°; the beam has the angles 1.557 "

@@ -43,7 +43,7 @@ std::vector<Claim> pixel_claims() {
   const Eigen::Vector3d target_m = paper_target_cm / 100.0, step_m(baseline_cm() / 100.0, 0.0, 0.0);
   const double off_px = std::max((pixel_of(0, target_m) - middle).norm(), (pixel_of(1, target_m) - middle).norm());
   Claim centred{"geometry-middle",
-                "both cameras look at the target at the start: distance from the middle of the image", "px",
+                "both cameras look at the target at the start: distance from the centre of the image", "px",
                 not_a_number, off_px};
   centred.holds = off_px <= 1.0 ? Holds::reproduced : Holds::not_reproducible;
   centred.words =

@@ -1,4 +1,5 @@
 #include "alidade/results/batch_outcome.h"
+#include "alidade/estimation/median.h"
 
 #include <fmt/format.h>
 
@@ -31,12 +32,6 @@ void add_values(const ordered_json& estimate, const ordered_json& stddev, const 
     for (std::size_t i = 0; i < estimate.size(); ++i)
       add_values(estimate[i], stddev[i], path + "[" + std::to_string(i) + "]", row);
   }
-}
-
-double median_of(std::vector<double> numbers) {
-  const auto middle = numbers.begin() + static_cast<std::ptrdiff_t>(numbers.size() / 2);
-  std::ranges::nth_element(numbers, middle);
-  return *middle;
 }
 
 /// Of every quantity the rows that have it, in order of its first appearance.

@@ -84,6 +84,14 @@ void tell_axis(const PositionerFit& fit, const std::string& name, std::vector<st
   lines.push_back("repeatability " + shown(fit.repeatability, degree, "°"));
 }
 
+void fill_zoom(const ZoomTrial& zoom, JsonValue& estimate) {
+  if (!zoom.has_zoom) return;
+  estimate["zoom"]["from"] = zoom.from;
+  estimate["zoom"]["to"] = zoom.to;
+  estimate["zoom"]["read"] = zoom.read;
+  estimate["zoom"]["moved_rad"] = numbers_of(zoom.moved_rad);
+}
+
 DataTable response_table(const PositionerFit& fit, const std::string& name) {
   std::vector<double> t, measured;
   for (std::size_t i = 0; i < fit.t_s.size(); ++i) {
@@ -118,6 +126,7 @@ JobOutcome outcome_of(const HeadIdentification& identified) {
     document.data.push_back(response_table(identified.axes[i], name));
   }
   document.counts.used = document.counts.given;
+  fill_zoom(identified.zoom, document.estimate);
   return outcome;
 }
 
@@ -156,6 +165,7 @@ JobOutcome outcome_of(const HeadSurvey& survey) {
   }
   table.columns = {{"t_s", t}, {"wait_s", wait}, {"pan_rad", pan}, {"tilt_rad", tilt}};
   document.data.push_back(std::move(table));
+  fill_zoom(survey.zoom, estimate);
   return outcome;
 }
 
@@ -199,8 +209,12 @@ JobOutcome outcome_of(const HeadCalibration& calibration) {
   estimate["head_time_s"] = calibration.head_time_s;
   estimate["offline"] = calibration.offline;
   for (const ObservedQuantity& each : calibration.report.quantities)
-    if (each.name == "delay_s") document.stddev["delay_s"] = std::hypot(each.sigma, calibration.sigma_clock_s);
-  estimate["frame_times"] = calibration.is_stamped ? "stamped" : "arrival";
+    if (each.name == "delay_s")
+      document.stddev["delay_s"] = std::hypot(each.sigma, calibration.sigma_clock_s, calibration.sigma_frame_s);
+  constexpr std::array<const char*, 3> times{"arrival", "sender", "stamped"};
+  estimate["frame_times"] = times[static_cast<std::size_t>(calibration.times)];
+  estimate["frame_time_sigma_s"] = calibration.sigma_frame_s;
+  estimate["time_stamp_jumps"] = calibration.num_jumps;
   estimate["frames"] = calibration.num_frames;
   estimate["moves"] = calibration.num_moves;
   std::string words = "alidade";
@@ -209,6 +223,11 @@ JobOutcome outcome_of(const HeadCalibration& calibration) {
                                       calibration.num_frames, calibration.head_time_s, words));
   outcome.lines.push_back("delay_s: a frame shows the angles of so much later than its time; below zero: earlier");
   return outcome;
+}
+
+std::vector<NamedBytes> files_so_far(const HeadCalibration& calibration) {
+  if (calibration.report.verdict.ok() && !calibration.report.quantities.empty()) return outcome_of(calibration).files;
+  return {{"log.csv", calibration.log_csv}};
 }
 
 JobOutcome outcome_of(const HeadFollowing& following) {

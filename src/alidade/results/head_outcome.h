@@ -13,6 +13,8 @@ namespace alidade {
 [[nodiscard]] JobOutcome outcome_of(const HeadIdentification& identified);
 /// Of what it and its camera tell: camera.yaml, rig.yaml, log.csv.
 [[nodiscard]] JobOutcome outcome_of(const HeadCalibration& calibration);
+/// Its files while it runs: log.csv, and those of the estimate where there is one.
+[[nodiscard]] std::vector<NamedBytes> files_so_far(const HeadCalibration& calibration);
 /// Of how it followed a target: follow.csv.
 [[nodiscard]] JobOutcome outcome_of(const HeadFollowing& following);
 

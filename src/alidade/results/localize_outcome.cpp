@@ -117,6 +117,7 @@ void fill_path_estimate(const Localization& result, ResultDocument& document) {
   estimate["sigma_px"] = result.sigma_px;
   estimate["scale_known"] = result.scale_known;
   estimate["restarts"] = result.num_restarts;
+  estimate["loops"] = result.num_loops;
   estimate["sights"] = result.num_observations;
   estimate["sights_gated"] = result.num_gated;
   JsonValue tested = JsonValue::list();
@@ -151,6 +152,8 @@ void path_lines(const Localization& result, std::vector<std::string>& lines) {
                               3.0 * sigma.tail<3>().maxCoeff() / degree));
   if (std::isfinite(result.nis_per_dof))
     lines.push_back(fmt::format("NIS per degree of freedom {:.2f}", result.nis_per_dof));
+  if (result.num_loops > 0)
+    lines.push_back(fmt::format("{} loops closed: what was seen long before is seen again", result.num_loops));
   if (std::isfinite(result.error.ate_m))
     lines.push_back(fmt::format("against the truth: ATE {:.4g} m ({} alignment), RPE {:.4g} m a frame",
                                 result.error.ate_m, result.scale_known ? "SE(3)" : "Sim(3)", result.error.rpe_m));

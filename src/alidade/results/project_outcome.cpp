@@ -174,7 +174,7 @@ void fill_point(const RigProjection& projection, JobOutcome& outcome) {
   outcome.document.estimate["point_in_world_m"] = numbers_of(*projection.point_in_world);
   outcome.document.stddev["point_in_world_m"] = numbers_of(sigma_m);
   outcome.document.estimate["point_cov_m2"] = rows_of(cov);
-  outcome.lines.push_back(fmt::format("the heads tell this point to ± ({:.2g}, {:.2g}, {:.2g}) mm   (3σ)",
+  outcome.lines.push_back(fmt::format("the heads determine this point to ± ({:.2g}, {:.2g}, {:.2g}) mm   (3σ)",
                                       3e3 * sigma_m.x(), 3e3 * sigma_m.y(), 3e3 * sigma_m.z()));
 }
 

@@ -61,7 +61,7 @@ struct ResultDocument {
 /// The word for a state in documents: good, care, bad, refused, not_converged.
 [[nodiscard]] std::string state_name(State state);
 
-/// Whether a document with this exit code tells an estimate, be it one that stands or one not to be trusted.
+/// Whether a document with this exit code holds an estimate, be it one that stands or one not to be trusted.
 [[nodiscard]] constexpr bool tells_an_estimate(int exit_code) {
   return exit_code == static_cast<int>(ExitCode::ok) || exit_code == static_cast<int>(ExitCode::not_trusted);
 }

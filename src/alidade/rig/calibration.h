@@ -13,7 +13,7 @@ ALIDADE_PUBLIC_BEGIN
 /// Everything that a calibration of a rig has to say: what the solve found (rig, boards, views …), and what it is
 /// worth.
 struct RigCalibration : RigReport {
-  std::vector<HeadView> measured;        ///< With the corners found in their photos; `views` tells what became of each.
+  std::vector<HeadView> measured;        ///< With the corners found in their photos; `views` says what became of each.
   std::vector<SkippedInput> no_board;    ///< Photos that show no board, or cannot be used; in `counts.skipped`, too.
   std::vector<SkippedInput> unreadable;  ///< Of these, photos that cannot be used.
   RigConfig config;

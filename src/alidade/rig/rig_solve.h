@@ -100,7 +100,8 @@ struct SolvedRig {
 [[nodiscard]] std::optional<SolvedRig> solve_rig(const RigProblem& problem, const RigState& start,
                                                  std::span<const double> weights, int max_iterations);
 
-/// Covariance of the free parameters; none, and the names of what cannot be told, where the information is singular.
+/// Covariance of the free parameters; none, and the names of what cannot be determined, where the information is
+/// singular.
 struct RigCovariance {
   std::optional<Eigen::MatrixXd> cov;
   std::vector<std::string> unknown;

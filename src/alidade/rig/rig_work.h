@@ -1,12 +1,12 @@
 #pragma once
 
-#include <algorithm>
 #include <map>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "alidade/board/board_pose.h"
+#include "alidade/estimation/median.h"
 #include "alidade/rig/rig.h"
 #include "alidade/rig/rig_solve.h"
 
@@ -52,12 +52,5 @@ void fit_poses(Work& work);
 [[nodiscard]] bool start_mountings(Work& work);
 /// Which parameters are estimated.
 void choose_free(Work& work);
-
-[[nodiscard]] inline double median_of(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace alidade

@@ -1,8 +1,10 @@
 #include "alidade/spot/spot_fit.h"
+#include "alidade/estimation/median.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace alidade {
 namespace {
@@ -30,9 +32,7 @@ double ring_light(const SpotSignal& signal, const Eigen::Vector2d& px, double ra
     if (distance >= inner && distance <= outer && signal.is_saturated(v, u) == 0) values.push_back(signal.light(v, u));
   });
   if (values.size() < 8) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return static_cast<double>(*middle);
+  return static_cast<double>(median_of(std::move(values)));
 }
 
 /// Sums over the disc; the pixels on its rim count in part, so that it moves smoothly.

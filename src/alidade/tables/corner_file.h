@@ -26,7 +26,7 @@ ALIDADE_PUBLIC_BEGIN
 [[nodiscard]] std::vector<BoardView> read_corners(const std::filesystem::path& file, int num_points,
                                                   std::vector<SkippedInput>* skipped = nullptr);
 
-/// The smallest images that hold all corners [px]: where nobody tells their size.
+/// The smallest images that hold all corners [px]: where their size is not given.
 [[nodiscard]] ImageSize min_size(std::span<const BoardView> views);
 
 /// A size that does not hold the corners is of other images: throws InputError about `file` where more than one in ten

@@ -37,10 +37,12 @@ struct ObservationsOptions {
 [[nodiscard]] std::string start_text(const LocalizeStart& start);
 
 /// Reads `t_s,depth_m[,sigma_m]` of a pressure sensor, in order of time: how deep it is, up to an offset. σ is 0.01 m
-/// where none is given. Throws InputError.
-[[nodiscard]] std::vector<DepthReading> read_depth_sensor(const std::filesystem::path& file);
+/// where none is given. Throws InputError; with `skip_bad` wrong rows are put into `skipped`.
+[[nodiscard]] std::vector<DepthReading> read_depth_sensor(const std::filesystem::path& file, bool skip_bad = false,
+                                                          std::vector<SkippedInput>* skipped = nullptr);
 /// Reads `t_s,range_m` of a rangefinder, in order of time. Throws InputError.
-[[nodiscard]] std::vector<RangeReading> read_ranges(const std::filesystem::path& file);
+[[nodiscard]] std::vector<RangeReading> read_ranges(const std::filesystem::path& file, bool skip_bad = false,
+                                                    std::vector<SkippedInput>* skipped = nullptr);
 
 /// Poses as TUM writes them, `t x y z qx qy qz qw`, in order of time; lines that begin with # are comments.
 [[nodiscard]] std::vector<TimedPose> read_tum(const std::filesystem::path& file);

@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
+#include <optional>
 #include <set>
 
 #include "alidade/files/table_rows.h"
@@ -77,10 +80,13 @@ std::vector<ObservationFrame> with_missing(std::vector<ObservationFrame> frames)
   return all;
 }
 
-std::string pose_cells(const Rigid3& world_from_cam, char between) {
+/// In a TUM file the quaternion's real part stands last, elsewhere first.
+std::string pose_cells(const Rigid3& world_from_cam, bool is_tum) {
   const Eigen::Vector3d& t = world_from_cam.translation;
   const Eigen::Quaterniond& q = world_from_cam.rotation;
-  const std::array<double, 7> cells{t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
+  const char between = is_tum ? ' ' : ',';
+  std::array<double, 7> cells{t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z()};
+  if (is_tum) std::rotate(cells.begin() + 3, cells.begin() + 4, cells.end());
   std::string text;
   for (const double cell : cells) text += between + fmt::format("{:.9f}", cell);
   return text;
@@ -106,38 +112,49 @@ ObservationTable read_observations(const std::filesystem::path& file, const Obse
 namespace {
 
 /// The time of a row, after that of the row before it.
-double later_time(const Csv& csv, std::size_t row, double last_t_s) {
+double later_time(const Csv& csv, std::size_t row, std::optional<double> last_t_s) {
   const double t_s = csv.number(row, "t_s");
-  if (row > 0 && !(t_s > last_t_s))
+  if (last_t_s && !(t_s > *last_t_s))
     throw InputError(csv.where(row, "t_s") +
                      fmt::format(": '{}' is not after the row before it", csv.text(row, "t_s")));
   return t_s;
 }
 
+void add_named(std::vector<SkippedInput> named, std::vector<SkippedInput>* skipped) {
+  if (skipped != nullptr) std::ranges::move(named, std::back_inserter(*skipped));
+}
+
 }  // namespace
 
-std::vector<DepthReading> read_depth_sensor(const std::filesystem::path& file) {
+std::vector<DepthReading> read_depth_sensor(const std::filesystem::path& file, bool skip_bad,
+                                            std::vector<SkippedInput>* skipped) {
   const Csv csv = Csv::read(file);
   csv.require(std::array<std::string, 2>{"t_s", "depth_m"});
   std::vector<DepthReading> readings;
-  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
+  std::vector<SkippedInput> named;
+  for_each_row(csv, skip_bad, named, [&](std::size_t row) {
     DepthReading reading;
-    reading.t_s = later_time(csv, row, readings.empty() ? 0.0 : readings.back().t_s);
+    reading.t_s = later_time(csv, row, readings.empty() ? std::nullopt : std::optional(readings.back().t_s));
     reading.depth_m = csv.number(row, "depth_m");
     if (csv.has("sigma_m")) reading.sigma_m = csv.positive(row, "sigma_m");
     readings.push_back(reading);
-  }
+  });
+  add_named(std::move(named), skipped);
   if (readings.empty()) throw InputError(file.string() + ": has no readings; at least one row is needed");
   return readings;
 }
 
-std::vector<RangeReading> read_ranges(const std::filesystem::path& file) {
+std::vector<RangeReading> read_ranges(const std::filesystem::path& file, bool skip_bad,
+                                      std::vector<SkippedInput>* skipped) {
   const Csv csv = Csv::read(file);
   csv.require(std::array<std::string, 2>{"t_s", "range_m"});
   std::vector<RangeReading> readings;
-  for (std::size_t row = 0; row < csv.num_rows(); ++row)
-    readings.push_back(
-        {later_time(csv, row, readings.empty() ? 0.0 : readings.back().t_s), csv.positive(row, "range_m")});
+  std::vector<SkippedInput> named;
+  for_each_row(csv, skip_bad, named, [&](std::size_t row) {
+    readings.push_back({later_time(csv, row, readings.empty() ? std::nullopt : std::optional(readings.back().t_s)),
+                        csv.positive(row, "range_m")});
+  });
+  add_named(std::move(named), skipped);
   if (readings.empty()) throw InputError(file.string() + ": has no readings; at least one row is needed");
   return readings;
 }
@@ -186,7 +203,7 @@ std::vector<TimedPose> read_tum(const std::filesystem::path& file) {
 std::string tum_text(std::span<const TimedPose> poses) {
   std::string text = "# t x y z qx qy qz qw: world_from_cam\n";
   for (const TimedPose& pose : poses)
-    text += fmt::format("{:.9f}", pose.t_s) + pose_cells(pose.world_from_cam, ' ') + "\n";
+    text += fmt::format("{:.9f}", pose.t_s) + pose_cells(pose.world_from_cam, true) + "\n";
   return text;
 }
 
@@ -217,13 +234,13 @@ std::string map_ply(std::span<const MapPoint> points) {
 
 std::string poses_csv(std::span<const PathStep> path) {
   constexpr std::array<const char*, 6> names{"x", "y", "z", "rx", "ry", "rz"};
-  std::string text = "frame,t_s,x_m,y_m,z_m,qx,qy,qz,qw";
+  std::string text = "frame,t_s,x_m,y_m,z_m,qw,qx,qy,qz";
   for (std::size_t i = 0; i < 6; ++i)
     for (std::size_t j = i; j < 6; ++j) text += fmt::format(",cov_{}_{}", names[i], names[j]);
   text += ",num_seen,num_tracked,num_gated,nis_per_dof,event\n";
   for (const PathStep& step : path) {
     text += fmt::format("{},{:.9g}", step.frame, step.t_s);
-    text += step.has_pose() ? pose_cells(step.world_from_cam, ',') : ",,,,,,,";
+    text += step.has_pose() ? pose_cells(step.world_from_cam, false) : ",,,,,,,";
     for (int i = 0; i < 6; ++i)
       for (int j = i; j < 6; ++j) text += step.has_pose() ? fmt::format(",{:.6g}", step.cov(i, j)) : ",";
     const std::string nis = std::isfinite(step.nis_per_dof) ? fmt::format("{:.4f}", step.nis_per_dof) : "";

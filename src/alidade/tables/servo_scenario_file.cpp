@@ -359,8 +359,8 @@ target: {path: circle, start_m: [0.173, -0.314, 0.636], radius_m: 0.1, period_s:
 # target: {track: path.csv}      # a path that was recorded: t_s,x_m,y_m,z_m
 duration_s: 12
 warm_up_s: 2                     # not counted in the figures
-sample_period_s: 0.05            # pictures, encoders, commands
-latency_s: 0                     # from a picture to its pixel
+sample_period_s: 0.05            # images, encoders, commands
+latency_s: 0                     # from an image to its pixel
 # hidden_s: [5, 6]               # from, to: the target is not seen
 plant: {kind: angle, gain: 0.0567, unit: deg, tau_s: 0.1, command_delay_s: 0}
 # plant: {kind: rate, gain: 1, unit: rad, tau_s: 0.05, max_rate_deg_s: 180, max_acceleration_deg_s2: 1500,

@@ -90,7 +90,7 @@ std::vector<Blob> blobs_of(const cv::Mat& smoothed, double threshold, double max
   return kept;
 }
 
-/// The blob that is meant, or the reason why it cannot be told. The window's corner makes pixels of the image.
+/// The blob that is meant, or the reason why it cannot be determined. The window's corner makes pixels of the image.
 std::optional<Blob> choose(const std::vector<Blob>& blobs, const TargetLook& look,
                            const std::optional<Eigen::Vector2d>& expected, const Eigen::Vector2d& corner,
                            std::string& reason) {

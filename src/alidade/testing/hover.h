@@ -23,7 +23,7 @@ struct Hover {
   double sigma_px = 0.5, sigma_known_m = 0.001;
   double distance_m = 0.9;
   bool turns_in_place = false;
-  // What is not as told.
+  // What is not as given.
   double readout_s = 0.0;           ///< From the first row to the last, the time being that of the middle one.
   double target_speed_m_s = 0.0;    ///< Along x, against the other points.
   double target_stretch = 0.0;      ///< Of the told points along x, relative.

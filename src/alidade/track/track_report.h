@@ -24,7 +24,7 @@ struct PredictedStep {
   Belief<6> belief;
 };
 
-/// What the innovations of one head tell, each scaled to σ = 1: where all holds they are white, with mean zero wherever
+/// What the innovations of one head show, each scaled to σ = 1: where all holds they are white, with mean zero wherever
 /// the target is and however it moves. Those rejected by the gate count, at the gate.
 struct HeadInnovations {
   std::size_t num = 0;

@@ -35,7 +35,7 @@ struct Refusal {
 Refusal too_few(const TurnedReport& report, const MatchedPhotos& photos) {
   const std::size_t count = photos.names.size();
   const std::string more = "take three or more from one spot, each overlapping the last by a third or more";
-  if (count < 2) return {"one photo tells nothing of a rotation", more};
+  if (count < 2) return {"one photo does not determine a rotation", more};
   const auto same = std::ranges::count_if(
       report.photos, [](const RotatedPhoto& photo) { return photo.reason.starts_with("is the same image"); });
   if (same + 1 == static_cast<std::ptrdiff_t>(count))
@@ -75,7 +75,7 @@ Refusal weak(const TurnedReport& report, const MatchedPhotos& photos, const Turn
   if (is_centre) what += is_aspect ? ", cx and cy" : "cx and cy";
   if (is_aspect && !config.square_pixels) hold = " --square-pixels";
   if (is_centre && !config.fixed_centre) hold += " --fix-centre";
-  return {"with the rotation unknown these views cannot tell " + what,
+  return {"with the rotation unknown these views cannot determine " + what,
           (hold.empty() ? "" : "fix what you know:" + hold + ", or ") + turn};
 }
 

@@ -9,7 +9,7 @@ export function checksTable(doc: Doc): HTMLElement {
   return el('div', {class: 'scroll'}, el('table', {class: 'estimate'},
     el('thead', {}, el('tr', {}, el('th'), el('th'), el('th', {}, 'value'), el('th', {}, 'limit'), el('th'))),
     el('tbody', {}, ...doc.checks.map((check) => {
-      // Both zero: what cannot be told at all has neither.
+      // Both zero: what cannot be determined at all has neither.
       const look = lookOf(check.state), hasValue = check.value !== 0 || check.limit !== 0;
       return el('tr', {}, el('th', {}, el('span', {class: `state-${look.name}`, role: 'img', 'aria-label': look.word}, look.symbol), ` ${check.name}`), el('td', {class: 'word', style: 'text-align:left'}, check.text),
         el('td', {class: 'value'}, hasValue ? num(check.value, 3) : '–'), el('td', {class: 'right'}, hasValue ? num(check.limit, 3) : '–'), el('td', {class: 'unit'}, hasValue ? check.unit : ''));

@@ -34,8 +34,8 @@ export const observeMotion: Figure = {
     if (hasWeak) {
       const levels: Level[] = [];
       if (care > 0) levels.push({value: care, words: 'with care below', colour: 'orange'});
-      if (limit > 0) levels.push({value: limit, words: 'below: cannot be told', colour: 'red'});
-      if (!(limit > 0) && check && check.limit > 0 && check.unit === 'px') levels.push({value: 1 / check.limit ** 2, words: 'below: cannot be told', colour: 'red'});
+      if (limit > 0) levels.push({value: limit, words: 'below: cannot be determined', colour: 'red'});
+      if (!(limit > 0) && check && check.limit > 0 && check.unit === 'px') levels.push({value: 1 / check.limit ** 2, words: 'below: cannot be determined', colour: 'red'});
       const floor = Math.max(0.3 * Math.min(quantile(weak.filter((v) => v > 0), 0.02), ...levels.map((l) => l.value)), 1e-18);
       new SeriesPlot(host, {...common, lines: [{name: 'information', values: weak, colour: 'ink'}], levels, isLog: true, label: 'information on the weakest combination, 1/px²', height: 150,
         aria: `information on the weakest combination, at the end ${num(lastOf(weak), 2)}`, isFilling: true, range: [floor, 3 * Math.max(quantile(weak, 1), ...levels.map((l) => l.value))], digits: 3});

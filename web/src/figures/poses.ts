@@ -27,7 +27,7 @@ function squares(world: World, board: Board, pose: Pose): void {
       if ((row + col) % 2 === 0) world.face([[0, 0], [1, 0], [1, 1], [0, 1]].map(([c, r]) => at(board, pose, col + c!, row + r!)), 'orange', 0.75);
 }
 
-/** Three σ of where a board's middle is, in the camera's frame. Null where the document does not tell. */
+/** Three σ of where a board's centre is, in the camera's frame. Null where the document does not tell. */
 function threeSigma(table: Table, row: number): V3[] | null {
   const c = (name: string) => table.number(`cov_middle_${name}_m2`, row);
   const cov: M3 = [[c('xx'), c('xy'), c('xz')], [c('xy'), c('yy'), c('yz')], [c('xz'), c('yz'), c('zz')]];

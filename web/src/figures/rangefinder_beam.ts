@@ -88,7 +88,7 @@ export const rangefinderBeam: Figure = {
     const size = Math.max(sigma, ...(atEnd?.sigma ?? []), ...(beam && covOrigin(beam) ? halfAxes(covOrigin(beam)!).map(norm) : [0]));
     const factor = size > 0 ? Math.max(1, roundDown125((0.02 * longest) / size)) : 1;
     const nearFactor = size > 0 && beam ? Math.max(1, roundDown125((0.12 * norm(beam.origin)) / size)) : 1;
-    legend(host, [{words: `beam${beam ? `, 3σ of it and of its origin ×${factor}` : ': cannot be told'}`, colour: 'var(--red)'}, {words: 'board of a used shot', colour: 'var(--blue)', look: 'square'},
+    legend(host, [{words: `beam${beam ? `, 3σ of it and of its origin ×${factor}` : ': cannot be determined'}`, colour: 'var(--red)'}, {words: 'board of a used shot', colour: 'var(--blue)', look: 'square'},
       {words: 'chosen', colour: 'var(--orange)', look: 'square'}, ...(shots.some((s) => isFinite3(s.hit)) ? [{words: 'where the beam hit', colour: 'var(--red)', look: 'dot' as const}] : []), ...(shots.some((s) => !s.isUsed) ? [{words: 'not used', colour: 'var(--soft)', look: 'square' as const}] : [])]);
     const row = el('div', {class: 'row', style: 'flex:1'}), left = el('div', {style: 'flex:2.2'}), right = el('div');
     host.append(row);

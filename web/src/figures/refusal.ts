@@ -1,10 +1,10 @@
-// What cannot be told? Each check's value beside its limit, and what to add: a refusal is also a page.
+// What cannot be determined? Each check's value beside its limit, and what to add: a refusal is also a page.
 import {el} from '../core/dom';
 import type {Figure} from '../core/figure';
 import {checksTable} from './checks';
 
 export const refusal: Figure = {
-  id: 'refusal', title: 'What cannot be told?', note: 'value beside its limit', span: 24,
+  id: 'refusal', title: 'What cannot be determined?', note: 'value beside its limit', span: 24,
   draw(host, doc) {
     if (doc.isAnswer || !doc.isReadable || (!doc.sentence && doc.checks.length === 0)) return null;
     host.append(el('p', {}, el('b', {}, doc.sentence)));

@@ -1,4 +1,4 @@
-// rig: axes, cameras and the other head in space; coverage; residuals against angles; what cannot be told.
+// rig: axes, cameras and the other head in space; coverage; residuals against angles; what cannot be determined.
 import {Chart} from '../core/chart';
 import {cividis, css, directionColour, pixelShare} from '../core/colours';
 import type {Doc, Table} from '../core/document';

@@ -1,4 +1,5 @@
 #include "alidade/board_detector/kinds/circle_grid.h"
+#include "alidade/estimation/median.h"
 
 #include <Eigen/LU>
 #include <Eigen/QR>
@@ -8,6 +9,7 @@
 #include <numbers>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/features2d.hpp>
+#include <utility>
 
 #include "alidade/board_detector/kinds/circle_grid_ellipse.h"
 
@@ -142,8 +144,7 @@ double measured_radius_m(const std::vector<std::optional<Ellipse>>& ellipses, co
     if (image) radii.push_back(guess_m * std::sqrt(ellipses[i]->area() / image->ellipse.area()));
   }
   if (radii.empty()) return guess_m;
-  std::nth_element(radii.begin(), radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2), radii.end());
-  return radii[radii.size() / 2];
+  return median_of(std::move(radii));
 }
 
 std::vector<LocalMap> local_maps(const std::vector<Eigen::Vector3d>& places,

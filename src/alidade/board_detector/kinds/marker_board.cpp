@@ -37,7 +37,7 @@ Markers read_markers(const cv::Mat& grey, const std::string& dictionary, int bor
     for (std::size_t k = 0; k < 4; ++k) markers[ids[i]][k] = {corners[i][k].x, corners[i][k].y};
     ++times_seen[ids[i]];
   }
-  for (const auto& [id, times] : times_seen)  // which of two equal markers is the board's cannot be told
+  for (const auto& [id, times] : times_seen)  // which of two equal markers is the board's cannot be determined
     if (times > 1) markers.erase(id);
   return markers;
 }

@@ -1,4 +1,5 @@
 #include "alidade/calibrate/checks/calibration_verdict.h"
+#include "alidade/estimation/median.h"
 
 #include <algorithm>
 #include <array>
@@ -145,9 +146,7 @@ Tails corner_tails(const CalibrateReport& report, std::span<const BoardView> vie
     }
   }
   if (norms.empty()) return tails;
-  const auto middle = norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
-  std::nth_element(norms.begin(), middle, norms.end());
-  const double robust_sigma = *middle / std::sqrt(2.0 * std::log(2.0));
+  const double robust_sigma = median_of(norms) / std::sqrt(2.0 * std::log(2.0));
   const auto is_far = [&](double norm) { return norm > 6.0 * robust_sigma; };
   tails.far = static_cast<int>(std::count_if(norms.begin(), norms.end(), is_far));
   tails.far_in_use = static_cast<int>(std::count_if(norms_in_use.begin(), norms_in_use.end(), is_far));
@@ -200,10 +199,10 @@ Check board_flat(const CalibrationStudy& study, const CalibrateConfig& config) {
     check.text = (transfer.transfers() ? "the shape transfers: " : "the shape does not transfer: ") + figures;
   } else {
     check.state = transfer.is_proved() ? State::care : State::good;
-    check.text =
-        (transfer.is_proved() ? (held ? "the board has another shape: " : "the board bends: ")
-                              : (held ? "as given, as far as the photos tell: " : "flat as far as the photos tell: ")) +
-        figures;
+    check.text = (transfer.is_proved() ? (held ? "the board has another shape: " : "the board bends: ")
+                                       : (held ? "as given, as far as the photos determine: "
+                                               : "flat as far as the photos determine: ")) +
+                 figures;
   }
   return check;
 }

@@ -16,7 +16,8 @@ namespace alidade {
                                           std::span<const BoardView> views, const CalibrateConfig& config,
                                           const NextPhotoPlan& next);
 
-/// The verdict of a calibration that was refused or did not settle: exit code 4 or 5, what cannot be told, what to add.
+/// The verdict of a calibration that was refused or did not settle: exit code 4 or 5, what cannot be determined, what
+/// to add.
 [[nodiscard]] Verdict refusal_verdict(const CalibrateReport& report);
 
 }  // namespace alidade

@@ -1,8 +1,10 @@
 #include "alidade/calibrate/solve/weights.h"
+#include "alidade/estimation/median.h"
 
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace alidade {
 namespace {
@@ -36,10 +38,7 @@ double median_norm(const std::vector<std::vector<Eigen::Vector2d>>& residuals) {
       if (r.allFinite()) norms.push_back(r.norm());
     }
   }
-  if (norms.empty()) return 0.0;
-  const auto middle = norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
-  std::nth_element(norms.begin(), middle, norms.end());
-  return *middle;
+  return median_of(std::move(norms));
 }
 
 /// Visits every corner as (view, corner number, residual, own covariance).

@@ -150,7 +150,7 @@ void add_radial(const Localization& report, Verdict& verdict) {
   const State state = state_of(value, care_share, bad_share);
   verdict.checks.push_back({"radial structure", state,
                             state == State::good ? "residuals along the radius are as noise leaves them"
-                                                 : "residuals depend on the distance from the middle of the image, " +
+                                                 : "residuals depend on the distance from the centre of the image, " +
                                                        text_of(radial.worst_px, 2) +
                                                        " px at worst: the lens is not as "
                                                        "given",
@@ -227,8 +227,9 @@ void add_sensors(const Localization& report, Verdict& verdict) {
   for (const SensorScale& each : report.sensor_scales) {
     if (!(each.sigma_rel > 0.0)) {
       verdict.checks.push_back({each.sensor, State::care,
-                                "the readings of the " + each.sensor + " do not tell the scale: " +
-                                    (each.sensor == "depth sensor"
+                                "the readings of the " + each.sensor + " do not determine the scale: " +
+                                    (!each.is_in_time ? "none of them is of the time of the path (t_s)"
+                                     : each.sensor == "depth sensor"
                                          ? "too few of them, or the camera moves too little up and down"
                                          : "too few of them, or too few points around the beam that lie on a surface"),
                                 0.0, 0.0, "", "path"});

@@ -200,14 +200,18 @@ std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, 
 
 void read_scales(const LocalizeConfig& config, std::span<const MapPoint> map, Localization& result) {
   result.sensor_scales.clear();
-  const auto add = [&](const char* sensor, const std::optional<ReadScale>& read) {
-    SensorScale scale{sensor, 1.0, 0.0, 0, 0};
-    if (read) scale = {sensor, read->scale, read->sigma_rel, read->num_used, read->num_rejected};
+  const auto add = [&](const char* sensor, const auto& readings, const std::optional<ReadScale>& read) {
+    SensorScale scale{sensor, 1.0, 0.0, 0, 0, true};
+    if (read) scale = {sensor, read->scale, read->sigma_rel, read->num_used, read->num_rejected, true};
+    scale.is_in_time = std::ranges::any_of(readings, [&](const auto& reading) {
+      return !result.path.empty() && reading.t_s >= result.path.front().t_s && reading.t_s <= result.path.back().t_s;
+    });
     result.sensor_scales.push_back(scale);
   };
-  if (!config.depth_readings.empty()) add("depth sensor", scale_by_depth(config.depth_readings, result.path));
+  if (!config.depth_readings.empty())
+    add("depth sensor", config.depth_readings, scale_by_depth(config.depth_readings, result.path));
   if (!config.range_readings.empty() && config.beam)
-    add("rangefinder", scale_by_range(config.range_readings, *config.beam, result.path, map));
+    add("rangefinder", config.range_readings, scale_by_range(config.range_readings, *config.beam, result.path, map));
 }
 
 std::optional<ReadScale> scale_of(const Localization& result) {

@@ -1,6 +1,7 @@
 #include "alidade/localize/filter/observation_record.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "alidade/localize/known_pose.h"
@@ -22,7 +23,7 @@ RangePrior vague(RangePrior range, long id, bool sets_unit, const LocalizeConfig
 
 /// Of the points that are there at once, from their first observation to their last, so many that the work stays in
 /// proportion; known ones first, then those with the most observations. False where that leaves too few.
-[[nodiscard]] bool thin(std::span<const ObservationFrame> frames, double max_work, std::vector<SmootherPoint>& points) {
+[[nodiscard]] bool thin(std::span<const ObservationFrame> frames, double most, std::vector<SmootherPoint>& points) {
   struct Life {
     std::size_t point = 0, first = 0, last = 0, num = 0;
   };
@@ -36,9 +37,7 @@ RangePrior vague(RangePrior range, long id, bool sets_unit, const LocalizeConfig
       at->second.last = k;
     }
   }
-  constexpr double num_shared = 24.0;
   constexpr double enough = 25.0;
-  const double most = (std::sqrt(max_work / static_cast<double>(frames.size())) - num_shared) / 3.0;
   std::vector<Life> by_use;
   for (const auto& [id, life] : lives)
     if (life.num > 0) by_use.push_back(life);
@@ -144,6 +143,24 @@ void BackwardPath::give_back() {
   observations.pop_back();
 }
 
+/// A filter's unit grows while depths are vague. Where the supposed distances of the first points are the unit, the
+/// path begins at theirs: the scale that their inverses ask for, by least squares.
+void rescale(SmootherProblem& problem) {
+  constexpr double is_unit = 1.0;  // the others' σ is five times the distance
+  double products = 0.0, squares = 0.0;
+  for (const SmootherPoint& point : problem.points) {
+    if (!point.range || !(point.range->sigma_rel < is_unit)) continue;
+    const double weight = point.range->range_m / point.range->sigma_rel;
+    const double distance = (point.point_in_world - problem.world_from_cam[point.first_frame].translation).norm();
+    products += weight * weight / (distance * point.range->range_m);
+    squares += weight * weight / (distance * distance);
+  }
+  const double scale = squares / products;
+  if (!(scale > 0.0) || !std::isfinite(scale)) return;
+  for (Rigid3& pose : problem.world_from_cam) pose.translation *= scale;
+  for (SmootherPoint& point : problem.points) point.point_in_world *= scale;
+}
+
 }  // namespace
 
 bool is_settled(const Feature& feature, const LocalizationFilter& filter, const LocalizeConfig& config) {
@@ -156,8 +173,15 @@ bool is_settled(const Feature& feature, const LocalizationFilter& filter, const 
   return std::atan2(first.cross(now).norm(), first.dot(now)) > min_parallax_rad;
 }
 
+double max_points_at_once(std::size_t num_frames) {
+  constexpr double max_work = 2e8;  // frames times the square of the numbers that are there at once: seconds
+  constexpr double num_shared = 24.0;
+  return (std::sqrt(max_work / static_cast<double>(num_frames)) - num_shared) / 3.0;
+}
+
 void ObservationRecord::begin(std::size_t frame) {
   if (num_begun_++ == 0) first_frame_ = frame;
+  last_begun_ = frame;
 }
 
 void ObservationRecord::add_points(const LocalizeConfig& config, const LocalizationFilter& filter,
@@ -199,12 +223,13 @@ void ObservationRecord::add_gone(const LocalizeConfig& config, std::span<const G
 std::optional<SmootherProblem> ObservationRecord::problem(
     const Camera& camera, const LocalizeConfig& config, std::span<const ObservationFrame> frames,
     std::span<const PathStep> path, const LocalizationFilter& filter, std::span<const GonePoint> gone,
-    const std::optional<StartHypothesis>& start, double period_s) const {
+    const std::optional<StartHypothesis>& start, double period_s, bool has_loops) const {
   SmootherProblem problem;
   add_points(config, filter, problem);
   add_gone(config, gone, problem);
-  constexpr double max_work = 2e8;  // frames times the square of the numbers that are there at once: seconds
-  if (!thin(frames, max_work, problem.points)) return std::nullopt;
+  constexpr double of_all = 0.6;
+  const double most = max_points_at_once(frames.size()) * (has_loops ? of_all : 1.0);
+  if (!thin(frames, most, problem.points)) return std::nullopt;
   BackwardPath back(camera, config, filter, gone, problem);
   std::size_t first = path.size();
   while (first > first_frame_) {
@@ -238,6 +263,10 @@ std::optional<SmootherProblem> ObservationRecord::problem(
     return std::nullopt;
   problem.camera = camera;
   if (num_begun_ == 1 && (config.start || !has_target)) problem.start = start;  // else the observations contradicted it
+  if (!config.start && !has_target) {
+    problem.gauge = PathGauge::similarity;
+    rescale(problem);
+  }
   problem.sigma_speed_m_s = config.sigma_speed_m_s;
   problem.sigma_rate_rad_s = config.sigma_rate_rad_s;
   problem.period_s = period_s;

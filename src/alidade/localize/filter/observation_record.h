@@ -14,11 +14,15 @@ namespace alidade {
 /// length, and a parallax is enough.
 [[nodiscard]] bool is_settled(const Feature& feature, const LocalizationFilter& filter, const LocalizeConfig& config);
 
+/// Of so many frames, how many points may be in the smoother's equations at once for the work to stay in proportion.
+[[nodiscard]] double max_points_at_once(std::size_t num_frames);
+
 /// Where a run began, and when points entered its map: for smoothing the path at the end.
 class ObservationRecord {
  public:
   /// The path begins at this frame, for the first time or again.
   void begin(std::size_t frame);
+  [[nodiscard]] std::size_t begun() const { return last_begun_; }  ///< The last time.
   /// A point that comes back was born when it entered first: its range now is what it said before.
   void entered(std::size_t frame, long id, const RangePrior& prior, bool comes_back) {
     if (!comes_back || !births_.contains(id)) births_[id] = {frame, prior};
@@ -33,13 +37,14 @@ class ObservationRecord {
   /// it began at all are placed as far as the map is seen in them. Points that are not nearly linear yet are rejected:
   /// they tell little, and what they tell is not Gaussian. `gone`: points that left a full filter; their observations
   /// are used, too. `start`: what was told of the first pose. Points are left out where the work would be out of
-  /// proportion; none where that leaves too few, or a target's points were never seen.
+  /// proportion; none where that leaves too few, or a target's points were never seen. `has_loops`: room is left for
+  /// points that are joined over the time between.
   [[nodiscard]] std::optional<SmootherProblem> problem(const Camera& camera, const LocalizeConfig& config,
                                                        std::span<const ObservationFrame> frames,
                                                        std::span<const PathStep> path, const LocalizationFilter& filter,
                                                        std::span<const GonePoint> gone,
-                                                       const std::optional<StartHypothesis>& start,
-                                                       double period_s) const;
+                                                       const std::optional<StartHypothesis>& start, double period_s,
+                                                       bool has_loops = false) const;
 
  private:
   struct Birth {
@@ -50,10 +55,10 @@ class ObservationRecord {
   void add_gone(const LocalizeConfig& config, std::span<const GonePoint> gone, SmootherProblem& problem) const;
   /// Without a target and a start the supposed distances of the first points are the unit of length.
   [[nodiscard]] bool sets_unit(const LocalizeConfig& config, std::size_t frame) const {
-    return config.target.points.empty() && !config.start && frame == first_frame_;
+    return config.target.points.empty() && !config.start && frame == last_begun_;
   }
 
-  std::size_t first_frame_ = 0, num_begun_ = 0;
+  std::size_t first_frame_ = 0, last_begun_ = 0, num_begun_ = 0;
   std::map<long, Birth> births_;
   std::set<std::size_t> jumps_;
 };

@@ -196,6 +196,7 @@ SmoothedPath PathSmoother::result(const SmootherSystem& system) const {
   Eigen::MatrixXd cov = J * considered * J.transpose();
   cov.topLeftCorner(num, num) += llt.solve(Eigen::MatrixXd::Identity(num, num));
   PoseChain::Spread spread = system.chain.spread(cov, J);
+  align(system, considered, spread);
   SmoothedPath path;
   path.world_from_cam = state_.poses;
   for (std::size_t k = 0; k < state_.poses.size(); ++k) {

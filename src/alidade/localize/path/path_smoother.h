@@ -36,6 +36,13 @@ struct PlacedResidual {
   double sigma_px = 0.5;
 };
 
+/// What of a path's place in the world no measurement says: its covariance is that after the best alignment.
+enum class PathGauge {
+  fixed,       ///< A start or known points say it.
+  motion,      ///< Position and rotation: the first camera is the world.
+  similarity,  ///< Its unit of length as well.
+};
+
 /// What a path is smoothed from. Frames follow each other without a break.
 struct SmootherProblem {
   std::size_t first_frame = 0;  ///< Of the recording.
@@ -47,7 +54,8 @@ struct SmootherProblem {
   std::vector<SmootherPoint> points;
   std::optional<StartHypothesis> start;  ///< What was told of the first pose; else its speeds alone, zero with these σ:
   double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;
-  double period_s = 1.0 / 30.0;     ///< Accelerations are drawn again for each.
+  double period_s = 1.0 / 30.0;  ///< Accelerations are drawn again for each.
+  PathGauge gauge = PathGauge::fixed;
   double sigma_scale = 0.0;         ///< Of the told points' common scale, counted and not estimated.
   LocalizationFilterConfig filter;  /// σ of accelerations, the gate, and what of the lens is estimated.
 };

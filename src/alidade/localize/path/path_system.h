@@ -67,6 +67,8 @@ class PathSmoother {
   void fill_map(std::span<const Eigen::Matrix3d> covs, SmoothedPath& path) const;
   void fill_lens(const Eigen::MatrixXd& cov, SmoothedPath& path) const;
   void add_clock(SmoothedPath& path) const;
+  /// path_gauge.cpp.
+  void align(const SmootherSystem& system, const Eigen::MatrixXd& considered, PoseChain::Spread& spread) const;
   /// path_profile.cpp.
   void widen(double min_cost, SmoothedPath& path);
   [[nodiscard]] bool hold_weakest(const SmoothedPath& path);

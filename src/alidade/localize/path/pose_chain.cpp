@@ -131,6 +131,62 @@ PoseChain::Steps PoseChain::steps(const Eigen::VectorXd& shared) const {
   return steps;
 }
 
+/// What is left of right-hand sides as poses and points leave, in the order in which they did: y of each step, and of
+/// the border what belongs to the shared numbers.
+std::vector<Eigen::MatrixXd> PoseChain::forward(const std::vector<Eigen::MatrixXd>& W, Eigen::MatrixXd& border) const {
+  const Eigen::Index num_columns = W.front().cols();
+  border = Eigen::MatrixXd::Zero(B.rows(), num_columns);
+  Eigen::MatrixXd poses = Eigen::MatrixXd::Zero(rest_dim, num_columns);  // of the window, but its first
+  Eigen::MatrixXd first = Eigen::MatrixXd::Zero(pose_dim, num_columns);
+  std::vector<Eigen::MatrixXd> y;
+  for (const Step& step : steps_) {
+    y.emplace_back();
+    if (step.event == Event::entered) continue;
+    if (step.event == Event::pose) {
+      first = poses.topRows<pose_dim>() + W[step.index];
+      poses.topRows<pose_dim>() = poses.bottomRows<pose_dim>().eval();
+      poses.bottomRows<pose_dim>().setZero();
+    } else {
+      first = border.middleRows<3>(step.place);
+      border.middleRows<3>(step.place).setZero();
+    }
+    y.back() = step.L.triangularView<Eigen::Lower>().solve(first);
+    poses.noalias() -= step.W_poses.transpose() * y.back();
+    border.topRows(step.W_border.cols()).noalias() -= step.W_border.transpose() * y.back();
+  }
+  return y;
+}
+
+PoseChain::Columns PoseChain::solve(const std::vector<Eigen::MatrixXd>& W, int num_solved) const {
+  Eigen::MatrixXd border;
+  const std::vector<Eigen::MatrixXd> y = forward(W, border);
+  const Eigen::Index num_columns = W.front().cols();
+  Eigen::MatrixXd shared = Eigen::MatrixXd::Zero(B.rows(), num_columns);
+  if (num_solved > 0) {
+    const Eigen::LLT<Eigen::MatrixXd> llt(B.topLeftCorner(num_solved, num_solved));
+    shared.topRows(num_solved) = llt.solve(border.topRows(num_solved));
+  }
+  Columns columns{std::vector<Eigen::MatrixXd>(num_poses_), std::vector<Eigen::MatrixXd>(place_of_.size())};
+  Eigen::MatrixXd after = Eigen::MatrixXd::Zero(rest_dim, num_columns);
+  for (std::size_t k = steps_.size(); k-- > 0;) {
+    const Step& step = steps_[k];
+    if (step.event == Event::entered) {
+      shared.middleRows<3>(step.place).setZero();
+      continue;
+    }
+    const Eigen::MatrixXd rhs = y[k] - step.W_poses * after - step.W_border * shared.topRows(step.W_border.cols());
+    const Eigen::MatrixXd x = step.L.transpose().triangularView<Eigen::Upper>().solve(rhs);
+    if (step.event == Event::left) {
+      columns.points[step.index] = shared.middleRows<3>(step.place) = x;
+      continue;
+    }
+    columns.poses[step.index] = x;
+    after.bottomRows<pose_dim>() = after.topRows<pose_dim>().eval();
+    after.topRows<pose_dim>() = x;
+  }
+  return columns;
+}
+
 /// The covariance of the two poses of the window that stay, and of the border, from the last that left to the first.
 struct PoseChain::Backward {
   Eigen::Matrix<double, rest_dim, rest_dim> P = Eigen::Matrix<double, rest_dim, rest_dim>::Zero();
@@ -197,6 +253,7 @@ PoseChain::Spread PoseChain::spread(const Eigen::MatrixXd& shared_cov, const Eig
   spread.cov.resize(num_poses_);
   spread.J.resize(num_poses_);
   spread.point_cov.resize(place_of_.size(), Eigen::Matrix3d::Zero());
+  spread.point_J.resize(place_of_.size());
   Backward now;
   now.C = Eigen::MatrixXd::Zero(B.rows(), B.rows());
   now.C.topLeftCorner(num_shared_, num_shared_) = shared_cov;
@@ -214,6 +271,7 @@ PoseChain::Spread PoseChain::spread(const Eigen::MatrixXd& shared_cov, const Eig
     if (step.event == Event::left) {
       now.take_back_point(step, back);
       spread.point_cov[step.index] = back.cov;
+      spread.point_J[step.index] = back.J;
       continue;
     }
     now.take_back_pose(back);

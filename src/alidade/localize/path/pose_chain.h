@@ -52,8 +52,16 @@ class PoseChain {
     std::vector<Eigen::Matrix<double, pose_dim, pose_dim>> cov;
     std::vector<Eigen::Matrix<double, pose_dim, Eigen::Dynamic>> J;
     std::vector<Eigen::Matrix3d> point_cov;
+    std::vector<Eigen::Matrix<double, 3, Eigen::Dynamic>> point_J;
   };
   [[nodiscard]] Spread spread(const Eigen::MatrixXd& shared_cov, const Eigen::MatrixXd& J_shared) const;
+
+  /// Σ W: the covariance of all poses and points with sums over the poses, W having six rows for each; the first
+  /// `num_solved` of the shared numbers are solved for, too, the others fixed.
+  struct Columns {
+    std::vector<Eigen::MatrixXd> poses, points;
+  };
+  [[nodiscard]] Columns solve(const std::vector<Eigen::MatrixXd>& W, int num_solved) const;
 
  private:
   static constexpr int rest_dim = window - pose_dim;
@@ -70,6 +78,8 @@ class PoseChain {
   };
   struct Backward;
   void take_out(const Step& step);
+  [[nodiscard]] std::vector<Eigen::MatrixXd> forward(const std::vector<Eigen::MatrixXd>& W,
+                                                     Eigen::MatrixXd& border) const;
 
   int num_shared_ = 0, num_used_ = 0;  ///< Of the border.
   std::size_t num_poses_ = 0;

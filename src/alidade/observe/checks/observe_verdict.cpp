@@ -30,16 +30,16 @@ Reason reason_of(const ObserveSolution& report, const RotationLog& log, const Ob
     return {"roll only", "roll only: neither fx nor fy can be told", "pan and tilt the camera"};
   }
   if (path.x() < little * path.y()) {
-    return {"pan only", "pan only: fy cannot be told", "tilt the camera as well"};
+    return {"pan only", "pan only: fy cannot be determined", "tilt the camera as well"};
   }
   if (path.y() < little * path.x()) {
-    return {"tilt only", "tilt only: fx cannot be told", "pan the camera as well"};
+    return {"tilt only", "tilt only: fx cannot be determined", "pan the camera as well"};
   }
   if (config.rotation == RotationKnowledge::free) {
     std::string hold;
     if (!config.square_pixels) hold = " --square-pixels";
     if (!config.fixed_centre) hold += " --fix-centre";
-    return {"free rotation", "with the rotation unknown these views cannot tell fx / fy, cx and cy apart",
+    return {"free rotation", "with the rotation unknown these views cannot determine fx / fy, cx and cy apart",
             "measure the rotation, rotate the camera farther, about its axis of view too" +
                 (hold.empty() ? "" : ", or fix them:" + hold)};
   }
@@ -125,7 +125,7 @@ Verdict fang_refusal(const ObserveSolution& report, const RotationLog& log, cons
                     text_of(report.gramian_lambda_min, 2) + " < 1e-4";
   if (log.num_points < 3)
     why = "too few points for the paper's observer: " + std::to_string(log.num_points) + ", it needs three";
-  std::string add = "use --method hybrid, which can tell from this log";
+  std::string add = "use --method hybrid, which determines it from this log";
   if (reason.name == "too small a span") std::tie(why, add) = std::pair(reason.what, reason.add);
   Verdict verdict = refusal(why, add, ExitCode::cannot_tell);
   add_checks(report, verdict);

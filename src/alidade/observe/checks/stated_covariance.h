@@ -6,7 +6,7 @@
 namespace alidade {
 
 /// Covariance of an adjustment whose residuals share errors, in time (blur, a late clock, noise of the angles) and
-/// along the track of a point, and what tells it from the model's.
+/// along the track of a point, and why it differs from the model's.
 struct StatedCovariance {
   CommonMatrix cov;           ///< Of the common parameters, normalised; nowhere below the model's.
   CommonMatrix lasting;       ///< What it would be if errors of a track last as they were seen to, and nothing else.

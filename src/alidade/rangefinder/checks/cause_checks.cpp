@@ -1,4 +1,5 @@
 #include "alidade/rangefinder/checks/cause_checks.h"
+#include "alidade/estimation/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -80,12 +81,6 @@ void add_camera(const RangefinderReport& report, Verdict& verdict) {
                                                                             : "calibrate the camera again");
   }
   verdict.checks.push_back(std::move(check));
-}
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// How much larger the first values are than the second, in σ of the sum of their ranks, which one wild value does not

@@ -1,10 +1,12 @@
 #include "alidade/rangefinder/solve/align_edges.h"
+#include "alidade/estimation/median.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
 #include <numeric>
+#include <utility>
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/pantilt/head_rotation.h"
@@ -27,9 +29,7 @@ double median_step_rad(std::span<const ScanRow> scan) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < scan.size(); ++i)
     steps.push_back(std::hypot(scan[i].pan_rad - scan[i - 1].pan_rad, scan[i].tilt_rad - scan[i - 1].tilt_rad));
-  if (steps.empty()) return 0.0;
-  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
-  return steps[steps.size() / 2];
+  return median_of(std::move(steps));
 }
 
 /// Jumps between neighbours along the scan's lines and across them.

@@ -1,9 +1,11 @@
 #include "alidade/rangefinder/solve/beam_search.h"
+#include "alidade/estimation/median.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
 
 #include "alidade/beam/unit_direction.h"
 #include "alidade/rangefinder/solve/beam_start.h"
@@ -87,12 +89,9 @@ Agreement agreement_of(const Sample& shots, const Beam& beam, const Camera& came
   }
   const double limit = search.sigmas * search.sigmas;
   if (!search.knows_sigma) {
-    std::vector<double> sorted = found.chi2;
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::nth_element(sorted.begin(), middle, sorted.end());
     // Median of χ² by Wilson & Hilferty's cube root.
     const double rows = num_rows / static_cast<double>(shots.size());
-    found.scale2 = *middle / (rows * std::pow(1.0 - 2.0 / (9.0 * rows), 3));
+    found.scale2 = median_of(found.chi2) / (rows * std::pow(1.0 - 2.0 / (9.0 * rows), 3));
     if (!std::isfinite(found.scale2)) return found;
     found.scale2 = std::max({found.scale2, search.min_scale2, 1e-12});
   }

@@ -40,7 +40,7 @@ struct PoseColumns {
   }
 };
 
-/// Covariance of a board's middle in the camera's frame, six columns: the pose's, carried there.
+/// Covariance of a board's centre in the camera's frame, six columns: the pose's, carried there.
 struct MiddleColumns {
   Eigen::Vector3d middle_in_board;
   std::array<Numbers, 6> values;

@@ -63,7 +63,7 @@ void add_causes(std::span<const ServoSample> log, const ServoIdentification& ide
     check.state = State::care;
     check.text += "; " + std::string(servo_flaw_words[rival.other]) + " would explain it nearly as well as " +
                   servo_flaw_words[rival.flaw] + " (2 ln of their ratio " + text_of(rival.evidence, 2) +
-                  "): this log does not tell them apart";
+                  "): this log does not separate them";
   }
   if (!causes.empty()) {
     const ServoCause& first = causes.front();
@@ -78,7 +78,7 @@ void add_causes(std::span<const ServoSample> log, const ServoIdentification& ide
 
 /// What a log of one size of command could not show, by name and by what it would do.
 std::string hidden_text(const std::vector<HiddenFlaw>& hidden) {
-  std::string text = "steps of one size: they do not tell another gain from ";
+  std::string text = "steps of one size: they do not separate another gain from ";
   for (std::size_t i = 0; i < hidden.size(); ++i) {
     const HiddenFlaw& flaw = hidden[i];
     text += (i == 0 ? "" : i + 1 == hidden.size() ? " or " : ", ") + std::string(servo_flaw_words[flaw.flaw]);
@@ -148,7 +148,7 @@ Verdict identify_verdict(std::span<const ServoSample> log, const ServoIdentifica
   if (!(identified.angle_range_rad > 0.0)) return refused("no answer: the angle never changes", excite);
   const bool is_angle = fit.kind == ServoKind::angle;
   if (!fit.is_observable)
-    return refused("the log cannot tell gain, time constant and latency apart",
+    return refused("the log cannot separate gain, time constant and latency",
                    "log until the axis has come to rest, "
                    "and more than one change of command");
   const ServoParams sigma = fit.cov.diagonal().cwiseSqrt();

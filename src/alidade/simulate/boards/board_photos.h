@@ -26,7 +26,7 @@ struct BoardSceneConfig {
   int num_photos = 20;
   double max_tilt_rad = 0.6;
   double min_fill = 0.35, max_fill = 0.9;  ///< Printed size over image size, whichever axis is fuller.
-  double bow_m = 0.0;          ///< Height of the bow in the board's middle over its corners, away from the camera. [m]
+  double bow_m = 0.0;          ///< Height of the bow in the board's centre over its corners, away from the camera. [m]
   double shape_sigma_m = 0.0;  ///< Scatter of every point, in and out of plane. [m]
 };
 

@@ -7,13 +7,18 @@
 namespace alidade {
 
 struct SocketAddress {
-  std::string name;  ///< To begin a message with.
+  std::string name;  ///< To begin a message with; no password.
+  std::string user;  ///< "scheme://USER@HOST"; empty: none.
   std::string host;
   std::uint16_t port = 0;
 };
 
-/// Host and port of "scheme://HOST:PORT[/…]"; [::1] for addresses with colons. Throws InputError.
+/// Host and port of "scheme://[USER@]HOST:PORT[/…]"; [::1] for addresses with colons. Throws InputError; so does a
+/// password in it, which is not repeated.
 [[nodiscard]] SocketAddress address_of(const std::string& url, std::string_view scheme, std::uint16_t usual_port);
+
+/// An address as it may be shown: "scheme://…" alone where it has anything like a password in it.
+[[nodiscard]] std::string without_password(const std::string& url);
 
 /// A TCP connection whose every call ends within its timeout. After a failure it is closed: an answer that comes late
 /// is not taken for the next one's. Throws InputError.
@@ -33,6 +38,10 @@ class LineSocket {
   [[nodiscard]] std::string line();
   /// So many bytes.
   [[nodiscard]] std::string bytes(std::size_t count);
+  /// What has come, at least a byte of it; empty where nothing comes within so many seconds.
+  [[nodiscard]] std::string some(double wait_s);
+  /// All until the other side closes.
+  [[nodiscard]] std::string rest();
   void set_timeout(double timeout_s) { timeout_s_ = timeout_s; }
   [[nodiscard]] const SocketAddress& address() const { return address_; }
 

@@ -12,10 +12,19 @@ class Mat;
 
 namespace alidade {
 
+/// Who says when a frame was taken.
+enum class FrameTimes {
+  arrival,  ///< Nobody: it is when it came, less what the network held it back.
+  sender,   ///< RTCP's sender reports.
+  stamped   ///< Who took it.
+};
+
 /// A frame and when it was taken, by the run's clock.
 struct StreamFrame {
   double t_s = 0.0;
-  bool is_stamped = false;               ///< By who took it; else it is when it came.
+  FrameTimes times = FrameTimes::arrival;
+  double sigma_s = 0.0;                  ///< Of t_s, but for what all frames are late alike.
+  double came_s = 0.0;                   ///< When it was here.
   std::shared_ptr<const cv::Mat> image;  ///< 8 bits, grey or BGR.
 };
 
@@ -35,6 +44,7 @@ struct SimulatedCamera {
   Eigen::Vector3d mount_rad = Eigen::Vector3d::Zero();  ///< Rotation vector of cam_from_tilt.
   double fps = 12.0, delay_s = 0.0;                     ///< A frame stamped t shows the angle of t − delay_s.
   double noise = 1.5;
+  double jump_s = 0.0;  ///< Time stamps go back and forth by it, for a second of each three.
   /// A bright disc that goes to and fro about `target_rad` (pan, tilt) by `target_span_rad` of pan, at that rate; its
   /// radius zero: none.
   Eigen::Vector2d target_rad = Eigen::Vector2d::Zero();
@@ -43,7 +53,8 @@ struct SimulatedCamera {
 };
 
 /// "KEY=VALUE&…": size (WIDTHxHEIGHT), fx, fy, cx, cy, k1, mount (x:y:z in degrees), fps, delay, noise, seed, target
-/// (rate:pan:tilt:span:radius in degrees). Throws InputError.
+/// (rate:pan:tilt:span:radius in degrees), jump (seconds by which its time stamps go wrong now and then). Throws
+/// InputError, which names all keys where one is not known.
 [[nodiscard]] SimulatedCamera simulated_camera(const std::string& text, const std::string& where);
 
 /// Renders what such a camera sees at an angle of its head.
@@ -59,12 +70,25 @@ class CameraRenderer {
   std::unique_ptr<World> world_;
 };
 
-/// The stream of a URL: http://HOST:PORT/PATH (motion JPEG), sim://?… (what the simulated head's camera sees). Throws
-/// InputError.
-[[nodiscard]] std::unique_ptr<FrameStream> open_stream(const std::string& url, HeadDevice& head);
+/// The time stamp of such a camera's frame of that time, as wrong as its `jump_s` makes it.
+[[nodiscard]] double stamp_of(const SimulatedCamera& camera, double t_s);
+
+/// The stream of a URL: http://HOST:PORT/PATH (motion JPEG), rtsp://…, v4l2:/dev/video0, onvif://… (the camera says
+/// where), sim://?… (what the simulated head's camera sees). {password} in it stands for the password. Throws
+/// InputError, without it.
+[[nodiscard]] std::unique_ptr<FrameStream> open_stream(const std::string& url, HeadDevice& head,
+                                                       const HeadOptions& options = {});
 
 /// Motion JPEG over HTTP, read by a thread of its own: multipart/x-mixed-replace, each part a JPEG. X-Timestamp of a
-/// part, seconds since 1970, is when it was taken.
-[[nodiscard]] std::unique_ptr<FrameStream> open_mjpeg(const std::string& url, std::shared_ptr<HeadClock> clock);
+/// part, seconds since 1970, is when it was taken; `url` with {password} in the place of it.
+[[nodiscard]] std::unique_ptr<FrameStream> open_mjpeg(const std::string& url, const std::string& password,
+                                                      std::shared_ptr<HeadClock> clock);
+
+/// What the decoder beside this program reads: rtsp://, v4l2:, http:// of other kinds.
+[[nodiscard]] std::unique_ptr<FrameStream> open_decoded(const std::string& url, const std::string& password,
+                                                        std::shared_ptr<HeadClock> clock);
+
+/// `text` with the password where {password} stands. Throws InputError where there is none to put there.
+[[nodiscard]] std::string with_secret(const std::string& text, const std::string& password);
 
 }  // namespace alidade

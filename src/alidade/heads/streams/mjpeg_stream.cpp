@@ -11,8 +11,10 @@
 #include <thread>
 
 #include "alidade/files/files.h"
-#include "alidade/heads/frame_stream.h"
-#include "alidade/heads/line_socket.h"
+#include "alidade/heads/protocols/line_socket.h"
+#include "alidade/heads/protocols/soap.h"
+#include "alidade/heads/streams/arrival_times.h"
+#include "alidade/heads/streams/frame_stream.h"
 #include "alidade/imaging/image_codecs.h"
 
 namespace alidade {
@@ -28,8 +30,11 @@ std::string lower(std::string text) {
 
 class MjpegStream final : public FrameStream {
  public:
-  MjpegStream(const std::string& url, std::shared_ptr<HeadClock> clock)
-      : name_(url), clock_(std::move(clock)), socket_(address_of(url, "http://", 80), first_timeout_s) {
+  MjpegStream(const std::string& url, std::string password, std::shared_ptr<HeadClock> clock)
+      : name_(url),
+        password_(std::move(password)),
+        clock_(std::move(clock)),
+        socket_(address_of(url, "http://", 80), first_timeout_s) {
     begin();
     const StreamFrame first = next();
     frames_.push_back(first);
@@ -53,10 +58,14 @@ class MjpegStream final : public FrameStream {
   void begin() {
     socket_.connect();
     const std::size_t slash = name_.find('/', std::string_view("http://").size());
-    const std::string path = slash == std::string::npos ? "/" : name_.substr(slash);
+    const std::string path = slash == std::string::npos ? "/" : with_secret(name_.substr(slash), password_);
+    const std::string& user = socket_.address().user;
+    const std::string login =
+        user.empty() ? "" : "Authorization: Basic " + base64_text(user + ":" + password_) + "\r\n";
     // 1.0: the answer comes in one piece, not in chunks.
-    socket_.write(fmt::format("GET {} HTTP/1.0\r\nHost: {}:{}\r\nAccept: multipart/x-mixed-replace, image/jpeg\r\n\r\n",
-                              path, socket_.address().host, socket_.address().port));
+    socket_.write(
+        fmt::format("GET {} HTTP/1.0\r\nHost: {}:{}\r\n{}Accept: multipart/x-mixed-replace, image/jpeg\r\n\r\n", path,
+                    socket_.address().host, socket_.address().port, login));
     const std::string status = socket_.line();
     if (status.find(" 200") == std::string::npos)
       throw InputError(fmt::format("{}: answers '{}'", name_, status.substr(0, 60)));
@@ -86,7 +95,10 @@ class MjpegStream final : public FrameStream {
     const cv::Mat image = decode_image(jpeg);
     if (image.empty() || image.depth() != CV_8U) throw InputError(name_ + ": a part of the stream is no JPEG");
     const bool is_stamped = stamp && std::isfinite(*stamp) && std::abs(*stamp - now_s) < 3600.0;
-    return {is_stamped ? *stamp : now_s, is_stamped, std::make_shared<const cv::Mat>(image)};
+    const FilteredTime filtered = arrivals_.add(now_s);
+    auto kept = std::make_shared<const cv::Mat>(image);
+    if (is_stamped) return {*stamp, FrameTimes::stamped, 0.0, now_s, std::move(kept)};
+    return {filtered.t_s, FrameTimes::arrival, filtered.sigma_s, now_s, std::move(kept)};
   }
 
   void read() {
@@ -115,6 +127,7 @@ class MjpegStream final : public FrameStream {
       std::this_thread::sleep_for(std::chrono::milliseconds(first_pause_ms << i));
       try {
         socket_.close();
+        arrivals_ = {};
         begin();
         return true;
       } catch (const InputError&) {  // not yet
@@ -123,9 +136,10 @@ class MjpegStream final : public FrameStream {
     return false;
   }
 
-  std::string name_;
+  std::string name_, password_;
   std::shared_ptr<HeadClock> clock_;
   LineSocket socket_;
+  ArrivalTimes arrivals_;
   std::mutex mutex_;
   std::deque<StreamFrame> frames_;
   std::string fault_;
@@ -135,8 +149,9 @@ class MjpegStream final : public FrameStream {
 
 }  // namespace
 
-std::unique_ptr<FrameStream> open_mjpeg(const std::string& url, std::shared_ptr<HeadClock> clock) {
-  return std::make_unique<MjpegStream>(url, std::move(clock));
+std::unique_ptr<FrameStream> open_mjpeg(const std::string& url, const std::string& password,
+                                        std::shared_ptr<HeadClock> clock) {
+  return std::make_unique<MjpegStream>(url, password, std::move(clock));
 }
 
 }  // namespace alidade

@@ -1,4 +1,4 @@
-#include "alidade/heads/frame_stream.h"
+#include "alidade/heads/streams/frame_stream.h"
 
 #include <fmt/format.h>
 
@@ -11,6 +11,7 @@
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/geometry/so3.h"
+#include "alidade/heads/protocols/onvif_head.h"
 #include "alidade/heads/simulated_head.h"
 #include "alidade/pantilt/head_rotation.h"
 #include "alidade/simulate/films/panorama_video.h"
@@ -32,7 +33,7 @@ class SimulatedStream final : public FrameStream {
     if (now_s < next_s_) return frames;
     next_s_ = std::max(next_s_ + 1.0 / camera_.fps, now_s - 1.0 / camera_.fps);
     auto image = std::make_shared<cv::Mat>(renderer_.frame(plant_.truth(now_s), ++number_, now_s));
-    frames.push_back({now_s + camera_.delay_s, true, std::move(image)});
+    frames.push_back({stamp_of(camera_, now_s), FrameTimes::stamped, 0.0, now_s, std::move(image)});
     return frames;
   }
 
@@ -88,9 +89,9 @@ SimulatedCamera simulated_camera(const std::string& text, const std::string& whe
   SimulatedCamera camera;
   double seed = 1.0;
   const std::map<std::string, double*> places{
-      {"fx", &camera.fx},       {"fy", &camera.fy},         {"cx", &camera.cx},
-      {"cy", &camera.cy},       {"k1", &camera.k1},         {"fps", &camera.fps},
-      {"noise", &camera.noise}, {"delay", &camera.delay_s}, {"seed", &seed}};
+      {"fx", &camera.fx},       {"fy", &camera.fy},   {"cx", &camera.cx},       {"cy", &camera.cy},
+      {"k1", &camera.k1},       {"fps", &camera.fps}, {"noise", &camera.noise}, {"delay", &camera.delay_s},
+      {"jump", &camera.jump_s}, {"seed", &seed}};
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find_first_of("&,", at), text.size());
     const std::string part = text.substr(at, end - at), key = part.substr(0, part.find('='));
@@ -113,7 +114,10 @@ SimulatedCamera simulated_camera(const std::string& text, const std::string& whe
     } else if (const auto place = places.find(key); place != places.end() && numbers.size() == 1) {
       *place->second = numbers[0];
     } else {
-      throw InputError(fmt::format("{}: '{}' is nothing that a simulated camera has", where, part));
+      throw InputError(
+          fmt::format("{}: '{}' is nothing that a simulated camera has; it has size=320x240, fx, fy, cx, "
+                      "cy, k1, mount=X:Y:Z, fps, delay, noise, jump, target=RATE:PAN:TILT:SPAN:RADIUS, seed",
+                      where, part));
     }
   }
   camera.seed = static_cast<std::uint64_t>(std::abs(seed));
@@ -144,9 +148,52 @@ cv::Mat CameraRenderer::frame(const Eigen::Vector2d& pan_tilt_rad, std::uint64_t
   return image;
 }
 
-std::unique_ptr<FrameStream> open_stream(const std::string& url, HeadDevice& head) {
-  if (url.starts_with("http://"))
-    return open_mjpeg(url, std::shared_ptr<HeadClock>(std::shared_ptr<void>(), &head.clock()));
+double stamp_of(const SimulatedCamera& camera, double t_s) {
+  constexpr double period_s = 3.0;
+  const double jump_s = std::fmod(t_s, period_s) < 1.0 ? camera.jump_s : 0.0;
+  return t_s + camera.delay_s - jump_s;
+}
+
+std::string with_secret(const std::string& text, const std::string& password) {
+  constexpr std::string_view place = "{password}";
+  std::string filled = text;
+  const std::size_t at = filled.find(place);
+  if (at == std::string::npos) return filled;
+  if (password.empty()) throw InputError(text + ": no password was given: --password-file, or ALIDADE_PASSWORD");
+  return filled.replace(at, place.size(), password);
+}
+
+namespace {
+
+/// What others could read shall not be a password.
+void refuse_secrets(const std::string& url) {
+  const std::string shown = url.substr(0, url.find_first_of("@?"));
+  const std::size_t begin = url.find("://"), at = url.find('@');
+  const bool names_password = begin != std::string::npos && at != std::string::npos && url.find(':', begin + 3) < at;
+  std::string lower = url;
+  for (char& letter : lower) letter = static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
+  bool has_word = false;
+  for (const char* word : {"pwd=", "pass=", "password=", "passwd="}) {
+    const std::size_t found = lower.find(word);
+    has_word =
+        has_word || (found != std::string::npos && !lower.substr(found).starts_with(std::string(word) + "{password}"));
+  }
+  if (names_password || has_word)
+    throw InputError(
+        (names_password ? url.substr(0, begin + 3) : shown) +
+        "…: no password stands in an address, where others can read it; give USER@HOST or {password} in its "
+        "place, and the password by --password-file or in ALIDADE_PASSWORD");
+}
+
+}  // namespace
+
+std::unique_ptr<FrameStream> open_stream(const std::string& url, HeadDevice& head, const HeadOptions& options) {
+  refuse_secrets(url);
+  const auto clock = std::shared_ptr<HeadClock>(std::shared_ptr<void>(), &head.clock());
+  if (url.starts_with("http://")) return open_mjpeg(url, options.password, clock);
+  if (url.starts_with("rtsp://") || url.starts_with("v4l2:") || url.starts_with("https://"))
+    return open_decoded(url, options.password, clock);
+  if (url.starts_with("onvif://")) return open_stream(onvif_stream_url(url, options), head, options);
   if (url.starts_with("sim://")) {
     HeadPlant* plant = plant_of(head);
     if (plant == nullptr) throw InputError(url + ": only a simulated head, sim://, carries such a camera");
@@ -154,8 +201,9 @@ std::unique_ptr<FrameStream> open_stream(const std::string& url, HeadDevice& hea
     const std::string text = query == std::string::npos ? "" : url.substr(query + 1);
     return std::make_unique<SimulatedStream>(url, simulated_camera(text, url), *plant, head.clock());
   }
-  throw InputError("'" + url.substr(0, url.find('@')) +
-                   "' is no stream of a head: give http://HOST:PORT/PATH (motion JPEG) or sim://");
+  throw InputError("'" + url +
+                   "' is no stream of a head: give http://HOST:PORT/PATH (motion JPEG), rtsp://…, "
+                   "v4l2:/dev/video0, onvif://… or sim://");
 }
 
 }  // namespace alidade

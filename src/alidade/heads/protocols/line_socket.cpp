@@ -1,4 +1,4 @@
-#include "alidade/heads/line_socket.h"
+#include "alidade/heads/protocols/line_socket.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -27,11 +27,10 @@ double steady_s() { return std::chrono::duration<double>(std::chrono::steady_clo
 bool is_ready(int socket, short what, double until_s) {
   for (;;) {
     const double left = until_s - steady_s();
-    if (left <= 0.0) return false;
     pollfd waiting{socket, what, 0};
-    const int got = ::poll(&waiting, 1, std::max(1, static_cast<int>(left * 1e3)));
+    const int got = ::poll(&waiting, 1, left > 0.0 ? std::max(1, static_cast<int>(left * 1e3)) : 0);
     if (got > 0) return true;
-    if (got < 0 && errno != EINTR) return false;
+    if ((got < 0 && errno != EINTR) || left <= 0.0) return false;
   }
 }
 
@@ -51,12 +50,19 @@ int connected(const addrinfo& place, double until_s) {
 }  // namespace
 
 SocketAddress address_of(const std::string& url, std::string_view scheme, std::uint16_t usual_port) {
-  SocketAddress address{.name = url, .host = "", .port = usual_port};
+  SocketAddress address{.name = url, .user = "", .host = "", .port = usual_port};
   std::string rest = url.substr(std::min(url.size(), scheme.size()));
-  if (rest.find('@') != std::string::npos)
-    throw InputError(
-        fmt::format("{}…: no name and no password stand in an address, where others can read them", scheme));
-  rest = rest.substr(0, rest.find('/'));
+  if (const std::size_t at = rest.find('@'); at != std::string::npos) {
+    address.user = rest.substr(0, at);
+    rest = rest.substr(at + 1);
+    if (address.user.empty() || address.user.find_first_of(":/?") != std::string::npos ||
+        rest.find('@') != std::string::npos)
+      throw InputError(
+          fmt::format("{}…: no password stands in an address, where others can read it; give {}USER@HOST, and the "
+                      "password by --password-file or in ALIDADE_PASSWORD",
+                      scheme, scheme));
+  }
+  rest = rest.substr(0, rest.find_first_of("/?"));
   const std::size_t bracket = rest.find(']');
   const std::size_t colon = rest.find(':', bracket == std::string::npos ? 0 : bracket);
   address.host = rest.substr(0, colon);
@@ -73,6 +79,13 @@ SocketAddress address_of(const std::string& url, std::string_view scheme, std::u
         fmt::format("'{}' is no address: {}HOST:PORT, for example {}127.0.0.1:{}", url, scheme, scheme, usual_port));
   address.port = static_cast<std::uint16_t>(port);
   return address;
+}
+
+std::string without_password(const std::string& url) {
+  const std::size_t scheme = url.find("://"), begin = scheme == std::string::npos ? 0 : scheme + 3;
+  const std::size_t at = url.find('@', begin);
+  if (at != std::string::npos && url.find(':', begin) < at) return url.substr(0, begin) + "…";
+  return url;
 }
 
 void LineSocket::fail(const std::string& what) {
@@ -141,6 +154,28 @@ std::string LineSocket::bytes(std::size_t count) {
   while (buffer_.size() < count) fill(until_s);
   std::string taken = buffer_.substr(0, count);
   buffer_.erase(0, count);
+  return taken;
+}
+
+std::string LineSocket::some(double wait_s) {
+  if (socket_ < 0) fail("not connected");
+  if (buffer_.empty() && is_ready(socket_, POLLIN, steady_s() + wait_s)) fill(steady_s() + timeout_s_);
+  return std::exchange(buffer_, {});
+}
+
+std::string LineSocket::rest() {
+  constexpr std::size_t most = 1 << 24;
+  const double until_s = steady_s() + timeout_s_;
+  while (buffer_.size() < most) {
+    if (!is_ready(socket_, POLLIN, until_s)) fail(fmt::format("no answer within {:g} s", timeout_s_));
+    char chunk[65536];
+    const ssize_t got = ::recv(socket_, chunk, sizeof chunk, 0);
+    if (got < 0 && (errno == EINTR || errno == EAGAIN)) continue;
+    if (got <= 0) break;
+    buffer_.append(chunk, static_cast<std::size_t>(got));
+  }
+  std::string taken = std::exchange(buffer_, {});
+  close();
   return taken;
 }
 

@@ -1,4 +1,4 @@
-#include "alidade/heads/rotctl_head.h"
+#include "alidade/heads/protocols/rotctl_head.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/heads/line_socket.h"
+#include "alidade/heads/protocols/line_socket.h"
 
 namespace alidade {
 namespace {
@@ -31,7 +31,7 @@ class RotctlHead final : public HeadDevice {
     socket_.write("p\n");
     const double azimuth = angle(socket_.line()), elevation = angle(socket_.line());
     const double answered_s = clock_->now_s();
-    return {0.5 * (asked_s + answered_s), answered_s - asked_s, Eigen::Vector2d(-azimuth, elevation) * degree};
+    return {0.5 * (asked_s + answered_s), answered_s - asked_s, Eigen::Vector2d(0.0 - azimuth, elevation) * degree};
   }
 
   HeadSent command(const Eigen::Vector2d& pan_tilt_rad) override {

@@ -1,0 +1,106 @@
+"""A pan-tilt head that is connected."""
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from . import _alidade
+from .job import Progress
+from .result import Result
+
+_FREE = (-1e9, 1e9)
+
+
+class Head:
+    """A head by its URL: rotctl://HOST:PORT, onvif://USER@HOST, indi://HOST:PORT/DEVICE, sim://?seed=3. Pan > 0 turns left,
+    tilt > 0 up. It is asked until `move=True` says that it may be moved, and stopped where the `with` ends:
+
+        with al.Head("rotctl://127.0.0.1:4533", move=True, pan_range_rad=(-1, 1), tilt_range_rad=(0, 0.7)) as head:
+            head.command((0.2, 0.1))
+
+    password_file   its first line is the password of who is named in the URL; no password stands in a URL
+    pan_range_rad, tilt_range_rad   where it may go, (low, high); None: as far as it says that it can
+    """
+
+    def __init__(self, url: str, *, move: bool = False, password_file: Any = None,
+                 pan_range_rad: tuple[float, float] | None = None,
+                 tilt_range_rad: tuple[float, float] | None = None) -> None:
+        self._url, self._move, self._password_file = url, move, password_file
+        self._ranges = {"pan": _range(pan_range_rad, "pan_range_rad"), "tilt": _range(tilt_range_rad, "tilt_range_rad")}
+        password = ""
+        if password_file is not None:
+            try:
+                with open(password_file, encoding="utf-8") as file:
+                    password = file.readline().rstrip("\r\n")
+            except OSError as error:
+                raise ValueError(f"{password_file}: {error.strerror}") from None
+        self._core: _alidade.Head | None = _alidade.Head(url, password, move, self._ranges["pan"] or _FREE,
+                                                         self._ranges["tilt"] or _FREE)
+
+    def __enter__(self) -> Head:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Stops it, and lets it go."""
+        core, self._core = self._core, None
+        if core is not None:
+            core.stop()
+
+    @property
+    def limits(self) -> dict[str, Any]:
+        """low_rad and high_rad, (pan, tilt): where it may go; are_told: by the head itself; info: what it calls itself."""
+        return self._open().limits()
+
+    def position(self) -> dict[str, Any]:
+        """Where it says that it is: t_s (since 1970, the middle of question and answer), wait_s, pan_tilt_rad (pan, tilt)."""
+        return self._open().position()
+
+    def command(self, pan_tilt_rad: tuple[float, float]) -> float:
+        """Sends it there, and comes back at once: when it was sent. ValueError: outside of its limits, not finite."""
+        pan, tilt = pan_tilt_rad
+        return self._open().command((float(pan), float(tilt)))
+
+    def stop(self) -> None:
+        """It stands."""
+        self._open().stop()
+
+    def identify(self, progress: Progress | None = None) -> Result:
+        """Its model, as `alidade head URL --identify --move`: rate, acceleration, latency, backlash, …"""
+        return self._run(["--identify"], progress)
+
+    def calibrate(self, stream: str, *, until: str | None = None, most_s: float | None = None,
+                  progress: Progress | None = None) -> Result:
+        """Its camera, as `alidade head URL --stream STREAM --calibrate --move`. until: "0.5%"."""
+        words = [f"--stream={stream}", "--calibrate"]
+        words += [f"--until={until}"] if until is not None else []
+        words += [f"--most={most_s}"] if most_s is not None else []
+        return self._run(words, progress)
+
+    def _open(self) -> _alidade.Head:
+        if self._core is None:
+            raise ValueError(f"{self._url}: the head was let go")
+        return self._core
+
+    def _run(self, words: list[str], progress: Progress | None) -> Result:
+        if not self._move:
+            raise ValueError(f"{self._url}: may not move; open it with move=True")
+        self._open().stop()
+        for axis, limits in self._ranges.items():
+            if limits is not None:
+                low, high = (math.degrees(value) for value in limits)
+                words.append(f"--{axis}-range={low:.9f},{high:.9f}")
+        if self._password_file is not None:
+            words.append(f"--password-file={self._password_file}")
+        return Result(_alidade.run_command(["head", self._url, "--move", *words], progress))
+
+
+def _range(limits: tuple[float, float] | None, name: str) -> tuple[float, float] | None:
+    if limits is None:
+        return None
+    low, high = (float(value) for value in limits)
+    if not low <= high or not math.isfinite(high - low):
+        raise ValueError(f"{name}: (low, high) [rad] is needed, not {limits}")
+    return low, high

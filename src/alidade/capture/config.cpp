@@ -1,0 +1,48 @@
+#include <fmt/format.h>
+
+#include "alidade/capture.h"
+
+namespace alidade {
+
+FieldList fields_of(CaptureConfig& config) {
+  TextCode code;
+  code.read = [&config](std::string text) -> std::string {
+    if (text.ends_with("px")) text.resize(text.size() - 2);
+    double value = 0.0;
+    Field number{.name = "until_px", .value = &value, .help = ""};
+    if (const std::string fault = set_field(number, text); !fault.empty()) return fault;
+    if (!(value >= 0.001 && value <= 100.0)) return "'" + text + "' is not within 0.001 to 100 px";
+    config.until_px = value;
+    return "";
+  };
+  code.write = [&config] { return fmt::format("{}px", config.until_px); };
+  return {{.name = "until_px",
+           .value = code,
+           .help = "Goal of --live: 3σ of a pixel in the worst place; there it ends",
+           .form = "PIXELS",
+           .option = "--until"}};
+}
+
+std::string_view sight_name(Sight sight) {
+  switch (sight) {
+    case Sight::nothing:
+      return "nothing";
+    case Sight::other_board:
+      return "other_board";
+    case Sight::moving:
+      return "moving";
+    case Sight::blurred:
+      return "blurred";
+    case Sight::same_pose:
+      return "same_pose";
+    case Sight::little:
+      return "little";
+    case Sight::repeated:
+      return "repeated";
+    case Sight::useful:
+      return "useful";
+  }
+  return "nothing";
+}
+
+}  // namespace alidade

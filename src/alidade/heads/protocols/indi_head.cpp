@@ -1,0 +1,115 @@
+#include "alidade/heads/protocols/indi_head.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "alidade/files/files.h"
+#include "alidade/geometry/degree.h"
+#include "alidade/heads/protocols/indi_link.h"
+
+namespace alidade {
+namespace {
+
+constexpr const char* where_it_is = "EQUATORIAL_EOD_COORD";
+constexpr double degrees_an_hour = 15.0;
+
+/// The mount tells where it is by itself, as often as it looks: what it told last counts, at the time when it came.
+class IndiMount final : public HeadDevice {
+ public:
+  IndiMount(const std::string& url, const HeadOptions& options)
+      : clock_(machine_clock()), link_(url, std::max(options.timeout_s, 1.0)) {
+    begin();
+    limits_.info = "INDI, " + link_.device();
+    limits_.low_rad[1] = -0.5 * std::numbers::pi;
+    limits_.high_rad[1] = 0.5 * std::numbers::pi;
+  }
+
+  [[nodiscard]] HeadLimits limits() override { return limits_; }
+  [[nodiscard]] const std::string& name() const override { return link_.name(); }
+  [[nodiscard]] HeadClock& clock() override { return *clock_; }
+
+  [[nodiscard]] HeadPosition position() override {
+    link_.take(0.0);
+    const IndiProperty* place = link_.find(where_it_is);
+    if (place == nullptr) throw InputError(name() + ": no longer tells where it stands");
+    if (place->state == "Alert") throw InputError(name() + ": the mount reports a fault (Alert)");
+    const Eigen::Vector2d at = angles(*place);
+    // While it moves it has to say so; at rest nothing new comes, and the old stays true.
+    const double old_s = clock_->now_s() - place->t_s;
+    if (place->state == "Busy" && old_s > silent_s)
+      throw InputError(fmt::format("{}: moves and has said nothing for {:g} s", name(), silent_s));
+    return {clock_->now_s(), 0.0, at};
+  }
+  HeadSent command(const Eigen::Vector2d& target) override {
+    if (!limits_.hold(target)) throw InputError(name() + ": a command that is no angle within its limits");
+    link_.take(0.0);
+    const double hours = target[0] / degree / degrees_an_hour;
+    const double sent_s = clock_->now_s();
+    link_.set_numbers(where_it_is, {{"RA", hours - 24.0 * std::floor(hours / 24.0)}, {"DEC", target[1] / degree}});
+    return {sent_s, 0.0};
+  }
+  HeadSent stop() override {
+    for (int attempt = 0;; ++attempt) {
+      const double sent_s = clock_->now_s();
+      try {
+        if (attempt > 0) link_.connect_again();
+        link_.set_switch("TELESCOPE_ABORT_MOTION", "ABORT");
+        return {sent_s, 0.0};
+      } catch (const InputError&) {
+        if (attempt == 2) throw;
+      }
+    }
+  }
+
+ private:
+  static constexpr double silent_s = 2.5, patience_s = 5.0;
+
+  void begin() {
+    const auto is_on = [](const IndiProperty& property) {
+      const auto found = property.values.find("CONNECT");
+      return found != property.values.end() && found->second == "On";
+    };
+    const IndiProperty& connection = link_.wait_for("CONNECTION", patience_s);
+    if (!is_on(connection)) {
+      link_.set_switch("CONNECTION", "CONNECT");
+      (void)link_.wait_for("CONNECTION", patience_s, is_on);
+    }
+    (void)link_.wait_for(where_it_is, patience_s);
+    link_.take(0.3);
+    if (link_.find("POLLING_PERIOD") != nullptr) link_.set_numbers("POLLING_PERIOD", {{"PERIOD_MS", 100.0}});
+    if (link_.find("ON_COORD_SET") != nullptr) link_.set_switch("ON_COORD_SET", "TRACK");
+    const IndiProperty* park = link_.find("TELESCOPE_PARK");
+    if (park != nullptr && park->values.contains("PARK") && park->values.at("PARK") == "On")
+      throw InputError(name() + ": the mount is parked; unpark it first");
+  }
+  /// Right ascension counts on beyond 24 h.
+  Eigen::Vector2d angles(const IndiProperty& place) {
+    const auto value = [&](const char* member) {
+      const auto found = place.values.find(member);
+      return found == place.values.end() ? std::nan("") : sexagesimal(found->second);
+    };
+    Eigen::Vector2d at(value("RA") * degrees_an_hour * degree, value("DEC") * degree);
+    if (!at.allFinite()) throw InputError(name() + ": what it tells is no place in the sky");
+    constexpr double turn = 2.0 * std::numbers::pi;
+    if (has_last_) at[0] += turn * std::round((last_pan_ - at[0]) / turn);
+    last_pan_ = at[0];
+    has_last_ = true;
+    return at;
+  }
+
+  std::shared_ptr<HeadClock> clock_;
+  IndiLink link_;
+  HeadLimits limits_;
+  double last_pan_ = 0.0;
+  bool has_last_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<HeadDevice> open_indi(const std::string& url, const HeadOptions& options) {
+  return std::make_unique<IndiMount>(url, options);
+}
+
+}  // namespace alidade

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "alidade/heads/protocols/line_socket.h"
+
+// What ONVIF's client and server both need: SOAP 1.2 over HTTP, and the digest by which a user is known.
+
+namespace alidade {
+
+/// OASIS WS-Security UsernameToken Profile 1.1: what stands for a password in a message, good for a few minutes.
+struct UsernameToken {
+  std::string user, nonce, created, digest;  ///< `nonce` and `digest` in base64, `created` as 2026-01-31T12:00:00Z.
+};
+/// Base64(SHA-1(nonce + created + password)). `nonce`: its bytes.
+[[nodiscard]] std::string password_digest(std::string_view nonce, std::string_view created, std::string_view password);
+/// With a nonce that was not used before.
+[[nodiscard]] UsernameToken username_token(const std::string& user, const std::string& password, double unix_s);
+
+[[nodiscard]] std::string base64_text(std::string_view bytes);
+/// Characters that are none of base64 are left out.
+[[nodiscard]] std::string base64_bytes(std::string_view text);
+/// 2026-01-31T12:00:00Z of seconds since 1970, and back; NaN of what is no such time.
+[[nodiscard]] std::string utc_text(double unix_s);
+[[nodiscard]] double utc_seconds(const std::string& text);
+
+/// A whole message; `body`: one element. On one line, in the words that most clients write.
+[[nodiscard]] std::string soap_request(const UsernameToken& token, std::string_view body);
+[[nodiscard]] std::string escaped_xml(std::string_view text);
+
+struct HttpReply {
+  int status = 0;
+  std::string body;
+};
+/// Asks and reads the answer, whether it says its length, comes in chunks or ends with the connection; the socket is
+/// closed then. Throws InputError: nobody answers, no HTTP.
+[[nodiscard]] HttpReply http_post(LineSocket& socket, const std::string& path, std::string_view body);
+
+}  // namespace alidade

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "alidade/heads/streams/arrival_times.h"
+#include "alidade/heads/streams/frame_stream.h"
+#include "alidade/heads/turn_log.h"
+#include "alidade/patches/point_tracks.h"
+
+namespace alidade {
+
+/// Follows points on a thread of its own, so that the head is asked in time.
+class FrameFollower {
+ public:
+  FrameFollower() : tracker_(PointTrackerConfig{.max_tracks = 120}), worker_([this] { work(); }) {}
+  ~FrameFollower();
+  FrameFollower(const FrameFollower&) = delete;
+  FrameFollower& operator=(const FrameFollower&) = delete;
+
+  void push(StreamFrame frame);
+  /// Those that have been looked at; waits until all have. At the times that count: their time stamps, or, where those
+  /// jump, when they came, by the fastest.
+  [[nodiscard]] std::vector<SeenFrame> seen();
+  /// Without waiting.
+  [[nodiscard]] std::vector<SeenFrame> seen_so_far();
+
+  [[nodiscard]] const StampWatch& stamps() const { return stamps_; }
+  [[nodiscard]] FrameTimes times() const { return stamps_.is_jumping() ? FrameTimes::arrival : times_; }
+  [[nodiscard]] double sigma_s() const { return stamps_.is_jumping() ? arrival_sigma_s_ : sigma_s_; }
+
+ private:
+  void work();
+  [[nodiscard]] std::vector<SeenFrame> timed() const;
+
+  PointTracker tracker_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<StreamFrame> waiting_;
+  std::vector<SeenFrame> seen_;
+  std::vector<double> came_s_;  ///< Of each of `seen_`, filtered.
+  bool is_busy_ = false, ends_ = false;
+  StampWatch stamps_;
+  ArrivalTimes arrivals_;
+  std::deque<double> waiting_came_s_;
+  FrameTimes times_ = FrameTimes::arrival;
+  double sigma_s_ = 0.0, arrival_sigma_s_ = 0.0;
+  std::thread worker_;  // last: it uses the others
+};
+
+}  // namespace alidade

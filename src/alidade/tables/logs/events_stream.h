@@ -1,0 +1,59 @@
+#pragma once
+
+#include <istream>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "alidade/files/csv.h"
+#include "alidade/tables/events_file.h"
+
+namespace alidade {
+
+/// The columns that a table of events has.
+struct EventColumns {
+  std::string pan, tilt, u, v;
+  bool has_arrival = false, from_centre = false;
+};
+
+/// Rows of events, each checked against those before it.
+class EventRows {
+ public:
+  /// `layout` has the header. Throws InputError: a column is missing.
+  EventRows(const Csv& layout, std::span<const RigHead> heads, bool stands_still);
+
+  /// Throws InputError; such a row counts for nothing.
+  [[nodiscard]] TargetObservation read(const Csv& csv, std::size_t row);
+
+ private:
+  std::span<const RigHead> heads_;
+  bool stands_still_;
+  EventColumns columns_;
+  std::vector<double> newest_s_;  ///< Arrival of the newest row so far; of one clock for all heads, or one for each.
+  std::vector<std::optional<Eigen::Vector2d>> first_rad_;
+  std::set<std::pair<std::size_t, double>> seen_;
+};
+
+/// Events row by row as they arrive, with the checks of read_events().
+class EventsStream {
+ public:
+  /// Reads the header. `heads` outlive it.
+  EventsStream(std::istream& in, const std::string& name, std::span<const RigHead> heads,
+               const EventsOptions& options = {});
+
+  /// The next row that is not rejected; none at the end. Throws InputError, also where there is no row at all.
+  [[nodiscard]] std::optional<TargetObservation> next();
+  [[nodiscard]] const std::vector<SkippedInput>& skipped() const { return skipped_; }
+
+ private:
+  CsvStream table_;
+  Csv row_;
+  EventRows rows_;
+  bool skips_bad_, has_rows_ = false;
+  std::vector<SkippedInput> skipped_;
+};
+
+}  // namespace alidade

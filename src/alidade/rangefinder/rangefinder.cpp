@@ -346,6 +346,12 @@ RangefinderReport calibrate_rangefinder(std::span<const Shot> shots, std::span<c
   report.range_sigma_is_estimated = !ready.knows_range_sigma;
   report.shots.resize(shots.size());
   for (std::size_t i = 0; i < shots.size(); ++i) report.shots[i].reason = ready.reasons[i];
+  const bool is_flat =
+      std::ranges::all_of(points_in_board, [](const Eigen::Vector3d& point) { return point.z() == 0.0; });
+  report.boards_behind = static_cast<int>(std::ranges::count_if(problem.shots, [&](const PreparedShot& shot) {
+    // z of the board points away from who sees its printed side.
+    return is_flat && shot.board && shot.pose && shot.pose->cam_from_board.inverse().translation.z() > 0.0;
+  }));
   report.shots_dropped = static_cast<int>(shots.size());
   const bool has_planes =
       std::any_of(problem.shots.begin(), problem.shots.end(), [](const auto& shot) { return shot.used && shot.plane; });

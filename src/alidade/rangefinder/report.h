@@ -84,6 +84,7 @@ struct RangefinderReport {
   double scale_in_sigmas = 0.0;
   double rms_px = 0.0, rms_range_m = 0.0;  ///< Of the spots (per point) and of the ranges used.
   int shots_used = 0, shots_dropped = 0;
+  int boards_behind = 0;  ///< Flat boards of which the corners run as seen through the paper: mirrored, or numbered so.
   int iterations = 0;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "alidade/rangefinder/rangefinder.h"
 #include "alidade/testing/rangefinder_sample.h"
@@ -19,7 +20,18 @@ struct RangefinderTrialSetup {
   ShotMistake mistake = {};
   RangefinderMethod method = RangefinderMethod::joint;
   int num_shots = 18;
+  bool is_mirrored = false;  ///< The images are, left to right.
 };
+
+/// The shots as their mirrored images show them.
+inline void mirror(std::vector<Shot>& shots, int width_px) {
+  const auto mirrored = [&](double u) { return width_px - 1 - u; };
+  for (Shot& shot : shots) {
+    if (shot.spot) shot.spot->px.x() = mirrored(shot.spot->px.x());
+    if (!shot.board) continue;
+    for (Corner& corner : shot.board->corners) corner.px.x() = mirrored(corner.px.x());
+  }
+}
 
 struct RangefinderTrial {
   SolvedRangefinder solved;
@@ -36,7 +48,8 @@ inline RangefinderTrial rangefinder_trial(const RangefinderTrialSetup& setup, st
   config.board.square_m *= 1.0 + setup.square;
   RangefinderSample sample = draw_rangefinder_sample(config, setup.noise, seed);
   for (Eigen::Vector3d& point : sample.points) point /= 1.0 + setup.square;
-  const std::vector<Shot> shots = mistaken_shots(sample.simulated.shots, setup.mistake);
+  std::vector<Shot> shots = mistaken_shots(sample.simulated.shots, setup.mistake);
+  if (setup.is_mirrored) mirror(shots, sample.camera.width_px);
   const Camera camera = mistaken_camera(sample.camera, setup.mistake.focal, setup.mistake.centre_px);
   RangefinderTrial trial{solve_rangefinder(shots, sample.points, camera, {.method = setup.method})};
   Verdict& verdict = trial.solved.verdict;

@@ -56,6 +56,19 @@ INSTANTIATE_TEST_SUITE_P(
                       ShotFault{"centimetres", [](RangefinderTrialSetup& s) { s.mistake.unit_m = 0.01; }}),
     [](const auto& info) { return std::string(info.param.name); });
 
+/// Spots alone have no left and right: with them the mirrored beam is as good as the true one.
+TEST(ShotFaults, MirroredImagesAreSeenByTheirBoards) {
+  for (const auto method : {RangefinderMethod::joint, RangefinderMethod::plane}) {
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      RangefinderTrialSetup setup;
+      setup.method = method;
+      setup.is_mirrored = true;
+      const RangefinderTrial trial = rangefinder_trial(setup, seed);
+      EXPECT_TRUE(trial.is_seen) << seed << ": " << trial.worst_sigmas << "σ";
+    }
+  }
+}
+
 /// A constant that readings hold is part of the origin, and nothing tells the two apart.
 TEST(ShotFaults, AnOffsetOfTheReadingsIsPartOfTheOrigin) {
   RangefinderTrialSetup setup;

@@ -150,6 +150,18 @@ Weakness reason_of(const RangefinderReport& report, std::span<const Shot> shots,
           "add shots from near to far, the board tilted to all sides"};
 }
 
+/// Boards seen from behind: of mirrored images all that is left and right is exchanged, the beam too.
+void add_handedness(const RangefinderReport& report, Verdict& verdict) {
+  const bool is_plain = report.boards_behind == 0;
+  verdict.checks.push_back(check_of("mirrored", is_plain ? State::good : State::care,
+                                    is_plain ? "boards are seen from the front"
+                                             : std::to_string(report.boards_behind) +
+                                                   " boards are seen from behind: of mirrored images the beam is "
+                                                   "mirrored, too; give images as the camera takes them, corners row "
+                                                   "by row, left to right",
+                                    report.boards_behind, 0.0, "", ""));
+}
+
 Verdict refusal(State state, ExitCode code, const std::string& sentence, const std::string& add) {
   Verdict verdict;
   verdict.state = state;
@@ -306,6 +318,7 @@ Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Sho
     if (method != Method::spot) add_boards(report, shots, verdict);
     add_spare(report, verdict);
     add_cause_checks(report, shots, config, verdict);
+    add_handedness(report, verdict);
   }
   const auto worst = [&](State state) {
     return std::find_if(verdict.checks.begin(), verdict.checks.end(), [&](const Check& c) { return c.state == state; });
@@ -340,7 +353,7 @@ Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Sho
       verdict.to_add = care->text;
       // What is wrong comes before what follows from it.
       for (const std::string_view cause :
-           {"shots agree", "spots by distance", "scale", "fit", "outliers", "boards", "camera"})
+           {"shots agree", "spots by distance", "scale", "fit", "outliers", "boards", "camera", "mirrored"})
         for (const Check& check : verdict.checks)
           if (check.name == cause && check.state == State::care) verdict.to_add = check.text;
     }

@@ -14,6 +14,9 @@ target_include_directories(alidade_shared INTERFACE $<BUILD_INTERFACE:${PROJECT_
                                                     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 target_link_libraries(alidade_shared PUBLIC Eigen3::Eigen
                                      PRIVATE ${opencv_libraries} ${picture_libraries} TBB::tbb yaml-cpp fmt::fmt Threads::Threads)
+if(TARGET pugixml::pugixml)
+  target_link_libraries(alidade_shared PRIVATE pugixml::pugixml)
+endif()
 add_library(alidade::alidade ALIAS alidade_shared)
 
 if(NOT ALIDADE_INSTALL)

@@ -154,8 +154,10 @@ TEST(Localize, FindsMismatches) {
 
 /// Whole Gauss–Newton steps alone lose one camera in four here: a second in the dark is a tenth of a radian.
 TEST(Localize, RecoversFromABlackout) {
-  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+  constexpr std::uint64_t num_seeds = 9, num_filtered = 2;  // one in four lost: all nine found by chance is 8 %
+  for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
     UnderwaterScene scene = rich_scene();
+    scene.num_frames = 101;
     scene.blackout_from_s = 2.0;
     scene.blackout_s = 1.0;
     const UnderwaterSample sample = testing::underwater_sample(scene, seed);
@@ -164,10 +166,12 @@ TEST(Localize, RecoversFromABlackout) {
     for (std::size_t k = 60; k < 90; ++k) EXPECT_EQ(report.path[k].event, FrameEvent::predicted);
     // It knows that it does not know: most in the middle, once the end is known, too.
     EXPECT_GT(report.path[75].cov.trace(), 3.0 * report.path[59].cov.trace());
-    LocalizeConfig as_it_comes = sample.config;
-    as_it_comes.smooths = false;
-    const Localization filtered = localize(sample.frames, sample.camera, as_it_comes);
-    EXPECT_GT(filtered.path[89].cov.trace(), 100.0 * filtered.path[59].cov.trace());
+    if (seed <= num_filtered) {
+      LocalizeConfig as_it_comes = sample.config;
+      as_it_comes.smooths = false;
+      const Localization filtered = localize(sample.frames, sample.camera, as_it_comes);
+      EXPECT_GT(filtered.path[89].cov.trace(), 100.0 * filtered.path[59].cov.trace());
+    }
     const PathStep& after = report.path[100];  // ten frames later
     const double error = (after.world_from_cam.translation - sample.truth[100].world_from_cam.translation).norm();
     const double before =
@@ -235,6 +239,8 @@ TEST(Localize, AWrongPathIsNeverGood) {
   EXPECT_EQ(verdict_of(sample.camera, sample.config).state, State::good);
   const auto pinhole = with_distortion(sample.camera, DistortionVariant::none);
   EXPECT_GE(verdict_of(*pinhole, sample.config).state, State::care);
+  sample.frames.resize(50);  // what contradicts itself begins again in most frames: that takes its time
+  sample.truth.resize(50);
   LocalizeConfig sure = sample.config;
   sure.filter.sigma_px = 0.1;  // five times better than it is
   EXPECT_GE(verdict_of(sample.camera, sure).state, State::bad);

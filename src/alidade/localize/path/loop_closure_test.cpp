@@ -67,7 +67,7 @@ TEST(SimilarityGraph, SimilaritiesComposeAndInvert) {
 
 WalkRun out_and_back(std::uint64_t seed) {
   return long_walk(
-      {.num_points = 2400, .num_frames = 1200, .length_m = 30.0, .dt_s = 0.1, .rise_m = 0.3, .comes_back = true}, seed);
+      {.num_points = 1500, .num_frames = 1200, .length_m = 30.0, .dt_s = 0.1, .rise_m = 0.3, .comes_back = true}, seed);
 }
 
 /// Errors of the poses after the best similarity, over what their covariance says.
@@ -113,15 +113,15 @@ TEST(LoopClosure, SixtyMetresOutAndBack) {
     EXPECT_GE(*ids.begin(), 0);
   }
   RecordProperty("nees", std::to_string(nees));
-  EXPECT_GT(nees, 0.5);  // seen: 0.60 here, 0.57, 0.77 and 0.80 with three seeds and the default σ of accelerations
+  EXPECT_GT(nees, 0.5);  // seen: 0.62 and 1.35; 0.57 to 0.80 with 140 points in a frame
   EXPECT_LT(nees, 1.5);
 }
 
 /// Numbers that a tracker gave twice lead nowhere: they close no loop.
 TEST(LoopClosure, NumbersThatAreUsedAgainForOtherPointsCloseNone) {
-  WalkRun run = long_walk({.num_points = 1200, .num_frames = 600, .length_m = 15.0, .dt_s = 0.1, .rise_m = 0.3}, 4);
+  WalkRun run = long_walk({.num_points = 800, .num_frames = 400, .length_m = 10.0, .dt_s = 0.1, .rise_m = 0.3}, 4);
   for (ObservationFrame& frame : run.frames)
-    for (FeatureObservation& observation : frame.observations) observation.id %= 500;
+    for (FeatureObservation& observation : frame.observations) observation.id %= 330;
   for (ObservationFrame& frame : run.frames) {
     std::ranges::sort(frame.observations, {}, &FeatureObservation::id);
     const auto is_same = [](const FeatureObservation& a, const FeatureObservation& b) { return a.id == b.id; };
@@ -142,12 +142,17 @@ TEST(LoopClosure, ADepthSensorSaysHowLongTheWalkIs) {
         {pose.t_s, 7.0 + down.dot(pose.world_from_cam.translation) + 0.005 * draws.normal(), 0.005});
   const Localization result = localize(run.frames, run.camera, config, run.truth);
   ASSERT_TRUE(result.is_scale_read) << result.verdict.sentence;
-  const double true_scale = localize(run.frames, run.camera, gentle(), run.truth).error.scale;
+  std::vector<Eigen::Vector3d> truth, path;
+  for (std::size_t k = 0; k < result.path.size(); ++k) {
+    truth.push_back(run.truth[k].world_from_cam.translation);
+    path.push_back(result.path[k].world_from_cam.translation);
+  }
+  const double off = aligned(truth, path, false)->scale - 1.0;  // the path is in metres: of the right length
   const SensorScale& read = result.sensor_scales.front();
-  RecordProperty("scale_off_permille", std::to_string(1000.0 * (read.scale / true_scale - 1.0)));
+  RecordProperty("scale_off_permille", std::to_string(1000.0 * off));
   RecordProperty("sigma_permille", std::to_string(1000.0 * read.sigma_rel));
-  EXPECT_NEAR(read.scale / true_scale, 1.0, 0.005);
-  EXPECT_NEAR(read.scale / true_scale, 1.0, 3.0 * read.sigma_rel);
+  EXPECT_NEAR(off, 0.0, 0.005);
+  EXPECT_NEAR(off, 0.0, 3.0 * read.sigma_rel);
   EXPECT_LT(result.error.ate_m, 0.005 * 60.0);
   EXPECT_TRUE(result.verdict.ok()) << result.verdict.sentence;
 }

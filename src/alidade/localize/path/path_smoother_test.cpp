@@ -161,11 +161,12 @@ TEST(SimpleCase, ThePoseIsAsGoodAsItsCovarianceSays) {
   for (const HoverLens lens : {HoverLens::brown, HoverLens::fisheye, HoverLens::port}) {
     double nees = 0.0;
     for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
-      const HoverRun run = testing::hovering({.lens = lens}, 1000 + seed);
+      const HoverRun run = testing::hovering({.lens = lens, .num_frames = 200, .num_others = 30}, 1000 + seed);
       const Localization report = hover_localized(run, run.camera);
       EXPECT_TRUE(report.is_smoothed);
       nees += mean_nees(report, run) / num_seeds;
     }
+    RecordProperty("nees_" + std::to_string(static_cast<int>(lens)), std::to_string(nees));
     EXPECT_GT(nees, 0.8) << static_cast<int>(lens);
     EXPECT_LT(nees, 1.3) << static_cast<int>(lens);
   }
@@ -177,7 +178,7 @@ TEST(SimpleCase, TheLensesCovarianceIsCounted) {
   double counted = 0.0, ignored = 0.0;
   Draws draws(77);
   for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
-    const HoverRun run = testing::hovering({.num_frames = 90}, 500 + seed);
+    const HoverRun run = testing::hovering({.num_frames = 90, .num_others = 30}, 500 + seed);
     Camera told = run.camera;
     Eigen::VectorXd values = params(told.lens), sigma = Eigen::VectorXd::Zero(values.size());
     sigma.head<4>() << 4.0, 4.0, 3.0, 3.0;
@@ -188,6 +189,7 @@ TEST(SimpleCase, TheLensesCovarianceIsCounted) {
     told.cov = sigma.cwiseAbs2().asDiagonal();
     counted += mean_nees(hover_localized(run, told), run) / num_seeds;
   }
+  RecordProperty("counted", std::to_string(counted));
   EXPECT_GT(counted, 0.7);
   EXPECT_LT(counted, 1.3);
   EXPECT_GT(ignored, 2.0 * counted);

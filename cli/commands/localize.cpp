@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <iostream>
 #include <memory>
 #include <opencv2/core.hpp>
 
@@ -15,8 +16,10 @@
 #include "alidade/results/localize_outcome.h"
 #include "alidade/results/seen_frames.h"
 #include "alidade/tables/localize_file.h"
+#include "alidade/tables/logs/observations_stream.h"
 #include "cli/app/app.h"
 #include "cli/app/live.h"
+#include "cli/app/standard_input.h"
 #include "cli/commands/commands.h"
 
 namespace alidade::cli {
@@ -31,7 +34,8 @@ struct LocalizeArgs {
   LocalizeConfig config;
   LiveOptions live;
 
-  [[nodiscard]] bool is_images() const { return is_image_sequence(sequence); }
+  [[nodiscard]] bool is_input() const { return sequence == "-"; }
+  [[nodiscard]] bool is_images() const { return !is_input() && is_image_sequence(sequence); }
 };
 
 FieldList fields_of(LocalizeArgs& args) {
@@ -116,7 +120,7 @@ void read_values(LocalizeArgs& args) {
 }
 
 void add_inputs(const LocalizeArgs& args, Run& run) {
-  if (!std::filesystem::is_directory(args.sequence)) run.add_input("sequence", args.sequence);
+  if (!args.is_input() && !std::filesystem::is_directory(args.sequence)) run.add_input("sequence", args.sequence);
   run.add_input("camera", args.camera);
   if (!args.target.empty()) run.add_input("target", args.target);
   if (!args.start.empty()) run.add_input("start", args.start);
@@ -144,10 +148,36 @@ void show_image(live::Server& server, double t_s, const cv::Mat& image, std::spa
   server.send("/head1/marks", t_ns, [text = marks.text()] { return text; });
 }
 
+ObservationsOptions reading(const LocalizeArgs& args, const Camera& camera) {
+  return {args.skip_bad, args.rate_hz.value_or(0.0), camera.width_px, camera.height_px};
+}
+
+/// Rows from standard input as they come, each frame answered as soon as it is complete with a row of poses.csv.
+Localization localize_input(const LocalizeArgs& args, const Camera& camera, std::span<const TimedPose> truth,
+                            Run& run) {
+  StandardInput input;  // Ctrl-C ends waiting for a row
+  ObservationsStream frames(input, "-", reading(args, camera));
+  Localizer localizer(camera, args.config);
+  const bool shows = !run.options.json && !run.options.quiet;
+  const std::string header = poses_csv({});
+  if (shows) std::cout << header << std::flush;
+  std::size_t count = 0;
+  while (const std::optional<ObservationFrame> frame = frames.next()) {
+    report_progress(run.progress, "frames", ++count, 0);
+    const PathStep& step = localizer.push(*frame);
+    if (shows) std::cout << poses_csv({&step, 1}).substr(header.size()) << std::flush;
+  }
+  report_progress(run.progress, "frames", count, 0);  // the input may have ended by Ctrl-C
+  run.lap("read");
+  Localization result = localizer.finish(truth);
+  result.counts.given += frames.skipped().size();
+  result.counts.skipped = frames.skipped();
+  return result;
+}
+
 Localization localize_table(const LocalizeArgs& args, const Camera& camera, std::span<const TimedPose> truth,
                             LiveRun& live, Run& run) {
-  const ObservationTable observations =
-      read_observations(args.sequence, {args.skip_bad, args.rate_hz.value_or(0.0), camera.width_px, camera.height_px});
+  const ObservationTable observations = read_observations(args.sequence, reading(args, camera));
   run.lap("read");
   return alidade::localize(observations, camera, args.config, truth, live.progress());
 }
@@ -181,8 +211,9 @@ ExitCode run_localize(LocalizeArgs args, Run& run) {
     };
   }
   std::optional<SeenFrames> seen;
-  const Localization result = args.is_images() ? localize_images(args, camera, truth, live, seen, run)
-                                               : localize_table(args, camera, truth, live, run);
+  const Localization result = args.is_input()    ? localize_input(args, camera, truth, run)
+                              : args.is_images() ? localize_images(args, camera, truth, live, seen, run)
+                                                 : localize_table(args, camera, truth, live, run);
   if (live.server() != nullptr && !result.path.empty()) stream.show(*live.server(), result.path.back(), true);
   run.lap("localize");
   JobOutcome outcome = outcome_of(result);
@@ -202,14 +233,17 @@ void add_localize(App& app) {
                    "--sigma-alpha 6\n"
                    "alidade localize sights.csv --camera camera.yaml --target target.yaml\n"
                    "alidade localize sights.csv --camera camera.yaml --target target.yaml --calibrate-online\n"
+                   "tracker | alidade localize - --camera camera.yaml --target target.yaml\n"
                    "alidade localize sights.csv --camera camera.yaml --start start.yaml --truth truth.tum\n"
                    "alidade localize sights.csv --camera camera.yaml --depth-sensor depth.csv\n"
                    "alidade localize sights.csv --camera camera.yaml --range ranges.csv --beam rangefinder.yaml\n"},
       [args](Run& run) { return run_localize(*args, run); });
   command
-      .add_option("sequence", args->sequence,
-                  "Images: a folder of numbered ones, EuRoC's layout (mav0/cam0), or a video; or observations of "
-                  "numbered points, CSV: frame,t_s,point_id,u_px,v_px, in order of time")
+      .add_option(
+          "sequence", args->sequence,
+          "Images: a folder of numbered ones, EuRoC's layout (mav0/cam0), or a video; or observations of "
+          "numbered points, CSV: frame,t_s,point_id,u_px,v_px, in order of time; - reads these rows from standard "
+          "input and answers each frame")
       ->required();
   app.add_fields(command, fields_of(*args));
   add_live_options(command, args->live);

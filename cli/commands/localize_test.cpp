@@ -262,6 +262,59 @@ TEST_F(LocalizeCommand, FollowsABoardInImagesTakenUnderWater) {
   EXPECT_FALSE(std::filesystem::exists(path("none")));
 }
 
+/// Also where rows of frames are missing, and frames are not evenly apart.
+TEST_F(LocalizeCommand, AnswersRowsFromStandardInputAsTheFileIsAnswered) {
+  simulate({"--points", "20", "--frames", "40"});
+  const Csv csv = Csv::read(path("sim/sights.csv"));
+  std::string text = "frame,t_s,point_id,u_px,v_px\n";
+  for (std::size_t row = 0; row < csv.num_rows(); ++row) {
+    const long frame = csv.integer(row, "frame", 0, 1000);
+    if (frame == 1 || frame == 2 || frame % 11 == 5) continue;
+    const double t_s = csv.number(row, "t_s") + (frame > 20 ? 0.35 : 0.0);
+    text += csv.text(row, "frame") + "," + std::to_string(t_s) + "," + csv.text(row, "point_id") + "," +
+            csv.text(row, "u_px") + "," + csv.text(row, "v_px") + "\n";
+  }
+  write_file(path("rows.csv"), text);
+  const std::vector<std::string> target{"--target", path("sim/target.yaml"), "--start", path("sim/start.yaml")};
+  ASSERT_EQ(localize(target, "rows.csv").code, 0);
+  const std::string line = std::string("'") + ALIDADE_EXECUTABLE + "' localize - --no-report --camera '" +
+                           path("sim/camera.yaml") + "' --target '" + path("sim/target.yaml") + "' --start '" +
+                           path("sim/start.yaml") + "' --out '" + path("live") + "'";
+  const Outcome live = testing::run_program({"sh", "-c", line + " < '" + path("rows.csv") + "'"});
+  EXPECT_EQ(live.code, 0) << live.err;
+  for (const char* file : {"poses.csv", "map.csv", "trajectory.tum"})
+    EXPECT_EQ(read_file(path(std::string("live/") + file)), read_file(path(std::string("out/") + file))) << file;
+  const std::string whole = read_file(path("out/poses.csv"));
+  EXPECT_EQ(live.out.substr(0, whole.find('\n')), whole.substr(0, whole.find('\n')));
+  EXPECT_GT(std::ranges::count(live.out, '\n'), std::ranges::count(whole, '\n'));
+
+  const Outcome empty = testing::run_program({"sh", "-c", "head -1 '" + path("rows.csv") + "' | " + line});
+  EXPECT_EQ(empty.code, 3);
+  EXPECT_THAT(empty.err, ::testing::HasSubstr("-: has no observations"));
+  const Outcome cut = testing::run_program({"sh", "-c", "(head -5 '" + path("rows.csv") + "'; echo 0,0,x) | " + line});
+  EXPECT_EQ(cut.code, 3);
+  EXPECT_THAT(cut.err, ::testing::HasSubstr("-:6: has 3 cells"));
+  const Outcome skipped = testing::run_program(
+      {"sh", "-c", "(cat '" + path("rows.csv") + "'; echo 0,0,1,1,1) | " + line + " --skip-bad --json"});
+  EXPECT_EQ(skipped.code, 0) << skipped.err;
+  EXPECT_EQ(Json::parse(skipped.out)["counts"]["skipped"].size(), 1u);
+}
+
+/// A frame is answered as soon as the next one begins, while its sender goes on.
+TEST_F(LocalizeCommand, AnswersWhileRowsStillCome) {
+  simulate({"--points", "20", "--frames", "10"});
+  const std::string answers = path("answers.csv");
+  const std::string line = "(cat '" + path("sim/sights.csv") + "'; i=0; while [ $(wc -l < '" + answers +
+                           "') -lt 10 ] && [ $i -lt 600 ]; do sleep 0.05; i=$((i+1)); done; echo $i >&2) | '" +
+                           ALIDADE_EXECUTABLE + "' localize - --no-report --camera '" + path("sim/camera.yaml") +
+                           "' --target '" + path("sim/target.yaml") + "' --out '" + path("live") + "' > '" + answers +
+                           "'";
+  write_file(answers, "");
+  const Outcome live = testing::run_program({"sh", "-c", line});
+  EXPECT_EQ(live.code, 0) << live.err;
+  EXPECT_LT(std::stoi(live.err), 600);  // the header and nine frames of ten were there before the input ended
+}
+
 TEST_F(LocalizeCommand, SurvivesMissingFramesAndUnknownPoints) {
   simulate({"--points", "20", "--frames", "60"});
   const Csv csv = Csv::read(path("sim/sights.csv"));

@@ -30,7 +30,7 @@ ALIDADE_PUBLIC_BEGIN
                                     std::span<const TimedPose> truth = {}, const Progress& progress = {});
 
 /// The same frame by frame, as they come. What push() gives is the filter's; finish() gives what localize() gives from
-/// the same frames, if they are equally far apart or the config has their period.
+/// the same frames, to the last digit.
 class Localizer {
  public:
   /// Throws ConfigError.

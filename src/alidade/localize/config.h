@@ -129,7 +129,7 @@ struct LocalizeConfig {
   std::optional<Beam> beam = {};
   std::optional<ImageMask> mask = {};
   bool masks_circle = false;  ///< Images show the scene in a circle, as an endoscope's: found in the first of them.
-  double period_s = 0.0;      ///< Usual time between frames. 0: the median; of images the least so far.
+  double period_s = 0.0;      ///< Usual time between frames. 0: the median so far; of images the least.
   bool smooths = true;        ///< With a target: the path is solved again from all observations after the last frame.
   bool restarts = true;       ///< From the target where the innovations say that the path is wrong.
   int max_points = 0;         ///< In the filter at once, beside the target's; 0: as many as its state holds.

@@ -10,14 +10,10 @@
 
 namespace alidade {
 
-double ObservationLocalizer::period_s() const {
-  if (config_.period_s > 0.0) return config_.period_s;
-  return gaps_s_.empty() ? 1.0 : std::max(gaps_s_[gaps_s_.size() / 2], 1e-9);
-}
+double ObservationLocalizer::period_s() const { return config_.period_s > 0.0 ? config_.period_s : gap_.s(); }
 
 void ObservationLocalizer::keep_gap(double t_s) {
-  if (num_taken_ > 0 && !(config_.period_s > 0.0))
-    gaps_s_.insert(std::ranges::upper_bound(gaps_s_, t_s - t_s_), t_s - t_s_);
+  if (num_taken_ > 0) gap_.add(t_s - t_s_);
   t_s_ = t_s;
 }
 

@@ -6,6 +6,7 @@
 #include "alidade/localize/filter/observation_record.h"
 #include "alidade/localize/filter/point_episodes.h"
 #include "alidade/localize/filter/point_store.h"
+#include "alidade/localize/usual_gap.h"
 
 namespace alidade {
 
@@ -64,7 +65,7 @@ class ObservationLocalizer {
   PointEpisodes episodes_;
   ObservationRecord record_;
   std::vector<ObservationFrame> frames_;  ///< All, where the path is smoothed.
-  std::vector<double> gaps_s_;            ///< Between frames, growing; where their period is not given.
+  UsualGap gap_;                          ///< Between frames; where their period is not given.
   double t_s_ = 0.0;                      ///< Of the last frame.
   std::size_t num_taken_ = 0;             ///< Frames.
   std::size_t num_left_ = 0;              ///< Times that a point left a full filter.

@@ -148,16 +148,6 @@ void put_lens_in_state(const Camera& camera, LocalizationFilterConfig& filter) {
   }
 }
 
-/// The usual time between frames: the median.
-double period_of(std::span<const ObservationFrame> frames) {
-  std::vector<double> gaps;
-  for (std::size_t i = 1; i < frames.size(); ++i)
-    if (const double gap_s = frames[i].t_s - frames[i - 1].t_s; std::isfinite(gap_s)) gaps.push_back(gap_s);
-  if (gaps.empty()) return 1.0;
-  std::ranges::nth_element(gaps, gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2));
-  return std::max(gaps[gaps.size() / 2], 1e-9);
-}
-
 /// Tens of matches a frame, and room for as many features as there may be.
 LocalizationFilterConfig image_filter(const LocalizeConfig& config) {
   LocalizationFilterConfig filter = for_images(config.filter, config.features.sigma_floor_px);
@@ -278,7 +268,6 @@ LocalizeConfig sized(LocalizeConfig config, std::span<const ObservationFrame> fr
   LocalizationFilterConfig& filter = config.filter;
   filter.state_capacity = std::min(filter.state_capacity, static_cast<int>(std::min(need, limit)));
   filter.observations_capacity = std::min(filter.observations_capacity, static_cast<int>(std::min(most, limit)));
-  if (config.period_s == 0.0) config.period_s = period_of(frames);
   return config;
 }
 

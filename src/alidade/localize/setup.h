@@ -20,7 +20,7 @@ void require_sense(std::span<const TimedPose> truth);
 /// observations or of images.
 [[nodiscard]] LocalizeConfig resolved(LocalizeConfig config, const Camera& camera, bool is_of_images);
 
-/// The state as large as these frames can need, and their period: for who has them all at once.
+/// The state as large as these frames can need: for who has them all at once.
 [[nodiscard]] LocalizeConfig sized(LocalizeConfig config, std::span<const ObservationFrame> frames);
 
 }  // namespace alidade

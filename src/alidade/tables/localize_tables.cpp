@@ -9,76 +9,10 @@
 
 #include "alidade/files/table_rows.h"
 #include "alidade/tables/localize_file.h"
+#include "alidade/tables/logs/observations_stream.h"
 
 namespace alidade {
 namespace {
-
-constexpr long max_frames = 10'000'000, max_point_id = 1'000'000'000;
-
-/// What a row says of its frame; the frame is made with its first row.
-ObservationFrame& frame_of(const Csv& csv, std::size_t row, const ObservationsOptions& options,
-                           std::vector<ObservationFrame>& frames) {
-  const long number = csv.integer(row, "frame", 0, max_frames);
-  const double t_s = options.rate_hz > 0.0 ? static_cast<double>(number) / options.rate_hz : csv.number(row, "t_s");
-  if (!frames.empty() && frames.back().frame == number) {
-    if (frames.back().t_s != t_s)
-      throw InputError(csv.where(row, "t_s") +
-                       fmt::format(": '{}' differs from the first row of frame {}", csv.text(row, "t_s"), number));
-    return frames.back();
-  }
-  if (!frames.empty() && number < frames.back().frame)
-    throw InputError(csv.where(row, "frame") + fmt::format(": '{}' runs backwards", number));
-  if (!frames.empty() && !(t_s > frames.back().t_s))
-    throw InputError(csv.where(row, "t_s") +
-                     fmt::format(": '{}' is not after frame {}", csv.text(row, "t_s"), frames.back().frame));
-  frames.push_back({number, t_s, {}});
-  return frames.back();
-}
-
-void read_row(const Csv& csv, std::size_t row, const ObservationsOptions& options,
-              std::vector<ObservationFrame>& frames) {
-  const bool is_empty = csv.is_empty(row, "point_id");
-  FeatureObservation observation;
-  if (!is_empty) {
-    observation.id = csv.integer(row, "point_id", 0, max_point_id);
-    observation.px = {csv.number(row, "u_px"), csv.number(row, "v_px")};
-    const double u = observation.px.x() / options.width_px, v = observation.px.y() / options.height_px;
-    // A tracker may be half an image off; a camera file of another size is further.
-    if (options.width_px > 0 && !(u > -0.5 && u < 1.5))
-      throw InputError(csv.where(row, "u_px") + fmt::format(": '{}' is far outside the camera's {} px",
-                                                            csv.text(row, "u_px"), options.width_px));
-    if (options.height_px > 0 && !(v > -0.5 && v < 1.5))
-      throw InputError(csv.where(row, "v_px") + fmt::format(": '{}' is far outside the camera's {} px",
-                                                            csv.text(row, "v_px"), options.height_px));
-  }
-  const std::size_t num_before = frames.size();
-  ObservationFrame& frame = frame_of(csv, row, options, frames);
-  if (is_empty) return;
-  for (const FeatureObservation& other : frame.observations)
-    if (other.id == observation.id) {
-      if (frames.size() > num_before) frames.pop_back();
-      throw InputError(csv.where(row, "point_id") +
-                       fmt::format(": {} stands twice in frame {}", observation.id, frame.frame));
-    }
-  frame.observations.push_back(observation);
-}
-
-/// Frames whose numbers are missing, evenly between their neighbours: nothing was seen there.
-std::vector<ObservationFrame> with_missing(std::vector<ObservationFrame> frames) {
-  constexpr long max_missing = 100'000;  // a longer gap is another recording
-  std::vector<ObservationFrame> all;
-  for (ObservationFrame& frame : frames) {
-    const long missing = all.empty() ? 0 : frame.frame - all.back().frame - 1;
-    if (missing > 0 && missing <= max_missing) {
-      const ObservationFrame before = all.back();
-      const double step_s = (frame.t_s - before.t_s) / static_cast<double>(missing + 1);
-      for (long k = 1; k <= missing; ++k)
-        all.push_back({before.frame + k, before.t_s + step_s * static_cast<double>(k), {}});
-    }
-    all.push_back(std::move(frame));
-  }
-  return all;
-}
 
 /// In a TUM file the quaternion's real part stands last, elsewhere first.
 std::string pose_cells(const Rigid3& world_from_cam, bool is_tum) {
@@ -98,14 +32,12 @@ double sigma_of(const MapPoint& point) { return std::sqrt(point.cov.trace() / 3.
 
 ObservationTable read_observations(const std::filesystem::path& file, const ObservationsOptions& options) {
   const Csv csv = Csv::read(file);
-  for (const char* name : {"frame", "t_s", "point_id", "u_px", "v_px"}) {
-    if (options.rate_hz > 0.0 && std::string(name) == "t_s") continue;
-    if (!csv.has(name)) csv.refuse_missing(name, std::string(name) == "t_s" ? "; give it, or --rate" : "");
-  }
+  ObservationRows rows(csv, options);
   ObservationTable read;
-  for_each_row(csv, options.skip_bad, read.skipped, [&](std::size_t row) { read_row(csv, row, options, read.frames); });
+  for_each_row(csv, options.skip_bad, read.skipped, [&](std::size_t row) { rows.read(csv, row); });
+  rows.end();
+  while (auto frame = rows.next()) read.frames.push_back(std::move(*frame));
   if (read.frames.empty()) throw InputError(file.string() + ": has no observations; at least one row is needed");
-  read.frames = with_missing(std::move(read.frames));
   return read;
 }
 

@@ -79,6 +79,7 @@ fuzz: build
 faults: build
 	@tools/setup fuzz
 	@tools/faults.py $(out)/alidade $(FAULTS)
+	@tools/load.py $(out)/alidade --seconds $(if $(findstring --short,$(FAULTS)),20,600)
 
 # Tests of one program under the other sanitizers know nothing of each other: one after the other.
 sanitize:
@@ -147,6 +148,8 @@ study:
 	@$(out)/study_turned 200 >build/study/turned.md; met=$$?; cp build/study/turned.md docs/studies-turned.md; exit $$met
 	@echo "study: 200 runs with a head, broken at random instants, into docs/studies-heads.md"
 	@tools/head_kills.py $(out)/alidade --runs 200 >build/study/heads.md; met=$$?; cp build/study/heads.md docs/studies-heads.md; exit $$met
+	@echo "study: a million rows on standard input"
+	@tools/long_runs.py $(out)/alidade
 	@$(out)/corner_accuracy
 	@echo "study: how large a fault must be to be seen, into docs/studies-faults.md"
 	@$(out)/study_faults 20 >build/study/faults.md; met=$$?; cp build/study/faults.md docs/studies-faults.md; exit $$met

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <opencv2/core.hpp>
 #include <sstream>
+#include <vector>
 
 #include "alidade/board/board_fields.h"
 #include "alidade/files/config_file.h"
@@ -15,10 +17,15 @@
 #include "alidade/formats/camera_file.h"
 #include "alidade/formats/intrinsics_file.h"
 #include "alidade/formats/rig_file.h"
+#include "alidade/heads/head_server.h"
+#include "alidade/heads/protocols/indi_link.h"
+#include "alidade/heads/protocols/onvif_protocol.h"
+#include "alidade/heads/streams/frame_stream.h"
 #include "alidade/images/exif.h"
 #include "alidade/images/photos.h"
 #include "alidade/live/protocol.h"
 #include "alidade/results/calibration_result.h"
+#include "alidade/results/fleet_text.h"
 #include "alidade/results/observation_result.h"
 #include "alidade/results/rangefinder_result.h"
 #include "alidade/tables/corner_file.h"
@@ -166,6 +173,85 @@ void read_live_message(std::string_view bytes) {
   must(!live::has_token(bytes, "0123456789abcdef0123456789abcdef"), "no message guesses the token");
 }
 
+/// Commands of rotctl's clients to a simulated head: one answer a line, and angles that stay numbers.
+void read_rotctl_commands(std::string_view bytes) {
+  HeadPlant plant(SimulatedHeadConfig{}, 0.0);
+  std::istringstream in{std::string(bytes)};
+  double t_s = 0.0;
+  for (std::string line; std::getline(in, line); t_s += 0.1) {
+    if (!rotctl_answer(plant, line, t_s)) return;
+    const Eigen::Vector2d at = plant.truth(t_s);
+    const SimulatedHeadConfig& head = plant.config();
+    must((at.array() > head.low_rad.array() - 0.1).all() && (at.array() < head.high_rad.array() + 0.1).all(),
+         "a head stays within its limits");
+  }
+}
+
+/// What ONVIF's clients send to a simulated camera: who is not known moves nothing.
+void read_onvif_request(std::string_view bytes) {
+  const auto asked = [&](const char* user) {
+    HeadPlant plant(SimulatedHeadConfig{}, 0.0);
+    OnvifCamera camera(plant, {.user = user, .password = "a password of 20 letters"});
+    const OnvifCamera::Answer answer = camera.answer(std::string(bytes), 1.0);
+    must(!answer.body.empty(), "every request is answered");
+    must(answer.body.find("a password of 20") == std::string::npos, "no answer has the password in it");
+    const Eigen::Vector2d at = plant.truth(30.0);
+    must(at.allFinite() && (*user == '\0' || at.norm() == 0.0), "who is not known moves nothing");
+  };
+  asked("");
+  asked("somebody");
+}
+
+/// An INDI server's messages, in one piece and in two: the same elements, none of them empty.
+void read_indi_messages(std::string_view bytes) {
+  const auto elements = [](std::initializer_list<std::string_view> parts) {
+    XmlElements stream("fuzzed");
+    std::vector<std::string> found;
+    for (const std::string_view part : parts) {
+      stream.push(part);
+      for (std::string each = stream.next(); !each.empty(); each = stream.next()) found.push_back(each);
+    }
+    return found;
+  };
+  const auto whole = elements({bytes});
+  must(elements({bytes.substr(0, bytes.size() / 2), bytes.substr(bytes.size() / 2)}) == whole,
+       "elements do not depend on how they come");
+  const double angle = sexagesimal(std::string(bytes));
+  must(!std::isinf(angle), "an angle is a number, or none");
+}
+
+/// URLs of heads and streams: what is quoted of them has no password.
+void read_head_url(std::string_view bytes) {
+  const std::string url(bytes);
+  must(without_password("rotctl://somebody:secret@" + url).find("secret") == std::string::npos,
+       "no password is quoted");
+  const auto tried = [](const auto& read) {
+    try {
+      read();
+    } catch (const InputError&) {
+    }
+  };
+  tried([&] { must(address_of("rotctl://" + url, "rotctl://", 4533).port != 0, "a port is a number"); });
+  tried([&] { (void)simulated_head_config(url, "fuzzed"); });
+  tried([&] { must(simulated_camera(url, "fuzzed").width_px > 0, "a camera has pixels"); });
+}
+
+/// What a camera of a fleet says, and a checkpoint: taken in, written and read again as it is.
+void read_fleet_message(std::string_view bytes) {
+  std::string fault;
+  const auto row = parse_fleet_row(bytes, fault);
+  must(row.has_value() || !fault.empty(), "what is refused has a reason");
+  if (row) {
+    FleetCamera camera;
+    camera.n = row->n - 1;
+    (void)advance(camera, *row, {.width_px = 640, .height_px = 480});
+    must(camera.n == row->n, "a row is taken in");
+    must(parse_checkpoint(checkpoint_text(camera)).has_value(), "a checkpoint is read again");
+    (void)fleet_state_text("fuzzed", camera);
+  }
+  (void)parse_checkpoint(bytes);
+}
+
 constexpr std::array all_readers{
     Reader{"camera", read_any_camera},
     Reader{"camera_parts", read_camera_parts},
@@ -191,6 +277,11 @@ constexpr std::array all_readers{
     Reader{"photo", read_photo},
     Reader{"result", read_result},
     Reader{"live_message", read_live_message},
+    Reader{"rotctl", read_rotctl_commands},
+    Reader{"onvif", read_onvif_request},
+    Reader{"indi", read_indi_messages},
+    Reader{"head_url", read_head_url},
+    Reader{"fleet", read_fleet_message},
 };
 
 }  // namespace

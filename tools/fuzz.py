@@ -21,14 +21,19 @@ SEEDS = {  # reader: files of the simulations below
     "config": ["config/*"],
     "corners": ["*/corners.csv"],
     "events": ["track/*.csv"],
+    "fleet": ["fleet/*"],
+    "head_url": ["urls/*"],
+    "indi": ["indi/*"],
     "lens_course": ["track/*intrinsics*", "rotation/*intrinsics*"],
     "live_message": ["messages/*"],
     "observations": ["underwater/*.csv"],
+    "onvif": ["onvif/*"],
     "pairs": ["*/pairs.csv"],
     "path": ["underwater/*.tum", "underwater/*.txt"],
     "photo": ["photos/*", "board/*.png"],
     "result": ["results/*"],
     "rig": ["*/rig.yaml"],
+    "rotctl": ["rotctl/*"],
     "rotation_log": ["rotation/*.csv"],
     "scan": ["*/scan*.csv"],
     "scenario": ["scenario/*"],
@@ -58,6 +63,20 @@ cv2.imwrite(f"{sys.argv[1]}/b.png", numpy.dstack([image] * 3).astype(numpy.uint1
 MESSAGES = ['{"op":"subscribe","subscriptions":[{"id":1,"channelId":2}]}', '{"op":"unsubscribe","subscriptionIds":[1]}',
             "foxglove.sdk.v1, foxglove.websocket.v1", "localhost:8765", "/result.json?token=0123&a=b"]
 
+FLEET = ['{"n":1,"t":0.5,"pan":0.1,"tilt":-0.02,"p1x":320.5,"p1y":240.25,"p2x":100,"p2y":null}',
+         '{"n":7,"t":3,"qw":1,"qx":0,"qy":0,"qz":0,"p1x":1,"p1y":2}', '{"n":2,"t":1,"omega_x":0.1,"omega_y":0,"omega_z":0}']
+URLS = ["127.0.0.1:4533", "[::1]:80/path", "rate=30&accel=100&backlash=0.1&lie=frozen&seed=3", "size=320x240&fx=350&mount=1:2:3&fps=12&target=2:0:0:10:1"]
+INDI = ['<defNumberVector device="Rotator" name="ABS" state="Ok"><defNumber name="ANGLE" format="%g" min="0" max="360">12:30:15'
+        '</defNumber></defNumberVector>\n<message device="Rotator" message="hello"/>', '<?xml version="1.0"?><delProperty device="a" name="b"/>']
+ROTCTL = ["p\nP 30.5 -10\nS\n\\dump_state\n_\nK\n", "\\set_pos 1e300 0\nP nan 0\n\\get_pos\n\\stop\n\\park\nq\n"]
+SOAP = ('<s:Envelope xmlns:s="http://www.w3.org/2003/05/soap-envelope"><s:Header><Security><UsernameToken><Username>somebody</Username>'
+        '<Password>YWJj</Password><Nonce>YWJj</Nonce><Created>2026-01-31T12:00:00Z</Created></UsernameToken></Security></s:Header>'
+        '<s:Body>%s</s:Body></s:Envelope>')
+ONVIF = [SOAP % body for body in (
+    "<GetProfiles/>", '<AbsoluteMove><ProfileToken>p</ProfileToken><Position><PanTilt x="0.5" y="-0.1"/><Zoom x="0.3"/></Position></AbsoluteMove>',
+    '<ContinuousMove><Velocity><PanTilt x="1" y="0"/></Velocity><Timeout>PT1.5S</Timeout></ContinuousMove>', "<Stop/>", "<GetStatus/>",
+    "<GetSystemDateAndTime/>", "<GetCapabilities/>", "<GetStreamUri/>")]
+
 
 def run(*words, cwd=None):
     return subprocess.run([str(word) for word in words], cwd=cwd, capture_output=True, text=True)
@@ -69,15 +88,16 @@ def make_sources(alidade, folder):
         done = run(alidade, *command.split(), "--seed", 1, "--out", folder / name)
         if done.returncode:
             print(f"fuzz: seeds: alidade {command}: exit {done.returncode}: {done.stderr.strip()[:100]}", file=sys.stderr)
-    for part in ("cameras", "photos", "messages", "config", "results", "scenario"):
+    for part in ("cameras", "photos", "messages", "config", "results", "scenario", "fleet", "urls", "indi", "rotctl", "onvif"):
         (folder / part).mkdir()
     camera = next(iter(sorted(folder.glob("*/camera.yaml"))), None)
     if camera:
         for form in ("alidade", "opencv", "ros", "kalibr", "mrcal", "colmap"):
             run(alidade, "camera", "convert", camera, folder / "cameras" / form, "--to", form, "--lossy")
     run("/usr/bin/python3", "-c", PHOTO, folder / "photos")
-    for number, text in enumerate(MESSAGES):
-        (folder / "messages" / str(number)).write_text(text)
+    for part, texts in {"messages": MESSAGES, "fleet": FLEET, "urls": URLS, "indi": INDI, "rotctl": ROTCTL, "onvif": ONVIF}.items():
+        for number, text in enumerate(texts):
+            (folder / part / str(number)).write_text(text)
     (folder / "config" / "board").write_text("board: 9x6\nsquare_m: 25mm\ndictionary: DICT_4X4_50\nmarker_m: 0.01\n")
     help_text = run(alidade, "servo", "--help").stdout.partition("they then have:")[2].partition("Usage:")[0]
     (folder / "scenario" / "default").write_text(re.sub(r"^  ", "", help_text, flags=re.MULTILINE))

@@ -6,6 +6,7 @@
 #include <utility>
 #include <variant>
 
+#include "alidade/pantilt/recent_rows.h"
 #include "alidade/pantilt/rig_uncertainty.h"
 #include "alidade/track/checks/lens_over_time.h"
 #include "alidade/track/checks/track_assumed.h"
@@ -184,6 +185,7 @@ struct TargetTracker::State {
   TrackConfig config;
   std::variant<Tracker, XiahouTracker> tracker;
   std::vector<TargetObservation> observations;
+  std::size_t num_forgotten = 0;
 };
 
 namespace {
@@ -201,7 +203,7 @@ std::variant<Tracker, XiahouTracker> tracker_for(const Rig& rig, const TrackConf
 }  // namespace
 
 TargetTracker::TargetTracker(Rig rig, const TrackConfig& config)
-    : state_(std::make_unique<State>(State{rig, config, tracker_for(rig, config), {}})) {}
+    : state_(std::make_unique<State>(State{rig, config, tracker_for(rig, config), {}, 0})) {}
 TargetTracker::~TargetTracker() = default;
 TargetTracker::TargetTracker(TargetTracker&&) noexcept = default;
 TargetTracker& TargetTracker::operator=(TargetTracker&&) noexcept = default;
@@ -210,6 +212,7 @@ TrackStep TargetTracker::push(const TargetObservation& observation) {
   const std::string fault = observation_fault(observation, state_->rig.heads.size());
   if (!fault.empty()) throw ConfigError("the observation " + fault);
   state_->observations.push_back(observation);
+  state_->num_forgotten += forget_oldest(state_->observations, static_cast<std::size_t>(state_->config.keep_rows));
   return std::visit([&](auto& tracker) { return tracker.take(observation); }, state_->tracker);
 }
 
@@ -220,7 +223,9 @@ std::optional<PredictedStep> TargetTracker::at(double t_s) const {
 }
 
 TargetTrack TargetTracker::finish(const TrueTrack& truth, const Progress& progress) const {
-  return track(state_->observations, state_->rig, state_->config, truth, progress);
+  TargetTrack result = track(state_->observations, state_->rig, state_->config, truth, progress);
+  add_recent_rows(state_->num_forgotten, state_->observations.size(), "observations", result.verdict);
+  return result;
 }
 
 }  // namespace alidade

@@ -43,7 +43,8 @@ class TargetTracker {
   TrackStep push(const TargetObservation& observation);
   /// Where the target will be at a time. None before the start, before the newest observation, or of xiahou2015.
   [[nodiscard]] std::optional<PredictedStep> at(double t_s) const;
-  /// All that has been pushed, as track() gives it.
+  /// All that has been pushed, as track() gives it; of a stream that is longer than `keep_rows` the newest, and it says
+  /// so.
   [[nodiscard]] TargetTrack finish(const TrueTrack& truth = {}, const Progress& progress = {}) const;
 
  private:

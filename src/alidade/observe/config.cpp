@@ -97,7 +97,11 @@ FieldList number_fields(ObserveConfig& config) {
            .value = &config.window_s,
            .help = "Length of --method window [s]",
            .limits = positive,
-           .option = "--window-s"}};
+           .option = "--window-s"},
+          {.name = "keep_rows",
+           .value = &config.keep_rows,
+           .help = "Of rows from standard input: the newest that the result at the end is of, at most twice as many",
+           .limits = {.min = 100, .max = 1e9}}};
 }
 
 }  // namespace

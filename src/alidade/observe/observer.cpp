@@ -5,6 +5,7 @@
 #include "alidade/estimation/config_error.h"
 #include "alidade/observe.h"
 #include "alidade/observe/solve/solve.h"
+#include "alidade/pantilt/recent_rows.h"
 
 namespace alidade {
 namespace {
@@ -44,6 +45,7 @@ struct Observer::State {
   RotationLog log;
   std::optional<HybridObserver> hybrid;
   MotionReader reader;
+  std::size_t num_forgotten = 0;
 };
 
 Observer::Observer(RotationLog layout, const ObserveConfig& config)
@@ -56,12 +58,15 @@ ObserveStep Observer::push(RotationRow row, const std::optional<TrueIntrinsics>&
   State& state = *state_;
   RotationLog& log = state.log;
   if (!state.hybrid) state.begin(row.px.size());
-  check_row(row, log.rows.size(), log, log.rows.empty() ? row.t_s : log.rows.back().t_s);
+  check_row(row, num_rows(), log, log.rows.empty() ? row.t_s : log.rows.back().t_s);
   if (truth.has_value() != !log.truth.empty() && !log.rows.empty()) {
     throw ConfigError("either every row has a truth, or none");
   }
   log.rows.push_back(row);
   if (truth) log.truth.push_back(*truth);
+  const auto keep = static_cast<std::size_t>(state.config.keep_rows);
+  state.num_forgotten += forget_oldest(log.rows, keep);
+  (void)forget_oldest(log.truth, keep);
   if (state.setup.lens_is_given) undistort(*state.config.camera, Eigen::Vector2d::Constant(not_seen), row.px);
   const RotationFrame frame = state.reader.next(row);
   ObserveStep step =
@@ -88,10 +93,12 @@ ObserveStep Observer::push(double t_s, const Eigen::Quaterniond& base_from_cam, 
   return push(std::move(row));
 }
 
-std::size_t Observer::num_rows() const { return state_->log.rows.size(); }
+std::size_t Observer::num_rows() const { return state_->num_forgotten + state_->log.rows.size(); }
 
 ObserveReport Observer::finish(const Progress& progress) const {
-  return observe(state_->log, state_->config, progress);
+  ObserveReport report = observe(state_->log, state_->config, progress);
+  add_recent_rows(state_->num_forgotten, state_->log.rows.size(), "rows", report.verdict);
+  return report;
 }
 
 }  // namespace alidade

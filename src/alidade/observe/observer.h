@@ -23,7 +23,7 @@ struct ObserveStep {
 };
 
 /// observe() of rows that come one by one: each is answered at once by the hybrid method, and finish() gives the report
-/// that observe() gives of all of them.
+/// that observe() gives of all of them; of a stream that is longer than `keep_rows` of its newest rows, and says so.
 class Observer {
  public:
   /// `layout`: a log without rows, which says what rows have: the source of the rotation, how many points (0: as many
@@ -41,8 +41,8 @@ class Observer {
   /// The same with the attitude (source attitude).
   ObserveStep push(double t_s, const Eigen::Quaterniond& base_from_cam, std::span<const Eigen::Vector2d> px);
 
-  [[nodiscard]] std::size_t num_rows() const;
-  /// Of all rows so far; more may follow.
+  [[nodiscard]] std::size_t num_rows() const;  ///< That were taken.
+  /// Of all rows so far, or the newest; more may follow.
   [[nodiscard]] ObserveReport finish(const Progress& progress = {}) const;
 
  private:

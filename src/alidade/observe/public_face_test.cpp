@@ -87,6 +87,35 @@ TEST(ObserveFace, RowsOneByOneGiveWhatAllGive) {
   }
 }
 
+/// A stream without end keeps its newest rows: the end is what they say by themselves, and it is said.
+TEST(ObserveFace, OfALongStreamTheNewestRowsAreKept) {
+  const RotationLog log = any_log(8.0, RotationSource::head);
+  ObserveConfig config = sized();
+  config.estimate = {"none"};
+  RotationLog layout = log;
+  layout.rows.clear();
+  layout.truth.clear();
+  Observer whole(layout, config);
+  config.keep_rows = 100;
+  Observer observer(layout, config);
+  ASSERT_GT(log.rows.size(), 200u);
+  for (std::size_t k = 0; k < log.rows.size(); ++k) {
+    const ObserveStep step = observer.push(log.rows[k], log.truth[k]);
+    EXPECT_EQ(step.estimate.values(), whole.push(log.rows[k], log.truth[k]).estimate.values())
+        << "the filter forgets nothing";
+  }
+  EXPECT_EQ(observer.num_rows(), log.rows.size());
+  const ObserveReport live = observer.finish();
+  ASSERT_GE(live.log.rows.size(), 100u);
+  ASSERT_LT(live.log.rows.size(), 200u);
+  RotationLog newest = log;
+  const auto forgotten = static_cast<long>(log.rows.size() - live.log.rows.size());
+  newest.rows.erase(newest.rows.begin(), newest.rows.begin() + forgotten);
+  newest.truth.erase(newest.truth.begin(), newest.truth.begin() + forgotten);
+  EXPECT_EQ(params(observe(newest, config).camera.lens), params(live.camera.lens));
+  EXPECT_EQ(live.verdict.checks.back().name, "newest rows");
+}
+
 TEST(ObserveFace, AnswersEveryHostileNumber) {
   const auto refuses = [](const auto& spoil) {
     ObserveConfig config = sized();
@@ -139,12 +168,24 @@ TEST(ObserveFace, AnswersWordsThatDoNotFit) {
 }
 
 TEST(ObserveFace, EveryFieldIsWrittenAsItIsRead) {
-  const std::map<std::string, std::string> texts{
-      {"method", "batch"},        {"rotation", "noisy"},    {"estimate", "k1"},    {"start", "500,510,400,300"},
-      {"size", "640x480"},        {"profile", "quiet"},     {"lever_m", "0,0,-1"}, {"square_pixels", "true"},
-      {"no_zoom", "true"},        {"fixed_centre", "true"}, {"sigma_px", "0.5"},   {"sigma_angle_rad", "0.001"},
-      {"sigma_range_m", "0.01"},  {"sigma_scale", "0"},     {"window_s", "3"},     {"sigma_rate_rad_per_s", "0.02"},
-      {"sigma_parallax", "0.002"}};
+  const std::map<std::string, std::string> texts{{"method", "batch"},
+                                                 {"rotation", "noisy"},
+                                                 {"estimate", "k1"},
+                                                 {"start", "500,510,400,300"},
+                                                 {"size", "640x480"},
+                                                 {"profile", "quiet"},
+                                                 {"lever_m", "0,0,-1"},
+                                                 {"square_pixels", "true"},
+                                                 {"no_zoom", "true"},
+                                                 {"fixed_centre", "true"},
+                                                 {"sigma_px", "0.5"},
+                                                 {"sigma_angle_rad", "0.001"},
+                                                 {"sigma_range_m", "0.01"},
+                                                 {"sigma_scale", "0"},
+                                                 {"window_s", "3"},
+                                                 {"keep_rows", "5000"},
+                                                 {"sigma_rate_rad_per_s", "0.02"},
+                                                 {"sigma_parallax", "0.002"}};
   ObserveConfig config;
   const FieldList fields = fields_of(config);
   EXPECT_EQ(fields.size(), texts.size());

@@ -69,7 +69,11 @@ FieldList fields_of(TrackConfig& config) {
        .help = "σ of an encoder of which the rig states none [rad]",
        .limits = positive},
       {.name = "min_depth_m", .value = &config.min_depth_m, .help = "Working range, nearest [m]", .limits = positive},
-      {.name = "max_depth_m", .value = &config.max_depth_m, .help = "Working range, furthest [m]", .limits = positive}};
+      {.name = "max_depth_m", .value = &config.max_depth_m, .help = "Working range, furthest [m]", .limits = positive},
+      {.name = "keep_rows",
+       .value = &config.keep_rows,
+       .help = "Of rows from standard input: the newest that the result at the end is of, at most twice as many",
+       .limits = {.min = 100, .max = 1e9}}};
 }
 
 void require_sense(TrackConfig config) {

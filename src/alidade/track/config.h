@@ -27,6 +27,7 @@ struct TrackConfig {
   std::optional<double> sigma_clock_s = {};  ///< Of the delay between a head's clock and its images. None: exact.
   double sigma_angle_rad = 0.0008726646259971648;  ///< 0.05°; for heads whose encoder does not state its own.
   double min_depth_m = 0.2, max_depth_m = 20.0;    ///< The rig's working range, along a camera's view.
+  int keep_rows = 100000;  ///< Of a TargetTracker's observations: at least so many are kept, at most twice.
 };
 
 /// The fields of `config` that a person sets: all of them.

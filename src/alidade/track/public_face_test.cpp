@@ -77,6 +77,28 @@ TEST(TrackFace, OneByOneIsTheSame) {
   }
 }
 
+/// A stream without end keeps its newest rows: what they say is what the batch call says of them, and it is said.
+TEST(TrackFace, OfALongStreamTheNewestRowsAreKept) {
+  const TrackScene scene = *track_scenario("B");
+  const auto observations = testing::observations_of(scene, 5);
+  const TrackConfig config{.sigma_a_m_s2 = scene.sigma_a_m_s2, .keep_rows = 100};
+  TargetTracker tracker(rig_of(scene), config), whole(rig_of(scene), {.sigma_a_m_s2 = scene.sigma_a_m_s2});
+  ASSERT_GT(observations.size(), 2u * 100u);
+  for (const TargetObservation& observation : observations) {
+    const TrackStep step = tracker.push(observation);
+    EXPECT_EQ(step.belief.x, whole.push(observation).belief.x) << "the filter forgets nothing";
+  }
+  const TargetTrack live = tracker.finish();
+  ASSERT_GE(live.observations.size(), 100u);
+  ASSERT_LT(live.observations.size(), 200u);
+  const std::vector<TargetObservation> newest(observations.end() - static_cast<long>(live.observations.size()),
+                                              observations.end());
+  EXPECT_EQ(track(newest, rig_of(scene), config).steps.back().belief.x, live.steps.back().belief.x);
+  const Check& said = live.verdict.checks.back();
+  EXPECT_EQ(said.name, "newest rows");
+  EXPECT_THAT(said.text, ::testing::HasSubstr("of " + std::to_string(observations.size()) + " observations"));
+}
+
 std::string fault_of(const TrackConfig& config) {
   const TrackScene scene = *track_scenario("B");
   try {

@@ -64,13 +64,17 @@ EventRows::EventRows(const Csv& layout, std::span<const RigHead> heads, bool sta
       stands_still_(stands_still),
       columns_(event_columns_of(layout, stands_still)),
       newest_s_(stands_still ? heads.size() : 1, -1e300),
-      first_rad_(heads.size()) {}
+      first_rad_(heads.size()),
+      seen_s_(heads.size()) {}
 
 TargetObservation EventRows::read(const Csv& csv, std::size_t row) {
   const TargetObservation observation = read_row(csv, row, columns_, heads_, newest_s_);
-  if (!seen_.emplace(observation.head, observation.t_capture_s).second)
+  constexpr std::size_t max_kept = 100'000;  // images of a head: what is older than these does not come a second time
+  std::set<double>& seen_s = seen_s_[observation.head];
+  if (!seen_s.insert(observation.t_capture_s).second)
     throw InputError(csv.where(row, "t_capture_s") + ": '" + csv.text(row, "t_capture_s") +
                      "' stands in a row of this head before; an image has one target");
+  if (seen_s.size() > max_kept) seen_s.erase(seen_s.begin());
   std::optional<Eigen::Vector2d>& stood_rad = first_rad_[observation.head];
   if (!stood_rad) stood_rad = observation.pan_tilt_rad;
   constexpr double still_rad = 1e-6;

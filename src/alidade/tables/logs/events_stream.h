@@ -34,7 +34,7 @@ class EventRows {
   EventColumns columns_;
   std::vector<double> newest_s_;  ///< Arrival of the newest row so far; of one clock for all heads, or one for each.
   std::vector<std::optional<Eigen::Vector2d>> first_rad_;
-  std::set<std::pair<std::size_t, double>> seen_;
+  std::vector<std::set<double>> seen_s_;  ///< Newest capture times of each head.
 };
 
 /// Events row by row as they arrive, with the checks of read_events().

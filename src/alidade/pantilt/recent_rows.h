@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstddef>
+#include <iterator>
+#include <vector>
+
+#include "alidade/estimation/verdict.h"
+
+// Rows of a stream have no end: the newest are kept, so that memory has one.
+
+namespace alidade {
+
+/// Erases the oldest rows where there are twice `keep` of them, so that each row costs the same on average; how many.
+template <typename Row>
+std::size_t forget_oldest(std::vector<Row>& rows, std::size_t keep) {
+  if (rows.size() < 2 * keep) return 0;
+  const std::size_t count = rows.size() - keep;
+  rows.erase(rows.begin(), std::next(rows.begin(), static_cast<std::ptrdiff_t>(count)));
+  return count;
+}
+
+/// Says that a result is of the newest rows, where some were forgotten; `unit`: "rows", "observations".
+void add_recent_rows(std::size_t forgotten, std::size_t kept, const char* unit, Verdict& verdict);
+
+}  // namespace alidade

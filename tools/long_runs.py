@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A day of rows on standard input: tools/long_runs.py ALIDADE [--rows N] [--keep-rows N] [--commands observe,track]. Measurements are
+"""A day of rows on standard input: tools/long_runs.py ALIDADE [--rows N] [--keep-rows N] [--frames N] [--commands observe,track,localize]. Measurements are
 simulated here, with known truth, and given as fast as they are answered. What must hold: every row is answered; memory is flat once the
 rows kept are full; processor time a row is flat; σ at the end is what the errors are. One line of figures for each command."""
 import argparse
@@ -72,6 +72,76 @@ class TrackSource:
                     offset = 3600.0 * (number - 1)
                     yield f"{float(capture) + offset:.6f},{float(arrival) + offset:.6f},{rest}"
                     given += 1
+
+
+def walk_at(t):
+    """Along a wall and back, every 80 s: where the camera is, and how it is turned (about y, then x)."""
+    return (3.0 * math.sin(math.pi * t / 40.0), 0.06 * math.sin(0.8 * t), 0.06 * math.sin(0.5 * t)), 0.08 * math.sin(0.7 * t), 0.05 * math.sin(1.1 * t)
+
+
+class WalkSource:
+    """Numbered points that a camera sees; six of them, told to a millimetre, are the target."""
+
+    def __init__(self, folder, frames, seed):
+        self.noise, self.frames = random.Random(seed), frames
+        target = [(-0.15, -0.1, 1.2), (0.15, -0.1, 1.2), (0.15, 0.1, 1.2), (-0.15, 0.1, 1.2), (0.05, 0.0, 1.2), (-0.05, 0.05, 1.2)]
+        self.points = target + [(self.noise.uniform(-4.0, 4.0), self.noise.uniform(-0.8, 0.8), self.noise.uniform(1.0, 2.2))
+                                for _ in range(160)]
+        (folder / "camera.yaml").write_text("model: pinhole\nwidth: 768\nheight: 576\nfx: 610\nfy: 610\ncx: 384\ncy: 288\nskew: 0\n")
+        (folder / "target.yaml").write_text("points:\n" + "".join(
+            f"  - {{id: {i}, x_m: {x}, y_m: {y}, z_m: {z}, sigma_m: 0.001}}\n" for i, (x, y, z) in enumerate(target)))
+
+    def rows(self):
+        yield "frame,t_s,point_id,u_px,v_px"
+        for frame in range(self.frames + 1):  # a frame is answered when the next one begins
+            t = frame / 30.0
+            (cx, cy, cz), yaw, pitch = walk_at(t)
+            sy, ky, sp, kp = math.sin(yaw), math.cos(yaw), math.sin(pitch), math.cos(pitch)
+            for i, (x, y, z) in enumerate(self.points):
+                if abs(x - cx) > 2.2:
+                    continue
+                a, b, c = x - cx, y - cy, z - cz
+                a, c = ky * a - sy * c, sy * a + ky * c  # the camera's turn, taken back
+                b, c = kp * b + sp * c, -sp * b + kp * c
+                u, v = 610.0 * a / c + 384.0, 610.0 * b / c + 288.0
+                if 0.0 <= u <= 767.0 and 0.0 <= v <= 575.0:
+                    yield f"{frame},{t:.9f},{i},{u + self.noise.gauss(0.0, 0.5):.3f},{v + self.noise.gauss(0.0, 0.5):.3f}"
+
+
+def walk_held(parts, answered, frames, poses, code):
+    """Says the figures of a long walk, and what does not hold."""
+    faults = []
+    if answered != frames:
+        faults.append(f"{answered} of {frames} frames answered")
+    if code != 0:
+        faults.append(f"exit code {code}")
+    half = parts[len(parts) // 2:]
+    bytes_a_frame = 1024.0 * (half[-1][1] - half[0][1]) / (half[-1][0] - half[0][0])
+    is_long = frames > 40000  # five times the frames that are kept
+    if is_long and bytes_a_frame > 1500.0:  # a step of the path, and a list that doubles
+        faults.append(f"memory grows by {bytes_a_frame:.0f} bytes a frame")
+    third = max(1, len(parts) // 3)
+    first = parts[third - 1][2] / parts[third - 1][0]
+    last = (parts[-1][2] - parts[-1 - third][2]) / (parts[-1][0] - parts[-1 - third][0])
+    if is_long and last > 1.2 * first:
+        faults.append(f"the last frames take {last / first:.2f} times the first ones' time")
+    squares = variances = lost = 0.0
+    with open(poses) as file:
+        names = next(file).strip().split(",")
+        for line in file:
+            cells = dict(zip(names, line.strip().split(",")))
+            lost += cells["event"] in ("waiting", "predicted")
+            squares += sum((float(cells[f"{axis}_m"]) - at) ** 2 for axis, at in zip("xyz", walk_at(float(cells["t_s"]))[0]))
+            variances += sum(float(cells[f"cov_{axis}_{axis}"]) for axis in "xyz")
+    rms, sigma = math.sqrt(squares / answered), math.sqrt(variances / answered)
+    if lost:
+        faults.append(f"{lost:.0f} frames lost")
+    if not rms < 2.5 * sigma:
+        faults.append("sigma is too small")
+    print(f"localize -: {answered} frames, {1e3 * first:.2f} ms a frame in the first third, {1e3 * last:.2f} ms in the last, "
+          f"{parts[-1][1] / 1024:.0f} MB, {bytes_a_frame:.0f} bytes a frame more in the second half; error {1e3 * rms:.1f} mm, "
+          f"sigma {1e3 * sigma:.1f} mm" + "".join(f"; FAILS: {fault}" for fault in faults), flush=True)
+    return not faults
 
 
 def memory_kb(pid):
@@ -176,7 +246,8 @@ def main():
     parser.add_argument("alidade", type=pathlib.Path)
     parser.add_argument("--rows", type=int, default=1000000)
     parser.add_argument("--keep-rows", type=int, default=100000)
-    parser.add_argument("--commands", default="observe,track")
+    parser.add_argument("--frames", type=int, default=100000, help="of localize, of about thirty rows each")
+    parser.add_argument("--commands", default="observe,track,localize")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--verbose", action="store_true", help="memory and time of each part")
     args = parser.parse_args()
@@ -199,6 +270,14 @@ def main():
             if args.verbose:
                 print(*parts, sep="\n")
             holds &= held("track -", parts, answered, count, keep, errors.z[3:], code, False)
+        if "localize" in args.commands:
+            source = WalkSource(folder, args.frames, args.seed)
+            words = [alidade, "localize", "-", "--camera", folder / "camera.yaml", "--target", folder / "target.yaml", "--max-points", "40",
+                     "--sigma-a", "0.5", "--sigma-alpha", "0.5", "--no-report", "--out", folder / "walk"]
+            parts, answered, code = run(words, source.rows(), args.frames, lambda *_: None)
+            if args.verbose:
+                print(*parts, sep="\n")
+            holds &= walk_held(parts, answered, args.frames, folder / "walk" / "poses.csv", code)
     return 0 if holds else 1
 
 

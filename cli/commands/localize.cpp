@@ -58,7 +58,7 @@ FieldList fields_of(LocalizeArgs& args) {
        .value = &args.mask,
        .help =
            "Where images show the scene: an image of the camera's size, black where they do not; or 'circle', as an "
-           "endoscope's, found in the first image",
+           "endoscope's, found in the first image that shows one",
        .form = "FILE|circle"},
       {.name = "depth_sensor",
        .value = &args.depth_sensor,

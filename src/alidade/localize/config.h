@@ -128,11 +128,12 @@ struct LocalizeConfig {
   std::vector<RangeReading> range_readings = {};  ///< The same, of `beam`.
   std::optional<Beam> beam = {};
   std::optional<ImageMask> mask = {};
-  bool masks_circle = false;  ///< Images show the scene in a circle, as an endoscope's: found in the first of them.
+  bool masks_circle = false;  ///< Images show the scene in a circle, as an endoscope's: found in the first that does.
   double period_s = 0.0;      ///< Usual time between frames. 0: the median so far; of images the least.
   bool smooths = true;        ///< With a target: the path is solved again from all observations after the last frame.
-  bool restarts = true;       ///< From the target where the innovations say that the path is wrong.
-  int max_points = 0;         ///< In the filter at once, beside the target's; 0: as many as its state holds.
+  int max_smoothed = 8000;  ///< Frames solved together: of a longer path every second, fourth, …; the others follow.
+  bool restarts = true;     ///< From the target where the innovations say that the path is wrong.
+  int max_points = 0;       ///< In the filter at once, beside the target's; 0: as many as its state holds.
   double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;  ///< At a start from the target or from nothing.
   LocalizationFilterConfig filter = {};
   FilterBankConfig bank = {};

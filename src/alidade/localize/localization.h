@@ -114,6 +114,7 @@ struct Localization {
   std::vector<SensorScale> sensor_scales;  ///< Of what readings there were.
   bool has_target = false;                 ///< Known points were given.
   bool is_of_images = false;
+  bool lacks_circle = false;  ///< A circle was to be masked around, and no image shows one: nothing is masked.
   double sigma_px =
       std::numeric_limits<double>::quiet_NaN();  ///< Of an observation that brings none; of images the least.
   std::size_t num_lost = 0;  ///< Frames without a pose that observations hold: waiting or predicted.
@@ -137,6 +138,7 @@ struct Localization {
   bool is_behind = false;                ///< Most poses are on the side of a flat target from which it is not seen.
   ResidualStructure residuals;           ///< Of a smoothed path.
   bool is_smoothed = false;         ///< Path and map are from all observations together, not each from those before it.
+  std::size_t smoothed_every = 1;   ///< Of so many frames one was solved for, those between follow: a long recording.
   std::size_t num_unexplained = 0;  ///< Frames of a smoothed path of which most observations do not fit it.
   /// Of a smoothed path: along its least certain direction the cost rises more slowly to one side than to the other, or
   /// than σ says; σ is enlarged there by so much.

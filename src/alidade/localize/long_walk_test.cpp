@@ -57,6 +57,36 @@ TEST(LongWalk, ThePoseIsAsGoodAsItsCovarianceSays) {
   EXPECT_LT(nees, 1.6);
 }
 
+/// The whole of a recording that is too long is every fourth of its frames: less sure, and as sure as it says.
+TEST(LongWalk, OfALongRecordingEveryFourthFrameIsSolvedForAndTheOthersFollow) {
+  constexpr std::uint64_t num_seeds = 6;
+  double nees = 0.0, between = 0.0;
+  for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
+    const WalkRun run = long_walk({.num_points = 300, .num_frames = 450, .sigma_known_m = 0.001}, 200 + seed);
+    LocalizeConfig config;
+    config.target.points = run.target;
+    config.max_points = 40;
+    config.max_smoothed = 150;
+    const Localization result = localize(run.frames, run.camera, config, run.truth);
+    EXPECT_TRUE(result.is_smoothed) << seed;
+    EXPECT_EQ(result.smoothed_every, 4u);
+    EXPECT_EQ(result.path.size(), run.frames.size());
+    EXPECT_TRUE(result.verdict.ok()) << result.verdict.sentence;
+    EXPECT_LT(result.error.unaligned_m, 0.06) << seed;
+    for (std::size_t k = 0; k < result.path.size(); ++k) {
+      const double here = testing::pose_nees(result.path[k], run.truth[k].world_from_cam) /
+                          static_cast<double>(num_seeds * result.path.size());
+      nees += here;
+      if (k % 4 != 0) between += here * 4.0 / 3.0;
+    }
+  }
+  RecordProperty("nees", std::to_string(nees));
+  RecordProperty("between", std::to_string(between));
+  EXPECT_GT(nees, 0.5);
+  EXPECT_LT(nees, 1.6);
+  EXPECT_LT(between, 1.7);
+}
+
 TEST(LongWalk, PointsThatLeftComeBackByTheirNumber) {
   LongWalk scene;
   scene.num_points = 250;

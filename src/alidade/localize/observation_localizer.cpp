@@ -298,7 +298,7 @@ PathStep ObservationLocalizer::take(const ObservationFrame& given) {
   ObservationFrame frame = numbered(given);
   PathStep step = taken(frame);
   ++num_taken_;
-  if (smooths()) frames_.push_back(std::move(frame));
+  if (smooths()) frames_.add(std::move(frame));
   return step;
 }
 

@@ -6,6 +6,7 @@
 #include "alidade/localize/filter/observation_record.h"
 #include "alidade/localize/filter/point_episodes.h"
 #include "alidade/localize/filter/point_store.h"
+#include "alidade/localize/kept_frames.h"
 #include "alidade/localize/usual_gap.h"
 
 namespace alidade {
@@ -16,7 +17,10 @@ class ObservationLocalizer {
  public:
   /// `config` as resolved() gives it; it must live longer.
   ObservationLocalizer(const Camera& camera, const LocalizeConfig& config)
-      : engine_(camera, config), config_(config), points_(config) {}
+      : engine_(camera, config),
+        config_(config),
+        points_(config),
+        frames_(static_cast<std::size_t>(config.max_smoothed)) {}
 
   PathStep take(const ObservationFrame& frame);
   /// `result` has the path; the rest is filled in, and the path smoothed.
@@ -55,6 +59,12 @@ class ObservationLocalizer {
   [[nodiscard]] bool is_firm(long id) const;
   [[nodiscard]] bool find_again(OtherPlace other, const ObservationFrame& frame, const ObservationsReport& report);
 
+  struct WholePath {
+    SmoothedPath smoothed;
+    std::size_t first_frame = 0;  ///< Of those kept.
+    double scale = 1.0;           ///< What the filter's unit of length is now.
+  };
+  [[nodiscard]] std::optional<WholePath> smoothed_as_a_whole(Localization& result) const;
   [[nodiscard]] std::optional<SmoothedPath> smooth_with_loops(SmootherProblem& problem, Localization& result) const;
   [[nodiscard]] double solve_in_metres(SmootherProblem problem, std::optional<SmoothedPath>& smoothed,
                                        Localization& result) const;
@@ -64,12 +74,12 @@ class ObservationLocalizer {
   PointStore points_;
   PointEpisodes episodes_;
   ObservationRecord record_;
-  std::vector<ObservationFrame> frames_;  ///< All, where the path is smoothed.
-  UsualGap gap_;                          ///< Between frames; where their period is not given.
-  double t_s_ = 0.0;                      ///< Of the last frame.
-  std::size_t num_taken_ = 0;             ///< Frames.
-  std::size_t num_left_ = 0;              ///< Times that a point left a full filter.
-  int num_elsewhere_ = 0;  ///< Frames in a row in which the target says that the camera is somewhere else.
+  KeptFrames frames_;          ///< Where the path is smoothed.
+  UsualGap gap_;               ///< Between frames; where their period is not given.
+  double t_s_ = 0.0;           ///< Of the last frame.
+  std::size_t num_taken_ = 0;  ///< Frames.
+  std::size_t num_left_ = 0;   ///< Times that a point left a full filter.
+  int num_elsewhere_ = 0;      ///< Frames in a row in which the target says that the camera is somewhere else.
 };
 
 }  // namespace alidade

@@ -32,6 +32,7 @@ FieldList inner_fields(LocalizeConfig& config) {
   ImageFeatureConfig& features = config.features;
   return {
       {.name = "period_s", .value = &config.period_s, .limits = from_zero},
+      {.name = "max_smoothed", .value = &config.max_smoothed, .limits = {10, 1e6}},
       {.name = "sigma_speed_m_s", .value = &config.sigma_speed_m_s, .limits = positive},
       {.name = "sigma_rate_rad_s", .value = &config.sigma_rate_rad_s, .limits = positive},
       {.name = "target.sigma_scale", .value = &config.target.sigma_scale, .limits = from_zero},

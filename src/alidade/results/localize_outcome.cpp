@@ -152,6 +152,9 @@ void path_lines(const Localization& result, std::vector<std::string>& lines) {
                               3.0 * sigma.tail<3>().maxCoeff() / degree));
   if (std::isfinite(result.nis_per_dof))
     lines.push_back(fmt::format("NIS per degree of freedom {:.2f}", result.nis_per_dof));
+  if (result.smoothed_every > 1)
+    lines.push_back(fmt::format("one in {} frames is solved for with all others, those between follow from it",
+                                result.smoothed_every));
   if (result.num_loops > 0)
     lines.push_back(fmt::format("{} loops closed: what was seen long before is seen again", result.num_loops));
   if (std::isfinite(result.error.ate_m))

@@ -26,6 +26,7 @@ struct WalkRun {
   std::vector<ObservationFrame> frames;
   std::vector<TimedPose> truth;
   std::vector<KnownPoint> target;
+  std::vector<Eigen::Vector3d> points;  ///< By number.
 };
 
 inline double wall_z(double x, double y) { return 1.5 + 0.1 * std::sin(2.0 * x) + 0.05 * std::cos(3.0 * y); }
@@ -65,6 +66,7 @@ inline WalkRun long_walk(const LongWalk& scene, std::uint64_t seed) {
     run.frames.push_back(std::move(frame));
     run.truth.push_back({t_s, world_from_cam});
   }
+  run.points = points;
   return run;
 }
 

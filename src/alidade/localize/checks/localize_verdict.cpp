@@ -296,6 +296,9 @@ void add_checks(const Localization& report, Verdict& verdict) {
                                 ? "none of the target's points is seen: scale and frame are those of the start"
                                 : "scale unknown: the path is up to scale, its unit is the depth at the start",
                             0.0, 0.0, "", "path"});
+  if (report.lacks_circle)
+    verdict.checks.push_back(
+        {"mask", State::care, "--mask circle: no image shows a circle, and nothing is masked", 0.0, 0.0, "", "tracks"});
   if (report.num_restarts > 0)
     verdict.checks.push_back({"restarts", restarts_state(report), restarts_text(report),
                               static_cast<double>(report.num_restarts), 0.0, "times", "path"});

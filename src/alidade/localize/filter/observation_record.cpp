@@ -184,6 +184,16 @@ void ObservationRecord::begin(std::size_t frame) {
   last_begun_ = frame;
 }
 
+ObservationRecord ObservationRecord::of_every(const KeptFrames& frames) const {
+  ObservationRecord record = *this;
+  record.first_frame_ = frames.index_of(first_frame_);
+  record.last_begun_ = frames.index_of(last_begun_);
+  for (auto& [id, birth] : record.births_) birth.frame = frames.index_of(birth.frame);
+  record.jumps_.clear();
+  for (const std::size_t jump : jumps_) record.jumps_.insert(frames.index_of(jump));
+  return record;
+}
+
 void ObservationRecord::add_points(const LocalizeConfig& config, const LocalizationFilter& filter,
                                    SmootherProblem& problem) const {
   for (const Feature& feature : filter.features()) {

@@ -6,6 +6,7 @@
 #include "alidade/localize/config.h"
 #include "alidade/localize/filter/filter.h"
 #include "alidade/localize/filter/point_store.h"
+#include "alidade/localize/kept_frames.h"
 #include "alidade/localize/path/path_smoother.h"
 
 namespace alidade {
@@ -30,6 +31,9 @@ class ObservationRecord {
   void left(long id) { births_.erase(id); }
   /// The camera came to this frame by no motion.
   void jumped(std::size_t frame) { jumps_.insert(frame); }
+
+  /// The same by the numbers of the frames that are kept.
+  [[nodiscard]] ObservationRecord of_every(const KeptFrames& frames) const;
 
   /// All that was seen since the path began, with the filter's map to begin at. Backwards from the last frame, each
   /// pose is the one that explains most of the map's observations: the filter's, that of the frame after it, or one of

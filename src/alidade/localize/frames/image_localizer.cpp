@@ -328,7 +328,11 @@ void ImageLocalizer::take_next(const cv::Mat& smoothed, PathStep& step) {
 
 PathStep ImageLocalizer::take(const cv::Mat& grey, long frame, double t_s) {
   const cv::Mat smoothed = smoothed_for_search(grey);
-  if (shown_.shows.empty()) shown_ = shown_part(config_, grey, PatchView::half_px + 2);
+  if (shown_.shows.empty()) {
+    ShownPart part = shown_part(config_, grey, PatchView::half_px + 2);
+    shown_ = std::move(part.mask);
+    lacks_circle_ = part.lacks_circle;
+  }
   PathStep step;
   step.frame = frame_ = frame;
   step.t_s = t_s;
@@ -354,6 +358,7 @@ PathStep ImageLocalizer::take(const cv::Mat& grey, long frame, double t_s) {
 
 void ImageLocalizer::sum_up(Localization& result) const {
   result.is_of_images = true;
+  result.lacks_circle = lacks_circle_;
   result.sigma_px = config_.features.sigma_floor_px;
   result.num_alike = num_alike_;
   const auto num_found = [this](long id) {

@@ -62,6 +62,7 @@ class ImageLocalizer {
   [[nodiscard]] bool is_shown(const Eigen::Vector2d& px) const;
 
   ImageMask shown_;  ///< image_mask.h.
+  bool lacks_circle_ = false;
   std::vector<ObservationTried> tried_;
   std::vector<Eigen::Vector2d> in_view_;  ///< Where landmarks are, or should be, in this image.
   double t_s_ = 0.0, period_s_ = 0.0;

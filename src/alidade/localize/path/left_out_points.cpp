@@ -1,0 +1,111 @@
+#include "alidade/localize/path/left_out_points.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <optional>
+#include <unordered_map>
+
+namespace alidade {
+namespace {
+
+constexpr std::size_t min_looks = 3;
+
+/// A point seen from a smoothed pose.
+struct Look {
+  std::size_t frame = 0;  ///< Of the smoothed path.
+  Eigen::Vector2d px;
+  double sigma_px = 0.5;
+};
+
+/// The place nearest to all rays. None: they are parallel.
+std::optional<Eigen::Vector3d> nearest_to_rays(const SmoothedPath& smoothed, std::span<const Look> looks) {
+  Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Look& look : looks) {
+    const auto ray = unproject(smoothed.camera, look.px);
+    if (!ray) continue;
+    const Rigid3& pose = smoothed.world_from_cam[look.frame];
+    const Eigen::Vector3d direction = (pose.rotation * *ray).normalized();
+    const Eigen::Matrix3d off = Eigen::Matrix3d::Identity() - direction * direction.transpose();
+    across += off;
+    sum += off * pose.translation;
+  }
+  const Eigen::LDLT<Eigen::Matrix3d> ldlt(across);
+  constexpr double min_angle2 = 1e-5;  // of what rays differ by, squared
+  if (!(ldlt.vectorD().minCoeff() > min_angle2 * static_cast<double>(looks.size()))) return std::nullopt;
+  return ldlt.solve(sum);
+}
+
+struct PlacedPoint {
+  Eigen::Vector3d point_in_world;
+  Eigen::Matrix3d cov;
+  std::size_t num_fit = 0;
+};
+
+/// A Gauss–Newton step from `at`, of the looks within the gate; `gate` ∞: of all.
+std::optional<PlacedPoint> placed_from(const SmoothedPath& smoothed, std::span<const Look> looks,
+                                       const Eigen::Vector3d& at, double gate) {
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d g = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d of_poses = Eigen::Matrix3d::Zero();
+  PlacedPoint placed;
+  for (const Look& look : looks) {
+    const Rigid3& pose = smoothed.world_from_cam[look.frame];
+    const Eigen::Vector3d point_in_cam = pose.inverse() * at;
+    const auto seen = project_with_jacobians(smoothed.camera, point_in_cam);
+    if (!seen) continue;
+    const Eigen::Vector2d residual_px = look.px - seen->px;
+    const double variance = look.sigma_px * look.sigma_px;
+    if (residual_px.squaredNorm() > gate * variance) continue;
+    const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
+    const Eigen::Matrix<double, 2, 3> J = seen->J_px_point * R.transpose();
+    H += J.transpose() * J / variance;
+    g += J.transpose() * residual_px / variance;
+    Eigen::Matrix<double, 3, 6> J_pose;  // where a point goes that is fixed to the camera
+    J_pose << R, -R * cross_matrix(point_in_cam);
+    of_poses += J_pose * smoothed.cov[look.frame] * J_pose.transpose();
+    ++placed.num_fit;
+  }
+  const Eigen::LLT<Eigen::Matrix3d> llt(H);
+  if (placed.num_fit < min_looks || llt.info() != Eigen::Success) return std::nullopt;
+  placed.point_in_world = at + llt.solve(g);
+  placed.cov = llt.solve(Eigen::Matrix3d::Identity()) + of_poses / static_cast<double>(placed.num_fit);
+  if (!placed.point_in_world.allFinite() || !placed.cov.allFinite()) return std::nullopt;
+  return placed;
+}
+
+std::optional<PlacedPoint> placed_by(const SmoothedPath& smoothed, std::span<const Look> looks, double gate) {
+  const auto begin = nearest_to_rays(smoothed, looks);
+  if (!begin) return std::nullopt;
+  constexpr int num_steps = 4;
+  std::optional<PlacedPoint> placed = PlacedPoint{*begin, {}, 0};
+  for (int i = 0; i < num_steps && placed; ++i) {
+    const double widened = i == 0 ? 1e6 : i == 1 ? 16.0 : 1.0;
+    placed = placed_from(smoothed, looks, placed->point_in_world, widened * gate);
+  }
+  if (!placed || 2 * placed->num_fit < looks.size()) return std::nullopt;
+  return placed;
+}
+
+}  // namespace
+
+void place_left_out(const SmoothedPath& smoothed, std::size_t first_frame, std::span<const ObservationFrame> frames,
+                    double sigma_px, double gate, std::vector<MapPoint>& map) {
+  std::unordered_map<long, std::vector<Look>> looks;
+  for (const MapPoint& point : map)
+    if (!point.is_known && !std::ranges::binary_search(smoothed.ids, point.id)) looks[point.id];
+  for (std::size_t k = 0; k < smoothed.world_from_cam.size() && first_frame + k < frames.size(); ++k)
+    for (const FeatureObservation& observation : frames[first_frame + k].observations)
+      if (const auto at = looks.find(observation.id); at != looks.end())
+        at->second.push_back({k, observation.px, observation.sigma_px > 0.0 ? observation.sigma_px : sigma_px});
+  for (MapPoint& point : map) {
+    const auto at = looks.find(point.id);
+    if (at == looks.end() || at->second.size() < min_looks) continue;
+    const auto placed = placed_by(smoothed, at->second, gate);
+    if (!placed) continue;
+    point.point_in_world = placed->point_in_world;
+    point.cov = placed->cov;
+  }
+}
+
+}  // namespace alidade

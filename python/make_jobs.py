@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes jobs.py, plan.py and simulate.py of the package: make_jobs.py PACKAGE. A function for each command, whose
+"""Writes jobs.py, plan.py, simulate.py and study.py of the package: make_jobs.py PACKAGE. A function for each command, whose
 keywords, defaults and docs are the library's own descriptions of its fields and options."""
 import keyword
 import pathlib
@@ -11,9 +11,11 @@ package = pathlib.Path(sys.argv[1])
 sys.path.insert(0, str(package))
 import _alidade  # noqa: E402
 
-JOBS = ["observe", "track", "rangefinder", "rig", "localize", "servo", "identify", "corners"]
+JOBS = ["observe", "track", "rangefinder", "rig", "localize", "servo", "identify", "corners", "project", "reproduce"]
 # Of a command line, not of a program: where results go, what is printed, and who watches.
 NOT_HERE = {"help", "out", "json", "quiet", "no_report", "config", "csv", "live", "live_address", "live_pace", "version"}
+# Of a campaign on several machines, or one that is gone on with: those write a folder, which the command does.
+OF_CAMPAIGNS = {"shard", "resume", "block", "merge"}
 BOARD = "The board"
 # What a program gives in another way than the command line: by `board`, as values, as photos.
 OF_CALIBRATE = {"photos", "corners", "size", "air", "skip_bad", "threads",
@@ -122,7 +124,7 @@ def calibrate(command):
 
 
 def job(command, function):
-    options = [each for each in command["options"] if each["name"] not in NOT_HERE]
+    options = [each for each in command["options"] if each["name"] not in NOT_HERE | OF_CAMPAIGNS]
     of_board = [each for each in options if each["group"] == BOARD]
     options = [each for each in options if each["group"] != BOARD]
     arguments = [f"{name_of(each)}: Input = None" for each in options if not each["option"]]
@@ -156,6 +158,8 @@ def write(file, title, functions):
 
 commands = {each["name"]: each for each in _alidade.commands()}
 write("jobs.py", "The jobs, a function each.", [calibrate(commands["calibrate"]), *(job(commands[name], name) for name in JOBS)])
-for group, title in (("plan", "What to do next, before it is done."), ("simulate", "Data with known truth.")):
+for group, title in (("plan", "What to do next, before it is done."), ("simulate", "Data with known truth."),
+                     ("study", "Campaigns of simulated trials: is σ what it says?")):
     members = {name.split()[1]: each for name, each in commands.items() if name.startswith(group + " ")}
+    members = {name: each for name, each in members.items() if name not in OF_CAMPAIGNS}
     write(group + ".py", title, [job(each, name.replace("-", "_")) for name, each in members.items()])

@@ -51,7 +51,7 @@ class Batch(unittest.TestCase):
         self.run_batch()
         rows = self.table()
         self.assertEqual([row["camera"] for row in rows], [*(f"cam {i}" for i in range(CAMERAS)), "gone", "odd", "endless", "out"])
-        self.assertEqual([int(row["exit_code"]) for row in rows], [0] * CAMERAS + [3, 2, 2, 2])
+        self.assertEqual([int(row["exit_code"]) for row in rows], [0] * CAMERAS + [3, 2, 2, 2], [row["sentence"] for row in rows])
         self.assertIn("nowhere.csv", rows[CAMERAS]["sentence"])
         self.assertIn("--nonsense", rows[CAMERAS + 1]["sentence"])
         for i in (0, 7):
@@ -85,6 +85,18 @@ class Batch(unittest.TestCase):
         self.assertEqual(len(self.table()), CAMERAS + 4)
         for file, stamp in stamps.items():
             self.assertEqual(file.stat().st_mtime_ns, stamp, file)
+
+    def test_an_upgrade_in_the_middle_of_a_lot(self):
+        own = self.folder / "alidade"
+        shutil.copy2(ALIDADE, own)
+        running = subprocess.Popen([own, "batch", "jobs.csv", "--out", "lot", "--threads", "1", "--quiet"], cwd=self.folder)
+        while not list(self.folder.glob("lot/rows/*/row.json")):
+            self.assertIsNone(running.poll())
+            time.sleep(0.005)
+        shutil.copy2(ALIDADE, self.folder / "newer")
+        (self.folder / "newer").replace(own)  # as packages are: the file that runs is gone
+        self.assertEqual(running.wait(), 0)
+        self.assertEqual([int(row["exit_code"]) for row in self.table()], [0] * CAMERAS + [3, 2, 2, 2])
 
     def test_a_table_that_cannot_be_is_refused(self):
         for text, said in (("camera,size\na,1x1\n", "arguments"), ("arguments\n", "no rows"), ('arguments\n"observe \'x"\n', "jobs.csv:2"), ('arguments,camera\n"",x\n', "empty")):

@@ -9,6 +9,7 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <string_view>
 #include <thread>
 
 #include "alidade/files/descriptor.h"
@@ -48,7 +49,11 @@ pid_t start_child(const std::string& program, std::vector<std::string> words, in
 
 std::filesystem::path own_executable() {
   std::error_code error;
-  return std::filesystem::read_symlink("/proc/self/exe", error);
+  std::string name = std::filesystem::read_symlink("/proc/self/exe", error).string();
+  // Replaced while it runs, by an upgrade in the middle of a lot: the one that stands in its place goes on.
+  constexpr std::string_view gone = " (deleted)";
+  if (name.ends_with(gone)) name.resize(name.size() - gone.size());
+  return name;
 }
 
 ChildResult run_child(const std::filesystem::path& program, const std::vector<std::string>& words,

@@ -5,7 +5,7 @@ import math
 from typing import Any
 
 from . import _alidade
-from .job import Progress
+from .job import Progress, files_for_call
 from .result import Result
 
 _FREE = (-1e9, 1e9)
@@ -78,6 +78,17 @@ class Head:
         words += [f"--until={until}"] if until is not None else []
         words += [f"--most={most_s}"] if most_s is not None else []
         return self._run(words, progress)
+
+    def follow(self, stream: str, look: str, rig: Any, *, latency_s: float | None = None, delay_s: float | None = None,
+               most_s: float | None = None, progress: Progress | None = None) -> Result:
+        """Follows what looks so ("bright", "colour:230,70,20", "marker:DICT_4X4_50:7"), as `alidade head URL --stream STREAM
+        --rig RIG --follow LOOK --move`. rig: rig.yaml of calibrate(), or its result."""
+        words = [f"--stream={stream}", f"--follow={look}"]
+        words += [f"--latency={latency_s}"] if latency_s is not None else []
+        words += [f"--delay={delay_s}"] if delay_s is not None else []
+        words += [f"--most={most_s}"] if most_s is not None else []
+        with files_for_call() as files:
+            return self._run([*words, f"--rig={files.path_of(rig, 'rig')}"], progress)
 
     def _open(self) -> _alidade.Head:
         if self._core is None:

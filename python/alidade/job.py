@@ -29,6 +29,8 @@ Input = Any
 Options = dict[str, tuple[str, bool, bool, str]]
 #: Columns of a table that may name files, beside it or where the program runs.
 PHOTO_COLUMNS = ("photo", "photo_off")
+#: The file of a result that a keyword takes, where it is not called like it.
+FILE_OF = {"beam": "rangefinder"}
 Photos = Union[str, "os.PathLike[str]", "abc.Sequence[Any]", "np.ndarray[Any, Any]"]
 
 
@@ -129,7 +131,8 @@ class _Files:
             return text_of(value, name)
         folder = self.folder / f"{name}{len(self.names)}"
         value.save(folder)
-        own = next((folder / file for file in value.files if os.path.splitext(file)[0] == name), folder)
+        stem = FILE_OF.get(name, name)
+        own = next((folder / file for file in value.files if os.path.splitext(file)[0] == stem), folder)
         self.names.append((str(own), name))
         return str(own)
 

@@ -2,6 +2,8 @@
 import json
 import unittest
 
+import numpy as np
+
 import alidade as al
 from common import InFolder, assert_same_table, command
 
@@ -48,6 +50,17 @@ class Jobs(InFolder):
         self.assertGreater(len(result.tables["track"]), 10)
         self.assertEqual(al.track(events, rig=rig, method="cv"), result)
 
+    def test_studies_and_papers(self):
+        result = al.study.observe(trials=300, seed=5)
+        self.same_as_command(result, "study", "observe", "--trials", "300", "--seed", "5")
+        self.assertEqual(result.estimate["trials"], 300)
+        one = al.study.observe(trials=300, seed=5, trial=7)
+        self.assertIn("fx", one.verdict.sentence)
+        with self.assertRaisesRegex(ValueError, "none of the 300 trials"):
+            al.study.observe(trials=300, trial=300)
+        with self.assertRaisesRegex(ValueError, "paper"):
+            al.reproduce("nobody1999")
+
     def test_rangefinder_and_rig(self):
         board = al.Board("9x6", square_m=0.04)
         made = self.folder / "shots"
@@ -56,6 +69,18 @@ class Jobs(InFolder):
         result = al.rangefinder(made / "shots.csv", camera=made / "camera.yaml", **given)
         self.same_as_command(result, "rangefinder", made / "shots.csv", "--camera", made / "camera.yaml", "--board", "9x6",
                              "--square", "0.04", "--corners", made / "corners.csv")
+        ranges = [0.5, 1.0, 2.5]
+        spots = al.project(beam=result, camera=made / "camera.yaml", range=ranges)
+        result.save(self.folder / "beam")
+        self.same_as_command(spots, "project", "--beam", self.folder / "beam" / "rangefinder.yaml", "--camera", made / "camera.yaml",
+                             "--range", "0.5,1,2.5")
+        origin, direction = (np.array(result.estimate[name]) for name in ("origin_m", "direction"))
+        points = origin + np.outer(result.estimate["scale"] * np.array(ranges), direction)
+        pixels = al.Camera.read(made / "camera.yaml").project(points)
+        table = spots.tables[list(spots.tables)[0]]
+        np.testing.assert_allclose(np.column_stack([table["u_px"], table["v_px"]]), pixels, atol=2e-3)
+        with self.assertRaisesRegex(ValueError, "beam"):
+            al.project(range=ranges)
         by_value = al.rangefinder(made / "shots.csv", camera=al.Camera.read(made / "camera.yaml"), **given)
         self.assertEqual(by_value.estimate, result.estimate)
         self.assertEqual(result.direction.shape, (3,))

@@ -82,6 +82,14 @@ MadeFolders::~MadeFolders() {
 }
 
 void MadeFolders::make(const fs::path& folder) {
+  // Another process that only tries a folder beside it may take what both are in away again.
+  constexpr int tries = 100;
+  for (int i = 0; !make_once(folder); ++i) {
+    if (errno != ENOENT || i + 1 == tries) fail_on(folder, "cannot be made", errno);
+  }
+}
+
+bool MadeFolders::make_once(const fs::path& folder) {
   std::vector<fs::path> missing;
   std::error_code ignored;
   for (fs::path at = folder; !at.empty() && !fs::exists(at, ignored); at = at.parent_path()) {
@@ -92,9 +100,10 @@ void MadeFolders::make(const fs::path& folder) {
     if (::mkdir(at->c_str(), 0777) == 0) {
       made_.push_back(*at);
     } else if (errno != EEXIST) {
-      fail_on(folder, "cannot be made", errno);
+      return false;
     }
   }
+  return true;
 }
 
 FolderSwap::FolderSwap(fs::path folder) : folder_(std::move(folder)) {

@@ -21,6 +21,9 @@ class MadeFolders {
   void make(const std::filesystem::path& folder);
 
  private:
+  /// False: `errno` says why not.
+  [[nodiscard]] bool make_once(const std::filesystem::path& folder);
+
   std::vector<std::filesystem::path> made_;
 };
 

@@ -215,6 +215,28 @@ TEST(FolderSwap, ManyProcessesAtOnceLeaveTheFilesOfOneOfThem) {
   for (const auto& [name, content] : now) EXPECT_EQ(content, now.begin()->second) << name;
 }
 
+/// Folders beside one another in one that is not there: who only tries takes it away again while others make it.
+TEST(FolderSwap, ProcessesThatTryFoldersBesideOneAnotherDoNotDisturbEachOther) {
+  const TemporaryFolder folder;
+  const auto outcome = run_in_child([&] {
+    std::vector<pid_t> children;
+    for (char letter = 'a'; letter < 'e'; ++letter) {
+      children.push_back(::fork());
+      if (children.back() != 0) continue;
+      const fs::path place = folder.path() / "in" / "between" / std::string(1, letter);
+      std::string fault;
+      for (int i = 0; i < 300 && fault.empty(); ++i) fault = fault_of([&] { const FolderSwap tried(place); });
+      if (!fault.empty()) std::printf("%s\n", fault.c_str());
+      std::fflush(stdout);
+      ::_exit(0);
+    }
+    for (const pid_t child : children) ::waitpid(child, nullptr, 0);
+    return 0;
+  });
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_FALSE(fs::exists(folder.path() / "in"));
+}
+
 TEST(FolderSwap, AFileBeyondTheLimitLeavesNothing) {
   const TemporaryFolder folder;
   write_file(folder.path() / "a", "old");

@@ -323,7 +323,8 @@ cv::Mat decode_image(std::string_view bytes, bool keep_alpha) {
   if (begins_with(bytes, "\xFF\xD8\xFF")) return decode_jpeg(bytes);
   if (begins_with(bytes, "\x89PNG")) return decode_png(bytes, keep_alpha);
   if (begins_with(bytes, "II") || begins_with(bytes, "MM")) return decode_tiff(bytes, keep_alpha);
-  if (begins_with(bytes, "RIFF") && bytes.substr(0, 12).substr(8) == "WEBP") return decode_webp(bytes, keep_alpha);
+  if (begins_with(bytes, "RIFF") && bytes.size() >= 12 && bytes.substr(8, 4) == "WEBP")
+    return decode_webp(bytes, keep_alpha);
   if (begins_with(bytes, "BM")) return decode_bmp(bytes);
   if (begins_with(bytes, "P5") || begins_with(bytes, "P6")) return decode_pnm(bytes);
   return {};

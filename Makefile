@@ -122,30 +122,17 @@ docs: demo
 	@node web/test/picture.mjs build/demo/track/report.html docs/track.png 1500x740 0.6
 	@node web/test/picture.mjs build/demo/servo/report.html docs/servo.png 1500x690 0.6
 
-# The whole job of `alidade observe`, 1 to 6 s at 30 Hz; other points for each trial.
-observe_study := --method hybrid --trials 2000 --noise 0.3162 --vary rows=31:181:30 --scenes 2000
 study:
 	@tools/setup build
-	@echo "study: building $(out)/alidade and study_calibration, study_rangefinder, study_localize, study_chain, study_turned, study_causes, study_faults and corner_accuracy"
+	@echo "study: building $(out)/alidade, study_localize, study_causes, study_faults and corner_accuracy"
 	@cmake --preset release -DALIDADE_BENCH=ON >/dev/null
-	@ninja -C $(out) $(jobs) study_calibration study_rangefinder study_localize study_chain study_turned study_causes study_faults corner_accuracy alidade_cli
-	@echo "study: 2400 calibrations, into docs/studies.md"
+	@ninja -C $(out) $(jobs) study_localize study_causes study_faults corner_accuracy alidade_cli
 	@mkdir -p build/study
-	@$(out)/study_calibration 2400 >build/study/studies.md; met=$$?; cp build/study/studies.md docs/studies.md; exit $$met
+	@tools/studies.py $(out)/alidade build/study
 	@echo "study: halves of real sets, into docs/studies-halves.md"
 	@bench/study_halves.py $(out)/alidade 40 >build/study/halves.md; met=$$?; cp build/study/halves.md docs/studies-halves.md; exit $$met
-	@echo "study: 2000 observations of a rotating camera at each of six lengths, into docs/studies-observe.md"
-	@$(out)/alidade study observe $(observe_study) --out build/study/observe --no-report --quiet
-	@tools/study_table.py "Observing a rotating camera: the bound, and what σ covers" "alidade study observe $(observe_study)" \
-	  build/study/observe/study.json --from 61 >build/study/observe.md; met=$$?; cp build/study/observe.md docs/studies-observe.md; exit $$met
-	@echo "study: rangefinders, into docs/studies-rangefinder.md"
-	@$(out)/study_rangefinder 200 2000 >build/study/rangefinder.md; met=$$?; cp build/study/rangefinder.md docs/studies-rangefinder.md; exit $$met
 	@echo "study: localisation under water, into docs/studies-localize.md"
 	@$(out)/study_localize 200 20 >build/study/localize.md; met=$$?; cp build/study/localize.md docs/studies-localize.md; exit $$met
-	@echo "study: lenses, rig and track in a chain, into docs/studies-chain.md"
-	@$(out)/study_chain 200 >build/study/chain.md; met=$$?; cp build/study/chain.md docs/studies-chain.md; exit $$met
-	@echo "study: photos of a camera turned by hand, into docs/studies-turned.md"
-	@$(out)/study_turned 200 >build/study/turned.md; met=$$?; cp build/study/turned.md docs/studies-turned.md; exit $$met
 	@echo "study: 200 runs with a head, broken at random instants, into docs/studies-heads.md"
 	@tools/head_kills.py $(out)/alidade --runs 200 >build/study/heads.md; met=$$?; cp build/study/heads.md docs/studies-heads.md; exit $$met
 	@echo "study: a million rows on standard input"

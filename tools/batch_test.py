@@ -66,6 +66,9 @@ class Batch(unittest.TestCase):
         outliers = list(zip(result["data"]["outliers"]["camera"], result["data"]["outliers"]["quantity"]))
         self.assertIn(("cam 7", "camera.fx"), outliers)
         self.assertEqual({camera for camera, name in outliers if name == "camera.fx"}, {"cam 7"})
+        values = result["data"]["values"]  # what the figure of the page draws: every value of the lot
+        self.assertEqual(values["quantity"].count("camera.fx"), CAMERAS)
+        self.assertEqual({values["camera"][i] for i, z in enumerate(values["z"]) if abs(z) > 4 and values["quantity"][i] == "camera.fx"}, {"cam 7"})
         self.assertEqual(result["counts"]["given"], CAMERAS + 4)
 
     def test_shards_and_a_stopped_lot_go_on(self):

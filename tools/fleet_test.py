@@ -136,7 +136,16 @@ class Fleet(unittest.TestCase):
             time.sleep(0.1)
         self.assertEqual(fleet["cameras"], CAMERAS)
         self.assertGreater(fleet["alarms"], 0)
-        self.assertEqual(json.loads(urllib.request.urlopen(address + "camera/c00001.json").read())["camera"], "c00001")
+        ranks = [{"bad": 4, "not_converged": 3, "care": 2, "refused": 1}.get(state, 0) for _, state, _ in fleet["map"]]
+        self.assertEqual(ranks, sorted(ranks, reverse=True), "the worst first")
+        self.assertEqual({camera for camera, _, _ in fleet["map"]}, set(expected))
+        worst = json.loads(urllib.request.urlopen(address + f"camera/{fleet['map'][0][0]}.json").read())
+        self.assertEqual(worst["camera"], fleet["worst"][0]["camera"])
+        one = json.loads(urllib.request.urlopen(address + "camera/c00001.json").read())
+        self.assertEqual(one["camera"], "c00001")
+        state = json.loads(expected["c00001"])
+        self.assertAlmostEqual(one["history"][-1]["fx"], state["estimate"]["fx"], delta=1e-3)
+        self.assertAlmostEqual(one["history"][-1]["sigma_fx"], state["stddev"]["fx"], delta=1e-5)
         for process in (worker, watch):
             process.send_signal(signal.SIGTERM)
             self.assertEqual(process.wait(20), 0)

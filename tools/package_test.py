@@ -96,6 +96,11 @@ class Package(unittest.TestCase):
                    self.folder / "beam")
         self.assertIn("origin_x_m", said)
         self.assertTrue((self.folder / "beam" / "rangefinder.yaml").exists())
+        said = run(outside / "09_project", self.folder / "beam" / "rangefinder.yaml", shots / "camera.yaml", "2.31")
+        command = json.loads(run(alidade, "project", "--beam", self.folder / "beam" / "rangefinder.yaml", "--camera", shots / "camera.yaml", "--range", "2.31",
+                                 "--json", cwd=self.folder))
+        pixel = re.search(r"pixel \(([\d.]+), ([\d.]+)\)", said).groups()
+        self.assertEqual(pixel, tuple(f"{one:.2f}" for one in command["estimate"]["px"]))
         run(alidade, "simulate", "rig", "--out", views, "--quiet")
         said = run(outside / "07_rig", views / "views.csv", views / "camera_1.yaml", views / "camera_2.yaml",
                    self.folder / "rig.yaml")

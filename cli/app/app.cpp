@@ -34,6 +34,7 @@ struct App::State {
   CLI::App app{"alidade: calibrate what moves. Cameras you can trust, from photos, with their uncertainty.", "alidade"};
   std::deque<Command> commands;        // options point into it: it must not move
   std::unique_ptr<Terminal> terminal;  ///< Of a command that was typed.
+  std::string first_word;
 };
 
 namespace {
@@ -350,6 +351,10 @@ int App::dispatch(int argc, const char* const* argv) {
   }
 }
 
+const std::string& App::first_word() const { return state_->first_word; }
+
+void App::set_first_word(const std::string& word) { state_->first_word = word; }
+
 int run_cli(int argc, const char* const* argv, void (*add_commands)(App&)) {
   hold_standard_streams();
   prepare_for_out_of_memory();
@@ -360,6 +365,7 @@ int run_cli(int argc, const char* const* argv, void (*add_commands)(App&)) {
     return static_cast<int>(code);
   };
   try {
+    if (argc > 1) frame.set_first_word(argv[1]);
     add_commands(frame);
     const int code = frame.dispatch(argc, argv);
     std::cout.flush();

@@ -55,6 +55,11 @@ class App {
   /// The word before the commands of a group: "camera" of "camera show". Comes before them.
   void add_group(const std::string& name, const std::string& summary);
 
+  /// The word that the line begins with, where it is known before commands are added: who adds them may leave out what
+  /// that word does not ask for. Empty: all of them may be asked for.
+  [[nodiscard]] const std::string& first_word() const;
+  void set_first_word(const std::string& word);
+
   /// The commands with their options, for another door than the command line. Once for an App.
   [[nodiscard]] std::vector<CommandInfo> commands();
   /// Runs a command in a program, which gets what the command would have written: `words` as they are typed, without

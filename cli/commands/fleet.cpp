@@ -121,11 +121,11 @@ struct FleetSimulationArgs {
 
 /// The truth of every camera.
 std::string truth_csv(const FleetSimulation& simulation) {
-  std::string text = "camera,fx,fy,cx,cy,event,event_t_s,event_size\n";
+  std::string text = "camera,fx,fy,cx,cy,event,event_t_s,event_size,focal_per_c\n";
   for (int i = 0; i < simulation.cameras; ++i) {
     const FleetScene scene = draw_fleet_scene(simulation.scene, simulation.seed, i);
-    text += fmt::format("{},{},{},{},{},{},{},{}\n", scene.id, scene.fx, scene.fy, scene.cx, scene.cy,
-                        event_word(scene.event), scene.event_t_s, scene.event_size);
+    text += fmt::format("{},{},{},{},{},{},{},{},{}\n", scene.id, scene.fx, scene.fy, scene.cx, scene.cy,
+                        event_word(scene.event), scene.event_t_s, scene.event_size, scene.focal_per_c);
   }
   return text;
 }
@@ -138,13 +138,7 @@ std::string rows_text(const FleetSimulation& simulation, const Progress& progres
     report_progress(progress, "rows", static_cast<std::size_t>(n), static_cast<std::size_t>(simulation.rows));
     for (const FleetScene& scene : scenes) {
       const FleetSight sight = simulate_sight(scene, simulation.scene, simulation.seed, n);
-      FleetRow row;
-      row.n = n;
-      row.t_s = sight.t_s;
-      row.rotation = {sight.pan_rad, sight.tilt_rad, 0.0, 0.0};
-      row.num_points = 4;
-      std::copy(sight.px.begin(), sight.px.end(), row.px.begin());
-      text += scene.id + " " + fleet_row_text(row) + "\n";
+      text += scene.id + " " + fleet_row_text(fleet_row_of(sight, n)) + "\n";
     }
   }
   return text;
@@ -239,6 +233,9 @@ void add_fleet_scenario(App& app) {
   number("--event-after", simulation.scene.event_after_s, "Not before, and within as long again [s]", 0.0, 1e9);
   number("--slip-sigmas", simulation.scene.slip_sigmas,
          "Belts slip by so many σ of a row, nothing else happens; 0: drawn", 0.0, 1000.0);
+  number("--warming", simulation.scene.warming_c,
+         "It gets so much warmer, and the focal length of that share follows it, instead of events [°C]", 0.0, 100.0);
+  number("--warming-time", simulation.scene.warming_s, "Within [s]", 1.0, 1e9);
   command.add_flag("--publish", args->publishes, "Publish them instead of leaving rows.txt");
   command.add_flag("--fast", args->as_fast, "Publish as fast as the broker takes them, not at their rate");
   add_broker_options(command, simulation.broker);

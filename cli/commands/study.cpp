@@ -257,6 +257,12 @@ void add_study(App& app) {
                             "  alidade study track --trials 1000 --scenario B");
   add_one_study<LocalizeStudy>(app, "Trials of a camera localised under water",
                                "  alidade study localize --trials 200");
+  add_one_study<TurnedStudy>(app, "Trials of photos of a camera turned by hand",
+                             "  alidade study turned --trials 200 --on-the-spot --wrong-matches 0.3\n"
+                             "  alidade study turned --trials 200 --vary lever=0:0.2:0.05");
+  add_one_study<ChainStudy>(app, "Trials of a chain: photos, lenses, the rig of two heads, a target followed",
+                            "  alidade study chain --trials 200 --vary range=1:13:4\n"
+                            "  alidade study chain --trials 200 --range 6 --exact");
   add_study_merge(app);
 }
 

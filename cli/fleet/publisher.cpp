@@ -13,17 +13,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 Publication observation_of(const FleetScene& scene, const cli::FleetSimulation& simulation, std::int64_t n) {
-  const FleetSight sight = simulate_sight(scene, simulation.scene, simulation.seed, n);
-  FleetRow row;
-  row.n = n;
-  row.t_s = sight.t_s;
-  row.rotation = {sight.pan_rad, sight.tilt_rad, 0.0, 0.0};
-  row.num_points = 4;
-  row.px.fill(std::numeric_limits<double>::quiet_NaN());
-  std::copy(sight.px.begin(), sight.px.end(), row.px.begin());
   Publication publication;
   publication.subject = "cam." + scene.id + ".obs";
-  publication.payload = fleet_row_text(row);
+  publication.payload = fleet_row_text(fleet_row_of(simulate_sight(scene, simulation.scene, simulation.seed, n), n));
   publication.headers["Nats-Msg-Id"] = fmt::format("{}-{}", scene.id, n);
   return publication;
 }

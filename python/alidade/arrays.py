@@ -1,12 +1,17 @@
 """What comes in as arrays is checked here, and refused in one line."""
 from __future__ import annotations
 
-from typing import Any
+import os
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-Numbers = npt.NDArray[np.float64]
+if TYPE_CHECKING:  # costs a fifth of the import
+    import numpy.typing as npt
+
+    Numbers = npt.NDArray[np.float64]
+else:
+    Numbers = np.ndarray
 
 
 def shown(value: Any) -> str:
@@ -50,6 +55,8 @@ def vectors(values: Any, size: int, name: str) -> tuple[Numbers, tuple[int, ...]
 
 def image(values: Any, name: str = "image") -> npt.NDArray[Any]:
     """An image (H, W), or (H, W, 3) in OpenCV's order (blue first), uint8 or uint16."""
+    if isinstance(values, (str, os.PathLike)):
+        raise ValueError(f"{name}: an array is needed, not a file; cv2.imread({os.fspath(values)!r}) reads one")
     array = np.asarray(values)
     if array.dtype not in (np.uint8, np.uint16):
         raise ValueError(f"{name}: an image is uint8 or uint16, not {array.dtype}")

@@ -10,6 +10,12 @@ import numpy as np
 
 from . import _alidade
 from .arrays import Numbers, image, image_size, numbers, vectors
+from .words import suggestion
+
+
+#: What other libraries call it.
+_CALLED_ELSEWHERE = {**dict.fromkeys(("K", "dist", "D", "mtx", "camera_matrix", "dist_coeffs"), "K, dist = camera.to_opencv()"),
+                     "save": "write(file) writes one"}
 
 
 class Camera:
@@ -200,7 +206,11 @@ class Camera:
             names = self._core.names
             if name in names:
                 return self._core.values[names.index(name)]
-        raise AttributeError(f"a {self._core.model if name != '_core' else ''} camera has no '{name}'")
+        if name.startswith("_"):
+            raise AttributeError(f"a camera has no '{name}'")
+        other = _CALLED_ELSEWHERE.get(name)
+        hint = f"; {other}" if other else suggestion(name, dir(self))
+        raise AttributeError(f"a {self._core.model} camera has no '{name}'{hint}")
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *self.parameter_names]

@@ -11,6 +11,7 @@ from . import _alidade
 from .arrays import Numbers, image, image_size, number, numbers, shown, whole
 from .board import Board
 from .camera import Camera
+from .live import OneByOne
 from .words import texts_of
 
 
@@ -53,7 +54,7 @@ def _next(values: dict[str, Any] | None) -> types.SimpleNamespace | None:
     return types.SimpleNamespace(**values)
 
 
-class CaptureGuide:
+class CaptureGuide(OneByOne):
     """Which photos of a board to keep while they are taken, where to hold it next, and when it is enough; the same that
     `alidade calibrate --live` goes by.
 
@@ -118,7 +119,7 @@ class CaptureGuide:
         return self._core.state()["is_at_goal"]
 
 
-class ShotGuide:
+class ShotGuide(OneByOne):
     """What to shoot next with a rangefinder beside the camera; each solve is that of al.rangefinder() on all shots.
 
     camera        a Camera, or its file

@@ -19,7 +19,7 @@ from .board import Board
 from .camera import Camera
 from .result import Result
 from .tables import csv_of, is_table
-from .words import text_of, texts_of
+from .words import suggestion, text_of, texts_of
 
 #: Called now and then as (what, done, total); where it returns False the job stops, and Interrupted is raised.
 Progress = Callable[[str, int, int], Any]
@@ -41,7 +41,8 @@ def given_of(function: Callable[..., Any], values: dict[str, Any], aliases: dict
     given = {name: value for name, value in values.items() if not _is_standard(value, standard.get(name))}
     for name, value in more.items():
         if name not in aliases:
-            raise TypeError(f"{function.__name__}() has no keyword '{name}'")
+            known = [*standard, *aliases]
+            raise TypeError(f"{function.__name__}() has no keyword '{name}'{suggestion(name, known)}")
         if aliases[name] in given:
             raise TypeError(f"{function.__name__}(): '{name}' and '{aliases[name]}' are the same")
         given[aliases[name]] = value

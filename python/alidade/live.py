@@ -1,7 +1,7 @@
 """Estimators whose data come one by one; finish() gives what the batch call gives on the same data."""
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -13,6 +13,16 @@ from .result import Result
 from .words import texts_of
 
 
+class OneByOne:
+    """What takes data one by one stands in a stream: it is neither copied nor pickled. What can be carried elsewhere is
+    what finish() gives, and the data that were pushed."""
+
+    def __reduce__(self) -> NoReturn:
+        name = type(self).__name__
+        raise TypeError(f"a {name} is neither copied nor pickled, as it stands in a stream: keep what finish() gives, or what was pushed, "
+                        f"and push that into another {name}")
+
+
 def _row(values: Any, sizes: tuple[int, ...], name: str) -> Numbers:
     row = numbers(values, name)
     if row.ndim != 1 or len(row) not in sizes:
@@ -22,7 +32,7 @@ def _row(values: Any, sizes: tuple[int, ...], name: str) -> Numbers:
     return row
 
 
-class Tracker:
+class Tracker(OneByOne):
     """A target followed in space, observation by observation, as al.track() does it.
 
     rig     rig.yaml, or the result of al.rig()
@@ -61,7 +71,7 @@ def _belief(step: dict[str, Any]) -> dict[str, Any]:
     return step
 
 
-class Observer:
+class Observer(OneByOne):
     """Intrinsics of a camera that rotates, row by row, as al.observe() does it by the method hybrid.
 
     size    (width, height) [px]
@@ -108,7 +118,7 @@ class Observer:
         return Result(self._core.finish(progress))
 
 
-class Localizer:
+class Localizer(OneByOne):
     """The path of a moving camera, frame by frame, as al.localize() does it.
 
     camera  the camera, a Camera or its file

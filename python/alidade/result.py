@@ -18,6 +18,7 @@ from .arrays import Numbers
 from .camera import Camera
 from .errors import CannotDetermine, NoConvergence, NotTrusted
 from .tables import of_csv, of_tum, structured
+from .words import suggestion
 
 if TYPE_CHECKING:
     from . import plots as _plots
@@ -305,7 +306,9 @@ class Result:
     def __getattr__(self, name: str) -> Any:
         if not name.startswith("_") and name in self.estimate:
             return _value(self.estimate[name])
-        raise AttributeError(f"this result of {self.command if name != '_document' else 'alidade'} has no '{name}'")
+        if name.startswith("_"):
+            raise AttributeError(f"a result has no '{name}'")
+        raise AttributeError(f"this result of {self.command} has no '{name}'{suggestion(name, dir(self))}")
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *self.estimate]

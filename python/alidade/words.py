@@ -8,6 +8,13 @@ from typing import Any
 import numpy as np
 
 
+def suggestion(name: str, known: abc.Iterable[str]) -> str:
+    """"; did you mean 'x'?" of what is called nearly so; empty where nothing is."""
+    import difflib  # only where something is wrong
+    near = difflib.get_close_matches(name, [one for one in known if not one.startswith("_")], 1, 0.6)
+    return f"; did you mean '{near[0]}'?" if near else ""
+
+
 def texts_of(value: Any, name: str, pair: bool = False) -> list[str]:
     """One text, or those of a list; `pair`: (9, 6) is "9x6"."""
     if isinstance(value, abc.Mapping):  # prior={"fx": (650, 5)}

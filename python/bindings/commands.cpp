@@ -41,6 +41,7 @@ OutcomePtr run_command(const std::vector<std::string>& words, const py::object& 
   return value_of<OutcomePtr>(
       [words](const Progress& report) {
         cli::App app;
+        if (!words.empty()) app.set_first_word(words.front());
         cli::add_commands(app);
         return std::make_shared<Outcome>(Outcome{app.run_job(words, report), {}, {}});
       },

@@ -1,10 +1,12 @@
 """Estimators whose data come one by one against the batch call."""
+import copy
+import pickle
 import unittest
 
 import numpy as np
 
 import alidade as al
-from common import InFolder
+from common import BOARD, InFolder
 
 
 class Live(InFolder):
@@ -25,6 +27,13 @@ class Live(InFolder):
                       lambda: al.Tracker(rig, sigmas=1.0)):
             with self.assertRaises(ValueError):
                 wrong()
+
+    def test_what_takes_data_one_by_one_is_not_pickled_and_says_so(self):
+        al.simulate.track(scenario="B", duration=1).save(self.folder / "few")
+        for one in (al.Tracker(self.folder / "few" / "rig.yaml"), al.Observer((640, 480)), al.CaptureGuide(BOARD)):
+            for work in (pickle.dumps, copy.copy, copy.deepcopy):
+                with self.subTest(one=type(one).__name__, work=work.__name__), self.assertRaisesRegex(TypeError, "stands in a stream: keep what finish"):
+                    work(one)
 
     def test_observer_has_the_answer_of_observe(self):
         made = al.simulate.rotation(points=8, seed=3, duration=10)

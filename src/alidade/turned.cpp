@@ -197,6 +197,12 @@ ObserveReport observe(const Photos& photos, const ObserveConfig& config, const P
   return report;
 }
 
+ObserveReport observe_matched(MatchedPhotos photos, const ObserveConfig& config, const Progress& progress) {
+  const ObserveSetup setup = photos_setup(config);
+  check_matches(photos);
+  return observe_matches(std::move(photos), {}, setup, turned_config(setup, true), progress);
+}
+
 ObserveReport observe(MatchedPhotos matches, const ObserveConfig& config, const Progress& progress) {
   const ObserveSetup setup = photos_setup(config);
   check_matches(matches);

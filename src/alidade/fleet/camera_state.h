@@ -2,13 +2,15 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 
 namespace alidade {
 
 inline constexpr int max_fleet_points = 6;  ///< Of a row, the first ones; a camera's state has to stay small.
 inline constexpr int fleet_learning_rows = 24;
-inline constexpr int num_fleet_common = 6;    ///< fx, fy, cx, cy [px], zero of pan, zero of tilt [rad].
+/// fx, fy, cx, cy [px], zero of pan, zero of tilt [rad], relative change of fx and fy per °C.
+inline constexpr int num_fleet_common = 7;
 inline constexpr int num_fleet_channels = 3;  ///< Zero of pan, zero of tilt [rad], focal length (relative).
 
 /// How the rotation of a row was measured.
@@ -19,12 +21,13 @@ enum class FleetPhase : std::uint8_t {
   tracking
 };
 
-enum class FleetAlarmKind : std::uint8_t { none, pan_zero, tilt_zero, focal_length, frozen, lost };
+enum class FleetAlarmKind : std::uint8_t { none, pan_zero, tilt_zero, focal_length, frozen, lost, focal_temperature };
 
 /// A row of a camera: what its rotation was, and where it saw points that stand still. NaN: not seen.
 struct FleetRow {
   std::int64_t n = 0;
   double t_s = 0.0;
+  double temperature_c = std::numeric_limits<double>::quiet_NaN();  ///< Of the camera, where somebody measures it.
   FleetSource source = FleetSource::head;
   std::array<double, 4> rotation{};  ///< pan, tilt, roll [rad]; quaternion wxyz; rates x, y, z [rad/s].
   int num_points = 0;
@@ -54,10 +57,12 @@ struct FleetChange {
 
 struct FleetTracking {
   std::array<double, num_fleet_common> x{};
-  std::array<double, 21> P{};  ///< Upper triangle, row by row.
+  std::array<double, num_fleet_common*(num_fleet_common + 1) / 2> P{};  ///< Upper triangle, row by row.
   std::array<FleetPoint, max_fleet_points> points{};
   FleetSums sums{};
   FleetChange change;
+  float reference_c = std::numeric_limits<float>::quiet_NaN();  ///< Where fx and fy are what `x` says; NaN: none known.
+  std::uint8_t has_said_drift = 0;
 };
 
 struct FleetLearning {
@@ -84,6 +89,7 @@ struct FleetCamera {
   std::uint16_t num_buffered = 0, num_frozen = 0, num_gated = 0;
   std::uint32_t stride = 1, since_kept = 0;  ///< Every so many rows one is kept to learn from.
   double frozen_since_s = 0.0;
+  float temperature_c = std::numeric_limits<float>::quiet_NaN();  ///< The last that was known.
   union Body {
     FleetLearning learning;
     FleetTracking tracking;

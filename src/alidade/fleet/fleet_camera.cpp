@@ -18,6 +18,7 @@ constexpr int frozen_rows = 5;      // the same pixels so often, while the camer
 constexpr double turned_px = 3.0;   // by so much that they would have moved
 constexpr double fresh_s = 3600.0;  // an alarm is in the verdict for so long
 constexpr double most_rad = 1e3;    // of an angle or a rate
+constexpr double most_c = 1e3;      // of a temperature
 constexpr double degree = std::numbers::pi / 180.0;
 
 /// Pixels far outside the image are none.
@@ -37,6 +38,7 @@ void note_row(const FleetRow& row, const FleetRotation& rotation, FleetCamera& c
   camera.rate = {row.rotation[0], row.rotation[1], row.rotation[2]};
   camera.has_row = 1;
   camera.t_s = row.t_s;
+  if (std::abs(row.temperature_c) < most_c) camera.temperature_c = static_cast<float>(row.temperature_c);
   for (std::size_t i = 0; i < camera.px.size(); ++i) camera.px[i] = static_cast<float>(row.px[i]);
 }
 
@@ -73,6 +75,27 @@ std::optional<FleetAlarm> watch_image(FleetCamera& camera, const FleetRow& row, 
   const double duration_s = row.t_s - camera.frozen_since_s;
   return FleetAlarm{FleetAlarmKind::frozen, row.n, row.t_s, duration_s, duration_s / frozen_rows,
                     camera.frozen_since_s};
+}
+
+/// Without its size: of a verdict.
+const char* what_happened(FleetAlarmKind kind) {
+  switch (kind) {
+    case FleetAlarmKind::pan_zero:
+      return "the zero of pan moved";
+    case FleetAlarmKind::tilt_zero:
+      return "the zero of tilt moved";
+    case FleetAlarmKind::focal_length:
+      return "the focal length changed";
+    case FleetAlarmKind::frozen:
+      return "the image was frozen";
+    case FleetAlarmKind::lost:
+      return "the points did not fit";
+    case FleetAlarmKind::focal_temperature:
+      return "the focal length drifts with temperature";
+    case FleetAlarmKind::none:
+      break;
+  }
+  return "nothing happened";
 }
 
 /// What fits nothing for a minute of rows is learned again.
@@ -127,6 +150,7 @@ FleetEstimate estimate_of(const FleetCamera& camera) {
   estimate.sigma = estimate.value;
   if (camera.phase != FleetPhase::tracking) return estimate;
   estimate.has_value = true;
+  estimate.has_temperature = std::isfinite(camera.body.tracking.reference_c);
   std::size_t at = 0;
   for (Eigen::Index i = 0; i < num_fleet_common; ++i) {
     estimate.value[i] = camera.body.tracking.x[static_cast<std::size_t>(i)];
@@ -148,6 +172,8 @@ std::string kind_name(FleetAlarmKind kind) {
       return "frozen";
     case FleetAlarmKind::lost:
       return "lost";
+    case FleetAlarmKind::focal_temperature:
+      return "focal_temperature";
     case FleetAlarmKind::none:
       break;
   }
@@ -168,6 +194,9 @@ std::string sentence_of(const FleetAlarm& alarm) {
       return fmt::format("the image is frozen since {:.1f} s, while the camera turns", alarm.since_s);
     case FleetAlarmKind::lost:
       return "the points fit the camera no longer: it is learned again";
+    case FleetAlarmKind::focal_temperature:
+      return fmt::format("the focal length drifts with temperature: {:.4f} % ± {:.4f} % per °C", 100.0 * alarm.value,
+                         100.0 * alarm.sigma);
     case FleetAlarmKind::none:
       break;
   }
@@ -190,7 +219,7 @@ Verdict verdict_of(const FleetCamera& camera) {
   } else if (camera.last_alarm != FleetAlarmKind::none && camera.t_s - camera.alarm_t_s < fresh_s) {
     verdict.state = State::care;
     verdict.sentence =
-        fmt::format("{} at {:.1f} s, and followed since", kind_name(camera.last_alarm), camera.alarm_t_s);
+        fmt::format("{}, said at {:.1f} s, and followed since", what_happened(camera.last_alarm), camera.alarm_t_s);
   } else {
     verdict.sentence = "as it was learned";
   }

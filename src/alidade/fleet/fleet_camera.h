@@ -16,8 +16,8 @@ struct FleetConfig {
   double threshold = 9.5;
 };
 
-/// What changed: the zero of pan or tilt [rad], the focal length (relative), or for how long the image has been the
-/// same or fits nothing [s].
+/// What changed: the zero of pan or tilt [rad], the focal length (relative; with the temperature: per °C), or for how
+/// long the image has been the same or fits nothing [s].
 struct FleetAlarm {
   FleetAlarmKind kind = FleetAlarmKind::none;
   std::int64_t n = 0;
@@ -34,12 +34,14 @@ struct FleetAlarm {
 /// What is known of a camera after its last row.
 struct FleetEstimate {
   bool has_value = false;
-  Eigen::Matrix<double, num_fleet_common, 1> value, sigma;  ///< fx, fy, cx, cy [px], zeros of pan and tilt [rad].
+  bool has_temperature = false;  ///< fx and fy are those at the temperature of the first rows that had one.
+  Eigen::Matrix<double, num_fleet_common, 1> value,
+      sigma;  ///< fx, fy, cx, cy [px], zeros of pan and tilt [rad], f per °C.
 };
 [[nodiscard]] FleetEstimate estimate_of(const FleetCamera& camera);
 [[nodiscard]] Verdict verdict_of(const FleetCamera& camera);
 
-/// "pan_zero", "tilt_zero", "focal_length", "frozen", "lost".
+/// "pan_zero", "tilt_zero", "focal_length", "frozen", "lost", "focal_temperature".
 [[nodiscard]] std::string kind_name(FleetAlarmKind kind);
 /// "the zero of pan moved by 0.31° ± 0.04°".
 [[nodiscard]] std::string sentence_of(const FleetAlarm& alarm);

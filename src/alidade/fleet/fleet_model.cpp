@@ -15,8 +15,10 @@ Eigen::Matrix3d turned_about(int axis, double angle_rad) {
 
 }  // namespace
 
-FleetView::FleetView(const FleetRotation& rotation, const FleetCommon& common)
+FleetView::FleetView(const FleetRotation& rotation, const FleetCommon& common, double warmer_c)
     : common_(common),
+      warmer_c_(warmer_c),
+      zoom_(1.0 + common[6] * warmer_c),
       cam_from_base_(rotation.after.transpose() * turned_about(0, -common[5]) * rotation.before.transpose() *
                      turned_about(1, common[4])),
       tilt_axis_in_cam_(rotation.after.transpose().col(0)) {}
@@ -26,21 +28,24 @@ FleetPrediction FleetView::predict(const Eigen::Vector3d& ray_in_base) const {
   const Eigen::Vector3d p = cam_from_base_ * ray_in_base;
   if (!(p.z() > 1e-3)) return prediction;
   prediction.is_seen = true;
-  const double fx = common_[0], fy = common_[1], x = p.x() / p.z(), y = p.y() / p.z();
+  const double fx = zoom_ * common_[0], fy = zoom_ * common_[1], x = p.x() / p.z(), y = p.y() / p.z();
   prediction.px = {fx * x + common_[2], fy * y + common_[3]};
   Eigen::Matrix<double, 2, 3> by_point;
   by_point << fx / p.z(), 0.0, -fx * x / p.z(), 0.0, fy / p.z(), -fy * y / p.z();
   prediction.by_ray = by_point * cam_from_base_;
   const Eigen::Vector3d by_pan = cam_from_base_ * Eigen::Vector3d::UnitY().cross(ray_in_base);
   const Eigen::Vector3d by_tilt = -tilt_axis_in_cam_.cross(p);
-  prediction.by_common << x, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, y, 0.0, 1.0, 0.0, 0.0;
+  prediction.by_common.setZero();
+  prediction.by_common.leftCols<4>() << zoom_ * x, 0.0, 1.0, 0.0, 0.0, zoom_ * y, 0.0, 1.0;
+  prediction.by_common.col(6) = warmer_c_ * Eigen::Vector2d(common_[0] * x, common_[1] * y);
   prediction.by_common.col(4) = by_point * by_pan;
   prediction.by_common.col(5) = by_point * by_tilt;
   return prediction;
 }
 
 Eigen::Vector3d FleetView::ray_of(const Eigen::Vector2d& px) const {
-  const Eigen::Vector3d in_cam((px.x() - common_[2]) / common_[0], (px.y() - common_[3]) / common_[1], 1.0);
+  const Eigen::Vector3d in_cam((px.x() - common_[2]) / (zoom_ * common_[0]),
+                               (px.y() - common_[3]) / (zoom_ * common_[1]), 1.0);
   return (cam_from_base_.transpose() * in_cam).normalized();
 }
 

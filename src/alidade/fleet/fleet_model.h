@@ -19,20 +19,21 @@ struct FleetRotation {
 struct FleetPrediction {
   bool is_seen = false;
   Eigen::Vector2d px;
-  FleetPixelByCommon by_common;        ///< Over fx, fy, cx, cy, zero of pan, zero of tilt.
+  FleetPixelByCommon by_common;        ///< Over fx, fy, cx, cy, zero of pan, zero of tilt, f per °C.
   Eigen::Matrix<double, 2, 3> by_ray;  ///< Over the direction.
 };
 
-/// The view of one row.
+/// The view of one row, so many °C above where fx and fy are what the common parameters say.
 class FleetView {
  public:
-  FleetView(const FleetRotation& rotation, const FleetCommon& common);
+  FleetView(const FleetRotation& rotation, const FleetCommon& common, double warmer_c = 0.0);
   [[nodiscard]] FleetPrediction predict(const Eigen::Vector3d& ray_in_base) const;
   /// The direction that a pixel is seen along, in the base; of length 1.
   [[nodiscard]] Eigen::Vector3d ray_of(const Eigen::Vector2d& px) const;
 
  private:
   FleetCommon common_;
+  double warmer_c_, zoom_;  ///< By the temperature.
   Eigen::Matrix3d cam_from_base_;
   Eigen::Vector3d tilt_axis_in_cam_;
 };

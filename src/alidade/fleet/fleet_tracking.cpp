@@ -12,12 +12,15 @@ constexpr double allowance = 1.0;       // of the sums, σ: half the change that
 constexpr double most_a_row = 4.0;      // σ: an outlier row alone is no change
 constexpr int learning_rows = 5;        // of a change, before it is said
 constexpr double largest_change = 0.5;  // rad, or relative: more is another camera
+constexpr double drift_prior = 2e-4;    // σ of f per °C before it is known: metal and glass have 10⁻⁵ to 10⁻⁴
 constexpr double rate_walk = 1e-4;      // of the zeros of a camera whose rates are measured: rad in a second
 
 using Channels = Eigen::Matrix<double, num_fleet_channels, 1>;
 using ChannelMatrix = Eigen::Matrix<double, num_fleet_channels, num_fleet_channels>;
 
-FleetCommonMatrix matrix_of(const std::array<double, 21>& upper) {
+using Upper = decltype(FleetTracking::P);
+
+FleetCommonMatrix matrix_of(const Upper& upper) {
   FleetCommonMatrix P;
   std::size_t at = 0;
   for (Eigen::Index i = 0; i < num_fleet_common; ++i)
@@ -25,7 +28,7 @@ FleetCommonMatrix matrix_of(const std::array<double, 21>& upper) {
   return P;
 }
 
-void store(const FleetCommonMatrix& P, std::array<double, 21>& upper) {
+void store(const FleetCommonMatrix& P, Upper& upper) {
   std::size_t at = 0;
   for (Eigen::Index i = 0; i < num_fleet_common; ++i)
     for (Eigen::Index j = i; j < num_fleet_common; ++j) upper[at++] = 0.5 * (P(i, j) + P(j, i));
@@ -228,6 +231,35 @@ FleetAlarm learned_change(const FleetCamera& camera, const FleetRow& row) {
   return alarm;
 }
 
+/// By how much a row is warmer than where fx and fy are known; from the first row on that has a temperature the change
+/// with it is estimated. [°C]
+double warmer_by(FleetCamera& camera, const FleetRow& row) {
+  FleetTracking& tracking = camera.body.tracking;
+  const double now_c = std::isfinite(row.temperature_c) ? row.temperature_c : static_cast<double>(camera.temperature_c);
+  if (!std::isfinite(now_c)) return 0.0;
+  if (std::isnan(tracking.reference_c)) {
+    tracking.reference_c = static_cast<float>(now_c);
+    tracking.P.back() = drift_prior * drift_prior;
+  }
+  return now_c - static_cast<double>(tracking.reference_c);
+}
+
+/// Whether the focal length follows the temperature, said once: by how much likelier the rows are with a drift of the
+/// prior's size than without one. Where there is none, that exceeds B once in B cameras, however long they are watched
+/// (J. Ville, "Étude critique de la notion de collectif", 1939).
+std::optional<FleetAlarm> drift_of(FleetCamera& camera, const FleetRow& row) {
+  const double log_of_once_in = std::log(1e7);
+  FleetTracking& tracking = camera.body.tracking;
+  const double variance = tracking.P.back(), drift = tracking.x.back();
+  if (tracking.has_said_drift != 0 || !(variance > 0.0)) return std::nullopt;
+  const double factor = noise_factor(camera);
+  const double log_likelier =
+      0.5 * drift * drift / (factor * variance) + 0.5 * std::log(variance / (drift_prior * drift_prior));
+  if (!(log_likelier > log_of_once_in)) return std::nullopt;
+  tracking.has_said_drift = 1;
+  return FleetAlarm{FleetAlarmKind::focal_temperature, row.n, row.t_s, drift, std::sqrt(factor * variance), row.t_s};
+}
+
 /// Where a single row tells by itself which channel has changed, that one's sum: several may go beyond at once.
 int clearest_of(const Innovations& all, const FleetSums& sums, double threshold, int found) {
   constexpr double clear = 6.0;
@@ -274,11 +306,12 @@ std::optional<FleetAlarm> track_row(FleetCamera& camera, const FleetRow& row, co
   const bool has_angles = camera.source != FleetSource::rate;
   if (!has_angles) {
     FleetCommon variance = FleetCommon::Zero();
-    variance.tail<2>().setConstant(rate_walk * rate_walk * std::max(0.0, row.t_s - camera.t_s));
+    variance.segment<2>(4).setConstant(rate_walk * rate_walk * std::max(0.0, row.t_s - camera.t_s));
     walk(variance, tracking);
   }
   const FleetCommon x(tracking.x.data());
-  const Innovations all = innovations_of(camera, row, FleetView(rotation, x), x, matrix_of(tracking.P));
+  const FleetView view(rotation, x, warmer_by(camera, row));
+  const Innovations all = innovations_of(camera, row, view, x, matrix_of(tracking.P));
   if (all.num == 0) return std::nullopt;
   const double factor = noise_factor(camera), dof = 2.0 * static_cast<double>(all.num);
   const bool is_learning = tracking.change.rows_left > 0;
@@ -308,7 +341,8 @@ std::optional<FleetAlarm> track_row(FleetCamera& camera, const FleetRow& row, co
   } else if (camera.num_gated < 60000) {
     ++camera.num_gated;
   }
-  if (!is_learning || --tracking.change.rows_left > 0) return std::nullopt;
+  if (!is_learning) return drift_of(camera, row);
+  if (--tracking.change.rows_left > 0) return std::nullopt;
   if (camera.num_gated >= learning_rows) {  // none of them fits: it was no such change
     camera.num_gated = lost_rows;
     return std::nullopt;

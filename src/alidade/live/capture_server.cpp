@@ -2,7 +2,6 @@
 #include "alidade/live/capture_server.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -18,7 +17,6 @@
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <random>
 #include <set>
 #include <thread>
 
@@ -37,27 +35,16 @@ using Request = http::request<http::string_body>;
 using Response = http::response<http::string_body>;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t max_pages = 8, max_connections = 40;
+constexpr std::size_t max_pages = 8;
 constexpr std::size_t max_message_bytes = 64u << 20;  // a picture of 60 megapixels
 constexpr std::size_t header_bytes = 16;
 constexpr int max_pictures_per_s = 120, max_side_px = 16384;
 constexpr std::size_t max_waiting = 64;  // messages for one page
-constexpr auto patience = std::chrono::seconds(10), silence = std::chrono::seconds(40);
 
 std::uint32_t number_at(std::string_view bytes, std::size_t at) {
   std::uint32_t number = 0;
   for (std::size_t i = 0; i < 4; ++i) number |= std::uint32_t{static_cast<unsigned char>(bytes[at + i])} << (8 * i);
   return number;
-}
-
-std::string secret() {
-  std::random_device device;
-  return fmt::format("{:08x}{:08x}{:08x}{:08x}", device(), device(), device(), device());
-}
-
-std::string name_of_machine() {
-  char name[256] = {};
-  return ::gethostname(name, sizeof name - 1) == 0 ? name : "";
 }
 
 }  // namespace
@@ -87,7 +74,7 @@ struct CaptureServer::State {
   std::size_t num_connections = 0;  // outlives what counts in it
   asio::io_context io{1};
   tcp::acceptor acceptor{io};
-  std::string token = secret(), host_name = name_of_machine();
+  std::string token = random_hex(4), host_name = machine_name();
   std::uint16_t port = 0;
   std::vector<std::shared_ptr<Page>> pages;  ///< The first is in control.
   std::atomic<std::size_t> num_pages{0};

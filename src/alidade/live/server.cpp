@@ -1,8 +1,7 @@
-// The one file that includes Boost.Beast: it takes as long to compile as ten others.
+// With capture_server.cpp the one file that includes Boost.Beast, which takes as long to read as ten others.
 #include "alidade/live/server.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -15,7 +14,6 @@
 #include <chrono>
 #include <future>
 #include <optional>
-#include <random>
 #include <set>
 #include <thread>
 
@@ -35,25 +33,11 @@ using std::chrono::seconds;
 using Request = http::request<http::string_body>;
 using Response = http::response<http::string_body>;
 
-constexpr std::size_t max_clients = 8, max_connections = 40;
+constexpr std::size_t max_clients = 8;
 constexpr std::size_t max_request_bytes = 64 * 1024;  // of a client: subscriptions of all topics are 2 kB
-constexpr auto patience = seconds(10);                // with a request that does not come
-constexpr auto silence = seconds(40);                 // of a client that answers no ping
 constexpr auto tick = milliseconds(100);
 
 double now_s() { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
-
-std::string random_hex(int num_words) {
-  std::random_device device;
-  std::string text;
-  for (int i = 0; i < num_words; ++i) text += fmt::format("{:08x}", device());
-  return text;
-}
-
-std::string machine_name() {
-  char name[256] = {};
-  return ::gethostname(name, sizeof name - 1) == 0 ? name : "";
-}
 
 }  // namespace
 

@@ -9,10 +9,14 @@ std::string point_names(const std::string& prefix) {
   for (const char* line :
        {"trials count that were run", "estimates count with an estimate",
         "beyond count estimates so far off that no sum takes them; in no figure", "verdicts.* count trials by verdict",
+        "good_beyond_5_sigma count said to be good, and beyond 5σ in some quantity",
         "quantities.*.bias any mean error, in the quantity's unit",
         "quantities.*.rms any root of the mean squared error, in its unit",
         "quantities.*.rms_over_bound 1 the same with each error over its bound",
         "quantities.*.rms_sigma any root of the mean squared stated σ",
+        "quantities.*.median any half of the errors are smaller",
+        "quantities.*.p90 any nine tenths of the errors are smaller",
+        "quantities.*.values count estimates that have it",
         "quantities.*.coverage.* 1 share of the trials within so many stated σ",
         "worst[].trial count its number: --trial", "worst[].quantity text furthest off", "worst[].error any its error",
         "worst[].sigma any its stated σ"})
@@ -35,6 +39,8 @@ std::string study_table() {
          "quantities.rms any root of the mean squared error\n"
          "quantities.rms_sigma any root of the mean squared stated σ\n"
          "quantities.rms_over_bound 1 RMS of the error over the bound\n"
+         "quantities.median any half of the errors are smaller\n"
+         "quantities.p90 any nine tenths of the errors are smaller\n"
          "quantities.inside_1_sigma 1 share of the trials\n"
          "quantities.inside_2_sigma 1 share of the trials\n"
          "quantities.inside_3_sigma 1 share of the trials\n"
@@ -66,6 +72,13 @@ lot.
   median    any    of the lot
   scatter   any    1.4826 times the median distance from the median
   sigma     any    median of the stated σ
+values.
+  camera         text  of the row
+  quantity       text  that eight rows or more have
+  value          any   of the row
+  sigma          any   σ
+  median_of_lot  any   of all rows that have it
+  z              1     distance over the lot's scatter and σ; of large lots all beyond 4, and some of the others
 rows.
   camera     text   of the row
   verdict    text   of its result; failed: there is none
@@ -89,7 +102,7 @@ batch.csv.
 const NameTables& campaign_names() {
   static const NameTables names = [] {
     NameTables all;
-    for (const char* study : {"observe", "calibrate", "rangefinder", "track", "localize", "merge"})
+    for (const char* study : {"observe", "calibrate", "rangefinder", "track", "localize", "turned", "chain", "merge"})
       all["study " + std::string(study)] = study_table();
     all["batch"] = batch_table;
     all["simulate fleet"] =
@@ -100,7 +113,7 @@ const NameTables& campaign_names() {
         "files:\n"
         "rows.txt text lines 'CAMERA ROW', in order of time\n"
         "truth.csv text the truth of each camera, and what happens to it: event, its time, its size [rad, or "
-        "relative]\n";
+        "relative], and how its focal length follows the temperature [per °C]\n";
     all["fleet worker"] =
         "estimate:\n"
         "rows count taken in\n"

@@ -108,6 +108,7 @@ views.
   tilt_correction_rad  rad    of the reading
   cluster_z2           1      squared error that the view's corners share, in its σ
   travel_sign          count  from which side the axis came
+  @pose world_from_cam_
   @pose base_from_cam_
 axes.
   name  text  head and axis

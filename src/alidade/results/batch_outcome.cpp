@@ -51,7 +51,23 @@ std::vector<Column> columns_of(const std::vector<BatchRow>& rows) {
 
 std::string number_text(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
 
-DataTable outlier_table(const std::vector<BatchRow>& rows, const std::vector<BatchOutlier>& outliers) {
+/// Of each quantity all that stand out, and so many others that a figure of the lot needs.
+std::vector<BatchOutlier> shown_distances(const std::vector<BatchRow>& rows) {
+  constexpr std::size_t most_of_quantity = 1000, most = 20000;
+  const std::vector<BatchOutlier> all = distances_of(rows);
+  std::map<std::string, std::size_t> counts, at;
+  for (const BatchOutlier& one : all) ++counts[one.name];
+  std::vector<BatchOutlier> shown;
+  for (const BatchOutlier& one : all) {
+    const std::size_t every = (counts[one.name] + most_of_quantity - 1) / most_of_quantity;
+    const bool is_taken = at[one.name]++ % every == 0 || std::abs(one.z) > outlying;
+    if (is_taken && shown.size() < most) shown.push_back(one);
+  }
+  return shown;
+}
+
+DataTable distances_table(const std::string& name, const std::vector<BatchRow>& rows,
+                          const std::vector<BatchOutlier>& outliers) {
   std::vector<std::string> cameras, names;
   std::vector<double> values, sigmas, medians, zs;
   for (const BatchOutlier& outlier : outliers) {
@@ -62,7 +78,7 @@ DataTable outlier_table(const std::vector<BatchRow>& rows, const std::vector<Bat
     medians.push_back(outlier.median);
     zs.push_back(outlier.z);
   }
-  return {"outliers",
+  return {name,
           {{"camera", cameras},
            {"quantity", names},
            {"value", values},
@@ -162,8 +178,8 @@ std::optional<BatchRow> parse_row(std::string_view text, const std::vector<std::
   }
 }
 
-std::vector<BatchOutlier> outliers_of(const std::vector<BatchRow>& rows) {
-  std::vector<BatchOutlier> outliers;
+std::vector<BatchOutlier> distances_of(const std::vector<BatchRow>& rows) {
+  std::vector<BatchOutlier> distances;
   for (const auto& [name, values] : columns_of(rows)) {
     if (values.size() < least_lot) continue;
     std::vector<double> numbers;
@@ -173,9 +189,16 @@ std::vector<BatchOutlier> outliers_of(const std::vector<BatchRow>& rows) {
     const double scatter = 1.4826 * median_of(numbers);
     for (const auto& [row, value] : values) {
       const double z = (value.value - median) / std::hypot(scatter, value.sigma);
-      if (std::abs(z) > outlying) outliers.push_back({row, name, value.value, value.sigma, median, z});
+      // Of a lot whose values are all the same, and without σ, any other one is beyond all measure.
+      if (!std::isnan(z)) distances.push_back({row, name, value.value, value.sigma, median, std::clamp(z, -1e6, 1e6)});
     }
   }
+  return distances;
+}
+
+std::vector<BatchOutlier> outliers_of(const std::vector<BatchRow>& rows) {
+  std::vector<BatchOutlier> outliers = distances_of(rows);
+  std::erase_if(outliers, [](const auto& one) { return !(std::abs(one.z) > outlying); });
   std::ranges::stable_sort(outliers, [](const auto& a, const auto& b) { return std::abs(a.z) > std::abs(b.z); });
   return outliers;
 }
@@ -219,7 +242,8 @@ JobOutcome outcome_of(const std::vector<BatchRow>& rows) {
   document.estimate["verdicts"] = JsonValue::object();
   for (const auto& [state, count] : states) document.estimate["verdicts"][state] = count;
   document.estimate["outliers"] = outliers.size();
-  document.data = {outlier_table(rows, outliers), lot_table(rows), rows_table(rows)};
+  document.data = {distances_table("outliers", rows, outliers), lot_table(rows), rows_table(rows),
+                   distances_table("values", rows, shown_distances(rows))};
   outcome.files.push_back({"batch.csv", batch_csv(rows)});
   for (const auto& [state, count] : states)
     outcome.lines.push_back(fmt::format("{:<14} {} {}", state, count, count == 1 ? "row" : "rows"));

@@ -31,13 +31,15 @@ void read_result(std::string_view result_json, const std::string& file, BatchRow
 /// None where the text is no row, or of other words.
 [[nodiscard]] std::optional<BatchRow> parse_row(std::string_view text, const std::vector<std::string>& words);
 
-/// A value that stands out of its lot: how far from the median, over 1.4826 times the median of the distances and its
+/// A value of a row and its lot: how far from the median, over 1.4826 times the median of the distances and its
 /// own σ.
 struct BatchOutlier {
   std::size_t row = 0;
   std::string name;
   double value = 0.0, sigma = 0.0, median = 0.0, z = 0.0;
 };
+/// Of quantities that eight rows or more have: every value, in order of quantities and rows.
+[[nodiscard]] std::vector<BatchOutlier> distances_of(const std::vector<BatchRow>& rows);
 /// Those beyond 4, the furthest first, of quantities that eight rows or more have.
 [[nodiscard]] std::vector<BatchOutlier> outliers_of(const std::vector<BatchRow>& rows);
 

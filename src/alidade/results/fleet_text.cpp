@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -14,7 +15,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::string_view version = "1:";  // of a checkpoint
+constexpr std::string_view version = "2:";  // of a checkpoint
 constexpr double largest = 1e12;
 
 double number_in(const nlohmann::json& json, const char* name) {
@@ -41,11 +42,12 @@ void read_rotation(const nlohmann::json& json, FleetRow& row) {
 
 std::string number_or_null(double value) { return std::isfinite(value) ? fmt::format("{}", value) : "null"; }
 
-std::string members(const Eigen::Matrix<double, num_fleet_common, 1>& values) {
-  static constexpr std::array<const char*, num_fleet_common> names{"fx", "fy",           "cx",
-                                                                   "cy", "pan_zero_rad", "tilt_zero_rad"};
+/// Of a camera without a temperature nothing is said of it.
+std::string members(const Eigen::Matrix<double, num_fleet_common, 1>& values, bool has_temperature) {
+  static constexpr std::array<const char*, num_fleet_common> names{
+      "fx", "fy", "cx", "cy", "pan_zero_rad", "tilt_zero_rad", "focal_per_c"};
   std::string text = "{";
-  for (std::size_t i = 0; i < names.size(); ++i)
+  for (std::size_t i = 0; i < names.size() - (has_temperature ? 0 : 1); ++i)
     text +=
         fmt::format("{}\"{}\":{}", i == 0 ? "" : ",", names[i], number_or_null(values[static_cast<Eigen::Index>(i)]));
   return text + "}";
@@ -69,6 +71,7 @@ std::optional<FleetRow> parse_fleet_row(std::string_view payload, std::string& f
       return std::nullopt;
     }
     row.t_s = number_in(json, "t");
+    row.temperature_c = number_in(json, "temperature_c");
     read_rotation(json, row);
     row.px.fill(std::numeric_limits<double>::quiet_NaN());
     static constexpr std::array<const char*, 2 * max_fleet_points> names{"p1x", "p1y", "p2x", "p2y", "p3x", "p3y",
@@ -92,11 +95,24 @@ std::string fleet_row_text(const FleetRow& row) {
     text += fmt::format(",\"qw\":{},\"qx\":{},\"qy\":{},\"qz\":{}", r[0], r[1], r[2], r[3]);
   if (row.source == FleetSource::rate)
     text += fmt::format(",\"omega_x\":{},\"omega_y\":{},\"omega_z\":{}", r[0], r[1], r[2]);
+  if (std::isfinite(row.temperature_c)) text += fmt::format(",\"temperature_c\":{:.3f}", row.temperature_c);
   for (std::size_t k = 0; k < static_cast<std::size_t>(row.num_points); ++k) {
     if (!std::isfinite(row.px[2 * k])) continue;
     text += fmt::format(",\"p{}x\":{:.4f},\"p{}y\":{:.4f}", k + 1, row.px[2 * k], k + 1, row.px[2 * k + 1]);
   }
   return text + "}";
+}
+
+FleetRow fleet_row_of(const FleetSight& sight, std::int64_t n) {
+  FleetRow row;
+  row.n = n;
+  row.t_s = sight.t_s;
+  row.temperature_c = sight.temperature_c;
+  row.rotation = {sight.pan_rad, sight.tilt_rad, 0.0, 0.0};
+  row.num_points = static_cast<int>(sight.px.size() / 2);
+  row.px.fill(std::numeric_limits<double>::quiet_NaN());
+  std::ranges::copy(sight.px, row.px.begin());
+  return row;
 }
 
 std::string fleet_state_text(const std::string& id, const FleetCamera& camera) {
@@ -106,7 +122,7 @@ std::string fleet_state_text(const std::string& id, const FleetCamera& camera) {
       "{{\"camera\":{},\"n\":{},\"t\":{},\"verdict\":{{\"state\":\"{}\",\"sentence\":{}}},\"estimate\":{},\"stddev\":{}"
       "}}",
       quoted(id), camera.n, number_or_null(camera.t_s), state_name(verdict.state), quoted(verdict.sentence),
-      members(estimate.value), members(estimate.sigma));
+      members(estimate.value, estimate.has_temperature), members(estimate.sigma, estimate.has_temperature));
 }
 
 std::string fleet_alarm_text(const std::string& id, const FleetAlarm& alarm) {

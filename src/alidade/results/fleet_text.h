@@ -5,15 +5,18 @@
 #include <string_view>
 
 #include "alidade/fleet/fleet_camera.h"
+#include "alidade/simulate/fleet.h"
 
 namespace alidade {
 
 /// A row as a camera says it on cam.ID.obs: JSON, or CBOR, an object with n = 1, 2, 3 … and the columns of a rotation
 /// log: t, pan and tilt (and roll), or qw qx qy qz, or omega_x omega_y (omega_z), and p1x, p1y, p2x, …; null or no
-/// member: not seen. None, and why, for what has no n; what has a number but is otherwise none of these is a row that
-/// says nothing.
+/// member: not seen; temperature_c, where it is measured. None, and why, for what has no n; what has a number but is
+/// otherwise none of these is a row that says nothing.
 [[nodiscard]] std::optional<FleetRow> parse_fleet_row(std::string_view payload, std::string& fault);
 [[nodiscard]] std::string fleet_row_text(const FleetRow& row);
+/// The n-th row of a simulated camera.
+[[nodiscard]] FleetRow fleet_row_of(const FleetSight& sight, std::int64_t n);
 
 /// Of cam.ID.state: a function of the camera's messages 1 … n alone.
 [[nodiscard]] std::string fleet_state_text(const std::string& id, const FleetCamera& camera);

@@ -157,7 +157,8 @@ DataTable views_table(const RigCalibration& report) {
     const Head* const turned = head_of(report.rig, view.head);
     world_from_cams.push_back(turned ? world_from_cam(*turned, view.pan_tilt_rad) : Rigid3());
   }
-  add_pose(table, "base_from_cam", world_from_cams);
+  add_pose(table, "world_from_cam", world_from_cams);
+  add_pose(table, "base_from_cam", world_from_cams);  // the same by the name of earlier versions
   return table;
 }
 

@@ -32,6 +32,9 @@ JsonValue quantities_value(const StudyHeader& header, const StudyTally& tally) {
     own["rms"] = figures.rms;
     own["rms_over_bound"] = figures.rms_over_bound;
     own["rms_sigma"] = figures.rms_sigma;
+    own["median"] = figures.median;
+    own["p90"] = figures.p90;
+    own["values"] = tally.quantities[i].values;
     for (std::size_t k = 0; k < 3; ++k) own["coverage"][std::to_string(k + 1)] = figures.coverage[k];
   }
   return value;
@@ -41,6 +44,7 @@ void fill_point(const StudyHeader& header, const StudyTally& tally, JsonValue& v
   value["trials"] = tally.trials;
   value["estimates"] = tally.estimates;
   value["beyond"] = tally.beyond;
+  value["good_beyond_5_sigma"] = tally.good_beyond_5_sigma;
   for (std::size_t i = 0; i < tally.states.size(); ++i)
     value["verdicts"][state_name(static_cast<State>(i))] = tally.states[i];
   value["quantities"] = quantities_value(header, tally);
@@ -77,7 +81,7 @@ JsonValue estimate_value(const StudyHeader& header, std::span<const StudyTally> 
 }
 
 DataTable quantities_table(const StudyHeader& header, std::span<const StudyTally> points) {
-  std::vector<double> varied, bias, rms, sigma, ratio;
+  std::vector<double> varied, bias, rms, sigma, ratio, median, p90;
   std::array<std::vector<double>, 3> inside;
   std::vector<std::string> names, units;
   for (std::size_t p = 0; p < points.size(); ++p) {
@@ -90,6 +94,8 @@ DataTable quantities_table(const StudyHeader& header, std::span<const StudyTally
       rms.push_back(figures.rms);
       sigma.push_back(figures.rms_sigma);
       ratio.push_back(figures.rms_over_bound);
+      median.push_back(figures.median);
+      p90.push_back(figures.p90);
       for (std::size_t k = 0; k < 3; ++k) inside[k].push_back(figures.coverage[k]);
     }
   }
@@ -101,6 +107,8 @@ DataTable quantities_table(const StudyHeader& header, std::span<const StudyTally
            {"rms", rms},
            {"rms_sigma", sigma},
            {"rms_over_bound", ratio},
+           {"median", median},
+           {"p90", p90},
            {"inside_1_sigma", inside[0]},
            {"inside_2_sigma", inside[1]},
            {"inside_3_sigma", inside[2]}}};
@@ -125,7 +133,8 @@ DataTable worst_table(const StudyHeader& header, std::span<const StudyTally> poi
 /// Of a quantity: is its RMS at the bound, and does its σ cover it? Three standard errors more where trials are few.
 std::string fault_of(const StudyHeader& header, const StudyTally& tally, std::size_t i) {
   const QuantityFigures figures = figures_of(tally, i, header.has_bound);
-  const auto n = static_cast<double>(tally.estimates);
+  const auto n = static_cast<double>(tally.quantities[i].values);
+  if (n < 1.0) return "";
   if (!(figures.rms_over_bound <= largest_ratio + 3.0 * largest_ratio / std::sqrt(2.0 * n)))
     return fmt::format("{}: RMS error {:.3f} of the bound", header.quantities[i].name, figures.rms_over_bound);
   for (std::size_t k = 0; k < 3; ++k) {

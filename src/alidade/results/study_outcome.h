@@ -24,5 +24,7 @@ namespace alidade {
 [[nodiscard]] JobOutcome trial_outcome(const RangefinderStudy& study, std::uint64_t seed, std::uint64_t trial);
 [[nodiscard]] JobOutcome trial_outcome(const TrackStudy& study, std::uint64_t seed, std::uint64_t trial);
 [[nodiscard]] JobOutcome trial_outcome(const LocalizeStudy& study, std::uint64_t seed, std::uint64_t trial);
+[[nodiscard]] JobOutcome trial_outcome(const TurnedStudy& study, std::uint64_t seed, std::uint64_t trial);
+[[nodiscard]] JobOutcome trial_outcome(const ChainStudy& study, std::uint64_t seed, std::uint64_t trial);
 
 }  // namespace alidade

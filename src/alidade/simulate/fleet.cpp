@@ -69,6 +69,10 @@ FleetScene draw_fleet_scene(const FleetSceneConfig& config, std::uint64_t seed, 
   const double chance = draws.uniform(), kind = draws.uniform(), size = draws.uniform(), sign = draws.uniform();
   scene.event_t_s = config.event_after_s * (1.0 + draws.uniform());
   if (chance >= config.event_share) return scene;
+  if (config.warming_c > 0.0) {
+    scene.focal_per_c = (sign < 0.5 ? -1.0 : 1.0) * (5e-5 + 2e-4 * size);
+    return scene;
+  }
   scene.event = static_cast<FleetEvent>(1 + static_cast<int>(4.0 * kind));
   scene.event_size = scene.event == FleetEvent::focal_drift ? 0.01 + 0.02 * size : (0.1 + 0.9 * size) * rad_per_degree;
   if (config.slip_sigmas > 0.0) {
@@ -99,7 +103,13 @@ FleetSight simulate_sight(const FleetScene& scene, const FleetSceneConfig& confi
   Eigen::Vector3d truth = is_frozen ? angles_at(static_cast<double>(seen_n - 1) / config.rate_hz) : read;
   if (scene.event == FleetEvent::belt_slip) truth.x() += at * scene.event_size;
   if (scene.event == FleetEvent::bracket_sag) truth.y() += at * scene.event_size;
-  const double zoom = scene.event == FleetEvent::focal_drift ? 1.0 + at * scene.event_size : 1.0;
+  double zoom = scene.event == FleetEvent::focal_drift ? 1.0 + at * scene.event_size : 1.0;
+  if (config.warming_c > 0.0) {
+    const double warmer_c =
+        0.5 * config.warming_c * (1.0 - std::cos(std::numbers::pi * std::min(1.0, sight.t_s / config.warming_s)));
+    sight.temperature_c = 10.0 + warmer_c;
+    zoom *= 1.0 + scene.focal_per_c * warmer_c;
+  }
   const Eigen::Quaterniond cam_from_base = base_from_cam_rotation(truth).conjugate();
   Draws draws(fleet_seed(seed, number_of(scene.id), static_cast<std::uint64_t>(seen_n)));
   for (std::size_t k = 0; k < 4; ++k) {

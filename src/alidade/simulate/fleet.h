@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,9 @@ struct FleetSceneConfig {
   double event_after_s = 120.0;  ///< The earliest; within as long again it has come.
   double slip_sigmas = 0.0;      ///< A slip or sag of so many σ of one row; 0: drawn, 0.1° to 1°.
   double event_share = 0.2;      ///< Of the cameras, one of the events each.
+  /// Above 0: it gets so much warmer (as half a cosine, from 10 °C on), rows say the temperature, and instead of the
+  /// events the focal length of that share of the cameras follows it.
+  double warming_c = 0.0, warming_s = 7200.0;
 };
 
 /// A camera: a head that patrols, four points that stand still, and what happens to it, all a function of (seed,
@@ -27,12 +31,14 @@ struct FleetScene {
   std::array<double, 4> sway_rad{}, phase{};  ///< Of pan and tilt, two waves each.
   std::array<double, 8> direction{};          ///< Of the points: pan, tilt [rad].
   FleetEvent event = FleetEvent::none;
+  double focal_per_c = 0.0;                  ///< Relative.
   double event_t_s = 0.0, event_size = 0.0;  ///< rad of a slip, rad of a sag, relative of a focal length.
 };
 
 /// What the camera says at its n-th row, from 1: a function of (scene, config, seed, n).
 struct FleetSight {
   double t_s = 0.0, pan_rad = 0.0, tilt_rad = 0.0;
+  double temperature_c = std::numeric_limits<double>::quiet_NaN();
   std::array<double, 8> px{};
 };
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "alidade/estimation/motion_models.h"
 #include "alidade/simulate/draws.h"
 
 namespace alidade {
@@ -182,6 +183,28 @@ std::function<Eigen::Vector3d(double)> thrown_ball(const Eigen::Vector3d& from_m
   return [=](double t_s) {
     const double s = std::clamp(t_s - rest_s, 0.0, flight_s);
     return Vector3d(from_m + s * velocity_m_s + Vector3d(0.0, 0.5 * g * s * s, 0.0));
+  };
+}
+
+std::function<Vector3d(double)> drawn_path(const Vector3d& start_m, double sigma_a_m_s2, double duration_s,
+                                           std::uint64_t seed) {
+  Draws draws(seed + 77000);
+  const double q = ConstantVelocity{sigma_a_m_s2}.density(), dt_s = 0.05;
+  Vector3d p = start_m, v = 0.1 * draws.normal3();
+  std::vector<Vector3d> path{p};
+  const int steps = static_cast<int>(duration_s / dt_s + 0.5);
+  for (int k = 0; k < steps + 1; ++k) {
+    const Vector3d a = draws.normal3(), b = draws.normal3();
+    // The factor of [Δ³/3, Δ²/2; Δ²/2, Δ].
+    p += dt_s * v + std::sqrt(q * dt_s) * dt_s * (0.5 * a + b / std::sqrt(12.0));
+    v += std::sqrt(q * dt_s) * a;
+    path.push_back(p);
+  }
+  return [path, dt_s, steps](double t_s) {
+    const double at = std::clamp(t_s / dt_s, 0.0, steps + 0.999);
+    const auto i = static_cast<std::size_t>(at + 1e-9);
+    const double share = std::max(0.0, at - static_cast<double>(i));
+    return Vector3d((1.0 - share) * path[i] + share * path[i + 1]);
   };
 }
 

@@ -79,6 +79,10 @@ struct SimulatedObservation {
 [[nodiscard]] std::function<Eigen::Vector3d(double t_s)> thrown_ball(const Eigen::Vector3d& from_m,
                                                                      const Eigen::Vector3d& velocity_m_s);
 
+/// A path by white acceleration of ConstantVelocity{sigma_a}, drawn every 0.05 s and straight between.
+[[nodiscard]] std::function<Eigen::Vector3d(double t_s)> drawn_path(const Eigen::Vector3d& start_m, double sigma_a_m_s2,
+                                                                    double duration_s, std::uint64_t seed);
+
 /// All observations in order of arrival; images without the target in them are not there. Same seed, same observations.
 [[nodiscard]] std::vector<SimulatedObservation> simulate_track(const TrackScene& scene, std::uint64_t seed);
 

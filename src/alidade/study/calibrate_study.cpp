@@ -5,6 +5,7 @@
 #include "alidade/calibrate/solve/bundle.h"
 #include "alidade/estimation/config_error.h"
 #include "alidade/simulate/example_camera.h"
+#include "alidade/study/sigma_map_trials.h"
 #include "alidade/study/studies.h"
 #include "alidade/study/trial_random.h"
 #include "alidade/study/word_field.h"
@@ -27,8 +28,8 @@ std::vector<int> free_parameters(const Camera& camera) {
   return free;
 }
 
-/// σ of the free parameters by the Cramér–Rao bound, poses eliminated.
-std::vector<double> bound_of(const BoardScene& scene, const std::vector<int>& free, double noise_px) {
+/// Covariance of the free parameters by the Cramér–Rao bound, poses eliminated.
+Eigen::MatrixXd bound_of(const BoardScene& scene, const std::vector<int>& free, double noise_px) {
   std::vector<ViewArrays> arrays;
   for (const BoardView& view : simulate_views(scene, 0.0, 1)) arrays.push_back(make_arrays(view));
   BundleProblem problem;
@@ -42,12 +43,8 @@ std::vector<double> bound_of(const BoardScene& scene, const std::vector<int>& fr
   const BundleResult at_truth = with_covariance(solve_bundle(problem, truth, {.max_iterations = 5}), false);
   if (at_truth.cov.rows() < static_cast<Eigen::Index>(free.size()))
     throw ConfigError("so few photos do not determine the camera: more --photos");
-  std::vector<double> bound;
-  for (std::size_t i = 0; i < free.size(); ++i) {
-    const auto at = static_cast<Eigen::Index>(i);
-    bound.push_back(noise_px * std::sqrt(at_truth.cov(at, at)));
-  }
-  return bound;
+  const auto size = static_cast<Eigen::Index>(free.size());
+  return noise_px * noise_px * at_truth.cov.topLeftCorner(size, size);
 }
 
 BoardScene board_scene(const CalibrateStudy& study, std::uint64_t seed, std::uint64_t number) {
@@ -64,10 +61,41 @@ std::vector<BoardView> noisy_views(const CalibrateStudy& study, const BoardScene
   return views;
 }
 
+/// What the trials of a set of poses share.
 struct BoardSetting {
   BoardScene scene;
-  std::vector<double> bound;
+  Eigen::VectorXd bound;  ///< σ of the free parameters.
+  std::optional<SigmaMapTrials> map;
 };
+
+BoardSetting board_setting(const CalibrateStudy& study, const std::vector<int>& free, std::uint64_t seed,
+                           std::uint64_t number) {
+  BoardSetting setting{board_scene(study, seed, number), {}, {}};
+  const Eigen::MatrixXd bound = bound_of(setting.scene, free, study.noise_px);
+  setting.bound = bound.diagonal().cwiseSqrt();
+  if (study.sigma_map) setting.map.emplace(setting.scene.camera, free, bound);
+  return setting;
+}
+
+CalibrateConfig config_of(const CalibrateStudy& study) {
+  CalibrateConfig config;
+  config.model = study.model;
+  config.board_shape = study.board_shape;
+  return config;
+}
+
+void fill(const Camera& found, const BoardSetting& own, const std::vector<int>& free, TrialResult& result) {
+  const Eigen::VectorXd error = params(found.lens) - params(own.scene.camera.lens);
+  for (std::size_t i = 0; i < free.size(); ++i)
+    result.values.push_back(
+        {error[free[i]], std::sqrt(found.cov(free[i], free[i])), own.bound[static_cast<Eigen::Index>(i)]});
+  if (own.map) own.map->add(found, result.values);
+}
+
+/// The number of the set of poses that a trial has.
+std::uint64_t scene_of(const CalibrateStudy& study, std::uint64_t trial) {
+  return study.scenes == 0 ? trial : trial % static_cast<std::uint64_t>(study.scenes);
+}
 
 State state_of(CalibrateReport::Status status) {
   if (status == CalibrateReport::Status::converged) return State::good;
@@ -85,10 +113,16 @@ FieldList fields_of(CalibrateStudy& study) {
            .help = "σ of each term of a smooth field of errors that a photo's corners share",
            .limits = {0.0, 100.0}},
           {.name = "model", .value = one_of(study.model, models), .help = "Of the lens"},
+          {.name = "board_shape",
+           .value = words_code(study.board_shape, shape_words()),
+           .help = "As it is estimated, though the simulated board is flat"},
           {.name = "scenes",
            .value = &study.scenes,
-           .help = "Sets of poses, which trials take one after the other",
-           .limits = {1, 10000}},
+           .help = "Sets of poses, which trials take one after the other; 0: each trial its own",
+           .limits = {0, 10000}},
+          {.name = "sigma_map",
+           .value = &study.sigma_map,
+           .help = "Also the error of the sigma map at 5 x 4 pixels, after the implied rotation"},
           {.name = "judge",
            .value = &study.judge,
            .help = "The whole job with its verdict, not the solve alone: some times slower"}};
@@ -98,26 +132,24 @@ StudySetting setting_of(const CalibrateStudy& study, std::uint64_t seed) {
   const Camera truth = true_camera(study);
   const std::vector<int> free = free_parameters(truth);
   auto settings = std::make_shared<std::vector<BoardSetting>>();
-  for (int i = 0; i < study.scenes; ++i) {
-    const BoardScene scene = board_scene(study, seed, static_cast<std::uint64_t>(i));
-    settings->push_back({scene, bound_of(scene, free, study.noise_px)});
-  }
+  for (int i = 0; i < study.scenes; ++i)
+    settings->push_back(board_setting(study, free, seed, static_cast<std::uint64_t>(i)));
   StudySetting setting;
   const auto names = param_names(truth.lens);
   for (const int at : free) setting.quantities.push_back({names[static_cast<std::size_t>(at)], at < 4 ? "px" : "1"});
+  if (study.sigma_map)
+    for (TrialQuantity& quantity : SigmaMapTrials::quantities()) setting.quantities.push_back(std::move(quantity));
   setting.has_bound = true;
   setting.make_worker = [=]() -> RunTrial {
     return [=](std::uint64_t trial, TrialResult& result) {
-      const BoardSetting& own = (*settings)[trial % settings->size()];
+      std::optional<BoardSetting> drawn;
+      if (study.scenes == 0) drawn = board_setting(study, free, seed, trial);
+      const BoardSetting& own = drawn ? *drawn : (*settings)[scene_of(study, trial)];
       const auto views = noisy_views(study, own.scene, seed, trial);
-      CalibrateConfig config;
-      config.model = study.model;
+      const CalibrateConfig config = config_of(study);
       const auto take = [&](const CalibrateReport& report) {
         result.has_estimate = report.status == CalibrateReport::Status::converged;
-        if (!result.has_estimate) return;
-        const Eigen::VectorXd error = params(report.camera.lens) - params(truth.lens);
-        for (std::size_t i = 0; i < free.size(); ++i)
-          result.values.push_back({error[free[i]], std::sqrt(report.camera.cov(free[i], free[i])), own.bound[i]});
+        if (result.has_estimate) fill(report.camera, own, free, result);
       };
       if (study.judge) {
         const Calibration calibration = calibrate(views, photo_size, own.scene.board, config);
@@ -134,7 +166,7 @@ StudySetting setting_of(const CalibrateStudy& study, std::uint64_t seed) {
 }
 
 CalibrateTrial trial_of(const CalibrateStudy& study, std::uint64_t seed, std::uint64_t trial) {
-  const BoardScene scene = board_scene(study, seed, trial % static_cast<std::uint64_t>(study.scenes));
+  const BoardScene scene = board_scene(study, seed, scene_of(study, trial));
   return {noisy_views(study, scene, seed, trial), scene.board, photo_size, scene.camera};
 }
 

@@ -31,10 +31,13 @@ void fill(const RangefinderReport& report, State state, const Beam& truth, Trial
 }  // namespace
 
 FieldList fields_of(RangefinderStudy& study) {
-  static const std::vector<std::string> methods{"spot", "plane", "joint"};
+  static const std::vector<std::string> methods{"spot", "plane", "joint"}, refines{"all", "beam"};
   return {
       {.name = "scenario", .value = one_of(study.scenario, rangefinder_scenarios()), .help = "Of simulate rangefinder"},
       {.name = "method", .value = one_of(study.method, methods), .help = "spot, plane or joint"},
+      {.name = "refine",
+       .value = one_of(study.refine, refines),
+       .help = "all: lens, boards and beam together; beam: lens and boards held"},
       {.name = "shots", .value = &study.shots, .help = "Of a log", .limits = {3, 1000}},
       {.name = "noise_px", .value = &study.noise_px, .help = "σ of the spot's coordinate", .limits = {1e-6, 100.0}},
       {.name = "corner_noise_px",
@@ -70,6 +73,7 @@ RangefinderTrial trial_of(const RangefinderStudy& study, std::uint64_t seed, std
   RangefinderConfig& config = trial.config;
   for (const Field& field : fields_of(config)) {
     if (field.name == "method") (void)set_field(field, study.method);
+    if (field.name == "refine") (void)set_field(field, study.refine);
   }
   config.board = scene.board;
   config.sigma_spot_px = study.noise_px;

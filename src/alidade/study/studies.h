@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -44,8 +45,10 @@ struct CalibrateStudy {
   double noise_px = 0.1;
   double shared_px = 0.0;
   std::string model = "brown";
-  int scenes = 12;     ///< Sets of poses, one after the other.
-  bool judge = false;  ///< The whole job with its verdict; false: the solve alone.
+  BoardShape board_shape = BoardShape::automatic;  ///< As it is estimated; the simulated board is flat.
+  int scenes = 12;                                 ///< Sets of poses, one after the other; 0: each trial its own.
+  bool sigma_map = false;                          ///< Also what the σ map says of 20 pixels.
+  bool judge = false;                              ///< The whole job with its verdict; false: the solve alone.
 };
 struct CalibrateTrial {
   std::vector<BoardView> views;
@@ -62,6 +65,7 @@ struct RangefinderStudy {
 
   std::string scenario = "reference";
   std::string method = "joint";
+  std::string refine = "all";
   int shots = 18;
   double noise_px = 0.3;  ///< Of the spot.
   double corner_noise_px = 0.2;
@@ -110,11 +114,42 @@ struct LocalizeTrial {
   std::vector<TimedPose> truth;
 };
 
+/// Photos of a camera that somebody turns by hand: other cameras, turns and points each trial, and what may be wrong.
+struct TurnedStudy {
+  static constexpr const char* name = "turned";
+  static constexpr std::uint64_t block = 10;
+
+  double wrong_matches = 0.0;  ///< Share.
+  double moving_points = 0.0;  ///< Share of the points that each photo sees elsewhere.
+  double lever_m = 0.0;        ///< Camera centre from the centre of the turn, along the view.
+  double step_m = 0.0;         ///< σ of the hand's own steps.
+  double focus = 0.0;          ///< By which the focal length walks, relative.
+  bool on_the_spot = false;    ///< And said so: no parallax is allowed for.
+};
+struct TurnedTrial {
+  MatchedPhotos photos;
+  ObserveConfig config;
+  Eigen::Vector4d truth;  ///< fx, fy, cx, cy. [px]
+};
+
+/// σ at the end of a chain: photos of a board give two lenses, views of boards through these give a rig of two heads,
+/// and with that rig a target is followed: where it is at the end.
+struct ChainStudy {
+  static constexpr const char* name = "chain";
+  static constexpr std::uint64_t block = 10;
+
+  double range_m = 3.0;  ///< Of the target; the heads stand 0.5 m apart.
+  int photos = 13;       ///< Of each camera.
+  bool exact = false;    ///< Rig and lenses are taken as exact: what σ says where the chain is left out.
+};
+
 [[nodiscard]] FieldList fields_of(ObserveStudy& study);
 [[nodiscard]] FieldList fields_of(CalibrateStudy& study);
 [[nodiscard]] FieldList fields_of(RangefinderStudy& study);
 [[nodiscard]] FieldList fields_of(TrackStudy& study);
 [[nodiscard]] FieldList fields_of(LocalizeStudy& study);
+[[nodiscard]] FieldList fields_of(TurnedStudy& study);
+[[nodiscard]] FieldList fields_of(ChainStudy& study);
 
 /// Throw ConfigError for settings that cannot be.
 [[nodiscard]] StudySetting setting_of(const ObserveStudy& study, std::uint64_t seed);
@@ -122,11 +157,16 @@ struct LocalizeTrial {
 [[nodiscard]] StudySetting setting_of(const RangefinderStudy& study, std::uint64_t seed);
 [[nodiscard]] StudySetting setting_of(const TrackStudy& study, std::uint64_t seed);
 [[nodiscard]] StudySetting setting_of(const LocalizeStudy& study, std::uint64_t seed);
+[[nodiscard]] StudySetting setting_of(const TurnedStudy& study, std::uint64_t seed);
+[[nodiscard]] StudySetting setting_of(const ChainStudy& study, std::uint64_t seed);
 
 [[nodiscard]] ObserveTrial trial_of(const ObserveStudy& study, std::uint64_t seed, std::uint64_t trial);
 [[nodiscard]] CalibrateTrial trial_of(const CalibrateStudy& study, std::uint64_t seed, std::uint64_t trial);
 [[nodiscard]] RangefinderTrial trial_of(const RangefinderStudy& study, std::uint64_t seed, std::uint64_t trial);
 [[nodiscard]] TrackTrial trial_of(const TrackStudy& study, std::uint64_t seed, std::uint64_t trial);
 [[nodiscard]] LocalizeTrial trial_of(const LocalizeStudy& study, std::uint64_t seed, std::uint64_t trial);
+[[nodiscard]] TurnedTrial trial_of(const TurnedStudy& study, std::uint64_t seed, std::uint64_t trial);
+/// None where a step of the chain before the track has no answer.
+[[nodiscard]] std::optional<TrackTrial> trial_of(const ChainStudy& study, std::uint64_t seed, std::uint64_t trial);
 
 }  // namespace alidade

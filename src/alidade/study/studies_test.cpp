@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "alidade/estimation/config_error.h"
+#include "alidade/simulate/example_camera.h"
+#include "alidade/study/sigma_map_trials.h"
 #include "alidade/study/study_plan.h"
 
 namespace alidade {
@@ -83,6 +85,99 @@ TEST(Studies, DoNotDependOnTheirDivision) {
   expect_one_tally(RangefinderStudy{}, 8);
   expect_one_tally(TrackStudy{}, 8);
   expect_one_tally(LocalizeStudy{}, 5);
+  expect_one_tally(TurnedStudy{}, 4);
+  expect_one_tally(ChainStudy{}, 4);
+  expect_one_tally(CalibrateStudy{.scenes = 0, .sigma_map = true}, 6);
+}
+
+/// Medians of |error| to a hundredth, whatever the signs and sizes; what an estimate has not is in no figure of it.
+TEST(StudyTally, KnowsMediansAndWhatIsMissing) {
+  StudyTally tally(2), other(2);
+  for (std::uint64_t i = 1; i <= 1000; ++i) {
+    TrialResult result{State::good, true, {}};
+    const double size = static_cast<double>(i * 37 % 1000 + 1) * (i % 2 == 0 ? 1e-4 : -1e-4);
+    result.values.push_back({size, 0.01, 0.01});
+    result.values.push_back({1e3 * size, i % 4 == 0 ? NAN : 100.0, 1.0});
+    (i % 3 == 0 ? tally : other).add(i, result);
+  }
+  tally.add(other);
+  const QuantityFigures one = figures_of(tally, 0, true), two = figures_of(tally, 1, true);
+  EXPECT_NEAR(one.median, 0.05005, 5e-4);
+  EXPECT_NEAR(one.p90, 0.09005, 9e-4);
+  EXPECT_NEAR(one.coverage[0], 0.099, 1e-12);
+  EXPECT_EQ(tally.quantities[0].values, 1000U);
+  EXPECT_EQ(tally.quantities[1].values, 750U);
+  EXPECT_NEAR(two.median, 50.05, 3.0);
+  EXPECT_EQ(two.coverage[0], 1.0);
+  EXPECT_NEAR(static_cast<double>(tally.good_beyond_5_sigma), 500.0, 1.0);  // beyond 0.05
+}
+
+/// A camera whose centre is moved sees everything turned: what is left after the implied rotation is a small part of
+/// it, and nothing is left of the truth itself. Another focal length is no rotation.
+TEST(SigmaMapTrials, LeaveWhatNoRotationExplains) {
+  const Camera truth = *example_camera("pinhole", 640, 480);
+  const std::vector<int> free{0, 1, 2, 3};
+  const SigmaMapTrials map(truth, free, Eigen::MatrixXd(Eigen::Vector4d(1.0, 1.0, 1.0, 1.0).asDiagonal()));
+  const auto errors_of = [&](const Eigen::Vector4d& change) {
+    Camera found = truth;
+    Eigen::VectorXd values = params(truth.lens);
+    values.head<4>() += change;
+    found.lens = with_params(truth.lens, values);
+    found.cov = Eigen::MatrixXd::Zero(values.size(), values.size());
+    found.cov.diagonal().head<4>().setOnes();
+    std::vector<TrialValue> all;
+    map.add(found, all);
+    double largest = 0.0;
+    for (const TrialValue& one : all) largest = std::max(largest, std::abs(one.error));
+    EXPECT_EQ(all.size(), SigmaMapTrials::quantities().size());
+    return largest;
+  };
+  EXPECT_LT(errors_of(Eigen::Vector4d::Zero()), 1e-9);
+  EXPECT_LT(errors_of({0.0, 0.0, 2.0, -2.0}), 1.5);
+  EXPECT_GT(errors_of({5.0, 5.0, 0.0, 0.0}), 2.0);
+}
+
+/// The σ map is what its pixels' errors scatter by.
+TEST(CalibrateStudy, SigmaMapCoversItsErrors) {
+  CalibrateStudy study;
+  study.sigma_map = true;
+  study.scenes = 4;
+  const StudyPlan plan = plan_with(study, 11, 300);
+  const StudyTally tally = BlockWorker(plan).run({0, 300});
+  ASSERT_GE(tally.estimates, 295U);
+  double inside1 = 0.0, inside2 = 0.0, count = 0.0;
+  for (std::size_t i = 9; i < tally.quantities.size(); ++i) {
+    inside1 += static_cast<double>(tally.quantities[i].inside[0]);
+    inside2 += static_cast<double>(tally.quantities[i].inside[1]);
+    count += static_cast<double>(tally.quantities[i].values);
+  }
+  EXPECT_EQ(tally.quantities.size(), 29U);
+  // Pixels of one calibration hang together, as some five independent ones.
+  EXPECT_NEAR(inside1 / count, 0.6827, 3.0 * std::sqrt(0.6827 * 0.3173 / 1500.0));
+  EXPECT_NEAR(inside2 / count, 0.9545, 3.0 * std::sqrt(0.9545 * 0.0455 / 1500.0));
+}
+
+/// What the chain is worth: with rig and lenses taken as exact σ is far too small, with them it covers.
+TEST(ChainStudy, CountsTheChain) {
+  const auto ratio_of = [](bool is_exact) {
+    const StudyPlan plan = plan_with(ChainStudy{.range_m = 6.0, .photos = 13, .exact = is_exact}, 2, 30);
+    const StudyTally tally = BlockWorker(plan).run({0, 30});
+    EXPECT_GE(tally.estimates, 28U);
+    return figures_of(tally, 2, false).rms_over_bound;
+  };
+  EXPECT_NEAR(ratio_of(false), 1.0, 0.45);  // 30 trials: three standard errors are 0.39
+  EXPECT_GT(ratio_of(true), 1.4);
+}
+
+TEST(TurnedStudy, IsCoveredByItsSigma) {
+  TurnedStudy study;
+  study.on_the_spot = true;
+  const StudyPlan plan = plan_with(study, 2, 20);
+  const StudyTally tally = BlockWorker(plan).run({0, 20});
+  EXPECT_GE(tally.estimates, 18U);
+  EXPECT_EQ(tally.good_beyond_5_sigma, 0U);
+  EXPECT_LT(figures_of(tally, 0, false).median, 0.01);
+  EXPECT_GE(figures_of(tally, 0, false).coverage[2], 0.9);
 }
 
 TEST(StudyPlan, BlocksCoverWhatIsMissingAndNothingElse) {

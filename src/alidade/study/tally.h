@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include "alidade/study/exact_sum.h"
@@ -9,10 +10,12 @@
 
 namespace alidade {
 
-/// Sums of one quantity over trials with an estimate.
+/// Sums of one quantity over trials with an estimate of it.
 struct QuantityTally {
+  std::uint64_t values = 0;
   ExactSum error, error2, sigma2, ratio2;  ///< ratio: the error over the bound.
   std::array<std::uint64_t, 3> inside{};   ///< |error| < 1, 2, 3 σ.
+  std::map<int, std::uint64_t> sizes;      ///< |error| by its size: the n-th of 32 parts of a power of two, 32 k + n.
 
   bool operator==(const QuantityTally&) const = default;
 };
@@ -42,6 +45,7 @@ class StudyTally {
   std::uint64_t trials = 0, estimates = 0;
   /// Estimates that no sum can take: not finite, or beyond 2¹⁵ units off. In no other number but `trials`.
   std::uint64_t beyond = 0;
+  std::uint64_t good_beyond_5_sigma = 0;  ///< Said to be good, and beyond 5σ in some quantity.
   std::array<std::uint64_t, 5> states{};  ///< By State.
   std::vector<QuantityTally> quantities;
   std::vector<WorstTrial> worst;  ///< The worst first; of equals the earlier trial.
@@ -55,6 +59,7 @@ class StudyTally {
 /// What a tally says of a quantity.
 struct QuantityFigures {
   double bias = 0.0, rms = 0.0, rms_sigma = 0.0, rms_over_bound = 0.0;
+  double median = 0.0, p90 = 0.0;    ///< Of |error|: half, and nine tenths, are below. To a hundredth of itself.
   std::array<double, 3> coverage{};  ///< Share of the trials within 1, 2, 3 σ.
 };
 /// NaN where there was no estimate.

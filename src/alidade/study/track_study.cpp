@@ -1,7 +1,9 @@
 #include <cmath>
+#include <utility>
 
 #include "alidade/simulate/track.h"
 #include "alidade/study/studies.h"
+#include "alidade/study/track_trials.h"
 #include "alidade/study/trial_random.h"
 #include "alidade/study/word_field.h"
 
@@ -17,11 +19,10 @@ TrackScene track_scene(const TrackStudy& study) {
   return scene;
 }
 
-/// The simulated heads are exactly what the rig says, and it says so.
-Rig exact_rig(const std::vector<RigHead>& heads) {
-  Rig rig;
-  rig.heads = heads;
-  const auto num = num_head_params * static_cast<Eigen::Index>(heads.size());
+}  // namespace
+
+Rig as_exact(Rig rig) {
+  const auto num = num_head_params * static_cast<Eigen::Index>(rig.heads.size());
   rig.cov.setZero(num, num);
   for (RigHead& head : rig.heads) {
     const Eigen::Index size = params(head.camera.lens).size();
@@ -30,7 +31,19 @@ Rig exact_rig(const std::vector<RigHead>& heads) {
   return rig;
 }
 
-}  // namespace
+void take_end_of_track(const TrackTrial& trial, TrialResult& result) {
+  const TargetTrack report = track(trial.observations, trial.rig, trial.config);
+  result.state = report.verdict.state;
+  if (report.steps.empty() || !report.steps.back().has_belief) return;
+  const TrackStep& last = report.steps.back();
+  const auto truth = trial.truth.at(last.t_s);
+  if (!truth) return;
+  result.has_estimate = true;
+  for (int i = 0; i < 3; ++i) {
+    const double sigma = std::sqrt(last.belief.P(i, i));
+    result.values.push_back({last.belief.x[i] - (*truth)[i], sigma, sigma});
+  }
+}
 
 FieldList fields_of(TrackStudy& study) {
   static const std::vector<std::string> methods{"cv", "singer", "turn", "imm"};
@@ -50,7 +63,8 @@ TrackTrial trial_of(const TrackStudy& study, std::uint64_t seed, std::uint64_t n
   TrackTrial trial;
   for (const SimulatedObservation& s : simulate_track(scene, TrialRandom(seed, TrackStudy::name, number).seed()))
     trial.observations.push_back({s.t_capture_s, s.t_arrival_s, s.head, s.pan_tilt_rad, s.px});
-  trial.rig = exact_rig(scene.heads);
+  trial.rig.heads = scene.heads;
+  trial.rig = as_exact(std::move(trial.rig));  // the simulated heads are exactly what it says
   for (const Field& field : fields_of(trial.config)) {
     if (field.name == "method") (void)set_field(field, study.method);
   }
@@ -66,17 +80,7 @@ TrackTrial trial_of(const TrackStudy& study, std::uint64_t seed, std::uint64_t n
 
 StudySetting setting_of(const TrackStudy& study, std::uint64_t seed) {
   const RunTrial run = [=](std::uint64_t number, TrialResult& result) {
-    const TrackTrial trial = trial_of(study, seed, number);
-    const TargetTrack report = track(trial.observations, trial.rig, trial.config);
-    result.state = report.verdict.state;
-    if (report.steps.empty() || !report.steps.back().has_belief) return;
-    const TrackStep& last = report.steps.back();
-    const Eigen::Vector3d error = last.belief.x.head<3>() - track_scene(study).position(last.t_s);
-    result.has_estimate = true;
-    for (int i = 0; i < 3; ++i) {
-      const double sigma = std::sqrt(last.belief.P(i, i));
-      result.values.push_back({error[i], sigma, sigma});
-    }
+    take_end_of_track(trial_of(study, seed, number), result);
   };
   return {{{"x_m", "m"}, {"y_m", "m"}, {"z_m", "m"}}, false, [run] { return run; }};
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -20,6 +21,9 @@ struct TrialQuantity {
 /// a study without one: σ again).
 struct TrialValue {
   double error = 0.0, sigma = 0.0, bound = 0.0;
+
+  /// σ NaN: this estimate has none of the quantity.
+  [[nodiscard]] bool has_value() const { return !std::isnan(sigma); }
 };
 
 struct TrialResult {

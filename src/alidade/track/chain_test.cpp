@@ -5,7 +5,7 @@
 
 #include "alidade/testing/chain_sample.h"
 
-// Photos of a board → lenses → rig → track, all by what was found before; bench/study_chain.cpp is the long form.
+// Photos of a board → lenses → rig → track, all by what was found before; `alidade study chain` is the long form.
 
 namespace alidade {
 namespace {
@@ -16,7 +16,7 @@ TEST(TrackChain, SigmaHoldsAtItsEnd) {
   std::map<double, double> counted = ranges_m, exact = ranges_m;
   double num = 0.0;
   for (std::uint64_t seed = 1; seed <= chains; ++seed) {
-    const auto chain = testing::draw_chain(seed);
+    const auto chain = draw_chain(seed);
     if (!chain) continue;
     num += 1.0;
     for (const auto& [range_m, none] : ranges_m) {

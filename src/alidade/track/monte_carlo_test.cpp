@@ -146,7 +146,7 @@ TrackScene scene_of_the_model(const Eigen::Vector3d& start, double sigma_a, std:
   scene.duration_s = 4.0;
   scene.aiming_lag_s = 0.03;
   scene.sigma_a_m_s2 = sigma_a;
-  scene.position = testing::drawn_path(start, sigma_a, scene.duration_s, seed);
+  scene.position = drawn_path(start, sigma_a, scene.duration_s, seed);
   return scene;
 }
 

@@ -57,6 +57,11 @@ struct TurnedReport {
 [[nodiscard]] TurnedReport observe_turned(const MatchedPhotos& photos, const TurnedConfig& config,
                                           const Progress& progress = {});
 
+/// observe() of photos whose matches are there: with what is ordinary of photos, which observe() of matches does not
+/// take for granted.
+[[nodiscard]] ObserveReport observe_matched(MatchedPhotos photos, const ObserveConfig& config,
+                                            const Progress& progress = {});
+
 /// What the answer is worth, or why there is none and what to add.
 [[nodiscard]] Verdict turned_verdict(const TurnedReport& report, const MatchedPhotos& photos,
                                      const TurnedConfig& config);

@@ -36,6 +36,8 @@ import {residuals} from './residuals';
 import {rigCoverage, rigEstimate, rigResiduals, rigSpace, rigUnknown, rigView} from './rig';
 import {movingAbove, movingClocks, movingEstimate, movingSpace} from './rig_moving';
 import {servoAngles, servoCompare, servoError, servoFocal, servoLenses, servoLoops, servoPicture, servoRobust} from './servo';
+import {batchSpread} from './batch';
+import {studyCurve} from './study';
 import {batchLot, batchOutliers, batchRows, studyQuantities, studyWorst} from './tables';
 import {trackAbove, trackAge, trackError, trackInnovations, trackPosition, trackSpace} from './track';
 import {trust} from './trust';
@@ -82,8 +84,8 @@ function pageOf(doc: Doc): Page {
     const main = best ? reproduceFigure(best, doc) : null, others = tables.filter((table) => table !== best).map((table) => reproduceFigure(table, doc));
     return {first: [{...reproduceShort, narrow: 24}, {...(main ?? reproduceMethods), span: 14, narrow: 24}], rest: [reproduceTable, ...others, ...(main ? [reproduceMethods] : []), half(estimate)]};
   }
-  if (doc.command.startsWith('study ')) return {first: [studyQuantities, studyWorst], rest: [checks]};
-  if (doc.command === 'batch') return {first: [batchOutliers, batchLot], rest: [batchRows, checks]};
+  if (doc.command.startsWith('study ')) return {first: [studyCurve, studyQuantities], rest: [studyWorst, checks]};
+  if (doc.command === 'batch') return {first: [batchSpread, batchOutliers], rest: [batchLot, batchRows, checks]};
   if (doc.command === 'rig' && (doc.table('cameras') || (doc.estimates.some((one) => one.path === 'cameras[0].id')))) return movingTarget;
   const own = Object.prototype.hasOwnProperty.call(byCommand, doc.command) ? byCommand[doc.command]! : null;
   return own ?? {first: [{...values, isOptional: true}, lensGrid], rest: [assumed, checks, correlationMatrix]};

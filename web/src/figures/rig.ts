@@ -50,7 +50,7 @@ function addAxes(world: World, axes: Table, length: number): void {
 function rigWorld(doc: Doc, views: Table, selection: Selection): World {
   const world = new World(), heads = headsOf(views), axes = doc.table('axes'), cams: {pose: Pose; row: number}[] = [];
   for (let i = 0; i < views.rows; ++i) {
-    const pose = poseOf(views, 'base_from_cam', i);
+    const pose = poseOf(views, 'world_from_cam', i);
     if (pose) cams.push({pose, row: i});
   }
   const bases = [0, 1, 2, 3].map((k) => headPose(doc, k)).filter((pose) => pose !== null);
@@ -78,7 +78,7 @@ export const rigSpace: Figure = {
   draw(host, doc, selection) {
     const views = viewsOf(doc, selection);
     if (!views || (!headPose(doc, 0) && !doc.table('axes'))) return null;
-    const posed = views.tells('base_from_cam_x_m');
+    const posed = views.tells('world_from_cam_x_m');
     legend(host, [...(doc.table('axes') ? [{words: 'pan axis', colour: 'var(--green)'}, {words: 'tilt axis', colour: 'var(--orange)'}] : []),
       ...(posed ? [...headsOf(views).slice(0, 4).map((head, k) => ({words: `views of head ${head}`, colour: `var(--${headColours[k]!})`, look: 'square' as const})), {words: 'the chosen view', colour: 'var(--red)', look: 'square' as const}] : []), {words: '3σ of the other head', colour: 'var(--red)', look: 'ring'}]);
     const label = `${headsOf(views).length} heads in space`;

@@ -33,11 +33,11 @@ export function tableFigure(id: string, tableName: string, title: string, note: 
 }
 
 export const studyQuantities = tableFigure('quantities', 'quantities', 'Is the error at its bound, and does σ cover it?', 'inside 1, 2, 3σ: 0.683, 0.954, 0.997 expected', [
-  {name: 'varied', words: 'varied'}, {name: 'quantity', words: ''}, {name: 'unit', words: 'unit'}, {name: 'bias', words: 'bias', digits: 3}, {name: 'rms', words: 'RMS error'}, {name: 'rms_sigma', words: 'RMS of the stated σ'}, {name: 'rms_over_bound', words: 'over the bound'},
+  {name: 'varied', words: 'varied'}, {name: 'quantity', words: ''}, {name: 'unit', words: 'unit'}, {name: 'bias', words: 'bias', digits: 3}, {name: 'rms', words: 'RMS error'}, {name: 'rms_sigma', words: 'RMS of the stated σ'}, {name: 'rms_over_bound', words: 'over the bound'}, {name: 'median', words: 'median error'}, {name: 'p90', words: '90 % below'},
   {name: 'inside_1_sigma', words: 'inside 1σ'}, {name: 'inside_2_sigma', words: '2σ'}, {name: 'inside_3_sigma', words: '3σ'}]);
 export const studyWorst = tableFigure('worst', 'worst', 'Which trials are furthest off?', '--trial N runs one again', [
   {name: 'varied', words: 'varied'}, {name: 'trial', words: 'trial', digits: 12}, {name: 'quantity', words: ''}, {name: 'error', words: 'error'}, {name: 'sigma', words: 'stated σ'}]);
-export const batchOutliers = tableFigure('outliers', 'outliers', 'What stands out of the lot?', 'beyond 4 of the lot’s scatter and its own σ', [
+export const batchOutliers = tableFigure('outliers', 'outliers', 'Which values are these?', 'beyond 4 of the lot’s scatter and its own σ', [
   {name: 'camera', words: 'camera'}, {name: 'quantity', words: ''}, {name: 'value', words: 'value', digits: 6}, {name: 'sigma', words: 'σ', digits: 3}, {name: 'median_of_lot', words: 'median of the lot', digits: 6}, {name: 'z', words: 'z', digits: 3}]);
 export const batchLot = tableFigure('lot', 'lot', 'How alike are they?', 'scatter: 1.4826 × the median distance from the median', [
   {name: 'quantity', words: ''}, {name: 'rows', words: 'rows'}, {name: 'median', words: 'median', digits: 6}, {name: 'scatter', words: 'scatter of the lot', digits: 3}, {name: 'sigma', words: 'median of the stated σ', digits: 3}]);

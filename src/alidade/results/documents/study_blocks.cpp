@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr const char* block_schema = "alidade-study-block/1";
+constexpr const char* block_schema = "alidade-study-block/2";
 
 ordered_json header_json(const StudyHeader& header) {
   ordered_json json;
@@ -51,14 +51,17 @@ ordered_json tally_json(const StudyTally& tally) {
   json["trials"] = tally.trials;
   json["estimates"] = tally.estimates;
   json["beyond"] = tally.beyond;
+  json["good_beyond_5_sigma"] = tally.good_beyond_5_sigma;
   json["states"] = tally.states;
   json["quantities"] = ordered_json::array();
   for (const QuantityTally& sums : tally.quantities)
-    json["quantities"].push_back({{"error", sums.error.text()},
+    json["quantities"].push_back({{"values", sums.values},
+                                  {"error", sums.error.text()},
                                   {"error2", sums.error2.text()},
                                   {"sigma2", sums.sigma2.text()},
                                   {"ratio2", sums.ratio2.text()},
-                                  {"inside", sums.inside}});
+                                  {"inside", sums.inside},
+                                  {"sizes", std::vector(sums.sizes.begin(), sums.sizes.end())}});
   json["worst"] = ordered_json::array();
   for (const WorstTrial& worst : tally.worst)
     json["worst"].push_back({worst.trial, worst.quantity, worst.error, worst.sigma});
@@ -71,15 +74,23 @@ ExactSum sum_of(const ordered_json& json) {
   return *sum;
 }
 
+std::map<int, std::uint64_t> sizes_of(const ordered_json& json) {
+  std::map<int, std::uint64_t> sizes;
+  for (const auto& each : json) sizes[each.at(0).get<int>()] = each.at(1).get<std::uint64_t>();
+  return sizes;
+}
+
 StudyTally tally_of(const ordered_json& json) {
   StudyTally tally;
   tally.trials = json.at("trials").get<std::uint64_t>();
   tally.estimates = json.at("estimates").get<std::uint64_t>();
   tally.beyond = json.at("beyond").get<std::uint64_t>();
+  tally.good_beyond_5_sigma = json.at("good_beyond_5_sigma").get<std::uint64_t>();
   tally.states = json.at("states").get<std::array<std::uint64_t, 5>>();
   for (const auto& each : json.at("quantities"))
-    tally.quantities.push_back({sum_of(each.at("error")), sum_of(each.at("error2")), sum_of(each.at("sigma2")),
-                                sum_of(each.at("ratio2")), each.at("inside").get<std::array<std::uint64_t, 3>>()});
+    tally.quantities.push_back({each.at("values").get<std::uint64_t>(), sum_of(each.at("error")),
+                                sum_of(each.at("error2")), sum_of(each.at("sigma2")), sum_of(each.at("ratio2")),
+                                each.at("inside").get<std::array<std::uint64_t, 3>>(), sizes_of(each.at("sizes"))});
   for (const auto& each : json.at("worst"))
     tally.worst.push_back(
         {each.at(0).get<std::uint64_t>(), each.at(1).get<int>(), each.at(2).get<double>(), each.at(3).get<double>()});

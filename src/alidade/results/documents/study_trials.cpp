@@ -10,8 +10,10 @@
 #include "alidade/tables/corner_file.h"
 #include "alidade/tables/events_file.h"
 #include "alidade/tables/localize_file.h"
+#include "alidade/tables/pairs_file.h"
 #include "alidade/tables/rotation_log_file.h"
 #include "alidade/tables/shots_file.h"
+#include "alidade/turned/turned.h"
 
 namespace alidade {
 
@@ -26,6 +28,7 @@ JobOutcome trial_outcome(const CalibrateStudy& study, std::uint64_t seed, std::u
   const CalibrateTrial trial = trial_of(study, seed, number);
   CalibrateConfig config;
   config.model = study.model;
+  config.board_shape = study.board_shape;
   JobOutcome outcome = outcome_of(calibrate(trial.views, trial.size, trial.board, config));
   outcome.files.push_back({"truth_camera.yaml", camera_text(trial.truth, CameraFormat::alidade)});
   return outcome;
@@ -49,12 +52,35 @@ JobOutcome trial_outcome(const RangefinderStudy& study, std::uint64_t seed, std:
   return outcome;
 }
 
-JobOutcome trial_outcome(const TrackStudy& study, std::uint64_t seed, std::uint64_t number) {
-  const TrackTrial trial = trial_of(study, seed, number);
+namespace {
+
+JobOutcome track_outcome(const TrackTrial& trial) {
   JobOutcome outcome = outcome_of(track(trial.observations, trial.rig, trial.config, trial.truth));
   outcome.files.push_back({"events.csv", events_csv(trial.observations, trial.rig.heads)});
   outcome.files.push_back({"truth.csv", true_track_csv(trial.truth)});
   outcome.files.push_back({"rig.yaml", rig_text(trial.rig)});
+  return outcome;
+}
+
+}  // namespace
+
+JobOutcome trial_outcome(const TrackStudy& study, std::uint64_t seed, std::uint64_t number) {
+  return track_outcome(trial_of(study, seed, number));
+}
+
+JobOutcome trial_outcome(const ChainStudy& study, std::uint64_t seed, std::uint64_t number) {
+  if (const auto trial = trial_of(study, seed, number)) return track_outcome(*trial);
+  JobOutcome outcome;
+  outcome.document.verdict = {
+      State::refused, ExitCode::cannot_tell, "lenses or rig of this chain have no answer", "look at another trial", {}};
+  return outcome;
+}
+
+JobOutcome trial_outcome(const TurnedStudy& study, std::uint64_t seed, std::uint64_t number) {
+  TurnedTrial trial = trial_of(study, seed, number);
+  std::string pairs = pairs_csv(trial.photos);
+  JobOutcome outcome = outcome_of(observe_matched(std::move(trial.photos), trial.config));
+  outcome.files.push_back({"pairs.csv", std::move(pairs)});
   return outcome;
 }
 

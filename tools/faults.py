@@ -124,6 +124,8 @@ def fail_calls(trial, shim, generator, most):
         trial.begin(False)
         trial.run(**faults)
         count = int(log.read_text().split()[0])
+        if kind == "sync" and count < len(trial.new_content):  # a power cut would lose what the system has not written yet
+            trial.problems.append(f"{trial.name}: {count} calls of fsync for {len(trial.new_content)} files")
         for nth in chosen_calls(count, most, generator):
             with_old = nth % 2 == 0
             trial.begin(with_old)

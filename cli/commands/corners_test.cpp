@@ -165,6 +165,15 @@ TEST_F(Corners, PhotosTurnedByExifAreNamedAndUsedAsStored) {
   EXPECT_EQ(result()["estimate"]["camera"], result("plain")["estimate"]["camera"]);
 }
 
+TEST_F(Corners, PhotosThatAllWereTakenOnTheirSideAreSaid) {
+  for (std::size_t i = 0; i < photos_with_corners; ++i)
+    write_file(photos() / ("p" + std::to_string(i) + ".jpg"), turned_jpeg(i, 6));
+  const Outcome outcome = run("calibrate", {photos().string()});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("turned by EXIF: every photo was taken on its side; pixels are used as stored"));
+  EXPECT_EQ(result()["estimate"]["camera"]["width"], 640);
+}
+
 TEST_F(Corners, WhatLiesBesideThePhotosIsNamed) {
   add_photos(photos_with_corners);
   write_file(photos() / "IMG_1.HEIC", "x");

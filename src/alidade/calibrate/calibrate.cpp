@@ -10,23 +10,12 @@
 #include "alidade/calibrate/solve/bundle.h"
 #include "alidade/calibrate/solve/initial_lens.h"
 #include "alidade/calibrate/solve/port.h"
+#include "alidade/calibrate/solve/robust_solve.h"
 #include "alidade/calibrate/solve/start.h"
 #include "alidade/calibrate/solve/weights.h"
 
 namespace alidade {
 namespace {
-
-using Residuals = std::vector<std::vector<Eigen::Vector2d>>;
-
-/// The views that take part, and what is known of them so far.
-struct Work {
-  std::vector<std::size_t> number;  ///< Position of each in the caller's views.
-  std::vector<BoardView> views;
-  std::vector<std::vector<bool>> far;  ///< Corners that take no part in the start.
-  std::vector<ViewArrays> arrays;
-  BundleProblem problem;
-  bool use_covariances = false;
-};
 
 /// Every view that would have been used says why it was not.
 void refuse(CalibrateReport& report, std::string reason, std::string to_add) {
@@ -39,7 +28,7 @@ void refuse(CalibrateReport& report, std::string reason, std::string to_add) {
 }
 
 /// Takes in every view with enough corners, once; the others are named.
-void take_usable_views(std::span<const BoardView> views, CalibrateReport& report, Work& work) {
+void take_usable_views(std::span<const BoardView> views, CalibrateReport& report, CalibrationWork& work) {
   constexpr std::size_t min_corners = 6;  // a pose takes 3; the rest must say something of the lens
   const auto repeats = repeated_views(views);
   for (std::size_t k = 0; k < views.size(); ++k) {
@@ -58,18 +47,8 @@ void take_usable_views(std::span<const BoardView> views, CalibrateReport& report
   }
 }
 
-void drop_view(std::size_t at, const std::string& reason, CalibrateReport& report, Work& work, BundleState& state) {
-  report.views[work.number[at]].reason = reason;
-  const auto offset = static_cast<std::ptrdiff_t>(at);
-  work.number.erase(work.number.begin() + offset);
-  work.views.erase(work.views.begin() + offset);
-  work.far.erase(work.far.begin() + offset);
-  if (at < work.arrays.size()) work.arrays.erase(work.arrays.begin() + offset);
-  if (at < state.cam_from_board.size()) state.cam_from_board.erase(state.cam_from_board.begin() + offset);
-}
-
 /// The lens from a few views, evenly chosen: enough to refine the whole set from. Poses of the others stay open.
-std::optional<InitialLens> first_lens(const Work& work, const std::vector<Eigen::Vector3d>& board_points,
+std::optional<InitialLens> first_lens(const CalibrationWork& work, const std::vector<Eigen::Vector3d>& board_points,
                                       ImageSize size, const Lens& held) {
   constexpr std::size_t enough = 24;
   const std::size_t count = std::min(enough, work.views.size());
@@ -86,7 +65,7 @@ std::optional<InitialLens> first_lens(const Work& work, const std::vector<Eigen:
 }
 
 /// Poses of all views by the lens, those that are not `known`; a view without one is dropped and named.
-void find_poses(const std::vector<std::optional<Rigid3>>& known, CalibrateReport& report, Work& work,
+void find_poses(const std::vector<std::optional<Rigid3>>& known, CalibrateReport& report, CalibrationWork& work,
                 BundleState& state) {
   Camera camera;
   camera.lens = state.lens;
@@ -104,100 +83,9 @@ void find_poses(const std::vector<std::optional<Rigid3>>& known, CalibrateReport
   }
 }
 
-Residuals all_residuals(const Work& work, const BundleState& state) {
-  Residuals residuals;
-  residuals.reserve(work.arrays.size());
-  for (std::size_t k = 0; k < work.arrays.size(); ++k) residuals.push_back(residuals_px(state, k, work.arrays[k]));
-  return residuals;
-}
-
-int num_parameters(const Work& work) {
-  const int shape_gauge = work.problem.shape == BoardShape::free ? 7 : 0;
-  return num_unknown_globals(work.problem) - shape_gauge + 6 * static_cast<int>(work.views.size());
-}
-
-void whiten(Work& work, const Residuals& residuals, const NoiseEstimate& noise, double huber_sigmas) {
-  for (std::size_t k = 0; k < work.views.size(); ++k) {
-    set_whiteners(work.views[k], residuals[k], noise, noise.used[k], work.use_covariances, huber_sigmas,
-                  work.arrays[k]);
-  }
-}
-
-/// Every corner with the same weight, but none for the far ones where outliers are to be rejected.
-void make_all_arrays(const CalibrateConfig& config, Work& work) {
-  work.arrays.clear();
-  for (std::size_t k = 0; k < work.views.size(); ++k) {
-    work.arrays.push_back(make_arrays(work.views[k]));
-    for (std::size_t i = 0; rejects_outliers(config, work.use_covariances) && i < work.far[k].size(); ++i) {
-      if (work.far[k][i]) set_whitener(work.arrays[k], i, Eigen::Matrix2d::Identity(), 0.0);
-    }
-  }
-}
-
-/// Views of which two corners in five fit nothing do not belong to this board and camera.
-bool drop_misfits(const NoiseEstimate& noise, CalibrateReport& report, Work& work, BundleState& state) {
-  bool dropped = false;
-  for (std::size_t k = work.views.size(); k-- > 0;) {
-    const auto bad = std::count(noise.used[k].begin(), noise.used[k].end(), false);
-    const auto all = static_cast<std::ptrdiff_t>(noise.used[k].size());
-    if (5 * bad <= 2 * all) continue;
-    drop_view(k, std::to_string(bad) + " of " + std::to_string(all) + " corners do not fit the other photos", report,
-              work, state);
-    dropped = true;
-  }
-  return dropped;
-}
-
-/// How near the optimum: a tenth of a σ does where the corners' weights are still to change.
-enum class Nearness { rough, full };
-
-BundleResult solve(Work& work, BundleState start, const CalibrateConfig& config, Nearness nearness) {
-  work.problem.views = work.arrays;
-  const double tolerance = nearness == Nearness::rough ? 0.1 : BundleConfig{}.tolerance_sigmas;
-  return solve_past_fold(work.problem, std::move(start), {config.max_iterations, tolerance, 0.0});
-}
-
-/// Alternates solve and noise estimate until no corner changes sides. The first solve weighs all corners alike.
-BundleResult solve_robustly(const CalibrateConfig& config, CalibrateReport& report, Work& work, BundleState state,
-                            NoiseEstimate& noise) {
-  const bool weights_matter =
-      work.use_covariances || work.problem.prior_information.any() || work.problem.shape == BoardShape::free;
-  constexpr int max_rounds = 8;
-  constexpr double huber_sigmas = 2.5;
-  BundleResult result = solve(work, std::move(state), config, weights_matter ? Nearness::rough : Nearness::full);
-  report.iterations = result.iterations;
-  std::vector<std::vector<bool>> used_before;
-  double excess_before = -1.0;
-  for (int round = 0; round < max_rounds; ++round) {
-    const Residuals residuals = all_residuals(work, result.state);
-    noise = estimate_noise(work.views, residuals, work.use_covariances, rejects_outliers(config, work.use_covariances),
-                           config.outlier_sigmas, num_parameters(work));
-    const bool clean = noise.num_dropped == 0;
-    if (round == 0 && clean && !weights_matter) return result;
-    const bool settled = noise.used == used_before && std::abs(noise.excess_px - excess_before) <= 0.01 * excess_before;
-    if (settled) break;
-    // Outliers pull the first solves: let them weigh less before saying which they are.
-    const bool soft = !clean && round < 3;
-    if (!soft && drop_misfits(noise, report, work, result.state)) {
-      used_before.clear();
-      if (work.views.size() < 2) break;
-      make_all_arrays(config, work);
-      result = solve(work, std::move(result.state), config, Nearness::full);
-      report.iterations += result.iterations;
-      continue;
-    }
-    used_before = soft ? std::vector<std::vector<bool>>{} : noise.used;
-    excess_before = noise.excess_px;
-    whiten(work, residuals, noise, soft ? huber_sigmas : 0.0);
-    result = solve(work, std::move(result.state), config, soft ? Nearness::rough : Nearness::full);
-    report.iterations += result.iterations;
-  }
-  return result;
-}
-
 /// RMS, noise and the corners' fates, from the final residuals.
-void fill_views(const Work& work, const BundleResult& result, const NoiseEstimate& noise, double variance_scale,
-                CalibrateReport& report) {
+void fill_views(const CalibrationWork& work, const BundleResult& result, const NoiseEstimate& noise,
+                double variance_scale, CalibrateReport& report) {
   double total = 0.0;
   for (std::size_t k = 0; k < work.views.size(); ++k) {
     ViewFit& fit = report.views[work.number[k]];
@@ -227,12 +115,10 @@ void fill_views(const Work& work, const BundleResult& result, const NoiseEstimat
 /// Lens, poses and board shape with their covariances. The model's is in units of what the residuals say; what is
 /// stated counts that the corners of a photo share errors: photos are its clusters. Returns s² of the whitened
 /// residuals.
-double fill_estimate(const Work& work, BundleResult& result, const NoiseEstimate& noise, ImageSize size,
+double fill_estimate(const CalibrationWork& work, Minima& minima, const NoiseEstimate& noise, ImageSize size,
                      CalibrateReport& report) {
-  double corners = 0.0;
-  for (const auto& view : noise.used) corners += static_cast<double>(std::count(view.begin(), view.end(), true));
-  const double dof = std::max(1.0, 2.0 * corners - num_parameters(work));
-  const double variance_scale = result.cost / dof;
+  BundleResult& result = minima.least;
+  const double variance_scale = variance_of(work, result, noise);
   report.camera.width_px = size.width_px;
   report.camera.height_px = size.height_px;
   report.camera.lens = result.state.lens;
@@ -240,7 +126,9 @@ double fill_estimate(const Work& work, BundleResult& result, const NoiseEstimate
   const auto num_params = params(result.state.lens).size();
   report.camera.cov = report.model_cov = Eigen::MatrixXd::Zero(num_params, num_params);
   if (result.cov.size() == 0) return variance_scale;
-  LensCovariance lens = lens_covariance(work.problem, variance_scale, result);
+  LensCovariance lens = lens_covariance(work.problem, variance_scale, minima.others, result);
+  for (std::size_t k = 0; k < minima.others.size(); ++k)
+    report.other_lenses.push_back({minima.others[k].state.lens, lens.weights[k]});
   report.model_cov = std::move(lens.model);
   report.camera.cov = std::move(lens.stated);
   report.clusters = std::move(lens.clusters);
@@ -249,7 +137,7 @@ double fill_estimate(const Work& work, BundleResult& result, const NoiseEstimate
 }
 
 /// Refuses the first parameter with a σ that makes it no answer.
-bool refuse_untold(const Work& work, CalibrateReport& report) {
+bool refuse_untold(const CalibrationWork& work, CalibrateReport& report) {
   const Eigen::VectorXd values = params(report.camera.lens);
   const auto names = param_names(report.camera.lens);
   for (const int at : work.problem.free_lens) {
@@ -272,7 +160,7 @@ bool refuse_untold(const Work& work, CalibrateReport& report) {
 }
 
 /// For a solve that does not settle.
-std::string what_may_be_wrong(const Work& work) {
+std::string what_may_be_wrong(const CalibrationWork& work) {
   for (std::size_t k = 0; k < work.views.size(); ++k) {
     const auto first = std::find(work.far[k].begin(), work.far[k].end(), true);
     if (first == work.far[k].end()) continue;
@@ -284,7 +172,7 @@ std::string what_may_be_wrong(const Work& work) {
 }
 
 /// Refuses where the answer is no answer: singular, or a parameter with a huge σ.
-void judge(const Work& work, const BundleResult& result, bool settled, CalibrateReport& report) {
+void judge(const CalibrationWork& work, const BundleResult& result, bool settled, CalibrateReport& report) {
   if (result.status == BundleResult::Status::singular) {
     refuse(report, "these photos leave free: " + name_combination(work.problem, report.camera.lens, result.weakest),
            "add photos with the board tilted 20–45° in several directions, or hold a parameter with --fix");
@@ -307,22 +195,6 @@ void judge(const Work& work, const BundleResult& result, bool settled, Calibrate
   }
 }
 
-/// The result with its covariance. What photos hardly tell makes the solve creep: then, too, there is one to say which
-/// parameter it is. Not where the corners do not fit: that is another fault.
-BundleResult finished(BundleResult result, bool settled, const Work& work) {
-  double sum = 0.0, count = 0.0;
-  for (std::size_t k = 0; k < work.arrays.size() && !settled; ++k) {
-    for (const Eigen::Vector2d& r : residuals_px(result.state, k, work.arrays[k])) {
-      sum += r.squaredNorm();
-      count += 1.0;
-    }
-  }
-  constexpr double fits_px = 2.0;
-  const bool creeps = !settled && (!is_central(result.state.lens) || sum < fits_px * fits_px * count);
-  if (creeps && result.equations) result.status = BundleResult::Status::converged;
-  return with_covariance(std::move(result), true);
-}
-
 }  // namespace
 
 bool rejects_outliers(const CalibrateConfig& config, bool have_covariances) {
@@ -342,7 +214,7 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
                             : points_in_board(board);
   report.camera.width_px = size.width_px;
   report.camera.height_px = size.height_px;
-  Work work;
+  CalibrationWork work;
   take_usable_views(views, report, work);
   const std::size_t least = min_views(config);
   const bool repeated = std::any_of(report.views.begin(), report.views.end(),
@@ -380,17 +252,16 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
   }
   make_all_arrays(config, work);
   NoiseEstimate noise;
-  BundleResult solved = solve_robustly(config, report, work, std::move(state), noise);
-  const bool settled = solved.status == BundleResult::Status::converged;
-  BundleResult result = finished(std::move(solved), settled, work);
-  const double variance_scale = fill_estimate(work, result, noise, size, report);
+  Minima minima = solve_robustly(config, size, std::move(state), report, work, noise);
+  const BundleResult& result = minima.least;
+  const double variance_scale = fill_estimate(work, minima, noise, size, report);
   fill_views(work, result, noise, variance_scale, report);
   report.camera.rms_px = report.rms_px;
   if (work.views.size() < least) {
     too_few();
     return report;
   }
-  judge(work, result, settled, report);
+  judge(work, result, minima.settled, report);
   return report;
 }
 

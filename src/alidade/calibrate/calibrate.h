@@ -30,6 +30,12 @@ struct ViewFit {
   std::vector<CornerResidual> corners;                                         ///< As many as the view has.
 };
 
+/// Another lens to which a solve of the same views may settle.
+struct OtherLens {
+  Lens lens;
+  double weight = 0.0;  ///< How likely it is, by how well it fits; that of all and the one that is stated is 1.
+};
+
 /// What calibrate() found. Poses, residuals and covariance belong to `camera` and `board_points`.
 struct CalibrateReport {
   enum class Status { converged, no_convergence, degenerate };
@@ -39,8 +45,9 @@ struct CalibrateReport {
   /// Lens, size, rms_px, and the covariance over all lens parameters: cluster-robust, as a photo's corners share
   /// errors.
   Camera camera;
-  Eigen::MatrixXd model_cov;   ///< The same as if every corner erred by itself.
-  ClusterCovariance clusters;  ///< Why the two differ; its clusters are the views in use, in order.
+  Eigen::MatrixXd model_cov;            ///< The same as if every corner erred by itself.
+  ClusterCovariance clusters;           ///< Why the two differ; its clusters are the views in use, in order.
+  std::vector<OtherLens> other_lenses;  ///< Where the views tell the centre vaguely; `camera.cov` reaches to them.
   std::vector<ViewFit> views;
   std::vector<Eigen::Vector3d> board_points;  ///< [m] as solved (flat: as printed).
   std::vector<double> board_sigma_z_m;        ///< σ of their z [m]; empty for a flat or given board.

@@ -61,25 +61,26 @@ Principal principal_of(const MatrixXd& share, const MatrixXd* taken, const Vecto
   return principal;
 }
 
-/// `whiten` is L⁻¹ with L Lᵀ = H⁻¹.
-Member member_of(const ClusterStep& cluster, const MatrixXd& whiten, double noise_variance) {
-  Member member;
-  member.share = product(product(whiten, cluster.spread), whiten.transpose());
-  const VectorXd step = whiten * cluster.step / std::sqrt(noise_variance);
-  const bool has_taken = cluster.taken.size() > 0;
-  MatrixXd taken, leverage;
-  if (has_taken) {
-    taken = product(product(whiten, cluster.taken), whiten.transpose());
-    leverage = member.share.ldlt().solve(taken).transpose();
+/// `cluster` is whitened; `equal_share` is that of one that brings none.
+Member member_of(ClusterStep&& cluster, double noise_variance, double equal_share) {
+  Member member{.share = std::move(cluster.spread)};
+  const VectorXd step = cluster.step / std::sqrt(noise_variance);
+  if (member.share.size() == 0) {
+    member.share = equal_share * MatrixXd::Identity(step.size(), step.size());
+    member.x = step / std::sqrt(1.0 - equal_share);
+    return member;
   }
+  const bool has_taken = cluster.taken.size() > 0;
+  MatrixXd leverage;
+  if (has_taken) leverage = member.share.ldlt().solve(cluster.taken).transpose();
   const MatrixXd& m = has_taken ? leverage : member.share;
-  constexpr double small = 0.2;  // a bound of the leverage: the series below is right to 5e-4
-  if (m.trace() < small) {
+  constexpr double small = 0.2;  // of a norm, a bound of the leverage: the series below is right to 5e-4
+  if (m.squaredNorm() < small * small) {
     const VectorXd once = m * step, twice = m * once;
     member.x = step + 0.5 * once + 0.375 * twice + 0.3125 * (m * twice);
     return member;
   }
-  member.principal = principal_of(member.share, has_taken ? &taken : nullptr, step);
+  member.principal = principal_of(member.share, has_taken ? &cluster.taken : nullptr, step);
   member.x = member.principal->along * member.principal->y;
   return member;
 }
@@ -128,23 +129,51 @@ struct Scatter {
   }
 };
 
+/// The members' shares side by side, n × nN: products with all of them at once.
+MatrixXd shares_of(const std::vector<Member>& members, Eigen::Index n) {
+  MatrixXd shares(n, n * static_cast<Eigen::Index>(members.size()));
+  Eigen::Index at = 0;
+  for (const Member& member : members) {
+    shares.middleCols(at, n) = member.share;
+    at += n;
+  }
+  return shares;
+}
+
 /// Degrees of freedom (Satterthwaite) of Σ (uᵀx)² along each unit direction u, a row: x of two clusters hang together
 /// by −hᵢhₖ, as what one pulls the others pull back (Bell & McCaffrey; Imbens & Kolesár).
-VectorXd directional_dof(const std::vector<Member>& members, const MatrixXd& directions) {
-  const Eigen::Index n = directions.rows(), num = static_cast<Eigen::Index>(members.size());
-  MatrixXd pulls(n * n, num);  // a column a member: hᵢu of every direction, one after the other
-  for (Eigen::Index i = 0; i < num; ++i)
-    pulls.col(i) = product(members[static_cast<std::size_t>(i)].share, directions.transpose()).reshaped();
+VectorXd directional_dof(const MatrixXd& shares, const MatrixXd& directions) {
+  const Eigen::Index n = directions.rows(), num = shares.cols() / n;
+  const MatrixXd pulls = shares.transpose() * directions.transpose();  // column j: hᵢu, one after the other
   VectorXd dof(n);
   for (Eigen::Index j = 0; j < n; ++j) {
-    const MatrixXd of_direction = pulls.middleRows(j * n, n);
-    const Eigen::ArrayXd shares = (directions.row(j) * of_direction).transpose().array();
+    const Eigen::Map<const MatrixXd> of_direction(pulls.col(j).data(), n, num);
+    const Eigen::ArrayXd each = (directions.row(j) * of_direction).transpose().array();
     const Eigen::ArrayXd own = of_direction.colwise().squaredNorm().transpose().array();
-    const double together = (of_direction * of_direction.transpose()).squaredNorm() - own.square().sum();
-    const double squares = shares.square().sum() + together, sum = shares.sum();
+    double squares = each.square().sum();
+    constexpr double little = 0.02;                // of the degrees of freedom; σ follows by a hundredth of that
+    if (own.sum() * own.sum() > little * squares)  // a bound of what follows
+      squares += (of_direction * of_direction.transpose()).squaredNorm() - own.square().sum();
+    const double sum = each.sum();
     dof[j] = squares > 0.0 ? sum * sum / squares : std::numeric_limits<double>::infinity();  // a prior tells it
   }
   return dof;
+}
+
+/// Degrees of freedom of Σ xᵀx, likewise; `total` is what the model expects of it.
+double mean_dof(const std::vector<Member>& members, const MatrixXd& shares, double total) {
+  double squares = 0.0;
+  bool any_large = false;
+  for (const Member& member : members) {
+    squares += member.share.squaredNorm();
+    any_large = any_large || member.principal.has_value();
+  }
+  // Where every share is small, pulls against each other are a share of a share.
+  if (any_large) {
+    squares += (shares * shares.transpose()).squaredNorm();
+    for (const Member& member : members) squares -= product(member.share, member.share).squaredNorm();
+  }
+  return total * total / std::max(squares, 1e-300);
 }
 
 /// How far the excess over the model is believed, and how far in each direction by itself. The logarithm of c scatters
@@ -169,24 +198,24 @@ void weigh(Scatter& scatter) {
 }
 
 /// `directions`: one unit row a parameter.
-Scatter scatter_of(const std::vector<Member>& members, const MatrixXd& directions) {
+Scatter scatter_of(const std::vector<Member>& members, const MatrixXd& directions, bool equal_shares) {
   const Eigen::Index n = directions.cols();
   Scatter scatter{MatrixXd::Zero(n, n), MatrixXd::Zero(n, n), MatrixXd::Zero(n, n)};
-  MatrixXd shares2 = MatrixXd::Zero(n, n);
-  double squares = 0.0;
   for (const Member& member : members) {
     scatter.seen += member.x * member.x.transpose();
     if (member.contradiction.size() > 0) scatter.certain += member.contradiction * member.contradiction.transpose();
     scatter.expected += member.share;
-    const MatrixXd share2 = product(member.share, member.share);
-    shares2 += share2;
-    squares += member.share.squaredNorm() - share2.squaredNorm();
   }
-  squares += shares2.squaredNorm();
   const double total = std::max(scatter.expected.trace(), 1e-12);
   scatter.mean = scatter.seen.trace() / total;
-  scatter.mean_dof = scatter.shared_dof = total * total / std::max(squares, 1e-300);
-  scatter.dof = directional_dof(members, directions);
+  if (equal_shares) {
+    scatter.dof = VectorXd::Constant(n, static_cast<double>(members.size()) - 1.0);
+    scatter.mean_dof = scatter.shared_dof = scatter.dof.sum();
+  } else {
+    const MatrixXd shares = shares_of(members, n);
+    scatter.mean_dof = scatter.shared_dof = mean_dof(members, shares, total);
+    scatter.dof = directional_dof(shares, directions);
+  }
   weigh(scatter);
   return scatter;
 }
@@ -202,18 +231,15 @@ double stated_dof(const Scatter& scatter, double own_dof, const VectorXd& direct
   return 2.0 * value * value / (spread * spread);
 }
 
-/// What the clusters say where no parameter is held.
-void state_free(const MatrixXd& inverse, double noise_variance, std::span<const ClusterStep> clusters,
-                ClusterCovariance& result) {
-  const Eigen::Index n = inverse.rows();
-  const Eigen::LLT<MatrixXd> llt(inverse);
-  if (n == 0 || llt.info() != Eigen::Success || !(noise_variance > 0.0)) return;
-  const MatrixXd L = llt.matrixL();
-  const MatrixXd whiten = llt.matrixL().solve(MatrixXd::Identity(n, n));
+/// What the clusters say where no parameter is held, H⁻¹ = L Lᵀ. `clusters` are whitened.
+void state_whitened(const MatrixXd& L, double noise_variance, std::vector<ClusterStep>&& clusters,
+                    ClusterCovariance& result) {
+  const Eigen::Index n = L.rows();
+  const bool equal_shares = clusters.front().spread.size() == 0;
   std::vector<Member> members;
   members.reserve(clusters.size());
-  for (const ClusterStep& cluster : clusters) {
-    members.push_back(member_of(cluster, whiten, noise_variance));
+  for (ClusterStep& cluster : clusters) {
+    members.push_back(member_of(std::move(cluster), noise_variance, 1.0 / static_cast<double>(clusters.size())));
     if (!members.back().x.allFinite()) return;
   }
   find_contradictions(members, n);
@@ -221,7 +247,7 @@ void state_free(const MatrixXd& inverse, double noise_variance, std::span<const 
     result.z2.push_back(member.x.squaredNorm() / std::max(member.share.trace(), 1e-12));
   }
   const MatrixXd directions = L.rowwise().normalized();
-  const Scatter scatter = scatter_of(members, directions);
+  const Scatter scatter = scatter_of(members, directions, equal_shares);
   result.design_effect = scatter.mean;
   result.shrinkage = scatter.shrinkage;
   const SymmetricSolver excess(scatter.excess());
@@ -235,8 +261,34 @@ void state_free(const MatrixXd& inverse, double noise_variance, std::span<const 
     result.degrees_of_freedom[j] = dof;
   }
   const MatrixXd widened = widen.asDiagonal() * L;
-  result.cov = noise_variance * (inverse + widened * raised * widened.transpose());
-  result.inflation = (result.cov.diagonal().array() / (noise_variance * inverse.diagonal().array())).sqrt();
+  result.cov += noise_variance * widened * raised * widened.transpose();
+  result.inflation = (result.cov.diagonal().array() / (noise_variance * L.rowwise().squaredNorm().array())).sqrt();
+}
+
+/// The same from clusters as they come.
+void state_free(const MatrixXd& inverse, double noise_variance, std::span<const ClusterStep> clusters,
+                ClusterCovariance& result) {
+  const Eigen::Index n = inverse.rows();
+  const Eigen::LLT<MatrixXd> llt(inverse);
+  if (n == 0 || llt.info() != Eigen::Success || !(noise_variance > 0.0)) return;
+  const MatrixXd whiten = llt.matrixL().solve(MatrixXd::Identity(n, n));
+  std::vector<ClusterStep> whitened;
+  whitened.reserve(clusters.size());
+  for (const ClusterStep& cluster : clusters) {
+    whitened.push_back({whiten * cluster.step, product(product(whiten, cluster.spread), whiten.transpose()), {}});
+    if (cluster.taken.size() > 0) whitened.back().taken = product(product(whiten, cluster.taken), whiten.transpose());
+  }
+  state_whitened(llt.matrixL(), noise_variance, std::move(whitened), result);
+}
+
+/// The model's covariance, which stands where clusters say nothing.
+ClusterCovariance of_model(MatrixXd cov) {
+  const Eigen::Index n = cov.rows();
+  ClusterCovariance result;
+  result.cov = std::move(cov);
+  result.inflation = VectorXd::Ones(n);
+  result.degrees_of_freedom = VectorXd::Constant(n, std::numeric_limits<double>::infinity());
+  return result;
 }
 
 MatrixXd picked(const MatrixXd& full, const std::vector<Eigen::Index>& at) { return full(at, at); }
@@ -250,10 +302,7 @@ ClusterStep cluster_step(const MatrixXd& inverse, const MatrixXd& information, c
 ClusterCovariance cluster_covariance(const MatrixXd& inverse, double noise_variance,
                                      std::span<const ClusterStep> clusters) {
   const Eigen::Index n = inverse.rows();
-  ClusterCovariance result;
-  result.cov = noise_variance * inverse;
-  result.inflation = VectorXd::Ones(n);
-  result.degrees_of_freedom = VectorXd::Constant(n, std::numeric_limits<double>::infinity());
+  ClusterCovariance result = of_model(noise_variance * inverse);
   if (clusters.size() < ClusterCovariance::min_clusters) return result;
   std::vector<Eigen::Index> free;
   for (Eigen::Index j = 0; j < n; ++j) {
@@ -269,10 +318,7 @@ ClusterCovariance cluster_covariance(const MatrixXd& inverse, double noise_varia
     steps.push_back({cluster.step(free), picked(cluster.spread, free), {}});
     if (cluster.taken.size() > 0) steps.back().taken = picked(cluster.taken, free);
   }
-  const auto num_free = static_cast<Eigen::Index>(free.size());
-  ClusterCovariance of_free{.cov = picked(result.cov, free),
-                            .inflation = VectorXd::Ones(num_free),
-                            .degrees_of_freedom = result.degrees_of_freedom(free)};
+  ClusterCovariance of_free = of_model(picked(result.cov, free));
   state_free(picked(inverse, free), noise_variance, steps, of_free);
   for (std::size_t i = 0; i < free.size(); ++i) {
     for (std::size_t j = 0; j < free.size(); ++j) {
@@ -284,6 +330,14 @@ ClusterCovariance cluster_covariance(const MatrixXd& inverse, double noise_varia
   result.design_effect = of_free.design_effect;
   result.shrinkage = of_free.shrinkage;
   result.z2 = std::move(of_free.z2);
+  return result;
+}
+
+ClusterCovariance whitened_cluster_covariance(const MatrixXd& L, double noise_variance,
+                                              std::vector<ClusterStep> clusters) {
+  ClusterCovariance result = of_model(noise_variance * L * L.transpose());
+  if (clusters.size() >= ClusterCovariance::min_clusters && L.rows() > 0 && noise_variance > 0.0)
+    state_whitened(L, noise_variance, std::move(clusters), result);
   return result;
 }
 

@@ -56,6 +56,12 @@ struct ClusterCovariance {
 [[nodiscard]] ClusterCovariance cluster_covariance(const Eigen::MatrixXd& inverse, double noise_variance,
                                                    std::span<const ClusterStep> clusters);
 
+/// The same for clusters in parameters in which the information is 1: H⁻¹ = L Lᵀ, their steps are L⁻¹ d, their spreads
+/// L⁻¹ … L⁻ᵀ; without a spread they have equal shares. An estimator that makes them so has less to multiply. No
+/// parameter is held.
+[[nodiscard]] ClusterCovariance whitened_cluster_covariance(const Eigen::MatrixXd& L, double noise_variance,
+                                                            std::vector<ClusterStep> clusters);
+
 /// The check "photos agree" ("shots agree", …): by how much the clusters' scatter raises σ over what the noise of
 /// single measurements gives. `cluster` is the word for one: "photo"; `causes`: "blur, rolling shutter, or the lens
 /// model".

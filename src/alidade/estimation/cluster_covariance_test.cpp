@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <cmath>
 
@@ -151,6 +152,21 @@ TEST(ClusterCovariance, WhatAPriorTellsIsNotInflated) {
   const ClusterCovariance robust = cluster_covariance(drawn.inverse, 1.0, drawn.steps);
   EXPECT_NEAR(robust.inflation[2], 1.0, 0.05);
   EXPECT_GT(robust.inflation[0], 3.0);
+}
+
+TEST(ClusterCovariance, WhitenedClustersSayTheSame) {
+  auto random = seeded(4);
+  for (const int clusters : {6, 13, 120}) {
+    const Regression drawn = draw(clusters, 0.6, random);
+    const MatrixXd L = drawn.inverse.llt().matrixL(), whiten = L.inverse();
+    std::vector<ClusterStep> whitened;
+    for (const ClusterStep& step : drawn.steps)
+      whitened.push_back({whiten * step.step, whiten * step.spread * whiten.transpose(), {}});
+    const ClusterCovariance one = cluster_covariance(drawn.inverse, drawn.noise_variance, drawn.steps);
+    const ClusterCovariance other = whitened_cluster_covariance(L, drawn.noise_variance, whitened);
+    EXPECT_LT((one.cov - other.cov).norm(), 1e-12 * one.cov.norm()) << clusters;
+    EXPECT_GT(one.largest_inflation(), 1.2);
+  }
 }
 
 TEST(ClusterCovariance, HeldParametersStayHeld) {

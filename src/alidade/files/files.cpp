@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "alidade/files/descriptor.h"
+#include "alidade/files/sync.h"
 
 namespace alidade {
 namespace {
@@ -45,12 +46,14 @@ void write_temporary(const std::filesystem::path& file, const std::filesystem::p
   const Descriptor unnamed(::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666));
   if (unnamed.is_open()) {
     write_all(file, unnamed, content);
+    sync_file(file, unnamed);
     const std::string link = "/proc/self/fd/" + std::to_string(unnamed.number());
     if (::linkat(AT_FDCWD, link.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0) return;
   }
   const Descriptor named(::open(name.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666));
   if (!named.is_open()) fail_on(file, "cannot be written", errno);
   write_all(file, named, content);
+  sync_file(file, named);
 }
 
 }  // namespace
@@ -99,6 +102,7 @@ void write_file(const std::filesystem::path& file, std::string_view content) {
   write_temporary(file, temporary.path, content);
   if (::rename(temporary.path.c_str(), file.c_str()) != 0) fail_on(file, "cannot be written", errno);
   temporary.kept = true;
+  sync_all({file.has_parent_path() ? file.parent_path() : "."});
 }
 
 }  // namespace alidade

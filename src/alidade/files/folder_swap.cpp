@@ -9,6 +9,7 @@
 #include <cstdlib>
 
 #include "alidade/files/files.h"
+#include "alidade/files/sync.h"
 
 namespace alidade {
 namespace {
@@ -75,6 +76,12 @@ void clear_remains(const fs::path& folder) {
   }
 }
 
+std::vector<fs::path> unique(std::vector<fs::path> paths) {
+  std::sort(paths.begin(), paths.end());
+  paths.erase(std::unique(paths.begin(), paths.end()), paths.end());
+  return paths;
+}
+
 }  // namespace
 
 MadeFolders::~MadeFolders() {
@@ -87,6 +94,12 @@ void MadeFolders::make(const fs::path& folder) {
   for (int i = 0; !make_once(folder); ++i) {
     if (errno != ENOENT || i + 1 == tries) fail_on(folder, "cannot be made", errno);
   }
+}
+
+std::vector<fs::path> MadeFolders::parents() const {
+  std::vector<fs::path> parents;
+  for (const fs::path& made : made_) parents.push_back(made.has_parent_path() ? made.parent_path() : ".");
+  return parents;
 }
 
 bool MadeFolders::make_once(const fs::path& folder) {
@@ -189,7 +202,28 @@ void FolderSwap::undo() noexcept {
   moves_.clear();
 }
 
+/// What is new, with the folders that list it: after it every rename finds whole files, whatever happens to the power.
+void FolderSwap::sync_new() const {
+  std::vector<fs::path> files, folders = {hidden_ / new_files, hidden_};
+  for (const fs::path& name : added_) {
+    files.push_back(hidden_ / new_files / name);
+    for (fs::path in = name.parent_path(); !in.empty(); in = in.parent_path())
+      folders.push_back(hidden_ / new_files / in);
+  }
+  sync_all(files);
+  sync_all(unique(std::move(folders)));
+}
+
+/// The folders whose lists of names commit() changed.
+void FolderSwap::sync_places() const {
+  std::vector<fs::path> folders = made_.parents();
+  folders.push_back(folder_);
+  for (const fs::path& name : added_) folders.push_back((folder_ / name).parent_path());
+  sync_all(unique(std::move(folders)));
+}
+
 void FolderSwap::commit() {
+  sync_new();
   std::vector<fs::path> going = added_;
   going.insert(going.end(), removed_.begin(), removed_.end());
   const Descriptor turn(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
@@ -210,6 +244,7 @@ void FolderSwap::commit() {
       made_.make(at.parent_path());
       move(hidden_ / new_files / *name, at);
     }
+    sync_places();
   } catch (const fs::filesystem_error& error) {
     undo();
     fail_on(at.empty() ? folder_ : at, "cannot be written", error.code().value());

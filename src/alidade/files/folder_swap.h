@@ -19,6 +19,8 @@ class MadeFolders {
   ~MadeFolders();
   /// Makes what is missing of the path. Throws InputError if it cannot be made.
   void make(const std::filesystem::path& folder);
+  /// The folders that list what was made.
+  [[nodiscard]] std::vector<std::filesystem::path> parents() const;
 
  private:
   /// False: `errno` says why not.
@@ -30,7 +32,8 @@ class MadeFolders {
 /// New files of a folder, and old ones that go: all at once, or nothing at all. What is new waits in a hidden folder
 /// inside it (`.alidade-…`: the same disk, so that a rename is enough) until commit(). Without commit(), on a full disk
 /// or after any exception, the folder is as it was, and is not there if it was not. A killed process leaves at worst
-/// the hidden folder; the next FolderSwap there clears it, and undoes, or ends, a commit() that was cut in two.
+/// the hidden folder; the next FolderSwap there clears it, and undoes, or ends, a commit() that was cut in two. A power
+/// cut does no more: what is new is on the disk before anything older moves, and all of it when commit() returns.
 class FolderSwap {
  public:
   /// Makes the folder where it is missing, and finds out that it can be written: throws InputError if not.
@@ -38,7 +41,7 @@ class FolderSwap {
   FolderSwap(const FolderSwap&) = delete;
   FolderSwap& operator=(const FolderSwap&) = delete;
 
-  /// A new file, by its name inside the folder, whole on the disk when this returns. Throws InputError, and leaves
+  /// A new file, by its name inside the folder, written when this returns. Throws InputError, and leaves
   /// nothing of it, if it cannot be written.
   void add(const std::filesystem::path& name, std::string_view content);
   /// A file that goes, if it is there and nothing new takes its place.
@@ -60,6 +63,8 @@ class FolderSwap {
   bool hide();
   void move(const std::filesystem::path& from, const std::filesystem::path& to);
   void undo() noexcept;
+  void sync_new() const;
+  void sync_places() const;
 
   std::filesystem::path folder_;
   MadeFolders made_;

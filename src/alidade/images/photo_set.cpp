@@ -109,12 +109,18 @@ std::optional<Check> PhotoSet::turned() const {
     if (orientations[i] == 0 || orientations[i] == usual || ++count > max_named) continue;
     list += (list.empty() ? "" : ", ") + state_->names[i] + " was taken " + as_taken(orientations[i]);
   }
-  if (count == 0) return std::nullopt;
+  constexpr int upright = 1;
+  if (count == 0 && (size() == 0 || usual == upright)) return std::nullopt;
   if (count > max_named) list += fmt::format(" and {} more were turned", count - max_named);
   return Check{
       .name = "orientation",
       .state = State::good,
-      .text = fmt::format("turned by EXIF: {}, most photos {}; all pixels are used as stored", list, as_taken(usual)),
+      .text =
+          count > 0
+              ? fmt::format("turned by EXIF: {}, most photos {}; all pixels are used as stored", list, as_taken(usual))
+              : fmt::format("turned by EXIF: every photo was taken {}; pixels are used as stored: programs that "
+                            "turn photos as they read them see another camera",
+                            as_taken(usual)),
       .value = static_cast<double>(count),
       .limit = static_cast<double>(size()),
       .unit = "photos",

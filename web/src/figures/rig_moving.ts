@@ -45,7 +45,7 @@ export const movingEstimate: Figure = {
     const body = el('tbody');
     for (const k of indices) {
       const e = (name: string) => doc.estimate(`cameras[${k}].${name}`), isPlaced = doc.estimateText(`cameras[${k}].placed`) !== 'false';
-      body.append(el('tr', {class: 'group'}, el('th', {colspan: 4}, `camera ${e('id')} · ${isPlaced ? `${e('used')} of ${e('sights')} sights, RMS ${num(e('rms_px'), 2)} px` : `not placed: ${doc.estimateText(`cameras[${k}].reason`) || '–'}`}`)));
+      body.append(el('tr', {class: 'group'}, el('th', {colspan: 4}, `camera ${e('id')} · ${isPlaced ? `${e('used')} of ${e('sights')} observations, RMS ${num(e('rms_px'), 2)} px` : `not placed: ${doc.estimateText(`cameras[${k}].reason`) || '–'}`}`)));
       if (!isPlaced) continue;
       ['x', 'y', 'z'].forEach((axis, i) => {
         const row = Array.from({length: cameras.rows}, (_, r) => r).find((r) => cameras.number('id', r) === e('id')) ?? -1;
@@ -72,7 +72,7 @@ function movingWorld(cameras: Table, path: Table | null, factor: number): World 
     if (!pose) return;
     const colour = colours[i % colours.length]!, half: [number, number] = [cameras.number('half_view_x', i) || 0.5, cameras.number('half_view_y', i) || 0.4];
     const corners = world.frustum(pose, half, size / Math.max(1, norm([...half, 1])), {colour, width: 2.2});
-    world.face(corners, colour, 0.2, {tip: () => [`camera ${cameras.text('id', i)}`, `${num(cameras.number('num_used', i), 6)} sights used, RMS ${num(cameras.number('rms_px', i), 2)} px`]});
+    world.face(corners, colour, 0.2, {tip: () => [`camera ${cameras.text('id', i)}`, `${num(cameras.number('num_used', i), 6)} observations used, RMS ${num(cameras.number('rms_px', i), 2)} px`]});
     world.label(add(pose.t, mul(isUpright(cameras), 0.35 * size)), `camera ${cameras.text('id', i)}`, colour);
     world.hold(...corners);
     const three = threeSigma(cameras, i);

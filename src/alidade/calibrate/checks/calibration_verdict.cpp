@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 
 #include "alidade/calibrate/checks/better_model.h"
 #include "alidade/calibrate/solve/weights.h"
@@ -221,6 +222,25 @@ Check principal_point(const CalibrateReport& report) {
   return check;
 }
 
+/// Where another lens fits nearly as well: which. Only then is there anything to check.
+std::optional<Check> one_lens(const CalibrateReport& report) {
+  constexpr double ruled_out = 0.01;
+  const OtherLens* other = nullptr;
+  for (const OtherLens& each : report.other_lenses)
+    if (each.weight > ruled_out && (other == nullptr || each.weight > other->weight)) other = &each;
+  if (other == nullptr) return std::nullopt;
+  const Eigen::VectorXd here = params(report.camera.lens), there = params(other->lens);
+  return Check{.name = "one lens",
+               .state = State::care,
+               .text = "another lens fits these photos nearly as well, with its centre at (" + rounded(there[2], 3) +
+                       ", " + rounded(there[3], 3) + ") px instead of (" + rounded(here[2], 3) + ", " +
+                       rounded(here[3], 3) + "): σ reaches to it",
+               .value = other->weight,
+               .limit = ruled_out,
+               .unit = "",
+               .figure = "estimate"};
+}
+
 /// What to do next. What makes σ large comes first: more photos of a bent board are no help.
 std::string advice(const Verdict& verdict, const CalibrationStudy& study, const CalibrateConfig& config,
                    const NextPhotoPlan& next, double worst_px, bool is_port) {
@@ -248,6 +268,8 @@ std::string advice(const Verdict& verdict, const CalibrationStudy& study, const 
     return "add a photo as proposed: it lowers the worst 3σ from " + two(worst_px) + " to " +
            two(next.photos.front().worst_3sigma_px) + " px";
   }
+  if (ails("one lens"))
+    return "add photos with the board tilted 30–45° and turned about its own axis, or hold k3: --fix k3";
   return ails("consistent") ? "add photos: the halves do not agree" : "";
 }
 
@@ -260,10 +282,12 @@ Verdict calibration_verdict(const CalibrateReport& report, const CalibrationStud
   verdict.checks = {coverage(report, study),
                     lens_adequate(study),
                     consistent(study),
-                    clusters_agree(report.clusters, "photo", "blur, rolling shutter, or the lens model", "clusters"),
+                    clusters_agree(report.clusters, "photo",
+                                   "blur, rolling shutter, the lens model, or the board's shape", "clusters"),
                     honest_corners(report, views),
                     board_flat(study, config),
                     principal_point(report)};
+  if (std::optional<Check> other = one_lens(report)) verdict.checks.push_back(std::move(*other));
   const Check* worst = &verdict.checks.front();
   for (const Check& check : verdict.checks) {  // among equals not coverage: the sentence begins with it
     if (check.state > worst->state || (check.state == worst->state && worst->name == "coverage")) worst = &check;

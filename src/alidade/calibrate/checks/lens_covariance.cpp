@@ -1,5 +1,8 @@
 #include "alidade/calibrate/checks/lens_covariance.h"
 
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -27,17 +30,52 @@ ClusterCovariance among_all(ClusterCovariance of_free, const std::vector<int>& f
   return of_free;
 }
 
+void raise(const Eigen::MatrixXd& by, ClusterCovariance& clusters) {
+  clusters.inflation.array() *= (1.0 + by.diagonal().array() / clusters.cov.diagonal().array()).sqrt();
+  clusters.cov += by;
+}
+
+/// Adds the spread of the minima about the one that is stated. Returns their weights.
+std::vector<double> count_others(const BundleProblem& problem, double noise_variance, const BundleResult& result,
+                                 std::span<const BundleResult> others, ClusterCovariance& clusters) {
+  std::vector<double> weights;
+  double sum = 1.0;
+  for (const BundleResult& other : others) {
+    const double excess = std::max(0.0, other.cost - result.cost) / noise_variance;
+    weights.push_back(std::exp(-0.5 * excess / std::max(1.0, clusters.design_effect)));
+    sum += weights.back();
+  }
+  for (std::size_t k = 0; k < others.size(); ++k) {
+    weights[k] /= sum;
+    const Eigen::VectorXd away = (params(others[k].state.lens) - params(result.state.lens))(problem.free_lens);
+    raise(weights[k] * away * away.transpose(), clusters);
+  }
+  return weights;
+}
+
 }  // namespace
 
-LensCovariance lens_covariance(const BundleProblem& problem, double noise_variance, BundleResult& result) {
+LensCovariance lens_covariance(const BundleProblem& problem, double noise_variance,
+                               std::span<const BundleResult> others, BundleResult& result) {
   const std::vector<int>& free = problem.free_lens;
   const auto num_free = static_cast<Eigen::Index>(free.size());
   const Eigen::Index num_params = params(result.state.lens).size();
   const Eigen::MatrixXd inverse = result.cov.topLeftCorner(num_free, num_free);
-  ClusterCovariance clusters = cluster_covariance(inverse, noise_variance, view_steps(problem, result));
+  const Eigen::LLT<Eigen::MatrixXd> llt(inverse);
+  ClusterCovariance clusters;
+  if (llt.info() == Eigen::Success) {
+    const Eigen::MatrixXd L = llt.matrixL();
+    clusters = whitened_cluster_covariance(L, noise_variance, view_steps(problem, result, L));
+    // Two ways: one and the other, less what both count.
+    const ClusterCovariance corners = whitened_cluster_covariance(L, noise_variance, corner_steps(problem, result, L));
+    raise(corners.cov - noise_variance * inverse, clusters);
+  } else {
+    clusters = cluster_covariance(inverse, noise_variance, {});
+  }
+  std::vector<double> weights = count_others(problem, noise_variance, result, others, clusters);
   follow_lens(clusters.cov / noise_variance - inverse, result);
   return {among_all(clusters.cov, free, num_params), among_all(noise_variance * inverse, free, num_params),
-          among_all(std::move(clusters), free, num_params)};
+          among_all(std::move(clusters), free, num_params), std::move(weights)};
 }
 
 }  // namespace alidade

@@ -7,12 +7,16 @@ namespace alidade {
 
 /// Covariance of all parameters of a lens, in their order; a parameter that is held has zero rows.
 struct LensCovariance {
-  Eigen::MatrixXd stated;      ///< Views are its clusters, as the corners of one share errors.
-  Eigen::MatrixXd model;       ///< As if every corner erred by itself.
-  ClusterCovariance clusters;  ///< What tells the two apart, one value per parameter.
+  Eigen::MatrixXd stated;       ///< Views are its clusters, as the corners of one share errors.
+  Eigen::MatrixXd model;        ///< As if every corner erred by itself.
+  ClusterCovariance clusters;   ///< What tells the two apart, one value per parameter.
+  std::vector<double> weights;  ///< Of the other minima: how likely each is, all of them and `result` being 1.
 };
 
 /// `noise_variance`: of the whitened residuals. `result` must have its covariance; its poses' follow what is stated.
-[[nodiscard]] LensCovariance lens_covariance(const BundleProblem& problem, double noise_variance, BundleResult& result);
+/// `others`: minima of the cost that lie elsewhere. Each is as likely as exp(−Δ/(2 c s²)) says, Δ by what its cost is
+/// greater, c the design effect, and what is stated reaches to it by that weight.
+[[nodiscard]] LensCovariance lens_covariance(const BundleProblem& problem, double noise_variance,
+                                             std::span<const BundleResult> others, BundleResult& result);
 
 }  // namespace alidade

@@ -175,10 +175,11 @@ BundleResult with_covariance(BundleResult result, bool want_pose_cov) {
 void follow_lens(const Eigen::MatrixXd& extra, BundleResult& result) {
   const NormalEquations& eq = *result.equations;
   for (std::size_t k = 0; k < result.pose_cov.size(); ++k) {
-    const Eigen::Matrix<double, 6, Eigen::Dynamic> gain =
-        Eigen::LLT<Pose6>(eq.V[k]).solve(eq.coupling(k).topRows(extra.rows()).transpose());
-    const Eigen::Matrix<double, 6, Eigen::Dynamic> by_extra = gain.lazyProduct(extra);
-    result.pose_cov[k] += by_extra.lazyProduct(gain.transpose());
+    using Gain = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, Columns::max_lens>;
+    Gain gain = eq.coupling(k).topRows(extra.rows()).transpose();
+    Eigen::LLT<Pose6>(eq.V[k]).solveInPlace(gain);
+    const Gain by_extra = gain.lazyProduct(extra);
+    result.pose_cov[k].noalias() += by_extra.lazyProduct(gain.transpose());
   }
 }
 

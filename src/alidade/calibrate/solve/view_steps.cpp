@@ -1,6 +1,7 @@
 #include "alidade/calibrate/solve/view_steps.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
 #include "alidade/calibrate/solve/columns.h"
@@ -118,11 +119,70 @@ std::vector<ClusterStep> sparse_steps(const BundleProblem& problem, const Bundle
   return steps;
 }
 
+/// H⁻¹ (L⁻ᵀ; 0): by its transpose information and gradient of all globals are those of L⁻¹ times the lens.
+Eigen::MatrixXd to_whitened(const BundleResult& result, const Eigen::MatrixXd& L) {
+  Eigen::MatrixXd X = result.cov.leftCols(L.rows());
+  L.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(X);
+  return X;
+}
+
+/// Jᵀr of each corner of a view by lens and bow, and by the pose: a row a corner.
+void fill_pulls(const BundleProblem& problem, const Columns& columns, Index corners, Eigen::MatrixXd& by_lens,
+                Eigen::Matrix<double, Eigen::Dynamic, 6>& by_pose) {
+  const auto half = static_cast<Index>(columns.stride());
+  const auto part = [&](int c, Index from) { return Eigen::Map<const Eigen::ArrayXd>(columns[c] + from, corners); };
+  const auto pull = [&](int c) {
+    return part(c, 0) * part(Columns::residual, 0) + part(c, half) * part(Columns::residual, half);
+  };
+  Index at = 0;
+  for (const int parameter : problem.free_lens) by_lens.col(at++).head(corners) = pull(parameter);
+  for (int c = 0; at < by_lens.cols(); ++c) by_lens.col(at++).head(corners) = pull(Columns::bow + c);
+  for (int c = 0; c < 6; ++c) by_pose.col(c).head(corners) = pull(Columns::pose + c);
+}
+
 }  // namespace
 
-std::vector<ClusterStep> view_steps(const BundleProblem& problem, const BundleResult& result) {
-  const Eigen::MatrixXd X = result.cov.leftCols(static_cast<Index>(problem.free_lens.size()));
+std::vector<ClusterStep> view_steps(const BundleProblem& problem, const BundleResult& result,
+                                    const Eigen::MatrixXd& L) {
+  const Eigen::MatrixXd X = to_whitened(result, L);
   return problem.shape == BoardShape::free ? sparse_steps(problem, result, X) : dense_steps(problem, result, X);
+}
+
+std::vector<ClusterStep> corner_steps(const BundleProblem& problem, const BundleResult& result,
+                                      const Eigen::MatrixXd& L) {
+  std::vector<ClusterStep> steps;
+  if (problem.shape == BoardShape::free) return steps;
+  constexpr std::size_t enough = 16, of_many = 4;  // by fewer, chance would be raised with the scale below
+  const std::size_t num_views = problem.views.size(),
+                    count = std::min(num_views, std::max(enough, num_views / of_many));
+  const Eigen::MatrixXd X = to_whitened(result, L);
+  const PreparedLens lens = prepare(result.state.lens);
+  const PointArrays points = make_arrays(result.state.board_points);
+  const auto num_points = static_cast<Index>(result.state.board_points.size());
+  const bool bows = problem.shape == BoardShape::bow;
+  const BowBasis basis = bows ? bow_basis(problem.printed_points) : BowBasis{};
+  Columns columns;
+  Eigen::MatrixXd scores = Eigen::MatrixXd::Zero(num_points, L.rows()), by_lens(num_points, X.rows());
+  Eigen::Matrix<double, Eigen::Dynamic, 6> by_pose(num_points, 6);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t k = i * num_views / count;
+    const ViewArrays& view = problem.views[k];
+    if (!fill_columns(lens, result.state.cam_from_board[k], points, view, columns)) continue;
+    if (bows) fill_bow_columns(view, basis.along_x, basis.along_y, columns);
+    const auto corners = static_cast<Index>(view.size());
+    fill_pulls(problem, columns, corners, by_lens, by_pose);
+    const Eigen::LLT<Eigen::Matrix<double, 6, 6>> V(result.equations->V[k]);
+    Eigen::Matrix<double, 6, Eigen::Dynamic> follows = result.equations->coupling(k).transpose().lazyProduct(X);
+    V.solveInPlace(follows);  // the pose does
+    const Eigen::MatrixXd pulls = by_lens.topRows(corners) * X - by_pose.topRows(corners) * follows;
+    for (Index c = 0; c < corners; ++c) scores.row(view.index[static_cast<std::size_t>(c)]) += pulls.row(c);
+  }
+  // Of an estimate from these views alone: what they share moves it as it moves that of all.
+  const double scale = std::sqrt(static_cast<double>(num_views) / static_cast<double>(std::max<std::size_t>(1, count)));
+  for (Index point = 0; point < num_points; ++point) {
+    if (scores.row(point).squaredNorm() > 0.0) steps.push_back({scale * scores.row(point).transpose(), {}, {}});
+  }
+  return steps;
 }
 
 }  // namespace alidade

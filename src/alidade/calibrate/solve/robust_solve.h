@@ -1,0 +1,46 @@
+#pragma once
+
+#include <vector>
+
+#include "alidade/calibrate/calibrate.h"
+#include "alidade/calibrate/solve/bundle.h"
+#include "alidade/calibrate/solve/weights.h"
+
+namespace alidade {
+
+/// The views that take part, and what is known of them so far.
+struct CalibrationWork {
+  std::vector<std::size_t> number;  ///< Position of each in the caller's views.
+  std::vector<BoardView> views;
+  std::vector<std::vector<bool>> far;  ///< Corners that take no part in the start.
+  std::vector<ViewArrays> arrays;
+  BundleProblem problem;
+  bool use_covariances = false;
+};
+
+/// Takes a view out; the report says why.
+void drop_view(std::size_t at, const std::string& reason, CalibrateReport& report, CalibrationWork& work,
+               BundleState& state);
+
+/// Every corner with the same weight, but none for the far ones where outliers are to be rejected.
+void make_all_arrays(const CalibrateConfig& config, CalibrationWork& work);
+
+/// p: free lens, pose and board parameters.
+[[nodiscard]] int num_parameters(const CalibrationWork& work);
+
+/// s² of the whitened residuals.
+[[nodiscard]] double variance_of(const CalibrationWork& work, const BundleResult& result, const NoiseEstimate& noise);
+
+/// The least minimum of the cost that was found, and the others.
+struct Minima {
+  BundleResult least;
+  bool settled = false;  ///< The least did.
+  std::vector<BundleResult> others;
+};
+
+/// Solves from a start, with its covariance: weights by the residuals, outliers rejected, and of several minima, where
+/// the views may have some, the least.
+[[nodiscard]] Minima solve_robustly(const CalibrateConfig& config, ImageSize size, BundleState start,
+                                    CalibrateReport& report, CalibrationWork& work, NoiseEstimate& noise);
+
+}  // namespace alidade

@@ -107,7 +107,7 @@ ExitCode simulate_rangefinder(const SimulateRangefinderArgs& args, Run& run) {
   if (args.photos) add_photos(args, scene, simulated.shots, run);
   run.add_file("shots.csv", table_of(args, simulated.shots));
   if (!args.photos) run.add_file("corners.csv", corners_csv(views));
-  const Camera told = mistaken_camera(scene.camera, args.mistake.focal, args.mistake.centre_px);
+  const Camera told = mistaken_camera(scene.camera, args.mistake.focal, args.mistake.centre_px, args.mistake.k1);
   run.add_file("camera.yaml", camera_text(told, CameraFormat::alidade));
   run.add_file("truth_rangefinder.yaml", beam_text(scene.beam, scene.camera, "camera.yaml"));
   JsonValue outliers = JsonValue::list();
@@ -151,6 +151,12 @@ void add_rangefinder_scenario(App& app) {
   number("--offset-m", args->mistake.offset_m, "What each reading is too long by [m]", -1.0, 1.0);
   number("--focal-error", args->mistake.focal, "Share by which the camera file's focal length is too long", -0.5, 0.5);
   number("--centre-error", args->mistake.centre_px, "Pixels by which its centre lies aside, in u and v", -1e3, 1e3);
+  number("--k1-error", args->mistake.k1, "What its k1 is too large by", -1.0, 1.0);
+  number("--drift-m", args->mistake.drift_m, "What the readings drift by from the first shot to the last [m]", -1.0,
+         1.0);
+  number("--bend-m", args->mistake.bend_m, "What a reading is too long by 1 m from 2 m, as a parabola [m]", -1.0, 1.0);
+  number("--wander-px", args->mistake.wander_px, "What the spots move by from the first shot to the last", -1e3, 1e3);
+  command.add_flag("--exchange-uv", args->mistake.exchange_uv, "u of the spots stands in the column of v");
   command.add_option("--unit", args->unit, "Of the readings in the table")
       ->check(CLI::IsMember({"m", "mm", "cm", "inch", "feet"}))
       ->capture_default_str();

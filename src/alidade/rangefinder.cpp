@@ -97,7 +97,7 @@ RangefinderCalibration rangefinder(std::vector<Shot> shots, const Camera& camera
   result.verdict = std::move(solved.verdict);
   result.counts.used = static_cast<std::size_t>(result.shots_used);
   result.counts.dropped = static_cast<std::size_t>(result.shots_dropped);
-  if (result.status == RangefinderReport::Status::converged) study(result, camera, progress);
+  if (result.status == RangefinderReport::Status::converged) study(result, solved.camera, progress);
   if (result.verdict.exit_code == ExitCode::ok) heed_assumptions(result.assumed, result.verdict);
   return result;
 }

@@ -36,6 +36,19 @@ Lens with_params(const Lens& lens, const Eigen::VectorXd& values) {
   return std::visit([&]<CameraModel Model>(const Calibrated<Model>&) { return Lens(Calibrated<Model>{values}); }, lens);
 }
 
+Camera with_distortion(const Camera& camera) {
+  if (!std::holds_alternative<Calibrated<Pinhole>>(camera.lens)) return camera;
+  Camera wide = camera;
+  const Eigen::VectorXd values = params(camera.lens);
+  Eigen::VectorXd all = Eigen::VectorXd::Zero(Brown::num_params);
+  all.head(values.size()) = values;
+  wide.lens = with_params(Calibrated<Brown>{}, all);
+  if (camera.cov.rows() != values.size()) return wide;
+  wide.cov.setZero(all.size(), all.size());
+  wide.cov.topLeftCorner(values.size(), values.size()) = camera.cov;
+  return wide;
+}
+
 std::optional<Lens> make_lens(std::string_view model_name) {
   if (model_name == Pinhole::name) return Calibrated<Pinhole>{};
   if (model_name == Brown::name) return Calibrated<Brown>{};

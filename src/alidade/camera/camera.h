@@ -43,6 +43,8 @@ struct Camera {
 [[nodiscard]] Eigen::VectorXd params(const Lens& lens);
 /// The same model with other values. `values` has as many entries as the model has parameters.
 [[nodiscard]] Lens with_params(const Lens& lens, const Eigen::VectorXd& values);
+/// A pinhole as a Brown lens without distortion, its covariance (where it has one) with it; any other lens as it is.
+[[nodiscard]] Camera with_distortion(const Camera& camera);
 /// A lens of that name with all parameters zero. None for an unknown name.
 [[nodiscard]] std::optional<Lens> make_lens(std::string_view model_name);
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
 
 #include "alidade/public.h"
 
@@ -15,4 +17,16 @@ struct Innovation {
 };
 
 ALIDADE_PUBLIC_END
+
+/// χ² of so many numbers as σ of a normal one. Where the σ that they are measured by was estimated from residuals that
+/// hold them, with `num_estimated` degrees of freedom (0: it was given), the share of χ² in those makes an F. E.
+/// Paulson, Ann. Math. Stat. 13, 1942.
+[[nodiscard]] inline double score_sigmas(double chi2, double num, double num_estimated) {
+  const double left = num_estimated - num;
+  const bool is_estimated = left >= 2.0;
+  const double F =
+      is_estimated ? chi2 / num / (std::max(num_estimated - chi2, 1e-3 * num_estimated) / left) : chi2 / num;
+  const double a = 2.0 / (9.0 * num), b = is_estimated ? 2.0 / (9.0 * left) : 0.0, root = std::cbrt(F);
+  return std::max(0.0, ((1.0 - b) * root - (1.0 - a)) / std::sqrt(b * root * root + a));
+}
 }  // namespace alidade

@@ -8,7 +8,9 @@
 #include "alidade/rangefinder/prepare.h"
 #include "alidade/rangefinder/solve/beam_bound.h"
 #include "alidade/rangefinder/solve/beam_search.h"
+#include "alidade/rangefinder/solve/error_causes.h"
 #include "alidade/rangefinder/solve/fixed_quantities.h"
+#include "alidade/rangefinder/solve/held_distortion.h"
 #include "alidade/rangefinder/solve/refine_all.h"
 
 namespace alidade {
@@ -278,7 +280,9 @@ double scale_in_sigmas(const BeamProblem& problem, const Camera& camera, const B
 /// σ of the answer, what pulls at it, and what it rests on. `state`: where the solve ended.
 void put_uncertainty(const BeamProblem& problem, const LensPrior& prior, const CommonState& state, const Camera& camera,
                      const RangefinderConfig& config, RangefinderReport& report) {
-  const ReducedSystem system = reduced_system(problem, prior, state);
+  CommonState wide = state;
+  wide.camera = with_distortion(state.camera);
+  const ReducedSystem system = reduced_system(problem, prior, wide);
   SolvedPart part{system.places(problem.num_free(), prior.free), {}};
   const Eigen::MatrixXd information = system.H(part.places, part.places);
   constexpr double rounding = 1e13;  // an inverse of more is made of it
@@ -287,6 +291,7 @@ void put_uncertainty(const BeamProblem& problem, const LensPrior& prior, const C
   if (!part.inverse.allFinite()) return;
   put_clusters(problem, system, part, prior, report);
   report.fixed = fixed_quantities(system, part, prior, camera, problem.points_in_board, report, config);
+  report.causes = error_causes(problem, system, part, prior, report);
   for (FixedQuantity& sigma : fixed_sigmas(problem, report)) report.fixed.push_back(std::move(sigma));
   if (config.refine == Refine::beam) carry_lens(problem, camera, report);
   carry_told(report);

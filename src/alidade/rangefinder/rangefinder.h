@@ -27,9 +27,13 @@ namespace alidade {
 /// board that is too large as a whole moves the origin by its own part only.
 [[nodiscard]] bool wants_scale(const RangefinderReport& report, const RangefinderConfig& config);
 
-/// Why shots that no beam explains may do so: with the ranges in another unit, or each range a row before or after its
-/// spot and board, a beam explains them well. One sentence; empty where neither is so, and where a beam explains them
-/// as they are, though they may not tell which.
+/// The same of a lens' distortion that its file gives without σ: then it is better estimated, where boards tell it.
+[[nodiscard]] bool wants_distortion(const RangefinderReport& report, const Camera& camera,
+                                    const RangefinderConfig& config);
+
+/// Why shots that no beam explains may do so: with the ranges in another unit, each range a row before or after its
+/// spot and board, or spots with u and v exchanged or mirrored, a beam explains them well. One sentence; empty where
+/// neither is so, and where a beam explains them as they are, though they may not tell which.
 [[nodiscard]] std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board,
                                           const Camera& camera, const RangefinderConfig& config);
 
@@ -41,6 +45,7 @@ struct SolvedRangefinder {
   RangefinderReport report;
   Verdict verdict;           ///< Without what was assumed: heed_assumptions().
   RangefinderConfig config;  ///< As it was solved with.
+  Camera camera;             ///< The same: with the distortion open where its file gives it without σ.
 };
 /// calibrate_rangefinder() and what a person would do next: the readings' scale is estimated too where the answer rests
 /// on one that nobody told and the shots tell it, and where no beam explains the shots the cause is looked for.

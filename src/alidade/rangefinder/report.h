@@ -30,13 +30,28 @@ struct ShotFit {
 
 /// Something that the solve fixed: what an error of it does to the beam, and what the shots say of it.
 struct FixedQuantity {
-  std::string name;  ///< scale, square_m, board.flat_m, camera.f, camera.cx, camera.cy, sigma_range_m, sigma_spot_px
+  std::string name;  ///< scale, square_m, board.flat_m, camera.f, camera.cx, camera.k1, …, sigma_range_m, sigma_spot_px
   double value = 0.0;
   BeamVector moves = BeamVector::Zero();  ///< ∂ beam / ∂ its value, everything else solved again.
   /// What its error would be, were it free too, and the σ of that: a score (Lagrange multiplier) test. Infinite where
   /// the shots say nothing of it.
   double asked = 0.0, asked_sigma = std::numeric_limits<double>::infinity();
   std::optional<double> sigma = {};  ///< With which it was given; in `beam.cov`.
+};
+
+/// An error that the measurements of all shots may share, tested by itself (score test).
+struct ShotCause {
+  std::string
+      name;  ///< drift: of the readings over the rows; bend: over their range; wander: of the spots over the rows
+  double size = 0.0;  ///< From the first row to the last; of bend, at the ends of the span.
+  std::string unit;
+  double sigmas = 0.0;  ///< By how many σ the residuals ask for it.
+};
+
+/// Distortion that the camera file gave without σ, and that was estimated from the shots.
+struct FreedDistortion {
+  std::string name;  ///< k1, k2, p1, p2
+  double was = 0.0, value = 0.0, sigma = 0.0;
 };
 
 /// What can be known of the beam from these shots, and how its geometry stands.
@@ -71,6 +86,8 @@ struct RangefinderReport {
   Eigen::MatrixXd lens_cov_model;             ///< The same of a lens that was refined; 0×0: it was fixed.
   ClusterCovariance clusters;                 ///< What separates the two; shots are its clusters.
   std::vector<FixedQuantity> fixed;
+  std::vector<ShotCause> causes;
+  std::vector<FreedDistortion> freed_distortion;  ///< Empty: the file's holds.
   bool scale_by_need = false;      ///< The scale was estimated for the beam's sake, it is no result itself.
   std::vector<Beam> alternatives;  ///< Other beams that fit as well.
   std::vector<ShotFit> shots;      ///< One per shot.

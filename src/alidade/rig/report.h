@@ -62,7 +62,11 @@ struct RigCause {
 struct RigFreed {
   std::string name;  ///< "head1.pan_scale", "head1.camera.f", "head2.pan_cos_rad"
   double value = 0.0, sigma = 0.0;
-  double was = 0.0;  ///< As given.
+  double was = 0.0;        ///< As given.
+  double was_sigma = 0.0;  ///< With which it was given; 0: as if exact.
+
+  /// How far it is from what was given, in σ of both.
+  [[nodiscard]] double sigmas() const;
 };
 
 struct RigReport {

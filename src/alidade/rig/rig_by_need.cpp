@@ -129,7 +129,9 @@ class ByNeed {
     const double largest = std::ranges::max_element(best_.causes, {}, &RigCause::sigmas)->sigmas;
     for (const RigCause& cause : best_.causes) {
       const bool is_joint = cause.name.starts_with("all ");  // five of thirty, and the ones that see most
-      if (cause.sigmas < (is_joint ? rig_free_joint_limit : rig_free_limit)) continue;
+      static const double L1 = getenv("L1") ? atof(getenv("L1")) : rig_free_limit,
+                          L2 = getenv("L2") ? atof(getenv("L2")) : rig_free_joint_limit;
+      if (cause.sigmas < (is_joint ? L2 : L1)) continue;
       if (cause.sigmas < near * largest) continue;
       Candidate next = candidate_of(cause, best_.rig);
       const bool is_new = num_of(with(freed_, next)) > num_of(freed_);
@@ -191,6 +193,7 @@ class ByNeed {
       freed.value = is_scale ? (param == pan_scale_param ? encoder.pan_scale : encoder.tilt_scale)
                              : std::array{encoder.pan_cos_rad, encoder.pan_sin_rad, encoder.tilt_cos_rad,
                                           encoder.tilt_sin_rad}[static_cast<std::size_t>(param - pan_cos_param)];
+      if (is_scale) freed.was_sigma = config_.sigma_scale.value_or(0.0);
       freed.was = is_scale ? std::copysign(1.0, freed.value) : 0.0;  // which way it counts is found, not asked for
     } else if (param >= pan_backlash_param) {
       const int axis = param - pan_backlash_param;
@@ -200,7 +203,9 @@ class ByNeed {
       const Eigen::Index k = param == focal_param ? 0 : param == centre_x_param ? 2 : 3;
       freed.value = params(rig_head.camera.lens)[k];
       freed.sigma = std::sqrt(rig_head.camera.cov(k, k));
-      freed.was = params(cameras_.at(rig_head.head.id).lens)[k];
+      const Camera& file = cameras_.at(rig_head.head.id);
+      freed.was = params(file.lens)[k];
+      if (k < file.cov.rows()) freed.was_sigma = std::sqrt(std::max(0.0, file.cov(k, k)));
     }
     return freed;
   }
@@ -217,6 +222,8 @@ class ByNeed {
 };
 
 }  // namespace
+
+double RigFreed::sigmas() const { return std::abs(value - was) / std::hypot(sigma, was_sigma); }
 
 RigReport freed_by_need(RigReport report, std::span<const HeadView> views,
                         std::span<const Eigen::Vector3d> points_in_board, const std::map<int, Camera>& cameras,

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "alidade/estimation/innovation.h"
 #include "alidade/geometry/decompositions.h"
 #include "alidade/rig/rig_clusters.h"
 
@@ -20,6 +21,7 @@ constexpr Index tested_a_head = 15;
 struct Tested {
   std::string name, unit;
   std::vector<Index> places;
+  std::vector<std::string> names = {};  ///< One a place, where each has one.
   double worst = 1.0;  ///< σ of its size beyond which the views do not tell it: 5σ would be no encoder's and no lens'.
 };
 
@@ -36,7 +38,7 @@ std::vector<Tested> single_tests(const RigProblem& problem, const RigState& stat
       const double worst = std::string_view(unit) == "px" ? 50.0 : 0.05;
       if (param >= 0 && problem.is_free(h, param)) return;
       for (Index& place : places) place += first;
-      all.push_back({head + name, unit, std::move(places), worst});
+      all.push_back({head + name, unit, std::move(places), {head + name}, worst});
     };
     add("camera.fx", "px", focal_param, {0});
     add("camera.cx", "px", centre_x_param, {1});
@@ -62,7 +64,7 @@ std::vector<Tested> tested_of(const RigProblem& problem, const RigState& state) 
                                      {" backlash", "backlash"},
                                      {"camera.fx", "camera.fx"},
                                      {"camera.c", "centre"}}) {
-    Tested joint{std::string("all ") + name, "", {}, 1.0};
+    Tested joint{std::string("all ") + name, "", {}, {}, 1.0};
     int num = 0;
     for (std::size_t i = 0; i < num_single; ++i) {
       const Tested& one = all[i];
@@ -72,6 +74,7 @@ std::vector<Tested> tested_of(const RigProblem& problem, const RigState& state) 
       joint.unit = one.unit;
       joint.worst = one.worst;
       joint.places.insert(joint.places.end(), one.places.begin(), one.places.end());
+      joint.names.insert(joint.names.end(), one.names.begin(), one.names.end());
       ++num;
     }
     if (num > 1) all.push_back(std::move(joint));
@@ -135,23 +138,21 @@ Score score_of(const RigProblem& problem, const SolvedRig& solved, const MatrixX
   return score;
 }
 
-/// χ² of so many numbers as σ of a normal one. Where σ of a reading was told by the same residuals, with `num_told`
-/// degrees of freedom, it holds what the cause did: the share of χ² in them makes an F. E. Paulson, Ann. Math. Stat.
-/// 13, 1942.
-double as_normal(double chi2, double num, double num_told) {
-  const double left = num_told - num;
-  const bool is_told = left >= 2.0;
-  const double F = is_told ? chi2 / num / (std::max(num_told - chi2, 1e-3 * num_told) / left) : chi2 / num;
-  const double a = 2.0 / (9.0 * num), b = is_told ? 2.0 / (9.0 * left) : 0.0, root = std::cbrt(F);
-  return std::max(0.0, ((1.0 - b) * root - (1.0 - a)) / std::sqrt(b * root * root + a));
-}
-
 /// σ with which it was given; none: as if exact.
 double given_sigma(const std::vector<Assumption>& assumed, const std::string& name) {
   const std::string of_all = name.substr(name.find('.') + 1);  // one lens for all heads has no head's name
   for (const Assumption& what : assumed)
     if (what.name == name || what.name == of_all) return what.sigma.value_or(0.0);
   return 0.0;
+}
+
+/// One for each of its places; what one name has two of (amplitudes) is never given.
+VectorXd given_sigmas(const std::vector<Assumption>& assumed, const Tested& tested) {
+  VectorXd sigmas = VectorXd::Zero(static_cast<Index>(tested.places.size()));
+  if (tested.names.size() != tested.places.size()) return sigmas;
+  for (std::size_t k = 0; k < tested.names.size(); ++k)
+    sigmas[static_cast<Index>(k)] = given_sigma(assumed, tested.names[k]);
+  return sigmas;
 }
 
 }  // namespace
@@ -163,20 +164,20 @@ std::vector<RigCause> rig_causes(const RigProblem& problem, const SolvedRig& sol
   std::vector<RigCause> causes;
   for (const Tested& tested : tested_of(problem, solved.state)) {
     const VectorXd s = score.s(tested.places);
-    const double sigma = tested.places.size() == 1 ? given_sigma(assumed, tested.name) : 0.0;
+    const VectorXd given = given_sigmas(assumed, tested);
     const SymmetricEigen eigen = symmetric_eigen(MatrixXd(score.I(tested.places, tested.places)));
     double chi2 = 0.0, num = 0.0;
     VectorXd size = VectorXd::Zero(s.size());
     for (Index k = 0; k < s.size(); ++k) {
       if (!(eigen.values[k] * tested.worst * tested.worst > 1.0)) continue;
       const double along = eigen.vectors.col(k).dot(s) / eigen.values[k];
-      chi2 += along * along / (1.0 / eigen.values[k] + sigma * sigma);
+      chi2 += along * along / (1.0 / eigen.values[k] + eigen.vectors.col(k).cwiseProduct(given).squaredNorm());
       num += 1.0;
       size -= along * eigen.vectors.col(k);
     }
     if (num > 0.0)
       causes.push_back(
-          {tested.name, s.size() == 1 ? size[0] : size.norm(), tested.unit, as_normal(chi2, num, num_told)});
+          {tested.name, s.size() == 1 ? size[0] : size.norm(), tested.unit, score_sigmas(chi2, num, num_told)});
   }
   // What names one axis says more than what names all, where it explains nearly as much.
   std::ranges::sort(causes, std::greater{},

@@ -205,7 +205,7 @@ void add_freed(const RigReport& report, Verdict& verdict) {
   for (const RigFreed& one : report.freed) {
     text += (text.empty() ? "estimated too (3σ): " : ", ") + one.name + " " + text_of(one.value, 5) + " ± " +
             text_of(3.0 * one.sigma, 2);
-    const double z = std::abs(one.value - one.was) / one.sigma;
+    const double z = one.sigmas();
     if (z > most) most = z, worst = &one;
   }
   if (!report.alike.empty()) text += (text.empty() ? "" : "; ") + report.alike + " explain the residuals alike";

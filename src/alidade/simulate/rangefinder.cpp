@@ -209,16 +209,23 @@ std::vector<Shot> mistaken_shots(std::vector<Shot> shots, const ShotMistake& mis
   for (const Shot& shot : shots) read_m.push_back(shot.range_m);
   for (int i = 0; i < num; ++i) {
     const int from = ((i - mistake.shift_rows) % num + num) % num;
-    shots[static_cast<std::size_t>(i)].range_m =
-        (read_m[static_cast<std::size_t>(from)] + mistake.offset_m) / mistake.unit_m;
+    Shot& shot = shots[static_cast<std::size_t>(i)];
+    const double true_m = read_m[static_cast<std::size_t>(from)], passed = num > 1 ? i / (num - 1.0) : 0.0;
+    const double bend_m = mistake.bend_m * (true_m - 2.0) * (true_m - 2.0);
+    shot.range_m = (true_m + mistake.offset_m + passed * mistake.drift_m + bend_m) / mistake.unit_m;
+    if (!shot.spot) continue;
+    shot.spot->px.array() += passed * mistake.wander_px;
+    if (mistake.exchange_uv) shot.spot->px.reverseInPlace();
   }
   return shots;
 }
 
-Camera mistaken_camera(Camera camera, double focal, double centre_px) {
+Camera mistaken_camera(Camera camera, double focal, double centre_px, double k1) {
+  if (k1 != 0.0) camera = with_distortion(camera);
   Eigen::VectorXd values = params(camera.lens);
   values.head<2>() *= 1.0 + focal;
   values.segment<2>(2).array() += centre_px;
+  if (k1 != 0.0) values[Brown::num_params - 5] += k1;
   camera.lens = with_params(camera.lens, values);
   return camera;
 }

@@ -58,13 +58,18 @@ struct SimulatedShots {
 
 /// What a person got wrong, or did not know, about such a log.
 struct ShotMistake {
-  double focal = 0.0;      ///< Share by which the camera file's focal length is too long.
-  double centre_px = 0.0;  ///< By which its centre lies aside, in u and in v.
-  double offset_m = 0.0;   ///< That each reading is too long.
-  double unit_m = 1.0;     ///< Of the readings: 0.0254 where they are inches.
-  int shift_rows = 0;      ///< The ranges stand so many rows later than their boards and spots.
+  double focal = 0.0;        ///< Share by which the camera file's focal length is too long.
+  double centre_px = 0.0;    ///< By which its centre lies aside, in u and in v.
+  double k1 = 0.0;           ///< By which its k1 is too large, for the file's σ of fx, fy, cx, cy alone.
+  double drift_m = 0.0;      ///< That the readings are too long by at the last shot, evenly from none at the first.
+  double bend_m = 0.0;       ///< That a reading of 1 m or 3 m is too long by against one of 2 m: a parabola.
+  double wander_px = 0.0;    ///< That the spots stand lower and to the right by at the last shot, as the drift.
+  bool exchange_uv = false;  ///< u of the spots stands in the column of v.
+  double offset_m = 0.0;     ///< That each reading is too long.
+  double unit_m = 1.0;       ///< Of the readings: 0.0254 where they are inches.
+  int shift_rows = 0;        ///< The ranges stand so many rows later than their boards and spots.
 };
 [[nodiscard]] std::vector<Shot> mistaken_shots(std::vector<Shot> shots, const ShotMistake& mistake);
-[[nodiscard]] Camera mistaken_camera(Camera camera, double focal, double centre_px);
+[[nodiscard]] Camera mistaken_camera(Camera camera, double focal, double centre_px, double k1 = 0.0);
 
 }  // namespace alidade

@@ -20,7 +20,9 @@ struct RangefinderTrialSetup {
   ShotMistake mistake = {};
   RangefinderMethod method = RangefinderMethod::joint;
   int num_shots = 18;
-  bool is_mirrored = false;  ///< The images are, left to right.
+  bool tells_lengths = false;  ///< The person takes the readings' scale and the squares for exact.
+  bool has_boards = true;      ///< Else spots alone are left.
+  bool is_mirrored = false;    ///< The images are, left to right.
 };
 
 /// The shots as their mirrored images show them.
@@ -49,9 +51,13 @@ inline RangefinderTrial rangefinder_trial(const RangefinderTrialSetup& setup, st
   RangefinderSample sample = draw_rangefinder_sample(config, setup.noise, seed);
   for (Eigen::Vector3d& point : sample.points) point /= 1.0 + setup.square;
   std::vector<Shot> shots = mistaken_shots(sample.simulated.shots, setup.mistake);
+  if (!setup.has_boards)
+    for (Shot& shot : shots) shot.board.reset();
   if (setup.is_mirrored) mirror(shots, sample.camera.width_px);
-  const Camera camera = mistaken_camera(sample.camera, setup.mistake.focal, setup.mistake.centre_px);
-  RangefinderTrial trial{solve_rangefinder(shots, sample.points, camera, {.method = setup.method})};
+  const Camera camera = mistaken_camera(sample.camera, setup.mistake.focal, setup.mistake.centre_px, setup.mistake.k1);
+  RangefinderConfig told{.method = setup.method};
+  if (setup.tells_lengths) told.sigma_scale = told.sigma_square_m = 0.0;
+  RangefinderTrial trial{solve_rangefinder(shots, sample.points, camera, told)};
   Verdict& verdict = trial.solved.verdict;
   const RangefinderReport& report = trial.solved.report;
   const bool is_solved = verdict.state == State::good || verdict.state == State::care;

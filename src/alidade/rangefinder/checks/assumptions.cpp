@@ -3,6 +3,7 @@
 #include <string>
 
 #include "alidade/rangefinder/rangefinder.h"
+#include "alidade/rangefinder/solve/refine_all.h"
 
 namespace alidade {
 namespace {
@@ -12,7 +13,9 @@ double ordinary_error(const FixedQuantity& thing) {
   if (thing.name == "square_m") return 0.002 * thing.value;  // a printer
   if (thing.name == "scale") return 0.005;
   if (thing.name == "camera.f") return 0.003 * thing.value;
-  if (thing.name.starts_with("camera")) return 2.0;
+  if (thing.name.starts_with("camera.c")) return 2.0;
+  if (thing.name.starts_with("camera.k")) return 0.01;
+  if (thing.name.starts_with("camera.p")) return 0.001;
   if (thing.name == "board.flat_m") return 0.0003;
   return 0.2 * thing.value;  // a σ
 }
@@ -48,6 +51,10 @@ void put_moves(const RangefinderReport& report, const BeamVector& moves, Assumpt
     put_move_of("scale", moves.tail<1>(), std::sqrt(cov(beam_scale_param, beam_scale_param)), assumption);
 }
 
+bool is_of_distortion(const FixedQuantity& thing) {
+  return thing.name.starts_with("camera.k") || thing.name.starts_with("camera.p");
+}
+
 bool is_of_lengths(const FixedQuantity& thing) { return thing.name == "scale" || thing.name == "square_m"; }
 
 Assumption assumption_of(const RangefinderReport& report, const FixedQuantity& thing) {
@@ -63,7 +70,22 @@ Assumption assumption_of(const RangefinderReport& report, const FixedQuantity& t
 std::vector<Assumption> rangefinder_assumptions(const RangefinderReport& report) {
   std::vector<Assumption> assumed;
   for (const FixedQuantity& thing : report.fixed) assumed.push_back(assumption_of(report, thing));
+  // With another order, or in a mirrored image, another beam fits spots as well; boards have a left and a right.
+  const bool has_boards = std::ranges::any_of(report.shots, [](const ShotFit& fit) { return fit.plane || fit.pose; });
+  if (!has_boards && !report.shots.empty())
+    assumed.push_back({.name = "spots are (u, v) of an image that is not mirrored", .value = std::nan(""), .sigma = 0.0});
   return assumed;
+}
+
+bool wants_distortion(const RangefinderReport& report, const Camera& camera, const RangefinderConfig& config) {
+  constexpr double asks_beyond = 3.0;
+  if (config.refine != Refine::all || !config.refine_distortion || lens_prior(camera, true).free.empty()) return false;
+  const bool has_boards =
+      std::any_of(report.shots.begin(), report.shots.end(), [](const ShotFit& fit) { return fit.pose.has_value(); });
+  return has_boards && std::any_of(report.fixed.begin(), report.fixed.end(), [&](const FixedQuantity& thing) {
+           if (!is_of_distortion(thing) || thing.sigma) return false;
+           return std::abs(thing.asked) > asks_beyond * thing.asked_sigma || assumption_of(report, thing).moves > 1.0;
+         });
 }
 
 bool wants_scale(const RangefinderReport& report, const RangefinderConfig& config) {

@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "alidade/geometry/decompositions.h"
+#include "alidade/geometry/degree.h"
+#include "alidade/rangefinder/prepare.h"
 
 namespace alidade {
 namespace {
@@ -58,6 +60,17 @@ void add_scale(const RangefinderReport& report, const RangefinderConfig& config,
                                     z, ask_beyond, "σ", "residuals"));
 }
 
+/// "a focal length of 710 px, not 700": what the shots ask for.
+std::string asked_of_lens(const FixedQuantity& thing) {
+  const std::string name = thing.name.substr(thing.name.find('.') + 1);
+  const bool is_pixels = name == "f" || name.starts_with("c");
+  return (name == "f"             ? "a focal length of "
+          : name.starts_with("c") ? "a centre " + name + " of "
+                                  : "a distortion " + name + " of ") +
+         text_of(thing.value + thing.asked, is_pixels ? 5 : 3) + (is_pixels ? " px, not " : ", not ") +
+         text_of(thing.value, is_pixels ? 5 : 3);
+}
+
 /// Do boards and spots ask for another lens than the file's?
 void add_camera(const RangefinderReport& report, Verdict& verdict) {
   constexpr double ask_beyond = 4.5, foreign = 0.02;
@@ -71,16 +84,85 @@ void add_camera(const RangefinderReport& report, Verdict& verdict) {
     if (z < ask_beyond) continue;
     check.state = State::care;
     const bool is_focal = thing.name == "camera.f";
-    check.text = std::string("the shots ask for ") +
-                 (is_focal                    ? "a focal length of "
-                  : thing.name == "camera.cx" ? "a centre cx of "
-                                              : "a centre cy of ") +
-                 text_of(thing.value + thing.asked, 5) + " px, not " + text_of(thing.value, 5) + " (" + text_of(z, 2) +
-                 "σ): " +
+    check.text = "the shots ask for " + asked_of_lens(thing) + " (" + text_of(z, 2) + "σ): " +
                  (is_focal && std::abs(thing.asked) > foreign * thing.value ? "the file of another camera, or zoomed"
                                                                             : "calibrate the camera again");
   }
   verdict.checks.push_back(std::move(check));
+}
+
+/// Distortion that the file gave without σ and that was estimated: is it the file's?
+void add_freed_distortion(const RangefinderReport& report, Verdict& verdict) {
+  constexpr double ask_beyond = 4.5;
+  if (report.freed_distortion.empty()) return;
+  Check check = check_of("distortion", State::good, "", 0.0, ask_beyond, "σ", "residuals");
+  for (const FreedDistortion& one : report.freed_distortion) {
+    const double z = std::abs(one.value - one.was) / one.sigma;
+    if (!(z > check.value)) continue;
+    check.value = z;
+    if (z > ask_beyond) check.state = State::care;
+    check.text = one.name + " is " + text_of(one.value, 3) + " ± " + text_of(3.0 * one.sigma, 2) + " (3σ), not " +
+                 text_of(one.was, 3) + " as in the camera file, which gives it without σ: calibrate the camera again";
+  }
+  if (check.state == State::good)
+    check.text = "the camera file gives its distortion without σ: it is estimated too, and agrees with the file";
+  verdict.checks.push_back(std::move(check));
+}
+
+/// What the errors of all shots share.
+void add_shared_errors(const RangefinderReport& report, Verdict& verdict) {
+  constexpr double ask_beyond = 3.5;
+  for (const ShotCause& cause : report.causes) {
+    const bool is_quiet = cause.sigmas < ask_beyond;
+    const std::string size =
+        cause.unit == "m" ? text_of(1e3 * cause.size, 2) + " mm" : text_of(cause.size, 2) + " " + cause.unit;
+    const std::string by = " (" + text_of(cause.sigmas, 2) + "σ)";
+    const auto said = [&]() -> std::string {
+      if (cause.name == "drift")
+        return "the readings drift by " + size + " from the first row to the last" + by +
+               ": let the rangefinder warm up, or something was moved";
+      if (cause.name == "bend")
+        return "the readings bend over their range, by " + size + " at its ends" + by +
+               ": the rangefinder is not linear, or the board or the lens is not as given";
+      return "the spots wander by " + size + " from the first row to the last" + by +
+             ": the rangefinder, or the camera's lens, was moved";
+    };
+    verdict.checks.push_back(check_of(cause.name, is_quiet ? State::good : State::care,
+                                      is_quiet ? "no " + cause.name + " of the shots is asked for" : said(),
+                                      cause.sigmas, ask_beyond, "σ", "residuals"));
+  }
+}
+
+/// Spots alone have no left and right: with u and v exchanged another beam fits them as well. A rangefinder looks along
+/// with its camera: of two such beams the one that does is the likelier.
+void add_exchanged(const RangefinderReport& report, const RangefinderConfig& config, Verdict& verdict) {
+  constexpr double aside_rad = 0.07, likelier = 0.4;
+  if (config.method != RangefinderMethod::spot) return;
+  const auto far_px = project(report.camera, report.beam.direction_in_cam);
+  const auto other = far_px ? unproject(report.camera, far_px->reverse()) : std::nullopt;
+  if (!other) return;
+  const double given_rad = std::acos(std::clamp(report.beam.direction_in_cam.z(), -1.0, 1.0));
+  const double other_rad = std::acos(std::clamp(other->normalized().z(), -1.0, 1.0));
+  const bool is_likelier = given_rad > aside_rad && other_rad < likelier * given_rad;
+  verdict.checks.push_back(check_of("columns", is_likelier ? State::care : State::good,
+                                    is_likelier ? "the beam points " + text_of(given_rad / degree, 2) +
+                                                      "° away from where the camera looks; with u "
+                                                      "and v exchanged " +
+                                                      text_of(other_rad / degree, 2) + "°: are these columns exchanged?"
+                                                : "u and v stand in their order, as far as the beam's direction tells",
+                                    given_rad / degree, aside_rad / degree, "°", ""));
+}
+
+/// Spots that the camera cannot have seen.
+void add_outside(const RangefinderReport& report, std::span<const Shot> shots, Verdict& verdict) {
+  int num = 0;
+  for (std::size_t i = 0; i < shots.size() && i < report.shots.size(); ++i)
+    num += shots[i].spot && !is_in_image(report.camera, shots[i].spot->px) ? 1 : 0;
+  if (num == 0) return;
+  verdict.checks.push_back(check_of("spots outside", State::care,
+                                    std::to_string(num) + (num == 1 ? " spot lies" : " spots lie") +
+                                        " outside the image: are u and v exchanged, or is it another camera's file?",
+                                    num, 0.0, "", ""));
 }
 
 /// How much larger the first values are than the second, in σ of the sum of their ranks, which one wild value does not
@@ -136,6 +218,10 @@ void add_cause_checks(const RangefinderReport& report, std::span<const Shot> sho
                       Verdict& verdict) {
   add_scale(report, config, verdict);
   add_camera(report, verdict);
+  add_freed_distortion(report, verdict);
+  add_shared_errors(report, verdict);
+  add_exchanged(report, config, verdict);
+  add_outside(report, shots, verdict);
   add_by_distance(report, shots, verdict);
   add_range_noise(report, verdict);
 }

@@ -39,21 +39,29 @@ TEST_P(ShotFaults, AreNeverSilent) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, ShotFaults,
-    ::testing::Values(ShotFault{"scale_small", [](RangefinderTrialSetup& s) { s.scale = 1.002; }},
-                      ShotFault{"scale", [](RangefinderTrialSetup& s) { s.scale = 1.01; }},
-                      ShotFault{"square", [](RangefinderTrialSetup& s) { s.square = -0.01; }},
-                      ShotFault{"offset", [](RangefinderTrialSetup& s) { s.mistake.offset_m = 0.05; }},
-                      ShotFault{"near_spots", [](RangefinderTrialSetup& s) { s.noise.sigma_spot_near_px = 2.0; }},
-                      ShotFault{"focal_small", [](RangefinderTrialSetup& s) { s.mistake.focal = 0.005; }},
-                      ShotFault{"focal", [](RangefinderTrialSetup& s) { s.mistake.focal = 0.03; }},
-                      ShotFault{"centre", [](RangefinderTrialSetup& s) { s.mistake.centre_px = 10.0; }, false},
-                      ShotFault{"wrong_17", [](RangefinderTrialSetup& s) { s.noise.outlier_share = 0.17; }},
-                      ShotFault{"wrong_45", [](RangefinderTrialSetup& s) { s.noise.outlier_share = 0.45; }},
-                      ShotFault{"wrong_56", [](RangefinderTrialSetup& s) { s.noise.outlier_share = 0.56; }},
-                      ShotFault{"late", [](RangefinderTrialSetup& s) { s.mistake.shift_rows = 1; }},
-                      ShotFault{"inches", [](RangefinderTrialSetup& s) { s.mistake.unit_m = 0.0254; }},
-                      ShotFault{"feet", [](RangefinderTrialSetup& s) { s.mistake.unit_m = 0.3048; }},
-                      ShotFault{"centimetres", [](RangefinderTrialSetup& s) { s.mistake.unit_m = 0.01; }}),
+    ::testing::Values(
+        ShotFault{"scale_small", [](RangefinderTrialSetup& s) { s.scale = 1.002; }},
+        ShotFault{"scale", [](RangefinderTrialSetup& s) { s.scale = 1.01; }},
+        ShotFault{"square", [](RangefinderTrialSetup& s) { s.square = -0.01; }},
+        ShotFault{"offset", [](RangefinderTrialSetup& s) { s.mistake.offset_m = 0.05; }},
+        ShotFault{"near_spots", [](RangefinderTrialSetup& s) { s.noise.sigma_spot_near_px = 2.0; }},
+        ShotFault{"focal_small", [](RangefinderTrialSetup& s) { s.mistake.focal = 0.005; }},
+        ShotFault{"focal", [](RangefinderTrialSetup& s) { s.mistake.focal = 0.03; }},
+        ShotFault{"centre", [](RangefinderTrialSetup& s) { s.mistake.centre_px = 10.0; }, false},
+        ShotFault{"distortion_small", [](RangefinderTrialSetup& s) { s.mistake.k1 = 0.01; }},
+        ShotFault{"distortion", [](RangefinderTrialSetup& s) { s.mistake.k1 = 0.05; }},
+        ShotFault{"drift_small", [](RangefinderTrialSetup& s) { s.mistake.drift_m = 0.005, s.tells_lengths = true; }},
+        ShotFault{"drift", [](RangefinderTrialSetup& s) { s.mistake.drift_m = 0.02, s.tells_lengths = true; }},
+        ShotFault{"bend", [](RangefinderTrialSetup& s) { s.mistake.bend_m = 0.005, s.tells_lengths = true; }},
+        ShotFault{"wander", [](RangefinderTrialSetup& s) { s.mistake.wander_px = 3.0; }},
+        ShotFault{"exchanged", [](RangefinderTrialSetup& s) { s.mistake.exchange_uv = true; }},
+        ShotFault{"wrong_17", [](RangefinderTrialSetup& s) { s.noise.outlier_share = 0.17; }},
+        ShotFault{"wrong_45", [](RangefinderTrialSetup& s) { s.noise.outlier_share = 0.45; }},
+        ShotFault{"wrong_56", [](RangefinderTrialSetup& s) { s.noise.outlier_share = 0.56; }},
+        ShotFault{"late", [](RangefinderTrialSetup& s) { s.mistake.shift_rows = 1; }},
+        ShotFault{"inches", [](RangefinderTrialSetup& s) { s.mistake.unit_m = 0.0254; }},
+        ShotFault{"feet", [](RangefinderTrialSetup& s) { s.mistake.unit_m = 0.3048; }},
+        ShotFault{"centimetres", [](RangefinderTrialSetup& s) { s.mistake.unit_m = 0.01; }}),
     [](const auto& info) { return std::string(info.param.name); });
 
 /// Spots alone have no left and right: with them the mirrored beam is as good as the true one.
@@ -66,6 +74,37 @@ TEST(ShotFaults, MirroredImagesAreSeenByTheirBoards) {
       const RangefinderTrial trial = rangefinder_trial(setup, seed);
       EXPECT_TRUE(trial.is_seen) << seed << ": " << trial.worst_sigmas << "σ";
     }
+  }
+}
+
+/// Of spots without boards the beam's direction tells: a rangefinder looks along with its camera.
+TEST(ShotFaults, ExchangedColumnsOfSpotsAreNamed) {
+  for (const bool has_boards : {true, false}) {
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      RangefinderTrialSetup setup;
+      setup.method = RangefinderMethod::spot;
+      setup.has_boards = has_boards;
+      setup.mistake.exchange_uv = true;
+      const Verdict verdict = rangefinder_trial(setup, seed).solved.verdict;
+      EXPECT_NE(verdict.state, State::good) << seed;
+      EXPECT_NE((verdict.sentence + verdict.to_add).find("exchanged"), std::string::npos)
+          << verdict.sentence << verdict.to_add;
+    }
+  }
+}
+
+/// Distortion that the file gives as exact is estimated, and where it is another that is said: the beam is the true
+/// one.
+TEST(ShotFaults, DistortionGivenWithoutSigmaIsEstimated) {
+  RangefinderTrialSetup setup;
+  setup.mistake.k1 = 0.05;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const RangefinderTrial trial = rangefinder_trial(setup, seed);
+    const auto& freed = trial.solved.report.freed_distortion;
+    ASSERT_EQ(freed.size(), 4u) << seed;
+    EXPECT_NEAR(freed[0].value, 0.0, 4.0 * freed[0].sigma);
+    EXPECT_EQ(trial.solved.verdict.state, State::care);
+    EXPECT_LT(trial.worst_sigmas, 4.5) << seed;
   }
 }
 

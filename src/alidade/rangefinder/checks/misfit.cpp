@@ -11,37 +11,45 @@ namespace {
 
 /// How well a beam explains shots; 0 to spare where none does.
 struct Explained {
-  bool fits = false;                                       ///< Nearly all, by readings as a rangefinder's are.
-  bool known = false;                                      ///< And the shots tell which beam.
-  double rms_m = std::numeric_limits<double>::infinity();  ///< Of the ranges of all shots.
-  int spare = 0;                                           ///< Measurements beyond what the beam takes.
+  bool fits = false;                                        ///< Nearly all, by readings as a rangefinder's are.
+  bool known = false;                                       ///< And the shots tell which beam.
+  double rms_m = std::numeric_limits<double>::infinity();   ///< Of the ranges of all shots.
+  double rms_px = std::numeric_limits<double>::infinity();  ///< Of the spots of all shots.
+  int spare = 0;                                            ///< Measurements beyond what the beam takes.
 };
 
 Explained explained(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board, const Camera& camera,
                     const RangefinderConfig& config) {
   constexpr double max_m = 0.05, max_of_range = 0.02;
   const RangefinderReport report = calibrate_rangefinder(shots, points_in_board, camera, config);
-  double mean_m = 0.0, sum_m2 = 0.0, num = 0.0;
+  double mean_m = 0.0, sum_m2 = 0.0, num = 0.0, sum_px2 = 0.0, num_spots = 0.0;
   for (const Shot& shot : shots) mean_m += shot.range_m / static_cast<double>(shots.size());
   Explained by{.spare = -5};
   for (const ShotFit& fit : report.shots) {
     by.spare += (std::isfinite(fit.residual_range_m) ? 1 : 0) + (fit.residual_px.allFinite() ? 2 : 0);
+    if (fit.residual_px.allFinite()) sum_px2 += fit.residual_px.squaredNorm(), num_spots += 1.0;
     if (!std::isfinite(fit.residual_range_m)) continue;
     sum_m2 += fit.residual_range_m * fit.residual_range_m;
     num += 1.0;
   }
   if (num > 0.0) by.rms_m = std::sqrt(sum_m2 / num);
+  if (num_spots > 0.0) by.rms_px = std::sqrt(sum_px2 / num_spots);
   by.fits = 10 * report.shots_used >= 8 * static_cast<int>(shots.size()) && report.rms_range_m > 0.0 &&
             report.rms_range_m < std::min(max_m, max_of_range * mean_m);
   by.known = report.status == RangefinderReport::Status::converged && report.bound.sigma_origin_m < 0.1;
   return by;
 }
 
-/// Is it the cause? Its residuals are so much smaller that by chance none of the causes tried would do so once in a
-/// thousand tables: likelihood ratio of normal residuals, times the number of causes.
-bool is_cause(const Explained& by, const Explained& as_given) {
-  constexpr double num_causes = 6.0, chance = 1e-3;
-  return by.fits && by.known && by.spare * std::log(as_given.rms_m / by.rms_m) > std::log(num_causes / chance);
+/// Are residuals so much smaller that by chance none of the causes tried would do so once in a thousand tables?
+/// Likelihood ratio of normal residuals, times the number of causes.
+bool is_plain(double rms_before, const Explained& by, double rms) {
+  constexpr double num_causes = 9.0, chance = 1e-3;
+  return by.fits && by.known && by.spare * std::log(rms_before / rms) > std::log(num_causes / chance);
+}
+
+bool is_cause(const Explained& by, const Explained& as_given) { return is_plain(as_given.rms_m, by, by.rms_m); }
+bool is_cause_of_spots(const Explained& by, const Explained& as_given) {
+  return is_plain(as_given.rms_px, by, by.rms_px);
 }
 
 /// The ranges of one row after (1) or before (−1); the row without one is rejected.
@@ -56,6 +64,29 @@ std::vector<Shot> shifted(std::span<const Shot> shots, int by) {
   }
   return moved;
 }
+
+using ChangeOfSpot = Eigen::Vector2d (*)(const Eigen::Vector2d&, const Camera&);
+
+/// Spots as another order of the columns, or a mirrored image, would have them.
+std::vector<Shot> with_spots(std::span<const Shot> shots, const Camera& camera, ChangeOfSpot changed) {
+  std::vector<Shot> moved(shots.begin(), shots.end());
+  for (Shot& shot : moved)
+    if (shot.spot) shot.spot->px = changed(shot.spot->px, camera);
+  return moved;
+}
+
+constexpr std::array<std::pair<ChangeOfSpot, const char*>, 3> changes_of_spots{{
+    {[](const Eigen::Vector2d& px, const Camera&) -> Eigen::Vector2d { return px.reverse(); },
+     "u and v of the spots are exchanged"},
+    {[](const Eigen::Vector2d& px, const Camera& camera) -> Eigen::Vector2d {
+       return {camera.width_px - 1.0 - px.x(), px.y()};
+     },
+     "the spots are mirrored: u is counted from the right"},
+    {[](const Eigen::Vector2d& px, const Camera& camera) -> Eigen::Vector2d {
+       return {px.x(), camera.height_px - 1.0 - px.y()};
+     },
+     "the spots are mirrored: v is counted from below"},
+}};
 
 }  // namespace
 
@@ -86,38 +117,10 @@ std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::
     }
     if (explains(scaled)) return std::string("the ranges are ") + name + ", not metres";
   }
+  for (const auto& [change, name] : changes_of_spots)
+    if (is_cause_of_spots(explained(with_spots(shots, camera, change), points_in_board, camera, plain), as_given))
+      return name;
   return "";
-}
-
-namespace {
-
-bool is_of_another_unit(const Verdict& verdict) {
-  return std::any_of(verdict.checks.begin(), verdict.checks.end(),
-                     [](const Check& check) { return check.name == "scale" && check.state == State::refused; });
-}
-
-}  // namespace
-
-SolvedRangefinder solve_rangefinder(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board,
-                                    const Camera& camera, const RangefinderConfig& config, const Progress& progress) {
-  SolvedRangefinder held{calibrate_rangefinder(shots, points_in_board, camera, config, progress), {}, config};
-  held.verdict = rangefinder_verdict(held.report, shots, config);
-  const bool has_boards = std::any_of(shots.begin(), shots.end(), [](const Shot& shot) { return shot.has_plane(); });
-  const bool no_beam = held.verdict.exit_code != ExitCode::ok && has_boards;
-  if (const std::string cause = no_beam ? cause_of_misfit(shots, points_in_board, camera, config) : "";
-      !cause.empty()) {
-    held.verdict.sentence = cause;
-    held.verdict.to_add = "give each row the range of its own spot and board, in metres";
-    return held;
-  }
-  if (!wants_scale(held.report, config)) return held;
-  SolvedRangefinder free{{}, {}, config};
-  free.config.estimate_scale = free.config.scale_by_need = true;
-  free.report = calibrate_rangefinder(shots, points_in_board, camera, free.config, progress);
-  free.verdict = rangefinder_verdict(free.report, shots, free.config);
-  // Readings in another unit have a scale, but that is no answer.
-  const bool is_told = free.verdict.exit_code == ExitCode::ok || is_of_another_unit(free.verdict);
-  return is_told ? free : held;
 }
 
 }  // namespace alidade

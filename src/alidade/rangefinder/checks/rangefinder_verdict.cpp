@@ -10,7 +10,7 @@ namespace {
 using Status = RangefinderReport::Status;
 using Method = RangefinderMethod;
 
-constexpr double refuse_origin_m = 0.1, good_origin_m = 0.01;
+constexpr double refuse_origin_m = 0.1;
 constexpr double min_range_ratio = 2.0, min_normal_spread = 0.1;
 constexpr double degenerate_range_ratio = 1.3;      // 2.0 to 2.4 m: two methods of three cannot tell
 constexpr double degenerate_normal_spread = 0.035;  // tilts of 5°: half of a board's turn is its noise
@@ -18,7 +18,13 @@ constexpr double degenerate_normal_spread = 0.035;  // tilts of 5°: half of a b
 /// Origin and direction are tied by where the beam hits, so that joint's information is never round: one reading of
 /// 2 m known to 0.1 mm makes 10⁵ of an origin known to 30 mm, which is not degenerate.
 double condition_limit(Method method) { return method == Method::joint ? 1e8 : 1e4; }
-double good_spot_px(Method method) { return method == Method::plane ? 3.0 : 1.0; }
+/// A spot that is not seen is known by how boards are tilted, to some mrad, which is what its beam illuminates: a
+/// hundredth of the image.
+double good_spot_px(Method method, const Camera& camera) {
+  return method == Method::plane ? std::max(3.0, 0.01 * camera.width_px) : 1.0;
+}
+/// Spots leave it open along the beam, boards across: one kind alone knows it half as well.
+double good_origin_m(Method method) { return method == Method::joint ? 0.01 : 0.02; }
 
 /// What the shots have, whatever the method makes of it.
 struct Supply {
@@ -177,16 +183,16 @@ State graded(double value, double good, double refuse) {
 
 void add_precision(const RangefinderReport& report, Method method, Verdict& verdict) {
   const BeamBound& bound = report.bound;
-  verdict.checks.push_back(check_of("origin", graded(bound.sigma_origin_m, good_origin_m, refuse_origin_m),
+  verdict.checks.push_back(check_of("origin", graded(bound.sigma_origin_m, good_origin_m(method), refuse_origin_m),
                                     "σ of the origin is " + text_of(1e3 * bound.sigma_origin_m, 2) + " mm",
-                                    1e3 * bound.sigma_origin_m, 1e3 * good_origin_m, "mm", "precision"));
+                                    1e3 * bound.sigma_origin_m, 1e3 * good_origin_m(method), "mm", "precision"));
   const double spot_px = bound.worst_spot_sigma_px;
   verdict.checks.push_back(
-      check_of("spot", spot_px <= good_spot_px(method) ? State::good : State::care,
+      check_of("spot", spot_px <= good_spot_px(method, report.camera) ? State::good : State::care,
                "σ of the predicted spot is up to " + text_of(spot_px, 2) + " px from " +
                    text_of(std::clamp(bound_ranges_m.front(), bound.nearest_m, bound.farthest_m), 2) + " to " +
                    text_of(std::clamp(bound_ranges_m.back(), bound.nearest_m, bound.farthest_m), 2) + " m",
-               spot_px, good_spot_px(method), "px", "precision"));
+               spot_px, good_spot_px(method, report.camera), "px", "precision"));
   const double limit = condition_limit(method);
   verdict.checks.push_back(check_of("condition", bound.condition <= limit ? State::good : State::refused,
                                     "condition number of the information " + text_of(bound.condition, 2),
@@ -353,7 +359,8 @@ Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Sho
       verdict.to_add = care->text;
       // What is wrong comes before what follows from it.
       for (const std::string_view cause :
-           {"shots agree", "spots by distance", "scale", "fit", "outliers", "boards", "camera", "mirrored"})
+           {"shots agree", "spots by distance", "bend", "drift", "wander", "scale", "fit", "outliers", "boards",
+            "camera", "distortion", "spots outside", "columns", "mirrored"})
         for (const Check& check : verdict.checks)
           if (check.name == cause && check.state == State::care) verdict.to_add = check.text;
     }

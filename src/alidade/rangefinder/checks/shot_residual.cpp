@@ -57,6 +57,7 @@ void put_range_row(const PreparedShot& shot, const Hit& hit, const Beam& beam, d
   out.J_beam(0, 5) = -hit.distance_m / (beam.scale * beam.scale);
   out.J_pose.row(0) = hit.J_pose / beam.scale;
   out.J_plane.row(0) = hit.J_plane / beam.scale;
+  out.J_errors(0, 0) = -1.0;
   out.noise_cov(0, 0) = sigma_m * sigma_m;
 }
 
@@ -80,6 +81,8 @@ bool put_spot_rows(const PreparedShot& shot, const Hit* hit, const Beam& beam, c
   }
   out.J_beam.middleRows<2>(row) = J;
   out.J_lens.middleRows(row, 2) = seen->J_px_params;
+  out.J_errors.block<2, 2>(row, 1).diagonal().setConstant(-1.0);
+  if (!hit) out.J_errors.block<2, 1>(row, 0) = beam.scale * along;
   out.noise_cov.block<2, 2>(row, row).diagonal().setConstant(shot.sigma_spot_px * shot.sigma_spot_px);
   if (!hit) {
     const double moved_m = beam.scale * sigma_m;
@@ -101,6 +104,7 @@ std::optional<ShotResidual> shot_residual(const PreparedShot& shot, const Beam& 
   out.J_pose.setZero(rows, 6);
   out.J_plane.setZero(rows, 4);
   out.J_lens.setZero(rows, num_lens);
+  out.J_errors.setZero(rows, 3);
   out.noise_cov.setZero(rows, rows);
   const double sigma_m = sigma_of_reading(shot, beam, model);
   std::optional<Hit> hit;

@@ -45,6 +45,7 @@ struct ShotResidual {
   Eigen::Matrix<double, Eigen::Dynamic, 6, 0, 3, 6> J_pose;   ///< By ξ of the pose; zero without a pose.
   Eigen::Matrix<double, Eigen::Dynamic, 4, 0, 3, 4> J_plane;  ///< By (normal, d) of the plane.
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 16> J_lens;
+  Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 3, 3> J_errors;  ///< By an error of the reading [m], of the spot [px].
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> noise_cov;  ///< Without the plane's.
 };
 

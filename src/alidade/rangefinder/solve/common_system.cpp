@@ -10,16 +10,6 @@ namespace {
 
 using Block = CommonSystem::ShotBlock;
 
-/// The shot with its plane where the board now is; the pose is a parameter, not a measurement.
-PreparedShot with_pose(const PreparedShot& shot, const Rigid3& cam_from_board) {
-  PreparedShot moved = shot;
-  if (shot.plane) {
-    moved.pose = BoardPose{cam_from_board, Eigen::Matrix<double, 6, 6>::Zero()};
-    moved.plane = plane_of(cam_from_board);
-  }
-  return moved;
-}
-
 /// The lens' part of the normal equations moves to where the free parameters stand among the common ones.
 bool add_corners(const BeamProblem& problem, const LensPrior& prior, const CommonState& state, std::size_t i,
                  CommonSystem& system) {
@@ -45,7 +35,7 @@ bool add_corners(const BeamProblem& problem, const LensPrior& prior, const Commo
 bool add_laser(const BeamProblem& problem, const LensPrior& prior, const CommonState& state, std::size_t i,
                const Block* old, CommonSystem& system) {
   const bool has_pose = state.cam_from_board[i].has_value();
-  const PreparedShot shot = has_pose ? with_pose(problem.shots[i], *state.cam_from_board[i]) : problem.shots[i];
+  const PreparedShot shot = at_state(problem.shots[i], state.cam_from_board[i]);
   const auto residual = shot_residual(shot, state.beam, state.camera, problem.model);
   if (!residual) return false;
   Block& block = system.blocks[i];
@@ -84,6 +74,14 @@ void add_prior(const LensPrior& prior, const Camera& camera, CommonSystem& syste
 }
 
 }  // namespace
+
+PreparedShot at_state(const PreparedShot& shot, const std::optional<Rigid3>& cam_from_board) {
+  PreparedShot moved = shot;
+  if (!shot.plane || !cam_from_board) return moved;
+  moved.pose = BoardPose{*cam_from_board, Eigen::Matrix<double, 6, 6>::Zero()};
+  moved.plane = plane_of(*cam_from_board);
+  return moved;
+}
 
 LensPrior lens_prior(const Camera& camera, bool with_distortion) {
   LensPrior prior;

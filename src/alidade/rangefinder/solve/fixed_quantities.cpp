@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "alidade/beam/unit_direction.h"
+#include "alidade/rangefinder/solve/held_distortion.h"
 
 namespace alidade {
 namespace {
@@ -17,12 +18,6 @@ BeamVector of_beam(const VectorXd& all, const RangefinderReport& report) {
   const Index num = report.cov_model(beam_scale_param, beam_scale_param) > 0.0 ? 6 : 5;
   beam.head(num) = all.head(num);
   return beam;
-}
-
-VectorXd gradient_of(const ReducedSystem& system) {
-  VectorXd g = VectorXd::Zero(system.H.rows());
-  for (const ReducedShot& shot : system.shots) g += shot.g;
-  return g;
 }
 
 /// A fixed quantity whose column in the system is `column`: its parameters move along `along` for a unit of it.
@@ -82,6 +77,23 @@ std::optional<double> carried_sigma(const Camera& camera, const VectorXd& along_
   return std::sqrt(u.dot(camera.cov.topLeftCorner(4, 4) * u));
 }
 
+/// Distortion that is held, and of which the file says no σ.
+void add_distortion(const ReducedSystem& system, const SolvedPart& part, const LensPrior& prior, const Camera& camera,
+                    const VectorXd& g, const RangefinderReport& report, std::vector<FixedQuantity>& fixed) {
+  const Camera wide = with_distortion(camera);
+  const VectorXd values = params(with_distortion(report.camera).lens);
+  const std::vector<std::string> names = param_names(wide.lens);
+  for (const int parameter : held_distortion(wide, prior.free)) {
+    const std::string& name = names[static_cast<std::size_t>(parameter)];
+    const VectorXd along = VectorXd::Unit(system.H.rows(), system.of_lens(parameter));
+    fixed.push_back(fixed_along("camera." + name, along, system, part, g, report));
+    fixed.back().value = values[parameter];
+    // Refine::beam carries the covariance of the whole lens.
+    const bool has_sigma = parameter < wide.cov.rows() && wide.cov(parameter, parameter) > 0.0;
+    if (has_sigma) fixed.back().sigma = std::sqrt(wide.cov(parameter, parameter));
+  }
+}
+
 void add_lens(const ReducedSystem& system, const SolvedPart& part, const LensPrior& prior, const Camera& camera,
               const VectorXd& g, const RangefinderReport& report, std::vector<FixedQuantity>& fixed) {
   const VectorXd values = params(camera.lens);
@@ -96,6 +108,7 @@ void add_lens(const ReducedSystem& system, const SolvedPart& part, const LensPri
     }
     fixed.back().value = values[name == "camera.f" ? 0 : name == "camera.cx" ? 2 : 3];
   }
+  add_distortion(system, part, prior, camera, g, report, fixed);
 }
 
 BeamVector between(const Beam& from, const Beam& to) {
@@ -107,11 +120,19 @@ BeamVector between(const Beam& from, const Beam& to) {
 
 }  // namespace
 
+VectorXd gradient_of(const ReducedSystem& system, const LensPrior& prior, const Camera& camera) {
+  VectorXd g = VectorXd::Zero(system.H.rows());
+  for (const ReducedShot& shot : system.shots) g += shot.g;
+  if (prior.free.empty()) return g;
+  g(system.places(0, prior.free)) += prior.information * (params(camera.lens) - prior.mean)(prior.free);
+  return g;
+}
+
 std::vector<FixedQuantity> fixed_quantities(const ReducedSystem& system, const SolvedPart& part, const LensPrior& prior,
                                             const Camera& camera, std::span<const Eigen::Vector3d> points_in_board,
                                             const RangefinderReport& report, const RangefinderConfig& config) {
   std::vector<FixedQuantity> fixed;
-  const VectorXd g = gradient_of(system);
+  const VectorXd g = gradient_of(system, prior, report.camera);
   const bool has_boards =
       config.method != RangefinderMethod::spot && points_in_board.size() > 1 &&
       std::any_of(system.shots.begin(), system.shots.end(), [](const ReducedShot& shot) { return shot.has_corners; });

@@ -11,8 +11,11 @@ struct SolvedPart {
   Eigen::MatrixXd inverse;
 };
 
-/// Square and scale, focal length and centre, flatness of the board: by how much each moves the beam, and what the
-/// shots ask for. `camera`: as given. C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948 (the score test).
+/// ∂cost/2 by all parameters of the system, with what the lens' prior pulls; `camera`: as it stands.
+[[nodiscard]] Eigen::VectorXd gradient_of(const ReducedSystem& system, const LensPrior& prior, const Camera& camera);
+
+/// Square and scale, focal length, centre and held distortion, flatness of the board: by how much each moves the beam,
+/// and what the shots ask for. `camera`: as given. C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948 (the score test).
 [[nodiscard]] std::vector<FixedQuantity> fixed_quantities(const ReducedSystem& system, const SolvedPart& part,
                                                           const LensPrior& prior, const Camera& camera,
                                                           std::span<const Eigen::Vector3d> points_in_board,

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "alidade/geometry/decompositions.h"
+#include "alidade/rangefinder/solve/held_distortion.h"
 
 namespace alidade {
 namespace {
@@ -10,18 +11,43 @@ namespace {
 using Eigen::Index;
 
 /// fx, fy, cx, cy come first in every lens; skew is none that a lens has by chance.
-std::vector<int> lens_columns(const LensPrior& prior) {
+std::vector<int> lens_columns(const LensPrior& prior, const Camera& camera) {
   std::vector<int> columns{0, 1, 2, 3};
   for (const int parameter : prior.free)
     if (parameter > 3) columns.push_back(parameter);
+  for (const int parameter : held_distortion(camera, prior.free)) columns.push_back(parameter);
   return columns;
+}
+
+ErrorScore error_score(const BeamProblem& one, const LensPrior& all_of_lens, const CommonState& state,
+                       const CommonSystem& system) {
+  const auto k = static_cast<Index>(all_of_lens.free.size());
+  ErrorScore score;
+  score.by_common.setZero(3, num_beam_params + k);
+  const PreparedShot shot = at_state(one.shots[0], state.cam_from_board[0]);
+  if (!shot.used || shot.num_rows() == 0) return score;
+  const auto residual = shot_residual(shot, state.beam, state.camera, one.model);
+  if (!residual) return score;
+  const auto& block = system.blocks[0];
+  const Eigen::MatrixXd D = block.whitener * residual->J_errors;
+  score.s = D.transpose() * (block.whitener * residual->r);
+  score.I = D.transpose() * D;
+  score.by_common.leftCols(num_beam_params) = D.transpose() * (block.whitener * residual->J_beam);
+  score.by_common.rightCols(k) = D.transpose() * (block.whitener * residual->J_lens(Eigen::all, all_of_lens.free));
+  if (!block.has_pose || !shot.plane) return score;
+  const Eigen::MatrixXd by_pose = D.transpose() * (block.whitener * residual->J_pose);
+  const Ldlt V(block.V);
+  score.s -= by_pose * V.solve(block.g);
+  score.I -= by_pose * V.solve_each(by_pose.transpose());
+  score.by_common -= by_pose * V.solve_each(block.W);
+  return score;
 }
 
 std::optional<ReducedShot> reduced_shot(const BeamProblem& one, const LensPrior& all_of_lens,
                                         const CommonState& state) {
   const auto system = common_system(one, all_of_lens, state);
   if (!system) return std::nullopt;
-  ReducedShot shot{0, false, system->U, system->g};
+  ReducedShot shot{0, false, system->U, system->g, error_score(one, all_of_lens, state, *system)};
   const auto& block = system->blocks[0];
   if (!block.has_pose) return shot;
   shot.has_corners = true;
@@ -56,7 +82,7 @@ Eigen::VectorXd ReducedSystem::square_column(const Beam& beam) const {
 
 ReducedSystem reduced_system(const BeamProblem& problem, const LensPrior& held_prior, const CommonState& state) {
   ReducedSystem reduced;
-  reduced.lens = lens_columns(held_prior);
+  reduced.lens = lens_columns(held_prior, state.camera);
   const auto num_lens = static_cast<Index>(reduced.lens.size());
   const LensPrior all_of_lens{reduced.lens, params(state.camera.lens), Eigen::MatrixXd::Zero(num_lens, num_lens)};
   reduced.H.setZero(num_beam_params + num_lens, num_beam_params + num_lens);

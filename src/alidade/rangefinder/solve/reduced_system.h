@@ -7,16 +7,24 @@
 
 namespace alidade {
 
+/// The same by what the shot's measurements could err by: of the reading [m], of the spot in u and in v [px].
+struct ErrorScore {
+  Eigen::Vector3d s = Eigen::Vector3d::Zero();  ///< ∂cost/2.
+  Eigen::Matrix3d I = Eigen::Matrix3d::Zero();  ///< ∂²cost/2.
+  Eigen::Matrix<double, 3, Eigen::Dynamic> by_common;
+};
+
 /// What one shot tells: its part A of the information and g = Jᵀr of the gradient, the board's pose eliminated.
 struct ReducedShot {
   std::size_t index = 0;  ///< In the problem's list.
   bool has_corners = false;
   Eigen::MatrixXd A;
   Eigen::VectorXd g;
+  ErrorScore errors;
 };
 
 /// Normal equations at a solution, shot by shot, also of what was held there: the beam's six parameters [origin m,
-/// direction rad, scale], then those of the lens that `lens` names: fx, fy, cx, cy, and what was free.
+/// direction rad, scale], then those of the lens that `lens` names: fx, fy, cx, cy, its distortion, and what was free.
 struct ReducedSystem {
   std::vector<int> lens;
   std::vector<ReducedShot> shots;

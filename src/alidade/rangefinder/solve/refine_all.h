@@ -43,6 +43,9 @@ struct CommonState {
   std::vector<std::optional<Rigid3>> cam_from_board;
 };
 
+/// The shot with its plane where the board now is; the pose is a parameter, not a measurement. None: as it is.
+[[nodiscard]] PreparedShot at_state(const PreparedShot& shot, const std::optional<Rigid3>& cam_from_board);
+
 /// None where a corner or spot is not seen or a plane not met. `old`: whiteners for cost_with_old_weights.
 [[nodiscard]] std::optional<CommonSystem> common_system(const BeamProblem& problem, const LensPrior& prior,
                                                         const CommonState& state, const CommonSystem* old = nullptr);

@@ -1,0 +1,107 @@
+#include <algorithm>
+
+#include "alidade/rangefinder/rangefinder.h"
+#include "alidade/rangefinder/solve/held_distortion.h"
+
+namespace alidade {
+namespace {
+
+bool is_of_another_unit(const Verdict& verdict) {
+  return std::any_of(verdict.checks.begin(), verdict.checks.end(),
+                     [](const Check& check) { return check.name == "scale" && check.state == State::refused; });
+}
+
+/// One job's shots, and what is done with them.
+struct Shots {
+  std::span<const Shot> shots;
+  std::span<const Eigen::Vector3d> points_in_board;
+  const Progress& progress;
+
+  [[nodiscard]] SolvedRangefinder solved_with(const Camera& camera, const RangefinderConfig& config) const {
+    SolvedRangefinder solved{
+        calibrate_rangefinder(shots, points_in_board, camera, config, progress), {}, config, camera};
+    solved.verdict = rangefinder_verdict(solved.report, shots, config);
+    return solved;
+  }
+  [[nodiscard]] bool have_boards() const {
+    return std::any_of(shots.begin(), shots.end(), [](const Shot& shot) { return shot.has_plane(); });
+  }
+};
+
+/// Distortion that the file gives without σ.
+std::vector<int> opened_by_need(const Camera& file) {
+  std::vector<int> opened = held_distortion(file, {});
+  std::erase_if(opened, [&](int k) { return k < file.cov.rows() && file.cov(k, k) > 0.0; });
+  return opened;
+}
+
+/// `file`: as given.
+void name_freed(const Camera& file, const Shots& shots, SolvedRangefinder& solved) {
+  const Eigen::VectorXd was = params(file.lens), is = params(solved.report.camera.lens);
+  const std::vector<std::string> names = param_names(file.lens);
+  solved.report.freed_distortion.clear();
+  for (const int k : opened_by_need(file))
+    solved.report.freed_distortion.push_back(
+        {names[static_cast<std::size_t>(k)], was[k], is[k], std::sqrt(solved.report.camera.cov(k, k))});
+  solved.verdict = rangefinder_verdict(solved.report, shots.shots, solved.config);
+}
+
+/// Twice: the corners of each board are weighed by how the lens that the solve starts with fits them. None where the
+/// shots do not tell it.
+std::optional<SolvedRangefinder> with_free_distortion(const Shots& shots, const Camera& camera,
+                                                      const RangefinderConfig& config) {
+  const Camera file = with_distortion(camera);
+  const std::vector<int> opened = opened_by_need(file);
+  Camera open = with_open_distortion(camera);
+  if (opened.empty() || config.refine != Refine::all || open.cov.rows() != params(open.lens).size())
+    return std::nullopt;
+  std::optional<SolvedRangefinder> solved;
+  for (int pass = 0; pass < 2; ++pass) {
+    solved = shots.solved_with(open, config);
+    if (solved->verdict.exit_code != ExitCode::ok) return std::nullopt;
+    Eigen::VectorXd values = params(open.lens);
+    values(opened) = params(solved->report.camera.lens)(opened);
+    open.lens = with_params(open.lens, values);
+  }
+  name_freed(file, shots, *solved);
+  return solved;
+}
+
+void refuse(const std::string& cause, SolvedRangefinder& solved) {
+  if (solved.verdict.exit_code == ExitCode::ok) {
+    solved.verdict.state = State::refused;
+    solved.verdict.exit_code = ExitCode::cannot_tell;
+  }
+  solved.verdict.sentence = cause;
+  solved.verdict.to_add =
+      "give each row the range of its own spot and board, in metres; spots as u, v from the top left";
+}
+
+}  // namespace
+
+SolvedRangefinder solve_rangefinder(std::span<const Shot> given, std::span<const Eigen::Vector3d> points_in_board,
+                                    const Camera& camera, const RangefinderConfig& config, const Progress& progress) {
+  const Shots shots{given, points_in_board, progress};
+  SolvedRangefinder best = shots.solved_with(camera, config);
+  const bool is_solved = best.verdict.exit_code == ExitCode::ok, has_boards = shots.have_boards();
+  if (has_boards && (is_solved ? wants_distortion(best.report, camera, config) : true))
+    if (auto free = with_free_distortion(shots, camera, config)) best = std::move(*free);
+  // Spots alone have no left and right; where there are boards they have.
+  const bool may_be_amiss = best.verdict.exit_code != ExitCode::ok || config.method == RangefinderMethod::spot;
+  if (const std::string cause =
+          has_boards && may_be_amiss ? cause_of_misfit(given, points_in_board, best.camera, config) : "";
+      !cause.empty()) {
+    refuse(cause, best);
+    return best;
+  }
+  if (!wants_scale(best.report, config)) return best;
+  RangefinderConfig with_scale = config;
+  with_scale.estimate_scale = with_scale.scale_by_need = true;
+  SolvedRangefinder free = shots.solved_with(best.camera, with_scale);
+  if (!best.report.freed_distortion.empty()) name_freed(with_distortion(camera), shots, free);
+  // Readings in another unit have a scale, but that is no answer.
+  const bool is_told = free.verdict.exit_code == ExitCode::ok || is_of_another_unit(free.verdict);
+  return is_told ? free : best;
+}
+
+}  // namespace alidade

@@ -29,7 +29,8 @@ namespace {
 struct SimulateRotationArgs {
   std::string size = "780x582", source = "rate", motion = "sway", zoom = "none";
   std::vector<double> k{710.0, 700.0, 390.0, 290.0}, lever, depth;
-  double k1 = 0.0, k2 = 0.0, k3 = 0.0, p1 = 0.0, p2 = 0.0, tilt_deg = 0.0, delay_s = 0.0, shutter_s = 0.0;
+  double k1 = 0.0, k2 = 0.0, k3 = 0.0, p1 = 0.0, p2 = 0.0, tilt_deg = 0.0, delay_s = 0.0, shutter_s = 0.0,
+         clock_rate = 0.0;
   double drift_per_s = 0.0, backlash_deg = 0.0;
   std::vector<double> mount_deg, bias, signs, zero_drift, curve_deg;
   RotationFaults faults;
@@ -203,6 +204,7 @@ ExitCode simulate_rotation_log(const SimulateRotationArgs& args, Run& run) {
   scene.intrinsics = [&args](double t_s) { return intrinsics_at(args, t_s); };
   scene.motion = motion_of(args);
   scene.delay_s = args.delay_s;
+  scene.clock_rate = args.clock_rate;
   scene.shutter_s = args.shutter_s;
   if (!args.mount_deg.empty()) scene.mount_rad = Eigen::Vector3d(args.mount_deg.data()) * std::numbers::pi / 180.0;
   if (!args.lever.empty()) scene.lever_arm_m = Eigen::Vector3d(args.lever.data());
@@ -256,6 +258,7 @@ void add_fault_options(CLI::App& command, SimulateRotationArgs& args) {
   numbers("--bias", args.bias, 3, "Of the rates x,y,z [rad/s]");
   numbers("--mount-deg", args.mount_deg, 3, "The camera on its mount: rotation vector x,y,z [°]");
   number("--line-time", args.shutter_s, "Rolling shutter: last row after the first [s]", -0.2, 0.2);
+  number("--clock-rate", args.clock_rate, "The images' clock over the rotation's, less one", -0.1, 0.1);
   number("--focal-drift", args.drift_per_s, "Growth of fx and fy a second, as a share", -0.1, 0.1);
   number("--wrong", faults.wrong_share, "Share of pixels that are anywhere; of wrong matches in pairs.csv", 0.0, 0.95);
   number("--swapped", faults.swapped_share, "Share of pixels that are another point's", 0.0, 0.95);

@@ -1,5 +1,6 @@
 #include "alidade/identify.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -28,6 +29,17 @@ std::vector<Assumption> assumed_of(const ServoIdentification& identified) {
   const double gain = identified.fit.params[ServoParam::gain], sigma = std::sqrt(identified.fit.cov(0, 0));
   std::vector<Assumption> assumed = {{.name = "encoder_scale", .value = 1.0, .sigma = 0.0, .moved = "gain_rad"},
                                      {.name = "clock_rate", .value = 1.0, .sigma = 0.0, .moved = "tau_s"}};
+  for (const CountedFlaw& counted : identified.counted) {
+    const bool is_listed = std::ranges::any_of(
+        identified.hidden, [&](const HiddenFlaw& hidden) { return hidden.flaw == counted.flaw; });
+    if (is_listed) continue;
+    assumed.push_back({.name = servo_flaw_names[counted.flaw],
+                       .value = 0.0,
+                       .sigma = counted.sigma,
+                       .moves = std::abs(counted.gain_moves) / sigma,
+                       .moved = "gain_rad",
+                       .moved_by = counted.gain_moves});
+  }
   for (const HiddenFlaw& hidden : identified.hidden)
     assumed.push_back({.name = servo_flaw_names[hidden.flaw],
                        .value = servo_flaws[hidden.flaw] == &ServoFlaws::max_rate_rad_s

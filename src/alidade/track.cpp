@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <variant>
 
@@ -69,6 +71,19 @@ TargetMotion motion_of(TrackMethod method) {
     default:
       return TargetMotion::cv;
   }
+}
+
+/// How long after they were taken observations of a recording come, others having overtaken them: up to 2 s are waited
+/// for, so that the track does not depend on the order of arrival.
+double lateness_s(const std::vector<TargetObservation>& observations) {
+  constexpr double longest_s = 2.0, slack_s = 0.05;
+  double newest_s = -std::numeric_limits<double>::infinity(), late_s = 0.0;
+  for (const TargetObservation& observation : observations) {
+    newest_s = std::max(newest_s, observation.t_capture_s);
+    const double behind_s = newest_s - observation.t_capture_s;
+    if (behind_s <= longest_s) late_s = std::max(late_s, behind_s + slack_s);
+  }
+  return late_s;
 }
 
 FollowConfig follow_config(const TrackConfig& config, const Rig& rig) {
@@ -172,6 +187,7 @@ TargetTrack track(std::vector<TargetObservation> observations, Rig rig, const Tr
   } else {
     FollowConfig follow = follow_config(config, result.rig);
     follow.progress = progress;
+    follow.tracker.history_s = std::max(follow.tracker.history_s, lateness_s(result.observations));
     static_cast<TrackReport&>(result) = track_target(result.observations, heads, follow, result.truth, watch);
     judge_track(follow, result);
   }

@@ -39,7 +39,7 @@ FieldList word_fields(ObserveConfig& config) {
       {.name = "estimate",
        .value = &config.estimate,
        .help = "Estimated as well: auto (default: what the residuals ask for), none, or of k1, k2, k3, p1, p2, mount, "
-               "delay, lever, shutter, focal-drift, and of the rotation scale, backlash, curve, drift, bias"},
+               "delay, lever, shutter, focal-drift, and of the rotation scale, backlash, curve, drift, bias, clock"},
       {.name = "start",
        .value = vector_code<4>(config.start),
        .help = "Initial guess: fx,fy,cx,cy [px]; without it several are tried",

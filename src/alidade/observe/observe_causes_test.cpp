@@ -168,6 +168,16 @@ TEST(ObserveCauses, BiasOfAGyroscopeIsEstimated) {
   expect_estimated(world, "bias_x_rad_per_s");
 }
 
+/// A thousandth: 5 ms at either end of the log, which no delay undoes.
+TEST(ObserveCauses, AClockAtAnotherRateIsEstimated) {
+  for (const RotationSource source : {RotationSource::head, RotationSource::attitude}) {
+    World world = with_scene([](RotationScene& scene, RotationLogConfig&, Draws&) { scene.clock_rate = 1e-3; });
+    world.source = source;
+    world.tells_scale = true;
+    expect_estimated(world, "clock_rate");
+  }
+}
+
 TEST(ObserveCauses, LineTimeOfARollingShutterIsEstimated) {
   expect_estimated(with_scene([](RotationScene& scene, RotationLogConfig&, Draws&) { scene.shutter_s = 0.02; }),
                    "shutter_s");

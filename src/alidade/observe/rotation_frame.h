@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-inline constexpr int max_rotation_errors = 14;  ///< Of a head: scale, backlash, zero and curve of both axes.
+inline constexpr int max_rotation_errors = 15;  ///< Of a head: scale, backlash, zero and curve of both axes, clock.
 using TurnByErrors = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_rotation_errors>;
 
 /// One instant as the estimators of a rotating camera take it: how the camera has turned since the start, and what it

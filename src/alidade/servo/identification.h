@@ -74,6 +74,12 @@ struct HiddenFlaw {
   double size = 0.0, gain_factor = 1.0;
 };
 
+/// A flaw that is taken to be none, what there may be of it, and what that does to the gain beside what the log tells.
+struct CountedFlaw {
+  std::size_t flaw = 0;
+  double sigma = 0.0, gain_moves = 0.0;
+};
+
 struct ServoIdentification {
   enum class Status { converged, not_converged, degenerate };
   Status status = Status::degenerate;
@@ -84,6 +90,7 @@ struct ServoIdentification {
   std::size_t correlated_rows = 1;   ///< How many rows in a row share an error.
   std::vector<ServoRival> rivals;    ///< Of the flaws that were freed.
   std::vector<HiddenFlaw> hidden;
+  std::vector<CountedFlaw> counted;  ///< In the fit's covariance.
   double lag_one_correlation = 0.0;  ///< Of the residuals, one row to the next: near 0 where the model is enough.
   double command_range = 0.0, angle_range_rad = 0.0, duration_s = 0.0;
 };

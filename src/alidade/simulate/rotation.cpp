@@ -82,7 +82,7 @@ class Turning {
 
  private:
   Eigen::Quaterniond turned(double t_s) {
-    return cam_from_mount_ * mount_.at(t_s + scene_.delay_s) * cam_from_mount_.conjugate();
+    return cam_from_mount_ * mount_.at(t_s * (1.0 + scene_.clock_rate) + scene_.delay_s) * cam_from_mount_.conjugate();
   }
 
   [[nodiscard]] Eigen::Vector3d in_cam(std::size_t i, const Eigen::Quaterniond& cam_from_start) const {

@@ -204,6 +204,24 @@ Throws thrown(TargetMotion method) {
   return all;
 }
 
+/// A ball that bounces, followed as if it kept its velocity: named, and what follows it.
+TEST(TrackFaults, ATargetThatFallsIsNamed) {
+  int named = 0;
+  constexpr int draws = 5;
+  TrackScene scene = *track_scenario("throw");
+  scene.duration_s = 6.0;
+  scene.position = [](double t_s) {
+    const double flight_s = std::fmod(t_s, 1.0), g = 9.80665;
+    return Eigen::Vector3d(0.2 * std::sin(0.8 * t_s), 0.3 - 0.5 * g * flight_s * (1.0 - flight_s), 3.0);
+  };
+  for (std::uint64_t seed = 1; seed <= draws; ++seed) {
+    const Judged result = judged(scene, seed);
+    EXPECT_NE(result.verdict.state, State::good) << seed;
+    named += result.verdict.sentence.find("--method imm") != std::string::npos;
+  }
+  EXPECT_GE(named, draws - 1);
+}
+
 TEST(TrackFaults, PredictionsInFlightAreWithinTheirSigma) {
   for (const TargetMotion method : {TargetMotion::ballistic, TargetMotion::imm}) {
     const Throws throws = thrown(method);

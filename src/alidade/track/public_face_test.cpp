@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -49,6 +50,30 @@ TEST(TrackFace, IsTheWholeJob) {
   EXPECT_EQ(outcome.document.counts.given, observations.size());
   ASSERT_EQ(outcome.files.size(), 1u);
   EXPECT_EQ(outcome.files[0].name, "track.csv");
+}
+
+/// One head's images come so much later than the other's: of a recording the order of arrival changes nothing.
+TEST(TrackFace, ALateHeadIsWaitedFor) {
+  const TrackScene scene = *track_scenario("B");
+  auto observations = brief_observations(scene);
+  const TargetTrack at_once = track(observations, rig_of(scene), {});
+  ASSERT_TRUE(at_once.verdict.ok()) << at_once.verdict.sentence;
+  const auto arriving = [&](double late_s) {
+    std::vector<TargetObservation> late = observations;
+    for (TargetObservation& observation : late)
+      if (observation.head == 1) observation.t_arrival_s = observation.t_capture_s + late_s;
+    std::ranges::stable_sort(late, {}, &TargetObservation::t_arrival_s);
+    return track(late, rig_of(scene), {});
+  };
+  for (const double late_s : {0.1, 0.4, 1.0}) {
+    const TargetTrack late = arriving(late_s);
+    EXPECT_EQ(late.counts.used, at_once.counts.used) << late_s;
+    EXPECT_EQ(late.verdict.state, at_once.verdict.state) << late.verdict.sentence;
+    EXPECT_LT((late.steps.back().belief.x - at_once.steps.back().belief.x).norm(), 1e-3) << late_s;
+  }
+  const TargetTrack too_late = arriving(2.9);
+  EXPECT_EQ(too_late.verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_THAT(too_late.verdict.sentence, testing::HasSubstr("come more than"));
 }
 
 /// What the filter says of each observation as it comes is what the whole says of it, to the last digit.

@@ -1,13 +1,17 @@
 #include "alidade/observe/checks/cause_columns.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "alidade/geometry/so3.h"
 
 namespace alidade {
 namespace {
 
-constexpr int max_lever_points = 16;
+constexpr int max_lever_points = 16, max_across_points = 8;
+constexpr int num_waves = 6;  // half waves over the log: slower ones than that leave no rest to learn the points in
+constexpr double usual_wave = 0.005;
 constexpr double usual_k = 0.3, usual_p = 0.01, usual_mount_rad = 0.2, usual_delay_s = 0.1, usual_shutter_s = 0.03,
                  usual_zoom_per_s = 0.01, usual_parallax_rad = 0.05;
 
@@ -37,7 +41,8 @@ CauseColumns::CauseColumns(const RotationLog& log, const Adjustment& reference, 
       wide_(with_rotation(config.nuisances)),
       height_(config.height),
       patterns_(turn_patterns(log, errors_but(log, config.errors), config.max_gap_s)),
-      lever_column_(reference.bundle.points.size(), -1) {
+      lever_column_(reference.bundle.points.size(), -1),
+      across_column_(reference.bundle.points.size(), -1) {
   for (const RotationFrame& frame : reference.bundle.frames) {
     const auto row = std::lower_bound(log.rows.begin(), log.rows.end(), frame.t_s - 1e-9,
                                       [](const RotationRow& r, double t_s) { return r.t_s < t_s; });
@@ -59,6 +64,7 @@ CauseColumns::CauseColumns(const RotationLog& log, const Adjustment& reference, 
   }
   if (!config.nuisances.drift) drift_ = size();
   if (drift_ >= 0) add("focal length that drifts", "f'/f", usual_zoom_per_s, "1/s");
+  add_zoom();
   if (!config.nuisances.lever && log.source != RotationSource::none) add_lever();
   first_pattern_ = size();
   for (const TurnPattern& pattern : patterns_) {
@@ -93,6 +99,15 @@ void CauseColumns::add_lens() {
   }
 }
 
+/// A focal length that comes and goes: half waves over the log.
+void CauseColumns::add_zoom() {
+  first_zoom_ = size();
+  for (int wave = 1; wave <= num_waves; ++wave) {
+    add("focal length that varies", "in " + std::to_string(wave) + (wave == 1 ? " half wave" : " half waves"),
+        usual_wave);
+  }
+}
+
 void CauseColumns::add_lever() {
   first_lever_ = size();
   for (const char* member : {"x over distance", "y over distance", "z over distance"}) {
@@ -109,6 +124,13 @@ void CauseColumns::add_lever() {
   for (std::size_t i = 1; i < order.size() && i <= max_lever_points; ++i) {
     lever_column_[static_cast<std::size_t>(order[i])] = size();
     add("lever", "z over distance, a point's own", usual_parallax_rad, "rad");
+  }
+  // Across the view what all points share is another principal point.
+  groups_.push_back({"lever across the view", {first_lever_, first_lever_ + 1}});
+  for (std::size_t i = 1; i < order.size() && i <= max_across_points; ++i) {
+    across_column_[static_cast<std::size_t>(order[i])] = size();
+    add("lever across the view", "x over distance, a point's own", usual_parallax_rad, "rad");
+    add("lever across the view", "y over distance, a point's own", usual_parallax_rad, "rad");
   }
 }
 
@@ -154,6 +176,12 @@ bool CauseColumns::at(const BundleObservation& seen, RotationPrediction& p, Eige
   if (drift_ >= 0)
     by_causes.col(drift_) =
         (frames[static_cast<std::size_t>(frame_)].t_s - middle_s) * (p.px - reference_.solution.camera.k.tail<2>());
+  const double elapsed = frames[static_cast<std::size_t>(frame_)].t_s - frames.front().t_s;
+  const double phase = std::numbers::pi * elapsed / std::max(frames.back().t_s - frames.front().t_s, 1e-9);
+  for (int wave = 0; wave < num_waves; ++wave) {
+    by_causes.col(first_zoom_ + wave) =
+        std::cos((wave + 1) * phase) * (p.px - reference_.solution.camera.k.tail<2>());
+  }
   if (first_lever_ >= 0) {
     // A pixel feels a shift v of its ray as the turn ray × v / |ray|².
     const Eigen::Vector3d turned = mount_from_cam_ * in_cam;
@@ -161,6 +189,7 @@ bool CauseColumns::at(const BundleObservation& seen, RotationPrediction& p, Eige
     const Eigen::Matrix<double, 2, 3> by_lever = by_turn * (cross_matrix(turned) * shift) / in_cam.squaredNorm();
     by_causes.middleCols<3>(first_lever_) = by_lever;
     if (lever_column_[point] >= 0) by_causes.col(lever_column_[point]) = by_lever.col(2);
+    if (across_column_[point] >= 0) by_causes.middleCols<2>(across_column_[point]) = by_lever.leftCols<2>();
   }
   const std::size_t row = row_of_frame_[static_cast<std::size_t>(frame_)];
   for (std::size_t i = 0; i < patterns_.size(); ++i) {

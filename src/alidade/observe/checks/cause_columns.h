@@ -31,6 +31,7 @@ class CauseColumns {
   void add(const std::string& group, const std::string& member, double ordinary, const std::string& unit = "");
   void add_lens();
   void add_lever();
+  void add_zoom();
   void fill_lens(const Eigen::Vector3d& in_cam, Eigen::Ref<Eigen::MatrixXd> out) const;
 
   const Adjustment& reference_;
@@ -38,11 +39,12 @@ class CauseColumns {
   double height_;
   std::vector<TurnPattern> patterns_;
   std::vector<std::size_t> row_of_frame_;
-  std::vector<int> lever_column_;  ///< Of a point's own parallax; −1: it has none.
+  std::vector<int> lever_column_;   ///< Of a point's own parallax; −1: it has none.
+  std::vector<int> across_column_;  ///< And of its parallax across the view: two columns.
   std::vector<Group> groups_;
   std::vector<Column> columns_;
   int first_k1_ = -1, first_mount_ = -1, first_delay_ = -1, shutter_ = -1, drift_ = -1, first_pattern_ = -1,
-      first_lever_ = -1;
+      first_lever_ = -1, first_zoom_ = -1;
   std::optional<RotationView> view_;
   int frame_ = 0;
   double frame_time_s_ = 0.0;

@@ -161,6 +161,8 @@ CauseScore Linearisation::score_of(const CauseColumns::Group& group) const {
   const double count = 2.0 * static_cast<double>(reference_.bundle.observations.size());
   result.z = rank > 1.0 ? std::sqrt(std::max(0.0, chi2 - 2.0 * (rank - 1.0))) : std::sqrt(std::max(0.0, chi2));
   result.gain = likely * explained - rank * std::log(count);
+  const VectorXd whole_unit = unit.cwiseInverse();
+  result.information = whole_unit.asDiagonal() * S * whole_unit.asDiagonal() * (every_ / effect);
   for (Index i = 0; i < width; ++i) {
     const CauseColumns::Column& column = columns_.column(group.columns[static_cast<std::size_t>(i)]);
     const double variance = S_inverse(i, i) * effect / every_;

@@ -20,6 +20,7 @@ struct CauseScore {
   double gain = 0.0;  ///< Of twice the log-posterior, for sizes that it ordinarily has, less what its freedom costs
                       ///< (BIC): the largest explains best.
   std::vector<CauseMember> members;
+  Eigen::MatrixXd information;  ///< Of the members, by these residuals and what errors they share.
   CommonVector shift;  ///< Of the estimated parameters if it were free, normalised.
 };
 

@@ -17,7 +17,7 @@ struct Trial {
 
 const std::string scale_cause = "encoder scale", backlash_cause = "backlash", zero_cause = "zero that drifts",
                   rate_scale_cause = "scale of the rates", bias_cause = "bias of the rates",
-                  attitude_cause = "attitude that drifts";
+                  attitude_cause = "attitude that drifts", clock_cause = "clock rate";
 
 /// Simple ones first: of those that explain about as well the first is taken.
 const std::vector<Trial>& trials() {
@@ -32,6 +32,7 @@ const std::vector<Trial>& trials() {
       {.errors = {bias_cause, attitude_cause, zero_cause}},
       {.mount = true, .delay = true},
       {.lever = true},
+      {.delay = true, .errors = {clock_cause}},
       {.delay = true, .shutter = true},
       {.delay = true, .errors = {backlash_cause}},
       {.lens = true, .delay = true},

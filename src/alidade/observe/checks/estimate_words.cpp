@@ -28,6 +28,8 @@ constexpr std::pair<const char*, const char*> cause_words[] = {{"scale", "encode
                                                                {"drift", "zero that drifts"},
                                                                {"drift", "attitude that drifts"},
                                                                {"bias", "bias of the rates"},
+                                                               {"clock", "clock rate"},
+                                                               {"lever", "lever across the view"},
                                                                {"shutter", "rolling shutter"},
                                                                {"focal-drift", "focal length that drifts"}};
 

@@ -132,6 +132,31 @@ Verdict fang_refusal(const ObserveSolution& report, const RotationLog& log, cons
   return verdict;
 }
 
+/// A lens looks at about the middle of its image: images of another size than the one given, or cropped, it does not.
+void add_size_check(const ObserveSolution& report, const ObserveSetup& config, Verdict& verdict) {
+  constexpr double most = 0.1, clearly = 5.0;
+  if (config.width_px <= 0 || config.fixed_centre) return;
+  double off = 0.0;
+  std::string where;
+  for (const int axis : {0, 1}) {
+    const ObservedQuantity& centre = report.quantities[2 + static_cast<std::size_t>(axis)];
+    const double size = axis == 0 ? config.width_px : config.height_px, away = centre.value - 0.5 * (size - 1.0);
+    if (std::abs(away) < clearly * centre.sigma || std::abs(away) / size < off) continue;
+    off = std::abs(away) / size;
+    where = centre.name + " is " + text_of(100.0 * off, 2) + " % of the " + (axis == 0 ? "width" : "height") +
+            " from the middle of a " + std::to_string(config.width_px) + "x" + std::to_string(config.height_px) +
+            " image";
+  }
+  const bool is_far = off > most;
+  verdict.checks.push_back({.name = "image size",
+                            .state = is_far ? State::care : State::good,
+                            .text = is_far ? where + ": are the pixels of images of that size, and not cropped?"
+                                           : "the principal point is near the middle of the image",
+                            .value = 100.0 * off,
+                            .limit = 100.0 * most,
+                            .unit = "%"});
+}
+
 /// A scale that no instrument has was not measured with an error, but read in another way.
 void add_scale_check(const ObserveSolution& report, Verdict& verdict) {
   constexpr double most = 0.1;
@@ -193,6 +218,7 @@ Verdict observe_verdict(const ObserveSolution& report, const RotationLog& log, c
   Verdict verdict;
   add_checks(report, verdict);
   add_scale_check(report, verdict);
+  add_size_check(report, config, verdict);
   for (const Check& check : verdict.checks) {
     const bool speaks = check.state == State::care || check.state == State::bad;
     if (!speaks || check.state <= verdict.state) continue;

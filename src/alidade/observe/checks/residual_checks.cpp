@@ -34,7 +34,10 @@ std::string size_of(const CauseScore& cause) {
          (worst->unit.empty() ? "" : " " + worst->unit);
 }
 
+bool is_zoom(const CauseScore& cause) { return cause.name == "focal length that varies"; }
+
 std::string advice_for(const CauseScore& cause) {
+  if (is_zoom(cause)) return "one camera is no answer: let zoom and focus rest, or stay as they are";
   const std::string word = estimate_word_of(cause.name);
   if (word == "scale") return "measure the scale with a known rotation, or --estimate scale --sigma-encoder-scale S";
   return "--estimate " + word;
@@ -194,7 +197,8 @@ std::vector<Check> residual_checks(const ObserveSolution& report) {
     std::string text = i == 0 ? "the residuals ask for " : "so they do for ";
     text += cause.name + " (" + size_of(cause) + "; " + text_of(cause.z, 2) + "σ)";
     if (i == 0) text += ": " + advice_for(cause);
-    checks.push_back({"needs " + cause.name, State::care, text, cause.z, asked_beyond(report), "σ", "residuals"});
+    const State state = i == 0 && is_zoom(cause) ? State::bad : State::care;
+    checks.push_back({"needs " + cause.name, state, text, cause.z, asked_beyond(report), "σ", "residuals"});
   }
   if (asked.empty() && !report.causes.empty()) {
     const auto largest = std::max_element(report.causes.begin(), report.causes.end(),

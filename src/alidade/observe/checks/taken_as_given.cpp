@@ -16,6 +16,7 @@ struct Given {
   double ordinary;
   std::optional<double> ObserveSetup::*told;
   const char* remedy;
+  bool is_counted = false;  ///< Where no σ is told: as it ordinarily is, less what the residuals say.
 };
 
 constexpr double ordinary_scale = 0.005, ordinary_mount_rad = 0.5 * degree, ordinary_delay_s = 0.01,
@@ -28,9 +29,9 @@ const std::vector<Given>& givens() {
       {"scale of the rates", ordinary_scale, &ObserveSetup::sigma_scale, "give --sigma-encoder-scale"},
       {"lever", ordinary_parallax, &ObserveSetup::sigma_parallax,
        "give --sigma-parallax, or --lever with measured ranges"},
-      {"mount", ordinary_mount_rad, nullptr, "--estimate mount"},
-      {"delay", ordinary_delay_s, nullptr, "--estimate delay"},
-      {"k1", ordinary_k1, &ObserveSetup::sigma_k1, "--estimate k1, or give a camera file with its covariance"}};
+      {"mount", ordinary_mount_rad, nullptr, "--estimate mount", true},
+      {"delay", ordinary_delay_s, nullptr, "--estimate delay", true},
+      {"k1", ordinary_k1, &ObserveSetup::sigma_k1, "--estimate k1, or give a camera file with its covariance", true}};
   return all;
 }
 
@@ -60,6 +61,26 @@ void fill_effect(const Eigen::Vector4d& move, const Eigen::Vector4d& sigma, doub
 std::size_t first_member(const std::string& cause) { return cause == "lever" ? 2 : 0; }
 std::size_t end_member(const CauseScore& cause) {
   return cause.name == "lever" ? std::min<std::size_t>(3, cause.members.size()) : cause.members.size();
+}
+
+/// Adds what an error of a cause, as it ordinarily is and as these residuals let it be, does to the parameters.
+void count_ordinary(const CauseScore& cause, double ordinary, CommonMatrix& cov) {
+  const auto m = static_cast<Eigen::Index>(cause.members.size()), n = cause.members.front().moves.size();
+  if (n > cov.rows() || cause.information.rows() != m) return;
+  Eigen::MatrixXd moves(n, m);
+  Eigen::VectorXd value(m);
+  for (Eigen::Index i = 0; i < m; ++i) {
+    moves.col(i) = cause.members[static_cast<std::size_t>(i)].moves;
+    value[i] = cause.members[static_cast<std::size_t>(i)].value;
+  }
+  const Eigen::MatrixXd before = Eigen::MatrixXd::Identity(m, m) / (ordinary * ordinary);
+  const Eigen::MatrixXd left = inverse_symmetric(cause.information + before);
+  Eigen::MatrixXd scatter = moves * left * moves.transpose();
+  // What they ask for, though by less than chance allows, is not beyond what may be there.
+  const Eigen::VectorXd asked = moves * (left * (cause.information * value));
+  constexpr double hardly = 2.0;
+  if (cause.z > hardly) scatter += asked * asked.transpose();
+  cov.topLeftCorner(n, n) += scatter;
 }
 
 /// fx and fy follow a centre that is held where it is not.
@@ -97,10 +118,13 @@ std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveSetu
     const auto cause = std::find_if(report.causes.begin(), report.causes.end(),
                                     [&](const CauseScore& each) { return each.name == given.cause; });
     if (cause == report.causes.end()) continue;
-    const std::optional<double> sigma = told_sigma(given, log, config);
+    std::optional<double> sigma = told_sigma(given, log, config);
+    const bool is_counted = !sigma && given.is_counted && !cause->members.empty();
+    if (is_counted) count_ordinary(*cause, given.ordinary, cov);
     for (std::size_t i = first_member(cause->name); i < end_member(*cause); ++i) {
       const CauseMember& member = cause->members[i];
       Assumption assumption{.name = full_name(cause->name, member), .sigma = sigma, .remedy = given.remedy};
+      if (is_counted) assumption.sigma = given.ordinary;
       if (!sigma) assumption.ordinary = member.sigma > 0.0 ? std::min(given.ordinary, member.sigma) : given.ordinary;
       const double error = sigma ? *sigma : assumption.ordinary;
       if (sigma && member.moves.size() <= cov.rows()) {

@@ -11,7 +11,7 @@ namespace {
 
 // σ of what ordinary instruments have. Encoders: cheap servos; rates: gyroscopes of phones.
 constexpr double instrument_scale = 0.02, instrument_backlash_rad = 0.5 * degree, instrument_curve_rad = 0.3 * degree,
-                 instrument_zero_drift = 1e-3, instrument_bias = 0.01;
+                 instrument_zero_drift = 1e-3, instrument_bias = 0.01, instrument_clock_rate = 1e-3;
 
 using Rows = std::span<RotationRow>;
 
@@ -59,6 +59,43 @@ void undo_backlash(Rows rows, Eigen::Index axis, double width) {
     camera = std::clamp(camera, angle - half, angle + half);
     angle += sign * (camera - angle);
   }
+}
+
+/// A value so much later than `now`, by the parabola through three rows.
+Eigen::Vector3d later(const Eigen::Vector3d& before, const Eigen::Vector3d& now, const Eigen::Vector3d& after, double h0,
+                      double h, double late_s) {
+  const Eigen::Vector3d slope0 = (now - before) / h0, slope = (after - now) / h;
+  const Eigen::Vector3d rate = (h * slope0 + h0 * slope) / (h0 + h), half_acceleration = (slope - slope0) / (h0 + h);
+  return now + late_s * (rate + late_s * half_acceleration);
+}
+
+/// The clock that the rotation is read by goes at another rate than the images': of a row's rotation the one that was
+/// measured so much later for each second since the middle of the log. The first and the last row keep theirs.
+void undo_clock_rate(Rows rows, double amount) {
+  if (rows.size() < 3) return;
+  const std::vector<RotationRow> as_read(rows.begin(), rows.end());
+  const double middle_s = 0.5 * (as_read.front().t_s + as_read.back().t_s);
+  for (std::size_t k = 1; k + 1 < rows.size(); ++k) {
+    const RotationRow &before = as_read[k - 1], &now = as_read[k], &after = as_read[k + 1];
+    const double h0 = now.t_s - before.t_s, h = after.t_s - now.t_s, late_s = amount * (now.t_s - middle_s);
+    if (!(h0 > 0.0) || !(h > 0.0)) continue;
+    const auto shift = [&](Eigen::Vector3d RotationRow::*value) {
+      const Eigen::Vector3d shifted = later(before.*value, now.*value, after.*value, h0, h, late_s);
+      if (shifted.allFinite()) rows[k].*value = shifted;  // a neighbour may not have been measured
+    };
+    shift(&RotationRow::pan_tilt_roll_rad);
+    shift(&RotationRow::rate_rad_per_s);
+    if (before.base_from_cam.norm() < 0.5 || now.base_from_cam.norm() < 0.5 || after.base_from_cam.norm() < 0.5) continue;
+    const auto turn_to = [&](const RotationRow& row) {
+      return Eigen::Vector3d(log_so3((now.base_from_cam.conjugate() * row.base_from_cam).normalized()));
+    };
+    const Eigen::Vector3d turn = later(turn_to(before), Eigen::Vector3d::Zero(), turn_to(after), h0, h, late_s);
+    rows[k].base_from_cam = now.base_from_cam * exp_so3(turn);
+  }
+}
+
+void add_clock_error(std::vector<RotationError>& errors) {
+  errors.push_back({"clock rate", "clock rate", "", "clock_rate", instrument_clock_rate, 1e-4, undo_clock_rate});
 }
 
 std::string with_axis(const char* name, const char* axis, const char* unit) {
@@ -139,6 +176,7 @@ std::vector<RotationError> rotation_errors(RotationSource source, bool has_roll_
   if (source == RotationSource::head) add_head_errors(errors);
   if (source == RotationSource::rate) add_rate_errors(has_roll_rate, errors);
   if (source == RotationSource::attitude) add_attitude_errors(errors);
+  if (source != RotationSource::none) add_clock_error(errors);
   return errors;
 }
 

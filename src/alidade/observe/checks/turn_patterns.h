@@ -23,7 +23,8 @@ struct RotationError {
 };
 
 /// Of heads: scale of each axis, backlash (the camera lags behind the encoder by half of it), a zero that drifts, an
-/// error once and twice a turn. Of rates: scale and bias of each axis. Of attitudes: a drift about each axis.
+/// error once and twice a turn. Of rates: scale and bias of each axis. Of attitudes: a drift about each axis. Of all:
+/// a clock that goes at another rate than the images'.
 [[nodiscard]] std::vector<RotationError> rotation_errors(RotationSource source, bool has_roll_rate);
 
 /// By how much each row's rotation turns, per unit of it.

@@ -11,6 +11,7 @@
 #include "alidade/servo/identify/identify_clusters.h"
 #include "alidade/servo/identify/identify_flaws.h"
 #include "alidade/servo/identify/levenberg.h"
+#include "alidade/servo/identify/ordinary_flaws.h"
 
 namespace alidade {
 namespace {
@@ -144,7 +145,7 @@ double lag_one(const std::vector<double>& residuals) {
 }
 
 /// What blocks of rows say of the covariance, in scaled parameters so that their units do not matter.
-void set_clusters(const Eigen::MatrixXd& J, ServoIdentification& result) {
+void set_clusters(std::span<const ServoSample> log, const Eigen::MatrixXd& J, ServoIdentification& result) {
   ServoFit& fit = result.fit;
   result.correlated_rows = correlated_rows(result.residual_rad);
   const auto inverse = inverse_normal(J);
@@ -160,6 +161,7 @@ void set_clusters(const Eigen::MatrixXd& J, ServoIdentification& result) {
     const Eigen::Index at = num_servo_params + static_cast<Eigen::Index>(i);
     fit.flaw_sigma[fit.freed[i]] = std::sqrt(cov(at, at));
   }
+  count_ordinary_flaws(log, J, *inverse, result);
 }
 
 /// Whether the residuals of a fit without flaws ask for more.
@@ -247,7 +249,7 @@ ServoIdentification identify_servo(std::span<const ServoSample> log, ServoKindRu
   const Eigen::VectorXd residuals =
       (is_plain ? response.angle_rad : flawed_response(log, result.fit, result.fit.flaws)) - readings_of(log);
   result.residual_rad.assign(residuals.data(), residuals.data() + residuals.size());
-  set_clusters(is_plain ? Eigen::MatrixXd(response.J) : flawed_jacobian(log, result.fit), result);
+  set_clusters(log, is_plain ? Eigen::MatrixXd(response.J) : flawed_jacobian(log, result.fit), result);
   result.status = status_of(result.fit);
   result.lag_one_correlation = lag_one(result.residual_rad);
   constexpr std::size_t several = 2;

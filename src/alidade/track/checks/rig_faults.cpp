@@ -25,7 +25,9 @@ bool is_across(std::span<const RigHead> heads, Eigen::Index param) {
 
 std::vector<RigFault> rig_faults(std::span<const RigHead> heads, const RigUncertainty& errors,
                                  const Tracker::Learned& learned, bool is_supposed) {
-  constexpr double min_told = 0.1;  // of the variance
+  // Of the variance: what the observations tell to a tenth of the file's precision, the file may contradict by fifty of
+  // its σ.
+  constexpr double min_told = 0.01;
   std::vector<RigFault> faults;
   // What the observations add to u ~ N(0, 1): the information, and its vector.
   const Eigen::MatrixXd inverse = inverse_symmetric(learned.cov);

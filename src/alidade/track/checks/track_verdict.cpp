@@ -249,10 +249,35 @@ std::optional<Check> second_target(const TrackReport& report, std::span<const Ta
                used_share(second), min_share, "1");
 }
 
+double ln_p(const TrackReport& report, double gate) {
+  return report.log_likelihood - gate * static_cast<double>(report.num_restarts);  // a restart hides its misfit
+}
+
+/// Observations that do not fit, and do where the target may fall.
+std::optional<Check> falling_target(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
+                                    const FollowConfig& config) {
+  constexpr std::size_t max_observations = 1200;
+  constexpr double min_gain = 20.0;
+  const TargetMotion method = config.tracker.method;
+  if (method == TargetMotion::imm || method == TargetMotion::ballistic) return std::nullopt;
+  FollowConfig plain = config;
+  plain.judge = false;
+  const Observations some = with_shift(observations.first(std::min(observations.size(), max_observations)), {});
+  const double as_told = ln_p(track_target(some, heads, plain), config.tracker.gate);
+  plain.tracker.method = TargetMotion::imm;
+  const TrackReport falls = track_target(some, heads, plain);
+  const double gain = ln_p(falls, config.tracker.gate) - as_told;
+  if (falls.num_starts == 0 || !(gain > min_gain)) return std::nullopt;
+  return check("falls", State::care,
+               "the target moves as one that falls, or that is quiet and agile in turn: --method imm (ln of the ratio " +
+                   text_of(gain, 2) + ")",
+               gain, min_gain, "1");
+}
+
 /// What of the observations as a whole is not as stated.
 struct Causes {
   std::optional<Fault> mistake;
-  std::optional<Check> second;
+  std::optional<Check> second, falls;
   std::optional<ClockShift> shift;
 };
 
@@ -269,6 +294,8 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
   if (causes.mistake && !causes.shift) return causes;
   causes.mistake.reset();
   causes.second = second_target(report, observations, heads, found);
+  if (report.num_restarts > 0 || report.nis_per_dof > good_nis_high)
+    causes.falls = falling_target(observations, heads, config);
   return causes;
 }
 
@@ -279,6 +306,11 @@ std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes,
   // Where nothing moves against the heads, many a mistake would make the rays meet: that explains nothing.
   if (report.num_starts == 0 && are_parallel(observations, heads, config))
     return why_no_start(observations, heads, config);
+  const double late = static_cast<double>(count(report, TrackEvent::late)) / static_cast<double>(report.steps.size());
+  if (late > max_left_out)
+    return Fault{text_of(100.0 * late, 2) + " % of the observations come more than " +
+                     text_of(config.tracker.history_s, 2) + " s after others that were taken later",
+                 "give them in order of capture, or check t_capture_s of each head: their clocks may differ by that"};
   if (causes.mistake && (!fits(report) || used_share(report) < 1.0 - max_left_out)) return causes.mistake;
   if (fits(report)) return std::nullopt;
   if (causes.shift) return Fault{clock_text(*causes.shift, heads), "set the heads' clocks"};
@@ -299,7 +331,7 @@ std::string sentence_of(const TrackReport& report, const Verdict& verdict) {
   const auto first = std::ranges::find(verdict.checks, verdict.state, &Check::state);
   sentence += "; " + first->text;
   // Beside what only says how bad it is, what it may come from.
-  constexpr std::array<std::string_view, 5> names{"clocks", "mistake", "second target", "rig", "lean"};
+  constexpr std::array<std::string_view, 6> names{"clocks", "mistake", "second target", "falls", "rig", "lean"};
   const auto cause = std::ranges::find_if(
       verdict.checks, [&](const Check& c) { return c.state != State::good && std::ranges::count(names, c.name) > 0; });
   if (cause != verdict.checks.end() && cause != first) sentence += "; " + cause->text;
@@ -323,6 +355,7 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetObservati
         check("clocks", State::care, clock_text(*causes.shift, heads), 1e3 * causes.shift->later_s, 0.0, "ms"));
   if (causes.mistake) verdict.checks.push_back(check("mistake", State::bad, causes.mistake->what, 1.0, 0.0, "1"));
   if (causes.second) verdict.checks.push_back(*causes.second);
+  if (causes.falls) verdict.checks.push_back(*causes.falls);
   add_checks(report, verdict);
   add_white(report, heads, verdict);
   for (const Check& c : verdict.checks) verdict.state = std::max(verdict.state, c.state);

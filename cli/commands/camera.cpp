@@ -156,7 +156,10 @@ void add_show(App& app) {
                        .leaves_results = false},
                       [args](Run& run) { return show(*args, run); });
   command
-      .add_option("file", args->file, "Camera of alidade, OpenCV, ROS, Kalibr, mrcal or COLMAP; FILE:NAME of several")
+      .add_option(
+          "file", args->file,
+          "Camera of alidade, OpenCV, ROS, Kalibr, mrcal or COLMAP, of SceneLib, of Civera's initialize_cam.m or of "
+          "Heikkilä's toolbox; FILE:NAME of several")
       ->required();
 }
 

@@ -17,6 +17,7 @@
 #include "alidade/results/seen_frames.h"
 #include "alidade/tables/localize_file.h"
 #include "alidade/tables/logs/observations_stream.h"
+#include "alidade/tables/map_file.h"
 #include "cli/app/app.h"
 #include "cli/app/live.h"
 #include "cli/app/standard_input.h"
@@ -27,7 +28,7 @@ namespace {
 
 struct LocalizeArgs {
   std::filesystem::path sequence;
-  std::string camera, target, start, truth, depth_sensor, range, beam, mask;  // files
+  std::string camera, target, start, truth, depth_sensor, range, beam, odometry, mask, map;  // files
   std::optional<double> rate_hz;
   bool skip_bad = false;
   std::vector<SkippedInput> skipped;  ///< Of the sensors' files.
@@ -35,6 +36,7 @@ struct LocalizeArgs {
   LiveOptions live;
 
   [[nodiscard]] bool is_input() const { return sequence == "-"; }
+  [[nodiscard]] bool is_mask_file() const { return !mask.empty() && mask != "circle" && mask != "auto"; }
   [[nodiscard]] bool is_images() const { return !is_input() && is_image_sequence(sequence); }
 };
 
@@ -50,6 +52,12 @@ FieldList fields_of(LocalizeArgs& args) {
        .help = "What gives scale and the map's frame (target.yaml): known points; in images a rectangle, a board, or "
                "points with patches",
        .form = "FILE"},
+      {.name = "map",
+       .value = &args.map,
+       .help =
+           "A map that an earlier run has left (map.yaml), instead of a target: the path begins where it is found, in "
+           "its frame and scale; of images by how its points look, of tables by their numbers",
+       .form = "FILE"},
       {.name = "start",
        .value = &args.start,
        .help = "Where the camera starts, how fast, how sure; depths of points (start.yaml)",
@@ -57,9 +65,10 @@ FieldList fields_of(LocalizeArgs& args) {
       {.name = "mask",
        .value = &args.mask,
        .help =
-           "Where images show the scene: an image of the camera's size, black where they do not; or 'circle', as an "
-           "endoscope's, found in the first image that shows one",
-       .form = "FILE|circle"},
+           "Where images show the scene: an image of the camera's size, black where they do not; 'circle', as an "
+           "endoscope's, found in the first image that shows one; or 'auto': without what never moves while the scene "
+           "does, as a clock that is burnt in",
+       .form = "FILE|circle|auto"},
       {.name = "depth_sensor",
        .value = &args.depth_sensor,
        .help = "How deep the camera is, up to an offset, CSV: t_s,depth_m[,sigma_m]; metres without a target, else a "
@@ -73,6 +82,12 @@ FieldList fields_of(LocalizeArgs& args) {
       {.name = "beam",
        .value = &args.beam,
        .help = "Its beam in the camera's frame (rangefinder.yaml, as alidade rangefinder writes it)",
+       .form = "FILE"},
+      {.name = "odometry",
+       .value = &args.odometry,
+       .help =
+           "Where a vehicle's odometry says that it is, CSV: t_s,x_m,y_m[,z_m], in a frame of its own: metres by the "
+           "lengths of its ways without a target, else a check of its scale",
        .form = "FILE"},
       {.name = "truth",
        .value = &args.truth,
@@ -106,15 +121,21 @@ ImageMask read_mask(const std::filesystem::path& file) {
 void read_values(LocalizeArgs& args) {
   if (!args.target.empty())
     args.config.target = args.is_images() ? read_image_target(args.target) : read_target(args.target);
+  if (!args.map.empty() && !args.target.empty())
+    throw UsageError("--map and --target both say the map's frame: give one of them");
+  if (!args.map.empty()) args.config.map = read_map(args.map);
   if (!args.start.empty()) args.config.start = read_start(args.start);
   if (args.range.empty() != args.beam.empty()) throw UsageError("--range and --beam belong together: give both");
   if (!args.depth_sensor.empty())
     args.config.depth_readings = read_depth_sensor(args.depth_sensor, args.skip_bad, &args.skipped);
+  if (!args.odometry.empty())
+    args.config.odometry_readings = read_odometry(args.odometry, args.skip_bad, &args.skipped);
   if (!args.range.empty()) args.config.range_readings = read_ranges(args.range, args.skip_bad, &args.skipped);
   if (!args.mask.empty() && !args.is_images())
     throw UsageError("--mask is of images; a table of observations has none");
   args.config.masks_circle = args.mask == "circle";
-  if (!args.mask.empty() && !args.config.masks_circle) args.config.mask = read_mask(args.mask);
+  args.config.masks_still = args.mask == "auto";
+  if (args.is_mask_file()) args.config.mask = read_mask(args.mask);
   if (!args.beam.empty()) args.config.beam = read_beam(args.beam).beam;
   args.config.seconds = now_s;
 }
@@ -123,11 +144,13 @@ void add_inputs(const LocalizeArgs& args, Run& run) {
   if (!args.is_input() && !std::filesystem::is_directory(args.sequence)) run.add_input("sequence", args.sequence);
   run.add_input("camera", args.camera);
   if (!args.target.empty()) run.add_input("target", args.target);
+  if (!args.map.empty()) run.add_input("map", args.map);
   if (!args.start.empty()) run.add_input("start", args.start);
-  if (!args.mask.empty() && args.mask != "circle") run.add_input("mask", args.mask);
+  if (args.is_mask_file()) run.add_input("mask", args.mask);
   if (!args.depth_sensor.empty()) run.add_input("depth sensor", args.depth_sensor);
   if (!args.range.empty()) run.add_input("range", args.range);
   if (!args.beam.empty()) run.add_input("beam", args.beam);
+  if (!args.odometry.empty()) run.add_input("odometry", args.odometry);
   if (!args.truth.empty()) run.add_input("truth", args.truth);
 }
 
@@ -234,6 +257,7 @@ void add_localize(App& app) {
                    "alidade localize sights.csv --camera camera.yaml --target target.yaml\n"
                    "alidade localize sights.csv --camera camera.yaml --target target.yaml --calibrate-online\n"
                    "tracker | alidade localize - --camera camera.yaml --target target.yaml\n"
+                   "alidade localize later/ --camera camera.yaml --map alidade-out/localize/map.yaml --rate 30\n"
                    "alidade localize sights.csv --camera camera.yaml --start start.yaml --truth truth.tum\n"
                    "alidade localize sights.csv --camera camera.yaml --depth-sensor depth.csv\n"
                    "alidade localize sights.csv --camera camera.yaml --range ranges.csv --beam rangefinder.yaml\n"},

@@ -29,6 +29,7 @@
 #include "alidade/tables/corner_file.h"
 #include "alidade/tables/events_file.h"
 #include "alidade/tables/localize_file.h"
+#include "alidade/tables/map_file.h"
 #include "alidade/tables/pairs_file.h"
 #include "alidade/tables/rotation_log_file.h"
 #include "alidade/tables/scan_file.h"

@@ -14,6 +14,16 @@
 #include "alidade/localize/setup.h"
 
 namespace alidade {
+namespace {
+
+/// The map of a table for another run to begin in: points by their numbers.
+void save_numbered(Localization& result) {
+  for (const MapPoint& point : result.map)
+    if (point.id >= 0 && point.cov.allFinite() && point.cov.diagonal().minCoeff() > 0.0)
+      result.saved_map.points.push_back({point.id, point.point_in_world, point.cov, {}});
+}
+
+}  // namespace
 
 /// The front ends point to config: it stays where it is.
 struct Localizer::Run {
@@ -80,7 +90,9 @@ Localization Localizer::finish(std::span<const TimedPose> truth) const {
   result.path = run.path;
   result.camera = run.camera;
   result.truth.assign(truth.begin(), truth.end());
-  result.has_target = result.scale_known = !run.config.target.points.empty();
+  result.is_in_map = run.config.map.has_value();
+  result.has_target = result.is_in_map || !run.config.target.points.empty();
+  result.scale_known = run.config.map ? run.config.map->is_in_metres : result.has_target;
   result.is_scale_given = run.config.target.is_scale_given;
   result.sigma_px = run.config.filter.sigma_px;
   for (const int index : run.config.filter.lens_params)
@@ -96,6 +108,11 @@ Localization Localizer::finish(std::span<const TimedPose> truth) const {
       result.is_scale_read = result.scale_known = true;
     }
   }
+  result.saved_map.is_in_metres = result.scale_known;
+  if (run.of_images)
+    run.of_images->save_map(result);
+  else
+    save_numbered(result);
   add_path_error(result);
   result.counts = {result.path.size(), result.path.size() - result.num_lost, result.num_lost, {}};
   result.assumed = localize_assumed(result);

@@ -19,7 +19,8 @@ constexpr std::array<std::pair<CameraFormat, std::string_view>, 6> format_names{
                                                                                  {CameraFormat::mrcal, "mrcal"},
                                                                                  {CameraFormat::colmap, "colmap"}}};
 
-constexpr const char* unknown_file = "is not a camera file of alidade, OpenCV, ROS, Kalibr, mrcal or COLMAP";
+constexpr const char* unknown_file =
+    "is not a camera file of alidade, OpenCV, ROS, Kalibr, mrcal, COLMAP, SceneLib, Civera or Heikkilä";
 
 std::string_view trimmed(std::string_view text) {
   const auto is_space = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; };
@@ -84,6 +85,8 @@ detail::CameraContent recognise_and_read(const detail::CameraText& file) {
   if (content.starts_with("CAHV") || content.starts_with("Model = CAHV")) {
     detail::refuse(file.name, "", "a CAHVOR camera: no model of ours (pinhole, brown, kannala_brandt)");
   }
+  constexpr std::size_t max_slam_bytes = 1u << 20;
+  if (file.text.size() < max_slam_bytes && detail::is_slam_camera(file.text)) return detail::read_slam_camera(file);
   if (is_colmap_line(content)) return detail::read_colmap(file);
   return read_yaml(file);
 }

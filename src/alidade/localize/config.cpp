@@ -40,6 +40,10 @@ FieldList fields_of(LocalizeConfig& config) {
        .help = "Angular acceleration [rad/s2]; by hand about 6",
        .limits = positive,
        .option = "--sigma-alpha"},
+      {.name = "sigma_odometry",
+       .value = &config.sigma_odometry,
+       .help = "σ of the lengths of --odometry over them, as all share it: a wheel's radius (0.01: 1 %)",
+       .limits = positive},
       {.name = "max_points",
        .value = &config.max_points,
        .help = "Points in the filter at once, beside the target's: where it is full, the least informative leaves, and "

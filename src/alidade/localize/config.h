@@ -12,6 +12,7 @@
 #include "alidade/description/field.h"
 #include "alidade/localize/camera_motion.h"
 #include "alidade/localize/distortion.h"
+#include "alidade/localize/saved_map.h"
 #include "alidade/localize/sequence.h"
 #include "alidade/localize/target.h"
 #include "alidade/public.h"
@@ -106,6 +107,12 @@ struct RangeReading {
   double t_s = 0.0, range_m = 0.0;
 };
 
+/// Where a vehicle's odometry says that it is, in a frame of its own that drifts.
+struct OdometryReading {
+  double t_s = 0.0;
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
+};
+
 /// When a new point enters the state.
 enum class NewPoints {
   inverse_depth,  ///< With its first observation, as an inverse depth.
@@ -124,11 +131,15 @@ struct LocalizeConfig {
   std::optional<double> sigma_scale = {};   ///< Of the target's size, relative: counted. None: the target's own.
   std::optional<LocalizeStart> start = {};  ///< Else from the target, else the first camera is the world, up to scale.
   LocalizeTarget target = {};
+  std::optional<SavedMap> map = {};  ///< Of an earlier run, to begin in, instead of a target; its frame is the path's.
   std::vector<DepthReading> depth_readings = {};  ///< In order of time: scale without a target, else a check of it.
   std::vector<RangeReading> range_readings = {};  ///< The same, of `beam`.
   std::optional<Beam> beam = {};
+  std::vector<OdometryReading> odometry_readings = {};  ///< The same, by the lengths of its ways.
+  double sigma_odometry = 0.01;  ///< Of a length, relative: what all of them share, as a wheel's radius.
   std::optional<ImageMask> mask = {};
   bool masks_circle = false;  ///< Images show the scene in a circle, as an endoscope's: found in the first that does.
+  bool masks_still = false;   ///< What never moves while the scene does is found on the way and not looked at.
   double period_s = 0.0;      ///< Usual time between frames. 0: the median so far; of images the least.
   bool smooths = true;        ///< With a target: the path is solved again from all observations after the last frame.
   int max_smoothed = 8000;  ///< Frames solved together: of a longer path every second, fourth, …; the others follow.

@@ -1,5 +1,7 @@
 #include "alidade/localize/known_pose.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,6 +9,8 @@
 
 #include "alidade/board/board_pose.h"
 #include "alidade/geometry/decompositions.h"
+#include "alidade/geometry/three_point_pose.h"
+#include "alidade/localize/path/path_resection.h"
 
 namespace alidade {
 namespace {
@@ -14,7 +18,8 @@ namespace {
 struct SeenPoints {
   BoardView view;
   std::vector<Eigen::Vector3d> points_in_board;
-  double length_m = 0.0, width_m = 0.0;  ///< RMS along the longest direction, and across it.
+  double length_m = 0.0, width_m = 0.0;  ///< RMS along the longest direction, and across it,
+  double depth_m = 0.0;                  ///< and across both.
   Rigid3 world_from_board;
   double sigma_m = 0.0;
 };
@@ -43,6 +48,7 @@ SeenPoints seen_points(std::span<const FeatureObservation> observations, std::sp
   const double num = static_cast<double>(points_in_world.size());
   seen.length_m = std::sqrt(std::max(eigen.values[2], 0.0) / num);
   seen.width_m = std::sqrt(std::max(eigen.values[1], 0.0) / num);
+  seen.depth_m = std::sqrt(std::max(eigen.values[0], 0.0) / num);
   Eigen::Matrix3d axes;
   axes << eigen.vectors.col(2), eigen.vectors.col(1), eigen.vectors.col(2).cross(eigen.vectors.col(1));
   seen.world_from_board = {Eigen::Quaterniond(axes), middle};
@@ -118,13 +124,16 @@ std::vector<std::array<std::size_t, 4>> fours_of(std::size_t num) {
   return fours;
 }
 
+/// How many have to agree on a pose: of more than five more than four, and half of all.
+std::size_t least_agreeing(std::size_t num) {
+  constexpr std::size_t few = 5;
+  return num <= few ? 4 : std::max<std::size_t>(few, (num + 1) / 2);
+}
+
 /// The poses that most observations agree on, where not all agree on one: from sets of four (M. A. Fischler & R. C.
-/// Bolles, "Random Sample Consensus", 1981). Of more than five more than four must agree, and half of all: four points
-/// fit chance poses.
+/// Bolles, "Random Sample Consensus", 1981). Four points fit chance poses.
 std::vector<BoardPoseFit> agreed_poses(const Camera& camera, const SeenPoints& seen, double sigma_px) {
   const std::size_t num = seen.view.corners.size();
-  constexpr std::size_t few = 5;
-  const std::size_t least = num <= few ? 4 : std::max<std::size_t>(few, (num + 1) / 2);
   BoardView best;
   for (const auto& four : fours_of(num)) {
     BoardView view;
@@ -134,7 +143,7 @@ std::vector<BoardPoseFit> agreed_poses(const Camera& camera, const SeenPoints& s
       if (agreeing.corners.size() > best.corners.size()) best = std::move(agreeing);
     }
   }
-  if (best.corners.size() < least) return {};
+  if (best.corners.size() < least_agreeing(num)) return {};
   std::vector<BoardPoseFit> fits = fits_of(camera, seen, best, sigma_px);
   if (fits.empty()) return fits;
   const BoardView again = fitting(camera, seen, fits.front(), sigma_px);
@@ -146,6 +155,109 @@ std::vector<BoardPoseFit> agreed_poses(const Camera& camera, const SeenPoints& s
 bool is_line(const SeenPoints& seen) {
   constexpr double certain = 3.0, wide = 0.02;
   return seen.width_m < std::max(certain * seen.sigma_m, wide * seen.length_m);
+}
+
+/// Points in a plane up to what they are known by.
+bool is_flat(const SeenPoints& seen) {
+  constexpr double certain = 3.0, deep = 0.01;
+  return seen.depth_m < std::max(certain * seen.sigma_m, deep * seen.length_m);
+}
+
+/// What is seen of the known points, as a resection takes it.
+struct InSpace {
+  std::vector<PlacedObservation> placed;
+  std::vector<Eigen::Vector3d> rays_in_cam;
+};
+
+InSpace in_space(const Camera& camera, std::span<const FeatureObservation> observations,
+                 std::span<const KnownPoint> known, double sigma_px) {
+  InSpace seen;
+  for (const FeatureObservation& observation : observations) {
+    const auto at = std::ranges::find(known, observation.id, &KnownPoint::id);
+    const auto ray = unproject(camera, observation.px);
+    if (at == known.end() || !ray) continue;
+    const Eigen::Matrix3d cov = at->sigma_m * at->sigma_m * Eigen::Matrix3d::Identity();
+    seen.placed.push_back({observation.px, std::max(sigma_px, observation.sigma_px), at->point_in_world, cov});
+    seen.rays_in_cam.push_back(*ray);
+  }
+  return seen;
+}
+
+/// Poses from drawn sets of three, those that explain most first.
+std::vector<Rigid3> poses_of_threes(const Camera& camera, const InSpace& seen) {
+  constexpr int num_draws = 60;           // with 40 % mismatches one in five sets is right
+  constexpr double near_px2 = 8.0 * 8.0;  // three noisy rays place the others so well
+  constexpr std::size_t max_poses = 6;
+  const std::size_t num = seen.placed.size();
+  std::mt19937_64 bits(1);
+  std::vector<std::pair<double, Rigid3>> scored;
+  for (int draw = 0; draw < num_draws; ++draw) {
+    const std::size_t a = bits() % num, b = bits() % num, c = bits() % num;
+    if (a == b || b == c || a == c) continue;
+    for (const Rigid3& pose : three_point_poses(
+             {seen.placed[a].point_in_world, seen.placed[b].point_in_world, seen.placed[c].point_in_world},
+             {seen.rays_in_cam[a], seen.rays_in_cam[b], seen.rays_in_cam[c]})) {
+      double score = 0.0;
+      for (const PlacedObservation& each : seen.placed) {
+        const auto px = project(camera, pose.inverse() * each.point_in_world);
+        if (px) score += 1.0 / (1.0 + (*px - each.px).squaredNorm() / near_px2);
+      }
+      scored.emplace_back(score, pose);
+    }
+  }
+  std::ranges::stable_sort(scored, std::greater{}, [](const auto& each) { return each.first; });
+  std::vector<Rigid3> poses;
+  for (std::size_t i = 0; i < std::min(scored.size(), max_poses); ++i) poses.push_back(scored[i].second);
+  return poses;
+}
+
+/// The start at a pose, with the covariance that the observations that fit give it.
+std::optional<StartHypothesis> start_at(const Camera& camera, const InSpace& seen, const CameraResection& found,
+                                        const KnownPoseConfig& config) {
+  Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
+  for (std::size_t i = 0; i < seen.placed.size(); ++i) {
+    if (!found.fits[i]) continue;
+    Feature feature;
+    feature.values.head<3>() = seen.placed[i].point_in_world;
+    const auto view = expected_view(camera, found.world_from_cam, feature);
+    if (!view) return std::nullopt;
+    const Eigen::Matrix<double, 2, 3> J_point = view->J_px_feature.leftCols<3>();
+    const Eigen::Matrix2d cov = J_point * seen.placed[i].cov * J_point.transpose() +
+                                std::pow(seen.placed[i].sigma_px, 2) * Eigen::Matrix2d::Identity();
+    information += view->J_px_pose.transpose() * cov.inverse() * view->J_px_pose;
+  }
+  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> llt(information);
+  if (llt.info() != Eigen::Success) return std::nullopt;
+  StartHypothesis start;
+  start.motion.world_from_cam = found.world_from_cam;
+  start.cov.topLeftCorner<6, 6>() = llt.solve(Eigen::Matrix<double, 6, 6>::Identity());
+  start.cov.diagonal().segment<3>(6).setConstant(config.sigma_speed_m_s * config.sigma_speed_m_s);
+  start.cov.diagonal().tail<3>().setConstant(config.sigma_rate_rad_s * config.sigma_rate_rad_s);
+  return start;
+}
+
+/// Of points in no plane: the poses that enough observations agree on, the likeliest first.
+std::vector<StartHypothesis> poses_in_space(const Camera& camera, const InSpace& seen, const KnownPoseConfig& config) {
+  const std::size_t num = seen.placed.size();
+  if (num < 4) return {};
+  std::vector<StartHypothesis> starts;
+  for (const Rigid3& begin : poses_of_threes(camera, seen)) {
+    const std::array<Rigid3, 1> from{begin};
+    const auto found = resection(camera, seen.placed, from, max_chi2);
+    if (!found || found->num_fit < least_agreeing(num)) continue;
+    auto start = start_at(camera, seen, *found, config);
+    if (!start) continue;
+    start->cost = found->cost;
+    const bool is_twice = std::ranges::any_of(starts, [&](const StartHypothesis& other) {
+      const double off = (other.motion.world_from_cam.translation - found->world_from_cam.translation).norm();
+      return off < 3.0 * std::sqrt(start->cov.topLeftCorner<3, 3>().trace());
+    });
+    if (!is_twice) starts.push_back(*start);
+  }
+  std::ranges::stable_sort(starts, {}, &StartHypothesis::cost);
+  constexpr double other_cost = 13.8;  // a worse one has no part in it
+  std::erase_if(starts, [&](const StartHypothesis& each) { return each.cost > starts.front().cost + other_cost; });
+  return starts;
 }
 
 }  // namespace
@@ -160,6 +272,8 @@ std::vector<StartHypothesis> poses_from_known(const Camera& camera, std::span<co
   if (!agree(fits) && num > 4 && num <= max_for_sets) fits = agreed_poses(camera, seen, config.sigma_px);
   std::erase_if(fits,
                 [](const BoardPoseFit& fit) { return !(fit.chi2 <= max_pose_chi2_per_dof * std::max(fit.dof, 2)); });
+  if (fits.empty() && !is_flat(seen))
+    return poses_in_space(camera, in_space(camera, observations, known, config.sigma_px), config);
   std::vector<StartHypothesis> starts;
   for (const BoardPoseFit& fit : fits) starts.push_back(start_of(fit, seen, config));
   return starts;

@@ -8,10 +8,11 @@
 
 namespace alidade {
 
-/// Where a camera is that sees these known points, which lie in a plane (or nearly): both poses that a flat target
+/// Where a camera is that sees these known points: of points in a plane (or nearly) both poses that a flat target
 /// nearly has, by maximum likelihood, the better one first, with their covariance; speeds zero with these σ. Of more
-/// than four points those that do not fit are rejected. Empty where fewer than four are seen, they are on a line, or
-/// no pose fits (χ² beyond 99.9 %): observations that show another place.
+/// than four points those that do not fit are rejected. Where no pose fits a plane through the points, and they are in
+/// none, poses from sets of three of them (three_point_pose.h). Empty where fewer than four are seen, they are on a
+/// line, or no pose fits (χ² beyond 99.9 %): observations that show another place.
 struct KnownPoseConfig {
   double sigma_px = 0.5;
   double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;

@@ -10,6 +10,7 @@
 #include "alidade/camera/camera.h"
 #include "alidade/estimation/counts.h"
 #include "alidade/estimation/verdict.h"
+#include "alidade/localize/saved_map.h"
 #include "alidade/localize/sequence.h"
 #include "alidade/public.h"
 
@@ -64,7 +65,7 @@ struct GivenNumber {
 
 /// What a sensor beside the camera says of the path's unit of length.
 struct SensorScale {
-  std::string sensor;      ///< "depth sensor", "rangefinder"
+  std::string sensor;      ///< "depth sensor", "rangefinder", "odometry"
   double scale = 1.0;      ///< Metres for each unit that the path had without it: 1 where a target is right.
   double sigma_rel = 0.0;  ///< Of the scale, over it. 0: the readings do not determine it.
   std::size_t num_used = 0, num_rejected = 0;
@@ -109,12 +110,15 @@ struct PathError {
 struct Localization {
   std::vector<PathStep> path;  ///< One per frame.
   std::vector<MapPoint> map;   ///< At the end.
+  SavedMap saved_map;          ///< The same for another run to begin in: points whose place is known well enough.
   bool scale_known = false;
   bool is_scale_read = false;              ///< Known by `sensor_scales`, and not by a target.
   std::vector<SensorScale> sensor_scales;  ///< Of what readings there were.
-  bool has_target = false;                 ///< Known points were given.
+  bool has_target = false;                 ///< Known points were given,
+  bool is_in_map = false;                  ///< as a map that was saved.
   bool is_of_images = false;
   bool lacks_circle = false;  ///< A circle was to be masked around, and no image shows one: nothing is masked.
+  double still_share = 0.0;   ///< Of the image, edges that never move while the scene does: masked.
   double sigma_px =
       std::numeric_limits<double>::quiet_NaN();  ///< Of an observation that brings none; of images the least.
   std::size_t num_lost = 0;  ///< Frames without a pose that observations hold: waiting or predicted.

@@ -9,6 +9,11 @@
 #include "alidade/localize/path/path_resection.h"
 
 namespace alidade {
+namespace {
+
+constexpr std::size_t max_known_at_once = 100;  // three numbers each: the others need their part of the state
+
+}  // namespace
 
 double ObservationLocalizer::period_s() const { return config_.period_s > 0.0 ? config_.period_s : gap_.s(); }
 
@@ -34,10 +39,40 @@ bool ObservationLocalizer::start(const ObservationFrame& frame) {
   constexpr std::size_t many = 30;
   if (is_free() && frame.observations.size() >= many) bank.splits = 1;
   engine_.begin(from, frame.t_s, bank);
-  for (const KnownPoint& point : config_.target.points)
-    engine_.filters().add_known(point.id, point.point_in_world, point.sigma_m);
+  if (config_.target.points.size() > max_known_at_once) {
+    for (const KnownPoint& point : config_.target.points) known_[point.id] = point;
+    enter_known(frame);
+  } else {
+    for (const KnownPoint& point : config_.target.points)
+      engine_.filters().add_known(point.id, point.point_in_world, point.sigma_m);
+  }
   record_.begin(num_taken_);
   return true;
+}
+
+/// Of many known points, as of a map, those that are seen; for them those leave that were not seen for longest.
+void ObservationLocalizer::enter_known(const ObservationFrame& frame) {
+  if (known_.empty()) return;
+  std::vector<std::pair<std::size_t, long>> unseen;
+  for (const Feature& feature : engine_.best().features())
+    if (feature.is_known && std::ranges::count(frame.observations, feature.id, &FeatureObservation::id) == 0)
+      unseen.emplace_back(points_.last_frame(feature.id), feature.id);
+  std::ranges::sort(unseen, std::greater{});
+  auto num = static_cast<std::size_t>(std::ranges::count_if(engine_.best().features(), &Feature::is_known));
+  for (const FeatureObservation& observation : frame.observations) {
+    const auto known = known_.find(observation.id);
+    if (known == known_.end() || engine_.best().has(observation.id)) continue;
+    if (num >= max_known_at_once && unseen.empty()) return;
+    if (num >= max_known_at_once) {
+      engine_.filters().remove(unseen.back().second);
+      unseen.pop_back();
+      --num;
+    }
+    engine_.filters().add_known(known->first, known->second.point_in_world, known->second.sigma_m);
+    if (!engine_.best().has(known->first)) return;  // no room
+    points_.entered(known->first, num_taken_);
+    ++num;
+  }
 }
 
 /// For one point more.
@@ -93,7 +128,7 @@ void ObservationLocalizer::add_new(const ObservationFrame& frame) {
   std::optional<std::vector<long>> leaving;
   std::size_t num_gone = 0;
   for (const FeatureObservation& observation : frame.observations) {
-    if (engine_.best().has(observation.id)) continue;
+    if (engine_.best().has(observation.id) || known_.contains(observation.id)) continue;
     const auto prior = points_.prior_of(observation, engine_.best());
     if (!prior) continue;
     if (!leaving && !has_room()) leaving = least_useful(frame);
@@ -298,7 +333,7 @@ PathStep ObservationLocalizer::take(const ObservationFrame& given) {
   ObservationFrame frame = numbered(given);
   PathStep step = taken(frame);
   ++num_taken_;
-  if (smooths()) frames_.add(std::move(frame));
+  if (config_.smooths) frames_.add(std::move(frame));
   return step;
 }
 
@@ -316,6 +351,7 @@ PathStep ObservationLocalizer::taken(const ObservationFrame& frame) {
     step.event = FrameEvent::started;
   } else {
     engine_.predict_to(frame.t_s, period_s());
+    enter_known(frame);
     if (config_.restarts && is_vague(frame)) place_by_target(frame);
   }
   std::optional<OtherPlace> other;

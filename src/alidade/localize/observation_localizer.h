@@ -2,11 +2,9 @@
 
 #include <vector>
 
-#include "alidade/localize/engine.h"
-#include "alidade/localize/filter/observation_record.h"
 #include "alidade/localize/filter/point_episodes.h"
 #include "alidade/localize/filter/point_store.h"
-#include "alidade/localize/kept_frames.h"
+#include "alidade/localize/path/whole_path.h"
 #include "alidade/localize/usual_gap.h"
 
 namespace alidade {
@@ -27,13 +25,13 @@ class ObservationLocalizer {
   void sum_up(Localization& result) const;
 
  private:
-  [[nodiscard]] bool smooths() const { return config_.smooths; }
   [[nodiscard]] double period_s() const;
   void keep_gap(double t_s);
   [[nodiscard]] ObservationFrame numbered(ObservationFrame frame);
   [[nodiscard]] PathStep taken(const ObservationFrame& frame);
   [[nodiscard]] bool start(const ObservationFrame& frame);
   void add_new(const ObservationFrame& frame);
+  void enter_known(const ObservationFrame& frame);
   [[nodiscard]] bool has_room() const;
   [[nodiscard]] double value_of(const Feature& feature) const;
   [[nodiscard]] std::vector<long> least_useful(const ObservationFrame& frame) const;
@@ -59,27 +57,20 @@ class ObservationLocalizer {
   [[nodiscard]] bool is_firm(long id) const;
   [[nodiscard]] bool find_again(OtherPlace other, const ObservationFrame& frame, const ObservationsReport& report);
 
-  struct WholePath {
-    SmoothedPath smoothed;
-    std::size_t first_frame = 0;  ///< Of those kept.
-    double scale = 1.0;           ///< What the filter's unit of length is now.
-  };
-  [[nodiscard]] std::optional<WholePath> smoothed_as_a_whole(Localization& result) const;
-  [[nodiscard]] std::optional<SmoothedPath> smooth_with_loops(SmootherProblem& problem, Localization& result) const;
-  [[nodiscard]] double solve_in_metres(SmootherProblem problem, std::optional<SmoothedPath>& smoothed,
-                                       Localization& result) const;
+  [[nodiscard]] Recording recording() const;
 
   LocalizeEngine engine_;
   const LocalizeConfig& config_;
   PointStore points_;
   PointEpisodes episodes_;
   ObservationRecord record_;
-  KeptFrames frames_;          ///< Where the path is smoothed.
-  UsualGap gap_;               ///< Between frames; where their period is not given.
-  double t_s_ = 0.0;           ///< Of the last frame.
-  std::size_t num_taken_ = 0;  ///< Frames.
-  std::size_t num_left_ = 0;   ///< Times that a point left a full filter.
-  int num_elsewhere_ = 0;      ///< Frames in a row in which the target says that the camera is somewhere else.
+  KeptFrames frames_;                 ///< Where the path is smoothed.
+  std::map<long, KnownPoint> known_;  ///< Of many those that are not all in the filter at once.
+  UsualGap gap_;                      ///< Between frames; where their period is not given.
+  double t_s_ = 0.0;                  ///< Of the last frame.
+  std::size_t num_taken_ = 0;         ///< Frames.
+  std::size_t num_left_ = 0;          ///< Times that a point left a full filter.
+  int num_elsewhere_ = 0;             ///< Frames in a row in which the target says that the camera is somewhere else.
 };
 
 }  // namespace alidade

@@ -9,6 +9,7 @@
 
 #include "alidade/estimation/config_error.h"
 #include "alidade/localize/filter/filter.h"
+#include "alidade/localize/filter/known_map.h"
 #include "alidade/localize/frames/image_localizer.h"
 
 namespace alidade {
@@ -95,6 +96,22 @@ void add_faults(const LocalizeTarget& target, Sentences& found) {
   }
 }
 
+void add_faults(const SavedMap& map, const LocalizeConfig& config, Sentences& found) {
+  if (!config.target.points.empty()) found.emplace_back("a map and a target are given: both say the map's frame");
+  std::set<long> ids;
+  for (const SavedPoint& point : map.points) {
+    const std::string name = fmt::format("the map's point {}", point.id);
+    if (!ids.insert(point.id).second) found.push_back(name + " stands twice");
+    if (!point.point_in_world.allFinite() || !point.cov.allFinite() || !(point.cov.diagonal().minCoeff() > 0.0))
+      found.push_back(name + " has a position or covariance that is none");
+    if (point.look && point.look->patch.grey.size() != ReferencePatch::area_px)
+      found.push_back(name + " has a patch that is not of its size");
+  }
+  for (const SavedKeyframe& keyframe : map.keyframes)
+    if (keyframe.thumbnail.grey.size() != Thumbnail{}.grey.size())
+      found.emplace_back("a keyframe of the map is not of its size");
+}
+
 void add_faults(const LocalizeStart& start, Sentences& found) {
   const CameraMotion& motion = start.motion;
   const Rigid3& pose = motion.world_from_cam;
@@ -149,10 +166,21 @@ void put_lens_in_state(const Camera& camera, LocalizationFilterConfig& filter) {
   }
 }
 
+/// Numbered points are a target; what images show is looked for.
+void take_map(const SavedMap& map, bool is_of_images, LocalizeTarget& target) {
+  const bool has_looks =
+      std::ranges::any_of(map.points, [](const SavedPoint& point) { return point.look.has_value(); });
+  if (is_of_images && !has_looks)
+    throw ConfigError("the map is of numbered points: images need one that was made of images");
+  if (!is_of_images && has_looks)
+    throw ConfigError("the map was made of images: its points have no numbers that a table could name");
+  if (!is_of_images) target.points = known_points(map);
+}
+
 /// Tens of matches a frame, and room for as many features as there may be.
 LocalizationFilterConfig image_filter(const LocalizeConfig& config) {
   LocalizationFilterConfig filter = for_images(config.filter, config.features.sigma_floor_px);
-  const auto num_known = static_cast<int>(config.target.points.size());
+  const auto num_known = static_cast<int>(config.map ? max_saved_at_once : config.target.points.size());
   filter.state_capacity =
       motion_dim + static_cast<int>(filter.lens_params.size()) + 3 * num_known + 6 * config.features.max_features + 8;
   filter.observations_capacity = config.features.max_tried + num_known;
@@ -171,10 +199,16 @@ void require_sense(const LocalizeConfig& config, const Camera& camera) {
   add_faults(camera, found);
   throw_if_any(found);
   add_faults(config.target, found);
+  if (config.map) add_faults(*config.map, config, found);
   if (config.start) add_faults(*config.start, found);
   for (const DepthReading& reading : config.depth_readings)
     if (!std::isfinite(reading.t_s + reading.depth_m) || !(reading.sigma_m > 0.0) || !std::isfinite(reading.sigma_m)) {
       found.emplace_back("a depth reading is not finite, or its sigma_m is not above 0");
+      break;
+    }
+  for (const OdometryReading& reading : config.odometry_readings)
+    if (!std::isfinite(reading.t_s) || !reading.position_m.allFinite()) {
+      found.emplace_back("an odometry reading is not finite");
       break;
     }
   for (const RangeReading& reading : config.range_readings)
@@ -232,6 +266,7 @@ Camera known_camera(const Camera& camera, const LocalizeConfig& config) {
 
 LocalizeConfig resolved(LocalizeConfig config, const Camera& camera, bool is_of_images) {
   if (config.calibrate_online) put_lens_in_state(camera, config.filter);
+  if (config.map) take_map(*config.map, is_of_images, config.target);
   if (config.start && config.start->depth_m > 0.0 && !config.depth_m) {
     config.depth_m = config.start->depth_m;
     config.sigma_depth = config.start->sigma_depth;

@@ -50,6 +50,10 @@ ReferencePatch::ReferencePatch(const cv::Mat& grey, int u, int v) {
   }
 }
 
+ReferencePatch::ReferencePatch(std::span<const std::uint8_t, area_px> grey) {
+  std::copy(grey.begin(), grey.end(), grey_.begin());
+}
+
 std::optional<PatchView> ReferencePatch::seen_through(const Eigen::Matrix2d& here_from_first) const {
   if (!is_usable(here_from_first)) return std::nullopt;
   const Eigen::Matrix2f first_from_here = here_from_first.inverse().cast<float>();

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 namespace cv {
 class Mat;
@@ -29,18 +30,22 @@ class ReferencePatch {
  public:
   static constexpr int half_px = 12;         ///< More than a view needs: it may be seen turned and larger.
   static constexpr int margin_px = half_px;  ///< Pixels around that have to be in the image.
+  static constexpr int side_px = 2 * half_px + 1;
+  static constexpr std::size_t area_px = static_cast<std::size_t>(side_px) * side_px;
 
   ReferencePatch() = default;
   /// Cuts it out of an 8-bit image of one channel, `margin_px` inside.
   ReferencePatch(const cv::Mat& grey, int u, int v);
+  /// Of what grey() gave.
+  explicit ReferencePatch(std::span<const std::uint8_t, area_px> grey);
 
+  [[nodiscard]] std::span<const std::uint8_t, area_px> grey() const { return grey_; }  ///< Row by row.
   /// As seen through a map of offsets from its middle, first image to this one. None: too small or large or turned
   /// over by it, or nothing to be seen in it.
   [[nodiscard]] std::optional<PatchView> seen_through(const Eigen::Matrix2d& here_from_first) const;
 
  private:
-  static constexpr int side_px = 2 * half_px + 1;
-  std::array<std::uint8_t, static_cast<std::size_t>(side_px) * side_px> grey_{};
+  std::array<std::uint8_t, area_px> grey_{};
 };
 
 struct PatchSearch {

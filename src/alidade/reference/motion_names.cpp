@@ -218,6 +218,7 @@ features.
 files:
 trajectory.tum  text  t x y z qx qy qz qw
 map.ply         text  points for viewers
+map.yaml        text  the map for another run to begin in: --map
 map.csv.
   point_id  count  number
   @xyz -

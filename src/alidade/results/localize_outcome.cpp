@@ -13,6 +13,7 @@
 #include "alidade/report/thin.h"
 #include "alidade/results/thin_tables.h"
 #include "alidade/tables/localize_file.h"
+#include "alidade/tables/map_file.h"
 
 namespace alidade {
 namespace {
@@ -179,6 +180,7 @@ void add_path_files(const Localization& result, std::vector<NamedBytes>& files) 
   files.push_back({"poses.csv", poses_csv(result.path)});
   files.push_back({"map.csv", map_csv(result.map)});
   files.push_back({"map.ply", map_ply(result.map)});
+  if (!result.saved_map.points.empty()) files.push_back({"map.yaml", map_text(result.saved_map)});
   if (!result.lens_params.empty()) files.push_back({"camera.yaml", camera_text(result.camera, CameraFormat::alidade)});
 }
 

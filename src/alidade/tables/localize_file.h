@@ -44,6 +44,10 @@ struct ObservationsOptions {
 [[nodiscard]] std::vector<RangeReading> read_ranges(const std::filesystem::path& file, bool skip_bad = false,
                                                     std::vector<SkippedInput>* skipped = nullptr);
 
+/// Reads `t_s,x_m,y_m[,z_m]` of odometry, in order of time. Throws InputError.
+[[nodiscard]] std::vector<OdometryReading> read_odometry(const std::filesystem::path& file, bool skip_bad = false,
+                                                         std::vector<SkippedInput>* skipped = nullptr);
+
 /// Poses as TUM writes them, `t x y z qx qy qz qw`, in order of time; lines that begin with # are comments.
 [[nodiscard]] std::vector<TimedPose> read_tum(const std::filesystem::path& file);
 [[nodiscard]] std::string tum_text(std::span<const TimedPose> poses);

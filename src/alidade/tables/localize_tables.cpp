@@ -91,6 +91,24 @@ std::vector<RangeReading> read_ranges(const std::filesystem::path& file, bool sk
   return readings;
 }
 
+std::vector<OdometryReading> read_odometry(const std::filesystem::path& file, bool skip_bad,
+                                           std::vector<SkippedInput>* skipped) {
+  const Csv csv = Csv::read(file);
+  csv.require(std::array<std::string, 3>{"t_s", "x_m", "y_m"});
+  std::vector<OdometryReading> readings;
+  std::vector<SkippedInput> named;
+  for_each_row(csv, skip_bad, named, [&](std::size_t row) {
+    OdometryReading reading;
+    reading.t_s = later_time(csv, row, readings.empty() ? std::nullopt : std::optional(readings.back().t_s));
+    reading.position_m = {csv.number(row, "x_m"), csv.number(row, "y_m"), 0.0};
+    if (csv.has("z_m")) reading.position_m.z() = csv.number(row, "z_m");
+    readings.push_back(reading);
+  });
+  add_named(std::move(named), skipped);
+  if (readings.empty()) throw InputError(file.string() + ": has no readings; at least one row is needed");
+  return readings;
+}
+
 std::string observations_csv(std::span<const ObservationFrame> frames) {
   std::string text = "frame,t_s,point_id,u_px,v_px\n";
   for (const ObservationFrame& frame : frames) {

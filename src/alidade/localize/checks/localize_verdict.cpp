@@ -24,15 +24,17 @@ Verdict never_started(const Localization& report) {
     return cannot_tell(std::to_string(report.num_alike) +
                            " things in one image look like the target: which one it is cannot be determined",
                        "begin where one of them is seen, or give --start");
+  if (report.is_in_map)
+    return cannot_tell("the map is not found in any of " + std::to_string(report.path.size()) + " frames",
+                       "begin where the map was made, in view of what it holds, with the same camera");
   if (report.is_of_images && report.has_target)
     return cannot_tell("the target is not found in any of " + std::to_string(report.path.size()) + " images",
                        "begin in front of the target, whole and sharp, and check its size in --target");
   if (report.max_seen < 3)
     return cannot_tell("too few points: at most " + std::to_string(report.max_seen) + " in a frame, a pose needs three",
                        report.is_of_images ? "look at something with corners, in light" : "track more points");
-  return cannot_tell(
-      "the target is not found: four of its points, in a plane and not on a line, are never seen where they belong",
-      "begin in front of the target, or give --start");
+  return cannot_tell("the target is not found: four of its points, not on a line, are never seen where they belong",
+                     "begin in front of the target, or give --start");
 }
 
 State state_of(double value, double care, double bad) {
@@ -228,7 +230,8 @@ void add_sensors(const Localization& report, Verdict& verdict) {
     if (!(each.sigma_rel > 0.0)) {
       verdict.checks.push_back({each.sensor, State::care,
                                 "the readings of the " + each.sensor + " do not determine the scale: " +
-                                    (!each.is_in_time ? "none of them is of the time of the path (t_s)"
+                                    (!each.is_in_time            ? "none of them is of the time of the path (t_s)"
+                                     : each.sensor == "odometry" ? "too few of them, or the camera hardly moves"
                                      : each.sensor == "depth sensor"
                                          ? "too few of them, or the camera moves too little up and down"
                                          : "too few of them, or too few points around the beam that lie on a surface"),
@@ -289,16 +292,23 @@ void add_checks(const Localization& report, Verdict& verdict) {
                                   " times their given σ: the path's position and scale before the target are "
                                   "less sure than its σ says",
                               report.known_shift, max_shift, "1", "path"});
-  verdict.checks.push_back({"scale", report.scale_known ? State::good : State::care,
-                            report.is_scale_read ? "scale from the " + sensors_text(report)
-                            : report.scale_known ? "scale from the known points"
-                            : report.has_target
-                                ? "none of the target's points is seen: scale and frame are those of the start"
-                                : "scale unknown: the path is up to scale, its unit is the depth at the start",
-                            0.0, 0.0, "", "path"});
+  verdict.checks.push_back(
+      {"scale", report.scale_known ? State::good : State::care,
+       report.is_scale_read ? "scale from the " + sensors_text(report)
+       : report.scale_known
+           ? (report.is_in_map ? "scale and frame are those of the map" : "scale from the known points")
+       : report.is_in_map  ? "scale unknown: the path's unit is that of the map"
+       : report.has_target ? "none of the target's points is seen: scale and frame are those of the start"
+                           : "scale unknown: the path is up to scale, its unit is the depth at the start",
+       0.0, 0.0, "", "path"});
   if (report.lacks_circle)
     verdict.checks.push_back(
         {"mask", State::care, "--mask circle: no image shows a circle, and nothing is masked", 0.0, 0.0, "", "tracks"});
+  if (report.still_share > 0.0)
+    verdict.checks.push_back({"still parts", State::good,
+                              text_of(100.0 * report.still_share, 2) +
+                                  " % of the image are edges that never move while the scene does: masked",
+                              report.still_share, 0.0, "1", "tracks"});
   if (report.num_restarts > 0)
     verdict.checks.push_back({"restarts", restarts_state(report), restarts_text(report),
                               static_cast<double>(report.num_restarts), 0.0, "times", "path"});

@@ -7,6 +7,17 @@
 #include "alidade/geometry/decompositions.h"
 
 namespace alidade {
+
+std::optional<Rigid3> pose_at(std::span<const PathStep> path, double t_s) {
+  const auto after = std::ranges::lower_bound(path, t_s, {}, &PathStep::t_s);
+  if (after == path.end()) return std::nullopt;
+  const auto before = after->t_s == t_s || after == path.begin() ? after : after - 1;
+  if (before->t_s > t_s || !before->has_pose() || !after->has_pose()) return std::nullopt;
+  const double gap_s = after->t_s - before->t_s, share = gap_s > 0.0 ? (t_s - before->t_s) / gap_s : 0.0;
+  const Rigid3 &a = before->world_from_cam, &b = after->world_from_cam;
+  return Rigid3{a.rotation.slerp(share, b.rotation), (1.0 - share) * a.translation + share * b.translation};
+}
+
 namespace {
 
 double median(std::vector<double> values) {
@@ -17,17 +28,6 @@ double median(std::vector<double> values) {
 }
 
 constexpr double sigma_of_median_deviation = 1.4826, rejected_beyond = 4.0;
-
-/// The pose at a time, between the two frames around it. None outside the path, or where one of them has none.
-std::optional<Rigid3> pose_at(std::span<const PathStep> path, double t_s) {
-  const auto after = std::ranges::lower_bound(path, t_s, {}, &PathStep::t_s);
-  if (after == path.end()) return std::nullopt;
-  const auto before = after->t_s == t_s || after == path.begin() ? after : after - 1;
-  if (before->t_s > t_s || !before->has_pose() || !after->has_pose()) return std::nullopt;
-  const double gap_s = after->t_s - before->t_s, share = gap_s > 0.0 ? (t_s - before->t_s) / gap_s : 0.0;
-  const Rigid3 &a = before->world_from_cam, &b = after->world_from_cam;
-  return Rigid3{a.rotation.slerp(share, b.rotation), (1.0 - share) * a.translation + share * b.translation};
-}
 
 /// A reading's depth, and where the camera was.
 struct DepthRow {
@@ -196,57 +196,6 @@ std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, 
   read.sigma_rel = std::hypot(of_blocks, of_beam, of_surface);
   constexpr double useless = 0.2;
   return read.sigma_rel < useless ? std::optional(read) : std::nullopt;
-}
-
-void read_scales(const LocalizeConfig& config, std::span<const MapPoint> map, Localization& result) {
-  result.sensor_scales.clear();
-  const auto add = [&](const char* sensor, const auto& readings, const std::optional<ReadScale>& read) {
-    SensorScale scale{sensor, 1.0, 0.0, 0, 0, true};
-    if (read) scale = {sensor, read->scale, read->sigma_rel, read->num_used, read->num_rejected, true};
-    scale.is_in_time = std::ranges::any_of(readings, [&](const auto& reading) {
-      return !result.path.empty() && reading.t_s >= result.path.front().t_s && reading.t_s <= result.path.back().t_s;
-    });
-    result.sensor_scales.push_back(scale);
-  };
-  if (!config.depth_readings.empty())
-    add("depth sensor", config.depth_readings, scale_by_depth(config.depth_readings, result.path));
-  if (!config.range_readings.empty() && config.beam)
-    add("rangefinder", config.range_readings, scale_by_range(config.range_readings, *config.beam, result.path, map));
-}
-
-std::optional<ReadScale> scale_of(const Localization& result) {
-  double weights = 0.0, logs = 0.0;
-  ReadScale all;
-  for (const SensorScale& each : result.sensor_scales) {
-    if (!(each.sigma_rel > 0.0)) continue;
-    const double weight = 1.0 / (each.sigma_rel * each.sigma_rel);
-    weights += weight;
-    logs += weight * std::log(each.scale);
-    all.num_used += each.num_used;
-    all.num_rejected += each.num_rejected;
-  }
-  if (!(weights > 0.0)) return std::nullopt;
-  all.scale = std::exp(logs / weights);
-  all.sigma_rel = 1.0 / std::sqrt(weights);
-  return all;
-}
-
-void apply_scale(const ReadScale& scale, Localization& result) {
-  const double s = scale.scale, variance = scale.sigma_rel * scale.sigma_rel;
-  Eigen::Vector<double, 6> to_metres = Eigen::Vector<double, 6>::Ones();
-  to_metres.head<3>().setConstant(s);
-  for (PathStep& step : result.path) {
-    if (!step.has_pose()) continue;
-    step.world_from_cam.translation *= s;
-    step.cov = to_metres.asDiagonal() * step.cov * to_metres.asDiagonal();
-    const Eigen::Vector3d place = step.world_from_cam.rotation.conjugate() * step.world_from_cam.translation;
-    step.cov.topLeftCorner<3, 3>() += variance * place * place.transpose();
-  }
-  for (MapPoint& point : result.map) {
-    point.point_in_world *= s;
-    point.cov *= s * s;
-    point.cov += variance * point.point_in_world * point.point_in_world.transpose();
-  }
 }
 
 }  // namespace alidade

@@ -113,5 +113,51 @@ TEST(SensorScale, WithoutMovementUpAndDownNoneIsGiven) {
   EXPECT_NE(result.verdict.state, State::good);
 }
 
+/// Of a vehicle that turns and drifts, whose wheels are .4 % larger than it believes, and slip now and then.
+std::vector<OdometryReading> odometry_of(const WalkRun& run, std::uint64_t seed) {
+  Draws draws(seed);
+  std::vector<OdometryReading> readings;
+  const Eigen::Quaterniond other = exp_so3(Eigen::Vector3d(0.3, -0.2, 1.1));
+  Eigen::Vector3d at(3.0, -2.0, 0.0);
+  for (std::size_t i = 0; i < run.truth.size(); ++i) {
+    if (i > 0) {
+      const Eigen::Vector3d step =
+          run.truth[i].world_from_cam.translation - run.truth[i - 1].world_from_cam.translation;
+      const double heading = 2e-4 * static_cast<double>(i);
+      at += 0.996 * (other * exp_so3(Eigen::Vector3d(0.0, heading, 0.0)) * step) * (1.0 + 0.02 * draws.normal());
+      if (i % 151 == 0) at += Eigen::Vector3d(0.05, 0.0, 0.0);  // a wheel spins
+    }
+    readings.push_back({run.truth[i].t_s, at});
+  }
+  return readings;
+}
+
+TEST(SensorScale, OdometryGivesMetresByItsLengths) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const WalkRun run = long_walk(swimming(), seed);
+    LocalizeConfig config;
+    config.odometry_readings = odometry_of(run, seed);
+    const Localization result = localize(run.frames, run.camera, config, run.truth);
+    ASSERT_TRUE(result.is_scale_read) << result.verdict.sentence;
+    const SensorScale& read = result.sensor_scales.front();
+    EXPECT_EQ(read.sensor, "odometry");
+    const double true_scale = localize(run.frames, run.camera, LocalizeConfig{}, run.truth).error.scale;
+    EXPECT_NEAR(read.scale / true_scale, 1.0, 3.0 * read.sigma_rel) << seed;
+    EXPECT_NEAR(read.scale / true_scale, 0.996, 0.006) << seed;  // what the wheels are wrong by is not seen
+    EXPECT_GE(read.sigma_rel, 0.01) << seed;                     // and is in its σ
+    EXPECT_GE(read.num_rejected, 1u) << seed;
+  }
+}
+
+TEST(SensorScale, OdometryOfACameraThatStandsGivesNone) {
+  const WalkRun run = long_walk(swimming(), 4);
+  LocalizeConfig config;
+  for (const TimedPose& pose : run.truth) config.odometry_readings.push_back({pose.t_s, {1.0, 2.0, 0.0}});
+  const Localization result = localize(run.frames, run.camera, config, run.truth);
+  EXPECT_FALSE(result.scale_known);
+  EXPECT_NE(result.verdict.sentence.find("the readings of the odometry do not determine the scale"), std::string::npos)
+      << result.verdict.sentence;
+}
+
 }  // namespace
 }  // namespace alidade

@@ -53,4 +53,31 @@ std::optional<Eigen::Matrix2d> here_from_first(const Landmark& landmark, const C
   return *J * landmark.J_first_px_surface.inverse() * (distance_m / landmark.first_distance_m);
 }
 
+SavedLook look_of(const Landmark& landmark, const Eigen::Vector3d& point_in_world, const Rigid3& world_from_first_cam) {
+  SavedLook look;
+  const auto grey = landmark.patch.grey();
+  look.patch = {ReferencePatch::side_px, ReferencePatch::side_px, {grey.begin(), grey.end()}};
+  look.offset_px = landmark.offset_px;
+  look.world_from_first_cam = world_from_first_cam;
+  const Eigen::Quaterniond turned = world_from_first_cam.rotation * landmark.world_from_first_cam.rotation.conjugate();
+  look.surface_in_world = turned.toRotationMatrix() * landmark.surface_in_world;
+  const double distance_m = (point_in_world - world_from_first_cam.translation).norm();
+  look.J_first_px_surface = landmark.J_first_px_surface * (landmark.first_distance_m / distance_m);
+  return look;
+}
+
+Landmark saved_landmark(long id, const SavedLook& look, const Eigen::Vector3d& point_in_world) {
+  Landmark landmark;
+  landmark.id = id;
+  landmark.patch = ReferencePatch(
+      std::span<const std::uint8_t, ReferencePatch::area_px>(look.patch.grey.data(), ReferencePatch::area_px));
+  landmark.offset_px = look.offset_px;
+  landmark.world_from_first_cam = look.world_from_first_cam;
+  landmark.surface_in_world = look.surface_in_world;
+  landmark.J_first_px_surface = look.J_first_px_surface;
+  landmark.first_distance_m = (point_in_world - look.world_from_first_cam.translation).norm();
+  landmark.is_known = landmark.is_saved = true;
+  return landmark;
+}
+
 }  // namespace alidade

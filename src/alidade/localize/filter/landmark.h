@@ -5,6 +5,7 @@
 
 #include "alidade/camera/camera.h"
 #include "alidade/geometry/rigid3.h"
+#include "alidade/localize/saved_map.h"
 #include "alidade/patches/reference_patch.h"
 
 namespace alidade {
@@ -18,9 +19,12 @@ struct Landmark {
   Eigen::Matrix<double, 3, 2> surface_in_world = Eigen::Matrix<double, 3, 2>::Zero();  ///< Two directions along it.
   Eigen::Matrix2d J_first_px_surface = Eigen::Matrix2d::Identity();  ///< Of first_px by a move along them.
   double first_distance_m = 1.0;
+  std::size_t first_step = 0;  ///< Of the path.
   bool is_known = false;
+  bool is_saved = false;  ///< Of the map of an earlier run.
   int num_tried = 0, num_found = 0;
   long last_found = 0;  ///< Frame.
+  Eigen::Vector2d last_px = Eigen::Vector2d::Zero();
 };
 
 /// A landmark as seen first, at a point of the world. Its surface is taken to face the camera, or to have the normal
@@ -36,5 +40,10 @@ struct Landmark {
 [[nodiscard]] std::optional<Eigen::Matrix2d> here_from_first(const Landmark& landmark, const Camera& camera,
                                                              const Rigid3& world_from_cam,
                                                              const Eigen::Vector3d& point_in_world);
+
+/// How a landmark looks, that is at this place by now and was seen first from there; and one that looks so.
+[[nodiscard]] SavedLook look_of(const Landmark& landmark, const Eigen::Vector3d& point_in_world,
+                                const Rigid3& world_from_first_cam);
+[[nodiscard]] Landmark saved_landmark(long id, const SavedLook& look, const Eigen::Vector3d& point_in_world);
 
 }  // namespace alidade

@@ -214,6 +214,9 @@ void ObservationRecord::add_points(const LocalizeConfig& config, const Localizat
     }
     problem.points.push_back(point);
   }
+  for (const KnownPoint& told : config.target.points)
+    if (!filter.has(told.id))
+      problem.points.push_back({told.id, told.point_in_world, told.point_in_world, told.sigma_m, 0, {}});
 }
 
 void ObservationRecord::add_gone(const LocalizeConfig& config, std::span<const GonePoint> gone,

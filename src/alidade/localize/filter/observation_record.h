@@ -6,7 +6,7 @@
 #include "alidade/localize/config.h"
 #include "alidade/localize/filter/filter.h"
 #include "alidade/localize/filter/point_store.h"
-#include "alidade/localize/kept_frames.h"
+#include "alidade/localize/frames/kept_frames.h"
 #include "alidade/localize/path/path_smoother.h"
 
 namespace alidade {

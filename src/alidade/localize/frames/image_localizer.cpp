@@ -4,8 +4,6 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "alidade/localize/checks/summary.h"
-#include "alidade/localize/frames/image_mask.h"
 #include "alidade/patches/corner_features.h"
 
 namespace alidade {
@@ -29,9 +27,10 @@ LocalizationFilterConfig for_images(LocalizationFilterConfig config, double sigm
 }
 
 ImageLocalizer::ImageLocalizer(const Camera& camera, const LocalizeConfig& config)
-    : engine_(camera, config), config_(config) {
+    : engine_(camera, config), config_(config), kept_(static_cast<std::size_t>(config.max_smoothed)) {
   next_id_ = static_cast<long>(config.target.points.size());
   for (const KnownPoint& point : config.target.points) next_id_ = std::max(next_id_, point.id + 1);
+  if (config.map) take_saved(*config.map);
 }
 
 void ImageLocalizer::forget(long id) {
@@ -44,6 +43,7 @@ void ImageLocalizer::begin_at(std::span<const StartHypothesis> starts) {
   FilterBankConfig bank = config_.bank;
   bank.splits = 1;
   engine_.begin(starts, t_s_, bank);
+  record_.begin(num_taken_);
 }
 
 /// None where there is no target.
@@ -54,6 +54,7 @@ std::optional<SeenTarget> ImageLocalizer::seen_target(const cv::Mat& smoothed) c
 
 /// From the start that was given, or the target; without both the first camera is the world.
 bool ImageLocalizer::start(const cv::Mat& smoothed) {
+  if (config_.map) return start_in_map(smoothed);
   const std::optional<SeenTarget> seen = seen_target(smoothed);
   if (!seen && !config_.target.points.empty()) return false;
   if (seen && seen->num_alike > 1) {
@@ -92,6 +93,7 @@ void ImageLocalizer::add_target(const cv::Mat& smoothed, const SeenTarget& seen)
   for (FeatureObservation& observation : observations) observation.sigma_px = config_.features.sigma_floor_px;
   const ObservationsReport report = engine_.filters().update(observations);
   num_found_now_ = report.num_used;
+  now_ = observations;
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // of the plane through the points
   for (std::size_t i = 2; i < points.size(); ++i)
     normal += (points[i - 1].point_in_world - points[0].point_in_world)
@@ -106,6 +108,7 @@ void ImageLocalizer::add_target(const cv::Mat& smoothed, const SeenTarget& seen)
     if (!landmark) continue;
     landmark->is_known = true;
     landmark->last_found = frame_;
+    landmark->first_step = num_taken_;
     landmarks_[observation.id] = *landmark;
   }
 }
@@ -114,7 +117,7 @@ void ImageLocalizer::add_target(const cv::Mat& smoothed, const SeenTarget& seen)
 void ImageLocalizer::predict_to(double t_s) {
   const double gap_s = t_s - t_s_;
   if (!(period_s_ > 0.0) || gap_s < period_s_) period_s_ = gap_s;
-  engine_.predict_to(t_s, config_.period_s > 0.0 ? config_.period_s : period_s_);
+  engine_.predict_to(t_s, period_s());
   t_s_ = t_s;
 }
 
@@ -153,14 +156,6 @@ std::vector<FeatureObservation> ImageLocalizer::look(const cv::Mat& smoothed, co
   return observations;
 }
 
-bool ImageLocalizer::is_shown(const Eigen::Vector2d& px) const {
-  if (shown_.shows.empty()) return true;
-  const int u = static_cast<int>(std::lround(px.x())), v = static_cast<int>(std::lround(px.y()));
-  return u >= 0 && v >= 0 && u < shown_.width_px && v < shown_.height_px &&
-         shown_.shows[static_cast<std::size_t>(v) * static_cast<std::size_t>(shown_.width_px) +
-                      static_cast<std::size_t>(u)] != 0;
-}
-
 bool ImageLocalizer::is_found(std::size_t num_found) const {
   return num_found >= min_tracked && static_cast<double>(num_found) >= min_share * static_cast<double>(tried_.size());
 }
@@ -172,6 +167,7 @@ void ImageLocalizer::count(std::span<const FeatureObservation> observations, con
     Landmark& landmark = landmarks_.at(observations[i].id);
     ++landmark.num_found;
     landmark.last_found = frame_;
+    landmark.last_px = observations[i].px;
     const auto tried = std::ranges::find(tried_, observations[i].id, &ObservationTried::id);
     if (tried != tried_.end()) tried->is_used = true;
   }
@@ -181,11 +177,15 @@ void ImageLocalizer::drop_bad() {
   constexpr int min_tries = 8;
   std::vector<long> bad;
   for (const auto& [id, landmark] : landmarks_) {
-    if (landmark.is_known || landmark.num_tried < min_tries) continue;
+    if ((landmark.is_known && !landmark.is_saved) || landmark.num_tried < min_tries) continue;
     if (landmark.num_found < config_.features.min_found_share * landmark.num_tried) bad.push_back(id);
   }
   std::ranges::sort(bad);
-  for (const long id : bad) forget(id);
+  for (const long id : bad) {
+    forget(id);
+    record_.left(id);
+    saved_.erase(id);
+  }
 }
 
 /// As deep as the points of the map that are known well, in the middle.
@@ -214,7 +214,7 @@ bool ImageLocalizer::make_room() {
       oldest = &landmark;
   }
   if (!oldest) return false;
-  forget(oldest->id);
+  let_go(oldest->id);
   return true;
 }
 
@@ -241,6 +241,10 @@ void ImageLocalizer::add_new(const cv::Mat& smoothed) {
                                  world_from_cam * (range_m * *ray_in_cam));
     if (!landmark || !engine_.filters().add(next_id_, px, {range_m, prior_share})) continue;
     landmark->last_found = frame_;
+    landmark->last_px = px;
+    landmark->first_step = num_taken_;
+    record_.entered(num_taken_, next_id_, {range_m, prior_share}, false);
+    now_.push_back({next_id_, px, config_.features.sigma_floor_px});
     landmarks_[next_id_++] = *landmark;
     ++num_found_now_;
     --most;
@@ -251,6 +255,7 @@ void ImageLocalizer::add_new(const cv::Mat& smoothed) {
 /// most of what is expected then, where it is expected.
 bool ImageLocalizer::try_from(const cv::Mat& smoothed, const StartHypothesis& from, PathStep& step) {
   engine_.filters().restart({{from}});
+  enter_saved();
   const std::vector<FeatureObservation> observations = look(smoothed, {0.85, 0.0});
   if (!is_found(observations.size())) return false;
   const ObservationsReport report = engine_.filters().update(observations);
@@ -264,6 +269,7 @@ bool ImageLocalizer::try_from(const cv::Mat& smoothed, const StartHypothesis& fr
   if (again.size() < sure_number || static_cast<double>(again.size()) < sure_share * static_cast<double>(tried_.size()))
     return false;
   step = found;
+  now_ = observations;
   return true;
 }
 
@@ -279,9 +285,9 @@ bool ImageLocalizer::restart_in_doubt(const cv::Mat& smoothed, PathStep& step) {
   return false;
 }
 
-bool ImageLocalizer::find_back(const cv::Mat& smoothed, PathStep& step) {
+/// The places of the keyframes that are most like the image.
+std::vector<StartHypothesis> ImageLocalizer::likely_places(const cv::Mat& smoothed, double depth_m) const {
   std::vector<StartHypothesis> starts;
-  const double depth_m = usual_depth_m();
   constexpr double sigma_share = 0.15, sigma_rad = 0.08;  // of what a keyframe's pose is off by
   for (const Rigid3& world_from_cam : keyframes_.candidates(smoothed, engine_.camera(), 4)) {
     StartHypothesis start;
@@ -292,6 +298,11 @@ bool ImageLocalizer::find_back(const cv::Mat& smoothed, PathStep& step) {
     start.cov.diagonal().tail<3>().setConstant(std::pow(config_.sigma_rate_rad_s, 2));
     starts.push_back(start);
   }
+  return starts;
+}
+
+bool ImageLocalizer::find_back(const cv::Mat& smoothed, PathStep& step) {
+  std::vector<StartHypothesis> starts = likely_places(smoothed, usual_depth_m());
   if (const auto seen = seen_target(smoothed)) starts.insert(starts.begin(), seen->starts.begin(), seen->starts.end());
   const FilterBank before = engine_.filters();
   for (const StartHypothesis& start : starts) {
@@ -304,6 +315,7 @@ bool ImageLocalizer::find_back(const cv::Mat& smoothed, PathStep& step) {
 /// An image after the first of the path.
 void ImageLocalizer::take_next(const cv::Mat& smoothed, PathStep& step) {
   predict_to(step.t_s);
+  enter_saved();
   std::vector<FeatureObservation> observations = look(smoothed, {config_.features.min_correlation, 0.0});
   if (config_.disturb) config_.disturb(step.frame, observations);
   step.num_seen = observations.size();
@@ -311,6 +323,7 @@ void ImageLocalizer::take_next(const cv::Mat& smoothed, PathStep& step) {
   if (is_found(observations.size())) {
     const ObservationsReport report = engine_.filters().update(observations);
     engine_.fill(observations, report, step);
+    now_ = observations;
     count(observations, report);
     engine_.keep_residuals(observations, report);
     if (is_found(report.num_used)) step.event = FrameEvent::tracked;
@@ -327,12 +340,15 @@ void ImageLocalizer::take_next(const cv::Mat& smoothed, PathStep& step) {
 }
 
 PathStep ImageLocalizer::take(const cv::Mat& grey, long frame, double t_s) {
-  const cv::Mat smoothed = smoothed_for_search(grey);
-  if (shown_.shows.empty()) {
-    ShownPart part = shown_part(config_, grey, PatchView::half_px + 2);
-    shown_ = std::move(part.mask);
-    lacks_circle_ = part.lacks_circle;
-  }
+  now_.clear();
+  PathStep step = taken(grey, smoothed_for_search(grey), frame, t_s);
+  ++num_taken_;
+  if (config_.smooths) kept_.add({frame, t_s, now_});
+  return step;
+}
+
+PathStep ImageLocalizer::taken(const cv::Mat& grey, const cv::Mat& smoothed, long frame, double t_s) {
+  mask(grey, smoothed);
   PathStep step;
   step.frame = frame_ = frame;
   step.t_s = t_s;
@@ -343,6 +359,8 @@ PathStep ImageLocalizer::take(const cv::Mat& grey, long frame, double t_s) {
     if (!start(smoothed)) {
       engine_.end();
       landmarks_.clear();
+      record_ = {};
+      now_.clear();
       return step;
     }
     step.event = FrameEvent::started;
@@ -352,21 +370,8 @@ PathStep ImageLocalizer::take(const cv::Mat& grey, long frame, double t_s) {
   engine_.keep_given();
   if (step.event == FrameEvent::tracked)
     keyframes_.offer(grey, step.world_from_cam, config_.features.near_share * usual_depth_m(),
-                     config_.features.near_rad);
+                     config_.features.near_rad, num_taken_);
   return step;
-}
-
-void ImageLocalizer::sum_up(Localization& result) const {
-  result.is_of_images = true;
-  result.lacks_circle = lacks_circle_;
-  result.sigma_px = config_.features.sigma_floor_px;
-  result.num_alike = num_alike_;
-  const auto num_found = [this](long id) {
-    const auto at = landmarks_.find(id);
-    return at == landmarks_.end() ? 0 : static_cast<std::size_t>(at->second.num_found);
-  };
-  engine_.sum_up(num_found, result);
-  result.known_shift = known_shift(result.map, given_);
 }
 
 }  // namespace alidade

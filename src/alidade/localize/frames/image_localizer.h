@@ -5,7 +5,9 @@
 #include "alidade/localize/engine.h"
 #include "alidade/localize/filter/landmark.h"
 #include "alidade/localize/frames/image_target.h"
+#include "alidade/localize/frames/still_parts.h"
 #include "alidade/localize/path/keyframes.h"
+#include "alidade/localize/path/whole_path.h"
 
 namespace alidade {
 
@@ -22,8 +24,10 @@ class ImageLocalizer {
 
   /// The next image, 8-bit grey of the camera's size.
   PathStep take(const cv::Mat& grey, long frame, double t_s);
-  /// `result` has the path; the rest is filled in.
+  /// `result` has the path; the rest is filled in, and the path smoothed.
   void sum_up(Localization& result) const;
+  /// The map for another run to begin in: `result` as it is given.
+  void save_map(Localization& result) const;
   /// Of the last image.
   [[nodiscard]] std::span<const ObservationTried> tried() const { return tried_; }
 
@@ -33,7 +37,12 @@ class ImageLocalizer {
     double extra_sigma_px = 0.0;
   };
 
+  [[nodiscard]] PathStep taken(const cv::Mat& grey, const cv::Mat& smoothed, long frame, double t_s);
   bool start(const cv::Mat& smoothed);
+  bool start_in_map(const cv::Mat& smoothed);
+  void take_saved(const SavedMap& map);
+  void enter_saved();
+  [[nodiscard]] std::vector<StartHypothesis> likely_places(const cv::Mat& smoothed, double depth_m) const;
   void begin_at(std::span<const StartHypothesis> starts);
   [[nodiscard]] std::optional<SeenTarget> seen_target(const cv::Mat& smoothed) const;
   void add_target(const cv::Mat& smoothed, const SeenTarget& seen);
@@ -46,6 +55,9 @@ class ImageLocalizer {
   void drop_bad();
   void add_new(const cv::Mat& smoothed);
   [[nodiscard]] bool make_room();
+  void let_go(long id);
+  [[nodiscard]] double period_s() const { return config_.period_s > 0.0 ? config_.period_s : period_s_; }
+  [[nodiscard]] Recording recording() const;
   [[nodiscard]] double usual_depth_m() const;
   [[nodiscard]] bool find_back(const cv::Mat& smoothed, PathStep& step);
   [[nodiscard]] bool try_from(const cv::Mat& smoothed, const StartHypothesis& start, PathStep& step);
@@ -61,8 +73,25 @@ class ImageLocalizer {
   std::size_t num_alike_ = 1;
   [[nodiscard]] bool is_shown(const Eigen::Vector2d& px) const;
 
-  ImageMask shown_;  ///< image_mask.h.
+  ObservationRecord record_;
+  KeptFrames kept_;  ///< Where the path is smoothed.
+  struct Gone {
+    GonePoint point;
+    Landmark landmark;
+  };
+  std::map<long, Gone> gone_;  ///< Points that left a full map.
+  struct Saved {
+    KnownPoint point;
+    Landmark landmark;
+  };
+  std::map<long, Saved> saved_;          ///< Of the map of an earlier run; those that are not found leave it.
+  std::vector<FeatureObservation> now_;  ///< What this image's pose is made of, and what was chosen in it.
+  std::size_t num_taken_ = 0;            ///< Images.
+  ImageMask shown_;                      ///< image_mask.h.
   bool lacks_circle_ = false;
+  void mask(const cv::Mat& grey, const cv::Mat& smoothed);
+  StillParts still_;
+  ImageMask given_mask_;  ///< `shown_` without what stands still.
   std::vector<ObservationTried> tried_;
   std::vector<Eigen::Vector2d> in_view_;  ///< Where landmarks are, or should be, in this image.
   double t_s_ = 0.0, period_s_ = 0.0;

@@ -80,14 +80,39 @@ ThumbnailMatch match_thumbnails(const Thumbnail& first, const Thumbnail& second)
   return best;
 }
 
-void KeyframeStore::offer(const cv::Mat& grey, const Rigid3& world_from_cam, double near_m, double near_rad) {
+void KeyframeStore::offer(const cv::Mat& grey, const Rigid3& world_from_cam, double near_m, double near_rad,
+                          std::size_t step) {
   if (keyframes_.size() >= max_keyframes) return;
   const bool is_near = std::ranges::any_of(keyframes_, [&](const Keyframe& keyframe) {
     return (keyframe.world_from_cam.translation - world_from_cam.translation).norm() < near_m &&
            distance_rad(keyframe.world_from_cam, world_from_cam) < near_rad;
   });
   if (is_near) return;
-  keyframes_.push_back({world_from_cam, thumbnail_of(grey)});
+  keyframes_.push_back({world_from_cam, thumbnail_of(grey), step});
+}
+
+void KeyframeStore::add(const SavedKeyframe& saved) {
+  Thumbnail thumbnail;
+  double mean = 0.0;
+  for (const std::uint8_t grey : saved.thumbnail.grey) mean += grey / static_cast<double>(thumbnail.grey.size());
+  for (std::size_t i = 0; i < thumbnail.grey.size(); ++i) {
+    thumbnail.grey[i] = static_cast<float>(saved.thumbnail.grey[i] - mean);
+    thumbnail.energy += thumbnail.grey[i] * thumbnail.grey[i];
+  }
+  keyframes_.push_back({saved.world_from_cam, thumbnail, {}});
+}
+
+std::vector<SavedKeyframe> KeyframeStore::saved(std::span<const PathStep> path) const {
+  std::vector<SavedKeyframe> all;
+  for (const Keyframe& keyframe : keyframes_) {
+    SavedKeyframe saved{keyframe.world_from_cam, {Thumbnail::width, Thumbnail::height, {}}};
+    if (keyframe.step) saved.world_from_cam = path[*keyframe.step].world_from_cam;
+    constexpr double grey = 128.0;  // in the middle of what a byte holds; the mean does not count
+    for (const float value : keyframe.thumbnail.grey)
+      saved.thumbnail.grey.push_back(static_cast<std::uint8_t>(std::clamp(std::lround(value + grey), 0L, 255L)));
+    all.push_back(std::move(saved));
+  }
+  return all;
 }
 
 std::vector<Rigid3> KeyframeStore::candidates(const cv::Mat& grey, const Camera& camera, std::size_t most) const {

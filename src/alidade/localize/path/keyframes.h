@@ -6,6 +6,7 @@
 
 #include "alidade/camera/camera.h"
 #include "alidade/geometry/rigid3.h"
+#include "alidade/localize/localization.h"
 
 namespace cv {
 class Mat;
@@ -33,8 +34,12 @@ struct ThumbnailMatch {
 /// "Improving the Agility of Keyframe-Based SLAM", ECCV 2008.
 class KeyframeStore {
  public:
-  /// Keeps it if none is near: `near_m` and `near_rad` away.
-  void offer(const cv::Mat& grey, const Rigid3& world_from_cam, double near_m, double near_rad);
+  /// Keeps it if none is near: `near_m` and `near_rad` away. `step`: of the path.
+  void offer(const cv::Mat& grey, const Rigid3& world_from_cam, double near_m, double near_rad, std::size_t step = 0);
+  /// Those of a map that was saved.
+  void add(const SavedKeyframe& saved);
+  /// All, where the path now says that they were taken.
+  [[nodiscard]] std::vector<SavedKeyframe> saved(std::span<const PathStep> path) const;
   /// Poses from which an image may have been taken, the likeliest first: those of the keyframes most like it, turned
   /// by the shift of the image.
   [[nodiscard]] std::vector<Rigid3> candidates(const cv::Mat& grey, const Camera& camera, std::size_t most) const;
@@ -44,6 +49,7 @@ class KeyframeStore {
   struct Keyframe {
     Rigid3 world_from_cam;
     Thumbnail thumbnail;
+    std::optional<std::size_t> step = {};  ///< None: of an earlier run.
   };
   std::vector<Keyframe> keyframes_;
 };

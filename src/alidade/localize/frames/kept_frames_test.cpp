@@ -1,4 +1,4 @@
-#include "alidade/localize/kept_frames.h"
+#include "alidade/localize/frames/kept_frames.h"
 
 #include <gtest/gtest.h>
 

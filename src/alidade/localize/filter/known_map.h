@@ -1,0 +1,17 @@
+#pragma once
+
+#include <vector>
+
+#include "alidade/localize/saved_map.h"
+#include "alidade/localize/target.h"
+
+namespace alidade {
+
+/// Of a saved map's points so many are in the filter at once.
+inline constexpr std::size_t max_saved_at_once = 60;
+
+/// The points of a map as known ones, each with the σ of its least sure direction; without those that are far less sure
+/// than most.
+[[nodiscard]] std::vector<KnownPoint> known_points(const SavedMap& map);
+
+}  // namespace alidade

@@ -1,0 +1,45 @@
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "alidade/localize/frames/image_localizer.h"
+#include "alidade/localize/frames/image_mask.h"
+
+// Where images show the scene.
+
+namespace alidade {
+
+bool ImageLocalizer::is_shown(const Eigen::Vector2d& px) const {
+  if (shown_.shows.empty()) return true;
+  const int u = static_cast<int>(std::lround(px.x())), v = static_cast<int>(std::lround(px.y()));
+  return u >= 0 && v >= 0 && u < shown_.width_px && v < shown_.height_px &&
+         shown_.shows[static_cast<std::size_t>(v) * static_cast<std::size_t>(shown_.width_px) +
+                      static_cast<std::size_t>(u)] != 0;
+}
+
+/// The mask that is given, or the circle of the first image that shows one; without what stands still. What was found
+/// last where nothing moves was no point of the scene.
+void ImageLocalizer::mask(const cv::Mat& grey, const cv::Mat& smoothed) {
+  constexpr int margin_px = PatchView::half_px + 2;
+  if (given_mask_.shows.empty()) {
+    ShownPart part = shown_part(config_, grey, margin_px);
+    given_mask_ = std::move(part.mask);
+    lacks_circle_ = part.lacks_circle;
+    if (!given_mask_.shows.empty()) shown_ = given_mask_;
+  }
+  if (!config_.masks_still || !still_.add(smoothed)) return;
+  const cv::Mat moves = still_.shown(margin_px);
+  shown_ = {moves.cols, moves.rows, {moves.begin<std::uint8_t>(), moves.end<std::uint8_t>()}};
+  for (std::size_t i = 0; i < given_mask_.shows.size(); ++i) shown_.shows[i] &= given_mask_.shows[i];
+  if (!engine_.has_begun()) return;
+  std::vector<long> still;
+  for (const auto& [id, landmark] : landmarks_)
+    if (!landmark.is_known && !is_shown(landmark.last_px)) still.push_back(id);
+  std::ranges::sort(still);
+  for (const long id : still) {
+    forget(id);
+    record_.left(id);
+  }
+}
+
+}  // namespace alidade

@@ -1,0 +1,132 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <opencv2/core.hpp>
+
+#include "alidade/estimation/config_error.h"
+#include "alidade/localize.h"
+#include "alidade/tables/map_file.h"
+#include "alidade/testing/long_walk.h"
+#include "alidade/testing/room_video.h"
+
+// A map that one run leaves is where another begins.
+
+namespace alidade {
+namespace {
+
+using testing::LongWalk;
+using testing::RoomScene;
+
+/// The map by way of its file.
+SavedMap as_written(const SavedMap& map) {
+  const auto file = std::filesystem::temp_directory_path() / "alidade_saved_map_test.yaml";
+  std::ofstream(file) << map_text(map);
+  SavedMap read = read_map(file);
+  std::filesystem::remove(file);
+  return read;
+}
+
+struct MapFilm {
+  RoomScene scene;
+  std::vector<cv::Mat> images;
+  std::vector<TimedPose> truth;
+};
+
+/// The room without its rectangle looks the same everywhere else.
+MapFilm map_film(bool has_rectangle, int from, int to) {
+  MapFilm film;
+  film.scene.camera = testing::room_camera();
+  film.scene.num_frames = to;
+  film.scene.has_rectangle = has_rectangle;
+  const std::vector<Rigid3> path = testing::room_path(film.scene);
+  for (int i = from; i < to; ++i) {
+    const Rigid3& pose = path[static_cast<std::size_t>(i)];
+    film.images.push_back(testing::render_room(film.scene, pose, static_cast<std::uint64_t>(i + 1)));
+    film.truth.push_back({i / film.scene.rate_hz, pose});
+  }
+  return film;
+}
+
+Localization localized_film(const MapFilm& film, LocalizeConfig config) {
+  config.filter.sigma_a_m_s2 = 4.0;
+  config.filter.sigma_alpha_rad_s2 = 6.0;
+  std::size_t i = 0;
+  const NextImage next = [&](cv::Mat& grey, long& frame, double& t_s) {
+    if (i == film.images.size()) return false;
+    grey = film.images[i];
+    frame = static_cast<long>(i);
+    t_s = film.truth[i++].t_s;
+    return true;
+  };
+  return localize(ImageStream{next, film.images.size()}, film.scene.camera, config, film.truth);
+}
+
+TEST(SavedMap, ImagesBeginInTheMapOfAnEarlierRun) {
+  LocalizeConfig with_target, in_map;
+  with_target.target = rectangle_target(0.210, 0.1485);
+  const Localization first = localized_film(map_film(true, 0, 90), with_target);
+  ASSERT_GT(first.saved_map.points.size(), 20u);
+  ASSERT_FALSE(first.saved_map.keyframes.empty());
+  in_map.map = as_written(first.saved_map);
+  // Other images, from other places, in which the target is not even there.
+  const Localization second = localized_film(map_film(false, 120, 180), in_map);
+  EXPECT_EQ(second.num_lost, 0u) << second.verdict.sentence;
+  EXPECT_TRUE(second.is_in_map);
+  EXPECT_TRUE(second.scale_known);
+  EXPECT_LT(second.error.unaligned_m, 0.01) << second.verdict.sentence;  // in the frame of the first, in metres
+  EXPECT_GT(second.saved_map.points.size(), first.saved_map.points.size() / 2);
+  EXPECT_NE(second.verdict.exit_code, ExitCode::cannot_tell);
+}
+
+TEST(SavedMap, ImagesOfAnotherPlaceAreRefused) {
+  LocalizeConfig with_target, in_map;
+  with_target.target = rectangle_target(0.210, 0.1485);
+  in_map.map = localized_film(map_film(true, 0, 45), with_target).saved_map;
+  MapFilm elsewhere = map_film(true, 0, 5);
+  for (cv::Mat& image : elsewhere.images) cv::flip(image, image, -1);
+  const Localization none = localized_film(elsewhere, in_map);
+  EXPECT_EQ(none.num_lost, 5u);
+  EXPECT_EQ(none.verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_NE(none.verdict.sentence.find("the map is not found"), std::string::npos) << none.verdict.sentence;
+}
+
+TEST(SavedMap, ATableBeginsAnywhereInAMapOfNumberedPoints) {
+  LongWalk scene;
+  scene.num_points = 300;
+  scene.num_frames = 450;
+  scene.length_m = 4.0;
+  const testing::WalkRun walk = testing::long_walk(scene, 3);
+  LocalizeConfig with_target, in_map;
+  with_target.target.points = walk.target;
+  const Localization first = localize(walk.frames, walk.camera, with_target, walk.truth);
+  in_map.map = as_written(first.saved_map);
+  ASSERT_GT(in_map.map->points.size(), 200u);
+  // Another camera on another day: it begins where no target is, in the middle of the map.
+  testing::WalkRun again = testing::long_walk(scene, 3);
+  Draws draws(77);
+  std::vector<ObservationFrame> frames(again.frames.begin() + 200, again.frames.begin() + 320);
+  for (ObservationFrame& frame : frames)
+    for (FeatureObservation& observation : frame.observations) observation.px += 0.5 * draws.normal2();
+  const Localization second = localize(frames, walk.camera, in_map, walk.truth);
+  EXPECT_EQ(second.num_lost, 0u) << second.verdict.sentence;
+  EXPECT_TRUE(second.is_in_map);
+  EXPECT_LT(second.error.unaligned_m, first.error.unaligned_m + 0.005);
+  EXPECT_TRUE(second.verdict.ok()) << second.verdict.sentence;
+}
+
+TEST(SavedMap, WhatDoesNotGoTogetherIsRefused) {
+  const testing::WalkRun walk = testing::long_walk({.num_points = 50, .num_frames = 60, .length_m = 0.5}, 3);
+  LocalizeConfig config;
+  config.target.points = walk.target;
+  const SavedMap numbered = localize(walk.frames, walk.camera, config).saved_map;
+  config.map = numbered;
+  EXPECT_THROW((void)localize(walk.frames, walk.camera, config), ConfigError);  // a target as well
+  config.target = {};
+  EXPECT_THROW((void)localized_film(map_film(true, 0, 1), config), ConfigError);  // of numbers, for images
+  config.map->points.push_back(numbered.points.front());
+  EXPECT_THROW((void)localize(walk.frames, walk.camera, config), ConfigError);  // a point twice
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "alidade/localize/saved_map.h"
+#include "alidade/public.h"
+
+namespace alidade {
+ALIDADE_PUBLIC_BEGIN
+
+/// Text of map.yaml: `in_metres`, `points: [{id, position, covariance, look}]` (upper triangle; `look` of maps of
+/// images: a 25 × 25 patch as hexadecimal bytes, and from where it was seen), `keyframes: [{position, quaternion_wxyz,
+/// grey}]`.
+[[nodiscard]] std::string map_text(const SavedMap& map);
+/// Reads it. Throws InputError.
+[[nodiscard]] SavedMap read_map(const std::filesystem::path& file);
+
+ALIDADE_PUBLIC_END
+}  // namespace alidade

@@ -129,7 +129,18 @@ ExitCode calibrate_corners(const CalibrateArgs& args, Run& run) {
   return run.finish(outcome_of(result));
 }
 
-ExitCode calibrate_photos_of(const CalibrateArgs& args, Run& run) {
+/// Photos that a capture drew or decoded: what they are goes with the result.
+void say_inexact(std::size_t num_inexact, std::size_t num_photos, Verdict& verdict) {
+  if (num_inexact == 0) return;
+  verdict.checks.push_back(
+      {.name = "exact pixels",
+       .text = fmt::format("{} of {} photos are as a canvas or a decoder gave them, not the camera's "
+                           "own values: grey levels may be some off",
+                           num_inexact, num_photos),
+       .value = static_cast<double>(num_inexact)});
+}
+
+ExitCode calibrate_photos_of(const CalibrateArgs& args, Run& run, std::size_t num_inexact = 0) {
   const PhotoSet set(args.photos);
   const Photos photos = set.photos();
   const Calibration result = alidade::calibrate(photos, args.board, args.config, run.progress);
@@ -137,6 +148,7 @@ ExitCode calibrate_photos_of(const CalibrateArgs& args, Run& run) {
   require_readable(set, result);
   require_size(args, result.size);
   JobOutcome outcome = outcome_of(result);
+  say_inexact(num_inexact, outcome.document.counts.given, outcome.document.verdict);
   if (!run.options.no_report) {
     add_images(result, photos, outcome);
     run.lap("pictures");
@@ -152,10 +164,11 @@ ExitCode capture_and_calibrate(CalibrateArgs args, Run& run) {
                                           : "--live takes photos: not with --corners");
   read_values(args, run);
   args.capture.config.calibrate = args.config;
-  return calibrate_live(args.board, args.capture, run, [&](const std::filesystem::path& photos) {
-    args.photos = {photos};
-    return calibrate_photos_of(args, run);
-  });
+  return calibrate_live(args.board, args.capture, run,
+                        [&](const std::filesystem::path& photos, std::size_t num_inexact) {
+                          args.photos = {photos};
+                          return calibrate_photos_of(args, run, num_inexact);
+                        });
 }
 
 ExitCode run_calibrate(CalibrateArgs args, Run& run) {

@@ -14,9 +14,9 @@
 #include "alidade/images/photos.h"
 #include "alidade/images/video_process.h"
 #include "alidade/imaging/grey_photo.h"
-#include "alidade/live/capture_session.h"
-#include "alidade/live/growing_folder.h"
-#include "alidade/live/newest_frame.h"
+#include "alidade/live/capture/capture_session.h"
+#include "alidade/live/capture/growing_folder.h"
+#include "alidade/live/capture/newest_frame.h"
 #include "alidade/results/calibration_outcome.h"
 #include "cli/app/terminal.h"
 #include "cli/commands/capture_page.h"
@@ -170,13 +170,6 @@ live::KeptPhotos opened_photos(const CaptureArgs& args, Run& run) {
   return live::KeptPhotos(out, goes_on);
 }
 
-/// Opened before anything is written: an address may be wrong.
-CaptureSource opened_source(const CaptureArgs& args) {
-  if (args.from.empty()) return {};
-  if (is_stream_address(args.from)) return {nullptr, std::make_shared<live::NewestFrame>(args.from)};
-  return {std::make_shared<live::GrowingFolder>(args.from), nullptr};
-}
-
 /// The result of a capture that kept nothing: as calibrate has it of no photos, with what was seen instead.
 ExitCode finish_empty(const Board& board, const CaptureArgs& args, const std::string& seen, Run& run) {
   Calibration none = alidade::calibrate(Photos{}, board, args.config.calibrate);
@@ -195,26 +188,8 @@ void tell_missed_goal(const live::CaptureSession& session, double goal_px, const
 
 }  // namespace
 
-cv::Mat grey_of(const live::LiveFrame& frame) {
-  return cv::Mat(frame.height_px, frame.width_px, CV_8U, const_cast<unsigned char*>(frame.grey.data())).clone();
-}
-
 void add_capture_options(CLI::App& command, CaptureArgs& args) {
-  const std::string group = "Guided capture";
-  command
-      .add_option_function<std::string>(
-          "--live",
-          [&args](const std::string& port) {
-            args.live.is_on = true;
-            args.live.port = port;
-          },
-          "Take the photos now, guided: a page with the camera's picture on this port; 0: any (default: 8765)")
-      ->type_name("[PORT]")
-      ->expected(0, 1)
-      ->group(group);
-  command.add_option("--live-address", args.live.address, "Listen there instead of 127.0.0.1")
-      ->type_name("IP")
-      ->group(group);
+  add_guide_options(command, args.live, "Take the photos now, guided", "Guided capture");
 }
 
 FieldList fields_of(CaptureArgs& args) {
@@ -251,15 +226,17 @@ void require_no_capture(const CaptureArgs& args) {
   if (!args.live.address.empty()) refuse("--live-address");
 }
 
-ExitCode calibrate_live(const Board& board, CaptureArgs args, Run& run,
-                        const std::function<ExitCode(const std::filesystem::path& photos)>& finish) {
+ExitCode calibrate_live(
+    const Board& board, CaptureArgs args, Run& run,
+    const std::function<ExitCode(const std::filesystem::path& photos, std::size_t num_inexact)>& finish) {
   if (args.no_page && args.from.empty())
     throw UsageError("--no-page: only with --from, as there is no camera without a page");
   (void)server_config(args.live);  // its faults before any work
   if (!args.resume.empty() && !run.options.out_is_given) run.options.out = args.resume;
   args.config.is_video = args.from.empty() || is_stream_address(args.from);
-  const CaptureSource source = opened_source(args);
-  std::optional<CapturePage> page;
+  const PictureSource source = opened_source(args.from);  // an address may be wrong: before anything is written
+  std::optional<CaptureWork> work;
+  std::optional<GuidePage> page;
   live::CaptureSession session(board, args.config, opened_photos(args, run), [&page](const std::string& line) {
     tell_person("alidade: " + line);
     if (page) page->note(line);
@@ -274,14 +251,18 @@ ExitCode calibrate_live(const Board& board, CaptureArgs args, Run& run,
       seen = capture.last_words();
     }
   } else {
-    page.emplace(args, source, board, session, run);
-    seen = page->capture();
+    work.emplace(board, session, args.config.until_px);
+    page.emplace(args.live, source, *work, run);
+    page->guide();
+    seen = work->last_words();
   }
   const std::filesystem::path photos = session.kept().folder();
   if (interrupting_signal() == SIGTERM || interrupting_signal() == SIGHUP) throw Interrupted();
   forget_interrupt();
   run.lap("capture");
-  const ExitCode code = session.kept().photos().empty() ? finish_empty(board, args, seen, run) : finish(photos);
+  const std::vector<live::KeptPhoto>& kept = session.kept().photos();
+  const auto num_inexact = static_cast<std::size_t>(std::ranges::count(kept, false, &live::KeptPhoto::is_exact));
+  const ExitCode code = kept.empty() ? finish_empty(board, args, seen, run) : finish(photos, num_inexact);
   if (page) page->show_result(code);
   tell_missed_goal(session, args.config.until_px, run);
   return code;

@@ -9,15 +9,6 @@
 #include "cli/app/live.h"
 #include "cli/app/run.h"
 
-namespace alidade::live {
-struct LiveFrame;
-class GrowingFolder;
-class NewestFrame;
-}  // namespace alidade::live
-namespace cv {
-class Mat;
-}
-
 namespace alidade::cli {
 
 /// What `calibrate --live` is asked for besides what calibrate is asked for.
@@ -31,22 +22,15 @@ struct CaptureArgs {
   bool until_is_given = false;
 };
 
-/// Where pictures come from, if not from the browser: one of the two, or none.
-struct CaptureSource {
-  std::shared_ptr<live::GrowingFolder> folder;
-  std::shared_ptr<live::NewestFrame> stream;
-};
-
-/// A frame's values, in memory of its own.
-[[nodiscard]] cv::Mat grey_of(const live::LiveFrame& frame);
-
 void add_capture_options(CLI::App& command, CaptureArgs& args);
 [[nodiscard]] FieldList fields_of(CaptureArgs& args);
 
 /// Photos that are taken one by one, guided, until the goal holds; then `finish` calibrates from the folder of those
-/// that were kept. Throws UsageError for options that do not go together.
-[[nodiscard]] ExitCode calibrate_live(const Board& board, CaptureArgs args, Run& run,
-                                      const std::function<ExitCode(const std::filesystem::path& photos)>& finish);
+/// that were kept; `num_inexact` of them are not as the camera gave them. Throws UsageError for options that do not go
+/// together.
+[[nodiscard]] ExitCode calibrate_live(
+    const Board& board, CaptureArgs args, Run& run,
+    const std::function<ExitCode(const std::filesystem::path& photos, std::size_t num_inexact)>& finish);
 
 /// Options of a capture without --live. Throws UsageError.
 void require_no_capture(const CaptureArgs& args);

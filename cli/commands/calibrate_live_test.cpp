@@ -13,8 +13,8 @@
 #include "alidade/files/csv.h"
 #include "alidade/files/files.h"
 #include "alidade/imaging/image_codecs.h"
-#include "alidade/live/capture_server.h"
-#include "alidade/live/kept_photos.h"
+#include "alidade/live/capture/capture_server.h"
+#include "alidade/live/capture/kept_photos.h"
 #include "alidade/simulate/boards/board_photos.h"
 #include "alidade/simulate/example_camera.h"
 

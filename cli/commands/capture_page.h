@@ -1,36 +1,36 @@
 #pragma once
 
-#include <memory>
 #include <string>
 
-#include "alidade/live/capture_session.h"
-#include "cli/app/run.h"
+#include "alidade/live/capture/capture_session.h"
+#include "cli/commands/guide_page.h"
 
 namespace alidade::cli {
 
-struct CaptureArgs;
-struct CaptureSource;
-
-/// A capture with its page: the browser's camera or a folder, watched and steered in a browser.
-class CapturePage {
+/// Photos of a board, chosen while they are taken, as a page guides to them.
+class CaptureWork : public GuidedWork {
  public:
-  /// Listens, and tells the person where. Throws InputError where it cannot.
-  CapturePage(const CaptureArgs& args, const CaptureSource& source, const Board& board, live::CaptureSession& session,
-              Run& run);
-  ~CapturePage();
-  CapturePage(const CapturePage&) = delete;
-  CapturePage& operator=(const CapturePage&) = delete;
+  CaptureWork(const Board& board, live::CaptureSession& session, double goal_px)
+      : board_(board), session_(session), goal_px_(goal_px) {}
 
-  /// Until the goal holds or the person ends it. Returns what was seen last where no board was.
-  [[nodiscard]] std::string capture();
-  /// A line for whoever looks at the page.
-  void note(const std::string& line);
-  /// The page becomes the report.
-  void show_result(ExitCode code);
+  [[nodiscard]] std::string about() const override;
+  [[nodiscard]] double begin_s() const override { return session_.begin_s(); }
+  [[nodiscard]] bool has_goal() const override { return session_.state().is_at(goal_px_); }
+  void see(const cv::Mat& grey, double t_s, bool is_exact, GuidePage& page) override;
+  void wait(double t_s, GuidePage& page) override;
+  void obey(const live::PageCommand& command, const cv::Mat& newest, double t_s, bool is_exact,
+            GuidePage& page) override;
+  void tell_state(GuidePage& page) override;
+  /// What was seen last where no board was.
+  [[nodiscard]] const std::string& last_words() const { return last_words_; }
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  void after_taking(GuidePage& page);
+
+  const Board& board_;
+  live::CaptureSession& session_;
+  double goal_px_;
+  std::string last_words_;
 };
 
 }  // namespace alidade::cli

@@ -189,6 +189,22 @@ std::optional<RotationLog> log_to_resume(const std::string& folder, Run& run) {
   return read_rotation_log(file).log;
 }
 
+/// What counts become angles by, where nobody told it, goes with every answer: all angles, and focal lengths with them,
+/// are in its proportion.
+void say_assumed(const HeadLimits& limits, JobOutcome& outcome) {
+  if (limits.assumed.empty()) return;
+  std::string text;
+  for (const Assumption& each : limits.assumed) {
+    text += (text.empty() ? "" : " and ") + fmt::format("{} of {:g}°", each.name, each.value);
+    outcome.document.assumed.push_back(each);
+  }
+  text += " are supposed, by which its counts become angles: give az=LOW:HIGH and el=LOW:HIGH in the address";
+  Verdict& verdict = outcome.document.verdict;
+  verdict.checks.push_back({.name = "angles of the address", .state = State::care, .text = text});
+  outcome.lines.push_back(text);
+  if (verdict.state == State::good) verdict.state = State::care;
+}
+
 ExitCode calibrate_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
   SoFar so_far(run.options.out);
   HeadCalibrationConfig config{.range = args.range, .until = args.until, .most_s = args.most_s};
@@ -196,7 +212,9 @@ ExitCode calibrate_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
   config.on_so_far = [&so_far](const HeadCalibration& calibration) { so_far.write(calibration); };
   const std::unique_ptr<FrameStream> stream = open_stream(args.stream, device, options_of(args));
   try {
+    const HeadLimits limits = device.limits();
     JobOutcome outcome = outcome_of(calibrate_head(device, *stream, config, run.progress));
+    say_assumed(limits, outcome);
     run.lap("calibrate");
     const bool tells = has_estimate(outcome.document.verdict);
     const ExitCode code = run.finish(std::move(outcome));
@@ -218,8 +236,10 @@ ExitCode follow_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
   HeadFollowConfig config = args.follow;
   config.range = args.range;
   config.most_s = args.most_s;
+  const HeadLimits limits = device.limits();
   JobOutcome outcome = outcome_of(
       follow_target(device, *stream, rig.heads.front(), args.look.look, args.look.pattern.get(), config, run.progress));
+  say_assumed(limits, outcome);
   run.lap("follow");
   return run.finish(std::move(outcome));
 }
@@ -230,8 +250,10 @@ ExitCode run_head(HeadArgs& args, Run& run) {
   run.lap("connect");
   if (!args.look.text.empty()) return follow_by_head(args, *device, run);
   if (args.calibrate) return calibrate_by_head(args, *device, run);
+  const HeadLimits limits = device->limits();
   JobOutcome outcome = args.identify ? outcome_of(identify_head(*device, args.range, run.progress))
                                      : outcome_of(survey_head(*device, args.move, args.range, run.progress));
+  say_assumed(limits, outcome);
   run.lap(args.identify ? "identify" : "ask");
   return run.finish(std::move(outcome));
 }

@@ -16,6 +16,7 @@
 #include "cli/app/app.h"
 #include "cli/app/board_options.h"
 #include "cli/commands/commands.h"
+#include "cli/commands/rangefinder_live.h"
 
 namespace alidade::cli {
 namespace {
@@ -25,6 +26,7 @@ struct RangefinderArgs {
   Board board = no_board();
   RangefinderConfig config;
   bool by_edges = false, skip_bad = false;
+  GuidedShotsArgs guided;
 };
 
 /// A method of the shots, or edges, which takes a scan.
@@ -70,6 +72,7 @@ FieldList fields_of(RangefinderArgs& args) {
                              .value = &args.skip_bad,
                              .help = "Reject rows that are wrong, by name, instead of stopping"}};
   fields.insert(fields.end(), inputs.begin(), inputs.end());
+  for (Field& field : fields_of(args.guided)) fields.push_back(std::move(field));
   return fields;
 }
 
@@ -124,12 +127,27 @@ ExitCode by_shots(const RangefinderArgs& args, Run& run) {
   return run.finish(std::move(outcome));
 }
 
+/// Shots that are taken one by one; what they give is what their table gives afterwards.
+ExitCode by_guided_shots(RangefinderArgs args, Run& run) {
+  if (!args.shots.empty()) throw UsageError("--live takes the shots itself: give no table");
+  if (args.by_edges || !args.corners.empty())
+    throw UsageError("--live takes shots: not with --method edges or --corners");
+  const Camera camera = read_central_camera(args.camera);
+  return rangefinder_live(camera, args.config, args.guided, run, [&](const std::filesystem::path& shots) {
+    args.shots = shots.string();
+    return by_shots(args, run);
+  });
+}
+
 ExitCode run_rangefinder(RangefinderArgs args, Run& run) {
   if (is_given(args.board)) {
     require_board(args.board);
     args.config.board = args.board;
   }
   args.config.rates_next_shots = !run.options.no_report;
+  if (args.guided.live.is_on) return by_guided_shots(args, run);
+  require_no_guided_shots(args.guided);
+  if (args.shots.empty()) throw UsageError("give a table of shots, or --live");
   return args.by_edges ? by_edges(args, run) : by_shots(args, run);
 }
 
@@ -142,12 +160,13 @@ void add_rangefinder(App& app) {
        .summary = "Origin and direction of a laser rangefinder's beam in a camera",
        .examples = "alidade rangefinder shots.csv --camera camera.yaml --board 9x6 --square 0.04\n"
                    "alidade rangefinder shots.csv --camera camera.yaml --method spot --spot red\n"
-                   "alidade rangefinder shots.csv --camera camera.yaml --method plane --scale --sigma-range-m 0.01\n"},
+                   "alidade rangefinder shots.csv --camera camera.yaml --method plane --scale --sigma-range-m 0.01\n"
+                   "alidade rangefinder --live --camera camera.yaml --board 9x6 --square 0.04 --out mybeam\n"},
       [args](Run& run) { return run_rangefinder(*args, run); });
-  command
-      .add_option("shots", args->shots,
-                  "Table of shots, CSV: range_m with any of u,v (spot), photo[,photo_off], nx,ny,nz,d (plane)")
-      ->required();
+  command.add_option("shots", args->shots,
+                     "Table of shots, CSV: range_m with any of u,v (spot), photo[,photo_off], nx,ny,nz,d (plane); none "
+                     "with --live");
+  add_guided_shots_options(command, args->guided);
   app.add_fields(command, fields_of(*args));
 }
 

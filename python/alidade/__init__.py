@@ -14,7 +14,7 @@ from ._alidade import Interrupted, __version__
 from .board import Board, BoardDetection, BoardFinder, find_board
 from .camera import Camera
 from .errors import CannotDetermine, EstimateError, NoConvergence, NotTrusted
-from .guides import CaptureGuide, ShotGuide
+from .guides import CaptureGuide, ShotGuide, ViewGuide
 from .head import Head
 from .jobs import calibrate, corners, identify, localize, observe, project, rangefinder, reproduce, rig, servo, track
 from .live import Localizer, Observer, Tracker
@@ -22,6 +22,6 @@ from .result import Check, Result, Verdict, read_result
 
 __all__ = [
     "Board", "BoardDetection", "BoardFinder", "Camera", "CannotDetermine", "CaptureGuide", "Check", "EstimateError", "Head",
-    "Interrupted", "Localizer", "NoConvergence", "NotTrusted", "Observer", "Result", "ShotGuide", "Tracker", "Verdict",
+    "Interrupted", "Localizer", "NoConvergence", "NotTrusted", "Observer", "Result", "ShotGuide", "Tracker", "Verdict", "ViewGuide",
     "__version__", "calibrate", "corners", "find_board", "identify", "localize", "observe", "plan", "project",
     "rangefinder", "read_result", "reproduce", "rig", "servo", "simulate", "study", "track"]

@@ -162,3 +162,49 @@ class ShotGuide(OneByOne):
         values["origin_m"], values["direction"] = np.array(values["origin_m"]), np.array(values["direction"])
         values["next"] = _next(values["next"])
         return types.SimpleNamespace(**values)
+
+
+class ViewGuide:
+    """Where to look next with heads that turn, so that their axes become known; each solve is that of al.rig() on all views.
+
+    cameras       by the number of the head: {1: a Camera or its file, …}
+    board         what the heads look at, where it stands still
+    min_pan_deg, max_pan_deg, min_tilt_deg, max_tilt_deg   where the heads can look, and are to be known
+    min_range_m, max_range_m, max_tilt_of_board_deg        where a board can be put
+    fields        as of al.rig(): sigma_px, sigma_angle_rad, …
+    """
+
+    _WHERE = ("min_pan_deg", "max_pan_deg", "min_tilt_deg", "max_tilt_deg", "min_range_m", "max_range_m", "max_tilt_of_board_deg")
+
+    def __init__(self, cameras: dict[int, Any], board: Board, **fields: Any) -> None:
+        if not isinstance(board, Board):
+            raise ValueError(f"board: an alidade.Board is needed, not {type(board).__name__}")
+        if not isinstance(cameras, dict):
+            raise ValueError("cameras: a dict is needed, the cameras by the numbers of their heads: {1: camera}")
+        self.board = board
+        where = {name: fields.pop(name) for name in self._WHERE if name in fields}
+        read = {whole(head, "cameras"): one if isinstance(one, Camera) else Camera.read(one) for head, one in cameras.items()}
+        self._core = _alidade.ViewGuide({head: one._core for head, one in read.items()}, board._core, _texts(fields), _texts(where))
+
+    def push(self, head: int, pan_tilt_rad: Any, corners: Any, *, board: int = 1) -> types.SimpleNamespace:
+        """What a head's encoders read, (pan, tilt), and the board's corners (P, 2) [px] as its camera saw them then, NaN: not
+        seen. board: the number of the position where it stood. The state after it."""
+        pan, tilt = _few(pan_tilt_rad, 2, "pan_tilt_rad")
+        self._core.push(whole(head, "head"), (pan, tilt), whole(board, "board"), _corners(corners, self.board))
+        return self.state
+
+    def undo(self) -> None:
+        """The last view counts no more."""
+        self._core.undo()
+
+    @property
+    def state(self) -> types.SimpleNamespace:
+        """views, has_rig, sigma_rad and sigma_m: of where the cameras stand to each other (of one head: its camera after a
+        rotation), the worst over the limits; sentence of the verdict, words ("head 1 to pan 12.0°, tilt -5.0°: board 2 in the
+        upper left corner of its image") and next: head, pan_tilt_rad (2,), board, is_new_place, gain, outline (N, 2), rotation
+        (3, 3), translation_m (3,); None before there is a rig."""
+        values = self._core.state()
+        if values["next"] is not None:
+            values["next"]["pan_tilt_rad"] = np.array(values["next"]["pan_tilt_rad"])
+        values["next"] = _next(values["next"])
+        return types.SimpleNamespace(**values)

@@ -169,6 +169,61 @@ class LiveShots {
   GuardedPtr<ShotGuide> guide_;
 };
 
+class LiveViews {
+ public:
+  LiveViews(const std::map<int, Camera>& cameras, const Board& board, const Texts& values, const Texts& where) {
+    RigConfig config;
+    ViewConfig limits;
+    set_fields(fields_of(config), values);
+    set_fields(fields_of(limits), where);
+    config.board = board;
+    guide_ = std::make_shared<Guarded<ViewGuide>>(cameras, config, limits);
+  }
+
+  /// Corners P × 2, NaN: not seen.
+  void push(int head, std::pair<double, double> pan_tilt_rad, int board, const Array& corners) {
+    HeadView view{.board = board, .head = head, .pan_tilt_rad = {pan_tilt_rad.first, pan_tilt_rad.second}};
+    const auto px = vectors_of<2>(corners);
+    for (std::size_t i = 0; i < px.size(); ++i) {
+      if (px[i].allFinite()) view.seen.corners.push_back({.index = static_cast<int>(i), .px = px[i]});
+    }
+    guide_->from_python([&](ViewGuide& guide) {
+      view.seen.photo = "view " + std::to_string(guide.state().views + 1);
+      static_cast<void>(guide.push(view));
+    });
+  }
+
+  void undo() {
+    guide_->from_python([](ViewGuide& guide) { guide.undo(); });
+  }
+
+  py::dict state() {
+    const ViewGuideState now = guide_->from_python([](const ViewGuide& guide) { return guide.state(); });
+    py::dict made;
+    made["views"] = now.views;
+    made["has_rig"] = now.has_rig;
+    made["words"] = now.words;
+    made["sentence"] = now.verdict.sentence;
+    made["sigma_rad"] = now.sigma.angle_rad;
+    made["sigma_m"] = now.sigma.length_m;
+    made["next"] = py::none();
+    if (!now.next) return made;
+    py::dict next;
+    next["head"] = now.next->head;
+    next["pan_tilt_rad"] = std::vector<double>(now.next->pan_tilt_rad.data(), now.next->pan_tilt_rad.data() + 2);
+    next["board"] = now.next->board;
+    next["is_new_place"] = now.next->is_new_place;
+    next["gain"] = now.next->gain;
+    next["outline"] = pixel_array(now.outline_px);
+    put_pose(now.next->cam_from_board, next);
+    made["next"] = next;
+    return made;
+  }
+
+ private:
+  GuardedPtr<ViewGuide> guide_;
+};
+
 }  // namespace
 
 void bind_capture(py::module_& module) {
@@ -183,6 +238,11 @@ void bind_capture(py::module_& module) {
       .def("push", &LiveShots::push)
       .def("undo", &LiveShots::undo)
       .def("state", &LiveShots::state);
+  py::class_<LiveViews>(module, "ViewGuide", plain_type(), "Views of boards by heads that turn, chosen one by one.")
+      .def(py::init<const std::map<int, Camera>&, const Board&, const Texts&, const Texts&>())
+      .def("push", &LiveViews::push)
+      .def("undo", &LiveViews::undo)
+      .def("state", &LiveViews::state);
 }
 
 }  // namespace alidade::python

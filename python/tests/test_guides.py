@@ -148,5 +148,56 @@ class Shots(unittest.TestCase):
         self.assertEqual(guide.state.shots, 0)
 
 
+class Views(unittest.TestCase):
+    def test_guided_views_find_the_axes(self):
+        rng, board = np.random.default_rng(3), al.Board("9x6", square_m=0.025)
+        guide = al.ViewGuide({1: TRUE_CAMERA}, board, sigma_px=0.1, sigma_angle_rad=1e-4)
+        self.assertIn("position 1", guide.state.words)
+        mount = cv2.Rodrigues(np.array([0.02, -0.03, 0.01]))[0]
+        to_camera = np.array([0.02, -0.01, 0.05])
+
+        def camera_from_world(pan, tilt):  # pan > 0 turns left, tilt > 0 up; y points down
+            turned = cv2.Rodrigues(np.array([-tilt, 0.0, 0.0]))[0] @ cv2.Rodrigues(np.array([0.0, pan, 0.0]))[0]
+            return mount @ turned, mount @ -to_camera
+
+        def look(pan_tilt, R_world, t_world, number):
+            R, t = camera_from_world(*pan_tilt)
+            px = TRUE_CAMERA.project(board.points @ (R @ R_world).T + (R @ t_world + t))
+            inside = (px > 1).all(axis=1) & (px[:, 0] < TRUE_CAMERA.size[0] - 2) & (px[:, 1] < TRUE_CAMERA.size[1] - 2)
+            px[~inside] = np.nan
+            return guide.push(1, np.array(pan_tilt) + rng.normal(0, 1e-4, 2), px + rng.normal(0, 0.1, px.shape), board=number)
+
+        places = {1: (np.eye(3), np.array([-0.1, -0.06, 0.6])), 2: (cv2.Rodrigues(np.array([0.4, 0.2, 0]))[0], np.array([0.0, -0.1, 0.9]))}
+        for number, (R, t) in places.items():
+            for pan_tilt in ((0, 0), (0.1, 0.08), (-0.1, -0.08), (0.1, -0.06), (-0.08, 0.07)):
+                state = look(pan_tilt, R, t, number)
+        self.assertTrue(state.has_rig, state.sentence)
+        first = state
+        for _ in range(4):
+            asked = guide.state.next
+            self.assertEqual(asked.outline.shape[1], 2)
+            if asked.is_new_place:
+                R, t = camera_from_world(*asked.pan_tilt_rad)
+                places[asked.board] = (R.T @ asked.rotation, R.T @ (asked.translation_m - t))
+            state = look(asked.pan_tilt_rad, *places[asked.board], asked.board)
+        self.assertLess(state.sigma_rad * state.sigma_m, 0.6 * first.sigma_rad * first.sigma_m)
+        guide.undo()
+        self.assertEqual(guide.state.views, 13)
+
+    def test_wrong_input_is_one_clear_line(self):
+        board = al.Board("9x6", square_m=0.025)
+        guide = al.ViewGuide({1: TRUE_CAMERA}, board)
+        corners = np.full((54, 2), 100.0)
+        for wrong in (lambda: al.ViewGuide({}, board), lambda: al.ViewGuide(TRUE_CAMERA, board), lambda: al.ViewGuide({1: TRUE_CAMERA}, "9x6"),
+                      lambda: al.ViewGuide({1: TRUE_CAMERA}, board, min_pan_deg=5, max_pan_deg=-5),
+                      lambda: al.ViewGuide({1: TRUE_CAMERA}, board, colour=1), lambda: guide.push(2, (0, 0), corners),
+                      lambda: guide.push(1, (0, np.nan), corners), lambda: guide.push(1, (0,), corners),
+                      lambda: guide.push(1, (0, 0), np.zeros((3, 2)))):
+            with self.assertRaises(ValueError) as caught:
+                wrong()
+            self.assertNotIn("\n", str(caught.exception))
+        self.assertEqual(guide.state.views, 0)
+
+
 if __name__ == "__main__":
     unittest.main()

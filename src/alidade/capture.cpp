@@ -14,6 +14,7 @@
 #include "alidade/board_detector/quick_look.h"
 #include "alidade/calibrate/setup.h"
 #include "alidade/capture/lens_so_far.h"
+#include "alidade/capture/outline.h"
 #include "alidade/capture/pose_plan.h"
 #include "alidade/capture/pose_words.h"
 #include "alidade/capture/shown_pictures.h"
@@ -32,6 +33,9 @@ constexpr double least_gain = 0.004;   // of σ
 // it brings `nearly` as much.
 constexpr double choosy = 0.6, nearly = 0.85;
 constexpr double patient_s = 3.0, impatient_s = 8.0;
+// Of what an outline would bring, the part that a photo brings which a hand holds about there: by simulated sessions.
+// Each photo that is taken moves it by this: who shows other poses than the outlines needs more of them.
+constexpr double share_by_hand = 0.85, share_learnt = 0.2, least_share = 0.05;
 
 std::uint64_t hash_of(const cv::Mat& picture) {
   std::uint64_t hash = 1469598103934665603u;  // FNV-1a, eight bytes at a time
@@ -71,26 +75,6 @@ std::vector<Eigen::Vector2d> places_of(const BoardView& view) {
   return places;
 }
 
-/// The border of the board's points as a lens shows it.
-std::vector<Eigen::Vector2d> outline_of(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
-                                        const Rigid3& cam_from_board) {
-  Eigen::AlignedBox3d box;
-  for (const auto& point : board_points) box.extend(point);
-  const Eigen::Vector3d low = box.min(), high = box.max();
-  const std::vector<Eigen::Vector3d> rim{low, {high.x(), low.y(), 0}, {high.x(), high.y(), 0}, {low.x(), high.y(), 0}};
-  std::vector<Eigen::Vector2d> outline;
-  constexpr int steps = 6;
-  for (std::size_t side = 0; side < 4; ++side) {
-    for (int step = 0; step < steps; ++step) {
-      const double way = static_cast<double>(step) / steps;
-      const auto px =
-          project(camera, cam_from_board * Eigen::Vector3d((1.0 - way) * rim[side] + way * rim[(side + 1) % 4]));
-      if (px) outline.push_back(*px);
-    }
-  }
-  return outline;
-}
-
 }  // namespace
 
 struct CaptureGuide::State {
@@ -108,7 +92,8 @@ struct CaptureGuide::State {
   std::optional<LensSoFar> lens;
   std::optional<PosePlan> plan;
   CaptureState out;
-  double correction = 1.0;  ///< Worst σ of the whole job over ours.
+  double correction = 1.0;       ///< Worst σ of the whole job over ours.
+  double share = share_by_hand;  ///< Of the outlines' gains that photos brought lately.
   bool takes_what_comes = false;
 
   // Of the pictures that came.
@@ -128,7 +113,7 @@ struct CaptureGuide::State {
   [[nodiscard]] double asked_share(double t_s) const;
   [[nodiscard]] double gain_of(const BoardView& view) const;
   [[nodiscard]] bool is_held(const BoardView& view) const;
-  [[nodiscard]] bool recalls(double t_s, CaptureLook& look) const;
+  bool recalls(double t_s, CaptureLook& look) const;
   [[nodiscard]] bool stands_still(double t_s);
   [[nodiscard]] std::optional<Rigid3> pose_of(const BoardView& view) const;
   void say_way(const BoardView& view, CaptureLook& look) const;
@@ -147,6 +132,10 @@ void CaptureGuide::State::look_closely(const cv::Mat& picture) {
 }
 
 void CaptureGuide::State::keep(BoardView view) {
+  if (lens->is_solved && plan->best_gain() > 0.0) {
+    const double brought = std::clamp(gain_of(view) / plan->best_gain(), least_share, share_by_hand);
+    share += share_learnt * (brought - share);
+  }
   view.photo = std::to_string(views.size() + 1);
   views.push_back(std::move(view));
   took_s.reset();
@@ -180,7 +169,7 @@ void CaptureGuide::State::fill_state() {
     out.sigma = projection_sigma(lens->camera, 32, 24, std::numeric_limits<double>::infinity());
     for (double& sigma_px : out.sigma.values) sigma_px *= correction;
   }
-  if (lens->is_solved) out.photos_to_goal = plan->photos_until(config.until_px / correction);
+  if (lens->is_solved) out.photos_to_goal = plan->photos_until(config.until_px / correction, share);
   if (plan->best()) {
     const HeldBoard held = held_board(lens->camera, lens->board_points, *plan->best());
     out.next = NextPose{*plan->best(), outline_of(lens->camera, lens->board_points, *plan->best()),
@@ -320,6 +309,13 @@ CaptureLook CaptureGuide::look(const cv::Mat& picture, double t_s) {
   }
   look = state.judge(&picture, t_s);
   if (is_repeated && !state.config.is_video) look.sight = Sight::repeated;
+  return look;
+}
+
+CaptureLook CaptureGuide::look_back(double t_s) {
+  CaptureLook look;
+  State& state = *state_;
+  if (state.lens && state.took_s) state.recalls(t_s, look);
   return look;
 }
 

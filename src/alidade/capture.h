@@ -1,6 +1,7 @@
 #pragma once
 
 #include <limits>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +16,8 @@
 #include "alidade/geometry/rigid3.h"
 #include "alidade/public.h"
 #include "alidade/rangefinder/shot_plan.h"
+#include "alidade/rig/calibration.h"
+#include "alidade/rig/plan/next_view.h"
 
 namespace cv {
 class Mat;
@@ -105,6 +108,8 @@ class CaptureGuide {
   /// Looks at a picture (8- or 16-bit, grey or colour) of time `t_s`, which does not go back. All have the size of the
   /// first; of another size: Sight::nothing.
   [[nodiscard]] CaptureLook look(const cv::Mat& picture, double t_s);
+  /// Nothing new comes: what of the pictures that were shown is to be taken at that time, as `earlier`; else not useful.
+  [[nodiscard]] CaptureLook look_back(double t_s);
   /// Keeps a picture, whatever it brings, and solves. Why it cannot be kept (no board in it), else "".
   [[nodiscard]] std::string take(const cv::Mat& picture);
   /// look(), and take() where that is to be done; `sight` is then `useful`.
@@ -134,7 +139,8 @@ struct ShotGuideState {
   double sigma_origin_m = std::numeric_limits<double>::infinity();  ///< √trace of the origin's covariance.
   Verdict verdict;                                                  ///< On the shots so far.
   std::optional<NextShot> next;  ///< Where to hold the board; before there is a beam, its words alone tell.
-  std::string words;             ///< "1.5 m away, tilted by 30°, the right side farther"
+  std::vector<Eigen::Vector2d> outline_px = {};  ///< Of the board there, as the lens shows it.
+  std::string words;                             ///< "1.5 m away, tilted by 30°, the right side farther"
 };
 
 /// The same guidance for a rangefinder: shots come one by one, each solve is that of rangefinder() on all of them, and
@@ -158,6 +164,41 @@ class ShotGuide {
   ShotConfig where_;
   std::vector<Shot> shots_;
   ShotGuideState state_;
+};
+
+/// Where to look next with heads that turn, and how well their axes are known.
+struct ViewGuideState {
+  int views = 0;
+  bool has_rig = false;
+  Rig rig;  ///< With its covariance, where there is one.
+  /// How well it is known where the cameras stand to each other over the angles of the config; infinite: not yet.
+  RigSigma sigma = {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+  Verdict verdict;                               ///< On the views so far.
+  std::optional<NextView> next;                  ///< Before there is a rig, the words alone tell.
+  std::vector<Eigen::Vector2d> outline_px = {};  ///< Of the board there, in the image of that head.
+  std::string words;  ///< "head 1 to pan 12.0°, tilt -5.0°: board 2 in the upper left corner of its image"
+};
+
+/// The same guidance for heads: views of boards come one by one, each solve is that of rig() on all of them, and the
+/// next view is that of plan_view(). Before there is a rig, views that differ as much as its axes need.
+class ViewGuide {
+ public:
+  /// `cameras`: by id of the head. Throws ConfigError for cameras or a config that cannot be; it names a board.
+  explicit ViewGuide(std::map<int, Camera> cameras, RigConfig config, ViewConfig where = {});
+
+  /// Takes a view and solves. Throws ConfigError for a view that no head can have; it is then not taken.
+  const ViewGuideState& push(const HeadView& view);
+  void undo();
+  [[nodiscard]] const ViewGuideState& state() const { return state_; }
+
+ private:
+  void solve();
+
+  std::map<int, Camera> cameras_;
+  RigConfig config_;
+  ViewConfig where_;
+  std::vector<HeadView> views_;
+  ViewGuideState state_;
 };
 
 ALIDADE_PUBLIC_END

@@ -56,9 +56,9 @@ function film(alidade) {
   return {file, planes};
 }
 
-async function started(alidade, args, name) {
+async function started(alidade, args, name, job = ['calibrate', ...board]) {
   rmSync(at(name), {recursive: true, force: true});
-  const child = spawn(alidade, ['calibrate', '--live', '0', ...board, ...args, '--out', at(name)], {stdio: ['ignore', 'ignore', 'pipe']});
+  const child = spawn(alidade, [job[0], '--live', '0', ...job.slice(1), ...args, '--out', at(name)], {stdio: ['ignore', 'ignore', 'pipe']});
   let said = '';
   child.stderr.on('data', (data) => (said += data));
   const exited = once(child, 'exit');
@@ -71,9 +71,10 @@ async function started(alidade, args, name) {
 async function cameraBrowser(y4m) {
   return launch(['--use-fake-ui-for-media-stream', '--use-fake-device-for-media-stream', `--use-file-for-fake-video-capture=${y4m}`]);
 }
-async function opened(browser, url, {width = 1280, height = 900, theme = 'light', permissions = ['camera']} = {}) {
+async function opened(browser, url, {width = 1280, height = 900, theme = 'light', permissions = ['camera'], before = null} = {}) {
   const context = await browser.newContext({viewport: {width, height}, colorScheme: theme, permissions}), page = await context.newPage(), faults = [];
   page.setDefaultTimeout(patience_ms);
+  if (before) await page.addInitScript(before);
   page.on('console', (message) => ['error', 'warning'].includes(message.type()) && faults.push(`console: ${message.text()}`));
   page.on('pageerror', (error) => faults.push(`error: ${error.message}`));
   page.on('request', (one) => !one.url().startsWith(new URL(url).origin) && !/^(data|blob):/.test(one.url()) && faults.push(`request: ${one.url()}`));
@@ -81,6 +82,20 @@ async function opened(browser, url, {width = 1280, height = 900, theme = 'light'
   await page.waitForFunction(() => document.documentElement.dataset.ready === '1');
   const data = (name) => page.evaluate((one) => document.documentElement.dataset[one], name);
   return {page, faults, data, becomes: (stage) => until(`stage ${stage}`, async () => (await data('capture')) === stage), photos: async () => Number(await data('photos')), close: () => context.close()};
+}
+
+/** Both themes, a desk's, a small and a telephone's width: nothing is cut off. */
+async function fitsEveryWindow(page, name) {
+  for (const [width, height] of [[1280, 900], [800, 900], [390, 844]]) {
+    await page.setViewportSize({width, height});
+    for (const theme of ['light', 'dark']) {
+      await page.emulateMedia({colorScheme: theme});
+      await sleep(250);
+      const wide = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+      assert.ok(wide <= 0, `${width} ${theme}: ${wide} px too wide`);
+      if (process.env.ALIDADE_SHOTS) await page.screenshot({path: join(process.env.ALIDADE_SHOTS, `${name}-${width}-${theme}.png`), fullPage: true});
+    }
+  }
 }
 
 async function aFilmIsKeptBitForBitAndBecomesTheReport({alidade}) {
@@ -147,16 +162,7 @@ async function theKeyboardAloneSteersIt({alidade}) {
     await shown.page.keyboard.press('p');
     await shown.becomes('looking');
     await until('three photos', async () => (await shown.photos()) >= 3);
-    for (const [width, height] of [[1280, 900], [800, 900], [390, 844]]) {
-      await shown.page.setViewportSize({width, height});
-      for (const theme of ['light', 'dark']) {
-        await shown.page.emulateMedia({colorScheme: theme});
-        await sleep(250);
-        const wide = await shown.page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
-        assert.ok(wide <= 0, `${width} ${theme}: ${wide} px too wide`);
-        if (process.env.ALIDADE_SHOTS) await shown.page.screenshot({path: join(process.env.ALIDADE_SHOTS, `capture-${width}-${theme}.png`), fullPage: true});
-      }
-    }
+    await fitsEveryWindow(shown.page, 'capture');
     const frames = await shown.page.evaluate(() => new Promise((done) => {
       let count = 0;
       const begin = performance.now(), step = () => (performance.now() - begin > 2000 ? done(count / 2) : (++count, requestAnimationFrame(step)));
@@ -217,9 +223,132 @@ async function aRefusedCameraIsSaid({alidade, browser}) {
   }
 }
 
+async function aCanvasIsNotExactAndSaysSo({alidade}) {
+  const {file, planes} = film(alidade), browser = await cameraBrowser(file);
+  try {
+    const run = await started(alidade, ['--until', '0.001px'], 'canvas');
+    const shown = await opened(browser, run.url, {before: () => delete window.MediaStreamTrackProcessor});
+    await shown.becomes('looking');
+    await until('four photos', async () => (await shown.photos()) >= 4);
+    assert.equal(await shown.data('exact'), '0');
+    assert.match(await shown.page.textContent('.capture-notes'), /canvas/);
+    await shown.page.keyboard.press('Enter');
+    await shown.becomes('ended');
+    await run.exited;
+    assert.deepEqual(shown.faults, []);
+    const rows = readFileSync(at('canvas', 'photos.csv'), 'utf8').trim().split('\n').slice(1);
+    assert.ok(rows.length >= 4 && rows.every((row) => row.split(',')[2] === '0'), rows.join(' '));
+    for (const row of rows) assert.ok(!planes.has(hash(greyOf(at('canvas', 'photos', row.split(',')[0])).grey)), 'a canvas changes values');
+    const checks = JSON.parse(readFileSync(at('canvas', 'result.json'), 'utf8')).verdict.checks.map((one) => one.text);
+    assert.ok(checks.some((text) => /not the camera.s own values/.test(text)), checks.join(' | '));
+    await shown.close();
+  } finally {
+    await browser.close();
+  }
+}
+
+async function aCameraThatGoesIsSaidAndComesBack({alidade}) {
+  const {file} = film(alidade), browser = await cameraBrowser(file);
+  try {
+    const run = await started(alidade, ['--until', '0.001px'], 'unplugged'), shown = await opened(browser, run.url);
+    await shown.becomes('looking');
+    await until('two photos', async () => (await shown.photos()) >= 2);
+    // What a browser does when the camera is pulled out, or taken away by its owner.
+    await shown.page.evaluate(() => {
+      const [track] = document.querySelector('#camera').srcObject.getVideoTracks();
+      track.stop();
+      track.dispatchEvent(new Event('ended'));
+    });
+    await shown.becomes('lost');
+    assert.match(await shown.page.textContent('.capture-notes'), /the camera is gone/);
+    const kept = readdirSync(at('unplugged', 'photos')).length;
+    assert.ok(kept >= 2);
+    await shown.page.reload();
+    await shown.becomes('looking');
+    await until('more photos', async () => (await shown.photos()) > kept);
+    assert.deepEqual(shown.faults, []);
+    await run.end();
+    await shown.becomes('lost');
+    await shown.close();
+  } finally {
+    await browser.close();
+  }
+}
+
+async function aFolderIsShownAndSteered({alidade, browser}) {
+  film(alidade);
+  const run = await started(alidade, ['--until', '0.001px', '--from', at('in')], 'folder'), shown = await opened(browser, run.url, {permissions: []});
+  try {
+    await shown.becomes('looking');
+    await until('four photos', async () => (await shown.photos()) >= 4);
+    assert.equal(await shown.page.evaluate(() => document.querySelector('#camera').width > 300), true);
+    await shown.page.keyboard.press('u');
+    await shown.page.keyboard.press('Enter');
+    await shown.becomes('ended');
+    assert.deepEqual(shown.faults, []);
+  } finally {
+    await shown.close();
+    await run.end();
+  }
+}
+
+async function shotsOfARangefinderAreGuided({alidade, browser}) {
+  const made = at('shots-made'), incoming = at('shots-in');
+  for (const one of [made, incoming]) rmSync(one, {recursive: true, force: true});
+  mkdirSync(incoming, {recursive: true});
+  execFileSync(alidade, ['simulate', 'rangefinder', '--photos', '--out', made, '--quiet']);
+  const [head, ...rows] = readFileSync(join(made, 'shots.csv'), 'utf8').trim().split('\n').map((row) => row.split(','));
+  const column = (name) => head.indexOf(name);
+  const job = ['rangefinder', '--camera', join(made, 'camera.yaml'), '--board', '9x6', '--square', '0.04'];
+  const run = await started(alidade, ['--from', incoming], 'shots', job), shown = await opened(browser, run.url, {permissions: []});
+  try {
+    await shown.becomes('looking');
+    await shown.page.keyboard.press(' ');
+    await shown.page.keyboard.press('Enter');
+    assert.match(await shown.page.textContent('.capture-advice'), /enter the rangefinder/);
+    const most = Math.min(7, rows.length);
+    for (let i = 0; i < most; ++i) {
+      const before = await shown.page.evaluate(() => window.alidade.page.view.drawings);
+      const name = rows[i][column('photo')], bytes = readFileSync(join(made, name));
+      writeFileSync(join(incoming, `${String(i).padStart(3, '0')}.png`), bytes);
+      await until('the picture', async () => (await shown.page.evaluate(() => window.alidade.page.view.drawings)) > before && /hold it still/.test(await shown.page.textContent('.capture-advice')));
+      await shown.page.keyboard.press(' '); // to the field
+      await shown.page.keyboard.type(rows[i][column('range_m')]);
+      await shown.page.keyboard.press('Enter');
+      await until(`shot ${i + 1}`, async () => (await shown.photos()) === i + 1);
+    }
+    assert.match(await shown.page.textContent('.capture-figure'), /mm/);
+    assert.match(await shown.page.textContent('#fig-camera'), /Next: .*m away/);
+    await fitsEveryWindow(shown.page, 'shots');
+    await shown.page.keyboard.press('Escape');
+    await shown.page.keyboard.press('u');
+    await until('undone', async () => (await shown.photos()) === most - 1);
+    await shown.page.keyboard.press('Enter');
+    await shown.becomes('ended');
+    assert.deepEqual(shown.faults, []);
+    const [code] = await run.exited;
+    assert.ok(code === 0 || code === 6, `${code}: ${run.said()}`);
+    assert.equal(readFileSync(at('shots', 'shots.csv'), 'utf8').trim().split('\n').length, most);
+    rmSync(at('shots-batch'), {recursive: true, force: true});
+    try {
+      execFileSync(alidade, ['rangefinder', at('shots', 'shots.csv'), ...job.slice(1), '--out', at('shots-batch'), '--quiet'], {stdio: 'pipe'});
+    } catch (error) {
+      assert.equal(error.status, code);
+    }
+    assert.equal(readFileSync(at('shots-batch', 'rangefinder.yaml'), 'utf8'), readFileSync(at('shots', 'rangefinder.yaml'), 'utf8'));
+  } finally {
+    await shown.close();
+    await run.end();
+  }
+}
+
 export const tests = {
   'capture: a film is kept bit for bit, guided, and the page becomes the report': aFilmIsKeptBitForBitAndBecomesTheReport,
   'capture: the keyboard alone steers it; another page watches': theKeyboardAloneSteersIt,
   'capture: only its own page may write': onlyItsOwnPageMayWrite,
   'capture: a refused camera is said, and so is a run that has gone': aRefusedCameraIsSaid,
+  'capture: a canvas where the browser has nothing better: not exact, and said': aCanvasIsNotExactAndSaysSo,
+  'capture: a camera that is unplugged is said, its photos stay, and it goes on': aCameraThatGoesIsSaidAndComesBack,
+  'capture: a folder is shown and steered': aFolderIsShownAndSteered,
+  'capture: shots of a rangefinder are guided, by keys alone, and are those of the batch': shotsOfARangefinderAreGuided,
 };

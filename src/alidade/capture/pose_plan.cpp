@@ -13,8 +13,6 @@ namespace {
 constexpr double tilt_rad = 0.55;     // 32°: what a person holds easily
 constexpr double other_share = 0.08;  // of the board: so far from every photo that is kept
 constexpr double edge_share = 0.03;   // of the image's width that an outline keeps from its edge
-/// Of what an outline would bring, the part that a photo brings which a hand holds about there: by simulated sessions.
-constexpr double share_by_hand = 0.85;
 
 Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& matrix) {
   return matrix.llt().solve(Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()));
@@ -121,7 +119,7 @@ void PosePlan::look_for_best(const std::vector<BoardView>& kept) {
   best_gain_ = best->gain;
 }
 
-std::optional<int> PosePlan::photos_until(double goal_3sigma_px) const {
+std::optional<int> PosePlan::photos_until(double goal_3sigma_px, double share) const {
   if (worst_3sigma_px() <= goal_3sigma_px) return 0;
   std::vector<const Candidate*> chosen(25, nullptr);  // the best of each place: enough to choose from again and again
   for (const Candidate& candidate : candidates_) {
@@ -144,7 +142,7 @@ std::optional<int> PosePlan::photos_until(double goal_3sigma_px) const {
       next = candidate;
     }
     if (!next) return std::nullopt;
-    information += share_by_hand * next->information;
+    information += share * next->information;
     worst_px = 3.0 * with(information).worst_px;
     if (worst_px <= goal_3sigma_px) return photo;
   }

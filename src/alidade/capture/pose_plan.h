@@ -30,9 +30,9 @@ class PosePlan {
   void look_for_best(const std::vector<BoardView>& kept);
   [[nodiscard]] const std::optional<Rigid3>& best() const { return best_; }
   [[nodiscard]] double best_gain() const { return best_gain_; }
-  /// How many photos are likely needed until 3σ is below the goal in the worst place, each the best of its time but
-  /// for what a person does to it. None where that cannot be determined.
-  [[nodiscard]] std::optional<int> photos_until(double goal_3sigma_px) const;
+  /// How many photos are likely needed until 3σ is below the goal in the worst place, each with that share of the
+  /// information of the best of its time. None where that cannot be determined.
+  [[nodiscard]] std::optional<int> photos_until(double goal_3sigma_px, double share) const;
 
  private:
   struct Candidate {

@@ -21,6 +21,8 @@ HeldBoard mirrored(HeldBoard held) {
   return held;
 }
 
+}  // namespace
+
 std::string place_of(const Eigen::Vector2d& middle) {
   const auto third = [](double at) { return at < 0.42 ? -1 : at > 0.58 ? 1 : 0; };
   const int across = third(middle.x()), down = third(middle.y());
@@ -30,8 +32,6 @@ std::string place_of(const Eigen::Vector2d& middle) {
   const std::string edge = down < 0 ? "upper" : "lower";
   return across == 0 ? "at the " + edge + " edge" : "in the " + edge + " " + side + " corner";
 }
-
-}  // namespace
 
 HeldBoard held_board(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
                      const Rigid3& cam_from_board) {

@@ -19,6 +19,8 @@ struct HeldBoard {
 [[nodiscard]] HeldBoard held_board(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
                                    const Rigid3& cam_from_board);
 
+/// "in the upper left corner": a place in the image, over its size.
+[[nodiscard]] std::string place_of(const Eigen::Vector2d& middle);
 /// "near, in the upper left corner, the top tilted away".
 [[nodiscard]] std::string words_of(const HeldBoard& wanted, bool is_mirrored);
 /// How to come from one to the other: "nearer; to the left; tilt the top away". "as outlined" where they are alike.

@@ -9,10 +9,13 @@
 #include <random>
 #include <string>
 
+#include "alidade/board/board_pose.h"
 #include "alidade/board_detector/find_board.h"
 #include "alidade/calibrate.h"
 #include "alidade/camera/camera_diff.h"
 #include "alidade/capture.h"
+#include "alidade/capture/lens_so_far.h"
+#include "alidade/capture/pose_plan.h"
 #include "alidade/simulate/boards/board_photos.h"
 #include "alidade/simulate/boards/board_placing.h"
 
@@ -112,13 +115,37 @@ int evenly_spaced(const Film& film) {
   return 150;
 }
 
+/// How many a choice needs that sees the whole film before each photo, and takes what tells most: what no guide can
+/// know.
+int all_seeing(const Film& film) {
+  std::vector<BoardView> shown, kept;
+  for (std::size_t at = frames_a_key / 2; at < num_frames; at += frames_a_key) {
+    BoardView view = find_board(film.frames[at], film_board).view;
+    if (!view.corners.empty()) shown.push_back(std::move(view));
+  }
+  while (!shown.empty()) {
+    const LensSoFar lens = lens_so_far(film_board, kept, {640, 480}, {.outliers = OutlierRule::drop});
+    const PosePlan plan(lens.camera, lens.board_points, lens.noise_px);
+    if (lens.is_solved && plan.worst_3sigma_px() <= film_goal_px) return static_cast<int>(kept.size());
+    const auto gain = [&](const BoardView& view) {
+      const auto fit = fit_board_pose(lens.camera, view, lens.board_points, 1.0);
+      return fit ? plan.gain_of(view, fit->pose.cam_from_board) : 0.0;
+    };
+    const auto best = std::ranges::max_element(shown, {}, gain);
+    kept.push_back(std::move(*best));
+    kept.back().photo = std::to_string(kept.size());
+    shown.erase(best);
+  }
+  return 150;
+}
+
 std::uint64_t num_films() {
   const char* given = std::getenv("ALIDADE_FILMS");  // more of them, for figures
   return given ? std::stoul(given) : 1;
 }
 
 TEST(RenderedWalk, NeedsFewerPhotosThanAnEvenChoice) {
-  int guided = 0, evenly = 0;
+  int guided = 0, evenly = 0, seeing = 0, num_within = 0, num_reached = 0;
   for (std::uint64_t seed = 1; seed <= num_films(); ++seed) {
     const Film film(seed);
     CaptureGuide guide(film_board, {.until_px = film_goal_px});
@@ -130,11 +157,17 @@ TEST(RenderedWalk, NeedsFewerPhotosThanAnEvenChoice) {
     std::printf("film %d: guided %d of %zu pictures (3 sigma %.2f px), evenly spaced %d; off by %.2f px\n",
                 static_cast<int>(seed), guide.state().photos, shown, guide.state().worst_3sigma_px, even,
                 diff ? diff->max_px : -1.0);
-    EXPECT_TRUE(guide.state().is_at(film_goal_px)) << seed;
-    EXPECT_TRUE(diff && diff->max_px <= film_goal_px) << seed;
+    EXPECT_TRUE(diff && diff->max_px <= guide.state().worst_3sigma_px) << seed;
+    num_within += diff && diff->max_px <= guide.state().worst_3sigma_px ? 1 : 0;
+    num_reached += guide.state().is_at(film_goal_px) ? 1 : 0;
+    if (num_films() > 1) seeing += all_seeing(film);
     guided += guide.state().photos;
     evenly += even;
   }
+  std::printf(
+      "%d films: guided %d, evenly spaced %d, all-seeing %d photos; %d at the goal, the truth within 3 sigma in %d\n",
+      static_cast<int>(num_films()), guided, evenly, seeing, num_reached, num_within);
+  EXPECT_EQ(num_reached, static_cast<int>(num_films()));
   EXPECT_LE(guided, 0.6 * evenly);
 }
 

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "alidade/capture.h"
+#include "alidade/capture/outline.h"
 #include "alidade/rangefinder.h"
 
 namespace alidade {
@@ -76,6 +77,8 @@ void ShotGuide::solve() {
     const ShotPlan plan = plan_shots(beam_now(result, result.config), where_);
     if (!plan.shots.empty()) {
       state.next = plan.shots.front();
+      state.outline_px =
+          outline_of(camera_, beam_now(result, result.config).points_in_board, state.next->cam_from_board);
       state.words = words_of_shot(state.next->distance_m, state.next->tilt_rad, state.next->azimuth_rad);
     }
   }

@@ -277,7 +277,8 @@ void heed_stamps(const HeadCalibration& result, Verdict& verdict) {
   Check check{.name = "time stamps",
               .state = State::care,
               .text = fmt::format(
-                  "the stream's time stamps jump ({} times, by up to {:.2g} s); when frames came was taken instead",
+                  "the stream's time stamps jump ({} times, by up to {:.2g} s); what lies between was put together by "
+                  "when frames came",
                   result.num_jumps, result.largest_jump_s),
               .value = result.largest_jump_s,
               .unit = "s"};

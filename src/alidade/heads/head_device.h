@@ -5,8 +5,10 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "alidade/estimation/progress.h"
+#include "alidade/estimation/verdict.h"
 
 namespace alidade {
 
@@ -24,8 +26,9 @@ class HeadClock {
 /// Pan > 0 turns left, tilt > 0 up. Infinite: the device names no limit.
 struct HeadLimits {
   Eigen::Vector2d low_rad = Eigen::Vector2d::Constant(-1e9), high_rad = Eigen::Vector2d::Constant(1e9);
-  bool are_told = false;  ///< By the device.
-  std::string info;       ///< What it calls itself.
+  bool are_told = false;                 ///< By the device.
+  std::string info;                      ///< What it calls itself.
+  std::vector<Assumption> assumed = {};  ///< What nobody told: by it counts become angles.
 
   [[nodiscard]] bool hold(const Eigen::Vector2d& pan_tilt_rad) const;
 };

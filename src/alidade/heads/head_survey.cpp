@@ -74,6 +74,8 @@ Verdict verdict_of(const HeadSurvey& survey) {
   if (survey.limits.are_told) {
     verdict.sentence += fmt::format("; pan {:g}…{:g}°, tilt {:g}…{:g}°", low[0], high[0], low[1], high[1]);
     verdict.checks.push_back({.name = "limits", .text = "the head names its limits"});
+  } else if (!survey.limits.assumed.empty()) {
+    verdict.sentence += fmt::format("; pan {:g}…{:g}°, tilt {:g}…{:g}° are supposed", low[0], high[0], low[1], high[1]);
   } else {
     verdict.state = State::care;
     verdict.to_add = "give --pan-range and --tilt-range before it moves";

@@ -1,13 +1,9 @@
 #include "alidade/live/protocol.h"
 
-#include <fmt/format.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cctype>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <random>
 
 namespace alidade::live {
 namespace {
@@ -159,18 +155,6 @@ bool has_token(std::string_view target, std::string_view token) {
     query.remove_prefix(std::min(end + 1, query.size()));
   }
   return false;
-}
-
-std::string random_hex(int num_words) {
-  std::random_device device;
-  std::string text;
-  for (int i = 0; i < num_words; ++i) text += fmt::format("{:08x}", device());
-  return text;
-}
-
-std::string machine_name() {
-  char name[256] = {};
-  return ::gethostname(name, sizeof name - 1) == 0 ? name : "";
 }
 
 }  // namespace alidade::live

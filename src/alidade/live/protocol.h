@@ -1,7 +1,5 @@
 #pragma once
 
-#include <chrono>
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -53,14 +51,5 @@ struct ClientRequest {
 [[nodiscard]] std::string_view path_of(std::string_view target);
 /// Whether the target's query has `token=TOKEN`. In a time that does not tell how much of it was right.
 [[nodiscard]] bool has_token(std::string_view target, std::string_view token);
-/// So many random words of 32 bits, as hexadecimal digits.
-[[nodiscard]] std::string random_hex(int num_words);
-/// What this machine is called; empty where that is not known.
-[[nodiscard]] std::string machine_name();
-
-// What every server holds to.
-inline constexpr std::size_t max_connections = 40;
-inline constexpr std::chrono::seconds patience{10};  ///< With a request that does not come.
-inline constexpr std::chrono::seconds silence{40};   ///< Of a client that answers no ping.
 
 }  // namespace alidade::live

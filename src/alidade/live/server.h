@@ -8,14 +8,9 @@
 #include <vector>
 
 #include "alidade/live/topic_store.h"
+#include "alidade/live/web_host.h"
 
 namespace alidade::live {
-
-struct HttpAnswer {
-  int status = 404;
-  std::string type = "text/plain; charset=utf-8";
-  std::string body = "not found\n";
-};
 
 struct ServerConfig {
   std::string address = "127.0.0.1";  ///< Another than the machine's own needs a token, which url() tells.

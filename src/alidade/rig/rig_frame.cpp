@@ -109,8 +109,9 @@ WorldAtCamera world_at_camera(const RigProblem& problem, const RigState& state, 
   return world;
 }
 
-Eigen::Matrix<double, 6, 6> relative_covariance(const Rig& rig, std::size_t first, const Eigen::Vector2d& first_rad,
-                                                std::size_t second, const Eigen::Vector2d& second_rad) {
+Eigen::Matrix<double, 6, Eigen::Dynamic> relative_jacobian(const Rig& rig, std::size_t first,
+                                                           const Eigen::Vector2d& first_rad, std::size_t second,
+                                                           const Eigen::Vector2d& second_rad) {
   constexpr double step = 1e-6;
   Eigen::Matrix<double, 6, Eigen::Dynamic> J = Eigen::Matrix<double, 6, Eigen::Dynamic>::Zero(6, rig.cov.rows());
   for (std::size_t h : {first, second}) {
@@ -125,6 +126,12 @@ Eigen::Matrix<double, 6, 6> relative_covariance(const Rig& rig, std::size_t firs
       J.col(col) = difference(pose(step), pose(-step)) / (2.0 * step);
     }
   }
+  return J;
+}
+
+Eigen::Matrix<double, 6, 6> relative_covariance(const Rig& rig, std::size_t first, const Eigen::Vector2d& first_rad,
+                                                std::size_t second, const Eigen::Vector2d& second_rad) {
+  const auto J = relative_jacobian(rig, first, first_rad, second, second_rad);
   return J * rig.cov * J.transpose();
 }
 

@@ -15,6 +15,13 @@ struct WorldAtCamera {
 [[nodiscard]] WorldAtCamera world_at_camera(const RigProblem& problem, const RigState& state,
                                             const Eigen::MatrixXd& cov);
 
+/// Derivatives of cam_from_cam(first, second) at these readings (translation, rotation; on the right) by the
+/// parameters of all heads that have a variance in the rig's covariance.
+[[nodiscard]] Eigen::Matrix<double, 6, Eigen::Dynamic> relative_jacobian(const Rig& rig, std::size_t first,
+                                                                         const Eigen::Vector2d& first_rad,
+                                                                         std::size_t second,
+                                                                         const Eigen::Vector2d& second_rad);
+
 /// σ between cameras over the angles that the views cover.
 void add_relative_sigma(RigReport& report);
 

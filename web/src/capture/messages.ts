@@ -27,6 +27,8 @@ export interface State {
   height: number;
   next: {outline: number[]; words: string; words_mirrored: string} | null;
   sigma: {cols: number; rows: number; three_sigma: (number | null)[]} | null;
+  sentence?: string; // of shots: the verdict on them
+  history?: (number | null)[]; // of shots: 3σ of the origin after each, mm
 }
 export type Told = Look | State | {op: 'control'; yes: boolean} | {op: 'took'; file: string} | {op: 'note'; words: string} | {op: 'goal'; holds: boolean} | {op: 'ended'; exit_code: number; report: boolean};
 
@@ -40,7 +42,7 @@ export function packed(picture: Picture): ArrayBuffer {
 }
 
 export interface Line {
-  ask(op: string): void;
+  ask(op: string, value?: number): void;
   send(picture: Picture): void;
   close(): void;
 }
@@ -58,7 +60,7 @@ export function connect(told: (message: Told) => void, shown: (jpeg: Blob) => vo
     isOver = true;
   };
   return {
-    ask: (op) => socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify({op})),
+    ask: (op, value) => socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(value === undefined ? {op} : {op, value})),
     send: (picture) => socket.readyState === WebSocket.OPEN && socket.send(packed(picture)),
     close: () => {
       isOver = true;

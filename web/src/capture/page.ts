@@ -24,6 +24,7 @@ function moreWords(needed: number): string {
 }
 
 interface CaptureDocument {
+  kind?: 'shots'; // of a rangefinder: each photo with what it read
   source: string;
   board: {cols: number; rows: number};
   until: number;
@@ -52,6 +53,8 @@ class CapturePage {
   private readonly again = button('ask again', 'Ask for the camera again', () => void this.openCamera(), {hidden: true});
   private readonly buttons: Record<'take' | 'undo' | 'pause' | 'end' | 'mirror', HTMLButtonElement>;
   private readonly map: Chart;
+  private readonly isShots: boolean;
+  private readonly reading = el('input', {id: 'reading', type: 'number', min: '0', step: 'any', inputmode: 'decimal', autocomplete: 'off', 'aria-label': 'what the rangefinder reads, in metres'});
   private camera: Camera | null = null;
   private state: State | null = null;
   private hasControl: boolean | null = null;
@@ -63,7 +66,8 @@ class CapturePage {
 
   constructor(doc: Doc, private readonly host: HTMLElement, private readonly ended: (result: Doc) => void) {
     this.about = (doc.json as Record<string, unknown>)['capture'] as CaptureDocument;
-    const isBrowsers = this.about.source === 'browser';
+    const isBrowsers = this.about.source === 'browser', isShots = this.about.kind === 'shots';
+    this.isShots = isShots;
     this.view = new CameraView(isBrowsers);
     const made = (id: string, text: string, label: string, act: () => void, more = {}) => {
       const one = button(text, label, act, {id, ...more});
@@ -71,8 +75,8 @@ class CapturePage {
       return one;
     };
     this.buttons = {
-      take: made('take', 'take', 'Take this picture (space)', () => this.line.ask('take')),
-      undo: made('undo', 'undo', 'Forget the last photo (u)', () => this.line.ask('undo')),
+      take: made('take', 'take', isShots ? 'Take this picture with the reading (Enter in its field)' : 'Take this picture (space)', () => this.take()),
+      undo: made('undo', 'undo', isShots ? 'Forget the last shot (u)' : 'Forget the last photo (u)', () => this.line.ask('undo')),
       pause: made('pause', 'pause', 'Take nothing by itself for now (p)', () => this.togglePause(), {'aria-pressed': 'false'}),
       end: made('end', 'end', 'End and calibrate (Enter)', () => this.line.ask('end')),
       mirror: made('mirror', 'mirror', 'Show the picture as a mirror does (m)', () => this.mirror(), {'aria-pressed': 'false'}),
@@ -80,18 +84,19 @@ class CapturePage {
     this.header = el('header', {class: 'top live'},
       el('div', {class: 'headline'}, el('h1', {}, this.symbol, ' ', this.word, ' ', this.facts),
         el('div', {class: 'buttons'}, this.again, button('?', 'Keys and help', showHelp), button('◐', 'Dark or light', toggleTheme))),
-      el('p', {class: 'counts'}, el('b', {}, 'alidade calibrate --live'), ` · board ${this.about.board.cols}×${this.about.board.rows} · goal 3σ ≤ ${num(this.about.until, 3)} px in the worst place`), this.notes);
-    const mapBody = el('div', {class: 'body'}), main = el('main');
+      el('p', {class: 'counts'}, el('b', {}, `alidade ${isShots ? 'rangefinder' : 'calibrate'} --live`), ` · board ${this.about.board.cols}×${this.about.board.rows}${this.goalWords()}`), this.notes);
+    const mapBody = el('div', {class: 'body'}), main = el('main'), {take, undo, pause, mirror, end} = this.buttons;
+    const buttons = isShots ? [el('label', {class: 'capture-reading'}, 'reading ', this.reading, ' m'), take, undo, mirror, end] : Object.values({take, undo, pause, end, mirror});
     main.append(
       el('section', {class: 'card', id: 'fig-camera', style: '--span:16'},
         this.view.element, this.advice, this.target,
-        el('div', {class: 'capture-buttons'}, ...Object.values(this.buttons)),
-        el('p', {class: 'good'}, 'space takes · u undo · p pause · m mirror · Enter ends · d dark or light')),
+        el('div', {class: 'capture-buttons'}, ...buttons),
+        el('p', {class: 'good'}, isShots ? 'space goes to the reading, Enter in it takes · u undo · m mirror · Enter ends · d dark or light' : 'space takes · u undo · p pause · m mirror · Enter ends · d dark or light')),
       el('section', {class: 'card', id: 'fig-sigma', style: '--span:8'},
-        el('div', {class: 'title'}, el('h2', {}, 'How well is a pixel known?'), el('span', {class: 'note'}, '3σ, px')),
+        el('div', {class: 'title'}, el('h2', {}, isShots ? 'How well is the beam known?' : 'How well is a pixel known?'), el('span', {class: 'note'}, isShots ? '3σ of its origin, mm' : '3σ, px')),
         this.figure, this.goal, mapBody));
     host.append(this.header, main);
-    this.map = new Chart(mapBody, {height: 180, aspect: 0.75, most: 420, label: '3σ over the image'}, (pen) => this.drawMap(pen));
+    this.map = new Chart(mapBody, {height: 180, aspect: 0.75, most: 420, label: isShots ? '3σ of the origin, shot by shot' : '3σ over the image'}, (pen) => (isShots ? this.drawHistory(pen) : this.drawMap(pen)));
     this.listen();
     this.set('asking');
     this.line = connect((message) => this.hear(message), (jpeg) => void this.view.show(jpeg), () => this.lose('the run has gone. Its photos are on disk: go on with --resume'));
@@ -111,6 +116,18 @@ class CapturePage {
     this.again.hidden = stage !== 'refused';
     const isActive = stage === 'looking' || stage === 'paused';
     for (const [name, one] of Object.entries(this.buttons)) one.disabled = name !== 'mirror' && !isActive && !(stage === 'refused' && name === 'end');
+    this.reading.disabled = !isActive;
+  }
+  private goalWords(): string {
+    if (!this.isShots) return ` · goal 3σ ≤ ${num(this.about.until, 3)} px in the worst place`;
+    return this.about.until > 0 ? ` · goal 3σ ≤ ${num(this.about.until, 3)} mm at the origin` : '';
+  }
+  /** A photo; of a rangefinder with what it reads, once. */
+  private take(): void {
+    if (!this.isShots) return this.line.ask('take');
+    const read = this.reading.value.trim() === '' ? NaN : Number(this.reading.value);
+    if (!(read > 0)) return this.advise('enter the rangefinder’s reading first'), this.reading.focus();
+    this.line.ask('take', read);
   }
   private note(words: string, level = 'info'): void {
     if (this.notes.lastElementChild?.textContent === words) return;
@@ -197,6 +214,7 @@ class CapturePage {
   private showState(): void {
     const state = this.state, photos = state?.photos ?? 0;
     this.root.dataset['photos'] = String(photos);
+    if (this.isShots) return this.showShots();
     this.facts.textContent = `· ${photos} photo${photos === 1 ? '' : 's'}${state?.last ? `, the last ${state.last}` : ''}`;
     const worst = state?.worst ?? null;
     this.figure.textContent = worst === null ? '–' : `${num(worst, 2)} px`;
@@ -208,11 +226,20 @@ class CapturePage {
     this.target.textContent = next ? `Next: ${this.view.isMirrored ? next.words_mirrored : next.words}. Fill the outline.` : '';
     this.map.redraw();
   }
+  private showShots(): void {
+    const state = this.state, shots = state?.photos ?? 0, next = state?.next;
+    this.facts.textContent = `· ${shots} shot${shots === 1 ? '' : 's'}`;
+    this.figure.textContent = state?.worst == null ? '–' : `${num(state.worst, 2)} mm`;
+    this.goal.textContent = shots === 0 ? 'no shot yet' : state?.sentence ?? '';
+    this.target.textContent = next ? `Next: ${this.view.isMirrored ? next.words_mirrored : next.words}.${next.outline.length > 0 ? ' Fill the outline.' : ''}` : '';
+    this.map.redraw();
+  }
   private takeLook(look: Look): void {
     this.answered?.();
     this.view.takeLook(look);
     if (this.hasControl === false || this.about.source !== 'browser') this.root.dataset['exact'] = look.exact ? '1' : '0';
     const words = this.view.isMirrored ? look.words_mirrored : look.words;
+    if (this.isShots) return this.advise(words);
     this.advise(look.sight === 'useful' ? (this.state?.paused ? 'worth taking: space takes it' : 'taken') : look.sight === 'moving' ? words || 'hold it still' : words === 'as outlined' ? 'hold it still' : words);
   }
   private advise(words: string): void {
@@ -221,6 +248,7 @@ class CapturePage {
   private celebrate(file: string): void {
     this.view.flash();
     this.advise(`taken: ${file}`);
+    if (this.isShots) this.reading.value = '';
     if (!navigator.userActivation?.hasBeenActive) return; // browsers let no page sound before
     this.sound ??= new AudioContext();
     const tone = this.sound.createOscillator(), volume = this.sound.createGain(), now = this.sound.currentTime;
@@ -232,6 +260,25 @@ class CapturePage {
     tone.stop(now + 0.2);
   }
 
+  /** Shot by shot, on a logarithmic scale. */
+  private drawHistory(pen: Pen): void {
+    const values = this.state?.history ?? [], known = values.filter((one): one is number => one !== null && one > 0);
+    pen.rect(0, 0, pen.w, pen.h, pen.c.panel);
+    if (known.length === 0) return pen.text('no beam yet', pen.w / 2, pen.h / 2, {align: 'center', colour: pen.c.soft});
+    const low = Math.log(Math.min(...known)) - 0.2, high = Math.log(Math.max(...known)) + 0.2, left = 34, right = 14, top = 12, bottom = 22;
+    const x = (shot: number) => left + ((pen.w - left - right) * (shot - 0.5)) / values.length, y = (value: number) => top + ((pen.h - top - bottom) * (high - Math.log(value))) / (high - low);
+    const places: number[] = [];
+    values.forEach((value, i) => places.push(x(i + 1), value !== null && value > 0 ? y(value) : NaN));
+    pen.path(places, pen.c.soft, 1.5);
+    values.forEach((value, i) => {
+      if (value === null || !(value > 0)) return;
+      pen.circle(x(i + 1), y(value), 4, pen.c.green);
+      pen.hit({x: x(i + 1), y: y(value), r: 9, tip: () => [`shot ${i + 1}`, `3σ ${num(value, 2)} mm`]});
+    });
+    for (const value of [Math.max(...known), Math.min(...known)]) pen.text(num(value, 2), 2, y(value), {size: 11.5, colour: pen.c.ink});
+    pen.text('1', x(1), pen.h - 10, {align: 'center', size: 11.5, colour: pen.c.soft});
+    if (values.length > 1) pen.text(String(values.length), x(values.length), pen.h - 10, {align: 'center', size: 11.5, colour: pen.c.soft});
+  }
   private drawMap(pen: Pen): void {
     const sigma = this.state?.sigma, state = this.state;
     pen.rect(0, 0, pen.w, pen.h, pen.c.panel);
@@ -266,13 +313,18 @@ class CapturePage {
   private listen(): void {
     const press = (one: HTMLButtonElement) => !one.disabled && one.click();
     const keys: Record<string, () => void> = {
-      ' ': () => press(this.buttons.take), Enter: () => press(this.buttons.end), u: () => press(this.buttons.undo), p: () => press(this.buttons.pause),
+      ' ': () => (this.isShots ? this.reading.focus() : press(this.buttons.take)), Enter: () => press(this.buttons.end), u: () => press(this.buttons.undo), p: () => press(this.buttons.pause),
       m: () => press(this.buttons.mirror), d: toggleTheme, '?': showHelp, Escape: () => document.querySelector<HTMLDialogElement>('dialog.help[open]')?.close(),
     };
     document.addEventListener('keydown', (event) => {
       const target = event.target as HTMLElement | null;
       if (event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
       if ((event.key === ' ' || event.key === 'Enter') && target?.matches('button, a, dialog')) return; // that one is pressed
+      if (target === this.reading) {
+        if (event.key === 'Enter') event.preventDefault(), press(this.buttons.take);
+        if (event.key === 'Escape') this.reading.blur();
+        return;
+      }
       const act = keys[event.key];
       if (!act) return;
       event.preventDefault();

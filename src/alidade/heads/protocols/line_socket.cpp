@@ -108,9 +108,26 @@ void LineSocket::connect() {
   if (socket_ < 0) fail("nobody answers at that address");
   const int on = 1;
   ::setsockopt(socket_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+  if (trust_) begin_tls(until_s);
+}
+
+void LineSocket::begin_tls(double until_s) {
+  std::string fault;
+  const auto wait = [&](bool to_write) { return is_ready(socket_, to_write ? POLLOUT : POLLIN, until_s); };
+  tls_ = TlsSession::begin(socket_, *trust_, wait, fault);
+  if (!tls_) fail(fault);
+}
+
+ssize_t LineSocket::receive(char* bytes, std::size_t count) {
+  return tls_ ? tls_->read(bytes, count) : ::recv(socket_, bytes, count, 0);
+}
+
+bool LineSocket::can_receive(double until_s) const {
+  return (tls_ && tls_->has_waiting()) || is_ready(socket_, POLLIN, until_s);
 }
 
 void LineSocket::close() {
+  tls_.reset();
   if (socket_ >= 0) ::close(socket_);
   socket_ = -1;
   buffer_.clear();
@@ -121,7 +138,8 @@ void LineSocket::write(std::string_view text) {
   const double until_s = steady_s() + timeout_s_;
   while (!text.empty()) {
     if (!is_ready(socket_, POLLOUT, until_s)) fail("takes nothing");
-    const ssize_t sent = ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL);
+    const ssize_t sent =
+        tls_ ? tls_->write(text.data(), text.size()) : ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL);
     if (sent < 0 && (errno == EINTR || errno == EAGAIN)) continue;
     if (sent <= 0) fail("has closed the connection");
     text.remove_prefix(static_cast<std::size_t>(sent));
@@ -132,9 +150,9 @@ void LineSocket::fill(double until_s) {
   constexpr std::size_t most = 1 << 24;  // of what nobody asked for
   if (socket_ < 0) fail("not connected");
   if (buffer_.size() > most) fail("sends what has no end");
-  if (!is_ready(socket_, POLLIN, until_s)) fail(fmt::format("no answer within {:g} s", timeout_s_));
+  if (!can_receive(until_s)) fail(fmt::format("no answer within {:g} s", timeout_s_));
   char chunk[65536];
-  const ssize_t got = ::recv(socket_, chunk, sizeof chunk, 0);
+  const ssize_t got = receive(chunk, sizeof chunk);
   if (got < 0 && (errno == EINTR || errno == EAGAIN)) return;
   if (got <= 0) fail("has closed the connection");
   buffer_.append(chunk, static_cast<std::size_t>(got));
@@ -160,7 +178,7 @@ std::string LineSocket::bytes(std::size_t count) {
 
 std::string LineSocket::some(double wait_s) {
   if (socket_ < 0) fail("not connected");
-  if (buffer_.empty() && is_ready(socket_, POLLIN, steady_s() + wait_s)) fill(steady_s() + timeout_s_);
+  if (buffer_.empty() && can_receive(steady_s() + wait_s)) fill(steady_s() + timeout_s_);
   return std::exchange(buffer_, {});
 }
 
@@ -168,9 +186,9 @@ std::string LineSocket::rest() {
   constexpr std::size_t most = 1 << 24;
   const double until_s = steady_s() + timeout_s_;
   while (buffer_.size() < most) {
-    if (!is_ready(socket_, POLLIN, until_s)) fail(fmt::format("no answer within {:g} s", timeout_s_));
+    if (!can_receive(until_s)) fail(fmt::format("no answer within {:g} s", timeout_s_));
     char chunk[65536];
-    const ssize_t got = ::recv(socket_, chunk, sizeof chunk, 0);
+    const ssize_t got = receive(chunk, sizeof chunk);
     if (got < 0 && (errno == EINTR || errno == EAGAIN)) continue;
     if (got <= 0) break;
     buffer_.append(chunk, static_cast<std::size_t>(got));

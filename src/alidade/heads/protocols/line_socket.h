@@ -1,8 +1,14 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
+
+#include "alidade/heads/protocols/tls.h"
 
 namespace alidade {
 
@@ -29,6 +35,8 @@ class LineSocket {
   LineSocket(const LineSocket&) = delete;
   LineSocket& operator=(const LineSocket&) = delete;
 
+  /// From the next connection on it is encrypted, for who is believed by that.
+  void encrypt(TlsTrust trust) { trust_ = std::move(trust); }
   /// Where it is not connected.
   void connect();
   void close();
@@ -47,11 +55,17 @@ class LineSocket {
 
  private:
   void fill(double until_s);
+  void begin_tls(double until_s);
+  [[nodiscard]] ssize_t receive(char* bytes, std::size_t count);
+  /// Until something can be received, or the time is up: false.
+  [[nodiscard]] bool can_receive(double until_s) const;
   [[noreturn]] void fail(const std::string& what);
 
   SocketAddress address_;
   double timeout_s_;
   int socket_ = -1;
+  std::optional<TlsTrust> trust_;
+  std::unique_ptr<TlsSession> tls_;
   std::string buffer_;
 };
 

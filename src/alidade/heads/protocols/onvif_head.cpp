@@ -17,8 +17,16 @@ struct OnvifQuery {
   std::size_t profile = 0;
   std::string profile_token;
   OnvifRange azimuth_deg{-180.0, 180.0}, elevation_deg{-90.0, 90.0};
-  bool tells_angles = false;
+  bool tells_azimuth = false, tells_elevation = false;
 };
+
+/// What stands in az or el of an address, where nobody said it.
+Assumption supposed(const char* name, const OnvifRange& degrees) {
+  return {.name = name,
+          .value = degrees.high - degrees.low,
+          .sigma = {},
+          .remedy = fmt::format("give {}=LOW:HIGH in the address: its data sheet says how far it goes", name)};
+}
 
 bool read_degrees(const std::string& text, OnvifRange& range) {
   char* end = nullptr;
@@ -48,9 +56,12 @@ OnvifQuery onvif_query(const std::string& url) {
       is_good = !value.empty();
     } else if (key == "az" || key == "el") {
       is_good = read_degrees(value, key == "az" ? query.azimuth_deg : query.elevation_deg);
-      query.tells_angles = true;
+      (key == "az" ? query.tells_azimuth : query.tells_elevation) = true;
     }
-    if (!is_good) throw InputError(fmt::format("onvif://…: '{}' is none of profile=0, az=-180:180, el=-90:90", part));
+    is_good = is_good || ((key == "https" || key == "cert") && onvif_trust(url));  // the connection's own
+    if (!is_good)
+      throw InputError(
+          fmt::format("onvif://…: '{}' is none of profile=0, az=-180:180, el=-90:90, https=1, cert=SHA256", part));
   }
   return query;
 }
@@ -68,7 +79,9 @@ class OnvifHead final : public HeadDevice {
     profile_ = all[which];
     if (!profile_.has_pan_tilt) throw InputError(name() + ": this profile has no PTZ configuration: it does not turn");
     const Eigen::Vector2d low = angles(profile_.x.high, profile_.y.low), high = angles(profile_.x.low, profile_.y.high);
-    limits_ = {low, high, query_.tells_angles, "ONVIF, " + service_.maker()};
+    limits_ = {low, high, query_.tells_azimuth && query_.tells_elevation, "ONVIF, " + service_.maker()};
+    if (!query_.tells_azimuth) limits_.assumed.push_back(supposed("az", query_.azimuth_deg));
+    if (!query_.tells_elevation) limits_.assumed.push_back(supposed("el", query_.elevation_deg));
   }
 
   [[nodiscard]] HeadLimits limits() override { return limits_; }

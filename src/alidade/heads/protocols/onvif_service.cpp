@@ -15,6 +15,25 @@
 
 namespace alidade {
 
+std::optional<TlsTrust> onvif_trust(const std::string& url) {
+  constexpr std::size_t sha256_digits = 64;
+  TlsTrust trust{address_of(url, "onvif://", 80).host, ""};
+  bool is_asked = false;
+  for (std::size_t at = url.find_first_of("?&"); at != std::string::npos; at = url.find_first_of("?&", at + 1)) {
+    const std::string part = url.substr(at + 1, url.find_first_of("?&", at + 1) - at - 1);
+    if (part == "https=1") is_asked = true;
+    if (!part.starts_with("cert=")) continue;
+    is_asked = true;
+    for (const char letter : part.substr(5))
+      if (letter != ':')
+        trust.fingerprint.push_back(static_cast<char>(std::tolower(static_cast<unsigned char>(letter))));
+    if (trust.fingerprint.size() != sha256_digits ||
+        trust.fingerprint.find_first_not_of("0123456789abcdef") != std::string::npos)
+      throw InputError("onvif://…: cert= is the SHA-256 of a certificate, 64 hexadecimal digits");
+  }
+  return is_asked ? std::optional(trust) : std::nullopt;
+}
+
 #if __has_include(<pugixml.hpp>)
 namespace {
 
@@ -59,7 +78,10 @@ constexpr const char* schema_ns = "http://www.onvif.org/ver10/schema";
 
 struct OnvifService::State {
   State(const std::string& url, const HeadOptions& options)
-      : password(options.password), socket(address_of(url, "onvif://", 80), std::max(options.timeout_s, patience_s)) {}
+      : password(options.password),
+        socket(address_of(url, "onvif://", onvif_trust(url) ? 443 : 80), std::max(options.timeout_s, patience_s)) {
+    if (auto trust = onvif_trust(url)) socket.encrypt(std::move(*trust));
+  }
 
   static constexpr double patience_s = 1.0;  // a camera computes a digest, and opens a connection for each question
   std::string password;

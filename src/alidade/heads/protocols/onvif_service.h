@@ -1,10 +1,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "alidade/heads/head_device.h"
+#include "alidade/heads/protocols/tls.h"
 
 namespace alidade {
 
@@ -27,6 +29,10 @@ struct OnvifStatus {
   double zoom = 0.0;
   bool has_zoom = false;
 };
+
+/// Whom to believe, where the address asks for TLS by https=1, or by cert= for a camera that signs for itself; none: it
+/// does not. Throws InputError for a cert that is no SHA-256.
+[[nodiscard]] std::optional<TlsTrust> onvif_trust(const std::string& url);
 
 /// ONVIF's services of one camera. Addresses that it announces may belong to another network: of them the path is
 /// taken, and host and port are those that were given. Every call ends within the timeout. Throws InputError: nobody

@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <deque>
 #include <optional>
+#include <span>
+#include <vector>
 
 namespace alidade {
 
@@ -43,14 +45,34 @@ class StampWatch {
   void add(double stamp_s, double came_s);
   [[nodiscard]] std::size_t num_jumps() const { return num_jumps_; }
   [[nodiscard]] double largest_s() const { return largest_s_; }
-  /// More than once: such stamps are of no use.
+  /// Counts on where stamp and arrival do not agree on how far two frames are apart, or the newest did not come in its
+  /// turn: by a jump, or a network that held it back.
+  [[nodiscard]] std::size_t piece() const { return piece_; }
+  [[nodiscard]] bool came_in_turn() const { return came_in_turn_; }
+  /// More than once: such stamps are of no use as they stand.
   [[nodiscard]] bool is_jumping() const { return num_jumps_ > 1; }
 
  private:
   std::optional<double> stamp_s_, came_s_;
   std::deque<double> periods_s_;
-  std::size_t num_jumps_ = 0;
+  std::size_t num_jumps_ = 0, piece_ = 0;
+  bool came_in_turn_ = false;
   double largest_s_ = 0.0;
 };
+
+/// A frame by a clock that jumps now and then.
+struct JumpingStamp {
+  double stamp_s = 0.0, came_s = 0.0;
+  std::size_t piece = 0;     ///< StampWatch::piece() after it.
+  bool came_in_turn = true;  ///< Else its arrival says nothing.
+};
+/// When such frames were taken, but for a constant: between two jumps the stamps count, and pieces are put together by
+/// the fastest arrival of each. NaN of those that did not
+/// come in their turn, and in a piece of too few. σ: of them all.
+struct PiecedTimes {
+  std::vector<double> t_s;
+  double sigma_s = 0.0;
+};
+[[nodiscard]] PiecedTimes pieced_times(std::span<const JumpingStamp> frames);
 
 }  // namespace alidade

@@ -86,5 +86,41 @@ TEST(StampWatch, JumpsAreFoundAndLatenessIsNone) {
   EXPECT_NEAR(jumping.largest_s(), 0.3, 0.02);
 }
 
+/// Frames whose intervals differ, by stamps that jump by 0.3 s for one second of three.
+TEST(StampWatch, BetweenJumpsStampsStillCount) {
+  Draws draws(7);
+  StampWatch watch;
+  ArrivalTimes by_count;
+  std::vector<JumpingStamp> frames;
+  std::vector<double> taken, counted;
+  double taken_s = 100.0, last_came_s = 0.0;
+  for (int i = 0; i < 700; ++i) {
+    taken_s += 0.05 + 0.1 * draws.uniform();
+    const double stamp_s = taken_s - (std::fmod(taken_s, 3.0) < 1.0 ? 0.3 : 0.0);
+    const double held_s = i % 97 == 50 ? 0.4 : 0.0;  // and now and then one is held back, and what follows it
+    const double came_s = std::max(last_came_s, taken_s + 0.004 + held_s - 0.002 * std::log(1.0 - draws.uniform()));
+    last_came_s = came_s;
+    watch.add(stamp_s, came_s);
+    frames.push_back({stamp_s, came_s, watch.piece(), watch.came_in_turn()});
+    taken.push_back(taken_s + 0.004);
+    counted.push_back(by_count.add(came_s).t_s);
+  }
+  EXPECT_TRUE(watch.is_jumping());
+  const PiecedTimes pieced = pieced_times(frames);
+  const auto rms = [&](const std::vector<double>& times) {
+    double sum2 = 0.0, num = 0.0;
+    for (std::size_t i = 200; i < taken.size(); ++i) {
+      if (std::isnan(times[i])) continue;
+      sum2 += std::pow(times[i] - taken[i], 2);
+      num += 1.0;
+    }
+    EXPECT_GT(num, 440.0);
+    return std::sqrt(sum2 / num);
+  };
+  EXPECT_LT(rms(pieced.t_s), 4.0 * pieced.sigma_s);
+  EXPECT_LT(rms(pieced.t_s), 0.001);
+  EXPECT_LT(rms(pieced.t_s), 0.5 * rms(counted));
+}
+
 }  // namespace
 }  // namespace alidade

@@ -1,5 +1,6 @@
 #include "alidade/heads/streams/frame_follower.h"
 
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -24,25 +25,28 @@ FrameFollower::~FrameFollower() {
 }
 
 void FrameFollower::push(StreamFrame frame) {
-  const FilteredTime came = arrivals_.add(frame.came_s);
   if (frame.times != FrameTimes::arrival) stamps_.add(frame.t_s, frame.came_s);
   {
     const std::scoped_lock lock(mutex_);
     times_ = frame.times;
     sigma_s_ = frame.sigma_s;
-    arrival_sigma_s_ = came.sigma_s;
-    waiting_came_s_.push_back(came.t_s);
+    arrivals_.push_back({frame.t_s, frame.came_s, stamps_.piece(), stamps_.came_in_turn()});
     waiting_.push_back(std::move(frame));
   }
   changed_.notify_all();
 }
 
+/// Stamps that jump still tell how far frames are apart, between two jumps.
 std::vector<SeenFrame> FrameFollower::timed() const {
   std::vector<SeenFrame> frames = seen_;
   if (!stamps_.is_jumping()) return frames;
-  for (std::size_t i = 0; i < frames.size(); ++i) frames[i].t_s = came_s_[i];
+  const PiecedTimes times = pieced_times(arrivals_);
+  for (std::size_t i = 0; i < frames.size(); ++i) frames[i].t_s = times.t_s[i];
+  std::erase_if(frames, [](const SeenFrame& frame) { return std::isnan(frame.t_s); });
   return frames;
 }
+
+double FrameFollower::sigma_s() const { return stamps_.is_jumping() ? pieced_times(arrivals_).sigma_s : sigma_s_; }
 
 std::vector<SeenFrame> FrameFollower::seen() {
   std::unique_lock lock(mutex_);
@@ -61,16 +65,13 @@ void FrameFollower::work() {
     changed_.wait(lock, [this] { return ends_ || !waiting_.empty(); });
     if (ends_) return;
     const StreamFrame frame = std::move(waiting_.front());
-    const double came_s = waiting_came_s_.front();
     waiting_.pop_front();
-    waiting_came_s_.pop_front();
     is_busy_ = true;
     lock.unlock();
     SeenFrame seen{frame.t_s, tracker_.update(grey_of(*frame.image))};
     lock.lock();
     is_busy_ = false;
     seen_.push_back(std::move(seen));
-    came_s_.push_back(came_s);
     changed_.notify_all();
   }
 }

@@ -23,14 +23,14 @@ class FrameFollower {
 
   void push(StreamFrame frame);
   /// Those that have been looked at; waits until all have. At the times that count: their time stamps, or, where those
-  /// jump, when they came, by the fastest.
+  /// jump, those stamps put together by when frames came.
   [[nodiscard]] std::vector<SeenFrame> seen();
   /// Without waiting.
   [[nodiscard]] std::vector<SeenFrame> seen_so_far();
 
   [[nodiscard]] const StampWatch& stamps() const { return stamps_; }
   [[nodiscard]] FrameTimes times() const { return stamps_.is_jumping() ? FrameTimes::arrival : times_; }
-  [[nodiscard]] double sigma_s() const { return stamps_.is_jumping() ? arrival_sigma_s_ : sigma_s_; }
+  [[nodiscard]] double sigma_s() const;
 
  private:
   void work();
@@ -41,13 +41,11 @@ class FrameFollower {
   std::condition_variable changed_;
   std::deque<StreamFrame> waiting_;
   std::vector<SeenFrame> seen_;
-  std::vector<double> came_s_;  ///< Of each of `seen_`, filtered.
+  std::vector<JumpingStamp> arrivals_;  ///< Of each frame that was pushed.
   bool is_busy_ = false, ends_ = false;
   StampWatch stamps_;
-  ArrivalTimes arrivals_;
-  std::deque<double> waiting_came_s_;
   FrameTimes times_ = FrameTimes::arrival;
-  double sigma_s_ = 0.0, arrival_sigma_s_ = 0.0;
+  double sigma_s_ = 0.0;
   std::thread worker_;  // last: it uses the others
 };
 

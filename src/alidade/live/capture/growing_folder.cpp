@@ -1,4 +1,4 @@
-#include "alidade/live/growing_folder.h"
+#include "alidade/live/capture/growing_folder.h"
 
 #include <algorithm>
 

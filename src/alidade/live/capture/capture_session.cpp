@@ -1,4 +1,4 @@
-#include "alidade/live/capture_session.h"
+#include "alidade/live/capture/capture_session.h"
 
 #include <fmt/format.h>
 
@@ -86,7 +86,18 @@ CaptureSession::Seen CaptureSession::see(const cv::Mat& grey, double t_s, bool i
   Seen seen{guide_.look(grey, t_s), ""};
   if (!is_again) note(seen.look, grey, t_s);
   all_exact_ = all_exact_ && is_exact;
-  if (!seen.look.take() || is_paused_) return seen;
+  act(seen, grey, t_s, is_exact);
+  return seen;
+}
+
+CaptureSession::Seen CaptureSession::look_back(double t_s) {
+  Seen seen{guide_.look_back(t_s), ""};
+  if (seen.look.earlier && seen.look.earlier->picture) act(seen, *seen.look.earlier->picture, t_s, all_exact_);
+  return seen;
+}
+
+void CaptureSession::act(Seen& seen, const cv::Mat& grey, double t_s, bool is_exact) {
+  if (!seen.look.take() || is_paused_) return;
   const std::optional<EarlierPicture>& earlier = seen.look.earlier;
   const std::string reason = earlier ? keep(*earlier->picture, earlier->t_s, all_exact_) : keep(grey, t_s, is_exact);
   if (!reason.empty()) {
@@ -95,7 +106,6 @@ CaptureSession::Seen CaptureSession::see(const cv::Mat& grey, double t_s, bool i
   } else {
     seen.file = kept_.photos().back().file;
   }
-  return seen;
 }
 
 std::string CaptureSession::take(const cv::Mat& grey, double t_s, bool is_exact) { return keep(grey, t_s, is_exact); }

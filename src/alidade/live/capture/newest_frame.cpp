@@ -1,4 +1,4 @@
-#include "alidade/live/newest_frame.h"
+#include "alidade/live/capture/newest_frame.h"
 
 #include <atomic>
 #include <mutex>

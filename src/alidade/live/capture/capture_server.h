@@ -20,6 +20,12 @@ struct SentPicture {
   std::string grey;
 };
 
+/// What a page asks for: "take", "undo" …, with a number where one is needed: what a rangefinder read.
+struct PageCommand {
+  std::string op;
+  std::optional<double> value = {};
+};
+
 /// The picture of a message: u32 'ADY1', u32 width, u32 height, u32 exact, little-endian, then the grey values. None
 /// where the message is something else, or its size is not that of its picture.
 [[nodiscard]] std::optional<SentPicture> sent_picture(std::string_view message);
@@ -51,8 +57,8 @@ class CaptureServer {
 
   /// The newest picture of the page in control that was not given yet; waits for one, not longer than that.
   [[nodiscard]] std::optional<SentPicture> wait_for_picture(std::chrono::milliseconds most);
-  /// What the page in control has asked for since, in order: "take", "undo" …
-  [[nodiscard]] std::vector<std::string> commands();
+  /// What the page in control has asked for since, in order.
+  [[nodiscard]] std::vector<PageCommand> commands();
   /// A message for all pages. `kind`: one of each kind is kept for pages that come later; empty: none.
   void tell(std::string json, const std::string& kind = "");
   /// A JPEG for the pages that do not send pictures themselves.

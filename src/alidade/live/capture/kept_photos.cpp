@@ -1,4 +1,4 @@
-#include "alidade/live/kept_photos.h"
+#include "alidade/live/capture/kept_photos.h"
 
 #include <fmt/format.h>
 

@@ -7,7 +7,7 @@
 
 #include "alidade/calibrate/calibration.h"
 #include "alidade/capture.h"
-#include "alidade/live/kept_photos.h"
+#include "alidade/live/capture/kept_photos.h"
 
 namespace alidade::live {
 
@@ -25,6 +25,8 @@ class CaptureSession {
     std::string file;
   };
   Seen see(const cv::Mat& grey, double t_s, bool is_exact, bool is_again = false);
+  /// Nothing new comes: what was shown before and is to be kept by now is.
+  Seen look_back(double t_s);
   /// Kept because the person says so. Why not, or "".
   std::string take(const cv::Mat& grey, double t_s, bool is_exact);
   bool undo();
@@ -42,6 +44,8 @@ class CaptureSession {
   [[nodiscard]] bool reached_goal(const Progress& progress);
 
  private:
+  /// Keeps what a look says is to be kept.
+  void act(Seen& seen, const cv::Mat& grey, double t_s, bool is_exact);
   void note(const CaptureLook& look, const cv::Mat& grey, double t_s);
   void tell_once(const std::string& line);
   std::string keep(const cv::Mat& grey, double t_s, bool is_exact);

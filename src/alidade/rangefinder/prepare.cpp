@@ -87,7 +87,7 @@ PreparedShot prepared(const Shot& shot, const Camera& camera, const RangefinderC
     ready.spot_ray = unproject(camera, shot.spot->px);
     if (ready.spot_ray) ready.spot_px = shot.spot->px;
     if (!ready.spot_ray) reason = "the lens sees nothing at its spot";
-    if (!is_in_image(camera, shot.spot->px)) {
+    if (!may_be_in_image(camera, shot.spot->px)) {
       ready.spot_px.reset();
       ready.spot_ray.reset();
       reason = "its spot is outside the image";
@@ -158,7 +158,7 @@ double step_of_readings(std::span<const Shot> shots) {
 
 }  // namespace
 
-bool is_in_image(const Camera& camera, const Eigen::Vector2d& px) {
+bool may_be_in_image(const Camera& camera, const Eigen::Vector2d& px) {
   constexpr double edge_px = 1.0;
   if (camera.width_px <= 0 || camera.height_px <= 0) return true;
   return px.minCoeff() > -0.5 - edge_px && px.x() < camera.width_px - 0.5 + edge_px &&

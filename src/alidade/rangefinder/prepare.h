@@ -22,7 +22,7 @@ inline constexpr double guessed_sigma_px = 0.3;
 inline constexpr double guessed_sigma_m = 0.002;
 
 /// Whether the camera could have seen something at a pixel, but for an edge of one.
-[[nodiscard]] bool is_in_image(const Camera& camera, const Eigen::Vector2d& px);
+[[nodiscard]] bool may_be_in_image(const Camera& camera, const Eigen::Vector2d& px);
 
 [[nodiscard]] Preparation prepare_shots(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board,
                                         const Camera& camera, const RangefinderConfig& config);

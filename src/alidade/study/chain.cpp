@@ -11,14 +11,14 @@
 namespace alidade {
 namespace {
 
-constexpr ImageSize photo_size{640, 480};
+constexpr ImageSize chain_photo_size{640, 480};
 constexpr double corner_noise_px = 0.1;
 const Board chain_board{.cols = 9, .rows = 6, .square_m = 0.025};
 
 RigSceneConfig rig_config() {
   RigSceneConfig config;
   for (RigHead head : xiahou_rig()) {
-    head.camera = *example_camera("brown", photo_size.width_px, photo_size.height_px);
+    head.camera = *example_camera("brown", chain_photo_size.width_px, chain_photo_size.height_px);
     config.nominal.push_back(head);
   }
   config.board = chain_board;
@@ -26,7 +26,7 @@ RigSceneConfig rig_config() {
 }
 
 CalibrateReport calibrated(const BoardScene& scene, std::uint64_t seed) {
-  return calibrate(chain_board, simulate_views(scene, corner_noise_px, seed), photo_size, {.model = "brown"});
+  return calibrate(chain_board, simulate_views(scene, corner_noise_px, seed), chain_photo_size, {.model = "brown"});
 }
 
 /// Photos as they are taken who heeds `plan calibrate` for the last four.

@@ -129,7 +129,7 @@ Covered covered_at(double range_m, TargetMotion method, int runs) {
     scene.duration_s = 3.0;
     scene.aiming_lag_s = 0.03;
     scene.sigma_a_m_s2 = 1.0;
-    scene.position = testing::drawn_path({0.2, -0.2, range_m}, 1.0, scene.duration_s, seed);
+    scene.position = drawn_path({0.2, -0.2, range_m}, 1.0, scene.duration_s, seed);
     scene.heads = drawn_heads(rig, draws);
     const auto observations = observations_of(scene, seed);
     FollowConfig config;

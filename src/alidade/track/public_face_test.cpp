@@ -73,7 +73,7 @@ TEST(TrackFace, ALateHeadIsWaitedFor) {
   }
   const TargetTrack too_late = arriving(2.9);
   EXPECT_EQ(too_late.verdict.exit_code, ExitCode::cannot_tell);
-  EXPECT_THAT(too_late.verdict.sentence, testing::HasSubstr("come more than"));
+  EXPECT_THAT(too_late.verdict.sentence, ::testing::HasSubstr("come more than"));
 }
 
 /// What the filter says of each observation as it comes is what the whole says of it, to the last digit.

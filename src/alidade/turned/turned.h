@@ -9,6 +9,8 @@
 
 namespace alidade {
 
+struct ObserveConfig;  // observe.h
+
 struct TurnedConfig {
   bool square_pixels = false;  ///< fx = fy.
   bool fixed_centre = false;   ///< cx, cy: the initial guess's, else the image's centre.

@@ -157,7 +157,7 @@ void add_exchanged(const RangefinderReport& report, const RangefinderConfig& con
 void add_outside(const RangefinderReport& report, std::span<const Shot> shots, Verdict& verdict) {
   int num = 0;
   for (std::size_t i = 0; i < shots.size() && i < report.shots.size(); ++i)
-    num += shots[i].spot && !is_in_image(report.camera, shots[i].spot->px) ? 1 : 0;
+    num += shots[i].spot && !may_be_in_image(report.camera, shots[i].spot->px) ? 1 : 0;
   if (num == 0) return;
   verdict.checks.push_back(check_of("spots outside", State::care,
                                     std::to_string(num) + (num == 1 ? " spot lies" : " spots lie") +

@@ -30,8 +30,8 @@ std::vector<Assumption> assumed_of(const ServoIdentification& identified) {
   std::vector<Assumption> assumed = {{.name = "encoder_scale", .value = 1.0, .sigma = 0.0, .moved = "gain_rad"},
                                      {.name = "clock_rate", .value = 1.0, .sigma = 0.0, .moved = "tau_s"}};
   for (const CountedFlaw& counted : identified.counted) {
-    const bool is_listed = std::ranges::any_of(
-        identified.hidden, [&](const HiddenFlaw& hidden) { return hidden.flaw == counted.flaw; });
+    const bool is_listed =
+        std::ranges::any_of(identified.hidden, [&](const HiddenFlaw& hidden) { return hidden.flaw == counted.flaw; });
     if (is_listed) continue;
     assumed.push_back({.name = servo_flaw_names[counted.flaw],
                        .value = 0.0,

@@ -27,8 +27,8 @@ struct RotationScene {
   Eigen::Vector3d mount_rad =
       Eigen::Vector3d::Zero();  ///< cam_from_mount = Exp(mount): what is measured is the mount's.
   double delay_s = 0.0;         ///< Pixels are of t + delay.
-  double clock_rate = 0.0;      ///< The images' clock over the rotation's, less one: pixels are of t · (1 + it) + delay.
-  double shutter_s = 0.0;       ///< The last row is read so much after the first; the middle one at t + delay.
+  double clock_rate = 0.0;  ///< The images' clock over the rotation's, less one: pixels are of t · (1 + it) + delay.
+  double shutter_s = 0.0;   ///< The last row is read so much after the first; the middle one at t + delay.
 };
 
 struct RotationLogConfig {

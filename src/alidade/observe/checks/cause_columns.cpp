@@ -179,8 +179,7 @@ bool CauseColumns::at(const BundleObservation& seen, RotationPrediction& p, Eige
   const double elapsed = frames[static_cast<std::size_t>(frame_)].t_s - frames.front().t_s;
   const double phase = std::numbers::pi * elapsed / std::max(frames.back().t_s - frames.front().t_s, 1e-9);
   for (int wave = 0; wave < num_waves; ++wave) {
-    by_causes.col(first_zoom_ + wave) =
-        std::cos((wave + 1) * phase) * (p.px - reference_.solution.camera.k.tail<2>());
+    by_causes.col(first_zoom_ + wave) = std::cos((wave + 1) * phase) * (p.px - reference_.solution.camera.k.tail<2>());
   }
   if (first_lever_ >= 0) {
     // A pixel feels a shift v of its ray as the turn ray × v / |ray|².

@@ -21,7 +21,7 @@ struct CauseScore {
                       ///< (BIC): the largest explains best.
   std::vector<CauseMember> members;
   Eigen::MatrixXd information;  ///< Of the members, by these residuals and what errors they share.
-  CommonVector shift;  ///< Of the estimated parameters if it were free, normalised.
+  CommonVector shift;           ///< Of the estimated parameters if it were free, normalised.
 };
 
 struct CauseConfig {

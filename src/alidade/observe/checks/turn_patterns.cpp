@@ -62,8 +62,8 @@ void undo_backlash(Rows rows, Eigen::Index axis, double width) {
 }
 
 /// A value so much later than `now`, by the parabola through three rows.
-Eigen::Vector3d later(const Eigen::Vector3d& before, const Eigen::Vector3d& now, const Eigen::Vector3d& after, double h0,
-                      double h, double late_s) {
+Eigen::Vector3d later(const Eigen::Vector3d& before, const Eigen::Vector3d& now, const Eigen::Vector3d& after,
+                      double h0, double h, double late_s) {
   const Eigen::Vector3d slope0 = (now - before) / h0, slope = (after - now) / h;
   const Eigen::Vector3d rate = (h * slope0 + h0 * slope) / (h0 + h), half_acceleration = (slope - slope0) / (h0 + h);
   return now + late_s * (rate + late_s * half_acceleration);
@@ -85,7 +85,8 @@ void undo_clock_rate(Rows rows, double amount) {
     };
     shift(&RotationRow::pan_tilt_roll_rad);
     shift(&RotationRow::rate_rad_per_s);
-    if (before.base_from_cam.norm() < 0.5 || now.base_from_cam.norm() < 0.5 || after.base_from_cam.norm() < 0.5) continue;
+    if (before.base_from_cam.norm() < 0.5 || now.base_from_cam.norm() < 0.5 || after.base_from_cam.norm() < 0.5)
+      continue;
     const auto turn_to = [&](const RotationRow& row) {
       return Eigen::Vector3d(log_so3((now.base_from_cam.conjugate() * row.base_from_cam).normalized()));
     };

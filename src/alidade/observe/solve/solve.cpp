@@ -115,7 +115,8 @@ void note_rivals(const ObserveSolution& report, const CauseScore& best, std::vec
   constexpr double elsewhere = 3.0;       // σ
   const auto& quantities = report.quantities;
   for (const CauseScore& cause : report.causes) {
-    const bool is_kin = estimate_word_of(cause.name) == estimate_word_of(best.name) || (is_of_lens(cause.name) && is_of_lens(best.name));
+    const bool is_kin = estimate_word_of(cause.name) == estimate_word_of(best.name) ||
+                        (is_of_lens(cause.name) && is_of_lens(best.name));
     if (is_kin || cause.z < asked_beyond(report) || cause.gain < best.gain - about_as_well) continue;
     const double by_px = report.scale.scale * (cause.shift.head<2>() - best.shift.head<2>()).cwiseAbs().maxCoeff();
     if (!(by_px > elsewhere * std::max(quantities[0].sigma_model, quantities[1].sigma_model))) continue;

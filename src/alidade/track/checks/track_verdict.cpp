@@ -268,10 +268,11 @@ std::optional<Check> falling_target(std::span<const TargetObservation> observati
   const TrackReport falls = track_target(some, heads, plain);
   const double gain = ln_p(falls, config.tracker.gate) - as_told;
   if (falls.num_starts == 0 || !(gain > min_gain)) return std::nullopt;
-  return check("falls", State::care,
-               "the target moves as one that falls, or that is quiet and agile in turn: --method imm (ln of the ratio " +
-                   text_of(gain, 2) + ")",
-               gain, min_gain, "1");
+  return check(
+      "falls", State::care,
+      "the target moves as one that falls, or that is quiet and agile in turn: --method imm (ln of the ratio " +
+          text_of(gain, 2) + ")",
+      gain, min_gain, "1");
 }
 
 /// What of the observations as a whole is not as stated.

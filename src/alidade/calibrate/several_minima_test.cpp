@@ -64,30 +64,27 @@ double squares_of(const CalibrateReport& report) {
 
 TEST(SeveralMinima, TheLeastIsStatedAndSigmaReachesToTheOthers) {
   const BoardScene scene = long_lens_scene();
-  constexpr int runs = 60;
-  int worse = 0, with_others = 0, inside_2 = 0, converged = 0, beyond_3 = 0;
+  constexpr int runs = 100;
+  int worse = 0, with_others = 0, inside_2 = 0, converged = 0;
   for (std::uint64_t seed = 1; seed <= runs; ++seed) {
     const std::vector<BoardView> views = simulate_views(scene, noise_px, seed);
     const CalibrateReport report =
         calibrate(small_board, views, testing::sample_size, {.board_shape = BoardShape::flat});
     if (report.status != CalibrateReport::Status::converged) continue;
     ++converged;
-    // In units of χ²: by less than a tenth two minima are one answer.
-    if (squares_of(report) - least_near_the_truth(scene, views) > 0.1 * noise_px * noise_px) ++worse;
+    // By less than one of χ² neither of two minima is the better answer.
+    if (squares_of(report) - least_near_the_truth(scene, views) > noise_px * noise_px) ++worse;
     if (!report.other_lenses.empty()) ++with_others;
     const Eigen::VectorXd error = params(report.camera.lens) - params(scene.camera.lens);
     for (const int at : {0, 1, 2, 3, 5, 6, 7, 8, 9}) {
       const double z = std::abs(error[at]) / std::sqrt(report.camera.cov(at, at));
       inside_2 += z < 2.0 ? 1 : 0;
-      beyond_3 += z > 3.0 ? 1 : 0;
     }
   }
-  RecordProperty("worse", worse);
-  RecordProperty("with_others", with_others);
-  std::printf("converged %d worse %d others %d inside2 %.3f beyond3 %.3f\n", converged, worse, with_others,
-              inside_2 / 9.0 / converged, beyond_3 / 9.0 / converged);
-  EXPECT_EQ(worse, 0);
-  EXPECT_GT(with_others, 3);
+  EXPECT_GE(converged, 95);
+  EXPECT_EQ(worse, 0);  // 5 by the solve that begins at the image's centre alone; up to 9 of χ²
+  EXPECT_GT(with_others, 30);
+  EXPECT_GT(inside_2, 0.90 * 9 * converged);
 }
 
 }  // namespace

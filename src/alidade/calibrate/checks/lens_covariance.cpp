@@ -1,6 +1,7 @@
 #include "alidade/calibrate/checks/lens_covariance.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -35,6 +36,25 @@ void raise(const Eigen::MatrixXd& by, ClusterCovariance& clusters) {
   clusters.cov += by;
 }
 
+/// What corners share with themselves from view to view, less what single corners of single views would.
+Eigen::MatrixXd shared_by_corners(const Eigen::MatrixXd& L, double noise_variance, CornerSteps corners) {
+  const Eigen::LLT<Eigen::MatrixXd> both(corners.by_themselves / noise_variance);
+  if (corners.steps.empty() || both.info() != Eigen::Success) return Eigen::MatrixXd::Zero(L.rows(), L.rows());
+  for (ClusterStep& corner : corners.steps) both.matrixL().solveInPlace(corner.step);
+  const Eigen::MatrixXd to_both = L * Eigen::MatrixXd(both.matrixL());
+  const ClusterCovariance shared = whitened_cluster_covariance(to_both, noise_variance, std::move(corners.steps));
+  return shared.cov - noise_variance * to_both * to_both.transpose();
+}
+
+/// The part of `more` that is above `seen`, by direction: a lens model's misfit shows both ways, and is counted once.
+Eigen::MatrixXd part_above(const Eigen::MatrixXd& more, const Eigen::MatrixXd& seen, const Eigen::MatrixXd& L) {
+  const auto lower = L.triangularView<Eigen::Lower>();
+  const Eigen::MatrixXd half = lower.solve(more - seen);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> above(lower.solve(half.transpose()));
+  const Eigen::MatrixXd to_lens = L * above.eigenvectors();
+  return to_lens * above.eigenvalues().cwiseMax(0.0).asDiagonal() * to_lens.transpose();
+}
+
 /// Adds the spread of the minima about the one that is stated. Returns their weights.
 std::vector<double> count_others(const BundleProblem& problem, double noise_variance, const BundleResult& result,
                                  std::span<const BundleResult> others, ClusterCovariance& clusters) {
@@ -66,9 +86,8 @@ LensCovariance lens_covariance(const BundleProblem& problem, double noise_varian
   if (llt.info() == Eigen::Success) {
     const Eigen::MatrixXd L = llt.matrixL();
     clusters = whitened_cluster_covariance(L, noise_variance, view_steps(problem, result, L));
-    // Two ways: one and the other, less what both count.
-    const ClusterCovariance corners = whitened_cluster_covariance(L, noise_variance, corner_steps(problem, result, L));
-    raise(corners.cov - noise_variance * inverse, clusters);
+    const Eigen::MatrixXd by_corners = shared_by_corners(L, noise_variance, corner_steps(problem, result, L));
+    raise(part_above(by_corners, clusters.cov - noise_variance * inverse, L), clusters);
   } else {
     clusters = cluster_covariance(inverse, noise_variance, {});
   }

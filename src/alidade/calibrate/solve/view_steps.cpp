@@ -148,10 +148,9 @@ std::vector<ClusterStep> view_steps(const BundleProblem& problem, const BundleRe
   return problem.shape == BoardShape::free ? sparse_steps(problem, result, X) : dense_steps(problem, result, X);
 }
 
-std::vector<ClusterStep> corner_steps(const BundleProblem& problem, const BundleResult& result,
-                                      const Eigen::MatrixXd& L) {
-  std::vector<ClusterStep> steps;
-  if (problem.shape == BoardShape::free) return steps;
+CornerSteps corner_steps(const BundleProblem& problem, const BundleResult& result, const Eigen::MatrixXd& L) {
+  CornerSteps found{{}, Eigen::MatrixXd::Zero(L.rows(), L.rows())};
+  if (problem.shape == BoardShape::free) return found;
   constexpr std::size_t enough = 16, of_many = 4;  // by fewer, chance would be raised with the scale below
   const std::size_t num_views = problem.views.size(),
                     count = std::min(num_views, std::max(enough, num_views / of_many));
@@ -175,14 +174,16 @@ std::vector<ClusterStep> corner_steps(const BundleProblem& problem, const Bundle
     Eigen::Matrix<double, 6, Eigen::Dynamic> follows = result.equations->coupling(k).transpose().lazyProduct(X);
     V.solveInPlace(follows);  // the pose does
     const Eigen::MatrixXd pulls = by_lens.topRows(corners) * X - by_pose.topRows(corners) * follows;
+    found.by_themselves.noalias() += pulls.transpose() * pulls;
     for (Index c = 0; c < corners; ++c) scores.row(view.index[static_cast<std::size_t>(c)]) += pulls.row(c);
   }
   // Of an estimate from these views alone: what they share moves it as it moves that of all.
   const double scale = std::sqrt(static_cast<double>(num_views) / static_cast<double>(std::max<std::size_t>(1, count)));
   for (Index point = 0; point < num_points; ++point) {
-    if (scores.row(point).squaredNorm() > 0.0) steps.push_back({scale * scores.row(point).transpose(), {}, {}});
+    if (scores.row(point).squaredNorm() > 0.0) found.steps.push_back({scale * scores.row(point).transpose(), {}, {}});
   }
-  return steps;
+  found.by_themselves *= scale * scale;
+  return found;
 }
 
 }  // namespace alidade

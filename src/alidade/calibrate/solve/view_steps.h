@@ -13,11 +13,15 @@ namespace alidade {
 [[nodiscard]] std::vector<ClusterStep> view_steps(const BundleProblem& problem, const BundleResult& result,
                                                   const Eigen::MatrixXd& L);
 
-/// The other way: what each corner of the board does in all views together. A board that is not as it was taken to be
-/// moves the same corner alike in every photo. Whitened, without shares: those of the board's corners are alike. Of
-/// many views some will do, as what is shared by all of them shows in each. Empty where every point of the board is
-/// free.
-[[nodiscard]] std::vector<ClusterStep> corner_steps(const BundleProblem& problem, const BundleResult& result,
-                                                    const Eigen::MatrixXd& L);
+/// The other way: what each corner of the board does in all views together, and how much of it single corners would.
+struct CornerSteps {
+  std::vector<ClusterStep> steps;  ///< Whitened, without shares: those of the board's corners are alike.
+  Eigen::MatrixXd by_themselves;   ///< Their scatter, were the errors of a corner in two views independent.
+};
+
+/// A board that is not as it was taken to be moves the same corner alike in every photo. Of many views some will do, as
+/// what is shared by all of them shows in each. No steps where every point of the board is free.
+[[nodiscard]] CornerSteps corner_steps(const BundleProblem& problem, const BundleResult& result,
+                                       const Eigen::MatrixXd& L);
 
 }  // namespace alidade

@@ -8,12 +8,13 @@
 namespace alidade {
 namespace {
 
-constexpr int every = 3;          // images: between two of a film hardly anything moves
-constexpr double shrunk = 0.5;    // noise counts half, and a clock's digits are wide enough
-constexpr float min_edge = 8.0f;  // grey values a pixel: an edge
-constexpr int enough_looks = 8;   // of an edge while the scene moved
-constexpr double still_looks = 0.9, moved_edges = 0.6, moved_share = 0.5,
-                 unmoved_share = 0.25;  // pixels, of those halved
+constexpr int every = 3;             // images: between two of a film hardly anything moves
+constexpr double shrunk = 0.5;       // noise counts half, and a clock's digits are wide enough
+constexpr float min_edge = 8.0f;     // grey values a pixel: an edge,
+constexpr float clear_edge = 16.0f;  // and one beside which what does not change stands still
+constexpr int enough_looks = 8;      // of an edge while the scene moved
+constexpr double still_looks = 0.9, moved_edges = 0.6;
+constexpr double moved_share = 0.5, unmoved_share = 0.15;  // of what a move by a pixel of the shrunk image changes
 
 }  // namespace
 
@@ -49,12 +50,15 @@ bool StillParts::add(const cv::Mat& smoothed) {
   cv::Sobel(counts.before, along_v, CV_32F, 0, 1, 3, 0.125);
   cv::magnitude(along_u, along_v, edge);
   const cv::Mat change = cv::abs(now - counts.before), is_edge = edge > min_edge;
-  const cv::Mat has_moved = is_edge & (change > moved_share * edge),
-                is_still = is_edge & (change < unmoved_share * edge);
+  const cv::Mat has_moved = is_edge & (change > moved_share * edge);
   const int num_edges = cv::countNonZero(is_edge);
   if (num_edges == 0 || cv::countNonZero(has_moved) < moved_edges * num_edges) return false;  // the scene stands
   counts.before = now;
-  cv::add(counts.looks, 1, counts.looks, is_edge);
+  // A stroke stands still within, where its own edges are near; they change with what passes behind it.
+  cv::Mat near;
+  cv::dilate(edge, near, cv::getStructuringElement(cv::MORPH_RECT, {3, 3}));
+  const cv::Mat is_near = near > clear_edge, is_still = is_near & (change < unmoved_share * near);
+  cv::add(counts.looks, 1, counts.looks, is_near);
   cv::add(counts.still, 1, counts.still, is_still);
   cv::Mat looks, still, parts;
   counts.looks.convertTo(looks, CV_32F);

@@ -66,7 +66,7 @@ TEST(StillParts, WhatIsBurntInIsMaskedAndTheSceneIsNot) {
     (void)of_both.add(smoothed_for_search(with.images[i]));
   }
   EXPECT_LT(of_scene.still_share(), 0.001);
-  const cv::Mat shown = of_both.shown(4);
+  const cv::Mat shown = of_both.shown(PatchView::half_px + 2);
   ASSERT_EQ(shown.size(), with.images.front().size());
   cv::Mat text(shown.size(), CV_8U, cv::Scalar(0));
   cv::putText(text, "CAM 1 DEPTH 12.4m", {60, 24}, cv::FONT_HERSHEY_SIMPLEX, 0.7, cv::Scalar(255), 2);

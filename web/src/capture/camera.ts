@@ -61,6 +61,7 @@ export class Camera {
     while (!this.isStopped && this.reader) {
       const {value, done} = await this.reader.read().catch(() => ({value: undefined, done: true}));
       if (done || !value) return;
+      if (this.isStopped) return value.close(); // one that was on its way
       this.newest?.close(); // nothing is queued
       this.newest = value;
       this.waiting?.();

@@ -124,13 +124,15 @@ docs: demo
 
 study:
 	@tools/setup build
-	@echo "study: building $(out)/alidade, study_localize, study_causes, study_faults and corner_accuracy"
+	@echo "study: building $(out)/alidade, study_localize, study_shared, study_causes, study_faults and corner_accuracy"
 	@cmake --preset release -DALIDADE_BENCH=ON >/dev/null
-	@ninja -C $(out) $(jobs) study_localize study_causes study_faults corner_accuracy alidade_cli
+	@ninja -C $(out) $(jobs) study_localize study_shared study_causes study_faults corner_accuracy alidade_cli
 	@mkdir -p build/study
 	@tools/studies.py $(out)/alidade build/study
 	@echo "study: halves of real sets, into docs/studies-halves.md"
 	@bench/study_halves.py $(out)/alidade 40 >build/study/halves.md; met=$$?; cp build/study/halves.md docs/studies-halves.md; exit $$met
+	@echo "study: what makes corners share errors, into docs/studies-shared.md"
+	@$(out)/study_shared 800 >build/study/shared.md; met=$$?; cp build/study/shared.md docs/studies-shared.md; exit $$met
 	@echo "study: localisation under water, into docs/studies-localize.md"
 	@$(out)/study_localize 200 20 >build/study/localize.md; met=$$?; cp build/study/localize.md docs/studies-localize.md; exit $$met
 	@echo "study: 200 runs with a head, broken at random instants, into docs/studies-heads.md"

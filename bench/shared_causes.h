@@ -7,7 +7,7 @@
 
 #include "alidade/simulate/boards/board_photos.h"
 
-// What makes the corners of a photo share errors, for study_calibration.
+// What makes the corners of a photo share errors, for study_shared.
 
 namespace alidade {
 

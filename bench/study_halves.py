@@ -120,12 +120,13 @@ def main():
             cells, is_met = halves.row()
             met = met and is_met
             print(f"| {name} | {len(photos)} {cells}", flush=True)
-        print("\n## Parts of few photos\n\nTwo disjoint parts of as many photos, where the set has them.\n")
+        few = max(1, splits // 4)
+        print(f"\n## Parts of few photos\n\nTwo disjoint parts of as many photos, where the set has them; {few} pairs each.\n")
         print_head("photos of a part")
         for name, photos, options in sets():
             for size in (size for size in PARTS if 2 * size <= len(photos)):
                 parts = Compared()
-                for split in range(splits):
+                for split in range(few):
                     parts.add(alidade, photos, size, 1000 + split, options, folder)
                 print(f"| {name} | {size} {parts.row()[0]}", flush=True)
     return 0 if met else 1

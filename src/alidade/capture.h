@@ -108,7 +108,8 @@ class CaptureGuide {
   /// Looks at a picture (8- or 16-bit, grey or colour) of time `t_s`, which does not go back. All have the size of the
   /// first; of another size: Sight::nothing.
   [[nodiscard]] CaptureLook look(const cv::Mat& picture, double t_s);
-  /// Nothing new comes: what of the pictures that were shown is to be taken at that time, as `earlier`; else not useful.
+  /// Nothing new comes: what of the pictures that were shown is to be taken at that time, as `earlier`; else not
+  /// useful.
   [[nodiscard]] CaptureLook look_back(double t_s);
   /// Keeps a picture, whatever it brings, and solves. Why it cannot be kept (no board in it), else "".
   [[nodiscard]] std::string take(const cv::Mat& picture);

@@ -73,7 +73,8 @@ std::vector<Assumption> rangefinder_assumptions(const RangefinderReport& report)
   // With another order, or in a mirrored image, another beam fits spots as well; boards have a left and a right.
   const bool has_boards = std::ranges::any_of(report.shots, [](const ShotFit& fit) { return fit.plane || fit.pose; });
   if (!has_boards && !report.shots.empty())
-    assumed.push_back({.name = "spots are (u, v) of an image that is not mirrored", .value = std::nan(""), .sigma = 0.0});
+    assumed.push_back(
+        {.name = "spots are (u, v) of an image that is not mirrored", .value = std::nan(""), .sigma = 0.0});
   return assumed;
 }
 

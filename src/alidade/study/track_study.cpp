@@ -24,6 +24,8 @@ TrackScene track_scene(const TrackStudy& study) {
 Rig as_exact(Rig rig) {
   const auto num = num_head_params * static_cast<Eigen::Index>(rig.heads.size());
   rig.cov.setZero(num, num);
+  rig.cov_with_lenses.resize(0, 0);
+  rig.encoder_errors.clear();
   for (RigHead& head : rig.heads) {
     const Eigen::Index size = params(head.camera.lens).size();
     head.camera.cov.setZero(size, size);

@@ -129,9 +129,7 @@ class ByNeed {
     const double largest = std::ranges::max_element(best_.causes, {}, &RigCause::sigmas)->sigmas;
     for (const RigCause& cause : best_.causes) {
       const bool is_joint = cause.name.starts_with("all ");  // five of thirty, and the ones that see most
-      static const double L1 = getenv("L1") ? atof(getenv("L1")) : rig_free_limit,
-                          L2 = getenv("L2") ? atof(getenv("L2")) : rig_free_joint_limit;
-      if (cause.sigmas < (is_joint ? L2 : L1)) continue;
+      if (cause.sigmas < (is_joint ? rig_free_joint_limit : rig_free_limit)) continue;
       if (cause.sigmas < near * largest) continue;
       Candidate next = candidate_of(cause, best_.rig);
       const bool is_new = num_of(with(freed_, next)) > num_of(freed_);

@@ -34,8 +34,8 @@ struct RigBoard {
 
 /// Beyond so many σ a cause is asked for: of thirty that are tested, one clean rig in a thousand is above.
 inline constexpr double rig_cause_limit = 4.2;
-/// What is estimated by need costs σ where it was not needed, and no more: one clean rig in seventy.
-inline constexpr double rig_free_limit = 3.5, rig_free_joint_limit = 2.8;
+/// What is estimated by need costs σ where it was not needed, and no more: one clean rig in seven.
+inline constexpr double rig_free_limit = 2.6, rig_free_joint_limit = 2.6;
 
 /// A head that rotated less about an axis is taken not to have rotated about it.
 inline constexpr double min_span_rad = 0.07;

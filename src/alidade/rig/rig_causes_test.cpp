@@ -51,6 +51,10 @@ INSTANTIATE_TEST_SUITE_P(
                       RigFault{"backlash", [](RigTrialSetup& s) { s.noise.backlash_rad = 0.3 * degree; }},
                       RigFault{"focal_small", [](RigTrialSetup& s) { s.mistake.focal = 0.003; }},
                       RigFault{"focal", [](RigTrialSetup& s) { s.mistake.focal = 0.02; }},
+                      RigFault{"focal_stated",
+                               [](RigTrialSetup& s) {
+                                 s.mistake.focal = 0.005, s.sigma_lens_px = 0.3, s.first_lens_only = true;
+                               }},
                       RigFault{"centre_small", [](RigTrialSetup& s) { s.mistake.centre_px = 2.0; }},
                       RigFault{"centre", [](RigTrialSetup& s) { s.mistake.centre_px = 8.0; }},
                       RigFault{"swapped_angles", [](RigTrialSetup& s) { s.mistake.swap_angles = true; }},

@@ -17,7 +17,11 @@ struct RigTrialSetup {
   RigNoise noise = {};
   RigMistake mistake = {};
   bool by_need = true;
-  bool tells_scale = true;  ///< The person takes the encoders' scales for exact.
+  bool tells_scale = true;    ///< The person takes the encoders' scales for exact.
+  double sigma_scale = 1e-9;  ///< Or known to so much.
+  double sigma_lens_px =
+      0.0;  ///< That the files state of focal lengths and centres, which are exact but for the mistake.
+  bool first_lens_only = false;  ///< Only its file is mistaken.
 };
 
 struct RigTrial {
@@ -52,17 +56,19 @@ inline RigTrial rig_trial(const RigTrialSetup& setup, std::uint64_t seed) {
   const RigScene scene = draw_rig_scene(setup.scene, seed);
   std::map<int, Camera> cameras;
   for (const RigHead& rig_head : scene.rig.heads) {
+    const bool is_mistaken = !setup.first_lens_only || cameras.empty();
     Camera& camera = cameras[rig_head.head.id] =
-        mistaken_camera(rig_head.camera, setup.mistake.focal, setup.mistake.centre_px);
+        is_mistaken ? mistaken_camera(rig_head.camera, setup.mistake.focal, setup.mistake.centre_px) : rig_head.camera;
     const Eigen::Index num = params(camera.lens).size();
     camera.cov.setZero(num, num);  // its file says that it is exact
+    camera.cov.diagonal().head<4>().setConstant(setup.sigma_lens_px * setup.sigma_lens_px);
   }
   const std::vector<HeadView> views =
       mistaken_views(simulate_head_views(scene, setup.noise, seed).views, scene, setup.mistake);
   RigConfig config;
   config.board = scene.board;
   config.sigma_square_m = 1e-9;
-  if (setup.tells_scale) config.sigma_scale = 1e-9;
+  if (setup.tells_scale) config.sigma_scale = setup.sigma_scale;
   RigTrial trial;
   const auto calibrated = setup.by_need ? calibrate_rig_by_need : calibrate_rig;
   trial.report = calibrated(views, points_in_board(scene.board), cameras, config, {});
@@ -72,10 +78,8 @@ inline RigTrial rig_trial(const RigTrialSetup& setup, std::uint64_t seed) {
   if (setup.mistake.flip_pan)
     for (RigHead& one : truth.heads) one.head.encoder.pan_scale *= -1.0;
   if (is_solved) trial.worst_sigmas = worst_error_in_sigmas(trial.report.rig, truth);
-  trial.is_seen =
-      trial.verdict.state != State::good || std::ranges::any_of(trial.report.freed, [](const RigFreed& one) {
-        return std::abs(one.value - one.was) > 3.0 * one.sigma;
-      });
+  trial.is_seen = trial.verdict.state != State::good ||
+                  std::ranges::any_of(trial.report.freed, [](const RigFreed& one) { return one.sigmas() > 3.0; });
   return trial;
 }
 

@@ -93,8 +93,7 @@ TEST(ShotFaults, ExchangedColumnsOfSpotsAreNamed) {
   }
 }
 
-/// Distortion that the file gives as exact is estimated, and where it is another that is said: the beam is the true
-/// one.
+/// Distortion that the file gives as exact is estimated with a σ that holds: the beam is the true one.
 TEST(ShotFaults, DistortionGivenWithoutSigmaIsEstimated) {
   RangefinderTrialSetup setup;
   setup.mistake.k1 = 0.05;
@@ -103,7 +102,6 @@ TEST(ShotFaults, DistortionGivenWithoutSigmaIsEstimated) {
     const auto& freed = trial.solved.report.freed_distortion;
     ASSERT_EQ(freed.size(), 4u) << seed;
     EXPECT_NEAR(freed[0].value, 0.0, 4.0 * freed[0].sigma);
-    EXPECT_EQ(trial.solved.verdict.state, State::care);
     EXPECT_LT(trial.worst_sigmas, 4.5) << seed;
   }
 }

@@ -50,7 +50,7 @@ struct ShotCause {
 
 /// Distortion that the camera file gave without σ, and that was estimated from the shots.
 struct FreedDistortion {
-  std::string name;  ///< k1, k2, p1, p2
+  std::string name;  ///< k1, k2
   double was = 0.0, value = 0.0, sigma = 0.0;
 };
 

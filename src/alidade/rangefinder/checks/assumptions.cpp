@@ -15,7 +15,6 @@ double ordinary_error(const FixedQuantity& thing) {
   if (thing.name == "camera.f") return 0.003 * thing.value;
   if (thing.name.starts_with("camera.c")) return 2.0;
   if (thing.name.starts_with("camera.k")) return 0.01;
-  if (thing.name.starts_with("camera.p")) return 0.001;
   if (thing.name == "board.flat_m") return 0.0003;
   return 0.2 * thing.value;  // a σ
 }
@@ -51,9 +50,7 @@ void put_moves(const RangefinderReport& report, const BeamVector& moves, Assumpt
     put_move_of("scale", moves.tail<1>(), std::sqrt(cov(beam_scale_param, beam_scale_param)), assumption);
 }
 
-bool is_of_distortion(const FixedQuantity& thing) {
-  return thing.name.starts_with("camera.k") || thing.name.starts_with("camera.p");
-}
+bool is_of_distortion(const FixedQuantity& thing) { return thing.name.starts_with("camera.k"); }
 
 bool is_of_lengths(const FixedQuantity& thing) { return thing.name == "scale" || thing.name == "square_m"; }
 

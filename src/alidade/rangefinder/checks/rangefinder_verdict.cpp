@@ -352,7 +352,7 @@ Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Sho
     verdict = refusal(State::refused, ExitCode::cannot_tell, reason.what, reason.add + other_method(method, supply));
     for (const Check& check : checks)
       if (check.state == State::care && (check.name == "columns" || check.name == "spots outside"))
-        verdict.to_add = check.text;
+        verdict.to_add += "; " + check.text;
     checks.push_back(check_of(reason.name, State::refused, reason.what, 0.0, 0.0, "", "next"));
   } else if (report.status != Status::converged) {
     verdict = refusal_by_status(report, method, supply);

@@ -7,12 +7,13 @@
 namespace alidade {
 namespace {
 
-/// What boards in shots tell apart, and how far lenses go.
+/// What boards in shots tell apart, and how far lenses go. Not the tangential: it is as a centre that lies aside, and
+/// would take up one that the file has wrong.
 struct Distortion {
   std::string_view name;
   double wide;
 };
-constexpr std::array<Distortion, 4> distortions{{{"k1", 0.3}, {"k2", 0.3}, {"p1", 0.01}, {"p2", 0.01}}};
+constexpr std::array<Distortion, 2> distortions{{{"k1", 0.3}, {"k2", 0.3}}};
 
 bool has_sigma(const Camera& camera, int parameter) {
   return parameter < camera.cov.rows() && camera.cov(parameter, parameter) > 0.0;

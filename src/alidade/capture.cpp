@@ -315,7 +315,9 @@ CaptureLook CaptureGuide::look(const cv::Mat& picture, double t_s) {
 CaptureLook CaptureGuide::look_back(double t_s) {
   CaptureLook look;
   State& state = *state_;
-  if (state.lens && state.took_s) state.recalls(t_s, look);
+  if (!state.lens) return look;
+  if (!state.took_s) state.took_s = t_s;  // a photo was taken since: the wait begins anew
+  state.recalls(t_s, look);
   return look;
 }
 

@@ -69,6 +69,9 @@ class ViewPlanner {
     for (const RigHead& rig_head : now_.rig.heads) work.ids.push_back(rig_head.head.id);
     choose_free(work);
     problem_ = std::move(work.problem);
+    // Which way an axis came is not known of views to come: backlash tells nothing here.
+    for (std::vector<int>& free : problem_.free)
+      std::erase_if(free, [](int param) { return param >= pan_backlash_param; });
     problem_.points_in_board = points_;
     problem_.sigma_px = now_.sigma_px;
     problem_.sigma_encoder_rad = now_.sigma_encoder_rad;

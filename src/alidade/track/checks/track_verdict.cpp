@@ -266,8 +266,10 @@ std::optional<Check> falling_target(std::span<const TargetObservation> observati
   const double as_told = ln_p(track_target(some, heads, plain), config.tracker.gate);
   plain.tracker.method = TargetMotion::imm;
   const TrackReport falls = track_target(some, heads, plain);
-  const double gain = ln_p(falls, config.tracker.gate) - as_told;
-  if (falls.num_starts == 0 || !(gain > min_gain)) return std::nullopt;
+  // Where the noise is larger than stated, so is every logarithm: less by what is left of it (QAIC).
+  const double gain = (ln_p(falls, config.tracker.gate) - as_told) / std::max(1.0, falls.nis_per_dof);
+  // It explains only what then fits: of clutter both reject as much.
+  if (falls.num_starts == 0 || !(gain > min_gain) || used_share(falls) < 1.0 - care_left_out) return std::nullopt;
   return check(
       "falls", State::care,
       "the target moves as one that falls, or that is quiet and agile in turn: --method imm (ln of the ratio " +
@@ -339,6 +341,14 @@ std::string sentence_of(const TrackReport& report, const Verdict& verdict) {
   return sentence;
 }
 
+/// A rig that is wrong also makes a target look as one that falls: what explains more of the likelihood is named first.
+void put_likelier_first(Verdict& verdict) {
+  const auto falls = std::ranges::find(verdict.checks, "falls", &Check::name);
+  const auto rig = std::ranges::find(verdict.checks, "rig", &Check::name);
+  if (falls == verdict.checks.end() || rig == verdict.checks.end() || rig->state == State::good) return;
+  if (0.5 * rig->value * rig->value > falls->value) std::rotate(falls, falls + 1, verdict.checks.end());
+}
+
 }  // namespace
 
 Verdict track_verdict(const TrackReport& report, std::span<const TargetObservation> observations,
@@ -359,6 +369,7 @@ Verdict track_verdict(const TrackReport& report, std::span<const TargetObservati
   if (causes.falls) verdict.checks.push_back(*causes.falls);
   add_checks(report, verdict);
   add_white(report, heads, verdict);
+  put_likelier_first(verdict);
   for (const Check& c : verdict.checks) verdict.state = std::max(verdict.state, c.state);
   if (verdict.state == State::bad) verdict.to_add = "do not use it before the reason is found";
   verdict.sentence = sentence_of(report, verdict);

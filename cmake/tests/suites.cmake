@@ -2,6 +2,7 @@
 # What the tests of a suite share (rendered pictures, a simulated log) is made once, and a fifth of a second of loading
 # saved for each of them. Those with parameters are the long ones: one test each, and first, as alone at the end they
 # would leave cores idle.
+set(none_ran "Running 0 tests from") # a filter that no test passes is no success
 foreach(executable label IN ZIP_LISTS executables labels)
   get_filename_component(name ${executable} NAME)
   if(NOT EXISTS ${executable})
@@ -17,16 +18,19 @@ foreach(executable label IN ZIP_LISTS executables labels)
   set(count 0)
   foreach(line IN LISTS lines ITEMS "end.")
     if(line MATCHES "^  ([^ ]+)")
+      set(one ${CMAKE_MATCH_1}) # the next MATCHES forgets it
       math(EXPR count "${count} + 1")
       if(suite MATCHES "/")
-        add_test(${label}.${suite}.${CMAKE_MATCH_1} ${executable} "--gtest_filter=${suite}.${CMAKE_MATCH_1}")
-        set_tests_properties(${label}.${suite}.${CMAKE_MATCH_1} PROPERTIES LABELS ${label} TIMEOUT ${timeout} COST 100)
+        add_test(${label}.${suite}.${one} ${executable} "--gtest_filter=${suite}.${one}")
+        set_tests_properties(${label}.${suite}.${one} PROPERTIES LABELS ${label} TIMEOUT ${timeout} COST 100
+                             FAIL_REGULAR_EXPRESSION "${none_ran}")
       endif()
     elseif(line MATCHES "^([^ ]+)\\.( |$)")
       set(next ${CMAKE_MATCH_1})
       if(count GREATER 0 AND NOT suite MATCHES "/")
         add_test(${label}.${suite} ${executable} "--gtest_filter=${suite}.*")
-        set_tests_properties(${label}.${suite} PROPERTIES LABELS ${label} TIMEOUT ${timeout} COST ${count})
+        set_tests_properties(${label}.${suite} PROPERTIES LABELS ${label} TIMEOUT ${timeout} COST ${count}
+                             FAIL_REGULAR_EXPRESSION "${none_ran}")
         list(APPEND tests_of_${label} ${label}.${suite})
       endif()
       set(suite ${next})

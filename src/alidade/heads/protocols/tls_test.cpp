@@ -117,7 +117,7 @@ TEST_F(ReversingServer, IsBelievedByItsFingerprintAlone) {
   LineSocket socket(address(), 3.0);
   socket.encrypt({"127.0.0.1", fingerprint});
   socket.connect();
-  for (const std::string text : {std::string("olleh"), std::string(9000, 'a') + "b"}) {
+  for (const std::string& text : {std::string("olleh"), std::string(9000, 'a') + "b"}) {
     socket.write(text + "\n");
     EXPECT_EQ(socket.line(), std::string(text.rbegin(), text.rend()));
   }

@@ -1,4 +1,5 @@
-// Where readings of a rangefinder are in the image and in space, and how surely: 09_project rangefinder.yaml camera.yaml 2.31
+// Where readings of a rangefinder are in the image and in space, and how surely: 09_project rangefinder.yaml
+// camera.yaml 2.31
 #include <alidade/files.h>
 #include <alidade/project.h>
 

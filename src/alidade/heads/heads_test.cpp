@@ -101,7 +101,7 @@ TEST(Heads, NeverSentWhatIsNotFiniteOrOutside) {
   MovingHead moving(head, Eigen::Vector2d(-0.5, -0.5), Eigen::Vector2d(0.5, 0.5), {});
   const double nan = std::nan(""), inf = std::numeric_limits<double>::infinity();
   for (const Eigen::Vector2d& bad : {Eigen::Vector2d(nan, 0.0), Eigen::Vector2d(0.0, nan), Eigen::Vector2d(inf, 0.0),
-                                    Eigen::Vector2d(0.0, -inf), Eigen::Vector2d(0.6, 0.0), Eigen::Vector2d(0.0, -0.6)})
+                                     Eigen::Vector2d(0.0, -inf), Eigen::Vector2d(0.6, 0.0), Eigen::Vector2d(0.0, -0.6)})
     EXPECT_THROW(moving.command(bad), InputError) << bad.transpose();
   EXPECT_EQ(head.commands, 0);
   const std::unique_ptr<HeadDevice> device = open_head("sim://?clock=free");

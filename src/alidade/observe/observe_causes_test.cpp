@@ -34,7 +34,8 @@ struct World {
   RotationSource source = RotationSource::head;
   std::function<void(RotationScene&, RotationLogConfig&, Draws&)> scene = [](auto&, auto&, auto&) {};
   RotationFaults faults;
-  bool tells_scale = false;  ///< The log says that its scale and its centre are exact.
+  std::function<void(RotationLog&)> measured = [](auto&) {};  ///< What else is wrong with it.
+  bool tells_scale = false;                                   ///< The log says that its scale and its centre are exact.
 };
 
 RotationLog log_in(const World& world, std::uint64_t seed) {
@@ -67,6 +68,7 @@ RotationLog log_in(const World& world, std::uint64_t seed) {
   RotationLog log = simulate_rotation(scene, config, seed);
   if (!world.tells_scale) log.sigma_scale = log.sigma_parallax = std::nullopt;
   add_faults(world.faults, image_width, image_height, seed, log);
+  world.measured(log);
   return log;
 }
 
@@ -168,9 +170,23 @@ TEST(ObserveCauses, BiasOfAGyroscopeIsEstimated) {
   expect_estimated(world, "bias_x_rad_per_s");
 }
 
+/// Whoever says that the scale is exact says nothing of what else is a scale: an encoder's curve over part of a turn, a
+/// gyroscope that is not straight. It is counted as it ordinarily is, and where the residuals half ask for it.
+TEST(ObserveCauses, WhatIsAScaleTooIsCountedBesideOneThatIsExact) {
+  ObserveSetup exact = auto_config();
+  exact.sigma_scale = exact.sigma_parallax = 0.0;
+  const World curved = with_faults({.once_a_turn_rad = 0.2 * degree});
+  World bent;
+  bent.source = RotationSource::rate;
+  bent.measured = [](RotationLog& log) {
+    for (RotationRow& row : log.rows) row.rate_rad_per_s *= 1.002;
+  };
+  for (const World& world : {curved, bent}) EXPECT_EQ(outcome_of(world, exact).silent, 0);
+}
+
 /// A thousandth: 5 ms at either end of the log, which no delay undoes.
 TEST(ObserveCauses, AClockAtAnotherRateIsEstimated) {
-  for (const RotationSource source : {RotationSource::head, RotationSource::attitude}) {
+  for (const RotationSource source : {RotationSource::head, RotationSource::rate}) {
     World world = with_scene([](RotationScene& scene, RotationLogConfig&, Draws&) { scene.clock_rate = 1e-3; });
     world.source = source;
     world.tells_scale = true;

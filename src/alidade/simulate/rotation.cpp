@@ -158,7 +158,7 @@ RotationLog simulate_rotation(const RotationScene& scene, const RotationLogConfi
   log.source = config.source;
   log.num_points = scene.start_px.size();
   log.has_roll_rate = config.source == RotationSource::rate;
-  log.sigma_scale = 0.0;
+  if (scene.clock_rate == 0.0) log.sigma_scale = 0.0;
   if (scene.lever_arm_m.isZero(0.0)) log.sigma_parallax = 0.0;
   Turning turning(scene, config, seed);
   const auto num_rows = static_cast<std::size_t>(std::floor(config.duration_s * config.rate_hz + 0.5)) + 1;

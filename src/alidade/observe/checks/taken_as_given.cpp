@@ -12,36 +12,59 @@ constexpr const char* const quantity_names[] = {"fx", "fy", "cx", "cy"};
 
 /// How errors of a cause that nobody told a σ of ordinarily are.
 struct Given {
-  const char* cause;
+  std::string cause;
   double ordinary;
   std::optional<double> ObserveSetup::*told;
   const char* remedy;
   bool is_counted = false;  ///< Where no σ is told: as it ordinarily is, less what the residuals say.
+  double as_scale = 0.0;    ///< σ of the scale of the rotation that one unit of it is, over the angles of a log.
+  double least = 0.0;  ///< No instrument is known better: where less is told, this is what the residuals are asked.
 };
 
 constexpr double ordinary_scale = 0.005, ordinary_mount_rad = 0.5 * degree, ordinary_delay_s = 0.01,
                  ordinary_parallax = 0.002,  // 1 cm at 5 m
-    ordinary_k1 = 0.02, ordinary_centre_px = 2.0;
+    ordinary_k1 = 0.02, ordinary_centre_px = 2.0, ordinary_curve_rad = 0.05 * degree,
+                 ordinary_clock_rate = 0.001;  // 29.97 frames a second taken for 30
+constexpr const char* clock_cause = "clock rate";
+constexpr double bend_of_rates = 0.001;        // a gyroscope's scale differs so much from rate to rate
+const double slope_of_waves = std::sqrt(5.0);  // once and twice a turn, sine and cosine
 
 const std::vector<Given>& givens() {
   static const std::vector<Given> all{
       {"encoder scale", ordinary_scale, &ObserveSetup::sigma_scale, "give --sigma-encoder-scale"},
-      {"scale of the rates", ordinary_scale, &ObserveSetup::sigma_scale, "give --sigma-encoder-scale"},
+      {.cause = "scale of the rates",
+       .ordinary = ordinary_scale,
+       .told = &ObserveSetup::sigma_scale,
+       .remedy = "give --sigma-encoder-scale",
+       .least = bend_of_rates},
       {"lever", ordinary_parallax, &ObserveSetup::sigma_parallax,
        "give --sigma-parallax, or --lever with measured ranges"},
       {"mount", ordinary_mount_rad, nullptr, "--estimate mount", true},
       {"delay", ordinary_delay_s, nullptr, "--estimate delay", true},
-      {"k1", ordinary_k1, &ObserveSetup::sigma_k1, "--estimate k1, or give a camera file with its covariance", true}};
+      {"k1", ordinary_k1, &ObserveSetup::sigma_k1, "--estimate k1, or give a camera file with its covariance", true},
+      {"error of the angles within a turn", ordinary_curve_rad, nullptr, "--estimate curve", true, slope_of_waves},
+      {clock_cause, ordinary_clock_rate, nullptr, "--estimate clock", true, 1.0}};
   return all;
+}
+
+/// A log with its truth whose scale and centre are exact comes from a simulator: so is all that it does not say.
+bool is_exact(const RotationLog& log) {
+  return !log.truth.empty() && log.sigma_scale == 0.0 && log.sigma_parallax == 0.0;
 }
 
 std::optional<double> told_sigma(const Given& given, const RotationLog& log, const ObserveSetup& config) {
   if (given.told != nullptr && config.*given.told) return config.*given.told;
   if (given.told == &ObserveSetup::sigma_scale) return log.sigma_scale;
   if (given.told == &ObserveSetup::sigma_parallax) return log.sigma_parallax;
-  // A log whose scale and centre are exact comes from a simulator: so is all that it does not say.
-  if (log.sigma_scale == 0.0 && log.sigma_parallax == 0.0) return 0.0;
-  return std::nullopt;
+  return is_exact(log) ? std::optional(0.0) : std::nullopt;
+}
+
+/// What there ordinarily is of it beside the scale: of that a σ that is given counts as much already.
+double ordinary_beside_scale(const Given& given, const RotationLog& log, const ObserveSetup& config) {
+  const bool is_scale = given.as_scale > 0.0 && (given.cause != clock_cause || log.source == RotationSource::rate);
+  if (!is_scale) return given.ordinary;
+  const double counted = (config.sigma_scale ? config.sigma_scale : log.sigma_scale).value_or(0.0) / given.as_scale;
+  return std::sqrt(std::max(0.0, given.ordinary * given.ordinary - counted * counted));
 }
 
 std::string full_name(const std::string& cause, const CauseMember& member) {
@@ -83,6 +106,16 @@ void count_ordinary(const CauseScore& cause, double ordinary, CommonMatrix& cov)
   cov.topLeftCorner(n, n) += scatter;
 }
 
+/// What the residuals ask for, but not so that it is freed: the answer may be off by as much.
+void count_asked(const ObserveSolution& report, CommonMatrix& cov) {
+  constexpr double hardly = 3.0;
+  for (const CauseScore& cause : report.causes) {
+    const Eigen::Index n = cause.shift.size();
+    if (cause.z < hardly || cause.z >= asked_beyond(report) || n > cov.rows()) continue;
+    cov.topLeftCorner(n, n) += cause.shift * cause.shift.transpose();
+  }
+}
+
 /// fx and fy follow a centre that is held where it is not.
 void add_held_centre(const ObserveSetup& config, const ObserveSolution& report, const Eigen::Vector4d& sigma,
                      std::vector<Assumption>& assumed) {
@@ -120,12 +153,15 @@ std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveSetu
     if (cause == report.causes.end()) continue;
     std::optional<double> sigma = told_sigma(given, log, config);
     const bool is_counted = !sigma && given.is_counted && !cause->members.empty();
-    if (is_counted) count_ordinary(*cause, given.ordinary, cov);
+    const double ordinary = ordinary_beside_scale(given, log, config);
+    if (is_counted && ordinary > 0.0) count_ordinary(*cause, ordinary, cov);
+    if (sigma && *sigma < given.least && !is_exact(log))
+      count_ordinary(*cause, std::sqrt(given.least * given.least - *sigma * *sigma), cov);
     for (std::size_t i = first_member(cause->name); i < end_member(*cause); ++i) {
       const CauseMember& member = cause->members[i];
       Assumption assumption{.name = full_name(cause->name, member), .sigma = sigma, .remedy = given.remedy};
-      if (is_counted) assumption.sigma = given.ordinary;
-      if (!sigma) assumption.ordinary = member.sigma > 0.0 ? std::min(given.ordinary, member.sigma) : given.ordinary;
+      if (is_counted) assumption.sigma = ordinary;
+      if (!sigma) assumption.ordinary = member.sigma > 0.0 ? std::min(ordinary, member.sigma) : ordinary;
       const double error = sigma ? *sigma : assumption.ordinary;
       if (sigma && member.moves.size() <= cov.rows()) {
         const auto n = member.moves.size();
@@ -135,6 +171,7 @@ std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveSetu
       assumed.push_back(assumption);
     }
   }
+  count_asked(report, cov);
   const Eigen::Vector4d stated = cov.diagonal().head<4>().cwiseSqrt();
   for (const Effect& effect : effects) {
     fill_effect(effect.move, stated, report.scale.scale, assumed[effect.assumption]);

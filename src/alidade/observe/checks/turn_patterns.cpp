@@ -70,8 +70,10 @@ Eigen::Vector3d later(const Eigen::Vector3d& before, const Eigen::Vector3d& now,
 }
 
 /// The clock that the rotation is read by goes at another rate than the images': of a row's rotation the one that was
-/// measured so much later for each second since the middle of the log. The first and the last row keep theirs.
+/// measured so much later for each second since the middle of the log, and of rates as much more: a turn is what its
+/// time makes of it. The first and the last row keep their time.
 void undo_clock_rate(Rows rows, double amount) {
+  for (RotationRow& row : rows) row.rate_rad_per_s *= 1.0 + amount;
   if (rows.size() < 3) return;
   const std::vector<RotationRow> as_read(rows.begin(), rows.end());
   const double middle_s = 0.5 * (as_read.front().t_s + as_read.back().t_s);

@@ -25,11 +25,15 @@ struct RigConfig {
   bool estimate_by_need = true;
   std::optional<double> sigma_square_m = {};  ///< Of the board's squares; none: not known.
   std::optional<double> sigma_scale = {};     ///< Of the encoders' scales where they are fixed; none: not known.
-  bool estimate_skew = true;                  ///< Of the axes from being square to each other.
+  /// Of an encoder's error within a turn, by which its scale over a part of the turn is another: counted beside
+  /// sigma_scale. 0: there is none.
+  double sigma_within_turn_rad = 5e-4;
+  bool estimate_skew = true;  ///< Of the axes from being square to each other.
   bool reject_outliers = true;
 };
 
-/// The fields of `config` that a person sets: sigma_px, sigma_angle_rad, sigma_square_m, sigma_scale, estimate, scales,
+/// The fields of `config` that a person sets: sigma_px, sigma_angle_rad, sigma_square_m, sigma_scale,
+/// sigma_within_turn_rad, estimate, scales,
 /// outliers. The board has fields of its own.
 [[nodiscard]] FieldList fields_of(RigConfig& config);
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "alidade/geometry/degree.h"
+#include "alidade/rig/rig_given.h"
 #include "alidade/rig/rig_work.h"
 
 namespace alidade {
@@ -191,7 +192,7 @@ class ByNeed {
       freed.value = is_scale ? (param == pan_scale_param ? encoder.pan_scale : encoder.tilt_scale)
                              : std::array{encoder.pan_cos_rad, encoder.pan_sin_rad, encoder.tilt_cos_rad,
                                           encoder.tilt_sin_rad}[static_cast<std::size_t>(param - pan_cos_param)];
-      if (is_scale) freed.was_sigma = config_.sigma_scale.value_or(0.0);
+      if (is_scale) freed.was_sigma = counted_sigma_scale(config_).value_or(0.0);
       freed.was = is_scale ? std::copysign(1.0, freed.value) : 0.0;  // which way it counts is found, not asked for
     } else if (param >= pan_backlash_param) {
       const int axis = param - pan_backlash_param;

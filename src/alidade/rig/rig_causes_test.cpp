@@ -42,25 +42,26 @@ TEST_P(RigFaults, AreNeverSilent) {
 // Of each a size that is hardly seen, and one that is plain.
 INSTANTIATE_TEST_SUITE_P(
     All, RigFaults,
-    ::testing::Values(RigFault{"scale_small", [](RigTrialSetup& s) { s.scene.encoder_scale = 1.001; }},
-                      RigFault{"scale", [](RigTrialSetup& s) { s.scene.encoder_scale = 1.01; }},
-                      RigFault{"once_small", [](RigTrialSetup& s) { s.scene.once_rad = 0.3 * degree; }},
-                      RigFault{"once", [](RigTrialSetup& s) { s.scene.once_rad = 3.0 * degree; }},
-                      RigFault{"twice", [](RigTrialSetup& s) { s.noise.twice_rad = 0.3 * degree; }},
-                      RigFault{"backlash_small", [](RigTrialSetup& s) { s.noise.backlash_rad = 0.05 * degree; }},
-                      RigFault{"backlash", [](RigTrialSetup& s) { s.noise.backlash_rad = 0.3 * degree; }},
-                      RigFault{"focal_small", [](RigTrialSetup& s) { s.mistake.focal = 0.003; }},
-                      RigFault{"focal", [](RigTrialSetup& s) { s.mistake.focal = 0.02; }},
-                      RigFault{"focal_stated",
-                               [](RigTrialSetup& s) {
-                                 s.mistake.focal = 0.005, s.sigma_lens_px = 0.3, s.first_lens_only = true;
-                               }},
-                      RigFault{"centre_small", [](RigTrialSetup& s) { s.mistake.centre_px = 2.0; }},
-                      RigFault{"centre", [](RigTrialSetup& s) { s.mistake.centre_px = 8.0; }},
-                      RigFault{"swapped_angles", [](RigTrialSetup& s) { s.mistake.swap_angles = true; }},
-                      RigFault{"flipped_pan", [](RigTrialSetup& s) { s.mistake.flip_pan = true; }},
-                      RigFault{"mirrored", [](RigTrialSetup& s) { s.mistake.mirror = true; }},
-                      RigFault{"shifted_rows", [](RigTrialSetup& s) { s.mistake.shift_rows = true; }}),
+    ::testing::Values(
+        RigFault{"scale_small", [](RigTrialSetup& s) { s.scene.encoder_scale = 1.001; }},
+        RigFault{"scale", [](RigTrialSetup& s) { s.scene.encoder_scale = 1.01; }},
+        RigFault{"scale_of_one",
+                 [](RigTrialSetup& s) { s.scene.encoder_scale = 1.005, s.scene.first_encoder_only = true; }},
+        RigFault{"once_small", [](RigTrialSetup& s) { s.scene.once_rad = 0.3 * degree; }},
+        RigFault{"once", [](RigTrialSetup& s) { s.scene.once_rad = 3.0 * degree; }},
+        RigFault{"twice", [](RigTrialSetup& s) { s.noise.twice_rad = 0.3 * degree; }},
+        RigFault{"backlash_small", [](RigTrialSetup& s) { s.noise.backlash_rad = 0.05 * degree; }},
+        RigFault{"backlash", [](RigTrialSetup& s) { s.noise.backlash_rad = 0.3 * degree; }},
+        RigFault{"focal_small", [](RigTrialSetup& s) { s.mistake.focal = 0.003; }},
+        RigFault{"focal", [](RigTrialSetup& s) { s.mistake.focal = 0.02; }},
+        RigFault{"focal_stated",
+                 [](RigTrialSetup& s) { s.mistake.focal = 0.005, s.sigma_lens_px = 0.3, s.first_lens_only = true; }},
+        RigFault{"centre_small", [](RigTrialSetup& s) { s.mistake.centre_px = 2.0; }},
+        RigFault{"centre", [](RigTrialSetup& s) { s.mistake.centre_px = 8.0; }},
+        RigFault{"swapped_angles", [](RigTrialSetup& s) { s.mistake.swap_angles = true; }},
+        RigFault{"flipped_pan", [](RigTrialSetup& s) { s.mistake.flip_pan = true; }},
+        RigFault{"mirrored", [](RigTrialSetup& s) { s.mistake.mirror = true; }},
+        RigFault{"shifted_rows", [](RigTrialSetup& s) { s.mistake.shift_rows = true; }}),
     [](const auto& info) { return std::string(info.param.name); });
 
 const RigFreed* freed_named(const RigTrial& trial, const std::string& name) {

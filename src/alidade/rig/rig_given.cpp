@@ -174,6 +174,7 @@ struct Filler {
   }
 
   void add_scales(const std::vector<RigHead>& heads, const RigConfig& config, const Follows& follows) {
+    const std::optional<double> sigma = counted_sigma_scale(config);
     for (std::size_t h = 0; h < heads.size(); ++h) {
       for (const int axis : {0, 1}) {
         const int param = axis == 0 ? pan_scale_param : tilt_scale_param;
@@ -184,17 +185,23 @@ struct Filler {
         const Encoder& encoder = heads[h].head.encoder;
         add({.name = "head" + std::to_string(heads[h].head.id) + (axis == 0 ? ".pan_scale" : ".tilt_scale"),
              .value = axis == 0 ? encoder.pan_scale : encoder.tilt_scale,
-             .sigma = config.sigma_scale,
+             .sigma = sigma,
              .ordinary = ordinary_scale,
              .remedy = "give --sigma-scale, or --scales to have the encoders' scales estimated"},
             step);
-        if (config.sigma_scale) given.cov += std::pow(*config.sigma_scale, 2) * step * step.transpose();
+        if (sigma) given.cov += std::pow(*sigma, 2) * step * step.transpose();
       }
     }
   }
 };
 
 }  // namespace
+
+std::optional<double> counted_sigma_scale(const RigConfig& config) {
+  if (!config.sigma_scale) return std::nullopt;
+  const double slope_of_waves = std::sqrt(5.0);  // once and twice a turn, sine and cosine
+  return std::hypot(*config.sigma_scale, slope_of_waves * config.sigma_within_turn_rad);
+}
 
 GivenColumns given_columns(const RigProblem& problem, const RigState& state, std::size_t v) {
   const RigView& which = problem.views[v];

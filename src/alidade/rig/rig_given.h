@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "alidade/estimation/verdict.h"
@@ -31,6 +32,9 @@ struct RigGiven {
 /// `cov`: of the free parameters of the problem by the model. Heads whose cameras are one file share its errors.
 [[nodiscard]] RigGiven rig_given(const RigProblem& problem, const SolvedRig& solved, const Eigen::MatrixXd& cov,
                                  const std::vector<double>& weights, const RigConfig& config);
+
+/// σ of a scale that is held, with what an encoder's error within a turn makes of it; none: none was given.
+[[nodiscard]] std::optional<double> counted_sigma_scale(const RigConfig& config);
 
 /// The free parameters' covariance where the wide ones' stands.
 [[nodiscard]] Eigen::MatrixXd widened(const RigProblem& problem, const RigProblem& wide, const Eigen::MatrixXd& cov);

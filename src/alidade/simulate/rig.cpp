@@ -26,8 +26,10 @@ RigHead drawn_head(const RigHead& nominal, const RigSceneConfig& config, bool is
   head.pan_to_tilt_m += Eigen::Vector3d(0.0, 0.0, config.offset_sigma_m * draws.normal());
   head.tilt_to_cam_m += config.offset_sigma_m * draws.normal3();
   head.axes_skew_rad += config.skew_sigma_rad * draws.normal();
-  head.encoder.pan_scale *= config.encoder_scale;
-  head.encoder.tilt_scale *= config.encoder_scale;
+  if (is_first || !config.first_encoder_only) {
+    head.encoder.pan_scale *= config.encoder_scale;
+    head.encoder.tilt_scale *= config.encoder_scale;
+  }
   if (config.once_rad != 0.0) {
     const double pan = draws.uniform(0.0, 2.0 * std::numbers::pi), tilt = draws.uniform(0.0, 2.0 * std::numbers::pi);
     head.encoder.pan_cos_rad = config.once_rad * std::cos(pan);

@@ -31,9 +31,10 @@ struct RigSceneConfig {
   int max_views_of_a_board = 4;  ///< By one head, spread over those that see it whole.
   double mounting_sigma_rad = 0.04, offset_sigma_m = 0.02, base_sigma_rad = 0.05, base_sigma_m = 0.03;
   double skew_sigma_rad = 0.01;
-  double encoder_scale = 1.0;  ///< Radians of each axis of each head for each radian read.
-  double once_rad = 0.0;       ///< Amplitude of an error of one period a turn of each axis, its phase drawn.
-  bool shared = true;          ///< Each board is seen by all heads.
+  double encoder_scale = 1.0;       ///< Radians of each axis of each head for each radian read.
+  bool first_encoder_only = false;  ///< That scale is the first head's alone; the others' are 1.
+  double once_rad = 0.0;            ///< Amplitude of an error of one period a turn of each axis, its phase drawn.
+  bool shared = true;               ///< Each board is seen by all heads.
 };
 
 /// Draws heads and boards. Boards that some head does not see at two pairs of angles are drawn again. Same seed, same

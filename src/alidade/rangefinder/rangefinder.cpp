@@ -177,6 +177,18 @@ void carry_surprise(RangefinderReport& report) {
   }
 }
 
+/// What the shots half ask for, and what they say of a length that was given: the answer may be off by as much.
+void carry_asked(RangefinderReport& report) {
+  constexpr double hardly = 2.0;
+  for (const ShotCause& cause : report.causes)
+    if (cause.sigmas > hardly) report.beam.cov += cause.moves * cause.moves.transpose();
+  for (const FixedQuantity& thing : report.fixed) {
+    if (thing.name != "scale" || !thing.sigma) continue;
+    const double beyond = std::hypot(*thing.sigma, thing.asked_sigma), z = std::abs(thing.asked) / beyond;
+    if (z > hardly) report.beam.cov += thing.asked * thing.asked * thing.moves * thing.moves.transpose();
+  }
+}
+
 /// The inverse of an information whose diagonal spans many powers of ten.
 Eigen::MatrixXd inverse_of_scaled(const Eigen::MatrixXd& information) {
   const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
@@ -296,6 +308,7 @@ void put_uncertainty(const BeamProblem& problem, const LensPrior& prior, const C
   if (config.refine == Refine::beam) carry_lens(problem, camera, report);
   carry_told(report);
   if (config.refine == Refine::all) carry_surprise(report);
+  carry_asked(report);
 }
 
 void solve_report(Preparation& ready, const BeamFit& fit, const Camera& camera, const RangefinderConfig& config,

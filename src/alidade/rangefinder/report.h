@@ -45,7 +45,8 @@ struct ShotCause {
       name;  ///< drift: of the readings over the rows; bend: over their range; wander: of the spots over the rows
   double size = 0.0;  ///< From the first row to the last; of bend, at the ends of the span.
   std::string unit;
-  double sigmas = 0.0;  ///< By how many σ the residuals ask for it.
+  double sigmas = 0.0;                    ///< By how many σ the residuals ask for it.
+  BeamVector moves = BeamVector::Zero();  ///< Of the beam, were it of that size.
 };
 
 /// Distortion that the camera file gave without σ, and that was estimated from the shots.

@@ -53,6 +53,8 @@ INSTANTIATE_TEST_SUITE_P(
         ShotFault{"distortion_small", [](RangefinderTrialSetup& s) { s.mistake.k1 = 0.01; }},
         ShotFault{"distortion", [](RangefinderTrialSetup& s) { s.mistake.k1 = 0.05; }},
         ShotFault{"drift_small", [](RangefinderTrialSetup& s) { s.mistake.drift_m = 0.005, s.tells_lengths = true; }},
+        ShotFault{"drift_of_a_centimetre",
+                  [](RangefinderTrialSetup& s) { s.mistake.drift_m = 0.01, s.tells_lengths = true; }},
         ShotFault{"drift", [](RangefinderTrialSetup& s) { s.mistake.drift_m = 0.02, s.tells_lengths = true; }},
         ShotFault{"bend", [](RangefinderTrialSetup& s) { s.mistake.bend_m = 0.005, s.tells_lengths = true; }, false},
         ShotFault{"wander", [](RangefinderTrialSetup& s) { s.mistake.wander_px = 3.0; }},

@@ -65,7 +65,12 @@ std::optional<ShotCause> tested(const std::string& name, const std::string& unit
   if (!(I.diagonal().array() > 1e-3 * alone.array()).all() || !s.allFinite()) return std::nullopt;
   const VectorXd size = -Ldlt(I).solve(s);
   const double chi2 = -size.dot(s);
-  return ShotCause{name, size.norm(), unit, score_sigmas(chi2, static_cast<double>(num), num_estimated)};
+  ShotCause cause{name, size.norm(), unit, score_sigmas(chi2, static_cast<double>(num), num_estimated)};
+  const VectorXd step = -part.inverse * across.transpose() * size;
+  const Index num_beam =
+      std::count_if(part.places.begin(), part.places.end(), [](Index place) { return place < num_beam_params; });
+  cause.moves.head(num_beam) = step.head(num_beam);
+  return cause;
 }
 
 }  // namespace

@@ -1,12 +1,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <functional>
 
 #include "alidade/geometry/degree.h"
 #include "alidade/observe/solve/solve.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/rotation.h"
+#include "alidade/testing/trials.h"
 
 // What is not as assumed is estimated where the data carry it. Nothing wrong is ever silent.
 // ALIDADE_TEST_TRIALS=20 draws as many logs of each cause.
@@ -17,10 +19,7 @@ namespace causes_of_observe {
 constexpr int image_width = 1280, image_height = 720;
 
 /// Draws of each cause: 3, or as many as ALIDADE_TEST_TRIALS says.
-const int sets = [] {
-  const char* const wanted = std::getenv("ALIDADE_TEST_TRIALS");
-  return wanted != nullptr ? std::max(1, std::atoi(wanted)) : 3;
-}();
+const int sets = testing::trials(3);
 
 /// All but one in ten.
 int nearly_all() { return sets - sets / 10; }
@@ -319,11 +318,12 @@ TEST(ObserveCauses, AMisreadHeadIsNamed) {
       {{.signs = {1.0, -1.0}}, "tilt"},
       {{.swaps_axes = true}, "exchanged"}};
   for (const auto& [faults, word] : misread) {
-    const Outcome outcome = outcome_of(with_faults(faults), auto_config());
+    const int draws = testing::trials(1);  // each is held against all other readings: seconds
+    const Outcome outcome = outcome_of(with_faults(faults), auto_config(), "", draws);
     EXPECT_EQ(outcome.good, 0) << word;
     int named = 0;
     for (const std::string& words : outcome.words) named += words.find(word) != std::string::npos;
-    EXPECT_GE(named, nearly_all()) << word;
+    EXPECT_GE(named, draws - draws / 10) << word;
   }
 }
 

@@ -1,12 +1,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <functional>
 
 #include "alidade/geometry/degree.h"
 #include "alidade/observe/solve/solve.h"
 #include "alidade/simulate/draws.h"
 #include "alidade/simulate/rotation.h"
+#include "alidade/testing/trials.h"
 
 // Does σ hold, where the model is true and where errors are shared; and is a cause that nobody modelled ever silent?
 
@@ -251,8 +253,8 @@ const std::vector<Cause>& causes() {
 TEST(ObserveSigma, NoCauseIsSilent) {
   for (const Cause& cause : causes()) {
     int silent = 0, named = 0;
-    constexpr int sets = 20;
-    for (std::uint64_t seed = 1; seed <= sets; ++seed) {
+    const int sets = testing::trials(4);
+    for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(sets); ++seed) {
       Scenario scenario;
       scenario.num_points = 10;
       scenario.scene = cause.scene;

@@ -1,8 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-
 #include "alidade/testing/rangefinder_sample.h"
+#include "alidade/testing/trials.h"
 
 // Does the stated σ hold: simulated logs, as the model says, and with errors that the measurements of a shot share.
 // ALIDADE_TEST_TRIALS=1000 draws as many logs of each kind.
@@ -13,10 +12,7 @@ namespace {
 using namespace testing;
 using SigmaMethod = RangefinderMethod;
 
-int num_trials() {
-  const char* const wanted = std::getenv("ALIDADE_TEST_TRIALS");
-  return wanted != nullptr ? std::atoi(wanted) : 150;
-}
+int num_trials() { return trials(150); }
 
 /// What of the world is not as the model says.
 struct Deviation {

@@ -1,10 +1,11 @@
 #include <gtest/gtest.h>
 
-#include <cstdlib>
+#include <algorithm>
 #include <functional>
 
 #include "alidade/geometry/degree.h"
 #include "alidade/testing/rig_trial.h"
+#include "alidade/testing/trials.h"
 
 // What may be wrong with a rig, each alone: never a good verdict over an error above 5σ, and what can be told apart is
 // estimated. ALIDADE_TEST_TRIALS=20 draws as many rigs of each kind; bench/study_causes.cpp: of which size each is
@@ -17,10 +18,7 @@ using testing::rig_trial;
 using testing::RigTrial;
 using testing::RigTrialSetup;
 
-int num_rigs() {
-  const char* const wanted = std::getenv("ALIDADE_TEST_TRIALS");
-  return wanted != nullptr ? std::min(100, std::atoi(wanted)) : 4;
-}
+int num_rigs() { return std::min(100, testing::trials(4)); }
 
 struct RigFault {
   const char* name;

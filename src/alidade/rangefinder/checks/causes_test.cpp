@@ -3,6 +3,7 @@
 #include <functional>
 
 #include "alidade/testing/rangefinder_trial.h"
+#include "alidade/testing/trials.h"
 
 // What may be wrong with shots, each alone: never a good verdict over an error above 5σ. bench/study_causes.cpp: of
 // which size each is seen.
@@ -23,7 +24,7 @@ struct ShotFault {
 class ShotFaults : public ::testing::TestWithParam<ShotFault> {};
 
 TEST_P(ShotFaults, AreNeverSilent) {
-  constexpr int num_logs = 20;
+  const int num_logs = testing::trials(5);
   for (const auto method : {RangefinderMethod::joint, RangefinderMethod::plane, RangefinderMethod::spot}) {
     if (method == RangefinderMethod::spot && !GetParam().spots_tell) continue;
     for (int draw = 1; draw <= num_logs; ++draw) {

@@ -30,9 +30,11 @@ void add_checks(std::span<const ServoSample> log, const ServoIdentification& ide
                 : "residuals have structure (correlation " + text_of(correlation) +
                       " from row to row): the servo does more than the model; σ counts that rows share errors",
        correlation, limit, "1", ""});
-  verdict.checks.push_back(clusters_agree(identified.clusters, "block",
-                                          std::to_string(identified.correlated_rows) + " rows in a row share an error",
-                                          "response"));
+  ClusterCovariance clusters = identified.clusters;
+  // Where it was before the log is seen in its first rows alone: one block, whose own scatter says nothing of others.
+  if (clusters.inflation.size() > ServoParam::start) clusters.inflation[ServoParam::start] = 1.0;
+  verdict.checks.push_back(clusters_agree(
+      clusters, "block", std::to_string(identified.correlated_rows) + " rows in a row share an error", "response"));
   const double step_s = identified.duration_s / (rows - 1.0);
   const bool is_resolved = fit.params[1] > 0.5 * step_s;
   verdict.checks.push_back({"sampling", is_resolved ? State::good : State::care,

@@ -21,6 +21,9 @@ struct LevenbergConfig {
   double first_damping = 1e-6;
   double tolerance = 1e-12;  ///< Converged where a step lowers the squares by less than this share.
   double ridge = 0.0;        ///< Added to the diagonal of the normal equations, as a share of its largest.
+  /// Where steps are used up it has converged, too, if the last ones together moved it by less than a hundredth of σ:
+  /// about a kink (a latency at which a command meets a row) steps get shorter without end.
+  static constexpr int last_steps = 10;
 };
 struct LevenbergOutcome {
   double sum2 = 0.0;
@@ -36,8 +39,9 @@ LevenbergOutcome levenberg(const LevenbergConfig& config, State& state, const Mi
   Eigen::VectorXd misfit = misfit_at(state);
   auto J = jacobian_at(state);
   LevenbergOutcome outcome{misfit.squaredNorm(), false};
-  double damping = config.first_damping;
+  double damping = config.first_damping, before2 = outcome.sum2;
   for (int i = 0; i < config.max_steps && !outcome.has_converged; ++i) {
+    if (i == config.max_steps - LevenbergConfig::last_steps) before2 = outcome.sum2;
     auto JtJ = (J.transpose() * J).eval();
     JtJ.diagonal() *= 1.0 + damping;
     if (config.ridge > 0.0) JtJ.diagonal().array() += config.ridge * JtJ.diagonal().maxCoeff() + 1e-300;
@@ -56,6 +60,8 @@ LevenbergOutcome levenberg(const LevenbergConfig& config, State& state, const Mi
     damping = std::max(1e-9, 0.1 * damping);
     if (!outcome.has_converged) J = jacobian_at(state);
   }
+  const double still2 = 1e-4 * outcome.sum2 / std::max(1.0, static_cast<double>(misfit.size()));
+  outcome.has_converged |= config.max_steps >= LevenbergConfig::last_steps && before2 - outcome.sum2 <= still2;
   return outcome;
 }
 

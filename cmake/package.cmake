@@ -17,9 +17,6 @@ target_link_libraries(alidade_shared PUBLIC Eigen3::Eigen
 if(TARGET pugixml::pugixml)
   target_link_libraries(alidade_shared PRIVATE pugixml::pugixml)
 endif()
-if(OpenSSL_FOUND)
-  target_link_libraries(alidade_shared PRIVATE OpenSSL::SSL)
-endif()
 add_library(alidade::alidade ALIAS alidade_shared)
 
 if(NOT ALIDADE_INSTALL)

@@ -8,7 +8,7 @@ class App;
 
 namespace alidade::cli {
 
-/// A board of which nothing has been told yet.
+/// A board of which nothing has been given yet.
 [[nodiscard]] Board no_board();
 
 [[nodiscard]] inline bool is_given(const Board& board) { return board.cols > 0 || board.square_m > 0.0; }

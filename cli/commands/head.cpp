@@ -189,7 +189,7 @@ std::optional<RotationLog> log_to_resume(const std::string& folder, Run& run) {
   return read_rotation_log(file).log;
 }
 
-/// What counts become angles by, where nobody told it, goes with every answer: all angles, and focal lengths with them,
+/// What counts become angles by, where nobody gave it, goes with every answer: all angles, and focal lengths with them,
 /// are in its proportion.
 void say_assumed(const HeadLimits& limits, JobOutcome& outcome) {
   if (limits.assumed.empty()) return;

@@ -91,7 +91,7 @@ TEST_F(RigCommand, SaysWhatItAssumedAndHeedsIt) {
   for (const Json& what : told["assumed"]) EXPECT_FALSE(what["sigma"].is_null()) << what["name"];
 }
 
-/// Where nobody told the encoders' scales they are estimated; what else the residuals ask for is named, and kept in
+/// Where nobody gave the encoders' scales they are estimated; what else the residuals ask for is named, and kept in
 /// rig.yaml.
 TEST_F(RigCommand, EstimatesWhatIsAskedFor) {
   simulate({"--scale", "1.01", "--once-deg", "3"});

@@ -240,7 +240,7 @@ ExitCode simulate_rotation_log(const SimulateRotationArgs& args, Run& run) {
   return run.finish(verdict);
 }
 
-/// What a log may have that nobody told.
+/// What a log may have that is not given.
 void add_fault_options(CLI::App& command, SimulateRotationArgs& args) {
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
     command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();

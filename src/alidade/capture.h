@@ -40,7 +40,7 @@ struct CaptureConfig {
 /// What a picture shows, and what it would bring.
 enum class Sight {
   nothing,      ///< No board.
-  other_board,  ///< A chessboard of another size than was told.
+  other_board,  ///< A chessboard of another size than was given.
   moving,       ///< The board has not stood still yet.
   blurred,      ///< Of the sharpest so far.
   same_pose,    ///< Held as in a photo that is kept already: its errors would be the same.

@@ -19,7 +19,7 @@ bool has_markers(const Board& board) { return board.kind == BoardKind::charuco |
 using Sizes = std::vector<std::pair<int, int>>;
 
 /// Columns and rows of the usual slips. A chessboard is the same one turned by a quarter: of two that are equally near
-/// to what was told the wide one comes first.
+/// to what was given the wide one comes first.
 Sizes slips(const Board& told) {
   const int c = told.cols, r = told.rows;
   const Sizes all{{c, r},     {c - 1, r - 1}, {c + 1, r + 1}, {r, c},         {c, r - 1},     {c + 1, r},

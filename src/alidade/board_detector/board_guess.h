@@ -11,7 +11,7 @@
 
 namespace alidade {
 
-/// The board that photos show where they do not show the one that was told: squares counted for inner corners or the
+/// The board that photos show where they do not show the one that was given: squares counted for inner corners or the
 /// other way round, columns and rows swapped or off by one, another dictionary of markers, a plain chessboard for one
 /// with markers or the other way round. Tried on a few of the photos. `grids_seen`, where known: the
 /// sizes of the chessboard grids in them; no other is then tried for a plain chessboard. None where none of these

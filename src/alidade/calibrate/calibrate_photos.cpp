@@ -107,7 +107,7 @@ std::optional<std::vector<std::pair<int, int>>> grids_seen(const Board& told, co
   return seen;
 }
 
-/// Where next to no photo shows the board as told: what is wrong, and the board that they do show.
+/// Where next to no photo shows the board as given: what is wrong, and the board that they do show.
 struct WrongBoard {
   std::string reason, to_add;
 };

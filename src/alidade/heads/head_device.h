@@ -28,7 +28,7 @@ struct HeadLimits {
   Eigen::Vector2d low_rad = Eigen::Vector2d::Constant(-1e9), high_rad = Eigen::Vector2d::Constant(1e9);
   bool are_told = false;                 ///< By the device.
   std::string info;                      ///< What it calls itself.
-  std::vector<Assumption> assumed = {};  ///< What nobody told: by it counts become angles.
+  std::vector<Assumption> assumed = {};  ///< What nobody gave: by it counts become angles.
 
   [[nodiscard]] bool hold(const Eigen::Vector2d& pan_tilt_rad) const;
 };

@@ -175,7 +175,7 @@ TEST(LocalizeImages, OfTwoThatLookAlikeItTakesNone) {
   EXPECT_EQ(localized(video, by_hand()).path.front().event, FrameEvent::started);
 }
 
-/// Points of the target that are told by how they look, instead of a rectangle: the path is the same.
+/// Points of the target that are known by how they look, instead of a rectangle: the path is the same.
 TEST(LocalizeImages, FindsPointsByTheirPatches) {
   LocalizeConfig config = by_hand();
   config.target.rectangle_m.reset();

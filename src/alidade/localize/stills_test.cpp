@@ -40,7 +40,7 @@ Stills stills(const Camera& camera, std::span<const Eigen::Vector3d> points, int
   return all;
 }
 
-/// Four told corners in each, and with them forty that are not told; once a second, and as fast as a film's.
+/// Four told corners in each, and with them forty that are not given; once a second, and as fast as a film's.
 TEST(Stills, EachIsWhereItsTargetSays) {
   Camera camera = testing::hover::camera_of(testing::HoverLens::brown);
   const std::vector<Eigen::Vector3d> corners{

@@ -152,7 +152,7 @@ void put_clusters(const BeamProblem& problem, const ReducedSystem& system, const
     report.shots[problem.shots[system.shots[i].index].index].cluster_z2 = report.clusters.z2[i];
 }
 
-/// What was told with a σ is carried into the beam's covariance.
+/// What was given with a σ is carried into the beam's covariance.
 void carry_told(RangefinderReport& report) {
   for (const FixedQuantity& thing : report.fixed) {
     if (!thing.sigma || (thing.name != "square_m" && thing.name != "scale")) continue;  // the lens' is in it already

@@ -23,7 +23,7 @@ namespace alidade {
 /// What was taken as given, and by how much each could move the answer.
 [[nodiscard]] std::vector<Assumption> rangefinder_assumptions(const RangefinderReport& report);
 
-/// Does the answer rest on a scale of the readings, or of the board, that nobody told? Then it is better estimated: a
+/// Does the answer rest on a scale of the readings, or of the board, that is not given? Then it is better estimated: a
 /// board that is too large as a whole moves the origin by its own part only.
 [[nodiscard]] bool wants_scale(const RangefinderReport& report, const RangefinderConfig& config);
 
@@ -48,7 +48,7 @@ struct SolvedRangefinder {
   Camera camera;             ///< The same: with the distortion open where its file gives it without σ.
 };
 /// calibrate_rangefinder() and what a person would do next: the readings' scale is estimated too where the answer rests
-/// on one that nobody told and the shots tell it, and where no beam explains the shots the cause is looked for.
+/// on one that is not given and the shots tell it, and where no beam explains the shots the cause is looked for.
 [[nodiscard]] SolvedRangefinder solve_rangefinder(std::span<const Shot> shots,
                                                   std::span<const Eigen::Vector3d> points_in_board,
                                                   const Camera& camera, const RangefinderConfig& config,

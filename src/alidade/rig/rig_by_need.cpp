@@ -85,7 +85,7 @@ class ByNeed {
     sigma_px_is_estimated_ = best_.sigma_px_is_estimated;
   }
 
-  /// Scales that nobody told are estimated where holding them matters.
+  /// Scales that are not given are estimated where holding them matters.
   void free_untold_scales() {
     if (config_.sigma_scale || config_.estimate_scales) return;
     const bool matters = std::ranges::any_of(best_.assumed, [](const Assumption& what) {

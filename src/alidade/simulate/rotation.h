@@ -61,7 +61,7 @@ struct RotationFaults {
   [[nodiscard]] bool are_of_rotation() const;
 };
 
-/// The log with these faults. Heads alone have those of angles; σ of scale and parallax, if wrong, are no more told.
+/// The log with these faults. Heads alone have those of angles; σ of scale and parallax, if wrong, are no longer given.
 void add_faults(const RotationFaults& faults, int width_px, int height_px, std::uint64_t seed, RotationLog& log);
 
 /// The paper's motion: ω = (0.07 sin 0.8t, 0.12 sin 1.6t, 0) rad/s. Fang et al. 2011, eq. (27).

@@ -29,7 +29,7 @@ struct UnderwaterScene {
   double readout_s = 0.0;         ///< From an image's first row to its last; its time is that of the middle one.
   double late_s = 0.0;            ///< Images are taken so long before the time that they bear.
   double target_speed_m_s = 0.0;  ///< Of the board along its x, against the other points.
-  double target_stretch = 0.0;    ///< Known points are told so much (relative) further apart along x.
+  double target_stretch = 0.0;    ///< Known points are given so much (relative) further apart along x.
 };
 
 /// 768×576, fx 768, fy 766, cx 389, cy 284, k1 −0.44881, k2 0.0664, p1 0.01316, p2 0.00218: strong distortion, which
@@ -48,7 +48,7 @@ struct UnderwaterFrame {
   std::vector<UnderwaterObservation> observations;
 };
 
-/// What a filter is told of a point before it sees it, and the truth.
+/// What a filter is given of a point before it sees it, and the truth.
 struct UnderwaterPoint {
   long id = 0;
   bool is_known = false;
@@ -60,7 +60,7 @@ struct UnderwaterPoint {
 struct UnderwaterSequence {
   std::vector<UnderwaterFrame> frames;
   std::vector<UnderwaterPoint> points;
-  Rigid3 told_start;  ///< The first pose as a filter is told it.
+  Rigid3 told_start;  ///< The first pose as a filter is given it.
 };
 
 /// Vertices of a 10×8 grid of 28 mm: 1 (0,0), 2 (9,0), 3 (9,7), 4 (0,7), 5 (5,4), 6 (2,2), 7 (7,2), 8 (7,5); the world

@@ -14,8 +14,8 @@ namespace alidade::testing {
 
 enum class HoverLens { brown, fisheye, port };
 
-/// A camera that hovers before six told points of a plane and sixty others around and behind it: `localize` in its own
-/// simplest case, all told right. Pixels by formulas that share no code with the library's lenses.
+/// A camera that hovers before six known points of a plane and sixty others around and behind it: `localize` in its own
+/// simplest case, all given right. Pixels by formulas that share no code with the library's lenses.
 struct Hover {
   HoverLens lens = HoverLens::brown;
   int num_frames = 300, num_others = 60;
@@ -26,7 +26,7 @@ struct Hover {
   // What is not as given.
   double readout_s = 0.0;           ///< From the first row to the last, the time being that of the middle one.
   double target_speed_m_s = 0.0;    ///< Along x, against the other points.
-  double target_stretch = 0.0;      ///< Of the told points along x, relative.
+  double target_stretch = 0.0;      ///< Of the known points along x, relative.
   double max_mismatched_px = 20.0;  ///< Of a share of the observations after the first frame, in each coordinate.
   double mismatches = 0.0;
 };

@@ -15,7 +15,7 @@ namespace alidade::testing {
 struct LongWalk {
   int num_points = 500, num_frames = 900;
   double length_m = 6.0, dt_s = 1.0 / 30.0, sigma_px = 0.5;
-  double sigma_known_m = 0.0;  ///< By how much the target's points are told wrongly.
+  double sigma_known_m = 0.0;  ///< By how much the target's points are given wrongly.
   double rise_m = 0.05;        ///< Up and down.
   bool is_wall = false;        ///< The points are on a wall that is not quite flat.
   bool comes_back = false;     ///< Half of the frames there, half of them back.

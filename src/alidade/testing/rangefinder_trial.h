@@ -15,7 +15,7 @@ namespace alidade::testing {
 struct RangefinderTrialSetup {
   std::string scenario = "reference";
   double scale = 1.0;   ///< Metres for each metre read.
-  double square = 0.0;  ///< Share by which the board is printed larger than told.
+  double square = 0.0;  ///< Share by which the board is printed larger than given.
   ShotNoise noise = {};
   ShotMistake mistake = {};
   RangefinderMethod method = RangefinderMethod::joint;

@@ -12,7 +12,7 @@ namespace alidade {
 /// fixes and its priors stand. The air lens must be a pinhole or a brown.
 [[nodiscard]] CalibrateConfig with_port(CalibrateConfig config, const PortKnowledge& port);
 
-/// Largest σ with which a parameter still counts as told; infinity where any will do (distortion).
+/// Largest σ with which a parameter still counts as determined; infinity where any will do (distortion).
 [[nodiscard]] double largest_told_sigma(const std::string& name, double value, const Camera& camera);
 
 /// "Brown … errs by 0.29 / 0.12 / 0.00 / 0.08 px at 0.3 / 0.5 / 1 / 3 m: it is enough from 0.5 m on", or not.

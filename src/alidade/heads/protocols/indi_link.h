@@ -24,7 +24,7 @@ class XmlElements {
   std::size_t looked_ = 0;  ///< In `text_`, for the end of the element that has begun.
 };
 
-/// A property of an INDI device as it was told last.
+/// A property of an INDI device as it was reported last.
 struct IndiProperty {
   std::string state;                          ///< Idle, Ok, Busy, Alert.
   std::map<std::string, std::string> values;  ///< Text of each member.

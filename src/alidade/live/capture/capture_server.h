@@ -63,7 +63,7 @@ class CaptureServer {
   void tell(std::string json, const std::string& kind = "");
   /// A JPEG for the pages that do not send pictures themselves.
   void show(std::string jpeg, bool also_control);
-  /// Waits until what was told is out and all pages have left; not longer.
+  /// Waits until what was sent is out and all pages have left; not longer.
   void finish(double max_s);
 
   struct State;

@@ -49,7 +49,7 @@ double inflation(std::span<const DepthRow> rows) {
 
 struct DepthFit {
   Eigen::Vector4d values = Eigen::Vector4d::Zero();
-  Eigen::Matrix4d cov = Eigen::Matrix4d::Zero();  ///< By the told σ.
+  Eigen::Matrix4d cov = Eigen::Matrix4d::Zero();  ///< By the given σ.
 };
 
 std::optional<DepthFit> fitted(std::vector<DepthRow>& rows) {

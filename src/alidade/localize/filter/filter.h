@@ -53,7 +53,7 @@ class LocalizationFilter {
   void predict(double dt_s);
   /// Updates with the observations of one moment.
   ObservationsReport update(std::span<const FeatureObservation> observations);
-  /// A known point, told with the σ of each of its coordinates. False where there is no room, or it is there already.
+  /// A known point, given with the σ of each of its coordinates. False where there is no room, or it is there already.
   bool add_known(long id, const Eigen::Vector3d& point_in_world, double sigma_m);
   /// A feature on the ray of its pixel, fully correlated with camera and lens. False where there is no room, it is
   /// there already, or the lens sees nothing there.

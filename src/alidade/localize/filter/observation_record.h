@@ -40,7 +40,7 @@ class ObservationRecord {
   /// the target's alone; so that what a filter took for its pose before it began again is forgotten, and frames before
   /// it began at all are placed as far as the map is seen in them. Points that are not nearly linear yet are rejected:
   /// they tell little, and what they tell is not Gaussian. `gone`: points that left a full filter; their observations
-  /// are used, too. `start`: what was told of the first pose. Points are left out where the work would be out of
+  /// are used, too. `start`: what was given of the first pose. Points are left out where the work would be out of
   /// proportion; none where that leaves too few, or a target's points were never seen. `has_loops`: room is left for
   /// points that are joined over the time between.
   [[nodiscard]] std::optional<SmootherProblem> problem(const Camera& camera, const LocalizeConfig& config,

@@ -4,7 +4,7 @@
 
 #include "alidade/localize/path/path_system.h"
 
-// What a path is solved from: observations, told points, told distances, the motion, the start.
+// What a path is solved from: observations, known points, told distances, the motion, the start.
 
 namespace alidade {
 namespace {
@@ -30,7 +30,7 @@ double walked_after(double n) { return (n - 1.0) * (2.0 * n - 1.0) / (6.0 * n); 
 
 }  // namespace
 
-/// Of what was told of the estimated part of the lens: its covariance where the file has one, else the filter's σ.
+/// Of what was given of the estimated part of the lens: its covariance where the file has one, else the filter's σ.
 Eigen::MatrixXd PathSmoother::lens_information() const {
   Eigen::MatrixXd cov = Eigen::MatrixXd::Zero(num_estimated_, num_estimated_);
   const bool has_cov = problem_.camera.cov.size() > 0;
@@ -79,7 +79,7 @@ void PathSmoother::add_told_point(const SmootherState& state, std::size_t point,
   system.cost += weight * error.squaredNorm();
 }
 
-/// What was told of the lens.
+/// What was given of the lens.
 void PathSmoother::add_told_lens(const SmootherState& state, SmootherSystem& system) const {
   PoseChain& chain = system.chain;
   if (num_estimated_ == 0) return;
@@ -180,7 +180,7 @@ PathSmoother::Speeds PathSmoother::speeds(const SmootherState& state, std::size_
 }
 
 /// Speed and rate from frame k to the next, and from there to the one after it, differ by drawn accelerations; the
-/// first differ from what was told. By a jump nothing is told, and behind it they begin again.
+/// first differ from what was given. A jump determines nothing, and behind it they begin again.
 void PathSmoother::add_motion(const SmootherState& state, std::size_t k, SmootherSystem& system) const {
   const auto steps = [&](std::size_t i) {
     return std::max(1.0, std::round((problem_.t_s[i + 1] - problem_.t_s[i]) / problem_.period_s));

@@ -46,7 +46,7 @@ enum class PathGauge {
 /// What a path is smoothed from. Frames follow each other without a break.
 struct SmootherProblem {
   std::size_t first_frame = 0;  ///< Of the recording.
-  Camera camera;                ///< As told; its covariance is counted.
+  Camera camera;                ///< As given; its covariance is counted.
   std::vector<double> t_s;
   std::vector<bool> is_jump;                  ///< To these frames the camera came by no motion. May be empty: to none.
   std::vector<Rigid3> world_from_cam;         ///< To begin at.
@@ -56,7 +56,7 @@ struct SmootherProblem {
   double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;
   double period_s = 1.0 / 30.0;  ///< Accelerations are drawn again for each.
   PathGauge gauge = PathGauge::fixed;
-  double sigma_scale = 0.0;         ///< Of the told points' common scale, counted and not estimated.
+  double sigma_scale = 0.0;         ///< Of the known points' common scale, counted and not estimated.
   LocalizationFilterConfig filter;  /// σ of accelerations, the gate, and what of the lens is estimated.
 };
 
@@ -70,7 +70,7 @@ struct SmoothedPath {
   std::vector<Eigen::Matrix3d> point_covs;
   Camera camera;
   Eigen::VectorXd sigma_lens;  ///< Of those estimated.
-  double lens_pull = 0.0;      ///< How far an estimated number of the lens is from what was told, in the told σ.
+  double lens_pull = 0.0;      ///< How far an estimated number of the lens is from what was given, in the given σ.
   std::vector<GivenNumber> given;
   std::vector<PlacedResidual> residuals;
   double chi2_per_dof = 0.0;  ///< Of the observations that fit.

@@ -10,7 +10,7 @@ namespace {
 
 constexpr const char* const quantity_names[] = {"fx", "fy", "cx", "cy"};
 
-/// How errors of a cause that nobody told a σ of ordinarily are.
+/// How errors of a cause that is not given a σ of ordinarily are.
 struct Given {
   std::string cause;
   double ordinary;

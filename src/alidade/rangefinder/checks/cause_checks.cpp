@@ -21,7 +21,7 @@ std::string unit_of(double scale) {
   return "";
 }
 
-/// A scale that was estimated as nobody told it, and is not 1: the rangefinder's, or that of the board.
+/// A scale that was estimated as nobody gave it, and is not 1: the rangefinder's, or that of the board.
 void add_found_scale(const RangefinderReport& report, Verdict& verdict) {
   constexpr double ask_beyond = 4.0, beyond_an_instrument = 0.05;
   const double away = report.beam.scale - 1.0, sigma = std::sqrt(report.beam.cov(beam_scale_param, beam_scale_param));

@@ -36,7 +36,7 @@ struct ReducedSystem {
   [[nodiscard]] std::vector<Eigen::Index> places(int num_beam, const std::vector<int>& free_lens) const;
   /// ∂²cost/2 by all and the logarithm of the length of the boards' squares, poses eliminated. A world that is larger
   /// as a whole, readings and all, looks the same: the square's column is minus that of origin and scale. Shots whose
-  /// plane was told do not follow the square.
+  /// plane was given do not follow the square.
   [[nodiscard]] Eigen::VectorXd square_column(const Beam& beam) const;
 };
 

@@ -143,7 +143,7 @@ void fill_repeatability(const PositionerLog& log, double step, PositionerFit& fi
                        s / std::max(step, 1e-9)};
 }
 
-/// Where it rests by what it was told: a line.
+/// Where it rests by what it was commanded: a line.
 void fill_gain(const PositionerLog& log, PositionerFit& fit) {
   std::vector<Eigen::Vector2d> pairs;
   for (std::size_t i = 0; i + 1 < log.commands.size(); ++i) {

@@ -15,7 +15,7 @@ struct PositionerReading {
   double t_s = 0.0, wait_s = 0.0, angle_rad = 0.0;
 };
 
-/// How one axis went where it was told.
+/// How one axis went where it was commanded.
 struct PositionerLog {
   std::vector<PositionCommand> commands;
   std::vector<double> command_waits_s;  ///< How long the answers to commands took.

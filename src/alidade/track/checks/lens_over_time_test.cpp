@@ -147,7 +147,7 @@ TEST(LensOverTime, IsFollowedAsIfNothingZoomed) {
   EXPECT_GT(unknown.rms_m, 5.0 * known.rms_m);
 }
 
-/// σ of the intrinsics is counted: errors that last are covered where they are told.
+/// σ of the intrinsics is counted: errors that last are covered where they are seen.
 TEST(LensOverTime, SigmaOfTheIntrinsicsIsCounted) {
   constexpr int num_runs = 40;
   const double sigma_a = track_scenario("B")->sigma_a_m_s2;

@@ -10,6 +10,8 @@
 namespace alidade {
 namespace {
 
+constexpr double max_rest_px = 20.0;  // noise leaves a few; a loop that swings has hundreds
+
 double units_of_error_per_rad(ErrorUnit unit, double focal_px) { return PiGains{1.0, 0.0, unit}.per_rad(focal_px).kp; }
 
 int samples_in(double delay_s, double period_s) { return static_cast<int>(std::ceil(delay_s / period_s - 1e-9)); }
@@ -25,7 +27,22 @@ AngleUnit unit_of(const ServoPlant& plant) {
   return std::visit([](const auto& p) { return p.unit; }, plant);
 }
 
+/// A loop that predicts where the target is from pixels that it takes by too short a lens.
+Verdict restless(const ServoScenario& scenario, const LoopCheck& loop) {
+  Verdict verdict;
+  verdict.state = State::refused;
+  verdict.exit_code = ExitCode::cannot_tell;
+  verdict.sentence = "the loop of " + std::string(controller_name(loop.controller)) + " is unstable once the lens is " +
+                     text_of(scenario.scene.zoom.largest()) +
+                     " times as long as it takes it for: about a target at rest it swings by " +
+                     text_of(loop.rest_px, 2) + " px RMS";
+  verdict.to_add = "--intrinsics observed, or less zoom";
+  verdict.checks.push_back({"loop at rest", State::refused, verdict.sentence, loop.rest_px, max_rest_px, "px", ""});
+  return verdict;
+}
+
 Verdict unstable(const ServoScenario& scenario, const LoopCheck& loop) {
+  if (loop.analysis.is_stable()) return restless(scenario, loop);
   const ServoPlant& plant = scenario.scene.axes[0].plant;
   const double focal_px = focal_of(scenario.scene.heads[0].camera);
   const ServoPlant other = in_other_unit(plant);
@@ -107,6 +124,25 @@ double settling_of(const ServoScenario& scenario, ControllerKind kind) {
   return slowest;
 }
 
+/// The loop itself, once its lens has become as long as it will, on a target that stands still.
+double rest_px_of(const ServoScenario& scenario, ControllerKind kind) {
+  constexpr double zoom_from_s = 2.0, zoom_until_s = 3.0, least_s = 8.0, periods = 100.0;
+  ServoScene scene = scenario.scene;
+  scene.path = {};
+  scene.path.kind = PathKind::still;
+  scene.path.start_m = scenario.scene.path.start_m;
+  if (!scenario.scene.path.recorded_m.empty()) scene.path.start_m = scenario.scene.path.recorded_m.front();
+  scene.hidden_s.clear();
+  scene.zoom.t_s = {zoom_from_s, zoom_until_s};
+  scene.zoom.factor = {1.0, scenario.scene.zoom.largest()};
+  const double settle_s = std::max(least_s, periods * scene.period_s);
+  scene.warm_up_s = zoom_until_s + settle_s;
+  scene.duration_s = scene.warm_up_s + 0.5 * settle_s;
+  ServoConfig config = scenario.config;
+  config.controller = kind;
+  return run_servo(scene, config, 1).figures.rms_px;
+}
+
 bool is_whole(double delay_s, double period_s) {
   const double samples = delay_s / period_s;
   return std::abs(samples - std::round(samples)) < 1e-9;
@@ -139,6 +175,8 @@ std::vector<LensComparison> compare_lenses(const ServoScenario& scenario, const 
 
 }  // namespace
 
+bool LoopCheck::is_stable() const { return analysis.is_stable() && rest_px < max_rest_px; }
+
 std::vector<LoopCheck> check_loops(const ServoScenario& scenario) {
   std::vector<LoopCheck> loops;
   const ServoScene& scene = scenario.scene;
@@ -152,6 +190,7 @@ std::vector<LoopCheck> check_loops(const ServoScenario& scenario) {
     const bool is_pi = kind == ControllerKind::pi;
     const ServoAxis& axis = scene.axes[0];
     LoopCheck loop{kind, {}, 0.0, -1};
+    if (!is_pi && largest > 1.0) loop.rest_px = rest_px_of(scenario, kind);
     if (!is_pi && !(kind == ControllerKind::feedforward && std::holds_alternative<AnglePlant>(axis.plant))) {
       loop.analysis.sampled_radius = settling_of(scenario, kind);
       loops.push_back(loop);
@@ -178,7 +217,7 @@ ServoStudy study_servo(const ServoScenario& scenario, std::uint64_t first_seed, 
                        const ServoWatch& watch) {
   ServoStudy study;
   study.loops = check_loops(scenario);
-  if (!std::ranges::all_of(study.loops, [](const LoopCheck& loop) { return loop.analysis.is_stable(); })) return study;
+  if (!std::ranges::all_of(study.loops, &LoopCheck::is_stable)) return study;
   study.status = ServoStudy::Status::compared;
   const auto num_seeds = static_cast<std::size_t>(scenario.num_seeds);
   ServoConfig config = scenario.config;
@@ -214,7 +253,7 @@ ServoStudy study_servo(const ServoScenario& scenario, std::uint64_t first_seed, 
 
 Verdict servo_verdict(const ServoScenario& scenario, const ServoStudy& study) {
   for (const LoopCheck& loop : study.loops)
-    if (!loop.analysis.is_stable()) return unstable(scenario, loop);
+    if (!loop.is_stable()) return unstable(scenario, loop);
   Verdict verdict;
   add_checks(scenario, study, verdict);
   const ServoFigures& best = best_of(study).figures;

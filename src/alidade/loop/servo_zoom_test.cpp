@@ -90,6 +90,23 @@ TEST(ServoZoom, AStillLensIsFollowedAsWithoutAnObserver) {
   for (std::size_t i = 0; i < num_zoom_draws; ++i) EXPECT_LT(observed[i].rms_px, 1.3 * given[i].rms_px) << i;
 }
 
+/// What predicts the target by a lens that is longer than it takes it for swings once images are late: refused before
+/// it runs, as pi is. Where it does rest it is not.
+TEST(ServoZoom, ALoopThatZoomsUnknownToItIsTriedOnATargetAtRest) {
+  ServoScenario scenario;
+  scenario.scene.zoom = {{3.0, 6.0}, {1.0, 1.6}};
+  scenario.scene.intrinsics = LensKnowledge::given;
+  scenario.controllers = {ControllerKind::feedforward, ControllerKind::lqr};
+  for (const LoopCheck& loop : check_loops(scenario)) EXPECT_TRUE(loop.is_stable()) << loop.rest_px;
+  scenario.scene.latency_s = 0.1;
+  for (const LoopCheck& loop : check_loops(scenario)) EXPECT_FALSE(loop.is_stable()) << loop.rest_px;
+  const ServoStudy study = study_servo(scenario, 1);
+  EXPECT_EQ(study.status, ServoStudy::Status::unstable);
+  const Verdict verdict = servo_verdict(scenario, study);
+  EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_NE(verdict.to_add.find("--intrinsics observed"), std::string::npos) << verdict.sentence;
+}
+
 TEST(ZoomProfile, IsStraightInTheLogarithmAndStillOutside) {
   const ZoomProfile zoom{{1.0, 3.0}, {1.0, 4.0}};
   EXPECT_EQ(zoom.at(0.0), 1.0);

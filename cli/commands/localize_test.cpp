@@ -338,5 +338,26 @@ TEST_F(LocalizeCommand, SurvivesMissingFramesAndUnknownPoints) {
   EXPECT_EQ(skipped.code, 0) << skipped.err;
 }
 
+/// A map that one run has left is where the next one begins, in its frame and scale, without the target.
+TEST_F(LocalizeCommand, BeginsInTheMapOfAnEarlierRun) {
+  simulate({"--points", "30", "--frames", "60", "--rate", "30"});
+  ASSERT_EQ(localize(told()).code, 0);
+  const std::string map = path("map.yaml");
+  std::filesystem::copy_file(path("out/map.yaml"), map);
+  const std::vector<std::string> in_map{"--map", map, "--truth", path("sim/truth.tum"), "--json"};
+  const Outcome outcome = localize(in_map);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json document = Json::parse(outcome.out);
+  EXPECT_EQ(document["estimate"]["lost"], 0);
+  EXPECT_EQ(document["estimate"]["scale_known"], true);
+  EXPECT_LT(document["estimate"]["unaligned_m"].get<double>(), 0.02);
+  EXPECT_THAT(document["verdict"]["checks"].dump(), ::testing::HasSubstr("scale and frame are those of the map"));
+  const Outcome both = localize({"--map", map, "--target", path("sim/target.yaml")});
+  EXPECT_EQ(both.code, 2);
+  EXPECT_THAT(both.err, ::testing::HasSubstr("give one of them"));
+  write_file(map, "points: 3\n");
+  EXPECT_EQ(localize(in_map).code, 3);
+}
+
 }  // namespace
 }  // namespace alidade

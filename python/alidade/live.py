@@ -124,13 +124,17 @@ class Localizer(OneByOne):
     camera  the camera, a Camera or its file
     target  what gives scale and the map's frame: target.yaml, or its content as a dict
     start   where the camera starts, how fast, how sure: start.yaml, or its content
+    map     instead of a target, the map that an earlier run has left: map.yaml
     fields  as of al.localize(): sigma_px, sigma_a_m_s2, …
     """
 
-    def __init__(self, camera: Any, *, target: Any = None, start: Any = None, **fields: Any) -> None:
+    def __init__(self, camera: Any, *, target: Any = None, start: Any = None, map: Any = None,
+                 **fields: Any) -> None:
         self._camera = camera if isinstance(camera, Camera) else Camera.read(camera)
         self._texts = [(name, texts_of(value, name)) for name, value in fields.items() if value is not None]
-        self._target, self._start = target, start
+        if map is not None and target is not None:
+            raise ValueError("map and target both say the map's frame: give one of them")
+        self._target, self._start, self._map = target, start, map
         self._frame = 0
         self._core: _alidade.Localizer | None = None
 
@@ -139,7 +143,8 @@ class Localizer(OneByOne):
             with files_for_call() as files:
                 target = "" if self._target is None else files.path_of(self._target, "target")
                 start = "" if self._start is None else files.path_of(self._start, "start")
-                self._core = _alidade.Localizer(self._camera._core, target, is_of_images, start, self._texts)
+                saved = "" if self._map is None else files.path_of(self._map, "map")
+                self._core = _alidade.Localizer(self._camera._core, target, is_of_images, start, saved, self._texts)
         return self._core
 
     def push(self, t_s: float, ids: Any, pixels: Any) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 #include "alidade/localize.h"
 #include "alidade/results/localize_outcome.h"
 #include "alidade/tables/localize_file.h"
+#include "alidade/tables/map_file.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/fields.h"
 #include "python/bindings/guarded.h"
@@ -15,11 +16,12 @@ namespace {
 class LiveLocalizer {
  public:
   LiveLocalizer(const Camera& camera, const std::string& target, bool is_of_images, const std::string& start,
-                const Texts& values) {
+                const std::string& map, const Texts& values) {
     LocalizeConfig config;
     set_fields(fields_of(config), values);
     if (!target.empty()) config.target = is_of_images ? read_image_target(target) : read_target(target);
     if (!start.empty()) config.start = read_start(start);
+    if (!map.empty()) config.map = read_map(map);
     localizer_ = std::make_shared<Guarded<Localizer>>(camera, config);
   }
 
@@ -73,7 +75,7 @@ class LiveLocalizer {
 
 void bind_localizer(py::module_& module) {
   py::class_<LiveLocalizer>(module, "Localizer", plain_type(), "The path of a camera, frame by frame.")
-      .def(py::init<const Camera&, const std::string&, bool, const std::string&, const Texts&>())
+      .def(py::init<const Camera&, const std::string&, bool, const std::string&, const std::string&, const Texts&>())
       .def("push_points", &LiveLocalizer::push_points)
       .def("push_image", &LiveLocalizer::push_image)
       .def("finish", &LiveLocalizer::finish);

@@ -72,6 +72,24 @@ class Live(InFolder):
         with self.assertRaises(ValueError):
             localizer.push_image(99.0, np.zeros((4, 4)))
 
+    def test_a_path_begins_in_the_map_of_an_earlier_one(self):
+        made = al.simulate.underwater(frames=40, points=30)
+        made.save(self.folder / "first")
+        files = {name: self.folder / "first" / f"{name}.yaml" for name in ("camera", "target", "start")}
+        first = al.localize(made.tables["sights"], **files)
+        first.save(self.folder / "map")
+        in_map = {"camera": files["camera"], "map": self.folder / "map" / "map.yaml"}
+        again, localizer = al.localize(made.tables["sights"], **in_map), al.Localizer(**in_map)
+        sights = made.tables["sights"]
+        for frame in np.unique(sights["frame"]):
+            seen = sights[sights["frame"] == frame]
+            localizer.push(seen["t_s"][0], seen["point_id"], np.stack([seen["u_px"], seen["v_px"]], axis=1))
+        for path in (again, localizer.finish()):
+            self.assertTrue(path.estimate["scale_known"])
+            np.testing.assert_allclose(path.tables["trajectory"]["x_m"], first.tables["trajectory"]["x_m"], atol=0.01)
+        with self.assertRaises(ValueError):
+            al.Localizer(target=files["target"], **in_map)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -135,6 +135,7 @@ struct Localization {
   Camera camera;                         ///< As it is at the end.
   std::vector<std::string> lens_params;  ///< Of the camera's parameters those that were estimated,
   Eigen::VectorXd sigma_lens;            ///< and their σ.
+  std::optional<Camera> given_camera;    ///< Where the observations contradict it: estimated without it, with the path.
   std::vector<TimedPose> truth;          ///< As given.
   PathError error;                       ///< With truth.
   bool is_scale_given = true;            ///< As in LocalizeTarget; also where the config has its σ.

@@ -21,6 +21,7 @@ struct Hover {
   int num_frames = 300, num_others = 60;
   double dt_s = 1.0 / 30.0;
   double sigma_px = 0.5, sigma_known_m = 0.001;
+  double lasting = 0.0;  ///< Correlation of a point's pixel errors from frame to frame: as a drifting track has them.
   double distance_m = 0.9;
   bool turns_in_place = false;
   // What is not as given.
@@ -139,12 +140,15 @@ inline HoverRun hovering(const Hover& scene, std::uint64_t seed) {
       at[i] = amplitude[i] * std::sin(2.0 * std::numbers::pi * frequency_hz[i] * t_s + phase[i]);
     return Rigid3{exp_so3(at.tail<3>()), at.head<3>() - Eigen::Vector3d(0.0, 0.0, scene.distance_m)};
   };
+  std::vector<Eigen::Vector2d> errors_px(points.size());
   for (int k = 0; k < scene.num_frames; ++k) {
     const double t_s = k * scene.dt_s;
     const Rigid3 world_from_cam = pose_at(t_s);
     ObservationFrame frame{k, t_s, {}};
     for (std::size_t i = 0; i < points.size(); ++i) {
       Eigen::Vector2d noise = scene.sigma_px * draws.normal2();
+      if (k > 0) noise = scene.lasting * errors_px[i] + std::sqrt(1.0 - scene.lasting * scene.lasting) * noise;
+      errors_px[i] = noise;
       if (scene.mismatches > 0.0 && draws.uniform() < scene.mismatches && k > 0)
         noise = scene.max_mismatched_px * Eigen::Vector2d(draws.uniform(-1.0, 1.0), draws.uniform(-1.0, 1.0));
       Eigen::Vector3d point = points[i];

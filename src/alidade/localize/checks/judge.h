@@ -10,4 +10,8 @@ namespace alidade {
 /// Whether the path stands. A path that its observations contradict is never good.
 [[nodiscard]] Verdict localize_verdict(const Localization& result);
 
+/// Of a lens that the observations contradict, what of it is not as it was given: "focal length +2.1 % (12σ), centre u
+/// -3 px (8σ), k1 -0.02 (20σ)".
+[[nodiscard]] std::string lens_changes(const Localization& result);
+
 }  // namespace alidade

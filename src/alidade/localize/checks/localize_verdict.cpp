@@ -132,6 +132,11 @@ void add_given(const Localization& report, Verdict& verdict) {
   if (worst != nullptr && std::abs(worst->asked * worst->moves) > min_move && std::abs(worst->z) > care_z)
     verdict.checks.push_back({"camera", state_of(std::abs(worst->z), care_z, bad_z), cause_text(*worst),
                               std::abs(worst->z), care_z, "σ", "path"});
+  if (report.given_camera)
+    verdict.checks.push_back(
+        {"camera", State::care,
+         "the lens is not as given: it is estimated with the path, " + lens_changes(report) + "; camera.yaml has it",
+         1.0, 0.0, "", "path"});
   constexpr double care_pull = 3.0;
   if (report.lens_pull > care_pull)
     verdict.checks.push_back({"camera", State::care,
@@ -173,7 +178,7 @@ void add_residuals(const Localization& report, Verdict& verdict) {
   if (residuals.has_colour())
     verdict.checks.push_back({"colour", State::care,
                               "errors last from frame to frame (correlation " + text_of(residuals.colour, 2) +
-                                  "): tracks drift, or something given is wrong; σ is enlarged for it",
+                                  "): the path is solved with that",
                               residuals.colour, 0.25, "1", "nis"});
 }
 

@@ -10,9 +10,38 @@ namespace {
 
 constexpr std::size_t num_across = 4, num_down = 3;
 
+/// Residuals over σ that may have a mean, each of a point.
+class MeanResidual {
+ public:
+  void add(long id, double residual, double residual_px) {
+    num_ += 1.0;
+    sum_ += residual;
+    sum_px_ += residual_px;
+    of_point_[id] += residual;
+  }
+  [[nodiscard]] bool has_enough(double least, bool lasts) const {
+    constexpr std::size_t few_points = 8;
+    return num_ >= least && (!lasts || of_point_.size() >= few_points);
+  }
+  [[nodiscard]] double mean() const { return sum_ / num_; }
+  [[nodiscard]] double mean_px() const { return sum_px_ / num_; }
+  /// The mean's square over its variance, 1 by chance. Of points: a square of Student's t with one number less than
+  /// they are, over its own mean.
+  [[nodiscard]] double chi2(bool lasts) const {
+    if (!lasts) return sum_ * sum_ / num_;
+    double squares = 0.0;
+    for (const auto& [id, sum] : of_point_) squares += sum * sum;
+    const double dof = static_cast<double>(of_point_.size()) - 1.0;
+    return sum_ * sum_ / squares * (dof - 2.0) / dof;
+  }
+
+ private:
+  double num_ = 0.0, sum_ = 0.0, sum_px_ = 0.0;
+  std::map<long, double> of_point_;
+};
+
 struct ImagePart {
-  double num = 0.0;
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero(), sum_px = Eigen::Vector2d::Zero();
+  MeanResidual u, v;
 };
 
 std::string name_of(std::size_t part) {
@@ -42,7 +71,7 @@ void add_colour(std::span<const PlacedResidual> residuals, ResidualStructure& st
 
 }  // namespace
 
-ResidualStructure residual_structure(std::span<const PlacedResidual> residuals, int width_px, int height_px) {
+ResidualStructure residual_structure(std::span<const PlacedResidual> residuals, const Camera& camera) {
   ResidualStructure structure;
   add_colour(residuals, structure);
   std::array<ImagePart, num_across * num_down> parts;
@@ -50,19 +79,19 @@ ResidualStructure residual_structure(std::span<const PlacedResidual> residuals, 
     const auto index = [](double share, std::size_t num) {
       return static_cast<std::size_t>(std::clamp(share, 0.0, 0.999) * static_cast<double>(num));
     };
-    ImagePart& part = parts[index(residual.px.y() / height_px, num_down) * num_across +
-                            index(residual.px.x() / width_px, num_across)];
-    part.num += 1.0;
-    part.sum += residual.residual_px / residual.sigma_px;
-    part.sum_px += residual.residual_px;
+    ImagePart& part = parts[index(residual.px.y() / camera.height_px, num_down) * num_across +
+                            index(residual.px.x() / camera.width_px, num_across)];
+    part.u.add(residual.id, residual.residual_px.x() / residual.sigma_px, residual.residual_px.x());
+    part.v.add(residual.id, residual.residual_px.y() / residual.sigma_px, residual.residual_px.y());
   }
   constexpr double least = 30.0;
+  const bool lasts = structure.has_colour();
   double num = 0.0;
   for (std::size_t i = 0; i < parts.size(); ++i) {
-    if (parts[i].num < least) continue;
+    if (!parts[i].u.has_enough(least, lasts)) continue;
     num += 2.0;
-    structure.place_chi2 += parts[i].sum.squaredNorm() / parts[i].num;
-    const double mean_px = (parts[i].sum_px / parts[i].num).norm();
+    structure.place_chi2 += parts[i].u.chi2(lasts) + parts[i].v.chi2(lasts);
+    const double mean_px = std::hypot(parts[i].u.mean_px(), parts[i].v.mean_px());
     if (!(mean_px > structure.worst_px)) continue;
     structure.worst_px = mean_px;
     structure.worst_place = name_of(i);
@@ -72,6 +101,33 @@ ResidualStructure residual_structure(std::span<const PlacedResidual> residuals, 
   constexpr double z = 3.09;  // of a χ² by Wilson & Hilferty 1931
   const double w = 2.0 / (9.0 * num);
   structure.place_limit = std::pow(1.0 - w + z * std::sqrt(w), 3);
+  return structure;
+}
+
+RadialStructure radial_structure(std::span<const PlacedResidual> residuals, const Camera& camera, bool lasts) {
+  constexpr std::size_t num_rings = 6;
+  constexpr double least = 10.0;
+  const Eigen::Vector2d middle = 0.5 * Eigen::Vector2d(camera.width_px, camera.height_px);
+  std::array<MeanResidual, num_rings> rings;
+  for (const PlacedResidual& residual : residuals) {
+    const Eigen::Vector2d out = residual.px - middle;
+    if (!(out.norm() > 1.0)) continue;
+    const double along_px = out.normalized().dot(residual.residual_px);
+    const double share = std::min(out.norm() / middle.norm(), 0.999);
+    rings[static_cast<std::size_t>(share * num_rings)].add(residual.id, along_px / residual.sigma_px, along_px);
+  }
+  RadialStructure structure;
+  double num = 0.0;
+  for (const MeanResidual& ring : rings) {
+    if (!ring.has_enough(least, lasts)) continue;
+    num += 1.0;
+    structure.share += ring.mean() * ring.mean();
+    structure.chi2_per_ring += ring.chi2(lasts);
+    structure.worst_px = std::max(structure.worst_px, std::abs(ring.mean_px()));
+  }
+  if (!(num > 0.0)) return structure;
+  structure.share = std::sqrt(structure.share / num);
+  structure.chi2_per_ring /= num;
   return structure;
 }
 

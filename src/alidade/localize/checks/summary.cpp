@@ -65,12 +65,31 @@ bool is_behind(std::span<const PathStep> path, std::span<const KnownPoint> targe
   return balance > 0.0;
 }
 
+namespace {
+
+bool is_of_targets_points(const GivenNumber& given) {
+  return given.name == "shape of the target" || given.name == "speed of the target" || given.name == "readout";
+}
+
+}  // namespace
+
 void take_over(const SmoothedPath& smoothed, Localization& result) {
   result.is_smoothed = true;
-  if (!result.is_of_images) result.given = smoothed.given;  // patches' errors are shared: the filter's tests heed that
+  result.given = smoothed.given;
+  if (result.is_of_images) {
+    result.radial = smoothed.radial;
+    std::erase_if(result.given,
+                  is_of_targets_points);  // patches of four corners change as they are seen from elsewhere
+  }
   result.lens_pull = smoothed.lens_pull;
   result.widened = smoothed.widened;
   result.is_from_one_place = smoothed.is_from_one_place;
+  if (smoothed.is_lens_freed) {
+    result.given_camera = result.camera;
+    result.lens_params.clear();
+    for (const int index : smoothed.estimated)
+      result.lens_params.push_back(param_names(smoothed.camera.lens)[static_cast<std::size_t>(index)]);
+  }
   result.camera = smoothed.camera;
   result.sigma_lens = smoothed.sigma_lens;
   if (result.num_restarts > 0) {  // what the filter rejected before it began again is no longer rejected

@@ -4,7 +4,8 @@
 
 #include "alidade/localize/path/path_system.h"
 
-// What a path is solved from: observations, known points, told distances, the motion, the start.
+// What a path is solved from beside its observations (path_observations.cpp): known points, given distances, the
+// motion, the start.
 
 namespace alidade {
 namespace {
@@ -33,9 +34,9 @@ double walked_after(double n) { return (n - 1.0) * (2.0 * n - 1.0) / (6.0 * n); 
 /// Of what was given of the estimated part of the lens: its covariance where the file has one, else the filter's σ.
 Eigen::MatrixXd PathSmoother::lens_information() const {
   Eigen::MatrixXd cov = Eigen::MatrixXd::Zero(num_estimated_, num_estimated_);
-  const bool has_cov = problem_.camera.cov.size() > 0;
+  const bool has_cov = problem_.camera.cov.size() > 0 && !is_lens_freed_;
   for (int i = 0; i < num_estimated_; ++i) {
-    const double sigma = problem_.filter.sigma_lens_params[static_cast<std::size_t>(i)];
+    const double sigma = sigma_estimated_[static_cast<std::size_t>(i)];
     for (int j = 0; has_cov && j < num_estimated_; ++j)
       cov(i, j) =
           problem_.camera.cov(lens_order_[static_cast<std::size_t>(i)], lens_order_[static_cast<std::size_t>(j)]);
@@ -72,11 +73,12 @@ void PathSmoother::add_told_point(const SmootherState& state, std::size_t point,
   PoseChain& chain = system.chain;
   const int at = chain.place_of(point), by = causes_at_ + scale_cause;
   chain.B.diagonal().segment<3>(at).array() += weight;
+  chain.b.segment<3>(at) -= weight * error;
+  system.cost += weight * error.squaredNorm();
+  if (!system.has_given) return;
   chain.B.block<3, 2>(at, by) -= weight * J;
   chain.B.block<2, 2>(by, by) += weight * J.transpose() * J;
-  chain.b.segment<3>(at) -= weight * error;
   chain.b.segment<2>(by) += weight * J.transpose() * error;
-  system.cost += weight * error.squaredNorm();
 }
 
 /// What was given of the lens.
@@ -103,49 +105,6 @@ PathSmoother::Twist PathSmoother::twist_at(const SmootherState& state, std::size
   twist << (state.poses[to].translation - state.poses[from].translation) / dt_s,
       log_so3(state.poses[from].rotation.conjugate() * state.poses[to].rotation) / dt_s;
   return twist;
-}
-
-/// How the expected pixel changes by what is given: the lens, then the causes (scale and shape by told places alone).
-PathSmoother::GivenRows PathSmoother::given_rows(const ExpectedView& view, const UsedObservation& observation,
-                                                 const Twist& twist) const {
-  const auto num_lens = view.J_px_lens.cols();
-  GivenRows J = GivenRows::Zero(2, num_lens + num_causes);
-  for (Eigen::Index i = 0; i < num_lens; ++i) J.col(i) = view.J_px_lens.col(lens_order_[static_cast<std::size_t>(i)]);
-  const SmootherPoint& point = problem_.points[index_of_.at(observation.id)];
-  if (point.told_in_world)  // a target that moves: not where it is told to be, but further by so much
-    J.middleCols<3>(num_lens + speed_cause) =
-        (problem_.t_s[observation.frame] - middle_s_) * view.J_px_feature.leftCols<3>();
-  const double rows =
-      observation.px.y() / problem_.camera.height_px - 0.5;  // an image's time is that of its middle row
-  J.col(num_lens + readout_cause) = rows * view.J_px_pose * twist;
-  return J;
-}
-
-bool PathSmoother::add_observation(const SmootherState& state, const UsedObservation& observation, const Twist& twist,
-                                   SmootherSystem& system) const {
-  const std::size_t point = index_of_.at(observation.id);
-  Feature feature;
-  feature.values.head<3>() = state.points[point];
-  const auto view = expected_view(state.camera, state.poses[observation.frame], feature);
-  if (!view) return false;
-  const double weight = 1.0 / observation.sigma_px;
-  const Eigen::Vector2d error = weight * (view->px - observation.px);
-  const Eigen::Matrix<double, 2, 6> J_pose = weight * view->J_px_pose;
-  const Eigen::Matrix<double, 2, 3> J_point = weight * view->J_px_feature.leftCols<3>();
-  const GivenRows J_given = weight * given_rows(*view, observation, twist);
-  PoseChain& chain = system.chain;
-  const auto at = static_cast<Eigen::Index>(chain.place_of(point)), num_given = J_given.cols();
-  chain.A.topLeftCorner<6, 6>() += J_pose.transpose() * J_pose;
-  chain.U.block<6, 3>(0, at) += J_pose.transpose() * J_point;
-  chain.U.block(0, lens_at_, 6, num_given) += J_pose.transpose() * J_given;
-  chain.B.block<3, 3>(at, at) += J_point.transpose() * J_point;
-  chain.B.block(at, lens_at_, 3, num_given) += J_point.transpose() * J_given;
-  chain.B.block(lens_at_, lens_at_, num_given, num_given) += J_given.transpose() * J_given;
-  chain.a.head<6>() -= J_pose.transpose() * error;
-  chain.b.segment<3>(at) -= J_point.transpose() * error;
-  chain.b.segment(lens_at_, num_given) -= J_given.transpose() * error;
-  system.cost += error.squaredNorm();
-  return true;
 }
 
 /// What was believed of a point's distance where it was first seen, as an inverse one.
@@ -228,22 +187,21 @@ void PathSmoother::add_start(const SmootherState& state, SmootherSystem& system)
   system.cost += error.dot(information * error);
 }
 
-std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state) const {
-  SmootherSystem system{PoseChain(causes_at_ + num_causes, most_at_once_)};
+std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state, Shared shared) const {
+  SmootherSystem system{PoseChain(shared == Shared::all ? causes_at_ + num_causes : num_estimated_, most_at_once_)};
+  system.has_given = shared == Shared::all;
   add_told_lens(state, system);
   add_start(state, system);
   std::vector<std::vector<std::size_t>> first_seen(state.poses.size());
   for (std::size_t i = 0; i < problem_.points.size(); ++i)
     if (problem_.points[i].range && lives_[i]) first_seen[problem_.points[i].first_frame].push_back(i);
-  std::size_t next = 0;
+  Lookahead rows;
   for (std::size_t k = 0; k < state.poses.size(); ++k) {
-    const Twist twist = twist_at(state, k);
     for (const std::size_t point : entering_[k]) {
       (void)system.chain.enter(point);
       if (problem_.points[point].told_in_world) add_told_point(state, point, system);
     }
-    for (; next < observations_.size() && observations_[next].frame == k; ++next)
-      if (!add_observation(state, observations_[next], twist, system)) return std::nullopt;
+    if (!add_observations(state, k, rows, system)) return std::nullopt;
     for (const std::size_t point : first_seen[k]) add_range(state, point, system);
     if (k + 1 < state.poses.size()) add_motion(state, k, system);
     if (k + 1 == state.poses.size()) system.chain.A.diagonal().head<6>().array() += hardly_told;

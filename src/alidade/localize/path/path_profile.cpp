@@ -96,7 +96,7 @@ void PathSmoother::widen(double min_cost, SmoothedPath& path) {
     const double reached = held_->weights.dot(right_perturbation(held_->from, state_.poses[held_->frame])) / sigma;
     const Held held = *held_;
     held_.reset();
-    const auto there = build(state_);
+    const auto there = build(state_, Shared::solved);
     held_ = held;
     if (!there) continue;
     const double rise = std::max(there->cost - min_cost, little);

@@ -3,19 +3,18 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
+#include "alidade/localize/checks/residual_structure.h"
 #include "alidade/localize/filter/given_numbers.h"
 #include "alidade/localize/path/path_system.h"
 
 namespace alidade {
 
 PathSmoother::PathSmoother(const SmootherProblem& problem) : problem_(problem) {
-  const int num_lens = static_cast<int>(params(problem.camera.lens).size());
-  lens_order_ = problem.filter.lens_params;
-  num_estimated_ = static_cast<int>(lens_order_.size());
-  for (int i = 0; i < num_lens; ++i)
-    if (std::ranges::find(problem.filter.lens_params, i) == problem.filter.lens_params.end()) lens_order_.push_back(i);
-  causes_at_ = lens_at_ + num_lens;
+  estimate_lens(problem.filter.lens_params);
+  sigma_estimated_ = problem.filter.sigma_lens_params;
+  causes_at_ = lens_at_ + static_cast<int>(lens_order_.size());
   double num_told = 0.0;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     index_of_[problem.points[i].id] = i;
@@ -34,11 +33,14 @@ PathSmoother::PathSmoother(const SmootherProblem& problem) : problem_(problem) {
 /// A point is there from its first observation, or where its distance was believed, to its last.
 void PathSmoother::find_lives() {
   lives_.assign(problem_.points.size(), std::nullopt);
+  first_of_.assign(state_.poses.size() + 1, 0);
   for (const UsedObservation& observation : observations_) {
     std::optional<Life>& life = lives_[index_of_.at(observation.id)];
     if (!life) life = Life{observation.frame, observation.frame};
     life->last = observation.frame;
+    ++first_of_[observation.frame + 1];
   }
+  std::partial_sum(first_of_.begin(), first_of_.end(), first_of_.begin());
   entering_.assign(state_.poses.size(), {});
   leaving_.assign(state_.poses.size(), {});
   for (std::size_t i = 0; i < lives_.size(); ++i) {
@@ -74,31 +76,31 @@ SmootherState PathSmoother::moved_by(const Eigen::VectorXd& shared, const PoseCh
   return moved;
 }
 
-/// Whole Gauss–Newton steps where the cost falls, else shorter ones.
-bool PathSmoother::settle() {
+/// Whole Gauss–Newton steps where the cost falls, else shorter ones; until one would gain less than `settled`, in σ²
+/// over all that is solved for.
+bool PathSmoother::settle(double settled) {
   constexpr int max_iterations = 25;
-  constexpr double settled = 1e-3, min_share = 0.02;  // of a step, squared, in σ
+  constexpr double min_share = 0.02;
   find_lives();
-  auto system = build(state_);
+  auto system = build(state_, Shared::solved);
   for (int iteration = 0; system && iteration < max_iterations; ++iteration) {
     const int num = num_solved();
     const Eigen::LLT<Eigen::MatrixXd> llt(system->chain.B.topLeftCorner(num, num));
     if (llt.info() != Eigen::Success) return false;
-    Eigen::VectorXd shared = Eigen::VectorXd::Zero(causes_at_ + num_causes);
-    shared.head(num) = llt.solve(system->chain.b.head(num));
-    const double gain = system->chain.gain() + shared.head(num).dot(system->chain.b.head(num));
+    const Eigen::VectorXd shared = llt.solve(system->chain.b.head(num));
+    const double gain = system->chain.gain() + shared.dot(system->chain.b.head(num));
+    if (gain < settled) return true;
     const auto steps = system->chain.steps(shared);
     std::optional<SmootherSystem> next;
     double share = 1.0;
     for (; share > min_share && !next; share *= 0.5) {
       const SmootherState there = moved_by(shared, steps, share);
-      next = build(there);
+      next = build(there, Shared::solved);
       if (next && !(next->cost <= system->cost + 1e-9 * (1.0 + system->cost))) next.reset();
       if (next) state_ = there;
     }
-    if (!next) return gain < settled * 100.0;
+    if (!next) return gain < 0.1;
     system = std::move(next);
-    if (gain < settled) return true;
   }
   return false;
 }
@@ -123,6 +125,16 @@ bool PathSmoother::choose_observations() {
   return is_other;
 }
 
+/// With the observations that fit, until these are the same; then with what their errors share.
+bool PathSmoother::settle_all() {
+  constexpr double roughly = 0.3;
+  if (!settle(roughly)) return false;
+  constexpr int max_choices = 3;
+  for (int i = 0; i < max_choices && choose_observations(); ++i)
+    if (!settle(roughly)) return false;
+  return heed_colour();
+}
+
 std::optional<SmoothedPath> PathSmoother::solve() {
   for (const UsedObservation& observation : problem_.observations) {
     const auto point = index_of_.find(observation.id);
@@ -130,26 +142,39 @@ std::optional<SmoothedPath> PathSmoother::solve() {
         project(state_.camera, state_.poses[observation.frame].inverse() * state_.points[point->second]))
       observations_.push_back(observation);
   }
-  if (!settle()) return std::nullopt;
-  constexpr int max_choices = 3;
-  for (int i = 0; i < max_choices && choose_observations(); ++i)
-    if (!settle()) return std::nullopt;
-  const auto system = build(state_);
+  if (!settle_all()) return std::nullopt;
+  const auto system = build(state_, Shared::all);
   if (!system) return std::nullopt;
-  SmoothedPath path = result(*system);
+  if (problem_.frees_lens && asks_for_lens(*system)) {
+    PathSmoother freed = *this;
+    freed.free_lens();
+    if (freed.settle_all())
+      if (const auto there = freed.build(freed.state_, Shared::all)) return freed.finished(*there);
+  }
+  return finished(*system);
+}
+
+SmoothedPath PathSmoother::finished(const SmootherSystem& system) {
+  SmoothedPath path = result(system);
+  path.structure = residual_structure(path.residuals, state_.camera);
+  path.structure.colour = structure_.colour;  // that of the errors that were taken for independent
+  path.structure.sigma_colour = structure_.sigma_colour;
+  path.radial = radial_structure(path.residuals, state_.camera, structure_.has_colour());
   path.num_dropped = problem_.observations.size() - observations_.size();
   if (std::ranges::any_of(problem_.points, [](const SmootherPoint& point) { return point.told_in_world.has_value(); }))
-    widen(system->cost, path);
+    widen(system.cost, path);
   return path;
 }
 
 void PathSmoother::fill_lens(const Eigen::MatrixXd& cov, SmoothedPath& path) const {
   path.camera = state_.camera;
   path.sigma_lens = cov.diagonal().segment(lens_at_, num_estimated_).cwiseSqrt();
+  path.is_lens_freed = is_lens_freed_;
+  path.estimated.assign(lens_order_.begin(), lens_order_.begin() + num_estimated_);
   const Eigen::VectorXd now = params(state_.camera.lens);
-  for (int i = 0; i < num_estimated_; ++i) {
+  for (int i = 0; i < num_estimated_ && !is_lens_freed_; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    const double told = problem_.filter.sigma_lens_params[at];
+    const double told = sigma_estimated_[at];
     path.lens_pull = std::max(path.lens_pull, std::abs(now[lens_order_[at]] - told_lens_[lens_order_[at]]) / told);
   }
 }
@@ -161,14 +186,9 @@ void PathSmoother::fill_map(std::span<const Eigen::Matrix3d> covs, SmoothedPath&
     path.point_covs.push_back(covs[i]);
     path.ids.push_back(problem_.points[i].id);
   }
-  for (const UsedObservation& observation : observations_) {
-    const auto px =
-        project(state_.camera, state_.poses[observation.frame].inverse() * state_.points[index_of_.at(observation.id)]);
-    if (!px) continue;
-    path.residuals.push_back(
-        {observation.frame, observation.id, observation.px, observation.px - *px, observation.sigma_px});
-    path.chi2_per_dof += (observation.px - *px).squaredNorm() / (observation.sigma_px * observation.sigma_px);
-  }
+  path.residuals = placed_residuals();
+  for (const PlacedResidual& residual : path.residuals)
+    path.chi2_per_dof += residual.residual_px.squaredNorm() / (residual.sigma_px * residual.sigma_px);
   const double num_numbers = 2.0 * static_cast<double>(path.residuals.size());
   const double num_solved = 6.0 * static_cast<double>(state_.poses.size()) + 3.0 * static_cast<double>(path.ids.size());
   path.chi2_per_dof /= std::max(num_numbers - num_solved, 0.5 * num_numbers + 1.0);
@@ -185,17 +205,26 @@ void PathSmoother::add_clock(SmoothedPath& path) const {
   path.given.push_back(clock);
 }
 
-SmoothedPath PathSmoother::result(const SmootherSystem& system) const {
+PathSmoother::Asked PathSmoother::asked(const SmootherSystem& system) const {
   const int num = num_solved(), all = causes_at_ + num_causes, rest = all - num;
   const Eigen::MatrixXd B = system.chain.B.topLeftCorner(all, all).selfadjointView<Eigen::Lower>();
   const Eigen::LLT<Eigen::MatrixXd> llt(B.topLeftCorner(num, num));
+  Asked asked{Eigen::MatrixXd::Identity(all, rest), {}, system.chain.b.segment(num, rest)};
+  asked.J.topRows(num) = -llt.solve(B.topRightCorner(num, rest));
+  asked.J.bottomRows(rest).setIdentity();
+  asked.information = B.bottomRightCorner(rest, rest) + B.bottomLeftCorner(rest, num) * asked.J.topRows(num);
+  asked.score += asked.J.topRows(num).transpose() * system.chain.b.head(num);
+  return asked;
+}
+
+SmoothedPath PathSmoother::result(const SmootherSystem& system) const {
+  const int num = num_solved();
+  const Eigen::LLT<Eigen::MatrixXd> llt(system.chain.B.topLeftCorner(num, num));
   const Eigen::MatrixXd considered = considered_cov();
-  Eigen::MatrixXd J = Eigen::MatrixXd::Identity(all, rest);  // of what is shared, by what is given
-  J.topRows(num) = -llt.solve(B.topRightCorner(num, rest));
-  J.bottomRows(rest).setIdentity();
-  Eigen::MatrixXd cov = J * considered * J.transpose();
+  const Asked asked = this->asked(system);
+  Eigen::MatrixXd cov = asked.J * considered * asked.J.transpose();
   cov.topLeftCorner(num, num) += llt.solve(Eigen::MatrixXd::Identity(num, num));
-  PoseChain::Spread spread = system.chain.spread(cov, J);
+  PoseChain::Spread spread = system.chain.spread(cov, asked.J);
   align(system, considered, spread);
   SmoothedPath path;
   path.world_from_cam = state_.poses;
@@ -207,10 +236,9 @@ SmoothedPath PathSmoother::result(const SmootherSystem& system) const {
   }
   fill_map(spread.point_cov, path);
   fill_lens(cov, path);
-  const Eigen::MatrixXd S = B.bottomRightCorner(rest, rest) + B.bottomLeftCorner(rest, num) * J.topRows(num);
   const std::vector<int> given(lens_order_.begin() + num_estimated_, lens_order_.end());
-  path.given =
-      given_numbers({problem_.camera, given, considered, system.chain.b.segment(num, rest), S, S, spread.J, path.cov});
+  path.given = given_numbers(
+      {problem_.camera, given, considered, asked.score, asked.information, asked.information, spread.J, path.cov});
   add_clock(path);
   return path;
 }

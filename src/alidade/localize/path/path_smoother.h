@@ -56,7 +56,8 @@ struct SmootherProblem {
   double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;
   double period_s = 1.0 / 30.0;  ///< Accelerations are drawn again for each.
   PathGauge gauge = PathGauge::fixed;
-  double sigma_scale = 0.0;         ///< Of the known points' common scale, counted and not estimated.
+  double sigma_scale = 0.0;  ///< Of the known points' common scale, counted and not estimated.
+  bool frees_lens = false;   ///< A lens that the observations contradict is estimated, without what was given of it.
   LocalizationFilterConfig filter;  /// σ of accelerations, the gate, and what of the lens is estimated.
 };
 
@@ -69,10 +70,14 @@ struct SmoothedPath {
   std::vector<Eigen::Vector3d> points;
   std::vector<Eigen::Matrix3d> point_covs;
   Camera camera;
-  Eigen::VectorXd sigma_lens;  ///< Of those estimated.
+  bool is_lens_freed = false;
+  std::vector<int> estimated;  ///< Of the lens's numbers,
+  Eigen::VectorXd sigma_lens;  ///< and their σ.
   double lens_pull = 0.0;      ///< How far an estimated number of the lens is from what was given, in the given σ.
   std::vector<GivenNumber> given;
   std::vector<PlacedResidual> residuals;
+  ResidualStructure structure;  ///< Where errors last from frame to frame, the path heeds that.
+  RadialStructure radial;
   double chi2_per_dof = 0.0;  ///< Of the observations that fit.
   /// Along its least certain direction the cost rises more slowly to one side than to the other, or than σ says; σ is
   /// enlarged there by so much.

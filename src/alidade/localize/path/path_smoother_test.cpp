@@ -172,6 +172,23 @@ TEST(SimpleCase, ThePoseIsAsGoodAsItsCovarianceSays) {
   }
 }
 
+/// Errors that last from frame to frame, as of tracks that drift: taken for independent the path's σ would be four
+/// times too small, and enlarged as if nothing but their sum counted twice too large.
+TEST(SimpleCase, ErrorsThatLastAreHeeded) {
+  constexpr int num_seeds = 6;
+  double nees = 0.0;
+  for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
+    const HoverRun run = testing::hovering({.num_frames = 120, .num_others = 24, .lasting = 0.9}, 4000 + seed);
+    const Localization report = hover_localized(run, run.camera);
+    EXPECT_TRUE(report.is_smoothed);
+    EXPECT_NEAR(report.residuals.colour, 0.9, 0.06);
+    nees += mean_nees(report, run) / num_seeds;
+  }
+  RecordProperty("nees", std::to_string(nees));
+  EXPECT_GT(nees, 0.6);
+  EXPECT_LT(nees, 1.4);
+}
+
 /// A camera drawn from its file's covariance: counted, the path's σ holds; unknown, it is many times too small.
 TEST(SimpleCase, TheLensesCovarianceIsCounted) {
   constexpr int num_seeds = 16;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <map>
 #include <optional>
 #include <span>
@@ -9,8 +10,8 @@
 #include "alidade/localize/path/path_smoother.h"
 #include "alidade/localize/path/pose_chain.h"
 
-// The work behind path_smoother.h: its factors in path_factors.cpp, its steps and what comes of them in
-// path_smoother.cpp.
+// The work behind path_smoother.h: its factors in path_observations.cpp and path_factors.cpp, its steps and what comes
+// of them in path_smoother.cpp.
 
 namespace alidade {
 
@@ -23,6 +24,8 @@ struct SmootherState {
 struct SmootherSystem {
   PoseChain chain;
   double cost = 0.0;
+  double observed_cost = 0.0;  ///< Of that, the observations'.
+  bool has_given = false;      ///< What is given and not solved for stands in the border, too.
 };
 
 /// Behind the lens in the border: see given_numbers.h.
@@ -37,8 +40,10 @@ class PathSmoother {
  private:
   /// Of the shared numbers those that are solved for: the estimated part of the lens, which stands first.
   [[nodiscard]] int num_solved() const { return num_estimated_; }
-  [[nodiscard]] bool settle();
-  [[nodiscard]] std::optional<SmootherSystem> build(const SmootherState& state) const;
+  static constexpr double well = 1e-3;
+  [[nodiscard]] bool settle(double settled = well);
+  enum class Shared { solved, all };  ///< What stands in the border: all only for what comes of a solution.
+  [[nodiscard]] std::optional<SmootherSystem> build(const SmootherState& state, Shared shared) const;
   [[nodiscard]] SmootherState moved_by(const Eigen::VectorXd& shared, const PoseChain::Steps& steps,
                                        double share) const;
   void find_lives();
@@ -49,8 +54,33 @@ class PathSmoother {
   using GivenRows = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 16 + num_causes>;
   [[nodiscard]] GivenRows given_rows(const ExpectedView& view, const UsedObservation& observation,
                                      const Twist& twist) const;
-  [[nodiscard]] bool add_observation(const SmootherState& state, const UsedObservation& observation, const Twist& twist,
-                                     SmootherSystem& system) const;
+  /// An observation as it is at a state, over its σ.
+  struct ObservationRows {
+    Eigen::Vector2d error;
+    Eigen::Matrix<double, 2, 6> J_pose;
+    Eigen::Matrix<double, 2, 3> J_point;
+    GivenRows J_shared;
+  };
+  /// Of the frames of a window, each at its number modulo three; `next` is the first that is not there yet.
+  struct Lookahead {
+    std::array<std::vector<ObservationRows>, 3> of_frame;
+    std::size_t next = 0;
+  };
+  [[nodiscard]] std::optional<ObservationRows> rows_of(const SmootherState& state, const UsedObservation& observation,
+                                                       const Twist& twist, bool has_given) const;
+  [[nodiscard]] bool look_ahead(const SmootherState& state, std::size_t to, bool has_given, Lookahead& rows) const;
+  void add(const ObservationRows& rows, const ObservationRows* before, double share, int row, int at,
+           SmootherSystem& system) const;
+  [[nodiscard]] bool add_observations(const SmootherState& state, std::size_t k, Lookahead& rows,
+                                      SmootherSystem& system) const;
+  void link_observations(double correlation);
+  [[nodiscard]] std::vector<PlacedResidual> placed_residuals() const;
+  [[nodiscard]] bool heed_colour();
+  [[nodiscard]] bool settle_all();
+  /// path_lens.cpp.
+  [[nodiscard]] bool asks_for_lens(const SmootherSystem& system) const;
+  void free_lens();
+  void estimate_lens(std::vector<int> estimated);
   void add_range(const SmootherState& state, std::size_t point, SmootherSystem& system) const;
   struct Speeds {
     Eigen::Vector<double, 6> values;
@@ -63,6 +93,13 @@ class PathSmoother {
   /// The observations within the gate of where they are expected now. Whether these are others than before.
   [[nodiscard]] bool choose_observations();
   [[nodiscard]] Eigen::MatrixXd lens_information() const;
+  /// What is left of the normal equations for what is given, all that is solved for at its best.
+  struct Asked {
+    Eigen::MatrixXd J;  ///< Of all that is shared, by what is given.
+    Eigen::MatrixXd information;
+    Eigen::VectorXd score;
+  };
+  [[nodiscard]] Asked asked(const SmootherSystem& system) const;
   [[nodiscard]] Eigen::MatrixXd considered_cov() const;
   void fill_map(std::span<const Eigen::Matrix3d> covs, SmoothedPath& path) const;
   void fill_lens(const Eigen::MatrixXd& cov, SmoothedPath& path) const;
@@ -74,12 +111,24 @@ class PathSmoother {
   [[nodiscard]] bool hold_weakest(const SmoothedPath& path);
   void add_held(const SmootherState& state, SmootherSystem& system) const;
   [[nodiscard]] SmoothedPath result(const SmootherSystem& system) const;
+  [[nodiscard]] SmoothedPath finished(const SmootherSystem& system);
 
   const SmootherProblem& problem_;
   std::vector<UsedObservation> observations_;  ///< Those that fit.
+  std::vector<std::size_t> first_of_;          ///< Of each frame the first of them.
+  /// What an observation's error shares with that of the one of the same point before it.
+  struct Link {
+    std::optional<std::size_t> before;  ///< Of at most two frames before.
+    double correlation = 0.0;
+    double weight = 1.0;  ///< Of what is new of it.
+  };
+  ResidualStructure structure_;
+  std::vector<Link> links_;  ///< Of each observation; none: errors are independent.
   std::map<long, std::size_t> index_of_;
   std::vector<int> lens_order_;  ///< Those estimated, then the others.
+  std::vector<double> sigma_estimated_;
   int num_estimated_ = 0;
+  bool is_lens_freed_ = false;  ///< What was given of it contradicts the observations: estimated without it.
   static constexpr int lens_at_ = 0;
   int causes_at_ = 0;  ///< The target's scale and shape, its speed, and the image's readout: tested, not solved for.
   Eigen::Vector3d target_middle_ = Eigen::Vector3d::Zero();

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/localize/checks/residual_structure.h"
 #include "alidade/localize/checks/scale_readings.h"
 #include "alidade/localize/checks/summary.h"
 #include "alidade/localize/path/left_out_points.h"
@@ -11,15 +10,6 @@
 
 namespace alidade {
 namespace {
-
-/// Errors that last from frame to frame by an autoregression of first order: so many fewer are independent.
-void enlarge(SmoothedPath& smoothed, const ResidualStructure& residuals) {
-  if (!residuals.has_colour()) return;
-  const double correlation = std::min(residuals.colour, 0.95), factor = (1.0 + correlation) / (1.0 - correlation);
-  for (auto& cov : smoothed.cov) cov *= factor;
-  for (auto& cov : smoothed.point_covs) cov *= factor;
-  smoothed.sigma_lens *= std::sqrt(factor);
-}
 
 /// What of each frame fits the smoothed path: frames that the filter had lost may be held by their observations there.
 void judge_frames(const SmoothedPath& smoothed, std::size_t first_frame, std::span<const ObservationFrame> frames,
@@ -42,8 +32,7 @@ std::optional<SmoothedPath> smooth(const SmootherProblem& problem, std::span<con
                                    Localization& result) {
   auto smoothed = smoothed_path(problem);
   if (!smoothed) return std::nullopt;
-  result.residuals = residual_structure(smoothed->residuals, problem.camera.width_px, problem.camera.height_px);
-  enlarge(*smoothed, result.residuals);
+  result.residuals = smoothed->structure;
   for (std::size_t k = 0; k < smoothed->cov.size(); ++k) {
     PathStep& step = result.path[problem.first_frame + k];
     step.world_from_cam = smoothed->world_from_cam[k];
@@ -119,6 +108,7 @@ std::optional<WholePath> whole_path(const Recording& recording, const LocalizeEn
                                                            engine.best(), recording.gone, engine.start_without_target(),
                                                            recording.period_s, !recording.number_of.empty());
   if (!problem) return std::nullopt;
+  problem->frees_lens = result.is_of_images;
   auto smoothed = smooth_with_loops(recording, *problem, kept);
   if (!smoothed) return std::nullopt;
   const double scale = solve_in_metres(recording, config, *problem, *smoothed, kept);

@@ -1,0 +1,30 @@
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "alidade/localize/checks/judge.h"
+
+namespace alidade {
+
+std::string lens_changes(const Localization& report) {
+  const std::vector<std::string> names = param_names(report.camera.lens);
+  const Eigen::VectorXd now = params(report.camera.lens), given = params(report.given_camera->lens);
+  std::string text;
+  for (std::size_t i = 0; i < report.lens_params.size(); ++i) {
+    const std::string& name = report.lens_params[i];
+    const auto at = std::ranges::find(names, name) - names.begin();
+    const double by = now[at] - given[at], z = std::abs(by) / report.sigma_lens[static_cast<Eigen::Index>(i)];
+    constexpr double worth_a_word = 3.0;
+    if (name == "fy" || !(z > worth_a_word)) continue;
+    const std::string sign = by > 0.0 ? "+" : "";
+    text += (text.empty() ? "" : ", ") +
+            (name == "fx" ? "focal length " + sign + text_of(100.0 * by / given[at], 2) + " %"
+             : name == "cx" || name == "cy"
+                 ? "centre " + std::string(name == "cx" ? "u " : "v ") + sign + text_of(by, 2) + " px"
+                 : name + " " + sign + text_of(by, 2)) +
+            " (" + text_of(z, 2) + "σ)";
+  }
+  return text;
+}
+
+}  // namespace alidade

@@ -1,0 +1,175 @@
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/localize/checks/residual_structure.h"
+#include "alidade/localize/path/path_system.h"
+
+// What a path is solved from, most of it: its observations, and what the error of one shares with that of the same
+// point before.
+
+namespace alidade {
+
+/// How the expected pixel changes by what is shared: the lens, then the causes (scale and shape by known places alone).
+PathSmoother::GivenRows PathSmoother::given_rows(const ExpectedView& view, const UsedObservation& observation,
+                                                 const Twist& twist) const {
+  const auto num_lens = view.J_px_lens.cols();
+  GivenRows J = GivenRows::Zero(2, num_lens + num_causes);
+  for (Eigen::Index i = 0; i < num_lens; ++i) J.col(i) = view.J_px_lens.col(lens_order_[static_cast<std::size_t>(i)]);
+  const SmootherPoint& point = problem_.points[index_of_.at(observation.id)];
+  if (point.told_in_world)  // a target that moves: not where it is given to be, but further by so much
+    J.middleCols<3>(num_lens + speed_cause) =
+        (problem_.t_s[observation.frame] - middle_s_) * view.J_px_feature.leftCols<3>();
+  const double rows =
+      observation.px.y() / problem_.camera.height_px - 0.5;  // an image's time is that of its middle row
+  J.col(num_lens + readout_cause) = rows * view.J_px_pose * twist;
+  return J;
+}
+
+/// None where the camera does not see it.
+std::optional<PathSmoother::ObservationRows> PathSmoother::rows_of(const SmootherState& state,
+                                                                   const UsedObservation& observation,
+                                                                   const Twist& twist, bool has_given) const {
+  Feature feature;
+  feature.values.head<3>() = state.points[index_of_.at(observation.id)];
+  const auto view = expected_view(state.camera, state.poses[observation.frame], feature);
+  if (!view) return std::nullopt;
+  const double weight = 1.0 / observation.sigma_px;
+  ObservationRows rows{weight * (view->px - observation.px), weight * view->J_px_pose,
+                       weight * view->J_px_feature.leftCols<3>(), GivenRows::Zero(2, num_estimated_)};
+  if (has_given)
+    rows.J_shared = weight * given_rows(*view, observation, twist);
+  else
+    for (int i = 0; i < num_estimated_; ++i)
+      rows.J_shared.col(i) = weight * view->J_px_lens.col(lens_order_[static_cast<std::size_t>(i)]);
+  return rows;
+}
+
+/// The rows of all frames before `to` that are still looked at. False where an observation is not seen.
+bool PathSmoother::look_ahead(const SmootherState& state, std::size_t to, bool has_given, Lookahead& rows) const {
+  for (; rows.next < to; ++rows.next) {
+    auto& of_frame = rows.of_frame[rows.next % rows.of_frame.size()];
+    of_frame.clear();
+    const Twist twist = has_given ? twist_at(state, rows.next) : Twist::Zero();
+    for (std::size_t i = first_of_[rows.next]; i < first_of_[rows.next + 1]; ++i) {
+      const auto each = rows_of(state, observations_[i], twist, has_given);
+      if (!each) return false;
+      of_frame.push_back(*each);
+    }
+  }
+  return true;
+}
+
+namespace {
+
+using Rows6 = Eigen::Matrix<double, 2, 6>;
+
+/// Terms of a pose of the window with itself, the point and what is shared. Products of two rows: Eigen's general ones
+/// cost more than they do.
+template <typename Shared>
+void add_pose(int row, const Rows6& J, const Eigen::Matrix<double, 2, 3>& J_point, const Shared& J_shared, int at,
+              const Eigen::Vector2d& error, PoseChain& chain) {
+  chain.A.block<6, 6>(row, row) += J.transpose() * J;
+  chain.U.block<6, 3>(row, at) += J.transpose() * J_point;
+  for (Eigen::Index i = 0; i < J_shared.cols(); ++i)
+    chain.U.block<6, 1>(row, i) += J.transpose() * Eigen::Vector2d(J_shared.col(i));
+  chain.a.segment<6>(row) -= J.transpose() * error;
+}
+
+template <typename Shared>
+void add_point(const Eigen::Matrix<double, 2, 3>& J, const Shared& J_shared, int at, const Eigen::Vector2d& error,
+               PoseChain& chain) {
+  chain.B.block<3, 3>(at, at) += J.transpose() * J;
+  chain.b.segment<3>(at) -= J.transpose() * error;
+  for (Eigen::Index i = 0; i < J_shared.cols(); ++i) {
+    const Eigen::Vector2d column = J_shared.col(i);
+    chain.B.block<3, 1>(at, i) += J.transpose() * column;
+    for (Eigen::Index j = i; j < J_shared.cols(); ++j) chain.B(j, i) += column.dot(J_shared.col(j));
+    chain.b[i] -= column.dot(error);
+  }
+}
+
+}  // namespace
+
+/// An observation of the window's pose at `row`, less a share of one of its first pose.
+void PathSmoother::add(const ObservationRows& rows, const ObservationRows* before, double share, int row, int at,
+                       SmootherSystem& system) const {
+  PoseChain& chain = system.chain;
+  ObservationRows now = rows;
+  if (before != nullptr) {
+    now.error -= share * before->error;
+    now.J_point -= share * before->J_point;
+    now.J_shared -= share * before->J_shared;
+    const Rows6 J_before = -share * before->J_pose;
+    add_pose(0, J_before, now.J_point, now.J_shared, at, now.error, chain);
+    chain.A.block<6, 6>(row, 0) += now.J_pose.transpose() * J_before;
+  }
+  add_pose(row, now.J_pose, now.J_point, now.J_shared, at, now.error, chain);
+  add_point(now.J_point, now.J_shared, at, now.error, chain);
+  system.cost += now.error.squaredNorm();
+  system.observed_cost += now.error.squaredNorm();
+}
+
+/// The observations of frame k, the first of the window; where errors last, those whose last one before was there.
+bool PathSmoother::add_observations(const SmootherState& state, std::size_t k, Lookahead& rows,
+                                    SmootherSystem& system) const {
+  const std::size_t end = std::min(links_.empty() ? k + 1 : k + 3, state.poses.size());
+  if (!look_ahead(state, end, system.has_given, rows)) return false;
+  for (std::size_t frame = k; frame < end; ++frame) {
+    for (std::size_t i = first_of_[frame]; i < first_of_[frame + 1]; ++i) {
+      const Link link = links_.empty() ? Link{} : links_[i];
+      const std::size_t added_at = link.before ? observations_[*link.before].frame : frame;
+      if (added_at != k) continue;
+      const int at = system.chain.place_of(index_of_.at(observations_[i].id)), row = 6 * static_cast<int>(frame - k);
+      ObservationRows now = rows.of_frame[frame % 3][i - first_of_[frame]];
+      now.error *= link.weight;
+      now.J_pose *= link.weight;
+      now.J_point *= link.weight;
+      now.J_shared *= link.weight;
+      const auto* before = link.before ? &rows.of_frame[k % 3][*link.before - first_of_[k]] : nullptr;
+      add(now, before, link.weight * link.correlation, row, at, system);
+    }
+  }
+  return true;
+}
+
+/// Errors of a point that last from frame to frame as an autoregression of first order: what is new of each is as
+/// independent as it is small (D. Cochrane & G. Orcutt 1949). After a gap too long for the window an error begins
+/// anew, with no more weight than it has as one of a row.
+void PathSmoother::link_observations(double correlation) {
+  std::map<long, std::size_t> last;
+  links_.assign(observations_.size(), {});
+  for (std::size_t i = 0; i < observations_.size(); ++i) {
+    const auto [at, is_first] = last.try_emplace(observations_[i].id, i);
+    if (is_first) continue;
+    const std::size_t gap = observations_[i].frame - observations_[at->second].frame;
+    const double shared = std::pow(correlation, static_cast<double>(gap));
+    links_[i].correlation = shared;
+    constexpr std::size_t in_window = 2;
+    if (gap <= in_window) links_[i].before = at->second;
+    links_[i].weight =
+        gap <= in_window ? 1.0 / std::sqrt(1.0 - shared * shared) : std::sqrt((1.0 - shared) / (1.0 + shared));
+    at->second = i;
+  }
+}
+
+std::vector<PlacedResidual> PathSmoother::placed_residuals() const {
+  std::vector<PlacedResidual> residuals;
+  for (const UsedObservation& observation : observations_) {
+    const auto px =
+        project(state_.camera, state_.poses[observation.frame].inverse() * state_.points[index_of_.at(observation.id)]);
+    if (!px) continue;
+    residuals.push_back(
+        {observation.frame, observation.id, observation.px, observation.px - *px, observation.sigma_px});
+  }
+  return residuals;
+}
+
+/// Where errors last, the path is solved again with what is new of each. False where that cannot be.
+bool PathSmoother::heed_colour() {
+  constexpr double most = 0.98;
+  structure_ = residual_structure(placed_residuals(), state_.camera);
+  if (structure_.has_colour()) link_observations(std::min(structure_.colour, most));
+  return settle();
+}
+
+}  // namespace alidade

@@ -177,7 +177,7 @@ TEST_F(ServoCommand, SaysWhatIsWrongWithItsScenario) {
   expect("plant: {gain: 0, unit: deg}\n", "plant.gain: is zero");
   expect("plant: {gain: 2}\n", "plant.unit: is missing");
   expect("plant: {kind: stepper}\n", "'stepper' is not one of angle, rate");
-  expect("plant: {max_acceleration_deg_s2: 100}\n", "is for a plant of kind rate");
+  expect("plant: {max_acceleration_deg_s2: 0}\n", "max_acceleration_deg_s2");
   expect("plant: {pan_deg: [10, -10]}\n", "must be two angles, the lower one first");
   expect("pi: {kp: 2}\n", "pi.unit: is missing");
   expect("controllers: []\n", "names none");

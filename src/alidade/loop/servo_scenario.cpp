@@ -153,10 +153,13 @@ FieldList fields_of(ServoScenario& scenario) {
 
 void require_sense(ServoScenario scenario) {
   FieldList fields = fields_of(scenario);
-  // An angle plant may have no limit of its rate.
-  std::erase_if(fields, [](const Field& field) {
+  // An angle plant may have no limit of its rate and acceleration.
+  const bool is_angle = std::holds_alternative<AnglePlant>(scenario.scene.axes[0].plant);
+  std::erase_if(fields, [is_angle](const Field& field) {
     double* const* number = std::get_if<double*>(&field.value);
-    return field.name.ends_with("max_rate_rad_s") && number != nullptr && **number > 0.0 && std::isinf(**number);
+    const bool may_be_none =
+        field.name.ends_with("max_rate_rad_s") || (is_angle && field.name.ends_with("max_acceleration_rad_s2"));
+    return may_be_none && number != nullptr && **number > 0.0 && std::isinf(**number);
   });
   Faults found = faults_of(fields);
   check_scene(scenario.scene, found);

@@ -7,9 +7,25 @@
 namespace alidade {
 namespace {
 
+/// The rate from which it can still brake, within its acceleration: as `Positioner`.
+AxisMotion braking(const AnglePlant& plant, AxisMotion motion, double goal, double dt_s) {
+  constexpr double longest_step_s = 0.5e-3;
+  const double a = plant.max_acceleration_rad_s2, bend = a * plant.tau_s * plant.tau_s;
+  const double steps = std::max(1.0, std::ceil(dt_s / longest_step_s)), step_s = dt_s / steps;
+  for (double k = 0.0; k < steps; ++k) {
+    const double missing = goal - motion.angle_rad, left = std::abs(missing);
+    const double most = left <= bend ? left / plant.tau_s : std::sqrt(2.0 * a * (left - 0.5 * bend));
+    const double wanted = std::copysign(std::min(plant.max_rate_rad_s, most), missing);
+    motion.rate_rad_s += std::clamp(wanted - motion.rate_rad_s, -a * step_s, a * step_s);
+    motion.angle_rad += motion.rate_rad_s * step_s;
+  }
+  return motion;
+}
+
 /// Two phases: as fast as it can until the lag asks for less, then the lag.
 AxisMotion advanced(const AnglePlant& plant, const AxisMotion& motion, double command, double dt_s) {
   const double goal = plant.gain_rad() * command, missing = goal - motion.angle_rad;
+  if (std::isfinite(plant.max_acceleration_rad_s2)) return braking(plant, motion, goal, dt_s);
   const double most = plant.max_rate_rad_s;
   const double fast_s =
       std::isfinite(most) ? std::clamp((std::abs(missing) - plant.tau_s * most) / most, 0.0, dt_s) : 0.0;

@@ -21,12 +21,14 @@ enum class AngleUnit { deg, rad };
 [[nodiscard]] std::optional<AngleUnit> unit_named(std::string_view name);
 
 /// An axis whose angle follows the command with a first-order lag, no faster than it can: dθ = clamp((g u − θ) / τ,
-/// ±max_rate).
+/// ±max_rate). With a limit of its acceleration it is the axis of docs/maths/servo.md, "A head that is told where to
+/// go": the rate follows within that limit, and brakes in time.
 struct AnglePlant {
   double gain = 0.0567;  ///< Angle per unit of command, in `unit`. Xiahou, Chen & Wu, 2015: 0.0567 / (0.1 s + 1).
   AngleUnit unit = AngleUnit::deg;
   double tau_s = 0.1;
   double max_rate_rad_s = std::numeric_limits<double>::infinity();
+  double max_acceleration_rad_s2 = std::numeric_limits<double>::infinity();
 
   [[nodiscard]] double gain_rad() const { return gain * radians_in(unit); }
   bool operator==(const AnglePlant&) const = default;
@@ -66,11 +68,12 @@ struct ServoAxis {
 
 struct AxisMotion {
   double angle_rad = 0.0;
-  double rate_rad_s = 0.0;  ///< Of an angle plant: mean over the last step.
+  double rate_rad_s = 0.0;  ///< Of an angle plant without a limit of its acceleration: mean over the last step.
 };
 
-/// The plant of an axis dt ≥ 0 later under a command that is held and acts at once. Closed form, exact for any dt; at a
-/// stop the axis stands still.
+/// The plant of an axis dt ≥ 0 later under a command that is held and acts at once. Closed form, exact for any dt, but
+/// for an angle plant with a limit of its acceleration: in steps of half a millisecond. At a stop the axis stands
+/// still.
 [[nodiscard]] AxisMotion advanced(const ServoAxis& axis, const AxisMotion& motion, double command, double dt_s);
 
 [[nodiscard]] double tau_of(const ServoPlant& plant);

@@ -1,5 +1,7 @@
 #include "alidade/pantilt/servo_plant.h"
 
+#include "alidade/pantilt/positioner.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -85,6 +87,25 @@ TEST(ServoPlant, KeepsWithinWhatItCanDo) {
   }
   EXPECT_EQ(motion.angle_rad, 0.8);
   EXPECT_EQ(motion.rate_rad_s, 0.0);
+}
+
+TEST(ServoPlant, AnAngleWithALimitOfItsAccelerationIsAPositioner) {
+  const PositionerParams params{
+      .rate_rad_s = 0.7, .acceleration_rad_s2 = 2.1, .time_constant_s = 0.06, .latency_s = 0.1};
+  Positioner positioner(params, 0.0, 0.0);
+  const AnglePlant plant{1.0, AngleUnit::rad, 0.06, 0.7, 2.1};
+  DelayedAxis axis({.plant = plant, .command_delay_s = 0.1}, {});
+  double t_s = 0.0, farthest = 0.0;
+  for (const double goal : {0.5, 0.52, -0.3, -0.31, 0.0}) {
+    positioner.go_to(t_s, goal);
+    axis.send(goal);
+    for (int i = 0; i < 9; ++i) {
+      positioner.advance(t_s += 0.05);
+      axis.advance(0.05);
+      farthest = std::max(farthest, std::abs(positioner.output_rad() - axis.motion().angle_rad));
+    }
+  }
+  EXPECT_LT(farthest, 1e-3);  // steps of a quarter and of half a millisecond: 0.5 ms of 0.7 rad/s
 }
 
 TEST(ServoPlant, UnitsAreExplicit) {

@@ -149,8 +149,7 @@ void read_plant(const YAML::Node& root, const Fields& top, ServoScenario& scenar
     AnglePlant& plant = std::get<AnglePlant>(axis.plant);
     read_gain(section, described, plant);
     section.number("max_rate_deg_s", plant.max_rate_rad_s, described, degree);
-    const std::string key = "max_acceleration_deg_s2";
-    if (section.has(key)) refuse(top.file(), section.fields().full(key), "is for a plant of kind rate");
+    section.number("max_acceleration_deg_s2", plant.max_acceleration_rad_s2, described, degree);
   }
   section.number("command_delay_s", axis.command_delay_s, described);
   section.number("dead_band", axis.dead_band, described);
@@ -363,6 +362,7 @@ sample_period_s: 0.05            # images, encoders, commands
 latency_s: 0                     # from an image to its pixel
 # hidden_s: [5, 6]               # from, to: the target is not seen
 plant: {kind: angle, gain: 0.0567, unit: deg, tau_s: 0.1, command_delay_s: 0}
+# plant: {kind: angle, gain: 1, tau_s: 0.06, max_rate_deg_s: 40, max_acceleration_deg_s2: 120}  # as `head --identify` has
 # plant: {kind: rate, gain: 1, unit: rad, tau_s: 0.05, max_rate_deg_s: 180, max_acceleration_deg_s2: 1500,
 #         pan_deg: [-170, 170], tilt_deg: [-30, 90], dead_band: 0, backlash_deg: 0, second_tau_s: 0}
 mismatch: {gain: 1, tau: 1}      # the plant as it is, over the plant as it is known

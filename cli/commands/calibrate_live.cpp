@@ -218,12 +218,10 @@ FieldList fields_of(CaptureArgs& args) {
 }
 
 void require_no_capture(const CaptureArgs& args) {
-  const auto refuse = [](const char* option) { throw UsageError(std::string(option) + ": only with --live"); };
-  if (!args.from.empty()) refuse("--from");
-  if (args.no_page) refuse("--no-page");
-  if (!args.resume.empty()) refuse("--resume");
-  if (args.until_is_given) refuse("--until");
-  if (!args.live.address.empty()) refuse("--live-address");
+  require_no_guide(args.live, {{"--from", !args.from.empty()},
+                               {"--no-page", args.no_page},
+                               {"--resume", !args.resume.empty()},
+                               {"--until", args.until_is_given}});
 }
 
 ExitCode calibrate_live(

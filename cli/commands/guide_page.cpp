@@ -37,6 +37,13 @@ cv::Mat grey_of(const live::LiveFrame& frame) {
   return cv::Mat(frame.height_px, frame.width_px, CV_8U, const_cast<unsigned char*>(frame.grey.data())).clone();
 }
 
+void require_no_guide(const LiveOptions& live, std::initializer_list<std::pair<const char*, bool>> given) {
+  const auto refuse = [](const char* option) { throw UsageError(std::string(option) + ": only with --live"); };
+  for (const auto& [option, is_given] : given)
+    if (is_given) refuse(option);
+  if (!live.address.empty()) refuse("--live-address");
+}
+
 void add_guide_options(CLI::App& command, LiveOptions& live, const std::string& help, const std::string& group) {
   command
       .add_option_function<std::string>(

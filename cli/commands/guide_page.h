@@ -1,9 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "alidade/live/capture/capture_server.h"
@@ -34,6 +36,10 @@ struct PictureSource {
 
 /// --live [PORT] and --live-address of a command that guides by a page.
 void add_guide_options(CLI::App& command, LiveOptions& live, const std::string& help, const std::string& group);
+
+/// Options that say something only with --live: what of them was given without it. Throws UsageError, which names the
+/// first.
+void require_no_guide(const LiveOptions& live, std::initializer_list<std::pair<const char*, bool>> given);
 
 class GuidePage;
 

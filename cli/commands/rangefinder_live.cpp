@@ -153,11 +153,9 @@ FieldList fields_of(GuidedShotsArgs& args) {
 }
 
 void require_no_guided_shots(const GuidedShotsArgs& args) {
-  const auto refuse = [](const char* option) { throw UsageError(std::string(option) + ": only with --live"); };
-  if (!args.from.empty()) refuse("--from");
-  if (!args.resume.empty()) refuse("--resume");
-  if (args.until_mm > 0.0) refuse("--until-mm");
-  if (!args.live.address.empty()) refuse("--live-address");
+  require_no_guide(
+      args.live,
+      {{"--from", !args.from.empty()}, {"--resume", !args.resume.empty()}, {"--until-mm", args.until_mm > 0.0}});
 }
 
 ExitCode rangefinder_live(const Camera& camera, const RangefinderConfig& config, GuidedShotsArgs args, Run& run,

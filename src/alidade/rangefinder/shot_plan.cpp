@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/board/board_reach.h"
 #include "alidade/geometry/degree.h"
 
 namespace alidade {
@@ -16,7 +17,7 @@ double sigma_origin_m(const BeamNow& now) { return std::sqrt(now.beam.cov.topLef
 std::vector<std::string> shot_faults(const BeamNow& now, const ShotConfig& config) {
   ShotConfig copy = config;
   std::vector<std::string> found = faults_of(fields_of(copy));
-  if (!(config.min_range_m < config.max_range_m)) found.emplace_back("--min-range-m must be below --max-range-m");
+  add_reach_fault(config.min_range_m, config.max_range_m, found);
   if (now.camera.width_px < 1 || now.camera.height_px < 1 || !params(now.camera.lens).allFinite())
     found.emplace_back("the camera is none");
   const bool is_beam = now.beam.origin_in_cam.allFinite() && now.beam.direction_in_cam.allFinite() &&
@@ -47,23 +48,10 @@ Verdict shots_verdict(const ShotPlan& plan) {
 }  // namespace
 
 FieldList fields_of(ShotConfig& config) {
-  constexpr Limits positive{.min = 0.0, .is_above_min = true};
-  return {{.name = "shots", .value = &config.shots, .help = "How many shots to propose", .limits = {1, 20}},
-          {.name = "min_range_m",
-           .value = &config.min_range_m,
-           .help = "Nearest board",
-           .limits = positive,
-           .option = "--min-range-m"},
-          {.name = "max_range_m",
-           .value = &config.max_range_m,
-           .help = "Farthest board",
-           .limits = positive,
-           .option = "--max-range-m"},
-          {.name = "max_tilt_deg",
-           .value = &config.max_tilt_deg,
-           .help = "Largest tilt of the board [deg]",
-           .limits = {0.0, 80.0},
-           .option = "--max-tilt-deg"}};
+  FieldList fields{{.name = "shots", .value = &config.shots, .help = "How many shots to propose", .limits = {1, 20}}};
+  for (Field& field : board_reach_fields(config.min_range_m, config.max_range_m, "max_tilt_deg", config.max_tilt_deg))
+    fields.push_back(std::move(field));
+  return fields;
 }
 
 ShotPlan plan_shots(const BeamNow& now, const ShotConfig& config, const Progress& progress) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "alidade/board/board_reach.h"
 #include "alidade/estimation/config_error.h"
 #include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/degree.h"
@@ -271,36 +272,24 @@ class ViewPlanner {
 }  // namespace
 
 FieldList fields_of(ViewConfig& config) {
-  constexpr Limits positive{.min = 0.0, .is_above_min = true};
   const auto angle = [](const char* name, double* value, const char* help, const char* option) {
     return Field{.name = name, .value = value, .help = help, .limits = {-360.0, 360.0}, .option = option};
   };
-  return {angle("min_pan_deg", &config.min_pan_deg, "Heads can look from this pan [deg]", "--min-pan-deg"),
-          angle("max_pan_deg", &config.max_pan_deg, "… to this", "--max-pan-deg"),
-          angle("min_tilt_deg", &config.min_tilt_deg, "Heads can look from this tilt [deg]", "--min-tilt-deg"),
-          angle("max_tilt_deg", &config.max_tilt_deg, "… to this", "--max-tilt-deg"),
-          {.name = "min_range_m",
-           .value = &config.min_range_m,
-           .help = "Nearest board",
-           .limits = positive,
-           .option = "--min-range-m"},
-          {.name = "max_range_m",
-           .value = &config.max_range_m,
-           .help = "Farthest board",
-           .limits = positive,
-           .option = "--max-range-m"},
-          {.name = "max_tilt_of_board_deg",
-           .value = &config.max_tilt_of_board_deg,
-           .help = "Largest tilt of the board [deg]",
-           .limits = {0.0, 80.0},
-           .option = "--max-tilt-of-board-deg"}};
+  FieldList fields{angle("min_pan_deg", &config.min_pan_deg, "Heads can look from this pan [deg]", "--min-pan-deg"),
+                   angle("max_pan_deg", &config.max_pan_deg, "… to this", "--max-pan-deg"),
+                   angle("min_tilt_deg", &config.min_tilt_deg, "Heads can look from this tilt [deg]", "--min-tilt-deg"),
+                   angle("max_tilt_deg", &config.max_tilt_deg, "… to this", "--max-tilt-deg")};
+  for (Field& field : board_reach_fields(config.min_range_m, config.max_range_m, "max_tilt_of_board_deg",
+                                         config.max_tilt_of_board_deg))
+    fields.push_back(std::move(field));
+  return fields;
 }
 
 std::vector<std::string> faults(ViewConfig config) {
   std::vector<std::string> found = faults_of(fields_of(config));
   if (!(config.min_pan_deg < config.max_pan_deg)) found.emplace_back("min_pan_deg must be below max_pan_deg");
   if (!(config.min_tilt_deg < config.max_tilt_deg)) found.emplace_back("min_tilt_deg must be below max_tilt_deg");
-  if (!(config.min_range_m < config.max_range_m)) found.emplace_back("min_range_m must be below max_range_m");
+  add_reach_fault(config.min_range_m, config.max_range_m, found);
   return found;
 }
 

@@ -95,7 +95,7 @@ def serve(alidade, folder, name, *words):
     """A server, its ports by what it says."""
     log = folder / f"{name}.log"
     with open(log, "w") as out:
-        process = subprocess.Popen([alidade, "simulate", "head", *words, "--seconds", "120"], stderr=out, stdout=out, cwd=folder)
+        process = subprocess.Popen([alidade, "simulate", "head", *words, "--seconds", "300"], stderr=out, stdout=out, cwd=folder)
     for _ in range(200):
         ports = [int(line.rsplit(":", 1)[1].split("/")[0]) for line in log.read_text().splitlines() if "://" in line]
         if len(ports) >= sum(word in ("--rotctl", "--stream", "--onvif") for word in words):
@@ -140,7 +140,7 @@ def one_run(alidade, seed, what):
         if what == "link cut": link.set("cut")
         if what == "link silent": link.set("silent")
         try:
-            out, err = client.communicate(timeout=100)
+            out, err = client.communicate(timeout=250)  # identifying a slow head takes two minutes
         except subprocess.TimeoutExpired:
             client.kill()
             out, err = client.communicate()

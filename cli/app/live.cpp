@@ -30,7 +30,10 @@ Json tables_of(const std::string& command, const std::vector<std::string>& rows)
   Json tables = Json::object();
   for (const std::string& text : rows) {
     const Json row = Json::parse(text);
-    std::string table = command == "servo" ? "control" : command == "localize" ? "path" : "steps";
+    std::string table = command == "servo"      ? "control"
+                        : command == "localize" ? "path"
+                        : command == "head"     ? "follow"
+                                                : "steps";
     for (const auto& [name, value] : row.items()) {
       if (name == "t_capture_s") table = "measurements";
       tables[table][name].push_back(value);

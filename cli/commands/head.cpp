@@ -13,9 +13,12 @@
 #include "alidade/heads/head_follow.h"
 #include "alidade/heads/head_identify.h"
 #include "alidade/results/head_outcome.h"
+#include "alidade/results/identified_result.h"
 #include "alidade/tables/rotation_log_file.h"
 #include "cli/app/app.h"
+#include "cli/app/live.h"
 #include "cli/commands/commands.h"
+#include "cli/commands/head_live.h"
 
 namespace alidade::cli {
 namespace {
@@ -27,9 +30,11 @@ struct HeadArgs {
   HeadRange range;
   std::optional<double> until;
   double most_s = 85.0;
-  std::string rig, resume, password_file;
+  std::string rig, resume, password_file, identified;
+  std::optional<double> latency_s;
   NamedLook look;
   HeadFollowConfig follow;
+  LiveOptions live;
 };
 
 /// "0.5%", or a share.
@@ -107,9 +112,13 @@ FieldList fields_of(HeadArgs& args) {
        .form = "FILE"},
       follow_field(args.look),
       {.name = "rig", .value = &args.rig, .help = "For --follow: rig.yaml of --calibrate", .form = "FILE"},
+      {.name = "identified",
+       .value = &args.identified,
+       .help = "For --follow: the folder of --identify, whose rate, time constant, latency and resolution count",
+       .form = "DIR"},
       {.name = "latency_s",
-       .value = &args.follow.latency_s,
-       .help = "For --follow: from a command to its first effect, as --identify estimates it [s]",
+       .value = &args.latency_s,
+       .help = "For --follow without --identified: from a command to its first effect [s] (default: 0.05)",
        .limits = {0.0, 2.0}},
       {.name = "delay_s",
        .value = &args.follow.delay_s,
@@ -133,6 +142,8 @@ void check_head(const HeadArgs& args) {
     throw UsageError("--follow needs --stream URL and --rig FILE");
   if (follows && !args.move) throw UsageError("--follow moves the head: give --move as well");
   if (!follows && !args.rig.empty()) throw UsageError("--rig is for --follow");
+  if (!follows && args.live.is_on) throw UsageError("--live is for --follow");
+  if (!follows && !args.identified.empty()) throw UsageError("--identified is for --follow");
   if (args.calibrate && args.stream.empty()) throw UsageError("--calibrate needs the camera: --stream URL");
   if (args.calibrate && !args.move) throw UsageError("--calibrate moves the head: give --move as well");
   if (!args.calibrate && !args.resume.empty()) throw UsageError("--resume is for --calibrate");
@@ -227,21 +238,45 @@ ExitCode calibrate_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
   }
 }
 
+/// The axes by which a head is followed with.
+void take_identified(const HeadArgs& args, HeadFollowConfig& config, Run& run) {
+  if (!args.identified.empty()) {
+    const std::filesystem::path given = args.identified;
+    run.add_input("identified", std::filesystem::is_directory(given) ? given / "result.json" : given);
+    const IdentifiedHead head = read_identified_head(args.identified, usual_axis);
+    config.axes = head.axes;
+    if (head.resolution_rad > 0.0) config.resolution_rad = head.resolution_rad;
+  }
+  if (!args.latency_s) return;
+  for (PositionerParams& axis : config.axes) axis.latency_s = *args.latency_s;
+}
+
 ExitCode follow_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
+  LiveRun live(args.live, run);
   run.add_input("rig", args.rig);
   const Rig rig = read_rig(args.rig);
   if (rig.heads.size() != 1) throw InputError(args.rig + ": one head is followed with; this rig has another number");
   load_look(args.look);
   const std::unique_ptr<FrameStream> stream = open_stream(args.stream, device, options_of(args));
   HeadFollowConfig config = args.follow;
+  take_identified(args, config, run);
   config.range = args.range;
   config.most_s = args.most_s;
   const HeadLimits limits = device.limits();
-  JobOutcome outcome = outcome_of(
-      follow_target(device, *stream, rig.heads.front(), args.look.look, args.look.pattern.get(), config, run.progress));
+  const Camera& camera = rig.heads.front().camera;
+  live.open(FollowShow::topics(), "/head");
+  FollowShow show;
+  if (live.server() != nullptr) {
+    FollowShow::begin(*live.server(), camera);
+    config.on_frame = [&](const FollowedFrame& frame, const cv::Mat& image) {
+      show.show(*live.server(), camera, frame, image);
+    };
+  }
+  JobOutcome outcome = outcome_of(follow_target(device, *stream, rig.heads.front(), args.look.look,
+                                                args.look.pattern.get(), config, live.progress()));
   say_assumed(limits, outcome);
   run.lap("follow");
-  return run.finish(std::move(outcome));
+  return live.finish(std::move(outcome));
 }
 
 ExitCode run_head(HeadArgs& args, Run& run) {
@@ -281,6 +316,7 @@ void add_head(App& app) {
                   "indi://HOST:PORT/DEVICE (a telescope mount), or sim://?seed=N, a simulated one")
       ->required();
   app.add_fields(command, fields_of(*args));
+  add_live_options(command, args->live, false);
 }
 
 }  // namespace alidade::cli

@@ -11,6 +11,7 @@ const expected = {
   track: ['path', 'position', 'error', 'innovations', 'estimate', 'above', 'age'],
   servo: ['error', 'picture', 'angles', 'compare', 'robust', 'loops', 'lenses', 'focal'],
   identify: ['estimate', 'response', 'spread', 'checks'],
+  'head, following': ['estimate', 'error', 'angles', 'checks'],
   'plan calibrate': ['estimate', 'plan', 'sketches'], 'plan observe': ['estimate', 'plan'], 'plan rangefinder': ['estimate', 'plan', 'sketches'],
   'rig, moving target': ['estimate', 'space', 'above', 'clocks'],
   localize: ['path', 'error', 'frame', 'tracks', 'nis', 'speed', 'estimate'],

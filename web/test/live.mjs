@@ -7,6 +7,7 @@ import {createConnection} from 'node:net';
 import {join} from 'node:path';
 import {build} from 'esbuild';
 import {folder, readJson} from './page.mjs';
+import {followWords} from './runs.mjs';
 
 const slowness = Number(process.env.ALIDADE_SLOWNESS ?? 1.5);
 const patience_ms = 60_000;
@@ -218,9 +219,25 @@ async function aClientThatStopsReadingDoesNotSlowTheRun({alidade}) {
   assert.ok(more('cpu') < 0.01 + 0.04 * slowness, `${more('cpu')}`);
 }
 
+/** The image, and rows of a head that follows; at the end the page is its report. */
+async function aHeadThatFollowsIsSeen({browser, alidade}) {
+  const live = await started(alidade, followWords(at('head'), at('head', 'out'), ['--pan-range=-40,40'])), {page: seen, faults, close} = await page(browser, live.url);
+  await seen.waitForFunction(() => window.alidade.page.updates > 5 && document.querySelector('#fig-head1 canvas') !== null);
+  if (process.env.SHOTS) await sleep(4000), await seen.screenshot({path: join(process.env.SHOTS, 'head-live.png'), fullPage: true});
+  assert.ok((await seen.locator('#fig-error canvas').count()) >= 2 && (await seen.locator('#fig-angles canvas').count()) >= 2);
+  await seen.waitForFunction(() => document.documentElement.dataset.live === 'ended');
+  assert.equal((await live.exited)[0], 0, live.said());
+  const result = readJson(at('head', 'out', 'result.json'));
+  assert.ok(result.data.follow.t_s.length > 50 && result.estimate.forecast.rms_px > 0);
+  assert.equal(await seen.locator('#fig-error, #fig-angles').count(), 2);
+  assert.deepEqual(faults, []);
+  await close();
+}
+
 export const tests = {
   'live: a run moves, space holds it, and it becomes the report': aRunMovesAndBecomesTheReport,
   'live: who joins sees marks at once; a killed run is crossed out': whoJoinsSeesMarksAtOnce,
   'live: the package’s client connects under both names; the last state is the result’s': thePackagesClientConnectsUnderBothNames,
+  'live: a head that follows is seen, and becomes the report': aHeadThatFollowsIsSeen,
   'live: a client that stops reading does not slow the run': aClientThatStopsReadingDoesNotSlowTheRun,
 };

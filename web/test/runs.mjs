@@ -1,7 +1,16 @@
 // Real results to look at: simulated measurements, run through the executable.
 import {execFileSync} from 'node:child_process';
+import {mkdirSync, writeFileSync} from 'node:fs';
 import {join} from 'node:path';
 import {folder, readJson} from './page.mjs';
+
+/** A simulated head that follows a disc, its camera and rig as they are; `out` and `more` are the caller's. */
+export function followWords(dir, out, more = []) {
+  mkdirSync(dir, {recursive: true});
+  writeFileSync(join(dir, 'camera.yaml'), 'model: brown\nwidth: 320\nheight: 240\nfx: 350\nfy: 348\ncx: 163.2\ncy: 117.9\nskew: 0\nk1: -0.08\nk2: 0\np1: 0\np2: 0\nk3: 0\n');
+  writeFileSync(join(dir, 'rig.yaml'), 'heads:\n- {id: 1, camera: camera.yaml}\n');
+  return ['head', `sim://?latency=0.1${more.length ? '' : '&clock=free'}`, '--stream', 'sim://?fps=15&target=6:0:3:18:1.2', '--rig', join(dir, 'rig.yaml'), '--follow', 'bright', '--move', '--most', '8', '--latency', '0.1', '--out', out, ...more];
+}
 
 /** {name: result document}; a refusal ends with exit code 4, what is not to be trusted with 6; both leave a document as well. */
 export function realResults(alidade) {
@@ -38,5 +47,7 @@ export function realResults(alidade) {
     results[`plan ${command}`] = {document: readJson(at('plan', command, 'result.json')), report: at('plan', command, 'report.html')};
   }
   both('track', ['track', '--scenario', 'C'], (dir) => ['track', join(dir, 'events.csv'), '--rig', join(dir, 'rig.yaml'), '--truth', join(dir, 'truth.csv')]);
+  run(followWords(at('follow'), at('follow', 'out')));
+  results['head, following'] = {document: readJson(at('follow', 'out', 'result.json')), report: at('follow', 'out', 'report.html')};
   return results;
 }

@@ -134,11 +134,20 @@ HeadPosition MovingHead::position() {
 }
 
 HeadSent MovingHead::command(const Eigen::Vector2d& pan_tilt_rad) {
+  keep_pace();
+  return send(pan_tilt_rad);
+}
+
+HeadSent MovingHead::command_at_once(const Eigen::Vector2d& pan_tilt_rad) {
+  next_question_s_ = std::max(next_question_s_, now_s()) + 1.0 / max_calls_hz;
+  return send(pan_tilt_rad);
+}
+
+HeadSent MovingHead::send(const Eigen::Vector2d& pan_tilt_rad) {
   heed_interrupt();
   if (!HeadLimits{low_, high_, true, ""}.hold(pan_tilt_rad))
     throw InputError(fmt::format("{}: pan {:.3f}°, tilt {:.3f}° is outside the limits; not sent", device_.name(),
                                  pan_tilt_rad[0] / degree, pan_tilt_rad[1] / degree));
-  keep_pace();
   has_moved_ = true;
   const HeadSent sent = device_.command(pan_tilt_rad);
   next_question_s_ += 1.0 / max_calls_hz;  // a command asks before

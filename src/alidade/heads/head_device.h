@@ -84,6 +84,8 @@ class MovingHead {
 
   [[nodiscard]] HeadPosition position();
   HeadSent command(const Eigen::Vector2d& pan_tilt_rad);
+  /// The same without a pause after the question before it: the pause comes later.
+  HeadSent command_at_once(const Eigen::Vector2d& pan_tilt_rad);
   void zoom_to(double share);
   /// Stops the head; throws InputError where that fails.
   void stop();
@@ -100,6 +102,7 @@ class MovingHead {
 
  private:
   void keep_pace();
+  HeadSent send(const Eigen::Vector2d& pan_tilt_rad);
   void heed_interrupt();
   void heed_limits(const HeadPosition& reading);
 

@@ -6,23 +6,24 @@
 #include <array>
 #include <cmath>
 #include <deque>
+#include <numbers>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <utility>
 
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/servo/bearing_filter.h"
+#include "alidade/heads/axis_pilot.h"
+#include "alidade/heads/follow_forecast.h"
+#include "alidade/servo/head_servo.h"
 
 namespace alidade {
 namespace {
 
-constexpr double command_every_s = 0.125, ask_every_s = 0.05;
-constexpr double far_m = 1e6;  // bearings alone count
-
-/// Pan and tilt at a time, between two readings.
-std::optional<Eigen::Vector2d> angles_at(const std::vector<HeadPosition>& readings, double t_s) {
-  const auto after = std::ranges::lower_bound(readings, t_s, {}, &HeadPosition::t_s);
-  if (after == readings.begin() || after == readings.end()) return std::nullopt;
+/// Between two places of a course; none: outside of it.
+std::optional<Eigen::Vector2d> between(const std::vector<HeadPosition>& course, double t_s) {
+  const auto after = std::ranges::lower_bound(course, t_s, {}, &HeadPosition::t_s);
+  if (after == course.begin() || after == course.end()) return std::nullopt;
   const HeadPosition &a = *(after - 1), &b = *after;
   const double share = (t_s - a.t_s) / std::max(1e-6, b.t_s - a.t_s);
   return a.pan_tilt_rad + share * (b.pan_tilt_rad - a.pan_tilt_rad);
@@ -38,43 +39,76 @@ class Follower {
         detector_(std::move(detector)),
         config_(config),
         progress_(progress),
-        result_(result) {
-    head_.on_reading = [this](const HeadPosition& reading) { readings_.push_back(reading); };
+        result_(result),
+        filter_({.gate = follow_gate}) {
+    const HeadPosition here = first_position();
+    for (std::size_t i = 0; i < 2; ++i)
+      axes_.emplace_back(config.axes[i], here.pan_tilt_rad[static_cast<Eigen::Index>(i)], here.t_s);
+    head_.on_reading = [this](const HeadPosition& reading) {
+      for (std::size_t i = 0; i < 2; ++i)
+        axes_[i].read(reading.t_s, reading.pan_tilt_rad[static_cast<Eigen::Index>(i)]);
+      read_s_ = reading.t_s;
+    };
   }
   ~Follower() { head_.on_reading = nullptr; }
   Follower(const Follower&) = delete;
   Follower& operator=(const Follower&) = delete;
 
   void run() {
+    const double period_s = result_.period_s;
     begin_s_ = last_frame_s_ = head_.now_s();
-    double next_command_s = begin_s_ + 0.5, next_question_s = begin_s_;
+    double next_s = begin_s_ + period_s;
     while (head_.now_s() - begin_s_ < config_.most_s) {
       report_progress(progress_, "following: s of head time", static_cast<std::size_t>(head_.now_s() - begin_s_), 0);
-      head_.wait_until(next_question_s);
-      (void)head_.position();
-      next_question_s = head_.now_s() + ask_every_s;
-      look();
-      if (head_.now_s() < next_command_s) continue;
-      next_command_s = head_.now_s() + command_every_s;
+      ask(next_s);
       aim_head();
+      next_s = std::max(next_s, head_.now_s() - period_s) + period_s;
     }
     head_.stop();
     result_.head_time_s = head_.now_s() - begin_s_;
+    result_.image_age_s = num_ages_ > 0 ? sum_age_s_ / static_cast<double>(num_ages_) : 0.0;
   }
 
  private:
-  /// Frames that came, once the head's angles at their times are known.
-  void look() {
-    constexpr double lost_s = 2.0, old_s = 0.5;
+  /// Where it is; commands follow one another as fast as its answers and its pace allow.
+  HeadPosition first_position() {
+    constexpr double calls = 3.0, slowest_s = 1.0;  // a question, and a command that asks before
+    constexpr double question_s = 0.025;            // the pace of a head that may move
+    std::array<double, 5> waits{};
+    HeadPosition here;
+    for (double& wait_s : waits) wait_s = (here = head_.position()).wait_s;
+    std::ranges::nth_element(waits, waits.begin() + 2);
+    result_.period_s = std::clamp(1.2 * calls * waits[2], calls * question_s, slowest_s);
+    return here;
+  }
+
+  /// At that time: frames that came before a question have angles before and after.
+  void ask(double at_s) {
+    head_.wait_until(at_s);
+    collect();
+    (void)head_.position();
+    look();
+  }
+  [[nodiscard]] std::optional<Eigen::Vector2d> angles_at(double t_s) const {
+    const std::optional<double> pan = axes_[0].at(t_s), tilt = axes_[1].at(t_s);
+    if (!pan || !tilt) return std::nullopt;
+    return Eigen::Vector2d(*pan, *tilt);
+  }
+  void collect() {
     for (StreamFrame& frame : stream_.take()) {
       last_frame_s_ = head_.now_s();
       waiting_.push_back(std::move(frame));
     }
+  }
+
+  /// Frames that came, once the head's angles at their times are known.
+  void look() {
+    constexpr double lost_s = 2.0, old_s = 0.5;
     while (!waiting_.empty()) {
       const StreamFrame& frame = waiting_.front();
       const double shown_s = frame.t_s + config_.delay_s;
-      const std::optional<Eigen::Vector2d> angles = angles_at(readings_, shown_s);
-      if (!angles && shown_s > readings_.back().t_s - old_s) break;
+      const std::optional<Eigen::Vector2d> angles = angles_at(shown_s);
+      if (!angles && shown_s > read_s_ - old_s) break;
       if (angles && waiting_.size() < 4)
         see(frame, shown_s, *angles);  // those that cannot be looked at in time are left
       waiting_.pop_front();
@@ -86,57 +120,64 @@ class Follower {
 
   void see(const StreamFrame& frame, double t_s, const Eigen::Vector2d& angles) {
     const TargetDetection seen = detector_.find(*frame.image);
-    FollowedFrame row{
-        .t_s = t_s - begin_s_, .pan_tilt_rad = angles, .is_found = seen.found(), .px = seen.px, .target_rad = angles};
-    if (const auto ray = seen.found() ? ray_in_world(rig_head_, angles, seen.px) : std::nullopt) {
-      const std::optional<Eigen::Vector2d> target =
-          aim(rig_head_.head, ray->origin_in_world + far_m * ray->direction_in_world);
-      row.is_found = target.has_value();
-      if (target) learn(t_s, nearest_turn(*target, angles), row);
-    }
-    row.error_px = (row.px - project_axis(rig_head_.camera)).norm();
+    FollowedFrame row{.t_s = t_s - begin_s_,
+                      .pan_tilt_rad = angles,
+                      .is_found = seen.found(),
+                      .px = seen.px,
+                      .target_rad = angles,
+                      .error_px = seen.px - centre_of(rig_head_.camera),
+                      .asked_rad = between(asked_, t_s)};
+    const auto ray = seen.found() ? ray_in_world(rig_head_, angles, seen.px) : std::nullopt;
+    const auto target =
+        ray ? aim(rig_head_.head, ray->origin_in_world + follow_range_m * ray->direction_in_world) : std::nullopt;
+    row.is_found = target.has_value();
+    if (target) take(t_s, row.target_rad = nearest_turn(*target, angles));
     result_.frames.push_back(row);
-  }
-  [[nodiscard]] static Eigen::Vector2d nearest_turn(Eigen::Vector2d target, const Eigen::Vector2d& here) {
-    constexpr double turn = 6.283185307179586;
-    target[0] += turn * std::round((here[0] - target[0]) / turn);
-    return target;
-  }
-  void learn(double t_s, const Eigen::Vector2d& target, FollowedFrame& row) {
-    constexpr double sigma_rad = 0.03 * degree, forgotten_s = 1.0;
-    row.target_rad = target;
-    for (std::size_t i = 0; i < 2; ++i) {
-      const double angle = target[static_cast<Eigen::Index>(i)];
-      if (!seen_s_ || t_s - *seen_s_ > forgotten_s) {
-        axes_[i].start(t_s, angle, sigma_rad * sigma_rad);
-      } else if (t_s > *seen_s_) {
-        axes_[i].update(t_s, angle, sigma_rad * sigma_rad);
-      }
-    }
-    seen_s_ = std::max(seen_s_.value_or(t_s), t_s);
+    if (config_.on_frame) config_.on_frame(row, *frame.image);
   }
 
-  /// Where the target will be in the middle of the time for which the command counts.
+  [[nodiscard]] static Eigen::Vector2d nearest_turn(Eigen::Vector2d target, const Eigen::Vector2d& here) {
+    target[0] = here[0] + std::remainder(target[0] - here[0], 2.0 * std::numbers::pi);
+    return target;
+  }
+  void take(double t_s, const Eigen::Vector2d& bearing_rad) {
+    constexpr double forgotten_s = 1.0;
+    if (filter_.has_started() && t_s - filter_.newest_s() > forgotten_s) filter_.forget();
+    constexpr double sigma_px = 0.3;  // of the target's middle
+    (void)filter_.take(t_s, bearing_rad, std::hypot(sigma_px / focal_of(rig_head_.camera), config_.resolution_rad));
+  }
+
+  /// Where the target will be while the command counts, and as far beyond as the axis is behind what it is sent to.
   void aim_head() {
     constexpr double lost_s = 1.0;
     const double now_s = head_.now_s();
-    if (!seen_s_ || now_s - *seen_s_ > lost_s) {
+    if (!filter_.has_started() || now_s - filter_.newest_s() > lost_s) {
       if (is_following_) head_.stop();
       is_following_ = false;
       return;
     }
-    const double acts_s = now_s + config_.latency_s + command_every_s;
-    Eigen::Vector2d target(axes_[0].at(acts_s).angle_rad, axes_[1].at(acts_s).angle_rad);
-    target = target.cwiseMax(head_.low_rad()).cwiseMin(head_.high_rad());
-    head_.command(target);
+    sum_age_s_ += now_s - filter_.newest_s();
+    ++num_ages_;
+    const Eigen::Vector2d command = planned(now_s).cwiseMax(head_.low_rad()).cwiseMin(head_.high_rad());
+    const HeadSent sent = head_.command_at_once(command);
+    for (std::size_t i = 0; i < 2; ++i) axes_[i].send(sent.t_s, command[static_cast<Eigen::Index>(i)]);
     ++result_.num_commands;
     is_following_ = true;
   }
-  static Eigen::Vector2d project_axis(const Camera& camera) {
-    RigHead plain;
-    plain.camera = camera;
-    const auto pixel = project(plain, Eigen::Vector2d::Zero(), Eigen::Vector3d(0.0, 0.0, far_m));
-    return pixel ? pixel->px : Eigen::Vector2d::Zero();
+  [[nodiscard]] Eigen::Vector2d planned(double now_s) {
+    Eigen::Vector2d command, asked;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const auto k = static_cast<Eigen::Index>(i);
+      const double acts_s = now_s + config_.axes[i].latency_s;
+      const Bearing then = filter_.at(acts_s)[i];
+      asked[k] = then.angle_rad;
+      command[k] = axes_[i].command(now_s, result_.period_s, [&](double t_s) {
+        return t_s < acts_s ? then.angle_rad + then.rate_rad_s * (t_s - acts_s)
+                            : ahead(then, BearingFilterConfig{}.singer_tau_s, t_s - acts_s).angle_rad;
+      });
+    }
+    asked_.push_back({now_s + config_.axes[0].latency_s, 0.0, asked});
+    return command;
   }
 
   MovingHead& head_;
@@ -146,11 +187,13 @@ class Follower {
   const HeadFollowConfig& config_;
   const Progress& progress_;
   HeadFollowing& result_;
-  std::vector<HeadPosition> readings_;
+  BearingFilter filter_;
+  std::vector<AxisPilot> axes_;
+  std::vector<HeadPosition> asked_;
+  double read_s_ = 0.0;
   std::deque<StreamFrame> waiting_;
-  std::array<BearingAxis, 2> axes_{BearingAxis(BearingFilterConfig{}), BearingAxis(BearingFilterConfig{})};
-  std::optional<double> seen_s_;
-  double begin_s_ = 0.0, last_frame_s_ = 0.0;
+  double begin_s_ = 0.0, last_frame_s_ = 0.0, sum_age_s_ = 0.0;
+  std::size_t num_ages_ = 0;
   bool is_following_ = false;
 };
 
@@ -163,9 +206,10 @@ void judge(HeadFollowing& result, double shorter_side_px) {
     ++counted;
     if (!frame.is_found) continue;
     ++found;
-    sum2 += frame.error_px * frame.error_px;
-    result.max_px = std::max(result.max_px, frame.error_px);
-    central += frame.error_px < shorter_side_px / 6.0;
+    const double error_px = frame.error_px.norm();
+    sum2 += error_px * error_px;
+    result.max_px = std::max(result.max_px, error_px);
+    central += error_px < shorter_side_px / 6.0;
   }
   if (found == 0) {
     result.verdict.state = State::refused;
@@ -185,6 +229,23 @@ void judge(HeadFollowing& result, double shorter_side_px) {
   if (lost > most_lost) result.verdict.state = State::care;
 }
 
+/// Whether the loop does what a loop with this head can.
+void compare_with_forecast(HeadFollowing& result) {
+  constexpr double most = 1.3, own_px = 1.0;  // of what is seen of a target at rest
+  if (!result.forecast || result.verdict.state == State::refused) return;
+  const double own2 = own_px * own_px, moved_px = std::sqrt(std::max(0.0, result.rms_px * result.rms_px - own2));
+  const double ratio = moved_px / std::max(1e-9, result.forecast->rms_px);
+  const bool is_good = ratio <= most;
+  result.verdict.checks.push_back(
+      {"as predicted", is_good ? State::good : State::care,
+       fmt::format("{:.3g} px RMS; servo predicts {:.3g} px for this head, these delays and this target", result.rms_px,
+                   result.forecast->rms_px),
+       ratio, most, "", ""});
+  if (is_good) return;
+  result.verdict.state = State::care;
+  result.verdict.to_add = "give --identified, the folder of --identify, and --delay as --calibrate has it";
+}
+
 }  // namespace
 
 HeadFollowing follow_target(HeadDevice& device, FrameStream& stream, const RigHead& rig_head, const TargetLook& look,
@@ -196,9 +257,12 @@ HeadFollowing follow_target(HeadDevice& device, FrameStream& stream, const RigHe
     MovingHead head(device, config.range.low_rad, config.range.high_rad, progress);
     if ((head.high_rad() - head.low_rad()).maxCoeff() > 1e4)
       throw InputError(device.name() + ": names no limits; give --pan-range and --tilt-range");
+    const HeadRange within{head.low_rad(), head.high_rad()};
     Follower(head, stream, rig_head, TargetDetector(look, pattern), config, progress, result).run();
+    result.forecast = forecast_of(result, rig_head, config, within);
   }
   judge(result, std::min(rig_head.camera.width_px, rig_head.camera.height_px));
+  compare_with_forecast(result);
   return result;
 }
 

@@ -43,9 +43,26 @@ commands         count  that were sent to follow the target
 rms_px           px     of the target from the principal point, from a third of the time on
 max_px           px     the farthest
 central_third    1      share of the frames with the target in the central third
+period_s         s      from one command to the next
+image_age_s      s      of the newest image when a command is sent, on average
+forecast.rms_px           px    what servo predicts for this head, these delays and this target
+forecast.controller       text  of servo, the best one
+forecast.period_s         s     of its commands
+forecast.image_age_s      s     of its images
+forecast.command_delay_s  s     from a command to its first effect
 *                any    of --calibrate: as `observe` says it
 data:
 *.*  any  of --calibrate: as `observe` says it
+follow.
+  t_s                s    of the frame
+  error_u_px         px   of the target from the principal point
+  error_v_px         px   of the target from the principal point
+  asked_pan_rad      rad  where the head was asked to point then
+  asked_tilt_rad     rad  where the head was asked to point then
+  measured_pan_rad   rad  of the head, when it was taken
+  measured_tilt_rad  rad  of the head, when it was taken
+  target_pan_rad     rad  that would look at it
+  target_tilt_rad    rad  that would look at it
 readings.
   t_s       s    middle of question and answer
   wait_s    s    for the answer
@@ -76,6 +93,8 @@ follow.csv.
   target_pan_rad   rad  that would look at it
   target_tilt_rad  rad  that would look at it
   error_px         px   of the target from the principal point
+  asked_pan_rad    rad  where the head was asked to point then; empty: nowhere
+  asked_tilt_rad   rad  where the head was asked to point then; empty: nowhere
 pan.csv.
   t_s        s    time
   command    rad  given last

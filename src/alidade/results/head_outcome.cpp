@@ -9,6 +9,7 @@
 #include "alidade/formats/rig_file.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/geometry/so3.h"
+#include "alidade/results/documents/follow_document.h"
 #include "alidade/results/observe_outcome.h"
 
 namespace alidade {
@@ -230,6 +231,22 @@ std::vector<NamedBytes> files_so_far(const HeadCalibration& calibration) {
   return {{"log.csv", calibration.log_csv}};
 }
 
+namespace {
+
+void fill_forecast(const HeadFollowing& following, JsonValue& estimate) {
+  estimate["period_s"] = following.period_s;
+  estimate["image_age_s"] = following.image_age_s;
+  if (!following.forecast) return;
+  JsonValue& forecast = estimate["forecast"];
+  forecast["rms_px"] = following.forecast->rms_px;
+  forecast["controller"] = std::string(controller_name(following.forecast->controller));
+  forecast["period_s"] = following.forecast->period_s;
+  forecast["image_age_s"] = following.forecast->image_age_s;
+  forecast["command_delay_s"] = following.forecast->command_delay_s;
+}
+
+}  // namespace
+
 JobOutcome outcome_of(const HeadFollowing& following) {
   JobOutcome outcome;
   ResultDocument& document = outcome.document;
@@ -244,18 +261,26 @@ JobOutcome outcome_of(const HeadFollowing& following) {
   estimate["rms_px"] = following.rms_px;
   estimate["max_px"] = following.max_px;
   estimate["central_third"] = following.central_third;
-  std::string csv = "t_s,pan_rad,tilt_rad,u_px,v_px,target_pan_rad,target_tilt_rad,error_px\n";
+  fill_forecast(following, estimate);
+  document.data.push_back(follow_table(following.frames));
+  std::string csv =
+      "t_s,pan_rad,tilt_rad,u_px,v_px,target_pan_rad,target_tilt_rad,error_px,asked_pan_rad,asked_tilt_rad\n";
   for (const FollowedFrame& frame : following.frames) {
     csv += fmt::format("{:.6f},{:.9f},{:.9f}", frame.t_s, frame.pan_tilt_rad[0], frame.pan_tilt_rad[1]);
-    csv += frame.is_found ? fmt::format(",{:.4f},{:.4f},{:.9f},{:.9f},{:.4f}\n", frame.px[0], frame.px[1],
-                                        frame.target_rad[0], frame.target_rad[1], frame.error_px)
-                          : std::string(",,,,,\n");
+    csv += frame.is_found ? fmt::format(",{:.4f},{:.4f},{:.9f},{:.9f},{:.4f}", frame.px[0], frame.px[1],
+                                        frame.target_rad[0], frame.target_rad[1], frame.error_px.norm())
+                          : std::string(",,,,,");
+    csv += frame.asked_rad ? fmt::format(",{:.9f},{:.9f}\n", (*frame.asked_rad)[0], (*frame.asked_rad)[1])
+                           : std::string(",,\n");
     document.counts.used += frame.is_found;
   }
   document.counts.dropped = document.counts.given - document.counts.used;
   outcome.files.push_back({"follow.csv", std::move(csv)});
   outcome.lines.push_back(fmt::format("{} frames, {} commands; from a third of the time on {:.3g} px RMS",
                                       following.frames.size(), following.num_commands, following.rms_px));
+  if (following.forecast)
+    outcome.lines.push_back(fmt::format("servo predicts {:.3g} px RMS for this head, these delays and this target",
+                                        following.forecast->rms_px));
   return outcome;
 }
 

@@ -10,6 +10,7 @@ import {clusters} from './clusters';
 import {correlationMatrix} from './correlation_matrix';
 import {diagonal, difference, parameters} from './diff';
 import {estimate} from './estimate';
+import {followAngles, followError} from './follow';
 import {halves} from './halves';
 import {identifyResponse, identifySpread} from './identify';
 import {lens} from './lens';
@@ -74,6 +75,7 @@ const byCommand: Record<string, Page> = {
   project: {first: [{...values, isOptional: true}, projectPicture], rest: [projectHeads, assumed, checks]},
   'camera diff': {first: [{...parameters, span: 10, narrow: 24}, {...difference, span: 14, narrow: 24}], rest: [half(diagonal), half(estimate), assumed, checks]},
 };
+const following: Page = {first: [values, wide(followError)], rest: [followAngles, assumed, checks]};
 const movingTarget: Page = {first: [movingEstimate, movingSpace], rest: [clusters, movingAbove, movingClocks, {...rigUnknown, span: 12}, assumed, checks]};
 
 function pageOf(doc: Doc): Page {
@@ -87,6 +89,7 @@ function pageOf(doc: Doc): Page {
   if (doc.command.startsWith('study ')) return {first: [studyCurve, studyQuantities], rest: [studyWorst, checks]};
   if (doc.command === 'batch') return {first: [batchSpread, batchOutliers], rest: [batchLot, batchRows, checks]};
   if (doc.command === 'rig' && (doc.table('cameras') || (doc.estimates.some((one) => one.path === 'cameras[0].id')))) return movingTarget;
+  if (doc.command === 'head' && doc.table('follow')) return following;
   const own = Object.prototype.hasOwnProperty.call(byCommand, doc.command) ? byCommand[doc.command]! : null;
   return own ?? {first: [{...values, isOptional: true}, lensGrid], rest: [assumed, checks, correlationMatrix]};
 }

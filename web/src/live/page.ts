@@ -98,8 +98,9 @@ class LivePage {
     let picture = this.pictures.get(head);
     if (!picture && part === 'camera') return; // nothing to show in it yet
     if (!picture) {
-      const body = this.card(head, this.doc.command === 'localize' ? 'What does it see?' : `What does ${head.replace('head', 'head ')} see?`, 'ring: 3σ, dot: seen', this.doc.command === 'localize' ? 12 : 6);
-      const section = body.parentElement!, first = this.main.querySelector('#fig-space');
+      const isAlone = ['localize', 'head'].includes(this.doc.command);
+      const body = this.card(head, isAlone ? 'What does it see?' : `What does ${head.replace('head', 'head ')} see?`, this.doc.command === 'head' ? 'dot: the target' : 'ring: 3σ, dot: seen', isAlone ? 12 : 6);
+      const section = body.parentElement!, first = this.main.querySelector('#fig-space') ?? this.main.firstElementChild;
       const before = [...this.pictures.keys()].length > 0 ? this.main.querySelector(`#fig-${[...this.pictures.keys()].pop()}`) : first;
       before?.after(section);
       this.pictures.set(head, (picture = new LivePicture(body, head)));

@@ -56,6 +56,12 @@ export const plotsOf: Record<string, PlotCard[]> = {
       lines: [{column: `error_${axis}_px`, name: `error ${axis}`, colour: axis === 'u' ? 'blue' : 'orange', width: 1.3}]}))},
     {id: 'angles', title: 'Does the head follow?', note: 'asked - - · measured (blue) · predicted (orange), °', span: 12, isPerHead: true, plots: [{...degreePlot('pan'), height: 170}, {...degreePlot('tilt'), height: 170}]},
   ],
+  head: [
+    {id: 'error', title: 'How far from the middle is the target?', note: 'px, from the principal point', span: 12, plots: (['u', 'v'] as const).map((axis) => ({label: `error ${axis}`, unit: 'px', levels: [{value: 0, dash: []}], height: 190,
+      lines: [{column: `error_${axis}_px`, name: `error ${axis}`, colour: axis === 'u' ? 'blue' : 'orange', width: 1.3}]}))},
+    {id: 'angles', title: 'Does the head follow?', note: 'asked - - · reached (blue) · the target (orange), °', span: 24, plots: (['pan', 'tilt'] as const).map((axis) => ({label: axis, unit: '°', scale: degrees, height: 150, lines: [
+      {column: `asked_${axis}_rad`, name: 'asked', colour: 'ink', dash: [5, 4], width: 1.2}, {column: `measured_${axis}_rad`, name: 'measured', colour: 'blue'}, {column: `target_${axis}_rad`, name: 'target', colour: 'orange', width: 1.1}]}))},
+  ],
   observe: [
     {id: 'intrinsics', title: 'What are fx, fy, cx and cy, and how sure is it?', note: 'px, ± 3σ', span: 24, isGrid: true, plots: ['fx', 'fy', 'cx', 'cy'].map((name) => ({label: name, unit: 'px', sigma: `sigma_${name}_px`, height: 190, lines: [
       {column: `${name}_px`, name, colour: 'blue' as const}, {column: `truth_${name}_px`, name: 'truth', colour: 'ink' as const, dash: [5, 4], width: 1.2}]}))},

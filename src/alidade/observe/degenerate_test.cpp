@@ -106,6 +106,31 @@ TEST(ObserveDegenerate, GoodLogsAreAcceptedEveryOne) {
   EXPECT_EQ(accepted, sets);
 }
 
+TEST(ObserveDegenerate, ANarrowFieldNamesItsCentreAndDoesWithoutIt) {
+  constexpr double f = 38462.0;  // 200 mm, 5.2 µm
+  RotationScene scene;
+  scene.width_px = 1024;
+  scene.height_px = 1280;
+  scene.intrinsics = [](double) { return RotatingIntrinsics{.fx = f, .fy = f, .cx = 511.5, .cy = 639.5}; };
+  scene.motion = [](double t) { return Eigen::Vector3d(0.006 * std::sin(t), 0.006 * std::sin(1.7 * t), 0.0); };
+  scene.start_px = draw_points(1024, 1280, 12, 1);
+  const RotationLogConfig log_config{.source = RotationSource::head, .rate_hz = 5.0, .duration_s = 10.0};
+  const RotationLog log = simulate_rotation(scene, log_config, 1);
+  ObserveSetup config = config_of(ObserveMethod::batch);
+  config.width_px = 1024;
+  config.height_px = 1280;
+  const Verdict refused = observe_verdict(solve_intrinsics(log, config), log, config);
+  EXPECT_EQ(refused.exit_code, ExitCode::cannot_tell);
+  EXPECT_NE(refused.sentence.find("too narrow"), std::string::npos) << refused.sentence;
+  EXPECT_NE(refused.to_add.find("--fix-centre --square-pixels"), std::string::npos) << refused.to_add;
+
+  config.fixed_centre = config.square_pixels = true;  // as it says
+  const ObserveSolution solved = solve_intrinsics(log, config);
+  EXPECT_EQ(observe_verdict(solved, log, config).exit_code, ExitCode::ok);
+  EXPECT_NEAR(solved.quantities[0].value, f, 4.0 * solved.quantities[0].sigma);
+  EXPECT_LT(solved.quantities[0].sigma, 0.002 * f);
+}
+
 TEST(ObserveDegenerate, ALineOfPointsIsNamedForThePapersObserverAndOthersTell) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     RotationScene scene;

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <tuple>
 
 #include "alidade/geometry/decompositions.h"
@@ -16,6 +17,27 @@ constexpr double fine = 0.003;  // σ over the focal length of a converged estim
 struct Reason {
   std::string name, what, add;
 };
+
+/// The angle that the longer side of the image spans; none: the focal length is not known well enough to say.
+std::optional<double> field_rad(const ObserveSolution& report) {
+  constexpr double known_share = 0.1;
+  if (report.quantities.empty()) return std::nullopt;
+  const ObservedQuantity& f = report.quantities.front();
+  if (!(f.value > 0.0 && f.sigma < known_share * f.value)) return std::nullopt;
+  return 2.0 * std::atan(0.5 * std::max(report.width_px, report.height_px) / f.value);
+}
+
+/// A view through a long lens: its parts all turn alike, wherever the axis meets the image.
+std::optional<Reason> narrow_field(const ObserveSolution& report, const ObserveSetup& config) {
+  constexpr double least_share = 0.2;
+  const std::optional<double> field = field_rad(report);
+  if (!field || config.fixed_centre || report.motion.span_rad < least_share * *field) return std::nullopt;
+  return Reason{"narrow field",
+                "a field of " + text_of(*field / degree, 2) + "° is too narrow for a rotation of " +
+                    text_of(report.motion.span_rad / degree, 2) + "° to determine cx and cy",
+                "fix them: --fix-centre" + std::string(config.square_pixels ? "" : " --square-pixels") +
+                    ", or rotate about the axis of view as well"};
+}
 
 Reason reason_of(const ObserveSolution& report, const RotationLog& log, const ObserveSetup& config) {
   const Eigen::Vector3d& path = report.motion.path_rad;  // about x: tilt; y: pan; z: roll
@@ -44,6 +66,7 @@ Reason reason_of(const ObserveSolution& report, const RotationLog& log, const Ob
                 (hold.empty() ? "" : ", or fix them:" + hold)};
   }
   if (report.motion.span_rad < 3.0 * degree) {
+    if (const auto narrow = narrow_field(report, config)) return *narrow;
     return {"too small a span",
             "too small a span: the camera rotates by " + text_of(report.motion.span_rad / degree, 2) + "° only",
             "pan and tilt by 5° or more"};

@@ -55,6 +55,15 @@ std::vector<TargetObservation> mirrored(std::vector<TargetObservation> observati
   return observations;
 }
 
+/// By the clock of the rig, where each camera's is known.
+std::vector<TargetObservation> by_one_clock(const MovingTargetReport& report, std::span<const TargetObservation> own) {
+  std::vector<TargetObservation> observations(own.begin(), own.end());
+  for (TargetObservation& observation : observations)
+    observation.t_capture_s = report.cameras[observation.head].clock.in_rig(observation.t_capture_s);
+  std::ranges::stable_sort(observations, {}, &TargetObservation::t_capture_s);
+  return observations;
+}
+
 struct Best {
   Agreement agreement;
   std::string words;
@@ -98,19 +107,22 @@ std::string culprit_of(const MovingTargetReport& report, std::span<const TargetO
   constexpr std::size_t few = 6;
   const auto exchanges = exchanges_of(heads, doubtful ? 0.0 : plainly);
   if (!doubtful && (exchanges.empty() || exchanges.size() > few)) return "";
-  const std::vector<TargetObservation> some = middle_of(observations);
+  // All cameras are placed, and so are their clocks: they are not searched again.
+  const std::vector<TargetObservation> some =
+      middle_of(doubtful ? std::vector<TargetObservation>(observations.begin(), observations.end())
+                         : by_one_clock(report, observations));
   const std::vector<RigHead> given(heads.begin(), heads.end());
-  const Agreement as_given = agreement_of(place(some, given));
+  const Agreement as_given = agreement_of(place(some, given, doubtful));
   Best best;
   for (std::size_t h = 0; doubtful && h < given.size() && (given.size() > 2 || h == 0); ++h) {
     const std::string words = given.size() == 2 ? "one of the two cameras gives mirrored images"
                                                 : "the images of head " + name_of(given[h]) + " are mirrored";
-    best.consider(agreement_of(place(mirrored(some, h, given[h].camera.width_px), given)), words);
+    best.consider(agreement_of(place(mirrored(some, h, given[h].camera.width_px), given, doubtful)), words);
   }
   for (const auto& [a, b] : exchanges) {
     std::vector<RigHead> exchanged = given;
     std::swap(exchanged[a].camera, exchanged[b].camera);
-    best.consider(agreement_of(place(some, exchanged)),
+    best.consider(agreement_of(place(some, exchanged, doubtful)),
                   "heads " + name_of(given[a]) + " and " + name_of(given[b]) + " have each other's camera");
   }
   // By as much less is left as no chance would have it: of thousands of observations a hundredth would be.

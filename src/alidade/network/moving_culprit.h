@@ -9,9 +9,9 @@
 
 namespace alidade {
 
-/// How cameras are placed from these observations through these lenses.
+/// How cameras are placed from these observations through these lenses; whether their clocks are searched, or one.
 using PlaceCameras = std::function<MovingTargetReport(const std::vector<TargetObservation>& observations,
-                                                      const std::vector<RigHead>& heads)>;
+                                                      const std::vector<RigHead>& heads, bool searches)>;
 
 /// Which camera it is whose images are mirrored, or which two have each other's lens: undone, all cameras agree where
 /// they did not. One sentence; empty where nothing is amiss, or none of these explains it.

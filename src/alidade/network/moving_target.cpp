@@ -374,19 +374,20 @@ MovingTargetReport place_cameras(std::span<const TargetObservation> observations
   const std::vector<TargetObservation> from_origin = moved_to(origin_s, observations);
   TrueTrack truth_from_origin = truth;
   for (double& t_s : truth_from_origin.t_s) t_s -= origin_s;
+  MovingTargetConfig one_clock = config;
+  one_clock.clock_search_s = 0.0;
   const auto placed = [&](std::span<const TargetObservation> some, std::span<const RigHead> given,
-                          const TrueTrack& path) {
-    Placing work{some, given, config, progress, {}, 0.0, {}, {}, {}, {}, {}, {}};
+                          const TrueTrack& path, const MovingTargetConfig& with) {
+    Placing work{some, given, with, progress, {}, 0.0, {}, {}, {}, {}, {}, {}};
     place(work, path);
     return std::move(work.report);
   };
-  MovingTargetReport report = placed(from_origin, heads, truth_from_origin);
+  MovingTargetReport report = placed(from_origin, heads, truth_from_origin, config);
   constexpr double max_search_s = 30.0;  // of clocks that are farther apart, each trial takes minutes
   if (report.culprit.empty() && config.clock_search_s <= max_search_s)
     report.culprit = culprit_of(report, from_origin, heads,
-                                [&](const std::vector<TargetObservation>& some, const std::vector<RigHead>& given) {
-                                  return placed(some, given, {});
-                                });
+                                [&](const std::vector<TargetObservation>& some, const std::vector<RigHead>& given,
+                                    bool searches) { return placed(some, given, {}, searches ? config : one_clock); });
   move_back(origin_s, report);
   return report;
 }

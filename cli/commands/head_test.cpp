@@ -174,8 +174,10 @@ TEST_F(HeadCommand, WhatWasMeasuredBeforeCountsAfterResume) {
   ASSERT_EQ(after.code, 0) << after.err;
   const auto one = nlohmann::json::parse(before.out), two = nlohmann::json::parse(after.out);
   EXPECT_GT(two["counts"]["given"].get<int>(), 3 * one["counts"]["given"].get<int>() / 2);
+  // By the pixels' noise: what instruments ordinarily have, which is counted beside it, does not lessen with rows.
   for (const char* name : {"fx", "fy", "cx", "cy"})
-    EXPECT_LT(two["stddev"]["camera"][name].get<double>(), one["stddev"]["camera"][name].get<double>()) << name;
+    EXPECT_LT(two["stddev_model"]["camera"][name].get<double>(), one["stddev_model"]["camera"][name].get<double>())
+        << name;
   EXPECT_NEAR(two["estimate"]["camera"]["fx"].get<double>(), 350.0, 4.0 * two["stddev"]["camera"]["fx"].get<double>());
   EXPECT_FALSE(std::filesystem::exists(path("second") + "/so-far"));  // it ended
 }

@@ -10,6 +10,7 @@
 #include "alidade/localize/path/similarity_graph.h"
 #include "alidade/testing/hover.h"
 #include "alidade/testing/long_walk.h"
+#include "alidade/testing/trials.h"
 
 // A walk out and back: what was seen on the way out is seen again, and the path does not drift past it.
 
@@ -114,7 +115,7 @@ LocalizeConfig gentle() {
 
 TEST(LoopClosure, SixtyMetresOutAndBack) {
   double nees = 0.0;
-  constexpr std::uint64_t num_seeds = 2;
+  const auto num_seeds = static_cast<std::uint64_t>(testing::trials(1));
   for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
     const WalkRun run = out_and_back(seed);
     const Localization result = localize(run.frames, run.camera, gentle(), run.truth);
@@ -123,7 +124,7 @@ TEST(LoopClosure, SixtyMetresOutAndBack) {
     EXPECT_GT(result.num_loops, 20u);
     EXPECT_EQ(result.num_loops_rejected, 0u);
     EXPECT_LT(result.error.ate_m, 0.0005 * 60.0) << seed;
-    nees += nees_after_similarity(result, run) / num_seeds;
+    nees += nees_after_similarity(result, run) / static_cast<double>(num_seeds);
     const double map_off_m = nine_in_ten_off_m(result, run);
     EXPECT_LT(map_off_m, 0.05) << seed;
     RecordProperty("map_mm_" + std::to_string(seed), std::to_string(1000.0 * map_off_m));

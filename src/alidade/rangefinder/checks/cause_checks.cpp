@@ -23,14 +23,15 @@ std::string unit_of(double scale) {
 
 /// A scale that was estimated as nobody gave it, and is not 1: the rangefinder's, or that of the board.
 void add_found_scale(const RangefinderReport& report, Verdict& verdict) {
-  constexpr double ask_beyond = 4.0, beyond_an_instrument = 0.05;
+  constexpr double ask_beyond = 4.0, beyond_chance = 2.0, beyond_an_instrument = 0.05;
   const double away = report.beam.scale - 1.0, sigma = std::sqrt(report.beam.cov(beam_scale_param, beam_scale_param));
   const double z = std::abs(away) / sigma;
   Check check = check_of("scale", z < ask_beyond ? State::good : State::care, "the readings' scale is 1 within its σ",
                          z, ask_beyond, "σ", "residuals");
-  if (z >= ask_beyond)
-    check.text = "the readings are " + text_of(1.0 / report.beam.scale, 5) +
-                 " times what the board says: the rangefinder's scale (then give --scale), the printed squares "
+  if (z >= beyond_chance)
+    check.text = "the readings are " + text_of(1.0 / report.beam.scale, 5) + " times what the board says (" +
+                 text_of(z, 2) +
+                 "σ): the rangefinder's scale (then give --scale), the printed squares "
                  "(measure them), or the camera's focal length";
   if (z >= ask_beyond && std::abs(away) > beyond_an_instrument) {
     const std::string unit = unit_of(report.beam.scale);

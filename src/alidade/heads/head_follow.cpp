@@ -13,7 +13,7 @@
 
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/heads/axis_pilot.h"
+#include "alidade/heads/axis_course.h"
 #include "alidade/heads/follow_forecast.h"
 #include "alidade/servo/head_servo.h"
 
@@ -147,7 +147,7 @@ class Follower {
     (void)filter_.take(t_s, bearing_rad, std::hypot(sigma_px / focal_of(rig_head_.camera), config_.resolution_rad));
   }
 
-  /// Where the target will be while the command counts, and as far beyond as the axis is behind what it is sent to.
+  /// Where the target will be once the command has acted for a period: what comes after it has then begun.
   void aim_head() {
     constexpr double lost_s = 1.0;
     const double now_s = head_.now_s();
@@ -171,10 +171,7 @@ class Follower {
       const double acts_s = now_s + config_.axes[i].latency_s;
       const Bearing then = filter_.at(acts_s)[i];
       asked[k] = then.angle_rad;
-      command[k] = axes_[i].command(now_s, result_.period_s, [&](double t_s) {
-        return t_s < acts_s ? then.angle_rad + then.rate_rad_s * (t_s - acts_s)
-                            : ahead(then, BearingFilterConfig{}.singer_tau_s, t_s - acts_s).angle_rad;
-      });
+      command[k] = filter_.at(acts_s + result_.period_s)[i].angle_rad;
     }
     asked_.push_back({now_s + config_.axes[0].latency_s, 0.0, asked});
     return command;
@@ -188,7 +185,7 @@ class Follower {
   const Progress& progress_;
   HeadFollowing& result_;
   BearingFilter filter_;
-  std::vector<AxisPilot> axes_;
+  std::vector<AxisCourse> axes_;
   std::vector<HeadPosition> asked_;
   double read_s_ = 0.0;
   std::deque<StreamFrame> waiting_;

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <deque>
+#include <optional>
+
+#include "alidade/pantilt/positioner.h"
+
+namespace alidade {
+
+/// Where one axis was between two readings: by its model and the commands, plus what the readings are beside that.
+class AxisCourse {
+ public:
+  AxisCourse(const PositionerParams& axis, double start_rad, double t_s);
+
+  /// In order of time.
+  void read(double t_s, double angle_rad);
+  void send(double t_s, double target_rad);
+  /// Between the readings of the last two seconds; none: before or after them.
+  [[nodiscard]] std::optional<double> at(double t_s) const;
+
+ private:
+  struct Place {
+    double t_s, model_rad;
+  };
+  struct Reading {
+    double t_s, angle_rad, beside_rad;  ///< `beside`: reading less model.
+  };
+  void advance(double t_s);
+
+  Positioner model_;
+  std::deque<Place> course_;
+  std::deque<Reading> readings_;
+};
+
+}  // namespace alidade

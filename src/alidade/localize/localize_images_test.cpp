@@ -97,7 +97,7 @@ Localization disturbed(const RoomVideo& video, bool takes_away, std::uint64_t se
 
 TEST(LocalizeImages, MismatchesOfFortyPercentChangeLittle) {
   double clean2 = 0.0, wrong2 = 0.0, missing2 = 0.0;
-  constexpr int num_draws = 2;
+  constexpr int num_draws = 4;
   for (const double amplitude : {1.0, 1.4, 1.8}) {
     RoomScene scene;
     scene.camera = room_camera();
@@ -114,9 +114,9 @@ TEST(LocalizeImages, MismatchesOfFortyPercentChangeLittle) {
   }
   RecordProperty("over_clean", std::to_string(std::sqrt(wrong2 / clean2)));
   RecordProperty("over_missing", std::to_string(std::sqrt(wrong2 / missing2)));
-  // Being wrong must cost no more than being away: six tenths of the observations tell with 1/√0.6 of the σ.
+  // Being wrong must cost no more than being away.
   EXPECT_LT(std::sqrt(wrong2 / missing2), 1.1);
-  EXPECT_LT(std::sqrt(wrong2 / clean2), 1.0 / std::sqrt(0.6));
+  EXPECT_LT(std::sqrt(wrong2 / clean2), 1.2);
 }
 
 TEST(LocalizeImages, ASecondOfDarknessIsRecoveredWithinTenFrames) {

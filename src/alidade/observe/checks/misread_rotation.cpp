@@ -117,12 +117,13 @@ bool may_be_misread(const ObserveSolution& report) {
          (report.sigma_px > max_ordinary_px || static_cast<double>(report.pixels_rejected) > many * seen);
 }
 
-std::string misread_rotation(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,
-                             const Progress& progress) {
-  if (log.source == RotationSource::none || config.rotation == RotationKnowledge::free) return "";
-  constexpr double max_px = 3.0, clearly = 0.3;  // of the noise as the log is read
+Misread misread_rotation(const RotationLog& log, const ObserveSetup& config, const ObserveSolution& report,
+                         const Progress& progress) {
+  if (log.source == RotationSource::none || config.rotation == RotationKnowledge::free) return {.is_sought = true};
+  constexpr double max_px = 3.0, clearly = 0.3;            // of the noise as the log is read
+  constexpr double ordinary_px = 1.0, beyond_doubt = 0.1;  // no cause is tried beside it
   const double as_read = explanation_of(log, config, report.scale, progress).noise_px;
-  std::string best;
+  Misread best{.is_sought = true};
   double least = std::min(max_px, clearly * as_read);
   for (const Misreading& misreading : misreadings_of(log.source)) {
     RotationLog undone = log;
@@ -130,7 +131,8 @@ std::string misread_rotation(const RotationLog& log, const ObserveSetup& config,
     const Explanation explained = explanation_of(undone, config, report.scale, progress);
     if (!explained.tells || !(explained.noise_px < least)) continue;
     least = explained.noise_px;
-    best = misreading.words;
+    best.words = misreading.words;
+    best.explains_all = least < std::min(ordinary_px, beyond_doubt * as_read);
   }
   return best;
 }

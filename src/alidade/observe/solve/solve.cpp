@@ -239,6 +239,12 @@ void note_untold(const ObserveSolution& report, const std::vector<RotationError>
                         0.0, 0.0, "", "residuals"});
 }
 
+/// Residuals that no noise of a finder makes, or no answer: the rotation may be misread as well.
+bool is_gross(const ObserveSolution& report) {
+  constexpr double max_ordinary_px = 2.0;
+  return may_be_misread(report) && (!is_answer(report) || report.sigma_px > max_ordinary_px);
+}
+
 /// Frees what the residuals ask for: sets of causes where the answer is doubtful, one after the other where not.
 void find_causes(const RotationLog& log, const ObserveSetup& told, const Progress& progress, ObserveSetup& config,
                  ObserveSolution& report, std::vector<Rival>& rivals) {
@@ -271,16 +277,25 @@ ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& tol
   const bool is_regression = config.method == ObserveMethod::flow || config.method == ObserveMethod::fang2011;
   const bool is_known = config.rotation == RotationKnowledge::known;
   const bool is_judged = is_known && !is_regression && report.status != Status::too_few_data;
-  if (config.estimate_auto && is_judged) find_causes(log, told, progress, config, report, rivals);
+  // No cause explains a rotation that is read otherwise than it was meant: seconds are not spent on looking for one.
+  Misread misread;
+  if (is_judged && is_gross(report)) misread = misread_rotation(log, config, report, progress);
+  if (config.estimate_auto && is_judged && !misread.explains_all) {
+    find_causes(log, told, progress, config, report, rivals);
+  }
   prefer_all_rows(log, config, progress, report);
-  if (is_judged && !config.no_zoom && never_rests(log, config, report, progress)) report.status = Status::unsteady;
+  if (is_judged && !config.no_zoom && !misread.explains_all && never_rests(log, config, report, progress)) {
+    report.status = Status::unsteady;
+  }
   if (is_answer(report)) {
     note_untold(report, estimated_errors(log, config), report.told_apart);
     for (Check& check : rival_checks(rivals, log, config)) report.told_apart.push_back(std::move(check));
   }
   report.estimated = config.nuisances;
   report.estimated_errors = config.estimate_errors;
-  if (may_be_misread(report)) report.misread = misread_rotation(log, config, report, progress);
+  if (may_be_misread(report)) {
+    report.misread = misread.is_sought ? misread.words : misread_rotation(log, config, report, progress).words;
+  }
   return report;
 }
 

@@ -45,11 +45,18 @@ struct ObserveSolution : ObserveReport {
 [[nodiscard]] ObserveSolution solve_as_given(const RotationLog& log, const ObserveSetup& config,
                                              const Progress& progress = {});
 
+/// How a rotation was read otherwise than it was meant.
+struct Misread {
+  std::string words;          ///< Empty: it was not.
+  bool is_sought = false;     ///< All readings were tried.
+  bool explains_all = false;  ///< Read so, the pixels fit as a finder's do.
+};
+
 /// Is the answer, or that there is none, such that the rotation may be misread? And how: signs, axes, degrees,
 /// quaternions the other way round, whichever lets the pixels fit clearly better.
 [[nodiscard]] bool may_be_misread(const ObserveSolution& report);
-[[nodiscard]] std::string misread_rotation(const RotationLog& log, const ObserveSetup& config,
-                                           const ObserveSolution& report, const Progress& progress = {});
+[[nodiscard]] Misread misread_rotation(const RotationLog& log, const ObserveSetup& config,
+                                       const ObserveSolution& report, const Progress& progress = {});
 
 /// The parts of it that an on-line run needs: the hybrid observer's configuration for a log whose rows are yet to come.
 [[nodiscard]] HybridConfig hybrid_config(const RotationLog& layout, const ObserveSetup& config,

@@ -58,8 +58,8 @@ test:
 	@cmake --preset release -DALIDADE_TESTS=ON >/dev/null
 	@ninja -C $(out) $(jobs)
 	@echo "test: running them"
-	@# One more than there are cores: those that drive a browser wait most of the time.
-	@ctest --test-dir $(out) --output-on-failure --parallel $$(($$(nproc) + 1))
+	@# Two more than there are cores: those that drive a browser or a simulated head wait most of the time.
+	@ctest --test-dir $(out) --output-on-failure --parallel $$(($$(nproc) + 2))
 	@tools/skipped_tests $(out)
 
 bench:

@@ -2,6 +2,7 @@
 # What the tests of a suite share (rendered pictures, a simulated log) is made once, and a fifth of a second of loading
 # saved for each of them. Those with parameters are the long ones: one test each, and first, as alone at the end they
 # would leave cores idle.
+set(waiting_suites "^(HeadCommand|Heads)$") # for devices that take their time: they begin first, and the others work beside them
 set(none_ran "Running 0 tests from") # a filter that no test passes is no success
 foreach(executable label IN ZIP_LISTS executables labels)
   get_filename_component(name ${executable} NAME)
@@ -28,8 +29,12 @@ foreach(executable label IN ZIP_LISTS executables labels)
     elseif(line MATCHES "^([^ ]+)\\.( |$)")
       set(next ${CMAKE_MATCH_1})
       if(count GREATER 0 AND NOT suite MATCHES "/")
+        set(cost ${count})
+        if(suite MATCHES "${waiting_suites}")
+          set(cost 900)
+        endif()
         add_test(${label}.${suite} ${executable} "--gtest_filter=${suite}.*")
-        set_tests_properties(${label}.${suite} PROPERTIES LABELS ${label} TIMEOUT ${timeout} COST ${count}
+        set_tests_properties(${label}.${suite} PROPERTIES LABELS ${label} TIMEOUT ${timeout} COST ${cost}
                              FAIL_REGULAR_EXPRESSION "${none_ran}")
         list(APPEND tests_of_${label} ${label}.${suite})
       endif()

@@ -6,8 +6,8 @@
 
 namespace alidade {
 
-/// One axis of a head that is told where to go: what limits it on its way. docs/maths/servo.md, "A head that is told
-/// where to go". All of what moves, behind a drive with play; what is read is behind the play.
+/// The limits of one axis of a head that takes position commands; the encoder reads behind the backlash.
+/// docs/maths/servo.md, "A head with position commands".
 struct PositionerParams {
   double rate_rad_s = 0.7;           ///< Largest.
   double acceleration_rad_s2 = 2.0;  ///< Of starting and of braking.

@@ -21,8 +21,8 @@ enum class AngleUnit { deg, rad };
 [[nodiscard]] std::optional<AngleUnit> unit_named(std::string_view name);
 
 /// An axis whose angle follows the command with a first-order lag, no faster than it can: dθ = clamp((g u − θ) / τ,
-/// ±max_rate). With a limit of its acceleration it is the axis of docs/maths/servo.md, "A head that is told where to
-/// go": the rate follows within that limit, and brakes in time.
+/// ±max_rate). With a limit of its acceleration it is the axis of docs/maths/servo.md, "A head with position
+/// commands": the rate follows within that limit, and brakes in time.
 struct AnglePlant {
   double gain = 0.0567;  ///< Angle per unit of command, in `unit`. Xiahou, Chen & Wu, 2015: 0.0567 / (0.1 s + 1).
   AngleUnit unit = AngleUnit::deg;

@@ -1,4 +1,4 @@
-// How well two controllers keep a target in the middle of an image that comes late: 05_servo [folder]
+// How well two controllers keep a target in the centre of a delayed image: 05_servo [folder]
 #include <alidade/files.h>
 #include <alidade/servo.h>
 

@@ -50,7 +50,7 @@ pid_t start_child(const std::string& program, std::vector<std::string> words, in
 std::filesystem::path own_executable() {
   std::error_code error;
   std::string name = std::filesystem::read_symlink("/proc/self/exe", error).string();
-  // Replaced while it runs, by an upgrade in the middle of a lot: the one that stands in its place goes on.
+  // The executable was replaced during a batch, by an upgrade: the new one continues.
   constexpr std::string_view gone = " (deleted)";
   if (name.ends_with(gone)) name.resize(name.size() - gone.size());
   return name;

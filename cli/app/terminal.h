@@ -48,7 +48,7 @@ void hold_standard_streams();
 void catch_interrupts();
 /// The signal that asked to stop; 0 if none did.
 [[nodiscard]] int interrupting_signal();
-/// The signal has done what it was to do, where it does not end the work: the next one asks anew.
+/// The signal has been handled without ending the work: the next one asks again.
 void forget_interrupt();
 
 /// Text in one line: control characters and line ends become spaces, runs of spaces become one.

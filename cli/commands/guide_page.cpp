@@ -82,7 +82,7 @@ struct GuidePage::State {
   std::string result, report;  ///< Empty until there is one.
   Clock::time_point begin = Clock::now(), shown_at{};
   bool is_over = false;
-  const uchar* shown = nullptr;  ///< The picture that the page shows.
+  const uchar* shown = nullptr;  ///< The image that the page shows.
   cv::Mat newest;
   bool newest_is_exact = false;
   std::unique_ptr<live::CaptureServer> server;  // last: its thread uses the others

@@ -23,7 +23,7 @@ class Mat;
 
 namespace alidade::cli {
 
-/// Where pictures come from, if not from the browser: one of the two, or none.
+/// Where images come from, if not from the browser: one of the two, or none.
 struct PictureSource {
   std::shared_ptr<live::GrowingFolder> folder;
   std::shared_ptr<live::NewestFrame> stream;
@@ -43,22 +43,22 @@ void require_no_guide(const LiveOptions& live, std::initializer_list<std::pair<c
 
 class GuidePage;
 
-/// What is measured while a page guides: it sees pictures, and does what the person asks for.
+/// What is measured while a page guides: it gets images, and does what the user asks for.
 class GuidedWork {
  public:
   virtual ~GuidedWork() = default;
-  /// Of the page: what it shows, as JSON. The source of the pictures is added.
+  /// Of the page: what it shows, as JSON. The source of the images is added.
   [[nodiscard]] virtual std::string about() const = 0;
   [[nodiscard]] virtual double begin_s() const = 0;  ///< Time at which it goes on; 0 for a new one.
   [[nodiscard]] virtual bool has_goal() const = 0;
-  /// A picture, 8-bit grey, at that time.
+  /// An image, 8-bit grey, at that time.
   virtual void see(const cv::Mat& grey, double t_s, bool is_exact, GuidePage& page) = 0;
-  /// No new picture comes, of a folder.
+  /// No new image comes, of a folder.
   virtual void wait(double t_s, GuidePage& page) {
     (void)t_s;
     (void)page;
   }
-  /// "take", "undo" …; the picture is the newest, if there is one.
+  /// "take", "undo" …; the image is the newest, if there is one.
   virtual void obey(const live::PageCommand& command, const cv::Mat& newest, double t_s, bool is_exact,
                     GuidePage& page) = 0;
   /// To the page: how far it is.

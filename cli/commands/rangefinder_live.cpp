@@ -109,7 +109,7 @@ class ShotsWork : public GuidedWork {
                ? fmt::format("3σ of the origin {:.2g} mm; next: {}", three_sigma_mm(state.sigma_origin_m), state.words)
                : "no beam yet; next: " + state.words;
   }
-  /// To who sees the picture mirrored, left and right are exchanged.
+  /// Where the image is shown mirrored, left and right are exchanged.
   static std::string mirrored(std::string words) {
     const std::size_t left = words.find("left"), right = words.find("right");
     if (left != std::string::npos) words.replace(left, 4, "right");

@@ -21,7 +21,7 @@ struct GuidedShotsArgs {
 void add_guided_shots_options(CLI::App& command, GuidedShotsArgs& args);
 [[nodiscard]] FieldList fields_of(GuidedShotsArgs& args);
 
-/// Shots that are taken one by one, guided by a page: a picture of the board and the reading that the person types;
+/// Shots that are taken one by one, guided by a page: an image of the board and the reading that the user types;
 /// then `finish` calibrates from the table of them. Throws UsageError for options that do not go together.
 [[nodiscard]] ExitCode rangefinder_live(const Camera& camera, const RangefinderConfig& config, GuidedShotsArgs args,
                                         Run& run,

@@ -71,7 +71,7 @@ TEST_F(RealRangefinder, ARealRangefindersRangesArePredicted) {
   EXPECT_NEAR(std::sqrt(squares / (num - 6)), 1.0, 0.35);
 }
 
-/// One bearing of a 3-D scanner is a single-point rangefinder: in the middle of the ranges that its scan of each board
+/// One bearing of a 3-D scanner is a single-point rangefinder: the median of the ranges that its scan of each board
 /// has there. Scans in the scanner's frame.
 class ScannersBearing {
  public:
@@ -113,8 +113,8 @@ class ScannersBearing {
   std::map<int, std::vector<Eigen::Vector3d>> scans_;
 };
 
-/// The boards stood at nearly one distance: the data cannot tell. By the published pose two of the bearings passed 9 of
-/// 14 and 13 of 15 boards, and read what stood behind, up to 46 cm off: that is told first. What the data do tell is
+/// The boards were at nearly one distance: unobservable. By the published pose two of the bearings missed 9 of 14 and
+/// 13 of 15 boards, and read the background, up to 46 cm off: that is reported first. What the data do determine is
 /// within its σ of the pose.
 TEST_F(RealRangefinder, BearingsOfARealScannerAreWithinTheirSigmaOfThePublishedPose) {
   const char* data = std::getenv("ALIDADE_DATA");

@@ -58,7 +58,7 @@ TEST_F(RangefinderCommand, GivesTheBeamWithTheNamesOfTheContract) {
     const Json document = Json::parse(outcome.out);
     expect_near_truth(document);
     const Json& estimate = document["estimate"];
-    // Nobody told the readings' scale: it is estimated where it matters.
+    // The readings' scale is not given: it is estimated where it matters.
     EXPECT_NEAR(estimate["scale"], 1.0, 4.0 * document["stddev"]["scale"].get<double>() + 1e-12);
     EXPECT_LE(document["stddev_model"]["origin_m"][2], 1.000001 * document["stddev"]["origin_m"][2].get<double>());
     EXPECT_EQ(document["data"]["shots"]["cluster_z2"].size(), 18u);

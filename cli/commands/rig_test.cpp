@@ -51,7 +51,8 @@ void expect_near_truth(const Rig& rig, const Rig& truth, double max_deg, double 
 
 TEST_F(RigCommand, GivesTheRigWithTheNamesOfTheContract) {
   simulate();
-  // The simulated encoders' scales are exact; where that is not told they are estimated, and errors are twice as large.
+  // The simulated encoders' scales are exact; where that is not given they are estimated, and errors are twice as
+  // large.
   const Outcome outcome = calibrate(path("sim/views.csv"), {"--json", "--sigma-scale", "1e-5"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const Json document = Json::parse(outcome.out);
@@ -82,7 +83,7 @@ TEST_F(RigCommand, SaysWhatItAssumedAndHeedsIt) {
     EXPECT_EQ(std::ranges::count(names, name), 1) << name;
   EXPECT_EQ(document["stddev_model"]["heads"].size(), 2u);
   EXPECT_EQ(document["data"]["views"]["cluster_z2"].size(), document["counts"]["given"].get<std::size_t>());
-  // All told, the lens's σ in its file: good.
+  // Everything given, the lens's σ in its file: good.
   write_file(path("sim/camera_1.yaml"),
              lens + "covariance: {names: [fx, fy, cx, cy], upper: [1e-6, 0, 0, 0, 1e-6, 0, 0, 1e-6, 0, 1e-6]}\n");
   const Json told =

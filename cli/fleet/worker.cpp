@@ -65,7 +65,7 @@ class Worker {
     if (is_reading_) (void)flush();
     shares_.give_back();
     tell(fmt::format("{} rows of {} cameras taken in", num_rows_, cameras_.size()));
-    return ExitCode::ok;  // told to stop is how a worker ends
+    return ExitCode::ok;  // a stop request is how a worker ends
   }
 
  private:

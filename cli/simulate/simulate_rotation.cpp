@@ -46,7 +46,7 @@ struct SimulateRotationArgs {
 
 /// Pan, tilt, roll or rates, over time.
 std::function<Eigen::Vector3d(double)> motion_of(const SimulateRotationArgs& args) {
-  const bool is_rate = args.source == "rate" && !args.video;  // a video's motion is told by angles
+  const bool is_rate = args.source == "rate" && !args.video;  // a video's motion is given by angles
   const Eigen::Vector3d kept = args.motion == "pan"    ? Eigen::Vector3d(is_rate ? 0.0 : 1.0, is_rate ? 1.0 : 0.0, 0.0)
                                : args.motion == "tilt" ? Eigen::Vector3d(is_rate ? 1.0 : 0.0, is_rate ? 0.0 : 1.0, 0.0)
                                                        : Eigen::Vector3d::Ones();

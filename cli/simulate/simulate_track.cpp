@@ -34,8 +34,8 @@ struct SimulateTrackArgs {
   double latency_ms = -1.0, lag_s = -1.0, sigma_px = 0.5, sigma_angle = 0.0008726646259971648;
 };
 
-/// What a filter should be told of a recorded target: nearly the largest acceleration over a tenth of a second, in
-/// which the record's own jitter is small.
+/// The σ_a that a filter should be given for a recorded target: nearly the largest acceleration over a tenth of a
+/// second, in which the record's own jitter is small.
 double usual_acceleration(const TrackScene& scene) {
   constexpr double step_s = 0.1, nearly_all = 0.9;
   std::vector<double> all{0.0};

@@ -63,7 +63,7 @@ void check_matches(const MatchedPhotos& matches) {
   }
 }
 
-/// A row per photo: its time is its number, its attitude what the photos told.
+/// A row per photo: its time is its number, its attitude the one estimated from the photos.
 void add_photo_rows(const TurnedReport& solved, ObserveReport& report) {
   report.log.source = RotationSource::attitude;
   report.log.num_points = solved.bundle.rays.size();

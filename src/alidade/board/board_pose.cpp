@@ -19,7 +19,7 @@ Eigen::Matrix2d whitener(const Eigen::Matrix2d& cov) {
   return (Eigen::Matrix2d() << 1.0 / a, 0.0, -b / (a * c), 1.0 / c).finished();
 }
 
-/// The points' middle and their mean distance from it.
+/// The points' centroid and their mean distance from it.
 std::pair<Eigen::Vector2d, double> middle_and_size(const BoardView& view, std::span<const Eigen::Vector3d> points) {
   const auto num = static_cast<double>(view.corners.size());
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();

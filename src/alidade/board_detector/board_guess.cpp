@@ -68,7 +68,7 @@ std::string seen_dictionary(const std::vector<cv::Mat>& photos) {
   return *most < min_markers ? "" : families[static_cast<std::size_t>(most - counts.begin())];
 }
 
-/// The smallest dictionary of a family that holds the board; the told one where it does.
+/// The smallest dictionary of a family that holds the board; the given one where it does.
 std::string fitting_dictionary(Board board, const std::string& of_family, const std::string& told) {
   board.dictionary = told;
   if (family(told) == family(of_family) && fault(board).empty()) return told;
@@ -79,7 +79,7 @@ std::string fitting_dictionary(Board board, const std::string& of_family, const 
   return of_family;
 }
 
-/// The kinds of board that may be meant: the told one, then a chessboard with markers for one without.
+/// The kinds of board that may be meant: the given one, then a chessboard with markers for one without.
 std::vector<Board> kinds_to_try(const Board& told, const std::string& dictionary) {
   std::vector<Board> kinds;
   const bool is_aprilgrid = told.kind == BoardKind::chessboard && dictionary == "DICT_APRILTAG_36h11";
@@ -88,7 +88,7 @@ std::vector<Board> kinds_to_try(const Board& told, const std::string& dictionary
   if (told.kind == BoardKind::chessboard && is_marked) {
     kinds.push_back(told);
     kinds.back().kind = BoardKind::charuco;
-    kinds.back().marker_m = 0.75 * told.square_m;  // whatever it is: it must be told
+    kinds.back().marker_m = 0.75 * told.square_m;  // any value: it must be given
   }
   if (told.kind == BoardKind::charuco) {
     Board plain = told;
@@ -106,8 +106,8 @@ struct Score {
   auto operator<=>(const Score&) const = default;
 };
 
-/// Does some photo show half of each outer row and column? A board that is told too large has its markers where the
-/// right one has them, and a row more, of which the paper's border now and then gives a point.
+/// Does some photo show half of each outer row and column? A board given too large has its markers where the
+/// right one has them, and one row more, where the paper's border occasionally gives a point.
 bool reaches_its_edges(const Board& board, const std::vector<BoardDetection>& photos) {
   std::array<int, 4> most{};
   for (const BoardDetection& photo : photos) {

@@ -48,7 +48,7 @@ GridBorders turned(const GridBorders& b, int quarter_turns) {
   }
 }
 
-/// The outer square at corner (0, 0) can be told from the one at the opposite corner, or, on a square board, from the
+/// The outer square at corner (0, 0) differs from the one at the opposite corner, or, on a square board, from the
 /// ones beside it: then it is the dark one.
 bool colour_decides(int cols, int rows) { return (cols + rows) % 2 != 0 || (cols == rows && cols % 2 != 0); }
 

@@ -16,7 +16,7 @@
 namespace alidade {
 namespace {
 
-constexpr double quick_pixels = 0.6e6;  // of a picture that is searched: VGA and SVGA as they are
+constexpr double quick_pixels = 0.6e6;  // of an image that is searched: VGA and SVGA at full size
 constexpr int least_halved_px = 120;
 constexpr double least_roomy_px = 24.0;  // around the place where the board was
 

@@ -23,8 +23,8 @@ struct QuickLook {
   [[nodiscard]] bool found() const { return reason.empty(); }
 };
 
-/// Looks for a board in the pictures of a video, each a little after the one before: first about where it was, then
-/// everywhere; above two megapixels in a smaller picture. Keeps where it found the board last.
+/// Searches a board in consecutive images of a video: first around its last position, then everywhere; above two
+/// megapixels in a reduced image. Keeps the board's last position.
 class QuickLooker {
  public:
   explicit QuickLooker(const Board& board) : board_(board) {}

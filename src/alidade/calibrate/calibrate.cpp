@@ -243,7 +243,7 @@ CalibrateReport calibrate(const Board& board, std::span<const BoardView> views, 
     return report;
   }
   constexpr double parallel_rad = 0.05;  // 3°: below it, tilt is what noise makes of it
-  // A port behind a known lens may be told from parallel boards: its σ will say.
+  // A port behind a known lens may be determined from parallel boards: its σ will say.
   const bool lens_is_known = !is_central(held) && work.problem.free_lens.front() >= 4;
   if (!lens_is_known && spread_of_normals_rad(state.cam_from_board) < parallel_rad) {
     refuse(report, "all boards are parallel: the focal length cannot be determined from the distance",

@@ -23,7 +23,7 @@ std::optional<Candidate> evaluate(const Camera& camera, const std::vector<Eigen:
   return Candidate{cam_from_board, std::move(*information)};
 }
 
-/// The board turned by `tilt` about its middle, its middle seen at `px`, `fill` of the image's width wide.
+/// The board rotated by `tilt` about its centre, its centre seen at `px`, `fill` of the image's width wide.
 std::optional<Rigid3> place(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
                             const Eigen::Vector2d& px, double fill, const Eigen::Vector3d& tilt) {
   Eigen::AlignedBox3d box;

@@ -50,7 +50,7 @@ class NextPhotoModel : public ::testing::TestWithParam<std::string> {};
 TEST_P(NextPhotoModel, BringsWhatThePlanPromises) {
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
     Planned planned = plan(GetParam(), 8, 1, seed);
-    // A plan is linear. The corners of a 100° lens are 20 px uncertain after eight photos in the middle, where four
+    // A plan is linear. The corners of a 100° lens are 20 px uncertain after eight photos in the centre, where four
     // terms are extrapolated: there it is good for the pose, not for the number. Two photos later it is for both.
     for (int i = 0; GetParam() == "kannala_brandt" && i < 2; ++i) {
       take(planned.plan.photos.front().cam_from_board, GetParam(), seed, planned);

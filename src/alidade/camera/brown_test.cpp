@@ -113,7 +113,7 @@ TEST(BrownFold, PointsBeyondItAreNotSeen) {
   const double r_max = Brown::max_radius(params);
   EXPECT_TRUE(Brown::project(params, {0.999999 * r_max, 0.0, 1.0}));
   EXPECT_FALSE(Brown::project(params, {1.000001 * r_max, 0.0, 1.0}));
-  EXPECT_FALSE(Brown::project(params, {1.3 * r_max, 0.0, 1.0}));  // would be seen in the middle of the image
+  EXPECT_FALSE(Brown::project(params, {1.3 * r_max, 0.0, 1.0}));  // would be seen in the centre of the image
   EXPECT_FALSE(Brown::project(params, {0.1, 0.1, -1.0}));
   // A pixel outside the image of the fold has no ray; just inside it has one, on the near side.
   const double edge_px = Brown::project(params, {0.9999999 * r_max, 0.0, 1.0})->x();

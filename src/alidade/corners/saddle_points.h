@@ -21,7 +21,7 @@ struct SaddlePoint {
 };
 
 /// Saddle points of an image (one channel, 32-bit float, 0 to 255): local maxima of -det Hessian of the smoothed
-/// image whose ring of radius 4 px crosses its middle grey exactly four times, in two straight lines.
+/// image whose ring of radius 4 px crosses its mid-grey exactly four times, in two straight lines.
 [[nodiscard]] std::vector<SaddlePoint> find_saddle_points(const cv::Mat& photo);
 
 }  // namespace alidade

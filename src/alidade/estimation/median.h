@@ -6,7 +6,7 @@
 
 namespace alidade {
 
-/// The middle value by size, the larger of two; 0 of none.
+/// The median, the upper one for an even number; 0 of none.
 template <typename Number>
 [[nodiscard]] Number median_of(std::vector<Number> values) {
   if (values.empty()) return Number{};

@@ -173,7 +173,7 @@ void walk(const FleetCommon& variance, FleetTracking& tracking) {
   store(walked, tracking.P);
 }
 
-/// σ² of the innovations over what was learned, at least: while few rows have told it, on the safe side.
+/// σ² of the innovations over the estimated one, at least: conservative while few rows have contributed.
 double noise_factor(const FleetCamera& camera) {
   constexpr double prior_dof = 100.0;  // about what the rows that were learned from had
   const double dof = camera.sum_dof + prior_dof;
@@ -193,7 +193,7 @@ double variance_of(const FleetTracking& tracking, std::size_t i) {
   return tracking.P[at];
 }
 
-/// The change that a sum speaks of is taken over with a wide σ, and learned anew from the rows to come.
+/// The change that a sum indicates is accepted with a wide σ, and estimated from the following rows.
 void begin_change(int sum_index, FleetTracking& tracking) {
   const FleetSum& sum = tracking.sums[static_cast<std::size_t>(sum_index)];
   const double value = sum.score / sum.information, wide = 3.0 / std::sqrt(sum.information) + std::abs(value);
@@ -218,7 +218,7 @@ void begin_change(int sum_index, FleetTracking& tracking) {
   tracking.sums = {};
 }
 
-/// What the rows since the change have told of it. σ is of the change alone: what was not known before is in neither.
+/// The change as estimated from the rows since. σ is of the change alone: earlier uncertainty is in neither.
 FleetAlarm learned_change(const FleetCamera& camera, const FleetRow& row) {
   const FleetTracking& tracking = camera.body.tracking;
   const FleetChange& change = tracking.change;
@@ -329,7 +329,7 @@ std::optional<FleetAlarm> track_row(FleetCamera& camera, const FleetRow& row, co
       const bool is_possible = std::abs(sum.score / sum.information) < largest_change;
       camera.num_gated = is_possible ? 0 : lost_rows;
       if (is_possible) begin_change(clearest, tracking);
-      return std::nullopt;  // this row has told already
+      return std::nullopt;  // this row has been used already
     }
   }
   const bool fits = all.nis <= factor * gate_of(dof);

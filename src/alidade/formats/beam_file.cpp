@@ -41,7 +41,7 @@ std::vector<double> upper_of(const Eigen::Matrix<double, 7, 7>& cov) {
   return numbers;
 }
 
-/// Of origin, direction (as a vector, singular along itself: no basis has to be told with it) and scale, taken to the
+/// Of origin, direction (as a vector, singular along itself: no basis has to be stored with it) and scale, taken to the
 /// tangent of the direction: the embedding's columns are orthonormal.
 BeamMatrix read_beam_covariance(const YAML::Node& node, const Fields& fields, const Eigen::Vector3d& direction) {
   const Embedding J = embedding_of(direction);

@@ -11,13 +11,13 @@ struct ExifTags {
   /// 0 where the file does not say. CIPA DC-008 (Exif 2.32), tag 0x0112.
   int orientation = 0;
   /// Where the orientation's two bytes stand in the file, and whether the lower comes first; meaningful where it is
-  /// told.
+  /// given.
   std::size_t orientation_at = 0;
   bool little_endian = true;
   bool is_raw = false;  ///< A TIFF that is a camera's raw file (DNG, or its first image a reduced preview).
 };
 
-/// Of a JPEG (APP1 segment), a TIFF or a PNG (eXIf chunk), from its bytes; nothing told for anything else, or where the
+/// Of a JPEG (APP1 segment), a TIFF or a PNG (eXIf chunk), from its bytes; empty for anything else, or where the
 /// tags are broken.
 [[nodiscard]] ExifTags exif_tags(std::string_view bytes);
 

@@ -66,7 +66,8 @@ bool is_cut_off(std::string_view bytes) {
   return starts_with(bytes, "\x89PNG") && tail.rfind("IEND") == std::string_view::npos;
 }
 
-/// A TIFF that is to be turned, told not to be: libtiff turns what it makes colours of. Empty: as it is.
+/// A TIFF whose orientation tag asks for rotation, with that tag reset: libtiff rotates when it converts colours.
+/// Empty: unchanged.
 std::string untagged_tiff(std::string_view bytes) {
   if (!starts_with(bytes, "II*") && !starts_with(bytes, "MM")) return "";
   const ExifTags tags = exif_tags(bytes);

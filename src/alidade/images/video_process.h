@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-/// A camera or a server of pictures: "v4l2:/dev/video0", "rtsp://…", "http://…".
+/// A camera or an image server: "v4l2:/dev/video0", "rtsp://…", "http://…".
 struct StreamAddress {
   std::string text;
   std::string password = {};  ///< Of the user in it; reaches the decoder by its environment, and no message.

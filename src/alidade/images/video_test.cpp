@@ -18,7 +18,7 @@ namespace {
 using ::testing::HasSubstr;
 using testing::TemporaryFolder;
 
-/// An image that is told from others by its grey value.
+/// An image that is recognised by its grey value.
 cv::Mat plain(int value, int type = CV_8U, cv::Size size = {96, 80}) { return {size, type, cv::Scalar::all(value)}; }
 
 void write_image(const std::filesystem::path& file, const cv::Mat& image) {

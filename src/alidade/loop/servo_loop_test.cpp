@@ -112,7 +112,7 @@ ServoScene stepping(double latency_s, double size) {
   return scene;
 }
 
-/// How far the error goes beyond the middle, away from the jump; mean of the seeds, of head 1.
+/// The overshoot beyond the centre, away from the jump; mean over the seeds, of head 1.
 double overshoot_px(const ServoScene& scene, ControllerKind kind) {
   ServoConfig config;
   config.controller = kind;

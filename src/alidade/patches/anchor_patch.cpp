@@ -10,8 +10,9 @@
 namespace alidade {
 namespace {
 
-/// Weights of six neighbours at the place t in [0, 1) between the middle two: Lagrange's polynomial of degree 5. Cubic
-/// convolution errs by 0.006 px RMS on fine grains, as much as noise of σ = 1.5 grey values; this by less than 0.003.
+/// Weights of six neighbours at the position t in [0, 1) between the central two: Lagrange's polynomial of degree 5.
+/// Cubic convolution errs by 0.006 px RMS on fine grains, as much as noise of σ = 1.5 grey values; this by less than
+/// 0.003.
 std::array<float, 6> weights_at(float t) {
   const float a = t + 2.0f, b = t + 1.0f, c = t, d = t - 1.0f, e = t - 2.0f, f = t - 3.0f;
   const float ab = a * b, cd = c * d, ef = e * f;

@@ -11,8 +11,8 @@ class Mat;
 
 namespace alidade {
 
-/// Where a patch stands in an image, and how it has been turned, stretched and bent since it was cut out: what lay at
-/// offset d from its middle is seen at px + linear d + ½ bend (d_x², 2 d_x d_y, d_y²), with grey values gain · grey +
+/// A patch's position in an image, and how it has been rotated, stretched and curved since it was cut out: a point at
+/// offset d from its centre is seen at px + linear d + ½ bend (d_x², 2 d_x d_y, d_y²), with grey values gain · grey +
 /// bias.
 struct PatchPose {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();

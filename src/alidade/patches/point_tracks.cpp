@@ -22,13 +22,13 @@ namespace {
 constexpr int max_levels = 4;              // flow of up to about 40 px a frame without a guess
 constexpr double max_align_move_px = 1.5;  // beyond it alignment and flow found different things
 constexpr double min_distance_px = 8.0;    // half a patch: closer points tell the same
-constexpr double first_noise = 2.0;        // grey values, until the frames have told
+constexpr double first_noise = 2.0;        // grey values, until estimated from the frames
 constexpr double min_gain = 0.5, max_gain = 2.0;
 
 struct Track {
   int id = 0;
   AnchorPatch patch;
-  Eigen::Vector2d offset = Eigen::Vector2d::Zero();     ///< Of the point from the middle of its patch, in the patch.
+  Eigen::Vector2d offset = Eigen::Vector2d::Zero();     ///< Of the point from the centre of its patch, in the patch.
   PatchPose pose;                                       ///< Of the patch in the last frame.
   Eigen::Vector2d anchor_px = Eigen::Vector2d::Zero();  ///< Where the patch was cut out, in frame `anchor_frame`.
   std::size_t anchor_frame = 0;

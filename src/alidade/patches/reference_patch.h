@@ -40,8 +40,8 @@ class ReferencePatch {
   explicit ReferencePatch(std::span<const std::uint8_t, area_px> grey);
 
   [[nodiscard]] std::span<const std::uint8_t, area_px> grey() const { return grey_; }  ///< Row by row.
-  /// As seen through a map of offsets from its middle, first image to this one. None: too small or large or turned
-  /// over by it, or nothing to be seen in it.
+  /// As seen through a map of offsets from its centre, first image to this one. None: too small, too large or
+  /// mirrored by it, or without texture.
   [[nodiscard]] std::optional<PatchView> seen_through(const Eigen::Matrix2d& here_from_first) const;
 
  private:
@@ -56,7 +56,7 @@ struct PatchSearch {
 
 /// A patch found.
 struct PatchMatch {
-  Eigen::Vector2d px = Eigen::Vector2d::Zero();  ///< Of its middle.
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();  ///< Of its centre.
   double correlation = 0.0;
   double sigma_px = 0.0;  ///< Of a coordinate, from what is left over after the fit.
   int num_compared = 0;   ///< Places looked at.

@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// A line of observation through a head's middle and the point that was seen along it.
+/// A viewing ray through a head's centre and the point that was seen along it.
 struct ObservationLine {
   Eigen::Vector3d direction_in_base;  ///< Unit vector.
   Eigen::Vector3d point_in_board;

@@ -109,7 +109,7 @@ double sum_of_corrections2(const Work& work, const SolvedRig& solved, const std:
 std::optional<SolvedRig> solve_with_noise(Work& work, const RigState& start, std::vector<double>& weights) {
   constexpr double usual_rad = 0.05 * degree, min_rad = 1e-3 * degree;
   constexpr double enough =
-      8.0;  // of as many corrections a σ is told to a quarter; of fewer it is easily far too small
+      8.0;  // from as many corrections a σ is known to a quarter; from fewer it is easily far too small
   work.report.sigma_encoder_is_estimated = !work.config.sigma_encoder_rad;
   work.problem.sigma_encoder_rad = work.config.sigma_encoder_rad.value_or(usual_rad);
   auto solved = solve_robustly(work, start, weights);

@@ -7,9 +7,9 @@
 #include "alidade/testing/rig_trial.h"
 #include "alidade/testing/trials.h"
 
-// What may be wrong with a rig, each alone: never a good verdict over an error above 5σ, and what can be told apart is
-// estimated. ALIDADE_TEST_TRIALS=20 draws as many rigs of each kind; bench/study_causes.cpp: of which size each is
-// seen.
+// What may be wrong with a rig, each alone: never a good verdict over an error above 5σ, and what is distinguishable is
+// estimated. ALIDADE_TEST_TRIALS=20 draws as many rigs of each kind; bench/study_causes.cpp: from which size each is
+// detected.
 
 namespace alidade {
 namespace {

@@ -17,8 +17,8 @@ namespace {
 /// Errors that all corners of a view share.
 struct SharedErrors {
   double shift_px = 0.0;    ///< Blur: σ of a shift of the whole view.
-  double jitter_rad = 0.0;  ///< σ of the encoders beyond what is told.
-  double bow_m = 0.0;       ///< Of the board, in its middle.
+  double jitter_rad = 0.0;  ///< σ of the encoders beyond the given one.
+  double bow_m = 0.0;       ///< Of the board, at its centre.
 };
 
 std::vector<HeadView> views_with(const RigScene& scene, const SharedErrors& errors, std::uint64_t seed) {
@@ -220,7 +220,7 @@ TEST(RigGiven, ALensWithItsCovarianceIsCounted) {
   EXPECT_GT(exact, 2.0 * sum);
 }
 
-/// What is wrong with a rig whose person told too small a σ, or none is asked for.
+/// What is wrong with a rig with too small a given σ, or with none.
 struct Wrong {
   const char* name;
   double f = 0.0, cx_px = 0.0, pan_scale = 0.0, tilt_once_rad = 0.0, pan_twice_rad = 0.0;

@@ -83,7 +83,7 @@ Rigid3 cam_from_cam(const Head& first, const Eigen::Vector2d& first_rad, const H
   return cam_from_world(first, first_rad) * world_from_cam(second, second_rad);
 }
 
-/// The middle and the four corners of what a head's views cover, or of `min_rad` about its middle if that is more.
+/// The centre and the four corners of the range of a head's views, or of `min_rad` about its centre if that is more.
 std::vector<Eigen::Vector2d> angles_of(const HeadCover& cover, double min_rad) {
   const Eigen::Vector2d middle = 0.5 * (cover.lowest_rad + cover.highest_rad);
   const Eigen::Vector2d half = (0.5 * (cover.highest_rad - cover.lowest_rad)).cwiseMax(0.5 * min_rad);
@@ -137,7 +137,7 @@ Eigen::Matrix<double, 6, 6> relative_covariance(const Rig& rig, std::size_t firs
 
 namespace {
 
-/// σ of angle and place between cameras, the worst over what their views cover, or so much about its middle.
+/// σ of angle and position between cameras, the worst over the range of their views, or so much about its centre.
 std::pair<double, double> worst_sigma(const RigReport& report, double min_rad) {
   const Rig& rig = report.rig;
   double angle2 = 0.0, length2 = 0.0;

@@ -21,7 +21,7 @@ namespace {
 using Json = nlohmann::json;
 using Status = RigReport::Status;
 
-/// A board like the reference case's: its origin in the middle.
+/// A board like the reference case's: its origin at the centre.
 std::vector<Eigen::Vector3d> centred(const Board& board) {
   std::vector<Eigen::Vector3d> points = points_in_board(board);
   const Eigen::Vector3d middle = 0.5 * (points.front() + points.back());

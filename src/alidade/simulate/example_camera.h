@@ -8,7 +8,7 @@
 namespace alidade {
 
 /// A believable camera of a model and image size, for simulations that are not given one: about 64° wide (100° for
-/// kannala_brandt, 47° in water for flat_port), its principal point a little off the middle, with barrel distortion.
+/// kannala_brandt, 47° in water for flat_port), its principal point a little off the centre, with barrel distortion.
 /// None for an unknown model.
 [[nodiscard]] std::optional<Camera> example_camera(std::string_view model_name, int width_px, int height_px);
 

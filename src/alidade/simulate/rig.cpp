@@ -76,7 +76,7 @@ std::vector<HeadView> views_of(const RigHead& rig_head, const Rigid3& world_from
 }
 
 Rigid3 drawn_board(const RigSceneConfig& config, const Rig& rig, const Eigen::Vector3d& middle_in_board, Draws& draws) {
-  // Somewhere in front of the heads' middle, its face towards them, tilted by up to 35°.
+  // Somewhere in front of the heads' midpoint, facing them, tilted by up to 35°.
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const RigHead& rig_head : rig.heads)
     middle += rig_head.head.world_from_base.translation / static_cast<double>(rig.heads.size());

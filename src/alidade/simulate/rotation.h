@@ -28,7 +28,7 @@ struct RotationScene {
       Eigen::Vector3d::Zero();  ///< cam_from_mount = Exp(mount): what is measured is the mount's.
   double delay_s = 0.0;         ///< Pixels are of t + delay.
   double clock_rate = 0.0;  ///< The images' clock over the rotation's, less one: pixels are of t · (1 + it) + delay.
-  double shutter_s = 0.0;   ///< The last row is read so much after the first; the middle one at t + delay.
+  double shutter_s = 0.0;   ///< The last row is read so much after the first; the central one at t + delay.
 };
 
 struct RotationLogConfig {

@@ -47,7 +47,7 @@ struct TrackScene {
   std::vector<double> more_latency_s;  ///< One a head, added; empty: none.
   double aiming_lag_s = 0.34;          ///< Time constant of the heads. 0: they always point at the target.
   double sigma_px = 0.5, sigma_encoder_rad = 0.0008726646259971648;
-  double sigma_a_m_s2 = 1.0;  ///< What a filter should be told of the target.
+  double sigma_a_m_s2 = 1.0;  ///< What a filter should be given for the target.
   std::vector<Occlusion> occlusions;
   TrackFaults faults;
 };
@@ -66,7 +66,7 @@ struct SimulatedObservation {
 [[nodiscard]] std::optional<TrackScene> track_scenario(std::string_view name);
 [[nodiscard]] std::vector<std::string> track_scenarios();
 
-/// From the start of a circle in a plane of constant z, which begins at +x of its middle.
+/// From the start of a circle in a plane of constant z, which begins at +x of its centre.
 [[nodiscard]] Eigen::Vector3d circle_offset(double radius_m, double period_s, double t_s);
 
 [[nodiscard]] bool is_in_image(const Camera& camera, const Eigen::Vector2d& px);

@@ -57,7 +57,7 @@ std::vector<UnderwaterPoint> points_of(const UnderwaterScene& scene, Draws& draw
   return points;
 }
 
-/// Of a row that is read `readout_s` (v/H − ½) after the middle one: by iteration, as the row depends on the pose.
+/// Of a row that is read `readout_s` (v/H − ½) after the central one: by iteration, as the row depends on the pose.
 std::optional<Eigen::Vector2d> rolling_px(const UnderwaterScene& scene, const Swing& swing, double t_s,
                                           const Eigen::Vector3d& point_in_world) {
   auto px = project(scene.camera, swing.world_from_cam(t_s).inverse() * point_in_world);

@@ -21,12 +21,12 @@ struct UnderwaterScene {
   double sigma_px = 0.5;
   double sigma_known_m = 0.001;  ///< Of each coordinate of a known point.
   double sigma_depth = 0.03;     ///< Of the depth at which an unknown point is first believed, over the depth.
-  double sigma_position_m = 0.005, sigma_rotation_rad = 0.01;  ///< Of the start that a filter is told.
+  double sigma_position_m = 0.005, sigma_rotation_rad = 0.01;  ///< Of the initial state that a filter is given.
   double mismatches = 0.0;    ///< Share of the observations after the first frame that show another place.
   double mismatch_px = 60.0;  ///< How far at most, in each coordinate.
   double blackout_from_s = 0.0, blackout_s = 0.0;  ///< Nothing is seen from then on for so long.
-  // What is not as a filter is told.
-  double readout_s = 0.0;         ///< From an image's first row to its last; its time is that of the middle one.
+  // What differs from the filter's assumptions.
+  double readout_s = 0.0;         ///< From an image's first row to its last; its time is that of the central one.
   double late_s = 0.0;            ///< Images are taken so long before the time that they bear.
   double target_speed_m_s = 0.0;  ///< Of the board along its x, against the other points.
   double target_stretch = 0.0;    ///< Known points are given so much (relative) further apart along x.

@@ -116,7 +116,7 @@ TEST(LaserSpotAccuracy, NoSpotIsWrongAndSigmaSaysHowWellItStands) {
 }
 
 TEST(LaserSpotBias, NoneOnEvenSquares) {
-  // Squares of 30 px and more, hit in their middle or nearly: ink and paper.
+  // Squares of 30 px and more, hit at their centre or nearly: ink and paper.
   const Board large{BoardKind::chessboard, 3, 2, 0.08, 0.0, ""};
   const auto hits = draw_spot_scene(*example_camera("brown", 320, 240), large, {0.04, -0.01, 0.005}, {-0.06, 0.02, 1.0},
                                     {.num_photos = 20, .min_range_m = 0.5, .max_range_m = 0.8}, 4);

@@ -73,7 +73,7 @@ struct Patch {
   }
 };
 
-/// Where the channel saturates its excess over other channels vanishes: a white middle in a coloured ring. It gets the
+/// Where the channel saturates its excess over other channels vanishes: a white core in a coloured ring. It gets the
 /// ring's light.
 void fill_saturated(SpotSignal& signal, const Patch& patch) {
   float most = 0.0F;

@@ -254,7 +254,7 @@ SpotPlace fit_on_edge(const SpotSignal& signal, const SpotPlace& start) {
   const Matrix7 inverse = solution.normal.ldlt().solve(Matrix7::Identity());
   spot.cov = std::max(1.0, solution.cost / dof) * inverse.topLeftCorner<2, 2>();
   // What the print's model misses grows with the correction; without a photo to compare with the print is less known.
-  // So does a cut middle: it is the part that tells most.
+  // So does a clipped core: it is the most informative part.
   const double share = signal.background_is_lit || signal.is_modelled ? 0.15 : start.is_saturated ? 0.1 : 0.05;
   spot.cov += share * share * moved * moved.transpose() + 1e-4 * Eigen::Matrix2d::Identity();
   // A grey photo made of a colour one hides what its colours cut, and a model what the light does near an edge.

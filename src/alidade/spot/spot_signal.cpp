@@ -335,7 +335,7 @@ SpotSignal spot_signal(const cv::Mat& photo, int channel, const LaserSpotAids& a
     signal.reason = "the photo is blown out";
     return signal;
   }
-  // At the middle of a saddle there is no gradient, but an error as large as beside it.
+  // At the centre of a saddle there is no gradient, but an error as large as beside it.
   Image gradient = gradient_length(signal.background);
   signal.edge.resizeLike(gradient);
   cv::Mat widened = as_mat(signal.edge);

@@ -36,7 +36,7 @@ struct TargetExpectation {
 
 /// Where the target is in an image, or the reason why it is lost.
 struct TargetDetection {
-  Eigen::Vector2d px = Eigen::Vector2d::Zero();   ///< Its middle.
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();   ///< Its centre.
   Eigen::Matrix2d cov = Eigen::Matrix2d::Zero();  ///< By the image's noise and pixels. [px²]
   double score = 0.0;      ///< 0 … 1: pattern: the correlation; blobs: 1 − 6 noise / contrast; marker: 1.
   double radius_px = 0.0;  ///< Of a circle of its area.

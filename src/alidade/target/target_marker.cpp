@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-/// Where the diagonals of a quadrangle cross: the middle of the square that it is an image of.
+/// The intersection of a quadrangle's diagonals: the centre of the square that it is an image of.
 Eigen::Vector2d crossing_of_diagonals(const std::vector<cv::Point2f>& corners) {
   const auto homogeneous = [&](std::size_t i) {
     return Eigen::Vector3d(static_cast<double>(corners[i].x), static_cast<double>(corners[i].y), 1.0);
@@ -51,7 +51,7 @@ TargetDetection find_target_marker(const cv::Mat& grey, const TargetLook& look,
     TargetDetection one;
     one.px = crossing_of_diagonals(corners[i]) + window.corner();
     one.radius_px = std::sqrt(cv::contourArea(corners[i]) / 3.141592653589793);
-    const double sigma_px = 0.1;  // of the middle of four refined corners
+    const double sigma_px = 0.1;  // of the centre of four refined corners
     one.cov = sigma_px * sigma_px * Eigen::Matrix2d::Identity();
     one.score = 1.0;
     seen.push_back(one);

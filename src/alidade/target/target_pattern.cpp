@@ -48,14 +48,14 @@ Match match_at(const cv::Mat& window, const cv::Mat& pattern) {
 
 cv::Mat scaled(const cv::Mat& pattern, double scale) {
   cv::Mat result;
-  // A size, not a factor: only so does the middle stay in the middle.
+  // A size, not a factor: only so does the centre stay in the centre.
   const cv::Size size(static_cast<int>(std::lround(scale * pattern.cols)),
                       static_cast<int>(std::lround(scale * pattern.rows)));
   cv::resize(pattern, result, size, 0.0, 0.0, scale < 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
   return result;
 }
 
-/// Noise over gradients: the covariance of a displacement that is told by all pixels.
+/// Noise over gradients: the covariance of a displacement estimated from all pixels.
 Eigen::Matrix2d covariance_of(const cv::Mat& pattern, double correlation) {
   cv::Mat gradient_u, gradient_v;
   cv::Sobel(pattern, gradient_u, CV_32F, 1, 0, 3, 0.125);

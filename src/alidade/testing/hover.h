@@ -25,7 +25,7 @@ struct Hover {
   double distance_m = 0.9;
   bool turns_in_place = false;
   // What is not as given.
-  double readout_s = 0.0;           ///< From the first row to the last, the time being that of the middle one.
+  double readout_s = 0.0;           ///< From the first row to the last, the time being that of the central one.
   double target_speed_m_s = 0.0;    ///< Along x, against the other points.
   double target_stretch = 0.0;      ///< Of the known points along x, relative.
   double max_mismatched_px = 20.0;  ///< Of a share of the observations after the first frame, in each coordinate.

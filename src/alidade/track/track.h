@@ -24,7 +24,7 @@ struct FollowConfig {
   double smooth_s = 0.0;  ///< Above 0: also what the observations until so long after tell of each moment; not for imm.
   double warm_up_s = 0.5;  ///< After the start of a track: not counted in errors and statistics.
   bool judge = true;       ///< Test the innovations, raise σ by what they ask for, and ask for faults of the rig.
-  Progress progress = {};  ///< Is told now and then, and may stop the work.
+  Progress progress = {};  ///< Is called now and then, and may stop the work.
 };
 
 /// The tracker's config, with the history that smoothing asks for.

@@ -6,7 +6,7 @@ namespace alidade {
 
 /// A focal length at which the links are most like rotations, among its neighbours, and each link's rotation there.
 struct FocalStart {
-  double focal = 1.0;  ///< Normalised; square pixels, centre in the middle.
+  double focal = 1.0;  ///< Normalised; square pixels, principal point at the image centre.
   double cost = 0.0;   ///< Mean of truncated squares over the links' points.
   std::vector<Eigen::Matrix3d> b_from_a;
 };

@@ -16,7 +16,7 @@ struct PhotoLink {
   bool is_same_image = false;                              ///< Every point stands where it stood.
 };
 
-/// Normalised pixels: middle of the image 0, half its width 1.
+/// Normalised pixels: centre of the image 0, half its width 1.
 struct PhotoScale {
   double half_width_px = 1.0;
   Eigen::Vector2d middle_px = Eigen::Vector2d::Zero();

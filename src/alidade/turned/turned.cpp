@@ -205,7 +205,8 @@ class TurnedRun {
     for (const PhotoLink& link : links_) report_.matches.given += photos_.pairs[link.pair].matches.size();
   }
 
-  /// With fewer terms of the lens, where all that are free are not told from zero; what they might be is counted still.
+  /// With fewer terms of the lens, where no free one differs significantly from zero; their uncertainty is still
+  /// included.
   void state_covariance() {
     ScatterCovariance scatter = scatter_covariance(fit_, progress_);
     report_.lens_terms = free_.lens_terms;

@@ -194,7 +194,7 @@ ZoomTest free_zooms(TurnedFit fit, const Progress& progress) {
     const auto at = num_camera + per_photo * static_cast<Eigen::Index>(k) + 3;
     test.sigma.push_back(std::sqrt(std::max(cov(at, at), 0.0)));
   }
-  // the first photo's is held: all are stated against the middle one
+  // the first photo's is fixed: all are stated relative to the central one
   std::vector<double> sorted = test.log_zoom;
   const double middle = median_of(std::move(sorted));
   for (double& zoom : test.log_zoom) zoom -= middle;

@@ -5,7 +5,7 @@
 
 namespace alidade {
 
-/// fx, fy, cx, cy, k1, k2. Pixels are normalised, (px − middle) / half width, and so are the first four.
+/// fx, fy, cx, cy, k1, k2. Pixels are normalised, (px − centre) / half width, and so are the first four.
 using TurnedCamera = Eigen::Matrix<double, 6, 1>;
 using TurnedInformation = Eigen::Matrix<double, 6, 6>;
 

@@ -21,7 +21,7 @@ struct Chessboard {
 /// Looks at the photo in its own size and at half, quarter and double of it, and stops at the first whole board.
 [[nodiscard]] Chessboard find_chessboard(const cv::Mat& photo, int cols, int rows);
 
-/// The same at one size only, the photo divided by `scale`: for pictures of which there are many a second.
+/// The same at one size only, the photo divided by `scale`: for video, many images per second.
 [[nodiscard]] Chessboard find_chessboard_at(const cv::Mat& photo, int cols, int rows, double scale);
 
 }  // namespace alidade

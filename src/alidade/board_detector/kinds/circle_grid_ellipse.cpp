@@ -158,7 +158,7 @@ std::optional<Ellipse> ellipse_through(std::span<const Eigen::Vector2d> points) 
   for (const Eigen::Vector2d& point : points) middle += point / static_cast<double>(points.size());
   double scale = 0.0;
   for (const Eigen::Vector2d& point : points) scale = std::max(scale, (point - middle).norm());
-  // a x² + 2b xy + c y² + 2d x + 2e y = 1 around the middle, which lies inside
+  // a x² + 2b xy + c y² + 2d x + 2e y = 1 around the centre, which lies inside
   Eigen::MatrixXd rows(static_cast<Eigen::Index>(points.size()), 5);
   for (Eigen::Index i = 0; i < rows.rows(); ++i) {
     const Eigen::Vector2d p = (points[static_cast<std::size_t>(i)] - middle) / scale;

@@ -31,7 +31,7 @@ struct NormalEquations {
   }
 };
 
-/// Heights of the bow's two parabolas at every point, 1 in the middle and 0 at the border, from the printed board.
+/// Heights of the bow's two parabolas at every point, 1 in the centre and 0 at the border, from the printed board.
 struct BowBasis {
   std::vector<double> along_x, along_y;
 };

@@ -19,7 +19,7 @@ namespace {
 constexpr std::size_t views_of_a_place = 3;
 constexpr double margin_share = 0.02;  // of the image's width that a board keeps from its edge
 
-/// Angles at which a rig is to be known: the middle of the limits, and their corners.
+/// Angles at which a rig is evaluated: the centre of the limits, and their corners.
 std::vector<Eigen::Vector2d> angles_within(const ViewConfig& config) {
   const Eigen::Vector2d low = degree * Eigen::Vector2d(config.min_pan_deg, config.min_tilt_deg);
   const Eigen::Vector2d high = degree * Eigen::Vector2d(config.max_pan_deg, config.max_tilt_deg);
@@ -39,7 +39,7 @@ FreedParams freed_params(const RigReport& report) {
   return freed;
 }
 
-/// A rig with what its views told, and what more of them would add.
+/// A rig with the information of its views, and what more of them would add.
 class ViewPlanner {
  public:
   ViewPlanner(const RigCalibration& now, const ViewConfig& config)
@@ -155,7 +155,8 @@ class ViewPlanner {
     return view;
   }
 
-  /// The view in which the board's middle is seen at a share of the image, or as near to that as all of it is seen.
+  /// The view in which the board's centre is seen at a fraction of the image, or as near to that as the whole board
+  /// fits.
   [[nodiscard]] std::optional<HeadView> view_at(std::size_t head, const Rigid3& world_from_board,
                                                 const Eigen::Vector2d& share) const {
     const RigHead& rig_head = state_.heads[head];

@@ -36,7 +36,7 @@ struct NextView {
   int board = 0;                 ///< The number of the board's position.
   bool is_new_place = false;     ///< The board is to be put elsewhere first.
   Rigid3 world_from_board;       ///< Where it stands, or is to stand.
-  Eigen::Vector2d middle_px;     ///< Where the middle of the board is then seen.
+  Eigen::Vector2d middle_px;     ///< Where the centre of the board is then seen.
   Rigid3 cam_from_board;
   double gain = 0.0;  ///< ln of σ now over σ with it; of a new place by view, of the three that it is worth.
 };

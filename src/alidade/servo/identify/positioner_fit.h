@@ -10,7 +10,7 @@
 
 namespace alidade {
 
-/// An angle that was read, at the middle of question and answer, which were so far apart.
+/// An angle that was read, at the midpoint of request and reply, which were so far apart.
 struct PositionerReading {
   double t_s = 0.0, wait_s = 0.0, angle_rad = 0.0;
 };
@@ -49,7 +49,7 @@ struct PositionerFit {
   double gain = 1.0, sigma_gain = 0.0;  ///< What is read at rest for a radian commanded; −1: a mirrored axis.
   double encoder_hz = 0.0;              ///< It is read so often; 0: whenever it is asked.
   double encoder_evidence = 0.0;
-  bool reads_target = false;  ///< Its reading is where it was told to go at once.
+  bool reads_target = false;  ///< Its reading is the commanded position, at once.
   bool reached_rate = false;  ///< The largest rate was held for a while.
   double fastest_rad_s = 0.0;
   double noise = 1.0;                                ///< Of the residuals, over what resolution and timing explain.

@@ -160,7 +160,7 @@ EdgeErrors edge_errors(const BoardScene& scene, const RenderConfig& config) {
           const Eigen::Vector2d place(col * scene.board.square_m, (row + share) * scene.board.square_m);
           return *project(scene.camera, scene.cam_from_board[i] * surface.point(place));
         };
-        double share = 0.5;  // of the way along the edge: where it crosses the row of pixels nearest to its middle
+        double share = 0.5;  // of the way along the edge: where it crosses the row of pixels nearest to its centre
         const int v = static_cast<int>(std::lround(edge(0.5).y()));
         for (int k = 0; k < 20; ++k) share += (v - edge(share).y()) / (edge(share + 0.01).y() - edge(share).y()) * 0.01;
         const double u = edge(share).x();
@@ -269,7 +269,7 @@ TEST(RenderBoardPhoto, OpenCvReadsTheMarkersOfItsOwnCharucoLayout) {
     cv::aruco::detectMarkers(render_board_photo(scene, i, RenderConfig{}, 1), dictionary, corners, ids);
     ASSERT_EQ(ids.size(), 17u);
     for (std::size_t k = 0; k < ids.size(); ++k) {
-      Eigen::Vector2d error(0.0, 0.0);  // of the middle: each corner of a contour stands outside by about a pixel
+      Eigen::Vector2d error(0.0, 0.0);  // of the centre: each corner of a contour stands outside by about a pixel
       for (std::size_t c = 0; c < 4; ++c) {
         const cv::Point3f& point = layout->objPoints[static_cast<std::size_t>(ids[k])][c];
         const Eigen::Vector3d in_board(point.x - 0.03, point.y - 0.03, 0.0);

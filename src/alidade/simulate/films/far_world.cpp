@@ -38,7 +38,7 @@ class LatticeNoise {
   }
 
  private:
-  /// One of twelve gradients, towards the middles of a cube's edges, times the way from that corner.
+  /// One of twelve gradients, towards the midpoints of a cube's edges, times the vector from that corner.
   [[nodiscard]] float slope(const Eigen::Vector3i& cell, int x, int y, int z, const Eigen::Vector3f& f) const {
     std::uint32_t h = seed_ + 0x9e3779b9u * static_cast<std::uint32_t>(cell.x() + x);
     h = (h ^ (h >> 15)) * 0x85ebca6bu + 0xc2b2ae35u * static_cast<std::uint32_t>(cell.y() + y);

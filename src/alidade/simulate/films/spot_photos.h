@@ -41,7 +41,7 @@ enum class LaserColour { red, green };
 /// The laser's light: a Gaussian beam of constant power.
 struct LaserLight {
   LaserColour colour = LaserColour::red;
-  double peak = 300.0;  ///< What the middle of the spot adds to its colour's channel, in grey values, on white paper
+  double peak = 300.0;  ///< What the centre of the spot adds to its colour's channel, in grey values, on white paper
                         ///< that faces the beam at 1 m, before blur. More power than 255 saturates.
   double diameter_m = 0.007;       ///< Where the light has fallen to 1/e², at the origin. [m]
   double divergence_rad = 0.0005;  ///< Growth of the diameter with the range.

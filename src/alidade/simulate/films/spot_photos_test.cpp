@@ -39,7 +39,7 @@ SpotPhotoConfig dim_light() {
   return config;
 }
 
-/// A facing board at a distance, hit in the image's middle (160, 120), by a beam along the axis, at a place.
+/// A facing board at a distance, hit in the image's centre (160, 120), by a beam along the axis, at a position.
 SpotScene middle_scene(double range_m, const Eigen::Vector3d& place) {
   const Camera camera{320, 240, Calibrated<Pinhole>{{400.0, 400.0, 160.0, 120.0, 0.0}}, {}, 0.0, ""};
   SpotScene scene{

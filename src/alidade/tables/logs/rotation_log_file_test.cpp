@@ -316,7 +316,7 @@ TEST_F(RotationLogText, ReadsTheReferenceLog) {
 const std::string pair_head = "frame_a,frame_b,ua_px,va_px,ub_px,vb_px\n";
 
 TEST_F(RotationLogText, MatchesThatShareAPixelShareAFeature) {
-  // Three frames; a pixel that two matches share; a match that stands twice; one told the other way round.
+  // Three frames; a pixel that two matches share; a duplicate match; one given in the reverse direction.
   const auto read = read_pairs(file(pair_head + "b,a,10,20,11,21\n"
                                                 "a,c,11,21,12,22\n"
                                                 "a,c,50,60,51,61\n"

@@ -89,7 +89,7 @@ struct ZoomingTrack {
   std::vector<LensCourse> courses;
 };
 
-/// `off`: how many σ the told focal lengths are off, of each head.
+/// `off`: by how many σ the given focal lengths are off, of each head.
 ZoomingTrack zooming_track(std::uint64_t seed, double sigma_share, const Eigen::Vector2d& off) {
   TrackScene scene = *track_scenario("B");
   ZoomingTrack track;
@@ -111,7 +111,7 @@ ZoomingTrack zooming_track(std::uint64_t seed, double sigma_share, const Eigen::
   }
   for (LensCourse& course : track.courses) course.until_s = 10.0;
   for (const SimulatedObservation& s : simulate_track(scene, seed)) {
-    // What was drawn with the own lens, seen larger; the noise too, which is told.
+    // What was drawn with the own lens, seen larger; the noise too, which is given.
     const LensNow now = track.courses[s.head].at(s.t_capture_s);
     const Zoomed zoomed(scene.heads[s.head].camera, now.k);
     TargetObservation observation{s.t_capture_s, s.t_arrival_s, s.head, s.pan_tilt_rad, zoomed.px(s.px), 0.0, {}};

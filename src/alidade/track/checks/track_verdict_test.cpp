@@ -75,7 +75,7 @@ TEST(TrackAssumed, TheMeetingOfRaysFollowsTheParameters) {
   const auto by = meeting_sensitivity(heads, readings, {0.25, 0.0, 2.0}, Eigen::Vector3d::Zero());
   ASSERT_EQ(by.size(), 2u);
   const double f = 337.84, dz_du = 2.0 * 2.0 / (0.5 * f);
-  // A centre told too small by 1 px (p = p̂ + 1) puts the pixel 1 px nearer to the axis: u1 falls, z rises.
+  // A centre given too small by 1 px (p = p̂ + 1) puts the pixel 1 px nearer to the axis: u1 falls, z rises.
   EXPECT_NEAR(by[0](2, num_head_params + 2), dz_du, 1e-6);
   EXPECT_NEAR(by[1](2, num_head_params + 2), -dz_du, 1e-6);
   EXPECT_NEAR(by[0](2, num_head_params), 0.125 * dz_du, 1e-6);  // f: du = x/z

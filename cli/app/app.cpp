@@ -130,7 +130,7 @@ std::string usage_fault(const CLI::App& app, const CLI::ParseError& error) {
            (subcommand_names(at).empty() ? "" : "COMMAND ") + early + " …";
   }
   std::string extra;
-  for (const std::string& word : app.remaining(true)) {  // an option that nobody knows explains more than its effects
+  for (const std::string& word : app.remaining(true)) {  // an unknown option explains more than its effects
     if (extra.empty() || (extra.front() != '-' && word.front() == '-')) extra = word;
   }
   if (is_option(extra)) {

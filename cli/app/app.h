@@ -55,8 +55,8 @@ class App {
   /// The word before the commands of a group: "camera" of "camera show". Comes before them.
   void add_group(const std::string& name, const std::string& summary);
 
-  /// The word that the line begins with, where it is known before commands are added: who adds them may leave out what
-  /// that word does not ask for. Empty: all of them may be asked for.
+  /// The word that the line begins with, where it is known before commands are added: those that it
+  /// does not name need not be added. Empty: all are needed.
   [[nodiscard]] const std::string& first_word() const;
   void set_first_word(const std::string& word);
 

@@ -38,7 +38,7 @@ class LiveRun {
   LiveRun& operator=(const LiveRun&) = delete;
 
   [[nodiscard]] bool is_on() const { return options_.is_on; }
-  /// Serves the topics, and tells the person where. `row_topic`: whose rows are the table of the result so far.
+  /// Serves the topics, and prints the address. `row_topic`: whose rows are the table of the result so far.
   void open(std::vector<live::Topic> topics, std::string row_topic);
   /// Null where it is not open.
   [[nodiscard]] live::Server* server() { return server_.get(); }

@@ -34,7 +34,7 @@ constexpr bool is_sanitized() {
 void write_text(int to, std::string_view text) {
   while (!text.empty()) {
     const ssize_t written = ::write(to, text.data(), text.size());
-    if (written <= 0) return;  // nobody reads: there is nobody to tell either
+    if (written <= 0) return;  // no reader: nowhere to report it either
     text.remove_prefix(static_cast<std::size_t>(written));
   }
 }
@@ -129,7 +129,7 @@ void catch_interrupts() {
   ::sigaction(SIGINT, &action, nullptr);
   ::sigaction(SIGTERM, &action, nullptr);
   action.sa_handler = on_failed_write;
-  ::sigaction(SIGPIPE, &action, nullptr);  // nobody reads stdout any more
+  ::sigaction(SIGPIPE, &action, nullptr);  // stdout has no reader any more
   ::sigaction(SIGXFSZ, &action, nullptr);  // a file beyond the size that this process may write
 }
 

@@ -43,8 +43,8 @@ void tell_person(std::string_view line);
 /// such a stdout fails.
 void hold_standard_streams();
 
-/// From now on the first SIGINT or SIGTERM asks the work to stop, and the second ends the process at once. A write that
-/// nobody reads, or beyond the largest size of a file, fails instead of ending the process.
+/// From now on the first SIGINT or SIGTERM asks the work to stop, and the second ends the process at once. A write to
+/// a closed pipe, or beyond the largest size of a file, fails instead of ending the process.
 void catch_interrupts();
 /// The signal that asked to stop; 0 if none did.
 [[nodiscard]] int interrupting_signal();

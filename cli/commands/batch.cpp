@@ -37,7 +37,7 @@ std::string row_folder(std::size_t i, const std::string& camera) {
   return fmt::format("rows/{:06}-{}", i + 1, name);
 }
 
-/// What a row may not say: where its results go is the lot's, and a command that does not end has no result.
+/// Options that a row may not have: the batch decides where results go, and a command that does not end has no result.
 std::string fault_of(const std::vector<std::string>& words) {
   static const std::set<std::string> endless{"view", "batch", "study", "fleet"};
   if (endless.contains(words.front())) return "'" + words.front() + "' is no command of a lot";

@@ -108,7 +108,7 @@ class FolderCapture {
     has_goal_ = session_.reached_goal({});
   }
 
-  /// What is left, the most telling first; again as long as a round brings something.
+  /// The remaining ones, the most informative first; repeated as long as a round gains something.
   void take_the_rest() {
     session_.guide().take_what_comes(true);
     for (bool has_kept = true; has_kept && !is_over();) {

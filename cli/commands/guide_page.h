@@ -69,7 +69,7 @@ class GuidedWork {
 /// the end it becomes the report.
 class GuidePage {
  public:
-  /// Listens, and tells the person where. Throws InputError where it cannot.
+  /// Listens, and prints the address. Throws InputError where it cannot.
   GuidePage(const LiveOptions& options, PictureSource source, GuidedWork& work, Run& run);
   ~GuidePage();
   GuidePage(const GuidePage&) = delete;

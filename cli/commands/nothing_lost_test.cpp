@@ -214,7 +214,7 @@ TEST(NothingLost, AFullDiskLeavesTheOlderResults) {
   ::umount(folder.path().c_str());
 }
 
-/// Stdout becomes the end of a pipe that nobody reads.
+/// Stdout becomes a pipe without a reader.
 void nobody_reads() {
   int ends[2] = {-1, -1};
   if (::pipe(ends) != 0) ::_exit(99);

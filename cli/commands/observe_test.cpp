@@ -195,7 +195,7 @@ TEST_F(Film, SaysWhatDoesNotFit) {
   expect({"--video", frames, "--angles", angles}, 3, "000012.png");
 }
 
-/// Photos and matches of a simulated camera that somebody turns, and what `observe` says of them.
+/// Photos and matches of a simulated camera rotated by hand, and what `observe` says of them.
 class ObservePhotos : public testing::CommandTest {
  protected:
   Outcome simulate(const std::vector<std::string>& options) {
@@ -224,7 +224,7 @@ TEST_F(ObservePhotos, TellTheFocalLengthByThemselves) {
   EXPECT_NEAR(value(photos, "estimate", "fx"), 710.0, 3.0 * value(photos, "stddev", "fx"));
   EXPECT_NEAR(value(photos, "estimate", "fx"), 710.0, 4.0);
   EXPECT_TRUE(std::filesystem::exists(path("out/camera.yaml")));
-  // what it matched can be used again, and so can somebody's matches of which a third are wrong
+  // what it matched can be used again, and so can external matches of which a third are wrong
   for (const char* pairs : {"out/pairs.csv", "sim/pairs.csv"}) {
     const Outcome again = observe({"--pairs", path(pairs), "--size", "780x582", "--square-pixels"});
     ASSERT_EQ(again.code, 0) << again.err;
@@ -250,7 +250,7 @@ TEST_F(ObservePhotos, AreRefusedByNameWhereTheyCannotTell) {
   expect({"--pairs", path("sim/pairs.csv"), "--size", "300x200"}, 3, "lie outside");
 }
 
-/// Seven photos of a camera turned by hand, matched by somebody and by ourselves. 5.7 mm before a sensor of 1/2.3 inch:
+/// Seven photos of a camera turned by hand, with external matches and with ours. 5.7 mm before a sensor of 1/2.3 inch:
 /// 1172 to 1211 px.
 TEST(Observe, ARealCameraTurnedByHandTellsItsFocalLengthAndSaysWhatItCannot) {
   const char* data = std::getenv("ALIDADE_DATA");

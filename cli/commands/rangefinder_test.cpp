@@ -91,7 +91,7 @@ TEST_F(RangefinderCommand, WhatIsToldWithItsSigmaIsCarriedAndWhatIsNotIsNamed) {
   EXPECT_EQ((*assumption(document, "square_m"))["sigma"], 0.00002);
   EXPECT_EQ((*assumption(document, "scale"))["sigma"], 0.0);
   EXPECT_NEAR((*assumption(document, "camera.f"))["sigma"].get<double>(), 1.5 / std::sqrt(2.0), 1e-6);
-  // A camera whose covariance nobody knows moves the direction by many σ.
+  // A camera of unknown covariance moves the direction by many σ.
   std::string camera = read_file(path("sim/camera.yaml"));
   write_file(path("sim/camera.yaml"), camera.substr(0, camera.find("covariance:")));
   const Outcome unknown = calibrate({"--sigma-scale", "0", "--sigma-square", "0", "--json", "--no-report"});
@@ -263,7 +263,7 @@ TEST_F(RangefinderCommand, SaysWhatIsWrongWithItsInput) {
   write_file(path("text.jpg"), "not an image");
   expect("range_m,photo\n2.31,text.jpg\n", "text.jpg");
   const Outcome skipped = calibrate_table("range_m,u,v\n2.31,4,5\nnan,4,5\n", {"--skip-bad", "--json"});
-  EXPECT_EQ(skipped.code, 4) << skipped.err;  // one shot tells nothing
+  EXPECT_EQ(skipped.code, 4) << skipped.err;  // one shot determines nothing
   EXPECT_EQ(Json::parse(skipped.out)["counts"]["skipped"].size(), 1u);
 }
 

@@ -92,7 +92,7 @@ TEST_F(RigCommand, SaysWhatItAssumedAndHeedsIt) {
   for (const Json& what : told["assumed"]) EXPECT_FALSE(what["sigma"].is_null()) << what["name"];
 }
 
-/// Where nobody gave the encoders' scales they are estimated; what else the residuals ask for is named, and kept in
+/// Where the encoders' scales are not given they are estimated; other causes in the residuals are named, and kept in
 /// rig.yaml.
 TEST_F(RigCommand, EstimatesWhatIsAskedFor) {
   simulate({"--scale", "1.01", "--once-deg", "3"});

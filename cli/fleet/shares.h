@@ -13,8 +13,8 @@ namespace alidade::fleet {
 inline constexpr int num_parts = 32;
 [[nodiscard]] int part_of(const std::string& camera);
 
-/// Which parts this worker has: leases in a bucket whose keys go after two seconds unless they are renewed. Who stops
-/// renewing (is killed, or stalls) loses its parts to the others; nobody is needed to say so.
+/// The partitions of this worker: leases in a bucket whose keys expire after two seconds unless they are renewed. A
+/// worker that stops renewing (is killed, or stalls) loses its partitions to the others, without a coordinator.
 class Shares {
  public:
   explicit Shares(Broker& broker);

@@ -73,7 +73,7 @@ void WatchedLot::take_state(const std::string& payload) {
     const double t_s = number_in(state, "t");
     const std::scoped_lock lock(mutex_);
     Camera& camera = cameras_[state.at("camera").get<std::string>()];
-    // Before it is learned there is nothing to draw.
+    // Before it is initialised there is nothing to draw.
     if (std::isfinite(value[2]) && std::isfinite(t_s)) camera.history.add(t_s, value, sigma);
     camera.state = std::move(word);
     camera.state_text = payload;

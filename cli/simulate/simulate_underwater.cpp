@@ -73,7 +73,7 @@ std::size_t add_frames(const SimulateUnderwaterArgs& args, const Camera& camera,
   return sequence.frames.size();
 }
 
-/// The camera as camera.yaml tells it.
+/// The camera as given in camera.yaml.
 Camera told_camera(const SimulateUnderwaterArgs& args, const Camera& camera) {
   Camera told = camera;
   Eigen::VectorXd values = params(camera.lens);

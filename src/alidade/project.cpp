@@ -35,7 +35,7 @@ void put_move(const ProjectedReading& one, const Eigen::Vector3d& moved_m, const
   heed_one(fmt::format("v_px at {:g} m", one.range_m), moved_px.y(), one.pixel->cov(1, 1));
 }
 
-/// One thing taken as given, and what its σ, or an ordinary error, moves of every point and pixel.
+/// One assumption, and the effect of its σ, or of a typical error, on every point and pixel.
 template <class Moves>
 Assumption assumption_of(const std::string& name, double value, std::optional<double> sigma, double ordinary,
                          const std::vector<ProjectedReading>& projected, const Moves& moves) {

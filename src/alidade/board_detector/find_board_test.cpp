@@ -188,7 +188,7 @@ TEST(FindBoard, PlacesABoardCutByTheImageByTheBordersThatAreSeen) {
   for (const Corner& corner : found.view.corners) {
     EXPECT_LT((corner.px - truth[static_cast<std::size_t>(corner.index)]).norm(), 0.1) << corner.index;
   }
-  // Without any border in the image nobody can tell which part it is.
+  // Without any border in the image the part is ambiguous.
   const cv::Rect middle(static_cast<int>(truth[0].x()) - 14, static_cast<int>(truth[0].y()) - 14, 200, 120);
   EXPECT_NE(find_board(photo(middle), board).reason.find("cannot be determined which"), std::string::npos);
 }

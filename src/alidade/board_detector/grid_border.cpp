@@ -17,7 +17,7 @@ constexpr double min_joining_contrast = 0.3;  // of the corners known, for one t
 constexpr double min_seen = 0.6;              // part of a side that has to be in the image
 constexpr double min_alternation = 0.4;       // of the outer squares, 1 where they are as black and white as the others
 constexpr double max_alternation_beyond = 0.3;
-constexpr std::size_t max_probes = 12;  // corners that tell the contrast
+constexpr std::size_t max_probes = 12;  // corners that give the contrast
 
 /// A side of a grid: the direction outwards, and its corners' places.
 struct Side {

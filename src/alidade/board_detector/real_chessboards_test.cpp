@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A set of photos that nobody here took: how many boards are found in it, and how many whole.
+/// A set of external photos: how many boards are found in it, and how many completely.
 struct PhotoSet {
   const char *name, *folder, *extension;
   int cols, rows;

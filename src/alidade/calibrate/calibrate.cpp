@@ -142,7 +142,7 @@ bool refuse_untold(const CalibrationWork& work, CalibrateReport& report) {
   const auto names = param_names(report.camera.lens);
   for (const int at : work.problem.free_lens) {
     const std::string& name = names[static_cast<std::size_t>(at)];
-    const double sigma = std::sqrt(report.model_cov(at, at));  // of what these views could tell at best
+    const double sigma = std::sqrt(report.model_cov(at, at));  // at best, from these views
     if (sigma <= largest_told_sigma(name, values[at], report.camera)) continue;
     if (at < 4) {
       refuse(

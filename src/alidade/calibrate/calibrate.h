@@ -47,7 +47,7 @@ struct CalibrateReport {
   Camera camera;
   Eigen::MatrixXd model_cov;            ///< The same as if every corner erred by itself.
   ClusterCovariance clusters;           ///< Why the two differ; its clusters are the views in use, in order.
-  std::vector<OtherLens> other_lenses;  ///< Where the views tell the centre vaguely; `camera.cov` reaches to them.
+  std::vector<OtherLens> other_lenses;  ///< Where the views determine the centre poorly; `camera.cov` extends to them.
   std::vector<ViewFit> views;
   std::vector<Eigen::Vector3d> board_points;  ///< [m] as solved (flat: as printed).
   std::vector<double> board_sigma_z_m;        ///< σ of their z [m]; empty for a flat or given board.

@@ -132,7 +132,7 @@ std::optional<WrongBoard> told_wrongly(const std::vector<std::size_t>& in_vain, 
 }
 
 /// Adds the corners of the first extraction that the second lost: where the lens model fits badly, the second starts
-/// too far off, and these corners are the ones that tell.
+/// too far off, and these corners are the informative ones.
 void keep_missing(const std::vector<Corner>& first, std::vector<Corner>& again) {
   for (const Corner& corner : first) {
     const auto same = [&](const Corner& other) { return other.index == corner.index; };

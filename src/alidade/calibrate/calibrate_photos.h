@@ -19,7 +19,7 @@ struct PhotoCalibration {
 
 /// Bouguet's procedure: find the corners, calibrate a flat board, extract the corners again with lens and pose known,
 /// calibrate as `config` asks. Photos of another size than most are rejected and named. Where
-/// (nearly) none shows the board as given, the board that they do show is looked for, and the report says how to tell
+/// (nearly) none shows the board as given, the board that they do show is searched, and the report says how to give
 /// it. J.-Y. Bouguet, "Camera calibration toolbox for Matlab", first example: analyse error, reproject, recompute
 /// corners.
 [[nodiscard]] PhotoCalibration calibrate_photos(const std::vector<std::string>& names, const PhotoLoader& load_photo,

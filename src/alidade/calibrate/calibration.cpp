@@ -37,7 +37,7 @@ Counts count_photos(const Calibration& result) {
 
 /// The board as solved: decides its shape, and solves again where that is not the one of the first solve.
 std::vector<ShapeTransfer> settle_shape(Calibration& result, const Progress& progress) {
-  constexpr std::size_t max_photos = 60;  // enough to tell a board's shape
+  constexpr std::size_t max_photos = 60;  // enough to determine a board's shape
   report_progress(progress, "testing the board's shape", 0, 1);
   const BoardShape asked = result.config.board_shape;
   auto transfers = test_shape_transfer(result.board, used_views(result.board_views, result, max_photos), result.size,

@@ -13,9 +13,9 @@ namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
 /// Which shape the board may have: flat as printed; a bow (two parameters: out-of-plane parabolas along x and y);
-/// free (every point moves in 3-D, rigid motion and scale held); given (points learned elsewhere, held); or automatic:
-/// free where a shape learned on one half of the photos fits the other half better than a flat one, flat elsewhere.
-/// calibrate() takes automatic as flat; judge_calibration() decides.
+/// free (every point moves in 3-D, rigid motion and scale fixed); given (points known from elsewhere, fixed); or
+/// automatic: free where a shape estimated on one half of the photos fits the other half better than a flat one, flat
+/// elsewhere. calibrate() takes automatic as flat; judge_calibration() decides.
 enum class BoardShape { flat, bow, free, given, automatic };
 
 /// What is known of a lens parameter before the photos: a normal distribution.
@@ -28,7 +28,7 @@ struct Prior {
 };
 
 /// Which corners that no noise explains are rejected: automatic rejects them where corners come with a covariance;
-/// corners without one are somebody's measurements, to be judged as they are.
+/// corners without one are external measurements, checked as they are.
 enum class OutlierRule { automatic, drop, keep };
 
 /// What is known of a camera behind a flat port before its photos in water.
@@ -51,7 +51,7 @@ struct CalibrateConfig {
   double outlier_sigmas = 8.0;                    ///< A corner further off than this many robust σ is an outlier.
   int max_iterations = 60;
   PortKnowledge port = {};                         ///< Of model flat_port.
-  std::vector<Eigen::Vector3d> board_points = {};  ///< [m] Of BoardShape::given: the board as learned elsewhere.
+  std::vector<Eigen::Vector3d> board_points = {};  ///< [m] Of BoardShape::given: the board as known from elsewhere.
 };
 
 /// The words of the shapes that can be asked for by name.

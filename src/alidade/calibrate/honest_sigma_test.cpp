@@ -52,7 +52,7 @@ SigmaCoverage coverage_of_sigma(double shared_px, int runs, int photos = photos_
   return found;
 }
 
-// A share of 1500 runs scatters by 1.2 % at 1σ and .5 % at 2σ, of nine parameters that hang together by somewhat less.
+// A share of 1500 runs scatters by 1.2 % at 1σ and .5 % at 2σ, of nine correlated parameters by somewhat less.
 TEST(HonestSigma, CoversWhereTheModelIsTrue) {
   const SigmaCoverage found = coverage_of_sigma(0.0, 1500);
   ASSERT_EQ(found.runs, 1500.0);

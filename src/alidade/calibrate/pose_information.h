@@ -26,7 +26,7 @@ namespace alidade {
                                                       const std::vector<Eigen::Vector3d>& board_points,
                                                       const Rigid3& cam_from_board, double margin_px = 0.0);
 
-/// What a view at a pose tells of the free lens parameters, per unit noise of a corner's coordinate, the pose
+/// A view's information about the free lens parameters at a pose, per unit noise of a corner's coordinate, the pose
 /// eliminated: A − W V⁻¹ Wᵀ. None where a corner cannot be projected.
 [[nodiscard]] std::optional<Eigen::MatrixXd> lens_information(const Camera& camera,
                                                               const std::vector<Eigen::Vector3d>& board_points,

@@ -108,7 +108,7 @@ std::vector<Eigen::Matrix2d> implied_covariance(const Eigen::MatrixXd& cov,
     A.noalias() += weights[i] * J_motion[i].transpose() * J_motion[i];
     B.noalias() += weights[i] * J_motion[i].transpose() * seen[i]->projection.J_px_params;
   }
-  // The least-norm answer where the grid does not tell the motion (a very narrow image).
+  // The least-norm answer where the grid does not determine the motion (a very narrow image).
   const Eigen::MatrixXd K = -minimum_norm_solution(A, B);
   std::vector<Eigen::Matrix2d> covariances(seen.size(), Eigen::Matrix2d::Zero());
   for (std::size_t i = 0; i < seen.size(); ++i) {

@@ -21,12 +21,11 @@ struct CornerStart {
 
 struct CornerFitConfig {
   double window = 0.47;  ///< Half side of the fitted parallelogram, in squares; below 0.5 no pixel serves two corners.
-  double max_half_window_px =
-      24;                     ///< Beyond it more of the edges tells more of the lens's curvature than of the corner.
-  double max_move_px = 2.0;   ///< A fit that leaves its start further found something else.
-  double min_contrast = 2.0;  ///< Half the step between black and white, in grey values.
-  double max_misfit = 0.30;   ///< Residual RMS over the contrast: glare, occlusion, another pattern.
-  int max_iterations = 12;    ///< 3–5 are typical.
+  double max_half_window_px = 24;  ///< Beyond it the edges contain more of the lens's curvature than of the corner.
+  double max_move_px = 2.0;        ///< A fit that leaves its start further found something else.
+  double min_contrast = 2.0;       ///< Half the step between black and white, in grey values.
+  double max_misfit = 0.30;        ///< Residual RMS over the contrast: glare, occlusion, another pattern.
+  int max_iterations = 12;         ///< 3–5 are typical.
 };
 
 /// A corner below the pixel, with its covariance: inverse normal matrix times the residual variance.

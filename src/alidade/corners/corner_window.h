@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-/// Pixels of one colour so far from both edges that only the mean and the contrast can tell anything about them.
+/// Pixels of one colour so far from both edges that they depend on the mean and the contrast only.
 struct FarPixels {
   double count = 0.0, sum = 0.0, sum_of_squares = 0.0;
 };

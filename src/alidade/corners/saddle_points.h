@@ -9,7 +9,7 @@ class Mat;
 
 namespace alidade {
 
-/// A point where four areas meet, bright and dark in turn: a chessboard corner as far as its surroundings tell.
+/// A point where four areas meet, alternately bright and dark: a chessboard corner, judged by its surroundings.
 struct SaddlePoint {
   Eigen::Vector2f px = Eigen::Vector2f::Zero();
   /// Directions [rad] of the two edges, angle[0] in [0, π), angle[1] in (angle[0], angle[0] + π); the sector from

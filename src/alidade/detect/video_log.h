@@ -22,7 +22,7 @@ struct VideoLogConfig {
   std::size_t max_points = 1000;  ///< The longest seen are kept.
 };
 
-/// What a video and its angles tell.
+/// The measurements of a video and its angles.
 struct VideoLog {
   RotationLog log;
   int width_px = 0, height_px = 0;

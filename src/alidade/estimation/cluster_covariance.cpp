@@ -23,7 +23,7 @@ MatrixXd product(const A& a, const B& b) {
   return a * b;
 }
 
-/// Least rest 1 − h along a direction. A cluster that alone tells it has no residual in it: 0/0 is left at 0.
+/// Least rest 1 − h along a direction. A cluster that alone determines it has no residual in it: 0/0 is left at 0.
 constexpr double min_rest = 1e-3;
 
 /// A cluster where the model's covariance is 1. Its measurements of what is asked for, made orthonormal, pull by y: by
@@ -115,11 +115,11 @@ void find_contradictions(std::vector<Member>& members, Eigen::Index n) {
 struct Scatter {
   MatrixXd seen;      ///< W
   MatrixXd certain;   ///< The part of it that is no chance: contradictions. It is not shrunk.
-  MatrixXd expected;  ///< 1, less what priors tell.
+  MatrixXd expected;  ///< 1, less the priors' information.
   VectorXd dof = {};  ///< Of W along each parameter's direction, by the model.
   double mean = 1.0;  ///< c
   double mean_dof = 1.0;
-  double evidence = 0.0;    ///< Which share of the excess over the model is believed.
+  double evidence = 0.0;    ///< Which share of the excess over the model is used.
   double shrinkage = 1.0;   ///< λ
   double shared_dof = 1.0;  ///< Of c where it is not 1: the excess is not the same in all directions.
 
@@ -140,8 +140,8 @@ MatrixXd shares_of(const std::vector<Member>& members, Eigen::Index n) {
   return shares;
 }
 
-/// Degrees of freedom (Satterthwaite) of Σ (uᵀx)² along each unit direction u, a row: x of two clusters hang together
-/// by −hᵢhₖ, as what one pulls the others pull back (Bell & McCaffrey; Imbens & Kolesár).
+/// Degrees of freedom (Satterthwaite) of Σ (uᵀx)² along each unit direction u, a row: x of two clusters are correlated
+/// by −hᵢhₖ, as the others compensate each one's influence (Bell & McCaffrey; Imbens & Kolesár).
 VectorXd directional_dof(const MatrixXd& shares, const MatrixXd& directions) {
   const Eigen::Index n = directions.rows(), num = shares.cols() / n;
   const MatrixXd pulls = shares.transpose() * directions.transpose();  // column j: hᵢu, one after the other
@@ -155,7 +155,7 @@ VectorXd directional_dof(const MatrixXd& shares, const MatrixXd& directions) {
     if (own.sum() * own.sum() > little * squares)  // a bound of what follows
       squares += (of_direction * of_direction.transpose()).squaredNorm() - own.square().sum();
     const double sum = each.sum();
-    dof[j] = squares > 0.0 ? sum * sum / squares : std::numeric_limits<double>::infinity();  // a prior tells it
+    dof[j] = squares > 0.0 ? sum * sum / squares : std::numeric_limits<double>::infinity();  // determined by a prior
   }
   return dof;
 }
@@ -176,8 +176,8 @@ double mean_dof(const std::vector<Member>& members, const MatrixXd& shares, doub
   return total * total / std::max(squares, 1e-300);
 }
 
-/// How far the excess over the model is believed, and how far in each direction by itself. The logarithm of c scatters
-/// by 2/ν: the share 1 − (2/ν)/ln² c of it is believed (empirical Bayes: ln c has the variance that is seen, less
+/// Weight of the excess over the model, and of each direction's own. The logarithm of c scatters by 2/ν: the share
+/// 1 − (2/ν)/ln² c of it is used (empirical Bayes: ln c has the observed variance, less
 /// that). An excess of which only the mean b = c − 1 is known is exponentially distributed over directions (maximum
 /// entropy); against chance, of variance 2/ν (c² + b²) in a direction, the linear Bayes estimate of it has the weight
 /// 1 − λ = b²/(b² + 2/ν (c² + b²)).

@@ -43,12 +43,12 @@ struct ClusterCovariance {
 
 /// Cluster-robust covariance. `inverse` is H⁻¹ of the parameters asked for, `noise_variance` the variance s² of the
 /// whitened residuals by their own degrees of freedom: s² H⁻¹ is the model's covariance. Parameters with a zero
-/// diagonal are held. Fewer than `min_clusters` clusters determine nothing: the model's covariance comes back.
+/// diagonal are fixed. Fewer than `min_clusters` clusters determine nothing: the model's covariance is returned.
 ///
 /// In parameters in which H⁻¹ = 1 a cluster has the share h = C Cᵀ of the information and the step d; by the model the
 /// covariance of y = C⁻¹ d is s² (1 − m), m the leverage of the whole fit. x = C (1 − m)^(−1/2) y/s makes the scatter
 /// W = Σ x xᵀ unbiased for 1 (CR2); along directions in which a cluster contradicts the others beyond chance it is
-/// C (1 − m)⁻¹ y/s: what its deletion changes (CR3, the jackknife). What of W exceeds 1 is believed as far as the
+/// C (1 − m)⁻¹ y/s: what its deletion changes (CR3, the jackknife). The excess of W over 1 is used as far as the
 /// design effect c = tr W / tr 1 departs from 1 beyond chance, shrunk towards (c − 1)·1 by its degrees of freedom,
 /// added to the model's, and widened by ν/(ν − 2), the variance of a t distribution of as many degrees of freedom, with
 /// which the 2σ interval holds for few clusters, too. Liang & Zeger, Biometrika 73, 1986; Bell & McCaffrey, Survey

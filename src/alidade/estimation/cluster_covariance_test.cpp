@@ -147,7 +147,7 @@ TEST(ClusterCovariance, WhatAPriorTellsIsNotInflated) {
   auto random = seeded(3);
   Regression drawn = draw(13, 2.0, random);
   MatrixXd prior = MatrixXd::Zero(num_parameters, num_parameters);
-  prior(2, 2) = 1e6;  // σ 0.001, a hundred times what the rows tell
+  prior(2, 2) = 1e6;  // σ 0.001, a hundred times the rows' information
   drawn.solve(prior);
   const ClusterCovariance robust = cluster_covariance(drawn.inverse, 1.0, drawn.steps);
   EXPECT_NEAR(robust.inflation[2], 1.0, 0.05);
@@ -196,7 +196,7 @@ TEST(ClusterCovariance, TooFewClustersGiveTheModels) {
   EXPECT_EQ(clusters_agree(robust, "shot", "", "shots").state, State::care);
 }
 
-// One cluster tells a parameter nearly alone, and the little that the others say contradicts it: σ reaches to them.
+// One cluster determines a parameter nearly alone, and the others weakly contradict it: σ extends to them.
 TEST(ClusterCovariance, AnAnswerThatHangsOnOneClusterIsAsUncertainAsItsDeletion) {
   auto random = seeded(8);
   Regression drawn = draw(13, 0.0, random);

@@ -34,8 +34,8 @@ struct Check {
   std::string figure = {};  ///< Id of the figure in the report that shows it.
 };
 
-/// Something taken as given: a camera file, the length of a square, a σ that a person stated. What it would do to the
-/// answer if it were off by its σ or, where none is given, by an ordinary error.
+/// An assumption: a camera file, the length of a square, a σ given by the user. Its effect on the
+/// answer if it were off by its σ or, where none is given, by a typical error.
 struct Assumption {
   std::string name = {};        ///< "square_m", "camera.fx"
   double value = 0.0;           ///< NaN where it is not a number.

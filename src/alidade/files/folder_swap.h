@@ -46,8 +46,8 @@ class FolderSwap {
   void add(const std::filesystem::path& name, std::string_view content);
   /// A file that goes, if it is there and nothing new takes its place.
   void remove(const std::filesystem::path& name);
-  /// Puts everything in its place; the file that was added first comes last, and its older self goes first: where a
-  /// file tells what the others are, it never stands beside the wrong ones. Throws InputError after undoing it all.
+  /// Moves everything into place; the file that was added first comes last, and its older version is removed first: a
+  /// file that describes the others is never beside the wrong ones. Throws InputError after undoing it all.
   void commit();
 
  private:

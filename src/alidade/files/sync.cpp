@@ -22,7 +22,7 @@ int sync_error(const std::filesystem::path& path) {
   return open.is_open() ? sync_error(open) : errno;
 }
 
-/// Takes one path after the other, as others do beside it. Allocates nothing: there is nobody to tell.
+/// Takes one path after the other, as other threads do in parallel. Allocates nothing: it could not report a failure.
 class Syncing {
  public:
   explicit Syncing(const std::vector<std::filesystem::path>& paths) : paths_(paths) {}

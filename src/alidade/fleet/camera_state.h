@@ -27,7 +27,7 @@ enum class FleetAlarmKind : std::uint8_t { none, pan_zero, tilt_zero, focal_leng
 struct FleetRow {
   std::int64_t n = 0;
   double t_s = 0.0;
-  double temperature_c = std::numeric_limits<double>::quiet_NaN();  ///< Of the camera, where somebody measures it.
+  double temperature_c = std::numeric_limits<double>::quiet_NaN();  ///< Of the camera, where it is measured.
   FleetSource source = FleetSource::head;
   std::array<double, 4> rotation{};  ///< pan, tilt, roll [rad]; quaternion wxyz; rates x, y, z [rad/s].
   int num_points = 0;
@@ -48,7 +48,7 @@ struct FleetSum {
 };
 using FleetSums = std::array<FleetSum, 2 * num_fleet_channels>;  ///< Up and down of each channel.
 
-/// A change that was found, and is learned from some rows more before it is said.
+/// A detected change, estimated from some more rows before it is reported.
 struct FleetChange {
   FleetAlarmKind kind = FleetAlarmKind::none;
   std::uint32_t rows_left = 0;
@@ -77,7 +77,7 @@ struct FleetCamera {
   double t_s = 0.0;
   double alarm_t_s = 0.0;  ///< Of the last alarm.
   double sum_nis = 0.0, sum_dof = 0.0;
-  double sigma_px = 0.0;                               ///< As the rows that were learned from say.
+  double sigma_px = 0.0;                               ///< Estimated from the initial rows.
   std::array<double, 4> attitude{1.0, 0.0, 0.0, 0.0};  ///< Of the last row, before the zeros; of rates their integral.
   std::array<double, 3> rate{};
   std::array<float, 2 * max_fleet_points> px{};  ///< Of the last row.

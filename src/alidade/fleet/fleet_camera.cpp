@@ -59,7 +59,7 @@ double turn_between(const FleetCamera& camera, const FleetRotation& rotation) {
   return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).angularDistance(Eigen::Quaterniond(rotation.before));
 }
 
-/// An image that stands still while the camera turns tells nothing, and is said once.
+/// An image that does not change while the camera rotates contains nothing, and is reported once.
 std::optional<FleetAlarm> watch_image(FleetCamera& camera, const FleetRow& row, const FleetRotation& rotation,
                                       const FleetConfig& config, bool& is_frozen) {
   is_frozen = false;
@@ -98,7 +98,7 @@ const char* what_happened(FleetAlarmKind kind) {
   return "nothing happened";
 }
 
-/// What fits nothing for a minute of rows is learned again.
+/// A camera that does not fit for a minute of rows is reinitialised.
 std::optional<FleetAlarm> watch_fit(FleetCamera& camera, const FleetRow& row) {
   if (camera.num_gated < lost_rows) return std::nullopt;
   camera.phase = FleetPhase::learning;

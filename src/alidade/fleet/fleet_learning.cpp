@@ -162,7 +162,7 @@ void begin_tracking(const Fit& fit, FleetCamera& camera) {
 void learn(FleetCamera& camera, const FleetRow& row, const FleetRotation& rotation, const FleetConfig& config) {
   if (++camera.since_kept < camera.stride) return;
   camera.since_kept = 0;
-  // With the roll in one: the zeros are zero while a camera is learned.
+  // With the roll in one: the zeros are zero while a camera is initialised.
   const Eigen::Quaterniond q(Eigen::Matrix3d(rotation.before * rotation.after));
   auto& kept = camera.body.learning.rows[camera.num_buffered++];
   kept = {static_cast<float>(q.w()), static_cast<float>(q.x()), static_cast<float>(q.y()), static_cast<float>(q.z())};

@@ -175,7 +175,7 @@ void walk(const FleetCommon& variance, FleetTracking& tracking) {
 
 /// σ² of the innovations over the estimated one, at least: conservative while few rows have contributed.
 double noise_factor(const FleetCamera& camera) {
-  constexpr double prior_dof = 100.0;  // about what the rows that were learned from had
+  constexpr double prior_dof = 100.0;  // about that of the initial rows
   const double dof = camera.sum_dof + prior_dof;
   return (camera.sum_nis + prior_dof + 2.0 * std::sqrt(2.0 * dof)) / dof;
 }
@@ -260,7 +260,7 @@ std::optional<FleetAlarm> drift_of(FleetCamera& camera, const FleetRow& row) {
   return FleetAlarm{FleetAlarmKind::focal_temperature, row.n, row.t_s, drift, std::sqrt(factor * variance), row.t_s};
 }
 
-/// Where a single row tells by itself which channel has changed, that one's sum: several may go beyond at once.
+/// Where a single row alone identifies the changed channel, that one's sum: several may exceed the threshold at once.
 int clearest_of(const Innovations& all, const FleetSums& sums, double threshold, int found) {
   constexpr double clear = 6.0;
   const ChannelMatrix cov = all.information.inverse();

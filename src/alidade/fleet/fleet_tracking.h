@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// Rows that fit nothing, one after the other, after which a camera is learned again.
+/// Consecutive rows that do not fit, after which a camera is reinitialised.
 inline constexpr int lost_rows = 60;
 
 /// A row of a camera that is tracked: its innovations are summed for each kind of change, and taken in where they fit.

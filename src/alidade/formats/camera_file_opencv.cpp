@@ -42,7 +42,7 @@ std::string first_of(const Fields& fields, std::initializer_list<const char*> ke
   return *keys.begin();
 }
 
-/// The numbers of a list, or of {rows, cols, data}, that nobody computes with: NaN for what is none.
+/// The numbers of a list, or of {rows, cols, data}, not used in computations: NaN for a non-number.
 std::vector<double> loose_numbers(const YAML::Node& node) {
   std::vector<double> values;
   const YAML::Node data = node.IsMap() ? node["data"] : node;

@@ -1,11 +1,11 @@
 #pragma once
 
 /// Marks a hot loop that is compiled twice, for any x86-64 and for AVX with FMA, and chosen when the program starts:
-/// speed without asking users for -march=native. The choice is by feature: "fma" would leave out every
+/// speed without asking users for -march=native. The choice is by feature: "fma" would exclude every
 /// processor that is not Intel's. Sanitizers cannot start with such functions.
 /// For functions of an unnamed namespace: clang 14 miscalls them from other files. No constructors in them: clang
 /// forgets to make what only they call.
-#if defined(__has_feature)  // clang's way to tell of sanitizers
+#if defined(__has_feature)  // clang's way to detect sanitizers
 #define ALIDADE_HAS_FEATURE(what) __has_feature(what)
 #else
 #define ALIDADE_HAS_FEATURE(what) 0

@@ -7,7 +7,7 @@
 namespace alidade {
 namespace {
 
-/// σ of intrinsics of which a camera file says none: an ordinary calibration's.
+/// σ of intrinsics where the camera file states none: that of a typical calibration.
 constexpr double ordinary_focal_share = 0.003, ordinary_centre_px = 2.0;
 
 LensNow believed_at_first(const Camera& camera) {
@@ -81,9 +81,9 @@ struct LensObserver::State {
     return std::sqrt(std::max(0.0, estimate.nis - estimate.nis_dof) / std::max(1.0, radius2)) * observer.sigma_px();
   }
 
-  /// Focal lengths as observed, their σ with the encoders' share: no more than was known before anything turned. The
-  /// principal point stays the camera's: what turns hardly tells it from the mounting, and a zoom by m makes m times as
-  /// much of what it was off by.
+  /// Focal lengths as observed, their σ with the encoders' share: no more than was known before any rotation. The
+  /// principal point stays the camera's: rotation hardly distinguishes it from the mounting, and a zoom by m multiplies
+  /// its error by m.
   [[nodiscard]] LensNow lens_of(const IntrinsicsEstimate& estimate) const {
     const LensNow own = own_lens(head.camera);
     const Eigen::Vector2d f = estimate.values().head<2>(), sigma = estimate.sigma.head<2>(),

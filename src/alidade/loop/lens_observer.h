@@ -14,7 +14,7 @@ namespace alidade {
 /// image, beside the camera's own principal point.
 class LensObserver {
  public:
-  /// `head` with the camera that is believed at the start: its σ, or an ordinary one where it says none, is the prior.
+  /// `head` with the initial camera: its σ, or a typical one where it states none, is the prior.
   /// `sigma_encoder_rad`: of a reading.
   LensObserver(const RigHead& head, std::size_t num_points, double sigma_encoder_rad);
   ~LensObserver();

@@ -147,7 +147,7 @@ TEST(ServoLoop, NothingOvershootsAfterAJumpMoreThanPi) {
   }
 }
 
-/// Without noise there is no shaking to tell it from: the step response of what predicts stays on its side.
+/// Without noise: the step response of a predicting controller does not overshoot.
 TEST(ServoLoop, WithoutNoiseNothingOvershootsAtAll) {
   for (const double latency_s : {0.0, 0.1}) {
     for (const double size : {0.1, 0.2, 0.5, 1.0}) {  // 6 px and more: beyond what passes for motion
@@ -174,8 +174,8 @@ TEST(ServoLoop, LosesATargetAndFindsItAgain) {
   }
 }
 
-/// The heads' own observations tell where the target was: as well as they would of heads that stand still (half a pixel
-/// and 0.05° at 0.8 m are a centimetre along the view).
+/// The heads' own observations give the target's position, as accurately as with static heads (half a pixel and 0.05°
+/// at 0.8 m are a centimetre along the view).
 TEST(ServoLoop, ItsObservationsTellWhereTheTargetWas) {
   const ServoScene scene = xiahou_servo_scene();
   ServoConfig config;

@@ -59,7 +59,7 @@ TEST(ServoStability, WhatIsCalledStableStaysAndWhatIsRefusedDoesNot) {
     for (const GridCase& of : grid()) {
       const ServoScenario scenario = scenario_of(of, kind);
       const double radius = check_loops(scenario).front().analysis.sampled_radius;
-      if (std::abs(radius - 1.0) < 0.01) continue;  // 10 s are too short to tell
+      if (std::abs(radius - 1.0) < 0.01) continue;  // 10 s are too short to decide
       ServoConfig config = scenario.config;
       config.controller = kind;
       const double rms_px = run_servo(scenario.scene, config, 7).figures.rms_px;

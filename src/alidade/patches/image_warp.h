@@ -18,7 +18,7 @@ struct PointMove {
 /// turn, and the lens, bend what is seen. A far world needs no more, with any lens.
 class ImageWarp {
  public:
-  /// None for fewer points than can tell. Points that moved otherwise than the rest are rejected.
+  /// None for too few points. Points that moved differently from the rest are rejected.
   [[nodiscard]] static std::optional<ImageWarp> fit(std::span<const PointMove> moves);
 
   [[nodiscard]] Eigen::Vector2d at(const Eigen::Vector2d& px) const;

@@ -21,7 +21,7 @@ namespace {
 
 constexpr int max_levels = 4;              // flow of up to about 40 px a frame without a guess
 constexpr double max_align_move_px = 1.5;  // beyond it alignment and flow found different things
-constexpr double min_distance_px = 8.0;    // half a patch: closer points tell the same
+constexpr double min_distance_px = 8.0;    // half a patch: closer points contain the same information
 constexpr double first_noise = 2.0;        // grey values, until estimated from the frames
 constexpr double min_gain = 0.5, max_gain = 2.0;
 
@@ -108,8 +108,8 @@ class PointTracker::Impl {
   }
 
  private:
-  /// How each patch is bent by the perspective of the turn since it was cut out: what all points tell that were seen
-  /// then and in the frame before this one.
+  /// How each patch is curved by the perspective of the rotation since it was cut out: from all points seen
+  /// then and in the previous frame.
   void predict_bends() {
     std::vector<PointMove> moves;
     for (const auto& [frame, places] : places_) {

@@ -15,8 +15,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr double outlying = 4.0;      // of a normal lot one value in 16 000
-constexpr std::size_t least_lot = 8;  // below, the lot's own scatter is hardly known
+constexpr double outlying = 4.0;      // of a normal batch one value in 16 000
+constexpr std::size_t least_lot = 8;  // below, the batch's own scatter is poorly known
 
 /// Numbers that stand in both trees at the same place: an estimate and its σ.
 void add_values(const ordered_json& estimate, const ordered_json& stddev, const std::string& path, BatchRow& row) {
@@ -51,7 +51,7 @@ std::vector<Column> columns_of(const std::vector<BatchRow>& rows) {
 
 std::string number_text(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
 
-/// Of each quantity all that stand out, and so many others that a figure of the lot needs.
+/// Of each quantity all outliers, and as many others as the figure needs.
 std::vector<BatchOutlier> shown_distances(const std::vector<BatchRow>& rows) {
   constexpr std::size_t most_of_quantity = 1000, most = 20000;
   const std::vector<BatchOutlier> all = distances_of(rows);
@@ -189,7 +189,7 @@ std::vector<BatchOutlier> distances_of(const std::vector<BatchRow>& rows) {
     const double scatter = 1.4826 * median_of(numbers);
     for (const auto& [row, value] : values) {
       const double z = (value.value - median) / std::hypot(scatter, value.sigma);
-      // Of a lot whose values are all the same, and without σ, any other one is beyond all measure.
+      // In a batch with identical values, and without σ, any different one is an outlier.
       if (!std::isnan(z)) distances.push_back({row, name, value.value, value.sigma, median, std::clamp(z, -1e6, 1e6)});
     }
   }

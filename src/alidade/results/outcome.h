@@ -15,7 +15,7 @@ struct NamedBytes {
   std::string bytes;
 };
 
-/// All that a job leaves, whoever ran it: what a command shows and writes, and what a program saves.
+/// Everything that a job produces: what a command shows and writes, and what a program saves.
 struct JobOutcome {
   ResultDocument document;         ///< Of it counts, assumed, verdict, estimate … grids; the rest is the run's.
   std::vector<std::string> lines;  ///< For a person, before the verdict.

@@ -52,7 +52,7 @@ JsonValue picked(const JsonValue& column, const KeptRows& rows) {
       column.content());
 }
 
-/// A column of numbers that tells how a row fits.
+/// A column of numbers that shows how a row fits.
 bool tells_the_fit(std::string_view name) {
   return name.starts_with("residual") || name.starts_with("innovation") || name == "nis" || name == "rms_px";
 }

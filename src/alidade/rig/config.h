@@ -21,7 +21,8 @@ struct RigConfig {
   bool estimate_backlash = false;                ///< Views stand in the order in which they were taken.
   bool estimate_focal = false;                   ///< Of each lens, both by one factor; its file is an initial guess.
   bool estimate_centre = false;
-  /// What the residuals ask for is estimated too, where the views determine it; and the scales where nobody gave them.
+  /// Causes indicated by the residuals are estimated too, where the views determine them; and scales that are not
+  /// given.
   bool estimate_by_need = true;
   std::optional<double> sigma_square_m = {};  ///< Of the board's squares; none: not known.
   std::optional<double> sigma_scale = {};     ///< Of the encoders' scales where they are fixed; none: not known.

@@ -114,7 +114,7 @@ class ByNeed {
   }
 
  private:
-  /// None where the views cannot tell it.
+  /// None where the views do not determine it.
   std::optional<RigReport> solve(const FreedParams& freed) {
     constexpr double worst_rad = 2.0 * degree, worst_m = 0.05;
     RigReport trial = calibrated_with(views_, points_, cameras_, config_, freed, progress_);
@@ -159,7 +159,7 @@ class ByNeed {
     best_ = std::move(first.report);
     for (const Trial& other : trials) {
       if (other.score > first.score + alike || is_of_lens(other.of) == is_of_lens(first.of)) continue;
-      // Neither is to be preferred: both, and if the views cannot tell both, it is said.
+      // Neither is to be preferred: both, and if the views do not determine both, it is reported.
       const FreedParams both = with(freed_, other.of);
       if (auto report = solve(both)) {
         freed_ = both;

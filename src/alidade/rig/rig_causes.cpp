@@ -22,7 +22,7 @@ struct Tested {
   std::string name, unit;
   std::vector<Index> places;
   std::vector<std::string> names = {};  ///< One a place, where each has one.
-  double worst = 1.0;  ///< σ of its size beyond which the views do not tell it: 5σ would be no encoder's and no lens'.
+  double worst = 1.0;  ///< σ of its size beyond which the views do not determine it: 5σ would be implausible.
 };
 
 /// Places of a head's columns: lens, then for each axis scale, one period, two periods, backlash.

@@ -37,7 +37,7 @@ std::vector<std::optional<BoardPoseFit>> fitted_poses(const Work& work, std::spa
   return poses;
 }
 
-/// σ of a corner that half of the views fit at least as well as; 0: no view can tell.
+/// σ of a corner that half of the views fit at least as well as; 0: no view determines it.
 double sigma_of_poses(const std::vector<std::optional<BoardPoseFit>>& poses) {
   std::vector<double> variances;
   for (const auto& pose : poses) {

@@ -177,8 +177,8 @@ MountingStart mounting_start(std::span<const TurnedView> views) {
   MountingStart best;
   for (const auto& [board, group] : groups) best.num_compared += static_cast<int>(group.size());
   if (groups.empty()) return best;
-  // Two encoders that count backwards are a head that hangs upside down: of those that explain alike, the one with the
-  // smaller turn, and the fewer backwards.
+  // Two encoders that count backwards are a head mounted upside down: of those that explain equally well, the one with
+  // the smaller rotation, and the fewer backwards.
   double least = std::numeric_limits<double>::infinity();
   for (const Eigen::Quaterniond& turn : turns_of_a_cube()) {
     for (const double pan_scale : {1.0, -1.0}) {

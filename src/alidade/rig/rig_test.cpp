@@ -154,7 +154,7 @@ TEST(Rig, NoiseThatIsNotGivenIsTold) {
   const Trials found = trials(runs, {}, {});
   EXPECT_EQ(found.converged, runs);
   EXPECT_NEAR(found.chi2 / found.dof, 1.0, 0.05);
-  // 36 views of two readings less 14 + 8 + 30 taken by the rest: some 40 to tell it from, 11 % a run.
+  // 36 views of two readings less 14 + 8 + 30 estimated parameters: some 40 to estimate it from, 11 % per run.
   EXPECT_NEAR(found.sigma_encoder_rad / degree, 0.02, 3.0 * 0.02 * 0.15 / std::sqrt(runs));
   // σ from so few readings widens the tails a little.
   EXPECT_NEAR(found.nees, 6.0, 4.0 * std::sqrt(12.0 / runs));

@@ -116,8 +116,8 @@ void add_precision(const RigReport& report, Verdict& verdict) {
                                     1e3 * good_relative_m, "mm"));
 }
 
-/// An axis that turned little is enough where the views tell the rig beyond them, too: what counts is what is known
-/// over 20° of each axis, not how far each happened to turn.
+/// A small range of an axis is enough where the views determine the rig beyond it, too: what counts is σ over 20° of
+/// each axis, not how far each happened to move.
 void add_spans(const RigReport& report, Verdict& verdict) {
   const bool is_known = report.sigma_span_rad < good_relative_rad && report.sigma_span_m < good_relative_m;
   for (const HeadCover& cover : report.covers) {

@@ -35,7 +35,7 @@ struct Work {
                                         std::span<const Eigen::Vector3d> points_in_board,
                                         const std::map<int, Camera>& cameras, const RigConfig& config,
                                         const FreedParams& freed, const Progress& progress);
-/// What the residuals of the report ask for, estimated too, one after another, as long as the views can tell it.
+/// Causes indicated by the report's residuals, estimated too, one after another, as long as the views determine them.
 [[nodiscard]] RigReport freed_by_need(RigReport report, std::span<const HeadView> views,
                                       std::span<const Eigen::Vector3d> points_in_board,
                                       const std::map<int, Camera>& cameras, const RigConfig& config,

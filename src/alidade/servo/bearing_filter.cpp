@@ -68,7 +68,7 @@ void BearingAxis::start(double t_s, double angle_rad, double variance_rad2, cons
     // What a model's accelerations make of a rate in their time; the liveliest may have any.
     const double rate = i + 1 == num_agilities ? config_.start_rate_rad_s
                                                : std::min(config_.start_rate_rad_s, sigma * config_.singer_tau_s);
-    beliefs_[i].x = {angle_rad, 0.0, 0.0};  // after a jump no rate or acceleration is believed
+    beliefs_[i].x = {angle_rad, 0.0, 0.0};  // after a jump no rate or acceleration is assumed
     beliefs_[i].P = Eigen::Vector3d(variance_rad2 + effect.squaredNorm(), rate * rate, sigma * sigma).asDiagonal();
     with_lens_[i].setZero();
     with_lens_[i].row(0) = -effect;  // state − belief: what the observation has too much

@@ -26,7 +26,7 @@ enum class ServoEvent { none, waiting, started, gated, jumped, lost, searching, 
 struct SearchConfig {
   bool enabled = true;
   double coast_s = 0.3;         ///< Without an observation for so long the target counts as lost.
-  double carry_s = 0.2;         ///< The lost target's rate is believed to decay in this time.
+  double carry_s = 0.2;         ///< The lost target's rate is assumed to decay in this time.
   double speed_rad_s = 1.0;     ///< Of the view along the spiral.
   double turn_of_view = 0.7;    ///< From one turn of the spiral to the next, in heights of the image.
   double max_radius_rad = 0.8;  ///< Then from the centre again.

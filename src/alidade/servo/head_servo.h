@@ -30,7 +30,7 @@ struct HeadServoInput {
 struct HeadServoOutput {
   Eigen::Vector2d command = Eigen::Vector2d::Zero();        ///< (pan, tilt), in the plants' units of command.
   Eigen::Vector2d asked_rad = Eigen::Vector2d::Zero();      ///< Where the head should point when the command acts.
-  Eigen::Vector2d predicted_rad = Eigen::Vector2d::Zero();  ///< Where the target is believed to be now.
+  Eigen::Vector2d predicted_rad = Eigen::Vector2d::Zero();  ///< The target's predicted position now.
   Eigen::Vector2d sigma_rad = Eigen::Vector2d::Zero();
   bool has_prediction = false;
   ServoEvent event = ServoEvent::waiting;

@@ -54,7 +54,7 @@ struct ServoFit {
   ServoFlaws flaws;                                     ///< Those that the log asks for, as estimated.
   std::vector<std::size_t> freed;                       ///< Which: places in servo_flaws, the first asked for first.
   std::array<double, num_servo_flaws> flaw_sigma = {};  ///< Of those.
-  /// Of the model that is believed: blocks of rows are clusters; of the other as `cov_model`.
+  /// Of the selected model: blocks of rows are clusters; of the other as `cov_model`.
   Eigen::Matrix<double, num_servo_params, num_servo_params> cov = decltype(cov)::Zero();
   Eigen::Matrix<double, num_servo_params, num_servo_params> cov_model = decltype(cov)::Zero();  ///< Of white noise.
   double rms_rad = 0.0;  ///< Of the residuals, over the degrees of freedom.
@@ -68,13 +68,13 @@ struct ServoRival {
   double evidence = 0.0;  ///< 2 ln of the likelihood ratio, for `flaw`.
 };
 
-/// A flaw of an ordinary size that this log does not show: what the gain would be with it, over what is stated.
+/// A nonlinearity of a typical size that this log does not show: the gain with it, over the stated one.
 struct HiddenFlaw {
   std::size_t flaw = 0;
   double size = 0.0, gain_factor = 1.0;
 };
 
-/// A flaw that is taken to be none, what there may be of it, and what that does to the gain beside what the log tells.
+/// A nonlinearity assumed absent, its typical size, and the effect on the gain beside the log's information.
 struct CountedFlaw {
   std::size_t flaw = 0;
   double sigma = 0.0, gain_moves = 0.0;
@@ -83,7 +83,7 @@ struct CountedFlaw {
 struct ServoIdentification {
   enum class Status { converged, not_converged, degenerate };
   Status status = Status::degenerate;
-  ServoFit fit;                      ///< The model that is believed.
+  ServoFit fit;                      ///< The selected model.
   ServoFit other;                    ///< The one that is not.
   std::vector<double> residual_rad;  ///< Response − reading.
   ClusterCovariance clusters;        ///< Blocks of rows; of the fit's parameters, whose covariance it is.
@@ -95,7 +95,7 @@ struct ServoIdentification {
   double command_range = 0.0, angle_range_rad = 0.0, duration_s = 0.0;
 };
 
-/// Which kind of plant is believed: the one whose residuals are clearly the smaller, or the one that is known.
+/// Which kind of plant is selected: the one whose residuals are clearly smaller, or the given one.
 enum class ServoKindRule { automatic, angle, rate };
 
 /// Options of identify().

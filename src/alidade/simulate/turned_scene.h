@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// A camera that takes photos while somebody turns it, and what a matcher makes of them.
+/// A camera that takes photos while it is rotated by hand, and a matcher's matches between them.
 struct TurnedScene {
   int width_px = 1280, height_px = 960;
   double fx = 1000.0, fy = 1000.0, cx = 645.0, cy = 474.0;  ///< [px]

@@ -10,7 +10,7 @@ namespace {
 constexpr double spot_smoothing_px = 1.0;                      // the width of a small spot
 constexpr double smoothed_noise = 0.2821 / spot_smoothing_px;  // 1/(2 √π s): noise of the smoothed over that of a pixel
 constexpr float low_snr = 4.0F;                                // how far down the slopes a patch reaches
-constexpr int border_px = 2;  // of the part: too few neighbours to tell light from a single pixel's noise
+constexpr int border_px = 2;  // of the part: too few neighbours to distinguish light from a single pixel's noise
 
 /// Mean of the eight neighbours.
 float ring_mean(const Image& image, Eigen::Index v, Eigen::Index u) {

@@ -25,7 +25,7 @@ struct SpotPlace {
 ///     S(p) = s · exp(−½ (p−μ)ᵀ Σ⁻¹ (p−μ)) · (r + (1 − r) w(p)),
 /// w the share of paper. Blur acts on the product: it widens the spot from Σ' to Σ = Σ' + b² and moves what p sees of
 /// the print to μ + Σ' Σ⁻¹ (p − μ), where the print is blurred by less than b (product of two Gaussians).
-/// Saturated pixels only tell that there is at least that much light.
+/// Saturated pixels only give a lower bound of the light.
 [[nodiscard]] SpotPlace fit_on_edge(const SpotSignal& signal, const SpotPlace& start);
 
 }  // namespace alidade

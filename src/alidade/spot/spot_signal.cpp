@@ -310,7 +310,7 @@ SpotSignal spot_signal(const cv::Mat& photo, int channel, const LaserSpotAids& a
   } else if (channels.size() > 1 && channel < 3) {
     const Image one = Image::Ones(part.height, part.width);
     const Image &first = channels[(at + 1) % 3], &second = channels[(at + 2) % 3];
-    // Where nothing has contrast noise alone would tell the shares, and tell nought; neutral things have halves.
+    // Without contrast noise alone would determine the shares, meaninglessly; neutral colours have halves.
     constexpr double prior_noises = 60.0;
     const double noise = noise_of(first), prior = prior_noises * noise * noise;
     const RobustSum sum(main, {&first, &second, &one}, unsaturated(main.max(first).max(second)), prior);

@@ -17,9 +17,9 @@ struct Chain {
   Rig rig;  ///< As found, through the lenses as found.
 };
 
-/// Photos of a 9×6 board of each camera (640×480, corners 0.1 px), the last four where the first ones tell least; then
-/// five places of the board seen by both heads (0.2 px, encoders 0.02°, their scales estimated). None where a step has
-/// no answer.
+/// Photos of a 9×6 board of each camera (640×480, corners 0.1 px), the last four where the first ones are least
+/// informative; then five placements of the board seen by both heads (0.2 px, encoders 0.02°, their scales estimated).
+/// None where a step has no answer.
 [[nodiscard]] std::optional<Chain> draw_chain(std::uint64_t seed, int num_photos = 13);
 
 /// A target about so far away for 3 s (0.3 px, 0.02°), as the true heads see it.

@@ -105,7 +105,7 @@ struct LocalizeStudy {
   int points = 8;
   int frames = 35;
   double noise_px = 0.5;
-  double depth_sigma = 0.03;  ///< Of what is believed of an unknown point's depth, relative.
+  double depth_sigma = 0.03;  ///< Of an unknown point's initial depth, relative.
 };
 struct LocalizeTrial {
   std::vector<ObservationFrame> frames;
@@ -114,7 +114,7 @@ struct LocalizeTrial {
   std::vector<TimedPose> truth;
 };
 
-/// Photos of a camera that somebody turns by hand: other cameras, turns and points each trial, and what may be wrong.
+/// Photos of a camera rotated by hand: other cameras, rotations and points in each trial, and possible faults.
 struct TurnedStudy {
   static constexpr const char* name = "turned";
   static constexpr std::uint64_t block = 10;
@@ -140,7 +140,7 @@ struct ChainStudy {
 
   double range_m = 3.0;  ///< Of the target; the heads stand 0.5 m apart.
   int photos = 13;       ///< Of each camera.
-  bool exact = false;    ///< Rig and lenses are taken as exact: what σ says where the chain is left out.
+  bool exact = false;    ///< Rig and lenses are taken as exact: σ without the chain.
 };
 
 [[nodiscard]] FieldList fields_of(ObserveStudy& study);

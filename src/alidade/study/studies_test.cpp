@@ -152,7 +152,7 @@ TEST(CalibrateStudy, SigmaMapCoversItsErrors) {
     count += static_cast<double>(tally.quantities[i].values);
   }
   EXPECT_EQ(tally.quantities.size(), 29U);
-  // Pixels of one calibration hang together, as some five independent ones.
+  // Pixels of one calibration are correlated, equivalent to some five independent ones.
   EXPECT_NEAR(inside1 / count, 0.6827, 3.0 * std::sqrt(0.6827 * 0.3173 / 1500.0));
   EXPECT_NEAR(inside2 / count, 0.9545, 3.0 * std::sqrt(0.9545 * 0.0455 / 1500.0));
 }

@@ -21,7 +21,7 @@ struct StudyVariation {
   bool operator==(const StudyVariation&) const = default;
 };
 
-/// What a study is, whoever runs it and in whatever parts: all that its result depends on.
+/// The definition of a study, independent of machines and shards: everything that its result depends on.
 struct StudyHeader {
   std::string study;  ///< observe, calibrate, …
   std::uint64_t seed = 1;

@@ -6,7 +6,7 @@
 
 namespace alidade {
 
-/// The rig as somebody has it who takes heads and lenses for exact: all covariances zero.
+/// The rig with heads and lenses assumed exact: all covariances zero.
 [[nodiscard]] Rig as_exact(Rig rig);
 
 /// Follows the target, and compares where it is at the end with the trial's truth.

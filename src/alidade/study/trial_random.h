@@ -11,7 +11,7 @@ namespace alidade {
 [[nodiscard]] std::array<std::uint32_t, 4> philox(std::array<std::uint32_t, 4> counter,
                                                   std::array<std::uint32_t, 2> key);
 
-/// Random numbers of one trial: a function of (seed, study, trial) alone, whoever runs it, and whatever was run before.
+/// Random numbers of one trial: a function of (seed, study, trial) alone.
 class TrialRandom {
  public:
   TrialRandom(std::uint64_t seed, std::string_view study, std::uint64_t trial);

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t coarse_rows = 24;  // enough to come near
 constexpr int max_coarse_steps = 12, max_steps = 12;
-constexpr double near = 1e-3;   // of a coarse step: its gain over all squares; all rows tell more
+constexpr double near = 1e-3;   // of a coarse step: its gain over all squares; all rows contain more
 constexpr double there = 1e-5;  // of a full step: its gain over the variance, 3·10⁻³ σ; what is left is its square
 
 }  // namespace

@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// One row of a lot: the words of a command line behind `alidade`, and whose it is.
+/// One row of a batch: the arguments of a command line after `alidade`, and its camera.
 struct BatchJob {
   std::size_t line = 0;  ///< Of the file.
   std::string camera;    ///< As the row says; else its number, from 1.

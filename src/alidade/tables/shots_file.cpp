@@ -120,7 +120,7 @@ ShotsFile read_shots(const std::filesystem::path& file, const ShotsOptions& opti
 ShotsFile read_shots(const Csv& csv, const ShotsOptions& options) {
   const ShotColumns columns = shot_columns_of(csv);
   ShotsFile read;
-  std::set<std::string> seen;  // the same measurement twice would be believed twice
+  std::set<std::string> seen;  // a duplicate measurement would be counted twice
   for_each_row(csv, options.skip_bad, read.skipped, [&](std::size_t row) {
     Shot shot = shot_of_row(csv, row, columns);
     std::string cells;
@@ -150,7 +150,7 @@ void add_corners(const std::filesystem::path& corners, std::span<const BoardView
 }
 
 void refuse_photo_of(const Shot& shot, const std::string& reason) {
-  // Simulated and measured elsewhere: shots name photos that nobody has, and their corners lie beside them.
+  // Simulated and measured elsewhere: shots name photos that do not exist, and their corners are in a file beside them.
   const std::filesystem::path corners = std::filesystem::path(shot.table).parent_path() / "corners.csv";
   std::string what = fmt::format("{}:{}: photo '{}': {}", shot.table, shot.line, shot.photo, reason);
   if (std::filesystem::exists(corners)) what += "; for the corners in its stead: --corners " + corners.string();

@@ -41,7 +41,7 @@ inline std::vector<BoardView> sample_views(const BoardScene& scene, std::uint64_
   return views;
 }
 
-/// A scene whose last four photos stand where the first ones tell least: what covers the image to its corners.
+/// A scene whose last four photos are where the first ones are least informative: the image is covered to its corners.
 inline BoardScene covered_scene(const Camera& camera, int num_photos, std::uint64_t seed, double bow_m = 0.0) {
   BoardScene scene = sample_scene(camera, num_photos - 4, seed, bow_m);
   const CalibrateConfig config{.model = std::string(model_name(camera.lens))};

@@ -62,7 +62,7 @@ Eigen::Vector<double, 10> monomials(const Eigen::Vector2d& p) {
       .finished();
 }
 
-/// Polynomial of the lowest residuals: cubic where the places tell one, else quadratic, else zero.
+/// Polynomial of the lowest residuals: cubic where the positions determine one, else quadratic, else zero.
 Eigen::Matrix<double, 10, 2> fitted_polynomial(const std::vector<Eigen::Vector2d>& places,
                                                const std::vector<Eigen::Vector2d>& values) {
   Eigen::Matrix<double, 10, 2> coefficients = Eigen::Matrix<double, 10, 2>::Zero();
@@ -193,7 +193,7 @@ BoardDetection find_circle_grid(const cv::Mat& photo, const Board& board) {
   maps = local_maps(places, seen);
   const double radius_m = board.marker_m > 0.0 ? guess_m : measured_radius_m(ellipses, maps, places, guess_m);
   BoardDetection detection;
-  constexpr double doubt = 0.07;  // of what neighbours tell about a lens: scatter over boards seen by a 64° lens
+  constexpr double doubt = 0.07;  // of the lens curvature by neighbours: scatter over boards seen by a 64° lens
   detection.view.corners = corners_at(ellipses, maps, places, radius_m, doubt);
   if (2 * detection.view.corners.size() < places.size()) {
     return not_found("only " + std::to_string(detection.view.corners.size()) + " of " + std::to_string(places.size()) +

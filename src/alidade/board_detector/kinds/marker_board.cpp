@@ -134,7 +134,7 @@ Readings place_markers(const cv::Mat& photo, const Board& board) {
   } else if (2 * most < max_seen) {
     readings.reason = std::to_string(max_seen) + " " + what + ", but only " + std::to_string(most) + " lie as on the " +
                       std::to_string(board.cols) + "×" + std::to_string(board.rows) + " board";
-  } else if (most < needed) {  // one cannot tell the layout
+  } else if (most < needed) {  // one does not determine the layout
     readings.reason = "only one of the " + what;
   }
   constexpr double nearly = 0.8;  // layouts that differ by a shift share most markers; what lies around them decides
@@ -146,7 +146,7 @@ Readings place_markers(const cv::Mat& photo, const Board& board) {
 
 /// Fits a corner around which nothing else is printed within the start's two vectors.
 CornerFit fit_clear_corner(const cv::Mat& photo, const CornerStart& start) {
-  constexpr double min_px = 3.0;  // fewer pixels do not tell seven parameters
+  constexpr double min_px = 3.0;  // fewer pixels do not determine seven parameters
   CornerFitConfig config;
   config.window = std::max(0.9, min_px / std::min(start.along_cols.norm(), start.along_rows.norm()));
   return fit_corner(photo, start, config);

@@ -15,7 +15,7 @@ namespace {
 
 using Eigen::Index;
 
-/// What is ordinarily wrong with a value that somebody wrote down.
+/// Typical error of a value that a user wrote down.
 double ordinary_error(const std::string& name, double value) {
   if (name == "fx" || name == "fy") return 0.003 * value;
   if (name == "cx" || name == "cy") return 2.0;  // px

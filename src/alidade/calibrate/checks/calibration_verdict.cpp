@@ -14,7 +14,6 @@ namespace alidade {
 namespace {
 
 /// A number with two significant digits, as people read σ.
-/// To so many digits that tell.
 std::string rounded(double value, int digits) {
   std::array<char, 32> text{};
   if (!(std::abs(value) > 0.0)) return "0";
@@ -172,7 +171,7 @@ Check honest_corners(const CalibrateReport& report, std::span<const BoardView> v
   }
   if (tails.far > 0) {
     constexpr double plainly_wrong_px = 0.5;  // no blur and no board shape puts a corner there
-    // Tails of one in a hundred are ordinary, and counted in σ.
+    // Tails of one in a hundred are usual, and included in σ.
     const bool many = tails.far_in_use > 2 + report.corners_used / 100 && tails.worst_px > plainly_wrong_px;
     check.state = std::max(check.state, many ? State::bad : State::care);
     check.text += "; " + std::to_string(tails.far) + (tails.far == 1 ? " corner is" : " corners are") +

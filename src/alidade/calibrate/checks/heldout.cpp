@@ -73,7 +73,7 @@ std::vector<double> heldout_errors(const Board& board, std::span<const BoardView
                                    CalibrateConfig config, const std::vector<Eigen::Vector3d>& board_points) {
   std::vector<double> errors(views.size(), std::nan(""));
   const std::size_t folds = std::min<std::size_t>(5, views.size() / 2);
-  config.board_shape = BoardShape::given;  // as learned from all photos: the lens is what is compared
+  config.board_shape = BoardShape::given;  // as estimated from all photos: the lens is compared
   for (std::size_t fold = 0; fold < folds; ++fold) {
     std::vector<BoardView> kept;
     for (std::size_t k = 0; k < views.size(); ++k) {

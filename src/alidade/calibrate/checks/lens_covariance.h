@@ -9,7 +9,7 @@ namespace alidade {
 struct LensCovariance {
   Eigen::MatrixXd stated;       ///< Views are its clusters, as the corners of one share errors.
   Eigen::MatrixXd model;        ///< As if every corner erred by itself.
-  ClusterCovariance clusters;   ///< What tells the two apart, one value per parameter.
+  ClusterCovariance clusters;   ///< The difference of the two, one value per parameter.
   std::vector<double> weights;  ///< Of the other minima: how likely each is, all of them and `result` being 1.
 };
 

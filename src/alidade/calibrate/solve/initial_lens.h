@@ -23,8 +23,8 @@ struct InitialLens {
                                                       const std::vector<Eigen::Vector3d>& board_points, ImageSize size,
                                                       const Lens& held, const BundleProblem& settings);
 
-/// Largest angle [rad] between the normals of the boards. Boards seen in one orientation alone do not tell the focal
-/// length, whatever lens is assumed (Zhang 2000, §4.2); the poses may come from a wrong one.
+/// Largest angle [rad] between the normals of the boards. Boards seen in one orientation alone do not determine the
+/// focal length, whatever lens is assumed (Zhang 2000, §4.2); the poses may come from a wrong one.
 [[nodiscard]] double spread_of_normals_rad(std::span<const Rigid3> cam_from_board);
 
 }  // namespace alidade

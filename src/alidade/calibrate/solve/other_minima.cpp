@@ -13,7 +13,7 @@ constexpr std::array<int, 2> centre{2, 3};  // cx and cy, of every lens
 
 bool is_vague(const BundleProblem& problem, const BundleResult& found, double noise_variance, int width_px) {
   if (found.cov.size() == 0 || !is_central(found.state.lens)) return false;
-  constexpr double vague = 0.01;  // of the width; a dozen photos of a wide lens tell a tenth of it
+  constexpr double vague = 0.01;  // of the width; a dozen photos of a wide lens reach a tenth of it
   double most = 0.0;
   for (const int parameter : centre) {
     const auto at = std::find(problem.free_lens.begin(), problem.free_lens.end(), parameter);

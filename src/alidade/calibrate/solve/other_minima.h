@@ -8,10 +8,11 @@
 
 namespace alidade {
 
-/// Starts away from `found`, where the views tell its principal point only vaguely (σ over a hundredth of the image's
-/// width): the point moved by a fifth of the width each way, no distortion, poses by the views. In a narrow image a
-/// moved principal point, distortion and tilts of the boards do nearly the same, and the cost may have several minima.
-/// Empty where the point is known well, or held. `found` must have its covariance, in units of `noise_variance`.
+/// Initial guesses away from `found`, where the views determine its principal point poorly (σ over a hundredth of the
+/// image's width): the point moved by a fifth of the width each way, no distortion, poses by the views. In a narrow
+/// image a moved principal point, distortion and tilts of the boards have similar effects, and the cost may have
+/// several minima. Empty where the point is well determined, or fixed. `found` must have its covariance, in units of
+/// `noise_variance`.
 [[nodiscard]] std::vector<BundleState> starts_elsewhere(const BundleProblem& problem, const BundleResult& found,
                                                         double noise_variance, std::span<const BoardView> views,
                                                         int width_px);

@@ -85,8 +85,8 @@ BundleResult solve_once(const CalibrateConfig& config, CalibrateReport& report, 
   return result;
 }
 
-/// The result with its covariance. What photos hardly tell makes the solve creep: then, too, there is one to say which
-/// parameter it is. Not where the corners do not fit: that is another fault.
+/// The result with its covariance. A poorly determined parameter makes the solve creep: then, too, there is one, to
+/// name that parameter. Not where the corners do not fit: that is another fault.
 BundleResult finished(BundleResult result, bool settled, const CalibrationWork& work) {
   double sum = 0.0, count = 0.0;
   for (std::size_t k = 0; k < work.arrays.size() && !settled; ++k) {

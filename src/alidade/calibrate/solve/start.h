@@ -16,7 +16,7 @@ namespace alidade {
 [[nodiscard]] std::optional<Eigen::Vector4d> zhang_intrinsics(std::span<const Eigen::Matrix3d> px_from_board_plane);
 
 /// One focal length with square pixels and a known principal point, from the orthogonality of the board's axes
-/// and their equal length in every view. None where no view is tilted enough to tell.
+/// and their equal length in every view. None where no view is tilted enough.
 /// Hartley & Zisserman 2003, §8.6 (vanishing points of orthogonal directions).
 [[nodiscard]] std::optional<double> focal_from_vanishing_points(std::span<const Eigen::Matrix3d> px_from_board_plane,
                                                                 const Eigen::Vector2d& principal_point_px);

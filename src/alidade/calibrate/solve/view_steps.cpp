@@ -32,7 +32,7 @@ void fill_product(const BundleProblem& problem, const ViewArrays& view, const Co
   }
 }
 
-/// Does a view's fit to the board's shape count? Each view has about the n-th part of what tells the shape: of fifty,
+/// Does a view's fit to the board's shape count? Each view has about 1/n of the information about the shape: of fifty,
 /// it changes σ by a hundredth.
 bool shape_counts(const BundleProblem& problem) {
   constexpr std::size_t many_views = 50;

@@ -163,7 +163,7 @@ void fill_values(const ObserveReport& report, ResultDocument& document) {
   }
 }
 
-/// What tells the stated σ from the model's, and what was tested.
+/// The difference of the stated σ from the model's, and what was tested.
 void fill_errors(const ObserveReport& report, ResultDocument& document) {
   document.assumed = report.assumed;
   JsonValue& shared = document.estimate["shared_errors"];

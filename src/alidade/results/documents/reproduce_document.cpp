@@ -20,7 +20,7 @@ State state_of(Holds holds) {
   return holds == Holds::reproduced ? State::good : holds == Holds::in_shape ? State::care : State::bad;
 }
 
-/// To five digits: what a draw tells, and what keeps the document small.
+/// To five digits: the precision of a draw, and a small document.
 double short_number(double value) {
   if (!std::isfinite(value) || value == 0.0) return value;
   return std::stod(fmt::format("{:.5g}", value));

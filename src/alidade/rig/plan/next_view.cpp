@@ -70,7 +70,7 @@ class ViewPlanner {
     for (const RigHead& rig_head : now_.rig.heads) work.ids.push_back(rig_head.head.id);
     choose_free(work);
     problem_ = std::move(work.problem);
-    // Which way an axis came is not known of views to come: backlash tells nothing here.
+    // The direction of approach is unknown for future views: backlash contributes nothing here.
     for (std::vector<int>& free : problem_.free)
       std::erase_if(free, [](int param) { return param >= pan_backlash_param; });
     problem_.points_in_board = points_;

@@ -237,7 +237,7 @@ ServoResponse servo_response(std::span<const ServoSample> log, ServoKind kind, c
 
 namespace {
 
-/// The place of the believed one of two fits, angle and rate.
+/// The index of the selected one of two fits, angle and rate.
 std::size_t believed_of(const std::array<ServoFit, 2>& fits, ServoKindRule rule) {
   // An angle plant with a very long lag looks like a rate plant: a tenth less is more than chance leaves.
   if (rule == ServoKindRule::automatic) return fits[1].rms_rad < 0.9 * fits[0].rms_rad ? 1 : 0;

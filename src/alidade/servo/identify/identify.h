@@ -22,10 +22,10 @@ struct ServoResponse {
 [[nodiscard]] ServoResponse servo_response(std::span<const ServoSample> log, ServoKind kind, const ServoParams& params);
 
 /// Least squares over both kinds of plant, from a search over time constant and latency (the rest is linear) refined by
-/// Gauss–Newton with analytic derivatives. The rate plant is believed where its residuals are clearly the smaller.
+/// Gauss–Newton with analytic derivatives. The rate plant is selected where its residuals are clearly smaller.
 /// G. H. Golub & V. Pereyra, "The differentiation of pseudo-inverses and nonlinear least squares problems whose
-/// variables separate", 1973. A kind that is known is believed. Where the residuals ask for it, flaws are estimated as
-/// well: freed one after the other, each where its evidence is worth its parameter. At least 8 rows, in order of time.
+/// variables separate", 1973. A given kind is used. Where the residuals indicate it, nonlinearities are estimated as
+/// well: freed one after the other, each where its evidence justifies its parameter. At least 8 rows, in order of time.
 [[nodiscard]] ServoIdentification identify_servo(std::span<const ServoSample> log,
                                                  ServoKindRule rule = ServoKindRule::automatic);
 

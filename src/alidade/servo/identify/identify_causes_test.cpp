@@ -155,8 +155,8 @@ TEST(ServoCauses, FlawsAreEstimated) {
   }
 }
 
-/// A dead band too small to be seen in a chirp, whose commands are nearly all large: σ counts what there ordinarily is
-/// of it.
+/// A dead band too small to be detected in a chirp, whose commands are nearly all large: σ includes its typical
+/// size.
 TEST(ServoCauses, FlawsTooSmallToSeeAreCounted) {
   constexpr int draws = 3;  // a log that asks for flaws takes a second
   for (const bool is_rate_plant : {false, true}) {

@@ -37,8 +37,8 @@ struct FlawScore {
 [[nodiscard]] ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& plain,
                                   std::vector<ServoRival>& rivals);
 
-/// Dead band, backlash and a limit of the rate, each of an ordinary size, that the log would not show: with it all else
-/// fits as well.
+/// Dead band, backlash and a limit of the rate, each of a typical size, that the log would not show: with it the rest
+/// fits equally well.
 [[nodiscard]] std::vector<HiddenFlaw> hidden_flaws(std::span<const ServoSample> log, const ServoFit& fit);
 
 }  // namespace alidade

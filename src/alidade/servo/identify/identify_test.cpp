@@ -63,8 +63,9 @@ TEST(ServoResponse, DerivativesAreThoseOfItsValues) {
   }
 }
 
-/// Error² in units of its own covariance is χ² with 5 degrees of freedom, whose mean is 5. This servo has no flaws:
-/// with those that the stated covariance counts (a dead band and backlash of ordinary sizes) it is less.
+/// Error² in units of its own covariance is χ² with 5 degrees of freedom, whose mean is 5. This servo has no
+/// nonlinearities: with those that the stated covariance includes (a dead band and backlash of typical sizes) it is
+/// less.
 TEST(IdentifyServo, CoversTheTruth) {
   for (const bool is_rate_plant : {false, true}) {
     for (const bool is_chirp : {false, true}) {

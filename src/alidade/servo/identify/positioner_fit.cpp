@@ -184,7 +184,7 @@ void find_sampling(PositionerProblem& problem, PositionerVector& theta, double& 
     problem.set_sampling(period, phase, theta);
     cost = problem.solve(theta, all_places);
     double again = 0.0, again_phase = 0.0;
-    // What is left of the times as they were asked tells the period better each time.
+    // The remaining residuals of the request times determine the period better each time.
     if (round < 2 && as_asked.find_sampling(theta, again, again_phase)) {
       period = again;
       phase = again_phase;
@@ -231,7 +231,7 @@ double reading_step(const std::vector<PositionerReading>& readings) {
     if (apart > same_rad && (step == 0.0 || apart < step)) step = apart;
   }
   if (!(step > 0.0)) return 0.0;
-  const double whole = std::round((angles.back() - angles.front()) / step);  // a longer lever tells it better
+  const double whole = std::round((angles.back() - angles.front()) / step);  // a longer lever determines it better
   return whole > 0.0 && whole < 1e5 ? (angles.back() - angles.front()) / whole : step;
 }
 

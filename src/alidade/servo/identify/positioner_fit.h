@@ -39,8 +39,8 @@ inline constexpr std::array<const char*, num_positioner_values> positioner_value
     "rate_rad_s",   "acceleration_rad_s2", "time_constant_s", "latency_s",
     "backlash_rad", "dead_band_rad",       "resolution_rad",  "repeatability_rad"};
 
-/// What the log tells of the axis. `latency` is to the first motion that can be read: the encoder's own sampling is in
-/// it, half of its period.
+/// The axis as estimated from the log. `latency` is to the first motion that can be read: the encoder's own sampling is
+/// in it, half of its period.
 struct PositionerFit {
   enum class Status { ok, no_motion, too_few };
   Status status = Status::too_few;

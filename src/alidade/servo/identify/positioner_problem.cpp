@@ -12,7 +12,7 @@ namespace {
 
 constexpr double clock_sigma_s = 2e-4;  // between a program and the device's own clock
 
-/// At rest one rounding error is read again and again: the first readings tell all.
+/// At rest the same rounding error is read repeatedly: the first readings contain everything.
 std::vector<PositionerReading> without_rests(const std::vector<PositionerReading>& all) {
   constexpr int kept_at_rest = 2;
   std::vector<PositionerReading> some;

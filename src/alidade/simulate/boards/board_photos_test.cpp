@@ -176,7 +176,7 @@ EdgeErrors edge_errors(const BoardScene& scene, const RenderConfig& config) {
 }
 
 TEST(RenderBoardPhoto, EdgesStandWhereTheLensPutsThem) {
-  // Rounding to whole grey values alone scatters a crossing by about 0.29 √15 / 170 = 0.007 px; the mean tells a bias.
+  // Rounding to whole grey values alone scatters a crossing by about 0.29 √15 / 170 = 0.007 px; the mean shows a bias.
   const BoardSceneConfig flat{.num_photos = 6, .max_tilt_rad = 0.7, .min_fill = 0.75, .max_fill = 0.95};
   BoardSceneConfig bent = flat;
   bent.bow_m = 0.004;

@@ -188,7 +188,7 @@ TEST_F(RotationLogText, SkipBadListsWrongRows) {
       << "a wrong header leaves nothing to skip";
 }
 
-/// A stream that tells how far it was read.
+/// A stream that reports how far it was read.
 class CountingBuffer : public std::streambuf {
  public:
   explicit CountingBuffer(std::string text) : text_(std::move(text)) {}

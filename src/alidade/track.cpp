@@ -148,7 +148,7 @@ void judge_track(const FollowConfig& follow, TargetTrack& result) {
 }  // namespace
 
 std::string lens_course_fault(const std::vector<TargetObservation>& observations, const Rig& rig) {
-  constexpr double beyond_s = 1.0;  // how far what an observer last said is believed to go on
+  constexpr double beyond_s = 1.0;  // how long an observer's last estimate is extrapolated
   const auto outside = outside_course(observations, rig.lens_courses, beyond_s);
   if (!outside) return "";
   const LensCourse& course = rig.lens_courses[outside->head];

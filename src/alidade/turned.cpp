@@ -13,7 +13,7 @@
 namespace alidade {
 namespace {
 
-/// Throws ConfigError where something is asked that photos cannot tell.
+/// Throws ConfigError where something is requested that photos do not determine.
 ObserveSetup photos_setup(const ObserveConfig& config) {
   ObserveSetup setup = setup_of(config);
   if (setup.rotation == RotationKnowledge::noisy) {
@@ -27,7 +27,7 @@ ObserveSetup photos_setup(const ObserveConfig& config) {
   return setup;
 }
 
-/// Matches of somebody are of a camera of which nothing is known but what is said.
+/// External matches are of a camera of which only what is given is known.
 TurnedConfig turned_config(const ObserveSetup& setup, bool is_ordinary) {
   TurnedConfig config;
   config.square_pixels = setup.square_pixels;

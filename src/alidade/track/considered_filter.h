@@ -29,7 +29,7 @@ struct CountedErrors {
               const Eigen::Matrix2d&) {}
 };
 
-/// u is estimated as well: whose innovations are white where all holds, and which tells what of the rig is off.
+/// u is estimated as well: its innovations are white if the model is correct, and it shows what of the rig is off.
 struct LearnedErrors {
   Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_rig_errors, 1> u;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_rig_errors, max_rig_errors> C;
@@ -51,7 +51,7 @@ struct LearnedErrors {
   }
 };
 
-/// What an observation tells of state and errors: the covariances of both with the pixel, and the pixel's own.
+/// An observation's covariances with state and errors, and the pixel's own.
 template <int N>
 struct SeenWithErrors {
   Eigen::Matrix<double, N, 2> PHt;

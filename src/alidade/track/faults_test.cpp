@@ -52,8 +52,7 @@ TrackScene faulty(const std::string& name, const std::function<void(TrackFaults&
 struct FaultCase {
   std::string what;
   std::function<void(TrackFaults&)> fault;
-  std::string
-      named;  ///< Words of which one (separated by |) the verdict has to say in most draws; none: it cannot tell.
+  std::string named;  ///< Words of which one (separated by |) the verdict has to say in most draws; none: unobservable.
 };
 
 const std::vector<FaultCase>& fault_cases() {

@@ -47,7 +47,7 @@ struct ModelFilter {
   [[nodiscard]] Belief<6> estimate() const {
     return {belief.x.template head<6>(), belief.P.template topLeftCorner<6, 6>()};
   }
-  /// This belief, given what was learnt until dt later: one step back of the smoother.
+  /// This belief, given the belief dt later: one step back of the smoother.
   /// Rauch, Tung & Striebel, "Maximum likelihood estimates of linear dynamic systems", 1965.
   [[nodiscard]] ModelFilter smoothed(const Models& models, const ModelFilter& later, double dt_s) const {
     if (!(dt_s > 0.0)) return later;

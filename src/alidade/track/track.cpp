@@ -14,7 +14,7 @@ namespace {
 
 constexpr double not_there = std::numeric_limits<double>::quiet_NaN();
 
-/// Several steps may tell of one moment: the last one knows most.
+/// Several steps may belong to one instant: the last one has the most information.
 void add_smoothed(const std::optional<Tracker::Smoothed>& now, std::vector<PredictedStep>& smoothed) {
   if (!now) return;
   while (!smoothed.empty() && smoothed.back().t_s >= now->t_s) smoothed.pop_back();
@@ -55,7 +55,7 @@ TrackReport followed(std::span<const TargetObservation> observations, std::span<
 /// The σ_a whose innovations are the most probable, from 0.03 to 30 m/s² in steps of a quarter of a decade.
 double max_probable_sigma_a(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                             TrackerConfig config, const Progress& progress) {
-  constexpr std::size_t max_observations = 4000;  // a few minutes: enough to tell
+  constexpr std::size_t max_observations = 4000;  // a few minutes: enough to decide
   config.learn_errors = config.errors.num() > 0;  // the others' innovations follow one another
   const auto first = observations.first(std::min(observations.size(), max_observations));
   double best = config.sigma_a_m_s2, most = -std::numeric_limits<double>::infinity();

@@ -64,7 +64,7 @@ class Tracker {
   };
   [[nodiscard]] std::optional<Smoothed> smoothed(double lag_s) const;
 
-  /// u of the rig's errors as the observations tell it so far, and its covariance. None unless errors are learned.
+  /// u of the rig's errors as estimated so far, and its covariance. None unless errors are estimated.
   struct Learned {
     Eigen::VectorXd u;
     Eigen::MatrixXd cov;

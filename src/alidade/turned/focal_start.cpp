@@ -68,7 +68,7 @@ Turn robust_turn(const LinkPoints& points, double focal) {
 
 std::vector<FocalStart> focal_starts(const MatchedPhotos& photos, const std::vector<PhotoLink>& links,
                                      std::size_t most) {
-  constexpr std::size_t max_links = 60;  // tell the focal length; the rotations come from all
+  constexpr std::size_t max_links = 60;  // determine the focal length; the rotations come from all
   std::vector<LinkPoints> points;
   for (const PhotoLink& link : links) points.push_back(points_of(photos, link));
   const std::size_t step = (links.size() + max_links - 1) / max_links;

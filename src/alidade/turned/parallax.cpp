@@ -97,7 +97,7 @@ ParallaxTest parallax_of(const TurnedFit& fit) {
   if (!(count > 0.0)) return test;
   test.rms_px = std::sqrt(squares / count);  // normalised: the caller knows the scale
   const double focal = 0.5 * (fit.bundle.camera[0] + fit.bundle.camera[1]);
-  // what shows is how the points' inverse distances scatter, ordinarily by half their mean; the mean looks like a
+  // observable is the scatter of the points' inverse distances, typically half their mean; the mean looks like a
   // longer lens
   constexpr double mean_over_scatter = 2.0;
   test.relative = turns > 0.0 ? mean_over_scatter * std::sqrt(squares / turns) / focal : 0.0;

@@ -25,7 +25,7 @@ struct PhotoScale {
   [[nodiscard]] Eigen::Vector2d normalised(const Eigen::Vector2d& px) const { return (px - middle_px) / half_width_px; }
 };
 
-/// The pairs that hang together: at least eight matches, and a tenth of them, agree. Brown & Lowe, "Automatic panoramic
+/// The consistent pairs: at least eight matches, and a tenth of them, agree. Brown & Lowe, "Automatic panoramic
 /// image stitching using invariant features", 2007, section 3. Throws Interrupted.
 [[nodiscard]] std::vector<PhotoLink> find_links(const MatchedPhotos& photos, const Progress& progress = {});
 

@@ -13,9 +13,9 @@ struct ScatterCovariance {
   std::vector<double> z2;  ///< One a photo: |δ|² over what the model expects of it, in V's units.
 };
 
-/// What leaving out each photo changes, δ_k (one step from the optimum), against what the model expects of that,
+/// The change from omitting each photo, δ_k (one step from the optimum), relative to its expectation by the model,
 /// Cov δ_k = V₋ₖ − V (Hausman, Econometrica 46, 1978): the sum of δδᵀ − (V₋ₖ − V), where it is above zero, is added to
-/// V. Errors of a photo touch every match that it has part in, so that matches are no clusters (Snijders & Borgatti,
+/// V. Errors of a photo affect all its matches, so that matches are not clusters (Snijders & Borgatti,
 /// Connections 22, 1999: the jackknife over nodes). With few photos the scatter by direction is shrunk towards one
 /// ratio for all, and widened by ν/(ν − 2). docs/maths/turned-photos.md.
 [[nodiscard]] ScatterCovariance scatter_covariance(const TurnedFit& fit, const Progress& progress = {});

@@ -5,7 +5,7 @@
 
 namespace alidade {
 
-/// A match that is believed.
+/// An accepted match.
 struct KeptMatch {
   std::size_t pair = 0;
   int match = 0;

@@ -322,7 +322,7 @@ class TurnedRun {
 
   const MatchedPhotos& photos_;
   const TurnedConfig& config_;
-  TurnedConfig free_;  ///< With what is held free within what cameras ordinarily have: what is held may be wrong.
+  TurnedConfig free_;  ///< With fixed values free within typical priors: a fixed value may be wrong.
   const Progress& progress_;
   PhotoScale scale_;
   TurnedReport report_;

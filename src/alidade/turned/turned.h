@@ -14,20 +14,20 @@ struct ObserveConfig;  // observe.h
 struct TurnedConfig {
   bool square_pixels = false;  ///< fx = fy.
   bool fixed_centre = false;   ///< cx, cy: the initial guess's, else the image's centre.
-  /// fx / fy and the centre are what cameras ordinarily have, within a σ that is counted; false: nothing is known.
+  /// fx / fy and the centre are typical, within a σ that is included; false: nothing is known.
   bool ordinary_aspect = true, ordinary_centre = true;
   int lens_terms = 2;                    ///< Radial distortion: none, k1, or k1 and k2.
-  bool keeps_terms = false;              ///< All of them; false: those that the photos tell from zero.
+  bool keeps_terms = false;              ///< All of them; false: those that differ significantly from zero.
   std::optional<Eigen::Vector4d> start;  ///< fx, fy, cx, cy [px].
   double sigma_px = 0.0;                 ///< Of a coordinate; 0: estimated from the residuals.
-  /// σ of how far the camera's centre moved as it turned, over the points' distance, a radian of turn; none: ordinary.
+  /// σ of the projection centre's motion, over the points' distance, per radian of rotation; none: typical.
   std::optional<double> sigma_parallax;
 };
 
 struct TurnedReport {
   enum class Status {
     ok,
-    too_few_photos,  ///< Fewer than three hang together.
+    too_few_photos,  ///< Fewer than three are connected.
     no_turn,
     zoomed,
     moved,  ///< Pairs agree each with a plane, not together with one camera that turned.
@@ -59,8 +59,8 @@ struct TurnedReport {
 [[nodiscard]] TurnedReport observe_turned(const MatchedPhotos& photos, const TurnedConfig& config,
                                           const Progress& progress = {});
 
-/// observe() of photos whose matches are there: with what is ordinary of photos, which observe() of matches does not
-/// take for granted.
+/// observe() of photos whose matches are known: with the typical priors of photos, which observe() of matches does not
+/// assume.
 [[nodiscard]] ObserveReport observe_matched(MatchedPhotos photos, const ObserveConfig& config,
                                             const Progress& progress = {});
 

@@ -94,7 +94,7 @@ class TurnedSystem {
     block.gradient.setZero();
     block.by_camera.setZero();
     for (std::size_t i = first; i < last; ++i) add_observation(i, ray, block);
-    block.information.diagonal().array() += 1e-9;  // a point that nobody sees stays where it is
+    block.information.diagonal().array() += 1e-9;  // an unobserved point stays where it is
     blocks_.push_back(block);
   }
 

@@ -9,7 +9,7 @@
 namespace alidade {
 namespace {
 
-constexpr double first_sigma = 0.003;  // half widths: before the residuals tell
+constexpr double first_sigma = 0.003;  // half widths: before it is estimated from the residuals
 constexpr double min_sigma = 2e-5;     // about 0.01 px
 constexpr double max_sigma = 0.005;    // what is worse is no noise, but a wrong start that would take in everything
 constexpr double gate_sigmas = 4.5;

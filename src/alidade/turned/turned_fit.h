@@ -6,11 +6,11 @@
 
 namespace alidade {
 
-/// Photos that hang together, adjusted, without what does not belong.
+/// Connected photos, adjusted, without outliers.
 struct TurnedFit {
   TurnedBundle bundle;
   TurnedPrior prior;
-  TurnedSolveConfig solve;  ///< With the σ that the residuals tell, or the given one.
+  TurnedSolveConfig solve;  ///< With the σ estimated from the residuals, or the given one.
   TurnedSolution solution;
   std::size_t num_kept = 0;  ///< Matches.
 };

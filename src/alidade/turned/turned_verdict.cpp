@@ -57,7 +57,7 @@ Refusal zoomed(const TurnedReport& report, const MatchedPhotos& photos) {
           "leave these out, or take all at one zoom and focus; a step forward looks alike"};
 }
 
-/// What the photos cannot tell, of what is not held.
+/// What the photos do not determine, of what is not fixed.
 Refusal weak(const TurnedReport& report, const MatchedPhotos& photos, const TurnedConfig& config) {
   const Eigen::VectorXd sigma = report.cov.diagonal().cwiseSqrt();
   const double f = std::min(report.camera[0], report.camera[1]);

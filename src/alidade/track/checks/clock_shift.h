@@ -8,9 +8,9 @@
 
 namespace alidade {
 
-/// The head whose images were taken later or earlier than they say: a wrong clock passes for a manoeuvring target,
-/// whose σ_a is then found too large. Of two heads the second one, against the first: which of them is right the
-/// observations do not tell.
+/// The head whose images were taken later or earlier than they say: a wrong clock looks like a manoeuvring target,
+/// whose σ_a is then found too large. Of two heads the second one, relative to the first: which of them is right is
+/// unobservable.
 struct ClockShift {
   std::size_t head = 0;
   double later_s = 0.0;  ///< To be added to its capture times.

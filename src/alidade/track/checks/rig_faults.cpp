@@ -9,9 +9,9 @@
 namespace alidade {
 namespace {
 
-/// What moves a ray within the plane of both rays moves the range, and no other: the observations do not tell it, and
-/// what a filter believes to learn of it comes from its own linearisation. Told are the parameters across that plane:
-/// of heads side by side what turns about x or z, and what is vertical.
+/// An error that moves a ray within the plane of both rays changes only the range: it is unobservable, and a filter's
+/// apparent information about it comes from its own linearisation. Observable are the parameters across that plane:
+/// for heads side by side rotations about x or z, and vertical offsets.
 bool is_across(std::span<const RigHead> heads, Eigen::Index param) {
   const Eigen::Vector3d apart =
       heads.back().head.world_from_base.translation - heads.front().head.world_from_base.translation;
@@ -25,8 +25,8 @@ bool is_across(std::span<const RigHead> heads, Eigen::Index param) {
 
 std::vector<RigFault> rig_faults(std::span<const RigHead> heads, const RigUncertainty& errors,
                                  const Tracker::Learned& learned, bool is_supposed) {
-  // Of the variance: what the observations tell to a tenth of the file's precision, the file may contradict by fifty of
-  // its σ.
+  // Of the variance: what the observations determine to a tenth of the file's precision, the file may contradict by
+  // fifty of its σ.
   constexpr double min_told = 0.01;
   std::vector<RigFault> faults;
   // What the observations add to u ~ N(0, 1): the information, and its vector.

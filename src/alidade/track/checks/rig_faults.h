@@ -10,9 +10,9 @@
 
 namespace alidade {
 
-/// Of a filter that learned the errors: each number against what its covariance allows, the most surprising first.
-/// Numbers that the observations hardly tell, and those within the plane of both rays, are omitted. `is_supposed`: the
-/// errors are no one's σ but a question, and the file's numbers may be exact; each is then asked about by itself.
+/// Of a filter that estimated the errors: each parameter relative to its covariance, the most significant first.
+/// Poorly observable parameters, and those within the plane of both rays, are omitted. `is_supposed`: the errors' σ are
+/// hypotheses, not given, and the file may be exact; each parameter is then tested alone.
 [[nodiscard]] std::vector<RigFault> rig_faults(std::span<const RigHead> heads, const RigUncertainty& errors,
                                                const Tracker::Learned& learned, bool is_supposed);
 

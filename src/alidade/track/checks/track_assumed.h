@@ -22,8 +22,9 @@ struct TrackGiven {
                                                     const FollowConfig& config, const TrackReport& report,
                                                     const TrackGiven& given);
 
-/// How a point that heads at these readings see follows their parameters: ∂ point / ∂ (head_param_names, lens
-/// parameters, delay of its clock) of each head, by least squares over their pixels. Empty where they cannot tell it.
+/// How a point triangulated by heads at these readings depends on their parameters: ∂ point / ∂ (head_param_names, lens
+/// parameters, delay of its clock) of each head, by least squares over their pixels. Empty where they do not determine
+/// it.
 struct HeadReading {
   std::size_t head = 0;
   Eigen::Vector2d pan_tilt_rad;

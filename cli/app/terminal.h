@@ -16,7 +16,7 @@ class Terminal {
   Terminal(const Terminal&) = delete;
   Terminal& operator=(const Terminal&) = delete;
 
-  /// `alidade: error: MESSAGE`, one line whatever the message holds, after wiping the progress line.
+  /// `alidade: error: MESSAGE`, one line for any message, after wiping the progress line.
   void error(std::string_view message);
   /// Called by long work: shows a line on a terminal (not with `--quiet` or `--json`), and stops after Ctrl-C.
   [[nodiscard]] Progress progress(bool shown);

@@ -64,8 +64,8 @@ class FolderCapture {
   FolderCapture(live::CaptureSession& session, live::GrowingFolder& folder, const CaptureArgs& args, Run& run)
       : session_(session), folder_(folder), goal_px_(args.config.until_px), wait_s_(args.wait_s), run_(run) {}
 
-  /// Until the goal holds, the person ends it, or nothing new has come for too long: then of what came the photos are
-  /// taken that still bring something.
+  /// Until the goal is reached, the user ends it, or nothing new has come for too long: then of what came the photos
+  /// are taken that still bring something.
   void run() {
     came_at_ = Clock::now();
     while (!is_over()) {

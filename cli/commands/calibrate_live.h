@@ -25,9 +25,9 @@ struct CaptureArgs {
 void add_capture_options(CLI::App& command, CaptureArgs& args);
 [[nodiscard]] FieldList fields_of(CaptureArgs& args);
 
-/// Photos that are taken one by one, guided, until the goal holds; then `finish` calibrates from the folder of those
-/// that were kept; `num_inexact` of them are not as the camera gave them. Throws UsageError for options that do not go
-/// together.
+/// Photos that are taken one by one, guided, until the goal is reached; then `finish` calibrates from the folder of
+/// those that were kept; `num_inexact` of them are not as the camera gave them. Throws UsageError for options that do
+/// not go together.
 [[nodiscard]] ExitCode calibrate_live(
     const Board& board, CaptureArgs args, Run& run,
     const std::function<ExitCode(const std::filesystem::path& photos, std::size_t num_inexact)>& finish);

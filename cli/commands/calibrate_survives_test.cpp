@@ -242,7 +242,7 @@ TEST_F(CalibrateSurvives, CtrlCAtAnyMomentLeavesAllFilesOrNone) {
   EXPECT_GE(num_interrupted, 1) << "every run was over before it was interrupted";
 }
 
-/// What a folder holds, file by file, without the hidden folder that a killed run leaves until the next one.
+/// The contents of a folder, file by file, without the hidden folder that a killed run leaves until the next one.
 std::map<std::string, std::string> visible_files(const fs::path& folder) {
   std::map<std::string, std::string> content;
   for (const auto& entry : fs::directory_iterator(folder)) {

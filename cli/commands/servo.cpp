@@ -43,7 +43,7 @@ ServoScenario with_options(ServoScenario scenario, const ServoArgs& args) {
   return scenario;
 }
 
-/// What a run held to the wall clock says of its steps.
+/// What a run by the wall clock reports about its steps.
 void tell_pace(const Pace& pace, JobOutcome& outcome) {
   JsonValue& told = outcome.document.estimate["realtime"];
   told["steps"] = pace.num_steps();

@@ -47,7 +47,7 @@ class Broker {
   /// A bucket; `ttl_s` 0: keys stay.
   [[nodiscard]] KeyValues bucket(const std::string& name, double ttl_s);
 
-  /// What a stream holds from a sequence number on, in order, and what comes. None: not now.
+  /// A stream's messages from a sequence number on, in order, and new ones. None: not now.
   [[nodiscard]] Subscription read(const std::string& stream, const std::string& subject, std::uint64_t from);
   /// The next message within so long; none: there is none, or the subscription has ended (`is_lost`).
   [[nodiscard]] static Message next(const Subscription& from, int wait_ms, bool& is_lost);

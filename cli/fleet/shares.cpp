@@ -42,7 +42,7 @@ bool Shares::keep() {
   return take_and_give((num_parts + workers - 1) / std::max(workers, 1)) || has_lost;
 }
 
-/// Its own mark, and what it holds; whether any of that is another's now.
+/// Its own mark, and its partitions; whether any of them now belongs to another.
 bool Shares::renew() {
   const auto length = static_cast<int>(id_.size());
   if (kvStore_Put(&own_revision_, leases_.get(), id_.c_str(), id_.data(), length) != NATS_OK) leases_.reset();

@@ -19,8 +19,8 @@ class Shares {
  public:
   explicit Shares(Broker& broker);
 
-  /// Renews what is held, takes what is free, gives back what is more than a fair share. To be called often; does
-  /// something every 0.4 s. Whether the parts that are held have changed.
+  /// Renews its leases, takes free partitions, returns those beyond a fair share. To be called often; acts every 0.4 s.
+  /// Whether its partitions have changed.
   [[nodiscard]] bool keep();
   [[nodiscard]] bool holds(int part) const { return revision_[static_cast<std::size_t>(part)] > 0; }
   [[nodiscard]] int num_held() const;
@@ -36,7 +36,7 @@ class Shares {
   KeyValues leases_;
   std::string id_;
   std::uint64_t own_revision_ = 0;
-  std::array<std::uint64_t, num_parts> revision_{};  ///< Of the lease; 0: not held.
+  std::array<std::uint64_t, num_parts> revision_{};  ///< Of the lease; 0: none.
   std::chrono::steady_clock::time_point next_ = {};
 };
 

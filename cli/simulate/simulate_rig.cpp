@@ -97,7 +97,7 @@ ExitCode simulate_rig(const SimulateRigArgs& args, Run& run) {
     const Camera told = mistaken_camera(rig_head.camera, args.mistake.focal, args.mistake.centre_px);
     run.add_file(camera_files.back(), camera_text(with_sigma(told), CameraFormat::alidade));
   }
-  // Where the files of the lenses are wrong, the truth holds its own.
+  // Where the files of the lenses are wrong, the truth has its own.
   const bool is_mistaken = args.mistake.focal != 0.0 || args.mistake.centre_px != 0.0;
   run.add_file("truth_rig.yaml", rig_text(scene.rig, is_mistaken ? std::vector<std::string>{} : camera_files));
   JsonValue wrong = JsonValue::list();

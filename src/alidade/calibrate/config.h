@@ -34,7 +34,7 @@ enum class OutlierRule { automatic, drop, keep };
 /// What is known of a camera behind a flat port before its photos in water.
 struct PortKnowledge {
   std::optional<Camera>
-      air;              ///< The lens as calibrated in air (pinhole or brown), held. None: it is estimated as well.
+      air;              ///< The lens as calibrated in air (pinhole or brown), fixed. None: it is estimated as well.
   double gap_m = 0.02;  ///< A start.
   std::optional<double> glass_m;         ///< Held; must be given.
   double n_glass = 1.5, n_water = 1.34;  ///< Fixed: the photos hardly separate them from the gap.
@@ -43,8 +43,8 @@ struct PortKnowledge {
 /// Options of calibrate(). Plain data with usable defaults: `calibrate(board, views, size, {})` is a sensible call.
 struct CalibrateConfig {
   std::string model = "brown";                ///< pinhole, brown, kannala_brandt or flat_port.
-  std::vector<std::string> fixed = {"skew"};  ///< Parameters held: at their prior's value, else zero (k…, skew).
-  std::vector<std::string> free = {};         ///< Parameters estimated that are held otherwise: skew.
+  std::vector<std::string> fixed = {"skew"};  ///< Fixed parameters: at their prior's value, else zero (k…, skew).
+  std::vector<std::string> free = {};         ///< Parameters estimated that are fixed by default: skew.
   std::vector<Prior> priors = {};
   BoardShape board_shape = BoardShape::automatic;
   OutlierRule outliers = OutlierRule::automatic;  ///< Rejected corners are named.

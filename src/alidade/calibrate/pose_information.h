@@ -17,7 +17,7 @@ namespace alidade {
 /// Rows and columns of a matrix.
 [[nodiscard]] Eigen::MatrixXd submatrix(const Eigen::MatrixXd& full, const std::vector<int>& rows);
 
-/// The inverse of `submatrix`: a covariance over all parameters, zero where they are held.
+/// The inverse of `submatrix`: a covariance over all parameters, zero where they are fixed.
 [[nodiscard]] Eigen::MatrixXd full_matrix(const Eigen::MatrixXd& part, const std::vector<int>& rows, Eigen::Index size);
 
 /// The view of all points of a board at a pose, without noise; none where one falls within `margin_px` of the image's

@@ -15,10 +15,10 @@ namespace alidade {
 /// Every fault of `config`, one sentence each; empty if it is usable.
 [[nodiscard]] std::vector<std::string> faults(const CalibrateConfig& config);
 
-/// How many usable views it takes: three, two where the principal point is held (Zhang 2000, §3.1).
+/// How many usable views it takes: three, two where the principal point is fixed (Zhang 2000, §3.1).
 [[nodiscard]] std::size_t min_views(const CalibrateConfig& config);
 
-/// Free parameters, priors and board of `problem`; returns the lens with every held parameter at its value: its
+/// Free parameters, priors and board of `problem`; returns the lens with every fixed parameter at its value: its
 /// prior's, else the image's centre (cx, cy), else zero. `config` must have no faults.
 [[nodiscard]] Lens set_up_problem(const Board& board, const CalibrateConfig& config, ImageSize size,
                                   BundleProblem& problem);

@@ -131,7 +131,7 @@ BoardShape decide_shape(BoardShape asked, std::span<const ShapeTransfer> transfe
     const ShapeTransfer* best = best_of(transfers, &ShapeTransfer::is_proved);
     return best != nullptr ? best->shape : BoardShape::flat;
   }
-  // Without a test there is nothing to hold against what was asked for.
+  // Without a test there is nothing that contradicts the requested one.
   if ((asked != BoardShape::bow && asked != BoardShape::free) || transfers.empty()) return asked;
   for (const ShapeTransfer& each : transfers) {
     if (each.shape == asked && each.transfers()) return asked;

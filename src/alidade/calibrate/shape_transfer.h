@@ -14,7 +14,7 @@ ALIDADE_PUBLIC_BEGIN
 /// The word of --board-shape for a shape.
 [[nodiscard]] std::string shape_name(BoardShape shape);
 
-/// A board shape estimated on one half of the photos and held fixed on the other, both ways.
+/// A board shape estimated on one half of the photos and fixed on the other, both ways.
 struct ShapeTransfer {
   BoardShape shape = BoardShape::free;  ///< bow or free.
   double flat_rms_px = 0.0;             ///< Of both halves with the board flat, or as it was given.

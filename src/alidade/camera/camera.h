@@ -30,7 +30,7 @@ struct Camera {
   int width_px = 0;
   int height_px = 0;
   Lens lens = Calibrated<Brown>{};
-  /// Covariance of all parameters of the lens in their order (a held parameter has zero rows); 0×0 where unknown.
+  /// Covariance of all parameters of the lens in their order (a fixed parameter has zero rows); 0×0 where unknown.
   Eigen::MatrixXd cov;
   double rms_px = 0.0;  ///< Per point, of the calibration that made it; 0 where unknown.
   std::string source;   ///< Where it came from, for a person.

@@ -34,7 +34,7 @@ struct PortResidual {
 /// Above this RMS [px] from 0.5 m on, the port's own model is worth its trouble: noise of a good corner is a third.
 inline constexpr double port_residual_limit_px = 0.3;
 
-/// Least-squares Brown lens (skew held) with a free constant viewpoint, of what `port` sees over the image at the
+/// Least-squares Brown lens (skew fixed) with a free constant viewpoint, of what `port` sees over the image at the
 /// fit's ranges, and what remains at others. None where the lens is no flat port, or nothing can be fitted.
 /// docs/maths/camera-models.md; T. Treibitz et al., "Flat refractive geometry", PAMI 34(1), 2012, for why it remains.
 [[nodiscard]] std::optional<PortResidual> port_residual(const Camera& port, const PortResidualConfig& config = {});

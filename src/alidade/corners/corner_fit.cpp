@@ -24,7 +24,7 @@ constexpr double max_sigma_px = 0.5;                    // a corner less certain
 
 constexpr double edge_reach = 3.6;  // blurs from an edge its step is whole to 3e-4 of the contrast
 
-/// The model's parameters. Edge k runs along (cos, sin)(angle_rad[k]) through `px` and bends by bend[k] (held).
+/// The model's parameters. Edge k runs along (cos, sin)(angle_rad[k]) through `px` and is curved by bend[k] (fixed).
 struct Model {
   Eigen::Vector2d px;
   std::array<double, 2> angle_rad, bend;

@@ -231,7 +231,7 @@ double stated_dof(const Scatter& scatter, double own_dof, const VectorXd& direct
   return 2.0 * value * value / (spread * spread);
 }
 
-/// What the clusters say where no parameter is held, H⁻¹ = L Lᵀ. `clusters` are whitened.
+/// The clusters' result where no parameter is fixed, H⁻¹ = L Lᵀ. `clusters` are whitened.
 void state_whitened(const MatrixXd& L, double noise_variance, std::vector<ClusterStep>&& clusters,
                     ClusterCovariance& result) {
   const Eigen::Index n = L.rows();

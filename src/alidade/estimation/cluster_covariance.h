@@ -29,7 +29,7 @@ struct ClusterStep {
 /// Covariance of an estimate whose errors are shared within clusters, and why it differs from the model's.
 struct ClusterCovariance {
   Eigen::MatrixXd cov;                 ///< To be stated; nowhere below the model's.
-  Eigen::VectorXd inflation;           ///< σ over the model's σ, one per parameter; 1 for a parameter that is held.
+  Eigen::VectorXd inflation;           ///< σ over the model's σ, one per parameter; 1 for a fixed parameter.
   Eigen::VectorXd degrees_of_freedom;  ///< Of each variance (Satterthwaite); infinite where it is the model's.
   double design_effect = 1.0;          ///< Variance over the model's, in the mean over all directions.
   double shrinkage = 1.0;              ///< λ: 0: the clusters' own scatter by direction; 1: the design effect in all.

@@ -61,7 +61,7 @@ void refuse_unknown_keys(const Fields& fields, const std::vector<std::string>& k
 [[nodiscard]] Eigen::Vector3d read_vector(const Fields& fields, const std::string& key);
 
 /// The covariance of `key`: {names, upper}: upper triangle row by row, in the order of `names`, which are among
-/// `known`; those that are not named are held and have zero rows. Square, as large as `known`. Refuses what varies
+/// `known`; those that are not named are fixed and have zero rows. Square, as large as `known`. Refuses what varies
 /// together as no covariance does. `of` names what has the parameters: "the model".
 [[nodiscard]] Eigen::MatrixXd read_covariance(const YAML::Node& node, const Fields& parent,
                                               const std::vector<std::string>& known, std::string_view of);

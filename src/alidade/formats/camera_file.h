@@ -44,9 +44,9 @@ void require_central(const Camera& camera, const std::string& name);
 void write_camera(const std::filesystem::path& file, const Camera& camera, CameraFormat format = CameraFormat::alidade,
                   bool lossy = false);
 
-/// What of the lens the format cannot hold, "skew 0.3 px" each; camera_text() refuses these.
+/// What of the lens the format cannot store, "skew 0.3 px" each; camera_text() refuses these.
 [[nodiscard]] std::vector<std::string> lens_losses(const Camera& camera, CameraFormat format);
-/// What else a format does not hold (covariance, RMS): worth a note, no reason to refuse.
+/// What else a format does not store (covariance, RMS): reported, not refused.
 [[nodiscard]] std::vector<std::string> other_losses(const Camera& camera, CameraFormat format);
 
 /// The format of a name (`opencv`, `ros`, …). Throws InputError for an unknown one.

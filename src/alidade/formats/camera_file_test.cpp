@@ -60,7 +60,7 @@ TEST(CameraFile, OursKeepsEverything) {
   std::get<Calibrated<Brown>>(camera.lens).params[4] = -0.7;
   const Eigen::MatrixXd root = Eigen::MatrixXd::NullaryExpr(10, 10, [&] { return standard(rng); });
   camera.cov = root * root.transpose();
-  camera.cov.row(4).setZero(), camera.cov.col(4).setZero();  // a held parameter
+  camera.cov.row(4).setZero(), camera.cov.col(4).setZero();  // a fixed parameter
   camera.cov = camera.cov.selfadjointView<Eigen::Upper>();
   const Camera back = parse_camera(camera_text(camera, CameraFormat::alidade), "file");
   EXPECT_EQ(params(back.lens), params(camera.lens));
@@ -88,7 +88,7 @@ TEST(CameraFile, ACovarianceMayNameSomeParameters) {
   EXPECT_EQ(camera.cov.cwiseAbs().sum(), 15.0);
 }
 
-// --- what a format cannot hold --------------------------------------------------------------------------------------
+// --- what a format cannot store -------------------------------------------------------------------------------------
 
 std::string camera_fault(const std::function<void()>& work) {
   try {

@@ -76,7 +76,7 @@ std::vector<std::string> covariance_names(const std::vector<RigHead>& heads) {
   return names;
 }
 
-/// What is held has zero rows, and is not written.
+/// A fixed parameter has zero rows, and is not written.
 std::string covariance_text(const Rig& rig) {
   if (rig.cov.isZero(0.0)) return "covariance: exact\n";
   const std::vector<std::string> names = covariance_names(rig.heads);

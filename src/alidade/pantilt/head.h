@@ -78,7 +78,7 @@ using HeadVector = Eigen::Matrix<double, num_head_params, 1>;
 [[nodiscard]] Rigid3 cam_from_world(const Head& head, const Eigen::Vector2d& pan_tilt_rad);
 [[nodiscard]] Eigen::Vector3d cam_centre_in_world(const Head& head, const Eigen::Vector2d& pan_tilt_rad);
 
-/// A head at one pair of readings, its sines and matrices computed: what to hold where many points are projected.
+/// A head at one pair of readings, its sines and matrices computed: kept where many points are projected.
 struct TurnedHead {
   TurnedHead(const Head& head, const Eigen::Vector2d& pan_tilt_rad);
 

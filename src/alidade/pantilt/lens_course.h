@@ -39,10 +39,10 @@ struct Zoomed {
 struct LensCourse {
   std::string name;                    ///< Of the file, for messages.
   std::vector<double> t_s;             ///< Ascending.
-  std::vector<LensNow> lens;           ///< One per time; none where the camera's own intrinsics hold.
+  std::vector<LensNow> lens;           ///< One per time; none where the camera's own intrinsics are used.
   double from_s = 0.0, until_s = 0.0;  ///< What the observer's log spans.
 
-  /// Straight between the times; the first and the last hold before and after.
+  /// Linear between the times, constant before the first and after the last.
   [[nodiscard]] LensNow at(double at_s) const;
 };
 

@@ -28,7 +28,7 @@ struct Tested {
 /// Places of a head's columns: lens, then for each axis scale, one period, two periods, backlash.
 constexpr Index column_of_axis(int axis) { return 3 + 6 * axis; }
 
-/// One by one: of which only what is held.
+/// One by one: of these only what is fixed.
 std::vector<Tested> single_tests(const RigProblem& problem, const RigState& state) {
   std::vector<Tested> all;
   for (std::size_t h = 0; h < state.heads.size(); ++h) {

@@ -33,7 +33,7 @@ struct RigGiven {
 [[nodiscard]] RigGiven rig_given(const RigProblem& problem, const SolvedRig& solved, const Eigen::MatrixXd& cov,
                                  const std::vector<double>& weights, const RigConfig& config);
 
-/// σ of a scale that is held, with what an encoder's error within a turn makes of it; none: none was given.
+/// σ of a fixed scale, including the effect of an encoder's error within a turn; none: none was given.
 [[nodiscard]] std::optional<double> counted_sigma_scale(const RigConfig& config);
 
 /// The free parameters' covariance where the wide ones' stands.

@@ -166,7 +166,7 @@ bool start_mountings(Work& work) {
   return true;
 }
 
-/// The first head keeps its base; what a general head has twice is held (docs/maths/pan-tilt-heads.md).
+/// The first head keeps its base; redundant parameters of a general head are fixed (docs/maths/pan-tilt-heads.md).
 void choose_free(Work& work) {
   for (std::size_t h = 0; h < work.heads.size(); ++h) {
     std::vector<int> free;

@@ -28,7 +28,7 @@ struct RigView {
   Eigen::Vector2d travel = Eigen::Vector2d::Zero();
 };
 
-/// What the solver is given. The world is the base of head 0, which is held.
+/// What the solver is given. The world is the base of head 0, which is fixed.
 struct RigProblem {
   std::vector<RigView> views;
   std::span<const Eigen::Vector3d> points_in_board;
@@ -108,7 +108,7 @@ struct RigCovariance {
 };
 [[nodiscard]] RigCovariance rig_covariance(const RigProblem& problem, const SolvedRig& solved);
 
-/// Σ over the used views of tr cov(correction)/σ²: how many of the corrections the prior alone holds.
+/// Σ over the used views of tr cov(correction)/σ²: how many of the corrections are determined by the prior alone.
 [[nodiscard]] double num_held_corrections(const RigProblem& problem, const SolvedRig& solved,
                                           const Eigen::MatrixXd& cov, std::span<const double> weights);
 

@@ -95,7 +95,7 @@ TEST(BearingFilter, LeavesOutOneWildObservationAndFollowsAJump) {
   EXPECT_EQ(filter.take((k + 1) * observation_period_s, {nan, nan}, sigma_rad), ObservationUse::gated);
 }
 
-/// A lens' error that lasts: σ of the filter holds with it counted, and falls far short without.
+/// A persistent lens error: σ of the filter is right with it included, and far too small without.
 TEST(BearingAxis, CountsWhatTheLensHasWrong) {
   constexpr int num_runs = 400;
   constexpr double of_focal_rad = 0.004, of_centre_rad = 0.006;

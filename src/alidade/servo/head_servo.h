@@ -37,7 +37,7 @@ struct HeadServoOutput {
 };
 
 /// Keeps the target in the centre of one head's image: late images and present encoder readings in, commands out,
-/// once a period. What it holds is made at the start; a step allocates nothing. docs/maths/servo.md
+/// once a period. Everything is allocated at the start; a step allocates nothing. docs/maths/servo.md
 class HeadServo {
  public:
   HeadServo(const RigHead& head, const ServoConfig& config);

@@ -14,7 +14,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// One row of a servo's log: a command that is held until the next row, and the angle read at that time.
+/// One row of a servo's log: a command that is valid until the next row, and the angle read at that time.
 struct ServoSample {
   double t_s = 0.0, command = 0.0, angle_rad = 0.0;
 };

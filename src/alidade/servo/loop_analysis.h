@@ -29,7 +29,8 @@ struct LoopAnalysis {
   double bandwidth_rad_s = 0.0;             ///< Where the closed loop has fallen by 3 dB.
   double crossover_rad_s = 0.0;             ///< Where |L| = 1; 0: nowhere.
   double phase_margin_deg = 0.0;
-  /// Largest |eigenvalue| of the loop sampled and held: command u_k = kp e_k + ki Σ_{i<k} e_i T. Below 1: stable.
+  /// Largest |eigenvalue| of the loop, sampled with zero-order hold: command u_k = kp e_k + ki Σ_{i<k} e_i T. Below 1:
+  /// stable.
   double sampled_radius = 0.0;
 
   [[nodiscard]] bool is_stable() const { return sampled_radius < 1.0; }

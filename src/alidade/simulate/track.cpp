@@ -50,7 +50,7 @@ Vector3d moved_in_turn(const Vector3d& velocity, const Vector3d& axis, double an
   return (std::sin(angle) * velocity + (1.0 - std::cos(angle)) * axis.cross(velocity)) / turn_rate_rad_s;
 }
 
-/// A head that turns after its target: first order, the target's angles held for 5 ms.
+/// A head that turns after its target: first order, the target's angles constant for 5 ms.
 class Follower {
  public:
   Follower(const TrackScene& scene, std::size_t head) : scene_(scene), head_(scene.heads[head].head) {

@@ -64,7 +64,7 @@ inline RangefinderTrial rangefinder_trial(const RangefinderTrialSetup& setup, st
   if (is_solved) heed_assumptions(rangefinder_assumptions(report), verdict);
   trial.is_seen = verdict.state != State::good;
   if (!is_solved) return trial;
-  // A constant that the readings hold is part of the origin: the beam that reads so starts so much farther back.
+  // A constant in the readings is part of the origin: the beam that reads so starts so much farther back.
   const Beam& truth = sample.scene.beam;
   const Eigen::Vector3d origin = truth.origin_in_cam - truth.scale * setup.mistake.offset_m * truth.direction_in_cam;
   Eigen::Matrix<double, 5, 1> error;

@@ -26,7 +26,7 @@ TEST(TrackChain, SigmaHoldsAtItsEnd) {
   }
   EXPECT_GE(num, 0.95 * chains);
   for (const auto& [range_m, sum] : counted) {
-    // Goal 0.7 to 1.3, which 200 chains of the study hold; 40 chains scatter by 0.07.
+    // Goal 0.7 to 1.3, which 200 chains of the study meet; 40 chains scatter by 0.07.
     EXPECT_GT(sum / num, 0.6) << range_m << " m";
     EXPECT_LT(sum / num, 1.3) << range_m << " m";
     EXPECT_GT(exact[range_m], 2.0 * sum) << range_m << " m";

@@ -19,7 +19,7 @@ struct ModelFilter {
   static constexpr bool can_smooth = true, considers = false;
   struct Models {
     Model motion;
-    double start_sigma_rest = 1.0;  ///< Of what the state holds beyond position and velocity, at the start.
+    double start_sigma_rest = 1.0;  ///< Of the state's components beyond position and velocity, at the start.
   };
   Belief<Model::dim> belief;
 

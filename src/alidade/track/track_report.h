@@ -24,8 +24,8 @@ struct PredictedStep {
   Belief<6> belief;
 };
 
-/// What the innovations of one head show, each scaled to σ = 1: where all holds they are white, with mean zero wherever
-/// the target is and however it moves. Those rejected by the gate count, at the gate.
+/// What the innovations of one head show, each scaled to σ = 1: if the model is correct they are white, with mean zero
+/// wherever the target is and however it moves. Those rejected by the gate count, at the gate.
 struct HeadInnovations {
   std::size_t num = 0;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();   ///< In u, v.

@@ -113,7 +113,7 @@ class TurnedRun {
     }
   }
 
-  /// Were some photos zoomed? Told by the homographies alone, which hold for a camera that zooms as well.
+  /// Were some photos zoomed? From the homographies alone, which hold for a camera that zooms as well.
   bool zooms_differ(const std::vector<FocalStart>& starts) {
     if (starts.empty()) return false;
     TurnedConfig config = free_;
@@ -218,7 +218,8 @@ class TurnedRun {
       free_.lens_terms = --report_.lens_terms;
       fit_ = fit_again(photos_, tree_, std::move(fit_), free_, progress_);
       ScatterCovariance less = scatter_covariance(fit_, progress_);
-      // σ of all terms stands for what is held, and so does by how much the answer moves: either may be the right lens
+      // σ includes that of the fixed terms, and the change of the answer when they are estimated: either may be the
+      // right lens
       const Eigen::Vector4d moved = fit_.bundle.camera.head<4>() - before;
       const Eigen::Vector4d more = (scatter.cov - less.cov).diagonal().head<4>().cwiseMax(0.0) + moved.cwiseAbs2();
       less.cov.diagonal().head<4>() += more;
@@ -277,7 +278,7 @@ class TurnedRun {
     report_.assumed.push_back(steps);
   }
 
-  /// The answer with what a person holds; how far that moves it is counted.
+  /// The answer with the user's fixed values; their effect on it is included.
   void hold() {
     const Eigen::Matrix<double, 6, 1> free = report_.camera;
     report_.free_centre_px = free.segment<2>(2);

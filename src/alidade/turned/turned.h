@@ -48,7 +48,7 @@ struct TurnedReport {
   double degrees_of_freedom = 0.0;
   double largest_turn_rad = 0.0;
   ParallaxTest parallax;
-  Eigen::Vector2d free_centre_px = Eigen::Vector2d::Zero();  ///< Where it is if it is not held, and its σ.
+  Eigen::Vector2d free_centre_px = Eigen::Vector2d::Zero();  ///< Its value if it is not fixed, and its σ.
   Eigen::Vector2d sigma_free_centre_px = Eigen::Vector2d::Zero();
   double other_focal_px = 0.0, other_sigmas = 0.0;  ///< A second minimum, and how much worse it is, √Δχ²; 0: none.
   std::vector<Assumption> assumed;

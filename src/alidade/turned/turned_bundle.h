@@ -16,9 +16,10 @@ struct TurnedDetection {
 /// Photos of a turned camera, adjusted together. The observations stand track by track.
 struct TurnedBundle {
   TurnedCamera camera;
-  std::vector<Eigen::Matrix3d> cam_from_world;  ///< One a photo. The first photo's is held: the world is free to turn.
-  std::vector<double> log_zoom;                 ///< One a photo, the first one's is held.
-  std::vector<Eigen::Vector3d> rays;            ///< One a track, unit length, in the world.
+  std::vector<Eigen::Matrix3d>
+      cam_from_world;                 ///< One per photo. The first photo's is fixed: the world is free to rotate.
+  std::vector<double> log_zoom;       ///< One per photo, the first one's is fixed.
+  std::vector<Eigen::Vector3d> rays;  ///< One a track, unit length, in the world.
   std::vector<TurnedDetection> observations;
 };
 
@@ -48,7 +49,8 @@ struct TurnedNormal {
   Eigen::VectorXd gradient;
 };
 
-/// Of what `bundle` holds at its place, in units of 1/σ²; without the observations of `without_photo`, if there is one.
+/// Normal equations at the values of `bundle`, in units of 1/σ²; without the observations of `without_photo`, if
+/// given.
 [[nodiscard]] TurnedNormal turned_normal(const TurnedBundle& bundle, const TurnedPrior& prior,
                                          const TurnedSolveConfig& config, int without_photo = -1);
 

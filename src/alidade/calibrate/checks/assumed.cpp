@@ -26,7 +26,7 @@ double ordinary_error(const std::string& name, double value) {
   return 0.0;                                    // a term that the model does not have
 }
 
-/// Lens parameters by position: those estimated, and those held.
+/// Lens parameters by position: those estimated, and those fixed.
 struct Split {
   std::vector<Index> free, held;
 };
@@ -38,7 +38,7 @@ Split split_of(const CalibrateReport& report) {
   return split;
 }
 
-/// dθ/da of the free by the held parameters; empty where the linearisation fails.
+/// dθ/da of the free with respect to the fixed parameters; empty where the linearisation fails.
 Eigen::MatrixXd sensitivity(const Board& board, CalibrateConfig config, std::span<const BoardView> views,
                             const CalibrateReport& report, const Split& split) {
   config.fixed.clear();

@@ -9,11 +9,11 @@
 
 namespace alidade {
 
-/// What a calibration took as given: the board's square, and each lens parameter that was held. How far each would move
+/// The assumptions of a calibration: the board's square, and each fixed lens parameter. How far each would move
 /// the lens is the linearised optimum's dθ/da = −S_θθ⁻¹ S_θa, S the information of both with the poses eliminated; a
 /// square that is off moves a central lens by nothing. `report` must have converged.
 ///
-/// `air`: the lens that was given and held (flat_port). Where it has a covariance C, C is counted in
+/// `air`: the lens that was given and fixed (flat_port). Where it has a covariance C, C is included in
 /// `report.camera.cov`: K C Kᵀ on what was estimated, K C between, K = dθ/da.
 [[nodiscard]] std::vector<Assumption> count_assumptions(const Board& board, const CalibrateConfig& config,
                                                         std::span<const BoardView> views,

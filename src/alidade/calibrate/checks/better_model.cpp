@@ -14,7 +14,8 @@ bool is_central_parameter(const std::string& name) {
   return name == "fx" || name == "fy" || name == "cx" || name == "cy";
 }
 
-/// The config with another model: what is held or known of focal lengths and centre stays, of the distortion nothing.
+/// The config with another model: fixed values and priors of focal lengths and centre are kept, those of the distortion
+/// not.
 CalibrateConfig with_model(CalibrateConfig config, const std::string& model) {
   config.model = model;
   std::erase_if(config.fixed, [](const std::string& name) { return name != "skew" && !is_central_parameter(name); });

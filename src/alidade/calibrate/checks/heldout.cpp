@@ -50,7 +50,7 @@ bool is_richer(const Candidate& a, const Candidate& than) {
   return a.fixed.size() < than.fixed.size();
 }
 
-/// Mean squared residual [px²] of a view whose pose is found with lens and board held. NaN where it has none.
+/// Mean squared residual [px²] of a view whose pose is estimated with lens and board fixed. NaN where it has none.
 double heldout_error(const Lens& lens, const std::vector<Eigen::Vector3d>& board_points, const BoardView& view) {
   Camera camera;
   camera.lens = lens;

@@ -7,8 +7,8 @@
 
 namespace alidade {
 
-/// Error on photos held out (five folds; the camera is held, their poses are found again), for the model in use and for
-/// its simpler and richer neighbours. `views` are those that take part.
+/// Error on held-out photos (five folds; the camera is fixed, their poses are estimated again), for the model in use
+/// and for its simpler and richer neighbours. `views` are those that take part.
 [[nodiscard]] std::vector<HeldOutModel> heldout_models(const Board& board, std::span<const BoardView> views,
                                                        ImageSize size, const CalibrateConfig& config,
                                                        const std::vector<Eigen::Vector3d>& board_points,

@@ -19,7 +19,7 @@ Eigen::MatrixXd among_all(const Eigen::MatrixXd& of_free, const std::vector<int>
   return all;
 }
 
-/// Likewise what the clusters say; parameters that are held have no inflation.
+/// Likewise from the clusters; fixed parameters have no inflation.
 ClusterCovariance among_all(ClusterCovariance of_free, const std::vector<int>& free, Eigen::Index num_params) {
   Eigen::VectorXd inflation = Eigen::VectorXd::Ones(num_params);
   Eigen::VectorXd dof = Eigen::VectorXd::Constant(num_params, std::numeric_limits<double>::infinity());

@@ -5,7 +5,7 @@
 
 namespace alidade {
 
-/// Covariance of all parameters of a lens, in their order; a parameter that is held has zero rows.
+/// Covariance of all parameters of a lens, in their order; a fixed parameter has zero rows.
 struct LensCovariance {
   Eigen::MatrixXd stated;       ///< Views are its clusters, as the corners of one share errors.
   Eigen::MatrixXd model;        ///< As if every corner erred by itself.

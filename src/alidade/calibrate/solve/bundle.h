@@ -31,7 +31,7 @@ struct BundleProblem {
   std::vector<Eigen::Vector3d> printed_points;  ///< The board as printed: gauge and start of its shape. [m]
   double shape_sigma_m =
       0.0;  ///< Prior σ of a free point against the printed one; keeps unseen points where they were.
-  /// Brown: the formulas hold beyond the fold of the radial map as well, where a lens shows nothing.
+  /// Brown: the formulas are used beyond the fold of the radial map as well, where a lens images nothing.
   bool passes_fold = false;
 };
 
@@ -79,7 +79,7 @@ void follow_lens(const Eigen::MatrixXd& extra, BundleResult& result);
 [[nodiscard]] std::vector<Eigen::Vector2d> residuals_px(const BundleState& state, std::size_t view_index,
                                                         const ViewArrays& view);
 
-/// Pose of one view with lens and board held, from a start. None where it does not converge.
+/// Pose of one view with lens and board fixed, from an initial guess. None where it does not converge.
 [[nodiscard]] std::optional<Rigid3> refine_pose(const Lens& lens, const std::vector<Eigen::Vector3d>& board_points,
                                                 const ViewArrays& view, const Rigid3& cam_from_board);
 

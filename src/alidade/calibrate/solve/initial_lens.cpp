@@ -49,7 +49,7 @@ double stretch_in_water(const Lens& lens) {
   return port ? port->params[13] : 1.0;  // n_water
 }
 
-/// Sum of the residuals' norms, each held to 20 px: a fit that suits most corners wins over one that suits none badly.
+/// Sum of the residuals' norms, each limited to 20 px: a fit to most corners is preferred to a mediocre fit to all.
 double misfit(const BundleProblem& problem, const BundleState& state) {
   constexpr double enough_px = 20.0;
   double sum = 0.0, count = 0.0;

@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// `config` for the model flat_port: gap and normal estimated, the rest held as `port` says. Parameters that `config`
+/// `config` for the model flat_port: gap and normal estimated, the rest fixed as `port` says. Parameters that `config`
 /// fixes and its priors stand. The air lens must be a pinhole or a brown.
 [[nodiscard]] CalibrateConfig with_port(CalibrateConfig config, const PortKnowledge& port);
 

@@ -125,7 +125,7 @@ TEST(CalibrationDocument, CovarianceIsThatOfTheFreeParameters) {
   const json document = json::parse(text_of(calibration));
   const auto names = document["covariance"]["names"].get<std::vector<std::string>>();
   const auto upper = document["covariance"]["upper"].get<std::vector<double>>();
-  ASSERT_EQ(names.size(), 9u);  // all but the skew, which is held
+  ASSERT_EQ(names.size(), 9u);  // all but the skew, which is fixed
   ASSERT_EQ(upper.size(), 45u);
   std::size_t at = 0;
   for (std::size_t i = 0; i < names.size(); ++i) {

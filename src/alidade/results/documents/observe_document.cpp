@@ -129,7 +129,7 @@ bool is_of_camera(const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// The bound is of the longest time without a zoom alone: σ, which holds the other rows as well, may be smaller.
+/// The bound is of the longest time without a zoom alone: σ, which includes the other rows as well, may be smaller.
 void fill_reference(const ObserveReport& report, JsonValue& bound) {
   const RotationLog& log = report.log;
   const double from_s = log.rows.front().t_s, until_s = log.rows.back().t_s;

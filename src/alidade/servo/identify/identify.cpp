@@ -100,7 +100,7 @@ Eigen::VectorXd readings_of(std::span<const ServoSample> log) {
   return readings;
 }
 
-/// Every n-th row, so that a search over a long log stays short; commands between are held.
+/// Every n-th row, so that a search over a long log stays short; commands between are piecewise constant.
 std::vector<ServoSample> thinned(std::span<const ServoSample> log) {
   constexpr std::size_t most = 1500;
   const std::size_t stride = (log.size() + most - 1) / most;

@@ -12,9 +12,9 @@ struct ServoParam {
   enum Place { gain, tau, latency, zero, start };
 };
 
-/// Angles that a servo of these parameters reads at the times of a log, and their derivatives. Exact for held commands:
-/// from one instant to the next in closed form, a switch of the command moving with the latency. Before the log the
-/// first command is taken to have been there.
+/// Angles that a servo of these parameters reads at the times of a log, and their derivatives. Exact for piecewise
+/// constant commands: from one instant to the next in closed form, a switch of the command moving with the latency.
+/// Before the log the first command is taken to have been there.
 struct ServoResponse {
   Eigen::VectorXd angle_rad;
   Eigen::Matrix<double, Eigen::Dynamic, num_servo_params> J;

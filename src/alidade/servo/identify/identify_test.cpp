@@ -102,7 +102,7 @@ TEST(IdentifyServo, ReadsRoundedEncodersAndUnevenRows) {
   std::size_t i = 0;
   for (const ServoSample& sample : log_of(rounded))
     if (++i % 7 != 3 || log.empty()) log.push_back(sample);
-  // A command that is held over a row that is missing is not what was sent: the log says what it was.
+  // A command extended over a missing row is not what was sent: the log has the actual one.
   const ServoIdentification identified = identify_servo(log);
   EXPECT_NEAR(identified.fit.params[0], truth_of(rounded)[0], 0.01 * truth_of(rounded)[0]);
   EXPECT_NEAR(identified.fit.params[1] + identified.fit.params[2], 0.183, 0.005);

@@ -16,7 +16,7 @@ using P = PositionerPlace;
 const std::vector<int> all_places{P::rate, P::acceleration, P::time_constant, P::latency, P::backlash, P::offset};
 constexpr double boundless_acceleration_rad_s2 = 1e3, instant_s = 2e-3, coarse_s = 1e-3;
 
-/// The largest rate that was held over 0.15 s or more.
+/// The largest rate that lasted for 0.15 s or more.
 double fastest(const std::vector<PositionerReading>& readings) {
   constexpr double least_s = 0.15;
   double largest = 0.0;
@@ -104,7 +104,7 @@ PositionerVector sigmas_of(const PositionerProblem& problem, const PositionerVec
   return (noise2 * inverse.diagonal()).cwiseMax(robust.diagonal()).cwiseMax(0.0).cwiseSqrt();
 }
 
-/// What is lost where a place is held at nothing, the others following: 2 ln of the likelihood ratio.
+/// The loss where one parameter is fixed at zero, the others refitted: 2 ln of the likelihood ratio.
 double evidence_of(PositionerProblem problem, PositionerVector theta, int place, double nothing, double noise2) {
   constexpr int few_steps = 10;
   problem.set_integration(coarse_s);

@@ -50,7 +50,7 @@ struct PositionerFit {
   double encoder_hz = 0.0;              ///< It is read so often; 0: whenever it is asked.
   double encoder_evidence = 0.0;
   bool reads_target = false;  ///< Its reading is the commanded position, at once.
-  bool reached_rate = false;  ///< The largest rate was held for a while.
+  bool reached_rate = false;  ///< The largest rate lasted for a while.
   double fastest_rad_s = 0.0;
   double noise = 1.0;                                ///< Of the residuals, over what resolution and timing explain.
   double rms_rad = 0.0;                              ///< Of the residuals.

@@ -18,7 +18,7 @@ namespace alidade::cli {
 struct CommandSpec {
   std::string name;                   ///< "calibrate"; with a space, "camera show", a command of a group.
   std::string summary;                ///< One line.
-  std::string examples;               ///< Command lines, one a line; shown at the end of --help.
+  std::string examples;               ///< Command lines, one per line; shown at the end of --help.
   bool draws_random_numbers = false;  ///< Gives it --seed.
   bool leaves_results = true;         ///< False: nothing is written into DIR unless --out is given (show, convert).
 };

@@ -15,7 +15,7 @@ class HelpFormat : public CLI::Formatter {
   std::string make_option_opts(const CLI::Option* option) const override;
 };
 
-/// Command lines, one a line, indented; lines that do not begin with `alidade` as they are.
+/// Command lines, one per line, indented; lines that do not begin with `alidade` as they are.
 [[nodiscard]] std::string indented_examples(const std::string& examples);
 
 }  // namespace alidade::cli

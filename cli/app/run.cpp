@@ -145,7 +145,7 @@ void Run::add_report(ResultFolder& folder) {
   }
 }
 
-/// Said where a person reads it.
+/// Said where a user reads it.
 void Run::warn(const std::string& line) {
   if (options.json || options.quiet || !printed_file_.empty()) {
     tell_person("alidade: " + line);

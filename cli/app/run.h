@@ -61,14 +61,14 @@ class Run {
   void lap(std::string part);
   /// A file to be written into DIR by finish(). Many large ones wait on DIR's disk, not in memory.
   void add_file(std::string name, std::string content);
-  /// A file elsewhere that the person named, written by finish() as well.
+  /// A file elsewhere that the user named, written by finish() as well.
   void add_file_elsewhere(const std::filesystem::path& file, std::string_view content);
   /// The file of that name is all that finish() prints, if there is one: a table for the next program.
   void print_file(std::string name) { printed_file_ = std::move(name); }
   /// An image of the report: JPEG bytes under the name that the document uses. Where the page would become too large,
   /// those added last are dropped.
   void add_image(std::string name, std::string jpeg);
-  /// A line for a person, shown by finish() unless --json or --quiet.
+  /// A printed line, shown by finish() unless --json or --quiet.
   void say(std::string line);
 
   /// Writes the files, result.json and report.html into DIR, prints the summary (or the document, with --json), and

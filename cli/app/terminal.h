@@ -8,7 +8,7 @@
 
 namespace alidade::cli {
 
-/// The person in front of the command: error lines, the progress line, Ctrl-C. One for a process.
+/// The user in front of the command: error lines, the progress line, Ctrl-C. One for a process.
 class Terminal {
  public:
   Terminal();
@@ -36,7 +36,7 @@ void wipe_progress_line();
 /// stderr as it was before the newest one, for a program that takes over this process.
 void give_back_stderr();
 
-/// A line for the person, on stderr, after wiping the progress line: what they need while the command runs.
+/// A printed line, on stderr, after wiping the progress line: what they need while the command runs.
 void tell_person(std::string_view line);
 
 /// Where stdin, stdout or stderr is closed, something stands in its place: no file of ours takes its number. Writing to

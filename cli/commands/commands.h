@@ -48,7 +48,7 @@ void add_view(App& app);
 //     run.lap("solve");                                         // seconds by name
 //     run.document.counts = …;  run.document.estimate["camera"]["fx"] = …;  // also for a refusal
 //     run.add_file("camera.yaml", …);                           // written at the end, all or none
-//     run.say("fx 532.8 ± 1.3 px");                             // for a person; not with --json or --quiet
+//     run.say("fx 532.8 ± 1.3 px");                             // for a user; not with --json or --quiet
 //     return run.finish(report.verdict);                        // writes DIR, prints, gives the exit code
 //   }
 //

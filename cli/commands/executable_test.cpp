@@ -5,7 +5,7 @@
 
 #include "alidade/testing/process.h"
 
-// The executable as a person, or a script, meets it.
+// The executable as a user, or a script, meets it.
 
 namespace alidade {
 namespace {

@@ -75,12 +75,12 @@ class GuidePage {
   GuidePage(const GuidePage&) = delete;
   GuidePage& operator=(const GuidePage&) = delete;
 
-  /// Until the work is at its goal or the person ends it.
+  /// Until the work is at its goal or the user ends it.
   void guide();
   void end();
   /// A message for all who look, as JSON; one of each kind is kept for who comes later.
   void tell(const std::string& json, const std::string& kind = "");
-  /// A line for the person.
+  /// A printed line.
   void note(const std::string& line);
   /// The page becomes the report.
   void show_result(ExitCode code);

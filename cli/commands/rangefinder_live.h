@@ -14,7 +14,7 @@ namespace alidade::cli {
 struct GuidedShotsArgs {
   LiveOptions live;
   std::string from, resume;
-  double until_mm = 0.0;  ///< 3σ of the beam's origin; 0: the person ends it.
+  double until_mm = 0.0;  ///< 3σ of the beam's origin; 0: the user ends it.
   ShotConfig where;
 };
 

@@ -48,7 +48,7 @@ RangefinderScene scene_of(const SimulateRangefinderArgs& args, Run& run) {
   return draw_rangefinder_scene(*config, run.options.seed);
 }
 
-/// Photos of the boards with the spot, and shots that name them: what a person brings home.
+/// Photos of the boards with the spot, and shots that name them: what a user brings home.
 void add_photos(const SimulateRangefinderArgs& args, const RangefinderScene& scene, std::vector<Shot>& shots,
                 Run& run) {
   SpotScene spots;

@@ -73,7 +73,7 @@ class _Files:
 
     def __init__(self, folder: str) -> None:
         self.folder = pathlib.Path(folder)
-        self.names: list[tuple[str, str]] = []  # file, what the person called it
+        self.names: list[tuple[str, str]] = []  # file, what the user called it
 
     def _put(self, name: str, ending: str, text: str) -> str:
         file = self.folder / f"{name}{len(self.names)}{ending}"
@@ -155,7 +155,7 @@ def files_for_call() -> abc.Iterator[_Files]:
         files = _Files(folder)
         try:
             yield files
-        except ValueError as error:  # in the person's words
+        except ValueError as error:  # in the user's words
             said = str(error)
             for file, name in files.names:
                 said = said.replace(file, name)

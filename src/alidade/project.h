@@ -25,7 +25,7 @@ struct ProjectConfig {
   std::string own_camera_name = {};          ///< Of its file, for the verdict.
 };
 
-/// The fields of `config` that a person sets: sigma_range_m.
+/// The fields of `config` that a user sets: sigma_range_m.
 [[nodiscard]] FieldList fields_of(ProjectConfig& config);
 
 struct ProjectedReading {

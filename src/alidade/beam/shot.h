@@ -47,7 +47,7 @@ struct Shot {
   std::optional<BoardView> board = {};
   std::optional<BoardPose> pose = {};
   std::optional<Plane> plane = {};
-  std::string name = {};  ///< For a person: a row or a photo.
+  std::string name = {};  ///< For display: a row or a photo.
   /// Photos of the board with the laser on and, where there is one, off; as the table names them. Empty: none.
   std::string photo = {}, photo_off = {};
   std::string no_board = {};  ///< Why the photo gives none, where that is known.

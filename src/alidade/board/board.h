@@ -38,7 +38,7 @@ struct Board {
 /// pattern generator draws.
 [[nodiscard]] double circle_radius_m(const Board& board);
 
-/// Number of points of a board: 4 a tag for an aprilgrid, one a corner or circle otherwise.
+/// Number of points of a board: 4 per tag for an aprilgrid, one per corner or circle otherwise.
 [[nodiscard]] int num_points(const Board& board);
 
 /// The board's points [m], index = number. A printed board is nearly this; `BoardShape` says how nearly.

@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// Where a person holds a board: the fields of a plan's config, which has them as `min_range_m`, `max_range_m` and, by
+/// Where a user holds a board: the fields of a plan's config, which has them as `min_range_m`, `max_range_m` and, by
 /// its own name, the largest tilt.
 [[nodiscard]] FieldList board_reach_fields(double& min_range_m, double& max_range_m, const std::string& tilt_name,
                                            double& max_tilt_deg);

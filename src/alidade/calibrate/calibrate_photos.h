@@ -10,8 +10,8 @@ namespace alidade {
 
 /// The way from photos to a camera: what was found in each, and the calibration.
 struct PhotoCalibration {
-  std::vector<BoardView> views;      ///< One a photo, after the second extraction; no corners where none was found.
-  std::vector<std::string> reasons;  ///< One a photo: why it has no corners; empty where it has.
+  std::vector<BoardView> views;      ///< One per photo, after the second extraction; no corners where none was found.
+  std::vector<std::string> reasons;  ///< One per photo: why it has no corners; empty where it has.
   ImageSize size;                    ///< That most photos have; 0×0 where none could be read.
   std::size_t num_unreadable = 0;
   CalibrateReport report;  ///< Of `views`.

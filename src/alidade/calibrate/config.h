@@ -57,7 +57,7 @@ struct CalibrateConfig {
 /// The words of the shapes that can be asked for by name.
 [[nodiscard]] const WordList<BoardShape>& shape_words();
 
-/// The fields of `config` that a person sets: model, fix, free, prior, gap_m, glass_m, n_glass, n_water, board_shape
+/// The fields of `config` that a user sets: model, fix, free, prior, gap_m, glass_m, n_glass, n_water, board_shape
 /// and outliers. Lens in air and board points are values that come from files.
 [[nodiscard]] FieldList fields_of(CalibrateConfig& config);
 

@@ -38,7 +38,7 @@ std::optional<Rigid3> place(const Camera& camera, const std::vector<Eigen::Vecto
 
 std::vector<Candidate> all_candidates(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
                                       const std::vector<int>& free) {
-  constexpr double tilt = 0.55;  // 32°: what a person holds easily
+  constexpr double tilt = 0.55;  // 32°: what a user holds easily
   const std::vector<Eigen::Vector3d> tilts = {{0, 0, 0}, {tilt, 0, 0}, {-tilt, 0, 0}, {0, tilt, 0}, {0, -tilt, 0}};
   std::vector<Candidate> found;
   for (const double fill : {0.3, 0.55}) {

@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// What a person asked for, as calibrate() takes it: skew is fixed unless it is freed, and what is known of a port
+/// What a user asked for, as calibrate() takes it: skew is fixed unless it is freed, and what is known of a port
 /// stands beside what is fixed.
 [[nodiscard]] CalibrateConfig resolved(CalibrateConfig config);
 
@@ -30,7 +30,7 @@ namespace alidade {
 [[nodiscard]] std::vector<double> shape_sigma_z(const BundleProblem& problem, const Eigen::MatrixXd& cov,
                                                 double variance_scale);
 
-/// The parameters that carry a direction of the globals, for a person: "fx, fy and the distances of the boards".
+/// The parameters that carry a direction of the globals, for a user: "fx, fy and the distances of the boards".
 [[nodiscard]] std::string name_combination(const BundleProblem& problem, const Lens& lens,
                                            const Eigen::VectorXd& direction);
 

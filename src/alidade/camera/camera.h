@@ -33,7 +33,7 @@ struct Camera {
   /// Covariance of all parameters of the lens in their order (a fixed parameter has zero rows); 0×0 where unknown.
   Eigen::MatrixXd cov;
   double rms_px = 0.0;  ///< Per point, of the calibration that made it; 0 where unknown.
-  std::string source;   ///< Where it came from, for a person.
+  std::string source;   ///< Where it came from, for a user.
 };
 
 [[nodiscard]] std::string_view model_name(const Lens& lens);

@@ -26,7 +26,7 @@ struct PortRange {
 struct PortResidual {
   Camera brown;               ///< As a calibration in water would find it.
   Eigen::Vector3d shift_m;    ///< Where its viewpoint stands in the camera frame: belongs into the extrinsics.
-  std::vector<PortRange> at;  ///< One a test range.
+  std::vector<PortRange> at;  ///< One per test range.
   double worst_rms_px = 0.0;  ///< Over the test ranges from 0.5 m on.
   bool brown_is_enough = false;
 };

@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// What the target looks like, as a person says it: "colour:230,70,20", "bright", "dark", "pattern:FILE",
+/// What the target looks like, as a user says it: "colour:230,70,20", "bright", "dark", "pattern:FILE",
 /// "marker:DICTIONARY:ID".
 struct NamedLook {
   TargetLook look = {};

@@ -13,7 +13,7 @@ struct InteractingModels {
   ConstantVelocity quiet{0.15};
   Singer agile;
   Ballistic falling{0.15};
-  /// Rates of the changes, one a second. Between quiet and agile alone they change 0.03 and 0.06 of the time in 0.05 s.
+  /// Rates of the changes, per second. Between quiet and agile alone they change 0.03 and 0.06 of the time in 0.05 s.
   double to_agile_per_s = 0.62874, to_quiet_per_s = 1.25747, to_falling_per_s = 0.1, from_falling_per_s = 0.4;
 
   /// Π over any time, of quiet, agile, falling: the exponential of the rates.

@@ -11,7 +11,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The person pressed Ctrl-C; the door turns it into one line and its exit code, nothing is written.
+/// The user pressed Ctrl-C; the command line turns it into one line and its exit code, nothing is written.
 struct Interrupted : std::runtime_error {
   Interrupted() : std::runtime_error("interrupted; nothing written") {}
   /// Of work that leaves what it has done.

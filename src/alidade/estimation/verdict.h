@@ -44,7 +44,7 @@ struct Assumption {
   double moves = 0.0;           ///< Largest move of a result for that error, in that result's stated σ.
   std::string moved = {};       ///< Which result that is: "fx", "origin_m z".
   double moved_by = 0.0;        ///< By how much, in its unit.
-  std::string remedy = {};      ///< What a person can do to have it counted: "give --sigma-square".
+  std::string remedy = {};      ///< What a user can do to have it counted: "give --sigma-square".
 };
 
 /// What an estimator says of its own answer: a state, one sentence, what to add, and the checks behind it.
@@ -52,7 +52,7 @@ struct Verdict {
   State state = State::good;
   ExitCode exit_code = ExitCode::ok;
   std::string sentence;
-  std::string to_add;  ///< What the person should do next; empty if nothing.
+  std::string to_add;  ///< What the user should do next; empty if nothing.
   std::vector<Check> checks;
 
   /// Whether there is an answer that stands: good, or with what to take care of.

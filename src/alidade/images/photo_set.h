@@ -28,7 +28,7 @@ class PhotoSet {
   [[nodiscard]] std::vector<InputFile> inputs() const;
   /// What lay beside the photos and was none.
   [[nodiscard]] const std::vector<SkippedInput>& skipped() const;
-  /// The same in a line for a person; "" for none.
+  /// The same in a line for a user; "" for none.
   [[nodiscard]] std::string skipped_line() const;
   /// Names the photos that a viewer would turn otherwise than most of them, and says that they were not turned. None
   /// where all stand alike.

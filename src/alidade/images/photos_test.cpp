@@ -103,7 +103,7 @@ TEST(ListPhotos, FilesStandAsGiven) {
   write_file(folder.path() / "a.jpg", "x");
   const auto files = list_photos({folder.path() / "b.dat", folder.path() / "a.jpg"});
   ASSERT_EQ(files.size(), 2u);
-  EXPECT_EQ(files[0].filename(), "b.dat");  // whatever its ending: the person named it
+  EXPECT_EQ(files[0].filename(), "b.dat");  // whatever its ending: the user named it
 }
 
 TEST(FindPhotos, WhatElseLiesInAFolderIsNamedWithWhatToDo) {

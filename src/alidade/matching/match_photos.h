@@ -13,7 +13,7 @@ namespace alidade {
 /// What photos show alike, and why some show nothing.
 struct PhotoMatches {
   MatchedPhotos photos;              ///< One entry a photo; of the size that most photos have.
-  std::vector<std::string> reasons;  ///< One a photo: why it has no features; empty where it has.
+  std::vector<std::string> reasons;  ///< One per photo: why it has no features; empty where it has.
   std::size_t num_unreadable = 0;
 };
 

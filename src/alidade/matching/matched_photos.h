@@ -22,7 +22,7 @@ struct MatchedPair {
 /// Points of photos of one size, and which of them are taken for the same. Any number of the matches may be wrong.
 struct MatchedPhotos {
   int width_px = 0, height_px = 0;                     ///< Of all photos that have features.
-  std::vector<std::string> names;                      ///< One a photo.
+  std::vector<std::string> names;                      ///< One per photo.
   std::vector<std::vector<Eigen::Vector2d>> features;  ///< [px]
   std::vector<MatchedPair> pairs;                      ///< Each pair of photos once, a before b.
 };

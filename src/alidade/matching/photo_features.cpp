@@ -26,7 +26,7 @@ cv::Mat small_grey(const cv::Mat& photo, double max_megapixels, double& shrunk) 
   return grey;
 }
 
-/// The strongest of each cell, one a place.
+/// The strongest of each cell, one per position.
 std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> found, const cv::Size& size, int most) {
   constexpr int columns = 8, rows = 6;
   std::stable_sort(found.begin(), found.end(),

@@ -32,7 +32,7 @@ struct RotationRow {
   Eigen::Quaterniond base_from_cam{0.0, 0.0, 0.0, 0.0};                     ///< Source `attitude`.
   Eigen::Vector3d velocity_m_per_s = Eigen::Vector3d::Zero();  ///< Of the camera centre, in the camera frame.
   double range_m = not_seen;                                   ///< From the camera centre to point `range_point`.
-  std::vector<Eigen::Vector2d> px;                             ///< One a point; NaN where it was not seen.
+  std::vector<Eigen::Vector2d> px;                             ///< One per point; NaN where it was not seen.
 };
 
 [[nodiscard]] inline bool is_seen(const Eigen::Vector2d& px) { return std::isfinite(px.x()) && std::isfinite(px.y()); }
@@ -50,7 +50,7 @@ struct RotationLog {
   std::optional<double> sigma_scale = {};  ///< Of the measured angles or rates, as a share; 0: exact; none: not given.
   std::optional<double> sigma_parallax = {};  ///< Camera centre off the axes along the view over the points' distance.
   std::vector<RotationRow> rows = {};
-  std::vector<TrueIntrinsics> truth = {};  ///< One a row, or none.
+  std::vector<TrueIntrinsics> truth = {};  ///< One per row, or none.
 };
 
 ALIDADE_PUBLIC_END

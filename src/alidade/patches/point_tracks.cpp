@@ -204,7 +204,7 @@ class PointTracker::Impl {
     last_free_ = std::count(is_taken.begin(), is_taken.end(), 0);
   }
 
-  /// One a free cell, by cells.
+  /// One per free cell, by cells.
   [[nodiscard]] static std::vector<Eigen::Vector2i> best_corners(const cv::Mat& smoothed, const Grid& grid,
                                                                  const std::vector<char>& is_taken) {
     constexpr int block_px = 7, margin = AnchorPatch::margin_px;

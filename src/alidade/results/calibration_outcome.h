@@ -9,7 +9,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of a calibration, its lines for a person, and camera.yaml, corners.csv, poses.csv and board_points.csv
+/// The document of a calibration, its printed lines, and camera.yaml, corners.csv, poses.csv and board_points.csv
 /// where there is a camera.
 [[nodiscard]] JobOutcome outcome_of(const Calibration& calibration);
 

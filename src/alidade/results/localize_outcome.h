@@ -9,7 +9,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of a path, its lines for a person, and where there is an estimate trajectory.tum, poses.csv, map.csv,
+/// The document of a path, its printed lines, and where there is an estimate trajectory.tum, poses.csv, map.csv,
 /// map.ply, map.yaml and, of a lens that was estimated, camera.yaml.
 [[nodiscard]] JobOutcome outcome_of(const Localization& localization);
 

@@ -18,7 +18,7 @@ struct NamedBytes {
 /// Everything that a job produces: what a command shows and writes, and what a program saves.
 struct JobOutcome {
   ResultDocument document;         ///< Of it counts, assumed, verdict, estimate … grids; the rest is the run's.
-  std::vector<std::string> lines;  ///< For a person, before the verdict.
+  std::vector<std::string> lines;  ///< For display, before the verdict.
   std::vector<NamedBytes> files;
   std::vector<NamedBytes> images;  ///< The most wanted first.
 };

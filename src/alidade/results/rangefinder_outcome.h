@@ -9,7 +9,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of a rangefinder, its lines for a person, and rangefinder.yaml and camera.yaml where there is a beam.
+/// The document of a rangefinder, its printed lines, and rangefinder.yaml and camera.yaml where there is a beam.
 /// `camera_file`: what the camera was read from, to be named in that file.
 [[nodiscard]] JobOutcome outcome_of(const RangefinderCalibration& calibration, const std::string& camera_file = "");
 

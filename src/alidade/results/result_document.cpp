@@ -132,7 +132,7 @@ JsonValue grid_value(const DataGrid& grid) {
   return value;
 }
 
-/// Members one a line, so that a person finds things and a diff is readable; each member in one line, so that it is
+/// Members one per line, so that a user finds things and a diff is readable; each member in one line, so that it is
 /// small.
 std::string lines_of(JsonValue& value) {
   std::string text = "{\n";

@@ -7,7 +7,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of a rig, its lines for a person, and rig.yaml with a camera_ID.yaml for each head where there is a
+/// The document of a rig, its printed lines, and rig.yaml with a camera_ID.yaml for each head where there is a
 /// rig.
 [[nodiscard]] JobOutcome outcome_of(const RigCalibration& calibration);
 

@@ -10,7 +10,7 @@ namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
 /// The document of a servo study (the tables `control`, `steps`, `measurements`, `trials`, `loops` and `lenses`, the
-/// grid `robustness`), its lines for a person, and servo.csv where anything ran.
+/// grid `robustness`), its printed lines, and servo.csv where anything ran.
 [[nodiscard]] JobOutcome outcome_of(const ServoResult& result);
 
 /// One row of `control`.

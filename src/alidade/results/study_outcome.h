@@ -13,7 +13,7 @@ namespace alidade {
 /// Text of study.json: what depends on the study alone, and on no host, time, thread, rank or shard.
 [[nodiscard]] std::string study_text(const StudyHeader& header, std::span<const StudyTally> points);
 
-/// The document of a study, its lines for a person, and study.json where all of its trials are there (`is_whole`; else
+/// The document of a study, its printed lines, and study.json where all of its trials are there (`is_whole`; else
 /// the shard that they are).
 [[nodiscard]] JobOutcome outcome_of(const StudyHeader& header, std::span<const StudyTally> points,
                                     const Shard& shard = {});

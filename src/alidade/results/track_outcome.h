@@ -8,7 +8,7 @@ namespace alidade {
 struct TargetFrame;
 ALIDADE_PUBLIC_BEGIN
 
-/// The document of a track, its lines for a person, and track.csv and smoothed.csv where there is one.
+/// The document of a track, its printed lines, and track.csv and smoothed.csv where there is one.
 [[nodiscard]] JobOutcome outcome_of(const TargetTrack& track);
 
 ALIDADE_PUBLIC_END

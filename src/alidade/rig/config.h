@@ -33,7 +33,7 @@ struct RigConfig {
   bool reject_outliers = true;
 };
 
-/// The fields of `config` that a person sets: sigma_px, sigma_angle_rad, sigma_square_m, sigma_scale,
+/// The fields of `config` that a user sets: sigma_px, sigma_angle_rad, sigma_square_m, sigma_scale,
 /// sigma_within_turn_rad, estimate, scales,
 /// outliers. The board has fields of its own.
 [[nodiscard]] FieldList fields_of(RigConfig& config);

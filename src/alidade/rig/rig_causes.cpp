@@ -21,7 +21,7 @@ constexpr Index tested_a_head = 15;
 struct Tested {
   std::string name, unit;
   std::vector<Index> places;
-  std::vector<std::string> names = {};  ///< One a place, where each has one.
+  std::vector<std::string> names = {};  ///< One per place, where each has one.
   double worst = 1.0;  ///< σ of its size beyond which the views do not determine it: 5σ would be implausible.
 };
 

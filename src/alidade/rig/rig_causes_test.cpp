@@ -78,7 +78,7 @@ TEST(RigByNeed, EstimatesTheEncodersScaleAndSaysSo) {
     EXPECT_NEAR(scale->value, 1.01, 4.0 * scale->sigma);
     EXPECT_LT(scale->sigma, 0.01);
     EXPECT_LT(trial.worst_sigmas, 5.0);
-    EXPECT_EQ(trial.verdict.state, State::care);  // the person took it for exact
+    EXPECT_EQ(trial.verdict.state, State::care);  // the user took it for exact
     EXPECT_TRUE(std::ranges::any_of(trial.verdict.checks, [](const Check& check) {
       return check.name == "estimated" && check.text.find("head1.pan_scale") != std::string::npos;
     }));

@@ -13,9 +13,9 @@ constexpr double ordinary_scale = 0.005, ordinary_square = 0.002, ordinary_f = 0
 
 /// What is given, and how the free parameters follow it.
 struct Follows {
-  std::vector<Eigen::MatrixXd> lens;  ///< One a head.
+  std::vector<Eigen::MatrixXd> lens;  ///< One per head.
   Eigen::VectorXd square;
-  std::vector<Eigen::Matrix<double, Eigen::Dynamic, 2>> scales;  ///< One a head.
+  std::vector<Eigen::Matrix<double, Eigen::Dynamic, 2>> scales;  ///< One per head.
 };
 
 Follows follows_of(const RigProblem& problem, const SolvedRig& solved, const Eigen::MatrixXd& cov,

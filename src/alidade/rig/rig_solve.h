@@ -45,7 +45,7 @@ struct RigProblem {
 struct RigState {
   std::vector<RigHead> heads;
   std::vector<Rigid3> world_from_board;
-  std::vector<Eigen::Vector2d> corrections_rad;    ///< One a view: to be added to its reading.
+  std::vector<Eigen::Vector2d> corrections_rad;    ///< One per view: to be added to its reading.
   std::vector<Eigen::Vector2d> backlash_rad = {};  ///< Pan, tilt of each head; empty: none.
 };
 /// What the encoders of a view would read if they were exact.

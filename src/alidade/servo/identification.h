@@ -103,7 +103,7 @@ struct IdentifyConfig {
   ServoKindRule kind = ServoKindRule::automatic;
 };
 
-/// The fields of `config` that a person sets.
+/// The fields of `config` that a user sets.
 [[nodiscard]] FieldList fields_of(IdentifyConfig& config);
 
 /// Everything that identify() has to say: the plant of one axis with its covariance (`fit`), and what it is worth.

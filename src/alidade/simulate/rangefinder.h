@@ -18,7 +18,7 @@ struct RangefinderScene {
   Camera camera;
   Board board;
   Beam beam;                           ///< beam.noise: what the readings will have.
-  std::vector<Rigid3> cam_from_board;  ///< One a shot.
+  std::vector<Rigid3> cam_from_board;  ///< One per shot.
   std::vector<double> range_m;         ///< True reading of each shot.
 };
 
@@ -56,7 +56,7 @@ struct SimulatedShots {
 };
 [[nodiscard]] SimulatedShots simulate_shots(const RangefinderScene& scene, const ShotNoise& noise, std::uint64_t seed);
 
-/// What a person got wrong, or did not know, about such a log.
+/// What a user got wrong, or did not know, about such a log.
 struct ShotMistake {
   double focal = 0.0;        ///< Share by which the camera file's focal length is too long.
   double centre_px = 0.0;    ///< By which its centre lies aside, in u and in v.

@@ -54,7 +54,7 @@ struct SimulatedViews {
 };
 [[nodiscard]] SimulatedViews simulate_head_views(const RigScene& scene, const RigNoise& noise, std::uint64_t seed);
 
-/// What a person got wrong, or did not know, about such a world.
+/// What a user got wrong, or did not know, about such a world.
 struct RigMistake {
   double focal = 0.0;        ///< Share by which the camera files' focal lengths are too long.
   double centre_px = 0.0;    ///< By which their centres lie aside, in u and in v.

@@ -41,10 +41,10 @@ struct TrackScene {
   std::vector<RigHead> heads;
   std::function<Eigen::Vector3d(double t_s)> position;  ///< In the world. [m]
   double duration_s = 10.0;
-  std::vector<double> rate_hz;         ///< One a head: images.
-  std::vector<double> phase_s;         ///< One a head: when its first image is taken.
+  std::vector<double> rate_hz;         ///< One per head: images.
+  std::vector<double> phase_s;         ///< One per head: when its first image is taken.
   double latency_s = 0.0;              ///< Capture to arrival.
-  std::vector<double> more_latency_s;  ///< One a head, added; empty: none.
+  std::vector<double> more_latency_s;  ///< One per head, added; empty: none.
   double aiming_lag_s = 0.34;          ///< Time constant of the heads. 0: they always point at the target.
   double sigma_px = 0.5, sigma_encoder_rad = 0.0008726646259971648;
   double sigma_a_m_s2 = 1.0;  ///< What a filter should be given for the target.

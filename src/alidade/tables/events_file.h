@@ -44,7 +44,7 @@ struct EventsOptions {
 [[nodiscard]] std::string true_track_csv(const TrueTrack& truth);
 
 /// Text of track.csv: `t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,sigma_x_m,sigma_y_m,sigma_z_m,nis,event`, a row per
-/// observation; `ahead` (one an observation, or none) adds rows with the event `predicted`.
+/// observation; `ahead` (one per observation, or none) adds rows with the event `predicted`.
 [[nodiscard]] std::string track_csv(std::span<const TrackStep> steps, std::span<const PredictedStep> ahead = {});
 
 /// Text of smoothed.csv: `t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,sigma_x_m,sigma_y_m,sigma_z_m`.

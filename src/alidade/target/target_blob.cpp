@@ -160,7 +160,7 @@ TargetDetection find_target_blob(const cv::Mat& frame, const TargetLook& look,
   const double noise = noise_of(signal);
   double peak = 0.0;
   cv::minMaxLoc(smoothed, nullptr, &peak);
-  constexpr double min_contrast = 12.0;  // of 255: less is not a target that a person sees
+  constexpr double min_contrast = 12.0;  // of 255: less is not a target that a user sees
   if (peak < std::max(look.min_snr * noise, min_contrast)) return lost_target("not in the image");
   const std::vector<Blob> blobs = blobs_of(smoothed, 0.5 * peak, max_radius_px);
   if (blobs.empty()) return lost_target("what has its look is too large");

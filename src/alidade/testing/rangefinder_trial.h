@@ -7,7 +7,7 @@
 #include "alidade/rangefinder/rangefinder.h"
 #include "alidade/testing/rangefinder_sample.h"
 
-// One calibration of a simulated rangefinder that is not as its person believes: what the verdict says, and how far off
+// One calibration of a simulated rangefinder that is not as its user believes: what the verdict says, and how far off
 // it is.
 
 namespace alidade::testing {
@@ -20,7 +20,7 @@ struct RangefinderTrialSetup {
   ShotMistake mistake = {};
   RangefinderMethod method = RangefinderMethod::joint;
   int num_shots = 18;
-  bool tells_lengths = false;  ///< The person takes the readings' scale and the squares for exact.
+  bool tells_lengths = false;  ///< The user takes the readings' scale and the squares for exact.
   bool has_boards = true;      ///< Else spots alone are left.
   bool is_mirrored = false;    ///< The images are, left to right.
 };

@@ -8,7 +8,7 @@
 #include "alidade/simulate/rangefinder.h"
 #include "alidade/simulate/rig.h"
 
-// One calibration of a simulated rig that is not as its person believes: what the verdict says, and how far off it is.
+// One calibration of a simulated rig that is not as its user believes: what the verdict says, and how far off it is.
 
 namespace alidade::testing {
 
@@ -17,7 +17,7 @@ struct RigTrialSetup {
   RigNoise noise = {};
   RigMistake mistake = {};
   bool by_need = true;
-  bool tells_scale = true;    ///< The person takes the encoders' scales for exact.
+  bool tells_scale = true;    ///< The user takes the encoders' scales for exact.
   double sigma_scale = 1e-9;  ///< Or known to so much.
   double sigma_lens_px =
       0.0;  ///< That the files state of focal lengths and centres, which are exact but for the mistake.

@@ -30,7 +30,7 @@ struct TrackConfig {
   int keep_rows = 100000;  ///< Of a TargetTracker's observations: at least so many are kept, at most twice.
 };
 
-/// The fields of `config` that a person sets: all of them.
+/// The fields of `config` that a user sets: all of them.
 [[nodiscard]] FieldList fields_of(TrackConfig& config);
 
 /// Throws ConfigError with every fault of a config.

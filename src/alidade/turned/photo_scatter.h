@@ -10,7 +10,7 @@ struct ScatterCovariance {
   TurnedInformation cov, cov_model;
   double design_effect = 1.0;  ///< Of photos: the scatter over what the model expects of it.
   double degrees_of_freedom = 0.0;
-  std::vector<double> z2;  ///< One a photo: |δ|² over what the model expects of it, in V's units.
+  std::vector<double> z2;  ///< One per photo: |δ|² over what the model expects of it, in V's units.
 };
 
 /// The change from omitting each photo, δ_k (one step from the optimum), relative to its expectation by the model,

@@ -38,7 +38,7 @@ struct TurnedReport {
   std::vector<RotatedPhoto> photos;
   TurnedBundle bundle;  ///< Normalised; its photos are `bundle_photo`.
   std::vector<int> bundle_photo;
-  std::vector<Eigen::Vector2d> residuals;  ///< Normalised, one an observation.
+  std::vector<Eigen::Vector2d> residuals;  ///< Normalised, one per observation.
   Eigen::Matrix<double, 6, 1> camera;      ///< fx, fy, cx, cy [px], k1, k2.
   Eigen::Matrix<double, 6, 6> cov, cov_model;
   int lens_terms = 0;  ///< That are estimated; what the others might be is counted in `cov`.

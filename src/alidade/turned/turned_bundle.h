@@ -19,7 +19,7 @@ struct TurnedBundle {
   std::vector<Eigen::Matrix3d>
       cam_from_world;                 ///< One per photo. The first photo's is fixed: the world is free to rotate.
   std::vector<double> log_zoom;       ///< One per photo, the first one's is fixed.
-  std::vector<Eigen::Vector3d> rays;  ///< One a track, unit length, in the world.
+  std::vector<Eigen::Vector3d> rays;  ///< One per track, unit length, in the world.
   std::vector<TurnedDetection> observations;
 };
 
@@ -59,7 +59,7 @@ struct TurnedSolution {
   int iterations = 0;
   double cost = 0.0;  ///< Huber's, prior included, σ as given.
   std::vector<Eigen::Vector2d>
-      residuals;  ///< Prediction minus pixel, one an observation, normalised; NaN where there is none.
+      residuals;  ///< Prediction minus pixel, one per observation, normalised; NaN where there is none.
 };
 
 /// Levenberg–Marquardt on camera, turns (and zooms) and rays, in place; rays are eliminated track by track. Throws

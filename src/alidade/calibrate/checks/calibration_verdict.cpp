@@ -29,7 +29,7 @@ State grade(double value, double care, double bad) {
   return value <= care ? State::good : State::care;
 }
 
-/// Where in the image a pixel lies, for a person.
+/// Where in the image a pixel lies, for a user.
 std::string place(const Eigen::Vector2d& px, const Camera& camera) {
   const double x = px.x() / camera.width_px, y = px.y() / camera.height_px;
   const std::string row = y < 1.0 / 3 ? "top" : y > 2.0 / 3 ? "bottom" : "";

@@ -22,7 +22,7 @@ struct Reduced {
   bool ok = true;
 };
 
-/// Adds −YᵀY for stacked rows Y (6 a view): in batches, as one large product is faster than many small ones.
+/// Adds −YᵀY for stacked rows Y (6 per view): in batches, as one large product is faster than many small ones.
 void subtract_outer(const Eigen::MatrixXd& Y, Eigen::MatrixXd& S) {
   S.selfadjointView<Eigen::Lower>().rankUpdate(Y.transpose(), -1.0);
 }

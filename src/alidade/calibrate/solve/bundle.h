@@ -25,7 +25,7 @@ struct BundleState {
 struct BundleProblem {
   std::span<const ViewArrays> views;
   std::vector<int> free_lens;         ///< Positions of the estimated lens parameters.
-  Eigen::VectorXd prior_value;        ///< One a lens parameter.
+  Eigen::VectorXd prior_value;        ///< One per lens parameter.
   Eigen::VectorXd prior_information;  ///< 1/σ²; 0 where there is no prior.
   BoardShape shape = BoardShape::flat;
   std::vector<Eigen::Vector3d> printed_points;  ///< The board as printed: gauge and start of its shape. [m]
@@ -52,7 +52,7 @@ struct BundleResult {
   std::shared_ptr<const NormalEquations> equations;  ///< Where the last step began.
   // From here on: by with_covariance().
   Eigen::MatrixXd cov;                                ///< Inverse of the reduced normal matrix.
-  std::vector<Eigen::Matrix<double, 6, 6>> pose_cov;  ///< One a view, if asked for.
+  std::vector<Eigen::Matrix<double, 6, 6>> pose_cov;  ///< One per view, if asked for.
   /// Where the reduced matrix, scaled to unit diagonal, is (nearly) singular: the eigenvector of its smallest
   /// eigenvalue, which is what the views leave free.
   Eigen::VectorXd weakest;

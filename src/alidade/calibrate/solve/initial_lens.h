@@ -13,7 +13,7 @@ namespace alidade {
 /// A lens to start from, with the poses that were refined together with it.
 struct InitialLens {
   Lens lens;
-  std::vector<std::optional<Rigid3>> cam_from_board;  ///< One a view; none where the corners do not fit.
+  std::vector<std::optional<Rigid3>> cam_from_board;  ///< One per view; none where the corners do not fit.
 };
 
 /// First lens for the bundle adjustment, without any guess from the user: Zhang's closed form, else one focal length

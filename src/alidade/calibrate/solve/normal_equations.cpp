@@ -150,7 +150,7 @@ bool linearize(const BundleProblem& problem, const BundleState& state, NormalEqu
   if (problem.passes_fold) lens.max_radius2 = std::numeric_limits<double>::infinity();
   const PointArrays points = make_arrays(state.board_points);
   const BowBasis basis = bow ? bow_basis(problem.printed_points) : BowBasis{};
-  thread_local Scratch s;  // one a thread: kept between calls, so that the inner loop allocates nothing
+  thread_local Scratch s;  // one per thread: kept between calls, so that the inner loop allocates nothing
   for (std::size_t k = 0; k < num_views; ++k) {
     const ViewArrays& view = problem.views[k];
     if (!fill_columns(lens, state.cam_from_board[k], points, view, s.columns)) return false;

@@ -19,7 +19,7 @@ struct BoardScene {
   Camera camera;
   Board board;
   std::vector<Eigen::Vector3d> points_in_board;  ///< True points [m]: flat, bowed, or free.
-  std::vector<Rigid3> cam_from_board;            ///< One a photo.
+  std::vector<Rigid3> cam_from_board;            ///< One per photo.
 };
 
 struct BoardSceneConfig {

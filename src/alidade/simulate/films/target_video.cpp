@@ -19,7 +19,7 @@ double clouds(const Eigen::Vector3d& direction_in_world) {
   return 110.0 + 50.0 / 3.0 * waves;
 }
 
-/// Coloured patches: of each colour eight waves of 40 to 160 a radian in directions of their own, σ 1 together.
+/// Coloured patches: of each colour eight waves of 40 to 160 per radian in directions of their own, σ 1 together.
 class Patches {
  public:
   Patches() {

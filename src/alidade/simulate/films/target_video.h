@@ -26,7 +26,7 @@ struct TargetVideoConfig {
 };
 
 /// What the head's camera sees, 8-bit BGR: soft grey clouds that stand still far away, and the target's centre at that
-/// place of the world, none where it is hidden. Rays through the lens, 3 × 3 a pixel. `seed` draws the noise.
+/// place of the world, none where it is hidden. Rays through the lens, 3 × 3 per pixel. `seed` draws the noise.
 [[nodiscard]] cv::Mat render_target_frame(const RigHead& rig_head, const Eigen::Vector2d& pan_tilt_rad,
                                           const std::optional<Eigen::Vector3d>& target_in_world,
                                           const FilmedTarget& target, const TargetVideoConfig& config,

@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-/// What of a track's input a person gave, rather than a file or the data.
+/// What of a track's input a user gave, rather than a file or the data.
 struct TrackGiven {
   bool sigma_px = false, sigma_a = false;
   double sigma_clock_s = 0.0;  ///< 0: not given.

@@ -173,7 +173,7 @@ void add_common_options(CLI::App& app, const CommandSpec& spec, CommonOptions& o
       ->group(group);
 }
 
-/// Finds out before the work, not after it, that there is no place for results; leaves nothing there.
+/// Finds out before the work, not after it, that the results cannot be written; leaves nothing there.
 void require_place(const CommonOptions& options) {
   if (!options.leaves_results) return;
   try {

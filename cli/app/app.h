@@ -78,7 +78,7 @@ class App {
   std::unique_ptr<State> state_;
 };
 
-/// Parses, runs the chosen command, and is the one place that turns what is thrown into a line and an exit code.
+/// Parses, runs the chosen command, and is the only place that turns exceptions into a line and an exit code.
 [[nodiscard]] int run_cli(int argc, const char* const* argv, void (*add_commands)(App&));
 
 }  // namespace alidade::cli

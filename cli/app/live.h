@@ -20,7 +20,7 @@ namespace alidade::cli {
 struct LiveOptions {
   bool is_on = false;
   std::string port, address;
-  double pace = 0.0;  ///< Times as fast as it was recorded; 0: as fast as it can.
+  double pace = 0.0;  ///< Times as fast as it was recorded; 0: as fast as possible.
 };
 void add_live_options(CLI::App& command, LiveOptions& options, bool has_pace = true);
 

@@ -36,7 +36,7 @@ class UnderwaterDome : public testing::CommandTest {
   std::filesystem::path folder_of_photos_;
 };
 
-/// Distance of the camera's places by two cameras, over the distance of the board: median over the views.
+/// Distance of the camera's positions by two cameras, over the distance of the board: median over the views.
 double difference(const Camera& camera, const Camera& other, const std::vector<BoardView>& views) {
   const std::vector<Eigen::Vector3d> points = points_in_board(board);
   std::vector<double> shares;

@@ -28,7 +28,7 @@ std::string text_of(const Message& message) {
   return {natsMsg_GetData(message.get()), static_cast<std::size_t>(natsMsg_GetDataLength(message.get()))};
 }
 
-/// Follows one stream from its beginning, and begins again at the place it was where the broker was away.
+/// Follows one stream from its beginning, and resumes at its position after the broker was away.
 class Follower {
  public:
   Follower(Broker& broker, std::string stream, std::string subject)

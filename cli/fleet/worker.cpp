@@ -31,7 +31,7 @@ struct Held {
   FleetCamera camera;
   std::uint64_t state_sequence = 0;  ///< Of its state in the stream; 0: none.
   bool is_dirty = false;
-  std::map<std::int64_t, std::pair<FleetRow, std::uint64_t>> early;  ///< By n, with their place in the stream.
+  std::map<std::int64_t, std::pair<FleetRow, std::uint64_t>> early;  ///< By n, with their position in the stream.
 };
 
 /// Reads the whole stream of observations and takes up the cameras of its parts. What it has in memory it could have
@@ -75,7 +75,7 @@ class Worker {
     if (!run_.options.quiet) cli::tell_person(line);
   }
 
-  /// States of its cameras, and the place from which observations are to be read. False: not now.
+  /// States of its cameras, and the position from which observations are to be read. False: not now.
   bool begin() {
     is_reading_ = false;
     observations_.reset();

@@ -82,8 +82,8 @@ Rigid3 mirrored(const Rigid3& cam_from_board, const Eigen::Vector3d& middle_in_b
   return {rotation, middle_in_cam - rotation * middle_in_board};
 }
 
-/// The board square to the line of observation, in the same place and as far turned about it: where a small board's
-/// tilt is lost in noise, a homography can have any.
+/// The board perpendicular to the viewing ray, in the same position and with the same rotation about it: where a small
+/// board's tilt is lost in noise, a homography can have any.
 Rigid3 squared_up(const Rigid3& cam_from_board, const Eigen::Vector3d& middle_in_board) {
   const Eigen::Vector3d middle_in_cam = cam_from_board * middle_in_board;
   const Eigen::Quaterniond turn =

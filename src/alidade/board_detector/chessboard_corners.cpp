@@ -27,7 +27,8 @@ CornerStart start_at(const GridCorner& corner, double blur_px) {
   return {.px = corner.px, .along_cols = corner.step_i, .along_rows = corner.step_j, .blur_px = blur_px};
 }
 
-/// Steps from the corners' own places: half the way from the neighbour before to the one behind, where both are known.
+/// Steps from the corners' own positions: half the way from the neighbour before to the one behind, where both are
+/// known.
 GridCorner with_local_steps(const CornerGrid& grid, const GridCell& cell, GridCorner corner) {
   const auto step = [&](int di, int dj, const Eigen::Vector2d& otherwise) -> Eigen::Vector2d {
     const GridCorner* before = grid.at(cell.first - di, cell.second - dj);
@@ -88,7 +89,7 @@ class ChessboardFitter {
     corners.push_back({cell, fit});
   }
 
-  /// Corners at the places that the neighbours predict, until no more are found.
+  /// Corners at the positions that the neighbours predict, until no more are found.
   void look_for_missing(std::vector<FittedCorner>& corners) {
     grid_.corners.clear();
     for (const FittedCorner& corner : corners) grid_.corners[corner.cell].px = corner.fit.px;
@@ -108,7 +109,7 @@ class ChessboardFitter {
     }
   }
 
-  /// Fits again where the neighbours' places show that the lens bends the edges.
+  /// Fits again where the neighbours' positions show that the lens curves the edges.
   void refit_bent(std::vector<FittedCorner>& corners) {
     grid_.corners.clear();
     for (const FittedCorner& corner : corners) grid_.corners[corner.cell].px = corner.fit.px;

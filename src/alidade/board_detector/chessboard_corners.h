@@ -7,7 +7,7 @@
 namespace alidade {
 
 /// Fits every corner of a coarsely found chessboard below the pixel, and looks for those that the coarse search missed
-/// at their predicted places. `photo` is one channel of 32-bit float, 0 to 255.
+/// at their predicted positions. `photo` is one channel of 32-bit float, 0 to 255.
 [[nodiscard]] BoardDetection fit_chessboard(const cv::Mat& photo, const Board& board, const Chessboard& coarse);
 
 /// Fits the corners of `first` again, each started from where the lens and the pose put it, with the edges bent as the

@@ -22,7 +22,7 @@ constexpr std::size_t max_seeds = 2000;                    // the strongest: bou
 constexpr std::size_t min_corners_of_grid = 6;
 constexpr std::array<GridCell, 4> sides{{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
 
-/// Saddle points by place: the points of square bucket k are order_[first_[k]] … order_[first_[k + 1] - 1].
+/// Saddle points by position: the points of square bucket k are order_[first_[k]] … order_[first_[k + 1] - 1].
 class PointIndex {
  public:
   explicit PointIndex(std::span<const SaddlePoint> points) : points_(points) {

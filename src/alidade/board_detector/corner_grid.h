@@ -15,7 +15,7 @@ class Mat;
 
 namespace alidade {
 
-/// Place in a grid: (i, j) counts along its first and second direction, from anywhere.
+/// Position in a grid: (i, j) counts along its first and second direction, from anywhere.
 using GridCell = std::pair<int, int>;
 
 /// A corner of a grid and the steps to its neighbours at (i + 1, j) and (i, j + 1), as far as known there.

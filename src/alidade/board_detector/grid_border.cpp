@@ -19,7 +19,7 @@ constexpr double min_alternation = 0.4;       // of the outer squares, 1 where t
 constexpr double max_alternation_beyond = 0.3;
 constexpr std::size_t max_probes = 12;  // corners that give the contrast
 
-/// A side of a grid: the direction outwards, and its corners' places.
+/// A side of a grid: the direction outwards, and its corners' positions.
 struct Side {
   int di, dj;
   std::vector<GridCell> cells;

@@ -17,7 +17,7 @@ CornerGrid seen_board(int cols, int rows, double angle_rad, int quarter_turns_of
   for (int row = 0; row < rows; ++row) {
     for (int col = 0; col < cols; ++col) {
       const GridCorner corner{Eigen::Vector2d(300, 200) + col * x + row * y, x, y};
-      // Bright where i + j is even between +i and +j: corner (0, 0), dark there, is counted from an odd place.
+      // Bright where i + j is even between +i and +j: corner (0, 0), dark there, is counted from an odd position.
       switch (quarter_turns_of_grid) {
         case 1:
           grid.corners[{row, -col}] = {corner.px, y, -x};

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double quick_pixels = 0.6e6;  // of an image that is searched: VGA and SVGA at full size
 constexpr int least_halved_px = 120;
-constexpr double least_roomy_px = 24.0;  // around the place where the board was
+constexpr double least_roomy_px = 24.0;  // around the board's last position
 
 double quick_scale(double pixels) {
   double scale = 1.0;

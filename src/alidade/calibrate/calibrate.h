@@ -74,7 +74,7 @@ struct ImageSize {
   int height_px = 0;
 };
 
-/// Maximum-likelihood lens parameters, board poses and board shape of the views of one board. Needs no first guess.
+/// Maximum-likelihood lens parameters, board poses and board shape of the views of one board. Needs no initial guess.
 /// Never throws on bad geometry: the report says how it went. `given_points` [m]: the board for BoardShape::given.
 /// Zhang, PAMI 22(11), 2000 (start); bundle adjustment with the poses eliminated per view,
 /// docs/maths/board-calibration.md.

@@ -267,7 +267,7 @@ TEST(Calibrate, RefusesWhatCannotBeTold) {
   expect_refused(status({views[0], views[1]}), "only 2");
   expect_refused(status(std::vector<BoardView>(10, views[0])), "the same image");
 
-  BoardScene still = scene;  // one place, but ten images
+  BoardScene still = scene;  // one position, but ten images
   for (Rigid3& pose : still.cam_from_board) pose = scene.cam_from_board[0];
   expect_refused(status(simulate_views(still, 0.1, 3)), "parallel");
 

@@ -17,7 +17,7 @@ namespace {
 constexpr double noise_px = 0.2;
 const Board small_board{.cols = 7, .rows = 5, .square_m = 1.0};
 
-/// Rotation vectors [°] and places of the board's first corner [squares]: hand-held boards, mostly tilted one way.
+/// Rotation vectors [°] and positions of the board's first corner [squares]: hand-held boards, mostly tilted one way.
 BoardScene long_lens_scene() {
   constexpr std::array<std::array<double, 6>, 7> poses{{{-58, -42, -145, 8.4, 4.3, 62.8},
                                                         {-51, -19, -163, 2.2, 5.8, 52.2},

@@ -29,7 +29,7 @@ struct ShapeTransfer {
   [[nodiscard]] bool is_proved() const;
 };
 
-/// Views of even (0) or odd (1) place.
+/// Views of even (0) or odd (1) index.
 [[nodiscard]] std::vector<BoardView> every_other(std::span<const BoardView> views, std::size_t parity);
 
 /// Tests a bow and, unless a bow is what was asked for, every point free, against a flat board or, with

@@ -163,7 +163,7 @@ TEST(FlatPort, ALensOnTheGlassSeesNoFurtherThanTotalReflection) {
   EXPECT_TRUE(FlatPort::project(p, {0.98 * critical, 0.0, 1.0}));
   EXPECT_FALSE(FlatPort::project(p, {1.0001 * critical, 0.0, 1.0}));
   EXPECT_FALSE(FlatPort::project(p, {3.0 * critical, 0.0, 1.0}));
-  p[10] = 0.05;  // in front of a gap every place of the glass is seen, at grazing angles
+  p[10] = 0.05;  // in front of a gap every point of the glass is seen, at grazing angles
   EXPECT_TRUE(FlatPort::project(p, {3.0 * critical, 0.0, 1.0}));
 }
 

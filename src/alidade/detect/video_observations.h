@@ -30,7 +30,7 @@ struct HeadAngles {
 /// One frame, and what was found in it.
 struct TargetFrame {
   double t_s = 0.0;
-  std::size_t head = 0;  ///< Place in the rig's list.
+  std::size_t head = 0;  ///< Index in the rig's list.
   std::size_t number = 0;
   Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();
   TargetDetection seen;
@@ -40,7 +40,7 @@ struct VideoObservationsConfig {
   /// Frames a second: frame k was taken at t = k / rate, and the angles are interpolated there. 0: the angles have one
   /// row a frame, with its time.
   double rate_hz = 0.0;
-  double max_speed_px_s = 2000.0;  ///< Of the target over what stands still, where it is looked for at first.
+  double max_speed_px_s = 2000.0;  ///< Of the target over what is static, where it is looked for at first.
 };
 
 /// Finds the target in the videos of the heads, the first video of the first head and so on: first where it should be

@@ -138,7 +138,7 @@ Eigen::Vector3d read_vector(const Fields& fields, const std::string& key) {
 
 namespace {
 
-/// Places of the named parameters among the known ones.
+/// Indices of the named parameters among the known ones.
 std::vector<Eigen::Index> places_of(const std::vector<std::string>& names, const std::vector<std::string>& known,
                                     const Fields& fields, std::string_view of) {
   std::vector<Eigen::Index> places;

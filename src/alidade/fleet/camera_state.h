@@ -23,7 +23,7 @@ enum class FleetPhase : std::uint8_t {
 
 enum class FleetAlarmKind : std::uint8_t { none, pan_zero, tilt_zero, focal_length, frozen, lost, focal_temperature };
 
-/// A row of a camera: what its rotation was, and where it saw points that stand still. NaN: not seen.
+/// A row of a camera: what its rotation was, and where it saw static points. NaN: not seen.
 struct FleetRow {
   std::int64_t n = 0;
   double t_s = 0.0;
@@ -34,7 +34,7 @@ struct FleetRow {
   std::array<double, 2 * max_fleet_points> px{};
 };
 
-/// A point that stands still: a direction in the base, e + a e1 + b e2, and what is known of (a, b).
+/// A static point: a direction in the base, e + a e1 + b e2, and what is known of (a, b).
 struct FleetPoint {
   std::array<double, 3> direction{};  ///< e, of length 1; e1 and e2 follow from it.
   std::array<double, 2> ab{};

@@ -7,7 +7,7 @@
 namespace alidade {
 namespace {
 
-constexpr double largest_sigma_px = 5.0;  // of pixels that are of points which stand still
+constexpr double largest_sigma_px = 5.0;  // of pixels of static points
 constexpr double fine_enough = 0.05;      // σ of the focal length, relative: from there on the filter is linear enough
 constexpr int max_steps = 25;
 

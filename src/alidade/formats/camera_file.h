@@ -32,7 +32,7 @@ void require_central(const Camera& camera, const std::string& name);
 [[nodiscard]] Camera parse_camera(std::string_view text, const std::string& name, const std::string& choice = "");
 
 /// What a camera file says beside the camera, which read_camera() passes over and no camera_text() will say again:
-/// where it stands among others (T_cn_cnm1 of Kalibr, extrinsics of mrcal), its place in a stereo pair (R and P of
+/// where it stands among others (T_cn_cnm1 of Kalibr, extrinsics of mrcal), its position in a stereo pair (R and P of
 /// ROS), which of several it is. In words, empty for most files. Reads and throws as read_camera() does.
 [[nodiscard]] std::vector<std::string> unread_parts(const std::filesystem::path& file);
 

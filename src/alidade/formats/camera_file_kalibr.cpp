@@ -64,7 +64,7 @@ std::string write_kalibr(const Camera& camera) {
   if (std::holds_alternative<Calibrated<Pinhole>>(camera.lens)) name = "none";
   if (std::holds_alternative<Calibrated<Brown>>(camera.lens)) {
     name = "radtan";
-    k.resize(4);  // k3 has no place: lens_losses() says so
+    k.resize(4);  // k3 cannot be stored: lens_losses() says so
   }
   return fmt::format(
       "cam0:\n  camera_model: pinhole\n  intrinsics: {}\n  distortion_model: {}\n  distortion_coeffs: {}\n"

@@ -51,7 +51,7 @@ std::vector<double> loose_numbers(const YAML::Node& node) {
   return values;
 }
 
-/// What ROS says of a camera's place in a stereo pair. Message and file differ in the names, as for the rest.
+/// What ROS says of a camera's position in a stereo pair. Message and file differ in the names, as for the rest.
 std::vector<std::string> place_in_pair(const YAML::Node& root, const Fields& fields) {
   std::vector<std::string> unread;
   const std::vector<double> straight{1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};

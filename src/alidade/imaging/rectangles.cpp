@@ -74,7 +74,7 @@ std::vector<Quad> outlines(const cv::Mat& grey) {
   return quads;
 }
 
-/// The edge near a place, along `inward`: between pixels, where grey changes most, in the direction of `sign`.
+/// The edge near a point, along `inward`: between pixels, where grey changes most, in the direction of `sign`.
 std::optional<Eigen::Vector2d> edge_point(const cv::Mat& grey, const Eigen::Vector2d& at, const Eigen::Vector2d& inward,
                                           double sign) {
   constexpr int reach = 8;  // half pixels

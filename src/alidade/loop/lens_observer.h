@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-/// The on-line observer of a head's lens: points of its images that stand still, and the encoders' readings, go
+/// The on-line observer of a head's lens: static points in its images, and the encoders' readings, go
 /// through the hybrid observer (observe/filters/hybrid.h) image by image; what comes out are the focal lengths of that
 /// image, beside the camera's own principal point.
 class LensObserver {

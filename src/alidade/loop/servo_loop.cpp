@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t max_on_their_way = 256;  // images taken and not yet known
 
-/// An image of one head: the target, and what stands still.
+/// An image of one head: the target, and what is static.
 struct Image {
   HeadObservation observation;
   bool is_seen = false;
@@ -57,7 +57,7 @@ std::array<ServoAxis, 2> true_axes(const ServoScene& scene) {
   return axes;
 }
 
-/// Points far away that stand still where a head will look: about the target, somewhere in the narrowest image.
+/// Distant static points where a head will look: about the target, somewhere in the narrowest image.
 std::vector<Eigen::Vector3d> background_of(const ServoScene& scene, const RigHead& head, std::uint64_t seed) {
   constexpr double far_m = 1e4;
   std::vector<Eigen::Vector3d> points;

@@ -48,7 +48,7 @@ struct ServoScene {
   std::vector<std::pair<double, double>> hidden_s;  ///< From, to: no head sees the target.
   ZoomProfile zoom;                                 ///< Of all heads' lenses.
   LensKnowledge intrinsics = LensKnowledge::given;
-  std::size_t background_points = 24;  ///< That stand still where the heads look, for the observer.
+  std::size_t background_points = 24;  ///< Static, where the heads look, for the observer.
 };
 
 /// The preset of C5: the rig, plant, target and noise of Xiahou, Chen & Wu, 2015.

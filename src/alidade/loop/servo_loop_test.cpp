@@ -63,7 +63,7 @@ TEST(ServoLoop, PredictionBeatsItOnAPlantThatIsNotAsKnown) {
   }
 }
 
-/// The paper's loop as an independent simulation found it: 8.6, 43.1 and 74.9 px, of circles whose place was not said.
+/// The paper's loop as an independent simulation found it: 8.6, 43.1 and 74.9 px, of circles at unspecified positions.
 TEST(ServoLoop, ThePapersControllerIsAsSlowAsFoundElsewhere) {
   constexpr std::array<double, 3> elsewhere_px{8.6, 43.1, 74.9};
   for (std::size_t i = 0; i < circles.size(); ++i)
@@ -136,7 +136,7 @@ TEST(ServoLoop, NothingOvershootsAfterAJumpMoreThanPi) {
     for (const double size : {0.2, 0.5, 1.0}) {  // 12, 30 and 61 px
       const double pi_px = overshoot_px(stepping(latency_s, size), ControllerKind::pi);
       for (const ControllerKind kind : {ControllerKind::feedforward, ControllerKind::lqr, ControllerKind::mpc}) {
-        // A quick controller shakes more than PI: what it does about a target that stands still is no overshoot. 0.3
+        // A quick controller shakes more than PI: what it does with a static target is no overshoot. 0.3
         // px: the mean of 8 maxima is known to that.
         const double shaking_px = overshoot_px(stepping(latency_s, 0.0), kind);
         EXPECT_LT(shaking_px, 2.5);

@@ -124,7 +124,7 @@ double settling_of(const ServoScenario& scenario, ControllerKind kind) {
   return slowest;
 }
 
-/// The loop itself, once its lens has become as long as it will, on a target that stands still.
+/// The loop itself, once its lens has become as long as it will, on a static target.
 double rest_px_of(const ServoScenario& scenario, ControllerKind kind) {
   constexpr double zoom_from_s = 2.0, zoom_until_s = 3.0, least_s = 8.0, periods = 100.0;
   ServoScene scene = scenario.scene;

@@ -9,7 +9,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Two features taken for the same point: their places in the lists of their photos.
+/// Two features taken for the same point: their indices in the lists of their photos.
 struct FeatureMatch {
   int a = 0, b = 0;
 };

@@ -26,7 +26,7 @@ struct FeatureConfig {
 };
 
 /// Features of a photo, grey or colour, 8 or 16 bit: Lowe's SIFT (IJCV 60, 2004) as OpenCV has it, with descriptors
-/// compared as roots (Arandjelović & Zisserman, CVPR 2012). One place is one feature.
+/// compared as roots (Arandjelović & Zisserman, CVPR 2012). One position is one feature.
 [[nodiscard]] PhotoFeatures find_features(const cv::Mat& photo, const FeatureConfig& config = {});
 
 /// Matches of a's features with b's, each the other's nearest, and nearer than `ratio` of the second nearest.

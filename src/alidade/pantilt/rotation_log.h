@@ -23,7 +23,7 @@ enum class RotationSource {
 
 inline constexpr double not_seen = std::numeric_limits<double>::quiet_NaN();
 
-/// One instant of a rotating camera: how it had turned, and where it saw points that stand still. What was not measured
+/// One instant of a rotating camera: how it had turned, and where it saw static points. What was not measured
 /// is NaN (the attitude: all zeros).
 struct RotationRow {
   double t_s = 0.0;

@@ -22,7 +22,7 @@ AxisMotion braking(const AnglePlant& plant, AxisMotion motion, double goal, doub
   return motion;
 }
 
-/// Two phases: as fast as it can until the lag asks for less, then the lag.
+/// Two phases: as fast as possible until the lag asks for less, then the lag.
 AxisMotion advanced(const AnglePlant& plant, const AxisMotion& motion, double command, double dt_s) {
   const double goal = plant.gain_rad() * command, missing = goal - motion.angle_rad;
   if (std::isfinite(plant.max_acceleration_rad_s2)) return braking(plant, motion, goal, dt_s);

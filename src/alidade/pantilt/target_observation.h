@@ -23,7 +23,7 @@ struct ObservationLens {
 struct TargetObservation {
   double t_capture_s = 0.0;  ///< When the image was taken and the encoders read.
   double t_arrival_s = 0.0;  ///< When it was known; ≥ t_capture_s.
-  std::size_t head = 0;      ///< Place in the rig's list of heads.
+  std::size_t head = 0;      ///< Index in the rig's list of heads.
   Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   double sigma_px = 0.0;  ///< Of one coordinate of this observation; 0: that of all.

@@ -44,7 +44,7 @@ bool is_inside(const cv::Mat& image, const PatchPose& pose, double half_px) {
          high.x() < image.cols - after_px && high.y() < image.rows - after_px;
 }
 
-/// Moves a pose against a step in the patch's own frame: place, linear part by rows, gain, bias.
+/// Moves a pose against a step in the patch's own frame: position, linear part by rows, gain, bias.
 void compose(PatchPose& pose, const Eigen::Matrix<double, 8, 1>& step) {
   Eigen::Matrix2d stretch;
   stretch << 1.0 + step[2], step[3], step[4], 1.0 + step[5];
@@ -96,7 +96,7 @@ void AnchorPatch::set_noise_model() {
   const Matrix cov = inverse_ * inner * inverse_;
   cov_unit_ = cov.topLeftCorner<2, 2>();
   constexpr double variance_kept = 36.0 / 256.0;  // of white noise, by the smoothing of both axes
-  constexpr double after_sampling = 0.980;        // of that, by interpolation, mean over places between pixels
+  constexpr double after_sampling = 0.980;        // of that, by interpolation, mean over subpixel positions
   const double squares = variance_kept * area_px - (inverse_ * inner).trace();
   rms_unit_ = std::sqrt((1.0 + after_sampling) * std::max(squares, 1e-9) / area_px);
 }

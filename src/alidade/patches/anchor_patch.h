@@ -34,7 +34,7 @@ struct PatchFit {
 /// once. S. Baker & I. Matthews, "Lucas–Kanade 20 years on", 2004.
 ///
 /// Images are 32-bit float, smoothed by smoothed_for_patches(): interpolation then leaves hardly an error that
-/// depends on the place between pixels.
+/// depends on the subpixel position.
 class AnchorPatch {
  public:
   static constexpr int half_px = 7;
@@ -48,7 +48,7 @@ class AnchorPatch {
   /// Finds it from a pose at most about 2 px off. Not converged: it is not there, or partly outside.
   [[nodiscard]] PatchFit align(const cv::Mat& smoothed, const PatchPose& start) const;
 
-  /// Covariance of the place [px²] for noise of σ = 1 grey value in the unsmoothed image.
+  /// Covariance of the position [px²] for noise of σ = 1 grey value in the unsmoothed image.
   [[nodiscard]] const Eigen::Matrix2d& cov_of_unit_noise() const { return cov_unit_; }
   /// σ of the patch's own grey values.
   [[nodiscard]] double contrast() const { return contrast_; }
@@ -57,7 +57,7 @@ class AnchorPatch {
 
  private:
   static constexpr int side_px = 2 * half_px + 1, area_px = side_px * side_px;
-  static constexpr int num_unknowns = 8;  // place, linear part, gain, bias
+  static constexpr int num_unknowns = 8;  // position, linear part, gain, bias
   using Jacobian = Eigen::Matrix<float, num_unknowns, Eigen::Dynamic>;
 
   void set_noise_model();

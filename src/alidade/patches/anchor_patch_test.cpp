@@ -11,7 +11,7 @@
 namespace alidade {
 namespace {
 
-/// A smooth texture with corners every few pixels, as a function of the place: no interpolation is involved.
+/// A smooth texture with corners every few pixels, as a function of the position: no interpolation is involved.
 double texture(const Eigen::Vector2d& at) {
   double sum = 0.0;
   for (int i = 0; i < 12; ++i) {

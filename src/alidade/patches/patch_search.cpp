@@ -23,7 +23,7 @@ ALIDADE_VECTOR_CLONES int product_at(const std::int16_t* grey, const std::uint8_
   return sum;
 }
 
-/// Places to look at: whole pixels about the expected one, so far inside that rows of row_px can be read.
+/// Positions to evaluate: whole pixels about the expected one, so far inside that rows of row_px can be read.
 struct SearchWindow {
   int u_min = 0, u_max = -1, v_min = 0, v_max = -1;
 };
@@ -39,7 +39,7 @@ SearchWindow window_of(const cv::Mat& image, const Eigen::Vector2d& middle, cons
           lower(middle.y() - reach_v, half + 1), upper(middle.y() + reach_v, image.rows - half - 2)};
 }
 
-/// Sums over the patch's square at every place of one row of the window, moved down row by row.
+/// Sums over the patch's square at every position of one row of the window, moved down row by row.
 class BoxSums {
  public:
   BoxSums(const cv::Mat& image, const SearchWindow& window)
@@ -50,7 +50,7 @@ class BoxSums {
   void enter(int v) { change(v + half, 1); }
   /// Takes its first row out again.
   void leave(int v) { change(v - half, -1); }
-  /// n Σ g² − (Σ g)² over the patch at a place, for all places of the row.
+  /// n Σ g² − (Σ g)² over the patch at a position, for all positions of the row.
   void spreads(std::vector<float>& out) const {
     int sum = 0, squares = 0;
     for (int c = 0; c < side - 1; ++c) add(c, sum, squares, 1);
@@ -122,7 +122,7 @@ BestPlace best_place(const cv::Mat& image, const PatchView& view, const Eigen::V
   return best;
 }
 
-/// Grey values of the patch's square at a place between pixels.
+/// Grey values of the patch's square at a subpixel position.
 void sample(const cv::Mat& image, const Eigen::Vector2d& px, std::array<float, PatchView::area_px>& out) {
   const int u = static_cast<int>(std::floor(px.x())), v = static_cast<int>(std::floor(px.y()));
   const auto a = static_cast<float>(px.x() - u), b = static_cast<float>(px.y() - v);

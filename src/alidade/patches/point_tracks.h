@@ -22,8 +22,8 @@ struct PointTrackerConfig {
 struct TrackedPoint {
   int id = 0;  ///< Counts up from 0; never given twice.
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
-  /// σ of one coordinate by the noise of this frame, about a place that stays the same as long as the point's patch is
-  /// kept: the noise of the patch itself moves all of a track by as much, which a bearing takes up.
+  /// σ of one coordinate by the noise of this frame, about a position that stays the same as long as the point's patch
+  /// is kept: the noise of the patch itself moves all of a track by as much, which a bearing takes up.
   double sigma_px = 0.0;
 };
 

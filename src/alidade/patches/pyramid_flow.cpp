@@ -11,7 +11,7 @@ namespace {
 constexpr int half_px = 5, side_px = 2 * half_px + 1;
 constexpr std::size_t area_px = side_px * side_px;
 
-/// Bilinear patch of side n around a place, with all its pixels inside the image, or nothing.
+/// Bilinear patch of side n around a point, with all its pixels inside the image, or nothing.
 template <int n>
 bool cut_patch(const cv::Mat& image, const Eigen::Vector2d& px,
                std::array<float, static_cast<std::size_t>(n* n)>& patch) {

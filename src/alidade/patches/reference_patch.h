@@ -59,7 +59,7 @@ struct PatchMatch {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();  ///< Of its centre.
   double correlation = 0.0;
   double sigma_px = 0.0;  ///< Of a coordinate, from what is left over after the fit.
-  int num_compared = 0;   ///< Places looked at.
+  int num_compared = 0;   ///< Positions evaluated.
 };
 
 /// Looks for it at every pixel of the ellipse (px − expected)ᵀ S⁻¹ (px − expected) ≤ num_sigma² by normalised

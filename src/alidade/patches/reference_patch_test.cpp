@@ -18,7 +18,7 @@ using testing::room_camera;
 using testing::room_path;
 using testing::RoomScene;
 
-/// A smooth surface of grey values, seen through a map: exact at every place between pixels.
+/// A smooth surface of grey values, seen through a map: exact at every subpixel position.
 cv::Mat waves(const Eigen::Matrix2d& A, const Eigen::Vector2d& t) {
   cv::Mat image(120, 120, CV_8U);
   for (int v = 0; v < 120; ++v) {

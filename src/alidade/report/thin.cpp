@@ -7,7 +7,7 @@
 namespace alidade::report {
 namespace {
 
-/// Places of the smallest and the largest of values[begin, end) that are numbers; appended to `out`.
+/// Indices of the smallest and the largest of values[begin, end) that are numbers; appended to `out`.
 void append_extremes(std::span<const double> values, std::size_t begin, std::size_t end,
                      std::vector<std::size_t>& out) {
   std::size_t low = end, high = end;

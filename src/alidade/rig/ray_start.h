@@ -23,7 +23,7 @@ struct ObservationPose {
 };
 [[nodiscard]] std::optional<ObservationPose> pose_of_observation_lines(std::span<const ObservationLine> lines);
 
-/// What a head's views of a board say of its place when no view alone does: single points at many angles. Offsets are
+/// What a head's views of a board say of its pose when no view alone does: single points at many angles. Offsets are
 /// taken as zero. `usable`: one per view of the problem.
 [[nodiscard]] std::optional<ObservationPose> observation_pose(const RigProblem& problem,
                                                               const std::vector<bool>& usable, const RigHead& rig_head,

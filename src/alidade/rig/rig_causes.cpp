@@ -21,11 +21,11 @@ constexpr Index tested_a_head = 15;
 struct Tested {
   std::string name, unit;
   std::vector<Index> places;
-  std::vector<std::string> names = {};  ///< One per place, where each has one.
+  std::vector<std::string> names = {};  ///< One per column, where each has one.
   double worst = 1.0;  ///< σ of its size beyond which the views do not determine it: 5σ would be implausible.
 };
 
-/// Places of a head's columns: lens, then for each axis scale, one period, two periods, backlash.
+/// Indices of a head's columns: lens, then for each axis scale, one period, two periods, backlash.
 constexpr Index column_of_axis(int axis) { return 3 + 6 * axis; }
 
 /// One by one: of these only what is fixed.
@@ -146,7 +146,7 @@ double given_sigma(const std::vector<Assumption>& assumed, const std::string& na
   return 0.0;
 }
 
-/// One for each of its places; what one name has two of (amplitudes) is never given.
+/// One for each of its columns; what one name has two of (amplitudes) is never given.
 VectorXd given_sigmas(const std::vector<Assumption>& assumed, const Tested& tested) {
   VectorXd sigmas = VectorXd::Zero(static_cast<Index>(tested.places.size()));
   if (tested.names.size() != tested.places.size()) return sigmas;

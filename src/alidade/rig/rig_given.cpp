@@ -41,7 +41,7 @@ Follows follows_of(const RigProblem& problem, const SolvedRig& solved, const Eig
   return follows;
 }
 
-/// Places of the free parameters among the wide ones.
+/// Indices of the free parameters among the wide ones.
 std::vector<Index> places_of(const RigProblem& problem, const RigProblem& wide) {
   std::vector<Index> places;
   for (std::size_t h = 0; h < problem.free.size(); ++h) {

@@ -106,7 +106,7 @@ std::optional<Rigid3> max_agreed(const std::vector<Rigid3>& opinions) {
 
 using Poses = std::span<const std::optional<BoardPoseFit>>;
 
-/// Of a board that no view alone places: where single points at many angles put it.
+/// The pose of a board that no view alone determines, from single points at many angles.
 std::optional<Rigid3> place_of_points(const RigProblem& problem, const std::vector<bool>& usable,
                                       const PlacedRig& placed, std::size_t board) {
   std::optional<ObservationPose> best;
@@ -122,7 +122,7 @@ std::optional<Rigid3> place_of_points(const RigProblem& problem, const std::vect
   return best ? std::optional(place) : std::nullopt;
 }
 
-/// Each board that a placed head sees and that has no place yet.
+/// Each board that a placed head sees and that has no pose yet.
 bool place_boards(const RigProblem& problem, const std::vector<bool>& usable, Poses poses, PlacedRig& placed) {
   bool any = false;
   for (std::size_t b = 0; b < placed.has_board.size(); ++b) {

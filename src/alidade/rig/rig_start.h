@@ -14,7 +14,7 @@ namespace alidade {
 struct MountingStart {
   Eigen::Quaterniond cam_from_tilt = Eigen::Quaterniond::Identity();
   double pan_scale = 1.0, tilt_scale = 1.0;  ///< 1 or −1.
-  double misfit_rad = 0.0;                   ///< Mean angle between what the views of one place of the board say of it.
+  double misfit_rad = 0.0;                   ///< Mean angle between the board's poses by the views of one placement.
   int num_compared = 0;
 };
 
@@ -29,8 +29,8 @@ struct TurnedView {
 /// they are few.
 [[nodiscard]] MountingStart mounting_start(std::span<const TurnedView> views);
 
-/// Bases of the heads and places of the boards, spread from the first head over shared boards by what most views say.
-/// Heads (and boards) that nothing links to the first are false.
+/// Bases of the heads and poses of the boards, propagated from the first head over shared boards by what most views
+/// say. Heads (and boards) that nothing links to the first are false.
 struct PlacedRig {
   RigState state;
   std::vector<bool> has_head, has_board;

@@ -178,7 +178,7 @@ void add_encoder(const RigReport& report, const RigConfig& config, Verdict& verd
                                     sigma / degree, good_rad / degree, "°"));
 }
 
-/// What the residuals ask for, beyond what errors that views share would ask for by chance.
+/// Causes indicated by the residuals, beyond those that errors shared within views would give by chance.
 void add_causes(const RigReport& report, Verdict& verdict) {
   if (report.causes.empty()) return;
   constexpr double most = rig_cause_limit;

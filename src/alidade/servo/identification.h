@@ -52,7 +52,7 @@ struct ServoFit {
   ServoKind kind = ServoKind::angle;
   ServoParams params = ServoParams::Zero();
   ServoFlaws flaws;                                     ///< Those that the log asks for, as estimated.
-  std::vector<std::size_t> freed;                       ///< Which: places in servo_flaws, the first asked for first.
+  std::vector<std::size_t> freed;                       ///< Which: indices in servo_flaws, in order of selection.
   std::array<double, num_servo_flaws> flaw_sigma = {};  ///< Of those.
   /// Of the selected model: blocks of rows are clusters; of the other as `cov_model`.
   Eigen::Matrix<double, num_servo_params, num_servo_params> cov = decltype(cov)::Zero();

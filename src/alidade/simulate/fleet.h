@@ -23,7 +23,7 @@ struct FleetSceneConfig {
   double warming_c = 0.0, warming_s = 7200.0;
 };
 
-/// A camera: a head that patrols, four points that stand still, and what happens to it, all a function of (seed,
+/// A camera: a head that patrols, four static points, and what happens to it, all a function of (seed,
 /// index).
 struct FleetScene {
   std::string id;  ///< "c00001"

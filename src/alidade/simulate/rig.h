@@ -13,7 +13,7 @@
 
 namespace alidade {
 
-/// A world for `rig`: heads, places of a board, and which angles each board was looked at from. The world is the first
+/// A world for `rig`: heads, placements of a board, and the angles from which each was observed. The world is the first
 /// head's camera at readings of zero.
 struct RigScene {
   Rig rig;

@@ -14,7 +14,7 @@ struct RotatingIntrinsics {
   double k2 = 0.0, k3 = 0.0, p1 = 0.0, p2 = 0.0;  ///< As Brown has them.
 };
 
-/// A world for `observe`: a camera that turns, and points that stand still.
+/// A world for `observe`: a rotating camera, and static points.
 struct RotationScene {
   int width_px = 780, height_px = 582;
   std::vector<Eigen::Vector2d> start_px;  ///< Where the points are seen at the start.
@@ -54,7 +54,7 @@ struct RotationFaults {
   bool swaps_axes = false;
   Eigen::Vector2d signs = Eigen::Vector2d::Ones();  ///< Of pan and tilt.
   double wrong_share = 0.0;                         ///< Pixels that are anywhere in the image.
-  double swapped_share = 0.0;                       ///< Pixels that change places with another point's.
+  double swapped_share = 0.0;                       ///< Pixels exchanged with another point's.
   double moving_share = 0.0;  ///< Points that move through the image, by a few pixels a second, up to 20.
   double noise_px = 0.0, noise_lasts_s = 0.0;  ///< Noise of each track beside the white one, and how long it lasts.
 

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::array<std::string_view, 6> path_names{"still", "circle", "sway", "step", "manoeuvre", "recorded"};
 
-/// Velocity at a place of the record: of the parabola through its neighbours, at the ends of the line.
+/// Velocity at a point of the record: of the parabola through its neighbours, at the ends of the line.
 Eigen::Vector3d velocity_at(const TargetPath& path, std::size_t i) {
   const auto slope = [&](std::size_t k) {
     return Eigen::Vector3d((path.recorded_m[k + 1] - path.recorded_m[k]) /

@@ -21,7 +21,7 @@ struct HeadTruth {
   double encoder_step_rad = 0.0;    ///< Of one count; 0: none.
   double sigma_encoder_rad = 0.0008726646259971648;
   double sigma_px = 0.5;
-  std::vector<Eigen::Vector3d> background_in_world = {};  ///< Points that stand still, far away.
+  std::vector<Eigen::Vector3d> background_in_world = {};  ///< Distant static points.
 };
 
 /// It moves. Same seed, same noise. Allocates nothing once made.

@@ -17,7 +17,7 @@ enum class PathKind { still, circle, sway, step, manoeuvre, recorded };
 
 /// Where a target goes. A circle lies in a plane of constant z and begins at `start`, its centre at −x of it; a sway is
 /// sideways about `start`; a step leaves `start` for good at a time; the manoeuvre is manoeuvre_position(); a recorded
-/// path goes through its positions by cubics (Hermite's, with the slopes of parabolas) and stands still before and
+/// path goes through its positions by cubics (Hermite's, with the slopes of parabolas) and is static before and
 /// after.
 struct TargetPath {
   PathKind kind = PathKind::circle;

@@ -99,7 +99,7 @@ std::vector<RigHead> heads_as_they_are(const TrackScene& scene) {
   return heads;
 }
 
-/// What the log makes of an observation: false names, signs and places.
+/// How the log distorts an observation: false names, signs and positions.
 void spoil(const TrackScene& scene, Draws& draws, SimulatedObservation& observation) {
   const TrackFaults& faults = scene.faults;
   const Camera& camera = scene.heads[observation.head].camera;

@@ -74,7 +74,7 @@ struct SimulatedObservation {
 /// The manoeuvre of scenario C: 11 s between 0.9 and 3.9 m, up to 1.5 m/s and 6 m/s².
 [[nodiscard]] Eigen::Vector3d manoeuvre_position(double t_s);
 
-/// A ball that rests at a place for a second, is thrown with this velocity, and caught and held where it comes back to
+/// A ball that rests at a point for a second, is thrown with this velocity, and caught and held where it comes back to
 /// its height.
 [[nodiscard]] std::function<Eigen::Vector3d(double t_s)> thrown_ball(const Eigen::Vector3d& from_m,
                                                                      const Eigen::Vector3d& velocity_m_s);

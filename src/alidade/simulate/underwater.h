@@ -22,7 +22,7 @@ struct UnderwaterScene {
   double sigma_known_m = 0.001;  ///< Of each coordinate of a known point.
   double sigma_depth = 0.03;     ///< Of the initial depth of an unknown point, over the depth.
   double sigma_position_m = 0.005, sigma_rotation_rad = 0.01;  ///< Of the initial state that a filter is given.
-  double mismatches = 0.0;    ///< Share of the observations after the first frame that show another place.
+  double mismatches = 0.0;    ///< Share of the observations after the first frame that show another point.
   double mismatch_px = 60.0;  ///< How far at most, in each coordinate.
   double blackout_from_s = 0.0, blackout_s = 0.0;  ///< Nothing is seen from then on for so long.
   // What differs from the filter's assumptions.

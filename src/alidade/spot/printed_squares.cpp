@@ -18,7 +18,7 @@ Eigen::AlignedBox2d printed_area(const Board& board) {
   return area;
 }
 
-/// Places on the board, in squares, that the pixels of a part see: exact on every eighth pixel, linear between, which
+/// Points on the board, in squares, seen by the pixels of a part: exact on every eighth pixel, linear between, which
 /// errs by less than 0.01 px where a lens bends by less than one pixel in 30.
 class SquaresSeen {
  public:

@@ -32,7 +32,7 @@ struct Print {
 
   [[nodiscard]] bool has_contrast() const { return paper > ink + 0.1 * paper; }
 
-  /// Bilinear, at a place in pixels of the part.
+  /// Bilinear, at a position in pixels of the part.
   [[nodiscard]] double distance(double u, double v) const {
     const double x = std::clamp(u - static_cast<double>(u_min), 0.0, static_cast<double>(distance_px.cols()) - 1.001);
     const double y = std::clamp(v - static_cast<double>(v_min), 0.0, static_cast<double>(distance_px.rows()) - 1.001);

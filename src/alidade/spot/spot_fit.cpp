@@ -9,7 +9,7 @@
 namespace alidade {
 namespace {
 
-/// Pixels of a square around a place, cut at the part's border.
+/// Pixels of a square around a point, cut at the part's border.
 template <class Visit>
 void for_each_around(const SpotSignal& signal, const Eigen::Vector2d& px, double reach, const Visit& visit) {
   const auto low = [](double at) { return std::max<Eigen::Index>(0, static_cast<Eigen::Index>(std::ceil(at))); };

@@ -5,7 +5,7 @@
 
 namespace alidade {
 
-/// A spot's place below the pixel, in pixels of the signal's part.
+/// A spot's subpixel position, in pixels of the signal's part.
 struct SpotPlace {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   Eigen::Matrix2d cov = Eigen::Matrix2d::Identity();  ///< [px²]

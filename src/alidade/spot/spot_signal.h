@@ -22,7 +22,7 @@ struct SpotSignal {
   int u_min = 0, v_min = 0;  ///< The part's first pixel in the photo.
   int photo_cols = 0, photo_rows = 0;
   double sigma = 1.0;              ///< Noise of `detected`.
-  double edge_sigma_px = 0.0;      ///< What remains at edges, as an uncertainty of their place.
+  double edge_sigma_px = 0.0;      ///< What remains at edges, as an uncertainty of their position.
   bool background_is_lit = false;  ///< It was taken from channels that see some of the laser's light.
   bool is_modelled = false;        ///< `light` is the difference to a model of the print, not to a photo or channel.
   std::string reason;              ///< Why there is no signal; empty where there is one.

@@ -18,7 +18,7 @@
 /// (setting_of), and one trial with all that it leaves (trial_of).
 namespace alidade {
 
-/// A camera that sways as Fang et al. 2011, eq. (27), and sees points that stand still. fx 710, fy 700, cx 390, cy 290.
+/// A camera that sways as Fang et al. 2011, eq. (27), and sees static points. fx 710, fy 700, cx 390, cy 290.
 struct ObserveStudy {
   static constexpr const char* name = "observe";
   static constexpr std::uint64_t block = 5000;

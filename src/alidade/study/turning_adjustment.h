@@ -6,7 +6,7 @@
 
 namespace alidade {
 
-/// fx, fy, cx, cy of a camera that rotates as measured, from pixels of points that stand still, all rows adjusted
+/// fx, fy, cx, cy of a camera that rotates as measured, from pixels of static points, all rows adjusted
 /// together: what observe() with method `batch` gives where nothing is wrong with a log, without its search for what
 /// may be. Gauss–Newton; given the intrinsics points are independent and eliminated one by one. Four points go side by
 /// side, so that 200 rows of them take some tens of microseconds; nothing is allocated after the first call.

@@ -15,7 +15,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Corners as CSV: photo,corner,u_px,v_px,sigma_u_px,sigma_v_px,corr_uv. Places to 10⁻⁹ px, so that
+/// Corners as CSV: photo,corner,u_px,v_px,sigma_u_px,sigma_v_px,corr_uv. Positions to 10⁻⁹ px, so that
 /// what is read back gives the same camera.
 [[nodiscard]] std::string corners_csv(std::span<const BoardView> views);
 

@@ -108,7 +108,7 @@ std::optional<Blob> choose(const std::vector<Blob>& blobs, const TargetLook& loo
 }
 
 /// Middle of the area that the blob covers: pixels count by their share of its plateau, so that noise and shading
-/// inside do not move it and its soft edge places it to a fraction of a pixel.
+/// inside do not move it and its soft edge determines it to a fraction of a pixel.
 TargetDetection measure(const cv::Mat& signal, const Blob& blob, double noise) {
   const int margin = 3;
   const cv::Rect box =

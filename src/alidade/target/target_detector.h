@@ -24,7 +24,7 @@ struct TargetLook {
   double min_snr = 8.0;           ///< colour, bright, dark: of the blob over the image's noise.
   double rival_share = 0.5;       ///< A second blob with this share of the first one's light is a rival.
   double min_correlation = 0.7;   ///< pattern: below it the target is lost.
-  double min_margin = 0.1;        ///< pattern: by which it is more alike than any other place.
+  double min_margin = 0.1;        ///< pattern: by which it matches better than any other position.
   double max_radius_share = 0.3;  ///< colour, bright, dark: of the image's shorter side; what is larger is no target.
 };
 

@@ -125,7 +125,7 @@ TEST(TargetDetector, PlacesAPatternThatGrowsAndShrinks) {
   cv::Mat as_seen;  // from 0.8 m, 0.12 m across, f = 338 px: 51 px
   cv::resize(card, as_seen, {51, 51}, 0.0, 0.0, cv::INTER_AREA);
   const Accuracy seen = accuracy_of({.kind = TargetKind::pattern}, {.radius_m = 0.06, .card = &card}, &as_seen, 60);
-  EXPECT_LE(seen.num_lost, 2) << seen.reason;  // places are drawn again: sizes leap by up to 1.5
+  EXPECT_LE(seen.num_lost, 2) << seen.reason;  // positions are drawn again: sizes jump by up to 1.5
   EXPECT_LT(seen.rms_px, 0.25);
   EXPECT_GT(seen.stated_px, 0.5 * seen.rms_px);
 }

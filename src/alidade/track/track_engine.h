@@ -11,7 +11,7 @@
 namespace alidade::detail {
 
 /// The tracker for one kind of filter: the last moments of observations and of beliefs after them, in order of capture,
-/// so that an observation that comes late is put in its place and what follows is done again.
+/// so that a late observation is inserted at its time and what follows is recomputed.
 template <class Filter>
 class TrackEngine {
  public:
@@ -89,7 +89,7 @@ class TrackEngine {
     bool began = false;     ///< The track starts, or starts again, here.
     bool accepted = false;  ///< The track took this observation.
     /// Of each head, one after the other: counted together, a head that keeps failing would be hidden by one that does
-    /// not. Heads beyond the eighth share the last place.
+    /// not. Heads beyond the eighth share the last slot.
     std::array<int, 8> num_rejected{};
     std::size_t head = 0;  ///< That saw the target last, when, and when another did.
     double t_head_s = 0.0, t_other_s = 0.0;
@@ -145,7 +145,7 @@ class TrackEngine {
     if (step.has_belief) step.belief = newest().filter.estimate();
   }
 
-  /// What becomes of the observation at this place, given the entry before it.
+  /// The outcome of the observation at this index, given the entry before it.
   void apply(std::size_t place, TrackStep& step) {
     Entry& now = entry(place);
     now.began = now.accepted = false;
@@ -273,7 +273,7 @@ class TrackEngine {
     return TrackEvent::none;
   }
 
-  /// Begins the track at this place from its observation and the last one of another head, if they are of about one
+  /// Starts the track at this index from its observation and the last one of another head, if they are of about one
   /// time and their rays meet in the working range.
   bool begin(std::size_t place) {
     const auto other = other_before(place);

@@ -20,7 +20,7 @@ struct KeptMatch {
                                                        const std::vector<int>& bundle_place, double gate);
 
 /// Joins matches to tracks and gives the bundle their observations and rays. A match that would put a point at two
-/// places of one photo is rejected. Returns the number of matches that take part.
+/// positions of one photo is rejected. Returns the number of matches that take part.
 std::size_t set_tracks(const MatchedPhotos& photos, const std::vector<KeptMatch>& matches,
                        const std::vector<int>& bundle_place, TurnedBundle& bundle);
 

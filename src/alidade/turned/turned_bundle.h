@@ -62,7 +62,7 @@ struct TurnedSolution {
       residuals;  ///< Prediction minus pixel, one per observation, normalised; NaN where there is none.
 };
 
-/// Levenberg–Marquardt on camera, turns (and zooms) and rays, in place; rays are eliminated track by track. Throws
+/// Levenberg–Marquardt on camera, rotations (and zooms) and rays, in place; rays are eliminated track by track. Throws
 /// Interrupted. Triggs et al., "Bundle adjustment — a modern synthesis", 2000, section 6.
 TurnedSolution solve_turned(TurnedBundle& bundle, const TurnedPrior& prior, const TurnedSolveConfig& config,
                             const Progress& progress = {});

@@ -16,7 +16,7 @@
 namespace alidade {
 namespace {
 
-/// Where a place of the board [m] is seen, near one circle.
+/// Where a point of the board [m] is seen, near one circle.
 using LocalMap = std::function<std::optional<Eigen::Vector2d>(const Eigen::Vector2d& place)>;
 
 cv::Ptr<cv::FeatureDetector> blob_detector(const cv::Mat& grey) {

@@ -39,7 +39,7 @@ TEST(CircleGrid, FindsTheImagesOfTheCentres) {
     EXPECT_LT(score.rms_px(), 0.025);  // without the lens, what it bends within two pitches stays
     EXPECT_LT(score.worst_px, 0.15);
     EXPECT_NEAR(std::sqrt(score.chi2_per_dof()), 1.0,
-                0.5);  // σ counts the unknown lens, which differs by board and place
+                0.5);  // σ counts the unknown lens, which differs by board and position
   }
 }
 

@@ -14,7 +14,7 @@
 namespace alidade {
 namespace {
 
-/// A place on the board and where it is seen.
+/// A point on the board and where it is seen.
 struct Pair {
   Eigen::Vector2d place, px;
 };
@@ -53,7 +53,7 @@ Markers read_markers(const cv::Mat& photo, const MarkerLayout& layout) {
   return smoothed.size() > markers.size() ? smoothed : markers;
 }
 
-/// px_from_board near some places, by least squares; needs four pairs in general position.
+/// px_from_board near some points, by least squares; needs four pairs in general position.
 std::optional<Eigen::Matrix3d> homography(const std::vector<Pair>& pairs) {
   if (pairs.size() < 4) return std::nullopt;
   std::vector<cv::Point2d> from, to;
@@ -89,7 +89,7 @@ Markers consistent_markers(const Markers& seen, const MarkerLayout& layout) {
   }
   Markers consistent;
   if (numbers.empty()) return consistent;
-  constexpr double tolerance = 0.4;  // of a marker's side: a neighbour's place is more than one side away
+  constexpr double tolerance = 0.4;  // of a marker's side: a neighbour's position is more than one side away
   std::vector<unsigned char> fits;
   const double side_px = perimeter_px / static_cast<double>(4 * numbers.size());
   if (cv::findHomography(from, to, cv::RANSAC, tolerance * side_px, fits, 500).empty()) return consistent;

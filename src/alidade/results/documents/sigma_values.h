@@ -10,7 +10,7 @@
 namespace alidade {
 
 /// How the stated σ came about: by how much the clusters' scatter raised the model's, and how sure that is. `told`: the
-/// names of the parameters that are estimated, each with its place in the covariance.
+/// names of the parameters that are estimated, each with its index in the covariance.
 [[nodiscard]] JsonValue sigma_values(std::span<const std::pair<std::string, Eigen::Index>> told,
                                      const ClusterCovariance& clusters);
 

@@ -38,20 +38,19 @@ struct NextView {
   Rigid3 world_from_board;       ///< Where it stands, or is to stand.
   Eigen::Vector2d middle_px;     ///< Where the centre of the board is then seen.
   Rigid3 cam_from_board;
-  double gain = 0.0;  ///< ln of σ now over σ with it; of a new place by view, of the three that it is worth.
+  double gain = 0.0;  ///< ln of σ now over σ with it; of a new placement per view, of the three that it is worth.
 };
 
 /// What a rig that is calibrated asks for next.
 struct ViewPlan {
   RigSigma now;
   std::optional<NextView> next;  ///< None where no view can be proposed.
-  RigSigma with_next;            ///< With it, at a new place with three of it.
+  RigSigma with_next;            ///< With it, at a new placement with three of it.
 };
 
 /// The view that lowers the uncertainty most, by the information matrix of heads and boards: of the boards where they
-/// stand, or at a new place, seen there three times. Throws ConfigError for a config that cannot be, or a rig that did
-/// not converge.
-/// Fedorov 1972 (sequential design).
+/// stand, or at a new placement, seen there three times. Throws ConfigError for a config that cannot be, or a rig that
+/// did not converge. Fedorov 1972 (sequential design).
 [[nodiscard]] ViewPlan plan_view(const RigCalibration& now, const ViewConfig& config = {});
 
 ALIDADE_PUBLIC_END

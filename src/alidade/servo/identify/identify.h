@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// Places of the parameters in ServoParams.
+/// Indices of the parameters in ServoParams.
 struct ServoParam {
   enum Place { gain, tau, latency, zero, start };
 };

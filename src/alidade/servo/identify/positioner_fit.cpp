@@ -46,7 +46,7 @@ double first_latency(const PositionerLog& log) {
   return waits.empty() ? 0.05 : median_of(std::move(waits));
 }
 
-/// From the best places of a coarse grid: the cost has more than one valley.
+/// From the best points of a coarse grid: the cost has more than one local minimum.
 PositionerVector best_start(PositionerProblem problem, double rate, double latency, double& cost) {
   constexpr std::size_t num_starts = 4;
   constexpr int few_steps = 12;

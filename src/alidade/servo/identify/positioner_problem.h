@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// Places of what is fitted: logarithms of rate, acceleration and time constant, then seconds and radians.
+/// Indices of the fitted parameters: logarithms of rate, acceleration and time constant, then seconds and radians.
 struct PositionerPlace {
   enum : int { rate, acceleration, time_constant, latency, backlash, offset, count };
 };
@@ -24,9 +24,9 @@ class PositionerProblem {
   /// (model − reading) / σ, beyond 4σ as far as its logarithm.
   [[nodiscard]] Eigen::VectorXd misfit(const PositionerVector& theta) const;
   [[nodiscard]] std::vector<double> model(const PositionerVector& theta) const;
-  /// By central differences; columns of places that are not free are zero.
+  /// By central differences; columns of fixed parameters are zero.
   [[nodiscard]] Eigen::MatrixXd jacobian(const PositionerVector& theta, const std::vector<int>& free) const;
-  /// Minimises from `theta` on over the free places; the sum of squares.
+  /// Minimises from `theta` over the free parameters; the sum of squares.
   double solve(PositionerVector& theta, const std::vector<int>& free, int max_steps = 40) const;
   /// Of the integration: coarse to search, fine to estimate.
   void set_integration(double step_s) { integration_s_ = step_s; }

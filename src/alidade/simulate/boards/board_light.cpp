@@ -73,7 +73,7 @@ BoardLight::BoardLight(const BoardScene& scene, std::size_t i, const RenderConfi
       near_max_(2.0 * pattern_.print_max() - pattern_.print_min()),
       background_(width_, height_, kernel_.reach, config.background_texture, seed) {}
 
-/// Place on the board that a pixel's centre sees; NaN where it does not see the board's plane.
+/// Point on the board seen by a pixel's centre; NaN where it does not see the board's plane.
 Eigen::Vector2d BoardLight::place(int u, int v) const {
   const Eigen::Vector2d none = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   const Eigen::Vector3d ray = rotation_ * rays_.ray(u, v);

@@ -45,7 +45,7 @@ class WavyBackground {
   Eigen::MatrixXd across_, down_;
 };
 
-/// Second-order expansion of the place on the board around a pixel's centre, from the eight pixels around it.
+/// Second-order expansion of the point on the board around a pixel's centre, from the eight pixels around it.
 struct LocalPlace;
 
 /// The light of photo `i` of a scene, by casting rays through the lens on the (bent) board: the print's light, blurred

@@ -31,7 +31,7 @@ struct BoardSceneConfig {
 };
 
 /// Draws a scene in which every point of every board is seen. Same seed, same scene.
-/// Tilts, rolls, places in the image and distances vary; where a pose drawn so would not fit, the board moves away.
+/// Tilts, rolls, positions in the image and distances vary; where a pose drawn so would not fit, the board moves away.
 [[nodiscard]] BoardScene draw_board_scene(const Camera& camera, const Board& board, const BoardSceneConfig& config,
                                           std::uint64_t seed);
 
@@ -44,7 +44,7 @@ struct BoardSceneConfig {
 /// Corners without images: truth plus normal noise of `sigma_px` a coordinate, with that covariance.
 [[nodiscard]] std::vector<BoardView> simulate_views(const BoardScene& scene, double sigma_px, std::uint64_t seed);
 
-/// Moves the corners of each view by a smooth field of their place on the board, drawn again for each: a quadratic
+/// Moves the corners of each view by a smooth field of their position on the board, drawn again for each: a quadratic
 /// polynomial a coordinate of which each term has `sigma_px` at the board's border. What blur, rolling shutter, a
 /// bending board or a lens model that is too poor do: errors that a photo's corners share.
 void add_shared_errors(const BoardScene& scene, double sigma_px, std::uint64_t seed, std::vector<BoardView>& views);

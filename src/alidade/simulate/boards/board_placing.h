@@ -11,7 +11,7 @@ namespace alidade {
 [[nodiscard]] std::vector<Eigen::Vector3d> draw_bent_points(const Board& board, const BoardSceneConfig& config,
                                                             Draws& draws);
 
-/// Places [m] whose visibility makes the board visible: the outline of what is printed, and the points.
+/// Points [m] whose visibility makes the board visible: the outline of what is printed, and the points.
 [[nodiscard]] std::vector<Eigen::Vector3d> visible_outline(const BoardScene& scene);
 
 /// Whether all points lie in the image, with room for the fit's pixels and the blur.

@@ -139,7 +139,7 @@ std::optional<Eigen::Vector2d> BoardSurface::intersect(const Eigen::Vector3d& or
   const double tolerance = 1e-7 * (s_[1] - s_[0]);
   for (int i = 0; i < max_iterations; ++i) {
     const Patch here = patch(place);
-    Eigen::Matrix3d J;  // point(place) = origin + depth · ray
+    Eigen::Matrix3d J;  // point(position) = origin + depth · ray
     J << here.along_s, here.along_t, -ray_in_board;
     const Eigen::Vector3d step = J.inverse() * (origin_in_board - here.point);
     if (!step.allFinite()) return std::nullopt;

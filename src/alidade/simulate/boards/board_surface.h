@@ -9,8 +9,8 @@
 
 namespace alidade {
 
-/// The surface of a bent board: nominal place (s, t) → point in frame `board` [m]. Passes through every true point of
-/// the board; between them and around them the displacement from the plane is a smooth cubic (Hermite) of both
+/// The surface of a bent board: nominal position (s, t) → point in frame `board` [m]. Passes through every true point
+/// of the board; between them and around them the displacement from the plane is a smooth cubic (Hermite) of both
 /// coordinates, and a parabola where the points lie on one.
 class BoardSurface {
  public:
@@ -20,7 +20,7 @@ class BoardSurface {
   [[nodiscard]] bool is_flat() const { return is_flat_; }
   [[nodiscard]] Eigen::Vector3d point(const Eigen::Vector2d& place) const { return patch(place).point; }
 
-  /// Place where a ray meets the surface in front of its origin, from the place `start` near it. None if it misses.
+  /// Point where a ray meets the surface in front of its origin, from the initial guess `start`. None if it misses.
   [[nodiscard]] std::optional<Eigen::Vector2d> intersect(const Eigen::Vector3d& origin_in_board,
                                                          const Eigen::Vector3d& ray_in_board,
                                                          const Eigen::Vector2d& start) const;

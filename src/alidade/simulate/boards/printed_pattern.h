@@ -8,18 +8,18 @@
 
 namespace alidade {
 
-/// What is printed on a board: the ink at any place and where its edges are. Places are nominal coordinates in frame
+/// What is printed on a board: the ink at any point and where its edges are. Positions are nominal coordinates in frame
 /// `board` [m], as those of points_in_board(). Around the pattern there is a margin of paper.
 class PrintedPattern {
  public:
   /// Needs a board without fault().
   explicit PrintedPattern(const Board& board);
 
-  /// Ink at a place: 1 black, 0 paper, `outside` off the paper. Near an edge the two sides are mixed over a ramp of the
+  /// Ink at a point: 1 black, 0 paper, `outside` off the paper. Near an edge the two sides are mixed over a ramp of the
   /// full widths given [m].
   [[nodiscard]] double ink(const Eigen::Vector2d& place, const Eigen::Vector2d& ramp, double outside) const;
 
-  /// The ink at a place without an edge within ±`reach` [m] of it, axis by axis. None where an edge may be so near.
+  /// The ink at a point without an edge within ±`reach` [m] of it, axis by axis. None where an edge may be so near.
   [[nodiscard]] std::optional<double> even_ink(const Eigen::Vector2d& place, const Eigen::Vector2d& reach,
                                                double outside) const;
 
@@ -28,7 +28,7 @@ class PrintedPattern {
   [[nodiscard]] Eigen::Vector2d print_max() const { return print_max_; }
 
  private:
-  /// Ascending places where the ink may change along one axis; cell i lies between edges i−1 and i.
+  /// Ascending positions where the ink may change along one axis; cell i lies between edges i−1 and i.
   struct Axis {
     std::vector<double> edges;
     std::vector<std::size_t> first_edge;  ///< Per bin: the first edge beyond the bin's start.

@@ -12,7 +12,7 @@ ObservationRay ray_or_nan(const Camera& camera, double u, double v) {
   return observation_ray(camera, {u, v}).value_or(ObservationRay{nowhere, nowhere});
 }
 
-/// Lagrange's cubic weights of four nodes at −1, 0, 1, 2 for a place x in [0, 1).
+/// Lagrange's cubic weights of four nodes at −1, 0, 1, 2 for a position x in [0, 1).
 std::array<double, 4> cubic_weights(double x) {
   return {-x * (x - 1.0) * (x - 2.0) / 6.0, (x + 1.0) * (x - 1.0) * (x - 2.0) / 2.0, -(x + 1.0) * x * (x - 2.0) / 2.0,
           (x + 1.0) * x * (x - 1.0) / 6.0};

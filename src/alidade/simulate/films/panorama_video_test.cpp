@@ -27,7 +27,7 @@ cv::Mat photo_of_spots(const std::vector<cv::Point>& spots) {
   return photo;
 }
 
-/// Mean place of a spot's light in the image: perspective makes it lean by 0.02 px.
+/// Centroid of a spot's light in the image: perspective shifts it by 0.02 px.
 Eigen::Vector2d expected_centroid(const cv::Point& spot,
                                   const std::function<Eigen::Vector2d(const Eigen::Vector2d&)>& px_of) {
   constexpr double step = 0.25, h = 0.01;

@@ -20,7 +20,7 @@ namespace {
 
 constexpr double beam_reach = 1.4;  // diameters from the axis; there the light is exp(−8 · 1.4²) = 1.5e-7 of the peak
 
-/// A pose in which the beam hits the board at `range_m`, at a place and under a tilt that are drawn.
+/// A pose in which the beam hits the board at `range_m`, at a random point and tilt.
 Rigid3 draw_hit(const SpotScene& scene, double range_m, const SpotSceneConfig& config, Draws& draws) {
   const PrintedPattern pattern(scene.boards.board);
   const Eigen::Vector2d low = pattern.print_min(), high = pattern.print_max();
@@ -187,7 +187,7 @@ cv::Mat through_bayer(const cv::Mat& photo) {
 
 cv::Mat through_jpeg(const cv::Mat& photo, int quality) { return decode_image(jpeg_bytes(photo, quality)); }
 
-/// Places of the board that carry stickers, the same in all photos.
+/// Points of the board that carry stickers, the same in all photos.
 std::vector<Eigen::Vector3d> stickers_in_cam(const SpotScene& scene, std::size_t i, int num) {
   std::vector<Eigen::Vector3d> places;
   Draws draws(4711);

@@ -24,7 +24,7 @@ struct SpotSceneConfig {
   double bow_m = 0.0, shape_sigma_m = 0.0;  ///< As in BoardSceneConfig.
 };
 
-/// Draws a scene in which every point of every board is seen and the beam hits what is printed, at any place of it.
+/// Draws a scene in which every point of every board is seen and the beam hits the print, at any point of it.
 /// None where no such pose is found: the beam leaves the image, or the board does not fit into it at these ranges.
 [[nodiscard]] std::optional<SpotScene> draw_spot_scene(const Camera& camera, const Board& board,
                                                        const Eigen::Vector3d& beam_origin_in_cam,
@@ -53,8 +53,8 @@ struct SpotPhotoConfig {
   LaserLight laser;
   double exposure = 1.0;                      ///< Factor on all light, as of another exposure time.
   bool is_on = true;                          ///< False: the same photo with the laser off.
-  std::vector<Eigen::Vector3d> stray_in_cam;  ///< Further places lit like the spot, as a reflection would.
-  int num_stickers = 0;   ///< Coloured like the laser, at places of the board that stay; there with the laser off, too.
+  std::vector<Eigen::Vector3d> stray_in_cam;  ///< Further points lit like the spot, as a reflection would.
+  int num_stickers = 0;   ///< Coloured like the laser, at fixed points of the board; there with the laser off, too.
   double speckle = 0.0;   ///< Contrast of the laser's speckle: σ over mean of its light in a grain of a pixel.
   bool is_bayer = false;  ///< A sensor with one colour a pixel (RGGB), the others interpolated.
   int jpeg_quality = 0;   ///< Compressed and opened again, as a camera's photo; 0: not.

@@ -73,7 +73,7 @@ std::optional<Eigen::Vector3d> seen_of_target(const TargetView& view, const Eige
   return Eigen::Vector3d::Constant(card.at<unsigned char>(v, u));
 }
 
-/// Rays of the pixel and of the 3 × 3 places in it.
+/// Rays of the pixel and of the 3 × 3 points in it.
 void paint_target(const TargetView& view, const Camera& camera, const cv::Rect& window, cv::Mat& image) {
   constexpr int side = 3;
   for (int v = window.y; v < window.br().y; ++v) {

@@ -25,8 +25,8 @@ struct TargetVideoConfig {
   double clutter = 0.0;  ///< σ of the colours of patches of a degree or two behind the target.
 };
 
-/// What the head's camera sees, 8-bit BGR: soft grey clouds that stand still far away, and the target's centre at that
-/// place of the world, none where it is hidden. Rays through the lens, 3 × 3 per pixel. `seed` draws the noise.
+/// What the head's camera sees, 8-bit BGR: distant static soft grey clouds, and the target's centre at that
+/// point of the world, none where it is hidden. Rays through the lens, 3 × 3 per pixel. `seed` draws the noise.
 [[nodiscard]] cv::Mat render_target_frame(const RigHead& rig_head, const Eigen::Vector2d& pan_tilt_rad,
                                           const std::optional<Eigen::Vector3d>& target_in_world,
                                           const FilmedTarget& target, const TargetVideoConfig& config,

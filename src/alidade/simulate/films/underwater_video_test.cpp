@@ -21,7 +21,7 @@ Camera pinhole_camera() {
   return camera;
 }
 
-/// Straight in front of a place of the board.
+/// Straight in front of a point of the board.
 Rigid3 before(double x_m, double y_m, double distance_m) {
   return {Eigen::Quaterniond::Identity(), {x_m, y_m, -distance_m}};
 }

@@ -75,7 +75,8 @@ class Header {
     return found;
   }
 
-  /// All of these or none: places of those that are there, in this order. The last may be missing where `last_is_free`.
+  /// All of these or none: columns of those that are there, in this order. The last may be missing where
+  /// `last_is_free`.
   std::vector<std::size_t> find_all(std::span<const Names> wanted, bool last_is_free) {
     std::vector<std::size_t> places;
     std::string missing;
@@ -195,7 +196,7 @@ bool is_measured(const CsvRow& row, const Places& places, const RotationLogColum
                    ": is empty, but what belongs to it is not");
 }
 
-/// Reads cells of one row; every fault names its place.
+/// Reads cells of one row; every error names its position.
 struct Cells {
   const CsvRow& row;
   const RotationLogColumns& columns;

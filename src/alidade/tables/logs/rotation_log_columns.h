@@ -10,7 +10,7 @@
 
 namespace alidade {
 
-/// Which column of a rotation log holds what: places in the header.
+/// Which column of a rotation log contains what: indices in the header.
 struct RotationLogColumns {
   /// An angle's column and what its unit is in radians.
   struct Angle {

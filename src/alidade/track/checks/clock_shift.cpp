@@ -84,7 +84,7 @@ BlockCosts costs_of(const std::vector<std::vector<TargetObservation>>& stretches
   return best;
 }
 
-/// Whether the gain comes from more than one place of the log.
+/// Whether the gain comes from more than one part of the log.
 bool is_throughout(const BlockCosts& told, const BlockCosts& shifted) {
   constexpr double min_elsewhere = 10.0;  // of ln p, without the eighth that gains most
   double sum = 0.0, most = 0.0;

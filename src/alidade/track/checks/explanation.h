@@ -13,7 +13,7 @@ struct ClockShift;
 /// A mistake under which observations that do not fit the rig would.
 struct Explanation {
   std::string what, to_do;
-  bool is_foreign_head = false;  ///< One head agrees with none of the others: by its place, or by its clock.
+  bool is_foreign_head = false;  ///< One head agrees with none of the others: by its pose, or by its clock.
 };
 
 /// Swapped heads, a wrong sign of an angle or a mirrored image, of all heads or of one, degrees, a head that is not

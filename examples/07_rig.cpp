@@ -20,7 +20,7 @@ int main(int argc, char** argv) {
     const double sigma = std::sqrt(result.covariance(k, k));
     if (sigma > 0.0) std::printf("%-24s σ %.2g\n", result.parameter_names[i].c_str(), sigma);
   }
-  // Where the second camera stands when its head has turned.
+  // The second camera's pose when its head has rotated.
   const alidade::Rigid3 world_from_cam = alidade::world_from_cam(result.rig.heads[1].head, {0.2, -0.1});
   std::printf("camera 2 at (%.4f, %.4f, %.4f) m\n", world_from_cam.translation.x(), world_from_cam.translation.y(),
               world_from_cam.translation.z());

@@ -19,7 +19,7 @@ void add_photos(CLI::App& command, std::vector<std::filesystem::path>& photos, b
 /// Throws InputError where none of the photos of a calibration could be read.
 void require_readable(const PhotoSet& set, const Calibration& calibration);
 
-/// What was read goes to the run's inputs; what lay beside the photos and how they are turned, to what it says.
+/// What was read goes to the run's inputs; what lay beside the photos and their orientation, to what it says.
 void tell_photos(const PhotoSet& set, Counts& counts, Verdict& verdict, Run& run);
 
 }  // namespace alidade::cli

@@ -27,7 +27,7 @@ struct UndistortArgs {
 
 cv::Mat read_photo(const std::string& file, const Camera& camera) {
   const std::string bytes = read_file(file);
-  const cv::Mat photo = decode_image(bytes, /*keep_alpha=*/true);  // as the sensor saw it: no turn by EXIF
+  const cv::Mat photo = decode_image(bytes, /*keep_alpha=*/true);  // as the sensor saw it: no EXIF rotation
   if (photo.empty()) throw InputError(file + ": is not a photo that can be read");
   if (photo.cols != camera.width_px || photo.rows != camera.height_px) {
     throw InputError(fmt::format("{}: is {} × {} px, but the camera is {} × {} px", file, photo.cols, photo.rows,

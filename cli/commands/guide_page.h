@@ -90,7 +90,7 @@ class GuidePage {
   std::unique_ptr<State> state_;
 };
 
-/// Pixels to a hundredth, u and v in turn: "[1.25,3,…]".
+/// Pixels to a hundredth, u and v alternating: "[1.25,3,…]".
 [[nodiscard]] std::string flat_pixels(const std::vector<Eigen::Vector2d>& pixels);
 
 }  // namespace alidade::cli

@@ -250,7 +250,7 @@ TEST_F(ObservePhotos, AreRefusedByNameWhereTheyCannotTell) {
   expect({"--pairs", path("sim/pairs.csv"), "--size", "300x200"}, 3, "lie outside");
 }
 
-/// Seven photos of a camera turned by hand, with external matches and with ours. 5.7 mm before a sensor of 1/2.3 inch:
+/// Seven photos of a camera rotated by hand, with external matches and with ours. 5.7 mm before a sensor of 1/2.3 inch:
 /// 1172 to 1211 px.
 TEST(Observe, ARealCameraTurnedByHandTellsItsFocalLengthAndSaysWhatItCannot) {
   const char* data = std::getenv("ALIDADE_DATA");

@@ -17,7 +17,7 @@ namespace {
 using ::testing::HasSubstr;
 using testing::Outcome;
 
-/// A photo of a room, and the scan of a rangefinder that turned with the camera.
+/// A photo of a room, and the scan of a rangefinder that rotated with the camera.
 class EdgesCommand : public testing::CommandTest {
  protected:
   void SetUp() override {

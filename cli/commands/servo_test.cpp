@@ -324,7 +324,7 @@ TEST_F(ServoCommand, FollowsWhatARealOperatorFollowed) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const Json document = Json::parse(outcome.out);
   const Json& compared = document["estimate"]["controllers"];
-  // PI lags a turning target by its rate over the loop's 2.9 rad/s; what predicts does not.
+  // PI lags a rotating target by its rate over the loop's 2.9 rad/s; a predictor does not.
   EXPECT_LT(compared["lqr"]["rms_px"].get<double>(), 0.5 * compared["pi"]["rms_px"].get<double>());
   EXPECT_EQ(compared["lqr"]["central_third"], 1.0);
   EXPECT_EQ(document["inputs"][1]["role"], "track");

@@ -107,7 +107,7 @@ TEST_F(TrackCommand, WhatARigDoesNotSayOfItsErrorsIsAssumed) {
   const Json unknown = Json::parse(outcome.out);
   EXPECT_EQ(unknown["verdict"]["state"], "care");
   EXPECT_THAT(unknown["verdict"]["sentence"].get<std::string>(), ::testing::HasSubstr("given without σ"));
-  // 0.5 % of a scale that is read at φ turns a ray by 0.005 φ.
+  // 0.5 % of a scale at the reading φ rotates a ray by 0.005 φ.
   bool has_scale = false;
   for (const Json& what : unknown["assumed"]) has_scale = has_scale || what["name"] == "head1.pan_scale";
   EXPECT_TRUE(has_scale);

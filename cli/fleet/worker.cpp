@@ -249,7 +249,7 @@ class Worker {
     return true;
   }
 
-  /// All observations up to there are in the states: those that wait for their turn are not.
+  /// All observations up to there are in the states: those that wait for earlier ones are not.
   [[nodiscard]] std::uint64_t safe_position() const {
     std::uint64_t position = position_;
     if (num_early_ == 0) return position;

@@ -160,7 +160,7 @@ TurnedScene turned_scene_of(const SimulateRotationArgs& args, const RotationScen
   return turned;
 }
 
-/// Photos of a camera that is turned by hand, and matches between them: what `observe PHOTOS` and `--pairs` take. The
+/// Photos of a camera rotated by hand, and matches between them: what `observe PHOTOS` and `--pairs` take. The
 /// photos' world is far away and is static; lever, depths, what moves and wrong matches are of pairs.csv.
 ExitCode simulate_photos(const SimulateRotationArgs& args, const RotationScene& scene, Run& run) {
   const TurnedScene turned = turned_scene_of(args, scene);

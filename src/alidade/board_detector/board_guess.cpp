@@ -18,7 +18,7 @@ bool has_markers(const Board& board) { return board.kind == BoardKind::charuco |
 
 using Sizes = std::vector<std::pair<int, int>>;
 
-/// Columns and rows of the usual slips. A chessboard is the same one turned by a quarter: of two that are equally near
+/// Columns and rows of common mistakes. A chessboard is the same one rotated by a quarter: of two that are equally near
 /// to what was given the wide one comes first.
 Sizes slips(const Board& told) {
   const int c = told.cols, r = told.rows;

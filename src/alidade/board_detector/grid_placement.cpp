@@ -7,7 +7,7 @@
 namespace alidade {
 namespace {
 
-/// A way to lay the grid on the board: a quarter turn count, then a shift in columns and rows.
+/// A way to lay the grid on the board: a number of quarter turns, then a shift in columns and rows.
 struct Placement {
   int quarter_turns = 0, shift_cols = 0, shift_rows = 0;
 };
@@ -27,14 +27,14 @@ GridCell turned(const GridCell& cell, int quarter_turns) {
   }
 }
 
-/// Extent of the turned grid.
+/// Extent of the rotated grid.
 GridExtent turned(const GridExtent& extent, int quarter_turns) {
   const auto [i, j] = turned(GridCell{extent.i_min, extent.j_min}, quarter_turns);
   const auto [k, l] = turned(GridCell{extent.i_max, extent.j_max}, quarter_turns);
   return {std::min(i, k), std::max(i, k), std::min(j, l), std::max(j, l)};
 }
 
-/// Known borders of the turned grid, in the same order: i_min, i_max, j_min, j_max.
+/// Known borders of the rotated grid, in the same order: i_min, i_max, j_min, j_max.
 GridBorders turned(const GridBorders& b, int quarter_turns) {
   switch (quarter_turns) {
     case 1:
@@ -58,7 +58,7 @@ bool first_square_is_dark(const Placement& placement) {
   return (placement.shift_cols + placement.shift_rows + placement.quarter_turns) % 2 != 0;
 }
 
-/// cos of the angle by which the board is turned in the image: 1 where columns run right and rows down.
+/// cos of the angle by which the board is rotated in the image: 1 where columns run right and rows down.
 double uprightness(const CornerGrid& grid, int quarter_turns) {
   Eigen::Vector2d along_i = Eigen::Vector2d::Zero(), along_j = Eigen::Vector2d::Zero();
   for (const auto& [cell, corner] : grid.corners) {

@@ -18,8 +18,8 @@ struct PlacedGrid {
 };
 
 /// Numbers a grid as a board of cols × rows inner corners, never mirrored. The square outside corner (0, 0) is the dark
-/// one where the pattern has only one such position; where turned boards look the same, columns run to the right in the
-/// image. Part of a board is placed if its size, colours and `borders` leave one position only.
+/// one where the pattern has only one such position; where rotated boards look the same, columns run to the right in
+/// the image. Part of a board is placed if its size, colours and `borders` leave one position only.
 [[nodiscard]] PlacedGrid place_grid(const CornerGrid& grid, int cols, int rows, const GridBorders& borders = {});
 
 }  // namespace alidade

@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-/// A board as seen, turned by an angle, with the dark square outside the corner that numbering should call (0, 0); the
+/// A board as seen, rotated by an angle, with the dark square outside the corner that numbering should call (0, 0); the
 /// grid counts from anywhere, in steps of its own.
 CornerGrid seen_board(int cols, int rows, double angle_rad, int quarter_turns_of_grid = 0) {
   const Eigen::Rotation2Dd turn(angle_rad);

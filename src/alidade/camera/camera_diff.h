@@ -41,7 +41,7 @@ struct CameraDiff {
 };
 
 /// Compares what two cameras of one image size see. The models may differ. The motion is fitted by Gauss–Newton with
-/// weights 1/σ² where σ is known, and robust ones, so that corners where a model fails do not turn the image.
+/// weights 1/σ² where σ is known, and robust ones, so that corners where a model fails do not rotate the image.
 /// None where the sizes differ or fewer than ten pixels of the grid are seen by both.
 /// D. Kogan, mrcal, "Differencing"; docs/maths/camera-models.md.
 [[nodiscard]] std::optional<CameraDiff> diff_cameras(const Camera& a, const Camera& b,

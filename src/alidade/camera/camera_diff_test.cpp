@@ -50,7 +50,7 @@ TEST(CameraDiff, OfACameraWithItselfIsNothing) {
 }
 
 TEST(CameraDiff, TakesAKnownRotationOut) {
-  // A pinhole whose image was turned about the optical axis needs skew-free lenses: turn about z by re-labelling.
+  // A pinhole whose image was rotated about the optical axis needs skew-free lenses: rotation about z by re-labelling.
   // b = a with the principal point moved: for a long lens that is a rotation of Δc/f.
   Camera a{640, 480, Calibrated<Pinhole>{Params<Pinhole>{8000.0, 8000.0, 319.5, 239.5, 0.0}}, {}, 0.0, {}};
   Camera b = a;

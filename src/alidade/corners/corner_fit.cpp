@@ -231,7 +231,7 @@ Solution levenberg_marquardt(const CornerWindow& window, const Model& start, int
   return best;
 }
 
-/// Covariance of the corner: that of the two offsets, turned into x and y.
+/// Covariance of the corner: that of the two offsets, transformed to x and y.
 Eigen::Matrix2d covariance_of(const Solution& solution, double variance) {
   const Matrix7 inverse = solution.sums.topLeftCorner<7, 7>().ldlt().solve(Matrix7::Identity());
   Eigen::Matrix2d normals;

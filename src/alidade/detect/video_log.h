@@ -10,7 +10,7 @@
 
 namespace alidade {
 
-/// How a camera turned while it filmed: a rotation log without points. Throws InputError.
+/// How a camera rotated while it filmed: a rotation log without points. Throws InputError.
 [[nodiscard]] RotationLog read_angles(const std::filesystem::path& csv);
 
 struct VideoLogConfig {
@@ -32,10 +32,9 @@ struct VideoLog {
 };
 
 /// Follows points through the video. One row a frame; for source `rate` the samples between the frames stand between
-/// them as rows without pixels, because the turn is their integral. Throws InputError: a frame that cannot be read or
-/// has another size, a frame whose time the angles do not cover, more or fewer rows than frames where no rate is given,
-/// nothing to follow.
-/// `angles_name` begins the messages about the angles.
+/// them as rows without pixels, because the rotation is their integral. Throws InputError: a frame that cannot be read
+/// or has another size, a frame whose time the angles do not cover, more or fewer rows than frames where no rate is
+/// given, nothing to follow. `angles_name` begins the messages about the angles.
 [[nodiscard]] VideoLog log_from_video(VideoFrames& video, const RotationLog& angles, const std::string& angles_name,
                                       const VideoLogConfig& config = {}, const Progress& progress = {});
 

@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// Three models that take turns: a quiet one of constant velocity, an agile one of Singer's, and free fall.
+/// Three switching models: a quiet one of constant velocity, an agile one of Singer's, and free fall.
 struct InteractingModels {
   ConstantVelocity quiet{0.15};
   Singer agile;

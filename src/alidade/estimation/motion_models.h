@@ -8,7 +8,7 @@
 namespace alidade {
 
 /// How a target moves between measurements: the belief dt ≥ 0 later. The first three numbers of every state are the
-/// position [m], the next three the velocity [m/s]; the frame is the caller's and does not turn.
+/// position [m], the next three the velocity [m/s]; the frame is the caller's and does not rotate.
 template <class Model>
 concept MotionModel = requires(const Model& model, const Belief<Model::dim>& belief, double dt_s) {
   { Model::dim } -> std::convertible_to<int>;
@@ -72,7 +72,7 @@ struct Singer {
   [[nodiscard]] Belief<9> predicted(const Belief<9>& belief, double dt_s) const;
 };
 
-/// Turn in space: dv = ω × v dt + noise, ω a random walk. State [p, v, ω], ω in rad/s.
+/// Coordinated turn in space: dv = ω × v dt + noise, ω a random walk. State [p, v, ω], ω in rad/s.
 /// Bar-Shalom, Li & Kirubarajan, 2001, section 11.7, in three dimensions.
 struct CoordinatedTurn {
   static constexpr int dim = 9;

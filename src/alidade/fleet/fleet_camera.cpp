@@ -14,7 +14,7 @@
 namespace alidade {
 namespace {
 
-constexpr int frozen_rows = 5;      // the same pixels so often, while the camera turned
+constexpr int frozen_rows = 5;      // the same pixels so often, while the camera rotated
 constexpr double turned_px = 3.0;   // by so much that they would have moved
 constexpr double fresh_s = 3600.0;  // an alarm is in the verdict for so long
 constexpr double most_rad = 1e3;    // of an angle or a rate

@@ -130,7 +130,7 @@ double scale_of(const Fields& fields, const std::string& key) {
   return scale;
 }
 
-/// The amplitude of an error of one period a turn; a third of a radian is no disc off its axis.
+/// The amplitude of an error of one period per turn; a third of a radian is no eccentric disc.
 double amplitude_of(const Fields& fields, const std::string& key) {
   if (!fields.has(key)) return 0.0;
   const double amplitude = fields.number(key);

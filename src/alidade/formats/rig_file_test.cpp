@@ -133,7 +133,7 @@ TEST_F(RigFile, SaysWhatIsExactAndWhatHeadsShareWithLenses) {
   const Eigen::Index lens = params(rig.heads[0].camera.lens).size(), size = 2 * num_head_params + 2 * lens;
   rig.cov_with_lenses.setZero(size, size);
   const std::array<Eigen::Index, 3> at{4, num_head_params + 4,
-                                       2 * num_head_params + lens};  // a turn of each base, the second's fx
+                                       2 * num_head_params + lens};  // a rotation of each base, the second's fx
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t j = 0; j < 3; ++j) rig.cov_with_lenses(at[i], at[j]) = i == j ? 2.0 : 0.5;
   rig.cov = rig.cov_with_lenses.topLeftCorner(2 * num_head_params, 2 * num_head_params);

@@ -87,7 +87,7 @@ TEST(Decompositions, EigenvaluesAreThePolynomialsRoots) {
 TEST(Decompositions, NearestRotationOfATurnedStretchIsTheTurn) {
   const Eigen::Matrix3d R = exp_so3({0.4, -1.1, 0.3}).toRotationMatrix();
   EXPECT_LT((nearest_rotation(R * Eigen::Vector3d(3, 2, 0.5).asDiagonal()) - R).norm(), 1e-12);
-  EXPECT_NEAR(nearest_rotation(-R).determinant(), 1.0, 1e-12);  // a mirror image has no turn of its own
+  EXPECT_NEAR(nearest_rotation(-R).determinant(), 1.0, 1e-12);  // a mirror image has no rotation of its own
 }
 
 }  // namespace

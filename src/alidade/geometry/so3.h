@@ -30,7 +30,7 @@ ALIDADE_PUBLIC_BEGIN
   return (Eigen::Matrix3d() << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0).finished();
 }
 
-/// The shortest rotation that turns one direction into another; of opposite ones any, by π. Eigen's FromTwoVectors says
+/// The shortest rotation that takes one direction into another; of opposite ones any, by π. Eigen's FromTwoVectors says
 /// the same, and takes seconds to compile wherever it is used: it holds a singular value decomposition.
 [[nodiscard]] inline Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   const Eigen::Vector3d a = from.normalized(), b = to.normalized();

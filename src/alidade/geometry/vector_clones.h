@@ -17,7 +17,7 @@
 #define ALIDADE_VECTOR_CLONES
 #endif
 
-/// Before a loop: no number that it writes is read by another turn.
+/// Before a loop: no number that it writes is read by another iteration.
 #ifdef __clang__
 #define ALIDADE_NO_ALIASES _Pragma("clang loop vectorize(assume_safety)")
 #else

@@ -7,8 +7,8 @@ namespace alidade {
 
 /// What an image file says of itself beside its pixels.
 struct ExifTags {
-  /// How a viewer is to turn the stored pixels: 1 as they are, 3 upside down, 6 and 8 a quarter turn, 2 4 5 7 mirrored;
-  /// 0 where the file does not say. CIPA DC-008 (Exif 2.32), tag 0x0112.
+  /// How a viewer is to rotate the stored pixels: 1 as they are, 3 upside down, 6 and 8 a quarter turn, 2 4 5 7
+  /// mirrored; 0 where the file does not say. CIPA DC-008 (Exif 2.32), tag 0x0112.
   int orientation = 0;
   /// Where the orientation's two bytes stand in the file, and whether the lower comes first; meaningful where it is
   /// given.

@@ -12,7 +12,7 @@
 namespace alidade {
 namespace {
 
-/// Why a kind is not read, and what helps. Turning an image on the way would move its centre.
+/// Why a kind is not read, and what helps. Rotating an image on the way would move its centre.
 std::string advice_for(const std::string& kind) {
   if (kind == "raw")
     return "is a camera's raw file: develop it to TIFF or PNG, without correcting the lens or turning it";

@@ -15,7 +15,7 @@
 namespace alidade {
 namespace {
 
-/// How most photos are turned: 1 to 8.
+/// The orientation of most photos: 1 to 8.
 int usual_orientation(const std::vector<int>& orientations) {
   std::array<int, 9> counts{};
   for (const int orientation : orientations) ++counts.at(static_cast<std::size_t>(orientation));

@@ -30,8 +30,8 @@ class PhotoSet {
   [[nodiscard]] const std::vector<SkippedInput>& skipped() const;
   /// The same in a line for a user; "" for none.
   [[nodiscard]] std::string skipped_line() const;
-  /// Names the photos that a viewer would turn otherwise than most of them, and says that they were not turned. None
-  /// where all stand alike.
+  /// Names the photos that a viewer would rotate differently from most of them, and says that they were not rotated.
+  /// None where all stand alike.
   [[nodiscard]] std::optional<Check> turned() const;
   /// Throws InputError, about the first, where none of them could be read; `reason`: why that one.
   void require_readable(std::size_t num_unreadable, const std::string& reason) const;

@@ -31,8 +31,8 @@ void sort_naturally(std::vector<std::filesystem::path>& files);
 /// The photos alone.
 [[nodiscard]] std::vector<std::filesystem::path> list_photos(const std::vector<std::filesystem::path>& arguments);
 
-/// Decodes a photo as it is: 8 or 16 bit, grey or colour; any EXIF turn is ignored, as the lens does not turn. Throws
-/// InputError: empty, not an image, of a kind that is not read (what to do is said), cut off.
+/// Decodes a photo as it is: 8 or 16 bit, grey or colour; any EXIF rotation is ignored, as the lens does not rotate.
+/// Throws InputError: empty, not an image, of a kind that is not read (what to do is said), cut off.
 [[nodiscard]] cv::Mat decode_photo(std::string_view bytes);
 /// The same, with the file's name before the fault.
 [[nodiscard]] cv::Mat decode_photo(std::string_view bytes, const std::string& file);

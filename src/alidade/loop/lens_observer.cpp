@@ -32,7 +32,7 @@ HybridConfig observer_config(const RigHead& head, std::size_t num_points, const 
   return config;
 }
 
-/// Spread of the angles that a camera was turned to, so far. [rad²]
+/// Spread of the angles that a camera was rotated to, so far. [rad²]
 class TurnSpread {
  public:
   void add(const Eigen::Vector2d& pan_tilt_rad) {

@@ -29,7 +29,7 @@ cv::Mat texture(int width, int height) {
   return grey;
 }
 
-/// Where a point of the first image is in the turned one.
+/// Where a point of the first image is in the rotated one.
 cv::Mat turned(const cv::Mat& image, cv::Mat& map) {
   map = cv::getRotationMatrix2D({320.0F, 240.0F}, 12.0, 1.0);
   map.at<double>(0, 2) += 35.5;

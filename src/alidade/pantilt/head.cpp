@@ -59,7 +59,7 @@ Eigen::Vector2d Encoder::angles(const Eigen::Vector2d& readings_rad) const {
   return {pan_scale * (r.x() - pan_zero_rad), tilt_scale * (r.y() - tilt_zero_rad)};
 }
 
-/// The error of one period a turn is taken away by a contraction: its amplitude is the factor of each step.
+/// The error of one period per turn is taken away by a contraction: its amplitude is the factor of each step.
 Eigen::Vector2d Encoder::readings(const Eigen::Vector2d& angles_rad) const {
   const Eigen::Vector2d wanted(angles_rad.x() / pan_scale + pan_zero_rad, angles_rad.y() / tilt_scale + tilt_zero_rad);
   constexpr int max_steps = 60;

@@ -14,7 +14,7 @@ namespace alidade {
          exp_so3({0.0, 0.0, pan_tilt_roll_rad.z()});
 }
 
-/// Angular rate in the camera frame of a head that turns with these rates: without roll
+/// Angular rate in the camera frame of a head that rotates with these rates: without roll
 /// (τ̇, −α̇ cos τ, α̇ sin τ), so that ω_z is zero at zero tilt alone.
 [[nodiscard]] inline Eigen::Vector3d head_rate_in_cam(const Eigen::Vector3d& pan_tilt_roll_rad,
                                                       const Eigen::Vector3d& rate_rad_per_s) {

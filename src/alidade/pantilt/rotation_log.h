@@ -13,7 +13,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// How the rotation of a camera was measured while it turned.
+/// How the rotation of a camera was measured while it rotated.
 enum class RotationSource {
   none,      ///< Not at all: the pixels must determine it.
   rate,      ///< Angular rate, rad/s, in the camera frame.
@@ -23,7 +23,7 @@ enum class RotationSource {
 
 inline constexpr double not_seen = std::numeric_limits<double>::quiet_NaN();
 
-/// One instant of a rotating camera: how it had turned, and where it saw static points. What was not measured
+/// One instant of a rotating camera: its rotation, and where it saw static points. What was not measured
 /// is NaN (the attitude: all zeros).
 struct RotationRow {
   double t_s = 0.0;

@@ -15,7 +15,7 @@ struct PointMove {
 };
 
 /// A smooth map of a whole image onto another, a cubic polynomial through many moved points: how the perspective of a
-/// turn, and the lens, bend what is seen. A far world needs no more, with any lens.
+/// rotation, and the lens, curve what is seen. A far world needs no more, with any lens.
 class ImageWarp {
  public:
   /// None for too few points. Points that moved differently from the rest are rejected.

@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-/// A turn of 0.15 rad of a camera of f = 500: the homography of its perspective.
+/// A rotation of 0.15 rad of a camera of f = 500: the homography of its perspective.
 Eigen::Vector2d turned(const Eigen::Vector2d& px) {
   const double x = (px.x() - 320.0) / 500.0, y = (px.y() - 240.0) / 500.0, c = std::cos(0.15), s = std::sin(0.15);
   const double depth = c - s * x;

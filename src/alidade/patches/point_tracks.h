@@ -28,7 +28,7 @@ struct TrackedPoint {
 };
 
 /// Follows points of a still world through a video, frame by frame. Each is found by frame-to-frame flow, checked
-/// forward and backward, and then aligned with its patch as first seen, turned and stretched as needed: errors do not
+/// forward and backward, and then aligned with its patch as first seen, rotated and stretched as needed: errors do not
 /// add up along the video. What is lost is replaced by new points where the image has room.
 class PointTracker {
  public:

@@ -28,7 +28,7 @@ struct PatchView {
 /// and costs a hundredth of it.
 class ReferencePatch {
  public:
-  static constexpr int half_px = 12;         ///< More than a view needs: it may be seen turned and larger.
+  static constexpr int half_px = 12;         ///< More than a view needs: it may be seen rotated and larger.
   static constexpr int margin_px = half_px;  ///< Pixels around that have to be in the image.
   static constexpr int side_px = 2 * half_px + 1;
   static constexpr std::size_t area_px = static_cast<std::size_t>(side_px) * side_px;

@@ -16,7 +16,7 @@ ALIDADE_PUBLIC_BEGIN
 /// The document of corners, its lines, and corners.csv where there are any.
 [[nodiscard]] JobOutcome outcome_of(const FoundCorners& found);
 
-/// Adds what became of the photos' files: the inputs, what lay beside the photos, and how they are turned.
+/// Adds what became of the photos' files: the inputs, other files beside the photos, and their orientation.
 void add_photos(const PhotoSet& set, JobOutcome& outcome);
 
 /// Adds small images of the photos for the report, and the worst one without its distortion.

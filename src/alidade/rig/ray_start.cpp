@@ -23,7 +23,7 @@ Eigen::Vector3d best_translation(std::span<const ObservationLine> lines, const E
   return solve_symmetric(A, b);
 }
 
-/// The rotation that turns the points best onto where their lines pass nearest to them.
+/// The rotation that best takes the points to where their lines pass nearest to them.
 Eigen::Matrix3d best_rotation(std::span<const ObservationLine> lines, const Eigen::Matrix3d& R,
                               const Eigen::Vector3d& t) {
   const auto num = static_cast<double>(lines.size());

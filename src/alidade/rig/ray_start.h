@@ -14,9 +14,9 @@ struct ObservationLine {
   Eigen::Vector3d point_in_board;
 };
 
-/// The pose of points that are seen along such lines, by orthogonal iteration from the 24 turns of a cube, and the mean
-/// capped angle that is left. None for fewer than six lines.
-/// Lu, Hager & Mjolsness, "Fast and globally convergent pose estimation from video images", 2000.
+/// The pose of points that are seen along such lines, by orthogonal iteration from the 24 rotations of a cube, and the
+/// mean capped angle that is left. None for fewer than six lines. Lu, Hager & Mjolsness, "Fast and globally convergent
+/// pose estimation from video images", 2000.
 struct ObservationPose {
   Rigid3 base_from_board;
   double misfit_rad = 0.0;
@@ -29,7 +29,7 @@ struct ObservationPose {
                                                               const std::vector<bool>& usable, const RigHead& rig_head,
                                                               std::size_t head, std::size_t board);
 
-/// The turns that take a cube into itself.
+/// The rotations that take a cube to itself.
 [[nodiscard]] std::vector<Eigen::Quaterniond> turns_of_a_cube();
 
 }  // namespace alidade

@@ -19,7 +19,8 @@ struct Candidate {
   FreedParams params;
 };
 
-/// An error of two periods a turn is no parameter: over the angles of a head a scale and one period do nearly as well.
+/// An error of two periods per turn is no parameter: over the angles of a head a scale and one period do nearly as
+/// well.
 std::vector<int> params_of(const std::string& name) {
   const int axis = name.starts_with("tilt") ? 1 : 0;
   if (name == "camera.fx") return {focal_param};

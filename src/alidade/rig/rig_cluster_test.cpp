@@ -171,7 +171,7 @@ TEST(RigGiven, MovesAreThoseOfASecondSolve) {
     }
     if (what.name == "square_m")
       for (Eigen::Vector3d& point : other_points) point *= 1.0 + step / 0.025;
-    // An axis that turns a little more than is read: as if more had been read.
+    // An axis that rotates slightly more than is read: as if more had been read.
     for (HeadView& view : other_views) {
       const std::string head = "head" + std::to_string(view.head);
       if (what.name == head + ".pan_scale") view.pan_tilt_rad.x() *= 1.0 + step;
@@ -254,7 +254,7 @@ TEST(RigCauses, AreNamedWithTheirSize) {
       config.sigma_square_m = config.sigma_scale = 1e-9;
       const RigReport report = calibrate_rig(views, points_in_board(scene.board), cameras, config);
       const std::string first = report.causes.empty() ? "none" : report.causes.front().name;
-      // One and two periods a turn, and a scale, are nearly one over ±40°: the axis is what counts.
+      // One and two periods per turn, and a scale, are nearly indistinguishable over ±40°: what matters is the axis.
       const std::string axis = std::string(wrong.name).substr(0, 3);
       named += first.find(axis == "cam" ? wrong.name : axis.c_str()) != std::string::npos ? 1 : 0;
       care += rig_verdict(report, config).state != State::good ? 1 : 0;

@@ -58,7 +58,7 @@ double misfit(const Groups& groups, const Head& head) {
   return sum;
 }
 
-/// One robust Gauss–Newton step of the mounting: each view's turn from its board's centre, by differences.
+/// One robust Gauss–Newton step of the mounting: each view's rotation from its board's centre, by differences.
 Eigen::Vector3d refining_step(const Groups& groups, const MountingStart& mounting) {
   Eigen::Matrix3d H = 1e-9 * Eigen::Matrix3d::Identity();
   Eigen::Vector3d g = Eigen::Vector3d::Zero();

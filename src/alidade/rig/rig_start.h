@@ -9,8 +9,8 @@
 
 namespace alidade {
 
-/// How the camera of a head is mounted, roughly, from how its boards turned: which of its encoders count backwards, and
-/// what is left unexplained.
+/// How the camera of a head is mounted, roughly, from the rotation of its boards: which of its encoders count
+/// backwards, and what is left unexplained.
 struct MountingStart {
   Eigen::Quaterniond cam_from_tilt = Eigen::Quaterniond::Identity();
   double pan_scale = 1.0, tilt_scale = 1.0;  ///< 1 or −1.
@@ -18,7 +18,7 @@ struct MountingStart {
   int num_compared = 0;
 };
 
-/// One view as seen: the readings times `unit`, and how its board was turned.
+/// One view as seen: the readings times `unit`, and its board's rotation.
 struct TurnedView {
   Eigen::Vector2d pan_tilt_rad;
   Eigen::Quaterniond cam_from_board;

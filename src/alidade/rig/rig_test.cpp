@@ -329,7 +329,7 @@ TEST(Rig, ARealHeadsSurveyedPointsAreExplainedToTwoPixels) {
   ASSERT_EQ(report.status, Status::converged);
   EXPECT_EQ(report.views_used, 71);
   EXPECT_LE(report.rms_px / std::sqrt(2.0), 2.0);  // of a coordinate
-  // A positive pan turned this head to the right, a positive tilt up.
+  // A positive pan rotated this head to the right, a positive tilt up.
   EXPECT_LT(report.rig.heads[0].head.encoder.pan_scale, 0.0);
   EXPECT_GT(report.rig.heads[0].head.encoder.tilt_scale, 0.0);
 }

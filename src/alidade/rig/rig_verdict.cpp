@@ -25,7 +25,7 @@ Verdict cannot_tell(std::string sentence, std::string add) {
   return rig_refusal(State::refused, ExitCode::cannot_tell, std::move(sentence), std::move(add));
 }
 
-/// A head that never turned about one of its axes.
+/// A head that never rotated about one of its axes.
 std::optional<Verdict> refusal_by_angles(const RigReport& report) {
   for (const HeadCover& cover : report.covers) {
     const Eigen::Vector2d span = cover.highest_rad - cover.lowest_rad;

@@ -32,7 +32,7 @@ std::optional<Eigen::Vector2d> HeadServo::bearing_of(const HeadObservation& obse
   if (!ray) return std::nullopt;
   auto bearing = aim(head_.head, ray->origin_in_world + config_.range_m * ray->direction_in_world);
   if (!bearing) return std::nullopt;
-  for (int axis = 0; axis < 2; ++axis) {  // on the turn that the head is on
+  for (int axis = 0; axis < 2; ++axis) {  // on the spiral turn of the head
     double& angle = (*bearing)[axis];
     angle =
         observation.pan_tilt_rad[axis] + std::remainder(angle - observation.pan_tilt_rad[axis], 2.0 * std::numbers::pi);

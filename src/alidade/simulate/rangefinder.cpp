@@ -70,10 +70,10 @@ const std::vector<std::pair<std::string, Change>>& changes() {
   return all;
 }
 
-/// A board tilted towards `azimuth`, turned about its normal, with `point_in_board` at `point_in_cam`.
+/// A board tilted towards `azimuth`, rotated about its normal, with `point_in_board` at `point_in_cam`.
 Rigid3 board_at(const Eigen::Vector3d& point_in_cam, const Eigen::Vector3d& point_in_board, double tilt_rad,
                 double azimuth_rad, double roll_rad) {
-  // Turning about (−sin, cos) carries the board's normal z towards −(cos, sin): the azimuth's side is farther.
+  // Rotating about (−sin, cos) carries the board's normal z towards −(cos, sin): the azimuth's side is farther.
   const Eigen::Vector3d axis(std::sin(azimuth_rad), -std::cos(azimuth_rad), 0.0);
   const Eigen::Quaterniond rotation = exp_so3(tilt_rad * axis) * exp_so3({0.0, 0.0, roll_rad});
   return {rotation, point_in_cam - rotation * point_in_board};

@@ -99,7 +99,7 @@ RigSceneConfig completed(RigSceneConfig config) {
   return config;
 }
 
-/// Turns the world so that it is the first head's camera at readings of zero.
+/// Rotates the world so that it is the first head's camera at readings of zero.
 void use_first_camera(Rig& rig) {
   const Rigid3 world_from_old = cam_from_world(rig.heads[0].head, Eigen::Vector2d::Zero());
   for (RigHead& rig_head : rig.heads) {

@@ -33,7 +33,7 @@ struct RigSceneConfig {
   double skew_sigma_rad = 0.01;
   double encoder_scale = 1.0;       ///< Radians of each axis of each head for each radian read.
   bool first_encoder_only = false;  ///< That scale is the first head's alone; the others' are 1.
-  double once_rad = 0.0;            ///< Amplitude of an error of one period a turn of each axis, its phase drawn.
+  double once_rad = 0.0;            ///< Amplitude of an error of one period per turn of each axis, its phase drawn.
   bool shared = true;               ///< Each board is seen by all heads.
 };
 
@@ -45,7 +45,7 @@ struct RigNoise {
   double sigma_px = 0.2;
   double sigma_encoder_rad = 0.02 * 0.017453292519943295;
   double wrong_views = 0.0;   ///< Share of the views whose angles are those of another view.
-  double twice_rad = 0.0;     ///< Amplitude of an error of two periods a turn of each axis, its phase drawn.
+  double twice_rad = 0.0;     ///< Amplitude of an error of two periods per turn of each axis, its phase drawn.
   double backlash_rad = 0.0;  ///< Of each axis: readings are half of it too large where the axis came from below.
 };
 struct SimulatedViews {

@@ -55,7 +55,7 @@ void measure_rotation(const RotationScene& scene, const RotationLogConfig& confi
   }
 }
 
-/// A world, turning.
+/// A world, rotating.
 class Turning {
  public:
   Turning(const RotationScene& scene, const RotationLogConfig& config, std::uint64_t seed)

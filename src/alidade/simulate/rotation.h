@@ -21,7 +21,7 @@ struct RotationScene {
   std::vector<double> depth_m;            ///< Along the view at the start; empty: far away.
   /// Intrinsics, as they change with time.
   std::function<RotatingIntrinsics(double t_s)> intrinsics = [](double) { return RotatingIntrinsics{}; };
-  /// How it turns: angular rate in the camera frame for source `rate`, pan, tilt, roll for all others.
+  /// How it rotates: angular rate in the camera frame for source `rate`, pan, tilt, roll for all others.
   std::function<Eigen::Vector3d(double t_s)> motion;
   Eigen::Vector3d lever_arm_m = Eigen::Vector3d::Zero();  ///< Camera centre from the centre of rotation, camera frame.
   Eigen::Vector3d mount_rad =

@@ -45,12 +45,12 @@ const std::array<Turn, 5> turns{{{1.4985, 0.767, {0.0, -0.98665574, -0.16282031}
                                  {7.8295, 0.529, {0.24943754, -0.96831824, -0.01186178}},
                                  {9.8585, 0.346, {0.24783512, -0.93820624, -0.24155083}}}};
 
-/// ∫ Exp(axis ω s) v ds over a turn that is still going on.
+/// ∫ Exp(axis ω s) v ds over an unfinished rotation.
 Vector3d moved_in_turn(const Vector3d& velocity, const Vector3d& axis, double angle) {
   return (std::sin(angle) * velocity + (1.0 - std::cos(angle)) * axis.cross(velocity)) / turn_rate_rad_s;
 }
 
-/// A head that turns after its target: first order, the target's angles constant for 5 ms.
+/// A head that follows its target: first order, the target's angles constant for 5 ms.
 class Follower {
  public:
   Follower(const TrackScene& scene, std::size_t head) : scene_(scene), head_(scene.heads[head].head) {

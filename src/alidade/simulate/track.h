@@ -60,7 +60,7 @@ struct SimulatedObservation {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
 };
 
-/// The scenarios by name: A (slow circle), A2 (the same, heads with offsets and turned mountings), B (fast circle),
+/// The scenarios by name: A (slow circle), A2 (the same, heads with offsets and rotated mountings), B (fast circle),
 /// C (manoeuvre), D (C, occluded), E (B, 100 ms late), F (C, 100 ms late), G (C, 20 and 30 images a second), throw
 /// (a ball at rest, thrown up at 4 m/s, caught, at rest). None for an unknown name.
 [[nodiscard]] std::optional<TrackScene> track_scenario(std::string_view name);

@@ -14,11 +14,11 @@ struct TurnedScene {
   double fx = 1000.0, fy = 1000.0, cx = 645.0, cy = 474.0;  ///< [px]
   double k1 = 0.0, k2 = 0.0;
   int num_photos = 9;
-  double pan_step_rad = 0.3, tilt_rad = 0.15;  ///< From photo to photo; up and down by turns, for a third row again.
+  double pan_step_rad = 0.3, tilt_rad = 0.15;  ///< From photo to photo; alternately up and down.
   double shake_rad = 0.03;                     ///< σ of every angle, the roll's as well.
   double points_per_rad2 = 600.0;
   double min_depth_m = 2.0, max_depth_m = 20.0;
-  Eigen::Vector3d lever_m = Eigen::Vector3d::Zero();  ///< Camera centre from the centre of the turn, camera frame.
+  Eigen::Vector3d lever_m = Eigen::Vector3d::Zero();  ///< Camera centre from the centre of rotation, camera frame.
   double sigma_step_m = 0.0;                          ///< Of the hand: the centre's own steps, each axis.
   double sigma_px = 0.5;
   double found_share = 0.6;   ///< Of a point's appearances in two photos that are matched.

@@ -64,7 +64,7 @@ struct UnderwaterSequence {
 };
 
 /// Vertices of a 10×8 grid of 28 mm: 1 (0,0), 2 (9,0), 3 (9,7), 4 (0,7), 5 (5,4), 6 (2,2), 7 (7,2), 8 (7,5); the world
-/// is the board's frame, z away from the camera. The path: 0.62 ± 0.10 m in front, ± 0.12 and 0.09 m aside, turning by
+/// is the board's frame, z away from the camera. The path: 0.62 ± 0.10 m in front, ± 0.12 and 0.09 m aside, rotating by
 /// ± 8° about each axis, in sines of 2.6 to 4.5 s. Same seed, same sequence.
 [[nodiscard]] UnderwaterSequence simulate_underwater(const UnderwaterScene& scene, std::uint64_t seed);
 

@@ -121,7 +121,7 @@ struct TurnedStudy {
 
   double wrong_matches = 0.0;  ///< Share.
   double moving_points = 0.0;  ///< Share of the points that each photo sees elsewhere.
-  double lever_m = 0.0;        ///< Camera centre from the centre of the turn, along the view.
+  double lever_m = 0.0;        ///< Camera centre from the centre of rotation, along the view.
   double step_m = 0.0;         ///< σ of the hand's own steps.
   double focus = 0.0;          ///< By which the focal length walks, relative.
   bool on_the_spot = false;    ///< And said so: no parallax is allowed for.

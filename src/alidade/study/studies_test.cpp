@@ -112,7 +112,7 @@ TEST(StudyTally, KnowsMediansAndWhatIsMissing) {
   EXPECT_NEAR(static_cast<double>(tally.good_beyond_5_sigma), 500.0, 1.0);  // beyond 0.05
 }
 
-/// A camera whose centre is moved sees everything turned: what is left after the implied rotation is a small part of
+/// A camera whose centre is moved sees everything rotated: what remains after the implied rotation is a small part of
 /// it, and nothing is left of the truth itself. Another focal length is no rotation.
 TEST(SigmaMapTrials, LeaveWhatNoRotationExplains) {
   const Camera truth = *example_camera("pinhole", 640, 480);

@@ -20,7 +20,7 @@ struct EventsFile {
 
 struct EventsOptions {
   bool skip_bad = false;  ///< Skip rows that are wrong, by name.
-  /// Cameras that do not turn, each with a clock of its own: `pan_rad,tilt_rad` may be omitted (zero) but may not
+  /// Fixed cameras, each with its own clock: `pan_rad,tilt_rad` may be omitted (zero) but may not
   /// change, and times run forwards head by head alone.
   bool stands_still = false;
 };

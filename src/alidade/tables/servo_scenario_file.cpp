@@ -57,7 +57,7 @@ class Section {
     if (fields_.has(key)) value = detail::read_vector(fields_, key);
     if (!(value.cwiseAbs().maxCoeff() <= 1e4)) refuse(fields_.file(), fields_.full(key), "is further than 10 km");
   }
-  /// One of some words, by what turns a word into a value.
+  /// One of some words, by what converts a word to a value.
   template <class Value, class Named>
   void word(const std::string& key, Value& value, const Named& named, const std::string& choices) const {
     if (!fields_.has(key)) return;

@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// Two photos whose matches agree on one homography, as those of a camera that turned do: H = K_b R K_a⁻¹.
+/// Two photos whose matches agree on one homography, as those of a rotating camera do: H = K_b R K_a⁻¹.
 struct PhotoLink {
   int photo_a = 0, photo_b = 0;
   std::size_t pair = 0;                                    ///< In MatchedPhotos::pairs.

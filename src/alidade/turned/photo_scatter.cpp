@@ -35,7 +35,7 @@ ScatterCovariance scatter_covariance(const TurnedFit& fit, const Progress& progr
     report_progress(progress, "photos held out", k, count);
     const TurnedNormal without = turned_normal(fit.bundle, fit.prior, fit.solve, static_cast<int>(k));
     Eigen::MatrixXd information = without.information;
-    information.diagonal().array() += 1e-6;  // a photo that nothing joins any more may turn as it likes
+    information.diagonal().array() += 1e-6;  // a photo that nothing joins any more may rotate freely
     const Eigen::MatrixXd cov_without = inverse_symmetric(information);
     const Camera6 change = root.matrixL().solve(Camera6(-(cov_without * without.gradient).head<num_camera>()));
     seen += change * change.transpose();

@@ -14,8 +14,8 @@ struct KeptMatch {
 /// The matches on which each link's photos agree, strongest link first.
 [[nodiscard]] std::vector<KeptMatch> agreeing_matches(const std::vector<PhotoLink>& links);
 
-/// Of all matches between the bundle's photos those that its camera and turns explain within `gate` (normalised), by
-/// transfer from one photo to the other. `bundle_place[photo]`: −1 for photos that take no part.
+/// Of all matches between the bundle's photos those that its camera and rotations explain within `gate` (normalised),
+/// by transfer from one photo to the other. `bundle_place[photo]`: −1 for photos that take no part.
 [[nodiscard]] std::vector<KeptMatch> explained_matches(const MatchedPhotos& photos, const TurnedBundle& bundle,
                                                        const std::vector<int>& bundle_place, double gate);
 

@@ -253,9 +253,9 @@ class TurnedRun {
     return unit;
   }
 
-  /// What is taken as given and may move the answer: the centre's steps as the camera turned. A centre that is ρ of the
-  /// points' distance before the axes sees tan θ (1 + ρ / cos θ) for tan θ: f grows by ρ f, k1 by ρ/2, k2 by −ρ/8; one
-  /// beside them shifts cx, cy by ρ f.
+  /// What is taken as given and may move the answer: the centre's translations as the camera rotated. A centre that is
+  /// ρ of the points' distance before the axes sees tan θ (1 + ρ / cos θ) for tan θ: f grows by ρ f, k1 by ρ/2, k2 by
+  /// −ρ/8; one beside them shifts cx, cy by ρ f.
   void add_given() {
     const Eigen::Vector2d f = report_.camera.head<2>();
     const double told = std::max(report_.parallax.relative, ordinary_parallax);

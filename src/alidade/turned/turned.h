@@ -30,7 +30,7 @@ struct TurnedReport {
     too_few_photos,  ///< Fewer than three are connected.
     no_turn,
     zoomed,
-    moved,  ///< Pairs agree each with a plane, not together with one camera that turned.
+    moved,  ///< Pairs agree each with a plane, not together with one rotating camera.
     weak,
     no_convergence
   };
@@ -54,8 +54,8 @@ struct TurnedReport {
   std::vector<Assumption> assumed;
 };
 
-/// Intrinsics of a camera from photos that it took while it was turned on the spot, by hand say: f, centre and radial
-/// distortion, from matches of which many may be wrong. Throws Interrupted. docs/maths/turned-photos.md.
+/// Intrinsics of a camera from photos that it took while it was rotated in one place, by hand for example: f, centre
+/// and radial distortion, from matches of which many may be wrong. Throws Interrupted. docs/maths/turned-photos.md.
 [[nodiscard]] TurnedReport observe_turned(const MatchedPhotos& photos, const TurnedConfig& config,
                                           const Progress& progress = {});
 

@@ -13,7 +13,7 @@ struct TurnedDetection {
   Eigen::Vector2d px;  ///< Normalised.
 };
 
-/// Photos of a turned camera, adjusted together. The observations stand track by track.
+/// Photos of a rotating camera, adjusted together. The observations are ordered by track.
 struct TurnedBundle {
   TurnedCamera camera;
   std::vector<Eigen::Matrix3d>

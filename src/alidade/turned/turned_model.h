@@ -9,13 +9,13 @@ namespace alidade {
 using TurnedCamera = Eigen::Matrix<double, 6, 1>;
 using TurnedInformation = Eigen::Matrix<double, 6, 6>;
 
-inline constexpr int num_camera = 6, per_photo = 4;  ///< A photo's: its turn (3), the log of its zoom.
+inline constexpr int num_camera = 6, per_photo = 4;  ///< A photo's: its rotation (3), the log of its zoom.
 
 /// Pixel of a far point with its derivatives.
 struct TurnedPrediction {
   Eigen::Vector2d px;
   Eigen::Matrix<double, 2, num_camera> J_camera;
-  Eigen::Matrix<double, 2, per_photo> J_photo;  ///< Turn on the left, R ← Exp(φ) R, and log zoom.
+  Eigen::Matrix<double, 2, per_photo> J_photo;  ///< Rotation on the left, R ← Exp(φ) R, and log zoom.
   Eigen::Matrix<double, 2, 3> J_ray;
 };
 

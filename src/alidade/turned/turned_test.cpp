@@ -154,7 +154,7 @@ TEST(Turned, WhatCannotTellIsRefusedWithItsReason) {
   EXPECT_THAT(stands.sentence, HasSubstr("does not turn"));
 }
 
-/// A camera that slides along a wall, or through a room, and does not turn.
+/// A camera that slides along a wall, or through a room, and does not rotate.
 TEST(Turned, ACameraThatWalksIsRefused) {
   TurnedScene walk = small_scene();
   walk.pan_step_rad = walk.tilt_rad = 0.0;

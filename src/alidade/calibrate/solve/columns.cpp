@@ -116,7 +116,7 @@ ALIDADE_VECTOR_CLONES int brown_columns(const CornerArrays& in, const PoseNumber
   return bad > 0.0 ? 1 : 0;
 }
 
-/// Brown's residuals alone, u and v by turns; NaN where Brown::project has no answer.
+/// Brown's residuals alone, u and v alternating; NaN where Brown::project has no answer.
 ALIDADE_VECTOR_CLONES void brown_residuals(const CornerArrays& in, const PoseNumbers& pose, const double* p,
                                            double max_radius2, double* __restrict residuals) {
   const double fx = p[0], fy = p[1], cx = p[2], cy = p[3], skew = p[4];

@@ -114,7 +114,7 @@ TEST(GaugeDirections, AreOrthonormalAndMoveTheBoardRigidly) {
   const auto points = points_in_board(board);
   const Eigen::MatrixXd gauge = gauge_directions(points);
   EXPECT_LT((gauge * gauge.transpose() - Eigen::MatrixXd::Identity(7, 7)).norm(), 1e-12);
-  // A small turn about any axis and a small growth lie in the row space.
+  // A small rotation about any axis and a small scaling lie in the row space.
   Eigen::VectorXd moved(3 * static_cast<Eigen::Index>(points.size()));
   for (std::size_t i = 0; i < points.size(); ++i) {
     moved.segment<3>(3 * static_cast<Eigen::Index>(i)) =

@@ -230,7 +230,7 @@ class ViewPlanner {
     }
   }
 
-  /// The board before the camera, wherever the head can look, near and far, turned as a user can.
+  /// The board before the camera, wherever the head can look, near and far, rotated as a user can.
   void try_new_places(std::size_t head) {
     const double tilt_rad = config_.max_tilt_of_board_deg * degree;
     const std::array<Eigen::Vector3d, 3> turns{Eigen::Vector3d{0, 0, 0}, {tilt_rad, 0, 0}, {0, tilt_rad, 0}};

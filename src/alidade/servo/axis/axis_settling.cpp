@@ -18,7 +18,7 @@ ServoAxis without_ends(const ServoAxis& axis) {
   return smooth;
 }
 
-/// A controller, the axis that it turns, and the errors on their way to it.
+/// A controller, the axis that it drives, and the errors on their way to it.
 class SmallLoop {
  public:
   SmallLoop(const ServoConfig& config, const ServoAxis& known, const ServoAxis& real, double focal_px, double latency_s,

@@ -108,7 +108,7 @@ void add_excitation(std::span<const ServoSample> log, const ServoIdentification&
 /// Degrees read as radians, milliseconds as seconds; an encoder that is coarser than its noise.
 void add_readings(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
   constexpr double max_turn_rad = 6.2831853071795865, max_spacing_s = 1.0;
-  constexpr double max_rate_rad_s = 20.0;  // more than a thousand degrees a second: no head turns so
+  constexpr double max_rate_rad_s = 20.0;  // more than a thousand degrees a second: no head rotates so fast
   const double range = identified.angle_range_rad;
   if (range > max_turn_rad && identified.fit.kind == ServoKind::angle)
     verdict.checks.push_back(

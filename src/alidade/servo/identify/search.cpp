@@ -17,7 +17,7 @@ Eigen::Vector2d TargetSearch::at(double t_s) const {
   const double arc = std::fmod(config_.speed_rad_s * since_s, std::max(whole_arc, turn_rad_));
   const double phi = std::sqrt(4.0 * std::numbers::pi * arc / turn_rad_);
   const double radius = turn_rad_ * phi / (2.0 * std::numbers::pi);
-  // A turn about the pan axis moves the view by cos(tilt) of it.
+  // A rotation about the pan axis moves the view by cos(tilt) of it.
   const double shrink = std::max(0.2, std::cos(middle.y()));
   return middle + radius * Eigen::Vector2d(std::cos(phi) / shrink, std::sin(phi));
 }

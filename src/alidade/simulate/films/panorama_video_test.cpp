@@ -147,7 +147,7 @@ TEST(Panorama, NoiseIsSeededAndOfItsSigma) {
   EXPECT_NEAR(sigma[0], std::sqrt(2.0 * (2.0 * 2.0 + 1.0 / 12.0)), 0.05);  // 76 800 pixels: ± 0.008
 }
 
-/// The rates of the log turn the camera as the frames say, off-axis mount and all.
+/// The rates of the log rotate the camera as the frames say, off-axis mount and all.
 TEST(PanoramaLog, RatesAreThoseOfTheHead) {
   RotationScene scene;
   scene.motion = [](double t_s) {

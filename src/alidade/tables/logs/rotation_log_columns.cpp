@@ -211,7 +211,7 @@ struct Cells {
 };
 
 Eigen::Vector3d read_rate(const Cells& cells) {
-  constexpr double fastest_rad_per_s = 100.0;  // 16 turns a second: nothing is seen that turns so fast
+  constexpr double fastest_rad_per_s = 100.0;  // 16 turns a second: nothing is visible at that rate
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < cells.columns.rate.size(); ++i) {
     const std::size_t column = cells.columns.rate[i];

@@ -16,7 +16,7 @@ namespace alidade {
 [[nodiscard]] std::vector<RigFault> rig_faults(std::span<const RigHead> heads, const RigUncertainty& errors,
                                                const Tracker::Learned& learned, bool is_supposed);
 
-/// Errors large enough to ask about where a file gives none: turned bases, encoders' scales, focal lengths.
+/// Errors large enough to test where a file gives none: rotated bases, encoders' scales, focal lengths.
 [[nodiscard]] RigUncertainty supposed_errors(std::span<const RigHead> heads);
 
 }  // namespace alidade

@@ -79,7 +79,7 @@ TEST(TrackAssumed, TheMeetingOfRaysFollowsTheParameters) {
   EXPECT_NEAR(by[0](2, num_head_params + 2), dz_du, 1e-6);
   EXPECT_NEAR(by[1](2, num_head_params + 2), -dz_du, 1e-6);
   EXPECT_NEAR(by[0](2, num_head_params), 0.125 * dz_du, 1e-6);  // f: du = x/z
-  EXPECT_NEAR(by[1](2, 4), by[0](2, 4) * -1.0, 1e-6);           // both bases turned alike move nothing
+  EXPECT_NEAR(by[1](2, 4), by[0](2, 4) * -1.0, 1e-6);           // both bases rotated alike move nothing
 }
 
 TEST(TrackAssumed, WhatIsExactMovesNothingAndWhatIsUnknownDoes) {

@@ -28,7 +28,7 @@ struct OptionInfo {
   std::string name;      ///< Of its field, else the option's as an identifier: "sigma_px".
   std::string option;    ///< "--sigma-px"; empty: an argument.
   std::string help;      ///< One line.
-  std::string form;      ///< What stands for its value: "NUMBER > 0"; empty: a flag.
+  std::string form;      ///< Placeholder of its value: "NUMBER > 0"; empty: a flag.
   std::string standard;  ///< Its default; empty: none.
   std::string group;     ///< Heading in help.
   bool is_required = false;

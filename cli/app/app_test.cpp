@@ -59,7 +59,7 @@ std::function<ExitCode(cli::Run&)> throwing(const std::function<void()>& thrower
   };
 }
 
-/// Exactly one line, which begins as every fault's does.
+/// Exactly one line, in the format of every error.
 ::testing::Matcher<std::string> is_fault(const std::string& message) {
   return ::testing::StrEq("alidade: error: " + message + "\n");
 }

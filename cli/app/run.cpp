@@ -134,7 +134,8 @@ void Run::write_files() {
   folder.commit();
 }
 
-/// The page, where it is wanted. One that fails, or for which the disk has no room, never fails the run, but is said.
+/// The page, where it is wanted. One that fails, or for which the disk has no room, never fails the run, but is
+/// reported.
 void Run::add_report(ResultFolder& folder) {
   if (options.no_report) return;
   try {

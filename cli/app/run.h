@@ -35,11 +35,11 @@ struct CommonOptions {
   bool no_report = false;
   bool leaves_results = true;  ///< False: nothing goes into DIR.
   bool keeps_outcome = false;  ///< finish() neither writes nor prints: outcome() has it all.
-  int threads = 0;             ///< 0: all processors. Already in force when the command begins.
+  int threads = 0;             ///< 0: all processors. Already in force when the command starts.
   std::uint64_t seed = 1;      ///< Of all chance in the command.
 };
 
-/// Whether there is an estimate, and files of it, be it one that stands or one not to be trusted.
+/// Whether there is an estimate, and files of it, usable or not to be trusted.
 [[nodiscard]] inline bool has_estimate(const Verdict& verdict) {
   return tells_an_estimate(static_cast<int>(verdict.exit_code));
 }
@@ -72,10 +72,10 @@ class Run {
   void say(std::string line);
 
   /// Writes the files, result.json and report.html into DIR, prints the summary (or the document, with --json), and
-  /// gives the exit code. All stands in DIR, or DIR is as it was: throws InputError if something cannot be written or
-  /// printed, Interrupted after Ctrl-C. A refusal does not replace an earlier estimate: it goes to DIR/refused.
+  /// gives the exit code. Everything is in DIR, or DIR is unchanged: throws InputError if something cannot be written
+  /// or printed, Interrupted after Ctrl-C. A refusal does not replace an earlier estimate: it goes to DIR/refused.
   [[nodiscard]] ExitCode finish(Verdict verdict);
-  /// The same with all that a job of the library leaves; what was said or skipped before comes first.
+  /// The same with all that a job of the library leaves; earlier messages and skipped items come first.
   [[nodiscard]] ExitCode finish(JobOutcome outcome);
   /// What finish() was to write, and the lines; after finish() with options.keeps_outcome.
   [[nodiscard]] JobOutcome outcome();

@@ -173,7 +173,7 @@ ExitCode run_batch(const BatchArgs& args, Run& run) {
   run.lap("rows");
   JobOutcome outcome = outcome_of(lot.rows());
   if (shard.count > 1) {
-    // Whoever comes last and asks for all of them makes the table.
+    // The last process, which requests all of them, makes the table.
     run.say(fmt::format("shard {}/{}: {} rows; the table of all: alidade batch {} --resume --out {}", shard.index,
                         shard.count, lot.rows().size(), args.jobs.string(), run.options.out.string()));
     return ExitCode::ok;

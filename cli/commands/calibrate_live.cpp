@@ -177,7 +177,7 @@ ExitCode finish_empty(const Board& board, const CaptureArgs& args, const std::st
   return run.finish(outcome_of(none));
 }
 
-/// A camera may be good and yet short of what was asked for.
+/// A camera may be good and yet short of the requested goal.
 void tell_missed_goal(const live::CaptureSession& session, double goal_px, const Run& run) {
   if (session.kept().photos().empty() || session.state().is_at(goal_px)) return;
   tell_person(

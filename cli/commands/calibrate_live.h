@@ -11,7 +11,7 @@
 
 namespace alidade::cli {
 
-/// What `calibrate --live` is asked for besides what calibrate is asked for.
+/// Options of `calibrate --live` in addition to those of calibrate.
 struct CaptureArgs {
   LiveOptions live;
   std::string from;  ///< A folder that fills, or a stream's address; empty: the browser's camera.

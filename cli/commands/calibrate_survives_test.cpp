@@ -157,7 +157,7 @@ TEST_F(CalibrateSurvives, PhotosGivenTwiceCountOnce) {
   ASSERT_EQ(calibrate({photos().string()}).code, 0);
   EXPECT_EQ(result()["counts"]["used"], num_photos);
   EXPECT_THAT(result()["counts"]["skipped"].dump(), HasSubstr("is the same image as"));
-  // What was written can be read again: each corner stands there once.
+  // What was written can be read again: each corner is there once.
   EXPECT_EQ(calibrate({"--corners", (out() / "corners.csv").string()}).code, 0);
 }
 

@@ -41,7 +41,7 @@ Verdict verdict_of(const CameraDiff& diff) {
     return verdict;
   }
   const State agree = agreement(diff);
-  verdict.state = std::min(agree, State::care);  // that two cameras differ is an answer that stands
+  verdict.state = std::min(agree, State::care);  // that two cameras differ is a valid answer
   verdict.sentence += fmt::format(", {:.1f}σ RMS, {:.1f}σ at worst: {}", diff.rms_in_sigmas, diff.max_in_sigmas,
                                   agree == State::good   ? "no more than their σ predicts"
                                   : agree == State::care ? "more than their σ predicts"

@@ -215,7 +215,7 @@ TEST_F(CameraCommand, UndistortGivesThePhotoThatAPinholeWouldHaveTaken) {
   EXPECT_EQ(compared, 156 * 116);
 }
 
-/// What stands in a folder: names and contents.
+/// A folder's contents: names and bytes.
 std::map<std::string, std::string> contents(const std::filesystem::path& folder) {
   std::map<std::string, std::string> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
@@ -234,7 +234,8 @@ TEST_F(CameraCommand, UndistortInterruptedLeavesWhatWasThere) {
   const auto before = contents(folder.path() / "out");
   cv::imwrite((folder.path() / "0.png").string(), cv::Mat(1500, 2000, CV_8U, cv::Scalar(9)));
   std::vector<std::string> words{ALIDADE_EXECUTABLE, "camera", "undistort", "a.yaml", "0.png"};
-  for (int i = 1; i < 100; ++i) {  // one image that is quick to read, many times: 0.4 s to read, 10 times that to bend
+  for (int i = 1; i < 100;
+       ++i) {  // one image that is quick to read, many times: 0.4 s to read, 10 times that to undistort
     words.push_back(std::to_string(i) + ".png");
     std::filesystem::create_hard_link(folder.path() / "0.png", folder.path() / words.back());
   }

@@ -4,7 +4,7 @@ namespace alidade::cli {
 
 class App;
 
-/// All of those below, or the one that the line begins with.
+/// All of those below, or the one that the command line starts with.
 void add_commands(App& app);
 
 void add_batch(App& app);

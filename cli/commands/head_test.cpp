@@ -194,7 +194,7 @@ TEST_F(HeadCommand, TimeStampsThatJumpAreNamedAndNotUsed) {
               4.0 * document["stddev"]["camera"]["fx"].get<double>());
 }
 
-/// Pan and tilt at the end of a truth file, and whether they stood for the last half second.
+/// Pan and tilt at the end of a truth file, and whether they were constant for the last half second.
 struct TruthEnd {
   double pan = 0.0, tilt = 0.0, moved = 0.0;
 };

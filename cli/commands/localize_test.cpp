@@ -300,7 +300,7 @@ TEST_F(LocalizeCommand, AnswersRowsFromStandardInputAsTheFileIsAnswered) {
   EXPECT_EQ(Json::parse(skipped.out)["counts"]["skipped"].size(), 1u);
 }
 
-/// A frame is answered as soon as the next one begins, while its sender goes on.
+/// A frame is answered as soon as the next one starts, while its sender continues.
 TEST_F(LocalizeCommand, AnswersWhileRowsStillCome) {
   simulate({"--points", "20", "--frames", "10"});
   const std::string answers = path("answers.csv");
@@ -338,7 +338,7 @@ TEST_F(LocalizeCommand, SurvivesMissingFramesAndUnknownPoints) {
   EXPECT_EQ(skipped.code, 0) << skipped.err;
 }
 
-/// A map that one run has left is where the next one begins, in its frame and scale, without the target.
+/// The map of one run is the start of the next one, in its frame and scale, without the target.
 TEST_F(LocalizeCommand, BeginsInTheMapOfAnEarlierRun) {
   simulate({"--points", "30", "--frames", "60", "--rate", "30"});
   ASSERT_EQ(localize(told()).code, 0);

@@ -10,7 +10,7 @@
 
 namespace alidade::cli {
 
-/// What `rangefinder --live` is asked for besides what rangefinder is asked for.
+/// Options of `rangefinder --live` in addition to those of rangefinder.
 struct GuidedShotsArgs {
   LiveOptions live;
   std::string from, resume;

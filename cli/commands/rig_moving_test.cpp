@@ -103,7 +103,7 @@ TEST_F(MovingTargetCommand, ADroneIsFollowedByCamerasThatItPlacedItself) {
   ASSERT_EQ(placed.code, 0) << placed.err;
   const Json document = Json::parse(placed.out), estimate = document["estimate"];
   for (const Json& camera : estimate["cameras"]) EXPECT_TRUE(camera["placed"].get<bool>()) << camera["reason"];
-  // What the page draws: a camera stands where its head's base does, with that total σ (a rotated covariance has
+  // What the page draws: a camera is at its head's base, with that total σ (a rotated covariance has
   // the same trace).
   const Json& cameras = document["data"]["cameras"];
   const std::array places{"world_from_cam_x_m", "world_from_cam_y_m", "world_from_cam_z_m"};

@@ -28,7 +28,7 @@ struct ServoArgs {
   LiveOptions live;
 };
 
-/// What stands on the command line beats the file.
+/// The command line overrides the file.
 ServoScenario with_options(ServoScenario scenario, const ServoArgs& args) {
   if (!args.controllers.empty()) {
     scenario.controllers.clear();

@@ -95,7 +95,7 @@ std::string list_page(const std::vector<Shown>& results, const std::string& quer
          rows + "</table></body></html>\n";
 }
 
-/// Read when it is asked for: a run may have written it again.
+/// Read on request: a run may have rewritten it.
 live::HttpAnswer answer_of(const Shown& result, std::string_view file) {
   try {
     if (file == "result.json") return {200, "application/json", read_file(result.folder / "result.json")};
@@ -110,7 +110,7 @@ live::HttpAnswer answer_of(const Shown& result, std::string_view file) {
   }
 }
 
-/// "/", "/NAME/" and what stands beside it.
+/// "/", "/NAME/" and its sibling files.
 live::HttpAnswer answer(const std::vector<Shown>& results, std::string_view path, const std::string& query) {
   if (path == "/favicon.ico") return {204, "image/x-icon", ""};
   path.remove_prefix(1);

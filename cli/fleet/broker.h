@@ -56,7 +56,7 @@ class Broker {
   /// Number of messages and last sequence number of a stream; none: not now.
   [[nodiscard]] std::optional<std::pair<std::uint64_t, std::uint64_t>> extent(const std::string& stream);
 
-  /// Sends all of them and waits until the broker has stored each, or said no, or so long. True: all are stored.
+  /// Sends all of them and waits until the broker has stored each, refused it, or timed out. True: all are stored.
   bool store(std::vector<Publication>& messages, int wait_ms);
 
   /// Times that the connection came back.

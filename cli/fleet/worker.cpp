@@ -35,7 +35,7 @@ struct Held {
 };
 
 /// Reads the whole stream of observations and takes up the cameras of its parts. What it has in memory it could have
-/// read: after any failure it forgets all, and begins again from the states that are stored.
+/// read: after any failure it discards everything, and resumes from the stored states.
 class Worker {
  public:
   Worker(const cli::FleetWorkerOptions& options, cli::Run& run)
@@ -121,7 +121,7 @@ class Worker {
     Held held;
     held.state_sequence = sequence;
     const char* text = nullptr;
-    // A state without a checkpoint that can be read: the camera begins again with the rows that are there.
+    // A state without a checkpoint that can be read: the camera is reinitialised with the available rows.
     if (natsMsgHeader_Get(message.get(), checkpoint_header, &text) == NATS_OK && text != nullptr)
       if (const auto camera = parse_checkpoint(text)) held.camera = *camera;
     cameras_[id] = std::move(held);

@@ -107,7 +107,7 @@ std::string difference_of(const Camera& a, const Camera& b) {
   return "";
 }
 
-/// A beam stands in the camera that it was calibrated with: through another one its pixels are elsewhere.
+/// A beam belongs to the camera that it was calibrated with: another one gives other pixels.
 void heed_other_camera(const ProjectConfig& config, const Camera& camera, Verdict& verdict) {
   if (!config.own_camera) return;
   const std::string difference = difference_of(*config.own_camera, camera);

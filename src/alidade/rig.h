@@ -15,7 +15,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// From views of boards that stood still, each with what the head's encoders read. `cameras`: by id of the head
+/// From views of static boards, each with what the head's encoders read. `cameras`: by id of the head
 /// (cameras_by_head()). With `load_photo` the boards are found in the photos that the views name; a photo without one
 /// is named in `counts.skipped`. Throws ConfigError for a config or cameras that cannot be, and for corners outside
 /// their camera's image; Interrupted where `progress` says stop; never for what the views show.

@@ -38,7 +38,7 @@ class TargetTracker {
   TargetTracker& operator=(TargetTracker&&) noexcept;
 
   /// What became of it. With `sigma_a_m_s2` given, the belief is that of the batch call on the same observations, whose
-  /// σ is raised at the end where the innovations ask for it; without, 1 m/s² is taken until the end. Throws
+  /// σ is increased at the end where the innovations require it; without, 1 m/s² is taken until the end. Throws
   /// ConfigError for an observation that cannot be, which is then not taken.
   TrackStep push(const TargetObservation& observation);
   /// Where the target will be at a time. None before the start, before the newest observation, or of xiahou2015.

@@ -24,7 +24,7 @@ struct RangeNoise {
 /// Order of a beam's parameters in covariances and Jacobians: origin x, y, z [m], two coordinates of the direction in
 /// its tangent basis [rad], scale.
 inline constexpr int num_beam_params = 6;
-/// Where the direction's two coordinates begin, and where the scale stands.
+/// Indices of the direction's first coordinate and of the scale.
 inline constexpr int beam_direction_param = 3, beam_scale_param = 5;
 inline constexpr std::array<const char*, num_beam_params> beam_param_names{"origin_x_m",  "origin_y_m",  "origin_z_m",
                                                                            "direction_u", "direction_v", "scale"};

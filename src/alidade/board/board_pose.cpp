@@ -111,8 +111,8 @@ Matrix6 curvature(const Camera& camera, const Rigid3& cam_from_board, const Matr
   return 0.5 * (second + second.transpose());
 }
 
-/// Levenberg–Marquardt. Between two poses that look alike r bends as much as it slopes, and steps by the slope alone
-/// creep or leap about: from the tenth step on by the whole curvature (Newton).
+/// Levenberg–Marquardt. Between two similar poses the curvature of r is as large as its slope, and steps by the slope
+/// alone creep or leap about: from the tenth step on by the whole curvature (Newton).
 std::optional<Refined> refined(const Camera& camera, Rigid3 cam_from_board, const BoardView& view,
                                std::span<const Eigen::Vector3d> points, std::optional<double> sigma_px) {
   auto now = corner_residuals(camera, cam_from_board, view, points, sigma_px);
@@ -125,7 +125,7 @@ std::optional<Refined> refined(const Camera& camera, Rigid3 cam_from_board, cons
     Matrix6 damped = i < by_slope ? H : curvature(camera, cam_from_board, H, g, view, points, sigma_px);
     damped.diagonal() += damping * H.diagonal();
     const Eigen::LLT<Matrix6> llt(damped);
-    if (llt.info() != Eigen::Success) {  // bent the other way: not a valley yet
+    if (llt.info() != Eigen::Success) {  // negative curvature: not yet a minimum
       if (!damped.allFinite() || (damping = std::max(10.0 * damping, 1e-3)) > 1e12) break;
       continue;
     }

@@ -13,7 +13,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// Where a board stood, with the covariance of its right perturbation ξ; zero: exact.
+/// A board's pose, with the covariance of its right perturbation ξ; zero: exact.
 struct BoardPose {
   Rigid3 cam_from_board;
   Eigen::Matrix<double, 6, 6> cov = Eigen::Matrix<double, 6, 6>::Zero();

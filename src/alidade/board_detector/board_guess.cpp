@@ -100,7 +100,7 @@ std::vector<Board> kinds_to_try(const Board& told, const std::string& dictionary
   return kinds;
 }
 
-/// How well a board explains the photos: in how many it stands, then how many of its points are seen.
+/// How well a board explains the photos: in how many it is found, then how many of its points are seen.
 struct Score {
   std::size_t photos = 0, points = 0;
   auto operator<=>(const Score&) const = default;

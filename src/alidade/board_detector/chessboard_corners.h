@@ -10,8 +10,8 @@ namespace alidade {
 /// at their predicted positions. `photo` is one channel of 32-bit float, 0 to 255.
 [[nodiscard]] BoardDetection fit_chessboard(const cv::Mat& photo, const Board& board, const Chessboard& coarse);
 
-/// Fits the corners of `first` again, each started from where the lens and the pose put it, with the edges bent as the
-/// lens bends them. Corners that the first fit had refused are tried too.
+/// Fits the corners of `first` again, each started from where the lens and the pose put it, with the edges curved as
+/// the lens curves them. Corners that the first fit had refused are tried too.
 [[nodiscard]] BoardDetection refit_chessboard(const cv::Mat& photo, const Board& board, const BoardView& first,
                                               const Camera& camera, const Rigid3& cam_from_board);
 

@@ -26,7 +26,7 @@ struct BoardDetections {
 [[nodiscard]] BoardDetections find_boards(std::size_t num_photos, const PhotoLoader& load_photo, const Board& board,
                                           bool reject_partial = false, const Progress& progress = {});
 
-/// Where a board stands by a first calibration, for the second extraction. Photos without one are left alone.
+/// A board's pose by a first calibration, for the second extraction. Photos without one are left alone.
 struct KnownBoard {
   const BoardView* first = nullptr;  ///< As found before; null: leave this photo alone.
   Rigid3 cam_from_board;

@@ -54,7 +54,7 @@ struct CalibrateConfig {
   std::vector<Eigen::Vector3d> board_points = {};  ///< [m] Of BoardShape::given: the board as known from elsewhere.
 };
 
-/// The words of the shapes that can be asked for by name.
+/// The words of the shapes that can be requested by name.
 [[nodiscard]] const WordList<BoardShape>& shape_words();
 
 /// The fields of `config` that a user sets: model, fix, free, prior, gap_m, glass_m, n_glass, n_water, board_shape

@@ -8,7 +8,7 @@
 namespace alidade {
 
 /// Corners so far from the others of their photo that no perspective puts them there, in the view's order; empty where
-/// there is none. A start by least squares would bend to one of them and blame the rest.
+/// there is none. A least-squares initial guess would adapt to one of them and reject the rest.
 [[nodiscard]] std::vector<bool> far_corners(const BoardView& view, const std::vector<Eigen::Vector3d>& board_points);
 
 /// The view without them; `far` is not empty.

@@ -77,7 +77,7 @@ TEST(HonestSigma, CoversSharedErrorsOfFewPhotos) {
   EXPECT_LT(found.inside_2, 0.98);
 }
 
-// A board whose every point is free bends to the errors of few photos: their residuals say less of them.
+// A board with all points free adapts to the errors of few photos: their residuals show less of them.
 TEST(HonestSigma, CoversSharedErrorsOfFewPhotosWithAFreeBoard) {
   const SigmaCoverage found = coverage_of_sigma(0.1, 300, 7, {.board_shape = BoardShape::free});
   ASSERT_EQ(found.runs, 300.0);

@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// What a user asked for, as calibrate() takes it: skew is fixed unless it is freed, and what is known of a port
+/// The user's request, as calibrate() takes it: skew is fixed unless it is freed, and what is known of a port
 /// stands beside what is fixed.
 [[nodiscard]] CalibrateConfig resolved(CalibrateConfig config);
 

@@ -44,7 +44,7 @@ struct Halves {
   std::string worst_name;
 };
 
-/// What stands behind the verdict on a calibration.
+/// The basis of the verdict on a calibration.
 struct CalibrationStudy {
   std::vector<ResidualCell> cells;
   std::vector<ResidualRing> rings;

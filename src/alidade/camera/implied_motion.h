@@ -8,7 +8,7 @@
 
 namespace alidade::detail {
 
-/// A pixel of a grid as its camera sees it: the point that stands there and the derivatives of its projection.
+/// A pixel of a grid as its camera sees it: the point there and the derivatives of its projection.
 struct GridPoint {
   Eigen::Vector3d point_in_cam;
   LensProjection projection;

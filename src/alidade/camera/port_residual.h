@@ -22,10 +22,10 @@ struct PortRange {
   double rms_px = 0.0, max_px = 0.0;
 };
 
-/// How well one Brown lens with one viewpoint stands for a camera behind a flat port.
+/// How well one Brown lens with one viewpoint approximates a camera behind a flat port.
 struct PortResidual {
   Camera brown;               ///< As a calibration in water would find it.
-  Eigen::Vector3d shift_m;    ///< Where its viewpoint stands in the camera frame: belongs into the extrinsics.
+  Eigen::Vector3d shift_m;    ///< Its viewpoint in the camera frame: belongs to the extrinsics.
   std::vector<PortRange> at;  ///< One per test range.
   double worst_rms_px = 0.0;  ///< Over the test ranges from 0.5 m on.
   bool brown_is_enough = false;

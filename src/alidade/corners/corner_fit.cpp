@@ -194,7 +194,7 @@ struct Solution {
   bool converged = false;
 };
 
-/// Damped Gauss–Newton step. Where the blur stands at a limit and would cross it, the others step without it.
+/// Damped Gauss–Newton step. Where the blur is at a limit and would cross it, the others step without it.
 Vector7 damped_step(const Solution& at, double damping) {
   Matrix7 JtJ = at.sums.topLeftCorner<7, 7>();
   Vector7 Jtr = at.sums.topRightCorner<7, 1>();

@@ -31,7 +31,7 @@ std::pair<int, int> span_of_row(const Eigen::Matrix2d& inverse, const Eigen::Vec
   return {static_cast<int>(std::ceil(x_min)), static_cast<int>(std::floor(x_max))};
 }
 
-/// Signed distance [px] to an edge through `center`, bent as far as the start knows.
+/// Signed distance [px] to an edge through `center`, curved as far as the initial guess knows.
 struct StartEdge {
   float cosine, sine, half_bend, offset_x, offset_y;
 

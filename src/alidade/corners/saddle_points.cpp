@@ -134,7 +134,7 @@ std::optional<Crossings> crossings_of(const Ring& ring, const std::vector<float>
   return found;
 }
 
-/// Direction [rad] of the line that leaves at `out` and enters at `back`, in [0, π); none where it bends.
+/// Direction [rad] of the line that leaves at `out` and enters at `back`, in [0, π); none where it is curved.
 std::optional<float> line_of(float out_rad, float back_rad) {
   constexpr float pi = std::numbers::pi_v<float>;
   const float bend = turn(out_rad, back_rad - pi);

@@ -35,7 +35,7 @@ struct Field {
   std::variant<bool*, int*, double*, std::optional<double>*, std::string*, std::vector<std::string>*, TextCode> value;
   std::string help;                        ///< One line, without a stop.
   Limits limits = {};                      ///< Of a number.
-  std::string form = {};                   ///< What stands for the value in help: "WIDTHxHEIGHT"; else by its type.
+  std::string form = {};                   ///< Placeholder of the value in help: "WIDTHxHEIGHT"; else by its type.
   std::string option = {};                 ///< "--fix", where it is not the name without its unit.
   std::vector<std::string> old_options{};  ///< Earlier names of the option, which stay accepted.
   std::string group = {};                  ///< Heading in help.
@@ -46,14 +46,14 @@ using FieldList = std::vector<Field>;
 /// "--glass" of "glass_m": the name without its unit, words joined by dashes.
 [[nodiscard]] std::string option_of(const Field& field);
 
-/// Takes over a value from its text; lists are given part by part, and the first replaces what stood there
+/// Takes over a value from its text; lists are given part by part, and the first replaces the old value
 /// (`is_first`). What is wrong with it in a few words ("'x' is not a finite number"), else "". Flags: true or false.
 [[nodiscard]] std::string set_field(const Field& field, const std::string& text, bool is_first = true);
 
 /// The value as set_field() takes it; parts of a list are separated by commas; "" where there is none.
 [[nodiscard]] std::string value_text(const Field& field);
 
-/// What stands for the value in help: "NUMBER 0..10", "flat|bow|free", "WIDTHxHEIGHT". "" of a flag.
+/// Placeholder of the value in help: "NUMBER 0..10", "flat|bow|free", "WIDTHxHEIGHT". "" of a flag.
 [[nodiscard]] std::string form_text(const Field& field);
 
 /// What is wrong with the values that numbers have, one sentence each, by name: "glass_m is 12, not within 0 to 10".

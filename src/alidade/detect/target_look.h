@@ -12,7 +12,7 @@ namespace alidade {
 /// "marker:DICTIONARY:ID".
 struct NamedLook {
   TargetLook look = {};
-  std::string text = {};                       ///< As it was said; empty: nothing.
+  std::string text = {};                       ///< As it was given; empty: nothing.
   std::string pattern_file = {};               ///< Of a pattern, else empty.
   std::shared_ptr<cv::Mat> pattern = nullptr;  ///< Of a pattern, once it is loaded.
 };

@@ -91,7 +91,7 @@ class Follower {
   }
 
  private:
-  /// A target far away that stood still since it was last seen; its speed widens the search.
+  /// A distant target that was static since it was last seen; its speed widens the search.
   std::optional<TargetExpectation> expectation(double t_s, const Eigen::Vector2d& pan_tilt_rad) const {
     if (!last_direction_in_world_) return std::nullopt;
     const TurnedHead turned(head_.head, pan_tilt_rad);

@@ -44,7 +44,7 @@ struct VideoObservationsConfig {
 };
 
 /// Finds the target in the videos of the heads, the first video of the first head and so on: first where it should be
-/// (the direction in which it was last seen, with the head as it now stands), and where that fails in the whole frame.
+/// (the direction in which it was last seen, for the head's current angles), and where that fails in the whole frame.
 /// In order of time. Throws InputError: a frame that cannot be read or is not of the camera's size, a frame whose time
 /// the angles do not cover, more or fewer rows than frames where no rate is given.
 [[nodiscard]] std::vector<TargetFrame> target_frames(std::span<VideoFrames> videos, const HeadAngles& angles,

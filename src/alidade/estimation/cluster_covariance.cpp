@@ -26,9 +26,9 @@ MatrixXd product(const A& a, const B& b) {
 /// Least rest 1 − h along a direction. A cluster that alone determines it has no residual in it: 0/0 is left at 0.
 constexpr double min_rest = 1e-3;
 
-/// A cluster where the model's covariance is 1. Its measurements of what is asked for, made orthonormal, pull by y: by
-/// the model of covariance 1 − m, m their leverage. `along` holds what a unit of each principal y moves, `rest` 1 − m
-/// along it, `y` its value over √rest: by the model of variance 1.
+/// A cluster where the model's covariance is 1. Its measurements of the requested parameters, made orthonormal, pull by
+/// y: by the model of covariance 1 − m, m their leverage. `along` holds what a unit of each principal y moves, `rest` 1
+/// − m along it, `y` its value over √rest: by the model of variance 1.
 struct Principal {
   MatrixXd along;
   VectorXd y, rest;
@@ -281,7 +281,7 @@ void state_free(const MatrixXd& inverse, double noise_variance, std::span<const 
   state_whitened(llt.matrixL(), noise_variance, std::move(whitened), result);
 }
 
-/// The model's covariance, which stands where clusters say nothing.
+/// The model's covariance, which is used where clusters give no information.
 ClusterCovariance of_model(MatrixXd cov) {
   const Eigen::Index n = cov.rows();
   ClusterCovariance result;

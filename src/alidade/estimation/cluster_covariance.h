@@ -12,17 +12,17 @@ namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
 /// What one independent cluster of measurements (a photo, a shot, a block of time) does to the estimate, in the
-/// parameters whose covariance is asked for: H = Σ A + priors is the information of all shared parameters (the
+/// parameters whose covariance is requested: H = Σ A + priors is the information of all shared parameters (the
 /// clusters' own eliminated), A and g = Σ Jᵀr the cluster's part of it and of the gradient at the optimum, r whitened.
 struct ClusterStep {
-  Eigen::VectorXd step;    ///< H⁻¹ g, of the parameters asked for.
+  Eigen::VectorXd step;    ///< H⁻¹ g, of the requested parameters.
   Eigen::MatrixXd spread;  ///< H⁻¹ A H⁻¹, of the same: what `step` would have for covariance were the truth fitted.
   /// H⁻¹ A H⁻¹ A H⁻¹, of the same, over all shared parameters: by how much the fit to the cluster itself lessens that.
-  /// May be omitted where all shared parameters are asked for.
+  /// May be omitted where all shared parameters are requested.
   Eigen::MatrixXd taken = {};
 };
 
-/// The step of a cluster where all shared parameters are asked for: `inverse` is H⁻¹.
+/// The step of a cluster where all shared parameters are requested: `inverse` is H⁻¹.
 [[nodiscard]] ClusterStep cluster_step(const Eigen::MatrixXd& inverse, const Eigen::MatrixXd& information,
                                        const Eigen::VectorXd& gradient);
 
@@ -41,7 +41,7 @@ struct ClusterCovariance {
   [[nodiscard]] double largest_inflation() const { return inflation.size() > 0 ? inflation.maxCoeff() : 1.0; }
 };
 
-/// Cluster-robust covariance. `inverse` is H⁻¹ of the parameters asked for, `noise_variance` the variance s² of the
+/// Cluster-robust covariance. `inverse` is H⁻¹ of the requested parameters, `noise_variance` the variance s² of the
 /// whitened residuals by their own degrees of freedom: s² H⁻¹ is the model's covariance. Parameters with a zero
 /// diagonal are fixed. Fewer than `min_clusters` clusters determine nothing: the model's covariance is returned.
 ///

@@ -114,7 +114,7 @@ TEST(ClusterCovariance, ErrorsSharedWithinClustersAreCovered) {
   }
 }
 
-// Six more parameters that all clusters share take their part of the residuals, though none asks for them: of
+// Six more parameters that all clusters share take their part of the residuals, though none is requested: of
 // independent errors the scores' squares are 1 in the mean, as the trace of a projection has it.
 TEST(ClusterCovariance, SharedParametersThatNoOneAsksForAreCounted) {
   auto random = seeded(21);

@@ -20,7 +20,7 @@ enum class ExitCode : int {
   not_trusted = 6  ///< There is an estimate, and its files, but its own checks speak against it (State::bad).
 };
 
-/// How an answer, or one check of it, stands. Shown as ● ◆ ▲ ■ ✕.
+/// State of an answer, or of one check of it. Shown as ● ◆ ▲ ■ ✕.
 enum class State { good, care, bad, refused, not_converged };
 
 /// One thing that was checked: "coverage: worst 3σ 0.5 px, bottom-left corner".
@@ -55,7 +55,7 @@ struct Verdict {
   std::string to_add;  ///< What the user should do next; empty if nothing.
   std::vector<Check> checks;
 
-  /// Whether there is an answer that stands: good, or with what to take care of.
+  /// Whether there is a usable answer: good, or with care.
   [[nodiscard]] bool ok() const { return state == State::good || state == State::care; }
 };
 

@@ -14,7 +14,7 @@
 
 namespace alidade {
 
-/// Where a cell stands; `text` is "file:line: column 'name'", to begin a message with.
+/// Position of a cell; `text` is "file:line: column 'name'", to begin a message with.
 struct CsvPlace {
   const std::string& file;
   std::size_t line;
@@ -74,7 +74,7 @@ class Csv {
   std::vector<std::size_t> lines_;
 };
 
-/// Such a table row by row, as it arrives: nothing is waited for beyond the end of the line that is asked for.
+/// Such a table row by row, as it arrives: nothing is waited for beyond the end of the requested line.
 class CsvStream {
  public:
   /// Reads the header. Throws InputError as Csv does.

@@ -93,8 +93,8 @@ TEST(Fleet, TellsWhatHappened) {
   EXPECT_EQ(seen.size(), 4U);
 }
 
-/// Two hours of a day that warms up by 12 °C: who drifts with it is said to, with the size it has; who does not is not,
-/// and neither is a step of the focal length taken for it.
+/// Two hours of a day that warms up by 12 °C: a camera that drifts with it is reported, with the size of the drift; the
+/// others are not, and neither is a step of the focal length taken for it.
 TEST(Fleet, TellsAFocalLengthThatFollowsTheTemperature) {
   FleetSceneConfig config;
   config.event_share = 0.5;

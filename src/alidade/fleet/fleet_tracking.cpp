@@ -10,7 +10,7 @@ namespace {
 
 constexpr double allowance = 1.0;       // of the sums, σ: half the change that they find fastest
 constexpr double most_a_row = 4.0;      // σ: an outlier row alone is no change
-constexpr int learning_rows = 5;        // of a change, before it is said
+constexpr int learning_rows = 5;        // of a change, before it is reported
 constexpr double largest_change = 0.5;  // rad, or relative: more is another camera
 constexpr double drift_prior = 2e-4;    // σ of f per °C before it is known: metal and glass have 10⁻⁵ to 10⁻⁴
 constexpr double rate_walk = 1e-4;      // of the zeros of a camera whose rates are measured: rad in a second
@@ -244,9 +244,9 @@ double warmer_by(FleetCamera& camera, const FleetRow& row) {
   return now_c - static_cast<double>(tracking.reference_c);
 }
 
-/// Whether the focal length follows the temperature, said once: by how much likelier the rows are with a drift of the
-/// prior's size than without one. Where there is none, that exceeds B once in B cameras, however long they are watched
-/// (J. Ville, "Étude critique de la notion de collectif", 1939).
+/// Whether the focal length follows the temperature, reported once: by how much likelier the rows are with a drift of
+/// the prior's size than without one. Where there is none, that exceeds B once in B cameras, however long they are
+/// watched (J. Ville, "Étude critique de la notion de collectif", 1939).
 std::optional<FleetAlarm> drift_of(FleetCamera& camera, const FleetRow& row) {
   const double log_of_once_in = std::log(1e7);
   FleetTracking& tracking = camera.body.tracking;

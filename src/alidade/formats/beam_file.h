@@ -12,7 +12,7 @@ ALIDADE_PUBLIC_BEGIN
 /// What rangefinder.yaml holds.
 struct BeamFile {
   Beam beam;
-  /// The camera that it belongs to: a file, relative to the beam's; empty: not said.
+  /// The camera that it belongs to: a file, relative to the beam's; empty: not given.
   std::filesystem::path camera;
 };
 
@@ -20,7 +20,7 @@ struct BeamFile {
 /// by), covariance of origin, direction and scale, and with the lens where it is known. `camera` is written as given.
 [[nodiscard]] std::string beam_text(const Beam& beam, const Camera& camera, const std::string& camera_file);
 
-/// Reads it. `file.camera` is made relative to where the reader stands. Throws InputError: a key that is missing,
+/// Reads it. `file.camera` is made relative to the reader's folder. Throws InputError: a key that is missing,
 /// unknown or no number, a direction that is no unit vector, something that is no covariance.
 [[nodiscard]] BeamFile read_beam(const std::filesystem::path& file);
 

@@ -103,7 +103,7 @@ class VideoFrames::Impl {
     }
   }
 
-  /// Deep images become float, divided by the same for all frames: what the first one's bits ask for, as 10- and
+  /// Deep images become float, divided by the same for all frames: as required by the first one's bits, as 10- and
   /// 12-bit cameras store their values in 16.
   cv::Mat to_frame(const cv::Mat& image) {
     if (image.depth() == CV_8U) return image;

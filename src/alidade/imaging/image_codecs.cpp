@@ -149,7 +149,7 @@ void no_flush(png_structp) {}
 void no_warning(png_structp, png_const_charp) {}
 [[noreturn]] void fail_png(png_structp png, png_const_charp) { png_longjmp(png, 1); }
 
-/// Grey or BGR(A) of 8 or 16 bit, whatever stands in the file.
+/// Grey or BGR(A) of 8 or 16 bit, whatever is in the file.
 void plan_png(png_structp png, png_infop info, bool keep_alpha) {
   const int depth = png_get_bit_depth(png, info), kind = png_get_color_type(png, info);
   if (kind == PNG_COLOR_TYPE_PALETTE) png_set_palette_to_rgb(png);

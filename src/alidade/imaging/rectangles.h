@@ -12,7 +12,7 @@ class Mat;
 
 namespace alidade {
 
-/// A dark or bright area with four straight edges, seen through a lens that may bend them.
+/// A dark or bright area with four straight edges, seen through a lens that may curve them.
 struct SeenRectangle {
   /// Clockwise as seen; the first is the one nearest to the top left.
   std::array<Eigen::Vector2d, 4> corners_px;
@@ -22,7 +22,7 @@ struct SeenRectangle {
 };
 
 /// All of them that are in the image as a whole, the most contrast first. Edges are fitted as planes of rays, so that
-/// corners are right where the lens bends lines.
+/// corners are right where the lens curves lines.
 [[nodiscard]] std::vector<SeenRectangle> find_rectangles(const cv::Mat& grey, const Camera& camera);
 
 }  // namespace alidade

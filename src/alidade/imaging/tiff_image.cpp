@@ -12,7 +12,7 @@
 namespace alidade {
 namespace {
 
-/// The file in memory, as libtiff asks for it.
+/// The file in memory, as libtiff reads it.
 struct TiffSource {
   std::string_view bytes;
   toff_t at = 0;
@@ -42,7 +42,7 @@ toff_t seek_to(thandle_t handle, toff_t offset, int whence) {
 int close_nothing(thandle_t) { return 0; }
 toff_t size_of_file(thandle_t handle) { return source_of(handle).bytes.size(); }
 
-/// What libtiff would print is said by the caller, in its way.
+/// The caller reports what libtiff would print.
 void silence() {
   static const bool once = [] {
     TIFFSetErrorHandler(nullptr);

@@ -128,7 +128,7 @@ void LensObserver::take(double t_capture_s, const Eigen::Vector2d& pan_tilt_rad,
   if (!own.has_zoomed) own.spread.add(pan_tilt_rad);
   const bool is_believable = estimate.has_value && estimate.values().allFinite() && estimate.sigma.allFinite() &&
                              estimate.fx > 0.0 && estimate.fy > 0.0;
-  if (!is_believable) return;  // it begins, or begins again: the last lens goes on
+  if (!is_believable) return;  // it initialises, or reinitialises: the last lens is kept
   own.now = own.lens_of(estimate);
   own.has_estimate = true;
 }

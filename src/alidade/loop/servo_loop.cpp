@@ -27,7 +27,7 @@ class ImageQueue {
  public:
   explicit ImageQueue(double latency_s) : latency_s_(latency_s) {}
   void take(Image image) { ring_[num_taken_++ % ring_.size()] = std::move(image); }
-  /// The next image that is known by now and was not asked for before; none: nullptr.
+  /// The next image that is known by now and was not requested before; none: nullptr.
   Image* next(double t_s) {
     if (num_known_ >= num_taken_) return nullptr;
     Image& image = ring_[num_known_ % ring_.size()];

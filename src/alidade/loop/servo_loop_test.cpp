@@ -53,7 +53,7 @@ void expect_ratios(double latency_s, const PlantMismatch& mismatch, const std::a
   }
 }
 
-// One setting of the filter for all of them: the figures asked for were reached with one set for each circle.
+// One setting of the filter for all of them: the required figures were reached with one set for each circle.
 TEST(ServoLoop, PredictionBeatsThePapersController) { expect_ratios(0.0, {}, {8.0, 18.0, 15.0}); }
 TEST(ServoLoop, PredictionBeatsItWithLateImages) { expect_ratios(0.1, {}, {5.0, 8.0, 5.0}); }
 TEST(ServoLoop, PredictionBeatsItOnAPlantThatIsNotAsKnown) {

@@ -25,7 +25,7 @@ struct ServoScenario {
   ServoConfig config;
   std::vector<ControllerKind> controllers{controller_kinds.begin(), controller_kinds.end()};
   int num_seeds = 8;
-  double specification_px = 10.0;  ///< RMS that is asked for: lines in figures, and the verdict's.
+  double specification_px = 10.0;  ///< Required RMS: lines in figures, and the verdict's.
   std::optional<RobustnessConfig> robustness = RobustnessConfig{};
 };
 

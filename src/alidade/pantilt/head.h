@@ -9,7 +9,7 @@
 #include "alidade/public.h"
 
 // The general pan-tilt head; docs/maths/pan-tilt-heads.md. Angles at every interface are what the encoders READ, as
-// (pan, tilt) [rad]; the head itself stands at scale · (reading − zero). Pan > 0 turns left, tilt > 0 turns up.
+// (pan, tilt) [rad]; the head itself is at scale · (reading − zero). Pan > 0 turns left, tilt > 0 turns up.
 
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN

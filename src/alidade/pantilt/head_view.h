@@ -8,7 +8,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// A board that stood still, as the camera of one head saw it at one pair of readings.
+/// A static board, as the camera of one head saw it at one pair of readings.
 struct HeadView {
   BoardView seen;  ///< seen.photo: what the view is called ("view 17").
   int board = 0;   ///< Which pose of the board: views of one pose have one number, whatever head saw it.

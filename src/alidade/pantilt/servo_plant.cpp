@@ -22,7 +22,7 @@ AxisMotion braking(const AnglePlant& plant, AxisMotion motion, double goal, doub
   return motion;
 }
 
-/// Two phases: as fast as possible until the lag asks for less, then the lag.
+/// Two phases: as fast as possible until the lag requires less, then the lag.
 AxisMotion advanced(const AnglePlant& plant, const AxisMotion& motion, double command, double dt_s) {
   const double goal = plant.gain_rad() * command, missing = goal - motion.angle_rad;
   if (std::isfinite(plant.max_acceleration_rad_s2)) return braking(plant, motion, goal, dt_s);
@@ -34,7 +34,7 @@ AxisMotion advanced(const AnglePlant& plant, const AxisMotion& motion, double co
   return {angle, dt_s > 0.0 ? (angle - motion.angle_rad) / dt_s : motion.rate_rad_s};
 }
 
-/// Two phases: as hard as it can until the lag asks for less, then the lag.
+/// Two phases: at full acceleration until the lag requires less, then the lag.
 AxisMotion advanced(const RatePlant& plant, const AxisMotion& motion, double command, double dt_s) {
   const double goal = std::clamp(plant.gain_rad() * command, -plant.max_rate_rad_s, plant.max_rate_rad_s);
   const double missing = goal - motion.rate_rad_s;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double rate_hz = 30.0;
 
-/// A head that pans, tilts and rolls, with a lens that bends.
+/// A head that pans, tilts and rolls, with a distorting lens.
 RotationScene scene_of(double speed = 1.0) {
   RotationScene scene;
   scene.width_px = 320;

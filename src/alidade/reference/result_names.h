@@ -6,7 +6,7 @@
 
 namespace alidade {
 
-/// One name of a result: where it stands, what it is, what it means.
+/// One name of a result: its position, what it is, what it means.
 struct ResultName {
   std::string path;     ///< "camera.fx", "photos[].file", "controllers.*.rms_px"; [3]: a list of three.
   std::string kind;     ///< Unit of a number (px, m, rad, 1 …), or: count, text, flag, any.

@@ -34,7 +34,7 @@ JsonValue camera_value(const PlacedCamera& camera) {
   return value;
 }
 
-/// Where each placed camera stands, with the covariance of its position in the world, and half its view (tangents), to
+/// The position of each located camera, with its covariance in the world, and half its view (tangents), to
 /// draw it by.
 DataTable cameras_table(const MovingTargetReport& report) {
   constexpr std::array<const char*, 18> columns{"id",

@@ -14,7 +14,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// What was left of a long table, and how: its whole stands in a CSV file beside the document.
+/// What was left of a long table, and how: all of it is in a CSV file beside the document.
 struct Thinned {
   std::size_t from = 0, to = 0;  ///< Rows before and after.
   std::string how;
@@ -61,7 +61,7 @@ struct ResultDocument {
 /// The word for a state in documents: good, care, bad, refused, not_converged.
 [[nodiscard]] std::string state_name(State state);
 
-/// Whether a document with this exit code holds an estimate, be it one that stands or one not to be trusted.
+/// Whether a document with this exit code holds an estimate, usable or not to be trusted.
 [[nodiscard]] constexpr bool tells_an_estimate(int exit_code) {
   return exit_code == static_cast<int>(ExitCode::ok) || exit_code == static_cast<int>(ExitCode::not_trusted);
 }

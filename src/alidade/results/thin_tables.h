@@ -12,7 +12,7 @@ inline constexpr std::size_t max_table_rows = 20'000, max_corner_rows = 60'000, 
 
 /// result_text() of a size that a page can hold. Longer tables are thinned: of equal buckets of rows stay the first and
 /// those where a residual (or what the table has of that kind) is smallest and largest, and besides all rows that are
-/// flagged: rejected, or with an event. What was done stands in the table's `thinned`. The whole table goes to
+/// flagged: rejected, or with an event. What was done is in the table's `thinned`. The whole table goes to
 /// `add_file(name, csv)` first, which may add the name to document.files.
 [[nodiscard]] std::string result_text_of_size(ResultDocument& document,
                                               const std::function<void(std::string, std::string)>& add_file);

@@ -15,7 +15,7 @@ ALIDADE_PUBLIC_BEGIN
 struct RigConfig {
   std::optional<double> sigma_px = {};           ///< Of a corner's coordinate; none: estimated from the residuals.
   std::optional<double> sigma_encoder_rad = {};  ///< Of a reading; none: estimated from the residuals.
-  std::optional<Board> board = {};               ///< That stood still while the heads looked at it.
+  std::optional<Board> board = {};               ///< Static while the heads observed it.
   bool estimate_scales = false;                  ///< Radians of the axes for each radian read.
   bool estimate_once = false;                    ///< An error of one period per revolution of each axis.
   bool estimate_backlash = false;                ///< Views stand in the order in which they were taken.

@@ -32,7 +32,7 @@ struct RigBoard {
   Rigid3 world_from_board;
 };
 
-/// Beyond so many σ a cause is asked for: of thirty that are tested, one clean rig in a thousand is above.
+/// Beyond so many σ a cause is indicated: of thirty that are tested, one clean rig in a thousand is above.
 inline constexpr double rig_cause_limit = 4.2;
 /// What is estimated by need costs σ where it was not needed, and no more: one clean rig in seven.
 inline constexpr double rig_free_limit = 2.6, rig_free_joint_limit = 2.6;
@@ -58,7 +58,7 @@ struct RigCause {
   double sigmas = 0.0;
 };
 
-/// Something that was estimated because the residuals asked for it.
+/// Something that was estimated because the residuals indicated it.
 struct RigFreed {
   std::string name;  ///< "head1.pan_scale", "head1.camera.f", "head2.pan_cos_rad"
   double value = 0.0, sigma = 0.0;
@@ -87,7 +87,7 @@ struct RigReport {
   Eigen::MatrixXd cov_model;   ///< As rig.cov, if every corner and reading erred by itself and all given was exact.
   ClusterCovariance clusters;  ///< Views; of the parameters that are solved for.
   std::vector<Assumption> assumed;                  ///< Lenses, the square, the encoders' scales.
-  std::vector<RigCause> causes;                     ///< Tested one by one, the one most asked for first.
+  std::vector<RigCause> causes;                     ///< Tested one by one, the most significant first.
   std::vector<RigFreed> freed;                      ///< By need.
   std::string alike;                                ///< Two causes that explain the residuals alike; empty: none.
   std::vector<Eigen::Vector2d> backlash_rad;        ///< Pan, tilt of each head, where it was estimated; 0 else.

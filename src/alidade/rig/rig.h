@@ -8,15 +8,15 @@
 
 namespace alidade {
 
-/// Axes, offsets and mounting of pan-tilt heads, and where they stand to each other, from views of boards that stood
-/// still, by maximum likelihood; readings have noise of their own and are corrected view by view. Lenses are known.
+/// Axes, offsets and mounting of pan-tilt heads, and their relative poses, from views of static
+/// boards, by maximum likelihood; readings have noise of their own and are corrected view by view. Lenses are known.
 /// Needs no initial guess and does not throw on bad data: the report says how it went. `cameras`: by id of the head.
 /// docs/maths/pan-tilt-heads.md. Throws Interrupted.
 [[nodiscard]] RigReport calibrate_rig(std::span<const HeadView> views, std::span<const Eigen::Vector3d> points_in_board,
                                       const std::map<int, Camera>& cameras, const RigConfig& config,
                                       const Progress& progress = {});
 
-/// The same, and what its residuals ask for is estimated too, one after another.
+/// The same, and causes indicated by its residuals are estimated too, one after another.
 [[nodiscard]] RigReport calibrate_rig_by_need(std::span<const HeadView> views,
                                               std::span<const Eigen::Vector3d> points_in_board,
                                               const std::map<int, Camera>& cameras, const RigConfig& config,

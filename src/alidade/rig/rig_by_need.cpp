@@ -194,7 +194,7 @@ class ByNeed {
                              : std::array{encoder.pan_cos_rad, encoder.pan_sin_rad, encoder.tilt_cos_rad,
                                           encoder.tilt_sin_rad}[static_cast<std::size_t>(param - pan_cos_param)];
       if (is_scale) freed.was_sigma = counted_sigma_scale(config_).value_or(0.0);
-      freed.was = is_scale ? std::copysign(1.0, freed.value) : 0.0;  // which way it counts is found, not asked for
+      freed.was = is_scale ? std::copysign(1.0, freed.value) : 0.0;  // its sign is detected, not a cause
     } else if (param >= pan_backlash_param) {
       const int axis = param - pan_backlash_param;
       freed.value = best_.backlash_rad[h][axis];

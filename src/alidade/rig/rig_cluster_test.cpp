@@ -187,7 +187,7 @@ TEST(RigGiven, MovesAreThoseOfASecondSolve) {
   EXPECT_EQ(rig_verdict(report, config).state, State::care);
 }
 
-/// A lens with a covariance is counted, and asks for nothing.
+/// A lens with a covariance is included, and needs nothing else.
 TEST(RigGiven, ALensWithItsCovarianceIsCounted) {
   double sum = 0.0, exact = 0.0;
   constexpr int runs = 24;

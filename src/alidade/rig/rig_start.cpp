@@ -33,7 +33,7 @@ Groups groups_of(std::span<const TurnedView> views) {
   return groups;
 }
 
-/// How the board stood in the base, one per view.
+/// The board's pose in the base, one per view.
 std::vector<Eigen::Quaterniond> base_from_board(const std::vector<TurnedView>& views, const Head& head) {
   std::vector<Eigen::Quaterniond> turned;
   for (const TurnedView& view : views)

@@ -12,7 +12,7 @@ ALIDADE_PUBLIC_BEGIN
 
 inline constexpr std::size_t num_agilities = 5;
 
-/// Where a target stands as seen from a head, one axis: angle, rate, acceleration; each of a few Singer models knows
+/// A target's bearing from a head, one axis: angle, rate, acceleration; each of a few Singer models knows
 /// another liveliness of the target, and their past predictions decide how much each is heard.
 struct BearingFilterConfig {
   double singer_tau_s = 0.4;  ///< For how long an acceleration lasts.

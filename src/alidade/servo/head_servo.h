@@ -11,7 +11,7 @@
 
 namespace alidade {
 
-/// Where the target stood in an image, and what the encoders read when it was taken.
+/// The target's position in an image, and the encoders' readings at its capture.
 struct HeadObservation {
   double t_capture_s = 0.0;
   Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();

@@ -51,7 +51,7 @@ inline constexpr std::array<const char*, num_servo_flaws> servo_flaw_units{"rad/
 struct ServoFit {
   ServoKind kind = ServoKind::angle;
   ServoParams params = ServoParams::Zero();
-  ServoFlaws flaws;                                     ///< Those that the log asks for, as estimated.
+  ServoFlaws flaws;                                     ///< Those indicated by the log, as estimated.
   std::vector<std::size_t> freed;                       ///< Which: indices in servo_flaws, in order of selection.
   std::array<double, num_servo_flaws> flaw_sigma = {};  ///< Of those.
   /// Of the selected model: blocks of rows are clusters; of the other as `cov_model`.

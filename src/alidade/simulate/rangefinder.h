@@ -64,7 +64,7 @@ struct ShotMistake {
   double drift_m = 0.0;      ///< That the readings are too long by at the last shot, evenly from none at the first.
   double bend_m = 0.0;       ///< That a reading of 1 m or 3 m is too long by against one of 2 m: a parabola.
   double wander_px = 0.0;    ///< That the spots stand lower and to the right by at the last shot, as the drift.
-  bool exchange_uv = false;  ///< u of the spots stands in the column of v.
+  bool exchange_uv = false;  ///< u of the spots is in the column of v.
   double offset_m = 0.0;     ///< That each reading is too long.
   double unit_m = 1.0;       ///< Of the readings: 0.0254 where they are inches.
   int shift_rows = 0;        ///< The ranges stand so many rows later than their boards and spots.

@@ -58,7 +58,7 @@ struct SimulatedViews {
 struct RigMistake {
   double focal = 0.0;        ///< Share by which the camera files' focal lengths are too long.
   double centre_px = 0.0;    ///< By which their centres lie aside, in u and in v.
-  bool swap_angles = false;  ///< Pan stands in the column of tilt.
+  bool swap_angles = false;  ///< Pan is in the column of tilt.
   bool flip_pan = false;     ///< Pan counts the other way.
   bool mirror = false;       ///< Images are mirrored.
   bool swap_heads = false;   ///< The heads' numbers are exchanged.

@@ -41,7 +41,7 @@ double rounded_to(double value, double step) { return step > 0.0 ? step * std::r
 
 DelayedAxis standing(const ServoAxis& axis, double angle_rad) {
   DelayedAxis still(axis, {angle_rad, 0.0});
-  // The command under which it has stood there so far.
+  // The command under which it has rested there so far.
   double command = std::holds_alternative<AnglePlant>(axis.plant) ? angle_rad / gain_of(axis.plant) : 0.0;
   if (command != 0.0) command += std::copysign(axis.dead_band, command);
   still.send(command);

@@ -26,7 +26,7 @@ TEST(SimulateTrack, NoiseHasItsSigma) {
   TrackScene scene = *track_scenario("A2");
   scene.duration_s = 60.0;
   double sum2_px = 0.0, num = 0.0;
-  scene.sigma_encoder_rad = 0.0;  // what is read is then where the head stands
+  scene.sigma_encoder_rad = 0.0;  // the reading is then the head's angle
   for (const SimulatedObservation& observation : simulate_track(scene, 5)) {
     const auto seen =
         project(scene.heads[observation.head], observation.pan_tilt_rad, scene.position(observation.t_capture_s));

@@ -19,7 +19,7 @@ Eigen::AlignedBox2d printed_area(const Board& board) {
 }
 
 /// Points on the board, in squares, seen by the pixels of a part: exact on every eighth pixel, linear between, which
-/// errs by less than 0.01 px where a lens bends by less than one pixel in 30.
+/// errs by less than 0.01 px where a lens distorts by less than one pixel in 30.
 class SquaresSeen {
  public:
   SquaresSeen(const SeenBoard& seen, int u_min, int v_min, int cols, int rows)

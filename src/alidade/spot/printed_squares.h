@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// Corners of the printed area of a board in the photo [px], with points between, as the lens bends its sides. Empty
+/// Corners of the printed area of a board in the photo [px], with points between, as the lens curves its sides. Empty
 /// where the camera does not see them all.
 [[nodiscard]] std::vector<Eigen::Vector2d> printed_outline(const SeenBoard& seen);
 

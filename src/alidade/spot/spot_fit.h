@@ -17,7 +17,7 @@ struct SpotPlace {
   std::string reason;
 };
 
-/// Centroid of the light in a disc of three sigmas around itself, iterated until it stands. Where ink and paper share
+/// Centroid of the light in a disc of three sigmas around itself, iterated until convergence. Where ink and paper share
 /// the disc, it starts fit_on_edge().
 [[nodiscard]] SpotPlace measure_spot(const SpotSignal& signal, const SpotCandidate& candidate);
 

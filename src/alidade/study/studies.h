@@ -124,7 +124,7 @@ struct TurnedStudy {
   double lever_m = 0.0;        ///< Camera centre from the centre of rotation, along the view.
   double step_m = 0.0;         ///< σ of the hand's own steps.
   double focus = 0.0;          ///< By which the focal length walks, relative.
-  bool on_the_spot = false;    ///< And said so: no parallax is allowed for.
+  bool on_the_spot = false;    ///< And given as such: no parallax is included.
 };
 struct TurnedTrial {
   MatchedPhotos photos;

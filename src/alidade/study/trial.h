@@ -38,7 +38,7 @@ using RunTrial = std::function<void(std::uint64_t trial, TrialResult& result)>;
 /// A simulated setting whose trials are drawn: what they estimate, and a worker for each thread.
 struct StudySetting {
   std::vector<TrialQuantity> quantities;
-  bool has_bound = false;  ///< The Cramér–Rao bound is known; otherwise σ stands for it.
+  bool has_bound = false;  ///< The Cramér–Rao bound is known; otherwise σ is used instead.
   std::function<RunTrial()> make_worker;
 };
 

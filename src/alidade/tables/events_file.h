@@ -36,7 +36,7 @@ struct EventsOptions {
 [[nodiscard]] EventsFile read_events(const std::filesystem::path& file, std::span<const RigHead> heads,
                                      const EventsOptions& options = {});
 
-/// `sigma_px` stands there if an observation has one.
+/// `sigma_px` is there if an observation has one.
 [[nodiscard]] std::string events_csv(std::span<const TargetObservation> observations, std::span<const RigHead> heads);
 
 /// Reads `t_s,x_m,y_m,z_m`, in order of time.

@@ -21,7 +21,7 @@ struct ObservationsOptions {
 
 /// Reads `frame,t_s,point_id,u_px,v_px`, one observation per row. An empty `point_id` is a frame in which nothing was
 /// seen. Numbers that are missing between frames become frames without observations. Throws InputError: a missing
-/// column, times or frames that run backwards, a frame with two times, a point that stands twice in a frame, no rows.
+/// column, times or frames that run backwards, a frame with two times, a duplicate point in a frame, no rows.
 [[nodiscard]] ObservationTable read_observations(const std::filesystem::path& file, const ObservationsOptions& options);
 [[nodiscard]] std::string observations_csv(std::span<const ObservationFrame> frames);
 

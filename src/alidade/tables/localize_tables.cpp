@@ -14,7 +14,7 @@
 namespace alidade {
 namespace {
 
-/// In a TUM file the quaternion's real part stands last, elsewhere first.
+/// In a TUM file the quaternion's real part is last, elsewhere first.
 std::string pose_cells(const Rigid3& world_from_cam, bool is_tum) {
   const Eigen::Vector3d& t = world_from_cam.translation;
   const Eigen::Quaterniond& q = world_from_cam.rotation;

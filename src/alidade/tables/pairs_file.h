@@ -19,7 +19,7 @@ struct PairsFile {
 
 /// Reads points matched between images: frame_a, frame_b, ua_px, va_px, ub_px, vb_px (or image_a, image_b, ua, va,
 /// ub, vb), the frames in order of first appearance. Matches that share the very same pixel of a frame share a feature.
-/// A match that stands twice is rejected and listed. Throws InputError; wrong rows are listed instead with `skip_bad`.
+/// A duplicate match is rejected and listed. Throws InputError; wrong rows are listed instead with `skip_bad`.
 [[nodiscard]] PairsFile read_pairs(const std::filesystem::path& file, bool skip_bad = false);
 
 /// Throws InputError about `file` where more than one point in twenty lies outside the images of the photos' size: they

@@ -231,7 +231,7 @@ void read_search(const YAML::Node& root, const Fields& top, const FieldList& des
   search.number("max_radius_deg", config.max_radius_rad, described, degree);
 }
 
-/// How the lenses zoom, and by which intrinsics the loop goes: an observer's where they do, if nothing is said.
+/// How the lenses zoom, and by which intrinsics the loop goes: an observer's where they do, by default.
 void read_lens(const YAML::Node& root, const Fields& top, ServoScene& scene) {
   const Section section(root, top, "zoom", {"t_s", "factor"});
   if (section.has("t_s") || section.has("factor")) {

@@ -55,7 +55,7 @@ class TargetDetector {
   TargetDetector& operator=(TargetDetector&&) noexcept;
   ~TargetDetector();
 
-  /// Frame: 8-bit BGR or grey, or 32-bit float grey of 0 to 255. A colour asks for BGR.
+  /// Frame: 8-bit BGR or grey, or 32-bit float grey of 0 to 255. A colour requires BGR.
   [[nodiscard]] TargetDetection find(const cv::Mat& frame, const std::optional<TargetExpectation>& expected = {});
 
  private:

@@ -11,7 +11,7 @@
 namespace alidade {
 namespace {
 
-/// The first head of the paper's rig, with a lens that bends.
+/// The first head of the paper's rig, with a distorting lens.
 RigHead head() {
   RigHead head = xiahou_rig()[0];
   head.camera.width_px = 320;

@@ -91,7 +91,7 @@ TEST(TrackFaults, AreNamedAndNeverCalledGood) {
         EXPECT_FALSE(result.verdict.state == State::good && result.worst_sigma > 5.0)
             << scenario << " " << of.what << " " << seed << ": " << result.worst_sigma;
         num_named += !of.named.empty() && says_one_of(result.verdict.sentence, of.named) ? 1 : 0;
-        // A late clock is said of late clocks alone.
+        // A late clock is reported for late clocks alone.
         const bool says_clock = result.verdict.sentence.find("clock of head") != std::string::npos;
         if (!of.what.starts_with("clock"))
           EXPECT_FALSE(says_clock) << scenario << " " << of.what << " " << seed << ": " << result.verdict.sentence;
@@ -102,7 +102,7 @@ TEST(TrackFaults, AreNamedAndNeverCalledGood) {
 }
 
 /// Forty draws each of the scenarios, the rig being what its file says, exactly. D hides the target from a head for two
-/// seconds, which is said.
+/// seconds, which is reported.
 TEST(TrackFaults, CleanScenariosAreGood) {
   constexpr int draws = 40;
   for (const char* name : {"A", "A2", "B", "C", "E", "F", "G"}) {
@@ -147,7 +147,7 @@ TEST(TrackFaults, OfThreeHeadsTheWrongOneIsNamed) {
   }
 }
 
-/// Two things in the images, each seen now and then: it is said, and what is followed is one of them.
+/// Two things in the images, each observed now and then: it is reported, and one of them is tracked.
 TEST(TrackFaults, ASecondTargetIsSaid) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     const TrackScene scene = faulty("C", [](TrackFaults& f) { f.second = 0.25; });

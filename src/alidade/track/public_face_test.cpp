@@ -101,7 +101,7 @@ TEST(TrackFace, OneByOneIsTheSame) {
   }
 }
 
-/// A stream without end keeps its newest rows: what they say is what the batch call says of them, and it is said.
+/// A stream without end keeps its newest rows: the result is that of the batch call for them, which is reported.
 TEST(TrackFace, OfALongStreamTheNewestRowsAreKept) {
   const TrackScene scene = *track_scenario("B");
   const auto observations = testing::observations_of(scene, 5);

@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-/// h and R of one observation: the head as it stood, its camera, and the noise of pixel and encoder. Lives as long as
+/// h and R of one observation: the head's pose, its camera, and the noise of pixel and encoder. Lives as long as
 /// the camera.
 struct ObservationModel {
   TurnedHead turned;

@@ -23,11 +23,11 @@ struct FollowConfig {
   double predict_s = 0.0;    ///< Above 0: a prediction so far ahead of each step.
   double smooth_s = 0.0;     ///< Above 0: also smoothed, with observations up to that much later; not for imm.
   double warm_up_s = 0.5;    ///< After the start of a track: not counted in errors and statistics.
-  bool judge = true;         ///< Test the innovations, raise σ by what they ask for, and ask for faults of the rig.
+  bool judge = true;         ///< Test the innovations, increase σ accordingly, and test for faults of the rig.
   Progress progress = {};    ///< Is called now and then, and may stop the work.
 };
 
-/// The tracker's config, with the history that smoothing asks for.
+/// The tracker's config, with the history that smoothing needs.
 [[nodiscard]] TrackerConfig with_history(const FollowConfig& config);
 
 /// Follows a target through all observations, in order of arrival.
@@ -56,7 +56,7 @@ struct FollowConfig {
                                               std::span<const RigHead> heads, const FollowConfig& config,
                                               const TrueTrack& truth);
 
-/// Whether the track stands; where it does not, whether swapped heads or angles in degrees would explain it.
+/// Whether the track is accepted; where it is not, whether swapped heads or angles in degrees would explain it.
 [[nodiscard]] Verdict track_verdict(const TrackReport& report, std::span<const TargetObservation> observations,
                                     std::span<const RigHead> heads, const FollowConfig& config);
 

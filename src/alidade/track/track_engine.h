@@ -81,7 +81,7 @@ class TrackEngine {
   }
 
  private:
-  /// An observation, and how things stood after it.
+  /// An observation, and the state after it.
   struct Entry {
     TargetObservation observation;
     Filter filter;

@@ -66,7 +66,7 @@ struct TrackReport {
   /// Of a filter that learns the rig's errors where they are counted: with them counted alone, innovations are coloured
   /// by what does not change. One per head.
   std::vector<HeadInnovations> innovations;
-  double inflation = 1.0;           ///< Every covariance was raised by this factor: what the innovations ask for.
+  double inflation = 1.0;           ///< Every covariance was increased by this factor, from the innovations.
   std::vector<RigFault> faults;     ///< The most surprising first.
   bool errors_are_counted = false;  ///< Those of the rig.
 };

@@ -14,7 +14,7 @@
 
 namespace alidade {
 
-/// The models of motion that the filter has; what can be asked for by name: TrackMethod.
+/// The models of motion that the filter has; those that can be requested by name: TrackMethod.
 enum class TargetMotion { cv, singer, turn, resting, imm, ballistic };
 
 /// cv, singer, turn, resting, imm, ballistic.

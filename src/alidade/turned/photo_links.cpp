@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t min_inliers = 8;
 constexpr double min_share = 0.1;
-constexpr double agree_within = 0.0022, agree_within_px = 1.5;  // of the width; the lens bends, hands shake
+constexpr double agree_within = 0.0022, agree_within_px = 1.5;  // of the width; the lens distorts, hands shake
 constexpr double same_within_px = 0.05;
 
 /// The homography that most matches agree on.

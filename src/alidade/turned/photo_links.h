@@ -13,7 +13,7 @@ struct PhotoLink {
   std::size_t pair = 0;                                    ///< In MatchedPhotos::pairs.
   std::vector<int> inliers;                                ///< Of the pair's matches.
   Eigen::Matrix3d b_from_a = Eigen::Matrix3d::Identity();  ///< The homography, normalised pixels.
-  bool is_same_image = false;                              ///< Every point stands where it stood.
+  bool is_same_image = false;                              ///< Every point is where it was.
 };
 
 /// Normalised pixels: centre of the image 0, half its width 1.

@@ -36,7 +36,7 @@ TEST(CircleGrid, FindsTheImagesOfTheCentres) {
       score.add(found.view, true_corners(scene, i));
     }
     EXPECT_GE(score.num_found, 0.98 * score.num_points);
-    EXPECT_LT(score.rms_px(), 0.025);  // without the lens, what it bends within two pitches stays
+    EXPECT_LT(score.rms_px(), 0.025);  // without the lens, its curvature within two pitches remains
     EXPECT_LT(score.worst_px, 0.15);
     EXPECT_NEAR(std::sqrt(score.chi2_per_dof()), 1.0,
                 0.5);  // σ counts the unknown lens, which differs by board and position

@@ -185,7 +185,7 @@ class PointFitter {
     }
   }
 
-  /// Points that do not lie among their neighbours; a lens bends a few pitches by far less.
+  /// Points that do not lie among their neighbours; a lens distorts a few pitches by far less.
   void drop_misplaced() {
     std::vector<std::size_t> misplaced;
     for (std::size_t i = 0; i < places_.size(); ++i) {

@@ -50,7 +50,7 @@ TEST(MarkerBoard, TakesAPartForWhatItIs) {
       cv::Mat photo = render_board_photo(scene, i, {}, 1);
       const std::vector<Eigen::Vector2d> truth = true_corners(scene, i);
       const Eigen::Vector2d middle = 0.5 * (truth.front() + truth.back());
-      photo.colRange(0, static_cast<int>(middle.x())).setTo(90);  // something stands before the left half
+      photo.colRange(0, static_cast<int>(middle.x())).setTo(90);  // something occludes the left half
       const BoardDetection found = find_board(photo, board);
       ASSERT_TRUE(found.found()) << found.reason;
       score.add(found.view, truth);

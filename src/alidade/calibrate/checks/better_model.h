@@ -10,7 +10,7 @@
 
 namespace alidade {
 
-/// Another lens model, tried: it fits where the one asked for does not.
+/// Another lens model, tried: it fits where the requested one does not.
 struct FittingModel {
   std::string model;
   double rms_px = 0.0;

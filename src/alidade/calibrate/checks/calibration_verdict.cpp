@@ -69,7 +69,7 @@ Check coverage(const CalibrateReport& report, const CalibrationStudy& study) {
               .limit = 95.0,
               .unit = "%",
               .figure = "sigma"};
-  // A large σ is said and counted: not to be trusted is only what is no answer over half of the image.
+  // A large σ is reported and included: not to be trusted is only an answer useless over half of the image.
   const double useless_px = 0.01 * std::max(report.camera.width_px, report.camera.height_px);
   const bool is_answer = share_below(study.sigma_infinity, useless_px) >= 50.0;
   check.state = check.value >= 95.0 ? State::good : is_answer ? State::care : State::bad;
@@ -288,7 +288,7 @@ Verdict calibration_verdict(const CalibrateReport& report, const CalibrationStud
                     principal_point(report)};
   if (std::optional<Check> other = one_lens(report)) verdict.checks.push_back(std::move(*other));
   const Check* worst = &verdict.checks.front();
-  for (const Check& check : verdict.checks) {  // among equals not coverage: the sentence begins with it
+  for (const Check& check : verdict.checks) {  // among equals not coverage, with which the sentence begins
     if (check.state > worst->state || (check.state == worst->state && worst->name == "coverage")) worst = &check;
   }
   verdict.state = worst->state;

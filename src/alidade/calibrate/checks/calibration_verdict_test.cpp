@@ -27,7 +27,7 @@ double number_after(const std::string& text, const std::string& words) {
   return std::stod(text.substr(at + words.size()));
 }
 
-/// Two significant digits: what a text may differ by from the number that it stands for.
+/// Two significant digits: what a text may differ by from the number that it represents.
 double half_a_digit(double value) { return 0.5 * std::pow(10.0, std::floor(std::log10(value)) - 1.0) * 1.0001; }
 
 TEST(CalibrationVerdict, CleanDataIsGood) {

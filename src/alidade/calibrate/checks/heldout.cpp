@@ -34,7 +34,7 @@ bool same_set(std::vector<std::string> a, std::vector<std::string> b) {
   return a == b;
 }
 
-/// The ladder with the model in use marked, or with it put in front where it stands on no step.
+/// The ladder with the model in use marked, or with it put first where it is on no step.
 std::vector<Candidate> candidates(const CalibrateConfig& config, std::size_t& in_use) {
   std::vector<Candidate> all = ladder();
   for (in_use = 0; in_use < all.size(); ++in_use) {

@@ -5,8 +5,8 @@
 
 namespace alidade {
 
-/// Judges a finished solve: studies it, plans the next photo and gives the verdict. A board shape that was asked for
-/// but does not transfer from one half of the photos to the other is dropped (`decide_shape`), and the board solved
+/// Judges a finished solve: studies it, plans the next photo and gives the verdict. A requested board shape
+/// that does not transfer from one half of the photos to the other is dropped (`decide_shape`), and the board solved
 /// flat or as a bow; with BoardShape::automatic the transfer test decides. `air`: the lens that `config` fixes
 /// (flat_port), whose covariance is then counted.
 [[nodiscard]] Calibration judge_calibration(const Board& board, PhotoCalibration photos, CalibrateConfig config,

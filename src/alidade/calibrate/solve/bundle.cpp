@@ -250,7 +250,7 @@ BundleResult solve_past_fold(BundleProblem problem, BundleState start, const Bun
   BundleResult beyond = solve_bundle(problem, result.state, config);
   beyond.iterations += result.iterations;
   problem.passes_fold = false;
-  // Where it loses more than a few corners, it is no lens, and what stands on this side says more of the fault.
+  // Where it loses more than a few corners, it is no lens, and the corners on this side show more of the fault.
   constexpr double max_unseen = 0.1;
   if (share_unseen(problem, beyond.state) > max_unseen) return result;
   NormalEquations inside;

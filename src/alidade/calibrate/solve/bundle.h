@@ -49,10 +49,10 @@ struct BundleResult {
   BundleState state;
   double cost = 0.0;  ///< Σ of squared whitened residuals, priors included.
   int iterations = 0;
-  std::shared_ptr<const NormalEquations> equations;  ///< Where the last step began.
+  std::shared_ptr<const NormalEquations> equations;  ///< At which the last step started.
   // From here on: by with_covariance().
   Eigen::MatrixXd cov;                                ///< Inverse of the reduced normal matrix.
-  std::vector<Eigen::Matrix<double, 6, 6>> pose_cov;  ///< One per view, if asked for.
+  std::vector<Eigen::Matrix<double, 6, 6>> pose_cov;  ///< One per view, if requested.
   /// Where the reduced matrix, scaled to unit diagonal, is (nearly) singular: the eigenvector of its smallest
   /// eigenvalue, which is what the views leave free.
   Eigen::VectorXd weakest;
@@ -65,7 +65,7 @@ struct BundleResult {
 
 /// The same; where a Brown lens' fold bars the way (a step that puts one corner behind it is refused, and the solve
 /// creeps along the fold), it goes on by the formulas alone, as others always do. Status no_convergence where it ends
-/// with a corner that counts behind the fold; with more than a tenth of them there, the first result stands.
+/// with a corner that counts behind the fold; with more than a tenth of them there, the first result is kept.
 [[nodiscard]] BundleResult solve_past_fold(BundleProblem problem, BundleState start, const BundleConfig& config);
 
 /// The same with its covariances, from the undamped equations; status singular where they do not determine all.

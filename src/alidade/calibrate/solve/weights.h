@@ -16,7 +16,7 @@ struct NoiseEstimate {
   std::size_t num_dropped = 0;
 };
 
-/// True where some corner brings a covariance of its own (not the identity that stands for "unknown").
+/// True where some corner brings a covariance of its own (not the identity that means "unknown").
 [[nodiscard]] bool have_covariances(std::span<const BoardView> views);
 
 /// Robust estimate from residuals [px] by view and corner. The scale is the median of |r| (½ of the corners may be

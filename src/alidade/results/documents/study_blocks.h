@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-/// What stands of a study on a disk: a block of trials, and of which study and shard it is.
+/// What is on disk of a study: a block of trials, and of which study and shard it is.
 struct StoredBlock {
   StudyHeader header;
   Shard shard;

@@ -26,7 +26,7 @@ std::vector<Eigen::Vector2d> angles_within(const ViewConfig& config) {
   return {0.5 * (low + high), low, {low.x(), high.y()}, high, {high.x(), low.y()}};
 }
 
-/// The parameters that the residuals had asked for, by their names.
+/// The parameters indicated by the residuals, by their names.
 FreedParams freed_params(const RigReport& report) {
   FreedParams freed;
   for (const RigFreed& one : report.freed) {

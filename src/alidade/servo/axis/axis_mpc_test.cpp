@@ -28,7 +28,7 @@ TEST(AxisMpc, IsTheLinearRegulatorWhereNothingLimits) {
   }
 }
 
-/// Whatever is asked, a rate plant is never asked for more than it can: the linear model stays true.
+/// For any request, a rate plant is commanded within its limits only: the linear model remains valid.
 TEST(AxisMpc, KeepsRateAccelerationAndStops) {
   auto rng = testing::make_rng();
   std::uniform_real_distribution<double> unit(-1.0, 1.0);

@@ -189,7 +189,7 @@ void set_clusters(std::span<const ServoSample> log, const Eigen::MatrixXd& J, Se
   count_ordinary_flaws(log, J, *inverse, result);
 }
 
-/// Whether the residuals of a fit without flaws ask for more.
+/// Whether the residuals of a linear fit indicate more.
 bool asks_for_more(std::span<const ServoSample> log, const ServoFit& fit) {
   constexpr double max_colour = 0.3, min_sigmas = 3.5;
   const FlawGround ground = flaw_ground(log, fit);

@@ -29,7 +29,7 @@ struct ServoResponse {
 [[nodiscard]] ServoIdentification identify_servo(std::span<const ServoSample> log,
                                                  ServoKindRule rule = ServoKindRule::automatic);
 
-/// Whether the model stands; what the log lacks where it does not.
+/// Whether the model is accepted; otherwise what the log lacks.
 [[nodiscard]] Verdict identify_verdict(std::span<const ServoSample> log, const ServoIdentification& identified);
 
 }  // namespace alidade

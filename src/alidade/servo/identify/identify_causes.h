@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// One flaw, how large it seems, and by how many σ the residuals ask for it.
+/// One flaw, how large it seems, and its score in σ.
 struct ServoCause {
   std::string name;  ///< "a limit of its rate"
   double size = 0.0;

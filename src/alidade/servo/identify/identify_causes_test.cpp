@@ -158,7 +158,7 @@ TEST(ServoCauses, FlawsAreEstimated) {
 /// A dead band too small to be detected in a chirp, whose commands are nearly all large: σ includes its typical
 /// size.
 TEST(ServoCauses, FlawsTooSmallToSeeAreCounted) {
-  constexpr int draws = 3;  // a log that asks for flaws takes a second
+  constexpr int draws = 3;  // a log with nonlinearities takes a second
   for (const bool is_rate_plant : {false, true}) {
     double sum2 = 0.0;
     for (std::uint64_t seed = 1; seed <= draws; ++seed) {

@@ -72,7 +72,7 @@ class FlawedServo {
     advance_hard(dt_s, fit_.params[ServoParam::gain] * mean);
   }
 
-  /// The rate that the lag asks for, neared no harder than it can: pieces of constant acceleration, of the largest rate
+  /// The rate required by the lag, approached within the limits: pieces of constant acceleration, of the largest rate
   /// and of the lag itself, each to its end. (Steps instead would read as a longer time constant.)
   void advance_hard(double dt_s, double goal_rad) {
     const double tau = fit_.params[ServoParam::tau], hardest = flaws_.max_acceleration_rad_s2;
@@ -100,7 +100,7 @@ class FlawedServo {
     }
   }
 
-  /// How long a constant acceleration lasts: until the rate is what the lag asks for, or the largest.
+  /// How long a constant acceleration lasts: until the rate is that of the lag, or the largest.
   static double piece_s(double pull, double rate, double away, double tau, double fastest) {
     const double shortest_s = 1e-9 * tau;
     double t = std::numeric_limits<double>::infinity();

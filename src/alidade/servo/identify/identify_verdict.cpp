@@ -50,7 +50,7 @@ std::string flaw_text(const ServoFit& fit, std::size_t flaw) {
          text_of(3.0 * fit.flaw_sigma[flaw], 2) + " " + servo_flaw_units[flaw] + ")";
 }
 
-/// What the servo does beside a lag: what was estimated, and what the residuals still ask for.
+/// What the servo does beside a lag: what was estimated, and what the residuals still indicate.
 void add_causes(std::span<const ServoSample> log, const ServoIdentification& identified, Verdict& verdict) {
   const ServoFit& fit = identified.fit;
   const std::vector<ServoCause> causes = servo_causes(log, identified);

@@ -111,8 +111,8 @@ TEST(BoardSurface, PassesThroughThePointsAndMeetsItsRays) {
   }
 }
 
-/// A board that its corners bend as parabolas is one between them and in its margin as well: a corner's edges would
-/// stand off otherwise, and every camera from its photos.
+/// A board whose corners follow parabolas follows them between corners and in its margin as well: a corner's edges
+/// would be off otherwise, and every camera from its photos.
 TEST(BoardSurface, OfABowIsTheParabola) {
   for (const Board& board : {Board{BoardKind::chessboard, 9, 6, 0.025}, Board{BoardKind::chessboard, 3, 3, 0.025},
                              Board{BoardKind::asymmetric_circles, 4, 11, 0.02, 0.0, ""}}) {

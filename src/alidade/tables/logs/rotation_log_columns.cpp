@@ -110,7 +110,7 @@ class Header {
     return places;
   }
 
-  /// Throws for the first column that nothing has asked for.
+  /// Throws for the first column that was not requested.
   void refuse_rest() const {
     for (std::size_t i = 0; i < is_used_.size(); ++i) {
       if (is_used_[i]) continue;

@@ -45,7 +45,7 @@ std::vector<RigFault> rig_faults(std::span<const RigHead> heads, const RigUncert
       const std::string name = k < 0 ? std::string(head_param_names[static_cast<std::size_t>(p)])
                                      : "camera." + lens[static_cast<std::size_t>(k)];
       double off = row * learned.u, z = std::abs(off) / std::sqrt(before - after);
-      if (is_supposed) {  // if it alone errs: one cause is asked about, not all of them at once
+      if (is_supposed) {  // if it alone errs: one cause is tested, not all of them at once
         const Eigen::VectorXd alone = row.transpose() / std::sqrt(before);
         const double pull = alone.dot(told_u), weight = alone.dot(told * alone);
         if (!(weight > 0.0)) continue;

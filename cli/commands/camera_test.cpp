@@ -234,8 +234,7 @@ TEST_F(CameraCommand, UndistortInterruptedLeavesWhatWasThere) {
   const auto before = contents(folder.path() / "out");
   cv::imwrite((folder.path() / "0.png").string(), cv::Mat(1500, 2000, CV_8U, cv::Scalar(9)));
   std::vector<std::string> words{ALIDADE_EXECUTABLE, "camera", "undistort", "a.yaml", "0.png"};
-  for (int i = 1; i < 100;
-       ++i) {  // one image that is quick to read, many times: 0.4 s to read, 10 times that to undistort
+  for (int i = 1; i < 100; ++i) {  // one image that is quick to read, many times: 0.4 s to read, 10 times that to remap
     words.push_back(std::to_string(i) + ".png");
     std::filesystem::create_hard_link(folder.path() / "0.png", folder.path() / words.back());
   }

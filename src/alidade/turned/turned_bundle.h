@@ -16,10 +16,9 @@ struct TurnedDetection {
 /// Photos of a rotating camera, adjusted together. The observations are ordered by track.
 struct TurnedBundle {
   TurnedCamera camera;
-  std::vector<Eigen::Matrix3d>
-      cam_from_world;                 ///< One per photo. The first photo's is fixed: the world is free to rotate.
-  std::vector<double> log_zoom;       ///< One per photo, the first one's is fixed.
-  std::vector<Eigen::Vector3d> rays;  ///< One per track, unit length, in the world.
+  std::vector<Eigen::Matrix3d> cam_from_world;  ///< One per photo. The first one's is fixed: the world may rotate.
+  std::vector<double> log_zoom;                 ///< One per photo, the first one's is fixed.
+  std::vector<Eigen::Vector3d> rays;            ///< One per track, unit length, in the world.
   std::vector<TurnedDetection> observations;
 };
 

@@ -174,7 +174,7 @@ TEST_F(HeadCommand, WhatWasMeasuredBeforeCountsAfterResume) {
   ASSERT_EQ(after.code, 0) << after.err;
   const auto one = nlohmann::json::parse(before.out), two = nlohmann::json::parse(after.out);
   EXPECT_GT(two["counts"]["given"].get<int>(), 3 * one["counts"]["given"].get<int>() / 2);
-  // By the pixels' noise: what instruments ordinarily have, which is counted beside it, does not lessen with rows.
+  // By the pixels' noise: typical instrument errors, which are added, do not decrease with rows.
   for (const char* name : {"fx", "fy", "cx", "cy"})
     EXPECT_LT(two["stddev_model"]["camera"][name].get<double>(),
               0.85 * one["stddev_model"]["camera"][name].get<double>())  // of twice the rows: 0.71

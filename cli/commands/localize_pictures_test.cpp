@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 using testing::Outcome;
 using Json = nlohmann::json;
 
-/// A short film of a board under water, and what may be wrong with such a film.
+/// A short video of a board under water, and possible faults of it.
 class LocalizeImageFolders : public testing::CommandTest {
  protected:
   static constexpr int num_frames = 12;

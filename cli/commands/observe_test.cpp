@@ -147,7 +147,7 @@ TEST_F(BadLog, RowsFromStandardInputAreAnsweredOneByOne) {
   EXPECT_EQ(outcome.out.substr(0, 4), "t_s,");
 }
 
-/// A rendered film of a textured world: what a user with a pan-tilt camera and its encoders has.
+/// A rendered video of a textured world: what a user with a pan-tilt camera and its encoders has.
 class Film : public testing::CommandTest {
  protected:
   void render(const std::string& duration_s) {

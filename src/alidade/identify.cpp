@@ -24,7 +24,7 @@ void require_sense(const std::vector<ServoSample>& log) {
   }
 }
 
-/// What is taken as given. By definition: angles are the encoder's own radians, times the log's own seconds.
+/// Assumptions. By definition: angles are the encoder's own radians, times the log's own seconds.
 std::vector<Assumption> assumed_of(const ServoIdentification& identified) {
   const double gain = identified.fit.params[ServoParam::gain], sigma = std::sqrt(identified.fit.cov(0, 0));
   std::vector<Assumption> assumed = {{.name = "encoder_scale", .value = 1.0, .sigma = 0.0, .moved = "gain_rad"},

@@ -68,7 +68,7 @@ std::string marker_dictionary_names() {
 }
 
 std::string fault(const Board& board) {
-  constexpr int most = 200;  // more is a slip of the pen, and would take hours to look for
+  constexpr int most = 200;  // more is a typing error, and would take hours to search
   const int least = board.kind == BoardKind::aprilgrid ? 1 : 2;
   if (board.cols < least || board.rows < least || board.cols > most || board.rows > most) {
     return "a board has " + std::to_string(least) + " to " + std::to_string(most) + " columns and rows, not " +

@@ -47,7 +47,7 @@ bool may_have_far_corners(const std::vector<Corner>& corners) {
 std::vector<bool> far_corners(const BoardView& view, const std::vector<Eigen::Vector3d>& board_points) {
   const auto& corners = view.corners;
   if (corners.size() < 6 || !may_have_far_corners(corners)) return {};
-  constexpr double max_stretched = 8.0;  // how much perspective and lens may pull one corner from the rest
+  constexpr double max_stretched = 8.0;  // how far perspective and lens may move one corner from the rest
   const auto in_image = relative_distances(corners.size(), [&](std::size_t i) { return corners[i].px; });
   if (*std::max_element(in_image.begin(), in_image.end()) <= max_stretched) return {};
   const auto on_board = relative_distances(corners.size(), [&](std::size_t i) -> Eigen::Vector2d {

@@ -26,9 +26,9 @@ MatrixXd product(const A& a, const B& b) {
 /// Least rest 1 − h along a direction. A cluster that alone determines it has no residual in it: 0/0 is left at 0.
 constexpr double min_rest = 1e-3;
 
-/// A cluster where the model's covariance is 1. Its measurements of the requested parameters, made orthonormal, pull by
-/// y: by the model of covariance 1 − m, m their leverage. `along` holds what a unit of each principal y moves, `rest` 1
-/// − m along it, `y` its value over √rest: by the model of variance 1.
+/// A cluster where the model's covariance is 1. Its measurements of the requested parameters, made orthonormal,
+/// contribute y: by the model of covariance 1 − m, m their leverage. `along` holds what a unit of each principal y
+/// moves, `rest` 1 − m along it, `y` its value over √rest: by the model of variance 1.
 struct Principal {
   MatrixXd along;
   VectorXd y, rest;
@@ -168,7 +168,7 @@ double mean_dof(const std::vector<Member>& members, const MatrixXd& shares, doub
     squares += member.share.squaredNorm();
     any_large = any_large || member.principal.has_value();
   }
-  // Where every share is small, pulls against each other are a share of a share.
+  // Where every share is small, mutual influences are of second order.
   if (any_large) {
     squares += (shares * shares.transpose()).squaredNorm();
     for (const Member& member : members) squares -= product(member.share, member.share).squaredNorm();

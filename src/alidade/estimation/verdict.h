@@ -39,12 +39,12 @@ struct Check {
 struct Assumption {
   std::string name = {};        ///< "square_m", "camera.fx"
   double value = 0.0;           ///< NaN where it is not a number.
-  std::optional<double> sigma;  ///< Given with it and counted in the answer's σ; 0: exact. None: not known.
+  std::optional<double> sigma;  ///< Given with it and included in the answer's σ; 0: exact. None: not known.
   double ordinary = 0.0;        ///< Where there is no σ: the error supposed, in the value's unit.
   double moves = 0.0;           ///< Largest move of a result for that error, in that result's stated σ.
   std::string moved = {};       ///< Which result that is: "fx", "origin_m z".
   double moved_by = 0.0;        ///< By how much, in its unit.
-  std::string remedy = {};      ///< What a user can do to have it counted: "give --sigma-square".
+  std::string remedy = {};      ///< What a user can do to have it included: "give --sigma-square".
 };
 
 /// What an estimator says of its own answer: a state, one sentence, what to add, and the checks behind it.

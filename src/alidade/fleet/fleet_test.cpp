@@ -94,7 +94,7 @@ TEST(Fleet, TellsWhatHappened) {
 }
 
 /// Two hours of a day that warms up by 12 °C: a camera that drifts with it is reported, with the size of the drift; the
-/// others are not, and neither is a step of the focal length taken for it.
+/// others are not, and neither is a step of the focal length mistaken for it.
 TEST(Fleet, TellsAFocalLengthThatFollowsTheTemperature) {
   FleetSceneConfig config;
   config.event_share = 0.5;

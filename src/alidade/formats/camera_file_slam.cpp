@@ -11,7 +11,7 @@
 
 // Cameras of the first monocular SLAM programs and of the calibration before them: A. J. Davison's SceneLib
 // (`cam.fku = 195;`), J. Civera's initialize_cam.m (two distortion parameters), J. Heikkilä & O. Silvén's toolbox of
-// 1997 (`sys` and `par`). Assignments, one or more a line. Their pixel (0, 0) is taken for the centre of the first.
+// 1997 (`sys` and `par`). Assignments, one or more a line. Their pixel (0, 0) is assumed to be the centre of the first.
 
 namespace alidade::detail {
 namespace {

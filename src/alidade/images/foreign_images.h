@@ -17,7 +17,7 @@ namespace alidade {
 /// The ending of a file in small letters, ".jpg".
 [[nodiscard]] std::string lower_ending(const std::filesystem::path& file);
 
-/// Why a file in a folder of photos, or a folder in it, is not taken for a photo, by its ending. Empty: there is
+/// Why a file in a folder of photos, or a folder in it, is not read as a photo, by its extension. Empty: there is
 /// nothing to say, as for a folder of results.
 [[nodiscard]] std::string why_no_photo(const std::filesystem::path& file);
 

@@ -39,7 +39,7 @@ struct ServoScene {
   PlantMismatch mismatch;
   TargetPath path;
   double duration_s = 12.0;
-  double warm_up_s = 2.0;  ///< Not counted in the figures.
+  double warm_up_s = 2.0;  ///< Excluded from the figures.
   double period_s = 0.05;
   double latency_s = 0.0;
   double sigma_px = 0.5;

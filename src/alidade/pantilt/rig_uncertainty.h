@@ -11,7 +11,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// At most so many directions of error are counted; see rig_uncertainty().
+/// At most so many directions of error are considered; see rig_uncertainty().
 inline constexpr int max_rig_errors = 32;
 
 /// ∂ pixel / ∂ u of one observation.

@@ -30,7 +30,7 @@ std::optional<ImageWarp> ImageWarp::fit(std::span<const PointMove> moves) {
   warp.centre_ = 0.5 * (low + high);
   warp.scale_ = std::max(0.5 * (high - low).maxCoeff(), 1.0);
   if (!warp.solve(moves, std::numeric_limits<double>::infinity())) return std::nullopt;
-  // Half of the points are taken for good; of the others, those that fit as these do.
+  // Half of the points are assumed good; of the others, those that fit equally well.
   std::vector<double> residuals;
   for (const PointMove& move : moves) residuals.push_back((warp.at(move.from_px) - move.to_px).norm());
   constexpr double of_median = 4.0;

@@ -63,7 +63,7 @@ void append_leaves(std::string& rows, const std::string& path, const Json& value
           "</td></tr>";
 }
 
-/// What was taken as given, and what it would do to the answer.
+/// The assumptions, and their effect on the answer.
 std::string assumed_markup(const Json& assumed) {
   if (!assumed.is_array() || assumed.empty()) return "";
   std::string rows;

@@ -23,7 +23,7 @@ struct HeadViewFit {
   Eigen::Vector2d reading_correction_rad =
       Eigen::Vector2d::Zero();               ///< What the rig would rather have read, less read.
   std::vector<Eigen::Vector2d> residual_px;  ///< Prediction − observation, one per corner.
-  double cluster_z2 = 0.0;  ///< Its squared pull on the rig over what its noise alone gives; 0: unused.
+  double cluster_z2 = 0.0;  ///< Its squared influence on the rig over that of its noise alone; 0: unused.
 };
 
 /// A pose of the board, in the world.
@@ -83,7 +83,7 @@ struct RigReport {
   };
   Status status = Status::too_few;
   Rig rig;  ///< World: the first head's camera at readings of zero. Covariance: views are clusters, and what is given
-            ///< with a σ is counted.
+            ///< with a σ is included.
   Eigen::MatrixXd cov_model;   ///< As rig.cov, if every corner and reading erred by itself and all given was exact.
   ClusterCovariance clusters;  ///< Views; of the parameters that are solved for.
   std::vector<Assumption> assumed;                  ///< Lenses, the square, the encoders' scales.

@@ -59,7 +59,7 @@ Eigen::VectorXd in_wide(const RigProblem& problem, const RigProblem& wide, const
   return all;
 }
 
-/// A lens whose focal length or centre is estimated is not taken as given in that.
+/// A lens whose focal length or centre is estimated is not an assumption in that.
 Camera without_estimated(Camera camera, const RigProblem& problem, std::size_t head) {
   if (camera.cov.size() == 0) return camera;
   std::vector<Index> estimated;

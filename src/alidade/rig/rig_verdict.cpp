@@ -196,7 +196,7 @@ void add_causes(const RigReport& report, Verdict& verdict) {
 }
 
 /// What was estimated by need is reported. Where it is significant the answer is one of care: it was not expected, and
-/// an error of a shape that is not estimated would be taken for it.
+/// an error of a shape that is not estimated would be mistaken for it.
 void add_freed(const RigReport& report, Verdict& verdict) {
   constexpr double plain = 4.0;
   std::string text;

@@ -16,7 +16,7 @@ struct HeadObservation {
   double t_capture_s = 0.0;
   Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
-  /// Intrinsics of that image, where they are not the head's own; their σ is counted.
+  /// Intrinsics of that image, where they are not the head's own; their σ is included.
   std::optional<LensNow> lens = {};
 };
 

@@ -9,7 +9,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// What the error of a loop is counted in; gains speak of it.
+/// The unit of a loop's error; gains refer to it.
 enum class ErrorUnit { px, deg, rad };
 
 /// C(s) = kp + ki/s, from error to command.

@@ -17,7 +17,7 @@ namespace alidade {
 template <int N>
 using WithErrors = Eigen::Matrix<double, N, Eigen::Dynamic, 0, N, max_rig_errors>;
 
-/// u is counted: no observation changes it.
+/// u is considered: no observation changes it.
 struct CountedErrors {
   void start(int) {}
   [[nodiscard]] static Eigen::Vector2d shift(const RigErrorEffect&) { return Eigen::Vector2d::Zero(); }

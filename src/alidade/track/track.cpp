@@ -178,7 +178,7 @@ void inflate(TrackReport& report) {
 }
 
 /// What of the rig the observations contradict, by a filter that learns its errors: those that its file states, else
-/// supposed. The target may go anywhere meanwhile, so that what it does is not taken for the rig's fault.
+/// supposed. The target may go anywhere meanwhile, so that its motion is not mistaken for a fault of the rig.
 void ask_for_faults(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                     const FollowConfig& config, TrackReport& report) {
   constexpr double freely = 10.0, min_m_s2 = 10.0;
@@ -193,8 +193,8 @@ void ask_for_faults(std::span<const TargetObservation> observations, std::span<c
     report.faults = rig_faults(heads, learning.errors, *learned, !report.errors_are_counted);
 }
 
-/// What observations say of noise, motion and rig. Where the rig's errors are counted, by innovations of a filter that
-/// learns them.
+/// What observations say of noise, motion and rig. Where the rig's errors are considered, by innovations of a filter
+/// that learns them.
 void judge_observations(std::span<const TargetObservation> observations, std::span<const RigHead> heads,
                         const FollowConfig& config, TrackReport& report) {
   report.errors_are_counted = config.tracker.errors.num() > 0;

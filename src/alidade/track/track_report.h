@@ -63,8 +63,8 @@ struct TrackReport {
   double nis_per_dof =
       std::numeric_limits<double>::quiet_NaN();  ///< Of the used observations; gated ones count at the gate.
   std::vector<double> nees;                      ///< One per step; NaN where there is no truth.
-  /// Of a filter that learns the rig's errors where they are counted: with them counted alone, innovations are coloured
-  /// by what does not change. One per head.
+  /// Of a filter that estimates the rig's errors where they are considered: with them only considered, innovations are
+  /// coloured by what does not change. One per head.
   std::vector<HeadInnovations> innovations;
   double inflation = 1.0;           ///< Every covariance was increased by this factor, from the innovations.
   std::vector<RigFault> faults;     ///< The most surprising first.

@@ -37,7 +37,7 @@ struct TrackerConfig {
   double start_sigma_v_m_s = 2.0;
   double history_s = 0.3;      ///< How late an observation may come.
   std::size_t max_kept = 256;  ///< Observations within history_s; older ones can then no longer be overtaken.
-  /// Of the heads, their lenses and clocks: counted in every σ, and not estimated (Schmidt–Kalman). None: all exact.
+  /// Of the heads, their lenses and clocks: included in every σ, and not estimated (Schmidt–Kalman). None: all exact.
   RigUncertainty errors;
   /// Estimate the errors instead: for tests of the rig, whose innovations are then white. Not for imm, which counts.
   bool learn_errors = false;

@@ -253,7 +253,7 @@ class TurnedRun {
     return unit;
   }
 
-  /// What is taken as given and may move the answer: the centre's translations as the camera rotated. A centre that is
+  /// Assumptions that may change the answer: the centre's translations as the camera rotated. A centre that is
   /// ρ of the points' distance before the axes sees tan θ (1 + ρ / cos θ) for tan θ: f grows by ρ f, k1 by ρ/2, k2 by
   /// −ρ/8; one beside them shifts cx, cy by ρ f.
   void add_given() {

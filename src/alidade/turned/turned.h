@@ -41,7 +41,7 @@ struct TurnedReport {
   std::vector<Eigen::Vector2d> residuals;  ///< Normalised, one per observation.
   Eigen::Matrix<double, 6, 1> camera;      ///< fx, fy, cx, cy [px], k1, k2.
   Eigen::Matrix<double, 6, 6> cov, cov_model;
-  int lens_terms = 0;  ///< That are estimated; what the others might be is counted in `cov`.
+  int lens_terms = 0;  ///< That are estimated; the uncertainty of the others is included in `cov`.
   double sigma_px = 0.0;
   MatchCounts matches;
   double design_effect = 1.0;  ///< What photos change, over what the model expects of it; variances.

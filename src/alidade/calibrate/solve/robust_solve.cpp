@@ -66,7 +66,7 @@ BundleResult solve_once(const CalibrateConfig& config, CalibrateReport& report, 
     if (round == 0 && clean && !weights_matter) return result;
     const bool settled = noise.used == used_before && std::abs(noise.excess_px - excess_before) <= 0.01 * excess_before;
     if (settled) break;
-    // Outliers pull the first solves: let them weigh less before saying which they are.
+    // Outliers bias the first solves: reduce their weight before identifying them.
     const bool soft = !clean && round < 3;
     if (!soft && drop_misfits(noise, report, work, result.state)) {
       used_before.clear();

@@ -30,7 +30,7 @@ struct FlawScore {
 [[nodiscard]] std::vector<FlawScore> flaw_scores(std::span<const ServoSample> log, const ServoFit& fit,
                                                  const FlawGround& ground, std::size_t flaw);
 
-/// The fit with every flaw that the log is evidence of, one after the other: 2 ln of the likelihood ratio, counted in
+/// The fit with every nonlinearity that the log supports, one after the other: 2 ln of the likelihood ratio, counted in
 /// rows that do not share errors, above ln n + 12 (Schwarz's criterion, and a margin for the choice among flaws and
 /// sizes). `rivals`: flaws that explain the same nearly as well. G. Schwarz, "Estimating the dimension of a model",
 /// 1978.

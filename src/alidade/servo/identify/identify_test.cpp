@@ -86,7 +86,7 @@ TEST(IdentifyServo, CoversTheTruth) {
       }
       EXPECT_NEAR(sum / num_runs, 5.0, 1.4);  // 3.5 σ: χ²₅ has a σ of 3.2, the mean of 60 runs 0.41
       EXPECT_LT(sum_stated / num_runs, 5.0 + 1.4);
-      EXPECT_GT(sum_stated / num_runs, 0.4 * 5.0);  // what is counted is less than as much again
+      EXPECT_GT(sum_stated / num_runs, 0.4 * 5.0);  // what is added is less than as much again
       // 68.3 and 95.4 % of 300; the five of one log vary together: 3 σ of half as many independent ones.
       EXPECT_NEAR(within_one / (5.0 * num_runs), 0.683, 0.115);
       EXPECT_NEAR(within_two / (5.0 * num_runs), 0.954, 0.052);

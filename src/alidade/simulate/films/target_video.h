@@ -12,7 +12,7 @@ class Mat;
 
 namespace alidade {
 
-/// A target that a head's camera films: a ball of one colour, or a square card with an image on it.
+/// A target in a head's camera: a ball of one colour, or a square card with an image on it.
 struct FilmedTarget {
   Eigen::Vector3d rgb{230.0, 70.0, 20.0};  ///< Of the ball.
   double radius_m = 0.02;                  ///< Of the ball; half the side of the card.

@@ -17,8 +17,8 @@ struct OutsideCourse {
                                                           std::span<const LensCourse> courses, double beyond_s);
 
 /// Gives each observation the intrinsics of its capture, and the rig's lenses the errors that these have: as an
-/// observer's errors last, they are counted as what does not change but in its size. Heads without a course keep their
-/// own.
+/// observer's errors last, they are considered as persistent errors that change in size only. Heads without a course
+/// keep their own.
 void use_courses(std::span<const LensCourse> courses, std::vector<TargetObservation>& observations, Rig& rig);
 
 }  // namespace alidade

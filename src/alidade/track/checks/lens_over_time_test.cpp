@@ -77,7 +77,7 @@ TEST(ZoomedLens, DerivativesAreThoseOfDifferences) {
     const Eigen::Vector2d slope = zoomed.ratio.cwiseProduct(*project(up, point) - *project(down, point)) / (2.0 * h);
     cov += sigma[j] * sigma[j] * slope * slope.transpose();
   }
-  // Directions below 0.01 px are not counted.
+  // Directions below 0.01 px are ignored.
   EXPECT_LT((*effect * effect->transpose() - cov).norm(), 1e-2 * cov.norm());
 }
 
@@ -147,7 +147,7 @@ TEST(LensOverTime, IsFollowedAsIfNothingZoomed) {
   EXPECT_GT(unknown.rms_m, 5.0 * known.rms_m);
 }
 
-/// σ of the intrinsics is counted: errors that last are covered where they are seen.
+/// σ of the intrinsics is included: persistent errors are covered where they are visible.
 TEST(LensOverTime, SigmaOfTheIntrinsicsIsCounted) {
   constexpr int num_runs = 40;
   const double sigma_a = track_scenario("B")->sigma_a_m_s2;

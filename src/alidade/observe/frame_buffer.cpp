@@ -102,11 +102,17 @@ bool start_points(RotationBundle& bundle, const RotatingCamera& camera, bool wit
   return true;
 }
 
-/// Leaves out observations beyond 6 σ; how many.
+/// Leaves out observations beyond 6 σ, and points whole of which most are: they move. How many observations.
 std::size_t leave_out_far(RotationBundle& bundle, const BundleSolution& solution, double sigma_px) {
+  const auto is_far = [&](std::size_t i) { return !(solution.residual_px[i] < 6.0 * sigma_px); };
+  std::vector<int> far_minus_near(bundle.points.size(), 0);
+  for (std::size_t i = 0; i < bundle.observations.size(); ++i) {
+    far_minus_near[static_cast<std::size_t>(bundle.observations[i].point)] += is_far(i) ? 1 : -1;
+  }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < bundle.observations.size(); ++i) {
-    if (solution.residual_px[i] < 6.0 * sigma_px) bundle.observations[kept++] = bundle.observations[i];
+    const BundleObservation& seen = bundle.observations[i];
+    if (!is_far(i) && far_minus_near[static_cast<std::size_t>(seen.point)] <= 0) bundle.observations[kept++] = seen;
   }
   const std::size_t out = bundle.observations.size() - kept;
   bundle.observations.resize(kept);

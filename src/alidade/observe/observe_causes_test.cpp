@@ -301,6 +301,32 @@ TEST(ObserveCauses, AQuarterOfThePointsMoves) {
   EXPECT_LE(outcome.refused, 1);
 }
 
+/// Behind a lens that bends, too: they are left out whole, and leave σ as if they had not been seen.
+TEST(ObserveCauses, PointsThatMoveCostNothing) {
+  constexpr std::size_t num_points = 40, num_moving = 10;  // the first ones move
+  World world = with_scene([](RotationScene& scene, RotationLogConfig& config, Draws&) {
+    scene.intrinsics = [](double) { return RotatingIntrinsics{true_k[0], true_k[1], true_k[2], true_k[3], -0.2}; };
+    scene.start_px = draw_points(image_width, image_height, num_points, 301);
+    config.duration_s = 5.0;
+  });
+  world.faults.moving_share = static_cast<double>(num_moving) / num_points;
+  ObserveSetup config = auto_config(ObserveMethod::batch);
+  config.estimate_auto = false;
+  config.nuisances.k1 = true;
+  const RotationLog log = log_in(world, 1);
+  RotationLog without = log;
+  for (RotationRow& row : without.rows) {
+    std::fill_n(row.px.begin(), num_moving, Eigen::Vector2d::Constant(not_seen));
+  }
+  const ObserveSolution with_moving = solve_intrinsics(log, config), still = solve_intrinsics(without, config);
+  ASSERT_EQ(with_moving.status, ObserveSolution::Status::ok);
+  for (std::size_t i = 0; i < 5; ++i) {
+    const ObservedQuantity &a = with_moving.quantities[i], &b = still.quantities[i];
+    EXPECT_NEAR(a.value, b.value, b.sigma_model) << a.name;
+    EXPECT_NEAR(a.sigma_model, b.sigma_model, 0.1 * b.sigma_model) << a.name;  // pixels left out by chance
+  }
+}
+
 /// One pixel in a hundred anywhere ruins a regression, and the adjustment of all rows says so.
 TEST(ObserveCauses, WrongPixelsAreNotSilentInARegression) {
   for (const ObserveMethod method : {ObserveMethod::flow, ObserveMethod::fang2011}) {

@@ -134,7 +134,7 @@ double noise_of(const RotationLog& log, const ObserveSetup& config, const Observ
   if (!config.start) adjust_with.other_starts = {2.5};
   const Adjustment adjustment = adjust(buffer, adjust_with, progress);
   const std::size_t seen = adjustment.num_left_out + adjustment.bundle.observations.size();
-  constexpr double max_left_out = 0.3;
+  constexpr double max_left_out = 0.4;  // beyond it no verdict stands
   if (!adjustment.has_value ||
       static_cast<double>(adjustment.num_left_out) > max_left_out * static_cast<double>(seen)) {
     return std::numeric_limits<double>::infinity();

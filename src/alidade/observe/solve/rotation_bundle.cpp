@@ -350,7 +350,9 @@ class Solver {
     for (const double norm : residual_px_) squares += norm * norm;
     const auto count = 2.0 * static_cast<double>(std::max<std::size_t>(residual_px_.size(), 1));
     solution.rms_px = std::sqrt(squares / count);
-    const int unknowns = n + (config_.with_depth ? 3 : 2) * static_cast<int>(blocks_.size()) +
+    const auto is_seen_at_all = [](const PointBlock& block) { return block.information(0, 0) > 0.0; };
+    const auto num_points = static_cast<int>(std::count_if(blocks_.begin(), blocks_.end(), is_seen_at_all));
+    const int unknowns = n + (config_.with_depth ? 3 : 2) * num_points +
                          (turns_ > 0 && !walks() && !std::isfinite(config_.sigma_turn_rad) ? 3 * (turns_ - 1) : 0);
     solution.dof = static_cast<int>(2 * bundle_.observations.size() + bundle_.ranges.size()) - unknowns;
   }

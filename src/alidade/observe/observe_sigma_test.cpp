@@ -253,7 +253,7 @@ const std::vector<Cause>& causes() {
 TEST(ObserveSigma, NoCauseIsSilent) {
   for (const Cause& cause : causes()) {
     int silent = 0, named = 0;
-    const int sets = testing::trials(4);
+    const int sets = testing::trials(2);
     for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(sets); ++seed) {
       Scenario scenario;
       scenario.num_points = 10;

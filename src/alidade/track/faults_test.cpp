@@ -101,20 +101,20 @@ TEST(TrackFaults, AreNamedAndNeverCalledGood) {
   }
 }
 
-/// Forty draws each of the scenarios, the rig being what its file says, exactly. D hides the target from a head for two
-/// seconds, which is reported.
+/// Draws of each scenario (ALIDADE_TEST_TRIALS=40: forty), the rig being what its file says, exactly. D hides the
+/// target from a head for two seconds, which is reported.
 TEST(TrackFaults, CleanScenariosAreGood) {
-  constexpr int draws = 40;
+  const int draws = testing::trials(20);
   for (const char* name : {"A", "A2", "B", "C", "E", "F", "G"}) {
     const TrackScene scene = *track_scenario(name);
     int num_good = 0;
-    for (std::uint64_t seed = 101; seed < 101 + draws; ++seed) {
+    for (std::uint64_t seed = 101; seed < 101 + static_cast<std::uint64_t>(draws); ++seed) {
       const std::vector<TargetObservation> observations = testing::observations_of(scene, seed);
       const FollowConfig config;
       const TrackReport report = track_target(observations, scene.heads, config, testing::truth_of(scene));
       num_good += track_verdict(report, observations, scene.heads, config).state == State::good ? 1 : 0;
     }
-    EXPECT_GE(num_good, 38) << name;
+    EXPECT_GE(num_good, draws - draws / 20) << name;
     RecordProperty(std::string("good_") + name, num_good);
   }
 }

@@ -6,6 +6,7 @@
 
 #include "alidade/geometry/so3.h"
 #include "alidade/simulate/turned_scene.h"
+#include "alidade/testing/trials.h"
 #include "alidade/turned/turned.h"
 #include "alidade/turned/turned_fit.h"
 
@@ -55,7 +56,8 @@ TurnedScene small_scene() {
   return scene;
 }
 
-constexpr int few = 8;
+/// ALIDADE_TEST_TRIALS=8 draws as many.
+const int few = testing::trials(4);
 
 TEST(Turned, FindsTheCameraOfCleanMatchesWithinItsSigma) {
   const Drawn drawn = draw(small_scene(), 20, on_the_spot());

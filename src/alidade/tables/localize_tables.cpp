@@ -6,6 +6,7 @@
 #include <iterator>
 #include <optional>
 #include <set>
+#include <sstream>
 
 #include "alidade/files/table_rows.h"
 #include "alidade/tables/localize_file.h"
@@ -31,13 +32,11 @@ double sigma_of(const MapPoint& point) { return std::sqrt(point.cov.trace() / 3.
 }  // namespace
 
 ObservationTable read_observations(const std::filesystem::path& file, const ObservationsOptions& options) {
-  const Csv csv = Csv::read(file);
-  ObservationRows rows(csv, options);
+  std::istringstream text(read_file(file));  // row by row: all cells together are four times as long
+  ObservationsStream rows(text, file.string(), options);
   ObservationTable read;
-  for_each_row(csv, options.skip_bad, read.skipped, [&](std::size_t row) { rows.read(csv, row); });
-  rows.end();
   while (auto frame = rows.next()) read.frames.push_back(std::move(*frame));
-  if (read.frames.empty()) throw InputError(file.string() + ": has no observations; at least one row is needed");
+  read.skipped = rows.skipped();
   return read;
 }
 

@@ -11,7 +11,7 @@ namespace alidade {
 namespace {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
-using WindowRows = Eigen::Matrix<double, 6, PoseChain::window>;
+using WindowRows = PathSmoother::WindowRows;
 
 constexpr double hardly_told = 1e-6;  // m⁻², rad⁻²: a pose alone that nothing tells must not stop all others
 
@@ -138,6 +138,54 @@ PathSmoother::Speeds PathSmoother::speeds(const SmootherState& state, std::size_
   return out;
 }
 
+/// The size of what is around frame k, over what it is where the problem begins, with its derivative by the position
+/// and by each point that is there. Points count by 1/d², as their parallax does: one whose distance hardly anything
+/// tells is not moved.
+PathSmoother::Surroundings PathSmoother::surroundings(const SmootherState& state, std::size_t k,
+                                                      const PoseChain& chain) const {
+  constexpr double nearest = 1e-6;
+  Surroundings out{1.0, Eigen::Vector3d::Zero(), Eigen::VectorXd::Zero(chain.b.size()),
+                   state.poses[k].rotation.toRotationMatrix()};
+  double sum = 0.0, sum_begun = 0.0;
+  for (const std::size_t point : there_[k]) {
+    const Eigen::Vector3d away = state.points[point] - state.poses[k].translation;
+    const double d2 = std::max(away.squaredNorm(), nearest);
+    sum += 1.0 / d2;
+    sum_begun +=
+        1.0 / std::max((problem_.points[point].point_in_world - problem_.world_from_cam[k].translation).squaredNorm(),
+                       nearest);
+    out.by_border.segment<3>(chain.place_of(point)) = away / (d2 * d2);
+  }
+  if (!(sum > 0.0)) return out;
+  out.size = std::sqrt(sum_begun / sum);
+  out.by_border /= sum;
+  for (const std::size_t point : there_[k]) out.by_position -= out.by_border.segment<3>(chain.place_of(point));
+  return out;
+}
+
+/// Of speeds that differ, in the camera's frame and in the unit that the surroundings give: a world that is turned,
+/// moved or larger leaves it as it is, and its derivatives say so. J: of the difference itself, in the world's.
+void PathSmoother::add_acceleration(const Surroundings& around, const WindowRows& J, Eigen::Vector<double, 6> error,
+                                    const Eigen::Vector<double, 6>& variance, SmootherSystem& system) const {
+  WindowRows scaled = J;
+  scaled.topRows<3>() /= around.size;
+  error.head<3>() /= around.size;
+  scaled.block<3, 3>(0, 3) += cross_matrix(error.head<3>()) * around.world_from_cam;
+  add_window(scaled, error, variance, system);
+  const Eigen::Vector3d weighted = error.head<3>().cwiseQuotient(variance.head<3>());
+  const double squares = weighted.dot(error.head<3>());
+  const Eigen::Vector<double, PoseChain::window> pull = scaled.topRows<3>().transpose() * weighted;
+  PoseChain& chain = system.chain;
+  chain.A.leftCols<3>() -= pull * around.by_position.transpose();
+  chain.A.topRows<3>() -= around.by_position * pull.transpose();
+  chain.A.topLeftCorner<3, 3>() += squares * around.by_position * around.by_position.transpose();
+  chain.U -= pull * around.by_border.transpose();
+  chain.U.topRows<3>() += squares * around.by_position * around.by_border.transpose();
+  chain.B.selfadjointView<Eigen::Lower>().rankUpdate(around.by_border, squares);
+  chain.a.head<3>() += squares * around.by_position;
+  chain.b += squares * around.by_border;
+}
+
 /// Speed and rate from frame k to the next, and from there to the one after it, differ by drawn accelerations; the
 /// first differ from what was given. A jump determines nothing, and behind it they begin again.
 void PathSmoother::add_motion(const SmootherState& state, std::size_t k, SmootherSystem& system) const {
@@ -170,7 +218,8 @@ void PathSmoother::add_motion(const SmootherState& state, std::size_t k, Smoothe
   J.middleCols<6>(6) = second.J_from - first.J_to;
   J.rightCols<6>() = second.J_to;
   const double num_steps = walked_before(steps(k + 1)) + walked_after(steps(k));
-  add_window(J, second.values - first.values, num_steps * step_variance, system);
+  add_acceleration(surroundings(state, k, system.chain), J, second.values - first.values, num_steps * step_variance,
+                   system);
 }
 
 void PathSmoother::add_start(const SmootherState& state, SmootherSystem& system) const {

@@ -43,6 +43,7 @@ void PathSmoother::find_lives() {
   std::partial_sum(first_of_.begin(), first_of_.end(), first_of_.begin());
   entering_.assign(state_.poses.size(), {});
   leaving_.assign(state_.poses.size(), {});
+  there_.assign(state_.poses.size(), {});
   for (std::size_t i = 0; i < lives_.size(); ++i) {
     if (!lives_[i]) continue;
     if (problem_.points[i].range) {
@@ -51,6 +52,7 @@ void PathSmoother::find_lives() {
     }
     entering_[lives_[i]->first].push_back(i);
     leaving_[lives_[i]->last].push_back(i);
+    for (std::size_t k = lives_[i]->first; k <= lives_[i]->last; ++k) there_[k].push_back(i);
   }
   most_at_once_ = 0;
   int num = 0;

@@ -141,8 +141,7 @@ TEST(PoseChain, PointsThatEnterAndLeaveAreTheWholeMatrixInverted) {
   }
 }
 
-Localization hover_localized(const HoverRun& run, const Camera& camera) {
-  LocalizeConfig config;
+Localization hover_localized(const HoverRun& run, const Camera& camera, LocalizeConfig config = {}) {
   config.target.points = run.target;
   return localize(run.frames, camera, config, run.truth);
 }
@@ -170,6 +169,24 @@ TEST(SimpleCase, ThePoseIsAsGoodAsItsCovarianceSays) {
     EXPECT_GT(nees, 0.8) << static_cast<int>(lens);
     EXPECT_LT(nees, 1.3) << static_cast<int>(lens);
   }
+}
+
+/// The target alone says how large the world is. Accelerations four times as large as they are told to be make the path
+/// shorter before its points by 0.3 %; counted in metres they made all of it smaller by 1.7 %.
+TEST(SimpleCase, AMotionTellsNothingOfTheWorldsSize) {
+  const HoverRun run = testing::hovering({.num_frames = 300, .num_others = 12}, 6);
+  std::vector<double> length_m;
+  for (const double sigma_a : {0.15, 3.0}) {
+    LocalizeConfig config;
+    config.filter.sigma_a_m_s2 = sigma_a;
+    const Localization report = hover_localized(run, run.camera, config);
+    ASSERT_TRUE(report.is_smoothed);
+    length_m.push_back(0.0);
+    for (std::size_t k = 10; k < report.path.size(); ++k)
+      length_m.back() +=
+          (report.path[k].world_from_cam.translation - report.path[k - 10].world_from_cam.translation).norm();
+  }
+  EXPECT_NEAR(length_m[0] / length_m[1], 1.0, 0.006);
 }
 
 /// Errors that last from frame to frame, as of tracks that drift: taken for independent the path's σ would be four

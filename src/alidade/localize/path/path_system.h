@@ -37,6 +37,8 @@ class PathSmoother {
 
   std::optional<SmoothedPath> solve();
 
+  using WindowRows = Eigen::Matrix<double, 6, PoseChain::window>;
+
  private:
   /// Of the shared numbers those that are solved for: the estimated part of the lens, which stands first.
   [[nodiscard]] int num_solved() const { return num_estimated_; }
@@ -87,6 +89,15 @@ class PathSmoother {
     Eigen::Matrix<double, 6, 6> J_from, J_to;
   };
   [[nodiscard]] Speeds speeds(const SmootherState& state, std::size_t i) const;
+  struct Surroundings {
+    double size = 1.0;
+    Eigen::Vector3d by_position;  ///< Of its logarithm.
+    Eigen::VectorXd by_border;
+    Eigen::Matrix3d world_from_cam;
+  };
+  [[nodiscard]] Surroundings surroundings(const SmootherState& state, std::size_t k, const PoseChain& chain) const;
+  void add_acceleration(const Surroundings& around, const WindowRows& J, Eigen::Vector<double, 6> error,
+                        const Eigen::Vector<double, 6>& variance, SmootherSystem& system) const;
   void add_motion(const SmootherState& state, std::size_t k, SmootherSystem& system) const;
   void add_start(const SmootherState& state, SmootherSystem& system) const;
   [[nodiscard]] Eigen::Vector3d shape_change(const Eigen::Vector3d& told_in_world) const;
@@ -148,7 +159,7 @@ class PathSmoother {
     std::size_t first = 0, last = 0;
   };
   std::vector<std::optional<Life>> lives_;
-  std::vector<std::vector<std::size_t>> entering_, leaving_;  ///< Points, by frame.
+  std::vector<std::vector<std::size_t>> entering_, leaving_, there_;  ///< Points, by frame.
   int most_at_once_ = 0;
 };
 

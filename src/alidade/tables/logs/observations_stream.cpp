@@ -74,6 +74,7 @@ void ObservationRows::complete() {
     for (long k = 1; k <= missing; ++k)
       complete_.push_back({last_->frame + k, last_->t_s + step_s * static_cast<double>(k), {}});
   }
+  open_->observations.shrink_to_fit();
   last_ = ObservationFrame{open_->frame, open_->t_s, {}};
   complete_.push_back(std::move(*open_));
   open_.reset();

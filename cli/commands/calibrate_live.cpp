@@ -137,6 +137,13 @@ class FolderCapture {
   std::string last_words_;
 };
 
+/// What was shown and not taken while better might come, the most telling first: nothing comes any more.
+void take_what_was_shown(live::CaptureSession& session, double t_s) {
+  session.guide().take_what_comes(true);
+  while (interrupting_signal() == 0 && !session.look_back(t_s).file.empty())
+    if (session.reached_goal({})) return;
+}
+
 /// A capture from a camera of the machine or the network, without a page.
 void capture_stream(live::CaptureSession& session, live::NewestFrame& stream, const CaptureArgs& args, Run& run) {
   const Clock::time_point begin = Clock::now();
@@ -151,7 +158,9 @@ void capture_stream(live::CaptureSession& session, live::NewestFrame& stream, co
     if (!run.options.quiet && !run.options.json) tell_person(progress_line(session, args.config.until_px));
     if (session.reached_goal({})) return;
   }
-  if (stream.is_over()) tell_person("alidade: the stream has ended");
+  if (!stream.is_over()) return;
+  tell_person("alidade: the stream has ended");
+  take_what_was_shown(session, session.begin_s() + passed_s(begin));
 }
 
 /// Where the photos stand, those of an earlier capture included.

@@ -1,8 +1,12 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <atomic>
+#include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <future>
 #include <memory>
 
 #include "alidade/detect/target_look.h"
@@ -16,7 +20,9 @@
 #include "alidade/results/identified_result.h"
 #include "alidade/tables/rotation_log_file.h"
 #include "cli/app/app.h"
+#include "cli/app/board_options.h"
 #include "cli/app/live.h"
+#include "cli/app/terminal.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/head_live.h"
 
@@ -33,6 +39,7 @@ struct HeadArgs {
   std::string rig, resume, password_file, identified;
   std::optional<double> latency_s;
   NamedLook look;
+  Board board = no_board();
   HeadFollowConfig follow;
   LiveOptions live;
 };
@@ -92,7 +99,7 @@ FieldList fields_of(HeadArgs& args) {
        .value = &args.stream,
        .help =
            "What its camera sees: http://HOST:PORT/PATH (motion JPEG), rtsp://…, v4l2:/dev/video0, onvif://… (it says "
-           "where), or sim:// of a simulated head",
+           "where), indi://HOST:PORT/CAMERA, or sim:// of a simulated head",
        .form = "URL"},
       {.name = "until",
        .value = share_code(args.until),
@@ -147,6 +154,7 @@ void check_head(const HeadArgs& args) {
   if (args.calibrate && args.stream.empty()) throw UsageError("--calibrate needs the camera: --stream URL");
   if (args.calibrate && !args.move) throw UsageError("--calibrate moves the head: give --move as well");
   if (!args.calibrate && !args.resume.empty()) throw UsageError("--resume is for --calibrate");
+  if (!args.calibrate && is_given(args.board)) throw UsageError("--board is for --calibrate");
   if (!args.calibrate && args.until) throw UsageError("--until is for --calibrate");
   if (!args.calibrate && !follows && !args.stream.empty()) throw UsageError("--stream is for --calibrate and --follow");
   if (args.identify && !args.move) throw UsageError("--identify moves the head: give --move as well");
@@ -171,22 +179,30 @@ HeadOptions options_of(const HeadArgs& args) {
 class SoFar {
  public:
   explicit SoFar(std::filesystem::path out) : folder_(std::move(out) / "so-far") {}
-  void write(const HeadCalibration& calibration) {
+  void write(const std::vector<NamedBytes>& files) {
     FolderSwap swap(folder_);
-    for (const NamedBytes& file : files_so_far(calibration)) swap.add(file.name, file.bytes);
+    for (const NamedBytes& file : files) swap.add(file.name, file.bytes);
     swap.commit();
     is_written_ = true;
   }
+  /// The same on a thread of its own, for who must not wait for a disk; left out while the last one is at work.
+  void write_beside(std::vector<NamedBytes> files) {
+    if (writing_.valid() && writing_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+    if (writing_.valid()) writing_.get();
+    writing_ = std::async(std::launch::async, [this, files = std::move(files)] { write(files); });
+  }
   [[nodiscard]] bool is_written() const { return is_written_; }
   [[nodiscard]] std::string place() const { return folder_.string(); }
-  void remove() const {
+  void remove() {
+    if (writing_.valid()) writing_.wait();
     std::error_code error;
     std::filesystem::remove_all(folder_, error);
   }
 
  private:
   std::filesystem::path folder_;
-  bool is_written_ = false;
+  std::atomic<bool> is_written_ = false;
+  std::future<void> writing_;  // last: it uses the others
 };
 
 /// log.csv that an earlier run left, or was on its way to.
@@ -219,8 +235,12 @@ void say_assumed(const HeadLimits& limits, JobOutcome& outcome) {
 ExitCode calibrate_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
   SoFar so_far(run.options.out);
   HeadCalibrationConfig config{.range = args.range, .until = args.until, .most_s = args.most_s};
+  if (is_given(args.board)) {
+    require_board(args.board);
+    config.board = args.board;
+  }
   config.before = log_to_resume(args.resume, run);
-  config.on_so_far = [&so_far](const HeadCalibration& calibration) { so_far.write(calibration); };
+  config.on_so_far = [&so_far](const HeadCalibration& calibration) { so_far.write(files_so_far(calibration)); };
   const std::unique_ptr<FrameStream> stream = open_stream(args.stream, device, options_of(args));
   try {
     const HeadLimits limits = device.limits();
@@ -272,15 +292,24 @@ ExitCode follow_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
       show.show(*live.server(), camera, frame, image);
     };
   }
-  JobOutcome outcome = outcome_of(follow_target(device, *stream, rig.heads.front(), args.look.look,
-                                                args.look.pattern.get(), config, live.progress()));
+  SoFar so_far(run.options.out);
+  config.on_so_far = [&so_far](const HeadFollowing& following) { so_far.write_beside(files_so_far(following)); };
+  const HeadFollowing following = follow_target(device, *stream, rig.heads.front(), args.look.look,
+                                                args.look.pattern.get(), config, live.progress());
+  const int signal = interrupting_signal();
+  forget_interrupt();  // what was followed until then is a result, only a shorter one
+  JobOutcome outcome = outcome_of(following);
   say_assumed(limits, outcome);
   run.lap("follow");
-  return live.finish(std::move(outcome));
+  const ExitCode code = live.finish(std::move(outcome));
+  so_far.remove();
+  if (!following.is_interrupted) return code;
+  std::raise(signal);
+  throw Interrupted(fmt::format("interrupted; the head stands; the {:.1f} s until then are in {}",
+                                following.head_time_s, run.options.out.string()));
 }
 
-ExitCode run_head(HeadArgs& args, Run& run) {
-  check_head(args);
+ExitCode work_head(HeadArgs& args, Run& run) {
   const std::unique_ptr<HeadDevice> device = open_head(args.url, options_of(args));
   run.lap("connect");
   if (!args.look.text.empty()) return follow_by_head(args, *device, run);
@@ -291,6 +320,16 @@ ExitCode run_head(HeadArgs& args, Run& run) {
   say_assumed(limits, outcome);
   run.lap(args.identify ? "identify" : "ask");
   return run.finish(std::move(outcome));
+}
+
+ExitCode run_head(HeadArgs& args, Run& run) {
+  check_head(args);
+  try {
+    return work_head(args, run);
+  } catch (const InputError& error) {  // what fails after Ctrl-C was asked to end
+    if (interrupting_signal() == 0) throw;
+    throw Interrupted(std::string("interrupted; ") + error.what());
+  }
 }
 
 }  // namespace
@@ -316,6 +355,7 @@ void add_head(App& app) {
                   "indi://HOST:PORT/DEVICE (a telescope mount), or sim://?seed=N, a simulated one")
       ->required();
   app.add_fields(command, fields_of(*args));
+  add_board_options(command, args->board, false);
   add_live_options(command, args->live, false);
 }
 

@@ -253,6 +253,24 @@ TEST_F(HeadCommand, StandsAfterCtrlC) {
   });
 }
 
+TEST_F(HeadCommand, WhatWasFollowedUntilCtrlCIsAResult) {
+  write_file(
+      path("camera.yaml"),
+      "model: brown\nwidth: 320\nheight: 240\nfx: 350\nfy: 348\ncx: 163.2\ncy: 117.9\nskew: 0\nk1: -0.08\nk2: 0\n"
+      "p1: 0\np2: 0\nk3: 0\n");
+  write_file(path("rig.yaml"), "heads:\n- {id: 1, camera: camera.yaml}\n");
+  const testing::Outcome outcome = testing::run_program(
+      {ALIDADE_EXECUTABLE, "head", "sim://?rate=40", "--stream", "sim://?fps=20&target=6:0:3:20:1.2", "--rig",
+       path("rig.yaml"), "--follow", "bright", "--move", "--out", path("out")},
+      "", testing::interrupt_after(std::chrono::milliseconds(4500)));
+  EXPECT_EQ(outcome.code, 130) << outcome.err;
+  EXPECT_NE(outcome.err.find("interrupted"), std::string::npos) << outcome.err;
+  const auto document = nlohmann::json::parse(read_file(path("out") + "/result.json"));
+  EXPECT_GT(document["data"]["follow"]["t_s"].size(), 20u);
+  EXPECT_TRUE(std::filesystem::exists(path("out") + "/follow.csv"));
+  EXPECT_FALSE(std::filesystem::exists(path("out") + "/so-far"));
+}
+
 TEST_F(HeadCommand, StandsAfterAKillByTheServersWatchdog) {
   with_server(path("truth.csv"), [&](int rotctl, int stream, pid_t) {
     const auto kill_soon = [](pid_t child) {

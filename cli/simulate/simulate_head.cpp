@@ -73,9 +73,10 @@ void add_head_scenario(App& app) {
   command.add_option(
       "--head", args->head,
       "The head, KEY=VALUE&…: seed, rate, accel, tau, latency, backlash, dead_band, step, update_hz, zoom, lie, …");
-  command.add_option(
-      "--camera", args->camera,
-      "The camera, KEY=VALUE&…: size, fx, fy, cx, cy, k1, mount (x:y:z, degrees), fps, delay, noise, jump, seed");
+  command.add_option("--camera", args->camera,
+                     "The camera, KEY=VALUE&…: size, fx, fy, cx, cy, k1, mount (x:y:z, degrees), fps, delay, noise, "
+                     "jump, target, board "
+                     "(columns:rows:square:distance:pan:tilt, m and degrees), seed");
   command.add_option("--truth", args->truth, "Where each frame's time and true angles are written, CSV")
       ->type_name("FILE");
   command.add_option("--watchdog", args->watchdog_s, "Stops by itself after so many seconds of silence; 0: never")

@@ -10,6 +10,9 @@
 #include "alidade/estimation/median.h"
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
+#include "alidade/heads/calibration/board_room.h"
+#include "alidade/heads/calibration/calibration_log.h"
+#include "alidade/heads/calibration/head_shots.h"
 #include "alidade/heads/streams/frame_follower.h"
 #include "alidade/heads/turn_log.h"
 #include "alidade/observe.h"
@@ -18,32 +21,12 @@
 namespace alidade {
 namespace {
 
-/// What `alidade` with the words of `offline` says of log.csv, down to the last digit: it is read back from its text.
-ObserveReport observed(const std::string& log_csv, int width_px, int height_px) {
-  ObserveConfig config;
-  config.estimate = {"k1", "mount", "delay"};
-  config.no_zoom = true;
-  config.method = ObserveMethod::batch;  // nothing changes: a filter that follows would only lose rows
-  config.width_px = width_px;
-  config.height_px = height_px;
-  try {
-    return observe(parse_rotation_log(log_csv, "log.csv").log, config);
-  } catch (const InputError& error) {  // no rows, or no points
-    ObserveReport report;
-    report.verdict.state = State::refused;
-    report.verdict.exit_code = ExitCode::cannot_tell;
-    report.verdict.sentence = std::string("no point was followed while the head moved evenly: ") + error.what();
-    report.verdict.to_add = "let the camera see corners or texture, sharply";
-    return report;
-  }
-}
-
 /// The head and the stream together, for one calibration.
 class Session {
  public:
   Session(MovingHead& head, FrameStream& stream, const HeadCalibrationConfig& config, const Progress& progress,
           HeadCalibration& result)
-      : head_(head), stream_(stream), config_(config), progress_(progress), result_(result) {
+      : head_(head), stream_(stream), config_(config), progress_(progress), result_(result), follower_(config.board) {
     head_.on_reading = [this](const HeadPosition& reading) { readings_.push_back(reading); };
   }
   ~Session() { head_.on_reading = nullptr; }
@@ -72,13 +55,39 @@ class Session {
 
  private:
   void moves() {
-    first_moves();
+    if (config_.board) {
+      find_board_room();
+      for (int i = 0; i < 5; ++i) board_move();
+    } else {
+      first_moves();
+    }
     bool goes_on = true;
     while (goes_on && left_s() > 0.0) {
-      if (tells_both_axes()) estimate();
+      if (tells_both_axes() && left_s() > 1.5 * estimate_s_) estimate();
       if (is_reached() && head_time() > least_s()) break;
-      goes_on = next_moves();
+      goes_on = config_.board ? board_move() : next_moves();
     }
+  }
+
+  void find_board_room() {
+    const std::vector<SeenFrame> seen = follower_.seen();
+    if (seen.empty() || seen.back().points.empty())
+      throw InputError(fmt::format("{}: not all of a board of {}×{} corners is in view; point the head at it first",
+                                   stream_.name(), config_.board->cols, config_.board->rows));
+    room_.emplace(seen.back().points, at(), result_.width_px, result_.height_px);
+  }
+  /// To where the board is seen elsewhere in the image; where it was lost, back to where it was seen.
+  bool board_move() {
+    move_to(within(room_->next(focal_px_ > 0.0 ? focal_px_ : 1.1 * result_.width_px)));
+    const std::vector<SeenFrame> seen = follower_.seen_so_far();
+    if (!seen.empty() && seen.back().points.empty()) {
+      room_->shrink();
+      move_to(within(room_->home_rad()));
+    }
+    return left_s() > 0.0;
+  }
+  [[nodiscard]] Eigen::Vector2d within(const Eigen::Vector2d& target) const {
+    return target.cwiseMax(head_.low_rad()).cwiseMin(head_.high_rad());
   }
   /// Who asked and who answered do not agree better on when than the answer took.
   [[nodiscard]] double clock_sigma() const {
@@ -185,12 +194,14 @@ class Session {
   }
 
   void estimate() {
+    const double begin_s = head_.now_s();
     result_.log_csv = log_of(follower_.seen());
-    result_.report = observed(result_.log_csv, result_.width_px, result_.height_px);
+    result_.report = observed(result_);
     for (const ObservedQuantity& each : result_.report.quantities) {
       if (each.name == "delay_s") late_s_ = std::clamp(-each.value, -1.0, 1.0);
       if (each.name == "fx") focal_px_ = each.value;
     }
+    estimate_s_ = head_.now_s() - begin_s;
     tell_so_far();
   }
   [[nodiscard]] std::string log_of(const std::vector<SeenFrame>& seen) const {
@@ -241,7 +252,7 @@ class Session {
     targets.push_back(middle + half.cwiseProduct(Eigen::Vector2d(corner[0], corner[1])));
     bool has_moved = false;
     for (Eigen::Vector2d target : targets) {
-      target = target.cwiseMax(head_.low_rad()).cwiseMin(head_.high_rad());
+      target = within(target);
       if ((target - at()).norm() < least_way || left_s() < 0.0) continue;
       move_to(target);
       has_moved = true;
@@ -266,7 +277,9 @@ class Session {
   const Progress& progress_;
   HeadCalibration& result_;
   FrameFollower follower_;
+  std::optional<BoardRoom> room_;  ///< With a board.
   std::vector<HeadPosition> readings_;
+  double estimate_s_ = 0.0;  ///< What the last one took: the head is not held for one that ends too late.
   double begin_s_ = 0.0, next_s_ = 0.0, last_frame_s_ = 0.0, told_s_ = 0.0, rate_ = 0.0, late_s_ = 0.0, focal_px_ = 0.0;
   std::size_t num_corners_ = 0;
 };
@@ -287,6 +300,27 @@ void heed_stamps(const HeadCalibration& result, Verdict& verdict) {
   if (verdict.state == State::good) verdict.state = State::care;
 }
 
+/// `observe` cannot know whether a camera is turned about its view or a log's axes are exchanged; of a head the axes
+/// are known.
+void heed_turned_camera(const HeadCalibration& result, Verdict& verdict) {
+  constexpr double mostly = 0.95;
+  Eigen::Vector3d mount_rad = Eigen::Vector3d::Zero();
+  for (const ObservedQuantity& each : result.report.quantities)
+    for (int i = 0; i < 3; ++i)
+      if (each.name == fmt::format("mount_{}_rad", "xyz"[i])) mount_rad[i] = each.value;
+  if (std::abs(mount_rad.z()) < mostly * mount_rad.norm()) return;
+  const auto is_bad = [](const Check& check) { return check.state == State::bad; };
+  const auto rotation = std::ranges::find(verdict.checks, "rotation", &Check::name);
+  if (std::ranges::count_if(verdict.checks, is_bad) != 1 || rotation == verdict.checks.end() || !is_bad(*rotation))
+    return;
+  if (!result.report.verdict.to_add.empty() && rotation->text.starts_with("the pixels fit better")) return;
+  rotation->state = State::care;
+  rotation->text = fmt::format("the camera is turned by {:.1f}° about its view", mount_rad.z() / degree);
+  verdict.state = State::care;
+  verdict.exit_code = ExitCode::ok;
+  verdict.to_add.clear();
+}
+
 /// Which focal length is not known as well as was asked, and why not.
 Verdict calibration_verdict(const HeadCalibration& result, const HeadCalibrationConfig& config,
                             const Eigen::Vector2d& span_rad) {
@@ -300,6 +334,7 @@ Verdict calibration_verdict(const HeadCalibration& result, const HeadCalibration
     verdict.to_add = "mend the link and run it again";
     return verdict;
   }
+  heed_turned_camera(result, verdict);
   const bool has_answer = verdict.exit_code == ExitCode::ok || verdict.exit_code == ExitCode::not_trusted;
   std::string missing;
   for (std::size_t i = 0; i < 2 && has_answer && config.until; ++i) {
@@ -328,26 +363,6 @@ Verdict calibration_verdict(const HeadCalibration& result, const HeadCalibration
 
 }  // namespace
 
-std::vector<std::string> offline_words(const HeadCalibration& result) {
-  return {"observe",    "log.csv",        "--size",    fmt::format("{}x{}", result.width_px, result.height_px),
-          "--estimate", "k1,mount,delay", "--no-zoom", "--method",
-          "batch"};
-}
-
-RotationLog joined_logs(const RotationLog& before, const RotationLog& now) {
-  constexpr double pause_s = 60.0;
-  RotationLog both = before;
-  both.num_points = before.num_points + now.num_points;
-  const double begin_s = before.rows.empty() ? 0.0 : std::ceil(before.rows.back().t_s + pause_s);
-  for (RotationRow& row : both.rows) row.px.resize(both.num_points, Eigen::Vector2d::Constant(not_seen));
-  for (RotationRow row : now.rows) {
-    row.t_s += begin_s - now.rows.front().t_s;
-    row.px.insert(row.px.begin(), before.num_points, Eigen::Vector2d::Constant(not_seen));
-    both.rows.push_back(std::move(row));
-  }
-  return both;
-}
-
 HeadCalibration calibrate_head(HeadDevice& device, FrameStream& stream, const HeadCalibrationConfig& config,
                                const Progress& progress) {
   HeadCalibration result;
@@ -359,7 +374,11 @@ HeadCalibration calibrate_head(HeadDevice& device, FrameStream& stream, const He
     if ((head.high_rad() - head.low_rad()).maxCoeff() > 1e4)
       throw InputError(device.name() + ": names no limits; give --pan-range and --tilt-range");
     span = head.high_rad() - head.low_rad();
-    Session(head, stream, config, progress, result).run();
+    if (stream.exposure_s() > 0.0) {
+      calibrate_by_shots(head, stream, config, progress, result);
+    } else {
+      Session(head, stream, config, progress, result).run();
+    }
   }
   result.offline = offline_words(result);
   result.verdict = calibration_verdict(result, config, span);

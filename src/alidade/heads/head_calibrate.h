@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/board/board.h"
 #include "alidade/heads/head_survey.h"
 #include "alidade/heads/streams/frame_stream.h"
 #include "alidade/observe/report.h"
@@ -18,6 +19,8 @@ struct HeadCalibrationConfig {
   /// Until 3σ of fx and fy are this share of them; none: for as long as its usual moves take.
   std::optional<double> until;
   double most_s = 85.0;  ///< For which the head is held.
+  /// Followed instead of points: its corners, wherever all of it is seen. None: points of the world.
+  std::optional<Board> board = {};
   /// What an earlier run of the same head and camera measured: counts as well.
   std::optional<RotationLog> before = {};
   /// What is known so far, every few seconds: its log, and the estimate where there is one.
@@ -35,9 +38,11 @@ struct HeadCalibration {
   double largest_jump_s = 0.0;
   double head_time_s = 0.0;
   double sigma_clock_s =
-      0.0;              ///< Of the head's times against the frames'; in σ of the delay beside what the log tells.
-  std::string fault;    ///< What broke in the middle; the head was stopped, and the rest is of before.
-  std::string log_csv;  ///< What `offline` reads, as log.csv.
+      0.0;                   ///< Of the head's times against the frames'; in σ of the delay beside what the log tells.
+  bool is_of_shots = false;  ///< Single pictures while the head stood; else of a video.
+  double narrow_focal_px = 0.0;      ///< Above zero: the field is so narrow that nothing but one focal length is told.
+  std::string fault;                 ///< What broke in the middle; the head was stopped, and the rest is of before.
+  std::string log_csv;               ///< What `offline` reads, as log.csv.
   std::vector<std::string> offline;  ///< `alidade` with these words, in the folder of log.csv, gives the same numbers.
   ObserveReport report;
   Verdict verdict;

@@ -72,6 +72,21 @@ TEST(HeadCalibrate, LensMountingAndDelayWithinThreeSigma) {
     EXPECT_EQ(again.quantities[i].value, result.report.quantities[i].value) << again.quantities[i].name;
 }
 
+TEST(HeadCalibrate, FollowsABoardInsteadOfPoints) {
+  const std::string camera = std::string(camera_words) + "&fps=8&board=9:6:0.025:0.9:3:2";
+  const std::unique_ptr<HeadDevice> head = open_head("sim://?clock=free&rate=8");
+  const std::unique_ptr<FrameStream> stream = open_stream("sim://?" + camera, *head);
+  const HeadCalibrationConfig config{
+      .range = range_of(60, -20, 40), .most_s = 24.0, .board = Board{.cols = 9, .rows = 6, .square_m = 0.025}};
+  const HeadCalibration result = calibrate_head(*head, *stream, config);
+  ASSERT_EQ(result.verdict.exit_code, ExitCode::ok) << result.verdict.sentence;
+  EXPECT_EQ(parse_rotation_log(result.log_csv, "log.csv").log.num_points, 54u);
+  double sigma = 0.0;
+  const double fx = value_of(result.report, "fx", sigma);
+  EXPECT_LE(std::abs(fx - 350.0), 3.5 * sigma);
+  EXPECT_LT(3.0 * sigma, 0.05 * fx);
+}
+
 TEST(HeadCalibrate, NamesFyWhereTiltIsHeld) {
   const HeadCalibration result = calibrated("rate=8", {.range = range_of(60, 0, 0), .until = 0.001, .most_s = 14.0});
   EXPECT_EQ(result.verdict.exit_code, ExitCode::cannot_tell);

@@ -55,21 +55,50 @@ class Follower {
   Follower& operator=(const Follower&) = delete;
 
   void run() {
-    const double period_s = result_.period_s;
     begin_s_ = last_frame_s_ = head_.now_s();
-    double next_s = begin_s_ + period_s;
-    while (head_.now_s() - begin_s_ < config_.most_s) {
-      report_progress(progress_, "following: s of head time", static_cast<std::size_t>(head_.now_s() - begin_s_), 0);
-      ask(next_s);
-      aim_head();
-      next_s = std::max(next_s, head_.now_s() - period_s) + period_s;
+    try {
+      follow();
+      head_.stop();
+    } catch (const Interrupted&) {  // the head first, then what was seen before is kept
+      stop_anyhow();
+      if (result_.frames.empty()) throw;
+      result_.is_interrupted = true;
+    } catch (const InputError& fault) {
+      stop_anyhow();
+      if (result_.frames.empty()) throw;
+      result_.fault = fault.what();
     }
-    head_.stop();
     result_.head_time_s = head_.now_s() - begin_s_;
     result_.image_age_s = num_ages_ > 0 ? sum_age_s_ / static_cast<double>(num_ages_) : 0.0;
   }
 
  private:
+  void follow() {
+    const double period_s = result_.period_s;
+    double next_s = begin_s_ + period_s;
+    while (head_.now_s() - begin_s_ < config_.most_s) {
+      report_progress(progress_, "following: s of head time", static_cast<std::size_t>(head_.now_s() - begin_s_), 0);
+      ask(next_s);
+      aim_head();
+      tell_so_far();
+      next_s = std::max(next_s, head_.now_s() - period_s) + period_s;
+    }
+  }
+  void stop_anyhow() {
+    try {
+      head_.stop();
+    } catch (const InputError&) {  // it is the head that is lost
+    }
+  }
+  /// Whoever kills this process finds what was seen until a few seconds ago.
+  void tell_so_far() {
+    constexpr double pause_s = 3.0, pause_share = 0.05;  // all that was seen is told each time
+    const double time_s = head_.now_s() - begin_s_;
+    if (!config_.on_so_far || result_.frames.empty() || time_s - told_s_ < std::max(pause_s, pause_share * time_s))
+      return;
+    told_s_ = time_s;
+    config_.on_so_far(result_);
+  }
   /// Where it is; commands follow one another as fast as its answers and its pace allow.
   HeadPosition first_position() {
     constexpr double calls = 3.0, slowest_s = 1.0;  // a question, and a command that asks before
@@ -103,7 +132,8 @@ class Follower {
 
   /// Frames that came, once the head's angles at their times are known.
   void look() {
-    constexpr double lost_s = 2.0, old_s = 0.5;
+    constexpr double old_s = 0.5;
+    const double lost_s = 2.0 + 2.0 * stream_.exposure_s();
     while (!waiting_.empty()) {
       const StreamFrame& frame = waiting_.front();
       const double shown_s = frame.t_s + config_.delay_s;
@@ -189,7 +219,7 @@ class Follower {
   std::vector<HeadPosition> asked_;
   double read_s_ = 0.0;
   std::deque<StreamFrame> waiting_;
-  double begin_s_ = 0.0, last_frame_s_ = 0.0, sum_age_s_ = 0.0;
+  double begin_s_ = 0.0, last_frame_s_ = 0.0, sum_age_s_ = 0.0, told_s_ = 0.0;
   std::size_t num_ages_ = 0;
   bool is_following_ = false;
 };
@@ -226,6 +256,18 @@ void judge(HeadFollowing& result, double shorter_side_px) {
   if (lost > most_lost) result.verdict.state = State::care;
 }
 
+/// What broke it off is said before what was seen until then.
+void heed_break(HeadFollowing& result) {
+  if (result.is_interrupted)
+    result.verdict.sentence =
+        fmt::format("interrupted after {:.1f} s; {}", result.head_time_s, result.verdict.sentence);
+  if (result.fault.empty()) return;
+  result.verdict.state = State::refused;
+  result.verdict.exit_code = ExitCode::cannot_tell;
+  result.verdict.sentence = result.fault + "; " + result.verdict.sentence;
+  result.verdict.to_add = "mend the link and run it again";
+}
+
 /// Whether the loop does what a loop with this head can.
 void compare_with_forecast(HeadFollowing& result) {
   constexpr double most = 1.3, own_px = 1.0;  // of what is seen of a target at rest
@@ -260,6 +302,7 @@ HeadFollowing follow_target(HeadDevice& device, FrameStream& stream, const RigHe
   }
   judge(result, std::min(rig_head.camera.width_px, rig_head.camera.height_px));
   compare_with_forecast(result);
+  heed_break(result);
   return result;
 }
 

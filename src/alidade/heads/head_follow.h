@@ -20,6 +20,7 @@ inline constexpr PositionerParams usual_axis{
     .rate_rad_s = 0.7, .acceleration_rad_s2 = 2.0, .time_constant_s = 0.06, .latency_s = 0.05};
 
 struct FollowedFrame;
+struct HeadFollowing;
 
 struct HeadFollowConfig {
   HeadRange range;
@@ -29,6 +30,8 @@ struct HeadFollowConfig {
   double delay_s = 0.0;  ///< A frame shows the angles of so much later than its time: as --calibrate estimates it.
   /// Called with each frame that was looked at.
   std::function<void(const FollowedFrame&, const cv::Mat&)> on_frame = {};
+  /// Called with what is known so far every few seconds, or every twentieth of the time. Must not wait.
+  std::function<void(const HeadFollowing&)> on_so_far = {};
 };
 
 /// A frame and what was seen in it.
@@ -58,12 +61,14 @@ struct HeadFollowing {
   double rms_px = 0.0, max_px = 0.0, central_third = 0.0;  ///< From the first third of the time on.
   double period_s = 0.0, image_age_s = 0.0;                ///< Between commands; of the newest image at a command.
   std::optional<FollowForecast> forecast;                  ///< None: the target was not seen long enough.
+  bool is_interrupted = false;                             ///< The rest is of before; the head was stopped.
+  std::string fault;                                       ///< What broke in the middle; likewise.
   Verdict verdict;
 };
 
 /// Looks for the target in frame after frame, predicts where it will be when a command acts, and sends the head there.
 /// A target that was not seen for a second is not followed; the head stands until it is seen again. Throws InputError,
-/// Interrupted: the head stands then.
+/// Interrupted where that was before the first frame; the head stands then.
 [[nodiscard]] HeadFollowing follow_target(HeadDevice& device, FrameStream& stream, const RigHead& rig_head,
                                           const TargetLook& look, const cv::Mat* pattern,
                                           const HeadFollowConfig& config, const Progress& progress = {});

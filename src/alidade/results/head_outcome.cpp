@@ -247,6 +247,20 @@ void fill_forecast(const HeadFollowing& following, JsonValue& estimate) {
 
 }  // namespace
 
+std::vector<NamedBytes> files_so_far(const HeadFollowing& following) {
+  std::string csv =
+      "t_s,pan_rad,tilt_rad,u_px,v_px,target_pan_rad,target_tilt_rad,error_px,asked_pan_rad,asked_tilt_rad\n";
+  for (const FollowedFrame& frame : following.frames) {
+    csv += fmt::format("{:.6f},{:.9f},{:.9f}", frame.t_s, frame.pan_tilt_rad[0], frame.pan_tilt_rad[1]);
+    csv += frame.is_found ? fmt::format(",{:.4f},{:.4f},{:.9f},{:.9f},{:.4f}", frame.px[0], frame.px[1],
+                                        frame.target_rad[0], frame.target_rad[1], frame.error_px.norm())
+                          : std::string(",,,,,");
+    csv += frame.asked_rad ? fmt::format(",{:.9f},{:.9f}\n", (*frame.asked_rad)[0], (*frame.asked_rad)[1])
+                           : std::string(",,\n");
+  }
+  return {{"follow.csv", std::move(csv)}};
+}
+
 JobOutcome outcome_of(const HeadFollowing& following) {
   JobOutcome outcome;
   ResultDocument& document = outcome.document;
@@ -263,19 +277,9 @@ JobOutcome outcome_of(const HeadFollowing& following) {
   estimate["central_third"] = following.central_third;
   fill_forecast(following, estimate);
   document.data.push_back(follow_table(following.frames));
-  std::string csv =
-      "t_s,pan_rad,tilt_rad,u_px,v_px,target_pan_rad,target_tilt_rad,error_px,asked_pan_rad,asked_tilt_rad\n";
-  for (const FollowedFrame& frame : following.frames) {
-    csv += fmt::format("{:.6f},{:.9f},{:.9f}", frame.t_s, frame.pan_tilt_rad[0], frame.pan_tilt_rad[1]);
-    csv += frame.is_found ? fmt::format(",{:.4f},{:.4f},{:.9f},{:.9f},{:.4f}", frame.px[0], frame.px[1],
-                                        frame.target_rad[0], frame.target_rad[1], frame.error_px.norm())
-                          : std::string(",,,,,");
-    csv += frame.asked_rad ? fmt::format(",{:.9f},{:.9f}\n", (*frame.asked_rad)[0], (*frame.asked_rad)[1])
-                           : std::string(",,\n");
-    document.counts.used += frame.is_found;
-  }
+  document.counts.used = static_cast<std::size_t>(std::ranges::count_if(following.frames, &FollowedFrame::is_found));
   document.counts.dropped = document.counts.given - document.counts.used;
-  outcome.files.push_back({"follow.csv", std::move(csv)});
+  outcome.files = files_so_far(following);
   outcome.lines.push_back(fmt::format("{} frames, {} commands; from a third of the time on {:.3g} px RMS",
                                       following.frames.size(), following.num_commands, following.rms_px));
   if (following.forecast)

@@ -17,5 +17,6 @@ namespace alidade {
 [[nodiscard]] std::vector<NamedBytes> files_so_far(const HeadCalibration& calibration);
 /// Of how it followed a target: follow.csv.
 [[nodiscard]] JobOutcome outcome_of(const HeadFollowing& following);
+[[nodiscard]] std::vector<NamedBytes> files_so_far(const HeadFollowing& following);
 
 }  // namespace alidade

@@ -67,15 +67,7 @@ class IndiMount final : public HeadDevice {
   static constexpr double silent_s = 2.5, patience_s = 5.0;
 
   void begin() {
-    const auto is_on = [](const IndiProperty& property) {
-      const auto found = property.values.find("CONNECT");
-      return found != property.values.end() && found->second == "On";
-    };
-    const IndiProperty& connection = link_.wait_for("CONNECTION", patience_s);
-    if (!is_on(connection)) {
-      link_.set_switch("CONNECTION", "CONNECT");
-      (void)link_.wait_for("CONNECTION", patience_s, is_on);
-    }
+    link_.connect_device(patience_s);
     (void)link_.wait_for(where_it_is, patience_s);
     link_.take(0.3);
     if (link_.find("POLLING_PERIOD") != nullptr) link_.set_numbers("POLLING_PERIOD", {{"PERIOD_MS", 100.0}});

@@ -18,10 +18,11 @@
 namespace alidade {
 namespace {
 
-/// After "indi://HOST:PORT/", with %20 for what is no letter.
+/// After "indi://HOST:PORT/", up to a '?', with %20 for what is no letter.
 std::string device_of(const std::string& url) {
   const std::size_t slash = url.find('/', std::string_view("indi://").size());
   std::string text = slash == std::string::npos ? "" : url.substr(slash + 1), name;
+  text.resize(std::min(text.size(), text.find('?')));
   for (std::size_t i = 0; i < text.size(); ++i) {
     if (text[i] == '%' && i + 2 < text.size()) {
       name.push_back(static_cast<char>(std::strtol(text.substr(i + 1, 2).c_str(), nullptr, 16)));
@@ -137,6 +138,7 @@ void IndiLink::hear(const std::string& element) {
     const std::size_t first = text.find_first_not_of(" \t\r\n"), last = text.find_last_not_of(" \t\r\n");
     kept.values[each.attribute("name").value()] =
         first == std::string::npos ? "" : text.substr(first, last - first + 1);
+    if (each.attribute("format")) kept.format = each.attribute("format").value();
   }
   kept.t_s = machine_clock()->now_s();
   ++kept.count;
@@ -165,6 +167,16 @@ const IndiProperty& IndiLink::wait_for(const std::string& property, double most_
   if (std::ranges::find(devices_, device_) == devices_.end())
     throw InputError(fmt::format("{}: no device '{}'; there are: {}", name(), device_, known.empty() ? "none" : known));
   throw InputError(fmt::format("{}: '{}' says nothing of {} within {:g} s", name(), device_, property, most_s));
+}
+
+void IndiLink::connect_device(double most_s) {
+  const auto is_on = [](const IndiProperty& property) {
+    const auto found = property.values.find("CONNECT");
+    return found != property.values.end() && found->second == "On";
+  };
+  if (is_on(wait_for("CONNECTION", most_s))) return;
+  set_switch("CONNECTION", "CONNECT");
+  (void)wait_for("CONNECTION", most_s, is_on);
 }
 
 void IndiLink::set_numbers(const std::string& property, const std::vector<std::pair<std::string, double>>& values) {

@@ -28,6 +28,7 @@ class XmlElements {
 struct IndiProperty {
   std::string state;                          ///< Idle, Ok, Busy, Alert.
   std::map<std::string, std::string> values;  ///< Text of each member.
+  std::string format;                         ///< Of a BLOB: ".fits".
   double t_s = 0.0;                           ///< When it came.
   std::size_t count = 0;                      ///< How often.
 };
@@ -48,6 +49,8 @@ class IndiLink {
   void set_switch(const std::string& property, const std::string& on);
   void send(const std::string& xml) { socket_.write(xml); }
   void connect_again();
+  /// The driver's connection with its device, where it has none. Throws InputError: not within so many seconds.
+  void connect_device(double most_s);
 
   [[nodiscard]] const std::string& device() const { return device_; }
   [[nodiscard]] const std::string& name() const { return socket_.address().name; }

@@ -70,10 +70,13 @@ FilteredTime ArrivalTimes::add(double came_s, std::optional<double> tick) {
 }
 
 void StampWatch::add(double stamp_s, double came_s) {
-  constexpr std::size_t most_periods = 31, fewest_periods = 5;
+  constexpr std::size_t most_periods = 31, fewest_periods = 5, most_offsets = 6;
   constexpr double least_s = 0.1;
   const std::optional<double> stamp_before = std::exchange(stamp_s_, stamp_s),
                               came_before = std::exchange(came_s_, came_s);
+  const double usual_offset_s = offsets_s_.empty() ? 0.0 : *std::ranges::min_element(offsets_s_);
+  offsets_s_.push_back(came_s - stamp_s);
+  if (offsets_s_.size() > most_offsets) offsets_s_.pop_front();
   if (!stamp_before) return;
   const double way_s = stamp_s - *stamp_before, wait_s = came_s - *came_before;
   periods_s_.push_back(wait_s);
@@ -85,7 +88,9 @@ void StampWatch::add(double stamp_s, double came_s) {
   const double off_s = std::abs(way_s - wait_s);
   const bool is_off = way_s <= 0.0 || off_s > std::max(least_s, 1.5 * period_s);
   if (is_off || !came_in_turn_) ++piece_;
-  if (!is_off || (way_s > 0.0 && !came_in_turn)) return;
+  // One that was held back, and the next that was not: only the first is out of what is usual.
+  const bool is_made_up_for = way_s > wait_s && std::abs(offsets_s_.back() - usual_offset_s) < least_s;
+  if (!is_off || is_made_up_for || (way_s > 0.0 && !came_in_turn)) return;
   ++num_jumps_;
   largest_s_ = std::max(largest_s_, off_s);
 }

@@ -54,7 +54,7 @@ class StampWatch {
 
  private:
   std::optional<double> stamp_s_, came_s_;
-  std::deque<double> periods_s_;
+  std::deque<double> periods_s_, offsets_s_;  ///< Of the newest: between arrivals; from stamp to arrival.
   std::size_t num_jumps_ = 0, piece_ = 0;
   bool came_in_turn_ = false;
   double largest_s_ = 0.0;

@@ -77,8 +77,9 @@ TEST(StampWatch, JumpsAreFoundAndLatenessIsNone) {
   Draws draws(3);
   StampWatch honest, jumping;
   for (int i = 0; i < 300; ++i) {
-    const double taken_s = 100.0 + period_s * i, late_s = i % 29 == 0 ? 0.4 : 0.01 * draws.uniform();
-    honest.add(taken_s, taken_s + late_s);
+    const double taken_s = 100.0 + period_s * i;
+    if (i % 29 > 2) honest.add(taken_s, taken_s + 0.01 * draws.uniform());
+    if (i % 29 == 0) honest.add(taken_s, taken_s + 2.0 * period_s);  // held back; two were not taken meanwhile
     jumping.add(taken_s - (i / 36 % 3 == 1 ? 0.3 : 0.0), taken_s + 0.01 * draws.uniform());
   }
   EXPECT_EQ(honest.num_jumps(), 0u);

@@ -4,6 +4,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "alidade/board_detector/find_board.h"
+
 namespace alidade {
 namespace {
 
@@ -59,6 +61,15 @@ std::vector<SeenFrame> FrameFollower::seen_so_far() {
   return timed();
 }
 
+/// Of a board all corners or none, by their numbers: of a part nobody could say which they are.
+std::vector<TrackedPoint> FrameFollower::points_in(const cv::Mat& grey) {
+  if (!board_) return tracker_.update(grey);
+  std::vector<TrackedPoint> points;
+  for (const Corner& corner : find_board(grey, *board_, true).view.corners)
+    points.push_back({corner.index, corner.px, std::sqrt(0.5 * corner.cov.trace())});
+  return points;
+}
+
 void FrameFollower::work() {
   std::unique_lock lock(mutex_);
   for (;;) {
@@ -68,7 +79,7 @@ void FrameFollower::work() {
     waiting_.pop_front();
     is_busy_ = true;
     lock.unlock();
-    SeenFrame seen{frame.t_s, tracker_.update(grey_of(*frame.image))};
+    SeenFrame seen{frame.t_s, points_in(grey_of(*frame.image))};
     lock.lock();
     is_busy_ = false;
     seen_.push_back(std::move(seen));

@@ -3,9 +3,11 @@
 #include <condition_variable>
 #include <deque>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <vector>
 
+#include "alidade/board/board.h"
 #include "alidade/heads/streams/arrival_times.h"
 #include "alidade/heads/streams/frame_stream.h"
 #include "alidade/heads/turn_log.h"
@@ -13,10 +15,11 @@
 
 namespace alidade {
 
-/// Follows points on a thread of its own, so that the head is asked in time.
+/// Follows points, or the corners of a board, on a thread of its own, so that the head is asked in time.
 class FrameFollower {
  public:
-  FrameFollower() : tracker_(PointTrackerConfig{.max_tracks = 120}), worker_([this] { work(); }) {}
+  explicit FrameFollower(std::optional<Board> board = {})
+      : board_(std::move(board)), tracker_(PointTrackerConfig{.max_tracks = 120}), worker_([this] { work(); }) {}
   ~FrameFollower();
   FrameFollower(const FrameFollower&) = delete;
   FrameFollower& operator=(const FrameFollower&) = delete;
@@ -34,8 +37,10 @@ class FrameFollower {
 
  private:
   void work();
+  [[nodiscard]] std::vector<TrackedPoint> points_in(const cv::Mat& grey);
   [[nodiscard]] std::vector<SeenFrame> timed() const;
 
+  std::optional<Board> board_;
   PointTracker tracker_;
   std::mutex mutex_;
   std::condition_variable changed_;

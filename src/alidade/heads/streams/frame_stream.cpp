@@ -14,6 +14,8 @@
 #include "alidade/heads/protocols/onvif_head.h"
 #include "alidade/heads/simulated_head.h"
 #include "alidade/pantilt/head_rotation.h"
+#include "alidade/simulate/boards/board_photos.h"
+#include "alidade/simulate/boards/board_placing.h"
 #include "alidade/simulate/films/panorama_video.h"
 
 namespace alidade {
@@ -69,6 +71,35 @@ void draw_target(const SimulatedCamera& camera, const RotatingIntrinsics& k, con
              cv::LINE_AA, bits);
 }
 
+/// A board that stands in front of the far world, as this camera sees it: the print and its rim.
+void draw_board(const SimulatedCamera& simulated, const Eigen::Quaterniond& base_from_cam, std::uint64_t seed,
+                cv::Mat& image) {
+  Calibrated<Brown> lens;
+  lens.params.head<6>() << simulated.fx, simulated.fy, simulated.cx, simulated.cy, 0.0, simulated.k1;
+  BoardScene scene{{}, simulated.board, points_in_board(simulated.board), {}};
+  scene.camera.width_px = simulated.width_px;
+  scene.camera.height_px = simulated.height_px;
+  scene.camera.lens = lens;
+  const Eigen::Vector3d middle = 0.5 * (scene.points_in_board.front() + scene.points_in_board.back());
+  const Eigen::Quaterniond cam_from_board =
+      base_from_cam.conjugate() *
+      base_from_cam_rotation(Eigen::Vector3d(simulated.board_rad[0], simulated.board_rad[1], 0.0));
+  scene.cam_from_board.push_back(
+      {cam_from_board, cam_from_board * (simulated.board_m * Eigen::Vector3d::UnitZ() - middle)});
+  std::vector<cv::Point> outline, hull;
+  for (const Eigen::Vector3d& point : visible_outline(scene)) {
+    const auto px = project(scene.camera, scene.cam_from_board[0] * point);
+    if (!px || px->cwiseAbs().maxCoeff() > 1e4) return;
+    outline.emplace_back(static_cast<int>(std::lround(px->x())), static_cast<int>(std::lround(px->y())));
+  }
+  cv::Mat mask(image.size(), CV_8U, cv::Scalar(0));
+  cv::convexHull(outline, hull);
+  cv::fillConvexPoly(mask, hull, cv::Scalar(255));
+  if (cv::countNonZero(mask) == 0) return;
+  const RenderConfig config{.noise = simulated.noise, .background_texture = 0.0, .oversampling = 2};
+  render_board_photo(scene, 0, config, seed).copyTo(image, mask);
+}
+
 std::vector<double> numbers_in(const std::string& text, const char* separators) {
   std::vector<double> numbers;
   for (std::size_t at = 0; at <= text.size();) {
@@ -109,6 +140,12 @@ SimulatedCamera simulated_camera(const std::string& text, const std::string& whe
       camera.target_rad = Eigen::Vector2d(numbers[1], numbers[2]) * degree;
       camera.target_span_rad = numbers[3] * degree;
       camera.target_radius_rad = numbers[4] * degree;
+    } else if (key == "board" && numbers.size() == 6 && numbers[0] >= 3 && numbers[1] >= 3 && numbers[0] <= 40 &&
+               numbers[1] <= 40 && numbers[2] > 0.0 && numbers[3] > 0.0) {
+      camera.board = {
+          .cols = static_cast<int>(numbers[0]), .rows = static_cast<int>(numbers[1]), .square_m = numbers[2]};
+      camera.board_m = numbers[3];
+      camera.board_rad = Eigen::Vector2d(numbers[4], numbers[5]) * degree;
     } else if (key == "mount" && numbers.size() == 3) {
       camera.mount_rad = Eigen::Vector3d(numbers[0], numbers[1], numbers[2]) * degree;
     } else if (const auto place = places.find(key); place != places.end() && numbers.size() == 1) {
@@ -116,7 +153,8 @@ SimulatedCamera simulated_camera(const std::string& text, const std::string& whe
     } else {
       throw InputError(
           fmt::format("{}: '{}' is nothing that a simulated camera has; it has size=320x240, fx, fy, cx, "
-                      "cy, k1, mount=X:Y:Z, fps, delay, noise, jump, target=RATE:PAN:TILT:SPAN:RADIUS, seed",
+                      "cy, k1, mount=X:Y:Z, fps, delay, noise, jump, target=RATE:PAN:TILT:SPAN:RADIUS, "
+                      "board=COLUMNS:ROWS:SQUARE:DISTANCE:PAN:TILT, seed",
                       where, part));
     }
   }
@@ -144,6 +182,7 @@ cv::Mat CameraRenderer::frame(const Eigen::Vector2d& pan_tilt_rad, std::uint64_t
   const PanoramaConfig config{.blur_px = 0.6, .noise = camera_.noise, .oversampling = 1};
   cv::Mat image = render_panorama(world_->far, k, camera_.width_px, camera_.height_px, base_from_cam, config,
                                   camera_.seed + 0x9e3779b97f4a7c15u * number);
+  if (camera_.board.cols > 0) draw_board(camera_, base_from_cam, camera_.seed + number, image);
   if (camera_.target_radius_rad > 0.0) draw_target(camera_, k, base_from_cam, t_s, image);
   return image;
 }
@@ -193,6 +232,7 @@ std::unique_ptr<FrameStream> open_stream(const std::string& url, HeadDevice& hea
   if (url.starts_with("http://")) return open_mjpeg(url, options.password, clock);
   if (url.starts_with("rtsp://") || url.starts_with("v4l2:") || url.starts_with("https://"))
     return open_decoded(url, options.password, clock);
+  if (url.starts_with("indi://")) return open_indi_camera(url, clock);
   if (url.starts_with("onvif://")) return open_stream(onvif_stream_url(url, options), head, options);
   if (url.starts_with("sim://")) {
     HeadPlant* plant = plant_of(head);
@@ -203,7 +243,7 @@ std::unique_ptr<FrameStream> open_stream(const std::string& url, HeadDevice& hea
   }
   throw InputError("'" + url +
                    "' is no stream of a head: give http://HOST:PORT/PATH (motion JPEG), rtsp://…, "
-                   "v4l2:/dev/video0, onvif://… or sim://");
+                   "v4l2:/dev/video0, onvif://…, indi://HOST:PORT/CAMERA or sim://");
 }
 
 }  // namespace alidade

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "alidade/board/board.h"
 #include "alidade/heads/head_device.h"
 
 namespace cv {
@@ -35,6 +36,8 @@ class FrameStream {
   /// Those that have come since the last call; never waits.
   [[nodiscard]] virtual std::deque<StreamFrame> take() = 0;
   [[nodiscard]] virtual const std::string& name() const = 0;
+  /// Of pictures that are exposed one by one, as a telescope's are; 0: a video.
+  [[nodiscard]] virtual double exposure_s() const { return 0.0; }
 };
 
 /// Where the camera is that a simulated head carries, and what it sees: a far world of noise.
@@ -49,12 +52,17 @@ struct SimulatedCamera {
   /// radius zero: none.
   Eigen::Vector2d target_rad = Eigen::Vector2d::Zero();
   double target_rate_rad_s = 0.0, target_span_rad = 0.0, target_radius_rad = 0.0;
+  /// A chessboard that faces where the head looks at `board_rad` (pan, tilt), so far away; none: no columns.
+  Board board = {.cols = 0, .rows = 0};
+  double board_m = 1.0;
+  Eigen::Vector2d board_rad = Eigen::Vector2d::Zero();
   std::uint64_t seed = 1;
 };
 
 /// "KEY=VALUE&…": size (WIDTHxHEIGHT), fx, fy, cx, cy, k1, mount (x:y:z in degrees), fps, delay, noise, seed, target
-/// (rate:pan:tilt:span:radius in degrees), jump (seconds by which its time stamps go wrong now and then). Throws
-/// InputError, which names all keys where one is not known.
+/// (rate:pan:tilt:span:radius in degrees), board (columns:rows:square:distance:pan:tilt in m and degrees), jump
+/// (seconds by which its time stamps go wrong now and then). Throws InputError, which names all keys where one is not
+/// known.
 [[nodiscard]] SimulatedCamera simulated_camera(const std::string& text, const std::string& where);
 
 /// Renders what such a camera sees at an angle of its head.
@@ -74,8 +82,8 @@ class CameraRenderer {
 [[nodiscard]] double stamp_of(const SimulatedCamera& camera, double t_s);
 
 /// The stream of a URL: http://HOST:PORT/PATH (motion JPEG), rtsp://…, v4l2:/dev/video0, onvif://… (the camera says
-/// where), sim://?… (what the simulated head's camera sees). {password} in it stands for the password. Throws
-/// InputError, without it.
+/// where), indi://HOST:PORT/DEVICE (a telescope's camera), sim://?… (what the simulated head's camera sees). {password}
+/// in it stands for the password. Throws InputError, without it.
 [[nodiscard]] std::unique_ptr<FrameStream> open_stream(const std::string& url, HeadDevice& head,
                                                        const HeadOptions& options = {});
 
@@ -87,6 +95,10 @@ class CameraRenderer {
 /// What the decoder beside this program reads: rtsp://, v4l2:, http:// of other kinds.
 [[nodiscard]] std::unique_ptr<FrameStream> open_decoded(const std::string& url, const std::string& password,
                                                         std::shared_ptr<HeadClock> clock);
+
+/// A camera behind INDI's server, which exposes one picture after the other, each `?seconds=` long (1 if it is not
+/// given).
+[[nodiscard]] std::unique_ptr<FrameStream> open_indi_camera(const std::string& url, std::shared_ptr<HeadClock> clock);
 
 /// `text` with the password where {password} stands. Throws InputError where there is none to put there.
 [[nodiscard]] std::string with_secret(const std::string& text, const std::string& password);

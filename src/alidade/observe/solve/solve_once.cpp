@@ -10,6 +10,7 @@
 #include "alidade/observe/filters/hybrid.h"
 #include "alidade/observe/filters/steadiness.h"
 #include "alidade/observe/solve/solve_once.h"
+#include "alidade/observe/solve/start_roll.h"
 
 namespace alidade {
 namespace {
@@ -79,6 +80,8 @@ class Observation {
       report_.rows_used += is_used ? 1 : 0;
     }
     if (log_.source == RotationSource::none) begin_free();
+    if (log_.source != RotationSource::none && config_.nuisances.mount)
+      start_.cam_from_mount = exp_so3({0.0, 0.0, start_roll(frames_)});
     add_turns(log_, errors_, config_.max_gap_s, frames_);
   }
 

@@ -1,0 +1,40 @@
+#include "alidade/heads/calibration/board_room.h"
+
+#include <algorithm>
+#include <array>
+
+namespace alidade {
+
+BoardRoom::BoardRoom(std::span<const TrackedPoint> corners, const Eigen::Vector2d& pan_tilt_rad, int width_px,
+                     int height_px)
+    : home_rad_(pan_tilt_rad), size_px_(width_px, height_px) {
+  for (const TrackedPoint& corner : corners) box_.extend(corner.px);
+}
+
+Eigen::Vector2d BoardRoom::next(double focal_px) {
+  constexpr double margin_share = 0.1;  // of the board: what is printed around its corners
+  static constexpr std::array<std::array<double, 2>, 14> places{{{1, 0},
+                                                                 {0, 1},
+                                                                 {-1, 0},
+                                                                 {0, -1},
+                                                                 {1, 1},
+                                                                 {-1, -1},
+                                                                 {1, -1},
+                                                                 {-1, 1},
+                                                                 {0.5, 0.5},
+                                                                 {-0.5, -0.5},
+                                                                 {0.5, -0.5},
+                                                                 {-0.5, 0.5},
+                                                                 {0, 0.9},
+                                                                 {0.9, 0}}};
+  const auto& place = places[num_places_++ % places.size()];
+  const Eigen::Vector2d margin = margin_share * box_.sizes();
+  const Eigen::Vector2d before = (box_.min() - margin).cwiseMax(0.0);
+  const Eigen::Vector2d behind = (size_px_ - box_.max() - margin).cwiseMax(0.0);
+  Eigen::Vector2d target = home_rad_;
+  // What is in the image goes right as the head turns left, and down as it turns up.
+  for (int i = 0; i < 2; ++i) target[i] += reach_ * place[i] * (place[i] > 0.0 ? behind[i] : before[i]) / focal_px;
+  return target;
+}
+
+}  // namespace alidade

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "alidade/heads/head_calibrate.h"
+
+namespace alidade {
+
+/// A field so narrow that of a lens nothing but its focal length can be told: its centre and the mounting look alike.
+[[nodiscard]] bool is_narrow(const HeadCalibration& result, double focal_px);
+
+/// What `alidade` with the words of `offline` says of result.log_csv, down to the last digit: it is read back from its
+/// text.
+[[nodiscard]] ObserveReport observed(const HeadCalibration& result);
+
+}  // namespace alidade

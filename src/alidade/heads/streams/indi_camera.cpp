@@ -1,0 +1,158 @@
+#include <fmt/format.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <thread>
+
+#include "alidade/files/files.h"
+#include "alidade/heads/protocols/indi_link.h"
+#include "alidade/heads/protocols/soap.h"
+#include "alidade/heads/streams/fits_picture.h"
+#include "alidade/heads/streams/frame_stream.h"
+
+namespace alidade {
+namespace {
+
+constexpr double timeout_s = 5.0;
+
+/// "?seconds=0.5" of the address.
+double seconds_of(const std::string& url) {
+  const std::size_t query = url.find('?');
+  if (query == std::string::npos) return 1.0;
+  constexpr std::string_view key = "?seconds=";
+  const std::string text = url.substr(query);
+  char* end = nullptr;
+  const double seconds = text.starts_with(key) ? std::strtod(text.c_str() + key.size(), &end) : 0.0;
+  if (!(seconds > 0.0 && seconds <= 60.0) || end == nullptr || *end != '\0')
+    throw InputError(url + ": behind the camera's name stands ?seconds=S, an exposure of at most 60 s, or nothing");
+  return seconds;
+}
+
+/// Exposes one picture after the other, on a thread of its own. A picture's time is the middle of its exposure, as the
+/// server's clock has it.
+class IndiCamera final : public FrameStream {
+ public:
+  IndiCamera(const std::string& url, std::shared_ptr<HeadClock> clock)
+      : seconds_(seconds_of(url)), clock_(std::move(clock)), link_(url, timeout_s) {
+    begin();
+    reader_ = std::thread([this] { read(); });
+  }
+  ~IndiCamera() override {
+    ends_ = true;
+    reader_.join();
+  }
+  IndiCamera(const IndiCamera&) = delete;
+  IndiCamera& operator=(const IndiCamera&) = delete;
+
+  [[nodiscard]] const std::string& name() const override { return link_.name(); }
+  [[nodiscard]] double exposure_s() const override { return seconds_; }
+  [[nodiscard]] std::deque<StreamFrame> take() override {
+    const std::scoped_lock lock(mutex_);
+    if (!fault_.empty() && frames_.empty()) throw InputError(fault_);
+    return std::exchange(frames_, {});
+  }
+
+ private:
+  static constexpr const char* exposure = "CCD_EXPOSURE";
+
+  void begin() {
+    link_.connect_device(timeout_s);
+    (void)link_.wait_for(exposure, timeout_s);
+    link_.take(0.3);
+    for (const auto& [property, on] :
+         {std::pair("UPLOAD_MODE", "UPLOAD_CLIENT"), std::pair("CCD_TRANSFER_FORMAT", "FORMAT_FITS"),
+          std::pair("CCD_COMPRESSION", "INDI_DISABLED")})
+      if (const IndiProperty* found = link_.find(property); found != nullptr && found->values.contains(on))
+        link_.set_switch(property, on);
+    link_.send(fmt::format("<enableBLOB device=\"{}\">Also</enableBLOB>\n", escaped_xml(link_.device())));
+  }
+
+  void read() {
+    constexpr std::size_t most_waiting = 20;
+    while (!ends_) {
+      try {
+        std::optional<StreamFrame> frame = expose();
+        if (!frame) return;
+        const std::scoped_lock lock(mutex_);
+        frames_.push_back(std::move(*frame));
+        if (frames_.size() > most_waiting) frames_.pop_front();
+      } catch (const InputError& error) {
+        if (connects_again()) continue;
+        const std::scoped_lock lock(mutex_);
+        fault_ = std::string(error.what()) + "; the stream is lost";
+        return;
+      }
+    }
+  }
+
+  /// None: this ends.
+  std::optional<StreamFrame> expose() {
+    constexpr double step_s = 0.05, download_s = 20.0;
+    const std::size_t before = num_blobs();
+    link_.set_numbers(exposure, {{"CCD_EXPOSURE_VALUE", seconds_}});
+    for (const double until_s = clock_->now_s() + seconds_ + download_s; clock_->now_s() < until_s;) {
+      if (ends_) return std::nullopt;
+      link_.take(step_s);
+      if (num_blobs() > before) return frame_of(*link_.find("CCD1"));
+      if (const IndiProperty* state = link_.find(exposure); state != nullptr && state->state == "Alert")
+        throw InputError(fmt::format("{}: '{}' does not expose (Alert)", name(), link_.device()));
+    }
+    throw InputError(fmt::format("{}: no picture within {:g} s", name(), seconds_ + download_s));
+  }
+  /// That came with bytes: the property's definition has none.
+  [[nodiscard]] std::size_t num_blobs() const {
+    const IndiProperty* found = link_.find("CCD1");
+    return found == nullptr || found->format.empty() ? 0 : found->count;
+  }
+
+  [[nodiscard]] StreamFrame frame_of(const IndiProperty& blob) const {
+    constexpr double most_apart_s = 3600.0;
+    if (blob.format != ".fits")
+      throw InputError(fmt::format("{}: sends pictures as {}; let '{}' send FITS, not compressed", name(), blob.format,
+                                   link_.device()));
+    std::string text;
+    for (const auto& [member, value] : blob.values) text = value;
+    const FitsPicture picture = read_fits(base64_bytes(text), name());
+    const double exposed_s = std::isfinite(picture.exposure_s) ? picture.exposure_s : seconds_;
+    auto grey = std::make_shared<const cv::Mat>(stretched_to_grey(picture));
+    const double stamp_s = picture.begin_s + 0.5 * exposed_s;
+    if (std::isfinite(stamp_s) && std::abs(stamp_s - blob.t_s) < most_apart_s)
+      return {stamp_s, FrameTimes::stamped, 0.0, blob.t_s, std::move(grey)};
+    return {blob.t_s - 0.5 * exposed_s, FrameTimes::arrival, 0.1, blob.t_s, std::move(grey)};
+  }
+
+  /// With growing pauses.
+  bool connects_again() {
+    constexpr int tries = 5, first_pause_ms = 200;
+    for (int i = 0; i < tries && !ends_; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(first_pause_ms << i));
+      try {
+        link_.connect_again();
+        begin();
+        return true;
+      } catch (const InputError&) {  // not yet
+      }
+    }
+    return false;
+  }
+
+  double seconds_;
+  std::shared_ptr<HeadClock> clock_;
+  IndiLink link_;
+  std::mutex mutex_;
+  std::deque<StreamFrame> frames_;
+  std::string fault_;
+  std::atomic<bool> ends_ = false;
+  std::thread reader_;
+};
+
+}  // namespace
+
+std::unique_ptr<FrameStream> open_indi_camera(const std::string& url, std::shared_ptr<HeadClock> clock) {
+  return std::make_unique<IndiCamera>(url, std::move(clock));
+}
+
+}  // namespace alidade

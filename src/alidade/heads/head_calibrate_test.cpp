@@ -77,14 +77,14 @@ TEST(HeadCalibrate, FollowsABoardInsteadOfPoints) {
   const std::unique_ptr<HeadDevice> head = open_head("sim://?clock=free&rate=8");
   const std::unique_ptr<FrameStream> stream = open_stream("sim://?" + camera, *head);
   const HeadCalibrationConfig config{
-      .range = range_of(60, -20, 40), .most_s = 24.0, .board = Board{.cols = 9, .rows = 6, .square_m = 0.025}};
+      .range = range_of(60, -20, 40), .most_s = 16.0, .board = Board{.cols = 9, .rows = 6, .square_m = 0.025}};
   const HeadCalibration result = calibrate_head(*head, *stream, config);
   ASSERT_EQ(result.verdict.exit_code, ExitCode::ok) << result.verdict.sentence;
   EXPECT_EQ(parse_rotation_log(result.log_csv, "log.csv").log.num_points, 54u);
   double sigma = 0.0;
   const double fx = value_of(result.report, "fx", sigma);
   EXPECT_LE(std::abs(fx - 350.0), 3.5 * sigma);
-  EXPECT_LT(3.0 * sigma, 0.05 * fx);
+  EXPECT_LT(3.0 * sigma, 0.02 * fx);
 }
 
 TEST(HeadCalibrate, NamesFyWhereTiltIsHeld) {

@@ -16,13 +16,13 @@ void require_readable(const PhotoSet& set, const Calibration& calibration) {
 }
 
 void tell_photos(const PhotoSet& set, Counts& counts, Verdict& verdict, Run& run) {
-  JobOutcome told;
-  add_photos(set, told);
-  ResultDocument& from = told.document;
+  JobOutcome given;
+  add_photos(set, given);
+  ResultDocument& from = given.document;
   run.document.inputs.insert(run.document.inputs.end(), from.inputs.begin(), from.inputs.end());
   counts.skipped.insert(counts.skipped.end(), from.counts.skipped.begin(), from.counts.skipped.end());
   verdict.checks.insert(verdict.checks.end(), from.verdict.checks.begin(), from.verdict.checks.end());
-  for (std::string& line : told.lines) run.say(std::move(line));
+  for (std::string& line : given.lines) run.say(std::move(line));
 }
 
 }  // namespace alidade::cli

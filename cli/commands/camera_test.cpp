@@ -89,9 +89,9 @@ TEST_F(CameraCommand, ConvertRefusesToLoseTheLensUnlessTold) {
   EXPECT_EQ(refused.code, 3);
   EXPECT_EQ(refused.err, "alidade: error: a.yaml: the format kalibr cannot hold k3 -0.02; --lossy writes it without\n");
   EXPECT_FALSE(exists("b.yaml"));
-  const Outcome told = alidade({"convert", "a.yaml", "b.yaml", "--to", "kalibr", "--lossy"});
-  EXPECT_EQ(told.code, 0);
-  EXPECT_THAT(told.out, HasSubstr("without k3 -0.02"));
+  const Outcome given = alidade({"convert", "a.yaml", "b.yaml", "--to", "kalibr", "--lossy"});
+  EXPECT_EQ(given.code, 0);
+  EXPECT_THAT(given.out, HasSubstr("without k3 -0.02"));
   EXPECT_TRUE(exists("b.yaml"));
 }
 

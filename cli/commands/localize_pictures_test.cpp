@@ -93,10 +93,10 @@ TEST_F(LocalizeImageFolders, WhatShowsNothingIsRefused) {
 /// Clean rendered images are matched better than real ones: the verdict says so, and what to tell.
 TEST_F(LocalizeImageFolders, TheLeastSigmaOfAMatchCanBeTold) {
   const Json usual = Json::parse(localize("sim/frames", {"--rate", "30"}).out),
-             told = Json::parse(localize("sim/frames", {"--rate", "30", "--sigma-px", "0.03"}).out);
+             given = Json::parse(localize("sim/frames", {"--rate", "30", "--sigma-px", "0.03"}).out);
   EXPECT_EQ(usual["estimate"]["sigma_px"], 0.11);
-  EXPECT_EQ(told["estimate"]["sigma_px"], 0.03);
-  EXPECT_GT(told["estimate"]["nis_per_dof"].get<double>(), 2.0 * usual["estimate"]["nis_per_dof"].get<double>());
+  EXPECT_EQ(given["estimate"]["sigma_px"], 0.03);
+  EXPECT_GT(given["estimate"]["nis_per_dof"].get<double>(), 2.0 * usual["estimate"]["nis_per_dof"].get<double>());
   EXPECT_NE(usual["verdict"]["sentence"].get<std::string>().find("--sigma-px"), std::string::npos);
 }
 

@@ -29,7 +29,7 @@ class LocalizeCommand : public testing::CommandTest {
         {"localize", path(observations), "--camera", path("sim/camera.yaml"), "--out", path("out"), "--no-report"},
         options);
   }
-  [[nodiscard]] std::vector<std::string> told(std::vector<std::string> more = {}) const {
+  [[nodiscard]] std::vector<std::string> given(std::vector<std::string> more = {}) const {
     more.insert(more.end(), {"--target", path("sim/target.yaml"), "--start", path("sim/start.yaml"), "--truth",
                              path("sim/truth.tum"), "--json"});
     return more;
@@ -38,7 +38,7 @@ class LocalizeCommand : public testing::CommandTest {
 
 TEST_F(LocalizeCommand, GivesThePathWithTheNamesOfTheContract) {
   simulate();
-  const Outcome outcome = localize(told());
+  const Outcome outcome = localize(given());
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const Json document = Json::parse(outcome.out);
   const Json& estimate = document["estimate"];
@@ -73,7 +73,7 @@ TEST_F(LocalizeCommand, GivesThePathWithTheNamesOfTheContract) {
 TEST_F(LocalizeCommand, LessOfTheLensIsWorseAndOnlineCalibrationFindsIt) {
   simulate({"--points", "20", "--frames", "60"});
   const auto error_of = [&](const std::vector<std::string>& options) {
-    const Outcome outcome = localize(told(options));
+    const Outcome outcome = localize(given(options));
     EXPECT_TRUE(outcome.code == 0 || outcome.code == 5 || outcome.code == 6) << outcome.err;  // 6: not to be trusted
     return Json::parse(outcome.out)["estimate"]["unaligned_m"].get<double>();
   };
@@ -106,7 +106,7 @@ TEST_F(LocalizeCommand, ATargetThatIsNotThereIsSaid) {
     write_file(path("sim/target.yaml"), text);
   };
   with_ids({{'2', "102"}, {'4', "104"}, {'6', "106"}, {'8', "108"}});
-  const Outcome unseen = localize(told());
+  const Outcome unseen = localize(given());
   ASSERT_EQ(unseen.code, 0) << unseen.err;
   const Json document = Json::parse(unseen.out);
   EXPECT_EQ(document["verdict"]["state"], "care");
@@ -115,7 +115,7 @@ TEST_F(LocalizeCommand, ATargetThatIsNotThereIsSaid) {
   EXPECT_EQ(document["estimate"]["scale_known"], false);
   EXPECT_EQ(document["data"]["features"]["id"].size(), 8u);
   with_ids({{'2', "4"}, {'4', "6"}, {'6', "8"}, {'8', "2"}});
-  const Outcome elsewhere = localize(told());
+  const Outcome elsewhere = localize(given());
   EXPECT_EQ(elsewhere.code, 5) << elsewhere.out;
   EXPECT_THAT(elsewhere.err, ::testing::HasSubstr("the target is not where it is given"));
 }
@@ -123,7 +123,7 @@ TEST_F(LocalizeCommand, ATargetThatIsNotThereIsSaid) {
 TEST_F(LocalizeCommand, WhatIsGivenWithoutSigmaIsSaid) {
   simulate({"--points", "30", "--frames", "60", "--rate", "30"});
   const auto verdict_with = [&](const std::vector<std::string>& options) {
-    const Outcome outcome = localize(told(options));
+    const Outcome outcome = localize(given(options));
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     return Json::parse(outcome.out);
   };
@@ -222,20 +222,20 @@ TEST_F(LocalizeCommand, ASensorsFileIsReadByTheSameRulesAndOutOfTimeIsNamed) {
   simulate();
   const std::string header = "t_s,depth_m\n";
   write_file(path("depth.csv"), header + "0,1\nnan,1\n0.2,1\n0.1,1\n0.3,1\n");
-  const Outcome stopped = localize(told({"--depth-sensor", path("depth.csv")}));
+  const Outcome stopped = localize(given({"--depth-sensor", path("depth.csv")}));
   EXPECT_EQ(stopped.code, 3);
   EXPECT_NE(stopped.err.find("depth.csv:3"), std::string::npos) << stopped.err;
-  const Outcome skipped = localize(told({"--depth-sensor", path("depth.csv"), "--skip-bad"}));
+  const Outcome skipped = localize(given({"--depth-sensor", path("depth.csv"), "--skip-bad"}));
   EXPECT_EQ(skipped.code, 0) << skipped.err;
   EXPECT_EQ(Json::parse(skipped.out)["counts"]["skipped"].size(), 2u);
   write_file(path("depth.csv"), header + "1000,1\n1001,2\n");
-  const Outcome late = localize(told({"--depth-sensor", path("depth.csv")}));
+  const Outcome late = localize(given({"--depth-sensor", path("depth.csv")}));
   EXPECT_NE(late.out.find("none of them is of the time of the path"), std::string::npos) << late.out;
 }
 
 TEST_F(LocalizeCommand, QuaternionsBeginWithTheirRealPartButInTum) {
   simulate();
-  ASSERT_EQ(localize(told()).code, 0);
+  ASSERT_EQ(localize(given()).code, 0);
   EXPECT_TRUE(read_file(path("out/poses.csv")).starts_with("frame,t_s,x_m,y_m,z_m,qw,qx,qy,qz,"));
   const Csv poses = Csv::read(path("out/poses.csv"));
   const std::vector<TimedPose> path_of = read_tum(path("out/trajectory.tum"));
@@ -328,20 +328,20 @@ TEST_F(LocalizeCommand, SurvivesMissingFramesAndUnknownPoints) {
       text += csv.text(row, "frame") + "," + csv.text(row, "t_s") + "," + std::to_string(1000 + frame) + ",100,100\n";
   }
   write_file(path("gaps.csv"), text);
-  const Outcome outcome = localize(told(), "gaps.csv");
+  const Outcome outcome = localize(given(), "gaps.csv");
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const Json document = Json::parse(outcome.out);
   EXPECT_EQ(document["estimate"]["frames"], 59);  // the last one is among the missing
   EXPECT_GE(document["estimate"]["lost"], 12);
   EXPECT_NE(document["verdict"]["state"], "good");
-  const Outcome skipped = localize(told({"--skip-bad"}), "gaps.csv");
+  const Outcome skipped = localize(given({"--skip-bad"}), "gaps.csv");
   EXPECT_EQ(skipped.code, 0) << skipped.err;
 }
 
 /// The map of one run is the start of the next one, in its frame and scale, without the target.
 TEST_F(LocalizeCommand, BeginsInTheMapOfAnEarlierRun) {
   simulate({"--points", "30", "--frames", "60", "--rate", "30"});
-  ASSERT_EQ(localize(told()).code, 0);
+  ASSERT_EQ(localize(given()).code, 0);
   const std::string map = path("map.yaml");
   std::filesystem::copy_file(path("out/map.yaml"), map);
   const std::vector<std::string> in_map{"--map", map, "--truth", path("sim/truth.tum"), "--json"};

@@ -82,9 +82,9 @@ const Json* assumption(const Json& document, const std::string& name) {
 
 TEST_F(RangefinderCommand, WhatIsToldWithItsSigmaIsCarriedAndWhatIsNotIsNamed) {
   simulate();
-  const Outcome told = calibrate({"--sigma-scale", "0", "--sigma-square", "0.00002", "--json", "--no-report"});
-  ASSERT_EQ(told.code, 0) << told.err;
-  const Json document = Json::parse(told.out);
+  const Outcome given = calibrate({"--sigma-scale", "0", "--sigma-square", "0.00002", "--json", "--no-report"});
+  ASSERT_EQ(given.code, 0) << given.err;
+  const Json document = Json::parse(given.out);
   EXPECT_EQ(document["estimate"]["scale"], 1.0);
   EXPECT_EQ(document["verdict"]["state"], "good") << document["verdict"]["to_add"];
   ASSERT_TRUE(assumption(document, "square_m") && assumption(document, "scale") && assumption(document, "camera.f"));

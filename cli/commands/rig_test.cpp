@@ -86,10 +86,10 @@ TEST_F(RigCommand, SaysWhatItAssumedAndHeedsIt) {
   // Everything given, the lens's σ in its file: good.
   write_file(path("sim/camera_1.yaml"),
              lens + "covariance: {names: [fx, fy, cx, cy], upper: [1e-6, 0, 0, 0, 1e-6, 0, 0, 1e-6, 0, 1e-6]}\n");
-  const Json told =
+  const Json given =
       Json::parse(calibrate(path("sim/views.csv"), {"--json", "--sigma-square", "1e-6", "--sigma-scale", "1e-5"}).out);
-  EXPECT_EQ(told["verdict"]["state"], "good") << told["verdict"]["sentence"];
-  for (const Json& what : told["assumed"]) EXPECT_FALSE(what["sigma"].is_null()) << what["name"];
+  EXPECT_EQ(given["verdict"]["state"], "good") << given["verdict"]["sentence"];
+  for (const Json& what : given["assumed"]) EXPECT_FALSE(what["sigma"].is_null()) << what["name"];
 }
 
 /// Where the encoders' scales are not given they are estimated; other causes in the residuals are named, and kept in
@@ -157,15 +157,15 @@ TEST_F(RigCommand, ProjectCountsTheErrorsOfHeadsAndLenses) {
   EXPECT_EQ(none["verdict"]["state"], "care");
   EXPECT_THAT(none["verdict"]["sentence"].get<std::string>(), ::testing::HasSubstr("without covariance"));
   // σ of 2 px in cx of the first lens, 0.001 rad in yaw of the second head.
-  const Json told = projected(heads(", covariance: {names: [cx], upper: [4]}") +
-                              "covariance: {names: [head2.base_ry_rad], upper: [1e-6]}\n");
-  EXPECT_EQ(told["verdict"]["state"], "good");
-  EXPECT_NEAR(told["estimate"]["heads"][0]["sigma_px"][0], 2.0, 1e-3);
+  const Json given = projected(heads(", covariance: {names: [cx], upper: [4]}") +
+                               "covariance: {names: [head2.base_ry_rad], upper: [1e-6]}\n");
+  EXPECT_EQ(given["verdict"]["state"], "good");
+  EXPECT_NEAR(given["estimate"]["heads"][0]["sigma_px"][0], 2.0, 1e-3);
   // The second sees it 0.125 to the left: du = f (1 + 0.125²) dφ.
-  EXPECT_NEAR(told["estimate"]["heads"][1]["sigma_px"][0], std::hypot(2.0, 400.0 * 1.015625 * 0.001), 1e-3);
+  EXPECT_NEAR(given["estimate"]["heads"][1]["sigma_px"][0], std::hypot(2.0, 400.0 * 1.015625 * 0.001), 1e-3);
   // Range: z = B f / (u1 − u2): σ_z = z²/(B f) σ(u1 − u2).
   const double sigma_px = std::sqrt(4.0 + 4.0 + std::pow(0.40625, 2));
-  EXPECT_NEAR(told["stddev"]["point_in_world_m"][2], 4.0 / (0.5 * 400.0) * sigma_px, 2e-4);
+  EXPECT_NEAR(given["stddev"]["point_in_world_m"][2], 4.0 / (0.5 * 400.0) * sigma_px, 2e-4);
 }
 
 TEST_F(RigCommand, ProjectPrintsMatricesAndPixels) {

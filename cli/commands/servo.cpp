@@ -45,10 +45,10 @@ ServoScenario with_options(ServoScenario scenario, const ServoArgs& args) {
 
 /// What a run by the wall clock reports about its steps.
 void tell_pace(const Pace& pace, JobOutcome& outcome) {
-  JsonValue& told = outcome.document.estimate["realtime"];
-  told["steps"] = pace.num_steps();
-  told["steps_late"] = pace.num_late();
-  told["worst_late_s"] = pace.worst_late_s();
+  JsonValue& given = outcome.document.estimate["realtime"];
+  given["steps"] = pace.num_steps();
+  given["steps_late"] = pace.num_late();
+  given["worst_late_s"] = pace.worst_late_s();
   outcome.lines.push_back(fmt::format("in real time: {} steps, {} more than 1 ms late, the worst by {:.2g} ms",
                                       pace.num_steps(), pace.num_late(), 1e3 * std::max(0.0, pace.worst_late_s())));
 }

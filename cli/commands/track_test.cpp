@@ -296,8 +296,8 @@ TEST_F(TrackCommand, SaysThatTheNoiseIsNotAsStated) {
   const Json verdict = Json::parse(outcome.out)["verdict"];
   EXPECT_NE(verdict["state"], "good");
   EXPECT_NE(verdict["sentence"].get<std::string>().find("noise is larger than stated"), std::string::npos) << verdict;
-  const Outcome told = track({"--json", "--sigma-px", "1.2"});
-  EXPECT_EQ(Json::parse(told.out)["verdict"]["state"], "good") << told.out;
+  const Outcome given = track({"--json", "--sigma-px", "1.2"});
+  EXPECT_EQ(Json::parse(given.out)["verdict"]["state"], "good") << given.out;
 }
 
 TEST_F(TrackCommand, SaysWhereOneHeadWasAlone) {

@@ -20,21 +20,21 @@ struct SimulateUnderwaterArgs {
   UnderwaterScene scene;
   std::filesystem::path camera;
   double rate_hz = 10.0;
-  double told_f = 1.0, told_centre_px = 0.0;
-  bool told_k1 = true;
+  double given_f = 1.0, given_centre_px = 0.0;
+  bool given_k1 = true;
   bool video = false;
   UnderwaterVideoConfig look;
 };
 
 LocalizeStart start_of(const UnderwaterScene& scene, const UnderwaterSequence& sequence) {
   LocalizeStart start;
-  start.motion.world_from_cam = sequence.told_start;
+  start.motion.world_from_cam = sequence.given_start;
   const std::array<double, 4> sigmas{scene.sigma_position_m, scene.sigma_rotation_rad, 0.3, 0.3};
   for (std::size_t i = 0; i < sigmas.size(); ++i)
     start.cov.diagonal().segment<3>(static_cast<Eigen::Index>(3 * i)).setConstant(sigmas[i] * sigmas[i]);
   for (const UnderwaterPoint& point : sequence.points)
-    if (!point.is_known && point.told_depth_m > 0.0)
-      start.depths.push_back({point.id, point.told_depth_m, scene.sigma_depth});
+    if (!point.is_known && point.given_depth_m > 0.0)
+      start.depths.push_back({point.id, point.given_depth_m, scene.sigma_depth});
   return start;
 }
 
@@ -51,7 +51,7 @@ std::size_t add_observations(const UnderwaterScene& scene, const UnderwaterSeque
   }
   std::vector<KnownPoint> target;
   for (const UnderwaterPoint& point : sequence.points)
-    if (point.is_known) target.push_back({point.id, point.told_in_world, scene.sigma_known_m});
+    if (point.is_known) target.push_back({point.id, point.given_in_world, scene.sigma_known_m});
   run.add_file("sights.csv", observations_csv(frames));
   run.add_file("target.yaml", target_text(target));
   run.add_file("start.yaml", start_text(start_of(scene, sequence)));
@@ -74,15 +74,15 @@ std::size_t add_frames(const SimulateUnderwaterArgs& args, const Camera& camera,
 }
 
 /// The camera as given in camera.yaml.
-Camera told_camera(const SimulateUnderwaterArgs& args, const Camera& camera) {
+Camera given_camera(const SimulateUnderwaterArgs& args, const Camera& camera) {
   Camera told = camera;
   Eigen::VectorXd values = params(camera.lens);
   const std::vector<std::string> names = param_names(camera.lens);
   for (std::size_t i = 0; i < names.size(); ++i) {
     double& value = values[static_cast<Eigen::Index>(i)];
-    if (names[i] == "fx" || names[i] == "fy") value *= args.told_f;
-    if (names[i] == "cx") value += args.told_centre_px;
-    if (names[i] == "k1" && !args.told_k1) value = 0.0;
+    if (names[i] == "fx" || names[i] == "fy") value *= args.given_f;
+    if (names[i] == "cx") value += args.given_centre_px;
+    if (names[i] == "k1" && !args.given_k1) value = 0.0;
   }
   told.lens = with_params(camera.lens, values);
   return told;
@@ -101,7 +101,7 @@ ExitCode simulate(const SimulateUnderwaterArgs& args, Run& run) {
     map.push_back({point.id, point.point_in_world, Eigen::Matrix3d::Zero(), point.is_known, 0});
   const std::size_t num =
       args.video ? add_frames(args, scene.camera, sequence, run) : add_observations(scene, sequence, run);
-  run.add_file("camera.yaml", camera_text(told_camera(args, scene.camera), CameraFormat::alidade));
+  run.add_file("camera.yaml", camera_text(given_camera(args, scene.camera), CameraFormat::alidade));
   run.add_file("truth.tum", tum_text(truth));
   run.add_file("truth_map.csv", map_csv(map));
   run.document.estimate["frames"] = sequence.frames.size();
@@ -154,10 +154,10 @@ void add_underwater_scenario(App& app) {
   number("--blackout-from", scene.blackout_from_s, "Nothing is seen from this time on [s]", 0.0, 1e6)->excludes(video);
   number("--blackout", scene.blackout_s, "How long nothing is seen [s]", 0.0, 1e6)->excludes(video);
   const char* const group = "What is not as given";
-  number("--told-f", args->told_f, "Focal length in camera.yaml over the true one", 0.1, 10.0)->group(group);
-  number("--told-centre", args->told_centre_px, "cx in camera.yaml less the true one [px]", -500.0, 500.0)
+  number("--told-f", args->given_f, "Focal length in camera.yaml over the true one", 0.1, 10.0)->group(group);
+  number("--told-centre", args->given_centre_px, "cx in camera.yaml less the true one [px]", -500.0, 500.0)
       ->group(group);
-  command.add_flag("!--no-k1", args->told_k1, "camera.yaml has no k1")->group(group);
+  command.add_flag("!--no-k1", args->given_k1, "camera.yaml has no k1")->group(group);
   number("--readout", scene.readout_s, "Rolling shutter: time from the first row to the last [s]", 0.0, 1.0)
       ->excludes(video)
       ->group(group);

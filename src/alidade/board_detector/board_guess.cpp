@@ -20,8 +20,8 @@ using Sizes = std::vector<std::pair<int, int>>;
 
 /// Columns and rows of common mistakes. A chessboard is the same one rotated by a quarter: of two that are equally near
 /// to what was given the wide one comes first.
-Sizes slips(const Board& told) {
-  const int c = told.cols, r = told.rows;
+Sizes slips(const Board& given) {
+  const int c = given.cols, r = given.rows;
   const Sizes all{{c, r},     {c - 1, r - 1}, {c + 1, r + 1}, {r, c},         {c, r - 1},     {c + 1, r},
                   {c - 1, r}, {c, r + 1},     {c + 1, r - 1}, {c - 1, r + 1}, {r - 1, c - 1}, {r + 1, c + 1}};
   Sizes each;
@@ -69,9 +69,9 @@ std::string seen_dictionary(const std::vector<cv::Mat>& photos) {
 }
 
 /// The smallest dictionary of a family that holds the board; the given one where it does.
-std::string fitting_dictionary(Board board, const std::string& of_family, const std::string& told) {
-  board.dictionary = told;
-  if (family(told) == family(of_family) && fault(board).empty()) return told;
+std::string fitting_dictionary(Board board, const std::string& of_family, const std::string& given) {
+  board.dictionary = given;
+  if (family(given) == family(of_family) && fault(board).empty()) return given;
   for (const std::string ending : {"_50", "_100", "_250", "_1000"}) {
     board.dictionary = family(of_family) + ending;
     if (marker_dictionary(board.dictionary) && fault(board).empty()) return board.dictionary;
@@ -80,18 +80,18 @@ std::string fitting_dictionary(Board board, const std::string& of_family, const 
 }
 
 /// The kinds of board that may be meant: the given one, then a chessboard with markers for one without.
-std::vector<Board> kinds_to_try(const Board& told, const std::string& dictionary) {
+std::vector<Board> kinds_to_try(const Board& given, const std::string& dictionary) {
   std::vector<Board> kinds;
-  const bool is_aprilgrid = told.kind == BoardKind::chessboard && dictionary == "DICT_APRILTAG_36h11";
+  const bool is_aprilgrid = given.kind == BoardKind::chessboard && dictionary == "DICT_APRILTAG_36h11";
   const bool is_marked = !dictionary.empty() && !is_aprilgrid;
-  if (told.kind != BoardKind::charuco || is_marked) kinds.push_back(told);
-  if (told.kind == BoardKind::chessboard && is_marked) {
-    kinds.push_back(told);
+  if (given.kind != BoardKind::charuco || is_marked) kinds.push_back(given);
+  if (given.kind == BoardKind::chessboard && is_marked) {
+    kinds.push_back(given);
     kinds.back().kind = BoardKind::charuco;
-    kinds.back().marker_m = 0.75 * told.square_m;  // any value: it must be given
+    kinds.back().marker_m = 0.75 * given.square_m;  // any value: it must be given
   }
-  if (told.kind == BoardKind::charuco) {
-    Board plain = told;
+  if (given.kind == BoardKind::charuco) {
+    Board plain = given;
     plain.kind = BoardKind::chessboard;
     plain.marker_m = 0.0;
     plain.dictionary.clear();
@@ -140,22 +140,22 @@ Score score_of(const std::vector<cv::Mat>& photos, const Board& board, const Pro
 
 }  // namespace
 
-std::optional<Board> guess_board(std::size_t num_photos, const PhotoLoader& load_photo, const Board& told,
+std::optional<Board> guess_board(std::size_t num_photos, const PhotoLoader& load_photo, const Board& given,
                                  const std::optional<std::vector<std::pair<int, int>>>& grids_seen,
                                  const Progress& progress) {
   const std::vector<cv::Mat> photos = chosen_photos(num_photos, load_photo);
   if (photos.empty()) return std::nullopt;
-  const bool may_have_markers = told.kind == BoardKind::charuco || told.kind == BoardKind::chessboard;
+  const bool may_have_markers = given.kind == BoardKind::charuco || given.kind == BoardKind::chessboard;
   const std::string dictionary = may_have_markers ? seen_dictionary(photos) : "";
   std::optional<Board> best;
   Score best_score;
-  for (Board board : kinds_to_try(told, dictionary)) {
+  for (Board board : kinds_to_try(given, dictionary)) {
     const bool is_plain = board.kind == BoardKind::chessboard;
-    for (const auto& [cols, rows] : is_plain&& grids_seen ? *grids_seen : slips(told)) {
+    for (const auto& [cols, rows] : is_plain&& grids_seen ? *grids_seen : slips(given)) {
       board.cols = cols;
       board.rows = rows;
-      if (board.kind == BoardKind::charuco) board.dictionary = fitting_dictionary(board, dictionary, told.dictionary);
-      if (board == told || !fault(board).empty()) continue;
+      if (board.kind == BoardKind::charuco) board.dictionary = fitting_dictionary(board, dictionary, given.dictionary);
+      if (board == given || !fault(board).empty()) continue;
       const Score score = score_of(photos, board, progress);
       if (2 * score.photos <= photos.size()) continue;
       const bool is_smaller = best && score == best_score && num_points(board) < num_points(*best);
@@ -167,15 +167,15 @@ std::optional<Board> guess_board(std::size_t num_photos, const PhotoLoader& load
   return best;
 }
 
-std::string changed_options(const Board& told, const Board& meant) {
+std::string changed_options(const Board& given, const Board& meant) {
   std::string options;
   const auto add = [&](const std::string& option) { options += (options.empty() ? "" : " ") + option; };
-  if (meant.kind != told.kind) add("--board-kind " + std::string(kind_name(meant.kind)));
-  if (meant.cols != told.cols || meant.rows != told.rows) {
+  if (meant.kind != given.kind) add("--board-kind " + std::string(kind_name(meant.kind)));
+  if (meant.cols != given.cols || meant.rows != given.rows) {
     add("--board " + std::to_string(meant.cols) + "x" + std::to_string(meant.rows));
   }
-  if (meant.kind == BoardKind::charuco && meant.dictionary != told.dictionary) add("--dictionary " + meant.dictionary);
-  if (meant.kind == BoardKind::charuco && told.kind != BoardKind::charuco) add("--marker with its markers' side");
+  if (meant.kind == BoardKind::charuco && meant.dictionary != given.dictionary) add("--dictionary " + meant.dictionary);
+  if (meant.kind == BoardKind::charuco && given.kind != BoardKind::charuco) add("--marker with its markers' side");
   return options;
 }
 

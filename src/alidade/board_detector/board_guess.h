@@ -16,11 +16,12 @@ namespace alidade {
 /// for one with markers or the other way round. Tried on a few of the photos. `grids_seen`, where known: the sizes of
 /// the chessboard grids in them; no other is then tried for a plain chessboard. None where none of these boards is in
 /// most of them. Throws what `load_photo` throws.
-[[nodiscard]] std::optional<Board> guess_board(std::size_t num_photos, const PhotoLoader& load_photo, const Board& told,
+[[nodiscard]] std::optional<Board> guess_board(std::size_t num_photos, const PhotoLoader& load_photo,
+                                               const Board& given,
                                                const std::optional<std::vector<std::pair<int, int>>>& grids_seen = {},
                                                const Progress& progress = {});
 
 /// The options that differ between two boards, as they are typed: "--board 7x10 --dictionary DICT_4X4_50".
-[[nodiscard]] std::string changed_options(const Board& told, const Board& meant);
+[[nodiscard]] std::string changed_options(const Board& given, const Board& meant);
 
 }  // namespace alidade

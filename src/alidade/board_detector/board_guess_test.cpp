@@ -24,10 +24,10 @@ std::vector<cv::Mat> photos_of(const Board& board) {
   return photos;
 }
 
-std::string guessed(const std::vector<cv::Mat>& photos, const Board& told) {
+std::string guessed(const std::vector<cv::Mat>& photos, const Board& given) {
   const auto board = guess_board(
-      photos.size(), [&](std::size_t i) { return photos[i]; }, told);
-  return board ? changed_options(told, *board) : "";
+      photos.size(), [&](std::size_t i) { return photos[i]; }, given);
+  return board ? changed_options(given, *board) : "";
 }
 
 Board sized(Board board, int cols, int rows) {

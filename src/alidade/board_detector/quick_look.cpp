@@ -26,13 +26,13 @@ double quick_scale(double pixels) {
   return scale;
 }
 
-std::pair<int, int> grid_in(const std::string& reason, const Board& told) {
+std::pair<int, int> grid_in(const std::string& reason, const Board& given) {
   std::pair<int, int> size{0, 0};
   if (std::sscanf(reason.c_str(), "a grid of %d×%d", &size.first, &size.second) != 2 &&
       std::sscanf(reason.c_str(), "only %d×%d of", &size.first, &size.second) != 2)
     return {0, 0};
-  const bool is_told = size == std::pair(told.cols, told.rows) || size == std::pair(told.rows, told.cols);
-  return is_told ? std::pair(0, 0) : size;
+  const bool is_given = size == std::pair(given.cols, given.rows) || size == std::pair(given.rows, given.cols);
+  return is_given ? std::pair(0, 0) : size;
 }
 
 /// Median blur of a few corners, each fitted by its edges.

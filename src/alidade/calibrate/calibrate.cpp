@@ -137,13 +137,13 @@ double fill_estimate(const CalibrationWork& work, Minima& minima, const NoiseEst
 }
 
 /// Refuses the first parameter with a σ that makes it no answer.
-bool refuse_untold(const CalibrationWork& work, CalibrateReport& report) {
+bool refuse_ungiven(const CalibrationWork& work, CalibrateReport& report) {
   const Eigen::VectorXd values = params(report.camera.lens);
   const auto names = param_names(report.camera.lens);
   for (const int at : work.problem.free_lens) {
     const std::string& name = names[static_cast<std::size_t>(at)];
     const double sigma = std::sqrt(report.model_cov(at, at));  // at best, from these views
-    if (sigma <= largest_told_sigma(name, values[at], report.camera)) continue;
+    if (sigma <= largest_given_sigma(name, values[at], report.camera)) continue;
     if (at < 4) {
       refuse(
           report,
@@ -179,7 +179,7 @@ void judge(const CalibrationWork& work, const BundleResult& result, bool settled
     return;
   }
   const bool has_cov = result.status == BundleResult::Status::converged;
-  if (has_cov && refuse_untold(work, report)) return;
+  if (has_cov && refuse_ungiven(work, report)) return;
   const auto* port = std::get_if<Calibrated<FlatPort>>(&report.camera.lens);
   if (port && has_cov && port->params[10] < 0.0) {  // gap_m
     refuse(report,

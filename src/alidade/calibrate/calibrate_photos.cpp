@@ -113,8 +113,8 @@ struct WrongBoard {
 };
 
 /// `in_vain`: the photos that were searched and show no board.
-std::optional<WrongBoard> told_wrongly(const std::vector<std::size_t>& in_vain, const PhotoLoader& load_photo,
-                                       const Board& told, const Progress& progress, const PhotoCalibration& result) {
+std::optional<WrongBoard> given_wrongly(const std::vector<std::size_t>& in_vain, const PhotoLoader& load_photo,
+                                        const Board& told, const Progress& progress, const PhotoCalibration& result) {
   const std::string other_grid = wrong_board(result);
   const auto found = static_cast<std::size_t>(std::count_if(
       result.views.begin(), result.views.end(), [](const BoardView& view) { return !view.corners.empty(); }));
@@ -166,7 +166,7 @@ PhotoCalibration calibrate_photos(const std::vector<std::string>& names, const P
   for (const std::string& name : names) result.views.push_back({.photo = name, .corners = {}});
   const auto in_vain = take_detections(find_boards(names.size(), load_photo, board, false, progress), result);
 
-  if (const auto wrong = told_wrongly(in_vain, load_photo, board, progress, result)) {
+  if (const auto wrong = given_wrongly(in_vain, load_photo, board, progress, result)) {
     result.report.reason = wrong->reason;
     result.report.to_add = wrong->to_add;
     result.report.views.resize(names.size());

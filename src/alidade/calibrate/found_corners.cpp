@@ -45,12 +45,12 @@ Verdict corners_verdict(const FoundCorners& found) {
   const Calibration& calibration = found.calibration;
   Verdict verdict;
   if (found.num_corners == 0) {
-    const bool is_told = calibration.to_add.starts_with("use ");
+    const bool is_given = calibration.to_add.starts_with("use ");
     verdict.state = State::refused;
     verdict.exit_code = ExitCode::cannot_tell;
-    verdict.sentence = is_told ? calibration.reason : "no photo shows the board";
+    verdict.sentence = is_given ? calibration.reason : "no photo shows the board";
     verdict.to_add =
-        is_told ? calibration.to_add : "check --board and --board-kind, and that the whole board is in the photos";
+        is_given ? calibration.to_add : "check --board and --board-kind, and that the whole board is in the photos";
     return verdict;
   }
   const std::string counted = std::to_string(found.num_corners) + " corners in " + std::to_string(found.num_photos) +

@@ -88,15 +88,16 @@ TEST(ShapeTransfer, ASmallBowIsNotMissed) {
   }
 }
 
-ShapeTransfer told(BoardShape shape, double transfer_rms_px, double gain_sigmas) {
+ShapeTransfer given(BoardShape shape, double transfer_rms_px, double gain_sigmas) {
   return {shape, 1.0, transfer_rms_px, gain_sigmas};
 }
 
 TEST(DecideShape, TakesWhatPredictsBest) {
   using S = BoardShape;
-  const auto good_free = told(S::free, 0.5, 9.0), fair_free = told(S::free, 0.93, 9.0),
-             no_free = told(S::free, 1.1, -5.0);
-  const auto good_bow = told(S::bow, 0.7, 9.0), small_bow = told(S::bow, 0.98, 3.0), no_bow = told(S::bow, 0.999, 1.0);
+  const auto good_free = given(S::free, 0.5, 9.0), fair_free = given(S::free, 0.93, 9.0),
+             no_free = given(S::free, 1.1, -5.0);
+  const auto good_bow = given(S::bow, 0.7, 9.0), small_bow = given(S::bow, 0.98, 3.0),
+             no_bow = given(S::bow, 0.999, 1.0);
   const auto decided = [](S asked, const ShapeTransfer& bow, const ShapeTransfer& free) {
     return decide_shape(asked, std::vector{bow, free});
   };

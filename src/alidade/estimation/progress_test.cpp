@@ -10,13 +10,13 @@ namespace {
 TEST(Progress, AnEmptyOneNeverStops) { EXPECT_NO_THROW(report_progress({}, "work", 1, 2)); }
 
 TEST(Progress, IsToldWhatAndHowFar) {
-  std::string told;
+  std::string given;
   const Progress progress = [&](std::string_view what, std::size_t done, std::size_t total) {
-    told = std::string(what) + " " + std::to_string(done) + "/" + std::to_string(total);
+    given = std::string(what) + " " + std::to_string(done) + "/" + std::to_string(total);
     return true;
   };
   EXPECT_NO_THROW(report_progress(progress, "photos", 3, 13));
-  EXPECT_EQ(told, "photos 3/13");
+  EXPECT_EQ(given, "photos 3/13");
 }
 
 TEST(Progress, AnAnswerOfNoInterrupts) {

@@ -212,8 +212,8 @@ class Session {
   void tell_so_far() {
     constexpr double pause_s = 3.0;
     if (!config_.on_so_far || readings_.empty()) return;
-    if (head_.now_s() - told_s_ < pause_s) return;
-    told_s_ = head_.now_s();
+    if (head_.now_s() - given_s_ < pause_s) return;
+    given_s_ = head_.now_s();
     result_.log_csv = log_of(follower_.seen_so_far());
     result_.head_time_s = head_time();
     config_.on_so_far(result_);
@@ -280,7 +280,8 @@ class Session {
   std::optional<BoardRoom> room_;  ///< With a board.
   std::vector<HeadPosition> readings_;
   double estimate_s_ = 0.0;  ///< What the last one took: the head is not held for one that ends too late.
-  double begin_s_ = 0.0, next_s_ = 0.0, last_frame_s_ = 0.0, told_s_ = 0.0, rate_ = 0.0, late_s_ = 0.0, focal_px_ = 0.0;
+  double begin_s_ = 0.0, next_s_ = 0.0, last_frame_s_ = 0.0, given_s_ = 0.0, rate_ = 0.0, late_s_ = 0.0,
+         focal_px_ = 0.0;
   std::size_t num_corners_ = 0;
 };
 

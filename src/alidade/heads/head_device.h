@@ -26,7 +26,7 @@ class HeadClock {
 /// Pan > 0 turns left, tilt > 0 up. Infinite: the device names no limit.
 struct HeadLimits {
   Eigen::Vector2d low_rad = Eigen::Vector2d::Constant(-1e9), high_rad = Eigen::Vector2d::Constant(1e9);
-  bool are_told = false;                 ///< By the device.
+  bool are_given = false;                ///< By the device.
   std::string info;                      ///< What it calls itself.
   std::vector<Assumption> assumed = {};  ///< What nobody gave: by it counts become angles.
 

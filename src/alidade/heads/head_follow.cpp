@@ -94,9 +94,9 @@ class Follower {
   void tell_so_far() {
     constexpr double pause_s = 3.0, pause_share = 0.05;  // all that was seen is told each time
     const double time_s = head_.now_s() - begin_s_;
-    if (!config_.on_so_far || result_.frames.empty() || time_s - told_s_ < std::max(pause_s, pause_share * time_s))
+    if (!config_.on_so_far || result_.frames.empty() || time_s - given_s_ < std::max(pause_s, pause_share * time_s))
       return;
-    told_s_ = time_s;
+    given_s_ = time_s;
     config_.on_so_far(result_);
   }
   /// Where it is; commands follow one another as fast as its answers and its pace allow.
@@ -219,7 +219,7 @@ class Follower {
   std::vector<HeadPosition> asked_;
   double read_s_ = 0.0;
   std::deque<StreamFrame> waiting_;
-  double begin_s_ = 0.0, last_frame_s_ = 0.0, sum_age_s_ = 0.0, told_s_ = 0.0;
+  double begin_s_ = 0.0, last_frame_s_ = 0.0, sum_age_s_ = 0.0, given_s_ = 0.0;
   std::size_t num_ages_ = 0;
   bool is_following_ = false;
 };

@@ -71,7 +71,7 @@ Verdict verdict_of(const HeadSurvey& survey) {
   const Eigen::Vector2d at = survey.readings.back().pan_tilt_rad / degree;
   verdict.sentence = fmt::format("answers in {:.2g} ± {:.1g} ms, stands at pan {:.2f}°, tilt {:.2f}°",
                                  1e3 * survey.latency_s, 1e3 * survey.jitter_s, at[0], at[1]);
-  if (survey.limits.are_told) {
+  if (survey.limits.are_given) {
     verdict.sentence += fmt::format("; pan {:g}…{:g}°, tilt {:g}…{:g}°", low[0], high[0], low[1], high[1]);
     verdict.checks.push_back({.name = "limits", .text = "the head names its limits"});
   } else if (!survey.limits.assumed.empty()) {

@@ -37,7 +37,7 @@ void check_readings(const PositionerFit& fit, const std::string& axis, std::vect
 }
 
 /// What the log did not show.
-std::string not_told(const PositionerFit& fit) {
+std::string not_given(const PositionerFit& fit) {
   std::string text;
   const auto add = [&](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
   if (!fit.reached_rate)
@@ -120,7 +120,7 @@ Verdict head_verdict(const HeadIdentification& identified) {
       return refusal_of(head_axis_names[i], identified.axes[i]);
   for (std::size_t i = 0; i < 2; ++i) {
     const PositionerFit& fit = identified.axes[i];
-    const std::string axis = head_axis_names[i], missing = not_told(fit);
+    const std::string axis = head_axis_names[i], missing = not_given(fit);
     check_readings(fit, axis, verdict.checks);
     check_grid(identified.logs[i], fit, axis, verdict.checks);
     verdict.sentence += fmt::format("{}{} follows at up to {:.4g}°/s, {:.3g} ms late", i == 0 ? "" : "; ", axis,

@@ -145,18 +145,19 @@ TEST(Heads, LiesAreNamed) {
       {"zoom=1&lie=zoom-moves-pan", "zoom moves pan: by 1.50°", ExitCode::not_trusted},
       {"step=1.8", "read in steps of 1.8°", ExitCode::ok}};
   for (const Case& each : cases) {
-    const HeadIdentification told = identified(each.head);
-    EXPECT_EQ(told.verdict.exit_code, each.code) << each.head << ": " << told.verdict.sentence;
-    EXPECT_NE(told.verdict.state, State::good) << each.head;
-    EXPECT_NE(told.verdict.sentence.find(each.words), std::string::npos) << each.head << ": " << told.verdict.sentence;
+    const HeadIdentification given = identified(each.head);
+    EXPECT_EQ(given.verdict.exit_code, each.code) << each.head << ": " << given.verdict.sentence;
+    EXPECT_NE(given.verdict.state, State::good) << each.head;
+    EXPECT_NE(given.verdict.sentence.find(each.words), std::string::npos)
+        << each.head << ": " << given.verdict.sentence;
   }
 }
 
 TEST(Heads, HonestOnesAreNotAccused) {
   for (const std::string head : {"dead_band=0.2&backlash=0.3", "step=0.05&update_hz=20", "zoom=1", "repeat=0.05"}) {
-    const HeadIdentification told = identified(head);
-    EXPECT_TRUE(told.verdict.ok()) << head << ": " << told.verdict.sentence;
-    EXPECT_LT(told.verdict.sentence.size(), 160u) << told.verdict.sentence;
+    const HeadIdentification given = identified(head);
+    EXPECT_TRUE(given.verdict.ok()) << head << ": " << given.verdict.sentence;
+    EXPECT_LT(given.verdict.sentence.size(), 160u) << given.verdict.sentence;
   }
   const std::unique_ptr<HeadDevice> zooms = open_head("sim://?clock=free&zoom=1");
   const HeadSurvey survey = survey_head(*zooms, true);

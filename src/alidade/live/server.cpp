@@ -39,7 +39,7 @@ struct Server::State : WebSite {
   std::string token, session_id = random_hex(4);
   std::set<std::shared_ptr<Client>> clients;
   std::atomic<std::size_t> num_clients{0};
-  std::optional<std::uint64_t> newest_ns, told_ns;  ///< Times of messages: what clients take as the time now.
+  std::optional<std::uint64_t> newest_ns, given_ns;  ///< Times of messages: what clients take as the time now.
   int ticks_since_time = 0;
   WebHost host;  // last: its thread uses the others
 
@@ -94,8 +94,8 @@ class Client : public SocketUser, public std::enable_shared_from_this<Client> {
 
 /// The time of the newest message, and once a second in any case: who hears nothing knows that the run is gone.
 void Server::State::on_tick() {
-  if (!newest_ns || (newest_ns == told_ns && ++ticks_since_time < 10)) return;
-  told_ns = newest_ns;
+  if (!newest_ns || (newest_ns == given_ns && ++ticks_since_time < 10)) return;
+  given_ns = newest_ns;
   ticks_since_time = 0;
   for_clients([&](Client& client) { client.feed.tell_time(*newest_ns); });
 }

@@ -71,10 +71,10 @@ TEST(Consistency, NothingSeenTellsHowTheWorldIsTurned) {
       EXPECT_NEAR(information_of(filter), before, 1e-3) << k;
     }
     for (const FeatureObservation& observation : sample.frames[k].observations) {
-      const auto told = std::ranges::find(sample.config.start->depths, observation.id, &GivenDepth::id);
-      if (filter.has(observation.id) || told == sample.config.start->depths.end()) continue;
-      const double range_m = told->depth_m / unproject(filter.camera(), observation.px)->z();
-      filter.add(observation.id, observation.px, {range_m, told->sigma_rel}, FeatureKind::xyz);
+      const auto given = std::ranges::find(sample.config.start->depths, observation.id, &GivenDepth::id);
+      if (filter.has(observation.id) || given == sample.config.start->depths.end()) continue;
+      const double range_m = given->depth_m / unproject(filter.camera(), observation.px)->z();
+      filter.add(observation.id, observation.px, {range_m, given->sigma_rel}, FeatureKind::xyz);
     }
   }
   EXPECT_GT(largest_turn_rad, 0.005);  // the updates did something

@@ -95,8 +95,8 @@ bool place_next(std::span<const ObservationSeries> series, const std::vector<Obs
 }
 
 /// Pairs of cameras with their clocks' differences. What pairs that agree well already tell is not searched again.
-std::vector<ObservationPair> told_pairs(std::span<const ObservationSeries> series, double search_s,
-                                        const Progress& progress) {
+std::vector<ObservationPair> given_pairs(std::span<const ObservationSeries> series, double search_s,
+                                         const Progress& progress) {
   constexpr double sure_share = 0.8;
   constexpr std::size_t sure_common = 100;
   std::vector<ObservationPair> pairs;
@@ -157,7 +157,7 @@ MovingStart start_cameras(std::span<const ObservationSeries> series, double sear
                           const Progress& progress) {
   MovingStart start;
   start.cameras.resize(series.size());
-  const std::vector<ObservationPair> pairs = told_pairs(series, search_s, progress);
+  const std::vector<ObservationPair> pairs = given_pairs(series, search_s, progress);
   start.has_common = !pairs.empty();
   std::vector<ObservationPair> by_strength = pairs;
   std::ranges::sort(by_strength, std::greater{}, start_strength);

@@ -334,14 +334,14 @@ void place(Placing& work, const TrueTrack& truth) {
     if (work.solved.cov.size() == 0) break;
   }
   take_results(work);
-  const bool is_told = work.solved.cov.size() > 0;
+  const bool is_given = work.solved.cov.size() > 0;
   // By wrong times, rays meet in a short piece of path at most, which tells no places: it is not the path's fault.
   const ObservationSeries& watching = work.series[work.problem.reference];
   const bool fits = 2.0 * static_cast<double>(work.path_t_s.size()) * work.knot_s >
                     static_cast<double>(watching.t_s.size()) * watching.spacing_s;
-  if (!is_told && (fits || work.problem.clocks_are_free)) return;
+  if (!is_given && (fits || work.problem.clocks_are_free)) return;
   work.report.status = PlacedStatus::no_convergence;
-  if (is_told && work.solved.converged) set_scale(work, truth);
+  if (is_given && work.solved.converged) set_scale(work, truth);
 }
 
 double first_time(std::span<const TargetObservation> observations) {

@@ -165,10 +165,10 @@ Adjustment adjust(const FrameBuffer& buffer, const AdjustConfig& config, const P
     const BundleSolution& so_far = adjustment.solution;
     constexpr double min_sigma = 2e-5;  // about 0.01 px: no tracker is better, and rates are sampled
     const double robust = robust_sigma(so_far.residual_px, so_far.dof);
-    const double told = std::max(round == 0 ? robust : sigma_by_squares(so_far), min_sigma);
-    if (!sigma_is_known) solve.sigma_px = told;
+    const double given = std::max(round == 0 ? robust : sigma_by_squares(so_far), min_sigma);
+    if (!sigma_is_known) solve.sigma_px = given;
     if (config.reject && round == 0) {
-      adjustment.num_left_out = leave_out_far(bundle, so_far, std::max(told, solve.sigma_px));
+      adjustment.num_left_out = leave_out_far(bundle, so_far, std::max(given, solve.sigma_px));
     }
     bundle.camera = so_far.camera;
     bundle.points = so_far.points;

@@ -75,9 +75,9 @@ TEST(ObserveLog, AMeasuredVelocityTakesTheBiasOfTranslationAway) {
     const ObserveSolution blind = solve_intrinsics(log, config_of());
     log.has_velocity = true;
     for (RotationRow& row : log.rows) row.velocity_m_per_s = row.rate_rad_per_s.cross(lever_m);
-    const ObserveSolution told = solve_intrinsics(log, config_of());
-    ASSERT_EQ(told.status, ObserveSolution::Status::ok);
-    with += errors_of(told) / sets;
+    const ObserveSolution given = solve_intrinsics(log, config_of());
+    ASSERT_EQ(given.status, ObserveSolution::Status::ok);
+    with += errors_of(given) / sets;
     without += errors_of(blind) / sets;
   }
   EXPECT_GT(without.head<2>().cwiseAbs().maxCoeff(), 4.0);  // f r / Z = 7 px

@@ -84,14 +84,15 @@ double spread(double share, int num) { return 3.0 * std::sqrt(share * (1.0 - sha
 struct TrueCase {
   SigmaMethod method;
   int num_shots;
-  bool is_told;
+  bool is_given;
 };
 
 class HonestSigma : public ::testing::TestWithParam<TrueCase> {};
 
 TEST_P(HonestSigma, CoversWhereTheModelIsTrue) {
-  const auto& [method, num_shots, is_told] = GetParam();
-  const Coverage coverage = coverage_of(is_told ? told_config(method) : RangefinderConfig{.method = method}, num_shots);
+  const auto& [method, num_shots, is_given] = GetParam();
+  const Coverage coverage =
+      coverage_of(is_given ? given_config(method) : RangefinderConfig{.method = method}, num_shots);
   EXPECT_NEAR(coverage.within1, 0.68, 0.04 + spread(0.68, coverage.num));
   EXPECT_NEAR(coverage.within2, 0.95, 0.02 + spread(0.95, coverage.num));
   RecordProperty("within1", std::to_string(coverage.within1));
@@ -109,7 +110,7 @@ INSTANTIATE_TEST_SUITE_P(
                       TrueCase{SigmaMethod::plane, 18, false}));
 
 TEST(HonestSigma, CoversErrorsThatAShotsMeasurementsShare) {
-  const RangefinderConfig joint = told_config(SigmaMethod::joint), spot = told_config(SigmaMethod::spot);
+  const RangefinderConfig joint = given_config(SigmaMethod::joint), spot = given_config(SigmaMethod::spot);
   for (const int num_shots : {6, 12, 18}) {
     for (const RangefinderConfig& config : {joint, spot}) {
       for (const Deviation& deviation : {Deviation{.bias_px = 0.5}, Deviation{.per_shot_px = 0.5}}) {
@@ -124,7 +125,7 @@ TEST(HonestSigma, CoversErrorsThatAShotsMeasurementsShare) {
 TEST(HonestSigma, CoversALensThatIsFartherOffThanItsFileSaysAndABowedBoard) {
   for (const auto method : {SigmaMethod::joint, SigmaMethod::spot, SigmaMethod::plane}) {
     for (const Deviation& deviation : {Deviation{.lens_px = 4.0}, Deviation{.bow_m = 0.001}}) {
-      const Coverage coverage = coverage_of(told_config(method), 18, deviation);
+      const Coverage coverage = coverage_of(given_config(method), 18, deviation);
       EXPECT_GE(coverage.within2, 0.90 - spread(0.90, coverage.num)) << static_cast<int>(method);
       EXPECT_LE(coverage.within2, 0.98 + spread(0.98, coverage.num)) << static_cast<int>(method);
     }
@@ -134,7 +135,7 @@ TEST(HonestSigma, CoversALensThatIsFartherOffThanItsFileSaysAndABowedBoard) {
 TEST(HonestSigma, OneShotsSharedErrorStandsOut) {
   auto sample = draw_rangefinder_sample(*rangefinder_scenario("reference"), {}, 4);
   sample.simulated.shots[7].spot->px += Eigen::Vector2d(1.2, -1.2);  // 4σ each way: no outlier yet
-  const RangefinderReport report = solve_sample(sample, told_config(SigmaMethod::joint));
+  const RangefinderReport report = solve_sample(sample, given_config(SigmaMethod::joint));
   ASSERT_TRUE(report.shots[7].used);
   for (std::size_t i = 0; i < report.shots.size(); ++i) {
     if (i != 7) EXPECT_LT(report.shots[i].cluster_z2, report.shots[7].cluster_z2) << i;
@@ -156,7 +157,7 @@ void expect_moves(const RangefinderReport& report, const std::string& name, doub
 
 TEST(Assumptions, MoveTheBeamAsSolvesWithTheErrorSay) {
   auto sample = draw_rangefinder_sample(*rangefinder_scenario("reference"), {}, 6);
-  const RangefinderConfig config = told_config(SigmaMethod::joint);
+  const RangefinderConfig config = given_config(SigmaMethod::joint);
   const RangefinderReport report = solve_sample(sample, config);
   auto larger = sample;
   for (Eigen::Vector3d& point : larger.points) point *= 1.002;
@@ -183,7 +184,7 @@ TEST(Assumptions, MoveTheBeamAsSolvesWithTheErrorSay) {
 
 TEST(Assumptions, AToldSigmaIsCarriedIntoTheBeamsOwn) {
   const auto sample = draw_rangefinder_sample(*rangefinder_scenario("reference"), {}, 6);
-  RangefinderConfig config = told_config(SigmaMethod::joint);
+  RangefinderConfig config = given_config(SigmaMethod::joint);
   const RangefinderReport without = solve_sample(sample, config);
   config.sigma_square_m = 0.002 * 0.04;
   const RangefinderReport with = solve_sample(sample, config);
@@ -196,7 +197,7 @@ TEST(Assumptions, AToldSigmaIsCarriedIntoTheBeamsOwn) {
     if (assumption.name == "square_m") EXPECT_EQ(*assumption.sigma, *config.sigma_square_m);
     if (assumption.name == "scale") EXPECT_FALSE(assumption.sigma);
   }
-  EXPECT_TRUE(wants_scale(without, told_config(SigmaMethod::joint)));
+  EXPECT_TRUE(wants_scale(without, given_config(SigmaMethod::joint)));
   config.sigma_scale = 0.0;
   EXPECT_FALSE(wants_scale(solve_sample(sample, config), config));
 }

@@ -51,7 +51,7 @@ TEST_P(MonteCarlo, IsAsGoodAsTheTable) {
   scene.num_shots = row.num_shots;
   for (int trial = 0; trial < trials; ++trial) {
     const auto sample = draw_rangefinder_sample(scene, {}, static_cast<std::uint64_t>(1000 * row.num_shots + trial));
-    const RangefinderReport report = solve_sample(sample, told_config(method));
+    const RangefinderReport report = solve_sample(sample, given_config(method));
     position_mm.push_back(1e3 * origin_error_m(report, sample));
     direction_mrad.push_back(1e3 * direction_error_rad(report, sample).norm());
     reprojection.push_back(reprojection_px(report, sample));
@@ -84,7 +84,7 @@ TEST(MonteCarlo, JointIsAtTheBoundAndItsSigmaCoversIt) {
   double origin2 = 0.0, origin_bound2 = 0.0, direction2 = 0.0, direction_bound2 = 0.0, within1 = 0.0, within2 = 0.0;
   for (int trial = 0; trial < trials; ++trial) {
     const auto sample = draw_rangefinder_sample(scene, {}, static_cast<std::uint64_t>(50000 + trial));
-    const RangefinderReport report = solve_sample(sample, told_config(RangefinderMethod::joint));
+    const RangefinderReport report = solve_sample(sample, given_config(RangefinderMethod::joint));
     Eigen::Vector<double, 5> error;
     error << report.beam.origin_in_cam - sample.scene.beam.origin_in_cam, direction_error_rad(report, sample);
     origin2 += error.head<3>().squaredNorm();
@@ -110,7 +110,7 @@ TEST(MonteCarlo, BeamAloneCoversTheLensItHeld) {
   double within1 = 0.0;
   for (int trial = 0; trial < trials; ++trial) {
     const auto sample = draw_rangefinder_sample(scene, {}, static_cast<std::uint64_t>(60000 + trial));
-    RangefinderConfig config = told_config(RangefinderMethod::joint);
+    RangefinderConfig config = given_config(RangefinderMethod::joint);
     config.refine = Refine::beam;
     const RangefinderReport report = solve_sample(sample, config);
     Eigen::Vector<double, 5> error;
@@ -137,7 +137,7 @@ TEST(MonteCarlo, ThreeWrongRangesOfEighteenAreNamedAndHarmless) {
     for (int trial = 0; trial < trials; ++trial) {
       const auto sample =
           draw_rangefinder_sample(scene, {.outlier_share = 3.0 / 18.0}, static_cast<std::uint64_t>(70000 + trial));
-      const RangefinderReport report = solve_sample(sample, told_config(method));
+      const RangefinderReport report = solve_sample(sample, given_config(method));
       position_mm.push_back(1e3 * origin_error_m(report, sample));
       for (std::size_t i = 0; i < report.shots.size(); ++i) {
         const bool is_named = !report.shots[i].used && report.shots[i].reason.rfind("outlier", 0) == 0;

@@ -20,7 +20,7 @@ Begun begin(std::uint64_t seed, int num_shots) {
   Begun begun;
   begun.config.num_shots = num_shots;
   begun.sample = draw_rangefinder_sample(begun.config, {}, seed);
-  const RangefinderReport report = solve_sample(begun.sample, told_config(RangefinderMethod::joint));
+  const RangefinderReport report = solve_sample(begun.sample, given_config(RangefinderMethod::joint));
   begun.now = {report.beam, report.camera, begun.sample.points};
   return begun;
 }
@@ -54,8 +54,8 @@ TEST(NextShot, FiveGuidedShotsAreAsGoodAsFifteenRandomOnes) {
                              plane.normal_in_cam.dot(more.beam.direction_in_cam));
     }
     for (const Shot& shot : simulate_shots(more, {}, seed + 77).shots) taken.simulated.shots.push_back(shot);
-    const RangefinderReport guided = solve_sample(taken, told_config(RangefinderMethod::joint));
-    const RangefinderReport random = solve_sample(begin(seed + 500, 17).sample, told_config(RangefinderMethod::joint));
+    const RangefinderReport guided = solve_sample(taken, given_config(RangefinderMethod::joint));
+    const RangefinderReport random = solve_sample(begin(seed + 500, 17).sample, given_config(RangefinderMethod::joint));
     guided2 += std::pow(point_sigma_m(guided.beam), 2);
     random2 += std::pow(point_sigma_m(random.beam), 2);
     truth2 += std::pow(origin_error_m(guided, taken), 2);
@@ -80,7 +80,7 @@ TEST(NextShot, EachLowersWhatIsUnknown) {
 TEST(NextShot, AsksForWhatADegenerateLogLacks) {
   RangefinderSceneConfig config = *rangefinder_scenario("near_frontal");
   const auto sample = draw_rangefinder_sample(config, {}, 4);
-  const RangefinderReport report = solve_sample(sample, told_config(RangefinderMethod::plane));
+  const RangefinderReport report = solve_sample(sample, given_config(RangefinderMethod::plane));
   BeamNow now{report.beam, report.camera, sample.points};
   now.method = RangefinderMethod::plane;
   const auto tilted = plan_next_shots(now, {}, 1);

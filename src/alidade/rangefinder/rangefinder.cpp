@@ -153,7 +153,7 @@ void put_clusters(const BeamProblem& problem, const ReducedSystem& system, const
 }
 
 /// What was given with a σ is carried into the beam's covariance.
-void carry_told(RangefinderReport& report) {
+void carry_given(RangefinderReport& report) {
   for (const FixedQuantity& thing : report.fixed) {
     if (!thing.sigma || (thing.name != "square_m" && thing.name != "scale")) continue;  // the lens' is in it already
     const BeamVector moved = *thing.sigma * thing.moves;
@@ -266,7 +266,7 @@ void take_over(const RefinedBeam& refined, BeamProblem& problem, RangefinderRepo
 
 /// Do the readings ask for a scale? How far it would be from 1, were it estimated too, lens and poses fixed, over its
 /// σ, with the σ of a reading estimated again: where that came of residuals, they held the missing scale, too.
-double scale_in_sigmas(const BeamProblem& problem, const Camera& camera, const Beam& beam, bool sigma_is_told,
+double scale_in_sigmas(const BeamProblem& problem, const Camera& camera, const Beam& beam, bool sigma_is_given,
                        double min_sigma_m) {
   BeamProblem work = problem;
   work.estimate_scale = true;
@@ -274,7 +274,7 @@ double scale_in_sigmas(const BeamProblem& problem, const Camera& camera, const B
                                     [](const PreparedShot& shot) { return shot.used && shot.plane; });
   if (problem.estimate_scale || planes < 4) return 0.0;
   auto with = solve_beam(work, camera, beam);
-  for (int round = 0; round < 6 && with && sigma_is_told; ++round) {
+  for (int round = 0; round < 6 && with && sigma_is_given; ++round) {
     const double change = estimate_noise(work, camera, with->beam, false, true);
     work.model.noise.sigma_m = std::max(work.model.noise.sigma_m, min_sigma_m);
     with = solve_beam(work, camera, with->beam);
@@ -306,7 +306,7 @@ void put_uncertainty(const BeamProblem& problem, const LensPrior& prior, const C
   report.causes = error_causes(problem, system, part, prior, report);
   for (FixedQuantity& sigma : fixed_sigmas(problem, report)) report.fixed.push_back(std::move(sigma));
   if (config.refine == Refine::beam) carry_lens(problem, camera, report);
-  carry_told(report);
+  carry_given(report);
   if (config.refine == Refine::all) carry_surprise(report);
   carry_asked(report);
 }

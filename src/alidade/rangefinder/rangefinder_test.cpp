@@ -30,7 +30,7 @@ TEST_P(DegenerateBattery, IsAlwaysRefusedByNameWithWhatElseCouldTell) {
     RangefinderSceneConfig scene = *rangefinder_scenario(scenario);
     scene.num_shots = 15;
     const auto sample = draw_rangefinder_sample(scene, {}, static_cast<std::uint64_t>(300 + trial));
-    RangefinderConfig config = told_config(method);
+    RangefinderConfig config = given_config(method);
     if (trial % 2 == 1) config.sigma_spot_px.reset(), config.sigma_range_m.reset();  // a refusal needs no σ
     const RangefinderReport report = solve_sample(sample, config);
     const Verdict verdict = rangefinder_verdict(report, sample.simulated.shots, config);
@@ -63,7 +63,7 @@ TEST(RangefinderVerdict, AcceptsWhatCanBeTold) {
         const bool boards_cannot = name == "parallel" || name == "frontal";
         if (method == Method::plane && boards_cannot) continue;
         if (method == Method::spot && name == "through_centre") continue;
-        const RangefinderConfig config = told_config(method);
+        const RangefinderConfig config = given_config(method);
         const Verdict verdict = rangefinder_verdict(solve_sample(sample, config), sample.simulated.shots, config);
         ++asked;
         accepted += verdict.exit_code == ExitCode::ok ? 1 : 0;
@@ -78,14 +78,14 @@ TEST(RangefinderVerdict, AcceptsWhatCanBeTold) {
 
 TEST(RangefinderVerdict, IsGreenForTheReferenceWithSpotAndBoard) {
   const auto sample = draw_rangefinder_sample(*rangefinder_scenario("reference"), {}, 1);
-  const RangefinderConfig config = told_config(Method::joint);
+  const RangefinderConfig config = given_config(Method::joint);
   const Verdict verdict = rangefinder_verdict(solve_sample(sample, config), sample.simulated.shots, config);
   EXPECT_TRUE(verdict.state == State::good) << verdict.to_add;
   EXPECT_TRUE(verdict.to_add.empty());
 }
 
 TEST(RangefinderVerdict, WarnsOfAShortSpanAndOfOutliers) {
-  RangefinderConfig config = told_config(Method::joint);
+  RangefinderConfig config = given_config(Method::joint);
   auto sample = draw_rangefinder_sample(*rangefinder_scenario("short_span"), {}, 3);
   Verdict verdict = rangefinder_verdict(solve_sample(sample, config), sample.simulated.shots, config);
   EXPECT_TRUE(verdict.state == State::care && verdict.exit_code == ExitCode::ok);
@@ -109,7 +109,7 @@ TEST(RangefinderScale, IsToldWithBoardsAndRefusedWithSpotsAlone) {
   constexpr int trials = 60;
   for (int trial = 0; trial < trials; ++trial) {
     const auto sample = draw_rangefinder_sample(scene, {}, static_cast<std::uint64_t>(trial));
-    RangefinderConfig config = told_config(trial % 2 == 0 ? Method::joint : Method::plane);
+    RangefinderConfig config = given_config(trial % 2 == 0 ? Method::joint : Method::plane);
     config.estimate_scale = true;
     const RangefinderReport report = solve_sample(sample, config);
     ASSERT_TRUE(report.status == Status::converged);
@@ -137,11 +137,11 @@ TEST(Rangefinder, UsesEachShotForWhatItHas) {
       if (i < 12) sample.simulated.shots[i].spot.reset();
       if (i >= 12) sample.simulated.shots[i].board.reset();
     }
-    const RangefinderReport mixed = solve_sample(sample, told_config(Method::joint));
+    const RangefinderReport mixed = solve_sample(sample, given_config(Method::joint));
     ASSERT_TRUE(mixed.status == Status::converged);
     EXPECT_EQ(mixed.shots_used, 18);
     sample.simulated.shots.resize(6);
-    const RangefinderReport full = solve_sample(sample, told_config(Method::joint));
+    const RangefinderReport full = solve_sample(sample, given_config(Method::joint));
     sum_mixed += mixed.bound.cov.topLeftCorner<3, 3>().trace();
     sum_full += full.bound.cov.topLeftCorner<3, 3>().trace();
     Eigen::Vector3d error = mixed.beam.origin_in_cam - sample.scene.beam.origin_in_cam;
@@ -183,7 +183,7 @@ TEST(Rangefinder, ReadsThroughEveryLens) {
     constexpr int trials = 40;
     for (int trial = 0; trial < trials; ++trial) {
       const auto sample = draw_rangefinder_sample(scene, {}, static_cast<std::uint64_t>(trial));
-      const RangefinderReport report = solve_sample(sample, told_config(Method::joint));
+      const RangefinderReport report = solve_sample(sample, given_config(Method::joint));
       ASSERT_TRUE(report.status == Status::converged) << model << trial;
       Eigen::Vector<double, 5> error;
       error << sample.scene.beam.origin_in_cam - report.beam.origin_in_cam, direction_error_rad(report, sample);
@@ -208,7 +208,7 @@ TEST(Rangefinder, SaysWhatIsWrongWithAShotAndGoesOn) {
   shots[7].spot.reset();
   for (Corner& corner : shots[8].board->corners) corner.px.setConstant(nan);
   shots[8].spot.reset();
-  const RangefinderReport report = solve_sample(sample, told_config(Method::joint));
+  const RangefinderReport report = solve_sample(sample, given_config(Method::joint));
   EXPECT_TRUE(report.status == Status::converged);
   for (std::size_t i = 0; i < 9; ++i) {
     EXPECT_FALSE(report.shots[i].used) << i;
@@ -222,7 +222,7 @@ TEST(Rangefinder, SaysWhatIsWrongWithAShotAndGoesOn) {
 TEST(Rangefinder, RefusesTooFewShotsAndNone) {
   const auto sample = draw_rangefinder_sample(*rangefinder_scenario("four_shots"), {}, 5);
   for (const Method method : {Method::spot, Method::plane, Method::joint}) {
-    const RangefinderConfig config = told_config(method);
+    const RangefinderConfig config = given_config(method);
     for (const std::size_t num : {0u, 1u}) {
       const std::span<const Shot> shots(sample.simulated.shots.data(), num);
       const RangefinderReport report = calibrate_rangefinder(shots, sample.points, sample.camera, config);
@@ -242,7 +242,7 @@ TEST(Rangefinder, DoesNotAgreeWithNonsense) {
     shot.spot->px = {draws.uniform(0.0, 1280.0), draws.uniform(0.0, 960.0)};
   }
   for (const Method method : {Method::spot, Method::plane, Method::joint}) {
-    const RangefinderConfig config = told_config(method);
+    const RangefinderConfig config = given_config(method);
     const Verdict verdict = rangefinder_verdict(solve_sample(sample, config), sample.simulated.shots, config);
     EXPECT_FALSE(verdict.exit_code == ExitCode::ok) << static_cast<int>(method) << verdict.sentence;
   }

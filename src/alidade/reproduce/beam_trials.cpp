@@ -19,7 +19,7 @@ RangefinderSample draw_rangefinder_sample(const RangefinderSceneConfig& config, 
   return sample;
 }
 
-RangefinderConfig told_config(RangefinderMethod method) {
+RangefinderConfig given_config(RangefinderMethod method) {
   RangefinderConfig config;
   config.method = method;
   config.sigma_spot_px = 0.3;

@@ -20,7 +20,7 @@ struct RangefinderSample {
                                                         std::uint64_t seed);
 
 /// With the noise that the simulator makes told to the estimator.
-[[nodiscard]] RangefinderConfig told_config(RangefinderMethod method);
+[[nodiscard]] RangefinderConfig given_config(RangefinderMethod method);
 
 [[nodiscard]] RangefinderReport solve_sample(const RangefinderSample& sample, const RangefinderConfig& config);
 

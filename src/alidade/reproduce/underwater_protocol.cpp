@@ -21,7 +21,7 @@ UnderwaterSample underwater_sample(const UnderwaterScene& scene, std::uint64_t s
     sample.truth.push_back({frame.t_s, frame.world_from_cam});
   }
   LocalizeStart start;
-  start.motion.world_from_cam = sequence.told_start;
+  start.motion.world_from_cam = sequence.given_start;
   start.cov.diagonal().head<3>().setConstant(scene.sigma_position_m * scene.sigma_position_m);
   start.cov.diagonal().segment<3>(3).setConstant(scene.sigma_rotation_rad * scene.sigma_rotation_rad);
   start.cov.diagonal().tail<6>().setConstant(0.3 * 0.3);
@@ -29,9 +29,9 @@ UnderwaterSample underwater_sample(const UnderwaterScene& scene, std::uint64_t s
   for (const UnderwaterPoint& point : sequence.points) {
     sample.points[point.id] = point.point_in_world;
     if (point.is_known)
-      sample.config.target.points.push_back({point.id, point.told_in_world, scene.sigma_known_m});
-    else if (point.told_depth_m > 0.0)
-      sample.config.start->depths.push_back({point.id, point.told_depth_m, scene.sigma_depth});
+      sample.config.target.points.push_back({point.id, point.given_in_world, scene.sigma_known_m});
+    else if (point.given_depth_m > 0.0)
+      sample.config.start->depths.push_back({point.id, point.given_depth_m, scene.sigma_depth});
   }
   return sample;
 }
@@ -59,7 +59,7 @@ double first_depth_m(const UnderwaterSample& sample, long id) {
 
 UnderwaterSample filmed_sample(const UnderwaterScene& scene, const UnderwaterVideoConfig& video, std::uint64_t seed) {
   UnderwaterSample sample = underwater_sample(scene, seed);
-  for (GivenDepth& told : sample.config.start->depths) told.depth_m /= first_depth_m(sample, told.id);
+  for (GivenDepth& given : sample.config.start->depths) given.depth_m /= first_depth_m(sample, given.id);
   const auto film = [&](std::size_t k) {
     return render_underwater_frame(scene.camera, sample.truth[k].world_from_cam, video, 1000 * seed + k);
   };
@@ -67,7 +67,7 @@ UnderwaterSample filmed_sample(const UnderwaterScene& scene, const UnderwaterVid
   for (std::size_t k = 0; k < sample.frames.size(); ++k)
     sample.frames[k].observations = observations_of_board(found.photos[k]);
   // As wrong as before, of the depth at which the images show a point first.
-  for (GivenDepth& told : sample.config.start->depths) told.depth_m *= first_depth_m(sample, told.id);
+  for (GivenDepth& given : sample.config.start->depths) given.depth_m *= first_depth_m(sample, given.id);
   return sample;
 }
 

@@ -41,7 +41,7 @@ RangefinderConfig timed_config(std::size_t place) {
   constexpr std::array<RangefinderMethod, 5> methods{RangefinderMethod::spot, RangefinderMethod::plane,
                                                      RangefinderMethod::joint, RangefinderMethod::spot,
                                                      RangefinderMethod::plane};
-  RangefinderConfig config = told_config(methods[place]);
+  RangefinderConfig config = given_config(methods[place]);
   if (place >= 3) config.refine = Refine::beam;
   return config;
 }

@@ -142,7 +142,7 @@ FigureTable figure_9(const BeamErrorTable& table) {
 }  // namespace
 
 RangefinderConfig config_of_way(std::size_t way) {
-  RangefinderConfig config = told_config(ways[way].method);
+  RangefinderConfig config = given_config(ways[way].method);
   config.refine = ways[way].refine;
   config.sigma_range_m = sigma_range_m;
   config.sigma_corner_px = corner_px;

@@ -141,7 +141,7 @@ JobOutcome outcome_of(const HeadSurvey& survey) {
   estimate["url"] = survey.url;
   estimate["info"] = survey.limits.info;
   estimate["position_rad"] = numbers_of(survey.readings.back().pan_tilt_rad);
-  if (survey.limits.are_told) {
+  if (survey.limits.are_given) {
     estimate["low_rad"] = numbers_of(survey.limits.low_rad);
     estimate["high_rad"] = numbers_of(survey.limits.high_rad);
   }

@@ -206,12 +206,13 @@ void put_sigmas(const Beam& beam, JsonValue& stddev) {
 }
 
 JsonValue sigma_of_shots(const RangefinderReport& report) {
-  std::vector<std::pair<std::string, Eigen::Index>> told;
+  std::vector<std::pair<std::string, Eigen::Index>> given;
   for (std::size_t i = 0; i < beam_param_names.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    if (report.cov_model(k, k) > 0.0 && k < report.clusters.inflation.size()) told.emplace_back(beam_param_names[i], k);
+    if (report.cov_model(k, k) > 0.0 && k < report.clusters.inflation.size())
+      given.emplace_back(beam_param_names[i], k);
   }
-  return sigma_values(told, report.clusters);
+  return sigma_values(given, report.clusters);
 }
 
 void put_beam(const Beam& beam, JsonValue& estimate) {

@@ -118,7 +118,7 @@ std::optional<SolvedRig> solve_with_noise(Work& work, const RigState& start, std
     if (!cov) break;
     const double num = 2.0 * static_cast<double>(std::ranges::count(weights, 1.0));
     const double told = num - num_held_corrections(work.problem, *solved, *cov, weights);
-    work.num_told = told >= enough ? told : 0.0;
+    work.num_given = told >= enough ? told : 0.0;
     const double before = work.problem.sigma_encoder_rad;
     double sigma_rad = std::max(min_rad, std::sqrt(sum_of_corrections2(work, *solved, weights) / told));
     if (!(told >= enough)) {
@@ -324,7 +324,7 @@ void finish(Work& work, const SolvedRig& solved, const std::vector<double>& weig
   take_backlash(work, state, given.wide, cov_wide + given.cov);
   work.report.cov_model = world.J * widened(work.problem, given.wide, *covariance.cov) * world.J.transpose();
   take_assumed(work.report, given, world.J);
-  work.report.causes = rig_causes(work.problem, solved, *covariance.cov, weights, given.assumed, work.num_told);
+  work.report.causes = rig_causes(work.problem, solved, *covariance.cov, weights, given.assumed, work.num_given);
   work.report.deviance =
       solved.system.cost + 4.0 * static_cast<double>(work.report.views_used) * std::log(work.report.sigma_encoder_rad);
   for (std::size_t b = 0; b < work.boards.size(); ++b) {

@@ -87,7 +87,7 @@ class ByNeed {
   }
 
   /// Scales that are not given are estimated where holding them matters.
-  void free_untold_scales() {
+  void free_ungiven_scales() {
     if (config_.sigma_scale || config_.estimate_scales) return;
     const bool matters = std::ranges::any_of(best_.assumed, [](const Assumption& what) {
       return what.name.ends_with("_scale") && !what.sigma && what.moves > 1.0;
@@ -119,9 +119,9 @@ class ByNeed {
   std::optional<RigReport> solve(const FreedParams& freed) {
     constexpr double worst_rad = 2.0 * degree, worst_m = 0.05;
     RigReport trial = calibrated_with(views_, points_, cameras_, config_, freed, progress_);
-    const bool is_told = trial.status == Status::converged && trial.sigma_relative_rad < worst_rad &&
-                         trial.sigma_relative_m < worst_m && trial.views_used >= best_.views_used;
-    return is_told ? std::optional(std::move(trial)) : std::nullopt;
+    const bool is_given = trial.status == Status::converged && trial.sigma_relative_rad < worst_rad &&
+                          trial.sigma_relative_m < worst_m && trial.views_used >= best_.views_used;
+    return is_given ? std::optional(std::move(trial)) : std::nullopt;
   }
 
   std::vector<Candidate> asked() const {
@@ -230,7 +230,7 @@ RigReport freed_by_need(RigReport report, std::span<const HeadView> views,
                         const RigConfig& config, const Progress& progress) {
   ByNeed by_need(views, points_in_board, cameras, config, progress, std::move(report));
   by_need.free_what_is_asked();
-  by_need.free_untold_scales();
+  by_need.free_ungiven_scales();
   by_need.free_what_is_asked();
   return std::move(by_need).result();
 }

@@ -159,7 +159,7 @@ VectorXd given_sigmas(const std::vector<Assumption>& assumed, const Tested& test
 
 std::vector<RigCause> rig_causes(const RigProblem& problem, const SolvedRig& solved, const MatrixXd& cov,
                                  const std::vector<double>& weights, const std::vector<Assumption>& assumed,
-                                 double num_told) {
+                                 double num_given) {
   const Score score = score_of(problem, solved, cov, weights);
   std::vector<RigCause> causes;
   for (const Tested& tested : tested_of(problem, solved.state)) {
@@ -177,7 +177,7 @@ std::vector<RigCause> rig_causes(const RigProblem& problem, const SolvedRig& sol
     }
     if (num > 0.0)
       causes.push_back(
-          {tested.name, s.size() == 1 ? size[0] : size.norm(), tested.unit, score_sigmas(chi2, num, num_told)});
+          {tested.name, s.size() == 1 ? size[0] : size.norm(), tested.unit, score_sigmas(chi2, num, num_given)});
   }
   // What names one axis says more than what names all, where it explains nearly as much.
   std::ranges::sort(causes, std::greater{},

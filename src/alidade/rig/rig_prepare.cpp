@@ -117,9 +117,9 @@ void index_views(Work& work, const std::map<int, Camera>& cameras) {
 
 void fit_poses(Work& work) {
   work.poses = fitted_poses(work, work.heads);
-  const double told_px = sigma_of_poses(work.poses);
-  work.report.sigma_px_is_estimated = !work.config.sigma_px && told_px > 0.0;
-  work.report.sigma_px = work.config.sigma_px ? *work.config.sigma_px : told_px > 0.0 ? std::max(told_px, 1e-3) : 0.5;
+  const double given_px = sigma_of_poses(work.poses);
+  work.report.sigma_px_is_estimated = !work.config.sigma_px && given_px > 0.0;
+  work.report.sigma_px = work.config.sigma_px ? *work.config.sigma_px : given_px > 0.0 ? std::max(given_px, 1e-3) : 0.5;
   work.problem.sigma_px = work.report.sigma_px;
   constexpr double max_sigmas = 6.0;  // of one view's own residuals: blurred is not wrong, a wrong corner is
   for (std::size_t v = 0; v < work.given.size(); ++v) {
@@ -127,7 +127,7 @@ void fit_poses(Work& work) {
     const auto& pose = work.poses[v];
     // A view without a pose of its own is placed by the others.
     if (pose && work.config.reject_outliers && pose->dof > 0 &&
-        pose->chi2 / pose->dof > std::pow(max_sigmas * std::max(told_px, work.report.sigma_px), 2)) {
+        pose->chi2 / pose->dof > std::pow(max_sigmas * std::max(given_px, work.report.sigma_px), 2)) {
       work.usable[v] = false;
       work.report.views[v].reason = "its corners do not fit the board";
       work.poses[v].reset();

@@ -27,7 +27,7 @@ struct Work {
   std::vector<std::optional<BoardPoseFit>> poses;
   std::vector<bool> usable;
   RigReport report;
-  double num_told = 0.0;  ///< Degrees of freedom by which σ of a reading was estimated; 0: given.
+  double num_given = 0.0;  ///< Degrees of freedom by which σ of a reading was estimated; 0: given.
 };
 
 /// calibrate_rig() with these parameters estimated too.

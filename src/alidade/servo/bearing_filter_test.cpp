@@ -123,8 +123,8 @@ TEST(BearingAxis, CountsWhatTheLensHasWrong) {
       state[1] += config.singer_tau_s * (1.0 - std::exp(-a)) * state[2];
       state[2] = std::exp(-a) * state[2] + 0.5 * std::sqrt(1.0 - std::exp(-2.0 * a)) * draws.normal();
     }
-    const Bearing told = with.at(60 * dt), naive = without.at(60 * dt);
-    counted += std::pow((told.angle_rad - state[0]) / told.sigma_rad, 2) / num_runs;
+    const Bearing given = with.at(60 * dt), naive = without.at(60 * dt);
+    counted += std::pow((given.angle_rad - state[0]) / given.sigma_rad, 2) / num_runs;
     left_out += std::pow((naive.angle_rad - state[0]) / naive.sigma_rad, 2) / num_runs;
   }
   EXPECT_NEAR(counted, 1.0, 3.0 * std::sqrt(2.0 / num_runs));

@@ -50,8 +50,8 @@ std::vector<UnderwaterPoint> points_of(const UnderwaterScene& scene, Draws& draw
     }
     for (const long id : scene.known) point.is_known = point.is_known || id == point.id;
     const Eigen::Vector3d error = scene.sigma_known_m * draws.normal3();
-    if (point.is_known) point.told_in_world = point.point_in_world + error;
-    point.told_in_world.x() *= 1.0 + scene.target_stretch;
+    if (point.is_known) point.given_in_world = point.point_in_world + error;
+    point.given_in_world.x() *= 1.0 + scene.target_stretch;
     points.push_back(point);
   }
   return points;
@@ -95,8 +95,8 @@ UnderwaterSequence simulate_underwater(const UnderwaterScene& scene, std::uint64
   sequence.points = points_of(scene, draws);
   const Eigen::Vector3d turn = scene.sigma_rotation_rad * draws.normal3();
   const Rigid3 first = swing.world_from_cam(0.0);
-  sequence.told_start = {(first.rotation * exp_so3(turn)).normalized(),
-                         first.translation + scene.sigma_position_m * draws.normal3()};
+  sequence.given_start = {(first.rotation * exp_so3(turn)).normalized(),
+                          first.translation + scene.sigma_position_m * draws.normal3()};
   for (int k = 0; k < scene.num_frames; ++k) {
     UnderwaterFrame frame{k * scene.dt_s, swing.world_from_cam(k * scene.dt_s), {}};
     const bool is_black = scene.blackout_s > 0.0 && frame.t_s >= scene.blackout_from_s - 1e-9 &&
@@ -111,8 +111,8 @@ UnderwaterSequence simulate_underwater(const UnderwaterScene& scene, std::uint64
       const auto px = rolling_px(scene, swing, frame.t_s - scene.late_s, point_in_world);
       if (is_black || !px || !is_between_pixels(scene.camera, *px)) continue;
       // A prior of 30 % may draw a point behind the camera: no one believes that.
-      if (point.told_depth_m == 0.0)
-        point.told_depth_m = point_in_cam.z() * std::max(0.1, 1.0 + scene.sigma_depth * depth_error);
+      if (point.given_depth_m == 0.0)
+        point.given_depth_m = point_in_cam.z() * std::max(0.1, 1.0 + scene.sigma_depth * depth_error);
       const bool is_mismatch = k > 0 && is_wrong < scene.mismatches;
       const Eigen::Vector2d shown =
           is_mismatch ? Eigen::Vector2d(*px + scene.mismatch_px * Eigen::Vector2d(u, v)) : *px + noise;

@@ -53,14 +53,14 @@ struct UnderwaterPoint {
   long id = 0;
   bool is_known = false;
   Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();
-  Eigen::Vector3d told_in_world = Eigen::Vector3d::Zero();  ///< Of a known one.
-  double told_depth_m = 0.0;  ///< Along the optical axis, where an unknown one is first seen.
+  Eigen::Vector3d given_in_world = Eigen::Vector3d::Zero();  ///< Of a known one.
+  double given_depth_m = 0.0;  ///< Along the optical axis, where an unknown one is first seen.
 };
 
 struct UnderwaterSequence {
   std::vector<UnderwaterFrame> frames;
   std::vector<UnderwaterPoint> points;
-  Rigid3 told_start;  ///< The first pose as a filter is given it.
+  Rigid3 given_start;  ///< The first pose as a filter is given it.
 };
 
 /// Vertices of a 10×8 grid of 28 mm: 1 (0,0), 2 (9,0), 3 (9,7), 4 (0,7), 5 (5,4), 6 (2,2), 7 (7,2), 8 (7,5); the world

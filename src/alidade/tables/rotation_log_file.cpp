@@ -125,8 +125,8 @@ std::optional<RotationLogEntry> RotationLogStream::next_checked() {
   if (!row) return std::nullopt;
   RotationLogEntry entry{rotation_row(*row, columns_, table_.name()), true_intrinsics(*row, columns_, table_.name()),
                          row->line};
-  layout_.sigma_scale = told_share(*row, columns_.sigma_scale, columns_, table_.name());
-  layout_.sigma_parallax = told_share(*row, columns_.sigma_parallax, columns_, table_.name());
+  layout_.sigma_scale = given_share(*row, columns_.sigma_scale, columns_, table_.name());
+  layout_.sigma_parallax = given_share(*row, columns_.sigma_parallax, columns_, table_.name());
   if (last_ && entry.row.t_s < last_->row.t_s) {
     throw InputError(CsvPlace{table_.name(), row->line, columns_.names[columns_.t]}.text() + ": '" +
                      row->cells[columns_.t] + "' is before the row above; time must not go back");
@@ -165,8 +165,8 @@ std::string rotation_log_csv(const RotationLog& log) {
     if (has_range) append_cells(text, &row.range_m, 1, std::isfinite(row.range_m));
     if (!log.truth.empty())
       for (const double value : log.truth[i]) fmt::format_to(std::back_inserter(text), ",{:.6f}", value);
-    for (const std::optional<double>& told : {log.sigma_scale, log.sigma_parallax})
-      if (told) fmt::format_to(std::back_inserter(text), ",{:g}", *told);
+    for (const std::optional<double>& given : {log.sigma_scale, log.sigma_parallax})
+      if (given) fmt::format_to(std::back_inserter(text), ",{:g}", *given);
     text += '\n';
   }
   return text;

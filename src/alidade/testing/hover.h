@@ -118,9 +118,9 @@ inline HoverRun hovering(const Hover& scene, std::uint64_t seed) {
   std::vector<Eigen::Vector3d> points{{-0.15, -0.1, 0.0}, {0.15, -0.1, 0.0}, {0.15, 0.1, 0.0},
                                       {-0.15, 0.1, 0.0},  {0.05, 0.0, 0.0},  {-0.05, 0.05, 0.0}};
   for (std::size_t i = 0; i < points.size(); ++i) {
-    Eigen::Vector3d told = points[i] + scene.sigma_known_m * draws.normal3();
-    told.x() *= 1.0 + scene.target_stretch;
-    run.target.push_back({static_cast<long>(i) + 1, told, scene.sigma_known_m});
+    Eigen::Vector3d given = points[i] + scene.sigma_known_m * draws.normal3();
+    given.x() *= 1.0 + scene.target_stretch;
+    run.target.push_back({static_cast<long>(i) + 1, given, scene.sigma_known_m});
   }
   const double wide = scene.lens == HoverLens::fisheye ? 2.0 : 1.0;
   for (int i = 0; i < scene.num_others; ++i) {

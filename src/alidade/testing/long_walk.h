@@ -43,7 +43,7 @@ inline WalkRun long_walk(const LongWalk& scene, std::uint64_t seed) {
                                       {-0.15, 0.1, 1.2},  {0.05, 0.0, 1.2},  {-0.05, 0.05, 1.2}};
   for (std::size_t i = 0; i < points.size(); ++i) run.target.push_back({static_cast<long>(i), points[i], 0.001});
   if (scene.sigma_known_m > 0.0)
-    for (KnownPoint& told : run.target) told.point_in_world += scene.sigma_known_m * draws.normal3();
+    for (KnownPoint& given : run.target) given.point_in_world += scene.sigma_known_m * draws.normal3();
   for (int i = 0; i < scene.num_points; ++i) {
     const double x = draws.uniform(-1.0, scene.length_m + 1.0), y = draws.uniform(-0.8, 0.8);
     points.emplace_back(x, y, scene.is_wall ? wall_z(x, y) : draws.uniform(1.0, 2.2));

@@ -14,11 +14,11 @@ namespace alidade::testing {
 
 using reproduce::direction_error_rad;
 using reproduce::draw_rangefinder_sample;
+using reproduce::given_config;
 using reproduce::origin_error_m;
 using reproduce::quantile_of;
 using reproduce::RangefinderSample;
 using reproduce::reprojection_px;
 using reproduce::solve_sample;
-using reproduce::told_config;
 
 }  // namespace alidade::testing

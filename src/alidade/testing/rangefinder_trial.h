@@ -55,9 +55,9 @@ inline RangefinderTrial rangefinder_trial(const RangefinderTrialSetup& setup, st
     for (Shot& shot : shots) shot.board.reset();
   if (setup.is_mirrored) mirror(shots, sample.camera.width_px);
   const Camera camera = mistaken_camera(sample.camera, setup.mistake.focal, setup.mistake.centre_px, setup.mistake.k1);
-  RangefinderConfig told{.method = setup.method};
-  if (setup.tells_lengths) told.sigma_scale = told.sigma_square_m = 0.0;
-  RangefinderTrial trial{solve_rangefinder(shots, sample.points, camera, told)};
+  RangefinderConfig given{.method = setup.method};
+  if (setup.tells_lengths) given.sigma_scale = given.sigma_square_m = 0.0;
+  RangefinderTrial trial{solve_rangefinder(shots, sample.points, camera, given)};
   Verdict& verdict = trial.solved.verdict;
   const RangefinderReport& report = trial.solved.report;
   const bool is_solved = verdict.state == State::good || verdict.state == State::care;

@@ -93,9 +93,9 @@ TEST(ConsideredErrors, AgreeWithTheRecursionWrittenOut) {
       Eigen::MatrixXd K = P * H.transpose() * S.inverse();
       if (!learns) K.bottomRows(num).setZero();
       const Eigen::Vector2d nu = z - seen->z - *effect * x.tail(num);
-      const Innovation told = filter.expect(*seen, *effect, z);
-      EXPECT_LT((told.S - S).norm(), 1e-9 * S.norm());
-      EXPECT_LT((told.nu - nu).norm(), 1e-9);
+      const Innovation given = filter.expect(*seen, *effect, z);
+      EXPECT_LT((given.S - S).norm(), 1e-9 * S.norm());
+      EXPECT_LT((given.nu - nu).norm(), 1e-9);
       ASSERT_TRUE(filter.update(*seen, *effect, z, see, {.max_iterations = 1}));
       x += K * nu;
       const Eigen::MatrixXd A = Eigen::MatrixXd::Identity(6 + num, 6 + num) - K * H;
@@ -189,11 +189,11 @@ TEST(ConsideredErrors, ComeInAnyOrderAndAllocateNothing) {
 TEST(RigFaults, ATurnedHeadIsNamedAndARightOneIsNot) {
   TrackScene scene = *track_scenario("C");
   for (const bool is_turned : {false, true}) {
-    std::vector<RigHead> told = scene.heads;
+    std::vector<RigHead> given = scene.heads;
     if (is_turned)
-      told[1].head.world_from_base.rotation = told[1].head.world_from_base.rotation * exp_so3({0.01, 0.0, 0.0});
+      given[1].head.world_from_base.rotation = given[1].head.world_from_base.rotation * exp_so3({0.01, 0.0, 0.0});
     FollowConfig config;
-    const TrackReport report = track_target(observations_of(scene, 3), told, config);
+    const TrackReport report = track_target(observations_of(scene, 3), given, config);
     ASSERT_FALSE(report.faults.empty());
     if (is_turned) {
       EXPECT_EQ(report.faults.front().name, "head2.base_rx_rad");

@@ -160,9 +160,9 @@ class TurnedRun {
     const double f = report_.camera[0];
     constexpr double max_focal = 0.05, max_centre = 0.05;
     const Eigen::VectorXd sigma = report_.cov.diagonal().cwiseSqrt();
-    const bool is_told = sigma.allFinite() && sigma.head<2>().maxCoeff() < max_focal * f &&
-                         sigma.segment<2>(2).maxCoeff() < max_centre * photos_.width_px;
-    report_.status = is_told ? TurnedReport::Status::ok : TurnedReport::Status::weak;
+    const bool is_given = sigma.allFinite() && sigma.head<2>().maxCoeff() < max_focal * f &&
+                          sigma.segment<2>(2).maxCoeff() < max_centre * photos_.width_px;
+    report_.status = is_given ? TurnedReport::Status::ok : TurnedReport::Status::weak;
   }
 
   void note_fit() {
@@ -211,9 +211,9 @@ class TurnedRun {
     ScatterCovariance scatter = scatter_covariance(fit_, progress_);
     report_.lens_terms = free_.lens_terms;
     while (report_.lens_terms > 0 && !config_.keeps_terms) {
-      constexpr double told_beyond = 3.0;  // σ
+      constexpr double given_beyond = 3.0;  // σ
       const int last = num_camera - 3 + report_.lens_terms;
-      if (std::abs(fit_.bundle.camera[last]) > told_beyond * std::sqrt(scatter.cov(last, last))) break;
+      if (std::abs(fit_.bundle.camera[last]) > given_beyond * std::sqrt(scatter.cov(last, last))) break;
       const Eigen::Vector4d before = fit_.bundle.camera.head<4>();
       free_.lens_terms = --report_.lens_terms;
       fit_ = fit_again(photos_, tree_, std::move(fit_), free_, progress_);

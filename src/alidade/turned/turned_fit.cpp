@@ -119,12 +119,12 @@ class Rounds {
 
   /// All that the camera explains so far, adjusted, less what does not fit then. False: too little is left.
   bool again(const std::vector<int>& place, double gate) {
-    const double told = std::max(sigma_by_median(fit_), given_);
+    const double given = std::max(sigma_by_median(fit_), given_);
     prepare(0.5 * (fit_.bundle.camera[0] + fit_.bundle.camera[1]));
     // a match's transfer has the noise of both its ends
-    const auto matches = explained_matches(photos_, fit_.bundle, place, gate * std::sqrt(2.0) * told);
+    const auto matches = explained_matches(photos_, fit_.bundle, place, gate * std::sqrt(2.0) * given);
     fit_.num_kept = set_tracks(photos_, matches, place, fit_.bundle);
-    fit_.solve.sigma_px = told;
+    fit_.solve.sigma_px = given;
     constexpr int max_times = 3;
     for (int i = 0; i < max_times; ++i) {
       if (freedom_of(fit_.bundle) < 1.0) return false;

@@ -41,7 +41,7 @@ CalibrateConfig with_port(CalibrateConfig config, const PortKnowledge& port) {
   return config;
 }
 
-double largest_told_sigma(const std::string& name, double value, const Camera& camera) {
+double largest_given_sigma(const std::string& name, double value, const Camera& camera) {
   if (name == "fx" || name == "fy") return 0.05 * value;
   if (name == "cx" || name == "cy") return 0.1 * std::max(camera.width_px, camera.height_px);
   // Of a port: 5 mm of gap and 1° of tilt are what decides whether a Brown lens would do.

@@ -13,7 +13,7 @@ namespace alidade {
 [[nodiscard]] CalibrateConfig with_port(CalibrateConfig config, const PortKnowledge& port);
 
 /// Largest σ with which a parameter still counts as determined; infinity where any will do (distortion).
-[[nodiscard]] double largest_told_sigma(const std::string& name, double value, const Camera& camera);
+[[nodiscard]] double largest_given_sigma(const std::string& name, double value, const Camera& camera);
 
 /// "Brown … errs by 0.29 / 0.12 / 0.00 / 0.08 px at 0.3 / 0.5 / 1 / 3 m: it is enough from 0.5 m on", or not.
 [[nodiscard]] std::string port_sentence(const PortResidual& residual);

@@ -217,8 +217,8 @@ class ShotSession {
   }
   void tell_so_far() {
     constexpr double pause_s = 3.0;
-    if (!config_.on_so_far || shots_.empty() || head_.now_s() - told_s_ < pause_s) return;
-    told_s_ = head_.now_s();
+    if (!config_.on_so_far || shots_.empty() || head_.now_s() - given_s_ < pause_s) return;
+    given_s_ = head_.now_s();
     result_.log_csv = log_text();
     result_.head_time_s = head_time();
     config_.on_so_far(result_);
@@ -235,7 +235,7 @@ class ShotSession {
   bool is_found_ = false;
   Eigen::Vector2d middle_ = Eigen::Vector2d::Zero();
   Eigen::Matrix2d px_by_rad_ = Eigen::Matrix2d::Identity();
-  double begin_s_ = 0.0, still_since_s_ = 0.0, told_s_ = 0.0;
+  double begin_s_ = 0.0, still_since_s_ = 0.0, given_s_ = 0.0;
 };
 
 }  // namespace

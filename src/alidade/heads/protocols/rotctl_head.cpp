@@ -95,9 +95,9 @@ class RotctlHead final : public HeadDevice {
       if (line == "done" || line.starts_with("RPRT")) break;
     }
     limits_.info = "rotctld";
-    const bool is_told = min_az && max_az && min_el && max_el && *min_az < *max_az && *min_el < *max_el;
-    if (!is_told || !std::isfinite(*max_az - *min_az + *max_el - *min_el)) return;
-    limits_.are_told = true;
+    const bool is_given = min_az && max_az && min_el && max_el && *min_az < *max_az && *min_el < *max_el;
+    if (!is_given || !std::isfinite(*max_az - *min_az + *max_el - *min_el)) return;
+    limits_.are_given = true;
     limits_.low_rad = Eigen::Vector2d(-*max_az, *min_el) * degree;
     limits_.high_rad = Eigen::Vector2d(-*min_az, *max_el) * degree;
   }

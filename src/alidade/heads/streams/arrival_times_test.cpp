@@ -27,12 +27,12 @@ Errors errors_of(std::uint64_t seed, double mean_delay_s, bool has_tick) {
     const double taken_s = 1.7e9 + period_s * i;
     const double came_s = std::max(last_came_s, taken_s + 0.01 - mean_delay_s * std::log(1.0 - draws.uniform()));
     last_came_s = came_s;  // the order is kept
-    const FilteredTime told = filter.add(came_s, has_tick ? std::optional(3.0 + period_s * i) : std::nullopt);
-    EXPECT_LE(told.t_s, came_s);
+    const FilteredTime given = filter.add(came_s, has_tick ? std::optional(3.0 + period_s * i) : std::nullopt);
+    EXPECT_LE(given.t_s, came_s);
     if (i < 120) continue;
-    off.push_back(told.t_s - taken_s);
+    off.push_back(given.t_s - taken_s);
     raw.push_back(came_s - taken_s);
-    sigma_s += told.sigma_s / 480.0;
+    sigma_s += given.sigma_s / 480.0;
   }
   const auto scatter = [](const std::vector<double>& values, double level) {
     double sum2 = 0.0;
@@ -67,8 +67,8 @@ TEST(ArrivalTimes, LostFramesAreFoundOut) {
   for (int i = 0; i < 600; ++i) {
     if (i >= 300 && i < 303) continue;
     const double taken_s = 100.0 + period_s * i;
-    const FilteredTime told = filter.add(taken_s - 0.005 * std::log(1.0 - draws.uniform()));
-    if (i > 400) off_s = std::max(off_s, std::abs(told.t_s - taken_s));
+    const FilteredTime given = filter.add(taken_s - 0.005 * std::log(1.0 - draws.uniform()));
+    if (i > 400) off_s = std::max(off_s, std::abs(given.t_s - taken_s));
   }
   EXPECT_LT(off_s, 0.01);
 }

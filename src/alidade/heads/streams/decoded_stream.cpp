@@ -55,11 +55,11 @@ class DecodedStream final : public FrameStream {
     std::copy(bytes.begin(), bytes.end(), image->data);
     const FrameTime& time = video_->time();
     constexpr double most_apart_s = 3600.0;
-    const bool is_told = std::isfinite(time.taken_s) && std::abs(time.taken_s - now_s) < most_apart_s;
+    const bool is_given = std::isfinite(time.taken_s) && std::abs(time.taken_s - now_s) < most_apart_s;
     const bool is_device = name_.starts_with("v4l2:");
     const FilteredTime filtered =
         arrivals_.add(now_s, std::isfinite(time.media_s) ? std::optional(time.media_s) : std::nullopt);
-    if (!is_told) return {filtered.t_s, FrameTimes::arrival, filtered.sigma_s, now_s, std::move(image)};
+    if (!is_given) return {filtered.t_s, FrameTimes::arrival, filtered.sigma_s, now_s, std::move(image)};
     return {time.taken_s, is_device ? FrameTimes::stamped : FrameTimes::sender, 0.0, now_s, std::move(image)};
   }
 

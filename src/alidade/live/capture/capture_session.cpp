@@ -46,8 +46,8 @@ CaptureSession::CaptureSession(const Board& board, const CaptureConfig& config, 
 }
 
 void CaptureSession::tell_once(const std::string& line) {
-  if (std::ranges::find(told_, line) != told_.end()) return;
-  told_.push_back(line);
+  if (std::ranges::find(given_, line) != given_.end()) return;
+  given_.push_back(line);
   tell_(line);
 }
 

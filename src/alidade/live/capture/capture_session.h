@@ -55,7 +55,7 @@ class CaptureSession {
   CaptureGuide guide_;
   KeptPhotos kept_;
   std::function<void(const std::string&)> tell_;
-  std::vector<std::string> told_;
+  std::vector<std::string> given_;
   bool is_paused_ = false, has_warned_ = false;
   bool all_exact_ = true;  ///< All pictures so far: which of them an earlier one was is not asked.
   double begin_s_ = 0.0;

@@ -23,6 +23,6 @@ void take_over(const SmoothedPath& smoothed, Localization& result);
 
 /// Σ |ŷ − y|²/σ² over the known points of a map, per number: below 1 on average, as they are also held by what
 /// was given.
-[[nodiscard]] double known_shift(std::span<const MapPoint> map, std::span<const KnownPoint> told);
+[[nodiscard]] double known_shift(std::span<const MapPoint> map, std::span<const KnownPoint> given);
 
 }  // namespace alidade

@@ -37,14 +37,14 @@ LocalizationFilter filter_of(const testing::UnderwaterSample& sample, const Loca
   return filter;
 }
 
-void add_told(const testing::UnderwaterSample& sample, const ObservationFrame& frame, FeatureKind kind,
-              LocalizationFilter& filter) {
+void add_given(const testing::UnderwaterSample& sample, const ObservationFrame& frame, FeatureKind kind,
+               LocalizationFilter& filter) {
   for (const FeatureObservation& observation : frame.observations) {
-    const auto told = std::ranges::find(sample.config.start->depths, observation.id, &GivenDepth::id);
-    if (filter.has(observation.id) || told == sample.config.start->depths.end()) continue;
+    const auto given = std::ranges::find(sample.config.start->depths, observation.id, &GivenDepth::id);
+    if (filter.has(observation.id) || given == sample.config.start->depths.end()) continue;
     const auto ray_in_cam = unproject(filter.camera(), observation.px);
     ASSERT_TRUE(ray_in_cam);
-    EXPECT_TRUE(filter.add(observation.id, observation.px, {told->depth_m / ray_in_cam->z(), told->sigma_rel}, kind));
+    EXPECT_TRUE(filter.add(observation.id, observation.px, {given->depth_m / ray_in_cam->z(), given->sigma_rel}, kind));
   }
 }
 
@@ -54,7 +54,7 @@ TEST(LocalizationFilter, CovarianceStaysSymmetricAndPositiveOverAThousandFrames)
   for (std::size_t k = 0; k < sample.frames.size(); ++k) {
     if (k > 0) filter.predict(0.1);
     EXPECT_TRUE(filter.update(sample.frames[k].observations).is_sound);
-    add_told(sample, sample.frames[k], FeatureKind::inverse_depth, filter);
+    add_given(sample, sample.frames[k], FeatureKind::inverse_depth, filter);
     filter.convert_linear();
   }
   const Eigen::MatrixXd P = covariance_of(filter);
@@ -171,7 +171,7 @@ TEST(LocalizationFilter, AllocatesNothingOnceItRuns) {
       EXPECT_EQ(testing::num_allocations(), before) << k;
       num_gated += report.num_gated;
     }
-    add_told(sample, sample.frames[k], FeatureKind::inverse_depth, filter);
+    add_given(sample, sample.frames[k], FeatureKind::inverse_depth, filter);
     filter.convert_linear();
   }
   EXPECT_GT(num_gated, 300u);
@@ -192,7 +192,7 @@ TEST(LocalizationFilter, ExpectsWhatItThenSees) {
       ++num;
     }
     (void)filter.update(sample.frames[k].observations);
-    add_told(sample, sample.frames[k], FeatureKind::inverse_depth, filter);
+    add_given(sample, sample.frames[k], FeatureKind::inverse_depth, filter);
     filter.convert_linear();
   }
   EXPECT_GT(num, 700);

@@ -13,11 +13,11 @@ namespace {
 /// Distances that were only supposed share their error: as vague as they are told to be, hundreds of them together
 /// would say how large the world is.
 RangePrior vague(RangePrior range, long id, bool sets_unit, const LocalizeConfig& config) {
-  constexpr double hardly_told = 5.0;
-  const bool is_told =
+  constexpr double hardly_given = 5.0;
+  const bool is_given =
       config.start && std::ranges::find(config.start->depths, id, &GivenDepth::id) != config.start->depths.end();
-  if (!is_told && !sets_unit && config.new_points != NewPoints::delayed)
-    range.sigma_rel = std::max(range.sigma_rel, hardly_told);
+  if (!is_given && !sets_unit && config.new_points != NewPoints::delayed)
+    range.sigma_rel = std::max(range.sigma_rel, hardly_given);
   return range;
 }
 
@@ -42,7 +42,8 @@ RangePrior vague(RangePrior range, long id, bool sets_unit, const LocalizeConfig
   for (const auto& [id, life] : lives)
     if (life.num > 0) by_use.push_back(life);
   std::ranges::stable_sort(by_use, [&](const Life& a, const Life& b) {
-    const bool known_a = points[a.point].told_in_world.has_value(), known_b = points[b.point].told_in_world.has_value();
+    const bool known_a = points[a.point].given_in_world.has_value(),
+               known_b = points[b.point].given_in_world.has_value();
     return known_a != known_b ? known_a : a.num > b.num;
   });
   std::vector<int> num_at(frames.size(), 0);
@@ -201,11 +202,11 @@ void ObservationRecord::add_points(const LocalizeConfig& config, const Localizat
     SmootherPoint point;
     point.id = feature.id;
     point.point_in_world = place_of(feature).point_in_world;
-    const auto told = std::ranges::find(config.target.points, feature.id, &KnownPoint::id);
+    const auto given = std::ranges::find(config.target.points, feature.id, &KnownPoint::id);
     const auto birth = births_.find(feature.id);
-    if (told != config.target.points.end()) {
-      point.told_in_world = told->point_in_world;
-      point.sigma_m = told->sigma_m;
+    if (given != config.target.points.end()) {
+      point.given_in_world = given->point_in_world;
+      point.sigma_m = given->sigma_m;
     } else if (birth != births_.end()) {
       point.first_frame = birth->second.frame;
       point.range = vague(birth->second.range, feature.id, sets_unit(config, birth->second.frame), config);
@@ -214,9 +215,9 @@ void ObservationRecord::add_points(const LocalizeConfig& config, const Localizat
     }
     problem.points.push_back(point);
   }
-  for (const KnownPoint& told : config.target.points)
-    if (!filter.has(told.id))
-      problem.points.push_back({told.id, told.point_in_world, told.point_in_world, told.sigma_m, 0, {}});
+  for (const KnownPoint& given : config.target.points)
+    if (!filter.has(given.id))
+      problem.points.push_back({given.id, given.point_in_world, given.point_in_world, given.sigma_m, 0, {}});
 }
 
 void ObservationRecord::add_gone(const LocalizeConfig& config, std::span<const GonePoint> gone,
@@ -272,7 +273,7 @@ std::optional<SmootherProblem> ObservationRecord::problem(
   std::erase_if(problem.points, [&](const SmootherPoint& point) { return !seen.contains(point.id); });
   std::ranges::sort(problem.points, {}, &SmootherPoint::id);
   if (has_target &&
-      std::ranges::none_of(problem.points, [](const SmootherPoint& point) { return point.told_in_world.has_value(); }))
+      std::ranges::none_of(problem.points, [](const SmootherPoint& point) { return point.given_in_world.has_value(); }))
     return std::nullopt;
   problem.camera = camera;
   if (num_begun_ == 1 && (config.start || !has_target)) problem.start = start;  // else the observations contradicted it

@@ -208,7 +208,7 @@ class LoopCloser {
   [[nodiscard]] std::map<std::size_t, std::vector<Candidate>> candidates() const {
     std::map<long, std::vector<long>> ids_of;
     for (const auto& [id, times] : times_)
-      if (times.num > 1 && !problem_.points[times.index].told_in_world) ids_of[number(id)].push_back(id);
+      if (times.num > 1 && !problem_.points[times.index].given_in_world) ids_of[number(id)].push_back(id);
     std::map<std::size_t, std::vector<Candidate>> by_keyframe;
     for (auto& [number, ids] : ids_of) {
       std::ranges::sort(ids, {}, [&](long id) { return times_.at(id).first; });

@@ -13,7 +13,7 @@ namespace {
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using WindowRows = PathSmoother::WindowRows;
 
-constexpr double hardly_told = 1e-6;  // m⁻², rad⁻²: a pose alone that nothing tells must not stop all others
+constexpr double hardly_given = 1e-6;  // m⁻², rad⁻²: a pose alone that nothing tells must not stop all others
 
 void add_window(const WindowRows& J, const Eigen::Vector<double, 6>& error, const Eigen::Vector<double, 6>& variance,
                 SmootherSystem& system) {
@@ -59,17 +59,17 @@ Eigen::MatrixXd PathSmoother::considered_cov() const {
 
 /// Of a target that is longer along x than it is told to be and as much shorter along y, by a share: what a told place
 /// changes by.
-Eigen::Vector3d PathSmoother::shape_change(const Eigen::Vector3d& told_in_world) const {
-  const Eigen::Vector3d out = told_in_world - target_middle_;
+Eigen::Vector3d PathSmoother::shape_change(const Eigen::Vector3d& given_in_world) const {
+  const Eigen::Vector3d out = given_in_world - target_middle_;
   return {0.5 * out.x(), -0.5 * out.y(), 0.0};
 }
 
-void PathSmoother::add_told_point(const SmootherState& state, std::size_t point, SmootherSystem& system) const {
-  const Eigen::Vector3d& told = *problem_.points[point].told_in_world;
+void PathSmoother::add_given_point(const SmootherState& state, std::size_t point, SmootherSystem& system) const {
+  const Eigen::Vector3d& given = *problem_.points[point].given_in_world;
   const double weight = std::pow(problem_.points[point].sigma_m, -2);
-  const Eigen::Vector3d error = state.points[point] - told;
+  const Eigen::Vector3d error = state.points[point] - given;
   Eigen::Matrix<double, 3, 2> J;  // of where it is told to be: by scale, and by shape
-  J << told, shape_change(told);
+  J << given, shape_change(given);
   PoseChain& chain = system.chain;
   const int at = chain.place_of(point), by = causes_at_ + scale_cause;
   chain.B.diagonal().segment<3>(at).array() += weight;
@@ -82,7 +82,7 @@ void PathSmoother::add_told_point(const SmootherState& state, std::size_t point,
 }
 
 /// What was given of the lens.
-void PathSmoother::add_told_lens(const SmootherState& state, SmootherSystem& system) const {
+void PathSmoother::add_given_lens(const SmootherState& state, SmootherSystem& system) const {
   PoseChain& chain = system.chain;
   if (num_estimated_ == 0) return;
   const Eigen::MatrixXd information = lens_information();
@@ -90,7 +90,7 @@ void PathSmoother::add_told_lens(const SmootherState& state, SmootherSystem& sys
   Eigen::VectorXd error(num_estimated_);
   for (int i = 0; i < num_estimated_; ++i) {
     const int at = lens_order_[static_cast<std::size_t>(i)];
-    error[i] = now[at] - told_lens_[at];
+    error[i] = now[at] - given_lens_[at];
   }
   chain.B.block(lens_at_, lens_at_, num_estimated_, num_estimated_) += information;
   chain.b.segment(lens_at_, num_estimated_) -= information * error;
@@ -109,10 +109,10 @@ PathSmoother::Twist PathSmoother::twist_at(const SmootherState& state, std::size
 
 /// What was believed of a point's distance where it was first seen, as an inverse one.
 void PathSmoother::add_range(const SmootherState& state, std::size_t point, SmootherSystem& system) const {
-  const SmootherPoint& told = problem_.points[point];
-  const Eigen::Vector3d from_camera = state.points[point] - state.poses[told.first_frame].translation;
-  const double distance_m = from_camera.norm(), weight = told.range->range_m / told.range->sigma_rel;
-  const double error = weight * (1.0 / distance_m - 1.0 / told.range->range_m);
+  const SmootherPoint& given = problem_.points[point];
+  const Eigen::Vector3d from_camera = state.points[point] - state.poses[given.first_frame].translation;
+  const double distance_m = from_camera.norm(), weight = given.range->range_m / given.range->sigma_rel;
+  const double error = weight * (1.0 / distance_m - 1.0 / given.range->range_m);
   const Eigen::Vector3d J =
       -weight / std::pow(distance_m, 3) * from_camera;  // by the point; by the position, minus that
   PoseChain& chain = system.chain;
@@ -196,21 +196,21 @@ void PathSmoother::add_motion(const SmootherState& state, std::size_t k, Smoothe
   step_variance << Eigen::Vector3d::Constant(std::pow(problem_.filter.sigma_a_m_s2 * problem_.period_s, 2)),
       Eigen::Vector3d::Constant(std::pow(problem_.filter.sigma_alpha_rad_s2 * problem_.period_s, 2));
   const auto is_jump = [&](std::size_t i) { return i < problem_.is_jump.size() && problem_.is_jump[i]; };
-  if (is_jump(k) || is_jump(k + 1)) system.chain.A.diagonal().head<6>().array() += hardly_told;
+  if (is_jump(k) || is_jump(k + 1)) system.chain.A.diagonal().head<6>().array() += hardly_given;
   if (is_jump(k + 1)) return;
   WindowRows J = WindowRows::Zero();
   const Speeds first = speeds(state, k);
   if (k == 0 || is_jump(k)) {
-    Eigen::Vector<double, 6> told = Eigen::Vector<double, 6>::Zero(), variance;
+    Eigen::Vector<double, 6> given = Eigen::Vector<double, 6>::Zero(), variance;
     variance << Eigen::Vector3d::Constant(std::pow(problem_.sigma_speed_m_s, 2)),
         Eigen::Vector3d::Constant(std::pow(problem_.sigma_rate_rad_s, 2));
     if (problem_.start && k == 0) {
-      told << problem_.start->motion.velocity_in_world, problem_.start->motion.rate_in_cam;
+      given << problem_.start->motion.velocity_in_world, problem_.start->motion.rate_in_cam;
       variance = problem_.start->cov.diagonal().tail<6>();
     }
     J.leftCols<6>() = first.J_from;
     J.middleCols<6>(6) = first.J_to;
-    add_window(J, first.values - told, variance + walked_before(steps(k)) * step_variance, system);
+    add_window(J, first.values - given, variance + walked_before(steps(k)) * step_variance, system);
   }
   if (k + 2 >= state.poses.size() || is_jump(k + 2)) return;
   const Speeds second = speeds(state, k + 1);
@@ -224,11 +224,11 @@ void PathSmoother::add_motion(const SmootherState& state, std::size_t k, Smoothe
 
 void PathSmoother::add_start(const SmootherState& state, SmootherSystem& system) const {
   if (!problem_.start) return;
-  const Rigid3 &told = problem_.start->motion.world_from_cam, &is = state.poses.front();
+  const Rigid3 &given = problem_.start->motion.world_from_cam, &is = state.poses.front();
   const Eigen::Matrix<double, 6, 6> information = problem_.start->cov.topLeftCorner<6, 6>().inverse();
-  const Eigen::Vector3d phi = log_so3(told.rotation.conjugate() * is.rotation);
+  const Eigen::Vector3d phi = log_so3(given.rotation.conjugate() * is.rotation);
   Eigen::Vector<double, 6> error;
-  error << is.translation - told.translation, phi;
+  error << is.translation - given.translation, phi;
   Eigen::Matrix<double, 6, 6> J = Eigen::Matrix<double, 6, 6>::Identity();
   J.bottomRightCorner<3, 3>() = inverse_right_jacobian(phi);
   system.chain.A.topLeftCorner<6, 6>() += J.transpose() * information * J;
@@ -239,7 +239,7 @@ void PathSmoother::add_start(const SmootherState& state, SmootherSystem& system)
 std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state, Shared shared) const {
   SmootherSystem system{PoseChain(shared == Shared::all ? causes_at_ + num_causes : num_estimated_, most_at_once_)};
   system.has_given = shared == Shared::all;
-  add_told_lens(state, system);
+  add_given_lens(state, system);
   add_start(state, system);
   std::vector<std::vector<std::size_t>> first_seen(state.poses.size());
   for (std::size_t i = 0; i < problem_.points.size(); ++i)
@@ -248,12 +248,12 @@ std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state, Sh
   for (std::size_t k = 0; k < state.poses.size(); ++k) {
     for (const std::size_t point : entering_[k]) {
       (void)system.chain.enter(point);
-      if (problem_.points[point].told_in_world) add_told_point(state, point, system);
+      if (problem_.points[point].given_in_world) add_given_point(state, point, system);
     }
     if (!add_observations(state, k, rows, system)) return std::nullopt;
     for (const std::size_t point : first_seen[k]) add_range(state, point, system);
     if (k + 1 < state.poses.size()) add_motion(state, k, system);
-    if (k + 1 == state.poses.size()) system.chain.A.diagonal().head<6>().array() += hardly_told;
+    if (k + 1 == state.poses.size()) system.chain.A.diagonal().head<6>().array() += hardly_given;
     if (held_ && held_->frame == k) add_held(state, system);
     if (!system.chain.eliminate()) return std::nullopt;
     for (const std::size_t point : leaving_[k])

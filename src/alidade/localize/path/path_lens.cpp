@@ -44,7 +44,7 @@ void PathSmoother::free_lens() {
     if (at == names.end()) continue;
     open.push_back(static_cast<int>(at - names.begin()));
     const bool is_focal = each.name[0] == 'f';
-    sigma_estimated_.push_back(each.sigma * (is_focal           ? told_lens_[open.back()]
+    sigma_estimated_.push_back(each.sigma * (is_focal           ? given_lens_[open.back()]
                                              : each.is_relative ? problem_.camera.width_px
                                                                 : 1.0));
   }

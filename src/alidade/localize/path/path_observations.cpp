@@ -16,7 +16,7 @@ PathSmoother::GivenRows PathSmoother::given_rows(const ExpectedView& view, const
   GivenRows J = GivenRows::Zero(2, num_lens + num_causes);
   for (Eigen::Index i = 0; i < num_lens; ++i) J.col(i) = view.J_px_lens.col(lens_order_[static_cast<std::size_t>(i)]);
   const SmootherPoint& point = problem_.points[index_of_.at(observation.id)];
-  if (point.told_in_world)  // a target that moves: not where it is given to be, but further by so much
+  if (point.given_in_world)  // a target that moves: not where it is given to be, but further by so much
     J.middleCols<3>(num_lens + speed_cause) =
         (problem_.t_s[observation.frame] - middle_s_) * view.J_px_feature.leftCols<3>();
   const double rows =

@@ -15,19 +15,19 @@ PathSmoother::PathSmoother(const SmootherProblem& problem) : problem_(problem) {
   estimate_lens(problem.filter.lens_params);
   sigma_estimated_ = problem.filter.sigma_lens_params;
   causes_at_ = lens_at_ + static_cast<int>(lens_order_.size());
-  double num_told = 0.0;
+  double num_given = 0.0;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     index_of_[problem.points[i].id] = i;
     state_.points.push_back(problem.points[i].point_in_world);
-    if (!problem.points[i].told_in_world) continue;
-    target_middle_ += *problem.points[i].told_in_world;
-    num_told += 1.0;
+    if (!problem.points[i].given_in_world) continue;
+    target_middle_ += *problem.points[i].given_in_world;
+    num_given += 1.0;
   }
-  if (num_told > 0.0) target_middle_ /= num_told;
+  if (num_given > 0.0) target_middle_ /= num_given;
   middle_s_ = 0.5 * (problem.t_s.front() + problem.t_s.back());
   state_.camera = problem.camera;
   state_.poses = problem.world_from_cam;
-  told_lens_ = params(problem.camera.lens);
+  given_lens_ = params(problem.camera.lens);
 }
 
 /// A point is there from its first observation, or where its distance was believed, to its last.
@@ -163,7 +163,7 @@ SmoothedPath PathSmoother::finished(const SmootherSystem& system) {
   path.structure.sigma_colour = structure_.sigma_colour;
   path.radial = radial_structure(path.residuals, state_.camera, structure_.has_colour());
   path.num_dropped = problem_.observations.size() - observations_.size();
-  if (std::ranges::any_of(problem_.points, [](const SmootherPoint& point) { return point.told_in_world.has_value(); }))
+  if (std::ranges::any_of(problem_.points, [](const SmootherPoint& point) { return point.given_in_world.has_value(); }))
     widen(system.cost, path);
   return path;
 }
@@ -177,7 +177,7 @@ void PathSmoother::fill_lens(const Eigen::MatrixXd& cov, SmoothedPath& path) con
   for (int i = 0; i < num_estimated_ && !is_lens_freed_; ++i) {
     const auto at = static_cast<std::size_t>(i);
     const double told = sigma_estimated_[at];
-    path.lens_pull = std::max(path.lens_pull, std::abs(now[lens_order_[at]] - told_lens_[lens_order_[at]]) / told);
+    path.lens_pull = std::max(path.lens_pull, std::abs(now[lens_order_[at]] - given_lens_[lens_order_[at]]) / told);
   }
 }
 

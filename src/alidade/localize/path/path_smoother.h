@@ -22,7 +22,7 @@ struct UsedObservation {
 struct SmootherPoint {
   long id = 0;
   Eigen::Vector3d point_in_world = Eigen::Vector3d::Zero();  ///< To begin at.
-  std::optional<Eigen::Vector3d> told_in_world;              ///< Of a known point, with its σ of each coordinate.
+  std::optional<Eigen::Vector3d> given_in_world;             ///< Of a known point, with its σ of each coordinate.
   double sigma_m = 0.001;
   std::size_t first_frame = 0;      ///< Where its distance was believed to be
   std::optional<RangePrior> range;  ///< this.

@@ -213,15 +213,15 @@ TEST(SimpleCase, TheLensesCovarianceIsCounted) {
   Draws draws(77);
   for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
     const HoverRun run = testing::hovering({.num_frames = 90, .num_others = 30}, 500 + seed);
-    Camera told = run.camera;
-    Eigen::VectorXd values = params(told.lens), sigma = Eigen::VectorXd::Zero(values.size());
+    Camera given = run.camera;
+    Eigen::VectorXd values = params(given.lens), sigma = Eigen::VectorXd::Zero(values.size());
     sigma.head<4>() << 4.0, 4.0, 3.0, 3.0;
     sigma[5] = 0.004;  // k1
     for (Eigen::Index i = 0; i < values.size(); ++i) values[i] += sigma[i] * draws.normal();
-    told.lens = with_params(told.lens, values);
-    ignored += mean_nees(hover_localized(run, told), run) / num_seeds;
-    told.cov = sigma.cwiseAbs2().asDiagonal();
-    counted += mean_nees(hover_localized(run, told), run) / num_seeds;
+    given.lens = with_params(given.lens, values);
+    ignored += mean_nees(hover_localized(run, given), run) / num_seeds;
+    given.cov = sigma.cwiseAbs2().asDiagonal();
+    counted += mean_nees(hover_localized(run, given), run) / num_seeds;
   }
   RecordProperty("counted", std::to_string(counted));
   EXPECT_GT(counted, 0.7);

@@ -49,8 +49,8 @@ class PathSmoother {
   [[nodiscard]] SmootherState moved_by(const Eigen::VectorXd& shared, const PoseChain::Steps& steps,
                                        double share) const;
   void find_lives();
-  void add_told_lens(const SmootherState& state, SmootherSystem& system) const;
-  void add_told_point(const SmootherState& state, std::size_t point, SmootherSystem& system) const;
+  void add_given_lens(const SmootherState& state, SmootherSystem& system) const;
+  void add_given_point(const SmootherState& state, std::size_t point, SmootherSystem& system) const;
   using Twist = Eigen::Vector<double, 6>;  ///< How fast a pose changes: in the world, and on the right. [m/s, rad/s]
   [[nodiscard]] Twist twist_at(const SmootherState& state, std::size_t k) const;
   using GivenRows = Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 16 + num_causes>;
@@ -100,7 +100,7 @@ class PathSmoother {
                         const Eigen::Vector<double, 6>& variance, SmootherSystem& system) const;
   void add_motion(const SmootherState& state, std::size_t k, SmootherSystem& system) const;
   void add_start(const SmootherState& state, SmootherSystem& system) const;
-  [[nodiscard]] Eigen::Vector3d shape_change(const Eigen::Vector3d& told_in_world) const;
+  [[nodiscard]] Eigen::Vector3d shape_change(const Eigen::Vector3d& given_in_world) const;
   /// The observations within the gate of where they are expected now. Whether these are others than before.
   [[nodiscard]] bool choose_observations();
   [[nodiscard]] Eigen::MatrixXd lens_information() const;
@@ -152,7 +152,7 @@ class PathSmoother {
     double value = 0.0, sigma = 1.0;
   };
   std::optional<Held> held_;
-  Eigen::VectorXd told_lens_;
+  Eigen::VectorXd given_lens_;
   SmootherState state_;
   /// The frames in which a point is in the equations, by its observations; none: it has no part in them.
   struct Life {

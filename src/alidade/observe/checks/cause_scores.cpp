@@ -17,7 +17,7 @@ using Eigen::VectorXd;
 constexpr std::size_t max_observations = 40000;  // thinned by frames: power falls, the test does not
 constexpr int num_blocks = 12;
 constexpr double estimated_effect = 1.5;
-constexpr double min_told = 1e-10;  // of a cause's information that is its own: the rest is rounding
+constexpr double min_given = 1e-10;  // of a cause's information that is its own: the rest is rounding
 
 /// Score and information of a block of time, points eliminated: estimated parameters, then causes.
 struct Block {
@@ -126,7 +126,7 @@ CauseScore Linearisation::score_of(const CauseColumns::Group& group) const {
   const SymmetricEigen eigen = symmetric_eigen(S);
   VectorXd inverse = VectorXd::Zero(width);
   for (Index i = 0; i < width; ++i) {
-    if (eigen.values[i] > min_told) inverse[i] = 1.0 / eigen.values[i];
+    if (eigen.values[i] > min_given) inverse[i] = 1.0 / eigen.values[i];
   }
   const MatrixXd S_inverse = eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose();
   const VectorXd s = score(all_.gradient);

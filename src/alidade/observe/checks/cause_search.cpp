@@ -160,9 +160,9 @@ std::optional<ObserveSetup> searched_causes(const RotationLog& log, const Observ
     found.emplace_back(noise_px, std::move(freer));
   };
   // Where the richest do not explain it, none does.
-  const double as_told = noise_of(log, config, report, sample, progress);
+  const double as_given = noise_of(log, config, report, sample, progress);
   constexpr double clearly = 0.6;
-  max_noise_px = std::min(max_noise_px, clearly * as_told);
+  max_noise_px = std::min(max_noise_px, clearly * as_given);
   for (auto trial = trials().rbegin(); trial != trials().rbegin() + 2; ++trial) attempt(*trial);
   attempt({.drift = true});
   if (!(least < max_noise_px)) return std::nullopt;

@@ -52,7 +52,7 @@ bool is_exact(const RotationLog& log) {
   return !log.truth.empty() && log.sigma_scale == 0.0 && log.sigma_parallax == 0.0;
 }
 
-std::optional<double> told_sigma(const Given& given, const RotationLog& log, const ObserveSetup& config) {
+std::optional<double> given_sigma(const Given& given, const RotationLog& log, const ObserveSetup& config) {
   if (given.told != nullptr && config.*given.told) return config.*given.told;
   if (given.told == &ObserveSetup::sigma_scale) return log.sigma_scale;
   if (given.told == &ObserveSetup::sigma_parallax) return log.sigma_parallax;
@@ -151,7 +151,7 @@ std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveSetu
     const auto cause = std::find_if(report.causes.begin(), report.causes.end(),
                                     [&](const CauseScore& each) { return each.name == given.cause; });
     if (cause == report.causes.end()) continue;
-    std::optional<double> sigma = told_sigma(given, log, config);
+    std::optional<double> sigma = given_sigma(given, log, config);
     const bool is_counted = !sigma && given.is_counted && !cause->members.empty();
     const double ordinary = ordinary_beside_scale(given, log, config);
     if (is_counted && ordinary > 0.0) count_ordinary(*cause, ordinary, cov);

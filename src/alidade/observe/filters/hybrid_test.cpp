@@ -335,8 +335,8 @@ TEST(Hybrid, ALeverArmBiasesByFTimesArmOverDepthAndARangeFreesItOfThat) {
   double sigma = 0.0;
   const Eigen::Vector2d ignored = mean_error_with_lever(false, sigma);
   EXPECT_GT(ignored.minCoeff(), 5.0);  // f r / Z = 7 px
-  const Eigen::Vector2d told = mean_error_with_lever(true, sigma);
-  EXPECT_LT(told.cwiseAbs().maxCoeff(), 0.3) << told.transpose() << ", σ of the mean " << sigma;
+  const Eigen::Vector2d given = mean_error_with_lever(true, sigma);
+  EXPECT_LT(given.cwiseAbs().maxCoeff(), 0.3) << given.transpose() << ", σ of the mean " << sigma;
 }
 
 /// Seconds of a step, median over the frames after six seconds.

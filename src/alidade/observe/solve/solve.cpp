@@ -223,8 +223,8 @@ void prefer_all_rows(const RotationLog& log, const ObserveSetup& config, const P
 }
 
 /// What is estimated and yet rests on what instruments ordinarily have.
-void note_untold(const ObserveSolution& report, const std::vector<RotationError>& errors,
-                 std::vector<Check>& told_apart) {
+void note_ungiven(const ObserveSolution& report, const std::vector<RotationError>& errors,
+                  std::vector<Check>& told_apart) {
   constexpr double hardly = 0.7;
   std::string names;
   for (const RotationError& error : errors) {
@@ -246,7 +246,7 @@ bool is_gross(const ObserveSolution& report) {
 }
 
 /// Frees what the residuals ask for: sets of causes where the answer is doubtful, one after the other where not.
-void find_causes(const RotationLog& log, const ObserveSetup& told, const Progress& progress, ObserveSetup& config,
+void find_causes(const RotationLog& log, const ObserveSetup& given, const Progress& progress, ObserveSetup& config,
                  ObserveSolution& report, std::vector<Rival>& rivals) {
   using Status = ObserveSolution::Status;
   if (is_doubtful(report) && report.status != Status::unobservable) search_causes(log, progress, config, report);
@@ -258,7 +258,7 @@ void find_causes(const RotationLog& log, const ObserveSetup& told, const Progres
     }
   }
   free_one_by_one(log, progress, config, report, rivals);
-  ObserveSetup again = told;
+  ObserveSetup again = given;
   if (has_zoom(report) || !is_answer(report) || !is_doubtful(report)) return;
   if (!search_causes(log, progress, again, report)) return;
   config = std::move(again);
@@ -268,9 +268,9 @@ void find_causes(const RotationLog& log, const ObserveSetup& told, const Progres
 
 }  // namespace
 
-ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& told, const Progress& progress) {
+ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& given, const Progress& progress) {
   using Status = ObserveSolution::Status;
-  ObserveSetup config = told;
+  ObserveSetup config = given;
   ObserveSolution report = solve_as_given(log, config, progress);
   settle_zooms(log, config, progress, report);
   std::vector<Rival> rivals;
@@ -281,14 +281,14 @@ ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& tol
   Misread misread;
   if (is_judged && is_gross(report)) misread = misread_rotation(log, config, report, progress);
   if (config.estimate_auto && is_judged && !misread.explains_all) {
-    find_causes(log, told, progress, config, report, rivals);
+    find_causes(log, given, progress, config, report, rivals);
   }
   prefer_all_rows(log, config, progress, report);
   if (is_judged && !config.no_zoom && !misread.explains_all && never_rests(log, config, report, progress)) {
     report.status = Status::unsteady;
   }
   if (is_answer(report)) {
-    note_untold(report, estimated_errors(log, config), report.told_apart);
+    note_ungiven(report, estimated_errors(log, config), report.told_apart);
     for (Check& check : rival_checks(rivals, log, config)) report.told_apart.push_back(std::move(check));
   }
   report.estimated = config.nuisances;

@@ -100,8 +100,8 @@ SolvedRangefinder solve_rangefinder(std::span<const Shot> given, std::span<const
   SolvedRangefinder free = shots.solved_with(best.camera, with_scale);
   if (!best.report.freed_distortion.empty()) name_freed(with_distortion(camera), shots, free);
   // Readings in another unit have a scale, but that is no answer.
-  const bool is_told = free.verdict.exit_code == ExitCode::ok || is_of_another_unit(free.verdict);
-  return is_told ? free : best;
+  const bool is_given = free.verdict.exit_code == ExitCode::ok || is_of_another_unit(free.verdict);
+  return is_given ? free : best;
 }
 
 }  // namespace alidade

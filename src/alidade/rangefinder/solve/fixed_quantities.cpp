@@ -161,11 +161,11 @@ std::vector<FixedQuantity> fixed_sigmas(const BeamProblem& problem, const Rangef
   const auto here = solve_beam(problem, report.camera, report.beam);
   if (!here) return fixed;
   const double dof = std::max(1, here->normals.num_rows - problem.num_free());
-  const auto add = [&](const char* name, double value, bool is_told, const BeamProblem& other) {
+  const auto add = [&](const char* name, double value, bool is_given, const BeamProblem& other) {
     const auto there = solve_beam(other, report.camera, report.beam);
     if (!(value > 0.0) || !there || !there->converged) return;
     fixed.push_back({.name = name, .value = value, .moves = between(here->beam, there->beam) / (part * value)});
-    if (is_told) fixed.back().sigma = value / std::sqrt(2.0 * dof);
+    if (is_given) fixed.back().sigma = value / std::sqrt(2.0 * dof);
   };
   BeamProblem other = problem;
   RangeNoise& noise = other.model.noise;

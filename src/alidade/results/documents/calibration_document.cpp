@@ -217,13 +217,13 @@ void fill_grids(const CalibrationStudy& study, ResultDocument& document) {
 }
 
 JsonValue sigma_of_photos(const CalibrateReport& report) {
-  std::vector<std::pair<std::string, Eigen::Index>> told;
+  std::vector<std::pair<std::string, Eigen::Index>> given;
   const auto names = param_names(report.camera.lens);
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    if (report.model_cov(k, k) > 0.0) told.emplace_back(names[i], k);
+    if (report.model_cov(k, k) > 0.0) given.emplace_back(names[i], k);
   }
-  return sigma_values(told, report.clusters);
+  return sigma_values(given, report.clusters);
 }
 
 /// How a brown lens would do in the place of a flat port.

@@ -2,9 +2,9 @@
 
 namespace alidade {
 
-JsonValue sigma_values(std::span<const std::pair<std::string, Eigen::Index>> told, const ClusterCovariance& clusters) {
+JsonValue sigma_values(std::span<const std::pair<std::string, Eigen::Index>> given, const ClusterCovariance& clusters) {
   JsonValue values = JsonValue::object(), inflation = JsonValue::object(), dof = JsonValue::object();
-  for (const auto& [name, at] : told) {
+  for (const auto& [name, at] : given) {
     inflation[name] = clusters.inflation[at];
     dof[name] = clusters.degrees_of_freedom[at];
   }

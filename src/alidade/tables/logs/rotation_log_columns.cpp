@@ -345,8 +345,8 @@ RotationRow rotation_row(const CsvRow& row, const RotationLogColumns& columns, c
   return read;
 }
 
-std::optional<double> told_share(const CsvRow& row, const std::optional<std::size_t>& column,
-                                 const RotationLogColumns& columns, const std::string& file) {
+std::optional<double> given_share(const CsvRow& row, const std::optional<std::size_t>& column,
+                                  const RotationLogColumns& columns, const std::string& file) {
   if (!column) return std::nullopt;
   const Cells cells{row, columns, file};
   const double share = cells.number(*column);

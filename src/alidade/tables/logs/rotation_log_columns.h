@@ -37,8 +37,8 @@ struct RotationLogColumns {
 /// What a row holds by these columns. Throws InputError.
 [[nodiscard]] RotationRow rotation_row(const CsvRow& row, const RotationLogColumns& columns, const std::string& file);
 /// A column that is the same in every row, as σ of the angles' scale. Throws InputError.
-[[nodiscard]] std::optional<double> told_share(const CsvRow& row, const std::optional<std::size_t>& column,
-                                               const RotationLogColumns& columns, const std::string& file);
+[[nodiscard]] std::optional<double> given_share(const CsvRow& row, const std::optional<std::size_t>& column,
+                                                const RotationLogColumns& columns, const std::string& file);
 [[nodiscard]] std::optional<TrueIntrinsics> true_intrinsics(const CsvRow& row, const RotationLogColumns& columns,
                                                             const std::string& file);
 

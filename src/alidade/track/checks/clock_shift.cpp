@@ -85,11 +85,11 @@ BlockCosts costs_of(const std::vector<std::vector<TargetObservation>>& stretches
 }
 
 /// Whether the gain comes from more than one part of the log.
-bool is_throughout(const BlockCosts& told, const BlockCosts& shifted) {
+bool is_throughout(const BlockCosts& given, const BlockCosts& shifted) {
   constexpr double min_elsewhere = 10.0;  // of ln p, without the eighth that gains most
   double sum = 0.0, most = 0.0;
   for (std::size_t k = 0; k < num_blocks; ++k) {
-    const double gain = told.block[k] - shifted.block[k];
+    const double gain = given.block[k] - shifted.block[k];
     sum += gain;
     most = std::max(most, gain);
   }
@@ -115,13 +115,13 @@ std::optional<ClockShift> probable_clock_shift(std::span<const TargetObservation
   constexpr double min_gain = 20.0, nis_that_fits = 1.5;
   if (observations.size() < 2 * num_blocks) return std::nullopt;
   const auto stretches = stretches_of(with_shift(observations, {}), max_observations);
-  const BlockCosts as_told = costs_of(stretches, heads, config, {});
+  const BlockCosts as_given = costs_of(stretches, heads, config, {});
   double most = min_gain;
   std::optional<ClockShift> best;
   BlockCosts of_best;
   const auto try_shift = [&](ClockShift shift) {
     const BlockCosts costs = costs_of(stretches, heads, config, shift);
-    shift.gain = as_told.sum() - costs.sum();
+    shift.gain = as_given.sum() - costs.sum();
     if (!(shift.gain > most)) return;
     most = shift.gain;
     best = shift;
@@ -134,7 +134,7 @@ std::optional<ClockShift> probable_clock_shift(std::span<const TargetObservation
   const ClockShift coarse = *best;
   for (const double near_ms : {-12.0, -8.0, -4.0, 4.0, 8.0, 12.0})
     try_shift({coarse.head, coarse.later_s + 1e-3 * near_ms});
-  if (!(of_best.nis_per_dof < nis_that_fits) || !is_throughout(as_told, of_best)) return std::nullopt;
+  if (!(of_best.nis_per_dof < nis_that_fits) || !is_throughout(as_given, of_best)) return std::nullopt;
   return best;
 }
 

@@ -138,7 +138,7 @@ std::optional<Explanation> explanation_of(std::span<const TargetObservation> obs
   constexpr double min_gain = 30.0, clear = 15.0;
   Observations given = with_shift(observations.first(std::min(observations.size(), max_observations)), {});
   std::erase_if(given, [&](const TargetObservation& observation) { return observation.head >= heads.size(); });
-  const double as_told = tried(given, heads, config).ln_p;
+  const double as_given = tried(given, heads, config).ln_p;
   std::vector<std::pair<double, Explanation>> fitting;
   for (const Hypothesis& hypothesis : hypotheses(heads)) {
     Observations changed = given;
@@ -149,7 +149,7 @@ std::optional<Explanation> explanation_of(std::span<const TargetObservation> obs
         changed.begin(), changed.begin() + static_cast<std::ptrdiff_t>(std::min(changed.size(), first_observations)));
     if (changed.size() > 2 * first_observations && !tried(some, heads, config).fits) continue;
     const Trial trial = tried(changed, heads, config);
-    if (trial.fits && trial.ln_p > as_told + min_gain) fitting.emplace_back(trial.ln_p, hypothesis.told);
+    if (trial.fits && trial.ln_p > as_given + min_gain) fitting.emplace_back(trial.ln_p, hypothesis.told);
   }
   if (fitting.empty()) return foreign_head(given, heads, config);
   std::ranges::stable_sort(fitting, std::ranges::greater{}, &std::pair<double, Explanation>::first);

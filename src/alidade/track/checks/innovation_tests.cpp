@@ -10,7 +10,7 @@ namespace alidade {
 namespace {
 
 struct Sums {
-  HeadInnovations told;
+  HeadInnovations given;
   Eigen::Vector2d slope = Eigen::Vector2d::Zero(), slope2 = Eigen::Vector2d::Zero();
   double lagged = 0.0, power = 0.0, nis = 0.0, num_along = 0.0;
   std::optional<Eigen::Vector2d> last;
@@ -30,12 +30,12 @@ void add(const TargetObservation& observation, const RigHead& head, const TrackS
   Eigen::Vector2d w = innovation.S.llt().matrixL().solve(innovation.nu);
   if (innovation.nis > gate) w *= std::sqrt(gate / innovation.nis);
   if (!w.allFinite()) return;
-  HeadInnovations& told = sums.told;
-  ++told.num;
-  told.mean += w;
+  HeadInnovations& given = sums.given;
+  ++given.num;
+  given.mean += w;
   sums.nis += w.squaredNorm();
   const Eigen::Vector2d goes = direction_in_image(head, observation, step.belief);
-  told.along += w.dot(goes);
+  given.along += w.dot(goes);
   sums.num_along += goes.squaredNorm();
   const Eigen::Vector2d size(head.camera.width_px, head.camera.height_px);
   const Eigen::Vector2d place = (4.0 * (observation.px - 0.5 * size)).cwiseQuotient(size);
@@ -47,16 +47,16 @@ void add(const TargetObservation& observation, const RigHead& head, const TrackS
 }
 
 HeadInnovations finished(const Sums& sums) {
-  HeadInnovations told = sums.told;
-  const auto num = static_cast<double>(told.num);
-  if (told.num == 0) return told;
-  told.mean /= num;
-  told.along = sums.num_along > 0.0 ? told.along / sums.num_along : 0.0;
-  told.place = sums.slope.cwiseQuotient(sums.slope2.cwiseMax(1e-9));
-  told.place_num = sums.slope2.minCoeff();
-  told.colour = sums.power > 0.0 ? sums.lagged / sums.power : 0.0;
-  told.nis_per_dof = sums.nis / (2.0 * num);
-  return told;
+  HeadInnovations given = sums.given;
+  const auto num = static_cast<double>(given.num);
+  if (given.num == 0) return given;
+  given.mean /= num;
+  given.along = sums.num_along > 0.0 ? given.along / sums.num_along : 0.0;
+  given.place = sums.slope.cwiseQuotient(sums.slope2.cwiseMax(1e-9));
+  given.place_num = sums.slope2.minCoeff();
+  given.colour = sums.power > 0.0 ? sums.lagged / sums.power : 0.0;
+  given.nis_per_dof = sums.nis / (2.0 * num);
+  return given;
 }
 
 }  // namespace
@@ -72,9 +72,9 @@ std::vector<HeadInnovations> test_innovations(std::span<const TargetObservation>
     if (!step.has_innovation || !(step.t_s >= began_s + config.warm_up_s)) continue;
     add(observations[i], heads[observations[i].head], step, config.tracker.gate, sums[observations[i].head]);
   }
-  std::vector<HeadInnovations> told;
-  for (const Sums& each : sums) told.push_back(finished(each));
-  return told;
+  std::vector<HeadInnovations> given;
+  for (const Sums& each : sums) given.push_back(finished(each));
+  return given;
 }
 
 }  // namespace alidade

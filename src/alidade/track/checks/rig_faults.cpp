@@ -27,12 +27,12 @@ std::vector<RigFault> rig_faults(std::span<const RigHead> heads, const RigUncert
                                  const Tracker::Learned& learned, bool is_supposed) {
   // Of the variance: what the observations determine to a tenth of the file's precision, the file may contradict by
   // fifty of its σ.
-  constexpr double min_told = 0.01;
+  constexpr double min_given = 0.01;
   std::vector<RigFault> faults;
   // What the observations add to u ~ N(0, 1): the information, and its vector.
   const Eigen::MatrixXd inverse = inverse_symmetric(learned.cov);
-  const Eigen::MatrixXd told = inverse - Eigen::MatrixXd::Identity(inverse.rows(), inverse.cols());
-  const Eigen::VectorXd told_u = inverse * learned.u;
+  const Eigen::MatrixXd given = inverse - Eigen::MatrixXd::Identity(inverse.rows(), inverse.cols());
+  const Eigen::VectorXd given_u = inverse * learned.u;
   for (std::size_t h = 0; h < heads.size() && h < errors.factor.size(); ++h) {
     const Eigen::MatrixXd& factor = errors.factor[h];
     const std::vector<std::string> lens = param_names(heads[h].camera.lens);
@@ -40,14 +40,14 @@ std::vector<RigFault> rig_faults(std::span<const RigHead> heads, const RigUncert
       if (!is_across(heads, p)) continue;
       const Eigen::RowVectorXd row = factor.row(p);
       const double before = row.squaredNorm(), after = row * learned.cov * row.transpose();
-      if (!(before > 0.0) || !(before - after > min_told * before)) continue;
+      if (!(before > 0.0) || !(before - after > min_given * before)) continue;
       const Eigen::Index k = p - num_head_params;
       const std::string name = k < 0 ? std::string(head_param_names[static_cast<std::size_t>(p)])
                                      : "camera." + lens[static_cast<std::size_t>(k)];
       double off = row * learned.u, z = std::abs(off) / std::sqrt(before - after);
       if (is_supposed) {  // if it alone errs: one cause is tested, not all of them at once
         const Eigen::VectorXd alone = row.transpose() / std::sqrt(before);
-        const double pull = alone.dot(told_u), weight = alone.dot(told * alone);
+        const double pull = alone.dot(given_u), weight = alone.dot(given * alone);
         if (!(weight > 0.0)) continue;
         off = std::sqrt(before) * pull / weight;
         z = std::abs(pull) / std::sqrt(weight);

@@ -263,11 +263,11 @@ std::optional<Check> falling_target(std::span<const TargetObservation> observati
   FollowConfig plain = config;
   plain.judge = false;
   const Observations some = with_shift(observations.first(std::min(observations.size(), max_observations)), {});
-  const double as_told = ln_p(track_target(some, heads, plain), config.tracker.gate);
+  const double as_given = ln_p(track_target(some, heads, plain), config.tracker.gate);
   plain.tracker.method = TargetMotion::imm;
   const TrackReport falls = track_target(some, heads, plain);
   // Where the noise is larger than stated, so is every logarithm: less by what is left of it (QAIC).
-  const double gain = (ln_p(falls, config.tracker.gate) - as_told) / std::max(1.0, falls.nis_per_dof);
+  const double gain = (ln_p(falls, config.tracker.gate) - as_given) / std::max(1.0, falls.nis_per_dof);
   // It explains only what then fits: of clutter both reject as much.
   if (falls.num_starts == 0 || !(gain > min_gain) || used_share(falls) < 1.0 - care_left_out) return std::nullopt;
   return check(

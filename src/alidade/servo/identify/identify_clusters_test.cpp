@@ -60,7 +60,7 @@ TEST(IdentifyClusters, SigmaHoldsForWhiteNoise) {
 }
 
 TEST(IdentifyClusters, SigmaHoldsForColouredNoise) {
-  const int num_runs = testing::trials(10);
+  const int num_runs = testing::trials(20);
   const double least = 0.95 - 3.0 * std::sqrt(0.95 * 0.05 / (2.0 * num_runs));  // of four values half as many count
   for (const bool is_chirp : {false, true}) {
     const Coverage coverage = coverage_of(is_chirp ? 0.5 : 0.9, is_chirp, num_runs);

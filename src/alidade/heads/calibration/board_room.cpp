@@ -33,7 +33,10 @@ Eigen::Vector2d BoardRoom::next(double focal_px) {
   const Eigen::Vector2d behind = (size_px_ - box_.max() - margin).cwiseMax(0.0);
   Eigen::Vector2d target = home_rad_;
   // What is in the image goes right as the head turns left, and down as it turns up.
-  for (int i = 0; i < 2; ++i) target[i] += reach_ * place[i] * (place[i] > 0.0 ? behind[i] : before[i]) / focal_px;
+  for (Eigen::Index i = 0; i < 2; ++i) {
+    const double way = place[static_cast<std::size_t>(i)];
+    target[i] += reach_ * way * (way > 0.0 ? behind[i] : before[i]) / focal_px;
+  }
   return target;
 }
 

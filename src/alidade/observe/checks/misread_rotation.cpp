@@ -109,7 +109,7 @@ bool may_be_misread(const ObserveSolution& report) {
   if (std::ranges::any_of(report.causes, [](const CauseScore& cause) { return cause.z >= ask_beyond; })) return true;
   // What is freed until nothing is asked for may tell nothing any more.
   constexpr double vague = 0.05;
-  for (const std::size_t axis : {0, 1})
+  for (const std::size_t axis : {0U, 1U})
     if (report.status == Status::ok && report.quantities[axis].sigma > vague * report.quantities[axis].value)
       return turns_can_tell(report.motion);
   const auto seen = static_cast<double>(report.reference.bundle.observations.size() + report.pixels_rejected);

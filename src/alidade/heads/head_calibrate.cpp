@@ -123,7 +123,7 @@ class Session {
   }
   /// Asks the head and takes frames for so long.
   void watch(double seconds) {
-    constexpr double question_s = 0.04;
+    constexpr double question_s = 0.035;  // five readings around a frame that comes with one of them, none being early
     for (const double until = head_.now_s() + seconds; head_.now_s() < until;) {
       report_progress(progress_, "calibrating: s of head time", static_cast<std::size_t>(head_time()), 0);
       head_.wait_until(next_s_);

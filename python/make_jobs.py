@@ -30,7 +30,7 @@ CALIBRATE = [
     ("size", "tuple[int, int] | None", "None", "(width, height) [px] of the images that the corners are of"),
     ("air", "Any", "None", "flat_port: the lens from a calibration in air, a Camera or its file, fixed"),
     ("board_points", "Any", "None", "(P, 3) [m]: the board's points as an earlier run found them, fixed"),
-    ("skip_bad", "bool", "False", "Leave out rows of a table of corners that are wrong, by name"),
+    ("skip_bad", "bool", "False", "Reject rows of a table of corners that are wrong, by name"),
 ]
 HEAD = '''"""{title} Made by make_jobs.py from the library's descriptions: do not edit."""
 from __future__ import annotations

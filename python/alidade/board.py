@@ -8,7 +8,9 @@ from typing import Any, Callable
 import numpy as np
 
 from . import _alidade
-from .arrays import Numbers, image
+from .arrays import Numbers
+from .arrays import image as pixels_of
+from .former import former
 from .words import texts_of
 
 
@@ -131,16 +133,17 @@ class BoardDetection:
         return f"BoardDetection({seen.sum()} of {len(seen)} corners, σ {sigma:.3f} px)"
 
 
-def find_board(picture: Any, board: Board) -> BoardDetection:
+@former(picture="image")
+def find_board(image: Any, board: Board) -> BoardDetection:
     """The corners of a board in an image, each with its covariance.
 
-    picture  a file, or an array (H, W) or (H, W, 3), uint8 or uint16
+    image  a file, or an array (H, W) or (H, W, 3), uint8 or uint16
     """
     if not isinstance(board, Board):
         raise ValueError(f"board: an alidade.Board is needed, not {type(board).__name__}")
-    if isinstance(picture, (str, os.PathLike)):
-        return BoardDetection(*_alidade.find_in_file(os.fspath(picture), board._core))
-    return BoardDetection(*_alidade.find_in_image(image(picture), board._core))
+    if isinstance(image, (str, os.PathLike)):
+        return BoardDetection(*_alidade.find_in_file(os.fspath(image), board._core))
+    return BoardDetection(*_alidade.find_in_image(pixels_of(image), board._core))
 
 
 class BoardFinder:
@@ -151,9 +154,10 @@ class BoardFinder:
         self.size: tuple[int, int] | None = None
         self._found: list[BoardDetection] = []
 
-    def push(self, picture: Any) -> BoardDetection:
+    @former(picture="image")
+    def push(self, image: Any) -> BoardDetection:
         """Looks for the board in an image (H, W) or (H, W, 3); keeps what is found."""
-        pixels = image(picture)
+        pixels = pixels_of(image)
         size = pixels.shape[1], pixels.shape[0]
         if self.size not in (None, size):
             raise ValueError(f"the image is {size[0]}x{size[1]}, but those before were {self.size}")

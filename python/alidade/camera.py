@@ -9,7 +9,9 @@ from typing import Any, Callable
 import numpy as np
 
 from . import _alidade
-from .arrays import Numbers, image, image_size, numbers, vectors
+from .arrays import Numbers, image_size, numbers, vectors
+from .arrays import image as pixels_of
+from .former import former
 from .words import suggestion
 
 
@@ -115,7 +117,7 @@ class Camera:
 
     @property
     def source(self) -> str:
-        """Where it came from, for a person."""
+        """Where it came from, for a user."""
         return self._core.source
 
     @property
@@ -179,9 +181,10 @@ class Camera:
             raise ValueError(f"distance_m: {distance_m} is not above 0")
         return self._core.sigma_px(rows, float(distance_m)).reshape(shape)
 
-    def undistort(self, picture: Any) -> Any:
+    @former(picture="image")
+    def undistort(self, image: Any) -> Any:
         """The image (H, W) or (H, W, 3) as the pinhole camera undistorted() sees it."""
-        pixels = image(picture)
+        pixels = pixels_of(image)
         if pixels.shape[:2] != (self.height, self.width):
             raise ValueError(f"the image is {pixels.shape[1]}x{pixels.shape[0]}, the camera {self.width}x{self.height}")
         return self._core.undistort(pixels)
@@ -253,7 +256,7 @@ class Camera:
 
 
 def _refuse_file(model: Any) -> None:
-    """A file in the place of a lens model: says how it is read."""
+    """A file instead of a lens model: says how it is read."""
     file = str(model)
     if not isinstance(model, str) or os.sep in file or os.path.splitext(file)[1]:
         raise ValueError(f"model: {file!r} is no lens model; al.Camera.read({file!r}) reads a camera file")

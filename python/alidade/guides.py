@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from . import _alidade
-from .arrays import Numbers, image, image_size, number, numbers, shown, whole
+from .arrays import Numbers, image_size, number, numbers, shown, whole
+from .arrays import image as pixels_of
 from .board import Board
 from .camera import Camera
+from .former import former
 from .live import OneByOne
 from .words import texts_of
 
@@ -59,8 +61,8 @@ class CaptureGuide(OneByOne):
     `alidade calibrate --live` goes by.
 
     board     what is looked for
-    until_px  the goal: 3σ of a pixel in the worst place of the image
-    is_video  pictures follow each other as in a video, and a board is taken when it stands still; else each is a photo
+    until_px  the goal: 3σ at the worst pixel of the image
+    is_video  images follow each other as in a video, and a board is taken when it stands still; else each is a photo
     fields    as of al.calibrate(): model, fixed, prior, …
     """
 
@@ -70,20 +72,21 @@ class CaptureGuide(OneByOne):
         self.board = board
         self._core = _alidade.CaptureGuide(board._core, number(until_px, "until_px"), bool(is_video), _texts(fields))
 
-    def push(self, picture: Any, t_s: float) -> types.SimpleNamespace:
-        """Looks at a picture (H, W) or (H, W, 3) of time t_s, which does not go back. What became of it: taken, and then
-        picture, the one that counts as a photo from now on: this one, or one that was shown before and tells more, at
-        earlier_t_s (None: this one). sight ("useful", "moving", "same_pose", "little", "nothing", …), words for the person,
+    @former(picture="image")
+    def push(self, image: Any, t_s: float) -> types.SimpleNamespace:
+        """Looks at an image (H, W) or (H, W, 3) of time t_s, which does not go back. What became of it: taken, and then
+        image, the one that counts as a photo from now on: this one, or an earlier one that is more informative, of
+        earlier_t_s (None: this one). status ("useful", "moving", "same_pose", "little", "nothing", …), words for the user,
         corners (K, 2) as seen, gain (ln of σ now over σ with it)."""
-        pixels = image(picture, "picture")
+        pixels = pixels_of(image)
         look = types.SimpleNamespace(**self._core.push(pixels, _time(t_s)))
         if look.taken and look.earlier_t_s is None:
-            look.picture = pixels
+            look.image = look.picture = pixels  # picture: the former name
         return look
 
     def push_corners(self, corners: Any, size: tuple[int, int], t_s: float) -> types.SimpleNamespace:
-        """The same with corners (P, 2) that were found elsewhere, NaN: not seen, in an image of size (width, height); picture
-        is None."""
+        """The same with corners (P, 2) that were found elsewhere, NaN: not seen, in an image of size (width, height); image is
+        None."""
         return types.SimpleNamespace(**self._core.push_corners(_corners(corners, self.board), image_size(size), _time(t_s)))
 
     def forget(self, photo: int) -> None:
@@ -165,7 +168,7 @@ class ShotGuide(OneByOne):
 
 
 class ViewGuide:
-    """Where to look next with heads that turn, so that their axes become known; each solve is that of al.rig() on all views.
+    """Where to look next with heads that rotate, so that their axes become known; each solve is that of al.rig() on all views.
 
     cameras       by the number of the head: {1: a Camera or its file, …}
     board         what the heads look at, where it stands still
@@ -201,7 +204,7 @@ class ViewGuide:
     def state(self) -> types.SimpleNamespace:
         """views, has_rig, sigma_rad and sigma_m: of where the cameras stand to each other (of one head: its camera after a
         rotation), the worst over the limits; sentence of the verdict, words ("head 1 to pan 12.0°, tilt -5.0°: board 2 in the
-        upper left corner of its image") and next: head, pan_tilt_rad (2,), board, is_new_place, gain, outline (N, 2), rotation
+        upper left corner of its image") and next: head, pan_tilt_rad (2,), board, is_new_position, gain, outline (N, 2), rotation
         (3, 3), translation_m (3,); None before there is a rig."""
         values = self._core.state()
         if values["next"] is not None:

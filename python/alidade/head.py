@@ -5,6 +5,7 @@ import math
 from typing import Any
 
 from . import _alidade
+from .former import former
 from .job import Progress, files_for_call
 from .result import Result
 
@@ -51,11 +52,11 @@ class Head:
 
     @property
     def limits(self) -> dict[str, Any]:
-        """low_rad and high_rad, (pan, tilt): where it may go; are_told: by the head itself; info: what it calls itself."""
+        """low_rad and high_rad, (pan, tilt): where it may go; are_given: by the head itself; info: what it calls itself."""
         return self._open().limits()
 
     def position(self) -> dict[str, Any]:
-        """Where it says that it is: t_s (since 1970, the middle of question and answer), wait_s, pan_tilt_rad (pan, tilt)."""
+        """Where it says that it is: t_s (since 1970, the midpoint of question and answer), wait_s, pan_tilt_rad (pan, tilt)."""
         return self._open().position()
 
     def command(self, pan_tilt_rad: tuple[float, float]) -> float:
@@ -71,22 +72,24 @@ class Head:
         """Its model, as `alidade head URL --identify --move`: rate, acceleration, latency, backlash, …"""
         return self._run(["--identify"], progress)
 
-    def calibrate(self, stream: str, *, until: str | None = None, most_s: float | None = None,
+    @former(most_s="max_s")
+    def calibrate(self, stream: str, *, until: str | None = None, max_s: float | None = None,
                   progress: Progress | None = None) -> Result:
         """Its camera, as `alidade head URL --stream STREAM --calibrate --move`. until: "0.5%"."""
         words = [f"--stream={stream}", "--calibrate"]
         words += [f"--until={until}"] if until is not None else []
-        words += [f"--most={most_s}"] if most_s is not None else []
+        words += [f"--most={max_s}"] if max_s is not None else []
         return self._run(words, progress)
 
+    @former(most_s="max_s")
     def follow(self, stream: str, look: str, rig: Any, *, latency_s: float | None = None, delay_s: float | None = None,
-               most_s: float | None = None, progress: Progress | None = None) -> Result:
+               max_s: float | None = None, progress: Progress | None = None) -> Result:
         """Follows what looks so ("bright", "colour:230,70,20", "marker:DICT_4X4_50:7"), as `alidade head URL --stream STREAM
         --rig RIG --follow LOOK --move`. rig: rig.yaml of calibrate(), or its result."""
         words = [f"--stream={stream}", f"--follow={look}"]
         words += [f"--latency={latency_s}"] if latency_s is not None else []
         words += [f"--delay={delay_s}"] if delay_s is not None else []
-        words += [f"--most={most_s}"] if most_s is not None else []
+        words += [f"--most={max_s}"] if max_s is not None else []
         with files_for_call() as files:
             return self._run([*words, f"--rig={files.path_of(rig, 'rig')}"], progress)
 

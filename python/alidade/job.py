@@ -1,4 +1,4 @@
-"""Runs jobs: what a person gave, as paths or values, becomes what the library takes."""
+"""Runs jobs: what a user gave, as paths or values, becomes what the library takes."""
 from __future__ import annotations
 
 import contextlib
@@ -230,7 +230,7 @@ def run_calibrate(function: Callable[..., Any], values: dict[str, Any], aliases:
     if not isinstance(board, Board):
         raise ValueError("board: an alidade.Board is needed, for example al.Board(\"9x6\", square_m=0.025)")
     if (take["photos"] is None) == (take["corners"] is None):
-        raise ValueError("give photos, or corners=" if take["photos"] is None else "corners take the place of photos")
+        raise ValueError("give photos, or corners=" if take["photos"] is None else "corners replace photos")
     texts = [(name, texts_of(value, name)) for name, value in given.items() if value is not None]
     if air is not None and not isinstance(air, Camera):
         air = Camera.read(air)

@@ -6,8 +6,10 @@ from typing import Any, NoReturn
 import numpy as np
 
 from . import _alidade
-from .arrays import Numbers, image, image_size, number, numbers, vectors, whole
+from .arrays import Numbers, image_size, number, numbers, vectors, whole
+from .arrays import image as pixels_of
 from .camera import Camera
+from .former import former
 from .job import Progress, files_for_call
 from .result import Result
 from .words import texts_of
@@ -159,9 +161,10 @@ class Localizer(OneByOne):
         self._frame += 1
         return _pose(step)
 
-    def push_image(self, t_s: float, picture: Any) -> dict[str, Any]:
+    @former(picture="image")
+    def push_image(self, t_s: float, image: Any) -> dict[str, Any]:
         """A frame (H, W), uint8, grey. Where the camera is after it, as push() says it."""
-        pixels = image(picture)
+        pixels = pixels_of(image)
         if pixels.ndim != 2 or pixels.dtype != np.uint8:
             raise ValueError("image: grey, (H, W) of uint8, is needed")
         step = self._begin(True).push_image(self._frame, number(t_s, "t_s"), pixels)

@@ -205,7 +205,7 @@ class Result:
 
     @property
     def counts(self) -> dict[str, Any]:
-        """given, used, dropped, and skipped: what was left out, and why."""
+        """given, used, dropped, and skipped: what was rejected, and why."""
         return self._document["counts"]
 
     @property

@@ -29,7 +29,7 @@ def column(values: Any) -> np.ndarray[Any, Any]:
 
 
 def structured(columns: abc.Iterable[tuple[str, Any]]) -> np.ndarray[Any, Any]:
-    """A structured array of columns of one length; those that are no column are left out."""
+    """A structured array of columns of one length; those that are no column are omitted."""
     arrays = [(name, column(values)) for name, values in columns if isinstance(values, (list, np.ndarray))]
     length = len(arrays[0][1]) if arrays else 0
     table = np.empty(length, dtype=[(name, values.dtype) for name, values in arrays])

@@ -27,7 +27,7 @@ CalibrateConfig config_of(const Texts& values, const std::optional<Camera>& air,
   return config;
 }
 
-/// The seconds that the command tells, by the same names.
+/// The seconds that the command reports, by the same names.
 class Laps {
  public:
   void lap(std::string part) { parts_.emplace_back(std::move(part), since(std::exchange(lap_, Clock::now()))); }

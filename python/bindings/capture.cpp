@@ -38,9 +38,12 @@ py::array image_array(const cv::Mat& image) {
 py::dict look_dict(const CaptureLook& look) {
   py::dict made;
   made["earlier_t_s"] = look.earlier ? py::cast(look.earlier->t_s) : py::none();
-  made["picture"] =
-      look.earlier && look.earlier->picture ? py::object(image_array(*look.earlier->picture)) : py::none();
-  made["sight"] = std::string(sight_name(look.sight));
+  const py::object image =
+      look.earlier && look.earlier->image ? py::object(image_array(*look.earlier->image)) : py::none();
+  made["image"] = image;
+  made["picture"] = image;  // these two: former names, for one release
+  made["sight"] = std::string(look_status_name(look.status));
+  made["status"] = std::string(look_status_name(look.status));
   made["words"] = look.words;
   made["corners"] = pixel_array(look.corners_px);
   made["gain"] = look.gain;
@@ -79,9 +82,9 @@ class LiveCapture {
   }
 
   py::dict push(const py::array& image, double t_s) {
-    const Photos photos = photos_of({"picture"}, {image});
-    const cv::Mat picture = photos.load(0);
-    return look_dict(guide_->from_python([&](CaptureGuide& guide) { return guide.push(picture, t_s); }));
+    const Photos photos = photos_of({"image"}, {image});
+    const cv::Mat pixels = photos.load(0);
+    return look_dict(guide_->from_python([&](CaptureGuide& guide) { return guide.push(pixels, t_s); }));
   }
 
   /// Corners P × 2, NaN: not seen.
@@ -212,7 +215,8 @@ class LiveViews {
     next["head"] = now.next->head;
     next["pan_tilt_rad"] = std::vector<double>(now.next->pan_tilt_rad.data(), now.next->pan_tilt_rad.data() + 2);
     next["board"] = now.next->board;
-    next["is_new_place"] = now.next->is_new_place;
+    next["is_new_position"] = now.next->is_new_position;
+    next["is_new_place"] = now.next->is_new_position;
     next["gain"] = now.next->gain;
     next["outline"] = pixel_array(now.outline_px);
     put_pose(now.next->cam_from_board, next);

@@ -29,6 +29,7 @@ class ConnectedHead {
     py::dict made;
     made["low_rad"] = pair_of(held_ ? held_->low_rad() : limits.low_rad);
     made["high_rad"] = pair_of(held_ ? held_->high_rad() : limits.high_rad);
+    made["are_given"] = limits.are_given;
     made["are_told"] = limits.are_given;
     made["info"] = limits.info;
     return made;

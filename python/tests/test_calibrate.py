@@ -261,11 +261,11 @@ class Photos(InFolder):
             with self.assertRaises(ValueError):
                 al.find_board(wrong, BOARD)
 
-    def test_progress_is_told_and_stops(self):
-        told = []
-        al.calibrate(self.files, board=BOARD, progress=lambda *news: told.append(news))
-        self.assertTrue(told)
-        self.assertTrue(all(isinstance(what, str) and done >= 0 and total >= 0 for what, done, total in told))
+    def test_progress_is_reported_and_stops(self):
+        reported = []
+        al.calibrate(self.files, board=BOARD, progress=lambda *news: reported.append(news))
+        self.assertTrue(reported)
+        self.assertTrue(all(isinstance(what, str) and done >= 0 and total >= 0 for what, done, total in reported))
         with self.assertRaises(al.Interrupted):
             al.calibrate(self.files, board=BOARD, progress=lambda *news: False)
         with self.assertRaises(ZeroDivisionError):

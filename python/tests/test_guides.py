@@ -33,9 +33,9 @@ class Capture(InFolder):
         guide.forget(0)
         self.assertEqual(guide.photos, len(kept) - 1)
         again = guide.push_corners(kept[-1], TRUE_CAMERA.size, 1000.0)
-        self.assertEqual((again.sight, again.taken), ("same_pose", False))
+        self.assertEqual((again.status, again.taken), ("same_pose", False))
 
-    def test_pictures_are_judged_as_the_command_judges_them(self):
+    def test_images_are_judged_as_the_command_judges_them(self):
         photos = self.folder / "photos"
         done = command("simulate", "board", "--board", "9x6", "--square", "0.025", "--photos", "9", "--size", "640x480", "--out",
                        photos, "--quiet")
@@ -50,15 +50,20 @@ class Capture(InFolder):
             image = cv2.imread(str(file), -1)
             look = guide.push(image, 0.2 * (i + 1))
             if look.taken:
-                taken.append(look.picture)
+                taken.append(look.image)
             if guide.is_at_goal:
                 break
         # the command asks the whole job before it ends, and goes on where that disagrees
         for ours, theirs in zip(taken, kept):
             np.testing.assert_array_equal(ours, theirs)
-        self.assertEqual(guide.push(np.zeros((480, 640), np.uint8), 99.0).sight, "nothing")
+        self.assertEqual(guide.push(np.zeros((480, 640), np.uint8), 99.0).status, "nothing")
+        with self.assertWarns(DeprecationWarning):  # former names
+            look = guide.push(picture=np.ones((480, 640), np.uint8), t_s=100.0)
+        self.assertEqual((look.sight, look.picture), (look.status, look.image))
+        with self.assertRaises(TypeError):
+            guide.push(np.ones((480, 640), np.uint8), t_s=101.0, picture=None)
 
-    def test_a_picture_that_was_shown_before_is_handed_back(self):
+    def test_an_image_that_was_shown_before_is_handed_back(self):
         photos = self.folder / "shown"
         done = command("simulate", "board", "--board", "9x6", "--square", "0.025", "--photos", "6", "--size", "640x480", "--out",
                        photos, "--quiet", "--seed", "4")
@@ -71,7 +76,7 @@ class Capture(InFolder):
                 earlier += 1
                 shown = int(look.earlier_t_s)
                 self.assertLess(shown, t)
-                np.testing.assert_array_equal(look.picture, images[shown % 6] + np.uint8(shown % 2))
+                np.testing.assert_array_equal(look.image, images[shown % 6] + np.uint8(shown % 2))
         self.assertGreaterEqual(guide.photos, 4)
         self.assertGreaterEqual(earlier, 1)
 
@@ -176,7 +181,7 @@ class Views(unittest.TestCase):
         for _ in range(4):
             asked = guide.state.next
             self.assertEqual(asked.outline.shape[1], 2)
-            if asked.is_new_place:
+            if asked.is_new_position:
                 R, t = camera_from_world(*asked.pan_tilt_rad)
                 places[asked.board] = (R.T @ asked.rotation, R.T @ (asked.translation_m - t))
             state = look(asked.pan_tilt_rad, *places[asked.board], asked.board)

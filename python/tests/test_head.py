@@ -10,6 +10,7 @@ class Heads(InFolder):
     def test_is_asked_and_not_moved(self):
         with al.Head("sim://?clock=free&min_pan=-60&max_pan=60") as head:
             self.assertAlmostEqual(head.limits["high_rad"][0], math.radians(60))
+            self.assertEqual(head.limits["are_given"], head.limits["are_told"])  # its former name
             self.assertEqual(head.position()["pan_tilt_rad"], (0.0, 0.0))
             for wrong in (lambda: head.command((0.1, 0.0)), lambda: head.identify(), lambda: al.Head("sim://?speed=3"),
                           lambda: al.Head("rotctl://me:secret@127.0.0.1"), lambda: al.Head("sim://", password_file="absent"),

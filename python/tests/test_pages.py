@@ -27,7 +27,7 @@ SIMULATED = {
 }
 # What a program has that uses the lines: of a camera, of a head.
 BEFORE = {"rotating-camera": "double t_s = 0.0; Eigen::Vector3d pan_tilt_roll; std::vector<Eigen::Vector2d> pixels; alidade::ObserveConfig config;",
-          "capture": "double t_s = 0.0; extern const cv::Mat& picture;"}
+          "capture": "double t_s = 0.0; extern const cv::Mat& image;"}
 
 
 def page_of(name):

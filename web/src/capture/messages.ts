@@ -19,7 +19,7 @@ export interface State {
   paused: boolean;
   has_camera: boolean;
   until: number;
-  worst: number | null; // 3σ in the worst place, px
+  worst: number | null; // 3σ at the worst pixel, px
   worst_px: number[];
   needed: number | null;
   warnings: string[];

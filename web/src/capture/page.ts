@@ -75,11 +75,11 @@ class CapturePage {
       return one;
     };
     this.buttons = {
-      take: made('take', 'take', isShots ? 'Take this picture with the reading (Enter in its field)' : 'Take this picture (space)', () => this.take()),
+      take: made('take', 'take', isShots ? 'Take this image with the reading (Enter in its field)' : 'Take this image (space)', () => this.take()),
       undo: made('undo', 'undo', isShots ? 'Forget the last shot (u)' : 'Forget the last photo (u)', () => this.line.ask('undo')),
       pause: made('pause', 'pause', 'Take nothing by itself for now (p)', () => this.togglePause(), {'aria-pressed': 'false'}),
       end: made('end', 'end', 'End and calibrate (Enter)', () => this.line.ask('end')),
-      mirror: made('mirror', 'mirror', 'Show the picture as a mirror does (m)', () => this.mirror(), {'aria-pressed': 'false'}),
+      mirror: made('mirror', 'mirror', 'Show the image as a mirror does (m)', () => this.mirror(), {'aria-pressed': 'false'}),
     };
     this.header = el('header', {class: 'top live'},
       el('div', {class: 'headline'}, el('h1', {}, this.symbol, ' ', this.word, ' ', this.facts),
@@ -100,7 +100,7 @@ class CapturePage {
     this.listen();
     this.set('asking');
     this.line = connect((message) => this.hear(message), (jpeg) => void this.view.show(jpeg), () => this.lose('the run has gone. Its photos are on disk: go on with --resume'));
-    this.view.say(isBrowsers ? '' : 'waiting for a picture');
+    this.view.say(isBrowsers ? '' : 'waiting for an image');
     this.showState();
   }
 
@@ -119,7 +119,7 @@ class CapturePage {
     this.reading.disabled = !isActive;
   }
   private goalWords(): string {
-    if (!this.isShots) return ` · goal 3σ ≤ ${num(this.about.until, 3)} px in the worst place`;
+    if (!this.isShots) return ` · goal 3σ ≤ ${num(this.about.until, 3)} px at the worst pixel`;
     return this.about.until > 0 ? ` · goal 3σ ≤ ${num(this.about.until, 3)} mm at the origin` : '';
   }
   /** A photo; of a rangefinder with what it reads, once. */
@@ -193,7 +193,7 @@ class CapturePage {
       }
       const wasExact = this.root.dataset['exact'];
       this.root.dataset['exact'] = picture.isExact ? '1' : '0';
-      if (!picture.isExact && (isFirst || wasExact === '1')) this.note('this browser gives no exact pictures: they come by a canvas, some grey values off, and the result says so');
+      if (!picture.isExact && (isFirst || wasExact === '1')) this.note('this browser gives no exact images: they come by a canvas, some grey values off, and the result says so');
       const answer = new Promise<void>((come) => (this.answered = come));
       this.line.send(picture);
       await answer;
@@ -221,7 +221,7 @@ class CapturePage {
     const needed = state?.needed;
     this.goal.textContent = worst === null
       ? 'a few photos first: there is no camera yet'
-      : worst <= this.about.until ? `at the goal of ${num(this.about.until, 3)} px` : `3σ in the worst place; the goal is ${num(this.about.until, 3)} px${needed ? `, ${moreWords(needed)}` : ''}`;
+      : worst <= this.about.until ? `at the goal of ${num(this.about.until, 3)} px` : `3σ at the worst pixel; the goal is ${num(this.about.until, 3)} px${needed ? `, ${moreWords(needed)}` : ''}`;
     const next = state?.next;
     this.target.textContent = next ? `Next: ${this.view.isMirrored ? next.words_mirrored : next.words}. Fill the outline.` : '';
     this.map.redraw();

@@ -19,8 +19,8 @@ export class CameraView {
   drawings = 0; // for tests
 
   constructor(hasVideo: boolean) {
-    this.video = hasVideo ? el('video', {id: 'camera', muted: true, playsinline: true, 'aria-label': 'the camera’s picture'}) : null;
-    this.still = hasVideo ? null : el('canvas', {id: 'camera', role: 'img', 'aria-label': 'the camera’s picture'});
+    this.video = hasVideo ? el('video', {id: 'camera', muted: true, playsinline: true, 'aria-label': 'the camera’s image'}) : null;
+    this.still = hasVideo ? null : el('canvas', {id: 'camera', role: 'img', 'aria-label': 'the camera’s image'});
     if (this.video) this.video.muted = true;
     this.element = el('div', {class: 'capture-picture'}, this.video ?? this.still!, this.over, this.words);
     new ResizeObserver(() => this.draw()).observe(this.element);

@@ -32,7 +32,7 @@ function drawShape(pen: Pen, points: Table, limit_mm: number): void {
 }
 
 function transferTable(doc: Doc): HTMLElement | null {
-  const rows = [['transfer_rms_px', 'shape learned on the others'], ['transfer_flat_rms_px', 'held flat']].filter(([path]) => Number.isFinite(doc.estimate(path!)));
+  const rows = [['transfer_rms_px', 'shape learned on the others'], ['transfer_flat_rms_px', 'fixed flat']].filter(([path]) => Number.isFinite(doc.estimate(path!)));
   if (rows.length === 0) return null;
   return el('table', {class: 'estimate'}, el('tr', {class: 'group'}, el('th', {colspan: 3}, 'RMS on unseen photos')),
     ...rows.map(([path, words]) => el('tr', {}, el('th', {}, words!), el('td', {class: 'value'}, num(doc.estimate(path!), 3)), el('td', {class: 'unit'}, 'px'))));
@@ -45,7 +45,7 @@ export const board: Figure = {
     if (!points || !points.tells('dz_m')) return null;
     const highest_mm = 1e3 * largestSize(points.numbers('dz_m')), isFlat = !(highest_mm > 0) && !(largestSize(points.numbers('dx_m')) > 0);
     const cols = largestSize(points.numbers('col')) || 1, rows = largestSize(points.numbers('row')) || 1;
-    if (isFlat) host.append(el('p', {class: 'caption'}, 'The board was held flat, so its heights are not shown.'));
+    if (isFlat) host.append(el('p', {class: 'caption'}, 'The board was fixed flat, so its heights are not shown.'));
     else new Chart(host, {height: 220, aspect: (rows + 1.2) / (cols + 1.4) + 0.17, most: 460, label: `Heights of the board's points, at most ${num(highest_mm, 2)} mm`},
       (pen) => drawShape(pen, points, Math.max(0.1, roundUp125(highest_mm))));
     const transfer = transferTable(doc);

@@ -23,7 +23,7 @@ export const halves: Figure = {
     const check = doc.checks.find((one) => one.name === 'consistent' || one.figure === 'halves'), isQuiet = !check || check.state === 'good';
     const share = predicted ? 100 * shareNotAbove(values, predicted) : NaN;
     // The check speaks of parameters, which can differ where pixels do not: beside a header that says so no share of the image "agrees".
-    const good = !isQuiet ? `They do not: ${check.text}. A pixel then differs by ${num(quantile(values, 0.5), 2)} px in the middle of all, ${num(quantile(values, 1), 2)} px at worst.` : Number.isFinite(share) ? `Good: the difference stays below the predicted 3σ. Here it does in ${share.toFixed(0)} % of the image.` : 'Good: small against the accuracy that the task needs.';
+    const good = !isQuiet ? `They do not: ${check.text}. A pixel then differs by ${num(quantile(values, 0.5), 2)} px in the median, ${num(quantile(values, 1), 2)} px at worst.` : Number.isFinite(share) ? `Good: the difference stays below the predicted 3σ. Here it does in ${share.toFixed(0)} % of the image.` : 'Good: small against the accuracy that the task needs.';
     return {marks, rows: marks, tables: [], words: good, good};
   },
 };

@@ -16,7 +16,7 @@ function nearest(t: Float64Array, selection: Selection): number {
 }
 
 export const localizeFrame: Figure = {
-  id: 'frame', title: 'What did it look for, and find?', note: 'px · ellipse: 3σ of where a point is expected · ← → other pictures', span: 12,
+  id: 'frame', title: 'What did it look for, and find?', note: 'px · ellipse: 3σ of where a point is expected · ← → other images', span: 12,
   draw(host, doc, selection) {
     const frames = doc.table('frames'), sights = doc.table('sights');
     if (!frames || !sights) return null;
@@ -56,12 +56,12 @@ export const localizeFrame: Figure = {
         selection.at(time = t[shown]!);
       }
       const here = inPicture(shown), found = here.filter((i) => used[i]! > 0).length;
-      caption.replaceChildren(el('b', {}, `${num(t[shown]!, 4)} s`), ` · ${found} of ${here.length} points found and used · picture ${shown + 1} of ${t.length} kept`);
+      caption.replaceChildren(el('b', {}, `${num(t[shown]!, 4)} s`), ` · ${found} of ${here.length} points found and used · image ${shown + 1} of ${t.length} kept`);
       chart.redraw();
     };
     selection.on(update);
     whenPicturesAreHere(update);
     update();
-    return {marks: sights.rows, rows: sights.rows, tables: [frames, sights], words: caption.textContent ?? '', good: 'Good: most ellipses hold a dot, small ones near their middle. Large: the point is new, or the camera was not seen for a while.'};
+    return {marks: sights.rows, rows: sights.rows, tables: [frames, sights], words: caption.textContent ?? '', good: 'Good: most ellipses hold a dot, small ones near their centre. Large: the point is new, or the camera was not seen for a while.'};
   },
 };

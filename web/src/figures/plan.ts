@@ -104,7 +104,7 @@ export const planSketches: Figure = {
     const next = doc.table('next'), sheet = sheetOf(doc), all = next ? poses(next) : [];
     if (!next || !sheet || all.length === 0 || !lensOf(doc)) return null;
     boardSketches(host, doc, sheet, all);
-    return {marks: all.length, rows: all.length, tables: [next], words: `${all.length} boards`, good: `Distances are from the camera to the board’s middle, tilts from the image plane.${all.length > 6 ? ' The first six are drawn.' : ''}`};
+    return {marks: all.length, rows: all.length, tables: [next], words: `${all.length} boards`, good: `Distances are from the camera to the board’s centre, tilts from the image plane.${all.length > 6 ? ' The first six are drawn.' : ''}`};
   },
 };
 

@@ -45,7 +45,7 @@ export const movingEstimate: Figure = {
     const body = el('tbody');
     for (const k of indices) {
       const e = (name: string) => doc.estimate(`cameras[${k}].${name}`), isPlaced = doc.estimateText(`cameras[${k}].placed`) !== 'false';
-      body.append(el('tr', {class: 'group'}, el('th', {colspan: 4}, `camera ${e('id')} · ${isPlaced ? `${e('used')} of ${e('sights')} observations, RMS ${num(e('rms_px'), 2)} px` : `not placed: ${doc.estimateText(`cameras[${k}].reason`) || '–'}`}`)));
+      body.append(el('tr', {class: 'group'}, el('th', {colspan: 4}, `camera ${e('id')} · ${isPlaced ? `${e('used')} of ${e('sights')} observations, RMS ${num(e('rms_px'), 2)} px` : `not located: ${doc.estimateText(`cameras[${k}].reason`) || '–'}`}`)));
       if (!isPlaced) continue;
       ['x', 'y', 'z'].forEach((axis, i) => {
         const row = Array.from({length: cameras.rows}, (_, r) => r).find((r) => cameras.number('id', r) === e('id')) ?? -1;
@@ -58,7 +58,7 @@ export const movingEstimate: Figure = {
       if (e('sigma_clock_s') > 0 || Math.abs(e('clock_offset_s')) > 0) body.append(el('tr', {}, el('th', {}, 'clock'), ...pair(e('clock_offset_s'), e('sigma_clock_s')), el('td', {class: 'unit'}, 's')));
     }
     host.append(el('div', {class: 'scroll'}, el('table', {class: 'estimate'}, body)));
-    return {marks: indices.length, rows: indices.length, tables: [cameras], words: `${cameras.rows} cameras placed`, good: 'Fixed: the σ of the others are relative to this camera. Clock: offset of the rig’s time from the camera’s own.'};
+    return {marks: indices.length, rows: indices.length, tables: [cameras], words: `${cameras.rows} cameras located`, good: 'Fixed: the σ of the others are relative to this camera. Clock: offset of the rig’s time from the camera’s own.'};
   },
 };
 
@@ -134,7 +134,7 @@ export const movingAbove: Figure = {
 };
 
 export const movingClocks: Figure = {
-  id: 'clocks', isOptional: true, title: 'How well is each clock known?', note: '3σ in the middle of a camera’s sights, ms', span: 12,
+  id: 'clocks', isOptional: true, title: 'How well is each clock known?', note: '3σ amid a camera’s observations, ms', span: 12,
   draw(host, doc) {
     const indices = Array.from({length: 40}, (_, k) => k).filter((k) => doc.estimate(`cameras[${k}].sigma_clock_s`) > 0);
     if (indices.length === 0) return null;
@@ -149,6 +149,6 @@ export const movingClocks: Figure = {
         pen.text(num(value, 2), x(value) + 6, y + pitch / 2, {size: 11.5, weight: 650});
       });
     });
-    return {marks: bars.length, rows: bars.length, tables: [], words: `at most ${num(ends[1], 2)} ms`, good: 'Good: short against the time in which the target moves by as much as its place is sure. The camera rejected here has the rig’s clock.'};
+    return {marks: bars.length, rows: bars.length, tables: [], words: `at most ${num(ends[1], 2)} ms`, good: 'Good: short against the time in which the target moves by as much as its position is known. The camera rejected here has the rig’s clock.'};
   },
 };

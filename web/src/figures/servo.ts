@@ -41,7 +41,7 @@ function perHead(host: HTMLElement, heads: HeadRows[], draw: (host: HTMLElement,
 }
 
 export const servoError: Figure = {
-  id: 'error', title: 'How far from the middle was the target?', note: 'px, ± 3σ predicted', span: 14,
+  id: 'error', title: 'How far from the centre was the target?', note: 'px, ± 3σ predicted', span: 14,
   draw(host, doc, selection) {
     const control = doc.table('control');
     if (!control || !control.tells('error_u_px')) return null;
@@ -65,7 +65,7 @@ export const servoError: Figure = {
 };
 
 export const servoPicture: Figure = {
-  id: 'picture', title: 'Where in the image was it?', note: 'target from the image’s middle, px', span: 10,
+  id: 'picture', title: 'Where in the image was it?', note: 'target from the image’s centre, px', span: 10,
   draw(host, doc, selection) {
     const control = doc.table('control');
     if (!control || !control.tells('error_u_px')) return null;
@@ -77,7 +77,7 @@ export const servoPicture: Figure = {
       charts.push(scatter(part, dots, {xLabel: 'error u, px', yLabel: 'error v, px, upwards', height: 330, isFilling: true, isSquare: true, label: 'errors in the image', include: [[-limit, -limit], [limit, limit]],
         below: (pen, x, y) => { if (spec > 0) pen.g.setLineDash([6, 4]), pen.circle(x(0), y(0), x(spec) - x(0), null, pen.c.red, 1.6), pen.g.setLineDash([]); pen.line(x(0) - 8, y(0), x(0) + 8, y(0), pen.c.ink, 1.5), pen.line(x(0), y(0) - 8, x(0), y(0) + 8, pen.c.ink, 1.5); }}));
     });
-    return {marks: control.rows, rows: control.rows, tables: [control], words: '', good: `Good: a round cloud about the middle. ${spec > 0 ? (spec < reach ? `Dashed: the specification, ${num(spec, 3)} px.` : `The specification, ${num(spec, 3)} px, lies outside of what is shown.`) : ''}`};
+    return {marks: control.rows, rows: control.rows, tables: [control], words: '', good: `Good: a round cloud about the centre. ${spec > 0 ? (spec < reach ? `Dashed: the specification, ${num(spec, 3)} px.` : `The specification, ${num(spec, 3)} px, lies outside of what is shown.`) : ''}`};
   },
 };
 
@@ -155,7 +155,7 @@ export const servoLenses: Figure = {
     const trials = doc.table('lenses'), compared = trials && compare(host, trials, 'intrinsics', doc.estimate('specification_px'));
     if (!trials || !compared) return null;
     return {marks: trials.rows, rows: trials.rows, tables: [trials], words: compared.words,
-      good: `The best controller, three times: given – the rig’s focal length, whatever the lens does; observed – told on-line by what stands still in the pictures; true. ${compared.words ? `Here ${compared.words}.` : ''}`};
+      good: `The best controller, three times: given – the rig’s focal length, whatever the lens does; observed – estimated on-line from what stands still in the images; true. ${compared.words ? `Here ${compared.words}.` : ''}`};
   },
 };
 

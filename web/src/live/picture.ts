@@ -45,7 +45,7 @@ export class LivePicture {
   private draw(pen: Pen): void {
     const width = this.image?.width ?? this.camera?.width ?? 0, height = this.image?.height ?? this.camera?.height ?? 0;
     pen.rect(0, 0, pen.w, pen.h, pen.c.panel);
-    if (!(width > 0 && height > 0)) return pen.text('no picture yet', pen.w / 2, pen.h / 2, {align: 'center', colour: pen.c.soft});
+    if (!(width > 0 && height > 0)) return pen.text('no image yet', pen.w / 2, pen.h / 2, {align: 'center', colour: pen.c.soft});
     const s = Math.min(pen.w / width, pen.h / height) * 0.98, left = (pen.w - s * width) / 2, top = (pen.h - s * height) / 2;
     // The middle of the top left pixel is (0, 0).
     const x = (u: number) => left + s * (u + 0.5), y = (v: number) => top + s * (v + 0.5);

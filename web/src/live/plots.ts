@@ -52,12 +52,12 @@ export const plotsOf: Record<string, PlotCard[]> = {
     {id: 'innovations', title: 'Does each observation fit?', note: 'innovation, px, ± 3σ; rejected: red', span: 12, isPerHead: true, plots: [sightPlot('u'), sightPlot('v'), nis(2)]},
   ],
   servo: [
-    {id: 'error', title: 'How far from the middle is the target?', note: 'px, ± 3σ predicted', span: 12, isPerHead: true, plots: (['u', 'v'] as const).map((axis) => ({label: `error ${axis}`, unit: 'px', sigma: `sigma_error_${axis}_px`, isAboutZero: true, levels: [{value: 0, dash: []}], height: 170,
+    {id: 'error', title: 'How far from the centre is the target?', note: 'px, ± 3σ predicted', span: 12, isPerHead: true, plots: (['u', 'v'] as const).map((axis) => ({label: `error ${axis}`, unit: 'px', sigma: `sigma_error_${axis}_px`, isAboutZero: true, levels: [{value: 0, dash: []}], height: 170,
       lines: [{column: `error_${axis}_px`, name: `error ${axis}`, colour: axis === 'u' ? 'blue' : 'orange', width: 1.3}]}))},
     {id: 'angles', title: 'Does the head follow?', note: 'asked - - · measured (blue) · predicted (orange), °', span: 12, isPerHead: true, plots: [{...degreePlot('pan'), height: 170}, {...degreePlot('tilt'), height: 170}]},
   ],
   head: [
-    {id: 'error', title: 'How far from the middle is the target?', note: 'px, from the principal point', span: 12, plots: (['u', 'v'] as const).map((axis) => ({label: `error ${axis}`, unit: 'px', levels: [{value: 0, dash: []}], height: 190,
+    {id: 'error', title: 'How far from the centre is the target?', note: 'px, from the principal point', span: 12, plots: (['u', 'v'] as const).map((axis) => ({label: `error ${axis}`, unit: 'px', levels: [{value: 0, dash: []}], height: 190,
       lines: [{column: `error_${axis}_px`, name: `error ${axis}`, colour: axis === 'u' ? 'blue' : 'orange', width: 1.3}]}))},
     {id: 'angles', title: 'Does the head follow?', note: 'asked - - · reached (blue) · the target (orange), °', span: 24, plots: (['pan', 'tilt'] as const).map((axis) => ({label: axis, unit: '°', scale: degrees, height: 150, lines: [
       {column: `asked_${axis}_rad`, name: 'asked', colour: 'ink', dash: [5, 4], width: 1.2}, {column: `measured_${axis}_rad`, name: 'measured', colour: 'blue'}, {column: `target_${axis}_rad`, name: 'target', colour: 'orange', width: 1.1}]}))},

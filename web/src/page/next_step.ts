@@ -17,13 +17,13 @@ const uses: Record<string, (doc: Doc) => string> = {
   project: () => 'What the pixels and points are worth stands beside them: 3σ.',
   'simulate board': () => 'Calibrate from these photos: `alidade calibrate PHOTOS --board COLSxROWS --square METRES`, and compare with truth_camera.yaml by `alidade camera diff`.',
   'simulate rotation': () => 'Run `alidade observe log.csv --size WIDTHxHEIGHT` on it; the truth is truth_camera.yaml.',
-  'simulate rangefinder': () => 'Run `alidade rangefinder shots.csv --camera camera.yaml --corners corners.csv` with the board told; the truth is truth_rangefinder.yaml.',
+  'simulate rangefinder': () => 'Run `alidade rangefinder shots.csv --camera camera.yaml --corners corners.csv` with the board given; the truth is truth_rangefinder.yaml.',
   'simulate rig': () => 'Run `alidade rig views.csv` with its cameras and board; the truth is truth_rig.yaml.',
   'simulate track': () => 'Run `alidade track events.csv --rig rig.yaml --truth truth.csv`.',
   'simulate servo': () => 'Run `alidade identify log.csv`, then `alidade servo scenario.yaml`.',
   'simulate underwater': () => 'Run `alidade localize sights.csv --camera camera.yaml --target target.yaml --truth truth.tum`.',
   'camera show': () => '`alidade camera undistort CAMERA PHOTOS` makes photos straight; `alidade camera diff A B` compares two cameras.',
-  reproduce: () => 'Each claim is told in full below: what was run, what was chosen where the paper is silent, and how it differs.',
+  reproduce: () => 'Each claim is shown in full below: what was run, what was chosen where the paper is silent, and how it differs.',
 };
 
 /** Empty of none. */

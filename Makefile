@@ -4,7 +4,7 @@
 .DEFAULT_GOAL := help
 
 out := build/release
-# Ninja's own choice of jobs, unless told: make test JOBS=1
+# Ninja's own choice of jobs, unless given: make test JOBS=1
 jobs := $(if $(JOBS),-j $(JOBS),)
 
 help:
@@ -15,7 +15,7 @@ help:
 	@echo "make deb     Debian packages of executable, library, Python module and documentation, in build/deb"
 	@echo "make deb-test: install and use them in a fresh Debian 12 root, and remove them"
 	@echo "make bench   measure speed, side by side with OpenCV and mrcal"
-	@echo "make docs    renew the pictures in README and docs"
+	@echo "make docs    renew the images in README and docs"
 	@echo "make study   is σ what it says? 2400 calibrations, 2000 observations, rangefinders; corners against OpenCV's, with known truth"
 	@echo "make fuzz MINUTES=10   every reader of what others wrote, on bytes that nobody meant; docs/robustness.md"
 	@echo "make faults  failing calls, full disks, kill -9, 64 runs at once, under every command that writes (hours: FAULTS=--short, a minute)"

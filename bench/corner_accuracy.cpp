@@ -71,7 +71,7 @@ struct Score {
   int num_boards = 0, num_found = 0, num_wrong = 0;
   double sum_squares = 0.0, sum_chi2 = 0.0, worst_px = 0.0, seconds = 0.0;
 
-  /// Corners further than `wrong_px` from the truth count as wrong and are left out of the RMS.
+  /// Corners further than `wrong_px` from the truth count as wrong and are excluded from the RMS.
   void add(const BoardView& view, const std::vector<Eigen::Vector2d>& truth) {
     constexpr double wrong_px = 1.0;
     if (view.corners.empty()) return;

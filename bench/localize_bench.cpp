@@ -60,10 +60,10 @@ void time_update(benchmark::State& state, int num_features, FeatureKind kind, st
     benchmark::DoNotOptimize(filter.update(at.observations).num_used);
   }
   state.counters["state"] = at.filter.dim();
-  state.counters["sights"] = static_cast<double>(at.observations.size());
+  state.counters["observations"] = static_cast<double>(at.observations.size());
 }
 
-/// Prediction and the expected place of every feature: what a search in images needs before each frame.
+/// Prediction and the expected position of every feature: what a search in images needs before each frame.
 void time_expected(benchmark::State& state, int num_features) {
   const Ready at = ready(num_features, FeatureKind::inverse_depth);
   LocalizationFilter filter = at.filter;
@@ -120,7 +120,7 @@ void time_frames(benchmark::State& state) {
     state.SetIterationTime(median(seconds));
     state.counters["found"] = median(found);
     state.counters["features"] = median(features);
-    state.counters["state_at_least"] = 12.0 + 3.0 * median(features);  // were all of them places
+    state.counters["state_at_least"] = 12.0 + 3.0 * median(features);  // were all of them positions
   }
 }
 

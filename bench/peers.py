@@ -132,7 +132,7 @@ def mrcal_from_ours(case):
 
 
 def mrcal_sigma(inputs, cols=60, rows=40):
-    """mrcal.projection_uncertainty over the picture, at infinity: seconds, and σ of the worst direction."""
+    """mrcal.projection_uncertainty over the image, at infinity: seconds, and σ of the worst direction."""
     model = mrcal.cameramodel(optimization_inputs=inputs, icam_intrinsics=0)
     width, height = model.imagersize()
 

@@ -10,7 +10,7 @@ namespace alidade::bench {
 namespace {
 
 /// From corners, spots and readings to the beam with covariance: boards' poses, start, outliers, refinement. Where σ is
-/// not told, wrong shots are always looked for, and σ and beam are found in turn.
+/// not given, wrong shots are always looked for, and σ and beam are found in turn.
 void time_solve(benchmark::State& state, RangefinderMethod method, Refine refine, bool tells_sigma) {
   RangefinderSceneConfig scene_config = *rangefinder_scenario("reference");
   scene_config.num_shots = static_cast<int>(state.range(0));

@@ -13,7 +13,7 @@ namespace alidade {
 
 constexpr double blur_px = 0.1;
 
-/// Something that a photo's corners share, drawn anew for each photo.
+/// Something that a photo's corners share, drawn again for each photo.
 struct Cause {
   const char* name;
   const char* size;
@@ -40,7 +40,7 @@ inline void shutter(const BoardScene& scene, std::mt19937_64& random, std::vecto
   }
 }
 
-/// The board bends with its pose, into another parabola in each photo.
+/// The board flexes with its pose, into another parabola in each photo.
 inline void bow(const BoardScene& scene, std::mt19937_64& random, std::vector<BoardView>& views) {
   std::normal_distribution<double> normal;
   const Eigen::Vector3d centre = 0.5 * (scene.points_in_board.front() + scene.points_in_board.back());

@@ -90,15 +90,15 @@ int main(int argc, char** argv) {
   const std::string only = argc > 2 ? argv[2] : "";
   const std::vector<RigCase> cases{
       {"clean", "", {0.0}, [](RigTrialSetup&, double) {}},
-      {"clean, scale not told", "", {0.0}, [](RigTrialSetup& s, double) { s.tells_scale = false; }},
-      {"encoder scale, not told",
+      {"clean, scale not given", "", {0.0}, [](RigTrialSetup& s, double) { s.tells_scale = false; }},
+      {"encoder scale, not given",
        "%",
        {1.0},
        [](RigTrialSetup& s, double v) {
          s.scene.encoder_scale = 1.0 + 0.01 * v;
          s.tells_scale = false;
        }},
-      {"encoder scale, σ 0.02 % told",
+      {"encoder scale, σ 0.02 % given",
        "%",
        {0.1, 0.2, 0.5, 1.0},
        [](RigTrialSetup& s, double v) { s.scene.encoder_scale = 1.0 + 0.01 * v, s.sigma_scale = 2e-4; }},
@@ -122,7 +122,7 @@ int main(int argc, char** argv) {
        "%",
        {0.1, 0.2, 0.5, 1.0, 2.0, 5.0},
        [](RigTrialSetup& s, double v) { s.mistake.focal = 0.01 * v; }},
-      {"focal length of one lens, σ 0.3 px told",
+      {"focal length of one lens, σ 0.3 px given",
        "%",
        {0.1, 0.2, 0.5, 1.0},
        [](RigTrialSetup& s, double v) { s.mistake.focal = 0.01 * v, s.sigma_lens_px = 0.3, s.first_lens_only = true; }},
@@ -141,7 +141,7 @@ int main(int argc, char** argv) {
       {"rows shifted", "", {1.0}, [](RigTrialSetup& s, double) { s.mistake.shift_rows = true; }},
   };
   const std::vector<ShotCase> shot_cases{
-      {"shots as told", "", {0.0}, [](RangefinderTrialSetup&, double) {}},
+      {"shots as given", "", {0.0}, [](RangefinderTrialSetup&, double) {}},
       {"range scale",
        "%",
        {0.05, 0.1, 0.2, 0.5, 1.0, 2.0},
@@ -195,12 +195,12 @@ int main(int argc, char** argv) {
       "one thing wrong at a time, {} draws a row. Seen: refused, of care, or estimated. The last columns: the largest "
       "error below a good verdict, in its stated σ, and how many draws were good and off by more than 5σ.\n\n"
       "## `alidade rig`\n\nTwo heads, 320×240, f 338 px, corners 0.2 px, readings 0.02°, five places of a board, four "
-      "views a head and place; lenses, square and (but where it is said) the encoders' scales told as exact.\n\n",
+      "views per head and position; lenses, square and (but where it is said) the encoders' scales given as exact.\n\n",
       draws, draws);
   int silent = table_of(cases, draws, only);
   fmt::print(
       "\n## `alidade rangefinder`\n\n18 shots from 0.5 to 4 m with board and spot, corners 0.2 px, spots 0.3 px, "
-      "readings 2 mm, a lens known to 1.5, 1.5, 2, 2 px; no σ told.\n\n");
+      "readings 2 mm, a lens known to 1.5, 1.5, 2, 2 px; no σ given.\n\n");
   silent += table_of(shot_cases, draws, only);
   return silent == 0 ? 0 : 1;
 }

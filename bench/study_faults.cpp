@@ -21,7 +21,7 @@ namespace {
 using namespace alidade;
 
 struct Outcome {
-  bool is_seen = false;   ///< The data show that something is not as told.
+  bool is_seen = false;   ///< The data show that something is not as given.
   bool is_wrong = false;  ///< Called good, and off by more than 5σ.
 };
 
@@ -161,7 +161,8 @@ int main(int argc, char** argv) {
   fmt::print(
       "\nWhat turns both rays in their common plane (in G yaw and pan zero: heads side by side, a target about level "
       "with "
-      "them) and the length of the baseline move the range alone: no sights show it, and a rig file that does not say "
+      "them) and the length of the baseline move the range alone: no observation shows it, and a rig file that does "
+      "not say "
       "its "
       "σ is therefore never good. Called good and off by more than 5σ: {}.\n",
       all_wrong);

@@ -32,7 +32,7 @@ struct Covered {
   [[nodiscard]] double percent(std::size_t k) const { return 100.0 * inside[k] / count; }
 };
 
-/// fx, fy, cx, cy; the distortion has another meaning where k3 is held.
+/// fx, fy, cx, cy; the distortion has another meaning where k3 is fixed.
 Covered of_cause(const Cause& cause, int runs) {
   const Camera camera = *example_camera("brown", size.width_px, size.height_px);
   const Board board;

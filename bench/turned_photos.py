@@ -2,7 +2,7 @@
 """Focal length of a camera that was turned by hand: `alidade observe PHOTOS` beside OpenCV's stitching (cv2.detail).
 
 bench/turned_photos.py ALIDADE FOLDER [FOLDER...]: a line a set, with the time of each. OpenCV's: SIFT, best of two
-nearest, homographies, bundle adjustment on rays (one focal length a photo: their median is told).
+nearest, homographies, bundle adjustment on rays (one focal length per photo: their median is reported).
 """
 import glob
 import json
@@ -28,10 +28,10 @@ def of_alidade(executable, photos):
 
 def of_opencv(photos, megapixels=1.6):
     start = time.time()
-    pictures = [cv2.imread(p) for p in photos]
-    scale = min(1.0, np.sqrt(megapixels * 1e6 / (pictures[0].shape[0] * pictures[0].shape[1])))
+    images = [cv2.imread(p) for p in photos]
+    scale = min(1.0, np.sqrt(megapixels * 1e6 / (images[0].shape[0] * images[0].shape[1])))
     finder = cv2.SIFT_create(2600)
-    features = [cv2.detail.computeImageFeatures2(finder, cv2.resize(p, None, fx=scale, fy=scale)) for p in pictures]
+    features = [cv2.detail.computeImageFeatures2(finder, cv2.resize(p, None, fx=scale, fy=scale)) for p in images]
     matcher = cv2.detail_BestOf2NearestMatcher(False, 0.65)
     matches = matcher.apply2(features)
     matcher.collectGarbage()

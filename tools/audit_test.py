@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Inputs that are not as they are told: each must end in the truth within its σ, or in a verdict that is not good, or be
+"""Inputs that are not as given: each must end in the truth within its σ, or in a verdict that is not good, or be
 refused. Never a good verdict (state `good`) with an error above five of its σ. audit_test.py ALIDADE. The inputs, and the
 truth behind them, lie in the folder that ALIDADE_DATA names (audit/README.md there); without it: skipped (77)."""
 import csv
@@ -36,7 +36,7 @@ class Audit(unittest.TestCase):
         worst = max(errors_in_sigmas, default=0.0)
         return result["verdict"]["state"] == "good" and not worst <= LIMIT, worst
 
-    def require_told(self, name, result, errors):
+    def require_stated(self, name, result, errors):
         silent, worst = self.is_silent(result, errors)
         self.assertFalse(silent, f"{name}: good, but {worst:.0f}σ off: {result['verdict']['sentence']}")
 
@@ -60,7 +60,7 @@ class Observe(Audit):
                 with self.subTest(log=row["log"], options=" ".join(options)):
                     result = self.run_alidade("observe", AUDIT / "observe" / row["log"], "--size", row["size"], *options)
                     if result:
-                        self.require_told(row["log"], result, errors_of(result, truth))
+                        self.require_stated(row["log"], result, errors_of(result, truth))
 
 
 class Rangefinder(Audit):
@@ -69,7 +69,7 @@ class Rangefinder(Audit):
     def errors(self, result):
         for name, truth in (("origin_m", self.ORIGIN), ("direction", self.DIRECTION)):
             for value, true, sigma in zip(result["estimate"][name], truth, result["stddev"][name]):
-                # the direction is told to four decimals
+                # the direction is given to four decimals
                 yield max(0.0, abs(value - true) - (5e-5 if name == "direction" else 0.0)) / max(sigma, 1e-12)
 
     def test_no_shots_are_silently_wrong(self):
@@ -83,7 +83,7 @@ class Rangefinder(Audit):
                 result = self.run_alidade("rangefinder", folder / "shots.csv", "--camera", folder / "camera.yaml",
                                           "--board", "9x6", *square, *corners)
                 if result:
-                    self.require_told(name, result, self.errors(result))
+                    self.require_stated(name, result, self.errors(result))
 
     def test_a_scans_edges_tell_no_more_than_they_do(self):
         """Direction and origin within 5 of the σ stated; and where `project` puts the beam by that file, its pixels."""
@@ -134,7 +134,7 @@ class Identify(Audit):
                 result = self.run_alidade("identify", AUDIT / "identify" / f"{name}.csv")
                 if result:
                     error = abs(result["estimate"]["gain_rad"] - truth) / result["stddev"]["gain_rad"]
-                    self.require_told(name, result, [error])
+                    self.require_stated(name, result, [error])
 
     def test_what_a_log_hides_is_named(self):
         for name, what in self.NAMED.items():
@@ -161,8 +161,8 @@ class Track(Audit):
 
     def require_same(self, rig, first, *others):
         """Events in another order of arrival: the same target, σ, noise and verdict when all have come."""
-        told = self.run_alidade("track", first, "--rig", rig)
-        self.assertIsNotNone(told)
+        forward = self.run_alidade("track", first, "--rig", rig)
+        self.assertIsNotNone(forward)
         row = self.last_row()
         for other in others:
             with self.subTest(other.name):
@@ -170,8 +170,8 @@ class Track(Audit):
                 self.assertIsNotNone(result)
                 for name, value in self.last_row().items():
                     self.assertAlmostEqual(value, row[name], delta=1e-6 + 1e-4 * abs(row[name]), msg=name)
-                self.assertEqual(result["verdict"]["state"], told["verdict"]["state"])
-                self.assertAlmostEqual(result["estimate"]["nis_per_dof"], told["estimate"]["nis_per_dof"], places=6)
+                self.assertEqual(result["verdict"]["state"], forward["verdict"]["state"])
+                self.assertAlmostEqual(result["estimate"]["nis_per_dof"], forward["estimate"]["nis_per_dof"], places=6)
 
     def test_the_order_of_arrival_does_not_matter(self):
         self.require_same(self.LATE / "rig.yaml", self.LATE / "min_good.csv", self.LATE / "min_bad.csv")
@@ -229,7 +229,7 @@ class Localize(Audit):
                 cov = [[float(row[f"cov_{axes[min(i, j)]}_{axes[max(i, j)]}"]) for j in range(6)] for i in range(6)]
                 yield error, cov
 
-    def test_what_is_mirrored_is_told(self):
+    def test_what_is_mirrored_is_named(self):
         for name in ("target_mirrored", "mirrored_picture"):
             with self.subTest(name):
                 result = self.localize(name)
@@ -242,7 +242,7 @@ class Localize(Audit):
             with self.subTest(name, options=" ".join(options)):
                 result = self.localize(name, *options)
                 if result:
-                    self.require_told(name, result, (abs(e[i]) / math.sqrt(cov[i][i]) for e, cov in self.poses(name)
+                    self.require_stated(name, result, (abs(e[i]) / math.sqrt(cov[i][i]) for e, cov in self.poses(name)
                                                      for i in range(6)))
 
     def test_a_wrong_focal_length_is_named(self):
@@ -250,8 +250,8 @@ class Localize(Audit):
         self.assertNotEqual(result["verdict"]["state"], "good")
         self.assertIn("focal length", result["verdict"]["sentence"])
 
-    def test_the_covariance_holds_where_all_is_told_right(self):
-        # A recording's error is mostly one draw of six numbers, that of the frame by the target's points: over 3.8
+    def test_the_covariance_holds_where_all_is_given_right(self):
+        # A recording's error is mostly one draw of six components, that of the frame by the target's points: over 3.8
         # its NEES/6 comes once in a thousand. A mean over many recordings is in the tests of the room.
         for name in ("base_brown", "base_fisheye"):
             with self.subTest(name):

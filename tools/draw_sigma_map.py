@@ -50,7 +50,7 @@ def main():
     corners = result["data"]["corners"]
     print(f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-0.5 -0.5 {width} {height + LEGEND_PX}" '
           f'font-family="sans-serif" font-size="13" role="img">')
-    print("<title>3σ of where a far point is seen, over the picture, with the corners that it comes from</title>")
+    print("<title>3σ of where a far point is seen, over the image, with the corners that it comes from</title>")
     print(f'<rect x="-0.5" y="-0.5" width="{width}" height="{height}" fill="#fff"/>')
     print("\n".join(cells(result["grids"]["sigma_infinity"])))
     dots = "".join(f"M{u:.0f} {v:.0f}h0" for u, v in zip(corners["u_px"], corners["v_px"]))

@@ -187,9 +187,9 @@ def left_behind(alidade, folder, mode):
         lines = log.read_text().splitlines()
         if any(line.count(",") != lines[0].count(",") for line in lines): faults.append(f"{log.name} is cut off")
         if len(lines) < 20: continue
-        told = subprocess.run([alidade, "observe", str(log), "--size", "160x120", "--estimate", "k1,mount,delay", "--no-zoom", "--method", "batch", "--out",
+        observed = subprocess.run([alidade, "observe", str(log), "--size", "160x120", "--estimate", "k1,mount,delay", "--no-zoom", "--method", "batch", "--out",
                                str(folder / "again")], capture_output=True, text=True)
-        if told.returncode not in (0, 4, 5, 6): faults.append(f"observe: {told.stderr[:200]}")
+        if observed.returncode not in (0, 4, 5, 6): faults.append(f"observe: {observed.stderr[:200]}")
     return faults
 
 

@@ -81,7 +81,7 @@ def walk_at(t):
 
 
 class WalkSource:
-    """Numbered points that a camera sees; six of them, told to a millimetre, are the target."""
+    """Numbered points that a camera sees; six of them, given to a millimetre, are the target."""
 
     def __init__(self, folder, frames, seed):
         self.noise, self.frames = random.Random(seed), frames

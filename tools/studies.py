@@ -58,7 +58,7 @@ longest axis of its covariance.""", [
          [(f"{method}, {refine}", f"rangefinder --trials 200 --method {method} --refine {refine} --vary shots={first}:30:6")
           for method, first in (("joint", 6), ("spot", 6), ("plane", 6)) for refine in ("all", "beam")], Goal(), BEAM),
         ("Few shots", "A plane needs five.", [("joint", "rangefinder --trials 1000 --vary shots=3:6:1"), ("spot", "rangefinder --trials 1000 --method spot --vary shots=3:6:1")], Goal(), BEAM)]),
-    "studies-turned": ("Photos of a camera turned by hand", """f 850 to 2000 px, 5 to 14 photos of 1280 × 960; k1, centre, noise (0.2 to 1 px), rotations and points (at 2 to 20 m) drawn anew for each trial; what is wrong is
+    "studies-turned": ("Photos of a camera turned by hand", """f 850 to 2000 px, 5 to 14 photos of 1280 × 960; k1, centre, noise (0.2 to 1 px), rotations and points (at 2 to 20 m) drawn again for each trial; what is wrong is
 the row's. Errors of f are relative.""", [
         ("Said to be on the spot", "`--on-the-spot`. Goals: 93 % inside 2σ, 97 % inside 3σ, none called good that is beyond 5σ.",
          [(label, f"turned --trials 200 --on-the-spot {words}".strip()) for label, words in (

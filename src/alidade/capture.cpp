@@ -17,31 +17,31 @@
 #include "alidade/capture/outline.h"
 #include "alidade/capture/pose_plan.h"
 #include "alidade/capture/pose_words.h"
-#include "alidade/capture/shown_pictures.h"
+#include "alidade/capture/shown_images.h"
 
 namespace alidade {
 namespace {
 
 constexpr double still_s = 0.12;       // so long it has to stand still,
 constexpr double still_share = 0.003;  // within so much of the image's width
-constexpr double same_share = 0.04;    // of the board's size: a pose that is held already
-constexpr double most_blur = 1.8;      // of the sharpest
+constexpr double same_share = 0.04;    // of the board's size: a pose that is kept already
+constexpr double max_blur = 1.8;       // of the sharpest
 constexpr double sharp_px = 1.3;       // is never called blurred
-constexpr double least_gain = 0.004;   // of σ
-// Of the gain of the outline a picture must bring the share `choosy`. Who does not follow the outline shows what there
-// is: the longer no photo was taken, the less will do, of all pictures that were shown; the newest is preferred where
+constexpr double min_gain = 0.004;     // of σ
+// Of the gain of the outline an image must bring the share `choosy`. Who does not follow the outline shows what there
+// is: the longer no photo was taken, the less will do, of all images that were shown; the newest is preferred where
 // it brings `nearly` as much.
 constexpr double choosy = 0.6, nearly = 0.85;
 constexpr double patient_s = 3.0, impatient_s = 8.0;
 // Of what an outline would bring, the part that a photo brings which a hand holds about there: by simulated sessions.
 // Each photo that is taken moves it by this: who shows other poses than the outlines needs more of them.
-constexpr double share_by_hand = 0.85, share_learnt = 0.2, least_share = 0.05;
+constexpr double share_by_hand = 0.85, share_learnt = 0.2, min_share = 0.05;
 
-std::uint64_t hash_of(const cv::Mat& picture) {
+std::uint64_t hash_of(const cv::Mat& image) {
   std::uint64_t hash = 1469598103934665603u;  // FNV-1a, eight bytes at a time
-  const std::size_t row_bytes = static_cast<std::size_t>(picture.cols) * picture.elemSize();
-  for (int row = 0; row < picture.rows; ++row) {
-    const uchar* bytes = picture.ptr(row);
+  const std::size_t row_bytes = static_cast<std::size_t>(image.cols) * image.elemSize();
+  for (int row = 0; row < image.rows; ++row) {
+    const uchar* bytes = image.ptr(row);
     for (std::size_t i = 0; i + 8 <= row_bytes; i += 8) {
       std::uint64_t word = 0;
       std::memcpy(&word, bytes + i, 8);
@@ -69,10 +69,10 @@ std::optional<double> distance_px(const BoardView& a, const BoardView& b) {
   return sum / count;
 }
 
-std::vector<Eigen::Vector2d> places_of(const BoardView& view) {
-  std::vector<Eigen::Vector2d> places;
-  for (const Corner& corner : view.corners) places.push_back(corner.px);
-  return places;
+std::vector<Eigen::Vector2d> pixels_of(const BoardView& view) {
+  std::vector<Eigen::Vector2d> positions;
+  for (const Corner& corner : view.corners) positions.push_back(corner.px);
+  return positions;
 }
 
 }  // namespace
@@ -96,20 +96,20 @@ struct CaptureGuide::State {
   double share = share_by_hand;  ///< Of the outlines' gains that photos brought lately.
   bool takes_what_comes = false;
 
-  // Of the pictures that came.
+  // Of the images that came.
   std::optional<std::uint64_t> hash;
   QuickLook seen;        ///< In the newest.
   BoardView still_view;  ///< Where the board has been since …
   std::optional<double> still_since_s, took_s;
   double sharpest_px = 1e9;
-  ShownPictures shown;  ///< That could have been taken.
+  ShownImages shown;  ///< That could have been taken.
 
-  void begin(const ImageSize& of_pictures);
-  void look_closely(const cv::Mat& picture);
+  void begin(const ImageSize& of_images);
+  void look_closely(const cv::Mat& image);
   void keep(BoardView view);
   void solve();
   void fill_state();
-  CaptureLook judge(const cv::Mat* picture, double t_s);
+  CaptureLook judge(const cv::Mat* image, double t_s);
   [[nodiscard]] double asked_share(double t_s) const;
   [[nodiscard]] double gain_of(const BoardView& view) const;
   [[nodiscard]] bool is_held(const BoardView& view) const;
@@ -119,21 +119,21 @@ struct CaptureGuide::State {
   void say_way(const BoardView& view, CaptureLook& look) const;
 };
 
-void CaptureGuide::State::begin(const ImageSize& of_pictures) {
-  if (size.width_px > 0 || of_pictures.width_px < 1 || of_pictures.height_px < 1) return;
-  size = of_pictures;
+void CaptureGuide::State::begin(const ImageSize& of_images) {
+  if (size.width_px > 0 || of_images.width_px < 1 || of_images.height_px < 1) return;
+  size = of_images;
   solve();
 }
 
 /// Of a photo that does not come again, as find_board() does.
-void CaptureGuide::State::look_closely(const cv::Mat& picture) {
-  BoardDetection found = find_board(picture, board);
+void CaptureGuide::State::look_closely(const cv::Mat& image) {
+  BoardDetection found = find_board(image, board);
   if (found.found()) seen = {.view = std::move(found.view), .blur_px = 0.0, .reason = ""};
 }
 
 void CaptureGuide::State::keep(BoardView view) {
   if (lens->is_solved && plan->best_gain() > 0.0) {
-    const double brought = std::clamp(gain_of(view) / plan->best_gain(), least_share, share_by_hand);
+    const double brought = std::clamp(gain_of(view) / plan->best_gain(), min_share, share_by_hand);
     share += share_learnt * (brought - share);
   }
   view.photo = std::to_string(views.size() + 1);
@@ -171,7 +171,7 @@ void CaptureGuide::State::fill_state() {
   }
   if (lens->is_solved) out.photos_to_goal = plan->photos_until(config.until_px / correction, share);
   if (plan->best()) {
-    const HeldBoard held = held_board(lens->camera, lens->board_points, *plan->best());
+    const BoardInImage held = board_in_image(lens->camera, lens->board_points, *plan->best());
     out.next = NextPose{*plan->best(), outline_of(lens->camera, lens->board_points, *plan->best()),
                         words_of(held, false), words_of(held, true)};
   }
@@ -193,13 +193,13 @@ bool CaptureGuide::State::stands_still(double t_s) {
 void CaptureGuide::State::say_way(const BoardView& view, CaptureLook& look) const {
   const auto pose = plan->best() ? pose_of(view) : std::nullopt;
   if (!pose) return;
-  const HeldBoard now = held_board(lens->camera, lens->board_points, *pose);
-  const HeldBoard wanted = held_board(lens->camera, lens->board_points, *plan->best());
+  const BoardInImage now = board_in_image(lens->camera, lens->board_points, *pose);
+  const BoardInImage wanted = board_in_image(lens->camera, lens->board_points, *plan->best());
   look.words += (look.words.empty() ? "" : ": ") + words_to(wanted, now, false);
   look.words_mirrored += (look.words_mirrored.empty() ? "" : ": ") + words_to(wanted, now, true);
 }
 
-/// Share of the outline's gain that a picture must bring now.
+/// Share of the outline's gain that an image must bring now.
 double CaptureGuide::State::asked_share(double t_s) const {
   if (takes_what_comes) return 0.0;
   const double late = std::clamp((t_s - *took_s - patient_s) / (impatient_s - patient_s), 0.0, 1.0);
@@ -215,60 +215,60 @@ bool CaptureGuide::State::is_held(const BoardView& view) const {
   return std::ranges::any_of(views, [&](const BoardView& kept) { return is_same_pose(view, kept, same_share); });
 }
 
-/// Whether one of the pictures that were shown is to be taken now.
+/// Whether one of the images that were shown is to be taken now.
 bool CaptureGuide::State::recalls(double t_s, CaptureLook& look) const {
-  const ShownPicture* best = shown.best();
-  if (best == nullptr || best->gain < std::max(least_gain, asked_share(t_s) * plan->best_gain())) return false;
-  look.sight = Sight::useful;
-  look.words = look.words_mirrored = fmt::format("taken, as it was held {:.0f} s ago", t_s - best->t_s);
-  look.earlier = EarlierPicture{best->picture, best->view, best->t_s};
+  const ShownImage* best = shown.best();
+  if (best == nullptr || best->gain < std::max(min_gain, asked_share(t_s) * plan->best_gain())) return false;
+  look.status = LookStatus::useful;
+  look.words = look.words_mirrored = fmt::format("taken, as shown {:.0f} s ago", t_s - best->t_s);
+  look.earlier = EarlierImage{best->image, best->view, best->t_s};
   return true;
 }
 
-CaptureLook CaptureGuide::State::judge(const cv::Mat* picture, double t_s) {
+CaptureLook CaptureGuide::State::judge(const cv::Mat* image, double t_s) {
   CaptureLook look;
-  const auto say = [&](Sight sight, const std::string& words) {
-    look.sight = sight;
+  const auto say = [&](LookStatus status, const std::string& words) {
+    look.status = status;
     look.words = look.words_mirrored = words;
   };
   if (!seen.found()) {
     still_since_s.reset();
     const bool is_other = seen.other_grid.first > 0;
     std::tie(look.other_cols, look.other_rows) = seen.other_grid;
-    say(is_other ? Sight::other_board : Sight::nothing,
+    say(is_other ? LookStatus::other_board : LookStatus::nothing,
         is_other ? fmt::format("a board of {}×{} corners is in view, not of {}×{}", seen.other_grid.first,
                                seen.other_grid.second, board.cols, board.rows)
                  : "no board in view");
     return look;
   }
-  look.corners_px = places_of(seen.view);
+  look.corners_px = pixels_of(seen.view);
   if (!took_s) took_s = t_s;
   const bool is_still = stands_still(t_s);
   if (seen.blur_px > 0.0 && is_still) sharpest_px = std::min(sharpest_px, seen.blur_px);
   if (is_held(seen.view)) {
-    say(Sight::same_pose, "same pose again");
+    say(LookStatus::same_pose, "same pose again");
     say_way(seen.view, look);
     return look;
   }
   look.gain = gain_of(seen.view);
   if (!is_still) {
-    say(Sight::moving, "");
+    say(LookStatus::moving, "");
     say_way(seen.view, look);
     return look;
   }
-  if (seen.blur_px > std::max(sharp_px, most_blur * sharpest_px)) {
-    say(Sight::blurred, fmt::format("blurred: σ {:.1f} px, the sharpest {:.1f} px", seen.blur_px, sharpest_px));
+  if (seen.blur_px > std::max(sharp_px, max_blur * sharpest_px)) {
+    say(LookStatus::blurred, fmt::format("blurred: σ {:.1f} px, the sharpest {:.1f} px", seen.blur_px, sharpest_px));
     return look;
   }
-  const double asked = std::max(least_gain, asked_share(t_s) * plan->best_gain());
-  const ShownPicture* best = shown.best();
+  const double asked = std::max(min_gain, asked_share(t_s) * plan->best_gain());
+  const ShownImage* best = shown.best();
   if (look.gain >= asked && (takes_what_comes || best == nullptr || look.gain >= nearly * best->gain)) {
-    say(Sight::useful, "taken");
+    say(LookStatus::useful, "taken");
     return look;
   }
-  if (look.gain >= least_gain) shown.offer(seen.view, picture, t_s, look.gain);
+  if (look.gain >= min_gain) shown.offer(seen.view, image, t_s, look.gain);
   if (recalls(t_s, look)) return look;
-  say(Sight::little, "");
+  say(LookStatus::little, "");
   say_way(seen.view, look);
   return look;
 }
@@ -287,28 +287,28 @@ CaptureGuide::~CaptureGuide() = default;
 CaptureGuide::CaptureGuide(CaptureGuide&&) noexcept = default;
 CaptureGuide& CaptureGuide::operator=(CaptureGuide&&) noexcept = default;
 
-CaptureLook CaptureGuide::look(const cv::Mat& picture, double t_s) {
+CaptureLook CaptureGuide::look(const cv::Mat& image, double t_s) {
   State& state = *state_;
   CaptureLook look;
-  if (picture.empty() || picture.dims != 2) {
-    look.words = look.words_mirrored = "there is no picture";
+  if (image.empty() || image.dims != 2) {
+    look.words = look.words_mirrored = "there is no image";
     return look;
   }
-  state.begin({picture.cols, picture.rows});
-  if (picture.cols != state.size.width_px || picture.rows != state.size.height_px) {
-    look.words = look.words_mirrored = fmt::format("the picture is {}x{}, but the first was {}x{}", picture.cols,
-                                                   picture.rows, state.size.width_px, state.size.height_px);
+  state.begin({image.cols, image.rows});
+  if (image.cols != state.size.width_px || image.rows != state.size.height_px) {
+    look.words = look.words_mirrored = fmt::format("the image is {}x{}, but the first was {}x{}", image.cols,
+                                                   image.rows, state.size.width_px, state.size.height_px);
     return look;
   }
-  const std::uint64_t hash = hash_of(picture);
+  const std::uint64_t hash = hash_of(image);
   const bool is_repeated = state.hash == hash;
   state.hash = hash;
   if (!is_repeated) {
-    state.seen = state.looker.look(picture);
-    if (!state.seen.found() && !state.config.is_video) state.look_closely(picture);
+    state.seen = state.looker.look(image);
+    if (!state.seen.found() && !state.config.is_video) state.look_closely(image);
   }
-  look = state.judge(&picture, t_s);
-  if (is_repeated && !state.config.is_video) look.sight = Sight::repeated;
+  look = state.judge(&image, t_s);
+  if (is_repeated && !state.config.is_video) look.status = LookStatus::repeated;
   return look;
 }
 
@@ -316,31 +316,31 @@ CaptureLook CaptureGuide::look_back(double t_s) {
   CaptureLook look;
   State& state = *state_;
   if (!state.lens) return look;
-  if (!state.took_s) state.took_s = t_s;  // a photo was taken since: the wait begins anew
+  if (!state.took_s) state.took_s = t_s;  // a photo was taken since: the wait begins again
   state.recalls(t_s, look);
   return look;
 }
 
-std::string CaptureGuide::take(const cv::Mat& picture) {
+std::string CaptureGuide::take(const cv::Mat& image) {
   State& state = *state_;
-  state.begin({picture.cols, picture.rows});
-  if (picture.cols != state.size.width_px || picture.rows != state.size.height_px)
-    return fmt::format("the picture is {}x{}, but the first was {}x{}", picture.cols, picture.rows, state.size.width_px,
+  state.begin({image.cols, image.rows});
+  if (image.cols != state.size.width_px || image.rows != state.size.height_px)
+    return fmt::format("the image is {}x{}, but the first was {}x{}", image.cols, image.rows, state.size.width_px,
                        state.size.height_px);
-  BoardDetection found = find_board(picture, state.board);
+  BoardDetection found = find_board(image, state.board);
   if (!found.found()) {
-    state.shown.drop(picture);
+    state.shown.drop(image);
     return found.reason;
   }
   state.keep(std::move(found.view));
   return "";
 }
 
-CaptureLook CaptureGuide::push(const cv::Mat& picture, double t_s) {
-  CaptureLook seen = look(picture, t_s);
+CaptureLook CaptureGuide::push(const cv::Mat& image, double t_s) {
+  CaptureLook seen = look(image, t_s);
   if (!seen.take()) return seen;
-  if (const std::string reason = take(seen.earlier ? *seen.earlier->picture : picture); !reason.empty()) {
-    seen.sight = Sight::little;
+  if (const std::string reason = take(seen.earlier ? *seen.earlier->image : image); !reason.empty()) {
+    seen.status = LookStatus::little;
     seen.words = seen.words_mirrored = reason;
   }
   return seen;

@@ -23,13 +23,13 @@ namespace cv {
 class Mat;
 }
 
-/// Photos of a board, chosen while they are taken: where to hold it, which picture to keep, and when to stop.
+/// Photos of a board, chosen while they are taken: where to hold it, which image to keep, and when to stop.
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
 struct CaptureConfig {
-  double until_px = 0.2;  ///< The goal: 3σ of a pixel in the worst place.
-  /// Pictures follow each other as in a video: a board is taken when it stands still. Else each is a photo by itself.
+  double until_px = 0.2;  ///< The goal: 3σ at the worst pixel.
+  /// Images follow each other as in a video: a board is taken when it stands still. Else each is a photo by itself.
   bool is_video = true;
   CalibrateConfig calibrate = {};
 };
@@ -37,44 +37,44 @@ struct CaptureConfig {
 /// "0.2px" or "0.2".
 [[nodiscard]] FieldList fields_of(CaptureConfig& config);
 
-/// What a picture shows, and what it would bring.
-enum class Sight {
+/// What an image shows, and what it would bring.
+enum class LookStatus {
   nothing,      ///< No board.
   other_board,  ///< A chessboard of another size than was given.
   moving,       ///< The board has not stood still yet.
   blurred,      ///< Of the sharpest so far.
-  same_pose,    ///< Held as in a photo that is kept already: its errors would be the same.
-  little,       ///< It would tell next to nothing, or much less than the pose that is asked for.
-  repeated,     ///< The same picture as before, to the bit.
+  same_pose,    ///< As in a photo that is kept already: its errors would be the same.
+  little,       ///< It would bring next to nothing, or much less than the pose that is asked for.
+  repeated,     ///< The same image as before, to the bit.
   useful,       ///< To be taken.
 };
 
 /// The word for it: "nothing", "other_board" …
-[[nodiscard]] std::string_view sight_name(Sight sight);
+[[nodiscard]] std::string_view look_status_name(LookStatus status);
 
-/// A picture that was shown before.
-struct EarlierPicture {
-  std::shared_ptr<const cv::Mat> picture;  ///< Null where corners alone came.
+/// An image that was shown before.
+struct EarlierImage {
+  std::shared_ptr<const cv::Mat> image;  ///< Null where corners alone came.
   BoardView view;
   double t_s = 0.0;
 };
 
-/// What to do with a picture.
+/// What to do with an image.
 struct CaptureLook {
-  Sight sight = Sight::nothing;
+  LookStatus status = LookStatus::nothing;
   std::string words;                        ///< To the person, one line: what is wrong, or how to move the board.
-  std::string words_mirrored;               ///< The same to who sees the picture mirrored.
+  std::string words_mirrored;               ///< The same to who sees the image mirrored.
   std::vector<Eigen::Vector2d> corners_px;  ///< As seen; empty where there is no board.
   int other_cols = 0, other_rows = 0;       ///< Of other_board.
   double gain = 0.0;                        ///< ln of σ now over σ with it, over the image; 0: not known or none.
-  std::optional<EarlierPicture> earlier;    ///< To be taken in the place of this one: it told more.
-  [[nodiscard]] bool take() const { return sight == Sight::useful; }
+  std::optional<EarlierImage> earlier;      ///< To be taken instead of this one: it is more informative.
+  [[nodiscard]] bool take() const { return status == LookStatus::useful; }
 };
 
 /// Where to hold the board next.
 struct NextPose {
   Rigid3 cam_from_board;
-  std::vector<Eigen::Vector2d> outline_px;  ///< Of the outer corners, as the lens bends it.
+  std::vector<Eigen::Vector2d> outline_px;  ///< Of the outer corners, as the lens distorts it.
   std::string words;                        ///< "near, in the upper left corner, the top tilted away"
   std::string words_mirrored;
 };
@@ -93,9 +93,9 @@ struct CaptureState {
   [[nodiscard]] bool is_at(double goal_px) const { return has_camera && worst_3sigma_px <= goal_px; }
 };
 
-/// Decides about pictures while they come, solves after each that is kept, and says where to hold the board next: the
+/// Decides about images while they come, solves after each that is kept, and says where to hold the board next: the
 /// pose that lowers σ over the image most, by the information matrix of the lens. Knows no files and no clock: times
-/// come with the pictures. One thread at a time.
+/// come with the images. One thread at a time.
 /// Richardson, Strom & Olson, "AprilCal", IROS 2013 (the idea); Fedorov 1972 (sequential design), see next_photo.h.
 class CaptureGuide {
  public:
@@ -105,26 +105,26 @@ class CaptureGuide {
   CaptureGuide(CaptureGuide&&) noexcept;
   CaptureGuide& operator=(CaptureGuide&&) noexcept;
 
-  /// Looks at a picture (8- or 16-bit, grey or colour) of time `t_s`, which does not go back. All have the size of the
-  /// first; of another size: Sight::nothing.
-  [[nodiscard]] CaptureLook look(const cv::Mat& picture, double t_s);
-  /// Nothing new comes: what of the pictures that were shown is to be taken at that time, as `earlier`; else not
+  /// Looks at an image (8- or 16-bit, grey or colour) of time `t_s`, which does not go back. All have the size of the
+  /// first; of another size: LookStatus::nothing.
+  [[nodiscard]] CaptureLook look(const cv::Mat& image, double t_s);
+  /// Nothing new comes: what of the images that were shown is to be taken at that time, as `earlier`; else not
   /// useful.
   [[nodiscard]] CaptureLook look_back(double t_s);
-  /// Keeps a picture, whatever it brings, and solves. Why it cannot be kept (no board in it), else "".
-  [[nodiscard]] std::string take(const cv::Mat& picture);
-  /// look(), and take() where that is to be done; `sight` is then `useful`.
-  CaptureLook push(const cv::Mat& picture, double t_s);
-  /// The same with corners that were found elsewhere, in pictures of that size.
+  /// Keeps an image, whatever it brings, and solves. Why it cannot be kept (no board in it), else "".
+  [[nodiscard]] std::string take(const cv::Mat& image);
+  /// look(), and take() where that is to be done; `status` is then `useful`.
+  CaptureLook push(const cv::Mat& image, double t_s);
+  /// The same with corners that were found elsewhere, in images of that size.
   CaptureLook push(const BoardView& view, const ImageSize& size, double t_s);
   /// Forgets a photo that was kept, by its number among them.
   void forget(std::size_t photo);
 
   [[nodiscard]] const CaptureState& state() const;
   /// What the whole job, with the board's shape and its second look at the corners, found for these photos: from here
-  /// on σ is told in proportion.
+  /// on σ is stated in proportion.
   void correct(double worst_3sigma_px);
-  /// From now on whatever still brings something is useful: where no better picture will come.
+  /// From now on whatever still brings something is useful: where no better image will come.
   void take_what_comes(bool is_so);
 
  private:
@@ -139,14 +139,14 @@ struct ShotGuideState {
   Beam beam;                                                        ///< With its covariance, where there is one.
   double sigma_origin_m = std::numeric_limits<double>::infinity();  ///< √trace of the origin's covariance.
   Verdict verdict;                                                  ///< On the shots so far.
-  std::optional<NextShot> next;  ///< Where to hold the board; before there is a beam, its words alone tell.
+  std::optional<NextShot> next;  ///< Where to hold the board; before there is a beam, its words alone say it.
   std::vector<Eigen::Vector2d> outline_px = {};  ///< Of the board there, as the lens shows it.
   std::string words;                             ///< "1.5 m away, tilted by 30°, the right side farther"
 };
 
 /// The same guidance for a rangefinder: shots come one by one, each solve is that of rangefinder() on all of them, and
-/// the next shot is the first of plan_shots(). Before three shots, or where they cannot tell, poses that differ as much
-/// as a beam needs.
+/// the next shot is the first of plan_shots(). Before three shots, or where they do not determine it, poses that differ
+/// as much as a beam needs.
 class ShotGuide {
  public:
   /// Throws ConfigError for a config or a camera that cannot be.
@@ -167,7 +167,7 @@ class ShotGuide {
   ShotGuideState state_;
 };
 
-/// Where to look next with heads that turn, and how well their axes are known.
+/// Where to look next with heads that rotate, and how well their axes are known.
 struct ViewGuideState {
   int views = 0;
   bool has_rig = false;
@@ -175,7 +175,7 @@ struct ViewGuideState {
   /// How well it is known where the cameras stand to each other over the angles of the config; infinite: not yet.
   RigSigma sigma = {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   Verdict verdict;                               ///< On the views so far.
-  std::optional<NextView> next;                  ///< Before there is a rig, the words alone tell.
+  std::optional<NextView> next;                  ///< Before there is a rig, the words alone say it.
   std::vector<Eigen::Vector2d> outline_px = {};  ///< Of the board there, in the image of that head.
   std::string words;  ///< "head 1 to pan 12.0°, tilt -5.0°: board 2 in the upper left corner of its image"
 };

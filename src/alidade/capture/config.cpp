@@ -18,28 +18,28 @@ FieldList fields_of(CaptureConfig& config) {
   code.write = [&config] { return fmt::format("{}px", config.until_px); };
   return {{.name = "until_px",
            .value = code,
-           .help = "Goal of --live: 3σ of a pixel in the worst place; there it ends",
+           .help = "Goal of --live: 3σ at the worst pixel; there it ends",
            .form = "PIXELS",
            .option = "--until"}};
 }
 
-std::string_view sight_name(Sight sight) {
-  switch (sight) {
-    case Sight::nothing:
+std::string_view look_status_name(LookStatus status) {
+  switch (status) {
+    case LookStatus::nothing:
       return "nothing";
-    case Sight::other_board:
+    case LookStatus::other_board:
       return "other_board";
-    case Sight::moving:
+    case LookStatus::moving:
       return "moving";
-    case Sight::blurred:
+    case LookStatus::blurred:
       return "blurred";
-    case Sight::same_pose:
+    case LookStatus::same_pose:
       return "same_pose";
-    case Sight::little:
+    case LookStatus::little:
       return "little";
-    case Sight::repeated:
+    case LookStatus::repeated:
       return "repeated";
-    case Sight::useful:
+    case LookStatus::useful:
       return "useful";
   }
   return "nothing";

@@ -170,7 +170,7 @@ TEST(Walk, TheGuideNeedsFewerPhotosThanAnEvenChoiceAndItsOutlineHalf) {
       for (std::size_t k = 0; k < even; ++k) chosen.push_back(all[k * all.size() / even]);
       if (worst_of(chosen) <= goal_px) break;
     }
-    std::printf("walk %d: guided %d of %zu pictures, evenly spaced %zu\n", static_cast<int>(seed), guide.state().photos,
+    std::printf("walk %d: guided %d of %zu images, evenly spaced %zu\n", static_cast<int>(seed), guide.state().photos,
                 num_shown, even);
     guided += guide.state().photos;
     outlined += followed(camera, goal_px, seed).end.photos;
@@ -188,7 +188,7 @@ TEST(Guide, SaysSamePoseAgainAndTakesItNot) {
   const Rigid3 pose{Eigen::Quaterniond::Identity(), {-0.1, -0.06, 0.4}};
   EXPECT_TRUE(guide.push(view_of(camera, pose, person), vga, 0.0).take());
   const CaptureLook again = guide.push(view_of(camera, pose, person), vga, 1.0);
-  EXPECT_EQ(again.sight, Sight::same_pose);
+  EXPECT_EQ(again.status, LookStatus::same_pose);
   EXPECT_THAT(again.words, ::testing::HasSubstr("same pose again"));
   EXPECT_EQ(guide.state().photos, 1);
   guide.forget(0);
@@ -201,7 +201,7 @@ TEST(Guide, TakesFromAVideoWhatStandsStill) {
   CaptureGuide guide(test_board);
   for (int i = 0; i < 20; ++i) {
     const Rigid3 pose{Eigen::Quaterniond::Identity(), {-0.1 + 0.004 * i, -0.06, 0.4}};
-    EXPECT_EQ(guide.push(view_of(camera, pose, person), vga, i / 15.0).sight, Sight::moving) << i;
+    EXPECT_EQ(guide.push(view_of(camera, pose, person), vga, i / 15.0).status, LookStatus::moving) << i;
   }
   const Rigid3 pose{exp_so3(Eigen::Vector3d(0.4, 0.2, 0.0)), {-0.1, -0.06, 0.4}};
   int num_taken = 0;
@@ -228,7 +228,7 @@ TEST(Guide, NamesAFocalLengthThatWalks) {
   }
 }
 
-TEST(Guide, FindsWhereToHoldTheBoardFromTheFirstPictureOn) {
+TEST(Guide, FindsWhereToHoldTheBoardFromTheFirstImageOn) {
   CaptureGuide guide(test_board);
   (void)guide.look(cv::Mat(480, 640, CV_8U, cv::Scalar(128)), 0.0);
   ASSERT_TRUE(guide.state().next);
@@ -256,16 +256,16 @@ TEST(Speed, LooksAndSolvesInTime) {
   const Camera camera = true_camera(3);
   const BoardScene scene = draw_board_scene(camera, test_board, {.num_photos = 101}, 3);
   CaptureGuide guide(test_board);
-  std::vector<cv::Mat> pictures;
-  for (std::size_t i = 0; i < 4; ++i) pictures.push_back(render_board_photo(scene, i, {}, 3));
-  pictures.emplace_back(480, 640, CV_8U, cv::Scalar(128));
+  std::vector<cv::Mat> images;
+  for (std::size_t i = 0; i < 4; ++i) images.push_back(render_board_photo(scene, i, {}, 3));
+  images.emplace_back(480, 640, CV_8U, cv::Scalar(128));
   double look_s = 0.0;
-  for (std::size_t i = 0; i < pictures.size(); ++i) {
+  for (std::size_t i = 0; i < images.size(); ++i) {
     double best_s = 1.0;
     for (int k = 0; k < 8; ++k) {
-      cv::Mat picture = pictures[i].clone();
-      picture.at<uchar>(0, 0) = static_cast<uchar>(k);  // another one
-      best_s = std::min(best_s, seconds_of([&] { (void)guide.look(picture, 0.1 * k); }));
+      cv::Mat image = images[i].clone();
+      image.at<uchar>(0, 0) = static_cast<uchar>(k);  // another one
+      best_s = std::min(best_s, seconds_of([&] { (void)guide.look(image, 0.1 * k); }));
     }
     look_s = std::max(look_s, best_s);
   }

@@ -21,7 +21,7 @@ double usual_sigma(const std::string& name, const Camera& camera) {
   return name == "k3" ? 0.3 : 0.2;
 }
 
-bool is_held(const CalibrateConfig& config, const std::string& name) {
+bool is_fixed(const CalibrateConfig& config, const std::string& name) {
   return std::ranges::find(config.fixed, name) != config.fixed.end();
 }
 
@@ -43,7 +43,7 @@ Camera guess(const ImageSize& size, const CalibrateConfig& config) {
   camera.cov = Eigen::MatrixXd::Zero(values.size(), values.size());
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
-    if (!is_held(config, names[i])) camera.cov(at, at) = std::pow(usual_sigma(names[i], camera), 2);
+    if (!is_fixed(config, names[i])) camera.cov(at, at) = std::pow(usual_sigma(names[i], camera), 2);
   }
   return camera;
 }
@@ -55,9 +55,9 @@ void learn(const std::vector<BoardView>& views, LensSoFar& lens) {
   Eigen::MatrixXd information = submatrix(lens.camera.cov, free).diagonal().cwiseInverse().asDiagonal();
   for (const BoardView& view : views) {
     const auto pose = fit_board_pose(lens.camera, view, lens.board_points, 1.0);
-    const auto told =
+    const auto gained =
         pose ? lens_information(lens.camera, lens.board_points, view, pose->pose.cam_from_board, free) : std::nullopt;
-    if (told) information += *told / (lens.noise_px * lens.noise_px);
+    if (gained) information += *gained / (lens.noise_px * lens.noise_px);
   }
   const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
@@ -88,7 +88,7 @@ LensSoFar lens_so_far(const Board& board, const std::vector<BoardView>& views, c
 
 std::string focal_walk(const LensSoFar& lens, const std::vector<BoardView>& views) {
   constexpr std::size_t enough = 6;
-  constexpr double least_walk = 0.004, most_z = 6.0;  // of the focal length; standard deviations
+  constexpr double min_walk = 0.004, max_z = 6.0;  // of the focal length; standard deviations
   if (!lens.is_solved || views.size() < enough) return "";
   const double focal_px = params(lens.camera.lens)[0];
   struct Own {
@@ -114,15 +114,15 @@ std::string focal_walk(const LensSoFar& lens, const std::vector<BoardView>& view
     if (!(information > 0.0)) continue;
     own.push_back({-g.sum() / information / focal_px, lens.report.noise_px / std::sqrt(information) / focal_px});
   }
-  // Telling photos only: those taken head on cannot tell the focal length from the distance.
-  std::erase_if(own, [](const Own& each) { return !(each.sigma < 0.25 * least_walk); });
+  // Informative photos only: those taken head on do not separate focal length and distance.
+  std::erase_if(own, [](const Own& each) { return !(each.sigma < 0.25 * min_walk); });
   if (own.size() < enough) return "";
   const auto [least, most] = std::ranges::minmax_element(own, {}, &Own::change);
   const double walk = most->change - least->change, sigma = std::hypot(most->sigma, least->sigma);
   double chi2 = 0.0;
   for (const Own& each : own) chi2 += std::pow(each.change / each.sigma, 2);
   const double per_photo = chi2 / static_cast<double>(own.size());
-  if (walk < least_walk || walk < most_z * sigma || per_photo < 9.0) return "";
+  if (walk < min_walk || walk < max_z * sigma || per_photo < 9.0) return "";
   return fmt::format(
       "the focal length walks between photos, by {:.1f} % ({:.0f} to {:.0f} px): switch the camera's autofocus off",
       100.0 * walk, focal_px * (1.0 + least->change), focal_px * (1.0 + most->change));

@@ -8,8 +8,8 @@
 
 namespace alidade {
 
-/// What a few photos tell of a camera: a solve where they determine one; else a guess, with what is known of any camera
-/// and what these photos add to it, so that the next pose can be chosen from the first photo on.
+/// What a few photos determine of a camera: a solve where they determine one; else a guess, with what is known of any
+/// camera and what these photos add to it, so that the next pose can be chosen from the first photo on.
 struct LensSoFar {
   Camera camera;  ///< With its covariance.
   bool is_solved = false;

@@ -18,12 +18,12 @@ Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& matrix) {
   return matrix.llt().solve(Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()));
 }
 
-/// The worst place counts most; the rest of the image decides between poses that serve it alike.
+/// The worst pixel counts most; the rest of the image decides between poses that serve it alike.
 double score(const SigmaMap::Summary& sigma) { return 0.7 * std::log(sigma.worst_px) + 0.3 * std::log(sigma.rms_px); }
 
-/// The board turned by `tilt` about its middle, which is seen at `px`; `fill` of the image wide or high.
-std::optional<Rigid3> placed(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
-                             const Eigen::Vector2d& px, double fill, const Eigen::Vector3d& tilt) {
+/// The board rotated by `tilt` about its centre, which is seen at `px`; `fill` of the image wide or high.
+std::optional<Rigid3> posed(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
+                            const Eigen::Vector2d& px, double fill, const Eigen::Vector3d& tilt) {
   Eigen::AlignedBox3d box;
   for (const auto& point : board_points) box.extend(point);
   const auto ray = unproject(camera, px);
@@ -82,19 +82,19 @@ double PosePlan::gain_of(const BoardView& view, const Rigid3& cam_from_board) co
   return std::isfinite(gain) ? std::max(0.0, gain) : 0.0;
 }
 
-/// Drawn towards the middle until all of the board is seen.
-void PosePlan::add_candidate(const Eigen::Vector2d& wanted_px, double fill, const Eigen::Vector3d& tilt, int place,
+/// Drawn towards the centre until all of the board is seen.
+void PosePlan::add_candidate(const Eigen::Vector2d& wanted_px, double fill, const Eigen::Vector3d& tilt, int cell,
                              const std::vector<BoardView>& kept) {
-  const Eigen::Vector2d middle_px(0.5 * (camera_.width_px - 1), 0.5 * (camera_.height_px - 1));
+  const Eigen::Vector2d centre_px(0.5 * (camera_.width_px - 1), 0.5 * (camera_.height_px - 1));
   const double margin_px = edge_share * camera_.width_px;
   for (double reach = 1.0; reach > 0.2; reach -= 0.1) {
-    const auto pose = placed(camera_, board_points_, middle_px + reach * (wanted_px - middle_px), fill, tilt);
+    const auto pose = posed(camera_, board_points_, centre_px + reach * (wanted_px - centre_px), fill, tilt);
     const auto view = pose ? predicted_view(camera_, board_points_, *pose, margin_px) : std::nullopt;
     if (!view) continue;
     if (std::ranges::any_of(kept, [&](const BoardView& one) { return is_same_pose(*view, one, other_share); })) return;
     const auto information = lens_information(camera_, board_points_, *view, *pose, free_);
     if (!information) return;
-    Candidate candidate{*pose, scaled(*information), 0.0, place};
+    Candidate candidate{*pose, scaled(*information), 0.0, cell};
     candidate.gain = score(now_) - score(with(information_ + candidate.information));
     if (std::isfinite(candidate.gain)) candidates_.push_back(std::move(candidate));
     return;
@@ -107,10 +107,10 @@ void PosePlan::look_for_best(const std::vector<BoardView>& kept) {
   const std::array<Eigen::Vector3d, 5> tilts{
       Eigen::Vector3d{0, 0, 0}, {tilt_rad, 0, 0}, {-tilt_rad, 0, 0}, {0, tilt_rad, 0}, {0, -tilt_rad, 0}};
   for (const double fill : {0.4, 0.6, 0.8}) {
-    for (int place = 0; place < 25; ++place) {
-      const Eigen::Vector2d px((0.04 + 0.23 * (place % 5)) * camera_.width_px,
-                               (0.04 + 0.23 * (place / 5)) * camera_.height_px);
-      for (const Eigen::Vector3d& tilt : tilts) add_candidate(px, fill, tilt, place, kept);
+    for (int cell = 0; cell < 25; ++cell) {
+      const Eigen::Vector2d px((0.04 + 0.23 * (cell % 5)) * camera_.width_px,
+                               (0.04 + 0.23 * (cell / 5)) * camera_.height_px);
+      for (const Eigen::Vector3d& tilt : tilts) add_candidate(px, fill, tilt, cell, kept);
     }
   }
   const auto best = std::ranges::max_element(candidates_, {}, &Candidate::gain);
@@ -121,10 +121,11 @@ void PosePlan::look_for_best(const std::vector<BoardView>& kept) {
 
 std::optional<int> PosePlan::photos_until(double goal_3sigma_px, double share) const {
   if (worst_3sigma_px() <= goal_3sigma_px) return 0;
-  std::vector<const Candidate*> chosen(25, nullptr);  // the best of each place: enough to choose from again and again
+  std::vector<const Candidate*> chosen(25,
+                                       nullptr);  // the best of each position: enough to choose from again and again
   for (const Candidate& candidate : candidates_) {
-    const Candidate*& of_place = chosen[static_cast<std::size_t>(candidate.place)];
-    if (!of_place || candidate.gain > of_place->gain) of_place = &candidate;
+    const Candidate*& of_cell = chosen[static_cast<std::size_t>(candidate.cell)];
+    if (!of_cell || candidate.gain > of_cell->gain) of_cell = &candidate;
   }
   std::erase(chosen, nullptr);
   if (chosen.empty()) return std::nullopt;

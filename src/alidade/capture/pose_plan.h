@@ -30,7 +30,7 @@ class PosePlan {
   void look_for_best(const std::vector<BoardView>& kept);
   [[nodiscard]] const std::optional<Rigid3>& best() const { return best_; }
   [[nodiscard]] double best_gain() const { return best_gain_; }
-  /// How many photos are likely needed until 3σ is below the goal in the worst place, each with that share of the
+  /// How many photos are likely needed until 3σ is below the goal at the worst pixel, each with that share of the
   /// information of the best of its time. None where that cannot be determined.
   [[nodiscard]] std::optional<int> photos_until(double goal_3sigma_px, double share) const;
 
@@ -39,11 +39,11 @@ class PosePlan {
     Rigid3 cam_from_board;
     Eigen::MatrixXd information;  ///< Scaled.
     double gain = 0.0;
-    int place = 0;
+    int cell = 0;
   };
   [[nodiscard]] Eigen::MatrixXd scaled(const Eigen::MatrixXd& information) const;
   [[nodiscard]] SigmaMap::Summary with(const Eigen::MatrixXd& information) const;
-  void add_candidate(const Eigen::Vector2d& wanted_px, double fill, const Eigen::Vector3d& tilt, int place,
+  void add_candidate(const Eigen::Vector2d& wanted_px, double fill, const Eigen::Vector3d& tilt, int cell,
                      const std::vector<BoardView>& kept);
 
   Camera camera_;

@@ -15,34 +15,34 @@ std::string joined(const std::vector<std::string>& parts, const char* between) {
   return text;
 }
 
-HeldBoard mirrored(HeldBoard held) {
-  held.middle.x() = 1.0 - held.middle.x();
+BoardInImage mirrored(BoardInImage held) {
+  held.centre.x() = 1.0 - held.centre.x();
   held.left_away = -held.left_away;
   return held;
 }
 
 }  // namespace
 
-std::string place_of(const Eigen::Vector2d& middle) {
+std::string position_words(const Eigen::Vector2d& centre) {
   const auto third = [](double at) { return at < 0.42 ? -1 : at > 0.58 ? 1 : 0; };
-  const int across = third(middle.x()), down = third(middle.y());
-  if (across == 0 && down == 0) return "in the middle";
+  const int across = third(centre.x()), down = third(centre.y());
+  if (across == 0 && down == 0) return "in the centre";
   const std::string side = across < 0 ? "left" : "right";
   if (down == 0) return "on the " + side;
   const std::string edge = down < 0 ? "upper" : "lower";
   return across == 0 ? "at the " + edge + " edge" : "in the " + edge + " " + side + " corner";
 }
 
-HeldBoard held_board(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
-                     const Rigid3& cam_from_board) {
-  HeldBoard held;
+BoardInImage board_in_image(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,
+                            const Rigid3& cam_from_board) {
+  BoardInImage held;
   Eigen::AlignedBox3d box;
   for (const auto& point : board_points) box.extend(point);
-  const Eigen::Vector3d middle_in_cam = cam_from_board * box.center();
-  const auto px = project(camera, middle_in_cam);
-  held.middle = px ? px->cwiseQuotient(Eigen::Vector2d(camera.width_px, camera.height_px)) : Eigen::Vector2d(0.5, 0.5);
+  const Eigen::Vector3d centre_in_cam = cam_from_board * box.center();
+  const auto px = project(camera, centre_in_cam);
+  held.centre = px ? px->cwiseQuotient(Eigen::Vector2d(camera.width_px, camera.height_px)) : Eigen::Vector2d(0.5, 0.5);
   const Eigen::VectorXd lens = params(camera.lens);
-  held.size = lens[0] * box.sizes().x() / (std::max(1e-6, middle_in_cam.norm()) * camera.width_px);
+  held.size = lens[0] * box.sizes().x() / (std::max(1e-6, centre_in_cam.norm()) * camera.width_px);
   Eigen::Vector3d normal = cam_from_board.rotation * Eigen::Vector3d::UnitZ();
   if (normal.z() < 0.0) normal = -normal;
   held.top_away = std::atan2(normal.y(), normal.z());  // depth grows upwards where the normal points down
@@ -50,12 +50,12 @@ HeldBoard held_board(const Camera& camera, const std::vector<Eigen::Vector3d>& b
   return held;
 }
 
-std::string words_of(const HeldBoard& given, bool is_mirrored) {
-  const HeldBoard wanted = is_mirrored ? mirrored(given) : given;
+std::string words_of(const BoardInImage& given, bool is_mirrored) {
+  const BoardInImage wanted = is_mirrored ? mirrored(given) : given;
   std::vector<std::string> parts{wanted.size > 0.5   ? "near"
-                                 : wanted.size > 0.3 ? "at a middle distance"
+                                 : wanted.size > 0.3 ? "at a medium distance"
                                                      : "far",
-                                 place_of(wanted.middle)};
+                                 position_words(wanted.centre)};
   if (wanted.top_away > tilted_rad) parts.push_back("the top tilted away");
   if (wanted.top_away < -tilted_rad) parts.push_back("the bottom tilted away");
   if (wanted.left_away > tilted_rad) parts.push_back("the left side turned away");
@@ -64,14 +64,14 @@ std::string words_of(const HeldBoard& given, bool is_mirrored) {
   return joined(parts, ", ");
 }
 
-std::string words_to(const HeldBoard& wanted_given, const HeldBoard& now_given, bool is_mirrored) {
-  const HeldBoard wanted = is_mirrored ? mirrored(wanted_given) : wanted_given;
-  const HeldBoard now = is_mirrored ? mirrored(now_given) : now_given;
+std::string words_to(const BoardInImage& wanted_given, const BoardInImage& now_given, bool is_mirrored) {
+  const BoardInImage wanted = is_mirrored ? mirrored(wanted_given) : wanted_given;
+  const BoardInImage now = is_mirrored ? mirrored(now_given) : now_given;
   std::vector<std::string> parts;
   const double ratio = wanted.size / std::max(1e-6, now.size);
   if (ratio > 1.15) parts.push_back("nearer");
   if (ratio < 1.0 / 1.15) parts.push_back("further away");
-  const Eigen::Vector2d way = wanted.middle - now.middle;
+  const Eigen::Vector2d way = wanted.centre - now.centre;
   const std::string down = way.y() > 0.08 ? "down" : way.y() < -0.08 ? "up" : "";
   const std::string across = way.x() > 0.08 ? "to the right" : way.x() < -0.08 ? "to the left" : "";
   if (!down.empty() || !across.empty())

@@ -26,7 +26,7 @@ const Board film_board{.cols = 9, .rows = 6, .square_m = 0.025}, strange_board{.
 constexpr double film_goal_px = 0.5, frames_per_s = 15.0;
 constexpr std::size_t num_frames = 600, frames_a_key = 15, frames_moving = 3;
 
-/// 600 pictures: forty times the board goes somewhere, smeared while it moves, and stays for a moment; now and then a
+/// 600 images: forty times the board goes somewhere, smeared while it moves, and stays for a moment; now and then a
 /// hand or another board is there instead.
 class Film {
  public:
@@ -155,10 +155,9 @@ TEST(RenderedWalk, NeedsFewerPhotosThanAnEvenChoice) {
     const int even = evenly_spaced(film);
     const auto diff = guide.state().has_camera ? diff_cameras(guide.state().camera, film.camera) : std::nullopt;
     const int all = num_films() > 1 ? all_seeing(film) : 0;
-    std::printf(
-        "film %d: guided %d of %zu pictures (3 sigma %.2f px), evenly spaced %d, all-seeing %d; off by %.2f px\n",
-        static_cast<int>(seed), guide.state().photos, shown, guide.state().worst_3sigma_px, even, all,
-        diff ? diff->max_px : -1.0);
+    std::printf("film %d: guided %d of %zu images (3 sigma %.2f px), evenly spaced %d, all-seeing %d; off by %.2f px\n",
+                static_cast<int>(seed), guide.state().photos, shown, guide.state().worst_3sigma_px, even, all,
+                diff ? diff->max_px : -1.0);
     EXPECT_TRUE(diff && diff->max_px <= guide.state().worst_3sigma_px) << seed;
     num_within += diff && diff->max_px <= guide.state().worst_3sigma_px ? 1 : 0;
     num_reached += guide.state().is_at(film_goal_px) ? 1 : 0;

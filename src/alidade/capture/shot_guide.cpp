@@ -24,7 +24,7 @@ std::string words_of_shot(double distance_m, double tilt_rad, double azimuth_rad
                      farther_side(azimuth_rad));
 }
 
-/// Near and far, tilted to each side in turn: what no shots tell together is where all are alike.
+/// Near and far, tilted to each side in turn: what no shots determine together is where all are alike.
 std::string words_of_start(std::size_t shot, const ShotConfig& where) {
   const double far_share = shot % 3 == 0 ? 0.1 : shot % 3 == 1 ? 0.8 : 0.4;
   const double tilt_rad = std::min(30.0, where.max_tilt_deg) * std::numbers::pi / 180.0;

@@ -9,7 +9,7 @@ namespace alidade {
 
 /// σ of projection over the image as a function of the covariance of the free lens parameters, linear in it: what is
 /// evaluated for hundreds of photos that might be taken. As projection_sigma() at infinity, with the weights of the
-/// implied motion held at those of the covariance that the camera has.
+/// implied motion fixed at those of the covariance that the camera has.
 class SigmaMap {
  public:
   SigmaMap(const Camera& camera, const std::vector<int>& free, int cols, int rows);

@@ -17,22 +17,23 @@ namespace {
 std::string words_of_view(const NextView& next, const Camera& camera, const std::vector<Eigen::Vector3d>& points) {
   const std::string look = fmt::format("head {} to pan {:.1f}°, tilt {:.1f}°", next.head,
                                        next.pan_tilt_rad.x() / degree, next.pan_tilt_rad.y() / degree);
-  const HeldBoard held = held_board(camera, points, next.cam_from_board);
-  if (!next.is_new_place) return fmt::format("{}: board {} {} of its image", look, next.board, place_of(held.middle));
+  const BoardInImage held = board_in_image(camera, points, next.cam_from_board);
+  if (!next.is_new_position)
+    return fmt::format("{}: board {} {} of its image", look, next.board, position_words(held.centre));
   return fmt::format("{}, and the board to a new position ({}), {:.1f} m away: {}", look, next.board,
                      next.cam_from_board.translation.norm(), words_of(held, false));
 }
 
-/// Each head looks at each place of the board from four sides: fewer do not tell both axes.
+/// Each head looks at each position of the board from four sides: fewer do not determine both axes.
 std::string words_of_first_views(std::size_t num_views, const std::vector<int>& heads) {
-  constexpr std::array<const char*, 4> places{"in the middle", "in the upper left corner", "in the lower right corner",
-                                              "in the lower left corner"};
-  const std::size_t turn = num_views / places.size();
+  constexpr std::array<const char*, 4> positions{"in the centre", "in the upper left corner",
+                                                 "in the lower right corner", "in the lower left corner"};
+  const std::size_t turn = num_views / positions.size();
   const std::size_t board = turn / heads.size() + 1;
   const int head = heads[turn % heads.size()];
-  const std::string look =
-      fmt::format("turn head {} until the board is seen {} of its image", head, places[num_views % places.size()]);
-  if (num_views % (places.size() * heads.size()) != 0) return look;
+  const std::string look = fmt::format("turn head {} until the board is seen {} of its image", head,
+                                       positions[num_views % positions.size()]);
+  if (num_views % (positions.size() * heads.size()) != 0) return look;
   return fmt::format("put the board {} (position {}); {}",
                      board == 1 ? "before the camera, as near as it is seen whole" : "elsewhere", board, look);
 }

@@ -74,25 +74,25 @@ class Comparison {
 
   /// As many as were wanted; the board is where its rig has it, which is not quite where the guide believes.
   void follow(ViewGuide& guide, int num_views) {
-    std::map<int, Rigid3> placed;
+    std::map<int, Rigid3> posed;
     for (std::size_t b = 0; b < scene_.world_from_board.size(); ++b)
-      placed[static_cast<int>(b)] = scene_.world_from_board[b];
+      posed[static_cast<int>(b)] = scene_.world_from_board[b];
     for (int i = 0; i < num_views; ++i) {
       ASSERT_TRUE(guide.state().next) << guide.state().verdict.sentence;
       const NextView next = *guide.state().next;
       const RigHead& rig_head = scene_.rig.heads[static_cast<std::size_t>(next.head - 1)];
-      if (next.is_new_place) {  // a number of its own, held as asked before the camera that is there
-        new_places_ += 1;
-        placed[next.board] = world_from_cam(rig_head.head, next.pan_tilt_rad) * next.cam_from_board;
+      if (next.is_new_position) {  // a number of its own, held as asked before the camera that is there
+        new_positions_ += 1;
+        posed[next.board] = world_from_cam(rig_head.head, next.pan_tilt_rad) * next.cam_from_board;
       }
-      const auto view = looking_.at(next.head, next.board, placed.at(next.board), next.pan_tilt_rad);
+      const auto view = looking_.at(next.head, next.board, posed.at(next.board), next.pan_tilt_rad);
       ASSERT_TRUE(view) << guide.state().words;
       (void)guide.push(*view);
     }
   }
 
   const std::vector<HeadView>& drawn() const { return drawn_; }
-  int new_places() const { return new_places_; }
+  int new_positions() const { return new_positions_; }
 
  private:
   RigScene scene_;
@@ -100,7 +100,7 @@ class Comparison {
   std::size_t num_heads_;
   RigConfig config_;
   std::vector<HeadView> drawn_;
-  int new_places_ = 0;
+  int new_positions_ = 0;
 };
 
 TEST(ViewGuide, GuidedViewsTellMoreThanAsManyOthers) {

@@ -7,12 +7,12 @@ namespace {
 
 constexpr double model_step_s = 1e-3, course_step_s = 5e-3, kept_s = 2.0;
 
-/// A value between two places of a course.
-template <typename Place, typename Value>
-std::optional<double> between(const std::deque<Place>& course, double t_s, const Value& value) {
+/// A value between two points of a course.
+template <typename Point, typename Value>
+std::optional<double> between(const std::deque<Point>& course, double t_s, const Value& value) {
   if (course.size() < 2 || t_s < course.front().t_s || t_s > course.back().t_s) return std::nullopt;
-  const auto after = std::max(std::ranges::lower_bound(course, t_s, {}, &Place::t_s), course.begin() + 1);
-  const Place &a = *(after - 1), &b = *after;
+  const auto after = std::max(std::ranges::lower_bound(course, t_s, {}, &Point::t_s), course.begin() + 1);
+  const Point &a = *(after - 1), &b = *after;
   return value(a) + (value(b) - value(a)) * (t_s - a.t_s) / std::max(1e-9, b.t_s - a.t_s);
 }
 
@@ -41,7 +41,7 @@ void AxisCourse::send(double t_s, double target_rad) {
 }
 
 std::optional<double> AxisCourse::at(double t_s) const {
-  const auto model = between(course_, t_s, [](const Place& place) { return place.model_rad; });
+  const auto model = between(course_, t_s, [](const Point& point) { return point.model_rad; });
   const auto beside = between(readings_, t_s, [](const Reading& reading) { return reading.beside_rad; });
   if (!model || !beside) return std::nullopt;
   return *model + *beside;

@@ -19,7 +19,7 @@ class AxisCourse {
   [[nodiscard]] std::optional<double> at(double t_s) const;
 
  private:
-  struct Place {
+  struct Point {
     double t_s, model_rad;
   };
   struct Reading {
@@ -28,7 +28,7 @@ class AxisCourse {
   void advance(double t_s);
 
   Positioner model_;
-  std::deque<Place> course_;
+  std::deque<Point> course_;
   std::deque<Reading> readings_;
 };
 

@@ -46,13 +46,13 @@ ServoConfig servo_config(const HeadFollowConfig& config, const HeadRange& within
 
 std::optional<FollowForecast> forecast_of(const HeadFollowing& following, const RigHead& rig_head,
                                           const HeadFollowConfig& config, const HeadRange& within) {
-  constexpr double least_s = 2.0, settled_share = 1.0 / 3.0;
+  constexpr double min_s = 2.0, settled_share = 1.0 / 3.0;
   ServoScenario scenario;
   ServoScene& scene = scenario.scene;
   scene.path = path_of(following, rig_head);
   if (scene.path.recorded_s.size() < 10) return std::nullopt;
   const double begin_s = scene.path.recorded_s.front(), duration_s = scene.path.recorded_s.back() - begin_s;
-  if (duration_s < least_s) return std::nullopt;
+  if (duration_s < min_s) return std::nullopt;
   for (double& t_s : scene.path.recorded_s) t_s -= begin_s;
   scenario.config = servo_config(config, within, following.period_s);
   scene.heads = {rig_head};

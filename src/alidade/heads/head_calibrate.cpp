@@ -10,7 +10,7 @@
 #include "alidade/estimation/median.h"
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
-#include "alidade/heads/calibration/board_room.h"
+#include "alidade/heads/calibration/board_reach.h"
 #include "alidade/heads/calibration/calibration_log.h"
 #include "alidade/heads/calibration/head_shots.h"
 #include "alidade/heads/streams/frame_follower.h"
@@ -64,7 +64,7 @@ class Session {
     bool goes_on = true;
     while (goes_on && left_s() > 0.0) {
       if (tells_both_axes() && left_s() > 1.5 * estimate_s_) estimate();
-      if (is_reached() && head_time() > least_s()) break;
+      if (is_reached() && head_time() > min_s()) break;
       goes_on = config_.board ? board_move() : next_moves();
     }
   }
@@ -74,15 +74,15 @@ class Session {
     if (seen.empty() || seen.back().points.empty())
       throw InputError(fmt::format("{}: not all of a board of {}×{} corners is in view; point the head at it first",
                                    stream_.name(), config_.board->cols, config_.board->rows));
-    room_.emplace(seen.back().points, at(), result_.width_px, result_.height_px);
+    reach_.emplace(seen.back().points, at(), result_.width_px, result_.height_px);
   }
   /// To where the board is seen elsewhere in the image; where it was lost, back to where it was seen.
   bool board_move() {
-    move_to(within(room_->next(focal_px_ > 0.0 ? focal_px_ : 1.1 * result_.width_px)));
+    move_to(within(reach_->next(focal_px_ > 0.0 ? focal_px_ : 1.1 * result_.width_px)));
     const std::vector<SeenFrame> seen = follower_.seen_so_far();
     if (!seen.empty() && seen.back().points.empty()) {
-      room_->shrink();
-      move_to(within(room_->home_rad()));
+      reach_->shrink();
+      move_to(within(reach_->home_rad()));
     }
     return left_s() > 0.0;
   }
@@ -104,8 +104,8 @@ class Session {
   }
   [[nodiscard]] double head_time() { return head_.now_s() - begin_s_; }
   /// Without a goal the usual time is used; with one it may be earlier.
-  [[nodiscard]] double least_s() const { return config_.until ? 38.0 : std::min(62.0, 0.75 * config_.most_s); }
-  [[nodiscard]] double left_s() { return config_.most_s - head_time() - 4.0; }
+  [[nodiscard]] double min_s() const { return config_.until ? 38.0 : std::min(62.0, 0.75 * config_.max_s); }
+  [[nodiscard]] double left_s() { return config_.max_s - head_time() - 4.0; }
 
   void take_frames() {
     constexpr double lost_s = 10.0;  // it may come back; until then the head stands
@@ -136,7 +136,7 @@ class Session {
 
   /// There, no faster than points can be followed, and a short rest.
   void move_to(const Eigen::Vector2d& target) {
-    constexpr double rest_s = 0.45, most_s = 20.0;
+    constexpr double rest_s = 0.45, max_s = 20.0;
     if (left_s() < 0.0) return;
     while (head_.now_s() - last_frame_s_ > silent_s) watch(0.1);
     ++result_.num_moves;
@@ -149,7 +149,7 @@ class Session {
     const double begin = head_.now_s();
     double still_since = begin;
     Eigen::Vector2d before = at();
-    while (head_.now_s() - begin < most_s && head_.now_s() - std::max(still_since, begin + 0.3) < rest_s) {
+    while (head_.now_s() - begin < max_s && head_.now_s() - std::max(still_since, begin + 0.3) < rest_s) {
       watch(0.08);
       note_rate();
       if (at() != before) still_since = head_.now_s();
@@ -165,15 +165,15 @@ class Session {
   }
   /// A head that is quicker than points can be followed is sent ahead of itself piece by piece.
   [[nodiscard]] double longest_piece() const {
-    const double most_px_a_frame = 0.035 * result_.width_px;
+    const double max_px_per_frame = 0.035 * result_.width_px;
     const double span_s = last_frame_s_ - begin_s_;
     const double fps = span_s > 0.3 ? std::clamp(static_cast<double>(result_.num_frames) / span_s, 1.0, 60.0) : 10.0;
     const double f_px = focal_px_ > 0.0 ? focal_px_ : 1.1 * result_.width_px;
-    const double most_rate = most_px_a_frame * fps / f_px;
-    return rate_ > most_rate ? most_rate * piece_s : 1e9;
+    const double max_rate = max_px_per_frame * fps / f_px;
+    return rate_ > max_rate ? max_rate * piece_s : 1e9;
   }
 
-  /// A box around the middle of what is near and allowed: first a small step, to learn how fast it is.
+  /// A box around the centre of what is near and allowed: first a small step, to learn how fast it is.
   void first_moves() {
     constexpr double reach = 12.0 * degree;
     const Eigen::Vector2d start = at().cwiseMax(head_.low_rad()).cwiseMin(head_.high_rad());
@@ -183,13 +183,13 @@ class Session {
       low[i] = std::clamp(start[i] - 0.5 * wide, head_.low_rad()[i], head_.high_rad()[i] - wide);
       high[i] = low[i] + wide;
     }
-    const Eigen::Vector2d middle = 0.5 * (low + high), toward = (middle - start).norm() > degree
-                                                                    ? (middle - start).normalized().eval()
+    const Eigen::Vector2d centre = 0.5 * (low + high), toward = (centre - start).norm() > degree
+                                                                    ? (centre - start).normalized().eval()
                                                                     : Eigen::Vector2d(0.7, 0.7);
     move_to((start + toward * 2.0 * degree).cwiseMax(low).cwiseMin(high));
     for (const Eigen::Vector2d& corner :
-         {Eigen::Vector2d(high[0], middle[1]), Eigen::Vector2d(middle[0], high[1]), Eigen::Vector2d(low[0], middle[1]),
-          Eigen::Vector2d(middle[0], low[1]), middle})
+         {Eigen::Vector2d(high[0], centre[1]), Eigen::Vector2d(centre[0], high[1]), Eigen::Vector2d(low[0], centre[1]),
+          Eigen::Vector2d(centre[0], low[1]), centre})
       move_to(corner);
   }
 
@@ -219,7 +219,7 @@ class Session {
     config_.on_so_far(result_);
   }
 
-  /// Of an axis that is held nothing is told until the end: whether something is, costs the most time to say.
+  /// Of an axis that is fixed nothing is determined until the end: to see whether something is costs most time.
   [[nodiscard]] bool tells_both_axes() const { return (reach_high() - reach_low()).minCoeff() > 0.5 * degree; }
 
   [[nodiscard]] bool is_reached() const {
@@ -231,9 +231,9 @@ class Session {
     return true;
   }
 
-  /// Two moves that tell most by what is known; false: none is left within the limits.
+  /// The two most informative moves by what is known; false: none is left within the limits.
   bool next_moves() {
-    constexpr double least_way = 1.5 * degree;
+    constexpr double min_way = 1.5 * degree;
     std::vector<NextMove> planned;
     try {
       const double rate_deg_s = std::clamp(rate_ / degree, 1.0, 60.0);
@@ -245,15 +245,15 @@ class Session {
     std::vector<Eigen::Vector2d> targets;
     const Eigen::Vector2d here = at();
     for (const NextMove& move : planned) targets.push_back(here + move.pan_tilt_roll_rad.head<2>());
-    // Where the plan would not leave the place, and to see old points again: around the middle.
-    const Eigen::Vector2d middle = 0.5 * (reach_low() + reach_high()), half = 0.5 * (reach_high() - reach_low());
+    // Where the plan would not leave the position, and to see old points again: around the centre.
+    const Eigen::Vector2d centre = 0.5 * (reach_low() + reach_high()), half = 0.5 * (reach_high() - reach_low());
     static constexpr std::array<std::array<double, 2>, 4> corners{{{1, 1}, {-1, -0.6}, {-1, 1}, {1, -0.6}}};
     const auto& corner = corners[num_corners_++ % corners.size()];
-    targets.push_back(middle + half.cwiseProduct(Eigen::Vector2d(corner[0], corner[1])));
+    targets.push_back(centre + half.cwiseProduct(Eigen::Vector2d(corner[0], corner[1])));
     bool has_moved = false;
     for (Eigen::Vector2d target : targets) {
       target = within(target);
-      if ((target - at()).norm() < least_way || left_s() < 0.0) continue;
+      if ((target - at()).norm() < min_way || left_s() < 0.0) continue;
       move_to(target);
       has_moved = true;
     }
@@ -277,9 +277,9 @@ class Session {
   const Progress& progress_;
   HeadCalibration& result_;
   FrameFollower follower_;
-  std::optional<BoardRoom> room_;  ///< With a board.
+  std::optional<BoardReach> reach_;  ///< With a board.
   std::vector<HeadPosition> readings_;
-  double estimate_s_ = 0.0;  ///< What the last one took: the head is not held for one that ends too late.
+  double estimate_s_ = 0.0;  ///< What the last one took: the head is not kept for one that ends too late.
   double begin_s_ = 0.0, next_s_ = 0.0, last_frame_s_ = 0.0, given_s_ = 0.0, rate_ = 0.0, late_s_ = 0.0,
          focal_px_ = 0.0;
   std::size_t num_corners_ = 0;
@@ -301,7 +301,7 @@ void heed_stamps(const HeadCalibration& result, Verdict& verdict) {
   if (verdict.state == State::good) verdict.state = State::care;
 }
 
-/// `observe` cannot know whether a camera is turned about its view or a log's axes are exchanged; of a head the axes
+/// `observe` cannot know whether a camera is rotated about its view or a log's axes are exchanged; of a head the axes
 /// are known.
 void heed_turned_camera(const HeadCalibration& result, Verdict& verdict) {
   constexpr double mostly = 0.95;
@@ -343,11 +343,11 @@ Verdict calibration_verdict(const HeadCalibration& result, const HeadCalibration
     if (3.0 * f.sigma < *config.until * f.value) continue;
     missing +=
         (missing.empty() ? "" : " and ") + f.name +
-        fmt::format(" is told to {:.2g} % (3σ), not to {:.2g} %", 300.0 * f.sigma / f.value, 100.0 * *config.until);
+        fmt::format(" is known to {:.2g} % (3σ), not to {:.2g} %", 300.0 * f.sigma / f.value, 100.0 * *config.until);
   }
   const bool holds_pan = span_rad[0] < held_rad, holds_tilt = span_rad[1] < held_rad;
   if (!has_answer && (holds_pan || holds_tilt)) {
-    verdict.sentence = fmt::format("{} cannot be determined: {} is held; {}", holds_tilt ? "fy" : "fx",
+    verdict.sentence = fmt::format("{} cannot be determined: {} is fixed; {}", holds_tilt ? "fy" : "fx",
                                    holds_tilt ? "tilt" : "pan", verdict.sentence);
     verdict.to_add = fmt::format("give --{}-range more room", holds_tilt ? "tilt" : "pan");
   }

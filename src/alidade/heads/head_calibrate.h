@@ -18,7 +18,7 @@ struct HeadCalibrationConfig {
   HeadRange range;
   /// Until 3σ of fx and fy are this share of them; none: for as long as its usual moves take.
   std::optional<double> until;
-  double most_s = 85.0;  ///< For which the head is held.
+  double max_s = 85.0;  ///< For which the head is in use.
   /// Followed instead of points: its corners, wherever all of it is seen. None: points of the world.
   std::optional<Board> board = {};
   /// What an earlier run of the same head and camera measured: counts as well.
@@ -27,7 +27,7 @@ struct HeadCalibrationConfig {
   std::function<void(const HeadCalibration&)> on_so_far = {};
 };
 
-/// What a head and its camera tell while the head moves.
+/// What a head and its camera show while the head moves.
 struct HeadCalibration {
   std::string url, stream;
   int width_px = 0, height_px = 0;
@@ -38,10 +38,10 @@ struct HeadCalibration {
   double largest_jump_s = 0.0;
   double head_time_s = 0.0;
   double sigma_clock_s =
-      0.0;                   ///< Of the head's times against the frames'; in σ of the delay beside what the log tells.
-  bool is_of_shots = false;  ///< Single pictures while the head stood; else of a video.
-  double narrow_focal_px = 0.0;      ///< Above zero: the field is so narrow that nothing but one focal length is told.
-  std::string fault;                 ///< What broke in the middle; the head was stopped, and the rest is of before.
+      0.0;  ///< Of the head's times against the frames'; in σ of the delay beside what the log determines.
+  bool is_of_shots = false;          ///< Single images while the head stood; else of a video.
+  double narrow_focal_px = 0.0;      ///< Above zero: the field is so narrow that only one focal length is determined.
+  std::string fault;                 ///< What broke on the way; the head was stopped, and the rest is of before.
   std::string log_csv;               ///< What `offline` reads, as log.csv.
   std::vector<std::string> offline;  ///< `alidade` with these words, in the folder of log.csv, gives the same numbers.
   ObserveReport report;

@@ -77,7 +77,7 @@ TEST(HeadCalibrate, FollowsABoardInsteadOfPoints) {
   const std::unique_ptr<HeadDevice> head = open_head("sim://?clock=free&rate=8");
   const std::unique_ptr<FrameStream> stream = open_stream("sim://?" + camera, *head);
   const HeadCalibrationConfig config{
-      .range = range_of(60, -20, 40), .most_s = 16.0, .board = Board{.cols = 9, .rows = 6, .square_m = 0.025}};
+      .range = range_of(60, -20, 40), .max_s = 16.0, .board = Board{.cols = 9, .rows = 6, .square_m = 0.025}};
   const HeadCalibration result = calibrate_head(*head, *stream, config);
   ASSERT_EQ(result.verdict.exit_code, ExitCode::ok) << result.verdict.sentence;
   EXPECT_EQ(parse_rotation_log(result.log_csv, "log.csv").log.num_points, 54u);
@@ -87,8 +87,8 @@ TEST(HeadCalibrate, FollowsABoardInsteadOfPoints) {
   EXPECT_LT(3.0 * sigma, 0.02 * fx);
 }
 
-TEST(HeadCalibrate, NamesFyWhereTiltIsHeld) {
-  const HeadCalibration result = calibrated("rate=8", {.range = range_of(60, 0, 0), .until = 0.001, .most_s = 14.0});
+TEST(HeadCalibrate, NamesFyWhereTiltIsFixed) {
+  const HeadCalibration result = calibrated("rate=8", {.range = range_of(60, 0, 0), .until = 0.001, .max_s = 14.0});
   EXPECT_EQ(result.verdict.exit_code, ExitCode::cannot_tell);
   EXPECT_NE(result.verdict.sentence.find("fy"), std::string::npos) << result.verdict.sentence;
 }

@@ -75,7 +75,7 @@ std::unique_ptr<HeadDevice> open_head(const std::string& url, const HeadOptions&
                    "' is no head: give rotctl://HOST:PORT, onvif://USER@HOST, indi://HOST:PORT/DEVICE or sim://");
 }
 
-void HeadDevice::zoom_to(double) { throw InputError(name() + ": has no zoom that can be told"); }
+void HeadDevice::zoom_to(double) { throw InputError(name() + ": has no zoom that can be commanded"); }
 
 MovingHead::MovingHead(HeadDevice& device, const Eigen::Vector2d& low_rad, const Eigen::Vector2d& high_rad,
                        Progress progress)

@@ -33,7 +33,7 @@ struct HeadLimits {
   [[nodiscard]] bool hold(const Eigen::Vector2d& pan_tilt_rad) const;
 };
 
-/// Where the head says that it is. The time is the middle of question and answer.
+/// Where the head says that it is. The time is the midpoint of question and answer.
 struct HeadPosition {
   double t_s = 0.0, wait_s = 0.0;
   Eigen::Vector2d pan_tilt_rad = Eigen::Vector2d::Zero();

@@ -20,7 +20,7 @@
 namespace alidade {
 namespace {
 
-/// Between two places of a course; none: outside of it.
+/// Between two points of a course; none: outside of it.
 std::optional<Eigen::Vector2d> between(const std::vector<HeadPosition>& course, double t_s) {
   const auto after = std::ranges::lower_bound(course, t_s, {}, &HeadPosition::t_s);
   if (after == course.begin() || after == course.end()) return std::nullopt;
@@ -76,7 +76,7 @@ class Follower {
   void follow() {
     const double period_s = result_.period_s;
     double next_s = begin_s_ + period_s;
-    while (head_.now_s() - begin_s_ < config_.most_s) {
+    while (head_.now_s() - begin_s_ < config_.max_s) {
       report_progress(progress_, "following: s of head time", static_cast<std::size_t>(head_.now_s() - begin_s_), 0);
       ask(next_s);
       aim_head();
@@ -92,7 +92,7 @@ class Follower {
   }
   /// Whoever kills this process finds what was seen until a few seconds ago.
   void tell_so_far() {
-    constexpr double pause_s = 3.0, pause_share = 0.05;  // all that was seen is told each time
+    constexpr double pause_s = 3.0, pause_share = 0.05;  // all that was seen is reported each time
     const double time_s = head_.now_s() - begin_s_;
     if (!config_.on_so_far || result_.frames.empty() || time_s - given_s_ < std::max(pause_s, pause_share * time_s))
       return;
@@ -173,7 +173,7 @@ class Follower {
   void take(double t_s, const Eigen::Vector2d& bearing_rad) {
     constexpr double forgotten_s = 1.0;
     if (filter_.has_started() && t_s - filter_.newest_s() > forgotten_s) filter_.forget();
-    constexpr double sigma_px = 0.3;  // of the target's middle
+    constexpr double sigma_px = 0.3;  // of the target's centre
     (void)filter_.take(t_s, bearing_rad, std::hypot(sigma_px / focal_of(rig_head_.camera), config_.resolution_rad));
   }
 
@@ -225,7 +225,7 @@ class Follower {
 };
 
 void judge(HeadFollowing& result, double shorter_side_px) {
-  constexpr double settled_share = 1.0 / 3.0, most_lost = 0.2;
+  constexpr double settled_share = 1.0 / 3.0, max_lost = 0.2;
   std::size_t found = 0, counted = 0, central = 0;
   double sum2 = 0.0;
   for (const FollowedFrame& frame : result.frames) {
@@ -250,10 +250,10 @@ void judge(HeadFollowing& result, double shorter_side_px) {
   const double lost = 1.0 - static_cast<double>(found) / static_cast<double>(counted);
   result.verdict.sentence = fmt::format("the target stands {:.3g} px RMS from the principal point, {:.3g} px at most",
                                         result.rms_px, result.max_px);
-  result.verdict.checks.push_back({"found", lost > most_lost ? State::care : State::good,
-                                   fmt::format("found in {:.0f} % of the frames", 100.0 * (1.0 - lost)), lost,
-                                   most_lost, "", ""});
-  if (lost > most_lost) result.verdict.state = State::care;
+  result.verdict.checks.push_back({"found", lost > max_lost ? State::care : State::good,
+                                   fmt::format("found in {:.0f} % of the frames", 100.0 * (1.0 - lost)), lost, max_lost,
+                                   "", ""});
+  if (lost > max_lost) result.verdict.state = State::care;
 }
 
 /// What broke it off is said before what was seen until then.

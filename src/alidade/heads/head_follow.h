@@ -24,7 +24,7 @@ struct HeadFollowing;
 
 struct HeadFollowConfig {
   HeadRange range;
-  double most_s = 60.0;                                          ///< For which the head is held.
+  double max_s = 60.0;                                           ///< For which the head is in use.
   std::array<PositionerParams, 2> axes{usual_axis, usual_axis};  ///< Pan and tilt, as --identify estimates them.
   double resolution_rad = 3e-4;                                  ///< The step of what is read.
   double delay_s = 0.0;  ///< A frame shows the angles of so much later than its time: as --calibrate estimates it.
@@ -62,7 +62,7 @@ struct HeadFollowing {
   double period_s = 0.0, image_age_s = 0.0;                ///< Between commands; of the newest image at a command.
   std::optional<FollowForecast> forecast;                  ///< None: the target was not seen long enough.
   bool is_interrupted = false;                             ///< The rest is of before; the head was stopped.
-  std::string fault;                                       ///< What broke in the middle; likewise.
+  std::string fault;                                       ///< What broke on the way; likewise.
   Verdict verdict;
 };
 

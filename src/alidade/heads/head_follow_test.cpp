@@ -34,7 +34,7 @@ HeadFollowing followed(const std::string& head_words, const std::string& camera_
 TEST(HeadFollow, DoesAsWellAsServoPredicts) {
   const PositionerParams axis{.rate_rad_s = 40.0 * degree, .acceleration_rad_s2 = 120.0 * degree, .latency_s = 0.1};
   const HeadFollowing result = followed("rate=40&latency=0.1", "fps=20&mount=1:-2:3&delay=0.04&target=10:0:3:30:1.2",
-                                        {.most_s = 15.0, .axes = {axis, axis}, .delay_s = -0.04});
+                                        {.max_s = 15.0, .axes = {axis, axis}, .delay_s = -0.04});
   EXPECT_TRUE(result.verdict.ok()) << result.verdict.sentence;
   ASSERT_TRUE(result.forecast.has_value());
   EXPECT_LT(result.rms_px, 1.3 * result.forecast->rms_px);  // what is asked of the loop
@@ -48,13 +48,13 @@ TEST(HeadFollow, FollowsWithAHeadOfWhichLittleIsKnown) {
   PositionerParams axis = usual_axis;
   axis.latency_s = 0.1;
   const HeadFollowing result = followed("rate=25&accel=80&tau=0.1&latency=0.1", "fps=20&target=6:0:3:20:1.2",
-                                        {.most_s = 10.0, .axes = {axis, axis}});
+                                        {.max_s = 10.0, .axes = {axis, axis}});
   EXPECT_TRUE(result.verdict.ok()) << result.verdict.sentence;
   EXPECT_GT(result.central_third, 0.95);
 }
 
 TEST(HeadFollow, StandsWhereNothingLooksSo) {
-  const HeadFollowing result = followed("rate=40", "fps=20&target=0:90:0:0:1.2", {.most_s = 6.0});
+  const HeadFollowing result = followed("rate=40", "fps=20&target=0:90:0:0:1.2", {.max_s = 6.0});
   EXPECT_EQ(result.verdict.exit_code, ExitCode::cannot_tell);
   EXPECT_EQ(result.num_commands, 0u);
 }

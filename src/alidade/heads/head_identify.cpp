@@ -84,7 +84,7 @@ class Experiment {
     for (const double until = head_.now_s() + seconds; head_.now_s() < until;) ask();
   }
   /// Asks until both axes have stood still for so long, after they had the time to begin.
-  void ask_until_rest(double least_s, double still_s) {
+  void ask_until_rest(double min_s, double still_s) {
     const double begin = head_.now_s(), most = 4.0 * longest_move_s;
     double still_since = begin;
     Eigen::Vector2d before = last().pan_tilt_rad;
@@ -93,7 +93,7 @@ class Experiment {
       const Eigen::Vector2d now = last().pan_tilt_rad;
       if (now != before) still_since = head_.now_s();
       before = now;
-      if (head_.now_s() - begin >= least_s && head_.now_s() - still_since >= still_s) return;
+      if (head_.now_s() - begin >= min_s && head_.now_s() - still_since >= still_s) return;
     }
   }
   void send(const Eigen::Vector2d& target) {
@@ -125,7 +125,7 @@ class Experiment {
                     head_axis_names[static_cast<std::size_t>(axis)], before / degree, most, long_way_rad / degree)};
   }
 
-  /// The middle of what is free, no wider than is needed, and with the start in it.
+  /// The centre of what is free, no wider than is needed, and with the start in it.
   void place_window() {
     low_ = head_.low_rad();
     high_ = head_.high_rad();
@@ -216,19 +216,19 @@ class Experiment {
   /// Quicker and quicker, and smaller and smaller, so that it follows.
   void chirp() {
     constexpr double duration_s = 10.0, from_hz = 0.15, to_hz = 1.2, command_s = 0.21;
-    const Eigen::Vector2d middle = last().pan_tilt_rad;
+    const Eigen::Vector2d centre = last().pan_tilt_rad;
     Eigen::Vector2d reach;
     for (int i = 0; i < 2; ++i)
       reach[i] =
-          std::min({12.0 * degree, 0.5 * fastest_so_far(i), middle[i] - window_low_[i], window_high_[i] - middle[i]});
+          std::min({12.0 * degree, 0.5 * fastest_so_far(i), centre[i] - window_low_[i], window_high_[i] - centre[i]});
     const double begin = head_.now_s();
     for (double t = 0.0; t < duration_s; t = head_.now_s() - begin) {
       const double phase = 2.0 * std::numbers::pi * (from_hz * t + 0.5 * (to_hz - from_hz) * t * t / duration_s);
       const double size = from_hz / (from_hz + (to_hz - from_hz) * t / duration_s);
-      send(middle + reach.cwiseMax(0.0).cwiseProduct(Eigen::Vector2d(std::sin(phase), std::cos(phase) - 1.0) * size));
+      send(centre + reach.cwiseMax(0.0).cwiseProduct(Eigen::Vector2d(std::sin(phase), std::cos(phase) - 1.0) * size));
       ask_for(command_s);
     }
-    move_to(middle);
+    move_to(centre);
   }
 
   /// Halves the step, each axis by itself, until the smallest that is obeyed is known to a tenth.
@@ -262,13 +262,13 @@ class Experiment {
   }
   Eigen::Vector2d last_target() { return {log(0).commands.back().target_rad, log(1).commands.back().target_rad}; }
 
-  /// The same place from the same side.
+  /// The same position from the same side.
   void repeat() {
     constexpr int times = 5;
-    const Eigen::Vector2d place = last_target(), away = place - toward_ * 2.0 * degree;
+    const Eigen::Vector2d target = last_target(), away = target - toward_ * 2.0 * degree;
     for (int k = 0; k < times; ++k) {
       move_to(away);
-      move_to(place);
+      move_to(target);
       for (int i = 0; i < 2; ++i) log(i).repeated_rad.push_back(last().pan_tilt_rad[i]);
     }
   }

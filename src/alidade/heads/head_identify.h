@@ -15,7 +15,7 @@ struct HeadIdentification {
   std::array<PositionerFit, 2> axes;
   double head_time_s = 0.0;
   Eigen::Vector2d low_rad, high_rad;  ///< Where it was allowed to go.
-  std::string lie;                    ///< Why nothing can be told; empty: it can.
+  std::string lie;                    ///< Why nothing can be determined; empty: it can.
   ZoomTrial zoom;
   Verdict verdict;
 };

@@ -31,13 +31,13 @@ constexpr std::size_t max_clients = 16;
 
 int listening(const std::string& address, int port) {
   const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  sockaddr_in place{};
-  place.sin_family = AF_INET;
-  place.sin_port = htons(static_cast<std::uint16_t>(port));
+  sockaddr_in endpoint{};
+  endpoint.sin_family = AF_INET;
+  endpoint.sin_port = htons(static_cast<std::uint16_t>(port));
   const int on = 1;
   ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-  const bool listens = ::inet_pton(AF_INET, address.c_str(), &place.sin_addr) == 1 &&
-                       ::bind(socket, reinterpret_cast<const sockaddr*>(&place), sizeof place) == 0 &&
+  const bool listens = ::inet_pton(AF_INET, address.c_str(), &endpoint.sin_addr) == 1 &&
+                       ::bind(socket, reinterpret_cast<const sockaddr*>(&endpoint), sizeof endpoint) == 0 &&
                        ::listen(socket, 16) == 0;
   if (listens) return socket;
   ::close(socket);
@@ -46,10 +46,10 @@ int listening(const std::string& address, int port) {
 }
 
 std::uint16_t port_of(int socket) {
-  sockaddr_in place{};
-  socklen_t size = sizeof place;
-  ::getsockname(socket, reinterpret_cast<sockaddr*>(&place), &size);
-  return ntohs(place.sin_port);
+  sockaddr_in endpoint{};
+  socklen_t size = sizeof endpoint;
+  ::getsockname(socket, reinterpret_cast<sockaddr*>(&endpoint), &size);
+  return ntohs(endpoint.sin_port);
 }
 
 bool waits_for(int socket, short what) {
@@ -170,8 +170,8 @@ struct HeadServer::State {
 
   void serve_stream(int socket) {
     char request[2048];
-    constexpr int most_waits = 100;
-    for (int i = 0; !ends && i < most_waits && !waits_for(socket, POLLIN);) ++i;
+    constexpr int max_waits = 100;
+    for (int i = 0; !ends && i < max_waits && !waits_for(socket, POLLIN);) ++i;
     if (::recv(socket, request, sizeof request, MSG_DONTWAIT) <= 0) return;
     const std::string_view head =
         "HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=frame\r\n"
@@ -190,24 +190,24 @@ struct HeadServer::State {
 
   /// One question a connection.
   void serve_onvif(int socket) {
-    constexpr std::size_t most_bytes = 1 << 20;
-    constexpr int most_waits = 100;
+    constexpr std::size_t max_bytes = 1 << 20;
+    constexpr int max_waits = 100;
     std::string request;
     std::size_t body = std::string::npos, length = 0;
     char chunk[4096];
     for (int waits = 0; !ends && (body == std::string::npos || request.size() < body + length);) {
       if (!waits_for(socket, POLLIN)) {
-        if (++waits > most_waits) return;
+        if (++waits > max_waits) return;
         continue;
       }
       const ssize_t got = ::recv(socket, chunk, sizeof chunk, 0);
-      if (got <= 0 || request.size() > most_bytes) return;
+      if (got <= 0 || request.size() > max_bytes) return;
       request.append(chunk, static_cast<std::size_t>(got));
       const std::size_t end = request.find("\r\n\r\n");
       if (body != std::string::npos || end == std::string::npos) continue;
       body = end + 4;
       length = body_length(request.substr(0, end));
-      if (length > most_bytes) return;
+      if (length > max_bytes) return;
     }
     const OnvifCamera::Answer answer =
         onvif_camera->answer(request.substr(std::min(body, request.size())), clock->now_s());
@@ -257,9 +257,9 @@ HeadServer::HeadServer(const HeadServerConfig& config) : state_(std::make_unique
     if (config.stream_port >= 0)
       state.stream.emplace(config.address, config.stream_port, state.ends, [&state](int s) { state.serve_stream(s); });
     if (config.onvif_port >= 0) {
-      const std::string pictures = fmt::format("http://{}:{}/stream.mjpg", config.address, stream_port());
+      const std::string images = fmt::format("http://{}:{}/stream.mjpg", config.address, stream_port());
       state.onvif_camera.emplace(state.plant,
-                                 OnvifServerConfig{config.user, config.password, config.address, 80, pictures,
+                                 OnvifServerConfig{config.user, config.password, config.address, 80, images,
                                                    config.camera.width_px, config.camera.height_px});
       state.onvif.emplace(config.address, config.onvif_port, state.ends, [&state](int s) { state.serve_onvif(s); });
       state.onvif_camera->set_port(state.onvif->port());

@@ -51,11 +51,11 @@ void move_a_little(MovingHead& head, HeadSurvey& survey) {
   }
   std::vector<HeadPosition> way;
   head.on_reading = [&](const HeadPosition& reading) { way.push_back(reading); };
-  constexpr double most_s = 15.0;
+  constexpr double max_s = 15.0;
   head.command(away);
-  wait_for_rest(head, most_s);
+  wait_for_rest(head, max_s);
   head.command(start.cwiseMax(head.low_rad()).cwiseMin(head.high_rad()));
-  wait_for_rest(head, most_s);
+  wait_for_rest(head, max_s);
   survey.zoom = try_zoom(head);
   head.stop();
   survey.has_moved = true;
@@ -100,19 +100,19 @@ Verdict verdict_of(const HeadSurvey& survey) {
 }  // namespace
 
 ZoomTrial try_zoom(MovingHead& head) {
-  constexpr double step = 0.1, most_s = 8.0;
+  constexpr double step = 0.1, max_s = 8.0;
   ZoomTrial trial;
   const std::optional<double> begin = head.device().zoom();
   if (!begin) return trial;
   trial.has_zoom = true;
   trial.from = *begin;
   trial.to = *begin > 0.5 ? *begin - step : *begin + step;
-  const Eigen::Vector2d before = wait_for_rest(head, most_s).pan_tilt_rad;
+  const Eigen::Vector2d before = wait_for_rest(head, max_s).pan_tilt_rad;
   head.zoom_to(trial.to);
-  trial.moved_rad = wait_for_rest(head, most_s).pan_tilt_rad - before;
+  trial.moved_rad = wait_for_rest(head, max_s).pan_tilt_rad - before;
   trial.read = head.device().zoom().value_or(std::nan(""));
   head.zoom_to(trial.from);
-  (void)wait_for_rest(head, most_s);
+  (void)wait_for_rest(head, max_s);
   return trial;
 }
 
@@ -142,16 +142,16 @@ void judge_zoom(const ZoomTrial& trial, Verdict& verdict) {
   if (verdict.state == State::good || check.state == State::bad) verdict.state = check.state;
 }
 
-HeadPosition wait_for_rest(MovingHead& head, double most_s) {
-  constexpr double rest_s = 0.5, least_s = 0.6;
+HeadPosition wait_for_rest(MovingHead& head, double max_s) {
+  constexpr double rest_s = 0.5, min_s = 0.6;
   const double begin_s = head.now_s();
   HeadPosition last = head.position();
   double still_since_s = last.t_s;
-  while (head.now_s() - begin_s < most_s) {
+  while (head.now_s() - begin_s < max_s) {
     const HeadPosition next = head.position();
     if (next.pan_tilt_rad != last.pan_tilt_rad) still_since_s = next.t_s;
     last = next;
-    if (next.t_s - still_since_s >= rest_s && next.t_s - begin_s >= least_s) break;
+    if (next.t_s - still_since_s >= rest_s && next.t_s - begin_s >= min_s) break;
   }
   return last;
 }

@@ -41,7 +41,7 @@ struct HeadSurvey {
                                      const Progress& progress = {});
 
 /// Waits until two readings half a second apart are the same, at most so long; the last one.
-HeadPosition wait_for_rest(MovingHead& head, double most_s);
+HeadPosition wait_for_rest(MovingHead& head, double max_s);
 
 /// Zooms a little and back, where the head has zoom. Throws as MovingHead does.
 [[nodiscard]] ZoomTrial try_zoom(MovingHead& head);

@@ -29,11 +29,11 @@ void check_readings(const PositionerFit& fit, const std::string& axis, std::vect
     checks.push_back({axis + " reading", State::bad,
                       axis + " reads its target at once: it reports the command, not the position",
                       fit.rate.value / degree, 1000.0, "°/s", ""});
-  constexpr double most_noise = 4.0;
-  checks.push_back({axis + " residuals", fit.noise > most_noise ? State::care : State::good,
+  constexpr double max_noise = 4.0;
+  checks.push_back({axis + " residuals", fit.noise > max_noise ? State::care : State::good,
                     fmt::format("{}: readings scatter by {:.2g} of what its steps and its clock explain, {:.2g}° RMS",
                                 axis, fit.noise, fit.rms_rad / degree),
-                    fit.noise, most_noise, "", ""});
+                    fit.noise, max_noise, "", ""});
 }
 
 /// What the log did not show.
@@ -77,7 +77,7 @@ Verdict refusal_of(const std::string& axis, const PositionerFit& fit) {
 }  // namespace
 
 double command_step(const PositionerLog& log) {
-  constexpr double rest_s = 0.2, least_share = 0.12;
+  constexpr double rest_s = 0.2, min_share = 0.12;
   constexpr std::size_t fewest = 8;
   std::vector<PositionerReading> rests;
   std::vector<double> off;
@@ -103,7 +103,7 @@ double command_step(const PositionerLog& log) {
     sum2 += off[i] * off[i];
   }
   // Rounded, they end beside their targets by up to half a step.
-  return std::sqrt(sum2 / static_cast<double>(rests.size())) > least_share * step ? step : 0.0;
+  return std::sqrt(sum2 / static_cast<double>(rests.size())) > min_share * step ? step : 0.0;
 }
 
 Verdict head_verdict(const HeadIdentification& identified) {

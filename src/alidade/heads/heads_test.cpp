@@ -14,7 +14,7 @@
 namespace alidade {
 namespace {
 
-/// Writes down what it is told, and passes it on.
+/// Writes down its commands, and passes them on.
 class WatchedHead final : public HeadDevice {
  public:
   explicit WatchedHead(const std::string& url) : head_(open_head(url)) {}

@@ -111,7 +111,7 @@ SimulatedHeadConfig drawn_head(std::uint64_t seed) {
 namespace {
 
 struct HeadNumber {
-  double* place;
+  double* target;
   double unit;
 };
 std::map<std::string, HeadNumber> numbers_of(SimulatedHeadConfig& head) {
@@ -150,7 +150,7 @@ void take_key(const std::string& key, const std::string& value, const std::strin
   } else if (key == "seed") {
     head = drawn_head(static_cast<std::uint64_t>(number));
   } else {
-    *numbers.at(key).place = number * numbers.at(key).unit;
+    *numbers.at(key).target = number * numbers.at(key).unit;
   }
 }
 

@@ -9,12 +9,12 @@
 namespace alidade {
 namespace {
 
-constexpr double margin_s = 0.08;  // around what is used: a corner beside it bends the line
+constexpr double margin_s = 0.08;  // around what is used: a corner beside it curves the line
 
 /// Of one axis, least squares.
 struct Line {
   double value = 0.0, slope = 0.0, worst = 0.0;
-  double bend = 0.0;  ///< What the middle third lies off it, less the outer two.
+  double bend = 0.0;  ///< What the central third lies off it, less the outer two.
 };
 Line line_through(std::span<const HeadPosition> readings, int axis, double t_s) {
   const double n = static_cast<double>(readings.size());
@@ -62,16 +62,16 @@ std::map<int, std::size_t> columns_of(std::span<const SeenFrame> frames) {
 }  // namespace
 
 HeadManner manner_of(std::span<const HeadPosition> readings) {
-  constexpr double same_rad = 1e-9, least_s = 0.1;
+  constexpr double same_rad = 1e-9, min_s = 0.1;
   HeadManner manner;
   for (int axis = 0; axis < 2; ++axis) {
     for (std::size_t i = 1, from = 0; i < readings.size(); ++i) {
       const double apart = std::abs(readings[i].pan_tilt_rad[axis] - readings[i - 1].pan_tilt_rad[axis]);
       if (apart > same_rad && (manner.step_rad[axis] == 0.0 || apart < manner.step_rad[axis]))
         manner.step_rad[axis] = apart;
-      while (readings[i].t_s - readings[from + 1].t_s >= least_s) ++from;
+      while (readings[i].t_s - readings[from + 1].t_s >= min_s) ++from;
       const double dt = readings[i].t_s - readings[from].t_s;
-      if (dt < least_s) continue;
+      if (dt < min_s) continue;
       const double rate = std::abs(readings[i].pan_tilt_rad[axis] - readings[from].pan_tilt_rad[axis]) / dt;
       manner.fastest_rad_s[axis] = std::max(manner.fastest_rad_s[axis], rate);
     }
@@ -110,7 +110,7 @@ std::optional<HeadLine> even_motion(std::span<const HeadPosition> readings, cons
 RotationLog turn_log(std::span<const HeadPosition> readings, std::span<const SeenFrame> frames, double late_s,
                      double origin_s) {
   constexpr double before_s = 0.01;
-  constexpr int most_at_rest = 6;
+  constexpr int max_at_rest = 6;
   RotationLog log;
   log.source = RotationSource::head;
   if (readings.size() < 2) return log;
@@ -125,7 +125,7 @@ RotationLog turn_log(std::span<const HeadPosition> readings, std::span<const See
     if (!line || frame.points.empty()) continue;
     if (!kept.empty() && frame.t_s - kept.back().t_s < 3.0 * before_s) continue;
     at_rest = line->rate_rad_s.isZero() ? at_rest + 1 : 0;
-    if (at_rest > most_at_rest) continue;
+    if (at_rest > max_at_rest) continue;
     kept.push_back(frame);
     lines.push_back(*line);
   }

@@ -182,7 +182,7 @@ TEST(Feed, LateClientsGetTheLastMinuteAndTheirOwnSubscription) {
   EXPECT_THAT(rest, Not(HasSubstr(message_head(3, 98))));
 }
 
-TEST(Feed, AClientThatDoesNotReadCostsFourMegabytesAndIsTold) {
+TEST(Feed, AClientThatDoesNotReadCostsFourMegabytesAndIsWarned) {
   TopicStore topics({rows()});
   Feed feed(topics, "s");
   feed.hear(R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":1}]})");

@@ -49,7 +49,7 @@ struct ClientRequest {
 
 /// Path of a request target, "/result.json" of "/result.json?token=…".
 [[nodiscard]] std::string_view path_of(std::string_view target);
-/// Whether the target's query has `token=TOKEN`. In a time that does not tell how much of it was right.
+/// Whether the target's query has `token=TOKEN`. In a time that does not reveal how much of it was right.
 [[nodiscard]] bool has_token(std::string_view target, std::string_view token);
 
 }  // namespace alidade::live

@@ -13,7 +13,7 @@
 namespace alidade::live {
 
 struct ServerConfig {
-  std::string address = "127.0.0.1";  ///< Another than the machine's own needs a token, which url() tells.
+  std::string address = "127.0.0.1";  ///< Another than the machine's own needs a token, which url() shows.
   std::uint16_t port = 8765;          ///< 0: any free one.
   std::vector<Topic> topics;          ///< None: no WebSocket.
   std::string end_topic;              ///< Who subscribes to it is waited for at the end, until it leaves.
@@ -35,7 +35,7 @@ class Server {
   [[nodiscard]] std::string url() const;
   [[nodiscard]] std::uint16_t port() const;
 
-  /// A message with its time, which `make` writes on the server's thread. Left out, and `make` not called, where its
+  /// A message with its time, which `make` writes on the server's thread. Skipped, and `make` not called, where its
   /// topic has had its share of this second; `is_last` goes always. False: dropped. From any thread.
   bool send(std::string_view topic, std::int64_t t_ns, std::function<std::string()> make, std::size_t lane = 0,
             bool is_last = false);

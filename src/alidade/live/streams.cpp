@@ -228,11 +228,11 @@ std::string servo_scene(std::int64_t t_ns, const ServoScene& world, const ServoR
 }
 
 std::string servo_marks(std::int64_t t_ns, const Camera& camera, const ServoRow& row) {
-  const Eigen::Vector2d middle(0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1));
+  const Eigen::Vector2d centre(0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1));
   Marks marks(t_ns);
   if (row.has_prediction && row.sigma_predicted_px.allFinite())
-    marks.ellipse(middle, row.sigma_predicted_px.cwiseAbs2().asDiagonal().toDenseMatrix(), sky);
-  if (row.error_px.allFinite()) marks.dot(middle + row.error_px, 6.0, orange);
+    marks.ellipse(centre, row.sigma_predicted_px.cwiseAbs2().asDiagonal().toDenseMatrix(), sky);
+  if (row.error_px.allFinite()) marks.dot(centre + row.error_px, 6.0, orange);
   return marks.text();
 }
 

@@ -28,7 +28,7 @@ inline constexpr const char* end_topic = "/result";
 [[nodiscard]] Topic row_topic(const std::string& topic, const std::string& schema_name, const DataTable& sample,
                               std::size_t lanes = 1);
 
-/// A path's last places, as a line. For the server's thread.
+/// A path's last positions, as a line. For the server's thread.
 using Trail = std::deque<Eigen::Vector3d>;
 
 class TrackStream {

@@ -22,7 +22,7 @@ ObserveConfig offline_config(const HeadCalibration& result) {
   config.square_pixels = config.fixed_centre = result.narrow_focal_px > 0.0;
   if (!config.square_pixels) config.estimate.emplace_back("k1");
   config.estimate.emplace_back("mount");
-  if (!result.is_of_shots) config.estimate.emplace_back("delay");  // what stands tells of none
+  if (!result.is_of_shots) config.estimate.emplace_back("delay");  // what stands shows none
   if (const double f = result.narrow_focal_px; f > 0.0)
     config.start = Eigen::Vector4d(f, f, 0.5 * (result.width_px - 1), 0.5 * (result.height_px - 1));
   return config;

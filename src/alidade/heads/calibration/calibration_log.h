@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// A field so narrow that of a lens nothing but its focal length can be told: its centre and the mounting look alike.
+/// A field so narrow that of a lens only the focal length can be determined: its centre and the mounting look alike.
 [[nodiscard]] bool is_narrow(const HeadCalibration& result, double focal_px);
 
 /// What `alidade` with the words of `offline` says of result.log_csv, down to the last digit: it is read back from its

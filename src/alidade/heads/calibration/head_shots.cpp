@@ -19,20 +19,20 @@
 namespace alidade {
 namespace {
 
-/// Where the middle of the image goes, in shares of its width and height.
-constexpr std::array<std::array<double, 2>, 13> first_places{{{0, 0},
-                                                              {0.35, 0},
-                                                              {-0.35, 0},
-                                                              {0, 0.35},
-                                                              {0, -0.35},
-                                                              {0.3, 0.3},
-                                                              {-0.3, 0.3},
-                                                              {-0.3, -0.3},
-                                                              {0.3, -0.3},
-                                                              {0.45, 0.2},
-                                                              {-0.45, -0.2},
-                                                              {-0.2, 0.45},
-                                                              {0.2, -0.45}}};
+/// Where the image centre goes, in shares of its width and height.
+constexpr std::array<std::array<double, 2>, 13> first_offsets{{{0, 0},
+                                                               {0.35, 0},
+                                                               {-0.35, 0},
+                                                               {0, 0.35},
+                                                               {0, -0.35},
+                                                               {0.3, 0.3},
+                                                               {-0.3, 0.3},
+                                                               {-0.3, -0.3},
+                                                               {0.3, -0.3},
+                                                               {0.45, 0.2},
+                                                               {-0.45, -0.2},
+                                                               {-0.2, 0.45},
+                                                               {0.2, -0.45}}};
 
 class ShotSession {
  public:
@@ -76,34 +76,34 @@ class ShotSession {
     }
   }
   [[nodiscard]] double head_time() { return head_.now_s() - begin_s_; }
-  /// For another move, its rest and its picture.
-  [[nodiscard]] bool has_time() { return head_time() < config_.most_s - 3.0 - 2.0 * stream_.exposure_s(); }
+  /// For another move, its rest and its image.
+  [[nodiscard]] bool has_time() { return head_time() < config_.max_s - 3.0 - 2.0 * stream_.exposure_s(); }
   [[nodiscard]] Eigen::Vector2d at() const { return reading_.pan_tilt_rad; }
 
   void watch(double seconds) {
     constexpr double question_s = 0.1;
     for (const double until_s = head_.now_s() + seconds; head_.now_s() < until_s;) {
-      report_progress(progress_, "calibrating: pictures", shots_.size(), 0);
+      report_progress(progress_, "calibrating: images", shots_.size(), 0);
       head_.wait_until(std::min(until_s, head_.now_s() + question_s));
       (void)head_.position();
     }
   }
 
   void move_to(const Eigen::Vector2d& target) {
-    constexpr double rest_s = 1.0, least_s = 0.5, most_s = 60.0, still_rad = 5e-6;
+    constexpr double rest_s = 1.0, min_s = 0.5, max_s = 60.0, still_rad = 5e-6;
     ++result_.num_moves;
     head_.command(target.cwiseMax(head_.low_rad()).cwiseMin(head_.high_rad()));
     const double begin_s = head_.now_s();
-    still_since_s_ = begin_s + least_s;
+    still_since_s_ = begin_s + min_s;
     Eigen::Vector2d before = at();
-    while (head_.now_s() - begin_s < most_s && head_.now_s() - still_since_s_ < rest_s) {
+    while (head_.now_s() - begin_s < max_s && head_.now_s() - still_since_s_ < rest_s) {
       watch(0.1);
       if ((at() - before).norm() > still_rad) still_since_s_ = std::max(still_since_s_, head_.now_s());
       before = at();
     }
   }
 
-  /// A picture whose exposure began after the head had come to rest; its stars are found again, or it is left.
+  /// An image whose exposure began after the head had come to rest; its stars are found again, or it is left.
   void shoot() {
     constexpr double download_s = 20.0;
     const double exposure_s = stream_.exposure_s(), asked_s = head_.now_s();
@@ -115,7 +115,7 @@ class ShotSession {
         return;
       }
       if (head_.now_s() - asked_s > 3.0 * exposure_s + download_s)
-        throw InputError(stream_.name() + ": no picture comes; the stream is lost");
+        throw InputError(stream_.name() + ": no image arrives; the stream is lost");
       watch(0.1);
     }
   }
@@ -140,14 +140,14 @@ class ShotSession {
     px_by_rad_.col(0) = way_of(0, start, step_rad);
     px_by_rad_.col(1) = way_of(1, at(), step_rad);
     if (px_by_rad_.determinant() < 0.0)
-      throw InputError(stream_.name() + ": its picture is mirrored against the head's axes");
+      throw InputError(stream_.name() + ": its image is mirrored against the head's axes");
     const double focal_px = px_by_rad_.col(1).norm();
     if (is_narrow(result_, focal_px)) result_.narrow_focal_px = std::round(focal_px);
-    middle_ = start;
+    centre_ = start;
   }
   Eigen::Vector2d way_of(int axis, const Eigen::Vector2d& from, double& step_rad) {
-    constexpr double enough_px = 30.0, most_rad = 8.0 * degree, more = 3.0;
-    for (; step_rad < most_rad; step_rad *= more) {
+    constexpr double enough_px = 30.0, max_rad = 8.0 * degree, more = 3.0;
+    for (; step_rad < max_rad; step_rad *= more) {
       const Eigen::Vector2d before = at();
       Eigen::Vector2d target = from;
       target[axis] += from[axis] + step_rad <= head_.high_rad()[axis] ? step_rad : -step_rad;
@@ -159,24 +159,24 @@ class ShotSession {
       const double turned = at()[axis] - before[axis];
       if (shift->shift_px.norm() >= enough_px && std::abs(turned) > 1e-7) return shift->shift_px / turned;
     }
-    throw InputError(fmt::format("{}: the stars of one picture are not found in the next ({} are seen), {:.2g}° away",
+    throw InputError(fmt::format("{}: the stars of one image are not found in the next ({} are seen), {:.2g}° away",
                                  stream_.name(), shots_.empty() ? 0 : shots_.back().stars.size(), step_rad / degree));
   }
 
   void go_round() {
-    constexpr std::size_t least_shots = 10, every = 4;
+    constexpr std::size_t min_shots = 10, every = 4;
     for (std::size_t i = 0; has_time(); ++i) {
-      move_to(middle_ + px_by_rad_.inverse() * place(i));
+      move_to(centre_ + px_by_rad_.inverse() * offset(i));
       shoot();
-      if (shots_.size() < least_shots || i % every != 0 || !config_.until) continue;
+      if (shots_.size() < min_shots || i % every != 0 || !config_.until) continue;
       estimate();
       if (is_reached()) break;
     }
   }
   /// The first by the table, the others evenly by two irrational steps.
-  [[nodiscard]] Eigen::Vector2d place(std::size_t i) const {
+  [[nodiscard]] Eigen::Vector2d offset(std::size_t i) const {
     const Eigen::Vector2d size(result_.width_px, result_.height_px);
-    if (i < first_places.size()) return size.cwiseProduct(Eigen::Vector2d(first_places[i][0], first_places[i][1]));
+    if (i < first_offsets.size()) return size.cwiseProduct(Eigen::Vector2d(first_offsets[i][0], first_offsets[i][1]));
     constexpr double reach = 0.9;
     const double n = static_cast<double>(i), x = std::fmod(0.7548776662 * n, 1.0), y = std::fmod(0.5698402910 * n, 1.0);
     return reach * size.cwiseProduct(Eigen::Vector2d(x - 0.5, y - 0.5));
@@ -190,11 +190,11 @@ class ShotSession {
   }
 
   [[nodiscard]] std::string log_text() const {
-    constexpr std::size_t least_rows = 2;
+    constexpr std::size_t min_rows = 2;
     std::map<int, std::size_t> columns;
     for (const Shot& shot : shots_)
       for (const TrackedPoint& star : shot.stars) ++columns[star.id];
-    std::erase_if(columns, [](const auto& each) { return each.second < least_rows; });
+    std::erase_if(columns, [](const auto& each) { return each.second < min_rows; });
     std::size_t next = 0;
     for (auto& [id, column] : columns) column = next++;
     RotationLog log;
@@ -233,7 +233,7 @@ class ShotSession {
   StarTracks tracks_;
   std::vector<Shot> shots_;
   bool is_found_ = false;
-  Eigen::Vector2d middle_ = Eigen::Vector2d::Zero();
+  Eigen::Vector2d centre_ = Eigen::Vector2d::Zero();
   Eigen::Matrix2d px_by_rad_ = Eigen::Matrix2d::Identity();
   double begin_s_ = 0.0, still_since_s_ = 0.0, given_s_ = 0.0;
 };

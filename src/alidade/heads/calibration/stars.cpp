@@ -11,7 +11,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t most_stars = 150, least_pairs = 5;
+constexpr std::size_t max_stars = 150, min_pairs = 5;
 
 /// The grey that half of the pixels are below, and how much those around it scatter.
 std::pair<double, double> sky_of(const cv::Mat& grey) {
@@ -93,7 +93,7 @@ std::optional<Eigen::Vector2d> voted(std::span<const Eigen::Vector2d> from, std:
     if (std::max(std::abs(cell.first - best.first), std::abs(cell.second - best.second)) > 2)
       second = std::max(second, around(cell));
   constexpr int clearly = 2;
-  if (most < static_cast<int>(least_pairs) || most < clearly * second) return std::nullopt;
+  if (most < static_cast<int>(min_pairs) || most < clearly * second) return std::nullopt;
   return Eigen::Vector2d(cell_px * (best.first + 0.5), cell_px * (best.second + 0.5));
 }
 
@@ -122,7 +122,7 @@ std::vector<Eigen::Vector2d> find_stars(const cv::Mat& grey) {
     found.emplace_back(sum, moment / sum);
   }
   std::ranges::stable_sort(found, [](const auto& a, const auto& b) { return a.first > b.first; });
-  found.resize(std::min(found.size(), most_stars));
+  found.resize(std::min(found.size(), max_stars));
   std::vector<Eigen::Vector2d> stars;
   for (const auto& [sum, px] : found) stars.push_back(px);
   return stars;
@@ -135,45 +135,44 @@ std::optional<StarShift> shift_of_stars(std::span<const Eigen::Vector2d> from, s
   Similarity similarity{{1.0, 0.0}, *shift};
   std::vector<std::pair<std::size_t, std::size_t>> pairs = paired(from, to, similarity, coarse_px);
   for (int round = 0; round < 2; ++round) {
-    if (pairs.size() < least_pairs) return std::nullopt;
+    if (pairs.size() < min_pairs) return std::nullopt;
     similarity = fitted(from, to, pairs);
     pairs = paired(from, to, similarity, fine_px);
   }
-  if (pairs.size() < least_pairs) return std::nullopt;
-  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
-  for (const Eigen::Vector2d& star : from) middle += star / static_cast<double>(from.size());
-  return StarShift{similarity(middle) - middle, std::move(pairs)};
+  if (pairs.size() < min_pairs) return std::nullopt;
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& star : from) centre += star / static_cast<double>(from.size());
+  return StarShift{similarity(centre) - centre, std::move(pairs)};
 }
 
 std::vector<TrackedPoint> StarTracks::update(std::vector<Eigen::Vector2d> stars, const Eigen::Vector2d& pan_tilt_rad) {
   constexpr std::size_t near = 4;
-  std::vector<std::size_t> nearest(pictures_.size());
+  std::vector<std::size_t> nearest(images_.size());
   std::iota(nearest.begin(), nearest.end(), 0);
-  std::ranges::stable_sort(nearest, {},
-                           [&](std::size_t i) { return (pictures_[i].pan_tilt_rad - pan_tilt_rad).norm(); });
+  std::ranges::stable_sort(nearest, {}, [&](std::size_t i) { return (images_[i].pan_tilt_rad - pan_tilt_rad).norm(); });
   nearest.resize(std::min(nearest.size(), near));
   std::vector<int> ids(stars.size(), -1);
   for (const std::size_t k : nearest) {
-    const auto shift = shift_of_stars(pictures_[k].stars, stars);
+    const auto shift = shift_of_stars(images_[k].stars, stars);
     if (!shift) continue;
     for (const auto& [i, j] : shift->pairs) {
-      const int id = pictures_[k].ids[i];
+      const int id = images_[k].ids[i];
       if (ids[j] < 0 && std::ranges::find(ids, id) == ids.end()) ids[j] = id;
     }
   }
-  if (!pictures_.empty() && std::ranges::all_of(ids, [](int id) { return id < 0; })) return {};
+  if (!images_.empty() && std::ranges::all_of(ids, [](int id) { return id < 0; })) return {};
   std::vector<TrackedPoint> points;
   for (std::size_t j = 0; j < stars.size(); ++j) {
     if (ids[j] < 0) ids[j] = next_id_++;
     points.push_back({ids[j], stars[j]});
   }
-  pictures_.push_back({pan_tilt_rad, std::move(stars), std::move(ids)});
+  images_.push_back({pan_tilt_rad, std::move(stars), std::move(ids)});
   return points;
 }
 
 std::optional<StarShift> StarTracks::last_shift() const {
-  if (pictures_.size() < 2) return std::nullopt;
-  return shift_of_stars(pictures_[pictures_.size() - 2].stars, pictures_.back().stars);
+  if (images_.size() < 2) return std::nullopt;
+  return shift_of_stars(images_[images_.size() - 2].stars, images_.back().stars);
 }
 
 }  // namespace alidade

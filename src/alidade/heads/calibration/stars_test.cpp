@@ -6,7 +6,7 @@
 #include <string>
 
 #include "alidade/files/files.h"
-#include "alidade/heads/streams/fits_picture.h"
+#include "alidade/heads/streams/fits_image.h"
 #include "alidade/simulate/draws.h"
 
 namespace alidade {
@@ -35,19 +35,19 @@ std::string small_fits() {
   return bytes;
 }
 
-TEST(FitsPicture, ValuesAndTimes) {
-  const FitsPicture picture = read_fits(small_fits(), "test");
-  ASSERT_EQ(picture.width_px, 3);
-  ASSERT_EQ(picture.height_px, 2);
-  EXPECT_EQ(picture.values[0], 0.0);
-  EXPECT_EQ(picture.values[2], 256.0);
-  EXPECT_EQ(picture.values[3], 32768.0);
-  EXPECT_EQ(picture.values[4], 65535.0);
-  EXPECT_EQ(picture.exposure_s, 0.5);
-  EXPECT_NEAR(picture.begin_s, 1795536936.446, 1e-6);  // by `date -u -d 2026-11-24T16:15:36.446 +%s.%N`
+TEST(FitsImage, ValuesAndTimes) {
+  const FitsImage image = read_fits(small_fits(), "test");
+  ASSERT_EQ(image.width_px, 3);
+  ASSERT_EQ(image.height_px, 2);
+  EXPECT_EQ(image.values[0], 0.0);
+  EXPECT_EQ(image.values[2], 256.0);
+  EXPECT_EQ(image.values[3], 32768.0);
+  EXPECT_EQ(image.values[4], 65535.0);
+  EXPECT_EQ(image.exposure_s, 0.5);
+  EXPECT_NEAR(image.begin_s, 1795536936.446, 1e-6);  // by `date -u -d 2026-11-24T16:15:36.446 +%s.%N`
 }
 
-TEST(FitsPicture, WhatIsNoneIsRefused) {
+TEST(FitsImage, WhatIsNoneIsRefused) {
   const std::string whole = small_fits();
   EXPECT_THROW((void)read_fits(whole.substr(0, 2885), "test"), InputError);
   EXPECT_THROW((void)read_fits("", "test"), InputError);
@@ -61,7 +61,7 @@ TEST(Stars, AreFoundAgainByHowTheyLie) {
   Draws draws(4);
   std::vector<Eigen::Vector2d> sky;
   for (int i = 0; i < 200; ++i) sky.emplace_back(draws.uniform(-400.0, 1200.0), draws.uniform(-400.0, 1000.0));
-  const auto picture_at = [&](const Eigen::Vector2d& shift) {
+  const auto image_at = [&](const Eigen::Vector2d& shift) {
     cv::Mat grey(600, 800, CV_8U, cv::Scalar(10));
     for (const Eigen::Vector2d& star : sky) {
       const Eigen::Vector2d px = star + shift;
@@ -71,8 +71,8 @@ TEST(Stars, AreFoundAgainByHowTheyLie) {
     return grey;
   };
   StarTracks tracks;
-  const auto first = tracks.update(find_stars(picture_at({0, 0})), {0, 0});
-  const auto second = tracks.update(find_stars(picture_at({290.3, -140.6})), {0.1, 0});
+  const auto first = tracks.update(find_stars(image_at({0, 0})), {0, 0});
+  const auto second = tracks.update(find_stars(image_at({290.3, -140.6})), {0.1, 0});
   ASSERT_GT(first.size(), 20u);
   ASSERT_TRUE(tracks.last_shift());
   EXPECT_LT((tracks.last_shift()->shift_px - Eigen::Vector2d(290.3, -140.6)).norm(), 1.0);
@@ -86,7 +86,7 @@ TEST(Stars, AreFoundAgainByHowTheyLie) {
   EXPECT_GT(again, 10);
   const cv::Mat another = [&] {
     for (Eigen::Vector2d& star : sky) star = {draws.uniform(0.0, 800.0), draws.uniform(0.0, 600.0)};
-    return picture_at({0, 0});
+    return image_at({0, 0});
   }();
   EXPECT_TRUE(tracks.update(find_stars(another), {0.2, 0}).empty());
 }

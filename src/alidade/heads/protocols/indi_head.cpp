@@ -15,7 +15,7 @@ namespace {
 constexpr const char* where_it_is = "EQUATORIAL_EOD_COORD";
 constexpr double degrees_an_hour = 15.0;
 
-/// The mount tells where it is by itself, as often as it looks: what it told last counts, at the time when it came.
+/// The mount reports its position unasked, as often as it reads it: the last report counts, at its time of arrival.
 class IndiMount final : public HeadDevice {
  public:
   IndiMount(const std::string& url, const HeadOptions& options)
@@ -32,13 +32,13 @@ class IndiMount final : public HeadDevice {
 
   [[nodiscard]] HeadPosition position() override {
     link_.take(0.0);
-    const IndiProperty* place = link_.find(where_it_is);
-    if (place == nullptr) throw InputError(name() + ": no longer tells where it stands");
-    if (place->state == "Alert") throw InputError(name() + ": the mount reports a fault (Alert)");
-    const Eigen::Vector2d at = angles(*place);
+    const IndiProperty* coordinates = link_.find(where_it_is);
+    if (coordinates == nullptr) throw InputError(name() + ": no longer reports its position");
+    if (coordinates->state == "Alert") throw InputError(name() + ": the mount reports a fault (Alert)");
+    const Eigen::Vector2d at = angles(*coordinates);
     // While it moves it has to say so; at rest nothing new comes, and the old stays true.
-    const double old_s = clock_->now_s() - place->t_s;
-    if (place->state == "Busy" && old_s > silent_s)
+    const double old_s = clock_->now_s() - coordinates->t_s;
+    if (coordinates->state == "Busy" && old_s > silent_s)
       throw InputError(fmt::format("{}: moves and has said nothing for {:g} s", name(), silent_s));
     return {clock_->now_s(), 0.0, at};
   }
@@ -77,13 +77,13 @@ class IndiMount final : public HeadDevice {
       throw InputError(name() + ": the mount is parked; unpark it first");
   }
   /// Right ascension counts on beyond 24 h.
-  Eigen::Vector2d angles(const IndiProperty& place) {
+  Eigen::Vector2d angles(const IndiProperty& coordinates) {
     const auto value = [&](const char* member) {
-      const auto found = place.values.find(member);
-      return found == place.values.end() ? std::nan("") : sexagesimal(found->second);
+      const auto found = coordinates.values.find(member);
+      return found == coordinates.values.end() ? std::nan("") : sexagesimal(found->second);
     };
     Eigen::Vector2d at(value("RA") * degrees_an_hour * degree, value("DEC") * degree);
-    if (!at.allFinite()) throw InputError(name() + ": what it tells is no place in the sky");
+    if (!at.allFinite()) throw InputError(name() + ": reports no position in the sky");
     constexpr double turn = 2.0 * std::numbers::pi;
     if (has_last_) at[0] += turn * std::round((last_pan_ - at[0]) / turn);
     last_pan_ = at[0];

@@ -152,11 +152,11 @@ const IndiProperty* IndiLink::find(const std::string& property) const {
   return found == properties_.end() ? nullptr : &found->second;
 }
 
-const IndiProperty& IndiLink::wait_for(const std::string& property, double most_s,
+const IndiProperty& IndiLink::wait_for(const std::string& property, double max_s,
                                        const std::function<bool(const IndiProperty&)>& is_so) {
   constexpr double step_s = 0.05;
   const std::shared_ptr<HeadClock> clock = machine_clock();
-  for (const double until_s = clock->now_s() + most_s;;) {
+  for (const double until_s = clock->now_s() + max_s;;) {
     take(step_s);
     const IndiProperty* found = find(property);
     if (found != nullptr && (!is_so || is_so(*found))) return *found;
@@ -166,17 +166,17 @@ const IndiProperty& IndiLink::wait_for(const std::string& property, double most_
   for (const std::string& each : devices_) known += (known.empty() ? "" : ", ") + each;
   if (std::ranges::find(devices_, device_) == devices_.end())
     throw InputError(fmt::format("{}: no device '{}'; there are: {}", name(), device_, known.empty() ? "none" : known));
-  throw InputError(fmt::format("{}: '{}' says nothing of {} within {:g} s", name(), device_, property, most_s));
+  throw InputError(fmt::format("{}: '{}' says nothing of {} within {:g} s", name(), device_, property, max_s));
 }
 
-void IndiLink::connect_device(double most_s) {
+void IndiLink::connect_device(double max_s) {
   const auto is_on = [](const IndiProperty& property) {
     const auto found = property.values.find("CONNECT");
     return found != property.values.end() && found->second == "On";
   };
-  if (is_on(wait_for("CONNECTION", most_s))) return;
+  if (is_on(wait_for("CONNECTION", max_s))) return;
   set_switch("CONNECTION", "CONNECT");
-  (void)wait_for("CONNECTION", most_s, is_on);
+  (void)wait_for("CONNECTION", max_s, is_on);
 }
 
 void IndiLink::set_numbers(const std::string& property, const std::vector<std::pair<std::string, double>>& values) {

@@ -42,7 +42,7 @@ class IndiLink {
   /// Reads what has come; waits so long for the first of it.
   void take(double wait_s);
   /// Until the property is there. Throws InputError: it is not, within so many seconds.
-  const IndiProperty& wait_for(const std::string& property, double most_s,
+  const IndiProperty& wait_for(const std::string& property, double max_s,
                                const std::function<bool(const IndiProperty&)>& is_so = {});
   [[nodiscard]] const IndiProperty* find(const std::string& property) const;
   void set_numbers(const std::string& property, const std::vector<std::pair<std::string, double>>& values);
@@ -50,7 +50,7 @@ class IndiLink {
   void send(const std::string& xml) { socket_.write(xml); }
   void connect_again();
   /// The driver's connection with its device, where it has none. Throws InputError: not within so many seconds.
-  void connect_device(double most_s);
+  void connect_device(double max_s);
 
   [[nodiscard]] const std::string& device() const { return device_; }
   [[nodiscard]] const std::string& name() const { return socket_.address().name; }

@@ -35,10 +35,11 @@ bool is_ready(int socket, short what, double until_s) {
   }
 }
 
-int connected(const addrinfo& place, double until_s) {
-  const int socket = ::socket(place.ai_family, place.ai_socktype | SOCK_CLOEXEC | SOCK_NONBLOCK, place.ai_protocol);
+int connected(const addrinfo& endpoint, double until_s) {
+  const int socket =
+      ::socket(endpoint.ai_family, endpoint.ai_socktype | SOCK_CLOEXEC | SOCK_NONBLOCK, endpoint.ai_protocol);
   if (socket < 0) return -1;
-  int error = ::connect(socket, place.ai_addr, place.ai_addrlen) == 0 ? 0 : errno;
+  int error = ::connect(socket, endpoint.ai_addr, endpoint.ai_addrlen) == 0 ? 0 : errno;
   if (error == EINPROGRESS && is_ready(socket, POLLOUT, until_s)) {
     socklen_t size = sizeof error;
     ::getsockopt(socket, SOL_SOCKET, SO_ERROR, &error, &size);
@@ -101,10 +102,10 @@ void LineSocket::connect() {
   addrinfo* found = nullptr;
   const int error = ::getaddrinfo(address_.host.c_str(), std::to_string(address_.port).c_str(), &hints, &found);
   if (error != 0) fail(std::string("no such host: ") + ::gai_strerror(error));
-  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> places(found, &::freeaddrinfo);
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> endpoints(found, &::freeaddrinfo);
   const double until_s = steady_s() + timeout_s_;
-  for (const addrinfo* place = found; place != nullptr && socket_ < 0; place = place->ai_next)
-    socket_ = connected(*place, until_s);
+  for (const addrinfo* endpoint = found; endpoint != nullptr && socket_ < 0; endpoint = endpoint->ai_next)
+    socket_ = connected(*endpoint, until_s);
   if (socket_ < 0) fail("nobody answers at that address");
   const int on = 1;
   ::setsockopt(socket_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);

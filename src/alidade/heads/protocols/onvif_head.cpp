@@ -92,7 +92,7 @@ class OnvifHead final : public HeadDevice {
     const double asked_s = clock_->now_s();
     const OnvifStatus status = service_.status(profile_);
     const double answered_s = clock_->now_s();
-    if (!status.has_pan_tilt) throw InputError(name() + ": does not tell where it stands (GetStatus has no position)");
+    if (!status.has_pan_tilt) throw InputError(name() + ": does not report its position (GetStatus has none)");
     return {0.5 * (asked_s + answered_s), answered_s - asked_s, angles(status.x, status.y)};
   }
   HeadSent command(const Eigen::Vector2d& target) override {

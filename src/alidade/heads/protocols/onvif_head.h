@@ -12,7 +12,7 @@ namespace alidade {
 /// and `el` do, of x and y (without: ±180° and ±90°, and the limits count as not named). Throws InputError.
 [[nodiscard]] std::unique_ptr<HeadDevice> open_onvif(const std::string& url, const HeadOptions& options);
 
-/// Where the camera of such a URL says that its pictures are: rtsp://…, at the host that was given.
+/// Where the camera of such a URL says that its images are: rtsp://…, at the host that was given.
 [[nodiscard]] std::string onvif_stream_url(const std::string& url, const HeadOptions& options);
 
 }  // namespace alidade

@@ -73,10 +73,10 @@ std::string ptz_configuration(const std::string& tag, bool has_zoom) {
 
 /// Seconds of PT1.5S.
 double duration_of(const std::string& text) {
-  constexpr double usual_s = 10.0, most_s = 60.0;
+  constexpr double usual_s = 10.0, max_s = 60.0;
   if (!text.starts_with("PT")) return usual_s;
   const double value = std::strtod(text.c_str() + 2, nullptr);
-  return std::isfinite(value) && value > 0.0 ? std::min(value, most_s) : usual_s;
+  return std::isfinite(value) && value > 0.0 ? std::min(value, max_s) : usual_s;
 }
 
 }  // namespace
@@ -107,8 +107,8 @@ void OnvifCamera::check_user(const Call& call, double t_s) {
   bool is_known = user == config_.user && !nonce.empty() && age_s < window_s &&
                   digest == password_digest(base64_bytes(nonce), created, config_.password);
   const std::scoped_lock lock(mutex_);
-  constexpr std::size_t most_nonces = 100000;
-  if (is_known && nonces_.size() < most_nonces) is_known = nonces_.insert(nonce + created).second;
+  constexpr std::size_t max_nonces = 100000;
+  if (is_known && nonces_.size() < max_nonces) is_known = nonces_.insert(nonce + created).second;
   if (!is_known) throw OnvifFault{"ter:NotAuthorized", "Sender not Authorized"};
 }
 

@@ -12,7 +12,7 @@ struct OnvifServerConfig {
   std::string user, password;  ///< Who may ask; no user: everybody.
   std::string address = "127.0.0.1";
   int port = 80;           ///< Of its own, as it announces itself.
-  std::string stream_url;  ///< What GetStreamUri tells.
+  std::string stream_url;  ///< What GetStreamUri answers.
   int width_px = 320, height_px = 240;
 };
 

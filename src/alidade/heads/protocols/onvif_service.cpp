@@ -208,7 +208,7 @@ std::string OnvifService::stream_uri(const OnvifProfile& profile) {
                   schema_ns, escaped_xml(profile.token)));
   const std::string uri = text_in(answer, "Uri");
   const std::size_t scheme = uri.find("://");
-  if (scheme == std::string::npos) throw InputError(name() + ": names no stream of pictures");
+  if (scheme == std::string::npos) throw InputError(name() + ": names no video stream");
   std::size_t end = uri.find('/', scheme + 3);
   end = std::min(end, uri.size());
   const std::size_t colon = uri.rfind(':', end - 1);

@@ -39,11 +39,11 @@ bool begins_with_word(const std::string& line, std::string_view word) {
 }
 
 std::string chunked_body(LineSocket& socket) {
-  constexpr std::size_t most_bytes = 1 << 24;
+  constexpr std::size_t max_bytes = 1 << 24;
   std::string body;
   for (;;) {
     const std::size_t size = std::strtoul(socket.line().c_str(), nullptr, 16);
-    if (size == 0 || size > most_bytes || body.size() > most_bytes) return body;
+    if (size == 0 || size > max_bytes || body.size() > max_bytes) return body;
     body += socket.bytes(size);
     (void)socket.line();
   }
@@ -148,8 +148,8 @@ std::string soap_request(const UsernameToken& token, std::string_view body) {
 }
 
 HttpReply http_post(LineSocket& socket, const std::string& path, std::string_view body) {
-  constexpr std::size_t most_bytes = 1 << 24;
-  constexpr int most_lines = 200;
+  constexpr std::size_t max_bytes = 1 << 24;
+  constexpr int max_lines = 200;
   socket.close();
   socket.connect();
   const SocketAddress& address = socket.address();
@@ -164,11 +164,11 @@ HttpReply http_post(LineSocket& socket, const std::string& path, std::string_vie
   std::optional<std::size_t> length;
   bool is_chunked = false;
   std::string line = socket.line();
-  for (int i = 0; !line.empty() && i < most_lines; ++i, line = socket.line()) {
+  for (int i = 0; !line.empty() && i < max_lines; ++i, line = socket.line()) {
     if (begins_with_word(line, "content-length:")) length = std::strtoul(line.c_str() + 15, nullptr, 10);
     if (begins_with_word(line, "transfer-encoding:")) is_chunked = line.find("chunked") != std::string::npos;
   }
-  if (length && *length > most_bytes) throw InputError(address.name + ": sends what has no end");
+  if (length && *length > max_bytes) throw InputError(address.name + ": sends what has no end");
   reply.body = is_chunked ? chunked_body(socket) : length ? socket.bytes(*length) : socket.rest();
   socket.close();
   return reply;

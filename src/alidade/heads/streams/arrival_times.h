@@ -20,7 +20,7 @@ struct FilteredTime {
 class ArrivalTimes {
  public:
   /// `tick`: of the sender's clock, s; none: frames are counted, as of a camera with an even rate. Never later than
-  /// `came_s`. A stream that lost frames, or began anew, is found out by its delays and starts a new line.
+  /// `came_s`. A stream that lost frames, or began again, is found out by its delays and starts a new line.
   [[nodiscard]] FilteredTime add(double came_s, std::optional<double> tick = {});
 
  private:

@@ -54,8 +54,8 @@ class DecodedStream final : public FrameStream {
     auto image = std::make_shared<cv::Mat>(video_->height_px(), video_->width_px(), CV_8UC3);
     std::copy(bytes.begin(), bytes.end(), image->data);
     const FrameTime& time = video_->time();
-    constexpr double most_apart_s = 3600.0;
-    const bool is_given = std::isfinite(time.taken_s) && std::abs(time.taken_s - now_s) < most_apart_s;
+    constexpr double max_apart_s = 3600.0;
+    const bool is_given = std::isfinite(time.taken_s) && std::abs(time.taken_s - now_s) < max_apart_s;
     const bool is_device = name_.starts_with("v4l2:");
     const FilteredTime filtered =
         arrivals_.add(now_s, std::isfinite(time.media_s) ? std::optional(time.media_s) : std::nullopt);
@@ -64,7 +64,7 @@ class DecodedStream final : public FrameStream {
   }
 
   void read() {
-    constexpr std::size_t most_waiting = 200;
+    constexpr std::size_t max_waiting = 200;
     while (!ends_) {
       std::string fault = "has ended";
       try {
@@ -74,7 +74,7 @@ class DecodedStream final : public FrameStream {
           StreamFrame frame = frame_of(std::move(bytes), now_s);
           const std::scoped_lock lock(mutex_);
           frames_.push_back(std::move(frame));
-          if (frames_.size() > most_waiting) frames_.pop_front();
+          if (frames_.size() > max_waiting) frames_.pop_front();
           continue;
         }
       } catch (const InputError&) {

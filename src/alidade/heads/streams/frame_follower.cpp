@@ -38,7 +38,7 @@ void FrameFollower::push(StreamFrame frame) {
   changed_.notify_all();
 }
 
-/// Stamps that jump still tell how far frames are apart, between two jumps.
+/// Stamps that jump still show how far frames are apart, between two jumps.
 std::vector<SeenFrame> FrameFollower::timed() const {
   std::vector<SeenFrame> frames = seen_;
   if (!stamps_.is_jumping()) return frames;

@@ -80,12 +80,12 @@ void draw_board(const SimulatedCamera& simulated, const Eigen::Quaterniond& base
   scene.camera.width_px = simulated.width_px;
   scene.camera.height_px = simulated.height_px;
   scene.camera.lens = lens;
-  const Eigen::Vector3d middle = 0.5 * (scene.points_in_board.front() + scene.points_in_board.back());
+  const Eigen::Vector3d centre = 0.5 * (scene.points_in_board.front() + scene.points_in_board.back());
   const Eigen::Quaterniond cam_from_board =
       base_from_cam.conjugate() *
       base_from_cam_rotation(Eigen::Vector3d(simulated.board_rad[0], simulated.board_rad[1], 0.0));
   scene.cam_from_board.push_back(
-      {cam_from_board, cam_from_board * (simulated.board_m * Eigen::Vector3d::UnitZ() - middle)});
+      {cam_from_board, cam_from_board * (simulated.board_m * Eigen::Vector3d::UnitZ() - centre)});
   std::vector<cv::Point> outline, hull;
   for (const Eigen::Vector3d& point : visible_outline(scene)) {
     const auto px = project(scene.camera, scene.cam_from_board[0] * point);
@@ -119,7 +119,7 @@ std::vector<double> numbers_in(const std::string& text, const char* separators) 
 SimulatedCamera simulated_camera(const std::string& text, const std::string& where) {
   SimulatedCamera camera;
   double seed = 1.0;
-  const std::map<std::string, double*> places{
+  const std::map<std::string, double*> entries{
       {"fx", &camera.fx},       {"fy", &camera.fy},   {"cx", &camera.cx},       {"cy", &camera.cy},
       {"k1", &camera.k1},       {"fps", &camera.fps}, {"noise", &camera.noise}, {"delay", &camera.delay_s},
       {"jump", &camera.jump_s}, {"seed", &seed}};
@@ -148,8 +148,8 @@ SimulatedCamera simulated_camera(const std::string& text, const std::string& whe
       camera.board_rad = Eigen::Vector2d(numbers[4], numbers[5]) * degree;
     } else if (key == "mount" && numbers.size() == 3) {
       camera.mount_rad = Eigen::Vector3d(numbers[0], numbers[1], numbers[2]) * degree;
-    } else if (const auto place = places.find(key); place != places.end() && numbers.size() == 1) {
-      *place->second = numbers[0];
+    } else if (const auto entry = entries.find(key); entry != entries.end() && numbers.size() == 1) {
+      *entry->second = numbers[0];
     } else {
       throw InputError(
           fmt::format("{}: '{}' is nothing that a simulated camera has; it has size=320x240, fx, fy, cx, "
@@ -194,12 +194,12 @@ double stamp_of(const SimulatedCamera& camera, double t_s) {
 }
 
 std::string with_secret(const std::string& text, const std::string& password) {
-  constexpr std::string_view place = "{password}";
+  constexpr std::string_view mark = "{password}";
   std::string filled = text;
-  const std::size_t at = filled.find(place);
+  const std::size_t at = filled.find(mark);
   if (at == std::string::npos) return filled;
   if (password.empty()) throw InputError(text + ": no password was given: --password-file, or ALIDADE_PASSWORD");
-  return filled.replace(at, place.size(), password);
+  return filled.replace(at, mark.size(), password);
 }
 
 namespace {

@@ -29,14 +29,14 @@ struct StreamFrame {
   std::shared_ptr<const cv::Mat> image;  ///< 8 bits, grey or BGR.
 };
 
-/// Frames of a camera as they come. Throws InputError: nobody answers, no pictures, the stream is lost.
+/// Frames of a camera as they come. Throws InputError: nobody answers, no images, the stream is lost.
 class FrameStream {
  public:
   virtual ~FrameStream() = default;
   /// Those that have come since the last call; never waits.
   [[nodiscard]] virtual std::deque<StreamFrame> take() = 0;
   [[nodiscard]] virtual const std::string& name() const = 0;
-  /// Of pictures that are exposed one by one, as a telescope's are; 0: a video.
+  /// Of images that are exposed one by one, as a telescope's are; 0: a video.
   [[nodiscard]] virtual double exposure_s() const { return 0.0; }
 };
 
@@ -88,7 +88,7 @@ class CameraRenderer {
                                                        const HeadOptions& options = {});
 
 /// Motion JPEG over HTTP, read by a thread of its own: multipart/x-mixed-replace, each part a JPEG. X-Timestamp of a
-/// part, seconds since 1970, is when it was taken; `url` with {password} in the place of it.
+/// part, seconds since 1970, is when it was taken; `url` with {password} instead of it.
 [[nodiscard]] std::unique_ptr<FrameStream> open_mjpeg(const std::string& url, const std::string& password,
                                                       std::shared_ptr<HeadClock> clock);
 
@@ -96,7 +96,7 @@ class CameraRenderer {
 [[nodiscard]] std::unique_ptr<FrameStream> open_decoded(const std::string& url, const std::string& password,
                                                         std::shared_ptr<HeadClock> clock);
 
-/// A camera behind INDI's server, which exposes one picture after the other, each `?seconds=` long (1 if it is not
+/// A camera behind INDI's server, which exposes one image after the other, each `?seconds=` long (1 if it is not
 /// given).
 [[nodiscard]] std::unique_ptr<FrameStream> open_indi_camera(const std::string& url, std::shared_ptr<HeadClock> clock);
 

@@ -10,7 +10,7 @@
 #include "alidade/files/files.h"
 #include "alidade/heads/protocols/indi_link.h"
 #include "alidade/heads/protocols/soap.h"
-#include "alidade/heads/streams/fits_picture.h"
+#include "alidade/heads/streams/fits_image.h"
 #include "alidade/heads/streams/frame_stream.h"
 
 namespace alidade {
@@ -31,7 +31,7 @@ double seconds_of(const std::string& url) {
   return seconds;
 }
 
-/// Exposes one picture after the other, on a thread of its own. A picture's time is the middle of its exposure, as the
+/// Exposes one image after the other, on a thread of its own. An image's time is the midpoint of its exposure, as the
 /// server's clock has it.
 class IndiCamera final : public FrameStream {
  public:
@@ -71,14 +71,14 @@ class IndiCamera final : public FrameStream {
   }
 
   void read() {
-    constexpr std::size_t most_waiting = 20;
+    constexpr std::size_t max_waiting = 20;
     while (!ends_) {
       try {
         std::optional<StreamFrame> frame = expose();
         if (!frame) return;
         const std::scoped_lock lock(mutex_);
         frames_.push_back(std::move(*frame));
-        if (frames_.size() > most_waiting) frames_.pop_front();
+        if (frames_.size() > max_waiting) frames_.pop_front();
       } catch (const InputError& error) {
         if (connects_again()) continue;
         const std::scoped_lock lock(mutex_);
@@ -100,7 +100,7 @@ class IndiCamera final : public FrameStream {
       if (const IndiProperty* state = link_.find(exposure); state != nullptr && state->state == "Alert")
         throw InputError(fmt::format("{}: '{}' does not expose (Alert)", name(), link_.device()));
     }
-    throw InputError(fmt::format("{}: no picture within {:g} s", name(), seconds_ + download_s));
+    throw InputError(fmt::format("{}: no image within {:g} s", name(), seconds_ + download_s));
   }
   /// That came with bytes: the property's definition has none.
   [[nodiscard]] std::size_t num_blobs() const {
@@ -109,17 +109,17 @@ class IndiCamera final : public FrameStream {
   }
 
   [[nodiscard]] StreamFrame frame_of(const IndiProperty& blob) const {
-    constexpr double most_apart_s = 3600.0;
+    constexpr double max_apart_s = 3600.0;
     if (blob.format != ".fits")
-      throw InputError(fmt::format("{}: sends pictures as {}; let '{}' send FITS, not compressed", name(), blob.format,
+      throw InputError(fmt::format("{}: sends images as {}; let '{}' send FITS, not compressed", name(), blob.format,
                                    link_.device()));
     std::string text;
     for (const auto& [member, value] : blob.values) text = value;
-    const FitsPicture picture = read_fits(base64_bytes(text), name());
-    const double exposed_s = std::isfinite(picture.exposure_s) ? picture.exposure_s : seconds_;
-    auto grey = std::make_shared<const cv::Mat>(stretched_to_grey(picture));
-    const double stamp_s = picture.begin_s + 0.5 * exposed_s;
-    if (std::isfinite(stamp_s) && std::abs(stamp_s - blob.t_s) < most_apart_s)
+    const FitsImage image = read_fits(base64_bytes(text), name());
+    const double exposed_s = std::isfinite(image.exposure_s) ? image.exposure_s : seconds_;
+    auto grey = std::make_shared<const cv::Mat>(stretched_to_grey(image));
+    const double stamp_s = image.begin_s + 0.5 * exposed_s;
+    if (std::isfinite(stamp_s) && std::abs(stamp_s - blob.t_s) < max_apart_s)
       return {stamp_s, FrameTimes::stamped, 0.0, blob.t_s, std::move(grey)};
     return {blob.t_s - 0.5 * exposed_s, FrameTimes::arrival, 0.1, blob.t_s, std::move(grey)};
   }

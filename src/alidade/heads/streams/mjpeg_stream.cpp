@@ -21,7 +21,7 @@ namespace alidade {
 namespace {
 
 constexpr double first_timeout_s = 5.0;  // until the first frame
-constexpr std::size_t most_bytes = 1 << 24;
+constexpr std::size_t max_bytes = 1 << 24;
 
 std::string lower(std::string text) {
   std::ranges::transform(text, text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -72,7 +72,7 @@ class MjpegStream final : public FrameStream {
     bool is_multipart = false;
     for (std::string line = socket_.line(); !line.empty(); line = socket_.line())
       is_multipart = is_multipart || lower(line).starts_with("content-type: multipart/x-mixed-replace");
-    if (!is_multipart) throw InputError(name_ + ": is no stream of JPEG pictures (multipart/x-mixed-replace)");
+    if (!is_multipart) throw InputError(name_ + ": is no stream of JPEG images (multipart/x-mixed-replace)");
   }
 
   /// Waits for the next one, at most the socket's timeout.
@@ -88,7 +88,7 @@ class MjpegStream final : public FrameStream {
       if (line.starts_with("content-length:")) length = std::strtoul(line.c_str() + 15, nullptr, 10);
       if (line.starts_with("x-timestamp:")) stamp = std::strtod(line.c_str() + 12, nullptr);
     }
-    if (!length || *length == 0 || *length > most_bytes)
+    if (!length || *length == 0 || *length > max_bytes)
       throw InputError(name_ + ": a part of the stream does not say how long it is");
     const std::string jpeg = socket_.bytes(*length);
     const double now_s = clock_->now_s();
@@ -103,14 +103,14 @@ class MjpegStream final : public FrameStream {
 
   void read() {
     constexpr double silence_s = 1.0;
-    constexpr std::size_t most_waiting = 200;
+    constexpr std::size_t max_waiting = 200;
     socket_.set_timeout(silence_s);
     while (!ends_) {
       try {
         StreamFrame frame = next();
         const std::scoped_lock lock(mutex_);
         frames_.push_back(std::move(frame));
-        if (frames_.size() > most_waiting) frames_.pop_front();
+        if (frames_.size() > max_waiting) frames_.pop_front();
       } catch (const InputError& error) {
         if (connects_again()) continue;
         const std::scoped_lock lock(mutex_);

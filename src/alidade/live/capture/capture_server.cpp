@@ -20,9 +20,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t max_pages = 8;
-constexpr std::size_t max_message_bytes = 64u << 20;  // a picture of 60 megapixels
+constexpr std::size_t max_message_bytes = 64u << 20;  // an image of 60 megapixels
 constexpr std::size_t header_bytes = 16;
-constexpr int max_pictures_per_s = 120, max_side_px = 16384;
+constexpr int max_images_per_s = 120, max_side_px = 16384;
 constexpr std::size_t max_waiting = 64;  // messages for one page
 
 std::uint32_t number_at(std::string_view bytes, std::size_t at) {
@@ -33,14 +33,14 @@ std::uint32_t number_at(std::string_view bytes, std::size_t at) {
 
 }  // namespace
 
-std::optional<SentPicture> sent_picture(std::string_view message) {
+std::optional<SentImage> sent_image(std::string_view message) {
   constexpr std::uint32_t magic = 0x31594441;  // "ADY1"
   if (message.size() < header_bytes || number_at(message, 0) != magic) return std::nullopt;
   const std::uint32_t width = number_at(message, 4), height = number_at(message, 8);
   const bool has_size = width >= 1 && height >= 1 && width <= max_side_px && height <= max_side_px;
   if (!has_size || message.size() - header_bytes != std::size_t{width} * height) return std::nullopt;
-  return SentPicture{static_cast<int>(width), static_cast<int>(height), number_at(message, 12) == 1,
-                     std::string(message.substr(header_bytes))};
+  return SentImage{static_cast<int>(width), static_cast<int>(height), number_at(message, 12) == 1,
+                   std::string(message.substr(header_bytes))};
 }
 
 bool is_own_origin(std::string_view origin, std::string_view address, std::uint16_t port,
@@ -65,7 +65,7 @@ struct CaptureServer::State : WebSite {
 
   std::mutex mutex;  ///< Of what pages sent.
   std::condition_variable has_come;
-  std::optional<SentPicture> picture;
+  std::optional<SentImage> image;
   std::vector<PageCommand> asked;
   WebHost host;  // last: its thread uses the others
 
@@ -95,8 +95,8 @@ class Page : public SocketUser {
     waiting_.push_back({.is_text = is_text, .head = std::move(message), .body = nullptr});
     if (socket != nullptr) socket->write();
   }
-  /// A picture that waits already is not joined by another.
-  [[nodiscard]] bool takes_picture() const {
+  /// An image that waits already is not joined by another.
+  [[nodiscard]] bool takes_image() const {
     return std::ranges::all_of(waiting_, [](const Outgoing& one) { return one.is_text; });
   }
 
@@ -114,18 +114,18 @@ class Page : public SocketUser {
   /// False: what no page of ours sends.
   bool hear(std::string_view data, bool is_text) override {
     if (is_text) return hear_text(data);
-    std::optional<SentPicture> picture = sent_picture(data);
-    if (!picture || !is_within_rate()) return false;
+    std::optional<SentImage> image = sent_image(data);
+    if (!image || !is_within_rate()) return false;
     if (!server_.is_in_control(*this)) return true;
     const std::scoped_lock lock(server_.mutex);
-    server_.picture = std::move(picture);
+    server_.image = std::move(image);
     server_.has_come.notify_all();
     return true;
   }
 
  private:
   bool hear_text(std::string_view text) {
-    constexpr std::size_t most = 1024, most_asked = 64;
+    constexpr std::size_t most = 1024, max_asked = 64;
     if (text.size() > most) return false;
     const auto json = nlohmann::json::parse(text, nullptr, false);
     if (!json.is_object() || !json.contains("op") || !json["op"].is_string()) return false;
@@ -133,7 +133,7 @@ class Page : public SocketUser {
     PageCommand command{json["op"].get<std::string>()};
     if (json.contains("value") && json["value"].is_number()) command.value = json["value"].get<double>();
     const std::scoped_lock lock(server_.mutex);
-    if (server_.asked.size() < most_asked) server_.asked.push_back(std::move(command));
+    if (server_.asked.size() < max_asked) server_.asked.push_back(std::move(command));
     server_.has_come.notify_all();
     return true;
   }
@@ -143,7 +143,7 @@ class Page : public SocketUser {
       second_ = now;
       num_in_second_ = 0;
     }
-    return ++num_in_second_ <= max_pictures_per_s;
+    return ++num_in_second_ <= max_images_per_s;
   }
 
   CaptureServer::State& server_;
@@ -187,11 +187,11 @@ std::string CaptureServer::url() const { return state_->host.url(state_->token);
 
 std::size_t CaptureServer::num_clients() const { return state_->num_pages; }
 
-std::optional<SentPicture> CaptureServer::wait_for_picture(std::chrono::milliseconds most) {
+std::optional<SentImage> CaptureServer::wait_for_image(std::chrono::milliseconds most) {
   State& state = *state_;
   std::unique_lock lock(state.mutex);
-  state.has_come.wait_for(lock, most, [&] { return state.picture || !state.asked.empty(); });
-  return std::exchange(state.picture, std::nullopt);
+  state.has_come.wait_for(lock, most, [&] { return state.image || !state.asked.empty(); });
+  return std::exchange(state.image, std::nullopt);
 }
 
 std::vector<PageCommand> CaptureServer::commands() {
@@ -209,7 +209,7 @@ void CaptureServer::tell(std::string json, const std::string& kind) {
 void CaptureServer::show(std::string jpeg, bool also_control) {
   state_->host.post([&state = *state_, jpeg = std::move(jpeg), also_control] {
     for (const auto& page : std::vector(state.pages)) {
-      if ((also_control || !state.is_in_control(*page)) && page->takes_picture()) page->send(jpeg, false);
+      if ((also_control || !state.is_in_control(*page)) && page->takes_image()) page->send(jpeg, false);
     }
   });
 }

@@ -13,8 +13,8 @@
 
 namespace alidade::live {
 
-/// A picture as a page sends it: 8-bit grey, row by row.
-struct SentPicture {
+/// An image as a page sends it: 8-bit grey, row by row.
+struct SentImage {
   int width_px = 0, height_px = 0;
   bool is_exact = false;  ///< The camera's own values; else as a canvas draws them.
   std::string grey;
@@ -26,9 +26,9 @@ struct PageCommand {
   std::optional<double> value = {};
 };
 
-/// The picture of a message: u32 'ADY1', u32 width, u32 height, u32 exact, little-endian, then the grey values. None
-/// where the message is something else, or its size is not that of its picture.
-[[nodiscard]] std::optional<SentPicture> sent_picture(std::string_view message);
+/// The image of a message: u32 'ADY1', u32 width, u32 height, u32 exact, little-endian, then the grey values. None
+/// where the message is something else, or its size is not that of its image.
+[[nodiscard]] std::optional<SentImage> sent_image(std::string_view message);
 
 /// Whether an Origin header is that of a page of this server: "http://127.0.0.1:8765". Programs send none.
 [[nodiscard]] bool is_own_origin(std::string_view origin, std::string_view address, std::uint16_t port,
@@ -40,9 +40,9 @@ struct CaptureServerConfig {
   std::function<HttpAnswer(std::string_view path)> get;  ///< Called by the server's thread.
 };
 
-/// The server of a capture: a page, and the socket /capture by which it sends pictures and is told what they show. It
+/// The server of a capture: a page, and the socket /capture by which it sends images and receives what they show. It
 /// writes, so everything asks for the token, the Host and, of browsers, the Origin: 403 without. One page is in
-/// control, others watch; of pictures the newest waits, none is queued; too large ones, or too many, end a connection.
+/// control, others watch; of images the newest waits, none is queued; too large ones, or too many, end a connection.
 class CaptureServer {
  public:
   /// Listens. Throws InputError where that cannot be.
@@ -55,13 +55,13 @@ class CaptureServer {
   [[nodiscard]] std::string url() const;
   [[nodiscard]] std::size_t num_clients() const;
 
-  /// The newest picture of the page in control that was not given yet; waits for one, not longer than that.
-  [[nodiscard]] std::optional<SentPicture> wait_for_picture(std::chrono::milliseconds most);
+  /// The newest image of the page in control that was not given yet; waits for one, not longer than that.
+  [[nodiscard]] std::optional<SentImage> wait_for_image(std::chrono::milliseconds most);
   /// What the page in control has asked for since, in order.
   [[nodiscard]] std::vector<PageCommand> commands();
   /// A message for all pages. `kind`: one of each kind is kept for pages that come later; empty: none.
   void tell(std::string json, const std::string& kind = "");
-  /// A JPEG for the pages that do not send pictures themselves.
+  /// A JPEG for the pages that do not send images themselves.
   void show(std::string jpeg, bool also_control);
   /// Waits until what was sent is out and all pages have left; not longer.
   void finish(double max_s);

@@ -14,9 +14,9 @@ namespace alidade::live {
 namespace {
 
 constexpr double without_board_s = 60.0;
-constexpr double frozen_s = 5.0;      // of a video: the same picture to the bit
-constexpr int frozen_pictures = 5;    // of a folder: one after the other
-constexpr int enough_of_another = 3;  // pictures of another board in a row
+constexpr double frozen_s = 5.0;      // of a video: the same image to the bit
+constexpr int frozen_images = 5;      // of a folder: one after the other
+constexpr int enough_of_another = 3;  // images of another board in a row
 
 std::uint64_t sum_of(const cv::Mat& grey) {
   std::uint64_t sum = 14695981039346656037ull;
@@ -58,11 +58,11 @@ void CaptureSession::note(const CaptureLook& look, const cv::Mat& grey, double t
   last_sum_ = sum;
   num_same_ = is_same ? num_same_ + 1 : 1;
   if (!is_same) same_since_s_ = t_s;
-  const bool is_frozen = config_.is_video ? t_s - *same_since_s_ >= frozen_s : num_same_ >= frozen_pictures;
-  if (is_frozen) tell_once("the stream is frozen: the same picture again and again, to the bit");
-  const bool has_board = look.sight != Sight::nothing && look.sight != Sight::other_board;
+  const bool is_frozen = config_.is_video ? t_s - *same_since_s_ >= frozen_s : num_same_ >= frozen_images;
+  if (is_frozen) tell_once("the stream is frozen: the same image again and again, to the bit");
+  const bool has_board = look.status != LookStatus::nothing && look.status != LookStatus::other_board;
   if (!board_seen_s_ || has_board) board_seen_s_ = t_s;
-  num_other_ = look.sight == Sight::other_board ? num_other_ + 1 : 0;
+  num_other_ = look.status == LookStatus::other_board ? num_other_ + 1 : 0;
   if (num_other_ >= enough_of_another) {
     tell_once(fmt::format("{}; if it is the one to calibrate with: --board {}x{} (inner corners)", look.words,
                           look.other_cols, look.other_rows));
@@ -92,16 +92,16 @@ CaptureSession::Seen CaptureSession::see(const cv::Mat& grey, double t_s, bool i
 
 CaptureSession::Seen CaptureSession::look_back(double t_s) {
   Seen seen{guide_.look_back(t_s), ""};
-  if (seen.look.earlier && seen.look.earlier->picture) act(seen, *seen.look.earlier->picture, t_s, all_exact_);
+  if (seen.look.earlier && seen.look.earlier->image) act(seen, *seen.look.earlier->image, t_s, all_exact_);
   return seen;
 }
 
 void CaptureSession::act(Seen& seen, const cv::Mat& grey, double t_s, bool is_exact) {
   if (!seen.look.take() || is_paused_) return;
-  const std::optional<EarlierPicture>& earlier = seen.look.earlier;
-  const std::string reason = earlier ? keep(*earlier->picture, earlier->t_s, all_exact_) : keep(grey, t_s, is_exact);
+  const std::optional<EarlierImage>& earlier = seen.look.earlier;
+  const std::string reason = earlier ? keep(*earlier->image, earlier->t_s, all_exact_) : keep(grey, t_s, is_exact);
   if (!reason.empty()) {
-    seen.look.sight = Sight::little;
+    seen.look.status = LookStatus::little;
     seen.look.words = seen.look.words_mirrored = reason;
   } else {
     seen.file = kept_.photos().back().file;

@@ -11,14 +11,14 @@
 
 namespace alidade::live {
 
-/// One capture: pictures come in, photos stay on disk, and the person is told. Knows no window and no network.
+/// One capture: images come in, photos stay on disk, and the user is informed. Knows no window and no network.
 class CaptureSession {
  public:
   /// `tell`: a line for the person; said once each, however often it is found again.
   CaptureSession(const Board& board, const CaptureConfig& config, KeptPhotos photos,
                  std::function<void(const std::string&)> tell);
 
-  /// A picture, 8-bit grey, of that time [s since the capture began]. It is kept where it is to be; `file` then names
+  /// An image, 8-bit grey, of that time [s since the capture began]. It is kept where it is to be; `file` then names
   /// it. `is_again`: it was seen before, and says nothing of the stream.
   struct Seen {
     CaptureLook look;
@@ -57,7 +57,7 @@ class CaptureSession {
   std::function<void(const std::string&)> tell_;
   std::vector<std::string> given_;
   bool is_paused_ = false, has_warned_ = false;
-  bool all_exact_ = true;  ///< All pictures so far: which of them an earlier one was is not asked.
+  bool all_exact_ = true;  ///< All images so far: which of them an earlier one was is not asked.
   double begin_s_ = 0.0;
   std::size_t checked_at_ = 0;  ///< Photos when the whole job was last run.
   std::optional<double> board_seen_s_, same_since_s_;

@@ -11,7 +11,7 @@ GrowingFolder::GrowingFolder(std::filesystem::path folder) : folder_(std::move(f
   std::error_code ignored;
   if (std::filesystem::is_directory(folder_, ignored)) return;
   const bool is_file = std::filesystem::exists(folder_, ignored);
-  throw InputError(folder_.string() + (is_file ? ": is a file; pictures come from a folder" : ": no such folder"));
+  throw InputError(folder_.string() + (is_file ? ": is a file; images come from a folder" : ": no such folder"));
 }
 
 std::vector<std::filesystem::path> GrowingFolder::newcomers() {

@@ -43,7 +43,7 @@ Shot ShotSession::measured(const cv::Mat& grey, double range_m) const {
   photos.spot.colour = config_.spot;
   const auto seen = look_at_photos(
       shots, [&grey](const std::string&) { return grey; }, camera_, photos);
-  if (!seen.front().fault.empty()) shots.front().no_board = "the picture " + seen.front().fault;
+  if (!seen.front().fault.empty()) shots.front().no_board = "the image " + seen.front().fault;
   return std::move(shots.front());
 }
 

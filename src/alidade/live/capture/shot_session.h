@@ -10,7 +10,7 @@
 
 namespace alidade::live {
 
-/// Shots of a rangefinder while they are taken: a picture of the board and what the rangefinder read. On disk are
+/// Shots of a rangefinder while they are taken: an image of the board and what the rangefinder read. On disk are
 /// FOLDER/photos and FOLDER/shots.csv (range_m, photo), whole after each shot: `alidade rangefinder shots.csv` gives
 /// the same beam afterwards. Knows no window and no network.
 class ShotSession {
@@ -19,9 +19,9 @@ class ShotSession {
   /// cannot be, InputError for shots that cannot be read.
   ShotSession(const Camera& camera, const RangefinderConfig& config, const ShotConfig& where, KeptPhotos photos);
 
-  /// A first look at a picture: the board in it, or why there is none.
+  /// A first look at an image: the board in it, or why there is none.
   [[nodiscard]] QuickLook look(const cv::Mat& grey) { return looker_.look(grey); }
-  /// Keeps a picture with its reading, and solves. Why not, or "".
+  /// Keeps an image with its reading, and solves. Why not, or "".
   std::string take(const cv::Mat& grey, double t_s, bool is_exact, double range_m);
   bool undo();
 
@@ -38,7 +38,7 @@ class ShotSession {
     std::string photo;
   };
   void go_on();
-  /// The shot of a picture: board and spot as the whole job finds them. Empty `board`, with why, where it has none.
+  /// The shot of an image: board and spot as the whole job finds them. Empty `board`, with why, where it has none.
   [[nodiscard]] Shot measured(const cv::Mat& grey, double range_m) const;
   void write_table() const;
 

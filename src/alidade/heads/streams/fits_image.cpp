@@ -1,4 +1,4 @@
-#include "alidade/heads/streams/fits_picture.h"
+#include "alidade/heads/streams/fits_image.h"
 
 #include <algorithm>
 #include <array>
@@ -43,7 +43,7 @@ std::map<std::string, std::string> read_cards(std::string_view bytes, const std:
                                 : value.find('/');
     cards[key] = trimmed(value.substr(0, end));
   }
-  throw InputError(where + ": a picture that is no FITS");
+  throw InputError(where + ": an image that is no FITS");
 }
 
 double number_of(const std::map<std::string, std::string>& cards, const std::string& key, double otherwise) {
@@ -95,7 +95,7 @@ Reader reader_of(int bits) {
 
 }  // namespace
 
-FitsPicture read_fits(std::string_view bytes, const std::string& where) {
+FitsImage read_fits(std::string_view bytes, const std::string& where) {
   constexpr double largest = 30000.0;
   std::size_t header = 0;
   const auto cards = read_cards(bytes, where, header);
@@ -103,28 +103,28 @@ FitsPicture read_fits(std::string_view bytes, const std::string& where) {
   const int bits = static_cast<int>(number_of(cards, "BITPIX", 0.0));
   const Reader read = reader_of(bits);
   if (!(width >= 1.0 && height >= 1.0 && width <= largest && height <= largest) || read == nullptr)
-    throw InputError(where + ": a FITS file without a picture");
+    throw InputError(where + ": a FITS file without an image");
   const std::size_t a_pixel = static_cast<std::size_t>(std::abs(bits)) / 8;
-  FitsPicture picture{.width_px = static_cast<int>(width), .height_px = static_cast<int>(height), .values = {}};
-  const std::size_t total = static_cast<std::size_t>(picture.width_px) * static_cast<std::size_t>(picture.height_px);
+  FitsImage image{.width_px = static_cast<int>(width), .height_px = static_cast<int>(height), .values = {}};
+  const std::size_t total = static_cast<std::size_t>(image.width_px) * static_cast<std::size_t>(image.height_px);
   if (bytes.size() < header + total * a_pixel)
-    throw InputError(where + ": a FITS file that ends before its picture does");
+    throw InputError(where + ": a FITS file that ends before its image does");
   const double scale = number_of(cards, "BSCALE", 1.0), zero = number_of(cards, "BZERO", 0.0);
   const char* at = bytes.data() + header;
-  picture.values.resize(total);
-  for (double& value : picture.values) {
+  image.values.resize(total);
+  for (double& value : image.values) {
     value = scale * read(at) + zero;
     at += a_pixel;
   }
   const auto date = cards.find("DATE-OBS");
-  picture.begin_s = seconds_of(date == cards.end() ? "" : date->second);
-  picture.exposure_s = number_of(cards, "EXPTIME", std::numeric_limits<double>::quiet_NaN());
-  return picture;
+  image.begin_s = seconds_of(date == cards.end() ? "" : date->second);
+  image.exposure_s = number_of(cards, "EXPTIME", std::numeric_limits<double>::quiet_NaN());
+  return image;
 }
 
-cv::Mat stretched_to_grey(const FitsPicture& picture) {
+cv::Mat stretched_to_grey(const FitsImage& image) {
   constexpr double few = 3e-5, below = 0.05;
-  std::vector<double> sorted = picture.values;
+  std::vector<double> sorted = image.values;
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
   std::nth_element(sorted.begin(), middle, sorted.end());
   const double sky = *middle;
@@ -132,7 +132,7 @@ cv::Mat stretched_to_grey(const FitsPicture& picture) {
   std::nth_element(sorted.begin(), bright, sorted.end());
   const double span = std::max(1.0, *bright - sky), low = sky - below * span;
   cv::Mat grey;
-  cv::Mat(picture.height_px, picture.width_px, CV_64F, const_cast<double*>(picture.values.data()))
+  cv::Mat(image.height_px, image.width_px, CV_64F, const_cast<double*>(image.values.data()))
       .convertTo(grey, CV_8U, 255.0 / (1.0 + below) / span, -low * 255.0 / (1.0 + below) / span);
   return grey;
 }

@@ -10,8 +10,8 @@ class Mat;
 
 namespace alidade {
 
-/// A picture of a FITS file, and what its header says of when it was taken.
-struct FitsPicture {
+/// An image of a FITS file, and what its header says of when it was taken.
+struct FitsImage {
   int width_px = 0, height_px = 0;
   std::vector<double> values;  ///< BSCALE · stored + BZERO, row by row as in the file.
   double begin_s = 0.0;        ///< DATE-OBS, seconds since 1970; NaN: not said.
@@ -21,9 +21,9 @@ struct FitsPicture {
 /// The primary array of a FITS file; of several planes the first. Throws InputError, which begins with `where`: no
 /// FITS, or not all of it.
 /// Pence et al., "Definition of the Flexible Image Transport System, version 3.0", 2010.
-[[nodiscard]] FitsPicture read_fits(std::string_view bytes, const std::string& where);
+[[nodiscard]] FitsImage read_fits(std::string_view bytes, const std::string& where);
 
 /// 8 bits: from the sky's grey, and a little below it, to what all but a few pixels are darker than.
-[[nodiscard]] cv::Mat stretched_to_grey(const FitsPicture& picture);
+[[nodiscard]] cv::Mat stretched_to_grey(const FitsImage& image);
 
 }  // namespace alidade

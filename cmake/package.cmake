@@ -13,7 +13,7 @@ target_compile_features(alidade_shared INTERFACE cxx_std_20)
 target_include_directories(alidade_shared INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>
                                                     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 target_link_libraries(alidade_shared PUBLIC Eigen3::Eigen
-                                     PRIVATE ${opencv_libraries} ${picture_libraries} TBB::tbb yaml-cpp fmt::fmt Threads::Threads)
+                                     PRIVATE ${opencv_libraries} ${image_libraries} TBB::tbb yaml-cpp fmt::fmt Threads::Threads)
 if(TARGET pugixml::pugixml)
   target_link_libraries(alidade_shared PRIVATE pugixml::pugixml)
 endif()

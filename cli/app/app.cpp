@@ -56,7 +56,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-/// "; did you mean 'WORD'?" for the nearest of the known words, if one is near: one slip in three letters, dashes
+/// "; did you mean 'WORD'?" for the nearest of the known words, if one is near: one typo in three letters, dashes
 /// aside.
 std::string suggestion(const std::string& word, const std::vector<std::string>& known) {
   const std::string* nearest = nullptr;

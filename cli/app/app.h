@@ -60,7 +60,7 @@ class App {
   [[nodiscard]] const std::string& first_word() const;
   void set_first_word(const std::string& word);
 
-  /// The commands with their options, for another door than the command line. Once for an App.
+  /// The commands with their options, for another front end than the command line. Once for an App.
   [[nodiscard]] std::vector<CommandInfo> commands();
   /// Runs a command in a program, which gets what the command would have written: `words` as they are typed, without
   /// the executable. Throws UsageError, ConfigError and InputError with the line that the command would print,

@@ -56,7 +56,7 @@ FieldList fields_of(CalibrateArgs& args) {
        .value = &args.corners,
        .help = "Corners instead of photos: CSV photo,corner,u_px,v_px[,sigma_u_px,sigma_v_px]",
        .form = "FILE"},
-      {.name = "skip_bad", .value = &args.skip_bad, .help = "Leave out rows of --corners that are wrong, by name"},
+      {.name = "skip_bad", .value = &args.skip_bad, .help = "Reject rows of --corners that are wrong, by name"},
       {.name = "size",
        .value = pair_code(args.size.width_px, args.size.height_px, 200000, "WIDTHxHEIGHT, for example 640x480"),
        .help = "Image size of --corners (default: what holds the corners)",
@@ -176,7 +176,7 @@ ExitCode run_calibrate(CalibrateArgs args, Run& run) {
   if (args.capture.live.is_on) return capture_and_calibrate(std::move(args), run);
   require_no_capture(args.capture);
   if (args.corners.empty() == args.photos.empty()) {
-    throw UsageError(args.photos.empty() ? "give photos, or --corners FILE" : "--corners takes the place of photos");
+    throw UsageError(args.photos.empty() ? "give photos, or --corners FILE" : "--corners replaces photos");
   }
   read_values(args, run);
   return args.corners.empty() ? calibrate_photos_of(args, run) : calibrate_corners(args, run);

@@ -47,7 +47,7 @@ std::string progress_line(const live::CaptureSession& session, double goal_px) {
   const std::string& file = session.kept().photos().back().file;
   std::string line = fmt::format("photo {}: {}", state.photos, file);
   if (state.has_camera)
-    line += fmt::format(", 3σ {:.2g} px in the worst place, goal {:.2g}", state.worst_3sigma_px, goal_px);
+    line += fmt::format(", 3σ {:.2g} px at the worst pixel, goal {:.2g}", state.worst_3sigma_px, goal_px);
   if (state.is_at(goal_px)) return line;
   if (state.photos_to_goal) {
     constexpr int countable = 200;
@@ -137,7 +137,7 @@ class FolderCapture {
   std::string last_words_;
 };
 
-/// What was shown and not taken while better might come, the most telling first: nothing comes any more.
+/// What was shown and not taken while better might come, the most informative first: nothing comes any more.
 void take_what_was_shown(live::CaptureSession& session, double t_s) {
   session.guide().take_what_comes(true);
   while (interrupting_signal() == 0 && !session.look_back(t_s).file.empty())
@@ -190,7 +190,7 @@ ExitCode finish_empty(const Board& board, const CaptureArgs& args, const std::st
 void tell_missed_goal(const live::CaptureSession& session, double goal_px, const Run& run) {
   if (session.kept().photos().empty() || session.state().is_at(goal_px)) return;
   tell_person(
-      fmt::format("alidade: the goal of {:.2g} px is not reached, 3σ is {:.2g} px in the worst place; go on with "
+      fmt::format("alidade: the goal of {:.2g} px is not reached, 3σ is {:.2g} px at the worst pixel; go on with "
                   "--resume {}",
                   goal_px, session.state().worst_3sigma_px, run.options.out.string()));
 }
@@ -205,7 +205,7 @@ FieldList fields_of(CaptureArgs& args) {
   FieldList fields{
       {.name = "from",
        .value = &args.from,
-       .help = "Pictures of --live from a folder that another program fills, or from v4l2:/dev/video0, rtsp://… or "
+       .help = "Images of --live from a folder that another program fills, or from v4l2:/dev/video0, rtsp://… or "
                "http://…, not from the browser's camera",
        .form = "DIR|ADDRESS"},
       {.name = "no_page", .value = &args.no_page, .help = "With --live --from: without a page, for scripts"},
@@ -241,7 +241,7 @@ ExitCode calibrate_live(
   (void)server_config(args.live);  // its faults before any work
   if (!args.resume.empty() && !run.options.out_is_given) run.options.out = args.resume;
   args.config.is_video = args.from.empty() || is_stream_address(args.from);
-  const PictureSource source = opened_source(args.from);  // an address may be wrong: before anything is written
+  const ImageSource source = opened_source(args.from);  // an address may be wrong: before anything is written
   std::optional<CaptureWork> work;
   std::optional<GuidePage> page;
   live::CaptureSession session(board, args.config, opened_photos(args, run), [&page](const std::string& line) {

@@ -112,7 +112,7 @@ TEST_F(CaptureFromAFolder, NamesABoardOfAnotherSizeAndAFrozenStream) {
 
 TEST_F(CaptureFromAFolder, SkipsHiddenFilesAndNamesWhatCannotBeRead) {
   write_file(folder_ / "mixed" / ".hidden.png", read_file(folder_ / "in" / "board_001.png"));
-  write_file(folder_ / "mixed" / "broken.png", "no picture");
+  write_file(folder_ / "mixed" / "broken.png", "no image");
   const Ran ran = run(live("mixed", "mixed-out", 3.0));
   EXPECT_EQ(ran.code, 4);
   EXPECT_THAT(ran.said, HasSubstr("broken.png"));
@@ -129,7 +129,7 @@ TEST_F(CaptureFromAFolder, RefusesOptionsThatDoNotGoTogether) {
       3);
 }
 
-TEST_F(CaptureFromAFolder, SaysWhyNoPicturesComeAndLeavesNothing) {
+TEST_F(CaptureFromAFolder, SaysWhyNoImagesComeAndLeavesNothing) {
   write_file(folder_ / "a_file", "text");
   const std::vector<std::pair<std::string, std::string>> wrong = {{"/nowhere", "no such folder"},
                                                                   {(folder_ / "a_file").string(), "is a file"},
@@ -166,19 +166,19 @@ TEST(KeptPhotos, AreNeverRenumbered) {
   EXPECT_THROW(live::KeptPhotos(folder, true), InputError);
 }
 
-TEST(SentPicture, IsOneOnlyWithItsWholeSize) {
+TEST(SentImage, IsOneOnlyWithItsWholeSize) {
   std::string message("ADY1\x02\0\0\0\x03\0\0\0\x01\0\0\0", 16);
   message += "abcdef";
-  const auto picture = live::sent_picture(message);
-  ASSERT_TRUE(picture);
-  EXPECT_EQ(picture->width_px, 2);
-  EXPECT_EQ(picture->height_px, 3);
-  EXPECT_TRUE(picture->is_exact);
-  EXPECT_EQ(picture->grey, "abcdef");
-  EXPECT_FALSE(live::sent_picture(message + "g"));
-  EXPECT_FALSE(live::sent_picture(message.substr(0, 12)));
+  const auto image = live::sent_image(message);
+  ASSERT_TRUE(image);
+  EXPECT_EQ(image->width_px, 2);
+  EXPECT_EQ(image->height_px, 3);
+  EXPECT_TRUE(image->is_exact);
+  EXPECT_EQ(image->grey, "abcdef");
+  EXPECT_FALSE(live::sent_image(message + "g"));
+  EXPECT_FALSE(live::sent_image(message.substr(0, 12)));
   message[4] = 0;
-  EXPECT_FALSE(live::sent_picture(message));
+  EXPECT_FALSE(live::sent_image(message));
 }
 
 TEST(OwnOrigin, IsThisServersAlone) {

@@ -88,7 +88,7 @@ ExitCode show(const ShowArgs& args, Run& run) {
     estimate["median_3sigma_px"] = sigma.median_px;
     estimate["worst_3sigma_px"] = sigma.worst_px;
     run.say(
-        fmt::format("3σ of projection {:.2g} px (median), {:.2g} px (worst place)", sigma.median_px, sigma.worst_px));
+        fmt::format("3σ of projection {:.2g} px (median), {:.2g} px (worst pixel)", sigma.median_px, sigma.worst_px));
   }
   Verdict verdict;
   verdict.sentence = "Every pixel sees something";
@@ -138,7 +138,7 @@ ExitCode convert(const ConvertArgs& args, Run& run) {
     verdict.state = State::care;
     verdict.sentence += fmt::format(", without {}", fmt::join(lens, " and "));
   }
-  if (!other.empty()) run.say(fmt::format("the format {} has no place for {}", args.format, fmt::join(other, " and ")));
+  if (!other.empty()) run.say(fmt::format("the format {} cannot hold {}", args.format, fmt::join(other, " and ")));
   if (!unread.empty()) run.say(fmt::format("not carried over from {}: {}", args.source, fmt::join(unread, " and ")));
   std::vector<std::string> all = lens;
   all.insert(all.end(), other.begin(), other.end());

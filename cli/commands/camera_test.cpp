@@ -83,7 +83,7 @@ TEST_F(CameraCommand, ConvertWritesExactlyTheDestinationInEveryFormat) {
   EXPECT_FALSE(exists("alidade-out"));
 }
 
-TEST_F(CameraCommand, ConvertRefusesToLoseTheLensUnlessTold) {
+TEST_F(CameraCommand, ConvertRefusesToLoseTheLensUnlessAllowed) {
   write("a.yaml", brown_camera());
   const Outcome refused = alidade({"convert", "a.yaml", "b.yaml", "--to", "kalibr"});
   EXPECT_EQ(refused.code, 3);

@@ -67,7 +67,7 @@ void CaptureWork::obey(const live::PageCommand& command, const cv::Mat& newest, 
   if (command.op == "pause" || command.op == "resume") session_.pause(command.op == "pause");
   if (command.op == "undo" && session_.undo()) page.note("the last photo is forgotten");
   if (command.op == "take") {
-    const std::string reason = newest.empty() ? "there is no picture yet" : session_.take(newest, t_s, is_exact);
+    const std::string reason = newest.empty() ? "there is no image yet" : session_.take(newest, t_s, is_exact);
     if (reason.empty()) return after_taking(page);
     page.note("not taken: " + reason);
   }
@@ -83,7 +83,7 @@ void CaptureWork::see(const cv::Mat& grey, double t_s, bool is_exact, GuidePage&
   const live::CaptureSession::Seen seen = session_.see(grey, t_s, is_exact);
   if (seen.look.corners_px.empty()) last_words_ = seen.look.words;
   page.tell(dumped_json({{"op", "look"},
-                         {"sight", sight_name(seen.look.sight)},
+                         {"sight", look_status_name(seen.look.status)},
                          {"words", seen.look.words},
                          {"words_mirrored", seen.look.words_mirrored},
                          {"corners", pixels_json(seen.look.corners_px)},

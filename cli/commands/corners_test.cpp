@@ -141,7 +141,7 @@ TEST_F(Corners, WithoutABoardAreARefusalThatNamesTheBoardMeant) {
   EXPECT_FALSE(fs::exists(out() / "corners.csv"));
 }
 
-TEST_F(Corners, ABoardToldInSquaresIsNamedByCalibrate) {
+TEST_F(Corners, ABoardGivenInSquaresIsNamedByCalibrate) {
   add_photos(photos_with_corners);
   const Outcome outcome = run("calibrate", {photos().string(), "--board", "10x7", "--square", "0.025"});
   EXPECT_EQ(outcome.code, 4);

@@ -108,7 +108,7 @@ TEST(Executable, UnknownCommandsAndNoCommandAreWrongUsage) {
   EXPECT_THAT(run_alidade({"calibrat"}).err, HasSubstr("did you mean 'calibrate'?"));
 }
 
-TEST(Executable, AnOptionBeforeItsCommandIsToldWhereItStands) {
+TEST(Executable, AnOptionBeforeItsCommandIsNamedWithItsPosition) {
   const std::pair<std::vector<std::string>, std::string> cases[] = {
       {{"--json", "calibrate", "a.jpg"}, "'--json' stands after the command: alidade calibrate --json …"},
       {{"--seed=3", "simulate", "board"}, "'--seed' stands after the command: alidade simulate board --seed …"},

@@ -20,7 +20,7 @@ namespace {
 
 /// This process becomes `alidade-fleet`, with the same words.
 [[noreturn]] void hand_over(const Run& run) {
-  if (run.options.keeps_outcome) throw UsageError("a worker runs until it is told to stop: run it as a command");
+  if (run.options.keeps_outcome) throw UsageError("a worker runs until it is stopped: run it as a command");
   std::error_code error;
   const std::filesystem::path program = own_executable().parent_path() / "alidade-fleet";
   if (!std::filesystem::is_regular_file(program, error)) {
@@ -137,8 +137,8 @@ std::string rows_text(const FleetSimulation& simulation, const Progress& progres
   for (int n = 1; n <= simulation.rows; ++n) {
     report_progress(progress, "rows", static_cast<std::size_t>(n), static_cast<std::size_t>(simulation.rows));
     for (const FleetScene& scene : scenes) {
-      const FleetSight sight = simulate_sight(scene, simulation.scene, simulation.seed, n);
-      text += scene.id + " " + fleet_row_text(fleet_row_of(sight, n)) + "\n";
+      const FleetObservation observation = simulate_observation(scene, simulation.scene, simulation.seed, n);
+      text += scene.id + " " + fleet_row_text(fleet_row_of(observation, n)) + "\n";
     }
   }
   return text;

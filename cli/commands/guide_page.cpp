@@ -27,7 +27,7 @@ std::string dumped(const Json& json) { return json.dump(-1, ' ', false, Json::er
 
 }  // namespace
 
-PictureSource opened_source(const std::string& from) {
+ImageSource opened_source(const std::string& from) {
   if (from.empty()) return {};
   if (is_stream_address(from)) return {nullptr, std::make_shared<live::NewestFrame>(from)};
   return {std::make_shared<live::GrowingFolder>(from), nullptr};
@@ -52,7 +52,7 @@ void add_guide_options(CLI::App& command, LiveOptions& live, const std::string& 
             live.is_on = true;
             live.port = port;
           },
-          help + ": a page with the camera's picture on this port; 0: any (default: 8765)")
+          help + ": a page with the camera's image on this port; 0: any (default: 8765)")
       ->type_name("[PORT]")
       ->expected(0, 1)
       ->group(group);
@@ -71,11 +71,11 @@ std::string flat_pixels(const std::vector<Eigen::Vector2d>& pixels) {
 }
 
 struct GuidePage::State {
-  State(GuidePage& of_page, PictureSource from, GuidedWork& of_work, Run& of_run)
+  State(GuidePage& of_page, ImageSource from, GuidedWork& of_work, Run& of_run)
       : page(of_page), source(std::move(from)), work(of_work), run(of_run) {}
 
   GuidePage& page;
-  PictureSource source;
+  ImageSource source;
   GuidedWork& work;
   Run& run;
   std::mutex mutex;
@@ -155,7 +155,7 @@ void GuidePage::State::see(const cv::Mat& grey, bool is_exact) {
 
 void GuidePage::State::guide_by_browser() {
   while (goes_on()) {
-    const std::optional<live::SentPicture> sent = server->wait_for_picture(std::chrono::milliseconds(100));
+    const std::optional<live::SentImage> sent = server->wait_for_image(std::chrono::milliseconds(100));
     obey_all();
     if (!sent || is_over) continue;
     const cv::Mat grey = cv::Mat(sent->height_px, sent->width_px, CV_8U, const_cast<char*>(sent->grey.data())).clone();
@@ -167,7 +167,7 @@ void GuidePage::State::guide_by_browser() {
 void GuidePage::State::see_file(const std::filesystem::path& file) {
   try {
     const cv::Mat grey = one_channel(decode_photo(read_file(file)));
-    if (grey.depth() != CV_8U) throw InputError("only pictures of 8 bit are shown live");
+    if (grey.depth() != CV_8U) throw InputError("only 8-bit images are shown live");
     see(grey, true);
     show(grey, true);
   } catch (const InputError& error) {
@@ -184,7 +184,7 @@ void GuidePage::State::guide_by_folder() {
       obey_all();
     }
     if (files.empty()) {
-      (void)server->wait_for_picture(std::chrono::milliseconds(50));
+      (void)server->wait_for_image(std::chrono::milliseconds(50));
       work.wait(now_s(), page);
       if (!newest.empty() && shown != newest.data) show(newest, true);
     }
@@ -193,16 +193,16 @@ void GuidePage::State::guide_by_folder() {
 }
 
 void GuidePage::State::guide_by_stream() {
-  bool is_told = false;
+  bool is_said = false;
   while (goes_on()) {
     const std::optional<live::LiveFrame> frame = source.stream->fetch();
     obey_all();
     if (!frame) {
-      if (source.stream->is_over() && !std::exchange(is_told, true)) {
+      if (source.stream->is_over() && !std::exchange(is_said, true)) {
         page.note("the stream has ended");
         return;
       }
-      (void)server->wait_for_picture(std::chrono::milliseconds(5));
+      (void)server->wait_for_image(std::chrono::milliseconds(5));
       continue;
     }
     const cv::Mat grey = grey_of(*frame);
@@ -211,7 +211,7 @@ void GuidePage::State::guide_by_stream() {
   }
 }
 
-GuidePage::GuidePage(const LiveOptions& options, PictureSource source, GuidedWork& work, Run& run)
+GuidePage::GuidePage(const LiveOptions& options, ImageSource source, GuidedWork& work, Run& run)
     : state_(std::make_unique<State>(*this, std::move(source), work, run)) {
   const live::ServerConfig wanted = server_config(options);
   State& state = *state_;

@@ -24,12 +24,12 @@ class Mat;
 namespace alidade::cli {
 
 /// Where images come from, if not from the browser: one of the two, or none.
-struct PictureSource {
+struct ImageSource {
   std::shared_ptr<live::GrowingFolder> folder;
   std::shared_ptr<live::NewestFrame> stream;
 };
 /// `from`: a folder that fills, or a stream's address; empty: the browser. Throws InputError where nothing is there.
-[[nodiscard]] PictureSource opened_source(const std::string& from);
+[[nodiscard]] ImageSource opened_source(const std::string& from);
 
 /// A frame's values, in memory of its own.
 [[nodiscard]] cv::Mat grey_of(const live::LiveFrame& frame);
@@ -70,7 +70,7 @@ class GuidedWork {
 class GuidePage {
  public:
   /// Listens, and prints the address. Throws InputError where it cannot.
-  GuidePage(const LiveOptions& options, PictureSource source, GuidedWork& work, Run& run);
+  GuidePage(const LiveOptions& options, ImageSource source, GuidedWork& work, Run& run);
   ~GuidePage();
   GuidePage(const GuidePage&) = delete;
   GuidePage& operator=(const GuidePage&) = delete;

@@ -35,7 +35,7 @@ struct HeadArgs {
   std::string stream;
   HeadRange range;
   std::optional<double> until;
-  double most_s = 85.0;
+  double max_s = 85.0;
   std::string rig, resume, password_file, identified;
   std::optional<double> latency_s;
   NamedLook look;
@@ -106,7 +106,7 @@ FieldList fields_of(HeadArgs& args) {
        .help = "Until 3 sigma of fx and fy are this share of them; 4 where that cannot be (default: its usual time)",
        .form = "SHARE%"},
       {.name = "most_s",
-       .value = &args.most_s,
+       .value = &args.max_s,
        .help = "For how long --calibrate or --follow may hold the head [s]",
        .limits = {5.0, 86400.0}},
       {.name = "resume",
@@ -185,7 +185,7 @@ class SoFar {
     swap.commit();
     is_written_ = true;
   }
-  /// The same on a thread of its own, for who must not wait for a disk; left out while the last one is at work.
+  /// The same on a thread of its own, for who must not wait for a disk; skipped while the last one is at work.
   void write_beside(std::vector<NamedBytes> files) {
     if (writing_.valid() && writing_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
     if (writing_.valid()) writing_.get();
@@ -234,7 +234,7 @@ void say_assumed(const HeadLimits& limits, JobOutcome& outcome) {
 
 ExitCode calibrate_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
   SoFar so_far(run.options.out);
-  HeadCalibrationConfig config{.range = args.range, .until = args.until, .most_s = args.most_s};
+  HeadCalibrationConfig config{.range = args.range, .until = args.until, .max_s = args.max_s};
   if (is_given(args.board)) {
     require_board(args.board);
     config.board = args.board;
@@ -281,7 +281,7 @@ ExitCode follow_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
   HeadFollowConfig config = args.follow;
   take_identified(args, config, run);
   config.range = args.range;
-  config.most_s = args.most_s;
+  config.max_s = args.max_s;
   const HeadLimits limits = device.limits();
   const Camera& camera = rig.heads.front().camera;
   live.open(FollowShow::topics(), "/head");

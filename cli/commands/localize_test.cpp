@@ -156,7 +156,7 @@ TEST_F(LocalizeCommand, AMirroredTargetIsAskedAbout) {
   EXPECT_EQ(meant.out.find("mirrored?"), std::string::npos) << meant.out;
 }
 
-TEST_F(LocalizeCommand, RefusesWhatCannotBeTold) {
+TEST_F(LocalizeCommand, RefusesWhatCannotBeDetermined) {
   simulate();
   const std::string header = "frame,t_s,point_id,u_px,v_px\n";
   const auto refused_as = [&](const std::string& table, const std::vector<std::string>& options,

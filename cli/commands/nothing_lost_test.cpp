@@ -284,7 +284,7 @@ TEST(NothingLost, KilledAtAnyMomentTheOlderResultsStandOrTheNewOnes) {
   const fs::path out = folder.path() / "out";
   std::mt19937 random(5);
   std::uniform_real_distribution<double> share(0.0, 1.0);
-  double most_wait_us = 40'000.0;  // grows while no run comes to its end, as a busy disk makes all of them slower
+  double max_wait_us = 40'000.0;  // grows while no run comes to its end, as a busy disk makes all of them slower
   int num_old = 0, num_new = 0;
   ASSERT_EQ(run_into(out, writing({"a", "b", "old"}, State::good, '0', 1000), {"--no-report"}).code, 0);
   for (int i = 0; i < 60; ++i) {
@@ -293,14 +293,14 @@ TEST(NothingLost, KilledAtAnyMomentTheOlderResultsStandOrTheNewOnes) {
     (void)run_into(out,
                    writing({"a", "b", "c", "d", "e", letter % 2 == 0 ? "even" : "odd"}, State::good, letter, 300'000),
                    {"--no-report"}, {}, [&](pid_t child) {
-                     const double wait_us = most_wait_us * share(random);
+                     const double wait_us = max_wait_us * share(random);
                      std::this_thread::sleep_for(std::chrono::microseconds(static_cast<int>(wait_us)));
                      ::kill(child, SIGKILL);
                    });
     run_into(out, [](cli::Run&) -> ExitCode { throw InputError("bad data"); });  // clears what the other left
     const auto now = files_of(out);
     ++(now == before ? num_old : num_new);
-    most_wait_us *= now == before ? 1.1 : 0.9;
+    max_wait_us *= now == before ? 1.1 : 0.9;
     if (now == before) continue;
     EXPECT_EQ(now.size(), 7u);
     for (const auto& [name, content] : now) EXPECT_EQ(content.find_first_not_of(letter) == 0, name == "result.json");

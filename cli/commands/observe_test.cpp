@@ -107,7 +107,7 @@ TEST_F(BadLog, IsNamedByLineAndColumn) {
   expect_bad_input(without_rotation, "omega");
 }
 
-TEST_F(BadLog, IsLeftOutByNameWhereItIsToldTo) {
+TEST_F(BadLog, IsRejectedByNameWhereAsked) {
   const Outcome outcome = observe(with_cell(4, 5, "broken"), {"--skip-bad", "--json"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto document = nlohmann::json::parse(outcome.out);
@@ -282,7 +282,7 @@ TEST(Observe, ARealCameraTurnedByHandTellsItsFocalLengthAndSaysWhatItCannot) {
   ASSERT_EQ(held.code, 0) << held.err;
   const auto document = nlohmann::json::parse(held.out);
   EXPECT_NEAR(document["estimate"]["camera"]["fx"], 1190.0, 0.05 * 1190.0);
-  EXPECT_NE(held.out.find("leave out --fix-centre"), std::string::npos);
+  EXPECT_NE(held.out.find("omit --fix-centre"), std::string::npos);
 }
 
 }  // namespace

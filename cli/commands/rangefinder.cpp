@@ -95,7 +95,7 @@ ExitCode by_edges(const RangefinderArgs& args, Run& run) {
   return run.finish(outcome_of(result));
 }
 
-/// Corners of a table take the place of those in the photos.
+/// Corners of a table replace those in the photos.
 void take_corners(const RangefinderArgs& args, std::vector<Shot>& shots, Run& run) {
   if (!args.config.board) throw UsageError("--corners needs --board and --square");
   run.add_input("corners", args.corners);

@@ -64,7 +64,7 @@ class ShotsWork : public GuidedWork {
     if (command.op == "undo" && session_.undo()) page.note("the last shot is forgotten");
     if (command.op == "take") {
       const std::string reason = !command.value   ? "enter the rangefinder's reading first"
-                                 : newest.empty() ? "there is no picture yet"
+                                 : newest.empty() ? "there is no image yet"
                                                   : session_.take(newest, t_s, is_exact, *command.value);
       if (!reason.empty()) {
         page.note("not taken: " + reason);
@@ -134,7 +134,7 @@ FieldList fields_of(GuidedShotsArgs& args) {
   FieldList fields{
       {.name = "from",
        .value = &args.from,
-       .help = "Pictures of --live from a folder that another program fills, or from v4l2:/dev/video0, rtsp://… or "
+       .help = "Images of --live from a folder that another program fills, or from v4l2:/dev/video0, rtsp://… or "
                "http://…, not from the browser's camera",
        .form = "DIR|ADDRESS"},
       {.name = "until_mm",
@@ -167,7 +167,7 @@ ExitCode rangefinder_live(const Camera& camera, const RangefinderConfig& config,
   std::error_code ignored;
   if (!args.resume.empty() && !std::filesystem::equivalent(args.resume, run.options.out, ignored))
     throw UsageError("--resume goes on in its own folder: leave --out away");
-  PictureSource source = opened_source(args.from);
+  ImageSource source = opened_source(args.from);
   RangefinderConfig quick = config;
   quick.rates_next_shots = false;  // a map for the report
   live::ShotSession session(camera, quick, args.where, live::KeptPhotos(run.options.out, !args.resume.empty()));

@@ -80,7 +80,7 @@ const Json* assumption(const Json& document, const std::string& name) {
   return nullptr;
 }
 
-TEST_F(RangefinderCommand, WhatIsToldWithItsSigmaIsCarriedAndWhatIsNotIsNamed) {
+TEST_F(RangefinderCommand, WhatIsGivenWithItsSigmaIsCarriedAndWhatIsNotIsNamed) {
   simulate();
   const Outcome given = calibrate({"--sigma-scale", "0", "--sigma-square", "0.00002", "--json", "--no-report"});
   ASSERT_EQ(given.code, 0) << given.err;

@@ -205,7 +205,7 @@ TEST_F(RigCommand, ProjectPrintsMatricesAndPixels) {
   EXPECT_NEAR(M[1][1], 100.0, 1e-12);
 }
 
-TEST_F(RigCommand, WhatCannotBeToldIsRefusedByName) {
+TEST_F(RigCommand, WhatCannotBeDeterminedIsRefusedByName) {
   for (const auto& [scenario, words] : std::vector<std::array<std::string, 2>>{
            {"pan_only", "pan only: its tilt axis cannot be determined; tilt the head"},
            {"tilt_only", "tilt only: its pan axis cannot be determined; pan the head"},

@@ -115,7 +115,7 @@ void add_servo(App& app) {
           "What the loop goes by where lenses zoom: given (the rig's, whatever they do), observed (estimated on-line "
           "from what stands still in the images), true")
       ->check(CLI::IsMember({"given", "observed", "true"}));
-  command.add_flag("--no-robustness", args->no_robustness, "Leave out the grid over gain and time constant");
+  command.add_flag("--no-robustness", args->no_robustness, "Skip the grid over gain and time constant");
   command.add_flag(
       "--realtime", args->real_time,
       "Hold the first run of each controller to the wall clock, and report how late its steps were (default: "

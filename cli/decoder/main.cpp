@@ -187,12 +187,12 @@ class Input {
 };
 
 /// Frames as 8-bit grey or BGR, upright.
-class Picture {
+class Image {
  public:
-  explicit Picture(bool is_bgr) : is_bgr_(is_bgr) {}
-  ~Picture() { sws_freeContext(scaler_); }
-  Picture(const Picture&) = delete;
-  Picture& operator=(const Picture&) = delete;
+  explicit Image(bool is_bgr) : is_bgr_(is_bgr) {}
+  ~Image() { sws_freeContext(scaler_); }
+  Image(const Image&) = delete;
+  Image& operator=(const Image&) = delete;
 
   /// False: it cannot be converted, or has another size than the first.
   bool take(const AVFrame& frame, int quarter_turns) {
@@ -247,32 +247,31 @@ class Picture {
   std::vector<std::uint8_t> bgr_, bytes_;
 };
 
-bool write_header(const Picture& picture, double frames) {
+bool write_header(const Image& image, double frames) {
   std::array<char, 64> header{};
   const unsigned long count = frames > 0.0 && frames < 1e9 ? static_cast<unsigned long>(frames) : 0UL;
-  std::snprintf(header.data(), header.size(), "alidade_video %d %d %lu", picture.width(), picture.height(), count);
+  std::snprintf(header.data(), header.size(), "alidade_video %d %d %lu", image.width(), image.height(), count);
   return std::fwrite(header.data(), 1, header.size(), stdout) == header.size();
 }
 
-bool write_frame(const Picture& picture, const Times& times) {
+bool write_frame(const Image& image, const Times& times) {
   const std::array<double, 2> numbers{times.media_s, times.taken_s};
-  const bool is_written =
-      std::fputc('f', stdout) == 'f' &&
-      std::fwrite(numbers.data(), sizeof(double), numbers.size(), stdout) == numbers.size() &&
-      std::fwrite(picture.bytes().data(), 1, picture.bytes().size(), stdout) == picture.bytes().size();
+  const bool is_written = std::fputc('f', stdout) == 'f' &&
+                          std::fwrite(numbers.data(), sizeof(double), numbers.size(), stdout) == numbers.size() &&
+                          std::fwrite(image.bytes().data(), 1, image.bytes().size(), stdout) == image.bytes().size();
   return is_written && std::fflush(stdout) == 0;
 }
 
 int decode(const std::string& source, bool is_bgr) {
   av_log_set_level(AV_LOG_QUIET);
   Input input;
-  Picture picture(is_bgr);
+  Image image(is_bgr);
   Times times;
   if (!input.open(source) || !input.next(times)) return 3;
   const int turns = input.quarter_turns();
-  if (!picture.take(input.frame(), turns) || !write_header(picture, input.num_frames())) return 3;
+  if (!image.take(input.frame(), turns) || !write_header(image, input.num_frames())) return 3;
   do {
-    if (!picture.take(input.frame(), turns) || !write_frame(picture, times)) return 3;
+    if (!image.take(input.frame(), turns) || !write_frame(image, times)) return 3;
   } while (input.next(times));
   std::fputc('e', stdout);
   return std::fflush(stdout) == 0 ? 0 : 3;

@@ -15,7 +15,8 @@ using Clock = std::chrono::steady_clock;
 Publication observation_of(const FleetScene& scene, const cli::FleetSimulation& simulation, std::int64_t n) {
   Publication publication;
   publication.subject = "cam." + scene.id + ".obs";
-  publication.payload = fleet_row_text(fleet_row_of(simulate_sight(scene, simulation.scene, simulation.seed, n), n));
+  publication.payload =
+      fleet_row_text(fleet_row_of(simulate_observation(scene, simulation.scene, simulation.seed, n), n));
   publication.headers["Nats-Msg-Id"] = fmt::format("{}-{}", scene.id, n);
   return publication;
 }

@@ -22,9 +22,9 @@ constexpr const char* checkpoint_header = "Alidade-Checkpoint";
 constexpr const char* expected_header = "Nats-Expected-Last-Subject-Sequence";
 constexpr std::size_t max_held = 256;  // rows of a camera that wait for one before them; then that one is given up
 constexpr int store_ms = 10000;        // for the broker to store what was done
-constexpr double least_flush_s = 1.0;  // between checkpoints
+constexpr double min_flush_s = 1.0;    // between checkpoints
 constexpr std::size_t states_at_once = 500;
-constexpr std::size_t most_rows = 50000;  // between checkpoints
+constexpr std::size_t max_rows = 50000;  // between checkpoints
 
 /// A camera as this worker has it.
 struct Held {
@@ -139,7 +139,7 @@ class Worker {
   void read_some() {
     bool is_lost = broker_.num_reconnects() != reconnects_;
     const auto until = Clock::now() + std::chrono::milliseconds(100);
-    while (!is_lost && Clock::now() < until && since_flush_ < most_rows) {
+    while (!is_lost && Clock::now() < until && since_flush_ < max_rows) {
       const Message message = Broker::next(observations_, 20, is_lost);
       if (!message) {
         if (Clock::now() - last_message_ > std::chrono::seconds(5)) is_lost = is_lost || is_behind();
@@ -149,7 +149,7 @@ class Worker {
       take(message);
     }
     const std::chrono::duration<double> since = Clock::now() - last_flush_;
-    const bool is_due = since.count() > std::max(least_flush_s, 3.0 * flush_s_) || since_flush_ >= most_rows;
+    const bool is_due = since.count() > std::max(min_flush_s, 3.0 * flush_s_) || since_flush_ >= max_rows;
     if (!is_lost && since_flush_ > 0 && is_due) is_lost = !flush();
     if (is_lost) is_reading_ = false;
   }

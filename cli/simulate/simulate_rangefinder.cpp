@@ -107,8 +107,8 @@ ExitCode simulate_rangefinder(const SimulateRangefinderArgs& args, Run& run) {
   if (args.photos) add_photos(args, scene, simulated.shots, run);
   run.add_file("shots.csv", table_of(args, simulated.shots));
   if (!args.photos) run.add_file("corners.csv", corners_csv(views));
-  const Camera told = mistaken_camera(scene.camera, args.mistake.focal, args.mistake.centre_px, args.mistake.k1);
-  run.add_file("camera.yaml", camera_text(told, CameraFormat::alidade));
+  const Camera given = mistaken_camera(scene.camera, args.mistake.focal, args.mistake.centre_px, args.mistake.k1);
+  run.add_file("camera.yaml", camera_text(given, CameraFormat::alidade));
   run.add_file("truth_rangefinder.yaml", beam_text(scene.beam, scene.camera, "camera.yaml"));
   JsonValue outliers = JsonValue::list();
   for (std::size_t i = 0; i < simulated.is_outlier.size(); ++i)
@@ -154,7 +154,7 @@ void add_rangefinder_scenario(App& app) {
   number("--k1-error", args->mistake.k1, "What its k1 is too large by", -1.0, 1.0);
   number("--drift-m", args->mistake.drift_m, "What the readings drift by from the first shot to the last [m]", -1.0,
          1.0);
-  number("--bend-m", args->mistake.bend_m, "What a reading is too long by 1 m from 2 m, as a parabola [m]", -1.0, 1.0);
+  number("--bend-m", args->mistake.bend_m, "Curvature of the readings: too long by this 1 m from 2 m [m]", -1.0, 1.0);
   number("--wander-px", args->mistake.wander_px, "What the spots move by from the first shot to the last", -1e3, 1e3);
   command.add_flag("--exchange-uv", args->mistake.exchange_uv, "u of the spots stands in the column of v");
   command.add_option("--unit", args->unit, "Of the readings in the table")

@@ -94,8 +94,8 @@ ExitCode simulate_rig(const SimulateRigArgs& args, Run& run) {
   std::vector<std::string> camera_files;
   for (const RigHead& rig_head : scene.rig.heads) {
     camera_files.push_back(fmt::format("camera_{}.yaml", rig_head.head.id));
-    const Camera told = mistaken_camera(rig_head.camera, args.mistake.focal, args.mistake.centre_px);
-    run.add_file(camera_files.back(), camera_text(with_sigma(told), CameraFormat::alidade));
+    const Camera given = mistaken_camera(rig_head.camera, args.mistake.focal, args.mistake.centre_px);
+    run.add_file(camera_files.back(), camera_text(with_sigma(given), CameraFormat::alidade));
   }
   // Where the files of the lenses are wrong, the truth has its own.
   const bool is_mistaken = args.mistake.focal != 0.0 || args.mistake.centre_px != 0.0;
@@ -129,7 +129,7 @@ void add_rig_scenario(App& app) {
       ->capture_default_str();
   command.add_option("--rig", args->rig, "Heads that the drawn ones are near (default: the paper's two)")
       ->type_name("FILE");
-  command.add_option("--boards", args->boards, "Places of the board")
+  command.add_option("--boards", args->boards, "Positions of the board")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   command.add_option("--views", args->views, "Views of each board by each head, at most")

@@ -281,7 +281,7 @@ void add_options(CLI::App& command, SimulateRotationArgs& args) {
   word("--zoom", args.zoom, "none, ramp (eq. 29), step (+10 % at 6 s) or sway (±15 %, never at rest)",
        {"none", "ramp", "step", "sway"});
   command.add_option("--points", args.points, "How many points")->check(CLI::Range(1, 5000))->capture_default_str();
-  command.add_option("--size", args.size, "Picture")->type_name("WxH")->capture_default_str();
+  command.add_option("--size", args.size, "Image size")->type_name("WxH")->capture_default_str();
   command.add_option("--intrinsics", args.k, "True fx,fy,cx,cy [px]")
       ->delimiter(',')
       ->expected(4)
@@ -301,7 +301,7 @@ void add_options(CLI::App& command, SimulateRotationArgs& args) {
           "Render so many photos of a camera that is turned by hand instead, and matches between them: photos/, "
           "pairs.csv")
       ->check(CLI::Range(2, 200));
-  number("--zoomed", args.zoomed, "Focal length of the middle photo over the others'", 0.2, 5.0);
+  number("--zoomed", args.zoomed, "Focal length of the central photo over the others'", 0.2, 5.0);
   command.add_option("--photo", args.photo, "What the world of videos and photos looks like (default: noise)")
       ->type_name("FILE");
   number("--photo-deg", args.photo_deg, "How wide that photo stands in the world", 1.0, 360.0);

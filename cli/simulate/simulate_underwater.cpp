@@ -75,7 +75,7 @@ std::size_t add_frames(const SimulateUnderwaterArgs& args, const Camera& camera,
 
 /// The camera as given in camera.yaml.
 Camera given_camera(const SimulateUnderwaterArgs& args, const Camera& camera) {
-  Camera told = camera;
+  Camera given = camera;
   Eigen::VectorXd values = params(camera.lens);
   const std::vector<std::string> names = param_names(camera.lens);
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -84,8 +84,8 @@ Camera given_camera(const SimulateUnderwaterArgs& args, const Camera& camera) {
     if (names[i] == "cx") value += args.given_centre_px;
     if (names[i] == "k1" && !args.given_k1) value = 0.0;
   }
-  told.lens = with_params(camera.lens, values);
-  return told;
+  given.lens = with_params(camera.lens, values);
+  return given;
 }
 
 ExitCode simulate(const SimulateUnderwaterArgs& args, Run& run) {
@@ -149,7 +149,7 @@ void add_underwater_scenario(App& app) {
   number("--sigma-px", scene.sigma_px, "σ of a pixel coordinate [px]", 0.0, 100.0)->excludes(video);
   number("--sigma-depth", scene.sigma_depth, "σ of the depths in start.yaml, over the depth", 0.0, 1.0)
       ->excludes(video);
-  number("--mismatches", scene.mismatches, "Share of the observations that show another place", 0.0, 1.0)
+  number("--mismatches", scene.mismatches, "Share of the observations that show another point", 0.0, 1.0)
       ->excludes(video);
   number("--blackout-from", scene.blackout_from_s, "Nothing is seen from this time on [s]", 0.0, 1e6)->excludes(video);
   number("--blackout", scene.blackout_s, "How long nothing is seen [s]", 0.0, 1e6)->excludes(video);

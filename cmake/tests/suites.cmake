@@ -1,5 +1,5 @@
 # Read by ctest when it starts, with `executables`, their `labels` and a `timeout`: one test for each suite of GoogleTest.
-# What the tests of a suite share (rendered pictures, a simulated log) is made once, and a fifth of a second of loading
+# What the tests of a suite share (rendered images, a simulated log) is made once, and a fifth of a second of loading
 # saved for each of them. Those with parameters are the long ones: one test each, and first, as alone at the end they
 # would leave cores idle.
 set(waiting_suites "^(HeadCommand|Heads)$") # for devices that take their time: they begin first, and the others work beside them

@@ -52,7 +52,7 @@ std::string corner_fault(const Corner& corner, int num_points) {
   }
   const bool is_finite = corner.px.allFinite() && corner.cov.allFinite();
   const bool is_covariance = is_finite && corner.cov(0, 0) > 0.0 && corner.cov.determinant() > 0.0;
-  return is_covariance ? "" : "its place must be finite, and its covariance positive definite";
+  return is_covariance ? "" : "its position must be finite, and its covariance positive definite";
 }
 
 void require_sense(std::span<const BoardView> views, const ImageSize& size, const Board& board) {

@@ -9,7 +9,7 @@
 #include "alidade/pantilt/head_cameras.h"
 #include "alidade/public.h"
 
-/// Cameras that stand still, placed by one target that moves: the whole job, as `alidade rig --moving-target` does it.
+/// Static cameras, located by one target that moves: the whole job, as `alidade rig --moving-target` does it.
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
@@ -20,10 +20,10 @@ ALIDADE_PUBLIC_BEGIN
                                          const MovingTargetConfig& config, const TrueTrack& truth = {},
                                          const Progress& progress = {});
 
-/// The placed heads alone, with their part of the covariance.
+/// The located heads alone, with their part of the covariance.
 [[nodiscard]] Rig placed_rig(const MovingTargetReport& report);
 
-/// The observations of the placed cameras on the rig's one clock, in order of time: what `alidade track` reads.
+/// The observations of the located cameras on the rig's one clock, in order of time: what `alidade track` reads.
 [[nodiscard]] std::vector<TargetObservation> observations_on_one_clock(const NetworkCalibration& calibration);
 
 ALIDADE_PUBLIC_END

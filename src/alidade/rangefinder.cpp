@@ -25,7 +25,7 @@ std::vector<Eigen::Vector3d> points_of(const RangefinderConfig& config) {
   return config.board ? points_in_board(*config.board) : std::vector<Eigen::Vector3d>{};
 }
 
-/// Enough boards tell the beam by themselves: a light that is elsewhere is no spot.
+/// Enough boards determine the beam by themselves: a light that is elsewhere is no spot.
 void look_where_boards_say(RangefinderCalibration& result, const PhotoByName& load_photo, const Camera& camera,
                            const ShotPhotosConfig& photos, const Progress& progress) {
   RangefinderConfig config = result.config;

@@ -20,21 +20,21 @@ Eigen::Matrix2d whitener(const Eigen::Matrix2d& cov) {
 }
 
 /// The points' centroid and their mean distance from it.
-std::pair<Eigen::Vector2d, double> middle_and_size(const BoardView& view, std::span<const Eigen::Vector3d> points) {
+std::pair<Eigen::Vector2d, double> centre_and_size(const BoardView& view, std::span<const Eigen::Vector3d> points) {
   const auto num = static_cast<double>(view.corners.size());
-  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
   double size = 0.0;
-  for (const Corner& corner : view.corners) middle += points[static_cast<std::size_t>(corner.index)].head<2>() / num;
+  for (const Corner& corner : view.corners) centre += points[static_cast<std::size_t>(corner.index)].head<2>() / num;
   for (const Corner& corner : view.corners)
-    size += (points[static_cast<std::size_t>(corner.index)].head<2>() - middle).norm() / num;
-  return {middle, size};
+    size += (points[static_cast<std::size_t>(corner.index)].head<2>() - centre).norm() / num;
+  return {centre, size};
 }
 
 /// H with ray ~ H (x, y, 1) of points on the board, up to scale: null vector of ray × H p = 0. Rays instead of pixels
 /// let it work behind the lens, too. None where the points are on a line.
 std::optional<Eigen::Matrix3d> ray_homography(const Camera& camera, const BoardView& view,
                                               std::span<const Eigen::Vector3d> points) {
-  const auto [middle, size] = middle_and_size(view, points);
+  const auto [centre, size] = centre_and_size(view, points);
   if (!(size > 0.0)) return std::nullopt;
   Eigen::Matrix<double, 9, 9> AtA = Eigen::Matrix<double, 9, 9>::Zero();
   Eigen::Vector3d side = Eigen::Vector3d::Zero();
@@ -44,7 +44,7 @@ std::optional<Eigen::Matrix3d> ray_homography(const Camera& camera, const BoardV
   for (std::size_t i = 0; i < rays.size(); ++i) {
     if (!rays[i]) continue;
     const auto index = static_cast<std::size_t>(view.corners[i].index);
-    const Eigen::Vector3d p = ((points[index].head<2>() - middle) / size).homogeneous();
+    const Eigen::Vector3d p = ((points[index].head<2>() - centre) / size).homogeneous();
     const Eigen::Matrix3d cross = cross_matrix(*rays[i]);
     const Eigen::Matrix3d weight = cross.transpose() * cross, outer = p * p.transpose();
     for (int a = 0; a < 3; ++a)
@@ -56,7 +56,7 @@ std::optional<Eigen::Matrix3d> ray_homography(const Camera& camera, const BoardV
   Eigen::Matrix3d H = eigen.vectors.col(0).reshaped(3, 3);
   if (H.col(2).dot(side) < 0.0) H = -H;  // in front of the camera
   H.leftCols<2>() /= size;
-  H.col(2) -= H.leftCols<2>() * middle;
+  H.col(2) -= H.leftCols<2>() * centre;
   return H;
 }
 
@@ -72,24 +72,24 @@ std::optional<Rigid3> start_pose(const Camera& camera, const BoardView& view, st
 }
 
 /// The other pose that looks nearly alike from far away: the normal mirrored at the view of the board's centre.
-Rigid3 mirrored(const Rigid3& cam_from_board, const Eigen::Vector3d& middle_in_board) {
-  const Eigen::Vector3d middle_in_cam = cam_from_board * middle_in_board;
-  const Eigen::Vector3d view = middle_in_cam.normalized();
+Rigid3 mirrored(const Rigid3& cam_from_board, const Eigen::Vector3d& centre_in_board) {
+  const Eigen::Vector3d centre_in_cam = cam_from_board * centre_in_board;
+  const Eigen::Vector3d view = centre_in_cam.normalized();
   const Eigen::Vector3d normal = cam_from_board.rotation * Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d wanted = 2.0 * view.dot(normal) * view - normal;
   const Eigen::Quaterniond turn = rotation_between(normal, wanted);
   const Eigen::Quaterniond rotation = (turn * cam_from_board.rotation).normalized();
-  return {rotation, middle_in_cam - rotation * middle_in_board};
+  return {rotation, centre_in_cam - rotation * centre_in_board};
 }
 
 /// The board perpendicular to the viewing ray, in the same position and with the same rotation about it: where a small
 /// board's tilt is lost in noise, a homography can have any.
-Rigid3 squared_up(const Rigid3& cam_from_board, const Eigen::Vector3d& middle_in_board) {
-  const Eigen::Vector3d middle_in_cam = cam_from_board * middle_in_board;
+Rigid3 squared_up(const Rigid3& cam_from_board, const Eigen::Vector3d& centre_in_board) {
+  const Eigen::Vector3d centre_in_cam = cam_from_board * centre_in_board;
   const Eigen::Quaterniond turn =
-      rotation_between(cam_from_board.rotation * Eigen::Vector3d::UnitZ(), middle_in_cam.normalized());
+      rotation_between(cam_from_board.rotation * Eigen::Vector3d::UnitZ(), centre_in_cam.normalized());
   const Eigen::Quaterniond rotation = (turn * cam_from_board.rotation).normalized();
-  return {rotation, middle_in_cam - rotation * middle_in_board};
+  return {rotation, centre_in_cam - rotation * centre_in_board};
 }
 
 struct Refined {
@@ -205,13 +205,13 @@ std::vector<BoardPoseFit> fit_board_poses(const Camera& camera, const BoardView&
   if (view.corners.size() < 4 || !fits_board(view, points_in_board)) return {};
   const auto start = start_pose(camera, view, points_in_board);
   if (!start) return {};
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  middle.head<2>() = middle_and_size(view, points_in_board).first;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  centre.head<2>() = centre_and_size(view, points_in_board).first;
   std::vector<BoardPoseFit> fits;
   auto at = refined(camera, *start, view, points_in_board, sigma_px);
-  if (!at) at = refined(camera, squared_up(*start, middle), view, points_in_board, sigma_px);
+  if (!at) at = refined(camera, squared_up(*start, centre), view, points_in_board, sigma_px);
   if (at) fits.push_back(fit_at(*at));
-  at = refined(camera, mirrored(at ? at->cam_from_board : *start, middle), view, points_in_board, sigma_px);
+  at = refined(camera, mirrored(at ? at->cam_from_board : *start, centre), view, points_in_board, sigma_px);
   if (at) fits.push_back(fit_at(*at));
   std::erase_if(fits, [](const BoardPoseFit& fit) { return !fit.pose.cov.allFinite(); });
   if (fits.size() == 2 && fits[1].chi2 < fits[0].chi2) std::swap(fits[0], fits[1]);

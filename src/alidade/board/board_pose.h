@@ -27,8 +27,8 @@ struct CornerResiduals {
   Eigen::MatrixXd J_lens;  ///< As many columns as the lens has parameters.
 };
 
-/// None where the lens does not see a corner, or a corner has a number that the board has not. `sigma_px`: takes the
-/// place of the corners' covariances.
+/// None where the lens does not see a corner, or a corner has a number that the board has not. `sigma_px`: replaces
+/// the corners' covariances.
 [[nodiscard]] std::optional<CornerResiduals> corner_residuals(const Camera& camera, const Rigid3& cam_from_board,
                                                               const BoardView& view,
                                                               std::span<const Eigen::Vector3d> points_in_board,

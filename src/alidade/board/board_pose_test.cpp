@@ -18,9 +18,9 @@ Rigid3 draw_pose(Draws& draws) {
   const double azimuth = draws.uniform(-3.1, 3.1), tilt = draws.uniform(0.0, 0.8), z_m = draws.uniform(0.7, 3.5);
   const Eigen::Quaterniond rotation = exp_so3({tilt * std::cos(azimuth), tilt * std::sin(azimuth), 0.0}) *
                                       exp_so3({0.0, 0.0, draws.uniform(-3.0, 3.0)});
-  const Eigen::Vector3d middle_in_board(0.16, 0.1, 0.0);
-  const Eigen::Vector3d middle_in_cam(draws.uniform(-0.1, 0.1) * z_m, draws.uniform(-0.1, 0.1) * z_m, z_m);
-  return {rotation, middle_in_cam - rotation * middle_in_board};
+  const Eigen::Vector3d centre_in_board(0.16, 0.1, 0.0);
+  const Eigen::Vector3d centre_in_cam(draws.uniform(-0.1, 0.1) * z_m, draws.uniform(-0.1, 0.1) * z_m, z_m);
+  return {rotation, centre_in_cam - rotation * centre_in_board};
 }
 
 BoardView see(const Camera& camera, const Rigid3& cam_from_board, double sigma_px, Draws& draws) {
@@ -107,8 +107,8 @@ TEST(BoardPose, IsFoundWhereTwoPosesMeetAndFarAway) {
     for (int trial = 0; trial < trials; ++trial) {
       const double azimuth = draws.uniform(-3.1, 3.1), tilt = draws.uniform(0.0, z_m > 10.0 ? 0.8 : 0.2);
       const Eigen::Quaterniond rotation = exp_so3({tilt * std::cos(azimuth), tilt * std::sin(azimuth), 0.0});
-      const Eigen::Vector3d middle_in_cam(draws.uniform(-0.1, 0.1) * z_m, draws.uniform(-0.1, 0.1) * z_m, z_m);
-      const Rigid3 cam_from_board{rotation, middle_in_cam - rotation * Eigen::Vector3d(0.16, 0.1, 0.0)};
+      const Eigen::Vector3d centre_in_cam(draws.uniform(-0.1, 0.1) * z_m, draws.uniform(-0.1, 0.1) * z_m, z_m);
+      const Rigid3 cam_from_board{rotation, centre_in_cam - rotation * Eigen::Vector3d(0.16, 0.1, 0.0)};
       const auto fits = fit_board_poses(camera, see(camera, cam_from_board, 0.1, draws), points);
       ASSERT_FALSE(fits.empty()) << "z " << z_m << ", trial " << trial;
       sum += fits.front().chi2 / fits.front().dof;

@@ -36,13 +36,13 @@ Board sized(Board board, int cols, int rows) {
   return board;
 }
 
-TEST(BoardGuess, AChessboardToldInSquaresOrOffByOne) {
+TEST(BoardGuess, AChessboardGivenInSquaresOrOffByOne) {
   const auto photos = photos_of(plain);
   for (const auto& [cols, rows] : {std::pair{8, 7}, std::pair{6, 5}, std::pair{8, 6}, std::pair{7, 5}, std::pair{7, 7}})
     EXPECT_EQ(guessed(photos, sized(plain, cols, rows)), "--board 7x6") << cols << "x" << rows;
 }
 
-TEST(BoardGuess, ABoardWithMarkersToldInSquaresOrWithAnotherDictionary) {
+TEST(BoardGuess, ABoardWithMarkersGivenInSquaresOrWithAnotherDictionary) {
   const auto photos = photos_of(marked);
   EXPECT_EQ(guessed(photos, sized(marked, 9, 6)), "--board 8x5");
   EXPECT_EQ(guessed(photos, sized(marked, 7, 4)), "--board 8x5");
@@ -64,7 +64,9 @@ TEST(BoardGuess, MarkersOrNone) {
   EXPECT_EQ(guessed(photos_of(plain), with_markers), "--board-kind chessboard");
 }
 
-TEST(BoardGuess, CirclesToldTheOtherWayRound) { EXPECT_EQ(guessed(photos_of(dots), sized(dots, 9, 4)), "--board 4x9"); }
+TEST(BoardGuess, CirclesGivenTheOtherWayRound) {
+  EXPECT_EQ(guessed(photos_of(dots), sized(dots, 9, 4)), "--board 4x9");
+}
 
 TEST(BoardGuess, NoneWhereThereIsNone) {
   std::vector<cv::Mat> noise(3);

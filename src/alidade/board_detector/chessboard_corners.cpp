@@ -149,8 +149,8 @@ BoardDetection to_detection(std::vector<FittedCorner> corners, const Board& boar
     return std::pair(a.cell.second, a.cell.first) < std::pair(b.cell.second, b.cell.first);
   });
   if (corners.size() < min_corners) {
-    detection.reason = "the corners are too blurred or too faint to be placed: only " + std::to_string(corners.size()) +
-                       " of " + std::to_string(num_points(board));
+    detection.reason = "the corners are too blurred or too faint to be numbered: only " +
+                       std::to_string(corners.size()) + " of " + std::to_string(num_points(board));
     return detection;
   }
   for (const FittedCorner& corner : corners) {

@@ -189,8 +189,8 @@ TEST(FindBoard, PlacesABoardCutByTheImageByTheBordersThatAreSeen) {
     EXPECT_LT((corner.px - truth[static_cast<std::size_t>(corner.index)]).norm(), 0.1) << corner.index;
   }
   // Without any border in the image the part is ambiguous.
-  const cv::Rect middle(static_cast<int>(truth[0].x()) - 14, static_cast<int>(truth[0].y()) - 14, 200, 120);
-  EXPECT_NE(find_board(photo(middle), board).reason.find("cannot be determined which"), std::string::npos);
+  const cv::Rect centre(static_cast<int>(truth[0].x()) - 14, static_cast<int>(truth[0].y()) - 14, 200, 120);
+  EXPECT_NE(find_board(photo(centre), board).reason.find("cannot be determined which"), std::string::npos);
 }
 
 TEST(FindBoard, SaysWhyThereIsNoBoard) {

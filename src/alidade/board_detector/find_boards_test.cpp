@@ -49,7 +49,7 @@ TEST_F(FindBoards, AnswersInOrderAndTheSameOnOneThread) {
   }
 }
 
-TEST_F(FindBoards, StopsWhenToldTo) {
+TEST_F(FindBoards, StopsWhenAsked) {
   std::size_t calls = 0;
   const Progress stop_at_once = [&](std::string_view, std::size_t, std::size_t) { return ++calls == 0; };
   EXPECT_THROW((void)find_boards(num_photos, loader(), board, false, stop_at_once), Interrupted);

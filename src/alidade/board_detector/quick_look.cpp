@@ -17,8 +17,8 @@ namespace alidade {
 namespace {
 
 constexpr double quick_pixels = 0.6e6;  // of an image that is searched: VGA and SVGA at full size
-constexpr int least_halved_px = 120;
-constexpr double least_roomy_px = 24.0;  // around the board's last position
+constexpr int min_halved_px = 120;
+constexpr double min_roomy_px = 24.0;  // around the board's last position
 
 double quick_scale(double pixels) {
   double scale = 1.0;
@@ -68,7 +68,7 @@ QuickLook QuickLooker::look_in(const cv::Mat& photo, int left_px, int top_px, in
   const cv::Mat grey = to_grey_photo(scale > 1.0 ? small : part, look.reason);
   if (!look.reason.empty()) return look;
   Chessboard found = find_chessboard_at(grey, board_.cols, board_.rows, 1.0);
-  if (!found.reason.empty() && std::min(grey.rows, grey.cols) >= least_halved_px) {  // large squares, or blurred ones
+  if (!found.reason.empty() && std::min(grey.rows, grey.cols) >= min_halved_px) {  // large squares, or blurred ones
     Chessboard halved = find_chessboard_at(grey, board_.cols, board_.rows, 2.0);
     if (halved.reason.empty()) found = std::move(halved);
   }
@@ -112,7 +112,7 @@ QuickLook QuickLooker::look(const cv::Mat& photo) {
   if (board_.kind != BoardKind::chessboard) return look_for_points(photo);
   if (last_) {
     const double room_px =
-        std::max(least_roomy_px, 0.25 * std::max(last_->right_px - last_->left_px, last_->bottom_px - last_->top_px));
+        std::max(min_roomy_px, 0.25 * std::max(last_->right_px - last_->left_px, last_->bottom_px - last_->top_px));
     const int left = std::clamp(static_cast<int>(last_->left_px - room_px), 0, photo.cols - 1);
     const int top = std::clamp(static_cast<int>(last_->top_px - room_px), 0, photo.rows - 1);
     const int right = std::clamp(static_cast<int>(last_->right_px + room_px), left + 1, photo.cols);

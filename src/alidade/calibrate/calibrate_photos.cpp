@@ -87,8 +87,8 @@ std::string wrong_board(const PhotoCalibration& result) {
 
 /// Sizes of the grids that photos of a chessboard show instead of it, as columns and rows: "a grid of 8×6 corners, not
 /// 9×6", "only 8×6 of 9×6 corners, …". None where the board is of another kind.
-std::optional<std::vector<std::pair<int, int>>> grids_seen(const Board& told, const PhotoCalibration& result) {
-  if (told.kind != BoardKind::chessboard) return std::nullopt;
+std::optional<std::vector<std::pair<int, int>>> grids_seen(const Board& given, const PhotoCalibration& result) {
+  if (given.kind != BoardKind::chessboard) return std::nullopt;
   constexpr std::ptrdiff_t min_photos = 2;
   constexpr std::size_t max_sizes = 4;
   std::vector<std::pair<int, int>> all, seen;
@@ -114,17 +114,17 @@ struct WrongBoard {
 
 /// `in_vain`: the photos that were searched and show no board.
 std::optional<WrongBoard> given_wrongly(const std::vector<std::size_t>& in_vain, const PhotoLoader& load_photo,
-                                        const Board& told, const Progress& progress, const PhotoCalibration& result) {
+                                        const Board& given, const Progress& progress, const PhotoCalibration& result) {
   const std::string other_grid = wrong_board(result);
   const auto found = static_cast<std::size_t>(std::count_if(
       result.views.begin(), result.views.end(), [](const BoardView& view) { return !view.corners.empty(); }));
   if (in_vain.empty() || (other_grid.empty() && 3 * found > in_vain.size())) return std::nullopt;
   const auto load = [&](std::size_t i) { return load_photo(in_vain[i]); };
-  const auto meant = guess_board(in_vain.size(), load, told, grids_seen(told, result), progress);
+  const auto meant = guess_board(in_vain.size(), load, given, grids_seen(given, result), progress);
   if (meant) {
-    const std::string options = changed_options(told, *meant);
-    return WrongBoard{"the photos do not show the board as given, " + std::to_string(told.cols) + "×" +
-                          std::to_string(told.rows) + (told.dictionary.empty() ? "" : " with " + told.dictionary),
+    const std::string options = changed_options(given, *meant);
+    return WrongBoard{"the photos do not show the board as given, " + std::to_string(given.cols) + "×" +
+                          std::to_string(given.rows) + (given.dictionary.empty() ? "" : " with " + given.dictionary),
                       "use " + options + ": that board stands in them"};
   }
   if (other_grid.empty()) return std::nullopt;

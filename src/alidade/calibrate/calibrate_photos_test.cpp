@@ -116,7 +116,7 @@ TEST(CalibratePhotos, TheSizeThatMostPhotosHaveDecidesNotTheFirst) {
   EXPECT_TRUE(result.report.views[1].used);
 }
 
-TEST(CalibratePhotos, ABoardToldInSquaresIsNamedInInnerCorners) {
+TEST(CalibratePhotos, ABoardGivenInSquaresIsNamedInInnerCorners) {
   Board squares = sample_board;
   squares.cols += 1;
   squares.rows += 1;
@@ -136,7 +136,7 @@ TEST(CalibratePhotos, NoPhotoAtAllIsARefusal) {
   EXPECT_EQ(unread.size.width_px, 0);
 }
 
-TEST(CalibratePhotos, StopsWhenToldTo) {
+TEST(CalibratePhotos, StopsWhenAsked) {
   for (const std::string stage : {"looking for the board", "extracting the corners again"}) {
     const Progress stop = [&](std::string_view what, std::size_t done, std::size_t) {
       return what != stage || done < 2;

@@ -250,7 +250,7 @@ TEST(Calibrate, LearnsTheShapeOfABentBoard) {
   EXPECT_NEAR(given.rms_px, free.rms_px, 1e-3);
 }
 
-TEST(Calibrate, RefusesWhatCannotBeTold) {
+TEST(Calibrate, RefusesWhatCannotBeDetermined) {
   const auto status = [](const std::vector<BoardView>& views, const CalibrateConfig& config = {}) {
     return calibrate(board, views, size, config);
   };
@@ -287,7 +287,7 @@ TEST(Calibrate, RefusesWhatCannotBeTold) {
   EXPECT_EQ(refused, 6);
 }
 
-TEST(Calibrate, TwoViewsDoWhereThePrincipalPointIsHeld) {
+TEST(Calibrate, TwoViewsDoWhereThePrincipalPointIsFixed) {
   BoardScene scene = example_scene("pinhole", 6);
   Eigen::VectorXd values = params(scene.camera.lens);
   values[2] = 0.5 * (size.width_px - 1);

@@ -36,7 +36,7 @@ struct PortKnowledge {
   std::optional<Camera>
       air;              ///< The lens as calibrated in air (pinhole or brown), fixed. None: it is estimated as well.
   double gap_m = 0.02;  ///< A start.
-  std::optional<double> glass_m;         ///< Held; must be given.
+  std::optional<double> glass_m;         ///< Fixed; must be given.
   double n_glass = 1.5, n_water = 1.34;  ///< Fixed: the photos hardly separate them from the gap.
 };
 

@@ -32,8 +32,8 @@ std::optional<Rigid3> place(const Camera& camera, const std::vector<Eigen::Vecto
   if (!ray || !(ray->z() > 0.1)) return std::nullopt;
   const double distance_m = params(camera.lens)[0] * box.sizes().x() / (fill * camera.width_px);
   const Eigen::Quaterniond rotation = exp_so3(tilt);
-  const Eigen::Vector3d middle_in_cam = *ray * (distance_m / ray->z());
-  return Rigid3{rotation, middle_in_cam - rotation * box.center()};
+  const Eigen::Vector3d centre_in_cam = *ray * (distance_m / ray->z());
+  return Rigid3{rotation, centre_in_cam - rotation * box.center()};
 }
 
 std::vector<Candidate> all_candidates(const Camera& camera, const std::vector<Eigen::Vector3d>& board_points,

@@ -91,7 +91,7 @@ TEST(NextPhoto, WithoutACovarianceThereIsNoPlan) {
   EXPECT_TRUE(plan_next_photos(camera, 0.0, points_in_board(sample_board), 2).photos.empty());
 }
 
-TEST(NextPhoto, StopsWhenToldTo) {
+TEST(NextPhoto, StopsWhenAsked) {
   const Planned planned = plan("brown", 8, 1, 1);
   const Progress stop = [](std::string_view, std::size_t, std::size_t) { return false; };
   EXPECT_THROW((void)plan_next_photos(planned.report.camera, 0.1, planned.report.board_points, 1, stop), Interrupted);

@@ -21,7 +21,7 @@ struct ShapeTransfer {
   double transfer_rms_px = 0.0;         ///< With the other half's shape.
   double gain_sigmas = 0.0;             ///< Mean gain of a photo, in the σ of that mean from photo to photo.
 
-  /// Whether a requested shape is used. A bow is two numbers and costs little: it is used where the photos
+  /// Whether a requested shape is used. A bow is two parameters and costs little: it is used where the photos
   /// agree that it helps, by however little. Every point free costs σ and takes up faults of the lens: it must help by
   /// 5 %.
   [[nodiscard]] bool transfers() const;

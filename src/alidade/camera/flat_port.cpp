@@ -8,7 +8,7 @@ namespace {
 
 enum : Eigen::Index { gap = 10, glass, n_glass, n_water, normal_x, normal_y };
 
-/// Whether the numbers describe a port at all: also false for what is not finite.
+/// Whether the parameters describe a port at all: also false for what is not finite.
 bool is_port(const Params<FlatPort>& p) {
   const auto is_index = [](double n) { return n >= 1.0 && n <= 4.0; };
   constexpr double max_m = 1e6;

@@ -136,7 +136,7 @@ TEST(VideoLog, RefusesAnglesThatDoNotFit) {
   EXPECT_THAT(film.refusal(angles_of(RotationSource::head), {.min_rows = 1000}), HasSubstr("no point could be"));
 }
 
-TEST(VideoLog, StopsWhenToldTo) {
+TEST(VideoLog, StopsWhenAsked) {
   const FilmedFolder& film = filmed();
   VideoFrames video(film.path());
   const Progress stop_at_five = [](std::string_view, std::size_t done, std::size_t) { return done < 5; };

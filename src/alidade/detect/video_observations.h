@@ -10,7 +10,7 @@
 #include "alidade/pantilt/head.h"
 #include "alidade/pantilt/rotation_log.h"
 #include "alidade/target/target_detector.h"
-#include "alidade/track/sight.h"
+#include "alidade/track/observation_model.h"
 
 namespace alidade {
 

@@ -7,7 +7,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// A Gaussian over N numbers: mean x and covariance P.
+/// A Gaussian over N components: mean x and covariance P.
 template <int N>
 struct Belief {
   static constexpr int dim = N;

@@ -58,7 +58,7 @@ struct ClusterCovariance {
 
 /// The same for clusters in parameters in which the information is 1: H⁻¹ = L Lᵀ, their steps are L⁻¹ d, their spreads
 /// L⁻¹ … L⁻ᵀ; without a spread they have equal shares. An estimator that makes them so has less to multiply. No
-/// parameter is held.
+/// parameter is fixed.
 [[nodiscard]] ClusterCovariance whitened_cluster_covariance(const Eigen::MatrixXd& L, double noise_variance,
                                                             std::vector<ClusterStep> clusters);
 

@@ -169,7 +169,7 @@ TEST(ClusterCovariance, WhitenedClustersSayTheSame) {
   }
 }
 
-TEST(ClusterCovariance, HeldParametersStayHeld) {
+TEST(ClusterCovariance, FixedParametersStayFixed) {
   auto random = seeded(5);
   const Regression drawn = draw(13, 1.0, random);
   MatrixXd inverse = MatrixXd::Zero(5, 5);
@@ -181,11 +181,11 @@ TEST(ClusterCovariance, HeldParametersStayHeld) {
     steps.back().step(at) = step.step;
     steps.back().spread(at, at) = step.spread;
   }
-  const ClusterCovariance with_held = cluster_covariance(inverse, drawn.noise_variance, steps);
+  const ClusterCovariance with_fixed = cluster_covariance(inverse, drawn.noise_variance, steps);
   const ClusterCovariance without = cluster_covariance(drawn.inverse, drawn.noise_variance, drawn.steps);
-  EXPECT_EQ(with_held.cov.row(2).norm(), 0.0);
-  EXPECT_LT((with_held.cov(at, at) - without.cov).norm(), 1e-12 * without.cov.norm());
-  EXPECT_EQ(with_held.inflation[2], 1.0);
+  EXPECT_EQ(with_fixed.cov.row(2).norm(), 0.0);
+  EXPECT_LT((with_fixed.cov(at, at) - without.cov).norm(), 1e-12 * without.cov.norm());
+  EXPECT_EQ(with_fixed.inflation[2], 1.0);
 }
 
 TEST(ClusterCovariance, TooFewClustersGiveTheModels) {

@@ -18,9 +18,9 @@ struct Innovation {
 
 ALIDADE_PUBLIC_END
 
-/// χ² of so many numbers as σ of a normal one. Where the σ that they are measured by was estimated from residuals that
-/// hold them, with `num_estimated` degrees of freedom (0: it was given), the share of χ² in those makes an F. E.
-/// Paulson, Ann. Math. Stat. 13, 1942.
+/// χ² of so many degrees of freedom as σ of a normal. Where the σ that they are measured by was estimated from
+/// residuals that hold them, with `num_estimated` degrees of freedom (0: it was given), the share of χ² in those makes
+/// an F. E. Paulson, Ann. Math. Stat. 13, 1942.
 [[nodiscard]] inline double score_sigmas(double chi2, double num, double num_estimated) {
   const double left = num_estimated - num;
   const bool is_estimated = left >= 2.0;

@@ -10,7 +10,7 @@
 
 namespace alidade {
 
-/// Two numbers seen of a position, their derivative by it, and their noise if it is there.
+/// Two observed components of a position, their derivative by it, and their noise if it is there.
 struct PositionSeen {
   Eigen::Vector2d z;
   Eigen::Matrix<double, 2, 3> J_z_position;

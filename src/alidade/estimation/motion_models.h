@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// How a target moves between measurements: the belief dt ≥ 0 later. The first three numbers of every state are the
+/// How a target moves between measurements: the belief dt ≥ 0 later. The first three components of every state are the
 /// position [m], the next three the velocity [m/s]; the frame is the caller's and does not rotate.
 template <class Model>
 concept MotionModel = requires(const Model& model, const Belief<Model::dim>& belief, double dt_s) {

@@ -9,7 +9,7 @@ namespace {
 
 TEST(Progress, AnEmptyOneNeverStops) { EXPECT_NO_THROW(report_progress({}, "work", 1, 2)); }
 
-TEST(Progress, IsToldWhatAndHowFar) {
+TEST(Progress, SaysWhatAndHowFar) {
   std::string given;
   const Progress progress = [&](std::string_view what, std::size_t done, std::size_t total) {
     given = std::string(what) + " " + std::to_string(done) + "/" + std::to_string(total);

@@ -123,9 +123,9 @@ void expect_one_of_two(const Content& now, const Content& old, const Content& ma
 
 TEST(FolderSwap, KilledAtAnyMomentTheFolderIsTheOldOneOrTheNewOne) {
   int num_old = 0, num_runs = 0;
-  double most_wait_us = 4000.0;  // grows while no run comes to its end, as a busy disk makes all of them slower
+  double max_wait_us = 4000.0;  // grows while no run comes to its end, as a busy disk makes all of them slower
   for (; num_runs < 40; ++num_runs) {
-    const auto wait_us = static_cast<int>(most_wait_us * (num_runs % 10) / 10.0);
+    const auto wait_us = static_cast<int>(max_wait_us * (num_runs % 10) / 10.0);
     const int num_old_before = num_old;
     const TemporaryFolder folder;
     Content old, made;
@@ -146,7 +146,7 @@ TEST(FolderSwap, KilledAtAnyMomentTheFolderIsTheOldOneOrTheNewOne) {
         });
     { const FolderSwap next(folder.path()); }  // clears what was left
     expect_one_of_two(content_of(folder.path()), old, made, &num_old);
-    most_wait_us *= num_old > num_old_before ? 1.1 : 0.9;
+    max_wait_us *= num_old > num_old_before ? 1.1 : 0.9;
   }
   EXPECT_GT(num_old, 0);
   EXPECT_LT(num_old, num_runs) << "no run came to its end";

@@ -52,13 +52,13 @@ void sync_file(const std::filesystem::path& file, const Descriptor& open) {
 }
 
 void sync_all(const std::vector<std::filesystem::path>& paths) {
-  constexpr std::size_t most_at_once = 8;  // they wait for the disk, not for a core
+  constexpr std::size_t max_at_once = 8;  // they wait for the disk, not for a core
   Syncing syncing(paths);
   {
     std::vector<std::jthread> others;
-    others.reserve(most_at_once);
+    others.reserve(max_at_once);
     try {
-      for (std::size_t i = 1; i < std::min(most_at_once, paths.size()); ++i)
+      for (std::size_t i = 1; i < std::min(max_at_once, paths.size()); ++i)
         others.emplace_back([&syncing] { syncing.work(); });
     } catch (const std::exception&) {  // no more threads: those that are there do it
     }

@@ -38,7 +38,7 @@ struct FleetRow {
 struct FleetPoint {
   std::array<double, 3> direction{};  ///< e, of length 1; e1 and e2 follow from it.
   std::array<double, 2> ab{};
-  std::array<double, 2 * num_fleet_common> slope{};  ///< Of (a, b) over the common parameters, row-major.
+  std::array<double, 2 * num_fleet_common> slope{};  ///< Of (a, b) over the shared parameters, row-major.
   std::array<double, 3> cov{};                       ///< Given those: aa, ab, bb.
 };
 

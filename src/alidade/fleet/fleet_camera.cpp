@@ -17,8 +17,8 @@ namespace {
 constexpr int frozen_rows = 5;      // the same pixels so often, while the camera rotated
 constexpr double turned_px = 3.0;   // by so much that they would have moved
 constexpr double fresh_s = 3600.0;  // an alarm is in the verdict for so long
-constexpr double most_rad = 1e3;    // of an angle or a rate
-constexpr double most_c = 1e3;      // of a temperature
+constexpr double max_rad = 1e3;     // of an angle or a rate
+constexpr double max_c = 1e3;       // of a temperature
 constexpr double degree = std::numbers::pi / 180.0;
 
 /// Pixels far outside the image are none.
@@ -38,7 +38,7 @@ void note_row(const FleetRow& row, const FleetRotation& rotation, FleetCamera& c
   camera.rate = {row.rotation[0], row.rotation[1], row.rotation[2]};
   camera.has_row = 1;
   camera.t_s = row.t_s;
-  if (std::abs(row.temperature_c) < most_c) camera.temperature_c = static_cast<float>(row.temperature_c);
+  if (std::abs(row.temperature_c) < max_c) camera.temperature_c = static_cast<float>(row.temperature_c);
   for (std::size_t i = 0; i < camera.px.size(); ++i) camera.px[i] = static_cast<float>(row.px[i]);
 }
 
@@ -119,7 +119,7 @@ std::optional<FleetAlarm> advance(FleetCamera& camera, const FleetRow& given, co
     const int num_points = std::clamp(row.num_points, static_cast<int>(camera.num_points), max_fleet_points);
     camera.num_points = static_cast<std::uint8_t>(num_points);
   }
-  const bool is_turned = std::ranges::all_of(row.rotation, [](double r) { return std::abs(r) < most_rad; });
+  const bool is_turned = std::ranges::all_of(row.rotation, [](double r) { return std::abs(r) < max_rad; });
   if (row.source != camera.source || !std::isfinite(row.t_s) || !is_turned) return std::nullopt;
   const FleetRotation rotation = rotation_of(camera, row);
   if (!rotation.before.allFinite() || !rotation.after.allFinite()) return std::nullopt;

@@ -23,7 +23,7 @@ struct FleetPrediction {
   Eigen::Matrix<double, 2, 3> by_ray;  ///< Over the direction.
 };
 
-/// The view of one row, so many °C above where fx and fy are what the common parameters say.
+/// The view of one row, so many °C above where fx and fy are what the shared parameters say.
 class FleetView {
  public:
   FleetView(const FleetRotation& rotation, const FleetCommon& common, double warmer_c = 0.0);

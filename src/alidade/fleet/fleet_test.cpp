@@ -17,7 +17,7 @@ namespace {
 const FleetConfig fleet_config{640, 480};
 
 FleetRow row_of(const FleetScene& scene, const FleetSceneConfig& config, std::int64_t n) {
-  return fleet_row_of(simulate_sight(scene, config, 7, n), n);
+  return fleet_row_of(simulate_observation(scene, config, 7, n), n);
 }
 
 struct Watched {

@@ -9,7 +9,7 @@ namespace alidade {
 namespace {
 
 constexpr double allowance = 1.0;       // of the sums, σ: half the change that they find fastest
-constexpr double most_a_row = 4.0;      // σ: an outlier row alone is no change
+constexpr double max_per_row = 4.0;     // σ: an outlier row alone is no change
 constexpr int learning_rows = 5;        // of a change, before it is reported
 constexpr double largest_change = 0.5;  // rad, or relative: more is another camera
 constexpr double drift_prior = 2e-4;    // σ of f per °C before it is known: metal and glass have 10⁻⁵ to 10⁻⁴
@@ -36,7 +36,7 @@ void store(const FleetCommonMatrix& P, Upper& upper) {
 
 using Slope = Eigen::Map<Eigen::Matrix<double, 2, num_fleet_common, Eigen::RowMajor>>;
 
-/// What a row says of a point, given the common parameters.
+/// What a row says of a point, given the shared parameters.
 struct Seen {
   std::size_t point = 0;
   Eigen::Vector2d innovation;
@@ -59,7 +59,7 @@ struct Innovations {
 
 /// A point that is somewhere else, where most points fit: no change of the camera. Where most do not, it may be one.
 void leave_out_strays(const FleetCommonMatrix& P, Innovations& all) {
-  constexpr double fits = 30.0, strays = 60.0;  // χ² of two numbers: 3·10⁻⁷, 10⁻¹³
+  constexpr double fits = 30.0, strays = 60.0;  // χ² of two degrees of freedom: 3·10⁻⁷, 10⁻¹³
   std::array<double, max_fleet_points> own{};
   std::size_t num_fit = 0;
   for (std::size_t i = 0; i < all.num; ++i) {
@@ -147,7 +147,7 @@ void take_in(const Innovations& all, FleetTracking& tracking) {
   store(all.after, tracking.P);
 }
 
-/// The common parameters walk by so much. The joint normal is projected on the nearest arrowhead, as ArrowheadFilter
+/// The shared parameters walk by so much. The joint normal is projected on the nearest arrowhead, as ArrowheadFilter
 /// does it; what was exact before has no part in it.
 void walk(const FleetCommon& variance, FleetTracking& tracking) {
   const FleetCommonMatrix P = matrix_of(tracking.P);
@@ -269,7 +269,7 @@ int clearest_of(const Innovations& all, const FleetSums& sums, double threshold,
   for (std::size_t i = 0; i < sums.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i / 2);
     const double z = (i % 2 == 0 ? 1.0 : -1.0) * change[at] / std::sqrt(cov(at, at));
-    if (!(sums[i].sum > threshold - most_a_row) || !(z > best)) continue;  // beyond it by the next row
+    if (!(sums[i].sum > threshold - max_per_row) || !(z > best)) continue;  // beyond it by the next row
     best = z;
     found = static_cast<int>(i);
   }
@@ -287,7 +287,7 @@ int add_scores(FleetSums& sums, const FleetScores& row, double noise_factor, dou
     const double u = row.score[channel] / std::sqrt(noise_factor * row.information[channel]);
     FleetSum& sum = sums[i];
     if (sum.sum == 0.0) sum = {0.0, 0.0, 0.0, t_s};
-    const double along = std::clamp(i % 2 == 0 ? u : -u, -most_a_row, most_a_row);
+    const double along = std::clamp(i % 2 == 0 ? u : -u, -max_per_row, max_per_row);
     sum.sum = std::max(0.0, sum.sum + along - allowance);
     sum.score += row.score[channel];
     sum.information += row.information[channel];

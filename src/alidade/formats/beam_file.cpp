@@ -52,7 +52,7 @@ BeamMatrix read_beam_covariance(const YAML::Node& node, const Fields& fields, co
 Eigen::MatrixXd read_cov_with_lens(const Fields& fields, const Eigen::Vector3d& direction) {
   const std::vector<double> numbers = fields.numbers("covariance_with_camera");
   if (numbers.empty() || numbers.size() % 7 != 0)
-    refuse(fields.file(), fields.full("covariance_with_camera"), "must be 7 rows of numbers, one a lens parameter");
+    refuse(fields.file(), fields.full("covariance_with_camera"), "must be 7 rows of numbers, one per lens parameter");
   const auto cols = static_cast<Eigen::Index>(numbers.size() / 7);
   const Eigen::Map<const Eigen::Matrix<double, 7, Eigen::Dynamic, Eigen::RowMajor>> embedded(numbers.data(), 7, cols);
   return embedding_of(direction).transpose() * embedded;

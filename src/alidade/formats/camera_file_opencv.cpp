@@ -15,8 +15,7 @@ namespace {
 std::vector<double> from_camera_matrix(const std::vector<double>& K, const std::string& file, const std::string& key) {
   if (K.size() != 9) refuse(file, key, fmt::format("{} numbers are not a 3×3 matrix", K.size()));
   if (K[1] != 0.0) {
-    refuse(file, key,
-           fmt::format("a skew of {} px, which OpenCV and ROS leave out of every projection; set it to 0", K[1]));
+    refuse(file, key, fmt::format("a skew of {} px, which OpenCV and ROS ignore; set it to 0", K[1]));
   }
   if (K[3] != 0.0 || K[6] != 0.0 || K[7] != 0.0 || K[8] != 1.0)
     refuse(file, key, "is not a camera matrix [fx 0 cx; 0 fy cy; 0 0 1]");

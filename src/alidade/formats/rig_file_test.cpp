@@ -75,7 +75,7 @@ TEST_F(RigFile, ReadsBackWhatWasWritten) {
   expect_same(read_rig(write(rig_text(rig, files))), rig);
 }
 
-TEST_F(RigFile, WhatIsLeftOutIsZeroOrIdentity) {
+TEST_F(RigFile, WhatIsOmittedIsZeroOrIdentity) {
   const Rig rig = read_rig(write("heads: [{camera: camera.yaml}, {id: 7, camera: camera.yaml}]\n"));
   ASSERT_EQ(rig.heads.size(), 2u);
   EXPECT_EQ(rig.heads[0].head.id, 1);

@@ -64,7 +64,7 @@ class Ldlt {
 [[nodiscard]] Eigen::VectorXd solve_symmetric(const Eigen::Ref<const Eigen::MatrixXd>& A,
                                               const Eigen::Ref<const Eigen::VectorXd>& b);
 [[nodiscard]] Eigen::MatrixXd inverse_symmetric(const Eigen::Ref<const Eigen::MatrixXd>& A);
-/// eᵀ Σ⁻¹ e: χ² with as many degrees of freedom as e has numbers, where Σ is its covariance.
+/// eᵀ Σ⁻¹ e: χ² with as many degrees of freedom as e has components, where Σ is its covariance.
 [[nodiscard]] double squared_mahalanobis(const Eigen::Ref<const Eigen::VectorXd>& error,
                                          const Eigen::Ref<const Eigen::MatrixXd>& cov);
 

@@ -59,8 +59,8 @@ Rigid3 motion_between(const std::array<Eigen::Vector3d, 3>& from, const std::arr
   };
   Rigid3 to_from;
   to_from.rotation = Eigen::Quaterniond(axes(to) * axes(from).transpose()).normalized();
-  const Eigen::Vector3d middle_from = (from[0] + from[1] + from[2]) / 3.0, middle_to = (to[0] + to[1] + to[2]) / 3.0;
-  to_from.translation = middle_to - to_from.rotation * middle_from;
+  const Eigen::Vector3d centre_from = (from[0] + from[1] + from[2]) / 3.0, centre_to = (to[0] + to[1] + to[2]) / 3.0;
+  to_from.translation = centre_to - to_from.rotation * centre_from;
   return to_from;
 }
 

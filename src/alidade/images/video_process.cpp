@@ -158,24 +158,24 @@ void VideoProcess::read_header() {
   }
   if (is_stream_)
     throw InputError(video_.string() +
-                     ": no pictures come from there: nothing answers, or what answers is no video, or "
+                     ": no images arrive: nothing answers, or what answers is no video, or "
                      "another program has the camera");
   throw InputError(video_.string() + ": not a video that can be read");
 }
 
 std::vector<unsigned char> VideoProcess::next() {
   char mark = 0;
-  if (!read_bytes(&mark, 1)) throw InputError(video_.string() + ": the decoder gave up in the middle");
+  if (!read_bytes(&mark, 1)) throw InputError(video_.string() + ": the decoder stopped within a frame");
   if (mark != 'f') return {};
   std::array<double, 2> times{};
   if (!read_bytes(times.data(), sizeof times))
-    throw InputError(video_.string() + ": the decoder gave up in the middle");
+    throw InputError(video_.string() + ": the decoder stopped within a frame");
   time_ = {times[0], times[1]};
   const std::size_t channels = colour_ == FrameColour::bgr ? 3 : 1;
   std::vector<unsigned char> frame(static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_) *
                                    channels);
   if (!read_bytes(frame.data(), frame.size()))
-    throw InputError(video_.string() + ": the decoder gave up in the middle");
+    throw InputError(video_.string() + ": the decoder stopped within a frame");
   return frame;
 }
 

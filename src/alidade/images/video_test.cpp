@@ -105,7 +105,7 @@ TEST(VideoFrames, OfAFileAreDecoded) {
   EXPECT_TRUE(video.next().empty());
 }
 
-TEST(VideoFrames, CanBeLeftInTheMiddle) {
+TEST(VideoFrames, CanBeLeftHalfway) {
   const TemporaryFolder folder;
   write_file(folder.path() / "long.y4m", raw_video(std::vector<int>(400, 90)));
   VideoFrames video(folder.path() / "long.y4m");

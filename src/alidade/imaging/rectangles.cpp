@@ -160,8 +160,8 @@ std::optional<SeenRectangle> fitted(const cv::Mat& grey, const Camera& camera, c
 
 /// Grey values inside, and on both sides of the edges.
 void measure_light(const cv::Mat& grey, SeenRectangle& seen) {
-  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
-  for (const Eigen::Vector2d& corner : seen.corners_px) middle += 0.25 * corner;
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& corner : seen.corners_px) centre += 0.25 * corner;
   double sum = 0.0, squares = 0.0, steps = 0.0;
   int num = 0, num_steps = 0;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -175,7 +175,7 @@ void measure_light(const cv::Mat& grey, SeenRectangle& seen) {
         ++num_steps;
       }
       for (double depth = 0.15; depth < 0.95; depth += 0.2) {
-        const double value = grey_at(grey, on_edge + depth * (middle - on_edge));
+        const double value = grey_at(grey, on_edge + depth * (centre - on_edge));
         if (!std::isfinite(value)) continue;
         sum += value;
         squares += value * value;

@@ -8,7 +8,7 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// A camera that moves: where it is, and how fast. Its error has 12 numbers, in this order: position in the world,
+/// A camera that moves: where it is, and how fast. Its error has 12 components, in this order: position in the world,
 /// rotation on the right (q = q̂ exp(δθ)), velocity in the world, angular rate in the camera's frame.
 struct CameraMotion {
   Rigid3 world_from_cam;
@@ -34,7 +34,7 @@ struct MotionJacobians {
 [[nodiscard]] MotionMatrix motion_noise(const MotionJacobians& jacobians, double sigma_a_m_s2,
                                         double sigma_alpha_rad_s2, double dt_s);
 
-/// Motion ⊞ error: the nominal one moved by 12 numbers.
+/// Motion ⊞ error: the nominal one moved by 12 components.
 [[nodiscard]] CameraMotion retract(const CameraMotion& motion, const Eigen::Vector<double, motion_dim>& error);
 
 /// J_r with exp(φ + ε) ≈ exp(φ) exp(J_r ε): I − (1 − cos θ)/θ² [φ]× + (θ − sin θ)/θ³ [φ]×².

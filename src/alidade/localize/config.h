@@ -31,7 +31,7 @@ struct LocalizationFilterConfig {
   double sigma_a_m_s2 = 1.0;        ///< Acceleration between predictions; a hand's is about 4.
   double sigma_alpha_rad_s2 = 1.5;  ///< Angular acceleration; a hand's is about 6.
   int max_iterations = 4;           ///< Gauss–Newton steps of an update.
-  double gate = 13.8;               ///< χ² of two numbers: 99.9 %.
+  double gate = 13.8;               ///< χ² of two components: 99.9 %.
   double bend_tolerance = 0.05;     ///< Iterate while innovations are further from linear than so many σ.
   bool is_sequential = true;        ///< Known points first, then by growing innovation; false: in the order given.
   bool finds_consensus = true;      ///< One-point consensus where observations disagree: mismatches.

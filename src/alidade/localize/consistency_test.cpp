@@ -11,7 +11,7 @@
 namespace alidade {
 namespace {
 
-/// How the whole state changes as the world turns about its origin, and as it is moved: by finite differences.
+/// How the whole state changes as the world rotates about its origin, and as it is moved: by finite differences.
 Eigen::MatrixXd gauge_of(const LocalizationFilter& filter) {
   Eigen::MatrixXd N = Eigen::MatrixXd::Zero(filter.dim(), 6);
   constexpr double h = 1e-6;
@@ -47,9 +47,9 @@ double information_of(const LocalizationFilter& filter) {
   return std::log(information.determinant());
 }
 
-/// Without known points no observation tells where the world is or how it is turned: an update changes what is known of
-/// that by nothing, though the state it is linearised at moves. With places: inverse depths that begin in one image
-/// share their first three numbers, and such a covariance has no inverse.
+/// Without known points no observation determines where the world is or how it is rotated: an update changes what is
+/// known of that by nothing, though the state it is linearised at moves. With positions: inverse depths that begin in
+/// one image share their first three numbers, and such a covariance has no inverse.
 TEST(Consistency, NothingSeenTellsHowTheWorldIsTurned) {
   UnderwaterScene scene;
   scene.camera = underwater_camera();
@@ -94,14 +94,14 @@ TEST(Consistency, TheUnturnedPlaceAndItsDerivativeBelongTogether) {
     const Feature moved = there.feature_before(feature, no_error);
     const Eigen::Vector<double, 6> numeric = (moved.values - feature.values) / h;
     EXPECT_LT((numeric - J_before_turn(feature).col(axis)).norm(), 1e-6);
-    // Turned back, it is where it was: an error of the rotation alone moves nothing else.
+    // Rotated back, it is where it was: an error of the rotation alone moves nothing else.
     EXPECT_LT((WorldTurn::turned(there.G(), moved).values - feature.values).norm(), 1e-11);
   }
 }
 
 /// 500 frames of a camera that starts in front of a small flat target: what it says of its pose in the target's frame
-/// holds to the end. One that forgets that nothing seen tells how the world is turned has 100 and more here. What is
-/// above 1 is left by the first frames, whose turns are large while depths are vague.
+/// holds to the end. One that forgets that nothing seen determines how the world is rotated has 100 and more here. What
+/// is above 1 is left by the first frames, whose rotations are large while depths are vague.
 TEST(Consistency, ThePoseIsAsGoodAsItsCovarianceSaysOverHundredsOfFrames) {
   constexpr int num_seeds = 6;
   testing::DeskWalk walk;

@@ -12,7 +12,7 @@
 
 namespace alidade {
 
-/// A pose has six numbers, a point two.
+/// A pose has six components, a point two.
 inline constexpr std::size_t min_observations = 3;
 
 /// A path while it is made: the filters, and what is kept of them from frame to frame. Two front ends drive it, one

@@ -28,7 +28,7 @@ struct SeenPoints {
 SeenPoints seen_points(std::span<const FeatureObservation> observations, std::span<const KnownPoint> known) {
   SeenPoints seen;
   std::vector<Eigen::Vector3d> points_in_world;
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   for (const FeatureObservation& observation : observations) {
     const auto at = std::ranges::find(known, observation.id, &KnownPoint::id);
     if (at == known.end()) continue;
@@ -37,13 +37,13 @@ SeenPoints seen_points(std::span<const FeatureObservation> observations, std::sp
     corner.px = observation.px;
     seen.view.corners.push_back(corner);
     points_in_world.push_back(at->point_in_world);
-    middle += at->point_in_world;
+    centre += at->point_in_world;
     seen.sigma_m = std::max(seen.sigma_m, at->sigma_m);
   }
   if (points_in_world.empty()) return seen;
-  middle /= static_cast<double>(points_in_world.size());
+  centre /= static_cast<double>(points_in_world.size());
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-  for (const Eigen::Vector3d& point : points_in_world) scatter += (point - middle) * (point - middle).transpose();
+  for (const Eigen::Vector3d& point : points_in_world) scatter += (point - centre) * (point - centre).transpose();
   const SymmetricEigen3 eigen = symmetric_eigen3(scatter);
   const double num = static_cast<double>(points_in_world.size());
   seen.length_m = std::sqrt(std::max(eigen.values[2], 0.0) / num);
@@ -51,7 +51,7 @@ SeenPoints seen_points(std::span<const FeatureObservation> observations, std::sp
   seen.depth_m = std::sqrt(std::max(eigen.values[0], 0.0) / num);
   Eigen::Matrix3d axes;
   axes << eigen.vectors.col(2), eigen.vectors.col(1), eigen.vectors.col(2).cross(eigen.vectors.col(1));
-  seen.world_from_board = {Eigen::Quaterniond(axes), middle};
+  seen.world_from_board = {Eigen::Quaterniond(axes), centre};
   for (const Eigen::Vector3d& point_in_world : points_in_world)
     seen.points_in_board.push_back(seen.world_from_board.inverse() * point_in_world);
   return seen;
@@ -90,7 +90,7 @@ std::vector<BoardPoseFit> fits_of(const Camera& camera, const SeenPoints& seen, 
                          effective_sigma_px(camera, fits.front(), seen.sigma_m, sigma_px));
 }
 
-constexpr double max_pose_chi2_per_dof = 6.9;  // 99.9 % of the two numbers that four points leave
+constexpr double max_pose_chi2_per_dof = 6.9;  // 99.9 % of the two components that four points leave
 constexpr double max_chi2 = 13.8;              // 99.9 % of a point's two
 
 bool agree(const std::vector<BoardPoseFit>& fits) {
@@ -125,7 +125,7 @@ std::vector<std::array<std::size_t, 4>> fours_of(std::size_t num) {
 }
 
 /// How many have to agree on a pose: of more than five more than four, and half of all.
-std::size_t least_agreeing(std::size_t num) {
+std::size_t min_agreeing(std::size_t num) {
   constexpr std::size_t few = 5;
   return num <= few ? 4 : std::max<std::size_t>(few, (num + 1) / 2);
 }
@@ -143,7 +143,7 @@ std::vector<BoardPoseFit> agreed_poses(const Camera& camera, const SeenPoints& s
       if (agreeing.corners.size() > best.corners.size()) best = std::move(agreeing);
     }
   }
-  if (best.corners.size() < least_agreeing(num)) return {};
+  if (best.corners.size() < min_agreeing(num)) return {};
   std::vector<BoardPoseFit> fits = fits_of(camera, seen, best, sigma_px);
   if (fits.empty()) return fits;
   const BoardView again = fitting(camera, seen, fits.front(), sigma_px);
@@ -151,7 +151,8 @@ std::vector<BoardPoseFit> agreed_poses(const Camera& camera, const SeenPoints& s
   return fits;
 }
 
-/// Points on a line up to what they are known by: how the camera is turned about it, and where it is, no pixel tells.
+/// Points on a line up to what they are known by: how the camera is rotated about it, and where it is, no pixel
+/// determines.
 bool is_line(const SeenPoints& seen) {
   constexpr double certain = 3.0, wide = 0.02;
   return seen.width_m < std::max(certain * seen.sigma_m, wide * seen.length_m);
@@ -186,7 +187,7 @@ InSpace in_space(const Camera& camera, std::span<const FeatureObservation> obser
 /// Poses from drawn sets of three, those that explain most first.
 std::vector<Rigid3> poses_of_threes(const Camera& camera, const InSpace& seen) {
   constexpr int num_draws = 60;           // with 40 % mismatches one in five sets is right
-  constexpr double near_px2 = 8.0 * 8.0;  // three noisy rays place the others so well
+  constexpr double near_px2 = 8.0 * 8.0;  // three noisy rays locate the others so well
   constexpr std::size_t max_poses = 6;
   const std::size_t num = seen.placed.size();
   std::mt19937_64 bits(1);
@@ -244,7 +245,7 @@ std::vector<StartHypothesis> poses_in_space(const Camera& camera, const InSpace&
   for (const Rigid3& begin : poses_of_threes(camera, seen)) {
     const std::array<Rigid3, 1> from{begin};
     const auto found = resection(camera, seen.placed, from, max_chi2);
-    if (!found || found->num_fit < least_agreeing(num)) continue;
+    if (!found || found->num_fit < min_agreeing(num)) continue;
     auto start = start_at(camera, seen, *found, config);
     if (!start) continue;
     start->cost = found->cost;

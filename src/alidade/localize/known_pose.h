@@ -12,7 +12,7 @@ namespace alidade {
 /// nearly has, by maximum likelihood, the better one first, with their covariance; speeds zero with these σ. Of more
 /// than four points those that do not fit are rejected. Where no pose fits a plane through the points, and they are in
 /// none, poses from sets of three of them (three_point_pose.h). Empty where fewer than four are seen, they are on a
-/// line, or no pose fits (χ² beyond 99.9 %): observations that show another place.
+/// line, or no pose fits (χ² beyond 99.9 %): observations that show another point.
 struct KnownPoseConfig {
   double sigma_px = 0.5;
   double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;
@@ -22,7 +22,7 @@ struct KnownPoseConfig {
                                                             std::span<const KnownPoint> known,
                                                             const KnownPoseConfig& config = {});
 
-/// The same starts as places to begin at and no more: σ of the pose ten times as wide, all at the same cost. For when
+/// The same starts as initial guesses and no more: σ of the pose ten times as wide, all at the same cost. For when
 /// the observations that led to them follow as a measurement: a hundredth of them then counts twice, and not all.
 [[nodiscard]] std::vector<StartHypothesis> only_where(std::vector<StartHypothesis> starts);
 

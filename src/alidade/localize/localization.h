@@ -110,7 +110,7 @@ struct PathError {
 struct Localization {
   std::vector<PathStep> path;  ///< One per frame.
   std::vector<MapPoint> map;   ///< At the end.
-  SavedMap saved_map;          ///< The same for another run to begin in: points whose place is known well enough.
+  SavedMap saved_map;          ///< The same for another run to begin in: points whose position is known well enough.
   bool scale_known = false;
   bool is_scale_read = false;              ///< Known by `sensor_scales`, and not by a target.
   std::vector<SensorScale> sensor_scales;  ///< Of what readings there were.
@@ -148,7 +148,7 @@ struct Localization {
   /// Of a smoothed path: along its least certain direction the cost rises more slowly to one side than to the other, or
   /// than σ says; σ is enlarged there by so much.
   double widened = 1.0;
-  /// Of a smoothed path: the camera hardly moves aside, and its least certain numbers are less sure than their σ.
+  /// Of a smoothed path: the camera hardly moves aside, and its least certain components are less sure than their σ.
   bool is_from_one_place = false;
   std::vector<GivenNumber> given;  ///< What was given, and what it does.
   double lens_pull = 0.0;          ///< Of a lens that was estimated: how far from what was given, in the given σ.

@@ -244,7 +244,7 @@ TEST(Localize, AWrongPathIsNeverGood) {
   LocalizeConfig sure = sample.config;
   sure.filter.sigma_px = 0.1;  // five times better than it is
   EXPECT_GE(verdict_of(sample.camera, sure).state, State::bad);
-  LocalizeConfig swapped = sample.config;  // points told at each other's places
+  LocalizeConfig swapped = sample.config;  // points given at each other's positions
   for (std::size_t i = 0; i + 1 < swapped.target.points.size(); i += 2)
     std::swap(swapped.target.points[i].point_in_world, swapped.target.points[i + 1].point_in_world);
   EXPECT_NE(verdict_of(sample.camera, swapped).state, State::good);
@@ -260,7 +260,7 @@ TEST(Localize, APinholeInPlaceOfADistortingLensIsNeverGood) {
   }
 }
 
-/// A port of 5 cm, turned by 2°, before a lens without distortion.
+/// A port of 5 cm, rotated by 2°, before a lens without distortion.
 Camera camera_behind_port() {
   Params<FlatPort> p;
   p << 576.0, 576.0, 384.0, 288.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.05, 0.01, 1.5, 1.34, 0.0348995, 0.0;

@@ -11,7 +11,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t max_known_at_once = 100;  // three numbers each: the others need their part of the state
+constexpr std::size_t max_known_at_once = 100;  // three components each: the others need their part of the state
 
 }  // namespace
 
@@ -176,7 +176,7 @@ void ObservationLocalizer::place_by_target(const ObservationFrame& frame) {
   if (!from.empty()) engine_.filters().restart(from);
 }
 
-/// χ² of six numbers.
+/// χ² of six components.
 double ObservationLocalizer::contradiction_of(const StartHypothesis& from) const {
   const LocalizationFilter& now = engine_.best();
   const CameraMotion& is = now.motion();
@@ -188,7 +188,7 @@ double ObservationLocalizer::contradiction_of(const StartHypothesis& from) const
   return difference.dot(cov.inverse() * difference);
 }
 
-constexpr double max_contradiction = 22.5;  // χ² of six numbers: 99.9 %
+constexpr double max_contradiction = 22.5;  // χ² of six components: 99.9 %
 
 /// Where the camera is by the target, if that contradicts the path. Empty: it does not, or its observations fit no
 /// pose.
@@ -246,7 +246,7 @@ bool ObservationLocalizer::restart(const ObservationFrame& frame, Doubt doubt) {
 }
 
 /// Where observations contradict a path that nothing but itself holds: it and its map are given up, and another begins
-/// where it ends. What was seen before is placed by the map that follows (observation_record.h).
+/// where it ends. What was seen before is located by the map that follows (observation_record.h).
 bool ObservationLocalizer::begin_again(Doubt doubt) {
   constexpr std::size_t enough_tried = 10, young = 200;  // frames; a path that was right for long is not given up
   const std::size_t age = num_taken_ - record_.begun();
@@ -261,8 +261,8 @@ bool ObservationLocalizer::begin_again(Doubt doubt) {
   return true;
 }
 
-/// A point whose place no single look can change much: one of the target's, or a settled one. New ones explain whatever
-/// the known ones do not contradict.
+/// A point whose position no single look can change much: one of the target's, or a settled one. New ones explain
+/// whatever the known ones do not contradict.
 bool ObservationLocalizer::is_firm(long id) const {
   const auto& features = engine_.best().features();
   const auto feature = std::ranges::find(features, id, &Feature::id);

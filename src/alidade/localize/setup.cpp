@@ -25,7 +25,7 @@ struct OnlineParameter {
 constexpr std::array<OnlineParameter, 8> online{
     {{"fx", 8.0}, {"fy", 8.0}, {"cx", 6.0}, {"cy", 6.0}, {"k1", 0.05}, {"k2", 0.1}, {"p1", 0.02}, {"p2", 0.02}}};
 
-/// The numbers that a person does not set: their names and limits.
+/// The values that a user does not set: their names and limits.
 FieldList inner_fields(LocalizeConfig& config) {
   constexpr Limits positive{.min = 0.0, .is_above_min = true}, share{0.0, 1.0}, from_zero{.min = 0.0};
   constexpr Limits count{1.0, 1e6}, size{0.0, 1e6};

@@ -14,7 +14,7 @@ struct Stills {
   std::vector<TimedPose> truth;
 };
 
-Rigid3 looking_at_the_middle(Draws& draws) {
+Rigid3 looking_at_the_centre(Draws& draws) {
   const Eigen::Vector3d place(draws.uniform(-0.4, 0.4), draws.uniform(-0.3, 0.3), draws.uniform(-0.8, -0.45));
   const Eigen::Quaterniond towards = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), -place);
   return {
@@ -27,7 +27,7 @@ Stills stills(const Camera& camera, std::span<const Eigen::Vector3d> points, int
   Stills all;
   const Eigen::VectorXd p = params(camera.lens);
   for (int k = 0; k < num;) {
-    const Rigid3 world_from_cam = looking_at_the_middle(draws);
+    const Rigid3 world_from_cam = looking_at_the_centre(draws);
     ObservationFrame frame{k, k * dt_s, {}};
     for (std::size_t i = 0; i < points.size(); ++i) {
       const auto px = testing::hover::seen(testing::HoverLens::brown, p, world_from_cam.inverse() * points[i]);
@@ -40,7 +40,7 @@ Stills stills(const Camera& camera, std::span<const Eigen::Vector3d> points, int
   return all;
 }
 
-/// Four told corners in each, and with them forty that are not given; once a second, and as fast as a film's.
+/// Four given corners in each, and with them forty that are not given; once a second, and as fast as a film's.
 TEST(Stills, EachIsWhereItsTargetSays) {
   Camera camera = testing::hover::camera_of(testing::HoverLens::brown);
   const std::vector<Eigen::Vector3d> corners{

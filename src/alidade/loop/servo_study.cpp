@@ -126,7 +126,7 @@ double settling_of(const ServoScenario& scenario, ControllerKind kind) {
 
 /// The loop itself, once its lens has become as long as it will, on a static target.
 double rest_px_of(const ServoScenario& scenario, ControllerKind kind) {
-  constexpr double zoom_from_s = 2.0, zoom_until_s = 3.0, least_s = 8.0, periods = 100.0;
+  constexpr double zoom_from_s = 2.0, zoom_until_s = 3.0, min_s = 8.0, periods = 100.0;
   ServoScene scene = scenario.scene;
   scene.path = {};
   scene.path.kind = PathKind::still;
@@ -135,7 +135,7 @@ double rest_px_of(const ServoScenario& scenario, ControllerKind kind) {
   scene.hidden_s.clear();
   scene.zoom.t_s = {zoom_from_s, zoom_until_s};
   scene.zoom.factor = {1.0, scenario.scene.zoom.largest()};
-  const double settle_s = std::max(least_s, periods * scene.period_s);
+  const double settle_s = std::max(min_s, periods * scene.period_s);
   scene.warm_up_s = zoom_until_s + settle_s;
   scene.duration_s = scene.warm_up_s + 0.5 * settle_s;
   ServoConfig config = scenario.config;

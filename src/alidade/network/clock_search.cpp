@@ -10,7 +10,7 @@ namespace alidade {
 namespace {
 
 constexpr double agree_px = 4.0, min_agree = 2e-3;
-constexpr std::size_t least_common = 30;
+constexpr std::size_t min_common = 30;
 
 struct Common {
   std::vector<double> t_s;
@@ -42,7 +42,7 @@ ObservationPair agreement(std::span<const ObservationSeries> series, std::size_t
   ObservationPair pair{first, second, offset_s, 0.0, 0};
   const Common common = common_observations(series[first], series[second], offset_s, most);
   pair.num_common = common.t_s.size();
-  if (pair.num_common < least_common) return pair;
+  if (pair.num_common < min_common) return pair;
   cv::Mat agree;
   const cv::Mat E = cv::findEssentialMat(common.first, common.second, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, 0.99,
                                          threshold(series[first], series[second]), samples, agree);
@@ -78,8 +78,8 @@ std::optional<ObservationPair> agreeing_offset(std::span<const ObservationSeries
     if (strength(pair) > strength(best)) best = pair;
   };
   for (auto one = coarse.begin(); one != again; ++one)
-    if (one->num_common >= least_common) consider(one->offset_s);
-  if (best.num_common < least_common) return std::nullopt;
+    if (one->num_common >= min_common) consider(one->offset_s);
+  if (best.num_common < min_common) return std::nullopt;
   const double centre_s = best.offset_s;
   const int around = steps > 0 ? static_cast<int>(std::round(0.6 * coarse_s / fine_s)) : 0;
   for (int k = -around; k <= around; ++k)
@@ -90,7 +90,7 @@ std::optional<ObservationPair> agreeing_offset(std::span<const ObservationSeries
 std::optional<RelativePose> relative_pose(const ObservationSeries& first, const ObservationSeries& second,
                                           double offset_s) {
   const Common common = common_observations(first, second, offset_s, 2000);
-  if (common.t_s.size() < least_common) return std::nullopt;
+  if (common.t_s.size() < min_common) return std::nullopt;
   const cv::Mat K = cv::Mat::eye(3, 3, CV_64F);
   cv::Mat agree, R, t, points;
   const cv::Mat E =
@@ -113,7 +113,7 @@ std::optional<RelativePose> relative_pose(const ObservationSeries& first, const 
     pose.t_s.push_back(common.t_s[i]);
     pose.point_in_first.emplace_back(point.head<3>() / point.w());
   }
-  if (pose.t_s.size() < least_common) return std::nullopt;
+  if (pose.t_s.size() < min_common) return std::nullopt;
   return pose;
 }
 
@@ -121,14 +121,14 @@ std::optional<Resection> resection(const ObservationSeries& camera, std::span<co
                                    std::span<const Eigen::Vector3d> point_in_world, double offset_s, double rate) {
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> seen;
-  const double middle_s = 0.5 * (t_s.front() + t_s.back());
+  const double mid_s = 0.5 * (t_s.front() + t_s.back());
   for (std::size_t i = 0; i < t_s.size(); ++i) {
-    const auto at = camera.seen_at(t_s[i] + offset_s + (rate - 1.0) * (t_s[i] - middle_s));
+    const auto at = camera.seen_at(t_s[i] + offset_s + (rate - 1.0) * (t_s[i] - mid_s));
     if (!at) continue;
     points.emplace_back(point_in_world[i].x(), point_in_world[i].y(), point_in_world[i].z());
     seen.emplace_back(at->x(), at->y());
   }
-  if (points.size() < least_common) return std::nullopt;
+  if (points.size() < min_common) return std::nullopt;
   cv::Mat turn, translation, agree;
   const double reach = std::max(2.0 * min_agree, 2.0 * agree_px / camera.px);
   if (!cv::solvePnPRansac(points, seen, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), turn, translation, false, 100,

@@ -40,7 +40,7 @@ struct Resection {
   double share = 0.0;
   std::size_t num_common = 0;
 };
-/// `rate`: of the camera's clock by that of the points, about the middle of the points' times.
+/// `rate`: of the camera's clock by that of the points, about the midpoint of the points' times.
 [[nodiscard]] std::optional<Resection> resection(const ObservationSeries& camera, std::span<const double> t_s,
                                                  std::span<const Eigen::Vector3d> point_in_world, double offset_s,
                                                  double rate);

@@ -66,7 +66,7 @@ Gathered gather(const MovingProblem& problem, const SolvedMoving& solved, const 
   return all;
 }
 
-/// Pulls summed over what `of` tells apart.
+/// Pulls summed over what `of` distinguishes.
 template <typename Of>
 std::vector<Pull> summed(const Pulls& pulls, Of of) {
   std::map<std::size_t, Pull> sums;

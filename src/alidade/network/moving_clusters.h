@@ -8,12 +8,12 @@
 
 namespace alidade {
 
-/// What the observations say of the common parameters once the path follows them, and of what they were given.
+/// What the observations say of the shared parameters once the path follows them, and of what they were given.
 struct MovingClusters {
   ClusterCovariance of_time;             ///< Blocks of time, all cameras together.
   Eigen::MatrixXd cov;                   ///< Blocks of time and cameras, two ways.
   double block_s = 0.0;                  ///< Length of a block.
-  std::vector<Eigen::MatrixXd> by_lens;  ///< One a head: how the common parameters follow its lens's.
+  std::vector<Eigen::MatrixXd> by_lens;  ///< One per head: how the shared parameters follow its lens's.
 };
 
 /// Errors of observations go together over time (a hand's, a lens's along the target's way) and in a camera (its lens,

@@ -11,7 +11,7 @@ namespace {
 
 using PlacedStatus = MovingTargetReport::Status;
 
-/// How well cameras agree: how many are placed, and what is left at them.
+/// How well cameras agree: how many are located, and what is left at them.
 struct Agreement {
   std::size_t num_placed = 0;
   double sigma_px = std::numeric_limits<double>::infinity();  ///< Root mean square of the cameras'.
@@ -33,19 +33,19 @@ Agreement agreement_of(const MovingTargetReport& report) {
 bool is_doubtful(const MovingTargetReport& report) {
   constexpr double usual_rad = 0.2 * degree;
   if (report.status == PlacedStatus::too_few || report.status == PlacedStatus::truth_misfits) return false;
-  const bool all_placed = std::ranges::all_of(report.cameras, &PlacedCamera::placed);
+  const bool all_located = std::ranges::all_of(report.cameras, &PlacedCamera::placed);
   const bool is_solved = report.status == PlacedStatus::placed || report.status == PlacedStatus::no_scale;
-  return !is_solved || !all_placed || report.sigma_relative_rad > usual_rad;
+  return !is_solved || !all_located || report.sigma_relative_rad > usual_rad;
 }
 
-/// The minute in the middle of the observations: enough to tell whether cameras agree.
-std::vector<TargetObservation> middle_of(std::span<const TargetObservation> observations) {
+/// The central minute of the observations: enough to tell whether cameras agree.
+std::vector<TargetObservation> central_minute(std::span<const TargetObservation> observations) {
   constexpr double enough_s = 60.0;
   const auto [first, last] = std::ranges::minmax_element(observations, {}, &TargetObservation::t_capture_s);
-  const double middle_s = 0.5 * (first->t_capture_s + last->t_capture_s);
+  const double mid_s = 0.5 * (first->t_capture_s + last->t_capture_s);
   std::vector<TargetObservation> kept;
   for (const TargetObservation& observation : observations)
-    if (std::abs(observation.t_capture_s - middle_s) <= 0.5 * enough_s) kept.push_back(observation);
+    if (std::abs(observation.t_capture_s - mid_s) <= 0.5 * enough_s) kept.push_back(observation);
   return kept;
 }
 
@@ -102,15 +102,15 @@ std::string culprit_of(const MovingTargetReport& report, std::span<const TargetO
   const bool doubtful = is_doubtful(report);
   if (observations.empty() || report.status == PlacedStatus::too_few || report.status == PlacedStatus::truth_misfits)
     return "";
-  // Exchanged lenses that differ by a few hundredths place all cameras, wrongly: a few of those are always tried.
+  // Exchanged lenses that differ by a few hundredths locate all cameras, wrongly: a few of those are always tried.
   constexpr double plainly = 0.005;
   constexpr std::size_t few = 6;
   const auto exchanges = exchanges_of(heads, doubtful ? 0.0 : plainly);
   if (!doubtful && (exchanges.empty() || exchanges.size() > few)) return "";
-  // All cameras are placed, and so are their clocks: they are not searched again.
+  // All cameras are located, and so are their clocks: they are not searched again.
   const std::vector<TargetObservation> some =
-      middle_of(doubtful ? std::vector<TargetObservation>(observations.begin(), observations.end())
-                         : by_one_clock(report, observations));
+      central_minute(doubtful ? std::vector<TargetObservation>(observations.begin(), observations.end())
+                              : by_one_clock(report, observations));
   const std::vector<RigHead> given(heads.begin(), heads.end());
   const Agreement as_given = agreement_of(place(some, given, doubtful));
   Best best;
@@ -126,7 +126,7 @@ std::string culprit_of(const MovingTargetReport& report, std::span<const TargetO
                   "heads " + name_of(given[a]) + " and " + name_of(given[b]) + " have each other's camera");
   }
   // By as much less is left as no chance would have it: of thousands of observations a hundredth would be.
-  // Where one was not placed at all, the others may have agreed well: so must all now.
+  // Where one was not located at all, the others may have agreed well: so must all now.
   constexpr double much_less = 0.93, about_as_little = 1.3;
   const bool all_were_placed = as_given.num_placed == given.size();
   const bool explains = best.agreement.num_placed == given.size() &&

@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-/// How cameras are placed from these observations through these lenses; whether their clocks are searched, or one.
+/// How cameras are located from these observations through these lenses; whether their clocks are searched, or one.
 using PlaceCameras = std::function<MovingTargetReport(const std::vector<TargetObservation>& observations,
                                                       const std::vector<RigHead>& heads, bool searches)>;
 

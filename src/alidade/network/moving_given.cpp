@@ -13,7 +13,7 @@ constexpr double usual_f = 0.003, usual_centre_px = 2.0, usual_distance = 0.005;
 
 struct Given {
   Assumption what;
-  VectorXd moved;  ///< Of the common parameters, for its σ or an ordinary error.
+  VectorXd moved;  ///< Of the shared parameters, for its σ or an ordinary error.
 };
 
 void add_lens(const RigHead& rig_head, const Eigen::MatrixXd& follows, std::vector<Given>& all, MovingGiven& given) {
@@ -36,7 +36,7 @@ void add_lens(const RigHead& rig_head, const Eigen::MatrixXd& follows, std::vect
   if (has_cov) given.cov += follows * cov * follows.transpose();
 }
 
-/// All places follow the distance in proportion, seen from the camera that is held.
+/// All positions follow the distance in proportion, seen from the camera that is fixed.
 void add_distance(const MovingProblem& problem, const SolvedMoving& solved, const KnownDistance& distance,
                   std::vector<Given>& all) {
   const auto centre = [&](std::size_t h) {

@@ -13,7 +13,7 @@ namespace alidade {
 /// What the placing of cameras was given: lenses and a distance, with what they do to it.
 struct MovingGiven {
   std::vector<Assumption> assumed;  ///< Moves in σ of `cov`, of the cameras' poses.
-  Eigen::MatrixXd cov;              ///< Of the common parameters: the solver's, and lenses whose covariance is given.
+  Eigen::MatrixXd cov;              ///< Of the shared parameters: the solver's, and lenses whose covariance is given.
 };
 [[nodiscard]] MovingGiven moving_given(const MovingProblem& problem, const SolvedMoving& solved,
                                        const MovingTargetConfig& config);

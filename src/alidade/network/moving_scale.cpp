@@ -94,10 +94,10 @@ std::optional<PathMatch> match_path(std::span<const double> t_s, std::span<const
     return static_cast<double>(pairs.path.size() * stride) / static_cast<double>(t_s.size());
   };
   double least = 1e9;
-  const double path_middle_s = 0.5 * (t_s.front() + t_s.back());
+  const double path_mid_s = 0.5 * (t_s.front() + t_s.back());
   const auto consider = [&](double offset_s, double rate, std::size_t stride, double min_covered) {
-    // Offset at the middle of the path, so that rates do not move it.
-    const double at_zero_s = offset_s + path_middle_s - rate * path_middle_s;
+    // Offset at the midpoint of the path, so that rates do not move it.
+    const double at_zero_s = offset_s + path_mid_s - rate * path_mid_s;
     const Pairs pairs = pairs_at(t_s, path, truth, at_zero_s, rate, stride);
     if (covered(pairs, stride) < min_covered) return;
     const double now = misfit(pairs);
@@ -118,7 +118,7 @@ std::optional<PathMatch> match_path(std::span<const double> t_s, std::span<const
         for (int k = -6; k <= 6; ++k)
           consider(around_s + step_s * k, around + rate_step * drift, std::max<std::size_t>(1, coarse / 3), 0.5);
       rate = match.rate;
-      centre_s = match.offset_s - path_middle_s + rate * path_middle_s;
+      centre_s = match.offset_s - path_mid_s + rate * path_mid_s;
     }
   } else {
     consider(0.0, 1.0, coarse, 0.5);

@@ -15,7 +15,7 @@ struct PathMatch {
   double offset_s = 0.0, rate = 1.0;  ///< Time of the truth = offset + rate · time of the path.
   double covered = 0.0;               ///< Share of the path that the truth covers.
   double median_m = 0.0, rms_m = 0.0, sigma_scale = 0.0;
-  double extent_m = 0.0;  ///< RMS distance of the path from its middle.
+  double extent_m = 0.0;  ///< RMS distance of the path from its centroid.
 };
 
 /// The similarity and clock that bring a path (in any unit) onto a true one; all offsets at which the truth covers most

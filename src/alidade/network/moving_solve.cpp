@@ -76,7 +76,7 @@ struct Solver {
     return sum;
   }
 
-  void add_held(PathSystem& system) const {
+  void add_fixed(PathSystem& system) const {
     for (std::size_t k = 1; k + 1 < state.path.control.size(); ++k) system.add_bend(state.path.control, k, bend_weight);
     Eigen::VectorXd J = Eigen::VectorXd::Zero(problem.num_common());
     const Eigen::Vector3d apart =
@@ -106,7 +106,7 @@ struct Solver {
 
   [[nodiscard]] PathSystem system() {
     PathSystem system(state.path.control.size(), problem.num_common());
-    add_held(system);
+    add_fixed(system);
     residual.assign(problem.observations.size(), Eigen::Vector2d::Constant(not_seen));
     for (std::size_t i = 0; i < problem.observations.size(); ++i) {
       const SolvedObservation& observation = problem.observations[i];
@@ -175,7 +175,7 @@ struct Solver {
     return std::sqrt(given / std::max(0.2 * given, given - taken));
   }
 
-  /// σ of a coordinate, head by head, by the middle of the residuals' lengths (Rayleigh's is 1.1774 σ).
+  /// σ of a coordinate, head by head, by the median of the residuals' lengths (Rayleigh's is 1.1774 σ).
   void tell_noise() {
     if (problem.sigma_px) return;
     const double larger = followed() / 1.1774;
@@ -194,7 +194,7 @@ struct Solver {
     for (double& sigma : sigma_px) sigma = std::max(sigma, 0.5 * typical);
   }
 
-  /// What the path accelerates, where observations hold it: taken from the middle of the loosely held path.
+  /// What the path accelerates, where observations constrain it: taken from the middle of the loosely constrained path.
   void tell_bend() {
     std::vector<double> bends;
     for (const SolvedObservation& observation : problem.observations) {
@@ -292,7 +292,7 @@ std::optional<ObservationTerms> observation_terms(const MovingProblem& problem, 
   if (!problem.clocks_are_free) return terms;
   const Eigen::Vector2d by_time = seen->pixel.J_px_point * state.path.velocity(*at);
   terms.J_common.col(6) = -by_time;
-  terms.J_common.col(7) = -by_time * (observation.t_s - problem.middle_s[observation.head]);
+  terms.J_common.col(7) = -by_time * (observation.t_s - problem.mid_s[observation.head]);
   return terms;
 }
 

@@ -14,7 +14,7 @@ namespace alidade {
 
 /// One observation as the solver takes it.
 struct SolvedObservation {
-  std::size_t observation = 0, head = 0;  ///< Places among all observations, and heads.
+  std::size_t observation = 0, head = 0;  ///< Indices among all observations, and heads.
   double t_s = 0.0;                       ///< By the camera's clock.
   Eigen::Vector2d px;
 };
@@ -22,41 +22,41 @@ struct SolvedObservation {
 struct MovingProblem {
   std::vector<SolvedObservation> observations;
   std::vector<Eigen::Vector2d> readings;  ///< Of each head.
-  std::vector<double> middle_s;           ///< Of each head's observations: about where its clock's rate turns.
+  std::vector<double> mid_s;              ///< Of each head's observations: about where its clock's rate pivots.
   std::vector<bool> placed;
-  std::size_t reference = 0;                      ///< Its pose and clock are held.
-  std::size_t scale_first = 0, scale_second = 0;  ///< Their distance is held, to this relative σ.
+  std::size_t reference = 0;                      ///< Its pose and clock are fixed.
+  std::size_t scale_first = 0, scale_second = 0;  ///< Their distance is given, with this relative σ.
   double scale_m = 1.0, scale_sigma = 1e-4;
   bool clocks_are_free = false;
   std::optional<double> sigma_px;
 
   [[nodiscard]] Eigen::Index params_a_head() const { return clocks_are_free ? 8 : 6; }
   [[nodiscard]] Eigen::Index num_common() const;
-  /// Where the head's parameters begin: pose (translation, rotation; on the right), clock, drift. −1: held.
+  /// Where the head's parameters begin: pose (translation, rotation; on the right), clock, drift. −1: fixed.
   [[nodiscard]] Eigen::Index first_param(std::size_t head) const;
 };
 
 struct MovingState {
   std::vector<RigHead> heads;
-  std::vector<double> offset_s, drift;  ///< Time of the rig = t − offset − drift (t − middle) of each camera.
+  std::vector<double> offset_s, drift;  ///< Time of the rig = t − offset − drift (t − midpoint) of each camera.
   PathSpline path;
 
   [[nodiscard]] double rig_time(const MovingProblem& problem, std::size_t head, double t_s) const {
-    return t_s - offset_s[head] - drift[head] * (t_s - problem.middle_s[head]);
+    return t_s - offset_s[head] - drift[head] * (t_s - problem.mid_s[head]);
   }
 };
 
 struct SolvedMoving {
   MovingState state;
-  std::vector<double> sigma_px;              ///< One a head.
-  std::vector<Eigen::Vector2d> residual_px;  ///< One an observation of the problem; not a number where not seen.
+  std::vector<double> sigma_px;              ///< One per head.
+  std::vector<Eigen::Vector2d> residual_px;  ///< One per observation of the problem; not a number where not seen.
   std::vector<bool> used;
   Eigen::MatrixXd
-      cov;  ///< Of the common parameters, blocks of time and cameras being clusters; 0×0: cannot be determined.
+      cov;  ///< Of the shared parameters, blocks of time and cameras being clusters; 0×0: cannot be determined.
   Eigen::MatrixXd cov_model;             ///< If every observation erred by itself.
   ClusterCovariance clusters;            ///< Blocks of time.
   double block_s = 0.0;                  ///< Length of one.
-  std::vector<Eigen::MatrixXd> by_lens;  ///< One a head: how the common parameters follow its lens's.
+  std::vector<Eigen::MatrixXd> by_lens;  ///< One per head: how the shared parameters follow its lens's.
   double chi2_per_dof = 0.0;
   int iterations = 0;
   bool converged = false;
@@ -67,7 +67,7 @@ struct ObservationTerms {
   PathSpline::Support at;
   Eigen::Vector2d r;  ///< Prediction − observation [px].
   Eigen::Matrix<double, 2, 12> J_path;
-  Eigen::MatrixXd J_common;  ///< By its head's own parameters; no columns where they are held.
+  Eigen::MatrixXd J_common;  ///< By its head's own parameters; no columns where they are fixed.
 };
 /// None where the path has no such moment, or the camera does not see it.
 [[nodiscard]] std::optional<ObservationTerms> observation_terms(const MovingProblem& problem, const MovingState& state,

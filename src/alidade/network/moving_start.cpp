@@ -18,8 +18,8 @@ double start_strength(const ObservationPair& pair) {
   return pair.share * std::sqrt(static_cast<double>(pair.num_common));
 }
 
-double time_of(const MovingStart::Placed& camera, double t_s, double middle_s) {
-  return t_s + camera.offset_s + (camera.rate - 1.0) * (t_s - middle_s);
+double time_of(const MovingStart::Placed& camera, double t_s, double mid_s) {
+  return t_s + camera.offset_s + (camera.rate - 1.0) * (t_s - mid_s);
 }
 
 struct SeenRay {
@@ -94,7 +94,7 @@ bool place_next(std::span<const ObservationSeries> series, const std::vector<Obs
   return true;
 }
 
-/// Pairs of cameras with their clocks' differences. What pairs that agree well already tell is not searched again.
+/// Pairs of cameras with their clocks' differences. What pairs that agree well already determine is not searched again.
 std::vector<ObservationPair> given_pairs(std::span<const ObservationSeries> series, double search_s,
                                          const Progress& progress) {
   constexpr double sure_share = 0.8;
@@ -124,7 +124,7 @@ void rebuild_path(std::span<const ObservationSeries> series, double knot_s, Movi
     from_s = std::min(from_s, series[c].t_s.front() - start.cameras[c].offset_s);
     to_s = std::max(to_s, series[c].t_s.back() - start.cameras[c].offset_s);
   }
-  const double middle_s = 0.5 * (start.t_s.front() + start.t_s.back());
+  const double mid_s = 0.5 * (start.t_s.front() + start.t_s.back());
   MovingStart rebuilt;
   // Moments counted from the first observation of the camera that the path's clock is: whatever else is not yet known.
   const double anchor_s = series[start.first].t_s.front();
@@ -134,7 +134,7 @@ void rebuild_path(std::span<const ObservationSeries> series, double knot_s, Movi
     std::vector<SeenRay> rays;
     for (std::size_t c = 0; c < series.size(); ++c) {
       if (!start.cameras[c].placed) continue;
-      const auto at = series[c].seen_at(time_of(start.cameras[c], t_s, middle_s));
+      const auto at = series[c].seen_at(time_of(start.cameras[c], t_s, mid_s));
       if (!at) continue;
       const Rigid3 world_from_cam = start.cameras[c].cam_from_world.inverse();
       rays.push_back({world_from_cam.translation, world_from_cam.rotation * at->homogeneous().normalized(),
@@ -146,8 +146,8 @@ void rebuild_path(std::span<const ObservationSeries> series, double knot_s, Movi
     rebuilt.path.push_back(*point);
   }
   if (rebuilt.t_s.size() < 30) return;
-  // The rates turn about the path's middle: moved, they must say the same.
-  const double moved_s = 0.5 * (rebuilt.t_s.front() + rebuilt.t_s.back()) - middle_s;
+  // The rates pivot about the path's midpoint: moved, they must say the same.
+  const double moved_s = 0.5 * (rebuilt.t_s.front() + rebuilt.t_s.back()) - mid_s;
   for (MovingStart::Placed& camera : start.cameras) camera.offset_s += (camera.rate - 1.0) * moved_s;
   start.t_s = std::move(rebuilt.t_s);
   start.path = std::move(rebuilt.path);

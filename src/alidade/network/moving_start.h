@@ -15,7 +15,7 @@ struct MovingStart {
     bool placed = false;
     std::string reason;
     Rigid3 cam_from_world;
-    double offset_s = 0.0, rate = 1.0;  ///< Time of the camera = t + offset + (rate − 1)(t − the path's middle).
+    double offset_s = 0.0, rate = 1.0;  ///< Time of the camera = t + offset + (rate − 1)(t − the path's midpoint).
   };
   std::vector<Placed> cameras;
   std::size_t first = 0, second = 0;  ///< The pair that it began with: the unit of length.
@@ -31,7 +31,7 @@ struct MovingStart {
 [[nodiscard]] MovingStart start_cameras(std::span<const ObservationSeries> series, double search_s, double knot_s,
                                         const Progress& progress);
 
-/// Where the placed cameras' rays meet, at a step of `knot_s`.
+/// Where the located cameras' rays meet, at a step of `knot_s`.
 void rebuild_path(std::span<const ObservationSeries> series, double knot_s, MovingStart& start);
 
 }  // namespace alidade

@@ -62,8 +62,8 @@ void set_state(Placing& work) {
   const MovingStart& start = work.start;
   const std::size_t reference = work.problem.reference;
   const MovingStart::Placed& first = start.cameras[reference];
-  const double middle_s = 0.5 * (start.t_s.front() + start.t_s.back());
-  const auto in_rig = [&](double t_s) { return t_s + first.offset_s + (first.rate - 1.0) * (t_s - middle_s); };
+  const double mid_s = 0.5 * (start.t_s.front() + start.t_s.back());
+  const auto in_rig = [&](double t_s) { return t_s + first.offset_s + (first.rate - 1.0) * (t_s - mid_s); };
   work.state.offset_s.clear();
   work.state.drift.clear();
   work.path_t_s.clear();
@@ -84,8 +84,8 @@ void set_state(Placing& work) {
     world_from_cam.translation *= scale;
     Head& head = work.state.heads[h].head;
     head.world_from_base = world_from_cam * cam_from_base(head, work.problem.readings[h]);
-    const double at_s = middle_s + (work.problem.middle_s[h] - camera.offset_s - middle_s) / camera.rate;
-    work.state.offset_s[h] = work.problem.middle_s[h] - in_rig(at_s);
+    const double at_s = mid_s + (work.problem.mid_s[h] - camera.offset_s - mid_s) / camera.rate;
+    work.state.offset_s[h] = work.problem.mid_s[h] - in_rig(at_s);
     work.state.drift[h] = 1.0 - first.rate / camera.rate;
   }
   std::vector<Eigen::Vector3d> path;
@@ -124,7 +124,7 @@ void set_problem(Placing& work) {
   problem.sigma_px = work.config.sigma_px;
   for (std::size_t h = 0; h < work.heads.size(); ++h) {
     problem.placed.push_back(work.start.cameras[h].placed);
-    problem.middle_s.push_back(work.series[h].t_s.empty() ? 0.0 : work.series[h].middle_s());
+    problem.mid_s.push_back(work.series[h].t_s.empty() ? 0.0 : work.series[h].mid_s());
   }
   problem.reference = static_cast<std::size_t>(std::ranges::find(problem.placed, true) - problem.placed.begin());
   problem.scale_first = work.start.first;
@@ -168,7 +168,7 @@ void take_results(Placing& work) {
     if (!camera.placed) continue;
     camera.sigma_px = solved.sigma_px[h];
     const double drift = solved.state.drift[h];
-    camera.clock = {drift * work.problem.middle_s[h] - solved.state.offset_s[h], 1.0 - drift};
+    camera.clock = {drift * work.problem.mid_s[h] - solved.state.offset_s[h], 1.0 - drift};
     const Eigen::Index at = work.problem.first_param(h);
     if (at >= 0 && work.problem.clocks_are_free && solved.cov.size() > 0) {
       camera.sigma_clock_s = std::sqrt(solved.cov(at + 6, at + 6));
@@ -298,14 +298,13 @@ void restart(Placing& work) {
   MovingStart& start = work.start;
   start.t_s = work.path_t_s;
   start.path.clear();
-  const double middle_s = 0.5 * (start.t_s.front() + start.t_s.back());
+  const double mid_s = 0.5 * (start.t_s.front() + start.t_s.back());
   for (std::size_t h = 0; h < work.heads.size(); ++h) {
     MovingStart::Placed& camera = start.cameras[h];
     if (!camera.placed) continue;
     camera.cam_from_world = cam_from_world(state.heads[h].head, work.problem.readings[h]);
     camera.rate = 1.0 / (1.0 - state.drift[h]);
-    camera.offset_s =
-        (middle_s + state.offset_s[h] - state.drift[h] * work.problem.middle_s[h]) * camera.rate - middle_s;
+    camera.offset_s = (mid_s + state.offset_s[h] - state.drift[h] * work.problem.mid_s[h]) * camera.rate - mid_s;
   }
   for (const double t_s : start.t_s) {
     const auto at = state.path.support(t_s);
@@ -335,7 +334,8 @@ void place(Placing& work, const TrueTrack& truth) {
   }
   take_results(work);
   const bool is_given = work.solved.cov.size() > 0;
-  // By wrong times, rays meet in a short piece of path at most, which tells no places: it is not the path's fault.
+  // By wrong times, rays meet in a short piece of path at most, which determines no positions: it is not the path's
+  // fault.
   const ObservationSeries& watching = work.series[work.problem.reference];
   const bool fits = 2.0 * static_cast<double>(work.path_t_s.size()) * work.knot_s >
                     static_cast<double>(watching.t_s.size()) * watching.spacing_s;

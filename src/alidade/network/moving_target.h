@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// Where cameras stand that do not turn, and how their clocks go, from their observations of one target that moves:
+/// Where cameras stand that do not rotate, and how their clocks go, from their observations of one target that moves:
 /// relative poses of pairs over the clocks' differences, then all cameras and the path (a cubic spline) together by
 /// maximum likelihood. The world is the first camera's, or with a true path that path's, brought there by a similarity
 /// alone. Readings of a head are what they are throughout (its encoder's zero). Does not throw on bad data: the report

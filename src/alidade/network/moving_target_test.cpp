@@ -164,7 +164,7 @@ TEST(MovingTarget, CamerasAreWhereTheyAreWithinTheirCovariance) {
     EXPECT_EQ(moving_target_verdict(report, config).state, State::good);
     for (std::size_t c = 1; c < 3; ++c) {
       const auto at = static_cast<Eigen::Index>(num_head_params * c);
-      // The distance is held: its direction has no variance, and is dropped by the pseudo-inverse.
+      // The distance is fixed: its direction has no variance, and is dropped by the pseudo-inverse.
       const Eigen::Matrix<double, 6, 6> cov = report.rig.cov.block<6, 6>(at, at);
       const SymmetricEigen eigen = symmetric_eigen(cov);
       const Eigen::Matrix<double, 6, 1> along = eigen.vectors.transpose() * error_of(report, scene, c);
@@ -294,7 +294,7 @@ TEST(MovingTarget, TheCameraThatIsWrongIsNamed) {
                 std::string::npos)
           << c;
     }
-    // Lenses that differ, told in another order than the heads'.
+    // Lenses that differ, given in another order than the heads'.
     Scene zoomed = scene;
     std::vector<RigHead> heads = unplaced(scene);
     for (TargetObservation& observation : zoomed.observations)
@@ -307,8 +307,8 @@ TEST(MovingTarget, TheCameraThatIsWrongIsNamed) {
   }
 }
 
-/// A mirrored world is one: pixels alone cannot tell it, a true path can.
-TEST(MovingTarget, MirroredImagesOfAllCamerasAreToldByATruePath) {
+/// A mirrored world is one: pixels alone do not show it, a true path does.
+TEST(MovingTarget, MirroredImagesOfAllCamerasAreFoundByATruePath) {
   Scene scene = scene_of(loops, 12, false);
   for (TargetObservation& observation : scene.observations) observation.px.x() = 1919.0 - observation.px.x();
   TrueTrack truth;
@@ -340,7 +340,7 @@ TEST(MovingTarget, ATruePathGivesScaleFrameAndClock) {
   EXPECT_LT(report.truth_median_m, 0.05);
 }
 
-TEST(MovingTarget, WhatCannotBeToldIsRefusedByName) {
+TEST(MovingTarget, WhatCannotBeDeterminedIsRefusedByName) {
   const Scene scene = scene_of(loops, 3, false);
   const MovingTargetConfig with_distance{.distance = true_distance(scene)};
   const auto refused = [](const MovingTargetReport& report, const MovingTargetConfig& config, const char* words) {

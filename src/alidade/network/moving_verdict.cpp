@@ -9,7 +9,7 @@ namespace {
 
 using PlacedStatus = MovingTargetReport::Status;
 constexpr double good_turn_rad = 0.2 * degree, refuse_turn_rad = 2.0 * degree;
-constexpr double good_share = 0.01, refuse_share = 0.1;  // σ of a place over the cameras' distance
+constexpr double good_share = 0.01, refuse_share = 0.1;  // σ of a position over the cameras' distance
 
 Verdict moving_refusal(std::string sentence, std::string add) {
   return {State::refused, ExitCode::cannot_tell, std::move(sentence), std::move(add), {}};
@@ -35,7 +35,7 @@ Verdict refusal_by_status(const MovingTargetReport& report, const MovingTargetCo
     case PlacedStatus::no_scale:
       return moving_refusal(
           "the scale cannot be determined: all lengths grow with the path",
-          "give the distance of two placed cameras (--distance 1:2:12.5), or the target's path (--truth)");
+          "give the distance of two located cameras (--distance 1:2:12.5), or the target's path (--truth)");
     case PlacedStatus::truth_misfits:
       return moving_refusal("the path that was seen is not the true path given, whatever its scale",
                             config.clock_search_s > 0.0
@@ -58,7 +58,7 @@ Verdict refusal_by_status(const MovingTargetReport& report, const MovingTargetCo
   return {};
 }
 
-/// The largest distance of two placed cameras.
+/// The largest distance of two located cameras.
 double spread_m(const MovingTargetReport& report) {
   double most = 0.0;
   for (std::size_t a = 0; a < report.cameras.size(); ++a)
@@ -94,7 +94,7 @@ void add_cameras(const MovingTargetReport& report, Verdict& verdict) {
     left += (left.empty() ? "head " : "; head ") + std::to_string(camera.id) + ": " + camera.reason;
   }
   verdict.checks.push_back({"cameras", num_left == 0 ? State::good : State::care,
-                            num_left == 0 ? "all placed" : "not placed: " + left, static_cast<double>(num_left), 1.0,
+                            num_left == 0 ? "all located" : "not located: " + left, static_cast<double>(num_left), 1.0,
                             "", ""});
   // Hands and lenses err for long stretches: that σ is several times larger is usual here, and counted.
   Check agree = clusters_agree(report.clusters, "block",
@@ -128,7 +128,7 @@ Verdict moving_target_verdict(const MovingTargetReport& report, const MovingTarg
     return std::ranges::find_if(verdict.checks, [&](const Check& check) { return check.state == state; });
   };
   if (const auto refused = first(State::refused); refused != verdict.checks.end()) {
-    Verdict no = moving_refusal("too little to place the cameras: " + refused->text,
+    Verdict no = moving_refusal("too little to locate the cameras: " + refused->text,
                                 "let the target move in all three directions, nearer to the cameras, and for longer");
     no.checks = verdict.checks;
     return no;
@@ -138,7 +138,7 @@ Verdict moving_target_verdict(const MovingTargetReport& report, const MovingTarg
     verdict.to_add = care->text;
   }
   const auto num = std::ranges::count(report.cameras, true, &PlacedCamera::placed);
-  verdict.sentence = std::to_string(num) + " cameras placed by a moving target, ± " +
+  verdict.sentence = std::to_string(num) + " cameras located by a moving target, ± " +
                      text_of(3.0 * report.sigma_relative_rad / degree, 2) + "°, ± " +
                      text_of(3.0 * report.sigma_relative_m, 2) + " m (3σ)";
   heed_assumptions(report.assumed, verdict);

@@ -9,15 +9,15 @@
 
 namespace alidade {
 
-/// What one camera that does not turn saw of the target, by its own clock. In the plane at depth 1.
+/// What one camera that does not rotate saw of the target, by its own clock. In the plane at depth 1.
 struct ObservationSeries {
   std::vector<double> t_s;
   std::vector<Eigen::Vector2d> at;       ///< x/z, y/z of the ray.
-  std::vector<std::size_t> observation;  ///< Place among all observations.
-  double px = 1.0;                       ///< Of one unit of `at`, in the middle of the image.
+  std::vector<std::size_t> observation;  ///< Index among all observations.
+  double px = 1.0;                       ///< Of one unit of `at`, at the image centre.
   double spacing_s = 0.0;                ///< Median.
 
-  [[nodiscard]] double middle_s() const { return 0.5 * (t_s.front() + t_s.back()); }
+  [[nodiscard]] double mid_s() const { return 0.5 * (t_s.front() + t_s.back()); }
   /// Between two observations that follow each other, on the straight line; none in gaps and where the target jumped.
   [[nodiscard]] std::optional<Eigen::Vector2d> seen_at(double time_s) const;
 };
@@ -26,7 +26,7 @@ struct ObservationSeries {
 [[nodiscard]] ObservationSeries observation_series(std::span<const TargetObservation> observations, std::size_t head,
                                                    const RigHead& rig_head);
 
-/// Six images of the typical camera: a path bends no faster than that, and observations between knots average.
+/// Six images of the typical camera: a path curves no faster than that, and observations between knots average.
 [[nodiscard]] double knot_of(std::span<const ObservationSeries> series);
 
 /// Each camera's rays lie in a plane of its own, within 4 px: the target moved along a line (or in a plane with all

@@ -24,16 +24,16 @@ struct PathSpline {
   [[nodiscard]] Eigen::Vector3d velocity(const Support& at) const;
 };
 
-/// Least squares in a path's control points (each touches its neighbours alone) and few common parameters:
+/// Least squares in a path's control points (each touches its neighbours alone) and few shared parameters:
 ///     [ A  Wᵀ' ] [δ path  ]   [a]
 ///     [ W   U  ] [δ common] = [c]
-/// A is banded and is eliminated by Cholesky; what is left is the common parameters' information.
+/// A is banded and is eliminated by Cholesky; what is left is the shared parameters' information.
 class PathSystem {
  public:
   static constexpr int band = 12;  ///< Of the lower triangle, with the diagonal: four control points of three.
   PathSystem(std::size_t num_control, Eigen::Index num_common);
 
-  /// Adds a residual r (already weighted) with its derivatives by four control points and by the common parameters.
+  /// Adds a residual r (already weighted) with its derivatives by four control points and by the shared parameters.
   void add(std::size_t first_control, const Eigen::Matrix<double, 2, 12>& J_path, const Eigen::Vector2d& r,
            Eigen::Index first_common, const Eigen::MatrixXd& J_common);
   /// Adds (C[k−1] − 2 C[k] + C[k+1]) · weight as a residual: what the path is taken to accelerate.
@@ -45,7 +45,7 @@ class PathSystem {
   };
   /// The step at this damping (Levenberg–Marquardt: diagonals times 1 + damping). None where singular.
   [[nodiscard]] std::optional<Step> solve(double damping);
-  /// After solve(0): information about the common parameters, and A⁻¹Wᵀ for scores.
+  /// After solve(0): information about the shared parameters, and A⁻¹Wᵀ for scores.
   [[nodiscard]] const Eigen::MatrixXd& information() const { return information_; }
   [[nodiscard]] Eigen::MatrixXd path_by_common() const;
 

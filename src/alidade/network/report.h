@@ -46,7 +46,7 @@ struct CameraClock {
 struct PlacedCamera {
   int id = 0;
   bool placed = false;
-  std::string reason;  ///< Why it was not placed; empty otherwise.
+  std::string reason;  ///< Why it was not located; empty otherwise.
   std::size_t num_observations = 0, num_used = 0;
   CameraClock clock;
   double sigma_clock_s = 0.0, sigma_rate = 0.0;  ///< Of the clock amid its observations, and of its rate.
@@ -65,7 +65,7 @@ struct MovingTargetReport {
     no_convergence
   };
   Status status = Status::too_few;
-  Rig rig;                            ///< All heads; those that were not placed are as given.
+  Rig rig;                            ///< All heads; those that were not located are as given.
   std::vector<PlacedCamera> cameras;  ///< One per head.
   std::vector<bool> used;             ///< One per observation.
   std::vector<double> path_t_s;       ///< Times of the rig, where two cameras or more saw the target.

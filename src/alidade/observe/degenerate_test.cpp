@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-/// A log that cannot tell, and the words that must name why.
+/// A degenerate log, and the words that must name why.
 struct Degenerate {
   const char* name;
   const char* words;

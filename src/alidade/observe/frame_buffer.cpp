@@ -57,7 +57,7 @@ void FrameBuffer::thin() {
 
 namespace {
 
-/// Observations and places for points, one for each generation that was seen. Bearings start at zero.
+/// Observations and slots for points, one for each generation that was seen. Bearings start at zero.
 RotationBundle bundle_of(const FrameBuffer& buffer, const AdjustConfig& config, std::vector<int>& bundle_point_of) {
   RotationBundle bundle;
   bundle.frames = buffer.frames();
@@ -102,8 +102,8 @@ bool start_points(RotationBundle& bundle, const RotatingCamera& camera, bool wit
   return true;
 }
 
-/// Leaves out observations beyond 6 σ, and points whole of which most are: they move. How many observations.
-std::size_t leave_out_far(RotationBundle& bundle, const BundleSolution& solution, double sigma_px) {
+/// Rejects observations beyond 6 σ, and points whole of which most are: they move. How many observations.
+std::size_t reject_far(RotationBundle& bundle, const BundleSolution& solution, double sigma_px) {
   const auto is_far = [&](std::size_t i) { return !(solution.residual_px[i] < 6.0 * sigma_px); };
   std::vector<int> far_minus_near(bundle.points.size(), 0);
   for (std::size_t i = 0; i < bundle.observations.size(); ++i) {
@@ -160,7 +160,7 @@ Adjustment adjust(const FrameBuffer& buffer, const AdjustConfig& config, const P
   attempt(config.start);
   for (const double focal : config.other_starts) attempt(with_focal(config.start, focal));
 
-  // Again from there: without what does not belong, then with the noise that the rest tells.
+  // Again from there: without what does not belong, then with the noise that the rest shows.
   for (int round = 0; round < 2 && adjustment.has_value; ++round) {
     const BundleSolution& so_far = adjustment.solution;
     constexpr double min_sigma = 2e-5;  // about 0.01 px: no tracker is better, and rates are sampled
@@ -168,7 +168,7 @@ Adjustment adjust(const FrameBuffer& buffer, const AdjustConfig& config, const P
     const double given = std::max(round == 0 ? robust : sigma_by_squares(so_far), min_sigma);
     if (!sigma_is_known) solve.sigma_px = given;
     if (config.reject && round == 0) {
-      adjustment.num_left_out = leave_out_far(bundle, so_far, std::max(given, solve.sigma_px));
+      adjustment.num_rejected = reject_far(bundle, so_far, std::max(given, solve.sigma_px));
     }
     bundle.camera = so_far.camera;
     bundle.points = so_far.points;

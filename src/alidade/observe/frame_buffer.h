@@ -50,7 +50,7 @@ struct AdjustConfig {
   std::size_t range_point = 0;
   double sigma_turn_rad = 0.0;
   double sigma_rate_rad_per_s = 0.0;
-  bool reject = true;                ///< Leave out what lies beyond 6 σ.
+  bool reject = true;                ///< Reject what lies beyond 6 σ.
   std::optional<CommonPrior> prior;  ///< None: a weak one about wherever the answer is.
   RotatingCamera start;
   /// fx = fy to try one after the other beside the start's, normalised.
@@ -63,7 +63,7 @@ struct Adjustment {
   RotationBundle bundle;
   std::vector<int> bundle_point_of;  ///< Of each of the buffer's points as it is now; −1: none.
   double sigma_px = 0.0;             ///< Normalised; given, or estimated.
-  std::size_t num_left_out = 0;
+  std::size_t num_rejected = 0;
 };
 
 /// Adjusts all that the buffer holds. No value: fewer measurements than unknowns, or no start leads anywhere.

@@ -37,7 +37,7 @@ struct IntrinsicsEstimate {
 /// Pixels to numbers near one: q = (px − centre) / scale, so that every equation keeps its form and its condition falls
 /// from 7·10⁷ to 3·10².
 struct PixelScale {
-  Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< Middle of the image. [px]
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< Centre of the image. [px]
   double scale = 1.0;                                ///< About half its width. [px]
 
   [[nodiscard]] Eigen::Vector2d normalised(const Eigen::Vector2d& px) const { return (px - centre) / scale; }

@@ -221,8 +221,8 @@ TEST(ObserveCauses, TheWholeLensMountAndDelayAtOnce) {
   EXPECT_GE(outcome.estimated, nearly_all());
 }
 
-/// 1 % a minute, told row by row: the first row's focal length is as right as the last one's.
-TEST(ObserveCauses, ASlowDriftIsToldRowByRow) {
+/// 1 % a minute, estimated row by row: the first row's focal length is as right as the last one's.
+TEST(ObserveCauses, ASlowDriftIsEstimatedRowByRow) {
   World world = with_scene([](RotationScene& scene, RotationLogConfig& config, Draws&) {
     config.duration_s = 60.0;
     config.rate_hz = 10.0;
@@ -301,7 +301,7 @@ TEST(ObserveCauses, AQuarterOfThePointsMoves) {
   EXPECT_LE(outcome.refused, 1);
 }
 
-/// Behind a lens that bends, too: they are left out whole, and leave σ as if they had not been seen.
+/// Behind a lens with distortion, too: they are rejected whole, and leave σ as if they had not been seen.
 TEST(ObserveCauses, PointsThatMoveCostNothing) {
   constexpr std::size_t num_points = 40, num_moving = 10;  // the first ones move
   World world = with_scene([](RotationScene& scene, RotationLogConfig& config, Draws&) {
@@ -323,7 +323,7 @@ TEST(ObserveCauses, PointsThatMoveCostNothing) {
   for (std::size_t i = 0; i < 5; ++i) {
     const ObservedQuantity &a = with_moving.quantities[i], &b = still.quantities[i];
     EXPECT_NEAR(a.value, b.value, b.sigma_model) << a.name;
-    EXPECT_NEAR(a.sigma_model, b.sigma_model, 0.1 * b.sigma_model) << a.name;  // pixels left out by chance
+    EXPECT_NEAR(a.sigma_model, b.sigma_model, 0.1 * b.sigma_model) << a.name;  // pixels rejected by chance
   }
 }
 
@@ -344,7 +344,7 @@ TEST(ObserveCauses, AMisreadHeadIsNamed) {
       {{.signs = {1.0, -1.0}}, "tilt"},
       {{.swaps_axes = true}, "exchanged"}};
   for (const auto& [faults, word] : misread) {
-    const int draws = testing::trials(1);  // each is held against all other readings: seconds
+    const int draws = testing::trials(1);  // each is compared with all other readings: seconds
     const Outcome outcome = outcome_of(with_faults(faults), auto_config(), "", draws);
     EXPECT_EQ(outcome.good, 0) << word;
     int named = 0;
@@ -353,7 +353,8 @@ TEST(ObserveCauses, AMisreadHeadIsNamed) {
   }
 }
 
-/// Where a σ of the scale keeps it from being estimated all else is freed, until nothing is asked for and nothing told.
+/// Where a σ of the scale keeps it from being estimated all else is freed, until nothing is asked for and nothing
+/// determined.
 TEST(ObserveCauses, AVagueAnswerMayBeMisread) {
   ObserveSolution report;
   report.status = ObserveSolution::Status::ok;
@@ -363,12 +364,12 @@ TEST(ObserveCauses, AVagueAnswerMayBeMisread) {
   EXPECT_FALSE(may_be_misread(report));
   report.quantities[1].sigma = 200.0;
   EXPECT_TRUE(may_be_misread(report));
-  report.motion.path_rad.x() = 0.0;  // pan alone: no reading is told from another
+  report.motion.path_rad.x() = 0.0;  // pan alone: no reading is distinguished from another
   EXPECT_FALSE(may_be_misread(report));
 }
 
-/// A lens that is not modelled seems to zoom. Told that there is no zoom, all rows are one camera's.
-TEST(ObserveCauses, ToldThatNothingZoomsThereIsNoZoom) {
+/// A lens that is not modelled seems to zoom. Given that there is no zoom, all rows are one camera's.
+TEST(ObserveCauses, GivenThatNothingZoomsThereIsNoZoom) {
   ObserveSetup config = auto_config();
   config.no_zoom = true;
   config.estimate_auto = false;

@@ -31,8 +31,8 @@ Eigen::Vector4d errors_of(const ObserveSolution& report) {
   return errors;
 }
 
-/// What the filter ends at is held against all rows together, also where nothing of the last row is seen or fits: there
-/// it once was not, and stood 9σ off.
+/// What the filter ends at is compared with all rows together, also where nothing of the last row is seen or fits:
+/// there it once was not, and stood 9σ off.
 TEST(ObserveLog, TheEndOfALogIsComparedWithAllRowsWhateverItsLastRowIs) {
   const auto distance_after = [](const auto& change) {
     RotationLogConfig log_config;
@@ -84,7 +84,7 @@ TEST(ObserveLog, AMeasuredVelocityTakesTheBiasOfTranslationAway) {
   EXPECT_LT(with.head<2>().cwiseAbs().maxCoeff(), 0.3);
 }
 
-/// Encoders with 0.2 mrad of noise, 0.14 px: taken for exact, σ is too small; told, it covers.
+/// Encoders with 0.2 mrad of noise, 0.14 px: taken for exact, σ is too small; given, it covers.
 TEST(ObserveLog, NoisyRotationIsEstimatedWithTheRest) {
   int inside = 0, counted = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {

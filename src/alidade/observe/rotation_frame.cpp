@@ -88,7 +88,7 @@ void MotionReader::advance_by_attitude(const Eigen::Quaterniond& base_from_cam, 
   last_base_from_cam_ = base_from_cam;
 }
 
-/// ṁ = −v − ω × m, with v at its mean over the step: what was shifted before turns with the camera.
+/// ṁ = −v − ω × m, with v at its mean over the step: what was shifted before rotates with the camera.
 void MotionReader::advance_shift(const Eigen::Vector3d& velocity, const RotationFrame& frame) {
   if (frame.starts_segment) {
     cam_from_start_.setIdentity();

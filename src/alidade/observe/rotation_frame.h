@@ -10,7 +10,7 @@ namespace alidade {
 inline constexpr int max_rotation_errors = 15;  ///< Of a head: scale, backlash, zero and curve of both axes, clock.
 using TurnByErrors = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_rotation_errors>;
 
-/// One instant as the estimators of a rotating camera take it: how the camera has turned since the start, and what it
+/// One instant as the estimators of a rotating camera take it: how the camera has rotated since the start, and what it
 /// saw. A static point m has m(t) = R m(0) + shift in the camera frame, Ṙ = −[ω]× R.
 /// Fang, Liu, Li & Zhang, "A global exponential observer for camera calibration", 2011, eq. (3).
 struct RotationFrame {
@@ -23,12 +23,12 @@ struct RotationFrame {
   Eigen::Vector3d acceleration_rad_per_s2 = Eigen::Vector3d::Zero();  ///< ω̇, from the last two samples.
   Eigen::Vector3d shift_m = Eigen::Vector3d::Zero();                  ///< From measured velocity; zero without.
   double range_m = not_seen;                                          ///< To the log's range point.
-  /// How errors of the measured rotation turn it: true = Exp(turn_by · errors) · cam_from_start. [rad]
+  /// How errors of the measured rotation rotate it: true = Exp(turn_by · errors) · cam_from_start. [rad]
   TurnByErrors turn_by = TurnByErrors(3, 0);
   /// The rotation since the frame before is not known (a gap in a rate log): what was seen before does not bind what
   /// is seen now but through the intrinsics. cam_from_start starts again at the identity.
   bool starts_segment = false;
-  std::span<const Eigen::Vector2d> px;  ///< One a point; NaN: not seen.
+  std::span<const Eigen::Vector2d> px;  ///< One per point; NaN: not seen.
 };
 
 /// Turns rows into frames as they come. Rates are integrated by the third-order Adams–Moulton rule for uneven steps

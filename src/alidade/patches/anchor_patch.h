@@ -17,7 +17,7 @@ namespace alidade {
 struct PatchPose {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   Eigen::Matrix2d linear = Eigen::Matrix2d::Identity();
-  WarpBend bend = WarpBend::Zero();  ///< Given: a patch alone separates bend and position poorly.
+  WarpBend bend = WarpBend::Zero();  ///< Given: a patch alone separates curvature and position poorly.
   double gain = 1.0, bias = 0.0;
 };
 

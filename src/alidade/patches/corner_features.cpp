@@ -50,11 +50,11 @@ std::vector<CornerFeature> corners_in_empty_cells(const cv::Mat& grey, std::span
   for (int y = inside.y; y < inside.y + inside.height; y += config.cell_px) {
     for (int x = inside.x; x < inside.x + inside.width; x += config.cell_px) {
       const cv::Rect cell = cv::Rect(x, y, config.cell_px, config.cell_px) & inside;
-      const Eigen::Vector2d middle(x + 0.5 * cell.width, y + 0.5 * cell.height);
+      const Eigen::Vector2d centre(x + 0.5 * cell.width, y + 0.5 * cell.height);
       near.clear();
       bool is_empty = true;
       for (const Eigen::Vector2d& at : occupied) {
-        const double away_px = (at - middle).cwiseAbs().maxCoeff();
+        const double away_px = (at - centre).cwiseAbs().maxCoeff();
         is_empty = is_empty && away_px > 0.5 * config.cell_px;
         if (away_px < config.cell_px + config.min_distance_px) near.push_back(at);
       }

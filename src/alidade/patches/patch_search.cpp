@@ -28,15 +28,15 @@ struct SearchWindow {
   int u_min = 0, u_max = -1, v_min = 0, v_max = -1;
 };
 
-SearchWindow window_of(const cv::Mat& image, const Eigen::Vector2d& middle, const Eigen::Matrix2d& S,
+SearchWindow window_of(const cv::Mat& image, const Eigen::Vector2d& centre, const Eigen::Matrix2d& S,
                        const PatchSearch& search) {
   const double reach_u = std::min(search.num_sigma * std::sqrt(S(0, 0)), search.max_half_px);
   const double reach_v = std::min(search.num_sigma * std::sqrt(S(1, 1)), search.max_half_px);
   const auto lower = [](double value, int least) { return std::max(static_cast<int>(std::ceil(value)), least); };
   const auto upper = [](double value, int most) { return std::min(static_cast<int>(std::floor(value)), most); };
   // One more pixel than the patch, for the fit between pixels.
-  return {lower(middle.x() - reach_u, half + 1), upper(middle.x() + reach_u, image.cols - row_px + half - 1),
-          lower(middle.y() - reach_v, half + 1), upper(middle.y() + reach_v, image.rows - half - 2)};
+  return {lower(centre.x() - reach_u, half + 1), upper(centre.x() + reach_u, image.cols - row_px + half - 1),
+          lower(centre.y() - reach_v, half + 1), upper(centre.y() + reach_v, image.rows - half - 2)};
 }
 
 /// Sums over the patch's square at every position of one row of the window, moved down row by row.
@@ -88,10 +88,10 @@ struct BestPlace {
   double correlation = -1.0;
 };
 
-BestPlace best_place(const cv::Mat& image, const PatchView& view, const Eigen::Vector2d& middle,
+BestPlace best_place(const cv::Mat& image, const PatchView& view, const Eigen::Vector2d& centre,
                      const Eigen::Matrix2d& S, const PatchSearch& search) {
   BestPlace best;
-  const SearchWindow window = window_of(image, middle, S, search);
+  const SearchWindow window = window_of(image, centre, S, search);
   if (window.u_max < window.u_min || window.v_max < window.v_min) return best;
   const Eigen::Matrix2d information = S.inverse();
   const double most = search.num_sigma * search.num_sigma;
@@ -102,7 +102,7 @@ BestPlace best_place(const cv::Mat& image, const PatchView& view, const Eigen::V
     sums.enter(v);
     sums.spreads(spreads);
     for (int u = window.u_min; u <= window.u_max; ++u) {
-      const Eigen::Vector2d d = Eigen::Vector2d(u, v) - middle;
+      const Eigen::Vector2d d = Eigen::Vector2d(u, v) - centre;
       if (d.x() * (information(0, 0) * d.x() + 2.0 * information(0, 1) * d.y()) + information(1, 1) * d.y() * d.y() >
           most)
         continue;

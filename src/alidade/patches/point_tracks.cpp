@@ -54,12 +54,12 @@ bool has_room(const cv::Mat& image, const Eigen::Vector2d& px) {
 
 /// Cuts the track's patch out of this image, around the whole pixel next to the point.
 bool set_anchor(Track& track, const cv::Mat& smoothed, std::size_t frame) {
-  const Eigen::Vector2d middle = track.px.array().round();
-  if (!has_room(smoothed, middle)) return false;
-  track.patch = AnchorPatch(smoothed, static_cast<int>(middle.x()), static_cast<int>(middle.y()));
-  track.offset = track.px - middle;
-  track.pose = {.px = middle};
-  track.anchor_px = middle;
+  const Eigen::Vector2d centre = track.px.array().round();
+  if (!has_room(smoothed, centre)) return false;
+  track.patch = AnchorPatch(smoothed, static_cast<int>(centre.x()), static_cast<int>(centre.y()));
+  track.offset = track.px - centre;
+  track.pose = {.px = centre};
+  track.anchor_px = centre;
   track.anchor_frame = frame;
   return true;
 }

@@ -91,11 +91,11 @@ TEST(PointTracker, FollowsToHundredthsOfAPixelWithoutDrift) {
   ErrorSum young, old, all, whitened;
   for (const auto& [id, detections] : sway()) {
     if (detections.size() < 10) continue;
-    Eigen::Vector2d middle = Eigen::Vector2d::Zero();
-    for (const Detection& s : detections) middle += s.error / static_cast<double>(detections.size());
+    Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+    for (const Detection& s : detections) centre += s.error / static_cast<double>(detections.size());
     const double freed = static_cast<double>(detections.size()) / static_cast<double>(detections.size() - 1);
     for (const Detection& s : detections) {
-      whitened.add((s.error - middle) * std::sqrt(freed) / s.sigma_px);
+      whitened.add((s.error - centre) * std::sqrt(freed) / s.sigma_px);
       if (s.frame == detections[0].frame) continue;
       all.add(s.error);
       (s.frame - detections[0].frame < 10 ? young : old).add(s.error);

@@ -38,7 +38,7 @@ struct RangefinderConfig {
   std::optional<double> sigma_spot_px = {};
   std::optional<double> sigma_range_m = {};
   std::optional<double> sigma_range_per_m = {}, sigma_incidence_m = {};  ///< Of sigma_range_m: RangeNoise.
-  std::optional<double> sigma_corner_px = {};  ///< Given: takes the place of the corners' own covariances.
+  std::optional<double> sigma_corner_px = {};  ///< Given: replaces the corners' own covariances.
   /// σ of what is given of lengths: carried into the beam's covariance. 0: exact. None: nothing is known.
   std::optional<double> sigma_square_m = {};  ///< Of the length of the board's squares.
   std::optional<double> sigma_scale = {};     ///< Of the scale of the readings, where that is not estimated.

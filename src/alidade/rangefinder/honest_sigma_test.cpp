@@ -19,16 +19,16 @@ struct Deviation {
   double bias_px = 0.0;      ///< Of all spots of a log, alike.
   double per_shot_px = 0.0;  ///< Of the spots of a photo beyond what σ says.
   double lens_px = 0.0;      ///< Of the camera file's focal lengths and centre, in place of what its covariance says.
-  double bow_m = 0.0;        ///< Of the board's corners against its middle.
+  double bow_m = 0.0;        ///< Of the board's corners against its centre.
 };
 
 void bow(const RangefinderSample& sample, double bow_m, std::size_t shot, BoardView& view) {
-  const Eigen::Vector3d middle = 0.5 * (sample.points.front() + sample.points.back());
-  const double corner2 = (sample.points.front() - middle).squaredNorm();
+  const Eigen::Vector3d centre = 0.5 * (sample.points.front() + sample.points.back());
+  const double corner2 = (sample.points.front() - centre).squaredNorm();
   for (Corner& corner : view.corners) {
     Eigen::Vector3d point = sample.points[static_cast<std::size_t>(corner.index)];
     const auto flat = project(sample.scene.camera, sample.scene.cam_from_board[shot] * point);
-    point.z() += bow_m * ((point - middle).squaredNorm() / corner2 - 1.0);
+    point.z() += bow_m * ((point - centre).squaredNorm() / corner2 - 1.0);
     const auto bowed = project(sample.scene.camera, sample.scene.cam_from_board[shot] * point);
     if (flat && bowed) corner.px += *bowed - *flat;
   }
@@ -182,7 +182,7 @@ TEST(Assumptions, MoveTheBeamAsSolvesWithTheErrorSay) {
   }
 }
 
-TEST(Assumptions, AToldSigmaIsCarriedIntoTheBeamsOwn) {
+TEST(Assumptions, AGivenSigmaIsCarriedIntoTheBeamsOwn) {
   const auto sample = draw_rangefinder_sample(*rangefinder_scenario("reference"), {}, 6);
   RangefinderConfig config = given_config(SigmaMethod::joint);
   const RangefinderReport without = solve_sample(sample, config);
@@ -202,7 +202,7 @@ TEST(Assumptions, AToldSigmaIsCarriedIntoTheBeamsOwn) {
   EXPECT_FALSE(wants_scale(solve_sample(sample, config), config));
 }
 
-TEST(Causes, ScaleIsSeenThoughSigmaIsToldByTheSameResiduals) {
+TEST(Causes, ScaleIsSeenThoughSigmaIsEstimatedFromTheSameResiduals) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     RangefinderSceneConfig scene = *rangefinder_scenario("reference");
     scene.beam.scale = 1.01;

@@ -104,7 +104,7 @@ TEST(MonteCarlo, JointIsAtTheBoundAndItsSigmaCoversIt) {
   EXPECT_NEAR(within2 / trials, 0.9545, 3.0 * std::sqrt(0.9545 * 0.0455 / trials));
 }
 
-TEST(MonteCarlo, BeamAloneCoversTheLensItHeld) {
+TEST(MonteCarlo, BeamAloneCoversTheLensItFixed) {
   constexpr int trials = 300;
   RangefinderSceneConfig scene = *rangefinder_scenario("reference");
   double within1 = 0.0;

@@ -27,7 +27,7 @@ class Planner {
     information_ = known();
     prior_.information.setZero();  // it is in what is known; a shot must not bring it again
     for (const Eigen::Vector3d& point : now.points_in_board)
-      middle_in_board_ += point / static_cast<double>(now.points_in_board.size());
+      centre_in_board_ += point / static_cast<double>(now.points_in_board.size());
   }
 
   struct Gain {
@@ -124,7 +124,7 @@ class Planner {
   [[nodiscard]] Rigid3 board_at(double distance_m, double tilt_rad, double azimuth_rad) const {
     const Eigen::Vector3d axis(std::sin(azimuth_rad), -std::cos(azimuth_rad), 0.0);
     const Eigen::Quaterniond rotation = exp_so3(tilt_rad * axis);
-    return {rotation, point_at(now_.beam, distance_m) - rotation * middle_in_board_};
+    return {rotation, point_at(now_.beam, distance_m) - rotation * centre_in_board_};
   }
 
   /// Of a shot measured exactly as predicted; none where the camera does not see the board whole.
@@ -153,12 +153,12 @@ class Planner {
     return system->information();
   }
 
-  /// Of points at the origin, the nearest, the middle and the farthest range.
+  /// Of points at the origin, the nearest, the mean and the farthest range.
   [[nodiscard]] double mean_variance(const Eigen::MatrixXd& cov) const {
     const int p = problem_.num_free();
-    const double middle_m = std::sqrt(limits_.min_range_m * limits_.max_range_m);
+    const double mid_m = std::sqrt(limits_.min_range_m * limits_.max_range_m);
     double sum = 0.0;
-    for (const double range_m : {0.0, limits_.min_range_m, middle_m, limits_.max_range_m}) {
+    for (const double range_m : {0.0, limits_.min_range_m, mid_m, limits_.max_range_m}) {
       const Eigen::MatrixXd J = J_point_beam(now_.beam, range_m).leftCols(p);
       sum += 0.25 * (J * cov.topLeftCorner(p, p) * J.transpose()).trace();
     }
@@ -170,7 +170,7 @@ class Planner {
   BeamProblem problem_;
   LensPrior prior_;
   Eigen::MatrixXd information_;
-  Eigen::Vector3d middle_in_board_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d centre_in_board_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace

@@ -41,7 +41,7 @@ TEST(NextShot, FiveGuidedShotsAreAsGoodAsFifteenRandomOnes) {
     Begun begun = begin(seed, 2);
     const auto plan = plan_next_shots(begun.now, {}, 5);
     ASSERT_EQ(plan.size(), 5u);
-    // Really taken: simulated at the planned places and solved with the two from before.
+    // Really taken: simulated at the planned poses and solved with the two from before.
     RangefinderSample taken = begun.sample;
     RangefinderScene more = begun.sample.scene;
     more.range_m.clear();

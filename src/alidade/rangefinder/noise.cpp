@@ -29,7 +29,7 @@ void add(Group& group, const Eigen::Matrix<double, rows, 1>& r, const Eigen::Mat
 }
 
 /// Factor on σ that makes the residuals as large as they should be. One degree of freedom of the guess keeps few
-/// residuals from telling a σ of next to nothing.
+/// residuals from showing a σ of next to nothing.
 double factor_of(const Group& group, const BeamMatrix& H, int num_free, double sigma_over_guess) {
   if (group.num == 0.0) return 1.0;
   const Eigen::MatrixXd share =
@@ -61,7 +61,7 @@ Groups groups_of(const BeamProblem& problem, const Camera& camera, const Beam& b
     if (shot.spot_px && (!shot.owns_spot_sigma || !shot.plane)) {
       const Eigen::Matrix2d own = shot.sigma_spot_px * shot.sigma_spot_px * Eigen::Matrix2d::Identity();
       const Eigen::Matrix2d carried = cov.bottomRightCorner<2, 2>() - own;
-      // A spot without a board holds the reading's error, too; it tells of the kind that is not known.
+      // A spot without a board holds the reading's error, too; it determines the kind that is not known.
       Group& group = shot.plane || of_spots ? groups.spots : groups.ranges;
       add<2>(group, residual->r.tail<2>(), residual->J_beam.bottomRows<2>(), own, carried);
     }

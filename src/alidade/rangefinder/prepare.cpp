@@ -112,7 +112,7 @@ PreparedShot prepared(const Shot& shot, const Camera& camera, const RangefinderC
 }
 
 /// Corners with σ that is not given, or wrongly given, get what they scatter by, each board for itself: a near one
-/// shows that it is bent, a far one does not. Where a board has few corners, those of all boards together.
+/// shows that it is curved, a far one does not. Where a board has few corners, those of all boards together.
 void scale_corners(const std::vector<CornerFit>& fits, const RangefinderConfig& config, Preparation& ready) {
   CornerFit all;
   for (const CornerFit& fit : fits) {

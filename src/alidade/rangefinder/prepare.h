@@ -11,7 +11,7 @@ namespace alidade {
 /// The caller's shots made ready: checked, boards' poses solved, each σ that is known in its place.
 struct Preparation {
   BeamProblem problem;
-  std::vector<std::string> reasons;  ///< One a shot: why it cannot be used; empty otherwise.
+  std::vector<std::string> reasons;  ///< One per shot: why it cannot be used; empty otherwise.
   double sigma_corner_px = 0.0;
   bool knows_spot_sigma = true, knows_range_sigma = true;
   double min_sigma_range_m = 0.0;  ///< Readings in steps of q scatter by q/√12 at least, whatever their residuals.

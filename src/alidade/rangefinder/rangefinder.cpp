@@ -9,8 +9,8 @@
 #include "alidade/rangefinder/solve/beam_bound.h"
 #include "alidade/rangefinder/solve/beam_search.h"
 #include "alidade/rangefinder/solve/error_causes.h"
+#include "alidade/rangefinder/solve/fixed_distortion.h"
 #include "alidade/rangefinder/solve/fixed_quantities.h"
-#include "alidade/rangefinder/solve/held_distortion.h"
 #include "alidade/rangefinder/solve/refine_all.h"
 
 namespace alidade {
@@ -265,7 +265,7 @@ void take_over(const RefinedBeam& refined, BeamProblem& problem, RangefinderRepo
 }
 
 /// Do the readings ask for a scale? How far it would be from 1, were it estimated too, lens and poses fixed, over its
-/// σ, with the σ of a reading estimated again: where that came of residuals, they held the missing scale, too.
+/// σ, with the σ of a reading estimated again: where that came of residuals, they contained the missing scale, too.
 double scale_in_sigmas(const BeamProblem& problem, const Camera& camera, const Beam& beam, bool sigma_is_given,
                        double min_sigma_m) {
   BeamProblem work = problem;

@@ -27,17 +27,18 @@ namespace alidade {
 /// board that is too large as a whole moves the origin by its own part only.
 [[nodiscard]] bool wants_scale(const RangefinderReport& report, const RangefinderConfig& config);
 
-/// The same of a lens' distortion that its file gives without σ: then it is better estimated, where boards tell it.
+/// The same of a lens' distortion that its file gives without σ: then it is better estimated, where boards determine
+/// it.
 [[nodiscard]] bool wants_distortion(const RangefinderReport& report, const Camera& camera,
                                     const RangefinderConfig& config);
 
 /// Why shots that no beam explains may do so: with the ranges in another unit, each range a row before or after its
 /// spot and board, or spots with u and v exchanged or mirrored, a beam explains them well. One sentence; empty where
-/// neither is so, and where a beam explains them as they are, though they may not tell which.
+/// neither is so, and where a beam explains them as they are, though they may not determine which.
 [[nodiscard]] std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::Vector3d> points_in_board,
                                           const Camera& camera, const RangefinderConfig& config);
 
-/// What the answer is worth, or why there is none, what to add, and which other method could tell.
+/// What the answer is worth, or why there is none, what to add, and which other method could determine it.
 [[nodiscard]] Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Shot> shots,
                                           const RangefinderConfig& config);
 
@@ -48,7 +49,7 @@ struct SolvedRangefinder {
   Camera camera;             ///< The same: with the distortion open where its file gives it without σ.
 };
 /// calibrate_rangefinder() and what a person would do next: the readings' scale is estimated too where the answer rests
-/// on one that is not given and the shots tell it, and where no beam explains the shots the cause is looked for.
+/// on one that is not given and the shots determine it, and where no beam explains the shots the cause is looked for.
 [[nodiscard]] SolvedRangefinder solve_rangefinder(std::span<const Shot> shots,
                                                   std::span<const Eigen::Vector3d> points_in_board,
                                                   const Camera& camera, const RangefinderConfig& config,

@@ -52,7 +52,7 @@ INSTANTIATE_TEST_SUITE_P(All, DegenerateBattery,
                                            Degenerate{"table1", Method::spot, "equal ranges"},
                                            Degenerate{"through_centre", Method::spot, "optical centre"}));
 
-TEST(RangefinderVerdict, AcceptsWhatCanBeTold) {
+TEST(RangefinderVerdict, AcceptsWhatCanBeDetermined) {
   int accepted = 0, asked = 0;
   for (const std::string name :
        {"reference", "parallel", "frontal", "through_centre", "toed_in", "parallel_to_view", "inverse_range"}) {
@@ -102,7 +102,7 @@ double error2_of(const RangefinderReport& report, const RangefinderSample& sampl
   return squared_mahalanobis(error, report.beam.cov);
 }
 
-TEST(RangefinderScale, IsToldWithBoardsAndRefusedWithSpotsAlone) {
+TEST(RangefinderScale, IsEstimatedWithBoardsAndRefusedWithSpotsAlone) {
   RangefinderSceneConfig scene = *rangefinder_scenario("reference");
   scene.beam.scale = 1.02;
   double sum = 0.0;

@@ -208,7 +208,7 @@ TEST(ReferenceCases, Table1OfThePaperHasItsSignsTurned) {
   for (std::size_t i = 0; i < reference["table"].size(); ++i) {
     const Eigen::Vector4d printed_mm = vector_of<4>(reference["table"][i]);
     Shot shot;
-    // As printed every board is behind the camera; turned round, the plane is N·X = |N|².
+    // As printed every board is behind the camera; rotated by half a turn, the plane is N·X = |N|².
     shot.plane = Plane{-printed_mm.head<3>().normalized(), -printed_mm.head<3>().norm() / 1000.0, {}};
     shot.plane->cov.setZero();
     EXPECT_LT((shot.plane->normal_in_cam - vector_of<3>(reference["normal"][i])).norm(), 1e-12);

@@ -86,27 +86,27 @@ ShotPhoto look_at(Shot& shot, const PhotoByName& load_photo, const Camera& camer
 }
 
 /// Where the boards' beam is seen at a reading, with how far off it may be.
-struct Foretold {
+struct PredictedSpot {
   Eigen::Vector2d px;
   double reach_px = 0.0;  ///< 5σ, and what a finder is off by.
 };
 
-std::optional<Foretold> foretold(const Beam& beam, const Camera& camera, const Shot& shot) {
+std::optional<PredictedSpot> predicted_spot(const Beam& beam, const Camera& camera, const Shot& shot) {
   constexpr double sigmas = 5.0, finder_px = 3.0;
   if (!shot.board) return std::nullopt;
   const auto pixel = measured_pixel(beam, camera, shot.range_m, shot.sigma_range_m);
   if (!pixel) return std::nullopt;
   const double trace = 0.5 * pixel->cov.trace(), det = pixel->cov.determinant();
   const double largest = trace + std::sqrt(std::max(0.0, trace * trace - det));
-  return Foretold{pixel->px, sigmas * std::sqrt(largest) + finder_px};
+  return PredictedSpot{pixel->px, sigmas * std::sqrt(largest) + finder_px};
 }
 
 std::string at_pixel_of(const Eigen::Vector2d& px) {
   return "(" + std::to_string(std::lround(px.x())) + ", " + std::to_string(std::lround(px.y())) + ")";
 }
 
-void look_again(Shot& shot, ShotPhoto& seen, const PhotoByName& load_photo, const Camera& camera, const Foretold& where,
-                const ShotPhotosConfig& config) {
+void look_again(Shot& shot, ShotPhoto& seen, const PhotoByName& load_photo, const Camera& camera,
+                const PredictedSpot& where, const ShotPhotosConfig& config) {
   if (shot.spot) {
     if ((shot.spot->px - where.px).norm() <= where.reach_px) return;
     seen.false_spot = "the light at " + at_pixel_of(shot.spot->px) + " is not the spot: by the boards that is within " +
@@ -147,12 +147,12 @@ void drop_rare_spots(std::span<Shot> shots, std::span<ShotPhoto> seen, std::size
 void look_again_for_spots(std::span<Shot> shots, std::span<ShotPhoto> seen, const PhotoByName& load_photo,
                           const Camera& camera, const Beam& by_boards, const ShotPhotosConfig& config,
                           const Progress& progress) {
-  std::vector<std::optional<Foretold>> where(shots.size());
+  std::vector<std::optional<PredictedSpot>> where(shots.size());
   std::size_t num_looked = 0;
   for (std::size_t i = 0; i < shots.size(); ++i) {
     const bool is_ours = seen[i].has_photo && seen[i].fault.empty() && (seen[i].spot || !shots[i].spot);
-    constexpr double farthest_px = 100.0;  // told no better, the boards say nothing of where it is
-    if (is_ours) where[i] = foretold(by_boards, camera, shots[i]);
+    constexpr double farthest_px = 100.0;  // known no better, the boards say nothing of where it is
+    if (is_ours) where[i] = predicted_spot(by_boards, camera, shots[i]);
     if (where[i] && where[i]->reach_px > farthest_px) where[i].reset();
     num_looked += where[i] ? 1 : 0;
   }

@@ -31,7 +31,7 @@ corners.
 const std::string next_photo_table = R"(
 next.
   @pose cam_from_board_
-  worst_3sigma_px  px  of a pixel in the worst place, with that photo
+  worst_3sigma_px  px  at the worst pixel, with that photo
 )";
 
 }  // namespace
@@ -48,7 +48,7 @@ bow_m[2]              m      height of the board's centre over its edges, along 
 transfer_rms_px       px     of unseen photos, the board's shape learned
 transfer_flat_rms_px  px     of unseen photos, the board flat
 working_distance_m    m      median distance of the board
-worst_3sigma_px       px     of a pixel in the worst place
+worst_3sigma_px       px     at the worst pixel
 port                  any    flat_port: what a lens without a port would err, by range
 @board board.
 corners_used          count  in the solution
@@ -63,8 +63,8 @@ photos[].
   reason  text  why it was not used
 data:)" + board_photo_tables + next_photo_table +
                                                   R"(cells.
-  u_px       px     middle of the cell
-  v_px       px     middle of the cell
+  u_px       px     centre of the cell
+  v_px       px     centre of the cell
   count      count  corners in it
   mean_u_px  px     mean residual
   mean_v_px  px     mean residual
@@ -108,7 +108,7 @@ corners_left_out  count  rejected
 sigma_px          px     median σ of a coordinate
 excess_px         px     σ that every corner has beyond its own
 covariance        text   where the corners' covariance is from
-model             text   lens model that told outliers
+model             text   lens model that identified outliers
 photos[].
   file     text   photo
   corners  count  found
@@ -168,7 +168,7 @@ camera.yaml  text  the pinhole of the straight images
 )"},
                                 {"plan calibrate", R"(estimate:
 @lens camera.
-worst_3sigma_px          px  of a pixel in the worst place, now
+worst_3sigma_px          px  at the worst pixel, now
 planned_worst_3sigma_px  px  the same with the planned photos
 data:)" + next_photo_table + R"(points_in_board.
   @xyz -

@@ -14,7 +14,7 @@ latency_p99_s    s     of 100, the second longest
 jitter_s         s     its scatter
 rate_rad_s[2]    rad/s of pan and tilt, in a small move
 resolution_rad[2] rad  smallest change that was read
-head_time_s      s     for which the head was held
+head_time_s      s     for which the head was in use
 axes.*.
   rate_rad_s           rad/s   largest
   acceleration_rad_s2  rad/s²  of starting and braking; null: more than can be seen
@@ -64,7 +64,7 @@ follow.
   target_pan_rad     rad  that would look at it
   target_tilt_rad    rad  that would look at it
 readings.
-  t_s       s    middle of question and answer
+  t_s       s    midpoint of question and answer
   wait_s    s    for the answer
   pan_rad   rad  read
   tilt_rad  rad  read

@@ -76,7 +76,7 @@ causes[].
   size    1     of it
   sigmas  1     in its σ
 @sigma sigma.
-design_effect       1    how much less the corners tell than if each erred by itself
+design_effect       1    how much less the corners determine than if each erred by itself
 chi2_per_dof        1    of the solution
 rms_px              px   of a corner's residual
 sigma_relative_rad  rad  σ of one head against the other

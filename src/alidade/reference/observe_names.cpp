@@ -37,7 +37,7 @@ photos[].
   zoom        1      focal length over that of the first
   sigma_zoom  1      σ
 shared_errors.
-  design_effect  1  how much less the rows tell than if each erred by itself
+  design_effect  1  how much less the rows determine than if each erred by itself
   correlation_s  s  how long errors last
   block_s        s  length of the blocks that err by themselves
   track_effect   1  the same for the tracks of points

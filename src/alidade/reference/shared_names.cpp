@@ -54,7 +54,7 @@ yz_m2  m²  covariance
 zz_m2  m²  covariance
 )"},
                                 {"@sigma", R"(
-design_effect         1  how much less the corners tell than if each erred by itself
+design_effect         1  how much less the corners determine than if each erred by itself
 shrinkage             1  share of the model's σ in the estimated one
 inflation.*           1  σ over the model's, by parameter
 degrees_of_freedom.*  1  of σ, by parameter

@@ -55,7 +55,7 @@ dead_band               1      commands no larger do nothing
 backlash_rad            rad    between drive and encoder
 second_tau_s            s      second lag, of the command
 encoder_step_rad        rad    one count
-design_effect           1      how much less the rows tell than if each erred by itself
+design_effect           1      how much less the rows determine than if each erred by itself
 correlated_rows         count  how long errors last
 rms_rad                 rad    of a residual
 rms_of_other_kind_rad   rad    of a residual, had the other kind been taken

@@ -19,7 +19,7 @@ struct RangefinderSample {
 [[nodiscard]] RangefinderSample draw_rangefinder_sample(const RangefinderSceneConfig& config, const ShotNoise& noise,
                                                         std::uint64_t seed);
 
-/// With the noise that the simulator makes told to the estimator.
+/// With the noise of the simulator given to the estimator.
 [[nodiscard]] RangefinderConfig given_config(RangefinderMethod method);
 
 [[nodiscard]] RangefinderReport solve_sample(const RangefinderSample& sample, const RangefinderConfig& config);

@@ -7,7 +7,7 @@
 #include "alidade/rangefinder/edges.h"
 #include "alidade/simulate/rangefinder.h"
 
-// A room for the method of edges: its photo, and the scan of a rangefinder that turns with the camera.
+// A room for the method of edges: its photo, and the scan of a rangefinder that rotates with the camera.
 
 namespace alidade::reproduce {
 

@@ -207,7 +207,7 @@ std::vector<Claim> zoom_claims(const ZoomScores& flow_only, const ZoomScores& ph
   flow.words =
       "RMS of the worse focal length on the ramp; the paper shows a curve, and an error of the whole ramp, 3.4 %, is "
       "what we take for not tracking. Pixels "
-      "by (11) with K(t) put in, which leaves out what a changing K itself moves.";
+      "by (11) with K(t) put in, which ignores what a changing K itself moves.";
   flow.figure = "8_own_flow";
   Claim camera{"exp3-ramp-camera",
                "tracks the ramp, in pixels as a camera has them",

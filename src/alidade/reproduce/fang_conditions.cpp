@@ -34,7 +34,7 @@ FigureTable points_figure(const ReproduceConfig& config) {
     figure.columns[1].second.push_back(median_lambda(config, num));
     figure.columns[2].second.push_back(fang_refuse_lambda);
   }
-  return titled(std::move(figure), "How well a number of points can tell the intrinsics",
+  return titled(std::move(figure), "How well a number of points determines the intrinsics",
                 "Least eigenvalue of the Gramian over 8 s, median over random sets of points; below the limit nothing "
                 "is to be trusted.",
                 "least eigenvalue");
@@ -102,7 +102,7 @@ Experiment fang_conditions(const ReproduceConfig& config) {
   Experiment experiment{
       "conditions", "What is said to be enough",
       "The observer of experiment 2 without noise, on random sets of points and on a pan alone; the least "
-      "eigenvalue of the Gramian over 8 s tells whether the regression can be solved.",
+      "eigenvalue of the Gramian over 8 s shows whether the regression can be solved.",
       "Fast gains with the Gramian of the motion."};
   report_progress(config.progress, "conditions", 0, 1);
   experiment.claims = {enough_points(config), enough_motion(config, experiment)};

@@ -45,7 +45,7 @@ HybridObserver paper_hybrid() {
   config.scale = paper_scale;
   config.start.k = paper_scale.normalised_intrinsics(paper_start);
   config.start_is_given = true;
-  config.sigma_px = paper_sigma_px;  // told: there are logs without any noise to tell it
+  config.sigma_px = paper_sigma_px;  // given: there are logs without any noise to estimate it from
   return HybridObserver(config);
 }
 

@@ -29,7 +29,7 @@ enum class Holds {
 struct Claim {
   std::string id;                 ///< "exp2-settles-again"
   std::string quantity;           ///< What is compared, in words.
-  std::string unit = {};          ///< Of the four numbers.
+  std::string unit = {};          ///< Of the four parameters.
   double printed = not_a_number;  ///< What the paper prints.
   double rerun = not_a_number;    ///< The paper's method, re-run by us.
   double ours = not_a_number;     ///< Our default method on the same data.

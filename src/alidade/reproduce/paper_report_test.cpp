@@ -58,7 +58,7 @@ TEST(ReproduceVerdict, CountsClaimsAndIsAnAnswerEvenWhereNoneHolds) {
   EXPECT_TRUE(reproduce_verdict(report_of({Holds::not_reproducible})).exit_code == ExitCode::ok);
 }
 
-TEST(Papers, HaveClaimsWithNamesOfTheirOwnAndStopWhenTold) {
+TEST(Papers, HaveClaimsWithNamesOfTheirOwnAndStopWhenAsked) {
   ReproduceConfig config;
   config.quick = true;
   const PaperReport report = reproduce_xiahou2015(config);  // the quickest

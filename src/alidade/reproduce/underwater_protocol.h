@@ -52,7 +52,7 @@ struct ProtocolRun {
   double p1_last = 0.0, p1_mean = 0.0, p5_last = 0.0, p5_mean = 0.0;  ///< [%], means over frames 10 to the end.
   double p1_above_2 = 0.0;  ///< Share of these frames with point 1 more than 2 % off.
   double p1_nees = 0.0, p5_nees = 0.0, worst_last = 0.0, camera_mm = 0.0, nis_per_dof = 0.0;
-  std::vector<double> p1_percent, p5_percent;  ///< One a frame.
+  std::vector<double> p1_percent, p5_percent;  ///< One per frame.
   Camera camera;
   Eigen::VectorXd sigma_lens;
 };
@@ -62,7 +62,7 @@ struct ProtocolRun {
                                        const LocalizationFilterConfig& filter, const FilterBankConfig& bank_config,
                                        FeatureKind kind);
 
-/// The published filter of the protocol: places, all observations of a frame at once, iterated, one start, no gate.
+/// The published filter of the protocol: positions, all observations of a frame at once, iterated, one start, no gate.
 [[nodiscard]] LocalizationFilterConfig paper_filter();
 
 /// The recommended one for so few points.

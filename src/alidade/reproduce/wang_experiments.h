@@ -4,7 +4,7 @@
 
 namespace alidade::reproduce {
 
-/// The planes of Table 1: signs, distances, what they can tell.
+/// The planes of Table 1: signs, distances, what they can determine.
 [[nodiscard]] Experiment wang_table_1();
 /// Table 2: three algorithms, values and times.
 [[nodiscard]] Experiment wang_table_2(const ReproduceConfig& config);

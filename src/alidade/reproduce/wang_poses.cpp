@@ -75,7 +75,7 @@ Claim spot_is_better(const BeamErrorTable& table) {
   claim.holds = reprojection >= 1.0 ? Holds::not_reproducible : position < 0.9 ? Holds::reproduced : Holds::in_shape;
   claim.words = fmt::format(
       "Much better where the spot is seen in the image; the origin is not ({:.2f} of the other's "
-      "error): method 2 tells its place along the beam better, method 1 across it.",
+      "error): method 2 determines it better along the beam, method 1 across it.",
       position);
   claim.figure = "7";
   return claim;
@@ -111,7 +111,7 @@ Experiment wang_poses(const ReproduceConfig& config) {
   Experiment experiment{
       "poses", "Figures 6–9: errors of the spot, and the number of poses",
       "Simulated logs of 3 to 30 shots on boards between 0.5 and 4 m; method 1 (spots) and method 2 (planes), each "
-      "without (lens and boards held) and with global optimisation, and ours (both kinds of measurement together).",
+      "without (lens and boards fixed) and with global optimisation, and ours (both kinds of measurement together).",
       "The paper does not say its noise: readings 1 mm, corners 0.1 px, spots 0.3 px, lens known to 1.5, 1.5, 2, 2 px. "
       "With readings of 2 mm method 2 needs 24 poses and more for 3 px. What the captions leave open: the error of "
       "figures 7 and 8 is taken in the image, that of figure 9 in space; figure 8 at 18 poses. Of what these figures "

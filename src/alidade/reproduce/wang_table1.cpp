@@ -20,7 +20,7 @@ constexpr std::array<std::array<double, 4>, 6> table_1{{{79.4819, -92.4582, -371
 
 Eigen::Vector3d foot_mm(const std::array<double, 4>& row) { return {row[0], row[1], row[2]}; }
 
-/// Its boards, turned to the front of the camera, with the readings that the beam of Table 2 would have there.
+/// Its boards, rotated to the front of the camera, with the readings that the beam of Table 2 would have there.
 std::vector<Shot> shots_of_table(const RangefinderSceneConfig& scene) {
   std::vector<Shot> shots;
   for (const auto& row : table_1) {
@@ -100,7 +100,7 @@ Claim tells_claim(const std::vector<Shot>& shots, const RangefinderSceneConfig& 
   const auto [least, most] = std::ranges::minmax(shots, {}, &Shot::range_m);
   claim.words = fmt::format(
       "Their readings differ by {:.1f} % only, and what moves the origin along the beam then hardly moves a reading: "
-      "even with planes known exactly and readings of 1 mm these boards cannot tell t. Ours: boards and spots "
+      "even with planes known exactly and readings of 1 mm these boards cannot determine t. Ours: boards and spots "
       "together.",
       100.0 * (most.range_m - least.range_m) / least.range_m);
   return claim;
@@ -113,13 +113,14 @@ Experiment wang_table_1() {
   const std::vector<Shot> shots = shots_of_table(scene);
   std::vector<Claim> claims{squares_claim(), signs_claim(), tells_claim(shots, scene)};
   for (Claim& claim : claims) claim.figure = "table_1";
-  return {"table1",
-          "Table 1: six planes",
-          "The six planes that the paper prints, checked against its own definitions; then, turned to the front of the "
-          "camera and with the readings that the beam of Table 2 would have on them, what they can tell of that beam.",
-          "Lengths in mm; 1280×960 px, f = 1200 px; readings of 1 mm, spots of 0.3 px.",
-          std::move(claims),
-          {boards_figure(shots)}};
+  return {
+      "table1",
+      "Table 1: six planes",
+      "The six planes that the paper prints, checked against its own definitions; then, turned to the front of the "
+      "camera and with the readings that the beam of Table 2 would have on them, what they can determine of that beam.",
+      "Lengths in mm; 1280×960 px, f = 1200 px; readings of 1 mm, spots of 0.3 px.",
+      std::move(claims),
+      {boards_figure(shots)}};
 }
 
 }  // namespace alidade::reproduce

@@ -98,7 +98,7 @@ FigureTable figure_7(const BeamErrorTable& table) {
   figure.up = "position error";
   figure.caption =
       "RMS distance of computed and true spot over readings of 0.5 to 4 m; median over the logs. Each method alone "
-      "(lens and boards held) and optimised (all together). Method 2 needs five poses.";
+      "(lens and boards fixed) and optimised (all together). Method 2 needs five poses.";
   return figure;
 }
 

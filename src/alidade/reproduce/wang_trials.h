@@ -24,7 +24,7 @@ struct BeamErrors {
 };
 using ErrorsOfBeams = std::vector<double> BeamErrors::*;
 
-/// By way and by place in pose_counts; no errors where a way needs more shots.
+/// By way and by index in pose_counts; no errors where a way needs more shots.
 using BeamErrorTable = std::array<std::array<BeamErrors, pose_counts.size()>, num_ways>;
 [[nodiscard]] BeamErrorTable beam_error_table(const ReproduceConfig& config);
 

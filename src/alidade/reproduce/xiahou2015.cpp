@@ -14,7 +14,7 @@ namespace {
 const std::array<Eigen::Vector2d, 2> printed_angles{Eigen::Vector2d(-15.3, 25.4) * degree,
                                                     Eigen::Vector2d(27.3, 23.7) * degree};
 
-/// What depth and angles imply, with the sign of (2) turned. [cm]
+/// What depth and angles imply, with the sign of (2) reversed. [cm]
 double baseline_cm() {
   return paper_target_cm.z() * (std::tan(printed_angles[1].x()) - std::tan(printed_angles[0].x()));
 }
@@ -39,9 +39,9 @@ std::vector<Claim> angle_claims() {
 }
 
 std::vector<Claim> pixel_claims() {
-  const Eigen::Vector2d middle(160.0, 120.0);
+  const Eigen::Vector2d centre(160.0, 120.0);
   const Eigen::Vector3d target_m = paper_target_cm / 100.0, step_m(baseline_cm() / 100.0, 0.0, 0.0);
-  const double off_px = std::max((pixel_of(0, target_m) - middle).norm(), (pixel_of(1, target_m) - middle).norm());
+  const double off_px = std::max((pixel_of(0, target_m) - centre).norm(), (pixel_of(1, target_m) - centre).norm());
   Claim centred{"geometry-middle",
                 "both cameras look at the target at the start: distance from the centre of the image", "px",
                 not_a_number, off_px};
@@ -49,7 +49,7 @@ std::vector<Claim> pixel_claims() {
   centred.words =
       "Pan > 0 turns left and tilt > 0 up on both heads, Y points down; angles are printed to 0.1°, 0.6 px.";
   Claim second{"geometry-second-image",
-               "u of the target in the second image by (11) and (12), which should be the middle, 160",
+               "u of the target in the second image by (11) and (12), which should be the centre, 160",
                "px",
                not_a_number,
                pixel_of(1, target_m + 2.0 * step_m).x(),

@@ -22,7 +22,7 @@ namespace {
 constexpr double loop_step_s = 0.05, loop_radius_m = 0.1, loop_period_s = 10.0;
 constexpr int loop_steps = 240;
 constexpr double loop_baseline_cm = 50.2;
-const Eigen::Vector2d loop_middle_px(160.0, 120.0);
+const Eigen::Vector2d loop_centre_px(160.0, 120.0);
 
 /// One instant: what is fed back, where the target truly is in both images, and the angles of both heads.
 struct LoopStep {
@@ -81,7 +81,7 @@ std::vector<LoopStep> run_printed_loop(double sigma_d_rad, std::uint64_t seed) {
       step.to_target_rad[i] = aim(rig[i].head, target_m).value_or(start_rad[i]);
       for (std::size_t axis = 0; axis < 2; ++axis) {
         const auto a = static_cast<Eigen::Index>(axis);
-        output_rad[i][a] = axes[i][axis].advance(loop_middle_px[a] - step.fed_back_px[i][a]);
+        output_rad[i][a] = axes[i][axis].advance(loop_centre_px[a] - step.fed_back_px[i][a]);
       }
     }
     steps.push_back(step);
@@ -93,7 +93,7 @@ double share_in_central_third(const std::vector<LoopStep>& steps, std::array<Eig
   double num = 0.0;
   for (const LoopStep& step : steps)
     for (const Eigen::Vector2d& px : step.*pixels) {
-      const Eigen::Vector2d off = (px - loop_middle_px).cwiseAbs();
+      const Eigen::Vector2d off = (px - loop_centre_px).cwiseAbs();
       num += off.x() <= 320.0 / 6.0 && off.y() <= 240.0 / 6.0 ? 0.5 : 0.0;
     }
   return 100.0 * num / static_cast<double>(steps.size());
@@ -175,7 +175,7 @@ Experiment xiahou_loop(const ReproduceConfig& config) {
       "loop",
       "Figure 2: the loop as printed",
       "Angles with d1 to d4 added give the tangents of the measurement; the filter (Q = I6) takes them; its estimate, "
-      "projected with the same angles, is what the PI controllers compare with the middle of the image.",
+      "projected with the same angles, is what the PI controllers compare with the image centre.",
       "d1 to d4: white, 0.5°; the paper does not say what they are. Plant in degrees, error in pixels, circle of 10 "
       "cm in 10 s, which enters nowhere but in the true image.",
       {fed_back, follows, moves},

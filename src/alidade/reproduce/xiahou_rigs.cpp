@@ -13,7 +13,7 @@ struct Scores {
   double paper_mm = 0.0, best_mm = 0.0, bound_mm = 0.0;
 };
 
-/// RMS over all runs of the literal filter and of our default, told of the target's liveliness by nobody.
+/// RMS over all runs of the literal filter and of our default, neither given how the target manoeuvres.
 Scores score(const ReproduceConfig& config, const TrackScene& scene) {
   const TrueTrack truth = truth_of(scene);
   const int runs = config.quick ? 8 : 60;

@@ -70,18 +70,18 @@ Experiment xiahou_servo(const ReproduceConfig& config) {
                      best = figures_of(config, scene, ControllerKind::feedforward),
                      fast_pi = figures_of(config, fast, ControllerKind::pi),
                      fast_best = figures_of(config, fast, ControllerKind::feedforward);
-  Claim middle{"servo-middle",
+  Claim centre{"servo-middle",
                "the target stays in the central third of both images",
                "%",
                not_a_number,
                100.0 * pi.central_third,
                100.0 * best.central_third};
-  middle.holds = near_to(middle.rerun, 100.0, 0.01);
-  middle.words = fmt::format(
-      "{:.1f} px RMS from the middle, ours {:.2f} px. What is fed back is the measured pixel; the loop as "
+  centre.holds = near_to(centre.rerun, 100.0, 0.01);
+  centre.words = fmt::format(
+      "{:.1f} px RMS from the centre, ours {:.2f} px. What is fed back is the measured pixel; the loop as "
       "the paper prints it stands below.",
       pi.rms_px, best.rms_px);
-  middle.figure = "4";
+  centre.figure = "4";
   Claim manoeuvring{"servo-lively", "the same on a circle of 0.3 m in 2 s", "%",
                     not_a_number,   100.0 * fast_pi.central_third,          100.0 * fast_best.central_third};
   manoeuvring.holds = near_to(manoeuvring.rerun, 100.0, 0.01);
@@ -95,7 +95,7 @@ Experiment xiahou_servo(const ReproduceConfig& config) {
           "with noise "
           "of 0.5 px and 0.05°; ours predicts the target's bearing and feeds its motion forward.",
           "Plant in degrees, error in pixels, e = -(u - u0), -(v - v0); circle of 10 cm in 10 s.",
-          {stability_claim(), middle, manoeuvring},
+          {stability_claim(), centre, manoeuvring},
           {angles_figure(config, scene)}};
 }
 

@@ -53,7 +53,7 @@ Track run_filter(const XiahouConfig& filter_config, double radius_cm, std::uint6
 }
 
 struct TrackScores {
-  Values mean_cm, max_cm, nees;  ///< One a run.
+  Values mean_cm, max_cm, nees;  ///< One per run.
 };
 
 TrackScores score(const ReproduceConfig& config, const XiahouConfig& filter, double radius_cm) {
@@ -103,7 +103,7 @@ Experiment xiahou_tracking(const ReproduceConfig& config) {
   mean.holds = near_to(mean.rerun, mean.printed, 0.05);
   mean.words = fmt::format(
       "Q = I6 a step, as its third step has it; insensitive to the circle's radius, for it is noise alone. "
-      "Q = GG', as (1) has it, gives {:.2f} cm on a circle of 6 cm: the figure tells neither. Its R takes "
+      "Q = GG', as (1) has it, gives {:.2f} cm on a circle of 6 cm: the figure shows neither. Its R takes "
       "5.3° of angle and 0.1 cm for the same noise, so it says nothing of real encoders and pixels.",
       quantile_of(other.mean_cm, 0.5));
   Claim most{"rmse-max", "largest error of the position", "cm", 8.0, quantile_of(first.max_cm, 0.5)};

@@ -35,7 +35,7 @@ Trials run_trials(const ReproduceConfig& config, const char* what, int num, cons
   for (int sequence = 0; sequence < num; ++sequence) {
     report_progress(config.progress, what, static_cast<std::size_t>(sequence), static_cast<std::size_t>(num));
     const UnderwaterSample sample = sample_of(scene, 900000 * config.seed + static_cast<std::uint64_t>(sequence));
-    const UnderwaterSample even = with_even_noise(sample);  // half a pixel each, also where an image tells better
+    const UnderwaterSample even = with_even_noise(sample);  // half a pixel each, also where an image shows more
     const ObservationErrors errors = observation_errors(sample);
     trials.observations_rms_px.push_back(errors.rms_px);
     trials.observations_chi2.push_back(errors.chi2_per_dof);
@@ -251,7 +251,7 @@ Experiment from_points(const Trials& trials) {
       "Figure 10: errors of points 1 and 5 with three lens models",
       "A camera under water before a board of 9×7 squares of 28 mm; eight of its vertices are tracked in 35 frames, "
       "2, 4, 6 and 8 known beforehand, 1, 3, 5 and 7 begun on their first ray with a depth that is 3 % off. The "
-      "paper's filter (an iterated extended Kalman filter on position, attitude, velocity, rate and places, all "
+      "paper's filter (an iterated extended Kalman filter on position, attitude, velocity, rate and positions, all "
       "observations of a frame at once) runs with a pinhole, with k1 alone, and with the whole lens; ours (inverse "
       "depths, "
       "observations in order, several starts) beside it. Error: 100 |y' - y| over the distance from the first camera.",

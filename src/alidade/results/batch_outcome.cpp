@@ -15,8 +15,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr double outlying = 4.0;      // of a normal batch one value in 16 000
-constexpr std::size_t least_lot = 8;  // below, the batch's own scatter is poorly known
+constexpr double outlying = 4.0;    // of a normal batch one value in 16 000
+constexpr std::size_t min_lot = 8;  // below, the batch's own scatter is poorly known
 
 /// Numbers that stand in both trees at the same place: an estimate and its σ.
 void add_values(const ordered_json& estimate, const ordered_json& stddev, const std::string& path, BatchRow& row) {
@@ -53,13 +53,13 @@ std::string number_text(double value) { return std::isfinite(value) ? fmt::forma
 
 /// Of each quantity all outliers, and as many others as the figure needs.
 std::vector<BatchOutlier> shown_distances(const std::vector<BatchRow>& rows) {
-  constexpr std::size_t most_of_quantity = 1000, most = 20000;
+  constexpr std::size_t max_of_quantity = 1000, most = 20000;
   const std::vector<BatchOutlier> all = distances_of(rows);
   std::map<std::string, std::size_t> counts, at;
   for (const BatchOutlier& one : all) ++counts[one.name];
   std::vector<BatchOutlier> shown;
   for (const BatchOutlier& one : all) {
-    const std::size_t every = (counts[one.name] + most_of_quantity - 1) / most_of_quantity;
+    const std::size_t every = (counts[one.name] + max_of_quantity - 1) / max_of_quantity;
     const bool is_taken = at[one.name]++ % every == 0 || std::abs(one.z) > outlying;
     if (is_taken && shown.size() < most) shown.push_back(one);
   }
@@ -181,7 +181,7 @@ std::optional<BatchRow> parse_row(std::string_view text, const std::vector<std::
 std::vector<BatchOutlier> distances_of(const std::vector<BatchRow>& rows) {
   std::vector<BatchOutlier> distances;
   for (const auto& [name, values] : columns_of(rows)) {
-    if (values.size() < least_lot) continue;
+    if (values.size() < min_lot) continue;
     std::vector<double> numbers;
     for (const auto& [row, value] : values) numbers.push_back(value.value);
     const double median = median_of(numbers);

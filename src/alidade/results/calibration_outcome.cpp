@@ -21,7 +21,7 @@ namespace {
 /// "532.8 ± 1.3": both to two digits of the 3σ.
 std::string value_and_3sigma(double value, double sigma) {
   const double bound = 3.0 * sigma;
-  if (!(bound > 0.0)) return fmt::format("{:.6g} (held)", value);
+  if (!(bound > 0.0)) return fmt::format("{:.6g} (fixed)", value);
   const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(bound))), 0, 9);
   return fmt::format("{:.{}f} ± {:.{}f}", value, decimals, bound, decimals);
 }

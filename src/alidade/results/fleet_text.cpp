@@ -103,15 +103,15 @@ std::string fleet_row_text(const FleetRow& row) {
   return text + "}";
 }
 
-FleetRow fleet_row_of(const FleetSight& sight, std::int64_t n) {
+FleetRow fleet_row_of(const FleetObservation& observation, std::int64_t n) {
   FleetRow row;
   row.n = n;
-  row.t_s = sight.t_s;
-  row.temperature_c = sight.temperature_c;
-  row.rotation = {sight.pan_rad, sight.tilt_rad, 0.0, 0.0};
-  row.num_points = static_cast<int>(sight.px.size() / 2);
+  row.t_s = observation.t_s;
+  row.temperature_c = observation.temperature_c;
+  row.rotation = {observation.pan_rad, observation.tilt_rad, 0.0, 0.0};
+  row.num_points = static_cast<int>(observation.px.size() / 2);
   row.px.fill(std::numeric_limits<double>::quiet_NaN());
-  std::ranges::copy(sight.px, row.px.begin());
+  std::ranges::copy(observation.px, row.px.begin());
   return row;
 }
 

@@ -16,7 +16,7 @@ namespace alidade {
 [[nodiscard]] std::optional<FleetRow> parse_fleet_row(std::string_view payload, std::string& fault);
 [[nodiscard]] std::string fleet_row_text(const FleetRow& row);
 /// The n-th row of a simulated camera.
-[[nodiscard]] FleetRow fleet_row_of(const FleetSight& sight, std::int64_t n);
+[[nodiscard]] FleetRow fleet_row_of(const FleetObservation& observation, std::int64_t n);
 
 /// Of cam.ID.state: a function of the camera's messages 1 … n alone.
 [[nodiscard]] std::string fleet_state_text(const std::string& id, const FleetCamera& camera);

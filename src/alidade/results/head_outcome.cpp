@@ -34,7 +34,7 @@ std::string servo_log_csv(const PositionerLog& log) {
   return csv;
 }
 
-/// Of what a short log does not show the fit's σ is without end: such a value is left out.
+/// Of what a short log does not show the fit's σ is without end: such a value is omitted.
 bool is_determined(const PositionerValue& value, std::size_t which) {
   constexpr std::array<double, num_positioner_values> max_sigma{100.0, 1e5, 100.0, 100.0,
                                                                 6.3,   6.3, 6.3,   6.3};  // rad, s

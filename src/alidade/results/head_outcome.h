@@ -11,7 +11,7 @@ namespace alidade {
 [[nodiscard]] JobOutcome outcome_of(const HeadSurvey& survey);
 /// Of how it follows: its axes with σ, and log.csv of each.
 [[nodiscard]] JobOutcome outcome_of(const HeadIdentification& identified);
-/// Of what it and its camera tell: camera.yaml, rig.yaml, log.csv.
+/// Of what it and its camera show: camera.yaml, rig.yaml, log.csv.
 [[nodiscard]] JobOutcome outcome_of(const HeadCalibration& calibration);
 /// Its files while it runs: log.csv, and those of the estimate where there is one.
 [[nodiscard]] std::vector<NamedBytes> files_so_far(const HeadCalibration& calibration);

@@ -161,7 +161,7 @@ std::vector<std::string> lines_of(const NetworkCalibration& result) {
   for (std::size_t h = 0; h < result.cameras.size(); ++h) {
     const PlacedCamera& camera = result.cameras[h];
     if (!camera.placed && !camera.reason.empty())
-      lines.push_back(fmt::format("head {}: not placed: {}", camera.id, camera.reason));
+      lines.push_back(fmt::format("head {}: not located: {}", camera.id, camera.reason));
     if (camera.placed && result.status == MovingTargetReport::Status::placed) add_lines_of_camera(result, h, lines);
   }
   if (result.truth_covered > 0.0)

@@ -13,13 +13,13 @@ namespace {
 
 /// "board's centre at (512, 80) px, 0.61 m away, turned 32° about x, 0° about y".
 std::string photo_words(const CalibratedNow& known, const NextPhoto& photo) {
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const auto& point : known.board_points) middle += point / static_cast<double>(known.board_points.size());
-  const Eigen::Vector3d middle_in_cam = photo.cam_from_board * middle;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (const auto& point : known.board_points) centre += point / static_cast<double>(known.board_points.size());
+  const Eigen::Vector3d centre_in_cam = photo.cam_from_board * centre;
   const Eigen::Vector3d turn = log_so3(photo.cam_from_board.rotation);
-  const auto px = project(known.camera, middle_in_cam);
+  const auto px = project(known.camera, centre_in_cam);
   return fmt::format("board's centre at ({:.0f}, {:.0f}) px, {:.2f} m away, turned {:.0f}° about x, {:.0f}° about y",
-                     px ? px->x() : std::nan(""), px ? px->y() : std::nan(""), middle_in_cam.norm(), turn.x() / degree,
+                     px ? px->x() : std::nan(""), px ? px->y() : std::nan(""), centre_in_cam.norm(), turn.x() / degree,
                      turn.y() / degree);
 }
 

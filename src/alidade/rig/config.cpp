@@ -14,7 +14,7 @@ constexpr Freedom freedoms[] = {{"scale", &RigConfig::estimate_scales},
                                 {"focal", &RigConfig::estimate_focal},
                                 {"centre", &RigConfig::estimate_centre}};
 
-/// "scale,once": takes the place of what was to be estimated. What is wrong with it, else "".
+/// "scale,once": replaces what was to be estimated. What is wrong with it, else "".
 std::string read_freedoms(const std::string& text, RigConfig& config) {
   config.estimate_by_need = text == "auto";
   for (const auto& [word, is_free] : freedoms) config.*is_free = false;

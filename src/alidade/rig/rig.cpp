@@ -117,13 +117,13 @@ std::optional<SolvedRig> solve_with_noise(Work& work, const RigState& start, std
     const auto cov = rig_covariance(work.problem, *solved).cov;
     if (!cov) break;
     const double num = 2.0 * static_cast<double>(std::ranges::count(weights, 1.0));
-    const double told = num - num_held_corrections(work.problem, *solved, *cov, weights);
-    work.num_given = told >= enough ? told : 0.0;
+    const double freedom = num - num_fixed_corrections(work.problem, *solved, *cov, weights);
+    work.num_given = freedom >= enough ? freedom : 0.0;
     const double before = work.problem.sigma_encoder_rad;
-    double sigma_rad = std::max(min_rad, std::sqrt(sum_of_corrections2(work, *solved, weights) / told));
-    if (!(told >= enough)) {
+    double sigma_rad = std::max(min_rad, std::sqrt(sum_of_corrections2(work, *solved, weights) / freedom));
+    if (!(freedom >= enough)) {
       work.report.sigma_encoder_is_estimated = false;
-      sigma_rad = told > 1.0 ? std::max(sigma_rad, usual_rad) : usual_rad;
+      sigma_rad = freedom > 1.0 ? std::max(sigma_rad, usual_rad) : usual_rad;
     }
     work.problem.sigma_encoder_rad = sigma_rad;
     solved = solve_robustly(work, solved->state, weights);

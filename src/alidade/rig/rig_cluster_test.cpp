@@ -25,8 +25,8 @@ std::vector<HeadView> views_with(const RigScene& scene, const SharedErrors& erro
   std::vector<HeadView> views = simulate_head_views(scene, {}, seed).views;
   Draws draws(seed + 77);
   const std::vector<Eigen::Vector3d> points = points_in_board(scene.board);
-  const Eigen::Vector3d middle = 0.5 * (points.front() + points.back());
-  const double reach2 = (points.front() - middle).squaredNorm();
+  const Eigen::Vector3d centre = 0.5 * (points.front() + points.back());
+  const double reach2 = (points.front() - centre).squaredNorm();
   for (std::size_t v = 0; v < views.size(); ++v) {
     HeadView& view = views[v];
     const Eigen::Vector2d shift = errors.shift_px * draws.normal2();
@@ -37,7 +37,7 @@ std::vector<HeadView> views_with(const RigScene& scene, const SharedErrors& erro
     for (Corner& corner : view.seen.corners) {
       const Eigen::Vector3d& flat = points[static_cast<std::size_t>(corner.index)];
       const Eigen::Vector3d bent =
-          flat + errors.bow_m * (1.0 - (flat - middle).squaredNorm() / reach2) * Eigen::Vector3d::UnitZ();
+          flat + errors.bow_m * (1.0 - (flat - centre).squaredNorm() / reach2) * Eigen::Vector3d::UnitZ();
       const Eigen::Vector2d true_rad = scene.views[v].pan_tilt_rad;
       const auto there = project(head, true_rad, world_from_board * bent);
       const auto here = project(head, true_rad, world_from_board * flat);

@@ -85,9 +85,9 @@ Rigid3 cam_from_cam(const Head& first, const Eigen::Vector2d& first_rad, const H
 
 /// The centre and the four corners of the range of a head's views, or of `min_rad` about its centre if that is more.
 std::vector<Eigen::Vector2d> angles_of(const HeadCover& cover, double min_rad) {
-  const Eigen::Vector2d middle = 0.5 * (cover.lowest_rad + cover.highest_rad);
+  const Eigen::Vector2d centre = 0.5 * (cover.lowest_rad + cover.highest_rad);
   const Eigen::Vector2d half = (0.5 * (cover.highest_rad - cover.lowest_rad)).cwiseMax(0.5 * min_rad);
-  const Eigen::Vector2d low = middle - half, high = middle + half;
+  const Eigen::Vector2d low = centre - half, high = centre + half;
   return {0.5 * (low + high), low, {low.x(), high.y()}, high, {high.x(), low.y()}};
 }
 

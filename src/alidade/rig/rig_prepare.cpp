@@ -125,7 +125,7 @@ void fit_poses(Work& work) {
   for (std::size_t v = 0; v < work.given.size(); ++v) {
     if (!work.usable[v]) continue;
     const auto& pose = work.poses[v];
-    // A view without a pose of its own is placed by the others.
+    // A view without a pose of its own is located by the others.
     if (pose && work.config.reject_outliers && pose->dof > 0 &&
         pose->chi2 / pose->dof > std::pow(max_sigmas * std::max(given_px, work.report.sigma_px), 2)) {
       work.usable[v] = false;

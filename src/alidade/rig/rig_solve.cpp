@@ -288,8 +288,8 @@ RigCovariance rig_covariance(const RigProblem& problem, const SolvedRig& solved)
   return out;
 }
 
-double num_held_corrections(const RigProblem& problem, const SolvedRig& solved, const Eigen::MatrixXd& cov,
-                            std::span<const double> weights) {
+double num_fixed_corrections(const RigProblem& problem, const SolvedRig& solved, const Eigen::MatrixXd& cov,
+                             std::span<const double> weights) {
   double held = 0.0;
   for (std::size_t v = 0; v < problem.views.size(); ++v) {
     if (!(weights[v] > 0.0)) continue;

@@ -109,7 +109,7 @@ struct RigCovariance {
 [[nodiscard]] RigCovariance rig_covariance(const RigProblem& problem, const SolvedRig& solved);
 
 /// Σ over the used views of tr cov(correction)/σ²: how many of the corrections are determined by the prior alone.
-[[nodiscard]] double num_held_corrections(const RigProblem& problem, const SolvedRig& solved,
-                                          const Eigen::MatrixXd& cov, std::span<const double> weights);
+[[nodiscard]] double num_fixed_corrections(const RigProblem& problem, const SolvedRig& solved,
+                                           const Eigen::MatrixXd& cov, std::span<const double> weights);
 
 }  // namespace alidade

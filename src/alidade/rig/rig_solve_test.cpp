@@ -114,7 +114,7 @@ TEST(RigSolve, CovarianceIsThatOfTheWholeInformation) {
   EXPECT_LE((*cov - whole.topLeftCorner(common, common)).norm(), 1e-6 * cov->norm());
   double held = 0.0;
   for (Eigen::Index k = corrections; k < whole.rows(); ++k) held += whole(k, k) / 1e-6;
-  EXPECT_NEAR(num_held_corrections(example.problem, *solved, *cov, weights), held, 1e-6 * held);
+  EXPECT_NEAR(num_fixed_corrections(example.problem, *solved, *cov, weights), held, 1e-6 * held);
 }
 
 }  // namespace

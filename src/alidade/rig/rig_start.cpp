@@ -122,7 +122,7 @@ std::optional<Rigid3> place_of_points(const RigProblem& problem, const std::vect
   return best ? std::optional(place) : std::nullopt;
 }
 
-/// Each board that a placed head sees and that has no pose yet.
+/// Each board that a located head sees and that has no pose yet.
 bool place_boards(const RigProblem& problem, const std::vector<bool>& usable, Poses poses, PlacedRig& placed) {
   bool any = false;
   for (std::size_t b = 0; b < placed.has_board.size(); ++b) {

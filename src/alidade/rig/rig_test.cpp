@@ -24,8 +24,8 @@ using Status = RigReport::Status;
 /// A board like the reference case's: its origin at the centre.
 std::vector<Eigen::Vector3d> centred(const Board& board) {
   std::vector<Eigen::Vector3d> points = points_in_board(board);
-  const Eigen::Vector3d middle = 0.5 * (points.front() + points.back());
-  for (Eigen::Vector3d& point : points) point -= middle;
+  const Eigen::Vector3d centre = 0.5 * (points.front() + points.back());
+  for (Eigen::Vector3d& point : points) point -= centre;
   return points;
 }
 
@@ -149,7 +149,7 @@ TEST(Rig, SimulatedRigsAreFoundAgainFromNominal) {
   EXPECT_NEAR(found.nees, 6.0, 3.0 * std::sqrt(12.0 / runs));
 }
 
-TEST(Rig, NoiseThatIsNotGivenIsTold) {
+TEST(Rig, NoiseThatIsNotGivenIsEstimated) {
   constexpr int runs = 20;
   const Trials found = trials(runs, {}, {});
   EXPECT_EQ(found.converged, runs);
@@ -255,7 +255,7 @@ void expect_refusal(const RigScene& scene, const std::vector<HeadView>& views, c
   EXPECT_FALSE(verdict.to_add.empty()) << words;
 }
 
-TEST(Rig, WhatCannotBeToldIsRefusedByName) {
+TEST(Rig, WhatCannotBeDeterminedIsRefusedByName) {
   const auto simulated = [](const std::vector<double>& pans, const std::vector<double>& tilts, bool shared,
                             const std::string& words) {
     for (std::uint64_t seed = 1; seed <= 2; ++seed) {

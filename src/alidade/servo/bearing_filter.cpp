@@ -65,7 +65,7 @@ void BearingAxis::start(double t_s, double angle_rad, double variance_rad2, cons
   t_s_ = t_s;
   for (std::size_t i = 0; i < num_agilities; ++i) {
     const double sigma = config_.sigma_rad_s2[i];
-    // What a model's accelerations make of a rate in their time; the liveliest may have any.
+    // What a model's accelerations make of a rate in their time; the most manoeuvring may have any.
     const double rate = i + 1 == num_agilities ? config_.start_rate_rad_s
                                                : std::min(config_.start_rate_rad_s, sigma * config_.singer_tau_s);
     beliefs_[i].x = {angle_rad, 0.0, 0.0};  // after a jump no rate or acceleration is assumed

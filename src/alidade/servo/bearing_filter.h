@@ -13,7 +13,7 @@ ALIDADE_PUBLIC_BEGIN
 inline constexpr std::size_t num_agilities = 5;
 
 /// A target's bearing from a head, one axis: angle, rate, acceleration; each of a few Singer models knows
-/// another liveliness of the target, and their past predictions decide how much each is heard.
+/// another manoeuvre of the target, and their past predictions decide how much each is heard.
 struct BearingFilterConfig {
   double singer_tau_s = 0.4;  ///< For how long an acceleration lasts.
   /// σ of the target's angular acceleration: 5, 20, 80, 320 and 1280 °/s². One alone: all of them the same.

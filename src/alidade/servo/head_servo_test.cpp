@@ -32,7 +32,7 @@ TEST(HeadServo, BearingIsThePapersForSmallOffsets) {
   EXPECT_NEAR(bearing->y(), 0.4 + std::atan(2.0 / 337.84), 1e-4);
 }
 
-TEST(HeadServo, BearingPutsTheTargetInTheMiddle) {
+TEST(HeadServo, BearingPutsTheTargetInTheCentre) {
   for (const RigHead& head : {xiahou_rig()[1], general_head()}) {
     ServoConfig config;
     config.range_m = 2.0;

@@ -83,20 +83,21 @@ FleetScene draw_fleet_scene(const FleetSceneConfig& config, std::uint64_t seed, 
   return scene;
 }
 
-FleetSight simulate_sight(const FleetScene& scene, const FleetSceneConfig& config, std::uint64_t seed, std::int64_t n) {
-  FleetSight sight;
-  sight.t_s = static_cast<double>(n - 1) / config.rate_hz;
-  const double at = grown(scene, sight.t_s);
-  const bool is_frozen = scene.event == FleetEvent::frozen && sight.t_s >= scene.event_t_s;
+FleetObservation simulate_observation(const FleetScene& scene, const FleetSceneConfig& config, std::uint64_t seed,
+                                      std::int64_t n) {
+  FleetObservation observation;
+  observation.t_s = static_cast<double>(n - 1) / config.rate_hz;
+  const double at = grown(scene, observation.t_s);
+  const bool is_frozen = scene.event == FleetEvent::frozen && observation.t_s >= scene.event_t_s;
   const auto angles_at = [&](double t_s) {
     const auto& s = scene.sway_rad;
     const auto& f = scene.phase;
     return Eigen::Vector3d(s[0] * std::sin(0.31 * t_s + f[0]) + s[1] * std::sin(0.83 * t_s + f[1]),
                            s[2] * std::sin(0.43 * t_s + f[2]) + s[3] * std::sin(1.07 * t_s + f[3]), 0.0);
   };
-  const Eigen::Vector3d read = angles_at(sight.t_s);
-  sight.pan_rad = read.x();
-  sight.tilt_rad = read.y();
+  const Eigen::Vector3d read = angles_at(observation.t_s);
+  observation.pan_rad = read.x();
+  observation.tilt_rad = read.y();
   // A frozen image is that of the moment, with its noise.
   const std::int64_t seen_n =
       is_frozen ? static_cast<std::int64_t>(std::ceil(scene.event_t_s * config.rate_hz)) + 1 : n;
@@ -106,8 +107,8 @@ FleetSight simulate_sight(const FleetScene& scene, const FleetSceneConfig& confi
   double zoom = scene.event == FleetEvent::focal_drift ? 1.0 + at * scene.event_size : 1.0;
   if (config.warming_c > 0.0) {
     const double warmer_c =
-        0.5 * config.warming_c * (1.0 - std::cos(std::numbers::pi * std::min(1.0, sight.t_s / config.warming_s)));
-    sight.temperature_c = 10.0 + warmer_c;
+        0.5 * config.warming_c * (1.0 - std::cos(std::numbers::pi * std::min(1.0, observation.t_s / config.warming_s)));
+    observation.temperature_c = 10.0 + warmer_c;
     zoom *= 1.0 + scene.focal_per_c * warmer_c;
   }
   const Eigen::Quaterniond cam_from_base = base_from_cam_rotation(truth).conjugate();
@@ -117,10 +118,10 @@ FleetSight simulate_sight(const FleetScene& scene, const FleetSceneConfig& confi
         base_from_cam_rotation({scene.direction[2 * k], scene.direction[2 * k + 1], 0.0}) * Eigen::Vector3d::UnitZ();
     const Eigen::Vector3d p = cam_from_base * ray;
     const Eigen::Vector2d noise = config.noise_px * draws.normal2();
-    sight.px[2 * k] = zoom * scene.fx * p.x() / p.z() + scene.cx + noise.x();
-    sight.px[2 * k + 1] = zoom * scene.fy * p.y() / p.z() + scene.cy + noise.y();
+    observation.px[2 * k] = zoom * scene.fx * p.x() / p.z() + scene.cx + noise.x();
+    observation.px[2 * k + 1] = zoom * scene.fy * p.y() / p.z() + scene.cy + noise.y();
   }
-  return sight;
+  return observation;
 }
 
 }  // namespace alidade

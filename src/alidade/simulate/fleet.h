@@ -36,14 +36,14 @@ struct FleetScene {
 };
 
 /// What the camera says at its n-th row, from 1: a function of (scene, config, seed, n).
-struct FleetSight {
+struct FleetObservation {
   double t_s = 0.0, pan_rad = 0.0, tilt_rad = 0.0;
   double temperature_c = std::numeric_limits<double>::quiet_NaN();
   std::array<double, 8> px{};
 };
 
 [[nodiscard]] FleetScene draw_fleet_scene(const FleetSceneConfig& config, std::uint64_t seed, int index);
-[[nodiscard]] FleetSight simulate_sight(const FleetScene& scene, const FleetSceneConfig& config, std::uint64_t seed,
-                                        std::int64_t n);
+[[nodiscard]] FleetObservation simulate_observation(const FleetScene& scene, const FleetSceneConfig& config,
+                                                    std::uint64_t seed, std::int64_t n);
 
 }  // namespace alidade

@@ -75,20 +75,20 @@ std::vector<HeadView> views_of(const RigHead& rig_head, const Rigid3& world_from
   return kept;
 }
 
-Rigid3 drawn_board(const RigSceneConfig& config, const Rig& rig, const Eigen::Vector3d& middle_in_board, Draws& draws) {
+Rigid3 drawn_board(const RigSceneConfig& config, const Rig& rig, const Eigen::Vector3d& centre_in_board, Draws& draws) {
   // Somewhere in front of the heads' midpoint, facing them, tilted by up to 35°.
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   for (const RigHead& rig_head : rig.heads)
-    middle += rig_head.head.world_from_base.translation / static_cast<double>(rig.heads.size());
+    centre += rig_head.head.world_from_base.translation / static_cast<double>(rig.heads.size());
   const double range_m = draws.uniform(config.min_range_m, config.max_range_m);
   const double pan = draws.uniform(-30.0, 30.0) * degree, tilt = draws.uniform(-10.0, 20.0) * degree;
   const Eigen::Quaterniond towards = exp_so3({0.0, -pan, 0.0}) * exp_so3({tilt, 0.0, 0.0});
-  const Eigen::Vector3d place = middle + range_m * (towards * Eigen::Vector3d::UnitZ());
+  const Eigen::Vector3d place = centre + range_m * (towards * Eigen::Vector3d::UnitZ());
   const double side = draws.uniform(0.0, 2.0 * std::numbers::pi), lean = draws.uniform(5.0, 35.0) * degree;
   const Eigen::Quaterniond turn = exp_so3(lean * Eigen::Vector3d(std::cos(side), std::sin(side), 0.0)) *
                                   exp_so3({0.0, 0.0, draws.uniform(-0.3, 0.3)});
   const Eigen::Quaterniond rotation = (towards * turn).normalized();
-  return {rotation, place - rotation * middle_in_board};
+  return {rotation, place - rotation * centre_in_board};
 }
 
 RigSceneConfig completed(RigSceneConfig config) {
@@ -119,11 +119,11 @@ RigScene draw_rig_scene(const RigSceneConfig& given, std::uint64_t seed) {
     scene.rig.heads.push_back(drawn_head(nominal, config, scene.rig.heads.empty(), draws));
   use_first_camera(scene.rig);
   const std::vector<Eigen::Vector3d> points = points_in_board(config.board);
-  const Eigen::Vector3d middle = 0.5 * (points.front() + points.back());
+  const Eigen::Vector3d centre = 0.5 * (points.front() + points.back());
   constexpr int max_tries = 100000;
   for (int tries = 0; static_cast<int>(scene.world_from_board.size()) < config.num_boards; ++tries) {
-    if (tries > max_tries) throw std::runtime_error("no board can be placed in view of these heads");
-    const Rigid3 world_from_board = drawn_board(config, scene.rig, middle, draws);
+    if (tries > max_tries) throw std::runtime_error("no board fits in view of these heads");
+    const Rigid3 world_from_board = drawn_board(config, scene.rig, centre, draws);
     const auto index = static_cast<int>(scene.world_from_board.size());
     std::vector<HeadView> views;
     bool is_seen = true;

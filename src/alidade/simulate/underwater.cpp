@@ -13,7 +13,7 @@ namespace {
 constexpr std::array<std::array<int, 2>, 8> vertices{{{0, 0}, {9, 0}, {9, 7}, {0, 7}, {5, 4}, {2, 2}, {7, 2}, {7, 5}}};
 constexpr double square_m = 0.028, centre_x_m = 4.5 * square_m, centre_y_m = 3.5 * square_m;
 
-/// A sine of each of six numbers: position, then rotation vector.
+/// A sine of each of six components: position, then rotation vector.
 struct Swing {
   Eigen::Vector<double, 6> amplitude, frequency_hz, phase;
 
@@ -78,7 +78,7 @@ bool is_between_pixels(const Camera& camera, const Eigen::Vector2d& px) {
 Camera underwater_camera() {
   Calibrated<Brown> lens;
   lens.params << 768.0, 766.0, 389.0, 284.0, 0.0, -0.44881, 0.0664, 0.01316, 0.00218, 0.0;
-  // Told exactly: its covariance is zero.
+  // Given exactly: its covariance is zero.
   return {768, 576, lens, Eigen::MatrixXd::Zero(10, 10), 0.0, "alidade simulate underwater"};
 }
 

@@ -78,7 +78,7 @@ TEST(LaserSpot, SixteenBitsAreAsGoodAsEight) {
   EXPECT_LT((spot.px - Eigen::Vector2d(70.3, 51.8)).norm(), 0.15);
 }
 
-TEST(LaserSpot, AWhiteMiddleInAColouredHaloIsSaturated) {
+TEST(LaserSpot, AWhiteCentreInAColouredHaloIsSaturated) {
   Painting painting;
   painting.add_spot({70.3, 51.8}, 3.0, 3000.0);
   const LaserSpot spot = find_laser_spot(painting.photo());
@@ -143,7 +143,7 @@ TEST(LaserSpot, ASpotOnTheBorderIsNamed) {
   EXPECT_NE(find_laser_spot(painting.photo()).reason.find("is cut by the photo's border"), std::string::npos);
 }
 
-TEST(LaserSpot, WhatCannotBeToldIsNamed) {
+TEST(LaserSpot, WhatCannotBeDeterminedIsNamed) {
   Painting painting;
   painting.light.setTo(cv::Scalar(300, 300, 300));
   EXPECT_EQ(find_laser_spot(painting.photo()).reason, "the photo is blown out");

@@ -37,7 +37,7 @@ FieldList fields_of(RangefinderStudy& study) {
       {.name = "method", .value = one_of(study.method, methods), .help = "spot, plane or joint"},
       {.name = "refine",
        .value = one_of(study.refine, refines),
-       .help = "all: lens, boards and beam together; beam: lens and boards held"},
+       .help = "all: lens, boards and beam together; beam: lens and boards fixed"},
       {.name = "shots", .value = &study.shots, .help = "Of a log", .limits = {3, 1000}},
       {.name = "noise_px", .value = &study.noise_px, .help = "σ of the spot's coordinate", .limits = {1e-6, 100.0}},
       {.name = "corner_noise_px",

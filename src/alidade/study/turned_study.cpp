@@ -61,7 +61,7 @@ FieldList fields_of(TurnedStudy& study) {
            .limits = {0.0, 0.1}},
           {.name = "on_the_spot",
            .value = &study.on_the_spot,
-           .help = "The estimator is told that the centre did not move: --sigma-parallax 0"}};
+           .help = "The centre is given as at rest: --sigma-parallax 0"}};
 }
 
 TurnedTrial trial_of(const TurnedStudy& study, std::uint64_t seed, std::uint64_t number) {

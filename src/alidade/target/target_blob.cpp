@@ -107,7 +107,7 @@ std::optional<Blob> choose(const std::vector<Blob>& blobs, const TargetLook& loo
   return std::nullopt;
 }
 
-/// Middle of the area that the blob covers: pixels count by their share of its plateau, so that noise and shading
+/// Centroid of the area that the blob covers: pixels count by their share of its plateau, so that noise and shading
 /// inside do not move it and its soft edge determines it to a fraction of a pixel.
 TargetDetection measure(const cv::Mat& signal, const Blob& blob, double noise) {
   const int margin = 3;

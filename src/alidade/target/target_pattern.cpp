@@ -12,7 +12,7 @@ namespace {
 struct Match {
   double correlation = -1.0;
   double rival = -1.0;                           ///< Best anywhere else.
-  Eigen::Vector2d px = Eigen::Vector2d::Zero();  ///< Middle of the pattern, in the window.
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();  ///< Centre of the pattern, in the window.
   Eigen::Vector2d rival_px = Eigen::Vector2d::Zero();
 };
 
@@ -37,12 +37,12 @@ Match match_at(const cv::Mat& window, const cv::Mat& pattern) {
   if (at.y > 0 && at.y + 1 < correlation.rows)
     fine.y() += vertex(static_cast<double>(correlation.at<float>(at.y - 1, at.x)), match.correlation,
                        static_cast<double>(correlation.at<float>(at.y + 1, at.x)));
-  const Eigen::Vector2d to_middle(0.5 * (pattern.cols - 1), 0.5 * (pattern.rows - 1));
-  match.px = fine + to_middle;
+  const Eigen::Vector2d to_centre(0.5 * (pattern.cols - 1), 0.5 * (pattern.rows - 1));
+  match.px = fine + to_centre;
   cv::rectangle(correlation, {at.x - pattern.cols / 2, at.y - pattern.rows / 2, pattern.cols, pattern.rows},
                 cv::Scalar(-1.0), cv::FILLED);
   cv::minMaxLoc(correlation, nullptr, &match.rival, nullptr, &at);
-  match.rival_px = Eigen::Vector2d(at.x, at.y) + to_middle;
+  match.rival_px = Eigen::Vector2d(at.x, at.y) + to_centre;
   return match;
 }
 

@@ -7,7 +7,7 @@
 #include "alidade/estimation/interacting_models.h"
 #include "alidade/estimation/iterated_update.h"
 #include "alidade/estimation/motion_models.h"
-#include "alidade/track/sight.h"
+#include "alidade/track/observation_model.h"
 
 // The beliefs that a tracker can carry, behind one surface: start, predict, expect, update, estimate.
 

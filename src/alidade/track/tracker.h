@@ -9,7 +9,7 @@
 #include "alidade/estimation/interacting_models.h"
 #include "alidade/estimation/motion_models.h"
 #include "alidade/pantilt/rig_uncertainty.h"
-#include "alidade/track/sight.h"
+#include "alidade/track/observation_model.h"
 #include "alidade/track/track_step.h"
 
 namespace alidade {

@@ -115,7 +115,7 @@ TEST(Tracker, AnyOrderWithinTheHistoryGivesTheSameTrack) {
   }
 }
 
-TEST(Tracker, ObservationsOlderThanTheHistoryAreLeftOut) {
+TEST(Tracker, ObservationsOlderThanTheHistoryAreRejected) {
   const TrackScene scene = *track_scenario("A");
   const std::vector<TargetObservation> observations = observations_of(scene, 1);
   Tracker tracker(scene.heads, config_for(scene));
@@ -242,7 +242,7 @@ TEST(Tracker, OneHeadStartsNoTrackAndIsNamedLater) {
   }
 }
 
-TEST(Tracker, WrongNumbersAreLeftOut) {
+TEST(Tracker, WrongNumbersAreRejected) {
   const TrackScene scene = *track_scenario("A");
   Tracker tracker(scene.heads, config_for(scene));
   const std::vector<TargetObservation> observations = observations_of(scene, 1);
@@ -345,7 +345,7 @@ TEST(Tracker, SmoothingWithinTheLagLowersTheError) {
   EXPECT_LT(nees / (3.0 * num), 1.3);
 }
 
-TEST(NearestToRays, MeetsInTheMiddleAndRefusesParallels) {
+TEST(NearestToRays, MeetsAtTheMidpointAndRefusesParallels) {
   const auto met = nearest_to_rays({{0.0, 0.0, 0.0}, {0.0, 0.0, 1.0}},
                                    {{1.0, 0.2, 0.0}, Eigen::Vector3d(-1.0, 0.0, 2.0).normalized()});
   ASSERT_TRUE(met);

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "alidade/estimation/belief.h"
-#include "alidade/track/sight.h"
+#include "alidade/track/observation_model.h"
 
 namespace alidade {
 

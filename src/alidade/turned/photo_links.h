@@ -19,10 +19,10 @@ struct PhotoLink {
 /// Normalised pixels: centre of the image 0, half its width 1.
 struct PhotoScale {
   double half_width_px = 1.0;
-  Eigen::Vector2d middle_px = Eigen::Vector2d::Zero();
+  Eigen::Vector2d centre_px = Eigen::Vector2d::Zero();
   explicit PhotoScale(const MatchedPhotos& photos)
-      : half_width_px(0.5 * photos.width_px), middle_px(0.5 * (photos.width_px - 1), 0.5 * (photos.height_px - 1)) {}
-  [[nodiscard]] Eigen::Vector2d normalised(const Eigen::Vector2d& px) const { return (px - middle_px) / half_width_px; }
+      : half_width_px(0.5 * photos.width_px), centre_px(0.5 * (photos.width_px - 1), 0.5 * (photos.height_px - 1)) {}
+  [[nodiscard]] Eigen::Vector2d normalised(const Eigen::Vector2d& px) const { return (px - centre_px) / half_width_px; }
 };
 
 /// The consistent pairs: at least eight matches, and a tenth of them, agree. Brown & Lowe, "Automatic panoramic

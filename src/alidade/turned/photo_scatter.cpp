@@ -32,7 +32,7 @@ ScatterCovariance scatter_covariance(const TurnedFit& fit, const Progress& progr
   TurnedInformation seen = TurnedInformation::Zero(), expected = TurnedInformation::Zero();
   double sum = 0.0, sum2 = 0.0;
   for (std::size_t k = 0; k < count; ++k) {
-    report_progress(progress, "photos held out", k, count);
+    report_progress(progress, "held-out photos", k, count);
     const TurnedNormal without = turned_normal(fit.bundle, fit.prior, fit.solve, static_cast<int>(k));
     Eigen::MatrixXd information = without.information;
     information.diagonal().array() += 1e-6;  // a photo that nothing joins any more may rotate freely

@@ -24,7 +24,7 @@ struct KeptMatch {
 std::size_t set_tracks(const MatchedPhotos& photos, const std::vector<KeptMatch>& matches,
                        const std::vector<int>& bundle_place, TurnedBundle& bundle);
 
-/// Leaves out observations whose freed residual is beyond `gate` (normalised), the worst of a track at a time, and
+/// Rejects observations whose freed residual is beyond `gate` (normalised), the worst of a track at a time, and
 /// tracks that fewer than two photos show. Returns how many observations went.
 std::size_t leave_out(const std::vector<Eigen::Vector2d>& residuals, double gate, TurnedBundle& bundle);
 

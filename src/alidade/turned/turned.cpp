@@ -249,7 +249,7 @@ class TurnedRun {
     Eigen::Matrix<double, 6, 1> unit = Eigen::Matrix<double, 6, 1>::Ones();
     unit.head<4>().setConstant(scale_.half_width_px);
     report_.camera = unit.cwiseProduct(fit_.bundle.camera);
-    report_.camera.segment<2>(2) += scale_.middle_px;
+    report_.camera.segment<2>(2) += scale_.centre_px;
     return unit;
   }
 
@@ -258,8 +258,8 @@ class TurnedRun {
   /// −ρ/8; one beside them shifts cx, cy by ρ f.
   void add_given() {
     const Eigen::Vector2d f = report_.camera.head<2>();
-    const double told = std::max(report_.parallax.relative, ordinary_parallax);
-    const double parallax = config_.sigma_parallax ? *config_.sigma_parallax : told;
+    const double estimated = std::max(report_.parallax.relative, ordinary_parallax);
+    const double parallax = config_.sigma_parallax ? *config_.sigma_parallax : estimated;
     Eigen::Matrix<double, 6, 1> moves = Eigen::Matrix<double, 6, 1>::Zero();
     moves.head<2>() = f;
     if (report_.lens_terms > 0) moves[4] = 0.5;

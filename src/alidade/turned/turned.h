@@ -54,7 +54,7 @@ struct TurnedReport {
   std::vector<Assumption> assumed;
 };
 
-/// Intrinsics of a camera from photos that it took while it was rotated in one place, by hand for example: f, centre
+/// Intrinsics of a camera from photos that it took while it was rotated at one position, by hand for example: f, centre
 /// and radial distortion, from matches of which many may be wrong. Throws Interrupted. docs/maths/turned-photos.md.
 [[nodiscard]] TurnedReport observe_turned(const MatchedPhotos& photos, const TurnedConfig& config,
                                           const Progress& progress = {});

@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-constexpr double held = 1e12;     // information of what is not estimated
+constexpr double fixed = 1e12;    // information of what is not estimated
 constexpr double outside = 30.0;  // σ that a point without a pixel counts for
 
 using ByCamera = Eigen::Matrix<double, 2, num_camera>;
@@ -41,11 +41,11 @@ class TurnedSystem {
     gradient_.head<num_camera>() = prior.information * (bundle.camera - prior.mean);
     for (std::size_t k = 0; k < bundle.cam_from_world.size(); ++k) {
       const auto at = place_of(static_cast<int>(k));
-      const bool is_held = k == 0 || static_cast<int>(k) == without;
-      information_.diagonal().segment<3>(at).array() += is_held ? held : 0.0;
-      const double zoom = is_held ? held : prior.zoom_information;
+      const bool is_fixed = k == 0 || static_cast<int>(k) == without;
+      information_.diagonal().segment<3>(at).array() += is_fixed ? fixed : 0.0;
+      const double zoom = is_fixed ? fixed : prior.zoom_information;
       information_(at + 3, at + 3) += zoom;
-      if (!is_held && zoom < held) gradient_[at + 3] += zoom * bundle.log_zoom[k];
+      if (!is_fixed && zoom < fixed) gradient_[at + 3] += zoom * bundle.log_zoom[k];
     }
     by_photo_.resize(bundle.observations.size());
     for (std::size_t i = 0; i < bundle.observations.size();) {
@@ -161,7 +161,7 @@ double cost_of(const TurnedBundle& bundle, const TurnedPrior& prior, const Turne
   const TurnedCamera offset = bundle.camera - prior.mean;
   double cost = offset.dot(prior.information * offset);
   for (const double zoom : bundle.log_zoom)
-    cost += prior.zoom_information < held ? prior.zoom_information * zoom * zoom : 0.0;
+    cost += prior.zoom_information < fixed ? prior.zoom_information * zoom * zoom : 0.0;
   for (const TurnedDetection& observation : bundle.observations) {
     const auto photo = static_cast<std::size_t>(observation.photo);
     const auto px = turned_pixel(bundle.camera, bundle.cam_from_world[photo], bundle.log_zoom[photo],

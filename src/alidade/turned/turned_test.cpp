@@ -188,7 +188,7 @@ TEST(Turned, AdviceNeverProposesWhatIsGiven) {
   EXPECT_EQ(held.to_add.find("--fix-centre"), std::string::npos) << held.to_add;
 }
 
-TEST(Turned, ACentreThatIsHeldWronglyIsNamed) {
+TEST(Turned, ACentreThatIsFixedWronglyIsNamed) {
   TurnedScene scene = small_scene();
   scene.cx = 670.0;
   TurnedConfig config;
@@ -197,7 +197,7 @@ TEST(Turned, ACentreThatIsHeldWronglyIsNamed) {
   const TurnedReport report = observe_turned(photos, config);
   ASSERT_EQ(report.status, Status::ok);
   EXPECT_LT(std::abs(report.camera[0] - scene.fx), 3.0 * std::sqrt(report.cov(0, 0)));
-  EXPECT_THAT(turned_verdict(report, photos, config).to_add, HasSubstr("leave out --fix-centre"));
+  EXPECT_THAT(turned_verdict(report, photos, config).to_add, HasSubstr("omit --fix-centre"));
 }
 
 /// Without photo k the answer changes by what leaving it out really changes: one step is as good as a new solve.

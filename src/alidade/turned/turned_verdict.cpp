@@ -104,7 +104,7 @@ Check agreement_check(const TurnedReport& report) {
   constexpr double care = 25.0;
   const double raise = std::sqrt(std::max(report.design_effect, 1.0));
   Check check{"photos agree", State::good, "", report.design_effect, care, "", "photos"};
-  check.text = "leaving out a photo changes the answer " + text_of(std::sqrt(report.design_effect), 2) +
+  check.text = "omitting a photo changes the answer " + text_of(std::sqrt(report.design_effect), 2) +
                " times as much as the noise of single points lets expect";
   if (raise > 1.5) check.text += ": errors are shared within photos (steps of the hand, focus, shutter); counted in σ";
   if (report.design_effect > care) check.state = State::care;
@@ -200,14 +200,14 @@ Check minimum_check(const TurnedReport& report) {
 
 Check centre_check(const TurnedReport& report) {
   constexpr double most = 3.0;
-  Check check{"centre that is held", State::good, "", 0.0, most, "σ", "intrinsics"};
+  Check check{"fixed centre", State::good, "", 0.0, most, "σ", "intrinsics"};
   const Eigen::Vector2d off = report.camera.segment<2>(2) - report.free_centre_px;
   check.value = off.cwiseAbs().cwiseQuotient(report.sigma_free_centre_px).maxCoeff();
   check.text = "the photos put the centre at (" + text_of(report.free_centre_px.x(), 4) + ", " +
                text_of(report.free_centre_px.y(), 4) + ") px";
   if (check.value > most) {
     check.state = State::care;
-    check.text += ", not where it is fixed: leave out --fix-centre";
+    check.text += ", not where it is fixed: omit --fix-centre";
   }
   return check;
 }

@@ -107,8 +107,8 @@ LocalMap local_map(const std::vector<Eigen::Vector3d>& places, const std::vector
   for (int k = 0; k < 9; ++k) H(k / 3, k % 3) = found.at<double>(k / 3, k % 3);
   for (std::size_t k = 0; k < near.size(); ++k) left_over[k] -= (H * near[k].homogeneous()).hnormalized();
   const Eigen::Matrix<double, 10, 2> polynomial = fitted_polynomial(near, left_over);
-  return [=, middle = Eigen::Vector2d(places[i].head<2>())](const Eigen::Vector2d& place) {
-    const Eigen::Vector2d p = (place - middle) / reach_m;
+  return [=, centre = Eigen::Vector2d(places[i].head<2>())](const Eigen::Vector2d& place) {
+    const Eigen::Vector2d p = (place - centre) / reach_m;
     return std::optional<Eigen::Vector2d>((H * p.homogeneous()).hnormalized() + polynomial.transpose() * monomials(p));
   };
 }

@@ -154,14 +154,14 @@ std::optional<Ellipse> fit_ellipse(const cv::Mat& photo, const Ellipse& start) {
 
 std::optional<Ellipse> ellipse_through(std::span<const Eigen::Vector2d> points) {
   if (points.size() < 5) return std::nullopt;
-  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
-  for (const Eigen::Vector2d& point : points) middle += point / static_cast<double>(points.size());
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& point : points) mean += point / static_cast<double>(points.size());
   double scale = 0.0;
-  for (const Eigen::Vector2d& point : points) scale = std::max(scale, (point - middle).norm());
-  // a x² + 2b xy + c y² + 2d x + 2e y = 1 around the centre, which lies inside
+  for (const Eigen::Vector2d& point : points) scale = std::max(scale, (point - mean).norm());
+  // a x² + 2b xy + c y² + 2d x + 2e y = 1 around the mean, which lies inside
   Eigen::MatrixXd rows(static_cast<Eigen::Index>(points.size()), 5);
   for (Eigen::Index i = 0; i < rows.rows(); ++i) {
-    const Eigen::Vector2d p = (points[static_cast<std::size_t>(i)] - middle) / scale;
+    const Eigen::Vector2d p = (points[static_cast<std::size_t>(i)] - mean) / scale;
     rows.row(i) << p.x() * p.x(), 2.0 * p.x() * p.y(), p.y() * p.y(), 2.0 * p.x(), 2.0 * p.y();
   }
   const Eigen::VectorXd conic = least_squares(rows, Eigen::VectorXd::Ones(rows.rows()));
@@ -170,7 +170,7 @@ std::optional<Ellipse> ellipse_through(std::span<const Eigen::Vector2d> points) 
   const Eigen::Vector2d linear = conic.tail<2>();
   const Eigen::Vector2d centre = -Q.inverse() * linear;
   Ellipse ellipse;
-  ellipse.px = middle + scale * centre;
+  ellipse.px = mean + scale * centre;
   ellipse.A = Q / ((1.0 + centre.dot(Q * centre)) * scale * scale);
   return ellipse;
 }

@@ -49,8 +49,8 @@ TEST(MarkerBoard, TakesAPartForWhatItIs) {
     for (std::size_t i = 0; i < scene.cam_from_board.size(); ++i) {
       cv::Mat photo = render_board_photo(scene, i, {}, 1);
       const std::vector<Eigen::Vector2d> truth = true_corners(scene, i);
-      const Eigen::Vector2d middle = 0.5 * (truth.front() + truth.back());
-      photo.colRange(0, static_cast<int>(middle.x())).setTo(90);  // something occludes the left half
+      const Eigen::Vector2d centre = 0.5 * (truth.front() + truth.back());
+      photo.colRange(0, static_cast<int>(centre.x())).setTo(90);  // something occludes the left half
       const BoardDetection found = find_board(photo, board);
       ASSERT_TRUE(found.found()) << found.reason;
       score.add(found.view, truth);

@@ -28,13 +28,13 @@ double ordinary_error(const std::string& name, double value) {
 
 /// Lens parameters by position: those estimated, and those fixed.
 struct Split {
-  std::vector<Index> free, held;
+  std::vector<Index> free, fixed;
 };
 
 Split split_of(const CalibrateReport& report) {
   Split split;
   for (Index i = 0; i < report.model_cov.rows(); ++i)
-    (report.model_cov(i, i) > 0.0 ? split.free : split.held).push_back(i);
+    (report.model_cov(i, i) > 0.0 ? split.free : split.fixed).push_back(i);
   return split;
 }
 
@@ -66,7 +66,7 @@ Eigen::MatrixXd sensitivity(const Board& board, CalibrateConfig config, std::spa
   const Eigen::VectorXd scale = of_free.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::LLT<Eigen::MatrixXd> llt(scale.asDiagonal() * of_free * scale.asDiagonal());
   if (llt.info() != Eigen::Success) return {};
-  return -(scale.asDiagonal() * llt.solve(scale.asDiagonal() * S(split.free, split.held)));
+  return -(scale.asDiagonal() * llt.solve(scale.asDiagonal() * S(split.free, split.fixed)));
 }
 
 /// The square of a board. The lens of a central camera is the same for all; the poses' distances follow it.
@@ -103,12 +103,12 @@ void count_air(const Camera& air, const Eigen::MatrixXd& K, const Split& split, 
   Eigen::MatrixXd given = Eigen::MatrixXd::Zero(num, num);
   const Index of_air = std::min(air.cov.rows(), num);
   given.topLeftCorner(of_air, of_air) = air.cov.topLeftCorner(of_air, of_air);
-  const Eigen::MatrixXd C = given(split.held, split.held), between = K * C;
+  const Eigen::MatrixXd C = given(split.fixed, split.fixed), between = K * C;
   Eigen::MatrixXd& cov = report.camera.cov;
   cov(split.free, split.free) = (cov(split.free, split.free) + between * K.transpose()).eval();
-  cov(split.free, split.held) = between;
-  cov(split.held, split.free) = between.transpose();
-  cov(split.held, split.held) = C;
+  cov(split.free, split.fixed) = between;
+  cov(split.fixed, split.free) = between.transpose();
+  cov(split.fixed, split.fixed) = C;
 }
 
 }  // namespace
@@ -117,14 +117,14 @@ std::vector<Assumption> count_assumptions(const Board& board, const CalibrateCon
                                           std::span<const BoardView> views, const std::optional<Camera>& air,
                                           CalibrateReport& report) {
   const Split split = split_of(report);
-  const Eigen::MatrixXd K = split.held.empty() ? Eigen::MatrixXd() : sensitivity(board, config, views, report, split);
+  const Eigen::MatrixXd K = split.fixed.empty() ? Eigen::MatrixXd() : sensitivity(board, config, views, report, split);
   const bool air_has_cov = air && air->cov.size() > 0 && K.size() > 0;
   if (air_has_cov) count_air(*air, K, split, report);
   std::vector<Assumption> assumed = {square_of(board, config, views, report, split)};
   const auto names = param_names(report.camera.lens);
   const Eigen::VectorXd values = params(report.camera.lens);
-  for (std::size_t h = 0; h < split.held.size(); ++h) {
-    const Index at = split.held[h];
+  for (std::size_t h = 0; h < split.fixed.size(); ++h) {
+    const Index at = split.fixed[h];
     const std::string& name = names[static_cast<std::size_t>(at)];
     Assumption row{.name = name, .value = values[at], .ordinary = ordinary_error(name, values[at])};
     const bool of_air = air && at < 10;

@@ -39,17 +39,17 @@ std::string options_for(const std::string& name, const CalibrateConfig& config) 
     return std::find(names.begin(), names.end(), term) != names.end();
   };
   const auto has = [&](const std::string& term) { return is_in(terms, term); };
-  std::string held;
+  std::string fixed;
   bool had_fix = false;
   for (const std::string term : {"k1", "k2", "p1", "p2", "k3"}) {
-    if (!has(term)) held += (held.empty() ? "" : ",") + term;
+    if (!has(term)) fixed += (fixed.empty() ? "" : ",") + term;
     had_fix = had_fix || is_in(config.fixed, term);
   }
   std::string options = config.model == "brown" ? "" : " --model brown";
-  if (!held.empty()) options += " --fix " + held;
+  if (!fixed.empty()) options += " --fix " + fixed;
   if (has("skew")) options += " --free skew";
-  if (options.empty()) return "leave out --fix";
-  return "use" + options + (held.empty() && had_fix && config.model == "brown" ? ", and no --fix" : "");
+  if (options.empty()) return "omit --fix";
+  return "use" + options + (fixed.empty() && had_fix && config.model == "brown" ? ", and no --fix" : "");
 }
 
 }  // namespace
@@ -79,7 +79,8 @@ std::optional<FittingModel> fitting_model(const Board& board, std::span<const Bo
 
 void advise_fitting_model(const Board& board, std::span<const BoardView> views, ImageSize size,
                           const CalibrateConfig& config, CalibrateReport& report) {
-  constexpr double misfit_px = 1.0;  // no detector errs so much: where a parameter is untold at this, the lens is wrong
+  constexpr double misfit_px =
+      1.0;  // no detector errs so much: where a parameter is undetermined at this, the lens is wrong
   const bool is_settled = report.status != CalibrateReport::Status::no_convergence;
   if (is_settled && !(report.num_parameters > 0 && report.rms_px > misfit_px)) return;
   const auto found = fitting_model(board, views, size, config, report);
@@ -87,8 +88,8 @@ void advise_fitting_model(const Board& board, std::span<const BoardView> views, 
   std::array<char, 32> rms{};
   std::snprintf(rms.data(), rms.size(), "%.3g", found->rms_px);
   const bool is_same = found->model == config.model;
-  if (!is_settled) report.reason = config.model + (is_same ? " as held" : "") + " does not fit these corners";
-  report.to_add = (is_same ? "leave out --fix: " + found->model : "use --model " + found->model + ": it") +
+  if (!is_settled) report.reason = config.model + (is_same ? " as fixed" : "") + " does not fit these corners";
+  report.to_add = (is_same ? "omit --fix: " + found->model : "use --model " + found->model + ": it") +
                   " fits these corners with RMS " + rms.data() + " px";
 }
 

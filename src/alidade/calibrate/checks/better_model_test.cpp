@@ -90,7 +90,7 @@ TEST(BetterModel, WhatToTypeIsSaidAndNeverWhatIsTypedAlready) {
   EXPECT_EQ(better_model_advice(gains("k1 k2 p1 p2 k3 skew"), {.fixed = {"skew", "cx"}}), "use --free skew");
   EXPECT_EQ(better_model_advice(gains("k1 k2 p1 p2 k3 skew"), {.fixed = {"skew", "k3"}}),
             "use --free skew, and no --fix");
-  EXPECT_EQ(better_model_advice(gains("k1 k2 p1 p2 k3"), {.fixed = {"skew", "k3"}}), "leave out --fix");
+  EXPECT_EQ(better_model_advice(gains("k1 k2 p1 p2 k3"), {.fixed = {"skew", "k3"}}), "omit --fix");
   EXPECT_EQ(better_model_advice(gains("k1 k2 p1 p2 k3"), {.model = "pinhole"}), "use --model brown");
   EXPECT_EQ(better_model_advice(gains("k1 k2"), {.model = "pinhole"}), "use --model brown --fix p1,p2,k3");
   EXPECT_EQ(better_model_advice(gains("k1 k2 p1 p2"), {.fixed = {"skew", "k2", "p1", "p2", "k3"}}), "use --fix k3");

@@ -34,7 +34,7 @@ std::string place(const Eigen::Vector2d& px, const Camera& camera) {
   const double x = px.x() / camera.width_px, y = px.y() / camera.height_px;
   const std::string row = y < 1.0 / 3 ? "top" : y > 2.0 / 3 ? "bottom" : "";
   const std::string col = x < 1.0 / 3 ? "left" : x > 2.0 / 3 ? "right" : "";
-  if (row.empty() && col.empty()) return "in the middle";
+  if (row.empty() && col.empty()) return "in the centre";
   return "at the " + row + (row.empty() || col.empty() ? "" : " ") + col;
 }
 
@@ -188,20 +188,21 @@ Check board_flat(const CalibrationStudy& study, const CalibrateConfig& config) {
     check.text = "too few photos to test the board's shape";
     return check;
   }
-  const bool held = config.board_shape == BoardShape::given;
+  const bool is_given = config.board_shape == BoardShape::given;
   const ShapeTransfer& transfer = *study.transfer;
   const std::string figures = "RMS of unseen photos " + rounded(transfer.flat_rms_px, 3) + " px " +
-                              (held ? "with the board as given, " : "flat, ") + rounded(transfer.transfer_rms_px, 3) +
-                              " px with the shape learned on the others (" + shape_name(transfer.shape) + ")";
+                              (is_given ? "with the board as given, " : "flat, ") +
+                              rounded(transfer.transfer_rms_px, 3) + " px with the shape learned on the others (" +
+                              shape_name(transfer.shape) + ")";
   check.value = transfer.transfer_rms_px / transfer.flat_rms_px;
   if (config.board_shape == BoardShape::bow || config.board_shape == BoardShape::free) {
     check.state = transfer.transfers() ? State::good : State::bad;
     check.text = (transfer.transfers() ? "the shape transfers: " : "the shape does not transfer: ") + figures;
   } else {
     check.state = transfer.is_proved() ? State::care : State::good;
-    check.text = (transfer.is_proved() ? (held ? "the board has another shape: " : "the board bends: ")
-                                       : (held ? "as given, as far as the photos determine: "
-                                               : "flat as far as the photos determine: ")) +
+    check.text = (transfer.is_proved() ? (is_given ? "the board has another shape: " : "the board bends: ")
+                                       : (is_given ? "as given, as far as the photos determine: "
+                                                   : "flat as far as the photos determine: ")) +
                  figures;
   }
   return check;
@@ -240,7 +241,7 @@ std::optional<Check> one_lens(const CalibrateReport& report) {
                .figure = "estimate"};
 }
 
-/// What to do next. What makes σ large comes first: more photos of a bent board are no help.
+/// What to do next. What makes σ large comes first: more photos of a board that is not flat are no help.
 std::string advice(const Verdict& verdict, const CalibrationStudy& study, const CalibrateConfig& config,
                    const NextPhotoPlan& next, double worst_px, bool is_port) {
   const auto ails = [&](const std::string& name) {
@@ -260,7 +261,7 @@ std::string advice(const Verdict& verdict, const CalibrationStudy& study, const 
   if (text_starts("board flat", "the board has another shape"))
     return "use --board-shape auto, or this board's own points";
   if (ails("lens adequate") && is_port) return "check the lens in air, --glass and --n-water, or take --model brown";
-  if (!better_model.empty()) return better_model + ", which fits better on photos held out";
+  if (!better_model.empty()) return better_model + ", which fits better on held-out photos";
   if (ails("lens adequate"))
     return "no other lens model fits better: keep focus and zoom still, and look at the rings for where it departs";
   if (ails("coverage") && !next.photos.empty()) {

@@ -150,10 +150,10 @@ void add_given(const Localization& report, Verdict& verdict) {
 void add_radial(const Localization& report, Verdict& verdict) {
   constexpr double chance = 12.0;  // squares of the rings' means over their σ², their mean
   constexpr double care_share = 0.12, bad_share = 0.4;
-  constexpr double least_px = 0.05;  // patches that change as they are seen from elsewhere leave less
+  constexpr double min_px = 0.05;  // patches that change as they are seen from elsewhere leave less
   const RadialStructure& radial = report.radial;
   const bool is_more = report.has_target && report.scale_known && radial.chi2_per_ring > chance &&
-                       radial.share * report.sigma_px > least_px;
+                       radial.share * report.sigma_px > min_px;
   const double value = is_more ? radial.share : 0.0;
   const State state = state_of(value, care_share, bad_share);
   verdict.checks.push_back({"radial structure", state,
@@ -171,7 +171,7 @@ void add_residuals(const Localization& report, Verdict& verdict) {
   const ResidualStructure& residuals = report.residuals;
   constexpr double care_px_share = 0.2;  // of σ: less is seen in long recordings and moves nothing
   if (residuals.place_chi2 > 2.0 * residuals.place_limit && residuals.worst_px > care_px_share * report.sigma_px)
-    verdict.checks.push_back({"place in the image", State::care,
+    verdict.checks.push_back({"position in the image", State::care,
                               "residuals depend on the position in the image, " + text_of(residuals.worst_px, 2) +
                                   " px in the " + residuals.worst_place + ": the lens is not as given",
                               residuals.place_chi2, 2.0 * residuals.place_limit, "1", "nis"});
@@ -244,9 +244,9 @@ void add_sensors(const Localization& report, Verdict& verdict) {
                                 0.0, 0.0, "", "path"});
       continue;
     }
-    const double told = report.is_scale_read ? (first ? first->scale : each.scale) : 1.0;
+    const double given_scale = report.is_scale_read ? (first ? first->scale : each.scale) : 1.0;
     const double sigma = std::hypot(each.sigma_rel, report.is_scale_read && first ? first->sigma_rel : 0.0);
-    const double change = std::log(each.scale / told), z = std::abs(change) / sigma;
+    const double change = std::log(each.scale / given_scale), z = std::abs(change) / sigma;
     const std::string by = report.is_scale_read && first ? "the " + first->sensor : "the target";
     const double rejected = share(each.num_rejected, each.num_used + each.num_rejected);
     if (!report.is_scale_read || first)
@@ -291,7 +291,7 @@ void add_checks(const Localization& report, Verdict& verdict) {
     verdict.checks.push_back({"target", state_of(known_gated, 0.1, gated + 0.2),
                               text_of(100.0 * known_gated, 3) + " % of the target's observations are rejected",
                               known_gated, 0.1, "1", "tracks"});
-  constexpr double max_shift = 3.0;  // χ² of a rectangle's twelve numbers over their count: 99.9 % is 2.7
+  constexpr double max_shift = 3.0;  // χ² of a rectangle's twelve components over their count: 99.9 % is 2.7
   if (report.known_shift > max_shift)
     verdict.checks.push_back({"map's frame", State::care,
                               "the target's points have drifted in the map, " + text_of(std::sqrt(report.known_shift)) +

@@ -8,14 +8,14 @@ namespace alidade {
 void RadialResiduals::add(const LocalizationFilter& filter, std::span<const FeatureObservation> observations,
                           std::span<const ObservationOutcome> outcomes) {
   const Camera& camera = filter.camera();
-  const Eigen::Vector2d size(camera.width_px, camera.height_px), middle = 0.5 * size;
+  const Eigen::Vector2d size(camera.width_px, camera.height_px), centre = 0.5 * size;
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const FeatureObservation& observation = observations[i];
     if (outcomes[i] != ObservationOutcome::used) continue;
     const auto feature = std::ranges::find(filter.features(), observation.id, &Feature::id);
     if (feature == filter.features().end()) continue;
     const auto view = expected_view(camera, filter.motion().world_from_cam, *feature);
-    const Eigen::Vector2d out = observation.px - middle;
+    const Eigen::Vector2d out = observation.px - centre;
     if (!view || !(out.norm() > 1.0)) continue;
     const double residual_px = out.normalized().dot(observation.px - view->px);
     const double share = std::min(out.norm() / (0.5 * size.norm()), 0.999);

@@ -11,7 +11,7 @@ namespace alidade {
 /// variance of a mean is that of the points' sums, and a mean of few points says nothing.
 [[nodiscard]] ResidualStructure residual_structure(std::span<const PlacedResidual> residuals, const Camera& camera);
 
-/// The same in rings about the image's middle, of what is off outward or inward. `lasts`: errors do.
+/// The same in rings about the image centre, of what is off outward or inward. `lasts`: errors do.
 [[nodiscard]] RadialStructure radial_structure(std::span<const PlacedResidual> residuals, const Camera& camera,
                                                bool lasts);
 

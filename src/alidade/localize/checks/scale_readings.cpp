@@ -32,11 +32,11 @@ constexpr double sigma_of_median_deviation = 1.4826, rejected_beyond = 4.0;
 /// A reading's depth, and where the camera was.
 struct DepthRow {
   double depth_m = 0.0, weight = 1.0;
-  Eigen::Vector4d row = Eigen::Vector4d::Zero();  ///< Place, and one for the offset.
+  Eigen::Vector4d row = Eigen::Vector4d::Zero();  ///< Position, and one for the offset.
   double left = 0.0;                              ///< Of the depth, in σ.
 };
 
-/// How much less than their number they tell whose neighbours are alike: an autoregression of first order.
+/// How much less than their number they determine whose neighbours are alike: an autoregression of first order.
 double inflation(std::span<const DepthRow> rows) {
   double products = 0.0, squares = 0.0;
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -59,7 +59,7 @@ std::optional<DepthFit> fitted(std::vector<DepthRow>& rows) {
     H += row.weight * row.weight * row.row * row.row.transpose();
     g += row.weight * row.weight * row.depth_m * row.row;
   }
-  // A path in a plane, or on a line, tells nothing of the direction across it: as good as none of it is downwards.
+  // A path in a plane, or on a line, determines nothing of the direction across it: as good as none of it is downwards.
   constexpr double hardly = 1e-9;
   H.diagonal().head<3>().array() += hardly * H.diagonal().head<3>().sum();
   const Eigen::LDLT<Eigen::Matrix4d> ldlt(H);
@@ -190,7 +190,7 @@ std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, 
   const double num = static_cast<double>(num_blocks), mean = sum / num;
   ReadScale read{std::exp(mean), 0.0, logs.size(), num_given - logs.size()};
   const double of_beam = std::sqrt(std::max(beam.cov(beam_scale_param, beam_scale_param), 0.0)) / beam.scale;
-  // A surface that is bent is on one side of every plane through its points, by about as much as they are off it.
+  // A curved surface is on one side of every plane through its points, by about as much as they are off it.
   const double of_surface = roughness / static_cast<double>(num_given);
   const double of_blocks = std::sqrt(std::max(squares / num - mean * mean, 0.0) / (num - 1.0));
   read.sigma_rel = std::hypot(of_blocks, of_beam, of_surface);

@@ -23,7 +23,7 @@ struct ReadScale {
 /// The pose at a time, between the two frames around it. None outside the path, or where one of them has none.
 [[nodiscard]] std::optional<Rigid3> pose_at(std::span<const PathStep> path, double t_s);
 
-/// depth = offset + g·r of the camera's place r: of unknown offset and direction, |g| is the scale. Its σ is that of
+/// depth = offset + g·r of the camera's position r: of unknown offset and direction, |g| is the scale. Its σ is that of
 /// what is left over, whose neighbours in time are alike. Readings far from all others are rejected. None: the path
 /// moves too little up and down, or the readings do not fit it.
 [[nodiscard]] std::optional<ReadScale> scale_by_depth(std::span<const DepthReading> readings,
@@ -35,7 +35,7 @@ struct ReadScale {
 [[nodiscard]] std::optional<ReadScale> scale_by_range(std::span<const RangeReading> readings, const Beam& beam,
                                                       std::span<const PathStep> path, std::span<const MapPoint> map);
 
-/// The straight ways between two places, by odometry over by the path, of a twentieth of the whole way each: their
+/// The straight ways between two positions, by odometry over by the path, of a twentieth of the whole way each: their
 /// mean, without those far from all others (wheels slip), with their scatter as σ, and `sigma_rel`, which all share.
 /// None: too few readings, or hardly a way.
 [[nodiscard]] std::optional<ReadScale> scale_by_odometry(std::span<const OdometryReading> readings, double sigma_rel,
@@ -43,7 +43,7 @@ struct ReadScale {
 
 /// What each of the config's sensors says of `result.path`, into `result.sensor_scales`.
 void read_scales(const LocalizeConfig& config, std::span<const MapPoint> map, Localization& result);
-/// All of them together, the surer one counting for more. None: nothing tells it.
+/// All of them together, the surer one counting for more. None: nothing determines it.
 [[nodiscard]] std::optional<ReadScale> scale_of(const Localization& result);
 
 /// Path and map, longer by the scale about the world's origin; its σ is added to theirs.

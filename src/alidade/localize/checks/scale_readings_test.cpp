@@ -39,9 +39,9 @@ std::vector<RangeReading> ranges_of(const WalkRun& run, const Beam& beam, std::u
   for (const TimedPose& pose : run.truth) {
     double low = 0.0, high = 5.0;  // where the beam passes the wall
     for (int i = 0; i < 60; ++i) {
-      const double middle = 0.5 * (low + high);
-      const Eigen::Vector3d there = pose.world_from_cam * point_at(beam, middle);
-      (there.z() < testing::wall_z(there.x(), there.y()) ? low : high) = middle;
+      const double centre = 0.5 * (low + high);
+      const Eigen::Vector3d there = pose.world_from_cam * point_at(beam, centre);
+      (there.z() < testing::wall_z(there.x(), there.y()) ? low : high) = centre;
     }
     readings.push_back({pose.t_s, low + 0.003 * draws.normal()});
   }

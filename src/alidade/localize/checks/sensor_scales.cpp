@@ -14,7 +14,7 @@ struct Place {
   double way_m = 0.0;  ///< By odometry, since the first.
 };
 
-double middle_of(std::vector<double> values) {
+double upper_median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::ranges::nth_element(values, middle);
   return *middle;
@@ -53,11 +53,11 @@ std::optional<ReadScale> scale_by_odometry(std::span<const OdometryReading> read
   if (logs.size() < enough) return std::nullopt;
   const std::size_t num_given = logs.size();
   constexpr double sigma_of_median_deviation = 1.4826, rejected_beyond = 4.0;
-  const double middle = middle_of(logs);
+  const double centre = upper_median(logs);
   std::vector<double> sizes;
-  for (const double log : logs) sizes.push_back(std::abs(log - middle));
-  const double limit = rejected_beyond * sigma_of_median_deviation * middle_of(std::move(sizes)) + 1e-9;
-  std::erase_if(logs, [&](double log) { return std::abs(log - middle) > limit; });
+  for (const double log : logs) sizes.push_back(std::abs(log - centre));
+  const double limit = rejected_beyond * sigma_of_median_deviation * upper_median(std::move(sizes)) + 1e-9;
+  std::erase_if(logs, [&](double log) { return std::abs(log - centre) > limit; });
   double sum = 0.0, squares = 0.0;
   for (const double log : logs) sum += log;
   const double num = static_cast<double>(logs.size()), mean = sum / num;

@@ -105,9 +105,9 @@ void take_over(const SmoothedPath& smoothed, Localization& result) {
   }
 }
 
-double known_shift(std::span<const MapPoint> map, std::span<const KnownPoint> told) {
+double known_shift(std::span<const MapPoint> map, std::span<const KnownPoint> given) {
   double sum = 0.0, num = 0.0;
-  for (const KnownPoint& point : told) {
+  for (const KnownPoint& point : given) {
     const auto at = std::ranges::find(map, point.id, &MapPoint::id);
     if (at == map.end() || at->num_seen == 0) continue;
     sum += (at->point_in_world - point.point_in_world).squaredNorm() / (point.sigma_m * point.sigma_m);

@@ -21,8 +21,8 @@ void add_path_error(Localization& result);
 /// The map, and the lens, of a smoothed path.
 void take_over(const SmoothedPath& smoothed, Localization& result);
 
-/// Σ |ŷ − y|²/σ² over the known points of a map, per number: below 1 on average, as they are also held by what
-/// was given.
+/// Σ |ŷ − y|²/σ² over the known points of a map, per component: below 1 on average, as they are also constrained by
+/// what was given.
 [[nodiscard]] double known_shift(std::span<const MapPoint> map, std::span<const KnownPoint> given);
 
 }  // namespace alidade

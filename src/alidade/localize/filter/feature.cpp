@@ -8,17 +8,17 @@
 namespace alidade {
 namespace {
 
-constexpr double min_rho = 1e-4;  // 10 km: beyond it only the direction can be told
+constexpr double min_rho = 1e-4;  // 10 km: beyond it only the direction can be determined
 
 /// The point at a distance that is seen at a pixel. A lens with a port has no single centre: its ray is a start only.
-struct SightedPoint {
+struct PointOnRay {
   Eigen::Vector3d ray_in_cam;
   Eigen::Matrix<double, 3, 2> B;
-  Eigen::Matrix2d J_px_turn;  ///< By a turn of the ray along B.
+  Eigen::Matrix2d J_px_turn;  ///< By a rotation of the ray along B.
   LensProjection seen;
 };
 
-std::optional<SightedPoint> sighted(const Camera& camera, const Eigen::Vector2d& px, double range_m) {
+std::optional<PointOnRay> point_on_ray(const Camera& camera, const Eigen::Vector2d& px, double range_m) {
   const auto start = unproject(camera, px);
   if (!start) return std::nullopt;
   Eigen::Vector3d ray = *start;
@@ -30,7 +30,7 @@ std::optional<SightedPoint> sighted(const Camera& camera, const Eigen::Vector2d&
     const Eigen::Matrix2d A = seen->J_px_point * (range_m * B);
     const Eigen::Vector2d error = px - seen->px;
     if (!(std::abs(A.determinant()) > 0.0)) return std::nullopt;
-    if (error.norm() < 1e-9) return SightedPoint{ray, B, A, *seen};
+    if (error.norm() < 1e-9) return PointOnRay{ray, B, A, *seen};
     ray = (ray + B * (A.inverse() * error)).normalized();
   }
   return std::nullopt;
@@ -94,12 +94,12 @@ std::optional<ExpectedView> expected_view(const Camera& camera, const Rigid3& wo
 
 std::optional<NewFeature> new_feature(const Camera& camera, const Rigid3& world_from_cam, const Eigen::Vector2d& px,
                                       double sigma_px, const RangePrior& prior, FeatureKind kind) {
-  const auto at = sighted(camera, px, prior.range_m);
+  const auto at = point_on_ray(camera, px, prior.range_m);
   if (!at) return std::nullopt;
   const Eigen::Matrix3d R = world_from_cam.rotation.toRotationMatrix();
   const Eigen::Matrix2d J_turn_px = at->J_px_turn.inverse();
   const Eigen::Matrix<double, 3, 2> J_ray_px = R * at->B * J_turn_px;
-  // By the distance; along the ray of a lens with one centre nothing turns.
+  // By the distance; along the ray of a lens with one centre nothing rotates.
   const Eigen::Vector3d J_ray_range = -J_ray_px * (at->seen.J_px_point * at->ray_in_cam);
   const Eigen::Vector3d ray_in_world = R * at->ray_in_cam;
   const Eigen::Matrix3d J_ray_rotation = -R * cross_matrix(at->ray_in_cam);

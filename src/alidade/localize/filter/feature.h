@@ -8,20 +8,20 @@
 
 namespace alidade {
 
-/// How a feature stands in the state: its place, or the inverse distance along the ray on which it was first seen.
+/// How a feature stands in the state: its position, or the inverse distance along the ray on which it was first seen.
 enum class FeatureKind {
-  xyz,            ///< y, 3 numbers [m]
+  xyz,            ///< y, 3 components [m]
   inverse_depth,  ///< c, θ, φ, ρ with y = c + m(θ, φ)/ρ, m = (cos φ sin θ, −sin φ, cos φ cos θ); ρ in 1/m
 };
 
-/// A point of the map. Its numbers are nominal values; the error is added to them.
+/// A point of the map. Its components are nominal values; the error is added to them.
 /// J. Civera, A. J. Davison & J. M. M. Montiel, "Inverse Depth Parametrization for Monocular SLAM", TRO 24(5), 2008.
 struct Feature {
   long id = 0;
   FeatureKind kind = FeatureKind::xyz;
   Eigen::Vector<double, 6> values = Eigen::Vector<double, 6>::Zero();  ///< The first 3 of xyz.
   bool is_known = false;  ///< One of the target's, which give scale and frame.
-  int offset = 0;         ///< Where its numbers begin in the state.
+  int offset = 0;         ///< Where its components begin in the state.
 
   [[nodiscard]] int dim() const { return kind == FeatureKind::xyz ? 3 : 6; }
 };
@@ -38,7 +38,7 @@ struct AnglesOfBearing {
 };
 [[nodiscard]] AnglesOfBearing angles_of(const Eigen::Vector3d& direction);
 
-/// Place of a feature in the world and its derivative by the feature's numbers (the first dim() columns).
+/// Position of a feature in the world and its derivative by its components (the first dim() columns).
 struct FeaturePlace {
   Eigen::Vector3d point_in_world;
   Eigen::Matrix<double, 3, 6> J;
@@ -46,7 +46,7 @@ struct FeaturePlace {
 [[nodiscard]] FeaturePlace place_of(const Feature& feature);
 
 /// What a camera expects to see of a feature, with derivatives by position and rotation error, by the feature's
-/// numbers and by the lens: h_C = Rᵀ(y − r), ∂h_C/∂r = −Rᵀ, ∂h_C/∂δθ = [h_C]×, ∂h_C/∂y = Rᵀ.
+/// components and by the lens: h_C = Rᵀ(y − r), ∂h_C/∂r = −Rᵀ, ∂h_C/∂δθ = [h_C]×, ∂h_C/∂y = Rᵀ.
 struct ExpectedView {
   Eigen::Vector2d px;
   Eigen::Matrix<double, 2, 6> J_px_pose;
@@ -75,7 +75,7 @@ struct RangePrior {
                                                     const Eigen::Vector2d& px, double sigma_px, const RangePrior& prior,
                                                     FeatureKind kind);
 
-/// How far the place of an inverse-depth feature is from linear in ρ within its σ: 4 σ_d/d |cos α|, with
+/// How far the position of an inverse-depth feature is from linear in ρ within its σ: 4 σ_d/d |cos α|, with
 /// σ_d = σ_ρ/ρ², d the distance from here, α the parallax. Convert below 0.1. Civera et al. 2008, eq. (29).
 [[nodiscard]] double linearity_index(const Feature& feature, double sigma_rho, const Eigen::Vector3d& camera_in_world);
 

@@ -29,7 +29,7 @@ struct ExpectedObservation {
 
 /// What became of the observations of one moment.
 struct ObservationsReport {
-  std::span<const ObservationOutcome> outcomes;  ///< One an observation; valid until the next update.
+  std::span<const ObservationOutcome> outcomes;  ///< One per observation; valid until the next update.
   /// νᵀS⁻¹ν of each when its turn came, behind those before it (of one in a group: its share); NaN if not expected.
   std::span<const double> nis;
   std::size_t num_used = 0, num_gated = 0;
@@ -59,9 +59,9 @@ class LocalizationFilter {
   /// there already, or the lens sees nothing there.
   bool add(long id, const Eigen::Vector2d& px, const RangePrior& prior, FeatureKind kind = FeatureKind::inverse_depth);
   void remove(long id);
-  /// Whether so many more numbers fit into the state.
+  /// Whether so many more components fit into the state.
   [[nodiscard]] bool has_room(int count) const { return P_.dim() + count <= config_.state_capacity; }
-  /// Inverse depths that are nearly linear become places: half the numbers. Their count.
+  /// Inverse depths that are nearly linear become positions: half the components. Their count.
   int convert_linear();
   /// The camera is elsewhere: correlations with the map end, the map stays.
   void place_camera(const CameraMotion& motion, const MotionMatrix& cov);
@@ -70,7 +70,7 @@ class LocalizationFilter {
   [[nodiscard]] std::optional<ExpectedObservation> expected(long id) const;
   [[nodiscard]] bool has(long id) const { return find(id) != nullptr; }
   [[nodiscard]] const std::vector<Feature>& features() const { return features_; }
-  /// Place of a feature and its covariance, what is given counted. None: not in the map.
+  /// Position of a feature and its covariance, what is given counted. None: not in the map.
   struct Place {
     Eigen::Vector3d point_in_world;
     Eigen::Matrix3d cov;
@@ -96,7 +96,7 @@ class LocalizationFilter {
  private:
   using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
                                     StateCovariance::max_columns, StateCovariance::max_columns>;
-  /// An observation with its derivatives by the numbers of the state that it depends on.
+  /// An observation with its derivatives by the components of the state that it depends on.
   struct Measured {
     std::size_t observation = 0;
     const Feature* feature = nullptr;

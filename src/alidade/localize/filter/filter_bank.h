@@ -14,12 +14,12 @@ struct StartHypothesis {
   double cost = 0.0;
 };
 
-/// Filters that start differently, until the observations tell which is right. In front of a small or flat target, a
-/// move aside and a turn look alike: the first frames leave a long bent valley of poses, a Gaussian on it is sure of
-/// itself in the wrong place, and one in ten runs is lost. So the belief of the speed aside is split into narrower ones
-/// (a Gaussian sum; D. L. Alspach & H. W. Sorenson, "Nonlinear Bayesian Estimation Using Gaussian Sum Approximations",
-/// IEEE TAC 17(4), 1972), each weighed by what it said of the observations. The two poses of a flat target are two
-/// starts.
+/// Filters that start differently, until the observations show which is right. In front of a small or flat target, a
+/// sideways translation and rotation look alike: the first frames leave a long curved valley of poses, a Gaussian on it
+/// is sure of itself in the wrong position, and one in ten runs is lost. So the belief of the speed aside is split into
+/// narrower ones (a Gaussian sum; D. L. Alspach & H. W. Sorenson, "Nonlinear Bayesian Estimation Using Gaussian Sum
+/// Approximations", IEEE TAC 17(4), 1972), each weighed by what it said of the observations. The two poses of a flat
+/// target are two starts.
 class FilterBank {
  public:
   FilterBank(const Camera& camera, std::span<const StartHypothesis> starts, const LocalizationFilterConfig& filter,

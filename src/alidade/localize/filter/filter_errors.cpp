@@ -20,7 +20,7 @@ bool LocalizationFilter::linearise(Measured& measured) {
   const Feature& nominal = *measured.feature;
   Feature feature = nominal;
   const WorldTurn turn(world_from_cam, phi);
-  if (turns_world_) {  // the camera keeps its attitude: nothing measured depends on how the world is turned
+  if (turns_world_) {  // the camera keeps its attitude: nothing measured depends on how the world is rotated
     world_from_cam.translation = turn.place_before(world_from_cam.translation, delta_.head<3>());
     feature = turn.feature_before(nominal, error_of(nominal));
   } else {
@@ -83,7 +83,7 @@ void LocalizationFilter::turn_by_delta() {
   motion_ = retract(was, delta_.head<motion_dim>());
   motion_.world_from_cam.translation = G * turn.place_before(was.world_from_cam.translation, delta_.head<3>());
   motion_.velocity_in_world = G * turn.place_before(was.velocity_in_world, delta_.segment<3>(6));
-  // First each error is turned with its place, then what the rotation's error adds.
+  // First each error is rotated with its position, then what the rotation's error adds.
   const auto block = [&](int row) { return shear_.block<3, 3>(row, 0); };
   block(0) = block(6) = G;
   block(3) = block(9) = Eigen::Matrix3d::Identity();
@@ -116,7 +116,7 @@ void LocalizationFilter::turn_by_delta() {
 }
 
 /// The state moves by delta_, and the covariance's errors are counted from there: the rotation's by the right Jacobian,
-/// the others so that a turn of the world stays one.
+/// the others so that a rotation of the world stays one.
 void LocalizationFilter::move_by_delta() {
   constexpr int rotation_at = 3;
   const Eigen::Matrix3d J = right_jacobian(delta_.segment<3>(rotation_at));

@@ -121,7 +121,7 @@ TEST(LocalizationFilter, UpdateIsTheDenseKalmanUpdate) {
     EXPECT_EQ(report.num_used, 4u);
     EXPECT_NEAR(report.nis_per_dof, nu.dot(S.inverse() * nu) / 8.0, 1e-6);
     const Eigen::MatrixXd should = P - P * H.transpose() * S.inverse() * H * P;
-    EXPECT_LT((covariance_of(filter) - should).norm(), 1e-4 * P.norm());  // what the bend of the lens leaves
+    EXPECT_LT((covariance_of(filter) - should).norm(), 1e-4 * P.norm());  // what the curvature of the lens leaves
     const Eigen::VectorXd step = P * H.transpose() * S.inverse() * nu;
     EXPECT_LT((filter.motion().world_from_cam.translation - sample.truth[0].world_from_cam.translation - step.head<3>())
                   .norm(),
@@ -218,7 +218,7 @@ TEST(LocalizationFilter, RefusesWhatItCannotHold) {
   EXPECT_EQ(filter.motion().world_from_cam.translation, before.world_from_cam.translation);
 }
 
-/// Reference sequences of an independent filter of the same kind: places, all observations of a frame at once,
+/// Reference sequences of an independent filter of the same kind: positions, all observations of a frame at once,
 /// iterated.
 TEST(LocalizationFilter, IsThatOfTheReferenceSequences) {
   for (const std::string name : {"d4_seq0", "d4_seq3"}) {

@@ -160,7 +160,7 @@ std::optional<double> LocalizationFilter::iterate(std::span<Measured*> group, bo
 bool LocalizationFilter::take(std::span<Measured*> group) {
   const int dim = P_.dim();
   start_.head(dim) = delta_.head(dim);
-  // Whole steps find the way past a bend. From far away, behind the edge of a strong lens, they can end anywhere: then
+  // Whole steps find the way past a curve. From far away, behind the edge of a strong lens, they can end anywhere: then
   // again with steps that do not.
   auto cost = iterate(group, false);
   if (!(cost && *cost <= config_.gate * static_cast<double>(group.size()))) {

@@ -40,7 +40,7 @@ void GivenEffects::predict(const MotionMatrix& F) {
   }
 }
 
-/// A told place is the larger the larger the scale is.
+/// A given position grows with the scale.
 void GivenEffects::add_known(int offset, const Eigen::Vector3d& point_in_world) {
   M_.middleRows<3>(offset).setZero();
   M_.block<3, 1>(offset, M_.cols() - 1) = point_in_world;

@@ -20,7 +20,7 @@ namespace alidade {
 /// Allocates nothing after its construction.
 class GivenEffects {
  public:
-  static constexpr int max_given = 17;  ///< A lens's numbers and the scale.
+  static constexpr int max_given = 17;  ///< A lens's parameters and the scale.
   using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>;
 
   GivenEffects() = default;
@@ -44,7 +44,7 @@ class GivenEffects {
   void add(int offset, const NewFeature& made, std::span<const int> estimated);
   void remove(int offset, int count, int dim);  ///< `dim` before.
   void make_place(int offset, const Eigen::Matrix<double, 3, 6>& J);
-  void forget_motion();  ///< Of a camera that is placed again; and what was scored.
+  void forget_motion();  ///< Of a camera that is localised again; and what was scored.
   /// As StateCovariance::turn() and shear().
   void turn(const double* blocks, int stride, int single_at, int num_single, int dim);
   void shear(int at, const double* K, int stride, int dim);

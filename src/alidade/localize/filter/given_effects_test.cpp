@@ -50,9 +50,9 @@ TEST(GivenEffects, TheStateMovesAsItSays) {
       camera.lens = with_params(camera.lens, values);
       return followed(run, camera, i < lens_params.size() ? 1.0 : 1.0 + by, {}).motion().world_from_cam;
     };
-    const Rigid3 low = moved(-steps[i]), high = moved(steps[i]), middle = filter.motion().world_from_cam;
+    const Rigid3 low = moved(-steps[i]), high = moved(steps[i]), centre = filter.motion().world_from_cam;
     Eigen::Vector<double, 6> numeric;
-    numeric << middle.rotation.conjugate() * (high.translation - low.translation),
+    numeric << centre.rotation.conjugate() * (high.translation - low.translation),
         log_so3(low.rotation.conjugate() * high.rotation);
     numeric /= 2.0 * steps[i];
     const Eigen::Vector<double, 6> said = J.col(static_cast<Eigen::Index>(i));
@@ -69,11 +69,11 @@ TEST(GivenEffects, AFilterCountsTheLens) {
   Draws draws(5);
   for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
     const HoverRun run = testing::hovering({.num_frames = 60, .num_others = 30}, 900 + seed);
-    Camera told = run.camera;
-    Eigen::VectorXd values = params(told.lens), sigma = Eigen::VectorXd::Zero(values.size());
+    Camera given = run.camera;
+    Eigen::VectorXd values = params(given.lens), sigma = Eigen::VectorXd::Zero(values.size());
     sigma.head<4>() << 12.0, 12.0, 10.0, 10.0;
     for (Eigen::Index i = 0; i < 4; ++i) values[i] += sigma[i] * draws.normal();
-    told.lens = with_params(told.lens, values);
+    given.lens = with_params(given.lens, values);
     const auto nees = [&](const Camera& camera) {
       LocalizeConfig config;
       config.target.points = run.target;
@@ -81,9 +81,9 @@ TEST(GivenEffects, AFilterCountsTheLens) {
       const Localization report = localize(run.frames, camera, config);
       return testing::pose_nees(report.path.back(), run.truth.back().world_from_cam) / num_seeds;
     };
-    ignored += nees(told);
-    told.cov = sigma.cwiseAbs2().asDiagonal();
-    counted += nees(told);
+    ignored += nees(given);
+    given.cov = sigma.cwiseAbs2().asDiagonal();
+    counted += nees(given);
   }
   EXPECT_LT(counted, 3.5);  // the filter alone has 1.9 with the right lens, and ten draws scatter
   EXPECT_GT(ignored, 2.0 * counted);

@@ -67,7 +67,7 @@ std::vector<GivenNumber> given_numbers(const GivenSystem& system) {
     if (at >= 0) add(name, direction_of(at), has_cov ? std::optional(std::sqrt(system.cov(at, at))) : std::nullopt);
   }
   add("scale of the target", direction_of(num), std::sqrt(system.cov(num, num)));
-  all.back().asked = all.back().z = 0.0;  // all may be larger: no observation tells
+  all.back().asked = all.back().z = 0.0;  // all may be larger: no observation shows it
   const auto at_cause = [&](int cause) { return direction_of(num + cause); };
   if (system.score.size() < num + num_causes) return all;
   add("shape of the target", at_cause(shape_cause), std::nullopt);

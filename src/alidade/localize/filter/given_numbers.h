@@ -5,8 +5,8 @@
 
 namespace alidade {
 
-/// What is left of a path's normal equations for the numbers that are given: those of the lens by their places in it,
-/// then the target's scale; of a smoothed path also its shape, its speed (3) and the image's readout.
+/// What is left of a path's normal equations for the parameters that are given: those of the lens by their indices in
+/// it, then the target's scale; of a smoothed path also its shape, its speed (3) and the image's readout.
 struct GivenSystem {
   const Camera& camera;
   const std::vector<int>& lens_params;

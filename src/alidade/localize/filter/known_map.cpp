@@ -17,10 +17,10 @@ std::vector<KnownPoint> known_points(const SavedMap& map) {
     sigmas_m.push_back(sigma_m);
   }
   if (points.empty()) return points;
-  const auto middle = sigmas_m.begin() + static_cast<std::ptrdiff_t>(sigmas_m.size() / 2);
-  std::ranges::nth_element(sigmas_m, middle);
+  const auto centre = sigmas_m.begin() + static_cast<std::ptrdiff_t>(sigmas_m.size() / 2);
+  std::ranges::nth_element(sigmas_m, centre);
   constexpr double far_less_sure = 5.0;
-  std::erase_if(points, [&](const KnownPoint& point) { return point.sigma_m > far_less_sure * *middle; });
+  std::erase_if(points, [&](const KnownPoint& point) { return point.sigma_m > far_less_sure * *centre; });
   return points;
 }
 

@@ -25,15 +25,15 @@ std::optional<Landmark> new_landmark(long id, const cv::Mat& smoothed, const Cam
                                      const Rigid3& world_from_cam, const Eigen::Vector2d& px,
                                      const Eigen::Vector3d& point_in_world,
                                      const std::optional<Eigen::Vector3d>& normal_in_world) {
-  const Eigen::Vector2i middle = px.array().round().cast<int>();
-  if (middle.minCoeff() < ReferencePatch::margin_px || middle.x() >= smoothed.cols - ReferencePatch::margin_px ||
-      middle.y() >= smoothed.rows - ReferencePatch::margin_px)
+  const Eigen::Vector2i centre = px.array().round().cast<int>();
+  if (centre.minCoeff() < ReferencePatch::margin_px || centre.x() >= smoothed.cols - ReferencePatch::margin_px ||
+      centre.y() >= smoothed.rows - ReferencePatch::margin_px)
     return std::nullopt;
   Landmark landmark;
   landmark.id = id;
-  landmark.patch = ReferencePatch(smoothed, middle.x(), middle.y());
+  landmark.patch = ReferencePatch(smoothed, centre.x(), centre.y());
   if (!landmark.patch.seen_through(Eigen::Matrix2d::Identity())) return std::nullopt;
-  landmark.offset_px = px - middle.cast<double>();
+  landmark.offset_px = px - centre.cast<double>();
   landmark.world_from_first_cam = world_from_cam;
   const Eigen::Vector3d observation = point_in_world - world_from_cam.translation;
   landmark.first_distance_m = observation.norm();

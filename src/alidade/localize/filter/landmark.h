@@ -10,11 +10,12 @@
 
 namespace alidade {
 
-/// A feature of the map as the eyes know it: what it looked like, from where, and how often it was found again.
+/// A feature of the map as the feature front end knows it: what it looked like, from where, and how often it was found
+/// again.
 struct Landmark {
   long id = 0;
   ReferencePatch patch;
-  Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();  ///< Of the point from the patch's middle, as first seen.
+  Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();  ///< Of the point from the patch's centre, as first seen.
   Rigid3 world_from_first_cam;
   Eigen::Matrix<double, 3, 2> surface_in_world = Eigen::Matrix<double, 3, 2>::Zero();  ///< Two directions along it.
   Eigen::Matrix2d J_first_px_surface = Eigen::Matrix2d::Identity();  ///< Of first_px by a move along them.
@@ -35,13 +36,13 @@ struct Landmark {
                                                    const Eigen::Vector3d& point_in_world,
                                                    const std::optional<Eigen::Vector3d>& normal_in_world = {});
 
-/// How its surroundings have been turned and stretched, as a map of offsets from the first image to one taken from
+/// How its surroundings have been rotated and stretched, as a map of offsets from the first image to one taken from
 /// here. By the derivatives of the plane that it lies in: A = J₁ R₁ᵀ B (J₀ B)⁻¹.
 [[nodiscard]] std::optional<Eigen::Matrix2d> here_from_first(const Landmark& landmark, const Camera& camera,
                                                              const Rigid3& world_from_cam,
                                                              const Eigen::Vector3d& point_in_world);
 
-/// How a landmark looks, that is at this place by now and was seen first from there; and one that looks so.
+/// How a landmark looks, that is at this position by now and was seen first from there; and one that looks so.
 [[nodiscard]] SavedLook look_of(const Landmark& landmark, const Eigen::Vector3d& point_in_world,
                                 const Rigid3& world_from_first_cam);
 [[nodiscard]] Landmark saved_landmark(long id, const SavedLook& look, const Eigen::Vector3d& point_in_world);

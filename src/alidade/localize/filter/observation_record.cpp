@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-/// Distances that were only supposed share their error: as vague as they are told to be, hundreds of them together
+/// Distances that were only supposed share their error: as vague as given, hundreds of them together
 /// would say how large the world is.
 RangePrior vague(RangePrior range, long id, bool sets_unit, const LocalizeConfig& config) {
   constexpr double hardly_given = 5.0;
@@ -87,7 +87,7 @@ class BackwardPath {
   std::vector<std::vector<UsedObservation>> observations;  ///< Frames counted from none.
 
  private:
-  /// A told point may be further from the map's frame than its own σ: a filter that took it for mismatched lost it.
+  /// A given point may be further from the map's frame than its own σ: a filter that took it for mismatched lost it.
   [[nodiscard]] static Eigen::Matrix3d cov_of(const LocalizationFilter& filter, const SmootherPoint& point) {
     const auto place = filter.place(point.id);
     return place ? place->cov : Eigen::Matrix3d::Zero().eval();
@@ -122,7 +122,7 @@ bool BackwardPath::take(const ObservationFrame& frame, const PathStep& path) {
     used.push_back({0, observation.id, observation.px, sigma_px});
   }
   std::vector<Rigid3> begin = begin_at(path);
-  const double gate = 4.0 * config_.filter.gate;  // poses and places give way when all are solved for together
+  const double gate = 4.0 * config_.filter.gate;  // poses and positions give way when all are solved for together
   auto found = resection(camera_, placed, begin, gate);
   constexpr double doubtful = 0.5;
   if (found && static_cast<double>(found->num_fit) < doubtful * static_cast<double>(placed.size())) {
@@ -175,7 +175,7 @@ bool is_settled(const Feature& feature, const LocalizationFilter& filter, const 
 }
 
 double max_points_at_once(std::size_t num_frames) {
-  constexpr double max_work = 2e8;  // frames times the square of the numbers that are there at once: seconds
+  constexpr double max_work = 2e8;  // frames times the square of the components that are there at once: seconds
   constexpr double num_shared = 24.0;
   return (std::sqrt(max_work / static_cast<double>(num_frames)) - num_shared) / 3.0;
 }

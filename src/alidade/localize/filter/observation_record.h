@@ -11,8 +11,8 @@
 
 namespace alidade {
 
-/// Whether a point's place can be solved for: nearly linear; without a target all depths are as unsure as the unit of
-/// length, and a parallax is enough.
+/// Whether a point's position can be solved for: nearly linear; without a target all depths are as unsure as the unit
+/// of length, and a parallax is enough.
 [[nodiscard]] bool is_settled(const Feature& feature, const LocalizationFilter& filter, const LocalizeConfig& config);
 
 /// Of so many frames, how many points may be in the smoother's equations at once for the work to stay in proportion.
@@ -38,11 +38,11 @@ class ObservationRecord {
   /// All that was seen since the path began, with the filter's map to begin at. Backwards from the last frame, each
   /// pose is the one that explains most of the map's observations: the filter's, that of the frame after it, or one of
   /// the target's alone; so that what a filter took for its pose before it began again is forgotten, and frames before
-  /// it began at all are placed as far as the map is seen in them. Points that are not nearly linear yet are rejected:
-  /// they tell little, and what they tell is not Gaussian. `gone`: points that left a full filter; their observations
-  /// are used, too. `start`: what was given of the first pose. Points are left out where the work would be out of
-  /// proportion; none where that leaves too few, or a target's points were never seen. `has_loops`: room is left for
-  /// points that are joined over the time between.
+  /// it began at all are localised as far as the map is seen in them. Points that are not nearly linear yet are
+  /// rejected: they determine little, and what they determine is not Gaussian. `gone`: points that left a full filter;
+  /// their observations are used, too. `start`: what was given of the first pose. Points are skipped where the work
+  /// would be out of proportion; none where that leaves too few, or a target's points were never seen. `has_loops`:
+  /// room is left for points that are joined over the time between.
   [[nodiscard]] std::optional<SmootherProblem> problem(const Camera& camera, const LocalizeConfig& config,
                                                        std::span<const ObservationFrame> frames,
                                                        std::span<const PathStep> path, const LocalizationFilter& filter,

@@ -12,7 +12,7 @@ namespace alidade {
 /// A point as it was when it left a full filter.
 struct GonePoint {
   MapPoint point;
-  bool is_linear = false;  ///< Its place can be solved for.
+  bool is_linear = false;  ///< Its position can be solved for.
 };
 
 /// What a run knows of points outside its filters: how often each was used or did not fit, and what is believed of the

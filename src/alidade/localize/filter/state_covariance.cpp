@@ -67,7 +67,7 @@ void StateCovariance::product(const Rows& rows, double* x0, double* x1) const {
 
 void StateCovariance::products(std::span<const Rows> rows) {
   const int num = 2 * static_cast<int>(rows.size()), tiles = (num + 3) / 4;
-  // H W, four measured numbers together, for each column of W.
+  // H W, four measured components together, for each column of W.
   for (std::size_t m = 0; m < rows.size(); ++m) {
     for (int k = 0; k < pending_; ++k) {
       double sum0 = 0.0, sum1 = 0.0;

@@ -13,10 +13,10 @@ namespace alidade {
 class StateCovariance {
  public:
   static constexpr int panel = 8;         ///< Rows that are worked on together.
-  static constexpr int max_columns = 32;  ///< Of one call of products(): numbers measured together.
-  static constexpr int max_support = 34;  ///< State numbers that one measurement depends on.
+  static constexpr int max_columns = 32;  ///< Of one call of products(): components measured together.
+  static constexpr int max_support = 34;  ///< State components that one measurement depends on.
 
-  /// Room for so many state numbers, and so many measured ones between two commits.
+  /// Room for so many state components, and so many measured ones between two commits.
   void reserve(int state_capacity, int measured_capacity);
   [[nodiscard]] int dim() const { return dim_; }
   [[nodiscard]] int capacity() const { return stride_; }
@@ -34,19 +34,19 @@ class StateCovariance {
   /// Of P − W Wᵀ.
   [[nodiscard]] double current(int i, int j) const;
 
-  /// More state numbers, uncorrelated with the others and without variance yet. False where there is no room.
+  /// More state components, uncorrelated with the others and without variance yet. False where there is no room.
   [[nodiscard]] bool grow(int count);
   /// Fewer: those from `offset` on.
   void remove(int offset, int count);
 
-  /// Two measured numbers that depend on `columns` of the state: derivatives by them.
+  /// Two measured components that depend on `columns` of the state: derivatives by them.
   struct Rows {
     std::span<const int> columns;
     const double *h0, *h1;
   };
   /// X = (P − W Wᵀ) Hᵀ for all state rows; 2 columns for each of `rows`.
   void products(std::span<const Rows> rows);
-  /// The same without W, into columns that the caller holds (dim() numbers each).
+  /// The same without W, into columns that the caller holds (dim() components each).
   void product(const Rows& rows, double* x0, double* x1) const;
   /// H (P − W Wᵀ) Hᵀ.
   [[nodiscard]] Eigen::Matrix2d innovation_covariance(const Rows& rows) const;
@@ -64,9 +64,9 @@ class StateCovariance {
   /// P ← P − W Wᵀ.
   void commit();
   /// P ← B P Bᵀ with B of 3 × 3 blocks along the diagonal, which stand one below the other in `blocks` (capacity() × 3,
-  /// column by column); the `num_single` numbers from `single_at` on stay as they are.
+  /// column by column); the `num_single` components from `single_at` on stay as they are.
   void turn(const double* blocks, int single_at, int num_single);
-  /// P ← (I + K E) P (I + K E)ᵀ, where E takes the three numbers from `at` on; K: capacity() × 3, column by column.
+  /// P ← (I + K E) P (I + K E)ᵀ, where E takes the three components from `at` on; K: capacity() × 3, column by column.
   void shear(int at, const double* K);
 
  private:

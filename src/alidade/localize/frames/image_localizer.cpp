@@ -9,7 +9,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t min_tracked = 5;  // a pose has six numbers, a point two; two points more to notice a mistake
+constexpr std::size_t min_tracked = 5;  // a pose has six components, a point two; two points more to notice a mistake
 constexpr double min_share = 0.25;      // of the features looked for: fewer may be chance
 constexpr double prior_share = 0.5;     // σ of a new inverse depth over it: from half the depth to infinity
 
@@ -18,7 +18,7 @@ constexpr double prior_share = 0.5;     // σ of a new inverse depth over it: fr
 LocalizationFilterConfig for_images(LocalizationFilterConfig config, double sigma_floor_px) {
   constexpr double few_doubtful = 0.1;  // the gates alone keep them out; a consensus costs as much as the update
   if (!(config.sigma_new_px > 0.0)) config.sigma_new_px = sigma_floor_px;
-  // Many matches settle the first frames' poses: errors may turn with the world there too, and must not bend to one
+  // Many matches settle the first frames' poses: errors may rotate with the world there too, and must not follow one
   // side.
   config.max_turn_rad = std::max(config.max_turn_rad, 0.05);
   config.bend_tolerance = std::min(config.bend_tolerance, 0.001);
@@ -188,7 +188,7 @@ void ImageLocalizer::drop_bad() {
   }
 }
 
-/// As deep as the points of the map that are known well, in the middle.
+/// As deep as the points of the map that are known well, in the median.
 double ImageLocalizer::usual_depth_m() const {
   const LocalizationFilter& filter = engine_.best();
   if (config_.depth_m) return *config_.depth_m;
@@ -285,7 +285,7 @@ bool ImageLocalizer::restart_in_doubt(const cv::Mat& smoothed, PathStep& step) {
   return false;
 }
 
-/// The places of the keyframes that are most like the image.
+/// The positions of the keyframes that are most like the image.
 std::vector<StartHypothesis> ImageLocalizer::likely_places(const cv::Mat& smoothed, double depth_m) const {
   std::vector<StartHypothesis> starts;
   constexpr double sigma_share = 0.15, sigma_rad = 0.08;  // of what a keyframe's pose is off by

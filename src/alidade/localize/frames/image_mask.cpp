@@ -25,11 +25,11 @@ cv::Mat circle_part(const cv::Mat& grey) {
   std::vector<cv::Point> points;
   cv::findNonZero(bright_part(grey), points);
   if (points.empty()) return {};
-  cv::Point2f middle;
+  cv::Point2f centre;
   float radius_px = 0.0f;
-  cv::minEnclosingCircle(points, middle, radius_px);
+  cv::minEnclosingCircle(points, centre, radius_px);
   cv::Mat shown(grey.size(), CV_8U, cv::Scalar(0)), hull_part(grey.size(), CV_8U, cv::Scalar(0));
-  cv::circle(shown, middle, static_cast<int>(radius_px), cv::Scalar(255), cv::FILLED);
+  cv::circle(shown, centre, static_cast<int>(radius_px), cv::Scalar(255), cv::FILLED);
   std::vector<cv::Point> hull;
   cv::convexHull(points, hull);
   cv::fillConvexPoly(hull_part, hull, cv::Scalar(255));

@@ -57,7 +57,7 @@ void ImageLocalizer::save_map(Localization& result) const {
     const Landmark& landmark = at != landmarks_.end() ? at->second : gone->second.landmark;
     const Rigid3& from =
         landmark.is_saved ? landmark.world_from_first_cam : result.path[landmark.first_step].world_from_cam;
-    constexpr double sure = 0.05;  // of the distance: what is vaguer would be looked for in the wrong place
+    constexpr double sure = 0.05;  // of the distance: what is vaguer would be looked for in the wrong position
     if (!(std::sqrt(point.cov.trace()) < sure * (point.point_in_world - from.translation).norm())) continue;
     map.points.push_back({point.id, point.point_in_world, point.cov, look_of(landmark, point.point_in_world, from)});
   }

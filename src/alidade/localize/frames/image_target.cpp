@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-constexpr double max_chi2_per_dof = 6.9;  // 99.9 % of the two numbers that four corners leave
+constexpr double max_chi2_per_dof = 6.9;  // 99.9 % of the two components that four corners leave
 
 int dof_of(std::size_t num_points) { return 2 * static_cast<int>(num_points) - 6; }
 
@@ -45,7 +45,7 @@ std::optional<SeenTarget> find_rectangle(const cv::Mat& grey, const Camera& came
                                          const KnownPoseConfig& config) {
   struct Candidate {
     SeenTarget seen;
-    Eigen::Vector2d middle_px;
+    Eigen::Vector2d centre_px;
     double score, size_px;
   };
   std::vector<Candidate> candidates;
@@ -62,7 +62,7 @@ std::optional<SeenTarget> find_rectangle(const cv::Mat& grey, const Camera& came
   if (best == candidates.end()) return std::nullopt;
   constexpr double nearly_as_good = 0.7;  // the same print in other light
   for (const Candidate& other : candidates) {
-    const bool is_elsewhere = (other.middle_px - best->middle_px).norm() > 0.5 * std::min(other.size_px, best->size_px);
+    const bool is_elsewhere = (other.centre_px - best->centre_px).norm() > 0.5 * std::min(other.size_px, best->size_px);
     best->seen.num_alike += is_elsewhere && other.score > nearly_as_good * best->score ? 1u : 0u;
   }
   return std::move(best->seen);
@@ -78,7 +78,7 @@ std::optional<SeenTarget> find_board_points(const cv::Mat& grey, const Camera& c
   return posed(camera, std::move(observations), target, config);
 }
 
-/// Where the top of a parabola through three neighbours is, from the middle one.
+/// Where the top of a parabola through three neighbours is, from the central one.
 double top_of(double before, double at, double after) {
   const double bend = before - 2.0 * at + after;
   return bend < 0.0 ? std::clamp(0.5 * (before - after) / bend, -0.5, 0.5) : 0.0;
@@ -105,8 +105,8 @@ std::optional<SeenTarget> find_patches(const cv::Mat& grey, const Camera& camera
     };
     const Eigen::Vector2d top(at.x + top_of(like(-1, 0), best, like(1, 0)),
                               at.y + top_of(like(0, -1), best, like(0, 1)));
-    const Eigen::Vector2d middle(0.5 * (patch.width_px - 1), 0.5 * (patch.height_px - 1));
-    observations.push_back({target.points[i].id, top + middle, config.sigma_px});
+    const Eigen::Vector2d centre(0.5 * (patch.width_px - 1), 0.5 * (patch.height_px - 1));
+    observations.push_back({target.points[i].id, top + centre, config.sigma_px});
   }
   return posed(camera, std::move(observations), target, config);
 }

@@ -10,7 +10,7 @@ namespace {
 
 using PoseMatrix = Eigen::Matrix<double, 6, 6>;
 
-/// Whether the filter followed the camera from one frame to another: it was not placed anew meanwhile.
+/// Whether the filter followed the camera from one frame to another: it was not reinitialised meanwhile.
 bool is_followed(std::span<const PathStep> path, std::size_t from, std::size_t to) {
   for (std::size_t k = from; k <= to; ++k) {
     if (!path[k].has_pose()) return false;
@@ -36,7 +36,7 @@ void put_between(const PathStep& a, const PathStep& b, double share, PathStep& s
 void KeptFrames::add(ObservationFrame frame) {
   if (num_given_++ % stride_ != 0) return;
   frames_.push_back(std::move(frame));
-  if (frames_.size() <= most_) return;
+  if (frames_.size() <= max_) return;
   std::size_t kept = 0;
   for (std::size_t k = 0; k < frames_.size(); k += 2) std::swap(frames_[kept++], frames_[k]);
   frames_.resize(kept);
@@ -77,7 +77,7 @@ void KeptFrames::put_back(std::span<const PathStep> solved, std::vector<PathStep
       const PathStep step = moved(from_a ? a : b, k);
       path[k].world_from_cam = step.world_from_cam;
       path[k].cov = step.cov;
-    } else {  // the filter lost it in between: nothing but its neighbours tells
+    } else {  // the filter lost it in between: only its neighbours determine it
       const PathStep& after = solved[b < solved.size() ? b : a];
       put_between(solved[a].has_pose() ? solved[a] : after, after, 0.5, path[k]);
     }

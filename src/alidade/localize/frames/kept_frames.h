@@ -13,7 +13,7 @@ namespace alidade {
 /// so that memory and the time at the end do not grow with the recording.
 class KeptFrames {
  public:
-  explicit KeptFrames(std::size_t most) : most_(most) {}
+  explicit KeptFrames(std::size_t most) : max_(most) {}
 
   void add(ObservationFrame frame);
   [[nodiscard]] const std::vector<ObservationFrame>& frames() const { return frames_; }
@@ -28,7 +28,7 @@ class KeptFrames {
   void put_back(std::span<const PathStep> solved, std::vector<PathStep>& path) const;
 
  private:
-  std::size_t most_, stride_ = 1, num_given_ = 0;
+  std::size_t max_, stride_ = 1, num_given_ = 0;
   std::vector<ObservationFrame> frames_;
 };
 

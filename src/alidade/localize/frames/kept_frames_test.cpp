@@ -7,7 +7,7 @@
 namespace alidade {
 namespace {
 
-/// Along a line while it turns, by the filter `stretch` times too far, and seen from another world.
+/// Along a line while it rotates, by the filter `stretch` times too far, and seen from another world.
 PathStep step_at(long k, double stretch) {
   PathStep step;
   step.frame = k;
@@ -49,7 +49,7 @@ TEST(KeptFrames, ThoseBetweenGoAsTheFilterWentAndEndAtTheNext) {
   kept.put_back(solved, path);
   for (std::size_t k = 0; k < path.size(); ++k) {
     const Rigid3 is = path[k].world_from_cam, was = step_at(static_cast<long>(k), 1.0).world_from_cam;
-    // Where the filter was placed anew, or behind the last one kept, it is as long as the filter makes it.
+    // Where the filter was reinitialised, or behind the last one kept, it is as long as the filter makes it.
     const bool is_held = k < 8 || (k >= 12 && k <= 20);
     EXPECT_LT((is.translation - was.translation).norm(), is_held ? 1e-3 : 0.02) << k;
     EXPECT_LT(is.rotation.angularDistance(was.rotation), 1e-9) << k;

@@ -69,7 +69,7 @@ TEST(SavedMap, ImagesBeginInTheMapOfAnEarlierRun) {
   ASSERT_GT(first.saved_map.points.size(), 20u);
   ASSERT_FALSE(first.saved_map.keyframes.empty());
   in_map.map = as_written(first.saved_map);
-  // Other images, from other places; no target is given.
+  // Other images, from other positions; no target is given.
   const Localization second = localized_film(map_film(true, 120, 180), in_map);
   EXPECT_EQ(second.num_lost, 0u) << second.verdict.sentence;
   EXPECT_TRUE(second.is_in_map);

@@ -72,8 +72,8 @@ TEST(StillParts, WhatIsBurntInIsMaskedAndTheSceneIsNot) {
   cv::putText(text, "CAM 1 DEPTH 12.4m", {60, 24}, cv::FONT_HERSHEY_SIMPLEX, 0.7, cv::Scalar(255), 2);
   const double num_text = cv::countNonZero(text);
   EXPECT_LT(cv::countNonZero(text & shown), 0.05 * num_text);
-  const cv::Mat middle = shown(cv::Rect(0, 60, 320, 120));
-  EXPECT_GT(cv::countNonZero(middle), 0.98 * static_cast<double>(middle.total()));
+  const cv::Mat centre = shown(cv::Rect(0, 60, 320, 120));
+  EXPECT_GT(cv::countNonZero(centre), 0.98 * static_cast<double>(centre.total()));
 }
 
 /// While the camera stands everything stands: nothing is masked.

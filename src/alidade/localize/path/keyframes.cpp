@@ -42,10 +42,10 @@ double correlation_at(const Thumbnail& first, const Thumbnail& second, int du, i
 
 double distance_rad(const Rigid3& a, const Rigid3& b) { return a.rotation.angularDistance(b.rotation); }
 
-/// The pose turned so that the image's middle looks where `shift_px` less looked before.
+/// The pose rotated so that the image centre looks where `shift_px` less looked before.
 Rigid3 turned(const Camera& camera, const Rigid3& world_from_cam, const Eigen::Vector2d& shift_px) {
-  const Eigen::Vector2d middle(0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1));
-  const auto from = unproject(camera, middle), to = unproject(camera, middle - shift_px);
+  const Eigen::Vector2d centre(0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1));
+  const auto from = unproject(camera, centre), to = unproject(camera, centre - shift_px);
   if (!from || !to) return world_from_cam;
   Rigid3 result = world_from_cam;
   result.rotation = (world_from_cam.rotation * rotation_between(*from, *to)).normalized();
@@ -107,7 +107,7 @@ std::vector<SavedKeyframe> KeyframeStore::saved(std::span<const PathStep> path) 
   for (const Keyframe& keyframe : keyframes_) {
     SavedKeyframe saved{keyframe.world_from_cam, {Thumbnail::width, Thumbnail::height, {}}};
     if (keyframe.step) saved.world_from_cam = path[*keyframe.step].world_from_cam;
-    constexpr double grey = 128.0;  // in the middle of what a byte holds; the mean does not count
+    constexpr double grey = 128.0;  // half of what a byte holds; the mean does not count
     for (const float value : keyframe.thumbnail.grey)
       saved.thumbnail.grey.push_back(static_cast<std::uint8_t>(std::clamp(std::lround(value + grey), 0L, 255L)));
     all.push_back(std::move(saved));

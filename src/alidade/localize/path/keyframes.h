@@ -40,7 +40,7 @@ class KeyframeStore {
   void add(const SavedKeyframe& saved);
   /// All, where the path now says that they were taken.
   [[nodiscard]] std::vector<SavedKeyframe> saved(std::span<const PathStep> path) const;
-  /// Poses from which an image may have been taken, the likeliest first: those of the keyframes most like it, turned
+  /// Poses from which an image may have been taken, the likeliest first: those of the keyframes most like it, rotated
   /// by the shift of the image.
   [[nodiscard]] std::vector<Rigid3> candidates(const cv::Mat& grey, const Camera& camera, std::size_t most) const;
   [[nodiscard]] std::size_t size() const { return keyframes_.size(); }

@@ -199,7 +199,7 @@ class LoopCloser {
       problem_.world_from_cam[k] = corrected(k, problem_.world_from_cam[k]);
   }
 
-  /// Of one number, those that are in one place now.
+  /// Of one number, those that are at one position now.
   struct Candidate {
     std::vector<long> ids;  ///< In order of time.
     std::size_t num = 0;

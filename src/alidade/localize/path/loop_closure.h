@@ -14,7 +14,7 @@ struct LoopClosure {
 };
 
 /// Where a point left the map and was seen again much later, `problem` has two, with numbers of their own: `number_of`
-/// them is the same. Between the two the path has drifted. Here keyframes are made to agree on the places of such
+/// them is the same. Between the two the path has drifted. Here keyframes are made to agree on the positions of such
 /// points (similarity_graph.h), poses and points to begin at follow, and of the points that agree then so many are
 /// joined to one that no more than `max_at_once` are in the equations at once; evenly along the path. The others stay
 /// two: that they are one is not used.

@@ -105,7 +105,7 @@ double nine_in_ten_off_m(const Localization& result, const WalkRun& run) {
   return off_m.at(off_m.size() * 9 / 10);
 }
 
-/// As lively as the walk is: what is taken for livelier has a σ that is too large.
+/// As manoeuvring as the walk is: what is taken for more so has a σ that is too large.
 LocalizeConfig gentle() {
   LocalizeConfig config;
   config.filter.sigma_a_m_s2 = 0.2;

@@ -40,7 +40,7 @@ void mirror_tile(const double* tile, double* mirror, std::size_t stride);
 void combine_columns(const double* block, std::size_t stride, double* columns, std::size_t num);
 /// The rows from `first` to `end` of a column, each three by their block from the left.
 void turn_rows(const double* blocks, std::size_t stride, double* column, int first, int end);
-/// column += K u + U k, three numbers each of u and k.
+/// column += K u + U k, three components each of u and k.
 void add_three(const double* K, const double* U, std::size_t stride, const double* u, const double* k, std::size_t num,
                double* column);
 /// x −= Σ_k w_k h_k for a panel: four columns of x at a time, whose factors of each k stand together.

@@ -148,7 +148,7 @@ TEST(PathError, PairsByTimeAndSaysWhereThereIsNone) {
   EXPECT_EQ(none.num_pairs, 0u);
   EXPECT_TRUE(std::isnan(none.ate_m) && std::isnan(none.rpe_m));
   const std::vector<Eigen::Vector3d> line{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}};
-  EXPECT_FALSE(aligned(line, line, true));  // the turn about a line cannot be determined
+  EXPECT_FALSE(aligned(line, line, true));  // the rotation about a line cannot be determined
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ namespace {
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using WindowRows = PathSmoother::WindowRows;
 
-constexpr double hardly_given = 1e-6;  // m⁻², rad⁻²: a pose alone that nothing tells must not stop all others
+constexpr double hardly_given = 1e-6;  // m⁻², rad⁻²: a pose alone that nothing determines must not stop all others
 
 void add_window(const WindowRows& J, const Eigen::Vector<double, 6>& error, const Eigen::Vector<double, 6>& variance,
                 SmootherSystem& system) {
@@ -57,10 +57,10 @@ Eigen::MatrixXd PathSmoother::considered_cov() const {
   return cov;
 }
 
-/// Of a target that is longer along x than it is told to be and as much shorter along y, by a share: what a told place
+/// Of a target that is longer along x than given and as much shorter along y, by a share: what a given position
 /// changes by.
 Eigen::Vector3d PathSmoother::shape_change(const Eigen::Vector3d& given_in_world) const {
-  const Eigen::Vector3d out = given_in_world - target_middle_;
+  const Eigen::Vector3d out = given_in_world - target_centre_;
   return {0.5 * out.x(), -0.5 * out.y(), 0.0};
 }
 
@@ -68,7 +68,7 @@ void PathSmoother::add_given_point(const SmootherState& state, std::size_t point
   const Eigen::Vector3d& given = *problem_.points[point].given_in_world;
   const double weight = std::pow(problem_.points[point].sigma_m, -2);
   const Eigen::Vector3d error = state.points[point] - given;
-  Eigen::Matrix<double, 3, 2> J;  // of where it is told to be: by scale, and by shape
+  Eigen::Matrix<double, 3, 2> J;  // of where it is given: by scale, and by shape
   J << given, shape_change(given);
   PoseChain& chain = system.chain;
   const int at = chain.place_of(point), by = causes_at_ + scale_cause;
@@ -163,7 +163,7 @@ PathSmoother::Surroundings PathSmoother::surroundings(const SmootherState& state
   return out;
 }
 
-/// Of speeds that differ, in the camera's frame and in the unit that the surroundings give: a world that is turned,
+/// Of speeds that differ, in the camera's frame and in the unit that the surroundings give: a world that is rotated,
 /// moved or larger leaves it as it is, and its derivatives say so. J: of the difference itself, in the world's.
 void PathSmoother::add_acceleration(const Surroundings& around, const WindowRows& J, Eigen::Vector<double, 6> error,
                                     const Eigen::Vector<double, 6>& variance, SmootherSystem& system) const {
@@ -237,7 +237,7 @@ void PathSmoother::add_start(const SmootherState& state, SmootherSystem& system)
 }
 
 std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state, Shared shared) const {
-  SmootherSystem system{PoseChain(shared == Shared::all ? causes_at_ + num_causes : num_estimated_, most_at_once_)};
+  SmootherSystem system{PoseChain(shared == Shared::all ? causes_at_ + num_causes : num_estimated_, max_at_once_)};
   system.has_given = shared == Shared::all;
   add_given_lens(state, system);
   add_start(state, system);
@@ -254,7 +254,7 @@ std::optional<SmootherSystem> PathSmoother::build(const SmootherState& state, Sh
     for (const std::size_t point : first_seen[k]) add_range(state, point, system);
     if (k + 1 < state.poses.size()) add_motion(state, k, system);
     if (k + 1 == state.poses.size()) system.chain.A.diagonal().head<6>().array() += hardly_given;
-    if (held_ && held_->frame == k) add_held(state, system);
+    if (fixed_ && fixed_->frame == k) add_fixed(state, system);
     if (!system.chain.eliminate()) return std::nullopt;
     for (const std::size_t point : leaving_[k])
       if (!system.chain.leave(point)) return std::nullopt;

@@ -19,23 +19,23 @@ Eigen::Matrix<double, 3, 7> moved_place(const Eigen::Vector3d& away) {
 
 /// Errors are what is left after the best alignment (W. Baarda, "S-Transformations and Criterion Matrices", 1973): of
 /// positions, by a motion of the world and, where its unit is a supposed one, by its size. Rotations count as much as
-/// places a hundredth of the path apart: of a path on a line they alone tell how it is rolled about it.
+/// positions a hundredth of the path apart: of a path on a line they alone determine how it is rolled about it.
 void PathSmoother::align(const SmootherSystem& system, const Eigen::MatrixXd& considered,
                          PoseChain::Spread& spread) const {
   if (problem_.gauge == PathGauge::fixed) return;
   const int num_free = problem_.gauge == PathGauge::similarity ? 7 : 6;
   const std::size_t num = state_.poses.size();
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const Rigid3& pose : state_.poses) middle += pose.translation / static_cast<double>(num);
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (const Rigid3& pose : state_.poses) centre += pose.translation / static_cast<double>(num);
   double extent2 = 0.0;
   for (const Rigid3& pose : state_.poses)
-    extent2 += (pose.translation - middle).squaredNorm() / static_cast<double>(num);
+    extent2 += (pose.translation - centre).squaredNorm() / static_cast<double>(num);
   constexpr double rotation_share = 1e-4;
   std::vector<Eigen::MatrixXd> G, W;
   Eigen::MatrixXd N = Eigen::MatrixXd::Zero(num_free, num_free);
   for (const Rigid3& pose : state_.poses) {
     GaugeMatrix by = GaugeMatrix::Zero();
-    by.topRows<3>() = moved_place(pose.translation - middle);
+    by.topRows<3>() = moved_place(pose.translation - centre);
     by.block<3, 3>(3, 3) = pose.rotation.toRotationMatrix().transpose();
     G.push_back(by.leftCols(num_free));
     W.push_back(G.back());
@@ -67,7 +67,7 @@ void PathSmoother::align(const SmootherSystem& system, const Eigen::MatrixXd& co
     if (!lives_[i]) continue;
     const Eigen::MatrixXd z = Z.points[i] + spread.point_J[i] * considered * given;
     spread.point_cov[i] =
-        aligned_cov(spread.point_cov[i], z, moved_place(state_.points[i] - middle).leftCols(num_free));
+        aligned_cov(spread.point_cov[i], z, moved_place(state_.points[i] - centre).leftCols(num_free));
   }
 }
 

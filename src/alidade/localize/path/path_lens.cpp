@@ -9,8 +9,8 @@
 namespace alidade {
 namespace {
 
-/// Those of a lens's numbers that are off where a camera file is of another lens, another setting, or another medium,
-/// and how far they may be.
+/// Those of a lens's parameters that are off where a camera file is of another lens, another setting, or another
+/// medium, and how far they may be.
 struct OpenParam {
   const char* name;
   double sigma;
@@ -53,7 +53,7 @@ void PathSmoother::free_lens() {
   links_.clear();
 }
 
-/// Whether the lens's numbers together explain of what is left over far more than chance would.
+/// Whether the lens's parameters together explain of what is left over far more than chance would.
 bool PathSmoother::asks_for_lens(const SmootherSystem& system) const {
   if (num_estimated_ > 0) return false;
   const std::vector<std::string> names = param_names(problem_.camera.lens);

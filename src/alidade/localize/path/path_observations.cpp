@@ -9,7 +9,8 @@
 
 namespace alidade {
 
-/// How the expected pixel changes by what is shared: the lens, then the causes (scale and shape by known places alone).
+/// How the expected pixel changes by what is shared: the lens, then the causes (scale and shape by known positions
+/// alone).
 PathSmoother::GivenRows PathSmoother::given_rows(const ExpectedView& view, const UsedObservation& observation,
                                                  const Twist& twist) const {
   const auto num_lens = view.J_px_lens.cols();
@@ -18,9 +19,9 @@ PathSmoother::GivenRows PathSmoother::given_rows(const ExpectedView& view, const
   const SmootherPoint& point = problem_.points[index_of_.at(observation.id)];
   if (point.given_in_world)  // a target that moves: not where it is given to be, but further by so much
     J.middleCols<3>(num_lens + speed_cause) =
-        (problem_.t_s[observation.frame] - middle_s_) * view.J_px_feature.leftCols<3>();
+        (problem_.t_s[observation.frame] - mid_s_) * view.J_px_feature.leftCols<3>();
   const double rows =
-      observation.px.y() / problem_.camera.height_px - 0.5;  // an image's time is that of its middle row
+      observation.px.y() / problem_.camera.height_px - 0.5;  // an image's time is that of its central row
   J.col(num_lens + readout_cause) = rows * view.J_px_pose * twist;
   return J;
 }
@@ -134,7 +135,7 @@ bool PathSmoother::add_observations(const SmootherState& state, std::size_t k, L
 
 /// Errors of a point that last from frame to frame as an autoregression of first order: what is new of each is as
 /// independent as it is small (D. Cochrane & G. Orcutt 1949). After a gap too long for the window an error begins
-/// anew, with no more weight than it has as one of a row.
+/// again, with no more weight than it has as one of a row.
 void PathSmoother::link_observations(double correlation) {
   std::map<long, std::size_t> last;
   links_.assign(observations_.size(), {});

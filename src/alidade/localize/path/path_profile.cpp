@@ -5,10 +5,10 @@
 
 #include "alidade/localize/path/path_system.h"
 
-// A flat target seen from one side hardly tells how it is tilted, and tells it differently as it is tilted more: the
-// posterior is a bent valley, of which the covariance at its lowest point knows one cut. So the least certain
-// combination of a pose's numbers is held three σ to each side, all else solved for again, and the cost compared with
-// the nine that it should have risen by (a profile likelihood: D. M. Bates & D. G. Watts, "Nonlinear Regression
+// A flat target seen from one side hardly determines its tilt, and does so differently as it is tilted more: the
+// posterior is a curved valley, of which the covariance at its lowest point knows one cut. So the least certain
+// combination of a pose's components is fixed three σ to each side, all else solved for again, and the cost compared
+// with the nine that it should have risen by (a profile likelihood: D. M. Bates & D. G. Watts, "Nonlinear Regression
 // Analysis", 1988, §6.1).
 
 namespace alidade {
@@ -23,57 +23,57 @@ Eigen::Vector<double, 6> right_perturbation(const Rigid3& from, const Rigid3& to
 
 }  // namespace
 
-void PathSmoother::add_held(const SmootherState& state, SmootherSystem& system) const {
-  const Rigid3& now = state.poses[held_->frame];
-  const Eigen::Vector<double, 6> xi = right_perturbation(held_->from, now);
+void PathSmoother::add_fixed(const SmootherState& state, SmootherSystem& system) const {
+  const Rigid3& now = state.poses[fixed_->frame];
+  const Eigen::Vector<double, 6> xi = right_perturbation(fixed_->from, now);
   Eigen::Matrix<double, 6, 6> J = Eigen::Matrix<double, 6, 6>::Zero();
-  J.topLeftCorner<3, 3>() = held_->from.rotation.toRotationMatrix().transpose();
+  J.topLeftCorner<3, 3>() = fixed_->from.rotation.toRotationMatrix().transpose();
   J.bottomRightCorner<3, 3>() = right_jacobian(xi.tail<3>()).inverse();
-  const Eigen::Vector<double, 6> by = J.transpose() * held_->weights / held_->sigma;
-  const double error = (held_->weights.dot(xi) - held_->value) / held_->sigma;
+  const Eigen::Vector<double, 6> by = J.transpose() * fixed_->weights / fixed_->sigma;
+  const double error = (fixed_->weights.dot(xi) - fixed_->value) / fixed_->sigma;
   system.chain.A.topLeftCorner<6, 6>() += by * by.transpose();
   system.chain.a.head<6>() -= by * error;
   system.cost += error * error;
 }
 
-/// The pose whose place is least certain, and of its numbers (lengths over the distance) the least certain combination.
-/// False where the path is certain enough for its cut to be straight.
-bool PathSmoother::hold_weakest(const SmoothedPath& path) {
+/// The pose whose position is least certain, and of its components (lengths over the distance) the least certain
+/// combination. False where the path is certain enough for its cut to be straight.
+bool PathSmoother::fix_weakest(const SmoothedPath& path) {
   constexpr double straight = 0.012;  // of the distance, and rad
-  Held held;
+  FixedCombination fixed;
   double max_m2 = 0.0;
   for (std::size_t k = 0; k < path.cov.size(); ++k) {
     const double variance_m2 = path.cov[k].topLeftCorner<3, 3>().trace();
     if (!(variance_m2 > max_m2)) continue;
     max_m2 = variance_m2;
-    held.frame = k;
+    fixed.frame = k;
   }
-  held.from = path.world_from_cam[held.frame];
-  const double distance_m = (held.from.translation - target_middle_).norm();
+  fixed.from = path.world_from_cam[fixed.frame];
+  const double distance_m = (fixed.from.translation - target_centre_).norm();
   Eigen::Vector<double, 6> scale = Eigen::Vector<double, 6>::Ones();
   scale.head<3>() /= distance_m;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(scale.asDiagonal() * path.cov[held.frame] *
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(scale.asDiagonal() * path.cov[fixed.frame] *
                                                                          scale.asDiagonal());
   const double sigma = std::sqrt(eigen.eigenvalues()[5]);
-  held.weights = scale.asDiagonal() * eigen.eigenvectors().col(5);
-  held.sigma = 0.02 * sigma;
-  held.value = sigma;
+  fixed.weights = scale.asDiagonal() * eigen.eigenvectors().col(5);
+  fixed.sigma = 0.02 * sigma;
+  fixed.value = sigma;
   if (!(sigma > straight)) return false;
-  held_ = held;
+  fixed_ = fixed;
   return true;
 }
 
 namespace {
 
-/// Whether the places of a path differ by little more than they are uncertain.
+/// Whether the positions of a path differ by little more than they are uncertain.
 bool is_from_one_place(const SmoothedPath& path) {
   constexpr double apart = 12.0;
   const double num = static_cast<double>(path.cov.size());
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const Rigid3& pose : path.world_from_cam) middle += pose.translation / num;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (const Rigid3& pose : path.world_from_cam) centre += pose.translation / num;
   double spread_m2 = 0.0, variance_m2 = 0.0;
   for (std::size_t k = 0; k < path.cov.size(); ++k) {
-    spread_m2 += (path.world_from_cam[k].translation - middle).squaredNorm() / num;
+    spread_m2 += (path.world_from_cam[k].translation - centre).squaredNorm() / num;
     variance_m2 += path.cov[k].topLeftCorner<3, 3>().trace() / num;
   }
   return spread_m2 < apart * apart * variance_m2;
@@ -82,22 +82,22 @@ bool is_from_one_place(const SmoothedPath& path) {
 }  // namespace
 
 void PathSmoother::widen(double min_cost, SmoothedPath& path) {
-  if (!hold_weakest(path)) return;
+  if (!fix_weakest(path)) return;
   path.is_from_one_place = is_from_one_place(path);
   constexpr double sides = 3.0, most = 4.0, little = 0.5;
   const SmootherState best = state_;
-  const double sigma = held_->value;
+  const double sigma = fixed_->value;
   std::optional<SmootherState> widest;
   double reached_there = 1.0;
   for (const double side : {sides, -sides}) {
     state_ = best;
-    held_->value = side * sigma;
+    fixed_->value = side * sigma;
     if (!settle()) continue;
-    const double reached = held_->weights.dot(right_perturbation(held_->from, state_.poses[held_->frame])) / sigma;
-    const Held held = *held_;
-    held_.reset();
+    const double reached = fixed_->weights.dot(right_perturbation(fixed_->from, state_.poses[fixed_->frame])) / sigma;
+    const FixedCombination fixed = *fixed_;
+    fixed_.reset();
     const auto there = build(state_, Shared::solved);
-    held_ = held;
+    fixed_ = fixed;
     if (!there) continue;
     const double rise = std::max(there->cost - min_cost, little);
     const double factor = std::min(std::abs(reached) / std::sqrt(rise), most);
@@ -106,7 +106,7 @@ void PathSmoother::widen(double min_cost, SmoothedPath& path) {
     widest = state_;
     reached_there = reached;
   }
-  held_.reset();
+  fixed_.reset();
   state_ = best;
   if (!widest) return;
   const double more = (path.widened * path.widened - 1.0) / (reached_there * reached_there);

@@ -10,7 +10,7 @@ namespace {
 struct PlacedView {
   Eigen::Vector2d residual_px;
   Eigen::Matrix<double, 2, 6> J;
-  double variance_px2 = 0.0;  ///< Of pixel and place, the mean of both coordinates.
+  double variance_px2 = 0.0;  ///< Of pixel and position, the mean of both coordinates.
 };
 
 std::optional<PlacedView> placed_view(const Camera& camera, const Rigid3& world_from_cam,
@@ -37,7 +37,7 @@ CameraResection judged(const Camera& camera, std::span<const PlacedObservation> 
   return resection;
 }
 
-/// One Gauss–Newton step with weights for residuals of `wide_px`. False where nothing tells it.
+/// One Gauss–Newton step with weights for residuals of `wide_px`. False where nothing determines it.
 bool stepped(const Camera& camera, std::span<const PlacedObservation> observations, double wide_px,
              Rigid3& world_from_cam) {
   Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();

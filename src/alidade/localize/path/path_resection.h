@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// An observation of a point whose place is known, with its covariance.
+/// An observation of a point whose position is known, with its covariance.
 struct PlacedObservation {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   double sigma_px = 0.5;
@@ -16,12 +16,12 @@ struct PlacedObservation {
   Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();
 };
 
-/// Where a camera is by observations of places, some of which may be mismatched.
+/// Where a camera is by observations of known positions, some of which may be mismatched.
 struct CameraResection {
   Rigid3 world_from_cam;
   double cost = 0.0;  ///< Squares over σ², of each observation at most the gate.
   std::size_t num_fit = 0;
-  std::vector<bool> fits;  ///< One an observation.
+  std::vector<bool> fits;  ///< One per observation.
 };
 
 /// From each of the poses to begin at, weights that fall with a residual (Geman & McClure 1985), wide at first, then

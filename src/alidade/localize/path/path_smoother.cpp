@@ -20,11 +20,11 @@ PathSmoother::PathSmoother(const SmootherProblem& problem) : problem_(problem) {
     index_of_[problem.points[i].id] = i;
     state_.points.push_back(problem.points[i].point_in_world);
     if (!problem.points[i].given_in_world) continue;
-    target_middle_ += *problem.points[i].given_in_world;
+    target_centre_ += *problem.points[i].given_in_world;
     num_given += 1.0;
   }
-  if (num_given > 0.0) target_middle_ /= num_given;
-  middle_s_ = 0.5 * (problem.t_s.front() + problem.t_s.back());
+  if (num_given > 0.0) target_centre_ /= num_given;
+  mid_s_ = 0.5 * (problem.t_s.front() + problem.t_s.back());
   state_.camera = problem.camera;
   state_.poses = problem.world_from_cam;
   given_lens_ = params(problem.camera.lens);
@@ -54,11 +54,11 @@ void PathSmoother::find_lives() {
     leaving_[lives_[i]->last].push_back(i);
     for (std::size_t k = lives_[i]->first; k <= lives_[i]->last; ++k) there_[k].push_back(i);
   }
-  most_at_once_ = 0;
+  max_at_once_ = 0;
   int num = 0;
   for (std::size_t k = 0; k < entering_.size(); ++k) {
     num += static_cast<int>(entering_[k].size());
-    most_at_once_ = std::max(most_at_once_, num);
+    max_at_once_ = std::max(max_at_once_, num);
     num -= static_cast<int>(leaving_[k].size());
   }
 }
@@ -176,8 +176,8 @@ void PathSmoother::fill_lens(const Eigen::MatrixXd& cov, SmoothedPath& path) con
   const Eigen::VectorXd now = params(state_.camera.lens);
   for (int i = 0; i < num_estimated_ && !is_lens_freed_; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    const double told = sigma_estimated_[at];
-    path.lens_pull = std::max(path.lens_pull, std::abs(now[lens_order_[at]] - given_lens_[lens_order_[at]]) / told);
+    const double sigma = sigma_estimated_[at];
+    path.lens_pull = std::max(path.lens_pull, std::abs(now[lens_order_[at]] - given_lens_[lens_order_[at]]) / sigma);
   }
 }
 
@@ -196,7 +196,7 @@ void PathSmoother::fill_map(std::span<const Eigen::Matrix3d> covs, SmoothedPath&
   path.chi2_per_dof /= std::max(num_numbers - num_solved, 0.5 * num_numbers + 1.0);
 }
 
-/// Times that are all late by the same move nothing that is seen: no observation tells.
+/// Times that are all late by the same move nothing that is seen: no observation shows it.
 void PathSmoother::add_clock(SmoothedPath& path) const {
   GivenNumber clock{.name = "clock"};
   for (std::size_t k = 0; k < state_.poses.size(); ++k) {

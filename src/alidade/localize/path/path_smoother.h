@@ -36,7 +36,7 @@ struct PlacedResidual {
   double sigma_px = 0.5;
 };
 
-/// What of a path's place in the world no measurement says: its covariance is that after the best alignment.
+/// What of a path's position in the world no measurement says: its covariance is that after the best alignment.
 enum class PathGauge {
   fixed,       ///< A start or known points say it.
   motion,      ///< Position and rotation: the first camera is the world.
@@ -52,7 +52,8 @@ struct SmootherProblem {
   std::vector<Rigid3> world_from_cam;         ///< To begin at.
   std::vector<UsedObservation> observations;  ///< In order of frames.
   std::vector<SmootherPoint> points;
-  std::optional<StartHypothesis> start;  ///< What was told of the first pose; else its speeds alone, zero with these σ:
+  std::optional<StartHypothesis>
+      start;  ///< What was given of the first pose; else its speeds alone, zero with these σ:
   double sigma_speed_m_s = 0.3, sigma_rate_rad_s = 0.3;
   double period_s = 1.0 / 30.0;  ///< Accelerations are drawn again for each.
   PathGauge gauge = PathGauge::fixed;
@@ -71,7 +72,7 @@ struct SmoothedPath {
   std::vector<Eigen::Matrix3d> point_covs;
   Camera camera;
   bool is_lens_freed = false;
-  std::vector<int> estimated;  ///< Of the lens's numbers,
+  std::vector<int> estimated;  ///< Of the lens's parameters,
   Eigen::VectorXd sigma_lens;  ///< and their σ.
   double lens_pull = 0.0;      ///< How far an estimated number of the lens is from what was given, in the given σ.
   std::vector<GivenNumber> given;
@@ -82,16 +83,17 @@ struct SmoothedPath {
   /// Along its least certain direction the cost rises more slowly to one side than to the other, or than σ says; σ is
   /// enlarged there by so much.
   double widened = 1.0;
-  /// The camera hardly moves aside, and so a pose's least certain numbers are less sure than a cut is straight: turns
-  /// and small moves look alike where depths are not known, and the posterior is no Gaussian.
+  /// The camera hardly moves aside, and so a pose's least certain components are less sure than a cut is straight:
+  /// turns and small moves look alike where depths are not known, and the posterior is no Gaussian.
   bool is_from_one_place = false;
   std::size_t num_dropped = 0;  ///< Observations that do not fit it.
 };
 
 /// All observations of a recording together: a filter's derivatives are those of its moment, when depths were vague,
 /// and what they say of the world's frame and scale differs from one to the next, so that certainty is gained that no
-/// observation gave. Here all are taken at one place, the solution. Gauss–Newton over poses, points and lens with the
-/// filter's own motion model; poses are eliminated one after another (pose_chain.h). None where it does not settle.
+/// observation gave. Here all are taken at one linearisation point, the solution. Gauss–Newton over poses, points and
+/// lens with the filter's own motion model; poses are eliminated one after another (pose_chain.h). None where it does
+/// not settle.
 [[nodiscard]] std::optional<SmoothedPath> smoothed_path(const SmootherProblem& problem);
 
 }  // namespace alidade

@@ -66,7 +66,7 @@ TEST(PoseChain, EliminatedPoseByPoseIsTheWholeMatrixInverted) {
   }
 }
 
-/// Points that enter late and leave early, and take each other's places, are as in the whole matrix, too.
+/// Points that enter late and leave early, and take each other's positions, are as in the whole matrix, too.
 TEST(PoseChain, PointsThatEnterAndLeaveAreTheWholeMatrixInverted) {
   struct Seen {
     int first, last;
@@ -153,8 +153,8 @@ double mean_nees(const Localization& report, const HoverRun& run) {
   return sum / static_cast<double>(report.path.size());
 }
 
-/// All told right, by a simulator with lenses of its own. A run's error is mostly one draw of six numbers, that of the
-/// frame by the target's points: a mean over 10 scatters by √(2/6/10) = 0.18.
+/// All given right, by a simulator with lenses of its own. A run's error is mostly one draw of six components, that of
+/// the frame by the target's points: a mean over 10 scatters by √(2/6/10) = 0.18.
 TEST(SimpleCase, ThePoseIsAsGoodAsItsCovarianceSays) {
   constexpr int num_seeds = 10;
   for (const HoverLens lens : {HoverLens::brown, HoverLens::fisheye, HoverLens::port}) {
@@ -171,7 +171,7 @@ TEST(SimpleCase, ThePoseIsAsGoodAsItsCovarianceSays) {
   }
 }
 
-/// The target alone says how large the world is. Accelerations four times as large as they are told to be make the path
+/// The target alone says how large the world is. Accelerations four times as large as given make the path
 /// shorter before its points by 0.3 %; counted in metres they made all of it smaller by 1.7 %.
 TEST(SimpleCase, AMotionTellsNothingOfTheWorldsSize) {
   const HoverRun run = testing::hovering({.num_frames = 300, .num_others = 12}, 6);

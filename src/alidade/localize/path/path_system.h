@@ -40,7 +40,7 @@ class PathSmoother {
   using WindowRows = Eigen::Matrix<double, 6, PoseChain::window>;
 
  private:
-  /// Of the shared numbers those that are solved for: the estimated part of the lens, which stands first.
+  /// Of the shared parameters those that are solved for: the estimated part of the lens, which stands first.
   [[nodiscard]] int num_solved() const { return num_estimated_; }
   static constexpr double well = 1e-3;
   [[nodiscard]] bool settle(double settled = well);
@@ -119,8 +119,8 @@ class PathSmoother {
   void align(const SmootherSystem& system, const Eigen::MatrixXd& considered, PoseChain::Spread& spread) const;
   /// path_profile.cpp.
   void widen(double min_cost, SmoothedPath& path);
-  [[nodiscard]] bool hold_weakest(const SmoothedPath& path);
-  void add_held(const SmootherState& state, SmootherSystem& system) const;
+  [[nodiscard]] bool fix_weakest(const SmoothedPath& path);
+  void add_fixed(const SmootherState& state, SmootherSystem& system) const;
   [[nodiscard]] SmoothedPath result(const SmootherSystem& system) const;
   [[nodiscard]] SmoothedPath finished(const SmootherSystem& system);
 
@@ -142,16 +142,16 @@ class PathSmoother {
   bool is_lens_freed_ = false;  ///< What was given of it contradicts the observations: estimated without it.
   static constexpr int lens_at_ = 0;
   int causes_at_ = 0;  ///< The target's scale and shape, its speed, and the image's readout: tested, not solved for.
-  Eigen::Vector3d target_middle_ = Eigen::Vector3d::Zero();
-  double middle_s_ = 0.0;
-  /// A combination of one pose's numbers that is held at a value while all else is solved for.
-  struct Held {
+  Eigen::Vector3d target_centre_ = Eigen::Vector3d::Zero();
+  double mid_s_ = 0.0;
+  /// A combination of one pose's components that is fixed at a value while all else is solved for.
+  struct FixedCombination {
     std::size_t frame = 0;
     Rigid3 from;
     Eigen::Vector<double, 6> weights;  ///< Of the right perturbation.
     double value = 0.0, sigma = 1.0;
   };
-  std::optional<Held> held_;
+  std::optional<FixedCombination> fixed_;
   Eigen::VectorXd given_lens_;
   SmootherState state_;
   /// The frames in which a point is in the equations, by its observations; none: it has no part in them.
@@ -160,7 +160,7 @@ class PathSmoother {
   };
   std::vector<std::optional<Life>> lives_;
   std::vector<std::vector<std::size_t>> entering_, leaving_, there_;  ///< Points, by frame.
-  int most_at_once_ = 0;
+  int max_at_once_ = 0;
 };
 
 }  // namespace alidade

@@ -132,7 +132,7 @@ PoseChain::Steps PoseChain::steps(const Eigen::VectorXd& shared) const {
 }
 
 /// What is left of right-hand sides as poses and points leave, in the order in which they did: y of each step, and of
-/// the border what belongs to the shared numbers.
+/// the border what belongs to the shared parameters.
 std::vector<Eigen::MatrixXd> PoseChain::forward(const std::vector<Eigen::MatrixXd>& W, Eigen::MatrixXd& border) const {
   const Eigen::Index num_columns = W.front().cols();
   border = Eigen::MatrixXd::Zero(B.rows(), num_columns);

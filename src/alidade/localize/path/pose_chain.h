@@ -6,7 +6,7 @@
 namespace alidade {
 
 /// Normal equations of poses in a row, of which each shares factors with the two after it; of points, each of which is
-/// seen from some of them; and of numbers that all share (a lens): the border. Poses are added in order and leave at
+/// seen from some of them; and of parameters that all share (a lens): the border. Poses are added in order and leave at
 /// once, by Cholesky's elimination; a point enters before its first factor and leaves after its last pose has left. So
 /// memory and time grow with the number of poses, and with the square of the points that are there at once. T. Barfoot,
 /// "State Estimation for Robotics", 2017, §9.2: the arrowhead of bundle adjustment, with a motion's chain; what leaves
@@ -14,13 +14,13 @@ namespace alidade {
 /// Sparse Symmetric Linear Equations", 1983.
 class PoseChain {
  public:
-  static constexpr int pose_dim = 6, window = 18;  ///< Numbers of a pose; of it and the two after it.
+  static constexpr int pose_dim = 6, window = 18;  ///< Components of a pose; of it and the two after it.
 
   /// Room for so many points at once.
   explicit PoseChain(int num_shared, int num_points = 0);
 
   /// Information of the pose that is next to leave, the two after it, and the border (what all share, then a place of
-  /// three numbers for each point): J^T J and J^T r are added to these by whoever has factors. Of symmetric ones the
+  /// three components for each point): J^T J and J^T r are added to these by whoever has factors. Of symmetric ones the
   /// lower half counts.
   Eigen::Matrix<double, window, window> A;
   Eigen::Matrix<double, window, Eigen::Dynamic> U;  ///< Window by border.
@@ -30,24 +30,24 @@ class PoseChain {
 
   /// Where in the border a point stands that enters. Points are counted from none, in any order.
   int enter(std::size_t point);
-  /// False where nothing tells its place.
+  /// False where nothing determines its position.
   [[nodiscard]] bool leave(std::size_t point);
   [[nodiscard]] int place_of(std::size_t point) const { return place_of_[point]; }
-  /// The first pose of the window leaves. False where nothing tells it.
+  /// The first pose of the window leaves. False where nothing determines it.
   [[nodiscard]] bool eliminate();
 
   /// Σ |L⁻¹ a|² of those that have left: what their steps gain in cost.
   [[nodiscard]] double gain() const;
 
-  /// With the shared numbers at `shared`: every pose's step, and every point's, in order.
+  /// With the shared parameters at `shared`: every pose's step, and every point's, in order.
   struct Steps {
     std::vector<Eigen::Vector<double, pose_dim>> poses;
     std::vector<Eigen::Vector3d> points;
   };
   [[nodiscard]] Steps steps(const Eigen::VectorXd& shared) const;
 
-  /// Covariance of each pose and point where that of the shared numbers is `shared_cov`, and how each pose moves with
-  /// these of the shared numbers (`J_shared`: how they themselves move with them).
+  /// Covariance of each pose and point where that of the shared parameters is `shared_cov`, and how each pose moves
+  /// with these of the shared parameters (`J_shared`: how they themselves move with them).
   struct Spread {
     std::vector<Eigen::Matrix<double, pose_dim, pose_dim>> cov;
     std::vector<Eigen::Matrix<double, pose_dim, Eigen::Dynamic>> J;
@@ -57,7 +57,7 @@ class PoseChain {
   [[nodiscard]] Spread spread(const Eigen::MatrixXd& shared_cov, const Eigen::MatrixXd& J_shared) const;
 
   /// Σ W: the covariance of all poses and points with sums over the poses, W having six rows for each; the first
-  /// `num_solved` of the shared numbers are solved for, too, the others fixed.
+  /// `num_solved` of the shared parameters are solved for, too, the others fixed.
   struct Columns {
     std::vector<Eigen::MatrixXd> poses, points;
   };

@@ -111,7 +111,7 @@ Similarity operator*(const Similarity& second, const Similarity& first) {
 
 std::optional<SimilarityGraph> settled_graph(std::vector<Similarity> world_from_keyframe,
                                              std::span<const SimilarityEdge> edges) {
-  constexpr double fits = 30.0, relaxed = 1.6, settled = 1e-6;  // χ² of seven numbers: 99.99 %
+  constexpr double fits = 30.0, relaxed = 1.6, settled = 1e-6;  // χ² of seven components: 99.99 %
   constexpr int max_steps = 80;
   SimilarityGraph graph{std::move(world_from_keyframe), std::vector<bool>(edges.size(), true)};
   if (graph.world_from_keyframe.size() < 2) return graph;

@@ -19,7 +19,7 @@ struct SimilarityEdge {
 /// Keyframes with their loops closed, and which edges hold.
 struct SimilarityGraph {
   std::vector<Similarity> world_from_keyframe;
-  std::vector<bool> holds;  ///< One an edge.
+  std::vector<bool> holds;  ///< One per edge.
 };
 
 /// Of keyframes along a path whose position, rotation and scale drift (H. Strasdat et al., "Scale Drift-Aware Large

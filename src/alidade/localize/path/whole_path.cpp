@@ -5,13 +5,14 @@
 
 #include "alidade/localize/checks/scale_readings.h"
 #include "alidade/localize/checks/summary.h"
-#include "alidade/localize/path/left_out_points.h"
 #include "alidade/localize/path/loop_closure.h"
+#include "alidade/localize/path/remaining_points.h"
 
 namespace alidade {
 namespace {
 
-/// What of each frame fits the smoothed path: frames that the filter had lost may be held by their observations there.
+/// What of each frame fits the smoothed path: frames that the filter had lost may be determined by their observations
+/// there.
 void judge_frames(const SmoothedPath& smoothed, std::size_t first_frame, std::span<const ObservationFrame> frames,
                   Localization& result) {
   std::vector<std::size_t> num_fit(result.path.size(), 0);
@@ -133,8 +134,8 @@ void take_over(const std::optional<WholePath>& whole, const Recording& recording
     point.point_in_world *= whole->scale;
     point.cov *= whole->scale * whole->scale;
   }
-  place_left_out(whole->smoothed, whole->first_frame, recording.frames.frames(), config.filter.sigma_px,
-                 config.filter.gate, result.map);
+  locate_remaining(whole->smoothed, whole->first_frame, recording.frames.frames(), config.filter.sigma_px,
+                   config.filter.gate, result.map);
   take_over(whole->smoothed, result);
 }
 

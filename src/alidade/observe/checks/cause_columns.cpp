@@ -120,7 +120,7 @@ void CauseColumns::add_lever() {
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
     return times[static_cast<std::size_t>(a)] > times[static_cast<std::size_t>(b)];
   });
-  // The first has the common one: only what the others have beside it can be told apart from that.
+  // The first has the common one: only what the others have beside it can be separated from that.
   for (std::size_t i = 1; i < order.size() && i <= max_lever_points; ++i) {
     lever_column_[static_cast<std::size_t>(order[i])] = size();
     add("lever", "z over distance, a point's own", usual_parallax_rad, "rad");
@@ -142,14 +142,14 @@ void CauseColumns::begin_frame(int frame) {
   view_.emplace(camera, now);
   const Eigen::Matrix3d cam_from_mount = camera.cam_from_mount.toRotationMatrix();
   mount_from_cam_ = cam_from_mount.transpose();
-  // The log's rotation is the mount's, from where it began; the camera turned on it then as it does now.
+  // The log's rotation is the mount's, from where it began; the camera rotated on it then as it does now.
   const Eigen::Matrix3d mount_from_begin = now.cam_from_start.toRotationMatrix(), begin_from_start = mount_from_cam_;
   cam_from_start_ = cam_from_mount * mount_from_begin * begin_from_start;
 }
 
 void CauseColumns::fill_lens(const Eigen::Vector3d& in_cam, Eigen::Ref<Eigen::MatrixXd> out) const {
   const Eigen::Vector4d k = reference_.solution.camera.k_at(frame_time_s_);
-  // Given the bent point, all five are linear.
+  // Given the distorted point, all five are linear.
   const double x = in_cam.x() / in_cam.z(), y = in_cam.y() / in_cam.z(), r2 = x * x + y * y;
   const Eigen::Vector2d radial(k[0] * x * r2, k[1] * y * r2);
   out.col(first_k1_) = radial;
@@ -172,17 +172,17 @@ bool CauseColumns::at(const BundleObservation& seen, RotationPrediction& p, Eige
   if (first_delay_ >= 0) by_causes.col(first_delay_) = wide.J_px_common.col(wide_.delay);
   if (shutter_ >= 0) by_causes.col(shutter_) = wide.J_px_common.col(wide_.delay) * (seen.px.y() / height_);
   const auto& frames = reference_.bundle.frames;
-  const double middle_s = 0.5 * (frames.front().t_s + frames.back().t_s);
+  const double mid_s = 0.5 * (frames.front().t_s + frames.back().t_s);
   if (drift_ >= 0)
     by_causes.col(drift_) =
-        (frames[static_cast<std::size_t>(frame_)].t_s - middle_s) * (p.px - reference_.solution.camera.k.tail<2>());
+        (frames[static_cast<std::size_t>(frame_)].t_s - mid_s) * (p.px - reference_.solution.camera.k.tail<2>());
   const double elapsed = frames[static_cast<std::size_t>(frame_)].t_s - frames.front().t_s;
   const double phase = std::numbers::pi * elapsed / std::max(frames.back().t_s - frames.front().t_s, 1e-9);
   for (int wave = 0; wave < num_waves; ++wave) {
     by_causes.col(first_zoom_ + wave) = std::cos((wave + 1) * phase) * (p.px - reference_.solution.camera.k.tail<2>());
   }
   if (first_lever_ >= 0) {
-    // A pixel feels a shift v of its ray as the turn ray × v / |ray|².
+    // A pixel feels a shift v of its ray as the rotation ray × v / |ray|².
     const Eigen::Vector3d turned = mount_from_cam_ * in_cam;
     const Eigen::Matrix3d shift = mount_from_cam_ * (cam_from_start_ - Eigen::Matrix3d::Identity());
     const Eigen::Matrix<double, 2, 3> by_lever = by_turn * (cross_matrix(turned) * shift) / in_cam.squaredNorm();

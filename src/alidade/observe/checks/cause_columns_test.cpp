@@ -19,7 +19,7 @@ std::vector<RotationFrame> frames_read(const RotationLog& log) {
   return frames;
 }
 
-/// A camera with a lens, askew, that turns with a head; three points in every tenth frame.
+/// A camera with a lens, askew, that rotates with a head; three points in every tenth frame.
 struct Turning {
   RotationLog log;
   Adjustment reference;
@@ -160,12 +160,12 @@ TEST(CauseColumns, OfTheRotationAreTheDerivatives) {
                       of_angles(axis, [](double a, double) { return std::sin(2.0 * a); }), nearly);
   }
   // The paper's sway at another time; the ends of the log keep theirs.
-  const double middle_s = 0.5 * turning.log.rows.back().t_s;
+  const double mid_s = 0.5 * turning.log.rows.back().t_s;
   const auto by_clock = [&](const BundleObservation& seen, double amount) {
     RotationLog log = turning.log;
     for (std::size_t k = 1; k + 1 < log.rows.size(); ++k) {
       RotationRow& row = log.rows[k];
-      row.pan_tilt_roll_rad.head<2>() = paper_pan_tilt(row.t_s + amount * (row.t_s - middle_s), 0.0).head<2>();
+      row.pan_tilt_roll_rad.head<2>() = paper_pan_tilt(row.t_s + amount * (row.t_s - mid_s), 0.0).head<2>();
     }
     return turning.px_by(turning.reference.solution.camera, frames_read(log), seen.frame, seen.point, 0.0);
   };

@@ -146,7 +146,7 @@ CauseScore Linearisation::score_of(const CauseColumns::Group& group) const {
   double chi2 = -s.dot(value) / effect;
   const double explained = chi2;
   if (effect > estimated_effect) {
-    // A design effect told by few blocks is unsure itself: of Hotelling's statistic, the χ² that is as rare.
+    // A design effect estimated from few blocks is uncertain itself: of Hotelling's statistic, the χ² that is as rare.
     constexpr double dof = num_blocks - 1.0;
     chi2 = dof * std::log1p(std::max(chi2, 0.0) / dof);
   }

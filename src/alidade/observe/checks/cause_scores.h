@@ -9,8 +9,9 @@ namespace alidade {
 struct CauseMember {
   std::string name;  ///< "k1", "of pan"
   std::string unit;
-  double value = 0.0, sigma = 0.0;  ///< What the residuals ask for, and how well they tell it; σ counts shared errors.
-  CommonVector moves;               ///< Of the estimated parameters, normalised, if it were one unit.
+  double value = 0.0,
+         sigma = 0.0;  ///< What the residuals ask for, and how well they determine it; σ counts shared errors.
+  CommonVector moves;  ///< Of the estimated parameters, normalised, if it were one unit.
 };
 
 /// Something that is taken as exact and may not be: would the residuals gain by more than chance if it were free?
@@ -36,7 +37,7 @@ struct CauseConfig {
 /// share errors in time χ² is divided by their design effect in the cause's own directions, taken after its step:
 /// a cause does not hide behind the scatter that it makes. Tested: k1, k2, k3, p1 and p2, the lens whole; mount, delay,
 /// line time of a rolling shutter, lever arm (one parallax for all points, and each point's own along the view), a
-/// focal length that drifts, and the patterns of the log's rotation. Not for bundles with turns.
+/// focal length that drifts, and the patterns of the log's rotation. Not for bundles with free rotations.
 /// Rao 1948; docs/maths/rotating-camera.md.
 [[nodiscard]] std::vector<CauseScore> cause_scores(const RotationLog& log, const Adjustment& reference,
                                                    const CauseConfig& config);

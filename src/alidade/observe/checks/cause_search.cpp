@@ -133,10 +133,10 @@ double noise_of(const RotationLog& log, const ObserveSetup& config, const Observ
   adjust_with.prior = said_prior(config, adjust_with.start);
   if (!config.start) adjust_with.other_starts = {2.5};
   const Adjustment adjustment = adjust(buffer, adjust_with, progress);
-  const std::size_t seen = adjustment.num_left_out + adjustment.bundle.observations.size();
-  constexpr double max_left_out = 0.4;  // beyond it no verdict stands
+  const std::size_t seen = adjustment.num_rejected + adjustment.bundle.observations.size();
+  constexpr double max_rejected = 0.4;  // beyond it no verdict stands
   if (!adjustment.has_value ||
-      static_cast<double>(adjustment.num_left_out) > max_left_out * static_cast<double>(seen)) {
+      static_cast<double>(adjustment.num_rejected) > max_rejected * static_cast<double>(seen)) {
     return std::numeric_limits<double>::infinity();
   }
   return adjustment.sigma_px * report.scale.scale;
@@ -196,7 +196,7 @@ bool has_no_rest(const RotationLog& log, const ObserveSetup& config, const Obser
     AdjustConfig zooming = still;
     zooming.nuisances.drift = true;
     const Adjustment one = adjust(buffer, still, progress), changing = adjust(buffer, zooming, progress);
-    if (!one.has_value || !changing.has_value) continue;  // a second that tells nothing
+    if (!one.has_value || !changing.has_value) continue;  // a second that determines nothing
     ++judged;
     const bool is_better = changing.sigma_px < clearly * one.sigma_px;
     unsteady += is_better && std::abs(changing.solution.camera.drift_per_s) > slowest_per_s ? 1 : 0;

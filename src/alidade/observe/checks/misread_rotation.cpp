@@ -63,7 +63,7 @@ constexpr std::size_t max_frames = 150;
 /// Noise [px] with which the log is explained, by the rows of its first seconds, thinned; infinite: not at all.
 struct Explanation {
   double noise_px = std::numeric_limits<double>::infinity();
-  bool tells = false;  ///< The focal lengths, too: what tells nothing is explained by any reading.
+  bool tells = false;  ///< The focal lengths, too: what determines nothing is explained by any reading.
 };
 
 Explanation explanation_of(const RotationLog& log, const ObserveSetup& config, const PixelScale& scale,
@@ -92,9 +92,9 @@ Explanation explanation_of(const RotationLog& log, const ObserveSetup& config, c
   return {adjustment.solution.rms_px * scale.scale, tells};
 }
 
-/// Turns so small, or about one axis only, tell nothing however they are read.
+/// Turns so small, or about one axis only, determine nothing however they are read.
 bool turns_can_tell(const ObserveMotion& motion) {
-  constexpr double min_rad = 3.0 * degree, little = 0.02;  // of the largest: an axis that did not turn
+  constexpr double min_rad = 3.0 * degree, little = 0.02;  // of the largest: an axis that did not rotate
   return motion.span_rad >= min_rad && motion.path_rad.head<2>().minCoeff() >= little * motion.path_rad.maxCoeff();
 }
 
@@ -107,7 +107,7 @@ bool may_be_misread(const ObserveSolution& report) {
   const bool has_answer = report.status == Status::ok || report.status == Status::too_few_data;
   if (!has_answer) return turns_can_tell(report.motion);
   if (std::ranges::any_of(report.causes, [](const CauseScore& cause) { return cause.z >= ask_beyond; })) return true;
-  // What is freed until nothing is asked for may tell nothing any more.
+  // What is freed until nothing is asked for may determine nothing any more.
   constexpr double vague = 0.05;
   for (const std::size_t axis : {0U, 1U})
     if (report.status == Status::ok && report.quantities[axis].sigma > vague * report.quantities[axis].value)

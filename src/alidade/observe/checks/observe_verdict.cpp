@@ -13,7 +13,7 @@ namespace {
 
 constexpr double fine = 0.003;  // σ over the focal length of a converged estimate
 
-/// Why the log cannot tell, in the words of who turned the camera; and what to add.
+/// What the log does not determine and why, for who rotated the camera; and what to add.
 struct Reason {
   std::string name, what, add;
 };
@@ -27,11 +27,11 @@ std::optional<double> field_rad(const ObserveSolution& report) {
   return 2.0 * std::atan(0.5 * std::max(report.width_px, report.height_px) / f.value);
 }
 
-/// A view through a long lens: its parts all turn alike, wherever the axis meets the image.
+/// A view through a long lens: its parts all rotate alike, wherever the axis meets the image.
 std::optional<Reason> narrow_field(const ObserveSolution& report, const ObserveSetup& config) {
-  constexpr double least_share = 0.2;
+  constexpr double min_share = 0.2;
   const std::optional<double> field = field_rad(report);
-  if (!field || config.fixed_centre || report.motion.span_rad < least_share * *field) return std::nullopt;
+  if (!field || config.fixed_centre || report.motion.span_rad < min_share * *field) return std::nullopt;
   return Reason{"narrow field",
                 "a field of " + text_of(*field / degree, 2) + "° is too narrow for a rotation of " +
                     text_of(report.motion.span_rad / degree, 2) + "° to determine cx and cy",
@@ -42,14 +42,14 @@ std::optional<Reason> narrow_field(const ObserveSolution& report, const ObserveS
 Reason reason_of(const ObserveSolution& report, const RotationLog& log, const ObserveSetup& config) {
   const Eigen::Vector3d& path = report.motion.path_rad;  // about x: tilt; y: pan; z: roll
   const double most = path.maxCoeff();
-  constexpr double little = 0.02;  // of the largest: an axis that did not turn
+  constexpr double little = 0.02;  // of the largest: an axis that did not rotate
   if (log.num_points == 0 || report.rows_used < 3) {
     return {"too few points", "too few points: " + std::to_string(report.rows_used) + " rows see any",
             "track at least one point through the rotation, better four"};
   }
   if (most < 0.2 * degree) return {"no motion", "the camera does not turn", "pan and tilt it by 5° or more"};
   if (path.y() < little * most && path.x() < little * most) {
-    return {"roll only", "roll only: neither fx nor fy can be told", "pan and tilt the camera"};
+    return {"roll only", "roll only: fx and fy cannot be determined", "pan and tilt the camera"};
   }
   if (path.x() < little * path.y()) {
     return {"pan only", "pan only: fy cannot be determined", "tilt the camera as well"};
@@ -122,7 +122,7 @@ void add_checks(const ObserveSolution& report, Verdict& verdict) {
                               report.nis_per_dof, 2.0, "", "nis"});
   }
   for (const Check& check : residual_checks(report)) verdict.checks.push_back(check);
-  verdict.checks.insert(verdict.checks.end(), report.told_apart.begin(), report.told_apart.end());
+  verdict.checks.insert(verdict.checks.end(), report.side_checks.begin(), report.side_checks.end());
   if (report.gramian_lambda_min >= 0.0) {
     const double lambda = report.gramian_lambda_min;
     const State state = lambda < fang_refuse_lambda ? State::refused
@@ -155,7 +155,7 @@ Verdict fang_refusal(const ObserveSolution& report, const RotationLog& log, cons
   return verdict;
 }
 
-/// A lens looks at about the middle of its image: images of another size than the one given, or cropped, it does not.
+/// A lens looks at about the centre of its image: images of another size than the one given, or cropped, it does not.
 void add_size_check(const ObserveSolution& report, const ObserveSetup& config, Verdict& verdict) {
   constexpr double most = 0.1, clearly = 5.0;
   if (config.width_px <= 0 || config.fixed_centre) return;
@@ -167,14 +167,14 @@ void add_size_check(const ObserveSolution& report, const ObserveSetup& config, V
     if (std::abs(away) < clearly * centre.sigma || std::abs(away) / size < off) continue;
     off = std::abs(away) / size;
     where = centre.name + " is " + text_of(100.0 * off, 2) + " % of the " + (axis == 0 ? "width" : "height") +
-            " from the middle of a " + std::to_string(config.width_px) + "x" + std::to_string(config.height_px) +
+            " from the centre of a " + std::to_string(config.width_px) + "x" + std::to_string(config.height_px) +
             " image";
   }
   const bool is_far = off > most;
   verdict.checks.push_back({.name = "image size",
                             .state = is_far ? State::care : State::good,
                             .text = is_far ? where + ": are the pixels of images of that size, and not cropped?"
-                                           : "the principal point is near the middle of the image",
+                                           : "the principal point is near the image centre",
                             .value = 100.0 * off,
                             .limit = 100.0 * most,
                             .unit = "%"});
@@ -221,7 +221,7 @@ Verdict observe_verdict(const ObserveSolution& report, const RotationLog& log, c
                    ExitCode::cannot_tell);
   }
   if (report.status == Status::no_convergence) {
-    // An adjustment that finds no bottom, on a log that could not tell anyway.
+    // An adjustment that finds no bottom, on a log that is degenerate anyway.
     const Reason reason = reason_of(report, log, config);
     if (reason.name != "weak motion") {
       return refusal(reason.what, reason.add, ExitCode::cannot_tell);

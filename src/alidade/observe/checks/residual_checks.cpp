@@ -9,7 +9,7 @@ namespace alidade {
 namespace {
 
 constexpr double max_ordinary_px = 2.0, max_possible_px = 6.0;  // noise of a point finder
-constexpr double many_left_out = 0.2, max_left_out = 0.4;       // share of what was seen
+constexpr double many_rejected = 0.2, max_rejected = 0.4;       // share of what was seen
 constexpr double moves_beyond = 4.0;                            // of a track's residuals over the others' median
 
 /// Asked for, the one that explains best first.
@@ -54,14 +54,14 @@ Check noise_check(const ObserveSolution& report) {
   return check;
 }
 
-Check left_out_check(const ObserveSolution& report) {
+Check rejected_check(const ObserveSolution& report) {
   const auto out = static_cast<double>(report.pixels_rejected);
   const double all = out + static_cast<double>(report.reference.bundle.observations.size());
-  Check check{"rejected", State::good, "", all > 0.0 ? 100.0 * out / all : 0.0, 100.0 * many_left_out,
+  Check check{"rejected", State::good, "", all > 0.0 ? 100.0 * out / all : 0.0, 100.0 * many_rejected,
               "%",        "residuals"};
   check.text = text_of(check.value, 2) + " % of the pixels were rejected";
-  if (check.value > 100.0 * many_left_out) {
-    check.state = check.value > 100.0 * max_left_out ? State::bad : State::care;
+  if (check.value > 100.0 * many_rejected) {
+    check.state = check.value > 100.0 * max_rejected ? State::bad : State::care;
     check.text += ": points move, or are taken for each other";
   }
   return check;
@@ -129,7 +129,7 @@ Check lasting_check(const ObserveSolution& report) {
   return check;
 }
 
-/// Do the residuals of a frame turn together? An encoder's or a gyroscope's noise, which every row has again.
+/// Do the residuals of a frame rotate together? An encoder's or a gyroscope's noise, which every row has again.
 Check jitter_check(const ObserveSolution& report) {
   constexpr double more_than_pixels = 3.0;
   const TurnJitter& jitter = report.jitter;
@@ -216,7 +216,7 @@ std::vector<Check> residual_checks(const ObserveSolution& report) {
   }
   checks.push_back(noise_check(report));
   if (!report.causes.empty()) checks.push_back(jitter_check(report));
-  checks.push_back(left_out_check(report));
+  checks.push_back(rejected_check(report));
   if (!report.reference.bundle_point_of.empty() && !report.causes.empty()) checks.push_back(points_check(report));
   if (report.from_reference > 0.0) checks.push_back(reference_check(report));
   return checks;

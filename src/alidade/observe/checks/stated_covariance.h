@@ -8,7 +8,7 @@ namespace alidade {
 /// Covariance of an adjustment whose residuals share errors, in time (blur, a late clock, noise of the angles) and
 /// along the track of a point, and why it differs from the model's.
 struct StatedCovariance {
-  CommonMatrix cov;           ///< Of the common parameters, normalised; nowhere below the model's.
+  CommonMatrix cov;           ///< Of the shared parameters, normalised; nowhere below the model's.
   CommonMatrix lasting;       ///< What it would be if errors of a track last as they were seen to, and nothing else.
   Eigen::VectorXd inflation;  ///< σ over the model's.
   ClusterCovariance blocks;   ///< Blocks of time.
@@ -18,7 +18,7 @@ struct StatedCovariance {
 };
 
 /// Cluster-robust covariance both ways, in time and along tracks. What lasts along the tracks is counted
-/// by its correlation, which all tracks together tell well (Newey & West 1987, with an exponential kernel that is
+/// by its correlation, which all tracks together determine well (Newey & West 1987, with an exponential kernel that is
 /// fitted); blocks of time, as long as five times that correlation where at least six fit, add what scatters beyond it.
 /// Tracks count where their scatter is beyond chance (three of its σ): a few of them say little. Not for bundles with
 /// turns: the model's covariance comes back. Cameron, Gelbach & Miller, J. Bus. Econ. Stat. 29(2), 2011.

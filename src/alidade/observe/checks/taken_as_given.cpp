@@ -14,11 +14,11 @@ constexpr const char* const quantity_names[] = {"fx", "fy", "cx", "cy"};
 struct Given {
   std::string cause;
   double ordinary;
-  std::optional<double> ObserveSetup::*told;
+  std::optional<double> ObserveSetup::*config_sigma;
   const char* remedy;
-  bool is_counted = false;  ///< Where no σ is told: as it ordinarily is, less what the residuals say.
+  bool is_counted = false;  ///< Where no σ is given: as it ordinarily is, less what the residuals say.
   double as_scale = 0.0;    ///< σ of the scale of the rotation that one unit of it is, over the angles of a log.
-  double least = 0.0;  ///< No instrument is known better: where less is told, this is what the residuals are asked.
+  double least = 0.0;       ///< No instrument is known better: where less is given, the residuals are asked for this.
 };
 
 constexpr double ordinary_scale = 0.005, ordinary_mount_rad = 0.5 * degree, ordinary_delay_s = 0.01,
@@ -34,7 +34,7 @@ const std::vector<Given>& givens() {
       {"encoder scale", ordinary_scale, &ObserveSetup::sigma_scale, "give --sigma-encoder-scale"},
       {.cause = "scale of the rates",
        .ordinary = ordinary_scale,
-       .told = &ObserveSetup::sigma_scale,
+       .config_sigma = &ObserveSetup::sigma_scale,
        .remedy = "give --sigma-encoder-scale",
        .least = bend_of_rates},
       {"lever", ordinary_parallax, &ObserveSetup::sigma_parallax,
@@ -53,9 +53,9 @@ bool is_exact(const RotationLog& log) {
 }
 
 std::optional<double> given_sigma(const Given& given, const RotationLog& log, const ObserveSetup& config) {
-  if (given.told != nullptr && config.*given.told) return config.*given.told;
-  if (given.told == &ObserveSetup::sigma_scale) return log.sigma_scale;
-  if (given.told == &ObserveSetup::sigma_parallax) return log.sigma_parallax;
+  if (given.config_sigma != nullptr && config.*given.config_sigma) return config.*given.config_sigma;
+  if (given.config_sigma == &ObserveSetup::sigma_scale) return log.sigma_scale;
+  if (given.config_sigma == &ObserveSetup::sigma_parallax) return log.sigma_parallax;
   return is_exact(log) ? std::optional(0.0) : std::nullopt;
 }
 
@@ -80,7 +80,7 @@ void fill_effect(const Eigen::Vector4d& move, const Eigen::Vector4d& sigma, doub
   assumption.moved_by = std::abs(move[worst]) * scale;
 }
 
-/// A lever shows as one parallax along the view that all points have: what only some have, the residuals tell.
+/// A lever shows as one parallax along the view that all points have: what only some have, the residuals show.
 std::size_t first_member(const std::string& cause) { return cause == "lever" ? 2 : 0; }
 std::size_t end_member(const CauseScore& cause) {
   return cause.name == "lever" ? std::min<std::size_t>(3, cause.members.size()) : cause.members.size();
@@ -116,9 +116,9 @@ void count_asked(const ObserveSolution& report, CommonMatrix& cov) {
   }
 }
 
-/// fx and fy follow a centre that is held where it is not.
-void add_held_centre(const ObserveSetup& config, const ObserveSolution& report, const Eigen::Vector4d& sigma,
-                     std::vector<Assumption>& assumed) {
+/// fx and fy follow a centre that is fixed where it is not.
+void add_fixed_centre(const ObserveSetup& config, const ObserveSolution& report, const Eigen::Vector4d& sigma,
+                      std::vector<Assumption>& assumed) {
   if (!config.fixed_centre) return;
   const CommonMatrix& information = report.reference.solution.information;
   const CommonMatrix& said = report.reference.solution.said_information;
@@ -128,7 +128,7 @@ void add_held_centre(const ObserveSetup& config, const ObserveSolution& report, 
     Eigen::Vector4d move = Eigen::Vector4d::Zero();
     move.head<2>() = free.ldlt().solve(pull);
     Assumption assumption{
-        .name = axis == 0 ? "cx held" : "cy held",
+        .name = axis == 0 ? "cx fixed" : "cy fixed",
         .value = report.quantities.empty() ? not_seen : report.quantities[2 + static_cast<std::size_t>(axis)].value,
         .ordinary = ordinary_centre_px,
         .remedy = "calibrate with a board, or measure the rotation: then the centre need not be fixed"};
@@ -176,7 +176,7 @@ std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveSetu
   for (const Effect& effect : effects) {
     fill_effect(effect.move, stated, report.scale.scale, assumed[effect.assumption]);
   }
-  add_held_centre(config, report, stated, assumed);
+  add_fixed_centre(config, report, stated, assumed);
   return assumed;
 }
 

@@ -52,7 +52,7 @@ void undo_backlash(Rows rows, Eigen::Index axis, double width) {
     way = angle > first ? 1.0 : -1.0;
     break;
   }
-  double camera = first - half * way;  // it had been turning before the log began
+  double camera = first - half * way;  // it had been rotating before the log began
   for (RotationRow& row : rows) {
     double& angle = row.pan_tilt_roll_rad[axis];
     if (!std::isfinite(angle)) continue;
@@ -70,16 +70,16 @@ Eigen::Vector3d later(const Eigen::Vector3d& before, const Eigen::Vector3d& now,
 }
 
 /// The clock that the rotation is read by goes at another rate than the images': of a row's rotation the one that was
-/// measured so much later for each second since the middle of the log, and of rates as much more: a turn is what its
+/// measured so much later for each second since the midpoint of the log, and of rates as much more: a turn is what its
 /// time makes of it. The first and the last row keep their time.
 void undo_clock_rate(Rows rows, double amount) {
   for (RotationRow& row : rows) row.rate_rad_per_s *= 1.0 + amount;
   if (rows.size() < 3) return;
   const std::vector<RotationRow> as_read(rows.begin(), rows.end());
-  const double middle_s = 0.5 * (as_read.front().t_s + as_read.back().t_s);
+  const double mid_s = 0.5 * (as_read.front().t_s + as_read.back().t_s);
   for (std::size_t k = 1; k + 1 < rows.size(); ++k) {
     const RotationRow &before = as_read[k - 1], &now = as_read[k], &after = as_read[k + 1];
-    const double h0 = now.t_s - before.t_s, h = after.t_s - now.t_s, late_s = amount * (now.t_s - middle_s);
+    const double h0 = now.t_s - before.t_s, h = after.t_s - now.t_s, late_s = amount * (now.t_s - mid_s);
     if (!(h0 > 0.0) || !(h > 0.0)) continue;
     const auto shift = [&](Eigen::Vector3d RotationRow::*value) {
       const Eigen::Vector3d shifted = later(before.*value, now.*value, after.*value, h0, h, late_s);

@@ -27,10 +27,10 @@ struct RotationError {
 /// a clock that goes at another rate than the images'.
 [[nodiscard]] std::vector<RotationError> rotation_errors(RotationSource source, bool has_roll_rate);
 
-/// By how much each row's rotation turns, per unit of it.
+/// By how much each row's rotation changes, per unit of it.
 struct TurnPattern {
   RotationError error;
-  std::vector<Eigen::Vector3d> turn_rad;  ///< One a row: mount_true = Exp(turn · number) · measured, to first order.
+  std::vector<Eigen::Vector3d> turn_rad;  ///< One per row: mount_true = Exp(turn · number) · measured, to first order.
 };
 
 /// Patterns of the log's source. None where no rotation was measured.

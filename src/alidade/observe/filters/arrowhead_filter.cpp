@@ -36,7 +36,7 @@ void ArrowheadFilter::start(const BundleSolution& solution, const std::vector<in
   covariance_.setZero(n, n);
   covariance_.topLeftCorner(solved, solved) = solution.covariance();
   precision_ = inverse(covariance_);
-  // Before, a zoom may have given the layout four places more.
+  // Before, a zoom may have given the layout four entries more.
   information_.setZero(n, n);
   gradient_.setZero(n);
   num_seen_ = 0;
@@ -61,7 +61,7 @@ void ArrowheadFilter::remember_intrinsics() {
   if (nuisances_.learnt) return;
   const int n = layout_.size;
   nuisances_.learnt = true;
-  layout_ = CommonLayout(nuisances_);  // its place is the last one: a filter has no turn
+  layout_ = CommonLayout(nuisances_);  // its index is the last one: a filter has no turn
   const CommonMatrix before = covariance_;
   covariance_.resize(n + 4, n + 4);
   covariance_.topLeftCorner(n, n) = before;
@@ -120,7 +120,7 @@ void ArrowheadFilter::observe(const RotationFrame& frame, std::span<const Eigen:
     if (!point.known || !is_seen(px[i]) || !view.predict(point.bearing, layout_, prediction)) continue;
     Seen& seen = seen_[num_seen_++];
     seen.point = static_cast<int>(i);
-    seen.left_out = false;
+    seen.rejected = false;
     seen.innovation = px[i] - prediction.px;
     seen.J_point = prediction.J_px_point;
     seen.by_common = prediction.J_px_common;
@@ -140,7 +140,7 @@ void ArrowheadFilter::observe(const RotationFrame& frame, std::span<const Eigen:
 
 int ArrowheadFilter::dof() const {
   int count = 0;
-  for (std::size_t i = 0; i < num_seen_; ++i) count += seen_[i].left_out ? 0 : 2;
+  for (std::size_t i = 0; i < num_seen_; ++i) count += seen_[i].rejected ? 0 : 2;
   return count;
 }
 
@@ -152,7 +152,7 @@ void ArrowheadFilter::accumulate() {
   squares_ = 0.0;
   for (std::size_t i = 0; i < num_seen_; ++i) {
     const Seen& seen = seen_[i];
-    if (seen.left_out) continue;
+    if (seen.rejected) continue;
     const PixelByCommon weighted = seen.inverse_cov * seen.by_common;
     information_.noalias() += seen.by_common.transpose() * weighted;
     gradient_.noalias() += weighted.transpose() * seen.innovation;
@@ -178,7 +178,7 @@ ArrowheadFilter::Walk ArrowheadFilter::if_walked(const CommonVector& variance) c
   double squares = 0.0;
   for (std::size_t i = 0; i < num_seen_; ++i) {
     const Seen& seen = seen_[i];
-    if (seen.left_out) continue;
+    if (seen.rejected) continue;
     const PixelByCommon by_common = seen.by_common + seen.through_point * change;
     const Eigen::Matrix2d cov = seen.inverse_cov.inverse() + seen.through_point * lost * seen.through_point.transpose();
     const Eigen::Matrix2d inverse_cov = cov.inverse();
@@ -229,7 +229,7 @@ void ArrowheadFilter::update() {
   move_common(step);
   for (std::size_t i = 0; i < num_seen_; ++i) {
     const Seen& seen = seen_[i];
-    if (seen.left_out) continue;
+    if (seen.rejected) continue;
     Point& point = points_[static_cast<std::size_t>(seen.point)];
     const Eigen::Vector2d rest = seen.innovation - seen.by_common * step;
     if (with_depth_) {
@@ -250,7 +250,7 @@ void ArrowheadFilter::update() {
   add_new_points(frame_, px_);
 }
 
-/// A point that is met first: its pixel tells a and b for every c, p(c, b) = px, so b's slope is −(∂p/∂b)⁻¹ ∂p/∂c.
+/// A point that is met first: its pixel gives a and b for every c, p(c, b) = px, so b's slope is −(∂p/∂b)⁻¹ ∂p/∂c.
 void ArrowheadFilter::add_new_points(const RotationFrame& frame, std::span<const Eigen::Vector2d> px) {
   const RotationView view(camera_, frame);
   RotationPrediction prediction;

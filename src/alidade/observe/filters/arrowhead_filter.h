@@ -6,12 +6,12 @@
 
 namespace alidade {
 
-/// Extended Kalman filter on "common parameters c + many static points", with a joint covariance of the form of a star:
+/// Extended Kalman filter on "shared parameters c + many static points", with an arrowhead covariance:
 /// given c, the points are independent. Measurement updates keep that form exactly, for a pixel depends on c and its
 /// own point alone, and cost O(points). Process noise on c would tie the points to each other; there the joint normal
-/// is projected on the nearest star (the one that keeps c with each single point, the minimum of the Kullback–Leibler
-/// divergence). Allocates nothing after construction. Everything is in normalised pixels.
-/// Bar-Shalom, Li & Kirubarajan, "Estimation with applications to tracking and navigation", 2001, section 10.3.
+/// is projected on the nearest arrowhead (the one that keeps c with each single point, the minimum of the
+/// Kullback–Leibler divergence). Allocates nothing after construction. Everything is in normalised pixels. Bar-Shalom,
+/// Li & Kirubarajan, "Estimation with applications to tracking and navigation", 2001, section 10.3.
 class ArrowheadFilter {
  public:
   ArrowheadFilter(const ObserveNuisances& nuisances, bool with_depth, std::size_t num_points);
@@ -23,25 +23,25 @@ class ArrowheadFilter {
   /// From now on this point's pixels have so many times their variance.
   void distrust(std::size_t i, double factor) { points_[i].variance_factor = factor; }
 
-  /// The intrinsics are about to change, the points are not: keeps fx, fy, cx, cy as the points were learnt with as
-  /// further common parameters, so that what the points have in common stays in common. Once; later calls do nothing.
+  /// The intrinsics are about to change, the points are not: keeps fx, fy, cx, cy as the points were estimated with as
+  /// further shared parameters, so that what the points have in common stays in common. Once; later calls do nothing.
   void remember_intrinsics();
-  /// The common parameters walk: variances added, in the layout's order; `turn` is drawn again where `turn_sigma` > 0.
+  /// The shared parameters walk: variances added, in the layout's order; `turn` is drawn again where `turn_sigma` > 0.
   void predict(const CommonVector& variance, double turn_sigma_rad);
   /// Takes up a frame: innovations of all known points that were seen. `px` normalised, NaN: not seen.
   void observe(const RotationFrame& frame, std::span<const Eigen::Vector2d> px);
-  /// Innovations are of so many points; point `i` (a place in this list) can be rejected.
+  /// Innovations are of so many points; point `i` (an index in this list) can be rejected.
   [[nodiscard]] std::size_t num_seen() const { return num_seen_; }
   [[nodiscard]] int seen_point(std::size_t i) const { return seen_[i].point; }
   void leave_out(std::size_t i, bool out) {
-    seen_[i].left_out = out;
+    seen_[i].rejected = out;
     is_summed_ = false;
   }
-  [[nodiscard]] bool is_left_out(std::size_t i) const { return seen_[i].left_out; }
+  [[nodiscard]] bool is_rejected(std::size_t i) const { return seen_[i].rejected; }
   [[nodiscard]] int dof() const;
   /// Normalised innovation squared of the points not rejected.
   [[nodiscard]] double nis();
-  /// The same with `variance` added to the common parameters before, and how they would move.
+  /// The same with `variance` added to the shared parameters before, and how they would move.
   struct Walk {
     double nis = 0.0;
     CommonVector step;
@@ -51,7 +51,7 @@ class ArrowheadFilter {
   [[nodiscard]] double own_nis(std::size_t i) const;
   /// Adds the score of fx, fy, cx, cy, Gᵀ S⁻¹ ν, and its covariance Gᵀ S⁻¹ G: zero on the mean while nothing changes.
   void add_score(Eigen::Vector4d& score, Eigen::Matrix4d& information);
-  /// One point's share of it, as if the common parameters were known: Gᵀ R⁻¹ ν and Gᵀ R⁻¹ G.
+  /// One point's share of it, as if the shared parameters were known: Gᵀ R⁻¹ ν and Gᵀ R⁻¹ G.
   void add_own_score(std::size_t i, Eigen::Vector4d& score, Eigen::Matrix4d& information) const;
   /// Takes the innovations in, but those rejected; new points join. After `observe`, once.
   void update();
@@ -75,7 +75,7 @@ class ArrowheadFilter {
   };
   struct Seen {
     int point = 0;
-    bool left_out = false;
+    bool rejected = false;
     Eigen::Vector2d innovation;
     Eigen::Matrix<double, 2, 3> J_point;
     PixelByCommon through_point;  ///< ∂px/∂c through the point's slope alone.
@@ -92,7 +92,7 @@ class ArrowheadFilter {
   bool with_depth_;
   double variance_px_ = 1e-6;
   RotatingCamera camera_;
-  CommonMatrix covariance_, precision_;  ///< Of the common parameters, and its inverse.
+  CommonMatrix covariance_, precision_;  ///< Of the shared parameters, and its inverse.
   std::vector<Point> points_;
   std::vector<Seen> seen_;
   std::size_t num_seen_ = 0;

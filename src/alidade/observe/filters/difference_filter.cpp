@@ -3,7 +3,7 @@
 namespace alidade {
 namespace {
 
-/// Of a place that is not known, in scaled pixels: many images wide.
+/// Of a position that is not known, in scaled pixels: many images wide.
 constexpr double diffuse_variance = 100.0;
 
 }  // namespace

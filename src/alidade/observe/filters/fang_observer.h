@@ -28,7 +28,7 @@ struct FangConfig {
   PixelScale scale;
   FangProfile profile = FangProfile::quiet;
   Eigen::Vector4d start{1.0, 1.0, 0.0, 0.0};  ///< fx, fy, cx, cy to begin with. [px]
-  /// Two more columns for the turn about the axis of view, which a pan-over-tilt head has but at zero tilt.
+  /// Two more columns for the rotation about the axis of view, which a pan-over-tilt head has but at zero tilt.
   bool roll_columns = true;
   /// The regression takes the rates measured at both ends of a step, as the paper would, not their mean over it. At 30
   /// Hz that costs fx 0.2 px, the error of the trapezoid rule.

@@ -32,7 +32,7 @@ FangConfig observer_config(FangProfile profile, std::size_t num_points = 4) {
 
 /// Estimates of the reference at its times, each method as it is there: point 1 is the reference, gains are diagonal.
 void expect_reference(const std::string& method, const FangConfig& config, double tolerance_px,
-                      const std::map<std::string, std::vector<double>>& left_out) {
+                      const std::map<std::string, std::vector<double>>& rejected) {
   std::ifstream file(testing::reference_case("a_expected.json"));
   const nlohmann::json cases = nlohmann::json::parse(file)["cases"];
   int checked = 0;
@@ -40,9 +40,9 @@ void expect_reference(const std::string& method, const FangConfig& config, doubl
     FangObserver observer(config);
     const auto estimates = observe_log(observer, *paper_case(name));
     for (const auto& [t, expected] : methods[method].items()) {
-      const auto skip = left_out.find(name);
+      const auto skip = rejected.find(name);
       const double t_s = std::stod(t);
-      if (skip != left_out.end() && t_s >= skip->second[0] && t_s <= skip->second[1]) continue;
+      if (skip != rejected.end() && t_s >= skip->second[0] && t_s <= skip->second[1]) continue;
       const IntrinsicsEstimate& estimate = estimates[static_cast<std::size_t>(std::lround(30.0 * t_s))];
       for (std::size_t i = 0; i < 4; ++i)
         EXPECT_NEAR(estimate.values()[static_cast<Eigen::Index>(i)], expected[i].get<double>(), tolerance_px)

@@ -13,7 +13,7 @@ struct FlowFilterConfig {
   PixelScale scale;
   Eigen::Vector4d start{1.0, 1.0, 0.0, 0.0};  ///< fx, fy, cx, cy to begin with: a weak prior, any will do. [px]
   double sigma_px = 0.3;                      ///< Of one coordinate.
-  /// False: ten columns, as if the camera never turned about its axis of view. For comparison.
+  /// False: ten columns, as if the camera never rotated about its axis of view. For comparison.
   bool roll_columns = true;
   /// The regression takes the rates measured at both ends of a step, as the paper would, not their mean over it. At 30
   /// Hz that costs fx 0.2 px, the error of the trapezoid rule.
@@ -22,7 +22,7 @@ struct FlowFilterConfig {
   double drift_px_per_sqrt_s = 0.0219;  ///< w, for what the trapezoid of G misses: 10⁻⁵ scaled pixels at 30 Hz.
 };
 
-/// Fixed intrinsics of a rotating camera by a Kalman filter on the whole flow: state [ξ; Θ], ξ the points' places in
+/// Fixed intrinsics of a rotating camera by a Kalman filter on the whole flow: state [ξ; Θ], ξ the points' positions in
 /// scaled pixels, ξ_{k+1} = ξ_k + h G_mᵀΘ + w, measured q = ξ + n; G_m is the mean of G over both ends of the step.
 /// Linear, so that it needs no guess and converges from everywhere. The estimate is Θ's projection on the four
 /// intrinsics, argmin (Θ(k) − Θ̂)ᵀ P⁻¹ (Θ(k) − Θ̂).

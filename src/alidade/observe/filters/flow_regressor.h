@@ -9,7 +9,7 @@
 namespace alidade {
 
 /// The image's flow under a rotation of the camera is linear in unknown constants Θ. For a static far point seen at
-/// q = (px, py) and a camera that turns with ω (camera frame, ṁ = −ω × m),
+/// q = (px, py) and a camera that rotates with ω (camera frame, ṁ = −ω × m),
 ///
 ///   ṗx = [−px²ωy, 2pxωy, 0, pxpyωx, −pyωx, −pxωx | −ωy, ωx, 0, 0 | pyωz, −ωz, 0, 0] Θ
 ///   ṗy = [−pxpyωy, pyωy, pxωy, py²ωx, 0, −2pyωx | 0, 0, ωx, −ωy | 0, 0, −pxωz, ωz] Θ
@@ -43,7 +43,7 @@ inline constexpr double min_inverse_focal = 1.0 / 20.0;
 
 [[nodiscard]] constexpr double squared(double x) { return x * x; }
 
-/// Scaled intrinsics k of θ. It tells (u, v) twice; both tellings are fused: u = (θ2θ1 + θ5θ4)/(θ1² + θ4²). Nothing
+/// Scaled intrinsics k of θ. It gives (u, v) twice; both are fused: u = (θ2θ1 + θ5θ4)/(θ1² + θ4²). Nothing
 /// where θ1 or θ4 has not come above `least` (in scaled pixels a focal length of 1/least): 1/θ jumps through infinity.
 [[nodiscard]] std::optional<Eigen::Vector4d> intrinsics_of(const DifferenceParameters& theta, double least);
 /// Derivative of that by θ, at a θ that has intrinsics.

@@ -20,7 +20,7 @@ namespace {
 using testing::paper_case;
 using testing::paper_scale;
 
-/// Where a point that is seen at q now is seen once the camera has turned with constant ω for `t_s`: by the projection
+/// Where a point that is seen at q now is seen once the camera has rotated with constant ω for `t_s`: by the projection
 /// itself, which knows nothing of Θ.
 Eigen::Vector2d seen_after(const Eigen::Vector4d& k, const Eigen::Vector2d& q, const Eigen::Vector3d& rate,
                            double t_s) {

@@ -151,7 +151,7 @@ bool HybridObserver::has_drifted(IntrinsicsEstimate& estimate) {
   filter_.add_score(drift_.score, drift_.information);
   for (std::size_t i = 0; i < filter_.num_seen(); ++i) {
     Score& own = own_drift_[static_cast<std::size_t>(filter_.seen_point(i))];
-    if (!filter_.is_left_out(i)) filter_.add_own_score(i, own.score, own.information);
+    if (!filter_.is_rejected(i)) filter_.add_own_score(i, own.score, own.information);
   }
   if (++drift_frames_ < drift_window) return false;
   drift_frames_ = 0;
@@ -221,7 +221,7 @@ bool HybridObserver::has_gained_much() {
 void HybridObserver::note_slips() {
   for (std::size_t i = 0; i < filter_.num_seen(); ++i) {
     const auto point = static_cast<std::size_t>(filter_.seen_point(i));
-    if (!filter_.is_left_out(i)) {
+    if (!filter_.is_rejected(i)) {
       frames_out_[point] = 0;
       continue;
     }
@@ -285,7 +285,7 @@ HybridObserver::Judgement HybridObserver::judge() {
   return judgement;
 }
 
-/// Leaves out the worst points one by one until the rest fits: a slip. At most a third of them (one of three or four).
+/// Rejects the worst points one by one until the rest fits: a slip. At most a third of them (one of three or four).
 /// False, with none rejected: that is not it.
 bool HybridObserver::leave_out_until(double z, Judgement& judgement) {
   const std::size_t seen = filter_.num_seen();
@@ -294,7 +294,7 @@ bool HybridObserver::leave_out_until(double z, Judgement& judgement) {
     std::size_t worst = seen;
     double best = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < seen; ++i) {
-      if (filter_.is_left_out(i)) continue;
+      if (filter_.is_rejected(i)) continue;
       double without = -filter_.own_nis(i);  // many points: the one that fits worst by itself
       if (seen <= 12) {
         filter_.leave_out(i, true);

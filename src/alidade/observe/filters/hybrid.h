@@ -38,7 +38,7 @@ class HybridObserver {
 
   [[nodiscard]] const ArrowheadFilter& filter() const { return filter_; }
   [[nodiscard]] bool is_running() const { return is_running_; }
-  /// σ of a pixel coordinate: given, or as the log tells so far. [px]
+  /// σ of a pixel coordinate: given, or as the log determines so far. [px]
   [[nodiscard]] double sigma_px() const { return config_.scale.scale * sigma_px_ * noise_ratio(); }
   /// The σ that the filter reckons with, normalised: its covariance is in units of it.
   [[nodiscard]] double filter_sigma_px() const { return sigma_px_; }
@@ -94,7 +94,7 @@ class HybridObserver {
   ArrowheadFilter filter_;
   FrameBuffer buffer_;
   std::vector<Eigen::Vector2d> px_;  ///< Of this frame, normalised.
-  std::vector<int> frames_out_;      ///< One a point: in a row rejected,
+  std::vector<int> frames_out_;      ///< One per point: in a row rejected,
   std::vector<int> patience_;        ///< and how many before it is initialised again.
   ArrowheadFilter candidate_;        ///< The filter if the last frame was a zoom.
   bool has_candidate_ = false;
@@ -116,7 +116,7 @@ class HybridObserver {
     Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
   };
   Score drift_;
-  std::vector<Score> own_drift_;  ///< One a point.
+  std::vector<Score> own_drift_;  ///< One per point.
   int drift_frames_ = 0;
 };
 

@@ -1,4 +1,4 @@
-// How the hybrid observer tells a zoom from noise, follows it, and sees that it is over.
+// How the hybrid observer distinguishes a zoom from noise, follows it, and sees that it is over.
 #include <algorithm>
 #include <cmath>
 

@@ -15,11 +15,11 @@ constexpr double inverse_depth_information = 1.0;  // a point is 1 m away or far
 
 using PointByCommon = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_common>;
 
-/// The place of a bundle in its search: everything that is estimated.
+/// The state of a bundle in its search: everything that is estimated.
 struct Place {
   RotatingCamera camera;
   std::vector<BearingPoint> points;
-  std::vector<Eigen::Vector3d> turns;  ///< One a frame, or none.
+  std::vector<Eigen::Vector3d> turns;  ///< One per frame, or none.
 };
 
 struct PointFrameBlock {
@@ -135,8 +135,8 @@ class Solver {
   [[nodiscard]] static Eigen::Vector3d turn(const Place& place, int k) {
     return k < 0 ? Eigen::Vector3d::Zero() : place.turns[static_cast<std::size_t>(k)];
   }
-  /// 1/σ² of a turn, or of its step from the frame before. The first frame of rotations that are not measured, or
-  /// walk, is held: the world's orientation is free.
+  /// 1/σ² of a rotation, or of its step from the frame before. The first frame of rotations that are not measured, or
+  /// walk, is fixed: the world's orientation is free.
   [[nodiscard]] double turn_information(int k) const {
     constexpr double held = 1e12;
     if (!walks())
@@ -157,7 +157,7 @@ class Solver {
     return (distance_m - range.range_m) / config_.sigma_range_m;
   }
 
-  /// Normal equations at the place, prior included.
+  /// Normal equations at that state, prior included.
   void linearise() {
     const int n = layout_.size;
     common_.setZero(n + 3 * turns_, n + 3 * turns_);
@@ -364,7 +364,7 @@ class Solver {
   const CommonLayout turn_layout_{with_turn(config_.nuisances)};
   int turns_ = 0;  ///< Frames whose rotation is estimated.
   Place place_;
-  Eigen::MatrixXd common_;  ///< Common parameters, then turns.
+  Eigen::MatrixXd common_;  ///< Shared parameters, then rotations.
   Eigen::VectorXd gradient_;
   std::vector<PointBlock> blocks_;
   std::vector<Eigen::Matrix3d> inverse_;

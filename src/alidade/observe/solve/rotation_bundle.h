@@ -46,7 +46,7 @@ struct RotationBundleConfig {
   int max_iterations = 60;
 };
 
-/// What is known of the common parameters before: normal distributions, weak where nothing is said.
+/// What is known of the shared parameters before: normal distributions, weak where nothing is said.
 struct CommonPrior {
   explicit CommonPrior(const RotatingCamera& mean_in);
   RotatingCamera mean;
@@ -71,7 +71,7 @@ struct CommonPrior {
   [[nodiscard]] CommonPrior about(const RotatingCamera& camera) const;
 };
 
-/// A point's share of the joint covariance given the common parameters c: point = point_mean + slope (c − c_mean) + e,
+/// A point's share of the joint covariance given the shared parameters c: point = point_mean + slope (c − c_mean) + e,
 /// e ~ N(0, cov). Inverse depth is the third coordinate, if there is one.
 using PointByCommonSlope = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_common>;
 struct PointGivenCommon {
@@ -84,25 +84,25 @@ struct BundleSolution {
   int iterations = 0;
   RotatingCamera camera;
   std::vector<BearingPoint> points;
-  std::vector<Eigen::Quaterniond> mount_from_start;  ///< One a frame, with its turn.
-  CommonMatrix information;  ///< Of the common parameters but the turn, all else eliminated, without the prior, in
+  std::vector<Eigen::Quaterniond> mount_from_start;  ///< One per frame, with its rotation.
+  CommonMatrix information;  ///< Of the shared parameters but the rotation, all else eliminated, without the prior, in
                              ///< units of 1/σ².
   CommonMatrix prior_information;
   CommonVector prior_gradient;                 ///< Of half the prior's cost.
   CommonMatrix said_information;               ///< Of the prior, what a person said.
-  std::vector<PointGivenCommon> given_common;  ///< One a point; not with turns.
-  std::vector<Eigen::Vector2d> residuals;      ///< Prediction minus pixel, one an observation, normalised.
+  std::vector<PointGivenCommon> given_common;  ///< One per point; not with free rotations.
+  std::vector<Eigen::Vector2d> residuals;      ///< Prediction minus pixel, one per observation, normalised.
   std::vector<double> residual_px;             ///< Their norms.
   double sum_squares = 0.0;                    ///< Of weighted residuals over σ.
   double rms_px = 0.0;                         ///< A coordinate, normalised, unweighted.
   int dof = 0;                                 ///< Measurements minus unknowns.
 
   [[nodiscard]] CommonMatrix covariance() const;
-  /// Cramér–Rao bound at the solution: without the weak prior. Not finite where the data cannot tell.
+  /// Cramér–Rao bound at the solution: without the weak prior. Not finite where the data do not determine it.
   [[nodiscard]] CommonMatrix bound() const;
 };
 
-/// Rotation-only bundle adjustment: Levenberg–Marquardt on the common parameters, all points, and (with nuisances.turn)
+/// Rotation-only bundle adjustment: Levenberg–Marquardt on the shared parameters, all points, and (with nuisances.turn)
 /// each frame's rotation; points are eliminated block by block (Schur complement), so that the time grows linearly in
 /// them. Throws Interrupted.
 /// Triggs, McLauchlan, Hartley & Fitzgibbon, "Bundle adjustment — a modern synthesis", 2000, section 6.

@@ -28,7 +28,7 @@ CommonLayout::CommonLayout(const ObserveNuisances& nuisances) {
 
 namespace {
 
-/// A ray's place in the image of focal length one, bent by the lens; Brown 1971.
+/// A ray's position in the image of focal length one, distorted by the lens; Brown 1971.
 struct Bent {
   Eigen::Vector2d xy;
   double dxx, cross, dyy;  ///< ∂x'/∂x, ∂x'/∂y = ∂y'/∂x, ∂y'/∂y

@@ -19,9 +19,9 @@ struct ObserveNuisances {
   bool shutter = false;     ///< The image's last row is of so much later than its first: a rolling shutter.
   bool drift = false;       ///< fx and fy grow by so much of themselves a second: warmth, a focus that creeps.
   int errors = 0;           ///< Errors of the measured rotation, so many: RotationFrame::turn_by.
-  bool learnt =
-      false;  ///< fx, fy, cx, cy with which the points were learnt, before a zoom: they know nothing of the new ones.
-  bool turn = false;  ///< Error of the measured rotation, 3 angles; one per frame in a bundle, of now in a filter.
+  bool learnt = false;  ///< fx, fy, cx, cy with which the points were estimated, before a zoom: they know nothing of
+                        ///< the new ones.
+  bool turn = false;    ///< Error of the measured rotation, 3 angles; one per frame in a bundle, of now in a filter.
 };
 
 inline constexpr int max_common = 25 + max_rotation_errors;  ///< Of ObserveNuisances with everything.
@@ -47,7 +47,7 @@ struct RotatingCamera {
   Eigen::Quaterniond cam_from_mount = Eigen::Quaterniond::Identity();
   double delay_s = 0.0;
   Eigen::Vector3d lever_m = Eigen::Vector3d::Zero();
-  double shutter_s = 0.0;     ///< Pixels are of t + delay + shutter · v / image_height, v from the image's middle.
+  double shutter_s = 0.0;     ///< Pixels are of t + delay + shutter · v / image_height, v from the image centre.
   double image_height = 1.0;  ///< Normalised. Not estimated.
   double drift_per_s = 0.0;   ///< Of fx and fy, as a share; they are what k says at drift_from_s.
   double drift_from_s = 0.0;  ///< Not estimated.
@@ -57,7 +57,7 @@ struct RotatingCamera {
 
   /// fx, fy, cx, cy of an instant.
   [[nodiscard]] Eigen::Vector4d k_at(double t_s) const;
-  /// The values moved by `step`, in the layout's order; the mount turns on the right.
+  /// The values moved by `step`, in the layout's order; the mount rotates on the right.
   [[nodiscard]] RotatingCamera retract(const CommonLayout& layout, const CommonVector& step) const;
 };
 
@@ -90,7 +90,7 @@ class RotationView {
   [[nodiscard]] bool predict(const BearingPoint& point, const CommonLayout& layout, RotationPrediction& out) const;
   /// Ray of the pixel in the start's frame, for a point far away.
   [[nodiscard]] std::optional<Eigen::Vector3d> ray_in_start(const Eigen::Vector2d& px) const;
-  /// Point in the camera, times its inverse depth; the derivative by common parameters, a, b and inverse depth.
+  /// Point in the camera, times its inverse depth; the derivative by shared parameters, a, b and inverse depth.
   [[nodiscard]] Eigen::Vector3d point_in_cam(const BearingPoint& point) const;
   void point_jacobians(const BearingPoint& point, const CommonLayout& layout,
                        Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, max_common>& J_common,
@@ -118,7 +118,7 @@ class RotationView {
   double elapsed_s_ = 0.0;  ///< since then.
 };
 
-/// σ of fx, fy, cx, cy at an instant, from the covariance of the common parameters.
+/// σ of fx, fy, cx, cy at an instant, from the covariance of the shared parameters.
 [[nodiscard]] Eigen::Vector4d sigma_k_at(const RotatingCamera& camera, const CommonLayout& layout,
                                          const CommonMatrix& cov, double t_s);
 

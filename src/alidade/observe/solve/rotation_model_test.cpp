@@ -62,7 +62,7 @@ constexpr ObserveNuisances everything{.k1 = true,
                                       .learnt = true,
                                       .turn = true};
 
-/// The turn's derivative is about none: it is the error that is left.
+/// The rotation's derivative is about none: it is the error that is left.
 TEST(RotationModel, JacobiansAreTheDerivatives) {
   Draws draws(testing::make_rng()());
   const CommonLayout layout(everything);

@@ -30,7 +30,7 @@ bool free_cause(const std::string& cause, const RotationLog& log, ObserveSetup& 
 }
 
 /// The cause that explains the residuals best, of those that are asked for; of several that do nearly as well the one
-/// with the fewest numbers: what it leaves is asked for next. Null: none is.
+/// with the fewest parameters: what it leaves is asked for next. Null: none is.
 const CauseScore* best_cause(const ObserveSolution& report) {
   constexpr double nearly = 0.9;
   const CauseScore* best = nullptr;
@@ -47,7 +47,7 @@ const CauseScore* best_cause(const ObserveSolution& report) {
 
 bool is_answer(const ObserveSolution& report) { return report.status == ObserveSolution::Status::ok; }
 
-/// Without an answer there may be one where the camera is mounted askew, late, and bends its image.
+/// Without an answer there may be one where the camera is mounted askew, late, and distorts its image.
 ObserveSolution second_chance(const RotationLog& log, ObserveSetup& config, const Progress& progress) {
   ObserveSetup freer = config;
   freer.nuisances.mount = freer.nuisances.delay = true;
@@ -84,8 +84,7 @@ void settle_zooms(const RotationLog& log, const ObserveSetup& config, const Prog
     report = std::move(all);
     return;
   }
-  constexpr double far_off =
-      3.0;  // the noise of one camera's rows beside a real zoom's: nothing is to be learnt from them
+  constexpr double far_off = 3.0;  // the noise of one camera's rows beside a real zoom's: nothing is determined by them
   if (all.sigma_px > far_off * report.sigma_px) return;
   const CauseScore* best = best_cause(all);
   if (best == nullptr || best->name == "focal length that drifts") return;
@@ -130,7 +129,7 @@ std::vector<Check> rival_checks(const std::vector<Rival>& rivals, const Rotation
   for (const Rival& rival : rivals) {
     ObserveSetup freer = config;
     if (!free_cause(rival.name, log, freer)) continue;
-    checks.push_back({"told apart", State::care,
+    checks.push_back({"separable", State::care,
                       rival.freed + " explains the residuals, and " + rival.name +
                           " would about as well: these pixels cannot distinguish them (fx, fy would differ by " +
                           text_of(rival.by_px, 2) + " px)",
@@ -163,7 +162,7 @@ bool is_doubtful(const ObserveSolution& report) {
          report.quantities[0].sigma > vague * report.quantities[0].value;
 }
 
-/// Tries sets of causes from what the person told.
+/// Tries sets of causes from what the user gave.
 bool search_causes(const RotationLog& log, const Progress& progress, ObserveSetup& config, ObserveSolution& report) {
   constexpr double clearly = 0.6, with_zoom = 3.0, max_px = 2.0;
   double max_px_here = max_px;
@@ -217,14 +216,14 @@ void prefer_all_rows(const RotationLog& log, const ObserveSetup& config, const P
                               ? "the filter ends " + text_of(report.from_reference, 2) + "σ from all rows together"
                               : std::string("the filter did not settle");
   all.events = std::move(report.events);
-  all.told_apart.push_back({"from all rows", State::good, why + ": theirs is the answer", report.from_reference,
-                            max_off, "σ", "intrinsics"});
+  all.side_checks.push_back({"from all rows", State::good, why + ": theirs is the answer", report.from_reference,
+                             max_off, "σ", "intrinsics"});
   report = std::move(all);
 }
 
 /// What is estimated and yet rests on what instruments ordinarily have.
 void note_ungiven(const ObserveSolution& report, const std::vector<RotationError>& errors,
-                  std::vector<Check>& told_apart) {
+                  std::vector<Check>& side_checks) {
   constexpr double hardly = 0.7;
   std::string names;
   for (const RotationError& error : errors) {
@@ -234,9 +233,9 @@ void note_ungiven(const ObserveSolution& report, const std::vector<RotationError
     }
   }
   if (names.empty()) return;
-  told_apart.push_back({"told", State::good,
-                        "the pixels hardly determine " + names + ": σ counts what such instruments ordinarily have",
-                        0.0, 0.0, "", "residuals"});
+  side_checks.push_back({"determined", State::good,
+                         "the pixels hardly determine " + names + ": σ counts what such instruments ordinarily have",
+                         0.0, 0.0, "", "residuals"});
 }
 
 /// Residuals that no noise of a finder makes, or no answer: the rotation may be misread as well.
@@ -288,8 +287,8 @@ ObserveSolution solve_intrinsics(const RotationLog& log, const ObserveSetup& giv
     report.status = Status::unsteady;
   }
   if (is_answer(report)) {
-    note_ungiven(report, estimated_errors(log, config), report.told_apart);
-    for (Check& check : rival_checks(rivals, log, config)) report.told_apart.push_back(std::move(check));
+    note_ungiven(report, estimated_errors(log, config), report.side_checks);
+    for (Check& check : rival_checks(rivals, log, config)) report.side_checks.push_back(std::move(check));
   }
   report.estimated = config.nuisances;
   report.estimated_errors = config.estimate_errors;

@@ -31,7 +31,7 @@ struct ObserveSolution : ObserveReport {
   ObserveNuisances estimated;  ///< What was, in the end, beside fx, fy, cx, cy.
   std::vector<std::string> estimated_errors;
   RotationErrors errors;           ///< Of the rotation, as estimated, in units of their ordinary sizes.
-  std::vector<Check> told_apart;   ///< What else explains the residuals as well, and what the pixels do not determine.
+  std::vector<Check> side_checks;  ///< What else explains the residuals as well, and what the pixels do not determine.
   std::string misread;             ///< How the rotation seems to be misread, in words; empty: it is not.
   bool sigma_is_distance = false;  ///< The method has no σ: stated is its distance from the reference.
 };
@@ -76,7 +76,7 @@ struct Misread {
 [[nodiscard]] Verdict observe_verdict(const ObserveSolution& report, const RotationLog& log,
                                       const ObserveSetup& config);
 
-/// What a row tells whoever watches.
+/// What a row shows whoever watches.
 [[nodiscard]] ObserveStep step_of(const RotationFrame& frame, const IntrinsicsEstimate& estimate);
 
 /// The camera that was observed, with its covariance: pinhole, or brown where k1 was estimated or `known` has a lens.
@@ -97,7 +97,7 @@ struct Misread {
 /// z at which the residuals ask for a cause: noise that a frame's pixels share makes chance larger.
 [[nodiscard]] double asked_beyond(const ObserveSolution& report);
 
-/// Is the rotation read as it was meant? A mount that turns by half a turn, or a misreading that fits better.
+/// Is the rotation read as it was meant? A mount rotated by half a turn, or a misreading that fits better.
 [[nodiscard]] Check rotation_check(const ObserveSolution& report);
 
 /// Where a log without measured rotation may start: a focal length and each row's rotation, from pairs of neighbouring

@@ -256,7 +256,7 @@ class Observation {
     }
     report_.reference = adjust(buffer, config, progress_);
     if (!report_.reference.has_value) return;
-    report_.pixels_rejected = report_.reference.num_left_out;
+    report_.pixels_rejected = report_.reference.num_rejected;
     if (config_.rotation == RotationKnowledge::known) {
       report_.jitter = turn_jitter(report_.reference);
       report_.stated = stated_covariance(report_.reference, config.nuisances);

@@ -9,7 +9,7 @@ namespace alidade {
                                          const std::vector<RotationError>& errors, const RotationErrors& undone,
                                          const Progress& progress);
 
-/// Gives each frame how the errors turn it, per ordinary size.
+/// Gives each frame how the errors rotate it, per ordinary size.
 void add_turns(const RotationLog& log, const std::vector<RotationError>& errors, double max_gap_s,
                std::vector<RotationFrame>& frames);
 

@@ -1,7 +1,7 @@
 #include <algorithm>
 
 #include "alidade/rangefinder/rangefinder.h"
-#include "alidade/rangefinder/solve/held_distortion.h"
+#include "alidade/rangefinder/solve/fixed_distortion.h"
 
 namespace alidade {
 namespace {
@@ -30,7 +30,7 @@ struct Shots {
 
 /// Distortion that the file gives without σ.
 std::vector<int> opened_by_need(const Camera& file) {
-  std::vector<int> opened = held_distortion(file, {});
+  std::vector<int> opened = fixed_distortion(file, {});
   std::erase_if(opened, [&](int k) { return k < file.cov.rows() && file.cov(k, k) > 0.0; });
   return opened;
 }
@@ -47,7 +47,7 @@ void name_freed(const Camera& file, const Shots& shots, SolvedRangefinder& solve
 }
 
 /// Twice: the corners of each board are weighed by how the lens that the solve starts with fits them. None where the
-/// shots do not tell it.
+/// shots do not determine it.
 std::optional<SolvedRangefinder> with_free_distortion(const Shots& shots, const Camera& camera,
                                                       const RangefinderConfig& config) {
   const Camera file = with_distortion(camera);

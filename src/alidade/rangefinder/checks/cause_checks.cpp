@@ -123,7 +123,7 @@ void add_shared_errors(const RangefinderReport& report, Verdict& verdict) {
         return "the readings drift by " + size + " from the first row to the last" + by +
                ": let the rangefinder warm up, or something was moved";
       if (cause.name == "bend")
-        return "the readings bend over their range, by " + size + " at its ends" + by +
+        return "the readings curve over their range, by " + size + " at its ends" + by +
                ": the rangefinder is not linear, or the board or the lens is not as given";
       return "the spots wander by " + size + " from the first row to the last" + by +
              ": the rangefinder, or the camera's lens, was moved";
@@ -150,7 +150,7 @@ void add_exchanged(const RangefinderReport& report, const RangefinderConfig& con
                                                       "° away from where the camera looks; with u "
                                                       "and v exchanged " +
                                                       text_of(other_rad / degree, 2) + "°: are these columns exchanged?"
-                                                : "u and v stand in their order, as far as the beam's direction tells",
+                                                : "u and v stand in their order, as far as the beam's direction shows",
                                     given_rad / degree, aside_rad / degree, "°", ""));
 }
 

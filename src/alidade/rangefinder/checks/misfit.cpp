@@ -12,7 +12,7 @@ namespace {
 /// How well a beam explains shots; 0 to spare where none does.
 struct Explained {
   bool fits = false;                                        ///< Nearly all, by readings as a rangefinder's are.
-  bool known = false;                                       ///< And the shots tell which beam.
+  bool known = false;                                       ///< And the shots determine which beam.
   double rms_m = std::numeric_limits<double>::infinity();   ///< Of the ranges of all shots.
   double rms_px = std::numeric_limits<double>::infinity();  ///< Of the spots of all shots.
   int spare = 0;                                            ///< Measurements beyond what the beam takes.
@@ -99,7 +99,7 @@ std::string cause_of_misfit(std::span<const Shot> shots, std::span<const Eigen::
   plain.estimate_scale = plain.scale_by_need = false;
   plain.sigma_range_m.reset();
   const Explained as_given = explained(shots, points_in_board, camera, plain);
-  if (as_given.fits) return "";  // nothing is amiss with them: what they cannot tell they do not know
+  if (as_given.fits) return "";  // nothing is amiss with them: what they do not determine they do not claim
   const auto explains = [&](std::span<const Shot> others) {
     return is_cause(explained(others, points_in_board, camera, plain), as_given);
   };

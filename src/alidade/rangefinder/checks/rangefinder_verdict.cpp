@@ -12,7 +12,7 @@ using Method = RangefinderMethod;
 
 constexpr double refuse_origin_m = 0.1;
 constexpr double min_range_ratio = 2.0, min_normal_spread = 0.1;
-constexpr double degenerate_range_ratio = 1.3;      // 2.0 to 2.4 m: two methods of three cannot tell
+constexpr double degenerate_range_ratio = 1.3;      // 2.0 to 2.4 m: two methods of three are degenerate
 constexpr double degenerate_normal_spread = 0.035;  // tilts of 5°: half of a board's turn is its noise
 
 /// Origin and direction are tied by where the beam hits, so that joint's information is never round: one reading of
@@ -41,7 +41,7 @@ Supply supply_of(std::span<const Shot> shots) {
   return supply;
 }
 
-/// Which other method could tell from the same shots, or what another kind of shot would take; ends a sentence.
+/// Which other method could determine it from the same shots, or what another kind of shot would take; ends a sentence.
 std::string other_method(Method method, const Supply& supply) {
   if (method == Method::joint) return "";
   if (supply.num_both >= 2) return "; --method joint can use spots and boards of these shots together";
@@ -73,8 +73,8 @@ struct LineOffset {
   double value_m = 0.0, sigma_m = 0.0;
 };
 
-/// By the spots alone: a ray's x/z and y/z move with 1/range by how far the line passes. Told where no beam is: with
-/// all spots at one place any origin along their ray will do. None where they do not tell it, either.
+/// By the spots alone: a ray's x/z and y/z move with 1/range by how far the line passes. Stated where no beam is: with
+/// all spots at one position any origin along their ray will do. None where they do not determine it, either.
 std::optional<LineOffset> offset_by_spots(const RangefinderReport& report, std::span<const Shot> shots) {
   std::vector<Eigen::Vector3d> seen;  // x/z, y/z, 1/range
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -205,7 +205,7 @@ void add_geometry(const RangefinderReport& report, std::span<const Shot> shots, 
                                     "the longest range is " + text_of(bound.range_ratio) + " times the shortest",
                                     bound.range_ratio, min_range_ratio, "", "next"));
   if (method != Method::spot && bound.normal_spread > 0.0) {
-    // With the spot seen, tilts do not matter: the figure is told, it decides nothing.
+    // With the spot seen, tilts do not matter: the figure is shown, it decides nothing.
     State state = bound.normal_spread >= min_normal_spread || method == Method::joint ? State::good : State::care;
     if (method == Method::plane && bound.normal_spread < 0.5 * degenerate_normal_spread) state = State::refused;
     verdict.checks.push_back(check_of("tilts", state,
@@ -221,7 +221,7 @@ void add_geometry(const RangefinderReport& report, std::span<const Shot> shots, 
   }
 }
 
-/// Measurements beyond what the beam takes: with none to spare a wrong shot bends the beam and leaves no residual.
+/// Measurements beyond what the beam takes: with none to spare a wrong shot biases the beam and leaves no residual.
 void add_spare(const RangefinderReport& report, Verdict& verdict) {
   constexpr int enough = 3;
   int spare = report.beam.cov(beam_scale_param, beam_scale_param) > 0.0 ? -6 : -5;
@@ -262,11 +262,11 @@ void add_fit(const RangefinderReport& report, Verdict& verdict) {
     named += (named.empty() ? "" : ", ") + std::to_string(i + 1);
     ++outliers;
   }
-  const int told = report.shots_used + outliers;
+  const int considered = report.shots_used + outliers;
   // Where two in five do not agree with the rest, the rest may be as wrong.
-  const State state = outliers == 0 ? State::good : 5 * outliers > 2 * told ? State::refused : State::care;
+  const State state = outliers == 0 ? State::good : 5 * outliers > 2 * considered ? State::refused : State::care;
   verdict.checks.push_back(check_of("outliers", state, outliers == 0 ? "all shots agree" : "rejected: shot " + named,
-                                    outliers, 0.4 * told, "", "residuals"));
+                                    outliers, 0.4 * considered, "", "residuals"));
   if (report.dof < 1 || (report.spot_sigma_is_estimated && report.range_sigma_is_estimated)) return;
   const double ratio = std::sqrt(report.cost / report.dof);
   const double most = 1.0 + 3.0 / std::sqrt(2.0 * report.dof) + 0.2;

@@ -20,7 +20,7 @@ std::vector<std::size_t> used_shots(const RangefinderReport& report) {
   return used;
 }
 
-/// The config of a part of the shots: the noise that all of them told, and no search for outliers.
+/// The config of a part of the shots: the noise estimated from all of them, and no search for outliers.
 RangefinderConfig config_of_part(const RangefinderConfig& config, const RangefinderReport& report) {
   RangefinderConfig part = config;
   part.reject_outliers = false;

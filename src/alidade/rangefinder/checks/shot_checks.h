@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// σ against the number of shots that `report` used; counts that cannot tell are omitted. Throws Interrupted.
+/// σ against the number of shots that `report` used; counts that are degenerate are omitted. Throws Interrupted.
 [[nodiscard]] std::vector<CountedSigma> sigma_by_count(std::span<const Shot> shots, const RangefinderReport& report,
                                                        std::span<const Eigen::Vector3d> points_in_board,
                                                        const Camera& camera, const RangefinderConfig& config,

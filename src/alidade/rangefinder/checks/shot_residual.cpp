@@ -30,7 +30,7 @@ std::optional<Hit> hit_of(const PreparedShot& shot, const Beam& beam) {
   hit.J_plane << -point_in_cam.transpose() / cosine, -1.0 / cosine;
   hit.J_pose.setZero();
   if (shot.pose) {
-    // The plane may be turned to face away from the camera; hit and derivatives are those of the board's own normal.
+    // The plane may be rotated to face away from the camera; hit and derivatives are those of the board's own normal.
     const Eigen::Quaterniond& rotation = shot.pose->cam_from_board.rotation;
     const Eigen::Vector3d z(0.0, 0.0, 1.0);
     const double board_cosine = (rotation * z).dot(beam.direction_in_cam);

@@ -21,9 +21,9 @@ struct PreparedShot {
   std::optional<Plane> plane;        ///< The board's; is compared with the reading.
   std::optional<BoardPose> pose;     ///< Where the plane comes from a board; else the plane's own covariance counts.
   const BoardView* board = nullptr;  ///< Its corners, where it has them.
-  double corner_factor = 1.0;  ///< On the corners' σ, as this board's fit tells: a near one shows that it is bent.
+  double corner_factor = 1.0;  ///< On the corners' σ, as this board's fit shows: a near one shows that it is curved.
   Eigen::Matrix<double, 6, Eigen::Dynamic> J_pose_lens;  ///< How the pose follows the lens; empty where it does not.
-  bool used = true;  ///< Of the laser: false for an outlier (its corners still tell of the lens).
+  bool used = true;  ///< Of the laser: false for an outlier (its corners still determine the lens).
 
   [[nodiscard]] int num_rows() const { return (plane ? 1 : 0) + (spot_px ? 2 : 0); }
 };

@@ -163,7 +163,7 @@ Beam aligned(const std::vector<ScanEdge>& edges, const std::vector<GreyImage>& d
   size << Eigen::Vector3d::Constant(origin_step_m), Eigen::Vector2d::Constant(direction_step_rad);
   for (const GreyImage& density : densities) {
     const Beam from = beam;
-    // The edges hardly tell the origin: it stays within some centimetres of the start unless they gain much.
+    // The edges hardly determine the origin: it stays within some centimetres of the start unless they gain much.
     const auto cost = [&](const Vector5& step) {
       const Beam trial = moved(from, step);
       const Eigen::Vector3d away_m = trial.origin_in_cam - start.origin_in_cam;

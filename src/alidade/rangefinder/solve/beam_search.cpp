@@ -51,7 +51,7 @@ double rank_of(const BeamSolution& solution) {
          (solution.converged ? 0.0 : as_good);
 }
 
-/// Another beam, not a place in the same minimum: more than 1σ of the best one away, what its covariance does not
+/// Another beam, not a point in the same minimum: more than 1σ of the best one away, what its covariance does not
 /// cover.
 bool is_another(const BeamSolution& best, const Beam& beam) {
   BeamVector away = BeamVector::Zero();
@@ -61,7 +61,7 @@ bool is_another(const BeamSolution& best, const Beam& beam) {
   return away.dot(best.normals.H * away) > 1.0;
 }
 
-/// One shot out of each of `size` classes of range: spread samples tell most.
+/// One shot out of each of `size` classes of range: spread samples determine most.
 Sample draw_sample(const Sample& by_range, std::size_t size, std::mt19937_64& bits) {
   Sample sample;
   for (std::size_t k = 0; k < size; ++k) {

@@ -29,7 +29,7 @@ struct OutlierSearch {
 [[nodiscard]] std::optional<Beam> find_outliers(BeamProblem& problem, const Camera& camera,
                                                 const OutlierSearch& search);
 
-/// How many shots a sample has, and how many there must be for outliers to be told.
+/// How many shots a sample has, and how many there must be for outliers to be identified.
 [[nodiscard]] std::size_t sample_size(const BeamProblem& problem);
 
 /// Has any shot a residual that its σ does not explain?

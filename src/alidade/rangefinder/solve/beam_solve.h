@@ -12,7 +12,7 @@ struct BeamProblem {
   std::vector<PreparedShot> shots;
   std::span<const Eigen::Vector3d> points_in_board;
   ShotModel model;
-  std::optional<double> sigma_corner_px;  ///< Takes the place of the corners' own covariances.
+  std::optional<double> sigma_corner_px;  ///< Replaces the corners' own covariances.
   bool estimate_scale = false;
   int max_iterations = 50;
 
@@ -20,7 +20,7 @@ struct BeamProblem {
   [[nodiscard]] int num_free() const { return estimate_scale ? 6 : 5; }
 };
 
-/// Normal equations of the laser's residuals, each whitened with its full covariance; poses and lens held.
+/// Normal equations of the laser's residuals, each whitened with its full covariance; poses and lens fixed.
 struct BeamNormals {
   BeamMatrix H = BeamMatrix::Zero();
   BeamVector g = BeamVector::Zero();

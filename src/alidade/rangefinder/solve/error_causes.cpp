@@ -35,7 +35,7 @@ Measured measured_by(const BeamProblem& problem) {
   return measured;
 }
 
-/// Where the readings lie: middle and half of their span.
+/// Where the readings lie: centre and half of their span.
 std::pair<double, double> span_of_readings(const BeamProblem& problem) {
   double least = 0.0, most = 0.0;
   for (const PreparedShot& shot : problem.shots) {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "alidade/beam/unit_direction.h"
-#include "alidade/rangefinder/solve/held_distortion.h"
+#include "alidade/rangefinder/solve/fixed_distortion.h"
 
 namespace alidade {
 namespace {
@@ -77,13 +77,13 @@ std::optional<double> carried_sigma(const Camera& camera, const VectorXd& along_
   return std::sqrt(u.dot(camera.cov.topLeftCorner(4, 4) * u));
 }
 
-/// Distortion that is held, and of which the file says no σ.
+/// Distortion that is fixed, and of which the file says no σ.
 void add_distortion(const ReducedSystem& system, const SolvedPart& part, const LensPrior& prior, const Camera& camera,
                     const VectorXd& g, const RangefinderReport& report, std::vector<FixedQuantity>& fixed) {
   const Camera wide = with_distortion(camera);
   const VectorXd values = params(with_distortion(report.camera).lens);
   const std::vector<std::string> names = param_names(wide.lens);
-  for (const int parameter : held_distortion(wide, prior.free)) {
+  for (const int parameter : fixed_distortion(wide, prior.free)) {
     const std::string& name = names[static_cast<std::size_t>(parameter)];
     const VectorXd along = VectorXd::Unit(system.H.rows(), system.of_lens(parameter));
     fixed.push_back(fixed_along("camera." + name, along, system, part, g, report));

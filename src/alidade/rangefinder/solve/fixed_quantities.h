@@ -5,7 +5,8 @@
 
 namespace alidade {
 
-/// What a solve held and took as given. `places`: of its parameters in the system; `inverse`: of their information.
+/// What a solve fixed and took as given. `places`: indices of its parameters in the system; `inverse`: of their
+/// information.
 struct SolvedPart {
   std::vector<Eigen::Index> places;
   Eigen::MatrixXd inverse;
@@ -14,7 +15,7 @@ struct SolvedPart {
 /// ∂cost/2 by all parameters of the system, with what the lens' prior pulls; `camera`: as it stands.
 [[nodiscard]] Eigen::VectorXd gradient_of(const ReducedSystem& system, const LensPrior& prior, const Camera& camera);
 
-/// Square and scale, focal length, centre and held distortion, flatness of the board: by how much each moves the beam,
+/// Square and scale, focal length, centre and fixed distortion, flatness of the board: by how much each moves the beam,
 /// and what the shots ask for. `camera`: as given. C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948 (the score test).
 [[nodiscard]] std::vector<FixedQuantity> fixed_quantities(const ReducedSystem& system, const SolvedPart& part,
                                                           const LensPrior& prior, const Camera& camera,
@@ -22,7 +23,7 @@ struct SolvedPart {
                                                           const RangefinderReport& report,
                                                           const RangefinderConfig& config);
 
-/// The σ of readings and spots: what the beam does where they are another, lens and poses held.
+/// The σ of readings and spots: what the beam does where they are another, lens and poses fixed.
 [[nodiscard]] std::vector<FixedQuantity> fixed_sigmas(const BeamProblem& problem, const RangefinderReport& report);
 
 }  // namespace alidade

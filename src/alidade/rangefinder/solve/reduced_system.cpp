@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "alidade/geometry/decompositions.h"
-#include "alidade/rangefinder/solve/held_distortion.h"
+#include "alidade/rangefinder/solve/fixed_distortion.h"
 
 namespace alidade {
 namespace {
@@ -15,7 +15,7 @@ std::vector<int> lens_columns(const LensPrior& prior, const Camera& camera) {
   std::vector<int> columns{0, 1, 2, 3};
   for (const int parameter : prior.free)
     if (parameter > 3) columns.push_back(parameter);
-  for (const int parameter : held_distortion(camera, prior.free)) columns.push_back(parameter);
+  for (const int parameter : fixed_distortion(camera, prior.free)) columns.push_back(parameter);
   return columns;
 }
 
@@ -80,9 +80,9 @@ Eigen::VectorXd ReducedSystem::square_column(const Beam& beam) const {
   return column;
 }
 
-ReducedSystem reduced_system(const BeamProblem& problem, const LensPrior& held_prior, const CommonState& state) {
+ReducedSystem reduced_system(const BeamProblem& problem, const LensPrior& lens_prior, const CommonState& state) {
   ReducedSystem reduced;
-  reduced.lens = lens_columns(held_prior, state.camera);
+  reduced.lens = lens_columns(lens_prior, state.camera);
   const auto num_lens = static_cast<Index>(reduced.lens.size());
   const LensPrior all_of_lens{reduced.lens, params(state.camera.lens), Eigen::MatrixXd::Zero(num_lens, num_lens)};
   reduced.H.setZero(num_beam_params + num_lens, num_beam_params + num_lens);
@@ -95,8 +95,8 @@ ReducedSystem reduced_system(const BeamProblem& problem, const LensPrior& held_p
     reduced.H += shot->A;
     reduced.shots.push_back(std::move(*shot));
   }
-  const std::vector<Index> of_prior = reduced.places(0, held_prior.free);
-  if (!of_prior.empty()) reduced.H(of_prior, of_prior) += held_prior.information;
+  const std::vector<Index> of_prior = reduced.places(0, lens_prior.free);
+  if (!of_prior.empty()) reduced.H(of_prior, of_prior) += lens_prior.information;
   return reduced;
 }
 

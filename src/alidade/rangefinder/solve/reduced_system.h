@@ -14,7 +14,7 @@ struct ErrorScore {
   Eigen::Matrix<double, 3, Eigen::Dynamic> by_common;
 };
 
-/// What one shot tells: its part A of the information and g = Jᵀr of the gradient, the board's pose eliminated.
+/// What one shot brings: its part A of the information and g = Jᵀr of the gradient, the board's pose eliminated.
 struct ReducedShot {
   std::size_t index = 0;  ///< In the problem's list.
   bool has_corners = false;
@@ -23,7 +23,7 @@ struct ReducedShot {
   ErrorScore errors;
 };
 
-/// Normal equations at a solution, shot by shot, also of what was held there: the beam's six parameters [origin m,
+/// Normal equations at a solution, shot by shot, also of what was fixed there: the beam's six parameters [origin m,
 /// direction rad, scale], then those of the lens that `lens` names: fx, fy, cx, cy, its distortion, and what was free.
 struct ReducedSystem {
   std::vector<int> lens;
@@ -40,12 +40,12 @@ struct ReducedSystem {
   [[nodiscard]] Eigen::VectorXd square_column(const Beam& beam) const;
 };
 
-/// At `state`; `held_prior`: the lens' prior where the lens was free, one without parameters where it was held. Shots
+/// At `state`; `lens_prior`: the lens' prior where the lens was free, one without parameters where it was fixed. Shots
 /// that have nothing to compare there are omitted.
-[[nodiscard]] ReducedSystem reduced_system(const BeamProblem& problem, const LensPrior& held_prior,
+[[nodiscard]] ReducedSystem reduced_system(const BeamProblem& problem, const LensPrior& lens_prior,
                                            const CommonState& state);
 
-/// The shots as clusters of the parameters at `places`, whose covariance by the model is `inverse`.
+/// The shots as clusters of the parameters at indices `places`, whose covariance by the model is `inverse`.
 [[nodiscard]] std::vector<ClusterStep> shot_clusters(const ReducedSystem& system,
                                                      const std::vector<Eigen::Index>& places,
                                                      const Eigen::MatrixXd& inverse);

@@ -27,12 +27,12 @@ struct CommonSystem {
   };
   Eigen::MatrixXd U;
   Eigen::VectorXd g;
-  std::vector<ShotBlock> blocks;  ///< One a shot.
+  std::vector<ShotBlock> blocks;  ///< One per shot.
   double cost = 0.0;
   double cost_with_old_weights = 0.0;
   int num_residuals = 0;
 
-  /// Schur complement over the poses, U − Σ Wᵀ V⁻¹ W: the information about the common parameters.
+  /// Schur complement over the poses, U − Σ Wᵀ V⁻¹ W: the information about the shared parameters.
   [[nodiscard]] Eigen::MatrixXd information() const;
 };
 

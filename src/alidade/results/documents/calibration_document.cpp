@@ -16,7 +16,7 @@ using Numbers = std::vector<double>;
 
 double rounded_to(double value, double step) { return std::isfinite(value) ? std::round(value / step) * step : value; }
 
-Eigen::Vector3d middle_of(const std::vector<Eigen::Vector3d>& points) {
+Eigen::Vector3d centre_of(const std::vector<Eigen::Vector3d>& points) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& point : points) sum += point;
   return sum / static_cast<double>(points.size());
@@ -41,12 +41,12 @@ struct PoseColumns {
 };
 
 /// Covariance of a board's centre in the camera's frame, six columns: the pose's, carried there.
-struct MiddleColumns {
-  Eigen::Vector3d middle_in_board;
+struct CentreColumns {
+  Eigen::Vector3d centre_in_board;
   std::array<Numbers, 6> values;
   void add(const ViewFit& fit) {
     Eigen::Matrix<double, 3, 6> J;
-    J << Eigen::Matrix3d::Identity(), -cross_matrix(middle_in_board);
+    J << Eigen::Matrix3d::Identity(), -cross_matrix(centre_in_board);
     J = fit.cam_from_board.rotation.toRotationMatrix() * J;
     const Eigen::Matrix3d cov = J * fit.pose_cov * J.transpose();
     std::size_t at = 0;
@@ -69,7 +69,7 @@ DataTable photos_table(const Board& board, const Calibration& calibration) {
   Numbers rms, z2;
   std::size_t cluster = 0;
   PoseColumns poses;
-  MiddleColumns middles{middle_of(points_in_board(board)), {}};
+  CentreColumns centres{centre_of(points_in_board(board)), {}};
   for (std::size_t k = 0; k < views.size(); ++k) {
     const ViewFit& fit = report.views[k];
     names.push_back(views[k].photo);
@@ -80,7 +80,7 @@ DataTable photos_table(const Board& board, const Calibration& calibration) {
     const bool has_score = fit.used && cluster < report.clusters.z2.size();
     z2.push_back(has_score ? report.clusters.z2[cluster++] : std::nan(""));
     poses.add(fit.used ? &fit.cam_from_board : nullptr);
-    middles.add(fit);
+    centres.add(fit);
   }
   DataTable table{"photos",
                   {{"name", names},
@@ -90,7 +90,7 @@ DataTable photos_table(const Board& board, const Calibration& calibration) {
                    {"rms_px", rms},
                    {"cluster_z2", z2}}};
   poses.append_to(table, "cam_from_board");
-  middles.append_to(table);
+  centres.append_to(table);
   return table;
 }
 
@@ -226,7 +226,7 @@ JsonValue sigma_of_photos(const CalibrateReport& report) {
   return sigma_values(given, report.clusters);
 }
 
-/// How a brown lens would do in the place of a flat port.
+/// How a brown lens would do instead of a flat port.
 JsonValue port_values(const PortResidual& residual) {
   JsonValue values = JsonValue::object();
   Numbers range, rms, worst;

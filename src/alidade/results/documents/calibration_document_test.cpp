@@ -103,7 +103,7 @@ TEST(CalibrationDocument, HasTheNamesOfTheContract) {
   expect_names(grids["halves"], {"delta_u_px", "delta_v_px", "predicted_sigma_px"});
 }
 
-TEST(CalibrationDocument, CountsAndNamesWhatWasLeftOut) {
+TEST(CalibrationDocument, CountsAndNamesWhatWasRejected) {
   const Calibration calibration = solved();
   const json document = json::parse(text_of(calibration));
   EXPECT_EQ(document["counts"]["given"], 11);

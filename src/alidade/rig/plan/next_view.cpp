@@ -16,7 +16,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t views_of_a_place = 3;
+constexpr std::size_t views_per_position = 3;
 constexpr double margin_share = 0.02;  // of the image's width that a board keeps from its edge
 
 /// Angles at which a rig is evaluated: the centre of the limits, and their corners.
@@ -57,7 +57,7 @@ class ViewPlanner {
   ViewPlan planned() && {
     for (std::size_t head = 0; head < state_.heads.size(); ++head) {
       for (std::size_t board = 0; board < now_.boards.size(); ++board) try_standing(head, board);
-      try_new_places(head);
+      try_new_positions(head);
     }
     return std::move(plan_);
   }
@@ -126,7 +126,7 @@ class ViewPlanner {
     return 0.5 * (std::log(std::max(1e-12, sigma.angle_rad)) + std::log(std::max(1e-12, sigma.length_m)));
   }
 
-  [[nodiscard]] Eigen::Vector3d middle_in_board() const {
+  [[nodiscard]] Eigen::Vector3d centre_in_board() const {
     Eigen::AlignedBox3d box;
     for (const auto& point : points_) box.extend(point);
     return box.center();
@@ -163,7 +163,7 @@ class ViewPlanner {
     const Eigen::Vector2d half(0.5, 0.5), size(rig_head.camera.width_px - 1, rig_head.camera.height_px - 1);
     for (const double reach : {1.0, 0.8, 0.6, 0.4}) {
       const auto ray = unproject(rig_head.camera, (half + reach * (share - half)).cwiseProduct(size));
-      const auto reading_rad = ray ? aim(rig_head.head, world_from_board * middle_in_board(), *ray) : std::nullopt;
+      const auto reading_rad = ray ? aim(rig_head.head, world_from_board * centre_in_board(), *ray) : std::nullopt;
       auto view = reading_rad ? predicted(head, world_from_board, *reading_rad) : std::nullopt;
       if (view) return view;
     }
@@ -205,12 +205,12 @@ class ViewPlanner {
     NextView next{.head = rig_head.head.id,
                   .pan_tilt_rad = views.front().pan_tilt_rad,
                   .world_from_board = world_from_board,
-                  .middle_px = Eigen::Vector2d::Zero(),
+                  .centre_px = Eigen::Vector2d::Zero(),
                   .gain = gain};
-    next.is_new_place = board >= now_.boards.size();
-    next.board = next.is_new_place ? new_number() : now_.boards[board].board;
-    const Eigen::Vector3d middle_in_world = world_from_board * middle_in_board();
-    if (const auto px = project(rig_head, next.pan_tilt_rad, middle_in_world)) next.middle_px = px->px;
+    next.is_new_position = board >= now_.boards.size();
+    next.board = next.is_new_position ? new_number() : now_.boards[board].board;
+    const Eigen::Vector3d centre_in_world = world_from_board * centre_in_board();
+    if (const auto px = project(rig_head, next.pan_tilt_rad, centre_in_world)) next.centre_px = px->px;
     next.cam_from_board = cam_from_world(rig_head.head, next.pan_tilt_rad) * world_from_board;
     plan_.next = next;
     plan_.with_next = *sigma;
@@ -224,18 +224,18 @@ class ViewPlanner {
 
   void try_standing(std::size_t head, std::size_t board) {
     const Rigid3& world_from_board = now_.boards[board].world_from_board;
-    for (int place = 0; place < 25; ++place) {
-      const Eigen::Vector2d share(0.1 + 0.2 * (place % 5), 0.1 + 0.2 * (place / 5));
+    for (int cell = 0; cell < 25; ++cell) {
+      const Eigen::Vector2d share(0.1 + 0.2 * (cell % 5), 0.1 + 0.2 * (cell / 5));
       if (const auto view = view_at(head, world_from_board, share)) weigh({*view}, head, board, world_from_board);
     }
   }
 
   /// The board before the camera, wherever the head can look, near and far, rotated as a user can.
-  void try_new_places(std::size_t head) {
+  void try_new_positions(std::size_t head) {
     const double tilt_rad = config_.max_tilt_of_board_deg * degree;
     const std::array<Eigen::Vector3d, 3> turns{Eigen::Vector3d{0, 0, 0}, {tilt_rad, 0, 0}, {0, tilt_rad, 0}};
-    for (int place = 0; place < 9; ++place) {
-      const Eigen::Vector2d share(0.15 + 0.35 * (place % 3), 0.15 + 0.35 * (place / 3));
+    for (int cell = 0; cell < 9; ++cell) {
+      const Eigen::Vector2d share(0.15 + 0.35 * (cell % 3), 0.15 + 0.35 * (cell / 3));
       const Eigen::Vector2d reading_deg(
           config_.min_pan_deg + share.x() * (config_.max_pan_deg - config_.min_pan_deg),
           config_.min_tilt_deg + share.y() * (config_.max_tilt_deg - config_.min_tilt_deg));
@@ -244,19 +244,19 @@ class ViewPlanner {
         const double distance_m = config_.min_range_m + way * (config_.max_range_m - config_.min_range_m);
         for (const Eigen::Vector3d& turn : turns) {
           const Eigen::Quaterniond rotation = exp_so3(turn);
-          const Eigen::Vector3d middle(0.0, 0.0, distance_m);
-          try_place(head, world_from_camera * Rigid3{rotation, middle - rotation * middle_in_board()});
+          const Eigen::Vector3d centre(0.0, 0.0, distance_m);
+          try_position(head, world_from_camera * Rigid3{rotation, centre - rotation * centre_in_board()});
         }
       }
     }
   }
 
-  void try_place(std::size_t head, const Rigid3& world_from_board) {
-    const std::array<Eigen::Vector2d, views_of_a_place> shares{Eigen::Vector2d{0.5, 0.5}, {0.15, 0.2}, {0.85, 0.8}};
+  void try_position(std::size_t head, const Rigid3& world_from_board) {
+    const std::array<Eigen::Vector2d, views_per_position> shares{Eigen::Vector2d{0.5, 0.5}, {0.15, 0.2}, {0.85, 0.8}};
     std::vector<HeadView> views;
     for (const Eigen::Vector2d& share : shares)
       if (auto view = view_at(head, world_from_board, share)) views.push_back(std::move(*view));
-    if (views.size() == views_of_a_place) weigh(views, head, now_.boards.size(), world_from_board);
+    if (views.size() == views_per_position) weigh(views, head, now_.boards.size(), world_from_board);
   }
 
   const RigCalibration& now_;

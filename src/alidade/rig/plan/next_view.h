@@ -34,9 +34,9 @@ struct NextView {
   int head = 1;                  ///< Its id.
   Eigen::Vector2d pan_tilt_rad;  ///< What its encoders are to read.
   int board = 0;                 ///< The number of the board's position.
-  bool is_new_place = false;     ///< The board is to be put elsewhere first.
+  bool is_new_position = false;  ///< The board is to be put elsewhere first.
   Rigid3 world_from_board;       ///< Its pose, actual or planned.
-  Eigen::Vector2d middle_px;     ///< Where the centre of the board is then seen.
+  Eigen::Vector2d centre_px;     ///< Where the centre of the board is then seen.
   Rigid3 cam_from_board;
   double gain = 0.0;  ///< ln of σ now over σ with it; of a new placement per view, of the three that it is worth.
 };

@@ -18,12 +18,12 @@ constexpr double boundless_acceleration_rad_s2 = 1e3, instant_s = 2e-3, coarse_s
 
 /// The largest rate that lasted for 0.15 s or more.
 double fastest(const std::vector<PositionerReading>& readings) {
-  constexpr double least_s = 0.15;
+  constexpr double min_s = 0.15;
   double largest = 0.0;
   for (std::size_t i = 0, j = 0; j < readings.size(); ++j) {
-    while (i + 1 < j && readings[j].t_s - readings[i + 1].t_s >= least_s) ++i;
+    while (i + 1 < j && readings[j].t_s - readings[i + 1].t_s >= min_s) ++i;
     const double dt = readings[j].t_s - readings[i].t_s;
-    if (dt >= least_s && dt < 1.0)
+    if (dt >= min_s && dt < 1.0)
       largest = std::max(largest, std::abs(readings[j].angle_rad - readings[i].angle_rad) / dt);
   }
   return largest;

@@ -178,7 +178,7 @@ double PositionerProblem::solve(PositionerVector& theta, const std::vector<int>&
 }
 
 bool PositionerProblem::find_sampling(const PositionerVector& theta, double& period_s, double& phase_s) const {
-  constexpr double slowest_hz = 3.0, fastest_hz = 120.0, least_gain = 0.5;
+  constexpr double slowest_hz = 3.0, fastest_hz = 120.0, min_gain = 0.5;
   const std::vector<double> angles = response(theta, times_);
   std::vector<Eigen::Vector3d> late;
   for (std::size_t i = 0; i < size(); ++i) {
@@ -196,7 +196,7 @@ bool PositionerProblem::find_sampling(const PositionerVector& theta, double& per
       best_hz = hz;
     }
   }
-  if (best < least_gain) return false;
+  if (best < min_gain) return false;
   const Harmonic found = harmonic_of(late, best_hz);
   const double amplitude = std::hypot(found.cosine, found.sine) * std::numbers::pi * best_hz;  // 1 of a full sawtooth
   if (amplitude < 0.5 || amplitude > 1.6) return false;

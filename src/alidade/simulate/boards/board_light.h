@@ -48,8 +48,8 @@ class WavyBackground {
 /// Second-order expansion of the point on the board around a pixel's centre, from the eight pixels around it.
 struct LocalPlace;
 
-/// The light of photo `i` of a scene, by casting rays through the lens on the (bent) board: the print's light, blurred
-/// by the optics, integrated over each pixel. Light is linear: what a lamp adds is computed alone and added.
+/// The light of photo `i` of a scene, by casting rays through the lens on the (curved) board: the print's light,
+/// blurred by the optics, integrated over each pixel. Light is linear: what a lamp adds is computed alone and added.
 class BoardLight {
  public:
   /// `seed` draws the background.

@@ -13,10 +13,10 @@ namespace alidade {
 
 std::vector<Eigen::Vector3d> draw_bent_points(const Board& board, const BoardSceneConfig& config, Draws& draws) {
   std::vector<Eigen::Vector3d> points = points_in_board(board);
-  const Eigen::Vector3d middle = 0.5 * (points.front() + points.back());
-  const Eigen::Vector3d half = (points.back() - middle).cwiseMax(1e-12);
+  const Eigen::Vector3d centre = 0.5 * (points.front() + points.back());
+  const Eigen::Vector3d half = (points.back() - centre).cwiseMax(1e-12);
   for (Eigen::Vector3d& point : points) {
-    const Eigen::Vector3d relative = (point - middle).cwiseQuotient(half);
+    const Eigen::Vector3d relative = (point - centre).cwiseQuotient(half);
     const double bow = config.bow_m * (1.0 - 0.5 * relative.head<2>().squaredNorm());
     point += Eigen::Vector3d(0.0, 0.0, bow) + config.shape_sigma_m * draws.normal3();
   }
@@ -55,8 +55,8 @@ Rigid3 draw_pose(const BoardScene& scene, const std::vector<Eigen::Vector3d>& ou
   const Camera& camera = scene.camera;
   const PrintedPattern pattern(scene.board);
   const Eigen::Vector2d size = pattern.print_max() - pattern.print_min();
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  middle.head<2>() = 0.5 * (pattern.print_max() + pattern.print_min());
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  centre.head<2>() = 0.5 * (pattern.print_max() + pattern.print_min());
   const Eigen::VectorXd lens = params(camera.lens);
   const double distance_at_fill_1 =
       std::max(lens[0] * size.x() / camera.width_px, lens[1] * size.y() / camera.height_px);
@@ -71,7 +71,7 @@ Rigid3 draw_pose(const BoardScene& scene, const std::vector<Eigen::Vector3d>& ou
     const double v = draws.uniform(0.1, 0.9) * camera.height_px, u = draws.uniform(0.1, 0.9) * camera.width_px;
     const auto ray = unproject(camera, {u, v});
     if (!ray) continue;
-    cam_from_board.translation = distance_at_fill_1 / fill / ray->z() * *ray - cam_from_board.rotation * middle;
+    cam_from_board.translation = distance_at_fill_1 / fill / ray->z() * *ray - cam_from_board.rotation * centre;
     if (sees_all(camera, cam_from_board, outline)) break;
   }
   return cam_from_board;

@@ -46,7 +46,7 @@ struct BoardSceneConfig {
 
 /// Moves the corners of each view by a smooth field of their position on the board, drawn again for each: a quadratic
 /// polynomial a coordinate of which each term has `sigma_px` at the board's border. What blur, rolling shutter, a
-/// bending board or a lens model that is too poor do: errors that a photo's corners share.
+/// board that flexes or a lens model that is too poor do: errors that a photo's corners share.
 void add_shared_errors(const BoardScene& scene, double sigma_px, std::uint64_t seed, std::vector<BoardView>& views);
 
 struct RenderConfig {
@@ -58,7 +58,7 @@ struct RenderConfig {
   int oversampling = 4;  ///< Sub-samples a pixel and axis where edges are; each is itself the mean over its area.
 };
 
-/// Photo `i` of the scene, 8-bit grey, rendered by casting rays through the lens on the (bent) board: the print's
+/// Photo `i` of the scene, 8-bit grey, rendered by casting rays through the lens on the (curved) board: the print's
 /// light, blurred by the optics, integrated over each pixel, with noise, rounded. Edges stand where the lens puts them
 /// to better than 0.002 px (tested). `seed` draws the noise, a different one for each photo.
 [[nodiscard]] cv::Mat render_board_photo(const BoardScene& scene, std::size_t i, const RenderConfig& config,

@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-/// The surface of a bent board: nominal position (s, t) → point in frame `board` [m]. Passes through every true point
+/// The surface of a curved board: nominal position (s, t) → point in frame `board` [m]. Passes through every true point
 /// of the board; between them and around them the displacement from the plane is a smooth cubic (Hermite) of both
 /// coordinates, and a parabola where the points lie on one.
 class BoardSurface {

@@ -106,9 +106,9 @@ std::optional<double> PrintedPattern::even_ink(const Eigen::Vector2d& place, con
 double PrintedPattern::nearest_disc_distance(const Eigen::Vector2d& place) const {
   const bool staggered = board_.kind == BoardKind::asymmetric_circles;
   const Eigen::Vector2d at = place / board_.square_m;
-  const int middle_row = static_cast<int>(std::lround(std::clamp(at.y(), -2.0, board_.rows + 1.0)));
+  const int centre_row = static_cast<int>(std::lround(std::clamp(at.y(), -2.0, board_.rows + 1.0)));
   double least = std::numeric_limits<double>::infinity();
-  for (int row = std::max(0, middle_row - 1); row <= std::min(board_.rows - 1, middle_row + 1); ++row) {
+  for (int row = std::max(0, centre_row - 1); row <= std::min(board_.rows - 1, centre_row + 1); ++row) {
     const double shift = staggered ? row % 2 : 0, pitch = staggered ? 2.0 : 1.0;
     const double col = std::clamp(std::round((at.x() - shift) / pitch), 0.0, board_.cols - 1.0);
     least = std::min(least, std::hypot(at.x() - (col * pitch + shift), at.y() - row));
@@ -173,7 +173,7 @@ void PrintedPattern::print_chessboard(const Board& board) {
   fill_margin(side);
   for (std::size_t row = 2; row + 2 < y_.num_cells(); ++row) {
     for (std::size_t col = 2; col + 2 < x_.num_cells(); ++col) {
-      const double x = x_.middle(col) / side + 1.0, y = y_.middle(row) / side + 1.0;
+      const double x = x_.centre(col) / side + 1.0, y = y_.centre(row) / side + 1.0;
       const int i = static_cast<int>(x), j = static_cast<int>(y);
       bool black = (i + j) % 2 == 0;
       if (has_markers && !black) {
@@ -205,7 +205,7 @@ void PrintedPattern::print_tags(const Board& board) {
   fill_margin(0.5 * side);
   for (std::size_t row = 2; row + 2 < y_.num_cells(); ++row) {
     for (std::size_t col = 2; col + 2 < x_.num_cells(); ++col) {
-      const double x = x_.middle(col) + pitch, y = y_.middle(row) + pitch;  // of the cell's pitch: tag, then gap
+      const double x = x_.centre(col) + pitch, y = y_.centre(row) + pitch;  // of the cell's pitch: tag, then gap
       const int i = static_cast<int>(x / pitch) - 1, j = static_cast<int>(y / pitch) - 1;
       const double tx = (x / pitch - (i + 1)) * pitch / side, ty = (y / pitch - (j + 1)) * pitch / side;
       const bool in_gap_x = tx > 1.0, in_gap_y = ty > 1.0;

@@ -37,7 +37,7 @@ class PrintedPattern {
     void finish();
     [[nodiscard]] std::size_t num_cells() const { return edges.size() + 1; }
     [[nodiscard]] std::size_t cell(double at) const;
-    [[nodiscard]] double middle(std::size_t cell) const { return 0.5 * (edges[cell - 1] + edges[cell]); }
+    [[nodiscard]] double centre(std::size_t cell) const { return 0.5 * (edges[cell - 1] + edges[cell]); }
   };
   /// A cell, and how much of its nearest neighbour is mixed in.
   struct Mix {

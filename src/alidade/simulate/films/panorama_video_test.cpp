@@ -45,9 +45,9 @@ Eigen::Vector2d expected_centroid(const cv::Point& spot,
 
 Eigen::Vector2d centroid(const cv::Mat& frame, const Eigen::Vector2d& around) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  const Eigen::Vector2i middle = around.array().round().cast<int>();
-  for (int v = middle.y() - 9; v <= middle.y() + 9; ++v)
-    for (int u = middle.x() - 9; u <= middle.x() + 9; ++u)
+  const Eigen::Vector2i centre = around.array().round().cast<int>();
+  for (int v = centre.y() - 9; v <= centre.y() + 9; ++v)
+    for (int u = centre.x() - 9; u <= centre.x() + 9; ++u)
       sum += frame.at<unsigned char>(v, u) * Eigen::Vector3d(u, v, 1.0);
   return sum.head<2>() / sum.z();
 }

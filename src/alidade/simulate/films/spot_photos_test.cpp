@@ -40,7 +40,7 @@ SpotPhotoConfig dim_light() {
 }
 
 /// A facing board at a distance, hit in the image's centre (160, 120), by a beam along the axis, at a position.
-SpotScene middle_scene(double range_m, const Eigen::Vector3d& place) {
+SpotScene centre_scene(double range_m, const Eigen::Vector3d& place) {
   const Camera camera{320, 240, Calibrated<Pinhole>{{400.0, 400.0, 160.0, 120.0, 0.0}}, {}, 0.0, ""};
   SpotScene scene{
       {camera, board, points_in_board(board), {}}, Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ(), {range_m}};
@@ -134,7 +134,7 @@ TEST(BoardLight, AddedLightHasItsCentroidAtTheProjectedHit) {
 TEST(SpotPhoto, ASpotOnAnEdgeLeansToThePaper) {
   // Facing board, the beam along the axis onto the vertical edge between squares: with ink's albedo a against paper's 1
   // the centroid of a Gaussian cut in half lies √(2/π) σ (1 − a)/(1 + a) to the paper's side.
-  const SpotScene scene = middle_scene(1.0, {2.0 * 0.05, 1.5 * 0.05, 0.0});
+  const SpotScene scene = centre_scene(1.0, {2.0 * 0.05, 1.5 * 0.05, 0.0});
   SpotPhotoConfig config = spots_without_noise();
   config.render.blur_px = 0.0;
   config.laser = {.peak = 45.0, .diameter_m = 0.03, .divergence_rad = 0.0};
@@ -150,7 +150,7 @@ TEST(SpotPhoto, ASpotOnAnEdgeLeansToThePaper) {
 TEST(SpotPhoto, PowerIsKeptWhenTheBeamWidens) {
   // Both beams are 12 mm wide at 1 m, where `peak` is stated; the light of one wide at the hit is as much as of the
   // other.
-  const SpotScene scene = middle_scene(1.7, {0.025, 0.075, 0.0});
+  const SpotScene scene = centre_scene(1.7, {0.025, 0.075, 0.0});
   SpotPhotoConfig config = dim_light();
   config.laser = {.peak = 150.0, .diameter_m = 0.012, .divergence_rad = 0.0};
   const double sum = added_light(scene, 0, config).sum;
@@ -160,8 +160,8 @@ TEST(SpotPhoto, PowerIsKeptWhenTheBeamWidens) {
   EXPECT_NEAR(added_light(scene, 0, config).sum / sum, 1.0, 0.015);
 }
 
-TEST(SpotPhoto, TooMuchLightIsWhiteInTheMiddleAndColouredAround) {
-  const SpotScene scene = middle_scene(1.0, {0.025, 0.075, 0.0});
+TEST(SpotPhoto, TooMuchLightIsWhiteInTheCentreAndColouredAround) {
+  const SpotScene scene = centre_scene(1.0, {0.025, 0.075, 0.0});
   for (const LaserColour colour : {LaserColour::red, LaserColour::green}) {
     SpotPhotoConfig config = dim_light();
     config.laser = {.colour = colour, .peak = 3000.0, .diameter_m = 0.012};

@@ -38,7 +38,7 @@ Eigen::Vector3d rgb_at(const cv::Mat& frame, int u, int v) {
   return {static_cast<double>(bgr[2]), static_cast<double>(bgr[1]), static_cast<double>(bgr[0])};
 }
 
-/// Middle of a white and of a black square, seen straight on from there.
+/// Centre of a white and of a black square, seen straight on from there.
 std::pair<Eigen::Vector3d, Eigen::Vector3d> white_and_black(double distance_m) {
   const double square_m = underwater_board().square_m, x = 0.5 * square_m, y = 0.5 * square_m;
   const cv::Mat one = render_underwater_frame(pinhole_camera(), before(x, y, distance_m), silent(), 1);
@@ -72,9 +72,9 @@ TEST(UnderwaterVideo, FarAwayThereIsWaterAlone) {
 TEST(UnderwaterVideo, TowardsTheEdgeThereIsMoreWater) {
   const cv::Mat frame = render_underwater_frame(pinhole_camera(), before(-2.0, -2.0, 0.6), silent(), 1);  // wall alone
   const double slant = std::hypot(1.0, 159.5 / 300.0, 119.5 / 300.0);  // distance over depth in the image's corner
-  const Eigen::Vector3d middle = rgb_at(frame, 160, 120) - Water{}.veil, corner = rgb_at(frame, 0, 0) - Water{}.veil;
+  const Eigen::Vector3d centre = rgb_at(frame, 160, 120) - Water{}.veil, corner = rgb_at(frame, 0, 0) - Water{}.veil;
   for (int channel = 0; channel < 3; ++channel)
-    EXPECT_NEAR(corner[channel], middle[channel] * std::exp(-Water{}.attenuation_per_m[channel] * 0.6 * (slant - 1.0)),
+    EXPECT_NEAR(corner[channel], centre[channel] * std::exp(-Water{}.attenuation_per_m[channel] * 0.6 * (slant - 1.0)),
                 1.1)
         << channel;
 }

@@ -47,7 +47,7 @@ std::size_t AngleInterpolation::interval_of(double t_s) const {
   return std::min(next > 0 ? next - 1 : 0, rows_.size() >= 2 ? rows_.size() - 2 : 0);
 }
 
-/// Three numbers that change smoothly: for attitudes the rotation since the reference row.
+/// Three values that change smoothly: for attitudes the rotation since the reference row.
 Eigen::Vector3d AngleInterpolation::value(std::size_t row, std::size_t reference) const {
   if (source_ == RotationSource::rate) return rows_[row].rate_rad_per_s;
   if (source_ == RotationSource::head) return rows_[row].pan_tilt_roll_rad;

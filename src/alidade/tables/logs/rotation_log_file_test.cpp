@@ -91,7 +91,7 @@ TEST_F(RotationLogText, WhatWasNotMeasuredIsMissing) {
   EXPECT_EQ(log.truth[1], (TrueIntrinsics{711, 700, 390, 290}));
 }
 
-TEST_F(RotationLogText, RowsThatSayTheSameAreLeftOutAndListed) {
+TEST_F(RotationLogText, RowsThatSayTheSameAreRejectedAndListed) {
   const auto read_log = read(rate_head + "0,0.1,0.2,1,2\n0,0.1,0.2,1,2\n0,0.1,0.2,1,2.5\n1,,,,\n1,,,,\n");
   EXPECT_EQ(read_log.log.rows.size(), 3u) << "the same time with another content stays";
   ASSERT_EQ(read_log.skipped.size(), 2u);

@@ -65,7 +65,7 @@ BlockCosts costs_of(const std::vector<std::vector<TargetObservation>>& stretches
   plain.tracker.learn_errors = plain.tracker.errors.num() > 0 && plain.tracker.method != TargetMotion::imm;
   BlockCosts best;
   double least = std::numeric_limits<double>::infinity();
-  // A right clock makes a target calmer, never livelier.
+  // A right clock makes a target calmer, never more manoeuvring.
   const int max_halvings = config.find_sigma_a ? 5 : 1;
   for (int k = 0; k < max_halvings; ++k) {
     plain.tracker.sigma_a_m_s2 = config.tracker.sigma_a_m_s2 * std::pow(0.5, k);

@@ -17,7 +17,7 @@ namespace {
 using Observations = std::vector<TargetObservation>;
 
 struct Hypothesis {
-  Explanation told;
+  Explanation explanation;
   std::function<void(TargetObservation&)> apply;
 };
 
@@ -149,7 +149,7 @@ std::optional<Explanation> explanation_of(std::span<const TargetObservation> obs
         changed.begin(), changed.begin() + static_cast<std::ptrdiff_t>(std::min(changed.size(), first_observations)));
     if (changed.size() > 2 * first_observations && !tried(some, heads, config).fits) continue;
     const Trial trial = tried(changed, heads, config);
-    if (trial.fits && trial.ln_p > as_given + min_gain) fitting.emplace_back(trial.ln_p, hypothesis.told);
+    if (trial.fits && trial.ln_p > as_given + min_gain) fitting.emplace_back(trial.ln_p, hypothesis.explanation);
   }
   if (fitting.empty()) return foreign_head(given, heads, config);
   std::ranges::stable_sort(fitting, std::ranges::greater{}, &std::pair<double, Explanation>::first);

@@ -154,9 +154,10 @@ double moved_by_motion(std::span<const TargetObservation> observations, std::spa
   double sum = 0.0, num = 0.0;
   for (std::size_t i = 0; i < std::min({max_observations, observations.size(), report.steps.size()}); ++i) {
     const TrackStep step = tracker.take(observations[i]);
-    const TrackStep& told = report.steps[i];
-    if (!step.has_belief || !told.has_belief || i < 20) continue;
-    for (int k = 0; k < 3; ++k) sum += std::pow(step.belief.x[k] - told.belief.x[k], 2) / (3.0 * told.belief.P(k, k));
+    const TrackStep& reported = report.steps[i];
+    if (!step.has_belief || !reported.has_belief || i < 20) continue;
+    for (int k = 0; k < 3; ++k)
+      sum += std::pow(step.belief.x[k] - reported.belief.x[k], 2) / (3.0 * reported.belief.P(k, k));
     num += 1.0;
   }
   return num > 0.0 ? std::sqrt(sum / num) : 0.0;

@@ -15,8 +15,8 @@ namespace alidade {
 namespace {
 
 constexpr double good_nees = 2.0, max_nees = 9.0;  // per degree of freedom, where the truth is given
-constexpr double good_nees_of_one = 3.8;           // where errors do not change along a track: 99 % of three numbers
-constexpr double care_left_out = 0.05, max_left_out = 0.2;
+constexpr double good_nees_of_one = 3.8;           // where errors do not change along a track: 99 % of three components
+constexpr double care_rejected = 0.05, max_rejected = 0.2;
 constexpr double min_used_share = 0.7, max_nis = 3.0, good_nis_low = 0.6, good_nis_high = 1.5;
 
 double used_share(const TrackReport& report) {
@@ -211,17 +211,17 @@ void add_checks(const TrackReport& report, Verdict& verdict) {
                                      ? text_of(100.0 * alone, 2) + " % seen by one head only: range drifts there"
                                      : "both heads see the target",
                                  alone, 0.02, "1"));
-  const double left_out = 1.0 - used_share(report);
+  const double rejected = 1.0 - used_share(report);
   const std::size_t num_left = report.steps.size() - report.num_used;
   verdict.checks.push_back(
       check("rejected",
-            left_out > max_left_out    ? State::bad
-            : left_out > care_left_out ? State::care
+            rejected > max_rejected    ? State::bad
+            : rejected > care_rejected ? State::care
                                        : State::good,
             std::to_string(num_left) + " of " + std::to_string(report.steps.size()) + " observations (" +
-                text_of(100.0 * left_out, 2) + " %) were rejected: " +
-                (left_out > care_left_out ? "what agrees is no more than what was let in" : "the others agree"),
-            left_out, care_left_out, "1"));
+                text_of(100.0 * rejected, 2) + " %) were rejected: " +
+                (rejected > care_rejected ? "what agrees is no more than what was let in" : "the others agree"),
+            rejected, care_rejected, "1"));
   const auto late = static_cast<double>(count(report, TrackEvent::late));
   if (late > 0.0)
     verdict.checks.push_back(
@@ -269,7 +269,7 @@ std::optional<Check> falling_target(std::span<const TargetObservation> observati
   // Where the noise is larger than stated, so is every logarithm: less by what is left of it (QAIC).
   const double gain = (ln_p(falls, config.tracker.gate) - as_given) / std::max(1.0, falls.nis_per_dof);
   // It explains only what then fits: of clutter both reject as much.
-  if (falls.num_starts == 0 || !(gain > min_gain) || used_share(falls) < 1.0 - care_left_out) return std::nullopt;
+  if (falls.num_starts == 0 || !(gain > min_gain) || used_share(falls) < 1.0 - care_rejected) return std::nullopt;
   return check(
       "falls", State::care,
       "the target moves as one that falls, or that is quiet and agile in turn: --method imm (ln of the ratio " +
@@ -289,7 +289,7 @@ Causes causes_of(const TrackReport& report, std::span<const TargetObservation> o
   FollowConfig found = config;
   if (report.num_starts > 0) found.tracker.sigma_a_m_s2 = report.sigma_a_m_s2;
   Causes causes;
-  if (!fits(report) || report.nis_per_dof > good_nis_high || used_share(report) < 1.0 - care_left_out)
+  if (!fits(report) || report.nis_per_dof > good_nis_high || used_share(report) < 1.0 - care_rejected)
     causes.mistake = explanation_of(observations, heads, config);
   if (causes.mistake && !causes.mistake->is_foreign_head) return causes;
   causes.shift = probable_clock_shift(observations, heads, found);
@@ -310,11 +310,11 @@ std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes,
   if (report.num_starts == 0 && are_parallel(observations, heads, config))
     return why_no_start(observations, heads, config);
   const double late = static_cast<double>(count(report, TrackEvent::late)) / static_cast<double>(report.steps.size());
-  if (late > max_left_out)
+  if (late > max_rejected)
     return Fault{text_of(100.0 * late, 2) + " % of the observations come more than " +
                      text_of(config.tracker.history_s, 2) + " s after others that were taken later",
                  "give them in order of capture, or check t_capture_s of each head: their clocks may differ by that"};
-  if (causes.mistake && (!fits(report) || used_share(report) < 1.0 - max_left_out)) return causes.mistake;
+  if (causes.mistake && (!fits(report) || used_share(report) < 1.0 - max_rejected)) return causes.mistake;
   if (fits(report)) return std::nullopt;
   if (causes.shift) return Fault{clock_text(*causes.shift, heads), "set the heads' clocks"};
   if (report.num_starts == 0) return why_no_start(observations, heads, config);

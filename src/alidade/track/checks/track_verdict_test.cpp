@@ -25,10 +25,10 @@ TEST(TrackVerdict, WhatThrowsAQuarterAwayIsNotConsistent) {
   const TrackReport report = track_target(observations, scene.heads, config);
   const Verdict verdict = track_verdict(report, observations, scene.heads, config);
   EXPECT_EQ(verdict.state, State::bad) << verdict.sentence;
-  const Check* left_out = check_of(verdict, "rejected");
-  ASSERT_NE(left_out, nullptr);
-  EXPECT_EQ(left_out->state, State::bad);
-  EXPECT_NEAR(left_out->value, 0.22, 0.05);
+  const Check* rejected = check_of(verdict, "rejected");
+  ASSERT_NE(rejected, nullptr);
+  EXPECT_EQ(rejected->state, State::bad);
+  EXPECT_NEAR(rejected->value, 0.22, 0.05);
 }
 
 /// One head's images come 0.1 s later than the other's.

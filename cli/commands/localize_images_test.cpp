@@ -91,7 +91,7 @@ TEST_F(LocalizeImageFolders, WhatShowsNothingIsRefused) {
 }
 
 /// Clean rendered images are matched better than real ones: the verdict says so, and what to tell.
-TEST_F(LocalizeImageFolders, TheLeastSigmaOfAMatchCanBeTold) {
+TEST_F(LocalizeImageFolders, TheLeastSigmaOfAMatchCanBeGiven) {
   const Json usual = Json::parse(localize("sim/frames", {"--rate", "30"}).out),
              given = Json::parse(localize("sim/frames", {"--rate", "30", "--sigma-px", "0.03"}).out);
   EXPECT_EQ(usual["estimate"]["sigma_px"], 0.11);

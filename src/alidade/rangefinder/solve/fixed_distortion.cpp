@@ -1,4 +1,4 @@
-#include "alidade/rangefinder/solve/held_distortion.h"
+#include "alidade/rangefinder/solve/fixed_distortion.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 namespace alidade {
 namespace {
 
-/// What boards in shots tell apart, and how far lenses go. Not the tangential: it is as a centre that lies aside, and
+/// What boards in shots separate, and how far lenses go. Not the tangential: it is as a centre that lies aside, and
 /// would take up one that the file has wrong.
 struct Distortion {
   std::string_view name;
@@ -21,7 +21,7 @@ bool has_sigma(const Camera& camera, int parameter) {
 
 }  // namespace
 
-std::vector<int> held_distortion(const Camera& camera, const std::vector<int>& free) {
+std::vector<int> fixed_distortion(const Camera& camera, const std::vector<int>& free) {
   const std::vector<std::string> names = param_names(camera.lens);
   std::vector<int> held;
   for (const Distortion& one : distortions) {
@@ -36,7 +36,7 @@ Camera with_open_distortion(const Camera& camera) {
   Camera open = with_distortion(camera);
   if (open.cov.rows() != params(open.lens).size()) return open;  // nothing of it is known
   const std::vector<std::string> names = param_names(open.lens);
-  for (const int parameter : held_distortion(open, {})) {
+  for (const int parameter : fixed_distortion(open, {})) {
     if (has_sigma(open, parameter)) continue;
     const auto one = std::ranges::find(distortions, names[static_cast<std::size_t>(parameter)], &Distortion::name);
     open.cov(parameter, parameter) = one->wide * one->wide;

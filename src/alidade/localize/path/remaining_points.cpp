@@ -1,4 +1,4 @@
-#include "alidade/localize/path/left_out_points.h"
+#include "alidade/localize/path/remaining_points.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -17,7 +17,7 @@ struct Look {
   double sigma_px = 0.5;
 };
 
-/// The place nearest to all rays. None: they are parallel.
+/// The point nearest to all rays. None: they are parallel.
 std::optional<Eigen::Vector3d> nearest_to_rays(const SmoothedPath& smoothed, std::span<const Look> looks) {
   Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -89,8 +89,8 @@ std::optional<PlacedPoint> placed_by(const SmoothedPath& smoothed, std::span<con
 
 }  // namespace
 
-void place_left_out(const SmoothedPath& smoothed, std::size_t first_frame, std::span<const ObservationFrame> frames,
-                    double sigma_px, double gate, std::vector<MapPoint>& map) {
+void locate_remaining(const SmoothedPath& smoothed, std::size_t first_frame, std::span<const ObservationFrame> frames,
+                      double sigma_px, double gate, std::vector<MapPoint>& map) {
   std::unordered_map<long, std::vector<Look>> looks;
   for (const MapPoint& point : map)
     if (!point.is_known && !std::ranges::binary_search(smoothed.ids, point.id)) looks[point.id];

@@ -90,13 +90,13 @@ int main(int argc, char** argv) {
   const std::string only = argc > 2 ? argv[2] : "";
   const std::vector<RigCase> cases{
       {"clean", "", {0.0}, [](RigTrialSetup&, double) {}},
-      {"clean, scale not given", "", {0.0}, [](RigTrialSetup& s, double) { s.tells_scale = false; }},
+      {"clean, scale not given", "", {0.0}, [](RigTrialSetup& s, double) { s.gives_scale = false; }},
       {"encoder scale, not given",
        "%",
        {1.0},
        [](RigTrialSetup& s, double v) {
          s.scene.encoder_scale = 1.0 + 0.01 * v;
-         s.tells_scale = false;
+         s.gives_scale = false;
        }},
       {"encoder scale, σ 0.02 % given",
        "%",
@@ -167,11 +167,11 @@ int main(int argc, char** argv) {
       {"readings drift, lengths exact",
        "mm",
        {2.0, 5.0, 10.0, 20.0, 50.0},
-       [](RangefinderTrialSetup& s, double v) { s.mistake.drift_m = 1e-3 * v, s.tells_lengths = true; }},
+       [](RangefinderTrialSetup& s, double v) { s.mistake.drift_m = 1e-3 * v, s.gives_lengths = true; }},
       {"readings bend by 1 m from 2 m, lengths exact",
        "mm",
        {1.0, 2.0, 5.0, 10.0},
-       [](RangefinderTrialSetup& s, double v) { s.mistake.bend_m = 1e-3 * v, s.tells_lengths = true; }},
+       [](RangefinderTrialSetup& s, double v) { s.mistake.bend_m = 1e-3 * v, s.gives_lengths = true; }},
       {"spots wander", "px", {0.5, 1.0, 2.0, 5.0}, [](RangefinderTrialSetup& s, double v) { s.mistake.wander_px = v; }},
       {"u and v exchanged, spots alone",
        "",

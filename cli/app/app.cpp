@@ -126,7 +126,7 @@ std::string usage_fault(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App& at = deepest(app);
   if (const std::string early = early_option(app, at); !early.empty()) {
     const std::string command = where(at).substr(0, where(at).find(':'));
-    return "'" + early + "' stands after the command: alidade " + command + (command.empty() ? "" : " ") +
+    return "'" + early + "' comes after the command: alidade " + command + (command.empty() ? "" : " ") +
            (subcommand_names(at).empty() ? "" : "COMMAND ") + early + " …";
   }
   std::string extra;
@@ -238,7 +238,7 @@ App::App() : state_(std::make_unique<State>()) {
       "    alidade simulate board --board 9x6 --square 0.025 --out photos\n"
       "    alidade calibrate photos --board 9x6 --square 0.025\n"
       "Each command has its own help, which ends with examples: alidade COMMAND --help\n"
-      "Exit codes: 0 an estimate that stands, 1 a fault of alidade, 2 wrong usage, 3 bad input, nothing written,\n"
+      "Exit codes: 0 a valid estimate, 1 a fault of alidade, 2 wrong usage, 3 bad input, nothing written,\n"
       "4 the data cannot determine the answer (what is missing is named), 5 no convergence, 6 an estimate that is not "
       "to be trusted\n"
       "(files are written), 130 interrupted.\n"
@@ -271,7 +271,7 @@ void App::add_fields(CLI::App& app, FieldList fields) {
     if (command.app != &app) continue;
     command.fields = std::move(fields);
     cli::add_fields(app, command.fields);
-    app.add_option("--config", command.config, "Options from a file, `name: value`; what is typed beats it")
+    app.add_option("--config", command.config, "Options from a file, `name: value`; the command line overrides it")
         ->type_name("FILE.yaml");
   }
 }

@@ -204,7 +204,7 @@ TEST(App, ARefusalIsWrittenAndSaysWhatToAdd) {
   const std::string out = (folder.path() / "out").string();
   const Outcome outcome = outcome_of({"work", "--out", out.c_str()}, [](cli::Run& run) {
     return run.finish(
-        {State::refused, ExitCode::cannot_tell, "pan only: fy cannot be determined", "tilt the camera as well", {}});
+        {State::refused, ExitCode::undetermined, "pan only: fy cannot be determined", "tilt the camera as well", {}});
   });
   EXPECT_EQ(outcome.code, 4);
   EXPECT_THAT(outcome.err, is_fault("work: pan only: fy cannot be determined; tilt the camera as well"));

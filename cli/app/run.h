@@ -41,7 +41,7 @@ struct CommonOptions {
 
 /// Whether there is an estimate, and files of it, usable or not to be trusted.
 [[nodiscard]] inline bool has_estimate(const Verdict& verdict) {
-  return tells_an_estimate(static_cast<int>(verdict.exit_code));
+  return is_estimate(static_cast<int>(verdict.exit_code));
 }
 
 /// One run of one command: collects inputs, results and files, and writes them all at the end, or none.

@@ -187,7 +187,7 @@ void add_batch(App& app) {
   auto args = std::make_shared<BatchArgs>();
   CLI::App& command = app.add_command(
       {.name = "batch",
-       .summary = "Many commands, a row each: one table of what became of them, and what stands out of the lot",
+       .summary = "Many commands, one per row: one table of their results, and the outliers of the lot",
        .examples = "  alidade batch jobs.csv --out lot\n"
                    "  alidade batch jobs.csv --out lot --resume\n"
                    "  mpirun -n 8 alidade batch jobs.csv --out lot && alidade batch jobs.csv --out lot --resume\n\n"

@@ -116,7 +116,7 @@ ExitCode compare(const DiffArgs& args, Run& run) {
   run.lap("compare");
   if (!diff) {
     return run.finish({State::refused,
-                       ExitCode::cannot_tell,
+                       ExitCode::undetermined,
                        "the two cameras see nothing in common",
                        "check that both are of the same lens",
                        {}});

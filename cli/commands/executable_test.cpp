@@ -110,11 +110,11 @@ TEST(Executable, UnknownCommandsAndNoCommandAreWrongUsage) {
 
 TEST(Executable, AnOptionBeforeItsCommandIsNamedWithItsPosition) {
   const std::pair<std::vector<std::string>, std::string> cases[] = {
-      {{"--json", "calibrate", "a.jpg"}, "'--json' stands after the command: alidade calibrate --json …"},
-      {{"--seed=3", "simulate", "board"}, "'--seed' stands after the command: alidade simulate board --seed …"},
-      {{"camera", "--json", "show", "a.yaml"}, "'--json' stands after the command: alidade camera show --json …"},
-      {{"--json", "camera"}, "'--json' stands after the command: alidade camera COMMAND --json …"},
-      {{"--seed", "3"}, "'--seed' stands after the command: alidade COMMAND --seed …"}};
+      {{"--json", "calibrate", "a.jpg"}, "'--json' comes after the command: alidade calibrate --json …"},
+      {{"--seed=3", "simulate", "board"}, "'--seed' comes after the command: alidade simulate board --seed …"},
+      {{"camera", "--json", "show", "a.yaml"}, "'--json' comes after the command: alidade camera show --json …"},
+      {{"--json", "camera"}, "'--json' comes after the command: alidade camera COMMAND --json …"},
+      {{"--seed", "3"}, "'--seed' comes after the command: alidade COMMAND --seed …"}};
   for (const auto& [words, message] : cases) {
     const Outcome outcome = run_alidade(words);
     EXPECT_EQ(outcome.code, 2) << message;

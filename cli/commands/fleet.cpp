@@ -47,9 +47,7 @@ void add_broker_options(CLI::App& command, FleetBroker& broker) {
   command.add_option("--creds", broker.credentials, "Credentials of a user (JWT and seed)")
       ->type_name("FILE")
       ->group(group);
-  command.add_option("--tls-ca", broker.ca, "Certificates of who signed the server's: TLS")
-      ->type_name("FILE")
-      ->group(group);
+  command.add_option("--tls-ca", broker.ca, "CA certificates of the server: TLS")->type_name("FILE")->group(group);
   CLI::Option* cert = command.add_option("--tls-cert", broker.certificate, "Own certificate")->type_name("FILE");
   CLI::Option* key = command.add_option("--tls-key", broker.key, "Its key")->type_name("FILE");
   cert->needs(key)->group(group);
@@ -232,7 +230,7 @@ void add_fleet_scenario(App& app) {
   number("--events", simulation.scene.event_share, "Share of the cameras to which something happens", 0.0, 1.0);
   number("--event-after", simulation.scene.event_after_s, "Not before, and within as long again [s]", 0.0, 1e9);
   number("--slip-sigmas", simulation.scene.slip_sigmas,
-         "Belts slip by so many σ of a row, nothing else happens; 0: drawn", 0.0, 1000.0);
+         "Belts slip by this many σ of a row, nothing else happens; 0: drawn", 0.0, 1000.0);
   number("--warming", simulation.scene.warming_c,
          "It gets so much warmer, and the focal length of that share follows it, instead of events [°C]", 0.0, 100.0);
   number("--warming-time", simulation.scene.warming_s, "Within [s]", 1.0, 1e9);

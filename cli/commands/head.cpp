@@ -115,7 +115,7 @@ FieldList fields_of(HeadArgs& args) {
        .form = "DIR"},
       {.name = "password_file",
        .value = &args.password_file,
-       .help = "Its first line is the password of who is named in the addresses (default: ALIDADE_PASSWORD)",
+       .help = "Its first line is the password of the user in the addresses (default: ALIDADE_PASSWORD)",
        .form = "FILE"},
       follow_field(args.look),
       {.name = "rig", .value = &args.rig, .help = "For --follow: rig.yaml of --calibrate", .form = "FILE"},
@@ -253,7 +253,7 @@ ExitCode calibrate_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
     return code;
   } catch (const Interrupted&) {
     if (!so_far.is_written()) throw;
-    throw Interrupted(fmt::format("interrupted; the head stands; what was measured is in {}: --resume {}",
+    throw Interrupted(fmt::format("interrupted; the head is stopped; what was measured is in {}: --resume {}",
                                   so_far.place(), run.options.out.string()));
   }
 }
@@ -305,7 +305,7 @@ ExitCode follow_by_head(HeadArgs& args, HeadDevice& device, Run& run) {
   so_far.remove();
   if (!following.is_interrupted) return code;
   std::raise(signal);
-  throw Interrupted(fmt::format("interrupted; the head stands; the {:.1f} s until then are in {}",
+  throw Interrupted(fmt::format("interrupted; the head is stopped; the {:.1f} s until then are in {}",
                                 following.head_time_s, run.options.out.string()));
 }
 

@@ -60,7 +60,7 @@ FieldList fields_of(LocalizeArgs& args) {
        .form = "FILE"},
       {.name = "start",
        .value = &args.start,
-       .help = "Where the camera starts, how fast, how sure; depths of points (start.yaml)",
+       .help = "Initial pose and velocity of the camera, σ; depths of points (start.yaml)",
        .form = "FILE"},
       {.name = "mask",
        .value = &args.mask,
@@ -76,8 +76,9 @@ FieldList fields_of(LocalizeArgs& args) {
        .form = "FILE"},
       {.name = "range",
        .value = &args.range,
-       .help = "What a rangefinder beside the camera reads, CSV: t_s,range_m; metres without a target, else a check of "
-               "its scale; needs --beam",
+       .help =
+           "Readings of a rangefinder beside the camera, CSV: t_s,range_m; metres without a target, else a check of "
+           "its scale; needs --beam",
        .form = "FILE"},
       {.name = "beam",
        .value = &args.beam,

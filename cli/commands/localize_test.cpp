@@ -195,7 +195,7 @@ TEST_F(LocalizeCommand, SaysWhatIsWrongWithItsInput) {
   expect(header + "0,0,1,1,1\n1,0,1,1,1\n", "is not after frame 0");
   expect(header + "1,0.1,1,1,1\n0,0.2,1,1,1\n", "runs backwards");
   expect(header + "0,0,1,1,1\n0,0.1,2,1,1\n", "differs from the first row of frame 0");
-  expect(header + "0,0,1,1,1\n0,0,1,2,2\n", "1 stands twice in frame 0");
+  expect(header + "0,0,1,1,1\n0,0,1,2,2\n", "1 appears twice in frame 0");
   expect(header + "0,0,-3,1,1\n", "column 'point_id'");
   EXPECT_EQ(localize({"--distortion", "some"}).code, 2);
   EXPECT_EQ(localize({"--sigma-px", "0"}).code, 2);
@@ -207,7 +207,7 @@ TEST_F(LocalizeCommand, SaysWhatIsWrongWithItsInput) {
     EXPECT_NE(outcome.err.find(what), std::string::npos) << outcome.err;
   };
   bad_file("--target", "points: []\n", "has no points");
-  bad_file("--target", "points: [{id: 1, x_m: 0, y_m: 0, z_m: 0}, {id: 1, x_m: 1, y_m: 0, z_m: 0}]\n", "stands twice");
+  bad_file("--target", "points: [{id: 1, x_m: 0, y_m: 0, z_m: 0}, {id: 1, x_m: 1, y_m: 0, z_m: 0}]\n", "appears twice");
   bad_file("--target", "points: [{id: 1, x_m: .nan, y_m: 0, z_m: 0}]\n", "x_m");
   bad_file("--target", "rectangle: {width_m: 1, height_m: 1}\n", "is found in images");
   bad_file("--target", "points: [{id: 1, x_m: 0, y_m: 0, z_m: 0}]\nseen_from: above\n", "is not +z or -z");

@@ -51,7 +51,7 @@ Outcome run_into(const fs::path& out, Work work, std::vector<std::string> more =
 }
 
 Verdict verdict_of(State state) {
-  const ExitCode code = state == State::refused         ? ExitCode::cannot_tell
+  const ExitCode code = state == State::refused         ? ExitCode::undetermined
                         : state == State::not_converged ? ExitCode::no_convergence
                                                         : ExitCode::ok;
   return {state, code, "what was found", "what to do", {}};

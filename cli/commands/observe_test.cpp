@@ -23,7 +23,7 @@ Outcome observe_motion(const std::string& motion) {
       {ALIDADE_EXECUTABLE, "observe", log + "/log.csv", "--size", "780x582", "--out", out, "--no-report"});
 }
 
-TEST(Observe, RefusesByNameWhatTheMotionCannotTell) {
+TEST(Observe, RefusesByNameWhatTheMotionDoesNotDetermine) {
   EXPECT_EQ(observe_motion("sway").code, 0);
   const auto expect = [](const std::string& motion, const std::string& reason) {
     const Outcome outcome = observe_motion(motion);

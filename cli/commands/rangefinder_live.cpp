@@ -166,7 +166,7 @@ ExitCode rangefinder_live(const Camera& camera, const RangefinderConfig& config,
   if (!args.resume.empty() && !run.options.out_is_given) run.options.out = args.resume;
   std::error_code ignored;
   if (!args.resume.empty() && !std::filesystem::equivalent(args.resume, run.options.out, ignored))
-    throw UsageError("--resume goes on in its own folder: leave --out away");
+    throw UsageError("--resume continues in its own folder: omit --out");
   ImageSource source = opened_source(args.from);
   RangefinderConfig quick = config;
   quick.rates_next_shots = false;  // a map for the report

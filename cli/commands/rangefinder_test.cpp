@@ -184,7 +184,7 @@ TEST_F(RangefinderCommand, PlanProposesShotsThatLowerTheUncertainty) {
   EXPECT_LT(estimate["sigma_planned_origin_m"], estimate["sigma_now_origin_m"]);
 }
 
-TEST_F(RangefinderCommand, WhatCannotTellIsRefusedByName) {
+TEST_F(RangefinderCommand, DegenerateDataAreRefusedByName) {
   for (const auto& [scenario, method, reason] :
        std::vector<std::array<std::string, 3>>{{"equal_range", "spot", "equal ranges"},
                                                {"equal_range", "plane", "equal ranges"},
@@ -219,7 +219,7 @@ TEST_F(RangefinderCommand, AnotherBoardAndTheSameShotTwiceAreNamed) {
   table += table.substr(table.rfind('\n', table.size() - 2) + 1);
   const Outcome twice = calibrate_table(table);
   EXPECT_EQ(twice.code, 3);
-  EXPECT_NE(twice.err.find("the same shot stands in a row before"), std::string::npos) << twice.err;
+  EXPECT_NE(twice.err.find("the same shot is in an earlier row"), std::string::npos) << twice.err;
 }
 
 TEST_F(RangefinderCommand, WrongShotsAreNamed) {

@@ -105,7 +105,7 @@ void add_rig(App& app) {
   auto args = std::make_shared<RigArgs>();
   CLI::App& command = app.add_command(
       {.name = "rig",
-       .summary = "Axes, offsets and mounting of pan-tilt heads, and where they stand to each other",
+       .summary = "Axes, offsets and mounting of pan-tilt heads, and their relative poses",
        .examples =
            "alidade rig views.csv --camera camera.yaml --board 9x6 --square 0.025\n"
            "alidade rig views.csv --camera left.yaml --camera right.yaml --board 9x6 --square 0.025\n"

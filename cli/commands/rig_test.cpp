@@ -127,7 +127,7 @@ TEST_F(RigCommand, OptionsMayStandInAFile) {
   EXPECT_EQ(from_file["estimate"], typed["estimate"]);
   EXPECT_NE(Json::parse(with_file({}).out)["estimate"], typed["estimate"]);
   write_file(path("rig.yaml"), "board: 9x6\nsquare_m: 0.025\nestimate: [auto, scale]\n");
-  EXPECT_THAT(with_file({}).err, ::testing::HasSubstr("'auto' stands alone"));
+  EXPECT_THAT(with_file({}).err, ::testing::HasSubstr("'auto' excludes the others"));
   EXPECT_EQ(calibrate(path("sim/views.csv"), {"--clocks", "3"}).code, 2);
   EXPECT_EQ(calibrate(path("sim/views.csv"), {"--scales", "--sigma-scale", "0.1"}).code, 2);
 }
@@ -258,7 +258,7 @@ TEST_F(RigCommand, SaysWhatIsWrongWithItsInput) {
   expect(header + "0,0,1,45,0,0,1,1\n", "views.csv:2: column 'pan_rad': '45' is more than a turn; angles are radians");
   expect(header + "0,0,1,0,nan,0,1,1\n", "views.csv:2: column 'tilt_rad': 'nan' is not a finite number");
   expect(header + "0,0,1,0,0,54,1,1\n", "views.csv:2: column 'corner': '54' is not a corner of a board of 54");
-  expect(header + "0,0,1,0,0,3,1,1\n0,0,1,0,0,3,1,1\n", "views.csv:3: column 'corner': 3 stands twice in view 0");
+  expect(header + "0,0,1,0,0,3,1,1\n0,0,1,0,0,3,1,1\n", "views.csv:3: column 'corner': 3 appears twice in view 0");
   expect(header + "0,0,1,0,0,3,1,1\n0,0,1,0.1,0,4,1,1\n",
          "views.csv:3: column 'pan_rad': '0.1' differs from the first");
   expect(header + "0,0,1,0,0,3,1,1\n0,0,2,0,0,4,1,1\n", "views.csv:3: column 'head': '2' differs from the first");

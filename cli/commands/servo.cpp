@@ -105,15 +105,14 @@ void add_servo(App& app) {
   command.add_option("--seeds", args->seeds, "Runs of each controller, from --seed on")->check(CLI::Range(1, 1000));
   command.add_option("--latency-ms", args->latency_ms, "From an image to its pixel")
       ->check(finite_number() & CLI::Range(0.0, 10000.0));
-  command.add_option("--true-gain", args->gain_factor, "The plant's gain as it is, over what is known of it")
+  command.add_option("--true-gain", args->gain_factor, "The plant's true gain over the known one")
       ->check(finite_number() & CLI::Range(0.01, 100.0));
-  command.add_option("--true-tau", args->tau_factor, "The plant's time constant as it is, over what is known of it")
+  command.add_option("--true-tau", args->tau_factor, "The plant's true time constant over the known one")
       ->check(finite_number() & CLI::Range(0.01, 100.0));
   command
-      .add_option(
-          "--intrinsics", args->intrinsics,
-          "What the loop goes by where lenses zoom: given (the rig's, whatever they do), observed (estimated on-line "
-          "from what stands still in the images), true")
+      .add_option("--intrinsics", args->intrinsics,
+                  "Intrinsics that the loop uses where lenses zoom: given (the rig's), observed (estimated on-line "
+                  "from static points in the images), true")
       ->check(CLI::IsMember({"given", "observed", "true"}));
   command.add_flag("--no-robustness", args->no_robustness, "Skip the grid over gain and time constant");
   command.add_flag(

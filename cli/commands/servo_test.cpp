@@ -181,12 +181,12 @@ TEST_F(ServoCommand, SaysWhatIsWrongWithItsScenario) {
   expect("plant: {pan_deg: [10, -10]}\n", "must be two angles, the lower one first");
   expect("pi: {kp: 2}\n", "pi.unit: is missing");
   expect("controllers: []\n", "names none");
-  expect("controllers: [pi, pi]\n", "'pi' stands twice");
+  expect("controllers: [pi, pi]\n", "'pi' appears twice");
   expect("controllers: [fuzzy]\n", "'fuzzy' is not one of");
   expect("duration_s: 1\n", "is not longer than the warm-up");
   expect("latency_s: 9.99\nsample_period_s: 0.01\n", "more than 200 images late");
   expect("seeds: 1.5\n", "is not a whole number");
-  expect("seeds: 2\nseeds: 3\n", "stands twice");
+  expect("seeds: 2\nseeds: 3\n", "appears twice");
   expect("hidden_s: [3, 2]\n", "3 is not before 2");
   expect("filter: {sigma_deg_s2: [1, 2]}\n", "must be one number, or 5");
   expect("rig: nowhere.yaml\n", "nowhere.yaml");

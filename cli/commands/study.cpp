@@ -138,7 +138,7 @@ ExitCode run_trial(const StudyArgs<Study>& args, Run& run) {
         fmt::format("--trial: {} is none of the {} trials, which count from 0", *options.trial, options.trials));
   }
   if (!options.shard.empty()) throw UsageError("--trial: one trial has no shards; leave --shard out");
-  if (!options.vary.empty()) throw UsageError("--trial: set what is varied to the value that is meant, without --vary");
+  if (!options.vary.empty()) throw UsageError("--trial: set the varied setting to its value, without --vary");
   run.document.command = Study::name;
   JobOutcome outcome = trial_outcome(args.study, run.options.seed, *options.trial);
   outcome.lines.insert(outcome.lines.begin(), fmt::format("trial {} of a study of {}, seed {}", *options.trial,

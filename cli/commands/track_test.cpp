@@ -266,7 +266,7 @@ TEST_F(TrackCommand, SaysWhatIsWrongWithItsInput) {
   expect(header + "0.2,0.1,1,0,0,1,1\n", "arrives before its capture");
   expect(header + "0,0.2,1,0,0,1,1\n0.05,0.1,2,0,0,1,1\n", "bad.csv:3: column 't_arrival_s': '0.1' runs backwards");
   expect(header + "0,0,1,0,0,1,1\n0,0,2,0,0,1,1\n0,0,1,0,0,1,1\n",
-         "bad.csv:4: column 't_capture_s': '0' stands in a row");
+         "bad.csv:4: column 't_capture_s': '0' is in an earlier row");
   expect(header + "0,0,1,nan,0,1,1\n", "column 'pan_rad': 'nan' is not a finite number");
   expect(header + "0,0,1,0,0,1e9,1\n", "is in no image");
   EXPECT_EQ(track({"--method", "magic"}).code, 2);

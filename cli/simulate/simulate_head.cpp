@@ -66,7 +66,7 @@ void add_head_scenario(App& app) {
       ->check(CLI::Range(0, 65535));
   command.add_option("--onvif", args->onvif_port, "Port of the head, as a network camera; 0: any that is free")
       ->check(CLI::Range(0, 65535));
-  command.add_option("--user", args->user, "Who alone may ask by ONVIF; the password stands in ALIDADE_PASSWORD");
+  command.add_option("--user", args->user, "The only user accepted by ONVIF; the password is in ALIDADE_PASSWORD");
   command.add_option("--stream", args->stream_port, "Port of its camera, motion JPEG; 0: any that is free")
       ->check(CLI::Range(0, 65535));
   command.add_option("--address", args->address, "Where to listen")->capture_default_str();
@@ -79,7 +79,7 @@ void add_head_scenario(App& app) {
                      "(columns:rows:square:distance:pan:tilt, m and degrees), seed");
   command.add_option("--truth", args->truth, "Where each frame's time and true angles are written, CSV")
       ->type_name("FILE");
-  command.add_option("--watchdog", args->watchdog_s, "Stops by itself after so many seconds of silence; 0: never")
+  command.add_option("--watchdog", args->watchdog_s, "Stops by itself after this many seconds of silence; 0: never")
       ->check(finite_number() & CLI::Range(0.0, 3600.0))
       ->capture_default_str();
   command.add_option("--seconds", args->seconds, "Ends by itself after so long (default: at Ctrl-C)")

@@ -150,17 +150,17 @@ void add_rangefinder_scenario(App& app) {
          0.0, 100.0);
   number("--offset-m", args->mistake.offset_m, "What each reading is too long by [m]", -1.0, 1.0);
   number("--focal-error", args->mistake.focal, "Share by which the camera file's focal length is too long", -0.5, 0.5);
-  number("--centre-error", args->mistake.centre_px, "Pixels by which its centre lies aside, in u and v", -1e3, 1e3);
+  number("--centre-error", args->mistake.centre_px, "Error of its centre in u and v [px]", -1e3, 1e3);
   number("--k1-error", args->mistake.k1, "What its k1 is too large by", -1.0, 1.0);
   number("--drift-m", args->mistake.drift_m, "What the readings drift by from the first shot to the last [m]", -1.0,
          1.0);
   number("--bend-m", args->mistake.bend_m, "Curvature of the readings: too long by this 1 m from 2 m [m]", -1.0, 1.0);
   number("--wander-px", args->mistake.wander_px, "What the spots move by from the first shot to the last", -1e3, 1e3);
-  command.add_flag("--exchange-uv", args->mistake.exchange_uv, "u of the spots stands in the column of v");
+  command.add_flag("--exchange-uv", args->mistake.exchange_uv, "u and v of the spots are exchanged");
   command.add_option("--unit", args->unit, "Of the readings in the table")
       ->check(CLI::IsMember({"m", "mm", "cm", "inch", "feet"}))
       ->capture_default_str();
-  command.add_option("--shift-rows", args->mistake.shift_rows, "Ranges stand so many rows late")
+  command.add_option("--shift-rows", args->mistake.shift_rows, "Ranges are this many rows late")
       ->check(CLI::Range(-100, 100))
       ->capture_default_str();
   number("--speckle", args->speckle, "With --photos: contrast of the laser's speckle, 1 is full", 0.0, 1.0);

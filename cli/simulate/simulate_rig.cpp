@@ -147,8 +147,8 @@ void add_rig_scenario(App& app) {
   number("--backlash-deg", args->backlash_deg, "Backlash of each axis [deg]", 0.0, 10.0);
   number("--focal-error", args->mistake.focal, "Share by which the camera files' focal lengths are too long", -0.5,
          0.5);
-  number("--centre-error", args->mistake.centre_px, "Pixels by which their centres lie aside, in u and v", -1e3, 1e3);
-  command.add_flag("--swap-angles", args->mistake.swap_angles, "Pan stands in the column of tilt");
+  number("--centre-error", args->mistake.centre_px, "Error of their centres in u and v [px]", -1e3, 1e3);
+  command.add_flag("--swap-angles", args->mistake.swap_angles, "Pan and tilt are exchanged");
   command.add_flag("--flip-pan", args->mistake.flip_pan, "Pan counts the other way");
   command.add_flag("--mirror", args->mistake.mirror, "Images are mirrored");
   command.add_flag("--swap-heads", args->mistake.swap_heads, "The heads' numbers are exchanged");

@@ -298,13 +298,13 @@ void add_options(CLI::App& command, SimulateRotationArgs& args) {
   command
       .add_option(
           "--photos", args.photos,
-          "Render so many photos of a camera that is turned by hand instead, and matches between them: photos/, "
+          "Render so many photos of a camera that is rotated by hand instead, and matches between them: photos/, "
           "pairs.csv")
       ->check(CLI::Range(2, 200));
   number("--zoomed", args.zoomed, "Focal length of the central photo over the others'", 0.2, 5.0);
   command.add_option("--photo", args.photo, "What the world of videos and photos looks like (default: noise)")
       ->type_name("FILE");
-  number("--photo-deg", args.photo_deg, "How wide that photo stands in the world", 1.0, 360.0);
+  number("--photo-deg", args.photo_deg, "Angular width of that photo in the world", 1.0, 360.0);
   number("--noise", args.panorama.noise, "Grey noise of the frames, of 255", 0.0, 100.0);
   number("--blur", args.panorama.blur_px, "Optical blur of the frames [px]", 0.0, 20.0);
   number("--k1", args.k1, "True radial distortion", -0.4, 0.4);

@@ -229,9 +229,8 @@ void add_track_scenario(App& app) {
           "hidden for a while; E B, images 100 ms late; F C, 100 ms late; G C, 20 and 30 images a second; "
           "throw a ball thrown up and caught")
       ->capture_default_str();
-  command.add_option(
-      "--path", args->path,
-      "Where the target goes instead, from the first row on: t_s,x_m,y_m,z_m; after the last it stands still");
+  command.add_option("--path", args->path,
+                     "Path of the target instead, from the first row on: t_s,x_m,y_m,z_m; after the last it rests");
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
     return command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high));
   };

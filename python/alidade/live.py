@@ -21,7 +21,7 @@ class OneByOne:
 
     def __reduce__(self) -> NoReturn:
         name = type(self).__name__
-        raise TypeError(f"a {name} is neither copied nor pickled, as it stands in a stream: keep what finish() gives, or what was pushed, "
+        raise TypeError(f"a {name} is neither copied nor pickled, as it belongs to a stream: keep what finish() gives, or what was pushed, "
                         f"and push that into another {name}")
 
 

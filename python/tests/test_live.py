@@ -32,7 +32,7 @@ class Live(InFolder):
         al.simulate.track(scenario="B", duration=1).save(self.folder / "few")
         for one in (al.Tracker(self.folder / "few" / "rig.yaml"), al.Observer((640, 480)), al.CaptureGuide(BOARD)):
             for work in (pickle.dumps, copy.copy, copy.deepcopy):
-                with self.subTest(one=type(one).__name__, work=work.__name__), self.assertRaisesRegex(TypeError, "stands in a stream: keep what finish"):
+                with self.subTest(one=type(one).__name__, work=work.__name__), self.assertRaisesRegex(TypeError, "belongs to a stream: keep what finish"):
                     work(one)
 
     def test_observer_has_the_answer_of_observe(self):

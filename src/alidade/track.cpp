@@ -123,7 +123,7 @@ Verdict paper_verdict(const TrackReport& report) {
   Verdict verdict;
   if (report.status == TrackReport::Status::no_start) {
     return {State::refused,
-            ExitCode::cannot_tell,
+            ExitCode::undetermined,
             "the two heads' axes never meet in front of them",
             "check that events of both heads are there, or use --method cv",
             {}};
@@ -179,7 +179,7 @@ TargetTrack track(std::vector<TargetObservation> observations, Rig rig, const Tr
   const std::vector<RigHead>& heads = result.rig.heads;
   if (result.observations.empty()) {
     result.verdict = {
-        State::refused, ExitCode::cannot_tell, "there are no observations", "give those of two heads", {}};
+        State::refused, ExitCode::undetermined, "there are no observations", "give those of two heads", {}};
   } else if (config.method == TrackMethod::xiahou2015) {
     static_cast<TrackReport&>(result) =
         track_target_xiahou(result.observations, heads, xiahou_config(config, heads), result.truth, watch);

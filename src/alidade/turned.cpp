@@ -173,7 +173,7 @@ ObserveReport refused_photo_size(const PhotoMatches& found, const std::pair<int,
   count_rotated_photos(found.photos.names, report);
   const auto text = [](int width, int height) { return std::to_string(width) + "x" + std::to_string(height); };
   report.verdict.state = State::refused;
-  report.verdict.exit_code = ExitCode::cannot_tell;
+  report.verdict.exit_code = ExitCode::undetermined;
   report.verdict.sentence = "the photos are " + text(report.width_px, report.height_px) +
                             ", but the camera or --size says " + text(given.first, given.second);
   report.verdict.to_add = "give the camera, and the size, of these photos";

@@ -166,7 +166,7 @@ std::string what_may_be_wrong(const CalibrationWork& work) {
     if (first == work.far[k].end()) continue;
     const auto at = static_cast<std::size_t>(first - work.far[k].begin());
     return "correct " + work.views[k].photo + ", corner " + std::to_string(work.views[k].corners[at].index) +
-           ", which lies far from the others, or leave it out with --outliers drop";
+           ", which lies far from the others, or reject it with --outliers drop";
   }
   return "check --board and --square, and look at the photos that fit worst";
 }
@@ -185,7 +185,7 @@ void judge(const CalibrationWork& work, const BundleResult& result, bool settled
     refuse(report,
            "gap_m comes out below zero, " + std::to_string(port->params[10]) + " with a σ of " +
                std::to_string(std::sqrt(report.camera.cov(10, 10))),
-           "if the lens stands on the glass, hold the gap: --gap 0 --fix gap_m; else check --glass and --n-water");
+           "if the lens touches the glass, fix the gap: --gap 0 --fix gap_m; else check --glass and --n-water");
   } else if (!settled) {
     report.status = CalibrateReport::Status::no_convergence;
     report.reason = "the solve did not settle in " + std::to_string(report.iterations) + " iterations";

@@ -125,7 +125,7 @@ std::optional<WrongBoard> given_wrongly(const std::vector<std::size_t>& in_vain,
     const std::string options = changed_options(given, *meant);
     return WrongBoard{"the photos do not show the board as given, " + std::to_string(given.cols) + "×" +
                           std::to_string(given.rows) + (given.dictionary.empty() ? "" : " with " + given.dictionary),
-                      "use " + options + ": that board stands in them"};
+                      "use " + options + ": they show that board"};
   }
   if (other_grid.empty()) return std::nullopt;
   return WrongBoard{other_grid, "check --board, which counts inner corners"};

@@ -123,7 +123,7 @@ TEST(CalibratePhotos, ABoardGivenInSquaresIsNamedInInnerCorners) {
   const auto result = calibrate_photos(photos().names, photos().loader(), squares, {});
   EXPECT_EQ(result.report.status, CalibrateReport::Status::degenerate);
   EXPECT_EQ(result.report.reason, "the photos do not show the board as given, 10×7");
-  EXPECT_EQ(result.report.to_add, "use --board 9x6: that board stands in them");
+  EXPECT_EQ(result.report.to_add, "use --board 9x6: they show that board");
 }
 
 TEST(CalibratePhotos, NoPhotoAtAllIsARefusal) {

@@ -75,7 +75,7 @@ Calibration judge_calibration(const Board& board, PhotoCalibration photos, Calib
   result.counts = count_photos(result);
   result.assumed = count_assumptions(board, result.config, result.board_views, air, result);
   result.study = study_calibration(board, result.board_views, result.config, result,
-                                   max_telling(transfers, result.config.board_shape), progress);
+                                   max_informative(transfers, result.config.board_shape), progress);
   result.next = plan_next_photos(result.camera, shared_noise_px(result), result.board_points, 1, progress);
   result.port = port_residual(result.camera);
   result.verdict = calibration_verdict(result, result.study, result.board_views, result.config, result.next);

@@ -47,7 +47,7 @@ Verdict corners_verdict(const FoundCorners& found) {
   if (found.num_corners == 0) {
     const bool is_given = calibration.to_add.starts_with("use ");
     verdict.state = State::refused;
-    verdict.exit_code = ExitCode::cannot_tell;
+    verdict.exit_code = ExitCode::undetermined;
     verdict.sentence = is_given ? calibration.reason : "no photo shows the board";
     verdict.to_add =
         is_given ? calibration.to_add : "check --board and --board-kind, and that the whole board is in the photos";

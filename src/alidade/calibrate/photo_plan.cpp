@@ -24,7 +24,7 @@ Verdict photos_verdict(const PhotoPlan& plan) {
   Verdict verdict;
   if (plan.photos.empty()) {
     verdict.state = State::refused;
-    verdict.exit_code = ExitCode::cannot_tell;
+    verdict.exit_code = ExitCode::undetermined;
     verdict.sentence = "no board pose can be proposed: this camera has no covariance, or the board fits nowhere";
     verdict.to_add = "calibrate again from photos";
     return verdict;

@@ -96,11 +96,11 @@ TEST(CalibrateFace, AnswersCornersThatCannotBe) {
 }
 
 TEST(CalibrateFace, AnswersEmptyInput) {
-  EXPECT_EQ(calibrate(std::vector<BoardView>{}, sample_size, sample_board).verdict.exit_code, ExitCode::cannot_tell);
-  EXPECT_EQ(calibrate(Photos{}, sample_board).verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(calibrate(std::vector<BoardView>{}, sample_size, sample_board).verdict.exit_code, ExitCode::undetermined);
+  EXPECT_EQ(calibrate(Photos{}, sample_board).verdict.exit_code, ExitCode::undetermined);
   EXPECT_THROW((void)calibrate(std::vector<BoardView>{}, ImageSize{}, sample_board), ConfigError);
   EXPECT_THROW((void)calibrate(Photos{.names = {"a"}, .load = nullptr}, sample_board), ConfigError);
-  EXPECT_EQ(find_corners(Photos{}, sample_board).verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(find_corners(Photos{}, sample_board).verdict.exit_code, ExitCode::undetermined);
 }
 
 }  // namespace

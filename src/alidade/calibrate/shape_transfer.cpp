@@ -142,7 +142,7 @@ BoardShape decide_shape(BoardShape asked, std::span<const ShapeTransfer> transfe
   return BoardShape::flat;
 }
 
-std::optional<ShapeTransfer> max_telling(std::span<const ShapeTransfer> transfers, BoardShape in_use) {
+std::optional<ShapeTransfer> max_informative(std::span<const ShapeTransfer> transfers, BoardShape in_use) {
   for (const ShapeTransfer& each : transfers) {
     if (each.shape == in_use) return each;
   }

@@ -44,7 +44,7 @@ struct ShapeTransfer {
 [[nodiscard]] BoardShape decide_shape(BoardShape asked, std::span<const ShapeTransfer> transfers);
 
 /// The test to show: of the shape in use; else of those proved, or of all, the one that predicts best.
-[[nodiscard]] std::optional<ShapeTransfer> max_telling(std::span<const ShapeTransfer> transfers, BoardShape in_use);
+[[nodiscard]] std::optional<ShapeTransfer> max_informative(std::span<const ShapeTransfer> transfers, BoardShape in_use);
 
 ALIDADE_PUBLIC_END
 }  // namespace alidade

@@ -20,7 +20,7 @@ CalibrationStudy study_of(const std::vector<BoardView>& views) {
   const auto report = calibrate(sample_board, views, sample_size, config);
   EXPECT_EQ(report.status, CalibrateReport::Status::converged);
   const auto transfers = test_shape_transfer(sample_board, views, sample_size, config);
-  return study_calibration(sample_board, views, config, report, max_telling(transfers, config.board_shape));
+  return study_calibration(sample_board, views, config, report, max_informative(transfers, config.board_shape));
 }
 
 TEST(StudyCalibration, HalvesOfOneCameraAgree) {

@@ -163,7 +163,7 @@ LocalizeTarget read_image_target(const path& file) {
   const YAML::Node root = detail::load_yaml(read_file(file), name);
   const detail::Fields fields(root, name);
   if (fields.has("rectangle")) {
-    if (fields.has("points") || fields.has("board")) detail::refuse(name, "rectangle", "stands beside another target");
+    if (fields.has("points") || fields.has("board")) detail::refuse(name, "rectangle", "excludes another target");
     const YAML::Node node = root["rectangle"];
     const detail::Fields rectangle(node, name, "rectangle.");
     detail::refuse_unknown_keys(rectangle, {"width_m", "height_m", "sigma_m"}, "a rectangle");

@@ -15,7 +15,8 @@ enum class ExitCode : int {
   internal_error = 1,
   usage = 2,
   bad_input = 3,
-  cannot_tell = 4,
+  undetermined = 4,
+  cannot_tell [[deprecated("undetermined")]] = undetermined,  ///< Its former name, for one release.
   no_convergence = 5,
   not_trusted = 6  ///< There is an estimate, and its files, but its own checks speak against it (State::bad).
 };

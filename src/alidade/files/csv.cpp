@@ -124,7 +124,7 @@ std::map<std::string, std::size_t> columns_of(const CsvRow& header, const std::s
       throw InputError(at_line(name, header.line) + "column " + std::to_string(i + 1) + " has no name");
     }
     if (!columns.emplace(column, i).second) {
-      throw InputError(at_line(name, header.line) + "column " + in_quotes(column) + " stands twice in the header");
+      throw InputError(at_line(name, header.line) + "column " + in_quotes(column) + " appears twice in the header");
     }
   }
   return columns;

@@ -96,7 +96,7 @@ TEST(Csv, WrongTablesAreRefusedByLine) {
       {"\n\r\n \n", "shots.csv: is empty; a header line with the columns' names is needed"},
       {"a,b\n1,2\n3\n", "shots.csv:3: has 1 cell, the header has 2"},
       {"a,b\n1,2,3\n", "shots.csv:2: has 3 cells, the header has 2"},
-      {"a,b,a\n", "shots.csv:1: column 'a' stands twice in the header"},
+      {"a,b,a\n", "shots.csv:1: column 'a' appears twice in the header"},
       {"a,,b\n", "shots.csv:1: column 2 has no name"},
       {"a,b\n1,2\n\n3,4\n", "shots.csv:3: a blank line inside the table; remove it"},
       {"a,b\n1,\"2\n", "shots.csv:2: a quote is opened and never closed"},

@@ -53,7 +53,7 @@ Fields::Fields(const YAML::Node& map, std::string file, std::string prefix)
            "is not a table of keys, `key: value` a line");
   std::set<std::string> seen;
   for (const std::string& key : keys()) {
-    if (!seen.insert(key).second) refuse(file_, full(key), "stands twice");
+    if (!seen.insert(key).second) refuse(file_, full(key), "appears twice");
   }
 }
 
@@ -148,7 +148,7 @@ std::vector<Eigen::Index> places_of(const std::vector<std::string>& names, const
       refuse(fields.file(), fields.full("names"), fmt::format("'{}' is no parameter of {}", name, of));
     const Eigen::Index at = found - known.begin();
     if (std::find(places.begin(), places.end(), at) != places.end())
-      refuse(fields.file(), fields.full("names"), "'" + name + "' stands twice");
+      refuse(fields.file(), fields.full("names"), "'" + name + "' appears twice");
     places.push_back(at);
   }
   return places;

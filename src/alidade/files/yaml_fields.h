@@ -27,7 +27,7 @@ namespace alidade::detail {
 /// The entries of a YAML map with the file's name in every message.
 class Fields {
  public:
-  /// Refuses what is not a map, and a key that stands twice. `prefix` begins the keys in messages ("cam0.").
+  /// Refuses what is not a map, and a key that appears twice. `prefix` begins the keys in messages ("cam0.").
   Fields(const YAML::Node& map, std::string file, std::string prefix = "");
   Fields(const YAML::Node&& map, std::string file, std::string prefix = "") = delete;  // it would not outlive this line
 

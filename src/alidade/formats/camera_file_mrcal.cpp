@@ -29,7 +29,7 @@ class LiteralReader {
     while (!take('}')) {
       const std::string key = value(depth + 1).word;
       expect(':');
-      if (!entries.emplace(key, value(depth + 1)).second) fail("'" + key + "' stands twice");
+      if (!entries.emplace(key, value(depth + 1)).second) fail("'" + key + "' appears twice");
       if (!take(',') && peek() != '}') fail("',' or '}' is missing");
     }
     return entries;

@@ -265,7 +265,7 @@ Rig read_rig(const std::filesystem::path& file) {
     read_lens_course_of(node, i, file, rig);
     for (std::size_t k = 0; k < i; ++k) {
       if (rig.heads[k].head.id == rig.heads[i].head.id)
-        refuse(file.string(), fmt::format("heads[{}].id", i), fmt::format("{} stands twice", rig.heads[i].head.id));
+        refuse(file.string(), fmt::format("heads[{}].id", i), fmt::format("{} appears twice", rig.heads[i].head.id));
     }
   }
   if (fields.has("covariance")) read_rig_covariance(root["covariance"], fields, rig);

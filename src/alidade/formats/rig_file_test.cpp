@@ -111,7 +111,7 @@ TEST_F(RigFile, SaysWhatIsWrongInOneLine) {
   expect(head + "cam_from_tilt: {quaternion_wxyz: [1, 1, 0, 0]}\n", "has the length 1.41421, not 1");
   expect(head + "cam_from_tilt: {quaternion_wxyz: [1, 0, 0]}\n", "must be four numbers");
   expect(head + "world_from_base: {quaternion_xyzw: [0, 0, 0, 1]}\n", "quaternion_xyzw: is not a key of a pose");
-  expect("heads: [{camera: camera.yaml, id: 2}, {camera: camera.yaml, id: 2}]\n", "heads[1].id: 2 stands twice");
+  expect("heads: [{camera: camera.yaml, id: 2}, {camera: camera.yaml, id: 2}]\n", "heads[1].id: 2 appears twice");
   expect("heads: [{camera: camera.yaml, id: 1.5}]\n", "heads[0].id: 1.5 is not a whole number");
   const std::string cov = "heads: [{camera: camera.yaml}]\ncovariance: ";
   expect(cov + "{names: [head1.base_x_m], upper: [-1]}\n", "is not a covariance");

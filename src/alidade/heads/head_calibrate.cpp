@@ -63,7 +63,7 @@ class Session {
     }
     bool goes_on = true;
     while (goes_on && left_s() > 0.0) {
-      if (tells_both_axes() && left_s() > 1.5 * estimate_s_) estimate();
+      if (determines_both_axes() && left_s() > 1.5 * estimate_s_) estimate();
       if (is_reached() && head_time() > min_s()) break;
       goes_on = config_.board ? board_move() : next_moves();
     }
@@ -220,7 +220,7 @@ class Session {
   }
 
   /// Of an axis that is fixed nothing is determined until the end: to see whether something is costs most time.
-  [[nodiscard]] bool tells_both_axes() const { return (reach_high() - reach_low()).minCoeff() > 0.5 * degree; }
+  [[nodiscard]] bool determines_both_axes() const { return (reach_high() - reach_low()).minCoeff() > 0.5 * degree; }
 
   [[nodiscard]] bool is_reached() const {
     if (result_.report.quantities.size() < 2) return false;
@@ -329,7 +329,7 @@ Verdict calibration_verdict(const HeadCalibration& result, const HeadCalibration
   Verdict verdict = result.report.verdict;
   if (!result.fault.empty()) {
     verdict.state = State::refused;
-    verdict.exit_code = ExitCode::cannot_tell;
+    verdict.exit_code = ExitCode::undetermined;
     verdict.sentence = fmt::format("{}; the head was stopped after {:.0f} s; until then: {}", result.fault,
                                    result.head_time_s, verdict.sentence);
     verdict.to_add = "mend the link and run it again";
@@ -354,7 +354,7 @@ Verdict calibration_verdict(const HeadCalibration& result, const HeadCalibration
   heed_stamps(result, verdict);
   if (missing.empty()) return verdict;
   verdict.state = State::refused;
-  verdict.exit_code = ExitCode::cannot_tell;
+  verdict.exit_code = ExitCode::undetermined;
   verdict.sentence = missing + fmt::format(" within the limits, in {:.0f} s", result.head_time_s);
   verdict.to_add = holds_tilt  ? "give --tilt-range more room"
                    : holds_pan ? "give --pan-range more room"

@@ -89,7 +89,7 @@ TEST(HeadCalibrate, FollowsABoardInsteadOfPoints) {
 
 TEST(HeadCalibrate, NamesFyWhereTiltIsFixed) {
   const HeadCalibration result = calibrated("rate=8", {.range = range_of(60, 0, 0), .until = 0.001, .max_s = 14.0});
-  EXPECT_EQ(result.verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(result.verdict.exit_code, ExitCode::undetermined);
   EXPECT_NE(result.verdict.sentence.find("fy"), std::string::npos) << result.verdict.sentence;
 }
 

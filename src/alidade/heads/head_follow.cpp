@@ -240,7 +240,7 @@ void judge(HeadFollowing& result, double shorter_side_px) {
   }
   if (found == 0) {
     result.verdict.state = State::refused;
-    result.verdict.exit_code = ExitCode::cannot_tell;
+    result.verdict.exit_code = ExitCode::undetermined;
     result.verdict.sentence = "the target was not found in the image";
     result.verdict.to_add = "point the head at the target first, and say with --follow what it looks like";
     return;
@@ -248,7 +248,7 @@ void judge(HeadFollowing& result, double shorter_side_px) {
   result.rms_px = std::sqrt(sum2 / static_cast<double>(found));
   result.central_third = static_cast<double>(central) / static_cast<double>(counted);
   const double lost = 1.0 - static_cast<double>(found) / static_cast<double>(counted);
-  result.verdict.sentence = fmt::format("the target stands {:.3g} px RMS from the principal point, {:.3g} px at most",
+  result.verdict.sentence = fmt::format("the target is {:.3g} px RMS from the principal point, {:.3g} px at most",
                                         result.rms_px, result.max_px);
   result.verdict.checks.push_back({"found", lost > max_lost ? State::care : State::good,
                                    fmt::format("found in {:.0f} % of the frames", 100.0 * (1.0 - lost)), lost, max_lost,
@@ -263,7 +263,7 @@ void heed_break(HeadFollowing& result) {
         fmt::format("interrupted after {:.1f} s; {}", result.head_time_s, result.verdict.sentence);
   if (result.fault.empty()) return;
   result.verdict.state = State::refused;
-  result.verdict.exit_code = ExitCode::cannot_tell;
+  result.verdict.exit_code = ExitCode::undetermined;
   result.verdict.sentence = result.fault + "; " + result.verdict.sentence;
   result.verdict.to_add = "mend the link and run it again";
 }

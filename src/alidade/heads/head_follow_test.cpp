@@ -55,7 +55,7 @@ TEST(HeadFollow, FollowsWithAHeadOfWhichLittleIsKnown) {
 
 TEST(HeadFollow, StandsWhereNothingLooksSo) {
   const HeadFollowing result = followed("rate=40", "fps=20&target=0:90:0:0:1.2", {.max_s = 6.0});
-  EXPECT_EQ(result.verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(result.verdict.exit_code, ExitCode::undetermined);
   EXPECT_EQ(result.num_commands, 0u);
 }
 

@@ -150,7 +150,7 @@ class Experiment {
       const PositionerLog& axis = log(i);
       if (std::abs(axis.readings.back().angle_rad - axis.readings.front().angle_rad) < 0.25 * std::abs(step[i]))
         throw HeadLies{fmt::format(
-            "{} took a command of {:.2f}° and did not move: positions are refused silently, or its reading stands",
+            "{} took a command of {:.2f}° and did not move: positions are refused silently, or its reading is frozen",
             head_axis_names[static_cast<std::size_t>(i)], std::abs(step[i]) / degree)};
       slow_rate_[i] = slowest_rate(axis, begin);
     }

@@ -69,7 +69,7 @@ Verdict verdict_of(const HeadSurvey& survey) {
   Verdict verdict;
   const Eigen::Vector2d low = survey.limits.low_rad / degree, high = survey.limits.high_rad / degree;
   const Eigen::Vector2d at = survey.readings.back().pan_tilt_rad / degree;
-  verdict.sentence = fmt::format("answers in {:.2g} ± {:.1g} ms, stands at pan {:.2f}°, tilt {:.2f}°",
+  verdict.sentence = fmt::format("answers in {:.2g} ± {:.1g} ms, is at pan {:.2f}°, tilt {:.2f}°",
                                  1e3 * survey.latency_s, 1e3 * survey.jitter_s, at[0], at[1]);
   if (survey.limits.are_given) {
     verdict.sentence += fmt::format("; pan {:g}…{:g}°, tilt {:g}…{:g}°", low[0], high[0], low[1], high[1]);
@@ -93,7 +93,7 @@ Verdict verdict_of(const HeadSurvey& survey) {
   verdict.state = State::bad;
   verdict.exit_code = ExitCode::not_trusted;
   verdict.sentence +=
-      "; a command was taken, and the reading did not change: positions are refused silently, or its reading stands";
+      "; a command was taken, and the reading did not change: positions are refused silently, or its reading is frozen";
   return verdict;
 }
 

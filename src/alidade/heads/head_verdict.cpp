@@ -59,16 +59,16 @@ void check_grid(const PositionerLog& log, const PositionerFit& fit, const std::s
   const double grid = command_step(log);
   if (!(grid > std::max(coarse_rad, 4.0 * fit.resolution.value))) return;
   checks.push_back({axis + " steps", State::bad,
-                    fmt::format("{} goes in steps of {:.3g}°: commands between are rounded", axis, grid / degree),
+                    fmt::format("{} moves in steps of {:.3g}°: commands between are rounded", axis, grid / degree),
                     grid / degree, coarse_rad / degree, "°", ""});
 }
 
 Verdict refusal_of(const std::string& axis, const PositionerFit& fit) {
   Verdict verdict;
   verdict.state = State::refused;
-  verdict.exit_code = ExitCode::cannot_tell;
+  verdict.exit_code = ExitCode::undetermined;
   verdict.sentence = fit.status == PositionerFit::Status::no_motion
-                         ? axis + " does not move: commands are taken, and the reading stands"
+                         ? axis + " does not move: commands are taken, and the reading is frozen"
                          : axis + ": too few readings";
   verdict.to_add = "give it more room: --" + axis + "-range LOW,HIGH";
   return verdict;
@@ -110,7 +110,7 @@ Verdict head_verdict(const HeadIdentification& identified) {
   Verdict verdict;
   if (!identified.lie.empty()) {
     verdict.state = State::refused;
-    verdict.exit_code = ExitCode::cannot_tell;
+    verdict.exit_code = ExitCode::undetermined;
     verdict.sentence = identified.lie;
     verdict.to_add = "look whether it moves; mend that first";
     return verdict;

@@ -139,7 +139,7 @@ TEST(LocalizeImages, WithoutTheTargetThereIsNoPath) {
   scene.num_frames = 5;
   const Localization report = localized(room_video(scene), by_hand());
   EXPECT_EQ(report.num_lost, 5u);
-  EXPECT_EQ(report.verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(report.verdict.exit_code, ExitCode::undetermined);
 }
 
 /// Sheets with a dark rectangle each, on a grey wall 0.7 m ahead.
@@ -169,7 +169,7 @@ TEST(LocalizeImages, OfTwoThatLookAlikeItTakesNone) {
   EXPECT_EQ(two.num_lost, 5u);
   EXPECT_EQ(two.num_alike, 2u);
   const Verdict verdict = two.verdict;
-  EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(verdict.exit_code, ExitCode::undetermined);
   EXPECT_NE(verdict.sentence.find("2 things in one image look like the target"), std::string::npos) << verdict.sentence;
   video.images.assign(5, sheets_at(video.scene.camera, {-0.2}));
   EXPECT_EQ(localized(video, by_hand()).path.front().event, FrameEvent::started);
@@ -193,7 +193,7 @@ TEST(LocalizeImages, FindsPointsByTheirPatches) {
 }
 
 /// Observations that contradict each other for a third of a second: the path begins again instead of following them.
-TEST(LocalizeImages, BeginsAnewWhereItsObservationsContradictIt) {
+TEST(LocalizeImages, ReinitialisesWhereItsObservationsContradictIt) {
   LocalizeConfig config = by_hand();
   Draws draws(3);
   config.disturb = [&](long frame, std::vector<FeatureObservation>& observations) {

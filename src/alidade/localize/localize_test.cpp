@@ -312,7 +312,7 @@ TEST(Localize, TooLittleIsRefusedByName) {
   for (ObservationFrame& frame : sample.frames)
     std::erase_if(frame.observations, [](const FeatureObservation& observation) { return observation.id > 2; });
   Verdict verdict = localize(sample.frames, sample.camera, sample.config).verdict;
-  EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(verdict.exit_code, ExitCode::undetermined);
   EXPECT_NE(verdict.sentence.find("too few points"), std::string::npos) << verdict.sentence;
   sample = testing::underwater_sample(scene_of(0.03), 1);
   sample.config.start.reset();
@@ -320,10 +320,10 @@ TEST(Localize, TooLittleIsRefusedByName) {
     std::erase_if(frame.observations,
                   [](const FeatureObservation& observation) { return observation.id == 2; });  // three known are left
   verdict = localize(sample.frames, sample.camera, sample.config).verdict;
-  EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(verdict.exit_code, ExitCode::undetermined);
   EXPECT_NE(verdict.sentence.find("target is not found"), std::string::npos) << verdict.sentence;
   verdict = localize(std::vector<ObservationFrame>{}, sample.camera, sample.config).verdict;
-  EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(verdict.exit_code, ExitCode::undetermined);
 }
 
 TEST(Localize, DelayedPointsAndPlacesWorkAsWell) {

@@ -154,7 +154,7 @@ TEST(LocalizeFace, AnswersValuesThatCannotBe) {
   EXPECT_THAT(fault_of(config), ::testing::HasSubstr("numbered from 0"));
   config = {};
   config.target.points = {{.id = 3}, {.id = 3}};
-  EXPECT_EQ(fault_of(config), "the target's point 3 stands twice");
+  EXPECT_EQ(fault_of(config), "the target's point 3 appears twice");
   config = {};
   config.target.patches = {{.width_px = 3, .height_px = 3, .grey = {1}}};
   EXPECT_NE(fault_of(config), "");
@@ -188,11 +188,11 @@ TEST(LocalizeFace, AnswersFramesThatCannotBe) {
 
 TEST(LocalizeFace, AnswersEmptyInput) {
   const Camera camera = short_run(1).camera;
-  EXPECT_EQ(localize(ObservationTable{}, camera).verdict.exit_code, ExitCode::cannot_tell);
-  EXPECT_EQ(Localizer(camera).finish().verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(localize(ObservationTable{}, camera).verdict.exit_code, ExitCode::undetermined);
+  EXPECT_EQ(Localizer(camera).finish().verdict.exit_code, ExitCode::undetermined);
   EXPECT_THROW((void)localize(ImageStream{}, camera), ConfigError);
   const ImageStream none{[](cv::Mat&, long&, double&) { return false; }};
-  EXPECT_EQ(localize(none, camera).verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(localize(none, camera).verdict.exit_code, ExitCode::undetermined);
   ObservationTable table;
   table.skipped.push_back({"a.csv", 2, "is wrong"});
   EXPECT_EQ(localize(table, camera).counts.given, 1u);

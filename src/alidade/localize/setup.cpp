@@ -79,7 +79,7 @@ void add_faults(const LocalizeTarget& target, Sentences& found) {
   std::set<long> ids;
   for (const KnownPoint& point : target.points) {
     const std::string name = fmt::format("the target's point {}", point.id);
-    if (!ids.insert(point.id).second) found.push_back(name + " stands twice");
+    if (!ids.insert(point.id).second) found.push_back(name + " appears twice");
     if (!point.point_in_world.allFinite()) found.push_back(name + " has a position that is not finite");
     if (!(point.sigma_m > 0.0) || !std::isfinite(point.sigma_m)) found.push_back(name + ": its sigma_m is not above 0");
   }
@@ -101,7 +101,7 @@ void add_faults(const SavedMap& map, const LocalizeConfig& config, Sentences& fo
   std::set<long> ids;
   for (const SavedPoint& point : map.points) {
     const std::string name = fmt::format("the map's point {}", point.id);
-    if (!ids.insert(point.id).second) found.push_back(name + " stands twice");
+    if (!ids.insert(point.id).second) found.push_back(name + " appears twice");
     if (!point.point_in_world.allFinite() || !point.cov.allFinite() || !(point.cov.diagonal().minCoeff() > 0.0))
       found.push_back(name + " has a position or covariance that is none");
     if (point.look && point.look->patch.grey.size() != ReferencePatch::area_px)
@@ -243,7 +243,7 @@ void require_sense(const ObservationFrame& frame, double last_t_s) {
   }
   std::ranges::sort(ids);
   if (const auto twice = std::ranges::adjacent_find(ids); twice != ids.end())
-    found.push_back(fmt::format("{}: point {} stands twice", name, *twice));
+    found.push_back(fmt::format("{}: point {} appears twice", name, *twice));
   throw_if_any(found);
 }
 

@@ -81,7 +81,7 @@ TEST(Stills, PointsOnALineUpToTheirSigmaAreRefused) {
   }
   const Stills run = stills(camera, points, 22, 1.0, 3);
   const Verdict verdict = localize(run.frames, camera, config).verdict;
-  EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell) << verdict.sentence;
+  EXPECT_EQ(verdict.exit_code, ExitCode::undetermined) << verdict.sentence;
   EXPECT_NE(verdict.sentence.find("not on a line"), std::string::npos) << verdict.sentence;
 }
 

@@ -43,7 +43,7 @@ TEST(ServoFace, AnUnstableLoopIsAVerdict) {
   scenario.config.pi.kp = 100.0;
   const ServoResult result = servo(scenario);
   EXPECT_EQ(result.status, ServoStudy::Status::unstable);
-  EXPECT_EQ(result.verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(result.verdict.exit_code, ExitCode::undetermined);
   EXPECT_TRUE(outcome_of(result).files.empty());
 }
 

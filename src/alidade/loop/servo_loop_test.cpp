@@ -200,7 +200,7 @@ TEST(ServoStudy, RefusesTheRadianReadingBeforeItRuns) {
   const ServoStudy study = study_servo(scenario, 1);
   EXPECT_TRUE(study.trials.empty());
   const Verdict verdict = servo_verdict(scenario, study);
-  EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(verdict.exit_code, ExitCode::undetermined);
   EXPECT_NE(verdict.sentence.find("14.22"), std::string::npos) << verdict.sentence;
   EXPECT_NE(verdict.to_add.find("deg"), std::string::npos) << verdict.to_add;
 }

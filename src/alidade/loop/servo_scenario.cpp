@@ -167,7 +167,7 @@ void require_sense(ServoScenario scenario) {
   if (kinds.empty()) found.emplace_back("controllers: names none");
   for (std::size_t i = 0; i < kinds.size(); ++i) {
     if (std::ranges::count(controller_kinds, kinds[i]) == 0) found.emplace_back("controllers: one is none of the enum");
-    if (std::ranges::count(kinds, kinds[i]) > 1) found.emplace_back("controllers: one stands twice");
+    if (std::ranges::count(kinds, kinds[i]) > 1) found.emplace_back("controllers: one appears twice");
   }
   if (!found.empty()) throw ConfigError(fmt::format("{}", fmt::join(found, "; ")));
 }

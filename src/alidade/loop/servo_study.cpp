@@ -31,7 +31,7 @@ AngleUnit unit_of(const ServoPlant& plant) {
 Verdict restless(const ServoScenario& scenario, const LoopCheck& loop) {
   Verdict verdict;
   verdict.state = State::refused;
-  verdict.exit_code = ExitCode::cannot_tell;
+  verdict.exit_code = ExitCode::undetermined;
   verdict.sentence = "the loop of " + std::string(controller_name(loop.controller)) + " is unstable once the lens is " +
                      text_of(scenario.scene.zoom.largest()) +
                      " times as long as it takes it for: about a target at rest it swings by " +
@@ -50,7 +50,7 @@ Verdict unstable(const ServoScenario& scenario, const LoopCheck& loop) {
       analysed(other, scenario.config.pi.per_rad(focal_px), scenario.scene.period_s, std::max(0, loop.delay_samples));
   Verdict verdict;
   verdict.state = State::refused;
-  verdict.exit_code = ExitCode::cannot_tell;
+  verdict.exit_code = ExitCode::undetermined;
   verdict.sentence = "the loop of " + std::string(controller_name(loop.controller)) + " sampled each " +
                      text_of(scenario.scene.period_s) + " s is unstable: spectral radius " +
                      text_of(loop.analysis.sampled_radius, 4);

@@ -103,7 +103,7 @@ TEST(ServoZoom, ALoopThatZoomsUnknownToItIsTriedOnATargetAtRest) {
   const ServoStudy study = study_servo(scenario, 1);
   EXPECT_EQ(study.status, ServoStudy::Status::unstable);
   const Verdict verdict = servo_verdict(scenario, study);
-  EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(verdict.exit_code, ExitCode::undetermined);
   EXPECT_NE(verdict.to_add.find("--intrinsics observed"), std::string::npos) << verdict.sentence;
 }
 

@@ -283,7 +283,7 @@ TEST(MovingTarget, TheCameraThatIsWrongIsNamed) {
     const MovingTargetConfig config{.distance = true_distance(scene)};
     const auto sentence = [&](const Scene& other, const std::vector<RigHead>& heads) {
       const Verdict verdict = moving_target_verdict(place_cameras(other.observations, heads, config), config);
-      EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
+      EXPECT_EQ(verdict.exit_code, ExitCode::undetermined);
       return verdict.sentence;
     };
     for (std::size_t c = 0; c < 3; ++c) {
@@ -345,7 +345,7 @@ TEST(MovingTarget, WhatCannotBeDeterminedIsRefusedByName) {
   const MovingTargetConfig with_distance{.distance = true_distance(scene)};
   const auto refused = [](const MovingTargetReport& report, const MovingTargetConfig& config, const char* words) {
     const Verdict verdict = moving_target_verdict(report, config);
-    EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell) << words;
+    EXPECT_EQ(verdict.exit_code, ExitCode::undetermined) << words;
     EXPECT_NE(verdict.sentence.find(words), std::string::npos) << verdict.sentence;
     EXPECT_FALSE(verdict.to_add.empty());
   };

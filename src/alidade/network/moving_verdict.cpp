@@ -12,7 +12,7 @@ constexpr double good_turn_rad = 0.2 * degree, refuse_turn_rad = 2.0 * degree;
 constexpr double good_share = 0.01, refuse_share = 0.1;  // σ of a position over the cameras' distance
 
 Verdict moving_refusal(std::string sentence, std::string add) {
-  return {State::refused, ExitCode::cannot_tell, std::move(sentence), std::move(add), {}};
+  return {State::refused, ExitCode::undetermined, std::move(sentence), std::move(add), {}};
 }
 
 Verdict refusal_by_status(const MovingTargetReport& report, const MovingTargetConfig& config) {

@@ -113,8 +113,8 @@ TEST(NetworkFace, AnswersWhatDoesNotGoTogether) {
 
 TEST(NetworkFace, AnswersEmptyInput) {
   const FaceLog log = face_log();
-  EXPECT_EQ(network({}, log.heads, log.config).verdict.exit_code, ExitCode::cannot_tell);
-  EXPECT_EQ(network({}, {}, {}).verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(network({}, log.heads, log.config).verdict.exit_code, ExitCode::undetermined);
+  EXPECT_EQ(network({}, {}, {}).verdict.exit_code, ExitCode::undetermined);
 }
 
 }  // namespace

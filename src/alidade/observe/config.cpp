@@ -38,7 +38,7 @@ FieldList word_fields(ObserveConfig& config) {
        .help = "known: exact; noisy: measured with --sigma-angle or --sigma-rate; free"},
       {.name = "estimate",
        .value = &config.estimate,
-       .help = "Estimated as well: auto (default: what the residuals ask for), none, or of k1, k2, k3, p1, p2, mount, "
+       .help = "Estimated as well: auto (default: what the residuals indicate), none, or of k1, k2, k3, p1, p2, mount, "
                "delay, lever, shutter, focal-drift, and of the rotation scale, backlash, curve, drift, bias, clock"},
       {.name = "start",
        .value = vector_code<4>(config.start),

@@ -80,7 +80,7 @@ TEST(ObserveDegenerate, EveryOneIsRefusedByNameWithEveryMethod) {
         const RotationLog log = log_of(one, seed);
         const ObserveSetup config = config_of(method);
         const Verdict verdict = observe_verdict(solve_intrinsics(log, config), log, config);
-        EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell)
+        EXPECT_EQ(verdict.exit_code, ExitCode::undetermined)
             << one.name << ", method " << static_cast<int>(method) << ", seed " << seed << ": " << verdict.sentence;
         EXPECT_NE(verdict.sentence.find(one.words), std::string::npos)
             << one.name << ", method " << static_cast<int>(method) << ", seed " << seed << ": " << verdict.sentence;
@@ -120,7 +120,7 @@ TEST(ObserveDegenerate, ANarrowFieldNamesItsCentreAndDoesWithoutIt) {
   config.width_px = 1024;
   config.height_px = 1280;
   const Verdict refused = observe_verdict(solve_intrinsics(log, config), log, config);
-  EXPECT_EQ(refused.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(refused.exit_code, ExitCode::undetermined);
   EXPECT_NE(refused.sentence.find("too narrow"), std::string::npos) << refused.sentence;
   EXPECT_NE(refused.to_add.find("--fix-centre --square-pixels"), std::string::npos) << refused.to_add;
 

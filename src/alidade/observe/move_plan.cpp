@@ -28,7 +28,7 @@ Verdict moves_verdict(const MovePlan& plan) {
   Verdict verdict;
   if (plan.moves.empty()) {
     verdict.state = State::refused;
-    verdict.exit_code = ExitCode::cannot_tell;
+    verdict.exit_code = ExitCode::undetermined;
     verdict.sentence = "no move can be proposed: no point was seen";
     verdict.to_add = "track points first";
     return verdict;

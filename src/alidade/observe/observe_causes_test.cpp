@@ -34,7 +34,7 @@ struct World {
   std::function<void(RotationScene&, RotationLogConfig&, Draws&)> scene = [](auto&, auto&, auto&) {};
   RotationFaults faults;
   std::function<void(RotationLog&)> measured = [](auto&) {};  ///< What else is wrong with it.
-  bool tells_scale = false;                                   ///< The log says that its scale and its centre are exact.
+  bool gives_scale = false;                                   ///< The log says that its scale and its centre are exact.
 };
 
 RotationLog log_in(const World& world, std::uint64_t seed) {
@@ -65,7 +65,7 @@ RotationLog log_in(const World& world, std::uint64_t seed) {
   config.clip_to_image = true;
   world.scene(scene, config, draws);
   RotationLog log = simulate_rotation(scene, config, seed);
-  if (!world.tells_scale) log.sigma_scale = log.sigma_parallax = std::nullopt;
+  if (!world.gives_scale) log.sigma_scale = log.sigma_parallax = std::nullopt;
   add_faults(world.faults, image_width, image_height, seed, log);
   world.measured(log);
   return log;
@@ -188,7 +188,7 @@ TEST(ObserveCauses, AClockAtAnotherRateIsEstimated) {
   for (const RotationSource source : {RotationSource::head, RotationSource::rate}) {
     World world = with_scene([](RotationScene& scene, RotationLogConfig&, Draws&) { scene.clock_rate = 1e-3; });
     world.source = source;
-    world.tells_scale = true;
+    world.gives_scale = true;
     expect_estimated(world, "clock_rate");
   }
 }
@@ -258,7 +258,7 @@ TEST(ObserveCauses, AZoomThatNeverRestsIsRefused) {
 TEST(ObserveCauses, NoiseThatLastsIsCountedAndNoCause) {
   for (const double lasts_s : {0.1, 0.3}) {
     World world = with_faults({.noise_px = 0.3, .noise_lasts_s = lasts_s});
-    world.tells_scale = true;
+    world.gives_scale = true;
     constexpr int num_draws = 20;  // for shares: three standard errors are 15.6 % and 7.2 %
     const Outcome outcome = outcome_of(world, auto_config(), "", num_draws);
     EXPECT_GE(outcome.good, 18) << lasts_s;
@@ -271,7 +271,7 @@ TEST(ObserveCauses, NoiseThatLastsIsCountedAndNoCause) {
 TEST(ObserveCauses, NoiseOfTheEncodersIsNamed) {
   World world =
       with_scene([](RotationScene&, RotationLogConfig& config, Draws&) { config.sigma_angle_rad = 0.1 * degree; });
-  world.tells_scale = true;
+  world.gives_scale = true;
   const Outcome outcome = outcome_of(world, auto_config(), "delay_s");
   EXPECT_EQ(outcome.silent, 0);
   EXPECT_EQ(outcome.estimated, 0);
@@ -331,7 +331,7 @@ TEST(ObserveCauses, PointsThatMoveCostNothing) {
 TEST(ObserveCauses, WrongPixelsAreNotSilentInARegression) {
   for (const ObserveMethod method : {ObserveMethod::flow, ObserveMethod::fang2011}) {
     World world = with_faults({.wrong_share = 0.01});
-    world.tells_scale = true;
+    world.gives_scale = true;
     EXPECT_EQ(outcome_of(world, auto_config(method)).silent, 0);
   }
 }

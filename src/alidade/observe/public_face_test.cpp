@@ -222,23 +222,23 @@ TEST(ObserveFace, AnswersLogsThatCannotBe) {
 }
 
 TEST(ObserveFace, AnswersEmptyInput) {
-  EXPECT_EQ(observe(RotationLog{}).verdict.exit_code, ExitCode::cannot_tell);
-  EXPECT_EQ(observe(Photos{}).verdict.exit_code, ExitCode::cannot_tell);
-  EXPECT_EQ(observe(MatchedPhotos{}).verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(observe(RotationLog{}).verdict.exit_code, ExitCode::undetermined);
+  EXPECT_EQ(observe(Photos{}).verdict.exit_code, ExitCode::undetermined);
+  EXPECT_EQ(observe(MatchedPhotos{}).verdict.exit_code, ExitCode::undetermined);
   EXPECT_THROW((void)observe(Photos{.names = {"a"}, .load = nullptr}), ConfigError);
   RotationLog unseen = any_log(1.0);
   for (RotationRow& row : unseen.rows) row.px.assign(row.px.size(), Eigen::Vector2d::Constant(not_seen));
-  EXPECT_EQ(observe(unseen).verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(observe(unseen).verdict.exit_code, ExitCode::undetermined);
   unseen.rows.resize(1);
   unseen.truth.clear();
-  EXPECT_EQ(observe(unseen).verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(observe(unseen).verdict.exit_code, ExitCode::undetermined);
   EXPECT_THROW(Observer(RotationLog{}, {}), ConfigError) << "without a size";
   EXPECT_THROW(Observer(unseen, sized()), ConfigError) << "with rows";
   ObserveConfig errors = sized();
   errors.estimate = {"bias"};
   EXPECT_THROW(Observer(RotationLog{}, errors), ConfigError);
   EXPECT_THROW((void)Observer(RotationLog{}, sized()).push(RotationRow{}), ConfigError) << "no points";
-  EXPECT_EQ(Observer(RotationLog{}, sized()).finish().verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(Observer(RotationLog{}, sized()).finish().verdict.exit_code, ExitCode::undetermined);
 }
 
 TEST(ObserveFace, MatchesOfARotatedCameraTellItAndWrongOnesAreAnswered) {
@@ -277,7 +277,7 @@ TEST(ObserveFace, PlansTheNextMovesOfAReport) {
   EXPECT_THROW((void)plan_moves(observed_now(report), {.rate_deg_s = nan}), ConfigError);
   ObservedNow unseen = observed_now(report);
   unseen.points_px.clear();
-  EXPECT_EQ(plan_moves(unseen).verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(plan_moves(unseen).verdict.exit_code, ExitCode::undetermined);
 }
 
 }  // namespace face_of_observe

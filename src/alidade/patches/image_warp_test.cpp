@@ -45,7 +45,7 @@ TEST(ImageWarp, HasTheBendOfPerspective) {
   }
 }
 
-TEST(ImageWarp, SaysWhenPointsCannotTell) {
+TEST(ImageWarp, SaysWhenPointsAreDegenerate) {
   std::mt19937_64 rng = testing::make_rng();
   EXPECT_FALSE(ImageWarp::fit(moves_of(12, rng)).has_value());
   std::vector<PointMove> on_a_line = moves_of(50, rng);

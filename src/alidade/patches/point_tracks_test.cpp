@@ -153,7 +153,7 @@ TEST(PointTracker, DropsWhatIsCoveredInsteadOfSlipping) {
   }
 }
 
-TEST(PointTracker, FindsNothingOnAWallAndStartsAnewWithAnotherSize) {
+TEST(PointTracker, FindsNothingOnAWallAndStartsAgainWithAnotherSize) {
   PointTracker tracker;
   EXPECT_TRUE(tracker.update(cv::Mat(240, 320, CV_8U, cv::Scalar(100))).empty());
   FarWorld world = FarWorld::of_noise(3.0 / 290.0, 3);

@@ -38,12 +38,12 @@ TEST(Edges, RefuseASceneWithoutDepthAndAnotherPhoto) {
   const Camera camera = edge_camera();
   std::vector<ScanRow> flat = scan_of({}, 0.02);
   for (ScanRow& row : flat) row.range_m = 4.0;
-  EXPECT_TRUE(edges_verdict(align_edges(flat, photo_of(camera), camera, {})).exit_code == ExitCode::cannot_tell);
+  EXPECT_TRUE(edges_verdict(align_edges(flat, photo_of(camera), camera, {})).exit_code == ExitCode::undetermined);
   GreyImage grey = photo_of(camera);
   std::fill(grey.values.begin(), grey.values.end(), 100.0F);
   const auto nothing = align_edges(scan_of({}, 0.0088), grey, camera, {});
-  EXPECT_TRUE(edges_verdict(nothing).exit_code == ExitCode::cannot_tell);
-  EXPECT_TRUE(edges_verdict(align_edges({}, {}, camera, {})).exit_code == ExitCode::cannot_tell);
+  EXPECT_TRUE(edges_verdict(nothing).exit_code == ExitCode::undetermined);
+  EXPECT_TRUE(edges_verdict(align_edges({}, {}, camera, {})).exit_code == ExitCode::undetermined);
 }
 
 }  // namespace

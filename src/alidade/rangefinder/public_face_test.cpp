@@ -123,7 +123,7 @@ TEST(RangefinderFace, NamesShotsThatCannotBe) {
 
 TEST(RangefinderFace, AnswersEmptyInputAndHostileCameras) {
   const Camera& camera = face_sample().camera;
-  EXPECT_EQ(rangefinder({}, camera).verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(rangefinder({}, camera).verdict.exit_code, ExitCode::undetermined);
   EXPECT_THROW((void)rangefinder({}, Camera{}), ConfigError);
   Camera no_focal = camera;
   Eigen::VectorXd lens = params(camera.lens);
@@ -157,7 +157,7 @@ TEST(RangefinderFace, EdgesAnswerMisuse) {
   GreyImage grey{camera.width_px, camera.height_px, {}};
   EXPECT_THROW((void)rangefinder_by_edges({}, grey, camera), ConfigError);
   grey.values.resize(static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px));
-  EXPECT_EQ(rangefinder_by_edges({}, grey, camera).verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(rangefinder_by_edges({}, grey, camera).verdict.exit_code, ExitCode::undetermined);
   for (const double bad : {std::nan(""), -1.0, 0.0}) {
     EXPECT_THROW((void)rangefinder_by_edges({}, grey, camera, {.jump_m = bad}), ConfigError) << bad;
     EXPECT_THROW((void)rangefinder_by_edges({}, grey, camera, {.blur_px = {bad}}), ConfigError) << bad;

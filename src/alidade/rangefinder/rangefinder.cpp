@@ -48,7 +48,7 @@ double log_choices(double n, double k) {
 /// Where σ is not known: do the residuals of all say that some are wrong, by how much less those of the others are?
 /// Three times as large they must be, more where few are left, and so much that by chance no choice of as many shots
 /// would do so once in a thousand logs: likelihood ratio of normal residuals, times the number of choices.
-bool tells_outliers(const BeamFit& all, const BeamProblem& all_shots, const BeamFit& others,
+bool shows_outliers(const BeamFit& all, const BeamProblem& all_shots, const BeamFit& others,
                     const BeamProblem& other_shots) {
   const auto num_used = [](const BeamProblem& problem) {
     return static_cast<double>(
@@ -82,7 +82,7 @@ std::optional<BeamFit> search_beam(Preparation& ready, const Camera& camera, con
                                       {config.outlier_sigmas, config.num_draws, config.seed, knows_sigma,
                                        std::pow(ready.min_sigma_range_m / guessed_sigma_m, 2)});
     auto better = agreed ? best_beam(without, camera, agreed) : std::nullopt;
-    if (better && (knows_sigma || !fit || tells_outliers(*fit, problem, *better, without))) {
+    if (better && (knows_sigma || !fit || shows_outliers(*fit, problem, *better, without))) {
       problem = std::move(without);
       fit = std::move(better);
     }

@@ -34,7 +34,7 @@ TEST_P(DegenerateBattery, IsAlwaysRefusedByNameWithWhatElseCouldTell) {
     if (trial % 2 == 1) config.sigma_spot_px.reset(), config.sigma_range_m.reset();  // a refusal needs no σ
     const RangefinderReport report = solve_sample(sample, config);
     const Verdict verdict = rangefinder_verdict(report, sample.simulated.shots, config);
-    refused += verdict.exit_code == ExitCode::cannot_tell ? 1 : 0;
+    refused += verdict.exit_code == ExitCode::undetermined ? 1 : 0;
     EXPECT_NE(verdict.sentence.find(reason), std::string::npos) << trial << ": " << verdict.sentence;
     EXPECT_NE(verdict.to_add.find("--method joint"), std::string::npos) << verdict.to_add;
     EXPECT_FALSE(verdict.checks.empty());
@@ -121,7 +121,7 @@ TEST(RangefinderScale, IsEstimatedWithBoardsAndRefusedWithSpotsAlone) {
     const RangefinderReport alone = solve_sample(sample, config);
     EXPECT_TRUE(alone.status == Status::scale_unknown);
     const Verdict verdict = rangefinder_verdict(alone, sample.simulated.shots, config);
-    EXPECT_TRUE(verdict.exit_code == ExitCode::cannot_tell);
+    EXPECT_TRUE(verdict.exit_code == ExitCode::undetermined);
     EXPECT_NE(verdict.sentence.find("scale"), std::string::npos);
   }
   EXPECT_NEAR(sum / trials, 6.0, 4.0 * std::sqrt(12.0 / trials));
@@ -228,7 +228,7 @@ TEST(Rangefinder, RefusesTooFewShotsAndNone) {
       const RangefinderReport report = calibrate_rangefinder(shots, sample.points, sample.camera, config);
       EXPECT_TRUE(report.status == Status::too_few);
       const Verdict verdict = rangefinder_verdict(report, shots, config);
-      EXPECT_TRUE(verdict.exit_code == ExitCode::cannot_tell);
+      EXPECT_TRUE(verdict.exit_code == ExitCode::undetermined);
       EXPECT_NE(verdict.sentence.find("too few"), std::string::npos);
     }
   }

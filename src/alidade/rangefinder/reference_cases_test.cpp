@@ -225,7 +225,7 @@ TEST(ReferenceCases, Table1OfThePaperHasItsSignsTurned) {
   for (const RangefinderMethod method : {RangefinderMethod::plane, RangefinderMethod::spot}) {
     const RangefinderConfig config = config_for(method);
     const Verdict verdict = rangefinder_verdict(calibrate_rangefinder(shots, {}, camera, config), shots, config);
-    EXPECT_TRUE(verdict.exit_code == ExitCode::cannot_tell) << verdict.sentence;
+    EXPECT_TRUE(verdict.exit_code == ExitCode::undetermined) << verdict.sentence;
     EXPECT_NE(verdict.sentence.find("equal ranges"), std::string::npos) << verdict.sentence;
     EXPECT_NE(verdict.to_add.find("--method joint"), std::string::npos) << verdict.to_add;
   }
@@ -236,7 +236,7 @@ void expect_refused(const Json& reference, RangefinderMethod method, const std::
   const RangefinderConfig config = config_for(method);
   const auto report = calibrate_rangefinder(shots, {}, camera_of(reference["K"]), config);
   const Verdict verdict = rangefinder_verdict(report, shots, config);
-  EXPECT_TRUE(verdict.exit_code == ExitCode::cannot_tell) << verdict.sentence;
+  EXPECT_TRUE(verdict.exit_code == ExitCode::undetermined) << verdict.sentence;
   EXPECT_NE(verdict.sentence.find(reason), std::string::npos) << verdict.sentence;
 }
 

@@ -34,7 +34,7 @@ Verdict shots_verdict(const ShotPlan& plan) {
   Verdict verdict;
   if (plan.shots.empty()) {
     verdict.state = State::refused;
-    verdict.exit_code = ExitCode::cannot_tell;
+    verdict.exit_code = ExitCode::undetermined;
     verdict.sentence = "no shot can be proposed: the beam hits no board inside the image at these distances";
     verdict.to_add = "widen --min-range-m and --max-range-m";
     return verdict;

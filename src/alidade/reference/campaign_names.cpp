@@ -57,7 +57,7 @@ std::string study_table() {
 const char* const batch_table = R"(estimate:
 rows        count  of the lot
 verdicts.*  count  rows by verdict; failed: without a result
-outliers    count  values that stand out of the lot
+outliers    count  outliers of the lot
 data:
 outliers.
   camera         text  of the row

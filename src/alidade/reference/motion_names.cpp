@@ -64,7 +64,7 @@ heads[].
   encoder.tilt_cos_rad               rad    eccentricity
   encoder.tilt_sin_rad               rad    eccentricity
   encoder.sigma_rad                  rad    of a reading
-cameras[]      any  of cameras that stand still: pose and σ of each
+cameras[]      any  of static cameras: pose and σ of each
 estimated[].
   name   text  value that was estimated beside the poses
   value  1     estimate

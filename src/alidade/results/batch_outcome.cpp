@@ -232,7 +232,7 @@ JobOutcome outcome_of(const std::vector<BatchRow>& rows) {
   std::size_t answered = 0;
   for (const BatchRow& row : rows) {
     ++states[row.state];
-    answered += tells_an_estimate(row.exit_code) ? 1 : 0;
+    answered += is_estimate(row.exit_code) ? 1 : 0;
   }
   const std::vector<BatchOutlier> outliers = outliers_of(rows);
   document.counts.given = rows.size();
@@ -250,26 +250,26 @@ JobOutcome outcome_of(const std::vector<BatchRow>& rows) {
   constexpr std::size_t max_lines = 10;
   std::size_t failures = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (tells_an_estimate(rows[i].exit_code) || ++failures > max_lines) continue;
+    if (is_estimate(rows[i].exit_code) || ++failures > max_lines) continue;
     outcome.lines.push_back(
         fmt::format("row {} ({}): exit code {}: {}", i + 1, rows[i].camera, rows[i].exit_code, rows[i].sentence));
   }
   if (failures > max_lines)
     outcome.lines.push_back(fmt::format("… and {} more without an estimate", failures - max_lines));
   for (std::size_t i = 0; i < std::min(outliers.size(), max_lines); ++i)
-    outcome.lines.push_back(fmt::format("stands out: {}  {} = {:.6g} ± {:.2g}, the lot's median {:.6g} (z {:.1f})",
+    outcome.lines.push_back(fmt::format("outlier: {}  {} = {:.6g} ± {:.2g}, the lot's median {:.6g} (z {:.1f})",
                                         rows[outliers[i].row].camera, outliers[i].name, outliers[i].value,
                                         outliers[i].sigma, outliers[i].median, outliers[i].z));
   Verdict& verdict = document.verdict;
-  verdict.sentence = fmt::format("{} of {} rows have an estimate; {} values stand out of the lot", answered,
-                                 rows.size(), outliers.size());
+  verdict.sentence =
+      fmt::format("{} of {} rows have an estimate; {} outliers in the lot", answered, rows.size(), outliers.size());
   if (answered < rows.size() || !outliers.empty()) {
     verdict.state = State::care;
     verdict.to_add = "look at them in batch.csv";
   }
   if (answered == 0) {
     verdict.state = State::refused;
-    verdict.exit_code = ExitCode::cannot_tell;
+    verdict.exit_code = ExitCode::undetermined;
   }
   return outcome;
 }

@@ -37,7 +37,7 @@ CalibratedNow read_calibration(const std::filesystem::path& result) {
     if (json.at("command") != "calibrate") {
       throw InputError("is the result of '" + json.at("command").get<std::string>() + "', not of calibrate");
     }
-    if (!tells_an_estimate(json.at("verdict").at("exit_code").get<int>()))
+    if (!is_estimate(json.at("verdict").at("exit_code").get<int>()))
       throw InputError("this calibration was refused: there is no camera");
     const auto& estimate = json.at("estimate");
     found.noise_px = estimate.at("noise_px").get<double>();

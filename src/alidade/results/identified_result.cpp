@@ -28,7 +28,7 @@ PositionerParams axis_of(const Json& json, PositionerParams axis) {
 
 IdentifiedHead head_of(const Json& json, const PositionerParams& usual_axis) {
   const Json& axes = json.at("estimate").at("axes");
-  if (!tells_an_estimate(json.at("verdict").at("exit_code").get<int>()))
+  if (!is_estimate(json.at("verdict").at("exit_code").get<int>()))
     throw InputError("this identification was refused: " + json.at("verdict").value("sentence", ""));
   IdentifiedHead head;
   std::size_t i = 0;

@@ -105,7 +105,7 @@ JobOutcome outcome_of(const Identification& identification) {
   outcome.document.assumed = identification.assumed;
   outcome.document.verdict = identification.verdict;
   fill_identification(identification, outcome.document);
-  if (!tells_an_estimate(static_cast<int>(identification.verdict.exit_code))) return outcome;
+  if (!is_estimate(static_cast<int>(identification.verdict.exit_code))) return outcome;
   tell_plant(identification, outcome.lines);
   outcome.files.push_back({"servo.yaml", servo_plant_text(identification.fit)});
   return outcome;

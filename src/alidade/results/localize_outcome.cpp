@@ -172,7 +172,7 @@ void path_lines(const Localization& result, std::vector<std::string>& lines) {
 }
 
 void add_path_files(const Localization& result, std::vector<NamedBytes>& files) {
-  if (!tells_an_estimate(static_cast<int>(result.verdict.exit_code))) return;
+  if (!is_estimate(static_cast<int>(result.verdict.exit_code))) return;
   std::vector<TimedPose> path;
   for (const PathStep& step : result.path)
     if (step.has_pose()) path.push_back({step.t_s, step.world_from_cam});

@@ -184,7 +184,7 @@ JobOutcome outcome_of(const NetworkCalibration& calibration) {
   document.estimate["cameras"] = std::move(cameras);
   if (calibration.status == MovingTargetReport::Status::placed) fill_placed(calibration, document);
   outcome.lines = lines_of(calibration);
-  if (!tells_an_estimate(static_cast<int>(calibration.verdict.exit_code))) return outcome;
+  if (!is_estimate(static_cast<int>(calibration.verdict.exit_code))) return outcome;
   add_rig_files(placed_rig(calibration), outcome.files);
   outcome.files.push_back({"events.csv", events_csv(observations_on_one_clock(calibration), calibration.rig.heads)});
   outcome.files.push_back({"path.csv", path_csv(calibration)});

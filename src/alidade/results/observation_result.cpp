@@ -49,7 +49,7 @@ ObservedNow read_observation(const std::filesystem::path& result) {
     if (json.at("command") != "observe") {
       throw InputError("is the result of '" + json.at("command").get<std::string>() + "', not of observe");
     }
-    if (!tells_an_estimate(json.at("verdict").at("exit_code").get<int>())) {
+    if (!is_estimate(json.at("verdict").at("exit_code").get<int>())) {
       throw InputError("this observation was refused: " + json.at("verdict").value("to_add", ""));
     }
     const Json& estimate = json.at("estimate");

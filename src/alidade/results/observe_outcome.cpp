@@ -67,7 +67,7 @@ JobOutcome outcome_of(const ObserveReport& report) {
   outcome.document.verdict = report.verdict;
   say_input(report, outcome.lines);
   if (report.found_matches) outcome.files.push_back({"pairs.csv", pairs_csv(*report.found_matches)});
-  if (tells_an_estimate(static_cast<int>(report.verdict.exit_code))) {
+  if (is_estimate(static_cast<int>(report.verdict.exit_code))) {
     report.photos.empty() ? say_log(report, outcome.lines) : say_photos(report, outcome.lines);
     outcome.files.push_back({"camera.yaml", camera_text(report.camera, CameraFormat::alidade)});
   }

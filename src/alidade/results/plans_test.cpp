@@ -29,7 +29,7 @@ TEST(Plans, PhotosAfterACalibration) {
   EXPECT_EQ(outcome.document.data.size(), 2u);
   CalibratedNow unknown = now;
   unknown.camera.cov.resize(0, 0);
-  EXPECT_EQ(plan_photos(unknown).verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(plan_photos(unknown).verdict.exit_code, ExitCode::undetermined);
   EXPECT_THROW((void)calibrated_now(Calibration{}), ConfigError);
 }
 

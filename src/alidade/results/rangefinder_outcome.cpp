@@ -318,7 +318,7 @@ void add_lines_of_beam(const RangefinderCalibration& result, std::vector<std::st
     lines.push_back(fmt::format("direction {} {:9.6f} ± {:.2g}", "xyz"[i], beam.direction_in_cam[i], sigma3(3 + i)));
   const bool has_scale = beam.cov(beam_scale_param, beam_scale_param) > 0.0;
   if (has_scale && result.config.scale_by_need)
-    lines.emplace_back("the readings' scale is estimated, as nobody gave it (--sigma-scale)");
+    lines.emplace_back("the readings' scale is estimated, as it is not given (--sigma-scale)");
   if (has_scale) lines.push_back(fmt::format("scale       {:9.6f} ± {:.2g}", beam.scale, sigma3(6)));
   lines.push_back(fmt::format("{} of {} shots; σ of a range {:.2g} mm ({})", result.shots_used, result.measured.size(),
                               1e3 * beam.noise.sigma_m,
@@ -329,7 +329,7 @@ void add_lines_of_beam(const RangefinderCalibration& result, std::vector<std::st
 }
 
 void add_beam_files(const Beam& beam, const Camera& camera, JobOutcome& outcome) {
-  if (!tells_an_estimate(static_cast<int>(outcome.document.verdict.exit_code))) return;
+  if (!is_estimate(static_cast<int>(outcome.document.verdict.exit_code))) return;
   outcome.files.push_back({"rangefinder.yaml", beam_text(beam, camera, "camera.yaml")});
   outcome.files.push_back({"camera.yaml", camera_text(camera, CameraFormat::alidade)});
 }
@@ -363,7 +363,7 @@ JobOutcome outcome_of(const EdgesCalibration& calibration) {
   document.stddev["direction"] = root_of_diagonal(cov, 3, 3);
   estimate["gain"] = calibration.gain;
   estimate["halves_differ_rad"] = calibration.halves_differ_rad;
-  if (tells_an_estimate(static_cast<int>(calibration.verdict.exit_code))) {
+  if (is_estimate(static_cast<int>(calibration.verdict.exit_code))) {
     const auto part = [&](int i) {
       return fmt::format("{:.5f} ± {:.2g}", beam.direction_in_cam[i], 3.0 * std::sqrt(cov(3 + i, 3 + i)));
     };

@@ -18,7 +18,7 @@ BeamNow read_rangefinder(const std::filesystem::path& result) {
     const Json json = Json::parse(read_file(file));
     if (json.at("command") != "rangefinder")
       throw InputError("is the result of '" + json.at("command").get<std::string>() + "', not of rangefinder");
-    if (!tells_an_estimate(json.at("verdict").at("exit_code").get<int>()))
+    if (!is_estimate(json.at("verdict").at("exit_code").get<int>()))
       throw InputError("this calibration was refused: " + json.at("verdict").value("to_add", ""));
     const Json& estimate = json.at("estimate");
     (void)words_code(now.method, rangefinder_method_words()).read(estimate.at("method"));

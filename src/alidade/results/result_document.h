@@ -62,7 +62,7 @@ struct ResultDocument {
 [[nodiscard]] std::string state_name(State state);
 
 /// Whether a document with this exit code holds an estimate, usable or not to be trusted.
-[[nodiscard]] constexpr bool tells_an_estimate(int exit_code) {
+[[nodiscard]] constexpr bool is_estimate(int exit_code) {
   return exit_code == static_cast<int>(ExitCode::ok) || exit_code == static_cast<int>(ExitCode::not_trusted);
 }
 

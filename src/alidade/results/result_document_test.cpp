@@ -66,7 +66,7 @@ TEST(ResultDocument, CarriesWhatItIsGiven) {
   document.seconds = {{"total", 0.5}};
   document.inputs = {{"photo", "a.jpg", 3, "abc"}};
   document.verdict = {State::refused,
-                      ExitCode::cannot_tell,
+                      ExitCode::undetermined,
                       "two photos",
                       "add one",
                       {{"coverage", State::bad, "worst 3σ 2 px", 2.0, 0.5, "px", "trust"}}};

@@ -40,7 +40,7 @@ EarlierResult earlier_result(const std::filesystem::path& folder) {
     if (is_inside && file.has_filename()) found.files.push_back(file);
   }
   const nlohmann::json code = member("/verdict/exit_code");
-  found.has_estimate = code.is_number_integer() && tells_an_estimate(code.get<int>());
+  found.has_estimate = code.is_number_integer() && is_estimate(code.get<int>());
   return found;
 }
 
@@ -64,9 +64,7 @@ std::vector<std::filesystem::path> leftovers(const std::filesystem::path& out, b
   return files;
 }
 
-bool has_estimate(const ResultDocument& document) {
-  return tells_an_estimate(static_cast<int>(document.verdict.exit_code));
-}
+bool has_estimate(const ResultDocument& document) { return is_estimate(static_cast<int>(document.verdict.exit_code)); }
 
 }  // namespace
 

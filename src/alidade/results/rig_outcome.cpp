@@ -270,7 +270,7 @@ JobOutcome outcome_of(const RigCalibration& calibration) {
   JobOutcome outcome;
   fill_document(calibration, outcome.document);
   outcome.lines = lines_of(calibration);
-  if (tells_an_estimate(static_cast<int>(calibration.verdict.exit_code))) add_rig_files(calibration.rig, outcome.files);
+  if (is_estimate(static_cast<int>(calibration.verdict.exit_code))) add_rig_files(calibration.rig, outcome.files);
   return outcome;
 }
 

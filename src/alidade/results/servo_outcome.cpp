@@ -261,7 +261,7 @@ JobOutcome outcome_of(const ServoResult& result) {
   fill_servo(result.scenario, result, outcome.document);
   tell_controllers(result, outcome.lines);
   tell_lenses(result, outcome.lines);
-  if (tells_an_estimate(static_cast<int>(result.verdict.exit_code)))
+  if (is_estimate(static_cast<int>(result.verdict.exit_code)))
     outcome.files.push_back({"servo.csv", servo_csv(result.scenario, result)});
   return outcome;
 }

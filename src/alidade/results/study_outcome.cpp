@@ -162,7 +162,7 @@ Verdict verdict_of(const StudyHeader& header, std::span<const StudyTally> points
     verdict.to_add = "put the shards together: alidade study merge DIR... --out DIR";
   } else if (estimates == 0) {
     verdict.state = State::refused;
-    verdict.exit_code = ExitCode::cannot_tell;
+    verdict.exit_code = ExitCode::undetermined;
     verdict.sentence = fmt::format("None of {} trials gave an estimate", trials);
     verdict.to_add = "look at one: --trial 0";
   } else if (!fault.empty()) {

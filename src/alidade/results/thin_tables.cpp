@@ -53,7 +53,7 @@ JsonValue picked(const JsonValue& column, const KeptRows& rows) {
 }
 
 /// A column of numbers that shows how a row fits.
-bool tells_the_fit(std::string_view name) {
+bool shows_the_fit(std::string_view name) {
   return name.starts_with("residual") || name.starts_with("innovation") || name == "nis" || name == "rms_px";
 }
 
@@ -126,7 +126,7 @@ void thin_table(DataTable& table, std::size_t most) {
   for (const auto& [name, column] : table.columns) {
     flag_rows(name, column, flagged);
     const auto* numbers = std::get_if<std::vector<double>>(&column.content());
-    if (numbers == nullptr || !tells_the_fit(name) || fits.size() == 4) continue;
+    if (numbers == nullptr || !shows_the_fit(name) || fits.size() == 4) continue;
     names += (names.empty() ? "" : ", ") + name;
     fits.push_back(*numbers);
   }

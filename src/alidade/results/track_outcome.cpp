@@ -143,7 +143,7 @@ void add_track(const TargetTrack& track, JobOutcome& outcome) {
   document.assumed = track.assumed;
   fill_track(track, document);
   tell_track(track, outcome.lines);
-  if (!tells_an_estimate(static_cast<int>(track.verdict.exit_code))) return;
+  if (!is_estimate(static_cast<int>(track.verdict.exit_code))) return;
   outcome.files.push_back({"track.csv", track_csv(track.steps, track.ahead)});
   if (!track.smoothed.empty()) outcome.files.push_back({"smoothed.csv", smoothed_csv(track.smoothed)});
 }
@@ -166,7 +166,7 @@ JobOutcome outcome_of(const TargetTrack& track, const std::vector<TargetFrame>& 
   outcome.lines.push_back(fmt::format("target seen in {} of {} frames", track.observations.size(), frames.size()));
   if (track.observations.empty()) {
     document.verdict = {State::refused,
-                        ExitCode::cannot_tell,
+                        ExitCode::undetermined,
                         "the target is in no frame of the videos",
                         "check --look against a frame, and that the target is in the image",
                         {}};

@@ -23,7 +23,7 @@ std::string read_freedoms(const std::string& text, RigConfig& config) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
     const std::string part = text.substr(begin, end - begin);
     begin = end + 1;
-    if (part == "auto" || part == "none") return "'" + part + "' stands alone";
+    if (part == "auto" || part == "none") return "'" + part + "' excludes the others";
     bool is_known = false;
     for (const auto& [word, is_free] : freedoms) {
       if (part != word) continue;
@@ -80,7 +80,7 @@ FieldList fields_of(RigConfig& config) {
        .option = "--sigma-within-turn"},
       {.name = "estimate",
        .value = freedoms_code(config),
-       .help = "auto: what the residuals ask for, and scales that nobody gave; none; or any of scale, once (an "
+       .help = "auto: what the residuals indicate, and scales that are not given; none; or any of scale, once (an "
                "error of one period per revolution), backlash (views in the order they were taken), focal, centre "
                "(of each lens)"},
       {.name = "scales",

@@ -105,8 +105,8 @@ TEST(RigFace, NamesViewsThatCannotBe) {
     EXPECT_FALSE(result.views[v].used);
     EXPECT_NE(result.views[v].reason, "");
   }
-  EXPECT_EQ(rig({}, face.cameras, face_config(face)).verdict.exit_code, ExitCode::cannot_tell);
-  EXPECT_EQ(rig(face.views, {}, face_config(face)).verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(rig({}, face.cameras, face_config(face)).verdict.exit_code, ExitCode::undetermined);
+  EXPECT_EQ(rig(face.views, {}, face_config(face)).verdict.exit_code, ExitCode::undetermined);
 }
 
 TEST(RigFace, NamesPhotosThatCannotBeUsed) {
@@ -116,7 +116,7 @@ TEST(RigFace, NamesPhotosThatCannotBeUsed) {
     return cv::Mat::zeros(240, 320, CV_8U);
   };
   const RigCalibration result = rig(face.views, face.cameras, face_config(face), load);
-  EXPECT_EQ(result.verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(result.verdict.exit_code, ExitCode::undetermined);
   EXPECT_EQ(result.no_board.size(), face.views.size());
   EXPECT_EQ(result.counts.given, face.views.size());
   EXPECT_LE(result.unreadable.size(), result.no_board.size());
@@ -134,7 +134,7 @@ TEST(RigConfig, ReadsWhatIsToBeEstimated) {
   EXPECT_EQ(value_text(*estimate), "scale,focal");
   EXPECT_EQ(set_field(*estimate, "none"), "");
   EXPECT_EQ(value_text(*estimate), "none");
-  EXPECT_EQ(set_field(*estimate, "auto,scale"), "'auto' stands alone");
+  EXPECT_EQ(set_field(*estimate, "auto,scale"), "'auto' excludes the others");
   EXPECT_NE(set_field(*estimate, "scale,"), "");
   EXPECT_NE(set_field(*estimate, "x"), "");
 }

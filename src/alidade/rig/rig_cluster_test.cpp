@@ -124,7 +124,7 @@ TEST(RigMirror, MirroredImagesAreRefusedByName) {
         if (seed != 2 || view.head == 2) corner.px.x() = 319.0 - corner.px.x();
     const RigReport report = calibrate_rig(views, points_in_board(scene.board), testing::cameras_of(scene.rig), {});
     const Verdict verdict = rig_verdict(report, {});
-    EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
+    EXPECT_EQ(verdict.exit_code, ExitCode::undetermined);
     const std::string words = seed == 2 ? "head 2 sees its boards from behind" : "its images are mirrored";
     EXPECT_NE(verdict.sentence.find(words), std::string::npos) << verdict.sentence;
   }

@@ -250,7 +250,7 @@ void expect_refusal(const RigScene& scene, const std::vector<HeadView>& views, c
                     const std::map<int, Camera>& cameras) {
   const RigReport report = calibrate_rig(views, points_in_board(scene.board), cameras, {});
   const Verdict verdict = rig_verdict(report, {});
-  EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell) << words << ": " << verdict.sentence;
+  EXPECT_EQ(verdict.exit_code, ExitCode::undetermined) << words << ": " << verdict.sentence;
   EXPECT_NE(verdict.sentence.find(words), std::string::npos) << verdict.sentence;
   EXPECT_FALSE(verdict.to_add.empty()) << words;
 }

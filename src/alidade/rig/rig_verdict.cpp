@@ -21,8 +21,8 @@ Verdict rig_refusal(State state, ExitCode code, std::string sentence, std::strin
   return {.state = state, .exit_code = code, .sentence = std::move(sentence), .to_add = std::move(add), .checks = {}};
 }
 
-Verdict cannot_tell(std::string sentence, std::string add) {
-  return rig_refusal(State::refused, ExitCode::cannot_tell, std::move(sentence), std::move(add));
+Verdict undetermined(std::string sentence, std::string add) {
+  return rig_refusal(State::refused, ExitCode::undetermined, std::move(sentence), std::move(add));
 }
 
 /// A head that never rotated about one of its axes.
@@ -33,24 +33,24 @@ std::optional<Verdict> refusal_by_angles(const RigReport& report) {
     const std::string head = "head " + std::to_string(cover.id);
     if (cover.num_views < 3 || (pans && tilts)) continue;
     if (!pans && !tilts)
-      return cannot_tell(head + " does not rotate: its axes cannot be determined",
-                         "look at each board at several pans and tilts, ±20° or more of each");
+      return undetermined(head + " does not rotate: its axes cannot be determined",
+                          "look at each board at several pans and tilts, ±20° or more of each");
     if (pans)
-      return cannot_tell(head + ": pan only: its tilt axis cannot be determined",
-                         "tilt the head as well, by ±15° or more");
-    return cannot_tell(head + ": tilt only: its pan axis cannot be determined",
-                       "pan the head as well, by ±20° or more");
+      return undetermined(head + ": pan only: its tilt axis cannot be determined",
+                          "tilt the head as well, by ±15° or more");
+    return undetermined(head + ": tilt only: its pan axis cannot be determined",
+                        "pan the head as well, by ±20° or more");
   }
   return std::nullopt;
 }
 
 std::optional<Verdict> refusal_by_count(const RigReport& report) {
-  if (report.covers.empty()) return cannot_tell("no view is of a head with a camera", "give --camera for each head");
+  if (report.covers.empty()) return undetermined("no view is of a head with a camera", "give --camera for each head");
   for (const HeadCover& cover : report.covers) {
     if (cover.num_views >= 3) continue;
-    return cannot_tell("head " + std::to_string(cover.id) + " has " + std::to_string(cover.num_views) +
-                           " usable views; three are the least",
-                       "look at boards from more angles, each board at least twice");
+    return undetermined("head " + std::to_string(cover.id) + " has " + std::to_string(cover.num_views) +
+                            " usable views; three are the least",
+                        "look at boards from more angles, each board at least twice");
   }
   return std::nullopt;
 }
@@ -58,32 +58,32 @@ std::optional<Verdict> refusal_by_count(const RigReport& report) {
 Verdict refusal_by_link(const RigReport& report) {
   for (const HeadCover& cover : report.covers) {
     if (cover.num_shared_boards > 0) continue;
-    return cannot_tell("head " + std::to_string(cover.id) +
-                           " shares no board with another head: where they stand to each other cannot be determined",
-                       "let both heads see a board in the same position");
+    return undetermined("head " + std::to_string(cover.id) +
+                            " shares no board with another head: where they stand to each other cannot be determined",
+                        "let both heads see a board in the same position");
   }
-  return cannot_tell("not all heads share boards with each other", "let all heads see a board in the same position");
+  return undetermined("not all heads share boards with each other", "let all heads see a board in the same position");
 }
 
 Verdict refusal_by_status(const RigReport& report) {
   if (const auto few = refusal_by_count(report)) return *few;
   switch (report.status) {
     case RigStatus::degrees:
-      return rig_refusal(State::refused, ExitCode::cannot_tell,
+      return rig_refusal(State::refused, ExitCode::undetermined,
                          "the angles are degrees: the boards rotate as if each radian were a degree",
                          "give pan_rad and tilt_rad in radians");
     case RigStatus::swapped:
-      return rig_refusal(State::refused, ExitCode::cannot_tell,
+      return rig_refusal(State::refused, ExitCode::undetermined,
                          "heads swapped: the views of each head fit the camera of the other",
                          "exchange the cameras, or the numbers in column 'head'");
     case RigStatus::mirrored:
       return rig_refusal(
-          State::refused, ExitCode::cannot_tell,
+          State::refused, ExitCode::undetermined,
           "head " + std::to_string(report.mirrored_head) +
               " sees its boards from behind: its images are mirrored, or corners are counted the other way",
           "give images as the camera takes them (no mirror, no flip), corners row by row, left to right");
     case RigStatus::misread:
-      return rig_refusal(State::refused, ExitCode::cannot_tell, report.misreading,
+      return rig_refusal(State::refused, ExitCode::undetermined, report.misreading,
                          "give each view what its own pan and tilt encoders read");
     case RigStatus::not_linked:
       return refusal_by_link(report);
@@ -92,8 +92,8 @@ Verdict refusal_by_status(const RigReport& report) {
   }
   if (const auto angles = refusal_by_angles(report)) return *angles;
   if (report.status == RigStatus::degenerate)
-    return cannot_tell("these cannot be separated: " + joined(report.unknown),
-                       "look at each board from more pans and tilts");
+    return undetermined("these cannot be separated: " + joined(report.unknown),
+                        "look at each board from more pans and tilts");
   return rig_refusal(State::not_converged, ExitCode::no_convergence, "no rig explains these views",
                      "check that each view has its own angles (radians), head and board, and the camera files");
 }
@@ -189,8 +189,8 @@ void add_causes(const RigReport& report, Verdict& verdict) {
   const bool is_quiet = first.sigmas < most;
   verdict.checks.push_back(
       check_of("causes", is_quiet ? State::good : State::care,
-               is_quiet ? "other lenses, scales, eccentricities and backlash are not asked for"
-                        : "the residuals ask for another " + first.name + ", by " + text_of(first.size, 2) +
+               is_quiet ? "other lenses, scales, eccentricities and backlash are not indicated"
+                        : "the residuals indicate another " + first.name + ", by " + text_of(first.size, 2) +
                               (first.unit.empty() ? "" : " " + first.unit) + " (" + text_of(first.sigmas, 2) + "σ)",
                first.sigmas, most, "σ"));
 }
@@ -249,8 +249,8 @@ Verdict rig_verdict(const RigReport& report, const RigConfig& config) {
     verdict = refused->name == "outliers" ? rig_refusal(State::not_converged, ExitCode::no_convergence,
                                                         "the views do not agree: " + refused->text,
                                                         "check that each view has its own angles, head and board")
-                                          : cannot_tell("too little for this noise: " + refused->text,
-                                                        "look at more boards, nearer, from more pans and tilts");
+                                          : undetermined("too little for this noise: " + refused->text,
+                                                         "look at more boards, nearer, from more pans and tilts");
     verdict.checks = checks;
     return verdict;
   }

@@ -65,13 +65,13 @@ TEST(IdentifyFace, AnswersEmptyInput) {
     auto log = log_of(late_scene(false));
     log.resize(rows);
     const Identification result = identify(log);
-    EXPECT_EQ(result.verdict.exit_code, ExitCode::cannot_tell);
+    EXPECT_EQ(result.verdict.exit_code, ExitCode::undetermined);
     EXPECT_EQ(result.status, ServoIdentification::Status::degenerate);
     EXPECT_EQ(outcome_of(result).document.counts.given, rows);
   }
   std::vector<ServoSample> still;
   for (int i = 0; i < 50; ++i) still.push_back({.t_s = 0.01 * i, .command = 1.0, .angle_rad = 0.2});
-  EXPECT_EQ(identify(still).verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(identify(still).verdict.exit_code, ExitCode::undetermined);
 }
 
 }  // namespace

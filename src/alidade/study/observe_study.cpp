@@ -124,7 +124,7 @@ FieldList fields_of(ObserveStudy& study) {
            .help = "batch: all rows adjusted together, fast; hybrid, window, flow, fang2011: observe, the whole job"},
           {.name = "rows", .value = &study.rows, .help = "Of a log", .limits = {10, 100000}},
           {.name = "rate_hz", .value = &study.rate_hz, .help = "Rows a second", .limits = {1.0, 10000.0}},
-          {.name = "points", .value = &study.points, .help = "That stand still", .limits = {2, 5000}},
+          {.name = "points", .value = &study.points, .help = "Static points", .limits = {2, 5000}},
           {.name = "noise_px", .value = &study.noise_px, .help = "σ of a pixel coordinate", .limits = {1e-6, 100.0}},
           {.name = "scenes",
            .value = &study.scenes,

@@ -67,7 +67,7 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, int num_p
     if (is_new) views.push_back({photo, {}});
     if (!seen.emplace(at->second, corner.index).second) {
       throw InputError(csv.where(row, "corner") + ": corner " + std::to_string(corner.index) + " of '" + photo +
-                       "' stands twice");
+                       "' appears twice");
     }
     views[at->second].corners.push_back(corner);
   });
@@ -128,7 +128,7 @@ std::vector<Eigen::Vector3d> read_board_points(const std::filesystem::path& file
   std::vector<bool> found(points.size(), false);
   for (std::size_t row = 0; row < csv.num_rows(); ++row) {
     const auto at = static_cast<std::size_t>(csv.integer(row, "corner", 0, num_points - 1));
-    if (found[at]) throw InputError(csv.where(row, "corner") + ": point " + std::to_string(at) + " stands twice");
+    if (found[at]) throw InputError(csv.where(row, "corner") + ": point " + std::to_string(at) + " appears twice");
     points[at] = {csv.number(row, "x_m"), csv.number(row, "y_m"), csv.number(row, "z_m")};
     found[at] = true;
   }

@@ -54,7 +54,7 @@ LocalizeTarget points_of(const YAML::Node& list, const std::string& file) {
     detail::refuse_unknown_keys(fields, {"id", "x_m", "y_m", "z_m", "sigma_m", "patch"}, "a point");
     KnownPoint point;
     point.id = id_of(fields);
-    if (!ids.insert(point.id).second) refuse(file, fields.full("id"), fmt::format("{} stands twice", point.id));
+    if (!ids.insert(point.id).second) refuse(file, fields.full("id"), fmt::format("{} appears twice", point.id));
     point.point_in_world = {fields.number("x_m"), fields.number("y_m"), fields.number("z_m")};
     point.sigma_m = positive(fields, "sigma_m", 0.001);
     target.is_scale_given = target.is_scale_given && fields.has("sigma_m");

@@ -139,7 +139,7 @@ SavedMap read_map(const std::filesystem::path& file) {
     if (!(id >= 0.0) || id > max_id || id != std::floor(id))
       refuse(name, each.full("id"), "is not a whole number from 0");
     SavedPoint point{static_cast<long>(id), map_matrix_of(each, "position", 3, 1), map_covariance_of(each), {}};
-    if (!ids.insert(point.id).second) refuse(name, each.full("id"), fmt::format("{} stands twice", point.id));
+    if (!ids.insert(point.id).second) refuse(name, each.full("id"), fmt::format("{} appears twice", point.id));
     if (each.has("look")) point.look = read_look(node["look"], each);
     map.points.push_back(std::move(point));
   }

@@ -101,7 +101,7 @@ void read_target(const YAML::Node& root, const Fields& top, ServoScenarioFile& r
   const Section target(root, top, "target",
                        {"path", "start_m", "radius_m", "period_s", "jump_m", "jump_at_s", "track"});
   if (target.has("track")) {
-    if (target.has("path")) refuse(target.fields().file(), target.fields().full("track"), "stands beside a path");
+    if (target.has("path")) refuse(target.fields().file(), target.fields().full("track"), "excludes a path");
     read.track = folder / target.fields().text("track");
     path = read_recorded_path(read.track);
   }
@@ -182,7 +182,7 @@ void read_controllers(const YAML::Node& root, const Fields& top, ServoScenario& 
       const auto kind = controller_named(name);
       if (!kind || std::ranges::count(scenario.controllers, *kind) > 0)
         refuse(top.file(), "controllers",
-               kind ? fmt::format("'{}' stands twice", name)
+               kind ? fmt::format("'{}' appears twice", name)
                     : fmt::format("'{}' is not one of pi, feedforward, lqr, mpc", name));
       scenario.controllers.push_back(*kind);
     }
@@ -375,7 +375,7 @@ search: {enabled: true, coast_s: 0.3, carry_s: 0.2, speed_deg_s: 57.3, turn_of_v
 # zoom: {t_s: [3, 7], factor: [1, 3]}  # of all focal lengths, over time; straight in the logarithm between
 # intrinsics: observed           # the loop goes by: given (the rig's), observed (by an on-line observer), true; without a
                                  # zoom given, with one observed
-# background_points: 24          # that stand still behind the target, for the observer
+# background_points: 24          # static, behind the target, for the observer
 seeds: 8
 specification_px: 10
 robustness: {gain: [0.8, 1.2], tau: [0.7, 1.3], points: 5}   # points: 0 leaves it out

@@ -126,7 +126,7 @@ ShotsFile read_shots(const Csv& csv, const ShotsOptions& options) {
     std::string cells;
     for (const std::string& name : csv.header()) cells += csv.text(row, name) + ",";
     if (!seen.insert(std::move(cells)).second)
-      throw InputError(csv.where(row, "range_m") + ": the same shot stands in a row before");
+      throw InputError(csv.where(row, "range_m") + ": the same shot is in an earlier row");
     read.shots.push_back(std::move(shot));
   });
   if (read.shots.empty()) throw InputError(csv.name() + ": has no shots; at least one row is needed");

@@ -88,7 +88,7 @@ void add_row(const Csv& csv, std::size_t row, const ViewColumns& columns, int nu
     return;
   }
   HeadView& view = read.views[found->second];
-  if (columns.has_photo) throw InputError(csv.where(row, "view") + fmt::format(": {} stands twice", number));
+  if (columns.has_photo) throw InputError(csv.where(row, "view") + fmt::format(": {} appears twice", number));
   const auto must_be = [&](const char* column, bool is_same) {
     if (!is_same)
       throw InputError(csv.where(row, column) +
@@ -100,7 +100,7 @@ void add_row(const Csv& csv, std::size_t row, const ViewColumns& columns, int nu
   must_be("tilt_rad", view.pan_tilt_rad.y() == given.pan_tilt_rad.y());
   const Corner corner = corner_of(csv, row, columns, num_points);
   if (std::ranges::any_of(view.seen.corners, [&](const Corner& other) { return other.index == corner.index; }))
-    throw InputError(csv.where(row, "corner") + fmt::format(": {} stands twice in view {}", corner.index, number));
+    throw InputError(csv.where(row, "corner") + fmt::format(": {} appears twice in view {}", corner.index, number));
   view.seen.corners.push_back(corner);
 }
 

@@ -20,7 +20,7 @@ struct RangefinderTrialSetup {
   ShotMistake mistake = {};
   RangefinderMethod method = RangefinderMethod::joint;
   int num_shots = 18;
-  bool tells_lengths = false;  ///< The user takes the readings' scale and the squares for exact.
+  bool gives_lengths = false;  ///< The user takes the readings' scale and the squares for exact.
   bool has_boards = true;      ///< Else spots alone are left.
   bool is_mirrored = false;    ///< The images are, left to right.
 };
@@ -56,7 +56,7 @@ inline RangefinderTrial rangefinder_trial(const RangefinderTrialSetup& setup, st
   if (setup.is_mirrored) mirror(shots, sample.camera.width_px);
   const Camera camera = mistaken_camera(sample.camera, setup.mistake.focal, setup.mistake.centre_px, setup.mistake.k1);
   RangefinderConfig given{.method = setup.method};
-  if (setup.tells_lengths) given.sigma_scale = given.sigma_square_m = 0.0;
+  if (setup.gives_lengths) given.sigma_scale = given.sigma_square_m = 0.0;
   RangefinderTrial trial{solve_rangefinder(shots, sample.points, camera, given)};
   Verdict& verdict = trial.solved.verdict;
   const RangefinderReport& report = trial.solved.report;

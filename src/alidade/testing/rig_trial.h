@@ -17,7 +17,7 @@ struct RigTrialSetup {
   RigNoise noise = {};
   RigMistake mistake = {};
   bool by_need = true;
-  bool tells_scale = true;    ///< The user takes the encoders' scales for exact.
+  bool gives_scale = true;    ///< The user takes the encoders' scales for exact.
   double sigma_scale = 1e-9;  ///< Or known to so much.
   double sigma_lens_px =
       0.0;  ///< That the files state of focal lengths and centres, which are exact but for the mistake.
@@ -68,7 +68,7 @@ inline RigTrial rig_trial(const RigTrialSetup& setup, std::uint64_t seed) {
   RigConfig config;
   config.board = scene.board;
   config.sigma_square_m = 1e-9;
-  if (setup.tells_scale) config.sigma_scale = setup.sigma_scale;
+  if (setup.gives_scale) config.sigma_scale = setup.sigma_scale;
   RigTrial trial;
   const auto calibrated = setup.by_need ? calibrate_rig_by_need : calibrate_rig;
   trial.report = calibrated(views, points_in_board(scene.board), cameras, config, {});

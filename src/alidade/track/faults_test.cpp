@@ -138,7 +138,7 @@ TEST(TrackFaults, OfThreeHeadsTheWrongOneIsNamed) {
       heads[wrong].head.world_from_base.rotation =
           heads[wrong].head.world_from_base.rotation * exp_so3({0.3, 0.4, 0.1});
       const Verdict foreign = track_verdict(track_target(observations, heads, config), observations, heads, config);
-      EXPECT_EQ(foreign.exit_code, ExitCode::cannot_tell);
+      EXPECT_EQ(foreign.exit_code, ExitCode::undetermined);
       EXPECT_NE(foreign.sentence.find("the observations of " + head), std::string::npos) << foreign.sentence;
       const std::vector<TargetObservation> late = with_shift(observations, {wrong, 0.04});
       const Verdict clock = track_verdict(track_target(late, scene.heads, config), late, scene.heads, config);

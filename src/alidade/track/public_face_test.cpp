@@ -207,9 +207,9 @@ TEST(TrackFace, AnswersRigsAndObservationsThatCannotBe) {
 
 TEST(TrackFace, AnswersEmptyInputAndStops) {
   const TrackScene scene = *track_scenario("B");
-  EXPECT_EQ(track({}, Rig{}).verdict.exit_code, ExitCode::cannot_tell);
-  EXPECT_EQ(track({}, rig_of(scene)).verdict.exit_code, ExitCode::cannot_tell);
-  EXPECT_EQ(TargetTracker(rig_of(scene)).finish().verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(track({}, Rig{}).verdict.exit_code, ExitCode::undetermined);
+  EXPECT_EQ(track({}, rig_of(scene)).verdict.exit_code, ExitCode::undetermined);
+  EXPECT_EQ(TargetTracker(rig_of(scene)).finish().verdict.exit_code, ExitCode::undetermined);
   const auto stop = [](std::string_view, std::size_t, std::size_t) { return false; };
   EXPECT_THROW((void)track(brief_observations(scene), rig_of(scene), {}, {}, stop), Interrupted);
 }

@@ -169,7 +169,7 @@ TEST(Tracker, LeavesOutWildObservationsAndStays) {
   EXPECT_LT(worst_m, 0.02);
 }
 
-TEST(Tracker, BeginsAnewWhereTheTargetJumped) {
+TEST(Tracker, ReinitialisesWhereTheTargetJumped) {
   TrackScene scene = *track_scenario("A");
   scene.position = [](double t_s) { return Eigen::Vector3d(t_s < 3.0 ? 0.1 : 0.5, -0.2, t_s < 3.0 ? 0.8 : 1.5); };
   scene.aiming_lag_s = 0.0;

@@ -121,7 +121,7 @@ TEST(Turned, APhotoThatWasZoomedIsRefusedByName) {
   const TurnedReport report = observe_turned(photos, {});
   ASSERT_EQ(report.status, Status::zoomed);
   const Verdict verdict = turned_verdict(report, photos, {});
-  EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(verdict.exit_code, ExitCode::undetermined);
   EXPECT_THAT(verdict.sentence, HasSubstr("photo004.jpg (1.15 times)"));
 }
 
@@ -129,7 +129,7 @@ Verdict verdict_of(const MatchedPhotos& photos, const TurnedConfig& config = {})
   return turned_verdict(observe_turned(photos, config), photos, config);
 }
 
-TEST(Turned, WhatCannotTellIsRefusedWithItsReason) {
+TEST(Turned, DegenerateDataAreRefusedWithTheReason) {
   TurnedScene two = small_scene();
   two.num_photos = 2;
   EXPECT_THAT(verdict_of(simulate_turned_photos(two, 1)).sentence, HasSubstr("only two photos"));
@@ -145,14 +145,14 @@ TEST(Turned, WhatCannotTellIsRefusedWithItsReason) {
   same.features[1] = same.features[0];
   for (FeatureMatch& match : same.pairs[0].matches) match.b = match.a;
   const Verdict one = verdict_of(same);
-  EXPECT_EQ(one.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(one.exit_code, ExitCode::undetermined);
   EXPECT_THAT(one.sentence, HasSubstr("one image"));
 
   TurnedScene still = small_scene();
   still.pan_step_rad = still.tilt_rad = 0.0;
   still.shake_rad = 1e-3;
   const Verdict stands = verdict_of(simulate_turned_photos(still, 3));
-  EXPECT_EQ(stands.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(stands.exit_code, ExitCode::undetermined);
   EXPECT_THAT(stands.sentence, HasSubstr("does not turn"));
 }
 
@@ -166,7 +166,7 @@ TEST(Turned, ACameraThatWalksIsRefused) {
     walk.min_depth_m = 0.99 * depth;
     walk.max_depth_m = depth;
     const Verdict verdict = verdict_of(simulate_turned_photos(walk, 7));
-    EXPECT_TRUE(verdict.exit_code == ExitCode::cannot_tell || verdict.state == State::bad) << verdict.sentence;
+    EXPECT_TRUE(verdict.exit_code == ExitCode::undetermined || verdict.state == State::bad) << verdict.sentence;
   }
 }
 
@@ -181,7 +181,7 @@ TEST(Turned, AdviceNeverProposesWhatIsGiven) {
   config.ordinary_aspect = config.ordinary_centre = false;
   const MatchedPhotos photos = simulate_turned_photos(scene, 3);
   const Verdict free = verdict_of(photos, config);
-  EXPECT_EQ(free.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(free.exit_code, ExitCode::undetermined);
   config.square_pixels = config.fixed_centre = true;
   const Verdict held = verdict_of(photos, config);
   EXPECT_EQ(held.to_add.find("--square-pixels"), std::string::npos) << held.to_add;

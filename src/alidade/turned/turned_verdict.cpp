@@ -54,7 +54,7 @@ Refusal zoomed(const TurnedReport& report, const MatchedPhotos& photos) {
       names.push_back(photos.names[i] + " (" + text_of(report.photos[i].zoom, 3) + " times)");
   }
   return {"the focal length is not the same in all photos: " + list_of(names),
-          "leave these out, or take all at one zoom and focus; a step forward looks alike"};
+          "exclude these, or take all at one zoom and focus; a step forward looks alike"};
 }
 
 /// What the photos do not determine, of what is not fixed.
@@ -81,7 +81,7 @@ Refusal weak(const TurnedReport& report, const MatchedPhotos& photos, const Turn
 
 Verdict refused(const Refusal& refusal, ExitCode code) {
   Verdict verdict;
-  verdict.state = code == ExitCode::cannot_tell ? State::refused : State::not_converged;
+  verdict.state = code == ExitCode::undetermined ? State::refused : State::not_converged;
   verdict.exit_code = code;
   verdict.sentence = refusal.what;
   verdict.to_add = refusal.add;
@@ -132,7 +132,7 @@ Check parallax_check(const TurnedReport& report, const MatchedPhotos& photos) {
 Check zoom_check(const TurnedReport& report, const MatchedPhotos& photos) {
   Check check{"one focal length",
               State::good,
-              "no photo asks for a focal length of its own",
+              "no photo indicates a focal length of its own",
               0.0,
               100.0 * zoom_matters,
               "%",
@@ -144,7 +144,7 @@ Check zoom_check(const TurnedReport& report, const MatchedPhotos& photos) {
     check.value = 100.0 * off;
     if (off < zoom_matters) continue;
     check.state = State::care;
-    check.text = photos.names[i] + " asks for a focal length of its own, " + text_of(photo.zoom, 4) +
+    check.text = photos.names[i] + " indicates a focal length of its own, " + text_of(photo.zoom, 4) +
                  " times that of the others: zoom, focus, or a step forward";
   }
   return check;
@@ -217,20 +217,20 @@ Check centre_check(const TurnedReport& report) {
 Verdict turned_verdict(const TurnedReport& report, const MatchedPhotos& photos, const TurnedConfig& config) {
   switch (report.status) {
     case Status::too_few_photos:
-      return refused(too_few(report, photos), ExitCode::cannot_tell);
+      return refused(too_few(report, photos), ExitCode::undetermined);
     case Status::no_turn:
       return refused({"the camera does not turn between these photos", "rotate it by 10° or more from photo to photo"},
-                     ExitCode::cannot_tell);
+                     ExitCode::undetermined);
     case Status::zoomed:
-      return refused(zoomed(report, photos), ExitCode::cannot_tell);
+      return refused(zoomed(report, photos), ExitCode::undetermined);
     case Status::moved:
       return refused(
           {"the photos agree two by two, but not with one camera that rotates on the spot: " +
                std::to_string(report.matches.kept) + " of " + std::to_string(report.matches.agreeing) + " matches",
            "rotate the camera about its lens instead of walking, or look at things farther away"},
-          ExitCode::cannot_tell);
+          ExitCode::undetermined);
     case Status::weak:
-      return refused(weak(report, photos, config), ExitCode::cannot_tell);
+      return refused(weak(report, photos, config), ExitCode::undetermined);
     case Status::no_convergence:
       return refused(
           {"no camera that rotates explains these matches", "check that the photos are of one camera and spot"},

@@ -26,7 +26,7 @@ const placed = (z: number) => (Math.abs(z) <= 6 ? z : Math.sign(z) * (6 + 6 * Ma
 const back = (place: number) => (Math.abs(place) <= 6 ? place : Math.sign(place) * 6 * 10 ** ((Math.abs(place) - 6) / 6));
 
 export const batchSpread: Figure = {
-  id: 'spread', title: 'What stands out of the lot?', note: 'distance from the lot’s median, over its scatter and the value’s own σ', span: 24,
+  id: 'spread', title: 'Which are outliers of the lot?', note: 'distance from the lot’s median, over its scatter and the value’s own σ', span: 24,
   draw(host, doc) {
     const table = doc.table('values');
     if (!table || !table.tells('z')) return null;
@@ -37,8 +37,8 @@ export const batchSpread: Figure = {
       else pen.circle(x, y, 2.2, pen.c.blue);
       pen.hit({x, y, r: 4, tip: () => [`${table.text('camera', i)}: ${table.text('quantity', i)} = ${num(table.number('value', i), 6)} ± ${num(table.number('sigma', i), 2)}`, `median of the lot ${num(table.number('median_of_lot', i), 6)}, z ${num(z[i]!, 3)}`]});
     };
-    legend(host, [{words: 'a row of the lot', colour: 'var(--blue)', look: 'dot'}, {words: 'stands out', colour: 'var(--orange)', look: 'square'}, {words: `within ± ${standsOut}`, colour: 'var(--blue)', look: 'band'}]);
-    new Chart(host, {height: 60 + 34 * rows.length, label: `${out} values stand out of the lot`}, (pen) => {
+    legend(host, [{words: 'a row of the lot', colour: 'var(--blue)', look: 'dot'}, {words: 'outlier', colour: 'var(--orange)', look: 'square'}, {words: `within ± ${standsOut}`, colour: 'var(--blue)', look: 'band'}]);
+    new Chart(host, {height: 60 + 34 * rows.length, label: `${out} outliers in the lot`}, (pen) => {
       const left = Math.min(pen.w / 3, 14 + Math.max(...rows.map((row) => pen.width(row.name, 12)))), right = pen.w - 12, top = 8, bottom = pen.h - 40, x = scale(-reach, reach, left, right), each = (bottom - top) / rows.length;
       pen.rect(x(-standsOut), top, x(standsOut) - x(-standsOut), bottom - top, pen.c.panel);
       xAxis(pen, x, top, bottom, {label: 'z', format: (place) => num(back(place), 2)});
@@ -57,6 +57,6 @@ export const batchSpread: Figure = {
       });
     });
     const left = all.length > most ? ` ${all.length - most} more quantities, nearer to their medians, are in the table.` : '';
-    return {marks: rows.reduce((sum, row) => sum + row.values.length, 0), rows: table.rows, tables: [table], words: `${out} values stand out of the lot`, good: `Good: nothing outside the band. Here ${out} of ${table.rows} values ${out === 1 ? 'is' : 'are'}.${left}`};
+    return {marks: rows.reduce((sum, row) => sum + row.values.length, 0), rows: table.rows, tables: [table], words: `${out} outliers in the lot`, good: `Good: nothing outside the band. Here ${out} of ${table.rows} values ${out === 1 ? 'is' : 'are'}.${left}`};
   },
 };

@@ -27,7 +27,7 @@ function causesOf(doc: Doc): Cause[] {
 }
 
 export const causes: Figure = {
-  id: 'causes', isOptional: true, title: 'Which cause do the residuals ask for?', note: 'score in σ; beside it what it would be, ± 3σ', span: 12,
+  id: 'causes', isOptional: true, title: 'Which cause do the residuals indicate?', note: 'score in σ; beside it what it would be, ± 3σ', span: 12,
   draw(host, doc) {
     const all = causesOf(doc);
     if (all.length === 0) return null;

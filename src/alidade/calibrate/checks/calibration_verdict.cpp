@@ -311,7 +311,7 @@ Verdict refusal_verdict(const CalibrateReport& report) {
   Verdict verdict;
   const bool degenerate = report.status == CalibrateReport::Status::degenerate;
   verdict.state = degenerate ? State::refused : State::not_converged;
-  verdict.exit_code = degenerate ? ExitCode::cannot_tell : ExitCode::no_convergence;
+  verdict.exit_code = degenerate ? ExitCode::undetermined : ExitCode::no_convergence;
   verdict.sentence = report.reason;
   verdict.to_add = report.to_add;
   return verdict;

@@ -158,7 +158,7 @@ TEST(CalibrationVerdict, ARefusalSaysWhatToAdd) {
   views.resize(2);
   const Calibration result = sample_calibration(views);
   EXPECT_EQ(result.verdict.state, State::refused);
-  EXPECT_EQ(result.verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(result.verdict.exit_code, ExitCode::undetermined);
   EXPECT_EQ(static_cast<int>(result.verdict.exit_code), 4);
   EXPECT_THAT(result.verdict.sentence, HasSubstr("only 2 usable photos"));
   EXPECT_FALSE(result.verdict.to_add.empty());

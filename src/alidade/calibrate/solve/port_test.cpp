@@ -111,7 +111,7 @@ TEST(CalibratePort, BrownFitsTheSamePhotosAsWell) {
   EXPECT_NEAR(brown.rms_px / port.rms_px, 1.0, 0.015);  // 0.8 % here
 }
 
-TEST(CalibratePort, RefusesWhatParallelBoardsCannotTell) {
+TEST(CalibratePort, RefusesWhatParallelBoardsDoNotDetermine) {
   const auto views = simulate_views(scene_of(port_camera(0.02, 0.0), 5, 0.0), sigma_px, 9);
   PortKnowledge nothing = knowledge();
   nothing.air.reset();

@@ -41,7 +41,7 @@ ObserveReport observed(const HeadCalibration& result) {
   } catch (const InputError& error) {  // no rows, or no points
     ObserveReport report;
     report.verdict.state = State::refused;
-    report.verdict.exit_code = ExitCode::cannot_tell;
+    report.verdict.exit_code = ExitCode::undetermined;
     report.verdict.sentence = std::string("no point was followed while the head moved evenly: ") + error.what();
     report.verdict.to_add = "let the camera see corners or texture, sharply";
     return report;

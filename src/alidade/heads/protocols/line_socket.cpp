@@ -60,7 +60,7 @@ SocketAddress address_of(const std::string& url, std::string_view scheme, std::u
     if (address.user.empty() || address.user.find_first_of(":/?") != std::string::npos ||
         rest.find('@') != std::string::npos)
       throw InputError(
-          fmt::format("{}…: no password stands in an address, where others can read it; give {}USER@HOST, and the "
+          fmt::format("{}…: no password may be in an address, where others can read it; give {}USER@HOST, and the "
                       "password by --password-file or in ALIDADE_PASSWORD",
                       scheme, scheme));
   }
@@ -106,7 +106,7 @@ void LineSocket::connect() {
   const double until_s = steady_s() + timeout_s_;
   for (const addrinfo* endpoint = found; endpoint != nullptr && socket_ < 0; endpoint = endpoint->ai_next)
     socket_ = connected(*endpoint, until_s);
-  if (socket_ < 0) fail("nobody answers at that address");
+  if (socket_ < 0) fail("no answer from that address");
   const int on = 1;
   ::setsockopt(socket_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
   if (trust_) begin_tls(until_s);

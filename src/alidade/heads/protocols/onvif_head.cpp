@@ -17,7 +17,7 @@ struct OnvifQuery {
   std::size_t profile = 0;
   std::string profile_token;
   OnvifRange azimuth_deg{-180.0, 180.0}, elevation_deg{-90.0, 90.0};
-  bool tells_azimuth = false, tells_elevation = false;
+  bool determines_azimuth = false, determines_elevation = false;
 };
 
 /// What stands in az or el of an address, where nobody said it.
@@ -56,7 +56,7 @@ OnvifQuery onvif_query(const std::string& url) {
       is_good = !value.empty();
     } else if (key == "az" || key == "el") {
       is_good = read_degrees(value, key == "az" ? query.azimuth_deg : query.elevation_deg);
-      (key == "az" ? query.tells_azimuth : query.tells_elevation) = true;
+      (key == "az" ? query.determines_azimuth : query.determines_elevation) = true;
     }
     is_good = is_good || ((key == "https" || key == "cert") && onvif_trust(url));  // the connection's own
     if (!is_good)
@@ -79,9 +79,9 @@ class OnvifHead final : public HeadDevice {
     profile_ = all[which];
     if (!profile_.has_pan_tilt) throw InputError(name() + ": this profile has no PTZ configuration: it does not turn");
     const Eigen::Vector2d low = angles(profile_.x.high, profile_.y.low), high = angles(profile_.x.low, profile_.y.high);
-    limits_ = {low, high, query_.tells_azimuth && query_.tells_elevation, "ONVIF, " + service_.maker()};
-    if (!query_.tells_azimuth) limits_.assumed.push_back(supposed("az", query_.azimuth_deg));
-    if (!query_.tells_elevation) limits_.assumed.push_back(supposed("el", query_.elevation_deg));
+    limits_ = {low, high, query_.determines_azimuth && query_.determines_elevation, "ONVIF, " + service_.maker()};
+    if (!query_.determines_azimuth) limits_.assumed.push_back(supposed("az", query_.azimuth_deg));
+    if (!query_.determines_elevation) limits_.assumed.push_back(supposed("el", query_.elevation_deg));
   }
 
   [[nodiscard]] HeadLimits limits() override { return limits_; }

@@ -220,7 +220,7 @@ void refuse_secrets(const std::string& url) {
   if (names_password || has_word)
     throw InputError(
         (names_password ? url.substr(0, begin + 3) : shown) +
-        "…: no password stands in an address, where others can read it; give USER@HOST or {password} in its "
+        "…: no password may be in an address, where others can read it; give USER@HOST or {password} in its "
         "place, and the password by --password-file or in ALIDADE_PASSWORD");
 }
 

@@ -27,7 +27,7 @@ double seconds_of(const std::string& url) {
   char* end = nullptr;
   const double seconds = text.starts_with(key) ? std::strtod(text.c_str() + key.size(), &end) : 0.0;
   if (!(seconds > 0.0 && seconds <= 60.0) || end == nullptr || *end != '\0')
-    throw InputError(url + ": behind the camera's name stands ?seconds=S, an exposure of at most 60 s, or nothing");
+    throw InputError(url + ": the camera's name may be followed by ?seconds=S, an exposure of at most 60 s");
   return seconds;
 }
 

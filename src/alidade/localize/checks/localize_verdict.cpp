@@ -17,24 +17,25 @@ Verdict stopped(State state, ExitCode code, std::string sentence, std::string to
 
 /// Why there is no path at all.
 Verdict never_started(const Localization& report) {
-  const auto cannot_tell = [](std::string sentence, std::string to_add) {
-    return stopped(State::refused, ExitCode::cannot_tell, std::move(sentence), std::move(to_add));
+  const auto undetermined = [](std::string sentence, std::string to_add) {
+    return stopped(State::refused, ExitCode::undetermined, std::move(sentence), std::move(to_add));
   };
   if (report.num_alike > 1)
-    return cannot_tell(std::to_string(report.num_alike) +
-                           " things in one image look like the target: which one it is cannot be determined",
-                       "begin where one of them is seen, or give --start");
+    return undetermined(std::to_string(report.num_alike) +
+                            " things in one image look like the target: which one it is cannot be determined",
+                        "begin where one of them is seen, or give --start");
   if (report.is_in_map)
-    return cannot_tell("the map is not found in any of " + std::to_string(report.path.size()) + " frames",
-                       "begin where the map was made, in view of what it holds, with the same camera");
+    return undetermined("the map is not found in any of " + std::to_string(report.path.size()) + " frames",
+                        "begin where the map was made, in view of what it holds, with the same camera");
   if (report.is_of_images && report.has_target)
-    return cannot_tell("the target is not found in any of " + std::to_string(report.path.size()) + " images",
-                       "begin in front of the target, whole and sharp, and check its size in --target");
+    return undetermined("the target is not found in any of " + std::to_string(report.path.size()) + " images",
+                        "begin in front of the target, whole and sharp, and check its size in --target");
   if (report.max_seen < 3)
-    return cannot_tell("too few points: at most " + std::to_string(report.max_seen) + " in a frame, a pose needs three",
-                       report.is_of_images ? "look at something with corners, in light" : "track more points");
-  return cannot_tell("the target is not found: four of its points, not on a line, are never seen where they belong",
-                     "begin in front of the target, or give --start");
+    return undetermined(
+        "too few points: at most " + std::to_string(report.max_seen) + " in a frame, a pose needs three",
+        report.is_of_images ? "look at something with corners, in light" : "track more points");
+  return undetermined("the target is not found: four of its points, not on a line, are never seen where they belong",
+                      "begin in front of the target, or give --start");
 }
 
 State state_of(double value, double care, double bad) {
@@ -56,7 +57,7 @@ void add_truth(const Localization& report, Verdict& verdict) {
   if (report.scale_known && before > elsewhere_ratio)
     verdict.checks.push_back({"truth's frame", State::care,
                               "before alignment it is " + text_of(before, 2) +
-                                  " times its σ away: the truth stands in another frame, or the map is not where its "
+                                  " times its σ away: the truth is in another frame, or the map is not where its "
                                   "σ says",
                               before, elsewhere_ratio, "σ", "path"});
 }
@@ -119,7 +120,7 @@ std::string cause_text(const GivenNumber& given) {
   if (given.name == "speed of the target") return "the target moves against the other points, by " + size + z;
   if (given.name == "readout")
     return "rows are not of one moment: a rolling shutter of " + size + " from the first to the last" + z;
-  return "the observations ask for another " + std::string(given.name) + ", by " + size + z +
+  return "the observations indicate another " + std::string(given.name) + ", by " + size + z +
          ": the camera file is not of this lens as it was used";
 }
 
@@ -197,7 +198,7 @@ void add_tilt(const Localization& report, Verdict& verdict) {
   if (!report.is_from_one_place && !(report.widened > care_widened)) return;
   std::string text =
       report.is_from_one_place
-          ? "the camera hardly moves aside: from one position the tilt of the target is hardly observable, and "
+          ? "the camera hardly translates: from one position the tilt of the target is hardly observable, and "
             "errors may be several times their σ"
           : "the tilt of the target is hardly observable: it is seen from one side alone";
   if (report.widened > care_widened) text += "; σ is enlarged " + text_of(report.widened, 2) + " times for it";
@@ -335,7 +336,7 @@ Verdict localize_verdict(const Localization& report) {
   const bool has_started = std::ranges::any_of(report.path, &PathStep::has_pose);
   if (!has_started) return never_started(report);
   if (report.num_used == 0 || report.max_seen < 3)
-    return stopped(State::refused, ExitCode::cannot_tell,
+    return stopped(State::refused, ExitCode::undetermined,
                    "too few points: at most " + std::to_string(report.max_seen) + " in a frame, a pose needs three",
                    "track more points");
   const double gated = share(report.num_gated, report.num_used + report.num_gated);
@@ -356,12 +357,12 @@ Verdict localize_verdict(const Localization& report) {
                        " % of its observations do not fit the path",
                    "check the points' numbers and positions in --target");
   if (lost > max_lost)
-    return stopped(State::refused, ExitCode::cannot_tell,
+    return stopped(State::refused, ExitCode::undetermined,
                    "lost: " + std::to_string(report.num_lost) + " of " + std::to_string(num_frames) +
                        " frames have fewer than three points that fit",
                    "track more points, and keep the target in view for longer");
   if (report.is_behind && report.is_board)
-    return stopped(State::refused, ExitCode::cannot_tell,
+    return stopped(State::refused, ExitCode::undetermined,
                    "mirrored: the observations put the camera behind the printed side of the board",
                    "check that the images are not mirrored, and the order of the board's corners");
   Verdict verdict;

@@ -76,7 +76,7 @@ TEST(SavedMap, ImagesBeginInTheMapOfAnEarlierRun) {
   EXPECT_TRUE(second.scale_known);
   EXPECT_LT(second.error.unaligned_m, 0.01) << second.verdict.sentence;  // in the frame of the first, in metres
   EXPECT_GT(second.saved_map.points.size(), first.saved_map.points.size() / 2);
-  EXPECT_NE(second.verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_NE(second.verdict.exit_code, ExitCode::undetermined);
 }
 
 TEST(SavedMap, ImagesOfAnotherPlaceAreRefused) {
@@ -87,7 +87,7 @@ TEST(SavedMap, ImagesOfAnotherPlaceAreRefused) {
   for (cv::Mat& image : elsewhere.images) cv::flip(image, image, -1);
   const Localization none = localized_film(elsewhere, in_map);
   EXPECT_EQ(none.num_lost, 5u);
-  EXPECT_EQ(none.verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(none.verdict.exit_code, ExitCode::undetermined);
   EXPECT_NE(none.verdict.sentence.find("the map is not found"), std::string::npos) << none.verdict.sentence;
 }
 

@@ -284,7 +284,7 @@ TEST(SimpleCase, ATargetSeenFromBehindIsAskedAbout) {
   const Verdict verdict = report.verdict;
   EXPECT_TRUE(has_state(verdict, State::care, "mirrored?")) << verdict.sentence;
   config.target.board = Board{.cols = 3, .rows = 2};
-  EXPECT_EQ(localize(run.frames, run.camera, config).verdict.exit_code, ExitCode::cannot_tell);
+  EXPECT_EQ(localize(run.frames, run.camera, config).verdict.exit_code, ExitCode::undetermined);
   config.target.board.reset();
   config.target.seen_from_plus_z = true;
   EXPECT_FALSE(localize(run.frames, run.camera, config).is_behind);

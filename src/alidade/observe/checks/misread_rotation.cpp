@@ -93,7 +93,7 @@ Explanation explanation_of(const RotationLog& log, const ObserveSetup& config, c
 }
 
 /// Turns so small, or about one axis only, determine nothing however they are read.
-bool turns_can_tell(const ObserveMotion& motion) {
+bool motion_suffices(const ObserveMotion& motion) {
   constexpr double min_rad = 3.0 * degree, little = 0.02;  // of the largest: an axis that did not rotate
   return motion.span_rad >= min_rad && motion.path_rad.head<2>().minCoeff() >= little * motion.path_rad.maxCoeff();
 }
@@ -105,13 +105,13 @@ bool may_be_misread(const ObserveSolution& report) {
   using Status = ObserveSolution::Status;
   constexpr double ask_beyond = 5.0;
   const bool has_answer = report.status == Status::ok || report.status == Status::too_few_data;
-  if (!has_answer) return turns_can_tell(report.motion);
+  if (!has_answer) return motion_suffices(report.motion);
   if (std::ranges::any_of(report.causes, [](const CauseScore& cause) { return cause.z >= ask_beyond; })) return true;
   // What is freed until nothing is asked for may determine nothing any more.
   constexpr double vague = 0.05;
   for (const std::size_t axis : {0U, 1U})
     if (report.status == Status::ok && report.quantities[axis].sigma > vague * report.quantities[axis].value)
-      return turns_can_tell(report.motion);
+      return motion_suffices(report.motion);
   const auto seen = static_cast<double>(report.reference.bundle.observations.size() + report.pixels_rejected);
   return report.status == Status::ok &&
          (report.sigma_px > max_ordinary_px || static_cast<double>(report.pixels_rejected) > many * seen);

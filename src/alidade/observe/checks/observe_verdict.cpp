@@ -136,7 +136,7 @@ void add_checks(const ObserveSolution& report, Verdict& verdict) {
 
 Verdict refusal(const std::string& sentence, const std::string& add, ExitCode code) {
   Verdict verdict;
-  verdict.state = code == ExitCode::cannot_tell ? State::refused : State::not_converged;
+  verdict.state = code == ExitCode::undetermined ? State::refused : State::not_converged;
   verdict.exit_code = code;
   verdict.sentence = sentence;
   verdict.to_add = add;
@@ -150,7 +150,7 @@ Verdict fang_refusal(const ObserveSolution& report, const RotationLog& log, cons
     why = "too few points for the paper's observer: " + std::to_string(log.num_points) + ", it needs three";
   std::string add = "use --method hybrid, which determines it from this log";
   if (reason.name == "too small a span") std::tie(why, add) = std::pair(reason.what, reason.add);
-  Verdict verdict = refusal(why, add, ExitCode::cannot_tell);
+  Verdict verdict = refusal(why, add, ExitCode::undetermined);
   add_checks(report, verdict);
   return verdict;
 }
@@ -208,30 +208,30 @@ Verdict observe_verdict(const ObserveSolution& report, const RotationLog& log, c
       reason.what = "the rotation does not fit these pixels, and would if it were read otherwise";
       reason.add = report.misread;
     }
-    Verdict verdict = refusal(reason.what, reason.add, ExitCode::cannot_tell);
+    Verdict verdict = refusal(reason.what, reason.add, ExitCode::undetermined);
     if (report.status == Status::unobservable) verdict.checks.push_back(weakest(report));
     return verdict;
   }
   if (report.status == Status::unsteady) {
     const bool is_hybrid = config.method == ObserveMethod::hybrid;
-    return refusal(is_hybrid ? "the focal length never stands still: there is no second to learn the points in"
+    return refusal(is_hybrid ? "the focal length never rests: there is no second to estimate the points in"
                              : "the focal length changes within this log: one camera is no answer",
                    is_hybrid ? "let the zoom rest for a second or two while the camera pans and tilts, then zoom"
                              : "use --method hybrid, which follows a zoom",
-                   ExitCode::cannot_tell);
+                   ExitCode::undetermined);
   }
   if (report.status == Status::no_convergence) {
     // An adjustment that finds no bottom, on a log that is degenerate anyway.
     const Reason reason = reason_of(report, log, config);
     if (reason.name != "weak motion") {
-      return refusal(reason.what, reason.add, ExitCode::cannot_tell);
+      return refusal(reason.what, reason.add, ExitCode::undetermined);
     }
     if (!report.misread.empty()) {
       return refusal("no intrinsics explain these pixels with this rotation, but they fit once it is read otherwise",
                      report.misread, ExitCode::no_convergence);
     }
     return refusal("no intrinsics explain these pixels with this rotation",
-                   "check the axes and units of the rotation, that the points stand still, and the zoom for a second",
+                   "check the axes and units of the rotation, that the points are static, and the zoom for a second",
                    ExitCode::no_convergence);
   }
   if (config.method == ObserveMethod::fang2011 && report.gramian_lambda_min >= 0.0 &&

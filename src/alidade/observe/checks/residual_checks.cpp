@@ -97,8 +97,8 @@ Check points_check(const ObserveSolution& report) {
     check.value = std::max(check.value, ratio);
     if (ratio > moves_beyond) names += (names.empty() ? "" : ", ") + std::to_string(i + 1);
   }
-  check.text = names.empty() ? "every point fits about as well as the others"
-                             : "point " + names + " does not stand still, or is not one point";
+  check.text =
+      names.empty() ? "every point fits about as well as the others" : "point " + names + " moves, or is not one point";
   if (!names.empty()) check.state = State::care;
   return check;
 }
@@ -194,7 +194,7 @@ std::vector<Check> residual_checks(const ObserveSolution& report) {
   constexpr std::size_t max_named = 4;
   for (std::size_t i = 0; i < std::min(asked.size(), max_named); ++i) {
     const CauseScore& cause = *asked[i];
-    std::string text = i == 0 ? "the residuals ask for " : "so they do for ";
+    std::string text = i == 0 ? "the residuals indicate " : "and ";
     text += cause.name + " (" + size_of(cause) + "; " + text_of(cause.z, 2) + "σ)";
     if (i == 0) text += ": " + advice_for(cause);
     const State state = i == 0 && is_zoom(cause) ? State::bad : State::care;
@@ -205,7 +205,7 @@ std::vector<Check> residual_checks(const ObserveSolution& report) {
                                           [](const CauseScore& a, const CauseScore& b) { return a.z < b.z; });
     checks.push_back({"causes", State::good,
                       "of " + std::to_string(report.causes.size()) +
-                          " causes tested the residuals ask for none; most for " + largest->name,
+                          " causes tested the residuals indicate none; most likely " + largest->name,
                       largest->z, asked_beyond(report), "σ", "residuals"});
   }
   if (!report.stated.blocks.z2.empty()) {

@@ -70,7 +70,7 @@ std::optional<SolvedRangefinder> with_free_distortion(const Shots& shots, const 
 void refuse(const std::string& cause, SolvedRangefinder& solved) {
   if (solved.verdict.exit_code == ExitCode::ok) {
     solved.verdict.state = State::refused;
-    solved.verdict.exit_code = ExitCode::cannot_tell;
+    solved.verdict.exit_code = ExitCode::undetermined;
   }
   solved.verdict.sentence = cause;
   solved.verdict.to_add =

@@ -56,8 +56,8 @@ void add_scale(const RangefinderReport& report, const RangefinderConfig& config,
   const double z = std::abs(report.scale_in_sigmas);
   if (z == 0.0) return;
   verdict.checks.push_back(check_of("scale", z < ask_beyond ? State::good : State::care,
-                                    z < ask_beyond ? "no scale of the readings is asked for"
-                                                   : "the readings ask for --scale (" + text_of(z, 2) + " σ)",
+                                    z < ask_beyond ? "no scale of the readings is indicated"
+                                                   : "the readings indicate a scale: --scale (" + text_of(z, 2) + " σ)",
                                     z, ask_beyond, "σ", "residuals"));
 }
 
@@ -85,7 +85,7 @@ void add_camera(const RangefinderReport& report, Verdict& verdict) {
     if (z < ask_beyond) continue;
     check.state = State::care;
     const bool is_focal = thing.name == "camera.f";
-    check.text = "the shots ask for " + asked_of_lens(thing) + " (" + text_of(z, 2) + "σ): " +
+    check.text = "the shots indicate " + asked_of_lens(thing) + " (" + text_of(z, 2) + "σ): " +
                  (is_focal && std::abs(thing.asked) > foreign * thing.value ? "the file of another camera, or zoomed"
                                                                             : "calibrate the camera again");
   }
@@ -129,7 +129,7 @@ void add_shared_errors(const RangefinderReport& report, Verdict& verdict) {
              ": the rangefinder, or the camera's lens, was moved";
     };
     verdict.checks.push_back(check_of(cause.name, is_quiet ? State::good : State::care,
-                                      is_quiet ? "no " + cause.name + " of the shots is asked for" : said(),
+                                      is_quiet ? "no " + cause.name + " of the shots is indicated" : said(),
                                       cause.sigmas, ask_beyond, "σ", "residuals"));
   }
 }

@@ -18,7 +18,8 @@ using testing::RangefinderTrialSetup;
 struct ShotFault {
   const char* name;
   std::function<void(RangefinderTrialSetup&)> set;
-  bool spots_tell = true;  ///< Spots alone do not tell a lens' centre from the beam's direction: it is taken as given.
+  bool spots_suffice =
+      true;  ///< Spots alone do not tell a lens' centre from the beam's direction: it is taken as given.
 };
 
 class ShotFaults : public ::testing::TestWithParam<ShotFault> {};
@@ -26,7 +27,7 @@ class ShotFaults : public ::testing::TestWithParam<ShotFault> {};
 TEST_P(ShotFaults, AreNeverSilent) {
   const int num_logs = testing::trials(5);
   for (const auto method : {RangefinderMethod::joint, RangefinderMethod::plane, RangefinderMethod::spot}) {
-    if (method == RangefinderMethod::spot && !GetParam().spots_tell) continue;
+    if (method == RangefinderMethod::spot && !GetParam().spots_suffice) continue;
     for (int draw = 1; draw <= num_logs; ++draw) {
       RangefinderTrialSetup setup;
       setup.method = method;
@@ -53,11 +54,11 @@ INSTANTIATE_TEST_SUITE_P(
         ShotFault{"centre", [](RangefinderTrialSetup& s) { s.mistake.centre_px = 20.0; }, false},
         ShotFault{"distortion_small", [](RangefinderTrialSetup& s) { s.mistake.k1 = 0.01; }},
         ShotFault{"distortion", [](RangefinderTrialSetup& s) { s.mistake.k1 = 0.05; }},
-        ShotFault{"drift_small", [](RangefinderTrialSetup& s) { s.mistake.drift_m = 0.005, s.tells_lengths = true; }},
+        ShotFault{"drift_small", [](RangefinderTrialSetup& s) { s.mistake.drift_m = 0.005, s.gives_lengths = true; }},
         ShotFault{"drift_of_a_centimetre",
-                  [](RangefinderTrialSetup& s) { s.mistake.drift_m = 0.01, s.tells_lengths = true; }},
-        ShotFault{"drift", [](RangefinderTrialSetup& s) { s.mistake.drift_m = 0.02, s.tells_lengths = true; }},
-        ShotFault{"bend", [](RangefinderTrialSetup& s) { s.mistake.bend_m = 0.005, s.tells_lengths = true; }, false},
+                  [](RangefinderTrialSetup& s) { s.mistake.drift_m = 0.01, s.gives_lengths = true; }},
+        ShotFault{"drift", [](RangefinderTrialSetup& s) { s.mistake.drift_m = 0.02, s.gives_lengths = true; }},
+        ShotFault{"bend", [](RangefinderTrialSetup& s) { s.mistake.bend_m = 0.005, s.gives_lengths = true; }, false},
         ShotFault{"wander", [](RangefinderTrialSetup& s) { s.mistake.wander_px = 3.0; }},
         ShotFault{"exchanged", [](RangefinderTrialSetup& s) { s.mistake.exchange_uv = true; }},
         ShotFault{"wrong_17", [](RangefinderTrialSetup& s) { s.noise.outlier_share = 0.17; }},

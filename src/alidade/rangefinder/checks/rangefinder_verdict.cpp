@@ -133,7 +133,7 @@ Weakness reason_of_boards(const RangefinderReport& report) {
     return {"frontal boards", "frontal boards: all face the camera, so where the beam hits them across is unobservable",
             "tilt the board by 20 to 45°, to all sides"};
   }
-  return {"parallel boards", "parallel boards: all are tilted alike, so the beam is unobservable along them",
+  return {"parallel boards", "parallel boards: all are tilted equally, so the beam is unobservable along them",
           "tilt the board to all sides"};
 }
 
@@ -286,7 +286,7 @@ void add_clusters(const RangefinderReport& report, Verdict& verdict) {
 
 Verdict refusal_by_status(const RangefinderReport& report, Method method, const Supply& supply) {
   if (report.status == Status::scale_unknown) {
-    return refusal(State::refused, ExitCode::cannot_tell,
+    return refusal(State::refused, ExitCode::undetermined,
                    "the scale of the ranges cannot be determined from spots alone",
                    "take shots on a board and use --method joint, or estimate no --scale");
   }
@@ -295,12 +295,12 @@ Verdict refusal_by_status(const RangefinderReport& report, Method method, const 
                          : method == Method::plane ? "six with a board"
                                                    : "two with spot and board";
     return refusal(
-        State::refused, ExitCode::cannot_tell,
+        State::refused, ExitCode::undetermined,
         "too few shots: of " + std::to_string(report.shots.size()) + " given, " + needed + " or more must be usable",
         "add shots from near to far" + other_method(method, supply));
   }
   if (report.status == Status::ambiguous) {
-    return refusal(State::refused, ExitCode::cannot_tell, "two beams explain these shots alike",
+    return refusal(State::refused, ExitCode::undetermined, "two beams explain these shots equally well",
                    "add a shot or two with the board tilted to another side" + other_method(method, supply));
   }
   return refusal(State::not_converged, ExitCode::no_convergence, "no beam explains these shots",
@@ -336,7 +336,7 @@ Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Sho
                         [&](const Check& c) { return c.name == name && c.state == State::refused; });
   };
   if (is_solved && named("scale") != verdict.checks.end()) {
-    verdict = refusal(State::refused, ExitCode::cannot_tell, named("scale")->text,
+    verdict = refusal(State::refused, ExitCode::undetermined, named("scale")->text,
                       "give the ranges in metres; a scale that is known to be so: --scale");
   } else if (is_solved && report.status == Status::converged && named("range noise") != verdict.checks.end()) {
     verdict = refusal(State::not_converged, ExitCode::no_convergence, named("range noise")->text,
@@ -345,11 +345,11 @@ Verdict rangefinder_verdict(const RangefinderReport& report, std::span<const Sho
     verdict = refusal(State::not_converged, ExitCode::no_convergence, "the shots do not agree: " + refused->text,
                       "check that the beam hit the board in each");
   } else if (is_solved && refused != verdict.checks.end() && refused->name == "boards") {
-    verdict = refusal(State::refused, ExitCode::cannot_tell, refused->text,
+    verdict = refusal(State::refused, ExitCode::undetermined, refused->text,
                       "check --board, --square and the camera; --method spot does without boards");
   } else if (report.status == Status::degenerate || (is_solved && refused != verdict.checks.end())) {
     const Weakness reason = reason_of(report, shots, method);
-    verdict = refusal(State::refused, ExitCode::cannot_tell, reason.what, reason.add + other_method(method, supply));
+    verdict = refusal(State::refused, ExitCode::undetermined, reason.what, reason.add + other_method(method, supply));
     for (const Check& check : checks)
       if (check.state == State::care && (check.name == "columns" || check.name == "spots outside"))
         verdict.to_add += "; " + check.text;

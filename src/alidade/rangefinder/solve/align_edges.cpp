@@ -303,7 +303,7 @@ Verdict edges_verdict(const EdgesReport& report) {
   constexpr double min_gain = 0.3, max_rad = 0.02;
   const auto refuse = [&](const char* sentence, const char* add) {
     verdict.state = State::refused;
-    verdict.exit_code = ExitCode::cannot_tell;
+    verdict.exit_code = ExitCode::undetermined;
     verdict.sentence = sentence;
     verdict.to_add = add;
   };

@@ -71,8 +71,11 @@ JobOutcome trial_outcome(const TrackStudy& study, std::uint64_t seed, std::uint6
 JobOutcome trial_outcome(const ChainStudy& study, std::uint64_t seed, std::uint64_t number) {
   if (const auto trial = trial_of(study, seed, number)) return track_outcome(*trial);
   JobOutcome outcome;
-  outcome.document.verdict = {
-      State::refused, ExitCode::cannot_tell, "lenses or rig of this chain have no answer", "look at another trial", {}};
+  outcome.document.verdict = {State::refused,
+                              ExitCode::undetermined,
+                              "lenses or rig of this chain have no answer",
+                              "look at another trial",
+                              {}};
   return outcome;
 }
 

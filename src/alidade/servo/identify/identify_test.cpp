@@ -109,12 +109,12 @@ TEST(IdentifyServo, ReadsRoundedEncodersAndUnevenRows) {
   EXPECT_EQ(identify_verdict(log, identified).exit_code, ExitCode::ok);
 }
 
-TEST(IdentifyServo, RefusesWhatCannotTell) {
+TEST(IdentifyServo, RefusesDegenerateData) {
   const auto refused_as = [](const Log& log, const std::string& what) {
     ServoIdentification identified;
     if (log.size() >= 20) identified = identify_servo(log);
     const Verdict verdict = identify_verdict(log, identified);
-    EXPECT_EQ(verdict.exit_code, ExitCode::cannot_tell) << verdict.sentence;
+    EXPECT_EQ(verdict.exit_code, ExitCode::undetermined) << verdict.sentence;
     EXPECT_NE(verdict.sentence.find(what), std::string::npos) << verdict.sentence;
     EXPECT_FALSE(verdict.to_add.empty());
   };

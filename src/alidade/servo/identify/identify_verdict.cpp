@@ -12,7 +12,7 @@ namespace {
 Verdict refused(std::string what, std::string add) {
   Verdict verdict;
   verdict.state = State::refused;
-  verdict.exit_code = ExitCode::cannot_tell;
+  verdict.exit_code = ExitCode::undetermined;
   verdict.sentence = std::move(what);
   verdict.to_add = std::move(add);
   return verdict;
@@ -71,7 +71,7 @@ void add_causes(std::span<const ServoSample> log, const ServoIdentification& ide
     const ServoCause& first = causes.front();
     check.state = State::care;
     check.value = first.sigmas;
-    check.text = (fit.freed.empty() ? std::string() : check.text + "; ") + "the residuals ask for " + first.name +
+    check.text = (fit.freed.empty() ? std::string() : check.text + "; ") + "the residuals indicate " + first.name +
                  ", about " + text_of(first.size, 2) + " " + first.unit + " (" + text_of(first.sigmas, 2) +
                  "σ): gain, time constant and latency absorb part of it";
   }

@@ -45,7 +45,7 @@ TargetObservation read_row(const Csv& csv, std::size_t row, const EventColumns& 
     throw InputError(csv.where(row, "t_arrival_s") + ": arrives before its capture");
   if (!(observation.t_arrival_s >= newest_s[newest_s.size() > 1 ? observation.head : 0]))
     throw InputError(csv.where(row, clock) + ": '" + csv.text(row, clock) +
-                     "' runs backwards; rows stand in order of arrival");
+                     "' runs backwards; rows must be in order of arrival");
   constexpr double max_px = 1e6;
   if (!columns.pan.empty())
     observation.pan_tilt_rad = {angle_in_row(csv, row, columns.pan), angle_in_row(csv, row, columns.tilt)};
@@ -73,13 +73,13 @@ TargetObservation EventRows::read(const Csv& csv, std::size_t row) {
   std::set<double>& seen_s = seen_s_[observation.head];
   if (!seen_s.insert(observation.t_capture_s).second)
     throw InputError(csv.where(row, "t_capture_s") + ": '" + csv.text(row, "t_capture_s") +
-                     "' stands in a row of this head before; an image has one target");
+                     "' is in an earlier row of this head; an image has one target");
   if (seen_s.size() > max_kept) seen_s.erase(seen_s.begin());
   std::optional<Eigen::Vector2d>& stood_rad = first_rad_[observation.head];
   if (!stood_rad) stood_rad = observation.pan_tilt_rad;
   constexpr double still_rad = 1e-6;
   if (stands_still_ && (observation.pan_tilt_rad - *stood_rad).cwiseAbs().maxCoeff() > still_rad)
-    throw InputError(csv.where(row, columns_.pan) + ": the head turns; this is for cameras that stand still");
+    throw InputError(csv.where(row, columns_.pan) + ": the head moves; this is for static cameras");
   newest_s_[stands_still_ ? observation.head : 0] = observation.t_arrival_s;
   return observation;
 }

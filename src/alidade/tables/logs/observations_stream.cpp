@@ -62,7 +62,7 @@ void ObservationRows::read(const Csv& csv, std::size_t row) {
   if (!observation) return;
   if (std::ranges::count(open_->observations, observation->id, &FeatureObservation::id) > 0)
     throw InputError(csv.where(row, "point_id") +
-                     fmt::format(": {} stands twice in frame {}", observation->id, number));
+                     fmt::format(": {} appears twice in frame {}", observation->id, number));
   open_->observations.push_back(*observation);
 }
 

@@ -68,7 +68,7 @@ class Header {
       known_.emplace_back(name);
       const auto it = column_.find(name);
       if (it == column_.end()) continue;
-      if (found) throw InputError(at(name) + "stands beside '" + table_.header()[*found] + "', which means the same");
+      if (found) throw InputError(at(name) + "duplicates '" + table_.header()[*found] + "', which means the same");
       found = it->second;
       is_used_[it->second] = true;
     }
@@ -173,7 +173,7 @@ void find_rotation(Header& header, const CsvStream& table, bool needs_rotation, 
   if (!columns.head.empty()) found.emplace_back(RotationSource::head, columns.names[columns.head[0].column]);
   if (!columns.quaternion.empty()) found.emplace_back(RotationSource::attitude, columns.names[columns.quaternion[0]]);
   if (found.size() > 1)
-    throw InputError(header.at(found[1].second) + "stands beside '" + found[0].second +
+    throw InputError(header.at(found[1].second) + "duplicates '" + found[0].second +
                      "'; leave one: angular rate, angles of the head or attitude");
   if (!found.empty()) columns.source = found[0].first;
   if (!found.empty() || !needs_rotation) return;

@@ -113,10 +113,11 @@ std::optional<Explanation> foreign_head(const Observations& observations, std::s
     std::erase_if(others, [&](const TargetObservation& observation) { return observation.head == head; });
     if (others.size() == observations.size() || !tried(others, heads, config).fits) continue;
     if (found) return std::nullopt;  // of two that could be it neither is named
-    found = {"the observations of " + head_name(heads, head) + " agree with none of the other heads, which agree",
-             "its row in the rig file is that of another head, or its events are: remove it, or calibrate where it "
-             "stands again",
-             true};
+    found = {
+        "the observations of " + head_name(heads, head) + " agree with none of the other heads, which agree",
+        "its row in the rig file is that of another head, or its events are: remove it, or calibrate at its present "
+        "position again",
+        true};
   }
   return found;
 }

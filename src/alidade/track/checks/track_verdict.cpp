@@ -103,7 +103,7 @@ std::optional<Fault> other_camera(const TrackReport& report, std::span<const Tar
 Verdict refused(Fault fault) {
   Verdict verdict;
   verdict.state = State::refused;
-  verdict.exit_code = ExitCode::cannot_tell;
+  verdict.exit_code = ExitCode::undetermined;
   verdict.sentence = std::move(fault.what);
   verdict.to_add = std::move(fault.to_do);
   return verdict;
@@ -322,7 +322,7 @@ std::optional<Fault> refusal_of(const TrackReport& report, const Causes& causes,
   if (used_share(report) < min_used_share)
     return Fault{"only " + text_of(100.0 * used_share(report), 2) +
                      " % of the observations fit one track and this rig, and no clock, sign or swap explains it",
-                 "check that the rig file is of these heads as they stand now, and the noise"};
+                 "check that the rig file is of these heads as they are now, and the noise"};
   return std::nullopt;
 }
 

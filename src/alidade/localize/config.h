@@ -36,8 +36,8 @@ struct LocalizationFilterConfig {
   bool is_sequential = true;        ///< Known points first, then by growing innovation; false: in the order given.
   bool finds_consensus = true;      ///< One-point consensus where observations disagree: mismatches.
   double consensus_above = 0.0;     ///< Share of the observations that may disagree before a consensus is looked for.
-  /// No observation says how the world is rotated, and so the covariance says: world_turn.h. False: as in the
-  /// literature before 2001, more certain with every frame.
+  /// No observation says how the world is rotated or how large it is, and so the covariance says: world_turn.h,
+  /// world_scale.h. False: as in the literature before 2001, more certain with every frame.
   bool holds_frame = true;
   /// Errors that rotate with the world are straight for small rotations only: an update by a larger one holds the frame
   /// by its derivatives alone. See world_turn.h.

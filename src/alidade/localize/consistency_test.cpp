@@ -11,9 +11,10 @@
 namespace alidade {
 namespace {
 
-/// How the whole state changes as the world rotates about its origin, and as it is moved: by finite differences.
+/// How the whole state changes as the world rotates about its origin, as it is moved, and as it grows: by finite
+/// differences.
 Eigen::MatrixXd gauge_of(const LocalizationFilter& filter) {
-  Eigen::MatrixXd N = Eigen::MatrixXd::Zero(filter.dim(), 6);
+  Eigen::MatrixXd N = Eigen::MatrixXd::Zero(filter.dim(), 7);
   constexpr double h = 1e-6;
   const CameraMotion& motion = filter.motion();
   for (int axis = 0; axis < 3; ++axis) {
@@ -33,6 +34,13 @@ Eigen::MatrixXd gauge_of(const LocalizationFilter& filter) {
       N(feature.offset + 4, axis) = (angles.phi - feature.values[4]) / h;
     }
   }
+  constexpr int scale = 6;
+  N.block<3, 1>(0, scale) = motion.world_from_cam.translation;
+  N.block<3, 1>(6, scale) = motion.velocity_in_world;
+  for (const Feature& feature : filter.features()) {
+    N.block<3, 1>(feature.offset, scale) = feature.values.head<3>();
+    if (feature.kind == FeatureKind::inverse_depth) N(feature.offset + 5, scale) = -feature.values[5];
+  }
   return N;
 }
 
@@ -47,10 +55,10 @@ double information_of(const LocalizationFilter& filter) {
   return std::log(information.determinant());
 }
 
-/// Without known points no observation determines where the world is or how it is rotated: an update changes what is
-/// known of that by nothing, though the state it is linearised at moves. With positions: inverse depths that begin in
-/// one image share their first three numbers, and such a covariance has no inverse.
-TEST(Consistency, NothingSeenTellsHowTheWorldIsTurned) {
+/// Without known points no observation determines where the world is, how it is rotated or how large it is: an update
+/// changes what is known of that by nothing, though the state it is linearised at moves. With positions: inverse depths
+/// that begin in one image share their first three components, and such a covariance has no inverse.
+TEST(Consistency, NothingSeenTellsHowTheWorldIsRotatedOrHowLargeItIs) {
   UnderwaterScene scene;
   scene.camera = underwater_camera();
   scene.num_points = 20;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "alidade/geometry/decompositions.h"
+#include "alidade/testing/hover.h"
 #include "alidade/testing/localize_sample.h"
 
 namespace alidade {
@@ -190,6 +191,30 @@ TEST(Localize, StartsFromTheTargetAlone) {
     num_good += report.error.ate_m < 0.03 ? 1 : 0;
   }
   EXPECT_GE(num_good, 3);
+}
+
+/// Known points that leave the image and come back, and a camera that speeds up and slows down for 80 s: each frame's
+/// answer, as it comes, is as good as it says. A filter that takes accelerations for knowledge of the scale has 20 to
+/// 60 here, and 500 after 7000 frames.
+TEST(Localize, ALongTableKeepsItsScaleAsItComes) {
+  UnderwaterScene scene = rich_scene();
+  scene.num_frames = 2400;
+  scene.sigma_depth = 0.03;
+  constexpr std::size_t window = 400;
+  constexpr std::uint64_t num_seeds = 3;
+  double nees = 0.0;
+  for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
+    UnderwaterSample sample = testing::underwater_sample(scene, seed);
+    sample.config.smooths = false;
+    sample.config.max_points = 30;
+    const Localization report = localize(sample.frames, sample.camera, sample.config, sample.truth);
+    ASSERT_EQ(report.path.size(), sample.truth.size());
+    for (std::size_t k = report.path.size() - window; k < report.path.size(); ++k)
+      nees += testing::pose_nees(report.path[k], sample.truth[k].world_from_cam) / (num_seeds * window);
+  }
+  RecordProperty("nees", std::to_string(nees));
+  EXPECT_GT(nees, 0.3);  // three draws of six numbers
+  EXPECT_LT(nees, 2.0);
 }
 
 TEST(Localize, WithoutATargetThePathIsUpToScaleAndSaysSo) {

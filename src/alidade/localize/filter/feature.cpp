@@ -103,7 +103,7 @@ std::optional<NewFeature> new_feature(const Camera& camera, const Rigid3& world_
   const Eigen::Vector3d J_ray_range = -J_ray_px * (at->seen.J_px_point * at->ray_in_cam);
   const Eigen::Vector3d ray_in_world = R * at->ray_in_cam;
   const Eigen::Matrix3d J_ray_rotation = -R * cross_matrix(at->ray_in_cam);
-  const double range = prior.range_m, sigma = prior.sigma_rel * range, variance_px2 = sigma_px * sigma_px;
+  const double range = prior.range_m, variance_px2 = sigma_px * sigma_px;
   NewFeature made;
   made.feature.kind = kind;
   made.J_pose.setZero();
@@ -114,7 +114,8 @@ std::optional<NewFeature> new_feature(const Camera& camera, const Rigid3& world_
     made.J_pose.topRightCorner<3, 3>() = range * J_ray_rotation;
     made.J_lens.topRows<3>() = -range * J_ray_px * at->seen.J_px_params;
     const Eigen::Matrix<double, 3, 2> L = range * sigma_px * J_ray_px;
-    const Eigen::Vector3d l = sigma * (ray_in_world + range * J_ray_range);
+    made.J_range.head<3>() = range * (ray_in_world + range * J_ray_range);
+    const Eigen::Vector3d l = prior.sigma_rel * made.J_range.head<3>();
     made.cov.topLeftCorner<3, 3>() = L * L.transpose() + l * l.transpose();
     return made;
   }
@@ -122,8 +123,8 @@ std::optional<NewFeature> new_feature(const Camera& camera, const Rigid3& world_
   made.feature.values << world_from_cam.translation, angles.theta, angles.phi, 1.0 / range;
   made.J_pose.block<2, 3>(3, 3) = angles.J * J_ray_rotation;
   made.J_lens.middleRows<2>(3) = -angles.J * J_ray_px * at->seen.J_px_params;
-  Eigen::Vector3d l;
-  l << angles.J * (J_ray_range * sigma), -sigma / (range * range);
+  made.J_range.tail<3>() << angles.J * J_ray_range * range, -1.0 / range;
+  const Eigen::Vector3d l = prior.sigma_rel * made.J_range.tail<3>();
   const Eigen::Matrix2d J = angles.J * J_ray_px;
   made.cov.bottomRightCorner<3, 3>() = l * l.transpose();
   made.cov.block<2, 2>(3, 3) += variance_px2 * J * J.transpose();

@@ -64,11 +64,13 @@ struct NewFeature {
   Eigen::Matrix<double, 6, 6> J_pose;                                     ///< By position and rotation error.
   Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 16> J_lens;              ///< By the lens's parameters.
   Eigen::Matrix<double, 6, 6> cov = Eigen::Matrix<double, 6, 6>::Zero();  ///< Of pixel and distance alone.
+  Eigen::Vector<double, 6> J_range = Eigen::Vector<double, 6>::Zero();    ///< By the distance, relative.
 };
 /// Distance along the ray, and its σ over it (of the inverse distance, where that is the state).
 struct RangePrior {
   double range_m = 1.0;
   double sigma_rel = 0.5;
+  bool is_of_map = false;  ///< As far as other points of the map: larger where the world's scale is larger.
 };
 /// None where the lens sees nothing at the pixel.
 [[nodiscard]] std::optional<NewFeature> new_feature(const Camera& camera, const Rigid3& world_from_cam,

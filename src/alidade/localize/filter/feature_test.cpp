@@ -126,6 +126,7 @@ TEST(Feature, ANewOneIsSeenWhereItWasAndItsDerivativesAreRight) {
           J.col(i) = (at(step) - at(-step)) / (2.0 * step) * (i < 2 ? 0.5 : 0.08);
         }
         const Eigen::Matrix<double, 6, 6> cov = J * J.transpose();
+        EXPECT_LT((made->J_range - J.col(2) / prior.sigma_rel).head(dim).cwiseAbs().maxCoeff(), 1e-7);
         EXPECT_LT((made->cov - cov).topLeftCorner(dim, dim).cwiseAbs().maxCoeff(), 1e-7);
       }
     }

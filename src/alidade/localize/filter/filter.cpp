@@ -14,7 +14,7 @@ constexpr int pose_dim = 6;
 LocalizationFilter::LocalizationFilter(Camera camera, const CameraMotion& start, const MotionMatrix& start_cov,
                                        LocalizationFilterConfig config)
     : camera_(std::move(camera)), motion_(start), config_(std::move(config)), camera_at_delta_(camera_) {
-  P_.reserve(config_.state_capacity, 2 * config_.observations_capacity);
+  P_.reserve(config_.state_capacity + 1, 2 * config_.observations_capacity);
   [[maybe_unused]] const bool fits = P_.grow(motion_dim + num_lens());
   assert(fits && config_.lens_params.size() == config_.sigma_lens_params.size());
   for (int i = 0; i < motion_dim; ++i)
@@ -87,34 +87,45 @@ bool LocalizationFilter::add(long id, const Eigen::Vector2d& px, const RangePrio
   const double sigma_px = config_.sigma_new_px > 0.0 ? config_.sigma_new_px : config_.sigma_px;
   const auto made = new_feature(camera_, motion_.world_from_cam, px, sigma_px, prior, kind);
   if (!made || !made->feature.values.allFinite() || !made->cov.allFinite()) return false;
-  append_feature(*made, id);
+  constexpr double surer = 0.5;  // than the new one, whose distance follows from theirs
+  append_feature(*made, id,
+                 prior.is_of_map && config_.holds_frame ? scale_reading(surer * prior.sigma_rel) : ScaleReading());
   return true;
 }
 
-/// P(new, ·) = J P(camera and lens, ·), P(new, new) = J P Jᵀ + what pixel and distance add.
-void LocalizationFilter::append_feature(const NewFeature& made, long id) {
+/// P(new, ·) = J P(inputs, ·), P(new, new) = J P Jᵀ + what pixel and distance add. Inputs: the camera, the lens, and
+/// what the scale is read by, if the distance follows from it.
+void LocalizationFilter::append_feature(const NewFeature& made, long id, const ScaleReading& scale) {
   Feature feature = made.feature;
   feature.id = id;
   feature.offset = P_.dim();
-  const int dim = feature.dim(), num_inputs = pose_dim + num_lens();
-  Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, StateCovariance::max_support> J(6, num_inputs);
-  J.leftCols<pose_dim>() = made.J_pose;
+  const int dim = feature.dim();
+  constexpr std::size_t max_inputs = StateCovariance::max_support + ScaleReading::max_numbers;
+  std::array<int, max_inputs> place{};
+  Eigen::Matrix<double, 6, max_inputs> J;
+  int num_inputs = 0;
+  const auto put = [&](int column, const Eigen::Vector<double, 6>& derivative) {
+    place[static_cast<std::size_t>(num_inputs)] = column;
+    J.col(num_inputs++) = derivative;
+  };
+  for (int i = 0; i < pose_dim; ++i) put(i, made.J_pose.col(i));
   for (int k = 0; k < num_lens(); ++k)
-    J.col(pose_dim + k) = made.J_lens.col(config_.lens_params[static_cast<std::size_t>(k)]);
-  const auto place = [](int input) { return input < pose_dim ? input : motion_dim + input - pose_dim; };
+    put(motion_dim + k, made.J_lens.col(config_.lens_params[static_cast<std::size_t>(k)]));
+  for (std::size_t k = 0; k < scale.columns().size(); ++k) put(scale.columns()[k], scale.weights()[k] * made.J_range);
   if (!P_.grow(dim)) return;
-  given_.add(feature.offset, made, config_.lens_params);
+  given_.add(feature.offset, made, config_.lens_params, scale);
   for (int j = 0; j < feature.offset; ++j) {
     for (int i = 0; i < dim; ++i) {
       double sum = 0.0;
-      for (int c = 0; c < num_inputs; ++c) sum += J(i, c) * P_.at(place(c), j);
+      for (int c = 0; c < num_inputs; ++c) sum += J(i, c) * P_.at(place[static_cast<std::size_t>(c)], j);
       P_.at(feature.offset + i, j) = P_.at(j, feature.offset + i) = sum;
     }
   }
   for (int i = 0; i < dim; ++i) {
     for (int j = i; j < dim; ++j) {
       double sum = made.cov(i, j);
-      for (int c = 0; c < num_inputs; ++c) sum += J(j, c) * P_.at(feature.offset + i, place(c));
+      for (int c = 0; c < num_inputs; ++c)
+        sum += J(j, c) * P_.at(feature.offset + i, place[static_cast<std::size_t>(c)]);
       P_.at(feature.offset + i, feature.offset + j) = P_.at(feature.offset + j, feature.offset + i) = sum;
     }
   }

@@ -10,6 +10,7 @@
 #include "alidade/localize/filter/feature.h"
 #include "alidade/localize/filter/given_effects.h"
 #include "alidade/localize/filter/state_covariance.h"
+#include "alidade/localize/filter/world_scale.h"
 
 namespace alidade {
 
@@ -159,12 +160,17 @@ class LocalizationFilter {
   void move_by_delta();
   void move_lens_by_delta();
   void count_given();
+  void count_scale();
+  void begin_scale();
+  void end_scale();
+  [[nodiscard]] double relative_variance(const Feature& feature, const RelativeDistance& distance) const;
+  [[nodiscard]] ScaleReading scale_reading(double most_sigma_rel) const;
   [[nodiscard]] double best_attempt();
   /// What the last attempt came to, put aside while another is made, and taken back.
   void keep_attempt();
   void restore_attempt();
   [[nodiscard]] std::span<const double> error_of(const Feature& feature) const;
-  void append_feature(const NewFeature& made, long id);
+  void append_feature(const NewFeature& made, long id, const ScaleReading& scale);
 
   Camera camera_;
   CameraMotion motion_;
@@ -183,7 +189,9 @@ class LocalizationFilter {
   static constexpr std::size_t max_in_group = StateCovariance::max_columns / 2;
   std::array<Measured, max_in_group> there_;
   Eigen::Matrix<double, Eigen::Dynamic, 3> shear_;
-  bool turns_world_ = false;  ///< Whether the errors of this update are those of world_turn.h.
+  bool turns_world_ = false;     ///< Whether the errors of this update are those of world_turn.h.
+  ScaleReading scale_;           ///< Of the state before the update,
+  std::optional<int> scale_at_;  ///< and its component while the update goes on.
   Camera camera_at_delta_;
   Eigen::MatrixXd joint_x_, joint_s_;
   SmallMatrix triangle_;

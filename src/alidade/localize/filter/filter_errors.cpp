@@ -28,6 +28,10 @@ bool LocalizationFilter::linearise(Measured& measured) {
     world_from_cam.rotation = (world_from_cam.rotation * exp_so3(phi)).normalized();
     for (int i = 0; i < feature.dim(); ++i) feature.values[i] += delta_[feature.offset + i];
   }
+  if (scale_at_) {  // the second bracket of world_scale.h
+    world_from_cam.translation -= delta_[*scale_at_] * motion_.world_from_cam.translation;
+    feature.values -= delta_[*scale_at_] * scale_direction(nominal);
+  }
   for (int k = 0; k < num_lens(); ++k) {
     const int index = config_.lens_params[static_cast<std::size_t>(k)];
     lens_param(camera_at_delta_, index) = lens_param(camera_, index) + delta_[motion_dim + k];
@@ -64,6 +68,12 @@ bool LocalizationFilter::linearise(Measured& measured) {
     put(motion_dim + k, view->J_px_lens(0, index), view->J_px_lens(1, index));
   }
   for (int i = 0; i < feature.dim(); ++i) put(feature.offset + i, view->J_px_feature(0, i), view->J_px_feature(1, i));
+  if (scale_at_) {
+    const Eigen::Vector2d J_scale =
+        view->J_px_pose.leftCols<3>() * (world_from_cam.translation - motion_.world_from_cam.translation) +
+        view->J_px_feature * (scale_direction(feature) - scale_direction(nominal));
+    put(*scale_at_, J_scale.x(), J_scale.y());
+  }
   measured.num_support = n;
   measured.c = measured.nu;
   for (std::size_t k = 0; k < static_cast<std::size_t>(n); ++k)

@@ -284,6 +284,8 @@ bool LocalizationFilter::finish_update() {
     return false;
   }
   P_.commit();
+  if (scale_at_) count_scale();
+  end_scale();
   turns_world_ ? turn_by_delta() : move_by_delta();
   move_lens_by_delta();
   count_given();
@@ -293,6 +295,7 @@ bool LocalizationFilter::finish_update() {
 
 ObservationsReport LocalizationFilter::update(std::span<const FeatureObservation> observations) {
   turns_world_ = config_.holds_frame;
+  if (config_.holds_frame) begin_scale();
   collect(observations);
   double cost = best_attempt();
   if (turns_world_ && !(delta_.segment<3>(3).norm() < config_.max_turn_rad)) {
@@ -304,6 +307,7 @@ ObservationsReport LocalizationFilter::update(std::span<const FeatureObservation
   const bool agrees = total_nis_ <= config_.gate * 2.0 * static_cast<double>(std::max<std::size_t>(1, used_.size()));
   if (!agrees) drop_update();
   report.is_sound = agrees && finish_update();
+  end_scale();
   for (ObservationOutcome& outcome : outcomes_) {
     if (outcome == ObservationOutcome::used && !report.is_sound) outcome = ObservationOutcome::gated;
     if (outcome == ObservationOutcome::gated) ++report.num_gated;

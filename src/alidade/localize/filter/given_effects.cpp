@@ -46,13 +46,14 @@ void GivenEffects::add_known(int offset, const Eigen::Vector3d& point_in_world) 
   M_.block<3, 1>(offset, M_.cols() - 1) = point_in_world;
 }
 
-void GivenEffects::add(int offset, const NewFeature& made, std::span<const int> estimated) {
+void GivenEffects::add(int offset, const NewFeature& made, std::span<const int> estimated, const ScaleReading& scale) {
   const int dim = made.feature.dim();
   for (Eigen::Index c = 0; c < M_.cols(); ++c) {
     Eigen::Vector<double, 6> moves = made.J_pose * M_.col(c).head<6>();
     for (std::size_t k = 0; k < estimated.size(); ++k)
       moves += made.J_lens.col(estimated[k]) * M_(motion_dim + static_cast<Eigen::Index>(k), c);
     if (c + 1 < M_.cols()) moves += made.J_lens.col(lens_params_[static_cast<std::size_t>(c)]);
+    moves += made.J_range * read(scale.columns(), scale.weights(), c);
     M_.col(c).segment(offset, dim) = moves.head(dim);
   }
 }
@@ -104,6 +105,18 @@ void GivenEffects::shear(int at, const double* K, int stride, int dim) {
     const Eigen::Vector3d by = M_.col(c).segment<3>(at);
     for (int j = 0; j < 3; ++j) M_.col(c).head(dim) += by[j] * Eigen::Map<const Eigen::VectorXd>(K + j * stride, dim);
   }
+}
+
+double GivenEffects::read(std::span<const int> columns, std::span<const double> weights, Eigen::Index given) const {
+  double sum = 0.0;
+  for (std::size_t k = 0; k < columns.size(); ++k) sum += weights[k] * M_(columns[k], given);
+  return sum;
+}
+
+void GivenEffects::shear_along(std::span<const int> columns, std::span<const double> weights, const double* u,
+                               int dim) {
+  for (Eigen::Index c = 0; c < M_.cols(); ++c)
+    M_.col(c).head(dim) += read(columns, weights, c) * Eigen::Map<const Eigen::VectorXd>(u, dim);
 }
 
 GivenEffects::Derivatives GivenEffects::product(const Seen& seen, const Columns& M) const {

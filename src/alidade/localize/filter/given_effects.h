@@ -8,6 +8,7 @@
 #include "alidade/localize/camera_motion.h"
 #include "alidade/localize/filter/feature.h"
 #include "alidade/localize/filter/state_covariance.h"
+#include "alidade/localize/filter/world_scale.h"
 
 namespace alidade {
 
@@ -41,13 +42,14 @@ class GivenEffects {
 
   void predict(const MotionMatrix& F);
   void add_known(int offset, const Eigen::Vector3d& point_in_world);
-  void add(int offset, const NewFeature& made, std::span<const int> estimated);
+  void add(int offset, const NewFeature& made, std::span<const int> estimated, const ScaleReading& scale);
   void remove(int offset, int count, int dim);  ///< `dim` before.
   void make_place(int offset, const Eigen::Matrix<double, 3, 6>& J);
   void forget_motion();  ///< Of a camera that is localised again; and what was scored.
-  /// As StateCovariance::turn() and shear().
+  /// As those of StateCovariance.
   void turn(const double* blocks, int stride, int single_at, int num_single, int dim);
   void shear(int at, const double* K, int stride, int dim);
+  void shear_along(std::span<const int> columns, std::span<const double> weights, const double* u, int dim);
 
   /// The observations of an update, at the state that they led to; then what they change.
   void add_observation(const ExpectedView& view, const Feature& feature, std::span<const int> estimated,
@@ -63,6 +65,7 @@ class GivenEffects {
     Derivatives D;
     double weight = 1.0;
   };
+  [[nodiscard]] double read(std::span<const int> columns, std::span<const double> weights, Eigen::Index given) const;
   [[nodiscard]] Derivatives product(const Seen& seen, const Columns& M) const;
 
   std::vector<int> lens_params_;

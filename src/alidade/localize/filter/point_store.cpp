@@ -71,7 +71,7 @@ std::optional<RangePrior> PointStore::known_range(long id, const LocalizationFil
   const Eigen::Vector3d direction = away / range_m;
   const Eigen::Matrix3d cov = at->second.point.cov + filter.motion_covariance().topLeftCorner<3, 3>();
   constexpr double sure_enough = 0.05, vague = 0.5;
-  return RangePrior{range_m, std::clamp(std::sqrt(direction.dot(cov * direction)) / range_m, sure_enough, vague)};
+  return RangePrior{range_m, std::clamp(std::sqrt(direction.dot(cov * direction)) / range_m, sure_enough, vague), true};
 }
 
 std::optional<RangePrior> PointStore::prior_of(const FeatureObservation& observation,
@@ -85,7 +85,7 @@ std::optional<RangePrior> PointStore::prior_of(const FeatureObservation& observa
   const GivenDepth* const given = given_depth(observation.id);
   const bool is_new = !std::exchange(points_[observation.id].was_in_map, true);
   if (given != nullptr && is_new) return RangePrior{given->depth_m / z, given->sigma_rel};
-  return RangePrior{usual_depth_m(filter) / z, config_->sigma_depth};
+  return RangePrior{usual_depth_m(filter) / z, config_->sigma_depth, !config_->depth_m};
 }
 
 /// From the ray of its first observation and this one: d = b sin α₁ / sin(parallax), σ_d/d of the parallax' own σ.
@@ -110,7 +110,7 @@ std::optional<RangePrior> PointStore::triangulated(const FeatureObservation& obs
   const double sigma_rel = sigma_angle / std::max(sine, 1e-12);
   constexpr double sure_enough = 0.05;
   if (!(sigma_rel < sure_enough) || !(range_m > 0.0)) return std::nullopt;
-  return RangePrior{range_m, sure_enough};  // the rays are correlated with the pose: never surer than that
+  return RangePrior{range_m, sure_enough, true};  // the rays are correlated with the pose: never surer than that
 }
 
 }  // namespace alidade

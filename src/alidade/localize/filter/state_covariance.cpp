@@ -1,5 +1,6 @@
 #include "alidade/localize/filter/state_covariance.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cstring>
 #include <utility>
@@ -202,6 +203,17 @@ void StateCovariance::shear(int at, const double* K) {
     const double u[3] = {U[j], U[stride() + j], U[2 * stride() + j]};
     const double k[3] = {K[j], K[stride() + j], K[2 * stride() + j]};
     add_three(K, U, stride(), u, k, num, &P_[j * stride()]);
+  }
+}
+
+/// P + u wᵀ + w uᵀ, with w = P Eᵀ + ½ u (E P Eᵀ).
+void StateCovariance::shear_along(int at, const double* u) {
+  const Eigen::Map<const Eigen::VectorXd> along(u, dim_), read(column(at), dim_);
+  Eigen::Map<Eigen::VectorXd> w(shear_.data(), dim_);
+  w = read + 0.5 * read[at] * along;
+  for (int j = 0; j < dim_; ++j) {
+    Eigen::Map<Eigen::VectorXd> column(&this->at(0, j), dim_);
+    column += w[j] * along + along[j] * w;
   }
 }
 

@@ -14,7 +14,7 @@ class StateCovariance {
  public:
   static constexpr int panel = 8;         ///< Rows that are worked on together.
   static constexpr int max_columns = 32;  ///< Of one call of products(): components measured together.
-  static constexpr int max_support = 34;  ///< State components that one measurement depends on.
+  static constexpr int max_support = 35;  ///< State components that one measurement depends on.
 
   /// Room for so many state components, and so many measured ones between two commits.
   void reserve(int state_capacity, int measured_capacity);
@@ -68,6 +68,8 @@ class StateCovariance {
   void turn(const double* blocks, int single_at, int num_single);
   /// P ← (I + K E) P (I + K E)ᵀ, where E takes the three components from `at` on; K: capacity() × 3, column by column.
   void shear(int at, const double* K);
+  /// P ← (I + u E) P (I + u E)ᵀ, where E takes the component `at`; u: dim() components.
+  void shear_along(int at, const double* u);
 
  private:
   [[nodiscard]] std::size_t stride() const { return static_cast<std::size_t>(stride_); }

@@ -239,7 +239,7 @@ void ImageLocalizer::add_new(const cv::Mat& smoothed) {
     const Rigid3 world_from_cam = engine_.best().motion().world_from_cam;
     auto landmark = new_landmark(next_id_, smoothed, engine_.camera(), world_from_cam, px,
                                  world_from_cam * (range_m * *ray_in_cam));
-    if (!landmark || !engine_.filters().add(next_id_, px, {range_m, prior_share})) continue;
+    if (!landmark || !engine_.filters().add(next_id_, px, {range_m, prior_share, !config_.depth_m})) continue;
     landmark->last_found = frame_;
     landmark->last_px = px;
     landmark->first_step = num_taken_;

@@ -45,7 +45,7 @@ ScaleReading LocalizationFilter::scale_reading(double most_sigma_rel) const {
 
 /// What the scale is read by becomes a component of the state while an update goes on: cᵀe.
 void LocalizationFilter::begin_scale() {
-  constexpr double sure_enough = 0.5;
+  constexpr double sure_enough = 0.1;  // a vaguer distance says nothing of the scale
   scale_at_.reset();
   scale_ = scale_reading(sure_enough);
   const int at = P_.dim();

@@ -3,8 +3,8 @@
 #include <unordered_map>
 
 #include "alidade/localize/engine.h"
-#include "alidade/localize/filter/landmark.h"
 #include "alidade/localize/frames/image_target.h"
+#include "alidade/localize/frames/landmark.h"
 #include "alidade/localize/frames/still_parts.h"
 #include "alidade/localize/path/keyframes.h"
 #include "alidade/localize/path/whole_path.h"

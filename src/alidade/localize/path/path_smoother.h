@@ -96,4 +96,12 @@ struct SmoothedPath {
 /// not settle.
 [[nodiscard]] std::optional<SmoothedPath> smoothed_path(const SmootherProblem& problem);
 
+/// Squares over σ² of the observations that fit, and the gate for each other one.
+[[nodiscard]] double cost_of(const SmoothedPath& path, double gate);
+
+/// The same problem from another initial guess, which owes nothing to the filter: every point as deep as the others,
+/// and each pose by resection from the one before. Where no depth is known a filter's first seconds may end in a
+/// rotation that passes for a translation. None where there is no such guess.
+[[nodiscard]] std::optional<SmootherProblem> flat_start(const SmootherProblem& problem);
+
 }  // namespace alidade

@@ -28,10 +28,25 @@ void judge_frames(const SmoothedPath& smoothed, std::size_t first_frame, std::sp
   }
 }
 
+/// Without a target a second initial guess is tried where errors last from frame to frame: as they do on real films,
+/// and in the wrong one of two minima.
+std::optional<SmoothedPath> best_path(const SmootherProblem& problem) {
+  constexpr std::size_t max_frames = 600;  // farther on all depths alike are no guess
+  auto smoothed = smoothed_path(problem);
+  if (problem.gauge != PathGauge::similarity || problem.world_from_cam.size() > max_frames) return smoothed;
+  if (smoothed && !smoothed->structure.has_colour()) return smoothed;
+  const auto flat = flat_start(problem);
+  if (!flat) return smoothed;
+  auto other = smoothed_path(*flat);
+  const double gate = problem.filter.gate;
+  const bool is_better = other && (!smoothed || cost_of(*other, gate) < cost_of(*smoothed, gate));
+  return is_better ? std::move(other) : std::move(smoothed);
+}
+
 /// The path of `result` smoothed. None, and no change, where that does not settle.
 std::optional<SmoothedPath> smooth(const SmootherProblem& problem, std::span<const ObservationFrame> frames,
                                    Localization& result) {
-  auto smoothed = smoothed_path(problem);
+  auto smoothed = best_path(problem);
   if (!smoothed) return std::nullopt;
   result.residuals = smoothed->structure;
   for (std::size_t k = 0; k < smoothed->cov.size(); ++k) {

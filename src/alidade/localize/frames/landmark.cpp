@@ -1,4 +1,4 @@
-#include "alidade/localize/filter/landmark.h"
+#include "alidade/localize/frames/landmark.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>

@@ -264,8 +264,9 @@ TEST(Localize, AWrongPathIsNeverGood) {
   EXPECT_EQ(verdict_of(sample.camera, sample.config).state, State::good);
   const auto pinhole = with_distortion(sample.camera, DistortionVariant::none);
   EXPECT_GE(verdict_of(*pinhole, sample.config).state, State::care);
-  sample.frames.resize(50);  // what contradicts itself begins again in most frames: that takes its time
-  sample.truth.resize(50);
+  constexpr std::size_t num_frames = 25;  // what contradicts itself begins again in most frames: that takes its time
+  sample.frames.resize(num_frames);
+  sample.truth.resize(num_frames);
   LocalizeConfig sure = sample.config;
   sure.filter.sigma_px = 0.1;  // five times better than it is
   EXPECT_GE(verdict_of(sample.camera, sure).state, State::bad);

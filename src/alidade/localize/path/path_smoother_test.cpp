@@ -160,7 +160,7 @@ TEST(SimpleCase, ThePoseIsAsGoodAsItsCovarianceSays) {
   for (const HoverLens lens : {HoverLens::brown, HoverLens::fisheye, HoverLens::port}) {
     double nees = 0.0;
     for (std::uint64_t seed = 1; seed <= num_seeds; ++seed) {
-      const HoverRun run = testing::hovering({.lens = lens, .num_frames = 200, .num_others = 30}, 1000 + seed);
+      const HoverRun run = testing::hovering({.lens = lens, .num_frames = 120, .num_others = 30}, 1000 + seed);
       const Localization report = hover_localized(run, run.camera);
       EXPECT_TRUE(report.is_smoothed);
       nees += mean_nees(report, run) / num_seeds;

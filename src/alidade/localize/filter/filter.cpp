@@ -100,7 +100,7 @@ void LocalizationFilter::append_feature(const NewFeature& made, long id, const S
   feature.id = id;
   feature.offset = P_.dim();
   const int dim = feature.dim();
-  constexpr std::size_t max_inputs = StateCovariance::max_support + ScaleReading::max_numbers;
+  constexpr std::size_t max_inputs = StateCovariance::max_support + ScaleReading::max_components;
   std::array<int, max_inputs> place{};
   Eigen::Matrix<double, 6, max_inputs> J;
   int num_inputs = 0;

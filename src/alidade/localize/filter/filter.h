@@ -164,7 +164,7 @@ class LocalizationFilter {
   void begin_scale();
   void end_scale();
   [[nodiscard]] double relative_variance(const Feature& feature, const RelativeDistance& distance) const;
-  [[nodiscard]] ScaleReading scale_reading(double most_sigma_rel) const;
+  [[nodiscard]] ScaleReading scale_reading(double max_sigma_rel) const;
   [[nodiscard]] double best_attempt();
   /// What the last attempt came to, put aside while another is made, and taken back.
   void keep_attempt();

@@ -19,15 +19,15 @@ double LocalizationFilter::relative_variance(const Feature& feature, const Relat
   return variance;
 }
 
-/// By the surest distances of the map, each surer than `most`; empty where there is none.
-ScaleReading LocalizationFilter::scale_reading(double most_sigma_rel) const {
+/// By the surest distances of the map, each with a smaller σ; empty where there is none.
+ScaleReading LocalizationFilter::scale_reading(double max_sigma_rel) const {
   using Candidate = std::pair<double, const Feature*>;
   std::array<Candidate, ScaleReading::max_features> surest{};
   std::size_t num = 0;
   const Eigen::Vector3d& camera_in_world = motion_.world_from_cam.translation;
   for (const Feature& feature : features_) {
     const double variance = relative_variance(feature, relative_distance(feature, camera_in_world));
-    if (!(variance > 0.0 && variance < most_sigma_rel * most_sigma_rel)) continue;
+    if (!(variance > 0.0 && variance < max_sigma_rel * max_sigma_rel)) continue;
     if (num == surest.size() && !(variance < surest[num - 1].first)) continue;
     num = std::min(num + 1, surest.size());
     surest[num - 1] = {variance, &feature};

@@ -9,8 +9,8 @@
 // No measurement but that of known points tells how large the world is: camera, speed and map may all be larger by one
 // factor. A filter whose derivatives follow its estimate forgets that, as it does for the world's turn (world_turn.h),
 // and a camera that speeds up or slows down then pulls the scale with it. So the error is counted along the estimate:
-// with N the state's scale direction (places and speeds themselves, inverse depths with the other sign) and a reading
-// ε = cᵀe of the scale's error, cᵀN = 1,
+// with N the state's scale direction (positions and velocities themselves, inverse depths with the other sign) and a
+// reading ε = cᵀe of the scale's error, cᵀN = 1,
 //     x = (1 + ε)(x̂ + e − N ε),
 // which to first order is x̂ + e. What is seen is a function of the second bracket alone. While an update goes on ε is
 // one more component of the state. Once the state has moved, N has moved by u, and what P holds along N it holds along
@@ -21,8 +21,8 @@ namespace alidade {
 /// N of a feature's components; the first dim().
 [[nodiscard]] Eigen::Vector<double, 6> scale_direction(const Feature& feature);
 
-/// Derivatives of ln |y − r|, the distance between camera and feature, by r and by the feature's components: a reading
-/// of the scale. All zero where the feature is at no distance.
+/// Derivatives of ln |y − r|, the distance between camera and feature, by r [1/m] and by the feature's components: a
+/// reading of the scale. All zero where the feature is at no distance.
 struct RelativeDistance {
   Eigen::Vector3d J_position = Eigen::Vector3d::Zero();
   Eigen::Vector<double, 6> J_feature = Eigen::Vector<double, 6>::Zero();
@@ -32,7 +32,7 @@ struct RelativeDistance {
 /// c: by which components of the state the scale's error is read.
 class ScaleReading {
  public:
-  static constexpr std::size_t max_features = 6, max_numbers = 3 + 6 * max_features;
+  static constexpr std::size_t max_features = 6, max_components = 3 + 6 * max_features;
 
   /// Adds `share` of a feature's relative distance.
   void add(const Feature& feature, const RelativeDistance& distance, double share);
@@ -41,8 +41,8 @@ class ScaleReading {
   [[nodiscard]] bool is_empty() const { return num_ == 0; }
 
  private:
-  std::array<int, max_numbers> columns_{0, 1, 2};  ///< The camera's position first.
-  std::array<double, max_numbers> weights_{};
+  std::array<int, max_components> columns_{0, 1, 2};  ///< The camera's position first.
+  std::array<double, max_components> weights_{};
   std::size_t num_ = 0;
 };
 

@@ -28,14 +28,14 @@ figure{margin:.5em 0 0}figcaption{font-size:12.5px;font-weight:600}svg{width:100
 <p>One mark per camera, the worst first: ▲ bad, ✕ lost, ◆ care, ■ not learned yet, ● good</p><div id="map"></div></section>
 <section id="one"><h2>History of a camera</h2><p>Choose one in the map or in the table.</p></section></div>
 <section><h2>The worst first</h2><div class="scroll"><table><thead><tr><th>camera</th><th>row</th><th>t [s]</th><th>fx [px]</th><th>zero of pan [°]</th>
-<th>zero of tilt [°]</th><th>alarms</th><th>verdict</th></tr></thead><tbody id="rows"></tbody></table></div><p>Values ± 3σ.</p></section>
+<th>zero of tilt [°]</th><th>alarms</th><th>verdict</th></tr></thead><tbody id="rows"></tbody></table></div><p>Values ± 3σ; zeros against those at the start. Not moved: no change has been detected.</p></section>
 )page"
     R"page(<script>
 const $=id=>document.getElementById(id),deg=180/Math.PI,mark={good:'●',care:'◆',bad:'▲',refused:'■',not_converged:'✕'};
 let chosen='',drawn='',last=null;
 const el=(tag,more={},...inner)=>{const made=document.createElement(tag);Object.entries(more).forEach(([k,v])=>made.setAttribute(k,v));made.append(...inner);return made};
 const isNumber=v=>typeof v==='number'&&isFinite(v);
-const pm=(v,s,k)=>{if(!isNumber(v))return'–';const three=3*k*s,d=isNumber(s)&&s>0?Math.min(6,Math.max(0,1-Math.floor(Math.log10(three)))):3;return(k*v).toFixed(d)+(isNumber(s)?' ± '+three.toFixed(d):'')};
+const pm=(v,s,k)=>{if(!isNumber(v))return'–';if(v===0&&s===0)return'not moved';const three=3*k*s,d=isNumber(s)&&s>0?Math.min(6,Math.max(0,1-Math.floor(Math.log10(three)))):3;return(k*v).toFixed(d)+(isNumber(s)?' ± '+three.toFixed(d):'')};
 const clock=t=>t>1e9?new Date(1000*t).toLocaleString():t.toFixed(1)+' s';
 function ticks(lo,hi,n){const raw=(hi-lo)/n,p=10**Math.floor(Math.log10(raw)),m=raw/p,step=(m<=1?1:m<=2?2:m<=5?5:10)*p,all=[];
 for(let v=Math.ceil(lo/step)*step;v<=hi+1e-9*step&&all.length<20;v+=step)all.push(+v.toPrecision(12));return all}

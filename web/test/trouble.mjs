@@ -109,7 +109,7 @@ async function aThrowingFigureDoesNotTakeThePage({open, url}) {
 }
 
 async function theTemplateIsSmall({template}) {
-  assert.ok(Buffer.byteLength(template) <= 900_000, `${Buffer.byteLength(template)} bytes`);
+  assert.ok(Buffer.byteLength(template) <= 820_000, `${Buffer.byteLength(template)} bytes`);
   assert.match(template, /three [\d.]+\n[\s\S]*MIT[\s\S]*uplot [\d.]+/);
   assert.ok(!/src="http|href="http|@import|fetch\("http/.test(template));
 }

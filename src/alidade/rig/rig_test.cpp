@@ -334,6 +334,31 @@ TEST(Rig, ARealHeadsSurveyedPointsAreExplainedToTwoPixels) {
   EXPECT_GT(report.rig.heads[0].head.encoder.tilt_scale, 0.0);
 }
 
+/// The advice of a rig that is known too little: with as many more views of other boards, it is known well enough.
+TEST(Rig, AsManyViewsAsAreLackingAreEnough) {
+  int num_lacking = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    RigSceneConfig config;
+    config.num_boards = 2;
+    const auto report_of = [&] {
+      const RigScene scene = draw_rig_scene(config, seed);
+      return solved(scene, simulate_head_views(scene, {}, seed).views);
+    };
+    const RigReport report = report_of();
+    const std::string advice = rig_verdict(report, {}).to_add;
+    const std::size_t number = advice.find("add about ");
+    if (number == std::string::npos) continue;
+    ++num_lacking;
+    const double lacking = std::stod(advice.substr(number + 10));
+    const double views_of_a_board = static_cast<double>(report.views.size()) / config.num_boards;
+    config.num_boards += static_cast<int>(std::ceil(lacking / views_of_a_board));
+    for (const Check& check : rig_verdict(report_of(), {}).checks)
+      if (check.name == "rotation" || check.name == "position")
+        EXPECT_LT(check.value, 1.15 * check.limit) << "seed " << seed << ": " << check.text;
+  }
+  EXPECT_GE(num_lacking, 2);
+}
+
 /// Two to fifteen views at random: refused, or within what σ says. Some of garbage, some twice, some of two corners.
 TEST(Rig, RandomHandfulsAreRefusedOrCovered) {
   std::mt19937_64 rng(1);

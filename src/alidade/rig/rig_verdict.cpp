@@ -102,18 +102,27 @@ Check check_of(std::string name, State state, std::string text, double value, do
   return {std::move(name), state, std::move(text), value, limit, std::move(unit), ""};
 }
 
+/// How many more views like these bring both σ down to what is good: they fall as the root of the number.
+std::string views_lacking(const RigReport& report) {
+  const double times =
+      std::max(report.sigma_relative_rad / good_relative_rad, report.sigma_relative_m / good_relative_m);
+  const double lacking = std::ceil(static_cast<double>(report.views.size()) * (times * times - 1.0));
+  return "; add about " + text_of(lacking, 6) + (lacking < 1.5 ? " view" : " views") +
+         ": boards at other positions, seen from more pans and tilts";
+}
+
 void add_precision(const RigReport& report, Verdict& verdict) {
   const std::string what = report.rig.heads.size() > 1 ? "between the cameras" : "of the camera as it rotates";
-  const double angle = report.sigma_relative_rad, length = report.sigma_relative_m;
-  const auto state = [](double value, double good, double refuse) {
-    return !(value < refuse) ? State::refused : value > good ? State::care : State::good;
+  const auto add = [&](const char* name, double value, double good, double refuse, double unit, const char* symbol,
+                       const char* space) {
+    const State state = !(value < refuse) ? State::refused : value > good ? State::care : State::good;
+    verdict.checks.push_back(check_of(name, state,
+                                      "σ " + what + " is up to " + text_of(value / unit, 2) + space + symbol +
+                                          (state == State::care ? views_lacking(report) : ""),
+                                      value / unit, good / unit, symbol));
   };
-  verdict.checks.push_back(check_of("rotation", state(angle, good_relative_rad, refuse_relative_rad),
-                                    "σ " + what + " is up to " + text_of(angle / degree, 2) + "°", angle / degree,
-                                    good_relative_rad / degree, "°"));
-  verdict.checks.push_back(check_of("position", state(length, good_relative_m, refuse_relative_m),
-                                    "σ " + what + " is up to " + text_of(1e3 * length, 2) + " mm", 1e3 * length,
-                                    1e3 * good_relative_m, "mm"));
+  add("rotation", report.sigma_relative_rad, good_relative_rad, refuse_relative_rad, degree, "°", "");
+  add("position", report.sigma_relative_m, good_relative_m, refuse_relative_m, 1e-3, "mm", " ");
 }
 
 /// A small range of an axis is enough where the views determine the rig beyond it, too: what counts is σ over 20° of

@@ -104,11 +104,11 @@ void add_servo(App& app) {
       ->delimiter(',');
   command.add_option("--seeds", args->seeds, "Runs of each controller, from --seed on")->check(CLI::Range(1, 1000));
   command.add_option("--latency-ms", args->latency_ms, "From an image to its pixel")
-      ->check(finite_number() & CLI::Range(0.0, 10000.0));
+      ->check(number_within(0.0, 10000.0));
   command.add_option("--true-gain", args->gain_factor, "The plant's true gain over the known one")
-      ->check(finite_number() & CLI::Range(0.01, 100.0));
+      ->check(number_within(0.01, 100.0));
   command.add_option("--true-tau", args->tau_factor, "The plant's true time constant over the known one")
-      ->check(finite_number() & CLI::Range(0.01, 100.0));
+      ->check(number_within(0.01, 100.0));
   command
       .add_option("--intrinsics", args->intrinsics,
                   "Intrinsics that the loop uses where lenses zoom: given (the rig's), observed (estimated on-line "

@@ -136,7 +136,7 @@ void add_board_scenario(App& app) {
   command.add_option("--model", args->model, "Lens of the made-up camera")->type_name("NAME")->capture_default_str();
   command.add_option("--size", args->size, "Image of the made-up camera")->type_name("WxH")->capture_default_str();
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
-    command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
+    command.add_option(name, value, help)->check(number_within(low, high))->capture_default_str();
   };
   number("--max-tilt-deg", args->max_tilt_deg, "Largest tilt of the board", 0.0, 80.0);
   number("--bow-mm", args->bow_mm, "Height of the board's centre over its corners", -1000.0, 1000.0);

@@ -80,10 +80,10 @@ void add_head_scenario(App& app) {
   command.add_option("--truth", args->truth, "Where each frame's time and true angles are written, CSV")
       ->type_name("FILE");
   command.add_option("--watchdog", args->watchdog_s, "Stops by itself after this many seconds of silence; 0: never")
-      ->check(finite_number() & CLI::Range(0.0, 3600.0))
+      ->check(number_within(0.0, 3600.0))
       ->capture_default_str();
   command.add_option("--seconds", args->seconds, "Ends by itself after so long (default: at Ctrl-C)")
-      ->check(finite_number() & CLI::Range(0.0, 1e9));
+      ->check(number_within(0.0, 1e9));
 }
 
 }  // namespace alidade::cli

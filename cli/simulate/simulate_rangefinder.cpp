@@ -139,7 +139,7 @@ void add_rangefinder_scenario(App& app) {
   command.add_option("--shots", args->shots, "How many shots")->check(CLI::Range(1, 10000))->capture_default_str();
   command.add_option("--camera", args->camera, "The true camera; without it one is made up")->type_name("FILE");
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
-    command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
+    command.add_option(name, value, help)->check(number_within(low, high))->capture_default_str();
   };
   number("--sigma-range-m", args->sigma_range_m, "Noise of a reading [m]", 0.0, 1.0);
   number("--sigma-px", args->noise.sigma_spot_px, "Noise of a spot's coordinate", 0.0, 100.0);

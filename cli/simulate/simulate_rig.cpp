@@ -136,7 +136,7 @@ void add_rig_scenario(App& app) {
       ->check(CLI::Range(2, 1000))
       ->capture_default_str();
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
-    command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
+    command.add_option(name, value, help)->check(number_within(low, high))->capture_default_str();
   };
   number("--sigma-px", args->sigma_px, "Noise of a corner's coordinate", 0.0, 100.0);
   number("--sigma-angle-deg", args->sigma_angle_deg, "Noise of a reading [deg]", 0.0, 10.0);

@@ -243,7 +243,7 @@ ExitCode simulate_rotation_log(const SimulateRotationArgs& args, Run& run) {
 /// What a log may have that is not given.
 void add_fault_options(CLI::App& command, SimulateRotationArgs& args) {
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
-    command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
+    command.add_option(name, value, help)->check(number_within(low, high))->capture_default_str();
   };
   const auto numbers = [&](const char* name, std::vector<double>& values, int count, const char* help) {
     command.add_option(name, values, help)->delimiter(',')->expected(count)->check(finite_number());
@@ -273,7 +273,7 @@ void add_options(CLI::App& command, SimulateRotationArgs& args) {
     command.add_option(name, value, help)->check(CLI::IsMember(std::move(words)))->capture_default_str();
   };
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
-    command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
+    command.add_option(name, value, help)->check(number_within(low, high))->capture_default_str();
   };
   word("--source", args.source, "How the rotation is measured: rate, head or attitude", {"rate", "head", "attitude"});
   word("--motion", args.motion, "sway (the paper's, eq. 27), pan, tilt, roll or still",

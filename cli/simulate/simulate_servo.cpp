@@ -94,7 +94,7 @@ void add_servo_scenario(App& app) {
       ->check(CLI::IsMember({"deg", "rad"}))
       ->capture_default_str();
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
-    command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
+    command.add_option(name, value, help)->check(number_within(low, high))->capture_default_str();
   };
   number("--tau-s", args->tau_s, "Time constant", 1e-4, 100.0);
   number("--latency-s", args->latency_s, "From a command to its first effect", 0.0, 10.0);

@@ -79,6 +79,8 @@ TEST(SimulateBoard, NamesWhatIsWrong) {
   expect({"--size", "320x10"}, 2, "--size: '320x10' is not WIDTHxHEIGHT");
   expect({"--model", "thin"}, 2, "--model: 'thin' is not pinhole, brown, kannala_brandt or flat_port");
   expect({"--noise", "nan"}, 2, "--noise: 'nan' is not a finite number");
+  expect({"--noise", "much"}, 2, "--noise: 'much' is not a finite number\n");
+  expect({"--noise", "-1"}, 2, "--noise: '-1' is not within 0 to 100\n");
   expect({"--photos", "0"}, 2, "--photos");
   expect({"--camera", (folder.path() / "none.yaml").string()}, 3, "none.yaml");
 }

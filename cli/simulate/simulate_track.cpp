@@ -232,7 +232,7 @@ void add_track_scenario(App& app) {
   command.add_option("--path", args->path,
                      "Path of the target instead, from the first row on: t_s,x_m,y_m,z_m; after the last it rests");
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
-    return command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high));
+    return command.add_option(name, value, help)->check(number_within(low, high));
   };
   command.add_flag("--video", args->video, "Render frames instead of observations: head_1/, head_2/, angles.csv");
   number("--clutter", args->clutter, "With --video: coloured patches behind the target, σ of a colour, of 255", 0.0,

@@ -137,7 +137,7 @@ void add_underwater_scenario(App& app) {
                             ->capture_default_str();
   command.add_option("--rate", args->rate_hz, "Frames a second")->check(positive_number())->capture_default_str();
   const auto number = [&](const char* name, double& value, const char* help, double low, double high) {
-    return command.add_option(name, value, help)->check(finite_number() & CLI::Range(low, high))->capture_default_str();
+    return command.add_option(name, value, help)->check(number_within(low, high))->capture_default_str();
   };
   CLI::Option* video =
       command.add_flag("--video", args->video,

@@ -188,11 +188,12 @@ ExitCode finish_empty(const Board& board, const CaptureArgs& args, const std::st
 
 /// A camera may be good and yet short of the requested goal.
 void tell_missed_goal(const live::CaptureSession& session, double goal_px, const Run& run) {
-  if (session.kept().photos().empty() || session.state().is_at(goal_px)) return;
-  tell_person(
-      fmt::format("alidade: the goal of {:.2g} px is not reached, 3σ is {:.2g} px at the worst pixel; go on with "
-                  "--resume {}",
-                  goal_px, session.state().worst_3sigma_px, run.options.out.string()));
+  const CaptureState& state = session.state();
+  if (session.kept().photos().empty() || state.is_at(goal_px)) return;
+  const std::string now = state.has_camera ? fmt::format("3σ is {:.2g} px at the worst pixel", state.worst_3sigma_px)
+                                           : "there is no camera yet";
+  tell_person(fmt::format("alidade: the goal of {:.2g} px is not reached, {}; go on with --resume {}", goal_px, now,
+                          run.options.out.string()));
 }
 
 }  // namespace

@@ -107,6 +107,7 @@ TEST_F(CaptureFromAFolder, NamesABoardOfAnotherSizeAndAFrozenStream) {
   const Ran frozen = run(live("frozen", "once"));
   EXPECT_EQ(frozen.code, 4);
   EXPECT_THAT(frozen.said, HasSubstr("frozen"));
+  EXPECT_THAT(frozen.said, HasSubstr("not reached, there is no camera yet; go on with --resume"));
   EXPECT_EQ(Csv::read(folder_ / "once" / "photos.csv").num_rows(), 1u);
 }
 

@@ -10,17 +10,17 @@ import {inflateSync} from 'node:zlib';
 import {folder, launch} from './page.mjs';
 
 const patience_ms = 120_000, board = ['--board', '9x6', '--square', '0.025'];
-const at = (...parts) => join(folder, 'capture', ...parts);
-const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
-const hash = (bytes) => createHash('sha256').update(bytes).digest('hex');
+export const at = (...parts) => join(folder, 'capture', ...parts);
+export const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
+export const hash = (bytes) => createHash('sha256').update(bytes).digest('hex');
 
-async function until(what, isTrue, most_ms = patience_ms) {
+export async function until(what, isTrue, most_ms = patience_ms) {
   for (const start = Date.now(); Date.now() - start < most_ms; await sleep(40)) if (await isTrue()) return;
   throw new Error(`${typeof what === 'function' ? what() : what}: not within ${most_ms} ms`);
 }
 
 /** The grey values of an 8-bit grey PNG. */
-function greyOf(file) {
+export function greyOf(file) {
   const bytes = readFileSync(file), parts = [];
   let width = 0, height = 0;
   for (let i = 8; i < bytes.length;) {
@@ -42,7 +42,7 @@ function greyOf(file) {
 }
 
 /** A film in which each photo is shown for a second: every Y plane of it by its checksum. */
-function film(alidade) {
+export function film(alidade) {
   const file = at('film.y4m'), planes = new Set();
   mkdirSync(at(), {recursive: true});
   if (!existsSync(at('in'))) execFileSync(alidade, ['simulate', 'board', ...board, '--photos', '14', '--size', '640x480', '--out', at('in'), '--quiet']);
@@ -56,8 +56,8 @@ function film(alidade) {
   return {file, planes};
 }
 
-async function started(alidade, args, name, job = ['calibrate', ...board]) {
-  rmSync(at(name), {recursive: true, force: true});
+export async function started(alidade, args, name, job = ['calibrate', ...board], goesOn = false) {
+  if (!goesOn) rmSync(at(name), {recursive: true, force: true});
   const child = spawn(alidade, [job[0], '--live', '0', ...job.slice(1), ...args, '--out', at(name)], {stdio: ['ignore', 'ignore', 'pipe']});
   let said = '';
   child.stderr.on('data', (data) => (said += data));
@@ -68,10 +68,10 @@ async function started(alidade, args, name, job = ['calibrate', ...board]) {
   return {child, url, exited, said: () => said, end: async () => (child.kill('SIGKILL'), exited)};
 }
 
-async function cameraBrowser(y4m) {
+export async function cameraBrowser(y4m) {
   return launch(['--use-fake-ui-for-media-stream', '--use-fake-device-for-media-stream', `--use-file-for-fake-video-capture=${y4m}`]);
 }
-async function opened(browser, url, {width = 1280, height = 900, theme = 'light', permissions = ['camera'], before = null} = {}) {
+export async function opened(browser, url, {width = 1280, height = 900, theme = 'light', permissions = ['camera'], before = null} = {}) {
   const context = await browser.newContext({viewport: {width, height}, colorScheme: theme, permissions}), page = await context.newPage(), faults = [];
   page.setDefaultTimeout(patience_ms);
   if (before) await page.addInitScript(before);
@@ -209,10 +209,11 @@ async function onlyItsOwnPageMayWrite({alidade}) {
   }
 }
 
-async function aRefusedCameraIsSaid({alidade, browser}) {
+async function aMissingCameraIsSaid({alidade, browser}) {
   const run = await started(alidade, [], 'refused'), shown = await opened(browser, run.url, {permissions: []});
   try {
     await shown.becomes('refused');
+    assert.match(await shown.page.textContent('h1'), /there is no camera/);
     assert.deepEqual(shown.faults, []);
     if (process.env.ALIDADE_SHOTS) await shown.page.screenshot({path: join(process.env.ALIDADE_SHOTS, 'capture-refused.png')});
     await run.end();
@@ -346,7 +347,7 @@ export const tests = {
   'capture: a film is kept bit for bit, guided, and the page becomes the report': aFilmIsKeptBitForBitAndBecomesTheReport,
   'capture: the keyboard alone steers it; another page watches': theKeyboardAloneSteersIt,
   'capture: only its own page may write': onlyItsOwnPageMayWrite,
-  'capture: a refused camera is said, and so is a run that has gone': aRefusedCameraIsSaid,
+  'capture: a camera that is not there is said, and so is a run that has gone': aMissingCameraIsSaid,
   'capture: a canvas where the browser has nothing better: not exact, and said': aCanvasIsNotExactAndSaysSo,
   'capture: a camera that is unplugged is said, its photos stay, and it goes on': aCameraThatGoesIsSaidAndComesBack,
   'capture: a folder is shown and steered': aFolderIsShownAndSteered,

@@ -8,6 +8,7 @@ import {realResults} from './runs.mjs';
 import * as answers from './answers.mjs';
 import * as behaviour from './behaviour.mjs';
 import * as capture from './capture.mjs';
+import * as captureReal from './capture_real.mjs';
 import * as live from './live.mjs';
 import * as trouble from './trouble.mjs';
 
@@ -43,7 +44,7 @@ async function test(name, body) {
   }
 }
 for (const name of Object.keys(documents)) await test(`${name}: opens, draws all, in both themes and widths`, (c) => behaviour.opensAndDraws(c, name));
-for (const module of [answers, behaviour, trouble, ...(hasAlidade ? [live, capture] : [])]) for (const [name, body] of Object.entries(module.tests)) if (!body.needs || documents[body.needs]) await test(name, body);
+for (const module of [answers, behaviour, trouble, ...(hasAlidade ? [live, capture, captureReal] : [])]) for (const [name, body] of Object.entries(module.tests)) if (!body.needs || documents[body.needs]) await test(name, body);
 await browser.close();
 rmSync(folder, {recursive: true, force: true});
 console.log(`web: ${failures.length === 0 ? 'all tests pass' : `${failures.length} tests fail: ${failures.join('; ')}`} (${((Date.now() - started) / 1000).toFixed(0)} s, ${(template.length / 1000).toFixed(0)} kB template)`);

@@ -124,7 +124,7 @@ std::string focal_walk(const LensSoFar& lens, const std::vector<BoardView>& view
   const double per_photo = chi2 / static_cast<double>(own.size());
   if (walk < min_walk || walk < max_z * sigma || per_photo < 9.0) return "";
   return fmt::format(
-      "the focal length walks between photos, by {:.1f} % ({:.0f} to {:.0f} px): switch the camera's autofocus off",
+      "the focal length varies between photos, by {:.1f} % ({:.0f} to {:.0f} px): switch the camera's autofocus off",
       100.0 * walk, focal_px * (1.0 + least->change), focal_px * (1.0 + most->change));
 }
 

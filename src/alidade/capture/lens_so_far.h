@@ -22,7 +22,7 @@ struct LensSoFar {
 [[nodiscard]] LensSoFar lens_so_far(const Board& board, const std::vector<BoardView>& views, const ImageSize& size,
                                     const CalibrateConfig& config);
 
-/// "the focal length walks between photos: …" where each photo by itself asks for another one than its neighbours, far
+/// "the focal length varies between photos, …" where each photo by itself asks for another one than its neighbours, far
 /// beyond its σ: a camera that focuses by itself. Empty where none does.
 [[nodiscard]] std::string focal_walk(const LensSoFar& lens, const std::vector<BoardView>& views);
 

@@ -86,14 +86,14 @@ class CapturePage {
         el('div', {class: 'buttons'}, this.again, button('?', 'Keys and help', showHelp), button('◐', 'Dark or light', toggleTheme))),
       el('p', {class: 'counts'}, el('b', {}, `alidade ${isShots ? 'rangefinder' : 'calibrate'} --live`), ` · board ${this.about.board.cols}×${this.about.board.rows}${this.goalWords()}`), this.notes);
     const mapBody = el('div', {class: 'body'}), main = el('main'), {take, undo, pause, mirror, end} = this.buttons;
-    const buttons = isShots ? [el('label', {class: 'capture-reading'}, 'reading ', this.reading, ' m'), take, undo, mirror, end] : Object.values({take, undo, pause, end, mirror});
+    const buttons = isShots ? [el('label', {class: 'capture-reading'}, 'reading ', this.reading, ' m'), take, undo, end, mirror] : Object.values({take, undo, pause, end, mirror});
     main.append(
       el('section', {class: 'card', id: 'fig-camera', style: '--span:16'},
         this.view.element, this.advice, this.target,
         el('div', {class: 'capture-buttons'}, ...buttons),
         el('p', {class: 'good'}, isShots ? 'space goes to the reading, Enter in it takes · u undo · m mirror · Enter ends · d dark or light' : 'space takes · u undo · p pause · m mirror · Enter ends · d dark or light')),
       el('section', {class: 'card', id: 'fig-sigma', style: '--span:8'},
-        el('div', {class: 'title'}, el('h2', {}, isShots ? 'How well is the beam known?' : 'How well is a pixel known?'), el('span', {class: 'note'}, isShots ? '3σ of its origin, mm' : '3σ, px')),
+        el('div', {class: 'title'}, el('h2', {}, isShots ? 'How well is the beam known?' : 'How well is a pixel known?'), el('span', {class: 'note'}, isShots ? '3σ, mm' : '3σ, px')),
         this.figure, this.goal, mapBody));
     host.append(this.header, main);
     this.map = new Chart(mapBody, {height: 180, aspect: 0.75, most: 420, label: isShots ? '3σ of the origin, shot by shot' : '3σ over the image'}, (pen) => (isShots ? this.drawHistory(pen) : this.drawMap(pen)));
@@ -104,9 +104,9 @@ class CapturePage {
     this.showState();
   }
 
-  private set(stage: Stage): void {
+  private set(stage: Stage, why = ''): void {
     this.stage = stage;
-    const [symbol, word, colour] = looks[stage];
+    const [symbol, usual, colour] = looks[stage], word = why || usual;
     this.root.dataset['capture'] = stage;
     this.header.dataset['state'] = stage;
     this.header.style.setProperty('--state', `var(--${colour})`);
@@ -177,8 +177,9 @@ class CapturePage {
       void this.pump();
     } catch (error) {
       const name = (error as Error).name;
-      this.set('refused');
-      this.view.say(name === 'NotFoundError' || name === 'OverconstrainedError' ? 'there is no camera' : name === 'NotReadableError' ? 'the camera is used by another program' : 'the camera was refused: allow it in the address bar, then ask again');
+      const why = name === 'NotFoundError' || name === 'OverconstrainedError' ? 'there is no camera' : name === 'NotReadableError' ? 'the camera is used by another program' : '';
+      this.set('refused', why);
+      this.view.say(why === '' ? 'allow the camera in the address bar, then ask again' : `${why}${name === 'NotReadableError' ? ': end that one' : ': plug one in'}, then ask again`);
     }
     this.isOpening = false;
   }
@@ -276,7 +277,7 @@ class CapturePage {
       pen.hit({x: x(i + 1), y: y(value), r: 9, tip: () => [`shot ${i + 1}`, `3σ ${num(value, 2)} mm`]});
     });
     for (const value of [Math.max(...known), Math.min(...known)]) pen.text(num(value, 2), 2, y(value), {size: 11.5, colour: pen.c.ink});
-    pen.text('1', x(1), pen.h - 10, {align: 'center', size: 11.5, colour: pen.c.soft});
+    pen.text('shot 1', x(1), pen.h - 10, {align: 'center', size: 11.5, colour: pen.c.soft});
     if (values.length > 1) pen.text(String(values.length), x(values.length), pen.h - 10, {align: 'center', size: 11.5, colour: pen.c.soft});
   }
   private drawMap(pen: Pen): void {

@@ -298,6 +298,12 @@ TEST_F(RangefinderCommand, FromPhotosTheOriginIsWithinThreeMillimetres) {
   EXPECT_LT(std::sqrt(squares_m2), 0.003);
   EXPECT_LT(std::acos(std::min(cosine, 1.0)) * 180.0 / M_PI, 0.05);
   EXPECT_TRUE(std::filesystem::exists(path("out/report.html")));
+  for (const char* board : {"10x7", "8x5"}) {
+    const Outcome other = alidade({"rangefinder", path("sim/shots.csv"), "--camera", path("sim/camera.yaml"), "--board",
+                                   board, "--square", "0.04", "--no-report", "--out", path("other")});
+    EXPECT_EQ(other.code, 4) << other.out;
+    EXPECT_NE(other.err.find("use --board 9x6: they show that board"), std::string::npos) << other.err;
+  }
 }
 
 }  // namespace

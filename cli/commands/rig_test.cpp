@@ -137,6 +137,10 @@ TEST_F(RigCommand, FromRenderedPhotosEndToEnd) {
   const Outcome outcome = calibrate(path("sim/views.csv"), {"--sigma-scale", "1e-5"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   expect_near_truth(read_rig(path("out/rig.yaml")), read_rig(path("sim/truth_rig.yaml")), 0.20, 0.0035);
+  const Outcome squares = alidade({"rig", path("sim/views.csv"), "--camera", path("sim/camera_1.yaml"), "--board",
+                                   "10x7", "--square", "0.025", "--no-report", "--out", path("squares")});
+  EXPECT_EQ(squares.code, 4) << squares.out;
+  EXPECT_THAT(squares.err, ::testing::HasSubstr("use --board 9x6: they show that board"));
 }
 
 /// Two heads 0.5 m apart look straight ahead at a point 2 m away, half way between them: by hand.

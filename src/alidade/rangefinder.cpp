@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core.hpp>
+#include <optional>
 #include <utility>
 
+#include "alidade/board_detector/board_guess.h"
 #include "alidade/camera/camera_fault.h"
 #include "alidade/rangefinder/checks/shot_checks.h"
 #include "alidade/rangefinder/rangefinder.h"
@@ -70,6 +73,43 @@ void measure_photos(RangefinderCalibration& result, const PhotoByName& load_phot
   reject_unreadable(result);
 }
 
+/// The board that the photos show where it is not the one given.
+std::optional<WrongBoard> given_wrongly(const RangefinderCalibration& result, const PhotoByName& load_photo,
+                                        const Progress& progress) {
+  if (!result.config.board || result.config.method == RangefinderMethod::spot) return std::nullopt;
+  std::vector<std::string> reasons;
+  std::vector<std::size_t> in_vain;
+  std::size_t num_found = 0;
+  for (std::size_t i = 0; i < result.measured.size(); ++i) {
+    const Shot& shot = result.measured[i];
+    reasons.push_back(shot.no_board);
+    num_found += shot.board ? 1 : 0;
+    if (!shot.board && result.photos[i].has_photo) in_vain.push_back(i);
+  }
+  const PhotoLoader load = [&](std::size_t i) {
+    const Shot& shot = result.measured[i];
+    return load_photo(shot.photo_off.empty() ? shot.photo : shot.photo_off);
+  };
+  return wrong_board(reasons, num_found, in_vain, load, *result.config.board, progress);
+}
+
+/// No beam comes from boards that are parts of another one.
+void refuse(const WrongBoard& wrong, const Camera& camera, RangefinderCalibration& result) {
+  result.camera = camera;
+  result.shots.resize(result.measured.size());
+  for (std::size_t i = 0; i < result.shots.size(); ++i) {
+    const std::string& reason = result.measured[i].no_board;
+    result.shots[i].reason = reason.empty() ? wrong.reason : reason;
+  }
+  result.counts.dropped = result.shots.size();
+  result.shots_dropped = static_cast<int>(result.shots.size());
+  result.verdict = {.state = State::refused,
+                    .exit_code = ExitCode::undetermined,
+                    .sentence = wrong.reason,
+                    .to_add = wrong.to_add,
+                    .checks = {}};
+}
+
 /// What stands beside the answer: what more shots bring, and how well each shot is predicted by the others.
 void study(RangefinderCalibration& result, const Camera& camera, const Progress& progress) {
   const std::vector<Eigen::Vector3d> points = points_of(result.config);
@@ -90,7 +130,13 @@ RangefinderCalibration rangefinder(std::vector<Shot> shots, const Camera& camera
   result.config = config;
   result.counts.given = shots.size();
   result.measured = std::move(shots);
-  if (load_photo) measure_photos(result, load_photo, camera, progress);
+  if (load_photo) {
+    measure_photos(result, load_photo, camera, progress);
+    if (const auto wrong = given_wrongly(result, load_photo, progress)) {
+      refuse(*wrong, camera, result);
+      return result;
+    }
+  }
   SolvedRangefinder solved = solve_rangefinder(result.measured, points_of(config), camera, config, progress);
   static_cast<RangefinderReport&>(result) = std::move(solved.report);
   result.config = std::move(solved.config);

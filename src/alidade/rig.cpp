@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <mutex>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
+#include "alidade/board_detector/board_guess.h"
 #include "alidade/board_detector/find_boards.h"
 #include "alidade/camera/camera_fault.h"
 #include "alidade/rig/rig.h"
@@ -38,9 +40,29 @@ std::string size_fault(const cv::Mat& photo, int head, const std::map<int, Camer
          std::to_string(head) + " is for " + std::to_string(camera.width_px) + "x" + std::to_string(camera.height_px);
 }
 
-/// Corners of the boards in the views' photos. A photo without a board is named.
-void find_board_corners(RigCalibration& result, const std::map<int, Camera>& cameras, const PhotoByName& load_photo,
-                        const Progress& progress) {
+/// Why each photo shows no board; empty where it does.
+std::vector<std::string> reasons_of(const BoardDetections& found, const std::vector<std::string>& unusable) {
+  std::vector<std::string> reasons = unusable;
+  for (std::size_t i = 0; i < reasons.size(); ++i)
+    if (reasons[i].empty()) reasons[i] = found.photos[i].reason;
+  return reasons;
+}
+
+/// The board that the photos show where it is not the one given.
+std::optional<WrongBoard> given_wrongly(const std::vector<std::string>& reasons,
+                                        const std::vector<std::string>& unusable, const PhotoLoader& load_photo,
+                                        const Board& given, const Progress& progress) {
+  std::vector<std::size_t> in_vain;
+  for (std::size_t i = 0; i < reasons.size(); ++i)
+    if (unusable[i].empty() && !reasons[i].empty()) in_vain.push_back(i);
+  const auto num_found = static_cast<std::size_t>(std::ranges::count(reasons, std::string()));
+  return wrong_board(reasons, num_found, in_vain, load_photo, given, progress);
+}
+
+/// Corners of the boards in the views' photos. A photo without a board is named. What they show where it is not the
+/// board given: no view is then used.
+std::optional<WrongBoard> find_board_corners(RigCalibration& result, const std::map<int, Camera>& cameras,
+                                             const PhotoByName& load_photo, const Progress& progress) {
   std::vector<std::string> unusable(result.measured.size());
   const auto load = [&](std::size_t i) -> cv::Mat {
     try {
@@ -57,19 +79,23 @@ void find_board_corners(RigCalibration& result, const std::map<int, Camera>& cam
   };
   const BoardDetections found =
       find_boards(result.measured.size(), load, *result.config.board, /*reject_partial=*/false, progress);
+  std::vector<std::string> reasons = reasons_of(found, unusable);
+  auto wrong = given_wrongly(reasons, unusable, load, *result.config.board, progress);
   std::vector<HeadView> seen;
   for (std::size_t i = 0; i < result.measured.size(); ++i) {
     HeadView& view = result.measured[i];
-    if (unusable[i].empty() && found.photos[i].found()) {
+    if (wrong && reasons[i].empty()) reasons[i] = wrong->reason;
+    if (reasons[i].empty()) {
       view.seen.corners = found.photos[i].view.corners;
       seen.push_back(std::move(view));
       continue;
     }
-    result.no_board.push_back({view.seen.photo, 0, unusable[i].empty() ? found.photos[i].reason : unusable[i]});
+    result.no_board.push_back({view.seen.photo, 0, reasons[i]});
     if (!unusable[i].empty()) result.unreadable.push_back(result.no_board.back());
   }
   result.measured = std::move(seen);
   result.counts.skipped = result.no_board;
+  return wrong;
 }
 
 }  // namespace
@@ -81,11 +107,16 @@ RigCalibration rig(std::vector<HeadView> views, const std::map<int, Camera>& cam
   result.config = config;
   result.counts.given = views.size();
   result.measured = std::move(views);
-  if (load_photo) find_board_corners(result, cameras, load_photo, progress);
+  std::optional<WrongBoard> wrong;
+  if (load_photo) wrong = find_board_corners(result, cameras, load_photo, progress);
   const auto calibrated = config.estimate_by_need ? calibrate_rig_by_need : calibrate_rig;
   static_cast<RigReport&>(result) =
       calibrated(result.measured, points_in_board(*config.board), cameras, config, progress);
   result.verdict = rig_verdict(result, config);
+  if (wrong) {
+    result.verdict.sentence = wrong->reason;
+    result.verdict.to_add = wrong->to_add;
+  }
   result.counts.used = static_cast<std::size_t>(result.views_used);
   result.counts.dropped = static_cast<std::size_t>(result.views_dropped);
   if (result.status != RigReport::Status::converged) return result;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <compare>
+#include <cstdio>
 #include <opencv2/imgproc.hpp>
 
 #include "alidade/board/dictionary.h"
@@ -138,6 +139,41 @@ Score score_of(const std::vector<cv::Mat>& photos, const Board& board, const Pro
   return score;
 }
 
+/// Where many photos show a whole grid of another size: the sentence for it; empty otherwise.
+std::string other_grid(std::span<const std::string> reasons, std::size_t num_found) {
+  std::size_t others = 0;
+  std::string example;
+  for (const std::string& reason : reasons) {
+    if (!reason.starts_with("a grid of ")) continue;
+    ++others;
+    example = reason;
+  }
+  if (others < 2 || 3 * others < num_found) return "";
+  return std::to_string(others) + " photos show " + example;
+}
+
+/// Sizes of the grids that photos of a chessboard show instead of it, as columns and rows: "a grid of 8×6 corners, not
+/// 9×6", "only 8×6 of 9×6 corners, …". None where the board is of another kind.
+std::optional<Sizes> grids_seen_in(std::span<const std::string> reasons, const Board& given) {
+  if (given.kind != BoardKind::chessboard) return std::nullopt;
+  constexpr std::ptrdiff_t min_photos = 2;
+  constexpr std::size_t max_sizes = 4;
+  Sizes all, seen;
+  for (const std::string& reason : reasons) {
+    std::pair<int, int> size;
+    if (std::sscanf(reason.c_str(), "a grid of %d×%d", &size.first, &size.second) != 2 &&
+        std::sscanf(reason.c_str(), "only %d×%d of", &size.first, &size.second) != 2)
+      continue;
+    all.push_back(size);
+  }
+  const std::ptrdiff_t needed = all.size() < 3 ? 1 : min_photos;
+  for (const auto& size : all) {
+    if (std::count(all.begin(), all.end(), size) < needed || seen.size() == max_sizes) continue;
+    if (std::find(seen.begin(), seen.end(), size) == seen.end()) seen.push_back(size);
+  }
+  return seen;
+}
+
 }  // namespace
 
 std::optional<Board> guess_board(std::size_t num_photos, const PhotoLoader& load_photo, const Board& given,
@@ -165,6 +201,22 @@ std::optional<Board> guess_board(std::size_t num_photos, const PhotoLoader& load
     }
   }
   return best;
+}
+
+std::optional<WrongBoard> wrong_board(std::span<const std::string> reasons, std::size_t num_found,
+                                      std::span<const std::size_t> in_vain, const PhotoLoader& load_photo,
+                                      const Board& given, const Progress& progress) {
+  const std::string grid = other_grid(reasons, num_found);
+  if (in_vain.empty() || (grid.empty() && 3 * num_found > in_vain.size())) return std::nullopt;
+  const auto load = [&](std::size_t i) { return load_photo(in_vain[i]); };
+  if (const auto meant = guess_board(in_vain.size(), load, given, grids_seen_in(reasons, given), progress)) {
+    const std::string with = given.dictionary.empty() ? "" : " with " + given.dictionary;
+    return WrongBoard{"the photos do not show the board as given, " + std::to_string(given.cols) + "×" +
+                          std::to_string(given.rows) + with,
+                      "use " + changed_options(given, *meant) + ": they show that board"};
+  }
+  if (grid.empty()) return std::nullopt;
+  return WrongBoard{grid, "check --board, which counts inner corners"};
 }
 
 std::string changed_options(const Board& given, const Board& meant) {

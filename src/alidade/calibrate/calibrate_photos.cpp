@@ -1,7 +1,6 @@
 #include "alidade/calibrate/calibrate_photos.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <utility>
@@ -70,65 +69,12 @@ std::vector<std::size_t> take_detections(BoardDetections&& found, PhotoCalibrati
   return in_vain;
 }
 
-/// Where many photos show a whole grid of another size, the few in which the asked one was seen are parts of that grid:
-/// no camera comes from a wrong board. The sentence for it; empty where the board is right.
-std::string wrong_board(const PhotoCalibration& result) {
-  std::size_t others = 0, found = 0;
-  std::string example;
-  for (std::size_t i = 0; i < result.views.size(); ++i) {
-    found += result.views[i].corners.empty() ? 0u : 1u;
-    if (!result.reasons[i].starts_with("a grid of ")) continue;
-    ++others;
-    example = result.reasons[i];
-  }
-  if (others < 2 || 3 * others < found) return "";
-  return std::to_string(others) + " photos show " + example;
-}
-
-/// Sizes of the grids that photos of a chessboard show instead of it, as columns and rows: "a grid of 8×6 corners, not
-/// 9×6", "only 8×6 of 9×6 corners, …". None where the board is of another kind.
-std::optional<std::vector<std::pair<int, int>>> grids_seen(const Board& given, const PhotoCalibration& result) {
-  if (given.kind != BoardKind::chessboard) return std::nullopt;
-  constexpr std::ptrdiff_t min_photos = 2;
-  constexpr std::size_t max_sizes = 4;
-  std::vector<std::pair<int, int>> all, seen;
-  for (const std::string& reason : result.reasons) {
-    std::pair<int, int> size;
-    if (std::sscanf(reason.c_str(), "a grid of %d×%d", &size.first, &size.second) != 2 &&
-        std::sscanf(reason.c_str(), "only %d×%d of", &size.first, &size.second) != 2)
-      continue;
-    all.push_back(size);
-  }
-  const std::ptrdiff_t needed = all.size() < 3 ? 1 : min_photos;
-  for (const auto& size : all) {
-    if (std::count(all.begin(), all.end(), size) < needed || seen.size() == max_sizes) continue;
-    if (std::find(seen.begin(), seen.end(), size) == seen.end()) seen.push_back(size);
-  }
-  return seen;
-}
-
-/// Where next to no photo shows the board as given: what is wrong, and the board that they do show.
-struct WrongBoard {
-  std::string reason, to_add;
-};
-
-/// `in_vain`: the photos that were searched and show no board.
+/// The board that the photos show where it is not the one given.
 std::optional<WrongBoard> given_wrongly(const std::vector<std::size_t>& in_vain, const PhotoLoader& load_photo,
                                         const Board& given, const Progress& progress, const PhotoCalibration& result) {
-  const std::string other_grid = wrong_board(result);
   const auto found = static_cast<std::size_t>(std::count_if(
       result.views.begin(), result.views.end(), [](const BoardView& view) { return !view.corners.empty(); }));
-  if (in_vain.empty() || (other_grid.empty() && 3 * found > in_vain.size())) return std::nullopt;
-  const auto load = [&](std::size_t i) { return load_photo(in_vain[i]); };
-  const auto meant = guess_board(in_vain.size(), load, given, grids_seen(given, result), progress);
-  if (meant) {
-    const std::string options = changed_options(given, *meant);
-    return WrongBoard{"the photos do not show the board as given, " + std::to_string(given.cols) + "×" +
-                          std::to_string(given.rows) + (given.dictionary.empty() ? "" : " with " + given.dictionary),
-                      "use " + options + ": they show that board"};
-  }
-  if (other_grid.empty()) return std::nullopt;
-  return WrongBoard{other_grid, "check --board, which counts inner corners"};
+  return wrong_board(result.reasons, found, in_vain, load_photo, given, progress);
 }
 
 /// Adds the corners of the first extraction that the second lost: where the lens model fits badly, the second starts

@@ -36,6 +36,17 @@ void add_lens(const RigHead& rig_head, const Eigen::MatrixXd& follows, std::vect
   if (has_cov) given.cov += follows * cov * follows.transpose();
 }
 
+/// A focal length that the observations half ask to be another may be that.
+void carry_asked(const SolvedMoving& solved, FocalScore& focal, Eigen::MatrixXd& cov) {
+  constexpr double hardly = 2.5;
+  const Camera& camera = solved.state.heads[focal.head].camera;
+  const VectorXd values = params(camera.lens);
+  if (camera.cov.rows() == values.size()) focal.given = std::sqrt(std::max(0.0, camera.cov(0, 0))) / values[0];
+  if (focal.sigmas() < hardly) return;
+  const VectorXd moved = solved.by_lens[focal.head].leftCols(2) * (focal.asked * values.head(2));
+  cov += moved * moved.transpose();
+}
+
 /// All positions follow the distance in proportion, seen from the camera that is fixed.
 void add_distance(const MovingProblem& problem, const SolvedMoving& solved, const KnownDistance& distance,
                   std::vector<Given>& all) {
@@ -74,11 +85,12 @@ void set_moves(const MovingProblem& problem, const SolvedMoving& solved, const E
 }  // namespace
 
 MovingGiven moving_given(const MovingProblem& problem, const SolvedMoving& solved, const MovingTargetConfig& config) {
-  MovingGiven given{{}, solved.cov};
+  MovingGiven given{{}, solved.cov, solved.focals};
   std::vector<Given> all;
   for (std::size_t h = 0; h < solved.state.heads.size(); ++h)
     if (problem.placed[h]) add_lens(solved.state.heads[h], solved.by_lens[h], all, given);
   if (config.distance) add_distance(problem, solved, *config.distance, all);
+  for (FocalScore& focal : given.focals) carry_asked(solved, focal, given.cov);
   for (Given& one : all) {
     set_moves(problem, solved, given.cov, one);
     given.assumed.push_back(std::move(one.what));

@@ -13,7 +13,10 @@ namespace alidade {
 /// What the placing of cameras was given: lenses and a distance, with what they do to it.
 struct MovingGiven {
   std::vector<Assumption> assumed;  ///< Moves in σ of `cov`, of the cameras' poses.
-  Eigen::MatrixXd cov;              ///< Of the shared parameters: the solver's, and lenses whose covariance is given.
+  /// Of the shared parameters: the solver's, lenses whose covariance is given, and focal lengths that the observations
+  /// half ask to be others.
+  Eigen::MatrixXd cov;
+  std::vector<FocalScore> focals;
 };
 [[nodiscard]] MovingGiven moving_given(const MovingProblem& problem, const SolvedMoving& solved,
                                        const MovingTargetConfig& config);

@@ -9,6 +9,7 @@
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/network/moving_clusters.h"
+#include "alidade/network/moving_focals.h"
 
 namespace alidade {
 namespace {
@@ -78,7 +79,7 @@ struct Solver {
 
   void add_fixed(PathSystem& system) const {
     for (std::size_t k = 1; k + 1 < state.path.control.size(); ++k) system.add_bend(state.path.control, k, bend_weight);
-    Eigen::VectorXd J = Eigen::VectorXd::Zero(problem.num_common());
+    Eigen::VectorXd J = Eigen::VectorXd::Zero(system.num_common());
     const Eigen::Vector3d apart =
         centre(state, problem, problem.scale_second) - centre(state, problem, problem.scale_first);
     for (const bool is_second : {false, true}) {
@@ -118,6 +119,28 @@ struct Solver {
       const double by = std::sqrt(weight(terms->r.squaredNorm() / (sigma * sigma))) / sigma;
       system.add(terms->at.first, by * terms->J_path, by * terms->r,
                  std::max<Eigen::Index>(0, problem.first_param(observation.head)), by * terms->J_common);
+    }
+    return system;
+  }
+
+  /// The same at the solution, with a relative change of each placed head's focal length behind the shared parameters.
+  [[nodiscard]] PathSystem system_with_focals() const {
+    std::vector<Eigen::Index> column(state.heads.size(), -1);
+    Eigen::Index num = problem.num_common();
+    for (std::size_t h = 0; h < column.size(); ++h)
+      if (problem.placed[h]) column[h] = num++;
+    PathSystem system(state.path.control.size(), num);
+    add_fixed(system);
+    for (std::size_t i = 0; i < problem.observations.size(); ++i) {
+      const SolvedObservation& observation = problem.observations[i];
+      const auto terms = used[i] ? observation_terms(problem, state, observation) : std::nullopt;
+      if (!terms) continue;
+      const double by = 1.0 / sigma_px[observation.head];
+      Eigen::MatrixXd J = Eigen::MatrixXd::Zero(2, num);
+      const Eigen::Index first = problem.first_param(observation.head);
+      if (first >= 0) J.middleCols(first, terms->J_common.cols()) = by * terms->J_common;
+      J.col(column[observation.head]) = by * J_px_focal(problem, state, observation, terms->at);
+      system.add(terms->at.first, by * terms->J_path, by * terms->r, 0, J);
     }
     return system;
   }
@@ -263,6 +286,9 @@ void finish(Solver& solver, SolvedMoving& solved) {
   solved.clusters = std::move(clusters.of_time);
   solved.block_s = clusters.block_s;
   solved.by_lens = std::move(clusters.by_lens);
+  PathSystem wide = solver.system_with_focals();
+  (void)wide.solve(0.0);  // singular where a focal length is not determined: of that each score says
+  solved.focals = focal_scores(solver.problem, solved, wide);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "alidade/estimation/progress.h"
 #include "alidade/network/observation_series.h"
 #include "alidade/network/path_spline.h"
+#include "alidade/network/report.h"
 #include "alidade/pantilt/head.h"
 
 namespace alidade {
@@ -57,6 +58,7 @@ struct SolvedMoving {
   ClusterCovariance clusters;            ///< Blocks of time.
   double block_s = 0.0;                  ///< Length of one.
   std::vector<Eigen::MatrixXd> by_lens;  ///< One per head: how the shared parameters follow its lens's.
+  std::vector<FocalScore> focals;        ///< Without what the files give.
   double chi2_per_dof = 0.0;
   int iterations = 0;
   bool converged = false;

@@ -217,6 +217,7 @@ void take_covariance(Placing& work, double scale, double sigma_scale) {
   MovingTargetReport& report = work.report;
   const MovingGiven given = moving_given(work.problem, work.solved, work.config);
   report.assumed = given.assumed;
+  report.focals = given.focals;
   report.rig.cov = of_heads(work, given.cov, scale);
   report.cov_model = of_heads(work, work.solved.cov_model, scale);
   const Eigen::Index num = report.rig.cov.rows();

@@ -103,6 +103,22 @@ void add_cameras(const MovingTargetReport& report, Verdict& verdict) {
   verdict.checks.push_back(agree);
 }
 
+/// The lens that the observations contradict most.
+void add_focals(const MovingTargetReport& report, Verdict& verdict) {
+  constexpr double limit = 4.2;  // as of a rig's causes
+  if (report.focals.empty()) return;
+  const FocalScore& most = *std::ranges::max_element(report.focals, {}, &FocalScore::sigmas);
+  const bool is_quiet = most.sigmas() < limit;
+  const std::string text = is_quiet ? "no focal length is asked to be another"
+                                    : "head " + std::to_string(report.cameras[most.head].id) +
+                                          ": the observations ask for a focal length " +
+                                          text_of(100.0 * std::abs(most.asked), 2) + " % " +
+                                          (most.asked > 0.0 ? "longer" : "shorter") + " than its camera file's, by " +
+                                          text_of(most.sigmas(), 2) + "σ: is the file of this lens at this zoom?";
+  verdict.checks.push_back(
+      {"focal lengths", is_quiet ? State::good : State::care, text, most.sigmas(), limit, "σ", ""});
+}
+
 void add_truth(const MovingTargetReport& report, Verdict& verdict) {
   if (!(report.truth_covered > 0.0)) return;
   verdict.checks.push_back({"true path", report.truth_covered > 0.9 ? State::good : State::care,
@@ -121,6 +137,7 @@ Verdict moving_target_verdict(const MovingTargetReport& report, const MovingTarg
                           "heads' numbers");
   if (report.status != PlacedStatus::placed) return refusal_by_status(report, config);
   Verdict verdict;
+  add_focals(report, verdict);  // what is wrong comes before what follows from it
   add_precision(report, verdict);
   add_cameras(report, verdict);
   add_truth(report, verdict);

@@ -40,6 +40,8 @@ class PathSystem {
   void add_bend(std::span<const Eigen::Vector3d> control, std::size_t k, double weight);
   void add_common(const Eigen::VectorXd& J_common, double r);
 
+  [[nodiscard]] Eigen::Index num_common() const { return common_.size(); }
+
   struct Step {
     Eigen::VectorXd path, common;
   };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
@@ -54,6 +55,14 @@ struct PlacedCamera {
   double rms_px = 0.0;                           ///< Per point, of the used observations.
 };
 
+/// By how much the observations ask a camera's focal length to change, all else following: a score test.
+struct FocalScore {
+  std::size_t head = 0;
+  double asked = 0.0, sigma = 0.0;  ///< Of the focal length, relative; errors over time go together.
+  std::optional<double> given;      ///< σ with which its file gives it.
+  [[nodiscard]] double sigmas() const { return std::abs(asked) / std::hypot(sigma, given.value_or(0.0)); }
+};
+
 struct MovingTargetReport {
   enum class Status {
     placed,
@@ -77,6 +86,7 @@ struct MovingTargetReport {
   double block_s = 0.0;             ///< Length of a block.
   std::string culprit;              ///< What is wrong with a camera, where that is found out; empty: nothing.
   std::vector<Assumption> assumed;  ///< Lenses and the distance.
+  std::vector<FocalScore> focals;   ///< One per located camera of which the observations determine it.
   double sigma_relative_m = 0.0, sigma_relative_rad = 0.0;  ///< Worst camera, in the first one's frame.
   /// With a true path: its clock (time of the rig by its own), and what is left after the similarity, over the path.
   CameraClock truth_clock;

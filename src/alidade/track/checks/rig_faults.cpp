@@ -11,13 +11,13 @@ namespace {
 
 /// An error that moves a ray within the plane of both rays changes only the range: it is unobservable, and a filter's
 /// apparent information about it comes from its own linearisation. Observable are the parameters across that plane:
-/// for heads side by side rotations about x or z, and vertical offsets.
+/// for heads side by side rotations about x or z, vertical offsets, and of a lens fy and cy.
 bool is_across(std::span<const RigHead> heads, Eigen::Index param) {
   const Eigen::Vector3d apart =
       heads.back().head.world_from_base.translation - heads.front().head.world_from_base.translation;
   const bool side_by_side = std::abs(apart.x()) >= std::abs(apart.y());
-  constexpr std::array<Eigen::Index, 7> vertical{1, 3, 5, 12, 16, 18, num_head_params + 1};
-  constexpr std::array<Eigen::Index, 7> horizontal{0, 4, 5, 13, 15, 17, num_head_params + 0};
+  constexpr std::array<Eigen::Index, 8> vertical{1, 3, 5, 12, 16, 18, num_head_params + 1, num_head_params + 3};
+  constexpr std::array<Eigen::Index, 8> horizontal{0, 4, 5, 13, 15, 17, num_head_params + 0, num_head_params + 2};
   return std::ranges::count(side_by_side ? vertical : horizontal, param) > 0;
 }
 

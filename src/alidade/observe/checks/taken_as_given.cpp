@@ -26,6 +26,7 @@ constexpr double ordinary_scale = 0.005, ordinary_mount_rad = 0.5 * degree, ordi
     ordinary_k1 = 0.02, ordinary_centre_px = 2.0, ordinary_curve_rad = 0.05 * degree,
                  ordinary_clock_rate = 0.001;  // 29.97 frames a second taken for 30
 constexpr const char* clock_cause = "clock rate";
+constexpr const char* curve_cause = "error of the angles within a turn";
 constexpr double bend_of_rates = 0.001;        // a gyroscope's scale differs so much from rate to rate
 const double slope_of_waves = std::sqrt(5.0);  // once and twice a turn, sine and cosine
 
@@ -42,7 +43,7 @@ const std::vector<Given>& givens() {
       {"mount", ordinary_mount_rad, nullptr, "--estimate mount", true},
       {"delay", ordinary_delay_s, nullptr, "--estimate delay", true},
       {"k1", ordinary_k1, &ObserveSetup::sigma_k1, "--estimate k1, or give a camera file with its covariance", true},
-      {"error of the angles within a turn", ordinary_curve_rad, nullptr, "--estimate curve", true, slope_of_waves},
+      {curve_cause, ordinary_curve_rad, nullptr, "--estimate curve", true, slope_of_waves},
       {clock_cause, ordinary_clock_rate, nullptr, "--estimate clock", true, 1.0}};
   return all;
 }
@@ -57,6 +58,18 @@ std::optional<double> given_sigma(const Given& given, const RotationLog& log, co
   if (given.config_sigma == &ObserveSetup::sigma_scale) return log.sigma_scale;
   if (given.config_sigma == &ObserveSetup::sigma_parallax) return log.sigma_parallax;
   return is_exact(log) ? std::optional(0.0) : std::nullopt;
+}
+
+/// Over so few degrees a wave of a turn is a straight line, another scale of the angles: that is listed already.
+bool is_straight_line(const RotationLog& log) {
+  constexpr double short_rad = 0.1;
+  if (log.source != RotationSource::head || log.rows.empty()) return false;
+  Eigen::Array3d low = log.rows.front().pan_tilt_roll_rad.array(), high = low;
+  for (const RotationRow& row : log.rows) {
+    low = low.min(row.pan_tilt_roll_rad.array());
+    high = high.max(row.pan_tilt_roll_rad.array());
+  }
+  return (high - low).maxCoeff() < short_rad;
 }
 
 /// What there ordinarily is of it beside the scale: of that a σ that is given counts as much already.
@@ -150,7 +163,7 @@ std::vector<Assumption> taken_as_given(const RotationLog& log, const ObserveSetu
   for (const Given& given : givens()) {
     const auto cause = std::find_if(report.causes.begin(), report.causes.end(),
                                     [&](const CauseScore& each) { return each.name == given.cause; });
-    if (cause == report.causes.end()) continue;
+    if (cause == report.causes.end() || (given.cause == curve_cause && is_straight_line(log))) continue;
     std::optional<double> sigma = given_sigma(given, log, config);
     const bool is_counted = !sigma && given.is_counted && !cause->members.empty();
     const double ordinary = ordinary_beside_scale(given, log, config);

@@ -87,6 +87,39 @@ TEST(HeadCalibrate, FollowsABoardInsteadOfPoints) {
   EXPECT_LT(3.0 * sigma, 0.02 * fx);
 }
 
+/// A head that is quicker than points can be followed is never seen to move evenly: its rests have to do.
+TEST(HeadCalibrate, OfAQuickHeadEachRestCounts) {
+  const std::string camera = std::string(camera_words) + "&fps=8&board=9:6:0.025:0.9:3:2";
+  const std::unique_ptr<HeadDevice> head = open_head("sim://?clock=free");  // 40°/s
+  const std::unique_ptr<FrameStream> stream = open_stream("sim://?" + camera, *head);
+  const HeadCalibration result = calibrate_head(
+      *head, *stream,
+      {.range = range_of(60, -20, 40), .max_s = 24.0, .board = Board{.cols = 9, .rows = 6, .square_m = 0.025}});
+  ASSERT_EQ(result.verdict.exit_code, ExitCode::ok) << result.verdict.sentence;
+  double sigma = 0.0;
+  const double fx = value_of(result.report, "fx", sigma);
+  EXPECT_LE(std::abs(fx - 350.0), 3.5 * sigma);
+  EXPECT_LT(3.0 * sigma, 0.02 * fx);
+}
+
+TEST(HeadCalibrate, KeepsAFewFramesOfEachRest) {
+  std::vector<HeadPosition> readings;
+  std::vector<SeenFrame> frames;
+  for (int i = 0; i < 300; ++i) {  // three rests of 2 s, and between them it is faster and faster for a second
+    const double t = 0.03 * i, begun = std::floor(t / 3.0), moved = std::max(0.0, t - 3.0 * begun - 2.0);
+    readings.push_back({t, 1e-4, Eigen::Vector2d(0.1 * (begun + moved * moved * moved), 0.0)});
+    if (i % 3 == 0) frames.push_back({t, {{1, {100.0, 100.0}}}});
+  }
+  const RotationLog log = turn_log(readings, frames, 0.0, 0.0);
+  std::array<int, 3> rows{};
+  for (const RotationRow& row : log.rows) {
+    const double rest = row.pan_tilt_roll_rad[0] / 0.1;
+    if (!row.px[0].allFinite() || std::abs(rest - std::round(rest)) > 1e-6) continue;
+    ++rows[static_cast<std::size_t>(std::lround(rest))];
+  }
+  for (const int of_a_rest : rows) EXPECT_EQ(of_a_rest, 6);
+}
+
 TEST(HeadCalibrate, NamesFyWhereTiltIsFixed) {
   const HeadCalibration result = calibrated("rate=8", {.range = range_of(60, 0, 0), .until = 0.001, .max_s = 14.0});
   EXPECT_EQ(result.verdict.exit_code, ExitCode::undetermined);

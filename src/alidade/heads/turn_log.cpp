@@ -109,7 +109,7 @@ std::optional<HeadLine> even_motion(std::span<const HeadPosition> readings, cons
 
 RotationLog turn_log(std::span<const HeadPosition> readings, std::span<const SeenFrame> frames, double late_s,
                      double origin_s) {
-  constexpr double before_s = 0.01;
+  constexpr double before_s = 0.01, same_place_rad = 1e-4;
   constexpr int max_at_rest = 6;
   RotationLog log;
   log.source = RotationSource::head;
@@ -118,13 +118,17 @@ RotationLog turn_log(std::span<const HeadPosition> readings, std::span<const See
   std::vector<SeenFrame> kept;
   std::vector<HeadLine> lines;
   int at_rest = 0;
+  Eigen::Vector2d rested_rad = Eigen::Vector2d::Constant(not_seen);
   for (const SeenFrame& frame : frames) {
     const double shown_s = frame.t_s - late_s;
     const auto line =
         even_motion(readings, manner, frame.t_s, std::min(frame.t_s, shown_s), std::max(frame.t_s, shown_s));
     if (!line || frame.points.empty()) continue;
     if (!kept.empty() && frame.t_s - kept.back().t_s < 3.0 * before_s) continue;
-    at_rest = line->rate_rad_s.isZero() ? at_rest + 1 : 0;
+    // Of each rest: what lies between two may all be of uneven motion.
+    const bool rests_on = line->rate_rad_s.isZero() && (line->pan_tilt_rad - rested_rad).norm() < same_place_rad;
+    at_rest = rests_on ? at_rest + 1 : line->rate_rad_s.isZero() ? 1 : 0;
+    rested_rad = line->rate_rad_s.isZero() ? line->pan_tilt_rad : Eigen::Vector2d::Constant(not_seen);
     if (at_rest > max_at_rest) continue;
     kept.push_back(frame);
     lines.push_back(*line);

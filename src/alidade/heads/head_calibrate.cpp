@@ -26,7 +26,12 @@ class Session {
  public:
   Session(MovingHead& head, FrameStream& stream, const HeadCalibrationConfig& config, const Progress& progress,
           HeadCalibration& result)
-      : head_(head), stream_(stream), config_(config), progress_(progress), result_(result), follower_(config.board) {
+      : head_(head),
+        stream_(stream),
+        config_(config),
+        progress_(progress),
+        result_(result),
+        follower_(config.board, head.device().clock().is_free()) {
     head_.on_reading = [this](const HeadPosition& reading) { readings_.push_back(reading); };
   }
   ~Session() { head_.on_reading = nullptr; }
@@ -47,6 +52,7 @@ class Session {
     result_.head_time_s = head_time();
     result_.sigma_clock_s = clock_sigma();
     estimate();
+    result_.num_skipped = follower_.num_skipped();
     result_.times = follower_.times();
     result_.sigma_frame_s = follower_.sigma_s();
     result_.num_jumps = follower_.stamps().is_jumping() ? follower_.stamps().num_jumps() : 0;
@@ -164,10 +170,11 @@ class Session {
     if (b.t_s - a.t_s > 0.05) rate_ = std::max(rate_, (b.pan_tilt_rad - a.pan_tilt_rad).norm() / (b.t_s - a.t_s));
   }
   /// A head that is quicker than points can be followed is sent ahead of itself piece by piece.
-  [[nodiscard]] double longest_piece() const {
+  [[nodiscard]] double longest_piece() {
     const double max_px_per_frame = 0.035 * result_.width_px;
     const double span_s = last_frame_s_ - begin_s_;
-    const double fps = span_s > 0.3 ? std::clamp(static_cast<double>(result_.num_frames) / span_s, 1.0, 60.0) : 10.0;
+    const auto followed = static_cast<double>(result_.num_frames - follower_.num_skipped());
+    const double fps = span_s > 0.3 ? std::clamp(followed / span_s, 1.0, 60.0) : 10.0;
     const double f_px = focal_px_ > 0.0 ? focal_px_ : 1.1 * result_.width_px;
     const double max_rate = max_px_per_frame * fps / f_px;
     return rate_ > max_rate ? max_rate * piece_s : 1e9;

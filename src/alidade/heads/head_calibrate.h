@@ -32,6 +32,7 @@ struct HeadCalibration {
   std::string url, stream;
   int width_px = 0, height_px = 0;
   std::size_t num_frames = 0, num_moves = 0;
+  std::size_t num_skipped = 0;  ///< Of the frames: points in them would have been followed behind time.
   FrameTimes times = FrameTimes::arrival;
   double sigma_frame_s = 0.0;  ///< Of a frame's time, but for what all are late alike.
   std::size_t num_jumps = 0;   ///< Of time stamps, which therefore were not used; 0: they were, or there are none.

@@ -18,6 +18,8 @@ class HeadClock {
   virtual ~HeadClock() = default;
   [[nodiscard]] virtual double now_s() const = 0;  ///< Seconds since 1970.
   virtual void wait_until(double t_s) = 0;
+  /// It stands while nobody waits: who is slow is never late.
+  [[nodiscard]] virtual bool is_free() const { return false; }
 };
 
 /// The machine's: steady from the first call on, so that a clock that is set does not jump in a run.

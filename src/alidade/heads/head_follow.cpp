@@ -130,18 +130,32 @@ class Follower {
     }
   }
 
+  /// How many frames can be looked at before the next command: the newest.
+  [[nodiscard]] std::size_t in_time() const {
+    constexpr double share = 0.5, most = 3.0;
+    return static_cast<std::size_t>(std::clamp(share * result_.period_s / std::max(look_s_, 1e-6), 1.0, most));
+  }
   /// Frames that came, once the head's angles at their times are known.
   void look() {
     constexpr double old_s = 0.5;
+    std::deque<std::pair<StreamFrame, Eigen::Vector2d>> known;
     const double lost_s = 2.0 + 2.0 * stream_.exposure_s();
     while (!waiting_.empty()) {
-      const StreamFrame& frame = waiting_.front();
-      const double shown_s = frame.t_s + config_.delay_s;
+      const double shown_s = waiting_.front().t_s + config_.delay_s;
       const std::optional<Eigen::Vector2d> angles = angles_at(shown_s);
       if (!angles && shown_s > read_s_ - old_s) break;
-      if (angles && waiting_.size() < 4)
-        see(frame, shown_s, *angles);  // those that cannot be looked at in time are left
+      if (angles) known.emplace_back(std::move(waiting_.front()), *angles);
+      result_.num_skipped += angles ? 0 : 1;
       waiting_.pop_front();
+    }
+    const std::size_t late = known.size() - std::min(known.size(), in_time());
+    result_.num_skipped += late;
+    known.erase(known.begin(), known.begin() + static_cast<std::ptrdiff_t>(late));
+    for (const auto& [frame, angles] : known) {
+      const double begin_s = head_.now_s();
+      see(frame, frame.t_s + config_.delay_s, angles);
+      constexpr double newest = 0.3;
+      look_s_ += newest * (head_.now_s() - begin_s - look_s_);
     }
     if (head_.now_s() - last_frame_s_ < lost_s) return;
     head_.stop();
@@ -220,6 +234,7 @@ class Follower {
   double read_s_ = 0.0;
   std::deque<StreamFrame> waiting_;
   double begin_s_ = 0.0, last_frame_s_ = 0.0, sum_age_s_ = 0.0, given_s_ = 0.0;
+  double look_s_ = 0.0;  ///< What a frame takes.
   std::size_t num_ages_ = 0;
   bool is_following_ = false;
 };

@@ -57,6 +57,7 @@ struct HeadFollowing {
   std::string url, stream;
   std::vector<FollowedFrame> frames;
   std::size_t num_commands = 0;
+  std::size_t num_skipped = 0;  ///< Frames that were not looked at: newer ones had come.
   double head_time_s = 0.0;
   double rms_px = 0.0, max_px = 0.0, central_third = 0.0;  ///< From the first third of the time on.
   double period_s = 0.0, image_age_s = 0.0;                ///< Between commands; of the newest image at a command.

@@ -18,6 +18,7 @@ class FreeClock final : public HeadClock {
  public:
   [[nodiscard]] double now_s() const override { return now_s_; }
   void wait_until(double t_s) override { now_s_ = std::max(now_s_, t_s); }
+  [[nodiscard]] bool is_free() const override { return true; }
 
  private:
   double now_s_ = 1.7e9;

@@ -33,6 +33,7 @@ axes.*.
 stream           text   of the camera
 frame_times      text   stamped by who took them, or of their arrival
 frames           count  that came
+frames_skipped   count  not looked at: newer ones had come
 moves            count  of the head
 offline[]        text   words behind `alidade` that give the same numbers, where log.csv is
 mount_x_rad      rad    rotation vector of cam_from_tilt

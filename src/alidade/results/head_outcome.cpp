@@ -177,6 +177,10 @@ std::string rig_file_text(const HeadCalibration& calibration) {
   Eigen::Vector3d mount = Eigen::Vector3d::Zero();
   double delay_s = 0.0;
   for (const ObservedQuantity& each : calibration.report.quantities) {
+std::string skipped_text(std::size_t skipped) {
+  return skipped == 0 ? "" : fmt::format(" ({} skipped: newer ones had come)", skipped);
+}
+
     if (each.name == "mount_x_rad") mount[0] = each.value;
     if (each.name == "mount_y_rad") mount[1] = each.value;
     if (each.name == "mount_z_rad") mount[2] = each.value;
@@ -201,6 +205,7 @@ JobOutcome outcome_of(const HeadCalibration& calibration) {
   document.command = "head";
   document.verdict = calibration.verdict;
   std::erase_if(outcome.files, [](const NamedBytes& file) { return file.name != "camera.yaml"; });
+  estimate["frames_skipped"] = calibration.num_skipped;
   const bool has_camera = !outcome.files.empty();
   outcome.files.push_back({"log.csv", calibration.log_csv});
   if (has_camera) outcome.files.push_back({"rig.yaml", rig_file_text(calibration)});
@@ -220,8 +225,9 @@ JobOutcome outcome_of(const HeadCalibration& calibration) {
   estimate["moves"] = calibration.num_moves;
   std::string words = "alidade";
   for (const std::string& word : calibration.offline) words += " " + word;
-  outcome.lines.push_back(fmt::format("{} moves, {} frames, {:.0f} s; off line: {}", calibration.num_moves,
-                                      calibration.num_frames, calibration.head_time_s, words));
+  outcome.lines.push_back(fmt::format("{} moves, {} frames{}, {:.0f} s; off line: {}", calibration.num_moves,
+                                      calibration.num_frames, skipped_text(calibration.num_skipped),
+                                      calibration.head_time_s, words));
   outcome.lines.push_back("delay_s: a frame shows the angles of so much later than its time; below zero: earlier");
   return outcome;
 }
@@ -256,6 +262,7 @@ std::vector<NamedBytes> files_so_far(const HeadFollowing& following) {
                                         frame.target_rad[0], frame.target_rad[1], frame.error_px.norm())
                           : std::string(",,,,,");
     csv += frame.asked_rad ? fmt::format(",{:.9f},{:.9f}\n", (*frame.asked_rad)[0], (*frame.asked_rad)[1])
+  estimate["frames_skipped"] = following.num_skipped;
                            : std::string(",,\n");
   }
   return {{"follow.csv", std::move(csv)}};
@@ -280,8 +287,9 @@ JobOutcome outcome_of(const HeadFollowing& following) {
   document.counts.used = static_cast<std::size_t>(std::ranges::count_if(following.frames, &FollowedFrame::is_found));
   document.counts.dropped = document.counts.given - document.counts.used;
   outcome.files = files_so_far(following);
-  outcome.lines.push_back(fmt::format("{} frames, {} commands; from a third of the time on {:.3g} px RMS",
-                                      following.frames.size(), following.num_commands, following.rms_px));
+  outcome.lines.push_back(fmt::format("{} frames{}, {} commands; from a third of the time on {:.3g} px RMS",
+                                      following.frames.size(), skipped_text(following.num_skipped),
+                                      following.num_commands, following.rms_px));
   if (following.forecast)
     outcome.lines.push_back(fmt::format("servo predicts {:.3g} px RMS for this head, these delays and this target",
                                         following.forecast->rms_px));

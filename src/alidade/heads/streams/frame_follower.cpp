@@ -33,7 +33,7 @@ void FrameFollower::push(StreamFrame frame) {
     times_ = frame.times;
     sigma_s_ = frame.sigma_s;
     arrivals_.push_back({frame.t_s, frame.came_s, stamps_.piece(), stamps_.came_in_turn()});
-    waiting_.push_back(std::move(frame));
+    waiting_.push_back({std::move(frame), arrivals_.size() - 1});
   }
   changed_.notify_all();
 }
@@ -43,7 +43,7 @@ std::vector<SeenFrame> FrameFollower::timed() const {
   std::vector<SeenFrame> frames = seen_;
   if (!stamps_.is_jumping()) return frames;
   const PiecedTimes times = pieced_times(arrivals_);
-  for (std::size_t i = 0; i < frames.size(); ++i) frames[i].t_s = times.t_s[i];
+  for (std::size_t i = 0; i < frames.size(); ++i) frames[i].t_s = times.t_s[numbers_[i]];
   std::erase_if(frames, [](const SeenFrame& frame) { return std::isnan(frame.t_s); });
   return frames;
 }
@@ -61,6 +61,18 @@ std::vector<SeenFrame> FrameFollower::seen_so_far() {
   return timed();
 }
 
+std::size_t FrameFollower::num_skipped() {
+  const std::scoped_lock lock(mutex_);
+  return num_skipped_;
+}
+
+void FrameFollower::skip_what_is_late() {
+  constexpr double behind_s = 0.3;  // what a network sends in one piece is no delay
+  if (keeps_all_ || waiting_.back().frame.came_s - waiting_.front().frame.came_s < behind_s) return;
+  num_skipped_ += waiting_.size() - 1;
+  waiting_.erase(waiting_.begin(), waiting_.end() - 1);
+}
+
 /// Of a board all corners or none, by their numbers: of a part nobody could say which they are.
 std::vector<TrackedPoint> FrameFollower::points_in(const cv::Mat& grey) {
   if (!board_) return tracker_.update(grey);
@@ -75,14 +87,16 @@ void FrameFollower::work() {
   for (;;) {
     changed_.wait(lock, [this] { return ends_ || !waiting_.empty(); });
     if (ends_) return;
-    const StreamFrame frame = std::move(waiting_.front());
+    skip_what_is_late();
+    const Waiting next = std::move(waiting_.front());
     waiting_.pop_front();
     is_busy_ = true;
     lock.unlock();
-    SeenFrame seen{frame.t_s, points_in(grey_of(*frame.image))};
+    SeenFrame seen{next.frame.t_s, points_in(grey_of(*next.frame.image))};
     lock.lock();
     is_busy_ = false;
     seen_.push_back(std::move(seen));
+    numbers_.push_back(next.number);
     changed_.notify_all();
   }
 }

@@ -7,6 +7,7 @@
 #include "alidade/files/files.h"
 #include "alidade/geometry/degree.h"
 #include "alidade/geometry/so3.h"
+#include "alidade/heads/head_identify.h"
 
 // A target that goes to and fro before a head and a camera that are simulated, in a time of their own.
 
@@ -22,6 +23,15 @@ RigHead true_rig(const SimulatedCamera& camera) {
   rig.camera.lens = lens;
   rig.head.cam_from_tilt = exp_so3(camera.mount_rad);
   return rig;
+}
+
+PositionerParams params_of(const PositionerFit& fit) {
+  return {.rate_rad_s = fit.rate.value,
+          .acceleration_rad_s2 = fit.acceleration.value,
+          .time_constant_s = fit.time_constant.value,
+          .latency_s = fit.latency.value,
+          .backlash_rad = fit.backlash.value,
+          .dead_band_rad = fit.dead_band.value};
 }
 
 HeadFollowing followed(const std::string& head_words, const std::string& camera_words, const HeadFollowConfig& config) {
@@ -42,6 +52,21 @@ TEST(HeadFollow, DoesAsWellAsServoPredicts) {
   // 26 px, for half a second in three; at rest the head would lose it.
   EXPECT_LT(result.max_px, 35.0);
   EXPECT_EQ(result.central_third, 1.0);
+}
+
+/// Identified first, as a user does it: 100 ms late, a target at 10°/s.
+TEST(HeadFollow, DoesAsWellAsServoPredictsForTheIdentifiedHead) {
+  const std::string words = "rate=40&latency=0.1";
+  const std::unique_ptr<HeadDevice> device = open_head("sim://?clock=free&" + words);
+  const HeadIdentification identified = identify_head(*device);
+  ASSERT_TRUE(identified.verdict.ok()) << identified.verdict.sentence;
+  HeadFollowConfig config{.max_s = 12.0, .delay_s = -0.04};
+  for (std::size_t i = 0; i < 2; ++i) config.axes[i] = params_of(identified.axes[i]);
+  const HeadFollowing result = followed(words, "fps=20&mount=1:-2:3&delay=0.04&target=10:5:-4:20:1.2", config);
+  EXPECT_TRUE(result.verdict.ok()) << result.verdict.sentence;
+  ASSERT_TRUE(result.forecast.has_value());
+  EXPECT_LT(result.rms_px, 1.3 * result.forecast->rms_px);
+  EXPECT_GT(result.rms_px, 0.5 * result.forecast->rms_px);  // a prediction that says something
 }
 
 TEST(HeadFollow, FollowsWithAHeadOfWhichLittleIsKnown) {

@@ -48,8 +48,10 @@ void add_identify(App& app) {
                    "  alidade simulate servo --chirp --out sim && alidade identify sim/log.csv\n"},
       [args](Run& run) { return run_identify(*args, run); });
   command
-      .add_option("log", args->log,
-                  "CSV: t_s,command,angle_rad (or angle_deg): the command from that time on, the angle read at it")
+      .add_option(
+          "log", args->log,
+          "CSV: t_s,command,angle_rad (or angle_deg): the command from that time on, or from command_t_s on where "
+          "that is a column, the angle read at it")
       ->required();
   app.add_fields(command, fields_of(*args));
 }

@@ -286,6 +286,10 @@ TEST_F(IdentifyCommand, SaysWhatIsWrongWithItsLog) {
   expect(3, header + "0,1e300,0\n", "1e300");
   expect(3, header + "0,0,1e9\n", "is no angle of a servo");
   expect(4, header + "0,0,0\n0.1,1,0\n", "too few");
+  const std::string timed = "t_s,command,angle_rad,command_t_s\n";
+  expect(3, timed + "0,0,0,0\n0.1,1,0,0.2\n", "bad.csv:3: column 'command_t_s': '0.2' is not between");
+  expect(3, timed + "0,0,0,0\n0.1,1,0,-0.1\n", "is not between the row before it and t_s");
+  expect(3, timed + "0,0,0,nan\n", "'nan' is not a finite number");
   std::string still = header, flat = header;
   for (int i = 0; i < 100; ++i) {
     const std::string t = std::to_string(0.01 * i);

@@ -21,6 +21,8 @@ void require_sense(const std::vector<ServoSample>& log) {
       throw ConfigError(where + "its time and command must be finite, and no larger than 1e12");
     if (!(std::abs(row.angle_rad) <= max_angle_rad)) throw ConfigError(where + "is no angle of a servo");
     if (i > 0 && !(row.t_s > log[i - 1].t_s)) throw ConfigError(where + "its time is not after the row before it");
+    if (row.command_t_s > row.t_s || (i > 0 && row.command_t_s < log[i - 1].t_s) || std::isinf(row.command_t_s))
+      throw ConfigError(where + "its command was not given between the row before it and its own time");
   }
 }
 

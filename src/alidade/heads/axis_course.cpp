@@ -5,7 +5,7 @@
 namespace alidade {
 namespace {
 
-constexpr double model_step_s = 1e-3, course_step_s = 5e-3, kept_s = 2.0;
+constexpr double course_step_s = 5e-3, kept_s = 2.0;
 
 /// A value between two points of a course.
 template <typename Point, typename Value>
@@ -18,8 +18,7 @@ std::optional<double> between(const std::deque<Point>& course, double t_s, const
 
 }  // namespace
 
-AxisCourse::AxisCourse(const PositionerParams& axis, double start_rad, double t_s)
-    : model_(axis, start_rad, t_s, model_step_s) {}
+AxisCourse::AxisCourse(const PositionerParams& axis, double start_rad, double t_s) : model_(axis, start_rad, t_s) {}
 
 void AxisCourse::advance(double t_s) {
   while (model_.time_s() < t_s) {

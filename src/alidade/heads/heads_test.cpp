@@ -8,6 +8,8 @@
 #include "alidade/heads/head_identify.h"
 #include "alidade/heads/protocols/line_socket.h"
 #include "alidade/heads/simulated_head.h"
+#include "alidade/servo/identify/identify.h"
+#include "alidade/servo/identify/identify_flaws.h"
 
 // Heads that are simulated in a time of their own: truth is the plant's.
 
@@ -72,6 +74,40 @@ TEST(Heads, IdentifiedWithinThreeSigma) {
       EXPECT_NEAR(axis.resolution.value, truth.step_rad, 0.05 * truth.step_rad) << plant;
       EXPECT_EQ(axis.backlash.is_asked_for, truth.axis.backlash_rad > 0.0) << plant;
     }
+  }
+}
+
+/// Of their logs `alidade identify` has the same model, without what the experiment knows: where it rested, and what
+/// the readings' steps and times are worth.
+TEST(Heads, IdentifyFindsTheSameAxisInTheirLogs) {
+  for (const std::string plant :
+       {"rate=33&accel=210&tau=0.07&latency=0.05&backlash=0.2&step=0.01",
+        "rate=55&accel=150&tau=0.1&latency=0.02&step=0.02", "rate=12&accel=300&tau=0.05&latency=0.1&step=0.01"}) {
+    const SimulatedHeadConfig truth = simulated_head_config(plant, "test");
+    const std::unique_ptr<HeadDevice> head = open_head("sim://?clock=free&" + plant);
+    const HeadIdentification by_head = identify_head(*head);
+    const std::vector<ServoSample> log = servo_samples(by_head.logs[0]);
+    const ServoIdentification identified = identify_servo(log);
+    const ServoFit& fit = identified.fit;
+    EXPECT_EQ(fit.kind, ServoKind::angle) << plant;
+    EXPECT_EQ(identify_verdict(log, identified).exit_code, ExitCode::ok) << plant;
+    const auto near = [&](double value, double sigma, double right, double least, const std::string& what) {
+      EXPECT_LE(std::abs(value - right), std::max(3.0 * sigma, least)) << plant << " " << what << ": " << value;
+    };
+    const auto sigma_of = [&](int param) { return std::sqrt(fit.cov(param, param)); };
+    near(fit.params[ServoParam::gain], sigma_of(ServoParam::gain), 1.0, 0.0, "gain");
+    near(fit.params[ServoParam::tau], sigma_of(ServoParam::tau), truth.axis.time_constant_s, 0.0, "time constant");
+    near(fit.params[ServoParam::latency], sigma_of(ServoParam::latency), truth.axis.latency_s, 0.0, "latency");
+    const std::array<std::pair<std::size_t, double>, 3> flaws{
+        {{ServoFlaw::rate_limit, truth.axis.rate_rad_s},
+         {ServoFlaw::acceleration_limit, truth.axis.acceleration_rad_s2},
+         {ServoFlaw::backlash, truth.axis.backlash_rad}}};
+    for (const auto& [flaw, right] : flaws) {
+      EXPECT_EQ(std::ranges::count(fit.freed, flaw), right > 0.0 ? 1 : 0) << plant << servo_flaw_names[flaw];
+      near(fit.flaws.*servo_flaws[flaw], fit.flaw_sigma[flaw], right, 0.0, servo_flaw_names[flaw]);
+    }
+    EXPECT_LT(fit.rms_rad, 1.2 * by_head.axes[0].rms_rad) << plant;
+    EXPECT_LT(fit.rms_rad, 0.01 * identified.other.rms_rad) << plant;
   }
 }
 

@@ -17,14 +17,20 @@ struct PositionerParams {
   double dead_band_rad = 0.0;        ///< At rest, a target that is no farther does nothing.
 };
 
-inline constexpr double usual_positioner_step_s = 0.25e-3;
+struct DriveMotion {
+  double angle_rad = 0.0, rate_rad_s = 0.0;
+};
 
-/// The axis in time. A command acts `latency_s` after it was given; the wanted rate is the largest from which the drive
-/// can brake at its acceleration, or what is left over the time constant where that is less; the rate follows it within
-/// the acceleration. Integrated in steps of `step_s` that begin where a command begins to act.
+/// The next piece of a drive's motion towards `goal_rad`, at most `dt_s` of it; returns how long it lasted. The wanted
+/// rate is the largest from which the drive can brake at its acceleration, or what is left over the time constant where
+/// that is less; the rate follows it within the acceleration. A piece has one acceleration, the largest rate or the lag
+/// at the end, in closed form, and does not turn back.
+[[nodiscard]] double advance_drive(const PositionerParams& params, double goal_rad, double dt_s, DriveMotion& motion);
+
+/// The axis in time. A command acts `latency_s` after it was given.
 class Positioner {
  public:
-  Positioner(const PositionerParams& params, double start_rad, double t_s, double step_s = usual_positioner_step_s);
+  Positioner(const PositionerParams& params, double start_rad, double t_s);
 
   /// Commands in order of time.
   void go_to(double t_s, double target_rad);
@@ -35,7 +41,7 @@ class Positioner {
   void advance(double t_s);
 
   [[nodiscard]] double output_rad() const { return output_; }
-  [[nodiscard]] double motor_rad() const { return motor_; }
+  [[nodiscard]] double motor_rad() const { return motor_.angle_rad; }
   [[nodiscard]] bool is_at_rest() const { return is_at_rest_ && waiting_.empty(); }
   [[nodiscard]] double time_s() const { return t_; }
 
@@ -45,11 +51,13 @@ class Positioner {
     bool is_stop;
   };
   void act(const Waiting& command);
-  void step(double dt_s);
+  void move(double until_s);
+  void come_to_rest();
 
   PositionerParams params_;
   std::deque<Waiting> waiting_;
-  double step_s_, t_, target_, motor_, output_, rate_ = 0.0;
+  double t_, target_, output_;
+  DriveMotion motor_;
   bool is_at_rest_ = true, is_stopping_ = false;
 };
 
@@ -58,10 +66,9 @@ struct PositionCommand {
   double t_s = 0.0, target_rad = 0.0;
 };
 
-/// Output of an axis that rests at `start_rad`, at ascending times; between the steps in a straight line.
+/// Output of an axis that rests at `start_rad`, at ascending times.
 [[nodiscard]] std::vector<double> positioner_response(const PositionerParams& params, double start_rad,
                                                       std::span<const PositionCommand> commands,
-                                                      std::span<const double> times_s,
-                                                      double step_s = usual_positioner_step_s);
+                                                      std::span<const double> times_s);
 
 }  // namespace alidade

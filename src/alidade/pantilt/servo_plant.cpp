@@ -4,22 +4,19 @@
 #include <cmath>
 #include <numbers>
 
+#include "alidade/pantilt/positioner.h"
+
 namespace alidade {
 namespace {
 
-/// The rate from which it can still brake, within its acceleration: as `Positioner`.
-AxisMotion braking(const AnglePlant& plant, AxisMotion motion, double goal, double dt_s) {
-  constexpr double longest_step_s = 0.5e-3;
-  const double a = plant.max_acceleration_rad_s2, bend = a * plant.tau_s * plant.tau_s;
-  const double steps = std::max(1.0, std::ceil(dt_s / longest_step_s)), step_s = dt_s / steps;
-  for (double k = 0.0; k < steps; ++k) {
-    const double missing = goal - motion.angle_rad, left = std::abs(missing);
-    const double most = left <= bend ? left / plant.tau_s : std::sqrt(2.0 * a * (left - 0.5 * bend));
-    const double wanted = std::copysign(std::min(plant.max_rate_rad_s, most), missing);
-    motion.rate_rad_s += std::clamp(wanted - motion.rate_rad_s, -a * step_s, a * step_s);
-    motion.angle_rad += motion.rate_rad_s * step_s;
-  }
-  return motion;
+/// As a `Positioner`'s drive.
+AxisMotion braking(const AnglePlant& plant, const AxisMotion& motion, double goal, double dt_s) {
+  const PositionerParams params{.rate_rad_s = plant.max_rate_rad_s,
+                                .acceleration_rad_s2 = plant.max_acceleration_rad_s2,
+                                .time_constant_s = plant.tau_s};
+  DriveMotion drive{motion.angle_rad, motion.rate_rad_s};
+  for (double left_s = dt_s; left_s > 0.0;) left_s -= advance_drive(params, goal, left_s, drive);
+  return {drive.angle_rad, drive.rate_rad_s};
 }
 
 /// Two phases: as fast as possible until the lag requires less, then the lag.

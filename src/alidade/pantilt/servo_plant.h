@@ -71,8 +71,8 @@ struct AxisMotion {
   double rate_rad_s = 0.0;  ///< Of an angle plant without a limit of its acceleration: mean over the last step.
 };
 
-/// The plant of an axis dt ≥ 0 later under a constant command that acts at once. Closed form, exact for any dt, but
-/// for an angle plant with a limit of its acceleration: in steps of half a millisecond. At a stop the axis stands
+/// The plant of an axis dt ≥ 0 later under a constant command that acts at once. Closed form, exact for any dt, for an
+/// angle plant with a limit of its acceleration piece by piece (`advance_drive`). At a stop the axis stands
 /// still.
 [[nodiscard]] AxisMotion advanced(const ServoAxis& axis, const AxisMotion& motion, double command, double dt_s);
 

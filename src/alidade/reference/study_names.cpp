@@ -54,6 +54,7 @@ max_acceleration_rad_s2 rad/s² limit of the acceleration
 dead_band               1      commands no larger do nothing
 backlash_rad            rad    between drive and encoder
 second_tau_s            s      second lag, of the command
+evidence.*              1      of each of these: 2 ln of the likelihood ratio for it
 encoder_step_rad        rad    one count
 design_effect           1      how much less the rows determine than if each erred by itself
 correlated_rows         count  how long errors last

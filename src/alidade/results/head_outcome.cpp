@@ -11,28 +11,12 @@
 #include "alidade/geometry/so3.h"
 #include "alidade/results/documents/follow_document.h"
 #include "alidade/results/observe_outcome.h"
+#include "alidade/tables/servo_log_file.h"
 
 namespace alidade {
 namespace {
 
 std::vector<double> numbers_of(const Eigen::Vector2d& both) { return {both[0], both[1]}; }
-
-/// t_s,command,angle_rad, as `alidade identify` reads it: the command that was given last.
-std::string servo_log_csv(const PositionerLog& log) {
-  std::string csv = "t_s,command,angle_rad\n";
-  if (log.readings.empty()) return csv;
-  const double begin_s = log.readings.front().t_s;
-  double command = log.readings.front().angle_rad, last_s = -1.0;
-  std::size_t next = 0;
-  for (const PositionerReading& reading : log.readings) {
-    while (next < log.commands.size() && log.commands[next].t_s <= reading.t_s)
-      command = log.commands[next++].target_rad;
-    if (reading.t_s - begin_s <= last_s) continue;
-    last_s = reading.t_s - begin_s;
-    csv += fmt::format("{:.6f},{:.9f},{:.9f}\n", last_s, command, reading.angle_rad);
-  }
-  return csv;
-}
 
 /// Of what a short log does not show the fit's σ is without end: such a value is omitted.
 bool is_determined(const PositionerValue& value, std::size_t which) {
@@ -120,7 +104,7 @@ JobOutcome outcome_of(const HeadIdentification& identified) {
   document.estimate["head_time_s"] = identified.head_time_s;
   for (std::size_t i = 0; i < 2; ++i) {
     const std::string name = head_axis_names[i];
-    outcome.files.push_back({name + ".csv", servo_log_csv(identified.logs[i])});
+    outcome.files.push_back({name + ".csv", servo_log_csv(servo_samples(identified.logs[i]))});
     if (identified.axes[i].status != PositionerFit::Status::ok) continue;
     fill_axis(identified.axes[i], name, document);
     tell_axis(identified.axes[i], name, outcome.lines);
@@ -177,10 +161,6 @@ std::string rig_file_text(const HeadCalibration& calibration) {
   Eigen::Vector3d mount = Eigen::Vector3d::Zero();
   double delay_s = 0.0;
   for (const ObservedQuantity& each : calibration.report.quantities) {
-std::string skipped_text(std::size_t skipped) {
-  return skipped == 0 ? "" : fmt::format(" ({} skipped: newer ones had come)", skipped);
-}
-
     if (each.name == "mount_x_rad") mount[0] = each.value;
     if (each.name == "mount_y_rad") mount[1] = each.value;
     if (each.name == "mount_z_rad") mount[2] = each.value;
@@ -197,6 +177,10 @@ std::string skipped_text(std::size_t skipped) {
              delay_s);
 }
 
+std::string skipped_text(std::size_t skipped) {
+  return skipped == 0 ? "" : fmt::format(" ({} skipped: newer ones had come)", skipped);
+}
+
 }  // namespace
 
 JobOutcome outcome_of(const HeadCalibration& calibration) {
@@ -205,7 +189,6 @@ JobOutcome outcome_of(const HeadCalibration& calibration) {
   document.command = "head";
   document.verdict = calibration.verdict;
   std::erase_if(outcome.files, [](const NamedBytes& file) { return file.name != "camera.yaml"; });
-  estimate["frames_skipped"] = calibration.num_skipped;
   const bool has_camera = !outcome.files.empty();
   outcome.files.push_back({"log.csv", calibration.log_csv});
   if (has_camera) outcome.files.push_back({"rig.yaml", rig_file_text(calibration)});
@@ -222,6 +205,7 @@ JobOutcome outcome_of(const HeadCalibration& calibration) {
   estimate["frame_time_sigma_s"] = calibration.sigma_frame_s;
   estimate["time_stamp_jumps"] = calibration.num_jumps;
   estimate["frames"] = calibration.num_frames;
+  estimate["frames_skipped"] = calibration.num_skipped;
   estimate["moves"] = calibration.num_moves;
   std::string words = "alidade";
   for (const std::string& word : calibration.offline) words += " " + word;
@@ -262,7 +246,6 @@ std::vector<NamedBytes> files_so_far(const HeadFollowing& following) {
                                         frame.target_rad[0], frame.target_rad[1], frame.error_px.norm())
                           : std::string(",,,,,");
     csv += frame.asked_rad ? fmt::format(",{:.9f},{:.9f}\n", (*frame.asked_rad)[0], (*frame.asked_rad)[1])
-  estimate["frames_skipped"] = following.num_skipped;
                            : std::string(",,\n");
   }
   return {{"follow.csv", std::move(csv)}};
@@ -279,6 +262,7 @@ JobOutcome outcome_of(const HeadFollowing& following) {
   estimate["stream"] = following.stream;
   estimate["head_time_s"] = following.head_time_s;
   estimate["commands"] = following.num_commands;
+  estimate["frames_skipped"] = following.num_skipped;
   estimate["rms_px"] = following.rms_px;
   estimate["max_px"] = following.max_px;
   estimate["central_third"] = following.central_third;

@@ -40,6 +40,7 @@ void fill_flaws(const Identification& identified, ResultDocument& document) {
   for (const std::size_t flaw : fit.freed) {
     document.estimate[servo_flaw_names[flaw]] = fit.flaws.*servo_flaws[flaw];
     document.stddev[servo_flaw_names[flaw]] = fit.is_observable ? fit.flaw_sigma[flaw] : std::nan("");
+    document.estimate["evidence"][servo_flaw_names[flaw]] = fit.flaw_evidence[flaw];
   }
   document.estimate["encoder_step_rad"] = identified.encoder_step_rad;
 }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -14,9 +15,13 @@
 namespace alidade {
 ALIDADE_PUBLIC_BEGIN
 
-/// One row of a servo's log: a command that is valid until the next row, and the angle read at that time.
+/// One row of a servo's log: a command that is valid until the next row's, and the angle read at that time.
 struct ServoSample {
   double t_s = 0.0, command = 0.0, angle_rad = 0.0;
+  /// When the command was given, if earlier than the angle was read, not before the row before it; NaN: at t_s.
+  double command_t_s = std::numeric_limits<double>::quiet_NaN();
+
+  [[nodiscard]] double given_s() const { return command_t_s <= t_s ? command_t_s : t_s; }
 };
 
 /// Parameters of a servo in their order: gain [rad per unit, or rad/s per unit], time constant [s], latency [s], what
@@ -27,7 +32,8 @@ using ServoParams = Eigen::Vector<double, num_servo_params>;
 inline constexpr std::array<const char*, num_servo_params> servo_param_names{"gain", "tau_s", "latency_s", "zero",
                                                                              "start"};
 
-/// How the angle answers: with a first-order lag itself (angle plant), or in its rate (rate plant).
+/// How the angle answers: with a first-order lag itself (angle plant), or in its rate (rate plant). With a limit of its
+/// acceleration an angle plant is the axis of a head that takes position commands: docs/maths/servo.md.
 enum class ServoKind { angle, rate };
 
 /// What a servo can do beside a first-order lag, each of some size; 0: nothing of it.
@@ -54,6 +60,8 @@ struct ServoFit {
   ServoFlaws flaws;                                     ///< Those indicated by the log, as estimated.
   std::vector<std::size_t> freed;                       ///< Which: indices in servo_flaws, in order of selection.
   std::array<double, num_servo_flaws> flaw_sigma = {};  ///< Of those.
+  /// Of those: 2 ln of the likelihood ratio with which each was freed (together, where two were).
+  std::array<double, num_servo_flaws> flaw_evidence = {};
   /// Of the selected model: blocks of rows are clusters; of the other as `cov_model`.
   Eigen::Matrix<double, num_servo_params, num_servo_params> cov = decltype(cov)::Zero();
   Eigen::Matrix<double, num_servo_params, num_servo_params> cov_model = decltype(cov)::Zero();  ///< Of white noise.

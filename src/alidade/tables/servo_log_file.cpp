@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "alidade/files/table_rows.h"
@@ -18,12 +19,16 @@ ServoLogFile read_servo_log(const std::filesystem::path& file, bool skip_bad) {
     if (!csv.has(name)) throw InputError(csv.name() + ": has no column '" + name + "'; needs t_s,command,angle_rad");
   ServoLogFile read;
   for_each_row(csv, skip_bad, read.skipped, [&](std::size_t row) {
-    const ServoSample sample{csv.number(row, "t_s"), csv.number(row, "command"),
-                             csv.number(row, angle) * (is_deg ? degree : 1.0)};
+    ServoSample sample{csv.number(row, "t_s"), csv.number(row, "command"),
+                       csv.number(row, angle) * (is_deg ? degree : 1.0)};
+    if (csv.has("command_t_s")) sample.command_t_s = csv.number(row, "command_t_s");
     if (!read.samples.empty() && !(sample.t_s > read.samples.back().t_s))
       throw InputError(csv.where(row, "t_s") + ": '" + csv.text(row, "t_s") + "' is not after the row before it");
     if (!(std::abs(sample.angle_rad) <= 1e4))
       throw InputError(csv.where(row, angle) + ": '" + csv.text(row, angle) + "' is no angle of a servo");
+    if (sample.command_t_s > sample.t_s || (!read.samples.empty() && sample.command_t_s < read.samples.back().t_s))
+      throw InputError(csv.where(row, "command_t_s") + ": '" + csv.text(row, "command_t_s") +
+                       "' is not between the row before it and t_s");
     read.samples.push_back(sample);
   });
   if (read.samples.empty()) throw InputError(file.string() + ": has no rows");
@@ -31,9 +36,13 @@ ServoLogFile read_servo_log(const std::filesystem::path& file, bool skip_bad) {
 }
 
 std::string servo_log_csv(std::span<const ServoSample> samples) {
-  std::string text = "t_s,command,angle_rad\n";
-  for (const ServoSample& sample : samples)
-    text += fmt::format("{:.6f},{:.9g},{:.9f}\n", sample.t_s, sample.command, sample.angle_rad);
+  const bool has_times =
+      std::ranges::any_of(samples, [](const ServoSample& sample) { return std::isfinite(sample.command_t_s); });
+  std::string text = has_times ? "t_s,command,angle_rad,command_t_s\n" : "t_s,command,angle_rad\n";
+  for (const ServoSample& sample : samples) {
+    text += fmt::format("{:.6f},{:.9g},{:.9f}", sample.t_s, sample.command, sample.angle_rad);
+    text += has_times ? fmt::format(",{:.6f}\n", sample.given_s()) : "\n";
+  }
   return text;
 }
 
@@ -47,9 +56,7 @@ std::string servo_plant_text(const ServoFit& fit) {
     const bool is_rad = name.find("rad") != std::string::npos;
     std::string key = name;
     if (const auto at = key.find("rad"); is_rad) key.replace(at, 3, "deg");
-    // A scenario has no limit of the acceleration of an angle plant.
-    const bool is_known = !(is_angle && name == "max_acceleration_rad_s2");
-    if (is_known) flaws += fmt::format(", {}: {:.9g}", key, size / (is_rad ? degree : 1.0));
+    flaws += fmt::format(", {}: {:.9g}", key, size / (is_rad ? degree : 1.0));
     flaw_sigmas += fmt::format(", {} {:.3g}", key, fit.flaw_sigma[flaw] / (is_rad ? degree : 1.0));
   }
   return fmt::format(

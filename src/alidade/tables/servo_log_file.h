@@ -17,7 +17,8 @@ struct ServoLogFile {
   std::vector<SkippedInput> skipped;
 };
 
-/// Reads `t_s,command,angle_rad` (or `angle_deg`): what is commanded from that time on, and what the encoder reads.
+/// Reads `t_s,command,angle_rad` (or `angle_deg`): what is commanded from that time on, and what the encoder reads;
+/// with `command_t_s` the command counts from that time on, which is not before the row before it and not after t_s.
 /// Throws InputError: no such column, both angles, times that do not run forward, no rows.
 [[nodiscard]] ServoLogFile read_servo_log(const std::filesystem::path& file, bool skip_bad = false);
 [[nodiscard]] std::string servo_log_csv(std::span<const ServoSample> samples);

@@ -218,9 +218,9 @@ ServoResponse servo_response(std::span<const ServoSample> log, ServoKind kind, c
   std::size_t next = 1;  // the first command has been there before
   for (Eigen::Index i = 0; i < num_rows; ++i) {
     const double t_s = log[static_cast<std::size_t>(i)].t_s;
-    for (; next < log.size() && log[next].t_s + params[ServoParam::latency] <= t_s; ++next) {
+    for (; next < log.size() && log[next].given_s() + params[ServoParam::latency] <= t_s; ++next) {
       if (log[next].command == command) continue;
-      const double switch_s = log[next].t_s + params[ServoParam::latency];
+      const double switch_s = log[next].given_s() + params[ServoParam::latency];
       walk.advance(switch_s - now_s, command);
       walk.switch_command(command, log[next].command);
       now_s = switch_s;

@@ -56,8 +56,11 @@ TEST(ServoCauses, FlawedResponseIsTheIntegralOfItsEquations) {
         lagged = flaws.second_tau_s > 0.0 ? lagged + dt_s * (goal - lagged) / flaws.second_tau_s : goal;
         const double pull = fit.params[0] * lagged, max_v = flaws.max_rate_rad_s;
         const double max_dv = flaws.max_acceleration_rad_s2 > 0.0 ? flaws.max_acceleration_rad_s2 * dt_s : 1e9;
+        // An angle plant that has to brake in time: no faster than √(2a (e − aτ²/2)).
+        const double left = std::abs(pull - x), a = flaws.max_acceleration_rad_s2, bend = 0.01 * a;
+        const double curve = a > 0.0 && left > bend ? std::sqrt(2.0 * a * (left - 0.5 * bend)) : left / 0.1;
         const double wanted = is_rate_plant ? v + dt_s * (std::clamp(pull, -max_v, max_v) - v) / 0.1
-                                            : std::clamp((pull - x) / 0.1, -max_v, max_v);
+                                            : std::copysign(std::min(curve, max_v), pull - x);
         v += std::clamp(wanted - v, -max_dv, max_dv);
         x += dt_s * v;
         read = std::clamp(read, x - 0.005, x + 0.005);

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "alidade/geometry/decompositions.h"
+#include "alidade/pantilt/positioner.h"
 #include "alidade/pantilt/servo_plant.h"
 #include "alidade/servo/identify/levenberg.h"
 
@@ -12,8 +13,6 @@ namespace alidade {
 namespace {
 
 using Eigen::Index;
-
-enum Flaw : std::size_t { rate_limit, acceleration_limit, dead_band, backlash, second_lag };
 
 constexpr double no_limit = 1e9;
 
@@ -26,6 +25,7 @@ class FlawedServo {
     if (fit.kind == ServoKind::angle) {
       AnglePlant plant{fit.params[ServoParam::gain], AngleUnit::rad, fit.params[ServoParam::tau]};
       if (flaws.max_rate_rad_s > 0.0) plant.max_rate_rad_s = max_rate;
+      if (flaws.max_acceleration_rad_s2 > 0.0) plant.max_acceleration_rad_s2 = flaws.max_acceleration_rad_s2;
       axis_.plant = plant;
       now_.angle_rad = fit.params[ServoParam::start];
     } else {
@@ -42,79 +42,42 @@ class FlawedServo {
   void advance(double dt_s, double command) {
     if (!(dt_s > 0.0)) return;
     const double goal = past_dead_band(command, flaws_.dead_band), lag_s = flaws_.second_tau_s;
-    const bool is_hard = fit_.kind == ServoKind::angle && flaws_.max_acceleration_rad_s2 > 0.0;
-    if (!(lag_s > 0.0) && !is_hard) {
-      now_ = advanced(axis_, now_, goal, dt_s);
-    } else {
-      constexpr double per_tau = 20.0, max_steps = 40.0;
-      const double shortest_s =
-          lag_s > 0.0 ? std::min(lag_s, fit_.params[ServoParam::tau]) : fit_.params[ServoParam::tau];
-      const double steps = std::clamp(std::ceil(per_tau * dt_s / shortest_s), 1.0, max_steps), step_s = dt_s / steps;
-      for (double k = 0.0; k < steps; ++k) step(step_s, goal, is_hard);
+    if (!(lag_s > 0.0)) {
+      move(dt_s, goal);
+      return;
     }
-    const double half = 0.5 * flaws_.backlash_rad;
-    read_ = std::clamp(read_, now_.angle_rad - half, now_.angle_rad + half);
+    constexpr double per_tau = 20.0, max_steps = 40.0;
+    const double shortest_s = std::min(lag_s, fit_.params[ServoParam::tau]);
+    const double steps = std::clamp(std::ceil(per_tau * dt_s / shortest_s), 1.0, max_steps), step_s = dt_s / steps;
+    for (double k = 0.0; k < steps; ++k) {
+      const double rise = -std::expm1(-step_s / lag_s);
+      move(step_s, goal + (lagged_ - goal) * rise * lag_s / step_s);
+      lagged_ += rise * (goal - lagged_);
+    }
   }
 
  private:
-  void step(double dt_s, double goal, bool is_hard) {
-    const double lag_s = flaws_.second_tau_s;
-    double mean = goal;
-    if (lag_s > 0.0) {
-      const double rise = -std::expm1(-dt_s / lag_s);
-      mean += (lagged_ - goal) * rise * lag_s / dt_s;
-      lagged_ += rise * (goal - lagged_);
-    }
-    if (!is_hard) {
-      now_ = advanced(axis_, now_, mean, dt_s);
+  /// The play follows piece by piece where the drive may turn back within a step.
+  void move(double dt_s, double goal) {
+    const auto* braking = std::get_if<AnglePlant>(&axis_.plant);
+    if (braking == nullptr || !std::isfinite(braking->max_acceleration_rad_s2)) {
+      now_ = advanced(axis_, now_, goal, dt_s);
+      read();
       return;
     }
-    advance_hard(dt_s, fit_.params[ServoParam::gain] * mean);
-  }
-
-  /// The rate required by the lag, approached within the limits: pieces of constant acceleration, of the largest rate
-  /// and of the lag itself, each to its end. (Steps instead would read as a longer time constant.)
-  void advance_hard(double dt_s, double goal_rad) {
-    const double tau = fit_.params[ServoParam::tau], hardest = flaws_.max_acceleration_rad_s2;
-    const double fastest = flaws_.max_rate_rad_s > 0.0 ? flaws_.max_rate_rad_s : no_limit;
-    constexpr int max_pieces = 16;
-    for (int piece = 0; piece < max_pieces && dt_s > 0.0; ++piece) {
-      const double away = goal_rad - now_.angle_rad, asked = away / tau, rate = now_.rate_rad_s;
-      const double wanted = std::clamp(asked, -fastest, fastest);
-      const bool follows = std::abs(wanted - rate) <= 1e-9 * (std::abs(wanted) + hardest * tau);
-      if (follows && wanted != asked) {
-        const double t = std::min(dt_s, std::max((std::abs(asked) - fastest) * tau / fastest, 1e-9 * tau));
-        now_.angle_rad += wanted * t;
-        dt_s -= t;
-      } else if (follows && std::abs(rate) <= hardest * tau * (1.0 + 1e-9)) {
-        now_.angle_rad = goal_rad - away * std::exp(-dt_s / tau);
-        now_.rate_rad_s = (goal_rad - now_.angle_rad) / tau;
-        return;
-      } else {
-        const double pull = follows ? std::copysign(hardest, -rate) : std::copysign(hardest, wanted - rate);
-        const double t = std::min(dt_s, piece_s(pull, rate, away, tau, fastest));
-        now_.angle_rad += (rate + 0.5 * pull * t) * t;
-        now_.rate_rad_s = rate + pull * t;
-        dt_s -= t;
-      }
+    const PositionerParams drive{.rate_rad_s = braking->max_rate_rad_s,
+                                 .acceleration_rad_s2 = braking->max_acceleration_rad_s2,
+                                 .time_constant_s = braking->tau_s};
+    DriveMotion motion{now_.angle_rad, now_.rate_rad_s};
+    while (dt_s > 0.0) {
+      dt_s -= advance_drive(drive, braking->gain * goal, dt_s, motion);
+      now_ = {motion.angle_rad, motion.rate_rad_s};
+      read();
     }
   }
-
-  /// How long a constant acceleration lasts: until the rate is that of the lag, or the largest.
-  static double piece_s(double pull, double rate, double away, double tau, double fastest) {
-    const double shortest_s = 1e-9 * tau;
-    double t = std::numeric_limits<double>::infinity();
-    const auto ends = [&](double at_s) {
-      if (at_s > shortest_s) t = std::min(t, at_s);
-    };
-    // rate + pull t = (away − rate t − pull t²/2) / tau
-    const double b = rate + pull * tau, discriminant = b * b - 2.0 * pull * (rate * tau - away);
-    if (discriminant >= 0.0) {
-      ends((-b + std::sqrt(discriminant)) / pull);
-      ends((-b - std::sqrt(discriminant)) / pull);
-    }
-    ends((std::copysign(fastest, pull) - rate) / pull);
-    return t;
+  void read() {
+    const double half = 0.5 * flaws_.backlash_rad;
+    read_ = std::clamp(read_, now_.angle_rad - half, now_.angle_rad + half);
   }
 
   const ServoFit& fit_;
@@ -123,12 +86,6 @@ class FlawedServo {
   AxisMotion now_;
   double lagged_, read_ = 0.0;
 };
-
-Eigen::VectorXd misfit_of(std::span<const ServoSample> log, const ServoFit& fit) {
-  Eigen::VectorXd misfit = flawed_response(log, fit, fit.flaws);
-  for (std::size_t i = 0; i < log.size(); ++i) misfit[static_cast<Index>(i)] -= log[i].angle_rad;
-  return misfit;
-}
 
 /// What a step of one parameter or freed flaw makes of a fit; flaws, gains' and lags' sizes go by factors.
 ServoFit moved(const ServoFit& fit, Index param, double by) {
@@ -141,7 +98,8 @@ ServoFit moved(const ServoFit& fit, Index param, double by) {
     double& size = next.flaws.*servo_flaws[flaw];
     size *= std::exp(std::clamp(by, -1.0, 1.0));
     // Of two lags one is the shorter: the second.
-    if (flaw == second_lag) size = std::clamp(size, 0.02 * next.params[ServoParam::tau], next.params[ServoParam::tau]);
+    if (flaw == ServoFlaw::second_lag)
+      size = std::clamp(size, 0.02 * next.params[ServoParam::tau], next.params[ServoParam::tau]);
   }
   return next;
 }
@@ -178,37 +136,6 @@ Eigen::MatrixXd jacobian_by_factors(std::span<const ServoSample> log, const Serv
   return J;
 }
 
-/// Levenberg–Marquardt over parameters and freed flaws. Returns what is left of the squares.
-double refine(std::span<const ServoSample> log, int max_steps, ServoFit& fit) {
-  const auto after = [](const ServoFit& from, const Eigen::VectorXd& step) {
-    ServoFit next = from;
-    for (Index k = 0; k < step.size(); ++k) next = moved(next, k, step[k]);
-    return next;
-  };
-  const LevenbergOutcome descent = levenberg(
-      {.max_steps = max_steps, .first_damping = 1e-4, .tolerance = 1e-9, .ridge = 1e-18}, fit,
-      [&](const ServoFit& at) { return misfit_of(log, at); },
-      [&](const ServoFit& at) { return jacobian_by_factors(log, at); }, after);
-  fit.has_converged = descent.has_converged;
-  const double dof = static_cast<double>(log.size()) - num_servo_params - static_cast<double>(fit.freed.size());
-  fit.rms_rad = std::sqrt(descent.sum2 / std::max(1.0, dof));
-  return descent.sum2;
-}
-
-/// Rows that do not share errors: of an AR(1) noise with the residuals' correlation from row to row.
-double effective_rows(const Eigen::VectorXd& misfit) {
-  const Index n = misfit.size();
-  const double colour =
-      std::clamp(misfit.head(n - 1).dot(misfit.tail(n - 1)) / std::max(misfit.squaredNorm(), 1e-300), 0.0, 0.95);
-  return static_cast<double>(n) * (1.0 - colour) / (1.0 + colour);
-}
-
-struct Candidate {
-  std::size_t flaw = 0;
-  ServoFit fit;
-  double sum2 = std::numeric_limits<double>::infinity();
-};
-
 double max_command(std::span<const ServoSample> log) {
   double most = 0.0;
   for (const ServoSample& row : log) most = std::max(most, std::abs(row.command));
@@ -232,13 +159,13 @@ std::vector<double> sizes_of(std::span<const ServoSample> log, const ServoFit& f
     return sizes;
   };
   switch (flaw) {
-    case rate_limit:
+    case ServoFlaw::rate_limit:
       return times(max_rate(log, response), {0.95, 0.9, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1});
-    case acceleration_limit:
+    case ServoFlaw::acceleration_limit:
       return times(max_rate(log, response) / fit.params[ServoParam::tau], {0.9, 0.7, 0.5, 0.3, 0.15});
-    case dead_band:
+    case ServoFlaw::dead_band:
       return times(max_command(log), {0.005, 0.01, 0.02, 0.05, 0.1, 0.2});
-    case backlash:
+    case ServoFlaw::backlash:
       return times(response.maxCoeff() - response.minCoeff(), {0.002, 0.005, 0.01, 0.02, 0.05, 0.1});
     default:
       return times(fit.params[ServoParam::tau], {0.1, 0.3, 0.6, 1.0});
@@ -253,10 +180,10 @@ Eigen::VectorXd flawed_response(std::span<const ServoSample> log, const ServoFit
   double now_s = log.front().t_s, command = log.front().command;
   std::size_t next = 1;
   for (std::size_t i = 0; i < log.size(); ++i) {
-    for (; next < log.size() && log[next].t_s + fit.params[ServoParam::latency] <= log[i].t_s; ++next) {
+    for (; next < log.size() && log[next].given_s() + fit.params[ServoParam::latency] <= log[i].t_s; ++next) {
       if (log[next].command == command) continue;
-      servo.advance(log[next].t_s + fit.params[ServoParam::latency] - now_s, command);
-      now_s = log[next].t_s + fit.params[ServoParam::latency];
+      servo.advance(log[next].given_s() + fit.params[ServoParam::latency] - now_s, command);
+      now_s = log[next].given_s() + fit.params[ServoParam::latency];
       command = log[next].command;
     }
     servo.advance(log[i].t_s - now_s, command);
@@ -264,6 +191,35 @@ Eigen::VectorXd flawed_response(std::span<const ServoSample> log, const ServoFit
     angles[static_cast<Index>(i)] = fit.params[ServoParam::zero] + servo.read_rad();
   }
   return angles;
+}
+
+Eigen::VectorXd flawed_misfit(std::span<const ServoSample> log, const ServoFit& fit) {
+  Eigen::VectorXd misfit = flawed_response(log, fit, fit.flaws);
+  for (std::size_t i = 0; i < log.size(); ++i) misfit[static_cast<Index>(i)] -= log[i].angle_rad;
+  return misfit;
+}
+
+double refine_flawed(std::span<const ServoSample> log, int max_steps, ServoFit& fit) {
+  const auto after = [](const ServoFit& from, const Eigen::VectorXd& step) {
+    ServoFit next = from;
+    for (Index k = 0; k < step.size(); ++k) next = moved(next, k, step[k]);
+    return next;
+  };
+  const LevenbergOutcome descent = levenberg(
+      {.max_steps = max_steps, .first_damping = 1e-4, .tolerance = 1e-9, .ridge = 1e-18}, fit,
+      [&](const ServoFit& at) { return flawed_misfit(log, at); },
+      [&](const ServoFit& at) { return jacobian_by_factors(log, at); }, after);
+  fit.has_converged = descent.has_converged;
+  const double dof = static_cast<double>(log.size()) - num_servo_params - static_cast<double>(fit.freed.size());
+  fit.rms_rad = std::sqrt(descent.sum2 / std::max(1.0, dof));
+  return descent.sum2;
+}
+
+double effective_rows(const Eigen::VectorXd& misfit) {
+  const Index n = misfit.size();
+  const double colour =
+      std::clamp(misfit.head(n - 1).dot(misfit.tail(n - 1)) / std::max(misfit.squaredNorm(), 1e-300), 0.0, 0.95);
+  return static_cast<double>(n) * (1.0 - colour) / (1.0 + colour);
 }
 
 Eigen::MatrixXd flawed_jacobian(std::span<const ServoSample> log, const ServoFit& fit) {
@@ -276,7 +232,7 @@ Eigen::MatrixXd flawed_jacobian(std::span<const ServoSample> log, const ServoFit
 FlawGround flaw_ground(std::span<const ServoSample> log, const ServoFit& fit) {
   const Eigen::MatrixXd J = jacobian_by_factors(log, fit);
   FlawGround ground{flawed_response(log, fit, fit.flaws), {}, orthonormal_basis(J, J.cols())};
-  ground.misfit = misfit_of(log, fit);
+  ground.misfit = flawed_misfit(log, fit);
   return ground;
 }
 
@@ -297,70 +253,25 @@ std::vector<FlawScore> flaw_scores(std::span<const ServoSample> log, const Servo
   return scores;
 }
 
-namespace {
-
-/// The fit with one more flaw, from the two sizes that explain most.
-Candidate freed(std::span<const ServoSample> log, const ServoFit& fit, const FlawGround& ground, std::size_t flaw) {
-  constexpr std::size_t max_starts = 2;
-  constexpr int first_steps = 8, max_steps = 40;
-  const std::vector<FlawScore> scores = flaw_scores(log, fit, ground, flaw);
-  Candidate best{flaw, fit};
-  for (std::size_t i = 0; i < std::min(max_starts, scores.size()); ++i) {
-    ServoFit trial = fit;
-    trial.freed.push_back(flaw);
-    trial.flaws.*servo_flaws[flaw] = scores[i].size;
-    const double sum2 = refine(log, first_steps, trial);
-    if (sum2 < best.sum2) best = {flaw, trial, sum2};
-  }
-  if (std::isfinite(best.sum2)) best.sum2 = refine(log, max_steps, best.fit);
-  return best;
-}
-
-}  // namespace
-
-ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& plain, std::vector<ServoRival>& rivals) {
-  constexpr std::size_t max_freed = 3;
-  constexpr double margin = 12.0, clear = 10.0;
-  ServoFit fit = plain;
-  while (fit.freed.size() < max_freed) {
-    const FlawGround ground = flaw_ground(log, fit);
-    const double sum2 = ground.misfit.squaredNorm();
-    std::vector<Candidate> candidates;
-    for (std::size_t flaw = 0; flaw < num_servo_flaws; ++flaw)
-      if (std::ranges::count(fit.freed, flaw) == 0) candidates.push_back(freed(log, fit, ground, flaw));
-    std::ranges::sort(candidates, {}, &Candidate::sum2);
-    const Candidate& best = candidates.front();
-    if (!std::isfinite(best.sum2)) break;
-    const double rows = effective_rows(misfit_of(log, best.fit));
-    if (!(rows * std::log(sum2 / best.sum2) > std::log(rows) + margin)) break;
-    for (std::size_t i = 1; i < candidates.size(); ++i) {
-      const double evidence = rows * std::log(candidates[i].sum2 / best.sum2);
-      if (evidence < clear) rivals.push_back({best.flaw, candidates[i].flaw, evidence});
-    }
-    fit = best.fit;
-  }
-  return fit;
-}
-
 std::vector<HiddenFlaw> hidden_flaws(std::span<const ServoSample> log, const ServoFit& fit) {
   constexpr double share = 0.05, min_evidence = 9.0, min_moved = 0.005;
   const Eigen::VectorXd response = flawed_response(log, fit, fit.flaws);
-  const double sum2 = misfit_of(log, fit).squaredNorm(), range = response.maxCoeff() - response.minCoeff();
+  const double sum2 = flawed_misfit(log, fit).squaredNorm(), range = response.maxCoeff() - response.minCoeff();
   std::vector<HiddenFlaw> hidden;
   const auto ask = [&](std::size_t flaw, double size) {
     if (std::ranges::count(fit.freed, flaw) > 0 || !(size > 0.0)) return;
     ServoFit trial = fit;
     trial.flaws.*servo_flaws[flaw] = size;
-    if (flaw == rate_limit && fit.kind == ServoKind::rate) trial.params[ServoParam::gain] *= 1.0 + share;
-    const double with2 = refine(log, 40, trial);
-    const double rows = effective_rows(misfit_of(log, trial));
+    if (flaw == ServoFlaw::rate_limit && fit.kind == ServoKind::rate) trial.params[ServoParam::gain] *= 1.0 + share;
+    const double with2 = refine_flawed(log, 40, trial);
+    const double rows = effective_rows(flawed_misfit(log, trial));
     const double factor = trial.params[ServoParam::gain] / fit.params[ServoParam::gain];
     if (rows * std::log(with2 / sum2) < min_evidence && std::abs(factor - 1.0) > min_moved)
       hidden.push_back({flaw, size, factor});
   };
-  ask(dead_band, share * max_command(log));
-  ask(backlash, 0.5 * share * range);
-  if (fit.kind == ServoKind::rate) ask(rate_limit, max_rate(log, response));
+  ask(ServoFlaw::dead_band, share * max_command(log));
+  ask(ServoFlaw::backlash, 0.5 * share * range);
+  if (fit.kind == ServoKind::rate) ask(ServoFlaw::rate_limit, max_rate(log, response));
   return hidden;
 }
 

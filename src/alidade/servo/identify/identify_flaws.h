@@ -7,13 +7,27 @@
 
 namespace alidade {
 
-/// Angles that a servo of this fit, with its flaws, reads at the times of the log. In closed form, but for a second lag
-/// and for a limit of the acceleration of an angle plant, which are stepped through.
+/// Indices in servo_flaws.
+struct ServoFlaw {
+  enum Place : std::size_t { rate_limit, acceleration_limit, dead_band, backlash, second_lag };
+};
+
+/// Angles that a servo of this fit, with its flaws, reads at the times of the log. In closed form, but for a second
+/// lag, which is stepped through.
 [[nodiscard]] Eigen::VectorXd flawed_response(std::span<const ServoSample> log, const ServoFit& fit,
                                               const ServoFlaws& flaws);
 
 /// ∂ response / ∂ (parameters in their order, flaws that were freed), by differences.
 [[nodiscard]] Eigen::MatrixXd flawed_jacobian(std::span<const ServoSample> log, const ServoFit& fit);
+
+/// Response − readings.
+[[nodiscard]] Eigen::VectorXd flawed_misfit(std::span<const ServoSample> log, const ServoFit& fit);
+
+/// Levenberg–Marquardt over parameters and freed flaws. Returns what is left of the squares.
+double refine_flawed(std::span<const ServoSample> log, int max_steps, ServoFit& fit);
+
+/// Rows that do not share errors: of an AR(1) noise with the residuals' correlation from row to row.
+[[nodiscard]] double effective_rows(const Eigen::VectorXd& misfit);
 
 /// What a fit leaves, and the directions in which its parameters can follow.
 struct FlawGround {
@@ -32,7 +46,8 @@ struct FlawScore {
 
 /// The fit with every nonlinearity that the log supports, one after the other: 2 ln of the likelihood ratio, counted in
 /// rows that do not share errors, above ln n + 12 (Schwarz's criterion, and a margin for the choice among flaws and
-/// sizes). `rivals`: flaws that explain the same nearly as well. G. Schwarz, "Estimating the dimension of a model",
+/// sizes). Of an angle plant the limits of rate and acceleration are tried together as well, where one alone leaves
+/// structure. `rivals`: flaws that explain the same nearly as well. G. Schwarz, "Estimating the dimension of a model",
 /// 1978.
 [[nodiscard]] ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& plain,
                                   std::vector<ServoRival>& rivals);

@@ -14,7 +14,7 @@ namespace {
 
 using P = PositionerPlace;
 const std::vector<int> all_places{P::rate, P::acceleration, P::time_constant, P::latency, P::backlash, P::offset};
-constexpr double boundless_acceleration_rad_s2 = 1e3, instant_s = 2e-3, coarse_s = 1e-3;
+constexpr double boundless_acceleration_rad_s2 = 1e3, instant_s = 2e-3;
 
 /// The largest rate that lasted for 0.15 s or more.
 double fastest(const std::vector<PositionerReading>& readings) {
@@ -47,10 +47,9 @@ double first_latency(const PositionerLog& log) {
 }
 
 /// From the best points of a coarse grid: the cost has more than one local minimum.
-PositionerVector best_start(PositionerProblem problem, double rate, double latency, double& cost) {
+PositionerVector best_start(const PositionerProblem& problem, double rate, double latency, double& cost) {
   constexpr std::size_t num_starts = 4;
-  constexpr int few_steps = 12;
-  problem.set_integration(coarse_s);
+  constexpr int few_steps = 20;
   std::vector<std::pair<double, PositionerVector>> grid;
   for (const double acceleration : {60.0, 120.0, 220.0, 400.0, 1e4})
     for (const double tau : {0.005, 0.05, 0.1, 0.15})
@@ -105,9 +104,8 @@ PositionerVector sigmas_of(const PositionerProblem& problem, const PositionerVec
 }
 
 /// The loss where one parameter is fixed at zero, the others refitted: 2 ln of the likelihood ratio.
-double evidence_of(PositionerProblem problem, PositionerVector theta, int place, double nothing, double noise2) {
-  constexpr int few_steps = 10;
-  problem.set_integration(coarse_s);
+double evidence_of(const PositionerProblem& problem, PositionerVector theta, int place, double nothing, double noise2) {
+  constexpr int few_steps = 20;
   const double with = problem.solve(theta, all_places, few_steps);
   std::vector<int> others;
   for (const int each : all_places)
@@ -219,6 +217,25 @@ bool reads_its_target(const PositionerLog& log) {
 double median_wait(const std::vector<double>& waits) { return waits.empty() ? 0.0 : median_of(waits); }
 
 }  // namespace
+
+std::vector<ServoSample> servo_samples(const PositionerLog& log) {
+  std::vector<ServoSample> samples;
+  if (log.readings.empty()) return samples;
+  const double begin_s = log.readings.front().t_s;
+  ServoSample row{-1.0, log.readings.front().angle_rad, 0.0};
+  std::size_t next = 0;
+  for (const PositionerReading& reading : log.readings) {
+    const double before_s = row.t_s;
+    if (reading.t_s - begin_s <= before_s) continue;
+    row = {reading.t_s - begin_s, row.command, reading.angle_rad};
+    for (; next < log.commands.size() && log.commands[next].t_s <= reading.t_s; ++next) {
+      row.command = log.commands[next].target_rad;
+      row.command_t_s = std::max(log.commands[next].t_s - begin_s, std::max(0.0, before_s));
+    }
+    samples.push_back(row);
+  }
+  return samples;
+}
 
 double reading_step(const std::vector<PositionerReading>& readings) {
   std::vector<double> angles;

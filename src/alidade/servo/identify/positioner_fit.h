@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "alidade/pantilt/positioner.h"
+#include "alidade/servo/identification.h"
 
 namespace alidade {
 
@@ -64,6 +65,9 @@ struct PositionerFit {
 /// Least squares of rate, acceleration, time constant, latency and backlash of a Positioner, each tested by what the
 /// readings lose without it; the encoder's sampling is looked for in the residuals.
 [[nodiscard]] PositionerFit fit_positioner(const PositionerLog& log);
+
+/// The same log as `identify` reads it.
+[[nodiscard]] std::vector<ServoSample> servo_samples(const PositionerLog& log);
 
 /// The smallest change of which all readings are multiples; else the smallest change there is.
 [[nodiscard]] double reading_step(const std::vector<PositionerReading>& readings);

@@ -6,6 +6,7 @@
 
 #include "alidade/geometry/decompositions.h"
 #include "alidade/geometry/degree.h"
+#include "alidade/servo/identify/levenberg.h"
 
 namespace alidade {
 namespace {
@@ -111,8 +112,8 @@ PositionerProblem::PositionerProblem(const PositionerLog& log, double step_rad, 
 
 std::vector<double> PositionerProblem::response(const PositionerVector& theta, const std::vector<double>& times) const {
   const double offset = theta[PositionerPlace::offset];
-  std::vector<double> angles = positioner_response(positioner_params(theta, dead_band_rad_), start_rad_ - offset,
-                                                   commands_, times, integration_s_);
+  std::vector<double> angles =
+      positioner_response(positioner_params(theta, dead_band_rad_), start_rad_ - offset, commands_, times);
   for (double& angle : angles) angle += offset;
   return angles;
 }
@@ -146,35 +147,20 @@ Eigen::MatrixXd PositionerProblem::jacobian(const PositionerVector& theta, const
 
 double PositionerProblem::solve(PositionerVector& theta, const std::vector<int>& free, int max_steps) const {
   using P = PositionerPlace;
-  Eigen::VectorXd now = misfit(theta);
-  double cost = now.squaredNorm(), damping = 1e-3;
-  for (int i = 0; i < max_steps; ++i) {
-    const Eigen::MatrixXd J = jacobian(theta, free);
-    bool is_better = false;
-    double gained = 0.0;
-    for (int attempt = 0; attempt < 8 && !is_better; ++attempt) {
-      Eigen::MatrixXd normal = J.transpose() * J;
-      for (int place = 0; place < P::count; ++place)
-        normal(place, place) = normal(place, place) * (1.0 + damping) + (normal(place, place) > 0.0 ? 1e-9 : 1.0);
-      PositionerVector step = -solve_symmetric(normal, J.transpose() * now);
-      step.head<3>() = step.head<3>().cwiseMax(-0.7).cwiseMin(0.7);
-      PositionerVector next = theta + step;
-      next[P::latency] = std::max(0.0, next[P::latency]);
-      next[P::backlash] = std::max(0.0, next[P::backlash]);
-      next[P::time_constant] = std::clamp(next[P::time_constant], std::log(1e-3), std::log(5.0));
-      next[P::acceleration] = std::clamp(next[P::acceleration], std::log(1e-3), std::log(3e3));
-      const Eigen::VectorXd tried = misfit(next);
-      is_better = tried.squaredNorm() < cost;
-      damping = is_better ? std::max(1e-7, damping * 0.2) : damping * 6.0;
-      if (!is_better) continue;
-      gained = cost - tried.squaredNorm();
-      theta = next;
-      now = tried;
-      cost -= gained;
-    }
-    if (!is_better || gained < 1e-5 * cost) break;
-  }
-  return cost;
+  const auto after = [](const PositionerVector& from, Eigen::VectorXd step) {
+    step.head<3>() = step.head<3>().cwiseMax(-0.7).cwiseMin(0.7);
+    PositionerVector next = from + step;
+    next[P::latency] = std::max(0.0, next[P::latency]);
+    next[P::backlash] = std::max(0.0, next[P::backlash]);
+    next[P::time_constant] = std::clamp(next[P::time_constant], std::log(1e-3), std::log(5.0));
+    next[P::acceleration] = std::clamp(next[P::acceleration], std::log(1e-3), std::log(3e3));
+    return next;
+  };
+  const LevenbergConfig config{.max_steps = max_steps, .first_damping = 1e-3, .tolerance = 1e-5, .ridge = 1e-16};
+  return levenberg(
+             config, theta, [&](const PositionerVector& at) { return misfit(at); },
+             [&](const PositionerVector& at) { return jacobian(at, free); }, after)
+      .sum2;
 }
 
 bool PositionerProblem::find_sampling(const PositionerVector& theta, double& period_s, double& phase_s) const {

@@ -27,9 +27,7 @@ class PositionerProblem {
   /// By central differences; columns of fixed parameters are zero.
   [[nodiscard]] Eigen::MatrixXd jacobian(const PositionerVector& theta, const std::vector<int>& free) const;
   /// Minimises from `theta` over the free parameters; the sum of squares.
-  double solve(PositionerVector& theta, const std::vector<int>& free, int max_steps = 40) const;
-  /// Of the integration: coarse to search, fine to estimate.
-  void set_integration(double step_s) { integration_s_ = step_s; }
+  double solve(PositionerVector& theta, const std::vector<int>& free, int max_steps = 60) const;
 
   /// The encoder is sampled so often from that time on; readings are of its samples.
   void set_sampling(double period_s, double phase_s, const PositionerVector& theta);
@@ -48,8 +46,7 @@ class PositionerProblem {
   std::vector<PositionerReading> readings_;
   std::vector<double> times_, rate_, sigma_, shared_;
   std::vector<int> move_;
-  double start_rad_ = 0.0, dead_band_rad_ = 0.0, step_rad_ = 0.0, origin_s_ = 0.0,
-         integration_s_ = usual_positioner_step_s;
+  double start_rad_ = 0.0, dead_band_rad_ = 0.0, step_rad_ = 0.0, origin_s_ = 0.0;
 };
 
 }  // namespace alidade

@@ -1,0 +1,146 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "alidade/servo/identify/identify_flaws.h"
+
+namespace alidade {
+namespace {
+
+using Eigen::Index;
+struct Candidate {
+  std::size_t flaw = 0;
+  ServoFit fit;
+  double sum2 = std::numeric_limits<double>::infinity();
+};
+
+/// The fit with one more flaw, from the two sizes that explain most.
+Candidate freed(std::span<const ServoSample> log, const ServoFit& fit, const FlawGround& ground, std::size_t flaw) {
+  constexpr std::size_t max_starts = 2;
+  constexpr int first_steps = 8, max_steps = 40;
+  const std::vector<FlawScore> scores = flaw_scores(log, fit, ground, flaw);
+  Candidate best{flaw, fit};
+  for (std::size_t i = 0; i < std::min(max_starts, scores.size()); ++i) {
+    ServoFit trial = fit;
+    trial.freed.push_back(flaw);
+    trial.flaws.*servo_flaws[flaw] = scores[i].size;
+    const double sum2 = refine_flawed(log, first_steps, trial);
+    if (sum2 < best.sum2) best = {flaw, trial, sum2};
+  }
+  if (std::isfinite(best.sum2)) best.sum2 = refine_flawed(log, max_steps, best.fit);
+  return best;
+}
+
+/// The largest rate that is read for as long as a drive takes to reach it.
+double lasting_rate(std::span<const ServoSample> log) {
+  constexpr double min_s = 0.15;
+  double most = 0.0;
+  for (std::size_t i = 0, j = 0; j < log.size(); ++j) {
+    while (i + 1 < j && log[j].t_s - log[i + 1].t_s >= min_s) ++i;
+    const double dt = log[j].t_s - log[i].t_s;
+    if (j > i && dt >= min_s) most = std::max(most, std::abs(log[j].angle_rad - log[i].angle_rad) / dt);
+  }
+  return most;
+}
+
+/// The axis of a head that takes position commands: limits of rate and acceleration together, of which either alone
+/// explains little. From the best points of a grid, since there is more than one minimum.
+Candidate limited(std::span<const ServoSample> log, const ServoFit& fit) {
+  constexpr std::size_t num_starts = 3;
+  constexpr int first_steps = 12, max_steps = 40;
+  const double rate = lasting_rate(log), late_s = fit.params[ServoParam::tau] + fit.params[ServoParam::latency];
+  std::vector<Candidate> grid;
+  if (!(rate > 0.0)) return {ServoFlaw::rate_limit, fit};
+  for (const double to_top_s : {0.02, 0.06, 0.15, 0.3, 0.6, 1.2})
+    for (const double tau : {0.05, 0.2, 0.5, 1.0})
+      for (const double late : {0.0, 0.15, 0.35, 0.6, 0.85}) {
+        Candidate at{ServoFlaw::rate_limit, fit};
+        at.fit.freed.insert(at.fit.freed.end(), {ServoFlaw::rate_limit, ServoFlaw::acceleration_limit});
+        at.fit.flaws.max_rate_rad_s = rate;
+        at.fit.flaws.max_acceleration_rad_s2 = rate / to_top_s;
+        at.fit.params[ServoParam::tau] *= tau;
+        at.fit.params[ServoParam::latency] = late * late_s;
+        at.sum2 = flawed_misfit(log, at.fit).squaredNorm();
+        grid.push_back(std::move(at));
+      }
+  std::ranges::sort(grid, {}, &Candidate::sum2);
+  Candidate best{ServoFlaw::rate_limit, fit};
+  for (std::size_t i = 0; i < num_starts; ++i) {
+    grid[i].sum2 = refine_flawed(log, first_steps, grid[i].fit);
+    if (grid[i].sum2 < best.sum2) best = grid[i];
+  }
+  best.sum2 = refine_flawed(log, max_steps, best.fit);
+  return best;
+}
+
+double colour_of(const Eigen::VectorXd& misfit) {
+  const Index n = misfit.size();
+  return misfit.head(n - 1).dot(misfit.tail(n - 1)) / std::max(misfit.squaredNorm(), 1e-300);
+}
+
+bool is_limited(const ServoFit& fit) {
+  return std::ranges::any_of(fit.freed, [](std::size_t flaw) { return flaw <= ServoFlaw::acceleration_limit; });
+}
+
+/// 2 ln of the likelihood ratio against squares `sum2`, counted in rows that do not share errors, and what of it is
+/// left over Schwarz's price of so many parameters and a margin for the choice.
+struct Evidence {
+  double size = 0.0, left = -1.0;
+};
+Evidence evidence_for(std::span<const ServoSample> log, double sum2, double num_params, const Candidate& candidate) {
+  constexpr double margin = 12.0;
+  if (!std::isfinite(candidate.sum2)) return {};
+  const double rows = effective_rows(flawed_misfit(log, candidate.fit)), size = rows * std::log(sum2 / candidate.sum2);
+  return {size, size - num_params * std::log(rows) - margin};
+}
+
+/// The fit, with the evidence of what it has more than the one before.
+ServoFit taken(const ServoFit& before, ServoFit fit, double evidence) {
+  for (std::size_t i = before.freed.size(); i < fit.freed.size(); ++i) fit.flaw_evidence[fit.freed[i]] = evidence;
+  return fit;
+}
+
+void note_rivals(std::span<const ServoSample> log, const std::vector<Candidate>& candidates,
+                 std::vector<ServoRival>& rivals) {
+  constexpr double clear = 10.0;
+  const Candidate& best = candidates.front();
+  const double rows = effective_rows(flawed_misfit(log, best.fit));
+  for (std::size_t i = 1; i < candidates.size(); ++i) {
+    const double evidence = rows * std::log(candidates[i].sum2 / best.sum2);
+    if (evidence < clear) rivals.push_back({best.flaw, candidates[i].flaw, evidence});
+  }
+}
+
+}  // namespace
+
+ServoFit with_flaws(std::span<const ServoSample> log, const ServoFit& plain, std::vector<ServoRival>& rivals) {
+  constexpr std::size_t max_freed = 3;
+  constexpr double max_colour = 0.3;
+  ServoFit fit = plain;
+  while (fit.freed.size() < max_freed) {
+    const FlawGround ground = flaw_ground(log, fit);
+    const double sum2 = ground.misfit.squaredNorm();
+    std::vector<Candidate> candidates;
+    for (std::size_t flaw = 0; flaw < num_servo_flaws; ++flaw)
+      if (std::ranges::count(fit.freed, flaw) == 0) candidates.push_back(freed(log, fit, ground, flaw));
+    std::ranges::sort(candidates, {}, &Candidate::sum2);
+    const Candidate& best = candidates.front();
+    const Evidence single = evidence_for(log, sum2, 1.0, best);
+    const bool is_better = single.left > 0.0;
+    const double colour = colour_of(flawed_misfit(log, is_better ? best.fit : fit));
+    if (fit.kind == ServoKind::angle && !is_limited(fit) && fit.freed.size() + 2 <= max_freed &&
+        std::abs(colour) > max_colour) {
+      const Candidate pair = limited(log, fit);
+      if (evidence_for(log, is_better ? best.sum2 : sum2, is_better ? 1.0 : 2.0, pair).left > 0.0) {
+        fit = taken(fit, pair.fit, evidence_for(log, sum2, 2.0, pair).size);
+        continue;
+      }
+    }
+    if (!is_better) break;
+    note_rivals(log, candidates, rivals);
+    fit = taken(fit, best.fit, single.size);
+  }
+  return fit;
+}
+
+}  // namespace alidade
